@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <string>
+
+#include "base/wide.hpp"
 
 namespace tandem::sim {
 namespace {
@@ -25,8 +28,15 @@ double clamp_to(double value, double limit) {
   return limit > 0.0 ? std::clamp(value, -limit, limit) : value;
 }
 
-using View = Eigen::Map<const Eigen::ArrayXd>;
-using Out = Eigen::Map<Eigen::ArrayXd>;
+/// What flows with the bridge on.
+template <class Elastic>
+inline double order_2_current(const Elastic& m, std::size_t j, double voltage_V,
+                              double velocity_rad_s) {
+  const double i = (voltage_V - m.back_emf[j] * velocity_rad_s) / m.resistance[j];
+  const double limit = m.current_limit[j];
+  const double above = i > -limit ? i : -limit;
+  return above < limit ? above : limit;
+}
 
 }  // namespace
 
@@ -98,8 +108,9 @@ Actuators::Actuators(std::vector<ActuatorModel> models, double ambient_C)
     all_elastic_ &= model.order == 2;
   }
   const auto array = [&](auto value) {
-    Eigen::ArrayXd values(static_cast<Eigen::Index>(n));
-    std::ranges::transform(models_, values.begin(), value);
+    std::vector<double> values(n);
+    std::ranges::transform(models_, values.begin(),
+                           [&](const ActuatorModel& model) { return std::invoke(value, model); });
     return values;
   };
   using Model = ActuatorModel;
@@ -235,6 +246,7 @@ void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor
 
 void Actuators::step_semi_implicit(double h_s, MotorStateView rate,
                                    MotorState motor) const noexcept TANDEM_RT {
+  if (all_elastic()) return step_elastic(h_s, rate, motor);
   for (std::size_t j = 0; j < models_.size(); ++j) {
     const ActuatorModel& m = models_[j];
     if (m.current_is_state()) {
@@ -279,36 +291,60 @@ void Actuators::cool(double h_s) noexcept {
   }
 }
 
-void Actuators::evaluate_elastic(const double* q, const double* qd, MotorStateView motor,
-                                 double* torque_Nm, MotorState rate) const noexcept {
-  const auto n = static_cast<Eigen::Index>(models_.size());
-  const View position(motor.position_rad, n), velocity(motor.velocity_rad_s, n);
-  const View free(free_.data(), n);
-  const Elastic& m = elastic_;
-  Out current(rate.current_A, n), torque(torque_Nm, n), speed_up(rate.velocity_rad_s, n);
-  current =
-      View(bridge_.data(), n) * ((View(voltage_.data(), n) - m.back_emf * velocity) / m.resistance)
-                                    .max(-m.current_limit)
-                                    .min(m.current_limit);
-  torque = View(whole_.data(), n) *
-           (m.spring * (position - View(q, n)) + m.spring_damping * (velocity - View(qd, n)));
-  speed_up = free * ((m.torque_per_A * current - m.friction * velocity - torque) / m.inertia);
-  Out(rate.position_rad, n) = free * velocity;
-  current.setZero();  // it is no state: nothing of it changes by itself
+// The loops below have the bits of the loops over joints, without a branch.
+Actuators::Elastic<const double*> Actuators::pointers(const Elastic<std::vector<double>>& m) {
+  return {m.torque_per_A.data(),   m.back_emf.data(),      m.friction.data(),
+          m.resistance.data(),     m.inertia.data(),       m.spring.data(),
+          m.spring_damping.data(), m.current_limit.data(), m.heating.data()};
 }
 
-void Actuators::finish_elastic(MotorState motor) noexcept {
-  const auto n = static_cast<Eigen::Index>(models_.size());
-  const Elastic& m = elastic_;
-  Out velocity(motor.velocity_rad_s, n), current(motor.current_A, n);
-  Out temperature(temperature_.data(), n);
-  velocity *= View(free_.data(), n);
-  current =
-      View(bridge_.data(), n) * ((View(voltage_.data(), n) - m.back_emf * velocity) / m.resistance)
-                                    .max(-m.current_limit)
-                                    .min(m.current_limit);
-  const auto warm = ambient_C_ + m.heating * current * current;
-  temperature = warm + (temperature - warm) * View(cooling_.data(), n);
+TANDEM_WIDE void Actuators::evaluate_elastic(const double* q, const double* qd,
+                                             MotorStateView motor, double* torque_Nm,
+                                             MotorState rate) const noexcept {
+  const Elastic<const double*> m = pointers(elastic_);
+  const double *bridge = bridge_.data(), *free = free_.data(), *whole = whole_.data();
+  const double* voltage = voltage_.data();
+  const std::size_t n = size();
+#pragma GCC ivdep
+  for (std::size_t j = 0; j < n; ++j) {
+    const double velocity = motor.velocity_rad_s[j];
+    const double current = bridge[j] * order_2_current(m, j, voltage[j], velocity);
+    const double spring = whole[j] * (m.spring[j] * (motor.position_rad[j] - q[j]) +
+                                      m.spring_damping[j] * (velocity - qd[j]));
+    const double drive = m.torque_per_A[j] * current - m.friction[j] * velocity;
+    torque_Nm[j] = spring;
+    rate.position_rad[j] = free[j] * velocity;
+    rate.velocity_rad_s[j] = free[j] * ((drive - spring) / m.inertia[j]);
+    rate.current_A[j] = 0.0;  // it is no state: nothing of it changes by itself
+  }
+}
+
+TANDEM_WIDE void Actuators::step_elastic(double h_s, MotorStateView rate,
+                                         MotorState motor) const noexcept {
+  const double* free = free_.data();
+  const std::size_t n = size();
+#pragma GCC ivdep
+  for (std::size_t j = 0; j < n; ++j) {
+    motor.velocity_rad_s[j] += h_s * rate.velocity_rad_s[j];
+    motor.position_rad[j] += h_s * free[j] * motor.velocity_rad_s[j];
+  }
+}
+
+TANDEM_WIDE void Actuators::finish_elastic(MotorState motor) noexcept {
+  const Elastic<const double*> m = pointers(elastic_);
+  const double *bridge = bridge_.data(), *free = free_.data(), *voltage = voltage_.data();
+  const double *cooling = cooling_.data(), ambient_C = ambient_C_;
+  double* temperature = temperature_.data();
+  const std::size_t n = size();
+#pragma GCC ivdep
+  for (std::size_t j = 0; j < n; ++j) {
+    const double velocity = motor.velocity_rad_s[j] * free[j];
+    const double current = bridge[j] * order_2_current(m, j, voltage[j], velocity);
+    const double warm = ambient_C + m.heating[j] * current * current;
+    motor.velocity_rad_s[j] = velocity;
+    motor.current_A[j] = current;
+    temperature[j] = warm + (temperature[j] - warm) * cooling[j];
+  }
 }
 
 }  // namespace tandem::sim

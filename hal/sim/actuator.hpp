@@ -2,7 +2,6 @@
 // Layer: hal/sim.  Thread: create non-RT; evaluate and step RT.
 #pragma once
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -157,19 +156,22 @@ class Actuators {
 
   /// A robot's actuators are all of order 2 and without brakes as a rule: then all joints at once,
   /// with the bits of the loops over joints. One array for each constant of ActuatorModel.
+  template <class Array>
   struct Elastic {
-    Eigen::ArrayXd torque_per_A, back_emf, friction, resistance, inertia, spring, spring_damping;
-    Eigen::ArrayXd current_limit;  ///< infinite where there is none
-    Eigen::ArrayXd heating;        ///< thermal_resistance_K_W * resistance_ohm
+    Array torque_per_A, back_emf, friction, resistance, inertia, spring, spring_damping;
+    Array current_limit;  ///< infinite where there is none
+    Array heating;        ///< thermal_resistance_K_W * resistance_ohm
   };
+  [[nodiscard]] static Elastic<const double*> pointers(const Elastic<std::vector<double>>& m);
   [[nodiscard]] bool all_elastic() const noexcept { return all_elastic_ && !any_brake_; }
   void evaluate_elastic(const double* q, const double* qd, MotorStateView motor, double* torque_Nm,
                         MotorState rate) const noexcept;
+  void step_elastic(double h_s, MotorStateView rate, MotorState motor) const noexcept;
   void finish_elastic(MotorState motor) noexcept;
   void cool(double h_s) noexcept;
 
   std::vector<ActuatorModel> models_;
-  Elastic elastic_;
+  Elastic<std::vector<double>> elastic_;
   bool all_elastic_ = true;
   std::vector<double> voltage_, brake_rad_, brake_Nm_, temperature_;
   // 1 or 0, as factors: the bridge is on; the rotor is not held; the spring is whole.

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "base/wide.hpp"
 
 namespace tandem::sim {
 namespace {
@@ -15,7 +18,9 @@ constexpr double kStopDampedShare = 0.3;  // of least / h
 }  // namespace
 
 EndStops::EndStops(const tandem_kernels& kernels, std::span<const JointRange> ranges,
-                   std::span<const JointInertia> inertias, std::int64_t substep_ns) {
+                   std::span<const JointInertia> inertias, std::int64_t substep_ns)
+    : lower_(kernels.joints, -std::numeric_limits<double>::infinity()),
+      upper_(kernels.joints, std::numeric_limits<double>::infinity()) {
   const double h_s = static_cast<double>(substep_ns) * 1e-9;
   for (const JointRange& range : ranges) {
     const std::size_t joint = joint_of(kernels, range.joint);
@@ -27,13 +32,18 @@ EndStops::EndStops(const tandem_kernels& kernels, std::span<const JointRange> ra
     const double damping =
         std::min(std::sqrt(stiffness * inertia.most), kStopDampedShare * inertia.least / h_s);
     stops_.push_back({joint, range.lower_rad, range.upper_rad, stiffness, damping});
+    lower_[joint] = std::max(lower_[joint], range.lower_rad);
+    upper_[joint] = std::min(upper_[joint], range.upper_rad);
   }
 }
 
-bool EndStops::touched(const double* q) const noexcept TANDEM_RT {
-  bool any = false;
-  for (const Stop& stop : stops_) any |= q[stop.joint] < stop.lower || q[stop.joint] > stop.upper;
-  return any;
+TANDEM_WIDE bool EndStops::touched(const double* q) const noexcept TANDEM_RT {
+  std::int64_t any = 0;  // as wide as what is compared
+  for (std::size_t j = 0; j < lower_.size(); ++j) {
+    any |= q[j] < lower_[j] ? 1 : 0;
+    any |= q[j] > upper_[j] ? 1 : 0;
+  }
+  return any != 0;
 }
 
 void EndStops::add_torques(const double* q, const double* qd,

@@ -41,6 +41,7 @@ class EndStops {
     double lower, upper, stiffness, damping;
   };
   std::vector<Stop> stops_;
+  std::vector<double> lower_, upper_;  // of every joint; infinite without a stop
 };
 
 }  // namespace tandem::sim

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 
+#include "base/wide.hpp"
 #include "hal/sim/plant.hpp"
 #include "hal/sim/rotation.hpp"
 
@@ -169,10 +170,18 @@ void Plant::step_runge_kutta(double h_s) noexcept {
   if (base_q_ != 0) normalise_quaternion(x_.data() + 3);
 }
 
+/// Whether every |v[i]| is within `limit`: not with NaN.
+TANDEM_WIDE static bool all_within(double limit, const double* v, std::size_t n) noexcept {
+  std::int64_t beyond = 0;  // as wide as what is compared
+  for (std::size_t i = 0; i < n; ++i) beyond |= std::abs(v[i]) <= limit ? 0 : 1;
+  return beyond == 0;
+}
+
 bool Plant::plausible() noexcept {
   const double* v = x_.data() + kernels_->nq;
+  if (all_within(rate_limit_, v, kernels_->nv)) return true;
   for (std::size_t i = 0; i < kernels_->nv; ++i) {
-    if (std::abs(v[i]) <= rate_limit_) continue;  // false for NaN too
+    if (std::abs(v[i]) <= rate_limit_) continue;
     diverged_ = static_cast<std::int32_t>(i);
     diverged_rate_ = v[i];
     return false;

@@ -1,0 +1,11 @@
+// Loops over arrays in the widest vectors that the CPU has.
+// Layer: base.  Thread: any.
+#pragma once
+
+/// Before a function whose loops treat every element alike: g++ compiles it for AVX2 as well, and
+/// the CPU's is called. Elements are computed as without it, so results have the same bits.
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__OPTIMIZE__)
+#define TANDEM_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define TANDEM_WIDE
+#endif
