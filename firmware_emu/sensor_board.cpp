@@ -1,6 +1,7 @@
 // Channels sampled at each SYNC, with seeded noise and bias.
 #include "firmware_emu/sensor_board.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string_view>
 
@@ -42,6 +43,23 @@ std::vector<NoisySensor> make_board(const SensorSetup& setup, ObjectDictionary& 
   return make_sensors(setup);
 }
 
+bool disturbs_quaternion(const SensorSetup& setup) {
+  const auto any = [](const std::vector<double>& values) {
+    return !values.empty() &&
+           std::ranges::any_of(std::span(values).first<4>(), [](double x) { return x != 0.0; });
+  };
+  return setup.orients && (any(setup.noise) || any(setup.bias));
+}
+
+/// As an IMU shows it: noise turns a quaternion, and does not stretch it.
+void normalise(std::span<float, 4> quaternion) noexcept {
+  double square = 0.0;
+  for (const float x : quaternion) square += static_cast<double>(x) * x;
+  if (!(square > 0.0)) return;
+  const double length = std::sqrt(square);
+  for (float& x : quaternion) x = static_cast<float>(x / length);
+}
+
 }  // namespace
 
 Status check(const SensorSetup& setup) {
@@ -50,6 +68,9 @@ Status check(const SensorSetup& setup) {
   if (setup.channels < 1 || setup.channels > kMaxChannels) {
     return bad_sensor("channels",
                       "a sensor has 1 to " + std::to_string(kMaxChannels) + " channels");
+  }
+  if (setup.orients && setup.channels < 4) {
+    return bad_sensor("orients", "a quaternion has four channels");
   }
   for (const auto& [key, values] : {std::pair{"noise", &setup.noise}, {"bias", &setup.bias}}) {
     if (!values->empty() && values->size() != setup.channels) {
@@ -69,6 +90,7 @@ SensorBoard::SensorBoard(const SensorSetup& setup)
     : setup_(setup),
       od_(kNodeObjects + kSensorEntries + setup.channels),
       values_(setup.channels),
+      disturbed_quaternion_(disturbs_quaternion(setup)),
       sensors_(make_board(setup_, od_, values_)),
       node_({.id = setup_.node_id,
              .device_type = kSensorDeviceType,
@@ -94,6 +116,7 @@ void SensorBoard::step(std::int64_t dt_ns, std::span<const double> truth) noexce
     const auto value = static_cast<float>(sensors_[i].sample(truth[i]));
     if (std::isfinite(value)) values_[i] = value;
   }
+  if (disturbed_quaternion_) normalise(std::span(values_).first<4>());
   node_.transmit_synchronous(outbox_);
 }
 

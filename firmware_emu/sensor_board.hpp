@@ -58,6 +58,7 @@ class SensorBoard {
   SensorSetup setup_;
   canopen::ObjectDictionary od_;
   std::vector<float> values_;
+  bool disturbed_quaternion_;  ///< by noise or bias: made a unit one again
   std::vector<NoisySensor> sensors_;
   canopen::Node node_;
   std::vector<canopen::Frame> outbox_storage_;

@@ -106,6 +106,7 @@ struct SensorSetup {
   std::size_t max_pdo_bytes = 64;  ///< 8 on a bus without CAN FD
   std::vector<double> noise;       ///< standard deviation per channel, SI; empty: none
   std::vector<double> bias;        ///< per channel, SI; empty: none
+  bool orients = false;            ///< the first four channels are a quaternion
   std::uint64_t seed = 1;
 };
 

@@ -263,6 +263,7 @@ firmware::SensorSetup sensor_setup(const hal::RobotConfig& robot, std::size_t in
   sensor.max_pdo_bytes = pdo_bytes(robot, config.bus);
   sensor.noise = config.noise;
   sensor.bias = config.bias;
+  sensor.orients = config.type == hal::SensorType::kImu;
   sensor.seed = seed_of(seed, 2, index);
   return sensor;
 }

@@ -115,6 +115,21 @@ TEST(SensorBoard, AddsSeededNoiseAndBiasPerChannel) {
   EXPECT_LT(equal, 10);
 }
 
+TEST(SensorBoard, NoiseTurnsAQuaternionAndDoesNotStretchIt) {
+  SensorSetup sensor = setup();
+  sensor.orients = true;
+  sensor.noise.assign(6, 0.05);
+  Node node(sensor);
+  double squares = 0.0;
+  for (int k = 0; k < 2000; ++k) {
+    node.cycle({0.0, 0.0, 0.6, 0.8, 5.0});
+    const auto q = node.board.channels();
+    ASSERT_NEAR(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1.0, 1e-6);
+    squares += q[0] * q[0];
+  }
+  EXPECT_NEAR(std::sqrt(squares / 2000), 0.05, 0.005);
+}
+
 TEST(SensorBoard, GoesOnFromASnapshotWithTheSameNoise) {
   SensorSetup sensor = setup();
   sensor.noise.assign(6, 0.2);
