@@ -70,11 +70,16 @@ void read_times(TomlTable& table, const Context& context, Fault& fault) {
 
 /// A board or a sensor: one of them has to be named.
 void read_node(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
-  if (table.has("sensor") && !table.has("board")) {
+  const bool board = table.has("board");
+  if (board && table.has("sensor")) {
+    (void)table.text("sensor");
+    table.error("sensor", "a fault is of one node, and `board` names another",
+                "leave one of both out, or write a second [[fault]]");
+  } else if (table.has("sensor")) {
     fault.sensor = index_of(table, "sensor", robot.sensors);
-  } else {
-    fault.board = index_of(table, "board", robot.boards);
+    return;
   }
+  fault.board = index_of(table, "board", robot.boards);
 }
 
 /// Which way, how often: of frames on any wire.

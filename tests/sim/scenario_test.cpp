@@ -109,6 +109,9 @@ TEST(Scenario, SaysWhatIsWrongAndWhere) {
             std::string::npos);
   EXPECT_NE(errors_of("[[fault]]\nkind = \"spring_break\"\njoint = \"swing\"\n", 0).find("rigid"),
             std::string::npos);
+  EXPECT_NE(errors_of("[[fault]]\nkind = 'board_kill'\nboard = 'board'\nsensor = 'tip'\n")
+                .find("a fault is of one node"),
+            std::string::npos);
   EXPECT_NE(errors_of("").find("there is no fault"), std::string::npos);
   const std::string robot = errors_of("name = \"arm\"\n[model]\nurdf = \"arm.urdf\"\n");
   EXPECT_NE(robot.find("there is no fault"), std::string::npos);
