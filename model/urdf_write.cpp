@@ -1,13 +1,15 @@
+// Edits the text itself, between the bytes where elements begin and end, so that what is not
+// replaced keeps its layout.
 #include "model/urdf_write.hpp"
 
 #include <tinyxml2.h>
 
+#include <algorithm>
 #include <charconv>
+#include <optional>
 
 namespace tandem::model {
 namespace {
-
-using tinyxml2::XMLElement;
 
 /// The shortest decimal number that is read back as the same double.
 std::string shortest_text(double value) {
@@ -16,28 +18,154 @@ std::string shortest_text(double value) {
   return {text, end};
 }
 
-XMLElement* fresh(XMLElement* parent, const char* name) {
-  if (XMLElement* old = parent->FirstChildElement(name)) parent->DeleteChild(old);
-  return parent->InsertNewChildElement(name);
+/// An element's bytes: [begin, end) with its tags, [inside, inside_end) between them. One that
+/// closes itself (<a/>) has inside = inside_end = end.
+struct Element {
+  std::string name;
+  std::size_t begin = 0, inside = 0, inside_end = 0, end = 0;
+  std::size_t depth = 0;  // of the root: 0
+};
+
+/// Behind the comment, CDATA section, declaration or processing instruction that begins at `at`;
+/// nothing if it is a tag.
+std::optional<std::size_t> behind_no_tag(std::string_view text, std::size_t at) {
+  const std::pair<std::string_view, std::string_view> kinds[] = {
+      {"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}, {"<!", ">"}};
+  for (const auto& [begins, ends] : kinds)
+    if (text.substr(at).starts_with(begins)) {
+      const std::size_t end = text.find(ends, at + begins.size());
+      return end == std::string_view::npos ? text.size() : end + ends.size();
+    }
+  return {};
 }
 
-void write_inertial(XMLElement* link, const Inertia& inertia) {
-  XMLElement* inertial = link->FirstChildElement("inertial");
-  if (inertial == nullptr) inertial = link->InsertNewChildElement("inertial");
+/// Behind the `>` of the tag that begins at `at`, which may have others in quotes.
+std::size_t behind_tag(std::string_view text, std::size_t at) {
+  char quote = '\0';
+  for (; at < text.size(); ++at) {
+    const char c = text[at];
+    if (quote != '\0') {
+      quote = c == quote ? '\0' : quote;
+    } else if (c == '"' || c == '\'') {
+      quote = c;
+    } else if (c == '>') {
+      return at + 1;
+    }
+  }
+  return at;
+}
+
+/// Every element, in the order in which they begin. @pre `text` is well-formed
+std::vector<Element> elements_of(std::string_view text) {
+  std::vector<Element> all;
+  std::vector<std::size_t> open;  // of all
+  for (std::size_t at = text.find('<'); at != std::string_view::npos; at = text.find('<', at)) {
+    if (const auto behind = behind_no_tag(text, at)) {
+      at = *behind;
+      continue;
+    }
+    const std::size_t end = behind_tag(text, at);
+    if (text.substr(at).starts_with("</")) {
+      if (open.empty()) break;
+      all[open.back()].inside_end = at;
+      all[open.back()].end = end;
+      open.pop_back();
+    } else {
+      const std::size_t name_end = text.find_first_of(" \t\r\n/>", at);
+      all.push_back(
+          {std::string(text.substr(at + 1, name_end - at - 1)), at, end, end, end, open.size()});
+      if (text[end - 2] != '/') open.push_back(all.size() - 1);
+    }
+    at = end;
+  }
+  return all;
+}
+
+/// The elements of this name directly within `parent`.
+std::vector<Element> children(const std::vector<Element>& all, const Element& parent,
+                              std::string_view name) {
+  std::vector<Element> found;
+  std::ranges::copy_if(all, std::back_inserter(found), [&](const Element& e) {
+    return e.depth == parent.depth + 1 && e.begin >= parent.inside && e.end <= parent.inside_end &&
+           e.name == name;
+  });
+  return found;
+}
+
+/// The value of the tag's attribute `name`, its entities resolved.
+std::string name_attribute(std::string_view text, const Element& element) {
+  std::string tag(text.substr(element.begin, element.inside - element.begin));
+  if (!tag.ends_with("/>")) tag.insert(tag.size() - 1, "/");
+  tinyxml2::XMLDocument alone;
+  if (alone.Parse(tag.c_str()) != tinyxml2::XML_SUCCESS) return {};
+  const char* value = alone.RootElement()->Attribute("name");
+  return value == nullptr ? "" : value;
+}
+
+/// The blanks before an element that has its line for itself.
+std::string indentation(std::string_view text, std::size_t begin) {
+  std::size_t line = begin;
+  while (line > 0 && (text[line - 1] == ' ' || text[line - 1] == '\t')) --line;
+  return line == 0 || text[line - 1] == '\n' ? std::string(text.substr(line, begin - line)) : "";
+}
+
+struct Edit {
+  std::size_t begin, end;
+  std::string text;
+};
+
+using Part = std::pair<std::string, std::string>;  // an inertial's: name, whole element
+
+std::vector<Part> parts_of(const Inertia& inertia) {
   const Eigen::Vector3d& c = inertia.com_m;
-  XMLElement* origin = fresh(inertial, "origin");
-  origin->SetAttribute(
-      "xyz",
-      (shortest_text(c.x()) + " " + shortest_text(c.y()) + " " + shortest_text(c.z())).c_str());
-  origin->SetAttribute("rpy", "0 0 0");
-  fresh(inertial, "mass")->SetAttribute("value", shortest_text(inertia.mass_kg).c_str());
-  XMLElement* moments = fresh(inertial, "inertia");
   const Eigen::Matrix3d& I = inertia.about_com_kg_m2;
+  std::string moments = "<inertia";
   const std::pair<const char*, double> entries[] = {{"ixx", I(0, 0)}, {"ixy", I(0, 1)},
                                                     {"ixz", I(0, 2)}, {"iyy", I(1, 1)},
                                                     {"iyz", I(1, 2)}, {"izz", I(2, 2)}};
   for (const auto& [name, value] : entries)
-    moments->SetAttribute(name, shortest_text(value).c_str());
+    moments += std::string(" ") + name + "=\"" + shortest_text(value) + "\"";
+  return {{"origin", "<origin xyz=\"" + shortest_text(c.x()) + " " + shortest_text(c.y()) + " " +
+                         shortest_text(c.z()) + "\" rpy=\"0 0 0\"/>"},
+          {"mass", "<mass value=\"" + shortest_text(inertia.mass_kg) + "\"/>"},
+          {"inertia", moments + "/>"}};
+}
+
+/// Parts that are there are replaced where they stand; others come first.
+void edit_inertial(std::string_view text, const std::vector<Element>& all, const Element& inertial,
+                   const Inertia& inertia, std::vector<Edit>& edits) {
+  const std::string outer = indentation(text, inertial.begin);
+  std::string more;
+  for (const auto& [name, element] : parts_of(inertia)) {
+    const std::vector<Element> found = children(all, inertial, name);
+    if (!found.empty()) {
+      edits.push_back({found[0].begin, found[0].end, element});
+    } else {
+      more += "\n" + outer + "  " + element;
+    }
+  }
+  if (inertial.inside == inertial.end) {  // <inertial/>
+    edits.push_back(
+        {inertial.begin, inertial.end, "<inertial>" + more + "\n" + outer + "</inertial>"});
+  } else if (!more.empty()) {
+    edits.push_back({inertial.inside, inertial.inside, more});
+  }
+}
+
+/// A link without an inertial gets one, as the first thing in it.
+void add_inertial(std::string_view text, const Element& link, const Inertia& inertia,
+                  std::vector<Edit>& edits) {
+  const std::string outer = indentation(text, link.begin);
+  std::string inertial = "\n" + outer + "  <inertial>";
+  for (const auto& [name, element] : parts_of(inertia)) inertial += "\n" + outer + "    " + element;
+  inertial += "\n" + outer + "  </inertial>";
+  if (link.inside != link.end) {
+    edits.push_back({link.inside, link.inside, inertial});
+    return;
+  }
+  std::string tag(text.substr(link.begin, link.end - link.begin));
+  tag.erase(tag.rfind('/'), 1);
+  edits.push_back({link.begin, link.end, tag + inertial + "\n" + outer + "</link>"});
 }
 
 }  // namespace
@@ -49,17 +177,29 @@ Result<std::string> with_inertias(std::string_view text,
       document.RootElement() == nullptr) {
     return fail("the description is no XML", "name a URDF");
   }
+  const std::vector<Element> all = elements_of(text);
+  const std::vector<Element> links = children(all, all.front(), "link");
+  std::vector<Edit> edits;
   for (const auto& [name, inertia] : inertias) {
-    XMLElement* link = document.RootElement()->FirstChildElement("link");
-    while (link != nullptr &&
-           (link->Attribute("name") == nullptr || link->Attribute("name") != name))
-      link = link->NextSiblingElement("link");
-    if (link == nullptr) return fail("the description has no link '" + name + "'");
-    write_inertial(link, inertia);
+    const auto link = std::ranges::find_if(
+        links, [&](const Element& e) { return name_attribute(text, e) == name; });
+    if (link == links.end()) return fail("the description has no link '" + name + "'");
+    const std::vector<Element> inertials = children(all, *link, "inertial");
+    if (inertials.empty()) {
+      add_inertial(text, *link, inertia, edits);
+    } else {
+      edit_inertial(text, all, inertials[0], inertia, edits);
+    }
   }
-  tinyxml2::XMLPrinter printer;
-  document.Print(&printer);
-  return std::string(printer.CStr());
+  std::ranges::stable_sort(edits, {}, &Edit::begin);
+  std::string result;
+  std::size_t at = 0;
+  for (const Edit& edit : edits) {
+    result += text.substr(at, edit.begin - at);
+    result += edit.text;
+    at = edit.end;
+  }
+  return result.append(text.substr(at));
 }
 
 }  // namespace tandem::model

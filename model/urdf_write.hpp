@@ -12,7 +12,7 @@
 
 namespace tandem::model {
 
-/// `text` with the <inertial> of these links replaced, or added; all else stays, comments included.
+/// `text` with the <inertial> of these links replaced, or added; all else stays, to the byte.
 ///
 /// @param inertias  link and its inertia, in the link's frame, along its axes
 /// Errors: no XML; a link that is not there.

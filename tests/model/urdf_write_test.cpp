@@ -1,0 +1,69 @@
+#include "model/urdf_write.hpp"
+
+#include <gtest/gtest.h>
+
+namespace tandem::model {
+namespace {
+
+Inertia inertia() {
+  Inertia result;
+  result.mass_kg = 1.5;
+  result.com_m = {0.1, 0.0, -0.25};
+  result.about_com_kg_m2 = Eigen::Vector3d(1.0, 2.0, 3.0).asDiagonal();
+  return result;
+}
+
+constexpr const char* kParts[] = {
+    R"(<origin xyz="0.1 0 -0.25" rpy="0 0 0"/>)", R"(<mass value="1.5"/>)",
+    R"(<inertia ixx="1" ixy="0" ixz="0" iyy="2" iyz="0" izz="3"/>)"};
+
+TEST(UrdfWrite, KeepsEveryByteThatIsNotAnInertials) {
+  const std::string before = R"(<?xml version="1.0"?>
+<!-- <link name="arm"><inertial/></link> a > b -->
+<robot name='r'>
+   <link name = "base" />
+	<link
+	   name="arm">  <!-- mine -->
+	<visual><geometry><box size="1 1 1"></box></geometry></visual>
+	  <inertial> <!-- by CAD -->
+	    )",
+                    after = R"(
+	  </inertial>
+	</link>
+   <joint name="j" type="fixed"><parent link="base"/><child link="arm"/></joint>
+</robot>
+)";
+  const std::string old = R"(<inertia ixx="9" ixy="0" ixz="0" iyy="9" iyz="0" izz="9"></inertia><mass
+	      value='2'/>   <origin rpy="1 2 3"/>)";
+  const auto written = with_inertias(before + old + after, {{"arm", inertia()}});
+  ASSERT_TRUE(written) << written.error().to_string();
+  EXPECT_EQ(*written, before + kParts[2] + kParts[1] + "   " + kParts[0] + after);
+}
+
+TEST(UrdfWrite, AddsWhatIsMissing) {
+  const std::string inner = std::string("\n    <inertial>\n      ") + kParts[0] + "\n      " +
+                            kParts[1] + "\n      " + kParts[2] + "\n    </inertial>";
+  const auto written = [](const std::string& link) {
+    const auto text =
+        with_inertias("<robot>\n  " + link + "\n</robot>", {{"a<b", inertia()}});
+    return text ? *text : text.error().to_string();
+  };
+  const auto robot = [](const std::string& link) { return "<robot>\n  " + link + "\n</robot>"; };
+  EXPECT_EQ(written("<link name='a&lt;b'/>"), robot("<link name='a&lt;b'>" + inner + "\n  </link>"));
+  EXPECT_EQ(written("<link name='a&lt;b'>\n  </link>"),
+            robot("<link name='a&lt;b'>" + inner + "\n  </link>"));
+  EXPECT_EQ(written("<link name='a&lt;b'>\n    <inertial/>\n  </link>"),
+            robot("<link name='a&lt;b'>" + inner + "\n  </link>"));
+  EXPECT_EQ(written("<link name='a&lt;b'>\n    <inertial>\n    </inertial>\n  </link>"),
+            robot("<link name='a&lt;b'>" + inner + "\n  </link>"));
+}
+
+TEST(UrdfWrite, NamesALinkThatIsNotThere) {
+  const auto written = with_inertias("<robot><link name='a'/></robot>", {{"b", inertia()}});
+  ASSERT_FALSE(written);
+  EXPECT_NE(written.error().to_string().find("'b'"), std::string::npos);
+  EXPECT_FALSE(with_inertias("<robot><link></robot>", {}));
+}
+
+}  // namespace
+}  // namespace tandem::model
