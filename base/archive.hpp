@@ -13,7 +13,8 @@ namespace tandem {
 /// Collects or hands out plain data in one fixed order. A component has one function
 /// `void archive(Archive& ar) { ar(position_, velocity_, ring_); }` that serves both ways.
 ///
-/// Plain data is copied byte by byte, so a type with padding must be zero-initialised.
+/// Plain data is copied byte by byte. What lies between the members of a struct is no state: g++
+/// writes zeros for it, so that the same state has the same bytes.
 /// A snapshot is read only by the process's own configuration: sizes must match, and
 /// `ok()` turns false (never throws) where they do not.
 class Archive {
@@ -73,6 +74,15 @@ class Archive {
       value.archive(*this);
     } else {
       static_assert(std::is_trivially_copyable_v<T>, "give the type an archive(Archive&) member");
+#if __has_builtin(__builtin_clear_padding)
+      if constexpr (std::is_class_v<T> && !std::has_unique_object_representations_v<T>) {
+        if (!reading_) {
+          T copy = value;
+          __builtin_clear_padding(&copy);
+          return raw(&copy, sizeof copy);
+        }
+      }
+#endif
       raw(&value, sizeof value);
     }
   }

@@ -33,6 +33,7 @@ struct SdoStep {
   bool kept = true;       ///< a write that a drive keeps: not a demand, as the mode is
   std::uint8_t size = 0;
   std::array<std::uint8_t, 4> bytes{};
+  std::uint8_t reserved = 0;  ///< no padding in a snapshot
 
   [[nodiscard]] std::span<const std::uint8_t> value() const noexcept {
     return {bytes.data(), size};

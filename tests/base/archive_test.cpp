@@ -53,6 +53,31 @@ TEST(Archive, ThatIsBoundedTakesWhatFitsAndNoMore) {
   EXPECT_TRUE(bounded.ok());
 }
 
+TEST(Archive, WritesNothingOfWhatLiesBetweenMembers) {
+#if __has_builtin(__builtin_clear_padding)
+  struct Padded {
+    char first;
+    double second;
+    char third;
+  };
+  std::vector<std::byte> written[2];
+  for (const int fill : {0x00, 0xAA}) {
+    alignas(Padded) std::byte memory[sizeof(Padded)];
+    std::memset(memory, fill, sizeof memory);
+    auto* padded = new (memory) Padded;
+    padded->first = 'a';
+    padded->second = 2.0;
+    padded->third = 'c';
+    Archive out;
+    out(*padded);
+    written[fill == 0 ? 0 : 1].assign(out.bytes().begin(), out.bytes().end());
+  }
+  EXPECT_EQ(written[0], written[1]);
+#else
+  GTEST_SKIP() << "this compiler cannot clear padding";
+#endif
+}
+
 TEST(Archive, RefusesToReadPastTheEnd) {
   Archive in(std::span<const std::byte>{});
   int value = 5;
