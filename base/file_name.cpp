@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "base/utf8.hpp"
+
 namespace tandem {
 namespace {
 
@@ -36,6 +38,17 @@ std::string topic_name_problem(std::string_view name) {
   if (std::string problem = length_problem(name); !problem.empty()) return problem;
   if (!std::ranges::all_of(name, is_word)) return "has other characters than letters, digits and _";
   return is_digit(name.front()) ? "begins with a digit" : "";
+}
+
+std::string shown_name_problem(std::string_view name) {
+  if (std::string problem = length_problem(name); !problem.empty()) return problem;
+  if (!is_utf8(name)) return "is not UTF-8";
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const auto c = static_cast<unsigned char>(name[i]);
+    const bool c1 = c == 0xC2 && static_cast<unsigned char>(name[i + 1]) < 0xA0;  // U+0080 to 9F
+    if (c < 0x20 || c == 0x7F || c1) return "has control characters";
+  }
+  return {};
 }
 
 std::string interface_name_problem(std::string_view name) {

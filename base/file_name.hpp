@@ -1,5 +1,5 @@
-// Which names may become part of a file's name, of a topic's, or name a network interface.
-// Layer: base.  Thread: non-RT only.
+// Which names may become part of a file's name, of a topic's, name a network interface, or be
+// shown. Layer: base.  Thread: non-RT only.
 #pragma once
 
 #include <string>
@@ -18,6 +18,10 @@ inline constexpr std::size_t kLongestFileName = 64;
 /// Why `name` cannot be part of a ROS 2 topic's name, or empty when it can: letters, digits and `_`
 /// of ASCII, no digit at the front, 1 to kLongestFileName characters.
 [[nodiscard]] std::string topic_name_problem(std::string_view name);
+
+/// Why `name` cannot be shown to people, or empty when it can: 1 to kLongestFileName bytes of UTF-8
+/// without control characters, which a terminal obeys.
+[[nodiscard]] std::string shown_name_problem(std::string_view name);
 
 /// Why no network interface of Linux can have the name, or empty when one can: 1 to 15 characters,
 /// none of them a blank, `/` or `:`, and neither `.` nor `..`.

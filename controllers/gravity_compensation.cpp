@@ -74,9 +74,7 @@ class GravityCompensation : public Controller {
       command.velocity_rad_s()[j] = 0.0;
       command.stiffness_Nm_rad()[j] = joint.stiffness_Nm_rad;
       command.damping_Nms_rad()[j] = joint.damping_Nms_rad;
-      // From the torque that was measured (torque control), or from none (the spring holds).
-      const double from = compliant_ ? 0.0 : joint.torque_Nm;
-      command.torque_Nm()[j] = from + (weight - from) * share;
+      command.torque_Nm()[j] = joint.torque_Nm + (weight - joint.torque_Nm) * share;
     }
     return Code::kOk;
   }

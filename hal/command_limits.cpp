@@ -18,6 +18,10 @@ bool is(ControlMode mode, std::int64_t value) noexcept {
   return value == static_cast<std::int64_t>(mode);
 }
 
+double acceleration_of(const JointCapabilities& limit) noexcept TANDEM_RT {
+  return std::min(limit.max_acceleration_rad_s2, limit.max_velocity_rad_s / kFullScale_s);
+}
+
 /// A value on its way to a wish, which nobody has written since it was sent: to that wish.
 void go_on(double& value, double sent, double wish) noexcept TANDEM_RT {
   if (sent != wish && value == sent) value = wish;
@@ -135,6 +139,21 @@ void CommandLimits::position(std::size_t joint, const StateImage& state,
   last.position_rad = reference;
 }
 
+/// A velocity may be so large that the joint stops at the end of its range with half of the
+/// acceleration that it may have; the other half is for what it lags behind.
+void CommandLimits::brake_before_ends(std::size_t joint, double position_rad,
+                                      double& reference) noexcept TANDEM_RT {
+  const JointCapabilities& limit = limits_[joint];
+  const auto fastest = [&](double way) { return std::sqrt(acceleration_of(limit) * way); };
+  const double up = limit.max_position_rad - position_rad;
+  const double down = position_rad - limit.min_position_rad;
+  double slower = reference;
+  if (up >= 0.0) slower = std::min(slower, fastest(up));
+  if (down >= 0.0) slower = std::max(slower, -fastest(down));
+  if (slower != reference) ++counters_[joint].too_fast;
+  reference = slower;
+}
+
 void CommandLimits::velocity(std::size_t joint, const Last& was, const StateImage& state,
                              CommandImage& command) noexcept TANDEM_RT {
   Last& last = last_[joint];
@@ -155,13 +174,13 @@ void CommandLimits::velocity(std::size_t joint, const Last& was, const StateImag
   bounded(joint, reference, last.velocity_rad_s, min, max);
   last.velocity_wish_rad_s = reference;
   if (!follows || !in_operation(state, joint)) return;
+  brake_before_ends(joint, state.position_rad()[joint], reference);
+  last.velocity_rad_s = reference;
   const bool closed = is(ControlMode::kVelocity, was.mode) && was.operates != 0;
   const double measured = state.velocity_rad_s()[joint];
   const double from = closed || !std::isfinite(measured) ? was.velocity_rad_s : measured;
   if (!std::isfinite(limit.max_jerk_rad_s3)) {
-    const double acceleration =
-        std::min(limit.max_acceleration_rad_s2, limit.max_velocity_rad_s / kFullScale_s);
-    rated(joint, reference, last.velocity_rad_s, from, acceleration * period_s_);
+    rated(joint, reference, last.velocity_rad_s, from, acceleration_of(limit) * period_s_);
   } else {
     if (!closed) velocity_[joint].begin(from);
     const double limited = velocity_[joint].step(reference,
@@ -187,8 +206,13 @@ void CommandLimits::torque(std::size_t joint, const Last& was, const StateImage&
   bounded(joint, reference, last.torque_Nm, -most, most);
   last.torque_wish_Nm = reference;
   if (!in_operation(state, joint)) return;
-  const bool closed = is(ControlMode::kTorque, was.mode) && was.operates != 0;
-  const bool starts = is(ControlMode::kTorque, last.mode) && !closed;
+  const auto by_torque = [](const Last& sent) {  // not a torque beside a stiff loop's
+    const bool moves =
+        is(ControlMode::kPosition, sent.mode) || is(ControlMode::kVelocity, sent.mode);
+    const bool yields = sent.interaction == static_cast<std::int64_t>(InteractionMode::kCompliant);
+    return is(ControlMode::kTorque, sent.mode) || (moves && yields);
+  };
+  const bool starts = by_torque(last) && !(by_torque(was) && was.operates != 0);
   const double measured = state.torque_Nm()[joint];
   rated(joint, reference, last.torque_Nm,
         starts && std::isfinite(measured) ? measured : was.torque_Nm,

@@ -91,6 +91,8 @@ class CommandLimits {
                 CommandImage& command) noexcept TANDEM_RT;
   void velocity(std::size_t joint, const Last& was, const StateImage& state,
                 CommandImage& command) noexcept TANDEM_RT;
+  void brake_before_ends(std::size_t joint, double position_rad,
+                         double& reference) noexcept TANDEM_RT;
   void torque(std::size_t joint, const Last& was, const StateImage& state,
               CommandImage& command) noexcept TANDEM_RT;
   void impedance(std::size_t joint, const Last& was, const StateImage& state,

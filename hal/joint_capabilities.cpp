@@ -35,7 +35,9 @@ const char* to_string(Capability capability) noexcept {
 bool JointCapabilities::can(ControlMode mode,
                             InteractionMode interaction) const noexcept TANDEM_RT {
   if (mode == ControlMode::kIdle) return true;
-  if (!can(needed(mode))) return false;
+  const bool known = mode >= ControlMode::kIdle && mode <= ControlMode::kCurrent &&
+                     interaction <= InteractionMode::kCompliant;
+  if (!known || !can(needed(mode))) return false;
   return interaction == InteractionMode::kStiff || can(Capability::kCompliant);
 }
 

@@ -5,6 +5,17 @@
 namespace tandem {
 namespace {
 
+TEST(ShownName, HasNothingThatATerminalObeys) {
+  for (const char* name : {"hold", "of joint 1", "a,b", "Knie links \u00e4", "\u4e2d"})
+    EXPECT_EQ(shown_name_problem(name), "") << name;
+  EXPECT_EQ(shown_name_problem("a\033[2J"), "has control characters");
+  EXPECT_EQ(shown_name_problem("a\nb"), "has control characters");
+  EXPECT_EQ(shown_name_problem("a\u009b2J"), "has control characters");
+  EXPECT_EQ(shown_name_problem("a\xc2"), "is not UTF-8");
+  EXPECT_EQ(shown_name_problem(""), "is empty");
+  EXPECT_EQ(shown_name_problem(std::string(65, 'a')), "is longer than 64 characters");
+}
+
 TEST(FileName, LettersDigitsAndThreeSignsAreAllowed) {
   for (const char* name : {"coman", "Walk-Man_2.0", "7", "_x", "a..b"}) {
     EXPECT_EQ(file_name_problem(name), "") << name;

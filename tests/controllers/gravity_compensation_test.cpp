@@ -59,9 +59,10 @@ TEST(GravityCompensation, YieldsAboutTheStartPostureWhenCompliant) {
   ASSERT_EQ(run.problem(), "");
   EXPECT_EQ(run.setup.claims()[0].interaction, hal::InteractionMode::kCompliant);
   run.state.position_rad()[0] = 0.3;
+  run.state.torque_Nm()[0] = 3.0;
   run.start();
   ASSERT_EQ(run.step(), Code::kOk);
-  EXPECT_EQ(run.command.torque_Nm()[0], 0.0);
+  EXPECT_EQ(run.command.torque_Nm()[0], 3.0) << "what carries it now";
   run.state.position_rad()[0] = 0.4;  // pushed by hand
   ASSERT_EQ(run.step(), Code::kOk);
   EXPECT_EQ(run.command.position_rad()[0], 0.3);

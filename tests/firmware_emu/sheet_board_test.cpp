@@ -136,7 +136,7 @@ TEST(SheetBoard, AnswersWithTheSheetsRightsLimitsAndValues) {
 TEST(SheetBoard, KnowsItsProfileAndItsModesWhereTheSheetHasNoValue) {
   for (const bool zero : {false, true}) {
     DataSheet sheet = sheet_of("servo.eds");
-    for (const std::uint16_t index : {0x1000, 0x6502}) {
+    for (const std::uint16_t index : {std::uint16_t{0x1000}, std::uint16_t{0x6502}}) {
       const auto entry = std::ranges::find(sheet.entries, index, &SheetEntry::index);
       entry->value.reset();
       if (zero) entry->value = canopen::SheetValue{.number = 0};

@@ -280,6 +280,27 @@ TEST_F(Limits, StartFromWhatIsMeasuredWhenADriveIsEnabledAgain) {
   EXPECT_DOUBLE_EQ(command.torque_Nm()[0], 2.0);
 }
 
+/// The drive carries the measured torque over, and what comes on top of it would add to that.
+TEST_F(Limits, LetACompliantJointBeginWithTheTorqueThatIsMeasured) {
+  state.torque_Nm()[0] = 15.0;
+  for (const ControlMode moves : {ControlMode::kPosition, ControlMode::kVelocity}) {
+    mode(moves);
+    command.interaction()[0] = static_cast<std::uint8_t>(InteractionMode::kStiff);
+    command.torque_Nm()[0] = 0.0;
+    for (int i = 0; i < 20; ++i) EXPECT_EQ(limits.apply(state, command), Code::kOk);
+    command.torque_Nm()[0] = 15.0;
+    EXPECT_EQ(limits.apply(state, command), Code::kOk);
+    EXPECT_DOUBLE_EQ(command.torque_Nm()[0], 2.0) << "beside a stiff loop's it is a step";
+    command.interaction()[0] = static_cast<std::uint8_t>(InteractionMode::kCompliant);
+    command.torque_Nm()[0] = 15.0;
+    EXPECT_EQ(limits.apply(state, command), Code::kOk);
+    EXPECT_EQ(command.torque_Nm()[0], 15.0);
+    command.torque_Nm()[0] = 20.0;
+    EXPECT_EQ(limits.apply(state, command), Code::kOk);
+    EXPECT_DOUBLE_EQ(command.torque_Nm()[0], 17.0) << "from then on it keeps its rate";
+  }
+}
+
 TEST_F(Limits, ChangeAnImpedanceInForceGradually) {
   const double stiffest = limits.limits()[0].max_stiffness_Nm_rad;
   const double most = limits.limits()[0].max_damping_Nms_rad;
@@ -311,6 +332,22 @@ class DeclaredLimits : public Limits {
     limits = CommandLimits(robot_of(declared()), 1'000'000);
     ASSERT_EQ(limits.apply(state, command), Code::kOk);
   }
+  /// A joint that does what it is told, from 0.1 rad at `wanted` [rad/s].
+  /// @return the farthest place, and the largest deceleration
+  std::pair<double, double> run_to_the_end(double wanted) {
+    mode(ControlMode::kVelocity);
+    double hardest = 0.0, before = 0.0;
+    for (int i = 0; i < 3000; ++i) {
+      command.velocity_rad_s()[0] = wanted;
+      (void)limits.apply(state, command);  // out of range, once it is there
+      const double now = command.velocity_rad_s()[0];
+      hardest = std::max(hardest, (std::abs(before) - std::abs(now)) / 1e-3);
+      before = now;
+      state.velocity_rad_s()[0] = now;
+      state.position_rad()[0] += 1e-3 * now;
+    }
+    return {state.position_rad()[0], hardest};
+  }
   /// The largest first, second and third difference of `field` on its way to `wanted`.
   std::array<double, 3> way(std::span<double> field, double wanted, int cycles) {
     std::array<double, 3> most{}, last{}, rate{};
@@ -329,6 +366,16 @@ class DeclaredLimits : public Limits {
     return most;
   }
 };
+
+TEST_F(DeclaredLimits, BrakeAVelocityBeforeTheEndOfTheRange) {
+  for (const double wanted : {2.0, -2.0}) {
+    state.position_rad()[0] = 0.0;
+    const auto [place, hardest] = run_to_the_end(wanted);
+    EXPECT_NEAR(place, std::copysign(1.5, wanted), 2e-3);
+    EXPECT_LT(hardest, 20.0 * 1.1) << "the last step is to 0";
+  }
+  EXPECT_GT(limits.counters()[0].too_fast, 0U);
+}
 
 TEST_F(DeclaredLimits, HoldForAPosition) {
   const auto [velocity, acceleration, jerk] = way(command.position_rad(), 1.4, 2000);

@@ -13,9 +13,9 @@ Inertia inertia() {
   return result;
 }
 
-constexpr const char* kParts[] = {
-    R"(<origin xyz="0.1 0 -0.25" rpy="0 0 0"/>)", R"(<mass value="1.5"/>)",
-    R"(<inertia ixx="1" ixy="0" ixz="0" iyy="2" iyz="0" izz="3"/>)"};
+constexpr const char* kParts[] = {R"(<origin xyz="0.1 0 -0.25" rpy="0 0 0"/>)",
+                                  R"(<mass value="1.5"/>)",
+                                  R"(<inertia ixx="1" ixy="0" ixz="0" iyy="2" iyz="0" izz="3"/>)"};
 
 TEST(UrdfWrite, KeepsEveryByteThatIsNotAnInertials) {
   const std::string before = R"(<?xml version="1.0"?>
@@ -33,7 +33,8 @@ TEST(UrdfWrite, KeepsEveryByteThatIsNotAnInertials) {
    <joint name="j" type="fixed"><parent link="base"/><child link="arm"/></joint>
 </robot>
 )";
-  const std::string old = R"(<inertia ixx="9" ixy="0" ixz="0" iyy="9" iyz="0" izz="9"></inertia><mass
+  const std::string old =
+      R"(<inertia ixx="9" ixy="0" ixz="0" iyy="9" iyz="0" izz="9"></inertia><mass
 	      value='2'/>   <origin rpy="1 2 3"/>)";
   const auto written = with_inertias(before + old + after, {{"arm", inertia()}});
   ASSERT_TRUE(written) << written.error().to_string();
@@ -44,12 +45,12 @@ TEST(UrdfWrite, AddsWhatIsMissing) {
   const std::string inner = std::string("\n    <inertial>\n      ") + kParts[0] + "\n      " +
                             kParts[1] + "\n      " + kParts[2] + "\n    </inertial>";
   const auto written = [](const std::string& link) {
-    const auto text =
-        with_inertias("<robot>\n  " + link + "\n</robot>", {{"a<b", inertia()}});
+    const auto text = with_inertias("<robot>\n  " + link + "\n</robot>", {{"a<b", inertia()}});
     return text ? *text : text.error().to_string();
   };
   const auto robot = [](const std::string& link) { return "<robot>\n  " + link + "\n</robot>"; };
-  EXPECT_EQ(written("<link name='a&lt;b'/>"), robot("<link name='a&lt;b'>" + inner + "\n  </link>"));
+  EXPECT_EQ(written("<link name='a&lt;b'/>"),
+            robot("<link name='a&lt;b'>" + inner + "\n  </link>"));
   EXPECT_EQ(written("<link name='a&lt;b'>\n  </link>"),
             robot("<link name='a&lt;b'>" + inner + "\n  </link>"));
   EXPECT_EQ(written("<link name='a&lt;b'>\n    <inertial/>\n  </link>"),
