@@ -17,6 +17,7 @@
 #include "apps/machine/child_process.hpp"
 #include "apps/machine/commands.hpp"
 #include "apps/run/commands.hpp"
+#include "apps/run/loop_crash.hpp"
 #include "apps/text/console.hpp"
 #include "apps/tools/commands.hpp"
 
@@ -104,6 +105,7 @@ std::expected<Exit, int> performed(const Command& command) {
 
 int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file at the limit of `ulimit -f` is its writer's error
+  name_crashing_controllers();
   const Command command = parse_command_line(argc, argv);
   if (!std::holds_alternative<Exit>(command)) {  // before it does anything
     if (const tandem::Status kept = check_writable(json_argument(argc, argv)); !kept) {

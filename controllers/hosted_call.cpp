@@ -12,10 +12,15 @@ namespace {
 
 constexpr int kStatus = 2;  // what a controller that cannot be used ends a command with
 
-thread_local const std::string* inside = nullptr;  // the controller whose code runs
+thread_local const std::string* inside = nullptr;             // the controller whose code runs
+thread_local const std::function<void()>* on_exit = nullptr;  // of a bounded_call()
 
 void refuse_the_end() {
   if (inside == nullptr) return;
+  if (on_exit != nullptr) {
+    (*on_exit)();
+    for (;;) ::pause();
+  }
   std::fprintf(stderr,
                "error: %s: the controller ended the process with exit() (a controller returns its "
                "errors; correct it)\n",
@@ -25,11 +30,24 @@ void refuse_the_end() {
 
 }  // namespace
 
-HostedCode::HostedCode(const std::string& controller) : outer_(inside) {
+HostedCode::HostedCode(const std::string& controller) : outer_(inside), outer_exits_(on_exit) {
   [[maybe_unused]] static const int registered = std::atexit(&refuse_the_end);
   inside = &controller;
 }
 
-HostedCode::~HostedCode() { inside = outer_; }
+// What was registered last is called first: before other libraries clean up, which are still
+// needed.
+HostedCode::HostedCode(const std::string& controller, const std::function<void()>& exits)
+    : HostedCode(controller) {
+  (void)std::atexit(&refuse_the_end);
+  on_exit = &exits;
+}
+
+HostedCode::~HostedCode() {
+  inside = outer_;
+  on_exit = outer_exits_;
+}
+
+const char* hosted_controller() noexcept { return inside == nullptr ? nullptr : inside->c_str(); }
 
 }  // namespace tandem

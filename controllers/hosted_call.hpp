@@ -2,8 +2,16 @@
 // Layer: controllers.  Thread: any, non-RT.
 #pragma once
 
+#include <chrono>
+#include <condition_variable>
 #include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include "base/result.hpp"
 
@@ -15,19 +23,25 @@ class HostedCode {
  public:
   /// @param controller  outlives this
   explicit HostedCode(const std::string& controller);
+  /// exit() ends nothing: `exits` is called, and the thread waits for ever.
+  HostedCode(const std::string& controller, const std::function<void()>& exits);
   ~HostedCode();
   HostedCode(const HostedCode&) = delete;
   HostedCode& operator=(const HostedCode&) = delete;
 
  private:
   const std::string* outer_;
+  const std::function<void()>* outer_exits_;
 };
+
+/// The controller whose code this thread is in, null: in none's. For a signal handler.
+[[nodiscard]] const char* hosted_controller() noexcept;
 
 /// @return what `call` returns, or what it threw as an error of `controller`
 template <class Call>
 [[nodiscard]] auto hosted_call(const std::string& controller, const Call& call)
     -> decltype(call()) {
-  const HostedCode inside(controller);
+  const HostedCode inside(controller);  // within bounded_call(): exit() stays what it is there
   const auto threw = [&](const std::string& what) {
     return std::unexpected(Error{.message = "the controller threw an exception: " + what,
                                  .hint = "a controller returns its errors; correct it",
@@ -41,6 +55,48 @@ template <class Call>
   } catch (...) {
     return threw("one that is no std::exception");
   }
+}
+
+/// As hosted_call(), for at most `limit`, on a thread of its own: the process goes on when `call`
+/// does not return, or calls exit(). Then the thread stays behind, with what `call` owns.
+template <class Call>
+[[nodiscard]] auto bounded_call(const std::string& controller, std::chrono::milliseconds limit,
+                                Call call) -> decltype(call()) {
+  using Answer = decltype(call());
+  struct Job {
+    std::string controller;
+    std::optional<Call> call;
+    std::mutex mutex{};
+    std::condition_variable over{};
+    std::optional<Answer> answer{};
+    bool exited = false;
+  };
+  const auto job = std::make_shared<Job>(controller, std::optional<Call>(std::move(call)));
+  std::thread([job] {
+    const std::function<void()> exits = [&job] {
+      const std::lock_guard lock(job->mutex);
+      job->exited = true;
+      job->over.notify_all();
+    };
+    const HostedCode inside(job->controller, exits);
+    Answer answer = hosted_call(job->controller, *job->call);
+    job->call.reset();  // nothing that it owns outlives the answer's reader here
+    const std::lock_guard lock(job->mutex);
+    job->answer.emplace(std::move(answer));
+    job->over.notify_all();
+  }).detach();
+  std::unique_lock lock(job->mutex);
+  job->over.wait_for(lock, limit, [&] { return job->answer || job->exited; });
+  if (job->answer) return std::move(*job->answer);
+  const bool exited = job->exited;
+  return std::unexpected(Error{
+      .message =
+          exited ? "the controller called exit()"
+                 : "the controller did not return within " + std::to_string(limit.count()) + " ms",
+      .hint = exited ? "a controller returns its errors; correct it"
+                     : "correct it; what it does goes on until this process ends",
+      .file = {},
+      .key = controller});
 }
 
 }  // namespace tandem

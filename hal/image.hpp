@@ -2,10 +2,12 @@
 // Layer: hal.  Thread: owned by one thread at a time; copied as bytes to hand it over.
 #pragma once
 
+#include <algorithm>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <numeric>
 #include <span>
 #include <string>
 #include <string_view>
@@ -211,7 +213,19 @@ class ParameterImage {
   [[nodiscard]] std::uint32_t revision(std::size_t joint) const noexcept {
     return revision_[joint];
   }
+  /// Changes with every joint's.
+  [[nodiscard]] std::uint64_t revision() const noexcept {
+    return std::accumulate(revision_.begin(), revision_.end(), std::uint64_t{0});
+  }
   [[nodiscard]] std::size_t joints() const noexcept { return revision_.size(); }
+  /// All gains: kPidLoops per joint, in PidLoop's order.
+  [[nodiscard]] std::span<const PidGains> all() const noexcept { return gains_; }
+  /// Gains and revision of one joint as they are in `from`, an image of the same joints.
+  void copy_joint(std::size_t joint, const ParameterImage& from) noexcept {
+    const auto first = static_cast<std::ptrdiff_t>(joint * kPidLoops);
+    std::copy_n(from.gains_.begin() + first, kPidLoops, gains_.begin() + first);
+    revision_[joint] = from.revision_[joint];
+  }
 
   void archive(Archive& ar);
 

@@ -15,16 +15,24 @@ bool put_back(std::span<T> now, std::span<const T> before, std::size_t joint) no
 
 }  // namespace
 
+void ClaimGuard::remember(const hal::CommandImage& command,
+                          const hal::ParameterImage& gains) noexcept TANDEM_RT {
+  before_.assign(command);
+  for (std::size_t j = 0; j < gains.joints(); ++j)
+    if (gains.revision(j) != gains_.revision(j)) gains_.copy_joint(j, gains);
+}
+
 std::int32_t ClaimGuard::take_back(std::span<const ControllerSetup::Claim> claims,
                                    std::span<const std::uint8_t> claimed,
-                                   std::span<const std::uint8_t> told,
-                                   hal::CommandImage& command) noexcept TANDEM_RT {
+                                   std::span<const std::uint8_t> told, hal::CommandImage& command,
+                                   hal::ParameterImage& gains) noexcept TANDEM_RT {
   std::int32_t first = -1;
   const auto note = [&](bool changed, std::size_t joint) {
     if (changed && first < 0 && told[joint] == 0) first = static_cast<std::int32_t>(joint);
   };
   for (std::size_t j = 0; j < claimed.size(); ++j) {
     if (claimed[j] == 0) note(take_back_joint(j, command), j);
+    note(take_back_gains(j, claimed[j] != 0, gains), j);
   }
   for (const ControllerSetup::Claim& claim : claims) {
     note(take_back_mode(claim, command), claim.joint);
@@ -46,6 +54,28 @@ bool ClaimGuard::take_back_joint(std::size_t joint,
   changed |= put_back(command.interaction(), before.interaction(), joint);
   changed |= put_back(command.fault_reset(), before.fault_reset(), joint);
   return changed;
+}
+
+bool ClaimGuard::take_back_gains(std::size_t joint, bool claimed,
+                                 hal::ParameterImage& gains) noexcept TANDEM_RT {
+  if (gains.revision(joint) == gains_.revision(joint)) return false;
+  const auto usable = [](const hal::PidGains& wanted, const hal::PidGains& most) {
+    return wanted.kp >= 0.0 && wanted.kp <= most.kp && wanted.ki >= 0.0 && wanted.ki <= most.ki &&
+           wanted.kd >= 0.0 && wanted.kd <= most.kd;
+  };
+  bool good = claimed;
+  for (std::size_t i = 0; i < hal::kPidLoops; ++i) {
+    const auto loop = static_cast<hal::PidLoop>(i);
+    const hal::PidGains& wanted = gains.gains(joint, loop);
+    good = good && (wanted == gains_.gains(joint, loop) ||
+                    usable(wanted, (*capabilities_)[joint].most_gains[i]));
+  }
+  if (good) {
+    gains_.copy_joint(joint, gains);
+  } else {
+    gains.copy_joint(joint, gains_);
+  }
+  return !good;
 }
 
 bool ClaimGuard::take_back_mode(const ControllerSetup::Claim& claim,

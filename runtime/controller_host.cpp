@@ -19,7 +19,7 @@ ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kern
       recovers_(robot_.joints.size()),
       operator_(robot_, gains_, period_ns),
       transfer_(robot_.joints.size(), period_ns),
-      guard_(robot_.shape(), capabilities_) {
+      guard_(robot_.shape(), capabilities_, gains_) {
   for (const hal::JointCapabilities& joint : capabilities_) {
     impedance_.push_back({joint.stiffness_Nm_rad, joint.damping_Nms_rad});
   }
@@ -44,7 +44,8 @@ Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> 
                    "at most " + std::to_string(kMostControllers));
   }
   auto made = configure(name, std::move(controller), std::move(parameters),
-                        active ? std::span<const double>(start_rad_) : std::span<const double>());
+                        active ? std::span<const double>(start_rad_) : std::span<const double>(),
+                        std::nullopt);
   if (!made) return std::unexpected(made.error());
   table_[slot] = made->get();
   const ControllerSet after = active_ | only(slot);
@@ -61,29 +62,38 @@ Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> 
   return {};
 }
 
-Result<std::unique_ptr<HostedController>> ControllerHost::configure(const std::string& name,
-                                                                    LoadedController plugin,
-                                                                    TomlTable parameters) {
+Result<std::unique_ptr<HostedController>> ControllerHost::configure(
+    const std::string& name, LoadedController plugin, TomlTable parameters,
+    std::chrono::milliseconds limit) {
   const std::string path = plugin.path();
   auto owner = std::make_shared<LoadedController>(std::move(plugin));
-  auto made = configure(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters));
+  auto made =
+      configure(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters), limit);
   if (made) (*made)->plugin = path;
   return made;
 }
 
 Result<std::unique_ptr<HostedController>> ControllerHost::configure(
-    const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters) {
-  return configure(name, std::move(controller), std::move(parameters), {});
+    const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
+    std::chrono::milliseconds limit) {
+  return configure(name, std::move(controller), std::move(parameters), {}, limit);
 }
 
 Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
-    std::span<const double> start_rad) {
-  ControllerSetup setup(robot_, gains_, kernels_, period_ns_, std::move(parameters), start_rad,
-                        estimate_, predictor_);
-  const Status configured = hosted_call(name, [&] { return controller->configure(setup); });
+    std::span<const double> start_rad, std::optional<std::chrono::milliseconds> limit) {
+  const auto shared =
+      std::make_shared<ControllerSetup>(robot_, gains_, kernels_, period_ns_, std::move(parameters),
+                                        start_rad, estimate_, predictor_);
+  const auto call = [controller, shared] { return controller->configure(*shared); };
+  const Status configured = limit ? bounded_call(name, *limit, call) : hosted_call(name, call);
   // Keys that it did not get to before it failed are not wrong.
-  if (!configured) return std::unexpected(configured.error());
+  if (!configured) {
+    Error error = configured.error();
+    if (error.message.empty()) error.message = "the controller refused, and did not say why";
+    return std::unexpected(std::move(error));
+  }
+  ControllerSetup& setup = *shared;
   setup.parameters.finish();
   if (Status claims = check_claims(name, setup.claims()); !claims) {
     return std::unexpected(claims.error());
@@ -219,7 +229,7 @@ Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& s
 void ControllerHost::call_start(HostedController& one, const hal::CycleTime& time,
                                 const hal::StateImage& state,
                                 hal::CommandImage& command) noexcept TANDEM_RT {
-  guard_.remember(command);
+  guard_.remember(command, gains_);
   enter(one).start(time, state, command);
   take_back(one, command);
 }
@@ -227,7 +237,7 @@ void ControllerHost::call_start(HostedController& one, const hal::CycleTime& tim
 Code ControllerHost::call_update(HostedController& one, const hal::CycleTime& time,
                                  const hal::StateImage& state,
                                  hal::CommandImage& command) noexcept TANDEM_RT {
-  guard_.remember(command);
+  guard_.remember(command, gains_);
   const Code code = enter(one).update(time, state, command);
   take_back(one, command);
   return code;
@@ -236,7 +246,8 @@ Code ControllerHost::call_update(HostedController& one, const hal::CycleTime& ti
 /// Reports each controller and joint once, and at most one a cycle: others follow in later cycles.
 void ControllerHost::take_back(HostedController& one,
                                hal::CommandImage& command) noexcept TANDEM_RT {
-  const std::int32_t joint = guard_.take_back(one.claims, one.claimed, one.strayed, command);
+  const std::int32_t joint =
+      guard_.take_back(one.claims, one.claimed, one.strayed, command, gains_);
   if (joint < 0 || stray_) return;
   one.strayed[static_cast<std::size_t>(joint)] = 1;
   stray_ = Stray{one.id, static_cast<std::size_t>(joint)};
@@ -274,6 +285,7 @@ void ControllerHost::archive(Archive& ar) {
     ar(one->strayed);
   }
   ar(active_, done_, impedance_, recovers_, failed_controller_, transfer_, operator_, gains_);
+  if (ar.reading()) guard_.forget(gains_);
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (table_[slot] == nullptr) active_ &= ~only(slot);  // bytes of something else
   }

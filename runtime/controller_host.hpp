@@ -5,6 +5,7 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -95,14 +96,17 @@ class ControllerHost {
 
   // Any thread but the loop's.
 
-  /// A controller that is ready to be inserted.
-  /// Errors: what its configure() says; a joint index or mode that the robot lacks; a joint that
-  /// it claims twice.
+  /// Less than a client waits for an answer.
+  static constexpr std::chrono::milliseconds kConfigureTime{4000};
+  /// A controller that is ready to be inserted. The run goes on whatever its configure() does.
+  /// Errors: what its configure() says; it throws, calls exit(), does not return within `limit`; a
+  /// joint index or mode that the robot lacks; a joint that it claims twice.
   [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
-      const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters);
-  [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(const std::string& name,
-                                                                    LoadedController plugin,
-                                                                    TomlTable parameters);
+      const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
+      std::chrono::milliseconds limit = kConfigureTime);
+  [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
+      const std::string& name, LoadedController plugin, TomlTable parameters,
+      std::chrono::milliseconds limit = kConfigureTime);
   /// The first joint that two of `active` claim.
   [[nodiscard]] static std::optional<ClaimConflict> find_conflict(
       const Table& table, ControllerSet active) noexcept TANDEM_RT;
@@ -231,7 +235,7 @@ class ControllerHost {
  private:
   [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
       const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
-      std::span<const double> start_rad);
+      std::span<const double> start_rad, std::optional<std::chrono::milliseconds> limit);
   [[nodiscard]] Status check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const;
   [[nodiscard]] std::uint32_t new_id(const std::string& name);

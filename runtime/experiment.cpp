@@ -6,6 +6,7 @@
 #include <limits>
 #include <ranges>
 
+#include "base/file_name.hpp"
 #include "base/nearest.hpp"
 #include "rt/clock_control.hpp"
 #include "runtime/estimation_options.hpp"
@@ -174,6 +175,9 @@ void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers)
     for (const ControllerSpec& other : controllers) {
       if (name.empty() || other.name != name) continue;
       table.error("name", "two controllers are called '" + name + "'", "rename one of them");
+    }
+    if (const std::string problem = shown_name_problem(name); !plugin.empty() && !problem.empty()) {
+      table.error("name", "the controller's name " + problem, "give it another name");
     }
     const bool active = table.boolean_or("active", true);
     controllers.push_back({plugin, name, active, table.table_or_empty("parameters")});

@@ -68,11 +68,15 @@ std::string text_of(const FaultRecord& record, const FaultContext& about) {
     case FaultSource::kJointLost: return "no feedback for " + count + " cycles";
     case FaultSource::kSensorLost: return "no sample for " + count + " cycles";
     case FaultSource::kBackend: return "the robot answered " + std::string(code);
-    case FaultSource::kController: return "the controller gave up: " + std::string(code);
+    case FaultSource::kController:
+      return record.code > static_cast<std::uint32_t>(Code::kStopped)
+                 ? "the controller gave up, with a code that there is not: " + count
+                 : "the controller gave up: " + std::string(code);
     case FaultSource::kCommand: return "a controller's command was not a finite number";
     case FaultSource::kStray:
       return "the controller '" + about.controllers.name(record.code) +
-             "' wrote to this joint, or its mode, without a claim: taken back";
+             "' wrote to this joint, its mode or its gains without a claim, or what the joint "
+             "cannot do: taken back";
     case FaultSource::kOverrun:
       return std::to_string(about.config.loop.stop_late) + " of the last " +
              std::to_string(about.config.loop.stop_window) + " cycles were late";

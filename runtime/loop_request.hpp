@@ -54,7 +54,7 @@ struct LoopRequest {
   hal::PidLoop loop = hal::PidLoop::kPosition;
   HostedController* controller = nullptr;
   JointRequest wish{};
-  hal::PidGains gains{};
+  hal::PidGains gains{};  ///< NaN: stays
   MoveRequest move{};
 };
 

@@ -330,6 +330,7 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
   if (run_.in(RunPhase::kRunning)) {
     statistics_.take(state_, command_, truth_, limits_.counters(), estimate());
   }
+  if (!ends(run_.phase())) statistics_.take_base(truth_);
   log_.images(time_, state_, command_, truth_, estimate());
   progress_.dropped.store(log_.dropped(), std::memory_order_relaxed);
   progress_.phase.store(run_.phase(), std::memory_order_relaxed);
@@ -404,6 +405,12 @@ void RobotCycle::show_joints() noexcept TANDEM_RT {
     joint.homing = homings_[j];
   }
   services_.show(joints_);
+  if (controllers_->gains().revision() != shown_gains_) show_gains();
+}
+
+void RobotCycle::show_gains() noexcept TANDEM_RT {
+  services_.show(controllers_->gains());
+  shown_gains_ = controllers_->gains().revision();
 }
 
 void RobotCycle::show_sensors() noexcept TANDEM_RT {

@@ -132,6 +132,7 @@ class RobotCycle {
   void show() noexcept TANDEM_RT;
   void show_joints() noexcept TANDEM_RT;
   void show_sensors() noexcept TANDEM_RT;
+  void show_gains() noexcept TANDEM_RT;
   void on(RunEvent event, bool holds_back = false) noexcept TANDEM_RT;
   void event(log::EventKind kind, std::int32_t joint = -1,
              std::uint32_t code = 0) noexcept TANDEM_RT;
@@ -166,6 +167,7 @@ class RobotCycle {
   void reset_failed() noexcept TANDEM_RT;
   void hold_back() noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer reset_drive(std::size_t joint) noexcept TANDEM_RT;
+  void set_gains(const LoopRequest& request) noexcept TANDEM_RT;
   void watch_drive_resets() noexcept TANDEM_RT;
   void hold_drives_in_reset(hal::CommandImage& command) noexcept TANDEM_RT;
   void drive_is_well(std::size_t joint) noexcept TANDEM_RT;
@@ -215,6 +217,7 @@ class RobotCycle {
   Heartbeat heartbeat_;
   RunServices services_;
   std::vector<JointStatus> joints_;    // as services_ shows them
+  std::uint64_t shown_gains_ = 0;      // their revision, as services_ shows them
   std::vector<SensorStatus> sensors_;  // the same
 
   hal::CycleTime time_;        // this cycle's

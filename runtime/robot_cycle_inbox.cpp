@@ -103,10 +103,19 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
     }
     case Kind::kReset: return reset_drive(request.joint);
     case Kind::kHome: return home_joint(request.joint);
-    case Kind::kGains: break;
+    case Kind::kGains: set_gains(request); break;
   }
-  controllers_->gains().set_gains(request.joint, request.loop, request.gains);
   return {};
+}
+
+/// What is not named stays as it is now, whoever has set it.
+void RobotCycle::set_gains(const LoopRequest& request) noexcept TANDEM_RT {
+  hal::ParameterImage& image = controllers_->gains();
+  const hal::PidGains now = image.gains(request.joint, request.loop);
+  const auto or_now = [](double wanted, double has) { return std::isnan(wanted) ? has : wanted; };
+  image.set_gains(request.joint, request.loop,
+                  {or_now(request.gains.kp, now.kp), or_now(request.gains.ki, now.ki),
+                   or_now(request.gains.kd, now.kd)});
 }
 
 /// @param drives  what is asked for needs a drive that is well

@@ -107,7 +107,7 @@ Status RobotCycle::restore(std::span<const std::byte> snapshot) {
                 "load and unload, in the same order, what was loaded then");
   }
   archive(ar);
-  services_.restored(controllers_->gains());
+  show_gains();
   if (!backend_->archive(ar)) {
     return fail("this robot cannot be rewound", "snapshots need a simulated robot");
   }

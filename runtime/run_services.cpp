@@ -5,6 +5,7 @@
 #include <thread>
 #include <utility>
 
+#include "base/file_name.hpp"
 #include "base/nearest.hpp"
 #include "runtime/owner_controller.hpp"
 
@@ -139,14 +140,16 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
 }  // namespace
 
 RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
-                         const Progress& progress, hal::ParameterImage parameters)
+                         const Progress& progress, const hal::ParameterImage& gains)
     : robot_(&robot),
       host_(&host),
       inbox_(&inbox),
       progress_(&progress),
       looks_(robot.joints.size()),
       sensor_looks_(robot.sensors.size()),
-      gains_(std::move(parameters)) {}
+      gain_looks_(gains.all().size()) {
+  show(gains);
+}
 
 // Asking the loop.
 
@@ -225,11 +228,6 @@ Error RunServices::refusal(const LoopAnswer& answer) const {
       .message = std::move(words.message), .hint = std::move(words.hint), .file = {}, .key = joint};
 }
 
-void RunServices::restored(const hal::ParameterImage& parameters) {
-  const std::lock_guard lock(mutex_);
-  gains_ = parameters;
-}
-
 // Controllers.
 
 std::vector<ControllerStatus> RunServices::controllers() {
@@ -273,7 +271,9 @@ ControllerSet RunServices::planned() const {
 }
 
 Status RunServices::check_name(const std::string& name) {
-  if (name.empty()) return fail_at("name", "the controller's name is empty", "give it one");
+  if (const std::string problem = shown_name_problem(name); !problem.empty()) {
+    return fail_at("name", "the controller's name " + problem, "give it another name");
+  }
   if (slot_of(name)) {
     return fail_at(name, "a controller of this name is loaded already",
                    "give this one another name");

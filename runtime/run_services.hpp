@@ -110,7 +110,7 @@ class RunServices {
 
   /// All outlive it.
   RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
-              const Progress& progress, hal::ParameterImage parameters);
+              const Progress& progress, const hal::ParameterImage& gains);
 
   /// Loaded controllers, in the order in which they run.
   [[nodiscard]] std::vector<ControllerStatus> controllers();
@@ -184,13 +184,12 @@ class RunServices {
                                                 const GainsRequest& wish,
                                                 Patience patience = kPatience);
 
-  /// The loop's: shows the joints, and the sensors. @rt wait-free.
+  /// The loop's: shows the joints, the sensors, and the gains that are in force. @rt wait-free.
   void show(std::span<const JointStatus> joints) noexcept TANDEM_RT { looks_.write(joints); }
   void show(std::span<const SensorStatus> sensors) noexcept TANDEM_RT {
     sensor_looks_.write(sensors);
   }
-  /// Between two steps: the run has been set back to a snapshot.
-  void restored(const hal::ParameterImage& parameters);
+  void show(const hal::ParameterImage& gains) noexcept TANDEM_RT { gain_looks_.write(gains.all()); }
 
  private:
   using Lock = std::unique_lock<std::mutex>;
@@ -223,10 +222,10 @@ class RunServices {
   const Progress* progress_;
   Seqlock<JointStatus> looks_;
   Seqlock<SensorStatus> sensor_looks_;
+  Seqlock<hal::PidGains> gain_looks_;
 
-  std::mutex mutex_;           // of all below, and of the asking side of inbox and host
-  hal::ParameterImage gains_;  // as asked for last
-  std::uint64_t number_ = 0;   // of the last request
+  std::mutex mutex_;          // of all below, and of the asking side of inbox and host
+  std::uint64_t number_ = 0;  // of the last request
   std::map<std::uint64_t, LoopRequest> asked_;                  // not answered yet
   std::map<std::uint64_t, std::optional<LoopAnswer>> awaited_;  // that somebody waits for
 };

@@ -117,6 +117,8 @@ std::vector<JointInfo> RunServices::joints() {
   const Lock lock(mutex_);
   collect();
   const std::vector<JointStatus> now = looks();
+  std::vector<hal::PidGains> gains(gain_looks_.size());
+  while (!gain_looks_.read(gains)) std::this_thread::yield();
   std::vector<JointInfo> all;
   for (std::size_t j = 0; j < now.size(); ++j) {
     JointInfo& joint = all.emplace_back();
@@ -124,9 +126,8 @@ std::vector<JointInfo> RunServices::joints() {
     joint.owner = controller_name(now[j].owner);
     joint.slides = robot_->joints[j].slides;
     joint.look = now[j];
-    for (std::size_t loop = 0; loop < hal::kPidLoops; ++loop) {
-      joint.gains[loop] = gains_.gains(j, static_cast<hal::PidLoop>(loop));
-    }
+    for (std::size_t loop = 0; loop < hal::kPidLoops; ++loop)
+      joint.gains[loop] = gains[j * hal::kPidLoops + loop];
   }
   return all;
 }
@@ -258,18 +259,14 @@ Result<RequestResult> RunServices::set_gains(const std::string& joint, hal::PidL
     const Status in_range = check_range(joint, what, value.value_or(0.0), limit);
     if (!in_range) return std::unexpected(in_range.error());
   }
-  const hal::PidGains before = gains_.gains(*index, loop);
-  const hal::PidGains gains{wish.kp.value_or(before.kp), wish.ki.value_or(before.ki),
-                            wish.kd.value_or(before.kd)};
-  gains_.set_gains(*index, loop, gains);  // before the wait, in which others may ask
-  auto asked = ask(lock,
-                   {.kind = LoopRequest::Kind::kGains,
-                    .joint = static_cast<std::uint32_t>(*index),
-                    .loop = loop,
-                    .gains = gains},
-                   patience);
-  if (!asked) gains_.set_gains(*index, loop, before);
-  return asked;
+  constexpr double kStays = std::numeric_limits<double>::quiet_NaN();
+  return ask(
+      lock,
+      {.kind = LoopRequest::Kind::kGains,
+       .joint = static_cast<std::uint32_t>(*index),
+       .loop = loop,
+       .gains = {wish.kp.value_or(kStays), wish.ki.value_or(kStays), wish.kd.value_or(kStays)}},
+      patience);
 }
 
 }  // namespace tandem::runtime

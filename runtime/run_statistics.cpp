@@ -102,18 +102,25 @@ void RunStatistics::take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT
     if (foot.touching == 0) continue;
     slip_m_ = std::max(slip_m_, std::hypot(at[0] - foot.anchor_x, at[1] - foot.anchor_y));
   }
-  const double height_m = truth.base_position_m()[2];
-  min_height_m_ = free_cycles_ == 0 ? height_m : std::min(min_height_m_, height_m);
-  max_height_m_ = free_cycles_ == 0 ? height_m : std::max(max_height_m_, height_m);
-  tilt_rad_ = tilt_of(truth.base_quaternion());
   ++free_cycles_;
+}
+
+void RunStatistics::take_base(const hal::TruthImage* truth) noexcept TANDEM_RT {
+  if (cycles_ == 0 || truth == nullptr || truth->hoist_share()[0] > 0.0) return;
+  const double height_m = truth->base_position_m()[2];
+  BaseFigures& base = base_;
+  base.min_height_m = base_free_ == 0 ? height_m : std::min(base.min_height_m, height_m);
+  base.max_height_m = base_free_ == 0 ? height_m : std::max(base.max_height_m, height_m);
+  base.final_tilt_rad = tilt_of(truth->base_quaternion());
+  base.max_tilt_rad = std::max(base.max_tilt_rad, base.final_tilt_rad);
+  base_free_ = 1;
 }
 
 std::vector<TrackingError> RunStatistics::tracking() const {
   std::vector<TrackingError> out;
   for (const Error& one : errors_) {
     const double count = static_cast<double>(std::max<std::uint64_t>(one.count, 1));
-    out.push_back({std::sqrt(one.square_sum / count), one.max});
+    out.push_back({std::sqrt(one.square_sum / count), one.max, one.count});
   }
   return out;
 }
@@ -130,8 +137,8 @@ std::optional<GroundFigures> RunStatistics::ground(double weight_N) const {
 }
 
 std::optional<BaseFigures> RunStatistics::base() const {
-  if (free_cycles_ == 0 || feet_.empty()) return std::nullopt;
-  return BaseFigures{min_height_m_, max_height_m_, tilt_rad_};
+  if (base_free_ == 0 || feet_.empty()) return std::nullopt;
+  return base_;
 }
 
 EstimateFigures RunStatistics::estimate() const {
@@ -142,7 +149,7 @@ EstimateFigures RunStatistics::estimate() const {
 void RunStatistics::archive(Archive& ar) {
   ar(errors_, limited_, cycles_, feet_, loops_, base_cycles_, compared_, tilt_error_rad_,
      height_error_m_, external_Nm_, base_wrench_, wrenches_, unexplained_Nm_, free_cycles_,
-     force_sum_N_, slip_m_, min_height_m_, max_height_m_, tilt_rad_);
+     force_sum_N_, slip_m_, base_, base_free_);
 }
 
 }  // namespace tandem::runtime

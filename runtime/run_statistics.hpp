@@ -21,18 +21,22 @@ namespace tandem::runtime {
 struct TrackingError {
   double rms_rad = 0.0;
   double max_rad = 0.0;  ///< of the absolute value
+  std::uint64_t cycles = 0;
 };
 
-/// From the plant's truth, over the cycles in which the base was free.
+/// From the plant's truth, over the cycles in which controllers ran and the base was free.
 struct GroundFigures {
   double weight_N = 0.0;               ///< mass times gravity, from the model
   double mean_vertical_force_N = 0.0;  ///< of all feet together
   double max_foot_slip_m = 0.0;        ///< horizontal way of a foot since it touched down
 };
+/// From the plant's truth, from the first cycle with controllers and a free base until the drives
+/// are disabled at the end: a fall after a fault counts, too.
 struct BaseFigures {
   double min_height_m = 0.0;  ///< of the base's origin above W's
   double max_height_m = 0.0;
   double final_tilt_rad = 0.0;  ///< angle between the base's z axis and W's
+  double max_tilt_rad = 0.0;
 };
 
 /// The largest of one component of an estimate, and when.
@@ -82,6 +86,8 @@ class RunStatistics {
   void take(const hal::StateImage& state, const hal::CommandImage& command,
             const hal::TruthImage* truth, std::span<const hal::LimitCounters> limits,
             const hal::EstimateImage* estimate = nullptr) noexcept TANDEM_RT;
+  /// A cycle before the shut-down, with controllers or without. `truth` may be null.
+  void take_base(const hal::TruthImage* truth) noexcept TANDEM_RT;
 
   [[nodiscard]] std::vector<TrackingError> tracking() const;
   /// Per joint: cycles in which a controller's command was not what the joint was given.
@@ -128,7 +134,8 @@ class RunStatistics {
   Peak unexplained_Nm_;
   std::uint64_t free_cycles_ = 0;
   double force_sum_N_ = 0.0, slip_m_ = 0.0;
-  double min_height_m_ = 0.0, max_height_m_ = 0.0, tilt_rad_ = 0.0;
+  BaseFigures base_;
+  std::uint64_t base_free_ = 0;  // it was, once
 };
 
 }  // namespace tandem::runtime

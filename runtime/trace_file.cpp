@@ -5,7 +5,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <memory>
+#include <system_error>
 
 #include "base/quoting.hpp"
 
@@ -79,20 +79,17 @@ void write_faults(Events& events, const CycleStamps& stamps, std::span<const Fau
   }
 }
 
-Error write_error(const std::string& file) {
-  return {.message = std::string("cannot write the trace: ") + std::strerror(errno),
-          .hint = "name a file in a folder that exists and can be written",
+Error write_error(const std::string& file, int problem) {
+  return {.message = std::string("cannot write the trace: ") + std::strerror(problem),
+          .hint = "name a file in a folder that exists, can be written and has room",
           .file = file,
           .key = {}};
 }
 
-}  // namespace
-
-Status write_trace(const std::string& file, const std::string& robot, const CycleTrace& trace,
-                   std::span<const Fault> faults) {
+/// Throws std::system_error, as fmt::print() does, when `out` takes no more.
+void write_all(std::FILE* out, const std::string& robot, const CycleTrace& trace,
+               std::span<const Fault> faults) {
   const std::vector<CycleStamps> cycles = trace.cycles();
-  std::FILE* out = std::fopen(file.c_str(), "wb");
-  if (out == nullptr) return std::unexpected(write_error(file));
   fmt::print(out, "{{\"displayTimeUnit\":\"ns\",\"otherData\":{{\"robot\":{},\"cycles\":{},",
              quoted_text(robot), cycles.size());
   fmt::print(out, "\"cycles_before\":{}}},\n\"traceEvents\":[\n", trace.count() - cycles.size());
@@ -104,8 +101,22 @@ Status write_trace(const std::string& file, const std::string& robot, const Cycl
     write_faults(events, stamps, faults);
   }
   fmt::print(out, "\n]}}\n");
-  const bool failed = std::ferror(out) != 0;
-  return std::fclose(out) == 0 && !failed ? Status{} : std::unexpected(write_error(file));
+}
+
+}  // namespace
+
+Status write_trace(const std::string& file, const std::string& robot, const CycleTrace& trace,
+                   std::span<const Fault> faults) {
+  std::FILE* out = std::fopen(file.c_str(), "wb");
+  if (out == nullptr) return std::unexpected(write_error(file, errno));
+  int problem = 0;
+  try {
+    write_all(out, robot, trace, faults);
+  } catch (const std::system_error& full) {
+    problem = full.code().value();
+  }
+  if (std::fclose(out) != 0 && problem == 0) problem = errno;
+  return problem == 0 ? Status{} : std::unexpected(write_error(file, problem));
 }
 
 }  // namespace tandem::runtime

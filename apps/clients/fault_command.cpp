@@ -132,7 +132,7 @@ Exit reset(const FaultOptions& options) {
     if (kept) fmt::print("{}\n", kAsked);
     if (done && !stays) fmt::print("reset: every joint is enabled where it is\n");
     if (!nothing) print_latched(answer);
-    if (done && held) fmt::print("held: `tandem controller start` lets the controllers continue\n");
+    if (done && held) fmt::print("held: `tandem controller start` starts the controllers again\n");
   }
   if (!nothing && !kept && !done) {
     const bool through = answer.value("failed_resets", 0) > asked->value("failed_resets", 0);

@@ -32,7 +32,7 @@ The same experiment and seed give the same bytes at every rate.)";
 const char kFaultExamples[] = R"(Examples:
   tandem fault show                                  what has been latched, and what was cleared
   tandem fault reset                                 clears and holds; exit status 1: it failed
-  tandem controller start                            then lets the controllers continue
+  tandem controller start                            then starts the controllers again
   tandem fault show --dds --namespace left           of the run with this [dds] namespace
 Without --socket or --dds it is the only `tandem run` of this user.)";
 

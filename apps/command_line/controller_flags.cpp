@@ -81,7 +81,7 @@ void add_flags(CLI::App& app, ControllerOptions& o) {
   add("unload", "Free an inactive controller", Action::kUnload)
       ->add_option("name", o.name, "Its name")
       ->required();
-  add("start", "Start controllers, all in one cycle; after a reset let them continue",
+  add("start", "Start controllers, all in one cycle; after a reset those that were active",
       Action::kStart)
       ->add_option("names", o.start, "Their names; none: those that were active before the reset");
   add("stop", "Stop controllers; joints without a controller are held", Action::kSwitch)

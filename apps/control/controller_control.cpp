@@ -4,7 +4,9 @@
 #include <filesystem>
 
 #include "apps/text/toml_text.hpp"
+#include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
+#include "runtime/controller_host.hpp"
 #include "runtime/owner_controller.hpp"
 
 namespace tandem::apps {
@@ -79,7 +81,8 @@ Result<Json> load(RunServices& services, const Json& request) {
   const std::string name = request.value("name", std::filesystem::path(plugin).stem().string());
   const auto parameters = parameters_of(request);
   if (!parameters) return std::unexpected(parameters.error());
-  auto loaded = load_controller(plugin, controller_folders());
+  auto loaded = bounded_call(name, runtime::ControllerHost::kConfigureTime,
+                             [plugin] { return load_controller(plugin, controller_folders()); });
   if (!loaded) return std::unexpected(loaded.error());
   Json what{{"name", name}, {"doc", loaded->plugin().doc}};
   auto answer = tell(services, services.load(name, std::move(*loaded), *parameters));

@@ -12,6 +12,8 @@
 #include <exception>
 #include <string>
 
+#include "controllers/hosted_call.hpp"
+
 namespace tandem::apps {
 namespace {
 
@@ -58,6 +60,12 @@ void write_text(const char* text) { (void)!::write(STDERR_FILENO, text, std::str
 
 void on_signal(int signal) {
   if (!in_cycle()) {
+    if (const char* controller = hosted_controller()) {
+      for (const char* part :
+           {"error: ", controller,
+            ": the controller crashed before its first cycle: ", name_of(signal), "\n"})
+        write_text(part);
+    }
     std::signal(signal, SIG_DFL);
     std::raise(signal);
     return;
@@ -83,7 +91,13 @@ void handle(int signal) {
   ::sigaction(signal, &action, nullptr);
 }
 
+void handle_all() {
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) handle(signal);
+}
+
 }  // namespace
+
+void name_crashing_controllers() { handle_all(); }
 
 void stand_still_on_crash(runtime::Heartbeat& heartbeat) {
   loop_heartbeat = &heartbeat;
@@ -95,7 +109,7 @@ void stand_still_on_crash(runtime::Heartbeat& heartbeat) {
     stack = {.ss_sp = signal_stack.data(), .ss_flags = 0, .ss_size = signal_stack.size()};
     ::sigaltstack(&stack, nullptr);
   }
-  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) handle(signal);
+  handle_all();
   std::atexit(on_exit);
 }
 

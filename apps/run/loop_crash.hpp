@@ -1,5 +1,6 @@
-// What would end the process in the middle of a cycle: an exception, a crash or exit().
-// Layer: apps/run.  Thread: the loop's.
+// What would end the process in the middle of a cycle, or without a word: an exception, a crash or
+// exit().
+// Layer: apps/run.  Thread: the loop's, or any where it is said.
 #pragma once
 
 #include "runtime/heartbeat.hpp"
@@ -13,5 +14,9 @@ namespace tandem::apps {
 /// two cycles, by _exit(), and by a signal that has another handler already, such as a sanitizer's.
 /// @param heartbeat  the loop's; outlives it
 void stand_still_on_crash(runtime::Heartbeat& heartbeat);
+
+/// The process ends by SIGSEGV and the like as it did, but names the controller in whose code that
+/// happens outside of the cycle, as in configure(). Any thread's.
+void name_crashing_controllers();
 
 }  // namespace tandem::apps

@@ -369,10 +369,10 @@ class Session {
       fmt::print(stderr, "warning: {}\n", warning);
     }
     for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
-    if (const Status traced = add_trace(options_, summary, out_); !traced)
-      return refuse(traced.error());
-    if (const Status written = write_json(options_.json, summary.json()); !written)
-      return refuse(written.error());
+    const Status traced = add_trace(options_, summary, out_);
+    const Status written = write_json(options_.json, summary.json());
+    if (!traced) return refuse(traced.error());
+    if (!written) return refuse(written.error());
     return summary.faults.empty() ? Exit::kDone : Exit::kFault;
   }
 

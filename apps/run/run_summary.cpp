@@ -63,7 +63,8 @@ Json base_json(const std::optional<runtime::BaseFigures>& base) {
   if (!base) return nullptr;
   return {{"min_height_m", base->min_height_m},
           {"max_height_m", base->max_height_m},
-          {"final_tilt_rad", base->final_tilt_rad}};
+          {"final_tilt_rad", base->final_tilt_rad},
+          {"max_tilt_rad", base->max_tilt_rad}};
 }
 
 double seconds(const runtime::Peak& peak) { return static_cast<double>(peak.time_ns) * 1e-9; }
@@ -152,6 +153,7 @@ void print_worst_joints(const RunSummary& s, std::FILE* out) {
   std::vector<Row> rows;
   const auto tracking = s.cycle.statistics().tracking();
   for (std::size_t i = 0; i < tracking.size(); ++i) {
+    if (tracking[i].cycles == 0) continue;  // it followed no position
     const hal::JointConfig& joint = s.composition.experiment.robot.joints[i];
     rows.push_back({joint.name, joint.slides, tracking[i]});
   }
@@ -198,9 +200,13 @@ void add_motion_facts(const RunSummary& summary, Facts& facts) {
     facts.add("feet slip", fmt::format("{:.3f} mm at most", ground->max_foot_slip_m * 1e3));
   }
   if (const auto base = summary.cycle.statistics().base()) {
+    constexpr double kStands_deg = 20.0;  // more says that it fell, or nearly did
+    const double most_deg = base->max_tilt_rad * kDegrees;
     facts.add("base height",
-              fmt::format("{:.4f} to {:.4f} m, tilted {:.3f} deg at the end", base->min_height_m,
-                          base->max_height_m, base->final_tilt_rad * kDegrees));
+              fmt::format("{:.4f} to {:.4f} m, tilted {:.3f} deg at the end{}", base->min_height_m,
+                          base->max_height_m, base->final_tilt_rad * kDegrees,
+                          most_deg < kStands_deg ? std::string()
+                                                 : fmt::format(", {:.0f} deg at most", most_deg)));
   }
 }
 

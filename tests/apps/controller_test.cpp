@@ -55,6 +55,8 @@ TEST_F(Controllers, ThatAreBrokenAreRefusedWhileTheRunGoesOn) {
   expect(refused("controller load " + broken + "no_entry.so'"), "has no entry point");
   expect(refused("controller load " + broken + "older_interface.so'"),
          "was built for controller interface ");
+  for (const char* name : {"exits", "exits_when_made"})  // it had ended the run
+    expect(refused("controller load " + broken + name + ".so'"), "the controller called exit()");
   expect(refused("controller load hodl"), "did you mean 'hold'?");
   expect(refused("controller load hold"), "of this name is loaded already");
   expect(refused("controller load hold --name x --set 'durtion_s = 2'"), "durtion_s");

@@ -22,7 +22,7 @@ TEST_F(Faults, AreShownAndResetWhileTheRunWaits) {
   EXPECT_NE(reset.out.find("every joint is enabled where it is"), std::string::npos) << reset.out;
   EXPECT_NE(reset.out.find("cleared at"), std::string::npos) << reset.out;
   EXPECT_NE(reset.out.find("phase held, 0 latched"), std::string::npos) << reset.out;
-  EXPECT_NE(reset.out.find("held: `tandem controller start` lets the controllers continue"),
+  EXPECT_NE(reset.out.find("held: `tandem controller start` starts the controllers again"),
             std::string::npos)
       << reset.out;
   const auto ran = [this] {

@@ -56,6 +56,14 @@ TEST_F(FullOutput, DoesNotStopARun) {
   EXPECT_EQ(with("2>/dev/full >out.txt", run + "run.json").status, 0);
 }
 
+TEST_F(FullOutput, OfATraceLeavesTheRunsResult) {
+  const Outcome run = tandem(
+      "run hold.toml --no-log --no-socket -q --duration 1 --trace /dev/full --json run.json");
+  EXPECT_EQ(run.status, 2);
+  EXPECT_NE(run.err.find("cannot write the trace: No space"), std::string::npos) << run.err;
+  EXPECT_EQ(json("run.json")["cycles"], 1000);
+}
+
 // A warning that could not be written had ended the command.
 TEST_F(FullOutput, OfErrorsTakesNothingFromTheOther) {
   EXPECT_EQ(with("2>/dev/full >out.txt", "check hold.toml").status, 0);

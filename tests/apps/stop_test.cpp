@@ -75,6 +75,19 @@ TEST_F(Stops, OfAControllerThatThrowsAreThoseOfOneThatHangs) {
   EXPECT_EQ(info.out.find("no index"), std::string::npos) << info.out;
 }
 
+TEST_F(Stops, AreNotTheEndOfACommandThatDoesNotSayWhoseCrashItWas) {
+  if (TANDEM_SANITIZED != 0) GTEST_SKIP() << "a sanitizer handles signals itself";
+  hang("0.0", "crash = \"null\"\nat_once = true\n");
+  for (const char* command : {"check hold.toml", "run hold.toml -q --no-log --duration 1"}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_NE(outcome.err.find("error: lazy: the controller crashed before its first cycle: "
+                               "segmentation fault (SIGSEGV)"),
+              std::string::npos)
+        << outcome.err;
+    EXPECT_NE(outcome.status, 0);
+  }
+}
+
 // The process had ended by the signal, or with status 0: no controller's name, no NMT stop.
 TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
   const std::pair<const char*, const char*> crashes[] = {

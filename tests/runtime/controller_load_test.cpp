@@ -45,6 +45,10 @@ TEST(ControllerLoad, RefusesWhatIsWrongWhileTheRunGoesOn) {
   };
   EXPECT_EQ(load("left", {0}).error().key, "left");
   EXPECT_FALSE(load("", {0}));
+  EXPECT_NE(load("a\033[2Jb", {0}).error().message.find("has control characters"),
+            std::string::npos);
+  EXPECT_NE(load(std::string(65, 'a'), {0}).error().message.find("longer than 64"),
+            std::string::npos);
   EXPECT_FALSE(load("late", {3}));
   EXPECT_FALSE(load("late", {1, 1}));
   const auto unknown = load("late", {0}, "amplitude_rd = 1");
@@ -52,6 +56,39 @@ TEST(ControllerLoad, RefusesWhatIsWrongWhileTheRunGoesOn) {
   EXPECT_NE(unknown.error().message.find("amplitude_rd"), std::string::npos);
   run.steps(10);
   EXPECT_EQ(run.services().controllers().size(), 3U);
+}
+
+/// What it does in configure() never comes back.
+class Lost : public Controller {
+ public:
+  explicit Lost(bool exits) : exits_(exits) {}
+  Status configure(ControllerSetup&) override {
+    if (exits_) std::exit(0);
+    for (;;) std::this_thread::sleep_for(std::chrono::seconds(1));
+  }
+  void start(const hal::CycleTime&, const hal::StateImage&, hal::CommandImage&) noexcept override {}
+  Code update(const hal::CycleTime&, const hal::StateImage&, hal::CommandImage&) noexcept override {
+    return Code::kOk;
+  }
+
+ private:
+  bool exits_;
+};
+
+TEST(ControllerLoad, LeavesAControllerBehindThatDoesNotComeBack) {
+  SwitchRun run;
+  run.run();
+  for (const bool exits : {false, true}) {
+    const auto made =
+        run.host.configure("lost", std::make_shared<Lost>(exits), document_of("").root(),
+                           std::chrono::milliseconds(exits ? 60'000 : 100));
+    ASSERT_FALSE(made);
+    EXPECT_EQ(made.error().key, "lost");
+    EXPECT_EQ(made.error().message, exits ? "the controller called exit()"
+                                          : "the controller did not return within 100 ms");
+  }
+  run.steps(10);
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kRunning);
 }
 
 TEST(ControllerLoad, HasRoomForSoManyAndSaysSo) {

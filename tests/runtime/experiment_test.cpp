@@ -363,6 +363,13 @@ TEST(Experiment, RefusesTwoControllersOfAName) {
             std::string::npos);
 }
 
+TEST(Experiment, RefusesAControllersNameThatATerminalMightObey) {
+  EXPECT_NE(errors_of(std::string(kExperiment) +
+                      "[[controller]]\nplugin = 'hold'\nname = \"a\\u001b[2J\"\n")
+                .find("the controller's name has control characters"),
+            std::string::npos);
+}
+
 TEST(Experiment, RefusesARobotWithoutJoints) {
   const hal::RobotConfig bare = robot("name = 'm'\n[model]\nurdf = 'm.urdf'\nbase = 'fixed'\n");
   EXPECT_NE(errors_of(kExperiment, bare).find("nothing to control"), std::string::npos);

@@ -209,6 +209,46 @@ TEST(JointServicesOf, ARunThatDoesNotControlYetRefuseModes) {
   EXPECT_EQ(run.services().joints()[1].gains[0].kp, 200.0) << "what is not named stays";
 }
 
+/// Joint 1's position gains after a controller that has `joint` has set them.
+hal::PidGains gains_after(std::size_t joint, hal::PidGains wanted, std::vector<Fault>& faults,
+                          const GainsRequest& operators = {}) {
+  JointRun run;
+  EXPECT_TRUE(
+      run.host.add("tuner", std::make_unique<test::Tuner>(joint, 1, wanted), test::parameters()));
+  run.begin({});
+  run.steps(50);
+  EXPECT_TRUE(
+      run.services().set_gains("elbow", PidLoop::kPosition, operators, RunServices::Patience{0}));
+  run.steps(1);
+  faults = run.cycle->faults();
+  EXPECT_EQ(run.services().joints()[1].gains[0], run.host.gains().gains(1, PidLoop::kPosition))
+      << "what is shown is in force";
+  return run.services().joints()[1].gains[0];
+}
+
+TEST(JointServicesOf, AControllerSetsTheGainsOfItsOwnJointsUpToTheirLimits) {
+  std::vector<Fault> faults;
+  EXPECT_EQ(gains_after(1, {.kp = 20.0, .ki = 1.0}, faults),
+            (hal::PidGains{.kp = 20.0, .ki = 1.0}));
+  EXPECT_TRUE(faults.empty());
+  const hal::PidGains usual = gains_after(0, {}, faults);
+  EXPECT_EQ(usual.kp, 200.0) << "a joint that another may have";
+  ASSERT_EQ(faults.size(), 1U);
+  EXPECT_EQ(faults[0].joint, "elbow");
+  EXPECT_NE(faults[0].text.find("'tuner' wrote to this joint, its mode or its gains"),
+            std::string::npos);
+  for (const double kp : {1e9, -1.0, std::nan("")}) {
+    EXPECT_EQ(gains_after(1, {.kp = kp}, faults), usual);
+    EXPECT_EQ(faults.size(), 1U);
+  }
+}
+
+TEST(JointServicesOf, AnOperatorsGainsLeaveWhatAControllerHasSet) {
+  std::vector<Fault> faults;
+  EXPECT_EQ(gains_after(1, {.kp = 20.0, .ki = 1.0}, faults, {.kd = 3.0}),
+            (hal::PidGains{.kp = 20.0, .ki = 1.0, .kd = 3.0}));
+}
+
 TEST_F(JointServices, HoldJointsAgainAfterAReset) {
   ASSERT_TRUE(mode("elbow", ControlMode::kTorque));
   steps(10);

@@ -96,8 +96,8 @@ void run_with_stray(TestRun& run) {
   EXPECT_EQ(first.cycle, 19U) << "the first in which controllers run";
   EXPECT_EQ(first.joint, run.robot.joints[0].name);
   EXPECT_EQ(first.text,
-            "the controller 'stray' wrote to this joint, or its mode, without a claim: "
-            "taken back");
+            "the controller 'stray' wrote to this joint, its mode or its gains without a claim, or "
+            "what the joint cannot do: taken back");
 }
 
 TEST(RobotCycle, WhatAControllerHasNotClaimedIsTakenBackAndTold) {

@@ -14,6 +14,7 @@ class RunStatisticsOfTwo : public testing::Test {
     command_.position_rad()[0] = wanted;
     state_.position_rad()[0] = measured;
     statistics_.take(state_, command_, &truth_, limits_);
+    statistics_.take_base(&truth_);
   }
   void foot(std::size_t index, double x, double force_N) {
     truth_.foot_position_m()[3 * index] = x;
@@ -135,6 +136,24 @@ TEST_F(RunStatisticsOfTwo, GivesTheBasesHeightsAndItsLastTilt) {
   EXPECT_EQ(base->min_height_m, 0.7);
   EXPECT_EQ(base->max_height_m, 0.9);
   EXPECT_NEAR(base->final_tilt_rad, angle, 1e-15);
+  EXPECT_NEAR(base->max_tilt_rad, angle, 1e-15);
+}
+
+TEST_F(RunStatisticsOfTwo, SeesTheBaseFallWhenNoControllerRunsAnyMore) {
+  truth_.base_quaternion()[3] = 1.0;
+  truth_.base_position_m()[2] = 0.8;
+  take(0, 0);
+  truth_.base_quaternion()[0] = std::sin(0.8);
+  truth_.base_quaternion()[3] = std::cos(0.8);
+  truth_.base_position_m()[2] = 0.1;
+  statistics_.take_base(&truth_);
+  EXPECT_EQ(statistics_.base()->min_height_m, 0.1);
+  EXPECT_NEAR(statistics_.base()->final_tilt_rad, 1.6, 1e-12);
+  truth_.hoist_share()[0] = 1.0;  // what hangs from a hoist has not fallen
+  truth_.base_position_m()[2] = 0.05;
+  statistics_.take_base(&truth_);
+  statistics_.take_base(nullptr);
+  EXPECT_EQ(statistics_.base()->min_height_m, 0.1);
 }
 
 /// Against the truth, whatever the yaw, which no sensor tells.

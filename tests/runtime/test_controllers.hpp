@@ -118,6 +118,31 @@ class Stray : public Controller {
   bool chooses_;
 };
 
+/// Claims one joint, and sets the gains of another, or of the same, in its first update().
+class Tuner : public Controller {
+ public:
+  Tuner(std::size_t joint, std::size_t tuned, hal::PidGains gains)
+      : joint_(joint), tuned_(tuned), wanted_(gains) {}
+
+  Status configure(ControllerSetup& setup) override {
+    setup.claim(joint_, hal::ControlMode::kPosition);
+    gains_ = &setup.gains;
+    return {};
+  }
+  void start(const hal::CycleTime&, const hal::StateImage&, hal::CommandImage&) noexcept override {}
+  Code update(const hal::CycleTime&, const hal::StateImage&, hal::CommandImage&) noexcept override {
+    if (!done_) gains_->set_gains(tuned_, hal::PidLoop::kPosition, wanted_);
+    done_ = true;
+    return Code::kOk;
+  }
+
+ private:
+  std::size_t joint_, tuned_;
+  hal::PidGains wanted_;
+  hal::ParameterImage* gains_ = nullptr;
+  bool done_ = false;
+};
+
 /// Parameters without a file.
 inline TomlTable parameters(const std::string& text = "") {
   return TomlDocument::parse(text, "x.toml")->root();

@@ -24,6 +24,7 @@ class Hangs final : public Controller {
     throws_ = setup.parameters.boolean_or("throws", false);
     crash_ = setup.parameters.choice_or("crash", "no",
                                         {"no", "null", "stack", "abort", "divide", "exit"});
+    if (setup.parameters.boolean_or("at_once", false)) crash();
     for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
       setup.claim(j, hal::ControlMode::kPosition);
     }
