@@ -17,6 +17,9 @@ std::string Backend::fault_text(FaultCause cause, std::uint32_t code) const {
     case FaultCause::kBoardStopped: return "its board left operation by itself";
     case FaultCause::kBoardRefused: return "its board cannot be configured";
     case FaultCause::kTwoBoards: return "two boards answer under its board's id";
+    case FaultCause::kNotFollowing:
+      return "it does not follow its command: is the joint blocked, does its drive get its "
+             "commands?";
   }
   char text[48];
   std::snprintf(text, sizeof text, "the drive reports error 0x%04X", code);

@@ -164,12 +164,13 @@ struct JointConfig {
   std::optional<double> max_torque_rate_Nm_s = {};  ///< of the torque reference
   double encoder_counts_per_rev = 0.0;              ///< link encoder
   double motor_encoder_counts_per_rev = 0.0;        ///< motor encoder, per revolution at the link
-  double torque_noise_Nm = 0.0;      ///< standard deviation of the spring torque's measurement
-  double following_error_rad = 0.5;  ///< in CSP, beyond it for longer than the next: a fault;
-  double following_timeout_s = 0.1;  ///< 0 rad: not watched
-  double max_oscillation = 0.35;     ///< RMS of the motor torque's fast part over the most that the
-                                     ///< drive gives; 0: not watched
-  double oscillation_time_s = 1.0;   ///< of that mean
+  double torque_noise_Nm = 0.0;        ///< standard deviation of the spring torque's measurement
+  double following_error_rad = 0.5;    ///< in CSP, beyond it for longer than the next: a fault;
+  double following_timeout_s = 0.1;    ///< 0 rad: not watched
+  bool following_error_given = false;  ///< following_error_rad is the file's, not its default
+  double max_oscillation = 0.35;    ///< RMS of the motor torque's fast part over the most that the
+                                    ///< drive gives; 0: not watched
+  double oscillation_time_s = 1.0;  ///< of that mean
   std::optional<BrakeConfig> brake = {};
   std::optional<HomingConfig> homing = {};  ///< none: its encoder is absolute
   bool reversed = false;                    ///< the drive counts down as the joint's angle grows

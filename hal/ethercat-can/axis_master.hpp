@@ -9,6 +9,7 @@
 #include "canopen/drive_abilities.hpp"
 #include "canopen/drive_machine.hpp"
 #include "hal/ethercat-can/axis_codec.hpp"
+#include "hal/ethercat-can/follow_watch.hpp"
 #include "hal/ethercat-can/homing_sequence.hpp"
 #include "hal/image.hpp"
 
@@ -17,10 +18,11 @@ namespace tandem::hal::can {
 /// Why an axis does not follow its command.
 enum class AxisError : std::uint8_t {
   kNone = 0,
-  kDriveFault,   ///< the drive says so; the code is CiA 402's error code
-  kNotEnabled,   ///< it did not reach Operation Enabled in time
-  kLeftEnabled,  ///< it left Operation Enabled by itself
-  kNodeLost,     ///< its board is not in operation any more
+  kDriveFault,    ///< the drive says so; the code is CiA 402's error code
+  kNotEnabled,    ///< it did not reach Operation Enabled in time
+  kLeftEnabled,   ///< it left Operation Enabled by itself
+  kNodeLost,      ///< its board is not in operation any more
+  kNotFollowing,  ///< its position stays away from its command
 };
 
 /// What a drive tells and can, where drives differ.
@@ -33,6 +35,7 @@ struct AxisTraits {
   bool tells_mode = true;      ///< else an enabled axis is in the mode that was sent
   bool homes = false;          ///< the joint has a homing, and the drive can be told to begin it
   bool tells_motor = true;     ///< the motor's position by itself; else the link's is taken for it
+  FollowLimits follow{};
 };
 
 class AxisMaster {
@@ -57,7 +60,7 @@ class AxisMaster {
   /// @param stiffness, damping  of the impedance mode until a command says otherwise
   AxisMaster(const AxisScale& scale, const AxisTraits& traits, double stiffness_Nm_rad,
              double damping_Nms_rad) noexcept
-      : scale_(scale), traits_(traits) {
+      : scale_(scale), traits_(traits), lag_(traits.follow) {
     raw_.stiffness = static_cast<float>(stiffness_Nm_rad);
     raw_.damping = static_cast<float>(damping_Nms_rad);
   }
@@ -112,6 +115,8 @@ class AxisMaster {
   [[nodiscard]] bool enabled() const noexcept {
     return heard_ && drive() == canopen::DriveState::kOperationEnabled;
   }
+  /// kReset is not through: the drive is in fault, or has not been disabled yet.
+  [[nodiscard]] bool in_reset() const noexcept TANDEM_RT;
   /// True when no torque can come from the drive any more.
   [[nodiscard]] bool off() const noexcept TANDEM_RT;
   [[nodiscard]] AxisError error() const noexcept { return error_; }
@@ -129,6 +134,8 @@ class AxisMaster {
   [[nodiscard]] std::uint16_t enable_operation() const noexcept;
   [[nodiscard]] std::uint16_t reset_controlword() noexcept;
   void seed() noexcept;
+  [[nodiscard]] bool lags(std::int64_t now_ns) noexcept;
+  [[nodiscard]] double position_error_rad() const noexcept;
   bool enable_is_late(std::int64_t now_ns) noexcept;
   bool reset_is_late(std::int64_t now_ns) noexcept;
   void go_home(const CommandImage* image, std::size_t joint, std::int64_t now_ns) noexcept;
@@ -141,7 +148,9 @@ class AxisMaster {
   TargetState target_ = TargetState::kNothing;
   AxisError error_ = AxisError::kNone;
   HomingSequence homing_;
-  bool was_idle_ = false;  ///< kHome: the image has had the joint idle since
+  FollowWatch lag_;
+  std::int32_t previous_target_ = 0;  ///< the target position before the one in `raw_`
+  bool was_idle_ = false;             ///< kHome: the image has had the joint idle since
   bool heard_ = false;
   bool was_enabled_ = false;  ///< reached Operation Enabled under the present wish to be
   std::uint16_t fault_code_ = 0;

@@ -117,6 +117,7 @@ FaultCause DriveMaster::Impl::cause(std::size_t joint) const noexcept TANDEM_RT 
                  : FaultCause::kDrive;
     case AxisError::kNotEnabled: return FaultCause::kNotEnabled;
     case AxisError::kLeftEnabled: return FaultCause::kLeftEnabled;
+    case AxisError::kNotFollowing: return FaultCause::kNotFollowing;
     case AxisError::kNodeLost: return node_cause(nodes[joint_node[joint]].master.error());
   }
   return FaultCause::kDrive;
@@ -186,7 +187,10 @@ bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
                                                                     : TargetState::kHold;
   bool changed = false;
   for (AxisMaster& axis : axes) {
-    const TargetState its = axis.error() == AxisError::kNone ? target : TargetState::kNothing;
+    TargetState its = axis.error() == AxisError::kNone ? target : TargetState::kNothing;
+    if (axis.error() == AxisError::kNotFollowing && target != TargetState::kNothing) {
+      its = TargetState::kQuickStop;  // it has no fault of its own: it can brake
+    }
     changed = changed || axis.target() != its;
     axis.set_target(its, now_ns);
   }
@@ -242,10 +246,7 @@ void DriveMaster::Impl::recover() noexcept TANDEM_RT {
     if (axis.error() == AxisError::kNodeLost) {
       if (node_of(joint).master.running() && axis.heard()) axis.clear_error();
     } else if (axis.target() == TargetState::kReset) {
-      using canopen::DriveState;
-      const bool faulted =
-          axis.drive() == DriveState::kFault || axis.drive() == DriveState::kFaultReactionActive;
-      if (faulted) continue;
+      if (axis.in_reset()) continue;
       axis.clear_error();
       axis.set_target(TargetState::kNothing, now_ns);
     }

@@ -145,6 +145,11 @@ std::string DriveMaster::Impl::axis_text(std::size_t joint) const {
     case AxisError::kLeftEnabled:
       return fmt::format("{}: left 'operation enabled' for '{}' by itself at {:.3f} s",
                          joint_name(joint), canopen::to_string(axis.drive()), at_s);
+    case AxisError::kNotFollowing:
+      return fmt::format(
+          "{}: does not follow its command at {:.3f} s: is the joint blocked, does the drive get "
+          "its commands?",
+          joint_name(joint), at_s);
     case AxisError::kNodeLost: {
       const std::string cause = node_text(nodes[joint_node[joint]]);
       return fmt::format("{}: board lost at {:.3f} s{}{}", joint_name(joint), at_s,

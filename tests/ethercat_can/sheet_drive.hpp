@@ -25,6 +25,7 @@ class SheetDrive {
   SheetDrive(DataSheet sheet, int node) : sheet_(std::move(sheet)), node_(node) { power_on(); }
 
   int boot_ms = 2;            ///< from a reset to the boot-up message
+  bool deaf = false;          ///< no RPDO reaches it
   bool answers_late = false;  ///< every SDO answer comes a second time, later
   bool emergency_at_boot = false;
   int homing_ms = 50;                 ///< from bit 4 until it is there; never in a negative time
@@ -54,6 +55,7 @@ class SheetDrive {
     }
     if (nmt_ != 5) return;
     if (id == 0x80) return on_sync();
+    if (deaf) return;
     for (int n = 0; n < 4; ++n) {
       const auto cob = value(0x1400 + n, 1);
       if ((cob & 0x80000000) == 0 && (cob & 0x7FF) == id) take_rpdo(n, frame);
