@@ -20,6 +20,9 @@ std::string Backend::fault_text(FaultCause cause, std::uint32_t code) const {
     case FaultCause::kNotFollowing:
       return "it does not follow its command: is the joint blocked, does its drive get its "
              "commands?";
+    case FaultCause::kIgnoresStop:
+      return "its drive does not obey the stop, and may still be enabled: cut its power (emergency "
+             "stop, STO)";
   }
   char text[48];
   std::snprintf(text, sizeof text, "the drive reports error 0x%04X", code);

@@ -36,6 +36,7 @@ enum class FaultCause : std::uint8_t {
   kBoardRefused,  ///< its board cannot be configured
   kTwoBoards,     ///< two boards answer under its board's id
   kNotFollowing,  ///< its position stays away from its command
+  kIgnoresStop,   ///< its drive stays enabled after a stop; its board was told to stop
 };
 
 /// Whether the joint's board is the matter, and not its drive alone.

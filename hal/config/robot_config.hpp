@@ -3,6 +3,7 @@
 // Layer: hal.  Thread: non-RT to read; immutable afterwards.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -319,9 +320,11 @@ struct RobotConfig {
   }
   [[nodiscard]] std::vector<std::string> passive_names() const;
   /// What a fault of joint `joint` for `cause` stops: an emergency stop the robot, any other fault
-  /// what the joint says.
+  /// what the joint says. A stop that is not obeyed stops the robot whatever the joint says.
   [[nodiscard]] StopCategory category_of(std::size_t joint, FaultCause cause) const noexcept {
-    return cause == FaultCause::kEmergencyInput ? emergency_stop : joints[joint].on_fault;
+    if (cause == FaultCause::kEmergencyInput) return emergency_stop;
+    const StopCategory own = joints[joint].on_fault;
+    return cause == FaultCause::kIgnoresStop ? std::min(own, StopCategory::kCategory1) : own;
   }
   [[nodiscard]] const BoardConfig* board(std::string_view name) const;
   [[nodiscard]] const BusConfig* bus(std::string_view name) const;

@@ -71,6 +71,14 @@ bool AxisMaster::check(std::int64_t now_ns) noexcept TANDEM_RT {
   return false;
 }
 
+bool AxisMaster::ignores_stop(std::int64_t now_ns) noexcept TANDEM_RT {
+  const bool stops = target_ == TargetState::kNothing || target_ == TargetState::kQuickStop;
+  if (!stops || age_cycles_ != 0 || !enabled()) return false;
+  const std::int64_t most_ns =
+      target_ == TargetState::kNothing ? kDisableTimeoutNs : kQuickStopTimeoutNs;
+  return ++disobedient_cycles_ > kObeyCycles && now_ns - since_ns_ >= most_ns;
+}
+
 /// In the position modes alone, and not while the drive changes its mode.
 bool AxisMaster::lags(std::int64_t now_ns) noexcept {
   const auto mode = static_cast<canopen::Mode>(raw_.mode);
@@ -128,6 +136,7 @@ void AxisMaster::set_target(TargetState target, std::int64_t now_ns) noexcept TA
   target_ = target;
   since_ns_ = now_ns;
   reset_cycles_ = 0;
+  disobedient_cycles_ = 0;
 }
 
 bool AxisMaster::command(const CommandImage* image, std::size_t joint,
@@ -325,7 +334,7 @@ void AxisMaster::forget() noexcept TANDEM_RT {
 }
 
 void AxisMaster::archive(Archive& ar) {
-  ar(homing_, was_idle_, held_cycles_, lag_, previous_target_);
+  ar(homing_, was_idle_, held_cycles_, lag_, previous_target_, ignored_stop_, disobedient_cycles_);
   ar(feedback_, raw_, target_, error_, heard_, was_enabled_, fault_code_, emergency_code_,
      age_cycles_, reset_cycles_, previous_velocity_, sample_ns_, trouble_ns_, since_ns_,
      acceleration_rad_s2_);

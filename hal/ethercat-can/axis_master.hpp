@@ -54,6 +54,11 @@ class AxisMaster {
 
   static constexpr std::int64_t kEnableTimeoutNs = 2'000'000'000;
   static constexpr std::int64_t kResetTimeoutNs = 1'000'000'000;
+  /// How long a drive may stay in Operation Enabled after category 0 and after a quick stop: a
+  /// drive that ramps down is in Quick Stop Active.
+  static constexpr std::int64_t kDisableTimeoutNs = 200'000'000;
+  static constexpr std::int64_t kQuickStopTimeoutNs = 500'000'000;
+  static constexpr std::uint32_t kObeyCycles = 4;  ///< the same, in samples
   /// A fault reset's bit 7 changes every so many cycles, so that a board that looks seldom sees it.
   static constexpr std::uint32_t kResetToggleCycles = 4;
 
@@ -86,6 +91,14 @@ class AxisMaster {
   void received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT;
   /// Looks for a fault in what was received. @return true when it is a new one.
   bool check(std::int64_t now_ns) noexcept TANDEM_RT;
+  /// Whether the drive stays enabled in spite of a stop: once a cycle, after received().
+  [[nodiscard]] bool ignores_stop(std::int64_t now_ns) noexcept TANDEM_RT;
+  /// It did, before its board was lost for it.
+  [[nodiscard]] bool ignored_stop() const noexcept { return ignored_stop_; }
+  void latch_ignored_stop(std::uint16_t code, std::int64_t now_ns) noexcept TANDEM_RT {
+    latch(AxisError::kNodeLost, code, now_ns);
+    ignored_stop_ = true;
+  }
   void latch(AxisError error, std::uint16_t code, std::int64_t now_ns) noexcept TANDEM_RT;
 
   void set_target(TargetState target, std::int64_t now_ns) noexcept TANDEM_RT;
@@ -122,7 +135,10 @@ class AxisMaster {
   [[nodiscard]] AxisError error() const noexcept { return error_; }
   [[nodiscard]] std::uint16_t fault_code() const noexcept { return fault_code_; }
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
-  void clear_error() noexcept { error_ = AxisError::kNone; }
+  void clear_error() noexcept {
+    error_ = AxisError::kNone;
+    ignored_stop_ = false;
+  }
   /// The node is configured anew: nothing of what was heard holds any more.
   void forget() noexcept TANDEM_RT;
 
@@ -152,13 +168,15 @@ class AxisMaster {
   std::int32_t previous_target_ = 0;  ///< the target position before the one in `raw_`
   bool was_idle_ = false;             ///< kHome: the image has had the joint idle since
   bool heard_ = false;
+  bool ignored_stop_ = false;
   bool was_enabled_ = false;  ///< reached Operation Enabled under the present wish to be
   std::uint16_t fault_code_ = 0;
   std::uint16_t emergency_code_ = 0;
   std::uint16_t last_emergency_ = 0;  ///< for a warning; no state
   std::uint32_t age_cycles_ = 0;
   std::uint32_t reset_cycles_ = 0;
-  std::uint32_t held_cycles_ = 0;  ///< kHome: since the homing is over
+  std::uint32_t disobedient_cycles_ = 0;  ///< since the stop: samples of an enabled drive
+  std::uint32_t held_cycles_ = 0;         ///< kHome: since the homing is over
   std::int32_t previous_velocity_ = 0;
   std::int64_t sample_ns_ = 0;
   std::int64_t trouble_ns_ = 0;

@@ -258,6 +258,7 @@ Code DriveMaster::receive(StateImage& state) noexcept TANDEM_RT {
       m.write_pdos();
     }
   }
+  m.watch_stops();
   (void)m.flush();
   m.fill(state);
   return m.receive_code();

@@ -113,6 +113,11 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
     case NodeError::kTwoNodes:
       return fmt::format("{}: two nodes answer under this id at {:.3f} s; give one of them another",
                          who, seconds(m.trouble_time_ns()));
+    case NodeError::kIgnoresStop:
+      return fmt::format(
+          "{}: a drive does not obey the stop at {:.3f} s: NMT stop was sent; cut its power "
+          "(emergency stop, STO)",
+          who, seconds(m.trouble_time_ns()));
     case NodeError::kFeedbackLost:
       return fmt::format("{}: no complete TPDO for {} cycles at {:.3f} s", who, node.timeout_cycles,
                          seconds(m.trouble_time_ns()));

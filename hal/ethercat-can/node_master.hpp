@@ -24,6 +24,7 @@ enum class NodeError : std::uint8_t {
   kLeftOperational,  ///< its heartbeat says another NMT state
   kFeedbackLost,     ///< its heartbeat is there, its TPDOs are not
   kTwoNodes,         ///< two answer under its id
+  kIgnoresStop,      ///< a drive of it stays enabled after a stop
 };
 
 /// How far a node is brought up.

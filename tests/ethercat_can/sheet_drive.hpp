@@ -42,6 +42,8 @@ class SheetDrive {
   [[nodiscard]] bool enabled(int axis = 0) const { return state_[axis] == 4; }
   [[nodiscard]] int guarded() const { return guarded_; }
   void fault() { state_[0] = 5; }
+  /// It boots once more, after boot_ms.
+  void lose_power() { power_on(); }
 
   void receive(const Frame& frame) {
     const auto id = static_cast<int>(frame.id);
