@@ -13,6 +13,7 @@ std::string Backend::fault_text(FaultCause cause, std::uint32_t code) const {
     case FaultCause::kLeftEnabled: return "the drive was disabled by itself";
     case FaultCause::kBoardSilent: return "its board sends no feedback any more";
     case FaultCause::kHeartbeatLost: return "its board's heartbeat was lost";
+    case FaultCause::kGuardingLost: return "its board does not answer node guarding any more";
     case FaultCause::kBoardRebooted: return "its board booted again by itself";
     case FaultCause::kBoardStopped: return "its board left operation by itself";
     case FaultCause::kBoardRefused: return "its board cannot be configured";

@@ -36,6 +36,7 @@ enum class FaultCause : std::uint8_t {
   kBoardRefused,  ///< its board cannot be configured
   kTwoBoards,     ///< two boards answer under its board's id
   kNotFollowing,  ///< its position stays away from its command
+  kGuardingLost,  ///< its board does not answer node guarding any more
   kIgnoresStop,   ///< its drive stays enabled after a stop; its board was told to stop
 };
 

@@ -33,6 +33,7 @@ constexpr std::int64_t kUnheardNs = 1'500'000'000;
 FaultCause node_cause(NodeError error) noexcept {
   switch (error) {
     case NodeError::kHeartbeatLost: return FaultCause::kHeartbeatLost;
+    case NodeError::kGuardingLost: return FaultCause::kGuardingLost;
     case NodeError::kRebooted: return FaultCause::kBoardRebooted;
     case NodeError::kLeftOperational: return FaultCause::kBoardStopped;
     case NodeError::kWrongIdentity:

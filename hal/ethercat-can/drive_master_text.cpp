@@ -107,6 +107,10 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
     case NodeError::kHeartbeatLost:
       return fmt::format("{}: heartbeat lost at {:.3f} s (none for {} ms)", who,
                          seconds(m.trouble_time_ns()), kHeartbeatPeriods * node.plan.heartbeat_ms);
+    case NodeError::kGuardingLost:
+      return fmt::format("{}: guarding lost at {:.3f} s (no answer to node guarding for {} ms)",
+                         who, seconds(m.trouble_time_ns()),
+                         kHeartbeatPeriods * node.plan.heartbeat_ms);
     case NodeError::kLeftOperational:
       return fmt::format("{}: went to {} by itself at {:.3f} s", who,
                          canopen::to_string(m.nmt_state()), seconds(m.trouble_time_ns()));

@@ -203,7 +203,9 @@ void NodeMaster::guard(std::int64_t now_ns, FrameSink& out) noexcept {
 
 void NodeMaster::watch_heartbeat(std::int64_t now_ns) noexcept {
   if (watch_ == NodeWatch::kNothing) return;
-  if (now_ns - heard_ns_ >= heartbeat_timeout_ns_) fail(NodeError::kHeartbeatLost, now_ns);
+  if (now_ns - heard_ns_ < heartbeat_timeout_ns_) return;
+  const bool guarded = watch_ == NodeWatch::kGuarding;
+  fail(guarded ? NodeError::kGuardingLost : NodeError::kHeartbeatLost, now_ns);
 }
 
 void NodeMaster::fail(NodeError error, std::int64_t now_ns) noexcept TANDEM_RT {

@@ -21,6 +21,7 @@ enum class NodeError : std::uint8_t {
   kNotOperational,  ///< it did not follow NMT start
   kRebooted,        ///< it booted again by itself
   kHeartbeatLost,
+  kGuardingLost,     ///< it does not answer the requests for its state
   kLeftOperational,  ///< its heartbeat says another NMT state
   kFeedbackLost,     ///< its heartbeat is there, its TPDOs are not
   kTwoNodes,         ///< two answer under its id

@@ -24,8 +24,9 @@ class SheetDrive {
  public:
   SheetDrive(DataSheet sheet, int node) : sheet_(std::move(sheet)), node_(node) { power_on(); }
 
-  int boot_ms = 2;            ///< from a reset to the boot-up message
-  bool deaf = false;          ///< no RPDO reaches it
+  int boot_ms = 2;    ///< from a reset to the boot-up message
+  bool deaf = false;  ///< no RPDO reaches it
+  bool answers_guarding = true;
   bool answers_late = false;  ///< every SDO answer comes a second time, later
   bool emergency_at_boot = false;
   int homing_ms = 50;                 ///< from bit 4 until it is there; never in a negative time
@@ -51,6 +52,7 @@ class SheetDrive {
     if (boot_in_ms_ > 0) return;
     if (id == 0x600 + node_) return on_sdo(frame);
     if (id == 0x700 + node_ && (frame.flags & canopen::kFlagRtr) != 0) {
+      if (!answers_guarding) return;
       ++guarded_;
       toggle_ ^= 0x80;
       return send(0x700 + node_, {static_cast<std::uint8_t>(toggle_ | nmt_)});
