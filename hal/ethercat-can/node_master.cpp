@@ -92,6 +92,13 @@ void NodeMaster::on_heartbeat(NmtState state, std::int64_t now_ns) noexcept TAND
   }
 }
 
+void NodeMaster::on_tpdo(std::int64_t now_ns) noexcept TANDEM_RT {
+  const std::int64_t heartbeat_ns = heartbeat_timeout_ns_ / kHeartbeatPeriods;
+  if (stage_ != NodeStage::kStarting || 2 * heartbeat_ns <= start_time_ns_) return;
+  nmt_ = NmtState::kOperational;
+  enter(NodeStage::kRunning, now_ns);
+}
+
 void NodeMaster::on_sdo(const canopen::Frame& frame, FrameSink& out) noexcept TANDEM_RT {
   sdo_.receive(frame, out);
 }
