@@ -83,5 +83,18 @@ TEST_F(Commands, ThatADriveDoesNotHearInARunThatWaitsStayLatched) {
   EXPECT_EQ(end(), 1);
 }
 
+/// The sheet has neither.
+TEST_F(Commands, AndWhatADriveDoesNotTellIsNotKnown) {
+  begin("");
+  const auto shown = nlohmann::json::parse(to_run("joint show joint1 --json -").out);
+  for (const char* key : {"current_A", "voltage_V", "temperature_C"}) {
+    EXPECT_TRUE(shown[key].is_null()) << key;
+  }
+  const std::string text = to_run("joint show joint1").out;
+  EXPECT_NE(text.find("current         not known\n"), std::string::npos) << text;
+  EXPECT_NE(to_run("joint list --drives").out.find("not known"), std::string::npos);
+  EXPECT_EQ(end(), 0);
+}
+
 }  // namespace
 }  // namespace tandem::apps
