@@ -35,11 +35,14 @@ enum class FaultCause : std::uint8_t {
   kBoardStopped,  ///< its board left NMT operational by itself
   kBoardRefused,  ///< its board cannot be configured
   kTwoBoards,     ///< two boards answer under its board's id
+  kNotFollowing,  ///< its position stays away from its command
+  kGuardingLost,  ///< its board does not answer node guarding any more
+  kIgnoresStop,   ///< its drive stays enabled after a stop; its board was told to stop
 };
 
 /// Whether the joint's board is the matter, and not its drive alone.
 [[nodiscard]] constexpr bool is_of_board(FaultCause cause) noexcept {
-  return cause >= FaultCause::kBoardSilent;
+  return cause >= FaultCause::kBoardSilent && cause != FaultCause::kNotFollowing;
 }
 
 /// As the TOML has it: "category0".

@@ -258,6 +258,29 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
 
 std::string ns(std::int64_t value) { return std::to_string(value) + " ns"; }
 
+/// The master's heartbeat goes out once a cycle at most; after three periods of it boards stop.
+void check_heartbeats(const Experiment& e, TomlTable& root) {
+  const std::int64_t period = e.loop.period_ns;
+  const auto look = [&](const std::string& who, const std::string& on, int heartbeat_ms) {
+    const hal::BusConfig* bus = e.robot.bus(on);
+    const bool on_can = bus != nullptr && bus->kind == hal::BusKind::kCan;
+    const std::int64_t least_ms = (period + 1'999'999) / 2'000'000;
+    if (!on_can || heartbeat_ms >= least_ms) return true;
+    root.error("period_ns",
+               ns(period) + " is more than two heartbeats of " + who + " (heartbeat_ms = " +
+                   std::to_string(heartbeat_ms) + "): it would count the master as lost",
+               "set its heartbeat_ms to " + std::to_string(least_ms) + " or more in " +
+                   e.robot.file + ", or shorten the period");
+    return false;
+  };
+  for (const hal::BoardConfig& board : e.robot.boards) {
+    if (!look("board '" + board.name + "'", board.bus, board.heartbeat_ms)) return;
+  }
+  for (const hal::SensorConfig& sensor : e.robot.sensors) {
+    if (!look("sensor '" + sensor.name + "'", sensor.bus, sensor.heartbeat_ms)) return;
+  }
+}
+
 /// One message: for the first board whose period does not fit, and how many others there are.
 void check_periods(const Experiment& e, TomlTable& root) {
   const std::int64_t period = e.loop.period_ns;
@@ -316,6 +339,7 @@ void remove_noise(hal::RobotConfig& robot) {
 /// Everything that needs both files.
 void combine(Experiment& e, TomlTable& root) {
   check_periods(e, root);
+  check_heartbeats(e, root);
   check_reference(root, "posture", e.posture, e.robot.postures, "posture");
   if (e.posture.empty() && e.robot.model.floating_base && !root.has("posture")) {
     root.error("posture", "a robot with a floating base needs a posture to start from",

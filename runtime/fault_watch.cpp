@@ -27,10 +27,19 @@ bool FaultWatch::is_ill(const hal::StateImage& state, std::size_t joint) const n
   return drive_in_fault(state, joint) || state.age_cycles()[joint] > lost_after_cycles_;
 }
 
+/// A stop that is not obeyed is news of a joint that was in fault before, too.
+FaultWatch::Told FaultWatch::found(const hal::StateImage& state, std::size_t joint) const noexcept {
+  if (!is_ill(state, joint)) return kNothing;
+  const bool disobeys =
+      state.fault()[joint] != 0 && backend_->fault_cause(joint) == hal::FaultCause::kIgnoresStop;
+  return disobeys ? kDisobedient : kFault;
+}
+
 std::optional<FaultRecord> FaultWatch::next_joint(const hal::StateImage& state) noexcept TANDEM_RT {
   for (std::size_t j = 0; j < joint_told_.size(); ++j) {
-    if (joint_told_[j] != 0 || !is_ill(state, j)) continue;
-    joint_told_[j] = 1;
+    const Told now = found(state, j);
+    if (now <= joint_told_[j]) continue;
+    joint_told_[j] = now;
     joint_in_fault_ = true;
     FaultRecord record{.index = static_cast<std::int32_t>(j),
                        .code = state.age_cycles()[j],
@@ -42,6 +51,22 @@ std::optional<FaultRecord> FaultWatch::next_joint(const hal::StateImage& state) 
     }
     record.category = robot_->category_of(j, record.cause);
     return record;
+  }
+  return std::nullopt;
+}
+
+std::optional<FaultRecord> FaultWatch::next_disobedient(
+    const hal::StateImage& state) noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < joint_told_.size(); ++j) {
+    constexpr auto kCause = hal::FaultCause::kIgnoresStop;
+    if (joint_told_[j] == kDisobedient || backend_->fault_cause(j) != kCause) continue;
+    joint_told_[j] = kDisobedient;
+    joint_in_fault_ = true;
+    return FaultRecord{.index = static_cast<std::int32_t>(j),
+                       .code = state.fault()[j],
+                       .source = FaultSource::kDrive,
+                       .cause = kCause,
+                       .category = robot_->category_of(j, kCause)};
   }
   return std::nullopt;
 }
@@ -89,14 +114,14 @@ std::optional<FaultRecord> FaultWatch::fall(const hal::TruthImage& truth) noexce
 void FaultWatch::reset(const hal::StateImage& state) noexcept TANDEM_RT {
   joint_in_fault_ = false;
   for (std::size_t j = 0; j < joint_told_.size(); ++j) {
-    joint_told_[j] = is_ill(state, j) ? 1 : 0;
+    joint_told_[j] = found(state, j);
     joint_in_fault_ = joint_in_fault_ || joint_told_[j] != 0;
   }
 }
 
 void FaultWatch::forget(std::size_t joint) noexcept TANDEM_RT {
-  joint_told_[joint] = 0;
-  joint_in_fault_ = std::ranges::find(joint_told_, 1) != joint_told_.end();
+  joint_told_[joint] = kNothing;
+  joint_in_fault_ = std::ranges::any_of(joint_told_, [](auto told) { return told != kNothing; });
 }
 
 bool FaultWatch::is_there(const FaultRecord& record) const noexcept TANDEM_RT {

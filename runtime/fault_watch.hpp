@@ -29,6 +29,10 @@ class FaultWatch {
   /// A joint whose drive is in fault, or whose feedback is lost; with the joint's category.
   [[nodiscard]] std::optional<FaultRecord> next_joint(
       const hal::StateImage& state) noexcept TANDEM_RT;
+  /// A joint whose drive stays enabled in spite of a stop; of those that next_joint() has not
+  /// returned as such.
+  [[nodiscard]] std::optional<FaultRecord> next_disobedient(
+      const hal::StateImage& state) noexcept TANDEM_RT;
   /// A sensor without samples: a warning, for the joints can still be controlled.
   [[nodiscard]] std::optional<FaultRecord> next_sensor(
       const hal::StateImage& state) noexcept TANDEM_RT;
@@ -63,11 +67,17 @@ class FaultWatch {
   void archive(Archive& ar) { ar(joint_told_, sensor_told_, joint_in_fault_, link_lost_, fall_); }
 
  private:
+  /// What has been reported of a joint.
+  enum Told : std::uint8_t { kNothing = 0, kFault = 1, kDisobedient = 2 };
+
+  [[nodiscard]] Told found(const hal::StateImage& state, std::size_t joint) const noexcept;
+
   const hal::RobotConfig* robot_;
   const hal::Backend* backend_;
   std::uint32_t lost_after_cycles_;
   FallWatch fall_;
-  std::vector<std::uint8_t> joint_told_, sensor_told_;
+  std::vector<std::uint8_t> joint_told_;  ///< a Told each
+  std::vector<std::uint8_t> sensor_told_;
   bool joint_in_fault_ = false, link_lost_ = false;
 };
 

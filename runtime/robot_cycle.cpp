@@ -101,6 +101,8 @@ void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
   if (!run_.in(RunPhase::kBringUp) && !run_.in(RunPhase::kShutDown)) {
     while (const auto found = watch_.next_joint(state_)) fault(*found);
     while (const auto found = watch_.next_sensor(state_)) fault(*found);
+  } else if (run_.in(RunPhase::kShutDown)) {
+    while (const auto found = watch_.next_disobedient(state_)) fault(*found);
   }
   if (run_.controllers_run() && truth_ != nullptr) {
     if (const auto found = watch_.fall(*truth_)) fault(*found);
@@ -318,6 +320,7 @@ void RobotCycle::write() noexcept TANDEM_RT {
     backend_->last_command(command_);
     const bool disabled = backend_->shut_down();
     if (disabled || run_.time_is_over(time_.cycle) || read_code_ == Code::kDiverged) {
+      while (const auto found = watch_.next_disobedient(state_)) fault(*found);
       event(EventKind::kShutDown);
       on(RunEvent::kDisabled);
     }

@@ -105,6 +105,11 @@ std::string limits_of(const Json& joint) {
                      unit_of(joint), number_of(joint, "max_torque_Nm"), torque_unit_of(joint));
 }
 
+/// What not every drive tells.
+std::string told(const Json& joint, const char* key, const char* unit = "") {
+  return joint[key].is_number() ? number_of(joint, key) + unit : "not known";
+}
+
 }  // namespace
 
 void print_joints(const Json& joints) {
@@ -128,8 +133,8 @@ void print_drives(const Json& joints) {
                "winding [degC]", "drive"});
   for (const Json& joint : joints) {
     table.add({joint.value("joint", ""), units.value(joint, "motor_position_rad", unit_of),
-               number_of(joint, "current_A"), number_of(joint, "voltage_V"),
-               number_of(joint, "temperature_C"), drive_of(joint)});
+               told(joint, "current_A"), told(joint, "voltage_V"), told(joint, "temperature_C"),
+               drive_of(joint)});
   }
   table.print(stdout);
 }
@@ -172,9 +177,9 @@ void print_joint(const Json& joint) {
   facts.add("damping", with("damping_Nms_rad", torque + "s/" + unit));
   facts.add("drive", drive_of(joint));
   facts.add("fault", fault.empty() ? "none" : fault);
-  facts.add("current", with("current_A", "A"));
-  facts.add("voltage", with("voltage_V", "V"));
-  facts.add("winding", with("temperature_C", "degC"));
+  facts.add("current", told(joint, "current_A", " A"));
+  facts.add("voltage", told(joint, "voltage_V", " V"));
+  facts.add("winding", told(joint, "temperature_C", " degC"));
   facts.add("sample", sample_of(joint));
   facts.print(stdout);
 }

@@ -27,11 +27,12 @@ const ControlKey kJoint{.name = "joint", .required = true, .doc = "its name"};
 
 using Type = ControlKey::Type;
 
-/// The run, its robot, and how far each joint goes.
+/// The run, its robot, how far each joint goes and what its drive tells.
 struct Run {
   RobotCycle& cycle;
   const hal::RobotConfig& robot;
   std::vector<hal::JointCapabilities> limits;
+  std::vector<hal::MotorFeedback> motors;
 
   /// Null: there is no such joint, which the run itself refuses.
   [[nodiscard]] const hal::JointCapabilities* limits_of(const std::string& joint) const {
@@ -65,6 +66,8 @@ const char* feedback_of(const runtime::JointStatus& look) {
 Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t index) {
   const runtime::JointStatus& look = joint.look;
   const hal::JointCapabilities& limit = run.limits[index];
+  const hal::MotorFeedback& tells = run.motors[index];
+  const auto measured = [](bool told, double value) { return told ? Json(value) : Json(nullptr); };
   const auto& homing = run.robot.joints[index].homing;
   Json gains = Json::object();
   for (const hal::PidLoop loop : kLoops) {
@@ -89,9 +92,9 @@ Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t ind
           {"acceleration_rad_s2", look.acceleration_rad_s2},
           {"motor_position_rad", look.motor_position_rad},
           {"motor_velocity_rad_s", look.motor_velocity_rad_s},
-          {"current_A", look.current_A},
-          {"voltage_V", look.voltage_V},
-          {"temperature_C", look.temperature_C},
+          {"current_A", measured(tells.current, look.current_A)},
+          {"voltage_V", measured(tells.voltage, look.voltage_V)},
+          {"temperature_C", measured(tells.temperature, look.temperature_C)},
           {"stiffness_Nm_rad", look.stiffness_Nm_rad},
           {"damping_Nms_rad", look.damping_Nms_rad},
           {"drive_state", hal::to_string(static_cast<hal::DriveState>(look.drive_state))},
@@ -254,7 +257,8 @@ void add_moves(ControlRegistry& registry, const std::shared_ptr<const Run>& run)
 
 void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle,
                         const hal::RobotConfig& robot) {
-  const auto run = std::make_shared<const Run>(Run{cycle, robot, hal::joint_capabilities(robot)});
+  const auto run = std::make_shared<const Run>(
+      Run{cycle, robot, hal::joint_capabilities(robot), hal::motor_feedback(robot)});
   registry.add("joint.list", ControlEffect::kReads,
                "every joint: who has it, what it does, what is measured", {},
                [run](const Json&) -> Result<Json> { return list(*run); });

@@ -76,6 +76,9 @@ runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
   config.on_stray = e.on_stray;
   config.retreat_cycles =
       static_cast<std::uint64_t>(e.retreat_s * 1e9 / static_cast<double>(e.loop.period_ns));
+  constexpr std::int64_t kShutDown_ns = 2'000'000'000;  // drives that come to rest slowly
+  config.shut_down_cycles = std::max(config.shut_down_cycles,
+                                     static_cast<std::uint64_t>(kShutDown_ns / e.loop.period_ns));
   config.fall = e.fall_limits();
   config.trace_cycles = options.trace.empty() ? 0 : options.trace_cycles;
   return config;

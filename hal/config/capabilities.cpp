@@ -14,12 +14,21 @@ using canopen::Mode;
 
 bool any(const PidGains& gains) { return gains.kp != 0.0 || gains.ki != 0.0 || gains.kd != 0.0; }
 
+struct DriveSheet {
+  const canopen::DataSheet& sheet;
+  int axis = 0;
+};
+
 /// A joint that is on no board yet is taken for one of ours.
-canopen::DriveAbilities drive_of(const RobotConfig& robot, const JointConfig& joint) {
+DriveSheet sheet_of(const RobotConfig& robot, const JointConfig& joint) {
   const BoardConfig* board = robot.board(joint.board);
   static const auto own = canopen::tandem_board_sheet();
-  return canopen::abilities_of(board != nullptr ? *board->sheet : *own,
-                               board != nullptr ? joint.axis : 0);
+  return {board != nullptr ? *board->sheet : *own, board != nullptr ? joint.axis : 0};
+}
+
+canopen::DriveAbilities drive_of(const RobotConfig& robot, const JointConfig& joint) {
+  const DriveSheet drive = sheet_of(robot, joint);
+  return canopen::abilities_of(drive.sheet, drive.axis);
 }
 
 std::uint8_t bit(Capability capability, bool set) {
@@ -101,6 +110,21 @@ JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& j
 std::vector<JointCapabilities> joint_capabilities(const RobotConfig& robot) {
   std::vector<JointCapabilities> out;
   for (const JointConfig& joint : robot.joints) out.push_back(capabilities_of(robot, joint));
+  return out;
+}
+
+std::vector<MotorFeedback> motor_feedback(const RobotConfig& robot) {
+  std::vector<MotorFeedback> out;
+  for (const JointConfig& joint : robot.joints) {
+    const DriveSheet drive = sheet_of(robot, joint);
+    const auto tells = [&](std::uint16_t index) {
+      return canopen::mappable(drive.sheet, canopen::of_axis(index, drive.axis), 0,
+                               canopen::DataType::kInteger16, canopen::kMapTpdo);
+    };
+    out.push_back({.current = tells(canopen::object::kCurrent),
+                   .voltage = tells(canopen::object::kVoltage),
+                   .temperature = tells(canopen::object::kTemperature)});
+  }
   return out;
 }
 

@@ -22,6 +22,15 @@ namespace tandem::hal {
 /// Of every joint, in the image's order.
 [[nodiscard]] std::vector<JointCapabilities> joint_capabilities(const RobotConfig& robot);
 
+/// What a joint's drive tells of its motor besides position, velocity and torque.
+struct MotorFeedback {
+  bool current = true;
+  bool voltage = true;
+  bool temperature = true;
+};
+/// Of every joint, as the data sheets of the drives say.
+[[nodiscard]] std::vector<MotorFeedback> motor_feedback(const RobotConfig& robot);
+
 /// Whether a joint can be put into a mode; asked for every claim at configuration.
 /// @return an Error that names the joint, the mode and the gains table that lacks a loop.
 [[nodiscard]] Status check_capability(const RobotConfig& robot, std::size_t joint, ControlMode mode,

@@ -3,6 +3,7 @@
 // Layer: hal.  Thread: non-RT to read; immutable afterwards.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -164,12 +165,13 @@ struct JointConfig {
   std::optional<double> max_torque_rate_Nm_s = {};  ///< of the torque reference
   double encoder_counts_per_rev = 0.0;              ///< link encoder
   double motor_encoder_counts_per_rev = 0.0;        ///< motor encoder, per revolution at the link
-  double torque_noise_Nm = 0.0;      ///< standard deviation of the spring torque's measurement
-  double following_error_rad = 0.5;  ///< in CSP, beyond it for longer than the next: a fault;
-  double following_timeout_s = 0.1;  ///< 0 rad: not watched
-  double max_oscillation = 0.35;     ///< RMS of the motor torque's fast part over the most that the
-                                     ///< drive gives; 0: not watched
-  double oscillation_time_s = 1.0;   ///< of that mean
+  double torque_noise_Nm = 0.0;        ///< standard deviation of the spring torque's measurement
+  double following_error_rad = 0.5;    ///< in CSP, beyond it for longer than the next: a fault;
+  double following_timeout_s = 0.1;    ///< 0 rad: not watched
+  bool following_error_given = false;  ///< following_error_rad is the file's, not its default
+  double max_oscillation = 0.35;    ///< RMS of the motor torque's fast part over the most that the
+                                    ///< drive gives; 0: not watched
+  double oscillation_time_s = 1.0;  ///< of that mean
   std::optional<BrakeConfig> brake = {};
   std::optional<HomingConfig> homing = {};  ///< none: its encoder is absolute
   bool reversed = false;                    ///< the drive counts down as the joint's angle grows
@@ -318,9 +320,11 @@ struct RobotConfig {
   }
   [[nodiscard]] std::vector<std::string> passive_names() const;
   /// What a fault of joint `joint` for `cause` stops: an emergency stop the robot, any other fault
-  /// what the joint says.
+  /// what the joint says. A stop that is not obeyed stops the robot whatever the joint says.
   [[nodiscard]] StopCategory category_of(std::size_t joint, FaultCause cause) const noexcept {
-    return cause == FaultCause::kEmergencyInput ? emergency_stop : joints[joint].on_fault;
+    if (cause == FaultCause::kEmergencyInput) return emergency_stop;
+    const StopCategory own = joints[joint].on_fault;
+    return cause == FaultCause::kIgnoresStop ? std::min(own, StopCategory::kCategory1) : own;
   }
   [[nodiscard]] const BoardConfig* board(std::string_view name) const;
   [[nodiscard]] const BusConfig* bus(std::string_view name) const;

@@ -40,6 +40,14 @@ void add_bus(TomlTable& table, RobotConfig& robot) {
     table.error("interface", "'" + bus.interface + "' " + problem,
                 "name it as `ip link` does, for instance \"can0\"");
   }
+  const auto same = std::ranges::find(robot.buses, bus.interface, &BusConfig::interface);
+  if (same != robot.buses.end()) {
+    table.error(table.has("interface") ? "interface" : "name",
+                "'" + bus.interface + "' is the interface of bus '" + same->name + "' (line " +
+                    std::to_string(same->line) + "), too: bus '" + bus.name +
+                    "' needs one of its own",
+                "give each [[bus]] another interface");
+  }
   if (bus.fd && bus.data_bitrate < bus.bitrate) {
     table.error("data_bitrate", "is lower than the bitrate of the arbitration phase",
                 "raise it, or set fd = false");

@@ -116,6 +116,7 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   joint.torque_noise_Nm = table.number_or("torque_noise_Nm", 0.0, kNotNegative);
   joint.following_error_rad =
       table.number_or("following_error_rad", joint.following_error_rad, kNotNegative);
+  joint.following_error_given = table.has("following_error_rad");
   joint.following_timeout_s =
       table.number_or("following_timeout_s", joint.following_timeout_s, {0.0, 65.0});
   joint.max_oscillation = table.number_or("max_oscillation", joint.max_oscillation, {0.0, 10.0});

@@ -2,6 +2,9 @@
 // each cycle, and latches the first deviation of the drive from it.
 #include "hal/ethercat-can/axis_master.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "base/archive.hpp"
 
 namespace tandem::hal::can {
@@ -61,7 +64,52 @@ bool AxisMaster::check(std::int64_t now_ns) noexcept TANDEM_RT {
     latch(AxisError::kLeftEnabled, static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
     return true;
   }
+  if (lags(now_ns)) {
+    latch(AxisError::kNotFollowing, static_cast<std::uint16_t>(ErrorCode::kFollowingError), now_ns);
+    return true;
+  }
   return false;
+}
+
+bool AxisMaster::ignores_stop(std::int64_t now_ns) noexcept TANDEM_RT {
+  const bool stops = target_ == TargetState::kNothing || target_ == TargetState::kQuickStop;
+  if (!stops || age_cycles_ != 0 || !enabled()) return false;
+  const std::int64_t most_ns =
+      target_ == TargetState::kNothing ? kDisableTimeoutNs : kQuickStopTimeoutNs;
+  return ++disobedient_cycles_ > kObeyCycles && now_ns - since_ns_ >= most_ns;
+}
+
+/// In the position modes alone, and not while the drive changes its mode.
+bool AxisMaster::lags(std::int64_t now_ns) noexcept {
+  const auto mode = static_cast<canopen::Mode>(raw_.mode);
+  const bool positions = mode == canopen::Mode::kCsp || mode == canopen::Mode::kIp;
+  const bool shown = !traits_.tells_mode || feedback_.mode_display == raw_.mode;
+  if (target_ != TargetState::kFollow || !was_enabled_ || !enabled() || !positions || !shown) {
+    lag_.rest();
+    return false;
+  }
+  return age_cycles_ == 0 && lag_.look(position_error_rad(), now_ns);
+}
+
+/// How far the joint is from the way between the last two targets: the last is in force since this
+/// sample's SYNC, the one before had a cycle's time. Of the link and the motor the nearer counts: a
+/// spring between them may sag.
+double AxisMaster::position_error_rad() const noexcept {
+  const auto outside = [](double from, double to) {
+    return from * to <= 0.0 ? 0.0 : std::min(std::abs(from), std::abs(to));
+  };
+  const auto ahead_rad = [&](std::int32_t target) {
+    const auto counts = static_cast<std::int32_t>(  // the counter may wrap around
+        static_cast<std::uint32_t>(target) - static_cast<std::uint32_t>(feedback_.position));
+    return counts / scale_.counts_per_rad;
+  };
+  const double last_rad = ahead_rad(raw_.target_position);
+  const double before_rad = ahead_rad(previous_target_);
+  const double link_rad = outside(before_rad, last_rad);
+  if (!traits_.tells_motor) return link_rad;
+  const double wound_rad = feedback_.motor_position / scale_.motor_counts_per_rad -
+                           scale_.from_zero(feedback_.position) / scale_.counts_per_rad;
+  return std::min(link_rad, outside(before_rad - wound_rad, last_rad - wound_rad));
 }
 
 void AxisMaster::latch(AxisError error, std::uint16_t code,
@@ -74,6 +122,7 @@ void AxisMaster::latch(AxisError error, std::uint16_t code,
 void AxisMaster::set_target(TargetState target, std::int64_t now_ns) noexcept TANDEM_RT {
   if (target == target_) return;
   homing_.interrupt();
+  lag_.rest();
   const bool was_up = target_ == TargetState::kBringUp || target_ == TargetState::kEnable ||
                       target_ == TargetState::kHome;
   const bool goes_on = was_up && target == TargetState::kFollow;
@@ -87,10 +136,12 @@ void AxisMaster::set_target(TargetState target, std::int64_t now_ns) noexcept TA
   target_ = target;
   since_ns_ = now_ns;
   reset_cycles_ = 0;
+  disobedient_cycles_ = 0;
 }
 
 bool AxisMaster::command(const CommandImage* image, std::size_t joint,
                          std::int64_t now_ns) noexcept TANDEM_RT {
+  previous_target_ = raw_.target_position;
   switch (target_) {
     case TargetState::kNothing:
       raw_.controlword = controlword::kCommandDisableVoltage;
@@ -232,8 +283,14 @@ bool AxisMaster::enable_is_late(std::int64_t now_ns) noexcept {
 }
 
 bool AxisMaster::reset_is_late(std::int64_t now_ns) noexcept {
-  if (drive() != WireState::kFault && drive() != WireState::kFaultReactionActive) return false;
-  return now_ns - since_ns_ >= kResetTimeoutNs;
+  return in_reset() && now_ns - since_ns_ >= kResetTimeoutNs;
+}
+
+/// A drive that is still enabled does not hear what it is told.
+bool AxisMaster::in_reset() const noexcept TANDEM_RT {
+  const WireState state = drive();
+  return state == WireState::kFault || state == WireState::kFaultReactionActive ||
+         state == WireState::kOperationEnabled;
 }
 
 bool AxisMaster::off() const noexcept TANDEM_RT {
@@ -277,7 +334,7 @@ void AxisMaster::forget() noexcept TANDEM_RT {
 }
 
 void AxisMaster::archive(Archive& ar) {
-  ar(homing_, was_idle_, held_cycles_);
+  ar(homing_, was_idle_, held_cycles_, lag_, previous_target_, ignored_stop_, disobedient_cycles_);
   ar(feedback_, raw_, target_, error_, heard_, was_enabled_, fault_code_, emergency_code_,
      age_cycles_, reset_cycles_, previous_velocity_, sample_ns_, trouble_ns_, since_ns_,
      acceleration_rad_s2_);

@@ -9,6 +9,7 @@
 #include "canopen/drive_abilities.hpp"
 #include "canopen/drive_machine.hpp"
 #include "hal/ethercat-can/axis_codec.hpp"
+#include "hal/ethercat-can/follow_watch.hpp"
 #include "hal/ethercat-can/homing_sequence.hpp"
 #include "hal/image.hpp"
 
@@ -17,10 +18,11 @@ namespace tandem::hal::can {
 /// Why an axis does not follow its command.
 enum class AxisError : std::uint8_t {
   kNone = 0,
-  kDriveFault,   ///< the drive says so; the code is CiA 402's error code
-  kNotEnabled,   ///< it did not reach Operation Enabled in time
-  kLeftEnabled,  ///< it left Operation Enabled by itself
-  kNodeLost,     ///< its board is not in operation any more
+  kDriveFault,    ///< the drive says so; the code is CiA 402's error code
+  kNotEnabled,    ///< it did not reach Operation Enabled in time
+  kLeftEnabled,   ///< it left Operation Enabled by itself
+  kNodeLost,      ///< its board is not in operation any more
+  kNotFollowing,  ///< its position stays away from its command
 };
 
 /// What a drive tells and can, where drives differ.
@@ -33,6 +35,7 @@ struct AxisTraits {
   bool tells_mode = true;      ///< else an enabled axis is in the mode that was sent
   bool homes = false;          ///< the joint has a homing, and the drive can be told to begin it
   bool tells_motor = true;     ///< the motor's position by itself; else the link's is taken for it
+  FollowLimits follow{};
 };
 
 class AxisMaster {
@@ -51,13 +54,18 @@ class AxisMaster {
 
   static constexpr std::int64_t kEnableTimeoutNs = 2'000'000'000;
   static constexpr std::int64_t kResetTimeoutNs = 1'000'000'000;
+  /// How long a drive may stay in Operation Enabled after category 0 and after a quick stop: a
+  /// drive that ramps down is in Quick Stop Active.
+  static constexpr std::int64_t kDisableTimeoutNs = 200'000'000;
+  static constexpr std::int64_t kQuickStopTimeoutNs = 500'000'000;
+  static constexpr std::uint32_t kObeyCycles = 4;  ///< the same, in samples
   /// A fault reset's bit 7 changes every so many cycles, so that a board that looks seldom sees it.
   static constexpr std::uint32_t kResetToggleCycles = 4;
 
   /// @param stiffness, damping  of the impedance mode until a command says otherwise
   AxisMaster(const AxisScale& scale, const AxisTraits& traits, double stiffness_Nm_rad,
              double damping_Nms_rad) noexcept
-      : scale_(scale), traits_(traits) {
+      : scale_(scale), traits_(traits), lag_(traits.follow) {
     raw_.stiffness = static_cast<float>(stiffness_Nm_rad);
     raw_.damping = static_cast<float>(damping_Nms_rad);
   }
@@ -83,6 +91,14 @@ class AxisMaster {
   void received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT;
   /// Looks for a fault in what was received. @return true when it is a new one.
   bool check(std::int64_t now_ns) noexcept TANDEM_RT;
+  /// Whether the drive stays enabled in spite of a stop: once a cycle, after received().
+  [[nodiscard]] bool ignores_stop(std::int64_t now_ns) noexcept TANDEM_RT;
+  /// It did, before its board was lost for it.
+  [[nodiscard]] bool ignored_stop() const noexcept { return ignored_stop_; }
+  void latch_ignored_stop(std::uint16_t code, std::int64_t now_ns) noexcept TANDEM_RT {
+    latch(AxisError::kNodeLost, code, now_ns);
+    ignored_stop_ = true;
+  }
   void latch(AxisError error, std::uint16_t code, std::int64_t now_ns) noexcept TANDEM_RT;
 
   void set_target(TargetState target, std::int64_t now_ns) noexcept TANDEM_RT;
@@ -112,12 +128,17 @@ class AxisMaster {
   [[nodiscard]] bool enabled() const noexcept {
     return heard_ && drive() == canopen::DriveState::kOperationEnabled;
   }
+  /// kReset is not through: the drive is in fault, or has not been disabled yet.
+  [[nodiscard]] bool in_reset() const noexcept TANDEM_RT;
   /// True when no torque can come from the drive any more.
   [[nodiscard]] bool off() const noexcept TANDEM_RT;
   [[nodiscard]] AxisError error() const noexcept { return error_; }
   [[nodiscard]] std::uint16_t fault_code() const noexcept { return fault_code_; }
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
-  void clear_error() noexcept { error_ = AxisError::kNone; }
+  void clear_error() noexcept {
+    error_ = AxisError::kNone;
+    ignored_stop_ = false;
+  }
   /// The node is configured anew: nothing of what was heard holds any more.
   void forget() noexcept TANDEM_RT;
 
@@ -129,6 +150,8 @@ class AxisMaster {
   [[nodiscard]] std::uint16_t enable_operation() const noexcept;
   [[nodiscard]] std::uint16_t reset_controlword() noexcept;
   void seed() noexcept;
+  [[nodiscard]] bool lags(std::int64_t now_ns) noexcept;
+  [[nodiscard]] double position_error_rad() const noexcept;
   bool enable_is_late(std::int64_t now_ns) noexcept;
   bool reset_is_late(std::int64_t now_ns) noexcept;
   void go_home(const CommandImage* image, std::size_t joint, std::int64_t now_ns) noexcept;
@@ -141,15 +164,19 @@ class AxisMaster {
   TargetState target_ = TargetState::kNothing;
   AxisError error_ = AxisError::kNone;
   HomingSequence homing_;
-  bool was_idle_ = false;  ///< kHome: the image has had the joint idle since
+  FollowWatch lag_;
+  std::int32_t previous_target_ = 0;  ///< the target position before the one in `raw_`
+  bool was_idle_ = false;             ///< kHome: the image has had the joint idle since
   bool heard_ = false;
+  bool ignored_stop_ = false;
   bool was_enabled_ = false;  ///< reached Operation Enabled under the present wish to be
   std::uint16_t fault_code_ = 0;
   std::uint16_t emergency_code_ = 0;
   std::uint16_t last_emergency_ = 0;  ///< for a warning; no state
   std::uint32_t age_cycles_ = 0;
   std::uint32_t reset_cycles_ = 0;
-  std::uint32_t held_cycles_ = 0;  ///< kHome: since the homing is over
+  std::uint32_t disobedient_cycles_ = 0;  ///< since the stop: samples of an enabled drive
+  std::uint32_t held_cycles_ = 0;         ///< kHome: since the homing is over
   std::int32_t previous_velocity_ = 0;
   std::int64_t sample_ns_ = 0;
   std::int64_t trouble_ns_ = 0;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "canopen/frame.hpp"
@@ -17,6 +18,7 @@ namespace {
 
 /// Time for one SDO exchange of every node is kept free so often.
 constexpr double kSdoEveryNs = 100e6;
+constexpr std::int64_t kMostPeriodNs = 100'000'000;  ///< that a remedy proposes
 
 using Kind = BusLoadRow::Kind;
 using Nodes = std::vector<const NodePlan*>;
@@ -139,15 +141,40 @@ Nodes nodes_of(const PdoLayout& layout, std::size_t bus) {
   return nodes;
 }
 
-/// The shortest longer period, in steps of 50 us up to 100 ms.
-std::optional<std::int64_t> feasible_period(const BusConfig& bus, const Nodes& nodes,
-                                            std::int64_t period_ns) {
+/// What the boards' control periods all divide; periods of a loop are its multiples, when they are
+/// longer than these.
+std::int64_t common_control_period(const RobotConfig& robot) {
+  std::int64_t common_ns = 1;
+  for (const BoardConfig& board : robot.boards) {
+    common_ns = std::lcm(common_ns, board.control_period_ns);
+    if (common_ns > kMostPeriodNs) break;
+  }
+  return common_ns;
+}
+
+/// The shortest longer period, in steps of 50 us up to 100 ms, that goes with every board's control
+/// period.
+std::optional<std::int64_t> feasible_period(const RobotConfig& robot, const BusConfig& bus,
+                                            const Nodes& nodes, std::int64_t period_ns) {
   constexpr std::int64_t kStepNs = 50'000;
-  constexpr std::int64_t kMostNs = 100'000'000;
-  for (std::int64_t ns = (period_ns / kStepNs + 1) * kStepNs; ns <= kMostNs; ns += kStepNs) {
-    if (load_of(bus, nodes, ns).fits()) return ns;
+  const std::int64_t common_ns = common_control_period(robot);
+  if (common_ns > kMostPeriodNs) return {};
+  const std::int64_t step_ns = std::gcd(common_ns, kStepNs) < kStepNs ? common_ns : kStepNs;
+  const auto goes_with = [&](std::int64_t ns) {
+    return std::ranges::all_of(robot.boards, [&](const BoardConfig& board) {
+      return ns % board.control_period_ns == 0 || board.control_period_ns % ns == 0;
+    });
+  };
+  for (std::int64_t ns = (period_ns / step_ns + 1) * step_ns; ns <= kMostPeriodNs; ns += step_ns) {
+    if (goes_with(ns) && load_of(bus, nodes, ns).fits()) return ns;
   }
   return {};
+}
+
+std::string period_text(const RobotConfig& robot, std::int64_t period_ns) {
+  const std::int64_t common_ns = common_control_period(robot);
+  return fmt::format("period_ns = {}", period_ns) +
+         (period_ns % common_ns == 0 ? fmt::format(" or a longer multiple of {}", common_ns) : "");
 }
 
 /// The lowest higher data bit rate that transceivers are sold for.
@@ -207,8 +234,8 @@ std::string remedy_of(const RobotConfig& robot, std::size_t index, const Nodes& 
                       std::int64_t period_ns) {
   const BusConfig& bus = robot.buses[index];
   std::vector<std::string> ways;
-  if (const auto ns = feasible_period(bus, nodes, period_ns)) {
-    ways.push_back(fmt::format("period_ns = {} or longer", *ns));
+  if (const auto ns = feasible_period(robot, bus, nodes, period_ns)) {
+    ways.push_back(period_text(robot, *ns));
   }
   if (const auto rate = feasible_data_rate(bus, nodes, period_ns)) {
     ways.push_back(fmt::format("data_bitrate = {}", *rate));

@@ -88,6 +88,7 @@ void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame,
   const bool listening = node.master.running() || node.master.stage() == NodeStage::kStarting;
   if (!pdo.in_use || !listening || frame.length < pdo.bytes) return;
   if (number == 1) ++node.answers;
+  node.master.on_tpdo(now_ns);
   if (pdo.part >= 0) {
     if (pdo.part != 0 && pdo.part != node.next_part) return;
     node.next_part = pdo.part + 1;
@@ -258,6 +259,7 @@ Code DriveMaster::receive(StateImage& state) noexcept TANDEM_RT {
       m.write_pdos();
     }
   }
+  m.watch_stops();
   (void)m.flush();
   m.fill(state);
   return m.receive_code();

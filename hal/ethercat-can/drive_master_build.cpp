@@ -18,11 +18,15 @@ std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& lay
     for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
       const bool homes = robot.joints[node.joints[axis]].homing && node.abilities[axis].homing &&
                          node.carries(axis, WireField::kMode);
-      traits[node.joints[axis]] = {.can = node.abilities[axis],
-                                   .tells_velocity = node.carries(axis, WireField::kVelocity),
-                                   .tells_mode = node.carries(axis, WireField::kModeDisplay),
-                                   .homes = homes,
-                                   .tells_motor = node.carries(axis, WireField::kMotorPosition)};
+      const bool ours =
+          node.board < 0 || robot.boards[static_cast<std::size_t>(node.board)].eds.empty();
+      traits[node.joints[axis]] = {
+          .can = node.abilities[axis],
+          .tells_velocity = node.carries(axis, WireField::kVelocity),
+          .tells_mode = node.carries(axis, WireField::kModeDisplay),
+          .homes = homes,
+          .tells_motor = node.carries(axis, WireField::kMotorPosition),
+          .follow = FollowLimits::of(robot.joints[node.joints[axis]], ours)};
     }
   }
   return traits;

@@ -116,6 +116,8 @@ struct DriveMaster::Impl {
   void advance() noexcept TANDEM_RT;
   void boot() noexcept TANDEM_RT;
   void watch() noexcept TANDEM_RT;
+  void watch_stops() noexcept TANDEM_RT;
+  void ignored_stop(std::size_t joint) noexcept TANDEM_RT;
   bool react(StopCategory category) noexcept TANDEM_RT;
   void recover() noexcept TANDEM_RT;
   void stop(StopCategory category) noexcept TANDEM_RT;

@@ -27,15 +27,20 @@ namespace {
 
 /// How long shut_down() waits for the drives to come to rest.
 constexpr std::int64_t kShutDownNs = 3'000'000'000;
+/// When a drive that was enabled, and is not heard any more, counts as still enabled there.
+constexpr std::int64_t kUnheardNs = 1'500'000'000;
+
 FaultCause node_cause(NodeError error) noexcept {
   switch (error) {
     case NodeError::kHeartbeatLost: return FaultCause::kHeartbeatLost;
+    case NodeError::kGuardingLost: return FaultCause::kGuardingLost;
     case NodeError::kRebooted: return FaultCause::kBoardRebooted;
     case NodeError::kLeftOperational: return FaultCause::kBoardStopped;
     case NodeError::kWrongIdentity:
     case NodeError::kSdoAbort:
     case NodeError::kNotOperational: return FaultCause::kBoardRefused;
     case NodeError::kTwoNodes: return FaultCause::kTwoBoards;
+    case NodeError::kIgnoresStop:  // of its joints that had obeyed
     case NodeError::kNone:
     case NodeError::kNoBootUp:
     case NodeError::kFeedbackLost: return FaultCause::kBoardSilent;
@@ -117,7 +122,10 @@ FaultCause DriveMaster::Impl::cause(std::size_t joint) const noexcept TANDEM_RT 
                  : FaultCause::kDrive;
     case AxisError::kNotEnabled: return FaultCause::kNotEnabled;
     case AxisError::kLeftEnabled: return FaultCause::kLeftEnabled;
-    case AxisError::kNodeLost: return node_cause(nodes[joint_node[joint]].master.error());
+    case AxisError::kNotFollowing: return FaultCause::kNotFollowing;
+    case AxisError::kNodeLost:
+      if (axis.ignored_stop()) return FaultCause::kIgnoresStop;
+      return node_cause(nodes[joint_node[joint]].master.error());
   }
   return FaultCause::kDrive;
 }
@@ -177,6 +185,31 @@ void DriveMaster::Impl::watch() noexcept TANDEM_RT {
   if (stops_drives(worst)) (void)react(worst);
 }
 
+/// A drive that stays enabled after a stop does not hear its commands, or does not heed them.
+void DriveMaster::Impl::watch_stops() noexcept TANDEM_RT {
+  if (!shutting_down && stage != MasterStage::kFaulted && stage != MasterStage::kFailed) return;
+  const bool ends = shutting_down && now_ns - shut_down_since_ns >= kUnheardNs;
+  for (std::size_t joint = 0; joint < axes.size(); ++joint) {
+    AxisMaster& axis = axes[joint];
+    const bool unheard = ends && axis.enabled() && axis.error() == AxisError::kNone &&
+                         node_of(joint).master.error() != NodeError::kRebooted;
+    if (axis.ignores_stop(now_ns) || unheard) ignored_stop(joint);
+  }
+}
+
+/// What its commands do not reach, NMT stop may: the board reacts as to a lost connection.
+void DriveMaster::Impl::ignored_stop(std::size_t joint) noexcept TANDEM_RT {
+  Node& node = node_of(joint);
+  axes[joint].latch_ignored_stop(kNodeLostCode, now_ns);
+  axes[joint].set_target(TargetState::kNothing, now_ns);
+  if (node.master.stage() != NodeStage::kDown) {
+    node.master.fail(NodeError::kIgnoresStop, now_ns);
+    node.counters_sent = 0;
+    ports[node.plan.bus].sink.push(canopen::make_nmt(canopen::NmtCommand::kStop, node.plan.id));
+  }
+  if (!shutting_down && stage == MasterStage::kFaulted) (void)react(category(joint));
+}
+
 /// @return whether an axis is to do something else than before.
 bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
   reaction = std::min(reaction, category);  // the lower the number, the harder the stop
@@ -186,7 +219,10 @@ bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
                                                                     : TargetState::kHold;
   bool changed = false;
   for (AxisMaster& axis : axes) {
-    const TargetState its = axis.error() == AxisError::kNone ? target : TargetState::kNothing;
+    TargetState its = axis.error() == AxisError::kNone ? target : TargetState::kNothing;
+    if (axis.error() == AxisError::kNotFollowing && target != TargetState::kNothing) {
+      its = TargetState::kQuickStop;  // it has no fault of its own: it can brake
+    }
     changed = changed || axis.target() != its;
     axis.set_target(its, now_ns);
   }
@@ -242,10 +278,7 @@ void DriveMaster::Impl::recover() noexcept TANDEM_RT {
     if (axis.error() == AxisError::kNodeLost) {
       if (node_of(joint).master.running() && axis.heard()) axis.clear_error();
     } else if (axis.target() == TargetState::kReset) {
-      using canopen::DriveState;
-      const bool faulted =
-          axis.drive() == DriveState::kFault || axis.drive() == DriveState::kFaultReactionActive;
-      if (faulted) continue;
+      if (axis.in_reset()) continue;
       axis.clear_error();
       axis.set_target(TargetState::kNothing, now_ns);
     }
@@ -321,13 +354,15 @@ bool DriveMaster::Impl::shut_down() noexcept TANDEM_RT {
     set_targets(reaction == StopCategory::kCategory0 ? TargetState::kNothing
                                                      : TargetState::kQuickStop);
   }
-  const bool at_rest = std::ranges::all_of(axes, [](const AxisMaster& axis) { return axis.off(); });
+  const bool at_rest = std::ranges::all_of(
+      axes, [](const AxisMaster& axis) { return axis.off() || axis.ignored_stop(); });
   const bool done = at_rest || now_ns - shut_down_since_ns >= kShutDownNs;
   if (done) set_targets(TargetState::kNothing);
   make_commands(nullptr);
   write_pdos();
   if (!done) return false;
   for (Node& node : nodes) {
+    if (node.master.error() == NodeError::kIgnoresStop) continue;  // stopped it stays
     ports[node.plan.bus].sink.push(
         canopen::make_nmt(canopen::NmtCommand::kEnterPreOperational, node.plan.id));
   }

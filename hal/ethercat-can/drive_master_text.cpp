@@ -107,12 +107,21 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
     case NodeError::kHeartbeatLost:
       return fmt::format("{}: heartbeat lost at {:.3f} s (none for {} ms)", who,
                          seconds(m.trouble_time_ns()), kHeartbeatPeriods * node.plan.heartbeat_ms);
+    case NodeError::kGuardingLost:
+      return fmt::format("{}: guarding lost at {:.3f} s (no answer to node guarding for {} ms)",
+                         who, seconds(m.trouble_time_ns()),
+                         kHeartbeatPeriods * node.plan.heartbeat_ms);
     case NodeError::kLeftOperational:
       return fmt::format("{}: went to {} by itself at {:.3f} s", who,
                          canopen::to_string(m.nmt_state()), seconds(m.trouble_time_ns()));
     case NodeError::kTwoNodes:
       return fmt::format("{}: two nodes answer under this id at {:.3f} s; give one of them another",
                          who, seconds(m.trouble_time_ns()));
+    case NodeError::kIgnoresStop:
+      return fmt::format(
+          "{}: a drive does not obey the stop at {:.3f} s: NMT stop was sent; cut its power "
+          "(emergency stop, STO)",
+          who, seconds(m.trouble_time_ns()));
     case NodeError::kFeedbackLost:
       return fmt::format("{}: no complete TPDO for {} cycles at {:.3f} s", who, node.timeout_cycles,
                          seconds(m.trouble_time_ns()));
@@ -145,6 +154,11 @@ std::string DriveMaster::Impl::axis_text(std::size_t joint) const {
     case AxisError::kLeftEnabled:
       return fmt::format("{}: left 'operation enabled' for '{}' by itself at {:.3f} s",
                          joint_name(joint), canopen::to_string(axis.drive()), at_s);
+    case AxisError::kNotFollowing:
+      return fmt::format(
+          "{}: does not follow its command at {:.3f} s: is the joint blocked, does the drive get "
+          "its commands?",
+          joint_name(joint), at_s);
     case AxisError::kNodeLost: {
       const std::string cause = node_text(nodes[joint_node[joint]]);
       return fmt::format("{}: board lost at {:.3f} s{}{}", joint_name(joint), at_s,

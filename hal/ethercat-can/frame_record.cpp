@@ -26,6 +26,11 @@ std::string candump_line(std::int64_t time_ns, const std::string& bus, const Fra
   static constexpr char kDigits[] = "0123456789ABCDEF";
   std::string line = fmt::format("({}.{:06}) {} {:03X}#", time_ns / kSecondNs,
                                  time_ns % kSecondNs / 1000, bus, frame.id);
+  if ((frame.flags & canopen::kFlagRtr) != 0) {  // no data: the length that is asked for, but 0
+    line += 'R';
+    if (frame.length > 0) line += kDigits[frame.length & 15];
+    return line;
+  }
   if (frame.fd()) {
     line += '#';
     line += (frame.flags & canopen::kFlagBrs) != 0 ? '1' : '0';

@@ -92,6 +92,13 @@ void NodeMaster::on_heartbeat(NmtState state, std::int64_t now_ns) noexcept TAND
   }
 }
 
+void NodeMaster::on_tpdo(std::int64_t now_ns) noexcept TANDEM_RT {
+  const std::int64_t heartbeat_ns = heartbeat_timeout_ns_ / kHeartbeatPeriods;
+  if (stage_ != NodeStage::kStarting || 2 * heartbeat_ns <= start_time_ns_) return;
+  nmt_ = NmtState::kOperational;
+  enter(NodeStage::kRunning, now_ns);
+}
+
 void NodeMaster::on_sdo(const canopen::Frame& frame, FrameSink& out) noexcept TANDEM_RT {
   sdo_.receive(frame, out);
 }
@@ -203,7 +210,9 @@ void NodeMaster::guard(std::int64_t now_ns, FrameSink& out) noexcept {
 
 void NodeMaster::watch_heartbeat(std::int64_t now_ns) noexcept {
   if (watch_ == NodeWatch::kNothing) return;
-  if (now_ns - heard_ns_ >= heartbeat_timeout_ns_) fail(NodeError::kHeartbeatLost, now_ns);
+  if (now_ns - heard_ns_ < heartbeat_timeout_ns_) return;
+  const bool guarded = watch_ == NodeWatch::kGuarding;
+  fail(guarded ? NodeError::kGuardingLost : NodeError::kHeartbeatLost, now_ns);
 }
 
 void NodeMaster::fail(NodeError error, std::int64_t now_ns) noexcept TANDEM_RT {

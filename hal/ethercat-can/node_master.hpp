@@ -21,9 +21,11 @@ enum class NodeError : std::uint8_t {
   kNotOperational,  ///< it did not follow NMT start
   kRebooted,        ///< it booted again by itself
   kHeartbeatLost,
+  kGuardingLost,     ///< it does not answer the requests for its state
   kLeftOperational,  ///< its heartbeat says another NMT state
   kFeedbackLost,     ///< its heartbeat is there, its TPDOs are not
   kTwoNodes,         ///< two answer under its id
+  kIgnoresStop,      ///< a drive of it stays enabled after a stop
 };
 
 /// How far a node is brought up.
@@ -56,6 +58,9 @@ class NodeMaster {
   /// Begins, or begins again, with a reset of the node.
   void restart(std::int64_t now_ns) noexcept TANDEM_RT;
   void on_heartbeat(canopen::NmtState state, std::int64_t now_ns) noexcept TANDEM_RT;
+  /// Its answer to a SYNC, which it gives in operation alone: where its heartbeat would come too
+  /// late to tell that it has started.
+  void on_tpdo(std::int64_t now_ns) noexcept TANDEM_RT;
   void on_sdo(const canopen::Frame& frame, canopen::FrameSink& out) noexcept TANDEM_RT;
   /// Once per cycle, after the cycle's frames.
   void process(std::int64_t now_ns, std::int64_t dt_ns, canopen::FrameSink& out) noexcept TANDEM_RT;

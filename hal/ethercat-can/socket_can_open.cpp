@@ -124,7 +124,8 @@ Status size_queues(const SocketCanOptions& options, int socket) {
 }
 
 /// What the kernel lets through: only 11-bit identifiers, and data frames but for the remote
-/// requests that a board may have to answer. A board hears every heartbeat: 1016 may name any node.
+/// requests that a board may have to answer: for its TPDOs, and node guarding. A board hears every
+/// heartbeat: 1016 may name any node.
 std::vector<can_filter> filters(SocketSide side) {
   std::vector<can_filter> all;
   const auto let = [&](std::uint32_t id, std::uint32_t mask, std::uint32_t remote = 0) {
@@ -150,6 +151,7 @@ std::vector<can_filter> filters(SocketSide side) {
     }
     let(cob::kSdoRequest, kFunctionMask);
     let(cob::kHeartbeat, kFunctionMask);
+    let(cob::kHeartbeat, kFunctionMask, CAN_RTR_FLAG);
   } else if (side == SocketSide::kWitness) {
     all.push_back({.can_id = 0, .can_mask = 0});
   }

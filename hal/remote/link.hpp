@@ -27,7 +27,7 @@ inline constexpr std::size_t kGainsPerJoint = 3 * hal::kPidLoops;
 /// Raised with every change of what the link's samples mean: their members, the numbers of stop
 /// categories, phases, modes, codes and causes, the images' fields. Builds before 2 say no number;
 /// they and later ones do not hear each other.
-inline constexpr std::uint32_t kLinkProtocol = 6;
+inline constexpr std::uint32_t kLinkProtocol = 7;
 
 /// What two processes must agree on before one drives the other's robot.
 struct Identity {

@@ -172,6 +172,20 @@ TEST(BringUp, StartsANodeAgainThatRebootsDuringConfiguration) {
   EXPECT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
 }
 
+TEST(BringUp, DoesNotWaitForASlowHeartbeat) {
+  for (const int heartbeat_ms : {600, 1'100, 20'000}) {
+    RobotConfig robot = robot_config();
+    for (BoardConfig& board : robot.boards) board.heartbeat_ms = heartbeat_ms;
+    for (SensorConfig& sensor : robot.sensors) sensor.heartbeat_ms = heartbeat_ms;
+    Rig rig(robot);
+    rig.leave(Phase::kBringUp);
+    ASSERT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
+    EXPECT_LT(rig.cycle, 2'000U);
+    rig.steps(5'000);
+    EXPECT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
+  }
+}
+
 TEST(BringUp, RefusesABusThatIsNotFd) {
   RobotConfig robot = robot_config();
   robot.buses[0].fd = false;

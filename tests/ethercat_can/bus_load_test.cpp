@@ -91,8 +91,9 @@ TEST(BusLoad, RefusesWhatACycleCannotCarryWithTheArithmetic) {
             "classic CAN 1 Mbit/s cannot carry what every cycle needs: SYNC 55.0 + commands 500.0 "
             "+ feedback 540.0 = 1095.0 us of 1000 us");
   EXPECT_EQ(errors[0].hint,
-            "any of these fits: period_ns = 1400000 or longer; fd = true; 2 buses, with b1 "
-            "moved");
+            "any of these fits: period_ns = 2000000 or a longer multiple of 1000000; fd = true; "
+            "2 buses, with b1 moved")
+      << "a loop's period goes with the boards' control periods";
 }
 
 TEST(BusLoad, RefusesAMeanAboveTheLimit) {
@@ -108,13 +109,14 @@ TEST(BusLoad, RefusesAMeanAboveTheLimit) {
 
 TEST(BusLoad, EveryRemedyFits) {
   RobotConfig robot = robot_config();
+  for (BoardConfig& board : robot.boards) board.control_period_ns = 100'000;
   robot.buses[0].data_bitrate = 2'000'000;
   const auto loads = bus_loads(robot, kMs);
   ASSERT_TRUE(loads);
   EXPECT_FALSE((*loads)[0].fits());
   EXPECT_EQ((*loads)[0].remedy,
-            "any of these fits: period_ns = 1700000 or longer; data_bitrate = 5000000; "
-            "3 buses, with board_1; on another board_2 moved");
+            "any of these fits: period_ns = 1700000 or a longer multiple of 100000; "
+            "data_bitrate = 5000000; 3 buses, with board_1; on another board_2 moved");
   robot.buses[0].data_bitrate = 5'000'000;
   EXPECT_TRUE(check_bus_load(robot, kMs).empty());
   robot.buses[0].data_bitrate = 2'000'000;

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <regex>
 
+#include "canopen/messages.hpp"
 #include "hal/ethercat-can/loopback.hpp"
 #include "rt/scoped_realtime.hpp"
 #include "tests/support/scratch_folder.hpp"
@@ -33,6 +34,9 @@ TEST(FrameRecord, WritesCandumpsLines) {
             "(0.000001) vcan1 18A##11122AB000000000000000000");
   EXPECT_EQ(candump_line(0, "can4", Frame{.id = 7, .length = 1, .flags = canopen::kFlagFd}),
             "(0.000000) can4 007##000");
+  EXPECT_EQ(candump_line(0, "can0", canopen::make_guard_request(0x20)), "(0.000000) can0 720#R1");
+  EXPECT_EQ(candump_line(0, "can0", Frame{.id = 0x181, .flags = canopen::kFlagRtr}),
+            "(0.000000) can0 181#R");
 }
 
 class FrameRecordFile : public testing::Test {

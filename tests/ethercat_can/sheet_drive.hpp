@@ -24,7 +24,9 @@ class SheetDrive {
  public:
   SheetDrive(DataSheet sheet, int node) : sheet_(std::move(sheet)), node_(node) { power_on(); }
 
-  int boot_ms = 2;            ///< from a reset to the boot-up message
+  int boot_ms = 2;    ///< from a reset to the boot-up message
+  bool deaf = false;  ///< no RPDO reaches it
+  bool answers_guarding = true;
   bool answers_late = false;  ///< every SDO answer comes a second time, later
   bool emergency_at_boot = false;
   int homing_ms = 50;                 ///< from bit 4 until it is there; never in a negative time
@@ -41,6 +43,8 @@ class SheetDrive {
   [[nodiscard]] bool enabled(int axis = 0) const { return state_[axis] == 4; }
   [[nodiscard]] int guarded() const { return guarded_; }
   void fault() { state_[0] = 5; }
+  /// It boots once more, after boot_ms.
+  void lose_power() { power_on(); }
 
   void receive(const Frame& frame) {
     const auto id = static_cast<int>(frame.id);
@@ -48,12 +52,14 @@ class SheetDrive {
     if (boot_in_ms_ > 0) return;
     if (id == 0x600 + node_) return on_sdo(frame);
     if (id == 0x700 + node_ && (frame.flags & canopen::kFlagRtr) != 0) {
+      if (!answers_guarding) return;
       ++guarded_;
       toggle_ ^= 0x80;
       return send(0x700 + node_, {static_cast<std::uint8_t>(toggle_ | nmt_)});
     }
     if (nmt_ != 5) return;
     if (id == 0x80) return on_sync();
+    if (deaf) return;
     for (int n = 0; n < 4; ++n) {
       const auto cob = value(0x1400 + n, 1);
       if ((cob & 0x80000000) == 0 && (cob & 0x7FF) == id) take_rpdo(n, frame);

@@ -137,9 +137,23 @@ struct SheetRig {
   }
   void ask(ControlMode mode) { command.mode()[0] = static_cast<std::int8_t>(mode); }
   void step() {
+    exchange();
+    const rt::ScopedRealtime in_cycle;
+    (void)master->send(command, parameters);
+  }
+  /// A cycle of the run's end. @return whether it has ended
+  bool end() {
+    exchange();
+    const rt::ScopedRealtime in_cycle;
+    return master->shut_down();
+  }
+  void exchange() {
     const CycleTime time{.cycle = cycle, .time_ns = static_cast<std::int64_t>(cycle) * 1'000'000};
     ++cycle;
-    master->cycle_begin(time);
+    {
+      const rt::ScopedRealtime in_cycle;
+      master->cycle_begin(time);
+    }
     drive.tick();
     for (const Frame& frame : bus.to_boards()) {
       drive.receive(frame);
@@ -148,8 +162,8 @@ struct SheetRig {
     bus.take_to_boards(bus.to_boards().size());
     (void)bus.boards().send(drive.out);
     drive.out.clear();
+    const rt::ScopedRealtime in_cycle;
     (void)master->receive(state);
-    (void)master->send(command, parameters);
   }
   void steps(int count) {
     for (int i = 0; i < count; ++i) step();

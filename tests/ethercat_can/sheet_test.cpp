@@ -105,6 +105,18 @@ TEST(Sheet, ADriveThatHearsNoHeartbeatIsGuarded) {
   EXPECT_EQ(rig.master->phase(), Phase::kOperational);
 }
 
+TEST(Sheet, AGuardedDriveThatDoesNotAnswerIsTold) {
+  SheetRig rig(interpolating());
+  ASSERT_TRUE(rig.bring_up());
+  rig.steps(10);
+  rig.drive.answers_guarding = false;
+  rig.steps(200);
+  EXPECT_EQ(rig.master->fault_cause(0), FaultCause::kGuardingLost);
+  const std::string text = rig.master->status_text();
+  EXPECT_NE(text.find("guarding lost at "), std::string::npos) << text;
+  EXPECT_NE(text.find("(no answer to node guarding for 150 ms)"), std::string::npos) << text;
+}
+
 TEST(Sheet, ADriveWithNeitherIsWatchedByItsTpdos) {
   SheetRig rig(servo().remove(0x1016).remove(0x1017));
   ASSERT_TRUE(rig.bring_up());

@@ -112,6 +112,23 @@ TEST(RobotConfig, RefusesALinkThatWeighsWrong) {
                "(give mass_kg, com_m or inertia_kg_m2, or remove it)");
 }
 
+TEST(RobotConfig, RefusesTwoBusesOnOneInterface) {
+  const std::string two = with("[[bus]]",
+                               "[[bus]]\nname = 'other'\ninterface = 'can7'\n[[bus]]\n"
+                               "name = 'third'\ninterface = 'can7'\n[[bus]]");
+  const auto robot = parse_robot_config(two, "robots/leg.toml");
+  ASSERT_FALSE(robot.has_value());
+  ASSERT_EQ(robot.error().size(), 1U);
+  const std::string text = robot.error()[0].to_string();
+  EXPECT_NE(text.find(".interface: 'can7' is the interface of bus 'other' (line "),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("), too: bus 'third' needs one of its own (give each [[bus]] another "
+                      "interface)"),
+            std::string::npos)
+      << text;
+}
+
 TEST(RobotConfig, RefusesANumberInPlaceOfAVectorOnce) {
   expect_error(with("[model.lock]", "gravity_m_s2 = 9.81\n[model.lock]"),
                "robots/leg.toml:5: model.gravity_m_s2: must be a list of numbers in brackets, not "

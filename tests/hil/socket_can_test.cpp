@@ -142,12 +142,15 @@ TEST(SocketCan, GivesRemoteRequestsToBoardsAloneAndNoLongIdentifiers) {
   other.write(0x181 | CAN_EFF_FLAG, {1});
   other.write(0x181 | CAN_RTR_FLAG, {});
   other.write(0x201 | CAN_RTR_FLAG, {});
+  other.write(0x705 | CAN_RTR_FLAG, {});
   other.write(0x182, {2});
   const std::vector<Frame> expected{make_frame(0x182, std::array<std::uint8_t, 1>{2})};
   EXPECT_EQ(witness.wait(1), expected);
   EXPECT_EQ(master.wait(1), expected);
-  EXPECT_EQ(boards.wait(1), (std::vector<Frame>{{.id = 0x181, .flags = canopen::kFlagRtr}}));
-  EXPECT_EQ(witness.bus().statistics().ignored, 3U);
+  EXPECT_EQ(boards.wait(2), (std::vector<Frame>{{.id = 0x181, .flags = canopen::kFlagRtr},
+                                                {.id = 0x705, .flags = canopen::kFlagRtr}}))
+      << "a TPDO is asked for, and a node is guarded";
+  EXPECT_EQ(witness.bus().statistics().ignored, 4U);
   EXPECT_EQ(master.bus().statistics().ignored, 0U) << "the kernel kept them back";
 }
 

@@ -106,10 +106,10 @@ TEST(OtherVersions, AreRefusedAndToldWhichIsOlder) {
     return owner ? "" : owner.error().to_string();
   };
   EXPECT_EQ(refusal(3),
-            "the server is of an older version of Tandem: the link's protocol is 3 there, 6 here ("
+            "the server is of an older version of Tandem: the link's protocol is 3 there, 7 here ("
             "install the same version on both; the older one is the server's)");
-  EXPECT_EQ(refusal(7),
-            "the server is of a newer version of Tandem: the link's protocol is 7 there, 6 here ("
+  EXPECT_EQ(refusal(8),
+            "the server is of a newer version of Tandem: the link's protocol is 8 there, 7 here ("
             "install the same version on both; the older one is this one)");
 }
 

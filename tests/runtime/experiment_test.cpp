@@ -243,6 +243,18 @@ TEST(Experiment, RefusesAPeriodThatDoesNotFitABoard) {
   EXPECT_NE(both.error()[0].message.find("of board 'board' and of 1 more"), std::string::npos);
 }
 
+TEST(Experiment, RefusesAPeriodThatLeavesNoTimeForAHeartbeat) {
+  EXPECT_TRUE(parse_experiment(with("period_ns = 100_000_000"), "arm/x.toml", robot()));
+  EXPECT_EQ(errors_of(with("period_ns = 101_000_000")),
+            "arm/x.toml:4: period_ns: 101000000 ns is more than two heartbeats of board 'board' "
+            "(heartbeat_ms = 50): it would count the master as lost (set its heartbeat_ms to 51 or "
+            "more in arm/robot.toml, or shorten the period)\n");
+  hal::RobotConfig slow = robot();
+  slow.boards[0].heartbeat_ms = 125;
+  slow.sensors[0].heartbeat_ms = 125;
+  EXPECT_EQ(errors_of(with("period_ns = 250_000_000"), slow), "");
+}
+
 TEST(Experiment, RefusesASubstepThatDoesNotDivide) {
   EXPECT_EQ(errors_of(with("[sim]\nsubstep_ns = 300_000")),
             "arm/x.toml:5: sim.substep_ns: 300000 ns does not divide the period of 1000000 ns "
