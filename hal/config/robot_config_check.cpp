@@ -5,6 +5,7 @@
 
 #include "hal/config/capabilities.hpp"
 #include "hal/config/drive_ranges.hpp"
+#include "hal/config/joint_scale.hpp"
 #include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
@@ -289,6 +290,7 @@ class Completion : private Check {
     }
     check_torque_rate(joint, key + ".max_torque_rate_Nm_s");
     check_gains(joint);
+    std::ranges::move(check_joint_scale(robot_, joint), std::back_inserter(errors_));
     std::ranges::move(check_drive_ranges(robot_, joint), std::back_inserter(errors_));
   }
 

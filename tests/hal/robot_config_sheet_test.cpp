@@ -96,6 +96,33 @@ TEST_F(BoardSheet, IsOverruledByTheRobotsUnits) {
   EXPECT_FALSE(joint.counts_of_sheet || joint.torque_of_sheet);
 }
 
+/// A sheet counts revolutions; how far one moves a slide, it does not say.
+TEST_F(BoardSheet, DoesNotScaleAJointThatSlides) {
+  sheet +=
+      "[60A9]\nParameterName=SI unit velocity\nObjectType=0x7\nDataType=0x0007\n"
+      "AccessType=ro\nDefaultValue=0x00B44700\n";
+  RobotDescription description{
+      .moving_joints = {{"elbow", -1.0, 1.0, 1.0, 10.0}}, .other_joints = {}, .links = {}};
+  auto turning = read();
+  ASSERT_TRUE(turning) << turning.error()[0].to_string();
+  auto slide = *turning;
+  EXPECT_TRUE(complete_from_description(*turning, description).empty());
+  description.moving_joints[0].slides = true;
+  const Diagnostics errors = complete_from_description(slide, description);
+  ASSERT_EQ(errors.size(), 3U);
+  EXPECT_EQ(errors[0].key, "joint.elbow.encoder_counts_per_rev");
+  EXPECT_EQ(errors[0].line, slide.joints[0].line);
+  EXPECT_NE(errors[0].to_string().find("joint 'elbow' slides"), std::string::npos)
+      << errors[0].to_string();
+  EXPECT_EQ(errors[1].key, "joint.elbow.velocity_units_per_rev");
+  EXPECT_EQ(errors[2].key, "joint.elbow.rated_torque_Nm");
+  auto told = read(with(kArm, "max_torque_Nm = 10.0\n",
+                        "max_torque_Nm = 10.0\nencoder_counts_per_rev = 1256637\n"
+                        "velocity_units_per_rev = 1000\nrated_torque_Nm = 12\n"));
+  ASSERT_TRUE(told) << told.error()[0].to_string();
+  EXPECT_TRUE(complete_from_description(*told, description).empty());
+}
+
 TEST_F(BoardSheet, LetsAJointHaveADirectionAndAZero) {
   const std::string turned =
       with(kArm, "max_torque_Nm = 10.0\n",

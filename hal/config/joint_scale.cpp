@@ -1,0 +1,61 @@
+#include "hal/config/joint_scale.hpp"
+
+#include <fmt/core.h>
+
+namespace tandem::hal {
+namespace {
+
+class ScaleCheck {
+ public:
+  ScaleCheck(const RobotConfig& robot, const JointConfig& joint, const BoardConfig& board)
+      : robot_(robot), joint_(joint), board_(board) {}
+
+  Diagnostics run() {
+    if (joint_.slides) check_slide();
+    return std::move(errors_);
+  }
+
+ private:
+  void error(const char* key, std::string message, std::string hint) {
+    errors_.push_back({std::move(message), std::move(hint), robot_.file, joint_.line,
+                       "joint." + joint_.name + "." + key});
+  }
+
+  /// A sheet's objects are of shafts. How far one revolution of them moves a slide, none tells.
+  void check_slide() {
+    const std::string slides = fmt::format("joint '{}' slides, and ", joint_.name);
+    if (joint_.counts_of_sheet) {
+      error("encoder_counts_per_rev",
+            fmt::format("{}608F, 6091 and 6092 of {} are per revolution of a shaft: they do not "
+                        "say how far it moves the joint",
+                        slides, board_.eds),
+            "set it to the drive's position units in 2 pi m (6.2832 m) of travel");
+    }
+    if (joint_.velocity_of_sheet) {
+      error("velocity_units_per_rev",
+            fmt::format("{}60A9 of {} is in revolutions of the motor", slides, board_.eds),
+            "set it to the drive's velocity units at 2 pi m/s (6.2832 m/s)");
+    }
+    if (joint_.torque_of_sheet) {
+      error("rated_torque_Nm",
+            fmt::format("{}6076 of {} is a torque: it does not say what force that is", slides,
+                        board_.eds),
+            "set it to the force, in N, at the motor's rated torque");
+    }
+  }
+
+  const RobotConfig& robot_;
+  const JointConfig& joint_;
+  const BoardConfig& board_;
+  Diagnostics errors_;
+};
+
+}  // namespace
+
+Diagnostics check_joint_scale(const RobotConfig& robot, const JointConfig& joint) {
+  const BoardConfig* board = robot.board(joint.board);
+  if (board == nullptr || board->eds.empty()) return {};
+  return ScaleCheck(robot, joint, *board).run();
+}
+
+}  // namespace tandem::hal
