@@ -151,7 +151,38 @@ TEST_F(BoardSheet, WithoutUnitsAsksForThemByName) {
   const auto both = read();
   ASSERT_FALSE(both);
   ASSERT_EQ(both.error().size(), 2U);
-  EXPECT_NE(both.error()[1].to_string().find("6076 has no value"), std::string::npos);
+  EXPECT_NE(both.error()[1].to_string().find("6076 is 0, 6091 is 1 / 1"), std::string::npos)
+      << both.error()[1].to_string();
+}
+
+/// A ratio with a 0, or without one of its two numbers, is neither 1 nor left out.
+TEST_F(BoardSheet, WithARatioThatIsNoneAsksForWhatItScales) {
+  const std::string whole = sheet;
+  const std::size_t shaft = sheet.find("[6091sub2]");
+  for (const auto& [value, said] : {std::pair{"DefaultValue=0", "6091 is 50 / 0"},
+                                    {"DefaultValue=", "6091 is 50 / not said"}}) {
+    sheet = whole;
+    sheet.replace(sheet.find("DefaultValue=1", shaft), 14, value);
+    const auto robot = read();
+    ASSERT_FALSE(robot) << value;
+    ASSERT_EQ(robot.error().size(), 2U);
+    EXPECT_EQ(robot.error()[0].key, "joint[0].encoder_counts_per_rev");
+    EXPECT_NE(robot.error()[0].to_string().find(said), std::string::npos)
+        << robot.error()[0].to_string();
+    EXPECT_EQ(robot.error()[1].key, "joint[0].rated_torque_Nm");
+    EXPECT_NE(robot.error()[1].to_string().find(said), std::string::npos);
+  }
+  sheet = whole;
+  for (const auto& [sub, value] : {std::pair{"0", "2"}, {"1", "360000"}, {"2", "0"}}) {
+    sheet += std::string("[6092sub") + sub +
+             "]\nParameterName=Feed\nObjectType=0x7\nDataType=0x0007\nAccessType=rw\n"
+             "DefaultValue=" +
+             value + "\n";
+  }
+  sheet += "[6092]\nParameterName=Feed constant\nObjectType=0x8\nSubNumber=3\n";
+  const std::string feed = refused();
+  EXPECT_NE(feed.find("encoder_counts_per_rev"), std::string::npos) << feed;
+  EXPECT_NE(feed.find("6092 is 360000 / 0"), std::string::npos) << feed;
 }
 
 TEST_F(BoardSheet, ThatCannotBeReadIsRefusedWithItsOwnLine) {
