@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include "canopen/objects.hpp"
+
 namespace tandem::hal {
 namespace {
 
@@ -12,6 +14,7 @@ class ScaleCheck {
 
   Diagnostics run() {
     if (joint_.slides) check_slide();
+    check_polarity();
     return std::move(errors_);
   }
 
@@ -42,6 +45,20 @@ class ScaleCheck {
                         board_.eds),
             "set it to the force, in N, at the motor's rated torque");
     }
+  }
+
+  void check_polarity() {
+    using namespace canopen::object;
+    const auto bits = board_.sheet->value(canopen::of_axis(kPolarity, joint_.axis), 0, 0);
+    const bool position = (bits.value_or(0) & 0x80) != 0;
+    const bool velocity = (bits.value_or(0) & 0x40) != 0;
+    if (position == velocity) return;
+    error("reversed",
+          fmt::format("607E (polarity) of {} is 0x{:02X}: the drive of joint '{}' would turn {} "
+                      "round, and no key can say that of one alone",
+                      board_.eds, *bits, joint_.name,
+                      position ? "positions and not velocities" : "velocities and not positions"),
+          "set bits 6 and 7 of 607E alike in the drive, and correct its sheet");
   }
 
   const RobotConfig& robot_;

@@ -11,6 +11,7 @@
 #include "canopen/drive_abilities.hpp"
 #include "canopen/objects.hpp"
 #include "canopen/sheet_mappings.hpp"
+#include "hal/config/joint_scale.hpp"
 
 namespace tandem::hal::can {
 namespace {
@@ -219,7 +220,7 @@ std::vector<DriveFact> drive_facts(const RobotConfig& robot) {
 Result<Diagnostics> drive_warnings(const RobotConfig& robot) {
   const auto layout = make_pdo_layout(robot);
   if (!layout) return std::unexpected(layout.error());
-  Diagnostics warnings;
+  Diagnostics warnings = scale_warnings(robot);
   std::set<std::string> seen;  // sheets that several boards have
   for (const NodePlan& node : layout->nodes) {
     if (node.board < 0) continue;

@@ -1,77 +1,15 @@
 // `eds` of a board: its drive's data sheet, and the units that it gives a joint.
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <string>
 
 #include "hal/config/capabilities.hpp"
 #include "hal/config/drive_ranges.hpp"
-#include "hal/config/robot_config.hpp"
-#include "tests/support/scratch_folder.hpp"
+#include "tests/hal/board_sheet.hpp"
 
 namespace tandem::hal {
 namespace {
-
-constexpr const char* kArm = R"(name = "arm"
-[model]
-urdf = "arm.urdf"
-base = "fixed"
-[actuator.motor]
-order = 0
-resistance_ohm = 1.0
-torque_constant_Nm_A = 0.02
-gear_ratio = 50
-inertia_kg_m2 = 0.002
-damping_Nms_rad = 0.17
-current_limit_A = 10
-voltage_limit_V = 24
-[gains.motor]
-position = { kp = 6.0 }
-torque_feedforward = 1.0
-[[bus]]
-name = "arm"
-fd = false
-[[board]]
-name = "drive"
-bus = "arm"
-eds = "drive.eds"
-joints = ["elbow"]
-[[joint]]
-name = "elbow"
-actuator = "motor"
-min_position_rad = -1.5
-max_position_rad = 1.5
-max_velocity_rad_s = 3.0
-max_torque_Nm = 10.0
-)";
-
-struct BoardSheet : ::testing::Test {
-  BoardSheet() {
-    std::ifstream file(std::string(TANDEM_SOURCE_DIR) + "/config/drives/servo.eds");
-    sheet = {std::istreambuf_iterator<char>(file), {}};
-    EXPECT_GT(sheet.size(), 10000U);
-  }
-  static std::string with(std::string text, const std::string& from, const std::string& to) {
-    const std::size_t at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    return text.replace(at, from.size(), to);
-  }
-  auto read(const std::string& robot = kArm) {
-    std::ofstream(folder / "drive.eds") << sheet;
-    return parse_robot_config(robot, folder / "robot.toml");
-  }
-  /// The only error's text.
-  std::string refused(const std::string& robot = kArm) {
-    const auto config = read(robot);
-    if (config) return "taken";
-    return config.error().size() == 1 ? config.error()[0].to_string() : "several errors";
-  }
-
-  tandem::test::ScratchFolder folder;
-  std::string sheet;
-};
 
 TEST_F(BoardSheet, GivesTheDrivesIdentityAndUnits) {
   const auto robot = read();
@@ -94,33 +32,6 @@ TEST_F(BoardSheet, IsOverruledByTheRobotsUnits) {
   EXPECT_EQ(joint.encoder_counts_per_rev, 36000.0);
   EXPECT_EQ(joint.rated_torque_Nm, 12.0);
   EXPECT_FALSE(joint.counts_of_sheet || joint.torque_of_sheet);
-}
-
-/// A sheet counts revolutions; how far one moves a slide, it does not say.
-TEST_F(BoardSheet, DoesNotScaleAJointThatSlides) {
-  sheet +=
-      "[60A9]\nParameterName=SI unit velocity\nObjectType=0x7\nDataType=0x0007\n"
-      "AccessType=ro\nDefaultValue=0x00B44700\n";
-  RobotDescription description{
-      .moving_joints = {{"elbow", -1.0, 1.0, 1.0, 10.0}}, .other_joints = {}, .links = {}};
-  auto turning = read();
-  ASSERT_TRUE(turning) << turning.error()[0].to_string();
-  auto slide = *turning;
-  EXPECT_TRUE(complete_from_description(*turning, description).empty());
-  description.moving_joints[0].slides = true;
-  const Diagnostics errors = complete_from_description(slide, description);
-  ASSERT_EQ(errors.size(), 3U);
-  EXPECT_EQ(errors[0].key, "joint.elbow.encoder_counts_per_rev");
-  EXPECT_EQ(errors[0].line, slide.joints[0].line);
-  EXPECT_NE(errors[0].to_string().find("joint 'elbow' slides"), std::string::npos)
-      << errors[0].to_string();
-  EXPECT_EQ(errors[1].key, "joint.elbow.velocity_units_per_rev");
-  EXPECT_EQ(errors[2].key, "joint.elbow.rated_torque_Nm");
-  auto told = read(with(kArm, "max_torque_Nm = 10.0\n",
-                        "max_torque_Nm = 10.0\nencoder_counts_per_rev = 1256637\n"
-                        "velocity_units_per_rev = 1000\nrated_torque_Nm = 12\n"));
-  ASSERT_TRUE(told) << told.error()[0].to_string();
-  EXPECT_TRUE(complete_from_description(*told, description).empty());
 }
 
 TEST_F(BoardSheet, LetsAJointHaveADirectionAndAZero) {
@@ -153,36 +64,6 @@ TEST_F(BoardSheet, WithoutUnitsAsksForThemByName) {
   ASSERT_EQ(both.error().size(), 2U);
   EXPECT_NE(both.error()[1].to_string().find("6076 is 0, 6091 is 1 / 1"), std::string::npos)
       << both.error()[1].to_string();
-}
-
-/// A ratio with a 0, or without one of its two numbers, is neither 1 nor left out.
-TEST_F(BoardSheet, WithARatioThatIsNoneAsksForWhatItScales) {
-  const std::string whole = sheet;
-  const std::size_t shaft = sheet.find("[6091sub2]");
-  for (const auto& [value, said] : {std::pair{"DefaultValue=0", "6091 is 50 / 0"},
-                                    {"DefaultValue=", "6091 is 50 / not said"}}) {
-    sheet = whole;
-    sheet.replace(sheet.find("DefaultValue=1", shaft), 14, value);
-    const auto robot = read();
-    ASSERT_FALSE(robot) << value;
-    ASSERT_EQ(robot.error().size(), 2U);
-    EXPECT_EQ(robot.error()[0].key, "joint[0].encoder_counts_per_rev");
-    EXPECT_NE(robot.error()[0].to_string().find(said), std::string::npos)
-        << robot.error()[0].to_string();
-    EXPECT_EQ(robot.error()[1].key, "joint[0].rated_torque_Nm");
-    EXPECT_NE(robot.error()[1].to_string().find(said), std::string::npos);
-  }
-  sheet = whole;
-  for (const auto& [sub, value] : {std::pair{"0", "2"}, {"1", "360000"}, {"2", "0"}}) {
-    sheet += std::string("[6092sub") + sub +
-             "]\nParameterName=Feed\nObjectType=0x7\nDataType=0x0007\nAccessType=rw\n"
-             "DefaultValue=" +
-             value + "\n";
-  }
-  sheet += "[6092]\nParameterName=Feed constant\nObjectType=0x8\nSubNumber=3\n";
-  const std::string feed = refused();
-  EXPECT_NE(feed.find("encoder_counts_per_rev"), std::string::npos) << feed;
-  EXPECT_NE(feed.find("6092 is 360000 / 0"), std::string::npos) << feed;
 }
 
 TEST_F(BoardSheet, ThatCannotBeReadIsRefusedWithItsOwnLine) {
@@ -232,19 +113,6 @@ TEST_F(BoardSheet, IsOnAnInterfaceThatLinuxCanHave) {
   const std::string error = refused(of("a_name_that_has_thirty_letters"));
   EXPECT_NE(error.find("is longer than 15 characters"), std::string::npos) << error;
   EXPECT_NE(error.find("robot.toml:20: bus[0].interface: "), std::string::npos) << error;
-}
-
-constexpr const char* kLast = "max_torque_Nm = 10.0\n";
-
-/// The arm with more of its joint, or of its board.
-std::string joint_with(const std::string& lines) {
-  std::string text = kArm;
-  return text.replace(text.find(kLast), std::string(kLast).size(), kLast + lines);
-}
-std::string board_with(const std::string& lines) {
-  const std::string last = "joints = [\"elbow\"]\n";
-  std::string text = kArm;
-  return text.replace(text.find(last), last.size(), last + lines);
 }
 
 TEST_F(BoardSheet, LetsAJointBeHomed) {
@@ -379,24 +247,6 @@ TEST_F(BoardSheet, TakesFramesOfCanFdWhereTheBusHasThem) {
   EXPECT_EQ(robot->boards[0].sheet->most_pdo_bytes, 64);
   const std::string ours = with(board_with("fd = true\n"), "eds = \"drive.eds\"\n", "");
   EXPECT_FALSE(read(ours));
-}
-
-TEST_F(BoardSheet, AsksForAVelocityUnitThatItDoesNotKnow) {
-  sheet = with(sheet, "[60B1]",
-               "[60A9]\nParameterName=SI unit velocity\nObjectType=0x7\n"
-               "DataType=0x0007\nAccessType=ro\nDefaultValue=0x00B44700\n"
-               "PDOMapping=0\n\n[60B1]");
-  const auto rpm = read();
-  ASSERT_TRUE(rpm) << rpm.error()[0].to_string();
-  EXPECT_EQ(rpm->joints[0].velocity_units_per_rev, 3000.0) << "60 times the gear";
-  EXPECT_TRUE(rpm->joints[0].velocity_of_sheet);
-  sheet = with(sheet, "0x00B44700", "0x00010300");
-  const std::string why = refused();
-  EXPECT_NE(why.find("velocity_units_per_rev"), std::string::npos) << why;
-  EXPECT_NE(why.find("60A9 is 0x00010300"), std::string::npos) << why;
-  const auto told = read(joint_with("velocity_units_per_rev = 1000\n"));
-  ASSERT_TRUE(told) << told.error()[0].to_string();
-  EXPECT_FALSE(told->joints[0].velocity_of_sheet);
 }
 
 TEST_F(BoardSheet, LetsAControllerClaimOnlyTheDrivesModes) {
