@@ -4,7 +4,9 @@
 
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <numbers>
+#include <vector>
 
 #include "base/counted.hpp"
 #include "canopen/drive_abilities.hpp"
@@ -49,6 +51,7 @@ class JointScale {
     doubt_positions();
     doubt_velocities();
     doubt_direction();
+    if (!joint_.slides) compare();
     return std::move(warnings_);
   }
 
@@ -91,14 +94,15 @@ class JointScale {
     if (unit == 0 || unit == kIncrements) return;
     const auto per_rev = units_per_rev(unit);
     if (per_rev && !differ(*per_rev, joint_.encoder_counts_per_rev)) return;
-    warn("encoder_counts_per_rev",
-         fmt::format("60A8 (SI unit position) is 0x{:08X} in {}, {}; the joint has {:.10g} by 608F, "
-                     "6091 or 6092",
-                     unit, board_.eds,
-                     per_rev ? fmt::format("{:.10g} position units per revolution", *per_rev)
-                             : std::string("no increments"),
-                     joint_.encoder_counts_per_rev),
-         "set this key to the drive's position units per revolution of the joint");
+    warn(
+        "encoder_counts_per_rev",
+        fmt::format("60A8 (SI unit position) is 0x{:08X} in {}, {}; the joint has {:.10g} by 608F, "
+                    "6091 or 6092",
+                    unit, board_.eds,
+                    per_rev ? fmt::format("{:.10g} position units per revolution", *per_rev)
+                            : std::string("no increments"),
+                    joint_.encoder_counts_per_rev),
+        "set this key to the drive's position units per revolution of the joint");
   }
 
   void doubt_velocities() {
@@ -128,6 +132,47 @@ class JointScale {
          fmt::format("607E (polarity) is 0x{:02X} in {}: the drive turns its counts round itself",
                      bits, board_.eds),
          "set this key to whether its counts then go down as the joint's position grows");
+  }
+
+  /// What the sheet says of counts; none: nothing that could be relied on.
+  [[nodiscard]] std::optional<double> sheets_counts() const {
+    constexpr double kLeast = 100.0;  // less is a 1 that the drive replaces
+    if (factor(object::kPositionFactor).value_or(1.0) != 1.0) return {};
+    const std::uint32_t unit = value(object::kPositionUnit);
+    const bool increments = unit == 0 || unit == kIncrements;
+    const auto counts = increments ? units_.counts_per_rev : units_per_rev(unit);
+    return counts.value_or(0.0) >= kLeast ? counts : std::nullopt;
+  }
+
+  /// robot.toml counts; one that is far from the sheet's word is often a slip, as a gear left out.
+  void compare() {
+    const auto against = [&](const char* key, double told, std::optional<double> said,
+                             std::initializer_list<std::uint16_t> objects) {
+      if (!said || !differ(told, *said)) return;
+      std::vector<std::uint16_t> there;
+      for (const std::uint16_t one : objects) {
+        if (board_.sheet->has(canopen::of_axis(one, joint_.axis))) there.push_back(one);
+      }
+      const std::string values = canopen::values_of(*board_.sheet, joint_.axis, there);
+      warn(key,
+           fmt::format("is {:.10g}, and the drive's sheet says {:.10g}, which is {:.4g} times as "
+                       "much ({} in {})",
+                       told, *said, *said / told, values, board_.eds),
+           "is the gear in both? This file's number is used: correct it, or the sheet");
+    };
+    if (!joint_.counts_of_sheet) {
+      against("encoder_counts_per_rev", joint_.encoder_counts_per_rev, sheets_counts(),
+              {object::kEncoderResolution, object::kGearRatio, object::kFeedConstant,
+               object::kPositionUnit});
+    }
+    if (!joint_.velocity_of_sheet && joint_.velocity_units_per_rev > 0.0) {
+      against("velocity_units_per_rev", joint_.velocity_units_per_rev, units_.velocity_per_rev,
+              {object::kVelocityUnit, object::kGearRatio});
+    }
+    if (!joint_.torque_of_sheet) {
+      against("rated_torque_Nm", joint_.rated_torque_Nm, units_.rated_torque_Nm,
+              {object::kRatedTorque, object::kGearRatio});
+    }
   }
 
   const RobotConfig& robot_;

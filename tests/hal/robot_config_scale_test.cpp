@@ -1,4 +1,5 @@
-// The scale of a joint on a drive of another make: its sheet's, where that says one, or robot.toml's.
+// The scale of a joint on a drive of another make: its sheet's, where that says one, or
+// robot.toml's.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -157,6 +158,39 @@ TEST_F(BoardScale, HasADirectionThatTheDriveMayTurnRound) {
     EXPECT_EQ(errors[0].key, "joint.elbow.reversed");
     EXPECT_NE(errors[0].message.find("607E (polarity)"), std::string::npos) << errors[0].message;
   }
+}
+
+TEST_F(BoardScale, FarFromTheSheetsIsWarnedOfWithBothNumbers) {
+  const auto of = [&](const std::string& line) { return warned(*read(joint_with(line))); };
+  const std::string counts = of("encoder_counts_per_rev = 4096\n");
+  EXPECT_NE(counts.find(":25: joint.elbow.encoder_counts_per_rev: is 4096, and the drive's sheet "
+                        "says 204800, which is 50 times as much (608F is 4096 / 1, 6091 is 50 / 1"),
+            std::string::npos)
+      << counts;
+  const std::string torque = of("rated_torque_Nm = 1.5\n");
+  EXPECT_NE(torque.find("rated_torque_Nm: is 1.5, and the drive's sheet says 25, which is 16.67 "),
+            std::string::npos)
+      << torque;
+  EXPECT_EQ(of("encoder_counts_per_rev = 204000\n"), "0") << "0.4 % off";
+  const std::string whole = sheet;
+  add("60A9", "0x00B44700");
+  EXPECT_NE(of("velocity_units_per_rev = 60\n").find("says 3000, which is 50 times as much"),
+            std::string::npos);
+  sheet = whole;
+  add("60A8", "0xFD410000");
+  EXPECT_NE(of("encoder_counts_per_rev = 204800\n").find("the drive's sheet says 360000"),
+            std::string::npos);
+  EXPECT_EQ(of("encoder_counts_per_rev = 360000\n"), "0");
+  sheet = whole;
+  add("6092", "1", "1");
+  EXPECT_EQ(of("encoder_counts_per_rev = 4096\n"), "0") << "a 1 that the drive replaces";
+}
+
+TEST_F(BoardScale, OfASlideIsNotComparedWithAShafts) {
+  auto robot = read(joint_with("encoder_counts_per_rev = 1256637\nrated_torque_Nm = 30\n"));
+  ASSERT_TRUE(robot);
+  robot->joints[0].slides = true;
+  EXPECT_EQ(warned(*robot), "0");
 }
 
 TEST_F(BoardScale, OfJointsWithTheSameSheetIsDoubtedOnce) {
