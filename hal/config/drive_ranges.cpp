@@ -114,18 +114,20 @@ class RangeCheck {
 
   void check_limits(int line, const std::string& key, int value, std::uint16_t index) {
     const BoardConfig* board = robot_.board(joint_.board);
-    if (board == nullptr || board->eds.empty()) return;
+    if (board == nullptr) return;
     const std::uint16_t of = canopen::of_axis(index, joint_.axis);
     const canopen::SheetEntry* entry = board->sheet->find(of);
     if (entry == nullptr) return;
     const bool low = entry->low && value < *entry->low;
     const bool high = entry->high && value > *entry->high;
     if (!low && !high) return;
-    error(
-        line, key,
-        fmt::format("{} is {} than {}, the limit of {:04X} in {}:{}", value, low ? "less" : "more",
-                    low ? *entry->low : *entry->high, of, board->sheet->file, entry->line),
-        "give a value that the drive takes");
+    const std::string where = board->eds.empty()
+                                  ? std::string("our own boards (docs/firmware.md)")
+                                  : fmt::format("{}:{}", board->sheet->file, entry->line);
+    error(line, key,
+          fmt::format("{} is {} than {}, the limit of {:04X} in {}", value, low ? "less" : "more",
+                      low ? *entry->low : *entry->high, of, where),
+          "give a value that the drive takes");
   }
 
   const RobotConfig& robot_;

@@ -234,6 +234,28 @@ TEST_F(BoardSheet, TakesStopOptionsThatTheDriveHas) {
       << why;
 }
 
+/// Our own boards have the options too; their limits are the firmware's.
+TEST_F(BoardSheet, OfOurOwnHasStopOptions) {
+  const auto of = [&](const std::string& options) {
+    return read(with(joint_with("encoder_counts_per_rev = 36000\n"
+                                "motor_encoder_counts_per_rev = 36000\nstop_options = " +
+                                options + "\n"),
+                     "eds = \"drive.eds\"\n", ""));
+  };
+  const auto robot = of("{ shutdown = 1, disable = 0, halt = 2, fault = -1 }");
+  ASSERT_TRUE(robot) << robot.error()[0].to_string();
+  EXPECT_TRUE(check_drive_ranges(*robot, robot->joints[0]).empty());
+  const auto beyond = of("{ halt = 3, fault = -2 }");
+  ASSERT_TRUE(beyond);
+  const Diagnostics errors = check_drive_ranges(*beyond, beyond->joints[0]);
+  ASSERT_EQ(errors.size(), 2U);
+  EXPECT_EQ(errors[0].key, "joint.elbow.stop_options.halt");
+  EXPECT_NE(errors[0].message.find("3 is more than 2, the limit of 605D in our own boards"),
+            std::string::npos)
+      << errors[0].message;
+  EXPECT_EQ(errors[1].key, "joint.elbow.stop_options.fault");
+}
+
 TEST_F(BoardSheet, KeepsAConfigurationWhereItCan) {
   const std::string why = refused(board_with("keeps_configuration = true\n"));
   EXPECT_NE(why.find("its drive cannot: 1010:1 is missing"), std::string::npos) << why;
