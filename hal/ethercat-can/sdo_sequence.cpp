@@ -264,8 +264,11 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   add_mode_check(steps, can, joint.homing.has_value(), static_cast<int>(axis));
   add_unit_checks(steps, sheet, joint);
   if (takes(object::kInterpolationPeriod, 1) && takes(object::kInterpolationPeriod, 2)) {
+    const auto limits = InterpolationLimits::of(sheet, static_cast<int>(axis));
     add(object::kInterpolationPeriod, 1, std::uint8_t{0});
+    steps.back().period = limits;
     add(object::kInterpolationPeriod, 2, std::int8_t{0});
+    steps.back().period = limits;
   }
   // What moves with an offset alone has no other target.
   const auto demand = [&](std::uint16_t index, auto value) {

@@ -9,6 +9,7 @@
 
 #include "canopen/bytes.hpp"
 #include "hal/config/robot_config.hpp"
+#include "hal/ethercat-can/interpolation_period.hpp"
 #include "hal/ethercat-can/pdo_layout.hpp"
 
 namespace tandem::hal::can {
@@ -33,6 +34,7 @@ struct SdoStep {
   bool kept = true;       ///< a write that a drive keeps: not a demand, as the mode is
   std::uint8_t size = 0;
   std::array<std::uint8_t, 4> bytes{};
+  InterpolationLimits period{};  ///< of 60C2: what its drive takes
 
   [[nodiscard]] std::span<const std::uint8_t> value() const noexcept {
     return {bytes.data(), size};
