@@ -13,9 +13,9 @@ namespace tandem::hal {
 [[nodiscard]] Diagnostics check_joint_scale(const RobotConfig& robot, const JointConfig& joint);
 
 /// What speaks against the scale that a joint was given: values of its sheet that change the
-/// meaning of positions and velocities, where robot.toml does not say itself what is right; and a
-/// scale of robot.toml that is more than 1 % off the sheet's. Joints of which the same is true
-/// share a warning.
+/// meaning of positions and velocities, where robot.toml does not say itself what is right; a scale
+/// of robot.toml that is more than 1 % off the sheet's; and one that our own boards have to round.
+/// Joints of which the same is true share a warning.
 /// @pre as above
 [[nodiscard]] Diagnostics scale_warnings(const RobotConfig& robot);
 

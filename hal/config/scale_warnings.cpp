@@ -182,6 +182,29 @@ class JointScale {
   Diagnostics warnings_;
 };
 
+/// Our own boards are told whole numbers: 608F, 2033, and 6076 in mNm.
+Diagnostics rounded(const RobotConfig& robot, const JointConfig& joint) {
+  Diagnostics warnings;
+  const auto compare = [&](const char* key, double told, double per_unit, const char* object) {
+    const double whole = std::round(told * per_unit) / per_unit;
+    constexpr double kUnseen = 1e-9;
+    const bool torque = per_unit > 1.0;
+    if (!(std::abs(told / whole - 1.0) > (torque ? 1e-3 : kUnseen))) return;
+    warnings.push_back(
+        {.message = fmt::format("is {:.12g}, and our own boards take whole numbers ({}): they are "
+                                "told {:.12g}",
+                                told, object, whole),
+         .hint = torque ? "give it in whole mNm" : "give a whole number",
+         .file = robot.file,
+         .line = joint.line,
+         .key = "joint." + joint.name + "." + key});
+  };
+  compare("encoder_counts_per_rev", joint.encoder_counts_per_rev, 1.0, "608F");
+  compare("motor_encoder_counts_per_rev", joint.motor_encoder_counts_per_rev, 1.0, "2033");
+  compare("rated_torque_Nm", joint.rated_torque_Nm, 1000.0, "6076, in mNm");
+  return warnings;
+}
+
 }  // namespace
 
 Diagnostics scale_warnings(const RobotConfig& robot) {
@@ -189,8 +212,9 @@ Diagnostics scale_warnings(const RobotConfig& robot) {
   std::vector<int> others;  // by warning: joints besides the first
   for (const JointConfig& joint : robot.joints) {
     const BoardConfig* board = robot.board(joint.board);
-    if (board == nullptr || board->eds.empty()) continue;
-    for (Error& warning : JointScale(robot, joint, *board).run()) {
+    if (board == nullptr) continue;
+    for (Error& warning :
+         board->eds.empty() ? rounded(robot, joint) : JointScale(robot, joint, *board).run()) {
       const auto same = std::ranges::find_if(all, [&](const Error& one) {
         return one.message == warning.message && one.hint == warning.hint;
       });

@@ -220,9 +220,9 @@ void add_unit_checks(Steps& steps, const DataSheet& sheet, const JointConfig& jo
 
 /// A joint that is homed: its method and what the sheet has besides. Positions and speeds in the
 /// drive's counts.
-void add_homing(AxisSteps& add, const DataSheet& sheet, const JointConfig& joint) {
+void add_homing(AxisSteps& add, const DataSheet& sheet, const AxisScale& scale,
+                const JointConfig& joint) {
   const HomingConfig& homing = *joint.homing;
-  const AxisScale scale = AxisScale::of(joint);
   const double counts = std::abs(scale.velocity_per_rad_s);
   const auto set = [&](std::uint16_t index, std::uint8_t sub, auto value) {
     if (writable(sheet, of_axis(index, joint.axis), sub)) add(index, sub, value);
@@ -259,7 +259,7 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
                                      {object::kFaultReactionOption, stop.fault}}) {
     if (value) add(index, 0, static_cast<std::int16_t>(*value));
   }
-  if (joint.homing) add_homing(add, sheet, joint);
+  if (joint.homing) add_homing(add, sheet, AxisScale::of(robot, joint), joint);
   if (can.settings) return add_settings(add, robot, node, joint);
   add_mode_check(steps, can, joint.homing.has_value(), static_cast<int>(axis));
   add_unit_checks(steps, sheet, joint);

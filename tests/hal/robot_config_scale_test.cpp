@@ -186,6 +186,24 @@ TEST_F(BoardScale, FarFromTheSheetsIsWarnedOfWithBothNumbers) {
   EXPECT_EQ(of("encoder_counts_per_rev = 4096\n"), "0") << "a 1 that the drive replaces";
 }
 
+TEST_F(BoardScale, OfOurOwnBoardsIsWholeOrWarnedOf) {
+  const auto of = [&](const std::string& counts, const std::string& torque) {
+    return warned(*read(with(joint_with("encoder_counts_per_rev = " + counts +
+                                        "\nmotor_encoder_counts_per_rev = 36000\n"
+                                        "rated_torque_Nm = " +
+                                        torque + "\n"),
+                             "eds = \"drive.eds\"\n", "")));
+  };
+  EXPECT_EQ(of("36000", "12.5"), "0");
+  EXPECT_EQ(of("36000", "12.00001"), "0") << "of no weight";
+  const std::string why = of("333333.33", "12.5");
+  EXPECT_NE(
+      why.find(":24: joint.elbow.encoder_counts_per_rev: is 333333.33, and our own boards take "
+               "whole numbers (608F): they are told 333333"),
+      std::string::npos)
+      << why;
+}
+
 TEST_F(BoardScale, OfASlideIsNotComparedWithAShafts) {
   auto robot = read(joint_with("encoder_counts_per_rev = 1256637\nrated_torque_Nm = 30\n"));
   ASSERT_TRUE(robot);
