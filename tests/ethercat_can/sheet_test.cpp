@@ -48,6 +48,31 @@ TEST(Sheet, TheDriveKnowsTheCycleAndWatchesTheMaster) {
   EXPECT_EQ(rig.drive.value(0x605A), 2);
 }
 
+TEST(Sheet, LimitsThatExcludeWhatItIsSentAreWarnedOf) {
+  Sheet s = servo();
+  const auto limits = [&](int index, std::int64_t low, std::int64_t high) {
+    for (SheetEntry& entry : s.sheet.entries) {
+      if (entry.index != index) continue;
+      entry.low = low;
+      entry.high = high;
+      entry.line = 77;
+    }
+  };
+  limits(0x6060, -4, 10);
+  limits(0x607A, -5, 5);
+  EXPECT_TRUE(drive_warnings(SheetRig(s).robot)->empty());
+  limits(0x6060, 1, 8);
+  limits(0x607A, 5, -5);
+  const auto warnings = drive_warnings(SheetRig(s).robot);
+  ASSERT_EQ(warnings->size(), 2U);
+  EXPECT_EQ((*warnings)[0].to_string().substr(0, 46),
+            "drive.eds:77: 607A: its LowLimit, 5, is more t");
+  EXPECT_NE((*warnings)[1].to_string().find(
+                "drive.eds:77: 6060: its limits do not take mode 9, 10, in which"),
+            std::string::npos)
+      << (*warnings)[1].to_string();
+}
+
 /// A third of a million counts per revolution, and 16.67 Nm: what sheets and gears give.
 TEST(Sheet, ItsScalesNeedNotBeWhole) {
   const auto thirds = [](RobotConfig& robot) {

@@ -195,7 +195,7 @@ TEST_F(BoardScale, OfOurOwnBoardsIsWholeOrWarnedOf) {
                              "eds = \"drive.eds\"\n", "")));
   };
   EXPECT_EQ(of("36000", "12.5"), "0");
-  EXPECT_EQ(of("36000", "12.00001"), "0") << "of no weight";
+  EXPECT_EQ(of("36000", "12.00001"), "0") << "too little to see";
   const std::string why = of("333333.33", "12.5");
   EXPECT_NE(
       why.find(":24: joint.elbow.encoder_counts_per_rev: is 333333.33, and our own boards take "
