@@ -238,6 +238,15 @@ void add_homing(AxisSteps& add, const DataSheet& sheet, const AxisScale& scale,
       scale.to_drive(clamp_round<std::int32_t>(homing.position_rad * scale.counts_per_rad)));
 }
 
+void add_stop_options(AxisSteps& add, const StopOptions& stop) {
+  for (const auto& [index, value] : {std::pair{object::kShutdownOption, stop.shutdown},
+                                     {object::kDisableOption, stop.disable},
+                                     {object::kHaltOption, stop.halt},
+                                     {object::kFaultReactionOption, stop.fault}}) {
+    if (value) add(index, 0, static_cast<std::int16_t>(*value));
+  }
+}
+
 void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std::size_t axis) {
   const BoardConfig& board = robot.boards[static_cast<std::size_t>(node.board)];
   const DataSheet& sheet = *board.sheet;
@@ -252,13 +261,7 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   // The drive adds it to every target: what somebody left there would shift the joint.
   if (takes(object::kPositionOffset, 0)) add(object::kPositionOffset, 0, std::int32_t{0});
   const JointConfig& joint = robot.joints[node.joints[axis]];
-  const StopOptions& stop = joint.stop_options;
-  for (const auto& [index, value] : {std::pair{object::kShutdownOption, stop.shutdown},
-                                     {object::kDisableOption, stop.disable},
-                                     {object::kHaltOption, stop.halt},
-                                     {object::kFaultReactionOption, stop.fault}}) {
-    if (value) add(index, 0, static_cast<std::int16_t>(*value));
-  }
+  add_stop_options(add, joint.stop_options);
   if (joint.homing) add_homing(add, sheet, AxisScale::of(robot, joint), joint);
   if (can.settings) return add_settings(add, robot, node, joint);
   add_mode_check(steps, can, joint.homing.has_value(), static_cast<int>(axis));
