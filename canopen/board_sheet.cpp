@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 
 #include "canopen/eds.hpp"
 #include "canopen/object_dictionary.hpp"
@@ -19,6 +20,8 @@ struct Item {
   std::uint8_t sub;
   DataType type;
   std::uint8_t access;
+  std::optional<std::int64_t> low = {};
+  std::optional<std::int64_t> high = {};
 };
 
 constexpr std::array kOfNode{
@@ -62,6 +65,10 @@ constexpr std::array kOfAxis{
     Item{object::kSupportedModes, 0, kUnsigned32, kRead},
     Item{object::kAbortConnectionOption, 0, kInteger16, kReadWrite},
     Item{object::kQuickStopOption, 0, kInteger16, kReadWrite},
+    Item{object::kShutdownOption, 0, kInteger16, kReadWrite, 0, 1},
+    Item{object::kDisableOption, 0, kInteger16, kReadWrite, 0, 1},
+    Item{object::kHaltOption, 0, kInteger16, kReadWrite, 1, 2},
+    Item{object::kFaultReactionOption, 0, kInteger16, kReadWrite, -1, 2},
     Item{object::kMotorResolution, 0, kUnsigned32, kReadWrite},
     Item{object::kHomeOffset, 0, kInteger32, kReadWrite},
     Item{object::kHomingMethod, 0, kInteger8, kReadWrite},
@@ -122,6 +129,8 @@ DataSheet make_sheet() {
       if (modes) value = kTandemModes;
       if (abort) value = 1;
       add(sheet, of_axis(item.index, axis), item.sub, item.type, item.access, value);
+      sheet.entries.back().low = item.low;
+      sheet.entries.back().high = item.high;
     }
   }
   std::ranges::sort(sheet.entries, {},

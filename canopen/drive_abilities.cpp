@@ -1,7 +1,9 @@
 // Modes from 6502, or from the objects that each needs.
 #include "canopen/drive_abilities.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "canopen/eds.hpp"
 
@@ -96,20 +98,27 @@ DriveAbilities abilities_of(const DataSheet& sheet, int axis) {
 
 namespace {
 
-/// The quotient of an object's sub 1 and 2, where both have values.
-std::optional<double> ratio(const DataSheet& sheet, std::uint16_t index,
-                            std::vector<UnitObject>& used) {
+/// The quotient of an object's sub 1 and 2.
+struct Ratio {
+  bool there = false;           ///< the sheet has the object
+  std::optional<double> value;  ///< none: one of the two is not said, or is 0
+  std::vector<UnitObject> of;   ///< what it was computed from
+};
+
+Ratio ratio_of(const DataSheet& sheet, std::uint16_t index) {
+  Ratio ratio{.there = sheet.has(index), .value = {}, .of = {}};
   const auto over = sheet.value(index, 1, 0).value_or(0);
   const auto under = sheet.value(index, 2, 0).value_or(0);
-  if (over <= 0 || under <= 0) return {};
-  used.push_back({index, 1, static_cast<std::uint32_t>(over)});
-  used.push_back({index, 2, static_cast<std::uint32_t>(under)});
-  return static_cast<double>(over) / static_cast<double>(under);
+  if (over <= 0 || under <= 0) return ratio;
+  ratio.value = static_cast<double>(over) / static_cast<double>(under);
+  ratio.of = {{index, 1, static_cast<std::uint32_t>(over)},
+              {index, 2, static_cast<std::uint32_t>(under)}};
+  return ratio;
 }
 
-}  // namespace
-
-namespace {
+void append(std::vector<UnitObject>& to, const std::vector<UnitObject>& more) {
+  to.insert(to.end(), more.begin(), more.end());
+}
 
 // 60A9, CiA 303-2: prefix (a power of ten), numerator, denominator, reserved.
 constexpr std::uint32_t kUnit = 0x00FFFF00;
@@ -142,32 +151,57 @@ std::vector<int> homing_methods(const DataSheet& sheet, int axis) {
 DriveUnits units_of(const DataSheet& sheet, int axis) {
   const auto at = [axis](std::uint16_t index) { return of_axis(index, axis); };
   DriveUnits units;
-  std::vector<UnitObject> of_gear;
-  const double gear = ratio(sheet, at(object::kGearRatio), of_gear).value_or(1.0);
-  units.counts_per_rev = ratio(sheet, at(object::kFeedConstant), units.position);
-  if (!units.counts_per_rev) {
-    units.counts_per_rev = ratio(sheet, at(object::kEncoderResolution), units.position);
-    if (units.counts_per_rev) {
-      *units.counts_per_rev *= gear;
-      units.position.insert(units.position.end(), of_gear.begin(), of_gear.end());
-    }
+  const Ratio feed = ratio_of(sheet, at(object::kFeedConstant));
+  const Ratio encoder = ratio_of(sheet, at(object::kEncoderResolution));
+  Ratio gear = ratio_of(sheet, at(object::kGearRatio));
+  if (!gear.there) gear.value = 1.0;
+  if (feed.there) {
+    units.counts_per_rev = feed.value;
+    units.position = feed.of;
+  } else if (encoder.value && gear.value) {
+    units.counts_per_rev = *encoder.value * *gear.value;
+    units.position = encoder.of;
+    append(units.position, gear.of);
   }
   const auto unit =
       static_cast<std::uint32_t>(sheet.value(at(object::kVelocityUnit), 0, 0).value_or(0));
-  if (const auto per_s = revolutions_per_s(unit); per_s && !of_gear.empty()) {
-    units.velocity_per_rev = gear / *per_s;
-    units.velocity = of_gear;
+  if (const auto per_s = revolutions_per_s(unit); per_s && !gear.of.empty()) {
+    units.velocity_per_rev = *gear.value / *per_s;
+    units.velocity = gear.of;
     units.velocity.push_back({at(object::kVelocityUnit), 0, unit});
   } else if (unit != 0 && !is_increments_per_s(unit)) {
     units.unknown_velocity = unit;
   }
   const auto rated_mNm = sheet.value(at(object::kRatedTorque), 0, 0).value_or(0);
-  if (rated_mNm > 0) {
-    units.rated_torque_Nm = 1e-3 * static_cast<double>(rated_mNm) * gear;
-    units.torque = of_gear;
+  if (rated_mNm > 0 && gear.value) {
+    units.rated_torque_Nm = 1e-3 * static_cast<double>(rated_mNm) * *gear.value;
+    units.torque = gear.of;
     units.torque.push_back({at(object::kRatedTorque), 0, static_cast<std::uint32_t>(rated_mNm)});
   }
   return units;
+}
+
+std::string values_of(const DataSheet& sheet, int axis, std::span<const std::uint16_t> objects) {
+  std::string text;
+  const auto value = [&](std::uint16_t index, std::uint8_t sub) {
+    const auto found = sheet.value(index, sub, 0);
+    return found ? std::to_string(*found) : std::string("not said");
+  };
+  for (const std::uint16_t axis_0 : objects) {
+    const std::uint16_t index = of_axis(axis_0, axis);
+    if (!text.empty()) text += ", ";
+    std::array<char, 8> name{};
+    (void)std::snprintf(name.data(), name.size(), "%04X", unsigned{index});
+    text += name.data();
+    if (!sheet.has(index)) {
+      text += " is not there";
+    } else if (sheet.find(index, 1) == nullptr) {
+      text += " is " + value(index, 0);
+    } else {
+      text += " is " + value(index, 1) + " / " + value(index, 2);
+    }
+  }
+  return text;
 }
 
 }  // namespace tandem::canopen

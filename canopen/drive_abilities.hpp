@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "canopen/data_sheet.hpp"
@@ -57,10 +59,11 @@ struct UnitObject {
 
 /// What an axis' numbers mean, as far as the sheet has values for it.
 struct DriveUnits {
-  /// Position units (6064, 607A) per revolution of the driven shaft: 6092:1 / 6092:2, or without
-  /// them 608F:1 / 608F:2 times the gear 6091:1 / 6091:2.
+  /// Position units (6064, 607A) per revolution of the driven shaft: 6092:1 / 6092:2, or where the
+  /// sheet has no 6092, 608F:1 / 608F:2 times the gear 6091:1 / 6091:2, which is 1 where it has no
+  /// 6091. A ratio with a 0, or without one of its numbers, tells nothing.
   std::optional<double> counts_per_rev;
-  /// 6076, at the motor, times the gear.
+  /// 6076, at the motor, times the gear as above.
   std::optional<double> rated_torque_Nm;
   std::vector<UnitObject> position;  ///< what counts_per_rev was computed from
   std::vector<UnitObject> torque;    ///< what rated_torque_Nm was computed from
@@ -77,6 +80,10 @@ struct DriveUnits {
 
 /// @param axis  from 0
 [[nodiscard]] DriveUnits units_of(const DataSheet& sheet, int axis);
+/// For messages: "608F is 4096 / 1, 6091 is 50 / 0, 6092 is not there".
+/// @param objects  of the first axis
+[[nodiscard]] std::string values_of(const DataSheet& sheet, int axis,
+                                    std::span<const std::uint16_t> objects);
 
 /// Modes go by 6502 where the sheet has its value; else a mode is there when its objects are.
 /// @param axis  from 0

@@ -38,6 +38,9 @@ Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDic
       velocity_units_(setup.velocity_units_per_rev > 0.0
                           ? setup.velocity_units_per_rev / setup.link_counts_per_rev
                           : 1.0),
+      exact_link_counts_(board.sheet != nullptr ? setup.link_counts_per_rev : 0.0),
+      exact_motor_counts_(board.sheet != nullptr ? setup.motor_counts_per_rev : 0.0),
+      exact_rated_Nm_(board.sheet != nullptr ? setup.rated_torque_Nm : 0.0),
       zero_at_power_on_(setup.zero_counts),
       zero_counts_(setup.zero_counts),
       home_switch_from_rad_(setup.home_switch_from_rad),
@@ -80,8 +83,10 @@ void Axis::power_on() noexcept TANDEM_RT {
 void Axis::apply_settings() noexcept TANDEM_RT {
   const ControllerConfig config = objects_.controller();
   controller_.configure(config, period_s_);
-  link_encoder_.set_resolution(objects_.link_counts);
-  motor_encoder_.set_resolution(objects_.motor_counts);
+  link_encoder_.set_resolution(exact_link_counts_ > 0.0 ? exact_link_counts_
+                                                        : objects_.link_counts);
+  motor_encoder_.set_resolution(exact_motor_counts_ > 0.0 ? exact_motor_counts_
+                                                          : objects_.motor_counts);
   link_velocity_.configure(objects_.cutoffs_Hz[kLinkVelocityCutoff - 1], period_s_);
   motor_velocity_.configure(objects_.cutoffs_Hz[kMotorVelocityCutoff - 1], period_s_);
   torque_rate_.configure(objects_.cutoffs_Hz[kTorqueRateCutoff - 1], period_s_);
@@ -171,7 +176,7 @@ void Axis::show_actual() noexcept {
       clamp_round<std::int32_t>(shown_shift_rad() * motor_encoder_.counts_per_rad()));
   o.motor_velocity =
       clamp_round<std::int32_t>(measured_.motor_velocity_rad_s * motor_encoder_.counts_per_rad());
-  o.torque = clamp_round<std::int16_t>(sign * measured_.torque_Nm * 1.0e3 / o.rated_torque_Nm());
+  o.torque = clamp_round<std::int16_t>(sign * measured_.torque_Nm * 1.0e3 / rated_torque_Nm());
   o.current = clamp_round<std::int16_t>(measured_.current_A * 100.0);
   o.temperature = clamp_round<std::int16_t>(temperature_C_ * 10.0);
 }
@@ -384,7 +389,7 @@ Reference Axis::reference() const noexcept {
   const AxisObjects& o = objects_;
   const double sign = reversed_ ? -1.0 : 1.0;
   const double rad = link_encoder_.rad_per_count();
-  const double Nm = o.rated_torque_Nm() * 1.0e-3;
+  const double Nm = rated_torque_Nm() * 1.0e-3;
   const bool profile = ProfileModes::has(mode_);
   const bool by_velocity = mode_ == Mode::kCsv || mode_ == Mode::kVelocityImpedance;
   const std::int64_t asked =

@@ -62,6 +62,9 @@ class Axis final : private canopen::ObjectOwner {
   [[nodiscard]] std::int32_t from_wire(std::int32_t value) const noexcept;
   /// By what 6064 is off until homing has found the joint's place: shown minus true [rad].
   [[nodiscard]] double shown_shift_rad() const noexcept;
+  [[nodiscard]] double rated_torque_Nm() const noexcept TANDEM_RT {
+    return exact_rated_Nm_ > 0.0 ? exact_rated_Nm_ : objects_.rated_torque_Nm();
+  }
   /// The modes in which the drive makes its own way: one period of them.
   void run_profile() noexcept;
   /// Switches and index pulses, in the drive's direction.
@@ -94,6 +97,10 @@ class Axis final : private canopen::ObjectOwner {
   std::uint32_t modes_;
   bool reversed_;
   double velocity_units_;  ///< in a count per second
+  /// A stand-in's own scales, which need not be whole; 0: those of its objects.
+  double exact_link_counts_;
+  double exact_motor_counts_;
+  double exact_rated_Nm_;
   std::int32_t zero_at_power_on_;
   std::int32_t zero_counts_;  ///< homing changes it
   double home_switch_from_rad_;

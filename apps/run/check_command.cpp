@@ -6,6 +6,7 @@
 #include "apps/can/bus_table.hpp"
 #include "apps/control/fault_table.hpp"
 #include "apps/robot/loop_facts.hpp"
+#include "apps/robot/scale_facts.hpp"
 #include "apps/robot/start_height.hpp"
 #include "apps/robot/start_torque.hpp"
 #include "apps/robot/wrong_kind.hpp"
@@ -47,6 +48,7 @@ void add_robot_facts(const hal::RobotConfig& robot, Facts& facts) {
   for (const hal::can::DriveFact& fact : hal::can::drive_facts(robot)) {
     facts.add("drive", fact.what + ": " + fact.how);
   }
+  add_scale_facts(robot, facts);
 }
 
 void add_kernel_facts(const model::KernelLibrary& kernels, const std::string& robot, Facts& facts) {
@@ -188,6 +190,7 @@ Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics
   print_warnings(warnings);
   const LoopStudy loops = study_loops(robot->config, robot->tree, postures_of(robot->config));
   add_loop_json(robot->config, loops, json);
+  add_scale_json(robot->config, json);
   if (!loops.errors.empty()) return loops.errors;
   const auto kernels = supply_kernels(*robot, {}, MissingKernels::kTolerate);
   if (!kernels) return {kernels.error()};
@@ -206,6 +209,7 @@ Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagno
   const runtime::Experiment& e = (*composition)->experiment;
   const LoopStudy loops = study_loops(e.robot, (*composition)->tree, {&e.posture, 1});
   add_loop_json(e.robot, loops, json);
+  add_scale_json(e.robot, json);
   print_plan(**composition, loops, out);
   add_engine_json(e, json);
   json["kernels"] = (*composition)->kernels.path();

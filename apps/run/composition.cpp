@@ -18,6 +18,7 @@
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
 #include "hal/ethercat-can/drive_use.hpp"
+#include "hal/ethercat-can/interpolation_period.hpp"
 #include "hal/ethercat-can/line_bus.hpp"
 #include "hal/sim/engine_loader.hpp"
 #include "hal/sim/scenario.hpp"
@@ -346,6 +347,7 @@ void add_description(Composition& c, const RobotFiles& robot, Collector& errors)
     if (auto drives = hal::can::drive_warnings(e.robot)) {
       std::ranges::move(*drives, std::back_inserter(c.warnings));
     }
+    errors.add(hal::can::check_interpolation(e.robot, e.loop.period_ns));
   }
   errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
 }

@@ -12,13 +12,15 @@
 namespace tandem::hal {
 namespace {
 
-constexpr double kMost = 2147483647.0;  // of an object of 32 bits with a sign
+constexpr double kMost = 2147483647.0;    // of an object of 32 bits with a sign
+constexpr double kMost32 = 4294967295.0;  // of one without
 
 class RangeCheck {
  public:
   RangeCheck(const RobotConfig& robot, const JointConfig& joint) : robot_(robot), joint_(joint) {}
 
   Diagnostics run() {
+    check_counts();
     check_velocity_units();
     if (joint_.homing) check_homing(*joint_.homing);
     const StopOptions& stop = joint_.stop_options;
@@ -42,15 +44,52 @@ class RangeCheck {
     return rad_s * per_rev / (2.0 * std::numbers::pi);
   }
 
+  /// Where the joint's range is too much for its encoders, their counts are as often the slip.
+  void check_counts() {
+    const bool motor = joint_.motor_encoder_counts_per_rev > joint_.encoder_counts_per_rev;
+    const char* key = motor ? "motor_encoder_counts_per_rev" : "encoder_counts_per_rev";
+    const double given =
+        motor ? joint_.motor_encoder_counts_per_rev : joint_.encoder_counts_per_rev;
+    const double most = std::max(-joint_.min_position_rad, joint_.max_position_rad);
+    const double per_count = 2.0 * std::numbers::pi / given;
+    const BoardConfig* board = robot_.board(joint_.board);
+    const bool own = board == nullptr || board->eds.empty();
+    if (given > kMost32) {
+      error(joint_.line, key,
+            fmt::format("{:.10g} does not fit the 32 bits of {}", given,
+                        own ? (motor ? "2033" : "608F") : "a revolution's counts (6064, 607A)"),
+            fmt::format("give at most {:.0f}", kMost32));
+    } else if (most > kMostCounts * per_count) {
+      error(joint_.line, key,
+            fmt::format("the joint's limits, {:.6g} to {:.6g}, would be up to {:.4g} counts, and "
+                        "the 32 bits of 6064 and 607A take {:.4g}",
+                        joint_.min_position_rad, joint_.max_position_rad, most / per_count,
+                        kMostCounts),
+            fmt::format("give at most {:.0f} counts, or narrow min_position_rad and "
+                        "max_position_rad",
+                        std::floor(kMostCounts * 2.0 * std::numbers::pi / most)));
+    }
+  }
+
   void check_velocity_units() {
-    if (!(joint_.velocity_units_per_rev > 0.0)) return;
     const double most = velocity_units(joint_.max_velocity_rad_s);
+    if (!(joint_.velocity_units_per_rev > 0.0)) return check_velocity(most);
     if (most >= 1.0 && most <= kMost) return;
     error(joint_.line, "velocity_units_per_rev",
           fmt::format("the joint's maximum velocity, {:.6g} rad/s, would be {:.3g} of the drive's "
                       "units, which are integers of 32 bits",
                       joint_.max_velocity_rad_s, most),
           "set it to the drive's velocity units at one revolution of the joint per second");
+  }
+
+  void check_velocity(double most) {
+    if (!(most > kMost)) return;
+    error(joint_.line, "max_velocity_rad_s",
+          fmt::format("{:.6g} {} would be {:.3g} counts per second, which are integers of 32 bits "
+                      "(606C, 60FF)",
+                      joint_.max_velocity_rad_s, joint_.slides ? "m/s" : "rad/s", most),
+          fmt::format("give at most {:.4g}, or correct encoder_counts_per_rev",
+                      kMost * joint_.max_velocity_rad_s / most));
   }
 
   void check_homing(const HomingConfig& homing) {
@@ -114,18 +153,20 @@ class RangeCheck {
 
   void check_limits(int line, const std::string& key, int value, std::uint16_t index) {
     const BoardConfig* board = robot_.board(joint_.board);
-    if (board == nullptr || board->eds.empty()) return;
+    if (board == nullptr) return;
     const std::uint16_t of = canopen::of_axis(index, joint_.axis);
     const canopen::SheetEntry* entry = board->sheet->find(of);
     if (entry == nullptr) return;
     const bool low = entry->low && value < *entry->low;
     const bool high = entry->high && value > *entry->high;
     if (!low && !high) return;
-    error(
-        line, key,
-        fmt::format("{} is {} than {}, the limit of {:04X} in {}:{}", value, low ? "less" : "more",
-                    low ? *entry->low : *entry->high, of, board->sheet->file, entry->line),
-        "give a value that the drive takes");
+    const std::string where = board->eds.empty()
+                                  ? std::string("our own boards (docs/firmware.md)")
+                                  : fmt::format("{}:{}", board->sheet->file, entry->line);
+    error(line, key,
+          fmt::format("{} is {} than {}, the limit of {:04X} in {}", value, low ? "less" : "more",
+                      low ? *entry->low : *entry->high, of, where),
+          "give a value that the drive takes");
   }
 
   const RobotConfig& robot_;

@@ -5,6 +5,7 @@
 
 #include "hal/config/capabilities.hpp"
 #include "hal/config/drive_ranges.hpp"
+#include "hal/config/joint_scale.hpp"
 #include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
@@ -232,11 +233,10 @@ class Completion : private Check {
           "add one or a [[passive]], or fix it with [model.lock] " + others.front() + " = 0.0");
   }
 
-  /// Positions travel as 32-bit counts: this is the largest one, with a margin for overshoot.
   static double countable_rad(const JointConfig& joint) {
     const double counts =
         std::max(joint.encoder_counts_per_rev, joint.motor_encoder_counts_per_rev);
-    return 0.9 * 2147483647.0 / counts * 2.0 * std::numbers::pi;
+    return kMostCounts / counts * 2.0 * std::numbers::pi;
   }
 
   /// One message for all that a joint lacks: often its <limit>.
@@ -258,11 +258,11 @@ class Completion : private Check {
     if (!std::isfinite(described) || described <= 0.0) unlimited_.push_back(key);
   }
 
-  /// @param countable  the most that a joint may turn, whatever is described
+  /// @param countable  the most that a joint without a limit may turn
   void fill_position(double& value, double described, double countable, const std::string& key) {
     if (!std::isnan(value)) return;
     if (std::isnan(described)) return unlimited_.push_back(key);
-    value = std::clamp(described, -countable, countable);
+    value = std::isfinite(described) ? described : std::copysign(countable, described);
   }
 
   void complete(JointConfig& joint, const JointDescription& found) {
@@ -271,7 +271,7 @@ class Completion : private Check {
     joint.slides = found.slides;
     fill_position(joint.min_position_rad, found.min_position_rad, countable, "min_position_rad");
     fill_position(joint.max_position_rad, found.max_position_rad, countable, "max_position_rad");
-    check_limits(joint, key, countable);
+    check_limits(joint, key);
     check_followers(joint, key);
     fill(joint.max_velocity_rad_s, found.max_velocity_rad_s, "max_velocity_rad_s");
     fill(joint.max_torque_Nm, found.max_torque_Nm, "max_torque_Nm");
@@ -289,6 +289,7 @@ class Completion : private Check {
     }
     check_torque_rate(joint, key + ".max_torque_rate_Nm_s");
     check_gains(joint);
+    std::ranges::move(check_joint_scale(robot_, joint), std::back_inserter(errors_));
     std::ranges::move(check_drive_ranges(robot_, joint), std::back_inserter(errors_));
   }
 
@@ -321,16 +322,11 @@ class Completion : private Check {
     }
   }
 
-  void check_limits(const JointConfig& joint, const std::string& key, double countable) {
+  void check_limits(const JointConfig& joint, const std::string& key) {
     if (joint.min_position_rad >= joint.max_position_rad) {
       error(joint.line, key + ".min_position_rad",
             "with the description's limits the position limits are reversed or equal",
             "give both min_position_rad and max_position_rad");
-    }
-    if (joint.min_position_rad < -countable || joint.max_position_rad > countable) {
-      error(joint.line, key + ".max_position_rad",
-            "the position limits are more than the encoder's 32 bits can count",
-            "narrow them or lower the counts per revolution");
     }
   }
 

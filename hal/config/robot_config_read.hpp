@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <set>
 #include <span>
@@ -159,6 +160,13 @@ struct SensorTable {
                                                  std::vector<SensorTable>& sensors);
 /// The joints that boards list, in that order.
 [[nodiscard]] std::vector<AxisAssignment> axes_listed_by(std::span<const BoardTable> boards);
+/// What a table leaves open, until the description or a drive's sheet completes it.
+inline constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
+/// Encoder counts per revolution; bits (20) would be far below.
+inline constexpr Range kCounts{100.0, 1e12};
+/// The units of a drive of another make: the joint's table's, else those of its sheet. Reports what
+/// neither says, and keys that are not for our own boards.
+void complete_units(TomlTable& table, const RobotConfig& robot, JointConfig& joint);
 /// [joint_defaults] and [[joint]]; after everything that a joint refers to. Those that a board
 /// lists come first, in that order.
 void read_joints(TomlTable& root, std::span<const AxisAssignment> listed, RobotConfig& robot,

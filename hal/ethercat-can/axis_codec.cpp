@@ -7,6 +7,7 @@
 
 #include "base/archive.hpp"
 #include "canopen/bytes.hpp"
+#include "canopen/drive_abilities.hpp"
 
 namespace tandem::hal::can {
 
@@ -30,12 +31,10 @@ float real32(double value) noexcept {
 
 }  // namespace
 
-AxisScale AxisScale::of(const JointConfig& joint) {
+namespace {
+
+AxisScale scale_of(const JointConfig& joint, double counts, double motor_counts, double rated_mNm) {
   constexpr double kRadPerRev = 2.0 * std::numbers::pi;
-  // As the drive has them: 608F, 2033 and 6076 are integers.
-  const auto counts = clamp_round<std::uint32_t>(joint.encoder_counts_per_rev);
-  const auto motor_counts = clamp_round<std::uint32_t>(joint.motor_encoder_counts_per_rev);
-  const auto rated_mNm = clamp_round<std::uint32_t>(1000.0 * joint.rated_torque_Nm);
   const double sign = joint.reversed ? -1.0 : 1.0;
   const double velocities =
       joint.velocity_units_per_rev > 0.0 ? joint.velocity_units_per_rev : counts;
@@ -44,6 +43,23 @@ AxisScale AxisScale::of(const JointConfig& joint) {
           .motor_counts_per_rad = motor_counts / kRadPerRev,
           .mille_per_Nm = sign * 1.0e6 / rated_mNm,
           .zero_counts = joint.zero_counts};
+}
+
+}  // namespace
+
+AxisScale AxisScale::of(const JointConfig& joint) {
+  return scale_of(joint, clamp_round<std::uint32_t>(joint.encoder_counts_per_rev),
+                  clamp_round<std::uint32_t>(joint.motor_encoder_counts_per_rev),
+                  clamp_round<std::uint32_t>(1000.0 * joint.rated_torque_Nm));
+}
+
+AxisScale AxisScale::of(const RobotConfig& robot, const JointConfig& joint) {
+  const BoardConfig* board = robot.board(joint.board);
+  const bool settings =
+      board == nullptr || canopen::abilities_of(*board->sheet, joint.axis).settings;
+  if (settings) return of(joint);  // it takes our scales, as whole numbers
+  return scale_of(joint, joint.encoder_counts_per_rev, joint.motor_encoder_counts_per_rev,
+                  1000.0 * joint.rated_torque_Nm);
 }
 
 void* RawFeedback::variable(WireField field) noexcept {

@@ -36,7 +36,11 @@ struct AxisScale {
     return static_cast<std::int32_t>(static_cast<std::uint32_t>(from_zero) +
                                      static_cast<std::uint32_t>(zero_counts));
   }
+  /// Of a joint on one of our own boards, whose 608F, 2033 and 6076 are whole numbers.
   [[nodiscard]] static AxisScale of(const JointConfig& joint);
+  /// The same; on a drive of another make the joint's numbers as they are: a ratio of its sheet
+  /// need not be whole.
+  [[nodiscard]] static AxisScale of(const RobotConfig& robot, const JointConfig& joint);
 };
 
 inline constexpr double kAmperePerUnit = 0.01;

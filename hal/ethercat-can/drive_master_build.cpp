@@ -55,7 +55,7 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
   const std::vector<AxisTraits> traits = traits_of(robot, layout);
   for (std::size_t j = 0; j < robot.joints.size(); ++j) {
     const GainsConfig& gains = robot.gains_of(robot.joints[j]);
-    axes.emplace_back(AxisScale::of(robot.joints[j]), traits[j], gains.stiffness_Nm_rad,
+    axes.emplace_back(AxisScale::of(robot, robot.joints[j]), traits[j], gains.stiffness_Nm_rad,
                       gains.damping_Nms_rad);
     for (const PidConfig* loop :
          {&gains.position, &gains.velocity, &gains.torque, &gains.current}) {

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <memory>
 #include <set>
 
@@ -11,6 +12,8 @@
 #include "canopen/drive_abilities.hpp"
 #include "canopen/objects.hpp"
 #include "canopen/sheet_mappings.hpp"
+#include "hal/config/joint_scale.hpp"
+#include "hal/ethercat-can/limit_warnings.hpp"
 
 namespace tandem::hal::can {
 namespace {
@@ -219,13 +222,16 @@ std::vector<DriveFact> drive_facts(const RobotConfig& robot) {
 Result<Diagnostics> drive_warnings(const RobotConfig& robot) {
   const auto layout = make_pdo_layout(robot);
   if (!layout) return std::unexpected(layout.error());
-  Diagnostics warnings;
+  Diagnostics warnings = scale_warnings(robot);
   std::set<std::string> seen;  // sheets that several boards have
   for (const NodePlan& node : layout->nodes) {
     if (node.board < 0) continue;
     const BoardConfig& board = robot.boards[static_cast<std::size_t>(node.board)];
     if (board.eds.empty()) continue;
-    if (seen.insert(board.eds).second) warn_of_mappings(*board.sheet, warnings);
+    if (seen.insert(board.eds).second) {
+      warn_of_mappings(*board.sheet, warnings);
+      std::ranges::move(limit_warnings(node, *board.sheet), std::back_inserter(warnings));
+    }
     const auto bus = std::ranges::find(robot.buses, board.bus, &BusConfig::name);
     const bool line = bus != robot.buses.end() && bus->kind == BusKind::kEthercat;
     if (bus != robot.buses.end() && !line) warn_of_bit_rate(*bus, board, robot.file, warnings);

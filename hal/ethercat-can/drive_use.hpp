@@ -33,7 +33,8 @@ struct DriveUse {
 /// How the drives of other makes stop, hold and are homed: joints, and what their drive does.
 [[nodiscard]] std::vector<DriveFact> drive_facts(const RobotConfig& robot);
 
-/// What the drives of other makes miss that their joints' safety rests on, each with its board.
+/// What the drives of other makes miss that their joints' safety rests on, each with its board;
+/// scale_warnings() and limit_warnings().
 /// Errors: those of make_pdo_layout().
 [[nodiscard]] Result<Diagnostics> drive_warnings(const RobotConfig& robot);
 

@@ -16,18 +16,6 @@ using canopen::SdoClient;
 
 namespace {
 
-/// 60C2 as mantissa and power of ten: the fewest digits that tell the period in a byte.
-/// @return false when none does.
-bool interpolation_period(std::int64_t period_ns, std::uint8_t& units, std::int8_t& power) {
-  std::int64_t unit_ns = 1'000'000;  // 10^-3 s: what drives know best
-  for (power = -3; power >= -6; --power, unit_ns /= 10) {
-    if (period_ns % unit_ns != 0 || period_ns / unit_ns > 0xFF) continue;
-    units = static_cast<std::uint8_t>(period_ns / unit_ns);
-    return true;
-  }
-  return false;
-}
-
 bool is_interpolation_period(std::uint16_t index) noexcept {
   return index >= 0x6000 && index < 0xA000 &&
          (index - 0x6000) % canopen::kAxisStride == canopen::object::kInterpolationPeriod - 0x6000;
@@ -47,14 +35,12 @@ NodeMaster::NodeMaster(int id, int heartbeat_ms, std::int64_t boot_time_ns, Node
 
 void NodeMaster::set_times(std::int64_t period_ns,
                            std::int64_t sync_timeout_ns) noexcept TANDEM_RT {
-  std::uint8_t units = 0;
-  std::int8_t power = 0;
-  const bool told = interpolation_period(period_ns, units, power);
   for (SdoStep& step : steps_) {
     const bool writes = step.use == SdoUse::kWrite;
-    if (told && writes && is_interpolation_period(step.index)) {
-      if (step.sub == 1) canopen::put(step.bytes.data(), units);
-      if (step.sub == 2) canopen::put(step.bytes.data(), power);
+    if (writes && is_interpolation_period(step.index)) {
+      const auto told = interpolation_period(period_ns, step.period);
+      if (told && step.sub == 1) canopen::put(step.bytes.data(), told->units);
+      if (told && step.sub == 2) canopen::put(step.bytes.data(), told->power);
     }
     if (step.index != canopen::object::kSyncTimeout) continue;
     canopen::put(step.bytes.data(), canopen::clamp_round<std::uint32_t>(

@@ -52,8 +52,8 @@ class NodeMaster {
   NodeMaster(int id, int heartbeat_ms, std::int64_t boot_time_ns, NodeWatch watch,
              std::vector<SdoStep> steps, std::int64_t start_time_ns = 1'000'000'000);
 
-  /// The values for the objects 60C2 (the period) and 2052 (the time-out; 0: none). Before the
-  /// first restart().
+  /// The values for the objects 60C2 (the period, see check_interpolation()) and 2052 (the
+  /// time-out; 0: none). Before the first restart().
   void set_times(std::int64_t period_ns, std::int64_t sync_timeout_ns) noexcept TANDEM_RT;
   /// Begins, or begins again, with a reset of the node.
   void restart(std::int64_t now_ns) noexcept TANDEM_RT;

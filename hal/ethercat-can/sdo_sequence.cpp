@@ -220,9 +220,9 @@ void add_unit_checks(Steps& steps, const DataSheet& sheet, const JointConfig& jo
 
 /// A joint that is homed: its method and what the sheet has besides. Positions and speeds in the
 /// drive's counts.
-void add_homing(AxisSteps& add, const DataSheet& sheet, const JointConfig& joint) {
+void add_homing(AxisSteps& add, const DataSheet& sheet, const AxisScale& scale,
+                const JointConfig& joint) {
   const HomingConfig& homing = *joint.homing;
-  const AxisScale scale = AxisScale::of(joint);
   const double counts = std::abs(scale.velocity_per_rad_s);
   const auto set = [&](std::uint16_t index, std::uint8_t sub, auto value) {
     if (writable(sheet, of_axis(index, joint.axis), sub)) add(index, sub, value);
@@ -236,6 +236,15 @@ void add_homing(AxisSteps& add, const DataSheet& sheet, const JointConfig& joint
   set(object::kHomingAcceleration, 0, rate(homing.acceleration_rad_s2));
   set(object::kHomeOffset, 0,
       scale.to_drive(clamp_round<std::int32_t>(homing.position_rad * scale.counts_per_rad)));
+}
+
+void add_stop_options(AxisSteps& add, const StopOptions& stop) {
+  for (const auto& [index, value] : {std::pair{object::kShutdownOption, stop.shutdown},
+                                     {object::kDisableOption, stop.disable},
+                                     {object::kHaltOption, stop.halt},
+                                     {object::kFaultReactionOption, stop.fault}}) {
+    if (value) add(index, 0, static_cast<std::int16_t>(*value));
+  }
 }
 
 void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std::size_t axis) {
@@ -252,20 +261,17 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   // The drive adds it to every target: what somebody left there would shift the joint.
   if (takes(object::kPositionOffset, 0)) add(object::kPositionOffset, 0, std::int32_t{0});
   const JointConfig& joint = robot.joints[node.joints[axis]];
-  const StopOptions& stop = joint.stop_options;
-  for (const auto& [index, value] : {std::pair{object::kShutdownOption, stop.shutdown},
-                                     {object::kDisableOption, stop.disable},
-                                     {object::kHaltOption, stop.halt},
-                                     {object::kFaultReactionOption, stop.fault}}) {
-    if (value) add(index, 0, static_cast<std::int16_t>(*value));
-  }
-  if (joint.homing) add_homing(add, sheet, joint);
+  add_stop_options(add, joint.stop_options);
+  if (joint.homing) add_homing(add, sheet, AxisScale::of(robot, joint), joint);
   if (can.settings) return add_settings(add, robot, node, joint);
   add_mode_check(steps, can, joint.homing.has_value(), static_cast<int>(axis));
   add_unit_checks(steps, sheet, joint);
   if (takes(object::kInterpolationPeriod, 1) && takes(object::kInterpolationPeriod, 2)) {
+    const auto limits = InterpolationLimits::of(sheet, static_cast<int>(axis));
     add(object::kInterpolationPeriod, 1, std::uint8_t{0});
+    steps.back().period = limits;
     add(object::kInterpolationPeriod, 2, std::int8_t{0});
+    steps.back().period = limits;
   }
   // What moves with an offset alone has no other target.
   const auto demand = [&](std::uint16_t index, auto value) {

@@ -5,10 +5,12 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "canopen/bytes.hpp"
 #include "hal/config/robot_config.hpp"
+#include "hal/ethercat-can/interpolation_period.hpp"
 #include "hal/ethercat-can/pdo_layout.hpp"
 
 namespace tandem::hal::can {
@@ -33,7 +35,8 @@ struct SdoStep {
   bool kept = true;       ///< a write that a drive keeps: not a demand, as the mode is
   std::uint8_t size = 0;
   std::array<std::uint8_t, 4> bytes{};
-  std::uint8_t reserved = 0;  ///< no padding in a snapshot
+  InterpolationLimits period{};  ///< of 60C2: what its drive takes
+  std::uint8_t reserved = 0;     ///< no padding in a snapshot
 
   [[nodiscard]] std::span<const std::uint8_t> value() const noexcept {
     return {bytes.data(), size};
@@ -41,6 +44,7 @@ struct SdoStep {
   /// Whether a check that read this is passed.
   [[nodiscard]] bool accepts(std::span<const std::uint8_t> read) const noexcept TANDEM_RT;
 };
+static_assert(std::has_unique_object_representations_v<SdoStep>, "no padding in a snapshot");
 
 template <class T>
 [[nodiscard]] SdoStep write_step(std::uint16_t index, std::uint8_t sub, T value, int axis = -1) {

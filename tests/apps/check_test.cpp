@@ -24,6 +24,24 @@ TEST_F(Check, ReadsARobotByItself) {
   EXPECT_NE(outcome.out.find("2 on 1 board\n"), std::string::npos) << outcome.out;
 }
 
+TEST_F(Check, ShowsTheScalesOfDrivesOfOthersAndWhereTheyComeFrom) {
+  const std::string robot = TANDEM_SOURCE_DIR "/config/panda_classic/robot.toml";
+  const Outcome outcome = tandem("check '" + robot + "' --json scales.json");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(read_text(folder_ / "scales.json"));
+  ASSERT_EQ(json["scales"].size(), 7U) << json;
+  const auto& first = json["scales"][0];
+  for (const char* key : {"encoder_counts_from", "rated_torque_from", "velocity_units_from"}) {
+    EXPECT_TRUE(first[key].is_string()) << key << first;
+  }
+  EXPECT_GT(first["encoder_counts_per_rev"], 100.0);
+  EXPECT_NE(outcome.out.find(first["joint"].get<std::string>()), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find(" counts per revolution ("), std::string::npos) << outcome.out;
+  const Outcome own = tandem("check robot.toml --json own.json");
+  EXPECT_EQ(own.status, 0) << own.err;
+  EXPECT_FALSE(nlohmann::json::parse(read_text(folder_ / "own.json")).contains("scales"));
+}
+
 /// `--json robot.toml` had replaced the robot.
 TEST_F(Check, DoesNotWriteItsJsonOverAFileThatIsNone) {
   const std::string robot = read_text(folder_ / "robot.toml");

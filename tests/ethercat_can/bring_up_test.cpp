@@ -50,6 +50,19 @@ TEST(BringUp, ConfiguresScalesLimitsGainsAndHeartbeats) {
   EXPECT_EQ(od.value<std::uint32_t>(0x1800, 1), 0x4000018Bu) << "no remote requests";
 }
 
+TEST(BringUp, WritesStopOptionsToOurOwnBoards) {
+  RobotConfig robot = robot_config();
+  robot.joints[3].stop_options = {.shutdown = 1, .disable = 0, .halt = 2, .fault = 1};
+  Rig rig(robot);
+  rig.bring_up();
+  const canopen::DriveOptions& set = rig.axis(3).objects().options;
+  EXPECT_EQ(set.shutdown, 1);
+  EXPECT_EQ(set.disable_operation, 0);
+  EXPECT_EQ(set.halt, 2);
+  EXPECT_EQ(set.fault_reaction, 1);
+  EXPECT_EQ(rig.axis(2).objects().options.fault_reaction, -1) << "as the firmware has it";
+}
+
 TEST(BringUp, NamesABoardThatDoesNotAnswer) {
   Rig rig;
   rig.present[1] = false;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 
+#include "hal/ethercat-can/axis_codec.hpp"
 #include "hal/ethercat-can/drive_use.hpp"
 #include "sheet_rig.hpp"
 
@@ -45,6 +46,55 @@ TEST(Sheet, TheDriveKnowsTheCycleAndWatchesTheMaster) {
   EXPECT_EQ(rig.drive.value(0x1017), 50);
   EXPECT_EQ(rig.drive.value(0x6007), 3) << "it did nothing when its master died";
   EXPECT_EQ(rig.drive.value(0x605A), 2);
+}
+
+TEST(Sheet, LimitsThatExcludeWhatItIsSentAreWarnedOf) {
+  Sheet s = servo();
+  const auto limits = [&](int index, std::int64_t low, std::int64_t high) {
+    for (SheetEntry& entry : s.sheet.entries) {
+      if (entry.index != index) continue;
+      entry.low = low;
+      entry.high = high;
+      entry.line = 77;
+    }
+  };
+  limits(0x6060, -4, 10);
+  limits(0x607A, -5, 5);
+  EXPECT_TRUE(drive_warnings(SheetRig(s).robot)->empty());
+  limits(0x6060, 1, 8);
+  limits(0x607A, 5, -5);
+  const auto warnings = drive_warnings(SheetRig(s).robot);
+  ASSERT_EQ(warnings->size(), 2U);
+  EXPECT_EQ((*warnings)[0].to_string().substr(0, 46),
+            "drive.eds:77: 607A: its LowLimit, 5, is more t");
+  EXPECT_NE((*warnings)[1].to_string().find(
+                "drive.eds:77: 6060: its limits do not take mode 9, 10, in which"),
+            std::string::npos)
+      << (*warnings)[1].to_string();
+}
+
+/// A third of a million counts per revolution, and 16.67 Nm: what sheets and gears give.
+TEST(Sheet, ItsScalesNeedNotBeWhole) {
+  const auto thirds = [](RobotConfig& robot) {
+    robot.joints[0].encoder_counts_per_rev = 1000.0 / 3.0;
+    robot.joints[0].motor_encoder_counts_per_rev = 1000.0 / 3.0;
+    robot.joints[0].rated_torque_Nm = 50.0001 / 3.0;
+  };
+  SheetRig rig(servo(), thirds);
+  const AxisScale scale = AxisScale::of(rig.robot, rig.robot.joints[0]);
+  EXPECT_DOUBLE_EQ(scale.counts_per_rad * 2.0 * kPi, 1000.0 / 3.0);
+  EXPECT_DOUBLE_EQ(scale.motor_counts_per_rad * 2.0 * kPi, 1000.0 / 3.0);
+  EXPECT_DOUBLE_EQ(scale.mille_per_Nm, 3000.0 / 50.0001);
+  ASSERT_TRUE(rig.bring_up());
+  rig.ask(ControlMode::kTorque);
+  rig.steps(5);
+  rig.drive.value(0x6064) = 100'000;
+  rig.steps(3);
+  EXPECT_NEAR(rig.state.position_rad()[0], 300.0 * 2.0 * kPi, 1e-9);
+  RobotConfig own = classic_config();
+  thirds(own);
+  EXPECT_DOUBLE_EQ(AxisScale::of(own, own.joints[0]).counts_per_rad * 2.0 * kPi, 333.0)
+      << "608F of our own boards";
 }
 
 TEST(Sheet, AnOffsetOfPositionsThatSomebodyLeftIsSetToZero) {

@@ -365,6 +365,15 @@ TEST(SheetBoard, TellsAndTakesVelocitiesInItsOwnUnits) {
   EXPECT_NEAR(rig.object<std::int32_t>(0x606C), 300, 30);
 }
 
+TEST(SheetBoard, CountsByAScaleThatIsNotWhole) {
+  BoardSetup setup = stand_in(servo_with_profiles());
+  setup.axes[0].link_counts_per_rev = 1000.0 / 3.0;
+  StandIn rig(setup);
+  rig.joints[0].q = rig.joints[0].th = 100.0;
+  rig.cycles(2);
+  EXPECT_EQ(rig.position(), 5305) << "100 rad; with 333 counts it would be 5300";
+}
+
 /// 6064 is 0 where the joint stands at power-on, and what homing says afterwards.
 TEST(SheetBoard, WithoutAnAbsoluteEncoderItCountsFromPowerOn) {
   BoardSetup setup = stand_in(servo_with_profiles());

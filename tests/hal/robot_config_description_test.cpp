@@ -55,6 +55,34 @@ TEST_F(Completed, GivesAContinuousJointWhatItsEncoderCounts) {
   EXPECT_LT(robot.joints[1].max_position_rad / (2 * M_PI) * 409600, 2147483647.0);
 }
 
+/// 32 bits count positions: neither the description's limits are narrowed, nor is a posture blamed.
+TEST_F(Completed, RefusesMoreCountsThanItsRangeHasRoomFor) {
+  const auto counts = [](const char* number) {
+    return with("motor_encoder_counts_per_rev = 409600",
+                std::string("motor_encoder_counts_per_rev = ") + number);
+  };
+  read(counts("4294967295"));
+  EXPECT_EQ(errors, "");
+  read(counts("4294967296"));
+  EXPECT_EQ(errors.substr(0, errors.find(" (")),
+            "leg.toml:37: joint.hip.motor_encoder_counts_per_rev: 4294967296 does not fit the 32 "
+            "bits of 2033");
+  description_.moving_joints[1].max_position_rad = 3.0;
+  read(counts("4294967295"));
+  EXPECT_EQ(errors,
+            "leg.toml:44: joint.knee.motor_encoder_counts_per_rev: the joint's limits, 0 to 3, "
+            "would be up to 2.051e+09 counts, and the 32 bits of 6064 and 607A take 1.933e+09 "
+            "(give at most 4047911309 counts, or narrow min_position_rad and max_position_rad)\n");
+}
+
+TEST_F(Completed, RefusesAVelocityThatItsEncoderCannotCount) {
+  description_.moving_joints[0].max_velocity_rad_s = 1e6;
+  read(kRobot);
+  EXPECT_EQ(errors.substr(0, errors.find(" (606C")),
+            "leg.toml:37: joint.hip.max_velocity_rad_s: 1e+06 rad/s would be 1.04e+10 counts per "
+            "second, which are integers of 32 bits");
+}
+
 TEST_F(Completed, SuggestsTheNearestForAJointThatTheDescriptionLacks) {
   description_.moving_joints[0].name = "hip_pitch";
   description_.moving_joints[1].name = "hipp";
@@ -221,7 +249,10 @@ TEST_F(Completed, TakesEveryLimitFromTheRobotsFileWhenTheDescriptionHasNone) {
 
 TEST_F(Completed, RefusesLimitsThatTheEncoderCannotCount) {
   read(with("max_position_rad = 1.0", "max_position_rad = 1e6"));
-  EXPECT_NE(errors.find("more than the encoder's 32 bits can count"), std::string::npos);
+  EXPECT_NE(
+      errors.find("joint.hip.motor_encoder_counts_per_rev: the joint's limits, -1.5 to 1e+06"),
+      std::string::npos)
+      << errors;
 }
 
 TEST_F(Completed, RefusesATorqueThatTheWireCannotSay) {

@@ -1,77 +1,15 @@
 // `eds` of a board: its drive's data sheet, and the units that it gives a joint.
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <string>
 
 #include "hal/config/capabilities.hpp"
 #include "hal/config/drive_ranges.hpp"
-#include "hal/config/robot_config.hpp"
-#include "tests/support/scratch_folder.hpp"
+#include "tests/hal/board_sheet.hpp"
 
 namespace tandem::hal {
 namespace {
-
-constexpr const char* kArm = R"(name = "arm"
-[model]
-urdf = "arm.urdf"
-base = "fixed"
-[actuator.motor]
-order = 0
-resistance_ohm = 1.0
-torque_constant_Nm_A = 0.02
-gear_ratio = 50
-inertia_kg_m2 = 0.002
-damping_Nms_rad = 0.17
-current_limit_A = 10
-voltage_limit_V = 24
-[gains.motor]
-position = { kp = 6.0 }
-torque_feedforward = 1.0
-[[bus]]
-name = "arm"
-fd = false
-[[board]]
-name = "drive"
-bus = "arm"
-eds = "drive.eds"
-joints = ["elbow"]
-[[joint]]
-name = "elbow"
-actuator = "motor"
-min_position_rad = -1.5
-max_position_rad = 1.5
-max_velocity_rad_s = 3.0
-max_torque_Nm = 10.0
-)";
-
-struct BoardSheet : ::testing::Test {
-  BoardSheet() {
-    std::ifstream file(std::string(TANDEM_SOURCE_DIR) + "/config/drives/servo.eds");
-    sheet = {std::istreambuf_iterator<char>(file), {}};
-    EXPECT_GT(sheet.size(), 10000U);
-  }
-  static std::string with(std::string text, const std::string& from, const std::string& to) {
-    const std::size_t at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    return text.replace(at, from.size(), to);
-  }
-  auto read(const std::string& robot = kArm) {
-    std::ofstream(folder / "drive.eds") << sheet;
-    return parse_robot_config(robot, folder / "robot.toml");
-  }
-  /// The only error's text.
-  std::string refused(const std::string& robot = kArm) {
-    const auto config = read(robot);
-    if (config) return "taken";
-    return config.error().size() == 1 ? config.error()[0].to_string() : "several errors";
-  }
-
-  tandem::test::ScratchFolder folder;
-  std::string sheet;
-};
 
 TEST_F(BoardSheet, GivesTheDrivesIdentityAndUnits) {
   const auto robot = read();
@@ -124,7 +62,8 @@ TEST_F(BoardSheet, WithoutUnitsAsksForThemByName) {
   const auto both = read();
   ASSERT_FALSE(both);
   ASSERT_EQ(both.error().size(), 2U);
-  EXPECT_NE(both.error()[1].to_string().find("6076 has no value"), std::string::npos);
+  EXPECT_NE(both.error()[1].to_string().find("6076 is 0, 6091 is 1 / 1"), std::string::npos)
+      << both.error()[1].to_string();
 }
 
 TEST_F(BoardSheet, ThatCannotBeReadIsRefusedWithItsOwnLine) {
@@ -174,19 +113,6 @@ TEST_F(BoardSheet, IsOnAnInterfaceThatLinuxCanHave) {
   const std::string error = refused(of("a_name_that_has_thirty_letters"));
   EXPECT_NE(error.find("is longer than 15 characters"), std::string::npos) << error;
   EXPECT_NE(error.find("robot.toml:20: bus[0].interface: "), std::string::npos) << error;
-}
-
-constexpr const char* kLast = "max_torque_Nm = 10.0\n";
-
-/// The arm with more of its joint, or of its board.
-std::string joint_with(const std::string& lines) {
-  std::string text = kArm;
-  return text.replace(text.find(kLast), std::string(kLast).size(), kLast + lines);
-}
-std::string board_with(const std::string& lines) {
-  const std::string last = "joints = [\"elbow\"]\n";
-  std::string text = kArm;
-  return text.replace(text.find(last), last.size(), last + lines);
 }
 
 TEST_F(BoardSheet, LetsAJointBeHomed) {
@@ -308,6 +234,28 @@ TEST_F(BoardSheet, TakesStopOptionsThatTheDriveHas) {
       << why;
 }
 
+/// Our own boards have the options too; their limits are the firmware's.
+TEST_F(BoardSheet, OfOurOwnHasStopOptions) {
+  const auto of = [&](const std::string& options) {
+    return read(with(joint_with("encoder_counts_per_rev = 36000\n"
+                                "motor_encoder_counts_per_rev = 36000\nstop_options = " +
+                                options + "\n"),
+                     "eds = \"drive.eds\"\n", ""));
+  };
+  const auto robot = of("{ shutdown = 1, disable = 0, halt = 2, fault = -1 }");
+  ASSERT_TRUE(robot) << robot.error()[0].to_string();
+  EXPECT_TRUE(check_drive_ranges(*robot, robot->joints[0]).empty());
+  const auto beyond = of("{ halt = 3, fault = -2 }");
+  ASSERT_TRUE(beyond);
+  const Diagnostics errors = check_drive_ranges(*beyond, beyond->joints[0]);
+  ASSERT_EQ(errors.size(), 2U);
+  EXPECT_EQ(errors[0].key, "joint.elbow.stop_options.halt");
+  EXPECT_NE(errors[0].message.find("3 is more than 2, the limit of 605D in our own boards"),
+            std::string::npos)
+      << errors[0].message;
+  EXPECT_EQ(errors[1].key, "joint.elbow.stop_options.fault");
+}
+
 TEST_F(BoardSheet, KeepsAConfigurationWhereItCan) {
   const std::string why = refused(board_with("keeps_configuration = true\n"));
   EXPECT_NE(why.find("its drive cannot: 1010:1 is missing"), std::string::npos) << why;
@@ -321,24 +269,6 @@ TEST_F(BoardSheet, TakesFramesOfCanFdWhereTheBusHasThem) {
   EXPECT_EQ(robot->boards[0].sheet->most_pdo_bytes, 64);
   const std::string ours = with(board_with("fd = true\n"), "eds = \"drive.eds\"\n", "");
   EXPECT_FALSE(read(ours));
-}
-
-TEST_F(BoardSheet, AsksForAVelocityUnitThatItDoesNotKnow) {
-  sheet = with(sheet, "[60B1]",
-               "[60A9]\nParameterName=SI unit velocity\nObjectType=0x7\n"
-               "DataType=0x0007\nAccessType=ro\nDefaultValue=0x00B44700\n"
-               "PDOMapping=0\n\n[60B1]");
-  const auto rpm = read();
-  ASSERT_TRUE(rpm) << rpm.error()[0].to_string();
-  EXPECT_EQ(rpm->joints[0].velocity_units_per_rev, 3000.0) << "60 times the gear";
-  EXPECT_TRUE(rpm->joints[0].velocity_of_sheet);
-  sheet = with(sheet, "0x00B44700", "0x00010300");
-  const std::string why = refused();
-  EXPECT_NE(why.find("velocity_units_per_rev"), std::string::npos) << why;
-  EXPECT_NE(why.find("60A9 is 0x00010300"), std::string::npos) << why;
-  const auto told = read(joint_with("velocity_units_per_rev = 1000\n"));
-  ASSERT_TRUE(told) << told.error()[0].to_string();
-  EXPECT_FALSE(told->joints[0].velocity_of_sheet);
 }
 
 TEST_F(BoardSheet, LetsAControllerClaimOnlyTheDrivesModes) {

@@ -1,0 +1,16 @@
+// The scales of joints on drives of other makes, as `tandem check` shows them.
+// Layer: apps/robot.  Thread: main.
+#pragma once
+
+#include "apps/text/console.hpp"
+#include "hal/config/robot_config.hpp"
+
+namespace tandem::apps {
+
+/// A line for each scale, with its joints. @pre the robot is completed from its description
+void add_scale_facts(const hal::RobotConfig& robot, Facts& facts);
+
+/// `scales` of docs/json.md. @pre as above
+void add_scale_json(const hal::RobotConfig& robot, Json& json);
+
+}  // namespace tandem::apps
