@@ -305,7 +305,7 @@ TANDEM_WIDE void Actuators::evaluate_elastic(const double* q, const double* qd,
   const double *bridge = bridge_.data(), *free = free_.data(), *whole = whole_.data();
   const double* voltage = voltage_.data();
   const std::size_t n = size();
-#pragma GCC ivdep
+  TANDEM_EACH_ALONE
   for (std::size_t j = 0; j < n; ++j) {
     const double velocity = motor.velocity_rad_s[j];
     const double current = bridge[j] * order_2_current(m, j, voltage[j], velocity);
@@ -323,7 +323,7 @@ TANDEM_WIDE void Actuators::step_elastic(double h_s, MotorStateView rate,
                                          MotorState motor) const noexcept {
   const double* free = free_.data();
   const std::size_t n = size();
-#pragma GCC ivdep
+  TANDEM_EACH_ALONE
   for (std::size_t j = 0; j < n; ++j) {
     motor.velocity_rad_s[j] += h_s * rate.velocity_rad_s[j];
     motor.position_rad[j] += h_s * free[j] * motor.velocity_rad_s[j];
@@ -336,7 +336,7 @@ TANDEM_WIDE void Actuators::finish_elastic(MotorState motor) noexcept {
   const double *cooling = cooling_.data(), ambient_C = ambient_C_;
   double* temperature = temperature_.data();
   const std::size_t n = size();
-#pragma GCC ivdep
+  TANDEM_EACH_ALONE
   for (std::size_t j = 0; j < n; ++j) {
     const double velocity = motor.velocity_rad_s[j] * free[j];
     const double current = bridge[j] * order_2_current(m, j, voltage[j], velocity);
