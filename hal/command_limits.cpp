@@ -143,8 +143,11 @@ void CommandLimits::position(std::size_t joint, const StateImage& state,
 /// acceleration that it may have; the other half is for what it lags behind.
 void CommandLimits::brake_before_ends(std::size_t joint, double position_rad,
                                       double& reference) noexcept TANDEM_RT {
+  constexpr double kBrake_s = 0.1;  // from full speed, of a joint that declares no acceleration
   const JointCapabilities& limit = limits_[joint];
-  const auto fastest = [&](double way) { return std::sqrt(acceleration_of(limit) * way); };
+  const double acceleration =
+      std::min(limit.max_acceleration_rad_s2, limit.max_velocity_rad_s / kBrake_s);
+  const auto fastest = [&](double way) { return std::sqrt(acceleration * way); };
   const double up = limit.max_position_rad - position_rad;
   const double down = position_rad - limit.min_position_rad;
   double slower = reference;

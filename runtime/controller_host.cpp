@@ -124,6 +124,12 @@ Status ControllerHost::check_claims(const std::string& name,
                      "is claimed twice by the controller '" + name + "'", "claim each joint once");
     }
     claimed[claim.joint] = 1;
+    if (claim.mode < hal::ControlMode::kIdle || claim.mode > hal::ControlMode::kCurrent) {
+      return fail_at(robot_.joints[claim.joint].name,
+                     "is claimed by the controller '" + name + "' in mode " +
+                         std::to_string(static_cast<int>(claim.mode)) + ", which does not exist",
+                     "name one of hal::ControlMode");
+    }
     if (Status able = hal::check_capability(*config_, claim.joint, claim.mode, claim.interaction);
         !able) {
       return able;

@@ -38,6 +38,17 @@ std::string right(const std::string& text, std::size_t columns) {
   return std::string(columns - std::min(columns, width(text)), ' ') + text;
 }
 
+/// What a terminal would obey, such as an escape sequence in a file's name, in signs that it shows.
+std::string harmless(const std::string& text) {
+  std::string shown;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool control = (byte < 0x20 && c != '\n' && c != '\t') || byte == 0x7F;
+    shown += control ? fmt::format("\\x{:02x}", byte) : std::string(1, c);
+  }
+  return shown;
+}
+
 Error json_error(const std::string& file) {
   return {.message = std::string("cannot write the JSON: ") + std::strerror(errno),
           .hint = "name a file in a folder that can be written",
@@ -239,7 +250,7 @@ Json percentiles_json(const rt::Percentiles& p) {
 void print_errors(const Diagnostics& errors) {
   reported.insert(reported.end(), errors.begin(), errors.end());
   for (const Error& error : errors)  // not fmt::print(), which throws when it cannot write
-    std::fputs(("error: " + error.to_string() + "\n").c_str(), stderr);
+    std::fputs(harmless("error: " + error.to_string() + "\n").c_str(), stderr);
 }
 
 Exit refuse(const Diagnostics& errors) {
@@ -251,7 +262,7 @@ Exit refuse(const Error& error) { return refuse(Diagnostics{error}); }
 
 void print_warnings(const Diagnostics& warnings) {
   for (const Error& warning : warnings)  // as above
-    std::fputs(("warning: " + warning.to_string() + "\n").c_str(), stderr);
+    std::fputs(harmless("warning: " + warning.to_string() + "\n").c_str(), stderr);
 }
 
 namespace {

@@ -11,6 +11,13 @@
 namespace tandem::apps {
 namespace {
 
+TEST_F(BadInput, OfATerminalsEscapesIsShownAndNotObeyed) {
+  const Outcome outcome = tandem("check 'a\033[2Jb.toml'");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("a\\x1b[2Jb.toml"), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find('\033'), std::string::npos);
+}
+
 /// A plugin that threw had ended `tandem check` with a signal, one that called exit(0) with
 /// success.
 TEST_F(BadInput, FromAControllersLibraryIsRefused) {

@@ -49,6 +49,11 @@ TEST(ControllerLoad, RefusesWhatIsWrongWhileTheRunGoesOn) {
             std::string::npos);
   EXPECT_NE(load(std::string(65, 'a'), {0}).error().message.find("longer than 64"),
             std::string::npos);
+  const auto none = run.services().load(
+      "odd", std::make_shared<Sine>(std::vector<std::size_t>{0}, static_cast<hal::ControlMode>(77)),
+      document_of(""), kNow);
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("in mode 77, which does not exist"), std::string::npos);
   EXPECT_FALSE(load("late", {3}));
   EXPECT_FALSE(load("late", {1, 1}));
   const auto unknown = load("late", {0}, "amplitude_rd = 1");
