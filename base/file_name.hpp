@@ -1,5 +1,5 @@
-// Which names may become part of a file's name, of a topic's, name a network interface, or be
-// shown. Layer: base.  Thread: non-RT only.
+// Which names may be part of a file's or a topic's name, name a network interface, or be shown.
+// Layer: base.  Thread: non-RT only.
 #pragma once
 
 #include <string>
