@@ -138,6 +138,10 @@ bool is_increments_per_s(std::uint32_t unit) { return unit == kIncrementsPerSeco
 
 }  // namespace
 
+std::optional<double> ratio(const DataSheet& sheet, std::uint16_t index) {
+  return ratio_of(sheet, index).value;
+}
+
 std::vector<int> homing_methods(const DataSheet& sheet, int axis) {
   const std::uint16_t index = of_axis(object::kHomingMethods, axis);
   std::vector<int> methods;

@@ -78,6 +78,8 @@ struct DriveUnits {
 /// The homing methods of an axis, as 60E3 lists them; empty: not said. @param axis  from 0
 [[nodiscard]] std::vector<int> homing_methods(const DataSheet& sheet, int axis);
 
+/// Sub 1 over sub 2 of an object; none: one of the two is not there, has no value, or is 0.
+[[nodiscard]] std::optional<double> ratio(const DataSheet& sheet, std::uint16_t index);
 /// @param axis  from 0
 [[nodiscard]] DriveUnits units_of(const DataSheet& sheet, int axis);
 /// For messages: "608F is 4096 / 1, 6091 is 50 / 0, 6092 is not there".

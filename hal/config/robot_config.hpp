@@ -175,7 +175,7 @@ struct JointConfig {
   std::optional<BrakeConfig> brake = {};
   std::optional<HomingConfig> homing = {};  ///< none: its encoder is absolute
   bool reversed = false;                    ///< the drive counts down as the joint's angle grows
-  bool direction_told = false;              ///< robot.toml has `reversed`, whatever it says
+  bool reversed_given = false;              ///< robot.toml has `reversed`, whatever it says
   std::int32_t zero_counts = 0;             ///< what the drive counts where the joint is at 0
   StopOptions stop_options = {};
   /// The drive's velocity units at one revolution of the joint per second; 0: its counts per

@@ -106,7 +106,7 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   joint.motor_encoder_counts_per_rev =
       table.number_or("motor_encoder_counts_per_rev", kUnset, kCounts);
   joint.reversed = table.boolean_or("reversed", false);
-  joint.direction_told = table.has("reversed");
+  joint.reversed_given = table.has("reversed");
   joint.zero_counts = static_cast<std::int32_t>(
       table.integer_or("zero_counts", 0, std::numeric_limits<std::int32_t>::min(),
                        std::numeric_limits<std::int32_t>::max()));

@@ -68,10 +68,7 @@ class JointScale {
 
   /// The factor or resolution; none: the sheet does not say it.
   [[nodiscard]] std::optional<double> factor(std::uint16_t index) const {
-    const double over = value(index, 1);
-    const double under = value(index, 2);
-    if (!(over > 0.0) || !(under > 0.0)) return {};
-    return over / under;
+    return canopen::ratio(*board_.sheet, canopen::of_axis(index, joint_.axis));
   }
 
   void warn_of_factor(const char* key, std::uint16_t index, const char* name, const char* what) {
@@ -127,7 +124,7 @@ class JointScale {
 
   void doubt_direction() {
     const std::uint32_t bits = value(object::kPolarity);
-    if (bits == 0 || joint_.direction_told) return;
+    if (bits == 0 || joint_.reversed_given) return;
     warn("reversed",
          fmt::format("607E (polarity) is 0x{:02X} in {}: the drive turns its counts round itself",
                      bits, board_.eds),
@@ -146,9 +143,9 @@ class JointScale {
 
   /// robot.toml counts; one that is far from the sheet's word is often a slip, as a gear left out.
   void compare() {
-    const auto against = [&](const char* key, double told, std::optional<double> said,
+    const auto against = [&](const char* key, double used, std::optional<double> said,
                              std::initializer_list<std::uint16_t> objects) {
-      if (!said || !differ(told, *said)) return;
+      if (!said || !differ(used, *said)) return;
       std::vector<std::uint16_t> there;
       for (const std::uint16_t one : objects) {
         if (board_.sheet->has(canopen::of_axis(one, joint_.axis))) there.push_back(one);
@@ -157,7 +154,7 @@ class JointScale {
       warn(key,
            fmt::format("is {:.10g}, and the drive's sheet says {:.10g}, which is {:.4g} times as "
                        "much ({} in {})",
-                       told, *said, *said / told, values, board_.eds),
+                       used, *said, *said / used, values, board_.eds),
            "is the gear in both? This file's number is used: correct it, or the sheet");
     };
     if (!joint_.counts_of_sheet) {
@@ -182,18 +179,18 @@ class JointScale {
   Diagnostics warnings_;
 };
 
-/// Our own boards are told whole numbers: 608F, 2033, and 6076 in mNm.
+/// Our own boards take whole numbers: 608F, 2033, and 6076 in mNm.
 Diagnostics rounded(const RobotConfig& robot, const JointConfig& joint) {
   Diagnostics warnings;
-  const auto compare = [&](const char* key, double told, double per_unit, const char* object) {
-    const double whole = std::round(told * per_unit) / per_unit;
+  const auto compare = [&](const char* key, double given, double per_unit, const char* object) {
+    const double whole = std::round(given * per_unit) / per_unit;
     constexpr double kUnseen = 1e-9;
     const bool torque = per_unit > 1.0;
-    if (!(std::abs(told / whole - 1.0) > (torque ? 1e-3 : kUnseen))) return;
+    if (!(std::abs(given / whole - 1.0) > (torque ? 1e-3 : kUnseen))) return;
     warnings.push_back(
         {.message = fmt::format("is {:.12g}, and our own boards take whole numbers ({}): they are "
                                 "told {:.12g}",
-                                told, object, whole),
+                                given, object, whole),
          .hint = torque ? "give it in whole mNm" : "give a whole number",
          .file = robot.file,
          .line = joint.line,

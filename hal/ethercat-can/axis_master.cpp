@@ -286,7 +286,7 @@ bool AxisMaster::reset_is_late(std::int64_t now_ns) noexcept {
   return in_reset() && now_ns - since_ns_ >= kResetTimeoutNs;
 }
 
-/// A drive that is still enabled does not hear what it is told.
+/// A drive that is still enabled does not hear its commands.
 bool AxisMaster::in_reset() const noexcept TANDEM_RT {
   const WireState state = drive();
   return state == WireState::kFault || state == WireState::kFaultReactionActive ||

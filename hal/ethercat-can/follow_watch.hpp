@@ -24,11 +24,11 @@ struct FollowLimits {
   double window_rad = 0.0;
   std::int64_t timeout_ns = 0;
 
-  /// @param told  the drive is told the joint's limits: those of our own boards, given or not
-  [[nodiscard]] static FollowLimits of(const JointConfig& joint, bool told) {
+  /// @param limited  the drive gets the joint's limits: our own boards do, given or not
+  [[nodiscard]] static FollowLimits of(const JointConfig& joint, bool limited) {
     double error_rad = joint.following_error_rad;
     const double lag_rad = kLag_s * joint.max_velocity_rad_s;
-    if (!told && !joint.following_error_given && lag_rad > 0.0) {
+    if (!limited && !joint.following_error_given && lag_rad > 0.0) {
       error_rad = std::min(error_rad, lag_rad);
     }
     return {.window_rad = kMargin * error_rad,

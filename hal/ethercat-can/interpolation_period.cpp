@@ -29,15 +29,15 @@ bool takes_period(const canopen::DataSheet& sheet, int axis) {
   return canopen::writable(sheet, index, 1) && canopen::writable(sheet, index, 2);
 }
 
-/// What the joints' drives of other makes take, each with its joint.
-struct Told {
+/// A joint's drive of another make whose 60C2 can be written.
+struct Drive {
   const JointConfig* joint;
   const BoardConfig* board;
   InterpolationLimits limits;
 };
 
-std::vector<Told> told_drives(const RobotConfig& robot) {
-  std::vector<Told> all;
+std::vector<Drive> drives_with_period(const RobotConfig& robot) {
+  std::vector<Drive> all;
   for (const JointConfig& joint : robot.joints) {
     const BoardConfig* board = robot.board(joint.board);
     if (board == nullptr || board->eds.empty() || !takes_period(*board->sheet, joint.axis))
@@ -47,10 +47,10 @@ std::vector<Told> told_drives(const RobotConfig& robot) {
   return all;
 }
 
-/// Whether every drive can be told this period.
-bool can_be_told(std::int64_t ns, const std::vector<Told>& drives) {
+/// Whether every drive takes this period.
+bool all_take(std::int64_t ns, const std::vector<Drive>& drives) {
   return std::ranges::all_of(
-      drives, [&](const Told& one) { return interpolation_period(ns, one.limits).has_value(); });
+      drives, [&](const Drive& one) { return interpolation_period(ns, one.limits).has_value(); });
 }
 
 /// Whether each board's control divides it or is divided by it.
@@ -85,15 +85,15 @@ std::vector<std::string> nearest_periods(std::int64_t period_ns, const Right& ri
 }
 
 /// What to do: periods that fit the boards' control, too, where there are any.
-std::string remedy(std::int64_t period_ns, const std::vector<Told>& drives,
+std::string remedy(std::int64_t period_ns, const std::vector<Drive>& drives,
                    const RobotConfig& robot) {
-  const auto told = [&](std::int64_t ns) { return can_be_told(ns, drives); };
-  const auto both = [&](std::int64_t ns) { return told(ns) && divides(ns, robot); };
+  const auto taken = [&](std::int64_t ns) { return all_take(ns, drives); };
+  const auto both = [&](std::int64_t ns) { return taken(ns) && divides(ns, robot); };
   constexpr const char* kSet = "set period_ns of the experiment to ";
   if (const auto periods = nearest_periods(period_ns, both); !periods.empty()) {
     return fmt::format("{}{}", kSet, fmt::join(periods, " or "));
   }
-  if (const auto periods = nearest_periods(period_ns, told); !periods.empty()) {
+  if (const auto periods = nearest_periods(period_ns, taken); !periods.empty()) {
     return fmt::format("{}{}, and each control_period_ns to one that fits it", kSet,
                        fmt::join(periods, " or "));
   }
@@ -135,10 +135,10 @@ std::optional<InterpolationPeriod> interpolation_period(
 }
 
 Diagnostics check_interpolation(const RobotConfig& robot, std::int64_t period_ns) {
-  const std::vector<Told> drives = told_drives(robot);
+  const std::vector<Drive> drives = drives_with_period(robot);
   Diagnostics errors;
   std::set<std::string> seen;  // sheets that several joints have
-  for (const Told& one : drives) {
+  for (const Drive& one : drives) {
     if (interpolation_period(period_ns, one.limits)) continue;
     if (!seen.insert(fmt::format("{}:{}", one.board->eds, one.joint->axis)).second) continue;
     errors.push_back({.message = fmt::format("the drive of joint '{}' cannot be told a cycle of {} "

@@ -34,8 +34,8 @@ struct InterpolationLimits {
 [[nodiscard]] std::optional<InterpolationPeriod> interpolation_period(
     std::int64_t period_ns, const InterpolationLimits& limits) noexcept TANDEM_RT;
 
-/// Whether every drive of another make can be told the cycle: for each sheet that cannot say it, an
-/// error with the board and the nearest periods that every drive can be told, which fit the boards'
+/// Whether every drive of another make takes the cycle: for each sheet whose 60C2 does not, an
+/// error with the board and the nearest periods that every drive takes, which fit the boards'
 /// control periods where there are such.
 [[nodiscard]] Diagnostics check_interpolation(const RobotConfig& robot, std::int64_t period_ns);
 

@@ -332,7 +332,7 @@ class DeclaredLimits : public Limits {
     limits = CommandLimits(robot_of(declared()), 1'000'000);
     ASSERT_EQ(limits.apply(state, command), Code::kOk);
   }
-  /// A joint that does what it is told, from 0.1 rad at `wanted` [rad/s].
+  /// A joint that follows its commands, from where it is, at `wanted` [rad/s].
   /// @return the farthest place, and the largest deceleration
   std::pair<double, double> run_to_the_end(double wanted) {
     mode(ControlMode::kVelocity);
