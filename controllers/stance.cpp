@@ -1,4 +1,4 @@
-// Newton's method with LU on a square system that make() selects from the feet's and the centre of
+// Newton's method on a square system that make() selects from the feet's and the centre of
 // mass' equations; docs/controllers.md has the choice.
 #include "controllers/stance.hpp"
 
@@ -26,6 +26,15 @@ Matrix3d rotation(const std::vector<double>& pose, std::size_t site) noexcept {
 }
 Vector3d origin(const std::vector<double>& pose, std::size_t site) noexcept {
   return Map<const Vector3d>(&pose[12 * site + 9]);
+}
+
+/// Largest magnitude; NaN when one is not a number.
+double largest(const std::vector<double>& values) noexcept {
+  double most = 0.0;
+  for (const double value : values) {
+    if (std::abs(value) > most || std::isnan(value)) most = std::abs(value);
+  }
+  return most;
 }
 
 /// The least rotation from one direction to another that is not its opposite. Eigen's
@@ -92,12 +101,13 @@ Status Stance::find_legs(const hal::Robot& robot) {
     return fail("the foot '" + foot.name + "' is moved by no joint",
                 "leave it out of `feet`, or correct its site's link in " + robot.file);
   }
-  std::vector<std::size_t> columns{0, 1};
+  std::vector<std::size_t> columns;
   for (std::size_t j = 0; j < map_.joints(); ++j) {
     if (!moves[map_.v_index(j)]) continue;
     columns.push_back(map_.v_index(j));
     legs_.push_back(map_.v_index(j));
   }
+  columns.insert(columns.end(), {0, 1});  // last: they join the equations of all legs
   choose(columns);
   return {};
 }
@@ -118,11 +128,12 @@ std::vector<Stance::Row> Stance::all_rows() const {
 /// Keeps independent equations, and as many of the unknowns `columns`.
 void Stance::choose(const std::vector<std::size_t>& columns) {
   const std::vector<Row> all = all_rows();
-  Eigen::MatrixXd J(all.size(), columns.size());
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  RowMajor J(all.size(), columns.size());
   std::vector<int> priorities;
   for (std::size_t row = 0; row < all.size(); ++row) {
     priorities.push_back(all[row].priority);
-    jacobian(all[row], columns, J.row(static_cast<Eigen::Index>(row)));
+    jacobian(all[row], columns, {&J(static_cast<Eigen::Index>(row), 0), columns.size()});
   }
   const std::vector<Eigen::Index> rows = independent_rows(J, priorities);
   Eigen::MatrixXd kept(static_cast<Eigen::Index>(rows.size()), J.cols());
@@ -133,11 +144,9 @@ void Stance::choose(const std::vector<std::size_t>& columns) {
   for (const Eigen::Index i : independent_rows(kept.transpose(), {})) {
     columns_.push_back(columns[static_cast<std::size_t>(i)]);
   }
-  const auto n = static_cast<Eigen::Index>(rows_.size());
-  A_.setIdentity(n, n);
-  error_.setZero(n);
-  step_.setZero(n);
-  lu_.compute(A_);
+  system_ = SquareSystem(rows_.size());
+  error_.assign(rows_.size(), 0.0);
+  step_.assign(rows_.size(), 0.0);
 }
 
 double Stance::place(std::span<const double> position_rad) noexcept TANDEM_RT {
@@ -214,12 +223,12 @@ double Stance::error(const Row& row) const noexcept TANDEM_RT {
 
 /// One row of the equations' Jacobian, for `columns` of v.
 void Stance::jacobian(const Row& row, std::span<const std::size_t> columns,
-                      RowOut out) const noexcept TANDEM_RT {
+                      std::span<double> out) const noexcept TANDEM_RT {
   const std::size_t nv = kernels_->nv;
   const auto axis_of_G = static_cast<std::size_t>(row.axis);
   if (row.what == What::kMass) {
     const double* J = &com_J_[axis_of_G * nv];
-    for (Eigen::Index i = 0; i < out.size(); ++i) out[i] = J[columns[static_cast<std::size_t>(i)]];
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = J[columns[i]];
     return;
   }
   // The site's Jacobian, rows of nv: 3 linear, 3 angular. A place moves with linear[axis] and,
@@ -230,26 +239,28 @@ void Stance::jacobian(const Row& row, std::span<const std::size_t> columns,
   const Vector3d turn =
       place ? Vector3d((middle(row.foot) - origin(pose_, site)).cross(Vector3d::Unit(row.axis)))
             : axis(row);
-  for (Eigen::Index i = 0; i < out.size(); ++i) {
-    const double* at = J + columns[static_cast<std::size_t>(i)];
-    const double turned = turn.x() * at[3 * nv] + turn.y() * at[4 * nv] + turn.z() * at[5 * nv];
-    out[i] = place ? at[axis_of_G * nv] + turned : turned;
+  const double x = turn.x(), y = turn.y(), z = turn.z();
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const double* w = J + 3 * nv + columns[i];
+    out[i] = x * w[0] + y * w[nv] + z * w[2 * nv];
   }
+  if (!place) return;
+  const double* linear = J + axis_of_G * nv;
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] += linear[columns[i]];
 }
 
 void Stance::gather() noexcept TANDEM_RT {
   for (std::size_t row = 0; row < rows_.size(); ++row) {
-    const auto r = static_cast<Eigen::Index>(row);
-    error_[r] = error(rows_[row]);
-    jacobian(rows_[row], columns_, A_.row(r));
+    error_[row] = error(rows_[row]);
+    jacobian(rows_[row], columns_, system_.row(row));
   }
 }
 
 /// Moves the unknowns. The base is level, so that its own axes are G's.
-void Stance::advance(const Eigen::VectorXd& step, double factor) noexcept TANDEM_RT {
+void Stance::advance(double factor) noexcept TANDEM_RT {
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     const std::size_t column = columns_[i];
-    q_[column < 6 ? column : column + 1] += factor * step[static_cast<Eigen::Index>(i)];
+    q_[column < 6 ? column : column + 1] += factor * step_[i];
   }
 }
 
@@ -259,13 +270,13 @@ Stance::Solution Stance::solve(double height_m, int max_steps) noexcept TANDEM_R
   while (solution.steps < max_steps && !solution.converged) {
     evaluate();
     gather();
-    lu_.compute(A_);
-    step_ = lu_.solve(error_);
-    const double length = step_.cwiseAbs().maxCoeff();
+    system_.factorise();
+    system_.solve(error_, step_);
+    const double length = largest(step_);
     ++solution.steps;
-    solution.residual = error_.cwiseAbs().maxCoeff();
+    solution.residual = largest(error_);
     if (!std::isfinite(length)) return solution;
-    advance(step_, length > kLongestStep ? kLongestStep / length : 1.0);
+    advance(length > kLongestStep ? kLongestStep / length : 1.0);
     solution.converged = length < kConverged;
   }
   return solution;
@@ -278,16 +289,16 @@ void Stance::predict(double dt_s) noexcept TANDEM_RT {
 }
 
 void Stance::move(double rate_m_s) noexcept TANDEM_RT {
+  // The base is level: what it rises by, so do the places, and turns and the mass' way aside do
+  // not.
   for (std::size_t row = 0; row < rows_.size(); ++row) {
-    constexpr std::size_t kHeight[] = {2};
-    Eigen::Matrix<double, 1, 1> rises;
-    jacobian(rows_[row], kHeight, rises);
-    error_[static_cast<Eigen::Index>(row)] = -rises[0] * rate_m_s;
+    const bool height = rows_[row].what == What::kPlace && rows_[row].axis == 2;
+    error_[row] = height ? -rate_m_s : 0.0;
   }
-  step_ = lu_.solve(error_);
+  system_.solve(error_, step_);
   v_[2] = rate_m_s;
   for (std::size_t i = 0; i < columns_.size(); ++i) {
-    v_[columns_[i]] = step_[static_cast<Eigen::Index>(i)];
+    v_[columns_[i]] = step_[i];
   }
 }
 
@@ -303,7 +314,7 @@ bool Stance::in_leg(std::size_t j) const noexcept {
 double Stance::residual() noexcept TANDEM_RT {
   evaluate();
   gather();
-  return error_.cwiseAbs().maxCoeff();
+  return largest(error_);
 }
 
 double Stance::slip_m() noexcept TANDEM_RT {

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -15,6 +14,7 @@
 #include "base/result.hpp"
 #include "controllers/feet.hpp"
 #include "controllers/model_map.hpp"
+#include "controllers/square_system.hpp"
 #include "controllers/support.hpp"
 #include "hal/robot.hpp"
 #include "model/kernels.h"
@@ -52,7 +52,7 @@ class Stance {
   /// What solve() did.
   struct Solution {
     bool converged = false;
-    int steps = 0;          ///< of Newton; each costs three kernel calls and one LU decomposition
+    int steps = 0;          ///< of Newton; each costs three kernel calls and one factorisation
     double residual = 0.0;  ///< largest before the last step [m or rad]
   };
   /// Solves for a height of the base, from the configuration at hand.
@@ -102,11 +102,10 @@ class Stance {
   [[nodiscard]] Eigen::Vector3d middle(std::size_t foot) const noexcept TANDEM_RT;
   [[nodiscard]] Eigen::Vector3d axis(const Row& row) const noexcept TANDEM_RT;
   [[nodiscard]] double error(const Row& row) const noexcept TANDEM_RT;
-  using RowOut = Eigen::Ref<Eigen::RowVectorXd, 0, Eigen::InnerStride<>>;
   void jacobian(const Row& row, std::span<const std::size_t> columns,
-                RowOut out) const noexcept TANDEM_RT;
+                std::span<double> out) const noexcept TANDEM_RT;
   void gather() noexcept TANDEM_RT;
-  void advance(const Eigen::VectorXd& step, double factor) noexcept TANDEM_RT;
+  void advance(double factor) noexcept TANDEM_RT;
 
   const tandem_kernels* kernels_;
   model::Sines sines_;
@@ -120,9 +119,8 @@ class Stance {
   std::vector<double> q_, v_, tau_, zero_;
   std::vector<double> pose_, twist_, site_J_, com_J_, wrench_;
   std::array<double, 3> com_{}, com_velocity_{};
-  Eigen::MatrixXd A_;
-  Eigen::VectorXd error_, step_;
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  SquareSystem system_;  // of the equations' Jacobian
+  std::vector<double> error_, step_;
 };
 
 }  // namespace tandem
