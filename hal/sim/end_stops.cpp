@@ -37,13 +37,20 @@ EndStops::EndStops(const tandem_kernels& kernels, std::span<const JointRange> ra
   }
 }
 
-TANDEM_WIDE bool EndStops::touched(const double* q) const noexcept TANDEM_RT {
+/// Whether any q[j] is below `lower` or above `upper`. Of this file only: link-time optimisation
+/// takes a function with several targets that others call for two.
+TANDEM_WIDE static bool any_outside(const double* lower, const double* upper, const double* q,
+                                    std::size_t n) noexcept {
   std::int64_t any = 0;  // as wide as what is compared
-  for (std::size_t j = 0; j < lower_.size(); ++j) {
-    any |= q[j] < lower_[j] ? 1 : 0;
-    any |= q[j] > upper_[j] ? 1 : 0;
+  for (std::size_t j = 0; j < n; ++j) {
+    any |= q[j] < lower[j] ? 1 : 0;
+    any |= q[j] > upper[j] ? 1 : 0;
   }
   return any != 0;
+}
+
+bool EndStops::touched(const double* q) const noexcept TANDEM_RT {
+  return any_outside(lower_.data(), upper_.data(), q, lower_.size());
 }
 
 void EndStops::add_torques(const double* q, const double* qd,

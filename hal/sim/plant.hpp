@@ -196,6 +196,7 @@ class Plant {
                                                                 const double* v) noexcept;
   void accelerate(const double* q, const double* v, const double* forces) noexcept;
   void step_semi_implicit(double h_s) noexcept;
+  void step_base(double h_s, double* q, double* v) noexcept;
   void step_runge_kutta(double h_s) noexcept;
   void step_engine(double h_s) noexcept;
   void step_motors(double h_s) noexcept;

@@ -103,15 +103,27 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
 void Plant::step_semi_implicit(double h_s) noexcept {
   double* q = x_.data();
   double* v = q + kernels_->nq;
-  for (std::size_t i = 0; i < kernels_->nv; ++i) v[i] += h_s * vdot_[i];
-  if (base_q_ != 0) {
-    const Mat3 R = rotation_of(q + 3);
-    const Vec3 velocity_W = rotate(R.data(), v);
-    for (std::size_t i = 0; i < 3; ++i) q[i] += h_s * velocity_W[i];
-    turn_quaternion(q + 3, v + 3, h_s);
+  if (base_q_ != 0) step_base(h_s, q, v);
+  for (std::size_t i = base_v_; i < kernels_->nv; ++i) {
+    v[i] += h_s * vdot_[i];
+    q[base_q_ - base_v_ + i] += h_s * v[i];
   }
-  for (std::size_t i = 0; i < kernels_->joints; ++i) q[base_q_ + i] += h_s * v[base_v_ + i];
   step_motors(h_s);
+}
+
+/// Velocities along B's axes change by B's turning too. A step of these would lengthen them by
+/// (w h)^2 / 2, so the base's velocity is stepped along W's, where that of a free body stays.
+void Plant::step_base(double h_s, double* q, double* v) noexcept {
+  const Vec3 turning = cross({v[3], v[4], v[5]}, {v[0], v[1], v[2]});
+  for (std::size_t i = 0; i < 3; ++i) v[i] += h_s * (vdot_[i] + turning[i]);
+  const Vec3 velocity_W = rotate(rotation_of(q + 3).data(), v);
+  for (std::size_t i = 0; i < 3; ++i) {
+    q[i] += h_s * velocity_W[i];
+    v[3 + i] += h_s * vdot_[3 + i];
+  }
+  turn_quaternion(q + 3, v + 3, h_s);
+  const Vec3 velocity_B = rotate_back(rotation_of(q + 3).data(), velocity_W.data());
+  std::ranges::copy(velocity_B, v);
 }
 
 void Plant::step_motors(double h_s) noexcept {

@@ -10,6 +10,10 @@ namespace tandem::sim {
 using Vec3 = std::array<double, 3>;
 using Mat3 = std::array<double, 9>;  ///< row-major
 
+[[nodiscard]] inline Vec3 cross(const Vec3& a, const Vec3& b) noexcept {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
 /// The rotation of quaternion `q` = [x y z w], normalised first: x_W = R x_B.
 [[nodiscard]] inline Mat3 rotation_of(const double* q) noexcept {
   const double s = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);

@@ -119,6 +119,28 @@ TEST(Plant, FreeFlightKeepsMomentumAndFallsOnAParabola) {
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(L[i], start[i], 1e-8);
 }
 
+// A body that nothing acts on, spinning fast: both integrators keep its velocity in W.
+TEST(Plant, AFreeSpinningBodyFliesStraight) {
+  for (const Integrator integrator : {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+    PlantConfig config;
+    config.kernels = block_kernels<0>();
+    config.integrator = integrator;
+    Plant plant = make(config);
+    plant.set_state(std::array{0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0},
+                    std::array{1.0, 0.0, 2.0, 13.0, -12.0, 14.0});
+    ASSERT_EQ(plant.advance(2'000'000'000), Code::kOk);
+    double R[9], velocity_W[3];
+    test::block::rotation(plant.q(), R);
+    test::block::turn(R, plant.v(), velocity_W);
+    const double expected[3] = {1.0, 0.0, 2.0 - 2.0 * kG};
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(velocity_W[i], expected[i], 1e-6);
+    EXPECT_NEAR(plant.q()[0], 2.0, 1e-6);
+    EXPECT_NEAR(plant.q()[1], 0.0, 1e-6);
+    // Of order 1: h g t / 2 beside the parabola.
+    EXPECT_NEAR(plant.q()[2], 4.0 - 2.0 * kG, 3e-3);
+  }
+}
+
 TEST(Plant, PassivePendulumKeepsItsEnergy) {
   PlantConfig config = pendulum(pendulum_kernels<0>(), 0, 1.2);
   config.joints[0].actuator.damping_Nms_rad = 0.0;  // bridge off and no friction: a free joint
