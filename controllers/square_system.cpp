@@ -6,12 +6,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "base/wide.hpp"
-
 namespace tandem {
 namespace {
 
-constexpr std::size_t kLanes = 4;
+constexpr std::size_t kLanes = 2;  // of any x86-64
 
 constexpr std::size_t whole_vectors(std::size_t size) noexcept {
   return (size + kLanes - 1) / kLanes * kLanes;
@@ -27,8 +25,8 @@ inline void subtract(double factor, const double* __restrict pivot_row, double* 
   }
 }
 
-TANDEM_WIDE void eliminate(std::size_t size, std::size_t stride, double* A, double* L,
-                           double* inverse, std::size_t* order) noexcept {
+void eliminate(std::size_t size, std::size_t stride, double* A, double* L, double* inverse,
+               std::size_t* order) noexcept {
   for (std::size_t k = 0; k < size; ++k) {
     std::size_t best = k;
     double most = 0.0;

@@ -19,9 +19,7 @@ class SquareSystem {
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   /// Row `i` of A, to be written before factorise(), which overwrites all of A.
-  [[nodiscard]] std::span<double> row(std::size_t i) noexcept {
-    return {&A_[i * stride_], size_};
-  }
+  [[nodiscard]] std::span<double> row(std::size_t i) noexcept { return {&A_[i * stride_], size_}; }
   void factorise() noexcept TANDEM_RT;
   /// Solutions of a singular A are not finite. @pre factorise() since a row was written
   void solve(std::span<const double> b, std::span<double> x) const noexcept TANDEM_RT;
