@@ -2,6 +2,8 @@
 // postures; an error names the joints of the motion without energy.
 #include "model/regular.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
@@ -16,6 +18,7 @@ namespace {
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 constexpr double kSingular = 1e-10;  // smallest eigenvalue, of a diagonal of ones
+constexpr double kNoEnergy = 1e-14;  // rounding of a motion that has none
 constexpr int kDrawn = 4;
 
 /// A joint's position within its limits, or a turn (1 m) either way, from a fixed sequence.
@@ -57,15 +60,19 @@ RowMajor mass_matrix(const Tree& tree, const Mechanism& m, const std::vector<dou
 }
 
 /// Velocities of a motion without energy, empty when there is none.
-Eigen::VectorXd motion_without_energy(const RowMajor& M) {
+/// @param share  out: the motion's energy, of that of its joints one by one
+Eigen::VectorXd motion_without_energy(const RowMajor& M, double& share) {
   const Eigen::VectorXd diagonal = M.diagonal();
   for (Eigen::Index i = 0; i < diagonal.size(); ++i) {
-    if (!(diagonal[i] > 0.0)) return Eigen::VectorXd::Unit(diagonal.size(), i);
+    if (diagonal[i] > 0.0) continue;
+    share = 0.0;
+    return Eigen::VectorXd::Unit(diagonal.size(), i);
   }
   const Eigen::VectorXd scale = diagonal.cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * M * scale.asDiagonal();
   const SymmetricEigen eigen = symmetric_eigen(scaled);
   if (eigen.values[0] >= kSingular) return {};
+  share = eigen.values[0];
   return eigen.vectors.col(0);
 }
 
@@ -110,14 +117,20 @@ Status check_regular(const Tree& tree, const ModelSpec& spec,
       return refuse("the mass matrix is not finite " + one.name,
                     "check masses, inertias and lengths of the description", -1);
     }
-    const Eigen::VectorXd motion = motion_without_energy(M);
+    double share = 0.0;
+    const Eigen::VectorXd motion = motion_without_energy(M, share);
     if (motion.size() == 0) continue;
     int first = -1;
     const std::string who = joints_text(*m, motion, first);
+    const std::string little = share < kNoEnergy
+                                   ? " can move without moving any mass"
+                                   : fmt::format(
+                                         " can move nearly without moving any mass ({:.0e} of what "
+                                         "the joints move one by one, at least {:.0e} are needed)",
+                                         share, kSingular);
     return refuse(
-        "the mass matrix is singular " + one.name + ": " + who +
-            " can move without moving any mass",
-        "give the link between them mass and inertia, in the description or in "
+        "the mass matrix is singular " + one.name + ": " + who + little,
+        "give the links that they move mass and inertia, in the description or in "
         "[model.link.NAME], or lock one of them",
         first < 0 ? -1 : tree.joint_index(m->joint_names[static_cast<std::size_t>(first)]));
   }

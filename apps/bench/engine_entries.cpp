@@ -12,7 +12,9 @@ using report::CurveStyle;
 EngineEntry by_runge_kutta(EngineEntry entry, CurveStyle style) {
   entry.label += " rk4";
   entry.integrator = sim::Integrator::kRungeKutta4;
-  entry.method = "Runge-Kutta, order 4";
+  entry.method = entry.ours() ? "Runge-Kutta, order 4"
+                              : "Runge-Kutta, order 4; 2 of a base's turning, 1 where motors or "
+                                "springs drive joints, whose torques it holds for a step";
   entry.style = style;
   return entry;
 }
@@ -35,9 +37,14 @@ Result<std::vector<EngineEntry>> engine_entries(const std::vector<std::string>& 
   std::vector<EngineEntry> entries = own();
   std::size_t style = 0;
   for (const std::string& name : names.empty() ? sim::installed_engines() : names) {
-    if (name == sim::kOwnEngine) continue;
+    if (name == sim::kOwnEngine || std::ranges::count(entries, name, &EngineEntry::engine) != 0)
+      continue;
     const Result<const sim::EnginePlugin*> plugin = sim::load_engine(name);
-    if (!plugin) return std::unexpected(plugin.error());
+    if (!plugin) {
+      Error error = plugin.error();
+      error.key = "--engines";
+      return std::unexpected(std::move(error));
+    }
     EngineEntry entry{.label = name,
                       .engine = name,
                       .version = (*plugin)->version,

@@ -27,6 +27,9 @@ std::string number(double value) {
   return fmt::format("{:.2g}", value);
 }
 
+/// Null where there is none.
+Json json_number(double value) { return std::isnan(value) ? Json() : Json(value); }
+
 std::string refused(const EngineEntry& entry, std::size_t columns, const std::string& why) {
   std::string row = fmt::format("| {} | {}", entry.label, why);
   for (std::size_t i = 1; i < columns; ++i) row += " |";
@@ -163,6 +166,7 @@ void EnginePage::add(const Flight& flight, const std::vector<FlightRow>& rows,
         fmt::format("error at {:g} ms [rad]", 1e-6 * static_cast<double>(step.step_ns)));
   if (flight.keeps_energy) columns.emplace_back("energy drift at 1 ms");
   if (flight.keeps_momentum) columns.emplace_back("angular momentum's drift at 1 ms");
+  if (flight.subject->floats()) columns.emplace_back("base out of place at 1 ms [mm]");
   columns.emplace_back("cost at 1 ms [us per ms]");
   sections_ += header(columns);
   std::vector<Price> prices;
@@ -176,10 +180,12 @@ void EnginePage::add(const Flight& flight, const std::vector<FlightRow>& rows,
       line += " | " + number(step.error_rad);
       note(flight.name, *row.entry, 1e-6 * static_cast<double>(step.step_ns), "error_rad",
            step.error_rad, step.cost_us_per_ms);
+      if (flight.subject->floats()) json_.back()["base_error_mm"] = json_number(step.base_error_mm);
     }
     const FlightResult& at_1ms = row.steps[std::min<std::size_t>(2, row.steps.size() - 1)];
     if (flight.keeps_energy) line += " | " + fmt::format("{:.1e}", at_1ms.energy_drift);
     if (flight.keeps_momentum) line += " | " + fmt::format("{:.1e}", at_1ms.momentum_drift);
+    if (flight.subject->floats()) line += " | " + number(at_1ms.base_error_mm);
     sections_ += line + fmt::format(" | {:.3g} |\n", at_1ms.cost_us_per_ms);
     const double shortest = row.steps.back().error_rad;
     prices.push_back(
@@ -299,7 +305,7 @@ void EnginePage::add(const std::string& title, const std::vector<HumanoidRow>& r
 void EnginePage::note(const std::string& scene, const EngineEntry& entry, double step_ms,
                       const std::string& error_key, double error, double cost_us_per_ms) {
   Json row{{"scene", scene}, {"engine", entry.label}, {"step_ms", step_ms}};
-  row[error_key] = std::isnan(error) ? Json() : Json(error);
+  row[error_key] = json_number(error);
   row["cost_us_per_ms"] = cost_us_per_ms;
   json_.push_back(row);
 }
@@ -317,7 +323,9 @@ std::string EnginePage::text(const std::string& folder) const {
       "same steps; a cost is the processor time of the whole plant. What is compared is these "
       "engines as adapted here: a user who tunes one of them for one scene may do better, and so "
       "may a newer version. The settings of Bullet, DART, ODE and Simbody were chosen on COMAN's "
-      "squat, which flatters them there; MuJoCo's and Tandem's were not.\n";
+      "squat, which flatters them there; MuJoCo's and Tandem's were not. MuJoCo's friction creeps "
+      "by design; impratio and noslip_iterations, which make it creep less, are left at 1 and "
+      "0.\n";
   page += header({"engine", "version", "integrator", "settings that are not its defaults"});
   for (const EngineEntry& entry : entries_)
     page += fmt::format("| {} | {} | {} | {} |\n", entry.label, entry.version, entry.method,

@@ -97,6 +97,12 @@ double distance_rad(const tandem_kernels& k, const End& a, const End& b) {
   return most;
 }
 
+/// Between the places of the floating base.
+double distance_mm(const End& a, const End& b) {
+  if (a.diverged) return std::numeric_limits<double>::quiet_NaN();
+  return 1e3 * std::hypot(a.q[0] - b.q[0], a.q[1] - b.q[1], a.q[2] - b.q[2]);
+}
+
 Result<FlightResult> best_of_repeats(const Flight& flight, const EngineEntry& entry,
                                      std::int64_t step_ns, const End& truth) {
   FlightResult result{.step_ns = step_ns};
@@ -105,6 +111,7 @@ Result<FlightResult> best_of_repeats(const Flight& flight, const EngineEntry& en
     const Result<End> end = fly(flight, entry, step_ns);
     if (!end) return std::unexpected(end.error());
     result.error_rad = distance_rad(*flight.subject->kernels, *end, truth);
+    if (flight.subject->floats()) result.base_error_mm = distance_mm(*end, truth);
     result.energy_drift = end->energy_drift;
     result.momentum_drift = end->momentum_drift;
     result.cost_us_per_ms = std::min(result.cost_us_per_ms, 1e3 * end->cost_s / flight.duration_s);

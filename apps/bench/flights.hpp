@@ -30,6 +30,7 @@ struct Flight {
 struct FlightResult {
   std::int64_t step_ns = 0;
   double error_rad = 0.0;       ///< the worst joint, or the base's turn, at the end; NaN: diverged
+  double base_error_mm = 0.0;   ///< of a floating base's place at the end; NaN: diverged
   double energy_drift = 0.0;    ///< largest, as a share of the kinetic energy's largest
   double momentum_drift = 0.0;  ///< largest of the angular one, as a share
   double cost_us_per_ms = 0.0;  ///< processor time of a simulated millisecond

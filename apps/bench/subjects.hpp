@@ -20,6 +20,7 @@ struct Subject {
   model::KernelLibrary kernels;
   std::array<double, 3> gravity_m_s2{0.0, 0.0, -9.81};
 
+  [[nodiscard]] bool floats() const noexcept { return kernels->floating_base != 0; }
   /// In an engine, at q = 0, in sub-steps of `step_ns`. Its joints' motors turn volts into as many
   /// Nm, and have no inertia, friction or limit.
   /// Errors: those of Plant::create().

@@ -327,6 +327,22 @@ Error in_its_file(Error error, const runtime::Experiment& e) {
 }
 
 /// What the description says of the robot and of where it starts.
+/// Other engines have one coefficient for soles that stick and that slide.
+std::optional<Error> other_friction(const runtime::Experiment& e) {
+  const hal::ContactConfig& contact = e.robot.contact;
+  if (e.sim.engine == sim::kOwnEngine || contact.feet.empty()) return {};
+  if (contact.static_friction == contact.sliding_friction) return {};
+  return in_its_file(
+      {.message = fmt::format("the engine '{}' has one coefficient of friction, "
+                              "static_friction = {:g}: sliding_friction = {:g} is "
+                              "not used",
+                              e.sim.engine, contact.static_friction, contact.sliding_friction),
+       .hint = "to compare slides with Tandem's own, make both alike in [contact]",
+       .file = {},
+       .key = "sim.engine"},
+      e);
+}
+
 void add_description(Composition& c, const RobotFiles& robot, Collector& errors) {
   runtime::Experiment& e = c.experiment;
   c.tree = robot.tree;
@@ -341,6 +357,7 @@ void add_description(Composition& c, const RobotFiles& robot, Collector& errors)
     }
     const Status engine = sim::check_engine(e.robot, e.sim_robot_config());
     if (!engine) errors.add(in_its_file(engine.error(), e), {}, 0);
+    if (auto warning = other_friction(e)) c.warnings.push_back(std::move(*warning));
   }
   if (e.hal.backend != runtime::BackendKind::kDds) {
     std::ranges::move(start_warnings(robot, e.posture), std::back_inserter(c.warnings));

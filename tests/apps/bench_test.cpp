@@ -25,6 +25,8 @@ TEST_F(Bench, EnginesConvergeWithTheOrderOfTheirIntegrator) {
   EXPECT_NEAR(error["tandem"][4.0] / error["tandem"][2.0], 2.0, 0.2);
   EXPECT_NEAR(error["tandem rk4"][4.0] / error["tandem rk4"][2.0], 16.0, 2.0);
   EXPECT_LT(error["tandem rk4"][1.0], 1e-9);
+  for (const nlohmann::json& row : measured["results"])
+    EXPECT_LT(row["base_error_mm"], 1e-4) << "a free box flies straight: " << row;
   const std::string page = read_text(folder_ / "out/engines.md");
   EXPECT_NE(page.find("| tandem rk4 | this build | Runge-Kutta, order 4 |"), std::string::npos);
   EXPECT_NE(page.find("**tandem rk4** needs least"), std::string::npos) << page;
@@ -38,7 +40,7 @@ TEST_F(Bench, EnginesConvergeWithTheOrderOfTheirIntegrator) {
 TEST_F(Bench, RefusesAnEngineThatIsNotThereBeforeItMeasures) {
   const Outcome outcome = tandem("bench engines --engines havok -o out", cache());
   EXPECT_EQ(outcome.status, 2);
-  EXPECT_NE(outcome.err.find("there is no engine 'havok' beside"), std::string::npos)
+  EXPECT_NE(outcome.err.find("--engines: there is no engine 'havok' beside"), std::string::npos)
       << outcome.err;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }

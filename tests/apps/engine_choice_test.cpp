@@ -53,6 +53,23 @@ TEST_F(EngineChoice, OfOursHasNoVersionOfItsOwn) {
   EXPECT_FALSE(json("info.json")["metadata"].contains("engine"));
 }
 
+TEST_F(EngineChoice, WithOneCoefficientOfFrictionIsWarnedOf) {
+  if (!installed("mujoco")) GTEST_SKIP() << "MuJoCo is not installed";
+  const std::string coman = TANDEM_SOURCE_DIR "/config/coman/";
+  write_text(folder_ / "stand.toml", "robot = \"" + coman +
+                                         "robot.toml\"\nposture = \"stand\"\nduration_s = 1\n"
+                                         "[[controller]]\nplugin = \"hold\"\n");
+  EXPECT_EQ(tandem("check stand.toml").err.find("coefficient"), std::string::npos);
+  write_text(folder_ / "stand.toml",
+             read_text(folder_ / "stand.toml") + "[sim]\nengine = \"mujoco\"\n");
+  const Outcome check = tandem("check stand.toml");
+  EXPECT_EQ(check.status, 0) << check.err;
+  EXPECT_NE(check.err.find("stand.toml:7: sim.engine: the engine 'mujoco' has one coefficient of "
+                           "friction, static_friction = 0.9: sliding_friction = 0.8 is not used"),
+            std::string::npos)
+      << check.err;
+}
+
 /// A robot of one's own, without kernels.
 class EngineRefusal : public EngineChoice {
  protected:

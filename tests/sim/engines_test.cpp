@@ -252,6 +252,24 @@ TEST_P(Engines, RefuseAClosedLoopByName) {
             std::string::npos);
 }
 
+TEST_P(Engines, MoveAMasslessLinkOrRefuseItByName) {
+  test::TestRobot robot = test::load_test_robot("double_pendulum");
+  model::Tree tree = *robot.tree;
+  tree.bodies[1].inertia = {};
+  const auto made = make_engine(GetParam(), robot.robot, tree, kStep_s);
+  if (!made) {
+    EXPECT_NE(made.error().message.find("'" + tree.joints[0].name + "'"), std::string::npos)
+        << made.error().to_string();
+    return;
+  }
+  const model::InterpretedKernels kernels(model::make_mechanism(tree, {}).value());
+  std::mt19937 random(1);
+  const State s = random_state(*kernels.get(), random);
+  std::vector<double> theirs(s.v.size());
+  (*made)->accelerations(s.q.data(), s.v.data(), s.tau.data(), theirs.data());
+  EXPECT_LT(largest_difference(theirs, ours(*kernels.get(), s)), 1e-6);
+}
+
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Engines);  // sanitizer builds have none
 INSTANTIATE_TEST_SUITE_P(Of, Engines, testing::ValuesIn(installed_engines()),
                          [](const auto& engine) { return engine.param; });

@@ -37,6 +37,24 @@ std::string inertial(const model::Inertia& inertia) {
          "\n";
 }
 
+// MuJoCo's own refusal names bodies and lines of a document that nobody sees.
+Status check_masses(const model::Tree& tree) {
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    const model::Inertia& inertia = tree.bodies[j + 1].inertia;
+    const double least = inertia.mass_kg > 0.0
+                             ? Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia.about_com_kg_m2,
+                                                                       Eigen::EigenvaluesOnly)
+                                   .eigenvalues()[0]
+                             : 0.0;
+    if (inertia.mass_kg >= mjMINVAL && least >= mjMINVAL) continue;
+    return fail("what joint '" + tree.joints[j].name + "' moves has no " +
+                    (inertia.mass_kg >= mjMINVAL ? "inertia about one of its axes" : "mass"),
+                "MuJoCo wants mass and inertia in every body that moves: give the link some in "
+                "[model.link.NAME], or set engine = \"tandem\"");
+  }
+  return {};
+}
+
 class Document {
  public:
   explicit Document(const EngineModel& model) : model_(model) {}
@@ -107,6 +125,8 @@ class Mujoco final : public Engine {
  public:
   static Result<std::unique_ptr<Engine>> create(const EngineModel& model) {
     mju_user_warning = [](const char*) {};  // else it writes a file where the program stands
+    if (const Status masses = check_masses(model.tree); !masses)
+      return std::unexpected(masses.error());
     auto engine = std::make_unique<Mujoco>();
     const std::string document = Document(model).text_of_robot();
     const auto files = std::make_unique<mjVFS>();  // megabytes
@@ -118,7 +138,7 @@ class Mujoco final : public Engine {
     char why[1000] = "";
     engine->model_.reset(mj_loadXML(kName, files.get(), why, sizeof why));
     mj_deleteVFS(files.get());
-    if (!engine->model_) return fail(why, "MuJoCo wants a mass in every body that moves");
+    if (!engine->model_) return fail(why, "set engine = \"tandem\", or another one");
     engine->data_.reset(mj_makeData(engine->model_.get()));
     if (!engine->data_) return fail("MuJoCo has no memory for it", "free some");
     engine->floating_ = model.tree.floating_base;
