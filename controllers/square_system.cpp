@@ -25,6 +25,12 @@ inline void subtract(double factor, const double* __restrict pivot_row, double* 
   }
 }
 
+inline void subtract(double factor, const std::array<double, 2>& from,
+                     std::array<double, 2>& rest) noexcept {
+  rest[0] -= factor * from[0];
+  rest[1] -= factor * from[1];
+}
+
 void eliminate(std::size_t size, std::size_t stride, double* A, double* L, double* inverse,
                std::size_t* order) noexcept {
   for (std::size_t k = 0; k < size; ++k) {
@@ -32,9 +38,8 @@ void eliminate(std::size_t size, std::size_t stride, double* A, double* L, doubl
     double most = 0.0;
     for (std::size_t i = k; i < size; ++i) {
       const double magnitude = std::abs(A[order[i] * stride + k]);
-      if (magnitude <= most) continue;
-      best = i;
-      most = magnitude;
+      best = magnitude > most ? i : best;
+      most = std::max(most, magnitude);
     }
     std::swap(order[k], order[best]);
     const double* pivot_row = A + order[k] * stride;
@@ -68,18 +73,18 @@ void SquareSystem::factorise() noexcept TANDEM_RT {
   eliminate(size_, stride_, A_.data(), L_.data(), inverse_.data(), order_.data());
 }
 
-void SquareSystem::solve(std::span<const double> b, std::span<double> x) const noexcept TANDEM_RT {
+void SquareSystem::solve(std::span<const Two> b, std::span<Two> x) const noexcept TANDEM_RT {
   for (std::size_t i = 0; i < size_; ++i) {
     const double* factors = &L_[order_[i] * stride_];
-    double rest = b[order_[i]];
-    for (std::size_t k = 0; k < i; ++k) rest -= factors[k] * x[k];
+    Two rest = b[order_[i]];
+    for (std::size_t k = 0; k < i; ++k) subtract(factors[k], x[k], rest);
     x[i] = rest;
   }
   for (std::size_t i = size_; i-- > 0;) {
     const double* upper = &A_[order_[i] * stride_];
-    double rest = x[i];
-    for (std::size_t k = i + 1; k < size_; ++k) rest -= upper[k] * x[k];
-    x[i] = rest * inverse_[i];
+    Two rest = x[i];
+    for (std::size_t k = i + 1; k < size_; ++k) subtract(upper[k], x[k], rest);
+    x[i] = {rest[0] * inverse_[i], rest[1] * inverse_[i]};
   }
 }
 

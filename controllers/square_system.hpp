@@ -2,6 +2,7 @@
 // Layer: controllers.  Thread: construction non-RT; the rest any, RT-safe.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -10,8 +11,8 @@
 
 namespace tandem {
 
-/// A x = b for several b: factorised once by Gauss' elimination with partial pivoting. Where a
-/// limb's equations have nothing to do with another limb's unknowns, nothing is computed.
+/// A x = b for two b at a time: factorised once by Gauss' elimination with partial pivoting. Where
+/// a limb's equations have nothing to do with another limb's unknowns, nothing is computed.
 class SquareSystem {
  public:
   /// A is the identity. @param size  of A; 0 is none
@@ -21,8 +22,10 @@ class SquareSystem {
   /// Row `i` of A, to be written before factorise(), which overwrites all of A.
   [[nodiscard]] std::span<double> row(std::size_t i) noexcept { return {&A_[i * stride_], size_}; }
   void factorise() noexcept TANDEM_RT;
+
+  using Two = std::array<double, 2>;  ///< of two right sides, or of their solutions
   /// Solutions of a singular A are not finite. @pre factorise() since a row was written
-  void solve(std::span<const double> b, std::span<double> x) const noexcept TANDEM_RT;
+  void solve(std::span<const Two> b, std::span<Two> x) const noexcept TANDEM_RT;
 
  private:
   std::size_t size_;

@@ -28,10 +28,10 @@ Vector3d origin(const std::vector<double>& pose, std::size_t site) noexcept {
   return Map<const Vector3d>(&pose[12 * site + 9]);
 }
 
-/// Largest magnitude; NaN when one is not a number.
-double largest(const std::vector<double>& values) noexcept {
+/// Largest magnitude of the first ones; NaN when one is not a number.
+double largest(const std::vector<SquareSystem::Two>& pairs) noexcept {
   double most = 0.0;
-  for (const double value : values) {
+  for (const auto& [value, other] : pairs) {
     if (std::abs(value) > most || std::isnan(value)) most = std::abs(value);
   }
   return most;
@@ -145,8 +145,8 @@ void Stance::choose(const std::vector<std::size_t>& columns) {
     columns_.push_back(columns[static_cast<std::size_t>(i)]);
   }
   system_ = SquareSystem(rows_.size());
-  error_.assign(rows_.size(), 0.0);
-  step_.assign(rows_.size(), 0.0);
+  error_.assign(rows_.size(), {});
+  step_.assign(rows_.size(), {});
 }
 
 double Stance::place(std::span<const double> position_rad) noexcept TANDEM_RT {
@@ -251,7 +251,10 @@ void Stance::jacobian(const Row& row, std::span<const std::size_t> columns,
 
 void Stance::gather() noexcept TANDEM_RT {
   for (std::size_t row = 0; row < rows_.size(); ++row) {
-    error_[row] = error(rows_[row]);
+    // As the base is level, its rising lifts places, and neither turns feet nor moves the mass
+    // aside.
+    const bool height = rows_[row].what == What::kPlace && rows_[row].axis == 2;
+    error_[row] = {error(rows_[row]), height ? -1.0 : 0.0};
     jacobian(rows_[row], columns_, system_.row(row));
   }
 }
@@ -260,7 +263,7 @@ void Stance::gather() noexcept TANDEM_RT {
 void Stance::advance(double factor) noexcept TANDEM_RT {
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     const std::size_t column = columns_[i];
-    q_[column < 6 ? column : column + 1] += factor * step_[i];
+    q_[column < 6 ? column : column + 1] += factor * step_[i][0];
   }
 }
 
@@ -289,16 +292,9 @@ void Stance::predict(double dt_s) noexcept TANDEM_RT {
 }
 
 void Stance::move(double rate_m_s) noexcept TANDEM_RT {
-  // The base is level: what it rises by, so do the places, and turns and the mass' way aside do
-  // not.
-  for (std::size_t row = 0; row < rows_.size(); ++row) {
-    const bool height = rows_[row].what == What::kPlace && rows_[row].axis == 2;
-    error_[row] = height ? -rate_m_s : 0.0;
-  }
-  system_.solve(error_, step_);
   v_[2] = rate_m_s;
   for (std::size_t i = 0; i < columns_.size(); ++i) {
-    v_[columns_[i]] = step_[i];
+    v_[columns_[i]] = rate_m_s * step_[i][1];
   }
 }
 

@@ -59,7 +59,7 @@ class Stance {
   [[nodiscard]] Solution solve(double height_m, int max_steps) noexcept TANDEM_RT;
   /// Moves the configuration on by `dt_s` with the velocity at hand: the next solve() starts near.
   void predict(double dt_s) noexcept TANDEM_RT;
-  /// The velocity for a rate of the base's height. @pre solve() at this configuration.
+  /// The velocity for a rate of the base's height. @pre solve() near this configuration.
   void move(double rate_m_s) noexcept TANDEM_RT;
   /// The joints' torques for the velocity at hand and an acceleration (nv).
   void carry(std::span<const double> vdot) noexcept TANDEM_RT;
@@ -119,8 +119,8 @@ class Stance {
   std::vector<double> q_, v_, tau_, zero_;
   std::vector<double> pose_, twist_, site_J_, com_J_, wrench_;
   std::array<double, 3> com_{}, com_velocity_{};
-  SquareSystem system_;  // of the equations' Jacobian
-  std::vector<double> error_, step_;
+  SquareSystem system_;                          // of the equations' Jacobian
+  std::vector<SquareSystem::Two> error_, step_;  // what is left; and what rises with the base
 };
 
 }  // namespace tandem

@@ -88,7 +88,17 @@ bool AxisMaster::lags(std::int64_t now_ns) noexcept {
     lag_.rest();
     return false;
   }
-  return age_cycles_ == 0 && lag_.look(position_error_rad(), now_ns);
+  if (age_cycles_ != 0) return false;
+  // The last target is no nearer than the way between the last two: mostly that is all one needs.
+  const double window_counts = lag_.window_rad() * std::abs(scale_.counts_per_rad);
+  const bool near = std::abs(counts_to(raw_.target_position)) <= window_counts;
+  return lag_.look(near ? 0.0 : position_error_rad(), now_ns);
+}
+
+/// From the joint's position; the counter may wrap around.
+double AxisMaster::counts_to(std::int32_t target) const noexcept {
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(target) -
+                                   static_cast<std::uint32_t>(feedback_.position));
 }
 
 /// How far the joint is from the way between the last two targets: the last is in force since this
@@ -98,13 +108,8 @@ double AxisMaster::position_error_rad() const noexcept {
   const auto outside = [](double from, double to) {
     return from * to <= 0.0 ? 0.0 : std::min(std::abs(from), std::abs(to));
   };
-  const auto ahead_rad = [&](std::int32_t target) {
-    const auto counts = static_cast<std::int32_t>(  // the counter may wrap around
-        static_cast<std::uint32_t>(target) - static_cast<std::uint32_t>(feedback_.position));
-    return counts / scale_.counts_per_rad;
-  };
-  const double last_rad = ahead_rad(raw_.target_position);
-  const double before_rad = ahead_rad(previous_target_);
+  const double last_rad = counts_to(raw_.target_position) / scale_.counts_per_rad;
+  const double before_rad = counts_to(previous_target_) / scale_.counts_per_rad;
   const double link_rad = outside(before_rad, last_rad);
   if (!traits_.tells_motor) return link_rad;
   const double wound_rad = feedback_.motor_position / scale_.motor_counts_per_rad -

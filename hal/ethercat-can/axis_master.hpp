@@ -151,6 +151,7 @@ class AxisMaster {
   [[nodiscard]] std::uint16_t reset_controlword() noexcept;
   void seed() noexcept;
   [[nodiscard]] bool lags(std::int64_t now_ns) noexcept;
+  [[nodiscard]] double counts_to(std::int32_t target) const noexcept;
   [[nodiscard]] double position_error_rad() const noexcept;
   bool enable_is_late(std::int64_t now_ns) noexcept;
   bool reset_is_late(std::int64_t now_ns) noexcept;

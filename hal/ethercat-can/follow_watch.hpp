@@ -40,6 +40,7 @@ class FollowWatch {
  public:
   explicit FollowWatch(const FollowLimits& limits) noexcept : limits_(limits) {}
 
+  [[nodiscard]] double window_rad() const noexcept { return limits_.window_rad; }
   /// Once for every fresh sample. @return whether the error has been too large for too long
   bool look(double error_rad, std::int64_t now_ns) noexcept TANDEM_RT {
     if (limits_.window_rad <= 0.0 || error_rad <= limits_.window_rad) {
