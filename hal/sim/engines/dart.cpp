@@ -20,6 +20,7 @@
 #include <tuple>
 
 #include "hal/sim/engine.hpp"
+#include "hal/sim/engines/masses.hpp"
 
 namespace tandem::sim {
 namespace {
@@ -65,12 +66,8 @@ Isometry3d isometry(const model::Placement& at) {
 class Dart final : public Engine {
  public:
   static Result<std::unique_ptr<Engine>> create(const EngineModel& model) {
-    for (std::size_t b = 0; b < model.tree.bodies.size(); ++b) {
-      const bool moves = b > 0 || model.tree.floating_base;
-      if (moves && !(model.tree.bodies[b].inertia.mass_kg > 0.0))
-        return fail("DART wants a mass in every body that moves",
-                    "give '" + model.tree.bodies[b].name + "' one");
-    }
+    if (const Status masses = check_masses(model.tree, "DART", false); !masses)
+      return std::unexpected(masses.error());
     return std::make_unique<Dart>(model);
   }
 

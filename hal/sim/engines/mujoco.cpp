@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "hal/sim/engine.hpp"
+#include "hal/sim/engines/masses.hpp"
 
 namespace tandem::sim {
 namespace {
@@ -35,24 +36,6 @@ std::string inertial(const model::Inertia& inertia) {
                      inertia.mass_kg, text(inertia.com_m), text(axes),
                      text(Vector3d(principal.eigenvalues()))) +
          "\n";
-}
-
-// MuJoCo's own refusal names bodies and lines of a document that nobody sees.
-Status check_masses(const model::Tree& tree) {
-  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
-    const model::Inertia& inertia = tree.bodies[j + 1].inertia;
-    const double least = inertia.mass_kg > 0.0
-                             ? Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia.about_com_kg_m2,
-                                                                       Eigen::EigenvaluesOnly)
-                                   .eigenvalues()[0]
-                             : 0.0;
-    if (inertia.mass_kg >= mjMINVAL && least >= mjMINVAL) continue;
-    return fail("what joint '" + tree.joints[j].name + "' moves has no " +
-                    (inertia.mass_kg >= mjMINVAL ? "inertia about one of its axes" : "mass"),
-                "MuJoCo wants mass and inertia in every body that moves: give the link some in "
-                "[model.link.NAME], or set engine = \"tandem\"");
-  }
-  return {};
 }
 
 class Document {
@@ -125,7 +108,8 @@ class Mujoco final : public Engine {
  public:
   static Result<std::unique_ptr<Engine>> create(const EngineModel& model) {
     mju_user_warning = [](const char*) {};  // else it writes a file where the program stands
-    if (const Status masses = check_masses(model.tree); !masses)
+    // MuJoCo's own refusal names bodies and lines of a document that nobody sees.
+    if (const Status masses = check_masses(model.tree, "MuJoCo", true, mjMINVAL); !masses)
       return std::unexpected(masses.error());
     auto engine = std::make_unique<Mujoco>();
     const std::string document = Document(model).text_of_robot();

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "hal/sim/engine.hpp"
+#include "hal/sim/engines/masses.hpp"
 
 namespace tandem::sim {
 namespace {
@@ -38,14 +39,8 @@ constexpr double kSurfaceLayer_m = 1e-4;
 class Ode final : public Engine {
  public:
   static Result<std::unique_ptr<Engine>> create(const EngineModel& model) {
-    for (std::size_t b = model.tree.floating_base ? 0 : 1; b < model.tree.bodies.size(); ++b) {
-      const model::Inertia& inertia = model.tree.bodies[b].inertia;
-      const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(inertia.about_com_kg_m2);
-      if (!(inertia.mass_kg > 0.0) || !(principal.eigenvalues().minCoeff() > 0.0)) {
-        return fail("'" + model.tree.bodies[b].name + "' has no mass or no inertia",
-                    "ODE wants both in every body that moves");
-      }
-    }
+    if (const Status masses = check_masses(model.tree, "ODE", true); !masses)
+      return std::unexpected(masses.error());
     return std::make_unique<Ode>(model);
   }
 

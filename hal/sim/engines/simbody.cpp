@@ -20,6 +20,7 @@ bool operator==(const Index& a, const Index& b) {
 #include <limits>
 
 #include "hal/sim/engine.hpp"
+#include "hal/sim/engines/masses.hpp"
 
 namespace tandem::sim {
 namespace {
@@ -96,6 +97,9 @@ class Impulses final : public SimTK::Force::Custom::Implementation {
 class Simbody final : public Engine {
  public:
   static Result<std::unique_ptr<Engine>> create(const EngineModel& model) {
+    // Without a mass it answers with accelerations that are wrong.
+    if (const Status masses = check_masses(model.tree, "Simbody", false); !masses)
+      return std::unexpected(masses.error());
     try {
       auto engine = std::make_unique<Simbody>(model);
       engine->system_.realize(engine->air_, SimTK::Stage::Acceleration);
