@@ -1,19 +1,29 @@
-// 04: a robot's generated dynamics by themselves: a pendulum without motors keeps its energy.
-//   build/release/bin/example_04_dynamics build/release/lib/models/double_pendulum_kernels.so
+// 04: a robot's generated dynamics by themselves: a pendulum without motors keeps its energy. Only
+// model/kernels.h of Tandem is needed, nothing to link:
+//   g++ -I. examples/04_dynamics.cpp -o pendulum
+//   ./pendulum build/release/lib/models/double_pendulum_kernels.so
+#include <dlfcn.h>
+
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include "model/kernel_library.hpp"
+
+#include "model/kernels.h"
 
 using State = std::array<double, 4>;  // q then v
 
 int main(int argc, char** argv) {
   const auto failed = [](const char* why) { return std::fprintf(stderr, "error: %s\n", why), 2; };
   if (argc != 2) return failed("name the kernels of the double pendulum: .../NAME_kernels.so");
-  const auto kernels = tandem::model::load_kernels(argv[1]);  // refuses other files
-  if (!kernels) return failed(kernels.error().to_string().c_str());
-  if ((*kernels)->nv != 2) return failed("these kernels are not the double pendulum's");
-  const tandem_kernels& robot = **kernels;
+  void* library = dlopen(argv[1], RTLD_NOW | RTLD_LOCAL);
+  if (library == nullptr) return failed(dlerror());
+  const auto get =
+      reinterpret_cast<decltype(&tandem_kernels_get)>(dlsym(library, "tandem_kernels_get"));
+  const tandem_kernels* kernels = get == nullptr ? nullptr : get(nullptr);  // this CPU's best
+  if (kernels == nullptr || kernels->abi != TANDEM_KERNELS_ABI)
+    return failed("not the kernels of this version: build them again");
+  if (kernels->nv != 2) return failed("these kernels are not the double pendulum's");
+  const tandem_kernels& robot = *kernels;
   std::printf("%s, %.3f kg, kernels for %s\n", robot.robot, robot.mass_kg, robot.variant);
   const double none[2] = {};  // no torque on any joint, no wrench
   const auto rate = [&](const State& x) {
