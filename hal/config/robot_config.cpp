@@ -59,7 +59,10 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
   model.exact_right_angles =
       table.choice_or("right_angles", "as_written", {"as_written", "exact"}) == "exact";
   model.derivatives = table.boolean_or("derivatives", false);
-  model.gravity_m_s2 = vector3(table, "gravity_m_s2", model.gravity_m_s2);
+  constexpr Range kGravity{.min = -1000.0, .max = 1000.0};  // three times the Sun's
+  const std::vector<double> gravity = table.numbers_or(
+      "gravity_m_s2", {model.gravity_m_s2.begin(), model.gravity_m_s2.end()}, kGravity, 3);
+  if (gravity.size() == 3) std::ranges::copy(gravity, model.gravity_m_s2.begin());
   model.gravity_line = table.line("gravity_m_s2");
   TomlTable lock = table.table_or_empty("lock");
   for (const std::string& joint : lock.keys()) {

@@ -130,6 +130,10 @@ TEST(RobotConfig, RefusesTwoBusesOnOneInterface) {
 }
 
 TEST(RobotConfig, RefusesANumberInPlaceOfAVectorOnce) {
+  expect_error(
+      with("[model.lock]", "gravity_m_s2 = [0, 0, -1e9]\n[model.lock]"),
+      "robots/leg.toml:5: model.gravity_m_s2: -1e+09 is out of range (must be at least -1000 and "
+      "at most 1000)");
   expect_error(with("[model.lock]", "gravity_m_s2 = 9.81\n[model.lock]"),
                "robots/leg.toml:5: model.gravity_m_s2: must be a list of numbers in brackets, not "
                "floating-point (give exactly 3)");
