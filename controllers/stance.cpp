@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "base/archive.hpp"
 #include "controllers/ground_frame.hpp"
@@ -86,30 +87,34 @@ Status Stance::find_legs(const hal::Robot& robot) {
   for (std::size_t j = 0; j < near.size(); ++j) near[j] += 0.1 + 0.01 * static_cast<double>(j);
   place(near);
   evaluate();
-  std::vector<bool> moves(kernels_->nv, false);
-  for (const Foot& foot : feet_) {
+  std::vector<bool> in_legs(kernels_->nv, false);
+  for (std::size_t foot = 0; foot < feet_.size(); ++foot) {
     bool any = false;
     for (std::size_t i = 6; i < kernels_->nv; ++i) {
-      double most = 0.0;
-      for (std::size_t k = 0; k < 6; ++k) {
-        most = std::max(most, std::abs(site_J_[(6 * foot.site + k) * kernels_->nv + i]));
-      }
-      if (most < 1e-9) continue;
-      moves[i] = any = true;
+      if (moves(foot, i)) in_legs[i] = any = true;
     }
     if (any) continue;
-    return fail("the foot '" + foot.name + "' is moved by no joint",
+    return fail("the foot '" + feet_[foot].name + "' is moved by no joint",
                 "leave it out of `feet`, or correct its site's link in " + robot.file);
   }
   std::vector<std::size_t> columns;
   for (std::size_t j = 0; j < map_.joints(); ++j) {
-    if (!moves[map_.v_index(j)]) continue;
+    if (!in_legs[map_.v_index(j)]) continue;
     columns.push_back(map_.v_index(j));
     legs_.push_back(map_.v_index(j));
   }
   columns.insert(columns.end(), {0, 1});  // last: they join the equations of all legs
   choose(columns);
   return {};
+}
+
+/// Whether a foot moves with this element of v, where evaluate() was.
+bool Stance::moves(std::size_t foot, std::size_t column) const {
+  double most = 0.0;
+  for (std::size_t k = 0; k < 6; ++k) {
+    most = std::max(most, std::abs(site_J_[(6 * feet_[foot].site + k) * kernels_->nv + column]));
+  }
+  return most >= 1e-9;
 }
 
 std::vector<Stance::Row> Stance::all_rows() const {
@@ -131,9 +136,11 @@ void Stance::choose(const std::vector<std::size_t>& columns) {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   RowMajor J(all.size(), columns.size());
   std::vector<int> priorities;
+  std::vector<std::size_t> every(columns.size());
+  std::iota(every.begin(), every.end(), std::size_t{0});
   for (std::size_t row = 0; row < all.size(); ++row) {
     priorities.push_back(all[row].priority);
-    jacobian(all[row], columns, {&J(static_cast<Eigen::Index>(row), 0), columns.size()});
+    jacobian(all[row], columns, every, {&J(static_cast<Eigen::Index>(row), 0), columns.size()});
   }
   const std::vector<Eigen::Index> rows = independent_rows(J, priorities);
   Eigen::MatrixXd kept(static_cast<Eigen::Index>(rows.size()), J.cols());
@@ -143,6 +150,12 @@ void Stance::choose(const std::vector<std::size_t>& columns) {
   }
   for (const Eigen::Index i : independent_rows(kept.transpose(), {})) {
     columns_.push_back(columns[static_cast<std::size_t>(i)]);
+  }
+  reach_.resize(feet_.size());
+  for (std::size_t foot = 0; foot < feet_.size(); ++foot) {
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      if (moves(foot, columns_[i])) reach_[foot].push_back(i);
+    }
   }
   system_ = SquareSystem(rows_.size());
   error_.assign(rows_.size(), {});
@@ -222,7 +235,9 @@ double Stance::error(const Row& row) const noexcept TANDEM_RT {
 }
 
 /// One row of the equations' Jacobian, for `columns` of v.
+/// @param which  of these move the row's foot: the others are 0
 void Stance::jacobian(const Row& row, std::span<const std::size_t> columns,
+                      std::span<const std::size_t> which,
                       std::span<double> out) const noexcept TANDEM_RT {
   const std::size_t nv = kernels_->nv;
   const auto axis_of_G = static_cast<std::size_t>(row.axis);
@@ -240,13 +255,14 @@ void Stance::jacobian(const Row& row, std::span<const std::size_t> columns,
       place ? Vector3d((middle(row.foot) - origin(pose_, site)).cross(Vector3d::Unit(row.axis)))
             : axis(row);
   const double x = turn.x(), y = turn.y(), z = turn.z();
-  for (std::size_t i = 0; i < out.size(); ++i) {
+  std::ranges::fill(out, 0.0);
+  for (const std::size_t i : which) {
     const double* w = J + 3 * nv + columns[i];
     out[i] = x * w[0] + y * w[nv] + z * w[2 * nv];
   }
   if (!place) return;
   const double* linear = J + axis_of_G * nv;
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] += linear[columns[i]];
+  for (const std::size_t i : which) out[i] += linear[columns[i]];
 }
 
 void Stance::gather() noexcept TANDEM_RT {
@@ -255,7 +271,7 @@ void Stance::gather() noexcept TANDEM_RT {
     // aside.
     const bool height = rows_[row].what == What::kPlace && rows_[row].axis == 2;
     error_[row] = {error(rows_[row]), height ? -1.0 : 0.0};
-    jacobian(rows_[row], columns_, system_.row(row));
+    jacobian(rows_[row], columns_, reach_[rows_[row].foot], system_.row(row));
   }
 }
 

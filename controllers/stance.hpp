@@ -102,8 +102,9 @@ class Stance {
   [[nodiscard]] Eigen::Vector3d middle(std::size_t foot) const noexcept TANDEM_RT;
   [[nodiscard]] Eigen::Vector3d axis(const Row& row) const noexcept TANDEM_RT;
   [[nodiscard]] double error(const Row& row) const noexcept TANDEM_RT;
+  [[nodiscard]] bool moves(std::size_t foot, std::size_t column) const;
   void jacobian(const Row& row, std::span<const std::size_t> columns,
-                std::span<double> out) const noexcept TANDEM_RT;
+                std::span<const std::size_t> which, std::span<double> out) const noexcept TANDEM_RT;
   void gather() noexcept TANDEM_RT;
   void advance(double factor) noexcept TANDEM_RT;
 
@@ -113,9 +114,10 @@ class Stance {
   std::vector<Foot> feet_;
   Support support_;
   std::vector<Placed> placed_;
-  std::vector<Row> rows_;             // that are solved
-  std::vector<std::size_t> columns_;  // of v: the unknowns
-  std::vector<std::size_t> legs_;     // of v: every joint between the base and a foot
+  std::vector<Row> rows_;                        // that are solved
+  std::vector<std::size_t> columns_;             // of v: the unknowns
+  std::vector<std::vector<std::size_t>> reach_;  // by foot: those of columns_ that move it
+  std::vector<std::size_t> legs_;                // of v: every joint between the base and a foot
   std::vector<double> q_, v_, tau_, zero_;
   std::vector<double> pose_, twist_, site_J_, com_J_, wrench_;
   std::array<double, 3> com_{}, com_velocity_{};
