@@ -1,15 +1,15 @@
-// Rows stay where they are and their order is kept beside them; the factors of L too, so that a
-// row's update may begin left of the pivot, at a whole vector.
+// Right sides are columns of their own. Rows stay where they are, and their order beside them. Left
+// of its pivot a row keeps what nobody reads, so that its update may begin at a whole vector.
 #include "controllers/square_system.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace tandem {
 namespace {
 
 constexpr std::size_t kLanes = 2;  // of any x86-64
+constexpr std::size_t kRights = 2;
 
 constexpr std::size_t whole_vectors(std::size_t size) noexcept {
   return (size + kLanes - 1) / kLanes * kLanes;
@@ -25,66 +25,54 @@ inline void subtract(double factor, const double* __restrict pivot_row, double* 
   }
 }
 
-inline void subtract(double factor, const std::array<double, 2>& from,
-                     std::array<double, 2>& rest) noexcept {
-  rest[0] -= factor * from[0];
-  rest[1] -= factor * from[1];
-}
-
-void eliminate(std::size_t size, std::size_t stride, double* A, double* L, double* inverse,
-               std::size_t* order) noexcept {
-  for (std::size_t k = 0; k < size; ++k) {
-    std::size_t best = k;
-    double most = 0.0;
-    for (std::size_t i = k; i < size; ++i) {
-      const double magnitude = std::abs(A[order[i] * stride + k]);
-      best = magnitude > most ? i : best;
-      most = std::max(most, magnitude);
-    }
-    std::swap(order[k], order[best]);
-    const double* pivot_row = A + order[k] * stride;
-    inverse[k] = 1.0 / pivot_row[k];
-    const std::size_t first = k / kLanes * kLanes;
-    for (std::size_t i = k + 1; i < size; ++i) {
-      double* row = A + order[i] * stride;
-      const double factor = row[k] * inverse[k];
-      L[order[i] * stride + k] = factor;
-      if (factor == 0.0) continue;  // of another limb
-      subtract(factor, pivot_row + first, row + first, stride - first);
-    }
-  }
-}
-
 }  // namespace
 
 SquareSystem::SquareSystem(std::size_t size)
     : size_(size),
-      stride_(whole_vectors(size)),
-      A_(size * stride_, 0.0),
-      L_(size * stride_, 0.0),
-      inverse_(size, 1.0),
-      order_(size, 0) {
-  for (std::size_t i = 0; i < size; ++i) A_[i * stride_ + i] = 1.0;
-  std::iota(order_.begin(), order_.end(), std::size_t{0});
+      stride_(whole_vectors(size + kRights)),
+      rows_(size * stride_, 0.0),
+      order_(size, 0) {}
+
+void SquareSystem::set_right(std::size_t i, const Two& b) noexcept TANDEM_RT {
+  std::ranges::copy(b, &rows_[i * stride_ + size_]);
 }
 
-void SquareSystem::factorise() noexcept TANDEM_RT {
-  std::iota(order_.begin(), order_.end(), std::size_t{0});
-  eliminate(size_, stride_, A_.data(), L_.data(), inverse_.data(), order_.data());
-}
-
-void SquareSystem::solve(std::span<const Two> b, std::span<Two> x) const noexcept TANDEM_RT {
-  for (std::size_t i = 0; i < size_; ++i) {
-    const double* factors = &L_[order_[i] * stride_];
-    Two rest = b[order_[i]];
-    for (std::size_t k = 0; k < i; ++k) subtract(factors[k], x[k], rest);
-    x[i] = rest;
+/// Above the pivots A is upper triangular then; in their places stand their inverses.
+void SquareSystem::eliminate() noexcept TANDEM_RT {
+  double* const rows = rows_.data();
+  std::size_t* const order = order_.data();
+  for (std::size_t i = 0; i < size_; ++i) order[i] = i * stride_;
+  for (std::size_t k = 0; k < size_; ++k) {
+    std::size_t best = k;
+    double most = 0.0;
+    for (std::size_t i = k; i < size_; ++i) {
+      const double magnitude = std::abs(rows[order[i] + k]);
+      best = magnitude > most ? i : best;
+      most = std::max(most, magnitude);
+    }
+    std::swap(order[k], order[best]);
+    double* const pivot_row = rows + order[k];
+    const double inverse = 1.0 / pivot_row[k];
+    const std::size_t first = k / kLanes * kLanes;
+    for (std::size_t i = k + 1; i < size_; ++i) {
+      double* const row = rows + order[i];
+      if (row[k] == 0.0) continue;  // of another limb
+      subtract(row[k] * inverse, pivot_row + first, row + first, stride_ - first);
+    }
+    pivot_row[k] = inverse;
   }
+}
+
+void SquareSystem::solve(std::span<Two> x) noexcept TANDEM_RT {
+  eliminate();
   for (std::size_t i = size_; i-- > 0;) {
-    const double* upper = &A_[order_[i] * stride_];
-    Two rest = x[i];
-    for (std::size_t k = i + 1; k < size_; ++k) subtract(upper[k], x[k], rest);
-    x[i] = {rest[0] * inverse_[i], rest[1] * inverse_[i]};
+    const double* row = &rows_[order_[i]];
+    Two rest{row[size_], row[size_ + 1]};
+    for (std::size_t k = i + 1; k < size_; ++k) {
+      rest[0] -= row[k] * x[k][0];
+      rest[1] -= row[k] * x[k][1];
+    }
+    x[i] = {rest[0] * row[i], rest[1] * row[i]};
   }
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <ranges>
 
 #include "base/archive.hpp"
 #include "controllers/ground_frame.hpp"
@@ -29,10 +30,11 @@ Vector3d origin(const std::vector<double>& pose, std::size_t site) noexcept {
   return Map<const Vector3d>(&pose[12 * site + 9]);
 }
 
-/// Largest magnitude of the first ones; NaN when one is not a number.
-double largest(const std::vector<SquareSystem::Two>& pairs) noexcept {
+/// Largest magnitude; NaN when one is not a number.
+template <class Values>
+double largest(const Values& values) noexcept {
   double most = 0.0;
-  for (const auto& [value, other] : pairs) {
+  for (const double value : values) {
     if (std::abs(value) > most || std::isnan(value)) most = std::abs(value);
   }
   return most;
@@ -158,7 +160,7 @@ void Stance::choose(const std::vector<std::size_t>& columns) {
     }
   }
   system_ = SquareSystem(rows_.size());
-  error_.assign(rows_.size(), {});
+  error_.assign(rows_.size(), 0.0);
   step_.assign(rows_.size(), {});
 }
 
@@ -270,7 +272,8 @@ void Stance::gather() noexcept TANDEM_RT {
     // As the base is level, its rising lifts places, and neither turns feet nor moves the mass
     // aside.
     const bool height = rows_[row].what == What::kPlace && rows_[row].axis == 2;
-    error_[row] = {error(rows_[row]), height ? -1.0 : 0.0};
+    error_[row] = error(rows_[row]);
+    system_.set_right(row, {error_[row], height ? -1.0 : 0.0});
     jacobian(rows_[row], columns_, reach_[rows_[row].foot], system_.row(row));
   }
 }
@@ -289,9 +292,8 @@ Stance::Solution Stance::solve(double height_m, int max_steps) noexcept TANDEM_R
   while (solution.steps < max_steps && !solution.converged) {
     evaluate();
     gather();
-    system_.factorise();
-    system_.solve(error_, step_);
-    const double length = largest(step_);
+    system_.solve(step_);
+    const double length = largest(step_ | std::views::elements<0>);
     ++solution.steps;
     solution.residual = largest(error_);
     if (!std::isfinite(length)) return solution;

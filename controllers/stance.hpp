@@ -52,7 +52,7 @@ class Stance {
   /// What solve() did.
   struct Solution {
     bool converged = false;
-    int steps = 0;          ///< of Newton; each costs three kernel calls and one factorisation
+    int steps = 0;          ///< of Newton; each costs three kernel calls and one elimination
     double residual = 0.0;  ///< largest before the last step [m or rad]
   };
   /// Solves for a height of the base, from the configuration at hand.
@@ -121,8 +121,10 @@ class Stance {
   std::vector<double> q_, v_, tau_, zero_;
   std::vector<double> pose_, twist_, site_J_, com_J_, wrench_;
   std::array<double, 3> com_{}, com_velocity_{};
-  SquareSystem system_;                          // of the equations' Jacobian
-  std::vector<SquareSystem::Two> error_, step_;  // what is left; and what rises with the base
+  SquareSystem
+      system_;  // the equations: their Jacobian, what is left, and what rises with the base
+  std::vector<double> error_;
+  std::vector<SquareSystem::Two> step_;
 };
 
 }  // namespace tandem
