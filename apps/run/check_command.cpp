@@ -199,12 +199,26 @@ Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics
   return {};
 }
 
+/// Controllers that a prediction cannot continue: a run by itself is right.
+void warn_of_archives(const Composition& c, Diagnostics& warnings) {
+  for (const ControllerNote& note : c.notes) {
+    if (!note.lacks_archive) continue;
+    warnings.push_back({.message = "has members but no archive(): predictions and snapshots leave "
+                                   "out what it remembers, and may be wrong",
+                        .hint = "give its class an archive(); an empty one says that nothing "
+                                "changes after configure() (docs/controllers.md#writing-one)",
+                        .file = c.experiment.file,
+                        .key = "controller." + note.name});
+  }
+}
+
 Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                              Json& json) {
   const auto composition = compose(options.file, {.missing_kernels = MissingKernels::kTolerate});
   if (!composition) return composition.error();
   warnings = (*composition)->experiment.warnings;
   warnings.insert(warnings.end(), (*composition)->warnings.begin(), (*composition)->warnings.end());
+  warn_of_archives(**composition, warnings);
   print_warnings(warnings);
   const runtime::Experiment& e = (*composition)->experiment;
   const LoopStudy loops = study_loops(e.robot, (*composition)->tree, {&e.posture, 1});

@@ -63,6 +63,7 @@ void add_controllers(Composition& c, Collector& errors) {
     }
     const std::string doc = loaded->plugin().doc;
     const bool retreats = (*loaded)->can_retreat();
+    const bool lacks_archive = loaded->plugin().lacks_archive;
     if (c.controllers != nullptr) {  // without kernels: only that it can be loaded
       const Status added =
           c.controllers->add(spec.name, std::move(*loaded), spec.parameters, spec.active);
@@ -73,7 +74,7 @@ void add_controllers(Composition& c, Collector& errors) {
         continue;
       }
     }
-    c.notes.push_back({spec.name, doc, spec.active, retreats});
+    c.notes.push_back({spec.name, doc, spec.active, retreats, lacks_archive});
   }
   errors.add(c.experiment.document.diagnostics());
 }

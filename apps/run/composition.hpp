@@ -52,9 +52,10 @@ struct Overrides {
 /// A controller as `check` lists it.
 struct ControllerNote {
   std::string name;
-  std::string doc;        ///< its plugin's one line
-  bool active = true;     ///< from the start
-  bool retreats = false;  ///< it can, in a stop of category 2
+  std::string doc;             ///< its plugin's one line
+  bool active = true;          ///< from the start
+  bool retreats = false;       ///< it can, in a stop of category 2
+  bool lacks_archive = false;  ///< it has members and no archive(): predictions may be wrong
 };
 
 struct Composition {
