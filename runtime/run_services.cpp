@@ -210,7 +210,7 @@ Result<RequestResult> RunServices::ask(Lock& lock, LoopRequest request, Patience
     return RequestResult{};
   }
   if (found->reason != RejectReason::kNone) return std::unexpected(refusal(*found));
-  return RequestResult{.done = true, .cycle = found->cycle};
+  return RequestResult{.done = true, .cycle = found->cycle, .phase = progress_->phase.load()};
 }
 
 std::string RunServices::controller_name(std::int32_t slot) const {
