@@ -13,6 +13,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -83,8 +84,20 @@ class ControllerSetup {
   };
   [[nodiscard]] std::span<const Claim> claims() const { return claims_; }
 
+  /// Says that what `key` of `table` wants is reached only `time_s` after the controller's start.
+  /// `tandem check` and `tandem run` warn of what is later than the end of the experiment.
+  void plan(const TomlTable& table, std::string_view key, double time_s) {
+    plans_.push_back({time_s, table.error_at(key, {})});
+  }
+  struct Plan {
+    double time_s;  ///< after the start
+    Error where;    ///< file, line and key; without a message
+  };
+  [[nodiscard]] std::span<const Plan> plans() const { return plans_; }
+
  private:
   std::vector<Claim> claims_;
+  std::vector<Plan> plans_;
 };
 
 /// A controller. It sees state, command and time; never a driver, a clock or a thread.

@@ -11,6 +11,7 @@
 #include "apps/robot/loop_facts.hpp"
 #include "apps/robot/start_height.hpp"
 #include "apps/robot/start_torque.hpp"
+#include "apps/run/late_plans.hpp"
 #include "apps/run/operator_link.hpp"
 #include "apps/run/retreats.hpp"
 #include "controllers/plugin_loader.hpp"
@@ -427,6 +428,9 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   add_owner(*c, errors);
   if (!errors.empty()) return errors.give();
   for (Error& warning : missing_retreats(*c)) c->warnings.push_back(std::move(warning));
+  if (c->controllers != nullptr && !overrides.duration_s && !overrides.serves) {
+    std::ranges::move(late_plans(*c), std::back_inserter(c->warnings));
+  }
   if (auto failed = add_parallel(*c, overrides); !failed.empty()) return std::unexpected(failed);
   const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
   if (!simulated || c->kernels.get() == nullptr) return c;

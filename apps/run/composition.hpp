@@ -81,7 +81,8 @@ struct Composition {
   std::shared_ptr<runtime::OwnerController> owner;  ///< null: nobody may own the robot from afar
   std::size_t owner_slot = 0;                       ///< its in `controllers`
   std::vector<ControllerNote> notes;
-  /// start_warnings(), links that start inside the ground, a category 2 that nobody can carry out
+  /// start_warnings(), links that start inside the ground, a category 2 that nobody can carry out,
+  /// late_plans() unless the command line says how long
   Diagnostics warnings;
 
   /// Empty without a CAN backend.

@@ -385,6 +385,25 @@ TEST_F(Check, WarnsOfACollisionShapeThatStartsInsideTheGround) {
   EXPECT_EQ(guessed.err.find(says), std::string::npos) << guessed.err;
 }
 
+TEST_F(Check, WarnsOfWhatIsPlannedForAfterTheEnd) {
+  const std::string late = "the controller 'joint_trajectory' reaches this ";
+  EXPECT_EQ(tandem("check trajectory.toml").err.find(late), std::string::npos);
+  edit("trajectory.toml", "duration_s = 5.0", "duration_s = 2.5");
+  for (const std::string command : {"check trajectory.toml", "run trajectory.toml --no-log"}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    for (const std::string& text :
+         {"trajectory.toml:14: controller[0].parameters.waypoint[1].time_s: " + late +
+              "3 s after its start, and 1 more later; the run ends after 2.5 s",
+          std::string("duration_s = 4.8 or more")}) {
+      EXPECT_NE(outcome.err.find(text), std::string::npos) << text << "\nin: " << outcome.err;
+    }
+  }
+  EXPECT_EQ(tandem("run trajectory.toml --no-log --duration 0.5").err.find(late),
+            std::string::npos)
+      << "who says how long knows it";
+}
+
 TEST_F(Check, RefusesAStartInsideTheGroundAndSaysWhichHeightTouches) {
   copy_coman(folder_, "0.362");
   for (const std::string command : {"check hold.toml", "run hold.toml"}) {
