@@ -393,14 +393,13 @@ TEST_F(Check, WarnsOfWhatIsPlannedForAfterTheEnd) {
     const Outcome outcome = tandem(command);
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     for (const std::string& text :
-         {"trajectory.toml:14: controller[0].parameters.waypoint[1].time_s: " + late +
+         {"trajectory.toml:14: controller.joint_trajectory.parameters.waypoint[1].time_s: " + late +
               "3 s after its start, and 1 more later; the run ends after 2.5 s",
           std::string("duration_s = 4.8 or more")}) {
       EXPECT_NE(outcome.err.find(text), std::string::npos) << text << "\nin: " << outcome.err;
     }
   }
-  EXPECT_EQ(tandem("run trajectory.toml --no-log --duration 0.5").err.find(late),
-            std::string::npos)
+  EXPECT_EQ(tandem("run trajectory.toml --no-log --duration 0.5").err.find(late), std::string::npos)
       << "who says how long knows it";
 }
 

@@ -214,7 +214,7 @@ TEST(Experiment, LeavesParametersToTheirController) {
   parameters.finish();
   ASSERT_EQ(e->document.diagnostics().size(), 1u);
   EXPECT_EQ(e->document.diagnostics()[0].to_string(),
-            "arm/x.toml:7: controller[0].parameters.stiffness: unknown key "
+            "arm/x.toml:7: controller.hold.parameters.stiffness: unknown key "
             "(did you mean 'stiffnes'?)");
 }
 
