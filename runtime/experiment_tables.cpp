@@ -162,7 +162,8 @@ void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers)
       if (name.empty() || other.name != name) continue;
       table.error("name", "two controllers are called '" + name + "'", "rename one of them");
     }
-    if (const std::string problem = shown_name_problem(name); !plugin.empty() && !problem.empty()) {
+    if (const std::string problem = listed_name_problem(name);
+        !plugin.empty() && !problem.empty()) {
       table.error("name", "the controller's name " + problem, "give it another name");
     }
     const bool active = table.boolean_or("active", true);

@@ -271,7 +271,7 @@ ControllerSet RunServices::planned() const {
 }
 
 Status RunServices::check_name(const std::string& name) {
-  if (const std::string problem = shown_name_problem(name); !problem.empty()) {
+  if (const std::string problem = listed_name_problem(name); !problem.empty()) {
     return fail_at("name", "the controller's name " + problem, "give it another name");
   }
   if (slot_of(name)) {

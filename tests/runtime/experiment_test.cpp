@@ -382,6 +382,12 @@ TEST(Experiment, RefusesAControllersNameThatATerminalMightObey) {
             std::string::npos);
 }
 
+TEST(Experiment, RefusesAControllersNameThatNoListCanHold) {
+  EXPECT_NE(errors_of(std::string(kExperiment) + "[[controller]]\nplugin = 'hold'\nname = 'a,b'\n")
+                .find("the controller's name has a comma"),
+            std::string::npos);
+}
+
 TEST(Experiment, RefusesARobotWithoutJoints) {
   const hal::RobotConfig bare = robot("name = 'm'\n[model]\nurdf = 'm.urdf'\nbase = 'fixed'\n");
   EXPECT_NE(errors_of(kExperiment, bare).find("nothing to control"), std::string::npos);
