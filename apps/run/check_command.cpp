@@ -6,6 +6,7 @@
 #include "apps/can/bus_table.hpp"
 #include "apps/control/fault_table.hpp"
 #include "apps/robot/loop_facts.hpp"
+#include "apps/robot/ringing_loops.hpp"
 #include "apps/robot/scale_facts.hpp"
 #include "apps/robot/start_height.hpp"
 #include "apps/robot/start_torque.hpp"
@@ -176,6 +177,9 @@ Diagnostics warnings_of(const RobotFiles& robot) {
     warnings.insert(warnings.end(), buried.begin(), buried.end());
   }
   if (auto error = upward_gravity(robot.config)) warnings.push_back(std::move(*error));
+  const auto& postures = robot.config.postures;
+  const std::string first = postures.empty() ? "" : postures.front().name;
+  if (auto error = ringing_loops(robot, first)) warnings.push_back(std::move(*error));
   return warnings;
 }
 

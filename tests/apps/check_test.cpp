@@ -385,6 +385,29 @@ TEST_F(Check, WarnsOfACollisionShapeThatStartsInsideTheGround) {
   EXPECT_EQ(guessed.err.find(says), std::string::npos) << guessed.err;
 }
 
+/// What is said is what then happens: at 40 ms the joints follow, at 100 ms they do not.
+TEST_F(Check, WarnsOfGainsThatAreTooHighForTheControlPeriod) {
+  const std::string says = "joint1.gains: with these gains and a control period of 100 ms the ";
+  EXPECT_EQ(tandem("check robot.toml").err.find("will probably oscillate"), std::string::npos);
+  const std::string robot = read_text(folder_ / "robot.toml");
+  const std::string trajectory = read_text(folder_ / "trajectory.toml");
+  for (const bool slow : {false, true}) {
+    const std::string period = slow ? "100_000_000" : "40_000_000";
+    write_text(folder_ / "robot.toml", robot);
+    edit("robot.toml", "name = \"board_1\"",
+         "name = \"board_1\"\nheartbeat_ms = 1000\ncontrol_period_ns = " + period);
+    write_text(folder_ / "trajectory.toml", "period_ns = " + period + "\n" + trajectory);
+    for (const std::string command : {"check robot.toml", "check trajectory.toml"}) {
+      const Outcome checked = tandem(command);
+      EXPECT_EQ(checked.status, 0) << checked.err;
+      EXPECT_EQ(checked.err.find(says) != std::string::npos, slow) << checked.err;
+    }
+    const Outcome run = tandem("run trajectory.toml --no-log");
+    EXPECT_EQ(run.status, slow ? 1 : 0) << run.out << run.err;
+    EXPECT_EQ(run.err.find(says) != std::string::npos, slow) << run.err;
+  }
+}
+
 TEST_F(Check, WarnsOfWhatIsPlannedForAfterTheEnd) {
   const std::string late = "the controller 'joint_trajectory' reaches this ";
   EXPECT_EQ(tandem("check trajectory.toml").err.find(late), std::string::npos);
