@@ -51,6 +51,12 @@ std::string shown_name_problem(std::string_view name) {
   return {};
 }
 
+std::string listed_name_problem(std::string_view name) {
+  const std::string problem = shown_name_problem(name);
+  if (problem.empty() && name.find(',') != std::string_view::npos) return "has a comma";
+  return problem;
+}
+
 std::string interface_name_problem(std::string_view name) {
   constexpr std::size_t kLongest = 15;  // IFNAMSIZ less the closing zero
   if (name.empty()) return "is empty";

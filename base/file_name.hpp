@@ -23,6 +23,9 @@ inline constexpr std::size_t kLongestFileName = 64;
 /// without control characters, which a terminal obeys.
 [[nodiscard]] std::string shown_name_problem(std::string_view name);
 
+/// The same of a name that also stands in lists: it has no comma, which parts them.
+[[nodiscard]] std::string listed_name_problem(std::string_view name);
+
 /// Why no network interface of Linux can have the name, or empty when one can: 1 to 15 characters,
 /// none of them a blank, `/` or `:`, and neither `.` nor `..`.
 [[nodiscard]] std::string interface_name_problem(std::string_view name);

@@ -11,6 +11,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "base/file_name.hpp"
 #include "base/nearest.hpp"
 #include "base/quoting.hpp"
 
@@ -21,6 +22,20 @@ struct TomlTable::Shared {
   std::string file;
   Diagnostics diagnostics;
   std::set<std::string> meant;  // keys that a misspelt one stands for: not missing besides
+  std::map<std::string, std::string> names;  // of entries of arrays: "joint[0]" is "hip"
+
+  /// A dotted path as errors have it: entries by their names, where they have one.
+  [[nodiscard]] std::string shown(const std::string& path) const {
+    std::string out;
+    std::size_t from = 0;
+    for (std::size_t at = path.find(']'); at != std::string::npos; at = path.find(']', at + 1)) {
+      const auto name = names.find(path.substr(0, at + 1));
+      if (name == names.end()) continue;
+      out.append(path, from, path.rfind('[', at) - from).append("." + name->second);
+      from = at + 1;
+    }
+    return out.append(path, from);
+  }
 };
 
 namespace {
@@ -44,6 +59,15 @@ std::string header_of(std::string path) {
     path.erase(at, path.find(']', at) + 1 - at);
   }
   return path;
+}
+
+/// What an entry of an array of tables is called; empty: by no name that can be shown.
+std::string name_of(const toml::table& entry) {
+  const bool named = entry.contains("name");
+  const auto* text = entry[named ? "name" : "plugin"].as_string();
+  if (text == nullptr || !shown_name_problem(text->get()).empty()) return {};
+  const bool path = !named && text->get().find('/') != std::string::npos;
+  return path ? std::string() : text->get();
 }
 
 std::string number_text(double value) {
@@ -154,7 +178,7 @@ Error TomlTable::error_at(std::string_view key, std::string message, std::string
           .hint = std::move(hint),
           .file = shared_->file,
           .line = line(key),
-          .key = dotted(key)};
+          .key = shared_->shown(dotted(key))};
 }
 
 void TomlTable::error(std::string_view key, std::string message, std::string hint) {
@@ -166,15 +190,16 @@ void TomlTable::error(std::string_view key, std::string message, std::string hin
 }
 
 bool TomlTable::has_errors() const {
+  const std::string path = shared_->shown(path_);
   return std::ranges::any_of(shared_->diagnostics, [&](const Error& error) {
-    return error.key == path_ || error.key.starts_with(path_ + ".") ||
+    return error.key == path || error.key.starts_with(path + ".") ||
            (!defaults_path_.empty() && error.key.starts_with(defaults_path_ + "."));
   });
 }
 
 bool TomlTable::has_errors(std::string_view key) const {
   return std::ranges::any_of(shared_->diagnostics, [&](const Error& error) {
-    return error.key == dotted(key) && error.line == line(key);
+    return error.key == shared_->shown(dotted(key)) && error.line == line(key);
   });
 }
 
@@ -184,7 +209,8 @@ void TomlTable::report_unknown(std::string_view key, const std::vector<std::stri
   if (meant.empty()) return;
   shared_->meant.insert(dotted(meant));
   std::erase_if(shared_->diagnostics, [&](const Error& other) {
-    return other.message == kMissing && other.key == dotted(meant) && other.line == line();
+    return other.message == kMissing && other.key == shared_->shown(dotted(meant)) &&
+           other.line == line();
   });
 }
 
@@ -422,6 +448,8 @@ TomlTable TomlTable::table_or_empty(std::string_view key) {
   return {shared_, &kBroken, dotted(key), line(key)};
 }
 
+/// Errors call an entry by its `name` (a controller without one by its plugin), which no other of
+/// the list has, and else by its number.
 std::vector<TomlTable> TomlTable::tables(std::string_view key) {
   const toml::node* node = find(key);
   if (node == nullptr) return {};
@@ -430,11 +458,16 @@ std::vector<TomlTable> TomlTable::tables(std::string_view key) {
     error(key, "must be an array of tables", "write [[" + header_of(dotted(key)) + "]]");
     return {};
   }
+  std::vector<std::string> names;
+  for (const toml::node& entry : *array) names.push_back(name_of(*entry.as_table()));
   std::vector<TomlTable> found;
   for (std::size_t i = 0; i < array->size(); ++i) {
     const toml::table* table = array->get(i)->as_table();
-    found.push_back(TomlTable(shared_, table, dotted(key) + "[" + std::to_string(i) + "]",
-                              static_cast<int>(table->source().begin.line)));
+    const std::string path = dotted(key) + "[" + std::to_string(i) + "]";
+    if (!names[i].empty() && std::ranges::count(names, names[i]) == 1) {
+      shared_->names[path] = names[i];
+    }
+    found.push_back(TomlTable(shared_, table, path, static_cast<int>(table->source().begin.line)));
   }
   return found;
 }

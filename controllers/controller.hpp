@@ -13,6 +13,8 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "base/archive.hpp"
@@ -82,8 +84,20 @@ class ControllerSetup {
   };
   [[nodiscard]] std::span<const Claim> claims() const { return claims_; }
 
+  /// Says that what `key` of `table` wants is reached only `time_s` after the controller's start.
+  /// `tandem check` and `tandem run` warn of what is later than the end of the experiment.
+  void plan(const TomlTable& table, std::string_view key, double time_s) {
+    plans_.push_back({time_s, table.error_at(key, {})});
+  }
+  struct Plan {
+    double time_s;  ///< after the start
+    Error where;    ///< file, line and key; without a message
+  };
+  [[nodiscard]] std::span<const Plan> plans() const { return plans_; }
+
  private:
   std::vector<Claim> claims_;
+  std::vector<Plan> plans_;
 };
 
 /// A controller. It sees state, command and time; never a driver, a clock or a thread.
@@ -120,13 +134,15 @@ class Controller {
   virtual void stop() noexcept TANDEM_RT {}
 
   /// Everything that update() depends on, for snapshots. For a prediction it is called between two
-  /// cycles of a robot: it takes no heap and no lock.
+  /// cycles of a robot: it takes no heap and no lock. A controller whose members do not change
+  /// after configure() says so by an empty override; one with members and without an override is
+  /// named by `tandem check` and `tandem predict`.
   virtual void archive(Archive&) {}
 };
 
 /// Version of what a plugin sees: this header and those that it includes. Raised with every change
 /// of them after which a plugin has to be built again. How a robot is wired is in none of them.
-inline constexpr std::uint32_t kControllerInterface = 12;
+inline constexpr std::uint32_t kControllerInterface = 13;
 
 /// FNV-1a of some numbers, folded to 16 bits.
 [[nodiscard]] constexpr std::uint32_t hash_of(std::initializer_list<std::size_t> numbers) noexcept {
@@ -146,13 +162,25 @@ inline constexpr std::uint32_t kControllerAbi =
              sizeof(hal::ParameterImage), sizeof(hal::Prediction), sizeof(hal::CycleTime),
              sizeof(TomlTable), sizeof(tandem_kernels)});
 
+/// Whether `Class` has members of its own, but no archive(): what a snapshot may lack.
+template <class Class>
+[[nodiscard]] consteval bool lacks_archive() noexcept {
+  if constexpr (requires { &Class::archive; }) {  // not of one that is private, or overloaded
+    using Inherited = void (Controller::*)(Archive&);
+    return std::is_same_v<decltype(&Class::archive), Inherited> &&
+           sizeof(Class) > sizeof(Controller);
+  }
+  return false;
+}
+
 /// What `tandem_controller_plugin()` of a shared library returns.
 struct ControllerPlugin {
-  std::uint32_t abi;        ///< kControllerAbi of the headers it was built with
-  const char* compiler;     ///< __VERSION__ of its compiler, for the error message
-  const char* name;         ///< "squat"
-  const char* doc;          ///< one line for `tandem check`
-  Controller* (*create)();  ///< never null
+  std::uint32_t abi;           ///< kControllerAbi of the headers it was built with
+  const char* compiler;        ///< __VERSION__ of its compiler, for the error message
+  const char* name;            ///< "squat"
+  const char* doc;             ///< one line for `tandem check`
+  Controller* (*create)();     ///< never null
+  bool lacks_archive = false;  ///< lacks_archive() of its class
 };
 
 }  // namespace tandem
@@ -162,7 +190,11 @@ struct ControllerPlugin {
   extern "C" __attribute__((visibility("default"))) const ::tandem::ControllerPlugin* \
   tandem_controller_plugin() {                                                        \
     static const ::tandem::ControllerPlugin plugin{                                   \
-        ::tandem::kControllerAbi, __VERSION__, plugin_name, plugin_doc,               \
-        []() -> ::tandem::Controller* { return new Class; }};                         \
+        ::tandem::kControllerAbi,                                                     \
+        __VERSION__,                                                                  \
+        plugin_name,                                                                  \
+        plugin_doc,                                                                   \
+        []() -> ::tandem::Controller* { return new Class; },                          \
+        ::tandem::lacks_archive<Class>()};                                            \
     return &plugin;                                                                   \
   }

@@ -35,6 +35,7 @@ class JointTrajectory : public Controller {
     for (const std::size_t joint : joints_) setup.claim(joint, hal::ControlMode::kPosition);
     if (interpolation == "fourier") {
       series_.configure(setup, joints_, joints_known_);
+      setup.plan(parameters, "periods", series_.end_s());
       return {};
     }
     std::vector<TomlTable> tables = parameters.tables("waypoint");
@@ -167,6 +168,7 @@ class JointTrajectory : public Controller {
                       "; in radians, or metres of a slide");
     }
     times_s_.push_back(time_s);
+    setup.plan(table, "time_s", time_s);
   }
 
   /// Through a way-point a joint runs as fast as between its neighbours, or rests where it turns.

@@ -50,7 +50,10 @@ class RecordedMotion : public Controller {
       const Error& error = read.error();
       const std::string of = error.file.empty() ? path : error.file;
       parameters.error("log", of + ": " + error.message, error.hint);
+      return {};
     }
+    const double period_s = static_cast<double>(setup.period_ns) * 1e-9;
+    setup.plan(parameters, "log", approach_s_ + static_cast<double>(plan_.cycles() - 1) * period_s);
     return {};
   }
 

@@ -108,6 +108,7 @@ class Squat : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     read(setup.parameters);
+    setup.plan(setup.parameters, "cycles", plan_.start_s + plan_.cycles * plan_.period_s);
     const hal::Posture* posture = posture_parameter(setup);
     const std::vector<std::string> feet =
         setup.parameters.texts_or("feet", foot_names(setup.robot));

@@ -135,6 +135,7 @@ class ToolPath : public Controller {
     auto places = read_path((folder / path).lexically_normal().string());
     if (!places) return std::unexpected(places.error());
     places_ = std::move(*places);
+    setup.plan(parameters, "path", places_.back().time_s);
     allocate();
     if (!setup.start_position_rad.empty()) check_reach(setup);
     return {};

@@ -13,6 +13,7 @@ namespace tandem::dds {
 namespace {
 
 constexpr std::uint32_t kStaleCycles = 10;  // as the loop takes a joint for lost
+const std::string kNotKnown{"not known"};   // what a drive does not tell
 constexpr double kHotShare = 0.9;           // of the winding's limit
 
 using KeyValue = diagnostic_msgs_msg_dds__KeyValue_;
@@ -49,6 +50,7 @@ std::string percentiles(const rt::Histogram& histogram) {
 DiagnosticTopics::DiagnosticTopics(OutputMaker& maker, const RunDescription& run)
     : robot_(run.robot),
       hal_(run.hal),
+      tells_(hal::motor_feedback(run.robot)),
       temperature_limit_C_(temperature_limits(run.robot)),
       output_(
           maker.periodic<diagnostic_msgs::DiagnosticArray>(Topic::kDiagnostics, "diagnostics")) {}
@@ -116,12 +118,15 @@ HealthStatus DiagnosticTopics::joint(const CycleSample& sample, std::size_t inde
       .name = "tandem: joint " + config.name,
       .message = hal::to_string(drive),
       .hardware_id = config.board,
-      .values = {{"drive", hal::to_string(drive)},
-                 {"mode", hal::to_string(static_cast<hal::ControlMode>(state.mode()[index]))},
-                 {"fault", fmt::format("0x{:04X}", state.fault()[index])},
-                 {"temperature [C]", fmt::format("{:.1f}", temperature_C)},
-                 {"current [A]", fmt::format("{:.2f}", state.current_A()[index])},
-                 {"age [cycles]", std::to_string(age)}}};
+      .values = {
+          {"drive", hal::to_string(drive)},
+          {"mode", hal::to_string(static_cast<hal::ControlMode>(state.mode()[index]))},
+          {"fault", fmt::format("0x{:04X}", state.fault()[index])},
+          {"temperature [C]",
+           tells_[index].temperature ? fmt::format("{:.1f}", temperature_C) : kNotKnown},
+          {"current [A]",
+           tells_[index].current ? fmt::format("{:.2f}", state.current_A()[index]) : kNotKnown},
+          {"age [cycles]", std::to_string(age)}}};
   const auto homing = static_cast<hal::HomingState>(state.homing()[index]);
   if (homing != hal::HomingState::kNone) {
     status.values.push_back({"homing", hal::to_string(homing)});
@@ -133,7 +138,8 @@ HealthStatus DiagnosticTopics::joint(const CycleSample& sample, std::size_t inde
   } else if (drive == hal::DriveState::kUnknown || age > kStaleCycles) {
     status.level = Level::kStale;
     status.message = fmt::format("no feedback for {} cycles", age);
-  } else if (temperature_C >= kHotShare * temperature_limit_C_[index]) {
+  } else if (tells_[index].temperature &&
+             temperature_C >= kHotShare * temperature_limit_C_[index]) {
     status.level = Level::kWarn;
     status.message = fmt::format("the winding is hot: {:.0f} of at most {:.0f} C", temperature_C,
                                  temperature_limit_C_[index]);

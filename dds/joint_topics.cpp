@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 
 namespace tandem::dds {
 namespace {
@@ -12,6 +13,7 @@ namespace {
 struct Interface {
   const char* name;
   std::span<const double> (hal::StateImage::*values)() const noexcept;
+  bool hal::MotorFeedback::*told = nullptr;  ///< null: of every joint
 };
 constexpr std::array<Interface, 9> kInterfaces{{
     {"position", &hal::StateImage::position_rad},
@@ -20,9 +22,9 @@ constexpr std::array<Interface, 9> kInterfaces{{
     {"effort", &hal::StateImage::torque_Nm},
     {"motor_position", &hal::StateImage::motor_position_rad},
     {"motor_velocity", &hal::StateImage::motor_velocity_rad_s},
-    {"current", &hal::StateImage::current_A},
-    {"voltage", &hal::StateImage::voltage_V},
-    {"temperature", &hal::StateImage::temperature_C},
+    {"current", &hal::StateImage::current_A, &hal::MotorFeedback::current},
+    {"voltage", &hal::StateImage::voltage_V, &hal::MotorFeedback::voltage},
+    {"temperature", &hal::StateImage::temperature_C, &hal::MotorFeedback::temperature},
 }};
 
 /// Every joint has been measured once: its sample is no older than the run.
@@ -46,7 +48,8 @@ std::vector<std::string> interface_names() {
 }  // namespace
 
 JointTopics::JointTopics(OutputMaker& maker, const RunDescription& run)
-    : joints_(joint_names(run.robot)),
+    : tells_(hal::motor_feedback(run.robot)),
+      joints_(joint_names(run.robot)),
       interfaces_(interface_names()),
       values_(run.robot.joints.size() * kInterfaces.size()),
       joint_values_(run.robot.joints.size()),
@@ -84,7 +87,12 @@ const control_msgs::DynamicJointState& JointTopics::dynamic(const CycleSample& s
   dynamic_.header.stamp = ros_time(sample.stamp_ns);
   for (std::size_t i = 0; i < kInterfaces.size(); ++i) {
     const auto values = (sample.state.*kInterfaces[i].values)();
-    for (std::size_t j = 0; j < values.size(); ++j) values_[j * kInterfaces.size() + i] = values[j];
+    const auto told = kInterfaces[i].told;
+    for (std::size_t j = 0; j < values.size(); ++j) {
+      const bool known = told == nullptr || tells_[j].*told;
+      values_[j * kInterfaces.size() + i] =
+          known ? values[j] : std::numeric_limits<double>::quiet_NaN();
+    }
   }
   return dynamic_;
 }

@@ -6,10 +6,12 @@
 
 #include "dds/message_parts.hpp"
 #include "dds/topic_group.hpp"
+#include "hal/config/capabilities.hpp"
 
 namespace tandem::dds {
 
-/// Every joint in the process image's order, link side. A joint that has not been heard of has 0.
+/// Every joint in the process image's order, link side. A joint that has not been heard of has 0;
+/// current, voltage and temperature are NaN where the drive does not tell them.
 class JointTopics final : public TopicGroup {
  public:
   JointTopics(OutputMaker& maker, const RunDescription& run);
@@ -18,6 +20,7 @@ class JointTopics final : public TopicGroup {
  private:
   [[nodiscard]] const control_msgs::DynamicJointState& dynamic(const CycleSample& sample);
 
+  std::vector<hal::MotorFeedback> tells_;  // of each joint's drive
   TextList joints_;
   TextList interfaces_;
   std::vector<double> values_;  // a joint's interfaces one after another

@@ -218,6 +218,7 @@ Result<Answer> PredictionService::answer_tool(std::int64_t horizon_ns) {
   const std::size_t before = fork_->cycle->fault_log().size();
   run_ahead(answer.prediction, horizon_ns, [this] { return closing(); });
   if (answer.prediction.end == hal::PredictionEnd::kCancelled) return std::unexpected(over());
+  answer.unarchived = fork_->unarchived;
   answer.faults = fork_->cycle->faults();
   answer.faults.erase(answer.faults.begin(),
                       answer.faults.begin() + static_cast<std::ptrdiff_t>(before));

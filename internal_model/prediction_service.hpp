@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -28,6 +29,7 @@ struct Fork {
   virtual ~Fork() = default;
   runtime::RobotCycle* cycle = nullptr;    ///< in simulated time, as fast as it goes
   const hal::TruthImage* truth = nullptr;  ///< of its plant
+  std::vector<std::string> unarchived;     ///< controllers that lack an archive(), by name
   [[nodiscard]] virtual bool diverged() const = 0;
 };
 /// Errors: whatever keeps it from being made.
@@ -37,8 +39,10 @@ using MakeFork = std::function<Result<std::unique_ptr<Fork>>()>;
 struct Answer {
   hal::Prediction prediction;
   std::vector<runtime::Fault> faults;  ///< that will come
-  std::size_t loop_bytes = 0;          ///< that the loop wrote down for it
-  std::int64_t loop_ns = 0;            ///< and the time that this took, between two cycles
+  /// Controllers whose copies began anew instead of where the run's are: they lack an archive().
+  std::vector<std::string> unarchived;
+  std::size_t loop_bytes = 0;  ///< that the loop wrote down for it
+  std::int64_t loop_ns = 0;    ///< and the time that this took, between two cycles
 };
 
 /// What a copy of a controller gets that is part of a prediction: no answer, ever.

@@ -14,6 +14,7 @@
 #include "model/urdf_vocabulary.hpp"
 #include "model/urdf_xacro.hpp"
 #include "model/xml_reference.hpp"
+#include "model/xml_scan.hpp"
 
 namespace tandem::model {
 namespace {
@@ -69,11 +70,12 @@ class Reader {
       error(1, "", "this is no XML, so no URDF", "name a .urdf file");
       return std::move(out_);
     }
-    if (document_.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
+    const std::string plain = without_instructions(text);
+    if (document_.Parse(plain.data(), plain.size()) != tinyxml2::XML_SUCCESS) {
       report_xml_error();
       return std::move(out_);
     }
-    if (const auto wrong = find_wrong_reference(text)) {
+    if (const auto wrong = find_wrong_reference(plain)) {
       error(wrong->line, "",
             "the character reference '" + wrong->text + "' stands for no character",
             "write the character itself, in UTF-8");

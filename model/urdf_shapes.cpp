@@ -7,6 +7,8 @@
 #include <Eigen/Geometry>
 #include <sstream>
 
+#include "model/xml_scan.hpp"
+
 namespace tandem::model {
 namespace {
 
@@ -57,7 +59,8 @@ Shape shape(const XMLElement& collision) {
 std::map<std::string, std::vector<Shape>> collision_shapes(std::string_view text) {
   std::map<std::string, std::vector<Shape>> shapes;
   tinyxml2::XMLDocument document;
-  const XMLElement* robot = document.Parse(text.data(), text.size()) == tinyxml2::XML_SUCCESS
+  const std::string plain = without_instructions(text);
+  const XMLElement* robot = document.Parse(plain.data(), plain.size()) == tinyxml2::XML_SUCCESS
                                 ? document.FirstChildElement("robot")
                                 : nullptr;
   if (robot == nullptr) return shapes;

@@ -6,7 +6,8 @@
 
 #include <algorithm>
 #include <charconv>
-#include <optional>
+
+#include "model/xml_scan.hpp"
 
 namespace tandem::model {
 namespace {
@@ -25,35 +26,6 @@ struct Element {
   std::size_t begin = 0, inside = 0, inside_end = 0, end = 0;
   std::size_t depth = 0;  // of the root: 0
 };
-
-/// Behind the comment, CDATA section, declaration or processing instruction that begins at `at`;
-/// nothing if it is a tag.
-std::optional<std::size_t> behind_no_tag(std::string_view text, std::size_t at) {
-  const std::pair<std::string_view, std::string_view> kinds[] = {
-      {"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}, {"<!", ">"}};
-  for (const auto& [begins, ends] : kinds)
-    if (text.substr(at).starts_with(begins)) {
-      const std::size_t end = text.find(ends, at + begins.size());
-      return end == std::string_view::npos ? text.size() : end + ends.size();
-    }
-  return {};
-}
-
-/// Behind the `>` of the tag that begins at `at`, which may have others in quotes.
-std::size_t behind_tag(std::string_view text, std::size_t at) {
-  char quote = '\0';
-  for (; at < text.size(); ++at) {
-    const char c = text[at];
-    if (quote != '\0') {
-      quote = c == quote ? '\0' : quote;
-    } else if (c == '"' || c == '\'') {
-      quote = c;
-    } else if (c == '>') {
-      return at + 1;
-    }
-  }
-  return at;
-}
 
 /// Every element, in the order in which they begin. @pre `text` is well-formed
 std::vector<Element> elements_of(std::string_view text) {
@@ -173,7 +145,8 @@ void add_inertial(std::string_view text, const Element& link, const Inertia& ine
 Result<std::string> with_inertias(std::string_view text,
                                   const std::vector<std::pair<std::string, Inertia>>& inertias) {
   tinyxml2::XMLDocument document;
-  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS ||
+  const std::string plain = without_instructions(text);
+  if (document.Parse(plain.data(), plain.size()) != tinyxml2::XML_SUCCESS ||
       document.RootElement() == nullptr) {
     return fail("the description is no XML", "name a URDF");
   }

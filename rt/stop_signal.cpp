@@ -1,10 +1,16 @@
 // Signal handlers that only set atomic flags. SIGINT, SIGTERM and SIGHUP get their former action
-// back for the second time, so that a run that hangs can still be ended.
+// back for the second time, so that a run that hangs can still be ended. Ended so in its bring-up a
+// robot is left with drives that are enabled, so two signals in quick succession are one.
 #include "rt/stop_signal.hpp"
+
+#include <time.h>
 
 #include <array>
 #include <atomic>
+#include <cerrno>
 #include <csignal>
+
+#include "base/clock_ns.hpp"
 
 namespace tandem::rt {
 namespace {
@@ -19,14 +25,25 @@ extern "C" void on_emergency_signal(int) { emergency_flag.store(true, std::memor
 
 struct Taken {
   int signal;
-  struct sigaction former;
+  struct sigaction former {};
+  std::atomic<std::int64_t> first_ns{0};  // when it came first; 0: it did not
 };
-std::array<Taken, 3> taken{{{SIGINT, {}}, {SIGTERM, {}}, {SIGHUP, {}}}};
+std::array<Taken, 3> taken{{{SIGINT}, {SIGTERM}, {SIGHUP}}};
+static_assert(std::atomic<std::int64_t>::is_always_lock_free);
 
 extern "C" void on_stop_signal(int signal) {
+  const int error = errno;
   stop_flag.store(true, std::memory_order_relaxed);
-  for (const Taken& one : taken)
-    if (one.signal == signal) ::sigaction(signal, &one.former, nullptr);
+  const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC);
+  for (Taken& one : taken) {
+    if (one.signal != signal) continue;
+    std::int64_t first_ns = 0;
+    if (one.first_ns.compare_exchange_strong(first_ns, now_ns)) break;
+    if (now_ns - first_ns < kOneSignal_ns) break;
+    ::sigaction(signal, &one.former, nullptr);
+    ::raise(signal);  // pending until this returns
+  }
+  errno = error;
 }
 
 }  // namespace
@@ -42,6 +59,7 @@ void install_stop_signals() {
     const bool ignored = now.sa_handler == SIG_IGN;
     if (ignored && one.signal == SIGHUP) continue;  // the terminal has gone, under nohup
     one.former = now;
+    one.first_ns.store(0);
     if (ignored) one.former.sa_handler = SIG_DFL;  // it could not be ended
     ::sigaction(one.signal, &action, nullptr);
   }

@@ -2,14 +2,18 @@
 // at once per cycle. Layer: rt.  Thread: any.
 #pragma once
 
+#include <cstdint>
+
 #include "base/realtime.hpp"
 
 namespace tandem::rt {
 
 /// From now on the first SIGINT, SIGTERM or SIGHUP (unless that is ignored, as under nohup) sets
 /// the stop flag; a second one does what the first would have done before, so that a hung program
-/// can still be ended.
+/// can still be ended. Within kOneSignal_ns of the first it is the same one: a key that bounces, a
+/// terminal and a supervisor that both pass it on.
 void install_stop_signals();
+inline constexpr std::int64_t kOneSignal_ns = 200'000'000;
 
 /// From now on the first of them does again what it would have done before: for what comes after
 /// the loop, and looks at no flag.

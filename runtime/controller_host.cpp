@@ -102,6 +102,7 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
   made->name = name;
   made->controller = std::move(controller);
   made->claims.assign(setup.claims().begin(), setup.claims().end());
+  made->plans.assign(setup.plans().begin(), setup.plans().end());
   made->claimed.assign(robot_.joints.size(), 0);
   made->strayed.assign(robot_.joints.size(), 0);
   for (const auto& claim : made->claims) made->claimed[claim.joint] = 1;

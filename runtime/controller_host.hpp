@@ -41,6 +41,7 @@ struct HostedController {
   std::string plugin;                      ///< its library's path; empty: it has none
   std::shared_ptr<Controller> controller;  ///< a plugin's shares its library's life
   std::vector<ControllerSetup::Claim> claims;
+  std::vector<ControllerSetup::Plan> plans;
   std::vector<std::uint8_t> claimed;  ///< by joint
   std::vector<std::uint8_t> strayed;  ///< by joint: something was taken back, and reported
   std::uint32_t id = 0;               ///< of its name, for the fault log

@@ -210,7 +210,7 @@ Result<RequestResult> RunServices::ask(Lock& lock, LoopRequest request, Patience
     return RequestResult{};
   }
   if (found->reason != RejectReason::kNone) return std::unexpected(refusal(*found));
-  return RequestResult{.done = true, .cycle = found->cycle};
+  return RequestResult{.done = true, .cycle = found->cycle, .phase = progress_->phase.load()};
 }
 
 std::string RunServices::controller_name(std::int32_t slot) const {
@@ -271,7 +271,7 @@ ControllerSet RunServices::planned() const {
 }
 
 Status RunServices::check_name(const std::string& name) {
-  if (const std::string problem = shown_name_problem(name); !problem.empty()) {
+  if (const std::string problem = listed_name_problem(name); !problem.empty()) {
     return fail_at("name", "the controller's name " + problem, "give it another name");
   }
   if (slot_of(name)) {

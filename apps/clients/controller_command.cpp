@@ -33,15 +33,18 @@ void print_list(const Json& controllers) {
   table.print(stdout);
 }
 
-/// "done in cycle 1200; active: squat".
+/// "done in cycle 1200; active: squat"; "selected in cycle 1200: squat; not started yet: …".
 void print_done(const Json& answer) {
   const std::vector<std::string> active =
       answer.value("active", Json::array()).get<std::vector<std::string>>();
   const std::string names = active.empty() ? "none" : fmt::format("{}", fmt::join(active, ", "));
-  if (answer.value("done", false)) {
+  const std::string note = answer.value("note", "");
+  if (answer.value("done", false) && !note.empty()) {
+    fmt::print("selected in cycle {}: {}; {}\n", answer.value("cycle", 0), names, note);
+  } else if (answer.value("done", false)) {
     fmt::print("done in cycle {}; active: {}\n", answer.value("cycle", 0), names);
   } else {
-    fmt::print("{}; active so far: {}\n", answer.value("note", ""), names);
+    fmt::print("{}; active so far: {}\n", note, names);
   }
 }
 

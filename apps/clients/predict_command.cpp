@@ -96,6 +96,14 @@ Exit predict_command(const PredictOptions& options) {
   const Result<Json> answer = (*run)->ask(question);
   if (!answer) return refuse(answer.error());
   if (options.json != "-") print_prediction(*answer);
+  for (const Json& name : answer->value("unarchived_controllers", Json::array())) {
+    print_warnings({{.message = fmt::format("the controller '{}' has no archive(): its copy began "
+                                            "anew, and what it would do may be something else",
+                                            name.get<std::string>()),
+                     .hint = "give its class an archive() (docs/controllers.md#writing-one)",
+                     .file = {},
+                     .key = {}}});
+  }
   if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
   return Exit::kDone;
 }

@@ -40,6 +40,26 @@ Json list(RunServices& services, const hal::RobotConfig& robot) {
   return all;
 }
 
+/// Why controllers that were selected do not run yet; empty: they do.
+std::string starts_later(hal::RunPhase phase) {
+  switch (phase) {
+    case hal::RunPhase::kBringUp:
+    case hal::RunPhase::kSettling: return "not started yet: they start when the robot is ready";
+    case hal::RunPhase::kFaulted:
+      return "not started yet: a fault is latched. `tandem fault reset`, then `tandem controller "
+             "start`, which after_reset = \"continue\" spares";
+    case hal::RunPhase::kResetting:
+      return "not started yet: a reset is under way. Then `tandem controller start`, which "
+             "after_reset = \"continue\" spares";
+    case hal::RunPhase::kRunning:
+    case hal::RunPhase::kHeld:
+    case hal::RunPhase::kRetreating:
+    case hal::RunPhase::kShutDown:
+    case hal::RunPhase::kDone: break;
+  }
+  return {};
+}
+
 /// What was done, and who is active now.
 Result<Json> tell(RunServices& services, const Result<runtime::RequestResult>& asked) {
   if (!asked) return std::unexpected(asked.error());
@@ -60,7 +80,12 @@ Result<Json> switch_by_hand(RunServices& services, const Names& stop, const Name
     return fail("'" + one.name + "' is the owner in another process: it comes and goes by itself",
                 "end the owner's run; `tandem estop` stops the robot whoever has it");
   }
-  return tell(services, services.switch_controllers(stop, start));
+  const auto asked = services.switch_controllers(stop, start);
+  auto answer = tell(services, asked);
+  if (!answer || !asked->done || start.empty()) return answer;
+  const std::string later = starts_later(asked->phase);
+  if (!later.empty()) (*answer)["note"] = later;
+  return answer;
 }
 
 Result<TomlDocument> parameters_of(const Json& request) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "apps/robot/ringing_loops.hpp"
 #include "model/interpreted_kernels.hpp"
 #include "scaffold/posed.hpp"
 #include "scaffold/strength.hpp"
@@ -38,18 +39,8 @@ std::set<int> joints_to_feet(const RobotFiles& robot) {
 /// What each of the model's coordinates must give at rest, the base held upright.
 std::vector<double> torques_at_rest(const hal::RobotConfig& robot, const tandem_kernels& kernels,
                                     const hal::PostureConfig* posture) {
-  const std::size_t first = kernels.floating_base != 0 ? 7 : 0;
-  std::vector<double> q(kernels.nq, 0.0), v(kernels.nv, 0.0), h(kernels.nv, 0.0);
-  if (first != 0) q[6] = 1.0;
-  for (std::size_t i = 0; i < kernels.joints; ++i) {
-    const int driven = robot.joint_index(kernels.joint_names[i]);
-    const auto passive =
-        std::ranges::find(robot.passive, kernels.joint_names[i], &hal::PassiveConfig::name);
-    if (passive != robot.passive.end()) q[first + i] = passive->position_rad;
-    if (driven >= 0 && posture != nullptr) {
-      q[first + i] = posture->position_rad[static_cast<std::size_t>(driven)];
-    }
-  }
+  const std::vector<double> q = coordinates_at(robot, kernels, posture);
+  std::vector<double> v(kernels.nv, 0.0), h(kernels.nv, 0.0);
   kernels.bias(q.data(), v.data(), h.data());
   return {h.end() - kernels.joints, h.end()};
 }
@@ -75,6 +66,23 @@ std::vector<Weak> weak_joints(const RobotFiles& robot, const hal::PostureConfig*
 }
 
 }  // namespace
+
+std::vector<double> coordinates_at(const hal::RobotConfig& robot, const tandem_kernels& kernels,
+                                   const hal::PostureConfig* posture) {
+  const std::size_t first = kernels.floating_base != 0 ? 7 : 0;
+  std::vector<double> q(kernels.nq, 0.0);
+  if (first != 0) q[6] = 1.0;
+  for (std::size_t i = 0; i < kernels.joints; ++i) {
+    const int driven = robot.joint_index(kernels.joint_names[i]);
+    const auto passive =
+        std::ranges::find(robot.passive, kernels.joint_names[i], &hal::PassiveConfig::name);
+    if (passive != robot.passive.end()) q[first + i] = passive->position_rad;
+    if (driven >= 0 && posture != nullptr) {
+      q[first + i] = posture->position_rad[static_cast<std::size_t>(driven)];
+    }
+  }
+  return q;
+}
 
 std::optional<Error> too_weak_at(const RobotFiles& robot, const std::string& posture) {
   const hal::PostureConfig* start = robot.config.posture(posture);
@@ -133,6 +141,7 @@ Diagnostics start_warnings(const RobotFiles& robot, const std::string& posture) 
   warn_of_back_emf(robot.config, warnings);
   if (auto error = upward_gravity(robot.config)) warnings.push_back(std::move(*error));
   if (auto error = too_weak_at(robot, posture)) warnings.push_back(std::move(*error));
+  if (auto error = ringing_loops(robot, posture)) warnings.push_back(std::move(*error));
   return warnings;
 }
 

@@ -6,6 +6,7 @@
 #include "apps/can/bus_table.hpp"
 #include "apps/control/fault_table.hpp"
 #include "apps/robot/loop_facts.hpp"
+#include "apps/robot/ringing_loops.hpp"
 #include "apps/robot/scale_facts.hpp"
 #include "apps/robot/start_height.hpp"
 #include "apps/robot/start_torque.hpp"
@@ -176,6 +177,9 @@ Diagnostics warnings_of(const RobotFiles& robot) {
     warnings.insert(warnings.end(), buried.begin(), buried.end());
   }
   if (auto error = upward_gravity(robot.config)) warnings.push_back(std::move(*error));
+  const auto& postures = robot.config.postures;
+  const std::string first = postures.empty() ? "" : postures.front().name;
+  if (auto error = ringing_loops(robot, first)) warnings.push_back(std::move(*error));
   return warnings;
 }
 
@@ -199,12 +203,26 @@ Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics
   return {};
 }
 
+/// Controllers that a prediction cannot continue: a run by itself is right.
+void warn_of_archives(const Composition& c, Diagnostics& warnings) {
+  for (const ControllerNote& note : c.notes) {
+    if (!note.lacks_archive) continue;
+    warnings.push_back({.message = "has members but no archive(): predictions and snapshots leave "
+                                   "out what it remembers, and may be wrong",
+                        .hint = "give its class an archive(); an empty one says that nothing "
+                                "changes after configure() (docs/controllers.md#writing-one)",
+                        .file = c.experiment.file,
+                        .key = "controller." + note.name});
+  }
+}
+
 Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                              Json& json) {
   const auto composition = compose(options.file, {.missing_kernels = MissingKernels::kTolerate});
   if (!composition) return composition.error();
   warnings = (*composition)->experiment.warnings;
   warnings.insert(warnings.end(), (*composition)->warnings.begin(), (*composition)->warnings.end());
+  warn_of_archives(**composition, warnings);
   print_warnings(warnings);
   const runtime::Experiment& e = (*composition)->experiment;
   const LoopStudy loops = study_loops(e.robot, (*composition)->tree, {&e.posture, 1});

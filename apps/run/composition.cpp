@@ -11,6 +11,7 @@
 #include "apps/robot/loop_facts.hpp"
 #include "apps/robot/start_height.hpp"
 #include "apps/robot/start_torque.hpp"
+#include "apps/run/late_plans.hpp"
 #include "apps/run/operator_link.hpp"
 #include "apps/run/retreats.hpp"
 #include "controllers/plugin_loader.hpp"
@@ -63,6 +64,7 @@ void add_controllers(Composition& c, Collector& errors) {
     }
     const std::string doc = loaded->plugin().doc;
     const bool retreats = (*loaded)->can_retreat();
+    const bool lacks_archive = loaded->plugin().lacks_archive;
     if (c.controllers != nullptr) {  // without kernels: only that it can be loaded
       const Status added =
           c.controllers->add(spec.name, std::move(*loaded), spec.parameters, spec.active);
@@ -73,7 +75,7 @@ void add_controllers(Composition& c, Collector& errors) {
         continue;
       }
     }
-    c.notes.push_back({spec.name, doc, spec.active, retreats});
+    c.notes.push_back({spec.name, doc, spec.active, retreats, lacks_archive});
   }
   errors.add(c.experiment.document.diagnostics());
 }
@@ -443,6 +445,9 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   add_owner(*c, errors);
   if (!errors.empty()) return errors.give();
   for (Error& warning : missing_retreats(*c)) c->warnings.push_back(std::move(warning));
+  if (c->controllers != nullptr && !overrides.duration_s && !overrides.serves) {
+    std::ranges::move(late_plans(*c), std::back_inserter(c->warnings));
+  }
   if (auto failed = add_parallel(*c, overrides); !failed.empty()) return std::unexpected(failed);
   const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
   if (!simulated || c->kernels.get() == nullptr) return c;

@@ -52,9 +52,10 @@ struct Overrides {
 /// A controller as `check` lists it.
 struct ControllerNote {
   std::string name;
-  std::string doc;        ///< its plugin's one line
-  bool active = true;     ///< from the start
-  bool retreats = false;  ///< it can, in a stop of category 2
+  std::string doc;             ///< its plugin's one line
+  bool active = true;          ///< from the start
+  bool retreats = false;       ///< it can, in a stop of category 2
+  bool lacks_archive = false;  ///< it has members and no archive(): predictions may be wrong
 };
 
 struct Composition {
@@ -80,7 +81,8 @@ struct Composition {
   std::shared_ptr<runtime::OwnerController> owner;  ///< null: nobody may own the robot from afar
   std::size_t owner_slot = 0;                       ///< its in `controllers`
   std::vector<ControllerNote> notes;
-  /// start_warnings(), links that start inside the ground, a category 2 that nobody can carry out
+  /// start_warnings(), links that start inside the ground, a category 2 that nobody can carry out,
+  /// late_plans() unless the command line says how long
   Diagnostics warnings;
 
   /// Empty without a CAN backend.

@@ -35,11 +35,13 @@ struct RunFork final : internal_model::Fork {
 };
 
 /// The same controllers in the same order.
-Status add_controllers_again(const Composition& c, runtime::ControllerHost& host) {
+Status add_controllers_again(const Composition& c, RunFork& fork) {
+  runtime::ControllerHost& host = *fork.controllers;
   const runtime::Experiment& e = c.experiment;
   for (const runtime::ControllerSpec& spec : e.controllers) {
     auto plugin = load_plugin(e, spec);
     if (!plugin) return std::unexpected(plugin.error());
+    if (plugin->plugin().lacks_archive) fork.unarchived.push_back(spec.name);
     const Status added = host.add(spec.name, std::move(*plugin), spec.parameters, spec.active);
     if (!added) return added;
   }
@@ -90,6 +92,7 @@ Json answer_json(const internal_model::Answer& answer, const hal::RobotConfig& r
             {"loop_bytes", answer.loop_bytes},
             {"loop_ns", answer.loop_ns},
             {"faults", faults_json(answer.faults)},
+            {"unarchived_controllers", answer.unarchived},
             {"joints", Json::object()},
             {"base", nullptr}};
   for (std::size_t j = 0; j < robot.joints.size(); ++j) {
@@ -122,7 +125,7 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
     fork->estimator = std::move(*estimator);
     fork->controllers->show_estimate(&fork->estimator->image());
   }
-  if (const Status added = add_controllers_again(c, *fork->controllers); !added) {
+  if (const Status added = add_controllers_again(c, *fork); !added) {
     return std::unexpected(added.error());
   }
   const bool beside = c.parallel != nullptr;

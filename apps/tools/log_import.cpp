@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "apps/robot/robot_files.hpp"
@@ -78,12 +79,31 @@ void print_summary(const log::ImportSummary& summary, std::FILE* out) {
   names("not used", left.ignored);
   names("joints without data", summary.missing);
   facts.print(out);
-  Table table({"samples of", "number", "every [ms]"});
+  Table table({"samples of", "number", "every [ms]", "late"});
   for (const log::Spacing& one : summary.series) {
-    table.add({one.name, std::to_string(one.rows), spacing_text(one)});
+    table.add({one.name, std::to_string(one.rows), spacing_text(one), std::to_string(one.late)});
   }
   fmt::print(out, "\n");
   table.print(out);
+}
+
+/// One, of the series with the largest share of late samples.
+Diagnostics warnings_of(const log::ImportSummary& summary, const std::string& file) {
+  const auto share = [](const log::Spacing& one) {
+    return static_cast<double>(one.late) / static_cast<double>(one.rows);
+  };
+  const auto worst = std::ranges::max_element(summary.series, {}, share);
+  if (worst == summary.series.end() || !worst->jitters()) return {};
+  const auto ms = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-6; };
+  return {
+      {.message = fmt::format("{} of {} samples came late, more than {:g} periods of {:.6g} ms "
+                              "after the one before, the worst after {:.6g} ms: velocities and "
+                              "accelerations of these cycles are those of lines between samples",
+                              worst->late, worst->rows, log::Spacing::kLateSteps,
+                              ms(worst->median_ns), ms(worst->most_ns)),
+       .hint = "record on a real-time thread, with the times at which the samples were taken",
+       .file = file,
+       .key = worst->name}};
 }
 
 Json summary_json(const log::ImportSummary& summary) {
@@ -108,7 +128,8 @@ Json summary_json(const log::ImportSummary& summary) {
                               {"samples", one.rows},
                               {"median_ns", one.median_ns},
                               {"least_ns", one.least_ns},
-                              {"most_ns", one.most_ns}});
+                              {"most_ns", one.most_ns},
+                              {"late", one.late}});
   }
   return json;
 }
@@ -130,6 +151,7 @@ Exit log_import_command(const LogOptions& options) {
   if (const Status placed = draft.place(); !placed) return refuse(placed.error());
   summary->log.path = *output;
   print_summary(*summary, human_output(options.json));
+  print_warnings(warnings_of(*summary, options.files.front()));
   if (const Status written = write_json(options.json, summary_json(*summary)); !written) {
     return refuse(written.error());
   }

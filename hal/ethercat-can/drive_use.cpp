@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include "base/counted.hpp"
@@ -73,6 +75,24 @@ void tell_pdos(const NodePlan& node, DriveUse& use) {
   }
 }
 
+/// A joint's `stop_options` with their objects.
+std::array<std::pair<std::uint16_t, std::optional<int>>, 4> options_of(const StopOptions& chosen) {
+  return {{{object::kShutdownOption, chosen.shutdown},
+           {object::kDisableOption, chosen.disable},
+           {object::kHaltOption, chosen.halt},
+           {object::kFaultReactionOption, chosen.fault}}};
+}
+
+/// What of it is set; empty: nothing.
+std::string set_text(const StopOptions& chosen) {
+  std::string text;
+  for (const auto& [index, option] : options_of(chosen)) {
+    if (!option) continue;
+    text += fmt::format("{}{:04X} is set to {}", text.empty() ? "" : ", ", index, *option);
+  }
+  return text;
+}
+
 /// What the drive does by itself when it is stopped: what the master writes, else the sheet's
 /// value.
 std::string stops_text(const DataSheet& sheet, int axis, const StopOptions& chosen) {
@@ -83,10 +103,7 @@ std::string stops_text(const DataSheet& sheet, int axis, const StopOptions& chos
   const bool quick = canopen::writable(sheet, canopen::of_axis(object::kQuickStopOption, axis), 0);
   std::string text =
       "605A " + (quick ? std::string("is set to 2") : value(object::kQuickStopOption));
-  for (const auto& [index, option] : {std::pair{object::kShutdownOption, chosen.shutdown},
-                                      {object::kDisableOption, chosen.disable},
-                                      {object::kHaltOption, chosen.halt},
-                                      {object::kFaultReactionOption, chosen.fault}}) {
+  for (const auto& [index, option] : options_of(chosen)) {
     if (sheet.find(canopen::of_axis(index, axis)) == nullptr) continue;
     text += fmt::format(", {:04X} ", index) +
             (option ? fmt::format("is set to {}", *option) : value(index));
@@ -198,10 +215,13 @@ std::vector<DriveFact> drive_facts(const RobotConfig& robot) {
   std::vector<std::size_t> others;  // by fact: joints besides the first
   for (const JointConfig& joint : robot.joints) {
     const BoardConfig* board = robot.board(joint.board);
-    if (board == nullptr || board->eds.empty()) continue;
-    std::string how = stops_text(*board->sheet, joint.axis, joint.stop_options);
-    if (joint.brake) how += "; its brake is the drive's own";
-    if (joint.homing) {
+    if (board == nullptr) continue;
+    const bool own = board->eds.empty();  // all else is as docs/firmware.md says
+    std::string how = own ? set_text(joint.stop_options)
+                          : stops_text(*board->sheet, joint.axis, joint.stop_options);
+    if (how.empty()) continue;
+    if (joint.brake && !own) how += "; its brake is the drive's own";
+    if (joint.homing && !own) {
       how += fmt::format("; homed by method {}{}", joint.homing->method,
                          joint.homing->required ? ", before anything else moves it" : "");
     }

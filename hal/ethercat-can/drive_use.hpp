@@ -30,7 +30,8 @@ struct DriveUse {
 /// Error: the master cannot drive it, and why.
 [[nodiscard]] Result<DriveUse> use_of(const canopen::DataSheet& sheet);
 
-/// How the drives of other makes stop, hold and are homed: joints, and what their drive does.
+/// How the drives of other makes stop, hold and are homed, and what `stop_options` change on our
+/// own boards: joints, and what their drive does.
 [[nodiscard]] std::vector<DriveFact> drive_facts(const RobotConfig& robot);
 
 /// What the drives of other makes miss that their joints' safety rests on, each with its board;

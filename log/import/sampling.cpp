@@ -355,8 +355,12 @@ std::vector<Spacing> spacings(const Recording& recording) {
   std::vector<Spacing> all;
   for (const Series& series : recording.series) {
     const std::vector<std::int64_t> steps = sorted_steps(series);
-    all.push_back(
-        {series.name, series.rows(), steps[steps.size() / 2], steps.front(), steps.back()});
+    const std::int64_t median_ns = steps[steps.size() / 2];
+    const double in_time_ns = Spacing::kLateSteps * static_cast<double>(median_ns);
+    const auto late = std::ranges::count_if(
+        steps, [=](std::int64_t step) { return static_cast<double>(step) > in_time_ns; });
+    all.push_back({series.name, series.rows(), median_ns, steps.front(), steps.back(),
+                   static_cast<std::size_t>(late)});
   }
   return all;
 }

@@ -19,6 +19,15 @@ struct Spacing {
   std::string name;
   std::size_t rows = 0;
   std::int64_t median_ns = 0, least_ns = 0, most_ns = 0;
+  std::size_t late = 0;  ///< samples more than kLateSteps medians after the one before
+
+  static constexpr double kLateSteps = 1.5;
+  static constexpr double kMostLate = 0.01;  ///< of the samples: what is between them is made up
+
+  /// Whether more than kMostLate of them are late.
+  [[nodiscard]] bool jitters() const {
+    return static_cast<double>(late) > kMostLate * static_cast<double>(rows);
+  }
 };
 
 /// Checks a recording's times and values, and leaves out what the map excludes: rows before begin_s

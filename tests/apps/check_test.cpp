@@ -385,6 +385,47 @@ TEST_F(Check, WarnsOfACollisionShapeThatStartsInsideTheGround) {
   EXPECT_EQ(guessed.err.find(says), std::string::npos) << guessed.err;
 }
 
+/// What is said is what then happens: at 40 ms the joints follow, at 100 ms they do not.
+TEST_F(Check, WarnsOfGainsThatAreTooHighForTheControlPeriod) {
+  const std::string says = "joint1.gains: with these gains and a control period of 100 ms the ";
+  EXPECT_EQ(tandem("check robot.toml").err.find("will probably oscillate"), std::string::npos);
+  const std::string robot = read_text(folder_ / "robot.toml");
+  const std::string trajectory = read_text(folder_ / "trajectory.toml");
+  for (const bool slow : {false, true}) {
+    const std::string period = slow ? "100_000_000" : "40_000_000";
+    write_text(folder_ / "robot.toml", robot);
+    edit("robot.toml", "name = \"board_1\"",
+         "name = \"board_1\"\nheartbeat_ms = 1000\ncontrol_period_ns = " + period);
+    write_text(folder_ / "trajectory.toml", "period_ns = " + period + "\n" + trajectory);
+    for (const std::string command : {"check robot.toml", "check trajectory.toml"}) {
+      const Outcome checked = tandem(command);
+      EXPECT_EQ(checked.status, 0) << checked.err;
+      EXPECT_EQ(checked.err.find(says) != std::string::npos, slow) << checked.err;
+    }
+    const Outcome run = tandem("run trajectory.toml --no-log");
+    EXPECT_EQ(run.status, slow ? 1 : 0) << run.out << run.err;
+    EXPECT_EQ(run.err.find(says) != std::string::npos, slow) << run.err;
+  }
+}
+
+TEST_F(Check, WarnsOfWhatIsPlannedForAfterTheEnd) {
+  const std::string late = "the controller 'joint_trajectory' reaches this ";
+  EXPECT_EQ(tandem("check trajectory.toml").err.find(late), std::string::npos);
+  edit("trajectory.toml", "duration_s = 5.0", "duration_s = 2.5");
+  for (const std::string command : {"check trajectory.toml", "run trajectory.toml --no-log"}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    for (const std::string& text :
+         {"trajectory.toml:14: controller.joint_trajectory.parameters.waypoint[1].time_s: " + late +
+              "3 s after its start, and 1 more later; the run ends after 2.5 s",
+          std::string("duration_s = 4.8 or more")}) {
+      EXPECT_NE(outcome.err.find(text), std::string::npos) << text << "\nin: " << outcome.err;
+    }
+  }
+  EXPECT_EQ(tandem("run trajectory.toml --no-log --duration 0.5").err.find(late), std::string::npos)
+      << "who says how long knows it";
+}
+
 TEST_F(Check, RefusesAStartInsideTheGroundAndSaysWhichHeightTouches) {
   copy_coman(folder_, "0.362");
   for (const std::string command : {"check hold.toml", "run hold.toml"}) {

@@ -45,6 +45,25 @@ TEST_F(Faults, AreShownAndResetWhileTheRunWaits) {
   EXPECT_EQ(result["fault_log"][0]["latched"], false);
 }
 
+TEST_F(Faults, LetAControllerBeSelectedAndSayThatItStartsLater) {
+  begin("--on-fault wait");
+  EXPECT_EQ(to_run("estop --category 1").status, 0);
+  until(R"("phase": "faulted")");
+  const Outcome stop = to_run("controller stop hold");
+  EXPECT_NE(stop.out.find("done in cycle"), std::string::npos) << stop.out;
+  const Outcome start = to_run("controller start hold");
+  EXPECT_EQ(start.status, 0) << start.err;
+  EXPECT_EQ(start.out.find("done"), std::string::npos) << start.out;
+  for (const char* text : {"selected in cycle ", ": hold; not started yet: a fault is latched"}) {
+    EXPECT_NE(start.out.find(text), std::string::npos) << text << "\nin: " << start.out;
+  }
+  EXPECT_EQ(to_run("fault reset").status, 0);
+  until(R"("phase": "held")");
+  EXPECT_EQ(to_run("controller start").out.find("not started"), std::string::npos);
+  until(R"("phase": "running")");
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(Faults, LeaveAJointBeyondItsLimitWhereItIsUntilItIsRecovered) {
   // Unpowered it falls to where it hangs, at 3.14 rad: the plant's end stop is the URDF's 6.3.
   edit("double_pendulum.urdf", R"(lower="0" upper="0")", R"(lower="-6.3" upper="6.3")");

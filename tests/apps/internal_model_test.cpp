@@ -131,6 +131,7 @@ TEST_F(Predict, SaysWhatTheRunWillDo) {
   EXPECT_EQ(answer["joints"]["joint1"]["position_rad"].size(), 101U) << "the last cycle too";
   EXPECT_TRUE(answer["base"].is_null());
   EXPECT_TRUE(answer["faults"].empty());
+  EXPECT_TRUE(answer["unarchived_controllers"].empty());
   const Outcome table = to_run("predict --horizon 0.2 --every 10");
   EXPECT_EQ(table.status, 0) << table.err;
   EXPECT_NE(table.out.find("x real time"), std::string::npos) << table.out;
@@ -139,6 +140,27 @@ TEST_F(Predict, SaysWhatTheRunWillDo) {
     EXPECT_EQ(refused.status, 2) << wrong;
     EXPECT_EQ(error_lines(refused.err), 1) << refused.err;
   }
+  EXPECT_EQ(end(), 0);
+}
+
+/// A copy of it begins anew: `hangs` counts its cycles, and has no archive().
+TEST_F(Predict, NamesAControllerThatItCannotCopy) {
+  edit("hold.toml", "plugin = \"hold\"",
+       "plugin = \"" TANDEM_BINARY_DIR
+       "/tests/test_plugins/hangs.so\"\nname = \"counts\"\n"
+       "[controller.parameters]\nafter_cycles = 1_000_000_000");
+  const Outcome checked = tandem("check hold.toml");
+  EXPECT_EQ(checked.status, 0) << checked.err;
+  EXPECT_NE(checked.err.find("controller.counts: has members but no archive()"), std::string::npos)
+      << checked.err;
+  begin("");
+  const Outcome table = to_run("predict --horizon 0.1");
+  EXPECT_EQ(table.status, 0) << table.err;
+  EXPECT_NE(table.err.find("the controller 'counts' has no archive()"), std::string::npos)
+      << table.err;
+  const Outcome answer = to_run("predict --horizon 0.1 --json -");
+  EXPECT_EQ(nlohmann::json::parse(answer.out)["unarchived_controllers"],
+            nlohmann::json::array({"counts"}));
   EXPECT_EQ(end(), 0);
 }
 

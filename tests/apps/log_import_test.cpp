@@ -46,6 +46,33 @@ TEST_F(LogImport, GivesARunsTableBackAndAReport) {
   EXPECT_NE(info.out.find("imported_from"), std::string::npos) << info.out;
 }
 
+/// A sample in fifty is missing: each gap is one that is bridged, and all together are too many.
+TEST_F(LogImport, WarnsOfSamplesThatCameLate) {
+  const std::string command = "log import run.csv --robot robot.toml --map map.toml ";
+  const Outcome even = tandem(command + "-o even.mcap --json even.json");
+  ASSERT_EQ(even.status, 0) << even.err;
+  EXPECT_EQ(json("even.json")["series"][0]["late"], 0);
+  EXPECT_EQ(even.err.find("came late"), std::string::npos) << even.err;
+  std::istringstream whole(read_text(folder_ / "run.csv"));
+  std::string text;
+  std::size_t row = 0, rows = 0, left_out = 0;
+  for (std::string line; std::getline(whole, line); ++row) {
+    const bool missing = row > 1 && row % 50 == 0;
+    left_out += missing ? 1 : 0;
+    rows += missing || row == 0 ? 0 : 1;
+    if (!missing) text += line + "\n";
+  }
+  write_text(folder_ / "run.csv", text);
+  const Outcome late = tandem(command + "-o late.mcap --json late.json");
+  ASSERT_EQ(late.status, 0) << late.err;
+  EXPECT_EQ(json("late.json")["series"][0]["late"], left_out);
+  EXPECT_NE(late.err.find(std::to_string(left_out) + " of " + std::to_string(rows) +
+                          " samples came late, more than 1.5 periods of 1 ms after the one before, "
+                          "the worst after 2 ms"),
+            std::string::npos)
+      << late.err;
+}
+
 TEST_F(LogImport, RefusesWithStatus2AndWritesNothing) {
   edit("map.toml", "period_s = 0.001\n", "");
   const Outcome asked = tandem("log import run.csv --robot robot.toml --map map.toml -o a.mcap");

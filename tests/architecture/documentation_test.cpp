@@ -37,7 +37,7 @@ std::set<std::string> keys_read() {
   for (const char* file :
        {"hal/config/robot_config.cpp", "hal/config/robot_config_drives.cpp",
         "hal/config/robot_config_loops.cpp", "hal/config/robot_config_joints.cpp",
-        "hal/sim/scenario.cpp", "runtime/experiment.cpp", "runtime/estimation_options.cpp",
+        "hal/sim/scenario.cpp", "runtime/experiment_tables.cpp", "runtime/estimation_options.cpp",
         "runtime/teleoperation.cpp", "dds/config.cpp"}) {
     const std::string source = text_of(kRoot / file);
     const auto found = matches(source,

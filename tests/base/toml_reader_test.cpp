@@ -163,6 +163,30 @@ TEST(TomlReader, GivesEveryValueByItsKeyForComparing) {
   EXPECT_EQ(document.root().values(), expected);
 }
 
+/// As other errors do, which are found when the file has been read.
+TEST(TomlReader, CallsAnEntryOfAListByItsNameWhereItHasOneOfItsOwn) {
+  const TomlDocument document = parse(
+      "[[joint]]\nname = 'hip'\nx = 1\n[[joint.part]]\nname = 'a'\ny = 1\n[[joint]]\nx = 1\n"
+      "[[joint]]\nname = 'twin'\nx = 1\n[[joint]]\nname = 'twin'\nx = 1\n[[joint]]\nname = "
+      "\"\\u001b\"\nx = 1\n[[joint]]\nname = 3\nx = 1\n[[run]]\nplugin = 'hold'\nx = "
+      "1\n[[run]]\nplugin "
+      "= 'a/b.so'\nx = 1\n");
+  TomlTable root = document.root();
+  for (const char* list : {"joint", "run"}) {
+    for (TomlTable& entry : root.tables(list)) {
+      entry.error("x", "is wrong");
+      EXPECT_TRUE(entry.has_errors());
+      EXPECT_TRUE(entry.has_errors("x"));
+      for (TomlTable& part : entry.tables("part")) part.error("y", "is wrong", "");
+    }
+  }
+  std::vector<std::string> keys;
+  for (const Error& error : document.diagnostics()) keys.push_back(error.key);
+  EXPECT_EQ(keys, (std::vector<std::string>{"joint.hip.x", "joint.hip.part.a.y", "joint[1].x",
+                                            "joint[2].x", "joint[3].x", "joint[4].x", "joint[5].x",
+                                            "run.hold.x", "run[1].x"}));
+}
+
 TEST(TomlReader, AKeyRequiredOfAnOptionalTableIsAnErrorAtTheTableAbove) {
   const TomlDocument document = parse("x = 1\n[controller]\nplugin = 'squat'\n");
   TomlTable root = document.root();

@@ -2,6 +2,7 @@
 #include <Eigen/Geometry>
 #include <map>
 
+#include "hal/config/capabilities.hpp"
 #include "model/dynamics.hpp"
 #include "model/mechanism.hpp"
 #include "model/sites.hpp"
@@ -91,6 +92,42 @@ TEST_P(EveryRobot, HasDynamicJointStatesWhenTheyAreAskedFor) {
           EXPECT_EQ(values["temperature"], rig.state.temperature_C()[j]);
         }
       });
+}
+
+/// A drive of another maker, whose sheet has no object of a current, a voltage or a temperature.
+TEST(Topics, OfADriveThatDoesNotTellAValueHaveNone) {
+  Config config = own_config();
+  config.every[static_cast<std::size_t>(Topic::kDynamicJointStates)] = 5;
+  PublisherRig rig({.robot = "double_pendulum_interpolated", .config = config});
+  ASSERT_FALSE(hal::motor_feedback(rig.robot.config)[0].temperature);
+  publish_and_take<control_msgs::DynamicJointState>(
+      rig, "dynamic_joint_states", [&](const auto& message) {
+        const auto joint = list(message.interface_values)[0];
+        const auto names = texts(joint.interface_names);
+        for (std::size_t i = 0; i < names.size(); ++i) {
+          const bool of_motor = names[i] == "temperature" || names[i] == "voltage";
+          EXPECT_EQ(std::isnan(joint.values._buffer[i]), of_motor || names[i] == "current")
+              << names[i];
+        }
+      });
+}
+
+TEST(Topics, OfDiagnosticsSayWhatADriveDoesNotTell) {
+  Config config = own_config();
+  config.every[static_cast<std::size_t>(Topic::kDiagnostics)] = 5;
+  PublisherRig rig({.robot = "double_pendulum_interpolated", .config = config});
+  rig.state.temperature_C()[0] = 1e3;  // it is none, and cannot be too hot
+  publish_and_take<diagnostic_msgs::DiagnosticArray>(rig, "diagnostics", [&](const auto& message) {
+    std::size_t not_known = 0;
+    for (const auto& status : list(message.status)) {
+      if (std::string(status.name) != "tandem: joint " + rig.robot.config.joints[0].name) continue;
+      EXPECT_EQ(status.level, 0) << status.message;
+      for (const auto& value : list(status.values)) {
+        not_known += std::string(value.value) == "not known" ? 1 : 0;
+      }
+    }
+    EXPECT_EQ(not_known, 2U) << "temperature and current";
+  });
 }
 
 TEST_P(EveryRobot, HasTheWholeStateAndCommand) {

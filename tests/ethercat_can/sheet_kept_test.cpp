@@ -92,6 +92,16 @@ TEST(SheetKept, StopOptionsAreSetWhereTheyAreAskedFor) {
             "605A is set to 2, 605B is set to 1, 605C 0, 605D is set to 2, 605E is set to -3");
 }
 
+TEST(SheetKept, StopOptionsOfOurOwnBoardsAreToldToo) {
+  RobotConfig robot = robot_config();
+  EXPECT_TRUE(drive_facts(robot).empty()) << "docs/firmware.md has what they do";
+  robot.joints[1].stop_options = {.shutdown = 1, .disable = {}, .halt = {}, .fault = 0};
+  const auto facts = drive_facts(robot);
+  ASSERT_EQ(facts.size(), 1U);
+  EXPECT_EQ(facts[0].what, robot.joints[1].name);
+  EXPECT_EQ(facts[0].how, "605B is set to 1, 605E is set to 0");
+}
+
 /// A motor that turns 50 times as often as the joint, and tells its speed in rpm: 3000 rpm are
 /// 60 revolutions of the joint per minute.
 TEST(SheetKept, VelocitiesInRpmAreConverted) {

@@ -127,11 +127,12 @@ TEST(RobotConfigDefaults, CountNodeIdsUpOnEachBus) {
 }
 
 TEST(RobotConfigDefaults, HaveNoNodeIdAfterTheLast) {
-  expect_error(shortened("joints = [\"ankle\"]", "joints = [\"ankle\"], node_id = 126"),
-               "robots/leg.toml:34: board[0].node_id: no node id is left after 126 on bus 'left' "
-               "(set node_id, here or of the node before)\n"
-               "robots/leg.toml:52: sensor[0].node_id: no node id is left after 126 on bus 'left' "
-               "(set node_id, here or of the node before)");
+  expect_error(
+      shortened("joints = [\"ankle\"]", "joints = [\"ankle\"], node_id = 126"),
+      "robots/leg.toml:34: board.toe_board.node_id: no node id is left after 126 on bus 'left' "
+      "(set node_id, here or of the node before)\n"
+      "robots/leg.toml:52: sensor.imu.node_id: no node id is left after 126 on bus 'left' "
+      "(set node_id, here or of the node before)");
 }
 
 TEST(RobotConfigDefaults, AreCheckedOnceWhoeverUsesThem) {
@@ -153,8 +154,9 @@ TEST(RobotConfigDefaults, AreCheckedOnceWhoeverUsesThem) {
 }
 
 TEST(RobotConfigDefaults, ReportAListThatCannotBeReadOnce) {
-  expect_error(shortened("joints = [\"ankle\"]", "joints = \"ankle\""),
-               "robots/leg.toml:32: bus[0].boards[1].joints: must be a list of texts, not string");
+  expect_error(
+      shortened("joints = [\"ankle\"]", "joints = \"ankle\""),
+      "robots/leg.toml:32: bus.left.boards.foot_board.joints: must be a list of texts, not string");
   expect_error(shortened("names = [\"ankle\", \"hip\"]", "names = 3"),
                "robots/leg.toml:46: joint[1].names: must be a list of texts, not integer");
   expect_error(shortened("actuator = \"big\"\n", "actuator = \"bigger\"\n"),
@@ -188,9 +190,10 @@ TEST(RobotConfigDefaults, LetSensorsStandBelowTheirBus) {
   EXPECT_EQ(robot->sensors[1].node_id, inside.node_id + 1);
   const std::string key = "sensors = [{";
   text.insert(text.find(key) + key.size(), " bus = \"left\",");
-  expect_error(text,
-               "robots/leg.toml:34: bus[0].sensors[0].bus: this stands in the table of bus 'left' "
-               "already (remove this key)");
+  expect_error(
+      text,
+      "robots/leg.toml:34: bus.left.sensors.imu.bus: this stands in the table of bus 'left' "
+      "already (remove this key)");
 }
 
 TEST(RobotConfigDefaults, AreCheckedWhenNobodyUsesThem) {
@@ -204,9 +207,10 @@ TEST(RobotConfigDefaults, AreCheckedWhenNobodyUsesThem) {
 }
 
 TEST(RobotConfigDefaults, RefuseAJointThatNoTableDescribes) {
-  expect_error(shortened("\"hip\", \"knee\"]", "\"hip\", \"knee\", \"kneee\"]"),
-               "robots/leg.toml:31: bus[0].boards[0].joints: there is no [[joint]] 'kneee' "
-               "(did you mean 'knee'?)");
+  expect_error(
+      shortened("\"hip\", \"knee\"]", "\"hip\", \"knee\", \"kneee\"]"),
+      "robots/leg.toml:31: bus.left.boards.hip_board.joints: there is no [[joint]] 'kneee' "
+      "(did you mean 'knee'?)");
 }
 
 TEST(RobotConfigDefaults, RefuseAJointThatNoBoardHas) {
@@ -214,39 +218,43 @@ TEST(RobotConfigDefaults, RefuseAJointThatNoBoardHas) {
                "robots/leg.toml:46: joint[1].names: no board lists joint 'heel' "
                "(add it to the joints of its board)");
   expect_error(shortened("board = \"toe_board\"\n", ""),
-               "robots/leg.toml:35: board[0].name: no joint is on board 'toe_board' "
+               "robots/leg.toml:35: board.toe_board.name: no joint is on board 'toe_board' "
                "(list its joints, or remove the board)\n"
-               "robots/leg.toml:41: joint[0].board: this key is missing "
+               "robots/leg.toml:41: joint.toe.board: this key is missing "
                "(add it to the table, or the joint to the joints of its board)");
 }
 
 TEST(RobotConfigDefaults, RefuseAJointThatTwoBoardsListOrOneTwice) {
-  expect_error(shortened("[\"ankle\"]", "[\"ankle\", \"hip\"]"),
-               "robots/leg.toml:32: bus[0].boards[1].joints: the joint 'hip' is on two boards, "
-               "'hip_board' and 'foot_board' (remove one of the two)");
-  expect_error(shortened("[\"ankle\"]", "[\"ankle\", \"ankle\"]"),
-               "robots/leg.toml:32: bus[0].boards[1].joints: the joint 'ankle' is listed twice "
-               "(remove one of the two)");
+  expect_error(
+      shortened("[\"ankle\"]", "[\"ankle\", \"hip\"]"),
+      "robots/leg.toml:32: bus.left.boards.foot_board.joints: the joint 'hip' is on two boards, "
+      "'hip_board' and 'foot_board' (remove one of the two)");
+  expect_error(
+      shortened("[\"ankle\"]", "[\"ankle\", \"ankle\"]"),
+      "robots/leg.toml:32: bus.left.boards.foot_board.joints: the joint 'ankle' is listed twice "
+      "(remove one of the two)");
 }
 
 TEST(RobotConfigDefaults, RefuseABoardForAJointThatIsListed) {
   expect_error(shortened("name = \"knee\"\n", "name = \"knee\"\nboard = \"toe_board\"\n"),
-               "robots/leg.toml:50: joint[2].board: board 'hip_board' lists joint 'knee' already "
+               "robots/leg.toml:50: joint.knee.board: board 'hip_board' lists joint 'knee' already "
                "(remove this key)");
 }
 
 TEST(RobotConfigDefaults, RefuseAnActuatorWhoseGainsAreMissing) {
-  expect_error(shortened("[gains.stiff]\nposition = {kp = 300}\n", "[gains.stif]\n"),
-               "robots/leg.toml:43: joint[0].gains: there is no gains table 'stiff' "
-               "(did you mean 'stif'?)\n"
-               "robots/leg.toml:47: joint[2].gains: there is no [gains.stiff] for the actuator of "
-               "that name (add that table, or set gains)");
+  expect_error(
+      shortened("[gains.stiff]\nposition = {kp = 300}\n", "[gains.stif]\n"),
+      "robots/leg.toml:43: joint.toe.gains: there is no gains table 'stiff' "
+      "(did you mean 'stif'?)\n"
+      "robots/leg.toml:47: joint.knee.gains: there is no [gains.stiff] for the actuator of "
+      "that name (add that table, or set gains)");
 }
 
 TEST(RobotConfigDefaults, AskForANameOrNames) {
-  expect_error(shortened("name = \"knee\"\n", "name = \"knee\"\nnames = [\"knee\"]\n"),
-               "robots/leg.toml:50: joint[2].names: a joint's table has a name or names, not both "
-               "(remove one of the two)");
+  expect_error(
+      shortened("name = \"knee\"\n", "name = \"knee\"\nnames = [\"knee\"]\n"),
+      "robots/leg.toml:50: joint.knee.names: a joint's table has a name or names, not both "
+      "(remove one of the two)");
 }
 
 }  // namespace

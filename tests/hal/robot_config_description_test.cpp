@@ -124,8 +124,9 @@ TEST(RobotConfigNames, ReportAJointWithoutItsTableOnceWhateverNamesIt) {
   const std::size_t axis = text.find("node_id = 3\n");
   text.insert(axis, "joints = [\"hip\", \"knee\"]\n");
   text.erase(text.find("board = \"hip_board\"\n"), 20);
-  EXPECT_EQ(names_wrong(text),
-            ":33: board[0].joints: there is no [[joint]] 'knee' (add one with its actuator)\n");
+  EXPECT_EQ(
+      names_wrong(text),
+      ":33: board.hip_board.joints: there is no [[joint]] 'knee' (add one with its actuator)\n");
 }
 
 TEST(RobotConfigNames, SayWhyAPostureCannotPlaceAJoint) {

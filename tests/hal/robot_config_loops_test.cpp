@@ -48,7 +48,7 @@ TEST(RobotConfig, SaysWhatIsWrongWithALoop) {
   EXPECT_NE(loop("type = \"bal\"\nsites = [\"pin\", \"eye\"]").find("did you mean 'ball'?"),
             std::string::npos);
   EXPECT_NE(loop("type = \"ball\"\nsites = [\"pin\", \"eyes\"]")
-                .find("loop[0].sites: there is no [[site]] 'eyes' (did you mean 'eye'?)"),
+                .find("loop.hinge.sites: there is no [[site]] 'eyes' (did you mean 'eye'?)"),
             std::string::npos)
       << loop("type = \"ball\"\nsites = [\"pin\", \"eyes\"]");
   EXPECT_NE(loop("type = \"ball\"\nsites = [\"pin\"]").find("must name two [[site]]s, and names 1"),
@@ -67,7 +67,7 @@ TEST(RobotConfig, SaysWhatIsWrongWithALoop) {
                 .find("the joint 'knee' has a motor: it is a [[joint]] too"),
             std::string::npos);
   EXPECT_NE(errors_of(with_loop("[[passive]]\nname = \"slider\"\ndamping_Nms_rad = -0.1\n"))
-                .find("passive[0].damping_Nms_rad"),
+                .find("passive.slider.damping_Nms_rad"),
             std::string::npos);
 }
 

@@ -48,10 +48,10 @@ TEST_F(BoardScale, WithARatioThatIsNoneAsksForWhatItScales) {
     const auto robot = read();
     ASSERT_FALSE(robot) << value;
     ASSERT_EQ(robot.error().size(), 2U);
-    EXPECT_EQ(robot.error()[0].key, "joint[0].encoder_counts_per_rev");
+    EXPECT_EQ(robot.error()[0].key, "joint.elbow.encoder_counts_per_rev");
     EXPECT_NE(robot.error()[0].to_string().find(said), std::string::npos)
         << robot.error()[0].to_string();
-    EXPECT_EQ(robot.error()[1].key, "joint[0].rated_torque_Nm");
+    EXPECT_EQ(robot.error()[1].key, "joint.elbow.rated_torque_Nm");
     EXPECT_NE(robot.error()[1].to_string().find(said), std::string::npos);
   }
   sheet = whole;

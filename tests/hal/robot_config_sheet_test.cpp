@@ -112,7 +112,7 @@ TEST_F(BoardSheet, IsOnAnInterfaceThatLinuxCanHave) {
   EXPECT_EQ(refused(of("enp0s31f6")), "taken");
   const std::string error = refused(of("a_name_that_has_thirty_letters"));
   EXPECT_NE(error.find("is longer than 15 characters"), std::string::npos) << error;
-  EXPECT_NE(error.find("robot.toml:20: bus[0].interface: "), std::string::npos) << error;
+  EXPECT_NE(error.find("robot.toml:20: bus.arm.interface: "), std::string::npos) << error;
 }
 
 TEST_F(BoardSheet, LetsAJointBeHomed) {

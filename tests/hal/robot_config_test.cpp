@@ -268,18 +268,21 @@ TEST(RobotConfig, RefusesADataPhaseThatIsSlowerThanTheArbitration) {
   };
   EXPECT_EQ(errors_of(rates("500000")), "");
   const std::string errors = errors_of(rates("499999"));
-  EXPECT_NE(errors.find("bus[0].data_bitrate: is lower than the bitrate of the arbitration phase"),
-            std::string::npos)
+  EXPECT_NE(
+      errors.find("bus.left.data_bitrate: is lower than the bitrate of the arbitration phase"),
+      std::string::npos)
       << errors;
 }
 
 TEST(RobotConfig, RefusesReversedLimits) {
-  expect_error(with("max_position_rad = 1.0", "max_position_rad = -2.0"),
-               "robots/leg.toml:42: joint[0].min_position_rad: the position limits are reversed or "
-               "equal (min_position_rad must be less than max_position_rad)");
-  expect_error(with("max_position_rad = 1.0", "max_position_rad = -1.5"),
-               "robots/leg.toml:42: joint[0].min_position_rad: the position limits are reversed or "
-               "equal (min_position_rad must be less than max_position_rad)");
+  expect_error(
+      with("max_position_rad = 1.0", "max_position_rad = -2.0"),
+      "robots/leg.toml:42: joint.hip.min_position_rad: the position limits are reversed or "
+      "equal (min_position_rad must be less than max_position_rad)");
+  expect_error(
+      with("max_position_rad = 1.0", "max_position_rad = -1.5"),
+      "robots/leg.toml:42: joint.hip.min_position_rad: the position limits are reversed or "
+      "equal (min_position_rad must be less than max_position_rad)");
 }
 
 TEST(RobotConfig, RefusesEncodersWithoutCounts) {
@@ -287,23 +290,23 @@ TEST(RobotConfig, RefusesEncodersWithoutCounts) {
                "robots/leg.toml:35: joint_defaults.encoder_counts_per_rev: 20 is out of range "
                "(must be at least 100 and at most 1e+12)");
   expect_error(with("\nencoder_counts_per_rev = 65536", ""),
-               "robots/leg.toml:36: joint[0].encoder_counts_per_rev: this key is missing "
+               "robots/leg.toml:36: joint.hip.encoder_counts_per_rev: this key is missing "
                "(add it to the table, or to [joint_defaults] for all)\n"
-               "robots/leg.toml:43: joint[1].encoder_counts_per_rev: this key is missing "
+               "robots/leg.toml:43: joint.knee.encoder_counts_per_rev: this key is missing "
                "(add it to the table, or to [joint_defaults] for all)");
 }
 
 TEST(RobotConfig, RefusesNodeIdsOffTheBus) {
   for (const std::string id : {"0", "127", "128"}) {  // 127 is the master's
-    expect_error(
-        with("node_id = 3", "node_id = " + id),
-        "robots/leg.toml:33: board[0].node_id: " + id + " is out of range (must be 1 to 126)");
+    expect_error(with("node_id = 3", "node_id = " + id),
+                 "robots/leg.toml:33: board.hip_board.node_id: " + id +
+                     " is out of range (must be 1 to 126)");
   }
 }
 
 TEST(RobotConfig, RefusesASensorWithABoardsNodeId) {
   expect_error(with("node_id = 10", "node_id = 3"),
-               "robots/leg.toml:56: sensor[0].node_id: node id 3 is taken on bus 'left' "
+               "robots/leg.toml:56: sensor.foot_ft.node_id: node id 3 is taken on bus 'left' "
                "(every board and sensor of a bus needs an id of its own)");
 }
 
@@ -319,13 +322,13 @@ TEST(RobotConfig, RefusesAJointOnTwoBoards) {
 
 TEST(RobotConfig, RefusesAnAxisTwice) {
   expect_error(with("axis = 1", "axis = 0"),
-               "robots/leg.toml:47: joint[1].axis: axis 0 of board 'hip_board' already drives "
+               "robots/leg.toml:47: joint.knee.axis: axis 0 of board 'hip_board' already drives "
                "joint 'hip' (give each joint of a board an axis of its own)");
 }
 
 TEST(RobotConfig, RefusesAGapInABoardsAxes) {
   expect_error(with("axis = 1", "axis = 3"),
-               "robots/leg.toml:31: board[0].name: the axes of board 'hip_board' have a gap "
+               "robots/leg.toml:31: board.hip_board.name: the axes of board 'hip_board' have a gap "
                "(number them from 0 without a gap)");
 }
 
@@ -339,9 +342,9 @@ TEST(RobotConfig, SuggestsTheNearestForAnUnknownReference) {
   const std::string text = with("axis = 1\nactuator = \"big\"\ngains = \"big\"",
                                 "axis = 1\nactuator = \"bigg\"\ngains = \"bg\"");
   EXPECT_EQ(errors_of(text),
-            "robots/leg.toml:48: joint[1].actuator: there is no actuator 'bigg' "
+            "robots/leg.toml:48: joint.knee.actuator: there is no actuator 'bigg' "
             "(did you mean 'big'?)\n"
-            "robots/leg.toml:49: joint[1].gains: there is no gains table 'bg' "
+            "robots/leg.toml:49: joint.knee.gains: there is no gains table 'bg' "
             "(did you mean 'big'?)\n");
 }
 
@@ -382,10 +385,10 @@ TEST(RobotConfig, RefusesNoiseOfTheWrongLength) {
 
 TEST(RobotConfig, RefusesALockedJointThatIsDriven) {
   expect_error(with("toe = 0.1", "hip = 0.1"),
-               "robots/leg.toml:38: joint[0].name: the joint 'hip' is locked in [model.lock] "
+               "robots/leg.toml:38: joint.hip.name: the joint 'hip' is locked in [model.lock] "
                "(remove it here, or the lock)");
   expect_error(with("toe = 0.1", "knee = 0.1"),
-               "robots/leg.toml:45: joint[1].name: the joint 'knee' is locked in [model.lock] "
+               "robots/leg.toml:45: joint.knee.name: the joint 'knee' is locked in [model.lock] "
                "(remove it here, or the lock)");
   expect_error(with("knee = 0.2", "toe = 0.2"),
                "robots/leg.toml:72: posture.home.toe: the joint 'toe' is locked in [model.lock] "
@@ -424,20 +427,23 @@ TEST(RobotConfig, RefusesAnExperimentInItsPlace) {
 TEST(RobotConfig, RefusesNamesThatCannotStandInFilesOrTopics) {
   for (const std::string name : {"a/1", "a b", ".a", "\\u00e4"}) {
     const std::string quoted = '"' + name + '"';
-    for (const auto& [from, place] : {std::pair("\"sole\"\nlink", ":8: site[0].name: '"),
-                                      std::pair("\"left\"\ninterface", ":28: bus[0].name: '"),
-                                      std::pair("\"hip_board\"\nbus", ":31: board[0].name: '"),
-                                      std::pair("\"foot_ft\"\ntype", ":53: sensor[0].name: '")}) {
+    const std::string shown = name.front() == '\\' ? "\u00e4" : name;
+    for (const auto& [from, place] :
+         {std::pair("\"sole\"\nlink", ":8: site."), std::pair("\"left\"\ninterface", ":28: bus."),
+          std::pair("\"hip_board\"\nbus", ":31: board."),
+          std::pair("\"foot_ft\"\ntype", ":53: sensor.")}) {
       const std::string old = from;
       const std::string text = with(old, quoted + old.substr(old.find('\n')));
-      EXPECT_NE(errors_of(text).find("robots/leg.toml" + std::string(place)), std::string::npos)
+      const std::string key = place + shown + ".name: '" + shown + "'";
+      EXPECT_NE(errors_of(text).find("robots/leg.toml" + key), std::string::npos)
           << name << " " << place << "\n"
           << errors_of(text);
     }
   }
-  expect_error(with("\"foot_ft\"", "\"foot-ft\""),
-               "robots/leg.toml:53: sensor[0].name: 'foot-ft' has other characters than letters, "
-               "digits and _, but it becomes part of a topic (use letters, digits and _)");
+  expect_error(
+      with("\"foot_ft\"", "\"foot-ft\""),
+      "robots/leg.toml:53: sensor.foot-ft.name: 'foot-ft' has other characters than letters, "
+      "digits and _, but it becomes part of a topic (use letters, digits and _)");
 }
 
 TEST(RobotConfig, RefusesAHeightOfAFixedBase) {

@@ -125,6 +125,27 @@ TEST(Urdf, OrdersChildrenByTheirJointsNames) {
   EXPECT_EQ(model->tree.joints[1].axis, Eigen::Vector3d(1, 0, 0)) << "URDF's default axis";
 }
 
+/// XML allows them wherever an element may be. Lines of errors stay those of the file.
+TEST(Urdf, PassesOverProcessingInstructionsAndComments) {
+  const std::string robot = R"(<?xml version="1.0"?>
+<?xml-stylesheet href="a>b"?>
+<robot name="r"><?hint one?><!-- <?not one -->
+  <link name="base"><inertial><?keep x="<mass/>"
+    y?><!-- a <b> --><mass value="2"/><?keep?><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
+  </inertial></link></robot><?end?>)";
+  const auto model = parse_urdf(robot, "r.urdf", {});
+  ASSERT_TRUE(model.has_value()) << to_text(model.error());
+  EXPECT_EQ(model->tree.links[0].inertia.mass_kg, 2.0);
+  std::string wrong = robot;
+  wrong.replace(wrong.find("value=\"2\""), 9, "value=\"x\"");
+  EXPECT_NE(errors_of(wrong).find(":5: "), std::string::npos) << errors_of(wrong);
+  for (const char* open : {"<?cut", "<?xml version=\"1.0\"?>", "<?>"}) {
+    std::string bad = robot;
+    bad.replace(bad.find("<?keep?>"), 8, open);
+    EXPECT_NE(errors_of(bad), "") << open;
+  }
+}
+
 // --- what cannot be read ---
 
 TEST(Urdf, NamesAMissingFile) {

@@ -1,7 +1,9 @@
 #include "rt/stop_signal.hpp"
 
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <thread>
 
 namespace tandem::rt {
 namespace {
@@ -18,11 +20,27 @@ TEST(StopSignal, TurnsSigtermAndSigintIntoAFlag) {
   EXPECT_FALSE(stop_requested());
 }
 
+/// Until a signal is no more the same one.
+void wait_for_another() {
+  std::this_thread::sleep_for(std::chrono::nanoseconds(kOneSignal_ns + 10'000'000));
+}
+
+TEST(StopSignal, TakesTwoInQuickSuccessionForOne) {
+  EXPECT_EXIT(
+      {
+        install_stop_signals();
+        for (int i = 0; i < 3; ++i) std::raise(SIGINT);
+        std::_Exit(stop_requested() ? 5 : 6);
+      },
+      testing::ExitedWithCode(5), "");
+}
+
 TEST(StopSignal, LetsASecondSignalEndAHungProgram) {
   EXPECT_EXIT(
       {
         install_stop_signals();
         std::raise(SIGTERM);
+        wait_for_another();
         std::raise(SIGTERM);
       },
       testing::KilledBySignal(SIGTERM), "");
@@ -37,6 +55,7 @@ TEST(StopSignal, GivesASecondSignalToWhomTheFirstBelonged) {
         install_stop_signals();
         install_stop_signals();
         std::raise(SIGINT);
+        wait_for_another();
         std::raise(SIGINT);
       },
       testing::ExitedWithCode(7), "");

@@ -47,6 +47,7 @@ TEST(ControllerLoad, RefusesWhatIsWrongWhileTheRunGoesOn) {
   EXPECT_FALSE(load("", {0}));
   EXPECT_NE(load("a\033[2Jb", {0}).error().message.find("has control characters"),
             std::string::npos);
+  EXPECT_NE(load("a,b", {0}).error().message.find("has a comma"), std::string::npos);
   EXPECT_NE(load(std::string(65, 'a'), {0}).error().message.find("longer than 64"),
             std::string::npos);
   const auto none = run.services().load(

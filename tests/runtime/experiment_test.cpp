@@ -214,7 +214,7 @@ TEST(Experiment, LeavesParametersToTheirController) {
   parameters.finish();
   ASSERT_EQ(e->document.diagnostics().size(), 1u);
   EXPECT_EQ(e->document.diagnostics()[0].to_string(),
-            "arm/x.toml:7: controller[0].parameters.stiffness: unknown key "
+            "arm/x.toml:7: controller.hold.parameters.stiffness: unknown key "
             "(did you mean 'stiffnes'?)");
 }
 
@@ -379,6 +379,12 @@ TEST(Experiment, RefusesAControllersNameThatATerminalMightObey) {
   EXPECT_NE(errors_of(std::string(kExperiment) +
                       "[[controller]]\nplugin = 'hold'\nname = \"a\\u001b[2J\"\n")
                 .find("the controller's name has control characters"),
+            std::string::npos);
+}
+
+TEST(Experiment, RefusesAControllersNameThatNoListCanHold) {
+  EXPECT_NE(errors_of(std::string(kExperiment) + "[[controller]]\nplugin = 'hold'\nname = 'a,b'\n")
+                .find("the controller's name has a comma"),
             std::string::npos);
 }
 

@@ -1,0 +1,14 @@
+// What the controllers of an experiment plan for a time after its end.
+// Layer: apps/run.  Thread: main.
+#pragma once
+
+#include "apps/run/composition.hpp"
+#include "base/result.hpp"
+
+namespace tandem::apps {
+
+/// A warning of each active controller that plans something for later than the run's end, with the
+/// key, both times and how much else is late.
+[[nodiscard]] Diagnostics late_plans(const Composition& composition);
+
+}  // namespace tandem::apps

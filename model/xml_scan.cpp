@@ -1,0 +1,52 @@
+#include "model/xml_scan.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tandem::model {
+
+std::optional<std::size_t> behind_no_tag(std::string_view text, std::size_t at) {
+  const std::pair<std::string_view, std::string_view> kinds[] = {
+      {"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}, {"<!", ">"}};
+  for (const auto& [begins, ends] : kinds)
+    if (text.substr(at).starts_with(begins)) {
+      const std::size_t end = text.find(ends, at + begins.size());
+      return end == std::string_view::npos ? text.size() : end + ends.size();
+    }
+  return {};
+}
+
+std::size_t behind_tag(std::string_view text, std::size_t at) {
+  char quote = '\0';
+  for (; at < text.size(); ++at) {
+    const char c = text[at];
+    if (quote != '\0') {
+      quote = c == quote ? '\0' : quote;
+    } else if (c == '"' || c == '\'') {
+      quote = c;
+    } else if (c == '>') {
+      return at + 1;
+    }
+  }
+  return at;
+}
+
+std::string without_instructions(std::string_view text) {
+  std::string out(text);
+  for (std::size_t at = text.find('<'); at != std::string_view::npos; at = text.find('<', at)) {
+    const std::size_t end = behind_no_tag(text, at).value_or(behind_tag(text, at));
+    const std::string_view one = text.substr(at, end - at);
+    const bool declares = one.starts_with("<?xml") && one.size() > 5 &&
+                          std::string_view(" \t\r\n?").find(one[5]) != std::string_view::npos;
+    if (one.starts_with("<?") && one.ends_with("?>") && one.size() > 3 && !declares) {
+      std::replace_if(
+          out.begin() + static_cast<std::ptrdiff_t>(at),
+          out.begin() + static_cast<std::ptrdiff_t>(end),
+          [](char c) { return c != '\n' && c != '\r'; }, ' ');
+    }
+    at = end;
+  }
+  return out;
+}
+
+}  // namespace tandem::model

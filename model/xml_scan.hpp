@@ -1,0 +1,24 @@
+// Where a tag, comment or processing instruction of an XML text ends, by its bytes.
+// Layer: model.  Thread: any.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace tandem::model {
+
+/// Behind the comment, CDATA section, declaration or processing instruction that begins at `at`
+/// (behind the text where it has no end); nothing if it is a tag.
+[[nodiscard]] std::optional<std::size_t> behind_no_tag(std::string_view text, std::size_t at);
+
+/// Behind the `>` of the tag that begins at `at`, which may have others in quotes.
+[[nodiscard]] std::size_t behind_tag(std::string_view text, std::size_t at);
+
+/// The text with blanks for its processing instructions (<?target …?>), which XML allows wherever an
+/// element may be and tinyxml2 only before the first. Lines stay where they are. What calls itself
+/// <?xml …?> stays: it is an error but at the beginning. So does one without an end.
+[[nodiscard]] std::string without_instructions(std::string_view text);
+
+}  // namespace tandem::model
