@@ -72,6 +72,7 @@ std::optional<OpenFolder> open_folder(fs::path folder, std::optional<uid_t> part
     if (std::string problem = problem_of(found, partner); !problem.empty()) {
       return OpenFolder{folder, std::move(problem), found.st_mode & 07777};
     }
+    if (folder == folder.parent_path()) break;  // without /proc nobody says where the program is
   }
   return std::nullopt;
 }

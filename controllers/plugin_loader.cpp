@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <sstream>
 
@@ -90,15 +89,27 @@ std::string built_for(std::uint32_t abi) {
          std::to_string(kControllerInterface);
 }
 
+/// What the macro TANDEM_CONTROLLER fills in, and an entry of its own may have forgotten.
+Status check_entry(const ControllerPlugin& plugin, const std::string& name,
+                   const std::string& file) {
+  const char* missing = plugin.name == nullptr     ? "name"
+                        : plugin.doc == nullptr    ? "doc"
+                        : plugin.create == nullptr ? "create"
+                                                   : nullptr;
+  if (missing == nullptr) return {};
+  return refuse(name, file, std::string("its entry point leaves `") + missing + "` null",
+                "end its source with TANDEM_CONTROLLER(Class, \"name\", \"One line.\")");
+}
+
 /// A library of another ABI is only asked for its entry's first two members, which never move.
 Status check(const ControllerPlugin& plugin, const std::string& name, const std::string& file) {
   if (plugin.abi != kControllerAbi) {
     return refuse(name, file, built_for(plugin.abi), "build it again with this version's headers");
   }
-  if (std::strcmp(plugin.compiler, __VERSION__) != 0) {
+  const std::string compiler = plugin.compiler == nullptr ? "" : plugin.compiler;
+  if (compiler != __VERSION__) {
     return refuse(name, file,
-                  "was built by compiler '" + std::string(plugin.compiler) +
-                      "', this program by '" + __VERSION__ + "'",
+                  "was built by compiler '" + compiler + "', this program by '" + __VERSION__ + "'",
                   "build it again with the same compiler");
   }
   return {};
@@ -161,9 +172,16 @@ Status LoadedController::open(const std::string& name) {
                   "end its source with TANDEM_CONTROLLER(Class, \"name\", \"One line.\")");
   }
   plugin_ = entry();
+  if (plugin_ == nullptr) {
+    return refuse(name, path_, "its entry point " + std::string(kEntry) + "() returns null",
+                  "end its source with TANDEM_CONTROLLER(Class, \"name\", \"One line.\")");
+  }
   if (Status ok = check(*plugin_, name, path_); !ok) return ok;
+  if (Status ok = check_entry(*plugin_, name, path_); !ok) return ok;
   controller_.reset(plugin_->create());
-  return {};
+  if (controller_ != nullptr) return {};
+  return refuse(name, path_, "its create() returns no controller (null)",
+                "return a new object; report what is wrong from configure()");
 }
 
 }  // namespace tandem

@@ -46,7 +46,8 @@ class LoadedController {
 ///
 /// Errors: there is no such file (with the folders searched and the nearest name); others may
 /// change it (check_trusted_code()), found out before it is opened; the system cannot load it; it
-/// lacks tandem_controller_plugin(); it was built for another plugin ABI, or by another compiler;
+/// lacks tandem_controller_plugin(), or that leaves something null, or its create() makes no
+/// controller; it was built for another plugin ABI, or by another compiler;
 /// it throws. A library that calls exit() ends the process with status 2. `key` of the error is
 /// `name`.
 [[nodiscard]] Result<LoadedController> load_controller(const std::string& name,

@@ -7,14 +7,9 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
-#include <csignal>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <optional>
 #include <string_view>
 
 #include "apps/clients/dds_client.hpp"
@@ -67,35 +62,6 @@ Status check_listener(int descriptor, const std::string& path) {
               "name your own run's socket with --socket, or stop the robot by its own means");
 }
 
-/// The process that "<kind>-<pid>.sock" names.
-std::optional<pid_t> owner_of(const std::string& name) {
-  pid_t pid = 0;
-  const char* end = name.data() + name.size();
-  const auto parsed = std::from_chars(name.data() + name.rfind('-') + 1, end, pid);
-  const bool named = parsed.ec == std::errc() && std::string_view(parsed.ptr, end) == ".sock";
-  return named && pid > 0 ? std::optional(pid) : std::nullopt;
-}
-
-bool owner_is_dead(const std::string& name) {
-  const std::optional<pid_t> pid = owner_of(name);
-  return pid && ::kill(*pid, 0) != 0 && errno == ESRCH;
-}
-
-/// "tandem run squat.toml": its arguments, without its program's folder. Empty: nobody says.
-std::string command_line_of(pid_t pid) {
-  constexpr std::size_t kMost = 120;
-  std::ifstream file(fmt::format("/proc/{}/cmdline", pid), std::ios::binary);
-  std::string words{std::istreambuf_iterator<char>(file), {}};
-  while (!words.empty() && words.back() == '\0') words.pop_back();
-  const std::size_t program = words.substr(0, words.find('\0')).rfind('/');
-  if (program != std::string::npos) words.erase(0, program + 1);
-  for (char& c : words) {
-    if (c == '\0' || c == '\n') c = ' ';
-  }
-  if (words.size() > kMost) words = words.substr(0, kMost) + "...";
-  return words;
-}
-
 Error no_answer(std::chrono::milliseconds patience) {
   return {.message = fmt::format("no answer within {:g} s", patience / 1.0s),
           .hint = patience == kStopAnswer
@@ -134,9 +100,6 @@ Result<std::string> exchange(int fd, std::string out, std::chrono::milliseconds 
   return in;
 }
 
-/// "tandem run"
-std::string name_of(const std::string& kind) { return kind.empty() ? "tandem" : "tandem " + kind; }
-
 /// A process that ends in order removes its socket; one that is killed leaves it.
 bool has_ended(const std::string& path) {
   std::error_code error;
@@ -169,58 +132,6 @@ class SocketClient : public ControlClient {
 
 std::chrono::milliseconds answer_time(const Json& question) {
   return question.value("do", "") == "estop" ? kStopAnswer : 5000ms;
-}
-
-std::vector<std::string> running_control_sockets(const std::string& kind) {
-  std::vector<std::string> found;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(control_folder(), error)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.ends_with(".sock") || !entry.is_socket(error)) continue;
-    if (!kind.empty() && !name.starts_with(kind + "-")) continue;
-    if (control_socket_alive(entry.path().string())) {
-      found.push_back(entry.path().string());
-    } else if (owner_is_dead(name)) {
-      ::unlink(entry.path().c_str());
-    }
-  }
-  std::ranges::sort(found);
-  return found;
-}
-
-std::string process_of(const std::string& path) {
-  const std::optional<pid_t> pid = owner_of(std::filesystem::path(path).filename().string());
-  if (!pid) return path;
-  const std::string command = command_line_of(*pid);
-  if (command.empty()) return fmt::format("process {}", *pid);
-  return fmt::format("{} (process {})", command, *pid);
-}
-
-Result<std::vector<std::string>> find_control_sockets(const std::string& kind) {
-  std::error_code error;
-  if (std::filesystem::exists(std::filesystem::symlink_status(control_folder(), error))) {
-    if (const Status ours = check_private_folder(control_folder()); !ours) {
-      return std::unexpected(ours.error());
-    }
-  }
-  std::vector<std::string> running = running_control_sockets(kind);
-  if (!running.empty()) return running;
-  return fail(fmt::format("no running `{}` in {}", name_of(kind), control_folder()),
-              "start one, or name its socket with --socket");
-}
-
-Result<std::string> find_control_socket(const std::string& path, const std::string& kind) {
-  if (!path.empty()) return path;
-  const Result<std::vector<std::string>> running = find_control_sockets(kind);
-  if (!running) return std::unexpected(running.error());
-  if (running->size() == 1) return running->front();
-  std::string list;
-  for (const std::string& one : *running) {
-    list += fmt::format("\n  --socket {}  {}", one, process_of(one));
-  }
-  return fail(
-      fmt::format("{} running `{}`, and none of them was asked", running->size(), name_of(kind)),
-      "say which:" + list);
 }
 
 Result<Json> ask(const std::string& path, const Json& question) {

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "apps/clients/control_search.hpp"
 #include "apps/command_line/control_target.hpp"
 #include "apps/text/console.hpp"
 #include "base/result.hpp"
@@ -16,23 +17,6 @@ namespace tandem::apps {
 
 /// How long ask() waits for the answer to `question`: kStopAnswer, or 5 s.
 [[nodiscard]] std::chrono::milliseconds answer_time(const Json& question);
-
-/// The sockets of this user's running processes, in the order of their names. Files that dead
-/// processes left are removed.
-/// @param kind  "run", "emulate"; empty: any
-[[nodiscard]] std::vector<std::string> running_control_sockets(const std::string& kind);
-
-/// The same. Errors: others may change the folder; none runs.
-[[nodiscard]] Result<std::vector<std::string>> find_control_sockets(const std::string& kind);
-
-/// Of a socket of running_control_sockets(): the command line and the number of its process,
-/// "tandem run squat.toml (process 17566)"; `path` when it does not name the process.
-[[nodiscard]] std::string process_of(const std::string& path);
-
-/// The one that is meant: `path` when it is not empty, else the only one of that kind.
-/// Errors: none runs; several do (they are listed, with process_of()).
-[[nodiscard]] Result<std::string> find_control_socket(const std::string& path,
-                                                      const std::string& kind);
 
 /// Sends `question` and waits for its answer.
 /// Errors: no process listens; no answer within answer_time(); {"ok": false}, with its error and

@@ -1,5 +1,5 @@
 // tandem fault show|reset and tandem estop: what they ask a running process, and its answer.
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <chrono>
 #include <future>
@@ -143,7 +143,7 @@ Exit reset(const FaultOptions& options) {
   return nothing || kept || (done && !again) ? Exit::kDone : Exit::kFault;
 }
 
-/// @param who  of several runs: whose answer it is
+/// @param who  whose answer it is; empty: of the one that was named
 Exit tell_stop(const Result<Json>& answer, const Json& question, const std::string& who) {
   if (!answer) {
     Error error = answer.error();
@@ -160,16 +160,33 @@ Exit tell_stop(const Result<Json>& answer, const Json& question, const std::stri
   return Exit::kDone;
 }
 
+/// Who looks for a run to stop needs no advice to start one.
+Error nobody_to_stop(const ControlSearch& search) {
+  return {.message = fmt::format("no run was stopped: none of this user was found in {}",
+                                 fmt::join(search.looked, ", ")),
+          .hint =
+              "if the robot moves, press its emergency stop or cut its power. Runs of other "
+              "users, in other containers and with --no-socket are not found: `tandem estop` "
+              "as that user or there, --socket PATH, --dds, or kill -USR1 PID",
+          .file = {},
+          .key = {}};
+}
+
 /// Stops every run of this user on this machine. All are asked at once: one that hangs must not
 /// delay the others.
 Exit stop_all(const Json& question) {
-  const Result<std::vector<std::string>> runs = find_control_sockets("run");
-  if (!runs) return tell_stop(std::unexpected(runs.error()), question, {});
-  const bool one = runs->size() == 1;
+  const ControlSearch search = search_control_sockets("run");
+  for (const Error& refused : search.refused) {
+    fmt::print(stderr, "warning: not looked for runs there: {}\n", refused.message);
+  }
+  if (search.sockets.empty()) {
+    print_errors({nobody_to_stop(search)});
+    return Exit::kFault;
+  }
   std::vector<std::string> who;  // while they run
-  for (const std::string& socket : *runs) who.push_back(one ? "" : process_of(socket));
+  for (const std::string& socket : search.sockets) who.push_back(process_of(socket));
   std::vector<std::future<Result<Json>>> answers;
-  for (const std::string& socket : *runs) {
+  for (const std::string& socket : search.sockets) {
     answers.push_back(std::async(std::launch::async, [&] { return ask(socket, question); }));
   }
   Exit exit = Exit::kDone;

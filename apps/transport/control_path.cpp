@@ -5,22 +5,63 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <sstream>
 
 #include "base/trusted_code.hpp"
 
 namespace tandem::apps {
+namespace {
+
+/// Of the user, in a place that every process of theirs has.
+std::string temporary_folder() { return fmt::format("/tmp/tandem-{}", ::geteuid()); }
+
+/// Null: it is not set.
+const char* only_folder() {
+  const char* only = std::getenv("TANDEM_SOCKETS");
+  return only != nullptr && *only != '\0' ? only : nullptr;
+}
+
+}  // namespace
+
+bool one_control_folder() { return only_folder() != nullptr; }
 
 std::string control_folder() {
+  if (const char* only = only_folder()) return std::filesystem::absolute(only).string();
   const char* runtime = std::getenv("XDG_RUNTIME_DIR");
   std::error_code error;
   if (runtime != nullptr && std::filesystem::is_directory(runtime, error)) {
     return (std::filesystem::path(runtime) / "tandem").string();
   }
-  return fmt::format("/tmp/tandem-{}", ::geteuid());
+  return temporary_folder();
+}
+
+std::vector<std::string> control_folders() {
+  std::vector<std::string> folders{control_folder()};
+  if (one_control_folder()) return folders;
+  for (const std::string& other : {fmt::format("/run/user/{}/tandem", ::geteuid()),
+                                   temporary_folder(), std::string("/run/tandem/tandem")}) {
+    if (std::ranges::find(folders, other) == folders.end()) folders.push_back(other);
+  }
+  return folders;
+}
+
+std::vector<std::string> listening_paths(const std::string& table) {
+  constexpr unsigned long kAccepts = 0x10000;  // __SO_ACCEPTCON: listen() was called
+  std::vector<std::string> paths;
+  std::istringstream lines(table);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream fields(line);
+    std::string number, references, protocol, flags, type, state, inode, path;
+    fields >> number >> references >> protocol >> flags >> type >> state >> inode >> std::ws;
+    if (!fields || !std::getline(fields, path) || !path.starts_with('/')) continue;
+    if ((std::strtoul(flags.c_str(), nullptr, 16) & kAccepts) != 0) paths.push_back(path);
+  }
+  return paths;
 }
 
 Status check_private_folder(const std::string& folder) {

@@ -8,14 +8,25 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/result.hpp"
 
 namespace tandem::apps {
 
-/// The folder of every socket of this user: $XDG_RUNTIME_DIR/tandem, or /tmp/tandem-<uid> where
-/// there is no such folder.
+/// The folder of this process' socket: $TANDEM_SOCKETS, else $XDG_RUNTIME_DIR/tandem, or
+/// /tmp/tandem-<uid> where there is no such folder.
 [[nodiscard]] std::string control_folder();
+/// Where another process of this user can have its socket, whose environment may be another one:
+/// control_folder() first, then /run/user/<uid>/tandem, /tmp/tandem-<uid> and that of
+/// scripts/tandem-run.service. Each once, as far as the names tell. With $TANDEM_SOCKETS there is
+/// no other than that.
+[[nodiscard]] std::vector<std::string> control_folders();
+/// Whether $TANDEM_SOCKETS keeps the search to one folder.
+[[nodiscard]] bool one_control_folder();
+/// The paths of what listens in a table like /proc/net/unix, of which another process' environment
+/// may have made the folder. Only absolute ones.
+[[nodiscard]] std::vector<std::string> listening_paths(const std::string& table);
 /// Whether `folder` is a folder that this user alone may change: in any other one somebody else may
 /// have put a socket of theirs. Errors: it is not, with its owner; it is not there.
 [[nodiscard]] Status check_private_folder(const std::string& folder);

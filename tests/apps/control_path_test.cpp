@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -84,6 +85,70 @@ TEST_F(Socket, IsFoundWhenItIsTheOnlyOne) {
   ASSERT_FALSE(both.has_value());
   EXPECT_NE(both.error().message.find("2 running"), std::string::npos);
   EXPECT_NE(both.error().hint.find(other->path()), std::string::npos);
+}
+
+/// The environment of another shell, service or cron job.
+struct OtherSurroundings : Socket {
+  OtherSurroundings() {
+    ::unsetenv("TANDEM_SOCKETS");
+    in("one");
+  }
+  ~OtherSurroundings() override { ::unsetenv("XDG_RUNTIME_DIR"); }
+  void in(const std::string& name) const {
+    std::filesystem::create_directory(folder + "/" + name);
+    ::setenv("XDG_RUNTIME_DIR", (folder + "/" + name).c_str(), 1);
+  }
+  static bool finds(const std::string& socket) {
+    const auto found = find_control_sockets("run");
+    return found && std::ranges::find(*found, socket) != found->end();
+  }
+};
+
+// `tandem estop` said that there was nobody, or stopped one run and returned 0, while another run
+// of the same user moved its robot.
+TEST_F(OtherSurroundings, DoNotHideARun) {
+  const auto first = open(default_control_path("run"));
+  EXPECT_EQ(first->path(), folder + "/one/tandem/run-" + std::to_string(::getpid()) + ".sock");
+  EXPECT_TRUE(finds(first->path()));
+  in("two");
+  EXPECT_TRUE(finds(first->path()));
+  ::unsetenv("XDG_RUNTIME_DIR");
+  EXPECT_TRUE(finds(first->path()));
+  ::setenv("XDG_RUNTIME_DIR", (folder + "/none").c_str(), 1);
+  EXPECT_TRUE(finds(first->path()));
+}
+
+// Also where there is no /proc.
+TEST_F(OtherSurroundings, AreLookedThroughInEveryUsualPlace) {
+  const std::string user = std::to_string(::geteuid());
+  const std::vector<std::string> all{folder + "/one/tandem", "/run/user/" + user + "/tandem",
+                                     "/tmp/tandem-" + user, "/run/tandem/tandem"};
+  EXPECT_EQ(control_folders(), all);
+  ::unsetenv("XDG_RUNTIME_DIR");
+  EXPECT_EQ(control_folders().front(), all[2]);
+  EXPECT_EQ(control_folders().size(), 3U) << "each once";
+}
+
+TEST_F(OtherSurroundings, GiveTheSameSocketTwoPathsAndItIsAskedOnce) {
+  const auto first = open(default_control_path("run"));
+  std::filesystem::create_directory_symlink(folder + "/one", folder + "/link");
+  ::setenv("XDG_RUNTIME_DIR", (folder + "/link").c_str(), 1);
+  const auto found = find_control_sockets("run").value_or(std::vector<std::string>{});
+  EXPECT_EQ(std::ranges::count_if(
+                found, [this](const std::string& path) { return path.starts_with(folder); }),
+            1);
+}
+
+TEST(ListeningPaths, AreThoseOfSocketsThatAccept) {
+  const std::string table =
+      "Num       RefCount Protocol Flags    Type St Inode Path\n"
+      "0000000000000000: 00000002 00000000 00010000 0001 01 17 /run/a b/run-1.sock\n"
+      "0000000000000000: 00000003 00000000 00000000 0001 03 18 /run/connected.sock\n"
+      "0000000000000000: 00000002 00000000 00010000 0001 01 19 @abstract\n"
+      "0000000000000000: 00000002 00000000 00010000 0001 01 20 relative.sock\n"
+      "0000000000000000: 00000002 00000000 00010000 0001 01 21\n"
+      "nonsense\n";
+  EXPECT_EQ(listening_paths(table), std::vector<std::string>{"/run/a b/run-1.sock"});
 }
 
 TEST_F(Socket, OfADeadProcessIsRemovedByWhoLooks) {

@@ -390,7 +390,7 @@ TEST_F(DdsCommands, AStopAsksNobodyForAdmission) {
     return client >= 0;
   };
   const std::string there = " --dds --domain " + std::to_string(dds::test::own_domain());
-  const std::string environment = "XDG_RUNTIME_DIR=" + runtime;
+  const std::string environment = "TANDEM_SOCKETS=" + runtime + "/tandem";
   EXPECT_EQ(tandem("estop" + there, environment).status, 0);
   EXPECT_FALSE(asked());
   EXPECT_EQ(tandem("clock show" + there, environment).status, 0);

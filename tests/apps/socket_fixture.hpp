@@ -40,7 +40,7 @@ struct Socket : ::testing::Test {
     add_commands(registry);
     char name[] = "/tmp/tandem-test-XXXXXX";
     folder = ::mkdtemp(name);
-    ::setenv("XDG_RUNTIME_DIR", folder.c_str(), 1);
+    ::setenv("TANDEM_SOCKETS", (folder + "/tandem").c_str(), 1);  // no run of anybody else
     path = folder + "/s.sock";
   }
   ~Socket() override { std::filesystem::remove_all(folder); }

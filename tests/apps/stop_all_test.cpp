@@ -33,7 +33,7 @@ class SeveralRuns : public Program {
     return runs_.back();
   }
   [[nodiscard]] std::string environment() const {
-    return "XDG_RUNTIME_DIR='" + runtime_.string() + "'";
+    return "TANDEM_SOCKETS='" + (runtime_ / "tandem").string() + "'";
   }
   [[nodiscard]] std::string socket(pid_t run) const {
     return (runtime_ / "tandem" / ("run-" + std::to_string(run) + ".sock")).string();
@@ -71,6 +71,25 @@ TEST_F(SeveralRuns, AreAllStopped) {
   expect(stop.out, "tandem run trajectory.toml");
   expect(stop.out, process(second) + ": emergency stop, category0\n");
   for (const pid_t run : {first, second}) EXPECT_TRUE(until(run, "\"phase\": \"faulted\""));
+}
+
+// It printed "emergency stop, category1" and did not say of what.
+TEST_F(SeveralRuns, AreNamedEvenWhenThereIsOne) {
+  const pid_t only = begin("run hold.toml --duration 2000 --on-fault wait");
+  const Outcome stop = ask("estop");
+  EXPECT_EQ(stop.status, 0) << stop.err;
+  expect(stop.out, "tandem run hold.toml --duration 2000 --on-fault wait");
+  expect(stop.out, process(only) + ": emergency stop, category1\n");
+}
+
+// "no running `tandem run` (start one …)": while a robot moves, that is no help.
+TEST_F(SeveralRuns, OfWhichThereIsNoneAreNoReasonToStartOne) {
+  const Outcome stop = ask("estop");
+  EXPECT_EQ(stop.status, 1);
+  expect(stop.err,
+         "no run was stopped: none of this user was found in " + (runtime_ / "tandem").string());
+  expect(stop.err, "press its emergency stop or cut its power");
+  EXPECT_EQ(stop.err.find("start one"), std::string::npos) << stop.err;
 }
 
 TEST_F(SeveralRuns, AreStoppedBesideOneThatDoesNotAnswer) {

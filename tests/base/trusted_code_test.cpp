@@ -2,7 +2,10 @@
 #include "base/trusted_code.hpp"
 
 #include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -33,6 +36,26 @@ struct TrustedCode : ::testing::Test {
 };
 
 TEST_F(TrustedCode, IsThisUsersAlone) { EXPECT_EQ(error(), ""); }
+
+// In a bare chroot: `tandem check` had looked at "/" for ever.
+TEST_F(TrustedCode, IsJudgedWithoutProc) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::alarm(60);
+    const bool own = ::unshare(CLONE_NEWNS) == 0 || ::unshare(CLONE_NEWUSER | CLONE_NEWNS) == 0;
+    if (!own || ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+        ::mount("none", "/proc", "tmpfs", 0, nullptr) != 0) {
+      ::_exit(77);
+    }
+    if (check_trusted_folder("/")) ::_exit(0);
+    ::_exit(1);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status)) << "it looked until signal " << WTERMSIG(status);
+  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "this machine gives nobody another /proc";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
 
 TEST_F(TrustedCode, IsAFile) {
   fs::remove(file);

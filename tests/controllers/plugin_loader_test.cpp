@@ -108,6 +108,21 @@ TEST(PluginLoader, RefusesALibraryOfAnotherCompiler) {
   EXPECT_NE(loaded.error().message.find("another age"), std::string::npos);
 }
 
+// A create() that returned null was the end of a run that had loaded it, by SIGSEGV.
+TEST(PluginLoader, RefusesALibraryThatLeavesSomethingNull) {
+  const std::pair<const char*, const char*> kinds[]{
+      {"null_plugin", "its entry point tandem_controller_plugin() returns null"},
+      {"null_name", "its entry point leaves `name` null"},
+      {"null_doc", "its entry point leaves `doc` null"},
+      {"null_create", "its entry point leaves `create` null"},
+      {"null_controller", "its create() returns no controller (null)"}};
+  for (const auto& [name, message] : kinds) {
+    const auto loaded = load_controller(name, kBroken);
+    ASSERT_FALSE(loaded.has_value()) << name;
+    EXPECT_EQ(loaded.error().message, message);
+  }
+}
+
 TEST(PluginLoader, RefusesAFileThatIsNoLibrary) {
   const test::ScratchFolder folder;
   std::ofstream(folder / "text.so") << "this is no library";
