@@ -131,6 +131,22 @@ const char kLifted[] = R"(<robot name="lifted">
     <limit lower="0" upper="0.04" effort="20" velocity="0.1"/></joint>
 </robot>)";
 
+// The slides moved the fingers in every direction, so that the stretched arm between them was the
+// best posture.
+TEST_F(New, BendsAnArmBetweenTwoSlides) {
+  write_text(folder_ / "lifted.urdf", kLifted);
+  ASSERT_EQ(tandem("new lifted.urdf -o lifted").status, 0);
+  const std::string text = read_text(folder_ / "lifted/robot.toml");
+  const std::size_t posture = text.find("[posture.");
+  ASSERT_NE(posture, std::string::npos);
+  double bent = 0.0;
+  for (const std::string joint : {"\nr1 = ", "\nr3 = "}) {
+    const std::size_t at = text.find(joint, posture);
+    if (at != std::string::npos) bent += std::abs(std::stod(text.substr(at + joint.size())));
+  }
+  EXPECT_GT(bent, 0.5) << text.substr(posture);
+}
+
 // 0.5, a joint's that turns, was 0.5 m: the lift was pushed to its end, and nothing tripped.
 TEST_F(New, TripsASlideThatIsPushedAway) {
   write_text(folder_ / "lifted.urdf", kLifted);
