@@ -13,6 +13,9 @@ namespace {
 std::atomic<bool> stop_flag{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 
+std::atomic<int> stop_cause{0};  // the signal
+static_assert(std::atomic<int>::is_always_lock_free);
+
 std::atomic<bool> emergency_flag{false};
 
 extern "C" void on_emergency_signal(int) { emergency_flag.store(true, std::memory_order_relaxed); }
@@ -24,6 +27,8 @@ struct Taken {
 std::array<Taken, 3> taken{{{SIGINT, {}}, {SIGTERM, {}}, {SIGHUP, {}}}};
 
 extern "C" void on_stop_signal(int signal) {
+  int none = 0;
+  if (!stop_flag.load(std::memory_order_relaxed)) stop_cause.compare_exchange_strong(none, signal);
   stop_flag.store(true, std::memory_order_relaxed);
   for (const Taken& one : taken)
     if (one.signal == signal) ::sigaction(signal, &one.former, nullptr);
@@ -70,6 +75,10 @@ bool take_emergency_stop() noexcept TANDEM_RT {
 
 bool stop_requested() noexcept TANDEM_RT { return stop_flag.load(std::memory_order_relaxed); }
 void request_stop() noexcept { stop_flag.store(true, std::memory_order_relaxed); }
-void clear_stop() noexcept { stop_flag.store(false, std::memory_order_relaxed); }
+void clear_stop() noexcept {
+  stop_flag.store(false, std::memory_order_relaxed);
+  stop_cause.store(0, std::memory_order_relaxed);
+}
+int stop_signal() noexcept { return stop_cause.load(std::memory_order_relaxed); }
 
 }  // namespace tandem::rt
