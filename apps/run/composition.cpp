@@ -13,6 +13,7 @@
 #include "apps/robot/start_torque.hpp"
 #include "apps/run/operator_link.hpp"
 #include "apps/run/retreats.hpp"
+#include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
@@ -198,7 +199,10 @@ std::vector<double> start_of(const runtime::Experiment& e) {
 
 Result<LoadedController> load_plugin(const runtime::Experiment& e,
                                      const runtime::ControllerSpec& spec) {
-  return load_controller(plugin_path(e, spec.plugin), controller_folders());
+  return bounded_call(spec.name, runtime::ControllerHost::kStartTime,
+                      [plugin = plugin_path(e, spec.plugin)] {
+                        return load_controller(plugin, controller_folders());
+                      });
 }
 
 std::string wire_name(const hal::RobotConfig& robot) {
@@ -424,7 +428,10 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (!add_kernels(*c, *robot, overrides, errors)) return errors.give();
   if (!overrides.serves) add_controllers(*c, errors);
   add_owner(*c, errors);
-  if (!errors.empty()) return errors.give();
+  if (!errors.empty()) {
+    if (a_hosted_call_goes_on()) (void)c.release();  // it uses what it was given
+    return errors.give();
+  }
   for (Error& warning : missing_retreats(*c)) c->warnings.push_back(std::move(warning));
   if (auto failed = add_parallel(*c, overrides); !failed.empty()) return std::unexpected(failed);
   const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
