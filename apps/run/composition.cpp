@@ -270,6 +270,24 @@ Diagnostics unfit_for_link(const runtime::Experiment& e, const Overrides& overri
   return {};
 }
 
+/// Of flags that are for a bus or a server: they would change nothing, and look as if they did.
+Diagnostics without_effect(const runtime::Experiment& e, const Overrides& overrides) {
+  const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
+  if (overrides.lockstep && simulated && !overrides.serves) {
+    return {fail("--lockstep: a robot in this process has no other to wait for",
+                 "add --hal can or --hal dds, or leave --lockstep out")
+                .error()};
+  }
+  if (!overrides.interfaces.empty() && e.hal.backend != runtime::BackendKind::kWire) {
+    return {fail(simulated ? "--interface: a robot in this process has no bus"
+                           : "--interface: the bus is the server's",
+                 simulated ? "add --hal can or --hal ethercat, or leave --interface out"
+                           : "give --interface to `tandem serve`")
+                .error()};
+  }
+  return {};
+}
+
 /// Why it cannot be run, whatever the robot.
 Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
   if (e.cycles() == 0) {
@@ -421,6 +439,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (Status done = replace_interfaces(e.robot, overrides.interfaces); !done) {
     return std::unexpected(Diagnostics{done.error()});
   }
+  if (auto flags = without_effect(e, overrides); !flags.empty()) return std::unexpected(flags);
   const auto robot = with_description(e.robot);
   if (!robot) return std::unexpected(robot.error());
   Collector errors;
