@@ -48,7 +48,7 @@ Result<std::string> user_model_folder() {
   if (home != nullptr && *home == '/') return std::string(home) + "/.cache/tandem/models";
   // A folder that everybody may write to is no place for code that is loaded.
   return fail("there is no folder for kernel libraries: neither HOME nor XDG_CACHE_HOME is set",
-              "set one of them to an absolute path, or name the library with -o");
+              "set one of them to an absolute path");
 }
 
 Result<std::string> user_library(const std::string& robot, const std::string& hash) {
