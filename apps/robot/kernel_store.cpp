@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "base/file_name.hpp"
+#include "base/quoting.hpp"
 #include "model/generate.hpp"
 #include "model/kernel_build.hpp"
 
@@ -75,7 +76,7 @@ std::vector<std::string> model_folders() {
 
 Result<model::KernelLibrary> find_kernels(const RobotFiles& robot, const std::string& variant) {
   return find(robot.config.name, model::description_hash(robot.tree, robot.spec), variant,
-              "run: tandem model build " + robot.config.file);
+              "run: tandem model build " + shell_word(robot.config.file));
 }
 
 Result<model::KernelLibrary> find_kernels(const std::string& robot, const std::string& hash,

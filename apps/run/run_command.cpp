@@ -408,7 +408,7 @@ void warn_of_inertias(const runtime::Experiment& e) {
   }
   if (links.empty()) return;
   fmt::print(stderr, "warning: {}: no body can have the inertia of {} (`tandem check {}`)\n",
-             e.robot.model.urdf, fmt::join(links, ", "), e.robot.file);
+             e.robot.model.urdf, fmt::join(links, ", "), shell_word(e.robot.file));
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "apps/tools/relative_path.hpp"
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 #include "controllers/motion_plan.hpp"
 #include "hal/config/capabilities.hpp"
 #include "log/joint_motion.hpp"
@@ -247,10 +248,10 @@ void print_facts(const Replay& replay, const LogOptions& options, std::FILE* out
                         replay.posture.empty() ? "every joint at 0" : "posture " + replay.posture));
   if (!replay.carried.keys.empty())
     facts.add("as recorded", fmt::format("{}", fmt::join(replay.carried.keys, ", ")));
-  facts.add("next", "tandem run " + options.output);
+  facts.add("next", "tandem run " + shell_word(options.output));
   facts.add("", fmt::format("tandem report {} RUN, RUN being the log that this writes: one over "
                             "the other",
-                            options.log));
+                            shell_word(options.log)));
   facts.print(out);
 }
 

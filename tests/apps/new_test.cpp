@@ -166,6 +166,14 @@ TEST_F(New, TripsASlideThatIsPushedAway) {
   EXPECT_EQ(tandem("run lifted/move.toml --no-log --no-socket", cache).status, 0);
 }
 
+// The commands were not what a shell takes.
+TEST_F(New, QuotesTheCommandsThatComeNext) {
+  const Outcome made = tandem("new double_pendulum.urdf -o \"it's mine\"");
+  ASSERT_EQ(made.status, 0) << made.err;
+  EXPECT_NE(made.out.find("\n  tandem run 'it'\\''s mine/hold.toml' --report\n"), std::string::npos)
+      << made.out;
+}
+
 TEST_F(New, WritesOverNothingWithoutForce) {
   EXPECT_EQ(tandem("new double_pendulum.urdf").status, 0);
   write_text(folder_ / "double_pendulum/hold.toml", "mine");
