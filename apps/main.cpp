@@ -120,5 +120,5 @@ int main(int argc, char** argv) {
   if (!printed && done != Exit::kUsage) print_errors({printed.error()});  // else it has said why
   if (!printed && exit == Exit::kDone) exit = Exit::kUsage;
   if (exit == Exit::kUsage && (done || json != "-")) write_failure(json);
-  return static_cast<int>(exit);
+  return end_beside_controllers(static_cast<int>(exit));
 }

@@ -14,6 +14,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "base/quoting.hpp"
 #include "base/sha256.hpp"
 
 namespace tandem {
@@ -123,7 +124,7 @@ Status check_trusted_folder(const std::string& folder, std::optional<uid_t> part
   mode << std::oct << open->mode;
   return refuse(open->path.string(), open->problem + " (its mode is " + mode.str() + ")",
                 "give it to this user, and take the right to write from others: chmod go-w " +
-                    open->path.string());
+                    shell_word(open->path.string()));
 }
 
 Status check_whole(const std::string& path) {

@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 
+#include <atomic>
 #include <cstdio>
 #include <cstdlib>
 
@@ -14,6 +15,8 @@ constexpr int kStatus = 2;  // what a controller that cannot be used ends a comm
 
 thread_local const std::string* inside = nullptr;             // the controller whose code runs
 thread_local const std::function<void()>* on_exit = nullptr;  // of a bounded_call()
+
+std::atomic<bool> one_goes_on{false};
 
 void refuse_the_end() {
   if (inside == nullptr) return;
@@ -47,6 +50,9 @@ HostedCode::~HostedCode() {
   inside = outer_;
   on_exit = outer_exits_;
 }
+
+bool a_hosted_call_goes_on() noexcept { return one_goes_on.load(std::memory_order_relaxed); }
+void note_hosted_call_goes_on() noexcept { one_goes_on.store(true, std::memory_order_relaxed); }
 
 const char* hosted_controller() noexcept { return inside == nullptr ? nullptr : inside->c_str(); }
 

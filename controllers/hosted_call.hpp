@@ -37,6 +37,12 @@ class HostedCode {
 /// The controller whose code this thread is in, null: in none's. For a signal handler.
 [[nodiscard]] const char* hosted_controller() noexcept;
 
+/// Whether a call was given up that may still go on: then the process ends by _exit(), and what the
+/// call uses stays.
+[[nodiscard]] bool a_hosted_call_goes_on() noexcept;
+/// Says so from now on.
+void note_hosted_call_goes_on() noexcept;
+
 /// @return what `call` returns, or what it threw as an error of `controller`
 template <class Call>
 [[nodiscard]] auto hosted_call(const std::string& controller, const Call& call)
@@ -88,6 +94,7 @@ template <class Call>
   std::unique_lock lock(job->mutex);
   job->over.wait_for(lock, limit, [&] { return job->answer || job->exited; });
   if (job->answer) return std::move(*job->answer);
+  note_hosted_call_goes_on();
   const bool exited = job->exited;
   return std::unexpected(Error{
       .message =

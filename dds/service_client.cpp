@@ -4,8 +4,10 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
+#include <optional>
 #include <thread>
 
 namespace tandem::dds {
@@ -15,6 +17,8 @@ using SteadyClock = std::chrono::steady_clock;
 
 /// How often a server is looked for, or after.
 constexpr std::chrono::milliseconds kLookAgain{5};
+/// How long a request to every server waits for the others, once one is connected.
+constexpr std::chrono::milliseconds kOthers{300};
 
 /// "left" of the topic "rq/left/tandem/askRequest" of `service`; false: it is another's.
 bool is_topic_of(std::string_view topic, const std::string& service, std::string& name_space) {
@@ -34,6 +38,13 @@ std::string user_data_of(const dds_builtintopic_endpoint_t& endpoint) {
   std::string text(static_cast<const char*>(bytes), size);
   dds_free(bytes);
   return text;
+}
+
+/// Without its namespace.
+FoundService service_of(const Peer& server) {
+  return {.name_space = {},
+          .node = user_data_value(server.user_data, "node"),
+          .pid = user_data_value(server.user_data, "pid")};
 }
 
 }  // namespace
@@ -104,44 +115,62 @@ Result<ServiceClientBase> ServiceClientBase::create(Participant& participant,
 
 std::size_t ServiceClientBase::servers() const { return requests_.matched(); }
 
-/// Both topics lead to the same server, who can so answer.
-bool ServiceClientBase::connected() const {
+/// The servers that both topics lead to, who can so answer: their replies' writers.
+std::vector<Peer> ServiceClientBase::connected() const {
   const std::vector<Peer> readers = matched_readers(requests_.get());
-  for (const Peer& writer : matched_writers(replies_.get())) {
-    for (const Peer& reader : readers) {
-      if (belong_together(reader, writer, "serviceid")) return true;
-    }
-  }
-  return false;
+  std::vector<Peer> servers = matched_writers(replies_.get());
+  std::erase_if(servers, [&readers](const Peer& writer) {
+    return std::ranges::none_of(readers, [&writer](const Peer& reader) {
+      return belong_together(reader, writer, "serviceid");
+    });
+  });
+  return servers;
 }
 
 Status ServiceClientBase::find_server(Deadline deadline) const {
-  while (!connected()) {
+  while (connected().empty()) {
     if (SteadyClock::now() > deadline) {
       return fail("no process serves " + name_,
                   "start one: tandem run EXPERIMENT --dds; is it in this domain and namespace?");
     }
     std::this_thread::sleep_for(kLookAgain);
   }
-  if (servers() == 1) return {};
-  return fail(fmt::format("{} processes serve {}", servers(), name_),
-              "give each its own domain or namespace: [dds] of the experiment");
+  return {};
+}
+
+Result<ServiceHeader> ServiceClientBase::send(void* request) {
+  const ServiceHeader header{guid_, ++sequence_};
+  std::memcpy(request, &header, sizeof header);
+  const dds_return_t sent = dds_write(requests_.get(), request);
+  if (sent != DDS_RETCODE_OK) return std::unexpected(dds_error("ask " + name_, sent));
+  return header;
+}
+
+Error ServiceClientBase::no_answer(Patience patience) const {
+  return {.message = fmt::format("no answer within {:g} s from {}",
+                                 std::chrono::duration<double>(patience).count(), name_),
+          .hint = "is the process stopped, or very busy?",
+          .file = {},
+          .key = {}};
 }
 
 Status ServiceClientBase::call(void* request, Patience patience, const Use& use) {
   const Deadline deadline = SteadyClock::now() + patience;
   if (Status found = find_server(deadline); !found) return found;
-  const ServiceHeader header{guid_, ++sequence_};
-  std::memcpy(request, &header, sizeof header);
-  const dds_return_t sent = dds_write(requests_.get(), request);
-  if (sent != DDS_RETCODE_OK) return std::unexpected(dds_error("ask " + name_, sent));
+  if (servers() != 1) {
+    return fail(fmt::format("{} processes serve {}", servers(), name_),
+                "give each its own domain or namespace: [dds] of the experiment");
+  }
+  const Result<ServiceHeader> header = send(request);
+  if (!header) return std::unexpected(header.error());
   for (;;) {
-    if (take(header, use)) return {};
-    if (SteadyClock::now() > deadline) {
-      return fail(fmt::format("no answer within {:g} s from {}",
-                              std::chrono::duration<double>(patience).count(), name_),
-                  "is the process stopped, or very busy?");
-    }
+    bool found = false;
+    take(*header, [&](const void* reply, dds_instance_handle_t) {
+      if (!found) use(reply);
+      found = true;
+    });
+    if (found) return {};
+    if (SteadyClock::now() > deadline) return std::unexpected(no_answer(patience));
     if (servers() == 0) {
       return fail("who serves " + name_ + " went away before it answered",
                   "look at what it printed");
@@ -150,19 +179,47 @@ Status ServiceClientBase::call(void* request, Patience patience, const Use& use)
   }
 }
 
-bool ServiceClientBase::take(const ServiceHeader& header, const Use& use) {
-  bool found = false;
+Result<std::vector<FoundService>> ServiceClientBase::call_each(void* request, Patience patience,
+                                                               const UseOfEach& use) {
+  const Deadline deadline = SteadyClock::now() + patience;
+  if (Status found = find_server(deadline); !found) return std::unexpected(found.error());
+  // The other servers of the same name are connected by themselves, but not at the same moment. One
+  // that cannot reply must not hold up the request to those that can.
+  const Deadline all = std::min(deadline, SteadyClock::now() + kOthers);
+  while (connected().size() < servers() && SteadyClock::now() < all) {
+    std::this_thread::sleep_for(kLookAgain);
+  }
+  const auto same = [](const Peer& one, const Peer& other) {
+    return belong_together(one, other, "serviceid");
+  };
+  std::vector<Peer> silent = matched_readers(requests_.get());
+  const Result<ServiceHeader> header = send(request);
+  if (!header) return std::unexpected(header.error());
+  for (;;) {
+    take(*header, [&](const void* reply, dds_instance_handle_t writer) {
+      const std::optional<Peer> from = matched_writer(replies_.get(), writer);
+      if (!from) return use(reply, {});
+      std::erase_if(silent, [&](const Peer& one) { return same(one, *from); });
+      use(reply, service_of(*from));
+    });
+    if (silent.empty() || SteadyClock::now() > deadline) break;
+    dds_waitset_wait(waitset_.get(), nullptr, 0, DDS_MSECS(20));
+  }
+  std::vector<FoundService> left;
+  for (const Peer& one : silent) left.push_back(service_of(one));
+  return left;
+}
+
+void ServiceClientBase::take(const ServiceHeader& header, const UseSample& use) {
   for (;;) {
     std::array<void*, 1> sample{};
     std::array<dds_sample_info_t, 1> info{};
     const dds_return_t taken = dds_take(replies_.get(), sample.data(), info.data(), 1, 1);
-    if (taken <= 0) return found;
+    if (taken <= 0) return;
     ServiceHeader got{};
     if (info[0].valid_data) std::memcpy(&got, sample[0], sizeof got);
-    if (info[0].valid_data && !found && got.guid == header.guid &&
-        got.sequence == header.sequence) {
-      use(sample[0]);
-      found = true;
+    if (info[0].valid_data && got.guid == header.guid && got.sequence == header.sequence) {
+      use(sample[0], info[0].publication_handle);
     } else if (info[0].valid_data) {
       ++ignored_;
     }

@@ -43,19 +43,25 @@ class ServiceClientBase {
  protected:
   using Patience = std::chrono::milliseconds;
   using Use = std::function<void(const void* reply)>;
+  using UseOfEach = std::function<void(const void* reply, const FoundService& from)>;
 
   [[nodiscard]] static Result<ServiceClientBase> create(Participant& participant,
                                                         const std::string& service,
                                                         const Type& request, const Type& response);
   [[nodiscard]] Status call(void* request, Patience patience, const Use& use);
+  [[nodiscard]] Result<std::vector<FoundService>> call_each(void* request, Patience patience,
+                                                            const UseOfEach& use);
 
  private:
   using Deadline = std::chrono::steady_clock::time_point;
   ServiceClientBase(std::string name, Endpoint requests, Endpoint replies, Entity waiting,
                     Entity waitset);
-  [[nodiscard]] bool connected() const;
+  using UseSample = std::function<void(const void* reply, dds_instance_handle_t writer)>;
+  [[nodiscard]] std::vector<Peer> connected() const;
   [[nodiscard]] Status find_server(Deadline deadline) const;
-  [[nodiscard]] bool take(const ServiceHeader& header, const Use& use);
+  [[nodiscard]] Result<ServiceHeader> send(void* request);
+  [[nodiscard]] Error no_answer(Patience patience) const;
+  void take(const ServiceHeader& header, const UseSample& use);
 
   std::string name_;  // for errors
   Endpoint requests_, replies_;
@@ -85,6 +91,19 @@ class ServiceClient : public ServiceClientBase {
     return ServiceClientBase::call(&request, patience, [&use](const void* reply) {
       use(*static_cast<const Response*>(reply));
     });
+  }
+
+  /// The same to every process that serves it, with one request: `use` sees each reply, and whose
+  /// it is, as it comes.
+  /// @param patience  for all of them
+  /// @return those that have not replied in time. Errors: nobody serves it.
+  [[nodiscard]] Result<std::vector<FoundService>> call_each(
+      Request request, Patience patience,
+      const std::function<void(const Response&, const FoundService&)>& use) {
+    return ServiceClientBase::call_each(&request, patience,
+                                        [&use](const void* reply, const FoundService& from) {
+                                          use(*static_cast<const Response*>(reply), from);
+                                        });
   }
 
  private:

@@ -16,8 +16,9 @@ namespace tandem::model {
 /// Behind the `>` of the tag that begins at `at`, which may have others in quotes.
 [[nodiscard]] std::size_t behind_tag(std::string_view text, std::size_t at);
 
-/// The text with blanks for its processing instructions (<?target …?>), which XML allows wherever an
-/// element may be and tinyxml2 only before the first. Lines stay where they are. What calls itself
+/// The text with blanks for its processing instructions (<?target …?>), which XML allows wherever
+/// an element may be and tinyxml2 only before the first. Lines stay where they are. What calls
+/// itself
 /// <?xml …?> stays: it is an error but at the beginning. So does one without an end.
 [[nodiscard]] std::string without_instructions(std::string_view text);
 

@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "base/counted.hpp"
+#include "base/quoting.hpp"
 #include "report/close_passive.hpp"
 #include "report/gnuplot.hpp"
 #include "report/page.hpp"
@@ -259,7 +260,7 @@ std::vector<std::string> close_and_remark(const std::vector<RunData*>& all,
     return {
         "no inverse dynamics: there is no kernel library that fits this log; run: "
         "tandem model build " +
-        run.robot.file};
+        shell_word(run.robot.file)};
   }
   std::vector<std::string> remarks;
   if (kernels->floating_base != 0 && !run.motion_known()) {

@@ -19,6 +19,9 @@ namespace {
 std::atomic<bool> stop_flag{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 
+std::atomic<int> stop_cause{0};  // the signal
+static_assert(std::atomic<int>::is_always_lock_free);
+
 std::atomic<bool> emergency_flag{false};
 
 extern "C" void on_emergency_signal(int) { emergency_flag.store(true, std::memory_order_relaxed); }
@@ -33,6 +36,8 @@ static_assert(std::atomic<std::int64_t>::is_always_lock_free);
 
 extern "C" void on_stop_signal(int signal) {
   const int error = errno;
+  int none = 0;
+  if (!stop_flag.load(std::memory_order_relaxed)) stop_cause.compare_exchange_strong(none, signal);
   stop_flag.store(true, std::memory_order_relaxed);
   const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC);
   for (Taken& one : taken) {
@@ -88,6 +93,10 @@ bool take_emergency_stop() noexcept TANDEM_RT {
 
 bool stop_requested() noexcept TANDEM_RT { return stop_flag.load(std::memory_order_relaxed); }
 void request_stop() noexcept { stop_flag.store(true, std::memory_order_relaxed); }
-void clear_stop() noexcept { stop_flag.store(false, std::memory_order_relaxed); }
+void clear_stop() noexcept {
+  stop_flag.store(false, std::memory_order_relaxed);
+  stop_cause.store(0, std::memory_order_relaxed);
+}
+int stop_signal() noexcept { return stop_cause.load(std::memory_order_relaxed); }
 
 }  // namespace tandem::rt

@@ -22,6 +22,9 @@ void remove_stop_signals();
 /// True once a stop was requested, by a signal or by request_stop().
 [[nodiscard]] bool stop_requested() noexcept TANDEM_RT;
 
+/// The first signal that requested it; 0: none, or request_stop() did.
+[[nodiscard]] int stop_signal() noexcept;
+
 /// Sets the flag. Safe in a signal handler.
 void request_stop() noexcept;
 

@@ -30,22 +30,28 @@ Status ControllerHost::add(const std::string& name, LoadedController plugin, Tom
   const std::string path = plugin.path();
   auto owner = std::make_shared<LoadedController>(std::move(plugin));
   const std::size_t slot = size();
-  Status added =
-      add(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters), active);
+  Status added = add(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters),
+                     active, kStartTime);
   if (added) owned_[slot]->plugin = path;
   return added;
 }
 
 Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> controller,
                            TomlTable parameters, bool active) {
+  return add(name, std::move(controller), std::move(parameters), active, std::nullopt);
+}
+
+Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> controller,
+                           TomlTable parameters, bool active,
+                           std::optional<std::chrono::milliseconds> limit) {
   const std::size_t slot = size();
   if (slot == kMostControllers) {
     return fail_at(name, "is one controller more than there can be",
                    "at most " + std::to_string(kMostControllers));
   }
-  auto made = configure(name, std::move(controller), std::move(parameters),
-                        active ? std::span<const double>(start_rad_) : std::span<const double>(),
-                        std::nullopt);
+  auto made =
+      configure(name, std::move(controller), std::move(parameters),
+                active ? std::span<const double>(start_rad_) : std::span<const double>(), limit);
   if (!made) return std::unexpected(made.error());
   table_[slot] = made->get();
   const ControllerSet after = active_ | only(slot);

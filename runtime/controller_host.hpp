@@ -92,8 +92,14 @@ class ControllerHost {
   [[nodiscard]] Status add(const std::string& name, std::shared_ptr<Controller> controller,
                            TomlTable parameters, bool active = true);
   /// The same for a plugin; the host keeps its library open.
+  /// Errors besides: its configure() calls exit(), or does not return within kStartTime. The host,
+  /// and what it was given, must then stay until the process ends (a_hosted_call_goes_on()).
   [[nodiscard]] Status add(const std::string& name, LoadedController plugin, TomlTable parameters,
                            bool active = true);
+
+  /// How long the opening of a library, and a configure(), may take before the run: nobody waits
+  /// for an answer yet, and a long recording takes a while to read.
+  static constexpr std::chrono::milliseconds kStartTime{15000};
 
   // Any thread but the loop's.
 
@@ -234,6 +240,9 @@ class ControllerHost {
   void archive(Archive& ar);
 
  private:
+  [[nodiscard]] Status add(const std::string& name, std::shared_ptr<Controller> controller,
+                           TomlTable parameters, bool active,
+                           std::optional<std::chrono::milliseconds> limit);
   [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
       const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
       std::span<const double> start_rad, std::optional<std::chrono::milliseconds> limit);

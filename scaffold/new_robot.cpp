@@ -11,6 +11,7 @@
 #include <limits>
 #include <sstream>
 
+#include "hal/config/following_error.hpp"
 #include "model/urdf.hpp"
 #include "scaffold/firmness.hpp"
 #include "scaffold/ground.hpp"
@@ -286,6 +287,8 @@ void Maker::fill_joints() {
       joint.max_velocity_rad_s = limit.velocity;
       joint.encoder_counts_per_rev = kEncoderCounts;
       joint.motor_encoder_counts_per_rev = kMotorCounts;
+      joint.slides = robot_.tree.joints[j].type == model::JointType::kPrismatic;
+      if (joint.slides) joint.following_error_rad = hal::slide_following_error_m(joint);
       config.joints.push_back(std::move(joint));
     }
   }

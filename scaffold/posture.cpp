@@ -26,11 +26,20 @@ constexpr double kSparedLoad = 0.33;
 constexpr double kSearchStep = 0.02;  // [rad]: in the search for less load
 constexpr double kClear_m = 0.05;     // over the base's plane, of a waiting posture
 
+/// The joints that a body's dexterity is judged by. Slides move it in their direction in every
+/// posture, and hide that the joints that turn are stretched: they count where fewer than two turn.
+std::vector<int> judged_by(const Posed& posed, const Tree& tree, int body) {
+  const std::vector<int> path = path_to(tree, body);
+  std::vector<int> turning = path;
+  std::erase_if(turning, [&posed](int joint) { return posed.slides(joint); });
+  return turning.size() < 2 ? path : turning;
+}
+
 /// The least velocity that a body's frame gets in its worst direction, per unit of joint speed
 /// and reach; with fewer than three joints, in the directions that there are.
 double dexterity(const Posed& posed, const Tree& tree, int body) {
   const MatrixXd all = posed.point_jacobian(body, posed.beyond(body - 1).com_m);
-  const std::vector<int> path = path_to(tree, body);
+  const std::vector<int> path = judged_by(posed, tree, body);
   MatrixXd J(3, static_cast<Eigen::Index>(path.size()));
   for (std::size_t i = 0; i < path.size(); ++i) {
     J.col(static_cast<Eigen::Index>(i)) = all.col(path[i]);

@@ -251,6 +251,10 @@ class Writer {
       text += fmt::format("max_velocity_rad_s = {}  # guess; the description's is {}\n",
                           number(joint.max_velocity_rad_s), stated(joint.name, false));
     }
+    if (joint.slides) {
+      text += fmt::format("following_error_rad = {}  # guess, in m: the way of 0.1 s at most\n",
+                          number(joint.following_error_rad));
+    }
     return text;
   }
 

@@ -43,10 +43,10 @@ Diagnostics weak_drives(const NewRobot& robot, const std::vector<double>& torque
     const char* unit = slides ? "N" : "Nm";
     Error report;
     report.message = fmt::format(
-        "the posture '{}' takes {:.3g} {} of it against gravity, and {} {:.3g} {}: it will sag, or "
-        "stop with a fault",
+        "the posture '{}' takes {:.3g} {} of it against gravity, and {} {:.3g} {}: {}",
         robot.config.postures.front().name, needs, unit,
-        by_limit ? "its limit (<limit effort>) is" : "its drive has for long", has, unit);
+        by_limit ? "its limit (<limit effort>) is" : "its drive has for long", has, unit,
+        needs > has ? "it will sag, or stop with a fault" : "little reserve is left to move");
     report.hint = by_limit ? "correct the effort, or give the joint max_torque_Nm and a stronger "
                              "drive in robot.toml; or choose another posture there"
                            : "give it a stronger drive in robot.toml, or choose another posture "

@@ -142,6 +142,10 @@ Result<Json> ask(const std::string& path, const Json& question) {
   const int error = connect_to(descriptor, *address, patience);
   if (error == EAGAIN) return std::unexpected(no_answer(patience));
   if (error != 0) {
+    if (error == EACCES) {
+      return fail(fmt::format("the socket {} is another user's: {}", path, std::strerror(error)),
+                  "only who runs the process, and root, may ask it");
+    }
     return fail(fmt::format("no process listens at {}: {}", path, std::strerror(error)),
                 "is the process running?");
   }

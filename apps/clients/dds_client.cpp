@@ -2,7 +2,11 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <chrono>
+#include <future>
+#include <iterator>
+#include <map>
 #include <thread>
 
 #include "apps/clients/dds_config.hpp"
@@ -67,13 +71,14 @@ std::vector<dds::FoundService> look(const dds::ServiceFinder& finder, const Cont
   return found;
 }
 
-Error nobody(const ControlTarget& target, const dds::Config& config) {
+Error nobody(const ControlTarget& target, const dds::Config& config, const char* advice) {
   const std::string where =
       target.name_space ? fmt::format(" in the namespace '{}'", *target.name_space) : "";
   return fail(fmt::format("no process serves {} in the DDS domain {}{}", kService, config.domain,
                           where),
-              "start one: tandem run EXPERIMENT --dds; is it in this domain and namespace, and on "
-              "this network interface? With DDS Security, use --dds-from")
+              fmt::format("{}; is it in this domain and namespace, and on this network interface? "
+                          "With DDS Security, use --dds-from",
+                          advice))
       .error();
 }
 
@@ -90,14 +95,22 @@ Error several(const std::vector<dds::FoundService>& found, const dds::Config& co
       .error();
 }
 
-}  // namespace
-
-void have_admitted(const dds::Participant& participant) {
-  const Json question{{"do", "dds.admit"}, {"participant", dds::to_text(dds::id_of(participant))}};
-  for (const std::string& socket : running_control_sockets("run")) (void)ask(socket, question);
+/// "/left/tandem/ask"
+std::string service_in(const std::string& name_space) {
+  return (name_space.empty() ? "/" : "/" + name_space + "/") + kService;
 }
 
-Result<std::unique_ptr<ControlClient>> open_dds_client(const ControlTarget& asked) {
+constexpr char kStartOne[] = "start one: tandem run EXPERIMENT --dds";
+constexpr char kCutPower[] = "if the robot moves, press its emergency stop or cut its power";
+
+/// What serves in the domain, and who looks.
+struct Found {
+  std::unique_ptr<dds::Participant> participant;
+  std::vector<dds::FoundService> services;  // not empty
+};
+
+/// @param advice  when nobody serves
+Result<Found> find_services(const ControlTarget& asked, const char* advice) {
   const Result<dds::Config> config = dds_config(asked.place);
   if (!config) return std::unexpected(config.error());
   ControlTarget target = asked;
@@ -108,14 +121,76 @@ Result<std::unique_ptr<ControlClient>> open_dds_client(const ControlTarget& aske
   if (!participant) return std::unexpected(participant.error());
   const auto finder = dds::ServiceFinder::create(**participant);
   if (!finder) return std::unexpected(finder.error());
-  const std::vector<dds::FoundService> found = look(*finder, target);
-  if (found.empty()) return std::unexpected(nobody(target, *config));
-  if (found.size() > 1) return std::unexpected(several(found, *config));
-  const std::string& name_space = found.front().name_space;
-  auto client = AskClient::create(**participant,
-                                  (name_space.empty() ? "/" : "/" + name_space + "/") + kService);
+  std::vector<dds::FoundService> found = look(*finder, target);
+  if (found.empty()) return std::unexpected(nobody(target, *config, advice));
+  return Found{std::move(*participant), std::move(found)};
+}
+
+std::string text_of(const dds::FoundService& one, const std::string& name_space) {
+  return fmt::format("{}{} (process {})", one.node.empty() ? "an unknown program" : one.node,
+                     name_space.empty() ? "" : fmt::format(" in the namespace '{}'", name_space),
+                     one.pid.empty() ? "unknown" : one.pid);
+}
+
+/// The answers of all that serve in one namespace.
+std::vector<DdsAnswer> ask_namespace(Result<AskClient>& client, const std::string& name_space,
+                                     const Json& question) {
+  std::vector<DdsAnswer> answers;
+  const std::string everybody = fmt::format("the namespace '{}'", name_space);
+  if (!client) return {{everybody, std::unexpected(client.error())}};
+  std::string text = json_text(question);
+  dds::tandem_msgs::Ask_Request request{};
+  request.request = text.data();
+  const auto silent = client->call_each(
+      request, answer_time(question),
+      [&](const dds::tandem_msgs::Ask_Response& reply, const dds::FoundService& from) {
+        const std::string who = text_of(from, name_space);
+        answers.push_back({who, read_answer(reply.answer, who)});
+      });
+  if (!silent) return {{everybody, std::unexpected(silent.error())}};
+  for (const dds::FoundService& one : *silent) {
+    answers.push_back({text_of(one, name_space), fail("no answer in time", kCutPower)});
+  }
+  return answers;
+}
+
+}  // namespace
+
+void have_admitted(const dds::Participant& participant) {
+  const Json question{{"do", "dds.admit"}, {"participant", dds::to_text(dds::id_of(participant))}};
+  for (const std::string& socket : running_control_sockets("run")) (void)ask(socket, question);
+}
+
+Result<std::unique_ptr<ControlClient>> open_dds_client(const ControlTarget& asked) {
+  auto found = find_services(asked, kStartOne);
+  if (!found) return std::unexpected(found.error());
+  if (found->services.size() > 1) {
+    return std::unexpected(several(found->services, found->participant->config()));
+  }
+  auto client =
+      AskClient::create(*found->participant, service_in(found->services.front().name_space));
   if (!client) return std::unexpected(client.error());
-  return std::make_unique<DdsClient>(std::move(*participant), std::move(*client));
+  return std::make_unique<DdsClient>(std::move(found->participant), std::move(*client));
+}
+
+Result<std::vector<DdsAnswer>> ask_all_over_dds(const ControlTarget& target, const Json& question) {
+  auto found = find_services(target, kCutPower);
+  if (!found) return std::unexpected(found.error());
+  std::map<std::string, Result<AskClient>> clients;  // by namespace
+  for (const dds::FoundService& one : found->services) {
+    if (clients.contains(one.name_space)) continue;
+    clients.emplace(one.name_space,
+                    AskClient::create(*found->participant, service_in(one.name_space)));
+  }
+  std::vector<std::future<std::vector<DdsAnswer>>> asked;
+  for (auto& [name_space, client] : clients) {
+    asked.push_back(std::async(std::launch::async, [&question, &name = name_space, &one = client] {
+      return ask_namespace(one, name, question);
+    }));
+  }
+  std::vector<DdsAnswer> answers;
+  for (auto& one : asked) std::ranges::move(one.get(), std::back_inserter(answers));
+  return answers;
 }
 
 }  // namespace tandem::apps

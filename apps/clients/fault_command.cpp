@@ -9,6 +9,7 @@
 
 #include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
+#include "apps/clients/dds_client.hpp"
 #include "apps/control/fault_table.hpp"
 #include "apps/text/console.hpp"
 
@@ -172,6 +173,17 @@ Error nobody_to_stop(const ControlSearch& search) {
           .key = {}};
 }
 
+/// Stops every run that serves in the DDS domain, and in the namespace when one is named.
+Exit stop_all_over_dds(const ControlTarget& target, const Json& question) {
+  const auto answers = ask_all_over_dds(target, question);
+  if (!answers) return tell_stop(std::unexpected(answers.error()), question, {});
+  Exit exit = Exit::kDone;
+  for (const DdsAnswer& one : *answers) {
+    if (tell_stop(one.answer, question, one.who) != Exit::kDone) exit = Exit::kFault;
+  }
+  return exit;
+}
+
 /// Stops every run of this user on this machine. All are asked at once: one that hangs must not
 /// delay the others.
 Exit stop_all(const Json& question) {
@@ -205,7 +217,8 @@ Exit fault_command(const FaultOptions& options) {
 Exit estop_command(const EstopOptions& options) {
   Json question{{"do", "estop"}};
   if (options.category) question["category"] = *options.category;
-  if (!options.target.dds && options.target.socket.empty()) return stop_all(question);
+  if (options.target.dds) return stop_all_over_dds(options.target, question);
+  if (options.target.socket.empty()) return stop_all(question);
   return tell_stop(ask(options.target, "run", question), question, {});
 }
 

@@ -16,6 +16,7 @@
 #include "apps/clients/joint_print.hpp"
 #include "apps/clients/named.hpp"
 #include "apps/text/console.hpp"
+#include "base/quoting.hpp"
 #include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
@@ -293,11 +294,11 @@ Exit tell_motion(const JointOptions& options, const Json& joint, double target, 
 /// What came of the reset of a drive.
 Exit tell_reset(const JointOptions& options, const Json& joint) {
   if (const std::string fault = joint.value("fault_text", ""); !fault.empty()) {
-    print_errors(
-        {{.message = fmt::format("the reset failed, its cause is still there: {}", fault),
-          .hint = "remove the cause, then `tandem joint reset " + options.joint + "` again",
-          .file = {},
-          .key = options.joint}});
+    print_errors({{.message = fmt::format("the reset failed, its cause is still there: {}", fault),
+                   .hint = "remove the cause, then `tandem joint reset " +
+                           shell_word(options.joint) + "` again",
+                   .file = {},
+                   .key = options.joint}});
     return Exit::kFault;
   }
   if (options.json == "-") return Exit::kDone;

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "base/file_name.hpp"
+#include "base/quoting.hpp"
 #include "model/generate.hpp"
 #include "model/kernel_build.hpp"
 
@@ -48,7 +49,7 @@ Result<std::string> user_model_folder() {
   if (home != nullptr && *home == '/') return std::string(home) + "/.cache/tandem/models";
   // A folder that everybody may write to is no place for code that is loaded.
   return fail("there is no folder for kernel libraries: neither HOME nor XDG_CACHE_HOME is set",
-              "set one of them to an absolute path, or name the library with -o");
+              "set one of them to an absolute path");
 }
 
 Result<std::string> user_library(const std::string& robot, const std::string& hash) {
@@ -75,7 +76,7 @@ std::vector<std::string> model_folders() {
 
 Result<model::KernelLibrary> find_kernels(const RobotFiles& robot, const std::string& variant) {
   return find(robot.config.name, model::description_hash(robot.tree, robot.spec), variant,
-              "run: tandem model build " + robot.config.file);
+              "run: tandem model build " + shell_word(robot.config.file));
 }
 
 Result<model::KernelLibrary> find_kernels(const std::string& robot, const std::string& hash,

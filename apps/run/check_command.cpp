@@ -15,6 +15,7 @@
 #include "apps/run/composition.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
+#include "base/quoting.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/drive_use.hpp"
 #include "hal/sim/engine_loader.hpp"
@@ -57,7 +58,7 @@ void add_kernel_facts(const model::KernelLibrary& kernels, const std::string& ro
     facts.add("kernels", fmt::format("{} ({})", kernels.path(), kernels->variant));
   } else {
     facts.add("kernels", "none yet: `tandem run` builds them, and so does");
-    facts.add("", "tandem model build " + robot);
+    facts.add("", "tandem model build " + shell_word(robot));
   }
 }
 

@@ -14,6 +14,7 @@
 #include "apps/run/late_plans.hpp"
 #include "apps/run/operator_link.hpp"
 #include "apps/run/retreats.hpp"
+#include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
@@ -200,7 +201,10 @@ std::vector<double> start_of(const runtime::Experiment& e) {
 
 Result<LoadedController> load_plugin(const runtime::Experiment& e,
                                      const runtime::ControllerSpec& spec) {
-  return load_controller(plugin_path(e, spec.plugin), controller_folders());
+  return bounded_call(spec.name, runtime::ControllerHost::kStartTime,
+                      [plugin = plugin_path(e, spec.plugin)] {
+                        return load_controller(plugin, controller_folders());
+                      });
 }
 
 std::string wire_name(const hal::RobotConfig& robot) {
@@ -264,6 +268,24 @@ Diagnostics unfit_for_link(const runtime::Experiment& e, const Overrides& overri
              .hint = "leave --lockstep out, or serve the robot by an experiment without this table",
              .file = e.file,
              .key = "teleoperation"}};
+  }
+  return {};
+}
+
+/// Of flags that are for a bus or a server: they would change nothing, and look as if they did.
+Diagnostics without_effect(const runtime::Experiment& e, const Overrides& overrides) {
+  const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
+  if (overrides.lockstep && simulated && !overrides.serves) {
+    return {fail("--lockstep: a robot in this process has no other to wait for",
+                 "add --hal can or --hal dds, or leave --lockstep out")
+                .error()};
+  }
+  if (!overrides.interfaces.empty() && e.hal.backend != runtime::BackendKind::kWire) {
+    return {fail(simulated ? "--interface: a robot in this process has no bus"
+                           : "--interface: the bus is the server's",
+                 simulated ? "add --hal can or --hal ethercat, or leave --interface out"
+                           : "give --interface to `tandem serve`")
+                .error()};
   }
   return {};
 }
@@ -436,6 +458,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (Status done = replace_interfaces(e.robot, overrides.interfaces); !done) {
     return std::unexpected(Diagnostics{done.error()});
   }
+  if (auto flags = without_effect(e, overrides); !flags.empty()) return std::unexpected(flags);
   const auto robot = with_description(e.robot);
   if (!robot) return std::unexpected(robot.error());
   Collector errors;
@@ -443,7 +466,10 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (!add_kernels(*c, *robot, overrides, errors)) return errors.give();
   if (!overrides.serves) add_controllers(*c, errors);
   add_owner(*c, errors);
-  if (!errors.empty()) return errors.give();
+  if (!errors.empty()) {
+    if (a_hosted_call_goes_on()) (void)c.release();  // it uses what it was given
+    return errors.give();
+  }
   for (Error& warning : missing_retreats(*c)) c->warnings.push_back(std::move(warning));
   if (c->controllers != nullptr && !overrides.duration_s && !overrides.serves) {
     std::ranges::move(late_plans(*c), std::back_inserter(c->warnings));

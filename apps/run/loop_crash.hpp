@@ -19,4 +19,9 @@ void stand_still_on_crash(runtime::Heartbeat& heartbeat);
 /// happens outside of the cycle, as in configure(). Any thread's.
 void name_crashing_controllers();
 
+/// As a return from main(), but at once where a controller was given up that did not return, or
+/// called exit(): what that uses must stay, and a second exit() would wait for the first.
+/// @return status
+[[nodiscard]] int end_beside_controllers(int status);
+
 }  // namespace tandem::apps

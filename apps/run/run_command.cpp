@@ -351,6 +351,7 @@ class Session {
   Exit finish(const LoopTimes& times) {
     RunSummary summary{c_, *cycle_, times, std::nullopt, std::nullopt, {}, {}, {}};
     summary.server = server_.get();
+    summary.interrupted_by = rt::stop_signal();
     if (parallel_) {
       summary.parallel = parallel_->finish();
       summary.differences = &parallel_->differences();
@@ -376,7 +377,8 @@ class Session {
     const Status written = write_json(options_.json, summary.json());
     if (!traced) return refuse(traced.error());
     if (!written) return refuse(written.error());
-    return summary.faults.empty() ? Exit::kDone : Exit::kFault;
+    if (!summary.faults.empty()) return Exit::kFault;
+    return summary.cut_short() ? interrupted(summary.interrupted_by) : Exit::kDone;
   }
 
   Composition& c_;
@@ -406,7 +408,7 @@ void warn_of_inertias(const runtime::Experiment& e) {
   }
   if (links.empty()) return;
   fmt::print(stderr, "warning: {}: no body can have the inertia of {} (`tandem check {}`)\n",
-             e.robot.model.urdf, fmt::join(links, ", "), e.robot.file);
+             e.robot.model.urdf, fmt::join(links, ", "), shell_word(e.robot.file));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 #include "apps/can/bus_watch.hpp"
@@ -14,6 +15,7 @@
 #include "apps/run/remote_link.hpp"
 #include "base/counted.hpp"
 #include "hal/sim/engine_loader.hpp"
+#include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -383,6 +385,23 @@ std::string start_text(const hal::can::DriveMaster* master) {
                      static_cast<double>(start.duration_ns) * 1e-9, start.sent, start.received);
 }
 
+std::uint64_t RunSummary::planned_cycles() const { return composition.experiment.cycles(); }
+
+bool RunSummary::cut_short() const {
+  return interrupted_by != 0 && cycle.running_cycles() < planned_cycles();
+}
+
+std::string RunSummary::ended() const {
+  const bool early = planned_cycles() == 0 || cycle.running_cycles() < planned_cycles();
+  if (early && interrupted_by != 0) {
+    const char* name = ::sigabbrev_np(interrupted_by);
+    return fmt::format("interrupted by SIG{}", name == nullptr ? "?" : name);
+  }
+  if (!faults.empty()) return "by a fault";
+  if (early && rt::stop_requested()) return "nobody reads its output any more";
+  return early ? "on request" : "as planned";
+}
+
 double RunSummary::sim_s() const {
   const auto cycles = static_cast<std::int64_t>(cycle.running_cycles());
   return static_cast<double>(cycles * composition.experiment.loop.period_ns) / 1e9;
@@ -399,6 +418,8 @@ Json RunSummary::json() const {
   json["robot"] = e.robot.name;
   json["hal"] = hal_name(e);
   json["seed"] = e.seed;
+  json["ended"] = ended();
+  json["planned_cycles"] = planned_cycles() > 0 ? Json(planned_cycles()) : Json(nullptr);
   json["cycles"] = cycle.running_cycles();
   json["period_ns"] = e.loop.period_ns;
   json["sim_seconds"] = sim_s();
@@ -501,6 +522,11 @@ void RunSummary::print(std::FILE* out) const {
     fmt::print(out, "\n");
   }
   Facts facts;
+  if (cut_short()) {
+    const auto planned = static_cast<double>(planned_cycles()) *
+                         static_cast<double>(composition.experiment.loop.period_ns) * 1e-9;
+    facts.add("ended", fmt::format("{} after {:.3f} of {:.3f} s", ended(), sim_s(), planned));
+  }
   add_limited(*this, facts);
   add_motion_facts(*this, facts);
   add_estimate_facts(*this, facts);

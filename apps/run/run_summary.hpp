@@ -36,6 +36,15 @@ struct RunSummary {
   const internal_model::Differences* differences = nullptr;  ///< with it
   const remote::Server* server = nullptr;  ///< null: nobody could own the robot from afar
 
+  int interrupted_by = 0;  ///< the signal that asked the run to end; 0: none did
+
+  /// Cycles under the controllers that the run was to have; 0: it has no planned end.
+  [[nodiscard]] std::uint64_t planned_cycles() const;
+  /// Whether a signal ended it before its planned end.
+  [[nodiscard]] bool cut_short() const;
+  /// How it ended: "as planned", "interrupted by SIGINT", "on request", …; "by a fault" when one is
+  /// latched and nobody interrupted it.
+  [[nodiscard]] std::string ended() const;
   [[nodiscard]] double sim_s() const;
   /// Simulated by wall clock, while controllers ran; 0: they did not.
   [[nodiscard]] double realtime_factor() const;

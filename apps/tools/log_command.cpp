@@ -11,6 +11,7 @@
 #include "apps/tools/commands.hpp"
 #include "apps/tools/log_thresholds.hpp"
 #include "base/counted.hpp"
+#include "base/quoting.hpp"
 #include "log/compare.hpp"
 #include "log/csv.hpp"
 #include "log/log_file.hpp"
@@ -104,7 +105,7 @@ Status print_fields(const log::LogFile& file, const std::string& name, std::FILE
   if ((*topic)->layout.fields().empty()) {
     const bool events = name == "/tandem/event";
     return fail("the messages of " + name + " are no table of fields but " + (*topic)->type,
-                events ? "tandem log csv " + file.path() + " --topic event lists them"
+                events ? "tandem log csv " + shell_word(file.path()) + " --topic event lists them"
                        : "open the log in a viewer: docs/log.md");
   }
   Table table({"field", "values", "meaning"});

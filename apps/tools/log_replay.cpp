@@ -14,6 +14,7 @@
 #include "apps/tools/relative_path.hpp"
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 #include "controllers/motion_plan.hpp"
 #include "hal/config/capabilities.hpp"
 #include "log/joint_motion.hpp"
@@ -95,13 +96,17 @@ Result<std::vector<std::size_t>> joints_of(const LogOptions& options, const hal:
 Error with_options(Error error) {
   const std::pair<std::string_view, std::string_view> names[] = {
       {"from_s and to_s", "--from and --to"},
+      {"from_s", "--from"},
       {"to_s", "--to"},
+      {"(speed)", "(--speed)"},
       {"source = \"state\"", "--source state"},
       {"`joints`", "--joints"},
       {"play it without: torque = false", "leave out --torque"}};
   for (const auto& [key, option] : names) {
-    const std::size_t at = error.hint.find(key);
-    if (at != std::string::npos) error.hint.replace(at, key.size(), option);
+    std::size_t at = error.hint.find(key);
+    for (; at != std::string::npos; at = error.hint.find(key, at + option.size())) {
+      error.hint.replace(at, key.size(), option);
+    }
   }
   return error;
 }
@@ -141,8 +146,8 @@ Result<Replay> plan(const LogOptions& options) {
   const auto made = MotionPlan::make(replay.motion, replay.robot, replay.joints,
                                      replay.carried.period_ns.value_or(kCycle_ns), options.speed);
   if (!made) {
-    return std::unexpected(
-        Error{made.error().message, made.error().hint, options.log, 0, made.error().key});
+    return std::unexpected(with_options(
+        Error{made.error().message, made.error().hint, options.log, 0, made.error().key}));
   }
   const hal::Posture* start = replay.robot.posture(replay.posture);
   replay.approach_s = log::kReplayApproach_s;
@@ -243,10 +248,10 @@ void print_facts(const Replay& replay, const LogOptions& options, std::FILE* out
                         replay.posture.empty() ? "every joint at 0" : "posture " + replay.posture));
   if (!replay.carried.keys.empty())
     facts.add("as recorded", fmt::format("{}", fmt::join(replay.carried.keys, ", ")));
-  facts.add("next", "tandem run " + options.output);
+  facts.add("next", "tandem run " + shell_word(options.output));
   facts.add("", fmt::format("tandem report {} RUN, RUN being the log that this writes: one over "
                             "the other",
-                            options.log));
+                            shell_word(options.log)));
   facts.print(out);
 }
 

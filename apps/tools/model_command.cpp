@@ -19,7 +19,11 @@ Status build(const RobotFiles& robot, const ModelOptions& options) {
   build.library = options.output;
   if (options.output.empty()) {
     auto path = user_library(robot.config.name, model::description_hash(robot.tree, robot.spec));
-    if (!path) return std::unexpected(path.error());
+    if (!path) {
+      Error error = path.error();
+      error.hint += ", or name the library with -o";
+      return std::unexpected(std::move(error));
+    }
     build.library = std::move(*path);
   }
   if (Status lost = check_overwrites(build.library,

@@ -15,6 +15,7 @@
 #include "apps/tools/right_angles.hpp"
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 #include "base/utf8.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "model/tree.hpp"
@@ -204,9 +205,9 @@ void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
 
 void print_next(const std::string& folder, std::FILE* out) {
   fmt::print(out,
-             "\nNext:\n  tandem run {0}/hold.toml --report\n  tandem run {0}/move.toml --report\n"
-             "Look for `guess` in {0}/robot.toml: replace each by your own figure.\n",
-             folder);
+             "\nNext:\n  tandem run {} --report\n  tandem run {} --report\n"
+             "Look for `guess` in {}/robot.toml: replace each by your own figure.\n",
+             shell_word(folder + "/hold.toml"), shell_word(folder + "/move.toml"), folder);
 }
 
 /// What can be said of the input before it is read as XML.
@@ -217,13 +218,13 @@ Diagnostics check_input(const std::string& file) {
   if (fs::path(file).extension() != ".toml") return {};
   if (is_robot(file)) {
     return one("this is a robot.toml already: `tandem new` makes one, from a URDF",
-               "`tandem check " + file +
+               "`tandem check " + shell_word(file) +
                    "` reads it, `tandem run` takes the experiments beside "
                    "it; or name the URDF that a new folder is to be made from",
                file);
   }
   return one("this is a TOML file: `tandem new` starts from a URDF",
-             "`tandem run " + file + "` runs an experiment", file);
+             "`tandem run " + shell_word(file) + "` runs an experiment", file);
 }
 
 /// Whether the robot may be written to `folder`.

@@ -51,10 +51,13 @@ Json DdsServices::ask(const std::string& question, const dds::Asker& asker) cons
       if (const Status open = gate_(name, effect, request); !open) return open;
     }
     if (effect != ControlEffect::kChanges || admission_->admits(asker)) return {};
-    return fail(name + ": this process takes no commands from a stranger",
-                "start both as one user on one machine; or have the participant admitted: tandem "
-                "ask '{\"do\": \"dds.admit\", \"participant\": \"" +
-                    (asker ? dds::to_text(*asker) : "…") + "\"}' (docs/security.md)");
+    return fail(
+        name + ": this process takes no commands from a stranger",
+        "a `tandem` command is taken from the user who runs this process, on its machine; from "
+        "others with [remote] trust = \"domain\" in its experiment, or with [dds.security]. A "
+        "program that stays in the domain, as a ROS 2 node does, can be admitted by that "
+        "user: tandem ask '{\"do\": \"dds.admit\", \"participant\": \"" +
+            (asker ? dds::to_text(*asker) : "…") + "\"}' (docs/security.md)");
   };
   return registry_->answer(question, gate);
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/quoting.hpp"
 #include "canopen/drive_abilities.hpp"
 
 namespace tandem::hal {
@@ -134,13 +135,13 @@ Status check_capability(const RobotConfig& robot, std::size_t joint, ControlMode
   if (capabilities_of(robot, config).can(mode, interaction)) return {};
   const BoardConfig* board = robot.board(config.board);
   if (board != nullptr && !board->eds.empty()) {
-    return std::unexpected(
-        Error{.message = "joint '" + config.name + "' has no " + to_string(mode) + " control (" +
-                         to_string(interaction) + "): its drive has no such mode",
-              .hint = "`tandem eds show " + board->eds + "` lists its modes; ask for another",
-              .file = robot.file,
-              .line = board->line,
-              .key = "board." + board->name});
+    return std::unexpected(Error{
+        .message = "joint '" + config.name + "' has no " + to_string(mode) + " control (" +
+                   to_string(interaction) + "): its drive has no such mode",
+        .hint = "`tandem eds show " + shell_word(board->eds) + "` lists its modes; ask for another",
+        .file = robot.file,
+        .line = board->line,
+        .key = "board." + board->name});
   }
   Error error{.message = "joint '" + config.name + "' has no " + to_string(mode) + " control (" +
                          to_string(interaction) + ")",

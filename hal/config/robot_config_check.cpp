@@ -5,6 +5,7 @@
 
 #include "hal/config/capabilities.hpp"
 #include "hal/config/drive_ranges.hpp"
+#include "hal/config/following_error.hpp"
 #include "hal/config/joint_scale.hpp"
 #include "hal/config/robot_config_read.hpp"
 
@@ -276,6 +277,9 @@ class Completion : private Check {
     fill(joint.max_velocity_rad_s, found.max_velocity_rad_s, "max_velocity_rad_s");
     fill(joint.max_torque_Nm, found.max_torque_Nm, "max_torque_Nm");
     report_unlimited(joint, found);
+    if (joint.slides && !joint.following_error_given) {
+      joint.following_error_rad = slide_following_error_m(joint);
+    }
     if (std::isnan(joint.rated_torque_Nm)) joint.rated_torque_Nm = joint.max_torque_Nm;
     if (joint.max_torque_Nm > 32.0 * joint.rated_torque_Nm) {
       error(joint.line, key + ".rated_torque_Nm",

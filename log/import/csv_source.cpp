@@ -58,8 +58,25 @@ class CsvSource {
         return CsvPlace{.file = f, .column = c};
       }
     }
-    return std::unexpected(Error{"the recording has no column '" + name + "'", suggest(name, names),
-                                 map_.file, line, key});
+    const std::string other = other_delimiter();
+    return std::unexpected(Error{"the recording has no column '" + name + "'",
+                                 other.empty() ? suggest(name, names) : other, map_.file, line,
+                                 key});
+  }
+
+  /// When a header is one column only and has another delimiter in it: what to write; else empty.
+  [[nodiscard]] std::string other_delimiter() const {
+    for (const CsvRows& rows : rows_) {
+      if (rows.names().size() != 1) continue;
+      const std::string& header = rows.names().front();
+      for (const auto& [sign, word] :
+           {std::pair{';', "semicolon"}, {'\t', "tab"}, {',', "comma"}}) {
+        if (header.find(sign) == std::string::npos) continue;
+        return "its header is one column, '" + header + "': say delimiter = \"" + word +
+               "\" in [csv] of the map";
+      }
+    }
+    return {};
   }
 
   Status add(const std::string& name, int line, const std::string& key, Target target, double scale,

@@ -28,11 +28,37 @@ TEST_F(BadInput, FromAControllersLibraryIsRefused) {
     EXPECT_EQ(threw.status, 2) << threw.err;
     EXPECT_NE(threw.err.find("threw an exception: no such thing"), std::string::npos) << threw.err;
     edit("hold.toml", "plugin = \"throws\"", "plugin = \"exits\"");
-    const Outcome ended = tandem(command + " hold.toml", folder);
+    const Outcome ended = tandem(command + " hold.toml --json ended.json", folder);
     EXPECT_EQ(ended.status, 2) << ended.err;
-    EXPECT_NE(ended.err.find("the controller ended the process with exit()"), std::string::npos)
-        << ended.err;
+    EXPECT_NE(ended.err.find("the controller called exit()"), std::string::npos) << ended.err;
+    EXPECT_EQ(json("ended.json")["ok"], false) << "there was none";
+    std::filesystem::remove(folder_ / "ended.json");
     edit("hold.toml", "plugin = \"exits\"", "plugin = \"hold\"");
+  }
+  EXPECT_FALSE(has_log());
+}
+
+// `tandem run` and `tandem check` had waited for ever.
+TEST_F(BadInput, FromAControllersLibraryThatDoesNotReturnIsRefused) {
+  const std::string hold = read_text(folder_ / "hold.toml");
+  const std::string program =
+      "TANDEM_CONTROLLERS='" TANDEM_BINARY_DIR
+      "/tests/broken_plugins' timeout 200 '" TANDEM_BINARY_DIR "/bin/tandem' ";
+  std::string both = "cd '" + folder_.string() + "'";
+  for (const std::string command : {"check", "run"}) {
+    const std::string plugin = command == "run" ? "never_returns" : "never_returns_when_made";
+    write_text(folder_ / (command + ".toml"), hold);
+    edit(command + ".toml", "plugin = \"hold\"", "plugin = \"" + plugin + "\"");
+    both += " && { (" + program + command + " " + command + ".toml --json " + command +
+            ".json >/dev/null 2>" + command + ".txt </dev/null; echo $? >" + command +
+            ".status) & }";
+  }
+  ASSERT_EQ(std::system((both + " && wait").c_str()), 0);
+  for (const std::string command : {"check", "run"}) {
+    EXPECT_EQ(read_text(folder_ / (command + ".status")), "2\n");
+    const std::string err = read_text(folder_ / (command + ".txt"));
+    EXPECT_NE(err.find("the controller did not return within 15000 ms"), std::string::npos) << err;
+    EXPECT_EQ(json(command + ".json")["ok"], false);
   }
   EXPECT_FALSE(has_log());
 }

@@ -393,7 +393,7 @@ TEST_F(Confined, ARunIsAskedAndStopsBySignal) {
                 .status,
             0);
   ASSERT_EQ(::kill(run, SIGINT), 0);
-  EXPECT_EQ(wait(run), 0) << read_text(folder_ / "err.txt");
+  EXPECT_EQ(wait(run), 130) << read_text(folder_ / "err.txt");
 }
 
 // That the list is a list: what it leaves out ends the process here.

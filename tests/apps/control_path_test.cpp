@@ -293,6 +293,19 @@ TEST_F(Impostor, IsNobodyWhomRootNamesInTheFolderOfItsOwner) {
   EXPECT_FALSE(ask(where, {{"do", "estop"}}).has_value());
 }
 
+// "is the process running?"
+TEST_F(Impostor, IsToldWhoseTheSocketIs) {
+  const auto mine = open(path);
+  ASSERT_EQ(::chmod(folder.c_str(), 0755), 0);
+  const auto told = [&] {
+    const auto answer = ask(path, {{"do", "help"}});
+    const bool said =
+        !answer && answer.error().message.find("is another user's") != std::string::npos;
+    return said ? 1 : 0;
+  };
+  EXPECT_EQ(as_user(kStranger, told), 1);
+}
+
 TEST_F(Impostor, FindsTheSocketOfARunShut) {
   const auto mine = open(path);
   ASSERT_EQ(::chmod(path.c_str(), 0777), 0);  // as if its mode did not hold

@@ -1,10 +1,13 @@
 // A run's services over DDS do what its registry's commands do, and no more than [remote] allows.
 #include "apps/transport/dds_services.hpp"
 
+#include <fmt/core.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
+
+#include <atomic>
 
 #include "dds/service_client.hpp"
 #include "tests/apps/running.hpp"
@@ -138,6 +141,9 @@ TEST_F(RunOverDds, ChangesForAStrangerWaitUntilHeIsAdmitted) {
   EXPECT_NE(refused["error"].dump().find("takes no commands from a stranger"), std::string::npos);
   const std::string self = dds::to_text(dds::id_of(*participant_));
   EXPECT_NE(refused["hint"].dump().find(self), std::string::npos) << refused["hint"];
+  EXPECT_NE(refused["hint"].get<std::string>().find("[remote] trust = \"domain\""),
+            std::string::npos)
+      << "a `tandem` command is another participant at every try: " << refused["hint"];
   EXPECT_NE(active_after({"hold"}, {})[0].find("from a stranger"), std::string::npos);
   const std::string admit = R"({"do": "dds.admit", "participant": ")" + self + "\"}";
   EXPECT_EQ(ask(admit)["ok"], false) << "nor does he admit himself";
@@ -345,7 +351,9 @@ TEST_F(DdsCommands, AreAnsweredAsOverTheSocket) {
   EXPECT_EQ(over_dds("clock step 5").status, 0);
   EXPECT_EQ(over_dds("clock resume").status, 0);
   EXPECT_EQ(over_dds("inject kind=supply_sag board=board1 volts=10").status, 2) << "no such board";
-  EXPECT_EQ(over_dds("estop --category 0").out, "emergency stop, category0\n");
+  const std::string stop = over_dds("estop --category 0").out;
+  EXPECT_TRUE(stop.starts_with("tandem_run (process ")) << stop;
+  EXPECT_TRUE(stop.ends_with("): emergency stop, category0\n")) << stop;
   until(R"("phase": "faulted")");
   const Outcome reset = over_dds("fault reset");
   EXPECT_EQ(reset.status, 0) << reset.err;
@@ -399,6 +407,73 @@ TEST_F(DdsCommands, AStopAsksNobodyForAdmission) {
   std::filesystem::remove_all(runtime);
   until(R"("phase": "faulted")");
   EXPECT_EQ(end(), 1);
+}
+
+/// Another process' services, in this one.
+struct SecondRun {
+  explicit SecondRun(dds::Participant& participant) {
+    registry.add(
+        "estop", ControlEffect::kStops, "stops",
+        {{.name = "category", .type = ControlKey::Type::kInteger, .doc = "0 to 2"}},
+        [this](const Json& request) -> Result<Json> {
+          ++stops;
+          if (refuses) return fail("its loop hangs", "press its emergency stop");
+          return Json{{"category", fmt::format("category{}", request.value("category", 1))}};
+        });
+    auto opened = DdsServices::open(participant, registry, {}, admission);
+    EXPECT_TRUE(opened) << opened.error().to_string();
+    if (opened) services = std::move(*opened);
+  }
+  std::atomic<int> stops = 0;
+  std::atomic<bool> refuses = false;
+  ControlRegistry registry;
+  DdsAdmission admission{true};
+  std::unique_ptr<DdsServices> services;
+};
+
+// "2 processes serve tandem/ask (say which …)": nobody was stopped.
+TEST_F(DdsCommands, AStopIsForAllOfSeveralRuns) {
+  begin_with("");
+  SecondRun second(*participant_);
+  const Outcome stop = over_dds("estop --category 0");
+  EXPECT_EQ(stop.status, 0) << stop.err;
+  EXPECT_NE(stop.out.find("tandem_run (process "), std::string::npos) << stop.out;
+  EXPECT_NE(stop.out.find("tester (process " + std::to_string(::getpid()) +
+                          "): emergency stop, category0\n"),
+            std::string::npos)
+      << stop.out;
+  EXPECT_EQ(second.stops, 1);
+  until(R"("phase": "faulted")");
+  second.refuses = true;
+  const Outcome partly = over_dds("estop");
+  EXPECT_EQ(partly.status, 1) << "one has not confirmed";
+  EXPECT_NE(partly.err.find("its loop hangs"), std::string::npos) << partly.err;
+  EXPECT_EQ(end(), 1);
+}
+
+TEST_F(DdsCommands, AStopIsForAllOfSeveralNamespaces) {
+  write_text(folder_ / "hold.toml",
+             read_text(folder_ / "hold.toml") + "[dds]\nnamespace = \"left\"\n");
+  begin_with("");
+  SecondRun second(*participant_);
+  const Outcome one = over_dds("estop --namespace ''");
+  EXPECT_EQ(second.stops, 1) << one.err;
+  EXPECT_EQ(one.out.find("left"), std::string::npos) << one.out;
+  const Outcome stop = over_dds("estop");
+  EXPECT_EQ(stop.status, 0) << stop.err;
+  EXPECT_NE(stop.out.find("tandem_run in the namespace 'left' (process "), std::string::npos)
+      << stop.out;
+  EXPECT_EQ(second.stops, 2);
+  until(R"("phase": "faulted")");
+  EXPECT_EQ(end(), 1);
+}
+
+TEST_F(DdsCommands, AStopThatReachesNobodySaysWhatToDo) {
+  const Outcome stop = over_dds("estop");
+  EXPECT_EQ(stop.status, 1);
+  EXPECT_NE(stop.err.find("press its emergency stop or cut its power"), std::string::npos)
+      << stop.err;
+  EXPECT_EQ(stop.err.find("start one"), std::string::npos) << stop.err;
 }
 
 TEST_F(DdsCommands, AreForOneOfSeveralRuns) {

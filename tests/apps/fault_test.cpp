@@ -187,8 +187,41 @@ TEST_F(Faults, EndASimulatedRunThatWasNotToldToWait) {
 TEST_F(Faults, AClosedTerminalIsAStopInOrder) {
   begin("--on-fault wait");
   signal("HUP");
-  EXPECT_EQ(join(), 0);
-  EXPECT_LT(nlohmann::json::parse(read_text(folder_ / "run.json"))["cycles"].get<int>(), 2'000'000);
+  EXPECT_EQ(join(), 129);
+  EXPECT_LT(json("run.json")["cycles"].get<int>(), 2'000'000);
+  EXPECT_EQ(json("run.json")["ended"], "interrupted by SIGHUP");
+}
+
+// A run of 11 s that Ctrl-C ended after one looked like one that was done: status 0, and no word of
+// it in its JSON.
+TEST_F(Faults, ARunThatASignalEndsBeforeItsTimeIsNotDone) {
+  const std::pair<const char*, int> kinds[]{{"INT", 130}, {"TERM", 143}};
+  for (const auto& [name, status] : kinds) {
+    begin("");
+    signal(name);
+    EXPECT_EQ(join(), status) << name;
+    const nlohmann::json result = json("run.json");
+    EXPECT_EQ(result["ended"], std::string("interrupted by SIG") + name);
+    EXPECT_EQ(result["planned_cycles"], 2'000'000);
+    EXPECT_LT(result["cycles"].get<int>(), 2'000'000);
+    EXPECT_TRUE(result["faults"].empty()) << "the robot is stopped in order";
+  }
+  begin("");
+  EXPECT_EQ(end(), 0) << "whoever asks for the end gets it";
+  EXPECT_EQ(json("run.json")["ended"], "on request");
+  EXPECT_EQ(tandem("run hold.toml --no-log --no-socket -q --duration 0.1 --json run.json").status,
+            0);
+  EXPECT_EQ(json("run.json")["ended"], "as planned");
+  EXPECT_EQ(json("run.json")["planned_cycles"], 100);
+}
+
+TEST_F(Faults, OfARunThatASignalEndsAreItsStatus) {
+  begin("--on-fault wait");
+  EXPECT_EQ(to_run("estop").status, 0);
+  until(R"("phase": "faulted")");
+  signal("INT");
+  EXPECT_EQ(join(), 1);
+  EXPECT_EQ(json("run.json")["ended"], "interrupted by SIGINT");
 }
 
 TEST_F(Faults, AReaderThatGoesIsAStopInOrder) {

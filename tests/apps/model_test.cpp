@@ -34,6 +34,20 @@ TEST_F(Model, AUsersOwnRobotRunsFromTheCacheFolder) {
   }
 }
 
+// A run has no -o.
+TEST_F(Model, WithoutACacheFolderEachCommandSaysWhatItTakes) {
+  edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\nderivatives = true");
+  const std::string without = "env -u HOME -u XDG_CACHE_HOME";
+  const Outcome run = tandem("run hold.toml --duration 0.05 --no-log", without);
+  EXPECT_EQ(run.status, 2);
+  EXPECT_NE(run.err.find("(set one of them to an absolute path)"), std::string::npos) << run.err;
+  const Outcome build = tandem("model build robot.toml", without);
+  EXPECT_EQ(build.status, 2);
+  EXPECT_NE(build.err.find("(set one of them to an absolute path, or name the library with -o)"),
+            std::string::npos)
+      << build.err;
+}
+
 /// Kernel libraries in the cache folder of a test.
 std::ptrdiff_t libraries_in(const std::filesystem::path& folder) {
   std::ptrdiff_t count = 0;

@@ -1,5 +1,6 @@
 // `tandem new`: a folder from a URDF alone, and what then runs.
 #include <algorithm>
+#include <cmath>
 
 #include "tests/apps/program.hpp"
 
@@ -92,6 +93,85 @@ TEST_F(New, WhatSlidesIsShownInMillimetresAndNewtons) {
   const std::string page = read_text(folder_ / "cart-move-001/report.html");
   EXPECT_NE(page.find(" mm</td>"), std::string::npos);
   EXPECT_NE(page.find(" N</td>"), std::string::npos);
+}
+
+/// A lift, an arm of four joints on it, and what slides at the arm's end.
+const char kLifted[] = R"(<robot name="lifted">
+  <link name="base"><inertial><origin xyz="0 0 0.1"/><mass value="10"/>
+    <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="column"><inertial><origin xyz="0 0 0.1"/><mass value="3"/>
+    <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="l0"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+    <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="l1"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+    <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="l2"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+    <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="l3"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+    <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="finger"><inertial><origin xyz="0 0 0.02"/><mass value="0.1"/>
+    <inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="lift" type="prismatic"><parent link="base"/><child link="column"/>
+    <origin xyz="0 0 0.3"/><axis xyz="0 0 1"/>
+    <limit lower="0" upper="0.4" effort="320" velocity="0.3"/></joint>
+  <joint name="r0" type="revolute"><parent link="column"/><child link="l0"/>
+    <origin xyz="0 0 0.25"/><axis xyz="0 1 0"/>
+    <limit lower="-2.5" upper="2.5" effort="200" velocity="2"/></joint>
+  <joint name="r1" type="revolute"><parent link="l0"/><child link="l1"/>
+    <origin xyz="0 0 0.25"/><axis xyz="0 1 0"/>
+    <limit lower="-2.5" upper="2.5" effort="200" velocity="2"/></joint>
+  <joint name="r2" type="revolute"><parent link="l1"/><child link="l2"/>
+    <origin xyz="0 0 0.25"/><axis xyz="0 0 1"/>
+    <limit lower="-2.5" upper="2.5" effort="200" velocity="2"/></joint>
+  <joint name="r3" type="revolute"><parent link="l2"/><child link="l3"/>
+    <origin xyz="0 0 0.25"/><axis xyz="0 1 0"/>
+    <limit lower="-2.5" upper="2.5" effort="200" velocity="2"/></joint>
+  <joint name="grip" type="prismatic"><parent link="l3"/><child link="finger"/>
+    <origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>
+    <limit lower="0" upper="0.04" effort="20" velocity="0.1"/></joint>
+</robot>)";
+
+// The slides moved the fingers in every direction, so that the stretched arm between them was the
+// best posture.
+TEST_F(New, BendsAnArmBetweenTwoSlides) {
+  write_text(folder_ / "lifted.urdf", kLifted);
+  ASSERT_EQ(tandem("new lifted.urdf -o lifted").status, 0);
+  const std::string text = read_text(folder_ / "lifted/robot.toml");
+  const std::size_t posture = text.find("[posture.");
+  ASSERT_NE(posture, std::string::npos);
+  double bent = 0.0;
+  for (const std::string joint : {"\nr1 = ", "\nr3 = "}) {
+    const std::size_t at = text.find(joint, posture);
+    if (at != std::string::npos) bent += std::abs(std::stod(text.substr(at + joint.size())));
+  }
+  EXPECT_GT(bent, 0.5) << text.substr(posture);
+}
+
+// 0.5, a joint's that turns, was 0.5 m: the lift was pushed to its end, and nothing tripped.
+TEST_F(New, TripsASlideThatIsPushedAway) {
+  write_text(folder_ / "lifted.urdf", kLifted);
+  const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+  ASSERT_EQ(tandem("new lifted.urdf -o lifted", cache).status, 0);
+  const std::string text = read_text(folder_ / "lifted/robot.toml");
+  EXPECT_NE(text.find("following_error_rad = 0.03 "), std::string::npos) << text;
+  EXPECT_NE(text.find("following_error_rad = 0.01 "), std::string::npos) << text;
+  write_text(folder_ / "push.toml",
+             "[[fault]]\nkind = \"push\"\njoint = \"lift\"\nforce_N = [0, 0, -600]\n"
+             "after_enabled_s = 1\nfor_s = 3\n");
+  const std::string run = "run lifted/hold.toml --no-log --no-socket --duration 5 --json run.json";
+  EXPECT_EQ(tandem(run, cache).status, 0) << "without a push";
+  const Outcome pushed = tandem(run + " --scenario push.toml", cache);
+  EXPECT_EQ(pushed.status, 1);
+  EXPECT_NE(pushed.err.find("lift: following error"), std::string::npos) << pushed.err;
+  EXPECT_EQ(tandem("run lifted/move.toml --no-log --no-socket", cache).status, 0);
+}
+
+// The commands were not what a shell takes.
+TEST_F(New, QuotesTheCommandsThatComeNext) {
+  const Outcome made = tandem("new double_pendulum.urdf -o \"it's mine\"");
+  ASSERT_EQ(made.status, 0) << made.err;
+  EXPECT_NE(made.out.find("\n  tandem run 'it'\\''s mine/hold.toml' --report\n"), std::string::npos)
+      << made.out;
 }
 
 TEST_F(New, WritesOverNothingWithoutForce) {

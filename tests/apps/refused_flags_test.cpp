@@ -31,6 +31,18 @@ TEST_F(RefusedFlags, AReportWithoutALog) {
   refused("run hold.toml --no-log --report", "--no-log excludes --report");
 }
 
+// They were ignored, and the run looked as if it had talked to that bus.
+TEST_F(RefusedFlags, OfABusThatIsNotThere) {
+  refused("run hold.toml --no-log --lockstep",
+          "--lockstep: a robot in this process has no other to wait for");
+  for (const char* command : {"run hold.toml --no-log", "serve hold.toml --no-log"}) {
+    refused(std::string(command) + " --interface can0=vcan99",
+            "--interface: a robot in this process has no bus (add --hal can");
+  }
+  refused("run hold.toml --no-log --hal dds --interface can0=vcan99",
+          "--interface: the bus is the server's (give --interface to `tandem serve`)");
+}
+
 TEST_F(RefusedFlags, AnInterfaceThatLinuxCannotHave) {
   for (const char* command : {"run hold.toml --no-log", "emulate hold.toml", "doctor robot.toml"}) {
     refused(std::string(command) + " --interface can0=a_name_that_has_thirty_letters",

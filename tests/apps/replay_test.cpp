@@ -269,6 +269,9 @@ TEST_F(LogReplay, RefusesWithStatus2AndWritesNothing) {
   refused(recording_ + to + " --joints elbow", "the robot has no joint 'elbow'");
   refused(recording_ + to + " --joints joint1,joint1", "joint 'joint1' stands twice");
   refused(recording_ + to + " --speed 10", "joint 'joint");
+  refused(recording_ + to + " --speed 10",
+          "(play it slower (--speed), leave it out of --joints, play another stretch with --from "
+          "and --to, or");
   refused(recording_ + to + " --speed 2 --torque", "--torque plays the torques of a slower motion");
   refused(recording_ + to + " --posture high", "the robot has no posture 'high'");
   refused(recording_ + " --robot " TANDEM_SOURCE_DIR "/config/ur5e/robot.toml --out replay.toml",

@@ -47,6 +47,27 @@ TEST_F(Completed, KnowsWhichJointsSlide) {
   EXPECT_TRUE(robot_of(robot).joints[1].slides) << "controllers know it too";
 }
 
+// 0.5, a joint's that turns, was 0.5 m: a slide with less travel than that never tripped.
+TEST_F(Completed, WatchesWhatSlidesMoreClosely) {
+  read(kRobot);
+  EXPECT_EQ(robot.joints[1].following_error_rad, 0.5);
+  description_.moving_joints[1].slides = true;
+  description_.moving_joints[1].max_velocity_rad_s = 0.3;
+  read(kRobot);
+  EXPECT_DOUBLE_EQ(robot.joints[1].following_error_rad, 0.03) << "the way of 0.1 s";
+  EXPECT_EQ(robot.joints[0].following_error_rad, 0.5) << "it turns";
+  description_.moving_joints[1].min_position_rad = -0.01;
+  description_.moving_joints[1].max_position_rad = 0.03;
+  read(kRobot);
+  EXPECT_DOUBLE_EQ(robot.joints[1].following_error_rad, 0.02) << "half its travel";
+  description_.moving_joints[1].max_position_rad = 10.0;
+  description_.moving_joints[1].max_velocity_rad_s = 20.0;
+  read(kRobot);
+  EXPECT_EQ(robot.joints[1].following_error_rad, 0.5) << "no more than of a joint that turns";
+  read(with(kRobot, "[[joint]]", "following_error_rad = 0.4\n"));
+  EXPECT_EQ(robot.joints[1].following_error_rad, 0.4) << "what the file says, it says";
+}
+
 TEST_F(Completed, GivesAContinuousJointWhatItsEncoderCounts) {
   description_.moving_joints[1].max_position_rad = INFINITY;
   read(kRobot);

@@ -1,4 +1,5 @@
 // Tables of text with the quirks of those that people publish.
+#include <algorithm>
 #include <cstdlib>
 #include <numbers>
 
@@ -40,6 +41,17 @@ std::string plain_rows(int rows, const std::function<std::string(int, std::strin
 }
 
 class Csv : public Import {};
+
+// It was "no column 't'", with the nearest name.
+TEST_F(Csv, OfAnotherDelimiterIsToldWhichKeySaysSo) {
+  std::string rows = plain_rows(5);
+  std::ranges::replace(rows, ',', ';');
+  EXPECT_NE(refusal({write("a.csv", rows)}, kPlain)
+                .find("the recording has no column 't' (its header is one column, "
+                      "'t;q1;q2;dq1;dq2;tau1;tau2': say delimiter = \"semicolon\" in [csv] of the "
+                      "map)"),
+            std::string::npos);
+}
 
 TEST_F(Csv, GivesItsNumbersBitForBit) {
   const ImportSummary done = imported({write("a.csv", plain_rows(50))}, kPlain);

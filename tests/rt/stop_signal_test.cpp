@@ -15,7 +15,14 @@ TEST(StopSignal, TurnsSigtermAndSigintIntoAFlag) {
     EXPECT_FALSE(stop_requested());
     std::raise(signal);
     EXPECT_TRUE(stop_requested());
+    EXPECT_EQ(stop_signal(), signal);
+    if (signal != SIGHUP) std::raise(SIGHUP);
+    EXPECT_EQ(stop_signal(), signal) << "the first one is the cause";
   }
+  clear_stop();
+  EXPECT_EQ(stop_signal(), 0);
+  request_stop();
+  EXPECT_EQ(stop_signal(), 0) << "no signal did that";
   clear_stop();
   EXPECT_FALSE(stop_requested());
 }

@@ -11,6 +11,7 @@
 
 #include "hal/ethercat-can/bus_load.hpp"
 #include "runtime/experiment.hpp"
+#include "scaffold/strength.hpp"
 #include "scaffold/toml_words.hpp"
 #include "scaffold/words.hpp"
 #include "tests/scaffold/robots.hpp"
@@ -315,9 +316,16 @@ TEST(NewRobot, SaysWhichDrivesAreTooWeakForThePosture) {
   for (const Error& warning : arm.warnings) {
     EXPECT_NE(warning.message.find("its limit (<limit effort>) is 4 Nm"), std::string::npos)
         << warning.to_string();
+    EXPECT_NE(warning.message.find("it will sag, or stop with a fault"), std::string::npos);
     EXPECT_GT(warning.line, 0);
   }
   EXPECT_TRUE(made(kPublicRobots[1]).warnings.empty());
+  // At 0.95 of its limit a joint holds, and the warning said that it would not.
+  for (const Error& warning : weak_drives(arm, std::vector<double>(torques.size(), 0.95 * 4.0))) {
+    EXPECT_NE(warning.message.find("4 Nm: little reserve is left to move"), std::string::npos)
+        << warning.to_string();
+  }
+  EXPECT_EQ(weak_drives(arm, std::vector<double>(torques.size(), 3.8)).size(), torques.size());
 }
 
 TEST(NewRobot, KeepsAnArmThatStandsOnItsBaseAboveIt) {

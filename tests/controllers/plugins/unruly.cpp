@@ -1,4 +1,6 @@
-// A controller that throws or ends the process, where its macro UNRULY_AT says.
+// A controller that throws, ends the process or does not return, where its macro UNRULY_AT says.
+#include <unistd.h>
+
 #include <cstdlib>
 #include <stdexcept>
 
@@ -10,6 +12,8 @@ namespace {
 [[maybe_unused]] void misbehave() {
 #ifdef UNRULY_EXITS
   std::exit(0);
+#elif defined(UNRULY_NEVER_RETURNS)
+  for (volatile bool more = true; more;) ::pause();
 #else
   throw std::runtime_error("no such thing");
 #endif
