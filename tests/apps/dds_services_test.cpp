@@ -385,12 +385,16 @@ TEST_F(DdsCommands, AStopAsksNobodyForAdmission) {
   std::string runtime = "/tmp/tandem_admission_XXXXXX";
   ASSERT_NE(::mkdtemp(runtime.data()), nullptr);
   ASSERT_EQ(::mkdir((runtime + "/tandem").c_str(), 0700), 0);
-  const std::string path = runtime + "/tandem/run-1.sock";  // of a run that answers nothing
+  // Of a run that answers nothing. Bound by a relative path, which the kernel's table shows: so the
+  // commands of tests that run beside this one, which search all of it, do not ask it.
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  path.copy(address.sun_path, sizeof address.sun_path - 1);
+  std::string("run-1.sock").copy(address.sun_path, sizeof address.sun_path - 1);
   const int silent = ::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
+  const std::filesystem::path here = std::filesystem::current_path();
+  std::filesystem::current_path(runtime + "/tandem");
   ASSERT_EQ(::bind(silent, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  std::filesystem::current_path(here);
   ASSERT_EQ(::listen(silent, 8), 0);
   const auto asked = [silent] {
     const int client = ::accept(silent, nullptr, nullptr);
