@@ -37,7 +37,7 @@ void SquareSystem::set_right(std::size_t i, const Two& b) noexcept TANDEM_RT {
   std::ranges::copy(b, &rows_[i * stride_ + size_]);
 }
 
-/// Above the pivots A is upper triangular then; in their places stand their inverses.
+/// Makes A upper triangular, in the order of the pivots. Each pivot is replaced by its inverse.
 void SquareSystem::eliminate() noexcept TANDEM_RT {
   double* const rows = rows_.data();
   std::size_t* const order = order_.data();

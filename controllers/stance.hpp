@@ -121,10 +121,9 @@ class Stance {
   std::vector<double> q_, v_, tau_, zero_;
   std::vector<double> pose_, twist_, site_J_, com_J_, wrench_;
   std::array<double, 3> com_{}, com_velocity_{};
-  SquareSystem
-      system_;  // the equations: their Jacobian, what is left, and what rises with the base
+  SquareSystem system_;  // the Jacobian; right sides: the errors, and the base's rise
   std::vector<double> error_;
-  std::vector<SquareSystem::Two> step_;
+  std::vector<SquareSystem::Two> step_;  // solutions: of Newton's step, and per rise of the base
 };
 
 }  // namespace tandem

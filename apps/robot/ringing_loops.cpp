@@ -93,8 +93,7 @@ void sample(const hal::ActuatorConfig& a, const hal::GainsConfig& g, double peri
   const double constant = a.gear_ratio * a.torque_constant_Nm_A;
   x(kVoltage) = g.torque_feedforward * a.resistance_ohm / constant * reference_Nm +
                 g.emf_compensation * constant * x(kMotorEstimate);
-  if (elastic) {  // without a spring the torque is the current's, and the loop is the current
-                  // loop's
+  if (elastic) {  // a rigid drive has no torque loop, but a current loop
     x(kVoltage) +=
         g.torque.gains.kp * (reference_Nm - torque_Nm) - g.torque.gains.kd * x(kTorqueEstimate);
   }

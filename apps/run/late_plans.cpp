@@ -16,7 +16,7 @@ Diagnostics late_plans(const Composition& c) {
     const auto spec = one == nullptr ? e.controllers.end()
                                      : std::ranges::find(e.controllers, one->name,
                                                          &runtime::ControllerSpec::name);
-    if (spec == e.controllers.end() || !spec->active) continue;  // others start when they are told
+    if (spec == e.controllers.end() || !spec->active) continue;  // others start later
     std::vector<ControllerSetup::Plan> late;
     std::ranges::copy_if(one->plans, std::back_inserter(late),
                          [&](const auto& plan) { return plan.time_s > end_s; });
