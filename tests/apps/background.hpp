@@ -11,6 +11,8 @@
 #include <string>
 #include <utility>
 
+#include "base/quoting.hpp"
+
 namespace tandem::apps {
 
 /// Killed by the destructor; and by the kernel, when the thread that started it is gone.
@@ -19,9 +21,9 @@ class Background {
   /// Starts `tandem ARGUMENTS` in `folder`, as a shell reads them. It writes NAME.txt and NAME.err.
   Background(const std::filesystem::path& folder, const std::string& arguments,
              const std::string& name) {
-    const std::string command = "cd '" + folder.string() +
-                                "' && exec '" TANDEM_BINARY_DIR "/bin/tandem' " + arguments + " >" +
-                                name + ".txt 2>" + name + ".err </dev/null";
+    const std::string command = "cd " + shell_word(folder.string()) + " && exec " +
+                                shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " " + arguments +
+                                " >" + name + ".txt 2>" + name + ".err </dev/null";
     const pid_t test = ::getpid();
     process_ = ::fork();
     if (process_ != 0) return;

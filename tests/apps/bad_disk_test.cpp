@@ -24,7 +24,8 @@ class Mount {
 
  private:
   [[nodiscard]] bool run(const std::string& command) const {
-    return std::system((command + " '" + folder_.string() + "' 2>/dev/null").c_str()) == 0;
+    return std::system((command + " " + shell_word(folder_.string()) + " 2>/dev/null").c_str()) ==
+           0;
   }
   std::filesystem::path folder_;
   bool mounted_ = false;

@@ -21,7 +21,8 @@ TEST_F(BadInput, OfATerminalsEscapesIsShownAndNotObeyed) {
 /// A plugin that threw had ended `tandem check` with a signal, one that called exit(0) with
 /// success.
 TEST_F(BadInput, FromAControllersLibraryIsRefused) {
-  const std::string folder = "TANDEM_CONTROLLERS='" TANDEM_BINARY_DIR "/tests/broken_plugins'";
+  const std::string folder =
+      "TANDEM_CONTROLLERS=" + shell_word(TANDEM_BINARY_DIR "/tests/broken_plugins");
   for (const std::string command : {"check", "run"}) {
     edit("hold.toml", "plugin = \"hold\"", "plugin = \"throws\"");
     const Outcome threw = tandem(command + " hold.toml", folder);
@@ -42,9 +43,9 @@ TEST_F(BadInput, FromAControllersLibraryIsRefused) {
 TEST_F(BadInput, FromAControllersLibraryThatDoesNotReturnIsRefused) {
   const std::string hold = read_text(folder_ / "hold.toml");
   const std::string program =
-      "TANDEM_CONTROLLERS='" TANDEM_BINARY_DIR
-      "/tests/broken_plugins' timeout 200 '" TANDEM_BINARY_DIR "/bin/tandem' ";
-  std::string both = "cd '" + folder_.string() + "'";
+      "TANDEM_CONTROLLERS=" + shell_word(TANDEM_BINARY_DIR "/tests/broken_plugins") +
+      " timeout 200 " + shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " ";
+  std::string both = "cd " + shell_word(folder_.string());
   for (const std::string command : {"check", "run"}) {
     const std::string plugin = command == "run" ? "never_returns" : "never_returns_when_made";
     write_text(folder_ / (command + ".toml"), hold);
@@ -462,7 +463,7 @@ TEST_F(BadInput, AFileThatIsNoUtf8IsRefusedInJsonToo) {
   write_text(folder_ / "latin\xE9.toml", "name = \"caf\xE9\"\n");
   write_text(folder_ / "names.toml", "robot = \"caf\xC3\xA9.toml\"\nduration_s = 1\n");
   for (const std::string file : {"latin\xE9.toml", "names.toml"}) {
-    const Outcome outcome = tandem("check '" + file + "' --json -");
+    const Outcome outcome = tandem("check " + shell_word(file) + " --json -");
     EXPECT_EQ(outcome.status, 2) << outcome.err;
     const auto json = nlohmann::json::parse(outcome.out);
     EXPECT_EQ(json["ok"], false);

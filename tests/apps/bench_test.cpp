@@ -9,7 +9,7 @@ namespace {
 class Bench : public Program {
  protected:
   [[nodiscard]] std::string cache() const {
-    return "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+    return "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache");
   }
 };
 

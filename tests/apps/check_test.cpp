@@ -26,7 +26,7 @@ TEST_F(Check, ReadsARobotByItself) {
 
 TEST_F(Check, ShowsTheScalesOfDrivesOfOthersAndWhereTheyComeFrom) {
   const std::string robot = TANDEM_SOURCE_DIR "/config/panda_classic/robot.toml";
-  const Outcome outcome = tandem("check '" + robot + "' --json scales.json");
+  const Outcome outcome = tandem("check " + shell_word(robot) + " --json scales.json");
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   const auto json = nlohmann::json::parse(read_text(folder_ / "scales.json"));
   ASSERT_EQ(json["scales"].size(), 7U) << json;
@@ -156,13 +156,15 @@ TEST_F(Check, RefusesWhatARealBusCannotCarryAndSoDoesRun) {
 }
 
 TEST_F(Check, TellsHowLoopsCloseAndWhatCanStillMove) {
-  const Outcome robot = tandem("check '" TANDEM_SOURCE_DIR "/config/four_bar/robot.toml'");
+  const Outcome robot =
+      tandem("check " + shell_word(TANDEM_SOURCE_DIR "/config/four_bar/robot.toml"));
   EXPECT_EQ(robot.status, 0) << robot.err;
   for (const std::string text :
        {"revolute, coupler_end to rocker_end", "closes from a gap of 0.0", "1 of 3 degrees"}) {
     EXPECT_NE(robot.out.find(text), std::string::npos) << text << "\nin: " << robot.out;
   }
-  const Outcome run = tandem("check '" TANDEM_SOURCE_DIR "/config/parallel_ankle/hold.toml'");
+  const Outcome run =
+      tandem("check " + shell_word(TANDEM_SOURCE_DIR "/config/parallel_ankle/hold.toml"));
   EXPECT_NE(run.out.find("2 of 4 degrees"), std::string::npos) << run.out;
 }
 
@@ -323,7 +325,7 @@ TEST_F(Check, HoldsOfWhatTheDemoNamesNext) {
     file = TANDEM_SOURCE_DIR "/" + file;
     EXPECT_TRUE(std::filesystem::exists(file)) << file;
     if (command != "run") continue;
-    EXPECT_EQ(tandem("check '" + file + "'").status, 0) << read_text(folder_ / "err.txt");
+    EXPECT_EQ(tandem("check " + shell_word(file)).status, 0) << read_text(folder_ / "err.txt");
   }
   EXPECT_EQ(named, 3);
 }

@@ -51,12 +51,14 @@ TEST_F(Controllers, AreLoadedSwitchedStoppedAndUnloaded) {
 
 TEST_F(Controllers, ThatAreBrokenAreRefusedWhileTheRunGoesOn) {
   begin("");
-  const std::string broken = "'" TANDEM_BINARY_DIR "/tests/broken_plugins/";
-  expect(refused("controller load " + broken + "no_entry.so'"), "has no entry point");
-  expect(refused("controller load " + broken + "older_interface.so'"),
-         "was built for controller interface ");
+  const auto broken = [](const std::string& name) {
+    return "controller load " +
+           shell_word(TANDEM_BINARY_DIR "/tests/broken_plugins/" + name + ".so");
+  };
+  expect(refused(broken("no_entry")), "has no entry point");
+  expect(refused(broken("older_interface")), "was built for controller interface ");
   for (const char* name : {"exits", "exits_when_made"})  // it had ended the run
-    expect(refused("controller load " + broken + name + ".so'"), "the controller called exit()");
+    expect(refused(broken(name)), "the controller called exit()");
   expect(refused("controller load hodl"), "did you mean 'hold'?");
   expect(refused("controller load hold"), "of this name is loaded already");
   expect(refused("controller load hold --name x --set 'durtion_s = 2'"), "durtion_s");

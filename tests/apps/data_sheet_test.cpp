@@ -100,7 +100,7 @@ TEST_F(DataSheets, OfEveryBundledRobotReadBackEqual) {
     if (!std::filesystem::exists(entry.path() / "robot.toml")) continue;
     const std::string name = entry.path().filename();
     const Outcome outcome =
-        tandem("eds '" + (entry.path() / "robot.toml").string() + "' -o " + name);
+        tandem("eds " + shell_word((entry.path() / "robot.toml").string()) + " -o " + name);
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     if (!std::filesystem::exists(folder_ / name)) {  // no folder for nothing
       EXPECT_NE(outcome.out.find("nothing written"), std::string::npos) << name << outcome.out;
@@ -125,14 +125,14 @@ TEST_F(DataSheets, OfEveryBundledRobotReadBackEqual) {
 }
 
 TEST_F(DataSheets, AreShownAsTheDocumentationHasThem) {
-  const Outcome outcome = tandem("eds show '" + kMover + "'");
+  const Outcome outcome = tandem("eds show " + shell_word(kMover));
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   const std::string page = read_text(TANDEM_SOURCE_DIR "/docs/drives.md");
   EXPECT_NE(page.find("\n" + outcome.out + "```"), std::string::npos) << outcome.out;
 }
 
 TEST_F(DataSheets, AreShownToPrograms) {
-  const Outcome outcome = tandem("eds show '" + kMover + "' --json -");
+  const Outcome outcome = tandem("eds show " + shell_word(kMover) + " --json -");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const auto json = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(json["file"], kMover);

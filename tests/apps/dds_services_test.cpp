@@ -64,7 +64,7 @@ class RunOverDds : public Running {
   }
   /// The same over the control socket, which is the local operator's.
   [[nodiscard]] nlohmann::json ask_local(const std::string& question) const {
-    const Outcome outcome = to_run("ask '" + question + "'");
+    const Outcome outcome = to_run("ask " + shell_word(question));
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     return nlohmann::json::parse(outcome.out, nullptr, false);
   }

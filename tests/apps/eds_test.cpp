@@ -106,10 +106,12 @@ TEST_F(Eds, OfABoardHasItsDictionaryAfterPowerOn) {
 
 TEST_F(Eds, OfClassicBoardsAndOfSensorsAreTypesOfTheirOwn) {
   const Outcome classic =
-      tandem("eds '" TANDEM_SOURCE_DIR "/config/double_pendulum_classic/robot.toml' -o classic");
+      tandem("eds " + shell_word(TANDEM_SOURCE_DIR "/config/double_pendulum_classic/robot.toml") +
+             " -o classic");
   ASSERT_EQ(classic.status, 0) << classic.err;
   expect_complete(read_sheet(folder_ / "classic/board_1_axis_classic.eds"));
-  const Outcome coman = tandem("eds '" TANDEM_SOURCE_DIR "/config/coman/robot.toml' -o coman");
+  const Outcome coman =
+      tandem("eds " + shell_word(TANDEM_SOURCE_DIR "/config/coman/robot.toml") + " -o coman");
   ASSERT_EQ(coman.status, 0) << coman.err;
   for (const char* name : {"board_2_axes_fd.eds", "force_torque_fd.eds", "imu_fd.eds"}) {
     ASSERT_TRUE(std::filesystem::exists(folder_ / "coman" / name)) << name << coman.out;

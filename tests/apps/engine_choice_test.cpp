@@ -74,7 +74,7 @@ TEST_F(EngineChoice, WithOneCoefficientOfFrictionIsWarnedOf) {
 class EngineRefusal : public EngineChoice {
  protected:
   void expect_refused(const std::string& expected) const {
-    const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+    const std::string cache = "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache");
     for (const std::string command : {"check", "run", "emulate"}) {
       const Outcome outcome = tandem(command + " hold.toml", cache);
       EXPECT_EQ(outcome.status, 2) << command;

@@ -295,12 +295,12 @@ TEST_F(EstimatedReport, RefusesThatRobotBeforeItsKernelsAreCompiled) {
   write_text(folder_ / "robot.toml", robot);
   write_text(folder_ / "squat.toml", read_text(folder_ / "squat.toml") + "\n[estimation.base]\n");
   const Outcome refused = tandem("run squat.toml --duration 1 --no-log",
-                                 "XDG_CACHE_HOME='" + folder_.string() + "/cache'");
+                                 "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache"));
   EXPECT_EQ(refused.status, 2);
   EXPECT_NE(refused.err.find("has no force/torque sensor"), std::string::npos) << refused.err;
   EXPECT_EQ(refused.err.find("compiling"), std::string::npos) << refused.err;
   const Outcome checked =
-      tandem("check squat.toml", "XDG_CACHE_HOME='" + folder_.string() + "/cache'");
+      tandem("check squat.toml", "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache"));
   EXPECT_EQ(checked.status, 2) << "it was right until the kernels were there";
   const std::string text = read_text(folder_ / "squat.toml");
   const auto line = std::count(text.begin(), text.end(), '\n');
@@ -319,7 +319,8 @@ TEST_F(EstimatedReport, RefusesPassiveJointsBeforeKernelsAreCompiled) {
   write_text(folder_ / "robot.toml", robot);
   write_text(folder_ / "hold.toml", read_text(folder_ / "hold.toml") + "\n[estimation.observer]\n");
   for (const std::string command : {"check hold.toml", "run hold.toml --no-log"}) {
-    const Outcome refused = tandem(command, "XDG_CACHE_HOME='" + folder_.string() + "/cache'");
+    const Outcome refused =
+        tandem(command, "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache"));
     EXPECT_EQ(refused.status, 2) << command;
     EXPECT_NE(refused.err.find("is passive"), std::string::npos) << refused.err;
     EXPECT_EQ(refused.err.find("compiling"), std::string::npos) << refused.err;

@@ -227,9 +227,9 @@ TEST_F(Faults, OfARunThatASignalEndsAreItsStatus) {
 TEST_F(Faults, AReaderThatGoesIsAStopInOrder) {
   for (const std::string pipe : {"| head -n 1", "2>&1 | head -n 1"}) {
     const std::string command =
-        "cd '" + folder_.string() +
-        "' && { timeout 100 '" TANDEM_BINARY_DIR
-        "/bin/tandem' run hold.toml --no-log --no-socket --duration 5000 --json run.json; "
+        "cd " + shell_word(folder_.string()) + " && { timeout 100 " +
+        shell_word(TANDEM_BINARY_DIR "/bin/tandem") +
+        " run hold.toml --no-log --no-socket --duration 5000 --json run.json; "
         "echo $? >status; } " +
         pipe + " >out.txt";
     EXPECT_EQ(std::system(command.c_str()), 0);

@@ -8,9 +8,9 @@ class FullOutput : public Program {
  protected:
   /// Runs `tandem ARGUMENTS` with this behind it in the shell.
   [[nodiscard]] Outcome with(const std::string& output, const std::string& arguments) const {
-    const std::string command = "cd '" + folder_.string() + "' && { '" + TANDEM_BINARY_DIR +
-                                "/bin/tandem' " + arguments + "; echo $? >status; } 2>err.txt " +
-                                output + " </dev/null";
+    const std::string command = "cd " + shell_word(folder_.string()) + " && { " +
+                                shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " " + arguments +
+                                "; echo $? >status; } 2>err.txt " + output + " </dev/null";
     EXPECT_EQ(std::system(command.c_str()), 0) << command;
     return {std::atoi(read_text(folder_ / "status").c_str()), "", read_text(folder_ / "err.txt")};
   }
@@ -25,7 +25,7 @@ class FullOutput : public Program {
   }
 };
 
-const std::string kSquat = "'" TANDEM_SOURCE_DIR "/config/coman/squat.toml'";
+const std::string kSquat = shell_word(TANDEM_SOURCE_DIR "/config/coman/squat.toml");
 
 TEST_F(FullOutput, IsSaidByEveryCommand) {
   ASSERT_EQ(tandem("run hold.toml --duration 0.05 --quiet --log a").status, 0);
@@ -77,13 +77,13 @@ TEST_F(FullOutput, IsNotAClosedPipe) {
     EXPECT_EQ(error_lines(err), 0) << command << "\n" << err;
     EXPECT_EQ(err.find("terminate"), std::string::npos) << command << "\n" << err;
   };
-  const std::string program = "'" TANDEM_BINARY_DIR "/bin/tandem' ";
+  const std::string program = shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " ";
   for (const std::string& arguments : {std::string("check hold.toml"), "check --bus " + kSquat,
                                        "check --json - " + kSquat, std::string("--help")}) {
     for (const std::string pipe : {"| true", "| head -n 1 >out.txt"}) {
       for (const std::string shell : {"", "trap '' PIPE; "}) {
-        const std::string command = "cd '" + folder_.string() + "' && (" + shell + program +
-                                    arguments + " 2>err.txt " + pipe + ")";
+        const std::string command = "cd " + shell_word(folder_.string()) + " && (" + shell +
+                                    program + arguments + " 2>err.txt " + pipe + ")";
         EXPECT_EQ(std::system(command.c_str()), 0) << command;
         expect_quiet(command);
       }

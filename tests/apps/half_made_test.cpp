@@ -48,7 +48,7 @@ class HalfMade : public Program {
     std::filesystem::permissions(folder_ / "bin/gnuplot", std::filesystem::perms::owner_all);
   }
   [[nodiscard]] std::string environment() const {
-    return "PATH='" + (folder_ / "bin").string() + "':$PATH";
+    return "PATH=" + shell_word((folder_ / "bin").string()) + ":$PATH";
   }
   std::string log_;
 };
@@ -124,10 +124,10 @@ TEST_F(HalfMade, PicturesAreRemovedAtAnInterrupt) {
   fake_gnuplot("cat > /dev/null\nkill -INT $PPID\n");
   const auto were = all();
   for (const char* output : {"", " -o made/of/folders", " -o ."}) {
-    const std::string command = "cd '" + folder_.string() + "' && " + environment() + " exec '" +
-                                TANDEM_BINARY_DIR "/bin/tandem' report " + log_ + output +
-                                " >out.txt 2>err.txt";
-    const int raw = std::system(("sh -c \"" + command + "\"").c_str());
+    const std::string command = "cd " + shell_word(folder_.string()) + " && " + environment() +
+                                " exec " + shell_word(TANDEM_BINARY_DIR "/bin/tandem") +
+                                " report " + log_ + output + " >out.txt 2>err.txt";
+    const int raw = std::system(("sh -c " + shell_word(command)).c_str());
     const bool interrupted = (WIFSIGNALED(raw) && WTERMSIG(raw) == SIGINT) ||
                              (WIFEXITED(raw) && WEXITSTATUS(raw) == 128 + SIGINT);
     EXPECT_TRUE(interrupted) << raw << read_text(folder_ / "err.txt");
@@ -232,7 +232,7 @@ TEST_F(HalfMade, OnlyDraftsOfItsNameWhoseProcessIsGoneAreRemoved) {
 TEST_F(HalfMade, MeasurementsLeaveNothingWhenTheyCannotWrite) {
   fake_gnuplot("cat > /dev/null\n");
   const tandem::test::ScratchFolder scratch;
-  const std::string cache = " XDG_CACHE_HOME='" + scratch.path() + "'";
+  const std::string cache = " XDG_CACHE_HOME=" + shell_word(scratch.path());
   expect_nothing("bench engines --engines tandem --scenes box --quiet -o made",
                  {"made/engines/", "could not write the whole picture"}, environment() + cache);
   const auto were = all();

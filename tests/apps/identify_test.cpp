@@ -363,7 +363,7 @@ TEST_F(Identify, FindsTheTorsoOfAHumanoidThatStands) {
 // What stands or hangs on soft springs sways: whatever the seed, what is written runs through.
 TEST_F(Identify, WritesHumanoidsExperimentsThatRunThrough) {
   if (std::getenv("TANDEM_IDENTIFY_ALL") == nullptr) GTEST_SKIP() << "takes minutes";
-  const std::string coman = TANDEM_SOURCE_DIR "/config/coman/robot.toml";
+  const std::string coman = shell_word(TANDEM_SOURCE_DIR "/config/coman/robot.toml");
   for (int seed = 1; seed <= 10; ++seed) {
     for (const char* how : {"", "--hung"}) {
       if (*how != 0 && seed > 3) continue;
@@ -427,9 +427,9 @@ TEST_F(Identify, OfTimeThatGoesBackIsOneError) {
 
 TEST_F(Identify, OfAnotherRobotsLogIsOneError) {
   ASSERT_EQ(tandem("run trajectory.toml --quiet --duration 1 --log logs").status, 0);
-  const Outcome other = tandem("identify " + log() +
-                               " --robot " TANDEM_SOURCE_DIR
-                               "/config/panda/robot.toml --out found --json found.json");
+  const Outcome other = tandem("identify " + log() + " --robot " +
+                               shell_word(TANDEM_SOURCE_DIR "/config/panda/robot.toml") +
+                               " --out found --json found.json");
   EXPECT_EQ(other.status, 2);
   EXPECT_NE(other.err.find("this log is of another robot: it has no joint 'panda_joint1'"),
             std::string::npos)
@@ -508,8 +508,8 @@ TEST_F(Identify, RefusesToExciteForTooShort) {
 }
 
 TEST_F(Identify, IsRefusedWhereLoopsAreClosed) {
-  const Outcome result =
-      tandem("excite " TANDEM_SOURCE_DIR "/config/four_bar/robot.toml --out e.toml");
+  const Outcome result = tandem(
+      "excite " + shell_word(TANDEM_SOURCE_DIR "/config/four_bar/robot.toml") + " --out e.toml");
   EXPECT_EQ(result.status, 2);
   EXPECT_NE(result.err.find("closed loops and passive joints cannot be identified"),
             std::string::npos)

@@ -24,7 +24,7 @@ class IdentifyTruth : public Program {
     std::string logs;
     for (const std::string& name : names)
       for (const auto& entry : std::filesystem::directory_iterator(folder_ / name))
-        if (entry.path().extension() == ".mcap") logs += entry.path().string() + " ";
+        if (entry.path().extension() == ".mcap") logs += shell_word(entry.path().string()) + " ";
     const Outcome found = tandem("identify " + logs + "--robot " + description(robot) +
                                  " --out found --json found.json");
     EXPECT_EQ(found.status, 0) << found.err;
@@ -41,7 +41,7 @@ class IdentifyTruth : public Program {
     return out;
   }
   static std::string description(const std::string& robot) {
-    return "'" TANDEM_SOURCE_DIR "/config/" + robot + "/robot.toml'";
+    return shell_word(TANDEM_SOURCE_DIR "/config/" + robot + "/robot.toml");
   }
 };
 
@@ -71,7 +71,7 @@ TEST_F(IdentifyTruth, OfALogThatIsOutOfStepWithTheBoardsHasAWarning) {
   ASSERT_EQ(tandem("excite ur5e/robot.toml --out e.toml").status, 0);
   ASSERT_EQ(tandem("run e.toml --quiet --log log").status, 0);
   const auto log = *std::filesystem::directory_iterator(folder_ / "log");
-  const Outcome found = tandem("identify " + log.path().string() +
+  const Outcome found = tandem("identify " + shell_word(log.path().string()) +
                                " --robot ur5e/robot.toml --out found --json found.json");
   ASSERT_EQ(found.status, 0) << found.err;
   EXPECT_NE(found.err.find("warning: the boards' control has another period than the log"),

@@ -51,9 +51,10 @@ TEST_F(Parallel, OfOtherGainsDiffersInTableLogAndReport) {
 
 /// COMAN, whose base floats: how far the two bases are apart is known, and nothing for a twin.
 TEST_F(Parallel, OfAFloatingBaseComparesTheBases) {
-  const Outcome twin = tandem("run '" TANDEM_SOURCE_DIR
-                              "/config/coman/squat_twin.toml' --duration 0.5 --no-log --json "
-                              "run.json");
+  const Outcome twin =
+      tandem("run " + shell_word(TANDEM_SOURCE_DIR "/config/coman/squat_twin.toml") +
+             " --duration 0.5 --no-log --json "
+             "run.json");
   ASSERT_EQ(twin.status, 0) << twin.err;
   EXPECT_EQ(json("run.json")["parallel"]["base"]["position_m"]["max"], 0.0);
   EXPECT_EQ(json("run.json")["parallel"]["base"]["angle_rad"]["max"], 0.0);

@@ -62,8 +62,8 @@ class LineRun : public Program {
 
 TEST_F(LineRun, ASquatOverACableIsTheInProcessRunBitForBit) {
   const std::string squat = TANDEM_SOURCE_DIR "/config/coman/squat_ethercat.toml";
-  const Outcome alone = tandem("run '" + squat + "' --duration 1 --no-socket -q --log '" +
-                               file("in_process") + "' --json in.json");
+  const Outcome alone = tandem("run " + shell_word(squat) + " --duration 1 --no-socket -q --log " +
+                               shell_word(file("in_process")) + " --json in.json");
   ASSERT_EQ(alone.status, 0) << alone.err;
   EXPECT_EQ(json("in.json")["faults"].size(), 0U);
   const int status =
@@ -102,8 +102,8 @@ TEST_F(LineRun, AHomingOverACableAndTheMotionBehindItAreTheInProcessRunBitForBit
              read_text(folder_ / "hold.toml") +
                  "[controller.parameters]\n[[controller.parameters.waypoint]]\n"
                  "time_s = 0.8\nposition_rad = [-0.3, 0.4]\n");
-  const Outcome alone = tandem("run hold.toml --duration 3 --no-socket -q --log '" +
-                               file("in_process") + "' --json in.json");
+  const Outcome alone = tandem("run hold.toml --duration 3 --no-socket -q --log " +
+                               shell_word(file("in_process")) + " --json in.json");
   ASSERT_EQ(alone.status, 0) << alone.err;
   const int status = run_over_cable(file("hold.toml"),
                                     {"--duration", "3", "-q", "--log", file("over_cable")}, true);
@@ -139,9 +139,9 @@ TEST_F(LineRun, TsharkReadsEveryFrameOfAStartAndARun) {
   if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
   ASSERT_EQ(status, 0);
   const auto count = [&](const std::string& filter) {
-    const std::string command = "tshark -r '" + file("cable.pcapng") + "' -Y '" + filter +
-                                "' -T fields -e frame.number 2>/dev/null | wc -l > '" +
-                                file("count") + "'";
+    const std::string command =
+        "tshark -r " + shell_word(file("cable.pcapng")) + " -Y " + shell_word(filter) +
+        " -T fields -e frame.number 2>/dev/null | wc -l > " + shell_word(file("count"));
     EXPECT_EQ(std::system(command.c_str()), 0);
     return std::stoi(read_text(file("count")));
   };

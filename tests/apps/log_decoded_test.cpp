@@ -28,13 +28,13 @@ class DecodedLog : public Program {
   /// Every message of every channel of the experiment's log, beside `tandem log csv`.
   /// @param viewed  the topics for ROS viewers
   void expect_decoded(const std::string& experiment, std::set<std::string> viewed) const {
-    const Outcome run = tandem("run '" TANDEM_SOURCE_DIR "/config/" + experiment +
-                               "' --duration 0.3 --json - --quiet");
+    const Outcome run = tandem("run " + shell_word(TANDEM_SOURCE_DIR "/config/" + experiment) +
+                               " --duration 0.3 --json - --quiet");
     ASSERT_EQ(run.status, 0) << run.err;
     const std::string log = nlohmann::json::parse(run.out)["log"]["path"];
     const auto info = nlohmann::json::parse(tandem("log info " + log + " --json -").out);
     std::string command =
-        std::string("'") + kNode + "' '" + kFolder + "/decode_log.mjs' " + log + " 10";
+        shell_word(kNode) + " " + shell_word(kFolder + "/decode_log.mjs") + " " + log + " 10";
     for (const auto& [topic, about] : info["topics"].items()) {
       if (!topic.starts_with("/tandem/")) {
         EXPECT_EQ(viewed.erase(topic), 1u) << topic;
@@ -47,7 +47,7 @@ class DecodedLog : public Program {
       command += " " + topic + "=" + table;
     }
     EXPECT_TRUE(viewed.empty()) << "there is no " << *viewed.begin();
-    command = "cd '" + folder_.string() + "' && " + command + " > decoded.txt 2>&1";
+    command = "cd " + shell_word(folder_.string()) + " && " + command + " > decoded.txt 2>&1";
     EXPECT_EQ(std::system(command.c_str()), 0) << read_text(folder_ / "decoded.txt");
   }
 };

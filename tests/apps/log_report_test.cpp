@@ -152,8 +152,9 @@ TEST_F(LogAndReport, ReportTellsTheFaultAtTheTimeThatTheRunTold) {
 }
 
 TEST_F(LogAndReport, ReportOfClosedLoopsHasTheirErrorsAndTheTorqueThroughThem) {
-  const Outcome run = tandem("run '" TANDEM_SOURCE_DIR
-                             "/config/parallel_ankle/move.toml' --duration 0.5 --log . --report");
+  const Outcome run =
+      tandem("run " + shell_word(TANDEM_SOURCE_DIR "/config/parallel_ankle/move.toml") +
+             " --duration 0.5 --log . --report");
   ASSERT_EQ(run.status, 0) << run.err;
   EXPECT_NE(run.out.find("\n\n  closed loops"), std::string::npos) << run.out;
   const std::string page = read_text(folder_ / "parallel_ankle-move-001/report.html");
@@ -166,20 +167,19 @@ TEST_F(LogAndReport, ReportOfClosedLoopsHasTheirErrorsAndTheTorqueThroughThem) {
 TEST_F(LogAndReport, AKilledRunLeavesALogThatIsReadAndDrawn) {
   const std::string log = (folder_ / "killed/double_pendulum-trajectory-001.mcap").string();
   const std::string kill_when_it_has_written =
-      "cd '" + folder_.string() +
-      "'; '" TANDEM_BINARY_DIR
-      "/bin/tandem' run trajectory.toml --duration 60 --realtime --log killed --quiet & "
-      "for i in $(seq 300); do [ $(stat -c %s '" +
-      log +
-      "' 2>/dev/null || echo 0) -gt 300000 ] "
+      "cd " + shell_word(folder_.string()) + "; " + shell_word(TANDEM_BINARY_DIR "/bin/tandem") +
+      " run trajectory.toml --duration 60 --realtime --log killed --quiet & "
+      "for i in $(seq 300); do [ $(stat -c %s " +
+      shell_word(log) +
+      " 2>/dev/null || echo 0) -gt 300000 ] "
       "&& break; sleep 0.1; done; kill -9 $!; wait";
   std::system(kill_when_it_has_written.c_str());
-  const Outcome info = tandem("log info '" + log + "' --json -");
+  const Outcome info = tandem("log info " + shell_word(log) + " --json -");
   ASSERT_EQ(info.status, 0) << info.err;
   const auto json = nlohmann::json::parse(info.out);
   EXPECT_EQ(json["complete"], false);
   EXPECT_GT(json["topics"]["/tandem/state"]["messages"].get<int>(), 100);
-  const Outcome report = tandem("report '" + log + "'");
+  const Outcome report = tandem("report " + shell_word(log));
   EXPECT_EQ(report.status, 0) << report.err;
   EXPECT_EQ(report.err, "") << "nothing is left out";
 }

@@ -18,7 +18,7 @@ TEST_F(Model, BuildsALibraryAndLeavesItAloneTheSecondTime) {
 
 TEST_F(Model, AUsersOwnRobotRunsFromTheCacheFolder) {
   edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\nderivatives = true");
-  const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+  const std::string cache = "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache");
   ASSERT_EQ(tandem("model build robot.toml", cache).status, 0);
   EXPECT_TRUE(std::filesystem::exists(folder_ / "cache/tandem/models"));
   const Outcome run = tandem("run hold.toml --duration 0.05 --no-log", cache);
@@ -58,7 +58,7 @@ std::ptrdiff_t libraries_in(const std::filesystem::path& folder) {
 }
 
 TEST_F(Model, TwoRobotsOfOneNameHaveTheirKernelsSideBySide) {
-  const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+  const std::string cache = "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache");
   edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = 0.003");
   const std::string other = read_text(folder_ / "robot.toml");
   ASSERT_EQ(tandem("model build robot.toml", cache).status, 0);
@@ -94,7 +94,7 @@ class MissingKernels : public Program {
   void SetUp() override {
     Program::SetUp();
     edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = 0.0025");
-    cache_ = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+    cache_ = "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache");
   }
   std::string cache_;
 };
@@ -127,8 +127,8 @@ TEST_F(MissingKernels, AreNoErrorForCheckWhichTellsOfThem) {
 
 TEST_F(MissingKernels, AreBuiltOnceByRunsSideBySide) {
   const std::string run = "run hold.toml --duration 0.05 --log ";
-  const std::string other =
-      "cd '" + folder_.string() + "' && " + cache_ + " '" TANDEM_BINARY_DIR "/bin/tandem' " + run;
+  const std::string other = "cd " + shell_word(folder_.string()) + " && " + cache_ + " " +
+                            shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " " + run;
   const Outcome both = tandem(run + "a --json a.json & " + other + "b --json b.json; wait", cache_);
   EXPECT_EQ(both.status, 0) << both.err;
   EXPECT_EQ(json("a.json")["log"]["data_sha256"], json("b.json")["log"]["data_sha256"]);
@@ -158,7 +158,7 @@ TEST_F(Model, InfoTellsWhatRightAnglesOfFewDigitsCost) {
   edit("double_pendulum.urdf", "<origin xyz=\"0.0060872 0 0.035\" rpy=\"0 0 0\"",
        "<origin xyz=\"0.0060872 0 0.035\" rpy=\"0 1.5708 0\"");
   edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\nright_angles = \"exact\"");
-  const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+  const std::string cache = "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache");
   ASSERT_EQ(tandem("model build robot.toml", cache).status, 0);
   const Outcome outcome = tandem("model info robot.toml --json -", cache);
   ASSERT_EQ(outcome.status, 0) << outcome.err;

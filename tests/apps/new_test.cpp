@@ -12,8 +12,9 @@ class New : public Program {
   /// Makes the folder, and lets the robot hold its posture and move.
   void holds_and_moves(const std::string& urdf, double most_rad, const std::string& flags = {}) {
     std::filesystem::remove_all(folder_ / "made");
-    const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
-    Outcome outcome = tandem("new '" TANDEM_SOURCE_DIR "/" + urdf + "' -o made" + flags, cache);
+    const std::string cache = "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache");
+    Outcome outcome =
+        tandem("new " + shell_word(TANDEM_SOURCE_DIR "/" + urdf) + " -o made" + flags, cache);
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     outcome = tandem("model build made/robot.toml", cache);
     ASSERT_EQ(outcome.status, 0) << outcome.err;
@@ -79,7 +80,7 @@ TEST_F(New, WhatSlidesIsShownInMillimetresAndNewtons) {
   <joint name="swing" type="revolute"><parent link="wagon"/><child link="pole"/>
     <axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="5" velocity="3"/></joint>
 </robot>)");
-  const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+  const std::string cache = "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache");
   Outcome outcome = tandem("new cart.urdf -o cart", cache);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   outcome = tandem("run cart/move.toml --duration 2 --log . --report", cache);
@@ -150,7 +151,7 @@ TEST_F(New, BendsAnArmBetweenTwoSlides) {
 // 0.5, a joint's that turns, was 0.5 m: the lift was pushed to its end, and nothing tripped.
 TEST_F(New, TripsASlideThatIsPushedAway) {
   write_text(folder_ / "lifted.urdf", kLifted);
-  const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+  const std::string cache = "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache");
   ASSERT_EQ(tandem("new lifted.urdf -o lifted", cache).status, 0);
   const std::string text = read_text(folder_ / "lifted/robot.toml");
   EXPECT_NE(text.find("following_error_rad = 0.03 "), std::string::npos) << text;
@@ -310,7 +311,7 @@ TEST_F(New, ShowsInertiasThatNoBodyCanHave) {
   const Outcome made = tandem("new bad.urdf --json new.json");
   EXPECT_EQ(made.status, 0) << made.err;
   const Outcome ran = tandem("run bad/hold.toml --duration 0.1 --no-log",
-                             "XDG_CACHE_HOME='" + folder_.string() + "/cache'");
+                             "XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache"));
   EXPECT_NE(made.err.find("link m: the inertia breaks the triangle inequality"), std::string::npos)
       << made.err;
   EXPECT_NE(made.err.find("correct it in the URDF"), std::string::npos) << made.err;
@@ -363,8 +364,8 @@ TEST_F(New, SaysWhichLimitsItHadToGuessAndWhy) {
 }
 
 TEST_F(New, SaysWhatItChoseAsJson) {
-  const Outcome outcome =
-      tandem("new '" TANDEM_SOURCE_DIR "/config/coman/coman.urdf' -o c --like coman --json -");
+  const Outcome outcome = tandem("new " + shell_word(TANDEM_SOURCE_DIR "/config/coman/coman.urdf") +
+                                 " -o c --like coman --json -");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const auto json = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(json["base"], "floating");

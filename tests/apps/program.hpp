@@ -11,6 +11,8 @@
 #include <sstream>
 #include <string>
 
+#include "base/quoting.hpp"
+
 namespace tandem::apps {
 
 inline std::string read_text(const std::filesystem::path& file) {
@@ -50,8 +52,8 @@ class Program : public ::testing::Test {
 
   /// Runs `tandem ARGUMENTS` in the test's folder.
   Outcome tandem(const std::string& arguments, const std::string& environment = {}) const {
-    const std::string command = "cd '" + folder_.string() + "' && " + environment + " '" +
-                                TANDEM_BINARY_DIR "/bin/tandem' " + arguments +
+    const std::string command = "cd " + shell_word(folder_.string()) + " && " + environment + " " +
+                                shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " " + arguments +
                                 " >out.txt 2>err.txt </dev/null";
     const int raw = std::system(command.c_str());
     return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -1, read_text(folder_ / "out.txt"),

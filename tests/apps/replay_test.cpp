@@ -274,7 +274,8 @@ TEST_F(LogReplay, RefusesWithStatus2AndWritesNothing) {
           "and --to, or");
   refused(recording_ + to + " --speed 2 --torque", "--torque plays the torques of a slower motion");
   refused(recording_ + to + " --posture high", "the robot has no posture 'high'");
-  refused(recording_ + " --robot " TANDEM_SOURCE_DIR "/config/ur5e/robot.toml --out replay.toml",
+  refused(recording_ + " --robot " + shell_word(TANDEM_SOURCE_DIR "/config/ur5e/robot.toml") +
+              " --out replay.toml",
           "is a recording of another robot");
   const std::string before = read_text(folder_ / "robot.toml");
   EXPECT_EQ(tandem("log replay " + recording_ + " --robot robot.toml --out robot.toml").status, 2);

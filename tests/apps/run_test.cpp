@@ -57,7 +57,8 @@ TEST_F(Run, WritesTheDocumentedKeys) {
 
 TEST_F(Run, FollowsATrajectoryOverClassicCan) {
   const auto json =
-      run("'" TANDEM_SOURCE_DIR "/config/double_pendulum_classic/trajectory.toml' --no-log");
+      run(shell_word(TANDEM_SOURCE_DIR "/config/double_pendulum_classic/trajectory.toml") +
+          " --no-log");
   EXPECT_EQ(json["period_ns"], 2'000'000);
   EXPECT_TRUE(json["faults"].empty());
   EXPECT_LT(json["joints"]["joint2"]["max_tracking_error_rad"].get<double>(), 0.02);
@@ -66,7 +67,8 @@ TEST_F(Run, FollowsATrajectoryOverClassicCan) {
 TEST_F(Run, KeepsClosedLoopsClosedThroughBoardsAndFirmware) {
   for (const std::string experiment :
        {"four_bar/hold", "four_bar/turn", "parallel_ankle/hold", "parallel_ankle/move"}) {
-    const auto json = run("'" TANDEM_SOURCE_DIR "/config/" + experiment + ".toml' --no-log");
+    const auto json =
+        run(shell_word(TANDEM_SOURCE_DIR "/config/" + experiment + ".toml") + " --no-log");
     EXPECT_TRUE(json["faults"].empty()) << experiment << json["faults"];
     EXPECT_EQ(json["loops"].size(), experiment.starts_with("four_bar") ? 1U : 2U);
     for (const auto& [name, loop] : json["loops"].items()) {
@@ -145,7 +147,7 @@ TEST_F(Run, OfAScenarioEndsInItsFaultWhichTheLogTells) {
   EXPECT_EQ(outcome.status, 1);
   const auto json = nlohmann::json::parse(outcome.out, nullptr, false);
   const std::string log = folder_ / json["log"]["path"].get<std::string>();
-  const Outcome events = tandem("log csv '" + log + "' --topic event");
+  const Outcome events = tandem("log csv " + shell_word(log) + " --topic event");
   EXPECT_NE(events.out.find("injected encoder_unplug of joint2"), std::string::npos)
       << events.out << events.err;
 }
@@ -189,13 +191,12 @@ TEST_F(Run, OfALogThatIsDeletedWarnsAtOnceAndIsNoSuccess) {
        {"rm -r logs", "rm logs/*.mcap", "cp $(ls logs/*.mcap) x && mv x logs/*.mcap"}) {
     const std::string command =
         "( while ! test -s logs/double_pendulum-hold-001.mcap; do sleep 0.02; done; sleep 0.2; " +
-        std::string(remove) +
-        " ) & '" TANDEM_BINARY_DIR
-        "/bin/tandem' run hold.toml --duration 3 --rate 2 --no-socket -q --log logs --json "
+        std::string(remove) + " ) & " + shell_word(TANDEM_BINARY_DIR "/bin/tandem") +
+        " run hold.toml --duration 3 --rate 2 --no-socket -q --log logs --json "
         "run.json "
         "2>err.txt; s=$?; wait; exit $s";
-    const int raw =
-        std::system(("cd '" + folder_.string() + "' && rm -rf logs || exit 3; " + command).c_str());
+    const int raw = std::system(
+        ("cd " + shell_word(folder_.string()) + " && rm -rf logs || exit 3; " + command).c_str());
     EXPECT_EQ(WEXITSTATUS(raw), 1) << remove;
     const std::string err = read_text(folder_ / "err.txt");
     EXPECT_NE(err.find("001.mcap: nothing is logged any more: its file was deleted during the run"),
@@ -284,13 +285,13 @@ TEST_F(Run, EveryBundledExperimentRunsAndEveryScenarioActs) {
     const std::filesystem::path& file = entry.path();
     if (file.extension() != ".toml" || file.filename().string().starts_with("robot")) continue;
     const bool scenario = file.parent_path().filename() == "faults";  // of the squat beside it
-    std::string what = file.string();
+    std::string what = shell_word(file.string());
     if (scenario) {
-      what = (file.parent_path().parent_path() / "squat.toml").string();
-      what += "' --scenario '" + file.string();
+      what = shell_word((file.parent_path().parent_path() / "squat.toml").string()) +
+             " --scenario " + what;
     }
     const Outcome outcome =
-        tandem("run '" + what + "' --no-log --quiet --duration " + (scenario ? "6.5" : "0.2"));
+        tandem("run " + what + " --no-log --quiet --duration " + (scenario ? "6.5" : "0.2"));
     if (scenario) {
       ASSERT_TRUE(acts.contains(file.stem())) << file << ": what does it do?";
       EXPECT_NE(outcome.err.find(acts.at(file.stem())), std::string::npos) << file << "\n"

@@ -23,9 +23,10 @@ class Running : public Program {
   /// The same with no flags but these, and without waiting.
   void start(const std::string& flags) {
     run_ = std::thread([this, flags] {
-      const std::string command = "cd '" + folder_.string() + "' && echo $$ >pid && exec '" +
-                                  TANDEM_BINARY_DIR +
-                                  "/bin/tandem' run hold.toml --no-log -q --json run.json "
+      const std::string command = "cd " + shell_word(folder_.string()) +
+                                  " && echo $$ >pid && exec " +
+                                  shell_word(TANDEM_BINARY_DIR "/bin/tandem") +
+                                  " run hold.toml --no-log -q --json run.json "
                                   "--socket " +
                                   socket_ + " " + flags + " 2>run.txt";
       const int raw = std::system(command.c_str());
@@ -46,7 +47,7 @@ class Running : public Program {
   }
   void signal(const std::string& name) const {
     const std::string pid = (folder_ / "pid").string();
-    EXPECT_EQ(std::system(("kill -" + name + " $(cat '" + pid + "')").c_str()), 0);
+    EXPECT_EQ(std::system(("kill -" + name + " $(cat " + shell_word(pid) + ")").c_str()), 0);
   }
   /// Waits for the run's end. @return its exit status.
   int join() {

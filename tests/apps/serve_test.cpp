@@ -21,7 +21,7 @@ class Serve : public Program {
     return " --domain " + std::to_string(dds::test::own_domain());
   }
   [[nodiscard]] static std::string coman() {
-    return "'" TANDEM_SOURCE_DIR "/config/coman/squat.toml'";
+    return shell_word(TANDEM_SOURCE_DIR "/config/coman/squat.toml");
   }
 
   void TearDown() override {
@@ -112,7 +112,7 @@ TEST_F(Serve, OfASquatInLockstepGivesTheBitsOfOneProcess) { compare(coman(), " -
 /// A robot of another process, and its exact twin in the owner's: also in the last cycle, after
 /// which the server goes on without an owner.
 TEST_F(Serve, OfATwinIsTheSameToTheLastBit) {
-  const std::string twin = "'" TANDEM_SOURCE_DIR "/config/coman/squat_twin.toml'";
+  const std::string twin = shell_word(TANDEM_SOURCE_DIR "/config/coman/squat_twin.toml");
   for (int repeat = 0; repeat < 4; ++repeat) {
     const pid_t server =
         begin("serve " + twin + domain() + " --lockstep --once --quiet --no-log", "serve");

@@ -10,8 +10,8 @@ namespace {
 class SquatDemo : public Program {};
 
 TEST_F(SquatDemo, ComanSquatsAndStandsAtTheEnd) {
-  const Outcome outcome =
-      tandem("run '" TANDEM_SOURCE_DIR "/config/coman/squat.toml' --report --json result.json");
+  const Outcome outcome = tandem("run " + shell_word(TANDEM_SOURCE_DIR "/config/coman/squat.toml") +
+                                 " --report --json result.json");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const auto json = this->json("result.json");
   EXPECT_TRUE(json["faults"].empty());

@@ -24,8 +24,8 @@ class SeveralRuns : public Program {
   /// A run with the flags, whose controllers run. @return its process
   pid_t begin(const std::string& flags) {
     const std::string command =
-        "cd '" + folder_.string() + "' && { " + environment() +
-        " '" TANDEM_BINARY_DIR "/bin/tandem' " + flags +
+        "cd " + shell_word(folder_.string()) + " && { " + environment() + " " +
+        shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " " + flags +
         " --no-log -q --rate 20 >>runs.txt 2>&1 </dev/null & echo $! >pid; }";
     EXPECT_EQ(std::system(command.c_str()), 0);
     runs_.push_back(std::stoi(read_text(folder_ / "pid")));
@@ -33,7 +33,7 @@ class SeveralRuns : public Program {
     return runs_.back();
   }
   [[nodiscard]] std::string environment() const {
-    return "TANDEM_SOCKETS='" + (runtime_ / "tandem").string() + "'";
+    return "TANDEM_SOCKETS=" + shell_word((runtime_ / "tandem").string());
   }
   [[nodiscard]] std::string socket(pid_t run) const {
     return (runtime_ / "tandem" / ("run-" + std::to_string(run) + ".sock")).string();

@@ -29,7 +29,7 @@ class TeleoperationRun : public Program {
  protected:
   /// A topic of a log as text, from cycle 0 to where controllers are done.
   [[nodiscard]] std::string rows(const std::string& log, const std::string& topic) const {
-    const Outcome csv = tandem("log csv '" + log + "' --topic " + topic);
+    const Outcome csv = tandem("log csv " + shell_word(log) + " --topic " + topic);
     EXPECT_EQ(csv.status, 0) << csv.err;
     std::size_t end = 0;
     for (int row = 0; row < 2200; ++row) end = csv.out.find('\n', end) + 1;
@@ -46,9 +46,10 @@ TEST_F(TeleoperationRun, OverDdsInLockstepIsTheRunInOneProcess) {
   const Outcome alone = tandem("run operated.toml --duration 2 --quiet --json alone.json");
   ASSERT_EQ(alone.status, 0) << alone.err;
   const std::string domain = " --domain " + std::to_string(dds::test::own_domain());
-  const std::string program = "'" TANDEM_BINARY_DIR "/bin/tandem' ";
-  const std::string both = "cd '" + folder_.string() + "' && { " + program + "serve served.toml" +
-                           domain + " --lockstep --once --quiet --json served.json 2>serve.err & " +
+  const std::string program = shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " ";
+  const std::string both = "cd " + shell_word(folder_.string()) + " && { " + program +
+                           "serve served.toml" + domain +
+                           " --lockstep --once --quiet --json served.json 2>serve.err & " +
                            program + "run operated.toml" + domain +
                            " --duration 2 --hal dds --lockstep --no-socket --quiet --json "
                            "owner.json 2>owner.err; wait; } </dev/null >both.txt";
@@ -117,9 +118,9 @@ TEST_F(TeleoperationRun, InRealTimeTheTwoEndsAreTwoProcesses) {
   write_text(folder_ / "operated.toml",
              plain.substr(0, at) + "[remote]\nlease_timeout_s = 30.0\n" + link + plain.substr(at));
   const std::string domain = " --domain " + std::to_string(dds::test::own_domain());
-  const std::string program = "'" TANDEM_BINARY_DIR "/bin/tandem' ";
-  const std::string both = "cd '" + folder_.string() + "' && { " + program + "serve operated.toml" +
-                           domain +
+  const std::string program = shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " ";
+  const std::string both = "cd " + shell_word(folder_.string()) + " && { " + program +
+                           "serve operated.toml" + domain +
                            " --realtime --once --no-log --quiet --json served.json 2>serve.err & " +
                            program + "run operated.toml" + domain +
                            " --duration 1.5 --hal dds --realtime --no-log --no-socket --quiet "
@@ -154,13 +155,14 @@ TEST_F(TeleoperationRun, OtherControllersAtTheRobotsEndAreRefused) {
   write_text(folder_ / "other.toml", experiment(holding("0.25")));
   write_text(folder_ / "same.toml", experiment(holding("0.50   # as there")));
   const std::string domain = " --domain " + std::to_string(dds::test::own_domain());
-  const std::string program = "'" TANDEM_BINARY_DIR "/bin/tandem' ";
+  const std::string program = shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " ";
   const auto run = [&](const std::string& name) {
     return program + "run " + name + ".toml" + domain + " --hal dds --realtime --no-log -q " +
            "--no-socket 2>" + name + ".err; echo $? >" + name + ".status; ";
   };
-  const std::string all = "cd '" + folder_.string() + "' && { " + program + "serve served.toml" +
-                          domain + " --realtime --once --no-log -q 2>serve.err & " + run("none") +
+  const std::string all = "cd " + shell_word(folder_.string()) + " && { " + program +
+                          "serve served.toml" + domain +
+                          " --realtime --once --no-log -q 2>serve.err & " + run("none") +
                           run("other") + run("same") + "wait; } </dev/null";
   ASSERT_EQ(std::system(all.c_str()), 0);
   const auto told = [&](const std::string& name) { return read_text(folder_ / (name + ".err")); };
@@ -208,12 +210,12 @@ TEST_F(TeleoperationRun, TellsAnOperatorThatTheRobotStandsElsewhere) {
   write_text(folder_ / "operated.toml", read_text(folder_ / "served.toml"));
   edit("operated.toml", "\"robot.toml\"", "\"other.toml\"");
   const std::string domain = " --domain " + std::to_string(dds::test::own_domain());
-  const std::string program = "'" TANDEM_BINARY_DIR "/bin/tandem' ";
+  const std::string program = shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " ";
   const std::string run = program + "run operated.toml" + domain + " --hal dds --no-log -q ";
-  const std::string both = "cd '" + folder_.string() + "' && { " + program + "serve served.toml" +
-                           domain + " --realtime --once --no-log -q 2>serve.err & " + run +
-                           "--rate 0.5 2>rate.err; " + run +
-                           "--duration 0.3 --realtime --no-socket 2>owner.err; wait; } </dev/null";
+  const std::string both =
+      "cd " + shell_word(folder_.string()) + " && { " + program + "serve served.toml" + domain +
+      " --realtime --once --no-log -q 2>serve.err & " + run + "--rate 0.5 2>rate.err; " + run +
+      "--duration 0.3 --realtime --no-socket 2>owner.err; wait; } </dev/null";
   ASSERT_EQ(std::system(both.c_str()), 0);
   const std::string told = read_text(folder_ / "owner.err"), rate = read_text(folder_ / "rate.err");
   EXPECT_NE(told.find("the robot does not stand in the posture 'ready': joint1 is 11."),

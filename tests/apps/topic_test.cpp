@@ -129,9 +129,10 @@ TEST_F(Topic, OfTwoRobotsInOneDomainAreKeptApartByTheirNamespaces) {
   write_text(folder_ / "hold.toml", hold + "[dds]\nnamespace = \"left\"\n");
   begin(domain_);
   std::thread other([&] {
-    const std::string command = "cd '" + folder_.string() + "' && echo $$ >other.pid && exec '" +
-                                TANDEM_BINARY_DIR
-                                "/bin/tandem' run other.toml --no-log -q"
+    const std::string command = "cd " + shell_word(folder_.string()) +
+                                " && echo $$ >other.pid && exec " +
+                                shell_word(TANDEM_BINARY_DIR "/bin/tandem") +
+                                " run other.toml --no-log -q"
                                 " --no-socket --rate 20 --duration 2000" +
                                 domain_;
     (void)!std::system(command.c_str());
@@ -142,7 +143,8 @@ TEST_F(Topic, OfTwoRobotsInOneDomainAreKeptApartByTheirNamespaces) {
   EXPECT_EQ(found.at("/right/joint_states")["writers"], 1);
   EXPECT_FALSE(found.contains("/joint_states"));
   EXPECT_EQ(topic("echo /right/joint_states --once --field name[0]").out, "joint1\n---\n");
-  EXPECT_EQ(std::system(("kill $(cat '" + (folder_ / "other.pid").string() + "')").c_str()), 0);
+  EXPECT_EQ(
+      std::system(("kill $(cat " + shell_word((folder_ / "other.pid").string()) + ")").c_str()), 0);
   other.join();
   EXPECT_EQ(end(), 0);
 }
@@ -220,17 +222,20 @@ TEST_F(Topic, OfADomainThatCannotBeEnteredEndTheRunBeforeItBegins) {
 }
 
 TEST_F(Topic, NeedNoNetwork) {
-  const std::string isolated = "unshare --user --map-root-user --net sh -c 'ip link set lo up && ";
-  if (std::system((isolated + "true' >/dev/null 2>&1").c_str()) != 0) {
+  const std::string isolated = "unshare --user --map-root-user --net sh -c ";
+  const std::string with_loopback = "ip link set lo up && ";
+  if (std::system((isolated + shell_word(with_loopback + "true") + " >/dev/null 2>&1").c_str()) !=
+      0) {
     GTEST_SKIP() << "no network namespace can be made here (unshare --user --net)";
   }
-  const std::string tandem = "\"" TANDEM_BINARY_DIR "/bin/tandem\" ";
+  const std::string tandem = shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " ";
   const std::string script =
-      "cd '" + folder_.string() + "' && " + isolated + "{ " + tandem +
-      "run hold.toml --dds --no-log -q --rate 20 --duration 2000 & run=$!; " + tandem +
-      "topic echo /joint_states --once --wait 30 --field name; " +
-      "status=$?; kill $run; wait $run; exit $status; }' "
-      ">out.txt 2>err.txt";
+      "cd " + shell_word(folder_.string()) + " && " + isolated +
+      shell_word(with_loopback + "{ " + tandem +
+                 "run hold.toml --dds --no-log -q --rate 20 --duration 2000 & run=$!; " + tandem +
+                 "topic echo /joint_states --once --wait 30 --field name; " +
+                 "status=$?; kill $run; wait $run; exit $status; }") +
+      " >out.txt 2>err.txt";
   EXPECT_EQ(std::system(script.c_str()), 0) << read_text(folder_ / "err.txt");
   EXPECT_EQ(read_text(folder_ / "out.txt"), "- joint1\n- joint2\n---\n");
 }
@@ -244,8 +249,8 @@ TEST_F(Topic, InASecuredDomainTheKeysOfATomlOpenEveryCommand) {
     GTEST_SKIP() << "the openssl command is not installed";
   }
   const std::string keys = (folder_ / "keys").string();
-  ASSERT_EQ(std::system(("'" TANDEM_SOURCE_DIR "/examples/dds_security/make-files' '" + keys +
-                         "' > /dev/null 2>&1")
+  ASSERT_EQ(std::system((shell_word(TANDEM_SOURCE_DIR "/examples/dds_security/make-files") + " " +
+                         shell_word(keys) + " > /dev/null 2>&1")
                             .c_str()),
             0);
   write_text(folder_ / "hold.toml", read_text(folder_ / "hold.toml") + R"(

@@ -71,8 +71,9 @@ TEST(Messages, AreDecodedByAnotherProjectWithThePublishedDefinitions) {
          << "\n";
   }
   file.close();
-  const std::string command = fmt::format("cd '{}' && '{}' decode_samples.mjs '{}' > '{}.out' 2>&1",
-                                          folder, kNode, path, path);
+  const std::string command =
+      fmt::format("cd {} && {} decode_samples.mjs {} > {} 2>&1", shell_word(folder),
+                  shell_word(kNode), shell_word(path), shell_word(path + ".out"));
   EXPECT_EQ(std::system(command.c_str()), 0) << content(path + ".out");
   std::printf("%s", content(path + ".out").c_str());
 }

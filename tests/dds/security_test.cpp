@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "base/quoting.hpp"
 #include "dds/domain.hpp"
 #include "dds/raw_endpoint.hpp"
 #include "tests/dds/raw_topic.hpp"
@@ -68,7 +69,8 @@ class Security : public testing::Test {
   }
   static void make_files(const std::string& folder) {
     const std::string command = fmt::format(
-        "'{}/examples/dds_security/make-files' '{}' > /dev/null 2>&1", TANDEM_SOURCE_DIR, folder);
+        "{} {} > /dev/null 2>&1", shell_word(TANDEM_SOURCE_DIR "/examples/dds_security/make-files"),
+        shell_word(folder));
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
   }
 

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "base/quoting.hpp"
 #include "tests/ethercat/master_rig.hpp"
 #include "tests/support/scratch_folder.hpp"
 
@@ -35,8 +36,8 @@ void write_capture(const std::filesystem::path& path, const std::vector<Bytes>& 
 /// The lines that tshark prints of a capture.
 std::vector<std::string> tshark(const std::filesystem::path& capture, const std::string& fields) {
   const std::string out = capture.string() + ".txt";
-  const std::string command = "tshark -r '" + capture.string() + "' -T fields " + fields + " > '" +
-                              out + "' 2> '" + out + ".err'";
+  const std::string command = "tshark -r " + shell_word(capture.string()) + " -T fields " + fields +
+                              " > " + shell_word(out) + " 2> " + shell_word(out + ".err");
   EXPECT_EQ(std::system(command.c_str()), 0);
   std::vector<std::string> lines;
   std::ifstream in(out);

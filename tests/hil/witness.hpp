@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/quoting.hpp"
 #include "tests/hil/process.hpp"
 
 namespace tandem::test {
@@ -95,10 +96,10 @@ class Candump {
 [[nodiscard]] inline std::string tshark_complaints(const std::filesystem::path& log,
                                                    std::map<std::string, int>& kinds) {
   const std::filesystem::path out = log.string() + ".tshark";
-  const std::string command = "tshark -r '" + log.string() +
-                              "' -d can.subdissector,canopen -T fields -e frame.number "
-                              "-e _ws.expert.message -e _ws.malformed -e _ws.col.Info > '" +
-                              out.string() + "' 2> '" + out.string() + ".err'";
+  const std::string command = "tshark -r " + shell_word(log.string()) +
+                              " -d can.subdissector,canopen -T fields -e frame.number "
+                              "-e _ws.expert.message -e _ws.malformed -e _ws.col.Info > " +
+                              shell_word(out.string()) + " 2> " + shell_word(out.string() + ".err");
   EXPECT_EQ(std::system(command.c_str()), 0) << text_of(out.string() + ".err");
   std::string complaints;
   std::ifstream in(out);

@@ -1,4 +1,5 @@
 #include "log/mcap_writer.hpp"
+#include "base/quoting.hpp"
 
 #include <cstdlib>
 #include <filesystem>
@@ -101,8 +102,8 @@ TEST(McapWriter, SatisfiesTheReaderOfTheFormatsProject) {
   for (const Compression one : {Compression::kNone, Compression::kLz4, Compression::kZstd}) {
     const std::string path = folder / "sample.mcap";
     write_sample(path, {.compression = one, .chunk_bytes = 4096}, 500);
-    const std::string command = std::string("'") + kNode + "' '" + tool + "' '" + path +
-                                "' 750 > '" + (folder / "out") + "' 2>&1";
+    const std::string command = shell_word(kNode) + " " + shell_word(tool) + " " +
+                                shell_word(path) + " 750 > " + shell_word(folder / "out") + " 2>&1";
     EXPECT_EQ(std::system(command.c_str()), 0) << content(folder / "out");
   }
 }

@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 
+#include "base/quoting.hpp"
 #include "model/emit.hpp"
 #include "model/file_lock.hpp"
 #include "model/kernel_build.hpp"
@@ -223,9 +224,9 @@ TEST(Kernels, SinesAndCosinesAreThoseOfLibmWithinTwoUlp) {
 TEST(Kernels, SinesAndCosinesAreComputedWithVectors) {
   const test::ScratchFolder folder;
   const std::string file = folder / "code.txt";
-  ASSERT_EQ(std::system(
-                ("objdump -d --no-show-raw-insn '" + built_library("coman") + "' > '" + file + "'")
-                    .c_str()),
+  ASSERT_EQ(std::system(("objdump -d --no-show-raw-insn " + shell_word(built_library("coman")) +
+                         " > " + shell_word(file))
+                            .c_str()),
             0);
   std::ifstream code(file);
   std::map<std::string, int> packed;  // instructions on two doubles and more, by function
