@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <sstream>
 
 extern char** environ;  // NOLINT: POSIX
@@ -68,6 +69,15 @@ int wait_for(pid_t child) {
     if (errno != EINTR) return -1;
   }
   return exit_status(raw);
+}
+
+bool is_debugged() {
+  std::ifstream status("/proc/self/status");
+  for (std::string key; status >> key;) {
+    int tracer = 0;
+    if (key == "TracerPid:") return status >> tracer && tracer != 0;
+  }
+  return false;
 }
 
 }  // namespace tandem

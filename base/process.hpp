@@ -33,4 +33,7 @@ struct Spawn {
 /// The same of what waitpid() answered.
 [[nodiscard]] int exit_status(int raw) noexcept;
 
+/// Whether a debugger has this process: what takes long then says nothing.
+[[nodiscard]] bool is_debugged();
+
 }  // namespace tandem

@@ -2,6 +2,7 @@
 // Layer: controllers.  Thread: any, non-RT.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
@@ -13,6 +14,7 @@
 #include <thread>
 #include <utility>
 
+#include "base/process.hpp"
 #include "base/result.hpp"
 
 namespace tandem {
@@ -64,7 +66,8 @@ template <class Call>
 }
 
 /// As hosted_call(), for at most `limit`, on a thread of its own: the process goes on when `call`
-/// does not return, or calls exit(). Then the thread stays behind, with what `call` owns.
+/// does not return, or calls exit(). Then the thread stays behind, with what `call` owns. While a
+/// debugger has the process the limit waits.
 template <class Call>
 [[nodiscard]] auto bounded_call(const std::string& controller, std::chrono::milliseconds limit,
                                 Call call) -> decltype(call()) {
@@ -92,7 +95,13 @@ template <class Call>
     job->over.notify_all();
   }).detach();
   std::unique_lock lock(job->mutex);
-  job->over.wait_for(lock, limit, [&] { return job->answer || job->exited; });
+  // In short waits, which do not count while a debugger has the process.
+  const auto is_over = [&] { return job->answer || job->exited; };
+  for (auto left = limit; left.count() > 0;) {
+    const auto tick = std::min(left, std::chrono::milliseconds(20));
+    if (job->over.wait_for(lock, tick, is_over)) break;
+    if (!is_debugged()) left -= tick;
+  }
   if (job->answer) return std::move(*job->answer);
   note_hosted_call_goes_on();
   const bool exited = job->exited;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 
 namespace tandem {
 namespace {
@@ -18,7 +19,7 @@ Result<ModelMap> ModelMap::make(const hal::Robot& robot, const tandem_kernels* k
                                 PassiveJoints passive) {
   if (kernels == nullptr) {
     return fail("this controller needs the robot's generated model",
-                "run `tandem model build` with " + robot.file);
+                "run `tandem model build " + shell_word(robot.file) + "`");
   }
   const std::vector<std::string> model = names_of(kernels->joint_names, kernels->joints);
   ModelMap map;

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 #include "base/trusted_code.hpp"
 #include "controllers/hosted_call.hpp"
 
@@ -54,7 +55,7 @@ std::string missing_hint(const std::string& name, const std::vector<std::string>
   std::error_code ignored;
   if (std::ranges::find(bundled, name) != bundled.end() &&
       fs::exists(build / "CMakeCache.txt", ignored)) {
-    return "build it: cmake --build " + build.string() + " --target controller_" + name;
+    return "build it: cmake --build " + shell_word(build.string()) + " --target controller_" + name;
   }
   const std::string nearest = suggest(name, available_controllers(folders));
   return (nearest.empty() ? nearest : nearest + "; ") +

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/quoting.hpp"
+
 namespace tandem::estimation {
 namespace {
 
@@ -82,7 +84,7 @@ Result<BaseEstimator> BaseEstimator::make(const hal::Robot& robot, const tandem_
   const int site = imu_site(robot, imu, kernels);
   if (site < 0) {
     return fail("the robot's kernels have no site for the IMU '" + imu.name + "'",
-                "run `tandem model build " + robot.file + "`");
+                "run `tandem model build " + shell_word(robot.file) + "`");
   }
   auto feet = FootSensors::make(robot, kernels);
   if (!feet) return std::unexpected(feet.error());

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 
 namespace tandem::estimation {
 
@@ -23,7 +24,7 @@ Error passive_joint(const hal::Robot& robot) {
 Result<ModelJoints> ModelJoints::make(const hal::Robot& robot, const tandem_kernels* kernels) {
   if (kernels == nullptr) {
     return fail("estimation needs the robot's generated model",
-                "run `tandem model build " + robot.file + "`");
+                "run `tandem model build " + shell_word(robot.file) + "`");
   }
   if (!robot.passive.empty()) return std::unexpected(passive_joint(robot));
   ModelJoints map;

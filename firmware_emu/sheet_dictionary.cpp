@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/counted.hpp"
+#include "base/quoting.hpp"
 #include "canopen/bytes.hpp"
 #include "canopen/drive_abilities.hpp"
 #include "canopen/objects.hpp"
@@ -335,7 +336,7 @@ std::uint32_t emulated_modes(const DataSheet& sheet, int axis) {
 Status check_sheet(const DataSheet& sheet, std::size_t axes) {
   const auto bad = [&](std::string message) {
     return fail_at(sheet.file, std::move(message),
-                   "`tandem eds show " + sheet.file + "` shows what the drive has");
+                   "`tandem eds show " + shell_word(sheet.file) + "` shows what the drive has");
   };
   for (std::size_t a = 0; a < axes; ++a) {
     const int axis = static_cast<int>(a);

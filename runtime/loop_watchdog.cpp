@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/process.hpp"
+
 namespace tandem::runtime {
 namespace {
 
@@ -62,6 +64,7 @@ void LoopWatchdog::run() {
     if (beats == 0 || (limit == nanoseconds{} && !crashed)) continue;
     if (crashed) limit = {};  // there is nothing to wait for
     silent += awake;
+    if (silent > limit && !crashed && config_.waits_for_debugger && is_debugged()) silent = {};
     if (!hung && silent > limit) {
       hung = true;
       hooks_.on_hang(at_work);

@@ -18,6 +18,7 @@ struct WatchdogConfig {
   /// paused, waits for the disk, for emulated boards, for an owner).
   std::chrono::nanoseconds wait_limit{};
   std::chrono::nanoseconds grace{};  ///< from on_hang to on_given_up
+  bool waits_for_debugger = false;   ///< a loop that a debugger holds does not hang
 };
 
 /// Counts the time that it has itself been awake for: a process that was stopped and goes on, or a

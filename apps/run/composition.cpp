@@ -14,6 +14,7 @@
 #include "apps/run/late_plans.hpp"
 #include "apps/run/operator_link.hpp"
 #include "apps/run/retreats.hpp"
+#include "base/quoting.hpp"
 #include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
@@ -250,8 +251,8 @@ Diagnostics unfit_for_link(const runtime::Experiment& e, const Overrides& overri
   if (!e.teleoperation) return {};
   if (e.hal.backend == runtime::BackendKind::kWire && !overrides.serves) {
     return {{.message = "the link lies between two processes",
-             .hint = "run with --hal dds, and serve the robot: tandem serve " + e.file + " --hal " +
-                     e.hal.wire,
+             .hint = "run with --hal dds, and serve the robot: tandem serve " + shell_word(e.file) +
+                     " --hal " + e.hal.wire,
              .file = e.file,
              .key = "teleoperation"}};
   }

@@ -1,6 +1,7 @@
 // Handlers of std::terminate, of signals and of exit(), which stop the loop's thread in a cycle.
 #include "apps/run/loop_crash.hpp"
 
+#include <execinfo.h>
 #include <fmt/core.h>
 #include <unistd.h>
 
@@ -59,6 +60,16 @@ const char* name_of(int signal) {
 /// Calls only what is safe in a signal handler.
 void write_text(const char* text) { (void)!::write(STDERR_FILENO, text, std::strlen(text)); }
 
+/// Where the calling handler's thread was: "plugin.so(+0x12a0)[0x7f…]", a line for each call.
+[[gnu::noinline]] void write_calls() {
+  std::array<void*, 12> calls;
+  const int count = ::backtrace(calls.data(), static_cast<int>(calls.size()));
+  constexpr int kHandlers = 3;  // this, on_signal(), and the system's call of it
+  write_text("called from (addr2line -Cife LIBRARY +0x… names the line):\n");
+  if (count > kHandlers)
+    ::backtrace_symbols_fd(calls.data() + kHandlers, count - kHandlers, STDERR_FILENO);
+}
+
 void on_signal(int signal) {
   if (!in_cycle()) {
     if (const char* controller = hosted_controller()) {
@@ -74,6 +85,8 @@ void on_signal(int signal) {
   write_text("fault: the loop crashed, and stands still: ");
   write_text(name_of(signal));
   write_text("\n");
+  loop_heartbeat->stand_still();  // what stops the robot does not wait for the rest
+  write_calls();
   stand_still();
 }
 
@@ -93,6 +106,8 @@ void handle(int signal) {
 }
 
 void handle_all() {
+  void* first = nullptr;
+  (void)::backtrace(&first, 1);  // loads what it needs, which a handler must not
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) handle(signal);
 }
 

@@ -61,7 +61,8 @@ void LoopGuard::start() {
       runtime::WatchdogConfig{
           .limit = limit,
           .wait_limit = on_robot ? limit + nanoseconds(loop.period_ns) : nanoseconds{},
-          .grace = kGrace},
+          .grace = kGrace,
+          .waits_for_debugger = !on_robot},
       runtime::LoopWatchdog::Hooks{
           .on_hang = [this](bool at_work) { on_hang(at_work); },
           .on_return = [] { say("note: the loop cycles again; the run ends in order"); },
@@ -73,18 +74,20 @@ void LoopGuard::on_hang(bool at_work) {
   const std::int32_t controller = composition_->controllers->at_work();
   cycle_->inbox().watchdog_stop(controller);
   const std::string nodes = stop_nodes();
-  if (controller >= 0) {
-    where_ = fmt::format("in the controller '{}'",
-                         composition_->controllers->name(static_cast<std::size_t>(controller)));
-  } else {
-    where_ = at_work ? "in its cycle, in no controller" : "between two cycles, in no controller";
-  }
+  const std::string where =
+      controller >= 0
+          ? fmt::format("in the controller '{}'",
+                        composition_->controllers->name(static_cast<std::size_t>(controller)))
+      : at_work ? "in its cycle, in no controller"
+                : "between two cycles, in no controller";
   const bool crashed = cycle_->heartbeat().stands_still();
+  fault_ =
+      crashed ? "the loop crashed " + where : "the loop hung " + where + " and did not come back";
   say(
       fmt::format("fault: the loop {}, it is {}. The emergency stop is latched{}; the process ends "
                   "in {} s{}",
                   crashed ? "stands still" : fmt::format("hangs: no cycle for {:g} s", limit_s_),
-                  where_, nodes, kGrace.count(), crashed ? "" : " if the loop does not come back"));
+                  where, nodes, kGrace.count(), crashed ? "" : " if the loop does not come back"));
 }
 
 std::string LoopGuard::stop_nodes() {

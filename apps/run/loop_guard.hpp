@@ -32,8 +32,8 @@ class LoopGuard {
                                                                runtime::RobotCycle& cycle);
 
   [[nodiscard]] bool gave_up() const noexcept { return gave_up_.load(std::memory_order_acquire); }
-  /// Where the loop hung last: "in the controller 'squat'". For when it gave up.
-  [[nodiscard]] const std::string& where() const noexcept { return where_; }
+  /// What the loop did: "the loop crashed in the controller 'squat'". For when it gave up.
+  [[nodiscard]] const std::string& fault() const noexcept { return fault_; }
 
  private:
   LoopGuard(const Composition& composition, runtime::RobotCycle& cycle)
@@ -47,7 +47,7 @@ class LoopGuard {
   runtime::RobotCycle* cycle_;
   std::vector<std::unique_ptr<hal::can::SocketCanBus>> buses_;
   double limit_s_ = 0.0;
-  std::string where_;
+  std::string fault_;
   std::atomic<bool> gave_up_{false};
   std::unique_ptr<runtime::LoopWatchdog> watchdog_;  // last: its thread uses the others
 };

@@ -335,7 +335,7 @@ class Session {
   /// The loop was given up. Its thread is still there, and may go on at any time: what it uses
   /// stays.
   [[noreturn]] void end_without_loop(const LoopGuard& guard) {
-    const std::string fault = "the loop hung " + guard.where() + " and did not come back";
+    const std::string& fault = guard.fault();
     std::string log;
     if (recorder_ != nullptr) log = recorder_->close({{"ended", fault}}).path;
     if (c_.frames != nullptr) (void)c_.frames->close();

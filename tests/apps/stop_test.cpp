@@ -66,7 +66,7 @@ TEST_F(Stops, OfAControllerThatThrowsAreThoseOfOneThatHangs) {
   const Outcome run = tandem("run hold.toml --no-socket -q --json run.json");
   EXPECT_EQ(run.status, 1);
   for (const char* text : {"fault: an exception left the loop, which stands still: no such thing",
-                           "fault: the loop hung in the controller 'lazy' and did not come back"}) {
+                           "fault: the loop crashed in the controller 'lazy'; the log"}) {
     EXPECT_NE(run.err.find(text), std::string::npos) << run.err;
   }
   EXPECT_EQ(json("run.json")["ok"], false);
@@ -108,9 +108,13 @@ TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
     EXPECT_NE(run.err.find(text), std::string::npos) << run.err;
     for (const char* said : {"the loop stands still, it is in the controller 'lazy'. The emergency "
                              "stop is latched",
-                             "the loop hung in the controller 'lazy' and did not come back"}) {
+                             "the loop crashed in the controller 'lazy'; the log"}) {
       EXPECT_NE(run.err.find(said), std::string::npos) << run.err;
     }
+    EXPECT_EQ(run.err.find("hung"), std::string::npos) << run.err;
+    EXPECT_EQ(run.err.find("hangs.so(") != std::string::npos, crash != std::string("exit"))
+        << "where it crashed\n"
+        << run.err;
     EXPECT_EQ(json("run.json")["ok"], false);
   }
 }
@@ -167,7 +171,7 @@ TEST_F(Stops, CannotBeToldToAnImpostorInAFolderThatIsOpen) {
                 " may be changed by everybody (its mode is 777): somebody else's socket could take "
                 "the place of open/s.sock, and receive its emergency stops (give it to "
                 "this user, and take the right to write from others: chmod go-w " +
-                open.string() + "; or choose another folder with --socket)\n");
+                shell_word(open.string()) + "; or choose another folder with --socket)\n");
 }
 
 TEST_F(Stops, OfNoRunAreNoSuccess) { EXPECT_EQ(to_run("estop").status, 1); }

@@ -2,6 +2,7 @@
 
 #include <fstream>
 
+#include "base/quoting.hpp"
 #include "tests/controllers/harness.hpp"
 #include "tests/support/scratch_folder.hpp"
 
@@ -34,8 +35,8 @@ TEST(PluginLoader, NamesTheFoldersSearchedAndTheNearestController) {
 TEST(PluginLoader, SaysHowABundledControllerIsBuilt) {
   const auto loaded = load_controller("squat", kBroken);
   ASSERT_FALSE(loaded.has_value());
-  EXPECT_EQ(loaded.error().hint,
-            "build it: cmake --build " TANDEM_BINARY_DIR " --target controller_squat");
+  EXPECT_EQ(loaded.error().hint, "build it: cmake --build " + shell_word(TANDEM_BINARY_DIR) +
+                                     " --target controller_squat");
 }
 
 TEST(PluginLoader, NamesAPathThatDoesNotExist) {
