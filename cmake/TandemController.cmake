@@ -11,9 +11,12 @@ function(tandem_add_controller name)
   if(TARGET tandem_pch)
     target_precompile_headers(controller_${name} REUSE_FROM tandem_pch)
   endif()
-  # Nothing undefined that the loader would find missing, nothing exported but the entry point.
+  # Nothing undefined that the loader would find missing, nothing exported but the entry point: a
+  # symbol that is one for the whole process would keep a library from ever being closed.
   # (A sanitizer's symbols stay undefined until then: they are in the executable.)
-  target_link_options(controller_${name} PRIVATE -Wl,--exclude-libs,ALL)
+  set(exports ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/plugin.map)
+  target_link_options(controller_${name} PRIVATE "SHELL:-Xlinker \"--version-script=${exports}\"")
+  set_property(TARGET controller_${name} APPEND PROPERTY LINK_DEPENDS ${exports})
   if(NOT TANDEM_SANITIZE)
     target_link_options(controller_${name} PRIVATE -Wl,--no-undefined)
   endif()

@@ -13,6 +13,7 @@
 #include "base/quoting.hpp"
 #include "base/trusted_code.hpp"
 #include "controllers/hosted_call.hpp"
+#include "controllers/newest_library.hpp"
 
 namespace tandem {
 namespace {
@@ -160,12 +161,9 @@ Result<LoadedController> load_controller(const std::string& name,
 }
 
 Status LoadedController::open(const std::string& name) {
-  library_.reset(dlopen(path_.c_str(), RTLD_NOW | RTLD_LOCAL));
-  if (!library_) {
-    std::string why = dlerror();
-    if (why.starts_with(path_ + ": ")) why.erase(0, path_.size() + 2);  // is said of the error
-    return refuse(name, path_, "cannot be loaded: " + why, "build it again, and link what it uses");
-  }
+  const Result<void*> opened = open_newest(path_);
+  if (!opened) return refuse(name, path_, opened.error().message, opened.error().hint);
+  library_.reset(*opened);
   using Entry = const ControllerPlugin* (*)();
   const auto entry = reinterpret_cast<Entry>(dlsym(library_.get(), kEntry));
   if (entry == nullptr) {

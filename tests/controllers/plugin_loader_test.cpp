@@ -1,5 +1,8 @@
 #include "controllers/plugin_loader.hpp"
 
+#include <dlfcn.h>
+
+#include <filesystem>
 #include <fstream>
 
 #include "base/quoting.hpp"
@@ -43,6 +46,70 @@ TEST(PluginLoader, NamesAPathThatDoesNotExist) {
   const auto loaded = load_controller("no/such.so", {});
   ASSERT_FALSE(loaded.has_value());
   EXPECT_EQ(loaded.error().file, "no/such.so");
+}
+
+/// A build of tests/controllers/plugins/renewed.cpp, put in the place of `file` as a linker does.
+void put(const std::string& build, const std::string& file) {
+  std::filesystem::copy_file(kBroken[0] + "/renewed_" + build + ".so", file + ".new");
+  std::filesystem::rename(file + ".new", file);
+}
+bool stays_mapped(const std::string& file) {
+  void* const library = dlopen(file.c_str(), RTLD_NOW | RTLD_NOLOAD);
+  if (library != nullptr) dlclose(library);
+  return library != nullptr;
+}
+
+// "done", and the former code ran: a symbol that is one for the process keeps a library mapped.
+TEST(PluginLoader, OpensTheNewBuildOfALibraryThatIsStillMapped) {
+  const test::ScratchFolder folder;
+  const std::string file = folder / "renewed.so";
+  put("1", file);
+  EXPECT_STREQ(load_controller(file, {})->plugin().doc, "Build 1.");
+  ASSERT_TRUE(stays_mapped(file)) << "else this shows nothing";
+  for (const std::string build : {"2", "1", "2"}) {
+    put(build, file);
+    const auto loaded = load_controller(file, {});
+    ASSERT_TRUE(loaded) << loaded.error().to_string();
+    EXPECT_EQ(loaded->plugin().doc, "Build " + build + ".");
+    EXPECT_EQ(loaded->path(), file);
+    EXPECT_EQ(load_controller(file, {})->plugin().doc, "Build " + build + ".") << "unchanged";
+  }
+}
+
+TEST(PluginLoader, OpensTheNewBuildBesideAControllerOfTheFormerOne) {
+  const test::ScratchFolder folder;
+  const std::string file = folder / "mine.so";
+  std::filesystem::copy_file(test::bundled_folder()[0] + "/hold.so", file);
+  const auto former = load_controller(file, {});
+  ASSERT_TRUE(former);
+  put("1", file);
+  const auto loaded = load_controller(file, {});
+  ASSERT_TRUE(loaded) << loaded.error().to_string();
+  EXPECT_STREQ(loaded->plugin().name, "renewed");
+  EXPECT_STREQ(former->plugin().name, "hold");
+}
+
+// Its new code would run with the variables of the former one.
+TEST(PluginLoader, RefusesTheNewBuildOfALibraryWhoseOwnVariablesStay) {
+  const test::ScratchFolder folder;
+  const std::string file = folder / "renewed.so";
+  put("own_1", file);
+  EXPECT_STREQ(load_controller(file, {})->plugin().doc, "Build 1.");
+  put("own_2", file);
+  const auto loaded = load_controller(file, {});
+  ASSERT_FALSE(loaded);
+  EXPECT_NE(loaded.error().message.find("would use its variable build_of_this"), std::string::npos)
+      << loaded.error().message;
+  put("1", file);
+  EXPECT_TRUE(load_controller(file, {})) << "has none";
+}
+
+// By tandem_add_controller() nothing is exported but the entry point, and so all of it is freed.
+TEST(PluginLoader, FreesABundledLibraryWithItsLastController) {
+  for (const std::string& name : available_controllers(test::bundled_folder())) {
+    ASSERT_TRUE(load_controller(name, test::bundled_folder())) << name;
+    EXPECT_FALSE(stays_mapped(test::bundled_folder()[0] + "/" + name + ".so")) << name;
+  }
 }
 
 // While it is copied, or after a full disk: the loader would map what is not there, and the first
