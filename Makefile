@@ -38,7 +38,7 @@ robot:
 	@scripts/install-dependencies demo
 	@JOBS=$(JOBS) scripts/build-robot
 
-# What CI runs: all tests; some of them in strange surroundings; the tests on a real CAN stack, which
+# What CI runs (.ci/run, in a fresh clone): all tests; some of them in strange surroundings; the tests on a real CAN stack, which
 # take one core, and beside them thirteen seconds of each fuzz target and the real-time proof. The last
 # lines say what ran and what did not. Strange surroundings want the build folder for themselves.
 test:
@@ -116,7 +116,7 @@ asan tsan:
 	@scripts/install-dependencies test
 	@cmake --preset $@ --log-level=WARNING
 	@cmake --build --preset $@ --parallel $(JOBS)
-	@TANDEM_ROBOTS=50 TSAN_OPTIONS=suppressions=$(CURDIR)/tests/tsan-suppressions.txt \
+	@TANDEM_ROBOTS=50 TSAN_OPTIONS="suppressions=\"$(CURDIR)/tests/tsan-suppressions.txt\"" \
 	  scripts/run-tests build/$@ $(JOBS) -LE hil
 
 fuzz:

@@ -43,19 +43,20 @@ function(tandem_install)
     FILES_MATCHING PATTERN "*_kernels.so")
   install(DIRECTORY config/ DESTINATION share/tandem/config
     PATTERN CMakeLists.txt EXCLUDE)
-  install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
-  install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs)
-  # The examples' robot lies elsewhere then.
-  foreach(controller 03_controller/sway 06_devices/reach)
-    set(example examples/${controller})
-    cmake_path(GET example PARENT_PATH folder)
-    cmake_path(GET example FILENAME name)
-    file(READ ${example}.toml experiment)
-    string(REPLACE "../../config" "../../../../tandem/config" experiment "${experiment}")
-    file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/installed/${name}.toml CONTENT "${experiment}" @ONLY)
-    install(FILES ${folder}/CMakeLists.txt ${example}.cpp
-      ${PROJECT_BINARY_DIR}/installed/${name}.toml DESTINATION ${CMAKE_INSTALL_DOCDIR}/${folder})
-  endforeach()
+  # The pages, and what they name, at the places where the pages look for it. Of the examples 03 and
+  # 06 are built there; 04 needs one installed header; the others link parts of the sources.
+  set(doc ${CMAKE_INSTALL_DOCDIR})
+  install(FILES LICENSE README.md CONTRIBUTING.md CHANGELOG.md DESTINATION ${doc})
+  install(DIRECTORY docs examples DESTINATION ${doc} USE_SOURCE_PERMISSIONS
+    PATTERN examples/CMakeLists.txt EXCLUDE PATTERN "*.cmake" EXCLUDE)
+  install(DIRECTORY dds/tandem_msgs DESTINATION ${doc}/dds)
+  install(FILES scripts/packages.txt scripts/tandem-run.service DESTINATION ${doc}/scripts)
+  install(FILES tests/mutations.md DESTINATION ${doc}/tests)
+  install(FILES tests/hil/README.md DESTINATION ${doc}/tests/hil)
+  install(CODE "set(doc \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${doc}\")
+    file(RELATIVE_PATH config \"/${doc}\" /share/tandem/config)
+    file(REMOVE \"\${doc}/config\")
+    file(CREATE_LINK \"\${config}\" \"\${doc}/config\" SYMBOLIC)")
 
   foreach(header IN LISTS TANDEM_PLUGIN_HEADERS)
     cmake_path(GET header PARENT_PATH folder)

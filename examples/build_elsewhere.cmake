@@ -1,11 +1,16 @@
 # Installs into WORK, builds the examples 03 and 06 against that, as they are installed, and 03 as a
 # copy in a folder with a blank, and lets the installed program run all on an installed robot.
-# -DBUILD=… -DWORK=… -DCOMPILER=…
+# Every link of the installed pages leads somewhere. Nothing sets the build type.
+# -DBUILD=… -DWORK=… -DCOMPILER=… -DPAGES_TEST=…
 file(REMOVE_RECURSE ${WORK})
 set(prefix ${WORK}/prefix)
 set(strange "${WORK}/a strange folder")
-execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix}
+# By its component: an installation as root leaves a list of files in BUILD, which has another name.
+execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix} --component Unspecified
   OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+set(ENV{TANDEM_PAGES} ${prefix}/share/doc/tandem)
+execute_process(COMMAND ${PAGES_TEST} --gtest_filter=Documentation.Links* COMMAND_ERROR_IS_FATAL ANY)
+unset(ENV{TANDEM_PAGES})
 
 # All headers that it lays down, and what the two for plugins include.
 file(GLOB_RECURSE installed RELATIVE ${prefix}/include/tandem ${prefix}/include/*)
@@ -26,8 +31,12 @@ endif()
 
 function(build from to)
   execute_process(COMMAND ${CMAKE_COMMAND} -S ${from} -B ${to} -DCMAKE_PREFIX_PATH=${prefix}
-    -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_BUILD_TYPE=Release OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
-  execute_process(COMMAND ${CMAKE_COMMAND} --build ${to} OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+    -DCMAKE_CXX_COMPILER=${COMPILER} OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+  execute_process(COMMAND ${CMAKE_COMMAND} --build ${to} --verbose OUTPUT_VARIABLE built
+    COMMAND_ERROR_IS_FATAL ANY)
+  if(NOT built MATCHES " -O[23] ")
+    message(FATAL_ERROR "a controller is built without optimisation: ${built}")
+  endif()
 endfunction()
 set(example ${prefix}/share/doc/tandem/examples/03_controller)
 build(${example} ${WORK}/in_place)
@@ -45,7 +54,7 @@ file(COPY ${example}/ DESTINATION ${strange})
 build(${strange} ${strange}/build)
 
 file(READ ${strange}/sway.toml experiment)
-string(REPLACE "../../../../tandem/config" "${prefix}/share/tandem/config" experiment "${experiment}")
+string(REPLACE "../../config" "${prefix}/share/tandem/config" experiment "${experiment}")
 file(WRITE ${strange}/sway.toml "${experiment}")
 set(ENV{TANDEM_CONTROLLERS} ${strange}/build/lib/controllers)
 execute_process(COMMAND ${prefix}/bin/tandem run --no-log --duration 2 sway.toml

@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include "tests/apps/bad_input.hpp"
+#include "tests/support/needs_root.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -51,13 +52,13 @@ TEST_F(BadDisk, AReadOnlyLogFolderIsRefused) {
   }
   // Permissions do not stop root: a file system that is mounted read-only does.
   const Mount disk(folder_ / "locked", "ro");
-  if (!disk.mounted()) GTEST_SKIP() << "a read-only disk needs the right to mount";
+  if (!disk.mounted()) GTEST_SKIP() << test::needs_root("to mount a read-only disk");
   expect_refused({"locked", "log"}, "run hold.toml --duration 0.05 --log locked");
 }
 
 TEST_F(BadDisk, AFullDiskIsRefused) {
   const Mount disk(folder_ / "disk", "size=64k");
-  if (!disk.mounted()) GTEST_SKIP() << "a small disk needs the right to mount";
+  if (!disk.mounted()) GTEST_SKIP() << test::needs_root("to mount a small disk");
   expect_refused({"disk", "too full"}, "run hold.toml --log disk");
 }
 

@@ -23,6 +23,7 @@
 
 #include "tests/apps/program.hpp"
 #include "tests/support/eventually.hpp"
+#include "tests/support/needs_root.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -291,7 +292,7 @@ class Confined : public Program {
   /// Why this machine cannot give a process these rights; empty: it can.
   [[nodiscard]] std::string not_permitted() const {
     if (*TANDEM_SANITIZE != '\0') return "the sanitizer's run-time makes other system calls";
-    if (::geteuid() != 0) return "only root can give a process another user and its rights";
+    if (::geteuid() != 0) return test::needs_root("to give a process another user and its rights");
     switch (in_child([this] {
       if (rights.take() != nullptr) return 1;
       const sched_param priority{.sched_priority = 80};

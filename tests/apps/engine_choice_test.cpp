@@ -114,7 +114,8 @@ TEST_F(EngineRefusal, OfAnEngineThatIsNotInstalledComesBeforeKernelsAreBuilt) {
 
 TEST_F(EngineRefusal, OfAnIntegratorComesBeforeKernelsAreBuilt) {
   edit("double_pendulum.urdf", "mass value=\"", "mass value=\"1");
-  if (!installed("ode")) GTEST_SKIP() << "ODE is not installed";
+  if (!installed("ode"))
+    GTEST_SKIP() << "in make test-all: ODE is not installed (scripts/install-dependencies engines)";
   choose("ode", "integrator = \"rk4\"\n");
   expect_refused("sim.integrator: the engine 'ode' has no rk4");
 }

@@ -289,7 +289,8 @@ TEST_F(Identify, TellsProgramsWhatItTellsPeople) {
 // The description lacks 1 kg of the torso, and has its centre of mass elsewhere; the robot's
 // sensors are noisy.
 TEST_F(Identify, FindsTheTorsoOfAHumanoidThatStands) {
-  if (std::getenv("TANDEM_IDENTIFY_ALL") == nullptr) GTEST_SKIP() << "takes a minute";
+  if (std::getenv("TANDEM_IDENTIFY_ALL") == nullptr)
+    GTEST_SKIP() << "in make test-all: TANDEM_IDENTIFY_ALL=1, takes a minute";
   for (const char* file : {"robot.toml", "coman.urdf"}) {
     std::filesystem::copy_file(std::filesystem::path(TANDEM_SOURCE_DIR "/config/coman") / file,
                                folder_ / file, std::filesystem::copy_options::overwrite_existing);
@@ -362,7 +363,8 @@ TEST_F(Identify, FindsTheTorsoOfAHumanoidThatStands) {
 
 // What stands or hangs on soft springs sways: whatever the seed, what is written runs through.
 TEST_F(Identify, WritesHumanoidsExperimentsThatRunThrough) {
-  if (std::getenv("TANDEM_IDENTIFY_ALL") == nullptr) GTEST_SKIP() << "takes minutes";
+  if (std::getenv("TANDEM_IDENTIFY_ALL") == nullptr)
+    GTEST_SKIP() << "in make test-all: TANDEM_IDENTIFY_ALL=1, takes minutes";
   const std::string coman = shell_word(TANDEM_SOURCE_DIR "/config/coman/robot.toml");
   for (int seed = 1; seed <= 10; ++seed) {
     for (const char* how : {"", "--hung"}) {

@@ -91,7 +91,8 @@ TEST_F(IdentifyTruth, OfALogThatIsOutOfStepWithTheBoardsHasAWarning) {
 // Its motions repeat 20 and 3 times, and so do the steps of its torques: intervals as if every
 // period was news held 203 of 263.
 TEST_F(IdentifyTruth, OfAHumanoidIsInsideTheIntervals) {
-  if (std::getenv("TANDEM_IDENTIFY_ALL") == nullptr) GTEST_SKIP() << "takes a minute";
+  if (std::getenv("TANDEM_IDENTIFY_ALL") == nullptr)
+    GTEST_SKIP() << "in make test-all: TANDEM_IDENTIFY_ALL=1, takes a minute";
   record("coman", "hung", "--hung");
   record("coman", "stand", "");
   for (const std::vector<std::string>& logs :

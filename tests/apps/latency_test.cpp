@@ -5,6 +5,7 @@
 #include "apps/machine/latency_measure.hpp"
 #include "apps/machine/latency_report.hpp"
 #include "tests/apps/program.hpp"
+#include "tests/support/needs_root.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -19,7 +20,7 @@ class Latency : public Program {
     if (!installed("cyclictest")) return "cyclictest is missing (apt-get install rt-tests)";
     const sched_param realtime{.sched_priority = 1}, ordinary{};
     if (::sched_setscheduler(0, SCHED_FIFO, &realtime) != 0) {
-      return "cyclictest may not run: this user has no real-time priority (ulimit -r)";
+      return test::needs_root("real-time priority for cyclictest (ulimit -r)");
     }
     return ::sched_setscheduler(0, SCHED_OTHER, &ordinary) == 0 ? ""
                                                                 : "the policy stays SCHED_FIFO";

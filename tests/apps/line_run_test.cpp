@@ -7,6 +7,7 @@
 #include "tests/apps/program.hpp"
 #include "tests/ethercat/own_network.hpp"
 #include "tests/hil/process.hpp"
+#include "tests/support/needs_root.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -68,7 +69,7 @@ TEST_F(LineRun, ASquatOverACableIsTheInProcessRunBitForBit) {
   EXPECT_EQ(json("in.json")["faults"].size(), 0U);
   const int status =
       run_over_cable(squat, {"--duration", "1", "-q", "--log", file("over_cable")}, true);
-  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  if (status == kNoNetwork) GTEST_SKIP() << test::needs_root("a network of its own");
   ASSERT_EQ(status, 0);
   const std::string log = "/coman-squat_ethercat-001.mcap";
   const Outcome diff = tandem("log diff in_process" + log + " over_cable" + log + " --json -");
@@ -84,7 +85,7 @@ TEST_F(LineRun, ATwinOfARobotOverACableIsTheSameToTheLastBit) {
   edit("trajectory.toml", "[[controller]]", "[parallel]\n[[controller]]");
   const int status =
       run_over_cable(file("trajectory.toml"), {"--duration", "1", "-q", "--no-log"}, true);
-  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  if (status == kNoNetwork) GTEST_SKIP() << test::needs_root("a network of its own");
   ASSERT_EQ(status, 0);
   const auto parallel = json("run.json")["parallel"];
   EXPECT_EQ(parallel["unequal"], 0) << "first in cycle " << parallel["first_unequal"];
@@ -107,7 +108,7 @@ TEST_F(LineRun, AHomingOverACableAndTheMotionBehindItAreTheInProcessRunBitForBit
   ASSERT_EQ(alone.status, 0) << alone.err;
   const int status = run_over_cable(file("hold.toml"),
                                     {"--duration", "3", "-q", "--log", file("over_cable")}, true);
-  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  if (status == kNoNetwork) GTEST_SKIP() << test::needs_root("a network of its own");
   ASSERT_EQ(status, 0);
   const std::string log = "/double_pendulum-hold-001.mcap";
   const Outcome diff = tandem("log diff in_process" + log + " over_cable" + log + " --json -");
@@ -136,7 +137,7 @@ TEST_F(LineRun, TsharkReadsEveryFrameOfAStartAndARun) {
   const std::string squat = TANDEM_SOURCE_DIR "/config/coman/squat_ethercat.toml";
   const int status =
       run_over_cable(squat, {"--duration", "0.1", "-q", "--no-log"}, true, file("cable.pcapng"));
-  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  if (status == kNoNetwork) GTEST_SKIP() << test::needs_root("a network of its own");
   ASSERT_EQ(status, 0);
   const auto count = [&](const std::string& filter) {
     const std::string command =
@@ -158,7 +159,7 @@ TEST_F(LineRun, InRealTimeTheRobotMovesWithoutAFault) {
   edit("hold.toml", "seed = 1", "seed = 1\nperiod_ns = 2_000_000");
   const int status = run_over_cable(file("hold.toml"),
                                     {"--duration", "0.3", "--no-log", "--on-fault", "end"}, false);
-  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  if (status == kNoNetwork) GTEST_SKIP() << test::needs_root("a network of its own");
   ASSERT_EQ(status, 0);
   EXPECT_EQ(json("run.json")["faults"].size(), 0U);
   EXPECT_GT(json("run.json")["cycles"], 100);
@@ -219,7 +220,7 @@ TEST_F(LineRun, TheDoctorLooksAtTheSlaves) {
     EXPECT_EQ(found.count("ecat_m states"), 0U) << "the run left them in INIT";
     EXPECT_EQ(boards.interrupt(), 0) << boards.output();
   });
-  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  if (status == kNoNetwork) GTEST_SKIP() << test::needs_root("a network of its own");
   EXPECT_EQ(status, 0);
 }
 

@@ -52,7 +52,7 @@ TEST_F(New, MakesAnArmHoldOnSpringsWithinADegree) {
 
 TEST_F(New, MakesEveryPublicRobotHoldAndMove) {
   if (std::getenv("TANDEM_NEW_ALL") == nullptr) {
-    GTEST_SKIP() << "compiles the kernels of six robots, minutes of work: set TANDEM_NEW_ALL=1";
+    GTEST_SKIP() << "in make test-all: TANDEM_NEW_ALL=1 compiles the kernels of six robots";
   }
   for (const std::string urdf :
        {"config/ur5e/ur5e.urdf", "config/panda/panda.urdf", "config/coman/coman.urdf",

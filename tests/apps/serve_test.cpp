@@ -11,6 +11,7 @@
 #include "tests/apps/background.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/support/dds_domain.hpp"
+#include "tests/support/needs_root.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -131,7 +132,7 @@ TEST_F(Serve, OfATwinIsTheSameToTheLastBit) {
 TEST_F(Serve, AnotherUserOfTheMachineMovesNothing) {
   const std::string other = "setpriv --reuid 65534 --regid 65534 --clear-groups";
   if (::geteuid() != 0 || tandem("--version", other).status != 0) {
-    GTEST_SKIP() << "needs root, setpriv, and a folder that others may read";
+    GTEST_SKIP() << test::needs_root("setpriv, and a folder that others may read");
   }
   const pid_t server = begin("serve trajectory.toml" + domain() + " --no-log --quiet", "serve");
   const std::string socket = control_folder() + "/run-" + std::to_string(server) + ".sock";

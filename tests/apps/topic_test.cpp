@@ -5,6 +5,7 @@
 #include "dds/endpoint.hpp"
 #include "tests/apps/running.hpp"
 #include "tests/support/dds_domain.hpp"
+#include "tests/support/needs_root.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -226,7 +227,7 @@ TEST_F(Topic, NeedNoNetwork) {
   const std::string with_loopback = "ip link set lo up && ";
   if (std::system((isolated + shell_word(with_loopback + "true") + " >/dev/null 2>&1").c_str()) !=
       0) {
-    GTEST_SKIP() << "no network namespace can be made here (unshare --user --net)";
+    GTEST_SKIP() << test::needs_root("a network of its own (unshare --user --net)");
   }
   const std::string tandem = shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " ";
   const std::string script =

@@ -12,6 +12,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/support/needs_root.hpp"
+
 namespace tandem {
 namespace {
 
@@ -53,7 +55,7 @@ TEST_F(TrustedCode, IsJudgedWithoutProc) {
   int status = 0;
   ::waitpid(child, &status, 0);
   ASSERT_TRUE(WIFEXITED(status)) << "it looked until signal " << WTERMSIG(status);
-  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "this machine gives nobody another /proc";
+  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << test::needs_root("another /proc");
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
@@ -84,7 +86,7 @@ TEST_F(TrustedCode, LiesInAFolderThatMayBeAskedFor) {
 }
 
 TEST_F(TrustedCode, IsNoOtherUsers) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a file away";
+  if (::geteuid() != 0) GTEST_SKIP() << test::needs_root("to give a file away");
   ASSERT_EQ(::chown(file.c_str(), 65534, 0), 0);
   EXPECT_EQ(error(), "belongs to user 65534");
   ASSERT_EQ(::chown(file.c_str(), 0, 65534), 0);

@@ -8,6 +8,7 @@
 #include "hal/ethercat-can/ethercat/packet_link.hpp"
 #include "tests/ethercat/master_rig.hpp"
 #include "tests/ethercat/own_network.hpp"
+#include "tests/support/needs_root.hpp"
 
 namespace tandem::test {
 namespace {
@@ -98,7 +99,7 @@ TEST(Cable, CarriesTheSameBytesAsInProcess) {
     EXPECT_GT(here.size(), 500u);
     EXPECT_EQ(there, here);
   });
-  if (status == kNoNetwork) GTEST_SKIP() << "this machine gives no network namespace";
+  if (status == kNoNetwork) GTEST_SKIP() << needs_root("a network of its own");
   EXPECT_EQ(status, 0);
 }
 

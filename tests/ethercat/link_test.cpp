@@ -12,6 +12,7 @@
 #include "hal/ethercat-can/ethercat/packet_link.hpp"
 #include "tests/ethercat/line_rig.hpp"
 #include "tests/ethercat/own_network.hpp"
+#include "tests/support/needs_root.hpp"
 
 namespace tandem::test {
 namespace {
@@ -121,7 +122,7 @@ TEST(PacketLink, SaysWhatIsMissing) {
     drop_rights();
     EXPECT_NE(text(kMasterEnd).find("CAP_NET_RAW"), std::string::npos) << text(kMasterEnd);
   });
-  if (status == kNoNetwork) GTEST_SKIP() << "this machine gives no network namespace";
+  if (status == kNoNetwork) GTEST_SKIP() << needs_root("a network of its own");
   EXPECT_EQ(status, 0);
 }
 
@@ -146,7 +147,7 @@ TEST(PacketLink, CarriesManyFramesOverACable) {
     EXPECT_EQ(back[39].bytes[6] & ethercat::kProcessedMark, ethercat::kProcessedMark);
     EXPECT_EQ((*master)->address()[0] & ethercat::kProcessedMark, 0);
   });
-  if (status == kNoNetwork) GTEST_SKIP() << "this machine gives no network namespace";
+  if (status == kNoNetwork) GTEST_SKIP() << needs_root("a network of its own");
   EXPECT_EQ(status, 0);
 }
 

@@ -11,6 +11,7 @@
 #include "rt/clock.hpp"
 #include "tests/ethercat/master_rig.hpp"
 #include "tests/ethercat/own_network.hpp"
+#include "tests/support/needs_root.hpp"
 
 namespace tandem::test {
 namespace {
@@ -176,7 +177,7 @@ TEST(Survey, OverACableFindsTheSameSlaves) {
     EXPECT_NEAR(found.slaves[3].delay_ns, 900.0, 20.0);
     EXPECT_GT(found.slaves[3].samples, 0u);
   });
-  if (status == kNoNetwork) GTEST_SKIP() << "this machine gives no network namespace";
+  if (status == kNoNetwork) GTEST_SKIP() << needs_root("a network of its own");
   EXPECT_EQ(status, 0);
 }
 

@@ -189,7 +189,8 @@ TEST(Derivatives, OfFollowersAreTheDifferencesOfTheDynamicsOfTheirCoordinates) {
 // In make test-all, for compiling it takes a minute. build_kernels() compares every variant.
 TEST(Derivatives, OfAHumanoidAreCompiled) {
   if (std::getenv("TANDEM_DERIVATIVES_ALL") == nullptr)
-    GTEST_SKIP() << "TANDEM_DERIVATIVES_ALL=1 compiles those of COMAN and of iCub";
+    GTEST_SKIP()
+        << "in make test-all: TANDEM_DERIVATIVES_ALL=1 compiles those of COMAN and of iCub";
   for (const char* name : {"coman", "icub"}) {
     const test::ScratchFolder folder;
     ModelSpec spec = reference_spec(reference_robot(name));

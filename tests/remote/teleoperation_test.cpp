@@ -312,7 +312,8 @@ TEST(TeleoperationLink, IsAFunctionOfItsSeed) {
 /// The table of docs/teleoperation.md. TANDEM_TELEOPERATION: a file for it.
 TEST(TeleoperationTable, OfDelaysAndLosses) {
   const char* file = std::getenv("TANDEM_TELEOPERATION");
-  if (file == nullptr) GTEST_SKIP() << "TANDEM_TELEOPERATION names no file for the table";
+  if (file == nullptr)
+    GTEST_SKIP() << "in make test-all: TANDEM_TELEOPERATION names no file for the table";
   std::ofstream out(file);
   out << "robot delay_ms loss predicted_mm plain_mm robot_mm prediction_mm loaded_prediction_mm "
          "starved_ms\n";

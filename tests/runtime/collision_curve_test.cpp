@@ -28,7 +28,8 @@ class CollisionCurve : public testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
     const char* text = std::getenv("TANDEM_FREE_HOURS");
-    if (text == nullptr) GTEST_SKIP() << "TANDEM_FREE_HOURS says how many hours of motion";
+    if (text == nullptr)
+      GTEST_SKIP() << "in make test-all: TANDEM_FREE_HOURS says how many hours of motion";
     hours_ = std::atof(text);
   }
   /// Runs with a seed of their own each, until there are so many hours.

@@ -284,7 +284,7 @@ TEST(EngineLoader, FindsEveryEngine) {
       missing += " " + name;
   }
   if (!missing.empty())
-    GTEST_SKIP() << "not tested, as they are not installed (scripts/install-dependencies engines):"
+    GTEST_SKIP() << "in make test-all: not installed (scripts/install-dependencies engines):"
                  << missing;
 }
 
