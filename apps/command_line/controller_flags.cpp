@@ -12,7 +12,7 @@ const char kControllerExamples[] = R"(Examples:
   tandem controller switch --stop squat --start rest in one cycle, or not at all
   tandem controller start                            after `fault reset`: those active before
   tandem controller stop rest                        its joints are held where they are
-  tandem controller unload rest                      and its library is closed
+  tandem controller unload rest                      then `load` runs a new build of it
 Without --socket or --dds it is the only `tandem run` of this user.)";
 
 const char kJointExamples[] = R"(Examples:

@@ -20,7 +20,7 @@ class BuildProgress {
     const int quarter = 4 * done / total;
     if (quarter == quarter_) return;
     quarter_ = quarter;
-    fmt::print(stderr, "  {:3d} %  {} of {} files\n", 25 * quarter, done, total);
+    fmt::print(stderr, "  {:3d} %  {} of {} steps\n", 25 * quarter, done, total);
   }
 
  private:
