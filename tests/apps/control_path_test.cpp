@@ -204,7 +204,7 @@ TEST_F(Socket, ThatIsNamedAndCannotBeMadeIsAnError) {
 }
 
 TEST_F(Socket, LiesInNoFolderOfAnotherUserOrGroup) {
-  if (::geteuid() != 0) GTEST_SKIP() << test::needs_root("to give a folder away");
+  if (::geteuid() != 0) GTEST_SKIP() << tandem::test::needs_root("to give a folder away");
   const std::string theirs = folder + "/theirs";
   std::filesystem::create_directory(theirs);
   ASSERT_EQ(::chown(theirs.c_str(), 65534, 0), 0);
@@ -233,7 +233,7 @@ int as_user(uid_t uid, const std::function<int()>& work) {
 struct Impostor : Socket {
   static constexpr uid_t kStranger = 65534, kVictim = 65533;
   void SetUp() override {
-    if (::geteuid() != 0) GTEST_SKIP() << test::needs_root("to act as two users");
+    if (::geteuid() != 0) GTEST_SKIP() << tandem::test::needs_root("to act as two users");
     ASSERT_EQ(::chmod(folder.c_str(), 01777), 0);
   }
   void TearDown() override {

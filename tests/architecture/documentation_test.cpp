@@ -108,9 +108,9 @@ std::set<std::string> anchors_of(const fs::path& page) {
   std::set<std::string> anchors;
   for (const std::string& heading : matches("\n" + prose_of(page), "\n#+ +([^\n]*)")) {
     std::string anchor;
-    for (const char c : heading) {
+    for (const char c : std::regex_replace(heading, std::regex("\\]\\([^)]*\\)"), "")) {
       if (c == ' ') anchor += '-';
-      if (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_' || c < 0)
+      if (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_')
         anchor += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     }
     anchors.insert(anchor);
