@@ -24,9 +24,12 @@ inline constexpr int kNoNetwork = 77;
 /// @return whether this machine lets it
 [[nodiscard]] inline bool enter_own_network() {
   const uid_t user = ::getuid();
+  const gid_t group = ::getgid();
   if (::unshare(CLONE_NEWNET) != 0) {
     if (::unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) return false;
     std::ofstream("/proc/self/uid_map") << "0 " << user << " 1";
+    std::ofstream("/proc/self/setgroups") << "deny";
+    std::ofstream("/proc/self/gid_map") << "0 " << group << " 1";  // tshark wants a group
   }
   const std::string command = std::string("ip link add ") + kMasterEnd + " type veth peer name " +
                               kSlaveEnd + " && ip link set " + kMasterEnd + " up && ip link set " +
