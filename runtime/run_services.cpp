@@ -131,6 +131,9 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
                                     "; tandem joint stop " + joint + " ends it"};
     case RejectReason::kDisabled:
       return {"its drive is not enabled", "tandem joint set " + joint + " --mode position"};
+    case RejectReason::kStopped:
+      return {"the robot was stopped in the same cycle, and a stop comes first",
+              "tandem fault reset, then ask again"};
     case RejectReason::kIncapable:
       return {"cannot be put into this mode", "its [gains] table lacks the loop"};
   }
