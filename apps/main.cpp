@@ -96,8 +96,16 @@ std::expected<Exit, int> performed(const Command& command) {
   try {
     return perform(command);
   } catch (const std::system_error& error) {
-    if (std::ferror(stdout) == 0 && std::ferror(stderr) == 0) throw;
-    return std::unexpected(error.code().value());
+    if (std::ferror(stdout) != 0 || std::ferror(stderr) != 0) {
+      return std::unexpected(error.code().value());
+    }
+    if (error.code() != std::errc::resource_unavailable_try_again) throw;
+    print_errors({{.message = "this process cannot make the threads that it needs",
+                   .hint = "raise the limit of threads: ulimit -u, TasksMax= of its systemd unit, "
+                           "pids.max of its container; or end other processes",
+                   .file = {},
+                   .key = {}}});
+    return Exit::kUsage;
   }
 }
 

@@ -2,62 +2,81 @@
 #include "base/nearest.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
-#include <vector>
+#include <cstdint>
 
 namespace tandem {
 namespace {
 
-char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
+/// Of a name and of a candidate that may be near it: too_far() of the longest name is 33.
+constexpr std::size_t kMostRow = kMostNamed + kMostNamed / 2 + 2;
 
-/// Optimal string alignment distance.
-std::size_t distance(std::string_view a, std::string_view b) {
-  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
-  for (std::size_t i = 0; i <= a.size(); ++i) d[i][0] = i;
-  for (std::size_t j = 0; j <= b.size(); ++j) d[0][j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const bool same = lower(a[i - 1]) == lower(b[j - 1]);
-      d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (same ? 0U : 1U)});
-      const bool swapped = i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) &&
-                           lower(a[i - 2]) == lower(b[j - 1]);
-      if (swapped) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
-    }
-  }
-  return d[a.size()][b.size()];
-}
+char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
 
 std::size_t too_far(std::string_view name) { return std::max<std::size_t>(2, name.size() / 2) + 1; }
 
-/// The distance, or what a lacking unit counts.
-std::size_t nearness(std::string_view name, const std::string& candidate) {
-  const bool lacks_unit = !name.empty() && candidate.starts_with(std::string(name) + "_");
-  return std::min(distance(name, candidate), lacks_unit ? 2 : too_far(name));
+/// Optimal string alignment distance. @pre both are shorter than kMostRow
+std::size_t distance(std::string_view a, std::string_view b) {
+  std::array<std::uint8_t, kMostRow> before{}, last{}, row{};  // two rows ago, one, now
+  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = static_cast<std::uint8_t>(j);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = static_cast<std::uint8_t>(i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const bool same = lower(a[i - 1]) == lower(b[j - 1]);
+      int d = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (same ? 0 : 1)});
+      const bool swapped = i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) &&
+                           lower(a[i - 2]) == lower(b[j - 1]);
+      if (swapped) d = std::min(d, before[j - 2] + 1);
+      row[j] = static_cast<std::uint8_t>(d);
+    }
+    before = last;
+    last = row;
+  }
+  return last[b.size()];
+}
+
+/// The distance, or what a lacking unit counts; too_far() when it is not worth looking.
+std::size_t nearness(std::string_view name, std::string_view candidate) {
+  const std::size_t far = too_far(name);
+  const bool lacks_unit = !name.empty() && candidate.size() > name.size() &&
+                          candidate[name.size()] == '_' && candidate.starts_with(name);
+  const std::size_t least = candidate.size() > name.size() ? candidate.size() - name.size()
+                                                           : name.size() - candidate.size();
+  if (least >= far) return lacks_unit ? std::min<std::size_t>(2, far) : far;
+  return std::min(distance(name, candidate), lacks_unit ? 2 : far);
+}
+
+struct Best {
+  std::string_view name;
+  std::size_t count = 0;  ///< of those as near
+};
+
+Best best_of(std::string_view name, std::span<const std::string> candidates) {
+  Best best;
+  if (name.size() > kMostNamed) return best;
+  std::size_t least = too_far(name);
+  for (const std::string& candidate : candidates.first(std::min(candidates.size(), kMostLooked))) {
+    const std::size_t d = nearness(name, candidate);
+    if (d == least && best.count > 0) ++best.count;
+    if (d >= least) continue;
+    least = d;
+    best = {candidate, 1};
+  }
+  return best;
 }
 
 }  // namespace
 
 std::string nearest(std::string_view name, std::span<const std::string> candidates) {
-  std::string best;
-  std::size_t best_distance = too_far(name);
-  for (const std::string& candidate : candidates) {
-    const std::size_t d = nearness(name, candidate);
-    if (d < best_distance) {
-      best_distance = d;
-      best = candidate;
-    }
-  }
-  return best;
+  return std::string(best_of(name, candidates).name);
 }
 
 std::string suggest(std::string_view name, std::span<const std::string> candidates,
                     std::size_t most) {
-  const std::string best = nearest(name, candidates);
-  const auto as_near = [&](const std::string& one) {
-    return !best.empty() && nearness(name, one) == nearness(name, best);
-  };
+  const Best best = best_of(name, candidates);
   // Of "category0" and "category1" neither is meant by "category3": all are listed.
-  if (std::ranges::count_if(candidates, as_near) == 1) return "did you mean '" + best + "'?";
+  if (best.count == 1) return "did you mean '" + std::string(best.name) + "'?";
   if (candidates.empty()) return {};
   std::string text = "known: ";
   for (std::size_t i = 0; i < std::min(most, candidates.size()); ++i) {

@@ -2,11 +2,16 @@
 // Layer: base.  Thread: non-RT only.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
 
 namespace tandem {
+
+/// Longest name that is compared, and most candidates that it is compared with: a word that nobody
+/// knows costs 1.6 million steps at most, some milliseconds, whoever sent it.
+inline constexpr std::size_t kMostNamed = 64, kMostLooked = 256;
 
 /// The candidate with the smallest edit distance to `name` (case-insensitive, transpositions
 /// count once), or empty when none is near enough to be a slip of the finger. A name

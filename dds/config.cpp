@@ -8,12 +8,11 @@
 #include <regex>
 
 #include "base/quoting.hpp"
+#include "dds/ports.hpp"
 
 namespace tandem::dds {
 namespace {
 
-/// Participants of one domain on one machine that find each other without multicast.
-constexpr int kMostParticipants = 120;
 /// What is larger is not received: a peer must not have this process allocate without limit.
 constexpr const char* kMostSampleBytes = "16 MiB";
 
@@ -131,7 +130,7 @@ std::uint64_t Config::cycles_between(Topic topic, std::int64_t period_ns) const 
 }
 
 /// On the loopback interface there is no multicast: others are looked for at its address.
-std::string to_xml(const Config& config) {
+std::string to_xml(const Config& config, bool any_ports) {
   std::string interfaces, peers;
   for (const std::string& name : config.interfaces) {
     const bool multicast = name != "lo";
@@ -152,15 +151,16 @@ std::string to_xml(const Config& config) {
   <AllowMulticast>{}</AllowMulticast>
 </General>
 <Discovery>
-  <ParticipantIndex>auto</ParticipantIndex>
+  <ParticipantIndex>{}</ParticipantIndex>
   <MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>
   <Peers>{}</Peers>
 </Discovery>
 <Internal><MaxSampleSize>{}</MaxSampleSize></Internal>
 {}</Domain></CycloneDDS>
 )",
-      interfaces, config.loopback_only() ? "false" : "spdp", kMostParticipants - 1, peers,
-      kMostSampleBytes, config.security.on() ? security_xml(config.security) : "");
+      interfaces, config.loopback_only() ? "false" : "spdp", any_ports ? "none" : "auto",
+      kMostParticipants - 1, peers, kMostSampleBytes,
+      config.security.on() ? security_xml(config.security) : "");
 }
 
 }  // namespace tandem::dds

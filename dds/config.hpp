@@ -86,6 +86,7 @@ struct Config {
 [[nodiscard]] Config read_config(TomlTable table, const std::string& folder);
 
 /// Cyclone DDS' configuration of that: XML.
-[[nodiscard]] std::string to_xml(const Config& config);
+/// @param any_ports  its UDP ports are any that are free, where others do not look for it
+[[nodiscard]] std::string to_xml(const Config& config, bool any_ports = false);
 
 }  // namespace tandem::dds

@@ -7,7 +7,12 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <latch>
+#include <system_error>
+#include <thread>
 #include <vector>
+
+#include "dds/ports.hpp"
 
 namespace tandem::dds {
 namespace {
@@ -34,6 +39,23 @@ Status check_descriptors(std::size_t needed) {
               "raise the limit: ulimit -n 1024, or LimitNOFILE= of its systemd unit");
 }
 
+/// Threads of a domain: Cyclone DDS aborts where it gets none.
+Status check_threads() {
+  constexpr std::size_t kThreads = 16;
+  std::latch all(1);
+  std::vector<std::jthread> made;
+  try {
+    while (made.size() < kThreads) made.emplace_back([&all] { all.wait(); });
+  } catch (const std::system_error&) {  // NOLINT(bugprone-empty-catch): that many there are
+  }
+  all.count_down();
+  if (made.size() == kThreads) return {};
+  return fail(
+      fmt::format("DDS needs {} threads, and this process can make {} more", kThreads, made.size()),
+      "raise the limit of threads: ulimit -u, TasksMax= of its systemd unit, pids.max of "
+      "its container; or end other processes");
+}
+
 }  // namespace
 
 DdsLog::DdsLog() { dds_set_log_sink(&DdsLog::write, this); }
@@ -56,9 +78,19 @@ Result<std::shared_ptr<Domain>> Domain::open(const Config& config) {
   if (const Status room = check_descriptors(descriptors); !room) {
     return std::unexpected(room.error());
   }
+  if (const Status room = check_threads(); !room) return std::unexpected(room.error());
+  // Whoever has taken all ports keeps nobody from looking for others, as `tandem estop --dds` does.
+  const bool any_ports = !has_free_ports(config.domain);
+  if (any_ports) {
+    fmt::print(stderr,
+               "warning: all UDP ports of the DDS domain {} on this machine are taken, by {}: who "
+               "does not look for this process by multicast finds it only when this one finds them "
+               "(`ss -lunp` as root names the processes; another domain: --domain, [dds] domain)\n",
+               config.domain, port_holders(config.domain));
+  }
   auto log = std::make_unique<DdsLog>();
-  Entity entity(
-      dds_create_domain(static_cast<dds_domainid_t>(config.domain), to_xml(config).c_str()));
+  Entity entity(dds_create_domain(static_cast<dds_domainid_t>(config.domain),
+                                  to_xml(config, any_ports).c_str()));
   if (entity.ok())
     return std::shared_ptr<Domain>(new Domain(config, std::move(log), std::move(entity)));
   const std::string what = fmt::format("enter the DDS domain {}", config.domain);

@@ -42,9 +42,12 @@ std::string user_data_of(const dds_builtintopic_endpoint_t& endpoint) {
 
 /// Without its namespace.
 FoundService service_of(const Peer& server) {
+  ParticipantId participant{};
+  std::copy_n(server.participant.v, participant.size(), participant.begin());
   return {.name_space = {},
           .node = user_data_value(server.user_data, "node"),
-          .pid = user_data_value(server.user_data, "pid")};
+          .pid = user_data_value(server.user_data, "pid"),
+          .participant = participant};
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,9 +16,10 @@ namespace tandem::dds {
 
 /// A service of a Tandem process, wherever it is.
 struct FoundService {
-  std::string name_space;  ///< "left"; empty: none
-  std::string node;        ///< of its participant; empty: it is no Tandem
-  std::string pid;         ///< on its machine
+  std::string name_space;                      ///< "left"; empty: none
+  std::string node;                            ///< of its participant; empty: it is no Tandem
+  std::string pid;                             ///< on its machine
+  std::optional<ParticipantId> participant{};  ///< of whose writer a reply is; else empty
 };
 /// Every service of this name and any namespace in the participant's domain, as far as they have
 /// been found until now. `finder` is new in the domain for some tens of milliseconds.

@@ -1,5 +1,5 @@
-// One thread receives requests into a bounded queue and does emergency stops at once, another works
-// the rest off in order; replies wait for their reader to be discovered.
+// One thread receives requests into bounded queues and does emergency stops at once, others work
+// the queues off in order; replies wait for their reader to be discovered.
 #include "dds/service_server.hpp"
 
 #include <unistd.h>
@@ -66,9 +66,10 @@ Status ServiceServer::add(const std::string& name, const Type& request, const Ty
   return {};
 }
 
-Status ServiceServer::start() {
+Status ServiceServer::start(bool only_at_once) {
   receiver_ = std::thread([this] { receive(); });
-  worker_ = std::thread([this] { work(); });
+  if (only_at_once) return {};
+  for (Turn& turn : turns_) turn.thread = std::thread([this, &turn] { work(turn); });
   return {};
 }
 
@@ -77,10 +78,12 @@ ServiceServer::~ServiceServer() {
     const std::scoped_lock lock(mutex_);
     ending_ = true;
   }
-  more_.notify_all();
+  for (Turn& turn : turns_) turn.more.notify_all();
   dds_set_guardcondition(wake_.get(), true);
   if (receiver_.joinable()) receiver_.join();
-  if (worker_.joinable()) worker_.join();
+  for (Turn& turn : turns_) {
+    if (turn.thread.joinable()) turn.thread.join();
+  }
 }
 
 ServiceServer::Counts ServiceServer::counts() const {
@@ -116,38 +119,39 @@ void ServiceServer::take(Service& service) {
     const Asker asker = participant_of(service.requests.get(), infos[i].publication_handle);
     Work work = service.read(samples[i], asker);
     job.answer = std::move(work.answer);
-    accept(std::move(job), work.at_once);
+    accept(std::move(job), work.at_once, work.takes_long);
   }
   dds_return_loan(service.requests.get(), samples.data(), taken);
 }
 
-void ServiceServer::accept(Job job, bool at_once) {
+void ServiceServer::accept(Job job, bool at_once, bool takes_long) {
   {
     const std::scoped_lock lock(mutex_);
     ++counts_.requests;
     if (!at_once) {
-      const auto of_this = std::ranges::count(jobs_, job.asker, &Job::asker);
-      if (jobs_.size() == kMostWaiting || of_this == static_cast<std::ptrdiff_t>(kMostOfOne)) {
+      Turn& turn = turns_[takes_long ? 1 : 0];
+      const auto of_this = std::ranges::count(turn.jobs, job.asker, &Job::asker);
+      if (turn.jobs.size() == kMostWaiting || of_this == static_cast<std::ptrdiff_t>(kMostOfOne)) {
         ++counts_.dropped;
         return;
       }
-      jobs_.push_back(std::move(job));
-      more_.notify_one();
+      turn.jobs.push_back(std::move(job));
+      turn.more.notify_one();
       return;
     }
   }
   answer(job);
 }
 
-void ServiceServer::work() {
+void ServiceServer::work(Turn& turn) {
   for (;;) {
     Job job;
     {
       std::unique_lock lock(mutex_);
-      more_.wait(lock, [this] { return ending_ || !jobs_.empty(); });
+      turn.more.wait(lock, [&] { return ending_ || !turn.jobs.empty(); });
       if (ending_) return;
-      job = std::move(jobs_.front());
-      jobs_.pop_front();
+      job = std::move(turn.jobs.front());
+      turn.jobs.pop_front();
     }
     answer(job);
   }

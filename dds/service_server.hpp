@@ -1,7 +1,8 @@
-// Serves ROS 2 services on threads of its own: one takes requests, one does what they ask for.
+// Serves ROS 2 services on threads of its own: one takes requests, two do what they ask for.
 // Layer: dds.  Thread: open and close main; what is served says which.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -46,6 +47,8 @@ struct ServiceWork {
   /// Done by the thread that takes requests, at once: it has to be short, and safe beside other
   /// work. Else it is done in its turn.
   bool at_once = false;
+  /// Done in its turn among those that take long, for which no other waits.
+  bool takes_long = false;
   /// Fills in the reply, which is zeroed but for its header: every text has to be set.
   std::function<void(Response& reply, ReplyMemory& memory)> answer;
 };
@@ -85,19 +88,20 @@ class ServiceServer {
     return add(name, type<Request>(), type<Response>(), sizeof(Response),
                [read = std::move(read)](const void* request, const Asker& asker) -> Work {
                  ServiceWork<Response> work = read(*static_cast<const Request*>(request), asker);
-                 return {work.at_once,
+                 return {work.at_once, work.takes_long,
                          [answer = std::move(work.answer)](void* reply, ReplyMemory& memory) {
                            answer(*static_cast<Response*>(reply), memory);
                          }};
                });
   }
-  [[nodiscard]] Status start();
+  /// @param only_at_once  no request is done in its turn: there are no threads for that
+  [[nodiscard]] Status start(bool only_at_once = false);
 
   [[nodiscard]] Counts counts() const;
 
  private:
   struct Work {
-    bool at_once = false;
+    bool at_once = false, takes_long = false;
     std::function<void(void* reply, ReplyMemory& memory)> answer;
   };
   using Read = std::function<Work(const void* request, const Asker& asker)>;
@@ -121,6 +125,11 @@ class ServiceServer {
     void* sample;
     std::chrono::steady_clock::time_point until;
   };
+  struct Turn {
+    std::condition_variable more;
+    std::deque<Job> jobs;
+    std::thread thread;
+  };
   enum class Reach : std::uint8_t { kConnected, kNotYet, kGone };
 
   explicit ServiceServer(Participant& participant) : participant_(&participant) {}
@@ -128,8 +137,8 @@ class ServiceServer {
                            std::size_t response_size, Read read);
   void receive();
   void take(Service& service);
-  void accept(Job job, bool at_once);
-  void work();
+  void accept(Job job, bool at_once, bool takes_long);
+  void work(Turn& turn);
   void answer(const Job& job);
   [[nodiscard]] static Reach reach(const Reply& reply);
   bool send(const Reply& reply);
@@ -140,14 +149,13 @@ class ServiceServer {
   Entity wake_;     // guard condition: something is held, or the end
   Entity waitset_;  // after what is attached to it, so that it goes first
 
-  mutable std::mutex mutex_;  // of all below
-  std::condition_variable more_;
+  mutable std::mutex mutex_;  // of all below, but the threads
   bool ending_ = false;
   Counts counts_;
-  std::deque<Job> jobs_;
-  std::deque<Reply> held_;  // until their readers are found
+  std::array<Turn, 2> turns_;  // the usual one, and the long one
+  std::deque<Reply> held_;     // until their readers are found
 
-  std::thread receiver_, worker_;
+  std::thread receiver_;
 };
 
 }  // namespace tandem::dds

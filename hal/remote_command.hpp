@@ -42,6 +42,7 @@ struct RemoteCommand {
   StopCategory on_loss = StopCategory::kWarn;  ///< with `loss`: kWarn holds every joint
   StopCategory stop = StopCategory::kWarn;     ///< asked for since the last exchange()
   bool reset = false;                          ///< asked for since the last exchange()
+  std::uint64_t reset_cycle = 0;  ///< with it: the cycle that the owner had seen when it asked
   const CommandImage* command = nullptr;
   const ParameterImage* gains = nullptr;  ///< null: as they were
 };

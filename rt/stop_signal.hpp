@@ -1,5 +1,5 @@
-// Ctrl-C, SIGTERM and a closed terminal, and SIGUSR1 as emergency stop: flags that the loop looks
-// at once per cycle. Layer: rt.  Thread: any.
+// Signals that end the process otherwise, as Ctrl-C, and SIGUSR1 as emergency stop: flags that the
+// loop looks at once per cycle. Layer: rt.  Thread: any.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,13 @@
 
 namespace tandem::rt {
 
-/// From now on the first SIGINT, SIGTERM or SIGHUP (unless that is ignored, as under nohup) sets
-/// the stop flag; a second one does what the first would have done before, so that a hung program
-/// can still be ended. Within kOneSignal_ns of the first it is the same one: a key that bounces, a
-/// terminal and a supervisor that both pass it on.
+/// From now on no signal ends the process at once that somebody sends to end it: the first SIGINT,
+/// SIGTERM, SIGHUP, SIGQUIT, SIGUSR2, SIGPWR or SIGSTKFLT sets the stop flag, as SIGXCPU and
+/// real-time signals do; but for SIGINT and SIGTERM only where its action is the default one. A
+/// second one (not of SIGXCPU, real-time signals) does what the first would have done before, so
+/// that a hung program can still be ended. Within kOneSignal_ns of the first it is the same one: a
+/// key that bounces, a terminal and a supervisor that both pass it on. SIGALRM, SIGVTALRM, SIGPROF,
+/// SIGIO, SIGPIPE and SIGXFSZ are ignored from now on, where nobody handles them.
 void install_stop_signals();
 inline constexpr std::int64_t kOneSignal_ns = 200'000'000;
 
@@ -28,7 +31,7 @@ void remove_stop_signals();
 /// Sets the flag. Safe in a signal handler.
 void request_stop() noexcept;
 
-/// Clears the flag, before the next run of the same process.
+/// Clears the flag, before the next run of the same process: its first signal is a first one again.
 void clear_stop() noexcept;
 
 /// From now on each SIGUSR1 is an emergency stop.

@@ -30,6 +30,7 @@ namespace tandem::runtime {
 class Inbox {
  public:
   static constexpr std::size_t kCapacity = 16;  ///< requests that wait
+  static constexpr std::uint64_t kNow = ~std::uint64_t{0};
 
   /// Pacing, rate and start_paused of the loop.
   explicit Inbox(const rt::LoopConfig& loop) : clock_(loop, bell_) {}
@@ -40,8 +41,11 @@ class Inbox {
     urgent_.fetch_or(kEnd, std::memory_order_relaxed);
     bell_.end();
   }
-  void reset_faults() noexcept {
-    urgent_.fetch_or(kReset, std::memory_order_relaxed);
+  /// @param known  Progress::stopped_before when it was asked for: a later stop wins. kNow: the
+  ///               asker knows all but those of the cycle that takes it
+  void reset_faults(std::uint64_t known = kNow) noexcept {
+    reset_known_.store(known, std::memory_order_relaxed);
+    urgent_.fetch_or(kReset, std::memory_order_release);
     bell_.ring();
   }
   /// kCategory0 or kCategory2; every other category stops as category 1.
@@ -94,6 +98,7 @@ class Inbox {
   struct Urgent {
     bool end = false;                                             ///< of the run, in order
     bool reset = false;                                           ///< of every latched fault
+    std::uint64_t known = kNow;                                   ///< with it: reset_faults()'s
     hal::StopCategory emergency_stop = hal::StopCategory::kWarn;  ///< the hardest; kWarn: none
     bool by_watchdog = false;      ///< an emergency stop, of the robot's category
     std::int32_t controller = -1;  ///< with it: the loop hung in this one; -1: in none
@@ -110,6 +115,7 @@ class Inbox {
     taken_ = number_of(asked);
     return {.end = (asked & kEnd) != 0,
             .reset = (asked & kReset) != 0,
+            .known = reset_known_.load(std::memory_order_relaxed),
             .emergency_stop = (asked & kStop0) != 0   ? hal::StopCategory::kCategory0
                               : (asked & kStop1) != 0 ? hal::StopCategory::kCategory1
                               : (asked & kStop2) != 0 ? hal::StopCategory::kCategory2
@@ -161,6 +167,7 @@ class Inbox {
   std::atomic<std::uint32_t> urgent_{0};
   std::uint32_t taken_ = 0;  // the loop's
   std::atomic<std::int32_t> hung_in_{-1};
+  std::atomic<std::uint64_t> reset_known_{kNow};
   std::atomic<std::uint32_t> confirmed_{0};
   std::atomic<std::uint64_t> confirmed_cycle_{0};
   static_assert(std::atomic<std::uint32_t>::is_always_lock_free);

@@ -84,6 +84,7 @@ enum class RejectReason : std::uint32_t {
   kHoming,      ///< `joint` is being homed
   kHomedThere,  ///< another process homes the drives
   kDisabled,    ///< the drive of `joint` is not enabled
+  kStopped,     ///< the robot was stopped in the same cycle
 };
 
 struct LoopAnswer {

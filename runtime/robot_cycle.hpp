@@ -149,7 +149,7 @@ class RobotCycle {
 
   // An owner in another process: robot_cycle_owner.cpp.
   void await_owner() noexcept;
-  void follow_owner() noexcept TANDEM_RT;
+  hal::RemoteCommand follow_owner() noexcept TANDEM_RT;
   void assign_owner(bool owned) noexcept TANDEM_RT;
   void take_gains(const hal::ParameterImage& wanted) noexcept TANDEM_RT;
   [[nodiscard]] bool has_owner() const noexcept TANDEM_RT;
@@ -161,7 +161,10 @@ class RobotCycle {
                       std::int32_t controller = -1) noexcept TANDEM_RT;
   void react(hal::StopCategory category) noexcept TANDEM_RT;
   [[nodiscard]] bool retreat() noexcept TANDEM_RT;
-  void begin_reset() noexcept TANDEM_RT;
+  void note_stop() noexcept TANDEM_RT;
+  /// A stop was latched in this cycle.
+  [[nodiscard]] bool stops_now() const noexcept TANDEM_RT { return stopped_before_ > time_.cycle; }
+  void begin_reset(std::uint64_t known) noexcept TANDEM_RT;
   void watch_reset() noexcept TANDEM_RT;
   void reset_done() noexcept TANDEM_RT;
   void reset_failed() noexcept TANDEM_RT;
@@ -229,6 +232,7 @@ class RobotCycle {
   ControllerSet held_back_ = 0;              // active before the reset
   ControllerSet before_retreat_ = 0;         // active then
   std::uint64_t ran_ = 0;                    // cycles of kRunning
+  std::uint64_t stopped_before_ = 0;         // Progress::stopped_before
   std::vector<std::uint8_t> joint_limited_;  // noted once each
   std::vector<std::uint8_t> causes_;         // for the owner
   std::uint64_t reset_cycles_;               // that the reset of one drive may take

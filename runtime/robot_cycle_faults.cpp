@@ -74,9 +74,21 @@ void RobotCycle::check_link() noexcept TANDEM_RT {
 
 void RobotCycle::react(StopCategory category) noexcept TANDEM_RT {
   if (!run_.latch(category)) return;
+  note_stop();
   backend_->stop(category);
   if (run_.in(RunPhase::kResetting)) reset_failed();
   on(RunEvent::kStop);
+}
+
+/// Whoever asked for something until now did not know of it. Resets of drives end with it.
+void RobotCycle::note_stop() noexcept TANDEM_RT {
+  stopped_before_ = time_.cycle + 1;
+  progress_.stopped_before.store(stopped_before_, std::memory_order_relaxed);
+  for (std::size_t j = 0; j < resets_.size(); ++j) {
+    if (resets_[j] != 0) event(EventKind::kResetFailed, static_cast<std::int32_t>(j));
+    resets_[j] = 0;
+    command_.fault_reset()[j] = wanted_.fault_reset()[j] = 0;  // a controller's too
+  }
 }
 
 /// The drives go on to follow those controllers that can bring the robot to a safe posture.
@@ -85,12 +97,18 @@ bool RobotCycle::retreat() noexcept TANDEM_RT {
   const ControllerSet active = controllers_->shown().active;
   if (!controllers_->retreat(time_, state_, controlled())) return false;
   before_retreat_ = active;
+  note_stop();
   on(RunEvent::kRetreat);
   return true;
 }
 
-/// Nothing latched: nothing to do, and no bump.
-void RobotCycle::begin_reset() noexcept TANDEM_RT {
+/// Nothing latched: nothing to do, and no bump. Stopped since it was asked for: it is not done.
+/// @param known  Progress::stopped_before then
+void RobotCycle::begin_reset(std::uint64_t known) noexcept TANDEM_RT {
+  if (std::min(known, time_.cycle) < stopped_before_ && !ends(run_.phase())) {
+    event(EventKind::kResetRequested);
+    return reset_failed();
+  }
   const bool controlled = run_.in(RunPhase::kRunning) || run_.in(RunPhase::kSettling);
   if (!run_.in(RunPhase::kFaulted) && !controlled) return;
   if (faults_.latched() == 0) return;

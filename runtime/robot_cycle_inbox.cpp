@@ -13,6 +13,11 @@ using log::EventKind;
 
 namespace {
 
+/// Moves, starts and enables nothing: there it is whatever stops the robot.
+bool only_hosts(const LoopRequest& request) noexcept TANDEM_RT {
+  return request.kind == LoopRequest::Kind::kInsert || request.kind == LoopRequest::Kind::kRemove;
+}
+
 /// joint.stop
 bool stops_motion(const LoopRequest& request) noexcept TANDEM_RT {
   return request.kind == LoopRequest::Kind::kMove && !std::isfinite(request.move.target_rad);
@@ -20,9 +25,10 @@ bool stops_motion(const LoopRequest& request) noexcept TANDEM_RT {
 
 }  // namespace
 
-/// After everything that may change the phase: the owner, then what is urgent, then requests.
+/// After everything that may change the phase. Stops come first, from wherever they come: a stop
+/// wins over all that was asked before it and in its cycle.
 void RobotCycle::take_inbox() noexcept TANDEM_RT {
-  follow_owner();
+  const hal::RemoteCommand wish = follow_owner();
   const Inbox::Urgent asked = inbox_.take_urgent();
   if (asked.emergency_stop != StopCategory::kWarn) {
     emergency_stop(EmergencyInput::kRequest, asked.emergency_stop);
@@ -33,7 +39,8 @@ void RobotCycle::take_inbox() noexcept TANDEM_RT {
                    std::min(robot_->emergency_stop, StopCategory::kCategory1), asked.controller);
   }
   if (rt::take_emergency_stop()) emergency_stop(EmergencyInput::kSignal, robot_->emergency_stop);
-  if (asked.reset) begin_reset();
+  if (wish.reset) begin_reset(wish.reset_cycle);
+  if (asked.reset) begin_reset(asked.known);
   const bool end = asked.end || rt::stop_requested();
   if (end && !run_.in(RunPhase::kShutDown)) {
     event(EventKind::kStopRequested);
@@ -49,7 +56,10 @@ void RobotCycle::take_requests() noexcept TANDEM_RT {
     if (!request) return;
     const bool ending = ends(run_.phase());
     const bool at_rest = stops_motion(*request) && !controllers_->leads(request->joint);
-    LoopAnswer answer = ending ? LoopAnswer{.reason = RejectReason::kEnding} : carry_out(*request);
+    const bool too_late = stops_now() && !only_hosts(*request);
+    LoopAnswer answer = ending     ? LoopAnswer{.reason = RejectReason::kEnding}
+                        : too_late ? LoopAnswer{.reason = RejectReason::kStopped}
+                                   : carry_out(*request);
     if (answer.reason == RejectReason::kNone && !at_rest) log_request(*request);
     answer.number = request->number;
     answer.cycle = time_.cycle;

@@ -42,8 +42,9 @@ void RobotCycle::await_owner() noexcept {
   loop_.exchanged();  // waiting is no work of the cycle's own
 }
 
-void RobotCycle::follow_owner() noexcept TANDEM_RT {
-  if (owner_.port == nullptr) return;
+/// @return what it wants: the reset is left, until every stop of the cycle is known
+hal::RemoteCommand RobotCycle::follow_owner() noexcept TANDEM_RT {
+  if (owner_.port == nullptr) return {};
   const hal::RemoteCommand wish = owner_.port->exchange(port_view());
   owner_.controller->follow(wish);
   if (wish.gains != nullptr) take_gains(*wish.gains);
@@ -57,13 +58,13 @@ void RobotCycle::follow_owner() noexcept TANDEM_RT {
            .source = FaultSource::kOwner,
            .category = wish.on_loss});
   }
-  if (wish.reset) begin_reset();
   assign_owner(wish.live);
   const bool serves = run_.in(RunPhase::kRunning) && has_owner();  // its controller ends the run
   if (wish.done && wish.ends_run && !serves && !run_.in(RunPhase::kShutDown)) {
     event(EventKind::kStopRequested);
     on(RunEvent::kEnd);
   }
+  return wish;
 }
 
 bool RobotCycle::has_owner() const noexcept TANDEM_RT {

@@ -68,6 +68,7 @@ void RobotCycle::archive(Archive& ar) {
   statistics_.archive(ar);
   controllers_->archive(ar);
   ar(time_, started_, controlling_, held_back_, before_retreat_, read_code_, ran_);
+  ar(stopped_before_);
   ar(joint_limited_, faults_, resets_, homings_, homes_at_start_);
 }
 
@@ -107,6 +108,7 @@ Status RobotCycle::restore(std::span<const std::byte> snapshot) {
                 "load and unload, in the same order, what was loaded then");
   }
   archive(ar);
+  progress_.stopped_before.store(stopped_before_, std::memory_order_relaxed);
   show_gains();
   if (!backend_->archive(ar)) {
     return fail("this robot cannot be rewound", "snapshots need a simulated robot");

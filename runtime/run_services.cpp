@@ -16,12 +16,15 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::microseconds kLook{200};  // between two looks for an answer
 
-/// Every error of a document in one.
+/// The errors of a document in one, as many as somebody reads.
 Status errors_of(const TomlDocument& document) {
+  constexpr std::size_t kMost = 20;
+  const Diagnostics& errors = document.diagnostics();
   std::string all;
-  for (const Error& error : document.diagnostics()) {
-    all += (all.empty() ? "" : "; ") + error.to_string();
+  for (std::size_t i = 0; i < std::min(kMost, errors.size()); ++i) {
+    all += (all.empty() ? "" : "; ") + errors[i].to_string();
   }
+  if (errors.size() > kMost) all += "; and " + std::to_string(errors.size() - kMost) + " more";
   if (all.empty()) return {};
   return fail(all, "the parameters of each controller are in docs/controllers.md");
 }
@@ -131,6 +134,9 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
                                     "; tandem joint stop " + joint + " ends it"};
     case RejectReason::kDisabled:
       return {"its drive is not enabled", "tandem joint set " + joint + " --mode position"};
+    case RejectReason::kStopped:
+      return {"the robot was stopped in the same cycle, and a stop comes first",
+              "tandem fault reset, then ask again"};
     case RejectReason::kIncapable:
       return {"cannot be put into this mode", "its [gains] table lacks the loop"};
   }

@@ -1,8 +1,11 @@
 #include "apps/can/can_sockets.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstdio>
 #include <set>
 #include <thread>
 
@@ -39,6 +42,7 @@ std::expected<std::unique_ptr<CanSockets>, Diagnostics> CanSockets::open(
         errors.push_back(of_bus(bus, lock.error()));
         continue;
       }
+      if (!lock->remark().empty()) fmt::print(stderr, "warning: {}\n", lock->remark());
       all->locks_.push_back(std::move(*lock));
     }
     const Status opened = bus.kind == hal::BusKind::kEthercat ? all->open_line(bus, b, make_line)

@@ -23,6 +23,10 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
+constexpr char kClosed[] = "the process closed the connection";
+/// Whose place others took before it was read stops the robot the next time.
+constexpr int kStopTries = 20;
+
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
@@ -63,7 +67,7 @@ Status check_listener(int descriptor, const std::string& path) {
 }
 
 Error no_answer(std::chrono::milliseconds patience) {
-  return {.message = fmt::format("no answer within {:g} s", patience / 1.0s),
+  return {.message = fmt::format("{} {:g} s", kNoAnswer, patience / 1.0s),
           .hint = patience == kStopAnswer
                       ? "a process that was stopped carries the stop out when "
                         "it continues; until then stop the robot by its own stop "
@@ -90,7 +94,7 @@ Result<std::string> exchange(int fd, std::string out, std::chrono::milliseconds 
                               ? ::recv(fd, bytes, sizeof bytes, MSG_DONTWAIT)
                               : ::send(fd, out.data(), out.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     if (count < 0 && (errno == EAGAIN || errno == EINTR)) continue;
-    if (count <= 0) return fail("the process closed the connection", "look at what it printed");
+    if (count <= 0) return fail(kClosed, "look at what it printed");
     if (out.empty()) {
       in.append(bytes, static_cast<std::size_t>(count));
     } else {
@@ -113,28 +117,7 @@ Error ended() {
           .key = {}};
 }
 
-class SocketClient : public ControlClient {
- public:
-  explicit SocketClient(std::string path) : path_(std::move(path)) {}
-  Result<Json> ask(const Json& question) override {
-    Result<Json> answer = apps::ask(path_, question);
-    if (!answer && heard_ && has_ended(path_)) return std::unexpected(ended());
-    heard_ = heard_ || answer;
-    return answer;
-  }
-
- private:
-  std::string path_;
-  bool heard_ = false;
-};
-
-}  // namespace
-
-std::chrono::milliseconds answer_time(const Json& question) {
-  return question.value("do", "") == "estop" ? kStopAnswer : 5000ms;
-}
-
-Result<Json> ask(const std::string& path, const Json& question) {
+Result<Json> ask_once(const std::string& path, const Json& question) {
   const Result<sockaddr_un> address = control_address(path);
   if (!address) return std::unexpected(address.error());
   const Descriptor descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
@@ -155,6 +138,36 @@ Result<Json> ask(const std::string& path, const Json& question) {
   const Result<std::string> line = exchange(descriptor.get(), json_text(question) + "\n", patience);
   if (!line) return std::unexpected(has_ended(path) ? ended() : line.error());
   return read_answer(*line, "what listens at " + path);
+}
+
+class SocketClient : public ControlClient {
+ public:
+  explicit SocketClient(std::string path) : path_(std::move(path)) {}
+  Result<Json> ask(const Json& question) override {
+    Result<Json> answer = apps::ask(path_, question);
+    if (!answer && heard_ && has_ended(path_)) return std::unexpected(ended());
+    heard_ = heard_ || answer;
+    return answer;
+  }
+
+ private:
+  std::string path_;
+  bool heard_ = false;
+};
+
+}  // namespace
+
+std::chrono::milliseconds answer_time(const Json& question) {
+  const std::string name = question.value("do", "");  // dds.show: an emergency stop waits for it
+  return name == "estop" || name == "dds.show" ? kStopAnswer : 5000ms;
+}
+
+Result<Json> ask(const std::string& path, const Json& question) {
+  const int tries = question.value("do", "") == "estop" ? kStopTries : 1;
+  for (int left = tries;; --left) {
+    Result<Json> answer = ask_once(path, question);
+    if (answer || answer.error().message != kClosed || left == 1) return answer;
+  }
 }
 
 Result<Json> read_answer(std::string_view text, const std::string& who) {

@@ -15,6 +15,9 @@
 
 namespace tandem::apps {
 
+/// How the error begins of who does not answer in time.
+inline constexpr char kNoAnswer[] = "no answer within";
+
 /// How long ask() waits for the answer to `question`: kStopAnswer, or 5 s.
 [[nodiscard]] std::chrono::milliseconds answer_time(const Json& question);
 

@@ -20,6 +20,7 @@ using SteadyClock = std::chrono::steady_clock;
 using AskClient = dds::ServiceClient<dds::tandem_msgs::Ask_Request, dds::tandem_msgs::Ask_Response>;
 
 constexpr char kService[] = "tandem/ask";
+constexpr char kStopService[] = "tandem/stop";
 /// To find the first process, and then others that are there, too, which a busy machine delays.
 constexpr std::chrono::milliseconds kFirst{3000}, kOthers{500}, kLookAgain{10};
 
@@ -59,22 +60,24 @@ std::vector<dds::FoundService> in_namespace(std::vector<dds::FoundService> found
   return found;
 }
 
-std::vector<dds::FoundService> look(const dds::ServiceFinder& finder, const ControlTarget& target) {
+std::vector<dds::FoundService> look(const dds::ServiceFinder& finder, const ControlTarget& target,
+                                    const char* service) {
   auto end = SteadyClock::now() + kFirst;
   std::vector<dds::FoundService> found;
   while (SteadyClock::now() < end) {
     const bool first = found.empty();
-    found = in_namespace(finder.find(kService), target.name_space);
+    found = in_namespace(finder.find(service), target.name_space);
     if (first && !found.empty()) end = SteadyClock::now() + kOthers;
     std::this_thread::sleep_for(kLookAgain);
   }
   return found;
 }
 
-Error nobody(const ControlTarget& target, const dds::Config& config, const char* advice) {
+Error nobody(const ControlTarget& target, const dds::Config& config, const char* service,
+             const char* advice) {
   const std::string where =
       target.name_space ? fmt::format(" in the namespace '{}'", *target.name_space) : "";
-  return fail(fmt::format("no process serves {} in the DDS domain {}{}", kService, config.domain,
+  return fail(fmt::format("no process serves {} in the DDS domain {}{}", service, config.domain,
                           where),
               fmt::format("{}; is it in this domain and namespace, and on this network interface? "
                           "With DDS Security, use --dds-from",
@@ -96,8 +99,8 @@ Error several(const std::vector<dds::FoundService>& found, const dds::Config& co
 }
 
 /// "/left/tandem/ask"
-std::string service_in(const std::string& name_space) {
-  return (name_space.empty() ? "/" : "/" + name_space + "/") + kService;
+std::string service_in(const std::string& name_space, const char* service) {
+  return (name_space.empty() ? "/" : "/" + name_space + "/") + service;
 }
 
 constexpr char kStartOne[] = "start one: tandem run EXPERIMENT --dds";
@@ -110,7 +113,7 @@ struct Found {
 };
 
 /// @param advice  when nobody serves
-Result<Found> find_services(const ControlTarget& asked, const char* advice) {
+Result<Found> find_services(const ControlTarget& asked, const char* service, const char* advice) {
   const Result<dds::Config> config = dds_config(asked.place);
   if (!config) return std::unexpected(config.error());
   ControlTarget target = asked;
@@ -121,8 +124,8 @@ Result<Found> find_services(const ControlTarget& asked, const char* advice) {
   if (!participant) return std::unexpected(participant.error());
   const auto finder = dds::ServiceFinder::create(**participant);
   if (!finder) return std::unexpected(finder.error());
-  std::vector<dds::FoundService> found = look(*finder, target);
-  if (found.empty()) return std::unexpected(nobody(target, *config, advice));
+  std::vector<dds::FoundService> found = look(*finder, target, service);
+  if (found.empty()) return std::unexpected(nobody(target, *config, service, advice));
   return Found{std::move(*participant), std::move(found)};
 }
 
@@ -145,7 +148,7 @@ std::vector<DdsAnswer> ask_namespace(Result<AskClient>& client, const std::strin
       request, answer_time(question),
       [&](const dds::tandem_msgs::Ask_Response& reply, const dds::FoundService& from) {
         const std::string who = text_of(from, name_space);
-        answers.push_back({who, read_answer(reply.answer, who)});
+        answers.push_back({who, read_answer(reply.answer, who), from.participant});
       });
   if (!silent) return {{everybody, std::unexpected(silent.error())}};
   for (const dds::FoundService& one : *silent) {
@@ -162,25 +165,25 @@ void have_admitted(const dds::Participant& participant) {
 }
 
 Result<std::unique_ptr<ControlClient>> open_dds_client(const ControlTarget& asked) {
-  auto found = find_services(asked, kStartOne);
+  auto found = find_services(asked, kService, kStartOne);
   if (!found) return std::unexpected(found.error());
   if (found->services.size() > 1) {
     return std::unexpected(several(found->services, found->participant->config()));
   }
-  auto client =
-      AskClient::create(*found->participant, service_in(found->services.front().name_space));
+  auto client = AskClient::create(*found->participant,
+                                  service_in(found->services.front().name_space, kService));
   if (!client) return std::unexpected(client.error());
   return std::make_unique<DdsClient>(std::move(found->participant), std::move(*client));
 }
 
-Result<std::vector<DdsAnswer>> ask_all_over_dds(const ControlTarget& target, const Json& question) {
-  auto found = find_services(target, kCutPower);
+Result<DdsAnswers> stop_all_by_dds(const ControlTarget& target, const Json& question) {
+  auto found = find_services(target, kStopService, kCutPower);
   if (!found) return std::unexpected(found.error());
   std::map<std::string, Result<AskClient>> clients;  // by namespace
   for (const dds::FoundService& one : found->services) {
     if (clients.contains(one.name_space)) continue;
-    clients.emplace(one.name_space,
-                    AskClient::create(*found->participant, service_in(one.name_space)));
+    clients.emplace(one.name_space, AskClient::create(*found->participant,
+                                                      service_in(one.name_space, kStopService)));
   }
   std::vector<std::future<std::vector<DdsAnswer>>> asked;
   for (auto& [name_space, client] : clients) {
@@ -188,9 +191,34 @@ Result<std::vector<DdsAnswer>> ask_all_over_dds(const ControlTarget& target, con
       return ask_namespace(one, name, question);
     }));
   }
-  std::vector<DdsAnswer> answers;
-  for (auto& one : asked) std::ranges::move(one.get(), std::back_inserter(answers));
+  DdsAnswers answers{.secured = found->participant->config().security.on()};
+  for (auto& one : asked) std::ranges::move(one.get(), std::back_inserter(answers.all));
   return answers;
+}
+
+OwnRuns own_runs_on_dds() {
+  const std::vector<std::string> sockets = running_control_sockets("run");
+  std::vector<std::future<Result<Json>>> answers;
+  for (const std::string& socket : sockets) {
+    answers.push_back(std::async(std::launch::async, [&socket] {
+      return ask(socket, {{"do", "dds.show"}});
+    }));
+  }
+  OwnRuns found;
+  for (std::size_t i = 0; i < sockets.size(); ++i) {
+    const Result<Json> answer = answers[i].get();
+    if (!answer && answer.error().message.starts_with(kNoAnswer)) {
+      found.silent.push_back(process_of(sockets[i]));
+    }
+    if (!answer) continue;  // it is not on DDS
+    const auto participant = dds::parse_participant(answer->value("participant", ""));
+    if (!participant) continue;
+    found.runs.push_back({.who = process_of(sockets[i]),
+                          .participant = *participant,
+                          .domain = answer->value("domain", -1),
+                          .name_space = answer->value("namespace", "")});
+  }
+  return found;
 }
 
 }  // namespace tandem::apps

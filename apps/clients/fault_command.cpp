@@ -1,6 +1,7 @@
 // tandem fault show|reset and tandem estop: what they ask a running process, and its answer.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <future>
 #include <string>
@@ -64,6 +65,17 @@ bool stayed(const Json& before, const Json& now) {
   return false;
 }
 
+/// Whether an emergency stop is latched that was not before.
+bool stopped_since(const Json& before, const Json& now) {
+  const auto stops = [](const Json& answer) {
+    return std::ranges::count_if(answer.value("faults", Json::array()), [](const Json& fault) {
+      return fault.value("latched", false) && fault.value("joint", "").empty() &&
+             fault.value("cause", "").starts_with("emergency stop");
+    });
+  };
+  return stops(now) > stops(before);
+}
+
 /// Of a joint whose faults only warn: the others are enabled.
 Error still_there(const Json& answer) {
   return {.message = fmt::format("a cause is still there ({}): what it struck is not enabled, "
@@ -83,8 +95,9 @@ Error faulted_again(const Json& answer) {
 }
 
 /// Why a reset did not succeed, with the joints whose faults are latched.
-Error failed_reset(const Json& answer, bool through) {
-  const std::string why = through ? "a cause is still there"
+/// @param stayed  nothing has stopped the robot since
+Error failed_reset(const Json& answer, bool through, bool stayed) {
+  const std::string why = through ? (stayed ? "a cause is still there" : "a stop came, and wins")
                                   : fmt::format("not through after {} s, in the phase {}",
                                                 kResetTime.count(), answer.value("phase", "?"));
   return {
@@ -137,7 +150,7 @@ Exit reset(const FaultOptions& options) {
   }
   if (!nothing && !kept && !done) {
     const bool through = answer.value("failed_resets", 0) > asked->value("failed_resets", 0);
-    print_errors({failed_reset(answer, through)});
+    print_errors({failed_reset(answer, through, !stopped_since(*asked, answer))});
   }
   if (again) print_errors({stays ? still_there(answer) : faulted_again(answer)});
   if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
@@ -173,15 +186,63 @@ Error nobody_to_stop(const ControlSearch& search) {
           .key = {}};
 }
 
-/// Stops every run that serves in the DDS domain, and in the namespace when one is named.
-Exit stop_all_over_dds(const ControlTarget& target, const Json& question) {
-  const auto answers = ask_all_over_dds(target, question);
-  if (!answers) return tell_stop(std::unexpected(answers.error()), question, {});
+/// Everybody in a domain can serve tandem/stop, and confirm what they like.
+Exit tell_unvouched(const DdsAnswer& one) {
+  print_errors({{.message = fmt::format(
+                     "{}: the stop was sent, and participant {} says that it is carried out, for "
+                     "whom nobody vouches: it is no confirmation",
+                     one.who, one.participant ? dds::to_text(*one.participant) : "unknown"),
+                 .hint = "if the robot moves, press its emergency stop or cut its power. What "
+                         "confirms is a run of this user on this machine, or DDS Security "
+                         "(--dds-from); --trust-domain takes everybody's word (docs/safety.md)",
+                 .file = {},
+                 .key = {}}});
+  return Exit::kFault;
+}
+
+/// Runs of this user in the same place that nobody has heard.
+Exit tell_missing(const OwnRuns& own, const DdsAnswers& answers, const ControlTarget& target) {
+  for (const std::string& who : own.silent) {
+    fmt::print(stderr, "warning: {} does not answer: if it is in this domain, it is not stopped\n",
+               who);
+  }
+  if (!target.place.from.empty()) return Exit::kDone;  // which domain and namespace, it says
   Exit exit = Exit::kDone;
-  for (const DdsAnswer& one : *answers) {
-    if (tell_stop(one.answer, question, one.who) != Exit::kDone) exit = Exit::kFault;
+  for (const OwnRun& run : own.runs) {
+    const bool meant = run.domain == target.place.domain &&
+                       (!target.name_space || *target.name_space == run.name_space);
+    const auto heard =
+        std::ranges::find(answers.all, std::optional(run.participant), &DdsAnswer::participant);
+    if (!meant || heard != answers.all.end()) continue;
+    print_errors({{.message = run.who + ": is in this domain, and has not confirmed the stop",
+                   .hint = "tandem estop, without --dds; or press its emergency stop",
+                   .file = {},
+                   .key = {}}});
+    exit = Exit::kFault;
   }
   return exit;
+}
+
+/// Stops every run that serves in the DDS domain, and in the namespace when one is named. Whose
+/// word counts is asked meanwhile: it delays no stop.
+Exit stop_all_over_dds(const EstopOptions& options, const Json& question) {
+  auto asked = std::async(std::launch::async, [all = options.trust_domain] {
+    return all ? OwnRuns{} : own_runs_on_dds();
+  });
+  const auto answers = stop_all_by_dds(options.target, question);
+  if (!answers) return tell_stop(std::unexpected(answers.error()), question, {});
+  const OwnRuns own = asked.get();
+  Exit exit = Exit::kDone;
+  for (const DdsAnswer& one : answers->all) {
+    const bool is_own =
+        one.participant &&
+        std::ranges::find(own.runs, *one.participant, &OwnRun::participant) != own.runs.end();
+    const bool vouched = is_own || answers->secured || options.trust_domain;
+    const Exit told =
+        one.answer && !vouched ? tell_unvouched(one) : tell_stop(one.answer, question, one.who);
+    if (told != Exit::kDone) exit = Exit::kFault;
+  }
+  return tell_missing(own, *answers, options.target) == Exit::kDone ? exit : Exit::kFault;
 }
 
 /// Stops every run of this user on this machine. All are asked at once: one that hangs must not
@@ -217,7 +278,7 @@ Exit fault_command(const FaultOptions& options) {
 Exit estop_command(const EstopOptions& options) {
   Json question{{"do", "estop"}};
   if (options.category) question["category"] = *options.category;
-  if (options.target.dds) return stop_all_over_dds(options.target, question);
+  if (options.target.dds) return stop_all_over_dds(options, question);
   if (options.target.socket.empty()) return stop_all(question);
   return tell_stop(ask(options.target, "run", question), question, {});
 }

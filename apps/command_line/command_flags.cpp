@@ -43,7 +43,8 @@ const char kEstopExamples[] = R"(Examples:
   tandem estop --category 0                          take the torque away at once
   tandem estop --category 2                          a safe posture first, where a controller has one
 Exit status: 0 each loop has carried it out (or simulated time is paused, and it is next); 1 a stop
-is not confirmed, or there is no run. `kill -USR1 PID` asks for the same without a socket, and gets
+is not confirmed, or there is no run. Over DDS what confirms is a run of this user on this machine,
+or whoever DDS Security has authenticated. `kill -USR1 PID` asks for the same without a socket, and gets
 no answer.)";
 
 const char kPredictExamples[] = R"(Examples:
@@ -316,6 +317,9 @@ void add_flags(CLI::App& app, EstopOptions& o) {
   app.add_option("--category", o.category, "0, 1 or 2, instead of the robot's [safety]")
       ->check(CLI::IsMember({0, 1, 2}));
   add_target(app, o.target);
+  app.add_flag("--trust-domain", o.trust_domain,
+               "Believe whoever answers in the DDS domain, where nobody but robots is")
+      ->needs("--dds");
   app.footer(kEstopExamples);
 }
 

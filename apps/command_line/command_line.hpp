@@ -59,8 +59,9 @@ struct FaultOptions {
 
 /// tandem estop
 struct EstopOptions {
-  std::optional<int> category;  ///< 0, 1; empty: the robot's
+  std::optional<int> category;  ///< 0, 1, 2; empty: the robot's
   ControlTarget target;
+  bool trust_domain = false;  ///< over DDS whoever answers is believed
 };
 
 /// tandem controller list|load|unload|start|stop|switch

@@ -40,23 +40,36 @@ bool is_of(const Json& value, ControlKey::Type type) {
   return false;
 }
 
-Result<Json> parse(std::string_view text) {
+Result<Json> parse(std::string_view text, bool known) {
   if (text.size() > kMaxQuestion) {
     return fail(fmt::format("a question of more than {} bytes", kMaxQuestion), "ask shorter ones");
+  }
+  if (!known && text.size() > kMaxStrangersQuestion) {
+    return fail(
+        fmt::format("a question of more than {} bytes by a stranger", kMaxStrangersQuestion),
+        "who runs the process may admit this program (docs/security.md)");
   }
   return read_json_object(text);
 }
 
+/// What somebody wrote, as far as it can be a word.
+std::string shown(const std::string& word) {
+  return word.size() <= kMostNamed ? word : word.substr(0, kMostNamed) + "…";
+}
+
+/// @param known_asker  for nobody else it is looked what may be meant
 Status check_keys(const Json& request, const std::string& command,
-                  const std::vector<ControlKey>& keys) {
+                  const std::vector<ControlKey>& keys, bool known_asker) {
   std::vector<std::string> names;
   for (const ControlKey& key : keys) names.push_back(key.name);
   for (const auto& [name, value] : request.items()) {
     if (name == "do") continue;
     const auto known = std::ranges::find(keys, name, &ControlKey::name);
     if (known == keys.end()) {
-      return fail(fmt::format("{}: unknown key \"{}\"", command, name),
-                  names.empty() ? "it takes none" : suggest(name, names));
+      return fail(fmt::format("{}: unknown key \"{}\"", command, shown(name)),
+                  names.empty() ? "it takes none"
+                  : known_asker ? suggest(name, names)
+                                : R"({"do": "help"} lists them)");
     }
     if (!is_of(value, known->type)) {
       return fail(
@@ -78,6 +91,7 @@ const char* to_string(ControlEffect effect) {
   switch (effect) {
     case ControlEffect::kReads: return "reads";
     case ControlEffect::kChanges: return "changes";
+    case ControlEffect::kEnds: return "ends";
     case ControlEffect::kStops: return "stops";
   }
   return "?";
@@ -90,6 +104,14 @@ ControlRegistry::ControlRegistry() {
 
 void ControlRegistry::add(std::string name, ControlEffect effect, std::string doc,
                           std::vector<ControlKey> keys, Handler handler) {
+  add(std::move(name), effect, std::move(doc), std::move(keys),
+      AskedHandler([handler = std::move(handler)](const Json& request, std::uint64_t) {
+        return handler(request);
+      }));
+}
+
+void ControlRegistry::add(std::string name, ControlEffect effect, std::string doc,
+                          std::vector<ControlKey> keys, AskedHandler handler) {
   commands_.push_back(
       {std::move(name), effect, std::move(doc), std::move(keys), std::move(handler)});
 }
@@ -100,7 +122,12 @@ std::optional<ControlEffect> ControlRegistry::effect(std::string_view name) cons
   return found->effect;
 }
 
-Result<const ControlRegistry::Command*> ControlRegistry::find(const Json& request) const {
+void ControlRegistry::takes_long(std::string_view name) {
+  std::ranges::find(commands_, name, &Command::name)->takes_long = true;
+}
+
+Result<const ControlRegistry::Command*> ControlRegistry::find(const Json& request,
+                                                              bool known) const {
   const auto name = request.find("do");
   if (name == request.end() || !name->is_string()) {
     return fail("\"do\" does not name a command", R"({"do": "help"} lists them)");
@@ -110,40 +137,73 @@ Result<const ControlRegistry::Command*> ControlRegistry::find(const Json& reques
   if (found != commands_.end()) return &*found;
   std::vector<std::string> names;
   for (const Command& command : commands_) names.push_back(command.name);
-  return fail(fmt::format("unknown command \"{}\"", wanted), suggest(wanted, names));
+  return fail(fmt::format("unknown command \"{}\"", shown(wanted)),
+              known ? suggest(wanted, names) : R"({"do": "help"} lists them)");
 }
 
-Result<Json> ControlRegistry::run(std::string_view question, const Gate& gate) const {
-  const Result<Json> request = parse(question);
+/// Whoever asked before the robot was stopped did not know of it.
+Status ControlRegistry::check_stops(const Command& command, const Asked& asked) const {
+  if (command.effect != ControlEffect::kChanges || asked.after_stop == last_stop()) return {};
+  return fail(command.name + ": the robot was stopped after this was asked: nothing was done",
+              "see why: tandem fault show; then ask again");
+}
+
+Result<Json> ControlRegistry::run(std::string_view question, const Asked& asked) const {
+  const Result<Json> request = parse(question, asked.known);
   if (!request) return request;
-  const Result<const Command*> command = find(*request);
-  if (!command) return std::unexpected(command.error());
-  if (Status keys = check_keys(*request, (*command)->name, (*command)->keys); !keys) {
-    return std::unexpected(keys.error());
-  }
-  if (gate) {
-    if (Status open = gate((*command)->name, (*command)->effect, *request); !open) {
+  const Result<const Command*> found = find(*request, asked.known);
+  if (!found) return std::unexpected(found.error());
+  const Command& command = **found;
+  if (asked.gate) {
+    if (Status open = asked.gate(command.name, command.effect, *request); !open) {
       return std::unexpected(open.error());
     }
   }
-  std::unique_lock lock(working_, std::defer_lock);
-  if ((*command)->effect != ControlEffect::kStops) lock.lock();
+  if (Status keys = check_keys(*request, command.name, command.keys, asked.known); !keys) {
+    return std::unexpected(keys.error());
+  }
+  const bool urgent =
+      command.effect == ControlEffect::kStops || command.effect == ControlEffect::kEnds;
+  std::unique_lock lock(command.takes_long ? working_long_ : working_, std::defer_lock);
+  if (!urgent) lock.lock();
+  if (Status in_time = check_stops(command, asked); !in_time) {
+    return std::unexpected(in_time.error());
+  }
   try {
-    return (*command)->handler(*request);
+    return command.handler(*request, asked.after_stop);
   } catch (const std::exception& error) {
-    return fail(fmt::format("{}: {}", (*command)->name, error.what()));
+    return fail(fmt::format("{}: {}", command.name, error.what()));
   }
 }
 
-bool ControlRegistry::stops(std::string_view question) const {
-  const Result<Json> request = parse(question);
-  if (!request) return false;
-  const Result<const Command*> command = find(*request);
-  return command && (*command)->effect == ControlEffect::kStops;
+/// Null: it is too long, no question, or of another command.
+const ControlRegistry::Command* ControlRegistry::named(std::string_view question) const {
+  if (question.size() > kMaxUrgentQuestion) return nullptr;
+  const Result<Json> request = read_json_object(question);
+  if (!request) return nullptr;
+  const auto name = request->find("do");
+  if (name == request->end() || !name->is_string()) return nullptr;
+  const auto found =
+      std::ranges::find(commands_, name->get_ref<const std::string&>(), &Command::name);
+  return found == commands_.end() ? nullptr : &*found;
 }
 
-Json ControlRegistry::answer(std::string_view question, const Gate& gate) const {
-  const Result<Json> result = run(question, gate);
+std::optional<ControlEffect> ControlRegistry::effect_of(std::string_view question) const {
+  const Command* command = named(question);
+  return command == nullptr ? std::nullopt : std::optional(command->effect);
+}
+
+ControlTurn ControlRegistry::turn_of(std::string_view question) const {
+  const Command* command = named(question);
+  if (command == nullptr) return ControlTurn::kOrdinary;
+  const bool urgent =
+      command->effect == ControlEffect::kStops || command->effect == ControlEffect::kEnds;
+  if (urgent) return ControlTurn::kUrgent;
+  return command->takes_long ? ControlTurn::kLong : ControlTurn::kOrdinary;
+}
+
+Json ControlRegistry::answer(std::string_view question, const Asked& asked) const {
+  const Result<Json> result = run(question, asked);
   Json answer;
   answer["ok"] = result.has_value();
   if (result) {

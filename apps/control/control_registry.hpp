@@ -21,13 +21,29 @@ namespace tandem::apps {
 enum class ControlEffect : std::uint8_t {
   kReads,    ///< nothing
   kChanges,  ///< something: not for everybody over a network
+  kEnds,     ///< it ends the process' work in order: the same, but it waits for no other
   kStops,    ///< it takes the robot to a stop, which everybody may always
 };
 
 [[nodiscard]] const char* to_string(ControlEffect effect);
+/// Whether not everybody over a network may ask for it.
+[[nodiscard]] constexpr bool is_guarded(ControlEffect effect) {
+  return effect == ControlEffect::kChanges || effect == ControlEffect::kEnds;
+}
 
-/// Longest question [bytes].
+/// In whose turn a question is answered. Each transport has a thread for each.
+enum class ControlTurn : std::uint8_t {
+  kUrgent,    ///< a stop or an end: at once
+  kOrdinary,  ///< one after another
+  kLong,      ///< what takes its time and nothing waits for: predictions
+};
+inline constexpr std::size_t kControlTurns = 3;
+
+/// Longest question [bytes]; longest that is looked at before its turn, and so can be urgent;
+/// longest of who is not known, who may only look and stop.
 inline constexpr std::size_t kMaxQuestion = 256 * 1024;
+inline constexpr std::size_t kMaxUrgentQuestion = 1024;
+inline constexpr std::size_t kMaxStrangersQuestion = 4096;
 
 /// How long an emergency stop waits for its answer: who asks has to know soon that nothing stops
 /// the robot. More than the longest time in which a run looks for the loop's confirmation.
@@ -57,31 +73,51 @@ class ControlRegistry {
   /// Gets a request whose keys are known, there when required, and of the right type.
   /// @return an object: its keys follow "ok" in the answer.
   using Handler = std::function<Result<Json>(const Json& request)>;
+  /// The same, which wants to know Asked::after_stop.
+  using AskedHandler = std::function<Result<Json>(const Json& request, std::uint64_t after_stop)>;
   /// Says whether a command may be asked for; the error is the answer otherwise.
   using Gate =
       std::function<Status(const std::string& command, ControlEffect effect, const Json& request)>;
+  /// Who asks, and when.
+  struct Asked {
+    std::uint64_t after_stop = 0;  ///< last_stop() when the question came
+    bool known = true;  ///< else kMaxStrangersQuestion, and nobody looks for what was meant
+    Gate gate = {};     ///< empty: everything may be asked for
+  };
 
   /// The command "help" is there from the start: it lists the others.
   ControlRegistry();
   ControlRegistry(const ControlRegistry&) = delete;
   ControlRegistry& operator=(const ControlRegistry&) = delete;
 
-  /// One handler runs at a time, except those that stop the robot: they wait for no other, so they
-  /// have to be safe beside them, and they hold up who carries them until the loop has confirmed.
+  /// One handler runs at a time, except those that stop or end: they wait for no other, so they
+  /// have to be safe beside them, and a stop holds up who carries it until the loop has confirmed.
   /// @param doc  one line, for "help".  @pre `name` is new
   void add(std::string name, ControlEffect effect, std::string doc, std::vector<ControlKey> keys,
            Handler handler);
+  void add(std::string name, ControlEffect effect, std::string doc, std::vector<ControlKey> keys,
+           AskedHandler handler);
+  /// No other command waits for this one, but for itself. @pre it is there
+  void takes_long(std::string_view name);
+  /// Who counts the stops of the robot: what changes something and was asked before one is refused.
+  void stops_by(std::function<std::uint64_t()> last_stop) { last_stop_ = std::move(last_stop); }
+  [[nodiscard]] std::uint64_t last_stop() const { return last_stop_ ? last_stop_() : 0; }
 
   /// What the command `name` does; empty when there is none.
   [[nodiscard]] std::optional<ControlEffect> effect(std::string_view name) const;
 
   /// The answer to `question`, a JSON text. Answered as errors: what is longer than
   /// kMaxQuestion, or no JSON object, a key twice, an unknown command or key (with the nearest), a
-  /// missing key, a wrong type, and whatever a handler says or throws.
-  /// @param gate  of who asks; empty: everything may be asked for
-  [[nodiscard]] Json answer(std::string_view question, const Gate& gate = {}) const;
-  /// Whether `question` asks for a command that stops the robot.
-  [[nodiscard]] bool stops(std::string_view question) const;
+  /// missing key, a wrong type, a stop that came after it, and whatever a handler says or throws.
+  [[nodiscard]] Json answer(std::string_view question, const Asked& asked) const;
+  /// The same, asked now.
+  [[nodiscard]] Json answer(std::string_view question, const Gate& gate = {}) const {
+    return answer(question, {.after_stop = last_stop(), .gate = gate});
+  }
+  /// What `question` asks for, as far as that is known before its turn: empty when it is longer
+  /// than kMaxUrgentQuestion, or names no command. No more is parsed than that.
+  [[nodiscard]] std::optional<ControlEffect> effect_of(std::string_view question) const;
+  [[nodiscard]] ControlTurn turn_of(std::string_view question) const;
 
  private:
   struct Command {
@@ -89,14 +125,18 @@ class ControlRegistry {
     ControlEffect effect;
     std::string doc;
     std::vector<ControlKey> keys;
-    Handler handler;
+    AskedHandler handler;
+    bool takes_long = false;
   };
-  [[nodiscard]] Result<Json> run(std::string_view question, const Gate& gate) const;
-  [[nodiscard]] Result<const Command*> find(const Json& request) const;
+  [[nodiscard]] Result<Json> run(std::string_view question, const Asked& asked) const;
+  [[nodiscard]] const Command* named(std::string_view question) const;
+  [[nodiscard]] Result<const Command*> find(const Json& request, bool known) const;
+  [[nodiscard]] Status check_stops(const Command& command, const Asked& asked) const;
   [[nodiscard]] Json help() const;
 
   std::vector<Command> commands_;
-  mutable std::mutex working_;
+  std::function<std::uint64_t()> last_stop_;
+  mutable std::mutex working_, working_long_;
 };
 
 }  // namespace tandem::apps

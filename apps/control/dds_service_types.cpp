@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <cstring>
 #include <span>
 
 namespace tandem::apps {
@@ -116,7 +117,8 @@ Json set_gains_question(const SetGains_Request& request) {
 }
 
 Json clock_question(const Clock_Request& request) {
-  const std::string action = request.action;
+  constexpr std::size_t kLongest = 64;  // of what is shown of an unknown one; all are shorter
+  const std::string action(request.action, ::strnlen(request.action, kLongest));
   Json question{{"do", "clock." + (action.empty() ? "show" : action)}};
   if (action == "step") question["cycles"] = request.cycles;
   if (action == "rate") question["rate"] = request.rate;

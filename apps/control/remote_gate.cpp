@@ -27,7 +27,7 @@ ControlRegistry::Gate remote_gate(const runtime::RemoteOptions& remote,
   const auto command = remote.command.value_or(runtime::RemoteCommand::kOff);
   return [command, load = remote.load, owner = std::move(owner)](
              const std::string& name, ControlEffect effect, const Json& request) -> Status {
-    if (effect != ControlEffect::kChanges) return {};
+    if (!is_guarded(effect)) return {};
     if (command == runtime::RemoteCommand::kOff) {
       return fail(name + ": this process takes no commands over DDS",
                   "[remote] command = \"local\" in its experiment allows them; its control socket "

@@ -47,7 +47,7 @@ Json status(const runtime::RobotCycle& cycle) {
           {"failed_resets", progress.failed_resets.load()}};
 }
 
-Result<Json> reset(runtime::RobotCycle& cycle) {
+Result<Json> reset(runtime::RobotCycle& cycle, std::uint64_t after_stop) {
   using runtime::RunPhase;
   const RunPhase phase = cycle.progress().phase.load();
   Json answer = status(cycle);
@@ -63,7 +63,7 @@ Result<Json> reset(runtime::RobotCycle& cycle) {
                 "a fault is reset while the run waits for it: tandem run --on-fault wait");
   }
   answer["faults"] = faults_json(cycle.faults());  // before it
-  cycle.inbox().reset_faults();
+  cycle.inbox().reset_faults(after_stop);
   return answer;
 }
 
@@ -115,6 +115,7 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
 
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                       const hal::RobotConfig& robot) {
+  registry.stops_by([&cycle] { return cycle.progress().stopped_before.load(); });
   registry.add("status", ControlEffect::kReads, "phase and counts of the run", {},
                [&cycle](const Json&) -> Result<Json> { return status(cycle); });
   registry.add("fault.show", ControlEffect::kReads, "every fault of the run, latched or cleared",
@@ -124,16 +125,17 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                  answer["lost"] = cycle.fault_log().lost();
                  return answer;
                });
-  registry.add("fault.reset", ControlEffect::kChanges,
-               "clears what is latched; resets or failed_resets counts on when done", {},
-               [&cycle](const Json&) { return reset(cycle); });
+  registry.add(
+      "fault.reset", ControlEffect::kChanges,
+      "clears what is latched; resets or failed_resets counts on when done", {},
+      [&cycle](const Json&, std::uint64_t after_stop) { return reset(cycle, after_stop); });
   registry.add(
       "estop", ControlEffect::kStops, "emergency stop, latched; waits until the loop confirms it",
       {{.name = "category",
         .type = ControlKey::Type::kInteger,
         .doc = "0, 1 or 2; else what robot.toml's [safety] says"}},
       [&cycle, &robot](const Json& request) { return stop(cycle, request, robot.emergency_stop); });
-  registry.add("run.stop", ControlEffect::kChanges, "ends the run in order", {},
+  registry.add("run.stop", ControlEffect::kEnds, "ends the run in order", {},
                [&cycle](const Json&) -> Result<Json> {
                  cycle.inbox().end_run();
                  return Json::object();

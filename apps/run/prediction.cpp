@@ -205,6 +205,7 @@ void add_predict(ControlRegistry& registry, internal_model::PredictionService* s
         }
         return answer_json(*answer, robot, step);
       });
+  registry.takes_long("predict");  // it waits for the loop, and runs the robot ahead
 }
 
 }  // namespace tandem::apps

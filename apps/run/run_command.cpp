@@ -12,6 +12,7 @@
 #include "apps/run/commands.hpp"
 #include "apps/run/composition.hpp"
 #include "apps/run/dds_run.hpp"
+#include "apps/run/end_guard.hpp"
 #include "apps/run/inject.hpp"
 #include "apps/run/loop_guard.hpp"
 #include "apps/run/loop_thread.hpp"
@@ -176,6 +177,16 @@ Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE
   return {};
 }
 
+/// Who the process is in its DDS domain: by this, what it answers there is told from a stranger's.
+void add_identity(ControlRegistry& commands, const dds::Participant& participant) {
+  Json is{{"participant", dds::to_text(dds::id_of(participant))},
+          {"domain", participant.config().domain},
+          {"namespace", participant.config().name_space}};
+  commands.add("dds.show", ControlEffect::kReads,
+               "this process in its DDS domain: its participant's GUID", {},
+               [is](const Json&) -> Result<Json> { return is; });
+}
+
 /// Null without DDS.
 Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlRegistry& commands,
                                                    const runtime::RemoteOptions& remote,
@@ -283,7 +294,10 @@ class Session {
     const runtime::Experiment& e = experiment();
     add_run_commands(commands_, *cycle_, e.robot);
     add_predict(commands_, c_.predictor.get(), e.robot);
-    if (dds_ != nullptr) admission_.add_to(commands_);
+    if (dds_ != nullptr) {
+      admission_.add_to(commands_);
+      add_identity(commands_, dds_->participant());
+    }
     if (c_.sim != nullptr) {
       add_inject(commands_, e.robot, e.loop.period_ns, [this](const sim::Fault& fault) -> Status {
         if (fault.kind == hal::FaultKind::kBoardDuplicate) return injected(Code::kOutOfRange);
@@ -323,6 +337,7 @@ class Session {
     watch(*cycle_, thread, c_, **guard, recorder_.get(), out_, waits_, options_.quiet);
     if ((*guard)->gave_up()) end_without_loop(**guard);
     thread.join();
+    const EndGuard in_time([this] { close_log(); });
     if (c_.predictor != nullptr) c_.predictor->close();
     guard->reset();
     if (server_ != nullptr) server_->close();
@@ -330,6 +345,10 @@ class Session {
       fmt::print(stderr, "note: {}\n", thread.report().to_string());
     }
     return thread.times();
+  }
+
+  void close_log() {
+    if (recorder_ != nullptr) (void)recorder_->close(result_of(c_.master));
   }
 
   /// The loop was given up. Its thread is still there, and may go on at any time: what it uses
@@ -356,7 +375,10 @@ class Session {
       summary.parallel = parallel_->finish();
       summary.differences = &parallel_->differences();
     }
-    if (dds_ != nullptr) summary.dds = dds_->finish();
+    if (dds_ != nullptr) {
+      const EndGuard in_time([this] { close_log(); });
+      summary.dds = dds_->finish();
+    }
     if (services_ != nullptr) summary.dds->services = services_->counts();
     if (recorder_ != nullptr) {
       summary.log = recorder_->close(result_of(c_.master));
@@ -451,10 +473,12 @@ Exit run_command(const RunOptions& options) {
   std::string log;
   bool whole = true;
   {
-    Session session(**composition, options);
-    exit = session.run();
-    log = session.log();
-    whole = session.log_is_whole();
+    auto session = std::make_unique<Session>(**composition, options);
+    exit = session->run();
+    log = session->log();
+    whole = session->log_is_whole();
+    const EndGuard in_time;
+    session.reset();
   }
   add_report(options, log, whole);
   return exit;

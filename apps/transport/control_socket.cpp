@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "apps/transport/control_path.hpp"
 
@@ -19,6 +20,8 @@ namespace {
 
 constexpr mode_t kFolderMode = 0700;
 constexpr mode_t kSocketMode = 0600;
+/// A controller may have closed the descriptor that says so: the end is looked for, too.
+constexpr int kLookAround_ms = 500;
 
 void wake(int eventfd) {
   const std::uint64_t one = 1;
@@ -69,8 +72,10 @@ struct ControlSocket::Client {
   int fd;
   std::uint64_t number;
   std::string in, out;
+  std::size_t searched = 0;  // of `in`, without an end of line
   std::uint64_t last_turn = 0;
-  bool waiting = false;  // the second thread has a question of this one
+  bool waiting = false;  // another thread has a question of this one
+  bool urgent = false;   // with it: a stop or an end, whose place nobody takes
   bool ending = false;   // nothing more is read: closed when its answers are out
   bool hung_up = false;  // it has closed its end, and reads no answer
   bool gone = false;
@@ -86,7 +91,9 @@ Result<std::unique_ptr<ControlSocket>> ControlSocket::open(const std::string& pa
     return std::unexpected(listening.error());
   }
   socket->thread_ = std::thread([raw = socket.get()] { raw->serve(); });
-  socket->worker_ = std::thread([raw = socket.get()] { raw->work(); });
+  for (Turn& turn : socket->turns_) {
+    turn.thread = std::thread([raw = socket.get(), &turn] { raw->work(turn); });
+  }
   return socket;
 }
 
@@ -104,7 +111,7 @@ Status ControlSocket::listen() {
       listener_ >= 0 && wake_ >= 0 && done_ >= 0 &&
       ::bind(listener_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0 &&
       ::chmod(path_.c_str(), kSocketMode) == 0 && ::stat(path_.c_str(), &made) == 0 &&
-      ::listen(listener_, static_cast<int>(kMaxControlClients)) == 0;
+      ::listen(listener_, SOMAXCONN) == 0;
   if (!listens) {
     return fail(fmt::format("cannot listen at {}: {}", path_, reason()),
                 "choose another place with --socket");
@@ -119,10 +126,12 @@ ControlSocket::~ControlSocket() {
     const std::scoped_lock lock(mutex_);
     ending_ = true;
   }
-  more_.notify_all();
+  for (Turn& turn : turns_) turn.more.notify_all();
   wake(wake_);
   if (thread_.joinable()) thread_.join();
-  if (worker_.joinable()) worker_.join();
+  for (Turn& turn : turns_) {
+    if (turn.thread.joinable()) turn.thread.join();
+  }
   struct stat found {};
   const bool ours = inode_ != 0 && ::lstat(path_.c_str(), &found) == 0 && found.st_dev == device_ &&
                     found.st_ino == inode_;
@@ -143,11 +152,10 @@ void ControlSocket::serve() {
       const short events = client->out.empty() ? asking : POLLOUT;
       watched.push_back({client->fd, events, 0});
     }
-    if (::poll(watched.data(), watched.size(), -1) < 0) {
-      if (errno == EINTR) continue;
-      return;
-    }
-    if (watched[0].revents != 0) return;
+    const int happenings = ::poll(watched.data(), watched.size(), kLookAround_ms);
+    if (happenings < 0 && errno != EINTR) return;
+    if (ending_ || (happenings > 0 && watched[0].revents != 0)) return;
+    if (happenings <= 0) continue;
     for (std::size_t i = 0; first + i < watched.size(); ++i) {
       const short happened = watched[first + i].revents;
       if (happened == 0) continue;
@@ -178,11 +186,13 @@ void ControlSocket::accept() {
     return;
   }
   if (clients_.size() == kMaxControlClients) {
-    clients_.erase(std::ranges::min_element(clients_, {},
-                                            [](const auto& client) { return client->last_turn; }));
+    clients_.erase(std::ranges::min_element(clients_, {}, [](const auto& client) {
+      return std::pair(client->urgent, client->last_turn);
+    }));
   }
   clients_.push_back(std::make_unique<Client>(fd, ++newest_));
   clients_.back()->last_turn = ++turn_;
+  take(*clients_.back());  // before anybody else can take its place
 }
 
 void ControlSocket::take(Client& client) {
@@ -196,72 +206,70 @@ void ControlSocket::take(Client& client) {
   }
 }
 
-/// Answers what is there, line by line, as long as the client takes the answers. What may take long
-/// goes to the second thread, and the rest waits for it.
+/// Hands over what is there, line by line, as long as the client takes the answers: to the thread
+/// of each question's turn, and the rest waits for it.
 void ControlSocket::answer_lines(Client& client) {
   while (!client.gone && !client.ending && !client.waiting && client.out.empty()) {
-    const std::size_t end = client.in.find('\n');
+    const std::size_t end = client.in.find('\n', client.searched);
+    client.searched = end == std::string::npos ? client.in.size() : 0;
     const std::size_t length = end == std::string::npos ? client.in.size() : end + 1;
     if (length > kMaxControlLine) {
       client.out = refused(fmt::format("a line of more than {} bytes", kMaxControlLine),
                            "send shorter ones");
       client.ending = true;
-    } else if (end == std::string::npos) {
+      client.out += '\n';
+      flush(client);
       return;
-    } else {
-      std::string question = client.in.substr(0, end);
-      client.in.erase(0, length);
-      if (registry_->stops(question)) {
-        client.out = answer_to(question);
-      } else {
-        // Whoever has hung up has given up: nothing may move when nobody expects it any more.
-        if (!client.hung_up) hand_over(client, std::move(question));
-        continue;
-      }
     }
-    client.out += '\n';
-    flush(client);
+    if (end == std::string::npos) return;
+    std::string question = client.in.substr(0, end);
+    client.in.erase(0, length);
+    const ControlTurn turn = registry_->turn_of(question);
+    // Whoever has hung up has given up: nothing may move when nobody expects it any more.
+    if (turn == ControlTurn::kUrgent || !client.hung_up) {
+      hand_over(client, turn, std::move(question));
+    }
   }
 }
 
-void ControlSocket::hand_over(Client& client, std::string question) {
+void ControlSocket::hand_over(Client& client, ControlTurn turn, std::string question) {
   const std::scoped_lock lock(mutex_);
-  questions_.push_back({client.number, std::move(question)});
+  Turn& its = turns_[static_cast<std::size_t>(turn)];
+  its.questions.push_back({client.number, registry_->last_stop(), std::move(question)});
   client.waiting = true;
-  more_.notify_one();
+  client.urgent = turn == ControlTurn::kUrgent;
+  its.more.notify_one();
 }
 
-std::string ControlSocket::answer_to(std::string_view question) const {
-  return json_text(registry_->answer(question));
-}
-
-/// The second thread: one question after the other, so that the first is free for a stop.
-void ControlSocket::work() {
+/// One question after the other. No turn waits for another one.
+void ControlSocket::work(Turn& turn) {
   std::unique_lock lock(mutex_);
   for (;;) {
-    more_.wait(lock, [this] { return ending_ || !questions_.empty(); });
+    turn.more.wait(lock, [&] { return ending_ || !turn.questions.empty(); });
     if (ending_) return;
-    Message message = std::move(questions_.front());
-    questions_.pop_front();
+    Message message = std::move(turn.questions.front());
+    turn.questions.pop_front();
     lock.unlock();
-    message.text = answer_to(message.text);
+    message.text = json_text(registry_->answer(message.text, {.after_stop = message.after_stop}));
     lock.lock();
     answers_.push_back(std::move(message));
     wake(done_);
   }
 }
 
-/// The clients that are gone, and what they asked for that has not begun.
+/// The clients that are gone, and what they asked for that has not begun, unless it is urgent.
 void ControlSocket::drop_gone() {
   const std::scoped_lock lock(mutex_);
-  std::erase_if(questions_, [this](const Message& question) {
-    const auto asker = std::ranges::find(clients_, question.client, &Client::number);
-    return asker == clients_.end() || (*asker)->gone;
-  });
+  for (const ControlTurn turn : {ControlTurn::kOrdinary, ControlTurn::kLong}) {
+    std::erase_if(turns_[static_cast<std::size_t>(turn)].questions, [this](const Message& one) {
+      const auto asker = std::ranges::find(clients_, one.client, &Client::number);
+      return asker == clients_.end() || (*asker)->gone;
+    });
+  }
   std::erase_if(clients_, [](const auto& one) { return one->gone; });
 }
 
-/// Hands the second thread's answers to the clients that are still there.
+/// Hands the answers to the clients that are still there.
 void ControlSocket::deliver() {
   std::uint64_t count = 0;
   (void)!::read(done_, &count, sizeof count);
@@ -274,7 +282,7 @@ void ControlSocket::deliver() {
     const auto found = std::ranges::find(clients_, answer.client, &Client::number);
     if (found == clients_.end()) continue;
     Client& client = **found;
-    client.waiting = false;
+    client.waiting = client.urgent = false;
     client.last_turn = ++turn_;
     client.out = std::move(answer.text) + '\n';
     flush(client);

@@ -1,9 +1,11 @@
 // The Unix-domain socket of a running process: a line of JSON in, a line of JSON out.
-// Layer: apps/transport.  Thread: open/close main; one of its own talks and stops, another works.
+// Layer: apps/transport.  Thread: open/close main; one of its own talks, one for each turn answers.
 #pragma once
 
 #include <sys/types.h>
 
+#include <array>
+#include <atomic>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -29,8 +31,9 @@ inline constexpr std::size_t kMaxControlClients = 16;
 /// Serves a registry until it is destroyed; the file is removed then. Nothing that a client does
 /// or leaves undone reaches the process: a client that sends a line that is too long, that does
 /// not read its answers, or that is gone, is closed. What such a client asked for and has not begun
-/// is dropped, unless it stops the robot. A client's questions are answered in order; a command
-/// that stops the robot waits for no other client's.
+/// is dropped, unless it stops the robot. A client's questions are answered in order; one whose
+/// turn is urgent waits for no other client's: who talks answers nothing itself, reads what a new
+/// client has sent as it comes in, and parses kMaxUrgentQuestion bytes of a question at most.
 class ControlSocket {
  public:
   /// Makes the folder of a default path (mode 0700) and the socket (mode 0600). The file of a dead
@@ -49,10 +52,16 @@ class ControlSocket {
 
  private:
   struct Client;
-  /// A question for the second thread, or its answer.
+  /// A question for the thread of its turn, or its answer.
   struct Message {
     std::uint64_t client;
+    std::uint64_t after_stop;
     std::string text;
+  };
+  struct Turn {
+    std::condition_variable more;
+    std::deque<Message> questions;
+    std::thread thread;
   };
   ControlSocket(std::string path, const ControlRegistry& registry);
   Status listen();
@@ -61,9 +70,8 @@ class ControlSocket {
   void take(Client& client);
   void answer_lines(Client& client);
   static void flush(Client& client);
-  void hand_over(Client& client, std::string question);
-  [[nodiscard]] std::string answer_to(std::string_view question) const;
-  void work();
+  void hand_over(Client& client, ControlTurn turn, std::string question);
+  void work(Turn& turn);
   void drop_gone();
   void deliver();
 
@@ -77,15 +85,13 @@ class ControlSocket {
   std::uint64_t newest_ = 0;  // client's number
   std::vector<std::unique_ptr<Client>> clients_;
 
-  int done_ = -1;  // eventfd: the second thread's word to the first, "answers_ has some"
-  std::mutex mutex_;
-  std::condition_variable more_;
-  std::deque<Message> questions_;
+  int done_ = -1;     // eventfd: to the thread that talks, "answers_ has some"
+  std::mutex mutex_;  // of what follows, but the turns' threads
+  std::array<Turn, kControlTurns> turns_;
   std::vector<Message> answers_;
-  bool ending_ = false;
+  std::atomic<bool> ending_{false};
 
   std::thread thread_;
-  std::thread worker_;
 };
 
 /// How a process takes questions over a socket.

@@ -1,42 +1,79 @@
 #include "apps/transport/dds_services.hpp"
 
+#include <cstring>
+
 #include "apps/control/dds_service_types.hpp"
 
 namespace tandem::apps {
+namespace {
+
+Json only_stops_here() {
+  return {{"ok", false},
+          {"error", "tandem/stop takes emergency stops only"},
+          {"hint", R"({"do": "estop"}; all else is asked of tandem/ask)"}};
+}
+
+}  // namespace
+
 Result<std::unique_ptr<DdsServices>> DdsServices::open(dds::Participant& participant,
                                                        const ControlRegistry& registry,
                                                        ControlRegistry::Gate gate,
                                                        const DdsAdmission& admission) {
   std::unique_ptr<DdsServices> services(new DdsServices(registry, std::move(gate), admission));
-  auto server = dds::ServiceServer::open(participant);
-  if (!server) return std::unexpected(server.error());
-  services->server_ = std::move(*server);
+  for (auto* one : {&services->stops_, &services->server_}) {
+    auto server = dds::ServiceServer::open(participant);
+    if (!server) return std::unexpected(server.error());
+    *one = std::move(*server);
+  }
+  if (Status added = services->add_stops(); !added) return std::unexpected(added.error());
   if (Status added = services->add_all(); !added) return std::unexpected(added.error());
+  if (Status started = services->stops_->start(true); !started) {
+    return std::unexpected(started.error());
+  }
   if (Status started = services->server_->start(); !started) {
     return std::unexpected(started.error());
   }
   return services;
 }
 
+dds::ServiceServer::Counts DdsServices::counts() const {
+  dds::ServiceServer::Counts all = server_->counts();
+  const dds::ServiceServer::Counts stops = stops_->counts();
+  all.requests += stops.requests;
+  all.replies += stops.replies;
+  all.dropped += stops.dropped;
+  all.unclaimed += stops.unclaimed;
+  return all;
+}
+
+Status DdsServices::add_stops() {
+  if (!registry_->effect("estop")) return {};
+  if (Status added = add_ask(*stops_, "tandem/stop", true); !added) return added;
+  return add(*stops_, "tandem/emergency_stop", "estop", &emergency_stop_question,
+             &fill_emergency_stop);
+}
+
 Status DdsServices::add_all() {
   using namespace dds::tandem_msgs;
   const Status added[]{
-      add_ask(),
-      add("tandem/emergency_stop", "estop", &emergency_stop_question, &fill_emergency_stop),
-      add("tandem/clear_faults", "fault.reset", &clear_faults_question, &fill_clear_faults),
-      add("tandem/start_controllers", "controller.start", &start_controllers_question,
+      add_ask(*server_, "tandem/ask", false),
+      add(*server_, "tandem/clear_faults", "fault.reset", &clear_faults_question,
+          &fill_clear_faults),
+      add(*server_, "tandem/start_controllers", "controller.start", &start_controllers_question,
           &fill_start_controllers),
-      add("tandem/list_controllers", "controller.list", &list_controllers_question,
+      add(*server_, "tandem/list_controllers", "controller.list", &list_controllers_question,
           &fill_controllers),
-      add("tandem/load_controller", "controller.load", &load_controller_question,
+      add(*server_, "tandem/load_controller", "controller.load", &load_controller_question,
           &fill_switched<LoadController_Response>),
-      add("tandem/unload_controller", "controller.unload", &unload_controller_question,
+      add(*server_, "tandem/unload_controller", "controller.unload", &unload_controller_question,
           &fill_switched<UnloadController_Response>),
-      add("tandem/switch_controllers", "controller.switch", &switch_controllers_question,
+      add(*server_, "tandem/switch_controllers", "controller.switch", &switch_controllers_question,
           &fill_switched<SwitchControllers_Response>),
-      add("tandem/set_joint", "joint.set", &set_joint_question, &fill_done<SetJoint_Response>),
-      add("tandem/set_gains", "joint.gains", &set_gains_question, &fill_done<SetGains_Response>),
-      add("tandem/clock", "clock.show", &clock_question, &fill_clock),
+      add(*server_, "tandem/set_joint", "joint.set", &set_joint_question,
+          &fill_done<SetJoint_Response>),
+      add(*server_, "tandem/set_gains", "joint.gains", &set_gains_question,
+          &fill_done<SetGains_Response>),
+      add(*server_, "tandem/clock", "clock.show", &clock_question, &fill_clock),
   };
   for (const Status& one : added) {
     if (!one) return one;
@@ -44,13 +81,15 @@ Status DdsServices::add_all() {
   return {};
 }
 
-Json DdsServices::ask(const std::string& question, const dds::Asker& asker) const {
+Json DdsServices::ask(const std::string& question, const dds::Asker& asker,
+                      std::uint64_t after_stop) const {
+  const bool known = admission_->admits(asker);
   const auto gate = [&](const std::string& name, ControlEffect effect,
                         const Json& request) -> Status {
     if (gate_) {
       if (const Status open = gate_(name, effect, request); !open) return open;
     }
-    if (effect != ControlEffect::kChanges || admission_->admits(asker)) return {};
+    if (!is_guarded(effect) || known) return {};
     return fail(
         name + ": this process takes no commands from a stranger",
         "a `tandem` command is taken from the user who runs this process, on its machine; from "
@@ -59,36 +98,50 @@ Json DdsServices::ask(const std::string& question, const dds::Asker& asker) cons
         "user: tandem ask '{\"do\": \"dds.admit\", \"participant\": \"" +
             (asker ? dds::to_text(*asker) : "…") + "\"}' (docs/security.md)");
   };
-  return registry_->answer(question, gate);
+  return registry_->answer(question, {.after_stop = after_stop, .known = known, .gate = gate});
 }
 
-Status DdsServices::add_ask() {
+Status DdsServices::add_ask(dds::ServiceServer& server, const char* name, bool only_stops) {
   using Request = dds::tandem_msgs::Ask_Request;
   using Response = dds::tandem_msgs::Ask_Response;
-  return server_->add<Request, Response>(
-      "tandem/ask", [this](const Request& request, const dds::Asker& asker) {
-        const std::string question = request.request;
+  return server.add<Request, Response>(
+      name, [this, only_stops](const Request& request, const dds::Asker& asker) {
+        const std::size_t most = only_stops                  ? kMaxUrgentQuestion
+                                 : admission_->admits(asker) ? kMaxQuestion
+                                                             : kMaxStrangersQuestion;
+        // One byte more is too long, too, and all that is kept of it.
+        const std::string question(request.request, ::strnlen(request.request, most + 1));
+        const bool refused = only_stops && registry_->effect_of(question) != ControlEffect::kStops;
+        const ControlTurn turn = only_stops ? ControlTurn::kUrgent : registry_->turn_of(question);
         return dds::ServiceWork<Response>{
-            .at_once = registry_->stops(question),
-            .answer = [this, question, asker](Response& reply, dds::ReplyMemory& memory) {
-              reply.answer = memory.text(json_text(ask(question, asker)));
+            .at_once = turn == ControlTurn::kUrgent,
+            .takes_long = turn == ControlTurn::kLong,
+            .answer = [this, question, asker, refused, after_stop = registry_->last_stop()](
+                          Response& reply, dds::ReplyMemory& memory) {
+              const Json answer = refused ? only_stops_here() : ask(question, asker, after_stop);
+              reply.answer = memory.text(json_text(answer));
             }};
       });
 }
 
+/// Of who may not ask for it nothing is read.
 template <class Request, class Response>
-Status DdsServices::add(const char* name, const char* needs, Json (*question)(const Request&),
+Status DdsServices::add(dds::ServiceServer& server, const char* name, const char* needs,
+                        Json (*question)(const Request&),
                         void (*fill)(const Json&, Response&, dds::ReplyMemory&)) {
-  if (!registry_->effect(needs)) return {};
-  return server_->add<Request, Response>(
-      name, [this, question, fill](const Request& request, const dds::Asker& asker) {
-        const std::string text = json_text(question(request));
-        return dds::ServiceWork<Response>{
-            .at_once = registry_->stops(text),
-            .answer = [this, text, fill, asker](Response& reply, dds::ReplyMemory& memory) {
-              fill(ask(text, asker), reply, memory);
-            }};
-      });
+  const auto effect = registry_->effect(needs);
+  if (!effect) return {};
+  return server.add<Request, Response>(name, [=, this, guarded = is_guarded(*effect)](
+                                                 const Request& request, const dds::Asker& asker) {
+    const bool read = !guarded || admission_->admits(asker);
+    const std::string text = json_text(read ? question(request) : Json{{"do", needs}});
+    return dds::ServiceWork<Response>{
+        .at_once = registry_->turn_of(text) == ControlTurn::kUrgent,
+        .answer = [this, text, fill, asker, after_stop = registry_->last_stop()](
+                      Response& reply, dds::ReplyMemory& memory) {
+          fill(ask(text, asker, after_stop), reply, memory);
+        }};
+  });
 }
 
 }  // namespace tandem::apps

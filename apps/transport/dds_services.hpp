@@ -13,6 +13,9 @@ namespace tandem::apps {
 
 /// Serves a registry as "tandem/ask", and those of its commands that have a type of their own:
 /// "tandem/list_controllers" and so on. Every typed request becomes a question to the registry.
+/// Stops have services, readers and a thread of their own, "tandem/stop" and
+/// "tandem/emergency_stop": what others ask for, and how much of it, does not delay them. Of who is
+/// not admitted kMaxStrangersQuestion bytes are read.
 class DdsServices {
  public:
   /// Participant, registry and admission outlive it; the registry is complete.
@@ -22,24 +25,28 @@ class DdsServices {
                                                                  ControlRegistry::Gate gate,
                                                                  const DdsAdmission& admission);
 
-  [[nodiscard]] dds::ServiceServer::Counts counts() const { return server_->counts(); }
+  [[nodiscard]] dds::ServiceServer::Counts counts() const;
 
  private:
   DdsServices(const ControlRegistry& registry, ControlRegistry::Gate gate,
               const DdsAdmission& admission)
       : registry_(&registry), gate_(std::move(gate)), admission_(&admission) {}
+  Status add_stops();
   Status add_all();
-  Status add_ask();
+  Status add_ask(dds::ServiceServer& server, const char* name, bool only_stops);
   /// Adds a service that asks for a command, when the registry has `needs`.
   template <class Request, class Response>
-  Status add(const char* name, const char* needs, Json (*question)(const Request&),
+  Status add(dds::ServiceServer& server, const char* name, const char* needs,
+             Json (*question)(const Request&),
              void (*fill)(const Json& answer, Response& reply, dds::ReplyMemory& memory));
-  [[nodiscard]] Json ask(const std::string& question, const dds::Asker& asker) const;
+  /// @param after_stop  ControlRegistry::last_stop() when the question came
+  [[nodiscard]] Json ask(const std::string& question, const dds::Asker& asker,
+                         std::uint64_t after_stop) const;
 
   const ControlRegistry* registry_;
   ControlRegistry::Gate gate_;
   const DdsAdmission* admission_;
-  std::unique_ptr<dds::ServiceServer> server_;  // last: its threads use the others
+  std::unique_ptr<dds::ServiceServer> stops_, server_;  // last: their threads use the others
 };
 
 }  // namespace tandem::apps

@@ -194,10 +194,10 @@ bool RemoteBackend::command_in_force(hal::CommandImage& command) const noexcept 
 }
 
 /// A stop that the server has carried out already is not asked for again: its category is the
-/// server's.
+/// server's. While a reset is on its way to the server, what it shows is what the reset clears.
 void RemoteBackend::stop(StopCategory category) noexcept TANDEM_RT {
   if (category == StopCategory::kWarn) return;
-  const bool known = newest_.front().reaction <= category;
+  const bool known = !resetting_ && newest_.front().reaction <= category;
   if (latched_ <= category) return;
   latched_ = category;
   if (known) return;

@@ -165,7 +165,10 @@ void Server::keep_for_playout(const Taken& taken) {
 }
 
 void Server::note_stops(const tandem_msgs::LinkCommand& sample) {
-  if (sample.resets != gate_resets_) reset_.store(true, std::memory_order_relaxed);
+  if (sample.resets != gate_resets_) {
+    reset_cycle_.store(sample.cycle, std::memory_order_relaxed);
+    reset_.store(true, std::memory_order_release);
+  }
   gate_resets_ = sample.resets;
   if (sample.stops == gate_stops_) return;
   gate_stops_ = sample.stops;
@@ -254,7 +257,8 @@ hal::RemoteCommand Server::exchange(const hal::PortView& view) noexcept TANDEM_R
     wish.stop = static_cast<StopCategory>(stop_.exchange(kNone, std::memory_order_relaxed));
   }
   if (reset_.load(std::memory_order_relaxed)) {
-    wish.reset = reset_.exchange(false, std::memory_order_relaxed);
+    wish.reset = reset_.exchange(false, std::memory_order_acquire);
+    wish.reset_cycle = reset_cycle_.load(std::memory_order_relaxed);
   }
   newest_.refresh();
   const Taken& taken = newest_.front();

@@ -159,6 +159,7 @@ class Server final : public hal::RemoteCommandPort {
   std::optional<SpscRing> commands_;  // that play-out has not seen: client, image
   std::atomic<std::uint8_t> stop_;    // a hal::StopCategory, to be carried out
   std::atomic<bool> reset_{false};
+  std::atomic<std::uint64_t> reset_cycle_{0};  // RemoteCommand::reset_cycle
   std::mutex ring_mutex_;
   std::function<void()> on_news_;
 

@@ -28,7 +28,9 @@ class Background {
     process_ = ::fork();
     if (process_ != 0) return;
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    ::signal(SIGINT, SIG_DFL);  // a shell's background job ignores it, and so would its children
+    for (const int of_terminal : {SIGINT, SIGQUIT}) {
+      ::signal(of_terminal, SIG_DFL);  // a shell's background job ignores it, and so would this one
+    }
     if (::getppid() == test) ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
     ::_exit(127);
   }

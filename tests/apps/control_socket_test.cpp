@@ -90,29 +90,35 @@ TEST_F(Socket, GivesTheQuietestClientsPlaceToANewOne) {
 TEST_F(Socket, DropsWhatAClientAskedForThatHasGone) {
   std::atomic<bool> at_work{false}, released{false};
   std::atomic<int> moved{0};
-  registry.add("stop", ControlEffect::kStops, "takes its time", {},
+  registry.add("slow", ControlEffect::kChanges, "takes its time", {},
                [&](const Json&) -> Result<Json> {
                  at_work = true;
                  while (!released) std::this_thread::yield();
-                 return Json{{"text", "stop"}};
+                 return Json{{"text", "slow"}};
                });
   registry.add("move", ControlEffect::kChanges, "moves", {}, [&](const Json&) -> Result<Json> {
     ++moved;
     return Json{{"text", "move"}};
   });
+  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+    return Json{{"text", "stop"}};
+  });
   const auto socket = open(path);
   const int busy = connect();
-  send(busy, "{\"do\": \"stop\"}\n");
-  while (!at_work) std::this_thread::yield();  // the socket's own thread: it reads nothing now
+  send(busy, "{\"do\": \"slow\"}\n");
+  while (!at_work) std::this_thread::yield();
   const int gone = connect();
   send(gone, "{\"do\": \"move\"}\n{\"do\": \"move\"}\n");
   ::close(gone);
   const int stays = connect();
   send(stays, "{\"do\": \"move\"}\n");
-  ::shutdown(stays, SHUT_WR);  // as `nc -N` does: it still reads
+  ::shutdown(stays, SHUT_WR);    // as `nc -N` does: it still reads
+  for (int i = 0; i < 2; ++i) {  // whoever came before it has been heard
+    EXPECT_TRUE(ask(path, {{"do", "stop"}}).has_value());
+  }
   released = true;
   EXPECT_EQ(line(stays), "{\"ok\":true,\"text\":\"move\"}\n");
-  EXPECT_EQ(line(busy), "{\"ok\":true,\"text\":\"stop\"}\n");
+  EXPECT_EQ(line(busy), "{\"ok\":true,\"text\":\"slow\"}\n");
   EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());  // after all that came before
   EXPECT_EQ(moved, 1);
   ::close(stays);
@@ -154,6 +160,121 @@ TEST_F(Socket, StopsWhileAnotherCommandIsAtWorkAndManyHaveGone) {
   EXPECT_EQ(begun, 0) << "what waited for the slow one";
   ::close(late);
   ::close(slow);
+}
+
+// One unknown command of 100 kB had held up the thread that stops for 1.35 s.
+TEST_F(Socket, StopsWhileManyAskLongQuestionsThatNobodyUnderstands) {
+  std::atomic<int> stops{0};
+  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+    ++stops;
+    return Json{{"text", "stop"}};
+  });
+  const auto socket = open(path);
+  constexpr std::size_t kStrangers = 12;
+  const std::string question = "{\"do\": \"" + std::string(200'000, 'x') + "\"}\n";
+  std::atomic<bool> enough{false};
+  std::vector<std::thread> strangers;
+  for (std::size_t i = 0; i < kStrangers; ++i) {
+    strangers.emplace_back([&] {
+      while (!enough) {
+        const int fd = connect();
+        (void)::send(fd, question.data(), question.size(), MSG_NOSIGNAL);
+        (void)line(fd);
+        ::close(fd);
+      }
+    });
+  }
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_TRUE(ask(path, {{"do", "stop"}}).has_value()) << "within 3 s, stop " << i;
+  }
+  EXPECT_EQ(stops, 20);
+  enough = true;
+  for (std::thread& stranger : strangers) stranger.join();
+}
+
+// Stops and ends wait for the loop on a thread of their own; what takes long does so, too.
+TEST_F(Socket, HasAThreadForEachTurn) {
+  std::atomic<int> released{0};
+  const auto waits = [&](int number) {
+    return [&released, number](const Json&) -> Result<Json> {
+      while (released < number) std::this_thread::yield();
+      return Json{{"number", number}};
+    };
+  };
+  registry.add("stop", ControlEffect::kStops, "stops", {}, waits(3));
+  registry.add("end", ControlEffect::kEnds, "ends", {}, waits(3));
+  registry.add("predict", ControlEffect::kReads, "takes long", {}, waits(2));
+  registry.takes_long("predict");
+  registry.add("move", ControlEffect::kChanges, "moves", {}, waits(1));
+  const auto socket = open(path);
+  std::vector<int> clients;
+  for (const char* name : {"stop", "end", "predict", "move"}) {
+    clients.push_back(connect());
+    send(clients.back(), std::string("{\"do\": \"") + name + "\"}\n");
+  }
+  released = 1;
+  EXPECT_EQ(line(clients[3]), "{\"ok\":true,\"number\":1}\n");
+  EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
+  released = 2;
+  EXPECT_EQ(line(clients[2]), "{\"ok\":true,\"number\":2}\n");
+  released = 3;
+  EXPECT_EQ(line(clients[0]), "{\"ok\":true,\"number\":3}\n");
+  EXPECT_EQ(line(clients[1]), "{\"ok\":true,\"number\":3}\n");
+  for (const int fd : clients) ::close(fd);
+}
+
+// Its place had been the quietest one.
+TEST_F(Socket, LeavesAClientThatStopsItsPlace) {
+  std::atomic<bool> released{false};
+  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+    while (!released) std::this_thread::yield();
+    return Json{{"text", "stop"}};
+  });
+  const auto socket = open(path);
+  const int stops = connect();
+  send(stops, "{\"do\": \"stop\"}\n");
+  std::vector<int> others;
+  for (std::size_t i = 0; i < 3 * kMaxControlClients; ++i) others.push_back(connect());
+  EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
+  released = true;
+  EXPECT_EQ(line(stops), "{\"ok\":true,\"text\":\"stop\"}\n");
+  for (const int fd : others) ::close(fd);
+  ::close(stops);
+}
+
+// It had waited behind a slow one, and undone the stop that came meanwhile.
+TEST_F(Socket, RefusesWhatWasAskedBeforeAStopAndComesToItsTurnAfterIt) {
+  std::atomic<bool> at_work{false}, released{false};
+  std::atomic<std::uint64_t> stops{0};
+  std::atomic<int> resets{0};
+  registry.stops_by([&] { return stops.load(); });
+  registry.add("slow", ControlEffect::kReads, "takes its time", {},
+               [&](const Json&) -> Result<Json> {
+                 at_work = true;
+                 while (!released) std::this_thread::yield();
+                 return Json{{"text", "slow"}};
+               });
+  registry.add("reset", ControlEffect::kChanges, "resets", {}, [&](const Json&) -> Result<Json> {
+    ++resets;
+    return Json{{"text", "reset"}};
+  });
+  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+    ++stops;
+    return Json{{"text", "stop"}};
+  });
+  const auto socket = open(path);
+  const int slow = connect(), early = connect();
+  send(slow, "{\"do\": \"slow\"}\n");
+  while (!at_work) std::this_thread::yield();
+  send(early, "{\"do\": \"reset\"}\n");
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(ask(path, {{"do", "stop"}}).has_value());
+  const int late = connect();
+  send(late, "{\"do\": \"reset\"}\n");
+  released = true;
+  EXPECT_NE(line(early).find("the robot was stopped after this was asked"), std::string::npos);
+  EXPECT_EQ(line(late), "{\"ok\":true,\"text\":\"reset\"}\n");
+  EXPECT_EQ(resets, 1);
+  for (const int fd : {slow, early, late}) ::close(fd);
 }
 
 // A process that is stopped: connect() itself had waited for ever.

@@ -105,14 +105,17 @@ TEST_F(RunOverDds, AnswerAsTheControlSocketDoes) {
   begin_with("");
   EXPECT_EQ(ask(R"({"do": "help"})"), ask_local(R"({"do": "help"})"));
   EXPECT_EQ(ask(R"({"do": "fault.show"})")["faults"], nlohmann::json::array());
-  EXPECT_EQ(ask(R"({"do": "stattus"})")["hint"], "did you mean 'status'?");
+  EXPECT_EQ(ask(R"({"do": "stattus"})")["hint"], R"({"do": "help"} lists them)") << "a stranger";
+  EXPECT_EQ(ask_local(R"({"do": "dds.show"})")["participant"],
+            ask(R"({"do": "dds.show"})")["participant"]);
   EXPECT_EQ(ask("rubbish")["ok"], false);
   EXPECT_EQ(ask("\xff\xfe")["ok"], false);
-  EXPECT_NE(ask(std::string(300'000, ' '))["error"].dump().find("of more than"), std::string::npos);
+  EXPECT_NE(ask(std::string(300'000, ' '))["error"].dump().find("of more than 4096 bytes by"),
+            std::string::npos);
   EXPECT_EQ(end(), 0);
   const auto counts = json("run.json")["dds"];
-  EXPECT_EQ(counts["requests"], 6);
-  EXPECT_EQ(counts["replies"], 6);
+  EXPECT_EQ(counts["requests"], 7);
+  EXPECT_EQ(counts["replies"], 7);
   EXPECT_EQ(counts["requests_dropped"], 0);
 }
 
@@ -351,7 +354,7 @@ TEST_F(DdsCommands, AreAnsweredAsOverTheSocket) {
   EXPECT_EQ(over_dds("clock step 5").status, 0);
   EXPECT_EQ(over_dds("clock resume").status, 0);
   EXPECT_EQ(over_dds("inject kind=supply_sag board=board1 volts=10").status, 2) << "no such board";
-  const std::string stop = over_dds("estop --category 0").out;
+  const std::string stop = over_dds("estop --trust-domain --category 0").out;
   EXPECT_TRUE(stop.starts_with("tandem_run (process ")) << stop;
   EXPECT_TRUE(stop.ends_with("): emergency stop, category0\n")) << stop;
   until(R"("phase": "faulted")");
@@ -374,7 +377,7 @@ TEST_F(DdsCommands, SayWhatIsNotAllowedAndWhatWouldAllowIt) {
     EXPECT_NE(refused.err.find("[remote] command = \"local\""), std::string::npos) << refused.err;
   }
   EXPECT_EQ(to_run("controller stop hold").status, 0) << "the local operator may";
-  EXPECT_EQ(over_dds("estop").status, 0);
+  EXPECT_EQ(over_dds("estop --trust-domain").status, 0);
   until(R"("phase": "faulted")");
   EXPECT_EQ(end(), 1);
 }
@@ -403,7 +406,7 @@ TEST_F(DdsCommands, AStopAsksNobodyForAdmission) {
   };
   const std::string there = " --dds --domain " + std::to_string(dds::test::own_domain());
   const std::string environment = "TANDEM_SOCKETS=" + runtime + "/tandem";
-  EXPECT_EQ(tandem("estop" + there, environment).status, 0);
+  EXPECT_EQ(tandem("estop --trust-domain" + there, environment).status, 0);
   EXPECT_FALSE(asked());
   EXPECT_EQ(tandem("clock show" + there, environment).status, 0);
   EXPECT_TRUE(asked());
@@ -439,7 +442,7 @@ struct SecondRun {
 TEST_F(DdsCommands, AStopIsForAllOfSeveralRuns) {
   begin_with("");
   SecondRun second(*participant_);
-  const Outcome stop = over_dds("estop --category 0");
+  const Outcome stop = over_dds("estop --trust-domain --category 0");
   EXPECT_EQ(stop.status, 0) << stop.err;
   EXPECT_NE(stop.out.find("tandem_run (process "), std::string::npos) << stop.out;
   EXPECT_NE(stop.out.find("tester (process " + std::to_string(::getpid()) +
@@ -449,7 +452,7 @@ TEST_F(DdsCommands, AStopIsForAllOfSeveralRuns) {
   EXPECT_EQ(second.stops, 1);
   until(R"("phase": "faulted")");
   second.refuses = true;
-  const Outcome partly = over_dds("estop");
+  const Outcome partly = over_dds("estop --trust-domain");
   EXPECT_EQ(partly.status, 1) << "one has not confirmed";
   EXPECT_NE(partly.err.find("its loop hangs"), std::string::npos) << partly.err;
   EXPECT_EQ(end(), 1);
@@ -460,10 +463,10 @@ TEST_F(DdsCommands, AStopIsForAllOfSeveralNamespaces) {
              read_text(folder_ / "hold.toml") + "[dds]\nnamespace = \"left\"\n");
   begin_with("");
   SecondRun second(*participant_);
-  const Outcome one = over_dds("estop --namespace ''");
+  const Outcome one = over_dds("estop --trust-domain --namespace ''");
   EXPECT_EQ(second.stops, 1) << one.err;
   EXPECT_EQ(one.out.find("left"), std::string::npos) << one.out;
-  const Outcome stop = over_dds("estop");
+  const Outcome stop = over_dds("estop --trust-domain");
   EXPECT_EQ(stop.status, 0) << stop.err;
   EXPECT_NE(stop.out.find("tandem_run in the namespace 'left' (process "), std::string::npos)
       << stop.out;

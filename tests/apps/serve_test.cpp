@@ -151,7 +151,10 @@ TEST_F(Serve, AnotherUserOfTheMachineMovesNothing) {
   const Outcome socket_of_ours = tandem("estop --socket " + socket, other);
   EXPECT_NE(socket_of_ours.status, 0) << "the folder is closed to others";
   EXPECT_EQ(ask(socket, "status").value("phase", ""), "running");
-  EXPECT_EQ(tandem("estop --dds" + domain(), other).status, 0) << "everybody may stop a robot";
+  const Outcome stop = tandem("estop --dds" + domain(), other);
+  EXPECT_EQ(stop.status, 1) << "nobody vouches to that user for who confirms";
+  EXPECT_NE(stop.err.find("the stop was sent"), std::string::npos) << stop.err;
+  EXPECT_EQ(ask(socket, "status").value("phase", ""), "faulted") << "everybody may stop a robot";
   ASSERT_EQ(::kill(server, SIGTERM), 0);
   EXPECT_TRUE(ended(server));
 }

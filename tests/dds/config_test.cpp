@@ -5,6 +5,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "dds/ports.hpp"
+
 namespace tandem::dds {
 namespace {
 
@@ -40,6 +42,24 @@ TEST(DdsConfig, RefusesAnUnknownTopicAndANegativeRate) {
   EXPECT_EQ(errors[0].key, "dds.every.tf");
   EXPECT_EQ(errors[1].key, "dds.every.joint_state");
   EXPECT_EQ(errors[1].hint, "did you mean 'joint_states'?");
+}
+
+// Lines of a kernel's /proc/net/udp.
+TEST(DdsPorts, AreCountedByWhoHasThem) {
+  const std::string table =
+      "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout "
+      "inode ref pointer drops\n"
+      "  170: 00000000:1CF2 00000000:0000 07 00000000:00000000 00:00000000 00000000  1000        0 "
+      "41273 2 00000000c3f1d1f7 0\n"
+      "  171: 0100007F:1CF3 00000000:0000 07 00000000:00000000 00:00000000 00000000 65534        0 "
+      "41274 2 00000000c3f1d1f7 0\n"
+      "  172: 00000000:1CF4 00000000:0000 07 00000000:00000000 00:00000000 00000000 65534        0 "
+      "41275 2 00000000c3f1d1f7 0\n"
+      "  173: 00000000:0035 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 "
+      "41276 2 00000000c3f1d1f7 0\n";
+  EXPECT_EQ(port_holders(table, 0), "user 65534 (2), user 1000 (1)") << "7410 and on";
+  EXPECT_EQ(port_holders(table, 1), "");
+  EXPECT_EQ(port_holders("", 0), "");
 }
 
 TEST(DdsConfig, OfEveryTopicIsDocumented) {

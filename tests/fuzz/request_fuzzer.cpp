@@ -93,7 +93,7 @@ ControlRegistry::Gate gate(unsigned who) {
 }
 
 void ask(Run& run, const std::string& question, const ControlRegistry::Gate& gate) {
-  (void)run.registry.stops(question);
+  (void)run.registry.turn_of(question);
   const Json answer = run.registry.answer(question, gate);
   const std::string text = json_text(answer);
   require(text.find('\n') == std::string::npos);

@@ -1,5 +1,7 @@
 // A controller that holds its joints, until it does not return from one update, throws in it,
-// crashes, or ends the process.
+// crashes, ends the process, or closes every descriptor of it.
+#include <unistd.h>
+
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -22,8 +24,8 @@ class Hangs final : public Controller {
     after_ = setup.parameters.integer_or("after_cycles", 100, 0, 1'000'000'000);
     for_s_ = setup.parameters.number_or("for_s", 0.0, {0.0, 600.0});  // 0: for ever
     throws_ = setup.parameters.boolean_or("throws", false);
-    crash_ = setup.parameters.choice_or("crash", "no",
-                                        {"no", "null", "stack", "abort", "divide", "exit"});
+    crash_ = setup.parameters.choice_or(
+        "crash", "no", {"no", "null", "stack", "abort", "divide", "exit", "close"});
     if (setup.parameters.boolean_or("at_once", false)) crash();
     for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
       setup.claim(j, hal::ControlMode::kPosition);
@@ -36,6 +38,10 @@ class Hangs final : public Controller {
               hal::CommandImage&) noexcept TANDEM_RT override {
     if (++cycles_ != after_) return Code::kOk;
     if (throws_) complain();
+    if (crash_ == "close") {
+      ::close_range(3, ~0U, 0);
+      return Code::kOk;
+    }
     crash();
     const auto until = SteadyClock::now() + std::chrono::duration<double>(for_s_);
     while (for_s_ == 0.0 || SteadyClock::now() < until) asm volatile("" ::: "memory");
