@@ -8,7 +8,7 @@
 namespace tandem {
 namespace {
 
-constexpr const char* kNotListed = " more errors are not listed";
+constexpr const char* kNotListed = " more are not listed";
 
 /// One pass over the bytes, which knows strings, comments, brackets and keys' dots.
 class TomlScan {
