@@ -11,6 +11,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "base/bounds.hpp"
 #include "base/file_name.hpp"
 #include "base/nearest.hpp"
 #include "base/quoting.hpp"
@@ -186,7 +187,7 @@ void TomlTable::error(std::string_view key, std::string message, std::string hin
   const bool known = std::ranges::any_of(shared_->diagnostics, [&](const Error& other) {
     return other.line == error.line && other.key == error.key && other.message == error.message;
   });
-  if (!known) shared_->diagnostics.push_back(std::move(error));
+  if (!known) add_error(shared_->diagnostics, std::move(error));
 }
 
 bool TomlTable::has_errors() const {
@@ -198,12 +199,14 @@ bool TomlTable::has_errors() const {
 }
 
 bool TomlTable::has_errors(std::string_view key) const {
-  return std::ranges::any_of(shared_->diagnostics, [&](const Error& error) {
-    return error.key == shared_->shown(dotted(key)) && error.line == line(key);
+  return std::ranges::any_of(shared_->diagnostics, [path = shared_->shown(dotted(key)),
+                                                    line = line(key)](const Error& error) {
+    return error.key == path && error.line == line;
   });
 }
 
 void TomlTable::report_unknown(std::string_view key, const std::vector<std::string>& known) {
+  if (shared_->diagnostics.size() > bounds::kErrors.most) return error(key, "unknown key");
   error(key, "unknown key", suggest(key, known));
   const std::string meant = nearest(key, known);
   if (meant.empty()) return;
@@ -536,6 +539,8 @@ Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::strin
     return std::unexpected(
         Error{"this is XML, not TOML", "`tandem new FILE` makes a robot of a URDF", file, 1, {}});
   }
+  if (Status within = check_toml_bounds(text, file); !within)
+    return std::unexpected(within.error());
   TomlDocument document;
   document.shared_ = std::make_shared<TomlTable::Shared>();
   document.shared_->file = file;

@@ -140,7 +140,7 @@ class TomlDocument {
  public:
   /// Errors: the file cannot be read; the text is no TOML (with line).
   [[nodiscard]] static Result<TomlDocument> load(const std::string& file);
-  /// The same from memory; `file` only names it in errors.
+  /// The same from memory; `file` only names it in errors. Errors: beyond a bound of bounds.hpp.
   [[nodiscard]] static Result<TomlDocument> parse(std::string_view text, const std::string& file);
 
   [[nodiscard]] TomlTable root() const;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/bounds.hpp"
 #include "controllers/min_jerk.hpp"
 
 namespace tandem {
@@ -72,6 +73,12 @@ Result<MotionPlan> MotionPlan::make(const log::JointMotion& motion, const hal::R
     return fail("the recording has " + std::to_string(plan.recorded_) +
                     " cycles of the run: too many for memory",
                 "play it in parts: from_s and to_s");
+  }
+  const std::size_t samples = motion.tracks.empty() ? 0 : motion.tracks.front().time_ns.size();
+  if (plan.recorded_ > samples * bounds::kReplayCycles.most) {
+    return fail("the recording has " + std::to_string(samples) + " samples for " +
+                    std::to_string(plan.recorded_) + " cycles of the run",
+                "play a recording with more samples, or a shorter stretch: from_s and to_s");
   }
   const std::size_t numbers = plan.cycles_ * plan.joints_;
   plan.position_rad_.resize(numbers);

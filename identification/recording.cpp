@@ -10,6 +10,7 @@
 #include <map>
 #include <ranges>
 
+#include "base/bounds.hpp"
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
 #include "base/toml_reader.hpp"
@@ -125,6 +126,7 @@ Result<Grid> make_grid(const std::string& path, const std::vector<double>& time_
   Grid grid;
   grid.period_s = period_s;
   grid.first = static_cast<std::size_t>(first);
+  const auto most = static_cast<std::size_t>(last - first) * bounds::kPeriodsPerSample.most;
   std::size_t source = grid.first;
   for (std::size_t k = 0;; ++k) {
     const double t = time_s[first] + static_cast<double>(k) * period_s;
@@ -136,6 +138,12 @@ Result<Grid> make_grid(const std::string& path, const std::vector<double>& time_
                      fmt::format("nothing was logged from {:.3f} s on for more than {} s",
                                  time_s[source], kLongestGap_s),
                      "cut the log there, and give both parts");
+    }
+    if (k == most) {
+      return bad_log(path,
+                     fmt::format("{} samples lie over more than {} periods of {:.6g} s",
+                                 last - first, most, period_s),
+                     "is its period_ns right? Cut it where nothing was logged");
     }
     grid.source.push_back(source);
     grid.time_s.push_back(t);
@@ -298,7 +306,8 @@ void note_simulation(const log::RunInfo& info, const hal::RobotConfig& robot,
   }
   recording.voltage_hold_s = period_s;
   recording.hold_steps = sim.semi_implicit
-                             ? std::max(1, static_cast<int>(std::ceil(period_s / substep_s - 1e-9)))
+                             ? static_cast<int>(std::clamp<double>(
+                                   std::ceil(period_s / substep_s - 1e-9), 1.0, kContinuous))
                              : kContinuous;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "base/bounds.hpp"
 #include "base/clock_ns.hpp"
 
 namespace tandem::internal_model {
@@ -78,7 +79,12 @@ void PredictionService::close() {
 }
 
 Status PredictionService::check_horizon(std::int64_t horizon_ns) const {
-  if (horizon_ns >= period_ns_ && horizon_ns <= hal::kMostHorizon_ns) return {};
+  const std::size_t columns = cycle_ == nullptr ? 0 : 3 * cycle_->state().joints() + 7;
+  const auto cycles = static_cast<std::size_t>(std::max<std::int64_t>(0, horizon_ns / period_ns_));
+  if (horizon_ns >= period_ns_ && horizon_ns <= hal::kMostHorizon_ns) {
+    if (cycles * columns <= bounds::kPredicted.most) return {};
+    return std::unexpected(beyond(bounds::kPredicted));
+  }
   const auto seconds = [](std::int64_t ns) {
     return fmt::format("{:g} s", static_cast<double>(ns) * 1e-9);
   };

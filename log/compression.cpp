@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <cstring>
 
+#include "base/bounds.hpp"
+
 namespace tandem::log {
 namespace {
-
-constexpr std::uint64_t kLargestChunk = std::uint64_t{1} << 30;
 
 /// The most bytes that `compressed` ones can hold, so that no more room is made than there is
 /// content for: lz4 grows a byte to 255 at most, zstd one of 4 bytes to a block of 128 KiB.
@@ -77,7 +77,8 @@ void compress(Compression compression, std::span<const std::byte> data, Bytes& o
 
 Status decompress(Compression compression, std::span<const std::byte> data, std::uint64_t size,
                   Bytes& out) {
-  if (size > std::min(kLargestChunk, most_content(compression, data.size()))) {
+  if (size >
+      std::min(std::uint64_t{bounds::kLogRecord.most}, most_content(compression, data.size()))) {
     return fail("a chunk claims " + std::to_string(size) + " bytes");
   }
   bool good = false;

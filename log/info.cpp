@@ -1,18 +1,22 @@
 // RunInfo to the metadata record `tandem` and back, lists as lines.
 #include "log/info.hpp"
 
+#include <algorithm>
 #include <cstdlib>
+
+#include "base/bounds.hpp"
 
 namespace tandem::log {
 namespace {
 
+constexpr std::int64_t kShortest_ns = 1'000, kLongest_ns = 10'000'000'000;  // that a period can be
 constexpr const char* kOperatorsView = "of a tele-operator";
 
-/// Lines of "name" or "name count".
+/// Lines of "name" or "name count", as many as a log may have.
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;
   std::size_t begin = 0;
-  while (begin < text.size()) {
+  while (begin < text.size() && lines.size() < bounds::kLogNames.most) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
     lines.push_back(text.substr(begin, end - begin));
     begin = end + 1;
@@ -52,10 +56,13 @@ RunInfo info_from(const StringMap& map) {
   for (const std::string& line : lines_of(value_of(map, "sensors"))) {
     const std::size_t space = std::min(line.rfind(' '), line.size());
     const std::string count = space < line.size() ? line.substr(space + 1) : "0";
-    info.sensors.push_back({line.substr(0, space), std::strtoull(count.c_str(), nullptr, 10)});
+    const std::uint64_t channels = std::strtoull(count.c_str(), nullptr, 10);
+    info.sensors.push_back(
+        {line.substr(0, space), std::min<std::uint64_t>(channels, bounds::kLogNames.most)});
   }
   info.seed = std::strtoull(value_of(map, "seed").c_str(), nullptr, 10);
   info.period_ns = std::strtoll(value_of(map, "period_ns").c_str(), nullptr, 10);
+  if (info.period_ns < kShortest_ns || info.period_ns > kLongest_ns) info.period_ns = 0;
   info.operators_view = value_of(map, "state") == kOperatorsView;
   info.engine = value_of(map, "engine");
   info.kernel_variant = value_of(map, "kernel_variant");

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "base/bounds.hpp"
 #include "base/nearest.hpp"
 #include "log/data_hash.hpp"
 #include "log/mcap_reader.hpp"
@@ -31,6 +32,14 @@ StringMap metadata_of(const McapReader& reader, const std::string& name) {
 
 Error at(const std::string& file, std::string message, std::string hint = {}) {
   return {.message = std::move(message), .hint = std::move(hint), .file = file, .key = {}};
+}
+
+/// Whether the topic's messages can be a period apart, some of them being left out.
+bool fits(const Topic& topic, std::int64_t period_ns) {
+  const double apart_ns = static_cast<double>(topic.last_ns) - static_cast<double>(topic.first_ns);
+  const double cycles = apart_ns / static_cast<double>(period_ns);
+  return topic.messages < 2 || cycles / static_cast<double>(topic.messages) <=
+                                   static_cast<double>(bounds::kReplayCycles.most);
 }
 
 constexpr char kCutHint[] = "its run was killed, or the copy is not whole: copy it again";
@@ -63,6 +72,8 @@ Result<LogFile> LogFile::open(const std::string& path) {
   }
   for (auto& [id, topic] : by_channel) log.topics_.push_back(std::move(topic));
   log.info_ = info_from(metadata_of(*reader, kInfoRecord));
+  for (const Topic& topic : log.topics_)
+    if (topic.name == "/tandem/state" && !fits(topic, log.info_.period_ns)) log.info_.period_ns = 0;
   log.info_.configuration = metadata_of(*reader, kConfigurationRecord);
   log.result_ = metadata_of(*reader, kResultRecord);
   log.truncated_ = reader->truncated();

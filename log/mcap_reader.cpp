@@ -7,10 +7,27 @@
 #include <cstring>
 #include <filesystem>
 
+#include "base/bounds.hpp"
 #include "log/compression.hpp"
 
 namespace tandem::log {
 namespace {
+
+constexpr std::uint64_t kSmallLog = std::uint64_t{256} << 20;  // that any file may unpack to
+
+/// Whether a record holds what is kept; others, such as attachments, are passed over unread.
+bool is_read(Opcode opcode) {
+  switch (opcode) {
+    case Opcode::kHeader:
+    case Opcode::kSchema:
+    case Opcode::kChannel:
+    case Opcode::kMessage:
+    case Opcode::kChunk:
+    case Opcode::kMetadata:
+    case Opcode::kDataEnd: return true;
+    default: return false;
+  }
+}
 
 Error file_error(const std::string& path, std::string message, std::string hint) {
   return {.message = std::move(message), .hint = std::move(hint), .file = path, .key = {}};
@@ -97,11 +114,16 @@ Status McapReader::read_record() {
     ended_ = truncated_ = true;
     return {};
   }
+  const auto opcode = static_cast<Opcode>(head[0]);
+  left_ -= length;
+  if (!is_read(opcode)) {
+    file_->seekg(static_cast<std::streamoff>(length), std::ios::cur);
+    return *file_ ? Status{} : damaged("reading failed");
+  }
+  if (length > bounds::kLogRecord.most) return std::unexpected(beyond(bounds::kLogRecord, path_));
   record_.resize(static_cast<std::size_t>(length));
   file_->read(reinterpret_cast<char*>(record_.data()), static_cast<std::streamsize>(length));
-  left_ -= length;
   if (!*file_) return damaged("reading failed");
-  const auto opcode = static_cast<Opcode>(head[0]);
   if (opcode == Opcode::kChunk) return open_chunk(record_);
   if (opcode != Opcode::kMessage) return take(opcode, record_);
   // A file without chunks: next_in_chunk() finds the message as one of its own.
@@ -113,6 +135,7 @@ Status McapReader::read_record() {
 
 Status McapReader::take(Opcode opcode, std::span<const std::byte> content) {
   ByteReader in(content);
+  if (Status within = count_text(is_read(opcode) ? content.size() : 0); !within) return within;
   switch (opcode) {
     case Opcode::kHeader: profile_ = in.text(); break;
     case Opcode::kSchema: {
@@ -137,6 +160,12 @@ Status McapReader::take(Opcode opcode, std::span<const std::byte> content) {
   return {};
 }
 
+Status McapReader::count_text(std::size_t bytes) {
+  texts_ += bytes;
+  if (texts_ <= bounds::kLogTexts.most) return {};
+  return std::unexpected(beyond(bounds::kLogTexts, path_));
+}
+
 Status McapReader::open_chunk(std::span<const std::byte> content) {
   ByteReader in(content);
   (void)in.number<std::uint64_t>();  // start time
@@ -147,6 +176,10 @@ Status McapReader::open_chunk(std::span<const std::byte> content) {
   const auto records = in.take(in.number<std::uint64_t>());
   if (!in.ok()) return damaged("a chunk is shorter than its content");
   if (!compression) return damaged(compression.error().message);
+  if (size > bounds::kLogRecord.most) return std::unexpected(beyond(bounds::kLogRecord, path_));
+  unpacked_ += size;
+  if (unpacked_ > kSmallLog && unpacked_ / bounds::kLogGrowth.most > bytes_)
+    return std::unexpected(beyond(bounds::kLogGrowth, path_));
   if (Status done = decompress(*compression, records, size, chunk_); !done) {
     return damaged(done.error().message);
   }

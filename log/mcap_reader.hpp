@@ -62,11 +62,14 @@ class McapReader {
   [[nodiscard]] Status open_chunk(std::span<const std::byte> content);
   [[nodiscard]] Result<std::optional<MessageView>> next_in_chunk();
   [[nodiscard]] std::unexpected<Error> damaged(std::string what) const;
+  [[nodiscard]] Status count_text(std::size_t bytes);
 
   std::string path_, profile_;
   std::unique_ptr<std::ifstream> file_;
   std::uint64_t bytes_ = 0;
-  std::uint64_t left_ = 0;  // bytes of the file not read yet
+  std::uint64_t left_ = 0;      // bytes of the file not read yet
+  std::uint64_t unpacked_ = 0;  // bytes of chunks so far
+  std::size_t texts_ = 0;       // bytes of schemas, channels and metadata so far
   bool ended_ = false, truncated_ = false;
   Bytes record_, chunk_;
   std::size_t chunk_at_ = 0;

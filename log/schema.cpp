@@ -5,6 +5,8 @@
 #include <cstring>
 #include <utility>
 
+#include "base/bounds.hpp"
+
 namespace tandem::log {
 namespace {
 
@@ -43,7 +45,7 @@ Status add_member(std::string_view member, std::string_view comment, hal::Layout
     const std::string_view digits = type.substr(bracket + 1, type.size() - bracket - 2);
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), count);
     if (error != std::errc{} || end != digits.data() + digits.size() || type.back() != ']' ||
-        count > 1'000'000) {
+        count > bounds::kLogNumbers.most) {
       return refuse();
     }
     type = type.substr(0, bracket);
@@ -52,6 +54,10 @@ Status add_member(std::string_view member, std::string_view comment, hal::Layout
     if (text != type) continue;
     const auto fields = layout.fields();
     if (!fields.empty() && hal::size_of(one) > hal::size_of(fields.back().type)) return refuse();
+    if (fields.size() == bounds::kLogFields.most)
+      return std::unexpected(beyond(bounds::kLogFields));
+    if (layout.bytes() / 8 + count > bounds::kLogNumbers.most)
+      return std::unexpected(beyond(bounds::kLogNumbers));
     layout.add(std::string(name), one, count, std::string(comment));
     return {};
   }

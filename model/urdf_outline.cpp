@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "base/bounds.hpp"
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
 #include "base/utf8.hpp"
@@ -21,7 +22,6 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-constexpr std::size_t kMostLinks = 10'000;
 constexpr double kLargestNumber = 1e30;  // so that no product of a few overflows
 constexpr double kMostTurn_rad = 6.5;    // of an rpy: more is degrees, most likely
 constexpr double kMostWay_rad = 26.0;    // of a revolute joint: likewise, four turns
@@ -70,6 +70,10 @@ class Reader {
       error(1, "", "this is no XML, so no URDF", "name a .urdf file");
       return std::move(out_);
     }
+    if (Status within = check_xml_bounds(text, file_); !within) {
+      out_.errors.push_back(within.error());
+      return std::move(out_);
+    }
     const std::string plain = without_instructions(text);
     if (document_.Parse(plain.data(), plain.size()) != tinyxml2::XML_SUCCESS) {
       report_xml_error();
@@ -103,11 +107,11 @@ class Reader {
 
  private:
   void error(int line, std::string key, std::string message, std::string hint = {}) {
-    out_.errors.push_back({std::move(message), std::move(hint), file_, line, std::move(key)});
+    add_error(out_.errors, {std::move(message), std::move(hint), file_, line, std::move(key)});
   }
 
   void warning(int line, std::string key, std::string message, std::string hint) {
-    out_.warnings.push_back({std::move(message), std::move(hint), file_, line, std::move(key)});
+    add_error(out_.warnings, {std::move(message), std::move(hint), file_, line, std::move(key)});
   }
 
   void report_xml_error() {
@@ -141,14 +145,25 @@ class Reader {
       }
     }
     if (out_.links.empty()) error(robot.GetLineNum(), "", "the robot has no link");
-    if (out_.links.size() > kMostLinks) {
-      error(robot.GetLineNum(), "", "the robot has more than 10000 links");
-    }
+    check_count();
     warn_of_dynamics();
     vocabulary_.warn(out_.warnings);
     tinyxml2::XMLPrinter printer(nullptr, true);
     reduced_.Print(&printer);
     out_.text = printer.CStr();
+  }
+
+  /// What follows costs more than in proportion to links and joints.
+  void check_count() {
+    if (out_.links.size() > bounds::kUrdfLinks.most)
+      add_error(out_.errors,
+                beyond(bounds::kUrdfLinks, file_, out_.links[bounds::kUrdfLinks.most].line));
+    std::size_t moving = 0;
+    for (const OutlineJoint& joint : out_.joints) {
+      if (joint.type == "fixed" || ++moving != bounds::kMovingJoints.most + 1) continue;
+      add_error(out_.errors,
+                beyond(bounds::kMovingJoints, file_, joint.line, "joint " + joint.name));
+    }
   }
 
   /// Elements that others use are passed over; a misspelt <link> or <joint> is an error.
@@ -162,8 +177,7 @@ class Reader {
       return error(e.GetLineNum(), name, "unknown element <" + name + ">",
                    "did you mean <" + meant + ">?");
     }
-    out_.warnings.push_back(
-        {"the element <" + name + "> is not used", {}, file_, e.GetLineNum(), name});
+    warning(e.GetLineNum(), name, "the element <" + name + "> is not used", {});
   }
 
   std::string attribute(const XMLElement& e, const char* name, const std::string& key,
@@ -185,6 +199,10 @@ class Reader {
       error(e.GetLineNum(), key,
             std::string("'") + attribute_name + "' of <" + e.Name() + "> is not UTF-8",
             "save the file in UTF-8, or name it in plain letters");
+      return {};
+    }
+    if (name.size() > bounds::kXmlName.most) {
+      add_error(out_.errors, beyond(bounds::kXmlName, file_, e.GetLineNum(), e.Name()));
       return {};
     }
     if (name.empty() || (!odd && name.front() != ' ' && name.back() != ' ')) return name;

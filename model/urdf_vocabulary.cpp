@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/bounds.hpp"
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
 
@@ -43,6 +44,12 @@ bool has(const std::vector<std::string>& words, std::string_view word) {
   return std::ranges::find(words, word) != words.end();
 }
 
+/// The nearest word; any, when so much is wrong that no more is listed.
+std::string meant_by(const std::string& name, const std::vector<std::string>& words,
+                     const Diagnostics& errors) {
+  return errors.size() > bounds::kErrors.most ? name : nearest(name, words);
+}
+
 }  // namespace
 
 void Vocabulary::look_at(const XMLElement& e, const std::string& key, Diagnostics& errors) {
@@ -56,9 +63,9 @@ void Vocabulary::look_at(const XMLElement& e, const std::string& key, Diagnostic
       look_at(*child, key, errors);
       continue;
     }
-    if (const std::string meant = nearest(name, words->elements); !meant.empty()) {
-      errors.push_back({"unknown element <" + name + "> in <" + e.Name() + ">",
-                        "did you mean <" + meant + ">?", file_, child->GetLineNum(), key});
+    if (const std::string meant = meant_by(name, words->elements, errors); !meant.empty()) {
+      add_error(errors, {"unknown element <" + name + "> in <" + e.Name() + ">",
+                         "did you mean <" + meant + ">?", file_, child->GetLineNum(), key});
       continue;
     }
     Place& place = unused_["the element <" + name + "> in <" + e.Name() + ">"];
@@ -74,13 +81,13 @@ void Vocabulary::look_at_attributes(const XMLElement& e, const std::string& key,
     const std::string name = one->Name();
     if (has(known, name)) continue;
     std::string hint;
-    if (const std::string meant = nearest(name, known); !meant.empty())
+    if (const std::string meant = meant_by(name, known, errors); !meant.empty())
       hint = "did you mean '" + meant + "'?";
     if (origin && hint.empty())
       hint = "a place is given by 'xyz' and 'rpy' (roll, pitch, yaw in rad)";
     if (!hint.empty()) {
-      errors.push_back({"unknown attribute '" + name + "' of <" + e.Name() + ">", hint, file_,
-                        e.GetLineNum(), key});
+      add_error(errors, {"unknown attribute '" + name + "' of <" + e.Name() + ">", hint, file_,
+                         e.GetLineNum(), key});
       continue;
     }
     Place& place = unused_["the attribute '" + name + "' of <" + e.Name() + ">"];
@@ -92,7 +99,7 @@ void Vocabulary::warn(Diagnostics& warnings) const {
   for (const auto& [what, place] : unused_) {
     const std::string more =
         place.count == 1 ? "" : ", nor in " + counted(place.count - 1, "more place");
-    warnings.push_back({what + " is not used" + more, {}, file_, place.line, {}});
+    add_error(warnings, {what + " is not used" + more, {}, file_, place.line, {}});
   }
 }
 

@@ -3,7 +3,28 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/bounds.hpp"
+
 namespace tandem::model {
+namespace {
+
+/// Of a tag: the equals signs outside of its quotes.
+std::size_t attributes_in(std::string_view tag) {
+  std::size_t count = 0;
+  char quote = '\0';
+  for (const char c : tag) {
+    if (quote != '\0') {
+      quote = c == quote ? '\0' : quote;
+    } else if (c == '"' || c == '\'') {
+      quote = c;
+    } else if (c == '=') {
+      ++count;
+    }
+  }
+  return count;
+}
+
+}  // namespace
 
 std::optional<std::size_t> behind_no_tag(std::string_view text, std::size_t at) {
   const std::pair<std::string_view, std::string_view> kinds[] = {
@@ -29,6 +50,34 @@ std::size_t behind_tag(std::string_view text, std::size_t at) {
     }
   }
   return at;
+}
+
+Status check_xml_bounds(std::string_view text, const std::string& file) {
+  std::size_t depth = 0, parts = 0;
+  for (std::size_t at = text.find('<'); at != std::string_view::npos; at = text.find('<', at)) {
+    if (const auto behind = behind_no_tag(text, at)) {
+      at = *behind;
+      continue;
+    }
+    const std::size_t end = behind_tag(text, at);
+    const std::string_view tag = text.substr(at, end - at);
+    const bool closes = tag.starts_with("</");
+    const std::size_t attributes = tag.size() > bounds::kXmlTag.most ? 0 : attributes_in(tag);
+    parts += closes ? 0 : 1 + attributes;
+    if (closes) depth -= depth > 0 ? 1 : 0;
+    if (!closes && !tag.ends_with("/>")) ++depth;
+    const Bound* const broken = tag.size() > bounds::kXmlTag.most          ? &bounds::kXmlTag
+                                : attributes > bounds::kXmlAttributes.most ? &bounds::kXmlAttributes
+                                : depth > bounds::kXmlDepth.most           ? &bounds::kXmlDepth
+                                : parts > bounds::kXmlParts.most           ? &bounds::kXmlParts
+                                                                           : nullptr;
+    if (broken != nullptr) {
+      const auto lines = std::ranges::count(text.substr(0, at), '\n');
+      return std::unexpected(beyond(*broken, file, 1 + static_cast<int>(lines)));
+    }
+    at = end;
+  }
+  return {};
 }
 
 std::string without_instructions(std::string_view text) {

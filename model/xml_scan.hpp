@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "base/result.hpp"
+
 namespace tandem::model {
 
 /// Behind the comment, CDATA section, declaration or processing instruction that begins at `at`
@@ -15,6 +17,10 @@ namespace tandem::model {
 
 /// Behind the `>` of the tag that begins at `at`, which may have others in quotes.
 [[nodiscard]] std::size_t behind_tag(std::string_view text, std::size_t at);
+
+/// Whether an XML parser may have the text: how deep elements are in each other, how many they are
+/// and how long their tags (bounds.hpp). What is not well-formed is left to the parser.
+[[nodiscard]] Status check_xml_bounds(std::string_view text, const std::string& file);
 
 /// The text with blanks for its processing instructions (<?target …?>), which XML allows wherever
 /// an element may be and tinyxml2 only before the first. Lines stay where they are. What calls

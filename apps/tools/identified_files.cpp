@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <regex>
 #include <set>
 #include <sstream>
 
@@ -32,23 +31,60 @@ std::string marked(const std::string& text, bool toml) {
               : fmt::format("{}<!-- {}. -->\n", text, kIdentifyMark);
 }
 
+constexpr const char* kBlanks = " \t\r\f\v";
+
+/// Behind `key = ` from `at` on, where something follows; npos: that does not stand there.
+std::size_t behind_key(std::string_view line, std::string_view key, std::size_t at) {
+  at = line.find_first_not_of(kBlanks, at);
+  if (at == std::string_view::npos || !line.substr(at).starts_with(key)) return at = line.npos;
+  at = line.find_first_not_of(kBlanks, at + key.size());
+  if (at == std::string_view::npos || line[at] != '=') return line.npos;
+  return line.find_first_not_of(kBlanks, at + 1);
+}
+
+/// Behind the text in quotes at `at`; npos: there is none.
+std::size_t behind_text(std::string_view line, std::size_t at) {
+  if (at >= line.size() || (line[at] != '"' && line[at] != '\'')) return line.npos;
+  const std::size_t end = line.find(line[at], at + 1);
+  return end == std::string_view::npos ? end : end + 1;
+}
+
 /// Replaces the text of the first `key = "…"` of a line.
-std::string with_value(const std::string& line, const std::string& key, const std::string& value) {
-  const std::regex pattern("^(\\s*" + key + "\\s*=\\s*)(\"[^\"]*\"|'[^']*')");
-  std::smatch match;
-  if (!std::regex_search(line, match, pattern)) return line;
-  return match[1].str() + "\"" + value + "\"" + match.suffix().str();
+std::string with_value(const std::string& line, std::string_view key, const std::string& value) {
+  const std::size_t begin = behind_key(line, key, 0), end = behind_text(line, begin);
+  if (end == std::string::npos) return line;
+  return line.substr(0, begin) + "\"" + value + "\"" + line.substr(end);
 }
 
 /// A relative path in quotes behind `eds =`, anywhere in the line, from the old folder.
 std::string with_sheet(const std::string& line, const fs::path& folder) {
-  static const std::regex pattern("(eds\\s*=\\s*)[\"']([^\"']+)[\"']");
-  std::smatch match;
-  if (!std::regex_search(line, match, pattern)) return line;
-  const fs::path path = match[2].str();
-  const fs::path whole = path.is_absolute() ? path : fs::absolute(folder / path);
-  return match.prefix().str() + match[1].str() + "\"" + whole.lexically_normal().string() + "\"" +
-         match.suffix().str();
+  for (std::size_t at = line.find("eds"); at != std::string::npos; at = line.find("eds", at + 1)) {
+    const std::size_t begin = behind_key(line, "eds", at), end = behind_text(line, begin);
+    if (end == std::string::npos || end - begin < 3) continue;
+    const fs::path path = line.substr(begin + 1, end - begin - 2);
+    const fs::path whole = path.is_absolute() ? path : fs::absolute(folder / path);
+    return line.substr(0, begin) + "\"" + whole.lexically_normal().string() + "\"" +
+           line.substr(end);
+  }
+  return line;
+}
+
+/// The name between the brackets of a table's head, [a.b] or [[a.b]]; empty: the line is none.
+std::string_view head_of(std::string_view line) {
+  const std::size_t begin = line.find_first_not_of(kBlanks);
+  if (begin == std::string_view::npos || line[begin] != '[') return {};
+  const std::size_t name = line.find_first_not_of(" \t\r[", begin);
+  const std::size_t end = line.find(']', begin);
+  if (end == std::string_view::npos || name >= end) return {};
+  return line.substr(name, line.find_last_not_of(" \t\r", end - 1) + 1 - name);
+}
+
+/// Whether a head is that of an actuator: [actuator.NAME], with blanks or quotes around its parts.
+bool heads_actuator(std::string_view line, std::string_view name) {
+  std::string plain;
+  for (const char c : head_of(line))
+    if (c != ' ' && c != '\t' && c != '"') plain += c;
+  return plain == "actuator." + std::string(name) && line[line.find('[') + 1] != '[';
 }
 
 /// A mean of estimates, each weighted by its interval.
@@ -72,13 +108,15 @@ class Mean {
 void set_number(std::vector<std::string>& lines, std::ptrdiff_t head, const std::string& key,
                 const std::optional<double>& value) {
   if (!value) return;
-  const std::regex pattern("^(\\s*" + key + "\\s*=\\s*)([^#\\s]+)(.*)$");
-  static const std::regex next(R"(^\s*\[.*$)");
   for (auto i = static_cast<std::size_t>(head) + 1; i < lines.size(); ++i) {
-    if (std::regex_match(lines[i], next)) break;
-    std::smatch match;
-    if (!std::regex_match(lines[i], match, pattern)) continue;
-    lines[i] = fmt::format("{}{:.6g}{}", match[1].str(), *value, match[3].str());
+    std::string& line = lines[i];
+    if (const auto first = line.find_first_not_of(kBlanks);
+        first != std::string::npos && line[first] == '[')
+      break;
+    const std::size_t begin = behind_key(line, key, 0);
+    if (begin == std::string::npos || line[begin] == '#') continue;
+    const std::size_t end = std::min(line.find_first_of(" \t\r#", begin), line.size());
+    line = fmt::format("{}{:.6g}{}", line.substr(0, begin), *value, line.substr(end));
     return;
   }
   lines.insert(lines.begin() + head + 1, fmt::format("{} = {:.6g}", key, *value));
@@ -203,9 +241,7 @@ std::string moved_robot(const std::string& text, const std::string& folder, cons
   std::istringstream in(text);
   std::string out, line, table;
   while (std::getline(in, line)) {
-    static const std::regex header(R"(^\s*\[+\s*([^\]]+?)\s*\]+)");
-    std::smatch match;
-    if (std::regex_search(line, match, header)) table = match[1].str();
+    if (const std::string_view head = head_of(line); !head.empty()) table = head;
     if (table.starts_with("model.link")) continue;
     if (table.empty()) line = with_value(line, "name", name);
     if (table == "model") line = with_value(line, "urdf", urdf);
@@ -243,9 +279,8 @@ std::string with_actuators(const std::string& text, const std::vector<ActuatorFi
   std::vector<std::string> lines;
   for (std::string line; std::getline(in, line);) lines.push_back(line);
   for (const ActuatorFigures& one : figures) {
-    const std::regex head("^\\s*\\[\\s*actuator\\s*\\.\\s*\"?" + one.name + "\"?\\s*\\].*$");
     const auto begin = std::ranges::find_if(
-        lines, [&](const std::string& line) { return std::regex_match(line, head); });
+        lines, [&](const std::string& line) { return heads_actuator(line, one.name); });
     if (begin == lines.end()) continue;
     const auto at = begin - lines.begin();
     set_number(lines, at, "inertia_kg_m2", one.inertia_kg_m2);

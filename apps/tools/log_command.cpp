@@ -76,7 +76,9 @@ void print_info(const log::LogFile& file, std::FILE* out) {
                                  counted(info.sensors.size(), "sensor")));
   facts.add("backend", info.hal);
   facts.add("seed", std::to_string(info.seed));
-  facts.add("period", fmt::format("{} us", static_cast<double>(info.period_ns) / 1e3));
+  facts.add("period", info.period_ns == 0
+                          ? "unknown"
+                          : fmt::format("{} us", static_cast<double>(info.period_ns) / 1e3));
   if (info.operators_view) facts.add("state", "what the tele-operator saw: predicted, or late");
   if (!info.engine.empty()) facts.add("engine", info.engine);
   facts.add("kernels", info.kernel_variant);

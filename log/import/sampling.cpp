@@ -10,6 +10,8 @@
 #include <numbers>
 #include <utility>
 
+#include "base/bounds.hpp"
+
 namespace tandem::log {
 namespace {
 
@@ -398,10 +400,12 @@ Sampler::Sampler(const Recording& recording, const ImportMap& map, const hal::Ro
 Result<Sampler> Sampler::create(const Recording& recording, const ImportMap& map,
                                 const hal::RobotConfig& robot) {
   Sampler made(recording, map, robot);
+  std::size_t samples = 0;
   std::int64_t begin = std::numeric_limits<std::int64_t>::min();
   std::int64_t end = std::numeric_limits<std::int64_t>::max();
   for (const Series& series : recording.series) {
     if (series.joints.empty()) continue;
+    samples = std::max(samples, series.rows());
     begin = std::max(begin, series.time_ns.front());
     end = std::min(end, series.time_ns.back());
   }
@@ -411,9 +415,10 @@ Result<Sampler> Sampler::create(const Recording& recording, const ImportMap& map
   }
   made.begin_ns_ = begin;
   made.cycles_ = static_cast<std::uint64_t>((end - begin) / map.period_ns) + 1;
-  if (made.cycles_ < 2 || made.cycles_ > kMostCycles) {
+  const std::uint64_t most = std::min(kMostCycles, samples * bounds::kReplayCycles.most);
+  if (made.cycles_ < 2 || made.cycles_ > most) {
     return fail("the recording has " + std::to_string(made.cycles_) + " cycles of " +
-                    in_seconds(map.period_ns),
+                    in_seconds(map.period_ns) + " for " + std::to_string(samples) + " samples",
                 "check [time] unit and period_s in " + map.file);
   }
   return made;

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "dds/ports.hpp"
+#include "tests/support/little_room.hpp"
 
 namespace tandem::dds {
 namespace {
@@ -60,6 +61,32 @@ TEST(DdsPorts, AreCountedByWhoHasThem) {
   EXPECT_EQ(port_holders(table, 0), "user 65534 (2), user 1000 (1)") << "7410 and on";
   EXPECT_EQ(port_holders(table, 1), "");
   EXPECT_EQ(port_holders("", 0), "");
+}
+
+TEST(DdsConfig, TakesNamesAndAddressesAndNothingElse) {
+  const auto wrong = [](const std::string& key, const std::string& value) {
+    Diagnostics errors;
+    (void)read("[dds]\n" + key + " = " + value + "\n", &errors);
+    return errors.size();
+  };
+  for (const char* good : {"a", "left", "robots/left_2", "A/b/c9"})
+    EXPECT_EQ(wrong("namespace", "'" + std::string(good) + "'"), 0U) << good;
+  for (const char* bad : {"/a", "a/", "a//b", "9a", "a/9", "_a", "a b", "a-b", "ä", "/"})
+    EXPECT_EQ(wrong("namespace", "'" + std::string(bad) + "'"), 1U) << bad;
+  EXPECT_EQ(wrong("peers", "['192.168.1.20', 'fe80::1%eth0', 'my-host_2.local']"), 0U);
+  EXPECT_EQ(wrong("peers", "['a b', '', '<x>']"), 3U);
+  EXPECT_EQ(wrong("interfaces", "['lo', 'a\"b']"), 1U);
+}
+
+/// A regular expression's stack grew with the text.
+TEST(DdsConfig, NeedsNoStackForALongName) {
+  const std::string name(60'000, 'a');
+  const auto read_all = [&] {
+    Diagnostics errors;
+    (void)read("[dds]\nnamespace = '" + name + "'\npeers = ['" + name + "']\n", &errors);
+    return errors.size() == 2 && errors.front().message.size() < 300;
+  };
+  EXPECT_IN_LITTLE_ROOM(read_all());
 }
 
 TEST(DdsConfig, OfEveryTopicIsDocumented) {

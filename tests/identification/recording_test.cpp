@@ -9,6 +9,7 @@
 #include "identification/identify.hpp"
 #include "log/recorder.hpp"
 #include "tests/identification/synthetic.hpp"
+#include "tests/support/little_room.hpp"
 #include "tests/support/scratch_folder.hpp"
 
 namespace tandem::identification {
@@ -219,6 +220,44 @@ TEST(Recording, OfATeleOperatorIsNoMeasurement) {
   const auto read = read_recording(path, panda().robot);
   ASSERT_FALSE(read);
   EXPECT_NE(read.error().message.find("what a tele-operator saw"), std::string::npos);
+}
+
+/// A log of the Panda standing still, `samples` of them.
+void write_still(const std::string& path, std::int64_t period_ns, std::int64_t apart_ns,
+                 int samples) {
+  log::RunInfo info{.robot = "panda", .hal = "import", .period_ns = period_ns};
+  for (const auto& joint : panda().robot.joints) info.joints.push_back(joint.name);
+  for (const auto& sensor : panda().robot.sensors)
+    info.sensors.push_back({sensor.name, sensor.channels()});
+  auto recorder = log::Recorder::open(path, info, {});
+  ASSERT_TRUE(recorder);
+  hal::StateImage state(panda().robot.shape());
+  const auto channel =
+      (*recorder)->add_channel("/tandem/state", "tandem/msg/State", state.layout());
+  (*recorder)->start();
+  for (int i = 0; i < samples; ++i) {
+    (*recorder)->wait_for_space(1);
+    (*recorder)->push(channel, i * apart_ns, state.bytes());
+  }
+  ASSERT_EQ((*recorder)->close().error, "");
+}
+
+/// A grid of 1 ns took 8 GB.
+TEST(Recording, TakesNoMoreMemoryThanItsSamplesWhateverItsPeriodIsSaidToBe) {
+  const tandem::test::ScratchFolder folder;
+  const std::string path = folder / "log.mcap";
+  for (const std::int64_t period_ns : {1L, 0L, -5L, 1'000'000'000'000L}) {
+    write_still(path, period_ns, 1'000'000, 2'000);
+    const auto by_its_times = [&] {
+      const auto read = read_recording(path, panda().robot);
+      return read ? read->rows() == 2'000 && std::abs(read->period_s - 1e-3) < 1e-9
+                  : read.error().message.find("never valid") != std::string::npos;
+    };
+    EXPECT_IN_LITTLE_ROOM(by_its_times()) << period_ns;
+  }
+  write_still(path, 20'000, 10'000'000, 2'000);
+  EXPECT_IN_LITTLE_ROOM(read_recording(path, panda().robot).error().message ==
+                        "2000 samples lie over more than 32000 periods of 2e-05 s");
 }
 
 // Two logs that were joined: the second begins at its own time 0.
