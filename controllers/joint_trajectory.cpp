@@ -325,8 +325,8 @@ class JointTrajectory : public Controller {
       const Motion now = at(segment, k, duration * i / kSamples);
       way.fastest = std::max(way.fastest, std::abs(now.velocity));
       const double position = now.position + turned_rad_[k];
-      way.inside = way.inside && position >= joint.min_position_rad &&
-                   position <= joint.max_position_rad;
+      way.inside =
+          way.inside && position >= joint.min_position_rad && position <= joint.max_position_rad;
     }
     return way;
   }
