@@ -2,23 +2,31 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <optional>
+#include <span>
 #include <tuple>
 
 #include "base/counted.hpp"
 #include "controllers/controller.hpp"
 #include "controllers/fourier_series.hpp"
+#include "controllers/min_jerk.hpp"
+#include "controllers/motion_plan.hpp"
 #include "controllers/parameters.hpp"
 #include "controllers/segment.hpp"
 
 namespace tandem {
 namespace {
 
+constexpr double kTurn_rad = 2.0 * std::numbers::pi;
 constexpr int kSamples = 50;  // of a segment, when its limits are checked
 
 /// Parameters: joints (all), interpolation ("min_jerk": rests at every way-point, "quintic": runs
-/// through them), stop_at_end (false), link_damping_Nms_rad (0), [[waypoint]] time_s, position_rad
-/// (one per joint). With interpolation "fourier" instead of way-points: period_s, periods (1),
+/// through them), stop_at_end (false), link_damping_Nms_rad (0), angle_wraparound (false: angles as
+/// they are; true: each by whole turns nearest to the one before), [[waypoint]] time_s,
+/// position_rad (one per joint), and of "quintic" velocity_rad_s, acceleration_rad_s2. A first
+/// way-point at 0 s is where the plan starts: joints that stand elsewhere are led there first. With
+/// interpolation "fourier" instead of way-points: period_s, periods (1),
 /// [[harmonic]] cos_rad, sin_rad (one per joint): x = start + sum_k cos_k (cos k w t - 1) + sin_k
 /// sin k w t.
 class JointTrajectory : public Controller {
@@ -29,10 +37,14 @@ class JointTrajectory : public Controller {
         parameters.choice_or("interpolation", "min_jerk", {"min_jerk", "quintic", "fourier"});
     through_ = interpolation == "quintic";
     stop_at_end_ = parameters.boolean_or("stop_at_end", false);
+    wraps_ = parameters.boolean_or("angle_wraparound", false);
     link_damping_Nms_rad_ = parameters.number_or("link_damping_Nms_rad", 0.0, kNotNegative);
     joints_ = joints_parameter(setup);
     joints_known_ = !setup.parameters.has_errors();
-    for (const std::size_t joint : joints_) setup.claim(joint, hal::ControlMode::kPosition);
+    for (const std::size_t joint : joints_) {
+      setup.claim(joint, hal::ControlMode::kPosition);
+      limits_.push_back(setup.robot.joints[joint]);
+    }
     if (interpolation == "fourier") {
       series_.configure(setup, joints_, joints_known_);
       setup.plan(parameters, "periods", series_.end_s());
@@ -43,18 +55,25 @@ class JointTrajectory : public Controller {
       parameters.error("", "there is no way-point",
                        "add [[controller.parameters.waypoint]] with time_s and position_rad");
     }
-    times_s_.assign(1, 0.0);
-    points_.assign(joints_.size(), Motion{});  // the measured positions, at the start
+    here_rad_.assign(joints_.size(), 0.0);
+    turned_rad_.assign(joints_.size(), 0.0);
     for (TomlTable& table : tables) read_waypoint(setup, table);
     wrong_number_.tell();
     beyond_.tell();
-    set_velocities();
-    const bool known = !setup.start_position_rad.empty();  // else it is left to the limits
-    for (std::size_t k = 0; known && k < joints_.size(); ++k) {
-      points_[k].position = setup.start_position_rad[joints_[k]];
+    check_ends(tables);
+    if (!planned_start_) {  // the measured positions, at the start
+      times_s_.insert(times_s_.begin(), 0.0);
+      points_.insert(points_.begin(), joints_.size(), Motion{});
     }
-    for (std::size_t i = known ? 0 : 1; i + 1 < times_s_.size(); ++i)
-      check_segment(setup, tables[i], i);
+    const bool known = !setup.start_position_rad.empty();  // else it is left to the limits
+    if (known && !tables.empty() && !incomplete_) begin_at(setup.start_position_rad);
+    set_velocities();
+    const std::size_t first = known || planned_start_ ? 0 : 1;
+    for (std::size_t i = first; i + 1 < times_s_.size(); ++i)
+      check_segment(setup, tables[planned_start_ ? i + 1 : i], i);
+    for (std::size_t i = 0; i < tables.size(); ++i) {
+      setup.plan(tables[i], "time_s", approach_s_ + times_s_[planned_start_ ? i : i + 1]);
+    }
     return {};
   }
 
@@ -63,9 +82,7 @@ class JointTrajectory : public Controller {
     start_ns_ = time.time_ns;
     segment_ = 0;
     if (series_.used()) return series_.start(joints_, state);
-    for (std::size_t k = 0; k < joints_.size(); ++k) {
-      points_[k].position = state.position_rad()[joints_[k]];
-    }
+    begin_at(state.position_rad());
   }
 
   Code update(const hal::CycleTime& time, const hal::StateImage& state,
@@ -76,21 +93,60 @@ class JointTrajectory : public Controller {
       damp_links(state, command);
       return stop_at_end_ && t_s >= series_.end_s() ? Code::kStopped : Code::kOk;
     }
+    if (t_s < approach_s_) {
+      approach(t_s, command);
+      damp_links(state, command);
+      return Code::kOk;
+    }
+    const double plan_s = t_s - approach_s_;
     const std::size_t last = times_s_.size() - 1;
-    while (segment_ < last && t_s >= times_s_[segment_ + 1]) ++segment_;
+    while (segment_ < last && plan_s >= times_s_[segment_ + 1]) ++segment_;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
       const Motion now = segment_ == last ? Motion{point(last, k).position, 0.0, 0.0}
-                                          : at(segment_, k, t_s - times_s_[segment_]);
-      command.position_rad()[joints_[k]] = now.position;
+                                          : at(segment_, k, plan_s - times_s_[segment_]);
+      command.position_rad()[joints_[k]] = now.position + turned_rad_[k];
       command.velocity_rad_s()[joints_[k]] = now.velocity;
     }
     damp_links(state, command);
     return segment_ == last && stop_at_end_ ? Code::kStopped : Code::kOk;
   }
 
-  void archive(Archive& ar) override { ar(start_ns_, segment_, points_, series_.start_rad()); }
+  void archive(Archive& ar) override {
+    ar(start_ns_, segment_, points_, series_.start_rad(), here_rad_, turned_rad_, approach_s_);
+  }
 
  private:
+  /// Where the joints are: the first point of the path, unless that is planned; then the way to it,
+  /// no faster than half of each joint's speed. Turned angles go as a whole to where the joint is.
+  void begin_at(std::span<const double> position_rad) noexcept TANDEM_RT {
+    approach_s_ = 0.0;
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+      here_rad_[k] = position_rad[joints_[k]];
+      turned_rad_[k] = wraps_ ? turns_to(k, here_rad_[k]) : 0.0;
+      if (!planned_start_) points_[k].position = here_rad_[k] - turned_rad_[k];
+      const double way = points_[k].position + turned_rad_[k] - here_rad_[k];
+      approach_s_ = std::max(approach_s_, approach_time_s(way, limits_[k]));
+    }
+  }
+  void approach(double t_s, hal::CommandImage& command) const noexcept TANDEM_RT {
+    const MinJerk share = min_jerk(t_s / approach_s_);
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+      const double way = points_[k].position + turned_rad_[k] - here_rad_[k];
+      command.position_rad()[joints_[k]] = here_rad_[k] + share.s * way;
+      command.velocity_rad_s()[joints_[k]] = share.ds / approach_s_ * way;
+    }
+  }
+  /// Whole turns that bring the path's first way-point nearest to `rad`, and leave it in its
+  /// limits.
+  [[nodiscard]] double turns_to(std::size_t k, double rad) const noexcept TANDEM_RT {
+    if (limits_[k].slides) return 0.0;
+    const double first = points_[planned_start_ ? k : joints_.size() + k].position;
+    const double fewest = std::ceil((limits_[k].min_position_rad - lowest_rad_[k]) / kTurn_rad);
+    const double most = std::floor((limits_[k].max_position_rad - highest_rad_[k]) / kTurn_rad);
+    const double turns = std::round((rad - first) / kTurn_rad);
+    return fewest <= most ? kTurn_rad * std::clamp(turns, fewest, most) : 0.0;
+  }
+
   /// On a spring the link may swing, which the motor's own loop hardly damps.
   void damp_links(const hal::StateImage& state,
                   hal::CommandImage& command) const noexcept TANDEM_RT {
@@ -138,24 +194,55 @@ class JointTrajectory : public Controller {
     return positions;
   }
 
+  /// Velocities or accelerations at a way-point: none, or one a joint, and then of every way-point.
+  std::vector<double> read_rates(TomlTable& table, const char* key, std::optional<bool>& given) {
+    const bool has = table.has(key);
+    const bool first = !given.has_value();
+    if (first) given = has;
+    std::vector<double> rates = has ? table.numbers(key, 0) : std::vector<double>();
+    const bool fits = rates.size() == joints_.size();
+    if (has && !through_) {
+      table.error(key, "min_jerk rests at every way-point", "set interpolation = \"quintic\"");
+    } else if (has != *given) {
+      table.error(has ? key : "time_s", std::string("some way-points have ") + key + ", some not",
+                  "give it to all of them or to none");
+    } else if (has && !fits && joints_known_ && !table.has_errors(key)) {
+      table.error(
+          key,
+          "has " + counted(rates.size(), "number") + " for " + counted(joints_.size(), "joint"),
+          "give one for each, as in position_rad");
+    }
+    rates.resize(joints_.size(), 0.0);
+    return rates;
+  }
+
   void read_waypoint(ControllerSetup& setup, TomlTable& table) {
-    const double time_s = table.number("time_s", kPositive);
+    const bool first = times_s_.empty();
+    const double time_s = table.number("time_s", first ? kNotNegative : kPositive);
     std::vector<double> positions = read_positions(setup, table);
+    const std::vector<double> velocities = read_rates(table, "velocity_rad_s", with_velocity_);
+    const std::vector<double> accelerations =
+        read_rates(table, "acceleration_rad_s2", with_acceleration_);
     const bool each_has_one = joints_known_ && positions.size() == joints_.size();
     incomplete_ = incomplete_ || !each_has_one;
     positions.resize(joints_.size(), 0.0);
     table.finish();
-    if (time_s > 0.0 && time_s <= times_s_.back()) {
+    if (first) planned_start_ = time_s == 0.0 && !table.has_errors("time_s");
+    if (!first && time_s == times_s_.back()) {
+      table.error("time_s", "is the time of the way-point before",
+                  "a joint cannot be at two places at once: remove one of the two, or move it");
+    } else if (!first && time_s > 0.0 && time_s < times_s_.back()) {
       table.error("time_s", "is not later than the way-point before", "sort them by time");
     }
     std::vector<const hal::Joint*> beyond;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
-      const hal::Joint& joint = setup.robot.joints[joints_[k]];
+      const hal::Joint& joint = limits_[k];
+      if (wraps_ && each_has_one) positions[k] = turned(k, positions[k]);
       if (each_has_one &&
           (positions[k] < joint.min_position_rad || positions[k] > joint.max_position_rad)) {
         beyond.push_back(&joint);
       }
-      points_.push_back({positions[k], 0.0, 0.0});
+      points_.push_back({positions[k], velocities[k], accelerations[k]});
     }
     if (!beyond.empty()) {
       const hal::Joint& first = *beyond.front();
@@ -168,17 +255,59 @@ class JointTrajectory : public Controller {
                       "; in radians, or metres of a slide");
     }
     times_s_.push_back(time_s);
-    setup.plan(table, "time_s", time_s);
+  }
+
+  /// The angle by whole turns that is nearest to the way-point before, and within the limits.
+  double turned(std::size_t k, double rad) {
+    const hal::Joint& limit = limits_[k];
+    if (!limit.slides && !times_s_.empty()) {
+      const double before = point(times_s_.size() - 1, k).position;
+      const double nearest = rad + kTurn_rad * std::round((before - rad) / kTurn_rad);
+      const bool fits = nearest >= limit.min_position_rad && nearest <= limit.max_position_rad;
+      if (fits) rad = nearest;
+    }
+    if (times_s_.empty()) {
+      lowest_rad_.push_back(rad);
+      highest_rad_.push_back(rad);
+    }
+    lowest_rad_[k] = std::min(lowest_rad_[k], rad);
+    highest_rad_[k] = std::max(highest_rad_[k], rad);
+    return rad;
+  }
+
+  /// A plan begins and ends at rest.
+  void check_ends(std::vector<TomlTable>& tables) {
+    if (tables.empty() || incomplete_) return;
+    if (!with_velocity_.value_or(false)) {
+      if (with_acceleration_.value_or(false)) {
+        tables.front().error("acceleration_rad_s2", "needs velocity_rad_s", "give both, or none");
+      }
+      return;
+    }
+    const auto moves = [&](std::size_t i) {
+      const auto at = points_.begin() + static_cast<std::ptrdiff_t>(i * joints_.size());
+      return std::any_of(at, at + static_cast<std::ptrdiff_t>(joints_.size()),
+                         [](const Motion& one) { return one.velocity != 0.0; });
+    };
+    if (planned_start_ && moves(0)) {
+      tables.front().error("velocity_rad_s", "the plan begins in motion, the joints at rest",
+                           "give 0 at 0 s");
+    }
+    if (moves(tables.size() - 1)) {
+      tables.back().error("velocity_rad_s", "the plan ends in motion, the joints stay there",
+                          "give 0 at the last way-point");
+    }
   }
 
   /// Through a way-point a joint runs as fast as between its neighbours, or rests where it turns.
   void set_velocities() {
+    if (with_velocity_.value_or(false)) return;
     for (std::size_t i = 1; through_ && i + 1 < times_s_.size(); ++i) {
       for (std::size_t k = 0; k < joints_.size(); ++k) {
         const double before = point(i, k).position - point(i - 1, k).position;
         const double after = point(i + 1, k).position - point(i, k).position;
         // The start is not known yet: the first way-point is where the joints rest.
-        const bool turns = i == 1 || before * after <= 0.0;
+        const bool turns = (i == 1 && !planned_start_) || before * after <= 0.0;
         point(i, k).velocity = turns ? 0.0 : (before + after) / (times_s_[i + 1] - times_s_[i - 1]);
       }
     }
@@ -195,8 +324,9 @@ class JointTrajectory : public Controller {
     for (int i = 0; i <= kSamples; ++i) {
       const Motion now = at(segment, k, duration * i / kSamples);
       way.fastest = std::max(way.fastest, std::abs(now.velocity));
-      way.inside = way.inside && now.position >= joint.min_position_rad &&
-                   now.position <= joint.max_position_rad;
+      const double position = now.position + turned_rad_[k];
+      way.inside =
+          way.inside && position >= joint.min_position_rad && position <= joint.max_position_rad;
     }
     return way;
   }
@@ -217,7 +347,8 @@ class JointTrajectory : public Controller {
         worst = share;
         char needs[96];
         std::snprintf(needs, sizeof needs, "would need %.3g rad/s on the way%s, its limit is %.3g",
-                      way.fastest, segment == 0 ? " from the start" : "", joint.max_velocity_rad_s);
+                      way.fastest, segment == 0 && !planned_start_ ? " from the start" : "",
+                      joint.max_velocity_rad_s);
         text = "joint '" + joint.name + "' " + needs;
       }
       if (!way.inside) {
@@ -232,10 +363,10 @@ class JointTrajectory : public Controller {
 
   /// From rest to rest the velocity goes with one over the time.
   [[nodiscard]] std::string more_time(std::size_t segment, double least_s) const {
-    if (through_ && segment > 0) return "give it more time";
+    if (through_ && (segment > 0 || planned_start_)) return "give it more time";
     char text[96];
     const double up_s = std::ceil(1e3 * least_s) * 1e-3;
-    if (segment == 0) {
+    if (segment == 0 && !planned_start_) {
       std::snprintf(text, sizeof text, "time_s = %g or more; and move the later ones", up_s);
     } else {
       std::snprintf(text, sizeof text, "give it %g s or more after the way-point before", up_s);
@@ -248,20 +379,31 @@ class JointTrajectory : public Controller {
   }
   [[nodiscard]] Motion at(std::size_t segment, std::size_t k, double t_s) noexcept TANDEM_RT {
     const double duration = times_s_[segment + 1] - times_s_[segment];
-    return quintic(point(segment, k), point(segment + 1, k), duration, t_s);
+    const Motion &from = point(segment, k), &to = point(segment + 1, k);
+    if (with_acceleration_.value_or(false)) return quintic_through(from, to, duration, t_s);
+    if (with_velocity_.value_or(false)) return cubic(from, to, duration, t_s);
+    return quintic(from, to, duration, t_s);
   }
 
   FourierSeries series_;
   bool through_ = false;
   bool stop_at_end_ = false;
+  bool wraps_ = false;
+  bool planned_start_ = false;                             // the first way-point is at 0
+  std::optional<bool> with_velocity_, with_acceleration_;  // the way-points have them
   double link_damping_Nms_rad_ = 0.0;
   bool joints_known_ = false;  // else their number says nothing of the way-points
   bool incomplete_ = false;    // some way-point is
   // Of all way-points; what is between them follows from these.
   Mistake wrong_number_, beyond_;
   std::vector<std::size_t> joints_;
-  std::vector<double> times_s_;  // of every point, the start at 0 first
-  std::vector<Motion> points_;   // per time, per joint
+  std::vector<hal::Joint> limits_;                // of these
+  std::vector<double> lowest_rad_, highest_rad_;  // of the way-points, where angles wrap around
+  std::vector<double> times_s_;                   // of every point, the start at 0 first
+  std::vector<Motion> points_;                    // per time, per joint
+  std::vector<double> here_rad_;                  // where the joints were at the start
+  std::vector<double> turned_rad_;                // by which the path is turned
+  double approach_s_ = 0.0;                       // to a planned start
   std::int64_t start_ns_ = 0;
   std::size_t segment_ = 0;
 };

@@ -22,6 +22,14 @@ double acceleration_of(const JointCapabilities& limit) noexcept TANDEM_RT {
   return std::min(limit.max_acceleration_rad_s2, limit.max_velocity_rad_s / kFullScale_s);
 }
 
+/// Of a joint whose position loop closes; 0: it rests.
+double speed_of(const StateImage& state, std::size_t joint,
+                const JointCapabilities& limit) noexcept TANDEM_RT {
+  const double most = limit.max_velocity_rad_s;
+  const double measured = state.velocity_rad_s()[joint];
+  return std::abs(measured) > kRestShare * most ? std::clamp(measured, -most, most) : 0.0;
+}
+
 /// A value on its way to a wish, which nobody has written since it was sent: to that wish.
 void go_on(double& value, double sent, double wish) noexcept TANDEM_RT {
   if (sent != wish && value == sent) value = wish;
@@ -74,7 +82,7 @@ void CommandLimits::follow(const CommandImage& command) noexcept TANDEM_RT {
                 .mode = command.mode()[j],
                 .interaction = command.interaction()[j],
                 .operates = 1};
-    position_[j].begin(last_[j].position_rad);
+    position_[j].begin(last_[j].position_rad, last_[j].velocity_rad_s);
     velocity_[j].begin(last_[j].velocity_rad_s);
   }
 }
@@ -108,6 +116,7 @@ void CommandLimits::position(std::size_t joint, const StateImage& state,
   if (!closed && std::isfinite(measured)) last.position_rad = measured;
   last.mode = command.mode()[joint];
   last.interaction = command.interaction()[joint];
+  last.held_back = 0;
   if (!wanted) {
     reference = last.position_rad;
     return;
@@ -120,7 +129,10 @@ void CommandLimits::position(std::size_t joint, const StateImage& state,
   bounded(joint, reference, last.position_rad, min, max);
   double limited = 0.0;
   if (std::isfinite(limit.max_acceleration_rad_s2)) {
-    if (!closed) position_[joint].begin(from);
+    if (!closed) {
+      position_[joint].begin(from,
+                             in_operation(state, joint) ? speed_of(state, joint, limit) : 0.0);
+    }
     limited = position_[joint].step(reference,
                                     {.min = min,
                                      .max = max,
@@ -128,12 +140,14 @@ void CommandLimits::position(std::size_t joint, const StateImage& state,
                                      .acceleration = limit.max_acceleration_rad_s2,
                                      .jerk = limit.max_jerk_rad_s3},
                                     period_s_);
+    last.held_back = limited != reference && !outside ? 1 : 0;
   } else {
     const double step = speed * period_s_;
     limited = std::clamp(reference, from - step, from + step);
     // A reference that runs at exactly the maximum velocity is not changed for its rounding.
     if (std::abs(limited - reference) <= 1e-9 * step) limited = reference;
   }
+  last.speed_rad_s = (limited - from) / period_s_;
   if (limited != reference) ++counters_[joint].too_fast;
   reference = limited;
   last.position_rad = reference;
@@ -176,6 +190,7 @@ void CommandLimits::velocity(std::size_t joint, const Last& was, const StateImag
   go_on(reference, was.velocity_rad_s, was.velocity_wish_rad_s);
   bounded(joint, reference, last.velocity_rad_s, min, max);
   last.velocity_wish_rad_s = reference;
+  if (last.held_back != 0) reference = last.velocity_rad_s = std::clamp(last.speed_rad_s, min, max);
   if (!follows || !in_operation(state, joint)) return;
   brake_before_ends(joint, state.position_rad()[joint], reference);
   last.velocity_rad_s = reference;

@@ -38,8 +38,11 @@ struct LimitCounters {
 ///   position loop is not yet closed (other mode, compliant, drive not enabled) the last one is
 ///   the measured position, so that every start is from where the joint stands. In other modes the
 ///   position reference is not used, and set to the measured position.
-/// - Where a joint declares them, a position reference keeps its acceleration and jerk, a velocity
-///   reference its acceleration and jerk: ReferenceMotion.
+/// - A position reference keeps the joint's acceleration and jerk, a velocity reference its
+///   acceleration and jerk: ReferenceMotion. Where the position loop closes on a joint that moves,
+///   the reference departs at its velocity.
+/// - While an acceleration holds a position reference back, the velocity reference beside it is its
+///   velocity.
 /// - Torque, and in its mode velocity, stiffness and damping, change by no more than their limit
 ///   in kFullScale_s. A loop that was open starts from what is measured, or free. A value that
 ///   nobody has written since goes on toward what was wanted.
@@ -84,7 +87,9 @@ class CommandLimits {
     double damping_wish_Nms_rad = 0.0;
     std::int64_t mode = 0;
     std::int64_t interaction = 0;
-    std::int64_t operates = 0;  // the drive followed it
+    std::int64_t operates = 0;   // the drive followed it
+    double speed_rad_s = 0.0;    // of the position reference
+    std::int64_t held_back = 0;  // the position reference was
   };
   void modes(std::size_t joint, CommandImage& command) noexcept TANDEM_RT;
   void position(std::size_t joint, const StateImage& state,

@@ -28,13 +28,16 @@ enum class Capability : std::uint8_t {
 /// declares no rate: faster than a drive's mechanics, slower than an error in a program.
 inline constexpr double kFullScale_s = 0.01;
 
+/// Of its largest velocity: a joint that is measured to move slower than that rests.
+inline constexpr double kRestShare = 0.01;
+
 /// A joint's limits, link side, and its capabilities. Torque and
 /// impedance limits of a joint that cannot do torque control are 0.
 struct JointCapabilities {
   double min_position_rad = 0.0;
   double max_position_rad = 0.0;
   double max_velocity_rad_s = 0.0;
-  double max_acceleration_rad_s2 = std::numeric_limits<double>::infinity();  ///< as declared
+  double max_acceleration_rad_s2 = std::numeric_limits<double>::infinity();  ///< of references
   double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();
   double max_torque_Nm = 0.0;
   /// Of the torque reference, as declared; else its limit in kFullScale_s.

@@ -94,8 +94,9 @@ class PositionControl {
   /// Greater than 0 and at most the joint's limit. Default: a quarter of the limit.
   Code set_ref_speed(std::size_t j, double rad_s) noexcept TANDEM_RT;
   [[nodiscard]] double ref_speed_rad_s(std::size_t j) const noexcept TANDEM_RT;
-  /// Greater than 0. Default: the default speed in half a second. A motion under way keeps the
-  /// largest that it had: with less it could not brake before its joint's limits.
+  /// Greater than 0 and at most the joint's limit. Default: the default speed in half a second, or
+  /// that limit. A motion under way keeps the largest that it had: with less it could not brake
+  /// before its joint's limits.
   Code set_ref_acceleration(std::size_t j, double rad_s2) noexcept TANDEM_RT;
   [[nodiscard]] double ref_acceleration_rad_s2(std::size_t j) const noexcept TANDEM_RT;
   /// Brakes with the motion's acceleration, at least the default one, and stays there.
@@ -142,7 +143,8 @@ class VelocityControl {
   /// Brings the reference to `rad_s` with the reference acceleration.
   Code velocity_move(std::size_t j, double rad_s) noexcept TANDEM_RT;
   [[nodiscard]] double target_velocity_rad_s(std::size_t j) const noexcept TANDEM_RT;
-  /// Greater than 0. Default: the joint's limit in two seconds.
+  /// Greater than 0 and at most the joint's limit. Default: the joint's velocity limit in two
+  /// seconds, or that limit.
   Code set_ref_acceleration(std::size_t j, double rad_s2) noexcept TANDEM_RT;
   [[nodiscard]] double ref_acceleration_rad_s2(std::size_t j) const noexcept TANDEM_RT;
   Code stop(std::size_t j) noexcept TANDEM_RT { return velocity_move(j, 0.0); }

@@ -8,7 +8,6 @@
 namespace tandem::hal {
 namespace {
 
-constexpr double kNoUpperLimit = std::numeric_limits<double>::max();
 constexpr double kSmallest = std::numeric_limits<double>::min();
 
 double seconds(const JointAccess& io) noexcept { return static_cast<double>(io.period_ns) * 1e-9; }
@@ -17,7 +16,10 @@ double default_speed_rad_s(const JointCapabilities& joint) noexcept {
   return joint.max_velocity_rad_s / 4.0;
 }
 double default_acceleration_rad_s2(const JointCapabilities& joint) noexcept {
-  return default_speed_rad_s(joint) / 0.5;
+  return std::min(default_speed_rad_s(joint) / 0.5, joint.max_acceleration_rad_s2);
+}
+double most_acceleration_rad_s2(const JointAccess& io, std::size_t j) noexcept {
+  return j < io.joints.size() ? io.joints[j].max_acceleration_rad_s2 : 0.0;
 }
 
 }  // namespace
@@ -70,7 +72,7 @@ double PositionControl::ref_speed_rad_s(std::size_t j) const noexcept TANDEM_RT 
 }
 
 Code PositionControl::set_ref_acceleration(std::size_t j, double rad_s2) noexcept TANDEM_RT {
-  const Code code = checked(io_, j, rad_s2, kSmallest, kNoUpperLimit);
+  const Code code = checked(io_, j, rad_s2, kSmallest, most_acceleration_rad_s2(io_, j));
   if (code == Code::kOk) motions_[j].acceleration_rad_s2 = rad_s2;
   return code;
 }
@@ -129,7 +131,9 @@ void PositionControl::archive(Archive& ar) { ar(motions_); }
 
 VelocityControl::VelocityControl(JointAccess& access) : io_(access), ramps_(access.joints.size()) {
   for (std::size_t j = 0; j < ramps_.size(); ++j) {
-    ramps_[j].acceleration_rad_s2 = io_.joints[j].max_velocity_rad_s / 2.0;
+    const JointCapabilities& limit = io_.joints[j];
+    ramps_[j].acceleration_rad_s2 =
+        std::min(limit.max_velocity_rad_s / 2.0, limit.max_acceleration_rad_s2);
   }
 }
 
@@ -147,7 +151,7 @@ double VelocityControl::target_velocity_rad_s(std::size_t j) const noexcept TAND
 }
 
 Code VelocityControl::set_ref_acceleration(std::size_t j, double rad_s2) noexcept TANDEM_RT {
-  const Code code = checked(io_, j, rad_s2, kSmallest, kNoUpperLimit);
+  const Code code = checked(io_, j, rad_s2, kSmallest, most_acceleration_rad_s2(io_, j));
   if (code == Code::kOk) ramps_[j].acceleration_rad_s2 = rad_s2;
   return code;
 }

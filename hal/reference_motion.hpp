@@ -32,8 +32,9 @@ struct MotionBounds {
 /// The bounds hold in each step, and the way to rest stays within min and max.
 class ReferenceMotion {
  public:
-  /// Begins at rest.
-  void begin(double position) noexcept TANDEM_RT { state_ = {position, 0.0, 0.0, position, 1}; }
+  void begin(double position, double velocity = 0.0) noexcept TANDEM_RT {
+    state_ = {position, velocity, 0.0, position, 1};
+  }
 
   /// @param wanted  finite, within min and max
   /// @return the reference in force; `wanted` itself when the bounds allow it

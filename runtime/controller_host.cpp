@@ -18,7 +18,8 @@ ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kern
       owner_(robot_.joints.size(), -1),
       recovers_(robot_.joints.size()),
       operator_(robot_, gains_, period_ns),
-      transfer_(robot_.joints.size(), period_ns),
+      transfer_(capabilities_, period_ns),
+      at_rest_(robot_.shape()),
       guard_(robot_.shape(), capabilities_, gains_) {
   for (const hal::JointCapabilities& joint : capabilities_) {
     impedance_.push_back({joint.stiffness_Nm_rad, joint.damping_Nms_rad});
@@ -201,20 +202,31 @@ void ControllerHost::set_active(ControllerSet active) noexcept TANDEM_RT {
 void ControllerHost::start(const hal::CycleTime& time, const hal::StateImage& state,
                            hal::CommandImage& command) noexcept TANDEM_RT {
   transfer_.clear();
-  release(command);  // so that hold() takes every measured position
-  hold(state, command);
-  done_ = 0;
+  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
+    const bool moves = command.velocity_rad_s()[j] != 0.0 && command.interaction()[j] == 0 &&
+                       command.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition);
+    if (moves) transfer_.begin_from(j, state, command);
+  }
+  idle(command);  // so that every joint stays at its measured position
+  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
+    stay(j, state, command);
+    settle(j, state, command);
+  }
+  done_ = ended_ = 0;
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (is_active(slot)) set_modes(*table_[slot], command);
   }
+  const hal::StateImage& shown = at_rest(state, active_);
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if (is_active(slot)) call_start(*table_[slot], time, state, command);
+    if (is_active(slot)) call_start(*table_[slot], time, shown, command);
   }
   leave_calls();
 }
 
 Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& state,
                             hal::CommandImage& command) noexcept TANDEM_RT {
+  settle_ended(state, command);
+  transfer_.watch(command);
   transfer_.before_update(command);
   bool ends = active_ != 0;
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
@@ -224,6 +236,7 @@ Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& s
       const Code code = call_update(one, time, state, command);
       if (code == Code::kStopped) {
         done_ |= only(slot);
+        ended_ |= only(slot);
       } else if (code != Code::kOk) {
         failed_controller_ = one.id;
         leave_calls();
@@ -271,8 +284,6 @@ void ControllerHost::stop() noexcept TANDEM_RT {
     if (is_active(slot)) enter(*table_[slot]).stop();
   }
   leave_calls();
-  operator_.position.abandon();
-  transfer_.clear();
 }
 
 std::uint64_t ControllerHost::fingerprint() const noexcept {
@@ -297,7 +308,8 @@ void ControllerHost::archive(Archive& ar) {
     one->controller->archive(ar);
     ar(one->strayed);
   }
-  ar(active_, done_, impedance_, recovers_, failed_controller_, transfer_, operator_, gains_);
+  ar(active_, done_, ended_, impedance_, recovers_, failed_controller_, transfer_, operator_,
+     gains_);
   if (ar.reading()) guard_.forget(gains_);
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (table_[slot] == nullptr) active_ &= ~only(slot);  // bytes of something else

@@ -139,9 +139,9 @@ class ControllerHost {
   [[nodiscard]] LoopAnswer insert(std::size_t slot,
                                   HostedController& controller) noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer remove(std::size_t slot) noexcept TANDEM_RT;
-  /// Stops and starts controllers, all or none. When they are `running`, what they leave is held
-  /// and every joint that changes hands does so without a bump (BumplessTransfer); else it is who
-  /// will start.
+  /// Stops and starts controllers, all or none. When they are `running`, every joint that changes
+  /// hands does so without a bump (BumplessTransfer): one that moves brakes, what nobody has is
+  /// held where it comes to rest, and who starts sees the joint there. Else it is who will start.
   [[nodiscard]] LoopAnswer switch_over(ControllerSet stop, ControllerSet start, bool running,
                                        const hal::CycleTime& time, const hal::StateImage& state,
                                        hal::CommandImage& command) noexcept TANDEM_RT;
@@ -157,7 +157,7 @@ class ControllerHost {
 
   /// Starts a motion of a joint that no active controller claims, in position control; one under
   /// way goes over into it. A claim, another mode, a stop and a reset end it.
-  [[nodiscard]] LoopAnswer move(std::size_t joint, const MoveRequest& wish, bool running,
+  [[nodiscard]] LoopAnswer move(std::size_t joint, const MoveRequest& wish,
                                 const hal::StateImage& state,
                                 hal::CommandImage& command) noexcept TANDEM_RT;
   /// Lets a joint that no active controller claims come back to its limits, by lead_back(), at the
@@ -167,22 +167,23 @@ class ControllerHost {
 
   // The cycle.
 
-  /// The motions of move(), in each cycle without update(), which does it itself.
-  void move_on(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
   /// Each cycle in which joints are held, last: their references, toward their limits.
   void lead_back(hal::CommandImage& command) noexcept TANDEM_RT;
-  /// Writes "stay where you are" for every joint: position control at the measured position.
-  /// A joint that is enabled and whose last command was in position control keeps its reference
-  /// and feed-forward.
-  void hold(const hal::StateImage& state, hal::CommandImage& command) const noexcept TANDEM_RT;
-  /// The same for one joint; ends its motion.
+  /// Each cycle without update(): writes "stay where you are" for every joint: position control at
+  /// the measured position. A joint that is enabled and whose last command was in position control
+  /// keeps its reference and feed-forward; it goes on to brake, and with a motion of move().
+  void hold(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
+  /// The cycle in which a stop takes every joint from whoever has it, before hold(): those that
+  /// move brake as hard as their limits allow, and are held where they come to rest.
+  void brake(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
+  /// What hold() writes, for one joint; ends its motion.
   void hold(std::size_t joint, const hal::StateImage& state,
             hal::CommandImage& command) noexcept TANDEM_RT;
-  /// Every joint idle: no torque.
+  /// Every joint idle: no torque. Forgets whatever led a joint.
   void release(hal::CommandImage& command) noexcept TANDEM_RT;
 
   /// First cycle: holds every joint, sets the claimed modes, lets the active controllers seed
-  /// theirs.
+  /// theirs. A joint that moves in `command`, which another loop sent, goes on from there.
   void start(const hal::CycleTime& time, const hal::StateImage& state,
              hal::CommandImage& command) noexcept TANDEM_RT;
   /// Every cycle, the first included.
@@ -191,6 +192,7 @@ class ControllerHost {
   ///         that is neither, failed_controller() says whose.
   [[nodiscard]] Code update(const hal::CycleTime& time, const hal::StateImage& state,
                             hal::CommandImage& command) noexcept TANDEM_RT;
+  /// Tells the active controllers.
   void stop() noexcept TANDEM_RT;
   /// A stop of category 2: those that can retreat go on to do so, the others are stopped.
   /// @return false: none can, and nothing has changed
@@ -233,6 +235,8 @@ class ControllerHost {
       std::size_t joint, const hal::CommandImage& command) const noexcept TANDEM_RT {
     return transfer_.written(joint, command);
   }
+  /// Whether a joint has begun to change hands in this cycle: update() has to follow.
+  [[nodiscard]] bool changes_hands() const noexcept TANDEM_RT { return transfer_.has_begun(); }
   /// Whether one of `by` claims `joint`.
   [[nodiscard]] bool is_claimed(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
   /// A number of what is loaded: slots, names and claims.
@@ -249,8 +253,15 @@ class ControllerHost {
   [[nodiscard]] Status check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const;
   [[nodiscard]] std::uint32_t new_id(const std::string& name);
+  void move_on(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
+  void idle(hal::CommandImage& command) noexcept TANDEM_RT;
   void stay(std::size_t joint, const hal::StateImage& state,
             hal::CommandImage& command) const noexcept TANDEM_RT;
+  void settle(std::size_t joint, const hal::StateImage& state,
+              hal::CommandImage& command) const noexcept TANDEM_RT;
+  void settle_ended(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
+  [[nodiscard]] const hal::StateImage& at_rest(const hal::StateImage& state,
+                                               ControllerSet start) noexcept TANDEM_RT;
   void assign(std::size_t joint, hal::ControlMode mode, hal::InteractionMode interaction,
               const hal::StateImage& state, hal::CommandImage& command) const noexcept TANDEM_RT;
   void release(std::size_t joint, const hal::StateImage& state,
@@ -289,11 +300,13 @@ class ControllerHost {
   // The loop's.
   Table table_{};
   ControllerSet active_ = 0, done_ = 0;
+  ControllerSet ended_ = 0;             // of done_: in the last cycle
   std::vector<std::int32_t> owner_;     // by joint: an active one's slot, or -1
   std::vector<Impedance> impedance_;    // by joint: that a start gives it
   std::vector<std::uint8_t> recovers_;  // by joint: it is led back to its limits
   hal::Devices operator_;               // moves joints that nobody claims
   BumplessTransfer transfer_;
+  hal::StateImage at_rest_;  // what a start sees of joints that brake
   ClaimGuard guard_;
   std::optional<Stray> stray_;
   std::size_t failed_controller_ = 0;

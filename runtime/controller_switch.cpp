@@ -26,8 +26,13 @@ LoopAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
 }  // namespace
 
 void ControllerHost::hold(const hal::StateImage& state,
-                          hal::CommandImage& command) const noexcept TANDEM_RT {
+                          hal::CommandImage& command) noexcept TANDEM_RT {
+  transfer_.watch(command);
+  transfer_.before_update(command);
   for (std::size_t j = 0; j < capabilities_.size(); ++j) stay(j, state, command);
+  move_on(state, command);
+  lead_back(command);
+  transfer_.after_update(state, command);
 }
 
 void ControllerHost::hold(std::size_t joint, const hal::StateImage& state,
@@ -35,6 +40,16 @@ void ControllerHost::hold(std::size_t joint, const hal::StateImage& state,
   operator_.position.abandon(joint);
   recovers_[joint] = 0;
   stay(joint, state, command);
+}
+
+void ControllerHost::brake(const hal::StateImage& state,
+                           hal::CommandImage& command) noexcept TANDEM_RT {
+  operator_.position.abandon();
+  std::ranges::fill(recovers_, std::uint8_t{0});
+  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
+    transfer_.begin(j, state, command, BumplessTransfer::Pace::kHard);
+    release(j, state, command);
+  }
 }
 
 void ControllerHost::stay(std::size_t joint, const hal::StateImage& state,
@@ -52,7 +67,58 @@ void ControllerHost::stay(std::size_t joint, const hal::StateImage& state,
   command.velocity_rad_s()[joint] = 0.0;
 }
 
+/// A joint that has begun to change hands, whose reference is in position control: where it comes
+/// to rest.
+void ControllerHost::settle(std::size_t joint, const hal::StateImage& state,
+                            hal::CommandImage& command) const noexcept TANDEM_RT {
+  const BumplessTransfer::Brake brake =
+      transfer_.brake(joint, state, static_cast<ControlMode>(command.mode()[joint]),
+                      static_cast<InteractionMode>(command.interaction()[joint]));
+  if (brake.way_rad == 0.0) return;
+  command.position_rad()[joint] = brake.from_rad + brake.way_rad;
+  command.velocity_rad_s()[joint] = 0.0;
+}
+
+/// The joints of controllers that were done in the cycle before: one that ended in motion brakes.
+void ControllerHost::settle_ended(const hal::StateImage& state,
+                                  hal::CommandImage& command) noexcept TANDEM_RT {
+  for (std::size_t slot = 0; ended_ != 0 && slot < table_.size(); ++slot) {
+    if ((ended_ & only(slot)) == 0 || table_[slot] == nullptr || !is_active(slot)) continue;
+    for (const auto& claim : table_[slot]->claims) {
+      if (command.mode()[claim.joint] != kPositionMode) continue;
+      transfer_.begin(claim.joint, state, command);
+      settle(claim.joint, state, command);
+      command.velocity_rad_s()[claim.joint] = 0.0;
+    }
+  }
+  ended_ = 0;
+}
+
+/// `state`, but with the joints that `start` claims, and that brake, where they come to rest.
+const hal::StateImage& ControllerHost::at_rest(const hal::StateImage& state,
+                                               ControllerSet start) noexcept TANDEM_RT {
+  bool brakes = false;
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((start & only(slot)) == 0 || table_[slot] == nullptr) continue;
+    for (const auto& claim : table_[slot]->claims) {
+      const double way_rad =
+          transfer_.brake(claim.joint, state, claim.mode, claim.interaction).way_rad;
+      if (way_rad == 0.0) continue;
+      if (!brakes) at_rest_.assign(state);
+      brakes = true;
+      at_rest_.position_rad()[claim.joint] += way_rad;
+      at_rest_.velocity_rad_s()[claim.joint] = 0.0;
+    }
+  }
+  return brakes ? at_rest_ : state;
+}
+
 void ControllerHost::release(hal::CommandImage& command) noexcept TANDEM_RT {
+  idle(command);
+  transfer_.clear();
+}
+
+void ControllerHost::idle(hal::CommandImage& command) noexcept TANDEM_RT {
   std::ranges::fill(command.mode(), static_cast<std::int8_t>(ControlMode::kIdle));
   std::ranges::fill(recovers_, std::uint8_t{0});
   operator_.position.abandon();
@@ -65,11 +131,12 @@ void ControllerHost::set_modes(const HostedController& one,
     command.interaction()[claim.joint] = static_cast<std::uint8_t>(claim.interaction);
     command.stiffness_Nm_rad()[claim.joint] = impedance_[claim.joint].stiffness_Nm_rad;
     command.damping_Nms_rad()[claim.joint] = impedance_[claim.joint].damping_Nms_rad;
+    command.velocity_rad_s()[claim.joint] = 0.0;  // an operator's, which nobody may write any more
   }
 }
 
-/// Every reference at what is measured. The torque is that of the spring now: what carries the
-/// load goes on to carry it, as reference or as feed-forward.
+/// Every reference at what is measured, or where the joint comes to rest. The torque is that of the
+/// spring now: what carries the load goes on to carry it, as reference or as feed-forward.
 void ControllerHost::assign(std::size_t joint, ControlMode mode, InteractionMode interaction,
                             const hal::StateImage& state,
                             hal::CommandImage& command) const noexcept TANDEM_RT {
@@ -84,6 +151,7 @@ void ControllerHost::assign(std::size_t joint, ControlMode mode, InteractionMode
   command.current_A()[joint] = mode == ControlMode::kCurrent ? state.current_A()[joint] : 0.0;
   command.stiffness_Nm_rad()[joint] = impedance_[joint].stiffness_Nm_rad;
   command.damping_Nms_rad()[joint] = impedance_[joint].damping_Nms_rad;
+  settle(joint, state, command);
 }
 
 /// A joint that nobody has any more stays: with its reference, when that was a stiff position.
@@ -93,6 +161,7 @@ void ControllerHost::release(std::size_t joint, const hal::StateImage& state,
                      command.interaction()[joint] == kStiffMode && is_enabled(state, joint);
   if (keeps) {
     command.velocity_rad_s()[joint] = 0.0;
+    settle(joint, state, command);
     return;
   }
   const bool can = capabilities_[joint].can(hal::Capability::kPosition);
@@ -139,6 +208,7 @@ LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, 
             .other = static_cast<std::int32_t>(conflict->other)};
   }
   done_ &= ~(stop | start);
+  ended_ &= ~(stop | start);
   set_active(after);
   if (!running) return {};
   for (std::size_t j = 0; j < capabilities_.size(); ++j) {
@@ -149,10 +219,11 @@ LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, 
     enter(*table_[slot]).stop();
     for (const auto& claim : table_[slot]->claims) release(claim.joint, state, command);
   }
+  const hal::StateImage& shown = at_rest(state, start);
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((start & only(slot)) == 0) continue;
     set_modes(*table_[slot], command);
-    call_start(*table_[slot], time, state, command);
+    call_start(*table_[slot], time, shown, command);
   }
   leave_calls();
   return {};
@@ -215,7 +286,7 @@ LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointRequest& wish
   return {.joint = number, .one = owned_by};
 }
 
-LoopAnswer ControllerHost::move(std::size_t joint, const MoveRequest& wish, bool running,
+LoopAnswer ControllerHost::move(std::size_t joint, const MoveRequest& wish,
                                 const hal::StateImage& state,
                                 hal::CommandImage& command) noexcept TANDEM_RT {
   LoopAnswer answer{.joint = static_cast<std::int32_t>(joint), .one = owner_[joint]};
@@ -236,10 +307,14 @@ LoopAnswer ControllerHost::move(std::size_t joint, const MoveRequest& wish, bool
   } else {
     const double most = limit.max_velocity_rad_s;
     const double speed = std::isfinite(wish.speed_rad_s) ? wish.speed_rad_s : most / 4.0;
-    const double acceleration =
-        std::isfinite(wish.acceleration_rad_s2) ? wish.acceleration_rad_s2 : speed / 0.5;
+    const double acceleration = std::isfinite(wish.acceleration_rad_s2)
+                                    ? wish.acceleration_rad_s2
+                                    : std::min(speed / 0.5, limit.max_acceleration_rad_s2);
     // From what is commanded now, a transfer's offset included.
-    if (running && motions.check_motion_done(joint)) transfer_.begin(joint, state, command);
+    if (motions.check_motion_done(joint)) {
+      transfer_.begin(joint, state, command);
+      settle(joint, state, command);
+    }
     const bool begun = motions.set_ref_speed(joint, speed) == Code::kOk &&
                        motions.set_ref_acceleration(joint, acceleration) == Code::kOk &&
                        motions.position_move(joint, wish.target_rad) == Code::kOk;

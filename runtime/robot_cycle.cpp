@@ -189,6 +189,7 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
 void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
   stamp(command_);
   stamp(wanted_);
+  if (std::exchange(brakes_, false)) controllers_->brake(state_, command_);
   switch (run_.phase()) {
     case RunPhase::kBringUp:
     case RunPhase::kResetting:
@@ -199,13 +200,12 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
     case RunPhase::kSettling:
     case RunPhase::kHeld:
       controllers_->hold(state_, command_);
-      controllers_->move_on(state_, command_);
-      controllers_->lead_back(command_);
       hold_drives_in_reset(command_);
       hold_unhomed(command_);
       break;
     case RunPhase::kRunning:
-      if (!tick.hold) run_controllers();  // else the last command goes out once more
+      // Else the last command goes out once more.
+      if (!tick.hold || controllers_->changes_hands()) run_controllers();
       break;
     case RunPhase::kRetreating: retreat_further(); break;
     case RunPhase::kFaulted:
@@ -430,11 +430,12 @@ void RobotCycle::show_sensors() noexcept TANDEM_RT {
 }
 
 /// The next phase, if this is one. Controllers stop with it, but for a retreat, which they carry
-/// out.
+/// out. Joints that a stop finds in motion brake.
 void RobotCycle::on(RunEvent event, bool holds_back) noexcept TANDEM_RT {
   if (!run_.on(event, time_.cycle, holds_back) || run_.in(RunPhase::kRetreating)) return;
   if (controlling_) controllers_->stop();
   controlling_ = false;
+  brakes_ = run_.in(RunPhase::kFaulted) || run_.in(RunPhase::kShutDown);
 }
 
 void RobotCycle::event(EventKind kind, std::int32_t joint, std::uint32_t code) noexcept TANDEM_RT {

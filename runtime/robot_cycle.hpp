@@ -229,6 +229,7 @@ class RobotCycle {
   Code read_code_ = Code::kOk;
   bool started_ = false;                     // the first cycle was
   bool controlling_ = false;                 // controllers are started
+  bool brakes_ = false;                      // a stop has found joints that nobody has any more
   ControllerSet held_back_ = 0;              // active before the reset
   ControllerSet before_retreat_ = 0;         // active then
   std::uint64_t ran_ = 0;                    // cycles of kRunning

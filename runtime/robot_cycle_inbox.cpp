@@ -108,8 +108,9 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
       const LoopAnswer no =
           may_lead(request.joint, recovers || std::isfinite(request.move.target_rad));
       if (no.reason != RejectReason::kNone) return no;
-      if (recovers) return controllers_->recover(request.joint, controlled());
-      return controllers_->move(request.joint, request.move, controlling_, state_, controlled());
+      hal::CommandImage& command = controlling_ ? controlled() : command_;
+      if (recovers) return controllers_->recover(request.joint, command);
+      return controllers_->move(request.joint, request.move, state_, command);
     }
     case Kind::kReset: return reset_drive(request.joint);
     case Kind::kHome: return home_joint(request.joint);

@@ -67,7 +67,7 @@ void RobotCycle::archive(Archive& ar) {
   if (estimator_ != nullptr) estimator_->archive(ar);
   statistics_.archive(ar);
   controllers_->archive(ar);
-  ar(time_, started_, controlling_, held_back_, before_retreat_, read_code_, ran_);
+  ar(time_, started_, controlling_, brakes_, held_back_, before_retreat_, read_code_, ran_);
   ar(stopped_before_);
   ar(joint_limited_, faults_, resets_, homings_, homes_at_start_);
 }

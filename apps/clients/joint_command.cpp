@@ -108,6 +108,7 @@ Result<Json> question_of(const JointOptions& o) {
     case JointOptions::Action::kGains: question["do"] = "joint.gains"; break;
   }
   question["joint"] = o.joint;
+  if (o.shortest) question["shortest"] = true;
   if (!o.mode.empty()) question["mode"] = o.mode;
   if (!o.interaction.empty()) question["interaction"] = o.interaction;
   if (o.stiffness_Nm_rad) question["stiffness_Nm_rad"] = *o.stiffness_Nm_rad;
@@ -356,7 +357,7 @@ Exit show(const JointOptions& options, Json answer) {
 
 Exit joint_command(const JointOptions& options) {
   using Action = JointOptions::Action;
-  const Result<Json> question = question_of(options);
+  Result<Json> question = question_of(options);
   if (!question) return refuse(question.error());
   const auto run = ControlClient::open(options.target, "run");
   if (!run) return refuse(run.error());
@@ -366,6 +367,7 @@ Exit joint_command(const JointOptions& options) {
   const Result<Json> asked = (*run)->ask(*question);
   if (!asked) return refuse(asked.error());
   Json answer = *asked;
+  if (answer.contains("target_rad")) (*question)["target_rad"] = answer["target_rad"];
   if (answer.contains("joints")) return show(options, answer);
   if (options.json != "-") print_answer(options, answer, *question);
   Exit exit = Exit::kDone;

@@ -102,6 +102,7 @@ struct JointOptions {
   bool drives = false;                        ///< list: motors and drives instead of joints
   std::string joint{};                        ///< all but list
   std::string to{}, speed{}, acceleration{};  ///< move: with or without a unit; empty: default
+  bool shortest = false;                      ///< move: by whole turns to the nearest angle
   bool wait = false;                          ///< move: until it has ended
   std::string mode{}, interaction{};          ///< empty: as it is
   std::optional<double> stiffness_Nm_rad{}, damping_Nms_rad{};

@@ -132,6 +132,8 @@ void add_flags(CLI::App& app, JointOptions& o) {
   move->add_option("--acceleration", o.acceleration,
                    "40deg/s2, 0.6 (default: reaches the speed in half a second)")
       ->check(is_given("leave it out for the default"));
+  move->add_flag("--shortest", o.shortest,
+                 "To the same angle by whole turns that is nearest, within the joint's limits");
   move->add_flag(
       "--wait", o.wait,
       "Until it has arrived: status 0; 1 when the motion ended elsewhere. Ctrl-C ends the "

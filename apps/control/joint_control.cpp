@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 
 #include "apps/control/controller_control.hpp"
 #include "base/nearest.hpp"
@@ -88,6 +89,7 @@ Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t ind
           {"min_position_rad", limit.min_position_rad},
           {"max_position_rad", limit.max_position_rad},
           {"max_velocity_rad_s", limit.max_velocity_rad_s},
+          {"max_acceleration_rad_s2", limit.max_acceleration_rad_s2},
           {"max_torque_Nm", limit.max_torque_Nm},
           {"acceleration_rad_s2", look.acceleration_rad_s2},
           {"motor_position_rad", look.motor_position_rad},
@@ -179,6 +181,20 @@ Status check_unit(const std::string& name, bool slides, const std::string& unit)
                  slides ? "give metres: 20mm, 0.02m" : "give an angle: 30deg, 0.5rad");
 }
 
+/// The same angle by whole turns, nearest to the joint's reference; as it is where that is beyond
+/// the joint's limits.
+double shortest(const Run& run, const std::string& name, double target_rad) {
+  constexpr double kTurn_rad = 2.0 * std::numbers::pi;
+  const auto joints = run.cycle.services().joints();
+  const auto joint = std::ranges::find(joints, name, &runtime::JointInfo::name);
+  const hal::JointCapabilities* limit = run.limits_of(name);
+  if (joint == joints.end() || limit == nullptr) return target_rad;
+  const double turns = std::round((joint->look.commanded_rad - target_rad) / kTurn_rad);
+  const double nearest = target_rad + turns * kTurn_rad;
+  return nearest < limit->min_position_rad || nearest > limit->max_position_rad ? target_rad
+                                                                                : nearest;
+}
+
 Result<Json> move(const Run& run, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
   const hal::JointCapabilities* limit = run.limits_of(joint);
@@ -189,7 +205,14 @@ Result<Json> move(const Run& run, const Json& request) {
   runtime::MoveRequest wish{.target_rad = request["target_rad"].get<double>()};
   wish.speed_rad_s = request.value("speed_rad_s", wish.speed_rad_s);
   wish.acceleration_rad_s2 = request.value("acceleration_rad_s2", wish.acceleration_rad_s2);
-  return tell(run, joint, run.cycle.services().move_joint(joint, wish));
+  if (request.value("shortest", false)) {
+    if (limit != nullptr && limit->slides)
+      return fail_at(joint, "this joint slides", "leave out shortest");
+    wish.target_rad = shortest(run, joint, wish.target_rad);
+  }
+  Result<Json> answer = tell(run, joint, run.cycle.services().move_joint(joint, wish));
+  if (answer) (*answer)["target_rad"] = wish.target_rad;
+  return answer;
 }
 
 Result<Json> reset(const Run& run, const std::string& name) {
@@ -230,7 +253,10 @@ void add_moves(ControlRegistry& registry, const std::shared_ptr<const Run>& run)
        {.name = "acceleration_rad_s2",
         .type = Type::kNumber,
         .doc = "else it reaches the speed in half a second"},
-       {.name = "unit", .doc = "angle, length: what the joint has to be"}},
+       {.name = "unit", .doc = "angle, length: what the joint has to be"},
+       {.name = "shortest",
+        .type = Type::kBoolean,
+        .doc = "the target by whole turns nearest to the joint, within its limits"}},
       [run](const Json& request) { return move(*run, request); });
   registry.add("joint.stop", ControlEffect::kChanges,
                "brakes a joint that joint.move or joint.home leads", {kJoint},

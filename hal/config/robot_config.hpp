@@ -147,6 +147,10 @@ struct StopOptions {
   std::optional<int> fault;     ///< 605E
 };
 
+/// In which a joint may reach its largest velocity where nobody says how fast: harder than bundled
+/// experiments move, softer than a step.
+inline constexpr double kFullSpeed_s = 0.1;
+
 /// [[joint]]
 struct JointConfig {
   std::string name;  ///< URDF joint
@@ -158,8 +162,9 @@ struct JointConfig {
   double max_position_rad = 0.0;  ///< them to the URDF, until complete_from_description()
   double max_velocity_rad_s = 0.0;
   double max_torque_Nm = 0.0;  ///< the torque reference's limit
-  double max_acceleration_rad_s2 = std::numeric_limits<double>::infinity();  ///< of references
-  double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();          ///< the same
+  /// Of references. Without the key: the largest velocity in kFullSpeed_s.
+  double max_acceleration_rad_s2 = std::numeric_limits<double>::infinity();
+  double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();  ///< the same; not limited
   double rated_torque_Nm = 0.0;  ///< CiA 402 6076: torques travel as per mille of it;
                                  ///< default: max_torque_Nm
   std::optional<double> max_torque_rate_Nm_s = {};  ///< of the torque reference

@@ -277,6 +277,9 @@ class Completion : private Check {
     fill(joint.max_velocity_rad_s, found.max_velocity_rad_s, "max_velocity_rad_s");
     fill(joint.max_torque_Nm, found.max_torque_Nm, "max_torque_Nm");
     report_unlimited(joint, found);
+    if (!std::isfinite(joint.max_acceleration_rad_s2)) {
+      joint.max_acceleration_rad_s2 = joint.max_velocity_rad_s / kFullSpeed_s;
+    }
     if (joint.slides && !joint.following_error_given) {
       joint.following_error_rad = slide_following_error_m(joint);
     }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/archive.hpp"
 
@@ -12,6 +13,15 @@ namespace tandem::hal::can {
 using canopen::ErrorCode;
 using WireState = canopen::DriveState;
 namespace controlword = canopen::controlword;
+
+namespace {
+
+bool is_stiff_position(const CommandImage& image, std::size_t joint) noexcept TANDEM_RT {
+  return image.mode()[joint] == static_cast<std::int8_t>(ControlMode::kPosition) &&
+         image.interaction()[joint] == static_cast<std::uint8_t>(InteractionMode::kStiff);
+}
+
+}  // namespace
 
 void AxisMaster::received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT {
   if (!fresh) {
@@ -134,7 +144,11 @@ void AxisMaster::set_target(TargetState target, std::int64_t now_ns) noexcept TA
   if (!goes_on) was_enabled_ = false;
   if (target == TargetState::kHold) {
     was_enabled_ = enabled();
-    seed();
+    const bool follows = target_ == TargetState::kFollow &&
+                         raw_.mode == static_cast<std::int8_t>(traits_.can.position);
+    longest_step_ =
+        follows ? step_from(previous_target_) + 1 : std::numeric_limits<std::int64_t>::max();
+    if (!follows) seed();
   }
   if (target_ == TargetState::kHome && target == TargetState::kEnable) seed();
   if (target == TargetState::kReset || target == TargetState::kBringUp) emergency_code_ = 0;
@@ -155,6 +169,7 @@ bool AxisMaster::command(const CommandImage* image, std::size_t joint,
     case TargetState::kHold:
       // A drive that is not enabled stays as it is: holding must not switch anything on.
       raw_.controlword = was_enabled_ ? enable_operation() : controlword::kCommandDisableVoltage;
+      if (was_enabled_) brake(image, joint);
       return false;
     case TargetState::kBringUp: walk_up(true, now_ns); return enable_is_late(now_ns);
     case TargetState::kEnable: walk_up(false, now_ns); return enable_is_late(now_ns);
@@ -182,6 +197,27 @@ void AxisMaster::follow(const CommandImage& image, std::size_t joint,
     return;
   }
   walk_up(false, now_ns);
+}
+
+/// As the loop says, as long as it only brakes: no cycle's way is longer than the one before.
+void AxisMaster::brake(const CommandImage* image, std::size_t joint) noexcept TANDEM_RT {
+  const RawCommand kept = raw_;
+  if (image != nullptr && is_stiff_position(*image, joint)) {
+    encode_command(scale_, traits_.can.position, *image, joint, raw_);
+    const std::int64_t step = step_from(kept.target_position);
+    if (step <= longest_step_) {
+      longest_step_ = std::min(longest_step_, step + 1);  // the targets are rounded
+      return;
+    }
+  }
+  raw_ = kept;
+  raw_.velocity_offset = 0;
+}
+
+/// Counts to the target; the counter may wrap around.
+std::int64_t AxisMaster::step_from(std::int32_t target) const noexcept TANDEM_RT {
+  return std::abs(std::int64_t{static_cast<std::int32_t>(
+      static_cast<std::uint32_t>(raw_.target_position) - static_cast<std::uint32_t>(target))});
 }
 
 bool AxisMaster::home(std::int64_t timeout_ns, std::int64_t now_ns) noexcept TANDEM_RT {
@@ -339,7 +375,8 @@ void AxisMaster::forget() noexcept TANDEM_RT {
 }
 
 void AxisMaster::archive(Archive& ar) {
-  ar(homing_, was_idle_, held_cycles_, lag_, previous_target_, ignored_stop_, disobedient_cycles_);
+  ar(homing_, was_idle_, held_cycles_, lag_, previous_target_, longest_step_, ignored_stop_,
+     disobedient_cycles_);
   ar(feedback_, raw_, target_, error_, heard_, was_enabled_, fault_code_, emergency_code_,
      age_cycles_, reset_cycles_, previous_velocity_, sample_ns_, trouble_ns_, since_ns_,
      acceleration_rad_s2_);

@@ -46,7 +46,7 @@ class AxisMaster {
     kBringUp,    ///< the same as kEnable, and a fault from before this master's time is cleared
     kEnable,     ///< walk to Operation Enabled, hold the measured position
     kFollow,     ///< the command image
-    kHold,       ///< keep the position that it has
+    kHold,       ///< keep the position that it has, or the command image as long as that brakes
     kQuickStop,  ///< stop category 1
     kReset,      ///< clear the drive's fault; then it waits, disabled
     kHome,       ///< the drive looks for the joint's place; then it is held, until it follows
@@ -150,6 +150,8 @@ class AxisMaster {
   [[nodiscard]] std::uint16_t enable_operation() const noexcept;
   [[nodiscard]] std::uint16_t reset_controlword() noexcept;
   void seed() noexcept;
+  void brake(const CommandImage* image, std::size_t joint) noexcept TANDEM_RT;
+  [[nodiscard]] std::int64_t step_from(std::int32_t target) const noexcept TANDEM_RT;
   [[nodiscard]] bool lags(std::int64_t now_ns) noexcept;
   [[nodiscard]] double counts_to(std::int32_t target) const noexcept;
   [[nodiscard]] double position_error_rad() const noexcept;
@@ -167,6 +169,7 @@ class AxisMaster {
   HomingSequence homing_;
   FollowWatch lag_;
   std::int32_t previous_target_ = 0;  ///< the target position before the one in `raw_`
+  std::int64_t longest_step_ = 0;     ///< kHold: that the target may go in a cycle [counts]
   bool was_idle_ = false;             ///< kHome: the image has had the joint idle since
   bool heard_ = false;
   bool ignored_stop_ = false;

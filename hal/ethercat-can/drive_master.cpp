@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <utility>
 
 #include "base/archive.hpp"
 #include "canopen/messages.hpp"
@@ -254,7 +255,8 @@ Code DriveMaster::receive(StateImage& state) noexcept TANDEM_RT {
   m.process_nodes();
   if (!m.shutting_down) {
     m.advance();
-    if (m.stage != Impl::MasterStage::kRunning) {
+    const bool braked = std::exchange(m.brakes, false);
+    if (m.stage != Impl::MasterStage::kRunning && !(braked && m.holds())) {
       m.make_commands(nullptr);
       m.write_pdos();
     }
@@ -273,10 +275,11 @@ Code DriveMaster::send(const CommandImage& command,
   if (m.stage == Impl::MasterStage::kBooting || m.stage == Impl::MasterStage::kEnabling)
     return Code::kOk;
   m.take_resets(command);
-  if (m.stage == Impl::MasterStage::kFaulted) return Code::kFault;
+  if (m.stage == Impl::MasterStage::kFaulted && !m.holds()) return Code::kFault;
+  m.brakes = m.holds();
   m.make_commands(&command);
   m.write_pdos();
-  m.send_parameters(parameters);
+  if (m.stage == Impl::MasterStage::kRunning) m.send_parameters(parameters);
   const bool taken = m.flush();
   if (m.stage == Impl::MasterStage::kFaulted) return Code::kFault;
   if (!taken) ++m.unsent;
@@ -372,7 +375,7 @@ std::vector<RoundTrip> DriveMaster::round_trips() const {
 void DriveMaster::archive(Archive& ar) { impl_->archive(ar); }
 
 void DriveMaster::Impl::archive(Archive& ar) {
-  ar(stage, reaction, latched, resetting, begun, shutting_down, counter, now_ns, dt_ns,
+  ar(stage, reaction, brakes, latched, resetting, begun, shutting_down, counter, now_ns, dt_ns,
      shut_down_since_ns, refused_node, refused_step, refused_code, axes, sent_revision);
   for (PidGains& gains : sent_gains) ar(gains.kp, gains.ki, gains.kd);
   for (Port& port : ports) ar(port.next_heartbeat_ns);

@@ -62,6 +62,7 @@ struct StartUp {
 /// SYNC k is sent at the start of cycle k; boards sample at it and their TPDOs are expected in
 /// the same cycle; the RPDOs that cycle k sends take effect at SYNC k+1. What bring-up, a fault's
 /// reaction and shut_down() have to send they send by themselves, whether send() is called or not.
+/// A stop of category hold follows send()'s command as long as that brakes (AxisMaster::kHold).
 ///
 /// Bring-up of every node, all in parallel: reset, boot-up, identity (1000, 1018), configuration
 /// by SDO (scales, limits, gains, PDO mapping, heartbeats), NMT start; when all nodes run, each

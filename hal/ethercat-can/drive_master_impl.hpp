@@ -129,6 +129,10 @@ struct DriveMaster::Impl {
   void watch_reset() noexcept TANDEM_RT;
   void set_targets(AxisMaster::TargetState target) noexcept TANDEM_RT;
   void fail() noexcept TANDEM_RT;
+  /// Every joint is held: send() may say how it comes to rest.
+  [[nodiscard]] bool holds() const noexcept TANDEM_RT {
+    return stage == MasterStage::kFaulted && reaction == StopCategory::kHold;
+  }
   void make_commands(const CommandImage* image) noexcept TANDEM_RT;
   [[nodiscard]] bool all_enabled() const noexcept TANDEM_RT;
   [[nodiscard]] FaultCause cause(std::size_t joint) const noexcept TANDEM_RT;
@@ -165,6 +169,7 @@ struct DriveMaster::Impl {
 
   MasterStage stage = MasterStage::kBooting;
   StopCategory reaction = StopCategory::kWarn;  ///< the hardest that is carried out
+  bool brakes = false;                          ///< send() has said how, since receive()
   StopCategory latched = StopCategory::kWarn;   ///< of stop(): until reset()
   bool resetting = false;                       ///< reset() is not through yet
   bool begun = false;

@@ -127,15 +127,19 @@ TEST(JointTrajectory, RefusesWhatTheJointsCannotDo) {
             "(give one each for wrist; or name those that move in `joints`)");
   EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"
                        "[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"),
+            "experiment.toml:6: waypoint[1].time_s: is the time of the way-point before (a joint "
+            "cannot be at two places at once: remove one of the two, or move it)");
+  EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 2\nposition_rad = [0.0]\n"
+                       "[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"),
             "experiment.toml:6: waypoint[1].time_s: is not later than the way-point before (sort "
             "them by time)");
   EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"
                        "[[waypoint]]\ntime_s = 1.5\nposition_rad = [1.0]\n"),
             "experiment.toml:6: waypoint[1].time_s: joint 'wrist' would need 3.75 rad/s on the "
             "way, its limit is 2 (give it 0.938 s or more after the way-point before)");
-  EXPECT_EQ(
-      problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 0\nposition_rad = [0.0]\n").find("\n"),
-      std::string::npos)
+  EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = -1\nposition_rad = [0.0]\n")
+                .find("\n"),
+            std::string::npos)
       << "one error for one number";
   EXPECT_EQ(problem_of("interpolation = 'qintic'\n"),
             "experiment.toml:1: interpolation: 'qintic' is not one of the choices (did you mean "
@@ -175,6 +179,127 @@ TEST(JointTrajectory, GoesOnFromASnapshot) {
   run.run(0.3);
   other.run(0.3);
   EXPECT_EQ(other.command.position_rad()[0], run.command.position_rad()[0]);
+}
+
+TEST(Segment, MeetsEverythingThatAPlannersPointSaysAndIsItsOwnDerivative) {
+  const Motion from{0.3, -0.4, 0.9}, to{1.0, 0.7, -1.3};
+  const double h = 1e-6, T = 0.5;
+  for (const auto& piece : {quintic_through, cubic}) {
+    const bool bends = piece == quintic_through;
+    const Motion first = piece(from, to, T, 0.0), last = piece(from, to, T, T);
+    EXPECT_NEAR(first.position, 0.3, 1e-12);
+    EXPECT_NEAR(first.velocity, -0.4, 1e-12);
+    EXPECT_NEAR(last.position, 1.0, 1e-12);
+    EXPECT_NEAR(last.velocity, 0.7, 1e-12);
+    if (bends) {
+      EXPECT_NEAR(first.acceleration, 0.9, 1e-12);
+      EXPECT_NEAR(last.acceleration, -1.3, 1e-11);
+    }
+    for (const double t : {0.1, 0.25, 0.4}) {
+      const Motion before = piece(from, to, T, t - h), after = piece(from, to, T, t + h);
+      const Motion now = piece(from, to, T, t);
+      EXPECT_NEAR(now.velocity, (after.position - before.position) / (2 * h), 1e-7);
+      EXPECT_NEAR(now.acceleration, (after.velocity - before.velocity) / (2 * h), 1e-6);
+    }
+  }
+}
+
+/// As planners write it: the start, then points with velocities (and accelerations).
+std::string plan(bool accelerations) {
+  std::string text = "joints = ['wrist']\ninterpolation = 'quintic'\nstop_at_end = true\n";
+  for (int i = 0; i <= 20; ++i) {  // 0.8 rad in 2 s
+    const MinJerk at = min_jerk(0.05 * i);
+    text += "[[waypoint]]\ntime_s = " + std::to_string(0.1 * i);
+    text += "\nposition_rad = [" + std::to_string(0.8 * at.s);
+    text += "]\nvelocity_rad_s = [" + std::to_string(0.4 * at.ds) + "]\n";
+    if (accelerations) text += "acceleration_rad_s2 = [" + std::to_string(0.2 * at.dds) + "]\n";
+  }
+  return text;
+}
+
+TEST(JointTrajectory, FollowsAPlanThatBeginsWhereTheJointStands) {
+  for (const bool accelerations : {false, true}) {
+    test::Harness run(hal::test::fake_robot(), "joint_trajectory", plan(accelerations));
+    ASSERT_EQ(run.problem(), "");
+    run.start();
+    for (int i = 0; i < 2000; ++i) {
+      ASSERT_EQ(run.step(), Code::kOk);
+      const MinJerk at = min_jerk(0.5e-3 * i);
+      ASSERT_NEAR(run.command.position_rad()[2], 0.8 * at.s, 1e-5) << i;
+      ASSERT_NEAR(run.command.velocity_rad_s()[2], 0.4 * at.ds, 1e-3) << i;
+    }
+    EXPECT_EQ(run.step(), Code::kStopped);
+  }
+}
+
+TEST(JointTrajectory, LeadsAJointThatStandsElsewhereToThePlansStartFirst) {
+  test::Harness run(hal::test::fake_robot(), "joint_trajectory", plan(true));
+  run.state.position_rad()[2] = -0.5;
+  run.start();
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_EQ(run.command.position_rad()[2], -0.5);
+  double fastest = 0.0, before = -0.5;
+  int cycles = 1;
+  while (run.step() == Code::kOk) {
+    ++cycles;
+    const double now = run.command.position_rad()[2];
+    if (before < 0.0) fastest = std::max(fastest, (now - before) * 1e3);
+    before = now;
+  }
+  EXPECT_NEAR(fastest, 1.0, 1e-2) << "half of the joint's speed";
+  EXPECT_NEAR(cycles, 938 + 2000, 2) << "the plan begins when it is there";
+}
+
+TEST(JointTrajectory, RefusesAPlanThatCannotBeMeant) {
+  const auto with = [](const std::string& from, const std::string& to) {
+    std::string text = plan(true);
+    text.replace(text.find(from), from.size(), to);
+    return problem_of(text);
+  };
+  EXPECT_NE(with("velocity_rad_s = [0.000000]", "velocity_rad_s = [0.1]").find("begins in motion"),
+            std::string::npos);
+  EXPECT_NE(with("acceleration_rad_s2 = [0.000000]\n", "").find("some not"), std::string::npos);
+  EXPECT_NE(with("velocity_rad_s = [0.000000]", "velocity_rad_s = [0, 0]").find("has 2 numbers"),
+            std::string::npos);
+  EXPECT_NE(with("'quintic'", "'min_jerk'").find("set interpolation = \"quintic\""),
+            std::string::npos);
+  std::string ends = plan(false);
+  ends.replace(ends.rfind("[0.000000]"), 10, "[0.2]");
+  EXPECT_NE(problem_of(ends).find("ends in motion"), std::string::npos);
+  EXPECT_NE(problem_of("joints = ['wrist']\ninterpolation = 'quintic'\n[[waypoint]]\ntime_s = 1\n"
+                       "position_rad = [1]\nacceleration_rad_s2 = [0]\n")
+                .find("needs velocity_rad_s"),
+            std::string::npos);
+}
+
+TEST(JointTrajectory, GoesTheShorterWayRoundWhereItIsAsked) {
+  hal::RobotConfig robot = hal::test::fake_robot();
+  robot.joints[2].min_position_rad = -7412.0;
+  robot.joints[2].max_position_rad = 7412.0;
+  const std::string way =
+      "[[waypoint]]\ntime_s = 1\nposition_rad = [-3.1, 0]\n"
+      "[[waypoint]]\ntime_s = 2\nposition_rad = [3.1, 1.0]\n";
+  const auto end = [&](const std::string& key, double from_rad) {
+    test::Harness run(robot, "joint_trajectory", "joints = ['wrist', 'elbow']\n" + key + way);
+    EXPECT_EQ(run.problem(), "");
+    run.state.position_rad()[2] = from_rad;
+    run.start();
+    double fastest = 0.0;
+    for (int i = 0; i < 3000; ++i) {
+      EXPECT_EQ(run.step(), Code::kOk);
+      fastest = std::max(fastest, std::abs(run.command.velocity_rad_s()[2]));
+    }
+    EXPECT_LT(fastest, 2.0);
+    EXPECT_EQ(run.command.position_rad()[1], 1.0) << "a joint with ends goes the way it has";
+    return run.command.position_rad()[2];
+  };
+  const double turn = 2.0 * std::numbers::pi;
+  EXPECT_NE(
+      test::Harness(robot, "joint_trajectory", "joints = ['wrist', 'elbow']\n" + way).problem(), "")
+      << "the long way is too fast";
+  EXPECT_NEAR(end("angle_wraparound = true\n", 3.1), 3.1, 1e-9);
+  EXPECT_NEAR(end("angle_wraparound = true\n", 3.1 + 10.0 * turn), 3.1 + 10.0 * turn, 1e-9);
+  EXPECT_NEAR(end("angle_wraparound = true\n", -3.1), 3.1 - turn, 1e-9);
 }
 
 // x0 + 0.1 (cos w t - 1) + 0.2 sin w t - 0.1 sin 2 w t, w = pi: from rest to rest.

@@ -80,6 +80,28 @@ TEST(Fault, CategoryHoldKeepsTheOthersWhereTheyAre) {
   }
 }
 
+TEST(Fault, CategoryHoldFollowsABrakingAxisToItsRestAndNoFurther) {
+  Rig rig(with_category(StopCategory::kHold));
+  rig.bring_up();
+  double place = 0.0, speed = 0.0;  // of axis 3
+  const auto go = [&](double change) {
+    speed += change;
+    place += speed;
+    rig.command.position_rad()[3] = place;
+    rig.command.velocity_rad_s()[3] = speed * 1e3;
+    rig.steps(1);
+    return rig.axis(3).objects().target_position;
+  };
+  for (int i = 0; i < 20; ++i) (void)go(1e-4);
+  rig.master->stop(StopCategory::kHold);
+  for (int i = 0; i < 20; ++i) (void)go(-1e-4);
+  const std::int32_t rest = go(0.0);
+  EXPECT_NEAR(rest, std::lround(place * 5730.0), 4) << "some 5730 counts per rad";
+  EXPECT_EQ(go(-1e-2), rest) << "that is no braking";
+  EXPECT_EQ(go(0.0), rest);
+  EXPECT_EQ(rig.axis(3).objects().velocity_offset, 0);
+}
+
 TEST(Fault, CategoryWarnOnlyTells) {
   Rig rig(with_category(StopCategory::kWarn));
   rig.bring_up();

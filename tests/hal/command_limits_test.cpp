@@ -426,5 +426,53 @@ TEST_F(Limits, GoOnFromASnapshotAsBefore) {
   EXPECT_EQ(command.position_rad()[0], first);
 }
 
+/// Joint 0 declares 20 rad/s^2.
+class DeclaredAcceleration : public Limits {
+ protected:
+  void SetUp() override {
+    robot.joints[0].max_acceleration_rad_s2 = 20.0;
+    limits = CommandLimits(robot_of(robot), 1'000'000);
+    Limits::SetUp();
+  }
+};
+
+TEST_F(DeclaredAcceleration, BrakesAJointThatMovesWhenItsPositionLoopCloses) {
+  mode(ControlMode::kTorque);
+  ASSERT_EQ(limits.apply(state, command), Code::kOk);
+  state.velocity_rad_s()[0] = 1.0;
+  mode(ControlMode::kPosition);
+  double before = 0.1, speed = 1.0, farthest = 0.1;
+  for (int i = 0; i < 500; ++i) {
+    command.position_rad()[0] = 0.1;  // where it was measured
+    command.velocity_rad_s()[0] = 0.0;
+    ASSERT_EQ(limits.apply(state, command), Code::kOk);
+    const double now = (command.position_rad()[0] - before) / 1e-3;
+    EXPECT_LE(std::abs(now - speed), 0.02 * (1.0 + 1e-9)) << i;
+    speed = now;
+    before = command.position_rad()[0];
+    farthest = std::max(farthest, before);
+  }
+  EXPECT_NEAR(farthest, 0.1 + 0.025, 1e-3) << "v^2 / 2a";
+  EXPECT_EQ(before, 0.1);
+}
+
+TEST_F(DeclaredAcceleration, SaysTheVelocityOfAPositionThatIsHeldBackAndThenTheOwnersAgain) {
+  command.position_rad()[0] = 0.5;
+  command.velocity_rad_s()[0] = 0.3;
+  double before = 0.1;
+  int held_back = 0;
+  for (int i = 0; i < 1000; ++i) {
+    command.position_rad()[0] = 0.5;  // the owner leaves the velocity alone
+    ASSERT_EQ(limits.apply(state, command), Code::kOk);
+    const double speed = (command.position_rad()[0] - before) / 1e-3;
+    before = command.position_rad()[0];
+    if (before == 0.5) continue;
+    ++held_back;
+    EXPECT_NEAR(command.velocity_rad_s()[0], speed, 1e-9) << i;
+  }
+  EXPECT_GT(held_back, 200);
+  EXPECT_EQ(command.velocity_rad_s()[0], 0.3);
+}
+
 }  // namespace
 }  // namespace tandem::hal

@@ -24,6 +24,25 @@ TEST_P(BundledRobot, IsCompleteWithItsDescription) {
   for (const hal::JointConfig& joint : bundled->joints) {
     EXPECT_LT(joint.min_position_rad, joint.max_position_rad) << joint.name;
     EXPECT_GT(joint.max_torque_Nm, 0.0) << joint.name;
+    EXPECT_TRUE(std::isfinite(joint.max_acceleration_rad_s2)) << joint.name;
+  }
+}
+
+TEST(BundledRobots, HaveThePandasPublishedAccelerationsAndElseTheVelocityInATenthOfASecond) {
+  const auto robot = [](const char* name) {
+    auto read = read_robot(std::string(TANDEM_SOURCE_DIR "/config/") + name + "/robot.toml");
+    EXPECT_TRUE(read) << name;
+    return read->config;
+  };
+  const double published[] = {15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0};
+  for (const char* panda : {"panda", "panda_classic"}) {
+    const auto read = robot(panda);
+    for (std::size_t j = 0; j < 7; ++j) {
+      EXPECT_EQ(read.joints[j].max_acceleration_rad_s2, published[j]) << panda << j;
+    }
+  }
+  for (const hal::JointConfig& joint : robot("ur5e").joints) {
+    EXPECT_EQ(joint.max_acceleration_rad_s2, joint.max_velocity_rad_s / 0.1) << joint.name;
   }
 }
 

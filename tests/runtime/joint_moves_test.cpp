@@ -95,7 +95,7 @@ TEST_F(JointMoves, EndWhenAControllerTakesTheJoint) {
   steps(500);
   EXPECT_LT(std::abs(cycle->command().position_rad()[1] - cycle->state().position_rad()[1]), 0.2);
   ASSERT_TRUE(services().switch_controllers({"wave"}, {}, RunServices::Patience{0}));
-  steps(200);
+  steps(300);  // it brakes
   const double left = reference(1);
   steps(1000);
   EXPECT_EQ(reference(1), left) << "the motion of before does not go on";
@@ -112,6 +112,33 @@ TEST_F(JointMoves, GoOnFromASnapshot) {
   EXPECT_LT(reference(1), then);
   steps(100);
   EXPECT_EQ(reference(1), then);
+}
+
+TEST(JointMove, KeepsTheJointsAccelerationWhatIsAskedForAndWhatIsNot) {
+  hal::RobotConfig config = hal::test::fake_robot();
+  config.joints[1].max_acceleration_rad_s2 = 1.0;
+  test::JointRun run(config);
+  run.add_sine(0);
+  run.begin({.settle_cycles = 20});
+  run.steps(100);
+  const auto move = [&](double acceleration) {
+    return test::JointRun::text(run.services().move_joint(
+        "elbow", {.target_rad = 1.4, .speed_rad_s = 1.0, .acceleration_rad_s2 = acceleration},
+        RunServices::Patience{0}));
+  };
+  EXPECT_NE(move(1e9).find("the acceleration 1e+09 rad/s2"), std::string::npos);
+  EXPECT_NE(move(1.01).find("give more than 0, at most 1 rad/s2"), std::string::npos);
+  EXPECT_EQ(move(MoveRequest::kDefault), "accepted") << "the speed in half a second is too hard";
+  double before = run.reference(1), speed = 0.0, hardest = 0.0;
+  for (int i = 0; i < 3000; ++i) {
+    run.steps(1);
+    const double now = (run.reference(1) - before) * 1e3;
+    hardest = std::max(hardest, std::abs(now - speed) * 1e3);
+    speed = now;
+    before = run.reference(1);
+  }
+  EXPECT_NEAR(hardest, 1.0, 1e-3);
+  EXPECT_EQ(run.reference(1), 1.4);
 }
 
 }  // namespace

@@ -220,6 +220,7 @@ TEST(RobotCycle, HoldsEveryJointWhenTheFaultyOneAsksForIt) {
   run.backend.latch_on_fault = true;
   run.steps(1);
   EXPECT_EQ(run.cycle->phase(), RunPhase::kFaulted);
+  run.steps(300);  // it brakes
   const double held = run.cycle->command().position_rad()[0];
   run.steps(50);
   EXPECT_EQ(run.cycle->command().position_rad()[0], held);

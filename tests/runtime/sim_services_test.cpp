@@ -1,6 +1,7 @@
 // The same through the whole chain: a pendulum that its joint has to carry, its board, its spring.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "canopen/objects.hpp"
 #include "rt/clock.hpp"
@@ -94,6 +95,97 @@ TEST_F(SimServices, GainsReachTheBoardsObjectDictionaryBySdo) {
   EXPECT_EQ(gain(object::kPositionGains, canopen::kPidKi), 300.0F);
   EXPECT_EQ(gain(object::kTorqueGains, canopen::kPidKi), 2.5F);
   EXPECT_TRUE(cycle->faults().empty());
+}
+
+/// What a joint under way does while it is brought to rest.
+struct Braking {
+  double torque_Nm = 0.0;    // the largest
+  double back_rad_s = 0.0;   // the fastest way back
+  double coasts_rad = 0.0;   // from there to its rest
+  double speed_rad_s = 0.0;  // at last
+};
+
+struct MovingSwing {
+  MovingSwing() { begin(); }
+  void begin() {
+    auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
+                                      {.posture = "up", .release_ns = 100'000'000});
+    ASSERT_TRUE(made) << made.error().to_string();
+    backend = std::move(*made);
+    ASSERT_TRUE(host.add("runner", std::make_shared<test::Runner>(2.5), test::parameters(), false));
+    ASSERT_TRUE(host.add("keeper", std::make_shared<test::Keeper>(), test::parameters(), false));
+    cycle = std::make_unique<RobotCycle>(CycleParts{robot, *backend, host, clock},
+                                         CycleConfig{.settle_cycles = 200});
+    while (cycle->phase() != RunPhase::kRunning && cycle->step()) {
+    }
+    steps(1500);
+  }
+  void steps(int count) {
+    for (int i = 0; i < count; ++i) ASSERT_TRUE(cycle->step());
+  }
+  void by_controller() {
+    ASSERT_TRUE(cycle->services().switch_controllers({}, {"runner"}, kNow));
+    steps(400);
+  }
+  void by_operator() {
+    ASSERT_TRUE(cycle->services().move_joint(
+        "swing", {.target_rad = 2.9, .speed_rad_s = 2.5, .acceleration_rad_s2 = 12.5}, kNow));
+    steps(300);
+  }
+  Braking braking() {
+    Braking seen;
+    const double from = cycle->state().position_rad()[0];
+    EXPECT_NEAR(cycle->state().velocity_rad_s()[0], 2.5, 0.2);
+    for (int i = 0; i < 1500; ++i) {
+      steps(1);
+      seen.torque_Nm = std::max(seen.torque_Nm, std::abs(cycle->state().torque_Nm()[0]));
+      seen.back_rad_s = std::max(seen.back_rad_s, -cycle->state().velocity_rad_s()[0]);
+    }
+    seen.coasts_rad = cycle->state().position_rad()[0] - from;
+    seen.speed_rad_s = cycle->state().velocity_rad_s()[0];
+    return seen;
+  }
+
+  const hal::RobotConfig robot = tandem::test::swing_robot();
+  ControllerHost host{robot, tandem::test::swing_kernels(2), 1'000'000};
+  std::unique_ptr<sim::SimRobot> backend;
+  rt::WallClock clock;
+  std::unique_ptr<RobotCycle> cycle;
+};
+
+TEST(MovingSwing, BrakesAsJointStopDoesWhoeverTakesItsHandOff) {
+  struct Way {
+    const char* what;
+    bool controlled;
+    std::function<void(MovingSwing&)> take;
+  };
+  const Way ways[] = {
+      {"joint stop", false,
+       [](MovingSwing& run) { ASSERT_TRUE(run.cycle->services().move_joint("swing", {}, kNow)); }},
+      {"controller stop", true,
+       [](MovingSwing& run) {
+         ASSERT_TRUE(run.cycle->services().switch_controllers({"runner"}, {}, kNow));
+       }},
+      {"controller switch", true,
+       [](MovingSwing& run) {
+         ASSERT_TRUE(run.cycle->services().switch_controllers({"runner"}, {"keeper"}, kNow));
+       }},
+      {"controller start", false, [](MovingSwing& run) {
+         ASSERT_TRUE(run.cycle->services().switch_controllers({}, {"keeper"}, kNow));
+       }}};
+  Braking right;
+  for (const Way& way : ways) {
+    MovingSwing run;
+    way.controlled ? run.by_controller() : run.by_operator();
+    way.take(run);
+    const Braking seen = run.braking();
+    std::printf("%-22s %5.1f Nm, back at %.3f rad/s, %.3f rad on, then %.4f rad/s\n", way.what,
+                seen.torque_Nm, seen.back_rad_s, seen.coasts_rad, seen.speed_rad_s);
+    if (right.torque_Nm == 0.0) right = seen;
+    EXPECT_LE(seen.torque_Nm, 1.5 * right.torque_Nm) << way.what;
+    EXPECT_LE(seen.back_rad_s, right.back_rad_s + 0.1) << way.what;
+    EXPECT_NEAR(seen.speed_rad_s, 0.0, 0.01) << way.what;
+  }
 }
 
 }  // namespace

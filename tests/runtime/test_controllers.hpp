@@ -1,6 +1,7 @@
 // Controllers for tests of the loop: one that moves joints on a sine, and one that misbehaves.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -67,6 +68,63 @@ class Sine : public Controller {
   std::int64_t began_ns_ = 0;
   std::vector<double> middle_;
   std::unique_ptr<int> last_words_;
+};
+
+/// Runs joint 0 up to a speed within 0.2 s, and on.
+class Runner : public Controller {
+ public:
+  /// @param says_speed  it writes the velocity's reference, too
+  explicit Runner(double speed_rad_s, bool says_speed = true)
+      : speed_rad_s_(speed_rad_s), says_speed_(says_speed) {}
+  Status configure(ControllerSetup& setup) override {
+    setup.claim(0, hal::ControlMode::kPosition);
+    return {};
+  }
+  void start(const hal::CycleTime&, const hal::StateImage& state,
+             hal::CommandImage&) noexcept override {
+    place_rad_ = state.position_rad()[0];
+    cycles_ = 0;
+  }
+  Code update(const hal::CycleTime&, const hal::StateImage&,
+              hal::CommandImage& command) noexcept override {
+    const double x = std::min(1.0, ++cycles_ / 200.0);
+    const double speed = speed_rad_s_ * x * x * (3.0 - 2.0 * x);
+    place_rad_ += speed * 1e-3;
+    command.position_rad()[0] = place_rad_;
+    if (says_speed_) command.velocity_rad_s()[0] = speed;
+    return ends ? Code::kStopped : Code::kOk;
+  }
+  bool ends = false;  ///< it is done, in motion
+
+ private:
+  double speed_rad_s_;
+  bool says_speed_;
+  double place_rad_ = 0.0;
+  int cycles_ = 0;
+};
+
+/// Keeps joint 0 where it was at the start, or 0.2 rad below.
+class Keeper : public Controller {
+ public:
+  explicit Keeper(bool goes_back = false) : goes_back_(goes_back) {}
+  Status configure(ControllerSetup& setup) override {
+    setup.claim(0, hal::ControlMode::kPosition);
+    return {};
+  }
+  void start(const hal::CycleTime&, const hal::StateImage& state,
+             hal::CommandImage&) noexcept override {
+    place_rad_ = state.position_rad()[0] - (goes_back_ ? 0.2 : 0.0);
+  }
+  Code update(const hal::CycleTime&, const hal::StateImage&,
+              hal::CommandImage& command) noexcept override {
+    command.position_rad()[0] = place_rad_;
+    command.velocity_rad_s()[0] = 0.0;
+    return Code::kOk;
+  }
+
+ private:
+  bool goes_back_;
+  double place_rad_ = 0.0;
 };
 
 /// Claims one joint and writes every field of every joint, in start() and update().
