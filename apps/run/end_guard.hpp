@@ -20,10 +20,11 @@ namespace tandem::apps {
 
 /// While one exists, `limit` is the time for what its scope does: closing what threads wait for.
 /// They may never come back, for instance where a controller has closed every descriptor of the
-/// process. The robot has been stopped by then.
+/// process. The robot has been stopped by then. What a client has asked for last may take its time,
+/// as a controller's configure() may: no more than this.
 class EndGuard {
  public:
-  static constexpr std::chrono::seconds kLimit{10};
+  static constexpr std::chrono::seconds kLimit{20};
 
   /// @param last_words  what is still to be done, on this class' thread; may be empty
   explicit EndGuard(std::function<void()> last_words = {}) : last_words_(std::move(last_words)) {

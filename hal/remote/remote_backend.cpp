@@ -89,6 +89,7 @@ Code RemoteBackend::read(const hal::CycleTime& time, hal::StateImage& state) noe
     if (answered_ns_ != 0) turn_around_.record(clock_ns(CLOCK_MONOTONIC) - answered_ns_);
   }
   if (resetting_ && seen.answered_cycle >= reset_after_) resetting_ = false;
+  if (seen.reaction == StopCategory::kWarn) clearing_ = false;
   return static_cast<Code>(seen.code) == Code::kTimeout ? Code::kTimeout : Code::kOk;
 }
 
@@ -194,10 +195,10 @@ bool RemoteBackend::command_in_force(hal::CommandImage& command) const noexcept 
 }
 
 /// A stop that the server has carried out already is not asked for again: its category is the
-/// server's. While a reset is on its way to the server, what it shows is what the reset clears.
+/// server's. From a reset on, until nothing is latched there, what it shows is what that clears.
 void RemoteBackend::stop(StopCategory category) noexcept TANDEM_RT {
   if (category == StopCategory::kWarn) return;
-  const bool known = !resetting_ && newest_.front().reaction <= category;
+  const bool known = !clearing_ && newest_.front().reaction <= category;
   if (latched_ <= category) return;
   latched_ = category;
   if (known) return;
@@ -208,7 +209,7 @@ void RemoteBackend::stop(StopCategory category) noexcept TANDEM_RT {
 void RemoteBackend::reset() noexcept TANDEM_RT {
   latched_ = StopCategory::kWarn;
   ++resets_;
-  resetting_ = true;
+  resetting_ = clearing_ = true;
   reset_after_ = last_cycle_;
 }
 

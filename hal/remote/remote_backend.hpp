@@ -168,6 +168,7 @@ class RemoteBackend final : public hal::Backend {
   std::uint64_t last_cycle_ = 0, missed_now_ = 0, missed_ = 0, sequence_ = 0;
   std::uint64_t reset_after_ = 0;  // the cycle whose command carries it
   bool resetting_ = false;
+  bool clearing_ = false;  // a reset was asked for, and the server has shown nothing latched since
   hal::StopCategory latched_ = hal::StopCategory::kWarn, asked_ = hal::StopCategory::kWarn;
   std::uint32_t stops_ = 0, resets_ = 0;
   bool clears_ = false;  // the last command asked for a joint's fault to be cleared

@@ -201,11 +201,11 @@ TEST_F(Socket, HasAThreadForEachTurn) {
       return Json{{"number", number}};
     };
   };
-  registry.add("stop", ControlEffect::kStops, "stops", {}, waits(3));
-  registry.add("end", ControlEffect::kEnds, "ends", {}, waits(3));
-  registry.add("predict", ControlEffect::kReads, "takes long", {}, waits(2));
+  registry.add("stop", ControlEffect::kStops, "stops", {}, waits(1));
+  registry.add("end", ControlEffect::kEnds, "ends", {}, waits(1));
+  registry.add("predict", ControlEffect::kReads, "takes long", {}, waits(3));
   registry.takes_long("predict");
-  registry.add("move", ControlEffect::kChanges, "moves", {}, waits(1));
+  registry.add("move", ControlEffect::kChanges, "moves", {}, waits(2));
   const auto socket = open(path);
   std::vector<int> clients;
   for (const char* name : {"stop", "end", "predict", "move"}) {
@@ -213,13 +213,13 @@ TEST_F(Socket, HasAThreadForEachTurn) {
     send(clients.back(), std::string("{\"do\": \"") + name + "\"}\n");
   }
   released = 1;
-  EXPECT_EQ(line(clients[3]), "{\"ok\":true,\"number\":1}\n");
-  EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
+  EXPECT_EQ(line(clients[0]), "{\"ok\":true,\"number\":1}\n");
+  EXPECT_EQ(line(clients[1]), "{\"ok\":true,\"number\":1}\n");
   released = 2;
-  EXPECT_EQ(line(clients[2]), "{\"ok\":true,\"number\":2}\n");
+  EXPECT_EQ(line(clients[3]), "{\"ok\":true,\"number\":2}\n");
+  EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
   released = 3;
-  EXPECT_EQ(line(clients[0]), "{\"ok\":true,\"number\":3}\n");
-  EXPECT_EQ(line(clients[1]), "{\"ok\":true,\"number\":3}\n");
+  EXPECT_EQ(line(clients[2]), "{\"ok\":true,\"number\":3}\n");
   for (const int fd : clients) ::close(fd);
 }
 

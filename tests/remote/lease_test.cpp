@@ -265,9 +265,17 @@ TEST_F(LinkChecks, AStopIsCarriedOutEvenWithACommandThatIsNotTaken) {
   EXPECT_TRUE(eventually([this] { return served.phase() == RunPhase::kFaulted; }));
   ASSERT_EQ(served.cycle->faults().size(), 1U);
   EXPECT_EQ(served.cycle->faults()[0].text, "the remote owner asked for a stop");
+  // Of an owner who had not seen it: the stop wins, whichever sample came first.
+  auto early = sample();
+  early.cycle = served.cycle->progress().stopped_before.load() - 1;
+  early.stops = 1;
+  early.resets = 1;
+  ASSERT_TRUE(commands_->write(early));
+  EXPECT_TRUE(eventually([this] { return served.cycle->progress().failed_resets.load() == 1; }));
+  EXPECT_EQ(served.phase(), RunPhase::kFaulted);
   auto reset = sample();
   reset.stops = 1;
-  reset.resets = 1;
+  reset.resets = 2;
   expect(Verdict::kTaken, reset);
   EXPECT_TRUE(eventually([this] { return served.phase() == RunPhase::kRunning; }));
 }

@@ -118,5 +118,34 @@ TEST(LockstepLink, AServerThatWaitsForACommandCanBeStopped) {
   EXPECT_TRUE(eventually([&] { return served.phase() == RunPhase::kFaulted; }));
 }
 
+// While its reset was on its way the server still showed the stop before it: the owner took that
+// for the one that it wanted, and sent none.
+TEST(LockstepLink, AnOwnersStopWinsOverItsResetInEachOfItsCycles) {
+  for (int into = 0; into < 6; ++into) {
+    SCOPED_TRACE(into);
+    ServerConfig config;
+    config.lockstep = true;
+    Served served(config);
+    served.begin();
+    ClientConfig client;
+    client.lockstep = true;
+    Owner owner(client, {.after_stop = runtime::AfterStop::kWait});
+    const auto steps = [&](int count) {
+      for (int i = 0; i < count; ++i) (void)owner.cycle->step();
+    };
+    while (owner.cycle->progress().running_cycles.load() < 10) ASSERT_TRUE(owner.cycle->step());
+    owner.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
+    steps(20);
+    ASSERT_EQ(served.phase(), RunPhase::kFaulted);
+    owner.cycle->inbox().reset_faults();
+    steps(1 + into);
+    owner.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
+    steps(200);
+    EXPECT_EQ(owner.cycle->phase(), RunPhase::kFaulted);
+    EXPECT_EQ(served.phase(), RunPhase::kFaulted);
+    EXPECT_GE(served.cycle->progress().latched.load(), 1U);
+  }
+}
+
 }  // namespace
 }  // namespace tandem::remote
