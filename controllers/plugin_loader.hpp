@@ -45,7 +45,7 @@ class LoadedController {
 /// holds a '/'. The library is not opened before its file exists.
 ///
 /// Errors: there is no such file (with the folders searched and the nearest name); others may
-/// change it (check_trusted_code()), found out before it is opened; the system cannot load it; it
+/// change it (check_trusted_code()), found out before it is opened; open_newest()'s; it
 /// lacks tandem_controller_plugin(), or that leaves something null, or its create() makes no
 /// controller; it was built for another plugin ABI, or by another compiler;
 /// it throws. A library that calls exit() ends the process with status 2. `key` of the error is

@@ -2,10 +2,14 @@
 #include "runtime/loop_watchdog.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/ptrace.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <thread>
 
+#include "base/process.hpp"
 #include "tests/support/eventually.hpp"
 
 namespace tandem::runtime {
@@ -40,6 +44,31 @@ TEST_F(Watched, ALoopThatDoesNotLeaveItsCycleHangsAndIsGivenUpOnce) {
   EXPECT_EQ(hangs, 1);
   EXPECT_EQ(waits, 0);
   EXPECT_EQ(returns, 0);
+}
+
+// Single steps in a controller had stopped the run. A robot is not left alone for them.
+TEST_F(Watched, ALoopThatADebuggerHoldsHangsOnARobotOnly) {
+  for (const bool waits_for_debugger : {true, false}) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      if (!tandem::test::eventually(is_debugged)) ::_exit(2);
+      const LoopWatchdog watchdog(heartbeat,
+                                  {.limit = milliseconds(50),
+                                   .grace = std::chrono::hours(1),
+                                   .waits_for_debugger = waits_for_debugger},
+                                  hooks());
+      heartbeat.enter();
+      if (!waits_for_debugger)
+        ::_exit(tandem::test::eventually([&] { return hangs == 1; }) ? 0 : 1);
+      std::this_thread::sleep_for(milliseconds(300));
+      ::_exit(hangs == 0 ? 0 : 1);
+    }
+    ASSERT_EQ(::ptrace(PTRACE_SEIZE, child, nullptr, nullptr), 0);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), 0) << waits_for_debugger;
+  }
 }
 
 TEST_F(Watched, ALoopThatStandsStillIsNotWaitedFor) {
