@@ -8,6 +8,7 @@
 
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
+#include "apps/robot/gains_judge.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/composition.hpp"
@@ -281,7 +282,12 @@ class Session {
   /// What may be asked of the run, and the ways in: the control socket and the services over DDS.
   Status open_inputs() {
     const runtime::Experiment& e = experiment();
-    add_run_commands(commands_, *cycle_, e.robot);
+    const auto judge = std::make_shared<const GainsJudge>(e.robot, c_.kernels.get());
+    add_run_commands(commands_, *cycle_, e.robot,
+                     [judge](std::size_t joint, hal::PidLoop loop, const GainsJudge::Gains& gains,
+                             const std::vector<double>& position_rad) {
+                       return judge->opinion(joint, loop, gains, position_rad);
+                     });
     add_predict(commands_, c_.predictor.get(), e.robot);
     if (dds_ != nullptr) admission_.add_to(commands_);
     if (c_.sim != nullptr) {
