@@ -228,6 +228,7 @@ class Session {
       auto recorder = open_log(c_, asked.empty() ? experiment().log.folder : asked);
       if (!recorder) return std::unexpected(recorder.error());
       recorder_ = std::move(*recorder);
+      plugins_at_start_ = c_.controllers->code().size();
     }
     auto server = open_server(c_, dds_.get(), options_.once, admission_);
     if (!server) return std::unexpected(server.error());
@@ -365,7 +366,12 @@ class Session {
     if (dds_ != nullptr) summary.dds = dds_->finish();
     if (services_ != nullptr) summary.dds->services = services_->counts();
     if (recorder_ != nullptr) {
-      summary.log = recorder_->close(result_of(c_.master));
+      log::StringMap result = result_of(c_.master);
+      std::string later;  // plugins that came during the run
+      const std::vector<std::string> code = controller_lines(*c_.controllers);
+      for (std::size_t i = plugins_at_start_; i < code.size(); ++i) later += code[i] + "\n";
+      if (!later.empty()) result.emplace_back("loaded_controllers", later);
+      summary.log = recorder_->close(result);
       log_ = summary.log->path;
       log_is_whole_ = summary.log->error.empty();
     }
@@ -391,6 +397,7 @@ class Session {
   const RunOptions& options_;
   std::FILE* out_;
   const hal::TruthImage* truth_ = nullptr;
+  std::size_t plugins_at_start_ = 0;  // in the log's first record
   std::unique_ptr<DdsRun> dds_;
   std::unique_ptr<log::Recorder> recorder_;
   std::string log_;
