@@ -2,6 +2,7 @@
 #include "base/sha256.hpp"
 
 #include <openssl/evp.h>
+#include <unistd.h>
 
 #include <array>
 
@@ -33,6 +34,19 @@ std::string sha256(std::span<const std::byte> bytes) {
   Sha256 hash;
   hash.update(bytes);
   return hash.finish();
+}
+
+std::string sha256_of(int file) {
+  Sha256 hash;
+  std::array<std::byte, 65536> block;
+  off_t at = 0;
+  for (;;) {
+    const ssize_t got = ::pread(file, block.data(), block.size(), at);
+    if (got < 0) return {};
+    if (got == 0) return hash.finish();
+    hash.update(std::span(block).first(static_cast<std::size_t>(got)));
+    at += got;
+  }
 }
 
 }  // namespace tandem

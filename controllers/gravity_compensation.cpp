@@ -70,7 +70,7 @@ class GravityCompensation : public Controller {
     for (const Joint& joint : joints_) {
       const std::size_t j = joint.index;
       const double weight = tau_[map_.v_index(j)];
-      command.position_rad()[j] = joint.position_rad;
+      if (compliant_) command.position_rad()[j] = joint.position_rad;
       command.velocity_rad_s()[j] = 0.0;
       command.stiffness_Nm_rad()[j] = joint.stiffness_Nm_rad;
       command.damping_Nms_rad()[j] = joint.damping_Nms_rad;

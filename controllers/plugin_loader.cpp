@@ -3,6 +3,8 @@
 #include "controllers/plugin_loader.hpp"
 
 #include <dlfcn.h>
+#include <fcntl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -11,6 +13,7 @@
 
 #include "base/nearest.hpp"
 #include "base/quoting.hpp"
+#include "base/sha256.hpp"
 #include "base/trusted_code.hpp"
 #include "controllers/hosted_call.hpp"
 #include "controllers/newest_library.hpp"
@@ -155,6 +158,10 @@ Result<LoadedController> load_controller(const std::string& name,
   }
   LoadedController loaded;
   loaded.path_ = *file;
+  if (const int opened_file = ::open(file->c_str(), O_RDONLY | O_CLOEXEC); opened_file >= 0) {
+    loaded.sha256_ = sha256_of(opened_file);
+    ::close(opened_file);
+  }
   const Status opened = hosted_call(name, [&] { return loaded.open(name); });
   if (!opened) return std::unexpected(opened.error());
   return loaded;

@@ -18,6 +18,8 @@ class LoadedController {
   [[nodiscard]] Controller* operator->() const noexcept { return controller_.get(); }
   [[nodiscard]] const ControllerPlugin& plugin() const noexcept { return *plugin_; }
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
+  /// Of its file as it was opened; empty: it could not be read.
+  [[nodiscard]] const std::string& sha256() const noexcept { return sha256_; }
 
  private:
   friend Result<LoadedController> load_controller(const std::string&,
@@ -30,6 +32,7 @@ class LoadedController {
   const ControllerPlugin* plugin_ = nullptr;
   std::unique_ptr<Controller> controller_;
   std::string path_;
+  std::string sha256_;
 };
 
 /// Where controllers are looked for by name: the folders of the environment variable

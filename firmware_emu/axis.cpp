@@ -263,7 +263,13 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
   watch_brake(brake_was_set);
 
   AxisEvents events;
-  if (now == DriveState::kFaultReactionActive && before != now) {
+  // Once it rests, and whenever a reset is asked for, the fault is what is there now: it may be
+  // another cause than the one that was found first.
+  const bool settled =
+      now == DriveState::kFault && cause != ErrorCode::kNone &&
+      (before != now || (objects_.controlword & canopen::controlword::kFaultReset) != 0);
+  if ((now == DriveState::kFaultReactionActive && before != now) ||
+      (settled && objects_.error_code != static_cast<std::uint16_t>(cause))) {
     events.raised = cause;
     objects_.error_code = static_cast<std::uint16_t>(cause);
   }

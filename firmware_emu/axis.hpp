@@ -19,7 +19,7 @@ namespace tandem::firmware {
 
 /// What supervise() reports to the board.
 struct AxisEvents {
-  canopen::ErrorCode raised = canopen::ErrorCode::kNone;  ///< a fault was latched just now
+  canopen::ErrorCode raised = canopen::ErrorCode::kNone;  ///< latched just now, or found behind it
   bool reset = false;                                     ///< a fault was cleared just now
 };
 

@@ -30,8 +30,9 @@ struct CycleView {
   RunPhase phase;
   Code read_code;  ///< of the backend's read()
   const StateImage& state;
-  const CommandImage& command;    ///< as it went to the drives
-  const TruthImage* truth;        ///< null without a simulation
+  const CommandImage&
+      command;              ///< as the log has it: what went to the drives, and wanted positions
+  const TruthImage* truth;  ///< null without a simulation
   const EstimateImage* estimate;  ///< null where nothing is estimated
   CycleTimes times;
 };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 #include "base/bounds.hpp"
 
@@ -42,6 +43,15 @@ StringMap to_map(const RunInfo& info) {
                 {"period_ns", std::to_string(info.period_ns)},
                 {"kernel_variant", info.kernel_variant},
                 {"description_hash", info.description_hash}};
+  std::string controllers;
+  for (const std::string& one : info.controllers) controllers += one + "\n";
+  for (const auto& [key, value] : {std::pair{"host", &info.host},
+                                   {"started", &info.started},
+                                   {"time_zone", &info.time_zone},
+                                   {"kernel_sha256", &info.kernel_sha256},
+                                   {"controllers", &std::as_const(controllers)}}) {
+    if (!value->empty()) map.emplace_back(key, *value);
+  }
   if (info.operators_view) map.emplace_back("state", kOperatorsView);
   if (!info.engine.empty()) map.emplace_back("engine", info.engine);
   return map;
@@ -67,6 +77,11 @@ RunInfo info_from(const StringMap& map) {
   info.engine = value_of(map, "engine");
   info.kernel_variant = value_of(map, "kernel_variant");
   info.description_hash = value_of(map, "description_hash");
+  info.host = value_of(map, "host");
+  info.started = value_of(map, "started");
+  info.time_zone = value_of(map, "time_zone");
+  info.kernel_sha256 = value_of(map, "kernel_sha256");
+  info.controllers = lines_of(value_of(map, "controllers"));
   return info;
 }
 

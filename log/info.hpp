@@ -19,7 +19,10 @@ struct SensorInfo {
 /// The metadata record "tandem", and "configuration" with the files' texts. Outside the data
 /// hash: equal runs on different machines may differ in it.
 struct RunInfo {
-  std::string version{};  ///< of tandem
+  std::string version{};    ///< of tandem
+  std::string host{};       ///< the machine that ran it
+  std::string started{};    ///< on its wall clock: UTC, ISO 8601
+  std::string time_zone{};  ///< the machine's: "+0100 CET"
   std::string robot{};
   std::string hal{};                  ///< "sim", …
   std::vector<std::string> joints{};  ///< the image's order
@@ -31,9 +34,11 @@ struct RunInfo {
   std::string engine{};            ///< "mujoco 2.2.2", which moved the bodies; empty: Tandem's own
   std::string kernel_variant{};    ///< "x86-64-v3"; may change a result's last bits
   std::string description_hash{};  ///< of what the kernels were made from
-  StringMap configuration{};       ///< path -> text of every file that was read
-  std::vector<std::string> boards{};  ///< for events' texts: in no record
-  std::vector<std::string> buses{};   ///< the same
+  std::string kernel_sha256{};     ///< of the kernels' library
+  std::vector<std::string> controllers{};  ///< "NAME SHA256 PATH" of each plugin at the start
+  StringMap configuration{};               ///< path -> text of every file that was read
+  std::vector<std::string> boards{};       ///< for events' texts: in no record
+  std::vector<std::string> buses{};        ///< the same
 };
 
 /// Metadata records' names.

@@ -179,7 +179,8 @@ Status read_state(const log::LogFile& file, log::RunWindow& window, RunData& run
   return read_rows(*table, window, run);
 }
 
-/// References of the joints that the command puts under position control, by the state's times.
+/// References of the joints that the command puts under position control, by the state's times. Of
+/// others those that a controller writes: what nobody writes is what is measured.
 Status read_command(const log::LogFile& file, RunData& run) {
   const std::size_t n = run.robot.joints.size();
   const double gap = std::numeric_limits<double>::quiet_NaN();
@@ -195,7 +196,9 @@ Status read_command(const log::LogFile& file, RunData& run) {
     if (c == table->time_s.size()) break;
     if (table->time_s[c] != run.time_s[row]) continue;
     for (std::size_t j = 0; j < n; ++j) {
-      if (table->columns[n + j][c] == kPosition) run.reference_rad[j][row] = table->columns[j][c];
+      const double reference = table->columns[j][c];
+      const bool follows = table->columns[n + j][c] == kPosition;
+      if (follows || reference != run.position_rad[j][row]) run.reference_rad[j][row] = reference;
     }
   }
   return {};

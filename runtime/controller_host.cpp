@@ -29,6 +29,7 @@ ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kern
 Status ControllerHost::add(const std::string& name, LoadedController plugin, TomlTable parameters,
                            bool active) {
   const std::string path = plugin.path();
+  note_code(name, plugin);
   auto owner = std::make_shared<LoadedController>(std::move(plugin));
   const std::size_t slot = size();
   Status added = add(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters),
@@ -69,10 +70,21 @@ Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> 
   return {};
 }
 
+void ControllerHost::note_code(const std::string& name, const LoadedController& plugin) {
+  const std::lock_guard lock(code_mutex_);
+  code_.push_back({name, plugin.sha256(), plugin.path()});
+}
+
+std::vector<ControllerCode> ControllerHost::code() const {
+  const std::lock_guard lock(code_mutex_);
+  return code_;
+}
+
 Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     const std::string& name, LoadedController plugin, TomlTable parameters,
     std::chrono::milliseconds limit) {
   const std::string path = plugin.path();
+  note_code(name, plugin);
   auto owner = std::make_shared<LoadedController>(std::move(plugin));
   auto made =
       configure(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters), limit);

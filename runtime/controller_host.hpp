@@ -35,6 +35,11 @@ inline constexpr std::size_t kMostControllers = 32;
 using ControllerSet = std::uint32_t;
 [[nodiscard]] constexpr ControllerSet only(std::size_t slot) { return ControllerSet{1} << slot; }
 
+/// The code of a controller: which file it came from.
+struct ControllerCode {
+  std::string name, sha256, path;
+};
+
 /// A configured controller.
 struct HostedController {
   std::string name;
@@ -127,6 +132,9 @@ class ControllerHost {
   [[nodiscard]] const std::vector<hal::JointCapabilities>& capabilities() const noexcept {
     return capabilities_;
   }
+
+  /// Every plugin that was given to add() and configure(), in order, also of those that are gone.
+  [[nodiscard]] std::vector<ControllerCode> code() const;
 
   using Owned = std::array<std::unique_ptr<HostedController>, kMostControllers>;
   /// What is loaded, by slot: add()'s before the run, RunServices' while it goes on.
@@ -286,6 +294,7 @@ class ControllerHost {
   void leave_calls() noexcept TANDEM_RT { at_work_.store(-1, std::memory_order_relaxed); }
 
   using Impedance = BumplessTransfer::Impedance;
+  void note_code(const std::string& name, const LoadedController& plugin);
 
   const hal::RobotConfig* config_;
   const hal::Robot robot_;  // what the controllers see of it
@@ -294,6 +303,8 @@ class ControllerHost {
   std::int64_t period_ns_;
   hal::Predictor* predictor_ = nullptr;
   std::vector<double> start_rad_;  // of start_from()
+  mutable std::mutex code_mutex_;
+  std::vector<ControllerCode> code_;
   const hal::EstimateImage* estimate_ = nullptr;
   std::vector<hal::JointCapabilities> capabilities_;
 

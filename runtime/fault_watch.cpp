@@ -21,6 +21,7 @@ FaultWatch::FaultWatch(const hal::RobotConfig& robot, const hal::Backend& backen
       lost_after_cycles_(lost_after_cycles),
       fall_(fall),
       joint_told_(robot.joints.size()),
+      code_told_(robot.joints.size()),
       sensor_told_(robot.sensors.size()) {}
 
 bool FaultWatch::is_ill(const hal::StateImage& state, std::size_t joint) const noexcept TANDEM_RT {
@@ -38,8 +39,11 @@ FaultWatch::Told FaultWatch::found(const hal::StateImage& state, std::size_t joi
 std::optional<FaultRecord> FaultWatch::next_joint(const hal::StateImage& state) noexcept TANDEM_RT {
   for (std::size_t j = 0; j < joint_told_.size(); ++j) {
     const Told now = found(state, j);
-    if (now <= joint_told_[j]) continue;
+    const std::uint32_t code = state.fault()[j];
+    const bool another = now == kFault && code_told_[j] != 0 && code != 0 && code != code_told_[j];
+    if (now <= joint_told_[j] && !another) continue;
     joint_told_[j] = now;
+    code_told_[j] = code;
     joint_in_fault_ = true;
     FaultRecord record{.index = static_cast<std::int32_t>(j),
                        .code = state.age_cycles()[j],
@@ -115,12 +119,14 @@ void FaultWatch::reset(const hal::StateImage& state) noexcept TANDEM_RT {
   joint_in_fault_ = false;
   for (std::size_t j = 0; j < joint_told_.size(); ++j) {
     joint_told_[j] = found(state, j);
+    code_told_[j] = joint_told_[j] == kNothing ? 0 : state.fault()[j];
     joint_in_fault_ = joint_in_fault_ || joint_told_[j] != 0;
   }
 }
 
 void FaultWatch::forget(std::size_t joint) noexcept TANDEM_RT {
   joint_told_[joint] = kNothing;
+  code_told_[joint] = 0;
   joint_in_fault_ = std::ranges::any_of(joint_told_, [](auto told) { return told != kNothing; });
 }
 

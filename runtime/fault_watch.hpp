@@ -64,7 +64,9 @@ class FaultWatch {
   [[nodiscard]] std::size_t joints() const noexcept { return joint_told_.size(); }
   [[nodiscard]] std::size_t sensors() const noexcept { return sensor_told_.size(); }
   [[nodiscard]] const FallLimits& fall_limits() const noexcept { return fall_.limits(); }
-  void archive(Archive& ar) { ar(joint_told_, sensor_told_, joint_in_fault_, link_lost_, fall_); }
+  void archive(Archive& ar) {
+    ar(joint_told_, code_told_, sensor_told_, joint_in_fault_, link_lost_, fall_);
+  }
 
  private:
   /// What has been reported of a joint.
@@ -77,6 +79,7 @@ class FaultWatch {
   std::uint32_t lost_after_cycles_;
   FallWatch fall_;
   std::vector<std::uint8_t> joint_told_;  ///< a Told each
+  std::vector<std::uint32_t> code_told_;  ///< of a drive's fault; another one is news
   std::vector<std::uint8_t> sensor_told_;
   bool joint_in_fault_ = false, link_lost_ = false;
 };

@@ -28,6 +28,10 @@ class AtWork {
   Heartbeat* heartbeat_;
 };
 
+bool follows_position(std::int8_t mode) noexcept TANDEM_RT {
+  return mode == static_cast<std::int8_t>(hal::ControlMode::kPosition);
+}
+
 }  // namespace
 
 bool RobotCycle::step() noexcept {
@@ -187,6 +191,7 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
 }
 
 void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
+  std::ranges::fill(written_, std::uint8_t{0});
   stamp(command_);
   stamp(wanted_);
   if (std::exchange(brakes_, false)) controllers_->brake(state_, command_);
@@ -228,7 +233,9 @@ void RobotCycle::run_controllers() noexcept TANDEM_RT {
   }
   controlling_ = true;
   ++ran_;
+  offer_measured(controlled());
   const Code code = controllers_->update(time_, state_, controlled());
+  note_written(controlled());
   controllers_->lead_back(controlled());
   hold_drives_in_reset(controlled());
   hold_unhomed(controlled());
@@ -254,9 +261,42 @@ void RobotCycle::controllers_answered(Code code) noexcept TANDEM_RT {
          .category = StopCategory::kCategory1});
 }
 
+/// The position reference of a joint outside position control is where it is, unless a controller
+/// writes another one in this cycle: what it wants the joint to follow by other means.
+void RobotCycle::offer_measured(hal::CommandImage& command) noexcept TANDEM_RT {
+  const auto measured = state_.position_rad();
+  const auto mode = command.mode();
+  for (std::size_t j = 0; j < written_.size(); ++j) {
+    const bool offers = !follows_position(mode[j]) && std::isfinite(measured[j]);
+    written_[j] = offers ? 1 : 0;
+    if (offers) command.position_rad()[j] = measured[j];
+  }
+}
+
+void RobotCycle::note_written(const hal::CommandImage& command) noexcept TANDEM_RT {
+  const auto measured = std::as_const(state_).position_rad(), reference = command.position_rad();
+  const auto mode = command.mode();
+  for (std::size_t j = 0; j < written_.size(); ++j) {
+    if (follows_position(mode[j]) || reference[j] == measured[j]) written_[j] = 0;
+  }
+}
+
+/// The command as log and statistics have it: what was sent, but for references that no drive
+/// follows.
+const hal::CommandImage& RobotCycle::told() noexcept TANDEM_RT {
+  if (std::ranges::none_of(written_, [](std::uint8_t one) { return one != 0; })) return command_;
+  told_.assign(command_);
+  for (std::size_t j = 0; j < written_.size(); ++j) {
+    if (written_[j] != 0) told_.position_rad()[j] = written_rad_[j];
+  }
+  return told_;
+}
+
 /// Until they have brought the robot to its posture, or their time is over.
 void RobotCycle::retreat_further() noexcept TANDEM_RT {
+  offer_measured(controlled());
   const Code code = controllers_->update(time_, state_, controlled());
+  note_written(controlled());
   if (delay_.on()) delay_.pass(wanted_, command_);
   if (code != Code::kOk && code != Code::kStopped) return controllers_answered(code);
   const bool late = run_.time_is_over(time_.cycle);
@@ -291,6 +331,13 @@ void RobotCycle::start_controllers() noexcept TANDEM_RT {
 }
 
 void RobotCycle::limit() noexcept TANDEM_RT {
+  const auto asked = std::as_const(command_).position_rad();
+  for (std::size_t j = 0; j < written_.size(); ++j) {
+    const bool tells =
+        written_[j] != 0 && std::isfinite(asked[j]) && !follows_position(command_.mode()[j]);
+    written_[j] = tells ? 1 : 0;
+    written_rad_[j] = asked[j];
+  }
   const Code limited = limits_.apply(state_, command_);
   const auto codes = limits_.codes();
   for (std::size_t j = 0; limited != Code::kOk && j < codes.size(); ++j) {
@@ -330,11 +377,12 @@ void RobotCycle::write() noexcept TANDEM_RT {
 
 /// To the log, the threads that watch the run, and those that wait for an answer.
 void RobotCycle::hand_over() noexcept TANDEM_RT {
+  const hal::CommandImage& command = told();
   if (run_.in(RunPhase::kRunning)) {
-    statistics_.take(state_, command_, truth_, limits_.counters(), estimate());
+    statistics_.take(state_, command, truth_, limits_.counters(), estimate());
   }
   if (!ends(run_.phase())) statistics_.take_base(truth_);
-  log_.images(time_, state_, command_, truth_, estimate());
+  log_.images(time_, state_, command, truth_, estimate());
   progress_.dropped.store(log_.dropped(), std::memory_order_relaxed);
   progress_.phase.store(run_.phase(), std::memory_order_relaxed);
   progress_.cycles.store(loop_.statistics().cycles, std::memory_order_relaxed);
@@ -355,7 +403,7 @@ void RobotCycle::show() noexcept TANDEM_RT {
                    .phase = run_.phase(),
                    .read_code = read_code_,
                    .state = state_,
-                   .command = command_,
+                   .command = told(),
                    .truth = truth_,
                    .estimate = estimate(),
                    .times = {.begin_ns = begin_ns_,

@@ -129,6 +129,9 @@ class RobotCycle {
   [[nodiscard]] bool go_on_from_robot() noexcept TANDEM_RT;
   [[nodiscard]] hal::CommandImage& controlled() noexcept TANDEM_RT;
   void stamp(hal::CommandImage& command) const noexcept TANDEM_RT;
+  void offer_measured(hal::CommandImage& command) noexcept TANDEM_RT;
+  void note_written(const hal::CommandImage& command) noexcept TANDEM_RT;
+  [[nodiscard]] const hal::CommandImage& told() noexcept TANDEM_RT;
   void show() noexcept TANDEM_RT;
   void show_joints() noexcept TANDEM_RT;
   void show_sensors() noexcept TANDEM_RT;
@@ -208,6 +211,10 @@ class RobotCycle {
   hal::StateImage state_;
   hal::CommandImage command_;
   hal::CommandImage wanted_;  // by the controllers, when what they want is delayed
+  hal::CommandImage told_;    // to log and statistics, when that is not command_
+  // In this cycle, position references of joints outside position control.
+  std::vector<std::uint8_t> written_;
+  std::vector<double> written_rad_;
   CommandDelay delay_;
   hal::CommandLimits limits_;
 

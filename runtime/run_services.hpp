@@ -185,6 +185,9 @@ class RunServices {
   [[nodiscard]] Result<RequestResult> set_gains(const std::string& joint, hal::PidLoop loop,
                                                 const GainsRequest& wish,
                                                 Patience patience = kPatience);
+  /// Whether set_gains() would take them now; the same errors.
+  [[nodiscard]] Status check_gains(const std::string& joint, hal::PidLoop loop,
+                                   const GainsRequest& wish);
 
   /// The loop's: shows the joints, the sensors, and the gains that are in force. @rt wait-free.
   void show(std::span<const JointStatus> joints) noexcept TANDEM_RT { looks_.write(joints); }
@@ -210,6 +213,8 @@ class RunServices {
   [[nodiscard]] Status check_switch(ControllerSet stop, ControllerSet start) const;
   [[nodiscard]] ControllerSet planned() const;
   [[nodiscard]] Result<std::size_t> joint_of(const std::string& name) const;
+  [[nodiscard]] Result<std::size_t> gains_fit(const std::string& joint, hal::PidLoop loop,
+                                              const GainsRequest& wish);
   [[nodiscard]] Result<std::size_t> joint_to_change(const std::string& name);
   [[nodiscard]] Status check_mode(std::size_t joint, const JointRequest& wish,
                                   const JointStatus& now) const;

@@ -243,11 +243,10 @@ Result<RequestResult> RunServices::move_joint(const std::string& joint, const Mo
       patience);
 }
 
-Result<RequestResult> RunServices::set_gains(const std::string& joint, hal::PidLoop loop,
-                                             const GainsRequest& wish, Patience patience) {
-  Lock lock(mutex_);
+Result<std::size_t> RunServices::gains_fit(const std::string& joint, hal::PidLoop loop,
+                                           const GainsRequest& wish) {
   const Result<std::size_t> index = joint_to_change(joint);
-  if (!index) return std::unexpected(index.error());
+  if (!index) return index;
   if (!host_->capabilities()[*index].can(needed_by(loop))) {
     return fail_at(joint, std::string("this joint has no ") + hal::to_string(loop) + " loop",
                    "give [gains." + robot_->joints[*index].gains + "] one");
@@ -259,6 +258,21 @@ Result<RequestResult> RunServices::set_gains(const std::string& joint, hal::PidL
     const Status in_range = check_range(joint, what, value.value_or(0.0), limit);
     if (!in_range) return std::unexpected(in_range.error());
   }
+  return index;
+}
+
+Status RunServices::check_gains(const std::string& joint, hal::PidLoop loop,
+                                const GainsRequest& wish) {
+  const Lock lock(mutex_);
+  const Result<std::size_t> fits = gains_fit(joint, loop, wish);
+  return fits ? Status() : std::unexpected(fits.error());
+}
+
+Result<RequestResult> RunServices::set_gains(const std::string& joint, hal::PidLoop loop,
+                                             const GainsRequest& wish, Patience patience) {
+  Lock lock(mutex_);
+  const Result<std::size_t> index = gains_fit(joint, loop, wish);
+  if (!index) return std::unexpected(index.error());
   constexpr double kStays = std::numeric_limits<double>::quiet_NaN();
   return ask(
       lock,

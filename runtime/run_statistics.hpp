@@ -17,7 +17,8 @@
 
 namespace tandem::runtime {
 
-/// Reference minus measured position of one joint, over the cycles in position control.
+/// Reference minus measured position of one joint, over the cycles in which it had one: those in
+/// position control, and those in which a controller wrote one in another mode.
 struct TrackingError {
   double rms_rad = 0.0;
   double max_rad = 0.0;  ///< of the absolute value

@@ -40,12 +40,20 @@ Exit show(const FaultOptions& options) {
   return Exit::kDone;
 }
 
-/// "RKneeSag: position sensor (error code 0x7300); …": what is latched.
+/// "RKneeSag: position sensor (error code 0x7300); …": what is latched; of each joint the last,
+/// which is what is there now.
 std::string causes_of(const Json& answer) {
+  const Json faults = answer.value("faults", Json::array());
   std::string causes;
-  for (const Json& fault : answer.value("faults", Json::array())) {
+  for (auto fault_at = faults.begin(); fault_at != faults.end(); ++fault_at) {
+    const Json& fault = *fault_at;
     if (!fault.value("latched", false)) continue;
     const std::string joint = fault.value("joint", "");
+    const bool superseded =
+        !joint.empty() && std::any_of(fault_at + 1, faults.end(), [&](const Json& later) {
+          return later.value("latched", false) && later.value("joint", "") == joint;
+        });
+    if (superseded) continue;
     causes += (causes.empty() ? "" : "; ") + (joint.empty() ? "" : joint + ": ") +
               fault.value("cause", "?");
   }

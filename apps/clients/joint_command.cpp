@@ -117,6 +117,7 @@ Result<Json> question_of(const JointOptions& o) {
   if (o.kp) question["kp"] = *o.kp;
   if (o.ki) question["ki"] = *o.ki;
   if (o.kd) question["kd"] = *o.kd;
+  if (o.anyway) question["anyway"] = true;
   for (const auto& [key, flag, text, per] :
        {std::tuple{"target_rad", "--to", &o.to, ""},
         {"speed_rad_s", "--speed", &o.speed, "/s"},

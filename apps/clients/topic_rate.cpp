@@ -74,7 +74,7 @@ Json TopicRate::json() const {
   json["min_s"] = f.min_s;
   json["max_s"] = f.max_s;
   json["deviation_s"] = f.deviation_s;
-  json["interval_ns"] = percentiles_json(all_.percentiles());
+  json["interval_ns"] = percentiles_json(all_);
   json["lost"] = missing ? Json(*missing) : Json(nullptr);
   return json;
 }

@@ -99,6 +99,7 @@ struct JointOptions {
   } action = Action::kList;
   std::vector<std::string> joints{};          ///< list: only these; empty: all
   bool gains = false;                         ///< list: the gains instead of what is measured
+  bool anyway = false;                        ///< gains: also unstable ones
   bool drives = false;                        ///< list: motors and drives instead of joints
   std::string joint{};                        ///< all but list
   std::string to{}, speed{}, acceleration{};  ///< move: with or without a unit; empty: default

@@ -161,6 +161,7 @@ void add_flags(CLI::App& app, JointOptions& o) {
   gains->add_option("--kp", o.kp, "Units as in [gains], docs/configuration.md")->check(is_finite());
   gains->add_option("--ki", o.ki)->check(is_finite());
   gains->add_option("--kd", o.kd)->check(is_finite());
+  gains->add_flag("--anyway", o.anyway, "Also when the model finds the loop unstable");
 }
 
 void add_flags(CLI::App& app, SensorOptions& o) {

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numbers>
+#include <utility>
 
 #include "apps/control/controller_control.hpp"
 #include "base/nearest.hpp"
@@ -24,6 +26,7 @@ constexpr std::array kModes{ControlMode::kIdle,   ControlMode::kPosition, Contro
 constexpr std::array kInteractions{InteractionMode::kStiff, InteractionMode::kCompliant};
 constexpr std::array kLoops{hal::PidLoop::kPosition, hal::PidLoop::kVelocity, hal::PidLoop::kTorque,
                             hal::PidLoop::kCurrent};
+constexpr double kLowMargin_deg = 30.0;
 const ControlKey kJoint{.name = "joint", .required = true, .doc = "its name"};
 
 using Type = ControlKey::Type;
@@ -34,6 +37,10 @@ struct Run {
   const hal::RobotConfig& robot;
   std::vector<hal::JointCapabilities> limits;
   std::vector<hal::MotorFeedback> motors;
+  JudgeGains judge = {};
+  /// What joint.gains asked for and the loop has not taken yet, by joint and loop: while a run is
+  /// paused. What comes next is judged with it.
+  std::map<std::pair<std::size_t, hal::PidLoop>, hal::PidGains> waiting = {};
 
   /// Null: there is no such joint, which the run itself refuses.
   [[nodiscard]] const hal::JointCapabilities* limits_of(const std::string& joint) const {
@@ -85,15 +92,15 @@ Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t ind
           {"moving", look.moving != 0},
           {"position_rad", look.position_rad},
           {"velocity_rad_s", look.velocity_rad_s},
-          {"torque_Nm", look.torque_Nm},
+          {"torque_Nm", measured(tells.torque, look.torque_Nm)},
           {"min_position_rad", limit.min_position_rad},
           {"max_position_rad", limit.max_position_rad},
           {"max_velocity_rad_s", limit.max_velocity_rad_s},
           {"max_acceleration_rad_s2", limit.max_acceleration_rad_s2},
           {"max_torque_Nm", limit.max_torque_Nm},
           {"acceleration_rad_s2", look.acceleration_rad_s2},
-          {"motor_position_rad", look.motor_position_rad},
-          {"motor_velocity_rad_s", look.motor_velocity_rad_s},
+          {"motor_position_rad", measured(tells.position, look.motor_position_rad)},
+          {"motor_velocity_rad_s", measured(tells.position, look.motor_velocity_rad_s)},
           {"current_A", measured(tells.current, look.current_A)},
           {"voltage_V", measured(tells.voltage, look.voltage_V)},
           {"temperature_C", measured(tells.temperature, look.temperature_C)},
@@ -226,7 +233,70 @@ Result<Json> reset(const Run& run, const std::string& name) {
   return answer;
 }
 
-Result<Json> set_gains(const Run& run, const Json& request) {
+/// The gains that a joint will have, but for what is asked now.
+std::array<hal::PidGains, hal::kPidLoops> gains_to_come(Run& run, const runtime::JointInfo& joint,
+                                                        std::size_t index) {
+  std::array<hal::PidGains, hal::kPidLoops> gains = joint.gains;
+  for (const hal::PidLoop loop : kLoops) {
+    const auto waits = run.waiting.find({index, loop});
+    if (waits == run.waiting.end()) continue;
+    hal::PidGains& shown = gains[static_cast<std::size_t>(loop)];
+    if (shown == waits->second) {
+      run.waiting.erase(waits);
+    } else {
+      shown = waits->second;
+    }
+  }
+  return gains;
+}
+
+/// What people read of it.
+std::string told(const Json& stability) {
+  if (!stability["judged"].get<bool>()) {
+    return "not judged against the model: " + stability["why"].get<std::string>();
+  }
+  const std::string loop = stability["loop"].get<std::string>() + " loop";
+  if (!stability["stable"].get<bool>()) {
+    return fmt::format("warning: the {} is unstable, it doubles in {:.2g} s", loop,
+                       stability["doubles_in_s"].get<double>());
+  }
+  if (stability["phase_margin_deg"].is_null()) return loop + ": stable, its gain stays below 1";
+  const double margin_deg = stability["phase_margin_deg"];
+  return fmt::format("{}{}: phase margin {:.0f} deg at {:.3g} rad/s",
+                     margin_deg < kLowMargin_deg ? "warning: it may swing; " : "", loop, margin_deg,
+                     stability["crossover_rad_s"].get<double>());
+}
+
+/// What the model says of a wish, once it is complete; unstable gains are refused.
+/// @param[out] wanted  all gains of the joint
+Result<Json> judged(Run& run, const std::string& name, hal::PidLoop loop,
+                    const runtime::GainsRequest& wish, bool anyway, hal::PidGains& wanted) {
+  const Json unknown{{"judged", false}, {"why", "this process has no model of the robot"}};
+  const int index = run.robot.joint_index(name);
+  if (index < 0) return unknown;  // which the run itself refuses
+  const auto j = static_cast<std::size_t>(index);
+  const auto joints = run.cycle.services().joints();
+  auto gains = gains_to_come(run, joints[j], j);
+  hal::PidGains& of = gains[static_cast<std::size_t>(loop)];
+  of = {wish.kp.value_or(of.kp), wish.ki.value_or(of.ki), wish.kd.value_or(of.kd)};
+  wanted = of;
+  if (!run.judge) return unknown;
+  std::vector<double> position_rad;
+  for (const runtime::JointInfo& joint : joints) position_rad.push_back(joint.look.position_rad);
+  Json stability = run.judge(j, loop, gains, position_rad);
+  if (anyway || stability.value("stable", true)) return stability;
+  const std::string remedy = stability.value("remedy", "");
+  return fail_at(
+      name,
+      fmt::format("with kp = {:g}, ki = {:g}, kd = {:g} the {} loop is unstable: with an "
+                  "inertia of {:.3g} {} it doubles in {:.2g} s",
+                  of.kp, of.ki, of.kd, stability["loop"].get<std::string>(),
+                  stability["inertia_kg_m2"].get<double>(), joints[j].slides ? "kg" : "kg m2",
+                  stability["doubles_in_s"].get<double>()),
+      (remedy.empty() ? "" : remedy + "; ") + "--anyway (\"anyway\": true) sets them nevertheless");
+}
+
+Result<Json> set_gains(Run& run, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
   const auto loop = choice(request, "loop", kLoops);
   if (!loop) return std::unexpected(loop.error());
@@ -237,8 +307,22 @@ Result<Json> set_gains(const Run& run, const Json& request) {
   if (!wish.kp && !wish.ki && !wish.kd) {
     return fail("joint.gains: nothing is to be set", "give kp, ki or kd");
   }
+  if (Status fits = run.cycle.services().check_gains(joint, *loop, wish); !fits) {
+    return std::unexpected(fits.error());
+  }
+  hal::PidGains wanted;
+  const auto stability = judged(run, joint, *loop, wish, request.value("anyway", false), wanted);
+  if (!stability) return stability;
   auto answer = tell(run, joint, run.cycle.services().set_gains(joint, *loop, wish));
-  if (answer && answer->value("done", false)) answer->erase("note");  // gains are nobody's
+  if (!answer) return answer;
+  const std::pair key{static_cast<std::size_t>(run.robot.joint_index(joint)), *loop};
+  if (answer->value("done", false)) {
+    run.waiting.erase(key);
+  } else {
+    run.waiting[key] = wanted;
+  }
+  (*answer)["stability"] = *stability;
+  (*answer)["note"] = told(*stability);  // gains are nobody's: not the one of the joint's owner
   return answer;
 }
 
@@ -281,10 +365,10 @@ void add_moves(ControlRegistry& registry, const std::shared_ptr<const Run>& run)
 
 }  // namespace
 
-void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle,
-                        const hal::RobotConfig& robot) {
-  const auto run = std::make_shared<const Run>(
-      Run{cycle, robot, hal::joint_capabilities(robot), hal::motor_feedback(robot)});
+void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle, const hal::RobotConfig& robot,
+                        JudgeGains judge) {
+  const auto run = std::make_shared<Run>(Run{cycle, robot, hal::joint_capabilities(robot),
+                                             hal::motor_feedback(robot), std::move(judge)});
   registry.add("joint.list", ControlEffect::kReads,
                "every joint: who has it, what it does, what is measured", {},
                [run](const Json&) -> Result<Json> { return list(*run); });
@@ -306,7 +390,10 @@ void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle,
                 {.name = "loop", .required = true, .doc = "position, velocity, torque, current"},
                 {.name = "kp", .type = Type::kNumber, .doc = "as in [gains]; it stays if left out"},
                 {.name = "ki", .type = Type::kNumber, .doc = "the same"},
-                {.name = "kd", .type = Type::kNumber, .doc = "the same"}},
+                {.name = "kd", .type = Type::kNumber, .doc = "the same"},
+                {.name = "anyway",
+                 .type = Type::kBoolean,
+                 .doc = "true: also when the model finds the loop unstable"}},
                [run](const Json& request) { return set_gains(*run, request); });
 }
 

@@ -114,7 +114,7 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
 }  // namespace
 
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
-                      const hal::RobotConfig& robot) {
+                      const hal::RobotConfig& robot, JudgeGains judge) {
   registry.stops_by([&cycle] { return cycle.progress().stopped_before.load(); });
   registry.add("status", ControlEffect::kReads, "phase and counts of the run", {},
                [&cycle](const Json&) -> Result<Json> { return status(cycle); });
@@ -141,7 +141,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                  return Json::object();
                });
   add_controller_commands(registry, cycle.services(), robot);
-  add_joint_commands(registry, cycle, robot);
+  add_joint_commands(registry, cycle, robot, std::move(judge));
   add_sensor_commands(registry, cycle.services());
   add_clock_commands(registry, cycle);
 }

@@ -2,14 +2,15 @@
 // Layer: apps/control.  Thread: main; the handlers run on the serving thread.
 #pragma once
 
-#include "apps/control/control_registry.hpp"
+#include "apps/control/joint_control.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
 
 /// Adds "status", "fault.show", "fault.reset", "estop" and "run.stop", and the commands of
 /// controllers, joints, sensors and clock. Cycle and robot outlive the registry.
+/// @param judge  add_joint_commands()'s
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
-                      const hal::RobotConfig& robot);
+                      const hal::RobotConfig& robot, JudgeGains judge = {});
 
 }  // namespace tandem::apps

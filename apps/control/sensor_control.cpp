@@ -5,8 +5,12 @@
 namespace tandem::apps {
 namespace {
 
-/// `count` of a sensor's channels from `first` on.
+/// `count` of a sensor's channels from `first` on; null of one that was never heard, whose age is
+/// more than the run's.
 Json channels(const runtime::SensorInfo& sensor, std::size_t first, std::size_t count) {
+  if (sensor.look.age_cycles > sensor.look.cycle) {
+    return std::vector<Json>(count);  // a client prints them one by one
+  }
   return std::span(sensor.look.values).subspan(first, count);
 }
 

@@ -81,7 +81,7 @@ void tell_faults(remote::Server& server, const runtime::RobotCycle& cycle) {
 
 Json remote_json(const remote::Server* server, const remote::RemoteBackend* client) {
   if (client != nullptr) {
-    return {{"turn_around_ns", percentiles_json(client->turn_around().percentiles())},
+    return {{"turn_around_ns", percentiles_json(client->turn_around())},
             {"missed_cycles", client->missed_cycles()}};
   }
   if (server == nullptr) return nullptr;
@@ -97,8 +97,8 @@ Json remote_json(const remote::Server* server, const remote::RemoteBackend* clie
           {"commands", commands},
           {"playout", playout},
           {"dropped", server->dropped()},
-          {"age_ns", percentiles_json(server->age().percentiles())},
-          {"age_cycles", percentiles_json(server->age_cycles().percentiles())}};
+          {"age_ns", percentiles_json(server->age())},
+          {"age_cycles", percentiles_json(server->age_cycles())}};
 }
 
 void add_remote_facts(const remote::Server* server, const remote::RemoteBackend* client,

@@ -8,6 +8,7 @@
 
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
+#include "apps/robot/gains_judge.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/composition.hpp"
@@ -238,6 +239,7 @@ class Session {
       auto recorder = open_log(c_, asked.empty() ? experiment().log.folder : asked);
       if (!recorder) return std::unexpected(recorder.error());
       recorder_ = std::move(*recorder);
+      plugins_at_start_ = c_.controllers->code().size();
     }
     auto server = open_server(c_, dds_.get(), options_.once, admission_);
     if (!server) return std::unexpected(server.error());
@@ -292,7 +294,12 @@ class Session {
   /// What may be asked of the run, and the ways in: the control socket and the services over DDS.
   Status open_inputs() {
     const runtime::Experiment& e = experiment();
-    add_run_commands(commands_, *cycle_, e.robot);
+    const auto judge = std::make_shared<const GainsJudge>(e.robot, c_.kernels.get());
+    add_run_commands(commands_, *cycle_, e.robot,
+                     [judge](std::size_t joint, hal::PidLoop loop, const GainsJudge::Gains& gains,
+                             const std::vector<double>& position_rad) {
+                       return judge->opinion(joint, loop, gains, position_rad);
+                     });
     add_predict(commands_, c_.predictor.get(), e.robot);
     if (dds_ != nullptr) {
       admission_.add_to(commands_);
@@ -381,7 +388,12 @@ class Session {
     }
     if (services_ != nullptr) summary.dds->services = services_->counts();
     if (recorder_ != nullptr) {
-      summary.log = recorder_->close(result_of(c_.master));
+      log::StringMap result = result_of(c_.master);
+      std::string later;  // plugins that came during the run
+      const std::vector<std::string> code = controller_lines(*c_.controllers);
+      for (std::size_t i = plugins_at_start_; i < code.size(); ++i) later += code[i] + "\n";
+      if (!later.empty()) result.emplace_back("loaded_controllers", later);
+      summary.log = recorder_->close(result);
       log_ = summary.log->path;
       log_is_whole_ = summary.log->error.empty();
     }
@@ -407,6 +419,7 @@ class Session {
   const RunOptions& options_;
   std::FILE* out_;
   const hal::TruthImage* truth_ = nullptr;
+  std::size_t plugins_at_start_ = 0;  // in the log's first record
   std::unique_ptr<DdsRun> dds_;
   std::unique_ptr<log::Recorder> recorder_;
   std::string log_;

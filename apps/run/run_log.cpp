@@ -6,16 +6,40 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
 
+#include "base/sha256.hpp"
 #include "hal/sim/engine_loader.hpp"
 
 namespace tandem::apps {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// The machine, and its wall clock: what is not known stays empty.
+void add_place_and_time(log::RunInfo& info) {
+  std::array<char, 256> text{};
+  if (::gethostname(text.data(), text.size() - 1) == 0) info.host = text.data();
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{}, local{};
+  if (::gmtime_r(&now, &utc) == nullptr || ::localtime_r(&now, &local) == nullptr) return;
+  if (std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc) > 0) {
+    info.started = text.data();
+  }
+  if (std::strftime(text.data(), text.size(), "%z %Z", &local) > 0) info.time_zone = text.data();
+}
+
+std::string sha256_of_file(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return {};
+  const std::string digest = sha256_of(file);
+  ::close(file);
+  return digest;
+}
 
 log::RunInfo info_of(const Composition& c) {
   const runtime::Experiment& e = c.experiment;
@@ -35,6 +59,9 @@ log::RunInfo info_of(const Composition& c) {
   if (c.sim != nullptr) info.engine = sim::engine_text(e.sim.engine);
   info.kernel_variant = c.kernels->variant;
   info.description_hash = c.kernels->description_hash;
+  info.kernel_sha256 = sha256_of_file(c.kernels.path());
+  info.controllers = controller_lines(*c.controllers);
+  add_place_and_time(info);
   std::vector<std::string> files{e.file, e.robot.file, e.robot.model.urdf};
   if (e.parallel) {
     files.push_back(e.parallel->robot.file);
@@ -138,6 +165,14 @@ log::RecorderOptions recorder_options(const Composition& c) {
 }
 
 }  // namespace
+
+std::vector<std::string> controller_lines(const runtime::ControllerHost& host) {
+  std::vector<std::string> lines;
+  for (const runtime::ControllerCode& one : host.code()) {
+    lines.push_back(fmt::format("{} {} {}", one.name, one.sha256, one.path));
+  }
+  return lines;
+}
 
 Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& folder) {
   if (const Status s = check_folder(folder, bytes_needed(c)); !s) return std::unexpected(s.error());

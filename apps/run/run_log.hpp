@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "apps/run/composition.hpp"
 #include "base/result.hpp"
@@ -18,5 +19,8 @@ namespace tandem::apps {
 /// room than the run will write.
 [[nodiscard]] Result<std::unique_ptr<log::Recorder>> open_log(const Composition& composition,
                                                               const std::string& folder);
+
+/// "NAME SHA256 PATH" of every plugin that a host was given.
+[[nodiscard]] std::vector<std::string> controller_lines(const runtime::ControllerHost& host);
 
 }  // namespace tandem::apps

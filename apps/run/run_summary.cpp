@@ -89,7 +89,7 @@ bool has_base_wrench(const hal::EstimateImage& image, const runtime::EstimateFig
 }
 
 /// What was estimated; null without [estimation].
-Json estimate_json(const Composition& c, const runtime::EstimateFigures& figures) {
+Json estimate_json(const Composition& c, const runtime::EstimateFigures& figures, bool ran) {
   if (c.estimator == nullptr) return nullptr;
   const hal::EstimateImage& image = c.estimator->image();
   Json json{{"base", nullptr},
@@ -106,15 +106,19 @@ Json estimate_json(const Composition& c, const runtime::EstimateFigures& figures
       json["base"]["max_height_error_m"] = figures.max_height_error_m;
     }
   }
-  for (std::size_t j = 0; j < image.joints(); ++j) {
+  // Without an estimate of the base nothing was looked for.
+  const bool looked = image.estimates_base() ? figures.base_cycles > 0 : ran;
+  for (std::size_t j = 0; looked && j < image.joints(); ++j) {
     json["external_torque_Nm"][c.experiment.robot.joints[j].name] = figures.max_external_Nm[j];
   }
   if (has_base_wrench(image, figures))
     json["external_base_wrench"] = wrench_json(figures.base_wrench);
   for (std::size_t i = 0; i < figures.wrenches.size(); ++i) {
-    json["wrenches"][c.experiment.estimation.wrenches[i].site] = wrench_json(figures.wrenches[i]);
+    json["wrenches"][c.experiment.estimation.wrenches[i].site] =
+        looked ? wrench_json(figures.wrenches[i]) : Json(nullptr);
   }
-  if (!figures.wrenches.empty()) json["unexplained_torque_Nm"] = figures.unexplained_Nm.value;
+  if (looked && !figures.wrenches.empty())
+    json["unexplained_torque_Nm"] = figures.unexplained_Nm.value;
   return json;
 }
 
@@ -155,7 +159,7 @@ void print_worst_joints(const RunSummary& s, std::FILE* out) {
   std::vector<Row> rows;
   const auto tracking = s.cycle.statistics().tracking();
   for (std::size_t i = 0; i < tracking.size(); ++i) {
-    if (tracking[i].cycles == 0) continue;  // it followed no position
+    if (tracking[i].cycles == 0) continue;  // it had no reference
     const hal::JointConfig& joint = s.composition.experiment.robot.joints[i];
     rows.push_back({joint.name, joint.slides, tracking[i]});
   }
@@ -429,10 +433,10 @@ Json RunSummary::json() const {
   json["realtime_factor"] = times.running_s > 0.0 ? Json(realtime_factor()) : Json(nullptr);
   json["overruns"] = loop.overruns;
   json["skipped"] = loop.skipped;
-  json["wakeup_ns"] = percentiles_json(loop.wakeup.percentiles());
-  json["bus_ns"] = composition.backend->waits_for_bus() ? percentiles_json(loop.bus.percentiles())
-                                                        : Json(nullptr);
-  json["cycle_ns"] = percentiles_json(loop.work.percentiles());
+  json["wakeup_ns"] = percentiles_json(loop.wakeup);
+  json["bus_ns"] =
+      composition.backend->waits_for_bus() ? percentiles_json(loop.bus) : Json(nullptr);
+  json["cycle_ns"] = percentiles_json(loop.work);
   json["log"] = log_json(log);
   json["frames"] = frames_json(frames);
   json["dds"] = dds_json(dds);
@@ -441,15 +445,18 @@ Json RunSummary::json() const {
   const auto tracking = cycle.statistics().tracking();
   const auto limited = cycle.statistics().limited_cycles();
   for (std::size_t i = 0; i < tracking.size(); ++i) {
-    json["joints"][e.robot.joints[i].name] = {{"rms_tracking_error_rad", tracking[i].rms_rad},
-                                              {"max_tracking_error_rad", tracking[i].max_rad},
-                                              {"limited_cycles", limited[i]}};
+    const bool tracked = tracking[i].cycles > 0;
+    json["joints"][e.robot.joints[i].name] = {
+        {"rms_tracking_error_rad", tracked ? Json(tracking[i].rms_rad) : Json()},
+        {"max_tracking_error_rad", tracked ? Json(tracking[i].max_rad) : Json()},
+        {"limited_cycles", limited[i]}};
   }
   json["ground"] = ground_json(cycle.statistics().ground(weight_N(*composition.kernels)));
   json["loops"] = loops_json(e.robot, cycle.statistics().loops());
   json["parallel"] = parallel ? parallel_json(e.parallel->robot, *parallel, *differences) : Json();
   json["base"] = base_json(cycle.statistics().base());
-  json["estimate"] = estimate_json(composition, cycle.statistics().estimate());
+  json["estimate"] =
+      estimate_json(composition, cycle.statistics().estimate(), cycle.running_cycles() > 0);
   const hal::can::DriveMaster* master = composition.master;
   json["round_trips"] = master == nullptr ? Json::array() : round_trips_json(master->round_trips());
   json["start"] = start_json(master);

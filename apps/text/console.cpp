@@ -243,6 +243,11 @@ void write_failure(const std::string& file) {
   (void)write_json(file, {{"ok", false}, {"errors", errors_json(reported)}});
 }
 
+Json percentiles_json(const rt::Histogram& of) {
+  if (of.count() == 0) return nullptr;
+  return percentiles_json(of.percentiles());
+}
+
 Json percentiles_json(const rt::Percentiles& p) {
   return {{"p50", p.p50}, {"p99", p.p99}, {"p999", p.p999}, {"max", p.max}};
 }

@@ -70,6 +70,8 @@ void outlive_files();
 
 /// p50, p99, p999, max; all [ns].
 [[nodiscard]] Json percentiles_json(const rt::Percentiles& p);
+/// The same; null when nothing was measured.
+[[nodiscard]] Json percentiles_json(const rt::Histogram& of);
 
 /// Every error on a line of its own, on standard error.
 void print_errors(const Diagnostics& errors);

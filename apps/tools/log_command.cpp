@@ -29,15 +29,14 @@ Json info_json(const log::LogFile& file) {
   Json json;
   json["path"] = file.path();
   json["complete"] = !file.truncated();
-  std::int64_t start_ns = 0;
-  std::int64_t end_ns = 0;
+  std::optional<std::int64_t> start_ns, end_ns;
   for (const log::Topic& topic : file.topics()) {
     if (topic.messages == 0) continue;
-    start_ns = std::min(start_ns, topic.first_ns);
-    end_ns = std::max(end_ns, topic.last_ns);
+    start_ns = std::min(start_ns.value_or(topic.first_ns), topic.first_ns);
+    end_ns = std::max(end_ns.value_or(topic.last_ns), topic.last_ns);
   }
-  json["start_ns"] = start_ns;
-  json["end_ns"] = end_ns;
+  json["start_ns"] = start_ns ? Json(*start_ns) : Json(nullptr);
+  json["end_ns"] = end_ns ? Json(*end_ns) : Json(nullptr);
   json["messages"] = file.messages();
   json["data_sha256"] = file.data_sha256();
   json["metadata"] = Json::object();
@@ -82,7 +81,14 @@ void print_info(const log::LogFile& file, std::FILE* out) {
   if (info.operators_view) facts.add("state", "what the tele-operator saw: predicted, or late");
   if (!info.engine.empty()) facts.add("engine", info.engine);
   facts.add("kernels", info.kernel_variant);
+  if (!info.kernel_sha256.empty()) facts.add("kernels sha256", info.kernel_sha256);
+  for (const std::string& controller : info.controllers) facts.add("controller", controller);
   facts.add("written by", "tandem " + info.version);
+  if (!info.host.empty()) facts.add("on", info.host);
+  if (!info.started.empty()) {
+    facts.add("started",
+              info.started + (info.time_zone.empty() ? "" : " (time zone " + info.time_zone + ")"));
+  }
   for (const auto& [key, value] : file.result()) {
     if (key != "data_sha256") facts.add(key, value);  // computed anew below
   }

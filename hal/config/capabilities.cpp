@@ -118,13 +118,17 @@ std::vector<MotorFeedback> motor_feedback(const RobotConfig& robot) {
   std::vector<MotorFeedback> out;
   for (const JointConfig& joint : robot.joints) {
     const DriveSheet drive = sheet_of(robot, joint);
-    const auto tells = [&](std::uint16_t index) {
-      return canopen::mappable(drive.sheet, canopen::of_axis(index, drive.axis), 0,
-                               canopen::DataType::kInteger16, canopen::kMapTpdo);
+    const auto tells = [&](std::uint16_t index,
+                           canopen::DataType type = canopen::DataType::kInteger16) {
+      return canopen::mappable(drive.sheet, canopen::of_axis(index, drive.axis), 0, type,
+                               canopen::kMapTpdo);
     };
-    out.push_back({.current = tells(canopen::object::kCurrent),
-                   .voltage = tells(canopen::object::kVoltage),
-                   .temperature = tells(canopen::object::kTemperature)});
+    out.push_back(
+        {.position = tells(canopen::object::kMotorPosition, canopen::DataType::kInteger32),
+         .torque = tells(canopen::object::kTorque),
+         .current = tells(canopen::object::kCurrent),
+         .voltage = tells(canopen::object::kVoltage),
+         .temperature = tells(canopen::object::kTemperature)});
   }
   return out;
 }

@@ -22,8 +22,10 @@ namespace tandem::hal {
 /// Of every joint, in the image's order.
 [[nodiscard]] std::vector<JointCapabilities> joint_capabilities(const RobotConfig& robot);
 
-/// What a joint's drive tells of its motor besides position, velocity and torque.
+/// What a joint's drive tells besides the joint's position; its velocity then follows from that.
 struct MotorFeedback {
+  bool position = true;  ///< the motor's own
+  bool torque = true;
   bool current = true;
   bool voltage = true;
   bool temperature = true;

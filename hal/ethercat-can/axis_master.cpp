@@ -55,9 +55,10 @@ bool AxisMaster::check(std::int64_t now_ns) noexcept TANDEM_RT {
   const WireState state = drive();
   const bool faulted = state == WireState::kFault || state == WireState::kFaultReactionActive;
   if (error_ != AxisError::kNone) {
-    // The error code may come later than the statusword: it travels in the slow PDO.
-    const bool vague = fault_code_ == static_cast<std::uint16_t>(ErrorCode::kGeneric);
-    if (error_ == AxisError::kDriveFault && faulted && vague && feedback_.error_code != 0) {
+    // The error code may come later than the statusword, for it travels in the slow PDO. It may be
+    // another one than at first: what is there now is what a reset has to do with.
+    if (error_ != AxisError::kNodeLost && faulted && feedback_.error_code != 0) {
+      error_ = AxisError::kDriveFault;
       fault_code_ = feedback_.error_code;
     }
     return false;

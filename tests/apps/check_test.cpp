@@ -389,7 +389,7 @@ TEST_F(Check, WarnsOfACollisionShapeThatStartsInsideTheGround) {
 
 /// What is said is what then happens: at 40 ms the joints follow, at 100 ms they do not.
 TEST_F(Check, WarnsOfGainsThatAreTooHighForTheControlPeriod) {
-  const std::string says = "joint1.gains: with these gains and a control period of 100 ms the ";
+  const std::string says = ".gains: with these gains and a control period of 100 ms the ";
   EXPECT_EQ(tandem("check robot.toml").err.find("will probably oscillate"), std::string::npos);
   const std::string robot = read_text(folder_ / "robot.toml");
   const std::string trajectory = read_text(folder_ / "trajectory.toml");

@@ -38,7 +38,7 @@ struct Answered : ::testing::Test {
         runtime::CycleConfig{.after_stop = runtime::AfterStop::kWait});
     steps(100);
     ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
-    add_run_commands(registry, *cycle, robot);
+    add_run_commands(registry, *cycle, robot, judge);
   }
   void steps(int count) {
     for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
@@ -83,6 +83,7 @@ struct Answered : ::testing::Test {
   runtime::ControllerHost host{robot, nullptr, 1'000'000};
   rt::WallClock clock;
   std::unique_ptr<runtime::RobotCycle> cycle;
+  JudgeGains judge;
   ControlRegistry registry;
   std::string out, err;  // of the last command
 };
@@ -415,6 +416,49 @@ TEST_F(JointAnswers, ShowOneJointWithItsDrive) {
   options.joint = "elbwo";
   EXPECT_EQ(command(joint_command, options), Exit::kUsage);
   has(err, "the robot has no joint 'elbwo' (did you mean 'elbow'?)");
+}
+
+/// Whether the loop takes them at once or, of a paused run, later: what is asked next is judged
+/// with what was asked before.
+TEST_F(JointAnswers, RefuseGainsThatTheModelFindsUnstable) {
+  judge = [](std::size_t joint, hal::PidLoop loop, const auto& gains, const auto& position_rad) {
+    EXPECT_EQ(joint, 1U);
+    EXPECT_EQ(position_rad.size(), 3U);
+    const hal::PidGains& of = gains[static_cast<std::size_t>(loop)];
+    const bool stable = of.ki < of.kp;
+    return Json{{"judged", true},         {"stable", stable},
+                {"loop", "position"},     {"phase_margin_deg", 20.0},
+                {"crossover_rad_s", 7.0}, {"inertia_kg_m2", 1.0},
+                {"doubles_in_s", 0.5},    {"remedy", "ki = 1 gives it one"}};
+  };
+  begin();
+  const std::string ask = R"({"do": "joint.gains", "joint": "elbow", "loop": "position", )";
+  const Json taken = answer(ask + R"("kp": 20.0, "ki": 10.0})");
+  EXPECT_EQ(taken["ok"], true) << taken;
+  EXPECT_EQ(taken["stability"]["phase_margin_deg"], 20.0);
+  has(taken["note"], "warning: it may swing; position loop: phase margin 20 deg at 7 rad/s");
+  const std::string no = refused(ask + R"("ki": 30.0})");
+  has(no, "elbow: with kp = 20, ki = 30, kd = ");
+  has(no, "ki = 1 gives it one; --anyway");
+  EXPECT_EQ(joint(1)["gains"]["position"]["ki"], 10.0);
+  has(refused(ask + R"("kp": -1})"), "kp -1 is beyond the joint's limit");
+
+  const Json waits = registry.answer(ask + R"("kp": 40.0})");  // no cycle takes it
+  EXPECT_EQ(waits["done"], false) << waits;
+  EXPECT_EQ(registry.answer(ask + R"("ki": 30.0})")["ok"], true) << "40, not 20";
+  const Json insisted = answer(ask + R"("ki": 60.0, "anyway": true})");
+  EXPECT_EQ(insisted["ok"], true) << insisted;
+  has(insisted["note"], "warning: the position loop is unstable, it doubles in 0.5 s");
+  EXPECT_EQ(joint(1)["gains"]["position"]["kp"], 40.0);
+  EXPECT_EQ(joint(1)["gains"]["position"]["ki"], 60.0);
+}
+
+TEST_F(JointAnswers, SayThatGainsWithoutAModelAreNotJudged) {
+  begin();
+  const Json taken =
+      answer(R"({"do": "joint.gains", "joint": "elbow", "loop": "position", "kp": 20.0})");
+  EXPECT_EQ(taken["stability"]["judged"], false) << taken;
+  has(taken["note"], "not judged against the model: ");
 }
 
 TEST_F(JointAnswers, ResetOneDrive) {

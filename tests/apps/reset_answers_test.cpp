@@ -160,5 +160,23 @@ TEST_F(AnsweredRun, SaysThatACauseIsStillThereOfAJointWhoseFaultsOnlyWarn) {
   EXPECT_NE(err.find("error: a cause is still there (elbow: "), std::string::npos) << err;
 }
 
+/// The reset named what had been found first, and what stood in its way nowhere.
+TEST_F(AnsweredRun, NamesTheCauseThatIsThereNow) {
+  backend.latch_on_fault = true;
+  backend.faulted_joint = 1;
+  backend.fault_code = 0x8612;
+  backend.reset_clears = false;
+  steps(2);
+  ASSERT_EQ(cycle->phase(), RunPhase::kFaulted);
+  backend.fault_code = 0x7320;
+  steps(20);
+  const Json shown = registry.answer(R"({"do": "fault.show"})");
+  ASSERT_EQ(shown["faults"].size(), 2U) << shown;
+  EXPECT_EQ(reset(1), Exit::kFault);
+  EXPECT_NE(err.find("7320"), std::string::npos) << err;
+  EXPECT_EQ(err.find("8612"), std::string::npos) << err;
+  EXPECT_EQ(registry.answer(R"({"do": "fault.show"})")["faults"].size(), 2U) << "told once";
+}
+
 }  // namespace
 }  // namespace tandem::apps

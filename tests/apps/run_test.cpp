@@ -1,5 +1,9 @@
 // `tandem run` on the smallest robot: results, logs, and the same bytes at every rate.
+#include <unistd.h>
+
+#include <cstdlib>
 #include <map>
+#include <regex>
 
 #include "tests/apps/program.hpp"
 
@@ -44,8 +48,8 @@ TEST_F(Run, WritesTheDocumentedKeys) {
   EXPECT_DOUBLE_EQ(json["sim_seconds"], 0.5);
   for (const std::string key : {"p50", "p99", "p999", "max"}) {
     EXPECT_TRUE(json["cycle_ns"].contains(key)) << key;
-    EXPECT_TRUE(json["wakeup_ns"].contains(key)) << key;
   }
+  EXPECT_TRUE(json["wakeup_ns"].is_null()) << "it waits for nothing";
   EXPECT_EQ(json["log"]["dropped"], 0);
   EXPECT_EQ(json["log"]["data_sha256"].get<std::string>().size(), 64U);
   EXPECT_TRUE(std::filesystem::exists(folder_ / json["log"]["path"].get<std::string>()));
@@ -53,6 +57,60 @@ TEST_F(Run, WritesTheDocumentedKeys) {
   EXPECT_TRUE(json["joints"]["joint1"].contains("max_tracking_error_rad"));
   EXPECT_TRUE(json["ground"].is_null());
   EXPECT_TRUE(json["faults"].empty());
+}
+
+TEST_F(Run, SaysNullOfWhatItDoesNotKnow) {
+  write_text(folder_ / "hold.toml",
+             read_text(folder_ / "hold.toml") + "\n[sim]\nground_truth = false\n");
+  const auto json = run("hold.toml --duration 0.2 --no-log");
+  for (const std::string key : {"wakeup_ns", "bus_ns", "log", "frames", "dds", "ground", "parallel",
+                                "base", "estimate", "remote", "teleoperation"}) {
+    ASSERT_TRUE(json.contains(key)) << key;
+    EXPECT_TRUE(json[key].is_null()) << key << ": " << json[key];
+  }
+}
+
+/// The error was 0 in torque mode, and whoever checked it was content.
+TEST_F(Run, TellsNoTrackingErrorWhereNoPositionIsWanted) {
+  edit("hold.toml", "plugin = \"hold\"",
+       "plugin = \"gravity_compensation\"\nparameters = { mode = \"torque\" }");
+  const auto json = run("hold.toml --duration 0.2");
+  for (const std::string joint : {"joint1", "joint2"}) {
+    EXPECT_TRUE(json["joints"][joint]["rms_tracking_error_rad"].is_null()) << json["joints"];
+    EXPECT_TRUE(json["joints"][joint]["max_tracking_error_rad"].is_null());
+    EXPECT_EQ(json["joints"][joint]["limited_cycles"], 0);
+  }
+}
+
+/// Which machine, when, and which code: not part of what makes two runs the same.
+TEST_F(Run, LogsItsHostItsTimeAndTheDigestsOfItsCode) {
+  const std::string first = run("hold.toml --duration 0.1")["log"]["path"];
+  const std::string second = run("hold.toml --duration 0.1")["log"]["path"];
+  const Outcome info = tandem("log info " + first + " --json info.json");
+  ASSERT_EQ(info.status, 0) << info.err;
+  const auto said = json("info.json")["metadata"];
+  char host[256] = {};
+  ASSERT_EQ(::gethostname(host, sizeof host - 1), 0);
+  EXPECT_EQ(said["host"], host);
+  const std::string started = said["started"];
+  EXPECT_TRUE(std::regex_match(started, std::regex("20\\d\\d-\\d\\d-\\d\\dT\\d\\d:\\d\\d:\\d\\dZ")))
+      << started;
+  EXPECT_TRUE(
+      std::regex_match(said["time_zone"].get<std::string>(), std::regex("[+-]\\d\\d\\d\\d .+")));
+  const std::string line = said["controllers"];  // "hold SHA256 PATH\n"
+  const std::string digest = line.substr(5, 64), path = line.substr(70, line.size() - 71);
+  EXPECT_EQ(line.substr(0, 5), "hold ");
+  const auto by_coreutils = [this](const std::string& file) {
+    const std::string command =
+        "sha256sum < '" + file + "' > '" + (folder_ / "digest.txt").string() + "'";
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    return read_text(folder_ / "digest.txt").substr(0, 64);
+  };
+  EXPECT_EQ(digest, by_coreutils(path));
+  EXPECT_EQ(said["kernel_sha256"].get<std::string>().size(), 64U);
+  EXPECT_NE(info.out.find(digest), std::string::npos) << info.out;
+  EXPECT_NE(info.out.find(started), std::string::npos) << info.out;
+  EXPECT_EQ(tandem("log diff " + first + " " + second).status, 0);
 }
 
 TEST_F(Run, FollowsATrajectoryOverClassicCan) {

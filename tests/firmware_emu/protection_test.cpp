@@ -211,6 +211,38 @@ TEST_F(Guard, StopsWhenEncodersAndSpringContradictEachOther) {
   EXPECT_TRUE(reset(r));
 }
 
+/// The link's encoder jumps far: its limits are left at once, and the contradiction is found later.
+TEST_F(Guard, NamesWhatIsStillThereBehindTheFaultThatItFoundFirst) {
+  BoardSetup setup = board_setup();
+  setup.axes[0].mismatch_window_rad = 0.02;
+  setup.axes[0].mismatch_timeout_s = 0.01;
+  setup.axes[0].undervoltage_V = 24.0;
+  start(setup);
+  Rig& r = *rig_owner;
+  r.enable();
+  r.cycles(50);
+  r.seen.clear();
+  r.tamper = [](std::vector<AxisSense>& sense) { sense[0].link_position_rad += 2.5; };
+  ASSERT_LT(until_fault(r, 4), 4);
+  EXPECT_EQ(r.error(), 0x8612);
+  r.cycles(400);  // until it rests
+  EXPECT_EQ(r.error(), 0x7320);
+  EXPECT_FALSE(reset(r));
+  EXPECT_EQ(r.error(), 0x7320);
+  std::vector<int> told;  // by emergencies, low byte first
+  for (const canopen::Frame& frame : r.frames_of(0x085)) {
+    told.push_back(frame.data[0] | frame.data[1] << 8);
+  }
+  EXPECT_EQ(told, (std::vector<int>{0x8612, 0x7320}));
+  r.tamper = nullptr;
+  r.joints[0].bus_V = 10.0;
+  EXPECT_FALSE(reset(r));
+  EXPECT_EQ(r.error(), 0x3100) << "the encoder is well again, and the supply is not";
+  r.joints[0].bus_V = 40.0;
+  EXPECT_TRUE(reset(r));
+  EXPECT_EQ(r.error(), 0);
+}
+
 TEST_F(Guard, StopsOnASensorThatGivesNoNumber) {
   rig.start();
   rig.enable();

@@ -164,6 +164,63 @@ TEST(RobotCycle, MeasuresHowWellEachJointFollows) {
   EXPECT_EQ(tracking[1].max_rad, 0.0);
 }
 
+/// Claims a joint for torque control, and leaves its position reference alone.
+class Silent : public Controller {
+ public:
+  explicit Silent(std::size_t joint) : joint_(joint) {}
+  Status configure(ControllerSetup& setup) override {
+    setup.claim(joint_, hal::ControlMode::kTorque);
+    return {};
+  }
+  void start(const hal::CycleTime&, const hal::StateImage&, hal::CommandImage&) noexcept override {}
+  Code update(const hal::CycleTime&, const hal::StateImage&,
+              hal::CommandImage& command) noexcept override {
+    command.torque_Nm()[joint_] = 0.5;
+    return Code::kOk;
+  }
+  void archive(Archive&) override {}
+
+ private:
+  std::size_t joint_;
+};
+
+/// It was lost: the tracking error of a controller with a loop of its own was 0.
+TEST(RobotCycle, KeepsThePositionThatAControllerWantsInTorqueMode) {
+  for (const std::uint32_t delay : {0U, 3U}) {
+    const hal::RobotConfig robot = hal::test::fake_robot();
+    FirstOrderRobot backend(robot);
+    ControllerHost host(robot, nullptr, 1'000'000);
+    rt::WallClock clock;
+    auto sine = std::make_unique<Sine>(std::vector<std::size_t>{0}, hal::ControlMode::kTorque);
+    ASSERT_TRUE(host.add("sine", std::move(sine), test::parameters()));
+    ASSERT_TRUE(host.add("silent", std::make_unique<Silent>(1), test::parameters()));
+    struct Seen final : hal::CycleObserver {
+      void take(const hal::CycleView& view) noexcept override {
+        if (view.phase != RunPhase::kRunning) return;
+        shown_rad = std::max(shown_rad, view.command.position_rad()[0] - 0.1);
+        silent = silent && view.command.position_rad()[1] == view.state.position_rad()[1];
+      }
+      double shown_rad = 0.0;
+      bool silent = true;
+    } seen;
+    RobotCycle cycle(CycleParts{.robot = robot,
+                                .backend = backend,
+                                .controllers = host,
+                                .clock = clock,
+                                .observer = &seen},
+                     {.running_cycles = kRunning, .delay_cycles = delay});
+    while (cycle.phase() != RunPhase::kRunning) ASSERT_TRUE(cycle.step());
+    for (int i = 0; i < 250; ++i) ASSERT_TRUE(cycle.step());
+    EXPECT_EQ(cycle.command().position_rad()[0], cycle.state().position_rad()[0]) << "is sent";
+    cycle.run();
+    const auto tracking = cycle.statistics().tracking();
+    EXPECT_NEAR(tracking[0].max_rad, 0.2, 1e-3) << "it does not move, and the sine does";
+    EXPECT_NEAR(seen.shown_rad, 0.2, 1e-3);
+    EXPECT_EQ(tracking[1].cycles, delay) << "until then it is held by position";
+    EXPECT_TRUE(seen.silent);
+  }
+}
+
 TEST(RobotCycle, StopsInOrderOnRequest) {
   TestRun run;
   run.steps(100);
