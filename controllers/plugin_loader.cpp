@@ -1,4 +1,4 @@
-// Search path, trusted-code check, dlopen, ABI (interface version and headers), compiler, in that
+// Search path, trusted code, ABI (interface version and headers), compiler, in that
 // order: no code of a library runs before its owner and mode were checked.
 #include "controllers/plugin_loader.hpp"
 
@@ -145,26 +145,22 @@ Result<LoadedController> load_controller(const std::string& name,
   const Result<std::string> file = find(name, folders);
   if (!file) return std::unexpected(file.error());
 
-  if (const Status mine = check_trusted_code(*file); !mine) {
-    return refuse(name, *file, mine.error().message, mine.error().hint);
-  }
-  if (const Status whole = check_whole(*file); !whole) {
+  const Result<TrustedCode> code = TrustedCode::open(*file);
+  if (!code) return refuse(name, *file, code.error().message, code.error().hint);
+  if (const Status whole = code->check_whole(); !whole) {
     return refuse(name, *file, "cannot be loaded: it " + whole.error().message, whole.error().hint);
   }
   LoadedController loaded;
   loaded.path_ = *file;
-  const Status opened = hosted_call(name, [&] { return loaded.open(name); });
+  const Status opened = hosted_call(name, [&] { return loaded.open(*code, name); });
   if (!opened) return std::unexpected(opened.error());
   return loaded;
 }
 
-Status LoadedController::open(const std::string& name) {
-  library_.reset(dlopen(path_.c_str(), RTLD_NOW | RTLD_LOCAL));
-  if (!library_) {
-    std::string why = dlerror();
-    if (why.starts_with(path_ + ": ")) why.erase(0, path_.size() + 2);  // is said of the error
-    return refuse(name, path_, "cannot be loaded: " + why, "build it again, and link what it uses");
-  }
+Status LoadedController::open(const TrustedCode& code, const std::string& name) {
+  const Result<void*> library = code.load(RTLD_NOW | RTLD_LOCAL);
+  if (!library) return refuse(name, path_, library.error().message, library.error().hint);
+  library_.reset(*library);
   using Entry = const ControllerPlugin* (*)();
   const auto entry = reinterpret_cast<Entry>(dlsym(library_.get(), kEntry));
   if (entry == nullptr) {

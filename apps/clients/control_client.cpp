@@ -16,26 +16,13 @@
 #include "apps/control/control_registry.hpp"
 #include "apps/text/json_reader.hpp"
 #include "apps/transport/control_path.hpp"
+#include "base/open_file.hpp"
 
 namespace tandem::apps {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 /// 0, or the errno of what went wrong.
 int connect_to(const Descriptor& descriptor, const sockaddr_un& address,
