@@ -12,6 +12,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "base/open_file.hpp"
+
 extern char** environ;  // NOLINT: POSIX
 
 namespace tandem {
@@ -33,6 +35,11 @@ Result<pid_t> spawn(const Spawn& what) {
   }
   arguments.push_back(nullptr);
 
+  const Result<Descriptor> output = open_output(what.output, 0644);
+  if (!output) {
+    return fail(what.command.front() + " could not be started: " + what.output + ": " +
+                output.error().message);
+  }
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   if (what.input < 0) {
@@ -40,8 +47,7 @@ Result<pid_t> spawn(const Spawn& what) {
   } else {
     posix_spawn_file_actions_adddup2(&actions, what.input, 0);
   }
-  posix_spawn_file_actions_addopen(&actions, 1, what.output.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
-                                   0644);
+  posix_spawn_file_actions_adddup2(&actions, output->get(), 1);
   posix_spawn_file_actions_adddup2(&actions, 1, 2);
   posix_spawn_file_actions_addchdir_np(&actions, what.directory.c_str());
   posix_spawnattr_t attributes;

@@ -8,12 +8,12 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 
 #include "base/bounds.hpp"
 #include "base/file_name.hpp"
 #include "base/nearest.hpp"
+#include "base/open_file.hpp"
 #include "base/quoting.hpp"
 
 namespace tandem {
@@ -512,25 +512,12 @@ Result<TomlDocument> TomlDocument::load(const std::string& file) {
   if (file.empty()) {
     return std::unexpected(Error{"the file's name is empty", "name a .toml file", {}, 0, {}});
   }
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
-    return std::unexpected(Error{"this is a folder", "name a .toml file", file, 0, {}});
-  }
-  if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored)) {
-    return std::unexpected(Error{"this is no regular file", "name a .toml file", file, 0, {}});
-  }
-  std::ifstream in(file, std::ios::binary);
-  if (!in) {
-    return std::unexpected(
-        Error{"cannot read this file", "check the path and its permissions", file, 0, {}});
-  }
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (in.bad()) return std::unexpected(Error{"reading failed", "check the disk", file, 0, {}});
-  if (text.view().find_first_not_of(" \t\r\n") == std::string_view::npos) {
+  const Result<std::string> text = read_file(file, "name a .toml file", kMostTomlBytes);
+  if (!text) return std::unexpected(text.error());
+  if (text->find_first_not_of(" \t\r\n") == std::string::npos) {
     return std::unexpected(Error{"the file is empty", "name another, or write it", file, 0, {}});
   }
-  return parse(text.str(), file);
+  return parse(*text, file);
 }
 
 Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::string& file) {

@@ -5,11 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <set>
 #include <utility>
 
+#include "base/open_file.hpp"
 #include "canopen/ini_text.hpp"
 #include "canopen/objects.hpp"
 #include "canopen/sheet_mappings.hpp"
@@ -288,29 +287,10 @@ Result<DataSheet> read_data_sheet(std::string_view text, std::string_view file) 
 }
 
 Result<DataSheet> load_data_sheet(const std::string& file) {
-  const auto wrong = [&](std::string message, std::string hint) {
-    return std::unexpected(Error{std::move(message), std::move(hint), file, 0, {}});
-  };
-  constexpr const char* kHint = "name the EDS or DCF of a device";
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) return wrong("this is a folder", kHint);
-  if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored)) {
-    return wrong("this is no regular file", kHint);
-  }
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return wrong("cannot read this file", "check the path and its permissions");
-  const std::uintmax_t size = std::filesystem::file_size(file, ignored);
-  if (ignored || size > kMaxSheetBytes) {
-    return wrong("has " + std::to_string(size) + " bytes, and a data sheet may have " +
-                     std::to_string(kMaxSheetBytes),
-                 kHint);
-  }
-  std::string text(static_cast<std::size_t>(size), '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (in.bad() || in.gcount() != static_cast<std::streamsize>(text.size())) {
-    return wrong("reading failed", "check the disk");
-  }
-  return read_data_sheet(text, file);
+  const Result<std::string> text =
+      read_file(file, "name the EDS or DCF of a device", kMaxSheetBytes);
+  if (!text) return std::unexpected(text.error());
+  return read_data_sheet(*text, file);
 }
 
 }  // namespace tandem::canopen

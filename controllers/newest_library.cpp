@@ -1,4 +1,4 @@
-// A former build stays mapped under its name; the new one gets another name for the same file.
+// A former build may stay mapped; the new one is loaded beside it, and shares no variable with it.
 #include "controllers/newest_library.hpp"
 
 #include <dlfcn.h>
@@ -6,8 +6,6 @@
 #include <sys/stat.h>
 
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <mutex>
 #include <tuple>
@@ -18,18 +16,10 @@ namespace {
 
 using Identity = std::tuple<dev_t, ino_t, time_t, long, off_t>;
 
-Identity identity_of(const std::string& path) {
-  struct stat file {};
-  ::stat(path.c_str(), &file);
-  return {file.st_dev, file.st_ino, file.st_mtim.tv_sec, file.st_mtim.tv_nsec, file.st_size};
-}
-
-/// The path with so many "./" before the file's name.
-std::string spelled(const std::string& path, int times) {
-  const std::size_t at = path.rfind('/') + 1;
-  std::string dots;
-  for (int i = 0; i < times; ++i) dots += "./";
-  return path.substr(0, at) + dots + path.substr(at);
+Identity identity_of(const Descriptor& file) {
+  struct stat found {};
+  ::fstat(file.get(), &found);
+  return {found.st_dev, found.st_ino, found.st_mtim.tv_sec, found.st_mtim.tv_nsec, found.st_size};
 }
 
 /// `count` items of a file; none when it does not hold them.
@@ -43,9 +33,9 @@ std::vector<Item> items(const std::string& bytes, std::size_t offset, std::size_
 
 /// A variable of the library's own that is one for the whole process. Those of the C++ library,
 /// such as std::ranges::iter_move, hold nothing. Empty: there is none.
-std::string unique_variable(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+std::string unique_variable(const TrustedCode& code) {
+  const std::string bytes =
+      read_all(code.file(), code.real_path(), kMostOtherBytes).value_or(std::string());
   const auto header = items<Elf64_Ehdr>(bytes, 0, 1);
   if (header.empty()) return {};
   const auto sections = items<Elf64_Shdr>(bytes, header[0].e_shoff, header[0].e_shnum);
@@ -65,46 +55,35 @@ std::string unique_variable(const std::string& path) {
   return {};
 }
 
-struct Opened {
-  Identity file;  ///< when it was opened last
-  int times = 0;  ///< its spelling
-};
-
 }  // namespace
 
-Result<void*> open_newest(const std::string& path) {
+Result<void*> load_newest(const TrustedCode& code) {
   static std::mutex mutex;
-  static std::map<std::string, Opened> opened;
+  static std::map<std::string, Identity> loaded;  // when it was loaded last, by its real path
   const std::lock_guard lock(mutex);
-  const Identity now = identity_of(path);
-  const auto [known, first] = opened.try_emplace(path, Opened{now});
+  const Identity now = identity_of(code.file());
+  const auto [known, first] = loaded.try_emplace(code.real_path(), now);
   void* former = nullptr;
-  if (!first && known->second.file != now)
-    former = dlopen(spelled(path, known->second.times).c_str(), RTLD_NOW | RTLD_NOLOAD);
+  if (!first && known->second != now)
+    former = dlopen(code.real_path().c_str(), RTLD_NOW | RTLD_NOLOAD);
   if (former != nullptr) {
     dlclose(former);
-    if (const std::string name = unique_variable(path); !name.empty()) {
+    if (const std::string name = unique_variable(code); !name.empty()) {
       return fail(
           "was built anew, but its former code stays in this process, and the new one would "
           "use its variable " +
               name,
           "end the run; build it by tandem_add_controller(), or with -fno-gnu-unique");
     }
-    ++known->second.times;
   }
-  void* library = dlopen(spelled(path, known->second.times).c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (library == nullptr) {
-    std::string why = dlerror();
-    const std::string file = spelled(path, known->second.times) + ": ";
-    if (why.starts_with(file)) why.erase(0, file.size());  // is said of the error
-    return fail("cannot be loaded: " + why, "build it again, and link what it uses");
-  }
-  if (library == former) {
-    dlclose(library);
+  Result<void*> library = code.load(RTLD_NOW | RTLD_LOCAL);
+  if (!library) return library;
+  if (*library == former) {
+    dlclose(*library);
     return fail("was overwritten in place while its former code is in this process",
                 "end the run; copy a library beside it and rename that, as linkers do");
   }
-  known->second.file = now;
+  known->second = now;
   return library;
 }
 

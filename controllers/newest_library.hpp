@@ -1,10 +1,9 @@
-// Opens a shared library as it is on the disk now, whatever of it the process had opened before.
+// Loads a shared library as it is on the disk now, whatever of it the process had opened before.
 // Layer: controllers.  Thread: any, non-RT.
 #pragma once
 
-#include <string>
-
 #include "base/result.hpp"
+#include "base/trusted_code.hpp"
 
 namespace tandem {
 
@@ -13,8 +12,8 @@ namespace tandem {
 /// ever where it has symbols that are one for the whole process (STB_GNU_UNIQUE). Such a library is
 /// opened beside the former one here.
 ///
-/// Errors: the system cannot load it; it was overwritten in place while its former code is mapped;
+/// Errors: TrustedCode::load()'s; it was overwritten in place while its former code is mapped;
 /// a variable of its own is unique, so that the new code would have the former one's.
-[[nodiscard]] Result<void*> open_newest(const std::string& path);
+[[nodiscard]] Result<void*> load_newest(const TrustedCode& code);
 
 }  // namespace tandem

@@ -1,10 +1,8 @@
-// Search path, trusted-code check, dlopen, ABI (interface version and headers), compiler, in that
+// Search path, trusted code, ABI (interface version and headers), compiler, in that
 // order: no code of a library runs before its owner and mode were checked.
 #include "controllers/plugin_loader.hpp"
 
 #include <dlfcn.h>
-#include <fcntl.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -150,27 +148,23 @@ Result<LoadedController> load_controller(const std::string& name,
   const Result<std::string> file = find(name, folders);
   if (!file) return std::unexpected(file.error());
 
-  if (const Status mine = check_trusted_code(*file); !mine) {
-    return refuse(name, *file, mine.error().message, mine.error().hint);
-  }
-  if (const Status whole = check_whole(*file); !whole) {
+  const Result<TrustedCode> code = TrustedCode::open(*file);
+  if (!code) return refuse(name, *file, code.error().message, code.error().hint);
+  if (const Status whole = code->check_whole(); !whole) {
     return refuse(name, *file, "cannot be loaded: it " + whole.error().message, whole.error().hint);
   }
   LoadedController loaded;
   loaded.path_ = *file;
-  if (const int opened_file = ::open(file->c_str(), O_RDONLY | O_CLOEXEC); opened_file >= 0) {
-    loaded.sha256_ = sha256_of(opened_file);
-    ::close(opened_file);
-  }
-  const Status opened = hosted_call(name, [&] { return loaded.open(name); });
+  const Status opened = hosted_call(name, [&] { return loaded.open(*code, name); });
   if (!opened) return std::unexpected(opened.error());
   return loaded;
 }
 
-Status LoadedController::open(const std::string& name) {
-  const Result<void*> opened = open_newest(path_);
-  if (!opened) return refuse(name, path_, opened.error().message, opened.error().hint);
-  library_.reset(*opened);
+Status LoadedController::open(const TrustedCode& code, const std::string& name) {
+  sha256_ = sha256_of(code.file().get());
+  const Result<void*> library = load_newest(code);
+  if (!library) return refuse(name, path_, library.error().message, library.error().hint);
+  library_.reset(*library);
   using Entry = const ControllerPlugin* (*)();
   const auto entry = reinterpret_cast<Entry>(dlsym(library_.get(), kEntry));
   if (entry == nullptr) {

@@ -11,6 +11,8 @@
 
 namespace tandem {
 
+class TrustedCode;
+
 /// A controller together with the library that its code lives in.
 class LoadedController {
  public:
@@ -24,7 +26,7 @@ class LoadedController {
  private:
   friend Result<LoadedController> load_controller(const std::string&,
                                                   const std::vector<std::string>&);
-  [[nodiscard]] Status open(const std::string& name);
+  [[nodiscard]] Status open(const TrustedCode& code, const std::string& name);
   struct Close {
     void operator()(void* library) const noexcept;
   };
@@ -48,7 +50,7 @@ class LoadedController {
 /// holds a '/'. The library is not opened before its file exists.
 ///
 /// Errors: there is no such file (with the folders searched and the nearest name); others may
-/// change it (check_trusted_code()), found out before it is opened; open_newest()'s; it
+/// change it (TrustedCode), found out before it is opened; load_newest()'s; it
 /// lacks tandem_controller_plugin(), or that leaves something null, or its create() makes no
 /// controller; it was built for another plugin ABI, or by another compiler;
 /// it throws. A library that calls exit() ends the process with status 2. `key` of the error is

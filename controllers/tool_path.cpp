@@ -4,9 +4,10 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
+#include <sstream>
 #include <string_view>
 
+#include "base/open_file.hpp"
 #include "controllers/controller.hpp"
 #include "controllers/model_map.hpp"
 #include "controllers/parameters.hpp"
@@ -16,6 +17,7 @@ namespace tandem {
 namespace {
 
 constexpr std::size_t kMostPlaces = 1'000'000;
+constexpr std::uint64_t kMostPathBytes = std::uint64_t{128} << 20;
 constexpr double kLargest_m = 100.0;  // of a coordinate
 constexpr double kLongest_s = 3600.0;
 constexpr double kNearest_s = 1e-4;  // between two places: a cycle passes few of them
@@ -57,8 +59,9 @@ bool read_row(const std::string& line, Place& place) {
 /// numbers; times that do not start at 0, do not grow by 0.1 ms, or are beyond an hour; a
 /// coordinate beyond 100 m; one place or more than a million.
 Result<std::vector<Place>> read_path(const std::string& file) {
-  std::ifstream in(file);
-  if (!in) return wrong_line(file, 0, "cannot be read", "is `path` right?");
+  const Result<std::string> text = read_file(file, "is `path` right?", kMostPathBytes);
+  if (!text) return std::unexpected(text.error());
+  std::istringstream in(*text);
   const std::string wanted(kHeader);
   std::string line;
   const auto next = [&] {

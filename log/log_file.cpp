@@ -47,10 +47,13 @@ constexpr char kCutHint[] = "its run was killed, or the copy is not whole: copy 
 }  // namespace
 
 Result<LogFile> LogFile::open(const std::string& path) {
-  auto reader = McapReader::open(path);
-  if (!reader) return std::unexpected(reader.error());
+  Result<Descriptor> file = open_to_read(path, "name a log of `tandem run`");
+  if (!file) return std::unexpected(file.error());
   LogFile log;
   log.path_ = path;
+  log.file_ = std::make_shared<const Descriptor>(std::move(*file));
+  auto reader = McapReader::open(log.file_, path);
+  if (!reader) return std::unexpected(reader.error());
   std::map<std::uint16_t, Topic> by_channel;
   DataHash hash;
   for (;;) {
@@ -119,7 +122,7 @@ Status LogFile::for_each(
     const std::function<void(std::int64_t, std::span<const std::byte>)>& visit) const {
   const auto topic = require(name);
   if (!topic) return std::unexpected(topic.error());
-  auto reader = McapReader::open(path_);
+  auto reader = McapReader::open(file_, path_);
   if (!reader) return std::unexpected(reader.error());
   for (;;) {
     auto message = reader->next();

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "base/open_file.hpp"
 #include "base/result.hpp"
 #include "hal/image.hpp"
 #include "log/event.hpp"
@@ -74,6 +76,7 @@ class LogFile {
 
  private:
   std::string path_;
+  std::shared_ptr<const Descriptor> file_;  // read again and again: always the same
   RunInfo info_;
   StringMap result_;
   std::vector<Topic> topics_;

@@ -3,9 +3,11 @@
 #include "log/mcap_reader.hpp"
 
 #include <libdeflate.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cstring>
-#include <filesystem>
 
 #include "base/bounds.hpp"
 #include "log/compression.hpp"
@@ -13,6 +15,7 @@
 namespace tandem::log {
 namespace {
 
+constexpr const char* kNameALog = "name a log of `tandem run`";
 constexpr std::uint64_t kSmallLog = std::uint64_t{256} << 20;  // that any file may unpack to
 
 /// Whether a record holds what is kept; others, such as attachments, are passed over unread.
@@ -71,22 +74,37 @@ std::unexpected<Error> McapReader::damaged(std::string what) const {
 }
 
 Result<McapReader> McapReader::open(const std::string& path) {
+  Result<Descriptor> file = open_to_read(path, kNameALog);
+  if (!file) return std::unexpected(file.error());
+  return open(std::make_shared<const Descriptor>(std::move(*file)), path);
+}
+
+Result<McapReader> McapReader::open(std::shared_ptr<const Descriptor> file,
+                                    const std::string& path) {
   McapReader reader;
   reader.path_ = path;
-  std::error_code error;
-  reader.bytes_ = reader.left_ = std::filesystem::file_size(path, error);
-  reader.file_ = std::make_unique<std::ifstream>(path, std::ios::binary);
-  if (error || !*reader.file_) {
-    return std::unexpected(
-        file_error(path, "cannot read this log", "check the path and its permissions"));
-  }
+  reader.file_ = std::move(file);
+  struct stat found {};
+  if (::fstat(reader.file_->get(), &found) != 0) return reader.damaged("reading failed");
+  reader.bytes_ = reader.left_ = static_cast<std::uint64_t>(found.st_size);
   std::array<std::byte, kMagic.size()> magic{};
-  reader.file_->read(reinterpret_cast<char*>(magic.data()), magic.size());
-  if (!*reader.file_ || magic != kMagic) {
-    return std::unexpected(file_error(path, "this is no MCAP file", "name a log of `tandem run`"));
+  if (reader.left_ < magic.size() || !reader.read(magic) || magic != kMagic) {
+    return std::unexpected(file_error(path, "this is no MCAP file", kNameALog));
   }
-  reader.left_ -= magic.size();
   return reader;
+}
+
+/// The next bytes. @pre as many are left
+bool McapReader::read(std::span<std::byte> into) {
+  while (!into.empty()) {
+    const auto at = static_cast<off_t>(bytes_ - left_);
+    const ssize_t size = ::pread(file_->get(), into.data(), into.size(), at);
+    if (size < 0 && errno == EINTR) continue;
+    if (size <= 0) return false;
+    left_ -= static_cast<std::uint64_t>(size);
+    into = into.subspan(static_cast<std::size_t>(size));
+  }
+  return true;
 }
 
 Result<std::optional<MessageView>> McapReader::next() {
@@ -102,8 +120,7 @@ Status McapReader::read_record() {
   std::array<std::byte, kRecordHeaderBytes> head{};
   std::uint64_t length = 0;
   if (left_ >= head.size()) {
-    file_->read(reinterpret_cast<char*>(head.data()), head.size());
-    left_ -= head.size();
+    if (!read(head)) return damaged("reading failed");
     ByteReader in(std::span<const std::byte>(head).subspan(1));
     length = in.number<std::uint64_t>();
   } else {
@@ -115,15 +132,13 @@ Status McapReader::read_record() {
     return {};
   }
   const auto opcode = static_cast<Opcode>(head[0]);
-  left_ -= length;
   if (!is_read(opcode)) {
-    file_->seekg(static_cast<std::streamoff>(length), std::ios::cur);
-    return *file_ ? Status{} : damaged("reading failed");
+    left_ -= length;
+    return {};
   }
   if (length > bounds::kLogRecord.most) return std::unexpected(beyond(bounds::kLogRecord, path_));
   record_.resize(static_cast<std::size_t>(length));
-  file_->read(reinterpret_cast<char*>(record_.data()), static_cast<std::streamsize>(length));
-  if (!*file_) return damaged("reading failed");
+  if (!read(record_)) return damaged("reading failed");
   if (opcode == Opcode::kChunk) return open_chunk(record_);
   if (opcode != Opcode::kMessage) return take(opcode, record_);
   // A file without chunks: next_in_chunk() finds the message as one of its own.

@@ -4,13 +4,13 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 
+#include "base/open_file.hpp"
 #include "base/result.hpp"
 #include "log/bytes.hpp"
 #include "log/mcap_format.hpp"
@@ -38,8 +38,11 @@ struct MessageView {
 
 class McapReader {
  public:
-  /// Errors: no such file, or no MCAP.
+  /// Errors: open_to_read()'s; no MCAP.
   [[nodiscard]] static Result<McapReader> open(const std::string& path);
+  /// The same of a file that is open: several readers may have it. @param path  for errors
+  [[nodiscard]] static Result<McapReader> open(std::shared_ptr<const Descriptor> file,
+                                               const std::string& path);
 
   /// The next message in the file's order, or none at the end of the data. A file that ends in
   /// the middle of a record ends there, with truncated() true. Errors: damaged data.
@@ -65,7 +68,9 @@ class McapReader {
   [[nodiscard]] Status count_text(std::size_t bytes);
 
   std::string path_, profile_;
-  std::unique_ptr<std::ifstream> file_;
+  [[nodiscard]] bool read(std::span<std::byte> into);
+
+  std::shared_ptr<const Descriptor> file_;
   std::uint64_t bytes_ = 0;
   std::uint64_t left_ = 0;      // bytes of the file not read yet
   std::uint64_t unpacked_ = 0;  // bytes of chunks so far

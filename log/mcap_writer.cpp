@@ -2,7 +2,6 @@
 // indices follow on close().
 #include "log/mcap_writer.hpp"
 
-#include <fcntl.h>
 #include <libdeflate.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
@@ -48,7 +47,7 @@ void append_map(Bytes& out, const std::map<std::uint16_t, std::uint64_t>& map) {
   }
 }
 
-Error open_error(const std::string& path, int error) {
+Error open_error(const std::string& path, int error, const std::string& reason) {
   std::string hint;
   switch (error) {
     case ENOENT: hint = "create the folder first"; break;
@@ -58,41 +57,40 @@ Error open_error(const std::string& path, int error) {
     case ENOSPC: hint = "free some space or choose another folder"; break;
     default: hint = "choose another path"; break;
   }
-  return {.message = std::string("cannot write the log: ") + std::strerror(error),
-          .hint = hint,
-          .file = path,
-          .key = {}};
+  return {.message = "cannot write the log: " + reason, .hint = hint, .file = path, .key = {}};
 }
 
 }  // namespace
 
-McapWriter::~McapWriter() {
-  if (file_ >= 0) ::close(file_);
+Status McapWriter::open(const std::string& path, const WriterOptions& options) {
+  Result<Descriptor> file = open_output(path, 0644);
+  if (!file) return std::unexpected(open_error(path, errno, file.error().message));
+  return open(std::move(*file), path, options);
 }
 
-Status McapWriter::open(const std::string& path, const WriterOptions& options) {
+Status McapWriter::open(Descriptor file, const std::string& path, const WriterOptions& options) {
   path_ = path;
   options_ = options;
-  file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file_ < 0) return std::unexpected(open_error(path, errno));
+  file_ = std::move(file);
   struct statvfs disk {};
-  if (::fstatvfs(file_, &disk) == 0 && disk.f_blocks > 0 &&
+  if (::fstatvfs(file_.get(), &disk) == 0 && disk.f_blocks > 0 &&
       disk.f_bavail * disk.f_frsize < kSpaceNeeded) {
-    return std::unexpected(open_error(path, ENOSPC));
+    return std::unexpected(open_error(path, ENOSPC, std::strerror(ENOSPC)));
   }
   chunk_.reserve(options.chunk_bytes + options.chunk_bytes / 4);
+  errno = 0;  // what fails from here on may be no system call
   emit(kMagic);
   Bytes header;
   append(header, "ros2");
   append(header, "tandem");
   emit_record(Opcode::kHeader, header);
-  if (failed()) return std::unexpected(open_error(path, errno));
+  if (failed()) return std::unexpected(open_error(path, errno, error_));
   return {};
 }
 
 void McapWriter::look_at_file() {
   struct stat found {};
-  if (failed() || ::fstat(file_, &found) != 0 || !S_ISREG(found.st_mode)) return;
+  if (failed() || ::fstat(file_.get(), &found) != 0 || !S_ISREG(found.st_mode)) return;
   const auto size = static_cast<std::uint64_t>(found.st_size);
   if (found.st_nlink == 0) {
     fail("its file was deleted during the run", 0);
@@ -119,7 +117,7 @@ void McapWriter::emit(std::span<const std::byte> bytes) {
   crc_ = crc(crc_, bytes);
   look_at_file();
   while (!bytes.empty() && !failed()) {
-    const ssize_t written = ::write(file_, bytes.data(), bytes.size());
+    const ssize_t written = ::write(file_.get(), bytes.data(), bytes.size());
     if (written < 0) {
       if (errno != EINTR) fail(std::strerror(errno), offset_);
       continue;
@@ -343,8 +341,7 @@ Status McapWriter::close() {
   emit_record(Opcode::kDataEnd, end);
   write_summary();
   look_at_file();
-  const int closed = ::close(file_);
-  file_ = -1;
+  const int closed = ::close(file_.release());
   if (closed != 0 && !failed()) fail(std::strerror(errno), offset_);
   if (!failed()) return {};
   return std::unexpected(Error{.message = "the log is incomplete: " + error_,

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/open_file.hpp"
 #include "base/result.hpp"
 #include "log/bytes.hpp"
 #include "log/compression.hpp"
@@ -26,13 +27,14 @@ struct WriterOptions {
 class McapWriter {
  public:
   McapWriter() = default;
-  ~McapWriter();
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
   /// Creates (or overwrites) `path` and writes the header, profile "ros2".
-  /// Errors: no such folder, no permission, a full disk: with what to do.
+  /// Errors: open_output()'s, a full disk: with what to do.
   [[nodiscard]] Status open(const std::string& path, const WriterOptions& options);
+  /// The same to a file that is open. @param path  for errors
+  [[nodiscard]] Status open(Descriptor file, const std::string& path, const WriterOptions& options);
 
   /// Ids count from 1 (schemas) and 0 (channels). Written into the first chunk.
   std::uint16_t add_schema(std::string_view name, std::string_view encoding, std::string_view text);
@@ -86,7 +88,7 @@ class McapWriter {
   [[nodiscard]] Bytes statistics_content() const;
   [[nodiscard]] Bytes chunk_index_content(const Chunk& chunk) const;
 
-  int file_ = -1;
+  Descriptor file_;
   std::string path_, error_;
   WriterOptions options_;
   std::uint64_t offset_ = 0;

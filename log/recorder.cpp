@@ -28,27 +28,43 @@ Recorder::~Recorder() { stop_thread(); }
 
 Result<std::unique_ptr<Recorder>> Recorder::open(const std::string& path, const RunInfo& info,
                                                  const RecorderOptions& options) {
-  std::unique_ptr<Recorder> recorder(new Recorder);
-  recorder->path_ = path;
-  recorder->names_ = {.joints = info.joints, .boards = info.boards, .buses = info.buses};
-  for (const SensorInfo& sensor : info.sensors) recorder->names_.sensors.push_back(sensor.name);
-  recorder->view_ = RobotView(options.viewed, info.joints);
-  recorder->ring_slots_ = options.ring_slots;
-  McapWriter& writer = recorder->writer_;
-  if (Status opened = writer.open(path, options.writer); !opened) {
-    return std::unexpected(opened.error());
-  }
-  writer.add_metadata(kInfoRecord, to_map(info));
-  writer.add_metadata(kConfigurationRecord, info.configuration);
-  if (writer.failed()) {
-    return std::unexpected(Error{.message = "cannot write the log: " + writer.error(),
+  std::unique_ptr<Recorder> recorder(new Recorder(path, info, options));
+  Status opened = recorder->writer_.open(path, options.writer);
+  if (opened) opened = recorder->begin(info);
+  if (!opened) return std::unexpected(opened.error());
+  return recorder;
+}
+
+Result<std::unique_ptr<Recorder>> Recorder::open(Descriptor file, const std::string& path,
+                                                 const RunInfo& info,
+                                                 const RecorderOptions& options) {
+  std::unique_ptr<Recorder> recorder(new Recorder(path, info, options));
+  Status opened = recorder->writer_.open(std::move(file), path, options.writer);
+  if (opened) opened = recorder->begin(info);
+  if (!opened) return std::unexpected(opened.error());
+  return recorder;
+}
+
+Recorder::Recorder(const std::string& path, const RunInfo& info, const RecorderOptions& options)
+    : path_(path),
+      names_{.joints = info.joints, .boards = info.boards, .buses = info.buses},
+      view_(options.viewed, info.joints),
+      ring_slots_(options.ring_slots) {
+  for (const SensorInfo& sensor : info.sensors) names_.sensors.push_back(sensor.name);
+}
+
+Status Recorder::begin(const RunInfo& info) {
+  writer_.add_metadata(kInfoRecord, to_map(info));
+  writer_.add_metadata(kConfigurationRecord, info.configuration);
+  if (writer_.failed()) {
+    return std::unexpected(Error{.message = "cannot write the log: " + writer_.error(),
                                  .hint = "free some space or choose another folder",
-                                 .file = path,
+                                 .file = path_,
                                  .key = {}});
   }
-  const std::uint16_t schema = writer.add_schema("tandem/msg/Event", "ros2msg", event_schema());
-  writer.add_channel(schema, "/tandem/event", "cdr");
-  return recorder;
+  const std::uint16_t schema = writer_.add_schema("tandem/msg/Event", "ros2msg", event_schema());
+  writer_.add_channel(schema, "/tandem/event", "cdr");
+  return {};
 }
 
 Recorder::Channel Recorder::add_channel(const std::string& topic, const std::string& type,

@@ -53,6 +53,11 @@ class Recorder {
   [[nodiscard]] static Result<std::unique_ptr<Recorder>> open(const std::string& path,
                                                               const RunInfo& info,
                                                               const RecorderOptions& options);
+  /// The same in a file that is open. @param path  for errors and the result
+  [[nodiscard]] static Result<std::unique_ptr<Recorder>> open(Descriptor file,
+                                                              const std::string& path,
+                                                              const RunInfo& info,
+                                                              const RecorderOptions& options);
   /// A channel whose messages are images of this layout: topic "/tandem/state", type
   /// "tandem/msg/State". The channel /tandem/event exists always.
   [[nodiscard]] Channel add_channel(const std::string& topic, const std::string& type,
@@ -94,7 +99,8 @@ class Recorder {
 
  private:
   struct Slot;  // the head of a ring slot
-  Recorder() = default;
+  Recorder(const std::string& path, const RunInfo& info, const RecorderOptions& options);
+  [[nodiscard]] Status begin(const RunInfo& info);
   static bool push(SpscRing& ring, Channel channel, std::int64_t time_ns,
                    std::span<const std::byte> image) noexcept TANDEM_RT;
   static void wait_for(const SpscRing& ring, std::size_t messages) noexcept;

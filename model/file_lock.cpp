@@ -21,7 +21,7 @@ bool lock(int descriptor, int how) {
 }  // namespace
 
 Result<FileLock> FileLock::take(const std::string& file, const std::function<void()>& waiting) {
-  FileLock taken(open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
+  FileLock taken(open(file.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644));
   bool held = taken.descriptor_ >= 0 && lock(taken.descriptor_, LOCK_EX | LOCK_NB);
   if (!held && taken.descriptor_ >= 0 && errno == EWOULDBLOCK) {
     if (waiting) waiting();

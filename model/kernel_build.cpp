@@ -3,16 +3,16 @@
 #include "model/kernel_build.hpp"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <mutex>
 #include <thread>
 
+#include "base/open_file.hpp"
 #include "base/process.hpp"
 #include "base/sha256.hpp"
 #include "base/trusted_code.hpp"
@@ -65,17 +65,21 @@ struct Job {
   std::string stamp;  // hash of all that the object depends on
 };
 
-std::string read_file(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
+/// Empty, too, when it cannot be read.
+std::string content_of(const fs::path& path) {
+  return read_file(path.string(), {}, kMostOtherBytes).value_or("");
+}
+
+/// The stamp that an object has when it is up to date: it names the object's bytes, too. After a
+/// crash of the machine an object may be empty, and its stamp whole.
+std::string stamp_of(const Job& job, const fs::path& directory) {
+  return job.stamp + " " + sha256(content_of(directory / job.object));
 }
 
 Status write_if_changed(const fs::path& path, const std::string& text) {
-  if (fs::exists(path) && read_file(path) == text) return {};
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << text;
-  file.close();
-  if (file) return {};
+  if (fs::exists(path) && content_of(path) == text) return {};
+  const Result<Descriptor> file = open_output(path.string());
+  if (file && write_all(*file, text) == 0) return {};
   return fail("cannot write " + path.string(), "check the folder's permissions and free space");
 }
 
@@ -134,7 +138,7 @@ std::vector<Job> make_jobs(const GeneratedKernels& generated,
 
 Error compile_error(const fs::path& directory, const std::string& what) {
   const fs::path log = directory / (what + ".log");
-  std::string text = read_file(log);
+  std::string text = content_of(log);
   if (text.size() > 400) text = text.substr(0, 400) + "…";
   Error error;
   error.message = "compiling the kernels failed at " + what + ": " + text;
@@ -157,8 +161,9 @@ Status compile(const std::vector<Job>& jobs, const fs::path& directory,
   const auto work = [&] {
     for (std::size_t i = next++; i < jobs.size(); i = next++) {
       const Job& job = jobs[i];
-      const bool ok = succeeds(job.command, directory, job.object + ".log");
-      if (ok) std::ofstream(directory / (job.object + ".stamp")) << job.stamp;
+      const bool ok =
+          succeeds(job.command, directory, job.object + ".log") &&
+          write_if_changed(directory / (job.object + ".stamp"), stamp_of(job, directory));
       const std::lock_guard lock(mutex);
       if (!ok) {
         failed = std::min(failed, i);
@@ -197,8 +202,7 @@ Result<int> compile_stale(const GeneratedKernels& generated, const std::vector<J
         return std::unexpected(status.error());
   std::vector<Job> stale;
   for (const Job& job : jobs)
-    if (!fs::exists(directory / job.object) ||
-        read_file(directory / (job.object + ".stamp")) != job.stamp)
+    if (content_of(directory / (job.object + ".stamp")) != stamp_of(job, directory))
       stale.push_back(job);
   if (Status status = compile(stale, directory, options); !status)
     return std::unexpected(status.error());
@@ -224,6 +228,24 @@ Status put_in_place(const fs::path& directory, const fs::path& library, const st
   return write_if_changed(directory / "library.stamp", stamp);
 }
 
+// A library that can be loaded.
+bool is_whole(const std::string& library) {
+  const Result<TrustedCode> code = TrustedCode::open(library);
+  return code && code->check_seal();
+}
+
+// What is made meanwhile, by compilers, too, is for no group to change.
+class OwnFiles {
+ public:
+  OwnFiles() : before_(::umask(0022)) { ::umask(before_ | 0022); }
+  ~OwnFiles() { ::umask(before_); }
+  OwnFiles(const OwnFiles&) = delete;
+  OwnFiles& operator=(const OwnFiles&) = delete;
+
+ private:
+  mode_t before_;
+};
+
 // What was compiled before; the lock stays.
 void forget_objects(const fs::path& directory) {
   std::error_code ignored;  // what cannot be removed is found out by writing it
@@ -241,6 +263,7 @@ std::string library_path(const std::string& directory, const std::string& robot)
 Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
                                   const BuildOptions& options) {
   const auto start = std::chrono::steady_clock::now();
+  const OwnFiles only_ours;
   const Result<GeneratedKernels> generated = generate_kernels(tree, spec);
   if (!generated) return std::unexpected(generated.error());
   const fs::path library = fs::absolute(options.library);
@@ -250,6 +273,9 @@ Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
   if (code)
     return fail("cannot make the folder " + directory.string() + ": " + code.message(),
                 "choose another path for the kernel library");
+  // What is compiled here is linked from here: nobody else may exchange it meanwhile.
+  if (Status ours = check_trusted_folder(directory.string()); !ours)
+    return std::unexpected(ours.error());
   const std::vector<std::string> compiler = compiler_command(options);
   if (!program_exists(compiler.back()))
     return fail("no C++ compiler '" + compiler.back() + "'", "install one: apt install g++");
@@ -262,7 +288,7 @@ Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
   std::string all;
   for (const Job& job : jobs) all += job.stamp;
   const std::string stamp = sha256(all);
-  if (read_file(directory / "library.stamp") == stamp && check_seal(library.string())) {
+  if (content_of(directory / "library.stamp") == stamp && is_whole(library.string())) {
     report.was_up_to_date = true;
     return report;
   }

@@ -1,4 +1,4 @@
-// dlopen() of a trusted, sealed library, then ABI, description hash and the best variant for this
+// Trusted code with its seal, then ABI, description hash and the best variant for this
 // CPU.
 #include "model/kernel_library.hpp"
 
@@ -26,18 +26,18 @@ std::unexpected<Error> refuse(const std::string& path, std::string message, std:
 Result<KernelLibrary> load_kernels(const std::string& path, const std::string& hash,
                                    const std::string& variant) {
   if (!std::filesystem::exists(path)) return refuse(path, "no such kernel library", kBuildHint);
-  const std::string absolute = std::filesystem::absolute(path).string();
-  if (const Status mine = check_trusted_code(absolute); !mine) return std::unexpected(mine.error());
-  if (const Status whole = check_seal(absolute); !whole) {
+  const Result<TrustedCode> code = TrustedCode::open(path);
+  if (!code) return std::unexpected(code.error());
+  if (const Status whole = code->check_seal(); !whole) {
     return refuse(path, whole.error().message, kBuildHint);
   }
   KernelLibrary library;
   library.path_ = path;
-  void* handle = dlopen(absolute.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (handle == nullptr) return refuse(path, std::string("cannot load: ") + dlerror(), kBuildHint);
-  library.handle_ = std::shared_ptr<void>(handle, [](void* h) { dlclose(h); });
+  const Result<void*> handle = code->load(RTLD_NOW | RTLD_LOCAL);
+  if (!handle) return refuse(path, handle.error().message, kBuildHint);
+  library.handle_ = std::shared_ptr<void>(*handle, [](void* h) { dlclose(h); });
   const auto get =
-      reinterpret_cast<decltype(&tandem_kernels_get)>(dlsym(handle, "tandem_kernels_get"));
+      reinterpret_cast<decltype(&tandem_kernels_get)>(dlsym(*handle, "tandem_kernels_get"));
   if (get == nullptr) return refuse(path, "is a library, but has no robot's kernels", kBuildHint);
   const tandem_kernels* best = get(nullptr);
   if (best->abi != TANDEM_KERNELS_ABI)

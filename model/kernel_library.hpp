@@ -36,7 +36,7 @@ class KernelLibrary {
 /// @param hash     what description_hash() says of the robot; empty: not compared.
 /// @param variant  "baseline", "x86-64-v3" or "x86-64-v4"; empty: the best that this CPU runs.
 /// Errors, with what to do next: the file is missing or no kernel library; others may change it
-/// (check_trusted_code()); it was damaged (check_seal()), found out before it is opened; it was
+/// (TrustedCode); it was damaged (check_seal()), found out before it is opened; it was
 /// made for another ABI or from another description; this CPU or library lacks the variant.
 [[nodiscard]] Result<KernelLibrary> load_kernels(const std::string& path,
                                                  const std::string& hash = {},

@@ -8,13 +8,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <mutex>
 #include <span>
-#include <sstream>
 
 #include "base/nearest.hpp"
+#include "base/open_file.hpp"
 #include "model/urdf_inertia.hpp"
 #include "model/urdf_mimic.hpp"
 #include "model/urdf_outline.hpp"
@@ -360,23 +358,12 @@ std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const st
 
 std::expected<UrdfModel, Diagnostics> read_urdf(const std::string& file,
                                                 const UrdfOptions& options) {
-  std::error_code ignored;
   const std::string named = options.overrides_file.empty()
                                 ? ""
                                 : "; it is the urdf of [model] in " + options.overrides_file;
-  if (std::filesystem::is_directory(file, ignored)) {
-    return std::unexpected(one_error("this is a folder", "name a .urdf file" + named, file));
-  }
-  if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored)) {
-    return std::unexpected(one_error("this is no regular file", "name a .urdf file" + named, file));
-  }
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (!in || (text << in.rdbuf(), in.bad())) {
-    return std::unexpected(one_error("cannot read this description",
-                                     "check the path and its permissions" + named, file));
-  }
-  return parse_urdf(text.str(), file, options);
+  const Result<std::string> text = read_file(file, "name a .urdf file", kMostUrdfBytes);
+  if (text) return parse_urdf(*text, file, options);
+  return std::unexpected(one_error(text.error().message, text.error().hint + named, file));
 }
 
 }  // namespace tandem::model

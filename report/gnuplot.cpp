@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <string_view>
 
+#include "base/open_file.hpp"
 #include "base/process.hpp"
 #include "report/layout.hpp"
 
@@ -197,13 +198,16 @@ Status write_all(int pipe, const std::string& text) {
   return {};
 }
 
-/// Runs gnuplot on `script`; what it says goes to the file `complaints`.
-Status run_gnuplot(const std::string& script, const std::string& complaints) {
+/// Runs gnuplot on `script` in `folder`; what it says goes to the file `complaints`.
+Status run_gnuplot(const std::string& script, const Descriptor& folder,
+                   const std::string& complaints) {
   const std::string hint = "install it: apt-get install gnuplot-nox";
   int pipe_ends[2];
   if (pipe2(pipe_ends, O_CLOEXEC) != 0) return fail("no pipe: " + std::string(strerror(errno)));
-  const Result<pid_t> child =
-      spawn({.command = {"gnuplot", "-"}, .output = complaints, .input = pipe_ends[0]});
+  const Result<pid_t> child = spawn({.command = {"gnuplot", "-"},
+                                     .output = complaints,
+                                     .directory = "/proc/self/fd/" + std::to_string(folder.get()),
+                                     .input = pipe_ends[0]});
   close(pipe_ends[0]);
   if (!child) {
     close(pipe_ends[1]);
@@ -220,15 +224,7 @@ Status run_gnuplot(const std::string& script, const std::string& complaints) {
 }
 
 std::string read_text(const std::string& file) {
-  std::string text;
-  if (std::FILE* in = std::fopen(file.c_str(), "rb")) {
-    char buffer[512];
-    for (std::size_t n = 0; (n = std::fread(buffer, 1, sizeof buffer, in)) > 0;) {
-      text.append(buffer, n);
-    }
-    std::fclose(in);
-  }
-  return text;
+  return read_file(file, {}, kMostOtherBytes).value_or("");
 }
 
 /// gnuplot says nothing of a full disk.
@@ -281,9 +277,10 @@ std::string gnuplot_script(std::span<const Figure> figures, const std::string& f
 Status draw(std::span<const Figure> figures, const std::string& folder) {
   if (figures.empty()) return fail("there is nothing to draw");
   const std::string complaints = folder + "/gnuplot.err";
-  // Absolute: gnuplot takes a name that begins with | for a command.
-  const std::string path = std::filesystem::absolute(folder).string();
-  Status drawn = run_gnuplot(gnuplot_script(figures, path), complaints);
+  // In the folder that is open, so that nobody can put another in its place meanwhile.
+  const Result<Descriptor> open = open_folder(folder);
+  if (!open) return std::unexpected(open.error());
+  Status drawn = run_gnuplot(gnuplot_script(figures, "."), *open, complaints);
   if (!drawn && drawn.error().hint.empty()) {
     drawn.error().hint = read_text(complaints);
     drawn.error().file = folder;

@@ -5,9 +5,8 @@
 
 #include <cerrno>
 #include <cstring>
-#include <fstream>
-#include <sstream>
 
+#include "base/open_file.hpp"
 #include "base/quoting.hpp"
 
 namespace tandem::report {
@@ -37,21 +36,11 @@ th { color: var(--soft); font-weight: 600; }
 @media print { body { background: #fff; } .card { break-inside: avoid; } }
 )";
 
-Error file_error(const std::string& message, const std::string& file) {
-  return {.message = message + ": " + std::strerror(errno),
-          .hint = "check the folder's permissions and the disk's free space",
-          .file = file,
-          .key = {}};
-}
-
 /// The SVG element of a file, with identifiers made unique: several stand in one page.
 Result<std::string> inline_svg(const std::string& file, const std::string& name) {
-  errno = 0;
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in) return std::unexpected(file_error("cannot read the drawing", file));
-  std::string svg = text.str();
+  Result<std::string> svg_read = read_file(file, "draw it again", kMostOtherBytes);
+  if (!svg_read) return svg_read;
+  std::string svg = std::move(*svg_read);
   svg.erase(0, svg.find("<svg"));
   for (const char* id :
        {"gnuplot_plot_", "gnuplot_canvas", "gpDot", "gpPt", "greybox", "textbox"}) {
@@ -104,11 +93,15 @@ Status write_page(const Page& page, std::span<const Figure> figures, const std::
   html += "</main>\n</body>\n</html>\n";
 
   const std::string file = folder + "/report.html";
-  errno = 0;
-  std::ofstream out(file, std::ios::binary);
-  out << html << std::flush;
-  if (!out) return std::unexpected(file_error("cannot write the report", file));
-  return {};
+  const Result<Descriptor> out = open_output(file);
+  const std::string why = !out                         ? out.error().message
+                          : write_all(*out, html) != 0 ? std::strerror(errno)
+                                                       : "";
+  if (why.empty()) return {};
+  return std::unexpected(Error{.message = "cannot write the report: " + why,
+                               .hint = "check the folder's permissions and the disk's free space",
+                               .file = file,
+                               .key = {}});
 }
 
 }  // namespace tandem::report

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <system_error>
 
+#include "base/open_file.hpp"
 #include "base/quoting.hpp"
 
 namespace tandem::runtime {
@@ -79,8 +80,8 @@ void write_faults(Events& events, const CycleStamps& stamps, std::span<const Fau
   }
 }
 
-Error write_error(const std::string& file, int problem) {
-  return {.message = std::string("cannot write the trace: ") + std::strerror(problem),
+Error write_error(const std::string& file, const std::string& reason) {
+  return {.message = "cannot write the trace: " + reason,
           .hint = "name a file in a folder that exists, can be written and has room",
           .file = file,
           .key = {}};
@@ -107,8 +108,9 @@ void write_all(std::FILE* out, const std::string& robot, const CycleTrace& trace
 
 Status write_trace(const std::string& file, const std::string& robot, const CycleTrace& trace,
                    std::span<const Fault> faults) {
-  std::FILE* out = std::fopen(file.c_str(), "wb");
-  if (out == nullptr) return std::unexpected(write_error(file, errno));
+  Result<Descriptor> opened = open_output(file);
+  if (!opened) return std::unexpected(write_error(file, opened.error().message));
+  std::FILE* out = ::fdopen(opened->release(), "wb");
   int problem = 0;
   try {
     write_all(out, robot, trace, faults);
@@ -116,7 +118,7 @@ Status write_trace(const std::string& file, const std::string& robot, const Cycl
     problem = full.code().value();
   }
   if (std::fclose(out) != 0 && problem == 0) problem = errno;
-  return problem == 0 ? Status{} : std::unexpected(write_error(file, problem));
+  return problem == 0 ? Status{} : std::unexpected(write_error(file, std::strerror(problem)));
 }
 
 }  // namespace tandem::runtime

@@ -6,11 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <limits>
-#include <sstream>
 
+#include "base/open_file.hpp"
 #include "hal/config/following_error.hpp"
 #include "model/urdf.hpp"
 #include "scaffold/firmness.hpp"
@@ -26,13 +25,6 @@ namespace {
 
 constexpr double kControlPeriod_s = 1e-3;
 constexpr double kMotorCounts = 1638400.0;
-
-std::string text_of(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
 
 /// Errors of a description whose root moves, read as one that is fixed: no fault of the file.
 bool wants_to_float(const Diagnostics& errors) {
@@ -140,7 +132,7 @@ Diagnostics Maker::take(model::UrdfModel found) {
     robot_.remarks.push_back(fmt::format("Limits are guessed: {} (joint {}){}.", note, joint,
                                          more == 0 ? "" : fmt::format(", and of {} more", more)));
   }
-  outfit_ = read_outfit(text_of(request_.urdf));
+  outfit_ = read_outfit(read_file(request_.urdf, {}, kMostUrdfBytes).value_or(""));
   return {};
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <fstream>
 
 #include "apps/robot/robot_files.hpp"
 
@@ -47,10 +48,12 @@ std::string header(const std::vector<std::string>& columns) {
 
 /// The model of the CPU, as Linux names it.
 std::string cpu() {
-  const std::string info = text_of("/proc/cpuinfo"), key = "model name\t: ";
-  const std::size_t at = info.find(key);
-  if (at == std::string::npos) return "unknown";
-  return info.substr(at + key.size(), info.find('\n', at) - at - key.size());
+  constexpr std::string_view kKey = "model name\t: ";
+  std::ifstream in("/proc/cpuinfo");
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with(kKey)) return line.substr(kKey.size());
+  }
+  return "unknown";
 }
 
 // At which error costs are compared.

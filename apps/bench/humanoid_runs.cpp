@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <numbers>
 
@@ -25,12 +26,13 @@ constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 class Scratch {
  public:
-  Scratch() : folder_(fs::temp_directory_path() / fmt::format("tandem-bench-{}", getpid())) {
-    fs::create_directories(folder_);
+  Scratch() {
+    std::string name = fs::temp_directory_path() / "tandem-bench-XXXXXX";
+    if (::mkdtemp(name.data()) != nullptr) folder_ = name;
   }
   ~Scratch() {
     std::error_code ignored;
-    fs::remove_all(folder_, ignored);
+    if (!folder_.empty()) fs::remove_all(folder_, ignored);
   }
   Scratch(const Scratch&) = delete;
   Scratch& operator=(const Scratch&) = delete;

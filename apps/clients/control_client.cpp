@@ -16,6 +16,7 @@
 #include "apps/control/control_registry.hpp"
 #include "apps/text/json_reader.hpp"
 #include "apps/transport/control_path.hpp"
+#include "base/open_file.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -26,20 +27,6 @@ using namespace std::chrono_literals;
 constexpr char kClosed[] = "the process closed the connection";
 /// Whose place others took before it was read stops the robot the next time.
 constexpr int kStopTries = 20;
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 /// 0, or the errno of what went wrong.
 int connect_to(const Descriptor& descriptor, const sockaddr_un& address,

@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
 #include "apps/text/console.hpp"
+#include "base/open_file.hpp"
 #include "base/toml_reader.hpp"
 
 namespace tandem::apps {
@@ -68,11 +67,9 @@ std::size_t end_of_top_level(const std::string& text, const std::string& file) {
 Result<std::string> parameters_of(const ControllerOptions& options) {
   std::string text;
   if (!options.parameters.empty()) {
-    std::ifstream file(options.parameters);
-    std::ostringstream read;
-    read << file.rdbuf();
-    if (!file) return fail("cannot read " + options.parameters, "is it a file?");
-    text = read.str() + '\n';
+    Result<std::string> read = read_file(options.parameters, "name a .toml file", kMostTomlBytes);
+    if (!read) return read;
+    text = std::move(*read) + '\n';
   }
   std::string added;
   for (const std::string& line : options.set) added += line + '\n';

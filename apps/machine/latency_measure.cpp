@@ -6,11 +6,10 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 #include <thread>
 
 #include "apps/machine/child_process.hpp"
+#include "base/open_file.hpp"
 #include "rt/cyclic_loop.hpp"
 #include "rt/stop_signal.hpp"
 
@@ -22,11 +21,8 @@ using std::chrono::milliseconds;
 /// By which cyclictest begins earlier and ends later than our loop, where both run at once.
 constexpr milliseconds kMargin{100};
 
-std::string text_of(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
+std::string written_to(const std::string& file) {
+  return read_file(file, {}, kMostTomlBytes).value_or("");
 }
 
 /// Our loop for one slice, on a thread of its own.
@@ -137,9 +133,9 @@ class Measurement {
     }
     if (*process.poll() != 0) {
       return fail(fmt::format("cyclictest ended with status {}", *process.poll()),
-                  text_of(output_file()).substr(0, 300));
+                  written_to(output_file()).substr(0, 300));
     }
-    const auto result = read_cyclictest(text_of(json_file()));
+    const auto result = read_cyclictest(written_to(json_file()));
     if (!result) return std::unexpected(result.error());
     sample.cyclictest->add(*result);
     sample.cyclictest_cpus.push_back(cpu);

@@ -1,9 +1,7 @@
 #include "apps/robot/robot_files.hpp"
 
-#include <fstream>
-#include <sstream>
-
 #include "apps/robot/loop_facts.hpp"
+#include "base/open_file.hpp"
 #include "hal/sim/setup.hpp"
 #include "model/regular.hpp"
 #include "runtime/experiment.hpp"
@@ -11,10 +9,7 @@
 namespace tandem::apps {
 
 std::string text_of(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
+  return read_file(file, {}, kMostUrdfBytes).value_or("");
 }
 
 namespace {

@@ -1,6 +1,5 @@
 #include "apps/run/run_log.hpp"
 
-#include <fcntl.h>
 #include <fmt/core.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -11,7 +10,9 @@
 #include <cstring>
 #include <ctime>
 #include <filesystem>
+#include <utility>
 
+#include "base/open_file.hpp"
 #include "base/sha256.hpp"
 #include "hal/sim/engine_loader.hpp"
 
@@ -132,18 +133,15 @@ Status check_folder(const std::string& folder, std::uint64_t needed) {
 }
 
 /// The first free name, taken by an empty file: of two runs that begin at once each has its own.
-Result<std::string> claim_path(const std::string& folder, const std::string& name) {
+/// That file stays open, and is the log.
+Result<std::pair<std::string, Descriptor>> claim_file(const std::string& folder,
+                                                      const std::string& name) {
   for (int number = 1;; ++number) {
     std::string path = fmt::format("{}/{}-{:03d}.mcap", folder, name, number);
-    const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-    if (file >= 0) {
-      ::close(file);
-      return path;
-    }
-    if (errno != EEXIST) {
-      return std::unexpected(
-          folder_error(path, std::string("cannot make the log: ") + std::strerror(errno)));
-    }
+    Result<Descriptor> file = open_new(path, 0644);
+    if (file) return std::pair(std::move(path), std::move(*file));
+    if (errno == EEXIST) continue;
+    return std::unexpected(folder_error(path, "cannot make the log: " + file.error().message));
   }
 }
 
@@ -178,9 +176,10 @@ Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std:
   if (const Status s = check_folder(folder, bytes_needed(c)); !s) return std::unexpected(s.error());
   const std::string name =
       c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
-  const Result<std::string> path = claim_path(folder, name);
-  if (!path) return std::unexpected(path.error());
-  return log::Recorder::open(*path, info_of(c), recorder_options(c));
+  auto claimed = claim_file(folder, name);
+  if (!claimed) return std::unexpected(claimed.error());
+  auto& [path, file] = *claimed;
+  return log::Recorder::open(std::move(file), path, info_of(c), recorder_options(c));
 }
 
 }  // namespace tandem::apps

@@ -1,20 +1,22 @@
 #include "apps/text/console.hpp"
 
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 #include <vector>
 
 #include "apps/text/draft.hpp"
+#include "base/open_file.hpp"
 #include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
@@ -49,8 +51,8 @@ std::string harmless(const std::string& text) {
   return shown;
 }
 
-Error json_error(const std::string& file) {
-  return {.message = std::string("cannot write the JSON: ") + std::strerror(errno),
+Error json_error(const std::string& file, const std::string& reason) {
+  return {.message = "cannot write the JSON: " + reason,
           .hint = "name a file in a folder that can be written",
           .file = file,
           .key = {}};
@@ -60,9 +62,11 @@ Error json_error(const std::string& file) {
 bool holds_something_else(const std::string& file) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(file, ignored)) return false;
-  std::ifstream in(file, std::ios::binary);
-  std::string begins(2, ' ');
-  in >> begins[0] >> begins[1];
+  const Result<Descriptor> in = open_to_read(file, {});
+  std::string begins(4096, ' ');  // blanks are no text
+  if (in) (void)!::pread(in->get(), begins.data(), begins.size(), 0);
+  std::erase_if(begins, [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; });
+  begins = (begins + "  ").substr(0, 2);
   if (begins[0] == ' ') return false;  // empty
   return begins[0] != '{' && begins != "[{" && begins != "[]";
 }
@@ -130,17 +134,17 @@ Status flush_output(int before) {
 }
 
 Status write_file(const std::filesystem::path& file, const std::string& text) {
-  errno = 0;
-  std::ofstream out(file, std::ios::binary);
-  const bool opened = out.is_open();
-  out << text;
-  out.close();
-  if (out) return {};
-  const std::string reason = errno == 0 ? "" : std::string(": ") + std::strerror(errno);
-  std::error_code ignored;
-  if (opened && std::filesystem::is_regular_file(file, ignored))
-    std::filesystem::remove(file, ignored);
-  return std::unexpected(Error{"the file cannot be written" + reason,
+  Result<Descriptor> out = open_output(file.string());
+  std::string reason = out ? "" : out.error().message;
+  if (out) {
+    int problem = write_all(*out, text);
+    if (::close(out->release()) != 0 && problem == 0) problem = errno;
+    if (problem == 0) return {};
+    reason = std::strerror(problem);
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(file, ignored)) std::filesystem::remove(file, ignored);
+  }
+  return std::unexpected(Error{"the file cannot be written: " + reason,
                                "name a file in a folder that you may write to, and whose disk has "
                                "space",
                                file.string(),
@@ -169,9 +173,8 @@ Status check_overwrites(const std::string& file, std::string_view begins, const 
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(file, ignored)) return {};
   std::string start(begins.size(), '\0');
-  std::ifstream in(file, std::ios::binary);
-  in.read(start.data(), static_cast<std::streamsize>(start.size()));
-  if (in.gcount() == 0 || start == begins) return {};
+  const Result<Descriptor> in = open_to_read(file, {});
+  if (!in || ::pread(in->get(), start.data(), start.size(), 0) <= 0 || start == begins) return {};
   return std::unexpected(Error{"this file is there, and it is no " + what + ": it would be lost",
                                "name another file, or remove it first",
                                file,
@@ -193,13 +196,16 @@ Status check_writable(const std::string& file) {
   const std::filesystem::path folder = std::filesystem::path(file).parent_path();
   if (!folder.empty() && !std::filesystem::exists(folder, ignored)) {
     const std::error_code problem = try_folders(file);
-    errno = problem.value();
-    return problem ? std::unexpected(json_error(file)) : Status{};
+    return problem ? std::unexpected(json_error(file, std::strerror(problem.value()))) : Status{};
   }
-  errno = 0;
-  const std::ofstream out(file, std::ios::app);  // changes nothing in a file that is there
-  if (!out) return std::unexpected(json_error(file));
-  if (!there) std::filesystem::remove(file, ignored);
+  if (there) {
+    const bool is_folder = std::filesystem::is_directory(file, ignored);
+    if (!is_folder && ::faccessat(AT_FDCWD, file.c_str(), W_OK, AT_EACCESS) == 0) return {};
+    return std::unexpected(json_error(file, std::strerror(is_folder ? EISDIR : errno)));
+  }
+  const Result<Descriptor> out = open_new(file);
+  if (!out) return std::unexpected(json_error(file, out.error().message));
+  std::filesystem::remove(file, ignored);
   return {};
 }
 

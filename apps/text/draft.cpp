@@ -4,6 +4,7 @@
 #include <dirent.h>
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -19,6 +20,8 @@
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "base/open_file.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -158,6 +161,32 @@ fs::path first_missing(fs::path path) {
   return path;
 }
 
+/// What somebody has put there is no draft of ours.
+std::error_code make_new(const fs::path& folder) {
+  return ::mkdir(folder.c_str(), 0777) == 0 ? std::error_code()
+                                            : std::error_code(errno, std::generic_category());
+}
+
+/// From one folder into another, whatever their names lead to by then.
+Status move_file(const fs::path& from, const fs::path& to) {
+  const auto folder_of = [](const fs::path& file) {
+    return open_folder(file.has_parent_path() ? file.parent_path().string() : ".");
+  };
+  const Result<Descriptor> source = folder_of(from), target = folder_of(to);
+  const auto fails = [&](const std::string& why) {
+    return std::unexpected(Error{"the file cannot be written: " + why,
+                                 "check the path, its permissions and the disk's free space",
+                                 to.string(),
+                                 0,
+                                 {}});
+  };
+  if (!source) return fails(source.error().message);
+  if (!target) return fails(target.error().message);
+  const int failed =
+      ::renameat(source->get(), from.filename().c_str(), target->get(), to.filename().c_str());
+  return failed == 0 ? Status() : fails(std::strerror(errno));
+}
+
 }  // namespace
 
 Draft::Draft(std::string final, fs::path root, std::string path, const std::string& interrupted)
@@ -206,6 +235,9 @@ Result<Draft> Draft::folder(const std::string& final, Removes removes,
     if (!path.has_filename()) path = path.parent_path();
   }
   remove_left(root);
+  if (problem = make_new(root); problem) {
+    return problem_of("the folder cannot be made", problem, final);
+  }
   Draft draft(final, root, path.string(), interrupted);
   fs::create_directories(path, problem);
   if (problem) return problem_of("the folder cannot be made", problem, final);
@@ -226,8 +258,9 @@ Draft Draft::file(const std::string& final) {
     const fs::path root = first.string() + suffix();
     const fs::path path = root / whole.lexically_relative(first);
     remove_left(root);
-    Draft in_folder(final, root, path.string());
-    fs::create_directories(path.parent_path(), problem);
+    problem = make_new(root);  // who writes to it finds out
+    Draft in_folder(final, problem ? fs::path() : root, path.string());
+    if (!problem) fs::create_directories(path.parent_path(), problem);
     in_folder.lock();
     return in_folder;
   }
@@ -264,8 +297,7 @@ Status Draft::place(const Before& before) {
   for (const auto& [from, to] : moves) {
     if (to.has_parent_path()) fs::create_directories(to.parent_path(), problem);
     if (Status ready = before ? before(to, from) : Status{}; !ready) return ready;
-    fs::rename(from, to, problem);
-    if (problem) return problem_of("the file cannot be written", problem, to.string());
+    if (Status moved = move_file(from, to); !moved) return moved;
   }
   remove();
   return {};

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <vector>
+
+#include "base/open_file.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -59,8 +59,9 @@ std::unexpected<Error> refuse(const std::string& library, std::string message) {
 
 Result<std::map<std::string, std::uint64_t>> kernel_text_bytes(const std::string& library,
                                                                const std::string& variant) {
-  std::ifstream in(library, std::ios::binary);
-  const Bytes bytes{std::istreambuf_iterator<char>(in), {}};
+  const Result<std::string> bytes_read = read_file(library, "build it again", kMostOtherBytes);
+  if (!bytes_read) return std::unexpected(bytes_read.error());
+  const Bytes bytes(bytes_read->begin(), bytes_read->end());
   Elf64_Ehdr header{};
   if (!read_at(bytes, 0, header) || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0 ||
       header.e_ident[EI_CLASS] != ELFCLASS64) {

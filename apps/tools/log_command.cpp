@@ -1,9 +1,9 @@
 // `tandem log`: what a log holds, its columns as CSV, and how two logs differ.
 #include <fmt/core.h>
+#include <ext/stdio_filebuf.h>
 
 #include <cerrno>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 
 #include "apps/text/console.hpp"
@@ -11,6 +11,7 @@
 #include "apps/tools/commands.hpp"
 #include "apps/tools/log_thresholds.hpp"
 #include "base/counted.hpp"
+#include "base/open_file.hpp"
 #include "base/quoting.hpp"
 #include "log/compare.hpp"
 #include "log/csv.hpp"
@@ -147,16 +148,18 @@ Status write_csv(const log::LogFile& file, const LogOptions& options) {
     return lost;
   }
   Draft draft = Draft::file(options.output);
-  std::ofstream out(draft.path(), std::ios::binary);
-  if (!out) {
-    return std::unexpected(Error{"cannot write this file",
+  Result<Descriptor> opened = open_output(draft.path());
+  if (!opened) {
+    return std::unexpected(Error{"cannot write this file: " + opened.error().message,
                                  "name a file in a folder that can be written",
                                  options.output,
                                  0,
                                  {}});
   }
+  __gnu_cxx::stdio_filebuf<char> buffer(opened->release(), std::ios::out | std::ios::binary);
+  std::ostream out(&buffer);
   Status written = log::write_csv(file, topic, options.every, out, options.fields);
-  out.close();
+  if (buffer.close() == nullptr) out.setstate(std::ios::failbit);
   if (written && !out) written = fail("writing the CSV failed", "check the space on the disk");
   if (written) return draft.place();
   if (!out) written.error().file = options.output;

@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "base/clock_ns.hpp"
+#include "base/open_file.hpp"
 #include "hal/ethercat-can/frame_time.hpp"
 
 namespace tandem::hal::can {
@@ -45,16 +46,16 @@ std::string candump_line(std::int64_t time_ns, const std::string& bus, const Fra
 Result<std::unique_ptr<FrameRecord>> FrameRecord::open(const std::string& path,
                                                        std::size_t ring_frames) {
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  std::error_code ignored;  // fopen() says it
+  std::error_code ignored;  // open_output() says it
   if (!folder.empty()) std::filesystem::create_directories(folder, ignored);
-  std::FILE* file = std::fopen(path.c_str(), "w");
-  if (file == nullptr) {
-    return std::unexpected(
-        Error{.message = fmt::format("cannot record frames: {}", std::strerror(errno)),
-              .hint = "choose a file in a folder that can be written",
-              .file = path,
-              .key = {}});
+  tandem::Result<Descriptor> opened = open_output(path);
+  if (!opened) {
+    return std::unexpected(Error{.message = "cannot record frames: " + opened.error().message,
+                                 .hint = "choose a file in a folder that can be written",
+                                 .file = path,
+                                 .key = {}});
   }
+  std::FILE* file = ::fdopen(opened->release(), "w");
   return std::unique_ptr<FrameRecord>(new FrameRecord(path, file, ring_frames));
 }
 

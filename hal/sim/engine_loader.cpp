@@ -1,4 +1,4 @@
-// Search beside the program, trusted-code check, dlopen, version; then the engine's model from the
+// Search beside the program, trusted code, version; then the engine's model from the
 // robot's description and its soles.
 #include "hal/sim/engine_loader.hpp"
 
@@ -41,18 +41,15 @@ std::string library_of(const std::string& name) {
 }
 
 Result<const EnginePlugin*> open(const std::string& name, const std::string& file) {
-  if (const Status mine = check_trusted_code(file); !mine) {
-    return refuse(mine.error().message, mine.error().hint, name);
-  }
-  if (const Status whole = check_whole(file); !whole) {
+  const Result<TrustedCode> code = TrustedCode::open(file);
+  if (!code) return refuse(code.error().message, code.error().hint, name);
+  if (const Status whole = code->check_whole(); !whole) {
     return refuse("cannot be loaded: it " + whole.error().message, whole.error().hint, name);
   }
-  void* library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
-  if (library == nullptr) {
-    return refuse("cannot be loaded: " + std::string(dlerror()), "build it again", name);
-  }
+  const Result<void*> library = code->load(RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
+  if (!library) return refuse(library.error().message, library.error().hint, name);
   using Entry = const EnginePlugin* (*)();
-  const auto entry = reinterpret_cast<Entry>(dlsym(library, "tandem_engine_plugin"));
+  const auto entry = reinterpret_cast<Entry>(dlsym(*library, "tandem_engine_plugin"));
   const EnginePlugin* plugin = entry == nullptr ? nullptr : entry();
   if (plugin == nullptr || plugin->interface != kEngineInterface ||
       std::strcmp(plugin->compiler, __VERSION__) != 0) {

@@ -51,17 +51,17 @@ std::int64_t header_ns(const dds::Value& message) {
 
 class BagSource {
  public:
-  BagSource(std::span<const std::string> paths, const ImportMap& map, const hal::RobotConfig& robot)
-      : paths_(paths),
+  BagSource(std::span<const ImportFile> files, const ImportMap& map, const hal::RobotConfig& robot)
+      : files_(files),
         map_(map),
         robot_(robot),
         joints_(robot.joints.size()),
         sensors_(map.sensors.size()) {}
 
   Result<Recording> read() {
-    for (const std::string& path : paths_) {
-      path_ = path;
-      if (Status done = read_file(); !done) return std::unexpected(done.error());
+    for (const ImportFile& file : files_) {
+      path_ = file.path;
+      if (Status done = read_one(file); !done) return std::unexpected(done.error());
     }
     if (Status done = check_topics(); !done) return std::unexpected(done.error());
     if (Status done = check_stamps(); !done) return std::unexpected(done.error());
@@ -89,8 +89,8 @@ class BagSource {
     return std::unexpected(Error{std::move(message), std::move(hint), path_, 0, std::move(key)});
   }
 
-  Status read_file() {
-    auto reader = McapReader::open(path_);
+  Status read_one(const ImportFile& file) {
+    auto reader = McapReader::open(file.file, path_);
     if (!reader) return std::unexpected(reader.error());
     for (;;) {
       auto message = reader->next();
@@ -369,7 +369,7 @@ class BagSource {
     return {};
   }
 
-  std::span<const std::string> paths_;
+  std::span<const ImportFile> files_;
   const ImportMap& map_;
   const hal::RobotConfig& robot_;
   std::string path_;  // being read
@@ -384,9 +384,9 @@ class BagSource {
 
 }  // namespace
 
-Result<Recording> read_bag_recording(std::span<const std::string> paths, const ImportMap& map,
+Result<Recording> read_bag_recording(std::span<const ImportFile> files, const ImportMap& map,
                                      const hal::RobotConfig& robot) {
-  return BagSource(paths, map, robot).read();
+  return BagSource(files, map, robot).read();
 }
 
 }  // namespace tandem::log

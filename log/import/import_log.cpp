@@ -1,11 +1,13 @@
 #include "log/import/import_log.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
-#include <filesystem>
-#include <fstream>
+#include <memory>
 #include <utility>
 
+#include "base/open_file.hpp"
 #include "base/sha256.hpp"
 #include "log/import/sources.hpp"
 #include "log/mcap_format.hpp"
@@ -16,24 +18,18 @@ namespace {
 
 constexpr std::size_t kMagicBytes = 8;
 
-/// A file's bytes into `hash` and, when it is there, `text`: a bag need not fit into memory.
-Status read_bytes(const std::string& path, Sha256& hash, std::string* text) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) {
-    return std::unexpected(
-        Error{"is a folder", "name the .mcap files in it, in their order", path, 0, {}});
+/// A file's bytes into `hash`, in pieces: a bag need not fit into memory.
+Status hash_bytes(const ImportFile& file, Sha256& hash) {
+  std::vector<std::byte> block(std::size_t{1} << 20);
+  for (off_t at = 0;;) {
+    const ssize_t size = ::pread(file.file->get(), block.data(), block.size(), at);
+    if (size < 0) {
+      return std::unexpected(Error{"reading failed", "check the disk", file.path, 0, {}});
+    }
+    if (size == 0) return {};
+    hash.update(std::span(block).first(static_cast<std::size_t>(size)));
+    at += size;
   }
-  std::ifstream in(path, std::ios::binary);
-  std::string block(std::size_t{1} << 20, '\0');
-  while (in) {
-    in.read(block.data(), static_cast<std::streamsize>(block.size()));
-    const std::string_view got(block.data(), static_cast<std::size_t>(in.gcount()));
-    hash.update(std::as_bytes(std::span(got)));
-    if (text != nullptr) text->append(got);
-  }
-  if (!in.bad() && in.is_open()) return {};
-  return std::unexpected(
-      Error{"cannot read this file", "check the path and its permissions", path, 0, {}});
 }
 
 /// Of a table. Errors: bytes that no text has, such as those of a picture or of UTF-16.
@@ -55,11 +51,11 @@ Status is_text(const ImportFile& file) {
 bool begins(std::string_view text, std::string_view magic) { return text.starts_with(magic); }
 
 /// What a file is by its first bytes. Errors: a kind that is known and not read.
-Result<bool> is_bag(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
+Result<bool> is_bag(const ImportFile& file) {
+  const std::string& path = file.path;
   std::array<char, 16> head{};
-  in.read(head.data(), head.size());
-  const std::string_view first(head.data(), static_cast<std::size_t>(in.gcount()));
+  const ssize_t size = ::pread(file.file->get(), head.data(), head.size(), 0);
+  const std::string_view first(head.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
   const auto refuse = [&](std::string message, std::string hint) {
     return std::unexpected(Error{std::move(message), std::move(hint), path, 0, {}});
   };
@@ -159,7 +155,10 @@ std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request
   std::vector<ImportFile> files;
   Sha256 hash;
   for (const std::string& path : request.files) {
-    const Result<bool> bag = is_bag(path);
+    Result<Descriptor> open = open_to_read(path, "name the .mcap files of a bag in their order");
+    if (!open) return refuse(open.error());
+    ImportFile file{path, std::make_shared<const Descriptor>(std::move(*open)), {}};
+    const Result<bool> bag = is_bag(file);
     if (!bag) return refuse(bag.error());
     if (!files.empty() && *bag != imported.bag) {
       return refuse({"is a bag beside a table, or the other way round",
@@ -169,21 +168,23 @@ std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request
                      {}});
     }
     imported.bag = *bag;
-    files.push_back({path, {}});
-    if (Status read = read_bytes(path, hash, *bag ? nullptr : &files.back().text); !read) {
-      return refuse(read.error());
+    if (Status read = hash_bytes(file, hash); !read) return refuse(read.error());
+    if (!*bag) {
+      Result<std::string> text = read_all(*file.file, path, kMostTableBytes);
+      if (!text) return refuse(text.error());
+      file.text = std::move(*text);
     }
-    if (Status text = is_text(files.back()); !text) return refuse(text.error());
+    if (Status text = is_text(file); !text) return refuse(text.error());
+    files.push_back(std::move(file));
   }
   imported.sha256 = hash.finish();
-  Sha256 ignored;
-  if (Status read = read_bytes(request.map, ignored, &imported.map_text); !read) {
-    return refuse(read.error());
-  }
+  Result<std::string> map_text = read_file(request.map, "name a .toml file", kMostTomlBytes);
+  if (!map_text) return refuse(map_text.error());
+  imported.map_text = std::move(*map_text);
   auto map = parse_import_map(imported.map_text, request.map, robot, imported.bag);
   if (!map) return std::unexpected(map.error());
   imported.map = std::move(*map);
-  auto recording = imported.bag ? read_bag_recording(request.files, imported.map, robot)
+  auto recording = imported.bag ? read_bag_recording(files, imported.map, robot)
                                 : read_csv_recording(files, imported.map, robot);
   if (!recording) return refuse(recording.error());
   imported.recording = std::move(*recording);

@@ -2,9 +2,11 @@
 // Layer: log/import.  Thread: any, non-RT.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
 
+#include "base/open_file.hpp"
 #include "base/result.hpp"
 #include "hal/config/robot_config.hpp"
 #include "log/import/import_map.hpp"
@@ -12,9 +14,10 @@
 
 namespace tandem::log {
 
-/// A file and its whole text.
+/// A file, held open, and of a table its whole text.
 struct ImportFile {
   std::string path;
+  std::shared_ptr<const Descriptor> file;
   std::string text;
 };
 
@@ -28,7 +31,7 @@ struct ImportFile {
                                                    const ImportMap& map,
                                                    const hal::RobotConfig& robot);
 
-/// Reads the ROS 2 bags `paths` (MCAP), one after the other: sensor_msgs/JointState, and for each
+/// Reads the ROS 2 bags `files` (MCAP), one after the other: sensor_msgs/JointState, and for each
 /// [sensor.NAME] of the map sensor_msgs/Imu or geometry_msgs/WrenchStamped, in CDR of either byte
 /// order. Several publishers may share the topic of joint states.
 ///
@@ -36,7 +39,7 @@ struct ImportFile {
 /// that is not said; a joint that is neither the robot's, named nor ignored; joints that the
 /// recording lacks; a topic of another type; a frame that is not the sensor's link; a message whose
 /// lists differ in length.
-[[nodiscard]] Result<Recording> read_bag_recording(std::span<const std::string> paths,
+[[nodiscard]] Result<Recording> read_bag_recording(std::span<const ImportFile> files,
                                                    const ImportMap& map,
                                                    const hal::RobotConfig& robot);
 

@@ -166,6 +166,7 @@ const std::map<std::string, int> kCalls{
     CALL(rmdir),
     CALL(unlink),
     CALL(rename),
+    CALL(renameat),
     CALL(chmod),
     CALL(dup2),
     CALL(poll),

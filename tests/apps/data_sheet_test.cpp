@@ -203,7 +203,7 @@ TEST_F(DataSheets, BeyondUseAreRefusedWithOneMessage) {
   for (const Row& row : std::initializer_list<Row>{
            {"eds show half.dcf", "error: half.dcf:"},
            {"eds show huge.dcf",
-            "huge.dcf: has 100000000 bytes, and a data sheet may have 4000000"},
+            "huge.dcf: has 100000000 bytes, and at most 4000000 are read"},
            {"eds show twice.dcf", "[1000]: is here twice with different contents"},
            {"eds show robot.toml", "robot.toml: has no section of an object, such as [1000]"},
            {"eds show nothing.eds", "nothing.eds: cannot read this file"},

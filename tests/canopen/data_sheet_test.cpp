@@ -505,7 +505,7 @@ TEST(DataSheet, OfAFileThatIsNoneIsAnError) {
   EXPECT_EQ(load_data_sheet(file)->entries.size(), 5U);
   std::filesystem::resize_file(file, 100'000'000);  // takes no place on the disk
   EXPECT_EQ(load_data_sheet(file).error().message,
-            "has 100000000 bytes, and a data sheet may have 4000000");
+            "has 100000000 bytes, and at most 4000000 are read");
 }
 
 }  // namespace
