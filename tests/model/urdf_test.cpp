@@ -152,7 +152,7 @@ TEST(Urdf, NamesAMissingFile) {
   const auto model = read_urdf("no/such.urdf", {});
   ASSERT_FALSE(model.has_value());
   EXPECT_EQ(to_text(model.error()),
-            "no/such.urdf: cannot read this description (check the path and its permissions)\n");
+            "no/such.urdf: cannot read this file (check the path and its permissions)\n");
 }
 
 TEST(Urdf, RefusesAFolder) { EXPECT_FALSE(read_urdf(TANDEM_SOURCE_DIR, {}).has_value()); }
