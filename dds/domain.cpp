@@ -99,9 +99,11 @@ Result<std::shared_ptr<Domain>> Domain::open(const Config& config) {
   }
   std::string interfaces;
   for (const std::string& name : config.interfaces) interfaces += " " + name;
+  const std::string held = port_holders(config.domain);
   return std::unexpected(
       dds_error(what, entity.get(),
-                "are these interfaces there and up:" + interfaces + "? `ip link` lists them"));
+                "are these interfaces there and up:" + interfaces + "? `ip link` lists them" +
+                    (held.empty() ? "" : "; the domain's UDP ports are held by " + held)));
 }
 
 }  // namespace tandem::dds

@@ -1,17 +1,17 @@
 // Tries the ports of every participant, and counts the users of those that are taken.
 #include "dds/ports.hpp"
 
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdlib>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <sstream>
 #include <utility>
@@ -35,6 +35,19 @@ bool is_free(int port) {
   return free;
 }
 
+/// A file of the kernel's; empty where there is none.
+std::string text_of(const char* file) {
+  std::string text;
+  const int descriptor = ::open(file, O_RDONLY | O_CLOEXEC);
+  std::array<char, 4096> part{};
+  for (ssize_t count = 1; descriptor >= 0 && count > 0;) {
+    count = ::read(descriptor, part.data(), part.size());
+    if (count > 0) text.append(part.data(), static_cast<std::size_t>(count));
+  }
+  if (descriptor >= 0) ::close(descriptor);
+  return text;
+}
+
 }  // namespace
 
 bool has_free_ports(int domain) {
@@ -47,7 +60,7 @@ bool has_free_ports(int domain) {
 }
 
 std::string port_holders(const std::string& table, int domain) {
-  const long first = kBase + kPerDomain * domain + kFirst;
+  const long first = kBase + kPerDomain * domain;
   std::map<std::string, int> counts;  // by user
   std::istringstream lines(table);
   for (std::string line; std::getline(lines, line);) {
@@ -57,7 +70,7 @@ std::string port_holders(const std::string& table, int domain) {
     const std::size_t colon = local.find(':');
     if (!fields || colon == std::string::npos) continue;
     const long port = std::strtol(local.c_str() + colon + 1, nullptr, 16);
-    if (port >= first && port < first + kEach * kMostParticipants) ++counts[user];
+    if (port >= first && port < first + kFirst + kEach * kMostParticipants) ++counts[user];
   }
   std::vector<std::pair<std::string, int>> users(counts.begin(), counts.end());
   std::ranges::stable_sort(users, std::greater{}, &std::pair<std::string, int>::second);
@@ -69,12 +82,7 @@ std::string port_holders(const std::string& table, int domain) {
 }
 
 std::string port_holders(int domain) {
-  std::string table;
-  for (const char* file : {"/proc/net/udp", "/proc/net/udp6"}) {
-    std::ifstream in(file);
-    table.append(std::istreambuf_iterator<char>(in), {});
-  }
-  return port_holders(table, domain);
+  return port_holders(text_of("/proc/net/udp") + text_of("/proc/net/udp6"), domain);
 }
 
 }  // namespace tandem::dds

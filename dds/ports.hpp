@@ -12,8 +12,8 @@ inline constexpr int kMostParticipants = 120;
 /// Whether a participant of `domain` still finds its two ports on this machine (RTPS 9.6.1).
 [[nodiscard]] bool has_free_ports(int domain);
 
-/// "user 1000 (238), user 0 (2)": who has how many of the domain's ports, by a table like
-/// /proc/net/udp. Empty: nobody.
+/// "user 1000 (238), user 0 (2)": who has how many of the domain's ports, those of discovery by
+/// multicast among them, by a table like /proc/net/udp. Empty: nobody.
 [[nodiscard]] std::string port_holders(const std::string& table, int domain);
 /// By the kernel's tables.
 [[nodiscard]] std::string port_holders(int domain);

@@ -19,6 +19,8 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kLookAgain{5};
 /// How long a request to every server waits for the others, once one is connected.
 constexpr std::chrono::milliseconds kOthers{300};
+/// A request to every server is sent again so often: others may have pushed it out.
+constexpr std::chrono::milliseconds kAgain{500};
 
 /// "left" of the topic "rq/left/tandem/askRequest" of `service`; false: it is another's.
 bool is_topic_of(std::string_view topic, const std::string& service, std::string& name_space) {
@@ -198,14 +200,22 @@ Result<std::vector<FoundService>> ServiceClientBase::call_each(void* request, Pa
   std::vector<Peer> silent = matched_readers(requests_.get());
   const Result<ServiceHeader> header = send(request);
   if (!header) return std::unexpected(header.error());
+  Deadline again = SteadyClock::now() + kAgain;
+  std::vector<dds_instance_handle_t> heard;  // each once, however often it was asked
   for (;;) {
     take(*header, [&](const void* reply, dds_instance_handle_t writer) {
+      if (std::ranges::find(heard, writer) != heard.end()) return;
+      heard.push_back(writer);
       const std::optional<Peer> from = matched_writer(replies_.get(), writer);
       if (!from) return use(reply, {});
       std::erase_if(silent, [&](const Peer& one) { return same(one, *from); });
       use(reply, service_of(*from));
     });
     if (silent.empty() || SteadyClock::now() > deadline) break;
+    if (SteadyClock::now() > again) {
+      (void)dds_write(requests_.get(), request);
+      again += kAgain;
+    }
     dds_waitset_wait(waitset_.get(), nullptr, 0, DDS_MSECS(20));
   }
   std::vector<FoundService> left;

@@ -95,8 +95,9 @@ class ServiceClient : public ServiceClientBase {
     });
   }
 
-  /// The same to every process that serves it, with one request: `use` sees each reply, and whose
-  /// it is, as it comes.
+  /// The same to every process that serves it, with one request: `use` sees the first reply of
+  /// each, and whose it is, as it comes. The request is repeated until all have replied: it must do
+  /// no harm twice.
   /// @param patience  for all of them
   /// @return those that have not replied in time. Errors: nobody serves it.
   [[nodiscard]] Result<std::vector<FoundService>> call_each(

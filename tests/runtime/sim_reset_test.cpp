@@ -127,6 +127,25 @@ TEST_F(Swing, IsHeldAfterAResetAndLedOverWithoutABumpWhenItsControllerIsStarted)
   EXPECT_LT(torque_step(50), first_start_Nm + kBump_Nm) << "as at the first start";
 }
 
+/// Whatever the drive, its axis and the master are at: reset, on the way up, held.
+TEST_F(Swing, IsWithoutPowerAfterAStopInAnyCycleOfItsReset) {
+  for (const int into : {0, 1, 2, 3, 5, 8, 13, 21, 34, 55, 89}) {
+    SCOPED_TRACE(into);
+    begin(StopCategory::kCategory1, AfterReset::kHold);
+    cycle->inbox().emergency_stop(StopCategory::kCategory1);
+    steps(500);
+    cycle->inbox().reset_faults();
+    steps(into);
+    cycle->inbox().emergency_stop(StopCategory::kCategory0);
+    steps(500);
+    EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+    EXPECT_FALSE(powered());
+    cycle->inbox().reset_faults();
+    until(RunPhase::kHeld);
+    EXPECT_TRUE(powered()) << "the next one is carried out";
+  }
+}
+
 /// One amplifier's fault, while the run is stopped: nothing is enabled by its reset.
 TEST_F(Swing, StaysDisabledWhenOnlyItsDriveIsReset) {
   begin(StopCategory::kCategory1, AfterReset::kHold);

@@ -169,10 +169,10 @@ TEST_F(StopUnderAttack, IsConfirmedByAnybodyWhereTheDomainIsTrusted) {
 
 // What is asked meanwhile.
 
-/// Asks for an unknown command of 120 kB, so often.
-void flood(int times) {
+/// Asks a service for an unknown command of 120 kB, so often.
+void flood(int times, const std::string& service) {
   const auto participant = join("flooder");
-  auto client = dds::ServiceClient<Ask_Request, Ask_Response>::create(*participant, "tandem/ask");
+  auto client = dds::ServiceClient<Ask_Request, Ask_Response>::create(*participant, service);
   ASSERT_TRUE(client) << client.error().to_string();
   std::string question = "{\"do\": \"" + std::string(120'000, 'x') + "\"}";
   for (int i = 0; i < times; ++i) {
@@ -185,7 +185,9 @@ void flood(int times) {
 TEST_F(StopUnderAttack, IsAnsweredOverDdsWhileStrangersAskLongQuestions) {
   begin("--rate 20 --dds" + domain());
   std::vector<std::thread> strangers;
-  for (int i = 0; i < 8; ++i) strangers.emplace_back([] { flood(40); });
+  for (const char* service : {"tandem/ask", "tandem/stop"}) {
+    for (int i = 0; i < 4; ++i) strangers.emplace_back([=] { flood(40, service); });
+  }
   for (int i = 0; i < 3; ++i) {
     const Outcome stop = stop_over_dds();
     EXPECT_EQ(stop.status, 0) << stop.err;
@@ -314,16 +316,17 @@ TEST_F(StopUnderAttack, AControllerThatClosesEveryDescriptorIsEnded) {
   }
 }
 
-/// Runs `tandem ARGUMENTS` as the user 65534, with so many threads.
+/// Runs `tandem ARGUMENTS` as a user who runs nothing else, with so many threads.
 int run_with_threads(const std::filesystem::path& folder, rlim_t most,
                      const std::string& arguments) {
+  const uid_t user = 40'000 + static_cast<uid_t>(::getpid() % 20'000);
   const pid_t child = ::fork();
   if (child == 0) {
     const rlimit limit{most, most};
     const int out = ::open((folder / "threads.txt").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
     (void)::dup2(out, STDOUT_FILENO);
     (void)::dup2(out, STDERR_FILENO);
-    if (::chdir(folder.c_str()) != 0 || ::setgid(65534) != 0 || ::setuid(65534) != 0 ||
+    if (::chdir(folder.c_str()) != 0 || ::setgid(65534) != 0 || ::setuid(user) != 0 ||
         ::setrlimit(RLIMIT_NPROC, &limit) != 0) {
       ::_exit(99);
     }
@@ -340,6 +343,9 @@ int run_with_threads(const std::filesystem::path& folder, rlim_t most,
 TEST_F(StopUnderAttack, ARunThatGetsNoThreadsSaysWhatToDo) {
   if (::geteuid() != 0) GTEST_SKIP() << "needs a user who has no other processes: run as root";
   std::filesystem::permissions(folder_, std::filesystem::perms::all);
+  if (run_with_threads(folder_, 1000, "--version") != 0) {
+    GTEST_SKIP() << "another user cannot run this build: a folder above it is closed";
+  }
   int refused = 0, done = 0;
   for (const char* dds : {"", " --dds"}) {
     for (rlim_t most = 1; most < 40; ++most) {
@@ -349,7 +355,6 @@ TEST_F(StopUnderAttack, ARunThatGetsNoThreadsSaysWhatToDo) {
                            "run hold.toml --no-log -q --duration 0.1 --no-build --no-socket" +
                                std::string(dds) + (*dds == '\0' ? "" : domain()));
       const std::string told = read_text(folder_ / "threads.txt");
-      ASSERT_NE(status, 99) << "the folders above are closed to others";
       EXPECT_TRUE(status == 0 || status == 2) << status << ": " << told;
       EXPECT_TRUE(status == 0 || has(told, "threads")) << told;
       ++(status == 0 ? done : refused);
