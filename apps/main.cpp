@@ -98,12 +98,19 @@ std::expected<Exit, int> performed(const Command& command) {
   } catch (const std::system_error& error) {
     if (std::ferror(stdout) == 0 && std::ferror(stderr) == 0) throw;
     return std::unexpected(error.code().value());
+  } catch (const Json::exception& error) {
+    print_errors({{.message = std::string("the answer is of another form: ") + error.what(),
+                   .hint = "is what answers a `tandem` of this version?",
+                   .file = {},
+                   .key = {}}});
+    return Exit::kFault;
   }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  show_harmless();
   std::signal(SIGXFSZ, SIG_IGN);  // a file at the limit of `ulimit -f` is its writer's error
   name_crashing_controllers();
   const Command command = parse_command_line(argc, argv);
