@@ -106,12 +106,19 @@ std::expected<Exit, int> performed(const Command& command) {
                    .file = {},
                    .key = {}}});
     return Exit::kUsage;
+  } catch (const Json::exception& error) {
+    print_errors({{.message = std::string("the answer is of another form: ") + error.what(),
+                   .hint = "is what answers a `tandem` of this version?",
+                   .file = {},
+                   .key = {}}});
+    return Exit::kFault;
   }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  show_harmless();
   std::signal(SIGXFSZ, SIG_IGN);  // a file at the limit of `ulimit -f` is its writer's error
   name_crashing_controllers();
   const Command command = parse_command_line(argc, argv);

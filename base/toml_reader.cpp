@@ -461,6 +461,11 @@ std::vector<TomlTable> TomlTable::tables(std::string_view key) {
     error(key, "must be an array of tables", "write [[" + header_of(dotted(key)) + "]]");
     return {};
   }
+  if (array->size() > bounds::kTomlTables.most) {
+    Error many = beyond(bounds::kTomlTables);
+    error(key, std::move(many.message), std::move(many.hint));
+    return {};
+  }
   std::vector<std::string> names;
   for (const toml::node& entry : *array) names.push_back(name_of(*entry.as_table()));
   std::vector<TomlTable> found;

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/bounds.hpp"
 #include "base/result.hpp"
 
 namespace tandem::canopen {
@@ -71,8 +72,8 @@ struct DataSheet {
 };
 
 /// The most that a sheet may have; those of real drives have up to 0.2 MB and 1,200 entries.
-inline constexpr std::size_t kMaxSheetBytes = 4'000'000;
-inline constexpr std::size_t kMaxSheetEntries = 100'000;
+inline constexpr std::size_t kMaxSheetBytes = bounds::kSheetBytes.most;
+inline constexpr std::size_t kMaxSheetEntries = bounds::kSheetEntries.most;
 
 /// Reads the text of an EDS or DCF.
 ///

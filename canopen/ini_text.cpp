@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/bounds.hpp"
 #include "base/utf8.hpp"
 
 namespace tandem::canopen {
 namespace {
 
-constexpr std::size_t kMostRemarks = 100;
+constexpr std::size_t kMostRemarks = bounds::kSheetRemarks.most;
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr char kEndOfFile = 0x1A;  // of DOS
 

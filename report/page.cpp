@@ -40,7 +40,7 @@ th { color: var(--soft); font-weight: 600; }
 Result<std::string> inline_svg(const std::string& file, const std::string& name) {
   Result<std::string> svg_read = read_file(file, "draw it again", kMostOtherBytes);
   if (!svg_read) return svg_read;
-  std::string svg = std::move(*svg_read);
+  std::string svg = harmless(*svg_read);  // names are in it
   svg.erase(0, svg.find("<svg"));
   for (const char* id :
        {"gnuplot_plot_", "gnuplot_canvas", "gpDot", "gpPt", "greybox", "textbox"}) {
@@ -52,14 +52,17 @@ Result<std::string> inline_svg(const std::string& file, const std::string& name)
   return svg;
 }
 
+/// In the page, whoever wrote it.
+std::string page_text(std::string_view text) { return xml_text(harmless(text)); }
+
 std::string html_table(const PageTable& table) {
   std::string out = fmt::format("<h2>{}</h2>\n<p>{}</p>\n<div class=\"card\"><table>\n<tr>",
-                                xml_text(table.title), xml_text(table.caption));
-  for (const std::string& cell : table.header) out += "<th>" + xml_text(cell) + "</th>";
+                                page_text(table.title), page_text(table.caption));
+  for (const std::string& cell : table.header) out += "<th>" + page_text(cell) + "</th>";
   out += "</tr>\n";
   for (const auto& row : table.rows) {
     out += "<tr>";
-    for (const std::string& cell : row) out += "<td>" + xml_text(cell) + "</td>";
+    for (const std::string& cell : row) out += "<td>" + page_text(cell) + "</td>";
     out += "</tr>\n";
   }
   return out + "</table></div>\n";
@@ -77,7 +80,7 @@ Status write_page(const Page& page, std::span<const Figure> figures, const std::
       "<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<main>\n<h1>{0}</h1>\n<p>{2}</p>\n",
-      xml_text(page.title), kStyle, xml_text(page.lead));
+      page_text(page.title), kStyle, page_text(page.lead));
   html += "<div class=\"figures\">\n";
   for (const Figure& figure : figures) {
     const Result<std::string> svg = inline_svg(folder + "/" + figure.name + ".svg", figure.name);
@@ -86,7 +89,7 @@ Status write_page(const Page& page, std::span<const Figure> figures, const std::
   }
   html += "</div>\n<h2>Run</h2>\n<div class=\"card\"><dl>\n";
   for (const auto& [name, value] : page.facts) {
-    html += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", xml_text(name), xml_text(value));
+    html += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", page_text(name), page_text(value));
   }
   html += "</dl></div>\n";
   for (const PageTable& table : page.tables) html += html_table(table);

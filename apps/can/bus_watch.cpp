@@ -16,9 +16,9 @@ void BusWatch::look() {
     if (text == told.text) continue;
     const Clock::time_point now = Clock::now();
     if (now < told.next) continue;
-    const char* clear = is_terminal(out_) ? "\r\x1b[K" : "";  // a progress bar
+    restart_line(out_);
     fmt::print(
-        out_, "{}note: {}\n", clear,
+        out_, "note: {}\n",
         text.empty() ? fmt::format("interface {} is well again", buses_[b].interface) : text);
     told = {.text = std::move(text), .next = now + std::chrono::seconds(1)};
   }

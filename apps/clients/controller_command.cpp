@@ -36,8 +36,9 @@ void print_list(const Json& controllers) {
 void print_done(const Json& answer) {
   const std::vector<std::string> active =
       answer.value("active", Json::array()).get<std::vector<std::string>>();
-  const std::string names = active.empty() ? "none" : fmt::format("{}", fmt::join(active, ", "));
-  const std::string note = answer.value("note", "");
+  const std::string names =
+      active.empty() ? "none" : shown(fmt::format("{}", fmt::join(active, ", ")), 2'000);
+  const std::string note = shown(answer.value("note", ""), 2'000);
   if (answer.value("done", false) && !note.empty()) {
     fmt::print("selected in cycle {}: {}; {}\n", answer.value("cycle", 0), names, note);
   } else if (answer.value("done", false)) {

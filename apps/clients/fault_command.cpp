@@ -28,7 +28,8 @@ const char kAsked[] =
     "fault show)";
 
 void print_latched(const Json& answer) {
-  fmt::print("phase {}, {} latched\n", answer.value("phase", "?"), answer.value("latched", 0));
+  fmt::print("phase {}, {} latched\n", shown(answer.value("phase", "?")),
+             answer.value("latched", 0));
   print_faults(answer.value("faults", Json::array()), stdout);
 }
 
@@ -173,9 +174,9 @@ Exit tell_stop(const Result<Json>& answer, const Json& question, const std::stri
     print_errors({error});
     return Exit::kFault;
   }
-  const std::string category = answer->value("category", "?");
+  const std::string category = shown(answer->value("category", "?"));
   const bool no_retreat = question.value("category", -1) == 2 && category == "category1";
-  fmt::print("{}{}emergency stop, {}{}\n", who, who.empty() ? "" : ": ", category,
+  fmt::print("{}{}emergency stop, {}{}\n", shown(who), who.empty() ? "" : ": ", category,
              no_retreat ? ": no active controller can bring the robot to a safe posture" : "");
   if (answer->value("paused", false)) fmt::print("{}\n", kKept);
   std::fflush(stdout);  // before an error of the next run

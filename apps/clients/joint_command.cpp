@@ -150,7 +150,7 @@ void print_answer(const JointOptions& options, const Json& answer, const Json& q
   if (options.action == Action::kShow) return print_joint(answer);
   const bool done = answer.value("done", false) && options.action != Action::kReset;
   if (done) fmt::print("done in cycle {}\n", answer.value("cycle", 0));
-  if (answer.contains("note")) fmt::print("{}\n", answer.value("note", ""));
+  if (answer.contains("note")) fmt::print("{}\n", shown(answer.value("note", ""), 2'000));
   switch (options.action) {
     case Action::kList:
     case Action::kShow: break;

@@ -79,7 +79,8 @@ void print_prediction(const Json& answer) {
   facts.add("faults to come", std::to_string(answer["faults"].size()));
   facts.print(stdout);
   for (const Json& fault : answer["faults"]) {
-    fmt::print("fault: {:.3f} s: {}\n", fault.value("time_s", 0.0), fault.value("text", ""));
+    fmt::print("fault: {:.3f} s: {}\n", fault.value("time_s", 0.0),
+               shown(fault.value("text", ""), 2'000));
   }
 }
 

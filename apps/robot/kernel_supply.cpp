@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "apps/robot/kernel_store.hpp"
+#include "apps/text/console.hpp"
 #include "base/counted.hpp"
 #include "model/generate.hpp"
 
@@ -14,7 +15,8 @@ class BuildProgress {
  public:
   void show(int done, int total, const std::string& file) {
     if (terminal_) {
-      fmt::print(stderr, "\r  [{}/{}] {}\033[K{}", done, total, file, done < total ? "" : "\n");
+      restart_line(stderr);
+      fmt::print(stderr, "  [{}/{}] {}{}", done, total, file, done < total ? "" : "\n");
       return;
     }
     const int quarter = 4 * done / total;

@@ -60,6 +60,14 @@ const char* name_of(int signal) {
 /// Calls only what is safe in a signal handler.
 void write_text(const char* text) { (void)!::write(STDERR_FILENO, text, std::strlen(text)); }
 
+/// The same of a name: what is no sign of ASCII is a question mark.
+void write_name(const char* name) {
+  for (; *name != '\0'; ++name) {
+    const char sign[2] = {*name >= 0x20 && *name < 0x7F ? *name : '?', '\0'};
+    write_text(sign);
+  }
+}
+
 /// Where the calling handler's thread was: "plugin.so(+0x12a0)[0x7f…]", a line for each call.
 [[gnu::noinline]] void write_calls() {
   std::array<void*, 12> calls;
@@ -73,9 +81,10 @@ void write_text(const char* text) { (void)!::write(STDERR_FILENO, text, std::str
 void on_signal(int signal) {
   if (!in_cycle()) {
     if (const char* controller = hosted_controller()) {
+      write_text("error: ");
+      write_name(controller);
       for (const char* part :
-           {"error: ", controller,
-            ": the controller crashed before its first cycle: ", name_of(signal), "\n"})
+           {": the controller crashed before its first cycle: ", name_of(signal), "\n"})
         write_text(part);
     }
     std::signal(signal, SIG_DFL);

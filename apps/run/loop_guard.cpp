@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "apps/text/console.hpp"
+#include "base/quoting.hpp"
 #include "canopen/messages.hpp"
 
 namespace tandem::apps {
@@ -26,7 +27,7 @@ nanoseconds seconds(double value_s) {
 
 /// A line on standard error. One whose reader is stuck must not hold up the end of the process.
 void say(const std::string& line) {
-  const std::string text = (is_terminal(stderr) ? "\r\x1b[K" : "") + line + "\n";
+  const std::string text = (is_terminal(stderr) ? "\r\x1b[K" : "") + shown(line, 2'000) + "\n";
   pollfd free{STDERR_FILENO, POLLOUT, 0};
   if (::poll(&free, 1, 100) == 1) (void)!::write(STDERR_FILENO, text.data(), text.size());
 }

@@ -38,10 +38,11 @@ class HomingNote {
       names += (names.empty() ? "" : ", ") + joint.name;
     }
     if (names.empty()) return;
+    restart_line(stderr);
     fmt::print(stderr,
-               "{}held until these are homed: {} (tandem joint home NAME; then tandem controller "
+               "held until these are homed: {} (tandem joint home NAME; then tandem controller "
                "start)\n",
-               is_terminal(stderr) ? "\r\x1b[K" : "", names);
+               names);
   }
 
  private:
@@ -53,11 +54,11 @@ class HomingNote {
     for (std::size_t j = 0; j < joints.size(); ++j) {
       const hal::HomingError error = joints[j].look.homing.error;
       if (std::exchange(failures_[j], error) == error || error == hal::HomingError::kNone) continue;
+      restart_line(stderr);
       fmt::print(stderr,
-                 "{}{}: the homing (method {}) failed: {}; {}; tandem joint home {} tries again\n",
-                 is_terminal(stderr) ? "\r\x1b[K" : "", joints[j].name,
-                 robot.joints[j].homing ? robot.joints[j].homing->method : 0, hal::to_string(error),
-                 hal::next_step(error), joints[j].name);
+                 "{}: the homing (method {}) failed: {}; {}; tandem joint home {} tries again\n",
+                 joints[j].name, robot.joints[j].homing ? robot.joints[j].homing->method : 0,
+                 hal::to_string(error), hal::next_step(error), joints[j].name);
     }
   }
 
@@ -72,15 +73,15 @@ class FaultNotes {
   void look(const runtime::RobotCycle& cycle) {
     if (cycle.fault_log().size() <= told_) return;
     const std::vector<runtime::Fault> faults = cycle.faults();
-    const char* clear = is_terminal(stderr) ? "\r\x1b[K" : "";  // a progress bar
+    restart_line(stderr);
     bool stopped = false;
     for (; told_ < faults.size(); ++told_) {
       const runtime::Fault& fault = faults[told_];
       const bool warns = fault.category == hal::StopCategory::kWarn;
       if (!warns && !waits_) continue;
       stopped = stopped || !warns;
-      fmt::print(stderr, "{}{}: {:.3f} s: {}{}{}\n", clear, warns ? "warning" : "fault",
-                 fault.time_s, fault.joint, fault.joint.empty() ? "" : ": ", fault.text);
+      fmt::print(stderr, "{}: {:.3f} s: {}{}{}\n", warns ? "warning" : "fault", fault.time_s,
+                 fault.joint, fault.joint.empty() ? "" : ": ", shown(fault.text, 2'000));
     }
     if (stopped) {
       fmt::print(stderr, "the run is stopped, and waits: tandem fault show, tandem fault reset\n");

@@ -151,7 +151,8 @@ void add_report(const RunOptions& options, const std::string& log, bool whole) {
     print_errors({files.error()});
     return;
   }
-  for (const std::string& remark : files->remarks) fmt::print(stderr, "note: {}\n", remark);
+  for (const std::string& remark : files->remarks)
+    fmt::print(stderr, "note: {}\n", shown(remark, 2'000));
   if (options.quiet) return;
   Facts facts;
   facts.add("report", files->page);
@@ -404,9 +405,10 @@ class Session {
       summary.print(out_);
     }
     for (const std::string& warning : summary.warnings()) {
-      fmt::print(stderr, "warning: {}\n", warning);
+      fmt::print(stderr, "warning: {}\n", shown(warning, 2'000));
     }
-    for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
+    for (const std::string& fault : summary.faults)
+      fmt::print(stderr, "fault: {}\n", shown(fault, 2'000));
     const Status traced = add_trace(options_, summary, out_);
     const Status written = write_json(options_.json, summary.json());
     if (!traced) return refuse(traced.error());

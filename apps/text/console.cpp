@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cctype>
 #include <cerrno>
@@ -17,10 +18,13 @@
 
 #include "apps/text/draft.hpp"
 #include "base/open_file.hpp"
+#include "base/quoting.hpp"
 #include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
 namespace {
+
+constexpr std::size_t kLongestCell = 2'000;  // characters
 
 Diagnostics reported;      // by print_errors(), for write_failure()
 bool has_written = false;  // by write_json()
@@ -38,17 +42,6 @@ std::string left(const std::string& text, std::size_t columns) {
 
 std::string right(const std::string& text, std::size_t columns) {
   return std::string(columns - std::min(columns, width(text)), ' ') + text;
-}
-
-/// What a terminal would obey, such as an escape sequence in a file's name, in signs that it shows.
-std::string harmless(const std::string& text) {
-  std::string shown;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool control = (byte < 0x20 && c != '\n' && c != '\t') || byte == 0x7F;
-    shown += control ? fmt::format("\\x{:02x}", byte) : std::string(1, c);
-  }
-  return shown;
 }
 
 Error json_error(const std::string& file, const std::string& reason) {
@@ -79,28 +72,66 @@ bool reader_is_gone() {
   return ::poll(&output, 1, 0) > 0 && (output.revents & (POLLERR | POLLHUP)) != 0;
 }
 
-/// Writes all of it, or loses it: a stream that fails would throw where it is printed to.
-ssize_t write_or_lose(void* cookie, const char* text, std::size_t size) {
-  const int fd = *static_cast<const int*>(cookie);
-  for (std::size_t done = 0; done < size;) {
-    const ssize_t count = ::write(fd, text + done, size - done);
+/// Standard output or error. It outlives every static object, as what is buffered is written last.
+struct Output {
+  int fd;
+  bool loses;                   // what cannot be written, instead of failing
+  std::array<char, 3> begun{};  // bytes of a character whose last has not come
+  std::size_t begun_size = 0;
+};
+Output outputs[] = {{STDOUT_FILENO, false, {}, 0}, {STDERR_FILENO, false, {}, 0}};
+
+/// @return whether all of it was written, or lost
+bool put(const Output& out, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t count = ::write(out.fd, text.data(), text.size());
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) {
+      if (!out.loses) return false;
       if (!is_full(errno)) rt::request_stop();
-      if (is_full(errno) && fd == STDOUT_FILENO) lost = errno;
-      break;
+      if (is_full(errno) && out.fd == STDOUT_FILENO) lost = errno;
+      return true;
     }
-    done += static_cast<std::size_t>(count);
+    text.remove_prefix(static_cast<std::size_t>(count));
   }
-  return static_cast<ssize_t>(size);
+  return true;
 }
 
-/// A stream on a descriptor that never fails; the program's, so it is not closed.
-std::FILE* lasting(int fd, int buffering) {
-  static int descriptors[] = {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO};
-  std::FILE* stream =
-      ::fopencookie(&descriptors[fd], "w", {nullptr, &write_or_lose, nullptr, nullptr});
-  if (stream == nullptr) return fd == STDERR_FILENO ? stderr : stdout;
+bool is_plain(std::string_view text) {
+  return std::ranges::all_of(
+      text, [](char c) { return (c >= 0x20 && c < 0x7F) || c == '\n' || c == '\t'; });
+}
+
+/// The bytes at the end of a text that may begin a character whose others have not come yet.
+std::size_t begun_at_end(std::string_view text) {
+  for (std::size_t i = 1; i <= std::min<std::size_t>(3, text.size()); ++i) {
+    const auto byte = static_cast<unsigned char>(text[text.size() - i]);
+    if (byte < 0x80) return 0;
+    if (byte < 0xC0) continue;
+    return i < (byte < 0xE0 ? 2U : byte < 0xF0 ? 3U : 4U) ? i : 0;
+  }
+  return 0;
+}
+
+/// What others wrote, such as an escape sequence in a name, is shown and not obeyed: the one way
+/// out for all that is printed. Our own sequences go by restart_line().
+ssize_t write_harmless(void* cookie, const char* text, std::size_t size) {
+  Output& out = *static_cast<Output*>(cookie);
+  const std::string_view added(text, size);
+  if (out.begun_size == 0 && is_plain(added))
+    return put(out, added) ? static_cast<ssize_t>(size) : 0;
+  std::string all(out.begun.data(), out.begun_size);
+  all += added;
+  out.begun_size = begun_at_end(all);
+  std::copy(all.end() - static_cast<std::ptrdiff_t>(out.begun_size), all.end(), out.begun.begin());
+  all.resize(all.size() - out.begun_size);
+  return put(out, harmless(all)) ? static_cast<ssize_t>(size) : 0;
+}
+
+/// A stream on a descriptor of the program's, which is not closed.
+std::FILE* stream_on(Output& out, int buffering) {
+  std::FILE* stream = ::fopencookie(&out, "w", {nullptr, &write_harmless, nullptr, nullptr});
+  if (stream == nullptr) return out.fd == STDERR_FILENO ? stderr : stdout;
   std::setvbuf(stream, nullptr, buffering, BUFSIZ);
   return stream;
 }
@@ -115,11 +146,26 @@ bool is_terminal(std::FILE* out) {
   return ::isatty(::fileno(out)) != 0;
 }
 
+void show_harmless() {
+  static bool done = false;
+  if (std::exchange(done, true)) return;
+  std::fflush(stdout);
+  stdout = stream_on(outputs[0], ::isatty(STDOUT_FILENO) != 0 ? _IOLBF : _IOFBF);
+  stderr = stream_on(outputs[1], _IONBF);
+}
+
+void restart_line(std::FILE* out) {
+  if (!is_terminal(out)) return;
+  std::fflush(out);
+  const int fd = out == stdout ? STDOUT_FILENO : out == stderr ? STDERR_FILENO : ::fileno(out);
+  (void)!::write(fd, "\r\x1b[K", 4);
+}
+
 void outlive_files() {
   std::signal(SIGPIPE, SIG_IGN);
+  show_harmless();
   if (std::fflush(stdout) != 0 && is_full(errno)) lost = errno;
-  stdout = lasting(STDOUT_FILENO, ::isatty(STDOUT_FILENO) != 0 ? _IOLBF : _IOFBF);
-  stderr = lasting(STDERR_FILENO, _IONBF);
+  for (Output& out : outputs) out.loses = true;
 }
 
 Status flush_output(int before) {
@@ -258,10 +304,23 @@ Json percentiles_json(const rt::Percentiles& p) {
   return {{"p50", p.p50}, {"p99", p.p99}, {"p999", p.p999}, {"max", p.max}};
 }
 
+namespace {
+
+/// An error's words; where they have lines, as a compiler's do, no line looks like one of ours.
+std::string indented(const std::string& text) {
+  constexpr std::size_t kMost = 20'000;
+  std::string out;
+  for (const char c : text.substr(0, kMost))
+    out += c == '\n' ? std::string("\n    ") : std::string(1, c);
+  return harmless(out + (text.size() > kMost ? "…" : "")) + "\n";
+}
+
+}  // namespace
+
 void print_errors(const Diagnostics& errors) {
   reported.insert(reported.end(), errors.begin(), errors.end());
   for (const Error& error : errors)  // not fmt::print(), which throws when it cannot write
-    std::fputs(harmless("error: " + error.to_string() + "\n").c_str(), stderr);
+    std::fputs(("error: " + indented(error.to_string())).c_str(), stderr);
 }
 
 Exit refuse(const Diagnostics& errors) {
@@ -273,7 +332,7 @@ Exit refuse(const Error& error) { return refuse(Diagnostics{error}); }
 
 void print_warnings(const Diagnostics& warnings) {
   for (const Error& warning : warnings)  // as above
-    std::fputs(harmless("warning: " + warning.to_string() + "\n").c_str(), stderr);
+    std::fputs(("warning: " + indented(warning.to_string())).c_str(), stderr);
 }
 
 namespace {
@@ -306,6 +365,11 @@ void narrow(std::vector<std::size_t>& columns) {
 }
 
 }  // namespace
+
+void Table::add(std::vector<std::string> row) {
+  for (std::string& cell : row) cell = shown(cell, kLongestCell);
+  rows_.push_back(std::move(row));
+}
 
 void Table::print(std::FILE* out) const {
   std::vector<std::size_t> columns;
@@ -340,6 +404,10 @@ void Table::print(std::FILE* out) const {
   }
 }
 
+void Facts::add(const std::string& name, const std::string& value) {
+  facts_.emplace_back(shown(name), shown(value, kLongestCell));
+}
+
 void Facts::print(std::FILE* out) const {
   std::size_t column = 0;
   for (const auto& [name, value] : facts_) column = std::max(column, width(name));
@@ -363,7 +431,8 @@ bool StatusLine::due() {
 }
 
 void StatusLine::show(const std::string& text) {
-  fmt::print(out_, "{}  {}{}", terminal_ ? "\r" : "", text, terminal_ ? "\033[K" : "\n");
+  restart_line(out_);
+  fmt::print(out_, "  {}{}", shown(text, kLongestCell), terminal_ ? "" : "\n");
   std::fflush(out_);
   drawn_ = terminal_;
 }
@@ -382,7 +451,8 @@ void ProgressBar::update(double done_s, const std::string& note) {
     const int tenth = static_cast<int>(share * 10.0 + 1e-9);
     if (tenth <= tenth_) return;
     tenth_ = tenth;
-    fmt::print(out_, "  {:3d} %  {:6.2f} of {:.2f} s  {}\n", tenth * 10, done_s, total_s_, note);
+    fmt::print(out_, "  {:3d} %  {:6.2f} of {:.2f} s  {}\n", tenth * 10, done_s, total_s_,
+               shown(note));
     std::fflush(out_);
     return;
   }
@@ -394,8 +464,9 @@ void ProgressBar::update(double done_s, const std::string& note) {
   std::string bar;
   for (int i = 0; i < kCells; ++i) bar += i < full ? "█" : "░";
   const double wall_s = std::chrono::duration<double>(now - started_).count();
-  fmt::print(out_, "\r  {} {:6.2f} / {:.2f} s  {:5.1f} s elapsed  {}\033[K", bar, done_s, total_s_,
-             wall_s, note);
+  restart_line(out_);
+  fmt::print(out_, "  {} {:6.2f} / {:.2f} s  {:5.1f} s elapsed  {}", bar, done_s, total_s_, wall_s,
+             shown(note));
   std::fflush(out_);
   drawn_ = true;
 }
@@ -405,14 +476,15 @@ void ProgressBar::update_endless(double done_s, const std::string& note) {
   const bool news = !noted_ || *noted_ != note;
   noted_ = note;
   if (!terminal_) {
-    if (news) fmt::print(out_, "  {:8.2f} s  {}\n", done_s, note.empty() ? "running" : note);
+    if (news) fmt::print(out_, "  {:8.2f} s  {}\n", done_s, note.empty() ? "running" : shown(note));
     std::fflush(out_);
     return;
   }
   if (now < next_ && !news) return;
   next_ = now + std::chrono::milliseconds(50);
   const double wall_s = std::chrono::duration<double>(now - started_).count();
-  fmt::print(out_, "\r  {:8.2f} s  {:5.1f} s elapsed  {}\033[K", done_s, wall_s, note);
+  restart_line(out_);
+  fmt::print(out_, "  {:8.2f} s  {:5.1f} s elapsed  {}", done_s, wall_s, shown(note));
   std::fflush(out_);
   drawn_ = true;
 }

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/quoting.hpp"
 #include "base/result.hpp"
 #include "rt/histogram.hpp"
 
@@ -35,6 +36,13 @@ using Json = nlohmann::ordered_json;
 
 /// Whether people read along: `out` is a terminal.
 [[nodiscard]] bool is_terminal(std::FILE* out);
+
+/// From now on what is printed to either standard stream is harmless() (base/quoting.hpp), whoever
+/// wrote it. Call it first.
+void show_harmless();
+
+/// Begins the line anew on a terminal, over a bar that is there; nothing elsewhere.
+void restart_line(std::FILE* out);
 
 /// From now on no file ends the process in the middle of a cycle. When a pipe's reader or the
 /// terminal is gone, what is printed is thrown away and a stop is asked for (rt::request_stop()).
@@ -94,12 +102,12 @@ void remember_error(Error error);
 void write_failure(const std::string& file);
 
 /// A table of two or more columns, the first left-aligned and the others to the right, unless all
-/// are texts. A table of texts that is wider than 100 characters breaks the widest column's lines
-/// at blanks.
+/// are texts. Cells are shown(), each in one line. A table of texts that is wider than 100
+/// characters breaks the widest column's lines at blanks.
 class Table {
  public:
   explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}
-  void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
+  void add(std::vector<std::string> row);
   [[nodiscard]] std::size_t rows() const { return rows_.size() - 1; }
   void align_left() { left_ = true; }
   /// Prints with a rule below the header, when that is not empty.
@@ -113,9 +121,7 @@ class Table {
 /// Name and value, one pair a line, the values aligned.
 class Facts {
  public:
-  void add(std::string name, std::string value) {
-    facts_.emplace_back(std::move(name), std::move(value));
-  }
+  void add(const std::string& name, const std::string& value);
   void print(std::FILE* out) const;
 
  private:

@@ -6,15 +6,16 @@
 #include <string_view>
 
 #include "apps/text/console.hpp"
+#include "base/bounds.hpp"
 #include "base/result.hpp"
 
 namespace tandem::apps {
 
 /// Deepest nesting, most values in all and most keys of an object that are read: beyond what any
 /// question or answer needs, and below what costs time or stack.
-inline constexpr int kDeepestJson = 32;
-inline constexpr std::size_t kMostJsonValues = 100'000;
-inline constexpr std::size_t kMostJsonKeys = 1'000;
+inline constexpr int kDeepestJson = static_cast<int>(bounds::kJsonDepth.most);
+inline constexpr std::size_t kMostJsonValues = bounds::kJsonValues.most;
+inline constexpr std::size_t kMostJsonKeys = bounds::kJsonKeys.most;
 
 /// One JSON object. Errors: no JSON (with the byte), a number that no double holds, another value
 /// than an object, a key twice, nested or longer than the limits. Throws nothing, whatever it gets.

@@ -166,12 +166,15 @@ Exit identify_command(const IdentifyOptions& options) {
   if (!result) return refuse(result.error());
   std::FILE* out = human_output(options.json);
   print_result(out, *result);
-  for (const std::string& remark : result->remarks) fmt::print(stderr, "note: {}\n", remark);
-  for (const std::string& warning : result->warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& remark : result->remarks)
+    fmt::print(stderr, "note: {}\n", shown(remark, 2'000));
+  for (const std::string& warning : result->warnings)
+    fmt::print(stderr, "warning: {}\n", shown(warning, 2'000));
   const auto written = write_identified(*robot, *result, options.logs, draft->path());
   if (!written) return refuse(draft->placed(written.error()));
   Facts files;
-  for (const std::string& note : written->notes) fmt::print(stderr, "note: {}\n", note);
+  for (const std::string& note : written->notes)
+    fmt::print(stderr, "note: {}\n", shown(note, 2'000));
   for (const std::string& file : written->paths) files.add("written", draft->placed(file));
   if (program_exists("gnuplot")) {
     const auto page = write_identify_page(*result, robot->config.name, draft->path());

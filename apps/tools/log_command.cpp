@@ -66,7 +66,7 @@ std::string readable_text(const log::LogFile& file) {
 
 void print_info(const log::LogFile& file, std::FILE* out) {
   const log::RunInfo& info = file.info();
-  fmt::print(out, "{}\n", file.path());
+  fmt::print(out, "{}\n", shown(file.path(), 4'096));
   Facts facts;
   if (file.truncated()) {
     facts.add("not whole", cut_text(file));
@@ -200,10 +200,10 @@ void print_comparison(const log::Comparison& comparison, std::FILE* out) {
   }
   table.print(out);
   for (const std::string& topic : comparison.only_a) {
-    fmt::print(out, "only the first log has {}\n", topic);
+    fmt::print(out, "only the first log has {}\n", shown(topic));
   }
   for (const std::string& topic : comparison.only_b) {
-    fmt::print(out, "only the second log has {}\n", topic);
+    fmt::print(out, "only the second log has {}\n", shown(topic));
   }
   fmt::print(out, "{}\n", comparison.equal() ? "the same, bit for bit" : "they differ");
 }

@@ -159,7 +159,7 @@ void print_learned(const std::vector<NamedTorques>& runs, const std::vector<std:
   }
   fmt::print(out, "[estimation.collision.threshold_Nm]\n");
   for (std::size_t j = 0; j < joints.size(); ++j)
-    fmt::print(out, "\"{}\" = {:.3f}\n", joints[j], thresholds[j]);
+    fmt::print(out, "{} = {:.3f}\n", quoted_text(joints[j]), thresholds[j]);
 }
 
 }  // namespace

@@ -11,7 +11,8 @@ Exit report_command(const ReportOptions& options) {
   const auto files = draw_report(options.log, options.others, options.output);
   if (!files) return refuse(files.error());
   std::FILE* out = human_output(options.json);
-  for (const std::string& remark : files->remarks) fmt::print(stderr, "note: {}\n", remark);
+  for (const std::string& remark : files->remarks)
+    fmt::print(stderr, "note: {}\n", shown(remark, 2'000));
   Facts facts;
   facts.add("report", files->page);
   for (const std::string& image : files->images) facts.add("image", image);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/bounds.hpp"
 #include "base/nearest.hpp"
 #include "dds/cdr.hpp"
 #include "log/import/sources.hpp"
@@ -201,6 +202,8 @@ class BagSource {
     const auto listed = [&](const char* one) {
       return std::ranges::find(map_.ignore, one) != map_.ignore.end();
     };
+    if (ignored.size() == bounds::kLogNames.most)
+      return std::unexpected(beyond(bounds::kLogNames, path_, 0, name));
     ignored.push_back(name);
     if (listed("*") || listed(name.c_str())) return {};
     std::vector<std::string> known;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "base/bounds.hpp"
+
 namespace tandem::log {
 namespace {
 
@@ -50,6 +52,8 @@ Result<CsvRows> CsvRows::open(std::string_view text, const std::string& file,
   if (!rows.next_line()) return refuse("has no rows", "is this the whole file?");
   rows.split(rows.text_line_);
   if (!rows.cells_.empty() && rows.cells_.back().empty()) rows.cells_.pop_back();
+  if (rows.cells_.size() > bounds::kCsvColumns.most)
+    return std::unexpected(beyond(bounds::kCsvColumns, file, rows.line_));
   for (std::size_t i = 0; i < rows.cells_.size(); ++i) {
     std::string name = format.header ? std::string(rows.cells_[i]) : "c" + std::to_string(i + 1);
     if (name.empty()) {

@@ -14,7 +14,7 @@ namespace {
 TEST_F(BadInput, OfATerminalsEscapesIsShownAndNotObeyed) {
   const Outcome outcome = tandem("check 'a\033[2Jb.toml'");
   EXPECT_EQ(outcome.status, 2);
-  EXPECT_NE(outcome.err.find("a\\x1b[2Jb.toml"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("a\\u001b[2Jb.toml"), std::string::npos) << outcome.err;
   EXPECT_EQ(outcome.err.find('\033'), std::string::npos);
 }
 

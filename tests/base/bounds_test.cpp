@@ -126,6 +126,15 @@ TEST(Bounds, OfErrorsListSomeAndCountTheRest) {
   EXPECT_EQ(errors.back().file, "many.toml");
 }
 
+TEST(Bounds, OfListsOfTablesAreOneError) {
+  const auto document = TomlDocument::parse(repeated("[[site]]\nname = 'a'\n", 1'001), "many.toml");
+  ASSERT_TRUE(document);
+  EXPECT_TRUE(document->root().tables("site").empty());
+  ASSERT_EQ(document->diagnostics().size(), 1U);
+  EXPECT_EQ(document->diagnostics().front().to_string(),
+            "many.toml:1: site: has more than 1000 tables [[NAME]] of a name (no more is read)");
+}
+
 /// The page has every figure, in the table's order.
 TEST(Bounds, AreThoseOfTheirPage) {
   std::ifstream in(std::string(TANDEM_SOURCE_DIR) + "/docs/bounds.md");
