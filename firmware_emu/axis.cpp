@@ -264,10 +264,10 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
 
   AxisEvents events;
   // Once it rests, and whenever a reset is asked for, the fault is what is there now: it may be
-  // another cause than the one that was found first.
-  const bool settled =
-      now == DriveState::kFault && cause != ErrorCode::kNone &&
-      (before != now || (objects_.controlword & canopen::controlword::kFaultReset) != 0);
+  // another cause than the one that was found first. Of a connection the first loss is the cause.
+  const bool asks = (objects_.controlword & canopen::controlword::kFaultReset) != 0;
+  const bool settled = now == DriveState::kFault && (before != now || asks) &&
+                       cause != ErrorCode::kNone && cause != connection;
   if ((now == DriveState::kFaultReactionActive && before != now) ||
       (settled && objects_.error_code != static_cast<std::uint16_t>(cause))) {
     events.raised = cause;
