@@ -40,9 +40,10 @@ struct LimitCounters {
 ///   position reference is not used, and set to the measured position.
 /// - Where a joint declares them, a position reference keeps its acceleration and jerk, a velocity
 ///   reference its acceleration and jerk: ReferenceMotion.
-/// - Torque, and in its mode velocity, stiffness and damping, change by no more than their limit
-///   in kFullScale_s. A loop that was open starts from what is measured, or free. A value that
-///   nobody has written since goes on toward what was wanted.
+/// - Torque, and in its mode velocity, current, voltage, stiffness and damping, change by no more
+///   than their limit in kFullScale_s (current and voltage: JointCapabilities has their rates). A
+///   loop that was open starts from what is measured, or free. A value that nobody has written
+///   since goes on toward what was wanted.
 class CommandLimits {
  public:
   /// Of its maximum velocity: the speed of a joint that is led back into its range.
@@ -80,6 +81,8 @@ class CommandLimits {
     // What was wanted of those that may not change at once.
     double velocity_wish_rad_s = 0.0;
     double torque_wish_Nm = 0.0;
+    double voltage_wish_V = 0.0;
+    double current_wish_A = 0.0;
     double stiffness_wish_Nm_rad = 0.0;
     double damping_wish_Nms_rad = 0.0;
     std::int64_t mode = 0;
@@ -94,6 +97,9 @@ class CommandLimits {
   void brake_before_ends(std::size_t joint, double position_rad,
                          double& reference) noexcept TANDEM_RT;
   void torque(std::size_t joint, const Last& was, const StateImage& state,
+              CommandImage& command) noexcept TANDEM_RT;
+  /// Voltage and current: of the last gate before the motor.
+  void direct(std::size_t joint, const Last& was, const StateImage& state,
               CommandImage& command) noexcept TANDEM_RT;
   void impedance(std::size_t joint, const Last& was, const StateImage& state,
                  CommandImage& command) noexcept TANDEM_RT;
