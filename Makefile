@@ -62,6 +62,7 @@ test-all: test
 	@TANDEM_IDENTIFY_SEEDS=1000 build/release/bin/identification_test --gtest_filter='Identify.Intervals*'
 	@TANDEM_IDENTIFY_ALL=1 build/release/bin/identify_test --gtest_brief=1
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
+	@TANDEM_MOTION_COMMANDS=20000 build/release/bin/motion_bounds_test
 	@TANDEM_TELEOPERATION=build/teleoperation.txt build/release/bin/teleoperation_test --gtest_filter='*Table*' --gtest_brief=1
 	@TANDEM_HIL_SECONDS=30 tests/hil/run build/release/bin/hil_test --gtest_filter='*HilLockstep*'
 	@scripts/test-anywhere --paths

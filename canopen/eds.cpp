@@ -67,6 +67,8 @@ constexpr std::array kNames{
     ObjectName{0x2038, "Sensor mismatch", "Window,Time"},
     ObjectName{0x2039, "Oscillation", "Limit,Time"},
     ObjectName{0x203A, "Brake", "Fitted,Release time,Engage time"},
+    ObjectName{0x203B, "Excess", "Share,Time"},
+    ObjectName{0x203C, "Swing"},
     ObjectName{0x2040, "Telemetry",
                "Torque reference,Transfer voltage,Position integral,Velocity integral,"
                "Torque integral,Current integral,I2t load,Oscillation load"},

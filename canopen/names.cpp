@@ -56,11 +56,13 @@ const char* to_string(ErrorCode code) noexcept {
     case ErrorCode::kPdoTooLong: return "PDO too long";
     case ErrorCode::kSyncLost: return "SYNC lost";
     case ErrorCode::kVelocityControl: return "velocity limit exceeded";
+    case ErrorCode::kExcessTorque: return "torque limit exceeded";
     case ErrorCode::kFollowingError: return "following error";
     case ErrorCode::kPositionLimit: return "position limit exceeded";
     case ErrorCode::kCommandTimeout: return "command time-out";
     case ErrorCode::kEmergencyInput: return "emergency stop input active";
     case ErrorCode::kOscillation: return "the joint oscillates";
+    case ErrorCode::kExcessPower: return "power limit exceeded";
   }
   return "";
 }

@@ -152,6 +152,8 @@ inline constexpr std::uint16_t kMotorResolution = 0x2033;   // u32 [motor counts
 inline constexpr std::uint16_t kTemperatureLimit = 0x2034;  // i16 [0.1 degC]
 inline constexpr std::uint16_t kOscillation = 0x2039;       // f32: OscillationSub
 inline constexpr std::uint16_t kBrake = 0x203A;             // u16: BrakeSub
+inline constexpr std::uint16_t kExcess = 0x203B;            // f32: ExcessSub
+inline constexpr std::uint16_t kSwing = 0x203C;             // f32 [rad/s], 0: not watched
 
 // The manufacturer's, of a board
 inline constexpr std::uint16_t kCycleCounter = 0x2051;  // u8: by RPDO, echoed by TPDO
@@ -205,6 +207,11 @@ enum I2tSub : std::uint8_t {
 enum OscillationSub : std::uint8_t {
   kOscillationLimit = 1,  ///< [Nm] RMS of the motor torque's fast part; 0: not watched
   kOscillationTime,       ///< [s] over which the mean is taken
+};
+/// Sub-indices of object::kExcess.
+enum ExcessSub : std::uint8_t {
+  kExcessShare = 1,  ///< of the limits, by which motion may be beyond them; 0: not watched
+  kExcessTime,       ///< [s] for which it may
 };
 /// Sub-indices of object::kBrake.
 enum BrakeSub : std::uint8_t {
@@ -317,8 +324,10 @@ enum class ErrorCode : std::uint16_t {
   kSyncLost = 0x8700,         ///< sync controller
   kCommandTimeout = 0xFF01,   ///< ours: SYNCs came without commands
   kEmergencyInput = 0xFF02,   ///< ours: the interlock input (60FD bit 3) is active
-  kOscillation = 0xFF03,      ///< ours: the motor's torque oscillates (2039)
+  kOscillation = 0xFF03,      ///< ours: the joint rings (2039) or swings (203C)
+  kExcessPower = 0xFF04,      ///< ours: more mechanical power than the limits allow (203B)
   kVelocityControl = 0x8400,  ///< velocity (limit) exceeded
+  kExcessTorque = 0x8311,     ///< more torque than the limit allows
   kFollowingError = 0x8611,
   kPositionLimit = 0x8612,  ///< reference or position limit
 };

@@ -105,8 +105,21 @@ void Axis::apply_settings() noexcept TANDEM_RT {
       .mismatch_window_rad = objects_.mismatch[kMismatchWindow - 1],
       .mismatch_timeout_s = objects_.mismatch[kMismatchTimeout - 1],
       .oscillation_limit_Nm = objects_.oscillation[canopen::kOscillationLimit - 1],
-      .oscillation_time_s = objects_.oscillation[canopen::kOscillationTime - 1]};
+      .oscillation_time_s = objects_.oscillation[canopen::kOscillationTime - 1],
+      .swing_limit_rad_s = objects_.swing};
+  watch_limits(config);
   settings_changed_ = false;
+}
+
+/// What motion may be, as a share more than the limits.
+void Axis::watch_limits(const ControllerConfig& config) noexcept {
+  const double share = objects_.excess[canopen::kExcessShare - 1];
+  if (!(share > 0.0)) return;
+  ProtectionConfig& c = protection_config_;
+  c.excess_velocity_rad_s = (1.0 + share) * config.velocity_limit_rad_s;
+  c.excess_torque_Nm = (1.0 + share) * config.torque_limit_Nm;
+  c.excess_power_W = (1.0 + share) * config.velocity_limit_rad_s * config.torque_limit_Nm;
+  c.excess_time_s = objects_.excess[canopen::kExcessTime - 1];
 }
 
 void Axis::sample(const AxisSense& sense) noexcept TANDEM_RT {
@@ -215,6 +228,12 @@ ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
        .mismatch_rad = mismatch_rad(),
        .motor_torque_Nm =
            objects_.motor_data[canopen::kMotorTorqueConstant - 1] * measured_.current_A,
+       .link_velocity_rad_s = measured_.link_velocity_rad_s,
+       .motor_velocity_rad_s = measured_.motor_velocity_rad_s,
+       .torque_Nm = measured_.torque_Nm,
+       .deviation_rad_s = controller_.terms().deviation_rad_s,
+       .asked_torque_Nm = controller_.terms().torque_reference_Nm,
+       .follows_motion = controller_.follows_motion(),
        .sensors_valid = sensors_valid_,
        .powered = powered(),
        .drives = action() != Action::kOff && action() != Action::kBrake,
@@ -386,6 +405,7 @@ bool Axis::can_ramp() const noexcept {
     case ErrorCode::kSensorMismatch:
     case ErrorCode::kVoltage:
     case ErrorCode::kOscillation:
+    case ErrorCode::kVelocityControl:
     case ErrorCode::kFollowingError: return false;
     default: return true;
   }

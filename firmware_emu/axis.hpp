@@ -56,6 +56,7 @@ class Axis final : private canopen::ObjectOwner {
                                                 const std::uint8_t* bytes) const noexcept;
 
   void apply_settings() noexcept TANDEM_RT;
+  void watch_limits(const ControllerConfig& config) noexcept;
   [[nodiscard]] bool supported(std::int8_t mode) const noexcept;
   /// Counts of the joint's encoder as 6064 shows them, and back.
   [[nodiscard]] std::int32_t to_wire(std::int64_t counts) const noexcept;

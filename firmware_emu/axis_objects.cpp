@@ -68,6 +68,8 @@ AxisObjects AxisObjects::from(const AxisSetup& setup, int command_timeout_syncs)
   o.i2t = {real32(setup.continuous_current_A), real32(setup.thermal_time_s)};
   o.mismatch = {real32(setup.mismatch_window_rad), real32(setup.mismatch_timeout_s)};
   o.oscillation = {real32(setup.oscillation_limit_Nm), real32(setup.oscillation_time_s)};
+  o.excess = {real32(setup.excess_share), real32(setup.excess_time_s)};
+  o.swing = real32(setup.swing_limit_rad_s);
   o.transfer_time_s = real32(c.transfer_time_s);
   o.undervoltage_V = real32(setup.undervoltage_V);
   o.stop_time_s = real32(setup.stop_time_s);
@@ -158,6 +160,8 @@ bool AxisObjects::add_limits(ObjectDictionary& od, int axis, ObjectOwner& owner)
          add_array(od, at(co::kI2t), i2t, kReadWrite, kNotNegative, &owner) &&
          add_array(od, at(own::kMismatch), mismatch, kReadWrite, kNotNegative, &owner) &&
          add_array(od, at(co::kOscillation), oscillation, kReadWrite, kNotNegative, &owner) &&
+         add_array(od, at(co::kExcess), excess, kReadWrite, kNotNegative, &owner) &&
+         od.add(at(co::kSwing), 0, swing, kReadWrite, kNotNegative, &owner) &&
          od.add_value<std::uint8_t>(at(co::kBrake), 0, 3) &&
          od.add(at(co::kBrake), kBrakeFitted, brake[0], kReadWrite, {0, 1}, &owner) &&
          od.add(at(co::kBrake), kBrakeRelease, brake[1], kReadWrite, {0, kLongestBrake_ms},

@@ -50,7 +50,7 @@ enum TelemetrySub : std::uint8_t {
 inline constexpr std::size_t kTelemetryValues = 8;
 
 /// Entries that an axis adds, for the dictionary's capacity.
-inline constexpr std::size_t kAxisEntries = 132;
+inline constexpr std::size_t kAxisEntries = 136;
 
 /// 6087: the torque reference may change as it likes.
 inline constexpr std::uint32_t kNoTorqueSlope = std::numeric_limits<std::uint32_t>::max();
@@ -88,6 +88,8 @@ struct AxisObjects {
   std::array<float, 2> i2t{};
   std::array<float, 2> mismatch{};
   std::array<float, 2> oscillation{};
+  std::array<float, 2> excess{};
+  float swing = 0.0F;
   float transfer_time_s = 0.0F;
   float undervoltage_V = 0.0F;
   float stop_time_s = 0.0F;

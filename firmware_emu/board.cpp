@@ -75,7 +75,10 @@ Status check_axis(const AxisSetup& axis, const std::string& key) {
                              axis.mismatch_window_rad,
                              axis.mismatch_timeout_s,
                              axis.oscillation_limit_Nm,
-                             axis.oscillation_time_s}) {
+                             axis.oscillation_time_s,
+                             axis.excess_share,
+                             axis.excess_time_s,
+                             axis.swing_limit_rad_s}) {
     if (!std::isfinite(value) || value < 0.0) {
       return bad(key, "a setting is negative or not finite");
     }

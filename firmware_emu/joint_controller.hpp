@@ -33,7 +33,7 @@ struct ControllerConfig {
   double torque_limit_Nm = 0.0;
   /// By how much the torque reference may change: the limit of its rate.
   double torque_slope_Nm_s = std::numeric_limits<double>::infinity();
-  double velocity_limit_rad_s = 0.0;  ///< of velocity references; 0: none
+  double velocity_limit_rad_s = 0.0;  ///< of velocity references and of the motion; 0: none
   double min_position_rad = -std::numeric_limits<double>::infinity();  ///< of references
   double max_position_rad = std::numeric_limits<double>::infinity();
   double stop_deceleration_rad_s2 = 20.0;  ///< of kRamp
@@ -87,6 +87,8 @@ class JointController {
     double held_position_rad = 0.0;       ///< kHold's, and the integrated one of kRamp and -4
     double ramp_velocity_rad_s = 0.0;     ///< kRamp's
     double last_position_rad = 0.0;       ///< reference of position control; first: measured
+    double drive_current_A = 0.0;         ///< that the voltage drives, the winding's lag left out
+    double deviation_rad_s = 0.0;         ///< velocity less the reference's; see follows_motion()
     std::int32_t voltage_saturation = 0;  ///< Saturation, by the voltage or current limit
     std::int32_t torque_saturation = 0;   ///< Saturation, by the torque's limit or slope
     std::int64_t reference_limited = 0;   ///< 1: position or velocity reference was cut
@@ -103,6 +105,10 @@ class JointController {
                 const Measurement& measured) noexcept TANDEM_RT;
 
   [[nodiscard]] const Terms& terms() const noexcept { return terms_; }
+  /// Whether the last update() led the joint to a position or velocity.
+  [[nodiscard]] bool follows_motion() const noexcept {
+    return cascaded() && (action_ != Action::kFollow || mode_ != canopen::Mode::kCst);
+  }
   [[nodiscard]] const Pid& position_loop() const noexcept { return position_; }
   [[nodiscard]] const Pid& velocity_loop() const noexcept { return velocity_; }
   [[nodiscard]] const Pid& torque_loop() const noexcept { return torque_; }
@@ -154,8 +160,11 @@ class JointController {
                Step& step) noexcept;
   void current_loop(double current_A, const Measurement& measured, Step& step) noexcept;
   [[nodiscard]] Saturation limit_torque(double& torque_Nm, double last_Nm) const noexcept;
+  [[nodiscard]] double current_of(double voltage_V, const Measurement& measured) const noexcept;
   [[nodiscard]] Saturation limit_voltage(double& voltage_V,
                                          const Measurement& measured) const noexcept;
+  /// The most current in direction `way` (1 or -1): see kTaperFrom.
+  [[nodiscard]] double most_current_A(double way, const Measurement& measured) const noexcept;
   void integrate(const Step& step, Saturation voltage_cut) noexcept;
 
   ControllerConfig config_;

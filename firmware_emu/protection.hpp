@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "base/realtime.hpp"
+#include "base/swing_watch.hpp"
 #include "canopen/objects.hpp"
 
 namespace tandem::firmware {
@@ -27,6 +28,12 @@ struct ProtectionConfig {
   double mismatch_timeout_s = 0.0;
   double oscillation_limit_Nm = 0.0;  ///< 0: not watched
   double oscillation_time_s = 1.0;
+  double swing_limit_rad_s = 0.0;  ///< 0: not watched
+  // What motion may not be beyond for longer than excess_time_s; 0: not watched.
+  double excess_velocity_rad_s = 0.0;
+  double excess_torque_Nm = 0.0;
+  double excess_power_W = 0.0;
+  double excess_time_s = 0.0;
 };
 
 struct ProtectionInputs {
@@ -37,7 +44,14 @@ struct ProtectionInputs {
   double bus_voltage_V = 0.0;
   /// Motor angle less link angle less what the spring's torque accounts for.
   double mismatch_rad = 0.0;
-  double motor_torque_Nm = 0.0;   ///< N K i
+  double motor_torque_Nm = 0.0;  ///< N K i
+  double link_velocity_rad_s = 0.0;
+  double motor_velocity_rad_s = 0.0;
+  double torque_Nm = 0.0;  ///< measured, of the link
+  // Of loops that follow a motion; see SwingWatch.
+  double deviation_rad_s = 0.0;
+  double asked_torque_Nm = 0.0;
+  bool follows_motion = false;    ///< the last two mean something
   bool sensors_valid = true;      ///< every reading is a number
   bool powered = false;           ///< the bridge is on
   bool drives = false;            ///< it is, and does not merely short the winding
@@ -62,7 +76,11 @@ struct ProtectionInputs {
 /// found after -T ln(1 - limit^2 / r^2), with r = a for a square wave and a / sqrt(2) for a sine
 /// (less below f: r is multiplied by F / sqrt(F^2 + f^2) at the frequency F); one step of the
 /// torque by d adds no more than d^2 / (4 pi f T) to x. A shorted winding is not watched: its
-/// torque only brakes.
+/// torque only brakes. Slower swings are SwingWatch's.
+///
+/// Motion beyond the joint's limits: the faster of link and motor, the link's torque, and the power
+/// that it gives or takes (torque times velocity), each for longer than excess_time_s: shorter ones
+/// are impacts. A winding that is shorted only brakes, and a bridge that is open does nothing.
 class Protection {
  public:
   /// Share of a limit from which the statusword warns, and to which I2t must fall before a reset.
@@ -70,9 +88,11 @@ class Protection {
   static constexpr double kTemperatureHysteresis_K = 5.0;
   /// f above.
   static constexpr double kFastTorque_Hz = 10.0;
+  /// n of SwingWatch.
+  static constexpr std::size_t kHalfSwings = 4;
 
   /// @return kNone, or the first of: position sensor, sensor mismatch, I2t, temperature,
-  ///         under-voltage, oscillation, following error, position limit.
+  ///         under-voltage, oscillation, velocity, torque, power, following error, position limit.
   canopen::ErrorCode update(const ProtectionConfig& config, const ProtectionInputs& in,
                             double dt_s) noexcept TANDEM_RT {
     using canopen::ErrorCode;
@@ -91,12 +111,15 @@ class Protection {
         config.mismatch_window_rad > 0.0 && std::abs(in.mismatch_rad) > config.mismatch_window_rad;
     state_.mismatch_s = contradicts ? state_.mismatch_s + dt_s : 0.0;
     watch_oscillation(config, in, dt_s);
+    const bool swings = swings_slowly(config, in, dt_s);
+    const ErrorCode excess = watch_excess(config, in, dt_s);
 
     if (state_.mismatch_s > config.mismatch_timeout_s) return ErrorCode::kSensorMismatch;
     if (state_.overload != 0) return ErrorCode::kI2t;
     if (state_.overheated != 0) return ErrorCode::kDriveTemperature;
     if (in.bus_voltage_V < config.undervoltage_V) return ErrorCode::kVoltage;
-    if (oscillation(config) >= 1.0) return ErrorCode::kOscillation;
+    if (oscillation(config) >= 1.0 || swings) return ErrorCode::kOscillation;
+    if (excess != ErrorCode::kNone) return excess;
     if (lags && state_.lagging_s > config.following_timeout_s) return ErrorCode::kFollowingError;
     if (leaves) return ErrorCode::kPositionLimit;
     return ErrorCode::kNone;
@@ -127,6 +150,9 @@ class Protection {
     double upper_rad = 0.0;
     double slow_Nm = 0.0;   ///< s above
     double fast_Nm2 = 0.0;  ///< x above
+    double too_fast_s = 0.0;
+    double too_strong_s = 0.0;
+    double too_powerful_s = 0.0;
     std::int64_t overload = 0;
     std::int64_t overheated = 0;
     std::int64_t warm = 0;
@@ -146,6 +172,33 @@ class Protection {
     state_.fast_Nm2 +=
         (fast * fast - state_.fast_Nm2) * std::min(1.0, dt_s / config.oscillation_time_s);
   }
+  bool swings_slowly(const ProtectionConfig& config, const ProtectionInputs& in,
+                     double dt_s) noexcept {
+    if (in.drives && in.follows_motion) {
+      return swing_.update(in.deviation_rad_s, in.asked_torque_Nm, config.swing_limit_rad_s,
+                           kHalfSwings, dt_s);
+    }
+    swing_.restart();
+    return false;
+  }
+  canopen::ErrorCode watch_excess(const ProtectionConfig& config, const ProtectionInputs& in,
+                                  double dt_s) noexcept {
+    const auto lasts = [&](double& since_s, double value, double limit) {
+      const bool beyond = in.drives && limit > 0.0 && value > limit;
+      since_s = beyond ? since_s + dt_s : 0.0;
+      return since_s > config.excess_time_s;
+    };
+    const double speed =
+        std::max(std::abs(in.link_velocity_rad_s), std::abs(in.motor_velocity_rad_s));
+    const double power_W = std::abs(in.torque_Nm * in.link_velocity_rad_s);
+    const bool fast = lasts(state_.too_fast_s, speed, config.excess_velocity_rad_s);
+    const bool strong = lasts(state_.too_strong_s, std::abs(in.torque_Nm), config.excess_torque_Nm);
+    const bool powerful = lasts(state_.too_powerful_s, power_W, config.excess_power_W);
+    return fast       ? canopen::ErrorCode::kVelocityControl
+           : strong   ? canopen::ErrorCode::kExcessTorque
+           : powerful ? canopen::ErrorCode::kExcessPower
+                      : canopen::ErrorCode::kNone;
+  }
   static void hysteresis(std::int64_t& flag, double value, double on, double off) noexcept {
     if (value >= on) flag = 1;
     if (value < off) flag = 0;
@@ -160,6 +213,7 @@ class Protection {
   }
 
   State state_;
+  SwingWatch swing_;
 };
 
 }  // namespace tandem::firmware

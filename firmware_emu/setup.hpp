@@ -73,6 +73,9 @@ struct AxisSetup {
   double mismatch_timeout_s = 0.01;         ///< 2038:2
   double oscillation_limit_Nm = 0.0;        ///< 2039:1; 0: not watched
   double oscillation_time_s = 1.0;          ///< 2039:2
+  double excess_share = 0.0;                ///< 203B:1; 0: not watched
+  double excess_time_s = 0.1;               ///< 203B:2
+  double swing_limit_rad_s = 0.0;           ///< 203C; 0: not watched
   bool brake = false;                       ///< 203A:1: the motor has a spring-applied brake
   std::uint16_t brake_release_ms = 0;       ///< 203A:2
   std::uint16_t brake_engage_ms = 0;        ///< 203A:3

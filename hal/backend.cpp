@@ -24,6 +24,14 @@ std::string Backend::fault_text(FaultCause cause, std::uint32_t code) const {
     case FaultCause::kIgnoresStop:
       return "its drive does not obey the stop, and may still be enabled: cut its power (emergency "
              "stop, STO)";
+    case FaultCause::kTooFast:
+      return "it moves faster than its maximum velocity, and its drive does not stop it";
+    case FaultCause::kTooStrong:
+      return "its torque is beyond its maximum, and its drive does not stop it";
+    case FaultCause::kTooPowerful:
+      return "its power is beyond that of its limits, and its drive does not stop it";
+    case FaultCause::kSwings:
+      return "it swings about its reference, and its drive does not stop it";
   }
   char text[48];
   std::snprintf(text, sizeof text, "the drive reports error 0x%04X", code);

@@ -51,14 +51,12 @@ Code CommandLimits::apply(const StateImage& state, CommandImage& command) noexce
   for (std::size_t j = 0; j < limits_.size(); ++j) {
     codes_[j] = Code::kOk;
     Last& last = last_[j];
-    const JointCapabilities& limit = limits_[j];
     const Last was = last;
     modes(j, command);
     position(j, state, command);
     velocity(j, was, state, command);
     torque(j, was, state, command);
-    bounded(j, command.voltage_V()[j], last.voltage_V, -limit.max_voltage_V, limit.max_voltage_V);
-    bounded(j, command.current_A()[j], last.current_A, -limit.max_current_A, limit.max_current_A);
+    direct(j, was, state, command);
     impedance(j, was, state, command);
     last.operates = in_operation(state, j) ? 1 : 0;
     if (codes_[j] == Code::kNotFinite || worst == Code::kOk) worst = codes_[j];
@@ -77,6 +75,8 @@ void CommandLimits::follow(const CommandImage& command) noexcept TANDEM_RT {
                 .damping_Nms_rad = command.damping_Nms_rad()[j],
                 .velocity_wish_rad_s = command.velocity_rad_s()[j],
                 .torque_wish_Nm = command.torque_Nm()[j],
+                .voltage_wish_V = command.voltage_V()[j],
+                .current_wish_A = command.current_A()[j],
                 .stiffness_wish_Nm_rad = command.stiffness_Nm_rad()[j],
                 .damping_wish_Nms_rad = command.damping_Nms_rad()[j],
                 .mode = command.mode()[j],
@@ -235,6 +235,27 @@ void CommandLimits::torque(std::size_t joint, const Last& was, const StateImage&
   rated(joint, reference, last.torque_Nm,
         starts && std::isfinite(measured) ? measured : was.torque_Nm,
         limits_[joint].max_torque_rate_Nm_s * period_s_);
+}
+
+void CommandLimits::direct(std::size_t joint, const Last& was, const StateImage& state,
+                           CommandImage& command) noexcept TANDEM_RT {
+  Last& last = last_[joint];
+  const JointCapabilities& limit = limits_[joint];
+  const bool operates = in_operation(state, joint);
+  const auto one = [&](ControlMode mode, double& value, double& sent, double& wish, double before,
+                       double measured, double most, double rate) noexcept {
+    go_on(value, before, wish);
+    bounded(joint, value, sent, -most, most);
+    wish = value;
+    if (!operates || !is(mode, last.mode)) return;
+    const bool closed = is(mode, was.mode) && was.operates != 0;
+    const double from = closed || !std::isfinite(measured) ? before : measured;
+    rated(joint, value, sent, std::clamp(from, -most, most), rate * period_s_);
+  };
+  one(ControlMode::kOpenLoop, command.voltage_V()[joint], last.voltage_V, last.voltage_wish_V,
+      was.voltage_V, state.voltage_V()[joint], limit.max_voltage_V, limit.max_voltage_rate_V_s);
+  one(ControlMode::kCurrent, command.current_A()[joint], last.current_A, last.current_wish_A,
+      was.current_A, state.current_A()[joint], limit.max_current_A, limit.max_current_rate_A_s);
 }
 
 void CommandLimits::impedance(std::size_t joint, const Last& was, const StateImage& state,

@@ -43,9 +43,10 @@ struct LimitCounters {
 ///   the reference departs at its velocity.
 /// - While an acceleration holds a position reference back, the velocity reference beside it is its
 ///   velocity.
-/// - Torque, and in its mode velocity, stiffness and damping, change by no more than their limit
-///   in kFullScale_s. A loop that was open starts from what is measured, or free. A value that
-///   nobody has written since goes on toward what was wanted.
+/// - Torque, and in its mode velocity, current, voltage, stiffness and damping, change by no more
+///   than their limit in kFullScale_s (current and voltage: JointCapabilities has their rates). A
+///   loop that was open starts from what is measured, or free. A value that nobody has written
+///   since goes on toward what was wanted.
 class CommandLimits {
  public:
   /// Of its maximum velocity: the speed of a joint that is led back into its range.
@@ -83,6 +84,8 @@ class CommandLimits {
     // What was wanted of those that may not change at once.
     double velocity_wish_rad_s = 0.0;
     double torque_wish_Nm = 0.0;
+    double voltage_wish_V = 0.0;
+    double current_wish_A = 0.0;
     double stiffness_wish_Nm_rad = 0.0;
     double damping_wish_Nms_rad = 0.0;
     std::int64_t mode = 0;
@@ -99,6 +102,9 @@ class CommandLimits {
   void brake_before_ends(std::size_t joint, double position_rad,
                          double& reference) noexcept TANDEM_RT;
   void torque(std::size_t joint, const Last& was, const StateImage& state,
+              CommandImage& command) noexcept TANDEM_RT;
+  /// Voltage and current: of the last gate before the motor.
+  void direct(std::size_t joint, const Last& was, const StateImage& state,
               CommandImage& command) noexcept TANDEM_RT;
   void impedance(std::size_t joint, const Last& was, const StateImage& state,
                  CommandImage& command) noexcept TANDEM_RT;

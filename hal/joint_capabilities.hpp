@@ -24,8 +24,9 @@ enum class Capability : std::uint8_t {
 };
 [[nodiscard]] const char* to_string(Capability capability) noexcept;
 
-/// In which torque, velocity, stiffness or damping may go from nothing to its limit where the joint
-/// declares no rate: faster than a drive's mechanics, slower than an error in a program.
+/// In which torque, velocity, current, voltage, stiffness or damping may go from nothing to its
+/// limit where the joint declares no rate: faster than a drive's mechanics, slower than an error in
+/// a program.
 inline constexpr double kFullScale_s = 0.01;
 
 /// Of its largest velocity: a joint that is measured to move slower than that rests.
@@ -43,7 +44,10 @@ struct JointCapabilities {
   /// Of the torque reference, as declared; else its limit in kFullScale_s.
   double max_torque_rate_Nm_s = 0.0;
   double max_voltage_V = 0.0;
-  double max_current_A = 0.0;
+  double max_current_A = 0.0;  ///< the actuator's, or what gives max_torque_Nm where that is less
+  /// Of the references: their limit in kFullScale_s, and no faster than max_torque_rate_Nm_s gives.
+  double max_voltage_rate_V_s = std::numeric_limits<double>::infinity();
+  double max_current_rate_A_s = std::numeric_limits<double>::infinity();
   /// Of the virtual spring: the position loop's kp (softer than stiff control), or the
   /// configured default where that is larger.
   double max_stiffness_Nm_rad = 0.0;

@@ -38,11 +38,17 @@ enum class FaultCause : std::uint8_t {
   kNotFollowing,  ///< its position stays away from its command
   kGuardingLost,  ///< its board does not answer node guarding any more
   kIgnoresStop,   ///< its drive stays enabled after a stop; its board was told to stop
+  // Its motion, as the master measures it
+  kTooFast,      ///< faster than its maximum velocity
+  kTooStrong,    ///< its torque is beyond its maximum
+  kTooPowerful,  ///< its power is beyond that of both maxima
+  kSwings,       ///< its loop swings it about its reference
 };
 
 /// Whether the joint's board is the matter, and not its drive alone.
 [[nodiscard]] constexpr bool is_of_board(FaultCause cause) noexcept {
-  return cause >= FaultCause::kBoardSilent && cause != FaultCause::kNotFollowing;
+  return cause >= FaultCause::kBoardSilent && cause != FaultCause::kNotFollowing &&
+         cause <= FaultCause::kIgnoresStop;
 }
 
 /// As the TOML has it: "category0".

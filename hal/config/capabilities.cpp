@@ -48,6 +48,23 @@ std::array<PidGains, kPidLoops> most_gains(double torque, double voltage, double
           most(volts_A, 1e2, 1e6, 1.0)};
 }
 
+/// Current and voltage, which no torque reference limits: by the torque that they drive.
+void bound_direct_drive(const JointConfig& joint, const ActuatorConfig& motor,
+                        JointCapabilities& out) {
+  const double constant_Nm_A = motor.gear_ratio * motor.torque_constant_Nm_A;
+  const bool known = joint.max_torque_Nm > 0.0 && constant_Nm_A > 0.0;
+  if (known) out.max_current_A = std::min(out.max_current_A, joint.max_torque_Nm / constant_Nm_A);
+  out.max_current_rate_A_s = out.max_current_A / kFullScale_s;
+  out.max_voltage_rate_V_s = out.max_voltage_V / kFullScale_s;
+  if (!known) return;
+  const double rate_A_s =
+      joint.max_torque_rate_Nm_s.value_or(joint.max_torque_Nm / kFullScale_s) / constant_Nm_A;
+  out.max_current_rate_A_s = std::min(out.max_current_rate_A_s, rate_A_s);
+  if (motor.resistance_ohm > 0.0) {
+    out.max_voltage_rate_V_s = std::min(out.max_voltage_rate_V_s, motor.resistance_ohm * rate_A_s);
+  }
+}
+
 }  // namespace
 
 Robot robot_of(const RobotConfig& config) {
@@ -105,6 +122,7 @@ JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& j
     const double critical = 2.0 * std::sqrt(out.max_stiffness_Nm_rad * actuator.inertia_kg_m2);
     out.max_damping_Nms_rad = std::max({critical, gains.position.gains.kd, gains.damping_Nms_rad});
   }
+  bound_direct_drive(joint, actuator, out);
   return out;
 }
 

@@ -177,6 +177,10 @@ struct JointConfig {
   double max_oscillation = 0.35;    ///< RMS of the motor torque's fast part over the most that the
                                     ///< drive gives; 0: not watched
   double oscillation_time_s = 1.0;  ///< of that mean
+  double max_swing =
+      0.25;  ///< of the maximum velocity: a swing about the reference; 0: not watched
+  double max_excess = 0.25;    ///< by which motion may be beyond its limits; 0: not watched
+  double excess_time_s = 0.1;  ///< for which it may
   std::optional<BrakeConfig> brake = {};
   std::optional<HomingConfig> homing = {};  ///< none: its encoder is absolute
   bool reversed = false;                    ///< the drive counts down as the joint's angle grows

@@ -79,7 +79,10 @@ bool AxisMaster::check(std::int64_t now_ns) noexcept TANDEM_RT {
     latch(AxisError::kNotFollowing, static_cast<std::uint16_t>(ErrorCode::kFollowingError), now_ns);
     return true;
   }
-  return false;
+  const ErrorCode beyond = excess(now_ns);
+  if (beyond == ErrorCode::kNone) return false;
+  latch(AxisError::kBeyondLimits, static_cast<std::uint16_t>(beyond), now_ns);
+  return true;
 }
 
 bool AxisMaster::ignores_stop(std::int64_t now_ns) noexcept TANDEM_RT {
@@ -88,6 +91,38 @@ bool AxisMaster::ignores_stop(std::int64_t now_ns) noexcept TANDEM_RT {
   const std::int64_t most_ns =
       target_ == TargetState::kNothing ? kDisableTimeoutNs : kQuickStopTimeoutNs;
   return ++disobedient_cycles_ > kObeyCycles && now_ns - since_ns_ >= most_ns;
+}
+
+/// In every mode of a drive that is enabled and wanted so.
+ErrorCode AxisMaster::excess(std::int64_t now_ns) noexcept {
+  const bool wanted = target_ == TargetState::kFollow || target_ == TargetState::kHold;
+  const double dt_s = static_cast<double>(now_ns - watched_ns_) * 1e-9;
+  if (wanted && enabled() && age_cycles_ != 0) return ErrorCode::kNone;
+  watched_ns_ = now_ns;
+  if (!wanted || !enabled() || dt_s <= 0.0) {
+    motion_.rest();
+    watched_mode_ = 0;
+    return ErrorCode::kNone;
+  }
+  return motion_.look(motion_sample(dt_s), dt_s);
+}
+
+MotionSample AxisMaster::motion_sample(double dt_s) noexcept {
+  using canopen::Mode;
+  MotionSample sample{.velocity_rad_s = feedback_.velocity / scale_.velocity_per_rad_s,
+                      .torque_Nm = feedback_.torque / scale_.mille_per_Nm};
+  const auto mode = static_cast<Mode>(raw_.mode);
+  const bool positions = mode == Mode::kCsp || mode == Mode::kIp;  // compliant: our boards watch
+  const double error_rad = counts_to(raw_.target_position) / scale_.counts_per_rad;
+  const double approached_rad = watched_error_rad_ - error_rad;
+  watched_error_rad_ = error_rad;
+  const bool shown = !traits_.tells_mode || feedback_.mode_display == raw_.mode;
+  sample.follows = shown && watched_mode_ == raw_.mode && (positions || mode == Mode::kCsv);
+  watched_mode_ = shown ? raw_.mode : std::int64_t{0};
+  sample.deviation_rad_s =
+      positions ? approached_rad / dt_s
+                : sample.velocity_rad_s - raw_.velocity_offset / scale_.velocity_per_rad_s;
+  return sample;
 }
 
 /// In the position modes alone, and not while the drive changes its mode.
@@ -376,6 +411,7 @@ void AxisMaster::forget() noexcept TANDEM_RT {
 }
 
 void AxisMaster::archive(Archive& ar) {
+  ar(motion_, watched_error_rad_, watched_ns_, watched_mode_);
   ar(homing_, was_idle_, held_cycles_, lag_, previous_target_, longest_step_, ignored_stop_,
      disobedient_cycles_);
   ar(feedback_, raw_, target_, error_, heard_, was_enabled_, fault_code_, emergency_code_,

@@ -11,6 +11,7 @@
 #include "hal/ethercat-can/axis_codec.hpp"
 #include "hal/ethercat-can/follow_watch.hpp"
 #include "hal/ethercat-can/homing_sequence.hpp"
+#include "hal/ethercat-can/motion_watch.hpp"
 #include "hal/image.hpp"
 
 namespace tandem::hal::can {
@@ -23,6 +24,7 @@ enum class AxisError : std::uint8_t {
   kLeftEnabled,   ///< it left Operation Enabled by itself
   kNodeLost,      ///< its board is not in operation any more
   kNotFollowing,  ///< its position stays away from its command
+  kBeyondLimits,  ///< it moves faster, harder or more to and fro than it may; the code says which
 };
 
 /// What a drive tells and can, where drives differ.
@@ -36,6 +38,7 @@ struct AxisTraits {
   bool homes = false;          ///< the joint has a homing, and the drive can be told to begin it
   bool tells_motor = true;     ///< the motor's position by itself; else the link's is taken for it
   FollowLimits follow{};
+  MotionLimits motion{};
 };
 
 class AxisMaster {
@@ -65,7 +68,7 @@ class AxisMaster {
   /// @param stiffness, damping  of the impedance mode until a command says otherwise
   AxisMaster(const AxisScale& scale, const AxisTraits& traits, double stiffness_Nm_rad,
              double damping_Nms_rad) noexcept
-      : scale_(scale), traits_(traits), lag_(traits.follow) {
+      : scale_(scale), traits_(traits), lag_(traits.follow), motion_(traits.motion) {
     raw_.stiffness = static_cast<float>(stiffness_Nm_rad);
     raw_.damping = static_cast<float>(damping_Nms_rad);
   }
@@ -153,6 +156,9 @@ class AxisMaster {
   void brake(const CommandImage* image, std::size_t joint) noexcept TANDEM_RT;
   [[nodiscard]] std::int64_t step_from(std::int32_t target) const noexcept TANDEM_RT;
   [[nodiscard]] bool lags(std::int64_t now_ns) noexcept;
+  /// What the joint's motion is beyond, or kNone.
+  [[nodiscard]] canopen::ErrorCode excess(std::int64_t now_ns) noexcept;
+  [[nodiscard]] MotionSample motion_sample(double dt_s) noexcept;
   [[nodiscard]] double counts_to(std::int32_t target) const noexcept;
   [[nodiscard]] double position_error_rad() const noexcept;
   bool enable_is_late(std::int64_t now_ns) noexcept;
@@ -168,6 +174,10 @@ class AxisMaster {
   AxisError error_ = AxisError::kNone;
   HomingSequence homing_;
   FollowWatch lag_;
+  MotionWatch motion_;
+  double watched_error_rad_ = 0.0;  ///< of the position, at the last look at the motion
+  std::int64_t watched_ns_ = 0;
+  std::int64_t watched_mode_ = 0;
   std::int32_t previous_target_ = 0;  ///< the target position before the one in `raw_`
   std::int64_t longest_step_ = 0;     ///< kHold: that the target may go in a cycle [counts]
   bool was_idle_ = false;             ///< kHome: the image has had the joint idle since

@@ -26,7 +26,8 @@ std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& lay
           .tells_mode = node.carries(axis, WireField::kModeDisplay),
           .homes = homes,
           .tells_motor = node.carries(axis, WireField::kMotorPosition),
-          .follow = FollowLimits::of(robot.joints[node.joints[axis]], ours)};
+          .follow = FollowLimits::of(robot.joints[node.joints[axis]], ours),
+          .motion = MotionLimits::of(robot.joints[node.joints[axis]])};
     }
   }
   return traits;

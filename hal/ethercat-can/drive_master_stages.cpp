@@ -48,6 +48,15 @@ FaultCause node_cause(NodeError error) noexcept {
   return FaultCause::kBoardSilent;
 }
 
+FaultCause beyond_cause(std::uint16_t code) noexcept {
+  switch (static_cast<canopen::ErrorCode>(code)) {
+    case canopen::ErrorCode::kVelocityControl: return FaultCause::kTooFast;
+    case canopen::ErrorCode::kExcessTorque: return FaultCause::kTooStrong;
+    case canopen::ErrorCode::kExcessPower: return FaultCause::kTooPowerful;
+    default: return FaultCause::kSwings;
+  }
+}
+
 constexpr auto kNodeLostCode = static_cast<std::uint16_t>(canopen::ErrorCode::kHeartbeatLost);
 
 }  // namespace
@@ -123,6 +132,7 @@ FaultCause DriveMaster::Impl::cause(std::size_t joint) const noexcept TANDEM_RT 
     case AxisError::kNotEnabled: return FaultCause::kNotEnabled;
     case AxisError::kLeftEnabled: return FaultCause::kLeftEnabled;
     case AxisError::kNotFollowing: return FaultCause::kNotFollowing;
+    case AxisError::kBeyondLimits: return beyond_cause(axis.fault_code());
     case AxisError::kNodeLost:
       if (axis.ignored_stop()) return FaultCause::kIgnoresStop;
       return node_cause(nodes[joint_node[joint]].master.error());
@@ -220,7 +230,9 @@ bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
   bool changed = false;
   for (AxisMaster& axis : axes) {
     TargetState its = axis.error() == AxisError::kNone ? target : TargetState::kNothing;
-    if (axis.error() == AxisError::kNotFollowing && target != TargetState::kNothing) {
+    const bool brakes =
+        axis.error() == AxisError::kNotFollowing || axis.error() == AxisError::kBeyondLimits;
+    if (brakes && target != TargetState::kNothing) {
       its = TargetState::kQuickStop;  // it has no fault of its own: it can brake
     }
     changed = changed || axis.target() != its;

@@ -159,6 +159,11 @@ std::string DriveMaster::Impl::axis_text(std::size_t joint) const {
           "{}: does not follow its command at {:.3f} s: is the joint blocked, does the drive get "
           "its commands?",
           joint_name(joint), at_s);
+    case AxisError::kBeyondLimits:
+      return fmt::format(
+          "{}: moves beyond its limits at {:.3f} s, and its drive does not stop it: "
+          "{}",
+          joint_name(joint), at_s, error_text(axis.fault_code()));
     case AxisError::kNodeLost: {
       const std::string cause = node_text(nodes[joint_node[joint]]);
       return fmt::format("{}: board lost at {:.3f} s{}{}", joint_name(joint), at_s,

@@ -173,6 +173,9 @@ void add_protections(AxisSteps& add, const JointConfig& joint, const ActuatorCon
       clamp_round<std::uint16_t>(1000.0 * joint.following_timeout_s));
   add(object::kOscillation, kOscillationLimit, to_float(oscillation_limit_Nm(joint, motor)));
   add(object::kOscillation, kOscillationTime, to_float(joint.oscillation_time_s));
+  add(object::kExcess, kExcessShare, to_float(joint.max_excess));
+  add(object::kExcess, kExcessTime, to_float(joint.excess_time_s));
+  add(object::kSwing, 0, to_float(joint.max_swing * joint.max_velocity_rad_s));
   if (!joint.brake) return;
   add(object::kBrake, kBrakeFitted, std::uint16_t{1});
   add(object::kBrake, kBrakeRelease, static_cast<std::uint16_t>(joint.brake->release_ms));

@@ -105,6 +105,9 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   axis.mismatch_window_rad = kMismatchWindow_rad;
   axis.oscillation_limit_Nm = hal::oscillation_limit_Nm(joint, actuator);
   axis.oscillation_time_s = joint.oscillation_time_s;
+  axis.swing_limit_rad_s = joint.max_swing * joint.max_velocity_rad_s;
+  axis.excess_share = joint.max_excess;
+  axis.excess_time_s = joint.excess_time_s;
   axis.brake = joint.brake.has_value();
   if (joint.brake) {
     axis.brake_release_ms = static_cast<std::uint16_t>(joint.brake->release_ms);

@@ -53,6 +53,10 @@ TEST(SdoSequence, WritesTheProtections) {
   robot.joints[1].following_error_rad = 0.25 * test::kPi;
   robot.joints[1].following_timeout_s = 0.05;
   robot.joints[1].oscillation_time_s = 0.5;
+  robot.joints[1].max_excess = 0.5;
+  robot.joints[1].excess_time_s = 0.25;
+  robot.joints[1].max_swing = 0.125;
+  robot.joints[1].max_velocity_rad_s = 8.0;
   robot.joints[1].max_torque_rate_Nm_s = 2.0 * robot.joints[1].rated_torque_Nm;
   robot.joints[1].brake = BrakeConfig{.torque_Nm = 9.0, .release_ms = 40, .engage_ms = 10};
   const auto layout = make_pdo_layout(robot);
@@ -67,6 +71,9 @@ TEST(SdoSequence, WritesTheProtections) {
   EXPECT_EQ(value(0x6865, 0), 4500u) << "45 degrees of 36000 counts";
   EXPECT_EQ(value(0x6866, 0), 50u);
   EXPECT_EQ(value(0x2839, 2), 0x3F000000u) << "0.5";
+  EXPECT_EQ(value(0x283B, 1), 0x3F000000u) << "0.5";
+  EXPECT_EQ(value(0x283B, 2), 0x3E800000u) << "0.25";
+  EXPECT_EQ(value(0x283C, 0), 0x3F800000u) << "1.0";
   EXPECT_EQ(value(0x6887, 0), 2000u) << "per mille of rated torque and second";
   EXPECT_EQ(value(0x283A, 1), 1u);
   EXPECT_EQ(value(0x283A, 2), 40u);

@@ -138,7 +138,9 @@ TEST(JointController, ShortsTheWindingInBrakeAndOpensTheBridgeInOff) {
 }
 
 TEST(JointController, LimitsTheVoltageToTheSupplyAndToItsSetting) {
-  const ControllerConfig c = config();
+  ControllerConfig c = config();
+  c.torque_limit_Nm = 1000.0;
+  c.velocity_limit_rad_s = 0.0;
   Reference r = reference();
   r.voltage_V = 100.0;
   Measurement m = measured();
@@ -161,6 +163,37 @@ TEST(JointController, LimitsTheCurrentThatTheVoltageWouldDrive) {
   const double V = controller.update(Action::kFollow, Mode::kOpenLoop, r, m);
   EXPECT_NEAR((V - 4.0 * m.motor_velocity_rad_s) / 0.5, -10.0, 1.0e-12);
   EXPECT_EQ(controller.terms().voltage_saturation, -1);
+}
+
+TEST(JointController, TakesTheDrivingCurrentAwayTowardsTheVelocityLimitInEveryMode) {
+  ControllerConfig c = config();
+  c.voltage_limit_V = 1000.0;
+  c.torque_to_voltage_V_Nm = 100.0;  // the cascade asks for all that there is
+  Reference r = reference();
+  Measurement m = measured();
+  m.bus_voltage_V = 1000.0;
+  for (const Mode mode : {Mode::kCst, Mode::kImpedance, Mode::kOpenLoop, Mode::kCurrent}) {
+    const bool direct = mode == Mode::kOpenLoop || mode == Mode::kCurrent;
+    for (const double way : {1.0, -1.0}) {
+      r.torque_Nm = way * 60.0;
+      r.voltage_V = way * 1000.0;
+      r.current_A = way * 50.0;
+      r.stiffness_Nm_rad = r.damping_Nms_rad = 0.0;
+      struct Case {
+        double share, most_A;
+      };
+      for (const Case& one :
+           {Case{0.5, direct ? 15.0 : 50.0}, Case{0.95, 0.75 * 15.0}, Case{1.0, 0.5 * 15.0},
+            Case{1.1, 0.0}, Case{1.2, -0.5 * 15.0}, Case{2.0, -15.0}}) {
+        m.link_velocity_rad_s = m.motor_velocity_rad_s = way * one.share * 5.0;
+        JointController controller = settled(c, mode, m, r);
+        const double V = controller.update(Action::kFollow, mode, r, m);
+        EXPECT_NEAR(way * (V - 4.0 * m.motor_velocity_rad_s) / 0.5, one.most_A, 1e-9)
+            << static_cast<int>(mode) << " " << way << " " << one.share;
+        EXPECT_TRUE(controller.limited());
+      }
+    }
+  }
 }
 
 TEST(JointController, LimitsTheTorqueReference) {

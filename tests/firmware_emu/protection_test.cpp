@@ -510,6 +510,153 @@ TEST_F(Guard, LeavesHonestMotionsAlone) {
   }
 }
 
+/// A board that watches motion as robot.toml's defaults have it, on a supply that could drive its
+/// joint at 24 rad/s; its limit is 8.
+BoardSetup bounded_setup() {
+  BoardSetup setup = watched_setup();
+  setup.axes[0].excess_share = 0.25;
+  setup.axes[0].excess_time_s = 0.1;
+  setup.axes[0].swing_limit_rad_s = 0.25 * 8.0;
+  setup.axes[0].controller.voltage_limit_V = 100.0;
+  setup.axes[0].controller.min_position_rad = -1e3;
+  setup.axes[0].controller.max_position_rad = 1e3;
+  return setup;
+}
+
+TEST_F(Guard, KeepsAFreeJointWithinItsVelocityInEveryMode) {
+  for (const int mode : {10, -1, -2, -3, -4}) {
+    SCOPED_TRACE(mode);
+    start(bounded_setup());
+    Rig& r = *rig_owner;
+    r.joints[0].link_inertia = 1.0;
+    r.joints[0].bus_V = 100.0;
+    r.enable(static_cast<std::int8_t>(mode));
+    ASSERT_EQ(r.write<float>(0x2010, 0, 0.0F), 0U);
+    ASSERT_EQ(r.write<float>(0x2011, 0, 0.0F), 0U);
+    for (const int way : {1, -1}) {
+      if (mode == -2) ASSERT_EQ(r.write(0x2012, 0, static_cast<std::int16_t>(way * 9900)), 0U);
+      if (mode == -3) ASSERT_EQ(r.write(0x2013, 0, static_cast<std::int16_t>(way * 4900)), 0U);
+      r.commands[0].torque_offset = static_cast<std::int16_t>(way * 1100);  // 55 Nm
+      r.cycles(3000);
+      EXPECT_GT(way * r.joints[0].v, 7.0) << "it moves";
+      EXPECT_LT(way * r.joints[0].v, 1.11 * 8.0);
+      EXPECT_EQ(r.error(), 0) << "never beyond 1.25 of a limit for 0.1 s";
+    }
+  }
+}
+
+TEST_F(Guard, HoldsTheTorqueOfCurrentAndOpenLoopWithinItsLimit) {
+  for (const int mode : {-2, -3}) {
+    SCOPED_TRACE(mode);
+    start(bounded_setup());
+    Rig& r = *rig_owner;
+    r.joints[0].bus_V = 100.0;
+    r.enable(static_cast<std::int8_t>(mode));
+    if (mode == -2) ASSERT_EQ(r.write(0x2012, 0, std::int16_t{9900}), 0U);
+    if (mode == -3) ASSERT_EQ(r.write(0x2013, 0, std::int16_t{4900}), 0U);
+    r.cycles(12000);
+    EXPECT_NEAR(r.joints[0].torque(), 60.0, 0.5) << "when its spring has come to rest";
+    EXPECT_EQ(r.error(), 0);
+  }
+}
+
+TEST_F(Guard, ChangesCurrentAndVoltageNoFasterThanTheTorquesSlope) {
+  for (const int mode : {-2, -3}) {
+    SCOPED_TRACE(mode);
+    BoardSetup setup = bounded_setup();
+    setup.axes[0].controller.torque_slope_Nm_s = 1000.0;  // 1 Nm/ms
+    start(setup);
+    Rig& r = *rig_owner;
+    r.joints[0].link_inertia = 0.2;
+    r.joints[0].bus_V = 100.0;
+    r.enable(static_cast<std::int8_t>(mode));
+    ASSERT_EQ(r.write<std::int16_t>(mode == -2 ? 0x2012 : 0x2013, 0, std::int16_t{4900}), 0U);
+    double before = 4.1 * r.joints[0].i;
+    for (int k = 0; k < 200; ++k) {
+      r.cycle();
+      const double now = 4.1 * r.joints[0].i;
+      EXPECT_LT(now - before, 1.5) << k;
+      before = now;
+    }
+    EXPECT_GT(before, 10.0);
+  }
+}
+
+TEST_F(Guard, StopsAJointThatItsLoadDrivesBeyondItsVelocity) {
+  for (const int mode : {8, 9, 10, -1, -2, -3}) {
+    SCOPED_TRACE(mode);
+    start(bounded_setup());
+    Rig& r = *rig_owner;
+    r.joints[0].link_inertia = 0.2;
+    r.enable(static_cast<std::int8_t>(mode));
+    r.joints[0].load_Nm = 90.0;  // more than it may give against it
+    EXPECT_LT(until_fault(r, 2000), 2000);
+    EXPECT_EQ(r.error(), 0x8400);
+  }
+}
+
+TEST(Excess, OfVelocityTorqueAndPowerIsAFaultAfterItsTimeWhileTheMotorDrives) {
+  const ProtectionConfig config{.temperature_limit_C = 100.0,
+                                .excess_velocity_rad_s = 10.0,
+                                .excess_torque_Nm = 75.0,
+                                .excess_power_W = 600.0,
+                                .excess_time_s = 0.1};
+  struct Case {
+    ProtectionInputs in;
+    ErrorCode code;
+  };
+  for (const Case& one :
+       {Case{{.link_velocity_rad_s = -10.1}, ErrorCode::kVelocityControl},
+        Case{{.motor_velocity_rad_s = 10.1}, ErrorCode::kVelocityControl},
+        Case{{.torque_Nm = -75.1}, ErrorCode::kExcessTorque},
+        Case{{.link_velocity_rad_s = 9.9, .torque_Nm = -70.0}, ErrorCode::kExcessPower},
+        Case{{.link_velocity_rad_s = 9.9, .torque_Nm = 60.0}, ErrorCode::kNone}}) {
+    Protection protection;
+    ProtectionInputs in = one.in;
+    for (int k = 0; k < 99; ++k) {
+      in.powered = in.drives = true;
+      ASSERT_EQ(protection.update(config, in, 1e-3), ErrorCode::kNone) << k;
+    }
+    in.drives = false;
+    ASSERT_EQ(protection.update(config, in, 1e-3), ErrorCode::kNone) << "it brakes";
+    in.drives = true;
+    int taken = 1;
+    while (taken < 200 && protection.update(config, in, 1e-3) == ErrorCode::kNone) ++taken;
+    EXPECT_EQ(protection.update(config, in, 1e-3), one.code);
+    EXPECT_NEAR(taken, one.code == ErrorCode::kNone ? 200 : 101, 1);
+  }
+}
+
+TEST_F(Guard, StopsAJointThatItsOwnLoopKeepsSwinging) {
+  BoardSetup setup = bounded_setup();
+  setup.axes[0].following_window_rad = 0.0;
+  start(setup);
+  Rig& r = *rig_owner;
+  r.joints[0].link_inertia = 0.4;
+  r.enable();
+  r.cycles(300);
+  ASSERT_EQ(r.write(0x2020, 1, 200.0F), 0U);
+  ASSERT_EQ(r.write(0x2020, 2, 2500.0F), 0U);
+  ASSERT_EQ(r.write(0x2020, 3, 0.0F), 0U);
+  r.joints[0].v = 0.5;  // something touches it
+  ASSERT_LT(until_fault(r, 6000), 6000);
+  EXPECT_LT(r.object<float>(0x2040, 8), 1.0F) << "slower than what rings";
+  expect_fault(r, 0xFF03, 0x20);
+}
+
+TEST_F(Guard, LeavesPushesAndStepsAlone) {
+  start(bounded_setup());
+  Rig& r = *rig_owner;
+  r.joints[0].link_inertia = 0.2;
+  r.enable();
+  for (int k = 0; k < 8000; ++k) {
+    r.commands[0].position = Rig::counts(k / 1000 % 2 == 0 ? 0.2 : -0.2);
+    r.joints[0].load_Nm = k / 250 % 4 == 0 ? 40.0 : k / 250 % 4 == 2 ? -40.0 : 0.0;
+    r.cycle();
+    ASSERT_EQ(r.error(), 0) << k;
+  }
+}
+
 TEST_F(Guard, DoesNotWatchOscillationWhereTheLimitIsZero) {
   rig.joints[0].link_inertia = 0.2;
   rig.start();

@@ -26,7 +26,7 @@ class Limits : public testing::Test {
   }
   void mode(ControlMode mode) { command.mode()[0] = static_cast<std::int8_t>(mode); }
 
-  RobotConfig robot = test::fake_robot();  // +-1.5 rad, 2 rad/s, 20 Nm, 24 V, 10 A
+  RobotConfig robot = test::fake_robot();  // +-1.5 rad, 2 rad/s, 20 Nm, 24 V, 10 A (4 A: 20 Nm)
   StateImage state{robot.shape()};
   CommandImage command{robot.shape()};
   CommandLimits limits{robot_of(robot), 1'000'000};
@@ -37,7 +37,7 @@ TEST_F(Limits, LetGoodCommandsPassUnchanged) {
   command.velocity_rad_s()[0] = 1.5;
   command.torque_Nm()[0] = -2.0;  // a tenth of what it may be, in a tenth of 10 ms
   command.voltage_V()[0] = 24.0;
-  command.current_A()[0] = -10.0;
+  command.current_A()[0] = -4.0;  // gives 20 Nm
   command.stiffness_Nm_rad()[0] = 200.0;
   command.damping_Nms_rad()[0] = 25.0;
   const CommandImage before = command;
@@ -52,7 +52,7 @@ TEST_F(Limits, KeepTheLastGoodValueOfEveryFieldThatIsNotFinite) {
   command.velocity_rad_s()[0] = 0.5;
   command.torque_Nm()[0] = 3.0;
   command.voltage_V()[0] = 4.0;
-  command.current_A()[0] = 5.0;
+  command.current_A()[0] = 3.5;
   command.stiffness_Nm_rad()[0] = 6.0;
   command.damping_Nms_rad()[0] = 7.0;
   ASSERT_EQ(limits.apply(state, command), Code::kOk);
@@ -97,7 +97,7 @@ TEST_F(Limits, HoldEveryReferenceWithinItsRange) {
   EXPECT_EQ(command.velocity_rad_s()[0], -2.0);
   EXPECT_EQ(command.torque_Nm()[0], 20.0);
   EXPECT_EQ(command.voltage_V()[0], -24.0);
-  EXPECT_EQ(command.current_A()[0], 10.0);
+  EXPECT_EQ(command.current_A()[0], 4.0) << "which gives 20 Nm";
   EXPECT_EQ(command.stiffness_Nm_rad()[0], 0.0);
   EXPECT_EQ(command.damping_Nms_rad()[0], limits.limits()[0].max_damping_Nms_rad);
   EXPECT_EQ(limits.counters()[0].out_of_range, 6U);
@@ -237,6 +237,39 @@ TEST_F(Limits, ChangeTorqueAndVelocityByATenthOfTheirLimitInAMillisecond) {
   command.velocity_rad_s()[0] = -2.0;
   EXPECT_EQ(limits.apply(state, command), Code::kOk);
   EXPECT_DOUBLE_EQ(command.velocity_rad_s()[0], 0.5);
+}
+
+TEST_F(Limits, ChangeCurrentAndVoltageNoFasterThanTheTorqueMayInTheirModes) {
+  const JointCapabilities& limit = limits.limits()[0];
+  EXPECT_LE(limit.max_current_rate_A_s, limit.max_current_A / kFullScale_s);
+  EXPECT_LE(limit.max_voltage_rate_V_s, limit.max_voltage_V / kFullScale_s);
+  const auto steps_to = [&](ControlMode which, double& value, double most, double rate) {
+    mode(which);
+    value = 0.0;
+    ASSERT_EQ(limits.apply(state, command), Code::kOk);
+    value = 1e9;
+    EXPECT_EQ(limits.apply(state, command), Code::kOutOfRange);
+    double before = 0.0;
+    for (int k = 0; k < 2000 && value < most; ++k) {
+      EXPECT_LE(value - before, rate * 1e-3 * (1.0 + 1e-9));
+      before = value;
+      ASSERT_EQ(limits.apply(state, command), Code::kOk) << "it goes on by itself";
+    }
+    EXPECT_EQ(value, most);
+  };
+  steps_to(ControlMode::kCurrent, command.current_A()[0], limit.max_current_A,
+           limit.max_current_rate_A_s);
+  steps_to(ControlMode::kOpenLoop, command.voltage_V()[0], limit.max_voltage_V,
+           limit.max_voltage_rate_V_s);
+}
+
+TEST_F(Limits, StartACurrentFromWhatIsMeasured) {
+  state.current_A()[0] = 3.0;
+  mode(ControlMode::kCurrent);
+  command.current_A()[0] = 0.0;
+  ASSERT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_NEAR(command.current_A()[0], 3.0, limits.limits()[0].max_current_rate_A_s * 1e-3 + 1e-9);
+  EXPECT_GT(command.current_A()[0], 0.0);
 }
 
 TEST_F(Limits, GoOnTowardATorqueThatIsWrittenOnce) {

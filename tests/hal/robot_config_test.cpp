@@ -496,13 +496,27 @@ TEST(RobotConfig, ReadsTheWatchOfOscillationTheTorquesRateAndTheBrake) {
   EXPECT_FALSE(robot->joints[0].brake.has_value());
 }
 
+TEST(RobotConfig, ReadsTheWatchOfMotionBeyondItsLimits) {
+  const auto robot = parse_robot_config(
+      with(kRobot, "[[sensor]]", "max_swing = 0\nmax_excess = 0.5\nexcess_time_s = 0.2\n"),
+      "leg.toml");
+  ASSERT_TRUE(robot.has_value()) << robot.error()[0].to_string();
+  EXPECT_EQ(robot->joints[0].max_swing, 0.25);
+  EXPECT_EQ(robot->joints[0].max_excess, 0.25);
+  EXPECT_EQ(robot->joints[0].excess_time_s, 0.1);
+  EXPECT_EQ(robot->joints[1].max_swing, 0.0);
+  EXPECT_EQ(robot->joints[1].max_excess, 0.5);
+  EXPECT_EQ(robot->joints[1].excess_time_s, 0.2);
+}
+
 TEST(RobotConfig, RefusesStrangeBrakesOscillationsAndRatesWithLineAndKey) {
   struct Case {
     const char* line;
     const char* key;
   };
   for (const Case& one :
-       {Case{"brake = 5", "brake"}, Case{"brake = {}", "torque_Nm"},
+       {Case{"brake = 5", "brake"},
+        Case{"brake = {}", "torque_Nm"},
         Case{"brake = { torque_Nm = 0, release_ms = 5, engage_ms = 5 }", "torque_Nm"},
         Case{"brake = { torque_Nm = nan, release_ms = 5, engage_ms = 5 }", "torque_Nm"},
         Case{"brake = { torque_Nm = inf, release_ms = 5, engage_ms = 5 }", "torque_Nm"},
@@ -511,9 +525,13 @@ TEST(RobotConfig, RefusesStrangeBrakesOscillationsAndRatesWithLineAndKey) {
         Case{"brake = { torque_Nm = 5, release_ms = 5 }", "engage_ms"},
         Case{"brake = { torque_Nm = 5, release_ms = 5, engage_ms = 1001 }", "engage_ms"},
         Case{"brake = { torque_Nm = 5, release_ms = 5, engage_ms = 5, colour = 1 }", "colour"},
-        Case{"brake = [5, 5, 5]", "brake"}, Case{"max_oscillation = -0.1", "max_oscillation"},
+        Case{"brake = [5, 5, 5]", "brake"},
+        Case{"max_oscillation = -0.1", "max_oscillation"},
         Case{"max_oscillation = 11", "max_oscillation"},
         Case{"oscillation_time_s = 0", "oscillation_time_s"},
+        Case{"max_swing = -1", "max_swing"},
+        Case{"max_excess = 11", "max_excess"},
+        Case{"excess_time_s = -1", "excess_time_s"},
         Case{"max_torque_rate_Nm_s = 0", "max_torque_rate_Nm_s"},
         Case{"max_torque_rate_Nm_s = -5", "max_torque_rate_Nm_s"},
         Case{"max_torque_rate_Nm_s = nan", "max_torque_rate_Nm_s"}}) {

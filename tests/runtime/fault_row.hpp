@@ -82,7 +82,7 @@ struct RowRig : private LoadedRobot, FaultRig {
                   hal::StopCategory on_fault = hal::StopCategory::kCategory1)
       : LoadedRobot(name),
         FaultRig(with(loaded.robot, on_fault), loaded.kernels.get(),
-                 name == "ur5e" ? "ready" : "stand", std::move(scenario), kHanging_ns) {}
+                 name == "coman" ? "stand" : "ready", std::move(scenario), kHanging_ns) {}
   static constexpr std::int64_t kHanging_ns = 1'000'000'000'000;
   static hal::RobotConfig with(hal::RobotConfig config, hal::StopCategory on_fault) {
     for (hal::JointConfig& joint : config.joints) joint.on_fault = on_fault;

@@ -311,6 +311,26 @@ TEST_P(FaultRow, JointRings) {
   EXPECT_NE(rig.causes().find("the joint oscillates"), std::string::npos) << rig.causes();
 }
 
+TEST(FaultRow, JointSwings) {
+  RowRig rig("ur5e");
+  rig.run();
+  ASSERT_TRUE(rig.cycle->services().set_gains(rig.robot.joints[1].name, hal::PidLoop::kPosition,
+                                              {.kp = 1000.0, .ki = 8000.0, .kd = 0.0},
+                                              RunServices::Patience{0}));
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("the joint oscillates"), std::string::npos) << rig.causes();
+}
+
+TEST(FaultRow, JointSwingsOfPanda) {
+  RowRig rig("panda");
+  rig.run();
+  ASSERT_TRUE(rig.cycle->services().set_gains(rig.robot.joints[2].name, hal::PidLoop::kPosition,
+                                              {.kp = 400.0, .ki = 8000.0, .kd = 0.0},
+                                              RunServices::Patience{0}));
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("the joint oscillates"), std::string::npos) << rig.causes();
+}
+
 // --- controllers ---
 
 TEST_P(FaultRow, ControllerGivesNaN) {
