@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -15,6 +16,7 @@
 namespace tandem::log {
 namespace {
 
+constexpr std::size_t kAheadBytes = std::size_t{1} << 16;
 constexpr const char* kNameALog = "name a log of `tandem run`";
 constexpr std::uint64_t kSmallLog = std::uint64_t{256} << 20;  // that any file may unpack to
 
@@ -97,12 +99,22 @@ Result<McapReader> McapReader::open(std::shared_ptr<const Descriptor> file,
 /// The next bytes. @pre as many are left
 bool McapReader::read(std::span<std::byte> into) {
   while (!into.empty()) {
-    const auto at = static_cast<off_t>(bytes_ - left_);
-    const ssize_t size = ::pread(file_->get(), into.data(), into.size(), at);
-    if (size < 0 && errno == EINTR) continue;
-    if (size <= 0) return false;
-    left_ -= static_cast<std::uint64_t>(size);
-    into = into.subspan(static_cast<std::size_t>(size));
+    if (ahead_at_ == ahead_.size()) {
+      ahead_.resize(kAheadBytes);
+      ssize_t size = 0;
+      do {
+        size =
+            ::pread(file_->get(), ahead_.data(), ahead_.size(), static_cast<off_t>(bytes_ - left_));
+      } while (size < 0 && errno == EINTR);
+      ahead_.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+      ahead_at_ = 0;
+      if (size <= 0) return false;
+    }
+    const std::size_t size = std::min(into.size(), ahead_.size() - ahead_at_);
+    std::memcpy(into.data(), ahead_.data() + ahead_at_, size);
+    ahead_at_ += size;
+    left_ -= size;
+    into = into.subspan(size);
   }
   return true;
 }

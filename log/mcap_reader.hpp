@@ -76,6 +76,8 @@ class McapReader {
   std::uint64_t unpacked_ = 0;  // bytes of chunks so far
   std::size_t texts_ = 0;       // bytes of schemas, channels and metadata so far
   bool ended_ = false, truncated_ = false;
+  Bytes ahead_;  // read from the file and not taken yet, from ahead_at_ on
+  std::size_t ahead_at_ = 0;
   Bytes record_, chunk_;
   std::size_t chunk_at_ = 0;
   std::map<std::uint16_t, SchemaRecord> schemas_;

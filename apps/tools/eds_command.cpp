@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "apps/robot/robot_files.hpp"
 #include "apps/robot/wrong_kind.hpp"

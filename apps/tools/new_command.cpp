@@ -5,7 +5,6 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 
 #include "apps/robot/bundled.hpp"
 #include "apps/robot/robot_files.hpp"

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <map>
 #include <regex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -209,6 +210,29 @@ TEST(Architecture, EverySourceOrItsHeaderBeginsWithItsPurpose) {
     }
   }
   EXPECT_GT(checked, 300);
+}
+
+// base/open_file.hpp and base/trusted_code.hpp open files once, and judge what they have opened.
+TEST(Architecture, FilesAreOpenedByBaseAlone) {
+  const std::set<std::string> kernels_own{
+      // which no user names
+      "apps/bench/engine_page.cpp", "apps/clients/control_search.cpp", "apps/machine/machine.cpp",
+      "apps/main.cpp"};
+  const std::regex opens(R"(\bi?o?fstream\b|\bfopen\(|\bdlopen\()");
+  const fs::path root = TANDEM_SOURCE_DIR;
+  std::set<std::string> found;
+  for (const auto& [room, allowed] : rules()) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / room)) {
+      const std::string file = fs::relative(entry.path(), root).generic_string();
+      if (room == "base" || (!file.ends_with(".cpp") && !file.ends_with(".hpp"))) continue;
+      std::ifstream in(entry.path());
+      for (std::string line; std::getline(in, line);) {
+        const std::string code = line.substr(0, line.find("//"));
+        if (!code.starts_with("#include") && std::regex_search(code, opens)) found.insert(file);
+      }
+    }
+  }
+  EXPECT_EQ(found, kernels_own);
 }
 
 TEST(Architecture, RuleRefusesARoomAboveAndAcceptsOneBelow) {

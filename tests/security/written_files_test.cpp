@@ -1,4 +1,5 @@
 // What is written goes to the file that was made for it, and through nobody else's link.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -78,6 +79,8 @@ TEST(WrittenFiles, NothingIsWrittenThroughAStrangersLink) {
                 (void)!::symlink((folder / "own/new").c_str(), (his + "new").c_str());
                 write_text(his + "his", "text");
               }).end());
+  const Descriptor given(::open((his + "his").c_str(), O_WRONLY | O_CLOEXEC));
+  EXPECT_TRUE(open_output("/proc/self/fd/" + std::to_string(given.get()))) << "as /dev/stdout";
   for (const char* name : {"file", "folder/victim", "new", "folder/new", "his"}) {
     const Result<Descriptor> file = open_output(his + name);
     ASSERT_FALSE(file) << name;
