@@ -213,8 +213,7 @@ TEST_F(Socket, LiesInNoFolderOfAnotherUserOrGroup) {
   EXPECT_NE(refusal(theirs + "/s.sock").find("belongs to user 65534"), std::string::npos);
   ASSERT_EQ(::chown(theirs.c_str(), 0, 65534), 0);
   ASSERT_EQ(::chmod(theirs.c_str(), 0775), 0);
-  EXPECT_NE(refusal(theirs + "/s.sock").find("may be changed by group 65534: "),
-            std::string::npos);
+  EXPECT_NE(refusal(theirs + "/s.sock").find("may be changed by group 65534: "), std::string::npos);
   ASSERT_EQ(::chown(theirs.c_str(), 0, 0), 0);
   EXPECT_NE(open(theirs + "/s.sock"), nullptr) << "this user's own group may";
 }

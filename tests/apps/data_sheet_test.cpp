@@ -202,8 +202,7 @@ TEST_F(DataSheets, BeyondUseAreRefusedWithOneMessage) {
   write_text(folder_ / "twice.dcf", read_text(kMover) + "[1000]\nDataType=7\nAccessType=rw\n");
   for (const Row& row : std::initializer_list<Row>{
            {"eds show half.dcf", "error: half.dcf:"},
-           {"eds show huge.dcf",
-            "huge.dcf: has 100000000 bytes, and at most 4000000 are read"},
+           {"eds show huge.dcf", "huge.dcf: has 100000000 bytes, and at most 4000000 are read"},
            {"eds show twice.dcf", "[1000]: is here twice with different contents"},
            {"eds show robot.toml", "robot.toml: has no section of an object, such as [1000]"},
            {"eds show nothing.eds", "nothing.eds: cannot read this file"},
