@@ -53,7 +53,7 @@ TEST_F(StrangersText, IsTheSameTextInJson) {
   write_log();
   const Outcome outcome = tandem("log info log.mcap --json -");
   expect_no_order(outcome.out);
-  const std::string robot = nlohmann::json::parse(outcome.out)["robot"];
+  const std::string robot = nlohmann::json::parse(outcome.out)["metadata"]["robot"];
   EXPECT_EQ(robot, kOrder.substr(0, kOrder.size() - 1) + "\uFFFD");
 }
 

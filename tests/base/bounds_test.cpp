@@ -1,5 +1,6 @@
 #include "base/bounds.hpp"
 
+#include <algorithm>
 #include <fstream>
 #include <random>
 #include <sstream>
