@@ -138,7 +138,7 @@ std::int64_t BumplessTransfer::fade_cycles(std::size_t joint,
   const double way = std::abs(way_rad);
   double time_s = std::sqrt(2.0 * kMinJerkAcceleration * way / limit.max_acceleration_rad_s2);
   if (limit.max_velocity_rad_s > 0.0) {
-    time_s = std::max(time_s, 4.0 * kMinJerkPeak * way / limit.max_velocity_rad_s);
+    time_s = std::max(time_s, 2.0 * kMinJerkPeak * way / limit.max_velocity_rad_s);
   }
   return std::max<std::int64_t>(cycles_, std::llround(std::min(time_s, kMost_s) / period_s_));
 }
@@ -220,7 +220,9 @@ void BumplessTransfer::notice_unwritten_speed(std::size_t index,
   const double most = limits_[index].max_velocity_rad_s;
   const double speed = (joint.written[kPosition] - first[kPosition]) / period_s_;
   const double unwritten = speed - first[kVelocity];
-  if (!(std::abs(unwritten) > hal::kRestShare * most && std::abs(speed) <= most)) return;
+  // One that says its speeds may correct its place at first: that is no motion.
+  const bool silent = first[kVelocity] == 0.0 && joint.written[kVelocity] == 0.0;
+  if (!silent || !(std::abs(unwritten) > hal::kRestShare * most && std::abs(speed) <= most)) return;
   const double brake_s = static_cast<double>(joint.brake_cycles) * period_s_;
   const double was_rad =
       first[kPosition] + joint.offset[kPosition] - joint.speed_rad_s * brake_s / 2.0;
@@ -232,12 +234,13 @@ void BumplessTransfer::notice_unwritten_speed(std::size_t index,
 
 BumplessTransfer::References BumplessTransfer::sum(const Joint& joint) const noexcept TANDEM_RT {
   const auto cycles = static_cast<double>(joint.since);
-  const double share = 1.0 - min_jerk(cycles / static_cast<double>(cycles_)).s;
   const MinJerk fade = min_jerk(cycles / static_cast<double>(joint.fade_cycles));
+  const double share = 1.0 - fade.s;  // position and torque carry a load together
   const double fade_s = static_cast<double>(joint.fade_cycles) * period_s_;
   References sum = joint.written;
-  for (std::size_t i = kVelocity; i < kReferences; ++i) sum[i] += share * joint.offset[i];
-  sum[kPosition] += (1.0 - fade.s) * joint.offset[kPosition];
+  const double impedance = 1.0 - min_jerk(cycles / static_cast<double>(cycles_)).s;
+  for (std::size_t i = 0; i < kStiffness; ++i) sum[i] += share * joint.offset[i];
+  for (std::size_t i = kStiffness; i < kReferences; ++i) sum[i] += impedance * joint.offset[i];
   sum[kVelocity] -= fade.ds / fade_s * joint.offset[kPosition];
   if (joint.speed_rad_s != 0.0 && joint.since < joint.brake_cycles) {
     const double brake_s = static_cast<double>(joint.brake_cycles) * period_s_;

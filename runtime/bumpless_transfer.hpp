@@ -22,12 +22,13 @@ namespace tandem::runtime {
 /// - Position, from the same mode and interaction: the motion in force loses its velocity relative
 ///   to the new reference within kBrake_s, all joints in the same time, so their path stays. What
 ///   lies between its end and the new reference goes away on a minimum-jerk profile within
-///   kTime_ns, or later where that would take more than a quarter of the joint's velocity or half
-///   of its acceleration (within kMost_s at most).
+///   kTime_ns, or later where that would take more than half of the joint's velocity or of its
+///   acceleration (within kMost_s at most).
 /// - Position, from another one: the same from the measured motion, where the joint moves; else
 ///   position starts at the measured one anyhow (CommandLimits).
-/// - Torque, stiffness, damping within kTime_ns from the last ones. When the mode or interaction
-///   changes, the torque goes over from the measured one, and in velocity mode the velocity.
+/// - Torque in the same time, stiffness and damping within kTime_ns, from the last ones. When the
+///   mode or interaction changes, the torque goes over from the measured one, and in velocity mode
+///   the velocity.
 /// - A drive that was idle or is not enabled: none.
 ///
 /// Whoever rests now, at the place of brake(), takes over without coming back.

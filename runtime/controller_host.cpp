@@ -215,9 +215,14 @@ void ControllerHost::start(const hal::CycleTime& time, const hal::StateImage& st
                            hal::CommandImage& command) noexcept TANDEM_RT {
   transfer_.clear();
   for (std::size_t j = 0; j < capabilities_.size(); ++j) {
-    const bool moves = command.velocity_rad_s()[j] != 0.0 && command.interaction()[j] == 0 &&
-                       command.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition);
-    if (moves) transfer_.begin_from(j, state, command);
+    const bool held = command.interaction()[j] == 0 &&
+                      command.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition);
+    if (!held) continue;
+    if (owner_[j] >= 0) {  // an impedance that nobody felt is no step
+      command.stiffness_Nm_rad()[j] = impedance_[j].stiffness_Nm_rad;
+      command.damping_Nms_rad()[j] = impedance_[j].damping_Nms_rad;
+    }
+    transfer_.begin_from(j, state, command);
   }
   idle(command);  // so that every joint stays at its measured position
   for (std::size_t j = 0; j < capabilities_.size(); ++j) {

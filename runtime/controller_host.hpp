@@ -191,7 +191,7 @@ class ControllerHost {
   void release(hal::CommandImage& command) noexcept TANDEM_RT;
 
   /// First cycle: holds every joint, sets the claimed modes, lets the active controllers seed
-  /// theirs. A joint that moves in `command`, which another loop sent, goes on from there.
+  /// theirs. Joints go over from `command`, which may be in motion when another loop sent it.
   void start(const hal::CycleTime& time, const hal::StateImage& state,
              hal::CommandImage& command) noexcept TANDEM_RT;
   /// Every cycle, the first included.

@@ -149,7 +149,7 @@ struct StopOptions {
 
 /// In which a joint may reach its largest velocity where nobody says how fast: harder than bundled
 /// experiments move, softer than a step.
-inline constexpr double kFullSpeed_s = 0.1;
+inline constexpr double kFullSpeed_s = 0.05;
 
 /// [[joint]]
 struct JointConfig {

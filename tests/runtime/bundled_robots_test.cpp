@@ -28,7 +28,7 @@ TEST_P(BundledRobot, IsCompleteWithItsDescription) {
   }
 }
 
-TEST(BundledRobots, HaveThePandasPublishedAccelerationsAndElseTheVelocityInATenthOfASecond) {
+TEST(BundledRobots, HaveThePandasPublishedAccelerationsAndElseTheVelocityIn50Milliseconds) {
   const auto robot = [](const char* name) {
     auto read = read_robot(std::string(TANDEM_SOURCE_DIR "/config/") + name + "/robot.toml");
     EXPECT_TRUE(read) << name;
@@ -42,7 +42,7 @@ TEST(BundledRobots, HaveThePandasPublishedAccelerationsAndElseTheVelocityInATent
     }
   }
   for (const hal::JointConfig& joint : robot("ur5e").joints) {
-    EXPECT_EQ(joint.max_acceleration_rad_s2, joint.max_velocity_rad_s / 0.1) << joint.name;
+    EXPECT_EQ(joint.max_acceleration_rad_s2, joint.max_velocity_rad_s / 0.05) << joint.name;
   }
 }
 

@@ -178,8 +178,8 @@ void switched(MovingRun& run, const char* to) {
 const Change kChanges[] = {
     {"released", [](MovingRun& run) { switched(run, nullptr); }, 0.0, 0.0, Change::kAny},
     {"to one that keeps it", [](MovingRun& run) { switched(run, "keeper"); }, 0.0, 0.0},
-    {"to one elsewhere", [](MovingRun& run) { switched(run, "elsewhere"); }, -0.6, 0.0},
-    {"to one that moves", [](MovingRun& run) { switched(run, "opposite"); }, -0.5, -0.5},
+    {"to one elsewhere", [](MovingRun& run) { switched(run, "elsewhere"); }, -1.0, 0.0},
+    {"to one that moves", [](MovingRun& run) { switched(run, "opposite"); }, -1.0, -0.5},
     {"to one that moves at once", [](MovingRun& run) { switched(run, "at_once"); }, -1.5, NAN},
     {"it ends", [](MovingRun& run) { run.runner->ends = true; }, 0.0, 0.0, Change::kControllers},
     {"stop of category hold", [](MovingRun& run) { run.backend.faulted_joint = 1; }, 0.0, 0.0,
@@ -187,7 +187,7 @@ const Change kChanges[] = {
     {"the others retreat",
      [](MovingRun& run) { run.cycle->inbox().emergency_stop(hal::StopCategory::kCategory2); }, 0.0,
      0.0, Change::kControllers},
-    {"an owner comes, at rest", owner_comes, -0.6, 0.0},
+    {"an owner comes, at rest", owner_comes, -1.0, 0.0},
     {"the owner is lost", owner_is_lost, 0.0, 0.0, Change::kOwners},
 };
 
