@@ -6,6 +6,7 @@
 
 #include <filesystem>
 
+#include "base/sha256.hpp"
 #include "base/trusted_code.hpp"
 
 namespace tandem::model {
@@ -33,6 +34,7 @@ Result<KernelLibrary> load_kernels(const std::string& path, const std::string& h
   }
   KernelLibrary library;
   library.path_ = path;
+  library.sha256_ = sha256_of(code->file().get());
   const Result<void*> handle = code->load(RTLD_NOW | RTLD_LOCAL);
   if (!handle) return refuse(path, handle.error().message, kBuildHint);
   library.handle_ = std::shared_ptr<void>(*handle, [](void* h) { dlclose(h); });

@@ -22,13 +22,15 @@ class KernelLibrary {
   [[nodiscard]] const tandem_kernels* operator->() const { return kernels_; }
   [[nodiscard]] const tandem_kernels* get() const { return kernels_; }
   [[nodiscard]] const std::string& path() const { return path_; }
+  /// Of the file that was loaded, in hexadecimal digits.
+  [[nodiscard]] const std::string& sha256() const { return sha256_; }
 
  private:
   friend Result<KernelLibrary> load_kernels(const std::string&, const std::string&,
                                             const std::string&);
   std::shared_ptr<void> handle_;
   const tandem_kernels* kernels_ = nullptr;
-  std::string path_;
+  std::string path_, sha256_;
 };
 
 /// Loads a library.

@@ -13,7 +13,6 @@
 #include <utility>
 
 #include "base/open_file.hpp"
-#include "base/sha256.hpp"
 #include "hal/sim/engine_loader.hpp"
 
 namespace tandem::apps {
@@ -34,14 +33,6 @@ void add_place_and_time(log::RunInfo& info) {
   if (std::strftime(text.data(), text.size(), "%z %Z", &local) > 0) info.time_zone = text.data();
 }
 
-std::string sha256_of_file(const std::string& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return {};
-  const std::string digest = sha256_of(file);
-  ::close(file);
-  return digest;
-}
-
 log::RunInfo info_of(const Composition& c) {
   const runtime::Experiment& e = c.experiment;
   log::RunInfo info;
@@ -60,7 +51,7 @@ log::RunInfo info_of(const Composition& c) {
   if (c.sim != nullptr) info.engine = sim::engine_text(e.sim.engine);
   info.kernel_variant = c.kernels->variant;
   info.description_hash = c.kernels->description_hash;
-  info.kernel_sha256 = sha256_of_file(c.kernels.path());
+  info.kernel_sha256 = c.kernels.sha256();
   info.controllers = controller_lines(*c.controllers);
   add_place_and_time(info);
   std::vector<std::string> files{e.file, e.robot.file, e.robot.model.urdf};
