@@ -119,6 +119,12 @@ bool McapReader::read(std::span<std::byte> into) {
   return true;
 }
 
+/// @pre as many bytes are left
+void McapReader::skip(std::uint64_t bytes) {
+  ahead_at_ += static_cast<std::size_t>(std::min<std::uint64_t>(bytes, ahead_.size() - ahead_at_));
+  left_ -= bytes;
+}
+
 Result<std::optional<MessageView>> McapReader::next() {
   for (;;) {
     auto found = next_in_chunk();
@@ -145,7 +151,7 @@ Status McapReader::read_record() {
   }
   const auto opcode = static_cast<Opcode>(head[0]);
   if (!is_read(opcode)) {
-    left_ -= length;
+    skip(length);
     return {};
   }
   if (length > bounds::kLogRecord.most) return std::unexpected(beyond(bounds::kLogRecord, path_));

@@ -69,6 +69,7 @@ class McapReader {
 
   std::string path_, profile_;
   [[nodiscard]] bool read(std::span<std::byte> into);
+  void skip(std::uint64_t bytes);
 
   std::shared_ptr<const Descriptor> file_;
   std::uint64_t bytes_ = 0;
