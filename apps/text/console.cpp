@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <poll.h>
 #include <unistd.h>
+#include <ext/stdio_sync_filebuf.h>
 
 #include <algorithm>
 #include <array>
@@ -13,6 +14,7 @@
 #include <csignal>
 #include <cstring>
 #include <filesystem>
+#include <iostream>
 #include <sstream>
 #include <vector>
 
@@ -78,8 +80,9 @@ struct Output {
   bool loses;                   // what cannot be written, instead of failing
   std::array<char, 3> begun{};  // bytes of a character whose last has not come
   std::size_t begun_size = 0;
+  std::array<char, 4096> buffer{};  // of the stream
 };
-Output outputs[] = {{STDOUT_FILENO, false, {}, 0}, {STDERR_FILENO, false, {}, 0}};
+Output outputs[] = {{STDOUT_FILENO, false}, {STDERR_FILENO, false}};
 
 /// @return whether all of it was written, or lost
 bool put(const Output& out, std::string_view text) {
@@ -132,7 +135,7 @@ ssize_t write_harmless(void* cookie, const char* text, std::size_t size) {
 std::FILE* stream_on(Output& out, int buffering) {
   std::FILE* stream = ::fopencookie(&out, "w", {nullptr, &write_harmless, nullptr, nullptr});
   if (stream == nullptr) return out.fd == STDERR_FILENO ? stderr : stdout;
-  std::setvbuf(stream, nullptr, buffering, BUFSIZ);
+  std::setvbuf(stream, out.buffer.data(), buffering, out.buffer.size());
   return stream;
 }
 
@@ -152,6 +155,9 @@ void show_harmless() {
   std::fflush(stdout);
   stdout = stream_on(outputs[0], ::isatty(STDOUT_FILENO) != 0 ? _IOLBF : _IOFBF);
   stderr = stream_on(outputs[1], _IONBF);
+  static __gnu_cxx::stdio_sync_filebuf<char> out(stdout), error(stderr);
+  std::cout.rdbuf(&out);  // they keep the streams that the program began with
+  std::cerr.rdbuf(&error);
 }
 
 void restart_line(std::FILE* out) {

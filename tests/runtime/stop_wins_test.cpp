@@ -259,6 +259,7 @@ TEST(AStop, OfCategory2KeepsARetreatThatAResetOfItsCycleWouldEnd) {
 }
 
 TEST(AStop, EndsAResetInEachOfItsCycles) {
+  rt::install_emergency_signal();
   for (int into = 0; into < 12; ++into) {
     for (const Stop& stop : stops()) {
       SCOPED_TRACE(stop.name + ", cycles into the reset: " + std::to_string(into));
