@@ -40,6 +40,9 @@ class TrustedCode {
   /// beside itself ($ORIGIN).
   /// Errors: the loader's words, without the path; /proc is missing.
   [[nodiscard]] Result<void*> load(int flags) const;
+  /// What this process has loaded by its real path, such as a former build: a handle to compare
+  /// with load()'s. Null: nothing.
+  [[nodiscard]] const void* loaded() const noexcept;
 
   /// The file itself, and where it is, without links.
   [[nodiscard]] const Descriptor& file() const noexcept { return file_; }

@@ -63,11 +63,8 @@ Result<void*> load_newest(const TrustedCode& code) {
   const std::lock_guard lock(mutex);
   const Identity now = identity_of(code.file());
   const auto [known, first] = loaded.try_emplace(code.real_path(), now);
-  void* former = nullptr;
-  if (!first && known->second != now)
-    former = dlopen(code.real_path().c_str(), RTLD_NOW | RTLD_NOLOAD);
+  const void* former = !first && known->second != now ? code.loaded() : nullptr;
   if (former != nullptr) {
-    dlclose(former);
     if (const std::string name = unique_variable(code); !name.empty()) {
       return fail(
           "was built anew, but its former code stays in this process, and the new one would "

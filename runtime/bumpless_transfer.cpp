@@ -153,7 +153,11 @@ BumplessTransfer::Impedance BumplessTransfer::written(
 void BumplessTransfer::before_update(hal::CommandImage& command) const noexcept TANDEM_RT {
   if (going_ == 0) return;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
-    if (joints_[j].left > 0 && joints_[j].known != 0) write(command, j, joints_[j].written);
+    if (joints_[j].left == 0 || joints_[j].known == 0) continue;
+    References last = joints_[j].written;
+    const auto mode = static_cast<ControlMode>(command.mode()[j]);
+    if (mode != ControlMode::kPosition) last[kPosition] = command.position_rad()[j];
+    write(command, j, last);
   }
 }
 

@@ -71,7 +71,8 @@ class BumplessTransfer {
   /// within its range.
   [[nodiscard]] Brake brake(std::size_t joint, const hal::StateImage& state, hal::ControlMode mode,
                             hal::InteractionMode interaction) const noexcept TANDEM_RT;
-  /// Before the owners write: gives them back what they wrote last.
+  /// Before the owners write: gives them back what they wrote last. Outside position control the
+  /// position stays what is offered to them: what nobody writes there, nobody wants.
   void before_update(hal::CommandImage& command) const noexcept TANDEM_RT;
   /// After it: adds what is left of the offsets.
   void after_update(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;

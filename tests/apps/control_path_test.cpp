@@ -136,7 +136,7 @@ TEST_F(OtherSurroundings, GiveTheSameSocketTwoPathsAndItIsAskedOnce) {
   ::setenv("XDG_RUNTIME_DIR", (folder + "/link").c_str(), 1);
   const auto found = find_control_sockets("run").value_or(std::vector<std::string>{});
   EXPECT_EQ(std::ranges::count_if(
-                found, [this](const std::string& path) { return path.starts_with(folder); }),
+                found, [this](const std::string& one) { return one.starts_with(folder); }),
             1);
 }
 

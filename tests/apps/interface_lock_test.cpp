@@ -10,6 +10,8 @@
 
 #include <cstddef>
 
+#include "tests/support/needs_root.hpp"
+
 namespace tandem::apps {
 namespace {
 
@@ -77,7 +79,7 @@ void expect_no_lock_of_another_user(bool listens) {
 }
 
 TEST(InterfaceLock, OfAnotherUserIsNoneAndIsToldOf) {
-  if (::geteuid() != 0) GTEST_SKIP() << "needs another user: run as root";
+  if (::geteuid() != 0) GTEST_SKIP() << tandem::test::needs_root("another user");
   expect_no_lock_of_another_user(true);
   expect_no_lock_of_another_user(false);
 }

@@ -55,5 +55,28 @@ TEST(BumplessTransfer, TakesItsTimeForALongWay) {
   EXPECT_EQ(go_from(1.0, -1.0).position_rad[2000], -1.0) << "2 s at most";
 }
 
+// What the joint measured a cycle ago counted as what the controller wants.
+TEST(BumplessTransfer, LeavesThePositionThatIsOfferedOutsidePositionControl) {
+  const hal::RobotConfig robot = hal::test::fake_robot();
+  const std::vector<hal::JointCapabilities> limits = hal::joint_capabilities(robot);
+  hal::StateImage state(robot.shape());
+  hal::CommandImage command(robot.shape());
+  state.drive_state()[1] = static_cast<std::uint8_t>(hal::DriveState::kOperationEnabled);
+  command.mode()[1] = static_cast<std::int8_t>(hal::ControlMode::kPosition);
+  BumplessTransfer transfer(limits, 1'000'000);
+  transfer.begin(1, state, command);
+  command.mode()[1] = static_cast<std::int8_t>(hal::ControlMode::kTorque);
+  command.torque_Nm()[1] = 1.0;
+  for (int cycle = 0; cycle < 120; ++cycle) {
+    const double offered_rad = 0.001 * cycle;
+    command.position_rad()[1] = offered_rad;
+    transfer.before_update(command);
+    EXPECT_EQ(command.position_rad()[1], offered_rad) << cycle;
+    EXPECT_EQ(command.torque_Nm()[1], 1.0) << "what it wrote last";
+    transfer.after_update(state, command);
+    EXPECT_EQ(command.position_rad()[1], offered_rad) << cycle;
+  }
+}
+
 }  // namespace
 }  // namespace tandem::runtime

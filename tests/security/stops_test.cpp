@@ -19,11 +19,13 @@
 
 #include "apps/clients/control_client.hpp"
 #include "apps/transport/dds_services.hpp"
+#include "base/quoting.hpp"
 #include "dds/service_client.hpp"
 #include "tests/apps/background.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/support/dds_domain.hpp"
 #include "tests/support/eventually.hpp"
+#include "tests/support/needs_root.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -95,9 +97,9 @@ class StopUnderAttack : public Program {
   }
   /// Beside others, which have files of their own for what is printed.
   [[nodiscard]] int tandem_in_shell(const std::string& arguments) const {
+    const std::string program = shell_word(TANDEM_BINARY_DIR "/bin/tandem");
     return std::system(
-        ("cd '" + folder_.string() + "' && '" TANDEM_BINARY_DIR "/bin/tandem' " + arguments)
-            .c_str());
+        ("cd " + shell_word(folder_.string()) + " && " + program + " " + arguments).c_str());
   }
   [[nodiscard]] Outcome stop_over_dds(const std::string& flags = {}) const {
     return tandem("estop --dds" + domain() + " " + flags);
@@ -330,8 +332,8 @@ int run_with_threads(const std::filesystem::path& folder, rlim_t most,
         ::setrlimit(RLIMIT_NPROC, &limit) != 0) {
       ::_exit(99);
     }
-    ::execl("/bin/sh", "sh", "-c", ("exec '" TANDEM_BINARY_DIR "/bin/tandem' " + arguments).c_str(),
-            nullptr);
+    const std::string program = shell_word(TANDEM_BINARY_DIR "/bin/tandem");
+    ::execl("/bin/sh", "sh", "-c", ("exec " + program + " " + arguments).c_str(), nullptr);
     ::_exit(98);
   }
   int raw = 0;
@@ -341,7 +343,7 @@ int run_with_threads(const std::filesystem::path& folder, rlim_t most,
 
 // It ended by abort(), with status 134.
 TEST_F(StopUnderAttack, ARunThatGetsNoThreadsSaysWhatToDo) {
-  if (::geteuid() != 0) GTEST_SKIP() << "needs a user who has no other processes: run as root";
+  if (::geteuid() != 0) GTEST_SKIP() << test::needs_root("a user who has no other processes");
   std::filesystem::permissions(folder_, std::filesystem::perms::all);
   if (run_with_threads(folder_, 1000, "--version") != 0) {
     GTEST_SKIP() << "another user cannot run this build: a folder above it is closed";
