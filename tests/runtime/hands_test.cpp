@@ -91,7 +91,7 @@ struct MovingRun {
     cycle = std::make_unique<RobotCycle>(
         CycleParts{robot, backend, host, clock, nullptr, nullptr, nullptr, parts},
         CycleConfig{
-            .settle_cycles = 20, .delay_cycles = delay_cycles, .after_stop = AfterStop::kWait});
+            .settle_cycles = 20, .after_stop = AfterStop::kWait, .delay_cycles = delay_cycles});
     steps(100);
     if (by == By::kOperator) {
       EXPECT_TRUE(cycle->services().move_joint(
