@@ -250,7 +250,7 @@ class ControllerHost {
   }
   /// What the controllers write is sent as it is: whoever has just got the joints has seen to it
   /// that they go over from what was commanded.
-  void take_as_written() noexcept TANDEM_RT { transfer_.clear(); }
+  void take_as_written(hal::CommandImage& command) noexcept TANDEM_RT { transfer_.cancel(command); }
   /// Whether a joint has begun to change hands in this cycle: update() has to follow.
   [[nodiscard]] bool changes_hands() const noexcept TANDEM_RT { return transfer_.has_begun(); }
   /// Whether one of `by` claims `joint`.

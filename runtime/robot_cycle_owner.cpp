@@ -93,7 +93,7 @@ void RobotCycle::assign_owner(bool owned) noexcept TANDEM_RT {
 /// and its limits have passed that on: what arrives is the command, to the last bit.
 void RobotCycle::take_from_owner() noexcept TANDEM_RT {
   if (owner_.port != nullptr && owner_.port->lockstep() && has_owner())
-    controllers_->take_as_written();
+    controllers_->take_as_written(controlled());
 }
 
 void RobotCycle::take_gains(const hal::ParameterImage& wanted) noexcept TANDEM_RT {
