@@ -105,8 +105,9 @@ class Backend {
   /// until it answers true.
   [[nodiscard]] virtual bool shut_down() noexcept TANDEM_RT = 0;
 
-  /// What the joints are commanded in a cycle that calls shut_down(), before that call. For a robot
-  /// that another loop drives: it carries it out.
+  /// The controllers' last command, before the first shut_down(), where they were done in that very
+  /// cycle. For a robot that another loop drives: it carries it out. Without this call that loop
+  /// brings the joints to rest by itself, from the command before.
   virtual void last_command(const CommandImage& /*command*/) noexcept TANDEM_RT {}
   /// The command that the robot follows before it follows this loop's: that of the loop that owns
   /// it, to go on from. False: there is no such loop.

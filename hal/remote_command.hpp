@@ -36,7 +36,7 @@ enum class OwnerLoss : std::uint8_t {
 /// What the owner wants in a cycle. Pointers are good until the next exchange().
 struct RemoteCommand {
   bool live = false;                  ///< `command` is to be followed
-  bool done = false;                  ///< it gives the robot back, with `command` as its last
+  bool done = false;                  ///< it gives the robot back; live: with `command` as its last
   bool ends_run = false;              ///< with `done`: nobody else is waited for
   OwnerLoss loss = OwnerLoss::kNone;  ///< reported once
   StopCategory on_loss = StopCategory::kWarn;  ///< with `loss`: kWarn holds every joint

@@ -56,7 +56,10 @@ void BumplessTransfer::write(hal::CommandImage& command, std::size_t joint,
 }
 
 void BumplessTransfer::watch(const hal::CommandImage& command) noexcept TANDEM_RT {
-  std::ranges::copy(command.position_rad(), before_rad_.begin());
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const bool begun = joints_[j].left > 0 && joints_[j].known == 0;
+    before_rad_[j] = begun ? joints_[j].offset[kPosition] : command.position_rad()[j];
+  }
 }
 
 void BumplessTransfer::begin(std::size_t joint, const hal::StateImage& state,
@@ -277,6 +280,13 @@ void BumplessTransfer::after_update(const hal::StateImage& state,
     ++joint.since;
     if (--joint.left == 0) --going_;
   }
+}
+
+void BumplessTransfer::cancel(hal::CommandImage& command) noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    if (joints_[j].left > 0 && joints_[j].known == 0) write(command, j, joints_[j].offset);
+  }
+  clear();
 }
 
 void BumplessTransfer::clear() noexcept TANDEM_RT {

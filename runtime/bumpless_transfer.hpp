@@ -57,7 +57,8 @@ class BumplessTransfer {
   /// `joints` outlives this.
   BumplessTransfer(std::span<const hal::JointCapabilities> joints, std::int64_t period_ns);
 
-  /// Each cycle, before anybody writes: `command` is what was sent last.
+  /// Each cycle, before anybody writes: `command` is what was sent last, but of joints that have
+  /// begun to change hands.
   void watch(const hal::CommandImage& command) noexcept TANDEM_RT;
   /// `joint` changes hands in this cycle; `command` is still what was sent last, and then what the
   /// owner until now wrote. A further change in the same cycle goes on from the same.
@@ -81,6 +82,8 @@ class BumplessTransfer {
   /// What the owner of the joint wrote last: `command` goes over to it while an offset is left.
   [[nodiscard]] Impedance written(std::size_t joint,
                                   const hal::CommandImage& command) const noexcept TANDEM_RT;
+  /// Forgets all. The references of joints that have begun to change hands are again what was sent.
+  void cancel(hal::CommandImage& command) noexcept TANDEM_RT;
   /// Forgets all.
   void clear() noexcept TANDEM_RT;
 

@@ -243,6 +243,14 @@ class ControllerHost {
       std::size_t joint, const hal::CommandImage& command) const noexcept TANDEM_RT {
     return transfer_.written(joint, command);
   }
+  /// The command before the last one that was sent, where a delay has let others through than
+  /// update() saw: a brake() goes on from these two.
+  void was_sent_before(const hal::CommandImage& command) noexcept TANDEM_RT {
+    transfer_.watch(command);
+  }
+  /// What the controllers write is sent as it is: whoever has just got the joints has seen to it
+  /// that they go over from what was commanded.
+  void take_as_written(hal::CommandImage& command) noexcept TANDEM_RT { transfer_.cancel(command); }
   /// Whether a joint has begun to change hands in this cycle: update() has to follow.
   [[nodiscard]] bool changes_hands() const noexcept TANDEM_RT { return transfer_.has_begun(); }
   /// Whether one of `by` claims `joint`.

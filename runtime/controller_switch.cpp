@@ -46,6 +46,7 @@ void ControllerHost::brake(const hal::StateImage& state,
                            hal::CommandImage& command) noexcept TANDEM_RT {
   operator_.position.abandon();
   std::ranges::fill(recovers_, std::uint8_t{0});
+  transfer_.clear();
   for (std::size_t j = 0; j < capabilities_.size(); ++j) {
     transfer_.begin(j, state, command, BumplessTransfer::Pace::kHard);
     release(j, state, command);

@@ -192,6 +192,7 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
 
 void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
   std::ranges::fill(written_, std::uint8_t{0});
+  ends_with_command_ = run_.controllers_run();
   stamp(command_);
   stamp(wanted_);
   if (std::exchange(brakes_, false)) controllers_->brake(state_, command_);
@@ -229,6 +230,7 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
 void RobotCycle::run_controllers() noexcept TANDEM_RT {
   if (!controlling_) {
     start_controllers();
+    take_from_owner();
     watch_.controllers_start();
   }
   controlling_ = true;
@@ -364,7 +366,7 @@ void RobotCycle::write() noexcept TANDEM_RT {
     }
     check_backend(backend_->write(command_, controllers_->gains()));
   } else {
-    backend_->last_command(command_);
+    if (ends_with_command_) backend_->last_command(command_);
     const bool disabled = backend_->shut_down();
     if (disabled || run_.time_is_over(time_.cycle) || read_code_ == Code::kDiverged) {
       while (const auto found = watch_.next_disobedient(state_)) fault(*found);
@@ -482,6 +484,7 @@ void RobotCycle::show_sensors() noexcept TANDEM_RT {
 void RobotCycle::on(RunEvent event, bool holds_back) noexcept TANDEM_RT {
   if (!run_.on(event, time_.cycle, holds_back) || run_.in(RunPhase::kRetreating)) return;
   if (controlling_) controllers_->stop();
+  if (controlling_ && delay_.on()) controllers_->was_sent_before(delay_.before());
   controlling_ = false;
   brakes_ = run_.in(RunPhase::kFaulted) || run_.in(RunPhase::kShutDown);
 }

@@ -154,6 +154,7 @@ class RobotCycle {
   void await_owner() noexcept;
   hal::RemoteCommand follow_owner() noexcept TANDEM_RT;
   void assign_owner(bool owned) noexcept TANDEM_RT;
+  void take_from_owner() noexcept TANDEM_RT;
   void take_gains(const hal::ParameterImage& wanted) noexcept TANDEM_RT;
   [[nodiscard]] bool has_owner() const noexcept TANDEM_RT;
   [[nodiscard]] hal::PortView port_view() noexcept TANDEM_RT;
@@ -236,6 +237,7 @@ class RobotCycle {
   Code read_code_ = Code::kOk;
   bool started_ = false;                     // the first cycle was
   bool controlling_ = false;                 // controllers are started
+  bool ends_with_command_ = false;           // controllers wrote in this cycle
   bool brakes_ = false;                      // a stop has found joints that nobody has any more
   ControllerSet held_back_ = 0;              // active before the reset
   ControllerSet before_retreat_ = 0;         // active then

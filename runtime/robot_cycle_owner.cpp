@@ -58,9 +58,15 @@ hal::RemoteCommand RobotCycle::follow_owner() noexcept TANDEM_RT {
            .source = FaultSource::kOwner,
            .category = wish.on_loss});
   }
+  const bool ends = wish.done && wish.ends_run;
+  if (ends && !wish.live && run_.in(RunPhase::kRunning) && has_owner()) {
+    event(EventKind::kControllersDone);  // in this cycle they command nothing any more
+    on(RunEvent::kFinished);
+    return wish;
+  }
   assign_owner(wish.live);
   const bool serves = run_.in(RunPhase::kRunning) && has_owner();  // its controller ends the run
-  if (wish.done && wish.ends_run && !serves && !run_.in(RunPhase::kShutDown)) {
+  if (ends && !serves && !run_.in(RunPhase::kShutDown)) {
     event(EventKind::kStopRequested);
     on(RunEvent::kEnd);
   }
@@ -80,6 +86,14 @@ void RobotCycle::assign_owner(bool owned) noexcept TANDEM_RT {
                                         state_, controlled())
             : controllers_->switch_over(owner, 0, controlling_, time_, state_, controlled());
   if (answer.reason == RejectReason::kNone && controlling_) event(EventKind::kControllersSwitched);
+  if (owned) take_from_owner();
+}
+
+/// In lockstep the owner's end has led its joints over from what is in force here, and its delay
+/// and its limits have passed that on: what arrives is the command, to the last bit.
+void RobotCycle::take_from_owner() noexcept TANDEM_RT {
+  if (owner_.port != nullptr && owner_.port->lockstep() && has_owner())
+    controllers_->take_as_written(controlled());
 }
 
 void RobotCycle::take_gains(const hal::ParameterImage& wanted) noexcept TANDEM_RT {

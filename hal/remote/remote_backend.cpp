@@ -150,14 +150,20 @@ Code RemoteBackend::write(const hal::CommandImage& command,
 }
 
 void RemoteBackend::last_command(const hal::CommandImage& command) noexcept TANDEM_RT {
-  if (!done_) live_ = phase() == hal::Phase::kOperational;
-  if (!done_) keep(command);
+  if (done_) return;
+  live_ = phase() == hal::Phase::kOperational;
+  keep(command);
+  ends_with_command_ = true;
 }
 
 bool RemoteBackend::shut_down() noexcept TANDEM_RT {
   const Seen& seen = newest_.front();
   const bool ends = seen.is_one && hal::ends(static_cast<RunPhase>(seen.phase));
   if (is_gone() || ends || (done_ && seen.owner != client_)) return true;
+  if (!done_) {
+    live_ = live_ && ends_with_command_;
+    pending_ = true;
+  }
   done_ = true;
   return false;
 }

@@ -163,6 +163,7 @@ class RemoteBackend final : public hal::Backend {
   // The loop's.
   Silence silence_;  // of the server
   bool fresh_ = false, first_ = true, pending_ = false, live_ = false, done_ = false;
+  bool ends_with_command_ = false;  // `done` comes with the controllers' last one
   std::uint64_t cycles_ahead_ = 0;  // of this loop, the server's count is
   std::int64_t ahead_ns_ = 0;
   std::uint64_t last_cycle_ = 0, missed_now_ = 0, missed_ = 0, sequence_ = 0;

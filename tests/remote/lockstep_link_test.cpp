@@ -11,9 +11,11 @@ using namespace test;
 
 constexpr std::uint64_t kRunning = 300, kSettling = 40;
 
-void in_process(Record& record, std::uint32_t delay) {
+void in_process(Record& record, std::uint32_t delay, std::uint64_t running = kRunning,
+                double sag_rad = 0.0) {
   const hal::RobotConfig robot = hal::test::fake_robot();
   runtime::test::FirstOrderRobot backend(robot);
+  backend.sag_rad = sag_rad;
   runtime::ControllerHost host(robot, nullptr, kPeriod_ns);
   EXPECT_TRUE(host.add("sine", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
                        runtime::test::parameters()));
@@ -24,23 +26,25 @@ void in_process(Record& record, std::uint32_t delay) {
                     .clock = clock,
                     .truth = &backend.truth,
                     .observer = &record},
-                   {.running_cycles = kRunning, .settle_cycles = kSettling, .delay_cycles = delay});
+                   {.running_cycles = running, .settle_cycles = kSettling, .delay_cycles = delay});
   cycle.run();
   EXPECT_TRUE(cycle.faults().empty());
 }
 
-void over_the_link(Record& record, std::uint32_t delay) {
+void over_the_link(Record& record, std::uint32_t delay, std::uint64_t running = kRunning,
+                   double sag_rad = 0.0) {
   Served served({.lockstep = true, .ends_with_owner = true, .lease_timeout_s = 30.0},
                 {.settle_cycles = kSettling}, &record);
+  served.backend.sag_rad = sag_rad;
   served.begin();
   ClientConfig config;
   config.lockstep = true;
-  Owner owner(config, {.running_cycles = kRunning, .delay_cycles = delay});
+  Owner owner(config, {.running_cycles = running, .delay_cycles = delay});
   owner.cycle->run();
   served.join();
   EXPECT_TRUE(owner.cycle->faults().empty());
   EXPECT_TRUE(served.cycle->faults().empty());
-  EXPECT_EQ(owner.cycle->running_cycles(), kRunning);
+  EXPECT_EQ(owner.cycle->running_cycles(), running);
   EXPECT_EQ(owner.cycle->loop().bus.count(), owner.cycle->loop().cycles)
       << "its wait for the server is no work";
 }
@@ -60,9 +64,9 @@ std::string difference_of(const hal::Image& a, const hal::Image& b) {
   return {};
 }
 
-void expect_same(const Record& a, const Record& b) {
+void expect_same(const Record& a, const Record& b, std::uint64_t running = kRunning) {
   ASSERT_EQ(a.cycles().size(), b.cycles().size());
-  ASSERT_GT(a.cycles().size(), kRunning + kSettling);
+  ASSERT_GT(a.cycles().size(), running + kSettling);
   for (std::size_t i = 0; i < a.cycles().size(); ++i) {
     const Record::Cycle& one = a.cycles()[i];
     const Record::Cycle& other = b.cycles()[i];
@@ -88,6 +92,18 @@ TEST(LockstepLink, WithADelayIsTheDelayedRunInOneProcess) {
   expect_same(here, there);
   in_process(undelayed, 0);
   EXPECT_FALSE(same(here.cycles().back().state, undelayed.cycles().back().state));
+}
+
+TEST(LockstepLink, IsTheSameWhereJointsSagAndTheRunEndsWhileTheyGoOver) {
+  for (const std::uint32_t delay : {0U, 3U}) {
+    for (const std::uint64_t running : {1U, 2U, 5U, 30U, 90U, 150U}) {
+      SCOPED_TRACE(std::to_string(running) + " cycles, delay " + std::to_string(delay));
+      Record here(hal::test::fake_robot()), there(hal::test::fake_robot());
+      in_process(here, delay, running, 0.02);
+      over_the_link(there, delay, running, 0.02);
+      expect_same(here, there, running);
+    }
+  }
 }
 
 TEST(LockstepLink, AnOwnersGainsAreTheServedRobots) {

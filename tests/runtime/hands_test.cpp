@@ -76,7 +76,7 @@ hal::RobotConfig wide_robot() {
 enum class By { kController, kSilentController, kOperator, kVelocityMode, kTorqueMode, kOwner };
 
 struct MovingRun {
-  explicit MovingRun(By by) : by_(by) {
+  explicit MovingRun(By by, std::uint32_t delay_cycles = 0) : by_(by) {
     runner = std::make_shared<Runner>(kSpeed_rad_s, by != By::kSilentController);
     const bool controlled = by == By::kController || by == By::kSilentController;
     add("runner", runner, controlled);
@@ -90,7 +90,8 @@ struct MovingRun {
     add(kOwnerController, remote, false);
     cycle = std::make_unique<RobotCycle>(
         CycleParts{robot, backend, host, clock, nullptr, nullptr, nullptr, parts},
-        CycleConfig{.settle_cycles = 20, .after_stop = AfterStop::kWait});
+        CycleConfig{
+            .settle_cycles = 20, .after_stop = AfterStop::kWait, .delay_cycles = delay_cycles});
     steps(100);
     if (by == By::kOperator) {
       EXPECT_TRUE(cycle->services().move_joint(
@@ -225,6 +226,25 @@ TEST(ChangeOfHands, BrakesAJointThatMovesWhateverItDidAndWhateverHappens) {
       EXPECT_LE(apart, silent_then ? 1.26 : silent ? kSpeed_rad_s : 0.02);
     }
   }
+}
+
+/// What is in the delay when the run stops is not sent any more.
+TEST(ChangeOfHands, AStopBrakesFromWhatWasSentWhateverTheDelay) {
+  MovingRun run(By::kController, 20);
+  run.backend.faulted_joint = 1;
+  double speed = kSpeed_rad_s, lowest = kSpeed_rad_s, hardest = 0.0;
+  for (int i = 0; i < 1000; ++i) {
+    run.steps(1);
+    hardest = std::max(hardest, std::abs(run.speed() - speed) * 1e3);
+    speed = run.speed();
+    lowest = std::min(lowest, speed);
+    if (i == 0) {
+      EXPECT_NEAR(speed, kSpeed_rad_s, 1e-6) << "it goes on as it did";
+    }
+  }
+  EXPECT_LE(hardest, kMostAcceleration_rad_s2 * 1.001);
+  EXPECT_GE(lowest, -1e-3);
+  EXPECT_NEAR(speed, 0.0, 1e-6);
 }
 
 }  // namespace
