@@ -38,9 +38,10 @@ robot:
 	@scripts/install-dependencies demo
 	@JOBS=$(JOBS) scripts/build-robot
 
-# What CI runs (.ci/run, in a fresh clone): all tests; some of them in strange surroundings; the tests on a real CAN stack, which
-# take one core, and beside them thirteen seconds of each fuzz target and the real-time proof. The last
-# lines say what ran and what did not. Strange surroundings want the build folder for themselves.
+# What CI runs (.ci/run, in a fresh clone): all tests; some of them in strange surroundings; the tests
+# on a real CAN stack, which take one core, and beside them thirteen seconds of each fuzz target and
+# the real-time proof. The last lines say what ran and what did not. Strange surroundings want the
+# build folder for themselves.
 test:
 	@rm -f build/summary
 	@$(MAKE) --no-print-directory lint

@@ -230,9 +230,9 @@ bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
   bool changed = false;
   for (AxisMaster& axis : axes) {
     TargetState its = axis.error() == AxisError::kNone ? target : TargetState::kNothing;
-    const bool brakes =
+    const bool can_brake =
         axis.error() == AxisError::kNotFollowing || axis.error() == AxisError::kBeyondLimits;
-    if (brakes && target != TargetState::kNothing) {
+    if (can_brake && target != TargetState::kNothing) {
       its = TargetState::kQuickStop;  // it has no fault of its own: it can brake
     }
     changed = changed || axis.target() != its;

@@ -96,7 +96,7 @@ TEST(Fault, CategoryHoldFollowsABrakingAxisToItsRestAndNoFurther) {
   rig.master->stop(StopCategory::kHold);
   for (int i = 0; i < 20; ++i) (void)go(-1e-4);
   const std::int32_t rest = go(0.0);
-  EXPECT_NEAR(rest, std::lround(place * 5730.0), 4) << "some 5730 counts per rad";
+  EXPECT_NEAR(rest, std::round(place * 5730.0), 4) << "some 5730 counts per rad";
   EXPECT_EQ(go(-1e-2), rest) << "that is no braking";
   EXPECT_EQ(go(0.0), rest);
   EXPECT_EQ(rig.axis(3).objects().velocity_offset, 0);
