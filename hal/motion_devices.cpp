@@ -113,6 +113,8 @@ void PositionControl::advance() noexcept TANDEM_RT {
     }
     motion.hardest_rad_s2 = std::max(motion.hardest_rad_s2, motion.acceleration_rad_s2);
     Trapezoid& reference = motion.reference;
+    // What the limits hold back arrives later: it is led until then.
+    const bool held_back = io_.command->position_rad()[j] != reference.position_rad;
     bool done = false;
     if (motion.phase == kMoving) {
       done = reference.step(motion.target_rad, motion.speed_rad_s, motion.hardest_rad_s2, dt);
@@ -123,7 +125,7 @@ void PositionControl::advance() noexcept TANDEM_RT {
     }
     io_.command->position_rad()[j] = reference.position_rad;
     io_.command->velocity_rad_s()[j] = reference.velocity_rad_s;
-    if (done) motion.phase = kResting;
+    if (done && !held_back) motion.phase = kResting;
   }
 }
 

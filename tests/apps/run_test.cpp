@@ -102,7 +102,7 @@ TEST_F(Run, LogsItsHostItsTimeAndTheDigestsOfItsCode) {
   EXPECT_EQ(line.substr(0, 5), "hold ");
   const auto by_coreutils = [this](const std::string& file) {
     const std::string command =
-        "sha256sum < '" + file + "' > '" + (folder_ / "digest.txt").string() + "'";
+        "sha256sum < " + shell_word(file) + " > " + shell_word((folder_ / "digest.txt").string());
     EXPECT_EQ(std::system(command.c_str()), 0);
     return read_text(folder_ / "digest.txt").substr(0, 64);
   };

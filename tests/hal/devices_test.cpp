@@ -124,6 +124,17 @@ TEST_F(FastMotion, BrakesHarderAsSoonAsItMay) {
   EXPECT_LE(command.position_rad()[0], fast_at_rad + 0.26) << "a quarter of a radian, not a half";
 }
 
+/// As limits do that hold a reference back: what is sent comes 50 cycles later.
+TEST_F(FastMotion, IsLedUntilWhatIsSentHasArrived) {
+  std::vector<double> sent(50, command.position_rad()[0]);
+  for (std::size_t i = 0; !motion.check_motion_done(0); ++i) {
+    advance();
+    std::swap(command.position_rad()[0], sent[i % sent.size()]);
+    ASSERT_LT(i, 100'000U);
+  }
+  EXPECT_EQ(command.position_rad()[0], 1.4);
+}
+
 /// The default is 1 rad/s^2 here: a quarter of 2 rad/s in half a second.
 TEST_F(DevicesTest, AStopBrakesAtLeastAsHardAsAnOrdinaryMotion) {
   mode(ControlMode::kPosition);
