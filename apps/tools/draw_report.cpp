@@ -5,6 +5,7 @@
 #include "apps/robot/kernel_store.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
+#include "base/open_file.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "report/page.hpp"
 
@@ -35,6 +36,12 @@ Result<report::ReportFiles> draw_report(const std::string& log,
     kernels = std::move(*found);
     return kernels.get();
   };
+  std::vector<std::string> logs{log};
+  logs.insert(logs.end(), others.begin(), others.end());
+  for (const std::string& one : logs) {  // before a folder is made beside it
+    if (const auto file = open_to_read(one, "name a log of `tandem run`"); !file)
+      return std::unexpected(file.error());
+  }
   const std::string folder = output.empty() ? default_folder(log, others) : output;
   if (const Status lost = check_overwrites(
           folder + "/report.html", report::page_begin("tandem report"), "page of `tandem report`");

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <string>
 
+#include "tests/support/needs_root.hpp"
 #include "tests/support/scratch_folder.hpp"
 
 namespace tandem::test {
@@ -18,7 +19,7 @@ inline constexpr uid_t kStranger = 65534;
 
 /// Why there is no other user here; empty: there is. Only root can be two.
 inline std::string no_stranger() {
-  return ::geteuid() == 0 ? "" : "only root can act as another user";
+  return ::geteuid() == 0 ? "" : needs_root("to act as another user");
 }
 
 /// A process of another user, which does `work` until it returns or the object's end.
