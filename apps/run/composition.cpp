@@ -321,6 +321,12 @@ Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
              .file = e.file,
              .key = "hal.backend"}};
   }
+  if (overrides.domain && !is_remote && !overrides.serves && !e.dds.enabled) {
+    return {{.message = "--domain: nothing of this run is in a DDS domain",
+             .hint = "add --dds, or leave it out",
+             .file = {},
+             .key = {}}};
+  }
   if (Diagnostics link = unfit_for_link(e, overrides); !link.empty()) return link;
   if (!overrides.scenario.empty() && e.hal.backend != runtime::BackendKind::kSim) {
     return {{.message = "faults are injected on the other end of the wire",

@@ -43,6 +43,11 @@ TEST_F(RefusedFlags, OfABusThatIsNotThere) {
           "--interface: the bus is the server's (give --interface to `tandem serve`)");
 }
 
+TEST_F(RefusedFlags, OfADomainThatNothingIsIn) {
+  refused("run hold.toml --no-log --domain 77",
+          "--domain: nothing of this run is in a DDS domain (add --dds");
+}
+
 TEST_F(RefusedFlags, AnInterfaceThatLinuxCannotHave) {
   for (const char* command : {"run hold.toml --no-log", "emulate hold.toml", "doctor robot.toml"}) {
     refused(std::string(command) + " --interface can0=a_name_that_has_thirty_letters",
