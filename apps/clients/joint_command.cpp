@@ -216,7 +216,10 @@ Result<Json> wait_for_motion(ControlClient& run, const std::string& name, double
     begun = begun || cycled;
     const bool rests =
         cycled && before["commanded_position_rad"] == (*now)["commanded_position_rad"];
-    if (!now->value("moving", false) && (now->value("arrived", false) || rests)) return now;
+    // The reference of a drive that is not enabled follows the joint, which may swing for long.
+    const bool led = now->value("drive_state", "") == "operation enabled";
+    const bool over = now->value("arrived", false) || rests || (begun && !led);
+    if (!now->value("moving", false) && over) return now;
     if (rt::stop_requested()) return now;
     before = *now;
     std::this_thread::sleep_for(kLook);
