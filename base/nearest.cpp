@@ -9,7 +9,8 @@
 namespace tandem {
 namespace {
 
-/// Of a name and of a candidate that may be near it: too_far() of the longest name is 33.
+/// Entries of a row of distances between a name and a candidate near it: too_far() of the longest
+/// name is 33.
 constexpr std::size_t kMostRow = kMostNamed + kMostNamed / 2 + 2;
 
 char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }

@@ -33,7 +33,7 @@ class Sha256 {
   return sha256(std::as_bytes(std::span(text)));
 }
 
-/// Of what an open file holds from its beginning; its offset stays. Empty: it cannot be read.
+/// The digest of an open file, from its beginning; its offset stays. Empty: it cannot be read.
 [[nodiscard]] std::string sha256_of(int file);
 
 }  // namespace tandem

@@ -11,8 +11,8 @@ namespace tandem::apps {
 
 /// An abstract Unix socket with the interface's name: there is one of a name in a network
 /// namespace, as there is one interface, whoever asks. The kernel takes it away with the process,
-/// however that ends. Nobody is served there. Everybody may take such a name: whoever holds it and
-/// is neither this user nor root locks nothing, and is told of.
+/// however that ends. Nobody is served there. Everybody may take such a name: a holder
+/// who is neither this user nor root locks nothing, and is reported.
 class InterfaceLock {
  public:
   /// @param side  kMaster or kBoards: one process each

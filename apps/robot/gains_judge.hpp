@@ -46,7 +46,7 @@ class GainsJudge {
                              std::span<const double> position_rad) const;
 
  private:
-  /// Of a joint's row of the mass matrix: alone, and with all else free.
+  /// What a joint feels of the mass matrix: all else free, and all else locked.
   struct Inertias {
     double free_kg_m2 = 0.0, locked_kg_m2 = 0.0;
   };

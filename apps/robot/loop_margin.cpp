@@ -57,7 +57,7 @@ struct Motor {
         current_is_state((a.order & 1) != 0),
         elastic(a.order >= 2) {}
 
-  /// Of a state of the physics; one row of a matrix as well.
+  /// The motor's current in a state of the physics.
   [[nodiscard]] double current(const Eigen::VectorXd& x) const {
     return current_is_state ? x(kCurrent) : (x(kVoltage) - back_emf * x(kMotorRate)) / resistance;
   }

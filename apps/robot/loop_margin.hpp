@@ -25,9 +25,9 @@ struct LoopVerdict {
   double inertia_kg_m2 = 0.0;
   double growth = 0.0;  ///< the largest magnitude of its eigenvalues: by so much it grows a period
   double period_s = 0.0;
-  /// Of the loop opened at its own output: the torque reference (position, velocity) or the torque
-  /// loop's voltage. The least, where the gain is 1 more than once. NaN: it is unstable, or its
-  /// gain is 1 nowhere.
+  /// Phase margin of the loop, opened at its own output: the torque reference (position, velocity)
+  /// or the torque loop's voltage. The least, where the gain is 1 more than once. NaN: it is
+  /// unstable, or its gain is 1 nowhere.
   double phase_margin_deg = std::numeric_limits<double>::quiet_NaN();
   double crossover_rad_s = std::numeric_limits<double>::quiet_NaN();
 

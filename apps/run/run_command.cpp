@@ -179,7 +179,7 @@ Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE
   return {};
 }
 
-/// Who the process is in its DDS domain: by this, what it answers there is told from a stranger's.
+/// The identity of this process in its DDS domain. Clients recognise its answers by it.
 void add_identity(ControlRegistry& commands, const dds::Participant& participant) {
   Json is{{"participant", dds::to_text(dds::id_of(participant))},
           {"domain", participant.config().domain},

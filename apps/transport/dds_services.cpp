@@ -124,7 +124,7 @@ Status DdsServices::add_ask(dds::ServiceServer& server, const char* name, bool o
       });
 }
 
-/// Of who may not ask for it nothing is read.
+/// The questions of whoever may not ask are not read.
 template <class Request, class Response>
 Status DdsServices::add(dds::ServiceServer& server, const char* name, const char* needs,
                         Json (*question)(const Request&),
