@@ -191,14 +191,27 @@ void BumplessTransfer::find_offset(std::size_t index, const hal::StateImage& sta
     joint.offset[kTorque] = state.torque_Nm()[index] - joint.written[kTorque];
   }
   if (mode == ControlMode::kPosition && (same || from.speed_rad_s != 0.0)) {
-    lead_from(index, from.from_rad + from.speed_rad_s * period_s_, from.speed_rad_s,
-              joint.written[kVelocity], from.cycles);
+    const double goes_on_rad = from.from_rad + from.speed_rad_s * period_s_;
+    if (!sets_out(index, goes_on_rad, from.speed_rad_s)) {
+      lead_from(index, goes_on_rad, from.speed_rad_s, joint.written[kVelocity], from.cycles);
+    }
     if (same) joint.offset[kVelocity] = last[kVelocity] - from.speed_rad_s;
   } else if (same) {
     joint.offset[kVelocity] = last[kVelocity] - joint.written[kVelocity];
   } else if (mode == ControlMode::kPosition || mode == ControlMode::kVelocity) {
     joint.offset[kVelocity] = state.velocity_rad_s()[index] - joint.written[kVelocity];
   }
+}
+
+/// Whether the owner's first reference is the first step of a motion from there, no harder than the
+/// joint may: there is nothing to lead over, and an offset would make it harder.
+bool BumplessTransfer::sets_out(std::size_t index, double from_rad,
+                                double speed_rad_s) const noexcept TANDEM_RT {
+  const References& written = joints_[index].written;
+  const double change = std::abs(written[kVelocity] - speed_rad_s);
+  return change > 0.0 &&
+         change <= limits_[index].max_acceleration_rad_s2 * period_s_ * (1 + 1e-9) &&
+         std::abs(written[kPosition] - from_rad) <= change * period_s_;
 }
 
 /// From a place and a speed in this cycle to the owner's reference, which moves at `owner_rad_s`.

@@ -118,6 +118,8 @@ class BumplessTransfer {
                                          double way_rad) const noexcept TANDEM_RT;
   void find_offset(std::size_t joint, const hal::StateImage& state,
                    const hal::CommandImage& command) noexcept TANDEM_RT;
+  [[nodiscard]] bool sets_out(std::size_t joint, double from_rad,
+                              double speed_rad_s) const noexcept TANDEM_RT;
   void lead_from(std::size_t joint, double from_rad, double speed_rad_s, double owner_rad_s,
                  std::int64_t brake_cycles) noexcept TANDEM_RT;
   void notice_unwritten_speed(std::size_t joint, const References& first) noexcept TANDEM_RT;
