@@ -77,14 +77,15 @@ TEST_F(Faults, LeaveAJointBeyondItsLimitWhereItIsUntilItIsRecovered) {
   EXPECT_NE(refused().err.find("joint1: is claimed by the controller 'hold'"), std::string::npos);
   EXPECT_EQ(to_run("estop --category 0").status, 0);
   EXPECT_NE(refused().err.find("while a fault is latched"), std::string::npos) << refused().err;
-  // Held in the middle of a swing it would move on a little: it hangs still first.
-  double swing = 1.0;
-  for (int i = 0; i < 200 && swing > 5e-4; ++i) {
+  // Held in the middle of a swing it would move on a little: it hangs still first. Two looks are
+  // the same about every turning point of the swing, so four in a row have to be.
+  int still = 0;
+  for (int i = 0; i < 200 && still < 4; ++i) {
     const double before = joint()["position_rad"];
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    swing = std::abs(joint()["position_rad"].get<double>() - before);
+    still = std::abs(joint()["position_rad"].get<double>() - before) < 5e-4 ? still + 1 : 0;
   }
-  ASSERT_LE(swing, 5e-4);
+  ASSERT_EQ(still, 4);
   EXPECT_EQ(to_run("fault reset").status, 0);
   const double beyond = joint()["position_rad"];
   ASSERT_GT(beyond, 2.95);
