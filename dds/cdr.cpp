@@ -1,5 +1,5 @@
-// A cursor over XCDR1 bytes whose first failure sticks; lengths are checked before memory is taken,
-// because a peer wrote them.
+// A cursor over XCDR1 or ROS 1 bytes whose first failure sticks; lengths are checked before memory
+// is taken, because a peer wrote them.
 #include "dds/cdr.hpp"
 
 #include <fmt/core.h>
@@ -11,15 +11,21 @@
 namespace tandem::dds {
 namespace {
 
+enum class Wire : std::uint8_t { kCdr, kRos1 };
+
 /// Reads forward; the first failure sticks, and everything after it reads as zero.
 class Cursor {
  public:
-  Cursor(std::span<const std::byte> bytes, bool big_endian)
-      : bytes_(bytes), swap_(big_endian != (std::endian::native == std::endian::big)) {}
+  Cursor(std::span<const std::byte> bytes, bool big_endian, Wire wire = Wire::kCdr)
+      : bytes_(bytes),
+        wire_(wire),
+        swap_(big_endian != (std::endian::native == std::endian::big)) {}
 
   template <class T>
   T number() {
-    at_ = std::min(bytes_.size(), (at_ + sizeof(T) - 1) / sizeof(T) * sizeof(T));
+    if (wire_ == Wire::kCdr) {
+      at_ = std::min(bytes_.size(), (at_ + sizeof(T) - 1) / sizeof(T) * sizeof(T));
+    }
     if (rest() < sizeof(T)) fail("it ends too early");
     if (failed()) return {};
     std::array<std::byte, sizeof(T)> raw;
@@ -31,14 +37,16 @@ class Cursor {
 
   /// @param most  characters, 0: any number
   std::string text(std::uint64_t most) {
-    const auto size = number<std::uint32_t>();  // with the zero at its end
+    const auto size = number<std::uint32_t>();
     if (failed()) return {};
-    if (size == 0 || size > rest() || bytes_[at_ + size - 1] != std::byte{0}) {
+    const std::uint32_t end = wire_ == Wire::kCdr ? 1 : 0;  // the zero that counts with it
+    if (size < end || size > rest() || (end != 0 && bytes_[at_ + size - 1] != std::byte{0})) {
       fail("a string does not end");
       return {};
     }
-    if (most != 0 && size - 1 > most) fail("a string is too long");
-    std::string out(reinterpret_cast<const char*>(&bytes_[at_]), size - 1);
+    if (most != 0 && size - end > most) fail("a string is too long");
+    const auto* first = reinterpret_cast<const char*>(bytes_.data()) + at_;
+    std::string out(first, size - end);
     at_ += size;
     return out;
   }
@@ -56,9 +64,11 @@ class Cursor {
   [[nodiscard]] std::string_view reason() const { return reason_; }
   [[nodiscard]] std::size_t at() const { return at_; }
   [[nodiscard]] std::size_t rest() const { return bytes_.size() - at_; }
+  [[nodiscard]] Wire wire() const { return wire_; }
 
  private:
   std::span<const std::byte> bytes_;
+  Wire wire_;
   bool swap_;
   std::size_t at_ = 0;
   std::string_view reason_;
@@ -114,6 +124,10 @@ Value::Message message(Cursor& cursor, const MessageDefinition& definition) {
     add("request_guid", {cursor.number<std::uint64_t>()});
     add("request_sequence", {cursor.number<std::int64_t>()});
   }
+  // ROS 1's header begins with a number that ROS 2's has no more.
+  if (cursor.wire() == Wire::kRos1 && definition.name == "std_msgs/msg/Header") {
+    (void)cursor.number<std::uint32_t>();
+  }
   for (const Field& field : definition.fields) {
     if (cursor.failed()) break;
     add(field.name, field_value(cursor, field));
@@ -122,6 +136,15 @@ Value::Message message(Cursor& cursor, const MessageDefinition& definition) {
 }
 
 }  // namespace
+
+Result<Value> decode_ros1(const MessageDefinition& definition, std::span<const std::byte> bytes) {
+  Cursor cursor(bytes, false, Wire::kRos1);
+  Value value{message(cursor, definition)};
+  if (!cursor.failed() && cursor.rest() > 0) cursor.fail("bytes follow its end");
+  if (!cursor.failed()) return value;
+  return fail(fmt::format("{} bytes are no {} of ROS 1: {} (byte {})", bytes.size(),
+                          definition.name, cursor.reason(), cursor.at()));
+}
 
 Result<Value> decode(const MessageDefinition& definition, std::span<const std::byte> bytes) {
   constexpr std::size_t kHeader = 4;

@@ -38,6 +38,11 @@ struct Member {
 [[nodiscard]] Result<Value> decode(const MessageDefinition& definition,
                                    std::span<const std::byte> bytes);
 
+/// The same of ROS 1's encoding: little-endian, without padding, and with the number that its
+/// header has besides. `definition` is ROS 2's of the same message.
+[[nodiscard]] Result<Value> decode_ros1(const MessageDefinition& definition,
+                                        std::span<const std::byte> bytes);
+
 /// A member of a message by its name; null when it has none, or is no message.
 [[nodiscard]] const Value* find(const Value& value, std::string_view name);
 
