@@ -6,7 +6,10 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
+#include <memory>
+#include <optional>
 
 #include "base/bounds.hpp"
 
@@ -92,6 +95,83 @@ Status decompress(Compression compression, std::span<const std::byte> data, std:
                : ZSTD_decompress(out.data(), out.size(), data.data(), data.size()) == size;
   }
   if (!good) return fail("a chunk's compressed data are damaged");
+  return {};
+}
+
+Compression packed_by(std::span<const std::byte> begin) noexcept {
+  constexpr std::array<std::uint8_t, 4> kZstd{0x28, 0xB5, 0x2F, 0xFD}, kLz4{0x04, 0x22, 0x4D, 0x18};
+  const auto is = [&](const std::array<std::uint8_t, 4>& magic) {
+    return begin.size() >= magic.size() &&
+           std::memcmp(begin.data(), magic.data(), magic.size()) == 0;
+  };
+  return is(kZstd) ? Compression::kZstd : is(kLz4) ? Compression::kLz4 : Compression::kNone;
+}
+
+namespace {
+
+/// One library's decoder, fed piece by piece.
+class Unpacker {
+ public:
+  explicit Unpacker(Compression compression) {
+    if (compression == Compression::kZstd) zstd_.reset(ZSTD_createDCtx());
+    LZ4F_dctx* made = nullptr;
+    if (compression == Compression::kLz4 &&
+        LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION)) == 0) {
+      lz4_.reset(made);
+    }
+  }
+
+  /// Consumes from `in` and fills `out`. @return bytes of it; none: damaged
+  std::optional<std::size_t> step(std::span<const std::byte>& in, std::span<std::byte> out) {
+    std::size_t produced = out.size(), consumed = in.size();
+    if (zstd_ != nullptr) {
+      ZSTD_inBuffer from{in.data(), in.size(), 0};
+      ZSTD_outBuffer to{out.data(), out.size(), 0};
+      wanted_ = ZSTD_decompressStream(zstd_.get(), &to, &from);
+      if (ZSTD_isError(wanted_) != 0) return std::nullopt;
+      produced = to.pos;
+      consumed = from.pos;
+    } else {
+      if (lz4_ == nullptr) return std::nullopt;
+      wanted_ = LZ4F_decompress(lz4_.get(), out.data(), &produced, in.data(), &consumed, nullptr);
+      if (LZ4F_isError(wanted_) != 0) return std::nullopt;
+    }
+    if (consumed == 0 && produced == 0 && !in.empty()) return std::nullopt;
+    in = in.subspan(consumed);
+    return produced;
+  }
+  /// A frame has ended, and no other has begun.
+  [[nodiscard]] bool whole() const { return wanted_ == 0; }
+
+ private:
+  struct Free {
+    void operator()(ZSTD_DCtx* one) const { ZSTD_freeDCtx(one); }
+    void operator()(LZ4F_dctx* one) const { LZ4F_freeDecompressionContext(one); }
+  };
+  std::unique_ptr<ZSTD_DCtx, Free> zstd_;
+  std::unique_ptr<LZ4F_dctx, Free> lz4_;
+  std::size_t wanted_ = 1;
+};
+
+}  // namespace
+
+Status unpack(Compression compression, const PackedBytes& more, const TakeBytes& take) {
+  constexpr std::size_t kPiece = std::size_t{1} << 17;
+  Unpacker unpacker(compression);
+  Bytes piece(kPiece);
+  for (;;) {
+    auto packed = more();
+    if (!packed) return std::unexpected(packed.error());
+    if (packed->empty()) break;
+    std::size_t produced = 0;
+    do {
+      const auto got = unpacker.step(*packed, piece);
+      if (!got) return fail("its compressed data are damaged");
+      produced = *got;
+      if (Status taken = take(std::span(piece).first(produced)); !taken) return taken;
+    } while (!packed->empty() || (!unpacker.whole() && produced == piece.size()));
+  }
+  if (!unpacker.whole()) return fail("its compressed data are cut");
   return {};
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string_view>
 
@@ -25,5 +26,21 @@ void compress(Compression compression, std::span<const std::byte> data, Bytes& o
 /// more than 1 GiB.
 [[nodiscard]] Status decompress(Compression compression, std::span<const std::byte> data,
                                 std::uint64_t size, Bytes& out);
+
+/// What bytes are packed by, as whole files and rosbag2's messages are: by the first four of them.
+/// kNone: by neither.
+[[nodiscard]] Compression packed_by(std::span<const std::byte> begin) noexcept;
+
+/// The next packed bytes; none at their end.
+using PackedBytes = std::function<Result<std::span<const std::byte>>()>;
+/// Takes what was unpacked, piece by piece. An error ends the unpacking: the one who takes bounds
+/// how much there is.
+using TakeBytes = std::function<Status(std::span<const std::byte>)>;
+
+/// Unpacks frames whose content's size nobody says. Memory: zstd's window, at most 128 MiB.
+/// Errors: those of `more` and `take`; damaged or cut data.
+/// @pre `compression` is not kNone
+[[nodiscard]] Status unpack(Compression compression, const PackedBytes& more,
+                            const TakeBytes& take);
 
 }  // namespace tandem::log
