@@ -6,6 +6,7 @@
 #include <ostream>
 
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 #include "log/schema.hpp"
 #include "log/signal_name.hpp"
 
@@ -18,7 +19,19 @@ void append_number(std::string& line, double value) {
   line.append(digits, end);
 }
 
-/// The name of element `index`.
+/// A text of others as one cell of one line.
+std::string cell(const std::string& text) {
+  std::string out = shown(text, text.size());
+  for (auto at = out.find('"'); at != std::string::npos; at = out.find('"', at + 2))
+    out.insert(at, 1, '"');
+  return "\"" + out + "\"";
+}
+/// The same of a name, which has no quotes where it needs none.
+std::string name_cell(const std::string& name) {
+  const bool plain = name.find_first_of(",\"\n\r") == std::string::npos;
+  return plain ? name : cell(name);
+}
+
 Status write_events(const LogFile& log, std::ostream& out) {
   const auto events = log.events();
   if (!events) return std::unexpected(events.error());
@@ -27,7 +40,7 @@ Status write_events(const LogFile& log, std::ostream& out) {
     std::string time;
     append_number(time, static_cast<double>(event.time_ns) * 1e-9);
     out << time << ',' << event.cycle << ',' << to_string(event.kind) << ',' << event.joint << ','
-        << event.code << ",\"" << text << "\"\n";
+        << event.code << ',' << cell(text) << "\n";
   }
   return {};
 }
@@ -55,7 +68,8 @@ Result<std::vector<const hal::Field*>> choose(const Topic* topic,
 std::string header(const std::vector<const hal::Field*>& fields, const RunInfo& info) {
   std::string line = "time_s";
   for (const hal::Field* field : fields) {
-    for (std::size_t i = 0; i < field->count; ++i) line += "," + signal_name(*field, i, info);
+    for (std::size_t i = 0; i < field->count; ++i)
+      line += "," + name_cell(signal_name(*field, i, info));
   }
   return line;
 }

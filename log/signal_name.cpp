@@ -23,19 +23,26 @@ constexpr Row kRows[] = {
 #undef TANDEM_FIELD
 };
 
-/// Whether the field has one element per joint. Of a field that is not ours its count says it.
-bool is_per_joint(const hal::Field& field, const RunInfo& info) {
-  if (field.count != info.joints.size()) return false;
+/// The count that the tables say: "joints"; empty of a field that is not ours.
+std::string_view count_of(const hal::Field& field) {
   const std::string name = hal::wire_name(field.name);
   const auto* row =
       std::ranges::find_if(kRows, [&](const Row& one) { return hal::wire_name(one.name) == name; });
-  return row == std::end(kRows) || row->count == "joints";
+  return row == std::end(kRows) ? std::string_view() : row->count;
+}
+
+/// Whether a robot may have one of them or more, so that one has its name or number, too.
+bool is_numbered(std::string_view count) {
+  constexpr std::string_view kCounts[] = {"joints", "feet",    "sensors",
+                                          "loops",  "passive", "wrenches"};
+  return std::ranges::find(kCounts, count) != std::end(kCounts);
 }
 
 }  // namespace
 
 std::string signal_name(const hal::Field& field, std::size_t index, const RunInfo& info) {
-  if (field.count == 1) return field.name;
+  const std::string_view count = count_of(field);
+  if (field.count == 1 && !is_numbered(count)) return field.name;
   if (field.name == "sensor") {
     std::size_t first = 0;
     for (const SensorInfo& sensor : info.sensors) {
@@ -45,7 +52,9 @@ std::string signal_name(const hal::Field& field, std::size_t index, const RunInf
       first += sensor.channels;
     }
   }
-  if (is_per_joint(field, info)) return field.name + "." + info.joints[index];
+  const bool per_joint =
+      count.empty() || count == "joints";  // of another's field its count says it
+  if (per_joint && field.count == info.joints.size()) return field.name + "." + info.joints[index];
   return field.name + "." + std::to_string(index);
 }
 

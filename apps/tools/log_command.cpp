@@ -211,8 +211,8 @@ void print_comparison(const log::Comparison& comparison, std::FILE* out) {
 /// Of logs that have other joints: their messages have other lengths, and no number in common.
 void print_robots(const log::RunInfo& a, const log::RunInfo& b, std::FILE* out) {
   if (a.joints == b.joints) return;
-  fmt::print(out, "these are logs of different robots: {} with {}, {} with {}\n", a.robot,
-             counted(a.joints.size(), "joint"), b.robot, counted(b.joints.size(), "joint"));
+  fmt::print(out, "these are logs of different robots: {} with {}, {} with {}\n", shown(a.robot),
+             counted(a.joints.size(), "joint"), shown(b.robot), counted(b.joints.size(), "joint"));
 }
 
 Result<Exit> diff(const log::LogFile& file, const LogOptions& options) {

@@ -12,6 +12,7 @@
 #include "apps/tools/log_alarms.hpp"
 #include "apps/tools/log_torques.hpp"
 #include "base/counted.hpp"
+#include "base/quoting.hpp"
 #include "estimation/collision.hpp"
 #include "estimation/config.hpp"
 
@@ -149,7 +150,8 @@ void print_learned(const std::vector<NamedTorques>& runs, const std::vector<std:
   for (const NamedTorques& run : runs) {
     const std::size_t rows = run.torques.free_rows();
     fmt::print(out, "# {} s of {}\n",
-               std::round(run.torques.time_s[rows - 1] - run.torques.time_s.front()), run.path);
+               std::round(run.torques.time_s[rows - 1] - run.torques.time_s.front()),
+               shown(run.path, 4'096));
   }
   fmt::print(out, "# {} false alarms an hour at most\n", options.alarms_per_hour);
   if (runs.size() < kFewRuns) {
@@ -185,7 +187,7 @@ Status print_thresholds(const LogOptions& options) {
     print_alarms(table, human_output(options.json));
     json["against"] = alarms_json(table);
   }
-  if (!page->empty()) fmt::print(human_output(options.json), "# {}\n", *page);
+  if (!page->empty()) fmt::print(human_output(options.json), "# {}\n", shown(*page, 4'096));
   return write_json(options.json, json);
 }
 
