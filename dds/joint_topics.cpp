@@ -1,5 +1,4 @@
-// Names and interfaces are set once; each sample lends DDS the image's values in robot.toml's
-// order.
+// Names and interfaces are set once; each sample lends DDS values in robot.toml's order.
 #include "dds/joint_topics.hpp"
 
 #include <algorithm>
@@ -19,7 +18,7 @@ constexpr std::array<Interface, 9> kInterfaces{{
     {"position", &hal::StateImage::position_rad},
     {"velocity", &hal::StateImage::velocity_rad_s},
     {"acceleration", &hal::StateImage::acceleration_rad_s2},
-    {"effort", &hal::StateImage::torque_Nm},
+    {"effort", &hal::StateImage::torque_Nm, &hal::MotorFeedback::torque},
     {"motor_position", &hal::StateImage::motor_position_rad},
     {"motor_velocity", &hal::StateImage::motor_velocity_rad_s},
     {"current", &hal::StateImage::current_A, &hal::MotorFeedback::current},
@@ -39,6 +38,12 @@ std::vector<std::string> joint_names(const hal::RobotConfig& robot) {
   return names;
 }
 
+std::vector<std::string> names_with_followers(const RunDescription& run) {
+  std::vector<std::string> names = joint_names(run.robot);
+  for (const hal::Follower& one : followers_of(run.robot, run.tree)) names.push_back(one.name);
+  return names;
+}
+
 std::vector<std::string> interface_names() {
   std::vector<std::string> names;
   for (const Interface& one : kInterfaces) names.emplace_back(one.name);
@@ -49,7 +54,9 @@ std::vector<std::string> interface_names() {
 
 JointTopics::JointTopics(OutputMaker& maker, const RunDescription& run)
     : tells_(hal::motor_feedback(run.robot)),
+      followers_(followers_of(run.robot, run.tree)),
       joints_(joint_names(run.robot)),
+      joints_and_followers_(names_with_followers(run)),
       interfaces_(interface_names()),
       values_(run.robot.joints.size() * kInterfaces.size()),
       joint_values_(run.robot.joints.size()),
@@ -72,14 +79,33 @@ void JointTopics::publish(const CycleSample& sample) {
   if (sample.is_due(Topic::kJointStates) && joint_states_.wanted()) {
     sensor_msgs::JointState message{};
     message.header = {ros_time(sample.stamp_ns), refer(no_frame_)};
-    refer(message.name, joints_.get());
-    refer(message.position, sample.state.position_rad());
-    refer(message.velocity, sample.state.velocity_rad_s());
-    refer(message.effort, sample.state.torque_Nm());
+    fill_states(sample.state);
+    refer(message.name, joints_and_followers_.get());
+    refer(message.position, std::span<const double>(position_));
+    refer(message.velocity, std::span<const double>(velocity_));
+    refer(message.effort, std::span<const double>(effort_));
     joint_states_.write(message);
   }
   if (sample.is_due(Topic::kDynamicJointStates) && dynamic_joint_states_.wanted()) {
     dynamic_joint_states_.write(dynamic(sample));
+  }
+}
+
+void JointTopics::fill_states(const hal::StateImage& state) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const auto copy = [](std::vector<double>& to, std::span<const double> from) {
+    to.assign(from.begin(), from.end());
+  };
+  copy(position_, state.position_rad());
+  copy(velocity_, state.velocity_rad_s());
+  copy(effort_, state.torque_Nm());
+  for (std::size_t j = 0; j < tells_.size(); ++j) {
+    if (!tells_[j].torque) effort_[j] = kNone;
+  }
+  for (const hal::Follower& one : followers_) {
+    position_.push_back(one.multiplier * position_[one.leader] + one.offset);
+    velocity_.push_back(one.multiplier * velocity_[one.leader]);
+    effort_.push_back(kNone);
   }
 }
 

@@ -4,13 +4,15 @@
 
 #include <vector>
 
+#include "dds/followers.hpp"
 #include "dds/message_parts.hpp"
 #include "dds/topic_group.hpp"
 #include "hal/config/capabilities.hpp"
 
 namespace tandem::dds {
 
-/// Every joint in the process image's order, link side. A joint that has not been heard of has 0;
+/// Every joint in the process image's order, link side; in joint_states the joints that follow them
+/// (URDF: mimic) stand behind. There is no message before each joint was measured once. Torque,
 /// current, voltage and temperature are NaN where the drive does not tell them.
 class JointTopics final : public TopicGroup {
  public:
@@ -19,11 +21,14 @@ class JointTopics final : public TopicGroup {
 
  private:
   [[nodiscard]] const control_msgs::DynamicJointState& dynamic(const CycleSample& sample);
+  void fill_states(const hal::StateImage& state);
 
   std::vector<hal::MotorFeedback> tells_;  // of each joint's drive
-  TextList joints_;
+  std::vector<hal::Follower> followers_;
+  TextList joints_, joints_and_followers_;
   TextList interfaces_;
-  std::vector<double> values_;  // a joint's interfaces one after another
+  std::vector<double> position_, velocity_, effort_;  // of joint_states
+  std::vector<double> values_;                        // a joint's interfaces one after another
   std::vector<control_msgs_msg_dds__InterfaceValue_> joint_values_;
   std::string no_frame_;
   Output<sensor_msgs::JointState> joint_states_;

@@ -100,10 +100,21 @@ bool RobotView::write_joint_states(std::int64_t time_ns, std::span<const std::by
   if (std::ranges::any_of(values_, [cycle](double age) { return age > cycle; })) return false;
   CdrWriter out(body_);
   write_header(out, time_ns, "");
-  out.number(static_cast<std::uint32_t>(joints_.size()));
+  out.number(static_cast<std::uint32_t>(joints_.size() + robot_.followers.size()));
   for (const std::string& joint : joints_) out.text(joint);
-  for (const char* field : {"position_rad", "velocity_rad_s", "torque_nm"}) {
+  for (const hal::Follower& one : robot_.followers) out.text(one.name);
+  // A follower has no torque that anybody measures.
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  struct Part {
+    const char* field;
+    double share, offset_share;  // of a follower: times its multiplier, its offset
+  };
+  for (const auto& [field, share, offset] :
+       {Part{"position_rad", 1.0, 1.0}, {"velocity_rad_s", 1.0, 0.0}, {"torque_nm", kNone, 0.0}}) {
     read_field(state_layout_, field, state, values_);
+    for (const hal::Follower& one : robot_.followers) {
+      values_.push_back(share * one.multiplier * values_.at(one.leader) + offset * one.offset);
+    }
     out.list(values_);
   }
   return true;

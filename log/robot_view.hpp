@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "hal/follower.hpp"
 #include "hal/image.hpp"
 #include "log/bytes.hpp"
 #include "log/mcap_writer.hpp"
@@ -19,6 +20,7 @@ namespace tandem::log {
 struct ViewedRobot {
   std::string urdf{};       ///< the description's text; empty: the log has nothing for viewers
   std::string base_link{};  ///< of a floating base: the root link; empty: the base does not move
+  std::vector<hal::Follower> followers{};  ///< joints that follow those of the images
 };
 
 /// Topics /joint_states, /tf and /robot_description, of the types that ROS 2 has for them.

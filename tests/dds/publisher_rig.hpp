@@ -20,9 +20,18 @@ namespace tandem::dds::test {
 
 using tandem::test::eventually;
 
-inline runtime::CompleteRobot robot_of(const std::string& name) {
+/// @param follows  its last joint has no drive, and goes by -2 times its first one, plus 0.5
+inline runtime::CompleteRobot robot_of(const std::string& name, bool follows = false) {
   auto robot = runtime::read_robot(TANDEM_SOURCE_DIR "/config/" + name + "/robot.toml");
   EXPECT_TRUE(robot) << robot.error().front().to_string();
+  if (follows) {
+    model::Tree& tree = robot->description.tree;
+    model::Joint& last = tree.joints[tree.joint_index(robot->config.joints.back().name)];
+    last.leader = tree.joint_index(robot->config.joints.front().name);
+    last.multiplier = -2.0;
+    last.offset = 0.5;
+    robot->config.joints.pop_back();
+  }
   return std::move(*robot);
 }
 
@@ -31,13 +40,14 @@ struct RigOptions {
   bool simulated_time = true;
   bool estimated = false;                  ///< a base's estimate beside the truth
   bool parallel = false;                   ///< a second robot
+  bool follows = false;                    ///< the last joint goes by the first
   std::vector<std::string> wrenches = {};  ///< sites of the estimate's; of a fixed base with it
   Config config = own_config();
 };
 
 struct PublisherRig {
   explicit PublisherRig(const RigOptions& options = {})
-      : robot(robot_of(options.robot)),
+      : robot(robot_of(options.robot, options.follows)),
         state(robot.config.shape()),
         command(robot.config.shape()),
         truth(robot.config.joints.size(), robot.config.contact.feet.size()) {

@@ -2,6 +2,7 @@
 #include <Eigen/Geometry>
 #include <map>
 
+#include "dds/followers.hpp"
 #include "hal/config/capabilities.hpp"
 #include "model/dynamics.hpp"
 #include "model/mechanism.hpp"
@@ -38,6 +39,42 @@ TEST_P(EveryRobot, HasJointStatesInTheImagesOrder) {
     EXPECT_EQ(ns(message.header.stamp), 20'000'000);
     EXPECT_STREQ(message.header.frame_id, "");
   });
+}
+
+// robot_state_publisher drew such joints nowhere.
+TEST(JointTopics, HaveTheJointsThatFollowOthers) {
+  PublisherRig rig({.follows = true});
+  ASSERT_EQ(rig.state.joints(), 1U);
+  publish_and_take<sensor_msgs::JointState>(rig, "joint_states", [&](const auto& message) {
+    EXPECT_EQ(texts(message.name), (std::vector<std::string>{"joint1", "joint2"}));
+    EXPECT_EQ(list(message.position), (std::vector<double>{0.1, -2.0 * 0.1 + 0.5}));
+    EXPECT_EQ(list(message.velocity), (std::vector<double>{-0.2, 0.4}));
+    EXPECT_EQ(list(message.effort).front(), 3.0);
+    EXPECT_TRUE(std::isnan(list(message.effort).back())) << "nobody measures it";
+  });
+}
+
+TEST(JointTopics, AFollowersPlaceIsItsMultiplierAndItsOffset) {
+  hal::RobotConfig robot;
+  robot.joints.resize(2);
+  robot.joints[0].name = "a";
+  robot.joints[1].name = "b";
+  model::Tree tree;
+  tree.joints.resize(3);
+  tree.joints[0].name = "driven_by_nobody";
+  tree.joints[1].name = "b";
+  tree.joints[2].name = "c";
+  tree.joints[2].leader = 1;
+  tree.joints[2].multiplier = -2.0;
+  tree.joints[2].offset = 0.5;
+  const auto found = followers_of(robot, tree);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].name, "c");
+  EXPECT_EQ(found[0].leader, 1U) << "in the image, not in the tree";
+  EXPECT_EQ(found[0].multiplier, -2.0);
+  EXPECT_EQ(found[0].offset, 0.5);
+  tree.joints[2].leader = 0;
+  EXPECT_TRUE(followers_of(robot, tree).empty());
 }
 
 /// A second robot that is always one cycle behind.

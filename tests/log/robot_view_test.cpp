@@ -105,6 +105,21 @@ TEST(RobotView, EncodesAJointStateAsCdrHasIt) {
   EXPECT_EQ(body, expected);
 }
 
+TEST(RobotView, HasTheJointsThatFollowOthers) {
+  const View view({.urdf = "<robot/>", .followers = {{"toe", 0, -2.0, 0.5}}});
+  const auto [time_ns, body] = view.of("/joint_states")[1];
+  EXPECT_EQ(time_ns, 21'000'000) << "cycle 7: hip at 7";
+  const auto number = [&](std::size_t from_end) {
+    double value = 0.0;
+    std::memcpy(&value, body.data() + body.size() - from_end, sizeof value);
+    return value;
+  };
+  EXPECT_NE(body.find(std::string("\x04\0\0\0toe\0", 8)), std::string::npos);
+  EXPECT_TRUE(std::isnan(number(8))) << "its torque, the last number";
+  EXPECT_EQ(number(8 + 8 + 3 * 8), -0.0) << "its velocity, before a length, padding and 3 torques";
+  EXPECT_EQ(number(8 + 8 + 3 * 8 + 8 + 3 * 8), -2.0 * 7.0 + 0.5);
+}
+
 TEST(RobotView, LeavesOutWhatNobodyKnows) {
   EXPECT_EQ(View({.urdf = "<robot/>"}).counts(), (Counts{15, 0, 1})) << "a fixed base";
   EXPECT_EQ(View({.urdf = "<robot/>", .base_link = "pelvis"}, false).counts(), (Counts{15, 0, 1}))
