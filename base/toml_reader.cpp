@@ -23,7 +23,7 @@ namespace tandem {
 
 struct TomlTable::Shared {
   toml::table root;
-  std::string file;
+  std::string file, text;
   Diagnostics diagnostics;
   std::set<std::string> meant;  // keys that a misspelt one stands for: not missing besides
   std::map<std::string, std::string> names;  // of entries of arrays: "joint[0]" is "hip"
@@ -539,6 +539,7 @@ Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::strin
   TomlDocument document;
   document.shared_ = std::make_shared<TomlTable::Shared>();
   document.shared_->file = file;
+  document.shared_->text = text;
   try {
     document.shared_->root = toml::parse(text, file);
   } catch (const toml::parse_error& e) {
@@ -561,6 +562,7 @@ Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::strin
 TomlTable TomlDocument::root() const { return {shared_, &shared_->root, {}, 1}; }
 const Diagnostics& TomlDocument::diagnostics() const { return shared_->diagnostics; }
 const std::string& TomlDocument::file() const { return shared_->file; }
+const std::string& TomlDocument::text() const { return shared_->text; }
 
 std::string TomlTable::folder() const {
   const std::string folder = std::filesystem::path(shared_->file).parent_path().string();

@@ -146,6 +146,8 @@ class TomlDocument {
   [[nodiscard]] TomlTable root() const;
   [[nodiscard]] const Diagnostics& diagnostics() const;
   [[nodiscard]] const std::string& file() const;
+  /// What was read: the file may be another by now.
+  [[nodiscard]] const std::string& text() const;
   /// The file's folder, for paths given relative to the file; "." when it has none.
   [[nodiscard]] std::string folder() const;
 

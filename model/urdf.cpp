@@ -353,6 +353,7 @@ std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const st
       link.shapes = found->second;
     }
   }
+  read->text = std::make_shared<const std::string>(text);
   return read;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <expected>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -44,8 +45,9 @@ struct UrdfOptions {
 
 struct UrdfModel {
   Tree tree;
-  Diagnostics warnings;        ///< what was tolerated, left out or repaired
-  RightAngles right_angles{};  ///< those that the text writes with few digits
+  std::shared_ptr<const std::string> text{};  ///< what was read
+  Diagnostics warnings;                       ///< what was tolerated, left out or repaired
+  RightAngles right_angles{};                 ///< those that the text writes with few digits
   /// Joint -> why its limits in `tree` are NaN where they are. A joint without limits has none.
   std::map<std::string, std::string> limits_notes{};
 };

@@ -26,8 +26,12 @@ model::UrdfOptions urdf_options(const hal::ModelConfig& model, const std::string
   return options;
 }
 
-std::expected<model::UrdfModel, Diagnostics> read_description(const hal::RobotConfig& robot) {
-  return model::read_urdf(robot.model.urdf, urdf_options(robot.model, robot.file));
+std::expected<model::UrdfModel, Diagnostics> read_description(const hal::RobotConfig& robot,
+                                                              const FileTexts& read = {}) {
+  const model::UrdfOptions options = urdf_options(robot.model, robot.file);
+  const std::string text = text_in(read, robot.model.urdf);
+  return text.empty() ? model::read_urdf(robot.model.urdf, options)
+                      : model::parse_urdf(text, robot.model.urdf, options);
 }
 
 hal::RobotDescription plain(const model::UrdfModel& model) {
@@ -54,8 +58,14 @@ hal::RobotDescription plain(const model::UrdfModel& model) {
 
 }  // namespace
 
-std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot) {
-  auto found = read_description(robot);
+std::string text_in(const FileTexts& files, const std::string& path) {
+  const auto found = std::ranges::find(files, path, &std::pair<std::string, std::string>::first);
+  return found == files.end() ? std::string() : found->second;
+}
+
+std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot,
+                                                            const FileTexts& read) {
+  auto found = read_description(robot, read);
   if (!found) return found;
   Diagnostics errors = hal::complete_from_description(robot, plain(*found));
   sort_by_line(errors);
@@ -71,12 +81,14 @@ std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& ro
 std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file, bool repair) {
   Diagnostics errors;
   std::vector<hal::JointReference> loose;
-  hal::RobotConfig config = hal::read_robot_config(file, errors, loose);
+  const Result<TomlDocument> document = TomlDocument::load(file);
+  hal::RobotConfig config = hal::read_robot_config(document, errors, loose);
   config.model.repair_inertia = config.model.repair_inertia || repair;
   if (errors.empty() && loose.empty()) {
     auto description = complete_robot(config);
     if (!description) return std::unexpected(description.error());
-    return CompleteRobot{std::move(config), std::move(*description)};
+    FileTexts files{{file, document->text()}, {config.model.urdf, *description->text}};
+    return CompleteRobot{std::move(config), std::move(*description), std::move(files)};
   }
   // The file is wrong by itself; what can be said of its names beside that is said too.
   const auto description =

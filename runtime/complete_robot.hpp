@@ -4,6 +4,8 @@
 
 #include <expected>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "base/result.hpp"
 #include "hal/config/robot_config.hpp"
@@ -11,10 +13,17 @@
 
 namespace tandem::runtime {
 
+/// Files by their paths, as they were read: what is run, whatever stands there later.
+using FileTexts = std::vector<std::pair<std::string, std::string>>;
+
+/// The text of one of them; empty: it is none of them.
+[[nodiscard]] std::string text_in(const FileTexts& files, const std::string& path);
+
 /// A robot.toml with its description.
 struct CompleteRobot {
   hal::RobotConfig config;
   model::UrdfModel description;
+  FileTexts files;  ///< both
 };
 
 /// Reads a robot.toml and its URDF. Errors: those of both at once, read_robot_config()'s and
@@ -26,6 +35,9 @@ struct CompleteRobot {
 /// Reads the robot's URDF and fills from it what robot.toml left out: limits, and the heights of
 /// postures that are "auto". Errors: read_urdf()'s and complete_from_description()'s. The answer
 /// holds the tree and what was tolerated in it.
-[[nodiscard]] std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot);
+///
+/// @param read  files that were read before: when the URDF is one of them, it is not read again
+[[nodiscard]] std::expected<model::UrdfModel, Diagnostics> complete_robot(
+    hal::RobotConfig& robot, const FileTexts& read = {});
 
 }  // namespace tandem::runtime

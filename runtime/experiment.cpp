@@ -145,6 +145,7 @@ void add_parallel(Experiment& e, TomlTable& root, Diagnostics& errors) {
     errors.insert(errors.end(), read.error().begin(), read.error().end());
     return;
   }
+  for (auto& one : read->files) e.files.push_back(std::move(one));
   std::vector<hal::LinkConfig> links = std::move(parallel.robot.model.links);
   parallel.robot = std::move(read->config);
   std::vector<hal::LinkConfig>& described = parallel.robot.model.links;
@@ -213,10 +214,12 @@ std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) 
   if (!document) return std::unexpected(Diagnostics{document.error()});
   TomlTable root = document->root();
   Experiment e = read_tables(*document, root);
+  e.files = {{file, document->text()}};
   Diagnostics robot_errors;
   if (!e.robot_file.empty()) {
     if (auto robot = read_robot(e.robot_file)) {
       e.robot = std::move(robot->config);
+      for (auto& one : robot->files) e.files.push_back(std::move(one));
       e.warnings = std::move(robot->description.warnings);
       e.tree = std::make_shared<const model::Tree>(std::move(robot->description.tree));
       combine(e, root);
@@ -243,6 +246,7 @@ std::expected<Experiment, Diagnostics> parse_experiment(std::string_view text,
   if (!document) return std::unexpected(Diagnostics{document.error()});
   TomlTable root = document->root();
   Experiment e = read_tables(*document, root);
+  e.files = {{file, document->text()}};
   e.robot = robot;
   combine(e, root);
   Diagnostics errors = document->diagnostics();

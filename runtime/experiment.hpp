@@ -108,6 +108,7 @@ struct Experiment {
   std::string file;                         ///< the TOML's path
   std::string robot_file;                   ///< resolved against the TOML's folder
   hal::RobotConfig robot;                   ///< completed from its description
+  FileTexts files;                          ///< all that was read, the TOML itself first
   Diagnostics warnings;                     ///< what was tolerated in the description
   std::shared_ptr<const model::Tree> tree;  ///< the description; null when none was read
   double duration_s = 0.0;                  ///< that controllers run, after the bring-up

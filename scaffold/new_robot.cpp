@@ -9,7 +9,6 @@
 #include <iterator>
 #include <limits>
 
-#include "base/open_file.hpp"
 #include "hal/config/following_error.hpp"
 #include "model/urdf.hpp"
 #include "scaffold/firmness.hpp"
@@ -132,7 +131,8 @@ Diagnostics Maker::take(model::UrdfModel found) {
     robot_.remarks.push_back(fmt::format("Limits are guessed: {} (joint {}){}.", note, joint,
                                          more == 0 ? "" : fmt::format(", and of {} more", more)));
   }
-  outfit_ = read_outfit(read_file(request_.urdf, {}, kMostUrdfBytes).value_or(""));
+  robot_.urdf_text = found.text;
+  outfit_ = read_outfit(*found.text);
   return {};
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <expected>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -56,6 +57,7 @@ struct Move {
 
 /// Everything that the files say, before it is text.
 struct NewRobot {
+  std::shared_ptr<const std::string> urdf_text;  ///< the description, as it was read
   model::Tree tree;
   hal::RobotConfig config;
   std::vector<Limb> limbs;

@@ -43,8 +43,9 @@ std::optional<Error> falls_for_ever(const hal::RobotConfig& robot) {
       .key = "model.base"};
 }
 
-std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config) {
-  auto description = runtime::complete_robot(config);
+std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config,
+                                                        runtime::FileTexts read) {
+  auto description = runtime::complete_robot(config, read);
   if (!description) return std::unexpected(description.error());
   if (Diagnostics errors = check_loop_bodies(config, description->tree); !errors.empty()) {
     return std::unexpected(std::move(errors));
@@ -58,14 +59,14 @@ std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config)
     return std::unexpected(Diagnostics{std::move(error)});
   }
   if (auto warning = falls_for_ever(config)) description->warnings.push_back(std::move(*warning));
-  return RobotFiles{std::move(config), std::move(description->tree), std::move(spec),
-                    description->right_angles, std::move(description->warnings)};
+  return RobotFiles{std::move(config),         std::move(description->tree),     std::move(spec),
+                    description->right_angles, std::move(description->warnings), std::move(read)};
 }
 
 std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file, bool repair) {
   auto robot = runtime::read_robot(file, repair);
   if (!robot) return std::unexpected(robot.error());
-  return with_description(std::move(robot->config));
+  return with_description(std::move(robot->config), std::move(robot->files));
 }
 
 bool is_robot(const std::string& file) {

@@ -11,6 +11,7 @@
 #include "model/model_spec.hpp"
 #include "model/right_angles.hpp"
 #include "model/tree.hpp"
+#include "runtime/complete_robot.hpp"
 
 namespace tandem::apps {
 
@@ -20,6 +21,7 @@ struct RobotFiles {
   model::ModelSpec spec;
   model::RightAngles right_angles;  ///< what the description has of few digits
   Diagnostics warnings;             ///< what the description's reader tolerated
+  runtime::FileTexts files{};       ///< what was read
 };
 
 /// A warning for a floating base that nothing carries.
@@ -27,7 +29,9 @@ struct RobotFiles {
 
 /// Reads the description that `config` names, checks the two against each other, and that the
 /// robot's dynamics can be solved: model::check_regular(), with every posture.
-[[nodiscard]] std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config);
+/// @param read  files that were read before, which are not read again
+[[nodiscard]] std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config,
+                                                                      runtime::FileTexts read = {});
 
 /// Whether the file is a robot's: a robot has a [model], an experiment names a robot.
 [[nodiscard]] bool is_robot(const std::string& file);

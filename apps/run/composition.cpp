@@ -154,7 +154,10 @@ std::expected<runtime::Experiment, Diagnostics> read_served(const std::string& f
   }
   text += "[[controller]]\nplugin = \"hold\"\n";
   auto experiment = runtime::parse_experiment(text, file, robot->config);
-  if (experiment) experiment->robot_file = file;
+  if (experiment) {
+    experiment->robot_file = file;
+    experiment->files = robot->files;
+  }
   return experiment;
 }
 
@@ -404,7 +407,7 @@ void add_description(Composition& c, const RobotFiles& robot, Collector& errors)
 Diagnostics add_parallel(Composition& c, const Overrides& overrides) {
   runtime::Experiment& e = c.experiment;
   if (!e.parallel || c.kernels.get() == nullptr) return {};
-  const auto robot = with_description(std::move(e.parallel->robot));
+  const auto robot = with_description(std::move(e.parallel->robot), e.files);
   if (!robot) return robot.error();
   e.parallel->robot = robot->config;
   auto kernels = supply_kernels(*robot, e.kernel_variant, overrides.missing_kernels);
@@ -466,7 +469,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
     return std::unexpected(Diagnostics{done.error()});
   }
   if (auto flags = without_effect(e, overrides); !flags.empty()) return std::unexpected(flags);
-  const auto robot = with_description(e.robot);
+  const auto robot = with_description(e.robot, e.files);
   if (!robot) return std::unexpected(robot.error());
   Collector errors;
   add_description(*c, *robot, errors);

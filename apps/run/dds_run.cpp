@@ -34,7 +34,7 @@ Result<std::unique_ptr<DdsRun>> DdsRun::open(const Composition& c, const std::st
   auto publisher = dds::Publisher::create(
       **participant, {.robot = e.robot,
                       .tree = c.tree,
-                      .urdf = text_of(e.robot.model.urdf),
+                      .urdf = runtime::text_in(e.files, e.robot.model.urdf),
                       .hal = hal_name(e),
                       .version = TANDEM_VERSION,
                       .description_hash = c.kernels->description_hash,

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "base/open_file.hpp"
+#include "dds/followers.hpp"
 #include "hal/sim/engine_loader.hpp"
 
 namespace tandem::apps {
@@ -54,15 +55,9 @@ log::RunInfo info_of(const Composition& c) {
   info.kernel_sha256 = c.kernels.sha256();
   info.controllers = controller_lines(*c.controllers);
   add_place_and_time(info);
-  std::vector<std::string> files{e.file, e.robot.file, e.robot.model.urdf};
-  if (e.parallel) {
-    files.push_back(e.parallel->robot.file);
-    files.push_back(e.parallel->robot.model.urdf);
-  }
-  for (std::size_t i = 0; i < files.size(); ++i) {  // each once
-    const auto before = files.begin() + static_cast<std::ptrdiff_t>(i);
-    if (std::find(files.begin(), before, files[i]) != before) continue;
-    info.configuration.emplace_back(files[i], text_of(files[i]));
+  for (const auto& file : e.files) {  // each once
+    const auto same = [&](const auto& one) { return one.first == file.first; };
+    if (std::ranges::none_of(info.configuration, same)) info.configuration.push_back(file);
   }
   return info;
 }
@@ -139,7 +134,8 @@ Result<std::pair<std::string, Descriptor>> claim_file(const std::string& folder,
 log::RecorderOptions recorder_options(const Composition& c) {
   const runtime::Experiment& e = c.experiment;
   log::RecorderOptions options;
-  options.viewed.urdf = text_of(e.robot.model.urdf);
+  options.viewed.urdf = runtime::text_in(e.files, e.robot.model.urdf);
+  options.viewed.followers = dds::followers_of(e.robot, c.tree);
   if (c.tree.floating_base) options.viewed.base_link = c.tree.links.front().name;
   switch (e.log.compression) {
     case runtime::LogCompression::kNone:

@@ -299,7 +299,8 @@ Result<IdentifiedFiles> write_identified(const RobotFiles& robot,
   std::vector<std::pair<std::string, model::Inertia>> inertias;
   for (const identification::LinkResult& link : result.links)
     inertias.emplace_back(link.name, link.identified);
-  const Result<std::string> urdf = model::with_inertias(text_of(config.model.urdf), inertias);
+  const Result<std::string> urdf =
+      model::with_inertias(runtime::text_in(robot.files, config.model.urdf), inertias);
   if (!urdf) return std::unexpected(urdf.error());
   const std::string description = fs::path(config.model.urdf).filename().string();
   const std::string name =
@@ -307,7 +308,7 @@ Result<IdentifiedFiles> write_identified(const RobotFiles& robot,
   const std::vector<ActuatorFigures> figures = actuator_figures(config, result);
   std::vector<std::pair<std::string, std::string>> files{
       {"robot.toml",
-       with_actuators(moved_robot(text_of(config.file),
+       with_actuators(moved_robot(runtime::text_in(robot.files, config.file),
                                   fs::path(config.file).parent_path().string(), name, description),
                       figures)},
       {description, *urdf}};

@@ -109,7 +109,7 @@ std::expected<RobotFiles, Diagnostics> write(const scaffold::NewRobot& robot,
   const fs::path folder = draft.path();
   const std::string copy = fs::path(urdf).filename().string();
   for (const auto& [name, text] :
-       {std::pair{copy, text_of(urdf)},
+       {std::pair{copy, *robot.urdf_text},
         {std::string("robot.toml"), scaffold::robot_text(robot, copy, copy)},
         {std::string("hold.toml"), scaffold::hold_text(robot)},
         {std::string("move.toml"), scaffold::move_text(robot)}}) {

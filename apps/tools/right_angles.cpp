@@ -28,7 +28,7 @@ Status add_right_angles(const RobotFiles& robot, Facts& facts, Json& json) {
   if (robot.right_angles.count == 0) return {};
   hal::RobotConfig other = robot.config;
   other.model.exact_right_angles = !robot.config.model.exact_right_angles;
-  const auto turned = with_description(std::move(other));
+  const auto turned = with_description(std::move(other), robot.files);
   if (!turned) return std::unexpected(turned.error().front());
   const bool exact = robot.config.model.exact_right_angles;
   const RobotFiles& exactly = exact ? robot : *turned;

@@ -327,9 +327,9 @@ std::expected<RobotConfig, Diagnostics> read_robot_config(const std::string& fil
   return finish(TomlDocument::load(file));
 }
 
-RobotConfig read_robot_config(const std::string& file, Diagnostics& errors,
+RobotConfig read_robot_config(const Result<TomlDocument>& loaded, Diagnostics& errors,
                               std::vector<JointReference>& loose) {
-  const Result<TomlDocument> document = robot_alone(TomlDocument::load(file));
+  const Result<TomlDocument> document = robot_alone(loaded);
   if (!document) {
     errors.push_back(document.error());
     return {};

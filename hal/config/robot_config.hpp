@@ -359,7 +359,8 @@ struct JointReference {
 /// may lead nowhere and names be empty. Only for finding errors in what comes next.
 ///
 /// @param loose  in: empty; out: errors that are not among `errors`; check_names() judges them
-[[nodiscard]] RobotConfig read_robot_config(const std::string& file, Diagnostics& errors,
+[[nodiscard]] RobotConfig read_robot_config(const Result<TomlDocument>& document,
+                                            Diagnostics& errors,
                                             std::vector<JointReference>& loose);
 /// The same from memory; `file` names it in errors and gives the folder of relative paths.
 [[nodiscard]] std::expected<RobotConfig, Diagnostics> parse_robot_config(std::string_view text,

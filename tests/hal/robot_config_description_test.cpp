@@ -119,7 +119,7 @@ std::string names_wrong(const std::string& text, const RobotDescription& d = des
   std::ofstream(file) << text;
   Diagnostics errors;
   std::vector<JointReference> loose;
-  const RobotConfig robot = read_robot_config(file, errors, loose);
+  const RobotConfig robot = read_robot_config(TomlDocument::load(file), errors, loose);
   EXPECT_TRUE(errors.empty()) << errors.front().to_string();
   std::string all;
   for (const Error& error : check_names(robot, d, loose)) {
