@@ -75,7 +75,10 @@ Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t ind
   const runtime::JointStatus& look = joint.look;
   const hal::JointCapabilities& limit = run.limits[index];
   const hal::MotorFeedback& tells = run.motors[index];
-  const auto measured = [](bool told, double value) { return told ? Json(value) : Json(nullptr); };
+  const bool heard = look.age_cycles <= look.cycle;  // once, since the run began
+  const auto measured = [heard](bool told, double value) {
+    return heard && told ? Json(value) : Json(nullptr);
+  };
   const auto& homing = run.robot.joints[index].homing;
   Json gains = Json::object();
   for (const hal::PidLoop loop : kLoops) {
@@ -90,15 +93,15 @@ Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t ind
           {"mode_in_force", hal::to_string(static_cast<ControlMode>(look.drive_mode))},
           {"commanded_position_rad", look.commanded_rad},
           {"moving", look.moving != 0},
-          {"position_rad", look.position_rad},
-          {"velocity_rad_s", look.velocity_rad_s},
+          {"position_rad", measured(true, look.position_rad)},
+          {"velocity_rad_s", measured(true, look.velocity_rad_s)},
           {"torque_Nm", measured(tells.torque, look.torque_Nm)},
           {"min_position_rad", limit.min_position_rad},
           {"max_position_rad", limit.max_position_rad},
           {"max_velocity_rad_s", limit.max_velocity_rad_s},
           {"max_acceleration_rad_s2", limit.max_acceleration_rad_s2},
           {"max_torque_Nm", limit.max_torque_Nm},
-          {"acceleration_rad_s2", look.acceleration_rad_s2},
+          {"acceleration_rad_s2", measured(true, look.acceleration_rad_s2)},
           {"motor_position_rad", measured(tells.position, look.motor_position_rad)},
           {"motor_velocity_rad_s", measured(tells.position, look.motor_velocity_rad_s)},
           {"current_A", measured(tells.current, look.current_A)},

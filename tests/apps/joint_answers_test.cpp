@@ -32,12 +32,12 @@ hal::RobotConfig with_a_slide() {
 /// slides.
 template <class Backend>
 struct Answered : ::testing::Test {
-  void begin() {
+  void begin(RunPhase in = RunPhase::kRunning) {
     cycle = std::make_unique<runtime::RobotCycle>(
         runtime::CycleParts{robot, backend, host, clock},
         runtime::CycleConfig{.after_stop = runtime::AfterStop::kWait});
     steps(100);
-    ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
+    ASSERT_EQ(cycle->phase(), in);
     add_run_commands(registry, *cycle, robot, judge);
   }
   void steps(int count) {
@@ -310,6 +310,21 @@ TEST_F(JointAnswers, SayThatTheFiguresOfAFaultySensorAreNotLive) {
   steps(20);
   EXPECT_EQ(joint(1)["feedback"], "lost");
   has(shown(), " cycles old: no feedback");
+}
+
+// It stood at 0, it seemed.
+TEST_F(JointAnswers, SayNothingOfAJointThatWasNeverHeard) {
+  backend.lost_joint = 1;  // and so the run is in fault
+  begin(RunPhase::kFaulted);
+  const Json joints = registry.answer(R"({"do": "joint.list"})")["joints"];
+  for (const char* key : {"position_rad", "velocity_rad_s", "torque_Nm", "motor_position_rad"}) {
+    EXPECT_TRUE(joints[1][key].is_null()) << key;
+    EXPECT_TRUE(joints[0][key].is_number()) << key;
+  }
+  JointOptions options{.action = JointOptions::Action::kShow};
+  options.joint = joints[1]["joint"];
+  (void)command(joint_command, options);
+  has(out, "position        - ");
 }
 
 TEST_F(JointAnswers, TakeQuantitiesWithABlankAndInCentimetres) {
