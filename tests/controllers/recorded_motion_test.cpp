@@ -324,6 +324,15 @@ TEST_F(RecordedMotion, RefusesLogsThatLackSomething) {
             "damaged, or two were joined: record it again)");
 }
 
+// Nearly all of it would be made up.
+TEST_F(RecordedMotion, RefusesFarMoreCyclesThanSamples) {
+  const std::string few = record({}, 20'000'000, 3);
+  EXPECT_EQ(problem(few, "speed = 0.02\n"), "");
+  EXPECT_EQ(problem(few, "speed = 0.01\n"),
+            "experiment.toml:1: log: LOG: the recording has 3 samples for 4001 cycles of the run "
+            "(play a recording with more samples, or a shorter stretch: from_s and to_s)");
+}
+
 TEST_F(RecordedMotion, PlaysARunFromTheStartOfItsControllersAndNotPastAFault) {
   hal_ = "sim";
   EXPECT_EQ(problem(record()),
