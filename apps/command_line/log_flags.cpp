@@ -161,7 +161,7 @@ void add_flags(CLI::App& app, LogOptions& o) {
   add_thresholds_flags(
       *app.add_subcommand("thresholds", "Collision thresholds from runs that touched nothing"), o);
   add_import_flags(
-      *app.add_subcommand("import", "A recording of another program (CSV, ROS 2 bag) as a log"), o);
+      *app.add_subcommand("import", "A recording of another program (CSV, ROS bag) as a log"), o);
   add_replay_flags(*app.add_subcommand("replay", "An experiment that plays the motion of a log"),
                    o);
 }

@@ -10,6 +10,7 @@
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "base/counted.hpp"
+#include "dds/followers.hpp"
 #include "log/import/import_log.hpp"
 #include "model/generate.hpp"
 
@@ -18,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-log::RunInfo info_of(const RobotFiles& robot, const std::string& file) {
+log::RunInfo info_of(const RobotFiles& robot) {
   log::RunInfo info;
   info.version = TANDEM_VERSION;
   info.robot = robot.config.name;
@@ -28,9 +29,7 @@ log::RunInfo info_of(const RobotFiles& robot, const std::string& file) {
     info.sensors.push_back({sensor.name, sensor.channels()});
   }
   info.description_hash = model::description_hash(robot.tree, robot.spec);
-  for (const std::string& one : {file, robot.config.model.urdf}) {
-    info.configuration.emplace_back(one, text_of(one));
-  }
+  info.configuration = robot.files;
   return info;
 }
 
@@ -62,12 +61,17 @@ void print_summary(const log::ImportSummary& summary, std::FILE* out) {
   facts.add("time 0", fmt::format("{} ns of the recording's clock", summary.begin_ns));
   facts.add("fields", fmt::format("{}", fmt::join(summary.fields, ", ")));
   const log::Exclusions& left = summary.excluded;
+  for (const std::string& note : summary.notes) facts.add("taken", note);
   const auto rows = [&](const char* what, std::uint64_t count) {
-    if (count > 0) facts.add("left out", counted(count, "row") + ": " + what);
+    const char* of = summary.bag ? "message" : "row";
+    if (count > 0) facts.add("left out", counted(count, of) + ": " + what);
   };
-  rows("a cell is empty or not finite", left.invalid);
+  rows(summary.bag ? "a value is not finite, or a joint is there twice"
+                   : "a cell is empty or not finite",
+       left.invalid);
   rows("too few or too many cells", left.ragged);
-  rows("the same time as the row before", left.duplicates);
+  rows(summary.bag ? "the same time as the one before" : "the same time as the row before",
+       left.duplicates);
   rows("time goes back", left.backwards);
   if (left.gaps > 0) {
     facts.add("left out", counted(left.gap_cycles, "cycle") + " in " + counted(left.gaps, "gap"));
@@ -117,6 +121,7 @@ Json summary_json(const log::ImportSummary& summary) {
   json["fields"] = summary.fields;
   json["missing_joints"] = summary.missing;
   const log::Exclusions& left = summary.excluded;
+  json["taken"] = summary.notes;
   json["ignored"] = left.ignored;
   json["excluded"] = {
       {"invalid", left.invalid},     {"ragged", left.ragged}, {"duplicates", left.duplicates},
@@ -142,8 +147,9 @@ Exit log_import_command(const LogOptions& options) {
   const Result<std::string> output = output_of(options, robot->config.name);
   if (!output) return refuse(output.error());
   Draft draft = Draft::file(*output);
-  auto summary = log::import_log({options.files, options.map, draft.path()}, robot->config,
-                                 info_of(*robot, options.robot), text_of(robot->config.model.urdf));
+  auto summary = log::import_log(
+      {options.files, options.map, draft.path(), dds::followers_of(robot->config, robot->tree)},
+      robot->config, info_of(*robot), runtime::text_in(robot->files, robot->config.model.urdf));
   if (!summary) {
     for (Error& error : summary.error()) error = draft.placed(std::move(error));
     return refuse(summary.error());

@@ -1,4 +1,4 @@
-// Messages of ROS 2, decoded by their published definitions: a series for each joint and sensor.
+// Messages of ROS, decoded by their published definitions: a series for each joint and sensor.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,7 +9,8 @@
 
 #include "base/bounds.hpp"
 #include "base/nearest.hpp"
-#include "dds/cdr.hpp"
+#include "base/quoting.hpp"
+#include "log/import/bag_message.hpp"
 #include "log/import/sources.hpp"
 #include "log/mcap_reader.hpp"
 
@@ -19,6 +20,8 @@ namespace {
 constexpr char kJointState[] = "sensor_msgs/msg/JointState";
 constexpr char kImu[] = "sensor_msgs/msg/Imu";
 constexpr char kWrench[] = "geometry_msgs/msg/WrenchStamped";
+constexpr std::size_t kNoJoint = std::numeric_limits<std::size_t>::max();
+constexpr std::size_t kMostTopics = 1'000;  // characters of their list in a message
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// The member at "header.stamp.sec". @pre the definition has it
@@ -57,6 +60,7 @@ class BagSource {
         map_(map),
         robot_(robot),
         joints_(robot.joints.size()),
+        topic_of_(robot.joints.size()),
         sensors_(map.sensors.size()) {}
 
   Result<Recording> read() {
@@ -82,6 +86,12 @@ class BagSource {
     for (Series& series : recording_.series) {
       if (Status done = drop_invalid(series); !done) return std::unexpected(done.error());
     }
+    recording_.excluded.invalid = distinct(std::move(invalid_));
+    if (joint_topics_.size() > 1) {
+      std::string names;
+      for (const std::string& name : joint_topics_) names += (names.empty() ? "" : ", ") + name;
+      recording_.notes.push_back("joint states of " + names);
+    }
     return std::move(recording_);
   }
 
@@ -99,7 +109,8 @@ class BagSource {
       if (!message->has_value()) break;
       const ChannelRecord& channel = reader->channels().at((*message)->channel);
       const auto schema = reader->schemas().find(channel.schema_id);
-      const std::string type = schema == reader->schemas().end() ? "" : schema->second.name;
+      const std::string type =
+          schema == reader->schemas().end() ? "" : ros_name(schema->second.name);
       if (Status taken = take(channel, type, **message); !taken) return taken;
     }
     if (!reader->truncated()) return {};
@@ -112,35 +123,43 @@ class BagSource {
     if (message.time_ns < 0 || message.time_ns > kLatest_ns) {
       return refuse("a message was logged after the year 2096", "the file is damaged");
     }
-    if (std::ranges::find(topics_, channel.topic) == topics_.end()) {
+    if (!number_.contains(channel.topic)) {
+      if (topics_.size() == bounds::kLogNames.most)
+        return std::unexpected(beyond(bounds::kLogNames, path_, 0, channel.topic));
       topics_.push_back(channel.topic);
+      said_ += (said_.empty() ? "" : ", ") + shown(channel.topic) + " (" +
+               (type.empty() ? "no type" : shown(type)) + ", " + shown(channel.message_encoding) +
+               ")";
     }
     ++number_[channel.topic];
     for (std::size_t s = 0; s < sensors_.size(); ++s) {
       if (map_.sensors[s].topic == channel.topic) return take_sensor(s, channel, type, message);
     }
-    const bool named = channel.topic == map_.joint_topic;
-    if (!named && (!map_.joint_topic.empty() || type != kJointState)) return {};
-    if (joint_topic_.empty()) joint_topic_ = channel.topic;
-    if (joint_topic_ != channel.topic) {
-      return refuse(
-          "has several topics of joint states: '" + joint_topic_ + "' and '" + channel.topic + "'",
-          "name one: [bag] joint_states = \"" + joint_topic_ + "\"", "bag.joint_states");
-    }
+    if (!has_joint_states(channel.topic, type)) return {};
     const auto value = decoded(channel, type, kJointState, message);
     if (!value) return std::unexpected(value.error());
     return take_joints(channel.topic, *value, message.time_ns);
   }
 
+  /// Named by the map; else by its type, or without one by its usual name.
+  bool has_joint_states(const std::string& topic, const std::string& type) const {
+    if (!map_.joint_topics.empty())
+      return std::ranges::find(map_.joint_topics, topic) != map_.joint_topics.end();
+    return type == kJointState ||
+           (type.empty() && (topic == "joint_states" || topic.ends_with("/joint_states")));
+  }
+
+  /// A type that nobody says is the wanted one.
   Result<dds::Value> decoded(const ChannelRecord& channel, const std::string& type,
-                             const char* wanted, const MessageView& message) const {
-    if (type != wanted || channel.message_encoding != "cdr") {
+                             const char* wanted, const MessageView& message) {
+    if ((!type.empty() && type != wanted) || !reads_encoding(channel.message_encoding)) {
       return refuse("the topic '" + channel.topic + "' has messages of " +
                         (type.empty() ? "no type" : type) + ", encoding '" +
                         channel.message_encoding + "'",
-                    std::string("it must be ") + wanted + " in cdr");
+                    std::string("it must be ") + wanted + " in cdr, ros1 or json");
     }
-    auto value = dds::decode(*dds::find_definition(wanted), message.data);
+    ++message_;
+    auto value = decode_message(channel.message_encoding, wanted, message.data);
     if (value) return value;
     return refuse(where(channel.topic) + ": " + value.error().message,
                   "the file is damaged, or its messages are not what its schema says");
@@ -181,19 +200,48 @@ class BagSource {
                         std::to_string(size) + " of " + field,
                     "its publisher is at fault: leave it out of the recording");
     }
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      const std::string& name = std::get<std::string>(names[i].of);
-      const auto joint = joint_of(name);
-      if (!joint) {
+    std::vector<std::size_t> joints;  // of the robot, in the message's order
+    for (const dds::Value& one : names) {
+      const std::string& name = std::get<std::string>(one.of);
+      joints.push_back(joint_of(name).value_or(kNoJoint));
+      if (joints.back() == kNoJoint) {
         if (Status known = note_unknown(name); !known) return known;
         continue;
       }
+      if (Status own = check_topic(joints.back(), topic); !own) return own;
+      if (std::ranges::count(joints, joints.back()) == 1) continue;
+      if (!map_.excludes(Trouble::kInvalid)) {
+        return refuse(where(topic) + " names '" + name + "' twice",
+                      "its publisher is at fault; exclude = [\"invalid\"] leaves such messages out",
+                      name);
+      }
+      invalid_.push_back(message_);
+      return {};
+    }
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (joints[i] == kNoJoint) continue;
       const auto of = [&](const char* field) {
         return list(field).empty() ? kNone : std::get<double>(list(field)[i].of);
       };
-      add_joint(*joint, time_ns, {of("position"), of("velocity"), of("effort")}, topic);
+      add_joint(joints[i], time_ns, {of("position"), of("velocity"), of("effort")}, topic);
     }
     return {};
+  }
+
+  /// A joint comes from one topic: of two, such as a driver's and one that gathers all joints,
+  /// nobody knows which to believe.
+  Status check_topic(std::size_t joint, const std::string& topic) {
+    std::string& own = topic_of_[joint];
+    if (own.empty()) {
+      own = topic;
+      if (std::ranges::find(joint_topics_, topic) == joint_topics_.end())
+        joint_topics_.push_back(topic);
+    }
+    if (own == topic) return {};
+    return refuse("the joint '" + robot_.joints[joint].name +
+                      "' is in two topics of joint states: '" + own + "' and '" + topic + "'",
+                  "name those to take, one or a list: [bag] joint_states = " + quoted_text(own),
+                  "bag.joint_states");
   }
 
   Status note_unknown(const std::string& name) {
@@ -205,7 +253,8 @@ class BagSource {
     if (ignored.size() == bounds::kLogNames.most)
       return std::unexpected(beyond(bounds::kLogNames, path_, 0, name));
     ignored.push_back(name);
-    if (listed("*") || listed(name.c_str())) return {};
+    const bool follows = std::ranges::find(map_.followers, name) != map_.followers.end();
+    if (follows || listed("*") || listed(name.c_str())) return {};
     std::vector<std::string> known;
     for (const hal::JointConfig& joint : robot_.joints) known.push_back(joint.name);
     if (std::ranges::find(known, name) != known.end()) {
@@ -214,9 +263,12 @@ class BagSource {
                         "gives to another",
                     "correct [bag.names], or name it in `ignore`", name);
     }
-    return refuse("the recording's joint '" + name + "' is none of the robot's",
-                  "say whose it is in [bag.names], or name it in `ignore`; " + suggest(name, known),
-                  name);
+    return refuse(
+        "the recording's joint '" + name + "' is none of the robot's",
+        "say whose it is in [bag.names], name it in `ignore`, or name the topics to take in "
+        "[bag] joint_states; " +
+            suggest(name, known),
+        name);
   }
 
   void add_joint(std::size_t joint, std::int64_t time_ns, std::array<double, 3> values,
@@ -233,6 +285,7 @@ class BagSource {
     }
     const auto place = std::ranges::find(map_.joints, joint) - map_.joints.begin();
     series.time_ns.push_back(time_ns);
+    series.message.push_back(message_);
     for (std::size_t i = 0; i < values.size(); ++i) {
       const SignalMap& signal = map_.signals[i];  // position, velocity, torque
       const auto p = static_cast<std::size_t>(place);
@@ -260,6 +313,7 @@ class BagSource {
     Series& series = sensors_[index];
     if (series.columns.empty()) start_sensor(series, sensor, channel.topic);
     series.time_ns.push_back(time_of(*value, message.time_ns));
+    series.message.push_back(message_);
     const std::vector<double> channels = imu ? imu_channels(*value) : wrench_channels(*value);
     for (std::size_t c = 0; c < channels.size(); ++c) {
       series.columns[c].values.push_back(sensor.scale[c] * channels[c]);
@@ -300,14 +354,20 @@ class BagSource {
   }
 
   Status check_topics() {
+    for (const std::string& topic : map_.joint_topics) {
+      if (number_.contains(topic)) continue;
+      return refuse("has no topic '" + topic + "'", suggest(topic, topics_), "bag.joint_states");
+    }
     const bool any = std::ranges::any_of(joints_, [](const Series& s) { return s.rows() > 0; });
     if (any) return {};
-    if (!map_.joint_topic.empty()) {
-      return refuse("has no topic '" + map_.joint_topic + "', or none of the robot's joints in it",
-                    suggest(map_.joint_topic, topics_), "bag.joint_states");
+    if (!recording_.excluded.ignored.empty()) {
+      return refuse("has no joint states of this robot: none of its joints is the robot's",
+                    "say whose they are in [bag.names]", "bag.names");
     }
-    return refuse("has no joint states of this robot",
-                  "record a topic of sensor_msgs/JointState, such as /joint_states");
+    return refuse("has no joint states of this robot; it has " +
+                      (said_.empty() ? "no messages" : shown(said_, kMostTopics)),
+                  "record a topic of sensor_msgs/JointState, such as /joint_states; [bag] "
+                  "joint_states names one whose type is not said");
   }
 
   Status check_stamps() {
@@ -366,7 +426,7 @@ class BagSource {
         return refuse("sample " + std::to_string(row + 1) + " of " + hole->name + " is not finite",
                       "leave such samples out by exclude = [\"invalid\"]", series.name);
       }
-      ++recording_.excluded.invalid;
+      invalid_.push_back(series.message[row]);
     }
     keep_rows(series, kept);
     return {};
@@ -376,11 +436,15 @@ class BagSource {
   const ImportMap& map_;
   const hal::RobotConfig& robot_;
   std::string path_;  // being read
-  std::vector<Series> joints_, sensors_;
-  std::vector<std::string> topics_;
-  std::string joint_topic_;                      // taken so far
-  std::map<std::string, std::uint64_t> number_;  // messages of each topic so far
-  std::vector<std::int64_t> behind_ns_;          // log time minus stamp
+  std::vector<Series> joints_;
+  std::vector<std::string> topic_of_;  // of each joint; empty: not met
+  std::vector<Series> sensors_;
+  std::vector<std::string> topics_, joint_topics_;  // in their order; those with joints taken
+  std::string said_;                                // the topics with types and encodings
+  std::map<std::string, std::uint64_t> number_;     // messages of each topic so far
+  std::uint32_t message_ = 0;                       // those decoded so far
+  std::vector<std::uint32_t> invalid_;              // of them
+  std::vector<std::int64_t> behind_ns_;             // log time minus stamp
   bool stamped_ = false;
   Recording recording_;
 };

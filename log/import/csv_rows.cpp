@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -32,7 +33,78 @@ std::optional<T> whole_number(std::string_view digits) {
   return value;
 }
 
+/// Takes digits and signs off the front of a text; the first thing that does not fit sticks.
+class DateReader {
+ public:
+  explicit DateReader(std::string_view text) : rest_(text) {}
+
+  /// Exactly so many digits.
+  int number(std::size_t digits) {
+    int value = 0;
+    const bool all = rest_.size() >= digits && rest_.substr(0, digits).find_first_not_of(
+                                                   "0123456789") == std::string_view::npos;
+    good = good && all;
+    if (!good) return 0;
+    (void)std::from_chars(rest_.data(), rest_.data() + digits, value);
+    rest_.remove_prefix(digits);
+    return value;
+  }
+  /// One of these characters. @return 0: none of them is next
+  char any(std::string_view of) {
+    if (rest_.empty() || of.find(rest_.front()) == std::string_view::npos) return '\0';
+    const char found = rest_.front();
+    rest_.remove_prefix(1);
+    return found;
+  }
+  void need(std::string_view of) { good = good && any(of) != '\0'; }
+  /// The digits of a fraction of a second [ns].
+  std::int64_t fraction_ns() {
+    std::int64_t value_ns = 0, digit_ns = 100'000'000;
+    for (char c = any("0123456789"); c != '\0'; c = any("0123456789"), digit_ns /= 10)
+      value_ns += (c - '0') * digit_ns;
+    return value_ns;
+  }
+  [[nodiscard]] bool at_end() const { return rest_.empty(); }
+
+  bool good = true;
+
+ private:
+  std::string_view rest_;
+};
+
 }  // namespace
+
+std::optional<std::int64_t> iso_time_ns(std::string_view text) {
+  using namespace std::chrono;
+  DateReader in(text);
+  const int y = in.number(4);
+  in.need("-/");
+  const int m = in.number(2);
+  in.need("-/");
+  const int d = in.number(2);
+  in.need("T t");
+  const int hour = in.number(2);
+  in.need(":");
+  const int minute = in.number(2);
+  const int second = in.any(":") != '\0' ? in.number(2) : 0;
+  const std::int64_t rest_ns = in.any(".,") != '\0' ? in.fraction_ns() : 0;
+  (void)in.any(" ");
+  minutes east{0};
+  if (in.any("Zz") == '\0') {
+    if (const char sign = in.any("+-"); sign != '\0') {
+      const int of_hour = in.number(2) * 60;
+      const bool more = in.any(":") != '\0' || !in.at_end();
+      east = minutes((sign == '-' ? -1 : 1) * (of_hour + (more ? in.number(2) : 0)));
+    }
+  }
+  const year_month_day date{year(y), month(static_cast<unsigned>(m)),
+                            day(static_cast<unsigned>(d))};
+  const bool clock = hour < 24 && minute < 60 && second <= 60;  // 60: a leap second
+  if (!in.good || !in.at_end() || !date.ok() || !clock || y < 1700 || y > 2250) return std::nullopt;
+  const auto since =
+      sys_days(date).time_since_epoch() + hours(hour) + minutes(minute) - east + seconds(second);
+  return duration_cast<nanoseconds>(since).count() + rest_ns;
+}
 
 Result<CsvRows> CsvRows::open(std::string_view text, const std::string& file,
                               const CsvFormat& format) {
@@ -128,6 +200,7 @@ std::optional<double> CsvRows::number(std::size_t column) const {
 }
 
 std::optional<std::int64_t> CsvRows::time_ns(std::size_t column, std::int64_t unit_ns) const {
+  if (unit_ns == 0) return iso_time_ns(cells_[column]);
   const auto value = whole_number<long double>(digits_of(column));
   constexpr long double kMost = 9.2e18L;
   if (!value) return std::nullopt;

@@ -14,6 +14,11 @@
 
 namespace tandem::log {
 
+/// A date of ISO 8601 as nanoseconds since 1970 in UTC: "2026-11-26T22:02:12.5Z", with a blank for
+/// the T, with a comma, without seconds, with "+01:00" or "+0100" for the Z; without either it is
+/// taken for UTC. None: it is no such date.
+[[nodiscard]] std::optional<std::int64_t> iso_time_ns(std::string_view text);
+
 /// Reads the lines of a text in order. A byte order mark, CRLF and quotes about a cell are
 /// tolerated; a delimiter at the end of every line as well.
 class CsvRows {
@@ -28,13 +33,15 @@ class CsvRows {
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
   /// The next row's cells, without blanks and quotes; false at the end.
   [[nodiscard]] bool next();
+  [[nodiscard]] bool empty(std::size_t column) const { return cells_[column].empty(); }
   /// As many as there are names, unless the row is ragged.
   [[nodiscard]] std::span<const std::string_view> cells() const { return cells_; }
   /// Of the row in the file, from 1.
   [[nodiscard]] int line() const { return line_; }
   /// A cell's number; NaN for an empty cell, nan and inf; none: it is no number.
   [[nodiscard]] std::optional<double> number(std::size_t column) const;
-  /// A time in units of `unit_ns`, rounded to a nanosecond; none: no number, or beyond 292 years.
+  /// A time in units of `unit_ns`, rounded to a nanosecond; of unit 0 a date (iso_time_ns()).
+  /// None: no number, or no date; beyond 292 years.
   [[nodiscard]] std::optional<std::int64_t> time_ns(std::size_t column, std::int64_t unit_ns) const;
 
  private:

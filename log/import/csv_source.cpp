@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numeric>
 #include <optional>
 #include <utility>
 
+#include "base/counted.hpp"
 #include "base/nearest.hpp"
 #include "log/import/csv_rows.hpp"
 #include "log/import/sources.hpp"
@@ -31,8 +33,13 @@ class CsvSource {
     }
     if (Status placed = place_columns(); !placed) return std::unexpected(placed.error());
     if (Status done = check_unused(); !done) return std::unexpected(done.error());
+    sparse_ = map_.csv.sparse ? *map_.csv.sparse : is_sparse();
     if (Status done = read_rows(); !done) return std::unexpected(done.error());
-    recording_.series.push_back(std::move(series_));
+    if (!sparse_) {
+      recording_.series.push_back(std::move(series_));
+    } else if (Status parted = part_columns(); !parted) {
+      return std::unexpected(parted.error());
+    }
     return std::move(recording_);
   }
 
@@ -207,11 +214,106 @@ class CsvSource {
 
   Result<std::int64_t> time_of(std::int64_t number) const {
     if (!time_) return number * map_.period_ns;
-    const auto time = rows_[time_->file].time_ns(time_->column, map_.time_unit_ns);
-    if (time) return *time;
-    return std::unexpected(at(time_->file, "this time is no number",
-                              "mend the file, or leave such rows out by exclude = [\"invalid\"]",
-                              *map_.time_column));
+    const CsvRows& rows = rows_[time_->file];
+    if (const auto time = rows.time_ns(time_->column, map_.time_unit_ns)) return *time;
+    const bool dates = map_.time_unit_ns == 0;
+    const bool date = !dates && rows.time_ns(time_->column, 0).has_value();
+    return std::unexpected(
+        at(time_->file,
+           dates  ? "this time is no date of ISO 8601, such as 2026-11-26T22:02:12.5Z"
+           : date ? "this time is a date"
+                  : "this time is no number",
+           date ? "say unit = \"iso\" in [time] of the map"
+                : "mend the file, or leave such rows out by exclude = [\"invalid\"]",
+           *map_.time_column));
+  }
+
+  /// Most rows lack a cell that is used: each column has its own times, as a plotter's export has.
+  bool is_sparse() const {
+    std::vector<CsvRows> rows = rows_;
+    std::size_t all = 0, lack = 0;
+    for (;; ++all) {
+      for (CsvRows& one : rows) {
+        if (!one.next()) return 2 * lack > all;
+      }
+      lack += std::ranges::any_of(places_, [&](const CsvPlace& place) {
+        const CsvRows& of = rows[place.file];
+        return place.column < of.cells().size() && of.empty(place.column);
+      });
+    }
+  }
+
+  /// A series for the columns that have the same rows.
+  Status part_columns() {
+    recording_.notes.emplace_back(
+        "an empty cell is no sample of its column: each column has its own times");
+    const auto there = [&](std::size_t column, std::size_t row) {
+      return std::isfinite(series_.columns[column].values[row]);
+    };
+    std::vector<std::size_t> left(series_.columns.size());
+    std::iota(left.begin(), left.end(), std::size_t{0});
+    while (!left.empty()) {
+      std::vector<std::size_t> rows, together, others;
+      for (std::size_t row = 0; row < series_.rows(); ++row) {
+        if (there(left.front(), row)) rows.push_back(row);
+      }
+      for (const std::size_t column : left) {
+        bool same = true;
+        for (std::size_t row = 0; same && row < series_.rows(); ++row)
+          same = there(column, row) == there(left.front(), row);
+        (same ? together : others).push_back(column);
+      }
+      if (Status added = add_part(together, rows); !added) return added;
+      left = std::move(others);
+    }
+    return {};
+  }
+
+  Status add_part(const std::vector<std::size_t>& columns, const std::vector<std::size_t>& rows) {
+    const std::string first = series_.columns[columns.front()].name;
+    if (rows.empty())
+      return std::unexpected(Error{"has no number", "is it the right column? Leave it out",
+                                   series_.columns[columns.front()].file, 0, first});
+    Series part;
+    part.name = "column " + first;
+    if (columns.size() > 1) part.name += " and " + counted(columns.size() - 1, "other");
+    part.time_ns = series_.time_ns;
+    part.line = series_.line;
+    for (const std::size_t column : columns) {
+      const Target& target = series_.columns[column].target;
+      if (std::ranges::find(series_.quaternions, column) != series_.quaternions.end())
+        part.quaternions.push_back(part.columns.size());
+      if (target.field == "sensor") {
+        add_once(part.sensors, sensor_of(target.index));
+      } else {
+        add_once(part.joints, target.index);
+      }
+      part.columns.push_back(std::move(series_.columns[column]));
+    }
+    for (const std::size_t quaternion : series_.quaternions) {
+      const auto of = [&](std::size_t column) {
+        return column >= quaternion && column < quaternion + 4;
+      };
+      const auto count = std::ranges::count_if(columns, of);
+      if (count == 0 || count == 4) continue;
+      return std::unexpected(Error{"the four columns of an orientation have different rows",
+                                   "give each row all four", part.columns.front().file, 0, first});
+    }
+    keep_rows(part, rows);
+    recording_.series.push_back(std::move(part));
+    return {};
+  }
+
+  static void add_once(std::vector<std::size_t>& list, std::size_t one) {
+    if (std::ranges::find(list, one) == list.end()) list.push_back(one);
+  }
+
+  /// The sensor that an element of the image's channels is of.
+  std::size_t sensor_of(std::size_t channel) const {
+    std::size_t sensor = 0;
+    for (std::size_t first = 0; channel >= first + robot_.sensors[sensor].channels(); ++sensor)
+      first += robot_.sensors[sensor].channels();
+    return sensor;
   }
 
   Status read_row(std::int64_t number) {
@@ -234,19 +336,19 @@ class CsvSource {
                "check [csv] delimiter, header and decimal_comma", name));
       }
       const double scaled = place.scale * *value + place.offset;
-      if (!std::isfinite(scaled) && !map_.excludes(Trouble::kInvalid)) {
+      const bool hole = sparse_ && rows_[place.file].empty(place.column);
+      if (!std::isfinite(scaled) && !hole && !map_.excludes(Trouble::kInvalid)) {
         return std::unexpected(at(place.file, "this cell is empty or not finite",
                                   "mend the file, or leave such rows out by exclude = "
-                                  "[\"invalid\"]",
+                                  "[\"invalid\"]; where columns have their own times, say sparse "
+                                  "= true in [csv] of the map",
                                   name));
       }
-      valid = valid && std::isfinite(scaled);
+      valid = valid && (hole || std::isfinite(scaled));
       values_.push_back(scaled);
     }
-    if (!valid) {
-      ++recording_.excluded.invalid;
-      return {};
-    }
+    if (!valid) ++recording_.excluded.invalid;
+    if (!valid && !sparse_) return {};
     series_.time_ns.push_back(*time);
     series_.line.push_back(rows_[0].line());
     for (std::size_t i = 0; i < values_.size(); ++i) {
@@ -264,7 +366,8 @@ class CsvSource {
   std::vector<std::string> used_;
   std::vector<double> values_;  // of one row
   std::int64_t row_ = 0;
-  Series series_;
+  bool sparse_ = false;
+  Series series_;  // of all columns
   Recording recording_;
 };
 

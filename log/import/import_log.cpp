@@ -1,14 +1,21 @@
 #include "log/import/import_log.hpp"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
 #include <memory>
 #include <utility>
 
+#include "base/bounds.hpp"
 #include "base/open_file.hpp"
 #include "base/sha256.hpp"
+#include "base/utf8.hpp"
+#include "log/compression.hpp"
 #include "log/import/sources.hpp"
 #include "log/mcap_format.hpp"
 #include "log/recorder.hpp"
@@ -32,6 +39,67 @@ Status hash_bytes(const ImportFile& file, Sha256& hash) {
   }
 }
 
+/// Errors: there is nothing to write to, or no space.
+Status write_piece(const Descriptor& out, std::span<const std::byte> piece,
+                   const std::string& folder) {
+  const int problem = write_all(out, {reinterpret_cast<const char*>(piece.data()), piece.size()});
+  if (problem == 0) return {};
+  return fail("cannot be unpacked in " + folder + ": " + std::strerror(problem),
+              "free some space there, or name another folder: TMPDIR=FOLDER tandem …");
+}
+
+/// A file that is packed as a whole, as rosbag2 leaves "bag_0.mcap.zstd", becomes what is in it:
+/// a file without a name, which goes with its descriptor. Errors: it is damaged or cut, holds more
+/// than bounds.hpp allows, or there is no space for it.
+Status unpack_file(ImportFile& file) {
+  constexpr std::uint64_t kAnyPacked = std::uint64_t{256} << 20;  // bytes that any file may hold
+  std::array<std::byte, 4> magic{};
+  if (::pread(file.file->get(), magic.data(), magic.size(), 0) < 0) return {};  // hash_bytes() says
+  const Compression compression = packed_by(magic);
+  if (compression == Compression::kNone) return {};
+  std::error_code ignored;
+  const std::string folder = std::filesystem::temp_directory_path(ignored).string();
+  Descriptor out(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600));
+  if (!out.valid()) return fail("cannot be unpacked in " + folder + ": " + std::strerror(errno));
+  std::vector<std::byte> block(std::size_t{1} << 20);
+  std::uint64_t packed = 0, plain = 0;
+  const auto more = [&]() -> Result<std::span<const std::byte>> {
+    const ssize_t size =
+        ::pread(file.file->get(), block.data(), block.size(), static_cast<off_t>(packed));
+    if (size < 0) return fail("reading failed", "check the disk");
+    packed += static_cast<std::uint64_t>(size);
+    return std::span<const std::byte>(block).first(static_cast<std::size_t>(size));
+  };
+  const auto take = [&](std::span<const std::byte> piece) -> Status {
+    plain += piece.size();
+    if (plain > kAnyPacked && plain / bounds::kLogGrowth.most > packed)
+      return std::unexpected(beyond(bounds::kLogGrowth));
+    return write_piece(out, piece, folder);
+  };
+  Status done = unpack(compression, more, take);
+  if (!done && done.error().hint.empty()) done.error().hint = "copy it again";
+  if (!done) {
+    done.error().file = file.path;
+    return done;
+  }
+  file.file = std::make_shared<const Descriptor>(std::move(out));
+  return {};
+}
+
+/// A table in Latin-1, as instruments write it for the sign of a degree, becomes UTF-8: its numbers
+/// are the same either way. @return whether it was
+bool to_utf8(std::string& text) {
+  if (is_utf8(text)) return false;
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x80) out += static_cast<char>(0xC0U | (byte >> 6U));
+    out += byte < 0x80 ? c : static_cast<char>(0x80U | (byte & 0x3FU));
+  }
+  text = std::move(out);
+  return true;
+}
+
 /// Of a table. Errors: bytes that no text has, such as those of a picture or of UTF-16.
 Status is_text(const ImportFile& file) {
   const auto control = [](char c) {
@@ -40,9 +108,13 @@ Status is_text(const ImportFile& file) {
   };
   const auto found = std::ranges::find_if(file.text, control);
   if (found == file.text.end()) return {};
+  if (file.text.starts_with("\xFF\xFE") || file.text.starts_with("\xFE\xFF")) {
+    return std::unexpected(
+        Error{"is in UTF-16", "convert it: iconv -f UTF-16 -t UTF-8 FILE > NEW", file.path, 0, {}});
+  }
   return std::unexpected(
       Error{"is no text: byte " + std::to_string(found - file.text.begin()) + " is no character",
-            "give a table in UTF-8 or ASCII, or a bag in MCAP",
+            "give a table in UTF-8, Latin-1 or ASCII, or a bag in MCAP",
             file.path,
             0,
             {}});
@@ -65,11 +137,10 @@ Result<bool> is_bag(const ImportFile& file) {
   if (begins(first, "#ROSBAG V")) {
     return refuse("is a bag of ROS 1", "convert it: mcap convert");
   }
-  if (begins(first, "\x28\xB5\x2F\xFD")) return refuse("is compressed", "decompress it: zstd -d");
   if (begins(first, "\x1F\x8B")) return refuse("is compressed", "decompress it: gunzip");
   const auto magic = std::as_bytes(std::span(head)).first(kMagicBytes);
   if (first.size() >= kMagicBytes && std::ranges::equal(magic, kMagic)) return true;
-  if (path.ends_with(".mcap")) {
+  if (path.ends_with(".mcap") || path.find(".mcap.") != std::string::npos) {
     return refuse(first.empty() ? "is empty" : "is no MCAP file: it does not begin as one",
                   "give the bag's .mcap file; a table needs another ending");
   }
@@ -111,7 +182,8 @@ StringMap counts_of(const ImportRequest& request, const Imported& imported,
           {"excluded_gap_cycles", std::to_string(out.gap_cycles)},
           {"excluded_frozen", listed(out.frozen)},
           {"ignored", listed(out.ignored)},
-          {"missing_joints", listed(summary.missing)}};
+          {"missing_joints", listed(summary.missing)},
+          {"taken", listed(summary.notes)}};
 }
 
 /// Every cycle into the log.
@@ -153,11 +225,14 @@ std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request
   const auto refuse = [](Error error) { return std::unexpected(Diagnostics{std::move(error)}); };
   Imported imported;
   std::vector<ImportFile> files;
+  std::vector<std::string> latin1;
   Sha256 hash;
   for (const std::string& path : request.files) {
     Result<Descriptor> open = open_to_read(path, "name the .mcap files of a bag in their order");
     if (!open) return refuse(open.error());
     ImportFile file{path, std::make_shared<const Descriptor>(std::move(*open)), {}};
+    if (Status read = hash_bytes(file, hash); !read) return refuse(read.error());
+    if (Status plain = unpack_file(file); !plain) return refuse(plain.error());
     const Result<bool> bag = is_bag(file);
     if (!bag) return refuse(bag.error());
     if (!files.empty() && *bag != imported.bag) {
@@ -168,13 +243,13 @@ std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request
                      {}});
     }
     imported.bag = *bag;
-    if (Status read = hash_bytes(file, hash); !read) return refuse(read.error());
     if (!*bag) {
       Result<std::string> text = read_all(*file.file, path, kMostTableBytes);
       if (!text) return refuse(text.error());
       file.text = std::move(*text);
     }
     if (Status text = is_text(file); !text) return refuse(text.error());
+    if (to_utf8(file.text)) latin1.push_back(path);
     files.push_back(std::move(file));
   }
   imported.sha256 = hash.finish();
@@ -184,10 +259,13 @@ std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request
   auto map = parse_import_map(imported.map_text, request.map, robot, imported.bag);
   if (!map) return std::unexpected(map.error());
   imported.map = std::move(*map);
+  for (const hal::Follower& one : request.followers) imported.map.followers.push_back(one.name);
   auto recording = imported.bag ? read_bag_recording(files, imported.map, robot)
                                 : read_csv_recording(files, imported.map, robot);
   if (!recording) return refuse(recording.error());
   imported.recording = std::move(*recording);
+  for (const std::string& path : latin1)
+    imported.recording.notes.push_back(path + " is no UTF-8: taken for Latin-1");
   if (Status s = clean(imported.recording, imported.map, robot); !s) return refuse(s.error());
   return imported;
 }
@@ -208,6 +286,7 @@ std::expected<ImportSummary, Diagnostics> import_log(const ImportRequest& reques
                         .excluded = imported->recording.excluded,
                         .fields = filled_fields(imported->recording),
                         .missing = {},
+                        .notes = imported->recording.notes,
                         .log = {}};
   for (const auto& [joint, place] : imported->map.missing) {
     summary.missing.push_back(robot.joints[joint].name);
@@ -217,6 +296,7 @@ std::expected<ImportSummary, Diagnostics> import_log(const ImportRequest& reques
   RecorderOptions options;
   options.writer.compression = Compression::kLz4;
   options.viewed.urdf = urdf;
+  options.viewed.followers = request.followers;
   auto recorder = Recorder::open(request.output, info, options);
   if (!recorder) return refuse(recorder.error());
   write_cycles(*sampler, robot, has_command(imported->map), **recorder, summary);

@@ -20,6 +20,7 @@ struct ImportRequest {
   std::vector<std::string> files;  ///< tables of text side by side, or bags one after the other
   std::string map;                 ///< path of the import map
   std::string output;              ///< path of the log
+  std::vector<hal::Follower> followers{};  ///< the robot's
 };
 
 /// A recording, read and cleaned.
@@ -47,6 +48,7 @@ struct ImportSummary {
   Exclusions excluded;
   std::vector<std::string> fields;   ///< "position_rad", "command torque_nm": what is filled
   std::vector<std::string> missing;  ///< joints that the recording lacks
+  std::vector<std::string> notes;    ///< what was taken how
   RecordingResult log;
 };
 

@@ -146,11 +146,12 @@ class Reader {
       return;
     }
     map_.time_column = time.text("column");
-    const std::string unit = time.choice("unit", {"s", "ms", "us", "ns"});
+    const std::string unit = time.choice("unit", {"s", "ms", "us", "ns", "iso"});
     map_.time_unit_ns = unit == "s"    ? 1'000'000'000
                         : unit == "ms" ? 1'000'000
                         : unit == "us" ? 1'000
-                                       : 1;
+                        : unit == "ns" ? 1
+                                       : 0;
   }
 
   void read_csv(TomlTable& root) {
@@ -171,12 +172,16 @@ class Reader {
     if (comment.size() > 1) csv.error("comment", "is one character");
     if (comment.size() == 1) map_.csv.comment = comment.front();
     map_.csv.skip_lines = static_cast<int>(csv.integer_or("skip_lines", 0, 0, 1000));
+    if (csv.has("sparse")) map_.csv.sparse = csv.boolean_or("sparse", false);
     csv.finish();
   }
 
   void read_bag(TomlTable& root) {
     TomlTable bag = root.table_or_empty("bag");
-    map_.joint_topic = bag.text_or("joint_states", "");
+    if (bag.is_text("joint_states"))
+      map_.joint_topics = {bag.text("joint_states")};
+    else
+      map_.joint_topics = bag.texts_or("joint_states", {});
     if (bag.has("stamp")) map_.stamp = bag.choice("stamp", {"header", "log"});
     TomlTable names = bag.table_or_empty("names");
     for (const std::string& name : names.keys()) {
@@ -321,6 +326,8 @@ class Reader {
       table.error(key, "is 0: every number would be lost", "give the true one");
     }
     one.offset = per_joint(table, "offset", count, 0.0);
+    const bool position = signal.units.data() == std::data(kPositions);
+    one.unwrap = position && table.boolean_or("unwrap", false);
     const std::vector<double> counts = per_joint(table, "counts_per_turn", count, 0.0);
     for (std::size_t j = 0; j < count && j < one.scale.size() && j < counts.size(); ++j) {
       const double factor = factor_of(table, signal, units[j], map_.joints[j]);

@@ -39,6 +39,7 @@ struct SignalMap {
   int line = 0;                       ///< the same
   std::vector<std::string> columns;   ///< (joints) of a CSV; empty in a bag
   std::vector<double> scale, offset;  ///< (joints) SI = scale * recorded + offset
+  bool unwrap = false;                ///< of positions: they were kept within a turn
 };
 
 /// A sensor's table [sensor.NAME].
@@ -58,7 +59,8 @@ struct CsvFormat {
   char comment = '\0';   ///< lines that begin so are left out; 0: none are
   bool header = true;    ///< the first line names the columns; else c1, c2, …
   bool decimal_comma = false;
-  int skip_lines = 0;  ///< before the header
+  int skip_lines = 0;          ///< before the header
+  std::optional<bool> sparse;  ///< an empty cell is no sample; empty: as most rows are
 };
 
 struct ImportMap {
@@ -70,7 +72,7 @@ struct ImportMap {
   bool allow_frozen = false;              ///< columns that never change are good
 
   std::optional<std::string> time_column;
-  std::int64_t time_unit_ns = 0;  ///< of the time column
+  std::int64_t time_unit_ns = 0;  ///< of the time column; 0: dates of ISO 8601
   bool by_rows = false;           ///< no time column: a row every period_ns
   std::int64_t period_ns = 0;     ///< of the log; 0: not said
   std::int64_t max_gap_ns = 0;    ///< longer pauses are gaps
@@ -79,9 +81,11 @@ struct ImportMap {
   Sampling sampling = Sampling::kLinear;
 
   CsvFormat csv;
-  std::string joint_topic;                   ///< empty: the only one of its type
+  std::vector<std::string> joint_topics;     ///< empty: all of their type
   std::string stamp;                         ///< "header", "log"; empty: not said
   std::map<std::string, std::size_t> names;  ///< a bag's joint -> the robot's
+
+  std::vector<std::string> followers;  ///< joints of the robot whose leaders say where they are
 
   std::vector<SignalMap> signals;
   std::vector<SensorMap> sensors;

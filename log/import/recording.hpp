@@ -34,18 +34,20 @@ struct Series {
   std::vector<std::size_t> sensors;      ///< the same
   std::vector<std::int64_t> time_ns;     ///< of each row, on the recording's clock
   std::vector<int> line;                 ///< of each row in its file; empty: rows have none
+  std::vector<std::uint32_t> message;    ///< of a bag, that each row is from; empty of a table
   std::vector<ImportedColumn> columns;   ///< as long as time_ns
   std::vector<std::size_t> quaternions;  ///< the first of four columns that are one
 
   [[nodiscard]] std::size_t rows() const { return time_ns.size(); }
 };
 
-/// What was left out, because the map says so. Counted for the summary and the log.
+/// What was left out, because the map says so. Counted for the summary and the log: rows of a
+/// table, messages of a bag, each once, whatever number of joints it has.
 struct Exclusions {
-  std::uint64_t invalid = 0;         ///< rows with a cell that is empty or not finite
-  std::uint64_t ragged = 0;          ///< rows with too few or too many cells
-  std::uint64_t duplicates = 0;      ///< rows whose time is the row's before
-  std::uint64_t backwards = 0;       ///< rows whose time is before that of an earlier row
+  std::uint64_t invalid = 0;         ///< with a cell that is empty or not finite, a joint twice
+  std::uint64_t ragged = 0;          ///< with too few or too many cells
+  std::uint64_t duplicates = 0;      ///< whose time is the row's before
+  std::uint64_t backwards = 0;       ///< whose time is before that of an earlier row
   std::uint64_t gaps = 0;            ///< pauses longer than max_gap_s
   std::uint64_t gap_cycles = 0;      ///< cycles in them, which the log lacks
   std::vector<std::string> frozen;   ///< columns that never change
@@ -55,10 +57,14 @@ struct Exclusions {
 /// Drops all rows but these, which are in rising order.
 void keep_rows(Series& series, const std::vector<std::size_t>& rows);
 
+/// How many different numbers there are.
+[[nodiscard]] std::uint64_t distinct(std::vector<std::uint32_t> numbers);
+
 /// A whole recording.
 struct Recording {
   std::vector<Series> series;
   Exclusions excluded;
+  std::vector<std::string> notes;  ///< what was taken how, for the summary
 };
 
 }  // namespace tandem::log

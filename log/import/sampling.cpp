@@ -36,8 +36,13 @@ Error row_error(const Series& series, std::size_t row, std::string message, std:
   return error;
 }
 
+/// What is left out of several series: the number of each row's line or message.
+struct LeftOut {
+  std::vector<std::uint32_t> duplicates, backwards;
+};
+
 /// Rows whose time is after that of every row before them.
-Status check_order(Series& series, const ImportMap& map, Exclusions& excluded) {
+Status check_order(Series& series, const ImportMap& map, LeftOut& left_out) {
   std::vector<std::size_t> kept;
   for (std::size_t row = 0; row < series.rows(); ++row) {
     const std::int64_t time = series.time_ns[row];
@@ -54,7 +59,9 @@ Status check_order(Series& series, const ImportMap& map, Exclusions& excluded) {
           twice ? "leave such rows out by exclude = [\"duplicates\"]"
                 : "is it the right time column? exclude = [\"backwards\"] leaves such rows out"));
     }
-    ++(twice ? excluded.duplicates : excluded.backwards);
+    const auto from = row < series.message.size() ? series.message[row]
+                                                  : static_cast<std::uint32_t>(series.line[row]);
+    (twice ? left_out.duplicates : left_out.backwards).push_back(from);
   }
   keep_rows(series, kept);
   return {};
@@ -67,6 +74,33 @@ std::vector<std::int64_t> sorted_steps(const Series& series) {
   }
   std::ranges::sort(steps);
   return steps;
+}
+
+/// Positions that the map says were kept within a turn, as an angle from -pi to pi is, go on: each
+/// row is the nearest to the one before. The whole column then stands in the joint's range, where
+/// a number of turns brings it there.
+void continue_turns(Series& series, const ImportMap& map, const hal::RobotConfig& robot) {
+  constexpr double kTurn_rad = 2.0 * std::numbers::pi;
+  for (ImportedColumn& column : series.columns) {
+    const auto of = [&](const SignalMap& one) {
+      return one.command == column.target.command && one.field == column.target.field;
+    };
+    const auto signal = std::ranges::find_if(map.signals, of);
+    if (signal == map.signals.end() || !signal->unwrap || column.values.empty()) continue;
+    const hal::JointConfig& joint = robot.joints[column.target.index];
+    if (joint.slides) continue;
+    for (std::size_t row = 1; row < column.values.size(); ++row) {
+      const double step = column.values[row] - column.values[row - 1];
+      column.values[row] -= kTurn_rad * std::round(step / kTurn_rad);
+    }
+    const auto [least, most] = std::ranges::minmax(column.values);
+    const double lower = joint.min_position_rad, upper = joint.max_position_rad;
+    const double turns = std::round((lower + upper - least - most) / 2.0 / kTurn_rad);
+    const double shift = kTurn_rad * turns;
+    const bool fits = least + shift >= lower && most + shift <= upper;  // not where no limits are
+    if (!fits || (least >= lower && most <= upper)) continue;
+    for (double& value : column.values) value += shift;
+  }
 }
 
 void crop(Recording& recording, const ImportMap& map) {
@@ -204,8 +238,8 @@ Status check_leaps(const Series& series, const ImportMap& map, const hal::RobotC
           row_error(series, row,
                     fmt::format("{} leaps by {:.4g} rad, a turn: '{}' does not", column.name, leap,
                                 joint.name),
-                    "its number was kept within a turn: let it go on (unwrap it), or leave the row "
-                    "out by begin_s or end_s"));
+                    "its number was kept within a turn: say unwrap = true in [position] of " +
+                        map.file + ", or leave the row out by begin_s or end_s"));
     }
   }
   return {};
@@ -316,14 +350,24 @@ void keep_rows(Series& series, const std::vector<std::size_t>& rows) {
   };
   keep(series.time_ns);
   keep(series.line);
+  keep(series.message);
   for (ImportedColumn& column : series.columns) keep(column.values);
 }
 
+std::uint64_t distinct(std::vector<std::uint32_t> numbers) {
+  std::ranges::sort(numbers);
+  return static_cast<std::uint64_t>(std::unique(numbers.begin(), numbers.end()) - numbers.begin());
+}
+
 Status clean(Recording& recording, const ImportMap& map, const hal::RobotConfig& robot) {
+  LeftOut left_out;
   for (Series& series : recording.series) {
-    if (Status s = check_order(series, map, recording.excluded); !s) return s;
+    if (Status s = check_order(series, map, left_out); !s) return s;
   }
+  recording.excluded.duplicates = distinct(std::move(left_out.duplicates));
+  recording.excluded.backwards = distinct(std::move(left_out.backwards));
   crop(recording, map);
+  for (Series& series : recording.series) continue_turns(series, map, robot);
   for (Series& series : recording.series) {
     if (series.rows() >= 2) continue;
     return std::unexpected(

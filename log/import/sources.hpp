@@ -22,7 +22,8 @@ struct ImportFile {
 };
 
 /// Reads tables of text. Several are laid side by side: row by row they belong together, and a
-/// column's name is STEM.NAME, of the file "STEM.csv".
+/// column's name is STEM.NAME, of the file "STEM.csv". In a sparse table each column has the times of
+/// the rows in which it has a cell.
 ///
 /// Errors: no such column; a column that is neither used nor ignored; a cell that is no number; and
 /// what the map does not exclude: ragged rows, cells that are empty or not finite. Each with its
@@ -31,11 +32,11 @@ struct ImportFile {
                                                    const ImportMap& map,
                                                    const hal::RobotConfig& robot);
 
-/// Reads the ROS 2 bags `files` (MCAP), one after the other: sensor_msgs/JointState, and for each
-/// [sensor.NAME] of the map sensor_msgs/Imu or geometry_msgs/WrenchStamped, in CDR of either byte
-/// order. Several publishers may share the topic of joint states.
+/// Reads the bags `files` (MCAP), one after the other: sensor_msgs/JointState, and for each
+/// [sensor.NAME] of the map sensor_msgs/Imu or geometry_msgs/WrenchStamped, as decode_message()
+/// reads them. Several publishers may share a topic of joint states, and several topics the joints.
 ///
-/// Errors: a damaged file; no joint states, or several topics of them while none is named; a stamp
+/// Errors: a damaged file; no joint states; a joint in two topics or twice in a message; a stamp
 /// that is not said; a joint that is neither the robot's, named nor ignored; joints that the
 /// recording lacks; a topic of another type; a frame that is not the sensor's link; a message whose
 /// lists differ in length.

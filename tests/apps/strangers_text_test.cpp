@@ -49,6 +49,63 @@ TEST_F(StrangersText, OfALogIsShownAndNotObeyed) {
             std::string::npos);
 }
 
+// The name of one of the two robots was printed as it is.
+TEST_F(StrangersText, OfTwoLogsIsWithinItsLine) {
+  for (const char* joint : {"a,b", "c"}) {
+    log::McapWriter writer;
+    const std::string name = *joint == 'a' ? "a.mcap" : "b.mcap";
+    ASSERT_TRUE(writer.open((folder_ / name).string(), {}));
+    writer.add_metadata("tandem", {{"robot", kOrder},
+                                   {"joints", *joint == 'a' ? "a,b\n" : "c\nd\n"},
+                                   {"period_ns", "1000000"}});
+    const auto schema = writer.add_schema("tandem/msg/State", "ros2msg", "float64 position_rad\n");
+    const auto channel = writer.add_channel(schema, "/tandem/state", "cdr");
+    const std::string head("\0\1\0\0", 4), body(8, '\0');
+    ASSERT_TRUE(
+        writer.write(channel, 0, std::as_bytes(std::span(head)), std::as_bytes(std::span(body))));
+    ASSERT_TRUE(writer.close());
+  }
+  const Outcome outcome = tandem("log diff a.mcap b.mcap");
+  EXPECT_NE(outcome.out.find("these are logs of different robots: r\\u001b[2J"), std::string::npos)
+      << outcome.out;
+  expect_no_order(outcome.out);
+  EXPECT_EQ(tandem("log csv a.mcap").out.substr(0, 28), "time_s,\"position_rad.a,b\"\n0,");
+}
+
+/// A bag whose topics and joints have such names, in the summary and in every refusal.
+TEST_F(StrangersText, OfABagIsWithinItsLine) {
+  const std::string encoding = "json";
+  log::McapWriter writer;
+  ASSERT_TRUE(writer.open((folder_ / "bag.mcap").string(), {}));
+  const auto schema = writer.add_schema("sensor_msgs/msg/JointState", "", "");
+  const auto joints = writer.add_channel(schema, "/joint_states" + kOrder, encoding);
+  const auto other = writer.add_channel(writer.add_schema(kOrder, "", ""), kOrder, kOrder);
+  const std::string stranger = nlohmann::json(kOrder.substr(0, kOrder.size() - 1)).dump();
+  for (int i = 0; i < 20; ++i) {
+    const std::string body = R"({"name": ["joint1", "joint2", )" + stranger +
+                             R"(], "position": [)" + std::to_string(0.001 * i) + ", " +
+                             std::to_string(0.002 * i) + ", 0]}";
+    for (const auto channel : {joints, other})
+      ASSERT_TRUE(writer.write(channel, i * 10'000'000, {}, std::as_bytes(std::span(body))));
+  }
+  ASSERT_TRUE(writer.close());
+  const std::string command = "log import bag.mcap --robot robot.toml --map map.toml";
+  const std::string rest = "[time]\nperiod_s = 0.01\n[bag]\nstamp = \"log\"\n";
+  for (const std::string& map : {rest, rest + "joint_states = \"/none\"\n",
+                                 "ignore = [\"*\"]\n" + rest + "[bag.names]\nx = \"joint1\"\n"}) {
+    write_text(folder_ / "map.toml", map);
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 2);
+    expect_no_order(outcome.err);
+  }
+  write_text(folder_ / "map.toml", "ignore = [\"*\"]\n" + rest);
+  const Outcome outcome = tandem(command);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("not used"), std::string::npos);
+  expect_no_order(outcome.out);
+  expect_no_order(tandem("log info runs/double_pendulum-bag.mcap").out);
+}
+
 TEST_F(StrangersText, IsTheSameTextInJson) {
   write_log();
   const Outcome outcome = tandem("log info log.mcap --json -");
