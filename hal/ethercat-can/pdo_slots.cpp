@@ -91,7 +91,7 @@ std::vector<std::uint32_t> default_mapping(const DataSheet& sheet, std::uint16_t
 
 std::uint8_t entries_of(const DataSheet& sheet, std::uint16_t mapping) {
   std::uint8_t most = 0;
-  while (most < kMaxMappedObjects && sheet.find(mapping, most + 1u) != nullptr) ++most;
+  while (most < kMaxMappedObjects && canopen::writable(sheet, mapping, most + 1u)) ++most;
   const SheetEntry* count = sheet.find(mapping, 0);
   const std::int64_t limit = count != nullptr ? count->high.value_or(0) : 0;
   return limit > 0 ? static_cast<std::uint8_t>(std::min<std::int64_t>(most, limit)) : most;

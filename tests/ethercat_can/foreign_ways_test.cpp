@@ -134,6 +134,19 @@ TEST(ForeignWays, AMappingIsNoLongerThanItsHighLimit) {
   EXPECT_NEAR(rig.state.position_rad()[0], 100 * kRadPerCount, 1e-12);
 }
 
+TEST(ForeignWays, AMappingEndsBeforeAnEntryThatCannotBeWritten) {
+  for (const int mapping : {0x1600, 0x1A00}) {
+    for (const int sub : {2, 3}) {
+      Sheet s = servo();
+      s.add(mapping, sub, kUnsigned32, canopen::kRead, 0);
+      SheetRig rig(s);
+      ASSERT_TRUE(rig.bring_up()) << mapping << ' ' << sub;
+      EXPECT_TRUE(rig.drive.aborts.empty());
+      EXPECT_LT(rig.drive.value(mapping), sub);
+    }
+  }
+}
+
 /// Position PDOs as most drives have them from power-on.
 Sheet with_default_mapping() {
   Sheet s = servo();
