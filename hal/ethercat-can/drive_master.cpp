@@ -124,7 +124,6 @@ void DriveMaster::Impl::on_emergency(Node& node, const Frame& frame) noexcept TA
     }
   }
   if (code == 0 || of_axis) return;
-  if (node.plan.joints.size() == 1) axes[node.plan.joints[0]].on_emergency(code, false);
   ++node.emergencies;
   node.emergency = *message;
 }
