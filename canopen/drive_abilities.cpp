@@ -19,14 +19,29 @@ const SheetEntry* offered(const DataSheet& sheet, std::uint16_t index, std::uint
   return manufacturer && entry->name != entry_name(index, sub) ? nullptr : entry;
 }
 
+bool writable(const DataSheet& sheet, std::uint16_t index, std::uint8_t sub) {
+  const SheetEntry* entry = sheet.find(index, sub);
+  return entry != nullptr && (entry->access & kWrite) != 0;
+}
+
+bool remappable(const DataSheet& sheet, std::uint16_t parameter) {
+  const auto mapping =
+      static_cast<std::uint16_t>(parameter + object::kRpdoMapping - object::kRpdoParameter);
+  return writable(sheet, mapping, 0) && writable(sheet, mapping, 1) &&
+         (sheet.find(parameter, kPdoCobId) == nullptr || writable(sheet, parameter, kPdoCobId));
+}
+
 namespace {
 
 /// Whether one of the first PDOs of a direction can be mapped, or has the entry from power-on.
 bool carried(const DataSheet& sheet, const SheetEntry& entry, Access right) {
-  const std::uint16_t first = right == kMapRpdo ? object::kRpdoMapping : object::kTpdoMapping;
+  const bool receive = right == kMapRpdo;
   for (int i = 0; i < kPdosPerNode; ++i) {
-    const auto mapping = static_cast<std::uint16_t>(first + i);
-    if (writable(sheet, mapping, 0) && writable(sheet, mapping, 1)) return true;
+    const auto parameter =
+        static_cast<std::uint16_t>((receive ? object::kRpdoParameter : object::kTpdoParameter) + i);
+    if (remappable(sheet, parameter)) return true;
+    const auto mapping =
+        static_cast<std::uint16_t>((receive ? object::kRpdoMapping : object::kTpdoMapping) + i);
     const auto count = sheet.value(mapping, 0, 0).value_or(0);
     for (int sub = 1; sub <= count; ++sub) {
       const auto mapped = sheet.value(mapping, static_cast<std::uint8_t>(sub), 0).value_or(0);
@@ -42,11 +57,6 @@ bool mappable(const DataSheet& sheet, std::uint16_t index, std::uint8_t sub, Dat
               Access right) {
   const SheetEntry* entry = offered(sheet, index, sub, type);
   return entry != nullptr && (entry->access & right) != 0 && carried(sheet, *entry, right);
-}
-
-bool writable(const DataSheet& sheet, std::uint16_t index, std::uint8_t sub) {
-  const SheetEntry* entry = sheet.find(index, sub);
-  return entry != nullptr && (entry->access & kWrite) != 0;
 }
 
 DriveAbilities abilities_of(const DataSheet& sheet, int axis) {

@@ -24,6 +24,11 @@ namespace tandem::canopen {
 /// Whether a master may write the entry by SDO, whatever its type.
 [[nodiscard]] bool writable(const DataSheet& sheet, std::uint16_t index, std::uint8_t sub);
 
+/// Whether a master may write the mapping of a PDO: it is switched off for that, by its COB-ID.
+/// Where the sheet has none (EtherCAT), nothing has to be switched.
+/// @param parameter  14xx or 18xx; its mapping is 200h above
+[[nodiscard]] bool remappable(const DataSheet& sheet, std::uint16_t parameter);
+
 /// Of one axis.
 struct DriveAbilities {
   bool machine = false;  ///< 6040 and 6041 can be in PDOs: it is a CiA 402 drive

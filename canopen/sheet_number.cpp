@@ -107,6 +107,13 @@ std::optional<std::string_view> beside_node_id(std::string_view text) noexcept {
   return trimmed(rest.substr(0, rest.size() - 1));
 }
 
+/// Without what C writes behind a number: 0x10UL, 5u.
+std::string_view without_suffix(std::string_view text) noexcept {
+  const std::size_t end = text.find_last_not_of("uUlL");
+  const std::size_t size = end == std::string_view::npos ? 0 : end + 1;
+  return size == 0 || text.size() - size > 3 ? text : text.substr(0, size);
+}
+
 }  // namespace
 
 SheetKind sheet_kind(std::uint16_t type) noexcept { return facts_of(type).kind; }
@@ -119,6 +126,7 @@ std::optional<SheetLiteral> read_literal(std::string_view text) noexcept {
     literal.negative = text.front() == '-';
     text.remove_prefix(1);
   }
+  text = without_suffix(text);
   literal.hex = text.starts_with("0x") || text.starts_with("0X");
   std::optional<std::uint64_t> value =
       digits(literal.hex ? text.substr(2) : text, literal.hex ? 16 : 10);

@@ -8,6 +8,7 @@
 
 #include "base/counted.hpp"
 #include "canopen/object_dictionary.hpp"
+#include "canopen/objects.hpp"
 #include "canopen/sheet_number.hpp"
 
 namespace tandem::canopen {
@@ -99,6 +100,20 @@ constexpr std::array kAccess{
     AccessBits{"const", kRead, kRead | kMapTpdo},
 };
 
+/// Whether a master may need the object. What is odd of another one is left out.
+bool is_needed(std::uint16_t index) noexcept {
+  struct Range {
+    std::uint16_t first, last;
+  };
+  constexpr std::array kCommunication{
+      Range{0x1000, 0x1006}, Range{0x100C, 0x100D}, Range{0x1010, 0x1010}, Range{0x1014, 0x1018},
+      Range{0x1020, 0x1029}, Range{0x1400, 0x1BFF}, Range{0x1C00, 0x1CFF}};
+  constexpr std::uint16_t kOfProfile = 0x600;  // behind it: data of motor and drive
+  if (index >= 0x6000 && index < 0xA000) return (index - 0x6000) % kAxisStride < kOfProfile;
+  return std::ranges::any_of(kCommunication,
+                             [&](const Range& r) { return index >= r.first && index <= r.last; });
+}
+
 /// Makes entries of objects.
 class EntryMaker {
  public:
@@ -111,13 +126,13 @@ class EntryMaker {
       return add_subs(index, object);
     }
     const auto type = object_type(section);
-    if (!type) return std::unexpected(type.error());
+    if (!type) return tolerate(index, std::unexpected(type.error()));
     const bool single = *type == kVariable || *type == kDomain;
     if (single && object.subs.empty()) return add_section(index, 0, section, {});
     if (single) remarks_.add(section.line, called(section) + "is a variable and has sub-indices");
     if (const Status added = add_subs(index, object); !added) return added;
     if (single || *type == kNull) return {};
-    return check_count(index, object);
+    return tolerate(index, check_count(index, object));
   }
 
   [[nodiscard]] std::vector<SheetEntry> take() { return std::move(entries_); }
@@ -125,6 +140,14 @@ class EntryMaker {
  private:
   static std::string called(const IniSection& section) {
     return "[" + printable(section.name) + "] ";
+  }
+
+  /// What is wrong with an object that nobody needs is a remark.
+  Status tolerate(std::uint16_t index, Status read) {
+    if (read || is_needed(index) || entries_.size() == kMaxSheetEntries) return read;
+    const Error& error = read.error();
+    remarks_.add(error.line, error.key + ": " + error.message + ": left out");
+    return {};
   }
 
   Status add_subs(std::uint16_t index, const SheetObject& object) {
@@ -197,11 +220,11 @@ class EntryMaker {
                      .high = {},
                      .text = {},
                      .line = section.line};
-    for (const auto& read : {&EntryMaker::read_type, &EntryMaker::read_access}) {
-      if (Status done = (this->*read)(section, entry); !done) return done;
+    for (Status& read :
+         std::array{read_type(section, entry), read_access(section, entry),
+                    read_default(section, own_value, entry), read_limits(section, entry)}) {
+      if (Status done = tolerate(index, std::move(read)); !done) return done;
     }
-    if (Status done = read_default(section, own_value, entry); !done) return done;
-    if (Status done = read_limits(section, entry); !done) return done;
     entries_.push_back(std::move(entry));
     return {};
   }

@@ -149,7 +149,7 @@ void ProfileModes::position_mode(const ProfileInputs& in, double dt_s) noexcept 
   take_set_point(in);
   const double unit = 1.0 / in.velocity_units;
   out_.target_reached = motion_.move(motion_.position + way(out_.position, target_), speed_ * unit,
-                                     acceleration_ * unit, deceleration_ * unit, dt_s) &&
+                                     speeding() * unit, slowing() * unit, dt_s) &&
                         !waiting_;
   out_.position = plus(start_, clamp_round<std::int32_t>(motion_.position));
   out_.velocity = clamp_round<std::int32_t>(motion_.velocity);
@@ -158,7 +158,7 @@ void ProfileModes::position_mode(const ProfileInputs& in, double dt_s) noexcept 
 void ProfileModes::velocity_mode(const ProfileInputs& in, double dt_s) noexcept {
   const double unit = 1.0 / in.velocity_units;
   out_.target_reached =
-      motion_.run(in.target_velocity * unit, acceleration_ * unit, deceleration_ * unit, dt_s);
+      motion_.run(in.target_velocity * unit, speeding() * unit, slowing() * unit, dt_s);
   out_.velocity = clamp_round<std::int32_t>(motion_.velocity);
   out_.position = in.position;
   out_.bit_12 = out_.velocity == 0;

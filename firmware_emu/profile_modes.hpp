@@ -90,6 +90,13 @@ class ProfileModes {
   void homing_mode(const ProfileInputs& in, double dt_s) noexcept;
   void take_set_point(const ProfileInputs& in) noexcept;
   void end_homing(Homing how) noexcept;
+  // A drive that has one of 6083 and 6084 takes it for both.
+  [[nodiscard]] double speeding() const noexcept {
+    return acceleration_ != 0 ? acceleration_ : deceleration_;
+  }
+  [[nodiscard]] double slowing() const noexcept {
+    return deceleration_ != 0 ? deceleration_ : acceleration_;
+  }
 
   // Objects
   std::uint32_t speed_ = 0;         ///< 6081 [velocity units]

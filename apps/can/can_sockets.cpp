@@ -77,32 +77,56 @@ Status CanSockets::open_line(const hal::BusConfig& bus, std::size_t index,
   return {};
 }
 
+namespace {
+
+/// What hears a bus: one of the two.
+struct Ear {
+  const hal::BusConfig* bus;
+  std::unique_ptr<SocketCanBus> can;
+  std::unique_ptr<hal::ecat::PacketLink> line;
+
+  [[nodiscard]] Status alone() const {
+    return can != nullptr ? hal::can::expect_no_master(*can, bus->interface)
+                          : hal::can::expect_silence(*line, bus->interface);
+  }
+};
+
+Status open_ear(Ear& ear) {
+  if (ear.bus->kind == hal::BusKind::kEthercat) {
+    auto opened = hal::ecat::PacketLink::open(ear.bus->interface);
+    if (!opened) return std::unexpected(opened.error());
+    ear.line = std::move(*opened);
+    return {};
+  }
+  auto opened = SocketCanBus::open({.interface = ear.bus->interface,
+                                    .fd = ear.bus->fd,
+                                    .side = hal::can::SocketSide::kWitness,
+                                    .stamps = false});
+  if (!opened) return std::unexpected(opened.error());
+  ear.can = std::move(*opened);
+  return {};
+}
+
+}  // namespace
+
 Diagnostics listen_for_masters(const hal::RobotConfig& robot, std::int64_t period_ns) {
   Diagnostics errors;
-  std::vector<std::unique_ptr<SocketCanBus>> ears;
-  std::vector<const hal::BusConfig*> heard;
+  std::vector<Ear> ears;
   for (const hal::BusConfig& bus : robot.buses) {
-    if (bus.kind != hal::BusKind::kCan) continue;  // a line's master sees another one's frames
-    auto opened = SocketCanBus::open({.interface = bus.interface,
-                                      .fd = bus.fd,
-                                      .side = hal::can::SocketSide::kWitness,
-                                      .stamps = false});
-    if (!opened) {
+    Ear ear{.bus = &bus, .can = {}, .line = {}};
+    if (const Status opened = open_ear(ear); !opened) {
       errors.push_back(of_bus(bus, opened.error()));
-      continue;
     }
-    ears.push_back(std::move(*opened));
-    heard.push_back(&bus);
+    ears.push_back(std::move(ear));
   }
-  if (!errors.empty()) return errors;
-  if (ears.empty()) return errors;
+  if (!errors.empty() || ears.empty()) return errors;
   const std::int64_t until_ns = rt::WallClock{}.now_ns() + hal::can::listening_ns(robot, period_ns);
   while (rt::WallClock{}.now_ns() < until_ns && !rt::stop_requested()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  for (std::size_t b = 0; b < ears.size(); ++b) {
-    const Status alone = hal::can::expect_no_master(*ears[b], ears[b]->interface());
-    if (!alone) errors.push_back(of_bus(*heard[b], alone.error()));
+  for (const Ear& ear : ears) {
+    const Status alone = ear.alone();
+    if (!alone) errors.push_back(of_bus(*ear.bus, alone.error()));
   }
   return errors;
 }

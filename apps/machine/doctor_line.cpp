@@ -119,6 +119,11 @@ Finding identities(const hal::BusConfig& bus, const std::vector<SlavePlan>& plan
           name, Health::kMissing, who + ": none", "its information memory cannot be read",
           std::string("switch it off and on; its maker's tool writes the memory anew") + kLockstep};
     }
+    if (!slave.settings_right) {
+      return {name, Health::kMissing, who + ": wrong check sum",
+              "its information memory (SII) is damaged, and a run refuses the slave",
+              "its maker's tool writes the memory anew"};
+    }
     Identity found = slave.identity;
     if (found.vendor == ethercat::sii::kNobodysVendor) {  // test equipment stands for any maker's
       emulated = true;

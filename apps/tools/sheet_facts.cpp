@@ -7,6 +7,7 @@
 #include <array>
 #include <span>
 
+#include "canopen/drive_abilities.hpp"
 #include "canopen/object_dictionary.hpp"
 #include "canopen/objects.hpp"
 
@@ -126,8 +127,11 @@ bool writable(const SheetEntry* entry) {
 
 /// The entries of a mapping object, and what they are by default.
 void add_mapping(const DataSheet& sheet, std::uint16_t mapping, SheetPdo& pdo) {
-  pdo.mapping_writable = sheet.granularity != 0 && writable(sheet.find(mapping, 0)) &&
-                         writable(sheet.find(mapping, 1));
+  constexpr std::uint16_t kToParameter =
+      canopen::object::kRpdoMapping - canopen::object::kRpdoParameter;
+  pdo.mapping_writable =
+      sheet.granularity != 0 &&
+      canopen::remappable(sheet, static_cast<std::uint16_t>(mapping - kToParameter));
   const std::int64_t used = sheet.value(mapping, 0, 0).value_or(0);
   for (int sub = 1; sub <= 0x40; ++sub) {
     const SheetEntry* entry = sheet.find(mapping, static_cast<std::uint8_t>(sub));
@@ -138,6 +142,9 @@ void add_mapping(const DataSheet& sheet, std::uint16_t mapping, SheetPdo& pdo) {
     pdo.carries.push_back(
         text_of(static_cast<std::uint16_t>(mapped >> 16), static_cast<std::uint8_t>(mapped >> 8)));
   }
+  const SheetEntry* count = sheet.find(mapping, 0);
+  const std::int64_t most = count != nullptr ? count->high.value_or(0) : 0;
+  if (most > 0) pdo.entries = static_cast<int>(std::min<std::int64_t>(pdo.entries, most));
 }
 
 void add_pdos(const DataSheet& sheet, bool receive, SheetFacts& facts) {

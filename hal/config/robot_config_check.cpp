@@ -1,4 +1,6 @@
 // robot.toml against the URDF: names that must exist, and limits that the URDF completes.
+#include <fmt/format.h>
+
 #include <cassert>
 #include <cmath>
 #include <numbers>
@@ -11,6 +13,9 @@
 
 namespace tandem::hal {
 namespace {
+
+/// A rated torque of a sheet beyond so many times the joint's largest is more likely in uNm.
+constexpr double kLikelyOverrated = 30.0;
 
 template <class T>
 const T* find(const std::vector<T>& items, std::string_view name) {
@@ -288,6 +293,16 @@ class Completion : private Check {
       error(joint.line, key + ".rated_torque_Nm",
             "max_torque_Nm is more than 32 times the rated torque, the range of the wire",
             "raise rated_torque_Nm");
+    } else if (joint.torque_of_sheet &&
+               joint.rated_torque_Nm > kLikelyOverrated * joint.max_torque_Nm) {
+      error(joint.line, key + ".rated_torque_Nm",
+            fmt::format("6076 of the sheet of board '{}', in mNm and with the gear, is {:.10g} Nm, "
+                        "{:.3g} times max_torque_Nm: is it in uNm there?",
+                        joint.board, joint.rated_torque_Nm,
+                        joint.rated_torque_Nm / joint.max_torque_Nm),
+            fmt::format("set this key: to {:.10g} if the drive's 6076 is in uNm, to {:.10g} if it "
+                        "is in mNm",
+                        1e-3 * joint.rated_torque_Nm, joint.rated_torque_Nm));
     } else if (joint.rated_torque_Nm > 100.0 * joint.max_torque_Nm) {
       error(joint.line, key + ".rated_torque_Nm",
             "torques go over the wire in thousandths of it, and max_torque_Nm has less than ten "

@@ -166,7 +166,12 @@ class JointScale {
       against("velocity_units_per_rev", joint_.velocity_units_per_rev, units_.velocity_per_rev,
               {object::kVelocityUnit, object::kGearRatio});
     }
-    if (!joint_.torque_of_sheet) {
+    // A sheet in uNm is right by a thousandth, and the key says so where that suits the joint.
+    const double ratio = units_.rated_torque_Nm.value_or(0.0) / joint_.rated_torque_Nm;
+    const bool in_uNm = !differ(ratio, 1000.0) &&
+                        joint_.max_torque_Nm < 32.0 * joint_.rated_torque_Nm &&
+                        joint_.rated_torque_Nm < 32.0 * joint_.max_torque_Nm;
+    if (!joint_.torque_of_sheet && !in_uNm) {
       against("rated_torque_Nm", joint_.rated_torque_Nm, units_.rated_torque_Nm,
               {object::kRatedTorque, object::kGearRatio});
     }

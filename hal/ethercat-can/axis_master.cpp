@@ -91,7 +91,14 @@ bool AxisMaster::ignores_stop(std::int64_t now_ns) noexcept TANDEM_RT {
   if (!stops || age_cycles_ != 0 || !enabled()) return false;
   const std::int64_t most_ns =
       target_ == TargetState::kNothing ? kDisableTimeoutNs : kQuickStopTimeoutNs;
-  return ++disobedient_cycles_ > kObeyCycles && now_ns - since_ns_ >= most_ns;
+  // The samples after "disable voltage" count anew.
+  const std::uint32_t least = target_ == TargetState::kNothing ? kObeyCycles : 2 * kObeyCycles;
+  return ++disobedient_cycles_ > least && now_ns - since_ns_ >= most_ns;
+}
+
+bool AxisMaster::ignores_quick_stop(std::int64_t now_ns) const noexcept TANDEM_RT {
+  return enabled() && disobedient_cycles_ > kObeyCycles &&
+         now_ns - since_ns_ >= kQuickStopPatienceNs;
 }
 
 /// In every mode of a drive that is enabled and wanted so.
@@ -167,6 +174,7 @@ double AxisMaster::position_error_rad() const noexcept {
 void AxisMaster::latch(AxisError error, std::uint16_t code,
                        std::int64_t now_ns) noexcept TANDEM_RT {
   error_ = error;
+  asked_ = false;
   fault_code_ = code;
   trouble_ns_ = now_ns;
 }
@@ -202,7 +210,10 @@ bool AxisMaster::command(const CommandImage* image, std::size_t joint,
     case TargetState::kNothing:
       raw_.controlword = controlword::kCommandDisableVoltage;
       return false;
-    case TargetState::kQuickStop: raw_.controlword = controlword::kCommandQuickStop; return false;
+    case TargetState::kQuickStop:
+      raw_.controlword = ignores_quick_stop(now_ns) ? controlword::kCommandDisableVoltage
+                                                    : controlword::kCommandQuickStop;
+      return false;
     case TargetState::kHold:
       // A drive that is not enabled stays as it is: holding must not switch anything on.
       raw_.controlword = was_enabled_ ? enable_operation() : controlword::kCommandDisableVoltage;
@@ -413,7 +424,7 @@ void AxisMaster::forget() noexcept TANDEM_RT {
 
 void AxisMaster::archive(Archive& ar) {
   ar(motion_, watched_error_rad_, watched_ns_, watched_mode_);
-  ar(homing_, was_idle_, held_cycles_, lag_, previous_target_, longest_step_, ignored_stop_,
+  ar(homing_, was_idle_, held_cycles_, lag_, previous_target_, longest_step_, ignored_stop_, asked_,
      disobedient_cycles_);
   ar(feedback_, raw_, target_, error_, heard_, was_enabled_, fault_code_, emergency_code_,
      age_cycles_, reset_cycles_, previous_velocity_, sample_ns_, trouble_ns_, since_ns_,

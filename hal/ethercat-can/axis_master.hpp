@@ -37,6 +37,7 @@ struct AxisTraits {
   bool tells_mode = true;      ///< else an enabled axis is in the mode that was sent
   bool homes = false;          ///< the joint has a homing, and the drive can be told to begin it
   bool tells_motor = true;     ///< the motor's position by itself; else the link's is taken for it
+  bool asks_cause = false;     ///< its error code (603F) is in no PDO, and may be read by SDO
   FollowLimits follow{};
   MotionLimits motion{};
 };
@@ -61,7 +62,10 @@ class AxisMaster {
   /// drive that ramps down is in Quick Stop Active.
   static constexpr std::int64_t kDisableTimeoutNs = 200'000'000;
   static constexpr std::int64_t kQuickStopTimeoutNs = 500'000'000;
-  static constexpr std::uint32_t kObeyCycles = 4;  ///< the same, in samples
+  /// When a drive that stays in Operation Enabled in spite of a quick stop is sent "disable
+  /// voltage", which it may obey.
+  static constexpr std::int64_t kQuickStopPatienceNs = 300'000'000;
+  static constexpr std::uint32_t kObeyCycles = 4;  ///< at least so many samples in any of them
   /// A fault reset's bit 7 changes every so many cycles, so that a board that looks seldom sees it.
   static constexpr std::uint32_t kResetToggleCycles = 4;
 
@@ -84,6 +88,16 @@ class AxisMaster {
   void on_emergency(std::uint16_t code, bool told) noexcept TANDEM_RT {
     emergency_code_ = code;
     if (told && code != 0) last_emergency_ = code;
+    take_cause(code);
+  }
+  /// The drive is in a fault whose cause no PDO tells, and it has not been asked yet.
+  [[nodiscard]] bool wants_cause() const noexcept TANDEM_RT {
+    return traits_.asks_cause && !asked_ && unknown_cause();
+  }
+  void cause_asked() noexcept TANDEM_RT { asked_ = true; }
+  /// What it answered, or an emergency said, of a fault that has no cause yet; 0: nothing.
+  void take_cause(std::uint16_t code) noexcept TANDEM_RT {
+    if (code != 0 && unknown_cause()) fault_code_ = code;
   }
   /// The code of the last emergency that may be told, if the axis has had no fault with it; 0:
   /// none.
@@ -149,7 +163,12 @@ class AxisMaster {
 
  private:
   void follow(const CommandImage& image, std::size_t joint, std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool ignores_quick_stop(std::int64_t now_ns) const noexcept TANDEM_RT;
   void walk_up(bool clears_faults, std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool unknown_cause() const noexcept TANDEM_RT {
+    return error_ == AxisError::kDriveFault &&
+           fault_code_ == static_cast<std::uint16_t>(canopen::ErrorCode::kGeneric);
+  }
   [[nodiscard]] std::uint16_t enable_operation() const noexcept;
   [[nodiscard]] std::uint16_t reset_controlword() noexcept;
   void seed() noexcept;
@@ -183,6 +202,7 @@ class AxisMaster {
   bool was_idle_ = false;             ///< kHome: the image has had the joint idle since
   bool heard_ = false;
   bool ignored_stop_ = false;
+  bool asked_ = false;        ///< for the cause of the fault that is latched
   bool was_enabled_ = false;  ///< reached Operation Enabled under the present wish to be
   std::uint16_t fault_code_ = 0;
   std::uint16_t emergency_code_ = 0;

@@ -54,6 +54,8 @@ class Bus {
   virtual void ask_again() noexcept TANDEM_RT {}
   /// As Backend::clock_shift_ns(); 0: the wire has no clock.
   [[nodiscard]] virtual std::int64_t clock_shift_ns() const noexcept TANDEM_RT { return 0; }
+  /// Whether the node cannot come up, however often it is reset: status_text() says why.
+  [[nodiscard]] virtual bool gives_up(int /*node*/) const noexcept TANDEM_RT { return false; }
   /// All that the nodes of this end say in a step has been sent.
   virtual void end_step() noexcept TANDEM_RT {}
 

@@ -105,7 +105,7 @@ std::string CanBackend::status_text() const {
 
 bool CanBackend::answered(std::size_t bus) const noexcept {
   return config_.lockstep ? buses_[bus]->answered()
-                          : (master_->in_operation(bus) & ~buses_[bus]->sampled()).none();
+                          : (master_->answering(bus) & ~buses_[bus]->sampled()).none();
 }
 
 void CanBackend::exchange(const CycleTime& time) noexcept {

@@ -88,6 +88,9 @@ class CanBackend final : public Backend {
     }
     std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override;
     [[nodiscard]] BusState state() const noexcept TANDEM_RT override { return bus_->state(); }
+    [[nodiscard]] bool gives_up(int node) const noexcept TANDEM_RT override {
+      return bus_->gives_up(node);
+    }
     [[nodiscard]] std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT override {
       return given_ns_;
     }

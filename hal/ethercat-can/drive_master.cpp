@@ -148,6 +148,10 @@ void DriveMaster::Impl::stop_when_lost(Node& node) noexcept TANDEM_RT {
 
 void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
   for (Node& node : nodes) {
+    const bool waits = node.master.stage() == NodeStage::kWaitBootUp;
+    if (waits && ports[node.plan.bus].bus->gives_up(node.plan.id)) {
+      node.master.fail(NodeError::kNoBootUp, now_ns);
+    }
     node.master.process(now_ns, dt_ns, ports[node.plan.bus].sink);
     const bool complete =
         node.plan.board >= 0
@@ -157,8 +161,10 @@ void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
     watch_doubles(node);
     node.silent_cycles = complete ? 0 : node.silent_cycles + 1;
     if (!complete && stage == MasterStage::kRunning && !shutting_down) ++node.missed;
-    if (!node.master.running() || node.timeout_cycles == 0) continue;
-    if (node.silent_cycles > static_cast<std::uint32_t>(node.timeout_cycles)) {
+    // A node may tell that it runs before the SYNC that its first sample answers.
+    node.unanswered = complete || !node.master.running() ? 0 : node.unanswered + 1;
+    if (node.timeout_cycles == 0) continue;
+    if (node.unanswered > static_cast<std::uint32_t>(node.timeout_cycles)) {
       node.master.fail(NodeError::kFeedbackLost, now_ns);
     }
   }
@@ -262,6 +268,7 @@ Code DriveMaster::receive(StateImage& state) noexcept TANDEM_RT {
     }
   }
   m.watch_stops();
+  for (Impl::Node& node : m.nodes) m.ask_cause(node);
   (void)m.flush();
   m.fill(state);
   return m.receive_code();
@@ -326,10 +333,12 @@ Phase DriveMaster::phase() const noexcept {
   return Phase::kFault;
 }
 
-DriveMaster::NodeSet DriveMaster::in_operation(std::size_t bus) const noexcept TANDEM_RT {
+DriveMaster::NodeSet DriveMaster::answering(std::size_t bus) const noexcept TANDEM_RT {
   NodeSet nodes;
   for (const Impl::Node& node : impl_->nodes) {
-    if (node.plan.bus == bus && node.master.running()) {
+    const bool starts = impl_->stage == Impl::MasterStage::kBooting && !node.plan.ethercat &&
+                        node.master.stage() == NodeStage::kStarting;
+    if (node.plan.bus == bus && (node.master.running() || starts)) {
       nodes.set(static_cast<std::size_t>(node.plan.id));
     }
   }
@@ -376,13 +385,13 @@ void DriveMaster::archive(Archive& ar) { impl_->archive(ar); }
 
 void DriveMaster::Impl::archive(Archive& ar) {
   ar(stage, reaction, brakes, latched, resetting, begun, shutting_down, counter, now_ns, dt_ns,
-     shut_down_since_ns, refused_node, refused_step, refused_code, axes, sent_revision);
+     shut_down_since_ns, at_rest_ns, refused_node, refused_step, refused_code, axes, sent_revision);
   for (PidGains& gains : sent_gains) ar(gains.kp, gains.ki, gains.kd);
   for (Port& port : ports) ar(port.next_heartbeat_ns);
   for (Node& node : nodes) {
     for (Send& pdo : node.sends) ar(pdo.frame, pdo.sent);
-    ar(node.master, node.channels, node.silent_cycles, node.doubled_cycles, node.counters_sent,
-       node.recovering, node.sending, node.next_item);
+    ar(node.master, node.channels, node.silent_cycles, node.unanswered, node.doubled_cycles,
+       node.counters_sent, node.recovering, node.sending, node.asking, node.watch, node.next_item);
   }
 }
 

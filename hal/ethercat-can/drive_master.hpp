@@ -126,8 +126,9 @@ class DriveMaster {
   [[nodiscard]] static std::string error_text(std::uint32_t code);
   /// By node-ID.
   using NodeSet = std::bitset<128>;
-  /// Nodes on bus `bus` that answer every SYNC with their TPDOs.
-  [[nodiscard]] NodeSet in_operation(std::size_t bus) const noexcept TANDEM_RT;
+  /// Nodes on bus `bus` whose answer to the next SYNC is worth waiting for: those in operation, and
+  /// at the first start those on CAN that were told to start.
+  [[nodiscard]] NodeSet answering(std::size_t bus) const noexcept TANDEM_RT;
   /// The node on bus `bus` whose answer to SYNC is whole with `frame`, the last TPDO of its sample;
   /// 0: nobody's.
   [[nodiscard]] std::size_t completes(std::size_t bus,

@@ -18,6 +18,8 @@ std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& lay
     for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
       const bool homes = robot.joints[node.joints[axis]].homing && node.abilities[axis].homing &&
                          node.carries(axis, WireField::kMode);
+      const std::uint16_t cause =
+          canopen::of_axis(canopen::object::kErrorCode, static_cast<int>(axis));
       const bool ours =
           node.board < 0 || robot.boards[static_cast<std::size_t>(node.board)].eds.empty();
       traits[node.joints[axis]] = {
@@ -26,6 +28,10 @@ std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& lay
           .tells_mode = node.carries(axis, WireField::kModeDisplay),
           .homes = homes,
           .tells_motor = node.carries(axis, WireField::kMotorPosition),
+          .asks_cause =
+              !node.carries(axis, WireField::kErrorCode) &&
+              (node.ethercat ||
+               robot.boards[static_cast<std::size_t>(node.board)].sheet->find(cause) != nullptr),
           .follow = FollowLimits::of(robot.joints[node.joints[axis]], ours),
           .motion = MotionLimits::of(robot.joints[node.joints[axis]])};
     }

@@ -72,6 +72,7 @@ struct DriveMaster::Impl {
     std::size_t first_channel = 0;  ///< of them in StateImage::sensor()
     int next_part = 0;              ///< of this cycle's sample
     std::uint32_t silent_cycles = 0;
+    std::uint32_t unanswered = 0;      ///< the same, in operation alone: a time-out counts these
     std::uint32_t answers = 0;         ///< this cycle's first TPDOs
     std::uint32_t doubled_cycles = 0;  ///< in succession, with several of them
     std::uint8_t counters_sent = 0;    ///< since its start; stays at 255
@@ -79,6 +80,8 @@ struct DriveMaster::Impl {
     bool recovering = false;           ///< a lost node that is configured anew
     // Parameters at run time
     std::int16_t sending = -1;  ///< item under way: see parameter_items
+    std::int16_t asking = -1;   ///< axis whose error code is being read
+    enum class Watch : std::uint8_t { kArmed, kEnding, kEnded } watch = Watch::kArmed;
     std::size_t next_item = 0;
     // Measurements, no state
     std::array<std::uint64_t, RoundTrip::kMostCycles> trip_cycles{};
@@ -117,6 +120,8 @@ struct DriveMaster::Impl {
   void boot() noexcept TANDEM_RT;
   void watch() noexcept TANDEM_RT;
   void watch_stops() noexcept TANDEM_RT;
+  void ask_cause(Node& node) noexcept TANDEM_RT;
+  [[nodiscard]] bool end_watch(Node& node) noexcept TANDEM_RT;
   void ignored_stop(std::size_t joint) noexcept TANDEM_RT;
   bool react(StopCategory category) noexcept TANDEM_RT;
   void recover() noexcept TANDEM_RT;
@@ -178,6 +183,7 @@ struct DriveMaster::Impl {
   std::int64_t now_ns = 0;
   std::int64_t dt_ns = 0;
   std::int64_t shut_down_since_ns = 0;
+  std::int64_t at_rest_ns = -1;  ///< since when shut_down() has found every axis at rest
   // The last value that a node refused at run time
   std::int32_t refused_node = -1;
   SdoStep refused_step;

@@ -25,11 +25,64 @@ void DriveMaster::Impl::send_parameters(const ParameterImage& parameters) noexce
   }
 }
 
+/// A fault whose cause no PDO tells: 603F has it, and on EtherCAT the emergency that waits in the
+/// mailbox comes first.
+void DriveMaster::Impl::ask_cause(Node& node) noexcept TANDEM_RT {
+  canopen::SdoClient& sdo = node.master.sdo();
+  if (!node.master.running()) {
+    node.asking = -1;
+    return;
+  }
+  if (sdo.status() == canopen::SdoClient::Status::kBusy) return;
+  if (node.asking >= 0) {
+    const std::size_t joint = node.plan.joints[static_cast<std::size_t>(node.asking)];
+    node.asking = -1;
+    const bool read = sdo.status() == canopen::SdoClient::Status::kDone && sdo.value().size() >= 2;
+    if (read) axes[joint].take_cause(canopen::get<std::uint16_t>(sdo.value().data()));
+  }
+  for (std::size_t axis = 0; axis < node.plan.joints.size(); ++axis) {
+    AxisMaster& asked = axes[node.plan.joints[axis]];
+    if (!asked.wants_cause()) continue;
+    asked.cause_asked();
+    node.asking = static_cast<std::int16_t>(axis);
+    node.sending = -1;
+    sdo.upload(canopen::of_axis(canopen::object::kErrorCode, static_cast<int>(axis)), 0,
+               ports[node.plan.bus].sink);
+    return;
+  }
+}
+
+/// A master that falls silent without this is an error to the node (8130), though the run ends as
+/// it should. @return whether that is through, or cannot be
+bool DriveMaster::Impl::end_watch(Node& node) noexcept TANDEM_RT {
+  using Watch = Node::Watch;
+  if (!node.master.running() || node.watch == Watch::kEnded) return true;
+  canopen::SdoClient& sdo = node.master.sdo();
+  if (sdo.status() == canopen::SdoClient::Status::kBusy) return false;
+  if (node.watch == Watch::kEnding) {
+    node.watch = Watch::kEnded;
+    return true;
+  }
+  const auto watches = [](const SdoStep& step) {
+    const bool guards = step.index == canopen::object::kHeartbeatConsumer ||
+                        step.index == canopen::object::kLifeTimeFactor;
+    return guards && step.use == SdoUse::kWrite;
+  };
+  const auto armed = std::ranges::find_if(node.master.steps(), watches);
+  const bool off = std::ranges::all_of(node.plan.joints, [&](auto j) { return axes[j].off(); });
+  if (armed == node.master.steps().end() || !off) return true;  // who still moves is watched on
+  static constexpr std::array<std::uint8_t, 4> kNobody{};
+  sdo.download(armed->index, armed->sub, std::span(kNobody).first(armed->size),
+               ports[node.plan.bus].sink);
+  node.watch = Watch::kEnding;
+  return false;
+}
+
 /// Finishes the transfer under way, then starts the next item that differs from what the drive has.
 void DriveMaster::Impl::send_parameter(Node& node,
                                        const ParameterImage& parameters) noexcept TANDEM_RT {
   canopen::SdoClient& sdo = node.master.sdo();
-  if (sdo.status() == canopen::SdoClient::Status::kBusy) return;
+  if (node.asking >= 0 || sdo.status() == canopen::SdoClient::Status::kBusy) return;
   if (node.sending >= 0 && sdo.status() == canopen::SdoClient::Status::kAborted) {
     refused_node = static_cast<std::int32_t>(&node - nodes.data());
     refused_step = {

@@ -12,8 +12,8 @@
 // react() gives every axis its target: nothing (category 0), quick stop (category 1) or hold; an
 // axis with a fault of its own gets nothing. A fault of a "warn" joint leaves the stage as it is.
 // recover() brings back joints that are reset and nodes that are configured anew, one by one.
-// shut_down() works in every stage: quick stop until the axes are off, 3 s at most, then NMT
-// pre-operational.
+// shut_down() works in every stage: quick stop until the axes are off, 3 s at most; then the nodes
+// are told to watch the master no more; then NMT pre-operational.
 #include <algorithm>
 
 #include "canopen/messages.hpp"
@@ -27,6 +27,8 @@ namespace {
 
 /// How long shut_down() waits for the drives to come to rest.
 constexpr std::int64_t kShutDownNs = 3'000'000'000;
+/// How long it then waits until the nodes watch the master no more.
+constexpr std::int64_t kWatchEndsNs = 500'000'000;
 /// When a drive that was enabled, and is not heard any more, counts as still enabled there.
 constexpr std::int64_t kUnheardNs = 1'500'000'000;
 
@@ -321,7 +323,7 @@ void DriveMaster::Impl::reset_joint(std::size_t joint) noexcept TANDEM_RT {
   Node& node = node_of(joint);
   if (node.recovering || node.master.stage() != NodeStage::kDown) return;
   node.recovering = true;
-  node.sending = -1;
+  node.sending = node.asking = -1;
   node.master.restart(now_ns);
   for (const std::size_t lost : node.plan.joints) {
     axes[lost].forget();
@@ -368,11 +370,16 @@ bool DriveMaster::Impl::shut_down() noexcept TANDEM_RT {
   }
   const bool at_rest = std::ranges::all_of(
       axes, [](const AxisMaster& axis) { return axis.off() || axis.ignored_stop(); });
-  const bool done = at_rest || now_ns - shut_down_since_ns >= kShutDownNs;
-  if (done) set_targets(TargetState::kNothing);
+  if (at_rest_ns < 0 && (at_rest || now_ns - shut_down_since_ns >= kShutDownNs)) {
+    at_rest_ns = now_ns;
+    set_targets(TargetState::kNothing);
+  }
   make_commands(nullptr);
   write_pdos();
-  if (!done) return false;
+  if (at_rest_ns < 0) return false;
+  bool unwatched = true;
+  for (Node& node : nodes) unwatched = end_watch(node) && unwatched;
+  if (!unwatched && now_ns - at_rest_ns < kWatchEndsNs) return false;
   for (Node& node : nodes) {
     if (node.master.error() == NodeError::kIgnoresStop) continue;  // stopped it stays
     ports[node.plan.bus].sink.push(

@@ -31,7 +31,7 @@ const char* identity_name(const SdoStep& step) {
 
 const char* allowed(SdoUse use) {
   if (use == SdoUse::kCheckRevision) return " or a later minor of it";
-  return use == SdoUse::kCheckProfile ? " (profile 402 in its lower half)" : "";
+  return use == SdoUse::kCheckProfile ? ", or profile 402 (0x0192) in its lower half" : "";
 }
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }

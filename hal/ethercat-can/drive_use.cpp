@@ -170,6 +170,23 @@ void warn_of_mappings(const DataSheet& sheet, Diagnostics& warnings) {
   }
 }
 
+/// A drive by its objects that does not call itself one.
+void warn_of_profile(const DataSheet& sheet, Diagnostics& warnings) {
+  const canopen::SheetEntry* type = sheet.find(object::kDeviceType);
+  if (type == nullptr || !type->value) return;
+  const auto number = static_cast<std::uint32_t>(type->value->number);
+  if ((number & 0xFFFF) == (canopen::kDriveDeviceType & 0xFFFF)) return;
+  warnings.push_back(
+      {.message = fmt::format("is 0x{:08X}: not profile 402 (0x0192). Its objects are those of a "
+                              "CiA 402 drive, and it is used as one",
+                              number),
+       .hint = "the drive must answer this value, or one with profile 402: is it the sheet of this "
+               "drive?",
+       .file = sheet.file,
+       .line = type->line,
+       .key = "1000"});
+}
+
 }  // namespace
 
 DriveUse use_of(const NodePlan& node, const DataSheet& sheet) {
@@ -250,6 +267,7 @@ Result<Diagnostics> drive_warnings(const RobotConfig& robot) {
     if (board.eds.empty()) continue;
     if (seen.insert(board.eds).second) {
       warn_of_mappings(*board.sheet, warnings);
+      warn_of_profile(*board.sheet, warnings);
       std::ranges::move(limit_warnings(node, *board.sheet), std::back_inserter(warnings));
     }
     const auto bus = std::ranges::find(robot.buses, board.bus, &BusConfig::name);

@@ -9,6 +9,7 @@
 #include "canopen/frame.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/bus.hpp"
+#include "hal/ethercat-can/ethercat/link.hpp"
 
 namespace tandem::hal::can {
 
@@ -25,5 +26,10 @@ namespace tandem::hal::can {
 /// @param name  of its interface
 /// Errors: frames of a master, with what they are.
 [[nodiscard]] Status expect_no_master(Bus& bus, const std::string& name);
+
+/// The same of an EtherCAT interface: slaves say nothing by themselves, so every frame is a
+/// master's.
+/// @param link  nothing was sent through it
+[[nodiscard]] Status expect_silence(ecat::Link& link, const std::string& name);
 
 }  // namespace tandem::hal::can

@@ -66,6 +66,9 @@ class FrameRecord {
     std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override;
     std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override;
     [[nodiscard]] BusState state() const noexcept TANDEM_RT override { return bus_.state(); }
+    [[nodiscard]] bool gives_up(int node) const noexcept TANDEM_RT override {
+      return bus_.gives_up(node);
+    }
     void ask_again() noexcept TANDEM_RT override { bus_.ask_again(); }
     void end_step() noexcept TANDEM_RT override { bus_.end_step(); }
     [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override {

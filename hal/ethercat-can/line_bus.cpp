@@ -23,8 +23,8 @@ using ecat::SlaveStage;
 
 namespace {
 
-/// A slave tells in a cycle: state, an answer, and its TPDOs.
-constexpr std::size_t kFramesPerSlave = 4 + canopen::kPdosPerNode;
+/// A slave tells in a cycle: state, an emergency, an answer, and its TPDOs.
+constexpr std::size_t kFramesPerSlave = 5 + canopen::kPdosPerNode;
 
 /// The plan of each node of the bus, by its place in the line.
 Result<std::vector<const NodePlan*>> in_order(const RobotConfig& robot, const PdoLayout& layout,
@@ -224,6 +224,7 @@ void LineBus::take_cycle() noexcept {
   follow_clock(cycle);
   for (std::size_t i = 0; i < slaves_.size(); ++i) {
     tell_state(i);
+    tell_emergency(i);
     tell_sdo(i);
     if (valid && line_->slave(i).running()) tell_inputs(i);
   }
@@ -246,6 +247,12 @@ void LineBus::follow_clock(const ecat::CycleReport& cycle) noexcept {
 
 std::int64_t LineBus::clock_shift_ns() const noexcept TANDEM_RT { return shift_ns_; }
 
+bool LineBus::gives_up(int node) const noexcept TANDEM_RT {
+  const auto place = static_cast<std::size_t>(node - 1);
+  if (place >= slaves_.size()) return false;
+  return line_->error() == ecat::LineError::kSecondMaster || line_->slave(place).hopeless();
+}
+
 void LineBus::tell_state(std::size_t i) noexcept {
   Slave& slave = slaves_[i];
   const SlaveMaster& master = line_->slave(i);
@@ -265,6 +272,18 @@ void LineBus::tell_state(std::size_t i) noexcept {
   slave.told = state;
   slave.told_ns = now_ns_;
   inbox_.push(canopen::make_heartbeat(slave.id, state));
+}
+
+/// The mailbox is read when an answer is waited for: what lay before it came with it.
+void LineBus::tell_emergency(std::size_t i) noexcept {
+  Slave& slave = slaves_[i];
+  const CoeClient& sdo = line_->slave(i).sdo();
+  if (std::exchange(slave.emergencies, sdo.emergencies()) == sdo.emergencies()) return;
+  Frame frame;
+  frame.id = canopen::cob::kEmergency + static_cast<std::uint32_t>(slave.id);
+  frame.length = 8;
+  std::ranges::copy(sdo.emergency(), frame.data.begin());
+  inbox_.push(frame);
 }
 
 void LineBus::tell_sdo(std::size_t i) noexcept {
@@ -313,7 +332,7 @@ void LineBus::archive(Archive& ar) {
   ar(*line_, now_ns_, taken_);
   for (Slave& s : slaves_) {
     ar(s.reset_wanted, s.op_wanted, s.booted, s.left, s.sdo_waits, s.sdo_reads, s.index, s.sub,
-       s.told, s.told_ns);
+       s.told, s.told_ns, s.emergencies);
   }
   if (!ar.reading()) return;
   inbox_.clear();

@@ -34,9 +34,9 @@ namespace tandem::hal::can {
 /// | NMT stop                       | outputs 0                                          |
 /// | NMT pre-operational, every node | INIT                                              |
 ///
-/// Back come inputs as TPDOs, answers of the mailbox, a boot-up when the slave is in PREOP, and as
-/// its heartbeat the state that it is in, as long as frames reach it. In lockstep TIME follows when
-/// all that was sent has come back.
+/// Back come inputs as TPDOs, answers and emergencies of the mailbox, a boot-up when the slave is
+/// in PREOP, and as its heartbeat the state that it is in, as long as frames reach it. In lockstep
+/// TIME follows when all that was sent has come back.
 class LineBus final : public Bus {
  public:
   struct Config {
@@ -59,6 +59,7 @@ class LineBus final : public Bus {
   static constexpr double kAfterSync0 = 0.3;
   [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override;
   void ask_again() noexcept TANDEM_RT override { (void)line_->resend(); }
+  [[nodiscard]] bool gives_up(int node) const noexcept TANDEM_RT override;
   [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override;
   [[nodiscard]] std::string status_text() const override;
   /// Of clocks and cycles.
@@ -90,6 +91,7 @@ class LineBus final : public Bus {
     std::uint8_t sub = 0;
     canopen::NmtState told = canopen::NmtState::kBootUp;
     std::int64_t told_ns = 0;
+    std::uint32_t emergencies = 0;  ///< that were told
   };
 
   LineBus(ecat::Link& link, std::unique_ptr<ecat::LineMaster> line, std::vector<Slave> slaves,
@@ -103,6 +105,7 @@ class LineBus final : public Bus {
   void take_cycle() noexcept;
   void follow_clock(const ecat::CycleReport& cycle) noexcept;
   void tell_state(std::size_t slave) noexcept;
+  void tell_emergency(std::size_t slave) noexcept;
   void tell_sdo(std::size_t slave) noexcept;
   void tell_inputs(std::size_t slave) noexcept;
 

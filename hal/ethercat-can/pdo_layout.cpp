@@ -6,6 +6,7 @@
 #include <array>
 #include <span>
 
+#include "canopen/drive_abilities.hpp"
 #include "canopen/frame.hpp"
 #include "canopen/objects.hpp"
 #include "hal/ethercat-can/pdo_packer.hpp"
@@ -121,6 +122,23 @@ NodeWatch watch_of(const canopen::DataSheet& sheet) {
   return guarded ? NodeWatch::kGuarding : NodeWatch::kNothing;
 }
 
+/// "", or that the drive's own modes (6502) make their own way to a target.
+std::string profile_modes(const canopen::DataSheet& sheet, std::size_t axis) {
+  using canopen::Mode;
+  const auto modes =
+      sheet.value(canopen::of_axis(object::kSupportedModes, static_cast<int>(axis)), 0, 0);
+  std::string names;
+  for (const auto& [mode, name] : {std::pair{Mode::kPp, "profile position"},
+                                   {Mode::kPv, "profile velocity"},
+                                   {Mode::kTq, "profile torque"}}) {
+    const bool has = (modes.value_or(0) & canopen::mode_bit(mode)) != 0;
+    if (has) names += (names.empty() ? "" : ", ") + std::string(name);
+  }
+  return names.empty() ? ""
+                       : ". Its modes (6502) make their own way to a target (" + names +
+                             "), and cannot follow one that is new in every cycle";
+}
+
 /// Errors: an axis cannot be switched on, seen or moved with what the PDOs carry.
 Status check_drive(const RobotConfig& robot, const NodePlan& node,
                    const canopen::DataSheet& sheet) {
@@ -134,11 +152,12 @@ Status check_drive(const RobotConfig& robot, const NodePlan& node,
     if (seen && moves) continue;
     std::string what = seen ? "no position, velocity or torque target of a cyclic mode"
                             : "not 6040, 6041 and 6064";
-    return std::unexpected(node_error(robot, node,
-                                      "cannot be driven in every cycle: the PDOs of its sheet " +
-                                          sheet.file + " carry " + what + " of axis " +
-                                          std::to_string(axis),
-                                      "`tandem eds show` lists what the drive offers"));
+    return std::unexpected(node_error(
+        robot, node,
+        "cannot be driven in every cycle: the PDOs of its sheet " + sheet.file + " carry " + what +
+            " of axis " + std::to_string(axis) + (moves ? "" : profile_modes(sheet, axis)),
+        "`tandem eds show` lists what the drive offers; a PDO whose "
+        "COB-ID is read only keeps its mapping"));
   }
   return {};
 }

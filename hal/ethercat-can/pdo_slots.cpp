@@ -1,6 +1,7 @@
 // Reads 14xx to 1Axx of a sheet, and finds the objects behind the image's fields in it.
 #include "hal/ethercat-can/pdo_slots.hpp"
 
+#include <algorithm>
 #include <array>
 
 #include "canopen/objects.hpp"
@@ -90,8 +91,10 @@ std::vector<std::uint32_t> default_mapping(const DataSheet& sheet, std::uint16_t
 
 std::uint8_t entries_of(const DataSheet& sheet, std::uint16_t mapping) {
   std::uint8_t most = 0;
-  while (most < kMaxMappedObjects && sheet.find(mapping, most + 1u) != nullptr) ++most;
-  return most;
+  while (most < kMaxMappedObjects && canopen::writable(sheet, mapping, most + 1u)) ++most;
+  const SheetEntry* count = sheet.find(mapping, 0);
+  const std::int64_t limit = count != nullptr ? count->high.value_or(0) : 0;
+  return limit > 0 ? static_cast<std::uint8_t>(std::min<std::int64_t>(most, limit)) : most;
 }
 
 }  // namespace
@@ -110,7 +113,7 @@ std::vector<PdoSlot> pdo_slots(const DataSheet& sheet, PdoDirection direction, i
     const std::uint32_t own = receive ? cob::rpdo(number, node_id) : cob::tpdo(number, node_id);
     const std::uint32_t from_power_on = identifier(id, own | cob::kInvalid, node_id);
     PdoSlot slot{.number = number,
-                 .mappable = writable(sheet, mapping, 0) && writable(sheet, mapping, 1),
+                 .mappable = canopen::remappable(sheet, parameter),
                  .on = (from_power_on & cob::kInvalid) == 0,
                  .id_writable = writable(sheet, parameter, 1),
                  .type_writable = writable(sheet, parameter, 2),

@@ -29,7 +29,9 @@ void add_check(Steps& steps, std::uint16_t index, std::uint8_t sub, std::uint32_
 /// What the configuration says, else the sheet; what neither tells is not looked at.
 void add_identity(Steps& steps, const BoardConfig& board) {
   const DataSheet& sheet = *board.sheet;
-  add_check(steps, object::kDeviceType, 0, kDriveDeviceType, SdoUse::kCheckProfile);
+  // A drive by its objects may say another profile, or none: then just what its sheet says.
+  const auto type = sheet.value(object::kDeviceType, 0, 0).value_or(kDriveDeviceType);
+  add_check(steps, object::kDeviceType, 0, static_cast<std::uint32_t>(type), SdoUse::kCheckProfile);
   const auto check = [&](IdentitySub sub, std::optional<std::uint32_t> configured,
                          std::optional<std::uint32_t> of_sheet, SdoUse use) {
     const auto wanted = configured ? configured : of_sheet;
@@ -302,7 +304,8 @@ bool SdoStep::accepts(std::span<const std::uint8_t> read) const noexcept TANDEM_
   const auto wanted = get<std::uint32_t>(bytes.data());
   switch (use) {
     case SdoUse::kCheckRevision: return found >> 16 == wanted >> 16 && found >= wanted;
-    case SdoUse::kCheckProfile: return (found & 0xFFFF) == (wanted & 0xFFFF);
+    case SdoUse::kCheckProfile:
+      return found == wanted || (found & 0xFFFF) == (kDriveDeviceType & 0xFFFF);
     case SdoUse::kCheckBits: return (found & wanted) == wanted;
     default: return false;
   }
@@ -316,6 +319,15 @@ void add_names(Steps& steps, SdoUse use) {
     steps.push_back(write_step(object::kVerifyConfiguration, sub, std::uint32_t{0}));
     steps.back().use = use;
   }
+}
+
+/// What the sheet says cannot be read is not looked at.
+void leave_out_unreadable(Steps& steps, const DataSheet& sheet) {
+  std::erase_if(steps, [&](const SdoStep& step) {
+    const bool reads = step.use != SdoUse::kWrite && step.use != SdoUse::kStore;
+    const SheetEntry* entry = sheet.find(step.index, step.sub);
+    return reads && entry != nullptr && (entry->access & kRead) == 0;
+  });
 }
 
 void add_watching(Steps& steps, const NodePlan& node, const DataSheet* sheet);
@@ -351,6 +363,7 @@ std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan
     steps.push_back(write_step(object::kStoreParameters, 1, kSave));
     steps.back().use = SdoUse::kStore;
   }
+  if (sheet != nullptr) leave_out_unreadable(steps, *sheet);
   return steps;
 }
 

@@ -20,7 +20,7 @@ enum class SdoUse : std::uint8_t {
   kWrite,          ///< download
   kCheck,          ///< upload, and compare with `bytes`
   kCheckRevision,  ///< the same, but a later minor (the lower 16 bits) is right too
-  kCheckProfile,   ///< the lower 16 bits are compared: the profile's number in 1000
+  kCheckProfile,   ///< the lower 16 bits are 402, the profile's number in 1000; or `bytes`, whole
   kCheckBits,      ///< every bit of `bytes` is set; an object that is not there passes
   kVerify,  ///< upload of 1020: with `bytes` in it, what the drive keeps is not written again
   kStore,   ///< download to 1010: it keeps what was written; a refusal is tolerated

@@ -56,6 +56,12 @@ class DoctorLine : public MachineTree {
   LineSurvey survey_;
 };
 
+TEST_F(DoctorLine, NamesAMemoryWhoseCheckSumIsWrong) {
+  survey_.slaves[1].settings_right = false;
+  expect("eth1 identities", Health::kMissing, "slave 1 (board_2): wrong check sum",
+         "its maker's tool");
+}
+
 TEST_F(DoctorLine, FindsNothingWrongWithAGoodOne) {
   const LineFindings line = judge();
   for (const Finding& one : line.findings) {

@@ -1,9 +1,14 @@
 // Robots on EtherCAT: in process, and master and boards in two processes on a cable of a network of
 // the test's own.
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cstdio>
 #include <map>
+#include <thread>
 
+#include "ethercat/datagram.hpp"
+#include "hal/ethercat-can/ethercat/packet_link.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/ethercat/own_network.hpp"
 #include "tests/hil/process.hpp"
@@ -90,6 +95,47 @@ TEST_F(LineRun, ATwinOfARobotOverACableIsTheSameToTheLastBit) {
   const auto parallel = json("run.json")["parallel"];
   EXPECT_EQ(parallel["unequal"], 0) << "first in cycle " << parallel["first_unequal"];
   EXPECT_GT(parallel["compared"].get<int>(), 1000);
+}
+
+/// A master that was there first, on the same end of the cable: a frame every 2 ms.
+TEST_F(LineRun, DoesNotTakeSlavesFromAMasterThatIsAtWork) {
+  const int status = in_own_network([&] {
+    Process boards(test::tandem({"emulate", file("hold.toml"), "--interface",
+                                 "eth1=" + std::string(test::kSlaveEnd), "--no-socket"}),
+                   file("boards.txt"));
+    ASSERT_TRUE(boards.says("Ctrl-C")) << boards.output();
+    auto link = hal::ecat::PacketLink::open(test::kMasterEnd);
+    ASSERT_TRUE(link.has_value()) << link.error().to_string();
+    std::atomic<bool> over = false;
+    std::thread foreign([&] {
+      std::vector<hal::ecat::FrameBuffer> frames(1);
+      while (!over) {
+        ethercat::FrameWriter writer;
+        writer.begin(frames[0].bytes, {0x01, 0x01, 0x01, 0x01, 0x01, 0x01});  // as SOEM's
+        (void)writer.add(ethercat::Command::kBrd, 1, 0x0130'0000, 2);
+        frames[0].size = writer.finish();
+        (void)(*link)->send(frames);
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      }
+    });
+    Process master(test::tandem({"run", file("hold.toml"), "--hal", "ethercat", "--interface",
+                                 "eth1=" + std::string(test::kMasterEnd), "--no-socket", "--no-log",
+                                 "--duration", "1"}),
+                   file("run.txt"));
+    EXPECT_NE(master.wait(), 0);
+    over = true;
+    foreign.join();
+    EXPECT_NE(master.output().find("another master is at work on ecat_m"), std::string::npos)
+        << master.output();
+    // Whatever came back is the other one's: the run sent nothing.
+    std::vector<hal::ecat::FrameBuffer> back(4096);
+    const std::size_t count = (*link)->receive(back);
+    EXPECT_GT(count, 0U);
+    for (std::size_t i = 0; i < count; ++i) EXPECT_EQ(back[i].bytes[11], 0x01) << i;
+    EXPECT_EQ(boards.interrupt(), 0) << boards.output();
+  });
+  if (status == kNoNetwork) GTEST_SKIP() << test::needs_root("a network of its own");
+  EXPECT_EQ(status, 0);
 }
 
 /// Joints that know nothing of their place are homed over the cable by the run itself, then move.

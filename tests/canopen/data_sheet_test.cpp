@@ -235,9 +235,10 @@ TEST(DataSheet, RefusesWhatIsNoNumberOfItsType) {
            {"0x0008", "1e39", "does not fit"},
            {"0x0008", "0x100000000", "does not fit"},
        }) {
-    const std::string error = refusal(variable(std::string("DataType=") + row.type +
-                                               "\nAccessType=rw\nDefaultValue=" + row.text + "\n"));
-    EXPECT_TRUE(error.starts_with("drive.eds:68: [2000] DefaultValue: '")) << error;
+    const std::string lines =
+        std::string("DataType=") + row.type + "\nAccessType=rw\nDefaultValue=" + row.text + "\n";
+    const std::string error = refusal(with(variable(lines), "[2000]", "[6071]"));
+    EXPECT_TRUE(error.starts_with("drive.eds:68: [6071] DefaultValue: '")) << error;
     EXPECT_NE(error.find(row.message), std::string::npos) << row.text << ": " << error;
   }
 }
@@ -434,8 +435,8 @@ TEST(DataSheet, RefusesWithFileLineSectionAndKey) {
             "drive.eds:21: [MandatoryObjects] 2: 'error register' is no object's index"},
            {with(kSheet, "[1001]", "[1001"),
             "drive.eds:35: [1000]: a section's name has no closing bracket"},
-           {variable("DataType=5\nAccessType=rw\nLowLimit=none\n"),
-            "drive.eds:68: [2000] LowLimit: 'none' is no number"},
+           {with(variable("DataType=5\nAccessType=rw\nLowLimit=none\n"), "[2000]", "[6071]"),
+            "drive.eds:68: [6071] LowLimit: 'none' is no number"},
            {plus("[6040]\nDataType=0x0007\nAccessType=ro\n"),
             "drive.eds:63: [6040]: is here twice with different contents, first in line 57"},
            {plus("[1018Sub01]\nDataType=0x0006\nAccessType=ro\n"),
@@ -449,6 +450,43 @@ TEST(DataSheet, RefusesWithFileLineSectionAndKey) {
     const std::string error = refusal(row.text);
     EXPECT_NE(error.find(row.message), std::string::npos) << row.message << "\n" << error;
   }
+}
+
+// source: robincornelius/libedssharp #219; UniMelbHumanRoboticsLab/CANOpenRobotController
+TEST(DataSheet, RemarksOnWhatIsWrongWithAnObjectThatNobodyNeeds) {
+  struct Row {
+    const char* lines;
+    const char* remark;
+  };
+  for (const Row& row : std::initializer_list<Row>{
+           {"DataType=7\nAccessType=wo\nDefaultValue=0.0\n",
+            "line 68: [2000] DefaultValue: '0.0' is no number: left out"},
+           {"DataType=5\nAccessType=rw\nDefaultValue=256\n", "'256' does not fit the DataType"},
+           {"DataType=5\nAccessType=rw\nHighLimit=many\n", "HighLimit: 'many' is no number"},
+           {"DataType=5\nAccessType=user\nDefaultValue=3\n", "AccessType: 'user' is no access"},
+           {"DataType=BYTE\nAccessType=ro\nDefaultValue=3\n", "DataType: 'BYTE' is no such number"},
+       }) {
+    const DataSheet sheet = read(variable(row.lines));
+    EXPECT_NE(remarks(sheet).find(row.remark), std::string::npos) << remarks(sheet);
+    EXPECT_TRUE(sheet.has(0x2000));
+    EXPECT_TRUE(sheet.has(0x6040)) << "the rest is there";
+  }
+  const DataSheet odd = read(variable("DataType=7\nAccessType=wo\nDefaultValue=0.0\n"));
+  EXPECT_FALSE(odd.value(0x2000, 0, 5).has_value()) << "unknown";
+  EXPECT_EQ(odd.find(0x2000)->access, kWrite);
+}
+
+// source: robincornelius/libedssharp #219 (an editor that writes C's suffixes)
+TEST(DataSheet, TakesNumbersWithTheSuffixesOfC) {
+  for (const char* text :
+       {"0x1234567890ABCDEFLL", "0x1234567890ABCDEFull", "0x1234567890ABCDEFL"}) {
+    const DataSheet sheet = read(
+        with(variable(std::string("DataType=0x1B\nAccessType=rw\nDefaultValue=") + text + "\n"),
+             "[2000]", "[6071]"));
+    EXPECT_EQ(sheet.value(0x6071, 0, 5), 0x1234567890ABCDEF) << text;
+  }
+  const DataSheet small = read(variable("DataType=6\nAccessType=rw\nDefaultValue=25u\n"));
+  EXPECT_EQ(small.value(0x2000, 0, 5), 25);
 }
 
 TEST(DataSheet, NoticesWhereverItIsCutOff) {

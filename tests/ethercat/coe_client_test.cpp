@@ -14,10 +14,39 @@ using canopen::AbortCode;
 using hal::ecat::CoeClient;
 using hal::ecat::FrameFate;
 
+/// Lays an emergency before the answer, the next time that the mailbox is read.
+class EmergencyFirst final : public ethercat::Medium {
+ public:
+  explicit EmergencyFirst(ethercat::Medium& slaves) : slaves_(&slaves) {}
+  bool pass(std::span<std::uint8_t> frame, std::int64_t now_ns) noexcept override {
+    ethercat::FrameReader reader(frame);
+    ethercat::Datagram datagram;
+    while (wanted && reader.next(datagram)) {
+      const bool reads = datagram.command() == ethercat::Command::kFprd;
+      if (!reads || datagram.offset() != 0x1080 || datagram.data().size() != 128) continue;
+      std::uint8_t* command = datagram.data().data() - ethercat::kDatagramHeaderBytes;
+      *command = 0;  // NOP: the answer stays in the mailbox
+      const bool back = slaves_->pass(frame, now_ns);
+      *command = static_cast<std::uint8_t>(ethercat::Command::kFprd);
+      constexpr std::array<std::uint8_t, 16> kEmergency{10,   0,    0,    0, 0, 0x13, 0x00, 0x10,
+                                                        0x11, 0x86, 0x20, 1, 2, 3,    4,    5};
+      std::ranges::copy(kEmergency, datagram.data().begin());
+      datagram.add_working_counter(1);
+      wanted = false;
+      return back;
+    }
+    return slaves_->pass(frame, now_ns);
+  }
+  bool wanted = false;
+
+ private:
+  ethercat::Medium* slaves_;
+};
+
 /// One slave in PREOP, and a client with frames of its own.
 class CoeRig {
  public:
-  CoeRig() : rig(1), link(*rig.line), batch_(8), exchange(1) {
+  CoeRig() : rig(1), emergencies(*rig.line), link(emergencies), batch_(8), exchange(1) {
     rig.write(0, ethercat::reg::kStation, {0x01, 0x10});
     rig.set_mailboxes(0);
     EXPECT_EQ(rig.request(0, 2), (std::pair{2, 0}));
@@ -47,6 +76,7 @@ class CoeRig {
   }
 
   LineRig rig;
+  EmergencyFirst emergencies;
   hal::ecat::InProcessLink link;
   hal::ecat::FrameBatch batch_;
   hal::ecat::Exchange exchange;
@@ -144,6 +174,20 @@ TEST(SlavePlan, AnIdentityMayHaveALaterMinorRevisionAndAnySerialNumber) {
   EXPECT_FALSE(matches(plan, {5, 2, 0x00030004, 9}));
   plan.identity.serial = 8;
   EXPECT_FALSE(matches(plan, {1, 2, 0x00030004, 9}));
+}
+
+TEST(CoeClient, KeepsTheEmergencyThatLayBeforeTheAnswer) {
+  CoeRig rig;
+  rig.client.upload(0x1000, 0);
+  ASSERT_EQ(rig.finish(), CoeClient::Status::kDone);
+  EXPECT_EQ(rig.client.emergencies(), 0u);
+  rig.emergencies.wanted = true;
+  rig.client.upload(0x1000, 0);
+  ASSERT_EQ(rig.finish(), CoeClient::Status::kDone);
+  EXPECT_EQ(canopen::get<std::uint32_t>(rig.client.value().data()), 0x00020192u);
+  EXPECT_EQ(rig.client.emergencies(), 1u);
+  EXPECT_EQ(Bytes(rig.client.emergency().begin(), rig.client.emergency().end()),
+            (Bytes{0x11, 0x86, 0x20, 1, 2, 3, 4, 5}));
 }
 
 }  // namespace

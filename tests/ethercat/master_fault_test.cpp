@@ -253,12 +253,26 @@ struct SharedRig {
 TEST(MasterStranger, FramesOfAnotherMasterAreNotTakenAndTold) {
   SharedRig rig;
   rig.master->restart(0);
-  for (int i = 0; i < 20; ++i) rig.cycle();
+  for (int i = 0; i < 300; ++i) rig.cycle();
   EXPECT_EQ(rig.master->text(), "");
   rig.shared.stranger = true;
   rig.cycle();
   EXPECT_EQ(rig.master->statistics().strangers, 1u);
   EXPECT_NE(rig.master->text().find("a second master is on the wire"), std::string::npos);
+}
+
+TEST(MasterStranger, OneThatWasThereFirstKeepsItsSlaves) {
+  SharedRig rig;
+  rig.master->restart(0);
+  rig.shared.stranger = true;
+  for (int i = 0; i < 3; ++i) rig.cycle();
+  EXPECT_EQ(rig.master->error(), hal::ecat::LineError::kSecondMaster);
+  EXPECT_NE(rig.master->text().find("another master is at work"), std::string::npos)
+      << rig.master->text();
+  const std::uint64_t sent = rig.link.statistics().sent;
+  for (int i = 0; i < 100; ++i) rig.cycle();
+  EXPECT_EQ(rig.link.statistics().sent, sent) << "nothing more is sent";
+  EXPECT_EQ(rig.rig.value<std::uint16_t>(0, ethercat::reg::kStation), 0) << "nobody was spoken to";
 }
 
 TEST(MasterStranger, AnOldFrameThatComesFirstIsNotTakenForTheCyclesOwn) {

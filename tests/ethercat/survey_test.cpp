@@ -11,6 +11,7 @@
 #include "rt/clock.hpp"
 #include "tests/ethercat/master_rig.hpp"
 #include "tests/ethercat/own_network.hpp"
+#include "tests/ethercat/spoilt_memory.hpp"
 #include "tests/support/needs_root.hpp"
 
 namespace tandem::test {
@@ -97,6 +98,19 @@ TEST(Survey, TakesTheFirstSlaveWithAClockForTheReference) {
   for (auto& setup : setups) setup.has_dc = false;
   LineRig without(setups);
   EXPECT_EQ(survey(without).reference, 3u) << "none";
+}
+
+TEST(Survey, FindsAMemoryWhoseCheckSumIsWrong) {
+  LineRig rig(MasterRig::setups(3));
+  for (const auto& slave : survey(rig).slaves) EXPECT_TRUE(slave.settings_right);
+  SpoiltMemory spoilt(*rig.line);
+  InProcessLink link(spoilt);
+  const LineSurvey found = survey(rig, link);
+  ASSERT_EQ(found.slaves.size(), 3u);
+  for (const auto& slave : found.slaves) {
+    EXPECT_TRUE(slave.identified);
+    EXPECT_FALSE(slave.settings_right);
+  }
 }
 
 TEST(Survey, SendsNothingWhileFramesPass) {

@@ -383,5 +383,33 @@ TEST(Fault, BoardsStopByThemselvesWhenTheMasterDies) {
   EXPECT_NE(rig.boards[0]->axis(0).machine().motion(), canopen::DriveMotion::kFollow);
 }
 
+/// Boards of ours, and a run that ends as it should: the silence after it is no error of theirs.
+TEST(Fault, TheSilenceAfterACleanRunIsNone) {
+  Rig rig;
+  rig.bring_up();
+  int taken = 0;
+  do (void)rig.read();
+  while (!rig.shut_down() && ++taken < 4000);
+  EXPECT_LT(taken, 1000);
+  std::vector<canopen::Frame> heard(64);
+  for (int i = 0; i < 2000; ++i) {  // nobody says anything any more
+    for (auto& board : rig.boards) {
+      std::array<firmware::AxisSense, 2> sense;
+      std::array<firmware::AxisDrive, 2> drive;
+      for (auto& one : sense) one.bus_voltage_V = 40.0;
+      if (i == 0) {
+        for (const canopen::Frame& frame : rig.legs.to_boards()) board->receive(frame);
+      }
+      board->step(1'000'000, sense, drive);
+      for (const canopen::Frame& frame : board->outgoing()) {
+        EXPECT_NE(frame.id & 0x780, canopen::cob::kEmergency)
+            << "code " << canopen::get<std::uint16_t>(frame.data.data()) << ", " << i
+            << " ms later";
+      }
+      board->clear_outgoing();
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tandem::hal::can

@@ -7,6 +7,7 @@
 
 #include "canopen/messages.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
+#include "hal/ethercat-can/ethercat/loopback_link.hpp"
 #include "hal/ethercat-can/loopback.hpp"
 #include "tests/hal/fake_backend.hpp"
 
@@ -44,6 +45,20 @@ TEST(ForeignMaster, IsHeardAmongManyFrames) {
   EXPECT_EQ(bus.master().send(many), many.size());
   EXPECT_EQ(bus.master().send(std::array{Frame{.id = 0x080}}), 1U);
   EXPECT_FALSE(expect_no_master(bus.boards(), "can0"));
+}
+
+TEST(ForeignMaster, OnEtherCatIsKnownByAnyFrame) {
+  ecat::LoopbackLink cable;
+  EXPECT_TRUE(expect_silence(cable.master(), "eth1"));
+  ecat::FrameBuffer frame;
+  ethercat::FrameWriter writer;
+  writer.begin(frame.bytes, {2, 0, 0, 0, 0, 1});
+  (void)writer.add(ethercat::Command::kLrw, 1, 0, 12);
+  frame.size = writer.finish();
+  EXPECT_EQ(cable.slaves().send(std::array{frame}), 1U);
+  const Status alone = expect_silence(cable.master(), "eth1");
+  ASSERT_FALSE(alone);
+  EXPECT_EQ(alone.error().message, "another master is at work on eth1: EtherCAT frames pass");
 }
 
 TEST(ForeignMaster, IsListenedForByItsPeriodAndHeartbeat) {

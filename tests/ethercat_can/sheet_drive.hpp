@@ -32,6 +32,10 @@ class SheetDrive {
   int homing_ms = 50;                 ///< from bit 4 until it is there; never in a negative time
   bool homing_fails = false;          ///< then it says so by bit 13
   bool knows_homing = true;           ///< it goes into mode 6
+  bool tells_states = false;          ///< its heartbeat comes at each change of state, too
+  int first_syncs_unanswered = 0;     ///< after each start
+  bool ignores_quick_stop = false;    ///< while it is enabled
+  int error = 0x8611;                 ///< 603F in a fault
   bool stores = true;                 ///< 1010:1 keeps what was written over a reset
   int writes = 0;                     ///< SDO downloads that it took
   std::vector<std::uint32_t> aborts;  ///< that it answered
@@ -114,6 +118,8 @@ class SheetDrive {
     if (command == 1) nmt_ = 5;
     if (command == 2) nmt_ = 4;
     if (command == 0x80) nmt_ = 127;
+    if (command == 1) unanswered_ = first_syncs_unanswered;
+    if (tells_states && nmt_ != 0) send(0x700 + node_, {static_cast<std::uint8_t>(nmt_)});
   }
   void on_sdo(const Frame& request) {
     const auto index = canopen::get<std::uint16_t>(&request.data[1]);
@@ -127,6 +133,8 @@ class SheetDrive {
     const SheetEntry* entry = sheet_.find(index, sub);
     std::uint32_t abort = 0;
     if (entry == nullptr) abort = sheet_.has(index) ? 0x06090011 : 0x06020000;
+    const bool reads = request.data[0] == 0x40;
+    if (abort == 0 && reads && (entry->access & canopen::kRead) == 0) abort = 0x06010001;
     if (abort == 0 && request.data[0] == 0x40) {
       answer.data[0] = static_cast<std::uint8_t>(0x43 | (4 - size_of(*entry)) << 2);
       canopen::put(&answer.data[4], static_cast<std::uint32_t>(value(index, sub)));
@@ -158,6 +166,7 @@ class SheetDrive {
       if (entry.sub != 0 && value(entry.index) != 0) return 0x06010000;
     }
     const auto raw = canopen::get<std::uint32_t>(&request.data[4]);
+    if (maps && entry.sub == 0 && entry.high && (raw & 0xFF) > *entry.high) return 0x06090031;
     ++writes;
     if (entry.index == 0x1010) return store(raw);
     const std::uint32_t mask = size == 4 ? 0xFFFFFFFF : (1u << 8 * size) - 1;
@@ -197,6 +206,7 @@ class SheetDrive {
       machine(axis);
       move(axis);
     }
+    if (unanswered_ > 0 && unanswered_-- > 0) return;
     for (int n = 0; n < 4; ++n) {
       const auto cob = value(0x1800 + n, 1);
       const auto type = value(0x1800 + n, 2);
@@ -221,7 +231,7 @@ class SheetDrive {
     const auto cw = static_cast<unsigned>(value(0x6040 + at));
     if (state == 5) {
       if ((cw & 0x80) != 0 && (last_controlword_[axis] & 0x80) == 0) state = 1;
-    } else if ((cw & 0x02) == 0 || (cw & 0x04) == 0) {
+    } else if ((cw & 0x02) == 0 || ((cw & 0x04) == 0 && !(ignores_quick_stop && state == 4))) {
       state = 1;
     } else if ((cw & 0x0F) == 0x06 && state <= 3) {
       state = 2;
@@ -234,7 +244,7 @@ class SheetDrive {
     constexpr std::array<int, 6> kStatusword{0, 0x0250, 0x0231, 0x0233, 0x0237, 0x0218};
     value(0x6041 + at) = kStatusword[static_cast<std::size_t>(state)];
     if (axis == 0 && state == 4 && value(0x6061) == 6) value(0x6041) |= home(cw);
-    value(0x603F + at) = state == 5 ? 0x8611 : 0;
+    value(0x603F + at) = state == 5 ? error : 0;
   }
   /// @return bits 10, 12 and 13 of the statusword. They stay until bit 4 rises again.
   unsigned home(unsigned cw) {
@@ -271,6 +281,7 @@ class SheetDrive {
   int nmt_ = 0;
   std::array<int, 2> state_{1, 1};  ///< by axis
   int boot_in_ms_ = 0;
+  int unanswered_ = 0;  ///< SYNCs
   int guarded_ = 0;
   int toggle_ = 0x80;
   std::int64_t since_heartbeat_ms_ = 0;

@@ -247,7 +247,9 @@ TEST(Sheet, AProfileWithAdditionalInformationIsADrive) {
     SheetRig rig(servo().add(0x1000, 0, kUnsigned32, canopen::kRead, type));
     EXPECT_TRUE(rig.bring_up()) << type;
   }
-  SheetRig other(servo().add(0x1000, 0, kUnsigned32, canopen::kRead, 0x00020191));
+  SheetRig other(servo());
+  other.drive =
+      SheetDrive(Sheet(servo()).add(0x1000, 0, kUnsigned32, canopen::kRead, 0x00020191).sheet, 5);
   EXPECT_FALSE(other.bring_up());
 }
 

@@ -272,6 +272,28 @@ TEST(SheetBoard, ReachesAProfileVelocityByItsAcceleration) {
   EXPECT_FALSE(rig.bit(12));
 }
 
+// iPOS, Pilz, Schunk and Xeryon have no 6084.
+TEST(SheetBoard, WithOneOfTwoAccelerationsTakesItForBoth) {
+  for (const int missing : {0x6083, 0x6084}) {
+    DataSheet sheet = servo_with_profiles();
+    std::erase_if(sheet.entries, [&](const SheetEntry& e) { return e.index == missing; });
+    StandIn there(stand_in(sheet));
+    there.enable_by_sdo(1);
+    ASSERT_EQ(there.write(0x607A, 0, there.position() + 20'000), 0U);
+    const std::int32_t goal = there.object<std::int32_t>(0x607A);
+    there.word(0x1F);
+    there.cycles(2000);
+    EXPECT_TRUE(there.bit(10)) << std::hex << missing;
+    EXPECT_NEAR(there.position(), goal, 500) << std::hex << missing;
+    StandIn goes(stand_in(sheet));
+    goes.enable_by_sdo(3);
+    ASSERT_EQ(goes.write(0x60FF, 0, 100'000), 0U);
+    goes.cycles(1000);
+    EXPECT_TRUE(goes.bit(10)) << std::hex << missing;
+    EXPECT_GT(goes.position(), 20'000) << std::hex << missing;
+  }
+}
+
 TEST(SheetBoard, RampsAProfileTorqueByItsSlope) {
   StandIn rig(stand_in(servo_with_profiles()));
   rig.enable_by_sdo(4);

@@ -85,6 +85,25 @@ std::string warned(const RobotConfig& robot) {
   return warnings.size() == 1 ? warnings[0].to_string() : std::to_string(warnings.size());
 }
 
+// EPOS4's DCF has 6076 in uNm. Its number as mNm would make every torque a thousandth.
+TEST_F(BoardScale, WhoseRatedTorqueIsAThousandTimesTooLargeIsRefused) {
+  const RobotDescription description{
+      .moving_joints = {{"elbow", -1.0, 1.0, 1.0, 10.0}}, .other_joints = {}, .links = {}};
+  sheet = with(sheet, "DefaultValue=500\n", "DefaultValue=512871\n");
+  auto wrong = read();
+  ASSERT_TRUE(wrong) << wrong.error()[0].to_string();
+  const Diagnostics errors = complete_from_description(*wrong, description);
+  ASSERT_EQ(errors.size(), 1U);
+  const std::string error = errors[0].to_string();
+  EXPECT_NE(error.find("rated_torque_Nm"), std::string::npos) << error;
+  EXPECT_NE(error.find("is it in uNm"), std::string::npos) << error;
+  EXPECT_NE(error.find("to 25.64355 if the drive's 6076 is in uNm"), std::string::npos) << error;
+  auto told = read(joint_with("rated_torque_Nm = 25.64355\n"));
+  ASSERT_TRUE(told) << told.error()[0].to_string();
+  EXPECT_TRUE(complete_from_description(*told, description).empty());
+  EXPECT_EQ(warned(*told), "0") << "the remedy helps";
+}
+
 TEST_F(BoardScale, IsDoubtedWhereAnotherObjectConvertsPositions) {
   const std::string whole = sheet;
   EXPECT_EQ(warned(*read()), "0");

@@ -1,6 +1,9 @@
 // The swing with its board and sensors on an EtherCAT line, in process.
 #include "base/archive.hpp"
+#include "hal/ethercat-can/ethercat/in_process_link.hpp"
 #include "hal/ethercat-can/ethercat/loopback_link.hpp"
+#include "tests/ethercat/line_rig.hpp"
+#include "tests/ethercat/spoilt_memory.hpp"
 #include "tests/sim/swing_loop.hpp"
 #include "tests/sim/swing_robot.hpp"
 
@@ -122,6 +125,35 @@ TEST(Line, TheLoopKeepsItsPlaceBetweenTwoPulsesOfSync0) {
   EXPECT_LT(std::abs(phase_ns(true, 1500) - wanted), 500);
   EXPECT_LT(std::abs(phase_ns(true, 4000) - wanted), 500);
   EXPECT_GT(std::abs(phase_ns(false, 4000) - wanted), 5'000) << "else it proves nothing";
+}
+
+/// Whom the slaves' own memory makes unusable is told at once, not when every reset was in vain.
+TEST(Line, ASlaveWhoseMemoryIsSpoiltIsNamedAtOnce) {
+  constexpr std::int64_t kPeriod = 1'000'000;
+  const hal::RobotConfig robot = line_swing_robot();
+  tandem::test::LineRig slaves(3);
+  tandem::test::SpoiltMemory spoilt(*slaves.line);
+  hal::ecat::InProcessLink link(spoilt);
+  auto line = hal::can::LineBus::create(robot, 0, link, {.period_ns = kPeriod});
+  ASSERT_TRUE(line.has_value());
+  const std::array<hal::can::Bus*, 1> ends{line->get()};
+  auto master = hal::can::DriveMaster::create(robot, ends);
+  ASSERT_TRUE(master.has_value());
+  hal::StateImage state(robot.shape());
+  int cycles = 0;
+  for (; cycles < 20'000 && (*master)->phase() == hal::Phase::kBringUp; ++cycles) {
+    (*master)->cycle_begin({.cycle = static_cast<std::uint64_t>(cycles),
+                            .time_ns = cycles * kPeriod,
+                            .period_ns = kPeriod});
+    slaves.step();
+    link.set_time(slaves.now_ns);
+    (void)(*master)->receive(state);
+  }
+  EXPECT_EQ((*master)->phase(), hal::Phase::kFault);
+  EXPECT_LT(cycles, 1000) << "twelve seconds before";
+  EXPECT_NE((*line)->status_text().find("slave 0 (board): the SII's check sum is wrong"),
+            std::string::npos)
+      << (*line)->status_text();
 }
 
 TEST(Line, HasNoBusTiming) {

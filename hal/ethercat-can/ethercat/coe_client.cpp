@@ -28,7 +28,7 @@ void CoeClient::reset(std::uint16_t station,
   status_ = Status::kIdle;
   counter_ = 0;
   repeat_ = false;
-  emergency_ = 0;
+  emergency_ = {};
 }
 
 void CoeClient::begin(std::uint16_t index, std::uint8_t sub, bool uploading) noexcept {
@@ -178,7 +178,10 @@ void CoeClient::take(Bytes message) noexcept {
   if (header.type != ethercat::MailboxType::kCoe || message.size() <= kSdoAt) return;
   const CoeService service = ethercat::coe_service(message);
   if (service == CoeService::kEmergency && message.size() >= kSdoAt + 2) {
-    emergency_ = canopen::get<std::uint16_t>(&message[kSdoAt]);
+    emergency_ = {};
+    std::copy_n(message.begin() + kSdoAt, std::min(emergency_.size(), message.size() - kSdoAt),
+                emergency_.begin());
+    ++emergencies_;
     return;
   }
   const bool aborts = (message[kSdoAt] & command::kSpecifier) == command::kAbort;

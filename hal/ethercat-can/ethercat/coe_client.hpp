@@ -54,8 +54,10 @@ class CoeClient {
     return {buffer_.data(), length_};
   }
   void archive(Archive& ar);
-  /// Error code of the last emergency message that was in the mailbox; 0: none.
-  [[nodiscard]] std::uint16_t emergency() const noexcept { return emergency_; }
+  /// The last emergency message that was in the mailbox: error code, register and five bytes as in
+  /// CiA 301's; error code 0: none, or the error is over.
+  [[nodiscard]] std::span<const std::uint8_t, 8> emergency() const noexcept { return emergency_; }
+  [[nodiscard]] std::uint32_t emergencies() const noexcept { return emergencies_; }
 
  private:
   enum class Step : std::uint8_t { kWrite, kLook, kRead, kAskAgain, kWaitAgain };
@@ -86,7 +88,8 @@ class CoeClient {
   std::uint8_t counter_ = 0;  ///< of our messages
   std::uint8_t sub_ = 0;
   std::uint16_t index_ = 0;
-  std::uint16_t emergency_ = 0;
+  std::array<std::uint8_t, 8> emergency_{};
+  std::uint32_t emergencies_ = 0;
   canopen::AbortCode abort_code_ = canopen::AbortCode::kNone;
   ethercat::MailboxError mailbox_error_ = ethercat::MailboxError::kNone;
   std::size_t expected_ = 0;

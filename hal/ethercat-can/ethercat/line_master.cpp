@@ -102,6 +102,12 @@ void LineMaster::take_frame(FrameBuffer& frame) noexcept {
   source[0] &= static_cast<std::uint8_t>(~ethercat::kProcessedMark);
   if (source != link_->address()) {
     ++statistics_.strangers;
+    if (scan_ == Scan::kCount || scan_ == Scan::kClear) {  // it was there first
+      error_ = LineError::kSecondMaster;
+      scan_ = Scan::kFailed;
+      sent_ = false;
+      stopped_ = true;
+    }
     return;
   }
   ethercat::FrameReader reader(frame.frame());
@@ -356,6 +362,10 @@ std::string LineMaster::text() const {
     case LineError::kTooMany:
       say(std::to_string(found_) + " slaves answer, " + expected + " are described");
       break;
+    case LineError::kSecondMaster:
+      say("another master is at work on the wire; end it: two masters would take the slaves from "
+          "each other");
+      return all;
     case LineError::kCable:
       say(broken_cable_ == 0
               ? std::string("the cable from the master to slave 0 is cut")

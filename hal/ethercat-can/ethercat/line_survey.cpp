@@ -211,9 +211,19 @@ void Surveyor::identify() {
   const auto vendors = read_sii(sii::kVendorWord);
   const auto products = read_sii(sii::kVendorWord + 2);
   const auto revisions = read_sii(sii::kVendorWord + 4);
+  std::vector<std::vector<std::uint8_t>> settings(size());
+  for (std::uint32_t word = 0; word < sii::kVendorWord; word += 2) {
+    const auto parts = read_sii(word);
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (parts[i].empty()) continue;
+      settings[i].insert(settings[i].end(), parts[i].begin(), parts[i].begin() + 4);
+    }
+  }
   for (std::size_t i = 0; i < size(); ++i) {
     SurveyedSlave& slave = survey_.slaves[i];
     slave.identified = !vendors[i].empty() && !products[i].empty() && !revisions[i].empty();
+    const bool whole = settings[i].size() == 2 * sii::kVendorWord;
+    slave.settings_right = !whole || settings[i][14] == sii::check_sum(settings[i]);
     if (!slave.identified) continue;
     slave.identity = {.vendor = get<std::uint32_t>(vendors[i].data()),
                       .product = get<std::uint32_t>(products[i].data()),

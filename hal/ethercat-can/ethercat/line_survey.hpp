@@ -15,6 +15,7 @@ namespace tandem::hal::ecat {
 struct SurveyedSlave {
   bool identified = false;           ///< its SII could be read
   ethercat::sii::Identity identity;  ///< serial number left out
+  bool settings_right = true;        ///< its SII's check sum is that of its settings
   bool has_clock = false;
   // Of a clock that follows the reference, over the measured cycles:
   std::uint64_t samples = 0;

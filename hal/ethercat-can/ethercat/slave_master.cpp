@@ -63,6 +63,13 @@ void SlaveMaster::fail(SlaveError error, std::int64_t now_ns) noexcept TANDEM_RT
   stage_ = SlaveStage::kDown;
 }
 
+bool SlaveMaster::hopeless() const noexcept {
+  if (stage_ != SlaveStage::kDown) return false;
+  return (error_ == SlaveError::kSii && sii_error_ != sii::Error::kNone) ||
+         error_ == SlaveError::kWrongIdentity || error_ == SlaveError::kNoMailbox ||
+         error_ == SlaveError::kNoMemory;
+}
+
 void SlaveMaster::clocks_latched(std::int64_t now_ns) noexcept TANDEM_RT {
   enter(SlaveStage::kClock, now_ns);
 }
@@ -118,6 +125,7 @@ void SlaveMaster::take(const Request& request, std::int64_t now_ns,
     case SlaveStage::kFeatures:
       has_clock_ = (get<std::uint16_t>(&data[8]) & ethercat::kFeatureDc) != 0;
       sii_.clear();
+      sii_error_ = sii::Error::kNone;
       category_at_ = 2 * sii::kFixedWords;
       return enter(SlaveStage::kSii, now_ns);
     case SlaveStage::kSii: return take_sii(data, now_ns);

@@ -121,6 +121,8 @@ class SlaveMaster {
     return stage_ >= SlaveStage::kReady && stage_ != SlaveStage::kDown;
   }
   [[nodiscard]] SlaveError error() const noexcept { return error_; }
+  /// Whether it is down for what it is: another start finds the same.
+  [[nodiscard]] bool hopeless() const noexcept;
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
   [[nodiscard]] const ethercat::sii::Content& content() const noexcept { return content_; }
   [[nodiscard]] ethercat::sii::Error sii_error() const noexcept { return sii_error_; }

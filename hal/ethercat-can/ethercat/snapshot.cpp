@@ -18,7 +18,8 @@ void Exchange::archive(Archive& ar) {
 void CoeClient::archive(Archive& ar) {
   ar(station_, mailbox_.out_start, mailbox_.out_bytes, mailbox_.in_start, mailbox_.in_bytes,
      status_, step_, uploading_, segments_, toggle_, repeat_, counter_, sub_, index_, emergency_,
-     abort_code_, mailbox_error_, expected_, length_, position_, since_ns_, buffer_, message_);
+     emergencies_, abort_code_, mailbox_error_, expected_, length_, position_, since_ns_, buffer_,
+     message_);
 }
 
 void ProcessImage::archive(Archive& ar) {
