@@ -21,10 +21,13 @@ const SheetEntry* offered(const DataSheet& sheet, std::uint16_t index, std::uint
 
 namespace {
 
-/// Whether one of the first PDOs of a direction can be mapped, or has the entry from power-on.
+/// Whether one of the first PDOs of a direction (of a slave: any) can be mapped, or has the entry
+/// from power-on.
 bool carried(const DataSheet& sheet, const SheetEntry& entry, Access right) {
   const std::uint16_t first = right == kMapRpdo ? object::kRpdoMapping : object::kTpdoMapping;
-  for (int i = 0; i < kPdosPerNode; ++i) {
+  constexpr int kPdosOfSlave = 0x200;
+  const int pdos = sheet.ethercat ? kPdosOfSlave : kPdosPerNode;
+  for (int i = 0; i < pdos; ++i) {
     const auto mapping = static_cast<std::uint16_t>(first + i);
     if (writable(sheet, mapping, 0) && writable(sheet, mapping, 1)) return true;
     const auto count = sheet.value(mapping, 0, 0).value_or(0);
