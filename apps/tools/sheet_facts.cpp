@@ -135,6 +135,10 @@ void add_mapping(const DataSheet& sheet, std::uint16_t mapping, SheetPdo& pdo) {
     pdo.entries = sub;
     if (sub > used || !entry->value || entry->value->number == 0) continue;
     const auto mapped = static_cast<std::uint32_t>(entry->value->number);
+    if (mapped >> 16 == 0) {
+      pdo.carries.push_back(fmt::format("({} bit)", mapped & 0xFF));
+      continue;
+    }
     pdo.carries.push_back(
         text_of(static_cast<std::uint16_t>(mapped >> 16), static_cast<std::uint8_t>(mapped >> 8)));
   }
@@ -154,6 +158,11 @@ void add_pdos(const DataSheet& sheet, bool receive, SheetFacts& facts) {
     if (const auto type = sheet.value(parameter, 2, 0)) pdo.transmission = static_cast<int>(*type);
     pdo.transmission_writable = writable(sheet.find(parameter, 2));
     add_mapping(sheet, mapping, pdo);
+    const std::uint16_t assignment = receive ? 0x1C12 : 0x1C13;
+    const auto used = sheet.value(assignment, 0, 0).value_or(0);
+    for (int sub = 1; sub <= used && sheet.ethercat; ++sub) {
+      pdo.assigned |= sheet.value(assignment, static_cast<std::uint8_t>(sub), 0) == mapping;
+    }
     facts.pdos.push_back(std::move(pdo));
   }
 }
@@ -170,6 +179,7 @@ SheetFacts sheet_facts(const DataSheet& sheet) {
   for (int axis = 0; axis < canopen::kMaxAxes; ++axis) {
     if (sheet.has(canopen::of_axis(object::kControlword, axis))) ++facts.axes;
   }
+  facts.ethercat = sheet.ethercat;
   add_modes(sheet, facts);
   add_pdos(sheet, true, facts);
   add_pdos(sheet, false, facts);
