@@ -228,10 +228,12 @@ class JointTrajectory : public Controller {
     positions.resize(joints_.size(), 0.0);
     table.finish();
     if (first) planned_start_ = time_s == 0.0 && !table.has_errors("time_s");
-    if (!first && time_s == times_s_.back()) {
+    if (table.has_errors("time_s")) {
+      // said already
+    } else if (!first && time_s == times_s_.back()) {
       table.error("time_s", "is the time of the way-point before",
                   "a joint cannot be at two places at once: remove one of the two, or move it");
-    } else if (!first && time_s > 0.0 && time_s < times_s_.back()) {
+    } else if (!first && time_s < times_s_.back()) {
       table.error("time_s", "is not later than the way-point before", "sort them by time");
     }
     std::vector<const hal::Joint*> beyond;
@@ -245,13 +247,13 @@ class JointTrajectory : public Controller {
       points_.push_back({positions[k], velocities[k], accelerations[k]});
     }
     if (!beyond.empty()) {
-      const hal::Joint& first = *beyond.front();
+      const hal::Joint& one = *beyond.front();
       const std::string others = beyond.size() == 1 ? " leaves its limits"
                                                     : " and " + std::to_string(beyond.size() - 1) +
                                                           " more leave their limits";
-      beyond_.add(table, "joint '" + first.name + "'" + others,
-                  "stay within " + std::to_string(first.min_position_rad) + " and " +
-                      std::to_string(first.max_position_rad) +
+      beyond_.add(table, "joint '" + one.name + "'" + others,
+                  "stay within " + std::to_string(one.min_position_rad) + " and " +
+                      std::to_string(one.max_position_rad) +
                       "; in radians, or metres of a slide");
     }
     times_s_.push_back(time_s);
@@ -363,8 +365,16 @@ class JointTrajectory : public Controller {
 
   /// From rest to rest the velocity goes with one over the time.
   [[nodiscard]] std::string more_time(std::size_t segment, double least_s) const {
-    if (through_ && (segment > 0 || planned_start_)) return "give it more time";
     char text[96];
+    if (through_ && (segment > 0 || planned_start_)) {
+      // The neighbours' times are in the velocities at the way-points: all of them together.
+      const double duration = times_s_[segment + 1] - times_s_[segment];
+      std::snprintf(
+          text, sizeof text, "give it more time: with all times %.3g times as long%s",
+          std::ceil(1e2 * least_s / duration) * 1e-2,
+          with_velocity_.value_or(false) ? ", and slower velocity_rad_s, it fits" : " it fits");
+      return text;
+    }
     const double up_s = std::ceil(1e3 * least_s) * 1e-3;
     if (segment == 0 && !planned_start_) {
       std::snprintf(text, sizeof text, "time_s = %g or more; and move the later ones", up_s);

@@ -43,12 +43,13 @@ Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDic
       exact_rated_Nm_(board.sheet != nullptr ? setup.rated_torque_Nm : 0.0),
       zero_at_power_on_(setup.zero_counts),
       zero_counts_(setup.zero_counts),
+      turn_counts_(setup.turn_counts),
       home_switch_from_rad_(setup.home_switch_from_rad),
       home_switch_to_rad_(setup.home_switch_to_rad),
       index_rad_(setup.index_rad),
       index_pitch_rad_(setup.index_pitch_rad),
       counts_from_power_on_(setup.counts_from_power_on),
-      at_power_on_(setup.counts_from_power_on),
+      at_power_on_(setup.counts_from_power_on || setup.turn_counts != 0),
       power_on_(AxisObjects::from(setup, board.command_timeout_syncs)),
       objects_(power_on_),
       torque_sensor_({.noise = setup.torque_noise_Nm, .quantum = setup.torque_quantum_Nm},
@@ -63,7 +64,7 @@ Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDic
 void Axis::power_on() noexcept TANDEM_RT {
   objects_ = power_on_;
   zero_counts_ = zero_at_power_on_;
-  at_power_on_ = counts_from_power_on_;
+  at_power_on_ = counts_from_power_on_ || turn_counts_ != 0;
   profile_.power_on();
   profiled_ = {};
   machine_.reset();
@@ -137,10 +138,12 @@ void Axis::sample(const AxisSense& sense) noexcept TANDEM_RT {
   if (!sensors_valid_) return;  // the last good values stay, and a fault follows
   const double velocity_before = measured_.link_velocity_rad_s;
   if (at_power_on_) {
-    zero_counts_ = 0;
-    zero_counts_ =
-        static_cast<std::int32_t>(static_cast<std::uint32_t>(zero_at_power_on_) -
-                                  static_cast<std::uint32_t>(to_wire(link_encoder_.counts())));
+    zero_counts_ = zero_at_power_on_;
+    const std::int32_t count = to_wire(link_encoder_.counts());
+    const std::int32_t shown = counts_from_power_on_ ? zero_at_power_on_ : within_turn(count);
+    zero_counts_ = static_cast<std::int32_t>(static_cast<std::uint32_t>(zero_at_power_on_) +
+                                             static_cast<std::uint32_t>(shown) -
+                                             static_cast<std::uint32_t>(count));
     at_power_on_ = false;
   }
   measured_.link_position_rad = link_encoder_.position_rad();
@@ -159,6 +162,11 @@ bool Axis::supported(std::int8_t mode) const noexcept {
   if (mode == 0) return true;
   const int bit = mode > 0 ? mode - 1 : 15 - mode;  // the manufacturer's from bit 16
   return bit < 32 && (modes_ >> bit & 1U) != 0;
+}
+
+std::int32_t Axis::within_turn(std::int32_t count) const noexcept {
+  const std::int32_t rest = count % turn_counts_;
+  return rest < 0 ? rest + turn_counts_ : rest;
 }
 
 std::int32_t Axis::to_wire(std::int64_t counts) const noexcept {

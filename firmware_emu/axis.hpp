@@ -59,6 +59,8 @@ class Axis final : private canopen::ObjectOwner {
   void watch_limits(const ControllerConfig& config) noexcept;
   [[nodiscard]] bool supported(std::int8_t mode) const noexcept;
   /// Counts of the joint's encoder as 6064 shows them, and back.
+  /// A count as a single-turn encoder tells it at power-on.
+  [[nodiscard]] std::int32_t within_turn(std::int32_t count) const noexcept;
   [[nodiscard]] std::int32_t to_wire(std::int64_t counts) const noexcept;
   [[nodiscard]] std::int32_t from_wire(std::int32_t value) const noexcept;
   /// By what 6064 is off until homing has found the joint's place: shown minus true [rad].
@@ -104,6 +106,7 @@ class Axis final : private canopen::ObjectOwner {
   double exact_rated_Nm_;
   std::int32_t zero_at_power_on_;
   std::int32_t zero_counts_;  ///< homing changes it
+  std::int32_t turn_counts_;  ///< AxisSetup::turn_counts
   double home_switch_from_rad_;
   double home_switch_to_rad_;
   double index_rad_;

@@ -79,8 +79,8 @@ struct ProtectionInputs {
 /// torque only brakes. Slower swings are SwingWatch's.
 ///
 /// Motion beyond the joint's limits: the faster of link and motor, the link's torque, and the power
-/// that it gives or takes (torque times velocity), each for longer than excess_time_s: shorter ones
-/// are impacts. A winding that is shorted only brakes, and a bridge that is open does nothing.
+/// that it gives or takes (torque times velocity), each for longer than excess_time_s more than it
+/// was within since: shorter ones are impacts. A winding that is shorted only brakes, and a bridge that is open does nothing.
 class Protection {
  public:
   /// Share of a limit from which the statusword warns, and to which I2t must fall before a reset.
@@ -185,7 +185,7 @@ class Protection {
                                   double dt_s) noexcept {
     const auto lasts = [&](double& since_s, double value, double limit) {
       const bool beyond = in.drives && limit > 0.0 && value > limit;
-      since_s = beyond ? since_s + dt_s : 0.0;
+      since_s = std::max(0.0, since_s + (beyond ? dt_s : -dt_s));
       return since_s > config.excess_time_s;
     };
     const double speed =

@@ -37,6 +37,9 @@ struct AxisSetup {
   std::uint32_t modes = canopen::kTandemModes;  ///< it takes these: bits of 6502
   bool reversed = false;         ///< 6064 counts down, and 6077 too, as the joint's angle grows
   std::int32_t zero_counts = 0;  ///< 6064 where the joint is at 0; its range may wrap around
+  /// The encoder is a single-turn one: 6064 is from 0 to this at power-on, and counts on from
+  /// there. 0: it counts the whole range.
+  std::int32_t turn_counts = 0;
   /// The encoder counts from where it stands at power-on, which 6064 shows as `zero_counts` until
   /// homing finds the joint's place.
   bool counts_from_power_on = false;

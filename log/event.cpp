@@ -124,6 +124,9 @@ std::string text_of(const Event& event, bool has_joint) {
                                       ": a foot is below the ground"};
       return event.code < std::size(kHow) ? kHow[event.code] : "";
     }
+    case EventKind::kLimited:
+      return event.code == static_cast<std::uint32_t>(Code::kNotFinite) ? ": it was not finite"
+                                                                        : ": it was out of range";
     case EventKind::kFault:
       if (!has_joint) {
         return std::string(": ") + tandem::to_string(static_cast<Code>(event.code));

@@ -237,6 +237,13 @@ Result<RequestResult> RunServices::move_joint(const std::string& joint, const Mo
     return std::unexpected(fits.error());
   }
   if (Status free = check_free_to_move(*index); !free) return std::unexpected(free.error());
+  const JointStatus now = looks()[*index];
+  const bool yields =
+      now.interaction == static_cast<std::uint8_t>(hal::InteractionMode::kCompliant);
+  if (yields && now.stiffness_Nm_rad == 0.0) {
+    return fail_at(joint, "is compliant without stiffness: nothing would move it",
+                   fmt::format("tandem joint set {} --stiffness, or --interaction stiff", joint));
+  }
   return ask(
       lock,
       {.kind = LoopRequest::Kind::kMove, .joint = static_cast<std::uint32_t>(*index), .move = wish},

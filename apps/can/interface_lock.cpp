@@ -142,9 +142,9 @@ Result<InterfaceLock> InterfaceLock::take(const std::string& interface, hal::can
                        : "end that emulator first, or use another interface");
   }
   lock.remark_ = fmt::format(
-      "{}: the lock's name @tandem/{}/{} is held by {}, which is neither this user's nor root's. "
-      "It "
-      "keeps nobody from the interface: a master that is at work there is found by its frames",
+      "{}: the lock's name @tandem/{}/{} is held by {}, which is neither this user's nor root's, "
+      "and "
+      "locks nothing: a master that is at work there is found by its frames",
       interface, interface, end, who.text());
   return lock;
 }

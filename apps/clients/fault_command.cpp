@@ -239,7 +239,13 @@ Exit stop_all_over_dds(const EstopOptions& options, const Json& question) {
     return all ? OwnRuns{} : own_runs_on_dds();
   });
   const auto answers = stop_all_by_dds(options.target, question);
-  if (!answers) return tell_stop(std::unexpected(answers.error()), question, {});
+  if (!answers) {
+    for (const std::string& socket : running_control_sockets("run")) {
+      fmt::print(stderr, "warning: {} is not stopped: tandem estop, without --dds\n",
+                 process_of(socket));
+    }
+    return tell_stop(std::unexpected(answers.error()), question, {});
+  }
   const OwnRuns own = asked.get();
   Exit exit = Exit::kDone;
   for (const DdsAnswer& one : answers->all) {

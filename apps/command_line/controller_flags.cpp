@@ -28,7 +28,9 @@ const char kJointExamples[] = R"(Examples:
   tandem joint home LElbj                            let its drive find the joint's place
   tandem joint reset LElbj                           clear the fault of its drive alone
   tandem joint recover LElbj                         outside its limits: slowly back inside
-  tandem joint gains LElbj position --kp 150         to its drive, by SDO
+  tandem joint gains LElbj position --kp 150         to its drive, by SDO, when the loop is stable
+  tandem joint gains LElbj position --kp 9e4 --anyway
+                                                     also when the model finds that it is not
 Without --socket or --dds it is the only `tandem run` of this user.)";
 
 const char kSensorExamples[] = R"(Examples:
@@ -159,9 +161,11 @@ void add_flags(CLI::App& app, JointOptions& o) {
   gains->add_option("joint", o.joint, "Its name")->required();
   gains->add_option("loop", o.loop, "position, velocity, torque, current")->required();
   gains->add_option("--kp", o.kp, "Units as in [gains], docs/configuration.md")->check(is_finite());
-  gains->add_option("--ki", o.ki)->check(is_finite());
-  gains->add_option("--kd", o.kd)->check(is_finite());
-  gains->add_flag("--anyway", o.anyway, "Also when the model finds the loop unstable");
+  gains->add_option("--ki", o.ki, "Of the integral: kp's units per second")->check(is_finite());
+  gains->add_option("--kd", o.kd, "Of the derivative: kp's units times seconds")
+      ->check(is_finite());
+  gains->add_flag("--anyway", o.anyway,
+                  "Also when the model finds the loop unstable; at your own risk");
 }
 
 void add_flags(CLI::App& app, SensorOptions& o) {

@@ -73,7 +73,8 @@ void add_scale_json(const hal::RobotConfig& robot, Json& json) {
          {"rated_torque_Nm", joint.rated_torque_Nm},
          {"rated_torque_from", source(joint.torque_of_sheet)},
          {"reversed", joint.reversed},
-         {"zero_counts", joint.zero_counts}});
+         {"zero_counts", joint.zero_counts},
+         {"encoder_turn_counts", joint.encoder_turn_counts}});
   }
   if (!scales.empty()) json["scales"] = std::move(scales);
 }

@@ -1,6 +1,7 @@
 #include "apps/run/run_summary.hpp"
 
 #include <fmt/core.h>
+#include <signal.h>
 
 #include "apps/control/fault_table.hpp"
 
@@ -399,7 +400,8 @@ std::string RunSummary::ended() const {
   const bool early = planned_cycles() == 0 || cycle.running_cycles() < planned_cycles();
   if (early && interrupted_by != 0) {
     const char* name = ::sigabbrev_np(interrupted_by);
-    return fmt::format("interrupted by SIG{}", name == nullptr ? "?" : name);
+    if (name != nullptr) return fmt::format("interrupted by SIG{}", name);
+    return fmt::format("interrupted by SIGRTMIN+{}", interrupted_by - SIGRTMIN);
   }
   if (!faults.empty()) return "by a fault";
   if (early && rt::stop_requested()) return "nobody reads its output any more";

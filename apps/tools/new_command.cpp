@@ -14,6 +14,7 @@
 #include "apps/tools/right_angles.hpp"
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
+#include "base/open_file.hpp"
 #include "base/quoting.hpp"
 #include "base/utf8.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
@@ -214,7 +215,10 @@ Diagnostics check_input(const std::string& file) {
   if (!is_utf8(fs::path(file).filename().string())) {
     return one("the file's name is not UTF-8, which robot.toml must be", "rename it", file);
   }
-  if (fs::path(file).extension() != ".toml") return {};
+  if (fs::path(file).extension() != ".toml") {
+    const Result<Descriptor> opened = open_to_read(file, "name a .urdf file", kMostUrdfBytes);
+    return opened ? Diagnostics() : Diagnostics{opened.error()};
+  }
   if (is_robot(file)) {
     return one("this is a robot.toml already: `tandem new` makes one, from a URDF",
                "`tandem check " + shell_word(file) +

@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "base/quoting.hpp"
 #include "base/trusted_code.hpp"
 
 namespace tandem::apps {
@@ -76,7 +77,9 @@ Status check_private_folder(const std::string& folder) {
   return fail(
       fmt::format("{} is no folder of this user alone (its owner is user {}, its mode {:o})",
                   folder, found.st_uid, found.st_mode & 07777),
-      "remove it, set XDG_RUNTIME_DIR, or choose another place with --socket");
+      found.st_uid == ::geteuid() && S_ISDIR(found.st_mode)
+          ? "chmod 700 " + shell_word(folder)
+          : "remove it, set XDG_RUNTIME_DIR, or choose another place with --socket");
 }
 
 Status check_socket_folder(const std::string& path, std::optional<uid_t> partner) {

@@ -21,6 +21,7 @@ class RangeCheck {
 
   Diagnostics run() {
     check_counts();
+    check_turn();
     check_velocity_units();
     if (joint_.homing) check_homing(*joint_.homing);
     const StopOptions& stop = joint_.stop_options;
@@ -68,6 +69,25 @@ class RangeCheck {
             fmt::format("give at most {:.0f} counts, or narrow min_position_rad and "
                         "max_position_rad",
                         std::floor(kMostCounts * 2.0 * std::numbers::pi / most)));
+    }
+  }
+
+  /// At power-on a place within the joint's range has to be one place of a single-turn encoder.
+  void check_turn() {
+    if (joint_.encoder_turn_counts == 0) return;
+    const double turn_rad =
+        2.0 * std::numbers::pi * joint_.encoder_turn_counts / joint_.encoder_counts_per_rev;
+    if (joint_.max_position_rad - joint_.min_position_rad >= turn_rad) {
+      error(joint_.line, "encoder_turn_counts",
+            fmt::format("an encoder that repeats itself after {:.6g} {} does not tell where in its "
+                        "range, {:.6g} to {:.6g}, the joint is at power-on",
+                        turn_rad, joint_.slides ? "m" : "rad", joint_.min_position_rad,
+                        joint_.max_position_rad),
+            "narrow min_position_rad and max_position_rad, or give it a `homing`");
+    }
+    if (joint_.homing && joint_.homing->required) {
+      error(joint_.line, "encoder_turn_counts", "an encoder that needs a homing tells no place",
+            "remove one of the two");
     }
   }
 

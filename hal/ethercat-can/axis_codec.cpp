@@ -42,10 +42,24 @@ AxisScale scale_of(const JointConfig& joint, double counts, double motor_counts,
           .velocity_per_rad_s = sign * velocities / kRadPerRev,
           .motor_counts_per_rad = motor_counts / kRadPerRev,
           .mille_per_Nm = sign * 1.0e6 / rated_mNm,
-          .zero_counts = joint.zero_counts};
+          .zero_counts = joint.zero_counts,
+          .turn_counts = joint.encoder_turn_counts,
+          .middle_counts =
+              clamp_round<std::int32_t>(0.5 * (joint.min_position_rad + joint.max_position_rad) *
+                                        sign * counts / kRadPerRev)};
 }
 
 }  // namespace
+
+void AxisScale::find_turn(std::int32_t count) noexcept TANDEM_RT {
+  if (turn_counts == 0) return;
+  const std::int64_t from_middle = std::int64_t{from_zero(count)} - middle_counts;
+  const std::int64_t half = turn_counts / 2;
+  const std::int64_t shifted = from_middle + half;
+  const std::int64_t turns = (shifted >= 0 ? shifted : shifted - turn_counts + 1) / turn_counts;
+  zero_counts = static_cast<std::int32_t>(static_cast<std::uint32_t>(zero_counts) +
+                                          static_cast<std::uint32_t>(turns * turn_counts));
+}
 
 AxisScale AxisScale::of(const JointConfig& joint) {
   return scale_of(joint, clamp_round<std::uint32_t>(joint.encoder_counts_per_rev),

@@ -25,6 +25,8 @@ struct AxisScale {
   double motor_counts_per_rad = 1.0;  ///< motor encoder reflected to the link, 2033 / 2 pi
   double mille_per_Nm = 1.0;          ///< 1000 / rated torque (6076); negative with the counts
   std::int32_t zero_counts = 0;       ///< the drive's count at 0 rad
+  std::int32_t turn_counts = 0;       ///< JointConfig::encoder_turn_counts
+  std::int32_t middle_counts = 0;     ///< of the joint's range, from its zero
 
   /// A drive's count from the joint's zero, and back. Both wrap around as the drive's counter does:
   /// the joint's range is less than the counter's, so that a count means one angle.
@@ -36,6 +38,10 @@ struct AxisScale {
     return static_cast<std::int32_t>(static_cast<std::uint32_t>(from_zero) +
                                      static_cast<std::uint32_t>(zero_counts));
   }
+  /// Moves the zero by turns of a single-turn encoder, so that the count is within half a turn of
+  /// the middle of the joint's range.
+  /// @param count  the drive's, when it is heard for the first time
+  void find_turn(std::int32_t count) noexcept TANDEM_RT;
   /// Of a joint on one of our own boards, whose 608F, 2033 and 6076 are whole numbers.
   [[nodiscard]] static AxisScale of(const JointConfig& joint);
   /// The same; on a drive of another make the joint's numbers as they are: a ratio of its sheet

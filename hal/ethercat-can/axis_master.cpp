@@ -30,6 +30,7 @@ void AxisMaster::received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT {
   }
   const std::int32_t last_position = feedback_.position;
   feedback_.adopt(sample_);
+  if (!heard_) scale_.find_turn(feedback_.position);
   const std::int64_t elapsed_ns = now_ns - sample_ns_;
   const bool recounts = homing_.under_way();  // a jump of the counts is no motion
   if (!traits_.tells_velocity && heard_ && elapsed_ns > 0 && !recounts) {
@@ -416,7 +417,7 @@ void AxisMaster::archive(Archive& ar) {
      disobedient_cycles_);
   ar(feedback_, raw_, target_, error_, heard_, was_enabled_, fault_code_, emergency_code_,
      age_cycles_, reset_cycles_, previous_velocity_, sample_ns_, trouble_ns_, since_ns_,
-     acceleration_rad_s2_);
+     acceleration_rad_s2_, scale_.zero_counts);
 }
 
 }  // namespace tandem::hal::can

@@ -3,6 +3,7 @@
 // Layer: hal/ethercat-can.  Thread: the loop's.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -54,7 +55,8 @@ class MotionWatch {
   canopen::ErrorCode look(const MotionSample& sample, double dt_s) noexcept TANDEM_RT {
     using canopen::ErrorCode;
     const auto lasts = [&](double& since_s, double value, double limit) {
-      since_s = limit > 0.0 && std::abs(value) > limit ? since_s + dt_s : 0.0;
+      const bool beyond = limit > 0.0 && std::abs(value) > limit;
+      since_s = std::max(0.0, since_s + (beyond ? dt_s : -dt_s));
       return since_s > limits_.timeout_s;
     };
     const double power_W = sample.torque_Nm * sample.velocity_rad_s;

@@ -1,6 +1,8 @@
 // What `tandem joint move` and `joint stop` say where nothing moves: of a joint at rest, while
 // simulated time is paused, and before controllers run.
+#include "tests/apps/background.hpp"
 #include "tests/apps/running.hpp"
+#include "tests/support/eventually.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -63,6 +65,35 @@ TEST_F(JointAtRest, DoesNotBrake) {
   EXPECT_EQ(to_run("controller stop hold").status, 0);
   EXPECT_EQ(to_run("joint stop joint1").out.find("brakes"), std::string::npos);
   expect(to_run("joint stop joint1").out, "joint1 is at rest");
+  EXPECT_EQ(end(), 0);
+}
+
+// The waiting had gone on for as long as the joint, which nothing held any more, swung.
+TEST_F(JointAtRest, HasNotArrivedWhenAFaultEndsItsMotion) {
+  begin("--on-fault wait");
+  EXPECT_EQ(to_run("controller stop hold").status, 0);
+  Background move(folder_, "joint move joint1 --to 3 --speed 0.001 --wait --socket " + socket_,
+                  "move");
+  EXPECT_TRUE(test::eventually([&] { return joint1().value("moving", false); }));
+  EXPECT_EQ(to_run("estop --category 0").status, 0);
+  EXPECT_TRUE(test::eventually([&] { return move.ended(); }));
+  EXPECT_EQ(move.status(), 1);
+  const std::string said = read_text(folder_ / "move.err");
+  expect(said, "its motion to 3 rad has ended at ");
+  expect(said, "its drive is not enabled any more: tandem fault show");
+  EXPECT_EQ(end(), 1);
+}
+
+// `joint move --wait` had said that it has arrived, 4 rad off.
+TEST_F(JointAtRest, WithoutStiffnessIsNotSentAnywhere) {
+  begin("");
+  EXPECT_EQ(to_run("controller stop hold").status, 0);
+  EXPECT_EQ(to_run("joint set joint1 --interaction compliant --stiffness 0").status, 0);
+  const Outcome move = to_run("joint move joint1 --to 0.3 --wait");
+  EXPECT_EQ(move.status, 2);
+  expect(move.err,
+         "joint1: is compliant without stiffness: nothing would move it (tandem joint "
+         "set joint1 --stiffness, or --interaction stiff)");
   EXPECT_EQ(end(), 0);
 }
 

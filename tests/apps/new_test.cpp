@@ -218,6 +218,14 @@ TEST_F(New, NamesWhatStandsWhereTheFolderShouldBe) {
       << within.err;
 }
 
+// It had named what is there already.
+TEST_F(New, NamesAnInputThatIsNoFile) {
+  std::filesystem::create_directory(folder_ / "arm");
+  const Outcome outcome = tandem("new arm");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.err, "error: arm: this is a folder (name a .urdf file)\n");
+}
+
 TEST_F(New, SaysWhichCommandATomlFileIsFor) {
   const Outcome robot = tandem("new robot.toml");
   EXPECT_EQ(robot.status, 2);

@@ -141,6 +141,22 @@ TEST(JointTrajectory, RefusesWhatTheJointsCannotDo) {
                 .find("\n"),
             std::string::npos)
       << "one error for one number";
+  EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = -1\nposition_rad = [0.0]\n"
+                       "[[waypoint]]\ntime_s = -1\nposition_rad = [0.0]\n")
+                .find("way-point before"),
+            std::string::npos)
+      << "the second error followed from the first";
+  const std::string through =
+      "joints = ['wrist']\ninterpolation = 'quintic'\n[[waypoint]]\ntime_s = 0\n"
+      "position_rad = [0.0]\n[[waypoint]]\ntime_s = TIME\nposition_rad = [1.0]\n";
+  const auto at = [&](const char* time_s) {
+    std::string text = through;
+    return problem_of(text.replace(text.find("TIME"), 4, time_s));
+  };
+  EXPECT_EQ(at("0.5"),
+            "experiment.toml:7: waypoint[1].time_s: joint 'wrist' would need 3.75 rad/s on the "
+            "way, its limit is 2 (give it more time: with all times 1.88 times as long it fits)");
+  EXPECT_EQ(at("0.94"), "") << "1.88 times as long";
   EXPECT_EQ(problem_of("interpolation = 'qintic'\n"),
             "experiment.toml:1: interpolation: 'qintic' is not one of the choices (did you mean "
             "'quintic'?)");

@@ -92,6 +92,30 @@ TEST_F(Codec, AZeroAndADirectionHoldAcrossTheCountersEnd) {
   EXPECT_DOUBLE_EQ(state.torque_Nm()[0], 5.0);
 }
 
+// A gripper's 100 deg begin at 300 deg of its encoder's turn.
+TEST_F(Codec, TheTurnOfASingleTurnEncoderIsTheOneOfTheJointsRange) {
+  JointConfig joint;
+  joint.encoder_counts_per_rev = joint.motor_encoder_counts_per_rev = 3600.0;
+  joint.min_position_rad = -0.2;
+  joint.max_position_rad = 1.5;
+  joint.zero_counts = 3114;
+  joint.encoder_turn_counts = 3600;
+  for (const bool reversed : {false, true}) {
+    joint.reversed = reversed;
+    for (const double rad : {-0.19, 0.0, 0.7, 0.85, 1.49}) {
+      for (const int turns : {-2, 0, 3}) {  // those that it has made since power-on
+        AxisScale found = AxisScale::of(joint);
+        const int counts = 3114 + static_cast<int>(std::lround(rad * found.counts_per_rad));
+        const int shown = ((counts % 3600) + 3600) % 3600 + turns * 3600;
+        found.find_turn(shown);
+        EXPECT_EQ(found.from_zero(shown), counts - 3114) << rad << ", " << turns;
+        found.find_turn(shown);
+        EXPECT_EQ(found.from_zero(shown), counts - 3114) << "once more";
+      }
+    }
+  }
+}
+
 TEST_F(Codec, IdleKeepsTheModeOfTheDrive) {
   encode_command(scale(), canopen::Mode::kCsp, command, 0, raw);
   command.mode()[0] = static_cast<std::int8_t>(ControlMode::kIdle);

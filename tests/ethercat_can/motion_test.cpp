@@ -71,9 +71,21 @@ TEST(Motion, ForAShorterTimeIsAnImpact) {
     rig.show(3.0, 3.0);
     rig.steps(190);
     rig.show(0.5, 0.5);
-    rig.steps(10);
+    rig.steps(200);
   }
   EXPECT_EQ(rig.master->phase(), Phase::kOperational);
+}
+
+TEST(Motion, ThatIsSeldomWithinItsLimitsIsNoImpact) {
+  FastRig rig;
+  on(rig, ControlMode::kPosition);
+  for (int n = 0; n < 2; ++n) {
+    rig.show(3.0, 0.0);
+    rig.steps(190);
+    rig.show(0.5, 0.0);
+    rig.steps(10);
+  }
+  EXPECT_EQ(rig.master->fault_cause(0), FaultCause::kTooFast);
 }
 
 TEST(Motion, TakesMarginAndTimeOfTheFileAndIsNotWatchedAtZero) {

@@ -534,8 +534,12 @@ TEST_F(Guard, KeepsAFreeJointWithinItsVelocityInEveryMode) {
     ASSERT_EQ(r.write<float>(0x2010, 0, 0.0F), 0U);
     ASSERT_EQ(r.write<float>(0x2011, 0, 0.0F), 0U);
     for (const int way : {1, -1}) {
-      if (mode == -2) ASSERT_EQ(r.write(0x2012, 0, static_cast<std::int16_t>(way * 9900)), 0U);
-      if (mode == -3) ASSERT_EQ(r.write(0x2013, 0, static_cast<std::int16_t>(way * 4900)), 0U);
+      if (mode == -2) {
+        ASSERT_EQ(r.write(0x2012, 0, static_cast<std::int16_t>(way * 9900)), 0U);
+      }
+      if (mode == -3) {
+        ASSERT_EQ(r.write(0x2013, 0, static_cast<std::int16_t>(way * 4900)), 0U);
+      }
       r.commands[0].torque_offset = static_cast<std::int16_t>(way * 1100);  // 55 Nm
       r.cycles(3000);
       EXPECT_GT(way * r.joints[0].v, 7.0) << "it moves";
@@ -552,8 +556,12 @@ TEST_F(Guard, HoldsTheTorqueOfCurrentAndOpenLoopWithinItsLimit) {
     Rig& r = *rig_owner;
     r.joints[0].bus_V = 100.0;
     r.enable(static_cast<std::int8_t>(mode));
-    if (mode == -2) ASSERT_EQ(r.write(0x2012, 0, std::int16_t{9900}), 0U);
-    if (mode == -3) ASSERT_EQ(r.write(0x2013, 0, std::int16_t{4900}), 0U);
+    if (mode == -2) {
+      ASSERT_EQ(r.write(0x2012, 0, std::int16_t{9900}), 0U);
+    }
+    if (mode == -3) {
+      ASSERT_EQ(r.write(0x2013, 0, std::int16_t{4900}), 0U);
+    }
     r.cycles(12000);
     EXPECT_NEAR(r.joints[0].torque(), 60.0, 0.5) << "when its spring has come to rest";
     EXPECT_EQ(r.error(), 0);
@@ -623,7 +631,8 @@ TEST(Excess, OfVelocityTorqueAndPowerIsAFaultAfterItsTimeWhileTheMotorDrives) {
     int taken = 1;
     while (taken < 200 && protection.update(config, in, 1e-3) == ErrorCode::kNone) ++taken;
     EXPECT_EQ(protection.update(config, in, 1e-3), one.code);
-    EXPECT_NEAR(taken, one.code == ErrorCode::kNone ? 200 : 101, 1);
+    // One sample within the limit began the time anew: COMAN's waist ran at 1.31 for 0.12 s.
+    EXPECT_NEAR(taken, one.code == ErrorCode::kNone ? 200 : 3, 1);
   }
 }
 

@@ -18,6 +18,10 @@ TEST(Event, SaysWhatHappenedInOneLine) {
   EXPECT_EQ(describe(event, kNames), "fault: no feedback of hip for 11 cycles");
   event = {.code = 1, .kind = EventKind::kFell};
   EXPECT_EQ(describe(event, kNames), "fault: the robot fell: its base is tilted");
+  event = {.code = static_cast<std::uint32_t>(Code::kOutOfRange),
+           .joint = 1,
+           .kind = EventKind::kLimited};
+  EXPECT_EQ(describe(event, kNames), "command limited of knee: it was out of range");
   event = {.code = 3, .kind = EventKind::kOverrun};
   EXPECT_EQ(describe(event, kNames), "overrun: 3 cycles skipped");
   event = {.kind = EventKind::kBringUpDone};

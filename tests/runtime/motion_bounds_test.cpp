@@ -198,6 +198,8 @@ class WildRun {
     int fast = 0, strong = 0, powerful = 0, swung = 0;  ///< cycles in succession
     double swing = 0.0, moved = 0.0;  ///< mean squares of deviation and reference's velocity
     double reference_rad = 0.0, deviation_rad = 0.0;
+    double position_rad = 0.0;  ///< a cycle ago
+    std::size_t mode = 0;       ///< in which it was well last
   };
 
   [[nodiscard]] bool is_over() const {
@@ -210,11 +212,14 @@ class WildRun {
     for (; told_ < faults.size(); ++told_) {
       const auto& fault = faults[told_];
       const int joint = robot_.joint_index(fault.joint);
-      const auto j = static_cast<std::size_t>(std::max(0, joint));
-      const char* who = joint < 0          ? ""
-                        : changed_[j] != 0 ? ", gains changed"
-                        : owned(j)         ? ", of a wild controller"
-                                           : ", held with the gains of the file";
+      std::string who;
+      if (joint >= 0) {
+        const auto j = static_cast<std::size_t>(joint);
+        who = fmt::format(", {}{}", kModeNames[joints_[j].mode],
+                          changed_[j] != 0 ? ", gains changed"
+                          : owned(j)       ? ", of a wild controller"
+                                           : ", with the gains of the file");
+      }
       ++found_.faults[fault.text + who];
     }
     for (std::size_t j = 0; j < joints_.size(); ++j) look(j);
@@ -223,19 +228,23 @@ class WildRun {
   void look(std::size_t j) {
     const hal::StateImage& state = cycle_->state();
     Joint& joint = joints_[j];
+    const sim::JointReading is = backend_->plant().joint(j);
+    // Of what it moves by: where a foot strikes the ground the velocity turns within the cycle.
+    const double velocity_rad_s = (is.position_rad - joint.position_rad) / 1e-3;
+    joint.position_rad = is.position_rad;
     const bool well =
         backend_->phase() == hal::Phase::kOperational && state.fault()[j] == 0 &&
         state.drive_state()[j] == static_cast<std::uint8_t>(hal::DriveState::kOperationEnabled) &&
         state.mode()[j] != 0;
     if (!well) {
-      joint = {};
+      joint = {.position_rad = is.position_rad, .mode = joint.mode};
       return;
     }
-    const sim::JointReading is = backend_->plant().joint(j);
     const hal::JointConfig& config = robot_.joints[j];
-    const double velocity = std::abs(is.velocity_rad_s) / config.max_velocity_rad_s;
+    const double velocity = std::abs(velocity_rad_s) / config.max_velocity_rad_s;
     const double torque = std::abs(is.torque_Nm) / config.max_torque_Nm;
     const std::size_t mode = index_of(state.mode()[j], state.interaction()[j]);
+    joint.mode = mode;
     const auto most = [](double& largest, double value) { largest = std::max(largest, value); };
     most(found_.velocity[mode], velocity);
     most(found_.torque[mode], torque);

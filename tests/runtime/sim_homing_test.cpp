@@ -386,6 +386,30 @@ TEST_P(HomedSwing, IsAFunctionOfItsStateAlone) {
   EXPECT_TRUE(*cycle->save() == *end);
 }
 
+/// At power-on the drive counts within one turn, wherever its zero is: the joint is where it is,
+/// and does not move.
+TEST(SingleTurn, OfADriveIsTheOneInWhichTheJointIs) {
+  hal::RobotConfig robot = others_robot();
+  const double turn = robot.joints[0].encoder_counts_per_rev;
+  robot.joints[0].encoder_turn_counts = static_cast<std::int32_t>(turn);
+  for (const double zero : {0.0, 0.02, 0.5, 0.98, 3.5, -2.4}) {  // [turns]
+    SCOPED_TRACE(zero);
+    robot.joints[0].zero_counts = static_cast<std::int32_t>(std::lround(zero * turn));
+    auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
+                                      {.posture = "up", .release_ns = 100'000'000'000});
+    ASSERT_TRUE(made) << made.error().to_string();
+    ControllerHost host(robot, tandem::test::swing_kernels(2), 1'000'000);
+    rt::WallClock clock;
+    RobotCycle cycle(CycleParts{robot, **made, host, clock},
+                     CycleConfig{.running_cycles = 300, .settle_cycles = 200});
+    const double begun_rad = (*made)->plant().joint(0).position_rad;
+    while (cycle.phase() != RunPhase::kRunning) ASSERT_TRUE(cycle.step());
+    for (int i = 0; i < 200; ++i) ASSERT_TRUE(cycle.step());
+    EXPECT_NEAR(cycle.state().position_rad()[0], (*made)->plant().joint(0).position_rad, 1e-3);
+    EXPECT_NEAR(cycle.state().position_rad()[0], begun_rad, 0.02);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Each, HomedSwing,
                          ::testing::Values(Kind{"can", can_robot}, Kind{"line", line_robot},
                                            Kind{"others", others_robot}),

@@ -150,6 +150,15 @@ TEST_F(StopUnderAttack, IsNotConfirmedByAStrangerWhileTheRunIsSuspended) {
   signal(SIGCONT);
 }
 
+TEST_F(StopUnderAttack, InADomainOfNobodyNamesTheRunThatIsOnThisMachine) {
+  begin("--rate 20");
+  const Outcome stop = stop_over_dds();
+  EXPECT_EQ(stop.status, 1);
+  EXPECT_TRUE(has(stop.err, "warning: tandem run hold.toml")) << stop.err;
+  EXPECT_TRUE(has(stop.err, "is not stopped: tandem estop, without --dds")) << stop.err;
+  EXPECT_EQ(status().value("phase", ""), "running");
+}
+
 TEST_F(StopUnderAttack, OfARunIsNoSuccessBesideAStrangerWhoConfirms) {
   begin("--rate 20 --dds" + domain());
   const auto participant = join("tandem_run");
