@@ -66,8 +66,8 @@ DriveAbilities abilities_of(const DataSheet& sheet, int axis) {
   const bool velocity_offset = by_rpdo(object::kVelocityOffset, 0, kInteger32);
   const bool torque_offset = by_rpdo(object::kTorqueOffset, 0, kInteger16);
   // Without 6502, targets alone may be those of the profile modes: the cyclic ones have an
-  // interpolation period or offsets.
-  const bool cyclic = told || period || velocity_offset;
+  // interpolation period or offsets. On EtherCAT process data is cyclic by itself.
+  const bool cyclic = told || period || velocity_offset || sheet.ethercat;
 
   DriveAbilities can;
   can.machine = by_rpdo(object::kControlword, 0, kUnsigned16) &&

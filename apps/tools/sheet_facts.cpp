@@ -96,10 +96,12 @@ SheetMode mode_of(const DataSheet& sheet, const ModeFacts& facts) {
 }
 
 /// Without 6502 nobody tells the modes: those whose objects are there may exist. A cyclic mode
-/// shares its objects with a profile mode, and is told from it by the cycle's time (60C2).
+/// shares its objects with a profile mode, and is told from it by the cycle's time (60C2); on
+/// EtherCAT by its being there.
 bool may_exist(const DataSheet& sheet, const SheetMode& mode) {
   const bool cyclic = mode.number >= static_cast<int>(canopen::Mode::kCsp);
-  return mode.lacks.empty() && (!cyclic || sheet.has(object::kInterpolationPeriod));
+  return mode.lacks.empty() &&
+         (!cyclic || sheet.ethercat || sheet.has(object::kInterpolationPeriod));
 }
 
 void add_modes(const DataSheet& sheet, SheetFacts& facts) {

@@ -117,6 +117,19 @@ TEST(LineDrive, PdosThatCanBeMappedTakeAllInOne) {
   expect_follows(robot);
 }
 
+/// A program of one's own on SOES: no dictionary that tells modes, a clock or sync managers.
+/// source: OpenEtherCATsociety/SOEM samples, which map 6040 607A 6060
+TEST(LineDrive, TheFewObjectsOfAProgramOfOnesOwnAreEnough) {
+  DataSheet sheet = drive(pdo("RxPdo", "1600", "Fixed=\"1\" Sm=\"2\"", kControl + kTarget + kMode) +
+                          pdo("TxPdo", "1A00", "Fixed=\"1\" Sm=\"3\"", kStatus + kPosition));
+  std::erase_if(sheet.entries, [](const canopen::SheetEntry& e) {
+    return e.index == 0x6502 || e.index == 0x1C12 || e.index == 0x1C13;
+  });
+  sheet.managers.clear();
+  sheet.dc_modes.clear();
+  expect_follows(with(std::move(sheet)));
+}
+
 TEST(LineDrive, AFixedPdoOfElevenBytesIsTakenAsItIs) {
   const auto robot = with(drive(
       pdo("RxPdo", "1701", "Fixed=\"1\" Sm=\"2\"", kControl + kTarget + kMode + kGap) +
