@@ -289,8 +289,11 @@ Result<DataSheet> read_data_sheet(std::string_view text, std::string_view file,
 }
 
 Result<DataSheet> load_data_sheet(const std::string& file, const DeviceChoice& choice) {
-  const Result<std::string> text =
-      read_file(file, "name the EDS, DCF or ESI of a device", bounds::kEsiBytes.most);
+  constexpr std::string_view kXml = ".xml";
+  const bool xml = file.size() > kXml.size() &&
+                   same_word(std::string_view(file).substr(file.size() - kXml.size()), kXml);
+  const Result<std::string> text = read_file(file, "name the EDS, DCF or ESI of a device",
+                                             xml ? bounds::kEsiBytes.most : kMaxSheetBytes);
   if (!text) return std::unexpected(text.error());
   return read_data_sheet(*text, file, choice);
 }

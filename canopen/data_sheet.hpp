@@ -129,7 +129,7 @@ inline constexpr std::size_t kMaxSheetEntries = bounds::kSheetEntries.most;
                                                 const DeviceChoice& choice = {});
 
 /// Reads the file. Errors: those of read_data_sheet(); there is no such file, it is none, or it is
-/// larger than kMaxSheetBytes, of which nothing is read.
+/// larger than kMaxSheetBytes, of which nothing is read; "….xml": than bounds::kEsiBytes.
 [[nodiscard]] Result<DataSheet> load_data_sheet(const std::string& file,
                                                 const DeviceChoice& choice = {});
 
