@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/open_file.hpp"
+#include "canopen/esi.hpp"
 #include "canopen/ini_text.hpp"
 #include "canopen/objects.hpp"
 #include "canopen/sheet_mappings.hpp"
@@ -47,7 +48,7 @@ class SheetReader {
     if (text.size() > kMaxSheetBytes) {
       return fail("has " + std::to_string(text.size()) + " bytes, and a data sheet may have " +
                       std::to_string(kMaxSheetBytes),
-                  "name the EDS or DCF of the device");
+                  "name the EDS, DCF or ESI of the device");
     }
     auto sections = read_ini(text, remarks_);
     if (!sections) return std::unexpected(std::move(sections.error()));
@@ -77,7 +78,7 @@ class SheetReader {
     objects_ = std::move(*objects);
     if (objects_.empty()) {
       return fail("has no section of an object, such as [1000]: it is no data sheet",
-                  "name the EDS or DCF of the device");
+                  "name the EDS, DCF or ESI of the device");
     }
     if (Status keys = check_keys(sections_, remarks_); !keys) return keys;
     if (Status whole = check_last_section(sections_.back(), objects_); !whole) return whole;
@@ -280,17 +281,21 @@ std::optional<std::int64_t> DataSheet::value(std::uint16_t index, std::uint8_t s
   return entry->value->of(id);
 }
 
-Result<DataSheet> read_data_sheet(std::string_view text, std::string_view file) {
-  auto sheet = SheetReader(file).read(text);
+Result<DataSheet> read_data_sheet(std::string_view text, std::string_view file,
+                                  const DeviceChoice& choice) {
+  auto sheet = is_xml(text) ? read_esi(text, file, choice) : SheetReader(file).read(text);
   if (!sheet) sheet.error().file = file;
   return sheet;
 }
 
-Result<DataSheet> load_data_sheet(const std::string& file) {
-  const Result<std::string> text =
-      read_file(file, "name the EDS or DCF of a device", kMaxSheetBytes);
+Result<DataSheet> load_data_sheet(const std::string& file, const DeviceChoice& choice) {
+  constexpr std::string_view kXml = ".xml";
+  const bool xml = file.size() > kXml.size() &&
+                   same_word(std::string_view(file).substr(file.size() - kXml.size()), kXml);
+  const Result<std::string> text = read_file(file, "name the EDS, DCF or ESI of a device",
+                                             xml ? bounds::kEsiBytes.most : kMaxSheetBytes);
   if (!text) return std::unexpected(text.error());
-  return read_data_sheet(*text, file);
+  return read_data_sheet(*text, file, choice);
 }
 
 }  // namespace tandem::canopen

@@ -1,4 +1,5 @@
-// What an electronic data sheet (EDS, DCF; CiA 306) says of a device: identity and objects.
+// What a data sheet says of a device: identity and objects. An EDS or DCF (CiA 306), or the ESI of
+// an EtherCAT slave (ETG.2000).
 // Layer: canopen.  Thread: non-RT only.
 #pragma once
 
@@ -7,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/bounds.hpp"
@@ -43,6 +45,35 @@ struct SheetEntry {
   [[nodiscard]] int size() const noexcept;
 };
 
+/// Which device of a file that has several, as an ESI may; what is empty is any.
+struct DeviceChoice {
+  std::optional<std::uint32_t> product;
+  std::optional<std::uint32_t> revision;  ///< its major is compared
+};
+
+/// A sync manager of an ESI: its process data or its mailbox.
+struct SheetManager {
+  std::string use;  ///< "Outputs"
+  std::uint32_t start = 0;
+  std::uint32_t bytes = 0;       ///< from power-on
+  std::uint32_t most_bytes = 0;  ///< 0: not said
+};
+
+/// A way to be synchronous that an ESI offers (Dc/OpMode).
+struct SheetDcMode {
+  std::string name;
+  std::uint16_t activate = 0;  ///< AssignActivate: bit 9 SYNC0, bit 10 SYNC1
+  [[nodiscard]] bool sync0() const noexcept { return (activate & 0x0200) != 0; }
+  [[nodiscard]] bool sync1() const noexcept { return (activate & 0x0400) != 0; }
+};
+
+/// A value that an ESI wants to be written before SAFEOP (CoE/InitCmd).
+struct SheetWrite {
+  std::uint16_t index = 0;
+  std::uint8_t sub = 0;
+  std::vector<std::uint8_t> bytes;  ///< one to four
+};
+
 /// A data sheet that was read. Entries are sorted by index and sub-index.
 struct DataSheet {
   std::string file;
@@ -60,6 +91,15 @@ struct DataSheet {
   std::optional<int> granularity;      ///< of PDO mappings [bit]; 0: they cannot be changed
   std::vector<std::uint16_t> dummies;  ///< data types that an RPDO may have as filler
   std::vector<SheetEntry> entries;
+  /// EtherCAT: PDOs are any of 1600 to 17FF and 1A00 to 1BFF, without COB-IDs; 1C12 and 1C13 say
+  /// which of them are the process data. An ESI's sheet, or one of a board on such a bus.
+  bool ethercat = false;
+  // The rest of an ESI
+  std::vector<SheetManager> managers;
+  std::vector<SheetDcMode> dc_modes;
+  std::vector<SheetWrite> writes;
+  std::vector<std::pair<std::uint16_t, std::uint16_t>> excludes;  ///< PDOs, of which one at a time
+  std::vector<std::uint16_t> mandatory;  ///< PDOs that are always among the process data
   /// What contradicts itself or CiA 306 and was read all the same: "line 12: …".
   std::vector<std::string> remarks;
 
@@ -75,7 +115,7 @@ struct DataSheet {
 inline constexpr std::size_t kMaxSheetBytes = bounds::kSheetBytes.most;
 inline constexpr std::size_t kMaxSheetEntries = bounds::kSheetEntries.most;
 
-/// Reads the text of an EDS or DCF.
+/// Reads the text of an EDS or DCF, or of an ESI: a text that begins with `<`.
 ///
 /// Takes what sheets of real drives have (docs/drives.md lists it) and notes it in `remarks`.
 /// @param file  name for errors; nothing is opened.
@@ -83,10 +123,14 @@ inline constexpr std::size_t kMaxSheetEntries = bounds::kSheetEntries.most;
 /// contents, a number that is none or does not fit its type, an unknown access or object type;
 /// the file ends in the middle of a section, or lacks more than a tenth of the objects that it
 /// lists; it is larger than kMaxSheetBytes or kMaxSheetEntries.
-[[nodiscard]] Result<DataSheet> read_data_sheet(std::string_view text, std::string_view file);
+/// Of an ESI, with line and element: no well-formed XML, or another kind of it; no device, or
+/// several of which `choice` does not name one; a number or a PDO that cannot be.
+[[nodiscard]] Result<DataSheet> read_data_sheet(std::string_view text, std::string_view file,
+                                                const DeviceChoice& choice = {});
 
 /// Reads the file. Errors: those of read_data_sheet(); there is no such file, it is none, or it is
-/// larger than kMaxSheetBytes, of which nothing is read.
-[[nodiscard]] Result<DataSheet> load_data_sheet(const std::string& file);
+/// larger than kMaxSheetBytes, of which nothing is read; "….xml": than bounds::kEsiBytes.
+[[nodiscard]] Result<DataSheet> load_data_sheet(const std::string& file,
+                                                const DeviceChoice& choice = {});
 
 }  // namespace tandem::canopen

@@ -33,10 +33,13 @@ bool remappable(const DataSheet& sheet, std::uint16_t parameter) {
 
 namespace {
 
-/// Whether one of the first PDOs of a direction can be mapped, or has the entry from power-on.
+/// Whether one of the first PDOs of a direction (of a slave: any) can be mapped, or has the entry
+/// from power-on.
 bool carried(const DataSheet& sheet, const SheetEntry& entry, Access right) {
   const bool receive = right == kMapRpdo;
-  for (int i = 0; i < kPdosPerNode; ++i) {
+  constexpr int kPdosOfSlave = 0x200;
+  const int pdos = sheet.ethercat ? kPdosOfSlave : kPdosPerNode;
+  for (int i = 0; i < pdos; ++i) {
     const auto parameter =
         static_cast<std::uint16_t>((receive ? object::kRpdoParameter : object::kTpdoParameter) + i);
     if (remappable(sheet, parameter)) return true;
@@ -73,8 +76,8 @@ DriveAbilities abilities_of(const DataSheet& sheet, int axis) {
   const bool velocity_offset = by_rpdo(object::kVelocityOffset, 0, kInteger32);
   const bool torque_offset = by_rpdo(object::kTorqueOffset, 0, kInteger16);
   // Without 6502, targets alone may be those of the profile modes: the cyclic ones have an
-  // interpolation period or offsets.
-  const bool cyclic = told || period || velocity_offset;
+  // interpolation period or offsets. On EtherCAT process data is cyclic by itself.
+  const bool cyclic = told || period || velocity_offset || sheet.ethercat;
 
   DriveAbilities can;
   can.machine = by_rpdo(object::kControlword, 0, kUnsigned16) &&

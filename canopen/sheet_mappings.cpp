@@ -65,7 +65,7 @@ void check(const DataSheet& sheet, const SheetEntry& count, std::vector<OddMappi
                                    " objects, and defines " + std::to_string(entries - missing)});
   }
   const int most = 8 * sheet.most_pdo_bytes;
-  if (bits <= most) return;
+  if (sheet.ethercat || bits <= most) return;  // a slave's PDOs are no frames
   const bool fits_fd = bits <= 8 * static_cast<int>(kMaxFrameBytes);
   odd.push_back({count.line, name + " maps " + std::to_string(bits) +
                                  " bits, and a frame has at most " + std::to_string(most) +

@@ -16,7 +16,7 @@ struct OddMapping {
 
 /// What is wrong with the mappings (1600 to 17FF, 1A00 to 1BFF) that the sheet gives as values:
 /// more entries than sub 0's HighLimit, than 64 or than the sheet defines, more bits than a frame
-/// of `sheet.most_pdo_bytes` carries.
+/// of `sheet.most_pdo_bytes` carries, but for a slave's.
 [[nodiscard]] std::vector<OddMapping> odd_mappings(const DataSheet& sheet);
 
 }  // namespace tandem::canopen

@@ -203,10 +203,20 @@ std::optional<MadeEntry> plain_entry(const SheetEntry& entry, ObjectDictionary& 
       .plain = true};
 }
 
+/// Of a slave, what is before the board: its PDOs, and what says of the sync managers which they
+/// are. The board behind it keeps its own PDOs.
+bool is_slaves(const DataSheet& sheet, std::uint16_t index) {
+  return sheet.ethercat && index >= co::kRpdoParameter && index < 0x1D00;
+}
+
 /// Sorted. What has no place in the stand-in is left out.
 std::vector<MadeEntry> entries_of(const DataSheet& sheet, std::size_t axes, ObjectDictionary& od) {
   std::vector<MadeEntry> made;
+  for (const ObjectEntry& own : od.entries()) {
+    if (is_slaves(sheet, own.index)) made.push_back({own, Start::kBoards});
+  }
   for (const SheetEntry& entry : sheet.entries) {
+    if (is_slaves(sheet, entry.index)) continue;
     const ObjectEntry* ours = variable_of(od, entry, axes);
     auto bound = ours != nullptr ? bound_entry(sheet, entry, *ours, axes) : std::nullopt;
     if (!bound) bound = plain_entry(entry, od);
@@ -251,8 +261,14 @@ SheetDictionary::SheetDictionary(const DataSheet& sheet, int node_id, std::size_
   std::vector<ObjectEntry> entries;
   for (const MadeEntry& one : made) entries.push_back(one.entry);
   od.replace(std::move(entries));
-  if (const std::size_t all = sheet.entries.size() + sheet.dummies.size(); made.size() < all) {
-    remarks_.push_back(counted(all - made.size(), "entry is", "entries are") +
+  const auto told = [&](std::uint16_t index) { return !is_slaves(sheet, index); };
+  const auto all =
+      static_cast<std::size_t>(std::ranges::count_if(sheet.entries, told, &SheetEntry::index)) +
+      sheet.dummies.size();
+  const auto kept = static_cast<std::size_t>(
+      std::ranges::count_if(made, [&](const MadeEntry& one) { return told(one.entry.index); }));
+  if (kept < all) {
+    remarks_.push_back(counted(all - kept, "entry is", "entries are") +
                        " left out: texts, domains, numbers of 24 or more than 32 bit");
   }
   for (const MadeEntry& one : made) {

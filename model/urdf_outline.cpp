@@ -12,10 +12,10 @@
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
 #include "base/utf8.hpp"
+#include "base/xml_scan.hpp"
 #include "model/urdf_vocabulary.hpp"
 #include "model/urdf_xacro.hpp"
 #include "model/xml_reference.hpp"
-#include "model/xml_scan.hpp"
 
 namespace tandem::model {
 namespace {

@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 #include <sstream>
 
-#include "model/xml_scan.hpp"
+#include "base/xml_scan.hpp"
 
 namespace tandem::model {
 namespace {

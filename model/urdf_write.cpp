@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <charconv>
 
-#include "model/xml_scan.hpp"
+#include "base/xml_scan.hpp"
 
 namespace tandem::model {
 namespace {

@@ -105,7 +105,8 @@ const char kEdsExamples[] = R"(Examples:
 
 const char kEdsShowExamples[] = R"(Examples:
   tandem eds show drive.eds                          identity, modes, PDOs, units, oddities
-  tandem eds show drive.dcf --json - | jq .modes     the same for programs)";
+  tandem eds show drive.dcf --json - | jq .modes     the same for programs
+  tandem eds show maker.xml --product 0x200          a device of an EtherCAT maker's file (ESI))";
 
 const char kLatencyExamples[] = R"(Examples:
   tandem latency                                     ours beside cyclictest, idle, then under load
@@ -433,7 +434,10 @@ void add_flags(CLI::App& app, EdsOptions& o) {
   CLI::Option* json = app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kEdsExamples);
   CLI::App* show = app.add_subcommand("show", "What the drive of a sheet is and can");
-  show->add_option("sheet", o.sheet, "EDS or DCF")->required();
+  show->add_option("sheet", o.sheet, "EDS or DCF; of an EtherCAT slave also its ESI (XML)")
+      ->required();
+  show->add_option("--product", o.product, "Of an ESI with several devices: the product code");
+  show->add_option("--revision", o.revision, "Of an ESI with several devices: the revision");
   show->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   show->footer(kEdsShowExamples);
   show->excludes(robot)->excludes(output)->excludes(json);

@@ -229,9 +229,11 @@ struct LogOptions {
 /// tandem eds ROBOT, tandem eds show SHEET
 struct EdsOptions {
   enum class Action : std::uint8_t { kWrite, kShow } action = Action::kWrite;
-  std::string robot;           ///< robot.toml
-  std::string sheet;           ///< show: EDS or DCF
-  std::string output = "eds";  ///< folder
+  std::string robot;                      ///< robot.toml
+  std::string sheet;                      ///< show: EDS, DCF or ESI
+  std::optional<std::uint32_t> product;   ///< show: which device of an ESI
+  std::optional<std::uint32_t> revision;  ///< show: the same
+  std::string output = "eds";             ///< folder
   std::string json;
 };
 

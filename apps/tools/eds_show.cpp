@@ -10,6 +10,7 @@
 #include "apps/tools/sheet_facts.hpp"
 #include "base/counted.hpp"
 #include "canopen/data_sheet.hpp"
+#include "canopen/drive_abilities.hpp"
 #include "canopen/object_dictionary.hpp"
 #include "canopen/objects.hpp"
 #include "firmware_emu/board.hpp"
@@ -63,6 +64,28 @@ std::string sheet_text(const DataSheet& sheet) {
   return text;
 }
 
+/// What only an EtherCAT slave has.
+void add_slave(Facts& table, const DataSheet& sheet) {
+  std::vector<std::string> managers;
+  for (const canopen::SheetManager& one : sheet.managers) {
+    managers.push_back(fmt::format("{} {} at 0x{:04X}", one.use.empty() ? "-" : one.use,
+                                   counted(one.bytes, "byte"), one.start));
+  }
+  table.add("managers",
+            managers.empty() ? "not said" : fmt::format("{}", fmt::join(managers, ", ")));
+  const bool chosen = canopen::writable(sheet, 0x1C12, 0) || canopen::writable(sheet, 0x1C13, 0);
+  table.add("assignment", chosen ? "the master may choose the PDOs (1C12, 1C13)"
+                                 : "the PDOs are those from power-on (1C12, 1C13)");
+  std::vector<std::string> modes;
+  for (const canopen::SheetDcMode& mode : sheet.dc_modes) {
+    modes.push_back(fmt::format("{} ({})", mode.name,
+                                mode.sync1()   ? "SYNC0 and SYNC1"
+                                : mode.sync0() ? "SYNC0"
+                                               : "no pulses"));
+  }
+  table.add("clock", modes.empty() ? "none" : fmt::format("{}", fmt::join(modes, ", ")));
+}
+
 void print_facts(std::FILE* out, const DataSheet& sheet, const SheetFacts& facts) {
   Facts table;
   table.add("device", device_name(sheet));
@@ -70,6 +93,11 @@ void print_facts(std::FILE* out, const DataSheet& sheet, const SheetFacts& facts
                                     known_hex(sheet.product), known_hex(sheet.revision)));
   table.add("profile", profile_text(facts));
   table.add("sheet", sheet_text(sheet));
+  if (sheet.ethercat) {
+    add_slave(table, sheet);
+    table.print(out);
+    return;
+  }
   table.add("bit rates", sheet.bit_rates_kbit_s.empty()
                              ? "not said"
                              : fmt::format("{} kbit/s", fmt::join(sheet.bit_rates_kbit_s, ", ")));
@@ -112,8 +140,23 @@ std::string cob_id_text(const std::optional<canopen::SheetValue>& id) {
   return fmt::format("0x{:X}{}", id->number & bits, id->plus_node_id ? "+id" : "");
 }
 
+/// By their objects; there are no COB-IDs.
+void print_slave_pdos(std::FILE* out, const SheetFacts& facts) {
+  Table table({"PDO", "from power-on", "entries", "carries"});
+  table.align_left();
+  for (const SheetPdo& pdo : facts.pdos) {
+    const int first = pdo.receive ? canopen::object::kRpdoMapping : canopen::object::kTpdoMapping;
+    table.add({fmt::format("{:04X}", first + pdo.number - 1),
+               pdo.assigned ? (pdo.receive ? "outputs" : "inputs") : "-",
+               std::to_string(pdo.entries) + (pdo.mapping_writable ? "*" : ""),
+               joined(pdo.carries)});
+  }
+  table.print(out);
+}
+
 void print_pdos(std::FILE* out, const SheetFacts& facts) {
   fmt::print(out, "\nPDOs (with *: the master may change it):\n");
+  if (facts.ethercat) return print_slave_pdos(out, facts);
   Table table({"PDO", "COB-ID", "type", "entries", "carries"});
   table.align_left();
   const auto star = [](bool writable) { return writable ? "*" : ""; };
@@ -242,6 +285,7 @@ Json pdos_json(const SheetFacts& facts) {
                     {"transmission_writable", pdo.transmission_writable},
                     {"entries", pdo.entries},
                     {"mapping_writable", pdo.mapping_writable},
+                    {"assigned", pdo.assigned},
                     {"carries", pdo.carries}});
   }
   return list;
@@ -277,6 +321,14 @@ Json stand_in_json(const Result<StandIn>& simulated) {
   return {{"refused", nullptr}, {"modes", simulated->modes}, {"remarks", simulated->remarks}};
 }
 
+Json dc_modes_json(const DataSheet& sheet) {
+  Json list = Json::array();
+  for (const canopen::SheetDcMode& mode : sheet.dc_modes) {
+    list.push_back({{"name", mode.name}, {"assign_activate", mode.activate}});
+  }
+  return list;
+}
+
 Json sheet_json(const DataSheet& sheet, const SheetFacts& facts,
                 const Result<hal::can::DriveUse>& use, const Result<StandIn>& simulated) {
   Json json{{"file", sheet.file},
@@ -293,6 +345,8 @@ Json sheet_json(const DataSheet& sheet, const SheetFacts& facts,
             {"bit_rate_kbit_s", known(sheet.bit_rate_kbit_s)},
             {"bit_rates_kbit_s", sheet.bit_rates_kbit_s},
             {"lss", sheet.lss},
+            {"ethercat", sheet.ethercat},
+            {"dc_modes", dc_modes_json(sheet)},
             {"heartbeat_consumers", facts.heartbeat_consumers},
             {"heartbeat_producer", facts.heartbeat_producer},
             {"node_guarding", facts.node_guarding}};
@@ -313,7 +367,8 @@ Json sheet_json(const DataSheet& sheet, const SheetFacts& facts,
 }  // namespace
 
 Exit eds_show(const EdsOptions& options) {
-  const auto sheet = canopen::load_data_sheet(options.sheet);
+  const auto sheet = canopen::load_data_sheet(
+      options.sheet, {.product = options.product, .revision = options.revision});
   if (!sheet) return refuse(sheet.error());
   const SheetFacts facts = sheet_facts(*sheet);
   const auto use = hal::can::use_of(*sheet);

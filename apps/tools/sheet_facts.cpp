@@ -97,10 +97,12 @@ SheetMode mode_of(const DataSheet& sheet, const ModeFacts& facts) {
 }
 
 /// Without 6502 nobody tells the modes: those whose objects are there may exist. A cyclic mode
-/// shares its objects with a profile mode, and is told from it by the cycle's time (60C2).
+/// shares its objects with a profile mode, and is told from it by the cycle's time (60C2); on
+/// EtherCAT by its being there.
 bool may_exist(const DataSheet& sheet, const SheetMode& mode) {
   const bool cyclic = mode.number >= static_cast<int>(canopen::Mode::kCsp);
-  return mode.lacks.empty() && (!cyclic || sheet.has(object::kInterpolationPeriod));
+  return mode.lacks.empty() &&
+         (!cyclic || sheet.ethercat || sheet.has(object::kInterpolationPeriod));
 }
 
 void add_modes(const DataSheet& sheet, SheetFacts& facts) {
@@ -139,6 +141,10 @@ void add_mapping(const DataSheet& sheet, std::uint16_t mapping, SheetPdo& pdo) {
     pdo.entries = sub;
     if (sub > used || !entry->value || entry->value->number == 0) continue;
     const auto mapped = static_cast<std::uint32_t>(entry->value->number);
+    if (mapped >> 16 == 0) {
+      pdo.carries.push_back(fmt::format("({} bit)", mapped & 0xFF));
+      continue;
+    }
     pdo.carries.push_back(
         text_of(static_cast<std::uint16_t>(mapped >> 16), static_cast<std::uint8_t>(mapped >> 8)));
   }
@@ -161,6 +167,11 @@ void add_pdos(const DataSheet& sheet, bool receive, SheetFacts& facts) {
     if (const auto type = sheet.value(parameter, 2, 0)) pdo.transmission = static_cast<int>(*type);
     pdo.transmission_writable = writable(sheet.find(parameter, 2));
     add_mapping(sheet, mapping, pdo);
+    const std::uint16_t assignment = receive ? 0x1C12 : 0x1C13;
+    const auto used = sheet.value(assignment, 0, 0).value_or(0);
+    for (int sub = 1; sub <= used && sheet.ethercat; ++sub) {
+      pdo.assigned |= sheet.value(assignment, static_cast<std::uint8_t>(sub), 0) == mapping;
+    }
     facts.pdos.push_back(std::move(pdo));
   }
 }
@@ -177,6 +188,7 @@ SheetFacts sheet_facts(const DataSheet& sheet) {
   for (int axis = 0; axis < canopen::kMaxAxes; ++axis) {
     if (sheet.has(canopen::of_axis(object::kControlword, axis))) ++facts.axes;
   }
+  facts.ethercat = sheet.ethercat;
   add_modes(sheet, facts);
   add_pdos(sheet, true, facts);
   add_pdos(sheet, false, facts);

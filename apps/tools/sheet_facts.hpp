@@ -31,6 +31,7 @@ struct SheetPdo {
   bool transmission_writable = false;
   int entries = 0;  ///< the most that it can carry
   bool mapping_writable = false;
+  bool assigned = false;             ///< of a slave: it is among the process data from power-on
   std::vector<std::string> carries;  ///< as the sheet has it: "6040", "60C1:1"
 };
 
@@ -42,6 +43,7 @@ struct SheetFacts {
   bool modes_said = false;                   ///< by 6502; else they are guessed from the objects
   std::vector<SheetMode> modes;
   std::vector<int> own_modes;  ///< the manufacturer's bits of 6502, 16 to 31
+  bool ethercat = false;       ///< PDOs are those of a slave
   std::vector<SheetPdo> pdos;
   std::vector<const canopen::SheetEntry*> into_rpdo;
   std::vector<const canopen::SheetEntry*> into_tpdo;

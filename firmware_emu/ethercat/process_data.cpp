@@ -10,14 +10,43 @@ namespace tandem::firmware::esc {
 using canopen::AbortCode;
 using canopen::ObjectEntry;
 
-ProcessData::ProcessData(Direction direction, std::span<const PdoSetup> pdos)
-    : direction_(direction) {
-  for (const PdoSetup& setup : pdos.first(std::min(pdos.size(), kMaxPdos))) {
+namespace {
+
+/// A gap: index 0, or a data type in the place of an object (CiA 301).
+bool is_gap(std::uint32_t mapped) noexcept { return mapped >> 16 < 0x1000; }
+
+}  // namespace
+
+ProcessData::ProcessData(Direction direction, std::span<const PdoSetup> pdos, bool assigns)
+    : direction_(direction), assigns_(assigns) {
+  std::size_t most = 1;
+  for (const PdoSetup& setup : pdos.first(std::min(pdos.size(), kMaxPdoObjects))) {
     Pdo& pdo = pdos_.emplace_back();
     pdo.index = setup.index;
-    pdo.count = static_cast<std::uint8_t>(std::min(setup.entries.size(), kMaxPdoEntries));
-    std::copy_n(setup.entries.begin(), pdo.count, pdo.entries.begin());
-    if (setup.assigned) assigned_[assigned_count_++] = setup.index;
+    pdo.fixed = setup.fixed;
+    pdo.power_on = setup.entries;
+    pdo.power_on.resize(std::min(pdo.power_on.size(), kMostPdoEntries));
+    pdo.entries.resize(std::min(setup.room(), kMostPdoEntries));
+    most = std::max(most, pdo.entries.size());
+    if (setup.assigned && power_on_count_ < kMaxPdos) power_on_[power_on_count_++] = setup.index;
+  }
+  copy_.resize(kMaxPdos * most);
+  ProcessData::reset();
+}
+
+std::size_t ProcessData::objects(std::span<const PdoSetup> pdos) noexcept {
+  std::size_t count = 1 + kMaxPdos;
+  for (const PdoSetup& pdo : pdos) count += 1 + pdo.room();
+  return count;
+}
+
+void ProcessData::reset() noexcept TANDEM_RT {
+  assigned_count_ = power_on_count_;
+  assigned_ = power_on_;
+  for (Pdo& pdo : pdos_) {
+    pdo.count = static_cast<std::uint8_t>(pdo.power_on.size());
+    std::ranges::fill(pdo.entries, 0U);
+    std::ranges::copy(pdo.power_on, pdo.entries.begin());
   }
 }
 
@@ -27,16 +56,17 @@ bool ProcessData::add_to(canopen::ObjectDictionary& od) {
   const auto most = [](std::size_t count) {
     return canopen::ObjectRange{.min = 0, .max = static_cast<double>(count)};
   };
-  bool done = od.add(assign, 0, assigned_count_, canopen::kReadWrite, most(kMaxPdos), this);
+  const auto right = [](bool writable) { return writable ? canopen::kReadWrite : canopen::kRead; };
+  bool done = od.add(assign, 0, assigned_count_, right(assigns_), most(kMaxPdos), this);
   for (std::size_t i = 0; i < kMaxPdos; ++i) {
-    done &= od.add(assign, static_cast<std::uint8_t>(i + 1), assigned_[i], canopen::kReadWrite, {},
-                   this);
+    done &=
+        od.add(assign, static_cast<std::uint8_t>(i + 1), assigned_[i], right(assigns_), {}, this);
   }
   for (Pdo& pdo : pdos_) {
-    done &= od.add(pdo.index, 0, pdo.count, canopen::kReadWrite, most(kMaxPdoEntries), this);
-    for (std::size_t i = 0; i < kMaxPdoEntries; ++i) {
-      done &= od.add(pdo.index, static_cast<std::uint8_t>(i + 1), pdo.entries[i],
-                     canopen::kReadWrite, {}, this);
+    const std::uint8_t access = right(!pdo.fixed);
+    done &= od.add(pdo.index, 0, pdo.count, access, most(pdo.entries.size()), this);
+    for (std::size_t i = 0; i < pdo.entries.size(); ++i) {
+      done &= od.add(pdo.index, static_cast<std::uint8_t>(i + 1), pdo.entries[i], access, {}, this);
     }
   }
   return done;
@@ -47,32 +77,33 @@ const ProcessData::Pdo* ProcessData::find(std::uint16_t index) const noexcept {
   return at == pdos_.end() ? nullptr : &*at;
 }
 
-std::size_t ProcessData::bytes_of(const Pdo& pdo) noexcept {
+std::size_t ProcessData::bits_of(const Pdo& pdo) noexcept {
   std::size_t bits = 0;
   for (std::size_t i = 0; i < pdo.count; ++i) bits += pdo.entries[i] & 0xFF;
-  return bits / 8;
+  return bits;
 }
 
 std::size_t ProcessData::bytes() const noexcept TANDEM_RT {
-  std::size_t sum = 0;
+  std::size_t bits = 0;
   for (std::size_t i = 0; i < assigned_count_; ++i) {
     const Pdo* pdo = find(assigned_[i]);
-    if (pdo != nullptr) sum += bytes_of(*pdo);
+    if (pdo != nullptr) bits += bits_of(*pdo);
   }
-  return sum;
+  return (bits + 7) / 8;
 }
 
-AbortCode ProcessData::check_entry(std::uint32_t mapped) const noexcept {
+/// @param at  bits before it in its PDO
+AbortCode ProcessData::check_entry(std::uint32_t mapped, std::size_t at) const noexcept {
   const auto index = static_cast<std::uint16_t>(mapped >> 16);
   const auto sub = static_cast<std::uint8_t>(mapped >> 8);
   const std::uint32_t bits = mapped & 0xFF;
-  if (bits == 0 || bits % 8 != 0) return AbortCode::kNotMappable;
-  if (index == 0) return AbortCode::kNone;  // a gap
+  if (bits == 0) return AbortCode::kNotMappable;
+  if (is_gap(mapped)) return AbortCode::kNone;
   const ObjectEntry* entry = od_->find(index, sub);
   if (entry == nullptr) return od_->exists(index, sub);
   const std::uint8_t right =
       direction_ == Direction::kOutputs ? canopen::kMapRpdo : canopen::kMapTpdo;
-  const bool fits = (entry->access & right) != 0 && bits == 8u * entry->size;
+  const bool fits = (entry->access & right) != 0 && bits == 8u * entry->size && at % 8 == 0;
   return fits ? AbortCode::kNone : AbortCode::kNotMappable;
 }
 
@@ -83,57 +114,61 @@ AbortCode ProcessData::check(const ObjectEntry& entry,
   const Pdo* pdo = assignment ? nullptr : find(entry.index);
   const std::uint8_t count = assignment ? assigned_count_ : pdo->count;
   if (entry.sub != 0) return count == 0 ? AbortCode::kNone : AbortCode::kUnsupportedAccess;
-  std::size_t sum = 0;
+  std::size_t bits = 0;
   for (std::size_t i = 0; i < bytes[0]; ++i) {
     if (assignment) {
       const Pdo* one = find(assigned_[i]);
       if (one == nullptr) return AbortCode::kNotMappable;
-      sum += bytes_of(*one);
+      bits += bits_of(*one);
     } else {
-      const AbortCode code = check_entry(pdo->entries[i]);
+      const AbortCode code = check_entry(pdo->entries[i], bits);
       if (code != AbortCode::kNone) return code;
-      sum += (pdo->entries[i] & 0xFF) / 8;
+      bits += pdo->entries[i] & 0xFF;
     }
   }
-  return sum > kMaxProcessBytes ? AbortCode::kMappingTooLong : AbortCode::kNone;
+  return (bits + 7) / 8 > kMaxProcessBytes ? AbortCode::kMappingTooLong : AbortCode::kNone;
 }
 
-void ProcessData::compile() noexcept TANDEM_RT {
+void ProcessData::lay_out() noexcept {
   copies_ = 0;
+  std::size_t bits = 0;
   for (std::size_t i = 0; i < assigned_count_; ++i) {
     const Pdo* pdo = find(assigned_[i]);
     if (pdo == nullptr) continue;
     for (std::size_t n = 0; n < pdo->count; ++n) {
       const std::uint32_t mapped = pdo->entries[n];
-      const bool known = check_entry(mapped) == AbortCode::kNone;
-      copy_[copies_++] = {.entry = known ? od_->find(static_cast<std::uint16_t>(mapped >> 16),
-                                                     static_cast<std::uint8_t>(mapped >> 8))
-                                         : nullptr,
-                          .bytes = (mapped & 0xFF) / 8};
+      if (!is_gap(mapped) && check_entry(mapped, bits) == AbortCode::kNone) {
+        copy_[copies_++] = {.entry = od_->find(static_cast<std::uint16_t>(mapped >> 16),
+                                               static_cast<std::uint8_t>(mapped >> 8)),
+                            .mapped = mapped,
+                            .at = bits / 8,
+                            .pdo = static_cast<std::uint8_t>(i)};
+      }
+      bits += mapped & 0xFF;
     }
   }
 }
 
+void ProcessData::compile() noexcept TANDEM_RT { lay_out(); }
+
 void ProcessData::take(std::span<const std::uint8_t> image) noexcept TANDEM_RT {
-  for (std::size_t i = 0, at = 0; i < copies_; at += copy_[i++].bytes) {
-    if (copy_[i].entry != nullptr) copy_[i].entry->decode(&image[at]);
-  }
+  for (const Copy& copy : copies()) copy.entry->decode(&image[copy.at]);
 }
 
 void ProcessData::give(std::span<std::uint8_t> image) const noexcept TANDEM_RT {
-  for (std::size_t i = 0, at = 0; i < copies_; at += copy_[i++].bytes) {
-    if (copy_[i].entry != nullptr) {
-      copy_[i].entry->encode(&image[at]);
-    } else {
-      std::fill_n(&image[at], copy_[i].bytes, std::uint8_t{0});
-    }
-  }
+  std::ranges::fill(image, std::uint8_t{0});
+  for (const Copy& copy : copies()) copy.entry->encode(&image[copy.at]);
 }
 
-void ProcessData::archive(Archive& ar) {
+void ProcessData::archive_objects(Archive& ar) {
   ar(open_, assigned_count_, assigned_);
-  for (Pdo& pdo : pdos_) ar(pdo.count, pdo.entries);
-  if (ar.reading() && od_ != nullptr) compile();
+  for (Pdo& pdo : pdos_) {
+    ar(pdo.count);
+    for (std::uint32_t& entry : pdo.entries) ar(entry);
+  }
+  if (ar.reading() && od_ != nullptr) lay_out();
 }
+
+void ProcessData::archive(Archive& ar) { archive_objects(ar); }
 
 }  // namespace tandem::firmware::esc

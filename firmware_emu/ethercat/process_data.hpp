@@ -2,6 +2,7 @@
 // Layer: firmware_emu.  Thread: the line's; construction non-RT.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -15,19 +16,33 @@
 
 namespace tandem::firmware::esc {
 
-inline constexpr std::size_t kMaxPdoEntries = 32;
+inline constexpr std::size_t kMaxPdoEntries = 32;    ///< of a mapping that can be written
+inline constexpr std::size_t kMostPdoEntries = 254;  ///< of a fixed one
+inline constexpr std::size_t kMaxPdoObjects = 512;
 
-/// A PDO at power-on: its object, and entries as index << 16 | sub << 8 | bits.
+/// A PDO at power-on: its object, and entries as index << 16 | sub << 8 | bits. An entry of index 0
+/// is a gap of that many bits.
 struct PdoSetup {
   std::uint16_t index = 0;  ///< 16xx or 1Axx
   std::vector<std::uint32_t> entries;
   bool assigned = true;
+  bool fixed = false;  ///< its mapping cannot be written
+
+  /// Entries that it has room for.
+  [[nodiscard]] std::size_t room() const noexcept {
+    return fixed ? entries.size() : std::max(entries.size(), kMaxPdoEntries);
+  }
 };
 
 /// One direction. Its objects change in PREOP only: count to 0, then entries, then count.
-class ProcessData final : public ProcessObjects, public canopen::ObjectOwner {
+class ProcessData : public ProcessObjects, public canopen::ObjectOwner {
  public:
-  ProcessData(Direction direction, std::span<const PdoSetup> pdos);
+  /// @param assigns  the assignment can be written
+  ProcessData(Direction direction, std::span<const PdoSetup> pdos, bool assigns = true);
+  /// Entries that add_to() adds.
+  [[nodiscard]] static std::size_t objects(std::span<const PdoSetup> pdos) noexcept;
+
+  void reset() noexcept TANDEM_RT override;
 
   /// The objects that it then maps are in `od` too.
   bool add_to(canopen::ObjectDictionary& od) override;
@@ -45,29 +60,48 @@ class ProcessData final : public ProcessObjects, public canopen::ObjectOwner {
                            const std::uint8_t* bytes) noexcept TANDEM_RT override;
   void written(const canopen::ObjectEntry&) noexcept TANDEM_RT override {}
 
+ protected:
+  struct Copy {
+    const canopen::ObjectEntry* entry = nullptr;
+    std::uint32_t mapped = 0;  ///< index << 16 | sub << 8 | bits
+    std::size_t at = 0;        ///< in the process data
+    std::uint8_t pdo = 0;      ///< of the assigned ones, from 0
+  };
+
+  /// The objects of the assigned PDOs in their order; gaps are left out.
+  void lay_out() noexcept;
+  [[nodiscard]] std::span<const Copy> copies() const noexcept { return {copy_.data(), copies_}; }
+  [[nodiscard]] std::size_t assigned() const noexcept { return assigned_count_; }
+  [[nodiscard]] bool is_open() const noexcept { return open_; }
+  [[nodiscard]] Direction direction() const noexcept { return direction_; }
+  /// The dictionary of the objects that are mapped; by default the one of add_to().
+  void map_from(const canopen::ObjectDictionary& od) noexcept { od_ = &od; }
+  void archive_objects(Archive& ar);
+
  private:
   struct Pdo {
     std::uint16_t index = 0;
     std::uint8_t count = 0;
-    std::array<std::uint32_t, kMaxPdoEntries> entries{};
-  };
-  struct Copy {
-    const canopen::ObjectEntry* entry = nullptr;  ///< none: a gap
-    std::uint32_t bytes = 0;
+    bool fixed = false;
+    std::vector<std::uint32_t> entries{};
+    std::vector<std::uint32_t> power_on{};
   };
 
   [[nodiscard]] const Pdo* find(std::uint16_t index) const noexcept;
-  [[nodiscard]] canopen::AbortCode check_entry(std::uint32_t mapped) const noexcept;
-  [[nodiscard]] static std::size_t bytes_of(const Pdo& pdo) noexcept;
+  [[nodiscard]] canopen::AbortCode check_entry(std::uint32_t mapped, std::size_t at) const noexcept;
+  [[nodiscard]] static std::size_t bits_of(const Pdo& pdo) noexcept;
 
   Direction direction_;
+  bool assigns_;
   bool open_ = false;
   const canopen::ObjectDictionary* od_ = nullptr;
   std::vector<Pdo> pdos_;
   std::uint8_t assigned_count_ = 0;
   std::array<std::uint16_t, kMaxPdos> assigned_{};
+  std::uint8_t power_on_count_ = 0;
+  std::array<std::uint16_t, kMaxPdos> power_on_{};
   std::size_t copies_ = 0;
-  std::array<Copy, kMaxPdos * kMaxPdoEntries> copy_{};
+  std::vector<Copy> copy_;
 };
 
 }  // namespace tandem::firmware::esc

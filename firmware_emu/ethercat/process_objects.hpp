@@ -12,7 +12,7 @@
 
 namespace tandem::firmware::esc {
 
-inline constexpr std::size_t kMaxPdos = 4;
+inline constexpr std::size_t kMaxPdos = 4;  ///< that are the process data at a time
 /// What the memory of one direction has room for, three buffers of it.
 inline constexpr std::size_t kMaxProcessBytes = 1024;
 
@@ -27,6 +27,8 @@ class ProcessObjects {
  public:
   virtual ~ProcessObjects() = default;
 
+  /// As after power-on.
+  virtual void reset() noexcept TANDEM_RT = 0;
   /// Adds its objects to `od`. @return false when `od` is full or has one of them
   virtual bool add_to(canopen::ObjectDictionary& od) = 0;
   /// Whether the objects may be written: in PREOP.

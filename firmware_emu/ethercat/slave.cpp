@@ -22,7 +22,7 @@ std::size_t default_bytes(const std::vector<PdoSetup>& pdos) {
     if (!pdo.assigned) continue;
     for (const std::uint32_t entry : pdo.entries) bits += entry & 0xFF;
   }
-  return bits / 8;
+  return (bits + 7) / 8;
 }
 
 bool is_state(std::uint8_t number) noexcept {
@@ -41,13 +41,16 @@ Status check(const SlaveSetup& setup) {
   }
   for (const auto* pdos : {&setup.outputs, &setup.inputs}) {
     const std::uint16_t base = pdos == &setup.outputs ? 0x1600 : 0x1A00;
-    if (pdos->size() > kMaxPdos) return refuse("too many PDOs", "4 each way at most");
+    const auto used = std::ranges::count(*pdos, true, &PdoSetup::assigned);
+    if (used > static_cast<std::ptrdiff_t>(kMaxPdos) || pdos->size() > kMaxPdoObjects) {
+      return refuse("too many PDOs", "4 each way at most, of 512");
+    }
     if (default_bytes(*pdos) > kMaxProcessBytes) {
       return refuse("the process data is too long", "1024 bytes each way at most");
     }
     for (const PdoSetup& pdo : *pdos) {
-      if (pdo.entries.size() > kMaxPdoEntries) {
-        return refuse("too many entries in a PDO", "32 at most");
+      if (pdo.entries.size() > (pdo.fixed ? kMostPdoEntries : kMaxPdoEntries)) {
+        return refuse("too many entries in a PDO", "32 at most, 254 of a fixed one");
       }
       if (pdo.index < base || pdo.index > base + 0x1FF) {
         return refuse("a PDO's object has a wrong index", "1600 to 17FF, and 1A00 to 1BFF");
@@ -104,20 +107,21 @@ void Slave::reset(std::int64_t now_ns) noexcept TANDEM_RT {
 
 void Slave::process(std::int64_t now_ns) noexcept TANDEM_RT {
   esc_.process(now_ns);
+  take_process_data();  // a master may ask for OP in the frame of its first outputs
   take_state_request(now_ns);
   if (state_ == AlState::kOp && outputs_->bytes() != 0 && esc_.watchdog_expired()) {
     fail(AlState::kSafeOp, AlCode::kWatchdog);
   }
   run_mailbox();
-  take_process_data();
 }
 
 void Slave::take_state_request(std::int64_t now_ns) noexcept {
   std::uint16_t request = 0;
   if (esc_.take_al_request(request)) {
-    request_ = static_cast<std::uint8_t>(request & 0x1F);
+    const auto wanted = static_cast<std::uint8_t>(request & 0x1F);
+    if (!requested_ || wanted != request_) requested_ns_ = now_ns;  // asked again, it waits on
+    request_ = wanted;
     requested_ = true;
-    requested_ns_ = now_ns;
   }
   if (!requested_ || now_ns - requested_ns_ < state_delay_ns_) return;
   requested_ = false;
@@ -130,6 +134,11 @@ void Slave::change(std::uint8_t request, std::int64_t now_ns) noexcept {
   const std::uint8_t number = request & ethercat::kAlStateMask;
   const auto wanted = static_cast<AlState>(number);
   AlCode code = is_state(number) ? try_enter(wanted) : AlCode::kUnknownState;
+  const bool may_come = code == AlCode::kNoOutputs || code == AlCode::kNoSync;
+  if (may_come && now_ns - requested_ns_ < kOpWaitNs) {
+    requested_ = true;
+    return;
+  }
   error_ = code != AlCode::kNone;
   code_ = code;
   if (!error_ && wanted != state_) enter(wanted, now_ns);
@@ -171,6 +180,8 @@ bool Slave::mailbox_is_right() const noexcept {
 
 void Slave::enter(AlState state, std::int64_t now_ns) noexcept {
   if (state == AlState::kInit || state_ == AlState::kInit) {
+    outputs_->reset();
+    inputs_->reset();
     coe_.reset();
     esc_.clear_mailboxes();
     last_counter_ = 0;

@@ -28,12 +28,15 @@ struct SlaveSetup {
   ethercat::sii::Identity identity{.vendor = ethercat::sii::kNobodysVendor};
   std::string name;
   std::uint16_t mailbox_bytes = 128;  ///< each way, kMinMailboxBytes to 1024
-  std::vector<PdoSetup> outputs{};    ///< 16xx, at most kMaxPdos
-  std::vector<PdoSetup> inputs{};     ///< 1Axx, at most kMaxPdos
+  std::vector<PdoSetup> outputs{};    ///< 16xx, of which at most kMaxPdos are assigned
+  std::vector<PdoSetup> inputs{};     ///< 1Axx, the same
   bool has_dc = true;
   ClockSetup clock;
   std::int64_t state_delay_ns = 0;  ///< how long the application takes to change its state
 };
+
+/// How long the request for OP waits for outputs and for the first SYNC0, before it is refused.
+inline constexpr std::int64_t kOpWaitNs = 1'000'000'000;
 
 /// Whether a Slave can be built from `setup`.
 [[nodiscard]] Status check(const SlaveSetup& setup);
@@ -48,7 +51,7 @@ class Slave {
   /// Adds 1C00, 1C12, 1C13 and the PDOs' objects to `od`, which has the rest already and outlives
   /// the slave. @pre check(setup)
   Slave(const SlaveSetup& setup, canopen::ObjectDictionary& od);
-  /// A slave whose process data is another's; of setup its PDOs are not used.
+  /// A slave whose process data is another's; of setup its PDOs are in the information memory.
   /// @param application  answers for what is not in `od`
   Slave(const SlaveSetup& setup, canopen::ObjectDictionary& od,
         canopen::ObjectDictionary& application, std::unique_ptr<ProcessObjects> outputs,

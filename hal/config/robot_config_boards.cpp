@@ -86,9 +86,10 @@ class Sheets {
     if (board.eds.empty()) return;
     namespace fs = std::filesystem;
     const std::string path = (fs::path(robot_file).parent_path() / board.eds).string();
-    const auto [known, is_new] = read_.try_emplace(path);
+    const canopen::DeviceChoice choice{.product = board.product_code, .revision = board.revision};
+    const auto [known, is_new] = read_.try_emplace({path, choice.product, choice.revision});
     if (is_new) {
-      if (auto sheet = canopen::load_data_sheet(path); sheet) {
+      if (auto sheet = canopen::load_data_sheet(path, choice); sheet) {
         known->second = std::move(*sheet);
       } else {
         table.error("eds", sheet.error().to_string(), "`tandem eds show` checks a sheet by itself");
@@ -104,8 +105,26 @@ class Sheets {
   }
 
  private:
-  std::map<std::string, std::optional<canopen::DataSheet>> read_;  // none: it has an error
+  using Key = std::tuple<std::string, std::optional<std::uint32_t>, std::optional<std::uint32_t>>;
+  std::map<Key, std::optional<canopen::DataSheet>> read_;  // none: it has an error
 };
+
+/// On a line of slaves PDOs are those of a slave, whichever kind of sheet tells them.
+void set_wire(TomlTable& table, const RobotConfig& robot, BoardConfig& board) {
+  const BusConfig* bus = robot.bus(board.bus);
+  if (board.eds.empty() || bus == nullptr) return;
+  const bool line = bus->kind == BusKind::kEthercat;
+  if (line == board.sheet->ethercat) return;
+  if (!line) {
+    table.error("eds", "is the file of an EtherCAT slave, and its bus '" + bus->name + "' is CAN",
+                "name the drive's EDS or DCF, or set kind = \"ethercat\" of the bus");
+    return;
+  }
+  auto sheet = std::make_shared<canopen::DataSheet>(*board.sheet);
+  sheet->ethercat = true;
+  sheet->most_pdo_bytes = static_cast<int>(canopen::kMaxFrameBytes);
+  board.sheet = std::move(sheet);
+}
 
 /// Whether the sheet is of the drive that robot.toml describes.
 void check_identity(TomlTable& table, const BoardConfig& board) {
@@ -133,7 +152,10 @@ void check_drive_keys(TomlTable& table, const RobotConfig& robot, const BoardCon
     table.error("fd", "is for drives of other makers: our own boards take what their bus has",
                 "remove this key, or set fd of the bus");
   } else if (table.has("fd") && table.boolean_or("fd", false) && bus != nullptr &&
-             (!bus->fd || bus->kind == BusKind::kEthercat)) {
+             bus->kind == BusKind::kEthercat) {
+    table.error("fd", "its bus '" + bus->name + "' is EtherCAT: PDOs are as long as the drive's",
+                "remove this key");
+  } else if (table.has("fd") && table.boolean_or("fd", false) && bus != nullptr && !bus->fd) {
     table.error("fd", "its bus '" + bus->name + "' is no CAN FD bus",
                 "remove this key, or set fd = true of the bus");
   }
@@ -184,6 +206,7 @@ void add_board(TomlTable table, const std::string& bus, NodeIds& ids,
   check_identity(table, board);
   board.bus = read_bus_name(table, bus);
   check_reference(table, "bus", board.bus, robot.buses, "bus");
+  set_wire(table, robot, board);
   check_drive_keys(table, robot, board);
   board.node_id = ids.read(table, board.bus);
   board.serial = read_identity(table, "serial");

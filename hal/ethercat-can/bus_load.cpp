@@ -93,7 +93,7 @@ BusLoad load_of_line(const BusConfig& bus, const Nodes& nodes, std::int64_t peri
   for (const NodePlan* node : nodes) {
     for (const PdoPlan& pdo : node->pdos) {
       const bool receive = pdo.direction == canopen::PdoDirection::kReceive;
-      (receive ? outputs : inputs) += pdo.bytes;
+      (receive ? outputs : inputs) += wire_bytes(pdo);
     }
   }
   constexpr std::size_t kStateAndClock = 12 + 2 + 12 + 8;

@@ -69,9 +69,13 @@ void tell_pdos(const NodePlan& node, DriveUse& use) {
       text += (text.empty() ? "" : " ") + object_text(field);
     }
     const bool receive = pdo.direction == canopen::PdoDirection::kReceive;
-    use.does.push_back({fmt::format("{} {}", receive ? "RPDO" : "TPDO", pdo.number),
-                        fmt::format("{} ({}{})", text, counted(pdo.bytes, "byte"),
-                                    pdo.mapping_written ? "" : ", as it is")});
+    const std::string name =
+        node.ethercat
+            ? fmt::format("{} {:04X}", receive ? "outputs" : "inputs", mapping_object(pdo))
+            : fmt::format("{} {}", receive ? "RPDO" : "TPDO", pdo.number);
+    use.does.push_back(
+        {name, fmt::format("{} ({}{})", text.empty() ? "-" : text, counted(wire_bytes(pdo), "byte"),
+                           pdo.mapping_written ? "" : ", as it is")});
   }
 }
 
@@ -158,6 +162,19 @@ void warn_of_bit_rate(const BusConfig& bus, const BoardConfig& board, const std:
        .key = "board '" + board.name + "'"});
 }
 
+/// A slave that is synchronous to pulses which the master does not send.
+void warn_of_clock(const BoardConfig& board, const std::string& file, Diagnostics& warnings) {
+  const auto& modes = board.sheet->dc_modes;
+  const auto needs_more = [](const canopen::SheetDcMode& mode) { return mode.sync1(); };
+  if (modes.empty() || !std::ranges::all_of(modes, needs_more)) return;
+  warnings.push_back({.message = "each of its drive's clock modes needs SYNC1, and SYNC0 alone is "
+                                 "sent",
+                      .hint = "set the drive to follow SYNC0, if it can",
+                      .file = file,
+                      .line = board.line,
+                      .key = "board '" + board.name + "'"});
+}
+
 /// A mapping that no drive can have: the sheet is another one's, or wrong.
 void warn_of_mappings(const DataSheet& sheet, Diagnostics& warnings) {
   for (canopen::OddMapping& odd : canopen::odd_mappings(sheet)) {
@@ -193,20 +210,23 @@ DriveUse use_of(const NodePlan& node, const DataSheet& sheet) {
   DriveUse use;
   tell_modes(node, use);
   tell_pdos(node, use);
-  use.does.push_back({"watching", node.watch == NodeWatch::kHeartbeat  ? "heartbeats"
-                                  : node.watch == NodeWatch::kGuarding ? "node guarding"
-                                                                       : "its TPDOs alone"});
+  use.does.push_back({"watching", node.ethercat ? "its state; it watches its outputs (watchdog)"
+                                  : node.watch == NodeWatch::kHeartbeat ? "heartbeats"
+                                  : node.watch == NodeWatch::kGuarding  ? "node guarding"
+                                                                        : "its TPDOs alone"});
   use.does.push_back({"stops", stops_text(sheet, 0, {})});
   use.does.push_back({"homing", node.abilities[0].homing ? "mode 6, where a joint has `homing`"
                                                          : "by the drive's own program alone"});
   tell_feedback(node, use);
-  for (std::string& text : unwatched(node, sheet, false)) use.misses.push_back(std::move(text));
+  for (std::string& text : unwatched(node, sheet, node.ethercat))
+    use.misses.push_back(std::move(text));
   return use;
 }
 
 Result<DriveUse> use_of(const DataSheet& sheet) {
   RobotConfig robot;
   robot.buses.push_back({.name = "bus", .interface = "can0", .fd = false});
+  if (sheet.ethercat) robot.buses[0].kind = BusKind::kEthercat;
   BoardConfig board;
   board.name = "drive";
   board.bus = "bus";
@@ -273,6 +293,7 @@ Result<Diagnostics> drive_warnings(const RobotConfig& robot) {
     const auto bus = std::ranges::find(robot.buses, board.bus, &BusConfig::name);
     const bool line = bus != robot.buses.end() && bus->kind == BusKind::kEthercat;
     if (bus != robot.buses.end() && !line) warn_of_bit_rate(*bus, board, robot.file, warnings);
+    if (line) warn_of_clock(board, robot.file, warnings);
     for (std::string& text : unwatched(node, *board.sheet, line)) {
       warnings.push_back({.message = std::move(text),
                           .hint = "set the drive's own time-out",

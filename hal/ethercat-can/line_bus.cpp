@@ -8,6 +8,7 @@
 #include "base/archive.hpp"
 #include "canopen/bytes.hpp"
 #include "canopen/sdo_bytes.hpp"
+#include "hal/ethercat-can/pdo_slots.hpp"
 #include "hal/ethercat-can/sdo_sequence.hpp"
 
 namespace tandem::hal::can {
@@ -46,13 +47,20 @@ Result<std::vector<const NodePlan*>> in_order(const RobotConfig& robot, const Pd
   return nodes;
 }
 
-ecat::SlavePlan plan_of(const NodePlan& node, std::int64_t period_ns) {
-  ecat::SlavePlan plan{.name = node.name, .waits_in_preop = true, .sync0_cycle_ns = period_ns};
+/// An ESI tells whether the slave has a clock and a mode that follows it; other sheets do not.
+bool follows_sync0(const canopen::DataSheet* sheet) {
+  if (sheet == nullptr) return true;
+  if (sheet->dc_modes.empty()) return sheet->managers.empty();
+  return std::ranges::any_of(sheet->dc_modes, &canopen::SheetDcMode::sync0);
+}
+
+ecat::SlavePlan plan_of(const NodePlan& node, const canopen::DataSheet* sheet,
+                        std::int64_t period_ns) {
+  ecat::SlavePlan plan{.name = node.name,
+                       .waits_in_preop = true,
+                       .sync0_cycle_ns = follows_sync0(sheet) ? period_ns : 0};
   for (const PdoPlan& pdo : node.pdos) {
-    ecat::PdoPlan one{.index = mapping_object(pdo), .fixed = true};
-    for (const MappedField& field : pdo.fields) {
-      one.entries.push_back(canopen::mapping_entry(field.index, field.sub, field.size));
-    }
+    ecat::PdoPlan one{.index = mapping_object(pdo), .entries = entries_of(pdo), .fixed = true};
     (pdo.direction == PdoDirection::kReceive ? plan.outputs : plan.inputs)
         .push_back(std::move(one));
   }
@@ -70,23 +78,46 @@ Result<std::unique_ptr<LineBus>> LineBus::create(const RobotConfig& robot, std::
   std::vector<ecat::SlavePlan> plans;
   std::vector<Slave> slaves;
   for (const NodePlan* node : *nodes) {
-    plans.push_back(plan_of(*node, config.period_ns));
+    const canopen::DataSheet* sheet =
+        node->board >= 0 ? robot.boards[static_cast<std::size_t>(node->board)].sheet.get()
+                         : nullptr;
+    plans.push_back(plan_of(*node, sheet, config.period_ns));
     Slave& slave = slaves.emplace_back();
     slave.id = node->id;
     slave.heartbeat_ns = std::int64_t{node->heartbeat_ms} * 1'000'000;
-    std::uint8_t outputs = 0;
-    std::uint8_t inputs = 0;
+    std::size_t outputs = 0;
+    std::size_t inputs = 0;
     for (const PdoPlan& pdo : node->pdos) {
-      const bool receive = pdo.direction == PdoDirection::kReceive;
-      std::uint8_t& at = receive ? outputs : inputs;
-      (receive ? slave.outputs : slave.inputs)
-          .push_back({.cob_id = pdo.cob_id, .offset = at, .bytes = pdo.bytes});
-      at = static_cast<std::uint8_t>(at + pdo.bytes);
+      add_pdo(pdo, sheet, pdo.direction == PdoDirection::kReceive ? outputs : inputs, slave);
     }
   }
   auto line = ecat::LineMaster::create(link, plans);
   if (!line) return std::unexpected(line.error());
   return std::unique_ptr<LineBus>(new LineBus(link, std::move(*line), std::move(slaves), config));
+}
+
+/// @param bits  of the direction so far
+void LineBus::add_pdo(const PdoPlan& plan, const canopen::DataSheet* sheet, std::size_t& bits,
+                      Slave& slave) {
+  const bool receive = plan.direction == PdoDirection::kReceive;
+  Pdo& pdo = (receive ? slave.outputs : slave.inputs)
+                 .emplace_back(Pdo{.cob_id = plan.cob_id, .bytes = plan.bytes});
+  for (const std::uint32_t entry : entries_of(plan)) {
+    const auto at = static_cast<std::uint16_t>(bits / 8);
+    bits += entry & 0xFF;
+    const auto field = std::ranges::find_if(plan.fields, [&](const MappedField& one) {
+      return canopen::mapping_entry(one.index, one.sub, one.size) == entry;
+    });
+    if (field != plan.fields.end()) {
+      pdo.copies.push_back({.at = at, .offset = field->offset, .bytes = field->size});
+    } else if (receive && sheet != nullptr) {
+      const std::uint32_t value = resting_value(*sheet, entry).value_or(0);
+      if (value != 0 && (entry & 0x7) == 0) {
+        slave.rests.push_back(
+            {.at = at, .bytes = static_cast<std::uint8_t>((entry & 0xFF) / 8), .value = value});
+      }
+    }
+  }
 }
 
 LineBus::LineBus(ecat::Link& link, std::unique_ptr<ecat::LineMaster> line,
@@ -163,7 +194,15 @@ void LineBus::request(std::size_t i, const Frame& frame) noexcept {
 bool LineBus::output(std::size_t i, const Frame& frame) noexcept {
   for (const Pdo& pdo : slaves_[i].outputs) {
     if (pdo.cob_id != frame.id || frame.length < pdo.bytes) continue;
-    std::copy_n(frame.data.begin(), pdo.bytes, line_->outputs(i).begin() + pdo.offset);
+    const std::span<std::uint8_t> image = line_->outputs(i);
+    for (const Copy& copy : pdo.copies) {
+      std::copy_n(frame.data.begin() + copy.offset, copy.bytes, image.begin() + copy.at);
+    }
+    for (const Rest& rest : slaves_[i].rests) {
+      std::array<std::uint8_t, 4> bytes{};
+      canopen::put(bytes.data(), rest.value);
+      std::copy_n(bytes.begin(), rest.bytes, image.begin() + rest.at);
+    }
     return true;
   }
   return false;
@@ -323,7 +362,9 @@ void LineBus::tell_inputs(std::size_t i) noexcept {
     if (frame.length > canopen::kClassicFrameBytes) {
       frame.flags = canopen::kFlagFd | canopen::kFlagBrs;
     }
-    std::copy_n(inputs.begin() + pdo.offset, pdo.bytes, frame.data.begin());
+    for (const Copy& copy : pdo.copies) {
+      std::copy_n(inputs.begin() + copy.at, copy.bytes, frame.data.begin() + copy.offset);
+    }
     inbox_.push(frame);
   }
 }

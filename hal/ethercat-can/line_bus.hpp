@@ -71,16 +71,28 @@ class LineBus final : public Bus {
   [[nodiscard]] const ecat::LineMaster& line() const noexcept { return *line_; }
 
  private:
+  struct Copy {
+    std::uint16_t at = 0;     ///< in the slave's outputs or inputs
+    std::uint8_t offset = 0;  ///< in the frame
+    std::uint8_t bytes = 0;
+  };
   struct Pdo {
     std::uint32_t cob_id = 0;
-    std::uint8_t offset = 0;  ///< in the slave's outputs or inputs
+    std::uint8_t bytes = 0;  ///< of the frame
+    std::vector<Copy> copies{};
+  };
+  /// An output that the drive master has no field for.
+  struct Rest {
+    std::uint16_t at = 0;
     std::uint8_t bytes = 0;
+    std::uint32_t value = 0;
   };
   struct Slave {
     int id = 0;
     std::int64_t heartbeat_ns = 0;
     std::vector<Pdo> outputs;
     std::vector<Pdo> inputs;
+    std::vector<Rest> rests;
     bool reset_wanted = false;
     bool op_wanted = false;
     bool booted = false;
@@ -94,6 +106,8 @@ class LineBus final : public Bus {
     std::uint32_t emergencies = 0;  ///< that were told
   };
 
+  static void add_pdo(const PdoPlan& plan, const canopen::DataSheet* sheet, std::size_t& bits,
+                      Slave& slave);
   LineBus(ecat::Link& link, std::unique_ptr<ecat::LineMaster> line, std::vector<Slave> slaves,
           const Config& config);
   void command(const canopen::Frame& frame) noexcept;

@@ -140,8 +140,9 @@ std::string profile_modes(const canopen::DataSheet& sheet, std::size_t axis) {
 }
 
 /// Errors: an axis cannot be switched on, seen or moved with what the PDOs carry.
-Status check_drive(const RobotConfig& robot, const NodePlan& node,
-                   const canopen::DataSheet& sheet) {
+/// @param unused  why PDOs that carry something of them are not used; may be empty
+Status check_drive(const RobotConfig& robot, const NodePlan& node, const canopen::DataSheet& sheet,
+                   const std::string& unused) {
   using canopen::Mode;
   for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
     const canopen::DriveAbilities& can = node.abilities[axis];
@@ -155,7 +156,7 @@ Status check_drive(const RobotConfig& robot, const NodePlan& node,
     return std::unexpected(node_error(
         robot, node,
         "cannot be driven in every cycle: the PDOs of its sheet " + sheet.file + " carry " + what +
-            " of axis " + std::to_string(axis) + (moves ? "" : profile_modes(sheet, axis)),
+            " of axis " + std::to_string(axis) + unused + (moves ? "" : profile_modes(sheet, axis)),
         "`tandem eds show` lists what the drive offers; a PDO whose "
         "COB-ID is read only keeps its mapping"));
   }
@@ -179,9 +180,11 @@ Status too_narrow(const RobotConfig& robot, const NodePlan& node, bool fd) {
           ")"));
 }
 
-/// Errors: a direction's PDOs that can be mapped do not take all that has to be in them.
+/// Errors: a direction's PDOs that can be mapped do not take all that has to be in them. A slave's
+/// may: whether the rest is enough is seen when all are laid out.
+/// @param unused  appended to: PDOs that cannot be used, with the reason
 Status pack(const RobotConfig& robot, const BoardConfig& board, BoardPacker::Spread spread,
-            NodePlan& node) {
+            NodePlan& node, std::string& unused) {
   using enum BoardPacker::Spread;
   const canopen::DataSheet& sheet = *board.sheet;
   const bool fill = spread == kFill;
@@ -192,26 +195,52 @@ Status pack(const RobotConfig& robot, const BoardConfig& board, BoardPacker::Spr
               : spread == kEach ? std::span<const WireField>(kAllCommands)
                                 : std::span<const WireField>(kCommandBlock));
   if (spread != kEach) receive.add(PdoGroup::kSlowCommand, canopen::kEverySync, kSlowCommands);
-  if (receive.has_mappable() && !receive.left().empty()) return too_narrow(robot, node, !fill);
+  const auto narrow = [&](const BoardPacker& packer) {
+    return spread != kEach && packer.has_mappable() && !packer.left().empty();
+  };
+  if (narrow(receive)) return too_narrow(robot, node, !fill);
   receive.use_fixed(PdoGroup::kCommand);
   BoardPacker transmit(node, sheet, PdoDirection::kTransmit, spread);
   transmit.add(PdoGroup::kFeedback, canopen::kEverySync,
                fill              ? std::span<const WireField>(kShortFeedback)
                : spread == kEach ? std::span<const WireField>(kAllFeedback)
                                  : std::span<const WireField>(kFeedbackBlock));
-  if (transmit.has_mappable() && !transmit.left().empty()) return too_narrow(robot, node, !fill);
+  if (narrow(transmit)) return too_narrow(robot, node, !fill);
   if (spread != kEach) transmit.add(PdoGroup::kSlowFeedback, slow, kSlowFeedback);
   transmit.use_fixed(PdoGroup::kFeedback);
+  unused = receive.unused() + transmit.unused();
   return {};
+}
+
+/// An assignment that cannot be written has an order of its own.
+void put_in_order(NodePlan& node, const canopen::DataSheet& sheet) {
+  const auto place = [&](const PdoPlan& pdo) {
+    const bool receive = pdo.direction == PdoDirection::kReceive;
+    const std::uint16_t assignment = receive ? kAssignOutputs : kAssignInputs;
+    const int fixed = assignment_written(sheet, pdo.direction)
+                          ? 0
+                          : place_in_assignment(sheet, assignment, pdo.mapping_index);
+    return std::pair{receive ? 0 : 1, fixed};
+  };
+  std::ranges::stable_sort(node.pdos, {}, place);
+}
+
+/// Whether an axis' sample is in more than one PDO.
+bool has_several_parts(const NodePlan& node) {
+  const auto feedback = std::ranges::count(node.pdos, PdoGroup::kFeedback, &PdoPlan::group);
+  return feedback > static_cast<std::ptrdiff_t>(node.joints.size());
 }
 
 Status pack_board(const RobotConfig& robot, const BoardConfig& board, bool fd, NodePlan& node) {
   using enum canopen::Access;
   using enum BoardPacker::Spread;
   const canopen::DataSheet& sheet = *board.sheet;
-  const BoardPacker::Spread spread = !fd ? kFill : node.ethercat ? kEach : kTogether;
-  if (Status packed = pack(robot, board, spread, node); !packed) return packed;
-  if (!fd) number_parts(node);
+  const BoardPacker::Spread spread = node.ethercat ? kEach : fd ? kTogether : kFill;
+  std::string unused;
+  if (Status packed = pack(robot, board, spread, node, unused); !packed) return packed;
+  if (node.ethercat) put_in_order(node, sheet);
+  const bool spread_out = node.ethercat && has_several_parts(node);
+  if (spread == kFill || spread_out) number_parts(node);
   const auto type = canopen::DataType::kUnsigned8;
   if (canopen::mappable(sheet, object::kCycleCounter, 0, type, kMapRpdo)) {
     add_counter(node, PdoGroup::kCommand, WireField::kCycleCounter, fd);
@@ -220,7 +249,7 @@ Status pack_board(const RobotConfig& robot, const BoardConfig& board, bool fd, N
   }
   node.watch = node.ethercat ? NodeWatch::kHeartbeat : watch_of(sheet);
   node.boot_time_ns = board.boot_time_ns;
-  return check_drive(robot, node, sheet);
+  return check_drive(robot, node, sheet, unused);
 }
 
 Result<NodePlan> plan_board(const RobotConfig& robot, std::size_t index) {
@@ -290,10 +319,22 @@ Result<NodePlan> plan_sensor(const RobotConfig& robot, std::size_t index) {
 
 }  // namespace
 
-std::uint16_t mapping_object(const PdoPlan& pdo) noexcept {
-  const bool receive = pdo.direction == PdoDirection::kReceive;
-  return static_cast<std::uint16_t>((receive ? object::kRpdoMapping : object::kTpdoMapping) +
-                                    pdo.number - 1);
+std::uint16_t mapping_object(const PdoPlan& pdo) noexcept { return pdo.mapping_index; }
+
+std::size_t wire_bytes(const PdoPlan& pdo) {
+  if (pdo.entries.empty()) return pdo.bytes;
+  std::size_t bits = 0;
+  for (const std::uint32_t entry : pdo.entries) bits += entry & 0xFF;
+  return (bits + 7) / 8;
+}
+
+std::vector<std::uint32_t> entries_of(const PdoPlan& pdo) {
+  if (!pdo.entries.empty()) return pdo.entries;
+  std::vector<std::uint32_t> entries;
+  for (const MappedField& field : pdo.fields) {
+    entries.push_back(canopen::mapping_entry(field.index, field.sub, field.size));
+  }
+  return entries;
 }
 
 bool NodePlan::carries(std::size_t axis, WireField field) const {

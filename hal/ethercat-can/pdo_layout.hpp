@@ -75,7 +75,8 @@ struct MappedField {
 struct PdoPlan {
   PdoGroup group = PdoGroup::kCommand;
   canopen::PdoDirection direction = canopen::PdoDirection::kReceive;  ///< as the node sees it
-  int number = 1;  ///< 1 to canopen::kPdosPerNode, of its direction
+  int number = 1;                   ///< 1 to canopen::kPdosPerNode, of its direction
+  std::uint16_t mapping_index = 0;  ///< 1600, 1A00 and on; on EtherCAT any of the slave's
   std::uint32_t cob_id = 0;
   std::uint8_t transmission = canopen::kEverySync;
   std::uint8_t bytes = 0;  ///< mapped; the frame may be longer
@@ -84,7 +85,15 @@ struct PdoPlan {
   bool type_written = true;
   bool mapping_written = true;
   std::vector<MappedField> fields;
+  /// EtherCAT, a PDO that stays as it is: the slave's entries, also those that nobody here reads or
+  /// commands. `fields` and `bytes` are without them.
+  std::vector<std::uint32_t> entries{};
 };
+
+/// Bytes of the PDO as the node has it.
+[[nodiscard]] std::size_t wire_bytes(const PdoPlan& pdo);
+/// The entries that the node has in this PDO, as mapping_entry() makes them.
+[[nodiscard]] std::vector<std::uint32_t> entries_of(const PdoPlan& pdo);
 
 /// The object that a PDO's mapping is: 1600, 1A00 and on.
 [[nodiscard]] std::uint16_t mapping_object(const PdoPlan& pdo) noexcept;
@@ -121,7 +130,8 @@ struct PdoLayout {
 /// board's fields are those that its sheet has objects for, in the PDOs that the sheet offers.
 ///
 /// On CAN FD an axis' block stays whole, and blocks follow one another in frames of at most 64
-/// bytes. On EtherCAT an axis has one PDO each way, with all of its fields in it. In frames of
+/// bytes. On EtherCAT an axis has one PDO each way, with all of its fields in it, or as many as its
+/// slave needs for them. In frames of
 /// eight bytes the fields fill one PDO after the other; one axis of our own
 /// boards takes all eight PDOs, two of them for each sample. Where a PDO's mapping cannot be
 /// written, it is used as it is.

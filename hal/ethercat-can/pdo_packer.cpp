@@ -2,8 +2,11 @@
 #include "hal/ethercat-can/pdo_packer.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 
 #include "canopen/frame.hpp"
+#include "canopen/objects.hpp"
 
 namespace tandem::hal::can {
 
@@ -53,14 +56,15 @@ bool PdoPacker::add(std::span<const MappedField> block) {
   return true;
 }
 
-void PdoPacker::add_fixed(const PdoSlot& slot, PdoGroup group, std::vector<MappedField> fields,
-                          std::uint8_t bytes) {
+PdoPlan& PdoPacker::add_fixed(const PdoSlot& slot, PdoGroup group, std::vector<MappedField> fields,
+                              std::uint8_t bytes) {
   begin(group, canopen::kEverySync);
   PdoPlan& pdo = start(slot);
   pdo.mapping_written = false;
   pdo.fields = std::move(fields);
   pdo.bytes = bytes;
   current_ = nullptr;
+  return pdo;
 }
 
 void PdoPacker::switch_off_the_rest() {
@@ -71,8 +75,23 @@ void PdoPacker::switch_off_the_rest() {
 
 bool PdoPacker::used(const PdoSlot& slot) const {
   return std::ranges::any_of(node_.pdos, [&](const PdoPlan& pdo) {
-    return pdo.direction == direction_ && pdo.number == slot.number;
+    return pdo.direction == direction_ && pdo.mapping_index == mapping_index(slot);
   });
+}
+
+bool PdoPacker::has_room(const PdoSlot& slot) const {
+  if (std::ranges::count(node_.pdos, direction_, &PdoPlan::direction) >= canopen::kPdosPerNode) {
+    return false;
+  }
+  return std::ranges::none_of(slots_, [&](const PdoSlot& other) {
+    return used(other) && std::ranges::find(slot.excludes, other.number) != slot.excludes.end();
+  });
+}
+
+std::uint16_t PdoPacker::mapping_index(const PdoSlot& slot) const {
+  const bool receive = direction_ == PdoDirection::kReceive;
+  return static_cast<std::uint16_t>(
+      (receive ? canopen::object::kRpdoMapping : canopen::object::kTpdoMapping) + slot.number - 1);
 }
 
 void PdoPacker::append(PdoPlan& pdo, MappedField field) {
@@ -82,7 +101,9 @@ void PdoPacker::append(PdoPlan& pdo, MappedField field) {
 }
 
 bool PdoPacker::open() {
-  const auto serves = [](const PdoSlot& slot) { return slot.mappable && slot.timely; };
+  const auto serves = [&](const PdoSlot& slot) {
+    return slot.mappable && slot.timely && has_room(slot);
+  };
   while (next_ < slots_.size() && !serves(slots_[next_])) ++next_;
   if (next_ >= slots_.size()) return false;
   start(slots_[next_++]);
@@ -99,9 +120,12 @@ PdoPlan PdoPacker::plan(const PdoSlot& slot) const {
   PdoPlan pdo;
   pdo.group = group_;
   pdo.direction = direction_;
-  pdo.number = slot.number;
-  pdo.cob_id = direction_ == PdoDirection::kReceive ? canopen::cob::rpdo(slot.number, node_.id)
-                                                    : canopen::cob::tpdo(slot.number, node_.id);
+  // A slave's PDOs have no identifiers: those that are used are numbered here.
+  const auto before = std::ranges::count(node_.pdos, direction_, &PdoPlan::direction);
+  pdo.number = node_.ethercat ? static_cast<int>(before) + 1 : slot.number;
+  pdo.mapping_index = mapping_index(slot);
+  pdo.cob_id = direction_ == PdoDirection::kReceive ? canopen::cob::rpdo(pdo.number, node_.id)
+                                                    : canopen::cob::tpdo(pdo.number, node_.id);
   pdo.transmission = slot.type_writable ? transmission_ : slot.type;
   pdo.id_written = slot.id_writable;
   pdo.type_written = slot.type_writable;
@@ -114,7 +138,8 @@ BoardPacker::BoardPacker(NodePlan& node, const canopen::DataSheet& sheet, PdoDir
       sheet_(sheet),
       spread_(spread),
       packer_(node, direction, most_bytes(spread != Spread::kFill),
-              pdo_slots(sheet, direction, node.id)) {}
+              node.ethercat ? line_slots(sheet, direction) : pdo_slots(sheet, direction, node.id)) {
+}
 
 void BoardPacker::add(PdoGroup group, std::uint8_t transmission,
                       std::span<const WireField> fields) {
@@ -131,7 +156,11 @@ void BoardPacker::add(PdoGroup group, std::uint8_t transmission,
       for (const MappedField& field : block) pack({&field, 1});
       continue;
     }
-    if (spread_ == Spread::kEach) packer_.begin(group, transmission);
+    if (spread_ == Spread::kEach) {
+      packer_.begin(group, transmission);
+      for (const MappedField& field : block) pack({&field, 1});
+      continue;
+    }
     pack(block);
   }
 }
@@ -141,18 +170,31 @@ void BoardPacker::pack(std::span<const MappedField> block) {
   if (!packer_.add(block)) left_.insert(left_.end(), block.begin(), block.end());
 }
 
+/// Whether the PDO can be used as it is; of a slave's the reason is kept where it cannot.
+bool BoardPacker::fits(const PdoSlot& slot, PdoGroup group) {
+  return node_.ethercat ? fills_line(slot, group) : fills(slot, group);
+}
+
 void BoardPacker::use_fixed(PdoGroup group) {
+  unused_.clear();
   for (;;) {
     const PdoSlot* best = nullptr;
     std::size_t most = 0;
     for (const PdoSlot& slot : packer_.slots()) {
-      if (slot.mappable || !slot.timely || packer_.used(slot) || !fills(slot, group)) continue;
+      if (slot.mappable || !slot.timely || packer_.used(slot) || !packer_.has_room(slot)) continue;
+      if (taken_by(slot) == 0) continue;
+      if (!fits(slot, group)) continue;
       const std::size_t takes = taken_by(slot);
       if (takes > most) best = &slot;
       most = std::max(most, takes);
     }
     if (best == nullptr) break;
     take_fixed(*best, group);
+  }
+  for (const PdoSlot& slot : packer_.slots()) {
+    if (slot.required && !packer_.used(slot) && packer_.has_room(slot) && fits(slot, group)) {
+      take_fixed(slot, group);
+    }
   }
   packer_.switch_off_the_rest();
   for (const auto& [number, id] : further_pdos(sheet_, packer_.direction(), node_.id)) {
@@ -179,6 +221,35 @@ bool BoardPacker::fills(const PdoSlot& slot, PdoGroup group) const {
   return bits <= 8 * canopen::kClassicFrameBytes && (known || group != PdoGroup::kCommand);
 }
 
+/// The same of a slave: gaps and objects of no use to the master pass, and its outputs rest.
+bool BoardPacker::fills_line(const PdoSlot& slot, PdoGroup group) {
+  const auto refuse = [&](std::string_view why, std::uint32_t entry) {
+    std::array<char, 48> text{};
+    const bool receive = packer_.direction() == PdoDirection::kReceive;
+    (void)std::snprintf(
+        text.data(), text.size(), "; %04X is not used: %04X:%02X ",
+        (receive ? canopen::object::kRpdoMapping : canopen::object::kTpdoMapping) + slot.number - 1,
+        entry >> 16, entry >> 8 & 0xFF);
+    const std::string all = std::string(text.data()) + std::string(why);
+    if (unused_.find(all) == std::string::npos) unused_ += all;
+    return false;
+  };
+  std::size_t bits = 0;
+  std::size_t bytes = 0;
+  for (const std::uint32_t entry : slot.mapping) {
+    const MappedField* known = find(known_, entry);
+    if (known != nullptr && bits % 8 != 0) return refuse("begins within a byte", entry);
+    if (known == nullptr && group == PdoGroup::kCommand && !resting_value(sheet_, entry)) {
+      return refuse("has no value that is known to ask for nothing", entry);
+    }
+    bytes += known != nullptr ? known->size : 0U;
+    bits += entry & 0xFF;
+  }
+  if (bits % 8 != 0) return refuse("ends within a byte", slot.mapping.back());
+  if (bytes > canopen::kMaxFrameBytes) return refuse("is beyond 64 bytes", slot.mapping.back());
+  return true;
+}
+
 std::size_t BoardPacker::taken_by(const PdoSlot& slot) const {
   return static_cast<std::size_t>(std::ranges::count_if(
       slot.mapping, [&](std::uint32_t entry) { return find(left_, entry) != nullptr; }));
@@ -191,11 +262,15 @@ void BoardPacker::take_fixed(const PdoSlot& slot, PdoGroup group) {
     if (const MappedField* found = find(known_, entry)) {
       fields.push_back(*found);
       fields.back().offset = static_cast<std::uint8_t>(bits / 8);
+    } else if (node_.ethercat) {
+      continue;  // it is in the slave's entries alone
     }
     bits += entry & 0xFF;
     std::erase_if(left_, [&](const MappedField& field) { return entry_of(field) == entry; });
   }
-  packer_.add_fixed(slot, group, std::move(fields), static_cast<std::uint8_t>(bits / 8));
+  PdoPlan& pdo =
+      packer_.add_fixed(slot, group, std::move(fields), static_cast<std::uint8_t>(bits / 8));
+  if (node_.ethercat) pdo.entries = slot.mapping;
 }
 
 }  // namespace tandem::hal::can

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "canopen/data_sheet.hpp"
@@ -28,14 +29,16 @@ class PdoPacker {
   /// @return false: no PDO is left that could take it.
   [[nodiscard]] bool add(std::span<const MappedField> block);
   /// A PDO whose mapping stays as it is. @param fields  with their offsets
-  void add_fixed(const PdoSlot& slot, PdoGroup group, std::vector<MappedField> fields,
-                 std::uint8_t bytes);
+  PdoPlan& add_fixed(const PdoSlot& slot, PdoGroup group, std::vector<MappedField> fields,
+                     std::uint8_t bytes);
   /// What is in use from power-on and carries nothing.
   void switch_off_the_rest();
 
   [[nodiscard]] canopen::PdoDirection direction() const { return direction_; }
   [[nodiscard]] std::span<const PdoSlot> slots() const { return slots_; }
   [[nodiscard]] bool used(const PdoSlot& slot) const;
+  /// Whether the node has a PDO more, and none that the slot cannot be beside.
+  [[nodiscard]] bool has_room(const PdoSlot& slot) const;
 
   static void append(PdoPlan& pdo, MappedField field);
 
@@ -43,6 +46,7 @@ class PdoPacker {
   bool open();
   PdoPlan& start(const PdoSlot& slot);
   [[nodiscard]] PdoPlan plan(const PdoSlot& slot) const;
+  [[nodiscard]] std::uint16_t mapping_index(const PdoSlot& slot) const;
 
   NodePlan& node_;
   canopen::PdoDirection direction_;
@@ -62,7 +66,7 @@ class BoardPacker {
   enum class Spread : std::uint8_t {
     kFill,      ///< one PDO of eight bytes after the other
     kTogether,  ///< they stay together, and PDOs of up to 64 bytes take several axes
-    kEach,      ///< each axis has a PDO of its own
+    kEach,      ///< a slave's: each axis has PDOs of its own, of its entries and up to 64 bytes
   };
   BoardPacker(NodePlan& node, const canopen::DataSheet& sheet, canopen::PdoDirection direction,
               Spread spread);
@@ -74,6 +78,8 @@ class BoardPacker {
   void use_fixed(PdoGroup group);
 
   [[nodiscard]] bool has_mappable() const;
+  /// A slave's PDOs that stay as they are and cannot be used: "; 1701 is not used: …".
+  [[nodiscard]] const std::string& unused() const { return unused_; }
   /// What is in no PDO.
   [[nodiscard]] const std::vector<MappedField>& left() const { return left_; }
 
@@ -82,6 +88,8 @@ class BoardPacker {
   [[nodiscard]] bool fills(const PdoSlot& slot, PdoGroup group) const;
   [[nodiscard]] std::size_t taken_by(const PdoSlot& slot) const;
   void take_fixed(const PdoSlot& slot, PdoGroup group);
+  [[nodiscard]] bool fills_line(const PdoSlot& slot, PdoGroup group);
+  [[nodiscard]] bool fits(const PdoSlot& slot, PdoGroup group);
 
   NodePlan& node_;
   const canopen::DataSheet& sheet_;
@@ -89,6 +97,7 @@ class BoardPacker {
   PdoPacker packer_;
   std::vector<MappedField> known_;  ///< all that the drive has objects for
   std::vector<MappedField> left_;   ///< of them, what is in no PDO yet
+  std::string unused_;
 };
 
 }  // namespace tandem::hal::can

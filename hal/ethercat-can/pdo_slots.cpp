@@ -130,6 +130,80 @@ std::vector<PdoSlot> pdo_slots(const DataSheet& sheet, PdoDirection direction, i
   return slots;
 }
 
+bool assignment_written(const DataSheet& sheet, PdoDirection direction) {
+  const auto assignment = direction == PdoDirection::kReceive ? kAssignOutputs : kAssignInputs;
+  return !sheet.has(assignment) || writable(sheet, assignment, 0);
+}
+
+int place_in_assignment(const DataSheet& sheet, std::uint16_t assignment, std::uint16_t pdo) {
+  const auto count = static_cast<int>(sheet.value(assignment, 0, 0).value_or(0));
+  for (int place = 0; place < count; ++place) {
+    if (sheet.value(assignment, static_cast<std::uint8_t>(place + 1), 0) == pdo) return place;
+  }
+  return count;
+}
+
+std::vector<PdoSlot> line_slots(const DataSheet& sheet, PdoDirection direction) {
+  const bool receive = direction == PdoDirection::kReceive;
+  const std::uint16_t first = receive ? object::kRpdoMapping : object::kTpdoMapping;
+  const std::uint16_t assignment = receive ? kAssignOutputs : kAssignInputs;
+  const bool chosen = assignment_written(sheet, direction);
+  const auto assigned = static_cast<int>(sheet.value(assignment, 0, 0).value_or(0));
+  std::vector<std::pair<int, PdoSlot>> found;
+  for (const SheetEntry& entry : sheet.entries) {
+    const int number = entry.index - first + 1;
+    if (entry.sub != 0 || number < 1 || number > 0x200) continue;
+    const int place = place_in_assignment(sheet, assignment, entry.index);
+    if (!chosen && place == assigned) continue;
+    PdoSlot slot{.number = number,
+                 .mappable = writable(sheet, entry.index, 0) && writable(sheet, entry.index, 1),
+                 .id_writable = false,
+                 .type_writable = false,
+                 .type = kEverySync,
+                 .most_entries = entries_of(sheet, entry.index),
+                 .mapping = default_mapping(sheet, entry.index)};
+    slot.required =
+        !chosen || std::ranges::find(sheet.mandatory, entry.index) != sheet.mandatory.end();
+    for (const auto& [one, other] : sheet.excludes) {
+      if (one == entry.index) slot.excludes.push_back(other - first + 1);
+      if (other == entry.index) slot.excludes.push_back(one - first + 1);
+    }
+    if (slot.mappable ? slot.most_entries == 0 : slot.mapping.empty()) continue;
+    found.emplace_back(place, std::move(slot));
+  }
+  std::ranges::stable_sort(found, {}, &std::pair<int, PdoSlot>::first);
+  std::vector<PdoSlot> slots;
+  for (auto& [place, slot] : found) slots.push_back(std::move(slot));
+  return slots;
+}
+
+std::optional<std::uint32_t> resting_value(const DataSheet& sheet, std::uint32_t entry) {
+  const auto index = static_cast<std::uint16_t>(entry >> 16);
+  const auto sub = static_cast<std::uint8_t>(entry >> 8);
+  if (index < 0x1000) return 0;  // a gap
+  if ((entry & 0xFF) > 32) return {};
+  const auto said = sheet.value(index, sub, 0);
+  if (said && *said != 0) return static_cast<std::uint32_t>(*said);
+  // Targets of other modes, offsets, touch probes, outputs: none of them asks for anything at 0.
+  constexpr std::array<std::uint16_t, 11> kNothingAtZero{
+      object::kTargetPosition,
+      object::kTargetVelocity,
+      object::kTargetTorque,
+      object::kPositionOffset,
+      object::kVelocityOffset,
+      object::kTorqueOffset,
+      object::kProfileVelocity,
+      object::kProfileAcceleration,
+      object::kProfileDeceleration,
+      0x60B8,  // touch probe function
+      0x60FE,  // digital outputs
+  };
+  const bool nothing = index >= 0x6000 && index < 0xA000 &&
+                       std::ranges::find(kNothingAtZero, 0x6000 + (index - 0x6000) % kAxisStride) !=
+                           kNothingAtZero.end();
+  return nothing ? std::optional<std::uint32_t>(0) : std::nullopt;
+}
+
 std::vector<std::pair<int, std::uint32_t>> further_pdos(const DataSheet& sheet,
                                                         PdoDirection direction, int node_id) {
   constexpr int kMostPdos = 512;

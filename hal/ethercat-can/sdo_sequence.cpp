@@ -9,6 +9,7 @@
 #include "canopen/objects.hpp"
 #include "hal/ethercat-can/axis_codec.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
+#include "hal/ethercat-can/pdo_slots.hpp"
 
 namespace tandem::hal::can {
 
@@ -62,20 +63,30 @@ void add_mapping(Steps& steps, const PdoPlan& pdo) {
   steps.push_back(write_step(mapping, 0, count));
 }
 
+/// What a slave's file wants to be written.
+void add_writes(Steps& steps, const DataSheet& sheet) {
+  for (const SheetWrite& write : sheet.writes) {
+    SdoStep step{.sub = write.sub, .index = write.index};
+    step.size = static_cast<std::uint8_t>(std::min(write.bytes.size(), step.bytes.size()));
+    std::copy_n(write.bytes.begin(), step.size, step.bytes.begin());
+    steps.push_back(step);
+  }
+}
+
 /// EtherCAT: mappings, then which PDOs are the process data, in their order.
-void add_process_data(Steps& steps, const NodePlan& node) {
-  constexpr std::uint16_t kAssignOutputs = 0x1C12;
-  constexpr std::uint16_t kAssignInputs = 0x1C13;
+/// @param sheet  of the board, or null: a sensor of ours
+void add_process_data(Steps& steps, const NodePlan& node, const DataSheet* sheet) {
   for (const PdoDirection direction : {PdoDirection::kReceive, PdoDirection::kTransmit}) {
     const auto assignment = direction == PdoDirection::kReceive ? kAssignOutputs : kAssignInputs;
-    steps.push_back(write_step(assignment, 0, std::uint8_t{0}));
+    const bool assigns = sheet == nullptr || assignment_written(*sheet, direction);
+    if (assigns) steps.push_back(write_step(assignment, 0, std::uint8_t{0}));
     std::uint8_t count = 0;
     for (const PdoPlan& pdo : node.pdos) {
       if (pdo.direction != direction) continue;
       add_mapping(steps, pdo);
-      steps.push_back(write_step(assignment, ++count, mapping_object(pdo)));
+      if (assigns) steps.push_back(write_step(assignment, ++count, mapping_object(pdo)));
     }
-    steps.push_back(write_step(assignment, 0, count));
+    if (assigns) steps.push_back(write_step(assignment, 0, count));
   }
 }
 
@@ -346,7 +357,8 @@ std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan
     add_sensor_identity(steps);
   }
   if (node.ethercat) {
-    add_process_data(steps, node);
+    if (sheet != nullptr) add_writes(steps, *sheet);
+    add_process_data(steps, node, sheet);
   } else {
     for (const PdoPlan& pdo : node.unused) switch_off(steps, pdo);
     for (const PdoPlan& pdo : node.pdos) add_pdo(steps, pdo, sheet);

@@ -195,7 +195,7 @@ Status EmulatedRobot::add_nodes(const hal::RobotConfig& robot, const SimRobotCon
     }
     boards_.push_back({std::make_unique<firmware::Board>(setup),
                        bus_index(robot, robot.boards[b].bus), joints_of(robot, robot.boards[b]),
-                       sense_.size(), setup.product, setup.revision});
+                       sense_.size(), setup.product, setup.revision, setup.sheet});
     attached_[boards_[b].bus].boards.push_back(b);
     sense_.resize(sense_.size() + setup.axes.size());
   }
@@ -249,7 +249,7 @@ std::vector<EmulatedRobot::Node> EmulatedRobot::nodes(std::size_t bus) {
   for (const std::size_t b : attached_[bus].boards) {
     firmware::Board& board = *boards_[b].board;
     all.push_back({board.name(), board.node_id(), static_cast<int>(b), &board.dictionary(),
-                   &boards_[b].powered});
+                   &boards_[b].powered, boards_[b].sheet.get()});
   }
   for (const std::size_t s : attached_[bus].sensors) {
     firmware::SensorBoard& board = *sensor_nodes_[s].board;

@@ -121,6 +121,7 @@ class EmulatedRobot {
     int board = -1;  ///< index in the configuration; -1: a sensor
     canopen::ObjectDictionary* dictionary = nullptr;
     const std::uint8_t* powered = nullptr;
+    const canopen::DataSheet* sheet = nullptr;  ///< null: one of our own
   };
   /// Those of a bus.
   [[nodiscard]] std::vector<Node> nodes(std::size_t bus);
@@ -161,6 +162,7 @@ class EmulatedRobot {
     std::vector<std::size_t> joints;  // by axis
     std::size_t first;                // of its axes in sense_ and drive_
     std::uint32_t product, revision;  // that it was made with
+    std::shared_ptr<const canopen::DataSheet> sheet;
     std::uint8_t powered = 1;
   };
   struct SensorNode {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "base/split_mix.hpp"
+#include "canopen/drive_abilities.hpp"
 #include "canopen/messages.hpp"
 #include "ethercat/datagram.hpp"
 
@@ -16,7 +17,7 @@ using firmware::esc::BoardData;
 namespace {
 
 constexpr std::size_t kFramesAtOnce = 64;
-constexpr std::size_t kOwnObjects = 16;
+constexpr std::size_t kOwnObjects = 16;  // besides those of PDOs
 constexpr double kWorstDrift_ppm = 20.0;
 constexpr std::int64_t kJitterNs = 10;
 constexpr std::int64_t kSilenceNs = 100'000'000;  // as the watchdog of the outputs
@@ -53,10 +54,22 @@ LineBoards::LineBoards(EmulatedRobot& robot, std::size_t bus, hal::ecat::Link& l
 void LineBoards::add_seat(const EmulatedRobot::Node& node, const Config& config) {
   Seat& seat = seats_.emplace_back();
   seat.node = node;
-  seat.objects = std::make_unique<canopen::ObjectDictionary>(kOwnObjects);
   using Way = firmware::esc::Direction;
-  auto outputs = std::make_unique<BoardData>(Way::kOutputs, *node.dictionary, node.id);
-  auto inputs = std::make_unique<BoardData>(Way::kInputs, *node.dictionary, node.id);
+  const auto pdos = [&](Way way) {
+    return firmware::esc::power_on_pdos(way, node.sheet, *node.dictionary);
+  };
+  const std::vector<firmware::esc::PdoSetup> out = pdos(Way::kOutputs);
+  const std::vector<firmware::esc::PdoSetup> in = pdos(Way::kInputs);
+  seat.objects = std::make_unique<canopen::ObjectDictionary>(kOwnObjects + BoardData::objects(out) +
+                                                             BoardData::objects(in));
+  const auto data = [&](Way way, std::span<const firmware::esc::PdoSetup> of) {
+    const std::uint16_t assignment = firmware::esc::assignment_object(way);
+    const bool assigns = node.sheet == nullptr || !node.sheet->has(assignment) ||
+                         canopen::writable(*node.sheet, assignment, 0);
+    return std::make_unique<BoardData>(way, of, assigns, *node.dictionary, node.id);
+  };
+  auto outputs = data(Way::kOutputs, out);
+  auto inputs = data(Way::kInputs, in);
   seat.outputs = outputs.get();
   seat.inputs = inputs.get();
   std::uint64_t random = config.seed + static_cast<std::uint64_t>(node.id);
@@ -66,6 +79,8 @@ void LineBoards::add_seat(const EmulatedRobot::Node& node, const Config& config)
                    .product = identity(*node.dictionary, canopen::kProduct),
                    .revision = identity(*node.dictionary, canopen::kRevision)},
       .name = node.name,
+      .outputs = out,
+      .inputs = in,
       .clock = {.drift_ppm = kWorstDrift_ppm * (2.0 * unit - 1.0),
                 .jitter_ns = kJitterNs,
                 .started_ns = static_cast<std::int64_t>(split_mix(random) >> 34),
@@ -184,7 +199,7 @@ void LineBoards::run(Seat& seat, std::size_t place) noexcept {
   tell_state(seat);
   if (!seat.outputs->fresh() || seat.slave->state() != AlState::kOp) return;
   for (const BoardData::Part& part : seat.outputs->parts()) {
-    inbox_.push(canopen::make_frame(part.cob_id, seat.outputs->bytes_of(part)));
+    inbox_.push(seat.outputs->frame_of(part));
   }
 }
 
@@ -211,7 +226,7 @@ std::size_t LineBoards::send(std::span<const Frame> frames) noexcept TANDEM_RT {
     if ((frame.id & 0x780) == canopen::cob::kHeartbeat) watch_boot_up(seats_[place], frame);
     for (const BoardData::Part& part : seats_[place].inputs->parts()) {
       if (part.cob_id != frame.id || frame.length < part.bytes) continue;
-      std::copy_n(frame.data.begin(), part.bytes, seats_[place].inputs->bytes_of(part).begin());
+      seats_[place].inputs->take_frame(part, frame);
     }
   }
   return frames.size();

@@ -85,6 +85,22 @@ TEST_F(LineRun, ASquatOverACableIsTheInProcessRunBitForBit) {
   EXPECT_EQ(json("boards.json")["steps"], cycles);
 }
 
+/// Drives of another maker, by their ESI alone.
+TEST_F(LineRun, DrivesOfAnotherMakerMoveTheSameInProcessAndOverACable) {
+  const std::string experiment =
+      TANDEM_SOURCE_DIR "/config/double_pendulum_ethercat/trajectory.toml";
+  const Outcome alone = tandem("run " + shell_word(experiment) + " --duration 2 --no-socket -q " +
+                               "--log " + shell_word(file("in_process")) + " --json in.json");
+  ASSERT_EQ(alone.status, 0) << alone.err;
+  const int status =
+      run_over_cable(experiment, {"--duration", "2", "-q", "--log", file("over_cable")}, true);
+  if (status == kNoNetwork) GTEST_SKIP() << test::needs_root("a network of its own");
+  ASSERT_EQ(status, 0);
+  const std::string log = "/double_pendulum-trajectory-001.mcap";
+  const Outcome diff = tandem("log diff in_process" + log + " over_cable" + log + " --json -");
+  EXPECT_EQ(diff.status, 0) << diff.out;
+}
+
 /// Beside a robot at the other end of the cable, its exact twin in the master's process.
 TEST_F(LineRun, ATwinOfARobotOverACableIsTheSameToTheLastBit) {
   edit("trajectory.toml", "[[controller]]", "[parallel]\n[[controller]]");

@@ -61,10 +61,72 @@ TEST(SlaveState, EachStateChecksItsSyncManagers) {
   EXPECT_EQ(rig.request(0, 0x14), StatusAndCode(0x12, 0x1E)) << "inputs of another length";
   rig.set_process_data(0);
   EXPECT_EQ(rig.request(0, 0x14), StatusAndCode(4, 0));
-  EXPECT_EQ(rig.request(0, 8), StatusAndCode(0x14, 0x19)) << "no outputs have come";
+  EXPECT_EQ(rig.request(0, 8), StatusAndCode(4, 0)) << "no outputs have come yet";
+  rig.step(firmware::esc::kOpWaitNs);
+  EXPECT_EQ(rig.value<std::uint16_t>(0, reg::kAlStatus), 0x14) << "nor later";
+  EXPECT_EQ(rig.value<std::uint16_t>(0, reg::kAlCode), 0x19);
   rig.write(0, 0x1800, Bytes(6, 0));
   rig.step();
   EXPECT_EQ(rig.request(0, 0x18), StatusAndCode(8, 0));
+}
+
+/// A master that sends its first outputs and the request for OP in one go, as KickCAT does.
+TEST(SlaveState, OpIsJudgedAfterTheOutputsThatCameWithIt) {
+  LineRig rig(1);
+  to_preop(rig);
+  rig.set_process_data(0);
+  ASSERT_EQ(rig.request(0, 4), StatusAndCode(4, 0));
+  rig.write(0, 0x1800, Bytes(6, 0));
+  EXPECT_EQ(rig.request(0, 8), StatusAndCode(8, 0));
+}
+
+/// And one that asks first, and again while it waits, as SOEM does.
+TEST(SlaveState, OpWaitsForOutputsAndForSync0) {
+  LineRig rig(1);
+  to_preop(rig);
+  rig.set_process_data(0);
+  ASSERT_EQ(rig.request(0, 4), StatusAndCode(4, 0));
+  const auto start = rig.value<std::uint64_t>(0, reg::kSystemTime) + 100 * kMs;
+  rig.write(0, reg::kSyncStart, LineRig::bytes(start));
+  rig.write(0, reg::kSync0Cycle, LineRig::bytes(std::uint32_t{1'000'000}));
+  rig.write(0, reg::kSyncActivation, Bytes{3});
+  EXPECT_EQ(rig.request(0, 8), StatusAndCode(4, 0));
+  for (int i = 0; i < 200; ++i) {
+    rig.write(0, 0x1800, Bytes(6, 0));
+    if (i % 50 == 0) rig.write(0, reg::kAlControl, Bytes{8, 0});
+    rig.step();
+    if (i < 90) {
+      EXPECT_EQ(rig.value<std::uint16_t>(0, reg::kAlStatus), 4) << i;
+    }
+  }
+  EXPECT_EQ(rig.value<std::uint16_t>(0, reg::kAlStatus), 8);
+}
+
+/// source: ETG.1000.6; SSC's CiA 402 sample pads its PDOs to words
+TEST(SlaveCoe, AGapCanBeMapped) {
+  LineRig rig(1);
+  to_preop(rig);
+  std::uint8_t counter = 0;
+  const auto write = [&](std::uint8_t command, std::uint16_t index, std::uint8_t sub,
+                         const Bytes& data) {
+    counter = ethercat::next_counter(counter);
+    return rig.ask(0, sdo(counter, command, index, sub, data))[kSdoAt];
+  };
+  EXPECT_EQ(write(0x2F, 0x1C13, 0, {0}), 0x60);
+  EXPECT_EQ(write(0x2F, 0x1A00, 0, {0}), 0x60);
+  EXPECT_EQ(write(0x23, 0x1A00, 1, {8, 0, 0x00, 0x20}), 0x60);   // 2000, 8 bits
+  EXPECT_EQ(write(0x23, 0x1A00, 2, {3, 0, 0, 0}), 0x60);         // a gap of three bits
+  EXPECT_EQ(write(0x23, 0x1A00, 3, {5, 0, 0, 0}), 0x60);         // and of five
+  EXPECT_EQ(write(0x23, 0x1A00, 4, {16, 0, 0x41, 0x60}), 0x60);  // 6041
+  EXPECT_EQ(write(0x2F, 0x1A00, 0, {4}), 0x60);
+  EXPECT_EQ(write(0x2B, 0x1C13, 1, {0x00, 0x1A}), 0x60);
+  EXPECT_EQ(write(0x2F, 0x1C13, 0, {1}), 0x60);
+  rig.set_manager(0, 2, {0x1800, 6, ethercat::kControlOutputs, 0, true});
+  rig.set_manager(0, 3, {0x2400, 4, ethercat::kControlInputs, 0, true});
+  ASSERT_EQ(rig.request(0, 4), StatusAndCode(4, 0));
+  rig.slaves[0]->counter = 0x77;
+  rig.step();
+  EXPECT_EQ(rig.read(0, 0x2400, 4).data, (Bytes{0x77, 0, 0x50, 0x02}));
 }
 
 TEST(SlaveState, TheWatchdogLeadsBackToSafeOp) {

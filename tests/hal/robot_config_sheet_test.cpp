@@ -271,6 +271,38 @@ TEST_F(BoardSheet, TakesFramesOfCanFdWhereTheBusHasThem) {
   EXPECT_FALSE(read(ours));
 }
 
+/// One device of two, on a bus that has slaves.
+TEST_F(BoardSheet, OfASlaveIsForItsBusAndItsProduct) {
+  const auto device = [](const char* product) {
+    return std::string("<Device><Type ProductCode=\"") + product +
+           R"(" RevisionNo="1">D</Type><Profile><ProfileNo>402</ProfileNo></Profile>
+<RxPdo Sm="2"><Index>#x1600</Index><Entry><Index>#x6040</Index><BitLen>16</BitLen></Entry>
+<Entry><Index>#x607A</Index><BitLen>32</BitLen><DataType>DINT</DataType></Entry></RxPdo>
+<TxPdo Sm="3"><Index>#x1A00</Index><Entry><Index>#x6041</Index><BitLen>16</BitLen></Entry>
+<Entry><Index>#x6064</Index><BitLen>32</BitLen><DataType>DINT</DataType></Entry></TxPdo></Device>)";
+  };
+  sheet = "<EtherCATInfo><Vendor><Id>7</Id></Vendor><Descriptions><Devices>" + device("#x10") +
+          device("#x20") + "</Devices></Descriptions></EtherCATInfo>";
+  const std::string joint = "encoder_counts_per_rev = 36000\nrated_torque_Nm = 12\n";
+  const auto robot = [&](const std::string& board, const std::string& bus) {
+    const std::string text = with(board_with(board), kLast, kLast + joint);
+    return with(text, "fd = false\n", bus);
+  };
+  const std::string line = "kind = \"ethercat\"\ninterface = \"eth1\"\n";
+  EXPECT_NE(refused(robot("", line)).find("has 2 devices: 0x00000010"), std::string::npos);
+  const auto taken = read(robot("product_code = 0x20\n", line));
+  ASSERT_TRUE(taken) << taken.error()[0].to_string();
+  EXPECT_EQ(taken->boards[0].sheet->product, 0x20U);
+  EXPECT_TRUE(taken->boards[0].sheet->ethercat);
+  const std::string can = refused(robot("product_code = 0x20\n", "fd = false\n"));
+  EXPECT_NE(can.find("is the file of an EtherCAT slave, and its bus 'arm' is CAN"),
+            std::string::npos)
+      << can;
+  const std::string fd = refused(robot("product_code = 0x20\nfd = true\n", line));
+  EXPECT_NE(fd.find("PDOs are as long as the drive's"), std::string::npos) << fd;
+  EXPECT_EQ(fd.find("fd = true"), std::string::npos) << "no advice that leads nowhere: " << fd;
+}
+
 TEST_F(BoardSheet, LetsAControllerClaimOnlyTheDrivesModes) {
   const auto robot = read();
   ASSERT_TRUE(robot);

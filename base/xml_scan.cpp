@@ -1,11 +1,9 @@
-#include "model/xml_scan.hpp"
+#include "base/xml_scan.hpp"
 
 #include <algorithm>
 #include <utility>
 
-#include "base/bounds.hpp"
-
-namespace tandem::model {
+namespace tandem {
 namespace {
 
 /// Of a tag: the equals signs outside of its quotes.
@@ -52,7 +50,7 @@ std::size_t behind_tag(std::string_view text, std::size_t at) {
   return at;
 }
 
-Status check_xml_bounds(std::string_view text, const std::string& file) {
+Status check_xml_bounds(std::string_view text, const std::string& file, const Bound& most_parts) {
   std::size_t depth = 0, parts = 0;
   for (std::size_t at = text.find('<'); at != std::string_view::npos; at = text.find('<', at)) {
     if (const auto behind = behind_no_tag(text, at)) {
@@ -69,7 +67,7 @@ Status check_xml_bounds(std::string_view text, const std::string& file) {
     const Bound* const broken = tag.size() > bounds::kXmlTag.most          ? &bounds::kXmlTag
                                 : attributes > bounds::kXmlAttributes.most ? &bounds::kXmlAttributes
                                 : depth > bounds::kXmlDepth.most           ? &bounds::kXmlDepth
-                                : parts > bounds::kXmlParts.most           ? &bounds::kXmlParts
+                                : parts > most_parts.most                  ? &most_parts
                                                                            : nullptr;
     if (broken != nullptr) {
       const auto lines = std::ranges::count(text.substr(0, at), '\n');
@@ -98,4 +96,4 @@ std::string without_instructions(std::string_view text) {
   return out;
 }
 
-}  // namespace tandem::model
+}  // namespace tandem
