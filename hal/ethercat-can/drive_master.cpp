@@ -385,13 +385,13 @@ void DriveMaster::archive(Archive& ar) { impl_->archive(ar); }
 
 void DriveMaster::Impl::archive(Archive& ar) {
   ar(stage, reaction, brakes, latched, resetting, begun, shutting_down, counter, now_ns, dt_ns,
-     shut_down_since_ns, at_rest_ns, refused_node, refused_step, refused_code, axes, sent_revision);
+     shut_down_since_ns, refused_node, refused_step, refused_code, axes, sent_revision);
   for (PidGains& gains : sent_gains) ar(gains.kp, gains.ki, gains.kd);
   for (Port& port : ports) ar(port.next_heartbeat_ns);
   for (Node& node : nodes) {
     for (Send& pdo : node.sends) ar(pdo.frame, pdo.sent);
     ar(node.master, node.channels, node.silent_cycles, node.unanswered, node.doubled_cycles,
-       node.counters_sent, node.recovering, node.sending, node.asking, node.watch, node.next_item);
+       node.counters_sent, node.recovering, node.sending, node.asking, node.next_item);
   }
 }
 

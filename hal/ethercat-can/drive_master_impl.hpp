@@ -81,7 +81,6 @@ struct DriveMaster::Impl {
     // Parameters at run time
     std::int16_t sending = -1;  ///< item under way: see parameter_items
     std::int16_t asking = -1;   ///< axis whose error code is being read
-    enum class Watch : std::uint8_t { kArmed, kEnding, kEnded } watch = Watch::kArmed;
     std::size_t next_item = 0;
     // Measurements, no state
     std::array<std::uint64_t, RoundTrip::kMostCycles> trip_cycles{};
@@ -121,7 +120,7 @@ struct DriveMaster::Impl {
   void watch() noexcept TANDEM_RT;
   void watch_stops() noexcept TANDEM_RT;
   void ask_cause(Node& node) noexcept TANDEM_RT;
-  [[nodiscard]] bool end_watch(Node& node) noexcept TANDEM_RT;
+  void end_watch(Node& node) noexcept TANDEM_RT;
   void ignored_stop(std::size_t joint) noexcept TANDEM_RT;
   bool react(StopCategory category) noexcept TANDEM_RT;
   void recover() noexcept TANDEM_RT;
@@ -183,7 +182,6 @@ struct DriveMaster::Impl {
   std::int64_t now_ns = 0;
   std::int64_t dt_ns = 0;
   std::int64_t shut_down_since_ns = 0;
-  std::int64_t at_rest_ns = -1;  ///< since when shut_down() has found every axis at rest
   // The last value that a node refused at run time
   std::int32_t refused_node = -1;
   SdoStep refused_step;

@@ -53,16 +53,8 @@ void DriveMaster::Impl::ask_cause(Node& node) noexcept TANDEM_RT {
 }
 
 /// A master that falls silent without this is an error to the node (8130), though the run ends as
-/// it should. @return whether that is through, or cannot be
-bool DriveMaster::Impl::end_watch(Node& node) noexcept TANDEM_RT {
-  using Watch = Node::Watch;
-  if (!node.master.running() || node.watch == Watch::kEnded) return true;
-  canopen::SdoClient& sdo = node.master.sdo();
-  if (sdo.status() == canopen::SdoClient::Status::kBusy) return false;
-  if (node.watch == Watch::kEnding) {
-    node.watch = Watch::kEnded;
-    return true;
-  }
+/// it should. NMT pre-operational follows at once, in which the node answers SDOs too.
+void DriveMaster::Impl::end_watch(Node& node) noexcept TANDEM_RT {
   const auto watches = [](const SdoStep& step) {
     const bool guards = step.index == canopen::object::kHeartbeatConsumer ||
                         step.index == canopen::object::kLifeTimeFactor;
@@ -70,12 +62,10 @@ bool DriveMaster::Impl::end_watch(Node& node) noexcept TANDEM_RT {
   };
   const auto armed = std::ranges::find_if(node.master.steps(), watches);
   const bool off = std::ranges::all_of(node.plan.joints, [&](auto j) { return axes[j].off(); });
-  if (armed == node.master.steps().end() || !off) return true;  // who still moves is watched on
+  if (!node.master.running() || armed == node.master.steps().end() || !off) return;
   static constexpr std::array<std::uint8_t, 4> kNobody{};
-  sdo.download(armed->index, armed->sub, std::span(kNobody).first(armed->size),
-               ports[node.plan.bus].sink);
-  node.watch = Watch::kEnding;
-  return false;
+  node.master.sdo().download(armed->index, armed->sub, std::span(kNobody).first(armed->size),
+                             ports[node.plan.bus].sink);
 }
 
 /// Finishes the transfer under way, then starts the next item that differs from what the drive has.

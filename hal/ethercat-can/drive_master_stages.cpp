@@ -27,8 +27,6 @@ namespace {
 
 /// How long shut_down() waits for the drives to come to rest.
 constexpr std::int64_t kShutDownNs = 3'000'000'000;
-/// How long it then waits until the nodes watch the master no more.
-constexpr std::int64_t kWatchEndsNs = 500'000'000;
 /// When a drive that was enabled, and is not heard any more, counts as still enabled there.
 constexpr std::int64_t kUnheardNs = 1'500'000'000;
 
@@ -370,18 +368,14 @@ bool DriveMaster::Impl::shut_down() noexcept TANDEM_RT {
   }
   const bool at_rest = std::ranges::all_of(
       axes, [](const AxisMaster& axis) { return axis.off() || axis.ignored_stop(); });
-  if (at_rest_ns < 0 && (at_rest || now_ns - shut_down_since_ns >= kShutDownNs)) {
-    at_rest_ns = now_ns;
-    set_targets(TargetState::kNothing);
-  }
+  const bool done = at_rest || now_ns - shut_down_since_ns >= kShutDownNs;
+  if (done) set_targets(TargetState::kNothing);
   make_commands(nullptr);
   write_pdos();
-  if (at_rest_ns < 0) return false;
-  bool unwatched = true;
-  for (Node& node : nodes) unwatched = end_watch(node) && unwatched;
-  if (!unwatched && now_ns - at_rest_ns < kWatchEndsNs) return false;
+  if (!done) return false;
   for (Node& node : nodes) {
     if (node.master.error() == NodeError::kIgnoresStop) continue;  // stopped it stays
+    end_watch(node);
     ports[node.plan.bus].sink.push(
         canopen::make_nmt(canopen::NmtCommand::kEnterPreOperational, node.plan.id));
   }

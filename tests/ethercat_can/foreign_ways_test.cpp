@@ -55,6 +55,7 @@ TEST(ForeignWays, AtTheEndGuardingIsOverToo) {
   ASSERT_TRUE(rig.bring_up());
   EXPECT_NE(rig.drive.value(0x100D), 0);
   for (int i = 0; i < 100 && !rig.end(); ++i) continue;
+  rig.exchange();
   EXPECT_EQ(rig.drive.value(0x100D), 0);
 }
 
