@@ -187,7 +187,7 @@ class Reader {
       return lost(e.GetLineNum(), name, "unknown element <" + name + ">",
                   "did you mean <" + meant + ">?");
     }
-    warning(e.GetLineNum(), name, "the element <" + name + "> is not used", {});
+    vocabulary_.pass_over(e);
   }
 
   std::string attribute(const XMLElement& e, const char* name, const std::string& key,

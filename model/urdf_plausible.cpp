@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kDensest_kg_m3 = 1e5;  // nine times lead
-constexpr double kSlack = 1.5;          // shapes may be somewhat smaller than the link
+constexpr double kSlack = 2.0;          // shapes may be smaller than the link: the Panda has 1.8
 constexpr double kLeast_m = 0.5;        // of a link whose size nothing says
 
 /// The volume of a solid ball with this radius of gyration.

@@ -119,6 +119,10 @@ bool Vocabulary::takes_foreign(const XMLElement& e) {
   return true;
 }
 
+void Vocabulary::pass_over(const XMLElement& e) {
+  count(unused_, std::string("the element <") + e.Name() + ">", e.GetLineNum());
+}
+
 void Vocabulary::count(std::map<std::string, Place>& places, const std::string& what, int line) {
   Place& place = places[what];
   if (place.count++ == 0) place.line = line;

@@ -23,6 +23,8 @@ class Vocabulary {
   void look_at(const tinyxml2::XMLElement& e, const std::string& key, Diagnostics& errors);
   /// Whether the name of an element in <robot> is in a namespace; then it is counted here.
   bool takes_foreign(const tinyxml2::XMLElement& e);
+  /// An element in <robot> that nobody reads.
+  void pass_over(const tinyxml2::XMLElement& e);
   /// A warning for each name that is not used.
   void warn(Diagnostics& warnings) const;
 
