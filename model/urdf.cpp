@@ -351,8 +351,13 @@ Diagnostics together(Diagnostics errors, const Diagnostics& others) {
 std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const std::string& file,
                                                  const UrdfOptions& options) {
   Outline outline = outline_urdf(text, file, options);
-  if (!outline.incomplete) check_topology(outline, file);
+  const bool named = !outline.incomplete;
+  if (named) check_topology(outline, file);
   sort_by_line(outline.errors);
+  if (named && outline.incomplete) {
+    const Diagnostics links = impossible_links(outline, file);
+    return std::unexpected(together(std::move(outline.errors), links));
+  }
   if (outline.incomplete) return std::unexpected(outline.errors);
   const auto model = parse_with_urdfdom(outline.text);
   if (!model) {

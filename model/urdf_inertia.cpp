@@ -188,4 +188,20 @@ void check_inertias(const Tree& tree, const Outline& outline, const UrdfOptions&
   Checker(tree, outline, options, errors, warnings).run();
 }
 
+Diagnostics impossible_links(const Outline& outline, const std::string& file) {
+  double whole_kg = 0.0;
+  for (const OutlineLink& link : outline.links) whole_kg += std::abs(link.mass_kg);
+  Diagnostics errors;
+  for (const OutlineLink& link : outline.links) {
+    const auto& [xx, xy, xz, yy, yz, zz] = link.moments_kg_m2;
+    Inertia inertia{link.mass_kg, Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
+    inertia.about_com_kg_m2 << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+    const std::string found = inertia_problem(inertia);
+    if (found.empty() || std::abs(link.mass_kg) < kNegligibleMassShare * whole_kg) continue;
+    errors.push_back({found, "check the mass, the six moments and their signs", file, link.line,
+                      "link " + link.name});
+  }
+  return errors;
+}
+
 }  // namespace tandem::model

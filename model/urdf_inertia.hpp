@@ -26,4 +26,8 @@ namespace tandem::model {
 void check_inertias(const Tree& tree, const Outline& outline, const UrdfOptions& options,
                     Diagnostics& errors, Diagnostics& warnings);
 
+/// What can be said of links' inertias where the joints make no tree: that they are impossible,
+/// unless the link may be a negligible one.
+[[nodiscard]] Diagnostics impossible_links(const Outline& outline, const std::string& file);
+
 }  // namespace tandem::model

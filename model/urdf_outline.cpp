@@ -324,14 +324,17 @@ class Reader {
     const std::vector<double> kg = numbers(mass, "value", 1, key, Needed::kYes);
     if (!kg.empty()) out_.links.back().mass_kg = kg[0];
     const XMLElement* inertia = child(inertial, "inertia", key, Needed::kYes);
+    double* entry = out_.links.back().moments_kg_m2.data();
     for (const char* moment : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) {
-      (void)numbers(inertia, moment, 1, key, Needed::kYes);
+      const std::vector<double> found = numbers(inertia, moment, 1, key, Needed::kYes);
+      *entry++ = found.empty() ? 0.0 : found[0];
     }
   }
 
   /// A possible inertial for a link that has an error, so that the rest can be read.
   void stand_in(XMLElement& link) {
     out_.links.back().mass_kg = 1.0;
+    out_.links.back().moments_kg_m2 = {0.01, 0.0, 0.0, 0.01, 0.0, 0.01};
     XMLElement* inertial = link.InsertNewChildElement("inertial");
     inertial->InsertNewChildElement("mass")->SetAttribute("value", "1");
     XMLElement* inertia = inertial->InsertNewChildElement("inertia");

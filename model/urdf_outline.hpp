@@ -2,6 +2,7 @@
 // Layer: model, private to urdf*.cpp.  Thread: non-RT only.
 #pragma once
 
+#include <array>
 #include <limits>
 #include <map>
 #include <string>
@@ -19,6 +20,8 @@ struct OutlineLink {
   std::string name;
   int line = 0;
   double mass_kg = 0.0;  ///< 0 without <inertial>
+  /// ixx ixy ixz iyy iyz izz, along the inertial's own axes.
+  std::array<double, 6> moments_kg_m2{};
 };
 
 inline constexpr double kNoLimit = std::numeric_limits<double>::quiet_NaN();
