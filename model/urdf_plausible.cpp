@@ -65,9 +65,9 @@ class Plausibility {
     text += ": " + found.links[0] + (found.example.empty() ? "" : " (" + found.example + ")");
     if (!one) text += ", and " + counted(found.links.size() - 1, "more", "more");
     const auto line = outline_.link_lines.find(found.links[0]);
-    warnings_.push_back({text, hint, tree_.file,
-                         line == outline_.link_lines.end() ? 0 : line->second,
-                         "link " + found.links[0]});
+    // Without a key: that of a link means an impossible inertia.
+    warnings_.push_back(
+        {text, hint, tree_.file, line == outline_.link_lines.end() ? 0 : line->second, {}});
   }
 
   void look_at_bodies(Found& bare) const {

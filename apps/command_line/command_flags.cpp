@@ -429,10 +429,11 @@ void add_flags(CLI::App& app, NewOptions& o) {
                  "kg/m^3: links without mass get that of their shapes (boxes, cylinders, spheres, "
                  "STL)")
       ->check(CLI::Range(1.0, 3e4));
-  app.add_flag("--dynamics", o.dynamics,
-               "Put the damping of the URDF's <dynamics> into the drives");
-  app.add_option("--like", o.like,
-                 "Series elastic drives in proportion to this robot's: its name or robot.toml");
+  CLI::Option* like =
+      app.add_option("--like", o.like,
+                     "Series elastic drives in proportion to this robot's: its name or robot.toml");
+  app.add_flag("--dynamics", o.dynamics, "Put the damping of the URDF's <dynamics> into the drives")
+      ->excludes(like);
   app.add_option("--base", o.base, "Kind of base (default: floating if it has feet)")
       ->check(CLI::IsMember({"floating", "fixed"}));
   app.add_flag("--force", o.force,
