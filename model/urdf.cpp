@@ -11,12 +11,14 @@
 #include <mutex>
 #include <span>
 
+#include "base/bounds.hpp"
 #include "base/nearest.hpp"
 #include "base/open_file.hpp"
 #include "model/urdf_inertia.hpp"
 #include "model/urdf_mimic.hpp"
 #include "model/urdf_outline.hpp"
 #include "model/urdf_override.hpp"
+#include "model/urdf_plausible.hpp"
 #include "model/urdf_repair.hpp"
 #include "model/urdf_shapes.hpp"
 
@@ -120,9 +122,8 @@ class Builder {
     mimics_ = resolve_mimics(outline_, options_, out_.tree.file, errors_);
     check_still(std::span(mimics_.still).subspan(options_.lock.size()));
     check_overrides(options_, outline_, errors_);
-    if (!errors_.empty()) return std::unexpected(errors_);
     add_all(floats ? *root->child_links.front() : *root);
-    apply_mimics(mimics_, out_.tree, errors_, out_.warnings);
+    apply_mimics(mimics_, out_.tree, out_.warnings);
     check_inertias(out_.tree, outline_, options_, errors_, out_.warnings);
     if (!errors_.empty()) return std::unexpected(errors_);
     return std::move(out_);
@@ -177,6 +178,7 @@ class Builder {
         continue;
       }
       if (!moves(*joint)) {
+        if (outlined(name).locked) continue;
         lock_error(name, "the joint '" + name + "' is fixed in the description",
                    "remove it from [model.lock]");
       } else if (!std::isfinite(position)) {
@@ -256,9 +258,9 @@ class Builder {
                            "joint " + joint.name});
       }
       const Placement in_body = above.in_body * origin;
-      if (const double* position = lock_of(joint.name)) {
+      if (const double* position = lock_of(joint.name); position != nullptr && moves(joint)) {
         link.body = above.body;
-        link.in_body = in_body * displacement(joint, *position);
+        link.in_body = in_body * displacement(joint, std::isfinite(*position) ? *position : 0.0);
       } else if (!moves(joint)) {
         link.body = above.body;
         link.in_body = in_body;
@@ -331,22 +333,42 @@ Diagnostics lost_masses(const Outline& outline, const urdf::ModelInterface& mode
   return lost;
 }
 
+/// What the text says wrongly, and what else is wrong with the model: of a link or joint that has
+/// been reported, the rest is made up.
+Diagnostics together(Diagnostics errors, const Diagnostics& others) {
+  const std::size_t of_text = errors.size();
+  for (const Error& one : others) {
+    const bool reported =
+        std::any_of(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(of_text),
+                    [&one](const Error& error) { return error.key == one.key; });
+    if (!reported) add_error(errors, one);
+  }
+  return errors;
+}
+
 }  // namespace
 
 std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const std::string& file,
                                                  const UrdfOptions& options) {
-  Outline outline = outline_urdf(text, file, options.exact_right_angles);
-  if (outline.errors.empty()) check_topology(outline, file);
-  if (!outline.errors.empty()) {
-    sort_by_line(outline.errors);
-    return std::unexpected(outline.errors);
+  Outline outline = outline_urdf(text, file, options);
+  const bool named = !outline.incomplete;
+  if (named) check_topology(outline, file);
+  sort_by_line(outline.errors);
+  if (named && outline.incomplete) {
+    const Diagnostics links = impossible_links(outline, file);
+    return std::unexpected(together(std::move(outline.errors), links));
   }
+  if (outline.incomplete) return std::unexpected(outline.errors);
   const auto model = parse_with_urdfdom(outline.text);
-  if (!model) return std::unexpected(one_error(model.error().message, {}, file));
+  if (!model) {
+    if (!outline.errors.empty()) return std::unexpected(outline.errors);
+    return std::unexpected(one_error(model.error().message, {}, file));
+  }
   if (Diagnostics lost = lost_masses(outline, **model, file); !lost.empty())
-    return std::unexpected(std::move(lost));
+    return std::unexpected(together(std::move(outline.errors), lost));
   auto read = Builder(outline, options, file).run(**model);
-  if (!read) return read;
+  if (!read) return std::unexpected(together(std::move(outline.errors), read.error()));
+  if (!outline.errors.empty()) return std::unexpected(outline.errors);
   const auto shapes = collision_shapes(text);
   for (Link& link : read->tree.links) {
     if (const auto found = shapes.find(link.name); found != shapes.end()) {
@@ -354,6 +376,7 @@ std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const st
     }
   }
   read->text = std::make_shared<const std::string>(text);
+  warn_of_odd_masses(read->tree, outline, read->warnings);
   return read;
 }
 

@@ -70,12 +70,12 @@ inline constexpr const char* kRepaired =
 ///
 /// Errors, all of them at once as far as the text can be understood:
 ///   - the file is missing, unreadable, cut off, no XML, no <robot>;
-///   - a name, attribute or element is missing; a number is unreadable, NaN or infinite;
+///   - a name, attribute or element is missing; a number (but a limit) unreadable, NaN or infinite;
 ///   - two links or joints of one name; a joint to a link that is not there (nearest suggested);
 ///   - a link with two parents, a loop, two roots, no link at all;
-///   - planar or unknown joint types; a floating one elsewhere, or with a fixed base; a joint that
-///     mimics itself, rings of mimics, limits that leader and follower cannot both keep; xacro that
-///     was not expanded;
+///   - planar or unknown joint types; a floating one elsewhere, or with a fixed base (either may be
+///     locked at 0); a joint that mimics itself, rings of mimics; a UTF-16 file; xacro that was not
+///     expanded;
 ///   - a zero axis; a lock on a joint that is missing, fixed or beyond limits; an override of a
 ///     link that is not there;
 ///   - negative mass; an inertia that is not positive definite or breaks the triangle inequality

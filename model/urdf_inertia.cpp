@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "model/urdf_override.hpp"
+#include "model/urdf_repair.hpp"
 
 namespace tandem::model {
 namespace {
@@ -39,8 +40,8 @@ class Checker {
       check_place(link);
       check_link(link);
     }
-    if (errors_.size() > before) return;
-    for (std::size_t i = 0; i < tree_.bodies.size(); ++i) check_body(i);
+    const bool possible = errors_.size() == before;
+    for (std::size_t i = 0; possible && i < tree_.bodies.size(); ++i) check_body(i);
     check_carried_mass();
   }
 
@@ -80,9 +81,12 @@ class Checker {
           "shows the nearest possible one";
       warnings_.push_back(report);
     } else {
-      report.hint =
-          "check the six moments, their signs and their reference point; inertia = \"repair\" in "
-          "[model] takes the nearest possible one, and `tandem check --repair` shows it";
+      report.hint = "check the six moments, their signs and their reference point";
+      if (repaired(link.inertia)) {
+        report.hint +=
+            "; inertia = \"repair\" in [model] takes the nearest possible one, and `tandem check "
+            "--repair` shows it";
+      }
       errors_.push_back(report);
     }
   }
@@ -98,8 +102,11 @@ class Checker {
   }
 
   void check_carried_mass() {
-    std::vector<double> carried;
-    for (const Body& body : tree_.bodies) carried.push_back(body.inertia.mass_kg);
+    // Masses that are negative are reported themselves; here they are masses.
+    std::vector<double> carried(tree_.bodies.size(), 0.0);
+    for (const Link& link : tree_.links)
+      carried[static_cast<std::size_t>(link.body)] += std::abs(link.inertia.mass_kg);
+    const double base_kg = carried[0];
     for (std::size_t i = tree_.joints.size(); i > 0; --i) {
       carried[static_cast<std::size_t>(tree_.joints[i - 1].parent)] += carried[i];
     }
@@ -114,11 +121,12 @@ class Checker {
       errors_.push_back({"the joint moves nothing that has mass",
                          "give link '" + tree_.bodies[i + 1].name +
                              "' mass and inertia, lock the "
-                             "joint or make it fixed",
+                             "joint or make it fixed; `tandem new` has --density, --lock and "
+                             "--drop for that",
                          tree_.file, joint.line, "joint " + joint.name});
     }
     const Body& base = tree_.bodies[0];
-    if (!tree_.floating_base || base.inertia.mass_kg > 0.0) return;
+    if (!tree_.floating_base || base_kg > 0.0) return;
     errors_.push_back({"the floating base has no mass",
                        "give it mass and inertia, or set base = \"fixed\" in robot.toml",
                        tree_.file, line_of(base.name), "link " + base.name});
@@ -138,6 +146,11 @@ class Checker {
 
 }  // namespace
 
+bool is_beyond_size(double mass_kg, const Eigen::Matrix3d& about_com_kg_m2) {
+  const double most = 2.0 * kMostGyration_m * kMostGyration_m * mass_kg;
+  return mass_kg > 0.0 && about_com_kg_m2.trace() > most;
+}
+
 std::string inertia_problem(const Inertia& inertia) {
   const Eigen::Matrix3d& I = inertia.about_com_kg_m2;
   if (!I.allFinite() || !inertia.com_m.allFinite() || !std::isfinite(inertia.mass_kg)) {
@@ -147,8 +160,7 @@ std::string inertia_problem(const Inertia& inertia) {
   if (inertia.mass_kg > kMostMass_kg) {
     return "the mass is " + mass_text(inertia) + ", more than any robot has";
   }
-  if (inertia.mass_kg > 0.0 &&
-      I.trace() > 2.0 * kMostGyration_m * kMostGyration_m * inertia.mass_kg) {
+  if (is_beyond_size(inertia.mass_kg, I)) {
     return "the inertia, of principal moments " + moments_text(inertia) +
            ", is that of a body of " + "more than " +
            std::to_string(static_cast<int>(kMostGyration_m)) + " m";
@@ -174,6 +186,22 @@ std::string moments_text(const Inertia& inertia) {
 void check_inertias(const Tree& tree, const Outline& outline, const UrdfOptions& options,
                     Diagnostics& errors, Diagnostics& warnings) {
   Checker(tree, outline, options, errors, warnings).run();
+}
+
+Diagnostics impossible_links(const Outline& outline, const std::string& file) {
+  double whole_kg = 0.0;
+  for (const OutlineLink& link : outline.links) whole_kg += std::abs(link.mass_kg);
+  Diagnostics errors;
+  for (const OutlineLink& link : outline.links) {
+    const auto& [xx, xy, xz, yy, yz, zz] = link.moments_kg_m2;
+    Inertia inertia{link.mass_kg, Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
+    inertia.about_com_kg_m2 << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+    const std::string found = inertia_problem(inertia);
+    if (found.empty() || std::abs(link.mass_kg) < kNegligibleMassShare * whole_kg) continue;
+    errors.push_back({found, "check the mass, the six moments and their signs", file, link.line,
+                      "link " + link.name});
+  }
+  return errors;
 }
 
 }  // namespace tandem::model

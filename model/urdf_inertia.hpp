@@ -14,6 +14,9 @@ namespace tandem::model {
 /// What is impossible about an inertia, or empty.
 [[nodiscard]] std::string inertia_problem(const Inertia& inertia);
 
+/// Whether the inertia is that of a body larger than any robot: it says nothing of the shape.
+[[nodiscard]] bool is_beyond_size(double mass_kg, const Eigen::Matrix3d& about_com_kg_m2);
+
 /// "0.01, 0.02, 0.02 kg m^2": the principal moments, ascending.
 [[nodiscard]] std::string moments_text(const Inertia& inertia);
 
@@ -22,5 +25,9 @@ namespace tandem::model {
 /// joint with its line, or what overrides it.
 void check_inertias(const Tree& tree, const Outline& outline, const UrdfOptions& options,
                     Diagnostics& errors, Diagnostics& warnings);
+
+/// What can be said of links' inertias where the joints make no tree: that they are impossible,
+/// unless the link may be a negligible one.
+[[nodiscard]] Diagnostics impossible_links(const Outline& outline, const std::string& file);
 
 }  // namespace tandem::model

@@ -83,26 +83,16 @@ std::string range_text(double lower, double upper) {
   return text;
 }
 
-/// Narrows one leader's range and speed to those of one follower.
+/// Narrows one leader's range and speed to those of one follower. Limits of a follower that leave
+/// the leader no way contradict the multiplier or the offset, a widespread error of grippers'
+/// descriptions: they are not used.
 class Narrowing {
  public:
-  Narrowing(Joint& leader, const Joint& follower, const std::string& file)
+  Narrowing(Joint& leader, Joint& follower, const std::string& file)
       : leader_(leader), follower_(follower), file_(file) {}
 
-  void run(Diagnostics& errors, Diagnostics& warnings) {
-    const double lower = leader_.lower;
-    const double upper = leader_.upper;
-    narrow_range(follower_.leaders_range());
-    if (leader_.lower > leader_.upper) {
-      errors.push_back(report("no position of it keeps its follower '" + follower_.name +
-                                  "' within " + range_text(follower_.lower, follower_.upper),
-                              "correct the multiplier, the offset or the limits"));
-    } else if (follower_.has_limits() && (leader_.lower != lower || leader_.upper != upper)) {
-      warnings.push_back(
-          report("its range is narrowed to " + range_text(leader_.lower, leader_.upper) +
-                     ", in which its follower '" + follower_.name + "' keeps its own",
-                 {}));
-    }
+  void run(Diagnostics& warnings) {
+    narrow_range(warnings);
     const double speed = follower_.velocity / std::abs(follower_.multiplier);
     if (!(speed < leader_.velocity)) return;  // or one of the two is not given
     leader_.velocity = speed;
@@ -112,19 +102,46 @@ class Narrowing {
   }
 
  private:
-  void narrow_range(const Range& range) {
+  void narrow_range(Diagnostics& warnings) {
+    constexpr double kNoWay = 1e-3;  // of what the narrower of the two has by itself
     if (!follower_.has_limits()) return;
-    const bool open = !leader_.has_limits();
-    leader_.lower = open ? range.lower : std::max(leader_.lower, range.lower);
-    leader_.upper = open ? range.upper : std::min(leader_.upper, range.upper);
+    const Range range = follower_.leaders_range();
+    // fmax() and fmin() take the follower's where the leader has none.
+    const double lower = std::fmax(leader_.lower, range.lower);
+    const double upper = std::fmin(leader_.upper, range.upper);
+    const double whole = leader_.has_limits()
+                             ? std::min(range.upper - range.lower, leader_.upper - leader_.lower)
+                             : range.upper - range.lower;
+    if (!(upper - lower > kNoWay * whole)) return drop_limits(warnings);
+    const bool narrower = leader_.lower != lower || leader_.upper != upper;
+    leader_.lower = lower;
+    leader_.upper = upper;
     if (leader_.type == JointType::kContinuous) leader_.type = JointType::kRevolute;
+    if (!narrower) return;
+    warnings.push_back(report("its range is narrowed to " + range_text(lower, upper) +
+                                  ", in which its follower '" + follower_.name + "' keeps its own",
+                              {}));
   }
+
+  void drop_limits(Diagnostics& warnings) {
+    const double a = follower_.multiplier * leader_.lower + follower_.offset;
+    const double b = follower_.multiplier * leader_.upper + follower_.offset;
+    warnings.push_back({"its limits, " + range_text(follower_.lower, follower_.upper) +
+                            ", contradict its <mimic>: joint '" + leader_.name + "' at " +
+                            range_text(leader_.lower, leader_.upper) + " takes it to " +
+                            range_text(std::min(a, b), std::max(a, b)) +
+                            ", and so they are not used",
+                        "correct the multiplier, the offset or the limits", file_, follower_.line,
+                        "joint " + follower_.name});
+    follower_.lower = follower_.upper = kNoLimit;
+  }
+
   Error report(std::string message, std::string hint) const {
     return {std::move(message), std::move(hint), file_, leader_.line, "joint " + leader_.name};
   }
 
   Joint& leader_;
-  const Joint& follower_;
+  Joint& follower_;
   const std::string& file_;
 };
 
@@ -136,7 +153,7 @@ Mimics resolve_mimics(const Outline& outline, const UrdfOptions& options, const 
   return Resolver(outline, options, file, errors).run(outline);
 }
 
-void apply_mimics(const Mimics& mimics, Tree& tree, Diagnostics& errors, Diagnostics& warnings) {
+void apply_mimics(const Mimics& mimics, Tree& tree, Diagnostics& warnings) {
   for (Joint& joint : tree.joints) {
     const auto found = mimics.followers.find(joint.name);
     if (found == mimics.followers.end()) continue;
@@ -144,7 +161,7 @@ void apply_mimics(const Mimics& mimics, Tree& tree, Diagnostics& errors, Diagnos
     joint.multiplier = found->second.multiplier;
     joint.offset = found->second.offset;
     Joint& leader = tree.joints[static_cast<std::size_t>(joint.leader)];
-    Narrowing(leader, joint, tree.file).run(errors, warnings);
+    Narrowing(leader, joint, tree.file).run(warnings);
   }
 }
 

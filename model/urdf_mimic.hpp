@@ -35,9 +35,10 @@ struct Mimics {
                                     const std::string& file, Diagnostics& errors);
 
 /// Sets the followers' `leader`, and narrows every leader's range and speed to what its followers
-/// allow.
+/// allow. Limits of a follower that leave its leader no way are taken away.
 ///
-/// Appends a warning for each range or speed that became narrower, an error where none is left.
-void apply_mimics(const Mimics& mimics, Tree& tree, Diagnostics& errors, Diagnostics& warnings);
+/// Appends a warning for each range or speed that became narrower, and for each follower whose
+/// limits are not used.
+void apply_mimics(const Mimics& mimics, Tree& tree, Diagnostics& warnings);
 
 }  // namespace tandem::model

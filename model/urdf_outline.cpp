@@ -5,16 +5,19 @@
 #include <tinyxml2.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "base/bounds.hpp"
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 #include "base/utf8.hpp"
 #include "base/xml_scan.hpp"
+#include "model/urdf_limits.hpp"
+#include "model/urdf_numbers.hpp"
 #include "model/urdf_vocabulary.hpp"
 #include "model/urdf_xacro.hpp"
+#include "model/xml_encoding.hpp"
 #include "model/xml_reference.hpp"
 
 namespace tandem::model {
@@ -22,23 +25,7 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-constexpr double kLargestNumber = 1e30;  // so that no product of a few overflows
-constexpr double kMostTurn_rad = 6.5;    // of an rpy: more is degrees, most likely
-constexpr double kMostWay_rad = 26.0;    // of a revolute joint: likewise, four turns
-constexpr const char* kBlanks = " \t\r\n";
-
-/// The words of a text that has numbers. urdfdom takes blanks between them only: with a tab, or a
-/// blank at the end, it leaves a link's inertial out and says nothing that is an error.
-std::vector<std::string> words_of(std::string_view text) {
-  std::vector<std::string> words;
-  std::size_t at = 0;
-  while ((at = text.find_first_not_of(kBlanks, at)) != std::string_view::npos) {
-    const std::size_t end = std::min(text.find_first_of(kBlanks, at), text.size());
-    words.emplace_back(text.substr(at, end - at));
-    at = end;
-  }
-  return words;
-}
+constexpr double kMostTurn_rad = 6.5;  // of an rpy: more is degrees, most likely
 
 /// The attributes of `e` and what is in it, whose values are numbers, with one blank between them.
 void tidy_numbers(tinyxml2::XMLElement& e) {
@@ -57,57 +44,78 @@ enum class Needed : bool { kNo, kYes };
 /// Walks the XML once, collects what matters and reports what is wrong with it.
 class Reader {
  public:
-  Reader(const std::string& file, bool exact_right_angles)
-      : file_(file), exact_right_angles_(exact_right_angles), vocabulary_(file) {}
+  Reader(const std::string& file, const UrdfOptions& options)
+      : file_(file), options_(options), vocabulary_(file), limits_(file, out_.errors) {}
 
   Outline run(std::string_view text) {
+    if (const XMLElement* robot = parse(text)) {
+      read_robot(*robot);
+    } else {
+      out_.incomplete = true;
+    }
+    return std::move(out_);
+  }
+
+ private:
+  /// The root element, or null with an error.
+  const XMLElement* parse(std::string_view text) {
+    if (const std::string encoding = wide_encoding(text); !encoding.empty()) {
+      error(0, "", "the file is " + encoding + ", and a URDF must be UTF-8",
+            conversion(encoding, file_));
+      return nullptr;
+    }
+    encoding_ = declared_encoding(text);
     if (text.find('\0') != std::string_view::npos) {
       error(0, "", "the file holds a zero byte, so it is no XML", "name a URDF text file");
-      return std::move(out_);
+      return nullptr;
     }
     const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
     if (first != std::string_view::npos && text[first] != '<') {
       error(1, "", "this is no XML, so no URDF", "name a .urdf file");
-      return std::move(out_);
+      return nullptr;
     }
     if (Status within = check_xml_bounds(text, file_); !within) {
       out_.errors.push_back(within.error());
-      return std::move(out_);
+      return nullptr;
     }
     const std::string plain = without_instructions(text);
     if (document_.Parse(plain.data(), plain.size()) != tinyxml2::XML_SUCCESS) {
       report_xml_error();
-      return std::move(out_);
+      return nullptr;
     }
     if (const auto wrong = find_wrong_reference(plain)) {
       error(wrong->line, "",
             "the character reference '" + wrong->text + "' stands for no character",
             "write the character itself, in UTF-8");
-      return std::move(out_);
+      return nullptr;
     }
     const XMLElement* robot = document_.RootElement();
     if (robot == nullptr || std::string_view(robot->Name()) != "robot") {
       const std::string found = robot == nullptr ? "" : robot->Name();
       error(robot == nullptr ? 0 : robot->GetLineNum(), found, "the root element is not <robot>",
             "name a URDF; expand xacro and convert SDF first");
-      return std::move(out_);
+      return nullptr;
     }
     if (const XMLElement* second = robot->NextSiblingElement()) {
       error(second->GetLineNum(), second->Name(), "there is a second root element",
             "a file holds one robot: remove the other");
-      return std::move(out_);
+      return nullptr;
     }
     if (auto left = find_xacro(*robot, file_)) {
       out_.errors.push_back(std::move(*left));
-      return std::move(out_);
+      return nullptr;
     }
-    read_robot(*robot);
-    return std::move(out_);
+    return robot;
   }
 
- private:
   void error(int line, std::string key, std::string message, std::string hint = {}) {
     add_error(out_.errors, {std::move(message), std::move(hint), file_, line, std::move(key)});
+  }
+
+  /// An error after which names, or what hangs on what, are not known.
+  void lost(int line, std::string key, std::string message, std::string hint = {}) {
+    out_.incomplete = true;
+    error(line, std::move(key), std::move(message), std::move(hint));
   }
 
   void warning(int line, std::string key, std::string message, std::string hint) {
@@ -144,9 +152,9 @@ class Reader {
         check_unknown(*e);
       }
     }
-    if (out_.links.empty()) error(robot.GetLineNum(), "", "the robot has no link");
+    if (out_.links.empty()) lost(robot.GetLineNum(), "", "the robot has no link");
     check_count();
-    warn_of_dynamics();
+    limits_.warn(out_.warnings);
     vocabulary_.warn(out_.warnings);
     tinyxml2::XMLPrinter printer(nullptr, true);
     reduced_.Print(&printer);
@@ -155,6 +163,7 @@ class Reader {
 
   /// What follows costs more than in proportion to links and joints.
   void check_count() {
+    const std::size_t before = out_.errors.size();
     if (out_.links.size() > bounds::kUrdfLinks.most)
       add_error(out_.errors,
                 beyond(bounds::kUrdfLinks, file_, out_.links[bounds::kUrdfLinks.most].line));
@@ -164,6 +173,7 @@ class Reader {
       add_error(out_.errors,
                 beyond(bounds::kMovingJoints, file_, joint.line, "joint " + joint.name));
     }
+    out_.incomplete |= out_.errors.size() > before || before > bounds::kErrors.most;
   }
 
   /// Elements that others use are passed over; a misspelt <link> or <joint> is an error.
@@ -171,13 +181,13 @@ class Reader {
     static const std::vector<std::string> kOthers{"material", "transmission", "gazebo", "sensor",
                                                   "mujoco",   "camera",       "plugin"};
     const std::string name = e.Name();
-    if (std::ranges::find(kOthers, name) != kOthers.end()) return;
+    if (std::ranges::find(kOthers, name) != kOthers.end() || vocabulary_.takes_foreign(e)) return;
     const std::vector<std::string> ours{"link", "joint"};
     if (const std::string meant = nearest(name, ours); !meant.empty() && name.size() <= 6) {
-      return error(e.GetLineNum(), name, "unknown element <" + name + ">",
-                   "did you mean <" + meant + ">?");
+      return lost(e.GetLineNum(), name, "unknown element <" + name + ">",
+                  "did you mean <" + meant + ">?");
     }
-    warning(e.GetLineNum(), name, "the element <" + name + "> is not used", {});
+    vocabulary_.pass_over(e);
   }
 
   std::string attribute(const XMLElement& e, const char* name, const std::string& key,
@@ -195,21 +205,23 @@ class Reader {
   std::string name_of(const XMLElement& e, const char* attribute_name, const std::string& key) {
     std::string name = attribute(e, attribute_name, key, Needed::kYes);
     const bool odd = std::ranges::any_of(name, [](unsigned char c) { return c < 32 || c == 127; });
+    const std::string what = std::string("'") + attribute_name + "' of <" + e.Name() + ">";
     if (!is_utf8(name)) {
-      error(e.GetLineNum(), key,
-            std::string("'") + attribute_name + "' of <" + e.Name() + "> is not UTF-8",
-            "save the file in UTF-8, or name it in plain letters");
+      lost(e.GetLineNum(), key, what + " is not UTF-8",
+           encoding_.empty()
+               ? "save the file in UTF-8, or name it in plain letters"
+               : "the file says that it is " + encoding_ + ": " + conversion(encoding_, file_));
       return {};
     }
     if (name.size() > bounds::kXmlName.most) {
+      out_.incomplete = true;
       add_error(out_.errors, beyond(bounds::kXmlName, file_, e.GetLineNum(), e.Name()));
       return {};
     }
+    out_.incomplete |= name.empty();
     if (name.empty() || (!odd && name.front() != ' ' && name.back() != ' ')) return name;
-    error(e.GetLineNum(), key,
-          std::string("'") + attribute_name + "' of <" + e.Name() +
-              "> has blanks around it or control characters in it",
-          "remove them");
+    lost(e.GetLineNum(), key, what + " has blanks around it or control characters in it",
+         "remove them");
     return {};
   }
 
@@ -251,30 +263,26 @@ class Reader {
 
   bool number(const XMLElement& e, const char* name, const std::string& word,
               const std::string& key, double& value) {
-    const char* begin = word.data() + (word.front() == '+' ? 1 : 0);
-    const char* end = word.data() + word.size();
-    const auto [stop, failure] = std::from_chars(begin, end, value);
+    const NumberText found = number_of(word);
+    value = found.value;
     const std::string where = std::string("'") + name + "' of <" + e.Name() + ">";
-    if (failure == std::errc::invalid_argument || stop != end) {
+    if (found.kind == NumberKind::kNoNumber) {
       error(e.GetLineNum(), key, where + " is no number: '" + word + "'", "write it as 1.5e-3");
-      return false;
-    }
-    if (failure != std::errc{} || !(std::abs(value) <= kLargestNumber)) {
+    } else if (found.kind == NumberKind::kEndless) {
       error(e.GetLineNum(), key, where + " is not finite or far out of range: " + word,
             "give a finite number below 1e30");
-      return false;
     }
-    return true;
+    return found.kind == NumberKind::kFinite;
   }
 
   void check_unique(std::map<std::string, int>& lines, const std::string& name, const XMLElement& e,
                     const std::string& key) {
     const auto [at, fresh] = lines.emplace(name, e.GetLineNum());
     if (fresh || name.empty()) return;
-    error(e.GetLineNum(), key,
-          std::string("there is another ") + e.Name() + " of this name at line " +
-              std::to_string(at->second),
-          "rename or remove one of them");
+    lost(e.GetLineNum(), key,
+         std::string("there is another ") + e.Name() + " of this name at line " +
+             std::to_string(at->second),
+         "rename or remove one of them");
   }
 
   void check_origin(const XMLElement& e, const std::string& key) {
@@ -290,6 +298,7 @@ class Reader {
   }
 
   void read_link(const XMLElement& e, XMLElement& reduced) {
+    const std::size_t before = out_.errors.size();
     const std::string name = name_of(e, "name", "link");
     const std::string key = "link " + name;
     check_unique(out_.link_lines, name, e, key);
@@ -299,22 +308,42 @@ class Reader {
     reduced.InsertEndChild(copy);
     vocabulary_.look_at(e, key, out_.errors);
     const XMLElement* inertial = child(e, "inertial", key, Needed::kNo);
+    if (inertial != nullptr) read_inertial(*inertial, key);
+    if (out_.errors.size() > before) return stand_in(*copy);
     if (inertial == nullptr) return;
-    check_origin(*inertial, key);
-    const XMLElement* mass = child(*inertial, "mass", key, Needed::kYes);
-    const std::vector<double> kg = numbers(mass, "value", 1, key, Needed::kYes);
-    if (!kg.empty()) out_.links.back().mass_kg = kg[0];
-    const XMLElement* inertia = child(*inertial, "inertia", key, Needed::kYes);
-    for (const char* moment : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) {
-      (void)numbers(inertia, moment, 1, key, Needed::kYes);
-    }
     tinyxml2::XMLElement* cloned =
         copy->InsertEndChild(inertial->DeepClone(&reduced_))->ToElement();
     tidy_numbers(*cloned);
-    look_at_rpy(cloned->FirstChildElement("origin"), exact_right_angles_, out_.right_angles);
+    look_at_rpy(cloned->FirstChildElement("origin"), options_.exact_right_angles,
+                out_.right_angles);
+  }
+
+  void read_inertial(const XMLElement& inertial, const std::string& key) {
+    check_origin(inertial, key);
+    const XMLElement* mass = child(inertial, "mass", key, Needed::kYes);
+    const std::vector<double> kg = numbers(mass, "value", 1, key, Needed::kYes);
+    if (!kg.empty()) out_.links.back().mass_kg = kg[0];
+    const XMLElement* inertia = child(inertial, "inertia", key, Needed::kYes);
+    double* entry = out_.links.back().moments_kg_m2.data();
+    for (const char* moment : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) {
+      const std::vector<double> found = numbers(inertia, moment, 1, key, Needed::kYes);
+      *entry++ = found.empty() ? 0.0 : found[0];
+    }
+  }
+
+  /// A possible inertial for a link that has an error, so that the rest can be read.
+  void stand_in(XMLElement& link) {
+    out_.links.back().mass_kg = 1.0;
+    out_.links.back().moments_kg_m2 = {0.01, 0.0, 0.0, 0.01, 0.0, 0.01};
+    XMLElement* inertial = link.InsertNewChildElement("inertial");
+    inertial->InsertNewChildElement("mass")->SetAttribute("value", "1");
+    XMLElement* inertia = inertial->InsertNewChildElement("inertia");
+    for (const char* moment : {"ixx", "iyy", "izz"}) inertia->SetAttribute(moment, "0.01");
+    for (const char* moment : {"ixy", "ixz", "iyz"}) inertia->SetAttribute(moment, "0");
   }
 
   void read_joint(const XMLElement& e, XMLElement& reduced) {
+    const std::size_t before = out_.errors.size();
     OutlineJoint joint;
     joint.line = e.GetLineNum();
     joint.name = name_of(e, "name", "joint");
@@ -327,6 +356,7 @@ class Reader {
     if (parent != nullptr) joint.parent = name_of(*parent, "link", key);
     const XMLElement* child_link = child(e, "child", key, Needed::kYes);
     if (child_link != nullptr) joint.child = name_of(*child_link, "link", key);
+    out_.incomplete |= parent == nullptr || child_link == nullptr;
     check_origin(e, key);
     if (joint.type != "fixed" && joint.type != "floating") read_motion(e, joint, key);
     if (const XMLElement* mimic = child(e, "mimic", key, Needed::kNo)) {
@@ -339,33 +369,56 @@ class Reader {
       read("offset", joint.mimic_offset);
     }
     out_.joints.push_back(joint);
+    copy_joint(e, joint, out_.errors.size() == before, reduced);
+  }
+
+  /// @param whole  it has no error; else its place and its axis are left out
+  void copy_joint(const XMLElement& e, const OutlineJoint& joint, bool whole, XMLElement& reduced) {
     XMLElement* copy = reduced_.NewElement("joint");
     copy->SetAttribute("name", joint.name.c_str());
     copy->SetAttribute("type", joint.type.c_str());
     reduced.InsertEndChild(copy);
     for (const char* part : {"parent", "child", "origin", "axis"}) {
       const XMLElement* found = e.FirstChildElement(part);
-      if (found == nullptr) continue;
+      const bool names = found != nullptr && found->Attribute("link") != nullptr;
+      if (found == nullptr || (!whole && !names)) continue;
       tinyxml2::XMLElement* cloned = copy->InsertEndChild(found->DeepClone(&reduced_))->ToElement();
-      if (found->Attribute("link") == nullptr) tidy_numbers(*cloned);
+      if (!names) tidy_numbers(*cloned);
     }
-    look_at_rpy(copy->FirstChildElement("origin"), exact_right_angles_, out_.right_angles);
-    if (joint.type != "fixed")
-      look_at_axis(copy->FirstChildElement("axis"), exact_right_angles_, out_.right_angles);
+    look_at_rpy(copy->FirstChildElement("origin"), options_.exact_right_angles, out_.right_angles);
+    if (joint.type != "fixed") {
+      look_at_axis(copy->FirstChildElement("axis"), options_.exact_right_angles, out_.right_angles);
+    }
     XMLElement* limit = reduced_.NewElement("limit");  // ours are in `joint`; urdfdom needs one
     for (const char* name : {"velocity", "effort"}) limit->SetAttribute(name, "0");
     copy->InsertEndChild(limit);
   }
 
-  void check_type(const OutlineJoint& joint, const std::string& key) {
+  /// A type that is none becomes "fixed". So does a planar or floating joint that is locked.
+  void check_type(OutlineJoint& joint, const std::string& key) {
     static const std::vector<std::string> kTypes{"revolute", "continuous", "prismatic", "fixed",
                                                  "floating"};
-    if (joint.type.empty() || std::ranges::find(kTypes, joint.type) != kTypes.end()) return;
-    if (joint.type == "planar") {
-      return error(joint.line, key, "joints of type 'planar' are not supported",
-                   "build it of two prismatic and one revolute joint");
+    const auto lock =
+        std::ranges::find(options_.lock, joint.name, &std::pair<std::string, double>::first);
+    const bool planar = joint.type == "planar";
+    const bool floats = joint.type == "floating" && !options_.floating_base;
+    if (lock != options_.lock.end() && (planar || floats)) {
+      joint.type = "fixed";
+      joint.locked = true;
+      if (lock->second == 0.0) return;
+      return error(joint.line, key, "a joint of several directions can be locked at 0 only",
+                   "[model.lock] " + joint.name + " = 0");
     }
-    error(joint.line, key, "unknown joint type '" + joint.type + "'", suggest(joint.type, kTypes));
+    if (!joint.type.empty() && std::ranges::find(kTypes, joint.type) != kTypes.end()) return;
+    if (planar) {
+      error(joint.line, key, "joints of type 'planar' are not supported",
+            "build it of two prismatic and one revolute joint; or `tandem new --lock " +
+                shell_word(joint.name) + "` makes it stand still");
+    } else if (!joint.type.empty()) {
+      error(joint.line, key, "unknown joint type '" + joint.type + "'",
+            suggest(joint.type, kTypes));
+    }
+    joint.type = "fixed";
   }
 
   void read_motion(const XMLElement& e, OutlineJoint& joint, const std::string& key) {
@@ -374,86 +427,24 @@ class Reader {
     if (!axis.empty() && std::hypot(axis[0], axis[1], axis[2]) < 1e-6) {
       error(joint.line, key, "the axis has no length", "give a direction, for example 0 0 1");
     }
-    if (const XMLElement* limit = child(e, "limit", key, Needed::kNo)) {
-      read_limits(*limit, joint, key);
-    } else if (joint.type == "continuous") {
-      joint.velocity = joint.effort = std::numeric_limits<double>::infinity();
-    } else {
-      joint.limits_note = "the joint at " + place(joint.line) + " has no <limit>";
-    }
-    if (joint.type == "continuous") {
-      joint.lower = -std::numeric_limits<double>::infinity();
-      joint.upper = std::numeric_limits<double>::infinity();
-    }
-    read_dynamics(e.FirstChildElement("dynamics"));
-  }
-
-  /// Limits that make no sense are left to robot.toml.
-  void read_limits(const XMLElement& limit, OutlineJoint& joint, const std::string& key) {
-    const auto one = [&](const char* name, double none) {
-      const std::vector<double> found = numbers(&limit, name, 1, key, Needed::kNo);
-      return found.empty() ? none : found[0];
-    };
-    const auto note = [&](const std::string& what) {
-      joint.limits_note += joint.limits_note.empty() ? place(limit.GetLineNum()) + ": " : ", ";
-      joint.limits_note += what;
-    };
-    joint.lower = one("lower", 0.0);
-    joint.upper = one("upper", 0.0);
-    if (joint.type == "revolute" &&
-        std::max(std::abs(joint.lower), std::abs(joint.upper)) > kMostWay_rad) {
-      warning(limit.GetLineNum(), key, "the joint's limits are more than four turns away",
-              "angles are in radians");
-    }
-    const bool missing = limit.Attribute("lower") == nullptr && limit.Attribute("upper") == nullptr;
-    if (joint.type != "continuous" && joint.lower >= joint.upper) {
-      note(missing                     ? "lower and upper are missing"
-           : joint.lower > joint.upper ? "lower is above upper"
-                                       : "lower and upper are equal");
-      joint.lower = joint.upper = kNoLimit;
-    }
-    joint.velocity = one("velocity", kNoLimit);
-    joint.effort = one("effort", kNoLimit);
-    for (double* most : {&joint.velocity, &joint.effort}) {
-      if (*most > 0.0) continue;
-      const std::string name = most == &joint.velocity ? "velocity" : "effort";
-      note(std::isnan(*most) ? name + " is missing" : name + " is not above 0");
-      *most = kNoLimit;
-    }
-  }
-
-  [[nodiscard]] std::string place(int line) const { return file_ + ":" + std::to_string(line); }
-
-  void read_dynamics(const XMLElement* dynamics) {
-    if (dynamics == nullptr) return;
-    const bool used =
-        dynamics->DoubleAttribute("damping") != 0.0 || dynamics->DoubleAttribute("friction") != 0.0;
-    if (used && damped_++ == 0) damped_line_ = dynamics->GetLineNum();
-  }
-
-  void warn_of_dynamics() {
-    if (damped_ == 0) return;
-    out_.warnings.push_back({"the damping and friction of " + std::to_string(damped_) +
-                                 (damped_ == 1 ? " joint" : " joints") +
-                                 " (<dynamics>) is not used: a joint's damping is its actuator's",
-                             "damping_Nms_rad of [actuator.NAME] in robot.toml", file_,
-                             damped_line_, "dynamics"});
+    (void)child(e, "limit", key, Needed::kNo);
+    limits_.read(e, joint, key, out_.warnings);
   }
 
   const std::string& file_;
-  const bool exact_right_angles_;
+  const UrdfOptions& options_;
+  std::string encoding_;  // that the file declares, if it is not UTF-8
   tinyxml2::XMLDocument document_;
   tinyxml2::XMLDocument reduced_;
   Outline out_;
   Vocabulary vocabulary_;
-  int damped_ = 0;  // joints with damping or friction
-  int damped_line_ = 0;
+  LimitsReader limits_;
 };
 
 }  // namespace
 
-Outline outline_urdf(std::string_view text, const std::string& file, bool exact_right_angles) {
-  return Reader(file, exact_right_angles).run(text);
+Outline outline_urdf(std::string_view text, const std::string& file, const UrdfOptions& options) {
+  return Reader(file, options).run(text);
 }
 
 }  // namespace tandem::model

@@ -2,6 +2,7 @@
 // Layer: model, private to urdf*.cpp.  Thread: non-RT only.
 #pragma once
 
+#include <array>
 #include <limits>
 #include <map>
 #include <string>
@@ -10,6 +11,8 @@
 
 #include "base/result.hpp"
 #include "model/right_angles.hpp"
+#include "model/urdf.hpp"
+#include "model/urdf_extras.hpp"
 
 namespace tandem::model {
 
@@ -17,6 +20,8 @@ struct OutlineLink {
   std::string name;
   int line = 0;
   double mass_kg = 0.0;  ///< 0 without <inertial>
+  /// ixx ixy ixz iyy iyz izz, along the inertial's own axes.
+  std::array<double, 6> moments_kg_m2{};
 };
 
 inline constexpr double kNoLimit = std::numeric_limits<double>::quiet_NaN();
@@ -30,22 +35,26 @@ struct OutlineJoint {
   double mimic_multiplier = 1.0;
   double mimic_offset = 0.0;
   int line = 0;
+  bool locked = false;  ///< planar or floating, and fixed by UrdfOptions::lock
   // kNoLimit where the text gives none, or one that makes no sense; then the note says why.
   double lower = kNoLimit;
   double upper = kNoLimit;
   double velocity = kNoLimit;
   double effort = kNoLimit;
   std::string limits_note;
+  JointExtras extras;
 };
 
 /// A URDF whose every element that matters is present, unique and numeric where it must be.
-/// Whether it is a tree is not known yet.
+/// Whether it is a tree is not known yet. Where a part is wrong, `text` has something possible
+/// instead, so that what is wrong elsewhere can be found too.
 struct Outline {
   std::string robot;
   std::vector<OutlineLink> links;
   std::vector<OutlineJoint> joints;
   std::string text;  ///< the same description with nothing but links' inertials and joints
   Diagnostics errors;
+  bool incomplete = false;  ///< errors are such that nothing more can be said of the description
   Diagnostics warnings;
   RightAngles right_angles;  ///< of joints and inertials
 
@@ -58,12 +67,13 @@ struct Outline {
   int floating_line = 0;
 };
 
-/// @param exact_right_angles  right angles of few digits are written exactly in the answer's text.
+/// @param options  of which the right angles and locks count: right angles of few digits are
+///                 written exactly in the answer's text, and a planar joint may be locked at 0
 [[nodiscard]] Outline outline_urdf(std::string_view text, const std::string& file,
-                                   bool exact_right_angles);
+                                   const UrdfOptions& options);
 
-/// Appends an error for each way in which the joints do not make one tree of all links, and takes
-/// a massless root out that nothing but a floating joint leaves.
+/// Appends an error for each way in which the joints do not make one tree of all links (`outline`
+/// is incomplete then), and takes a massless root out that nothing but a floating joint leaves.
 void check_topology(Outline& outline, const std::string& file);
 
 }  // namespace tandem::model

@@ -26,7 +26,9 @@ Matrix3d nearest_possible(double mass_kg, const Matrix3d& I) {
   const Matrix3d J = 0.5 * I.trace() * Matrix3d::Identity() - I;
   const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(J);
   const double largest = solver.eigenvalues()[2];
-  if (!(largest > mass_kg * kPoint_m * kPoint_m)) return ball(mass_kg);
+  if (!(largest > mass_kg * kPoint_m * kPoint_m) || is_beyond_size(mass_kg, I)) {
+    return ball(mass_kg);
+  }
   const Vector3d raised = solver.eigenvalues().cwiseMax(kThinnest * largest);
   const Matrix3d& axes = solver.eigenvectors();
   const Matrix3d possible = axes * raised.asDiagonal() * axes.transpose();

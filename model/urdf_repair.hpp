@@ -21,7 +21,8 @@ struct InertiaRepair {
 /// have no negative eigenvalue (Wensing, Kim, Slotine 2017). J's eigenvalues are raised to 1e-4
 /// of the largest: the nearest J, in Frobenius' norm, of a body that is nowhere thinner than a
 /// hundredth of its length. A J that is as small as that of a body of 0.1 mm says nothing of the
-/// shape; the link is taken for a solid ball of aluminium. An inertia without mass is dropped.
+/// shape, and neither does one of a body of more than 10 m; the link is taken for a solid ball of
+/// aluminium. An inertia without mass is dropped.
 [[nodiscard]] std::optional<InertiaRepair> repaired(const Inertia& inertia);
 
 }  // namespace tandem::model

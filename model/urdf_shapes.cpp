@@ -33,7 +33,9 @@ Placement origin(const XMLElement& e) {
           vector(at, "xyz")};
 }
 
-Shape shape(const XMLElement& collision) {
+}  // namespace
+
+Shape shape_of(const XMLElement& collision) {
   Shape shape;
   shape.in_link = origin(collision);
   const XMLElement* geometry = collision.FirstChildElement("geometry");
@@ -54,8 +56,6 @@ Shape shape(const XMLElement& collision) {
   return shape;
 }
 
-}  // namespace
-
 std::map<std::string, std::vector<Shape>> collision_shapes(std::string_view text) {
   std::map<std::string, std::vector<Shape>> shapes;
   tinyxml2::XMLDocument document;
@@ -69,7 +69,7 @@ std::map<std::string, std::vector<Shape>> collision_shapes(std::string_view text
     const char* name = link->Attribute("name");
     for (const XMLElement* c = link->FirstChildElement("collision");
          c != nullptr && name != nullptr; c = c->NextSiblingElement("collision")) {
-      shapes[name].push_back(shape(*c));
+      shapes[name].push_back(shape_of(*c));
     }
   }
   return shapes;

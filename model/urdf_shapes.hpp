@@ -2,6 +2,8 @@
 // Layer: model.  Thread: any, non-RT.
 #pragma once
 
+#include <tinyxml2.h>
+
 #include <map>
 #include <string>
 #include <string_view>
@@ -10,6 +12,9 @@
 #include "model/tree.hpp"
 
 namespace tandem::model {
+
+/// The shape of a <collision> or a <visual>.
+[[nodiscard]] Shape shape_of(const tinyxml2::XMLElement& collision);
 
 /// By link. Reads a description whose other parts are right. A shape that cannot be understood, or
 /// whose figures are unusable, is a mesh: nothing of the dynamics depends on it.

@@ -3,6 +3,7 @@
 #include <map>
 
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 #include "model/urdf_outline.hpp"
 
 namespace tandem::model {
@@ -14,12 +15,12 @@ class Topology {
 
   void run() {
     for (const OutlineJoint& joint : outline_.joints) check_ends(joint);
-    if (!outline_.errors.empty()) return;  // what follows would only repeat it
+    if (outline_.incomplete) return;  // what follows would only repeat it
     for (const OutlineJoint& joint : outline_.joints) add(joint);
-    if (!outline_.errors.empty()) return;
+    if (outline_.incomplete) return;
     check_roots();
     check_loops();
-    if (!outline_.errors.empty()) return;
+    if (outline_.incomplete) return;
     for (const OutlineJoint& joint : outline_.joints) {
       if (joint.type == "floating" && free_base(joint)) return take_out(joint);
     }
@@ -27,6 +28,7 @@ class Topology {
 
  private:
   void error(int line, std::string key, std::string message, std::string hint) {
+    outline_.incomplete = true;
     outline_.errors.push_back({std::move(message), std::move(hint), file_, line, std::move(key)});
   }
 
@@ -109,8 +111,10 @@ class Topology {
         "a joint of type 'floating' is understood only from a root without "
         "mass to the robot's base, ";
     if (leads_to_.contains(joint.parent)) {
-      error(joint.line, key, what + "and '" + joint.parent + "' is not the root",
-            "make it fixed, or describe what it carries as a robot of its own");
+      error(
+          joint.line, key, what + "and '" + joint.parent + "' is not the root",
+          "make it fixed, or describe what it carries as a robot of its own; `tandem new --lock " +
+              shell_word(joint.name) + "` does the one, `--drop` leaves out what it carries");
       return false;
     }
     if (std::ranges::count(outline_.joints, joint.parent, &OutlineJoint::parent) > 1) {

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <set>
 
+#include "base/nearest.hpp"
 #include "base/xml_scan.hpp"
 
 namespace tandem::model {
@@ -142,6 +144,100 @@ void add_inertial(std::string_view text, const Element& link, const Inertia& ine
 
 }  // namespace
 
+namespace {
+
+/// `text` with the edits, which do not overlap.
+std::string edited(std::string_view text, std::vector<Edit> edits) {
+  std::ranges::stable_sort(edits, {}, &Edit::begin);
+  std::string result;
+  std::size_t at = 0;
+  for (const Edit& edit : edits) {
+    result += text.substr(at, edit.begin - at);
+    result += edit.text;
+    at = edit.end;
+  }
+  return result.append(text.substr(at));
+}
+
+/// A joint's ends.
+struct Edge {
+  std::string joint, parent, child;
+};
+
+std::vector<Edge> edges_of(const tinyxml2::XMLElement& robot) {
+  const auto value = [](const tinyxml2::XMLElement* e, const char* name) {
+    const char* const text = e == nullptr ? nullptr : e->Attribute(name);
+    return std::string(text == nullptr ? "" : text);
+  };
+  std::vector<Edge> edges;
+  for (const auto* e = robot.FirstChildElement("joint"); e != nullptr;
+       e = e->NextSiblingElement("joint")) {
+    edges.push_back({value(e, "name"), value(e->FirstChildElement("parent"), "link"),
+                     value(e->FirstChildElement("child"), "link")});
+  }
+  return edges;
+}
+
+/// The link that a name leaves out: it, or the child of the joint so named.
+Result<std::string> first_dropped(const std::string& name, const std::vector<Edge>& edges) {
+  std::vector<std::string> known;
+  for (const Edge& edge : edges) {
+    if (edge.child == name || edge.joint == name) return edge.child;
+    known.push_back(edge.joint);
+    known.push_back(edge.child);
+  }
+  const bool root = std::ranges::find(edges, name, &Edge::parent) != edges.end();
+  if (root) return fail("'" + name + "' is the root: nothing would be left", "name another link");
+  return fail("the description has no link and no joint '" + name + "'", suggest(name, known));
+}
+
+/// The element with its line, where that has nothing else.
+Edit removed(std::string_view text, const Element& element) {
+  Edit edit{element.begin, element.end, {}};
+  while (edit.begin > 0 && (text[edit.begin - 1] == ' ' || text[edit.begin - 1] == '\t'))
+    --edit.begin;
+  const bool alone = edit.begin == 0 || text[edit.begin - 1] == '\n';
+  if (!alone) edit.begin = element.begin;
+  if (alone && edit.end < text.size() && text[edit.end] == '\n') ++edit.end;
+  return edit;
+}
+
+}  // namespace
+
+Result<std::string> without_limbs(std::string_view text, const std::vector<std::string>& names) {
+  tinyxml2::XMLDocument document;
+  const std::string plain = without_instructions(text);
+  if (document.Parse(plain.data(), plain.size()) != tinyxml2::XML_SUCCESS ||
+      document.RootElement() == nullptr) {
+    return fail("the description is no XML", "name a URDF");
+  }
+  const std::vector<Edge> edges = edges_of(*document.RootElement());
+  std::set<std::string> links;
+  std::vector<std::string> open;
+  for (const std::string& name : names) {
+    const Result<std::string> first = first_dropped(name, edges);
+    if (!first) return std::unexpected(first.error());
+    open.push_back(*first);
+  }
+  while (!open.empty()) {
+    const std::string link = open.back();
+    open.pop_back();
+    if (!links.insert(link).second) continue;
+    for (const Edge& edge : edges)
+      if (edge.parent == link) open.push_back(edge.child);
+  }
+  std::set<std::string> joints;
+  for (const Edge& edge : edges)
+    if (links.contains(edge.child)) joints.insert(edge.joint);
+  const std::vector<Element> all = elements_of(text);
+  std::vector<Edit> edits;
+  for (const auto& [kind, gone] : {std::pair{"link", &links}, {"joint", &joints}}) {
+    for (const Element& element : children(all, all.front(), kind))
+      if (gone->contains(name_attribute(text, element))) edits.push_back(removed(text, element));
+  }
+  return edited(text, std::move(edits));
+}
+
 Result<std::string> with_inertias(std::string_view text,
                                   const std::vector<std::pair<std::string, Inertia>>& inertias) {
   tinyxml2::XMLDocument document;
@@ -164,15 +260,7 @@ Result<std::string> with_inertias(std::string_view text,
       edit_inertial(text, all, inertials[0], inertia, edits);
     }
   }
-  std::ranges::stable_sort(edits, {}, &Edit::begin);
-  std::string result;
-  std::size_t at = 0;
-  for (const Edit& edit : edits) {
-    result += text.substr(at, edit.begin - at);
-    result += edit.text;
-    at = edit.end;
-  }
-  return result.append(text.substr(at));
+  return edited(text, std::move(edits));
 }
 
 }  // namespace tandem::model

@@ -1,4 +1,4 @@
-// A URDF's text with other inertias.
+// A URDF's text with other inertias, or without some limbs.
 // Layer: model.  Thread: non-RT only.
 #pragma once
 
@@ -18,5 +18,12 @@ namespace tandem::model {
 /// Errors: no XML; a link that is not there.
 [[nodiscard]] Result<std::string> with_inertias(
     std::string_view text, const std::vector<std::pair<std::string, Inertia>>& inertias);
+
+/// `text` without these links and all that hangs on them, and without the joints to them. A joint's
+/// name stands for the link that it moves.
+///
+/// Errors: no XML; a name that is not there, or the root's.
+[[nodiscard]] Result<std::string> without_limbs(std::string_view text,
+                                                const std::vector<std::string>& names);
 
 }  // namespace tandem::model

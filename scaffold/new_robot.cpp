@@ -9,8 +9,10 @@
 #include <iterator>
 #include <limits>
 
+#include "base/open_file.hpp"
 #include "hal/config/following_error.hpp"
 #include "model/urdf.hpp"
+#include "scaffold/described_damping.hpp"
 #include "scaffold/firmness.hpp"
 #include "scaffold/ground.hpp"
 #include "scaffold/like.hpp"
@@ -57,6 +59,7 @@ class Maker {
   Diagnostics take(model::UrdfModel found);
   [[nodiscard]] std::expected<model::UrdfModel, Diagnostics> read_tree(bool floating,
                                                                        bool exact = false) const;
+  void narrow_to_soft_limits();
   Status choose_base();
   Status choose_posture();
   Status choose_drives();
@@ -69,6 +72,7 @@ class Maker {
   void fill_report();
 
   const Request& request_;
+  std::string text_;  ///< of the description
   NewRobot robot_;
   Outfit outfit_;
   std::optional<Standing> standing_;
@@ -77,13 +81,23 @@ class Maker {
 };
 
 std::expected<model::UrdfModel, Diagnostics> Maker::read_tree(bool floating, bool exact) const {
-  return model::read_urdf(request_.urdf, {.floating_base = floating,
-                                          .repair_inertia = robot_.config.model.repair_inertia,
-                                          .exact_right_angles = exact});
+  return model::parse_urdf(text_, request_.urdf,
+                           {.floating_base = floating,
+                            .lock = request_.lock,
+                            .repair_inertia = robot_.config.model.repair_inertia,
+                            .exact_right_angles = exact});
 }
 
-/// As it stands if that is possible; else with what the reader offers to make it so.
+/// As it stands if that is possible; else with what the reader offers to make it so. What that
+/// mends is no error here.
 Diagnostics Maker::read() {
+  text_ = request_.text;
+  if (text_.empty()) {
+    auto text = read_file(request_.urdf, "name a .urdf file", kMostUrdfBytes);
+    if (!text) return {Error{text.error().message, text.error().hint, request_.urdf, 0, {}}};
+    text_ = std::move(*text);
+  }
+  robot_.config.model.lock = request_.lock;
   Diagnostics fewest;
   for (const bool repair : {false, true}) {
     robot_.config.model.repair_inertia = repair;
@@ -92,7 +106,8 @@ Diagnostics Maker::read() {
       if (!found) {
         const bool better =
             fewest.empty() || wants_to_float(fewest) || found.error().size() < fewest.size();
-        if (better && (fewest.empty() || !wants_to_float(found.error()))) fewest = found.error();
+        const bool judged = repair && (fewest.empty() || !wants_to_float(found.error()));
+        if (better && judged) fewest = found.error();
         continue;
       }
       must_float_ = floating;
@@ -106,16 +121,6 @@ Diagnostics Maker::take(model::UrdfModel found) {
   if (found.tree.joints.empty()) {
     return {Error{
         "the robot has no joint that moves", "name another description", request_.urdf, 0, {}}};
-  }
-  for (const model::Joint& joint : found.tree.joints) {
-    if (joint.follows() || !(joint.lower == joint.upper)) continue;
-    return {Error{fmt::format("its limits and those of its followers leave it one position, {:.6g}",
-                              joint.lower),
-                  "correct the limits, the multiplier or the offset; or make the joint fixed",
-                  request_.urdf, joint.line, "joint " + joint.name}};
-  }
-  if (robot_.config.model.repair_inertia) {
-    robot_.remarks.push_back("Impossible inertias are replaced by the nearest possible ones.");
   }
   robot_.tree = std::move(found.tree);
   robot_.warnings = std::move(found.warnings);
@@ -131,9 +136,26 @@ Diagnostics Maker::take(model::UrdfModel found) {
     robot_.remarks.push_back(fmt::format("Limits are guessed: {} (joint {}){}.", note, joint,
                                          more == 0 ? "" : fmt::format(", and of {} more", more)));
   }
-  robot_.urdf_text = found.text;
-  outfit_ = read_outfit(*found.text);
+  robot_.extras = model::joint_extras(text_);
+  narrow_to_soft_limits();
+  outfit_ = read_outfit(text_);
   return {};
+}
+
+/// From here on the soft limits are the joints' limits.
+void Maker::narrow_to_soft_limits() {
+  for (model::Joint& joint : robot_.tree.joints) {
+    const auto own = robot_.extras.find(joint.name);
+    if (own == robot_.extras.end()) continue;
+    // fmax() and fmin() pass over limits that are not there.
+    const double lower = std::fmax(joint.lower, own->second.soft_lower);
+    const double upper = std::fmin(joint.upper, own->second.soft_upper);
+    if (!(lower < upper)) continue;
+    if (lower == joint.lower) own->second.soft_lower = model::JointExtras::kNone;
+    if (upper == joint.upper) own->second.soft_upper = model::JointExtras::kNone;
+    joint.lower = lower;
+    joint.upper = upper;
+  }
 }
 
 Status Maker::choose_base() {
@@ -173,11 +195,19 @@ Status Maker::choose_base() {
       fmt::format("The base is {}: {}.", floating ? "floating" : "fixed", why));
   if (floating) {  // a base that moves changes what the reader has to refuse
     auto found = read_tree(true);
+    if (!found && !robot_.config.model.repair_inertia) {
+      robot_.config.model.repair_inertia = true;
+      found = read_tree(true);
+    }
     if (!found) return std::unexpected(found.error().front());
     robot_.tree = std::move(found->tree);
     robot_.warnings = std::move(found->warnings);
+    narrow_to_soft_limits();
     robot_.ahead = direction_ahead(robot_.feet, posed);
     face_ahead(robot_.ahead, posed, robot_.feet);
+  }
+  if (robot_.config.model.repair_inertia) {
+    robot_.remarks.push_back("Impossible inertias are replaced by the nearest possible ones.");
   }
   robot_.limbs = split_limbs(robot_.tree, robot_.feet, posed, robot_.ahead);
   robot_.mass_kg = 0.0;
@@ -211,6 +241,7 @@ Status Maker::choose_drives() {
     take_drives(*request_.like, loads, torques, kControlPeriod_s, robot_);
   } else {
     robot_.drives = size_drives(robot_.tree, robot_.limits);
+    if (request_.damping) add_described_damping(robot_);
     robot_.gains = tune(robot_.drives, loads, kControlPeriod_s);
   }
   robot_.sensors = find_sensors(robot_.tree, outfit_);
@@ -277,6 +308,12 @@ void Maker::fill_joints() {
       joint.max_position_rad = limit.range.upper;
       joint.max_torque_Nm = joint.rated_torque_Nm = limit.effort;
       joint.max_velocity_rad_s = limit.velocity;
+      if (const auto own = robot_.extras.find(joint.name); own != robot_.extras.end()) {
+        if (own->second.acceleration > 0.0) {
+          joint.max_acceleration_rad_s2 = own->second.acceleration;
+        }
+        if (own->second.jerk > 0.0) joint.max_jerk_rad_s3 = own->second.jerk;
+      }
       joint.encoder_counts_per_rev = kEncoderCounts;
       joint.motor_encoder_counts_per_rev = kMotorCounts;
       joint.slides = robot_.tree.joints[j].type == model::JointType::kPrismatic;

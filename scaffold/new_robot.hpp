@@ -4,7 +4,7 @@
 #pragma once
 
 #include <expected>
-#include <memory>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +12,7 @@
 #include "base/result.hpp"
 #include "hal/config/robot_config.hpp"
 #include "model/right_angles.hpp"
+#include "model/urdf_extras.hpp"
 #include "scaffold/drives.hpp"
 #include "scaffold/limbs.hpp"
 #include "scaffold/sensors.hpp"
@@ -35,6 +36,9 @@ struct Request {
   std::string name;  ///< of the robot; also its folder's
   Base base = Base::kAuto;
   const Like* like = nullptr;  ///< take springs and ground from it; null: rigid drives
+  std::string text = {};       ///< of the description; empty: the file's
+  std::vector<std::pair<std::string, double>> lock = {};  ///< joint -> where it stands [rad or m]
+  bool damping = false;  ///< rigid drives get the damping that the description's joints have
 };
 
 /// A way-point of move.toml, in the order of [[joint]].
@@ -57,14 +61,14 @@ struct Move {
 
 /// Everything that the files say, before it is text.
 struct NewRobot {
-  std::shared_ptr<const std::string> urdf_text;  ///< the description, as it was read
   model::Tree tree;
   hal::RobotConfig config;
   std::vector<Limb> limbs;
   std::vector<Foot> feet;
   Eigen::Vector3d ahead = Eigen::Vector3d::UnitX();  ///< where it looks; one of the root's axes
   std::vector<FoundSensor> sensors;
-  std::vector<JointLimits> limits;  ///< by the tree's joints
+  std::vector<JointLimits> limits;                   ///< by the tree's joints
+  std::map<std::string, model::JointExtras> extras;  ///< by joint; the tree has the soft limits
   std::vector<DriveSize> drives;
   std::vector<GainSet> gains;
   std::vector<std::string> remarks;  ///< of the whole: what was decided, and why
@@ -81,8 +85,8 @@ struct NewRobot {
 };
 
 /// Reads the description and decides everything else.
-/// Errors: those of model::read_urdf(); no moving joint; no standing posture; a bus that cannot
-/// carry its limb however it is cut.
+/// Errors: those of model::read_urdf(), with inertias repaired; no moving joint; no standing
+/// posture; a bus that cannot carry its limb however it is cut.
 [[nodiscard]] std::expected<NewRobot, Diagnostics> make_robot(const Request& request);
 
 /// The files' contents. @pre `urdf_file` is the name beside them.

@@ -61,6 +61,8 @@ PositionRange position_range(const model::Joint& joint) {
   if (joint.type == model::JointType::kContinuous) return {joint.lower, joint.upper, false};
   if (joint.upper > joint.lower) return {joint.lower, joint.upper, false};
   const double span = joint.type == model::JointType::kPrismatic ? 0.1 : std::numbers::pi;
+  if (std::isfinite(joint.lower)) return {joint.lower, joint.lower + 2.0 * span, true};
+  if (std::isfinite(joint.upper)) return {joint.upper - 2.0 * span, joint.upper, true};
   return {-span, span, true};
 }
 

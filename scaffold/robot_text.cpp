@@ -79,6 +79,14 @@ class Writer {
     line("\n[model]\nurdf = {}\nbase = \"{}\"", quoted_text(urdf_),
          robot_.config.model.floating_base ? "floating" : "fixed");
     if (robot_.config.model.repair_inertia) line("inertia = \"repair\"");
+    right_angles();
+    if (robot_.config.model.lock.empty()) return;
+    line("\n[model.lock]  # as --lock says: joints that stand still, in rad or m");
+    for (const auto& [joint, position] : robot_.config.model.lock)
+      line("{} = {}", key_of(joint), number(position));
+  }
+
+  void right_angles() {
     if (!(robot_.turned.distance_m > 0.0)) return;  // those of inertias alone cost nothing
     line(
         "# {} right angles have few digits, {:.1g} rad off at most. Exact ones move no link by "
@@ -240,6 +248,10 @@ class Writer {
           "min_position_rad = {}  # guess: the description has no range\n"
           "max_position_rad = {}  # guess\n",
           number(joint.min_position_rad), number(joint.max_position_rad));
+    } else if (is_soft(joint)) {
+      text += fmt::format(
+          "min_position_rad = {}  # the description's soft limits\nmax_position_rad = {}\n",
+          number(joint.min_position_rad), number(joint.max_position_rad));
     }
     if (limit.effort_guessed) {
       text += fmt::format(
@@ -251,9 +263,35 @@ class Writer {
       text += fmt::format("max_velocity_rad_s = {}  # guess; the description's is {}\n",
                           number(joint.max_velocity_rad_s), stated(joint.name, false));
     }
+    text += rates(joint);
     if (joint.slides) {
       text += fmt::format("following_error_rad = {}  # guess, in m: the way of 0.1 s at most\n",
                           number(joint.following_error_rad));
+    }
+    return text;
+  }
+
+  /// Whether a soft limit of the description is the joint's limit.
+  [[nodiscard]] bool is_soft(const hal::JointConfig& joint) const {
+    const auto own = robot_.extras.find(joint.name);
+    return own != robot_.extras.end() && (joint.min_position_rad == own->second.soft_lower ||
+                                          joint.max_position_rad == own->second.soft_upper);
+  }
+
+  /// The description's acceleration and jerk; a jerk needs an acceleration.
+  [[nodiscard]] static std::string rates(const hal::JointConfig& joint) {
+    std::string text;
+    const bool jerk = std::isfinite(joint.max_jerk_rad_s3);
+    if (std::isfinite(joint.max_acceleration_rad_s2)) {
+      text = fmt::format("max_acceleration_rad_s2 = {}  # the description's\n",
+                         number(joint.max_acceleration_rad_s2));
+    } else if (jerk) {
+      text = fmt::format("max_acceleration_rad_s2 = {}  # guess\n",
+                         number(joint.max_velocity_rad_s / hal::kFullSpeed_s));
+    }
+    if (jerk) {
+      text +=
+          fmt::format("max_jerk_rad_s3 = {}  # the description's\n", number(joint.max_jerk_rad_s3));
     }
     return text;
   }

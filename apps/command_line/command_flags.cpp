@@ -81,6 +81,8 @@ const char kNewExamples[] = R"(Examples:
   tandem run my_robot/hold.toml                      the robot holds a posture, or stands
   tandem new my_robot.urdf --like coman -o soft      springs and ground in proportion to COMAN's
   tandem new my_robot.urdf --base fixed --force
+  tandem new my_robot.urdf --lock caster --drop gripper_base_link
+  tandem new my_arm.urdf --density 2700              an arm whose links have no masses, as aluminium
 Every figure that is guessed is marked so in robot.toml. Rules: docs/robots.md.)";
 
 const char kModelExamples[] = R"(Examples:
@@ -416,10 +418,23 @@ void add_flags(CLI::App& app, ModelOptions& o) {
 }
 
 void add_flags(CLI::App& app, NewOptions& o) {
-  app.add_option("urdf", o.urdf, "Robot description (URDF; expand xacro first)")->required();
+  app.add_option("urdf", o.urdf, "Robot description (URDF, or .xacro where xacro is installed)")
+      ->required();
   app.add_option("-o,--output", o.output, "Folder to write (default: the description's name)");
-  app.add_option("--like", o.like,
-                 "Series elastic drives in proportion to this robot's: its name or robot.toml");
+  app.add_option("--lock", o.lock, "JOINT or JOINT=rad: it stands still there, or at 0; repeatable")
+      ->allow_extra_args(false);
+  app.add_option("--drop", o.drop,
+                 "LINK or JOINT: leave it out with all that hangs on it; repeatable")
+      ->allow_extra_args(false);
+  app.add_option("--density", o.density_kg_m3,
+                 "kg/m^3: links without mass get that of their shapes (boxes, cylinders, spheres, "
+                 "STL)")
+      ->check(CLI::Range(1.0, 3e4));
+  CLI::Option* like =
+      app.add_option("--like", o.like,
+                     "Series elastic drives in proportion to this robot's: its name or robot.toml");
+  app.add_flag("--dynamics", o.dynamics, "Put the damping of the URDF's <dynamics> into the drives")
+      ->excludes(like);
   app.add_option("--base", o.base, "Kind of base (default: floating if it has feet)")
       ->check(CLI::IsMember({"floating", "fixed"}));
   app.add_flag("--force", o.force,

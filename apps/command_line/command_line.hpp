@@ -187,10 +187,14 @@ struct ModelOptions {
 /// tandem new URDF
 struct NewOptions {
   std::string urdf;
-  std::string output;  ///< folder; empty: the description's name, here
-  std::string like;    ///< a bundled robot or a robot.toml; empty: rigid drives
-  std::string base;    ///< "floating", "fixed"; empty: found out
-  bool force = false;  ///< write into a folder that exists
+  std::string output;             ///< folder; empty: the description's name, here
+  std::string like;               ///< a bundled robot or a robot.toml; empty: rigid drives
+  std::string base;               ///< "floating", "fixed"; empty: found out
+  std::vector<std::string> lock;  ///< "JOINT" or "JOINT=0.5" [rad or m]
+  std::vector<std::string> drop;  ///< links or joints: they and what hangs on them are left out
+  double density_kg_m3 = 0.0;     ///< of links that have shapes and no mass; 0: they stay so
+  bool dynamics = false;          ///< the description's damping goes into the drives
+  bool force = false;             ///< write into a folder that exists
   std::string json;
 };
 

@@ -1,6 +1,7 @@
 #include "apps/robot/robot_files.hpp"
 
 #include "apps/robot/loop_facts.hpp"
+#include "apps/robot/unused_limits.hpp"
 #include "base/open_file.hpp"
 #include "hal/sim/setup.hpp"
 #include "model/regular.hpp"
@@ -59,6 +60,8 @@ std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config,
     return std::unexpected(Diagnostics{std::move(error)});
   }
   if (auto warning = falls_for_ever(config)) description->warnings.push_back(std::move(*warning));
+  for (Error& warning : unused_limits(config, description->tree))
+    description->warnings.push_back(std::move(warning));
   return RobotFiles{std::move(config),         std::move(description->tree),     std::move(spec),
                     description->right_angles, std::move(description->warnings), std::move(read)};
 }

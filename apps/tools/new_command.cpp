@@ -11,8 +11,10 @@
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
+#include "apps/tools/new_source.hpp"
 #include "apps/tools/right_angles.hpp"
 #include "base/counted.hpp"
+#include "base/file_name.hpp"
 #include "base/nearest.hpp"
 #include "base/open_file.hpp"
 #include "base/quoting.hpp"
@@ -32,12 +34,15 @@ Diagnostics one(std::string message, std::string hint, std::string file) {
   return {Error{std::move(message), std::move(hint), std::move(file), 0, {}}};
 }
 
-/// A name for files and TOML: letters, digits, '_' and '-'; "robot" of a name in other letters.
+/// A name for files and TOML: letters, digits, '_' and '-', as many as a robot's name may have;
+/// "robot" of a name in other letters.
 std::string plain_name(std::string name) {
+  if (name.size() > kLongestFileName) name.resize(kLongestFileName);
   const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0; };
   if (std::ranges::none_of(name, is_plain)) return "robot";
   std::ranges::replace_if(
       name, [&](unsigned char c) { return !is_plain(c) && c != '-'; }, '_');
+  if (name.front() == '-') name.front() = '_';
   return name;
 }
 
@@ -106,12 +111,12 @@ Diagnostics placed(const Draft& draft, Diagnostics errors) {
 
 /// Writes everything into the draft, and reads it back as `tandem run` would.
 std::expected<RobotFiles, Diagnostics> write(const scaffold::NewRobot& robot,
-                                             const std::string& urdf, const Draft& draft) {
+                                             const NewSource& source, const Draft& draft) {
   const fs::path folder = draft.path();
-  const std::string copy = fs::path(urdf).filename().string();
+  const std::string& copy = source.copy;
   for (const auto& [name, text] :
-       {std::pair{copy, *robot.urdf_text},
-        {std::string("robot.toml"), scaffold::robot_text(robot, copy, copy)},
+       {std::pair{copy, source.text},
+        {std::string("robot.toml"), scaffold::robot_text(robot, copy, source.name)},
         {std::string("hold.toml"), scaffold::hold_text(robot)},
         {std::string("move.toml"), scaffold::move_text(robot)}}) {
     if (Status written = write_file(folder / name, text); !written)
@@ -171,10 +176,11 @@ void add_placeholders(const model::Tree& tree, Facts& facts) {
                                   what));
 }
 
-void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
+void add_facts(const scaffold::NewRobot& robot, const NewSource& source, Facts& facts) {
   facts.add("robot", fmt::format("{}: {}, {:.2f} kg", robot.config.name,
                                  counted(robot.config.joints.size(), "joint"), robot.mass_kg));
   for (const std::string& remark : robot.remarks) facts.add("", remark);
+  for (const std::string& mass : source.masses) facts.add("mass", mass);
   for (std::size_t f = 0; f < robot.feet.size(); ++f) {
     const scaffold::Foot& foot = robot.feet[f];
     facts.add("foot " + foot.name, fmt::format("{}, {}{}", robot.tree.links[foot.link].name,
@@ -246,7 +252,7 @@ Diagnostics check_folder(const std::string& folder, bool force) {
 }
 
 Diagnostics run(const NewOptions& options) {
-  const std::string name = plain_name(fs::path(options.urdf).stem().string());
+  const std::string name = plain_name(robot_stem(options.urdf));
   const std::string folder = options.output.empty() ? name : options.output;
   if (Diagnostics wrong = check_input(options.urdf); !wrong.empty()) return wrong;
   if (Diagnostics wrong = check_folder(folder, options.force); !wrong.empty()) return wrong;
@@ -256,21 +262,27 @@ Diagnostics run(const NewOptions& options) {
     if (!read) return read.error();
     like = std::move(*read);
   }
+  auto source = read_source(options);
+  if (!source) return {source.error()};
   scaffold::Request request;
   request.urdf = options.urdf;
+  request.text = source->text;
+  request.lock = source->lock;
+  request.damping = options.dynamics;
   request.name = plain_name(fs::path(folder).lexically_normal().filename().string());
   request.base = options.base == "floating" ? scaffold::Base::kFloating
                  : options.base == "fixed"  ? scaffold::Base::kFixed
                                             : scaffold::Base::kAuto;
   request.like = like ? &*like : nullptr;
-  const auto robot = scaffold::make_robot(request);
-  if (!robot) return robot.error();
+  auto robot = scaffold::make_robot(request);
+  if (!robot) return of_options(robot.error());
+  robot->remarks.insert(robot->remarks.end(), source->remarks.begin(), source->remarks.end());
   Result<Draft> draft = Draft::folder(folder);
   if (!draft) return {draft.error()};
-  const auto written = write(*robot, options.urdf, *draft);
+  const auto written = write(*robot, *source, *draft);
   if (!written) return written.error();
   Facts facts;
-  add_facts(*robot, facts);
+  add_facts(*robot, *source, facts);
   Json json = to_json(*robot, folder);
   if (Status counted = add_right_angles(*written, facts, json); !counted) return {counted.error()};
   Kept kept;

@@ -89,7 +89,8 @@ TEST(UrdfInertia, RefusesAMovingJointThatCarriesNoMass) {
       replaced(with("joint name=\"end\" type=\"fixed\"", "joint name=\"end\" type=\"continuous\""),
                "<origin xyz=\"0 0 0.1\"/>", ""),
       "arm.urdf:42: joint end: the joint moves nothing that has mass "
-      "(give link 'tip' mass and inertia, lock the joint or make it fixed)");
+      "(give link 'tip' mass and inertia, lock the joint or make it fixed; `tandem new` has "
+      "--density, --lock and --drop for that)");
 }
 
 TEST(UrdfInertia, AcceptsAMasslessLinkBetweenMovingJoints) {
@@ -102,6 +103,10 @@ TEST(UrdfInertia, AcceptsAMasslessLinkBetweenMovingJoints) {
   const auto model = parse_urdf(kCardan, "cardan.urdf", {});
   ASSERT_TRUE(model.has_value()) << to_text(model.error());
   EXPECT_EQ(model->tree.bodies[1].inertia.mass_kg, 0.0);
+  EXPECT_NE(to_text(model->warnings)
+                .find("1 link has no mass, though between two joints that move: cross"),
+            std::string::npos)
+      << to_text(model->warnings);
 }
 
 TEST(UrdfInertia, RefusesAFloatingBaseWithoutMass) {

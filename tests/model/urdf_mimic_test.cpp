@@ -67,11 +67,23 @@ TEST(UrdfMimic, NarrowsTheLeaderToWhatItsFollowersAllowAndSaysSo) {
   EXPECT_EQ(model->warnings[0].key, "joint shoulder");
 }
 
-TEST(UrdfMimic, RefusesLimitsThatNoPositionKeeps) {
-  EXPECT_NE(errors_of(arm("", "<mimic joint=\"shoulder\" offset=\"7\"/>"))
-                .find("joint shoulder: no position of it keeps its follower 'slide' within 0 to "
-                      "0.5 (correct the multiplier, the offset or the limits)"),
-            std::string::npos);
+// source: ros-industrial-attic/robotiq #157
+TEST(UrdfMimic, TakesAwayAFollowersLimitsThatLeaveItsLeaderNoWay) {
+  for (const char* mimic :
+       {"<mimic joint=\"shoulder\" offset=\"7\"/>", "<mimic joint=\"shoulder\" offset=\"-2\"/>"}) {
+    const auto model = parse_urdf(arm("", mimic), "arm.urdf", {});
+    ASSERT_TRUE(model.has_value()) << to_text(model.error());
+    const Joint& slide = joint_of(*model, "slide");
+    EXPECT_FALSE(slide.has_limits());
+    const Joint& shoulder = joint_of(*model, "shoulder");
+    EXPECT_EQ(shoulder.lower, -1.0);
+    EXPECT_EQ(shoulder.upper, 2.0);
+    EXPECT_EQ(model->warnings[0].key, "joint slide");
+    EXPECT_NE(model->warnings[0].message.find("its limits, 0 to 0.5, contradict its <mimic>: joint "
+                                              "'shoulder' at -1 to 2 takes it to "),
+              std::string::npos)
+        << to_text(model->warnings);
+  }
 }
 
 TEST(UrdfMimic, FixesTheFollowerOfAJointThatStandsStill) {

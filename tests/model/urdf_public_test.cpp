@@ -93,11 +93,13 @@ TEST(UrdfFloating, IsRefusedAnywhereElse) {
   const std::string root =
       "a joint of type 'floating' is understood only from a root without mass to the robot's "
       "base, ";
-  expect_error(replaced(walker("fixed"), "'hip' type='revolute'", "'hip' type='floating'"),
-               "arm.urdf:6: joint hip: " + root +
-                   "and 'trunk' is not the root (make it fixed, or describe what it carries as a "
-                   "robot of its own)",
-               kFree);
+  expect_error(
+      replaced(walker("fixed"), "'hip' type='revolute'", "'hip' type='floating'"),
+      "arm.urdf:6: joint hip: " + root +
+          "and 'trunk' is not the root (make it fixed, or describe what it carries as a "
+          "robot of its own; `tandem new --lock hip` does the one, `--drop` leaves out what "
+          "it carries)",
+      kFree);
   expect_error(walker("floating", kGood),
                "arm.urdf:5: joint free: " + root +
                    "and 'world' has mass (remove its <inertial>, or remove the link and the joint)",

@@ -230,7 +230,7 @@ TEST(Urdf, WarnsOfAnElementThatItDoesNotKnow) {
                                 "arm.urdf", {});
   ASSERT_TRUE(model.has_value());
   EXPECT_EQ(to_text(model->warnings),
-            "arm.urdf:2: soft_body: the element <soft_body> is not used\n");
+            "arm.urdf:2: the element <soft_body> is not used\n");
 }
 
 TEST(Urdf, RefusesARobotWithoutLinks) {

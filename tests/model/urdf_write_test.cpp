@@ -66,5 +66,28 @@ TEST(UrdfWrite, NamesALinkThatIsNotThere) {
   EXPECT_FALSE(with_inertias("<robot><link></robot>", {}));
 }
 
+TEST(UrdfWrite, LeavesOutALimbByItsLinkOrItsJoint) {
+  const std::string head = "<robot name='r'>\n  <link name='base'/>\n  <link name='arm'/>\n",
+                    tool = "  <link name='tool'>\n  </link>\n  <link name='tip'/>\n",
+                    arm =
+                        "  <joint name='j' type='fixed'><parent link='base'/><child link='arm'/>"
+                        "</joint>\n",
+                    rest =
+                        "  <joint name='t' type='fixed'><parent link='arm'/><child link='tool'/>"
+                        "</joint>\n  <joint name='u' type='fixed'><parent link='tool'/><child "
+                        "link='tip'/></joint>\n",
+                    end = "  <link name='other'/><gazebo/>\n</robot>\n";
+  const std::string robot = head + tool + arm + rest + end;
+  for (const char* name : {"tool", "t"}) {
+    const auto left = without_limbs(robot, {name});
+    ASSERT_TRUE(left) << left.error().to_string();
+    EXPECT_EQ(*left, head + arm + end) << name;
+  }
+  EXPECT_EQ(without_limbs(robot, {"t", "tip", "tool"}).value_or(""), head + arm + end);
+  EXPECT_EQ(without_limbs(robot, {"base"}).error().message,
+            "'base' is the root: nothing would be left");
+  EXPECT_EQ(without_limbs(robot, {"tol"}).error().hint, "did you mean 'tool'?");
+}
+
 }  // namespace
 }  // namespace tandem::model
