@@ -6,6 +6,7 @@
 #include <expected>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/result.hpp"
@@ -34,6 +35,7 @@ struct Request {
   std::string name;  ///< of the robot; also its folder's
   Base base = Base::kAuto;
   const Like* like = nullptr;  ///< take springs and ground from it; null: rigid drives
+  std::vector<std::pair<std::string, double>> lock = {};  ///< joint -> where it stands [rad or m]
 };
 
 /// A way-point of move.toml, in the order of [[joint]].

@@ -79,6 +79,14 @@ class Writer {
     line("\n[model]\nurdf = {}\nbase = \"{}\"", quoted_text(urdf_),
          robot_.config.model.floating_base ? "floating" : "fixed");
     if (robot_.config.model.repair_inertia) line("inertia = \"repair\"");
+    right_angles();
+    if (robot_.config.model.lock.empty()) return;
+    line("\n[model.lock]  # joints that stand still, in rad or m");
+    for (const auto& [joint, position] : robot_.config.model.lock)
+      line("{} = {}{}", key_of(joint), number(position), kGuess);
+  }
+
+  void right_angles() {
     if (!(robot_.turned.distance_m > 0.0)) return;  // those of inertias alone cost nothing
     line(
         "# {} right angles have few digits, {:.1g} rad off at most. Exact ones move no link by "
