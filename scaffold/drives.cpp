@@ -29,9 +29,10 @@ constexpr double kContinuous = 0.6;
 
 // Gains.
 constexpr double kEmfCompensation = 0.9;
-constexpr double kEstimator_Hz = 150.0;    // cut-off of the firmware's velocity estimate
-constexpr double kLagMargin = 0.4;         // [rad]: phase that the lag may take at the crossover
-constexpr double kDamping = 0.7;           // of the heaviest load
+constexpr double kEstimator_Hz = 150.0;  // cut-off of the firmware's velocity estimate
+constexpr double kLagMargin = 0.4;       // [rad]: phase that the lag may take at the crossover
+constexpr double kDamping = 0.7;         // of the heaviest load
+constexpr double kLegDamping = 0.5;      // the same, of what stands on a leg: it has to be carried
 constexpr double kImpedance_rad_s = 53.0;  // a rotor alone on its impedance's spring
 constexpr double kIntegralMargin = 4.0;    // in Routh's criterion
 constexpr double kSwayMargin = 2.0;        // in the same, for the whole robot on a leg
@@ -88,7 +89,8 @@ PositionGains position_gains(const hal::ActuatorConfig& drive, const Range& iner
          std::min(crossover * inertia.least, kChatter * effort / velocity_step(period_s));
   g.damping = g.kd + drive.damping_Nms_rad - kEmfCompensation * emf;
   const double fastest = g.damping * crossover / tuning.cascade;
-  const double damped = g.damping * g.damping / (4.0 * kDamping * kDamping * inertia.most);
+  const double ratio = inertia.fall > 0.0 ? kLegDamping : kDamping;
+  const double damped = g.damping * g.damping / (4.0 * ratio * ratio * inertia.most);
   g.kp = std::min(fastest, std::max(damped, tuning.fall_margin * inertia.fall));
   const double routh = g.damping * (g.kp - inertia.fall) / (kIntegralMargin * inertia.most);
   g.ki = std::min(kIntegralRate_1_s * g.kp, routh);
