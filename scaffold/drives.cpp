@@ -95,7 +95,8 @@ PositionGains position_gains(const hal::ActuatorConfig& drive, const Range& iner
   const double routh = g.damping * (g.kp - inertia.fall) / (kIntegralMargin * inertia.most);
   g.ki = std::min(kIntegralRate_1_s * g.kp, routh);
   if (inertia.sway > 0.0) {
-    g.ki = std::min(g.ki, g.damping * (g.kp - inertia.sway_fall) / (kSwayMargin * inertia.sway));
+    const double held = std::min(g.kp - inertia.sway_fall, tuning.reserve * inertia.sway_fall);
+    g.ki = std::min(g.ki, g.damping * held / (kSwayMargin * inertia.sway));
   }
   g.ki = std::max(0.0, g.ki);
   return g;

@@ -36,6 +36,7 @@ struct Tuning {
   double period_s = 1e-3;    ///< of the control loop
   double fall_margin = 3.0;  ///< least stiffness of a leg over what the pendulum on it needs
   double cascade = 4.0;      ///< velocity loop over position loop, the least
+  double reserve = 1.0;      ///< of a robot's stiffness over what it needs to stand, less 1
 };
 
 /// Gains for each size, by the smallest and the largest inertia that its joints move; joints

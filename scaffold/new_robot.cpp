@@ -106,6 +106,7 @@ class Maker {
   void warn_of_weakness(const std::vector<double>& torques);
   Status check_down(const Posed& neutral, bool asked);
   void firm_up(const std::vector<JointLoad>& loads);
+  void retune(const std::vector<JointLoad>& loads, const Tuning& tuning);
   void fill_model();
   void fill_drives();
   void fill_joints();
@@ -300,20 +301,31 @@ Status Maker::choose_drives() {
 }
 
 /// Ankles, knees and hips that give way one after the other need more than each one alone; last of
-/// all, the position loop may be nearer to the velocity loop.
+/// all, the position loop may be nearer to the velocity loop. Integrals are for the stiffness that
+/// all of them have together.
 void Maker::firm_up(const std::vector<JointLoad>& loads) {
+  Tuning tuning{.period_s = kControlPeriod_s};
+  double needed = needed_firmness(robot_, q_).value_or(0.0);
   for (const auto& [fall_margin, cascade] :
        {std::pair{4.5, 4.0}, {7.0, 4.0}, {10.0, 4.0}, {10.0, 3.0}, {15.0, 2.5}, {20.0, 2.0}}) {
-    if (needed_firmness(robot_, q_).value_or(0.0) <= kFirm) return;
-    robot_.gains =
-        tune(robot_.drives, loads,
-             {.period_s = kControlPeriod_s, .fall_margin = fall_margin, .cascade = cascade});
-    robot_.config.actuators.clear();
-    robot_.config.gains.clear();
-    robot_.config.joints.clear();
-    fill_drives();
-    fill_joints();
+    if (needed <= kFirm) break;
+    tuning.fall_margin = fall_margin;
+    tuning.cascade = cascade;
+    retune(loads, tuning);
+    needed = needed_firmness(robot_, q_).value_or(0.0);
   }
+  if (!(needed > 0.5)) return;  // else the reserve is as large as it is taken to be
+  tuning.reserve = std::max(0.0, 1.0 / needed - 1.0);
+  retune(loads, tuning);
+}
+
+void Maker::retune(const std::vector<JointLoad>& loads, const Tuning& tuning) {
+  robot_.gains = tune(robot_.drives, loads, tuning);
+  robot_.config.actuators.clear();
+  robot_.config.gains.clear();
+  robot_.config.joints.clear();
+  fill_drives();
+  fill_joints();
 }
 
 void Maker::find_overloaded(const std::vector<double>& torques) {
