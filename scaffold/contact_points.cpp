@@ -12,6 +12,8 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kSameLevel_m = 0.01;  // points so much above the lowest still belong to the sole
+constexpr double kFlat_m = 5e-4;       // points so near to a plane are in it
+constexpr double kNearlyLevel = 0.97;  // cosine: a plane within 14 degrees of level
 constexpr std::size_t kMostPoints = 8;
 constexpr double kAheadOfAnkle = 0.15;  // of a guessed sole's length
 constexpr double kClearlyLonger = 1.1;  // in y: less is as good as square, and soles lie along x
@@ -91,6 +93,24 @@ std::vector<Vector3d> outermost(const std::vector<Vector3d>& points) {
   return kept;
 }
 
+/// The upward normal of the plane that all points are in; z when they are in none, or nearly so.
+Vector3d normal_of(const std::vector<Vector3d>& points) {
+  Vector3d middle = Vector3d::Zero(), normal = Vector3d::Zero();
+  for (const Vector3d& p : points) middle += p / static_cast<double>(points.size());
+  for (const Vector3d& a : points) {
+    for (const Vector3d& b : points) {
+      const Vector3d n = (a - middle).cross(b - middle);
+      if (n.norm() > normal.norm()) normal = n.z() < 0.0 ? Vector3d(-n) : n;
+    }
+  }
+  if (!(normal.norm() > 1e-12)) return Vector3d::UnitZ();
+  normal.normalize();
+  if (normal.z() < kNearlyLevel || normal.head<2>().norm() < 1e-6) return Vector3d::UnitZ();
+  const bool flat = std::ranges::all_of(
+      points, [&](const Vector3d& p) { return std::abs(normal.dot(p - middle)) < kFlat_m; });
+  return flat ? normal : Vector3d::UnitZ();
+}
+
 }  // namespace
 
 ContactPatch lowest_points(const std::vector<Shape>& shapes,
@@ -116,6 +136,7 @@ ContactPatch lowest_points(const std::vector<Shape>& shapes,
     }
   }
   patch.points = outermost(patch.points);
+  patch.up = normal_of(patch.points);
   return patch;
 }
 

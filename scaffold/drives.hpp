@@ -27,15 +27,22 @@ struct GainSet {
 };
 
 /// Groups joints by effort, from the strongest on: a size serves those that need at least 0.6 of
-/// it. Rigid drives that reach effort and speed at their limits of current and voltage.
+/// it, and whose own rotor would have between half and twice the inertia of the strongest's. Rigid
+/// drives that reach effort and speed at their limits of current and voltage.
 [[nodiscard]] std::vector<DriveSize> size_drives(const model::Tree& tree,
                                                  const std::vector<JointLimits>& limits);
+
+struct Tuning {
+  double period_s = 1e-3;    ///< of the control loop
+  double fall_margin = 3.0;  ///< least stiffness of a leg over what the pendulum on it needs
+  double cascade = 4.0;      ///< velocity loop over position loop, the least
+  double reserve = 1.0;      ///< of a robot's stiffness over what it needs to stand, less 1
+};
 
 /// Gains for each size, by the smallest and the largest inertia that its joints move; joints
 /// whose stiffness would differ by more than a factor of 2.5 get sets of their own.
 [[nodiscard]] std::vector<GainSet> tune(const std::vector<DriveSize>& drives,
-                                        const std::vector<JointLoad>& loads,
-                                        double control_period_s);
+                                        const std::vector<JointLoad>& loads, const Tuning& tuning);
 
 /// Rounds to `digits` significant ones, so that files stay readable.
 [[nodiscard]] double rounded(double value, int digits = 3);

@@ -20,9 +20,16 @@ using Eigen::Vector3d;
 using model::Placement;
 using model::Tree;
 
-constexpr double kLowestShare = 0.1;  // of the height: ends so near to the lowest are feet, too
-constexpr double kSoleLink_m = 0.03;  // a link called sole so near to the geometry sets the level
-constexpr double kLevel = 0.98;       // cosine: a frame within 11 degrees of level
+constexpr double kLowestShare = 0.1;   // of the height: ends so near to the lowest are feet, too
+constexpr double kSoleLink_m = 0.03;   // a link called sole so near to the geometry sets the level
+constexpr double kLevel = 0.98;        // cosine: a frame within 11 degrees of level
+constexpr double kShank = 0.25;        // of a leg: an end so far beyond its last joint is no sole
+constexpr std::size_t kFewJoints = 3;  // of a leg: hip and knee need them
+constexpr std::size_t kMostWithoutAnkle = 4;  // joints of a leg
+constexpr double kLargestBall = 0.2;          // of a leg's length: a larger one is no foot
+constexpr double kLying = 0.3;                // cosine: an axis so near to level
+constexpr double kOneWay = 0.8;  // of all legs together: they lie along an axis of the root
+constexpr double kOnAxis = 0.2;  // of a wheel's radius: its centre of mass from its axis
 
 Placement inverse(const Placement& a) { return {a.R.transpose(), -(a.R.transpose() * a.p)}; }
 
@@ -109,6 +116,64 @@ int best_link(const Tree& tree, int body) {
   return best;
 }
 
+/// The radius of the ball that has this inertia.
+double ball_radius(const model::Inertia& inertia) {
+  if (!(inertia.mass_kg > 0.0)) return 0.0;
+  return std::sqrt(2.5 * inertia.about_com_kg_m2.trace() / 3.0 / inertia.mass_kg);
+}
+
+/// A limb that ends far beyond its last joint ends in a point: it has no joint left that would keep
+/// a sole level. Without points when it does not.
+ContactPatch shank_end(const Tree& tree, const Posed& neutral, int body, int& link) {
+  if (path_to(tree, body).size() > kMostWithoutAnkle) return {};
+  const Vector3d knee = neutral.origin(body - 1);
+  const double leg = leg_length(tree, neutral, body);
+  Vector3d end = 2.0 * (neutral.body(body) * tree.bodies[body].inertia).com_m - knee;
+  double farthest = 0.0, radius = 0.0;
+  for (std::size_t i = 0; i < tree.links.size(); ++i) {
+    const model::Link& one = tree.links[i];
+    const Vector3d at = neutral.link(static_cast<int>(i)).p;
+    if (one.body != body || foot_word(one.name) == 0 || (at - knee).norm() <= farthest) continue;
+    link = static_cast<int>(i);
+    farthest = (at - knee).norm();
+    end = at;
+    radius = ball_radius(one.inertia);
+  }
+  if ((end - knee).norm() < kShank * leg) return {};
+  return {{end}, Vector3d::UnitZ(), radius < kLargestBall * leg ? radius : 0.0};
+}
+
+/// No sole stays level at the end of a shank.
+void stand_on_the_middle(const Tree& tree, const Posed& neutral, Foot& foot, ContactPatch& patch) {
+  if (patch.points.size() < 3 || path_to(tree, foot.body).size() > kFewJoints) return;
+  int link = foot.link;
+  if (shank_end(tree, neutral, foot.body, link).points.empty()) return;
+  Vector3d middle = Vector3d::Zero();
+  for (const Vector3d& p : patch.points) middle += p / static_cast<double>(patch.points.size());
+  patch = {{middle}, Vector3d::UnitZ(), 0.0};
+  foot.guess = "flat, on a leg that has no joint to keep it level: a point foot, its middle";
+}
+
+/// A wheel at the end of a leg: what turns without limits about a level axis that its centre of
+/// mass is on. Without points when it is none.
+ContactPatch wheel(const Tree& tree, const Posed& neutral, int body) {
+  const Vector3d axis = neutral.axis(body - 1);
+  const model::Inertia own = neutral.body(body) * tree.bodies[body].inertia;
+  const bool turns = tree.joints[body - 1].type == model::JointType::kContinuous;
+  if (!turns || std::abs(axis.z()) > kLying || !(own.mass_kg > 0.0)) return {};
+  double radius = std::sqrt(2.0 * axis.dot(own.about_com_kg_m2 * axis) / own.mass_kg);
+  const Vector3d way = own.com_m - neutral.origin(body - 1);
+  if ((way - axis * axis.dot(way)).norm() > kOnAxis * radius) return {};
+  for (std::size_t i = 0; i < tree.links.size(); ++i) {
+    if (tree.links[i].body != body) continue;
+    for (const Shape& shape : tree.links[i].shapes) {
+      const bool round = shape.kind == Shape::Kind::kCylinder || shape.kind == Shape::Kind::kSphere;
+      if (round && shape.size_m.x() > 0.0) radius = shape.size_m.x();
+    }
+  }
+  return {{neutral.origin(body - 1) + axis * axis.dot(way)}, Vector3d::UnitZ(), radius};
+}
+
 /// A level link called sole says where the ground is better than a box around the foot does.
 void use_sole_link(const Tree& tree, const Posed& neutral, Foot& foot, ContactPatch& patch) {
   for (std::size_t i = 0; i < tree.links.size(); ++i) {
@@ -128,7 +193,23 @@ Foot make_foot(const Tree& tree, const Posed& neutral, int body) {
   Foot foot;
   foot.body = body;
   foot.link = best_link(tree, body);
-  ContactPatch patch = patch_of(tree, neutral, body, foot.link);
+  ContactPatch patch = wheel(tree, neutral, body);
+  if (!patch.points.empty()) {
+    foot.guess = fmt::format(
+        "a wheel of {:.3g} m that its drive holds still: it touches the ground in one point, and "
+        "does not roll",
+        patch.radius_m);
+  } else {
+    patch = patch_of(tree, neutral, body, foot.link);
+    stand_on_the_middle(tree, neutral, foot, patch);
+  }
+  if (patch.points.empty()) {
+    patch = shank_end(tree, neutral, body, foot.link);
+    foot.guess = fmt::format("no usable collision shape: a point foot, {}; measure it",
+                             patch.radius_m > 0.0
+                                 ? fmt::format("a ball of {:.3f} m by its inertia", patch.radius_m)
+                                 : "where the leg ends");
+  }
   if (patch.points.empty()) {
     patch = equivalent_sole(neutral.body(body) * tree.bodies[body].inertia,
                             neutral.origin(body - 1), leg_length(tree, neutral, body));
@@ -159,6 +240,21 @@ std::vector<Foot> find_feet(const Tree& tree, const Posed& neutral, FeetBy by) {
     feet.push_back(make_foot(tree, neutral, body));
   }
   return feet;
+}
+
+Vector3d direction_down(const Tree& tree, const std::vector<Foot>& feet, const Posed& neutral) {
+  Vector3d way = Vector3d::Zero();
+  double length = 0.0;
+  for (const Foot& foot : feet) {
+    const Vector3d leg = (neutral.body(foot.body) * tree.bodies[foot.body].inertia).com_m -
+                         neutral.origin(path_to(tree, foot.body).front());
+    way += leg;
+    length += leg.norm();
+  }
+  Eigen::Index axis = 2;
+  const double most = way.cwiseAbs().maxCoeff(&axis);
+  if (most < kOneWay * length) return -Vector3d::UnitZ();
+  return Vector3d::Unit(axis) * (way[axis] > 0.0 ? 1.0 : -1.0);
 }
 
 Vector3d direction_ahead(const std::vector<Foot>& feet, const Posed& neutral) {

@@ -31,6 +31,10 @@ enum class FeetBy : std::uint8_t {
 /// @return none when nothing looks like a foot
 [[nodiscard]] std::vector<Foot> find_feet(const model::Tree& tree, const Posed& neutral, FeetBy by);
 
+/// Along which of the root's axes the legs lie: -z, or another one when nearly all of them do.
+[[nodiscard]] Eigen::Vector3d direction_down(const model::Tree& tree, const std::vector<Foot>& feet,
+                                             const Posed& neutral);
+
 /// Where the robot looks, by model::direction_ahead(): one of the root's axes, in W.
 [[nodiscard]] Eigen::Vector3d direction_ahead(const std::vector<Foot>& feet, const Posed& neutral);
 

@@ -198,7 +198,7 @@ void add_slides(const std::vector<JointLoad>& loads, double period_s, NewRobot& 
   std::erase_if(sizes, [&](const DriveSize& size) {
     return robot.tree.joints[size.joints[0]].type != model::JointType::kPrismatic;
   });
-  std::ranges::move(tune(sizes, loads, period_s), std::back_inserter(robot.gains));
+  std::ranges::move(tune(sizes, loads, {.period_s = period_s}), std::back_inserter(robot.gains));
   std::ranges::move(sizes, std::back_inserter(robot.drives));
 }
 

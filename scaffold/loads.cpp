@@ -72,8 +72,11 @@ void add_stance(const Tree& tree, const std::vector<Foot>& feet, const Posed& st
     const std::vector<int> path = path_to(tree, foot.body);
     const Vector3d sole = (stance.link(foot.link) * foot.sole_in_link).p;
     const double length = (stance.origin(path.front()) - sole).norm();
+    const double height = (stance.whole().com_m - sole).norm();
     for (const int j : path) {
       if (stance.slides(j)) continue;
+      loads[j].sway_inertia = share_kg * height * height;
+      loads[j].sway_Nm_rad = share_kg * kGravity_m_s2 * height;
       const double lever = (stance.whole().com_m - stance.origin(j)).norm();
       loads[j].most_inertia = std::max(loads[j].most_inertia, share_kg * lever * lever);
       loads[j].fall_Nm_rad = share_kg * kGravity_m_s2 * lever;

@@ -16,6 +16,8 @@ struct JointLoad {
   double most_inertia = 0.0;   ///< a leg's: at least what it swings when its foot stands
   double free_inertia = 0.0;   ///< the largest with its foot in the air
   double gravity_Nm = 0.0;     ///< the most that gravity asks for
+  double sway_inertia = 0.0;   ///< a leg's: what sways about the sole when nothing else gives way
+  double sway_Nm_rad = 0.0;    ///< what keeps that from falling
   double fall_Nm_rad = 0.0;    ///< a leg's: what keeps the inverted pendulum on it from falling
 };
 

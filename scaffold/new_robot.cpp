@@ -26,6 +26,43 @@ namespace {
 
 constexpr double kControlPeriod_s = 1e-3;
 constexpr double kMotorCounts = 1638400.0;
+constexpr double kFirm = 0.6;  // needed_firmness() up to which legs are as firm as they should be
+constexpr double kTold_m = 1e-4;
+
+/// A slide that cannot carry what it bears, a suspension without a motor above all: it is locked.
+struct Overload {
+  std::string joint;
+  double position = 0.0;
+  Error told;
+};
+
+/// What turns the root so that `down` points down, as a URDF has it.
+std::string upright_rpy(const Eigen::Vector3d& down) {
+  constexpr const char* kQuarter = "1.570796327";
+  if (down.z() > 0.5) return "3.141592654 0 0";
+  const std::string sign = down.x() < -0.5 || down.y() > 0.5 ? "-" : "";
+  return std::abs(down.y()) > 0.5 ? sign + kQuarter + " 0 0" : "0 " + sign + kQuarter + " 0";
+}
+
+/// A robot whose legs lie along another axis of its root than -z would be laid on its side.
+Error lies(const std::string& root, const Eigen::Vector3d& down) {
+  const char axis = "xyz"[down.cwiseAbs().maxCoeff() == std::abs(down.x())   ? 0
+                          : down.cwiseAbs().maxCoeff() == std::abs(down.y()) ? 1
+                                                                             : 2];
+  const char sign = down.sum() > 0.0 ? '+' : '-';
+  return {.message = fmt::format("the legs lie along {}{} of the root '{}' and not along -z: the "
+                                 "robot would lie on the ground",
+                                 sign, axis, root),
+          .hint = fmt::format(
+              "put a root with z up before it: <link name=\"upright\"/> <joint "
+              "name=\"to_upright\" type=\"fixed\"><origin rpy=\"{}\"/><parent "
+              "link=\"upright\"/><child link=\"{}\"/></joint>; or give --base floating to take it "
+              "as it is, --base fixed to do without feet",
+              upright_rpy(down), root),
+          .file = {},
+          .line = 0,
+          .key = {}};
+}
 
 /// Errors of a description whose root moves, read as one that is fixed: no fault of the file.
 bool wants_to_float(const Diagnostics& errors) {
@@ -38,6 +75,8 @@ bool wants_to_float(const Diagnostics& errors) {
 class Maker {
  public:
   explicit Maker(const Request& request) : request_(request) {}
+
+  [[nodiscard]] const std::vector<Overload>& overloaded() const { return overloaded_; }
 
   std::expected<NewRobot, Diagnostics> run() {
     if (Diagnostics errors = read(); !errors.empty()) return std::unexpected(errors);
@@ -65,8 +104,13 @@ class Maker {
   Status choose_drives();
   Status look_at_angles();
   Status wire_up();
+  void find_overloaded(const std::vector<double>& torques);
   void warn_of_weakness(const std::vector<double>& torques);
+  Status check_down(const Posed& neutral, bool asked);
+  void firm_up(const std::vector<JointLoad>& loads);
+  void retune(const std::vector<JointLoad>& loads, const Tuning& tuning);
   void fill_model();
+  void fill_drives();
   void fill_joints();
   void fill_posture(const std::string& name, double base_height_m);
   void fill_report();
@@ -77,6 +121,7 @@ class Maker {
   Outfit outfit_;
   std::optional<Standing> standing_;
   Eigen::VectorXd q_;
+  std::vector<Overload> overloaded_;
   bool must_float_ = false;  ///< the description has a floating joint at its root
 };
 
@@ -203,6 +248,7 @@ Status Maker::choose_base() {
     robot_.tree = std::move(found->tree);
     robot_.warnings = std::move(found->warnings);
     narrow_to_soft_limits();
+    if (Status upright = check_down(posed, asked); !upright) return upright;
     robot_.ahead = direction_ahead(robot_.feet, posed);
     face_ahead(robot_.ahead, posed, robot_.feet);
   }
@@ -217,6 +263,16 @@ Status Maker::choose_base() {
   return {};
 }
 
+Status Maker::check_down(const Posed& neutral, bool asked) {
+  const Eigen::Vector3d down = direction_down(robot_.tree, robot_.feet, neutral);
+  if (down.z() < -0.5) return {};
+  Error error = lies(robot_.tree.links[0].name, down);
+  if (!asked) return std::unexpected(std::move(error));
+  error.file = request_.urdf;
+  robot_.warnings.push_back(std::move(error));
+  return {};
+}
+
 Status Maker::choose_posture() {
   if (robot_.feet.empty()) {
     q_ = waiting_posture(robot_.tree);
@@ -225,6 +281,12 @@ Status Maker::choose_posture() {
   standing_.emplace(robot_.tree, robot_.feet, robot_.ahead, spared_posture(robot_.tree));
   if (Status found = standing_->find(); !found) return found;
   q_ = standing_->q();
+  if (const double beside_m = standing_->beside_m(); beside_m > kTold_m) {
+    robot_.remarks.push_back(
+        fmt::format("The centre of mass is {:.2g} mm beside the middle of the feet: the legs have "
+                    "no joints to shift it over level soles.",
+                    1e3 * beside_m));
+  }
   return {};
 }
 
@@ -242,11 +304,12 @@ Status Maker::choose_drives() {
   } else {
     robot_.drives = size_drives(robot_.tree, robot_.limits);
     if (request_.damping) add_described_damping(robot_);
-    robot_.gains = tune(robot_.drives, loads, kControlPeriod_s);
+    robot_.gains = tune(robot_.drives, loads, {.period_s = kControlPeriod_s});
   }
   robot_.sensors = find_sensors(robot_.tree, outfit_);
   fill_model();
   fill_joints();
+  find_overloaded(torques);
   if (!standing_) {
     fill_posture("ready", 0.0);
     robot_.move = swing(robot_, q_);
@@ -257,12 +320,61 @@ Status Maker::choose_drives() {
   standing_->stay_on(robot_.feet);
   robot_.move = squat_and_swing(robot_, *standing_);
   fill_ground(request_.like == nullptr ? nullptr : &request_.like->config, robot_);
+  if (request_.like == nullptr) firm_up(loads);
   robot_.stands_m = standing_->height_m();
   robot_.stands_share = standing_->height_m() / standing_->greatest_height_m();
   fill_posture("stand", robot_.stands_m);
   warn_of_weakness(torques);
   if (auto warning = falls_over(robot_, q_)) robot_.warnings.push_back(std::move(*warning));
   return {};
+}
+
+/// Ankles, knees and hips that give way one after the other need more than each one alone; last of
+/// all, the position loop may be nearer to the velocity loop. Integrals are for the stiffness that
+/// all of them have together.
+void Maker::firm_up(const std::vector<JointLoad>& loads) {
+  Tuning tuning{.period_s = kControlPeriod_s};
+  double needed = needed_firmness(robot_, q_).value_or(0.0);
+  for (const auto& [fall_margin, cascade] :
+       {std::pair{4.5, 4.0}, {7.0, 4.0}, {10.0, 4.0}, {10.0, 3.0}, {15.0, 2.5}, {20.0, 2.0}}) {
+    if (needed <= kFirm) break;
+    tuning.fall_margin = fall_margin;
+    tuning.cascade = cascade;
+    retune(loads, tuning);
+    needed = needed_firmness(robot_, q_).value_or(0.0);
+  }
+  if (!(needed > 0.5)) return;  // else the reserve is as large as it is taken to be
+  tuning.reserve = std::max(0.0, 1.0 / needed - 1.0);
+  retune(loads, tuning);
+}
+
+void Maker::retune(const std::vector<JointLoad>& loads, const Tuning& tuning) {
+  robot_.gains = tune(robot_.drives, loads, tuning);
+  robot_.config.actuators.clear();
+  robot_.config.gains.clear();
+  robot_.config.joints.clear();
+  fill_drives();
+  fill_joints();
+}
+
+void Maker::find_overloaded(const std::vector<double>& torques) {
+  for (const hal::JointConfig& joint : robot_.config.joints) {
+    const int index = robot_.tree.joint_index(joint.name);
+    const auto j = static_cast<std::size_t>(index);
+    const double bears_N = std::abs(torques[j]);
+    if (!joint.slides || robot_.limits[j].effort_guessed || bears_N <= joint.max_torque_Nm)
+      continue;
+    overloaded_.push_back(
+        {joint.name,
+         std::round(q_[index] * 1e4) / 1e4,
+         {.message = fmt::format("it bears {:.4g} N, and its <limit effort> is {:.4g} N: it is "
+                                 "locked, as a suspension without a motor is to be",
+                                 bears_N, joint.max_torque_Nm),
+          .hint = "to have it moved, correct the effort, and make the robot anew",
+          .file = robot_.tree.file,
+          .line = robot_.tree.joints[j].line,
+          .key = "joint " + joint.name}});
+  }
 }
 
 void Maker::warn_of_weakness(const std::vector<double>& torques) {
@@ -288,8 +400,12 @@ void Maker::fill_model() {
   config.name = request_.name;
   config.model.urdf = request_.urdf;
   config.model.floating_base = robot_.tree.floating_base;
-  for (const DriveSize& drive : robot_.drives) config.actuators.push_back(drive.actuator);
-  for (const GainSet& set : robot_.gains) config.gains.push_back(set.gains);
+  fill_drives();
+}
+
+void Maker::fill_drives() {
+  for (const DriveSize& drive : robot_.drives) robot_.config.actuators.push_back(drive.actuator);
+  for (const GainSet& set : robot_.gains) robot_.config.gains.push_back(set.gains);
 }
 
 void Maker::fill_joints() {
@@ -344,7 +460,24 @@ void Maker::fill_report() {
 }  // namespace
 
 std::expected<NewRobot, Diagnostics> make_robot(const Request& request) {
-  return Maker(request).run();
+  Request own = request;
+  Diagnostics told;
+  for (std::optional<NewRobot> robot;;) {
+    Maker maker(own);
+    auto made = maker.run();
+    if (!made && robot) return std::move(*robot);  // nothing would be left that moves
+    if (!made) return made;
+    robot = std::move(*made);
+    for (const Error& one : told) {
+      robot->warnings.push_back(one);
+      robot->remarks.push_back(fmt::format("{}: {}.", one.key, one.message));
+    }
+    if (maker.overloaded().empty()) return std::move(*robot);
+    for (const Overload& one : maker.overloaded()) {
+      own.lock.emplace_back(one.joint, one.position);
+      told.push_back(one.told);
+    }
+  }
 }
 
 }  // namespace tandem::scaffold

@@ -81,7 +81,7 @@ class Writer {
     if (robot_.config.model.repair_inertia) line("inertia = \"repair\"");
     right_angles();
     if (robot_.config.model.lock.empty()) return;
-    line("\n[model.lock]  # as --lock says: joints that stand still, in rad or m");
+    line("\n[model.lock]  # joints that stand still, in rad or m");
     for (const auto& [joint, position] : robot_.config.model.lock)
       line("{} = {}", key_of(joint), number(position));
   }

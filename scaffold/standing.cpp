@@ -19,6 +19,8 @@ using model::Tree;
 constexpr double kTurnWeight_m = 0.3;  // a sole's tilt of 1 rad counts as so many metres
 constexpr double kBend_rad = 0.7;      // of the knees, where the search begins
 constexpr std::array kHeightShares{0.94, 0.96, 0.98};  // of the greatest height, by preference
+constexpr double kLooseWeight = 0.03;                  // of the centre of mass beside the feet
+constexpr double kBeside_m = 0.02;                     // the most that it may then be
 constexpr double kMiddleHalf = 0.5;                    // of a sole: where the centre of mass may be
 constexpr std::size_t kMostLegs = 4;                   // whose knees are tried every way
 constexpr double kHeightRatio = 1.02;  // ratio of heights in the search for the greatest
@@ -132,14 +134,34 @@ std::vector<std::vector<double>> Standing::patterns() const {
 }
 
 /// Each foot's way to where it has to be, under a centre of mass that moves with the legs; and
-/// how it changes with the joints.
+/// how it changes with the joints. Loose: about the feet's own middle, whose way to the centre of
+/// mass counts little.
 double Standing::residual(const Posed& posed, double height_m, VectorXd& r, MatrixXd* J) const {
   Eigen::Index rows = 0;
   for (const Foot& foot : feet_) rows += foot.flat() ? 6 : 3;
+  if (loose_) rows += 2;
   r.resize(rows);
   if (J != nullptr) J->setZero(rows, static_cast<Eigen::Index>(tree_.joints.size()));
-  const Vector3d com = posed.whole().com_m;
+  Vector3d com = posed.whole().com_m;
+  MatrixXd way;  // of `com`
+  if (J != nullptr) way = posed.com_jacobian();
   Eigen::Index at = 0;
+  if (loose_) {
+    Vector3d middle = Vector3d::Zero();
+    MatrixXd turn = MatrixXd::Zero(3, static_cast<Eigen::Index>(tree_.joints.size()));
+    const double share = 1.0 / static_cast<double>(feet_.size());
+    for (std::size_t f = 0; f < feet_.size(); ++f) {
+      const Vector3d sole = (posed.link(feet_[f].link) * feet_[f].sole_in_link).p;
+      middle += share * (sole - homes_[f] + middle_home_);
+      if (J != nullptr) turn += share * posed.point_jacobian(feet_[f].body, sole);
+    }
+    r.head<2>() = kLooseWeight * (com - middle).head<2>();
+    if (J != nullptr) J->topRows<2>() = kLooseWeight * (turn - way).topRows<2>();
+    com = middle;
+    way = turn;
+    at = 2;
+  }
+  if (J != nullptr) way.row(2).setZero();
   for (std::size_t f = 0; f < feet_.size(); ++f) {
     const Foot& foot = feet_[f];
     const Placement sole = posed.link(foot.link) * foot.sole_in_link;
@@ -147,8 +169,6 @@ double Standing::residual(const Posed& posed, double height_m, VectorXd& r, Matr
     target.z() = -height_m + foot.radius_m;
     r.segment<3>(at) = target - sole.p;
     if (J != nullptr) {
-      MatrixXd way = posed.com_jacobian();
-      way.row(2).setZero();
       J->middleRows<3>(at) = posed.point_jacobian(foot.body, sole.p) - way;
     }
     at += 3;
@@ -211,7 +231,9 @@ bool Standing::solve(double height_m, VectorXd& q) const {
     }
   }
   q = best;
-  return error < 100.0 * kConverged_m;
+  if (!loose_) return error < 100.0 * kConverged_m;
+  return r.tail(r.size() - 2).norm() < 100.0 * kConverged_m &&
+         r.head<2>().norm() < kLooseWeight * kBeside_m;
 }
 
 /// From a bent posture up until the feet leave the ground, and down again to a share of that.
@@ -247,9 +269,16 @@ bool Standing::settle(VectorXd q) {
   return true;
 }
 
-Status Standing::find() {
+/// Legs that have fewer joints than their feet have conditions cannot fulfil all of them.
+bool Standing::lacks_joints() const {
+  std::ptrdiff_t conditions = 0;
+  for (const Foot& foot : feet_) conditions += foot.flat() ? 6 : 3;
+  return std::ranges::count(in_leg_, true) < conditions;
+}
+
+bool Standing::search() {
   for (const std::vector<double>& sides : patterns()) {
-    if (settle(bent(sides))) return {};
+    if (settle(bent(sides))) return true;
   }
   for (int sample = 0; sample < kSamples; ++sample) {
     VectorXd q = neutral_;
@@ -257,10 +286,27 @@ Status Standing::find() {
       const double low = std::max(bounds_.lower[j], -1.0), high = std::min(bounds_.upper[j], 1.0);
       if (in_leg_[j] && low < high) q[j] = low + (high - low) * halton(sample, static_cast<int>(j));
     }
-    if (settle(q)) return {};
+    if (settle(q)) return true;
+  }
+  return false;
+}
+
+Status Standing::find() {
+  loose_ = lacks_joints();
+  if (search()) return {};
+  if (!loose_) {
+    loose_ = true;
+    if (search()) return {};
   }
   return fail("no posture was found in which the robot stands level on its feet",
               "give --base fixed, and edit what is written");
+}
+
+double Standing::beside_m() const {
+  if (!loose_) return 0.0;
+  VectorXd r;
+  static_cast<void>(residual(Posed(tree_, q_), height_m_, r, nullptr));
+  return r.head<2>().norm() / kLooseWeight;
 }
 
 void Standing::stay_on(const std::vector<Foot>& settled) {

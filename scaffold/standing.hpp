@@ -20,7 +20,8 @@ class Standing {
            Eigen::VectorXd start);
 
   /// Finds a posture with bent knees: 0.94 of the greatest height over the
-  /// ground, or up to 0.98 where limits leave no more.
+  /// ground, or up to 0.98 where limits leave no more. Where legs have too few joints to shift the
+  /// centre of mass over level soles, it may be up to 20 mm beside where it should be.
   /// Errors: no posture was found in which all feet reach the ground.
   [[nodiscard]] Status find();
 
@@ -28,6 +29,8 @@ class Standing {
   /// Of the root's origin over the ground.
   [[nodiscard]] double height_m() const { return height_m_; }
   [[nodiscard]] double greatest_height_m() const { return greatest_m_; }
+  /// Of the centre of mass from where it should be, along the ground.
+  [[nodiscard]] double beside_m() const;
 
   /// Takes the feet as they are now, in the posture found, for those that stay where they are:
   /// after settle_balls() the simulated contact is a point of the shank, which turns with it.
@@ -57,6 +60,8 @@ class Standing {
   [[nodiscard]] double residual(const Posed& posed, double height_m, Eigen::VectorXd& r,
                                 Eigen::MatrixXd* J) const;
   [[nodiscard]] bool settle(Eigen::VectorXd q);
+  [[nodiscard]] bool lacks_joints() const;
+  [[nodiscard]] bool search();
 
   const model::Tree& tree_;
   std::vector<Foot> feet_;
@@ -68,6 +73,7 @@ class Standing {
   Eigen::VectorXd neutral_, q_;
   double height_m_ = 0.0;
   double greatest_m_ = 0.0;
+  bool loose_ = false;  ///< the centre of mass need not be over the feet exactly
 };
 
 }  // namespace tandem::scaffold

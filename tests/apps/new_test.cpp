@@ -43,6 +43,11 @@ TEST_F(New, MakesAQuadrupedStandAndMoveOnPointFeet) {
   holds_and_moves("config/anymal_c/anymal_c.urdf", 0.01);
 }
 
+/// Its feet are meshes: points, by its topology.
+TEST_F(New, MakesAQuadrupedStandOnFeetWithoutShapes) {
+  holds_and_moves("tests/data/robots/unitree_go2.urdf", 0.03);
+}
+
 TEST_F(New, MakesAnArmHoldOnSpringsWithinADegree) {
   holds_and_moves("config/ur5e/ur5e.urdf", 0.0175, " --like coman");
   const std::string robot = read_text(folder_ / "made/robot.toml");
@@ -52,7 +57,7 @@ TEST_F(New, MakesAnArmHoldOnSpringsWithinADegree) {
 
 TEST_F(New, MakesEveryPublicRobotHoldAndMove) {
   if (std::getenv("TANDEM_NEW_ALL") == nullptr) {
-    GTEST_SKIP() << "in make test-all: TANDEM_NEW_ALL=1 compiles the kernels of six robots";
+    GTEST_SKIP() << "in make test-all: TANDEM_NEW_ALL=1 compiles the kernels of eight robots";
   }
   for (const std::string urdf :
        {"config/ur5e/ur5e.urdf", "config/panda/panda.urdf", "config/coman/coman.urdf",
@@ -60,6 +65,10 @@ TEST_F(New, MakesEveryPublicRobotHoldAndMove) {
         "tests/data/robots/simple_humanoid.urdf"}) {
     SCOPED_TRACE(urdf);
     holds_and_moves(urdf, 0.03);
+  }
+  for (const std::string robot : {"unitree_h1", "unitree_g1"}) {  // light drives: softer hips
+    SCOPED_TRACE(robot);
+    holds_and_moves("tests/data/robots/" + robot + ".urdf", 0.05);
   }
   for (const std::string urdf :
        {"config/panda/panda.urdf", "tests/data/robots/simple_humanoid.urdf"}) {

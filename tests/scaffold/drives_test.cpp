@@ -108,7 +108,7 @@ TEST(Drives, DoNotChatterUnderALoadThatIsHeavyForThem) {
   const std::vector<JointLimits> limits{{.effort = 30.0, .velocity = 4.6, .range = {}}};
   const JointLoad trunk{.least_inertia = 15.0, .most_inertia = 20.0};
   const std::vector<DriveSize> sizes = size_drives(tree, limits);
-  const hal::GainsConfig g = tune(sizes, {trunk}, period_s).at(0).gains;
+  const hal::GainsConfig g = tune(sizes, {trunk}, {.period_s = period_s}).at(0).gains;
   const hal::ActuatorConfig& a = sizes[0].actuator;
   const double emf = std::pow(a.gear_ratio * a.torque_constant_Nm_A, 2.0) / a.resistance_ohm;
   const double raw_step_rad_s = 2.0 * std::numbers::pi / kEncoderCounts / period_s;
@@ -122,7 +122,7 @@ TEST(Drives, AreThreeTimesAsStiffAsThePendulumOnALegNeeds) {
   tree.joints.resize(1);
   const std::vector<JointLimits> limits{{.effort = 100.0, .velocity = 4.0, .range = {}}};
   const JointLoad body{.least_inertia = 1.0, .most_inertia = 100.0, .fall_Nm_rad = 600.0};
-  const hal::GainsConfig g = tune(size_drives(tree, limits), {body}, 1e-3).at(0).gains;
+  const hal::GainsConfig g = tune(size_drives(tree, limits), {body}, {}).at(0).gains;
   EXPECT_NEAR(g.position.gains.kp, 3.0 * 600.0, 1e-6);
 }
 

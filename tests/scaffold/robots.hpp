@@ -5,6 +5,7 @@
 #include <ostream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "scaffold/new_robot.hpp"
 
@@ -17,7 +18,7 @@ struct PublicRobot {
 };
 inline void PrintTo(const PublicRobot& robot, std::ostream* out) { *out << robot.name; }
 
-inline constexpr std::array<PublicRobot, 8> kPublicRobots{{
+inline constexpr std::array<PublicRobot, 11> kPublicRobots{{
     {"double_pendulum", "config/double_pendulum/double_pendulum.urdf", 0},
     {"ur5e", "config/ur5e/ur5e.urdf", 0},
     {"panda", "config/panda/panda.urdf", 0},
@@ -26,7 +27,17 @@ inline constexpr std::array<PublicRobot, 8> kPublicRobots{{
     {"coman", "config/coman/coman.urdf", 2},
     {"walkman", "config/walkman/walkman.urdf", 2},
     {"icub", "config/icub/icub.urdf", 2},
+    {"unitree_h1", "tests/data/robots/unitree_h1.urdf", 2},
+    {"unitree_go2", "tests/data/robots/unitree_go2.urdf", 4},
+    {"unitree_g1", "tests/data/robots/unitree_g1.urdf", 2},
 }};
+
+inline const PublicRobot& public_robot(std::string_view name) {
+  for (const PublicRobot& robot : kPublicRobots) {
+    if (name == robot.name) return robot;
+  }
+  throw std::runtime_error("no such robot");
+}
 
 inline std::string path_of(const PublicRobot& robot) {
   return std::string(TANDEM_SOURCE_DIR) + "/" + robot.urdf;
