@@ -253,8 +253,7 @@ class JointTrajectory : public Controller {
                                                           " more leave their limits";
       beyond_.add(table, "joint '" + one.name + "'" + others,
                   "stay within " + std::to_string(one.min_position_rad) + " and " +
-                      std::to_string(one.max_position_rad) +
-                      "; in radians, or metres of a slide");
+                      std::to_string(one.max_position_rad) + "; in radians, or metres of a slide");
     }
     times_s_.push_back(time_s);
   }

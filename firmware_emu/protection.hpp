@@ -80,7 +80,8 @@ struct ProtectionInputs {
 ///
 /// Motion beyond the joint's limits: the faster of link and motor, the link's torque, and the power
 /// that it gives or takes (torque times velocity), each for longer than excess_time_s more than it
-/// was within since: shorter ones are impacts. A winding that is shorted only brakes, and a bridge that is open does nothing.
+/// was within since: shorter ones are impacts. A winding that is shorted only brakes, and a bridge
+/// that is open does nothing.
 class Protection {
  public:
   /// Share of a limit from which the statusword warns, and to which I2t must fall before a reset.

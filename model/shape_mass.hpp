@@ -24,9 +24,9 @@ struct ShapeMasses {
 };
 
 /// The masses of links that have no <inertial>, or mass 0: from collision shapes, or visual ones
-/// where a link has none of those. Boxes, cylinders, spheres and capsules are solid, and so is what a
-/// mesh (STL) encloses; one that encloses nothing possible counts as the box around it. Shapes that
-/// overlap count twice.
+/// where a link has none of those. Boxes, cylinders, spheres and capsules are solid, and so is what
+/// a mesh (STL) encloses; one that encloses nothing possible counts as the box around it. Shapes
+/// that overlap count twice.
 /// @param file  of the description: meshes are looked for beside it, and package://NAME/… in the
 ///              folders above it
 [[nodiscard]] ShapeMasses masses_from_shapes(std::string_view text, const std::string& file,

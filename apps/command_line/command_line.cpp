@@ -178,8 +178,7 @@ void add_all(Subcommands& commands) {
   commands.add<LogOptions>("log", "Logs: info, csv, diff, import, replay, thresholds");
   commands.add<ModelOptions>("model", "A robot's generated kernels: build, info");
   commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
-  commands.add<EdsOptions>("eds",
-                           "Data sheets (EDS): write those of a robot's nodes, show one");
+  commands.add<EdsOptions>("eds", "Data sheets (EDS): write those of a robot's nodes, show one");
   commands.add<FaultOptions>("fault", "Faults of a running run: show, reset");
   commands.add<EstopOptions>("estop", "Emergency stop of every run of this user");
   commands.add<ControllerOptions>(

@@ -222,6 +222,8 @@ Diagnostics check_input(const std::string& file) {
     return one("the file's name is not UTF-8, which robot.toml must be", "rename it", file);
   }
   if (fs::path(file).extension() != ".toml") {
+    std::error_code ignored;
+    if (!fs::exists(file, ignored)) return {};  // its reader says so
     const Result<Descriptor> opened = open_to_read(file, "name a .urdf file", kMostUrdfBytes);
     return opened ? Diagnostics() : Diagnostics{opened.error()};
   }

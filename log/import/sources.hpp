@@ -22,8 +22,8 @@ struct ImportFile {
 };
 
 /// Reads tables of text. Several are laid side by side: row by row they belong together, and a
-/// column's name is STEM.NAME, of the file "STEM.csv". In a sparse table each column has the times of
-/// the rows in which it has a cell.
+/// column's name is STEM.NAME, of the file "STEM.csv". In a sparse table each column has the times
+/// of the rows in which it has a cell.
 ///
 /// Errors: no such column; a column that is neither used nor ignored; a cell that is no number; and
 /// what the map does not exclude: ragged rows, cells that are empty or not finite. Each with its

@@ -133,7 +133,8 @@ TEST(Esi, PdosAreMappingsAndAnAssignment) {
   EXPECT_EQ(sheet.find(0x6064)->access, kReadTpdo);
   EXPECT_EQ(sheet.find(0x6040)->access, kWriteRpdo);
   // PdoAssign and PdoConfig say what a master may write at all.
-  const DataSheet rigid = read_slave(slave_with("PdoAssign=\"1\" PdoConfig=\"1\"", "PdoAssign=\"0\""));
+  const DataSheet rigid =
+      read_slave(slave_with("PdoAssign=\"1\" PdoConfig=\"1\"", "PdoAssign=\"0\""));
   EXPECT_EQ(rigid.find(0x1C12)->access, kRead);
   EXPECT_EQ(rigid.find(0x1600)->access, kRead);
 }
@@ -194,8 +195,9 @@ TEST(Esi, AnotherXmlIsNamedForWhatItIs) {
   EXPECT_NE(of_root("EtherCATConfig").find("(ENI)"), std::string::npos);
   EXPECT_NE(of_root("robot").find("(URDF)"), std::string::npos);
   EXPECT_NE(of_root("html").find("its first element is <html>"), std::string::npos);
-  EXPECT_NE(slave_error("<EtherCATInfo><Vendor><Id>1</Id></Vendor></EtherCATInfo>").find("no device"),
-            std::string::npos);
+  EXPECT_NE(
+      slave_error("<EtherCATInfo><Vendor><Id>1</Id></Vendor></EtherCATInfo>").find("no device"),
+      std::string::npos);
   EXPECT_NE(slave_error("\xFF\xFE<\0?").find("UTF-16"), std::string::npos);
 }
 

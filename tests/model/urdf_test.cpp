@@ -229,8 +229,7 @@ TEST(Urdf, WarnsOfAnElementThatItDoesNotKnow) {
   const auto model = parse_urdf(with("<link name=\"post\"/>", "<link name=\"post\"/><soft_body/>"),
                                 "arm.urdf", {});
   ASSERT_TRUE(model.has_value());
-  EXPECT_EQ(to_text(model->warnings),
-            "arm.urdf:2: the element <soft_body> is not used\n");
+  EXPECT_EQ(to_text(model->warnings), "arm.urdf:2: the element <soft_body> is not used\n");
 }
 
 TEST(Urdf, RefusesARobotWithoutLinks) {
