@@ -220,11 +220,12 @@ class EntryMaker {
                      .high = {},
                      .text = {},
                      .line = section.line};
-    for (Status& read :
-         std::array{read_type(section, entry), read_access(section, entry),
-                    read_default(section, own_value, entry), read_limits(section, entry)}) {
-      if (Status done = tolerate(index, std::move(read)); !done) return done;
+    for (const auto& read : {&EntryMaker::read_type, &EntryMaker::read_access}) {
+      // Without a type or an access it is no entry.
+      if (Status done = (this->*read)(section, entry); !done) return tolerate(index, done);
     }
+    if (Status done = tolerate(index, read_default(section, own_value, entry)); !done) return done;
+    if (Status done = tolerate(index, read_limits(section, entry)); !done) return done;
     entries_.push_back(std::move(entry));
     return {};
   }

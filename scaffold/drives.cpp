@@ -37,12 +37,14 @@ constexpr double kImpedance_rad_s = 53.0;  // a rotor alone on its impedance's s
 constexpr double kIntegralMargin = 4.0;    // in Routh's criterion
 constexpr double kSwayMargin = 2.0;        // in the same, for the whole robot on a leg
 constexpr double kIntegralRate_1_s = 2.0;
+constexpr double kSag_rad = 0.016;  // of a leg's joint before its integral has what it bears
 constexpr double kSameGains = 2.5;
 constexpr double kChatter = 0.02;  // of the effort: what one count of the encoder may ask for
 
 struct Range {
   double least = 0.0, most = 0.0, fall = 0.0;
   double sway = 0.0, sway_fall = 0.0;  ///< of all that stands on a leg
+  double stand = 0.0;
 };
 
 Range range_of(const std::vector<int>& joints, const std::vector<JointLoad>& loads, double rotor) {
@@ -51,6 +53,7 @@ Range range_of(const std::vector<int>& joints, const std::vector<JointLoad>& loa
     range.least = std::min(range.least, rotor + loads[j].least_inertia);
     range.most = std::max(range.most, rotor + loads[j].most_inertia);
     range.fall = std::max(range.fall, loads[j].fall_Nm_rad);
+    range.stand = std::max(range.stand, loads[j].stand_Nm);
     range.sway = std::max(range.sway, loads[j].sway_inertia);
     range.sway_fall = std::max(range.sway_fall, loads[j].sway_Nm_rad);
   }
@@ -91,7 +94,8 @@ PositionGains position_gains(const hal::ActuatorConfig& drive, const Range& iner
   const double fastest = g.damping * crossover / tuning.cascade;
   const double ratio = inertia.fall > 0.0 ? kLegDamping : kDamping;
   const double damped = g.damping * g.damping / (4.0 * ratio * ratio * inertia.most);
-  g.kp = std::min(fastest, std::max(damped, tuning.fall_margin * inertia.fall));
+  g.kp = std::min(fastest,
+                  std::max({damped, tuning.fall_margin * inertia.fall, inertia.stand / kSag_rad}));
   const double routh = g.damping * (g.kp - inertia.fall) / (kIntegralMargin * inertia.most);
   g.ki = std::min(kIntegralRate_1_s * g.kp, routh);
   if (inertia.sway > 0.0) {

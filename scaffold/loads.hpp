@@ -18,6 +18,7 @@ struct JointLoad {
   double gravity_Nm = 0.0;     ///< the most that gravity asks for
   double sway_inertia = 0.0;   ///< a leg's: what sways about the sole when nothing else gives way
   double sway_Nm_rad = 0.0;    ///< what keeps that from falling
+  double stand_Nm = 0.0;       ///< a leg's: what it bears in the standing posture
   double fall_Nm_rad = 0.0;    ///< a leg's: what keeps the inverted pendulum on it from falling
 };
 

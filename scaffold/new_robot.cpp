@@ -293,9 +293,10 @@ Status Maker::choose_posture() {
 Status Maker::choose_drives() {
   const std::optional<Posed> stance =
       standing_ ? std::optional<Posed>(std::in_place, robot_.tree, q_) : std::nullopt;
-  const std::vector<JointLoad> loads =
-      loads_of(robot_.tree, robot_.feet, stance ? &*stance : nullptr);
+  std::vector<JointLoad> loads = loads_of(robot_.tree, robot_.feet, stance ? &*stance : nullptr);
   const std::vector<double> torques = torques_at(robot_.tree, robot_.feet, Posed(robot_.tree, q_));
+  for (std::size_t j = 0; j < loads.size(); ++j)
+    if (loads[j].fall_Nm_rad > 0.0) loads[j].stand_Nm = std::abs(torques[j]);
   robot_.limits = limits_of(robot_.tree, loads);
   if (request_.like != nullptr) {
     robot_.like = request_.like->config.name;
