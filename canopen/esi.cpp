@@ -22,6 +22,11 @@ std::string hex8(std::uint32_t number) {
   return text.data();
 }
 
+/// A number of the identity; 0 is none.
+std::optional<std::uint32_t> known(std::uint32_t number) {
+  return number == 0 ? std::nullopt : std::optional(number);
+}
+
 /// What the root of another XML file tells, and what to do about it.
 struct OtherXml {
   std::string_view root;
@@ -82,7 +87,7 @@ class EsiReader {
     if (vendor == nullptr) {
       esi_.fail(root, "has no Vendor", "get the whole file from its maker");
     } else {
-      esi_.sheet.vendor = static_cast<std::uint32_t>(esi_.number(*vendor, "Id", 0xFFFFFFFF));
+      esi_.sheet.vendor = known(static_cast<std::uint32_t>(esi_.number(*vendor, "Id", 0xFFFFFFFF)));
       esi_.sheet.vendor_name = name_of(*vendor);
     }
     const auto device = choose(root, choice);
@@ -166,8 +171,8 @@ class EsiReader {
       esi_.remarks.add(0, "the device has " + std::to_string(fitting.size()) +
                               " revisions; this is " + hex8(newest->revision) + ", the newest");
     }
-    esi_.sheet.product = newest->product;
-    esi_.sheet.revision = newest->revision;
+    esi_.sheet.product = known(newest->product);
+    esi_.sheet.revision = known(newest->revision);
     return newest->element;
   }
 

@@ -115,6 +115,20 @@ TEST(Esi, IsReadAsTheSheetOfASlave) {
   EXPECT_EQ(sheet.value(0x1000, 0, 0), 0x20192);
 }
 
+TEST(Esi, AnIdentityThatItDoesNotSayIsNotKnown) {
+  std::string file = kSlaveFile;
+  for (const std::string number :
+       {"#x0000FFF1", "ProductCode=\"#x00000200\"", "RevisionNo=\"65538\""}) {
+    const std::string none = number.front() == '#' ? "0" : "";
+    file.replace(file.find(number), number.size(), none);
+  }
+  const auto sheet = read_data_sheet(file, "line.xml");
+  ASSERT_TRUE(sheet.has_value()) << sheet.error().to_string();
+  EXPECT_FALSE(sheet->vendor.has_value());
+  EXPECT_FALSE(sheet->product.has_value());
+  EXPECT_FALSE(sheet->revision.has_value());
+}
+
 TEST(Esi, PdosAreMappingsAndAnAssignment) {
   const DataSheet sheet = read_slave(kSlaveFile);
   EXPECT_EQ(sheet.value(0x1C12, 0, 0), 1);
