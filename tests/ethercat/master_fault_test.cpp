@@ -222,13 +222,17 @@ class SharedLink final : public hal::ecat::Link {
   }
   std::size_t receive(std::span<hal::ecat::FrameBuffer> frames) noexcept override {
     const std::size_t count = link_->receive(frames);
-    if (stranger && count > 0) frames[0].bytes[8] ^= 0x10;
+    if (stranger && count > 0) {
+      frames[0].bytes[8] ^= 0x10;
+      stranger = !once;
+    }
     std::reverse(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(count));
     return count;
   }
   [[nodiscard]] ethercat::MacAddress address() const noexcept override { return link_->address(); }
   [[nodiscard]] hal::ecat::LinkStatistics statistics() const noexcept override { return {}; }
   bool stranger = false;
+  bool once = false;  ///< the next frame alone
 
  private:
   hal::ecat::Link* link_;
@@ -273,6 +277,18 @@ TEST(MasterStranger, OneThatWasThereFirstKeepsItsSlaves) {
   for (int i = 0; i < 100; ++i) rig.cycle();
   EXPECT_EQ(rig.link.statistics().sent, sent) << "nothing more is sent";
   EXPECT_EQ(rig.rig.value<std::uint16_t>(0, ethercat::reg::kStation), 0) << "nobody was spoken to";
+}
+
+/// It ended the start after the next restart, for good (found by the fuzzer).
+TEST(MasterStranger, AFrameFromBeforeARestartIsOfNoScan) {
+  SharedRig rig;
+  rig.master->restart(0);
+  for (int i = 0; i < 300; ++i) rig.cycle();
+  rig.shared.stranger = rig.shared.once = true;
+  rig.master->send(rig.rig.now_ns);  // what comes of it waits to be received
+  rig.master->restart(rig.rig.now_ns);
+  for (int i = 0; i < 300; ++i) rig.cycle();
+  EXPECT_TRUE(rig.master->all(SlaveStage::kReady)) << rig.master->text();
 }
 
 TEST(MasterStranger, AnOldFrameThatComesFirstIsNotTakenForTheCyclesOwn) {

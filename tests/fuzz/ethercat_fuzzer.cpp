@@ -5,6 +5,7 @@
 // The input: the first byte is where it begins, then an act for each frame (Wire::act()).
 #include <algorithm>
 #include <cstdint>
+#include <cstdio>
 #include <span>
 
 #include "tests/ethercat/master_rig.hpp"
@@ -143,6 +144,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     ends.line.line->set_power(i, true, ends.line.now_ns);
   }
   ends.master->restart(ends.line.now_ns);
-  require(ends.to_op());
+  const bool works = ends.to_op();
+  if (!works) std::fputs((ends.master->text() + "\n").c_str(), stderr);
+  require(works);
   return 0;
 }

@@ -51,7 +51,8 @@ LineMaster::LineMaster(Link& link, const std::vector<SlavePlan>& plans)
       came_(kMostFramesOfCycle) {}
 
 void LineMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
-  scan_ = Scan::kCount;
+  for (std::size_t count = came_.size(); count == came_.size();) count = link_->receive(came_);
+  scan_ = Scan::kCount;  // what came before it is of no scan: not a second master's frame either
   stopped_ = false;
   scan_ns_ = now_ns;
   part_ = 0;
