@@ -123,7 +123,7 @@ inline constexpr std::size_t kMaxSheetEntries = bounds::kSheetEntries.most;
 /// contents, a number that is none or does not fit its type, an unknown access or object type;
 /// the file ends in the middle of a section, or lacks more than a tenth of the objects that it
 /// lists; it is larger than kMaxSheetBytes or kMaxSheetEntries.
-/// Of an ESI, with line and element: no well-formed XML, or another kind of it; no device, or
+/// An ESI's errors have line and element: no well-formed XML, or another kind of it; no device, or
 /// several of which `choice` does not name one; a number or a PDO that cannot be.
 [[nodiscard]] Result<DataSheet> read_data_sheet(std::string_view text, std::string_view file,
                                                 const DeviceChoice& choice = {});

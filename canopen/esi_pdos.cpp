@@ -110,7 +110,7 @@ class PdoReader {
     }
   }
 
-  /// Of which sync manager it is from power-on, and which PDOs it does not go with.
+  /// The sync manager that has it from power-on, and the PDOs that it does not go with.
   void add_rules() {
     const std::uint16_t assignment = receive_ ? kAssignOutputs : kAssignInputs;
     const int own = receive_ ? 2 : 3;

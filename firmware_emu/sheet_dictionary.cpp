@@ -203,8 +203,8 @@ std::optional<MadeEntry> plain_entry(const SheetEntry& entry, ObjectDictionary& 
       .plain = true};
 }
 
-/// Of a slave, what is before the board: its PDOs, and what says of the sync managers which they
-/// are. The board behind it keeps its own PDOs.
+/// Whether the slave in front of the board has the object: its PDOs, and the sync managers' lists
+/// of them. The board behind it keeps its own PDOs.
 bool is_slaves(const DataSheet& sheet, std::uint16_t index) {
   return sheet.ethercat && index >= co::kRpdoParameter && index < 0x1D00;
 }

@@ -29,7 +29,7 @@ class Standing {
   /// Of the root's origin over the ground.
   [[nodiscard]] double height_m() const { return height_m_; }
   [[nodiscard]] double greatest_height_m() const { return greatest_m_; }
-  /// Of the centre of mass from where it should be, along the ground.
+  /// How far the centre of mass is from where it should be, along the ground.
   [[nodiscard]] double beside_m() const;
 
   /// Takes the feet as they are now, in the posture found, for those that stay where they are:

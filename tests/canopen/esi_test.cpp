@@ -229,7 +229,7 @@ TEST(Esi, OneOfSeveralDevicesIsChosen) {
   EXPECT_EQ(read_slave(two, {.product = 7, .revision = {}}).product, 7U);
   EXPECT_NE(slave_error(two, {.product = 9, .revision = {}}).find("no device of this product"),
             std::string::npos);
-  // Of one product the newest revision, unless another is named.
+  // The newest revision of a product, unless another is named.
   const std::string newer = slave_with(end, more("ProductCode=\"#x200\" RevisionNo=\"#x20000\""));
   EXPECT_EQ(read_slave(newer).revision, 0x20000U);
   EXPECT_EQ(read_slave(newer, {.product = {}, .revision = 0x10000}).revision, 0x10002U);

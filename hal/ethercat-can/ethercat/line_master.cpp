@@ -51,8 +51,11 @@ LineMaster::LineMaster(Link& link, const std::vector<SlavePlan>& plans)
       came_(kMostFramesOfCycle) {}
 
 void LineMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
-  for (std::size_t count = came_.size(); count == came_.size();) count = link_->receive(came_);
-  scan_ = Scan::kCount;  // what came before it is of no scan: not a second master's frame either
+  // What came before is no second master's frame of this scan. Bounded: a stranger may flood.
+  constexpr int kMostRounds = 4;
+  for (int i = 0; i < kMostRounds && link_->receive(came_) == came_.size(); ++i) {
+  }
+  scan_ = Scan::kCount;
   stopped_ = false;
   scan_ns_ = now_ns;
   part_ = 0;
