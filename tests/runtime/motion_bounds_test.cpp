@@ -229,7 +229,8 @@ class WildRun {
     const hal::StateImage& state = cycle_->state();
     Joint& joint = joints_[j];
     const sim::JointReading is = backend_->plant().joint(j);
-    // From the way of the cycle: where a foot strikes the ground the velocity turns within the cycle.
+    // From the way of the cycle: where a foot strikes the ground the velocity turns within the
+    // cycle.
     const double velocity_rad_s = (is.position_rad - joint.position_rad) / 1e-3;
     joint.position_rad = is.position_rad;
     const bool well =
