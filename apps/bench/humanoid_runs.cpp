@@ -11,7 +11,7 @@
 
 #include "apps/bench/flights.hpp"
 #include "apps/bench/subjects.hpp"
-#include "apps/robot/kernel_supply.hpp"
+#include "apps/robot/kernel_build.hpp"
 #include "apps/text/console.hpp"
 #include "base/process.hpp"
 #include "hal/sim/held_robot.hpp"
@@ -126,7 +126,7 @@ Result<std::vector<StandRow>> measure_stand(const std::vector<EngineEntry>& entr
   if (!folder) return std::unexpected(folder.error());
   const auto coman = robot::read_robot(*folder + "/robot.toml");
   if (!coman) return std::unexpected(coman.error().front());
-  const auto kernels = supply_kernels(*coman, {}, MissingKernels::kBuild);
+  const auto kernels = robot::supply_kernels(*coman, {}, robot::MissingKernels::kBuild, build_once);
   if (!kernels) return std::unexpected(kernels.error());
   std::vector<StandRow> rows;
   for (const EngineEntry& entry : entries) {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "apps/robot/bundled.hpp"
-#include "apps/robot/kernel_supply.hpp"
+#include "apps/robot/kernel_build.hpp"
 #include "hal/sim/setup.hpp"
 #include "model/urdf.hpp"
 
@@ -26,7 +26,7 @@ std::array<double, 3> box_inertia(double mass, double x, double y, double z) {
 }
 
 Result<Subject> finish(robot::RobotFiles robot) {
-  auto kernels = supply_kernels(robot, {}, MissingKernels::kBuild);
+  auto kernels = robot::supply_kernels(robot, {}, robot::MissingKernels::kBuild, build_once);
   if (!kernels) return std::unexpected(kernels.error());
   Subject subject{std::move(robot), std::move(*kernels)};
   subject.gravity_m_s2 = subject.robot.config.model.gravity_m_s2;

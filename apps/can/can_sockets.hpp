@@ -68,9 +68,4 @@ class CanSockets final : public hal::can::FrameWait {
 /// Errors: a bus on which another master is at work; one that cannot be opened.
 [[nodiscard]] Diagnostics listen_for_masters(const hal::RobotConfig& robot, std::int64_t period_ns);
 
-/// Puts the interfaces of the command line in the place of robot.toml's: "can0=vcan0".
-/// Errors: no such form, an interface that no bus has (the nearest is suggested).
-[[nodiscard]] Status replace_interfaces(hal::RobotConfig& robot,
-                                        std::span<const std::string> replacements);
-
 }  // namespace tandem::apps

@@ -91,7 +91,7 @@ Exit doctor_command(const DoctorOptions& options) {
   if (!options.robot.empty()) {
     auto robot = robot::read_robot(options.robot);
     if (!robot) return refuse(robot.error());
-    if (Status done = replace_interfaces(robot->config, options.interfaces); !done) {
+    if (Status done = hal::replace_interfaces(robot->config, options.interfaces); !done) {
       return refuse(done.error());
     }
     const auto is_can = [](const hal::BusConfig& bus) { return bus.kind == hal::BusKind::kCan; };

@@ -9,7 +9,7 @@
 #include "apps/robot/scale_facts.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
-#include "apps/run/composition.hpp"
+#include "apps/run/connection.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
 #include "base/quoting.hpp"
@@ -174,7 +174,7 @@ Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics
   add_loop_json(robot->config, found.loops, json);
   add_scale_json(robot->config, json);
   if (!found.errors.empty()) return found.errors;
-  const auto kernels = supply_kernels(*robot, {}, MissingKernels::kTolerate);
+  const auto kernels = robot::supply_kernels(*robot, {}, robot::MissingKernels::kTolerate);
   if (!kernels) return {kernels.error()};
   print_robot(*robot, *kernels, found.loops, !warnings.empty(), out);
   json["kernels"] = kernels->path();
@@ -196,7 +196,8 @@ void warn_of_archives(const Composition& c, Diagnostics& warnings) {
 
 Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                              Json& json) {
-  const auto composition = compose(options.file, {.missing_kernels = MissingKernels::kTolerate});
+  const auto composition =
+      compose(options.file, {.missing_kernels = robot::MissingKernels::kTolerate});
   if (!composition) return composition.error();
   warnings = (*composition)->experiment.description->warnings;
   warnings.insert(warnings.end(), (*composition)->warnings.begin(), (*composition)->warnings.end());

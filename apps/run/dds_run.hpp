@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "apps/run/composition.hpp"
+#include "apps/run/connection.hpp"
 #include "base/result.hpp"
 #include "dds/participant.hpp"
 #include "dds/publisher.hpp"

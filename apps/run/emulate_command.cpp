@@ -3,7 +3,7 @@
 
 #include "apps/can/bus_watch.hpp"
 #include "apps/can/can_sockets.hpp"
-#include "apps/robot/kernel_supply.hpp"
+#include "apps/robot/kernel_build.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/inject.hpp"
@@ -54,7 +54,7 @@ std::expected<Subject, Diagnostics> read_subject(const EmulateOptions& options) 
   subject.sim.posture = options.posture.value_or(subject.sim.posture);
   subject.sim.seed = options.seed.value_or(subject.sim.seed);
   subject.sim.period_ns = options.period_ns.value_or(subject.sim.period_ns);
-  if (Status done = replace_interfaces(subject.robot, options.interfaces); !done) {
+  if (Status done = hal::replace_interfaces(subject.robot, options.interfaces); !done) {
     return std::unexpected(Diagnostics{done.error()});
   }
   if (!options.scenario.empty()) {
@@ -99,8 +99,8 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   if (!found.errors.empty()) return std::unexpected(std::move(found.errors));
   for (Error& warning : found.warnings) warning = in_file(std::move(warning), options.file).front();
   if (!options.quiet) print_warnings(found.warnings);
-  auto kernels = supply_kernels(*joined, options.kernel_variant,
-                                missing_kernels(options.no_build, options.quiet));
+  auto kernels = robot::supply_kernels(*joined, options.kernel_variant,
+                                       missing_kernels(options.no_build), builder(options.quiet));
   if (!kernels) return std::unexpected(in_file(kernels.error(), robot.file));
   e->kernels = std::move(*kernels);
   auto emulated = sim::EmulatedRobot::create(robot, e->kernels.get(), e->subject.sim);

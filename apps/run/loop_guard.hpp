@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/run/composition.hpp"
+#include "apps/run/connection.hpp"
 #include "base/result.hpp"
 #include "runtime/loop_watchdog.hpp"
 #include "runtime/robot_cycle.hpp"

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <thread>
 
-#include "apps/run/composition.hpp"
+#include "apps/run/connection.hpp"
 #include "apps/run/loop_guard.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/robot_cycle.hpp"

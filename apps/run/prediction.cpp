@@ -10,11 +10,11 @@
 
 #include "apps/control/fault_table.hpp"
 #include "apps/control/rate_limit.hpp"
-#include "apps/run/operator_link.hpp"
 #include "base/clock_ns.hpp"
 #include "base/counted.hpp"
 #include "hal/config/capabilities.hpp"
 #include "rt/clock.hpp"
+#include "runtime/run/operator_link.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -39,7 +39,7 @@ Status add_controllers_again(const Composition& c, RunFork& fork) {
   runtime::ControllerHost& host = *fork.controllers;
   const runtime::Experiment& e = c.experiment;
   for (const runtime::ControllerSpec& spec : e.controllers) {
-    auto plugin = load_plugin(e, spec);
+    auto plugin = runtime::load_plugin(e, spec);
     if (!plugin) return std::unexpected(plugin.error());
     if (plugin->plugin().lacks_archive) fork.unarchived.push_back(spec.name);
     const Status added = host.add(spec.name, std::move(*plugin), spec.parameters, spec.active);
@@ -116,7 +116,7 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
   auto fork = std::make_unique<RunFork>();
   fork->controllers =
       std::make_unique<runtime::ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
-  fork->controllers->start_from(start_of(e));
+  fork->controllers->start_from(runtime::start_of(e));
   fork->controllers->predict_by(&fork->nobody);
   if (c.estimator != nullptr) {
     auto estimator = estimation::Estimator::make(hal::robot_of(e.robot), c.kernels.get(),
@@ -138,7 +138,7 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
   fork->truth = &fork->robot->truth();
   fork->backend = std::move(*robot);
   if (c.tele != nullptr && !beside) {  // the operator's loop: its link and its robot
-    auto link = link_to(c, std::move(fork->backend));
+    auto link = runtime::link_to(c, std::move(fork->backend));
     if (!link) return std::unexpected(link.error().front());
     fork->backend = std::move(*link);
   }

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "apps/control/control_registry.hpp"
-#include "apps/run/composition.hpp"
+#include "apps/run/connection.hpp"
 #include "base/result.hpp"
 #include "internal_model/prediction_service.hpp"
 #include "runtime/cycle_config.hpp"

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "apps/run/composition.hpp"
+#include "apps/run/connection.hpp"
 #include "apps/run/dds_run.hpp"
 #include "apps/text/console.hpp"
 #include "apps/transport/dds_admission.hpp"

@@ -9,9 +9,10 @@
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
 #include "apps/robot/gains_opinion.hpp"
+#include "apps/robot/kernel_build.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
-#include "apps/run/composition.hpp"
+#include "apps/run/connection.hpp"
 #include "apps/run/dds_run.hpp"
 #include "apps/run/end_guard.hpp"
 #include "apps/run/inject.hpp"
@@ -54,34 +55,20 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
   return texts;
 }
 
+/// The experiment's, with what the command line says of pace and stops.
 runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
   runtime::Experiment& e = c.experiment;
   const bool simulated = c.backend->pace() == hal::Pace::kSimulatedClock;
-  e.loop.pacing = rt::Pacing::kSimulated;
-  if (c.backend->pace() == hal::Pace::kWallClock) e.loop.pacing = rt::Pacing::kWallClock;
-  if (c.backend->pace() == hal::Pace::kBus) e.loop.pacing = rt::Pacing::kExternal;
   e.loop.rate = options.rate.value_or(simulated ? e.loop.rate : 0.0);
   e.loop.start_paused = simulated && (options.start_paused || e.loop.start_paused);
-  runtime::CycleConfig config;
-  config.loop = e.loop;
-  config.running_cycles = e.cycles();
-  config.settle_cycles = e.settle_cycles();
-  config.delay_cycles = e.hal.delay_cycles;
+  runtime::CycleConfig config = runtime::cycle_config(e, c.backend->pace());
+  e.loop = config.loop;
   const bool waits =
       options.serves || (e.loop.pacing == rt::Pacing::kWallClock && c.remote == nullptr);
-  config.after_stop = waits ? runtime::AfterStop::kWait : runtime::AfterStop::kEnd;
+  if (!e.after_stop && waits) config.after_stop = runtime::AfterStop::kWait;
   if (c.remote != nullptr) config.bring_up_cycles = ~std::uint64_t{0};  // the server's is limited
-  if (e.after_stop) config.after_stop = *e.after_stop;
   if (options.on_fault == "end") config.after_stop = runtime::AfterStop::kEnd;
   if (options.on_fault == "wait") config.after_stop = runtime::AfterStop::kWait;
-  config.after_reset = e.after_reset;
-  config.on_stray = e.on_stray;
-  config.retreat_cycles =
-      static_cast<std::uint64_t>(e.retreat_s * 1e9 / static_cast<double>(e.loop.period_ns));
-  constexpr std::int64_t kShutDown_ns = 2'000'000'000;  // drives that come to rest slowly
-  config.shut_down_cycles = std::max(config.shut_down_cycles,
-                                     static_cast<std::uint64_t>(kShutDown_ns / e.loop.period_ns));
-  config.fall = e.fall_limits();
   config.trace_cycles = options.trace.empty() ? 0 : options.trace_cycles;
   return config;
 }
@@ -463,7 +450,8 @@ Exit run_command(const RunOptions& options) {
   Overrides overrides{.seed = options.seed,
                       .duration_s = options.duration_s,
                       .kernel_variant = options.kernel_variant,
-                      .missing_kernels = missing_kernels(options.no_build, options.quiet),
+                      .missing_kernels = missing_kernels(options.no_build),
+                      .build_kernels = builder(options.quiet),
                       .lockstep = options.lockstep,
                       .interfaces = options.interfaces,
                       .scenario = options.scenario,

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/run/composition.hpp"
+#include "apps/run/connection.hpp"
 #include "base/result.hpp"
 #include "log/recorder.hpp"
 

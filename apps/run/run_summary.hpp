@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/run/composition.hpp"
+#include "apps/run/connection.hpp"
 #include "apps/run/dds_run.hpp"
 #include "apps/run/loop_thread.hpp"
 #include "apps/text/console.hpp"

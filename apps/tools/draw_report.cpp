@@ -2,12 +2,12 @@
 
 #include <filesystem>
 
-#include "apps/robot/kernel_store.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "base/open_file.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "report/page.hpp"
+#include "robot/kernel_store.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -31,7 +31,7 @@ Result<report::ReportFiles> draw_report(const std::string& log,
                                         const std::string& output, const std::string& interrupted) {
   model::KernelLibrary kernels;  // lives as long as the drawing needs it
   const auto find = [&kernels](const report::RunData& run) -> const tandem_kernels* {
-    auto found = find_kernels(run.info.robot, run.info.description_hash, {});
+    auto found = robot::find_kernels(run.info.robot, run.info.description_hash, {});
     if (!found) return nullptr;
     kernels = std::move(*found);
     return kernels.get();

@@ -1,14 +1,14 @@
 // `tandem model`: builds a robot's kernels, and shows what its description amounts to.
 #include <fmt/core.h>
 
-#include "apps/robot/kernel_store.hpp"
-#include "apps/robot/kernel_supply.hpp"
+#include "apps/robot/kernel_build.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/text/console.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/kernel_sizes.hpp"
 #include "apps/tools/right_angles.hpp"
 #include "base/counted.hpp"
+#include "robot/kernel_store.hpp"
 #include "robot/robot_files.hpp"
 
 namespace tandem::apps {
@@ -18,7 +18,8 @@ Status build(const robot::RobotFiles& robot, const ModelOptions& options) {
   model::BuildOptions build;
   build.library = options.output;
   if (options.output.empty()) {
-    auto path = user_library(robot.config.name, model::description_hash(robot.tree, robot.spec));
+    auto path =
+        robot::user_library(robot.config.name, model::description_hash(robot.tree, robot.spec));
     if (!path) {
       Error error = path.error();
       error.hint += ", or name the library with -o";
@@ -63,7 +64,7 @@ std::uint64_t text_bytes_of(const std::string& kernel,
 }
 
 Status info(const robot::RobotFiles& robot, const ModelOptions& options) {
-  const auto library = find_kernels(robot, options.kernel_variant);
+  const auto library = robot::find_kernels(robot, options.kernel_variant);
   if (!library) return std::unexpected(library.error());
   const tandem_kernels& k = **library;
   const auto bytes = kernel_text_bytes(library->path(), k.variant);

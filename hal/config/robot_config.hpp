@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -416,5 +417,10 @@ struct RobotDescription {
 /// what a follower allows, a posture beyond the limits.
 [[nodiscard]] Diagnostics complete_from_description(RobotConfig& robot,
                                                     const RobotDescription& description);
+
+/// Puts the interfaces of the command line in the place of robot.toml's: "can0=vcan0".
+/// Errors: no such form, an interface that no bus has (the nearest is suggested).
+[[nodiscard]] Status replace_interfaces(RobotConfig& robot,
+                                        std::span<const std::string> replacements);
 
 }  // namespace tandem::hal

@@ -281,4 +281,30 @@ void check_boards(std::span<BoardTable> boards, const RobotConfig& robot,
   }
 }
 
+Status replace_interfaces(RobotConfig& robot, std::span<const std::string> replacements) {
+  std::vector<std::string> known;
+  for (const BusConfig& bus : robot.buses) known.push_back(bus.interface);
+  for (const std::string& text : replacements) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
+      return fail("--interface " + text + " is not of the form FROM=TO",
+                  "for instance --interface can0=vcan0");
+    }
+    const std::string from = text.substr(0, equals);
+    if (std::ranges::find(known, from) == known.end()) {
+      return fail("no bus of " + robot.file + " has the interface '" + from + "'",
+                  suggest(from, known));
+    }
+    const std::string to = text.substr(equals + 1);
+    if (const std::string problem = interface_name_problem(to); !problem.empty()) {
+      return fail("--interface " + text + ": '" + to + "' " + problem,
+                  "name an interface that `ip link` lists");
+    }
+    for (std::size_t b = 0; b < known.size(); ++b) {
+      if (known[b] == from) robot.buses[b].interface = to;
+    }
+  }
+  return {};
+}
+
 }  // namespace tandem::hal

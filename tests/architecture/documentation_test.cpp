@@ -64,7 +64,7 @@ TEST(Documentation, OfTheConfigurationHasEveryKey) {
 
 TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
   const std::string page = text_of(kRoot / "docs/json.md");
-  for (const char* file : {"apps/run/run_summary.cpp",        "apps/run/composition.cpp",
+  for (const char* file : {"apps/run/run_summary.cpp",        "apps/run/connection.cpp",
                            "apps/can/bus_table.cpp",          "apps/run/check_command.cpp",
                            "apps/tools/model_command.cpp",    "apps/tools/new_command.cpp",
                            "apps/tools/log_command.cpp",      "apps/tools/log_import.cpp",

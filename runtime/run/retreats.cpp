@@ -1,4 +1,4 @@
-#include "apps/run/retreats.hpp"
+#include "runtime/run/retreats.hpp"
 
 #include <fmt/core.h>
 
@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace tandem::apps {
+namespace tandem::runtime {
 namespace {
 
 using hal::StopCategory;
@@ -57,4 +57,4 @@ Diagnostics missing_retreats(const Composition& c) {
   return warnings;
 }
 
-}  // namespace tandem::apps
+}  // namespace tandem::runtime

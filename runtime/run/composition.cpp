@@ -1,4 +1,4 @@
-#include "apps/run/composition.hpp"
+#include "runtime/run/composition.hpp"
 
 #include <fmt/core.h>
 
@@ -7,21 +7,17 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "apps/clients/dds_client.hpp"
-#include "apps/run/late_plans.hpp"
-#include "apps/run/operator_link.hpp"
-#include "apps/run/retreats.hpp"
 #include "base/quoting.hpp"
 #include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
-#include "hal/ethercat-can/can_backend.hpp"
-#include "hal/ethercat-can/line_bus.hpp"
 #include "hal/sim/engine_loader.hpp"
 #include "hal/sim/scenario.hpp"
-#include "rt/stop_signal.hpp"
+#include "runtime/run/late_plans.hpp"
+#include "runtime/run/operator_link.hpp"
+#include "runtime/run/retreats.hpp"
 
-namespace tandem::apps {
+namespace tandem::runtime {
 namespace {
 
 /// Errors of several stages, so that one reading finds as many as it can.
@@ -45,7 +41,7 @@ class Collector {
 };
 
 void add_controllers(Composition& c, Collector& errors) {
-  for (const runtime::ControllerSpec& spec : c.experiment.controllers) {
+  for (const ControllerSpec& spec : c.experiment.controllers) {
     Result<LoadedController> loaded = load_plugin(c.experiment, spec);
     const int line = spec.parameters.line();
     const std::string key = "controller." + spec.name;
@@ -76,7 +72,7 @@ void add_controllers(Composition& c, Collector& errors) {
 }
 
 /// Of [estimation], with the line of its table.
-void refuse_estimation(const runtime::Experiment& e, const Error& error, Collector& errors) {
+void refuse_estimation(const Experiment& e, const Error& error, Collector& errors) {
   TomlTable root = e.document.root();
   const std::string table = "estimation";
   const bool of_part = error.key.starts_with(table + ".");
@@ -88,7 +84,7 @@ void refuse_estimation(const runtime::Experiment& e, const Error& error, Collect
 
 /// What the experiment wants estimated, shown to the controllers that are added after it.
 void add_estimator(Composition& c, Collector& errors) {
-  const runtime::Experiment& e = c.experiment;
+  const Experiment& e = c.experiment;
   if (!e.estimation.any()) return;
   auto made = estimation::Estimator::make(hal::robot_of(e.robot), c.kernels.get(), e.estimation,
                                           e.loop.period_ns);
@@ -102,18 +98,20 @@ void add_estimator(Composition& c, Collector& errors) {
 /// @return false: there are errors, and no more to find
 bool add_kernels(Composition& c, const robot::RobotFiles& robot, const Overrides& overrides,
                  Collector& errors) {
-  const runtime::Experiment& e = c.experiment;
-  const bool builds = overrides.missing_kernels != MissingKernels::kRefuse;
-  auto kernels = supply_kernels(robot, e.kernel_variant,
-                                builds ? MissingKernels::kTolerate : MissingKernels::kRefuse);
+  const Experiment& e = c.experiment;
+  const bool builds = overrides.missing_kernels != robot::MissingKernels::kRefuse;
+  auto kernels = robot::supply_kernels(
+      robot, e.kernel_variant,
+      builds ? robot::MissingKernels::kTolerate : robot::MissingKernels::kRefuse);
   if (kernels && kernels->get() == nullptr &&
-      overrides.missing_kernels != MissingKernels::kTolerate) {
+      overrides.missing_kernels != robot::MissingKernels::kTolerate) {
     if (!overrides.serves) add_controllers(c, errors);
     const Status needs = estimation::Estimator::check(hal::robot_of(e.robot), e.estimation);
     if (!needs) refuse_estimation(e, needs.error(), errors);
     if (!errors.empty()) return false;
     c.notes.clear();
-    kernels = supply_kernels(robot, e.kernel_variant, overrides.missing_kernels);
+    kernels = robot::supply_kernels(robot, e.kernel_variant, overrides.missing_kernels,
+                                    overrides.build_kernels);
   }
   if (!kernels) {
     errors.add(kernels.error(), e.robot.file, 0);
@@ -125,11 +123,10 @@ bool add_kernels(Composition& c, const robot::RobotFiles& robot, const Overrides
     if (!needs) refuse_estimation(e, needs.error(), errors);
     return true;
   }
-  c.controllers =
-      std::make_unique<runtime::ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
+  c.controllers = std::make_unique<ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
   c.controllers->start_from(start_of(e));
   add_estimator(c, errors);
-  if (e.hal.backend == runtime::BackendKind::kSim || e.parallel) {
+  if (e.hal.backend == BackendKind::kSim || e.parallel) {
     c.predictor = std::make_unique<internal_model::PredictionService>(e.loop.period_ns);
   }
   c.controllers->predict_by(c.predictor.get());
@@ -137,8 +134,8 @@ bool add_kernels(Composition& c, const robot::RobotFiles& robot, const Overrides
 }
 
 /// What to serve: an experiment, or a robot in the first of its postures.
-std::expected<runtime::Experiment, Diagnostics> read_served(const std::string& file) {
-  if (!robot::is_robot(file)) return runtime::read_experiment(file);
+std::expected<Experiment, Diagnostics> read_served(const std::string& file) {
+  if (!robot::is_robot(file)) return read_experiment(file);
   auto robot = robot::read_complete_robot(file);
   if (!robot) return std::unexpected(robot.error());
   std::string text = "robot = \"robot.toml\"\nduration_s = 1.0\n";  // is not followed
@@ -146,7 +143,7 @@ std::expected<runtime::Experiment, Diagnostics> read_served(const std::string& f
     text += "posture = \"" + robot->config.postures.front().name + "\"\n";
   }
   text += "[[controller]]\nplugin = \"hold\"\n";
-  auto experiment = runtime::parse_experiment(text, file, robot->config);
+  auto experiment = parse_experiment(text, file, robot->config);
   if (experiment) {
     experiment->robot_file = file;
     experiment->files = std::move(robot->files);
@@ -157,17 +154,17 @@ std::expected<runtime::Experiment, Diagnostics> read_served(const std::string& f
 }
 
 /// Without controllers and without an end; DDS is what it is for.
-void serve_only(runtime::Experiment& e, bool lockstep) {
+void serve_only(Experiment& e, bool lockstep) {
   e.controllers.clear();
   e.duration_s = 0.0;
   e.hal.delay_cycles = 0;  // the owner's is in its commands
   e.dds.enabled = true;
-  e.remote.command = e.remote.command.value_or(runtime::RemoteCommand::kLocal);
+  e.remote.command = e.remote.command.value_or(RemoteCommand::kLocal);
   e.remote.lockstep = e.remote.lockstep || lockstep;
 }
 
 /// What stays at this end of a link, while its owner is at the other.
-void add_robot_side(Composition& c, runtime::OwnerController& owner, Collector& errors) {
+void add_robot_side(Composition& c, OwnerController& owner, Collector& errors) {
   auto side = robot_side_of(c);
   if (!side) return errors.add(side.error());
   c.robot_side = std::move(*side);
@@ -176,14 +173,14 @@ void add_robot_side(Composition& c, runtime::OwnerController& owner, Collector& 
 
 /// The controller that an owner in another process is.
 void add_owner(Composition& c, Collector& errors) {
-  const runtime::Experiment& e = c.experiment;
-  const auto command = e.remote.command.value_or(runtime::RemoteCommand::kOff);
-  const bool may = command != runtime::RemoteCommand::kOff && e.dds.enabled;
-  if (!may || c.controllers == nullptr || e.hal.backend == runtime::BackendKind::kDds) return;
-  auto owner = std::make_shared<runtime::OwnerController>();
+  const Experiment& e = c.experiment;
+  const auto command = e.remote.command.value_or(RemoteCommand::kOff);
+  const bool may = command != RemoteCommand::kOff && e.dds.enabled;
+  if (!may || c.controllers == nullptr || e.hal.backend == BackendKind::kDds) return;
+  auto owner = std::make_shared<OwnerController>();
   c.owner_slot = c.controllers->size();
   const auto nothing = TomlDocument::parse("", e.file);
-  const Status added = c.controllers->add(runtime::kOwnerController, owner, nothing->root(), false);
+  const Status added = c.controllers->add(kOwnerController, owner, nothing->root(), false);
   if (!added) return errors.add(added.error(), e.file, 0);
   if (e.teleoperation && e.controllers.empty()) add_robot_side(c, *owner, errors);
   c.owner = std::move(owner);
@@ -191,48 +188,24 @@ void add_owner(Composition& c, Collector& errors) {
 
 }  // namespace
 
-std::vector<double> start_of(const runtime::Experiment& e) {
-  if (e.hal.backend == runtime::BackendKind::kDds) return {};  // wherever its owner left it
+std::vector<double> start_of(const Experiment& e) {
+  if (e.hal.backend == BackendKind::kDds) return {};  // wherever its owner left it
   if (const hal::PostureConfig* posture = e.robot.posture(e.posture)) return posture->position_rad;
-  if (e.hal.backend == runtime::BackendKind::kWire) return {};
+  if (e.hal.backend == BackendKind::kWire) return {};
   return std::vector<double>(e.robot.joints.size(), 0.0);
 }
 
-Result<LoadedController> load_plugin(const runtime::Experiment& e,
-                                     const runtime::ControllerSpec& spec) {
-  return bounded_call(spec.name, runtime::ControllerHost::kStartTime,
+Result<LoadedController> load_plugin(const Experiment& e, const ControllerSpec& spec) {
+  return bounded_call(spec.name, ControllerHost::kStartTime,
                       [plugin = plugin_path(e, spec.plugin)] {
                         return load_controller(plugin, controller_folders());
                       });
 }
 
-std::string wire_name(const hal::RobotConfig& robot) {
-  const bool line =
-      !robot.buses.empty() && std::ranges::all_of(robot.buses, [](const hal::BusConfig& bus) {
-        return bus.kind == hal::BusKind::kEthercat;
-      });
-  return line ? "EtherCAT" : "CAN";
-}
-
-std::string hal_name(const runtime::Experiment& e) {
-  const runtime::HalOptions& hal = e.hal;
-  if (hal.backend == runtime::BackendKind::kSim) return "sim";
-  const std::string wire = wire_name(e.robot) == "CAN" ? "can" : "ethercat";
-  const std::string name = hal.backend == runtime::BackendKind::kWire ? wire : "dds";
-  return hal.lockstep ? name + " lockstep" : name;
-}
-
-void add_engine_json(const runtime::Experiment& e, Json& json) {
-  const bool here = e.hal.backend == runtime::BackendKind::kSim;
-  const std::string version = here ? sim::engine_version(e.sim.engine) : "";
-  json["engine"] = here ? Json(e.sim.engine) : Json();
-  json["engine_version"] = version.empty() ? Json() : Json(version);
-}
-
 namespace {
 
 /// What the command line wants of the experiment.
-void override_experiment(runtime::Experiment& e, const Overrides& overrides) {
+void override_experiment(Experiment& e, const Overrides& overrides) {
   e.seed = overrides.seed.value_or(e.seed);
   e.duration_s = overrides.duration_s.value_or(e.duration_s);
   if (!overrides.kernel_variant.empty()) e.kernel_variant = overrides.kernel_variant;
@@ -245,9 +218,9 @@ void override_experiment(runtime::Experiment& e, const Overrides& overrides) {
 }
 
 /// Why [teleoperation] cannot be done: empty if it can, or is not wanted.
-Diagnostics unfit_for_link(const runtime::Experiment& e, const Overrides& overrides) {
+Diagnostics unfit_for_link(const Experiment& e, const Overrides& overrides) {
   if (!e.teleoperation) return {};
-  if (e.hal.backend == runtime::BackendKind::kWire && !overrides.serves) {
+  if (e.hal.backend == BackendKind::kWire && !overrides.serves) {
     return {{.message = "the link lies between two processes",
              .hint = "run with --hal dds, and serve the robot: tandem serve " + shell_word(e.file) +
                      " --hal " + e.hal.wire,
@@ -272,14 +245,14 @@ Diagnostics unfit_for_link(const runtime::Experiment& e, const Overrides& overri
 }
 
 /// Of flags that are for a bus or a server: they would change nothing, and look as if they did.
-Diagnostics without_effect(const runtime::Experiment& e, const Overrides& overrides) {
-  const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
+Diagnostics without_effect(const Experiment& e, const Overrides& overrides) {
+  const bool simulated = e.hal.backend == BackendKind::kSim;
   if (overrides.lockstep && simulated && !overrides.serves) {
     return {fail("--lockstep: a robot in this process has no other to wait for",
                  "add --hal can or --hal dds, or leave --lockstep out")
                 .error()};
   }
-  if (!overrides.interfaces.empty() && e.hal.backend != runtime::BackendKind::kWire) {
+  if (!overrides.interfaces.empty() && e.hal.backend != BackendKind::kWire) {
     return {fail(simulated ? "--interface: a robot in this process has no bus"
                            : "--interface: the bus is the server's",
                  simulated ? "add --hal can or --hal ethercat, or leave --interface out"
@@ -290,7 +263,7 @@ Diagnostics without_effect(const runtime::Experiment& e, const Overrides& overri
 }
 
 /// Why it cannot be run, whatever the robot.
-Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
+Diagnostics unfit(const Experiment& e, const Overrides& overrides) {
   if (e.cycles() == 0) {
     return {{.message = fmt::format("{} s are less than half a cycle of the loop", e.duration_s),
              .hint = fmt::format("run for {} s or longer",
@@ -303,7 +276,7 @@ Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
   };
   const hal::BusKind asked =
       e.hal.wire == "ethercat" ? hal::BusKind::kEthercat : hal::BusKind::kCan;
-  if (e.hal.backend == runtime::BackendKind::kWire && !has(asked)) {
+  if (e.hal.backend == BackendKind::kWire && !has(asked)) {
     const std::string wire = e.hal.wire == "ethercat" ? "EtherCAT" : "CAN";
     const char* other = e.hal.wire == "ethercat" ? "can" : "ethercat";
     return {{.message = "the robot has no " + wire + " bus",
@@ -312,7 +285,7 @@ Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
              .file = e.file,
              .key = "hal.backend"}};
   }
-  const bool is_remote = e.hal.backend == runtime::BackendKind::kDds;
+  const bool is_remote = e.hal.backend == BackendKind::kDds;
   if (overrides.serves && is_remote) {
     return {{.message = "a robot of another process cannot be served once more",
              .hint = "add --hal sim or --hal can",
@@ -326,7 +299,7 @@ Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
              .key = {}}};
   }
   if (Diagnostics link = unfit_for_link(e, overrides); !link.empty()) return link;
-  if (!overrides.scenario.empty() && e.hal.backend != runtime::BackendKind::kSim) {
+  if (!overrides.scenario.empty() && e.hal.backend != BackendKind::kSim) {
     return {{.message = "faults are injected on the other end of the wire",
              .hint = is_remote ? "give --scenario to `tandem serve`"
                                : "give --scenario to `tandem emulate`",
@@ -337,15 +310,15 @@ Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
 }
 
 /// What only one end of the link does.
-void keep_to_own_end(runtime::Experiment& e, const Overrides& overrides) {
+void keep_to_own_end(Experiment& e, const Overrides& overrides) {
   if (overrides.serves) serve_only(e, overrides.lockstep);
-  if (e.hal.backend != runtime::BackendKind::kDds) return;
+  if (e.hal.backend != BackendKind::kDds) return;
   e.dds.enabled = false;  // the robot is the server's to show
   e.hal.settle_s = 0.0;   // bring-up and settling are the server's
 }
 
 /// An error of the simulation, with the place of its key.
-Error in_its_file(Error error, const runtime::Experiment& e) {
+Error in_its_file(Error error, const Experiment& e) {
   if (!error.file.empty()) return error;
   constexpr std::string_view kOurs = "sim.";  // keys of the experiment
   const bool of_experiment = error.key.starts_with(kOurs);
@@ -358,14 +331,13 @@ Error in_its_file(Error error, const runtime::Experiment& e) {
 
 /// What is wrong, or odd, with the robot where it starts.
 void check_robot(Composition& c, const robot::RobotFiles& robot, Collector& errors) {
-  const runtime::Experiment& e = c.experiment;
-  const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
-  robot::Findings found =
-      robot::check(robot, {.plant = simulated,
-                           .drives = e.hal.backend != runtime::BackendKind::kDds,
-                           .postures = {e.posture},
-                           .period_ns = e.loop.period_ns,
-                           .simulation = e.sim_robot_config()});
+  const Experiment& e = c.experiment;
+  const bool simulated = e.hal.backend == BackendKind::kSim;
+  robot::Findings found = robot::check(robot, {.plant = simulated,
+                                               .drives = e.hal.backend != BackendKind::kDds,
+                                               .postures = {e.posture},
+                                               .period_ns = e.loop.period_ns,
+                                               .simulation = e.sim_robot_config()});
   for (Error& error : found.errors) errors.add(in_its_file(std::move(error), e), {}, 0);
   for (Error& warning : found.warnings) c.warnings.push_back(in_its_file(std::move(warning), e));
   c.loops = std::move(found.loops);
@@ -373,12 +345,13 @@ void check_robot(Composition& c, const robot::RobotFiles& robot, Collector& erro
 
 /// The second robot of [parallel], and its kernels. Scenarios are the first robot's.
 Diagnostics add_parallel(Composition& c, const Overrides& overrides) {
-  runtime::Experiment& e = c.experiment;
+  Experiment& e = c.experiment;
   if (!e.parallel || c.kernels.get() == nullptr) return {};
   const auto robot = robot::with_description(std::move(e.parallel->robot), e.files);
   if (!robot) return robot.error();
   e.parallel->robot = robot->config;
-  auto kernels = supply_kernels(*robot, e.kernel_variant, overrides.missing_kernels);
+  auto kernels = robot::supply_kernels(*robot, e.kernel_variant, overrides.missing_kernels,
+                                       overrides.build_kernels);
   if (!kernels) {
     return {{.message = "the parallel robot has no kernels: " + kernels.error().message,
              .hint = "leave --no-build out: the run builds them",
@@ -404,7 +377,7 @@ Diagnostics add_parallel(Composition& c, const Overrides& overrides) {
 /// The robot in simulation.
 Diagnostics add_simulation(Composition& c, const Overrides& overrides) {
   const std::string& scenario = overrides.scenario;
-  const runtime::Experiment& e = c.experiment;
+  const Experiment& e = c.experiment;
   sim::SimRobotConfig sim = e.sim_robot_config();
   if (!scenario.empty()) {
     auto faults = sim::read_scenario(scenario, e.robot, e.loop.period_ns);
@@ -423,123 +396,60 @@ Diagnostics add_simulation(Composition& c, const Overrides& overrides) {
 
 }  // namespace
 
-std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& file,
-                                                                 const Overrides& overrides) {
-  auto experiment = overrides.serves ? read_served(file) : runtime::read_experiment(file);
-  if (!experiment) return std::unexpected(experiment.error());
-  auto c = std::make_unique<Composition>();
-  runtime::Experiment& e = c->experiment;
+Diagnostics compose(Composition& c, const std::string& file, const Overrides& overrides) {
+  auto experiment = overrides.serves ? read_served(file) : read_experiment(file);
+  if (!experiment) return experiment.error();
+  Experiment& e = c.experiment;
   e = std::move(*experiment);
   override_experiment(e, overrides);
-  if (auto reasons = unfit(e, overrides); !reasons.empty()) return std::unexpected(reasons);
+  if (auto reasons = unfit(e, overrides); !reasons.empty()) return reasons;
   keep_to_own_end(e, overrides);
-  if (Status done = replace_interfaces(e.robot, overrides.interfaces); !done) {
-    return std::unexpected(Diagnostics{done.error()});
+  if (Status done = hal::replace_interfaces(e.robot, overrides.interfaces); !done) {
+    return {done.error()};
   }
-  if (auto flags = without_effect(e, overrides); !flags.empty()) return std::unexpected(flags);
+  if (auto flags = without_effect(e, overrides); !flags.empty()) return flags;
   const auto robot = robot::join(e.robot, *e.description, e.files);
-  if (!robot) return std::unexpected(robot.error());
+  if (!robot) return robot.error();
   Collector errors;
-  check_robot(*c, *robot, errors);
-  if (!add_kernels(*c, *robot, overrides, errors)) return errors.give();
-  if (!overrides.serves) add_controllers(*c, errors);
-  add_owner(*c, errors);
+  check_robot(c, *robot, errors);
+  if (!add_kernels(c, *robot, overrides, errors)) return errors.give().error();
+  if (!overrides.serves) add_controllers(c, errors);
+  add_owner(c, errors);
   if (!errors.empty()) {
-    if (a_hosted_call_goes_on()) (void)c.release();  // it uses what it was given
-    return errors.give();
+    return errors.give().error();
   }
-  for (Error& warning : missing_retreats(*c)) c->warnings.push_back(std::move(warning));
-  if (c->controllers != nullptr && !overrides.duration_s && !overrides.serves) {
-    std::ranges::move(late_plans(*c), std::back_inserter(c->warnings));
+  for (Error& warning : missing_retreats(c)) c.warnings.push_back(std::move(warning));
+  if (c.controllers != nullptr && !overrides.duration_s && !overrides.serves) {
+    std::ranges::move(late_plans(c), std::back_inserter(c.warnings));
   }
-  if (auto failed = add_parallel(*c, overrides); !failed.empty()) return std::unexpected(failed);
-  const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
-  if (!simulated || c->kernels.get() == nullptr) return c;
-  if (auto failed = add_simulation(*c, overrides); !failed.empty()) {
-    return std::unexpected(failed);
+  if (auto failed = add_parallel(c, overrides); !failed.empty()) return failed;
+  const bool simulated = e.hal.backend == BackendKind::kSim;
+  if (!simulated || c.kernels.get() == nullptr) return {};
+  if (auto failed = add_simulation(c, overrides); !failed.empty()) {
+    return failed;
   }
-  return c;
-}
-
-namespace {
-
-/// The robot of a server in the experiment's domain.
-Diagnostics connect_remote(Composition& c) {
-  const runtime::Experiment& e = c.experiment;
-  auto domain = dds::Domain::open(e.dds);
-  if (!domain) return {domain.error()};
-  auto participant = dds::Participant::open(std::move(*domain), "tandem_owner");
-  if (!participant) return {participant.error()};
-  c.participant = std::move(*participant);
-  const hal::Robot robot = hal::robot_of(e.robot);
-  const bool own_pace = e.teleoperation && !e.hal.lockstep;
-  remote::RobotEnd robot_end;  // in lockstep it is in this process
-  if (own_pace) {
-    robot_end = {.playout_cycles = runtime::playout_cycles(*e.teleoperation, e.loop.period_ns) + 1,
-                 .controllers = runtime::robot_controller_values(*e.teleoperation)};
-  }
-  auto backend = remote::RemoteBackend::connect(
-      *c.participant, robot,
-      remote::identity_of(robot, c.kernels->description_hash, e.loop.period_ns),
-      {.name = fmt::format("tandem run {}, process {}",
-                           std::filesystem::path(e.file).filename().string(), ::getpid()),
-       .lockstep = e.hal.lockstep,
-       .own_pace = own_pace,
-       .robot_end = robot_end,
-       .before_asking = [&c] { have_admitted(*c.participant); },
-       .interrupted = [] { return rt::stop_requested(); },
-       .error_text = [](std::uint32_t code) { return hal::can::DriveMaster::error_text(code); }});
-  if (!backend) return {backend.error()};
-  c.remote = backend->get();
-  if (own_pace) return operate_live(c, std::move(*backend));
-  c.backend = std::move(*backend);
-  return put_link_between(c);
-}
-
-}  // namespace
-
-Diagnostics connect(Composition& c, const std::string& record_frames) {
-  const runtime::Experiment& e = c.experiment;
-  if (e.hal.backend == runtime::BackendKind::kDds && record_frames.empty()) {
-    return connect_remote(c);
-  }
-  if (e.hal.backend != runtime::BackendKind::kWire) {
-    if (record_frames.empty()) return {};
-    return {fail("--record-frames: a robot in this process has no bus to record",
-                 "add --hal can, and start tandem emulate")
-                .error()};
-  }
-  const auto make_line = [&e](std::size_t bus, hal::ecat::Link& link,
-                              hal::can::FrameWait&) -> Result<std::unique_ptr<hal::can::Bus>> {
-    auto made = hal::can::LineBus::create(
-        e.robot, bus, link, {.period_ns = e.loop.period_ns, .lockstep = e.hal.lockstep});
-    if (!made) return std::unexpected(made.error());
-    return std::move(*made);
-  };
-  auto sockets =
-      CanSockets::open(e.robot, hal::can::SocketSide::kMaster, !e.hal.lockstep, make_line);
-  if (!sockets) return sockets.error();
-  if (Diagnostics others = listen_for_masters(e.robot, e.loop.period_ns); !others.empty()) {
-    return others;
-  }
-  c.sockets = std::move(*sockets);
-  const auto ends = c.sockets->buses();
-  std::vector<hal::can::Bus*> buses(ends.begin(), ends.end());
-  if (!record_frames.empty()) {
-    auto record = hal::can::FrameRecord::open(record_frames);
-    if (!record) return {record.error()};
-    c.frames = std::move(*record);
-    for (std::size_t b = 0; b < buses.size(); ++b) {
-      buses[b] = &c.frames->watch(*buses[b], e.robot.buses[b].interface);
-    }
-  }
-  auto backend = hal::can::CanBackend::create(
-      e.robot, buses, *c.sockets,
-      {.lockstep = e.hal.lockstep, .answer_window = e.hal.answer_window});
-  if (!backend) return {backend.error()};
-  c.master = &(*backend)->master();
-  c.backend = std::move(*backend);
   return {};
 }
 
-}  // namespace tandem::apps
+CycleConfig cycle_config(const Experiment& e, hal::Pace pace) {
+  CycleConfig config;
+  config.loop = e.loop;
+  config.loop.pacing = rt::Pacing::kSimulated;
+  if (pace == hal::Pace::kWallClock) config.loop.pacing = rt::Pacing::kWallClock;
+  if (pace == hal::Pace::kBus) config.loop.pacing = rt::Pacing::kExternal;
+  config.running_cycles = e.cycles();
+  config.settle_cycles = e.settle_cycles();
+  config.delay_cycles = e.hal.delay_cycles;
+  if (e.after_stop) config.after_stop = *e.after_stop;
+  config.after_reset = e.after_reset;
+  config.on_stray = e.on_stray;
+  config.retreat_cycles =
+      static_cast<std::uint64_t>(e.retreat_s * 1e9 / static_cast<double>(e.loop.period_ns));
+  constexpr std::int64_t kShutDown_ns = 2'000'000'000;  // drives that come to rest slowly
+  config.shut_down_cycles = std::max(config.shut_down_cycles,
+                                     static_cast<std::uint64_t>(kShutDown_ns / e.loop.period_ns));
+  config.fall = e.fall_limits();
+  return config;
+}
+
+}  // namespace tandem::runtime

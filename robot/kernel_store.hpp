@@ -1,5 +1,5 @@
 // Where kernel libraries stand, and which of them fits a robot.
-// Layer: apps/robot.  Thread: main.
+// Layer: robot.  Thread: main.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 #include "model/kernel_library.hpp"
 #include "robot/robot_files.hpp"
 
-namespace tandem::apps {
+namespace tandem::robot {
 
 /// Digits of the description's hash in the name of a library in the user's folder.
 inline constexpr std::size_t kHashDigits = 16;
@@ -36,7 +36,7 @@ inline constexpr std::size_t kHashDigits = 16;
 /// @param variant  empty: the best that this CPU runs.
 /// Errors: no library, or none made from these files (with the command that makes it); a variant
 /// that the library or this CPU lacks; a robot's name that is no file name.
-[[nodiscard]] Result<model::KernelLibrary> find_kernels(const robot::RobotFiles& robot,
+[[nodiscard]] Result<model::KernelLibrary> find_kernels(const RobotFiles& robot,
                                                         const std::string& variant);
 
 /// The same for a robot that is known by name and hash only, as a log knows it.
@@ -44,4 +44,4 @@ inline constexpr std::size_t kHashDigits = 16;
                                                         const std::string& hash,
                                                         const std::string& variant);
 
-}  // namespace tandem::apps
+}  // namespace tandem::robot

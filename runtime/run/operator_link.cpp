@@ -1,4 +1,4 @@
-#include "apps/run/operator_link.hpp"
+#include "runtime/run/operator_link.hpp"
 
 #include <fmt/core.h>
 
@@ -12,23 +12,21 @@
 #include "hal/remote/tele_backend.hpp"
 #include "runtime/local_controllers.hpp"
 
-namespace tandem::apps {
+namespace tandem::runtime {
 
-std::string plugin_path(const runtime::Experiment& e, const std::string& plugin) {
+std::string plugin_path(const Experiment& e, const std::string& plugin) {
   if (!plugin.contains('/')) return plugin;
   // Absolute, so that "./x.so" beside a file of the working directory does not become a name.
   const std::filesystem::path folder = std::filesystem::absolute(e.document.folder());
   return (folder / plugin).lexically_normal().string();
 }
 
-std::expected<std::unique_ptr<runtime::LocalControllers>, Diagnostics> robot_side_of(
-    const Composition& c) {
-  const runtime::Experiment& e = c.experiment;
+std::expected<std::unique_ptr<LocalControllers>, Diagnostics> robot_side_of(const Composition& c) {
+  const Experiment& e = c.experiment;
   if (e.teleoperation->robot_controllers.empty()) return nullptr;
   Diagnostics errors;
-  auto side =
-      std::make_unique<runtime::LocalControllers>(e.robot, c.kernels.get(), e.loop.period_ns);
-  for (const runtime::ControllerSpec& spec : e.teleoperation->robot_controllers) {
+  auto side = std::make_unique<LocalControllers>(e.robot, c.kernels.get(), e.loop.period_ns);
+  for (const ControllerSpec& spec : e.teleoperation->robot_controllers) {
     auto loaded = load_controller(plugin_path(e, spec.plugin), controller_folders());
     Status added = loaded ? side->add(spec.name, std::move(*loaded), spec.parameters)
                           : Status(std::unexpected(loaded.error()));
@@ -47,9 +45,9 @@ std::expected<std::unique_ptr<runtime::LocalControllers>, Diagnostics> robot_sid
 namespace {
 
 /// A joint that controllers of both ends claim.
-Diagnostics shared_joint(const Composition& c, const runtime::LocalControllers* side) {
+Diagnostics shared_joint(const Composition& c, const LocalControllers* side) {
   if (side == nullptr || c.controllers == nullptr) return {};
-  const runtime::Experiment& e = c.experiment;
+  const Experiment& e = c.experiment;
   const auto joint = side->shared_joint(*c.controllers);
   if (!joint) return {};
   return {{.message = "the joint '" + e.robot.joints[*joint].name +
@@ -61,7 +59,7 @@ Diagnostics shared_joint(const Composition& c, const runtime::LocalControllers* 
 
 /// A simulated robot that follows each command at once, with its own controllers.
 std::expected<remote::OperatorEnd::End, Diagnostics> twin_of(const Composition& c) {
-  const runtime::Experiment& e = c.experiment;
+  const Experiment& e = c.experiment;
   auto side = robot_side_of(c);
   if (!side) return std::unexpected(side.error());
   sim::SimRobotConfig sim = e.sim_robot_config();
@@ -75,7 +73,7 @@ std::expected<remote::OperatorEnd::End, Diagnostics> twin_of(const Composition& 
 
 std::expected<std::unique_ptr<remote::OperatorEnd>, Diagnostics> link_to(
     const Composition& c, std::unique_ptr<hal::Backend> robot) {
-  const runtime::Experiment& e = c.experiment;
+  const Experiment& e = c.experiment;
   remote::TeleConfig config = e.teleoperation->link;
   config.seed = e.seed;
   auto side = robot_side_of(c);
@@ -107,7 +105,7 @@ namespace {
 void warn_elsewhere(Composition& c, remote::RemoteBackend& robot) {
   constexpr double kElsewhere_rad = 0.05;  // or m: more than a robot sags under its weight
   constexpr double kDegrees = 180.0 / std::numbers::pi;
-  const runtime::Experiment& e = c.experiment;
+  const Experiment& e = c.experiment;
   const hal::PostureConfig* posture = e.robot.posture(e.posture);
   hal::StateImage state(e.robot.shape());
   if (posture == nullptr || !robot.first_state(state)) return;
@@ -134,7 +132,7 @@ void warn_elsewhere(Composition& c, remote::RemoteBackend& robot) {
 }  // namespace
 
 Diagnostics operate_live(Composition& c, std::unique_ptr<remote::RemoteBackend> robot) {
-  const runtime::Experiment& e = c.experiment;
+  const Experiment& e = c.experiment;
   warn_elsewhere(c, *robot);
   remote::TeleConfig config = e.teleoperation->link;
   config.seed = e.seed;
@@ -144,8 +142,7 @@ Diagnostics operate_live(Composition& c, std::unique_ptr<remote::RemoteBackend> 
   if (config.predict) {
     auto made = twin_of(c);
     if (!made) return made.error();
-    if (auto shared =
-            shared_joint(c, static_cast<const runtime::LocalControllers*>(made->side.get()));
+    if (auto shared = shared_joint(c, static_cast<const LocalControllers*>(made->side.get()));
         !shared.empty()) {
       return shared;
     }
@@ -153,11 +150,11 @@ Diagnostics operate_live(Composition& c, std::unique_ptr<remote::RemoteBackend> 
   }
   auto link = std::make_unique<remote::LiveLink>(
       hal::robot_of(e.robot), std::move(robot), std::move(twin), config,
-      e.teleoperation->real ? 0 : delay_ns,
-      runtime::playout_cycles(*e.teleoperation, e.loop.period_ns), e.loop.period_ns);
+      e.teleoperation->real ? 0 : delay_ns, playout_cycles(*e.teleoperation, e.loop.period_ns),
+      e.loop.period_ns);
   c.tele = link.get();
   c.backend = std::move(link);
   return {};
 }
 
-}  // namespace tandem::apps
+}  // namespace tandem::runtime

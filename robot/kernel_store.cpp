@@ -1,4 +1,4 @@
-#include "apps/robot/kernel_store.hpp"
+#include "robot/kernel_store.hpp"
 
 #include <cstdlib>
 #include <filesystem>
@@ -8,7 +8,7 @@
 #include "model/generate.hpp"
 #include "model/kernel_build.hpp"
 
-namespace tandem::apps {
+namespace tandem::robot {
 namespace {
 
 namespace fs = std::filesystem;
@@ -74,8 +74,7 @@ std::vector<std::string> model_folders() {
   return folders;
 }
 
-Result<model::KernelLibrary> find_kernels(const robot::RobotFiles& robot,
-                                          const std::string& variant) {
+Result<model::KernelLibrary> find_kernels(const RobotFiles& robot, const std::string& variant) {
   return find(robot.config.name, model::description_hash(robot.tree, robot.spec), variant,
               "run: tandem model build " + shell_word(robot.config.file));
 }
@@ -85,4 +84,4 @@ Result<model::KernelLibrary> find_kernels(const std::string& robot, const std::s
   return find(robot, hash, variant, "make it with `tandem model build`");
 }
 
-}  // namespace tandem::apps
+}  // namespace tandem::robot

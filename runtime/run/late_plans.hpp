@@ -2,13 +2,13 @@
 // Layer: apps/run.  Thread: main.
 #pragma once
 
-#include "apps/run/composition.hpp"
 #include "base/result.hpp"
+#include "runtime/run/composition.hpp"
 
-namespace tandem::apps {
+namespace tandem::runtime {
 
 /// A warning of each active controller that plans something for later than the run's end, with the
 /// key, both times and how much else is late.
 [[nodiscard]] Diagnostics late_plans(const Composition& composition);
 
-}  // namespace tandem::apps
+}  // namespace tandem::runtime

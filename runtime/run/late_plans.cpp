@@ -1,4 +1,4 @@
-#include "apps/run/late_plans.hpp"
+#include "runtime/run/late_plans.hpp"
 
 #include <fmt/core.h>
 
@@ -6,16 +6,16 @@
 #include <iterator>
 #include <vector>
 
-namespace tandem::apps {
+namespace tandem::runtime {
 
 Diagnostics late_plans(const Composition& c) {
   Diagnostics warnings;
-  const runtime::Experiment& e = c.experiment;
+  const Experiment& e = c.experiment;
   const double end_s = e.duration_s + 0.5e-9 * static_cast<double>(e.loop.period_ns);
   for (const auto& one : c.controllers->owned()) {
-    const auto spec = one == nullptr ? e.controllers.end()
-                                     : std::ranges::find(e.controllers, one->name,
-                                                         &runtime::ControllerSpec::name);
+    const auto spec = one == nullptr
+                          ? e.controllers.end()
+                          : std::ranges::find(e.controllers, one->name, &ControllerSpec::name);
     if (spec == e.controllers.end() || !spec->active) continue;  // others start later
     std::vector<ControllerSetup::Plan> late;
     std::ranges::copy_if(one->plans, std::back_inserter(late),
@@ -36,4 +36,4 @@ Diagnostics late_plans(const Composition& c) {
   return warnings;
 }
 
-}  // namespace tandem::apps
+}  // namespace tandem::runtime

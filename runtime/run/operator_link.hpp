@@ -6,13 +6,13 @@
 #include <memory>
 #include <string>
 
-#include "apps/run/composition.hpp"
 #include "base/result.hpp"
+#include "runtime/run/composition.hpp"
 
-namespace tandem::apps {
+namespace tandem::runtime {
 
 /// A plugin's path is relative to the experiment's file; its bare name is looked for.
-[[nodiscard]] std::string plugin_path(const runtime::Experiment& e, const std::string& plugin);
+[[nodiscard]] std::string plugin_path(const Experiment& e, const std::string& plugin);
 
 /// With [teleoperation] the backend becomes a TeleBackend before it, with a twin and the robot's
 /// own controllers; else nothing happens. Errors: plugins and parameters of
@@ -27,7 +27,7 @@ namespace tandem::apps {
 
 /// [[teleoperation.robot_controller]], for the robot's end; null: there are none.
 /// Errors: plugins and parameters.
-[[nodiscard]] std::expected<std::unique_ptr<runtime::LocalControllers>, Diagnostics> robot_side_of(
+[[nodiscard]] std::expected<std::unique_ptr<LocalControllers>, Diagnostics> robot_side_of(
     const Composition& c);
 
 /// In real time: the backend becomes a LiveLink to `robot`, with a twin. A robot that stands
@@ -36,4 +36,4 @@ namespace tandem::apps {
 [[nodiscard]] Diagnostics operate_live(Composition& c,
                                        std::unique_ptr<remote::RemoteBackend> robot);
 
-}  // namespace tandem::apps
+}  // namespace tandem::runtime

@@ -1,0 +1,54 @@
+// A composed run of the command line: with its CAN interfaces, or its robot's server.
+// Layer: apps/run.  Thread: main.
+#pragma once
+
+#include <expected>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "apps/can/can_sockets.hpp"
+#include "apps/text/console.hpp"
+#include "dds/domain.hpp"
+#include "dds/participant.hpp"
+#include "hal/ethercat-can/frame_record.hpp"
+#include "runtime/run/composition.hpp"
+
+namespace tandem::apps {
+
+using runtime::ControllerNote;
+using runtime::Overrides;
+
+struct Composition : runtime::Composition {
+  std::unique_ptr<CanSockets> sockets;            ///< of the CAN backend
+  std::unique_ptr<hal::can::FrameRecord> frames;  ///< of the CAN backend, when it was asked for
+  std::unique_ptr<dds::Participant> participant;  ///< of the DDS backend
+
+  /// Empty without a CAN backend.
+  [[nodiscard]] std::span<const OpenBus> open_buses() const {
+    if (sockets == nullptr) return {};
+    return sockets->open_buses();
+  }
+};
+
+/// "EtherCAT" when the robot has no other bus, else "CAN".
+[[nodiscard]] std::string wire_name(const hal::RobotConfig& robot);
+
+/// "sim", "can", "can lockstep", "ethercat", "dds", "dds lockstep", for logs and summaries.
+[[nodiscard]] std::string hal_name(const runtime::Experiment& e);
+
+/// The keys `engine` and `engine_version` of JSON; null where no plant is in this process.
+void add_engine_json(const runtime::Experiment& e, Json& json);
+
+/// runtime::compose() of a new one.
+[[nodiscard]] std::expected<std::unique_ptr<Composition>, Diagnostics> compose(
+    const std::string& experiment, const Overrides& overrides);
+
+/// Opens the CAN interfaces and makes the CAN backend, or finds the server of the DDS backend and
+/// gets its robot; the simulation has nothing to connect.
+/// @param record_frames  file that every frame is written to; empty: none
+/// Errors: CanSockets::open()'s; a record that cannot be made, or without a bus; Domain::open()'s,
+/// RemoteBackend::connect()'s.
+[[nodiscard]] Diagnostics connect(Composition& composition, const std::string& record_frames);
+
+}  // namespace tandem::apps
