@@ -173,14 +173,15 @@ TEST_P(ProfileChain, ACutCableAndAnEmergencyStopBringItToRest) {
       for (int i = 0; i < 8000; ++i) {
         refer(std::max(-2.9, loop->command.position_rad()[0] - 1e-3), -1.0);
         const auto joint = loop->sim_robot->plant().joint(0);
-        if (i < 600) furthest_rad = std::min(furthest_rad, joint.position_rad - start_rad);
+        furthest_rad = std::min(furthest_rad, joint.position_rad - start_rad);
         if (off_at < 0 && loop->sim_robot->phase() == hal::Phase::kFault) off_at = i;
       }
       EXPECT_GE(off_at, 0) << static_cast<int>(kind) << static_cast<int>(mode);
-      // Disabled it swings as a pendulum; driven on it would be at the end of its range.
-      EXPECT_GT(furthest_rad, -1.2) << static_cast<int>(kind) << static_cast<int>(mode);
-      EXPECT_GT(loop->sim_robot->plant().joint(0).position_rad, -2.0);
-      EXPECT_LT(std::abs(speed_rad_s()), 0.02) << static_cast<int>(kind) << static_cast<int>(mode);
+      // Driven on it would be 8 rad away, or at the end of its range, 3.5 rad. The heartbeat is
+      // missed after 150 ms; then the drive is disabled, and gravity draws the joint to 0.
+      EXPECT_GT(furthest_rad, -0.9) << static_cast<int>(kind) << static_cast<int>(mode);
+      EXPECT_LT(std::abs(loop->sim_robot->plant().joint(0).position_rad), 0.3);
+      EXPECT_LT(std::abs(speed_rad_s()), 0.2) << static_cast<int>(kind) << static_cast<int>(mode);
     }
   }
 }
