@@ -62,6 +62,32 @@ bool mappable(const DataSheet& sheet, std::uint16_t index, std::uint8_t sub, Dat
   return entry != nullptr && (entry->access & right) != 0 && carried(sheet, *entry, right);
 }
 
+namespace {
+
+/// Profile position and velocity, where the ramps can be set. In profile velocity a drive runs on
+/// when its master is gone, unless it watches it.
+/// @param has  by 6502
+template <class Has>
+void take_profile_modes(const DataSheet& sheet, int axis, const Has& has, DriveAbilities& can) {
+  const auto sets = [&](std::uint16_t index) { return writable(sheet, of_axis(index, axis), 0); };
+  const auto target = [&](std::uint16_t index) {
+    return mappable(sheet, of_axis(index, axis), 0, kInteger32, kMapRpdo);
+  };
+  const bool ramps = sets(object::kProfileAcceleration) || sets(object::kProfileDeceleration);
+  const bool watches =
+      sheet.ethercat || writable(sheet, object::kHeartbeatConsumer, 1) ||
+      (writable(sheet, object::kGuardTime, 0) && writable(sheet, object::kLifeTimeFactor, 0));
+  if (has(Mode::kPp) && ramps && sets(object::kProfileVelocity) &&
+      target(object::kTargetPosition)) {
+    can.position = Mode::kPp;
+  }
+  if (has(Mode::kPv) && ramps && watches && target(object::kTargetVelocity)) {
+    can.velocity = Mode::kPv;
+  }
+}
+
+}  // namespace
+
 DriveAbilities abilities_of(const DataSheet& sheet, int axis) {
   const auto at = [axis](std::uint16_t index) { return of_axis(index, axis); };
   const auto by_rpdo = [&](std::uint16_t index, std::uint8_t sub, DataType type) {
@@ -97,6 +123,7 @@ DriveAbilities abilities_of(const DataSheet& sheet, int axis) {
       (torque_offset || by_rpdo(object::kTargetTorque, 0, kInteger16))) {
     can.torque = Mode::kCst;
   }
+  if (first_mode(can) == Mode::kNone) take_profile_modes(sheet, axis, has, can);
   if (can.one_mode) {
     if (can.position != Mode::kNone) can.velocity = Mode::kNone;
     if (first_mode(can) != can.torque) can.torque = Mode::kNone;

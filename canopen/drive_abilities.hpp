@@ -32,7 +32,8 @@ namespace tandem::canopen {
 /// Of one axis.
 struct DriveAbilities {
   bool machine = false;  ///< 6040 and 6041 can be in PDOs: it is a CiA 402 drive
-  /// For positions, kCsp or kIp; for velocities kCsv; for torques kCst; each kNone: not at all.
+  /// For positions kCsp, kIp or kPp; for velocities kCsv or kPv; for torques kCst; each kNone: not
+  /// at all. The profile modes are for a drive without a cyclic one.
   Mode position = Mode::kNone;
   Mode velocity = Mode::kNone;
   Mode torque = Mode::kNone;
@@ -53,6 +54,11 @@ struct DriveAbilities {
   return can.position != Mode::kNone   ? can.position
          : can.velocity != Mode::kNone ? can.velocity
                                        : can.torque;
+}
+
+/// It moves in profile modes: by ramps of its own, which the master sets.
+[[nodiscard]] constexpr bool moves_by_profile(const DriveAbilities& can) noexcept {
+  return can.position == Mode::kPp || can.velocity == Mode::kPv;
 }
 
 /// A value of the drive that a scale was computed from.

@@ -38,6 +38,9 @@ Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDic
       velocity_units_(setup.velocity_units_per_rev > 0.0
                           ? setup.velocity_units_per_rev / setup.link_counts_per_rev
                           : 1.0),
+      acceleration_units_(setup.acceleration_units_per_rev > 0.0
+                              ? setup.acceleration_units_per_rev / setup.link_counts_per_rev
+                              : velocity_units_),
       exact_link_counts_(board.sheet != nullptr ? setup.link_counts_per_rev : 0.0),
       exact_motor_counts_(board.sheet != nullptr ? setup.motor_counts_per_rev : 0.0),
       exact_rated_Nm_(board.sheet != nullptr ? setup.rated_torque_Nm : 0.0),
@@ -304,7 +307,10 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
     events.reset = true;
     objects_.error_code = 0;
   }
-  if (now == DriveState::kOperationEnabled && before != now) seed_references();
+  if (now == DriveState::kOperationEnabled && before != now) {
+    seed_references();
+    profile_.forget_target();
+  }
   index_turn_ = profile ? index_turn_ : kNoTurn;
   if (profile) run_profile();
   return events;
@@ -338,6 +344,7 @@ void Axis::run_profile() noexcept {
                              .target_position = o.target_position,
                              .target_velocity = o.target_velocity,
                              .velocity_units = velocity_units_,
+                             .acceleration_units = acceleration_units_,
                              .target_torque = o.target_torque,
                              .torque = o.torque,
                              .senses = senses()},

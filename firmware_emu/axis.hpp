@@ -99,7 +99,8 @@ class Axis final : private canopen::ObjectOwner {
   double period_s_;
   std::uint32_t modes_;
   bool reversed_;
-  double velocity_units_;  ///< in a count per second
+  double velocity_units_;      ///< in a count per second
+  double acceleration_units_;  ///< in a count per second and second
   /// A stand-in's own scales, which need not be whole; 0: those of its objects.
   double exact_link_counts_;
   double exact_motor_counts_;

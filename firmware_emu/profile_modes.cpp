@@ -147,18 +147,19 @@ void ProfileModes::take_set_point(const ProfileInputs& in) noexcept {
 
 void ProfileModes::position_mode(const ProfileInputs& in, double dt_s) noexcept {
   take_set_point(in);
-  const double unit = 1.0 / in.velocity_units;
-  out_.target_reached = motion_.move(motion_.position + way(out_.position, target_), speed_ * unit,
-                                     speeding() * unit, slowing() * unit, dt_s) &&
-                        !waiting_;
+  const double unit = 1.0 / in.acceleration_units;
+  out_.target_reached =
+      motion_.move(motion_.position + way(out_.position, target_), speed_ / in.velocity_units,
+                   speeding() * unit, slowing() * unit, dt_s) &&
+      !waiting_;
   out_.position = plus(start_, clamp_round<std::int32_t>(motion_.position));
   out_.velocity = clamp_round<std::int32_t>(motion_.velocity);
 }
 
 void ProfileModes::velocity_mode(const ProfileInputs& in, double dt_s) noexcept {
-  const double unit = 1.0 / in.velocity_units;
-  out_.target_reached =
-      motion_.run(in.target_velocity * unit, speeding() * unit, slowing() * unit, dt_s);
+  const double unit = 1.0 / in.acceleration_units;
+  out_.target_reached = motion_.run(in.target_velocity / in.velocity_units, speeding() * unit,
+                                    slowing() * unit, dt_s);
   out_.velocity = clamp_round<std::int32_t>(motion_.velocity);
   out_.position = in.position;
   out_.bit_12 = out_.velocity == 0;
@@ -221,7 +222,7 @@ void ProfileModes::homing_mode(const ProfileInputs& in, double dt_s) noexcept {
   }
   if (search_.turned()) motion_.velocity = 0.0;
   const std::uint32_t speed = homing_speeds_[search_.slow() && homing_speeds_[1] != 0 ? 1 : 0];
-  const double acceleration = homing_acceleration_ / in.velocity_units;
+  const double acceleration = homing_acceleration_ / in.acceleration_units;
   motion_.run(search_.direction() * (speed / in.velocity_units), acceleration, acceleration, dt_s);
   out_.position = plus(start_, clamp_round<std::int32_t>(motion_.position));
   out_.velocity = clamp_round<std::int32_t>(motion_.velocity);

@@ -37,7 +37,8 @@ struct ProfileInputs {
   std::int32_t position = 0;
   std::int32_t target_position = 0;  ///< 607A, and 60C1:1
   std::int32_t target_velocity = 0;  ///< 60FF
-  double velocity_units = 1.0;       ///< in a count per second: of 60FF, 6081, 6083, …
+  double velocity_units = 1.0;       ///< in a count per second: of 60FF, 6081, 6099
+  double acceleration_units = 1.0;   ///< in a count per second and second: of 6083, 6084, 609A
   std::int16_t target_torque = 0;    ///< 6071
   std::int16_t torque = 0;           ///< 6077
   HomingSenses senses{};             ///< homing's
@@ -76,6 +77,10 @@ class ProfileModes {
   ProfileOutputs step(const ProfileInputs& in, double dt_s) noexcept TANDEM_RT;
 
   [[nodiscard]] std::int32_t home_offset() const noexcept { return home_offset_; }
+  /// The drive is enabled anew: it stays where it is, whatever it was to reach before.
+  void forget_target() noexcept TANDEM_RT {
+    if (mode_ == canopen::Mode::kPp) mode_ = canopen::Mode::kNone;
+  }
   void power_on() noexcept TANDEM_RT;
   void archive(Archive& ar);
 

@@ -51,9 +51,12 @@ struct AxisSetup {
   double index_rad = 0.0;
   double index_pitch_rad = 0.0;
   double link_counts_per_rev = 524288.0;  ///< 608F
-  /// Velocity units (606C, 60FF, 60B1, 6081, 6099; accelerations in them per second) at one
-  /// revolution of the link per second; 0: counts per second.
+  /// Velocity units (606C, 60FF, 60B1, 6081, 6099) at one revolution of the link per second; 0:
+  /// counts per second.
   double velocity_units_per_rev = 0.0;
+  /// Acceleration units (6083, 6084, 609A) at one revolution per second and second; 0: velocity
+  /// units per second.
+  double acceleration_units_per_rev = 0.0;
   double motor_counts_per_rev = 819200.0;  ///< 2033, per revolution of the link
   double rated_torque_Nm = 1.0;            ///< 6076
   /// Gains, motor data, limits. Position limits (607D) may be infinite: no limit.

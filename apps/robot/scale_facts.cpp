@@ -24,9 +24,13 @@ std::string scale_text(const hal::JointConfig& joint) {
           ? fmt::format("{:.10g} velocity units at one per second ({})",
                         joint.velocity_units_per_rev, source(joint.velocity_of_sheet))
           : std::string("velocities in counts per second");
-  return fmt::format("{:.10g} counts per {} ({}), {}, rated {:.6g} {} ({}){}",
+  const std::string acceleration = joint.acceleration_units_per_rev > 0.0
+                                       ? fmt::format("{:.10g} acceleration units (robot.toml), ",
+                                                     joint.acceleration_units_per_rev)
+                                       : std::string();
+  return fmt::format("{:.10g} counts per {} ({}), {}, {}rated {:.6g} {} ({}){}",
                      joint.encoder_counts_per_rev, joint.slides ? "2 pi m" : "revolution",
-                     source(joint.counts_of_sheet), velocity, joint.rated_torque_Nm,
+                     source(joint.counts_of_sheet), velocity, acceleration, joint.rated_torque_Nm,
                      joint.slides ? "N" : "Nm", source(joint.torque_of_sheet),
                      joint.reversed ? ", reversed" : "");
 }
@@ -70,6 +74,10 @@ void add_scale_json(const hal::RobotConfig& robot, Json& json) {
          {"velocity_units_per_rev",
           own_velocity ? joint.velocity_units_per_rev : joint.encoder_counts_per_rev},
          {"velocity_units_from", own_velocity ? source(joint.velocity_of_sheet) : "counts"},
+         {"acceleration_units_per_rev", joint.acceleration_units_per_rev > 0.0
+                                            ? joint.acceleration_units_per_rev
+                                        : own_velocity ? joint.velocity_units_per_rev
+                                                       : joint.encoder_counts_per_rev},
          {"rated_torque_Nm", joint.rated_torque_Nm},
          {"rated_torque_from", source(joint.torque_of_sheet)},
          {"reversed", joint.reversed},

@@ -4,9 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <initializer_list>
 #include <numbers>
 
 #include "canopen/data_sheet.hpp"
+#include "canopen/drive_abilities.hpp"
 #include "canopen/objects.hpp"
 
 namespace tandem::hal {
@@ -24,6 +26,7 @@ class RangeCheck {
     check_turn();
     check_velocity_units();
     if (joint_.homing) check_homing(*joint_.homing);
+    check_profile();
     const StopOptions& stop = joint_.stop_options;
     using namespace canopen::object;
     check_option("shutdown", stop.shutdown, kShutdownOption);
@@ -110,6 +113,48 @@ class RangeCheck {
                       joint_.max_velocity_rad_s, joint_.slides ? "m/s" : "rad/s", most),
           fmt::format("give at most {:.4g}, or correct encoder_counts_per_rev",
                       kMost * joint_.max_velocity_rad_s / most));
+  }
+
+  /// The limits of a joint whose drive moves in profile modes are written to it: what the sheet
+  /// does not take is mostly in other units.
+  void check_profile() {
+    const BoardConfig* board = robot_.board(joint_.board);
+    if (board == nullptr) return;
+    using namespace canopen::object;
+    if (!canopen::moves_by_profile(canopen::abilities_of(*board->sheet, joint_.axis))) return;
+    const double velocity = velocity_units(joint_.max_velocity_rad_s);
+    const double acceleration = joint_.acceleration_units_per_rev > 0.0
+                                    ? joint_.max_acceleration_rad_s2 *
+                                          joint_.acceleration_units_per_rev /
+                                          (2.0 * std::numbers::pi)
+                                    : velocity_units(joint_.max_acceleration_rad_s2);
+    check_rate("velocity", velocity, {kMaxProfileVelocity, kProfileVelocity});
+    check_rate("acceleration", acceleration, {kProfileAcceleration, kProfileDeceleration});
+  }
+
+  /// @param what  "velocity" or "acceleration", of the keys' names
+  void check_rate(const std::string& what, double units,
+                  std::initializer_list<std::uint16_t> objects) {
+    const canopen::DataSheet& sheet = *robot_.board(joint_.board)->sheet;
+    for (const std::uint16_t index : objects) {
+      const std::uint16_t of = canopen::of_axis(index, joint_.axis);
+      const canopen::SheetEntry* entry = sheet.find(of);
+      if (entry == nullptr || (entry->access & canopen::kWrite) == 0) continue;
+      const auto most =
+          static_cast<double>(entry->high.value_or(0) > 0 ? *entry->high : 0xFFFFFFFF);
+      if (units <= most) continue;
+      error(joint_.line, what + "_units_per_rev",
+            fmt::format("the joint's maximum {} would be {:.0f} in {:04X}, which takes at most "
+                        "{:.0f} in {}",
+                        what, units, of, most, sheet.file),
+            fmt::format("set it to the drive's {} units at one revolution of the joint per second"
+                        "{}, or give the joint a smaller max_{}",
+                        what,
+                        what == "velocity" ? " (a motor's rpm: 60 times the gear)"
+                                           : " and second (a motor's rev/s^2: the gear)",
+                        what == "velocity" ? "velocity_rad_s" : "acceleration_rad_s2"));
+      return;
+    }
   }
 
   void check_homing(const HomingConfig& homing) {

@@ -193,6 +193,7 @@ struct JointConfig {
   /// The drive's velocity units at one revolution of the joint per second; 0: its counts per
   /// second.
   double velocity_units_per_rev = 0.0;
+  double acceleration_units_per_rev = 0.0;  ///< of its accelerations; 0: the former per second
   bool velocity_of_sheet = false;  ///< velocity_units_per_rev is what the drive's sheet says
   bool counts_of_sheet = false;    ///< encoder_counts_per_rev is what the drive's sheet says
   bool torque_of_sheet = false;    ///< rated_torque_Nm is

@@ -128,6 +128,7 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   joint.homing = read_homing(table);
   joint.stop_options = read_stop_options(table);
   joint.velocity_units_per_rev = table.number_or("velocity_units_per_rev", 0.0, kPositive);
+  joint.acceleration_units_per_rev = table.number_or("acceleration_units_per_rev", 0.0, kPositive);
   joint.on_fault = read_stop_category(table);
   joint.on_fault_line = table.line("on_fault");
   return joint;

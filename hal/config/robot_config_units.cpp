@@ -85,8 +85,8 @@ class FromSheet {
 void complete_units(TomlTable& table, const RobotConfig& robot, JointConfig& joint) {
   const BoardConfig* board = robot.board(joint.board);
   if (board == nullptr || board->eds.empty()) {
-    for (const char* key :
-         {"reversed", "zero_counts", "encoder_turn_counts", "velocity_units_per_rev"}) {
+    for (const char* key : {"reversed", "zero_counts", "encoder_turn_counts",
+                            "velocity_units_per_rev", "acceleration_units_per_rev"}) {
       if (!table.has(key)) continue;
       table.error(key, "is for drives of other makers: our own boards count along the joint",
                   "give its board an `eds`, or remove this key");

@@ -38,8 +38,11 @@ AxisScale scale_of(const JointConfig& joint, double counts, double motor_counts,
   const double sign = joint.reversed ? -1.0 : 1.0;
   const double velocities =
       joint.velocity_units_per_rev > 0.0 ? joint.velocity_units_per_rev : counts;
+  const double accelerations =
+      joint.acceleration_units_per_rev > 0.0 ? joint.acceleration_units_per_rev : velocities;
   return {.counts_per_rad = sign * counts / kRadPerRev,
           .velocity_per_rad_s = sign * velocities / kRadPerRev,
+          .acceleration_per_rad_s2 = sign * accelerations / kRadPerRev,
           .motor_counts_per_rad = motor_counts / kRadPerRev,
           .mille_per_Nm = sign * 1.0e6 / rated_mNm,
           .zero_counts = joint.zero_counts,
@@ -116,12 +119,14 @@ void* RawCommand::variable(WireField field) noexcept {
   }
 }
 
-Mode wire_mode(ControlMode mode, InteractionMode interaction, Mode position) noexcept TANDEM_RT {
+Mode wire_mode(ControlMode mode, InteractionMode interaction,
+               const canopen::DriveAbilities& can) noexcept TANDEM_RT {
+  const Mode velocity = can.velocity == Mode::kPv ? Mode::kPv : Mode::kCsv;
   const bool compliant = interaction == InteractionMode::kCompliant;
   switch (mode) {
     case ControlMode::kIdle: return Mode::kNone;
-    case ControlMode::kPosition: return compliant ? Mode::kImpedance : position;
-    case ControlMode::kVelocity: return compliant ? Mode::kVelocityImpedance : Mode::kCsv;
+    case ControlMode::kPosition: return compliant ? Mode::kImpedance : can.position;
+    case ControlMode::kVelocity: return compliant ? Mode::kVelocityImpedance : velocity;
     case ControlMode::kTorque: return Mode::kCst;
     case ControlMode::kOpenLoop: return Mode::kOpenLoop;
     case ControlMode::kCurrent: return Mode::kCurrent;
@@ -132,16 +137,16 @@ Mode wire_mode(ControlMode mode, InteractionMode interaction, Mode position) noe
 std::pair<ControlMode, InteractionMode> image_mode(std::int8_t mode) noexcept TANDEM_RT {
   constexpr auto kStiff = InteractionMode::kStiff;
   switch (static_cast<Mode>(mode)) {
+    case Mode::kPp:
     case Mode::kIp:
     case Mode::kCsp: return {ControlMode::kPosition, kStiff};
     case Mode::kImpedance: return {ControlMode::kPosition, InteractionMode::kCompliant};
+    case Mode::kPv:
     case Mode::kCsv: return {ControlMode::kVelocity, kStiff};
     case Mode::kVelocityImpedance: return {ControlMode::kVelocity, InteractionMode::kCompliant};
     case Mode::kCst: return {ControlMode::kTorque, kStiff};
     case Mode::kOpenLoop: return {ControlMode::kOpenLoop, kStiff};
     case Mode::kCurrent: return {ControlMode::kCurrent, kStiff};
-    case Mode::kPp:
-    case Mode::kPv:
     case Mode::kTq:
     case Mode::kHm:
     case Mode::kNone: break;
@@ -149,11 +154,12 @@ std::pair<ControlMode, InteractionMode> image_mode(std::int8_t mode) noexcept TA
   return {ControlMode::kIdle, kStiff};
 }
 
-void encode_command(const AxisScale& scale, Mode position, const CommandImage& command,
-                    std::size_t joint, RawCommand& raw) noexcept TANDEM_RT {
+void encode_command(const AxisScale& scale, const canopen::DriveAbilities& can,
+                    const CommandImage& command, std::size_t joint,
+                    RawCommand& raw) noexcept TANDEM_RT {
   const auto mode = static_cast<ControlMode>(command.mode()[joint]);
   const auto interaction = static_cast<InteractionMode>(command.interaction()[joint]);
-  const Mode wire = wire_mode(mode, interaction, position);
+  const Mode wire = wire_mode(mode, interaction, can);
   if (wire != Mode::kNone) raw.mode = static_cast<std::int8_t>(wire);
   raw.target_position = scale.to_drive(
       clamp_round<std::int32_t>(command.position_rad()[joint] * scale.counts_per_rad));

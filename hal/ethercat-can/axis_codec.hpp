@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/realtime.hpp"
+#include "canopen/drive_abilities.hpp"
 #include "canopen/drive_machine.hpp"
 #include "canopen/objects.hpp"
 #include "hal/config/robot_config.hpp"
@@ -20,13 +21,14 @@ namespace tandem::hal::can {
 
 /// Factors of one joint's wire units.
 struct AxisScale {
-  double counts_per_rad = 1.0;        ///< link encoder, 608F / 2 pi; negative: it counts down
-  double velocity_per_rad_s = 1.0;    ///< of 606C, 60FF and 60B1; counts/s but for other units
-  double motor_counts_per_rad = 1.0;  ///< motor encoder reflected to the link, 2033 / 2 pi
-  double mille_per_Nm = 1.0;          ///< 1000 / rated torque (6076); negative with the counts
-  std::int32_t zero_counts = 0;       ///< the drive's count at 0 rad
-  std::int32_t turn_counts = 0;       ///< JointConfig::encoder_turn_counts
-  std::int32_t middle_counts = 0;     ///< of the joint's range, from its zero
+  double counts_per_rad = 1.0;           ///< link encoder, 608F / 2 pi; negative: it counts down
+  double velocity_per_rad_s = 1.0;       ///< of 606C, 60FF and 60B1; counts/s but for other units
+  double acceleration_per_rad_s2 = 1.0;  ///< of 6083, 6084 and 609A
+  double motor_counts_per_rad = 1.0;     ///< motor encoder reflected to the link, 2033 / 2 pi
+  double mille_per_Nm = 1.0;             ///< 1000 / rated torque (6076); negative with the counts
+  std::int32_t zero_counts = 0;          ///< the drive's count at 0 rad
+  std::int32_t turn_counts = 0;          ///< JointConfig::encoder_turn_counts
+  std::int32_t middle_counts = 0;        ///< of the joint's range, from its zero
 
   /// A drive's count from the joint's zero, and back. Both wrap around as the drive's counter does:
   /// the joint's range is less than the counter's, so that a count means one angle.
@@ -92,17 +94,16 @@ struct RawCommand {
 };
 
 /// The mode of operation for what the image asks; kNone for kIdle.
-/// @param position  the drive's mode for stiff positions: kCsp, or kIp where it has no other
 [[nodiscard]] canopen::Mode wire_mode(ControlMode mode, InteractionMode interaction,
-                                      canopen::Mode position) noexcept TANDEM_RT;
+                                      const canopen::DriveAbilities& can) noexcept TANDEM_RT;
 /// The way back, for the mode display; kIdle for a mode that is none of ours.
 [[nodiscard]] std::pair<ControlMode, InteractionMode> image_mode(
     std::int8_t mode) noexcept TANDEM_RT;
 
 /// Everything but the controlword: references, feed-forward and mode (kIdle: the mode stays).
-/// @param position  as wire_mode() takes it
-void encode_command(const AxisScale& scale, canopen::Mode position, const CommandImage& command,
-                    std::size_t joint, RawCommand& raw) noexcept TANDEM_RT;
+void encode_command(const AxisScale& scale, const canopen::DriveAbilities& can,
+                    const CommandImage& command, std::size_t joint,
+                    RawCommand& raw) noexcept TANDEM_RT;
 /// The drive's values into the image, but acceleration, fault and age.
 void decode_feedback(const AxisScale& scale, const RawFeedback& raw, std::size_t joint,
                      StateImage& state) noexcept TANDEM_RT;

@@ -120,12 +120,13 @@ MotionSample AxisMaster::motion_sample(double dt_s) noexcept {
   MotionSample sample{.velocity_rad_s = feedback_.velocity / scale_.velocity_per_rad_s,
                       .torque_Nm = feedback_.torque / scale_.mille_per_Nm};
   const auto mode = static_cast<Mode>(raw_.mode);
-  const bool positions = mode == Mode::kCsp || mode == Mode::kIp;  // compliant: our boards watch
+  const bool positions = mode == traits_.can.position;  // compliant: our boards watch
   const double error_rad = counts_to(raw_.target_position) / scale_.counts_per_rad;
   const double approached_rad = watched_error_rad_ - error_rad;
   watched_error_rad_ = error_rad;
   const bool shown = !traits_.tells_mode || feedback_.mode_display == raw_.mode;
-  sample.follows = shown && watched_mode_ == raw_.mode && (positions || mode == Mode::kCsv);
+  sample.follows =
+      shown && watched_mode_ == raw_.mode && (positions || mode == traits_.can.velocity);
   watched_mode_ = shown ? raw_.mode : std::int64_t{0};
   sample.deviation_rad_s =
       positions ? approached_rad / dt_s
@@ -135,8 +136,7 @@ MotionSample AxisMaster::motion_sample(double dt_s) noexcept {
 
 /// In the position modes alone, and not while the drive changes its mode.
 bool AxisMaster::lags(std::int64_t now_ns) noexcept {
-  const auto mode = static_cast<canopen::Mode>(raw_.mode);
-  const bool positions = mode == canopen::Mode::kCsp || mode == canopen::Mode::kIp;
+  const bool positions = raw_.mode == static_cast<std::int8_t>(traits_.can.position);
   const bool shown = !traits_.tells_mode || feedback_.mode_display == raw_.mode;
   if (target_ != TargetState::kFollow || !was_enabled_ || !enabled() || !positions || !shown) {
     lag_.rest();
@@ -193,7 +193,10 @@ void AxisMaster::set_target(TargetState target, std::int64_t now_ns) noexcept TA
                          raw_.mode == static_cast<std::int8_t>(traits_.can.position);
     longest_step_ =
         follows ? step_from(previous_target_) + 1 : std::numeric_limits<std::int64_t>::max();
-    if (!follows) seed();
+    if (!follows) {
+      seed();
+      aim_ = resting_place(feedback_.position, feedback_.velocity);
+    }
   }
   if (target_ == TargetState::kHome && target == TargetState::kEnable) seed();
   if (target == TargetState::kReset || target == TargetState::kBringUp) emergency_code_ = 0;
@@ -206,6 +209,10 @@ void AxisMaster::set_target(TargetState target, std::int64_t now_ns) noexcept TA
 bool AxisMaster::command(const CommandImage* image, std::size_t joint,
                          std::int64_t now_ns) noexcept TANDEM_RT {
   previous_target_ = raw_.target_position;
+  if (!enabled()) {
+    offers_ = false;
+    last_set_point_ = kNoSetPoint;
+  }
   switch (target_) {
     case TargetState::kNothing:
       raw_.controlword = controlword::kCommandDisableVoltage;
@@ -240,7 +247,7 @@ void AxisMaster::follow(const CommandImage& image, std::size_t joint,
   }
   if (was_enabled_ || enabled()) {
     was_enabled_ = true;
-    encode_command(scale_, traits_.can.position, image, joint, raw_);
+    encode(image, joint);
     raw_.controlword = enable_operation();
     return;
   }
@@ -251,12 +258,14 @@ void AxisMaster::follow(const CommandImage& image, std::size_t joint,
 void AxisMaster::brake(const CommandImage* image, std::size_t joint) noexcept TANDEM_RT {
   const RawCommand kept = raw_;
   if (image != nullptr && is_stiff_position(*image, joint)) {
-    encode_command(scale_, traits_.can.position, *image, joint, raw_);
+    const std::int32_t aimed = aim_;
+    encode(*image, joint);
     const std::int64_t step = step_from(kept.target_position);
     if (step <= longest_step_) {
       longest_step_ = std::min(longest_step_, step + 1);  // the targets are rounded
       return;
     }
+    aim_ = aimed;
   }
   raw_ = kept;
   raw_.velocity_offset = 0;
@@ -338,11 +347,52 @@ void AxisMaster::walk_up(bool clears_faults, std::int64_t now_ns) noexcept {
   }
 }
 
-/// Interpolated position waits for bit 4 before it follows.
-std::uint16_t AxisMaster::enable_operation() const noexcept {
-  const bool interpolates = raw_.mode == static_cast<std::int8_t>(canopen::Mode::kIp);
-  return static_cast<std::uint16_t>(controlword::kCommandEnableOperation |
-                                    (interpolates ? controlword::kEnableInterpolation : 0u));
+/// Interpolated position waits for bit 4 before it follows, profile position for its edge.
+std::uint16_t AxisMaster::enable_operation() noexcept {
+  std::uint16_t bits = 0;
+  if (raw_.mode == static_cast<std::int8_t>(canopen::Mode::kIp)) {
+    bits = controlword::kEnableInterpolation;
+  } else if (raw_.mode == static_cast<std::int8_t>(canopen::Mode::kPp)) {
+    bits = hand_set_point_over();
+  }
+  return static_cast<std::uint16_t>(controlword::kCommandEnableOperation | bits);
+}
+
+/// One step of the handshake: bit 4 rises when the set-point has been on the wire for a cycle, and
+/// falls when the drive has taken it (bit 12). From then until it rises again the wire has the
+/// newest one.
+std::uint16_t AxisMaster::hand_set_point_over() noexcept {
+  const bool shown =
+      !traits_.tells_mode || feedback_.mode_display == static_cast<std::int8_t>(canopen::Mode::kPp);
+  const bool taken = (feedback_.statusword & canopen::statusword::kSetPointTaken) != 0;
+  if (!shown || !enabled()) {
+    offers_ = false;
+    last_set_point_ = kNoSetPoint;
+  } else if (offers_) {
+    offers_ = !taken;
+  } else if (!taken && last_set_point_ != set_point_) {
+    offers_ = true;
+    last_set_point_ = set_point_;
+  }
+  if (!offers_) set_point_ = aim_;
+  return static_cast<std::uint16_t>(controlword::kChangeAtOnce |
+                                    (offers_ ? controlword::kNewSetPoint : 0u));
+}
+
+void AxisMaster::encode(const CommandImage& image, std::size_t joint) noexcept {
+  encode_command(scale_, traits_.can, image, joint, raw_);
+  aim_ = resting_place(raw_.target_position, raw_.velocity_offset);
+}
+
+/// Where the joint would stand if it braked now. A drive that makes its own way to there passes the
+/// reference's place with the reference's speed; and if nothing more comes, it stops there.
+std::int32_t AxisMaster::resting_place(std::int32_t position,
+                                       std::int32_t velocity) const noexcept {
+  const double way_rad = traits_.profile.braking_way_rad(
+      scale_.from_zero(position) / scale_.counts_per_rad, velocity / scale_.velocity_per_rad_s);
+  const auto way = canopen::clamp_round<std::int32_t>(way_rad * scale_.counts_per_rad);
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(position) +
+                                   static_cast<std::uint32_t>(way));
 }
 
 /// Bit 7 off and on in turns: whenever the drive looks, there is an edge to come.
@@ -354,6 +404,8 @@ std::uint16_t AxisMaster::reset_controlword() noexcept {
 void AxisMaster::seed() noexcept {
   raw_.mode = static_cast<std::int8_t>(canopen::first_mode(traits_.can));
   raw_.target_position = feedback_.position;
+  aim_ = feedback_.position;
+  if (!offers_) set_point_ = aim_;
   raw_.velocity_offset = 0;
   raw_.torque_offset = 0;
   raw_.target_voltage = 0;
@@ -429,6 +481,7 @@ void AxisMaster::archive(Archive& ar) {
   ar(feedback_, raw_, target_, error_, heard_, was_enabled_, fault_code_, emergency_code_,
      age_cycles_, reset_cycles_, previous_velocity_, sample_ns_, trouble_ns_, since_ns_,
      acceleration_rad_s2_, scale_.zero_counts);
+  ar(aim_, set_point_, last_set_point_, offers_);
 }
 
 }  // namespace tandem::hal::can

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "base/realtime.hpp"
 #include "canopen/drive_abilities.hpp"
@@ -12,6 +13,7 @@
 #include "hal/ethercat-can/follow_watch.hpp"
 #include "hal/ethercat-can/homing_sequence.hpp"
 #include "hal/ethercat-can/motion_watch.hpp"
+#include "hal/ethercat-can/profile_limits.hpp"
 #include "hal/image.hpp"
 
 namespace tandem::hal::can {
@@ -40,6 +42,7 @@ struct AxisTraits {
   bool asks_cause = false;     ///< its error code (603F) is in no PDO, and may be read by SDO
   FollowLimits follow{};
   MotionLimits motion{};
+  ProfileLimits profile{};  ///< of a drive that moves in profile modes
 };
 
 class AxisMaster {
@@ -83,7 +86,11 @@ class AxisMaster {
   /// whole.
   [[nodiscard]] void* sample_variable(WireField field) noexcept { return sample_.variable(field); }
   /// Where a field of an RPDO comes from.
-  [[nodiscard]] void* command_variable(WireField field) noexcept { return raw_.variable(field); }
+  [[nodiscard]] void* command_variable(WireField field) noexcept {
+    const bool set_point =
+        field == WireField::kTargetPosition && traits_.can.position == canopen::Mode::kPp;
+    return set_point ? &set_point_ : raw_.variable(field);
+  }
   /// The axis' error code from an emergency of its board; `told`: warnings may tell it.
   void on_emergency(std::uint16_t code, bool told) noexcept TANDEM_RT {
     emergency_code_ = code;
@@ -169,7 +176,11 @@ class AxisMaster {
     return error_ == AxisError::kDriveFault &&
            fault_code_ == static_cast<std::uint16_t>(canopen::ErrorCode::kGeneric);
   }
-  [[nodiscard]] std::uint16_t enable_operation() const noexcept;
+  [[nodiscard]] std::uint16_t enable_operation() noexcept;
+  [[nodiscard]] std::uint16_t hand_set_point_over() noexcept;
+  void encode(const CommandImage& image, std::size_t joint) noexcept;
+  [[nodiscard]] std::int32_t resting_place(std::int32_t position,
+                                           std::int32_t velocity) const noexcept;
   [[nodiscard]] std::uint16_t reset_controlword() noexcept;
   void seed() noexcept;
   void brake(const CommandImage* image, std::size_t joint) noexcept TANDEM_RT;
@@ -184,6 +195,8 @@ class AxisMaster {
   bool reset_is_late(std::int64_t now_ns) noexcept;
   void go_home(const CommandImage* image, std::size_t joint, std::int64_t now_ns) noexcept;
 
+  static constexpr std::int64_t kNoSetPoint = std::numeric_limits<std::int64_t>::max();
+
   AxisScale scale_;
   AxisTraits traits_;
   RawFeedback feedback_;
@@ -197,9 +210,13 @@ class AxisMaster {
   double watched_error_rad_ = 0.0;  ///< of the position, at the last look at the motion
   std::int64_t watched_ns_ = 0;
   std::int64_t watched_mode_ = 0;
-  std::int32_t previous_target_ = 0;  ///< the target position before the one in `raw_`
-  std::int64_t longest_step_ = 0;     ///< kHold: that the target may go in a cycle [counts]
-  bool was_idle_ = false;             ///< kHome: the image has had the joint idle since
+  std::int32_t aim_ = 0;        ///< profile position: where the joint is to come to rest
+  std::int32_t set_point_ = 0;  ///< profile position: on the wire
+  std::int64_t last_set_point_ = kNoSetPoint;  ///< that was offered to the drive
+  bool offers_ = false;                        ///< bit 4 is set for it
+  std::int32_t previous_target_ = 0;           ///< the target position before the one in `raw_`
+  std::int64_t longest_step_ = 0;  ///< kHold: that the target may go in a cycle [counts]
+  bool was_idle_ = false;          ///< kHome: the image has had the joint idle since
   bool heard_ = false;
   bool ignored_stop_ = false;
   bool asked_ = false;        ///< for the cause of the fault that is latched

@@ -33,7 +33,8 @@ std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& lay
               (node.ethercat ||
                robot.boards[static_cast<std::size_t>(node.board)].sheet->find(cause) != nullptr),
           .follow = FollowLimits::of(robot.joints[node.joints[axis]], ours),
-          .motion = MotionLimits::of(robot.joints[node.joints[axis]])};
+          .motion = MotionLimits::of(robot.joints[node.joints[axis]]),
+          .profile = ProfileLimits::of(robot.joints[node.joints[axis]])};
     }
   }
   return traits;

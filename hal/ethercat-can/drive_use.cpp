@@ -39,23 +39,35 @@ std::string carrier(const NodePlan& node, WireField field) {
   return {};
 }
 
-std::string mode_text(Mode mode, const char* name, const std::string& target) {
-  return fmt::format("mode {} ({}), target {}", static_cast<int>(mode), name, target);
+const char* name_of(Mode mode) {
+  switch (mode) {
+    case Mode::kPp: return "profile position";
+    case Mode::kPv: return "profile velocity";
+    case Mode::kIp: return "interpolated position";
+    case Mode::kCsp: return "CSP";
+    case Mode::kCsv: return "CSV";
+    default: return "CST";
+  }
+}
+
+std::string mode_text(Mode mode, const std::string& target) {
+  return fmt::format("mode {} ({}), target {}", static_cast<int>(mode), name_of(mode), target);
 }
 
 void tell_modes(const NodePlan& node, DriveUse& use) {
   const canopen::DriveAbilities& can = node.abilities[0];
-  const auto tell = [&](const char* what, Mode mode, const char* name, WireField field) {
+  const bool profile = canopen::moves_by_profile(can);
+  const auto tell = [&](const char* what, Mode mode, WireField field) {
     if (mode == Mode::kNone) {
-      use.misses.push_back(fmt::format("{} control: no cyclic mode for it", what));
+      use.misses.push_back(
+          fmt::format("{} control: no {} for it", what, profile ? "mode" : "cyclic mode"));
     } else {
-      use.does.push_back({what, mode_text(mode, name, carrier(node, field))});
+      use.does.push_back({what, mode_text(mode, carrier(node, field))});
     }
   };
-  tell("position", can.position, can.position == Mode::kIp ? "interpolated position" : "CSP",
-       WireField::kTargetPosition);
-  tell("velocity", can.velocity, "CSV", WireField::kVelocityOffset);
-  tell("torque", can.torque, "CST", WireField::kTorqueOffset);
+  tell("position", can.position, WireField::kTargetPosition);
+  tell("velocity", can.velocity, WireField::kVelocityOffset);
+  tell("torque", can.torque, WireField::kTorqueOffset);
   if (can.one_mode) {
     use.misses.push_back("change of mode: 6060 cannot be in a PDO, the first mode stays");
   }
@@ -204,6 +216,18 @@ void warn_of_profile(const DataSheet& sheet, Diagnostics& warnings) {
        .key = "1000"});
 }
 
+/// "", or that it moves in profile modes, and in which.
+std::string profile_text(const DataSheet& sheet, int axis) {
+  const canopen::DriveAbilities can = canopen::abilities_of(sheet, axis);
+  if (!canopen::moves_by_profile(can)) return {};
+  std::string text = "by ramps of its own: ";
+  for (const Mode mode : {can.position, can.velocity}) {
+    if (mode == Mode::kNone) continue;
+    text += fmt::format("{} (mode {}), ", name_of(mode), static_cast<int>(mode));
+  }
+  return text + "no torque; ";
+}
+
 }  // namespace
 
 DriveUse use_of(const NodePlan& node, const DataSheet& sheet) {
@@ -257,6 +281,7 @@ std::vector<DriveFact> drive_facts(const RobotConfig& robot) {
     std::string how = own ? set_text(joint.stop_options)
                           : stops_text(*board->sheet, joint.axis, joint.stop_options);
     if (how.empty()) continue;
+    if (!own) how = profile_text(*board->sheet, joint.axis) + how;
     if (joint.brake && !own) how += "; its brake is the drive's own";
     if (joint.homing && !own) {
       how += fmt::format("; homed by method {}{}", joint.homing->method,

@@ -134,9 +134,12 @@ std::string profile_modes(const canopen::DataSheet& sheet, std::size_t axis) {
     const bool has = (modes.value_or(0) & canopen::mode_bit(mode)) != 0;
     if (has) names += (names.empty() ? "" : ", ") + std::string(name);
   }
-  return names.empty() ? ""
-                       : ". Its modes (6502) make their own way to a target (" + names +
-                             "), and cannot follow one that is new in every cycle";
+  return names.empty()
+             ? ""
+             : ". Its modes (6502) make their own way to a target (" + names +
+                   "). The master uses profile position with a 6081 and a ramp (6083 or 6084) "
+                   "that it can write, and profile velocity with a ramp and with a watch "
+                   "for a dead master (1016, or 100C and 100D)";
 }
 
 /// Errors: an axis cannot be switched on, seen or moved with what the PDOs carry.

@@ -223,19 +223,24 @@ std::optional<MappedField> object_of(const DataSheet& sheet, const DriveAbilitie
                                      WireField field, int axis) {
   const Finder find(sheet, axis);
   const bool follows = can.position == Mode::kCsp;
+  const bool profile = moves_by_profile(can);
   switch (field) {
     case WireField::kTargetPosition:
-      if (follows) return find(field, object::kTargetPosition, 0, kInteger32, kMapRpdo);
+      if (follows || can.position == Mode::kPp)
+        return find(field, object::kTargetPosition, 0, kInteger32, kMapRpdo);
       if (can.position == Mode::kIp)
         return find(field, object::kInterpolationData, 1, kInteger32, kMapRpdo);
       return {};
     case WireField::kVelocityOffset: {
+      if (can.velocity == Mode::kPv)
+        return find(field, object::kTargetVelocity, 0, kInteger32, kMapRpdo);
       if (!follows && can.velocity == Mode::kNone) return {};
       auto found = find(field, object::kVelocityOffset, 0, kInteger32, kMapRpdo);
       if (found || can.velocity == Mode::kNone) return found;
       return find(field, object::kTargetVelocity, 0, kInteger32, kMapRpdo);
     }
     case WireField::kTorqueOffset: {
+      if (profile) return {};
       if (!follows && can.velocity == Mode::kNone && can.torque == Mode::kNone) return {};
       auto found = find(field, object::kTorqueOffset, 0, kInteger16, kMapRpdo);
       if (found || can.torque == Mode::kNone) return found;

@@ -10,6 +10,7 @@
 #include "hal/ethercat-can/axis_codec.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "hal/ethercat-can/pdo_slots.hpp"
+#include "hal/ethercat-can/profile_limits.hpp"
 
 namespace tandem::hal::can {
 
@@ -210,7 +211,7 @@ void add_settings(AxisSteps& add, const RobotConfig& robot, const NodePlan& node
   add(object::kCommandTimeout, 0, clamp_round<std::uint16_t>(board.command_timeout_cycles));
 }
 
-/// The cyclic modes that the axis is used in must be among those that the drive itself names.
+/// The modes that the axis is used in must be among those that the drive itself names.
 void add_mode_check(Steps& steps, const DriveAbilities& can, bool homes, int axis) {
   std::uint32_t wanted = homes ? mode_bit(Mode::kHm) : 0;
   for (const Mode mode : {can.position, can.velocity, can.torque}) {
@@ -234,22 +235,42 @@ void add_unit_checks(Steps& steps, const DataSheet& sheet, const JointConfig& jo
   if (joint.velocity_of_sheet) check(units.velocity);
 }
 
+/// At least 1, in the drive's units.
+std::uint32_t rate_units(double per_rad, double rate) {
+  return std::max(1U, clamp_round<std::uint32_t>(rate * std::abs(per_rad)));
+}
+
+/// The joint's limits, by which a drive in profile modes makes its way.
+void add_profile(AxisSteps& add, const DataSheet& sheet, const AxisScale& scale,
+                 const JointConfig& joint) {
+  const auto set = [&](std::uint16_t index, auto value) {
+    if (writable(sheet, of_axis(index, joint.axis), 0)) add(index, 0, value);
+  };
+  const ProfileLimits most = ProfileLimits::of(joint);
+  const std::uint32_t velocity = rate_units(scale.velocity_per_rad_s, most.velocity_rad_s);
+  const std::uint32_t acceleration =
+      rate_units(scale.acceleration_per_rad_s2, most.acceleration_rad_s2);
+  set(object::kMotionProfileType, std::int16_t{0});
+  set(object::kMaxProfileVelocity, velocity);
+  set(object::kProfileVelocity, velocity);
+  set(object::kProfileAcceleration, acceleration);
+  set(object::kProfileDeceleration, acceleration);
+}
+
 /// A joint that is homed: its method and what the sheet has besides. Positions and speeds in the
 /// drive's counts.
 void add_homing(AxisSteps& add, const DataSheet& sheet, const AxisScale& scale,
                 const JointConfig& joint) {
   const HomingConfig& homing = *joint.homing;
-  const double counts = std::abs(scale.velocity_per_rad_s);
   const auto set = [&](std::uint16_t index, std::uint8_t sub, auto value) {
     if (writable(sheet, of_axis(index, joint.axis), sub)) add(index, sub, value);
   };
-  const auto rate = [&](double per_rad) {
-    return std::max(1U, clamp_round<std::uint32_t>(per_rad * counts));
-  };
+  const double velocities = scale.velocity_per_rad_s;
   set(object::kHomingMethod, 0, static_cast<std::int8_t>(homing.method));
-  set(object::kHomingSpeeds, 1, rate(homing.speed_rad_s));
-  set(object::kHomingSpeeds, 2, rate(homing.zero_speed_rad_s));
-  set(object::kHomingAcceleration, 0, rate(homing.acceleration_rad_s2));
+  set(object::kHomingSpeeds, 1, rate_units(velocities, homing.speed_rad_s));
+  set(object::kHomingSpeeds, 2, rate_units(velocities, homing.zero_speed_rad_s));
+  set(object::kHomingAcceleration, 0,
+      rate_units(scale.acceleration_per_rad_s2, homing.acceleration_rad_s2));
   set(object::kHomeOffset, 0,
       scale.to_drive(clamp_round<std::int32_t>(homing.position_rad * scale.counts_per_rad)));
 }
@@ -282,6 +303,7 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   if (can.settings) return add_settings(add, robot, node, joint);
   add_mode_check(steps, can, joint.homing.has_value(), static_cast<int>(axis));
   add_unit_checks(steps, sheet, joint);
+  if (moves_by_profile(can)) add_profile(add, sheet, AxisScale::of(robot, joint), joint);
   if (takes(object::kInterpolationPeriod, 1) && takes(object::kInterpolationPeriod, 2)) {
     const auto limits = InterpolationLimits::of(sheet, static_cast<int>(axis));
     add(object::kInterpolationPeriod, 1, std::uint8_t{0});

@@ -117,6 +117,7 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   axis.zero_counts = joint.zero_counts;
   axis.turn_counts = joint.encoder_turn_counts;
   axis.velocity_units_per_rev = joint.velocity_units_per_rev;
+  axis.acceleration_units_per_rev = joint.acceleration_units_per_rev;
   const auto [from_rad, to_rad] = home_switch_rad(joint);
   axis.home_switch_from_rad = from_rad;
   axis.home_switch_to_rad = to_rad;

@@ -17,6 +17,10 @@ AxisScale scale() {
   return AxisScale::of(joint);
 }
 
+constexpr canopen::DriveAbilities kCyclic{.position = canopen::Mode::kCsp,
+                                          .velocity = canopen::Mode::kCsv,
+                                          .torque = canopen::Mode::kCst};
+
 struct Codec : ::testing::Test {
   CommandImage command{ImageShape{.joints = 1, .sensor_channels = {}}};
   StateImage state{ImageShape{.joints = 1, .sensor_channels = {}}};
@@ -32,7 +36,7 @@ TEST_F(Codec, CommandsBecomeCountsAndPerMille) {
   command.voltage_V()[0] = 24.0;
   command.current_A()[0] = -0.014;
   command.stiffness_Nm_rad()[0] = 300.0;
-  encode_command(scale(), canopen::Mode::kCsp, command, 0, raw);
+  encode_command(scale(), kCyclic, command, 0, raw);
   EXPECT_EQ(raw.mode, 8);
   EXPECT_EQ(raw.target_position, -9000);
   EXPECT_EQ(raw.velocity_offset, 100);
@@ -48,7 +52,7 @@ TEST_F(Codec, CommandsAreClampedAndNeverWrapped) {
   command.torque_Nm()[0] = 1.0e9;
   command.current_A()[0] = std::nan("");
   command.stiffness_Nm_rad()[0] = 1.0e300;
-  encode_command(scale(), canopen::Mode::kCsp, command, 0, raw);
+  encode_command(scale(), kCyclic, command, 0, raw);
   EXPECT_EQ(raw.target_position, std::numeric_limits<std::int32_t>::max());
   EXPECT_EQ(raw.velocity_offset, std::numeric_limits<std::int32_t>::min());
   EXPECT_EQ(raw.torque_offset, 32767);
@@ -57,7 +61,7 @@ TEST_F(Codec, CommandsAreClampedAndNeverWrapped) {
 }
 
 TEST_F(Codec, PositionsGoByInterpolationWhereADriveHasNoCsp) {
-  encode_command(scale(), canopen::Mode::kIp, command, 0, raw);
+  encode_command(scale(), {.position = canopen::Mode::kIp}, command, 0, raw);
   EXPECT_EQ(raw.mode, 7);
   EXPECT_EQ(image_mode(7).first, ControlMode::kPosition);
 }
@@ -75,7 +79,7 @@ TEST_F(Codec, AZeroAndADirectionHoldAcrossTheCountersEnd) {
   command.position_rad()[0] = -10 * 2.0 * std::numbers::pi / 36000.0;
   command.velocity_rad_s()[0] = 2.0 * std::numbers::pi / 36000.0;
   command.torque_Nm()[0] = 5.0;
-  encode_command(turned, canopen::Mode::kCsp, command, 0, raw);
+  encode_command(turned, kCyclic, command, 0, raw);
   EXPECT_EQ(raw.target_position, kFirst + 1) << "ten counts up, past the last one";
   EXPECT_EQ(raw.velocity_offset, -1);
   EXPECT_EQ(raw.torque_offset, -100);
@@ -117,9 +121,9 @@ TEST_F(Codec, TheTurnOfASingleTurnEncoderIsTheOneOfTheJointsRange) {
 }
 
 TEST_F(Codec, IdleKeepsTheModeOfTheDrive) {
-  encode_command(scale(), canopen::Mode::kCsp, command, 0, raw);
+  encode_command(scale(), kCyclic, command, 0, raw);
   command.mode()[0] = static_cast<std::int8_t>(ControlMode::kIdle);
-  encode_command(scale(), canopen::Mode::kCsp, command, 0, raw);
+  encode_command(scale(), kCyclic, command, 0, raw);
   EXPECT_EQ(raw.mode, 8);
 }
 

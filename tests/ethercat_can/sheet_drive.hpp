@@ -2,7 +2,9 @@
 // own node and firmware, so that the master meets a stranger.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <utility>
@@ -29,16 +31,20 @@ class SheetDrive {
   bool answers_guarding = true;
   bool answers_late = false;  ///< every SDO answer comes a second time, later
   bool emergency_at_boot = false;
-  int homing_ms = 50;                 ///< from bit 4 until it is there; never in a negative time
-  bool homing_fails = false;          ///< then it says so by bit 13
-  bool knows_homing = true;           ///< it goes into mode 6
-  bool tells_states = false;          ///< its heartbeat comes at each change of state, too
-  int first_syncs_unanswered = 0;     ///< after each start
-  bool ignores_quick_stop = false;    ///< while it is enabled
-  int error = 0x8611;                 ///< 603F in a fault
-  bool stores = true;                 ///< 1010:1 keeps what was written over a reset
-  int writes = 0;                     ///< SDO downloads that it took
-  std::vector<std::uint32_t> aborts;  ///< that it answered
+  int homing_ms = 50;                    ///< from bit 4 until it is there; never in a negative time
+  bool homing_fails = false;             ///< then it says so by bit 13
+  bool knows_homing = true;              ///< it goes into mode 6
+  bool tells_states = false;             ///< its heartbeat comes at each change of state, too
+  int first_syncs_unanswered = 0;        ///< after each start
+  bool ignores_quick_stop = false;       ///< while it is enabled
+  int error = 0x8611;                    ///< 603F in a fault
+  int set_point_ms = 0;                  ///< mode 1: from bit 4 until it takes one
+  bool takes_set_points = true;          ///< mode 1
+  std::vector<std::int64_t> set_points;  ///< that it took
+  double fastest = 0.0;                  ///< modes 1 and 3 [counts/s]
+  bool stores = true;                    ///< 1010:1 keeps what was written over a reset
+  int writes = 0;                        ///< SDO downloads that it took
+  std::vector<std::uint32_t> aborts;     ///< that it answered
 
   [[nodiscard]] std::int64_t& value(int index, int sub = 0) {
     return values_[{static_cast<std::uint16_t>(index), static_cast<std::uint8_t>(sub)}];
@@ -244,7 +250,46 @@ class SheetDrive {
     constexpr std::array<int, 6> kStatusword{0, 0x0250, 0x0231, 0x0233, 0x0237, 0x0218};
     value(0x6041 + at) = kStatusword[static_cast<std::size_t>(state)];
     if (axis == 0 && state == 4 && value(0x6061) == 6) value(0x6041) |= home(cw);
+    if (axis == 0 && value(0x6061) == 1) value(0x6041) |= take_set_point(cw);
     value(0x603F + at) = state == 5 ? error : 0;
+  }
+  /// Profile position's handshake. @return bit 12 of the statusword
+  unsigned take_set_point(unsigned cw) {
+    const bool offered = state_[0] == 4 && (cw & 0x10) != 0;
+    if (state_[0] != 4) {
+      way_to_ = value(0x6064);
+      speed_ = 0.0;
+      acknowledges_ = false;
+    }
+    if (offered && (last_offer_ & 0x10) == 0) looks_in_ms_ = set_point_ms;
+    if (offered && looks_in_ms_ >= 0 && --looks_in_ms_ < 0 && takes_set_points) {
+      way_to_ = static_cast<std::int32_t>(value(0x607A));
+      set_points.push_back(way_to_);
+      acknowledges_ = true;
+    }
+    if (!offered) acknowledges_ = false;
+    last_offer_ = cw;
+    return acknowledges_ ? 0x1000u : 0u;
+  }
+  /// A millisecond of a way by 6081, 6083 and 6084, which ends at rest. Units are counts.
+  void go_on_way() {
+    const double left = static_cast<double>(way_to_) - static_cast<double>(value(0x6064)) - part_;
+    const auto down = static_cast<double>(value(0x6084));
+    const double most =
+        std::min(static_cast<double>(value(0x6081)), std::sqrt(2 * down * std::abs(left)));
+    approach(std::copysign(most, left), std::abs(left));
+  }
+  /// @param left  counts that it may still go
+  void approach(double wanted, double left) {
+    const bool slower = std::abs(wanted) < std::abs(speed_) || wanted * speed_ < 0.0;
+    const double step = static_cast<double>(value(slower ? 0x6084 : 0x6083)) * 1e-3;
+    speed_ += std::clamp(wanted - speed_, -step, step);
+    part_ += std::clamp(speed_ * 1e-3, -left, left);
+    const double whole = std::round(part_);
+    value(0x6064) += static_cast<std::int64_t>(whole);
+    part_ -= whole;
+    if (has(0x606C)) value(0x606C) = static_cast<std::int64_t>(speed_);
+    fastest = std::max(fastest, std::abs(speed_));
   }
   /// @return bits 10, 12 and 13 of the statusword. They stay until bit 4 rises again.
   unsigned home(unsigned cw) {
@@ -265,11 +310,14 @@ class SheetDrive {
     const int at = 0x800 * axis;
     auto mode = static_cast<std::int8_t>(value(0x6060 + at));
     if (mode == 6 && !knows_homing) mode = static_cast<std::int8_t>(value(0x6061));
+    if (mode == 1 && value(0x6061 + at) != 1) way_to_ = value(0x6064);
     value(0x6061 + at) = mode;
     const auto i32 = [&](int index, int sub = 0) {
       return has(index + at, sub) ? static_cast<std::int32_t>(value(index + at, sub)) : 0;
     };
     if (state_[axis] != 4) return;
+    if (mode == 1) go_on_way();
+    if (mode == 3) approach(i32(0x60FF), 1e9);
     if (mode == 8) value(0x6064 + at) = i32(0x607A);
     if (mode == 7 && (last_controlword_[axis] & 0x10) != 0) value(0x6064 + at) = i32(0x60C1, 1);
     if (mode == 9) value(0x6064 + at) += (i32(0x60FF) + i32(0x60B1)) / 1000;
@@ -289,6 +337,12 @@ class SheetDrive {
   unsigned last_homing_ = 0;
   unsigned homed_bits_ = 0;
   int homing_ = 0;  ///< [ms] that are left
+  unsigned last_offer_ = 0;
+  int looks_in_ms_ = -1;
+  bool acknowledges_ = false;
+  std::int64_t way_to_ = 0;
+  double speed_ = 0.0;  ///< counts/s
+  double part_ = 0.0;   ///< of a count
   std::array<int, 4> syncs_{};
   std::map<std::pair<std::uint16_t, std::uint8_t>, std::int64_t> values_, pending_, stored_;
   std::vector<Frame> late_;

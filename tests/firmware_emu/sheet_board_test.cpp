@@ -387,6 +387,36 @@ TEST(SheetBoard, TellsAndTakesVelocitiesInItsOwnUnits) {
   EXPECT_NEAR(rig.object<std::int32_t>(0x606C), 300, 30);
 }
 
+/// 50 revolutions of that motor per second and second are one of the joint: velocity units per
+/// second would be 60 times as many.
+TEST(SheetBoard, TakesAccelerationsInTheirOwnUnits) {
+  BoardSetup setup = stand_in(servo_with_profiles());
+  setup.axes[0].velocity_units_per_rev = 3000.0;
+  setup.axes[0].acceleration_units_per_rev = 50.0;
+  StandIn rig(setup);
+  ASSERT_EQ(rig.write(0x6083, 0, std::uint32_t{50}), 0U);
+  rig.enable_by_sdo(3);
+  ASSERT_EQ(rig.write(0x60FF, 0, std::int32_t{300}), 0U);
+  int periods = 2;
+  rig.cycles(2);
+  while (!rig.bit(10) && periods < 1000) rig.cycles(1), ++periods;
+  EXPECT_NEAR(periods, 100, 3) << "0.1 rev/s at 1 rev/s^2";
+}
+
+TEST(SheetBoard, EnabledAnewItForgetsTheSetPointOfBefore) {
+  StandIn rig(stand_in(servo_with_profiles()));
+  rig.enable_by_sdo(1);
+  ASSERT_EQ(rig.write(0x607A, 0, std::int32_t{200'000}), 0U);
+  rig.word(0x1F, 150);
+  rig.word(0x06, 1000);  // on its way
+  const std::int32_t rest = rig.position();
+  EXPECT_GT(rest, 5'000);
+  EXPECT_LT(rest, 150'000);
+  rig.word(0x07);
+  rig.word(0x0F, 1000);
+  EXPECT_NEAR(rig.position(), rest, 500);
+}
+
 TEST(SheetBoard, CountsByAScaleThatIsNotWhole) {
   BoardSetup setup = stand_in(servo_with_profiles());
   setup.axes[0].link_counts_per_rev = 1000.0 / 3.0;
