@@ -420,7 +420,7 @@ void add_flags(CLI::App& app, ModelOptions& o) {
 void add_flags(CLI::App& app, NewOptions& o) {
   app.add_option("urdf", o.urdf, "Robot description (URDF, or .xacro where xacro is installed)")
       ->required();
-  app.add_option("-o,--output", o.output, "Folder to write (default: the description's name)");
+  app.add_option("-o,--output", o.output, "Folder to write (default: the name of the URDF's file)");
   app.add_option("--lock", o.lock, "JOINT or JOINT=rad: it stands still there, or at 0; repeatable")
       ->allow_extra_args(false);
   app.add_option("--drop", o.drop,

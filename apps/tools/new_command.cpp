@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <map>
 
 #include "apps/robot/bundled.hpp"
 #include "apps/text/console.hpp"
@@ -152,14 +153,17 @@ Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
 
 /// The limit that every joint of a kind has, when it is a round one (1, 20, 500): such figures come
 /// with exporters, and not from a data sheet. 0: there is none.
-double common_limit(const model::Tree& tree, double model::Joint::*limit) {
+double common_limit(const scaffold::NewRobot& robot, double scaffold::JointLimits::*limit,
+                    bool scaffold::JointLimits::*guessed) {
   constexpr std::size_t kFewest = 4;
   std::size_t count = 0;
   double common = 0.0;
-  for (const model::Joint& joint : tree.joints) {
+  for (std::size_t j = 0; j < robot.limits.size(); ++j) {
+    const model::Joint& joint = robot.tree.joints[j];
     if (joint.follows() || joint.type == model::JointType::kPrismatic) continue;
-    if (count++ == 0) common = joint.*limit;
-    if (!(joint.*limit == common)) return 0.0;
+    const scaffold::JointLimits& own = robot.limits[j];
+    if (count++ == 0) common = own.*limit;
+    if (own.*guessed || !(own.*limit == common)) return 0.0;
   }
   if (count < kFewest || !(common > 0.0) || !std::isfinite(common)) return 0.0;
   const double power = std::pow(10.0, std::floor(std::log10(common)));
@@ -167,9 +171,10 @@ double common_limit(const model::Tree& tree, double model::Joint::*limit) {
   return std::abs(digit - std::round(digit)) < 1e-9 ? common : 0.0;
 }
 
-void add_placeholders(const model::Tree& tree, Facts& facts) {
-  const double velocity = common_limit(tree, &model::Joint::velocity);
-  const double effort = common_limit(tree, &model::Joint::effort);
+void add_placeholders(const scaffold::NewRobot& robot, Facts& facts) {
+  using Limits = scaffold::JointLimits;
+  const double velocity = common_limit(robot, &Limits::velocity, &Limits::velocity_guessed);
+  const double effort = common_limit(robot, &Limits::effort, &Limits::effort_guessed);
   if (velocity == 0.0 && effort == 0.0) return;
   std::string what = velocity == 0.0 ? "" : fmt::format("{:g} rad/s", velocity);
   if (effort != 0.0) what += (what.empty() ? "" : " and ") + fmt::format("{:g} Nm", effort);
@@ -178,11 +183,20 @@ void add_placeholders(const model::Tree& tree, Facts& facts) {
                                   what));
 }
 
+/// Links that --density gives no mass to, all of a reason together: frames have no shape.
+void add_bare(const NewSource& source, Facts& facts) {
+  std::map<std::string, std::vector<std::string>> by_reason;
+  for (const auto& [link, why] : source.bare) by_reason[why].push_back(link);
+  for (const auto& [why, links] : by_reason)
+    facts.add("mass", fmt::format("{}: none, for {}", fmt::join(links, ", "), why));
+}
+
 void add_facts(const scaffold::NewRobot& robot, const NewSource& source, Facts& facts) {
   facts.add("robot", fmt::format("{}: {}, {:.2f} kg", robot.config.name,
                                  counted(robot.config.joints.size(), "joint"), robot.mass_kg));
   for (const std::string& remark : robot.remarks) facts.add("", remark);
   for (const std::string& mass : source.masses) facts.add("mass", mass);
+  add_bare(source, facts);
   for (std::size_t f = 0; f < robot.feet.size(); ++f) {
     const scaffold::Foot& foot = robot.feet[f];
     facts.add("foot " + foot.name, fmt::format("{}, {}{}", robot.tree.links[foot.link].name,
@@ -196,7 +210,7 @@ void add_facts(const scaffold::NewRobot& robot, const NewSource& source, Facts& 
               (wrench ? "force/torque at " + sensor.config.joint : "IMU at " + sensor.config.link) +
                   (sensor.guess.empty() ? "" : " (guess)"));
   }
-  add_placeholders(robot.tree, facts);
+  add_placeholders(robot, facts);
   for (const scaffold::DriveSize& drive : robot.drives) {
     facts.add("drive " + drive.actuator.name,
               fmt::format("{}, {}", counted(drive.joints.size(), "joint"), drive.remark));
@@ -279,7 +293,7 @@ Diagnostics run(const NewOptions& options) {
                                             : scaffold::Base::kAuto;
   request.like = like ? &*like : nullptr;
   auto robot = scaffold::make_robot(request);
-  if (!robot) return of_options(robot.error());
+  if (!robot) return of_options(robot.error(), *source);
   robot->remarks.insert(robot->remarks.end(), source->remarks.begin(), source->remarks.end());
   Result<Draft> draft = Draft::folder(folder);
   if (!draft) return {draft.error()};

@@ -99,14 +99,18 @@ Status add_masses(const NewOptions& options, NewSource& source) {
   if (options.density_kg_m3 == 0.0) return {};
   const model::ShapeMasses found =
       model::masses_from_shapes(source.text, options.urdf, options.density_kg_m3);
+  if (!found.errors.empty()) {
+    Error error = found.errors.front();
+    if (!options.drop.empty() || is_xacro(options.urdf)) error.line = 0;  // of another text
+    return std::unexpected(std::move(error));
+  }
   std::vector<std::pair<std::string, model::Inertia>> inertias;
   for (const model::ShapeMass& one : found.links) {
     inertias.emplace_back(one.link, one.inertia);
     source.masses.push_back(
         fmt::format("{}: {:.4g} kg (guess: {})", one.link, one.inertia.mass_kg, one.from));
   }
-  for (const auto& [link, why] : found.without)
-    source.masses.push_back(fmt::format("{}: none, for {}", link, why));
+  source.bare.insert(found.without.begin(), found.without.end());
   if (inertias.empty()) {
     if (found.without.empty()) return {};
     return failed(options.urdf, "no link gets a mass by --density: " + found.without[0].second,
@@ -145,7 +149,9 @@ Result<NewSource> read_source(const NewOptions& options) {
     source.lock.push_back(std::move(*lock));
   }
   if (!options.drop.empty()) {
-    auto rest = model::without_limbs(source.text, options.drop);
+    std::vector<std::string> still;
+    for (const auto& [joint, position] : source.lock) still.push_back(joint);
+    auto rest = model::without_limbs(source.text, options.drop, still);
     if (!rest) {
       Error error = rest.error();
       error.file = options.urdf;
@@ -161,9 +167,16 @@ Result<NewSource> read_source(const NewOptions& options) {
   return source;
 }
 
-Diagnostics of_options(Diagnostics errors) {
+Diagnostics of_options(Diagnostics errors, const NewSource& source) {
   constexpr std::string_view kKey = "model.lock.";
   for (Error& error : errors) {
+    for (const auto& [link, why] : source.bare) {
+      const std::size_t begin = error.hint.find("'" + link + "' mass");
+      const std::size_t option = error.hint.find("--density, ");
+      if (begin == std::string::npos || option == std::string::npos) continue;
+      error.message += ": --density gives link '" + link + "' none, for " + why;
+      error.hint.erase(option, std::string_view("--density, ").size());
+    }
     if (!error.key.starts_with(kKey)) continue;
     error.key = "--lock " + error.key.substr(kKey.size());
     if (error.hint.find("[model.lock]") != std::string::npos) error.hint = "leave --lock out";

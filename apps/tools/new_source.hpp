@@ -2,6 +2,7 @@
 // Layer: apps/tools.  Thread: main.
 #pragma once
 
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,6 +19,7 @@ struct NewSource {
   std::vector<std::pair<std::string, double>> lock{};  ///< joint -> where it stands [rad or m]
   std::vector<std::string> remarks{};                  ///< what the options have changed
   std::vector<std::string> masses{};                   ///< of links, from their shapes
+  std::map<std::string, std::string> bare{};           ///< link without mass -> why, by --density
 };
 
 /// The name of a description's robot: "arm" of arm.urdf, arm.xacro and arm.urdf.xacro.
@@ -31,6 +33,7 @@ struct NewSource {
 
 /// Errors of locks that --lock has asked for, as the reader of robot.toml words them, with the
 /// option instead of the key.
-[[nodiscard]] Diagnostics of_options(Diagnostics errors);
+/// @param source  of what was read: where --density found no mass, the hint says why
+[[nodiscard]] Diagnostics of_options(Diagnostics errors, const NewSource& source);
 
 }  // namespace tandem::apps
