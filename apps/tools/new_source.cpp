@@ -102,11 +102,11 @@ Status add_masses(const NewOptions& options, NewSource& source) {
   std::vector<std::pair<std::string, model::Inertia>> inertias;
   for (const model::ShapeMass& one : found.links) {
     inertias.emplace_back(one.link, one.inertia);
-    source.masses.push_back(
-        fmt::format("{}: {:.4g} kg (guess: {})", one.link, one.inertia.mass_kg, one.from));
+    source.masses.emplace_back(one.link,
+                               fmt::format("{:.4g} kg (guess: {})", one.inertia.mass_kg, one.from));
   }
   for (const auto& [link, why] : found.without)
-    source.masses.push_back(fmt::format("{}: none, for {}", link, why));
+    source.masses.emplace_back(link, fmt::format("none, for {}", why));
   if (inertias.empty()) {
     if (found.without.empty()) return {};
     return failed(options.urdf, "no link gets a mass by --density: " + found.without[0].second,
@@ -115,6 +115,7 @@ Status add_masses(const NewOptions& options, NewSource& source) {
   auto text = model::with_inertias(source.text, inertias);
   if (!text) return std::unexpected(text.error());
   source.text = std::move(*text);
+  source.changed = true;
   source.remarks.push_back(fmt::format(
       "{} in the URDF beside this file: from shapes, at {:g} kg/m^3 (a guess).",
       counted(inertias.size(), "mass", "masses") + (inertias.size() == 1 ? " is" : " are"),
@@ -138,6 +139,7 @@ Result<NewSource> read_source(const NewOptions& options) {
   if (!text) return std::unexpected(text.error());
   source.copy = xacro ? robot_stem(options.urdf) + ".urdf" : source.name;
   source.text = std::move(*text);
+  source.changed = xacro;
   if (xacro) source.remarks.push_back(source.copy + " is what xacro makes of " + source.name + ".");
   for (const std::string& word : options.lock) {
     auto lock = read_lock(word);
@@ -153,6 +155,7 @@ Result<NewSource> read_source(const NewOptions& options) {
       return std::unexpected(std::move(error));
     }
     source.text = std::move(*rest);
+    source.changed = true;
     std::string names;
     for (const std::string& name : options.drop) names += (names.empty() ? "" : ", ") + name;
     source.remarks.push_back("Left out by --drop, with what hangs on it: " + names + ".");
