@@ -14,7 +14,7 @@
 #include "hal/config/following_error.hpp"
 #include "model/urdf.hpp"
 #include "scaffold/burden.hpp"
-#include "scaffold/described_damping.hpp"
+#include "scaffold/described_dynamics.hpp"
 #include "scaffold/firmness.hpp"
 #include "scaffold/ground.hpp"
 #include "scaffold/like.hpp"
@@ -161,6 +161,8 @@ Diagnostics Maker::read() {
     text_ = std::move(*text);
   }
   robot_.config.model.lock = request_.lock;
+  robot_.command =
+      request_.command.empty() ? "tandem new " + shell_word(request_.urdf) : request_.command;
   Diagnostics fewest;
   for (const bool repair : {false, true}) {
     robot_.config.model.repair_inertia = repair;
@@ -329,7 +331,7 @@ Status Maker::choose_drives() {
     take_drives(*request_.like, loads, torques, kControlPeriod_s, robot_);
   } else {
     robot_.drives = size_drives(robot_.tree, robot_.limits);
-    if (request_.damping) add_described_damping(robot_);
+    if (request_.dynamics) add_described_dynamics(robot_);
     robot_.gains = tune(robot_.drives, loads, {.period_s = kControlPeriod_s});
   }
   robot_.sensors = find_sensors(robot_.tree, outfit_);
@@ -404,6 +406,7 @@ void Maker::find_overloaded(const std::vector<double>& torques) {
 
 void Maker::warn_of_weakness(const std::vector<JointLoad>& loads,
                              const std::vector<double>& torques) {
+  std::ranges::move(undriven(robot_), std::back_inserter(robot_.warnings));
   if (const auto burden = overburdened(robot_, loads)) {
     const bool still = !robot_.move.swings && robot_.move.squat_m == 0.0;
     std::string remark = burden->told.message + (still ? "; move.toml keeps still." : ".");

@@ -433,7 +433,8 @@ void add_flags(CLI::App& app, NewOptions& o) {
   CLI::Option* like =
       app.add_option("--like", o.like,
                      "Series elastic drives in proportion to this robot's: its name or robot.toml");
-  app.add_flag("--dynamics", o.dynamics, "Put the damping of the URDF's <dynamics> into the drives")
+  app.add_flag("--dynamics", o.dynamics,
+               "Put damping and friction of the URDF's <dynamics> into the drives")
       ->excludes(like);
   app.add_option("--base", o.base, "Kind of base (default: floating if it has feet)")
       ->check(CLI::IsMember({"floating", "fixed"}));

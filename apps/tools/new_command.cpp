@@ -132,7 +132,22 @@ std::expected<robot::RobotFiles, Diagnostics> write(const scaffold::NewRobot& ro
   return read;
 }
 
-Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
+/// By link with mass: the mass, and whether --density made it. Links that it found none for have
+/// null.
+Json masses_json(const scaffold::NewRobot& robot, const NewSource& source) {
+  Json masses = Json::object();
+  for (const auto& [link, note] : source.masses)
+    masses[link] = {{"mass_kg", nullptr}, {"from", nullptr}, {"note", note}};
+  for (const model::Link& link : robot.tree.links) {
+    if (!(link.inertia.mass_kg > 0.0)) continue;
+    const bool guessed = masses.contains(link.name);
+    masses[link.name]["mass_kg"] = link.inertia.mass_kg;
+    masses[link.name]["from"] = guessed ? "density" : "urdf";
+  }
+  return masses;
+}
+
+Json to_json(const scaffold::NewRobot& robot, const NewSource& source, const std::string& folder) {
   Json feet = Json::array(), sensors = Json::array(), drives = Json::array();
   for (const scaffold::Foot& foot : robot.feet) feet.push_back(foot.name);
   for (const scaffold::FoundSensor& sensor : robot.sensors) sensors.push_back(sensor.config.name);
@@ -141,6 +156,7 @@ Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
           {"robot", robot.config.name},
           {"joints", robot.config.joints.size()},
           {"mass_kg", robot.mass_kg},
+          {"masses", masses_json(robot, source)},
           {"base", robot.config.model.floating_base ? "floating" : "fixed"},
           {"base_height_m", robot.stands_m},
           {"feet", feet},
@@ -183,20 +199,26 @@ void add_placeholders(const scaffold::NewRobot& robot, Facts& facts) {
                                   what));
 }
 
-/// Links that --density gives no mass to, all of a reason together: frames have no shape.
-void add_bare(const NewSource& source, Facts& facts) {
-  std::map<std::string, std::vector<std::string>> by_reason;
-  for (const auto& [link, why] : source.bare) by_reason[why].push_back(link);
-  for (const auto& [why, links] : by_reason)
-    facts.add("mass", fmt::format("{}: none, for {}", fmt::join(links, ", "), why));
+/// What --density has found; links that get nothing for one reason are together, for frames have no
+/// shape.
+void add_masses(const NewSource& source, Facts& facts) {
+  std::map<std::string, std::vector<std::string>> without;
+  for (const auto& [link, mass] : source.masses) {
+    if (mass.starts_with("none")) {
+      without[mass].push_back(link);
+    } else {
+      facts.add("mass", link + ": " + mass);
+    }
+  }
+  for (const auto& [why, links] : without)
+    facts.add("mass", fmt::format("{}: {}", fmt::join(links, ", "), why));
 }
 
 void add_facts(const scaffold::NewRobot& robot, const NewSource& source, Facts& facts) {
   facts.add("robot", fmt::format("{}: {}, {:.2f} kg", robot.config.name,
                                  counted(robot.config.joints.size(), "joint"), robot.mass_kg));
   for (const std::string& remark : robot.remarks) facts.add("", remark);
-  for (const std::string& mass : source.masses) facts.add("mass", mass);
-  add_bare(source, facts);
+  add_masses(source, facts);
   for (std::size_t f = 0; f < robot.feet.size(); ++f) {
     const scaffold::Foot& foot = robot.feet[f];
     facts.add("foot " + foot.name, fmt::format("{}, {}{}", robot.tree.links[foot.link].name,
@@ -232,6 +254,22 @@ void print_next(const std::string& folder, std::FILE* out) {
              shell_word(folder + "/hold.toml"), shell_word(folder + "/move.toml"), folder);
 }
 
+/// What makes the robot again, with what is added to it, in the same folder.
+std::string command_again(const NewOptions& options) {
+  std::string command = "tandem new " + shell_word(options.urdf);
+  const auto add = [&command](const char* option, const std::string& value) {
+    if (!value.empty()) command += fmt::format(" {} {}", option, shell_word(value));
+  };
+  add("-o", options.output);
+  add("--like", options.like);
+  add("--base", options.base);
+  for (const std::string& word : options.lock) add("--lock", word);
+  for (const std::string& word : options.drop) add("--drop", word);
+  if (options.density_kg_m3 != 0.0) add("--density", fmt::format("{:g}", options.density_kg_m3));
+  if (options.dynamics) command += " --dynamics";
+  return command + " --force";
+}
+
 /// What can be said of the input before it is read as XML.
 Diagnostics check_input(const std::string& file) {
   if (!is_utf8(fs::path(file).filename().string())) {
@@ -252,6 +290,13 @@ Diagnostics check_input(const std::string& file) {
   }
   return one("this is a TOML file: `tandem new` starts from a URDF",
              "`tandem run " + shell_word(file) + "` runs an experiment", file);
+}
+
+/// Errors of a text that the options have changed, and that is nowhere to be read: their lines
+/// would be taken for the file's.
+Diagnostics without_lines(Diagnostics errors) {
+  for (Error& error : errors) error.line = 0;
+  return errors;
 }
 
 /// Whether the robot may be written to `folder`.
@@ -286,14 +331,21 @@ Diagnostics run(const NewOptions& options) {
   request.urdf = options.urdf;
   request.text = source->text;
   request.lock = source->lock;
-  request.damping = options.dynamics;
+  request.dynamics = options.dynamics;
+  request.command = command_again(options);
   request.name = plain_name(fs::path(folder).lexically_normal().filename().string());
   request.base = options.base == "floating" ? scaffold::Base::kFloating
                  : options.base == "fixed"  ? scaffold::Base::kFixed
                                             : scaffold::Base::kAuto;
   request.like = like ? &*like : nullptr;
   auto robot = scaffold::make_robot(request);
-  if (!robot) return of_options(robot.error(), *source);
+  if (!robot) {
+    return of_options(source->changed ? without_lines(robot.error()) : robot.error(), *source);
+  }
+  if (source->changed) {  // lines are those of the copy
+    for (Error& warning : robot->warnings)
+      if (warning.file == options.urdf) warning.file = (fs::path(folder) / source->copy).string();
+  }
   robot->remarks.insert(robot->remarks.end(), source->remarks.begin(), source->remarks.end());
   Result<Draft> draft = Draft::folder(folder);
   if (!draft) return {draft.error()};
@@ -301,7 +353,7 @@ Diagnostics run(const NewOptions& options) {
   if (!written) return written.error();
   Facts facts;
   add_facts(*robot, *source, facts);
-  Json json = to_json(*robot, folder);
+  Json json = to_json(*robot, *source, folder);
   if (Status counted = add_right_angles(*written, facts, json); !counted) return {counted.error()};
   Kept kept;
   if (Status done = draft->place(

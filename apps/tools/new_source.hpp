@@ -2,7 +2,6 @@
 // Layer: apps/tools.  Thread: main.
 #pragma once
 
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,8 +17,9 @@ struct NewSource {
   std::string text;                                    ///< of that URDF
   std::vector<std::pair<std::string, double>> lock{};  ///< joint -> where it stands [rad or m]
   std::vector<std::string> remarks{};                  ///< what the options have changed
-  std::vector<std::string> masses{};                   ///< of links, from their shapes
-  std::map<std::string, std::string> bare{};           ///< link without mass -> why, by --density
+  bool changed = false;  ///< `text` is not the file's: lines are others
+  /// Links that --density has looked at, and what came of it: "3.14 kg (guess: 1 shape)".
+  std::vector<std::pair<std::string, std::string>> masses{};
 };
 
 /// The name of a description's robot: "arm" of arm.urdf, arm.xacro and arm.urdf.xacro.
