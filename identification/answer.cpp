@@ -228,6 +228,7 @@ class Answer {
     if (rows == nullptr)
       out.link_viscous_Nms_rad.identifiable = out.link_coulomb_Nm.identifiable = false;
     out.motor_viscous_Nms_rad = motor.viscous_Nms_rad;
+    out.motor_coulomb_Nm = motor.coulomb_Nm;
     out.viscous_Nms_rad = together(out.link_viscous_Nms_rad, motor.viscous_Nms_rad);
     out.coulomb_Nm = together(out.link_coulomb_Nm, motor.coulomb_Nm);
     out.offset_Nm = together(rows == nullptr ? Estimate{} : offset, motor.offset_Nm);

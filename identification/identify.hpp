@@ -64,8 +64,8 @@ struct JointResult {
   bool slides = false;
   bool behind_rotor = false;  ///< the torques hold nothing of the rotor, though there is no spring
   Estimate viscous_Nms_rad, coulomb_Nm, rotor_inertia_kg_m2, offset_Nm;
-  Estimate link_viscous_Nms_rad, link_coulomb_Nm;  ///< the share behind the torque measurement
-  Estimate motor_viscous_Nms_rad;                  ///< the share before it
+  Estimate link_viscous_Nms_rad, link_coulomb_Nm;    ///< the share behind the torque measurement
+  Estimate motor_viscous_Nms_rad, motor_coulomb_Nm;  ///< the share before it
   double delay_s = 0.0;              ///< by which the torque is sampled later than the position
   double rms_Nm = kUnknown;          ///< of the residual, on held-out data; NaN without
   double relative_error = kUnknown;  ///< over the torque, both as RMS; NaN without held-out data

@@ -1,7 +1,8 @@
-// LZ4 and Zstandard by their libraries; a chunk that claims more content than its bytes can hold is
-// refused before memory is taken.
+// LZ4, Zstandard and gzip by their libraries; a chunk that claims more content than its bytes can
+// hold is refused before memory is taken.
 #include "log/compression.hpp"
 
+#include <libdeflate.h>
 #include <lz4frame.h>
 #include <zstd.h>
 
@@ -48,6 +49,7 @@ std::string_view mcap_name(Compression compression) noexcept {
     case Compression::kNone: return "";
     case Compression::kLz4: return "lz4";
     case Compression::kZstd: return "zstd";
+    case Compression::kGzip: return "gzip";
   }
   return "";
 }
@@ -75,6 +77,7 @@ void compress(Compression compression, std::span<const std::byte> data, Bytes& o
       out.resize(ZSTD_compressBound(data.size()));
       out.resize(ZSTD_compress(out.data(), out.size(), data.data(), data.size(), 1));
       return;
+    case Compression::kGzip: out.clear(); return;  // nothing here packs by it
   }
 }
 
@@ -104,6 +107,8 @@ Compression packed_by(std::span<const std::byte> begin) noexcept {
     return begin.size() >= magic.size() &&
            std::memcmp(begin.data(), magic.data(), magic.size()) == 0;
   };
+  constexpr std::byte kGzip[] = {std::byte{0x1F}, std::byte{0x8B}, std::byte{8}};
+  if (begin.size() >= 4 && std::ranges::equal(begin.first(3), kGzip)) return Compression::kGzip;
   return is(kZstd) ? Compression::kZstd : is(kLz4) ? Compression::kLz4 : Compression::kNone;
 }
 
@@ -153,9 +158,60 @@ class Unpacker {
   std::size_t wanted_ = 1;
 };
 
+constexpr std::uint64_t kMostGzip = std::uint64_t{1} << 30;
+
+/// The library has no stream: a member is unpacked at once, into more room until it fits.
+/// @return what is behind the member
+Result<std::span<const std::byte>> gunzip_member(libdeflate_decompressor* gzip,
+                                                 std::span<const std::byte> packed, Bytes& out) {
+  constexpr std::uint64_t kDeflateGrowth = 1032;  // at most
+  const std::uint64_t most = std::min(kMostGzip, kDeflateGrowth * packed.size());
+  for (std::uint64_t room = std::min<std::uint64_t>(most, 4 * packed.size());;
+       room = std::min(most, 2 * room)) {
+    out.resize(room);
+    std::size_t used = 0, made = 0;
+    const libdeflate_result result = libdeflate_gzip_decompress_ex(
+        gzip, packed.data(), packed.size(), out.data(), out.size(), &used, &made);
+    if (result == LIBDEFLATE_SUCCESS) {
+      out.resize(made);
+      return packed.subspan(used);
+    }
+    if (result != LIBDEFLATE_INSUFFICIENT_SPACE)
+      return fail("its compressed data are damaged or cut");
+    if (room < most) continue;
+    if (most < kMostGzip) return fail("its compressed data are damaged or cut");
+    return fail("holds more than 1 GiB in gzip", "decompress it: gunzip");
+  }
+}
+
+Status gunzip(const PackedBytes& more, const TakeBytes& take) {
+  Bytes all, plain;
+  for (;;) {
+    auto packed = more();
+    if (!packed) return std::unexpected(packed.error());
+    if (packed->empty()) break;
+    if (all.size() + packed->size() > kMostGzip)
+      return fail("has more than 1 GiB in gzip", "decompress it: gunzip");
+    all.insert(all.end(), packed->begin(), packed->end());
+  }
+  const auto free = [](libdeflate_decompressor* one) { libdeflate_free_decompressor(one); };
+  const std::unique_ptr<libdeflate_decompressor, decltype(free)> gzip(
+      libdeflate_alloc_decompressor(), free);
+  if (gzip == nullptr) return fail("there is no memory to unpack it");
+  std::span<const std::byte> rest(all);
+  do {
+    auto behind = gunzip_member(gzip.get(), rest, plain);
+    if (!behind) return std::unexpected(behind.error());
+    if (Status taken = take(plain); !taken) return taken;
+    rest = *behind;
+  } while (std::ranges::any_of(rest, [](std::byte one) { return one != std::byte{0}; }));
+  return {};
+}
+
 }  // namespace
 
 Status unpack(Compression compression, const PackedBytes& more, const TakeBytes& take) {
+  if (compression == Compression::kGzip) return gunzip(more, take);
   constexpr std::size_t kPiece = std::size_t{1} << 17;
   Unpacker unpacker(compression);
   Bytes piece(kPiece);

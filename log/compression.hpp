@@ -12,7 +12,12 @@
 
 namespace tandem::log {
 
-enum class Compression : std::uint8_t { kNone, kLz4, kZstd };
+enum class Compression : std::uint8_t {
+  kNone,
+  kLz4,
+  kZstd,
+  kGzip,  ///< of whole files; no chunk has it
+};
 
 /// MCAP's name: "", "lz4", "zstd".
 [[nodiscard]] std::string_view mcap_name(Compression compression) noexcept;
@@ -28,7 +33,7 @@ void compress(Compression compression, std::span<const std::byte> data, Bytes& o
                                 std::uint64_t size, Bytes& out);
 
 /// What bytes are packed by, as whole files and rosbag2's messages are: by the first four of them.
-/// kNone: by neither.
+/// kNone: by none.
 [[nodiscard]] Compression packed_by(std::span<const std::byte> begin) noexcept;
 
 /// The next packed bytes; none at their end.
@@ -37,8 +42,9 @@ using PackedBytes = std::function<Result<std::span<const std::byte>>()>;
 /// how much there is.
 using TakeBytes = std::function<Status(std::span<const std::byte>)>;
 
-/// Unpacks frames whose content's size nobody says. Memory: zstd's window, at most 128 MiB.
-/// Errors: those of `more` and `take`; damaged or cut data.
+/// Unpacks frames whose content's size nobody says. Memory: zstd's window, at most 128 MiB; of gzip
+/// all of the file and what is in it, at most 1 GiB.
+/// Errors: those of `more` and `take`; damaged or cut data; more in gzip.
 /// @pre `compression` is not kNone
 [[nodiscard]] Status unpack(Compression compression, const PackedBytes& more,
                             const TakeBytes& take);

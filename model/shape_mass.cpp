@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <numbers>
 #include <sstream>
@@ -23,7 +24,8 @@ using tinyxml2::XMLElement;
 namespace fs = std::filesystem;
 
 constexpr double kPi = std::numbers::pi;
-constexpr int kLevels = 8;  // of folders above the description, in which a package may be
+constexpr double kLargest_m = 10.0;  // of a link
+constexpr int kLevels = 8;           // of folders above the description, in which a package may be
 
 Inertia solid(double mass_kg, const Vector3d& moments) {
   return {mass_kg, Vector3d::Zero(), moments.asDiagonal()};
@@ -96,7 +98,13 @@ Vector3d scale_of(const XMLElement& mesh) {
   return words && scale.allFinite() ? scale : Vector3d::Ones().eval();
 }
 
-Inertia box_around(const std::vector<Triangle>& surface, double density) {
+/// A shape's inertia in its own frame, and its longest side.
+struct Solid {
+  Inertia inertia;
+  double longest_m = 0.0;
+};
+
+Solid box_around(const std::vector<Triangle>& surface, double density) {
   Vector3d least = surface[0][0], most = surface[0][0];
   for (const Triangle& one : surface) {
     for (const Vector3d& corner : one) {
@@ -104,13 +112,24 @@ Inertia box_around(const std::vector<Triangle>& surface, double density) {
       most = most.cwiseMax(corner);
     }
   }
-  Inertia found = box(most - least, density);
-  found.com_m = 0.5 * (least + most);
+  Solid found{box(most - least, density), (most - least).maxCoeff()};
+  found.inertia.com_m = 0.5 * (least + most);
   return found;
 }
 
-/// The inertia of a mesh, in its own frame.
-Result<Inertia> solid_of(const XMLElement& mesh, const std::string& description, double density) {
+double longest_m(const Shape& shape) {
+  const Vector3d& s = shape.size_m;
+  switch (shape.kind) {
+    case Shape::Kind::kBox: return s.maxCoeff();
+    case Shape::Kind::kSphere: return 2.0 * s.x();
+    case Shape::Kind::kCylinder: return std::max(2.0 * s.x(), s.z());
+    case Shape::Kind::kCapsule: return 2.0 * s.x() + s.z();
+    case Shape::Kind::kMesh: break;
+  }
+  return 0.0;
+}
+
+Result<Solid> solid_of(const XMLElement& mesh, const std::string& description, double density) {
   const char* const text = mesh.Attribute("filename");
   const std::string name = text == nullptr ? "" : text;
   const std::string path = find_mesh(name, description);
@@ -122,10 +141,12 @@ Result<Inertia> solid_of(const XMLElement& mesh, const std::string& description,
   const Vector3d scale = scale_of(mesh);
   for (Triangle& one : *surface)
     for (Vector3d& corner : one) corner = corner.cwiseProduct(scale);
-  const Inertia around = box_around(*surface, density);
-  Inertia found = solid_within(*surface, density);
-  const bool fits = found.mass_kg > 0.01 * around.mass_kg && found.mass_kg <= around.mass_kg;
-  return fits && inertia_problem(found).empty() ? found : around;
+  Solid solid = box_around(*surface, density);
+  const Inertia found = solid_within(*surface, density);
+  const double box_kg = solid.inertia.mass_kg;
+  const bool fits = found.mass_kg > 0.01 * box_kg && found.mass_kg <= box_kg;
+  if (fits && inertia_problem(found).empty()) solid.inertia = found;
+  return solid;
 }
 
 class Masses {
@@ -160,20 +181,40 @@ class Masses {
       const XMLElement* const geometry = one->FirstChildElement("geometry");
       const XMLElement* const mesh =
           geometry == nullptr ? nullptr : geometry->FirstChildElement("mesh");
-      const auto found = mesh != nullptr ? solid_of(*mesh, file_, density_)
-                                         : Result<Inertia>(solid_of(shape, density_));
+      const auto found = mesh != nullptr
+                             ? solid_of(*mesh, file_, density_)
+                             : Result<Solid>({solid_of(shape, density_), longest_m(shape)});
       if (!found) {
         out_.without.emplace_back(name, found.error().message);
         continue;
       }
-      if (!(found->mass_kg > 0.0)) continue;
+      if (found->longest_m > kLargest_m) report_size(*one, mesh, name, found->longest_m);
+      if (!(found->inertia.mass_kg > 0.0)) continue;
       ++(mesh != nullptr ? meshes : shapes);
-      whole = whole + shape.in_link * *found;
+      whole = whole + shape.in_link * found->inertia;
     }
+    if (link.FirstChildElement(role) == nullptr)
+      out_.without.emplace_back(name, "it has no <collision> and no <visual>");
     if (shapes + meshes == 0) return;
     std::string from = shapes == 0 ? "" : counted(shapes, "shape");
     if (meshes != 0) from += (from.empty() ? "" : ", ") + counted(meshes, "mesh", "meshes");
     out_.links.push_back({name, whole, from});
+  }
+
+  void report_size(const XMLElement& element, const XMLElement* mesh, const std::string& link,
+                   double longest_m) {
+    char size[32];
+    std::snprintf(size, sizeof size, "%.3g m long", longest_m);
+    if (mesh == nullptr) {
+      out_.errors.push_back({std::string("its shape is ") + size + ", and takes no mass from that",
+                             "lengths are in metres", file_, element.GetLineNum(), "link " + link});
+      return;
+    }
+    const char* const name = mesh->Attribute("filename");
+    out_.errors.push_back(
+        {std::string("its mesh ") + (name == nullptr ? "" : name) + " is " + size +
+             ", and takes no mass from that: it is in millimetres, most likely",
+         "give the <mesh> scale=\"0.001 0.001 0.001\"", file_, mesh->GetLineNum(), "link " + link});
   }
 
   const std::string& file_;

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/result.hpp"
 #include "model/tree.hpp"
 
 namespace tandem::model {
@@ -21,6 +22,7 @@ struct ShapeMasses {
   std::vector<ShapeMass> links;
   /// Links without mass that stay so, and why: "tool: its mesh tool.dae is no STL".
   std::vector<std::pair<std::string, std::string>> without;
+  Diagnostics errors;  ///< shapes that are larger than any robot's: in millimetres, most likely
 };
 
 /// The masses of links that have no <inertial>, or mass 0: from collision shapes, or visual ones

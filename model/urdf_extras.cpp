@@ -13,7 +13,7 @@ std::map<std::string, JointExtras> joint_extras(std::string_view text) {
     const JointExtras& extras = joint.extras;
     const bool any = !std::isnan(extras.soft_lower) || !std::isnan(extras.soft_upper) ||
                      !std::isnan(extras.acceleration) || !std::isnan(extras.jerk) ||
-                     extras.damping != 0.0 || extras.friction != 0.0;
+                     extras.damping != 0.0 || extras.friction != 0.0 || extras.no_effort;
     if (any) all.emplace(joint.name, extras);
   }
   return all;

@@ -1,4 +1,5 @@
-// What a URDF says of its joints that is no part of the tree: soft limits, rates, damping.
+// What a URDF says of its joints that is no part of the tree: soft limits, rates, damping, and an
+// effort of 0.
 // Layer: model.  Thread: any, non-RT.
 #pragma once
 
@@ -18,6 +19,7 @@ struct JointExtras {
   double jerk = kNone;          ///< [rad/s^3 or m/s^3]
   double damping = 0.0;         ///< of <dynamics> [Nms/rad or Ns/m]
   double friction = 0.0;        ///< [Nm or N]
+  bool no_effort = false;       ///< an <limit effort> of 0, said and not left out
 };
 
 /// By joint; those that have none of it are left out.

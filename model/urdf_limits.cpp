@@ -94,6 +94,7 @@ void LimitsReader::read_limit(const XMLElement& limit, OutlineJoint& joint, cons
   if (joint.type != "continuous") read_range(limit, joint, key, warnings);
   joint.velocity = most(limit, "velocity", joint, key);
   joint.effort = most(limit, "effort", joint, key);
+  joint.extras.no_effort = limit.DoubleAttribute("effort", kNoLimit) == 0.0;
   const auto above_zero = [&](const char* name) {
     const double value = number(limit, name, kNoLimit, key);
     return value > 0.0 && value < kNoSize ? value : kNoLimit;
@@ -183,9 +184,9 @@ void LimitsReader::warn(Diagnostics& warnings) const {
   }
   if (damped_.joints.empty()) return;
   warnings.push_back({"the damping and friction of " + counted(damped_.joints.size(), "joint") +
-                          " (<dynamics>) is not used: a joint's damping is its actuator's",
-                      "damping_Nms_rad of [actuator.NAME] in robot.toml", file_, damped_.line,
-                      "dynamics"});
+                          " (<dynamics>) is not used: a joint's are its actuator's",
+                      "damping_Nms_rad and friction_Nm of [actuator.NAME] in robot.toml", file_,
+                      damped_.line, "dynamics"});
 }
 
 }  // namespace tandem::model

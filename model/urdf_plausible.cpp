@@ -1,12 +1,11 @@
 #include "model/urdf_plausible.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
 #include "base/counted.hpp"
+#include "model/density.hpp"
 #include "model/urdf.hpp"
 
 namespace tandem::model {
@@ -17,11 +16,6 @@ using Eigen::Vector3d;
 constexpr double kDensest_kg_m3 = 1e5;  // nine times lead
 constexpr double kSlack = 2.0;          // shapes may be smaller than the link: the Panda has 1.8
 constexpr double kLeast_m = 0.5;        // of a link whose size nothing says
-
-/// The volume of a solid ball with this radius of gyration.
-double ball_m3(double gyration_m) {
-  return 4.0 / 3.0 * std::numbers::pi * std::pow(gyration_m / std::sqrt(0.4), 3.0);
-}
 
 double half_size_m(const Shape& shape) {
   switch (shape.kind) {
@@ -95,16 +89,14 @@ class Plausibility {
     const double mass_kg = link.inertia.mass_kg;
     const bool counts = link.body != 0 || tree_.floating_base;
     if (!counts || !(mass_kg > kNegligibleMassShare * whole_kg)) return;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(link.inertia.about_com_kg_m2,
-                                                                Eigen::EigenvaluesOnly);
-    const double gyration_m = std::sqrt(std::max(0.0, solver.eigenvalues()[2]) / mass_kg);
+    const double gyration_m = largest_gyration_m(link.inertia);
     const double size_m = size_of(index);
     char text[96];
     if (gyration_m > size_m) {
       std::snprintf(text, sizeof text, "radius of gyration %.3g m, of a size of %.3g m", gyration_m,
                     size_m);
       note(wide, link.name, text);
-    } else if (gyration_m > 0.0 && mass_kg > kDensest_kg_m3 * ball_m3(gyration_m)) {
+    } else if (density_of_ball(link.inertia) > kDensest_kg_m3) {
       std::snprintf(text, sizeof text, "%.5g kg, radius of gyration %.3g m", mass_kg, gyration_m);
       note(dense, link.name, text);
     }

@@ -161,7 +161,7 @@ std::string edited(std::string_view text, std::vector<Edit> edits) {
 
 /// A joint's ends.
 struct Edge {
-  std::string joint, parent, child;
+  std::string joint, parent, child, leader;  // whom it mimics, or empty
 };
 
 std::vector<Edge> edges_of(const tinyxml2::XMLElement& robot) {
@@ -173,7 +173,8 @@ std::vector<Edge> edges_of(const tinyxml2::XMLElement& robot) {
   for (const auto* e = robot.FirstChildElement("joint"); e != nullptr;
        e = e->NextSiblingElement("joint")) {
     edges.push_back({value(e, "name"), value(e->FirstChildElement("parent"), "link"),
-                     value(e->FirstChildElement("child"), "link")});
+                     value(e->FirstChildElement("child"), "link"),
+                     value(e->FirstChildElement("mimic"), "joint")});
   }
   return edges;
 }
@@ -191,6 +192,12 @@ Result<std::string> first_dropped(const std::string& name, const std::vector<Edg
   return fail("the description has no link and no joint '" + name + "'", suggest(name, known));
 }
 
+std::unexpected<Error> orphaned(const Edge& edge) {
+  return fail(
+      "joint '" + edge.joint + "' mimics joint '" + edge.leader + "', which goes away",
+      "leave it out, too: --drop " + edge.joint + "; or let it stand still: --lock " + edge.joint);
+}
+
 /// The element with its line, where that has nothing else.
 Edit removed(std::string_view text, const Element& element) {
   Edit edit{element.begin, element.end, {}};
@@ -204,7 +211,8 @@ Edit removed(std::string_view text, const Element& element) {
 
 }  // namespace
 
-Result<std::string> without_limbs(std::string_view text, const std::vector<std::string>& names) {
+Result<std::string> without_limbs(std::string_view text, const std::vector<std::string>& names,
+                                  const std::vector<std::string>& still) {
   tinyxml2::XMLDocument document;
   const std::string plain = without_instructions(text);
   if (document.Parse(plain.data(), plain.size()) != tinyxml2::XML_SUCCESS ||
@@ -229,8 +237,19 @@ Result<std::string> without_limbs(std::string_view text, const std::vector<std::
   std::set<std::string> joints;
   for (const Edge& edge : edges)
     if (links.contains(edge.child)) joints.insert(edge.joint);
+  std::set<std::string> freed;  // joints that are left, and whose leader is not
+  for (const Edge& edge : edges) {
+    if (joints.contains(edge.joint) || !joints.contains(edge.leader)) continue;
+    if (std::ranges::find(still, edge.joint) == still.end()) return orphaned(edge);
+    freed.insert(edge.joint);
+  }
   const std::vector<Element> all = elements_of(text);
   std::vector<Edit> edits;
+  for (const Element& element : children(all, all.front(), "joint")) {
+    if (!freed.contains(name_attribute(text, element))) continue;
+    for (const Element& mimic : children(all, element, "mimic"))
+      edits.push_back(removed(text, mimic));
+  }
   for (const auto& [kind, gone] : {std::pair{"link", &links}, {"joint", &joints}}) {
     for (const Element& element : children(all, all.front(), kind))
       if (gone->contains(name_attribute(text, element))) edits.push_back(removed(text, element));

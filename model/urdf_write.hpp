@@ -20,10 +20,13 @@ namespace tandem::model {
     std::string_view text, const std::vector<std::pair<std::string, Inertia>>& inertias);
 
 /// `text` without these links and all that hangs on them, and without the joints to them. A joint's
-/// name stands for the link that it moves.
+/// name stands for the link that it moves. A joint of `still` stands still whatever it mimics: its
+/// <mimic> of a joint that goes away goes, too.
 ///
-/// Errors: no XML; a name that is not there, or the root's.
+/// Errors: no XML; a name that is not there, or the root's; another joint that is left mimics one
+/// that goes away.
 [[nodiscard]] Result<std::string> without_limbs(std::string_view text,
-                                                const std::vector<std::string>& names);
+                                                const std::vector<std::string>& names,
+                                                const std::vector<std::string>& still = {});
 
 }  // namespace tandem::model

@@ -409,7 +409,8 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configure
     const double x = begin_m + row.middle_m[s];
     figure.notes.push_back({samples[s].label, x, up_m.low - row.line_m});
     figure.notes.push_back(
-        {fmt::format("{:.2f} s", samples[s].time_s), x, up_m.low - 2.0 * row.line_m});
+        {fmt::format("{:.2f} s", std::abs(samples[s].time_s) < 0.005 ? 0.0 : samples[s].time_s), x,
+         up_m.low - 2.0 * row.line_m});
   }
   if (legged) figure.levels.push_back({"ground", robot.contact.height_m});
   for (Curve* curve : {&sticks.others, &sticks.trunk, &sticks.legs}) {

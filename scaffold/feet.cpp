@@ -145,7 +145,7 @@ ContactPatch shank_end(const Tree& tree, const Posed& neutral, int body, int& li
 
 /// No sole stays level at the end of a shank.
 void stand_on_the_middle(const Tree& tree, const Posed& neutral, Foot& foot, ContactPatch& patch) {
-  if (patch.points.size() < 3 || tree.path_to(foot.body).size() > kFewJoints) return;
+  if (patch.points.size() < 2 || tree.path_to(foot.body).size() > kFewJoints) return;
   int link = foot.link;
   if (shank_end(tree, neutral, foot.body, link).points.empty()) return;
   Vector3d middle = Vector3d::Zero();
@@ -255,6 +255,23 @@ Vector3d direction_down(const Tree& tree, const std::vector<Foot>& feet, const P
   const double most = way.cwiseAbs().maxCoeff(&axis);
   if (most < kOneWay * length) return -Vector3d::UnitZ();
   return Vector3d::Unit(axis) * (way[axis] > 0.0 ? 1.0 : -1.0);
+}
+
+Vector3d direction_ahead_of(const Tree& tree, const std::vector<Foot>& feet, const Posed& neutral,
+                            const Vector3d& down) {
+  Vector3d turning = Vector3d::Zero(), reach = Vector3d::Zero();
+  for (const Foot& foot : feet) {
+    for (const int j : tree.path_to(foot.body))
+      if (!neutral.slides(j)) turning += neutral.axis(j).cwiseAbs();
+    reach += (neutral.body(foot.body) * tree.bodies[foot.body].inertia).com_m -
+             neutral.origin(foot.body - 1);
+  }
+  turning -= turning.cwiseProduct(down.cwiseAbs());
+  Eigen::Index across = 0;
+  turning.maxCoeff(&across);
+  const Vector3d along = down.cross(Vector3d::Unit(across)).cwiseAbs();
+  constexpr double kLeast_m = 0.005;  // of a reach
+  return reach.dot(along) < -kLeast_m * static_cast<double>(feet.size()) ? Vector3d(-along) : along;
 }
 
 Vector3d direction_ahead(const std::vector<Foot>& feet, const Posed& neutral) {

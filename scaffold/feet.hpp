@@ -20,6 +20,12 @@ struct Foot {
   std::string guess;                    ///< what was assumed; empty: the description has it
 
   [[nodiscard]] bool flat() const { return points.size() > 2; }
+  /// A cylinder that lies: it touches the ground along this [m], of any length; 0: it does not.
+  [[nodiscard]] Eigen::Vector3d line() const {
+    return points.size() == 2 ? Eigen::Vector3d(points[0] - points[1]) : Eigen::Vector3d::Zero();
+  }
+  /// What a posture has to fulfil for it to stand: place, and what keeps it level.
+  [[nodiscard]] int conditions() const { return flat() ? 6 : points.size() == 2 ? 4 : 3; }
 };
 
 enum class FeetBy : std::uint8_t {
@@ -34,6 +40,12 @@ enum class FeetBy : std::uint8_t {
 /// Along which of the root's axes the legs lie: -z, or another one when nearly all of them do.
 [[nodiscard]] Eigen::Vector3d direction_down(const model::Tree& tree, const std::vector<Foot>& feet,
                                              const Posed& neutral);
+
+/// Where a robot looks whose legs lie along `down`: across the axes about which most of the legs'
+/// joints turn, to the side to which its feet reach; one of the root's axes.
+[[nodiscard]] Eigen::Vector3d direction_ahead_of(const model::Tree& tree,
+                                                 const std::vector<Foot>& feet,
+                                                 const Posed& neutral, const Eigen::Vector3d& down);
 
 /// Where the robot looks, by model::direction_ahead(): one of the root's axes, in W.
 [[nodiscard]] Eigen::Vector3d direction_ahead(const std::vector<Foot>& feet, const Posed& neutral);

@@ -180,17 +180,19 @@ std::optional<Error> falls_over(const NewRobot& robot, const VectorXd& q) {
   const hal::JointConfig& joint = robot.config.joints[static_cast<std::size_t>(
       robot.config.joint_index(robot.tree.joints[softest].name))];
   const double has = stiffness_of(robot, softest);
-  return Error{
-      .message =
-          fmt::format("it holds with {:.3g} Nm/rad, and the robot needs {:.3g} to stand: with "
-                      "joints as soft as these it falls over",
-                      has, has * *times),
-      .hint = fmt::format("make [actuator.{}] spring_Nm_rad and [gains.{}] position in robot.toml "
-                          "at least {:.2g} times as stiff, better twice that",
-                          joint.actuator, joint.gains, *times),
-      .file = robot.tree.file,
-      .line = robot.tree.joints[softest].line,
-      .key = "joint " + joint.name};
+  const bool sprung = robot.config.actuator_of(joint).order >= 2;
+  return Error{.message = fmt::format(
+                   "it holds with {:.3g} Nm/rad, and the robot needs {:.3g} to stand: with "
+                   "joints as soft as these it falls over",
+                   has, has * *times),
+               .hint = fmt::format(
+                   "make {}[gains.{}] position in robot.toml at least {:.2g} times as "
+                   "stiff, better twice that",
+                   sprung ? fmt::format("[actuator.{}] spring_Nm_rad and ", joint.actuator) : "",
+                   joint.gains, *times),
+               .file = robot.tree.file,
+               .line = robot.tree.joints[softest].line,
+               .key = "joint " + joint.name};
 }
 
 }  // namespace tandem::scaffold

@@ -80,7 +80,7 @@ void scale(hal::PidGains& gains, double factor) {
 hal::ActuatorConfig scaled(hal::ActuatorConfig a, double s) {
   a.resistance_ohm = rounded(a.resistance_ohm / s);
   a.inductance_H = rounded(a.inductance_H / s);
-  for (double* value : {&a.inertia_kg_m2, &a.damping_Nms_rad, &a.spring_Nm_rad,
+  for (double* value : {&a.inertia_kg_m2, &a.damping_Nms_rad, &a.friction_Nm, &a.spring_Nm_rad,
                         &a.spring_damping_Nms_rad, &a.current_limit_A, &a.continuous_current_A}) {
     *value = rounded(*value * s);
   }

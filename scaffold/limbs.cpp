@@ -89,18 +89,22 @@ class Namer {
       : tree_(tree), neutral_(neutral), ahead_(ahead), limbs_(limbs) {
     for (std::size_t b = 0; b < tree.bodies.size(); ++b) {
       size_ = std::max(size_, neutral.body(static_cast<int>(b)).p.norm());
-      for (const Limb& limb : limbs) legs_ += b == 0 && limb.foot >= 0 ? 1 : 0;
     }
+    for (const Limb& limb : limbs) legs_ += limb.foot >= 0 ? 1 : 0;
+    for (const Limb& limb : limbs)
+      if (limb.foot >= 0) middle_ += tip_of(limb) / static_cast<double>(legs_);
   }
 
   [[nodiscard]] std::string name(const Limb& limb) const {
     std::string kind = kind_of(limb);
     if (kind == "torso" || kind == "head" || limbs_.size() == 1) return kind;
-    const Vector3d tip = neutral_.beyond(limb.joints.back()).com_m;
     const Vector3d left = Vector3d::UnitZ().cross(ahead_);
+    double aside = tip_of(limb).dot(left);
+    if (kind == "leg") aside -= middle_.dot(left);
     std::string side;
-    if (tip.dot(left) > kAside * size_) side = "left_";
-    if (tip.dot(left) < -kAside * size_) side = "right_";
+    if (aside > kAside * size_) side = "left_";
+    if (aside < -kAside * size_) side = "right_";
+    if (kind == "leg" && side.empty()) side = told_side(limb);
     if (kind == "leg" && legs_ > 2) {
       const double x = (neutral_.origin(limb.joints.front()) - neutral_.whole().com_m).dot(ahead_);
       side += x >= 0.0 ? "front_" : "hind_";
@@ -109,6 +113,18 @@ class Namer {
   }
 
  private:
+  [[nodiscard]] Vector3d tip_of(const Limb& limb) const {
+    return neutral_.beyond(limb.joints.back()).com_m;
+  }
+  /// The side in the names of its links, where legs stand one behind the other.
+  [[nodiscard]] std::string told_side(const Limb& limb) const {
+    for (const int j : limb.joints) {
+      const std::string& name = tree_.bodies[j + 1].name;
+      if (has_word(name, "left") || has_word(name, "l")) return "left_";
+      if (has_word(name, "right") || has_word(name, "r")) return "right_";
+    }
+    return {};
+  }
   [[nodiscard]] std::string kind_of(const Limb& limb) const {
     if (limb.foot >= 0) return "leg";
     for (const Limb& other : limbs_) {
@@ -128,14 +144,17 @@ class Namer {
   const std::vector<Limb>& limbs_;
   double size_ = 0.0;
   int legs_ = 0;
+  Vector3d middle_ = Vector3d::Zero();  ///< of the legs' tips
 };
 
 std::string foot_name(const std::string& limb, bool flat, std::size_t feet) {
   if (flat && feet == 2 && limb == "left_leg") return "l_sole";  // what controllers look for
   if (flat && feet == 2 && limb == "right_leg") return "r_sole";
+  const std::string kind = flat ? "sole" : "foot";
   std::string name = limb;
-  if (const std::size_t at = name.find("leg"); at != std::string::npos) name.erase(at, 3);
-  return name + (flat ? "sole" : "foot");
+  if (const std::size_t at = name.find("leg"); at != std::string::npos)
+    return name.replace(at, 3, kind);
+  return name + kind;
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 // series, and limits where the description has no usable ones.
 #include "scaffold/loads.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -154,6 +156,28 @@ std::vector<JointLimits> limits_of(const Tree& tree, const std::vector<JointLoad
     if (limit.effort_guessed) limit.effort = next_size(limit.effort);
   }
   return limits;
+}
+
+std::string replaced_limits(const Tree& tree, const std::vector<JointLimits>& limits) {
+  std::string first;
+  std::size_t count = 0;
+  for (std::size_t j = 0; j < limits.size(); ++j) {
+    const model::Joint& joint = tree.joints[j];
+    if (joint.follows()) continue;
+    std::vector<std::string> what;
+    const bool slid = slides(joint);
+    if (limits[j].effort_guessed && joint.effort > 0.0 && std::isfinite(joint.effort))
+      what.push_back(fmt::format("an effort of {:g} {}", joint.effort, slid ? "N" : "Nm"));
+    if (limits[j].velocity_guessed && joint.velocity > 0.0 && std::isfinite(joint.velocity))
+      what.push_back(fmt::format("a speed of {:g} {}", joint.velocity, slid ? "m/s" : "rad/s"));
+    if (what.empty()) continue;
+    if (count++ == 0) {
+      first = fmt::format("Limits are guessed: {} {} (joint {})", fmt::join(what, " and "),
+                          what.size() == 1 ? "is none" : "are none", joint.name);
+    }
+  }
+  if (count == 0) return {};
+  return first + (count == 1 ? "." : fmt::format(", and so with {} more.", count - 1));
 }
 
 }  // namespace tandem::scaffold

@@ -2,6 +2,7 @@
 // Layer: scaffold.  Thread: any, non-RT.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "scaffold/feet.hpp"
@@ -48,5 +49,10 @@ struct JointLimits {
 /// what its neighbours in the tree have.
 [[nodiscard]] std::vector<JointLimits> limits_of(const model::Tree& tree,
                                                  const std::vector<JointLoad>& loads);
+
+/// A sentence on the description's figures that limits_of() has not used, beyond all that a robot
+/// has; empty: there are none.
+[[nodiscard]] std::string replaced_limits(const model::Tree& tree,
+                                          const std::vector<JointLimits>& limits);
 
 }  // namespace tandem::scaffold

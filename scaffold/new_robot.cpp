@@ -10,9 +10,11 @@
 #include <limits>
 
 #include "base/open_file.hpp"
+#include "base/quoting.hpp"
 #include "hal/config/following_error.hpp"
 #include "model/urdf.hpp"
-#include "scaffold/described_damping.hpp"
+#include "scaffold/burden.hpp"
+#include "scaffold/described_dynamics.hpp"
 #include "scaffold/firmness.hpp"
 #include "scaffold/ground.hpp"
 #include "scaffold/like.hpp"
@@ -36,40 +38,56 @@ struct Overload {
   Error told;
 };
 
-/// What turns the root so that `down` points down, as a URDF has it.
-std::string upright_rpy(const Eigen::Vector3d& down) {
-  constexpr const char* kQuarter = "1.570796327";
-  if (down.z() > 0.5) return "3.141592654 0 0";
-  const std::string sign = down.x() < -0.5 || down.y() > 0.5 ? "-" : "";
-  return std::abs(down.y()) > 0.5 ? sign + kQuarter + " 0 0" : "0 " + sign + kQuarter + " 0";
+/// What turns the root so that `down` points down and `ahead` along x, as a URDF has it; both are
+/// axes of the root.
+std::string upright_rpy(const Eigen::Vector3d& down, const Eigen::Vector3d& ahead) {
+  Eigen::Matrix3d R;  // its rows: the new axes in the old ones
+  R << ahead.transpose(), ahead.cross(down).transpose(), -down.transpose();
+  const bool steep = std::abs(R(2, 0)) > 0.5;
+  const double pitch = std::asin(-R(2, 0));
+  const double yaw = steep ? 0.0 : std::atan2(R(1, 0), R(0, 0));
+  const double roll = steep ? std::atan2(pitch * R(0, 1), R(1, 1)) : std::atan2(R(2, 1), R(2, 2));
+  return fmt::format("{:.10g} {:.10g} {:.10g}", roll + 0.0, pitch + 0.0, yaw + 0.0);
+}
+
+/// "+x" of the root's axes.
+std::string axis_name(const Eigen::Vector3d& axis) {
+  Eigen::Index index = 0;
+  axis.cwiseAbs().maxCoeff(&index);
+  return std::string(axis[index] > 0.0 ? "+" : "-") + "xyz"[index];
 }
 
 /// A robot whose legs lie along another axis of its root than -z would be laid on its side.
-Error lies(const std::string& root, const Eigen::Vector3d& down) {
-  const char axis = "xyz"[down.cwiseAbs().maxCoeff() == std::abs(down.x())   ? 0
-                          : down.cwiseAbs().maxCoeff() == std::abs(down.y()) ? 1
-                                                                             : 2];
-  const char sign = down.sum() > 0.0 ? '+' : '-';
-  return {.message = fmt::format("the legs lie along {}{} of the root '{}' and not along -z: the "
+Error lies(const std::string& root, const Eigen::Vector3d& down, const Eigen::Vector3d& ahead) {
+  return {.message = fmt::format("the legs lie along {} of the root '{}' and not along -z: the "
                                  "robot would lie on the ground",
-                                 sign, axis, root),
+                                 axis_name(down), root),
           .hint = fmt::format(
               "put a root with z up before it: <link name=\"upright\"/> <joint "
               "name=\"to_upright\" type=\"fixed\"><origin rpy=\"{}\"/><parent "
-              "link=\"upright\"/><child link=\"{}\"/></joint>; or give --base floating to take it "
-              "as it is, --base fixed to do without feet",
-              upright_rpy(down), root),
+              "link=\"upright\"/><child link=\"{}\"/></joint> (it looks along its {}, as its "
+              "joints and "
+              "feet have it; to another side with another last number); or give --base floating "
+              "to take it as it is, --base fixed to do without feet",
+              upright_rpy(down, ahead), root, axis_name(ahead)),
           .file = {},
           .line = 0,
           .key = {}};
 }
 
-/// Errors of a description whose root moves, read as one that is fixed: no fault of the file.
-bool wants_to_float(const Diagnostics& errors) {
-  return std::ranges::any_of(errors, [](const Error& error) {
-    return error.message.find("of type 'floating' lets the base move") != std::string::npos;
-  });
+/// The joint that lets the root move, of errors of a description that was read as one that is
+/// fixed; empty: there is none.
+std::string floating_joint(const Diagnostics& errors) {
+  constexpr std::string_view kKey = "joint ";
+  for (const Error& error : errors) {
+    if (error.message.find("of type 'floating' lets the base move") != std::string::npos)
+      return error.key.starts_with(kKey) ? error.key.substr(kKey.size()) : error.key;
+  }
+  return {};
 }
+
+/// Such errors are no fault of the file.
+bool wants_to_float(const Diagnostics& errors) { return !floating_joint(errors).empty(); }
 
 /// Decides one thing after the other; each step may use what the steps before have found.
 class Maker {
@@ -105,7 +123,7 @@ class Maker {
   Status look_at_angles();
   Status wire_up();
   void find_overloaded(const std::vector<double>& torques);
-  void warn_of_weakness(const std::vector<double>& torques);
+  void warn_of_weakness(const std::vector<JointLoad>& loads, const std::vector<double>& torques);
   Status check_down(const Posed& neutral, bool asked);
   void firm_up(const std::vector<JointLoad>& loads);
   void retune(const std::vector<JointLoad>& loads, const Tuning& tuning);
@@ -122,7 +140,7 @@ class Maker {
   std::optional<Standing> standing_;
   Eigen::VectorXd q_;
   std::vector<Overload> overloaded_;
-  bool must_float_ = false;  ///< the description has a floating joint at its root
+  std::string floating_;  ///< the description's floating joint at its root, or empty
 };
 
 std::expected<model::UrdfModel, Diagnostics> Maker::read_tree(bool floating, bool exact) const {
@@ -143,11 +161,14 @@ Diagnostics Maker::read() {
     text_ = std::move(*text);
   }
   robot_.config.model.lock = request_.lock;
+  robot_.command =
+      request_.command.empty() ? "tandem new " + shell_word(request_.urdf) : request_.command;
   Diagnostics fewest;
   for (const bool repair : {false, true}) {
     robot_.config.model.repair_inertia = repair;
     for (const bool floating : {false, true}) {
       auto found = read_tree(floating);
+      if (!found && !floating) floating_ = floating_joint(found.error());
       if (!found) {
         const bool better =
             fewest.empty() || wants_to_float(fewest) || found.error().size() < fewest.size();
@@ -155,7 +176,7 @@ Diagnostics Maker::read() {
         if (better && judged) fewest = found.error();
         continue;
       }
-      must_float_ = floating;
+      if (!floating) floating_.clear();
       return take(std::move(*found));
     }
   }
@@ -206,10 +227,11 @@ void Maker::narrow_to_soft_limits() {
 Status Maker::choose_base() {
   const Posed posed(robot_.tree, neutral_posture(robot_.tree));
   const bool heavy = robot_.tree.bodies[0].inertia.mass_kg > 0.0;
-  const bool asked = request_.base == Base::kFloating || must_float_;
-  if (must_float_ && request_.base == Base::kFixed) {
-    return fail("the description's root moves by a floating joint",
-                "leave --base out, or make that joint fixed");
+  const bool asked = request_.base == Base::kFloating || !floating_.empty();
+  const std::string lock = "--lock " + shell_word(floating_);
+  if (!floating_.empty() && request_.base == Base::kFixed) {
+    return fail("the description's root moves by the floating joint '" + floating_ + "'",
+                "fix it by " + lock + ", or leave --base out, if the robot stands on feet");
   }
   if (request_.base != Base::kFixed && heavy) {
     robot_.feet = find_feet(robot_.tree, posed, FeetBy::kName);
@@ -224,7 +246,9 @@ Status Maker::choose_base() {
   const bool floating = !robot_.feet.empty();
   if (!floating && asked) {
     const std::string& root = robot_.tree.bodies[0].name;
-    const std::string hint = must_float_ ? "" : "give --base fixed, or leave --base out; or ";
+    const std::string hint = !floating_.empty()
+                                 ? "fix the floating joint at its root by " + lock + "; or "
+                                 : "give --base fixed, or leave --base out; or ";
     if (!heavy) {
       return fail("the root link '" + root + "' has no mass, so it cannot float",
                   hint + "give the link an <inertial>");
@@ -233,7 +257,7 @@ Status Maker::choose_base() {
                 hint + "call the feet's links foot or sole");
   }
   const char* why = request_.base != Base::kAuto ? "as --base says"
-                    : must_float_                ? "the description has a floating joint"
+                    : !floating_.empty()         ? "the description has a floating joint"
                     : floating                   ? "there are feet by name"
                                                  : "no link is called a foot";
   robot_.remarks.push_back(
@@ -266,7 +290,8 @@ Status Maker::choose_base() {
 Status Maker::check_down(const Posed& neutral, bool asked) {
   const Eigen::Vector3d down = direction_down(robot_.tree, robot_.feet, neutral);
   if (down.z() < -0.5) return {};
-  Error error = lies(robot_.tree.links[0].name, down);
+  const Eigen::Vector3d ahead = direction_ahead_of(robot_.tree, robot_.feet, neutral, down);
+  Error error = lies(robot_.tree.links[0].name, down, ahead);
   if (!asked) return std::unexpected(std::move(error));
   error.file = request_.urdf;
   robot_.warnings.push_back(std::move(error));
@@ -298,13 +323,15 @@ Status Maker::choose_drives() {
   for (std::size_t j = 0; j < loads.size(); ++j)
     if (loads[j].fall_Nm_rad > 0.0) loads[j].stand_Nm = std::abs(torques[j]);
   robot_.limits = limits_of(robot_.tree, loads);
+  if (std::string replaced = replaced_limits(robot_.tree, robot_.limits); !replaced.empty())
+    robot_.remarks.push_back(std::move(replaced));
   if (request_.like != nullptr) {
     robot_.like = request_.like->config.name;
     robot_.scale = scale_of(robot_.tree, request_.like->tree);
     take_drives(*request_.like, loads, torques, kControlPeriod_s, robot_);
   } else {
     robot_.drives = size_drives(robot_.tree, robot_.limits);
-    if (request_.damping) add_described_damping(robot_);
+    if (request_.dynamics) add_described_dynamics(robot_);
     robot_.gains = tune(robot_.drives, loads, {.period_s = kControlPeriod_s});
   }
   robot_.sensors = find_sensors(robot_.tree, outfit_);
@@ -314,7 +341,7 @@ Status Maker::choose_drives() {
   if (!standing_) {
     fill_posture("ready", 0.0);
     robot_.move = swing(robot_, q_);
-    warn_of_weakness(torques);
+    warn_of_weakness(loads, torques);
     return {};
   }
   settle_balls(robot_.ahead, *stance, robot_.feet);
@@ -325,8 +352,7 @@ Status Maker::choose_drives() {
   robot_.stands_m = standing_->height_m();
   robot_.stands_share = standing_->height_m() / standing_->greatest_height_m();
   fill_posture("stand", robot_.stands_m);
-  warn_of_weakness(torques);
-  if (auto warning = falls_over(robot_, q_)) robot_.warnings.push_back(std::move(*warning));
+  warn_of_weakness(loads, torques);
   return {};
 }
 
@@ -378,8 +404,20 @@ void Maker::find_overloaded(const std::vector<double>& torques) {
   }
 }
 
-void Maker::warn_of_weakness(const std::vector<double>& torques) {
+void Maker::warn_of_weakness(const std::vector<JointLoad>& loads,
+                             const std::vector<double>& torques) {
+  std::ranges::move(undriven(robot_), std::back_inserter(robot_.warnings));
+  if (const auto burden = overburdened(robot_, loads)) {
+    const bool still = !robot_.move.swings && robot_.move.squat_m == 0.0;
+    std::string remark = burden->told.message + (still ? "; move.toml keeps still." : ".");
+    remark[0] = 'T';
+    robot_.remarks.push_back(std::move(remark));
+    robot_.warnings.push_back(burden->told);
+    if (burden->grams) return;  // all else is wrong because of it
+  }
   std::ranges::move(weak_drives(robot_, torques), std::back_inserter(robot_.warnings));
+  if (!standing_) return;
+  if (auto warning = falls_over(robot_, q_)) robot_.warnings.push_back(std::move(*warning));
 }
 
 /// How far the robot would move if its right angles were exact.

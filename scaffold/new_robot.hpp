@@ -39,7 +39,8 @@ struct Request {
   const Like* like = nullptr;  ///< take springs and ground from it; null: rigid drives
   std::string text = {};       ///< of the description; empty: the file's
   std::vector<std::pair<std::string, double>> lock = {};  ///< joint -> where it stands [rad or m]
-  bool damping = false;  ///< rigid drives get the damping that the description's joints have
+  std::string command = {};  ///< that makes this robot again, in the same folder; empty: unknown
+  bool dynamics = false;     ///< rigid drives get the damping and friction of <dynamics>
 };
 
 /// A way-point of move.toml, in the order of [[joint]].
@@ -73,6 +74,7 @@ struct NewRobot {
   std::vector<DriveSize> drives;
   std::vector<GainSet> gains;
   std::vector<std::string> remarks;  ///< of the whole: what was decided, and why
+  std::string command;               ///< of the request
   Move move;
   std::vector<std::string> report;  ///< one or two joints that are worth plots
   std::string like;                 ///< name of the robot that springs come from; may be empty

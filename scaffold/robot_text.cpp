@@ -155,7 +155,7 @@ class Writer {
     for (const std::string& key : keys) line("{}", key);
   }
 
-  static Keys keys(const hal::ActuatorConfig& a) {
+  [[nodiscard]] Keys keys(const hal::ActuatorConfig& a) const {
     Keys keys{fmt::format("order = {}{}", a.order, kGuess)};
     add(keys, "resistance_ohm", a.resistance_ohm);
     add(keys, "inductance_H", a.inductance_H);
@@ -164,6 +164,10 @@ class Writer {
     add(keys, "inertia_kg_m2", a.inertia_kg_m2);
     add(keys, "damping_Nms_rad", a.damping_Nms_rad);
     keys.back() += "; back-EMF included";
+    if (a.friction_Nm > 0.0) {
+      keys.push_back(fmt::format("friction_Nm = {}{}", number(a.friction_Nm),
+                                 robot_.like.empty() ? "  # the description's" : kGuess));
+    }
     if (a.order >= 2) {
       add(keys, "spring_Nm_rad", a.spring_Nm_rad);
       add(keys, "spring_damping_Nms_rad", a.spring_damping_Nms_rad);

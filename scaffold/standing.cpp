@@ -138,7 +138,7 @@ std::vector<std::vector<double>> Standing::patterns() const {
 /// mass counts little.
 double Standing::residual(const Posed& posed, double height_m, VectorXd& r, MatrixXd* J) const {
   Eigen::Index rows = 0;
-  for (const Foot& foot : feet_) rows += foot.flat() ? 6 : 3;
+  for (const Foot& foot : feet_) rows += foot.conditions();
   if (loose_) rows += 2;
   r.resize(rows);
   if (J != nullptr) J->setZero(rows, static_cast<Eigen::Index>(tree_.joints.size()));
@@ -172,6 +172,15 @@ double Standing::residual(const Posed& posed, double height_m, VectorXd& r, Matr
       J->middleRows<3>(at) = posed.point_jacobian(foot.body, sole.p) - way;
     }
     at += 3;
+    if (foot.points.size() == 2) {  // its line is level
+      const Vector3d line = (sole.R * foot.line()).normalized();
+      r[at] = -kTurnWeight_m * line.z();
+      if (J != nullptr) {
+        const MatrixXd turn = posed.turn_jacobian(foot.body);
+        J->row(at) = kTurnWeight_m * (line.y() * turn.row(0) - line.x() * turn.row(1));
+      }
+      ++at;
+    }
     if (!foot.flat()) continue;
     Vector3d turn = Vector3d::Zero();
     for (int i = 0; i < 3; ++i) turn += 0.5 * Vector3d(sole.R.col(i)).cross(level_.col(i));
@@ -272,7 +281,7 @@ bool Standing::settle(VectorXd q) {
 /// Legs that have fewer joints than their feet have conditions cannot fulfil all of them.
 bool Standing::lacks_joints() const {
   std::ptrdiff_t conditions = 0;
-  for (const Foot& foot : feet_) conditions += foot.flat() ? 6 : 3;
+  for (const Foot& foot : feet_) conditions += foot.conditions();
   return std::ranges::count(in_leg_, true) < conditions;
 }
 

@@ -11,4 +11,8 @@ namespace tandem::scaffold {
 /// @param torques  (joints) of torques_at(), in the tree's order
 [[nodiscard]] Diagnostics weak_drives(const NewRobot& robot, const std::vector<double>& torques);
 
+/// A warning for each joint whose effort is 0 in a description that has efforts: it may be passive,
+/// and gets a drive all the same. The hint's commands make it stand still, or leave it out.
+[[nodiscard]] Diagnostics undriven(const NewRobot& robot);
+
 }  // namespace tandem::scaffold

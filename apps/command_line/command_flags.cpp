@@ -420,7 +420,7 @@ void add_flags(CLI::App& app, ModelOptions& o) {
 void add_flags(CLI::App& app, NewOptions& o) {
   app.add_option("urdf", o.urdf, "Robot description (URDF, or .xacro where xacro is installed)")
       ->required();
-  app.add_option("-o,--output", o.output, "Folder to write (default: the description's name)");
+  app.add_option("-o,--output", o.output, "Folder to write (default: the name of the URDF's file)");
   app.add_option("--lock", o.lock, "JOINT or JOINT=rad: it stands still there, or at 0; repeatable")
       ->allow_extra_args(false);
   app.add_option("--drop", o.drop,
@@ -433,7 +433,8 @@ void add_flags(CLI::App& app, NewOptions& o) {
   CLI::Option* like =
       app.add_option("--like", o.like,
                      "Series elastic drives in proportion to this robot's: its name or robot.toml");
-  app.add_flag("--dynamics", o.dynamics, "Put the damping of the URDF's <dynamics> into the drives")
+  app.add_flag("--dynamics", o.dynamics,
+               "Put damping and friction of the URDF's <dynamics> into the drives")
       ->excludes(like);
   app.add_option("--base", o.base, "Kind of base (default: floating if it has feet)")
       ->check(CLI::IsMember({"floating", "fixed"}));

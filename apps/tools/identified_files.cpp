@@ -99,6 +99,8 @@ class Mean {
   [[nodiscard]] std::optional<double> value() const {
     return weight_ > 0.0 ? std::optional(sum_ / weight_) : std::nullopt;
   }
+  /// Whether zero is outside of its interval.
+  [[nodiscard]] bool there() const { return std::abs(sum_) > std::sqrt(weight_); }
 
  private:
   double sum_ = 0.0, weight_ = 0.0;
@@ -132,7 +134,7 @@ std::vector<std::string> not_carried(const robot::RobotFiles& written,
     const auto there = [](const identification::Estimate& one) {
       return one.identifiable && std::abs(one.value) > one.ci95;
     };
-    if (there(joint.coulomb_Nm) || there(joint.offset_Nm))
+    if (there(joint.offset_Nm) || there(joint.link_coulomb_Nm))
       names += (names.empty() ? "" : ", ") + joint.name;
   }
   for (const ActuatorFigures& one : figures) {
@@ -141,14 +143,16 @@ std::vector<std::string> not_carried(const robot::RobotFiles& written,
       const bool there =
           (!one.inertia_kg_m2 || std::abs(got.inertia_kg_m2 / *one.inertia_kg_m2 - 1.0) < 1e-4) &&
           (!one.damping_Nms_rad || std::abs(got.damping_Nms_rad - *one.damping_Nms_rad) <
-                                       1e-4 * (1.0 + std::abs(*one.damping_Nms_rad)));
+                                       1e-4 * (1.0 + std::abs(*one.damping_Nms_rad))) &&
+          (!one.friction_Nm ||
+           std::abs(got.friction_Nm - *one.friction_Nm) < 1e-4 * (1.0 + *one.friction_Nm));
       if (!there) drives += (drives.empty() ? "" : ", ") + one.name;
     }
   }
   if (!names.empty()) {
     notes.push_back(
-        "robot.toml has no Coulomb friction and no torque offsets: those of these joints are in "
-        "the report and in JSON only: " +
+        "robot.toml has no torque offsets and no friction behind a torque's measurement: those of "
+        "these joints are in the report and in JSON only: " +
         names);
   }
   if (!drives.empty()) {
@@ -255,21 +259,24 @@ std::vector<ActuatorFigures> actuator_figures(const hal::RobotConfig& robot,
                                               const identification::Identification& result) {
   std::vector<ActuatorFigures> all;
   for (const hal::ActuatorConfig& actuator : robot.actuators) {
-    Mean inertia, friction;
+    Mean inertia, friction, coulomb;
     for (std::size_t j = 0; j < robot.joints.size() && j < result.joints.size(); ++j) {
       if (robot.actuator_of(robot.joints[j]).name != actuator.name) continue;
       const identification::JointResult& joint = result.joints[j];
       inertia.add(joint.rotor_inertia_kg_m2);
       const bool motors = actuator.order < 2 && !joint.behind_rotor;  // torques are the motors'
       friction.add(motors ? joint.viscous_Nms_rad : joint.motor_viscous_Nms_rad);
+      coulomb.add(motors ? joint.coulomb_Nm : joint.motor_coulomb_Nm);
     }
     const double per_A = actuator.gear_ratio * actuator.torque_constant_Nm_A;
     const double back_emf =  // of a data sheet that has less, less
         std::min(per_A * per_A / actuator.resistance_ohm, actuator.damping_Nms_rad);
-    ActuatorFigures figures{actuator.name, inertia.value(), friction.value()};
+    ActuatorFigures figures{actuator.name, inertia.value(), friction.value(), coulomb.value()};
     if (figures.inertia_kg_m2 && !(*figures.inertia_kg_m2 > 0.0)) figures.inertia_kg_m2.reset();
     if (figures.damping_Nms_rad)
       *figures.damping_Nms_rad = std::max(0.0, *figures.damping_Nms_rad) + back_emf;
+    if (!coulomb.there()) figures.friction_Nm.reset();  // as described
+    if (figures.friction_Nm) *figures.friction_Nm = std::max(0.0, *figures.friction_Nm);
     all.push_back(std::move(figures));
   }
   return all;
@@ -286,6 +293,7 @@ std::string with_actuators(const std::string& text, const std::vector<ActuatorFi
     const auto at = begin - lines.begin();
     set_number(lines, at, "inertia_kg_m2", one.inertia_kg_m2);
     set_number(lines, at, "damping_Nms_rad", one.damping_Nms_rad);
+    set_number(lines, at, "friction_Nm", one.friction_Nm);
   }
   std::string out;
   for (const std::string& line : lines) out += line + "\n";

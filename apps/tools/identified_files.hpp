@@ -22,7 +22,7 @@ struct IdentifiedFiles {
 /// by its own interval; nothing of what the data do not give.
 struct ActuatorFigures {
   std::string name;
-  std::optional<double> inertia_kg_m2, damping_Nms_rad;
+  std::optional<double> inertia_kg_m2, damping_Nms_rad, friction_Nm;
 };
 [[nodiscard]] std::vector<ActuatorFigures> actuator_figures(
     const hal::RobotConfig& robot, const identification::Identification& result);

@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <map>
 
 #include "apps/robot/bundled.hpp"
 #include "apps/text/console.hpp"
@@ -131,7 +132,22 @@ std::expected<robot::RobotFiles, Diagnostics> write(const scaffold::NewRobot& ro
   return read;
 }
 
-Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
+/// By link with mass: the mass, and whether --density made it. Links that it found none for have
+/// null.
+Json masses_json(const scaffold::NewRobot& robot, const NewSource& source) {
+  Json masses = Json::object();
+  for (const auto& [link, note] : source.masses)
+    masses[link] = {{"mass_kg", nullptr}, {"from", nullptr}, {"note", note}};
+  for (const model::Link& link : robot.tree.links) {
+    if (!(link.inertia.mass_kg > 0.0)) continue;
+    const bool guessed = masses.contains(link.name);
+    masses[link.name]["mass_kg"] = link.inertia.mass_kg;
+    masses[link.name]["from"] = guessed ? "density" : "urdf";
+  }
+  return masses;
+}
+
+Json to_json(const scaffold::NewRobot& robot, const NewSource& source, const std::string& folder) {
   Json feet = Json::array(), sensors = Json::array(), drives = Json::array();
   for (const scaffold::Foot& foot : robot.feet) feet.push_back(foot.name);
   for (const scaffold::FoundSensor& sensor : robot.sensors) sensors.push_back(sensor.config.name);
@@ -140,6 +156,7 @@ Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
           {"robot", robot.config.name},
           {"joints", robot.config.joints.size()},
           {"mass_kg", robot.mass_kg},
+          {"masses", masses_json(robot, source)},
           {"base", robot.config.model.floating_base ? "floating" : "fixed"},
           {"base_height_m", robot.stands_m},
           {"feet", feet},
@@ -152,14 +169,17 @@ Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
 
 /// The limit that every joint of a kind has, when it is a round one (1, 20, 500): such figures come
 /// with exporters, and not from a data sheet. 0: there is none.
-double common_limit(const model::Tree& tree, double model::Joint::*limit) {
+double common_limit(const scaffold::NewRobot& robot, double scaffold::JointLimits::*limit,
+                    bool scaffold::JointLimits::*guessed) {
   constexpr std::size_t kFewest = 4;
   std::size_t count = 0;
   double common = 0.0;
-  for (const model::Joint& joint : tree.joints) {
+  for (std::size_t j = 0; j < robot.limits.size(); ++j) {
+    const model::Joint& joint = robot.tree.joints[j];
     if (joint.follows() || joint.type == model::JointType::kPrismatic) continue;
-    if (count++ == 0) common = joint.*limit;
-    if (!(joint.*limit == common)) return 0.0;
+    const scaffold::JointLimits& own = robot.limits[j];
+    if (count++ == 0) common = own.*limit;
+    if (own.*guessed || !(own.*limit == common)) return 0.0;
   }
   if (count < kFewest || !(common > 0.0) || !std::isfinite(common)) return 0.0;
   const double power = std::pow(10.0, std::floor(std::log10(common)));
@@ -167,9 +187,10 @@ double common_limit(const model::Tree& tree, double model::Joint::*limit) {
   return std::abs(digit - std::round(digit)) < 1e-9 ? common : 0.0;
 }
 
-void add_placeholders(const model::Tree& tree, Facts& facts) {
-  const double velocity = common_limit(tree, &model::Joint::velocity);
-  const double effort = common_limit(tree, &model::Joint::effort);
+void add_placeholders(const scaffold::NewRobot& robot, Facts& facts) {
+  using Limits = scaffold::JointLimits;
+  const double velocity = common_limit(robot, &Limits::velocity, &Limits::velocity_guessed);
+  const double effort = common_limit(robot, &Limits::effort, &Limits::effort_guessed);
   if (velocity == 0.0 && effort == 0.0) return;
   std::string what = velocity == 0.0 ? "" : fmt::format("{:g} rad/s", velocity);
   if (effort != 0.0) what += (what.empty() ? "" : " and ") + fmt::format("{:g} Nm", effort);
@@ -178,11 +199,26 @@ void add_placeholders(const model::Tree& tree, Facts& facts) {
                                   what));
 }
 
+/// What --density has found; links that get nothing for one reason are together, for frames have no
+/// shape.
+void add_masses(const NewSource& source, Facts& facts) {
+  std::map<std::string, std::vector<std::string>> without;
+  for (const auto& [link, mass] : source.masses) {
+    if (mass.starts_with("none")) {
+      without[mass].push_back(link);
+    } else {
+      facts.add("mass", link + ": " + mass);
+    }
+  }
+  for (const auto& [why, links] : without)
+    facts.add("mass", fmt::format("{}: {}", fmt::join(links, ", "), why));
+}
+
 void add_facts(const scaffold::NewRobot& robot, const NewSource& source, Facts& facts) {
   facts.add("robot", fmt::format("{}: {}, {:.2f} kg", robot.config.name,
                                  counted(robot.config.joints.size(), "joint"), robot.mass_kg));
   for (const std::string& remark : robot.remarks) facts.add("", remark);
-  for (const std::string& mass : source.masses) facts.add("mass", mass);
+  add_masses(source, facts);
   for (std::size_t f = 0; f < robot.feet.size(); ++f) {
     const scaffold::Foot& foot = robot.feet[f];
     facts.add("foot " + foot.name, fmt::format("{}, {}{}", robot.tree.links[foot.link].name,
@@ -196,7 +232,7 @@ void add_facts(const scaffold::NewRobot& robot, const NewSource& source, Facts& 
               (wrench ? "force/torque at " + sensor.config.joint : "IMU at " + sensor.config.link) +
                   (sensor.guess.empty() ? "" : " (guess)"));
   }
-  add_placeholders(robot.tree, facts);
+  add_placeholders(robot, facts);
   for (const scaffold::DriveSize& drive : robot.drives) {
     facts.add("drive " + drive.actuator.name,
               fmt::format("{}, {}", counted(drive.joints.size(), "joint"), drive.remark));
@@ -216,6 +252,22 @@ void print_next(const std::string& folder, std::FILE* out) {
              "\nNext:\n  tandem run {} --report\n  tandem run {} --report\n"
              "Look for `guess` in {}/robot.toml: replace each by your own figure.\n",
              shell_word(folder + "/hold.toml"), shell_word(folder + "/move.toml"), folder);
+}
+
+/// What makes the robot again, with what is added to it, in the same folder.
+std::string command_again(const NewOptions& options) {
+  std::string command = "tandem new " + shell_word(options.urdf);
+  const auto add = [&command](const char* option, const std::string& value) {
+    if (!value.empty()) command += fmt::format(" {} {}", option, shell_word(value));
+  };
+  add("-o", options.output);
+  add("--like", options.like);
+  add("--base", options.base);
+  for (const std::string& word : options.lock) add("--lock", word);
+  for (const std::string& word : options.drop) add("--drop", word);
+  if (options.density_kg_m3 != 0.0) add("--density", fmt::format("{:g}", options.density_kg_m3));
+  if (options.dynamics) command += " --dynamics";
+  return command + " --force";
 }
 
 /// What can be said of the input before it is read as XML.
@@ -238,6 +290,13 @@ Diagnostics check_input(const std::string& file) {
   }
   return one("this is a TOML file: `tandem new` starts from a URDF",
              "`tandem run " + shell_word(file) + "` runs an experiment", file);
+}
+
+/// Errors of a text that the options have changed, and that is nowhere to be read: their lines
+/// would be taken for the file's.
+Diagnostics without_lines(Diagnostics errors) {
+  for (Error& error : errors) error.line = 0;
+  return errors;
 }
 
 /// Whether the robot may be written to `folder`.
@@ -272,14 +331,21 @@ Diagnostics run(const NewOptions& options) {
   request.urdf = options.urdf;
   request.text = source->text;
   request.lock = source->lock;
-  request.damping = options.dynamics;
+  request.dynamics = options.dynamics;
+  request.command = command_again(options);
   request.name = plain_name(fs::path(folder).lexically_normal().filename().string());
   request.base = options.base == "floating" ? scaffold::Base::kFloating
                  : options.base == "fixed"  ? scaffold::Base::kFixed
                                             : scaffold::Base::kAuto;
   request.like = like ? &*like : nullptr;
   auto robot = scaffold::make_robot(request);
-  if (!robot) return of_options(robot.error());
+  if (!robot) {
+    return of_options(source->changed ? without_lines(robot.error()) : robot.error(), *source);
+  }
+  if (source->changed) {  // lines are those of the copy
+    for (Error& warning : robot->warnings)
+      if (warning.file == options.urdf) warning.file = (fs::path(folder) / source->copy).string();
+  }
   robot->remarks.insert(robot->remarks.end(), source->remarks.begin(), source->remarks.end());
   Result<Draft> draft = Draft::folder(folder);
   if (!draft) return {draft.error()};
@@ -287,7 +353,7 @@ Diagnostics run(const NewOptions& options) {
   if (!written) return written.error();
   Facts facts;
   add_facts(*robot, *source, facts);
-  Json json = to_json(*robot, folder);
+  Json json = to_json(*robot, *source, folder);
   if (Status counted = add_right_angles(*written, facts, json); !counted) return {counted.error()};
   Kept kept;
   if (Status done = draft->place(

@@ -99,14 +99,19 @@ Status add_masses(const NewOptions& options, NewSource& source) {
   if (options.density_kg_m3 == 0.0) return {};
   const model::ShapeMasses found =
       model::masses_from_shapes(source.text, options.urdf, options.density_kg_m3);
+  if (!found.errors.empty()) {
+    Error error = found.errors.front();
+    if (source.changed) error.line = 0;  // of a text that is nowhere to be read
+    return std::unexpected(std::move(error));
+  }
   std::vector<std::pair<std::string, model::Inertia>> inertias;
   for (const model::ShapeMass& one : found.links) {
     inertias.emplace_back(one.link, one.inertia);
-    source.masses.push_back(
-        fmt::format("{}: {:.4g} kg (guess: {})", one.link, one.inertia.mass_kg, one.from));
+    source.masses.emplace_back(one.link,
+                               fmt::format("{:.4g} kg (guess: {})", one.inertia.mass_kg, one.from));
   }
   for (const auto& [link, why] : found.without)
-    source.masses.push_back(fmt::format("{}: none, for {}", link, why));
+    source.masses.emplace_back(link, fmt::format("none, for {}", why));
   if (inertias.empty()) {
     if (found.without.empty()) return {};
     return failed(options.urdf, "no link gets a mass by --density: " + found.without[0].second,
@@ -115,6 +120,7 @@ Status add_masses(const NewOptions& options, NewSource& source) {
   auto text = model::with_inertias(source.text, inertias);
   if (!text) return std::unexpected(text.error());
   source.text = std::move(*text);
+  source.changed = true;
   source.remarks.push_back(fmt::format(
       "{} in the URDF beside this file: from shapes, at {:g} kg/m^3 (a guess).",
       counted(inertias.size(), "mass", "masses") + (inertias.size() == 1 ? " is" : " are"),
@@ -138,6 +144,7 @@ Result<NewSource> read_source(const NewOptions& options) {
   if (!text) return std::unexpected(text.error());
   source.copy = xacro ? robot_stem(options.urdf) + ".urdf" : source.name;
   source.text = std::move(*text);
+  source.changed = xacro;
   if (xacro) source.remarks.push_back(source.copy + " is what xacro makes of " + source.name + ".");
   for (const std::string& word : options.lock) {
     auto lock = read_lock(word);
@@ -145,7 +152,9 @@ Result<NewSource> read_source(const NewOptions& options) {
     source.lock.push_back(std::move(*lock));
   }
   if (!options.drop.empty()) {
-    auto rest = model::without_limbs(source.text, options.drop);
+    std::vector<std::string> still;
+    for (const auto& [joint, position] : source.lock) still.push_back(joint);
+    auto rest = model::without_limbs(source.text, options.drop, still);
     if (!rest) {
       Error error = rest.error();
       error.file = options.urdf;
@@ -153,6 +162,7 @@ Result<NewSource> read_source(const NewOptions& options) {
       return std::unexpected(std::move(error));
     }
     source.text = std::move(*rest);
+    source.changed = true;
     std::string names;
     for (const std::string& name : options.drop) names += (names.empty() ? "" : ", ") + name;
     source.remarks.push_back("Left out by --drop, with what hangs on it: " + names + ".");
@@ -161,9 +171,17 @@ Result<NewSource> read_source(const NewOptions& options) {
   return source;
 }
 
-Diagnostics of_options(Diagnostics errors) {
+Diagnostics of_options(Diagnostics errors, const NewSource& source) {
   constexpr std::string_view kKey = "model.lock.";
   for (Error& error : errors) {
+    for (const auto& [link, mass] : source.masses) {
+      if (!mass.starts_with("none")) continue;
+      const std::size_t begin = error.hint.find("'" + link + "' mass");
+      const std::size_t option = error.hint.find("--density, ");
+      if (begin == std::string::npos || option == std::string::npos) continue;
+      error.message += ": --density gives link '" + link + "' " + mass;
+      error.hint.erase(option, std::string_view("--density, ").size());
+    }
     if (!error.key.starts_with(kKey)) continue;
     error.key = "--lock " + error.key.substr(kKey.size());
     if (error.hint.find("[model.lock]") != std::string::npos) error.hint = "leave --lock out";

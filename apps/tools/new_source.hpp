@@ -17,7 +17,9 @@ struct NewSource {
   std::string text;                                    ///< of that URDF
   std::vector<std::pair<std::string, double>> lock{};  ///< joint -> where it stands [rad or m]
   std::vector<std::string> remarks{};                  ///< what the options have changed
-  std::vector<std::string> masses{};                   ///< of links, from their shapes
+  bool changed = false;  ///< `text` is not the file's: lines are others
+  /// Links that --density has looked at, and what came of it: "3.14 kg (guess: 1 shape)".
+  std::vector<std::pair<std::string, std::string>> masses{};
 };
 
 /// The name of a description's robot: "arm" of arm.urdf, arm.xacro and arm.urdf.xacro.
@@ -31,6 +33,7 @@ struct NewSource {
 
 /// Errors of locks that --lock has asked for, as the reader of robot.toml words them, with the
 /// option instead of the key.
-[[nodiscard]] Diagnostics of_options(Diagnostics errors);
+/// @param source  of what was read: where --density found no mass, the hint says why
+[[nodiscard]] Diagnostics of_options(Diagnostics errors, const NewSource& source);
 
 }  // namespace tandem::apps

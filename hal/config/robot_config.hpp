@@ -71,6 +71,7 @@ struct ActuatorConfig {
   double gear_ratio = 1.0;
   double inertia_kg_m2 = 0.0;           ///< J
   double damping_Nms_rad = 0.0;         ///< D, the back-EMF's share N^2 K^2 / R included
+  double friction_Nm = 0.0;             ///< dry (Coulomb) friction, where D acts (simulation)
   double spring_Nm_rad = 0.0;           ///< Ks (orders 2, 3)
   double spring_damping_Nms_rad = 0.0;  ///< Ds (orders 2, 3)
   double current_limit_A = 0.0;
@@ -217,7 +218,8 @@ struct PassiveConfig {
   std::string name;           ///< URDF joint
   double position_rad = 0.0;  ///< at the start; where loops close, from near here
   double damping_Nms_rad = 0.0;
-  int line = 0;  ///< in the TOML, for messages
+  double friction_Nm = 0.0;  ///< dry (Coulomb) friction
+  int line = 0;              ///< in the TOML, for messages
 };
 
 /// [[loop]]

@@ -14,6 +14,7 @@ ActuatorConfig read_actuator(TomlTable& table) {
   a.inertia_kg_m2 = table.number("inertia_kg_m2", kPositive);
   a.damping_Nms_rad = table.number("damping_Nms_rad", kNotNegative);
   a.damping_line = table.line("damping_Nms_rad");
+  a.friction_Nm = table.number_or("friction_Nm", 0.0, kNotNegative);
   a.spring_Nm_rad = table.number_or("spring_Nm_rad", 0.0, kNotNegative);
   a.spring_damping_Nms_rad = table.number_or("spring_damping_Nms_rad", 0.0, kNotNegative);
   a.current_limit_A = table.number("current_limit_A", kPositive);

@@ -18,6 +18,7 @@ void read_passive(TomlTable table, RobotConfig& robot) {
   check_not_locked(table, "name", passive.name, robot);
   passive.position_rad = table.number_or("position_rad", 0.0);
   passive.damping_Nms_rad = table.number_or("damping_Nms_rad", 0.0, {0.0, 1e6});
+  passive.friction_Nm = table.number_or("friction_Nm", 0.0, {0.0, 1e6});
   table.finish();
   robot.passive.push_back(passive);
 }

@@ -142,19 +142,43 @@ void Actuators::set_brake(std::size_t joint, bool engaged, double position_rad,
 }
 
 void Actuators::fit_brake(std::size_t joint, const hal::BrakeConfig& brake, double substep_s) {
-  const double J = models_[joint].inertia_kg_m2;
   constexpr std::int64_t kNsPerMs = 1'000'000;
-  brakes_[joint] = {.torque_Nm = brake.torque_Nm,
-                    .stiffness_Nm_rad = J * (0.4 / substep_s) * (0.4 / substep_s),
-                    .damping_Nms_rad = 0.3 * J / substep_s,
+  const double J = models_[joint].inertia_kg_m2;
+  brakes_[joint] = {.law = DryFriction::fit(brake.torque_Nm, J, substep_s),
                     .release_ns = brake.release_ms * kNsPerMs,
                     .engage_ns = brake.engage_ms * kNsPerMs};
   brake_states_[joint] = {.closed = 1};
   any_brake_ = true;
 }
 
+void Actuators::fit_friction(std::size_t joint, double friction_Nm, double inertia_kg_m2,
+                             double substep_s) {
+  frictions_.resize(size());
+  friction_anchors_rad_.resize(size());
+  frictions_[joint] = DryFriction::fit(friction_Nm, inertia_kg_m2, substep_s);
+}
+
+Actuators::DryFriction Actuators::DryFriction::fit(double torque_Nm, double inertia_kg_m2,
+                                                   double substep_s) {
+  return {.torque_Nm = torque_Nm,
+          .stiffness_Nm_rad = inertia_kg_m2 * (0.4 / substep_s) * (0.4 / substep_s),
+          .damping_Nms_rad = 0.3 * inertia_kg_m2 / substep_s};
+}
+
+double Actuators::DryFriction::torque(double anchor_rad, double position_rad,
+                                      double velocity_rad_s) const noexcept {
+  const double spring = clamp_to(stiffness_Nm_rad * (anchor_rad - position_rad), torque_Nm);
+  return clamp_to(spring - damping_Nms_rad * velocity_rad_s, torque_Nm);
+}
+
+void Actuators::DryFriction::drag(double& anchor_rad, double position_rad) const noexcept {
+  const double reach = torque_Nm / stiffness_Nm_rad;
+  anchor_rad = std::clamp(anchor_rad, position_rad - reach, position_rad + reach);
+}
+
 void Actuators::seat_brakes(const double* position_rad) noexcept {
   for (std::size_t j = 0; j < brakes_.size(); ++j) brake_states_[j].anchor_rad = position_rad[j];
+  std::copy_n(position_rad, frictions_.size(), friction_anchors_rad_.begin());
 }
 
 void Actuators::set_coil(std::size_t joint, bool current) noexcept TANDEM_RT {
@@ -175,27 +199,32 @@ void Actuators::obey_coil(std::size_t joint, double position_rad) noexcept {
 
 void Actuators::advance_brakes(std::int64_t step_ns,
                                const double* position_rad) noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < frictions_.size(); ++j) {
+    if (frictions_[j].torque_Nm > 0.0)
+      frictions_[j].drag(friction_anchors_rad_[j], position_rad[j]);
+  }
   if (!any_brake_) return;
   for (std::size_t j = 0; j < brakes_.size(); ++j) {
     const Brake& brake = brakes_[j];
-    if (!(brake.torque_Nm > 0.0)) continue;
+    if (!(brake.law.torque_Nm > 0.0)) continue;
     BrakeState& state = brake_states_[j];
     state.since_ns += step_ns;
     obey_coil(j, position_rad[j]);
-    const double reach = brake.torque_Nm / brake.stiffness_Nm_rad;
-    state.anchor_rad =
-        std::clamp(state.anchor_rad, position_rad[j] - reach, position_rad[j] + reach);
+    brake.law.drag(state.anchor_rad, position_rad[j]);
   }
 }
 
-double Actuators::brake_torque(std::size_t joint, double position_rad,
-                               double velocity_rad_s) const noexcept {
-  const BrakeState& state = brake_states_[joint];
-  if (state.closed == 0) return 0.0;
-  const Brake& brake = brakes_[joint];
-  const double spring =
-      clamp_to(brake.stiffness_Nm_rad * (state.anchor_rad - position_rad), brake.torque_Nm);
-  return clamp_to(spring - brake.damping_Nms_rad * velocity_rad_s, brake.torque_Nm);
+/// Of the joint's brake and its friction.
+double Actuators::dry_torque(std::size_t joint, double position_rad,
+                             double velocity_rad_s) const noexcept {
+  double torque_Nm = 0.0;
+  if (const BrakeState& state = brake_states_[joint]; state.closed != 0)
+    torque_Nm = brakes_[joint].law.torque(state.anchor_rad, position_rad, velocity_rad_s);
+  if (!frictions_.empty() && frictions_[joint].torque_Nm > 0.0) {
+    torque_Nm +=
+        frictions_[joint].torque(friction_anchors_rad_[joint], position_rad, velocity_rad_s);
+  }
+  return torque_Nm;
 }
 
 double Actuators::current(std::size_t joint, double velocity_rad_s) const noexcept {
@@ -227,8 +256,8 @@ void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor
           (voltage_[j] - m.resistance_ohm * i - m.back_emf_Vs_rad * velocity) / m.inductance_H;
     }
     double drive = m.torque_per_A * i - m.friction_Nms_rad * velocity;
-    if (brake_states_[j].closed != 0) {
-      drive += brake_torque(j, m.elastic() ? motor.position_rad[j] : q[j], velocity);
+    if (brake_states_[j].closed != 0 || !frictions_.empty()) {
+      drive += dry_torque(j, m.elastic() ? motor.position_rad[j] : q[j], velocity);
     }
     if (!m.elastic()) {
       rate.position_rad[j] = 0.0;

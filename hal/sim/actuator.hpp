@@ -97,7 +97,12 @@ class Actuators {
   /// well inside what that can integrate. Inside the cut the anchor rests: it does not creep. Both
   /// cuts are projections, so it only ever takes energy. Closed at first.
   void fit_brake(std::size_t joint, const hal::BrakeConfig& brake, double substep_s);
-  /// Sets every brake's anchor to where its motor is. `position_rad` (n)
+  /// Gives the joint dry friction by the same law, with `inertia_kg_m2` for J: on the rotor, or on
+  /// the link of a rigid or a passive joint. It holds where the anchor is and moves by at most
+  /// friction_Nm / k, for good; while it slides it is friction_Nm, to the bit.
+  /// @param inertia_kg_m2  at most what the joint shows
+  void fit_friction(std::size_t joint, double friction_Nm, double inertia_kg_m2, double substep_s);
+  /// Sets every anchor of brakes and friction to where its motor is. `position_rad` (n)
   void seat_brakes(const double* position_rad) noexcept;
   /// Current in the coil of the joint's brake, or none. It obeys after its time.
   void set_coil(std::size_t joint, bool current) noexcept TANDEM_RT;
@@ -134,13 +139,22 @@ class Actuators {
   [[nodiscard]] std::span<const double> temperature_C() const noexcept { return temperature_; }
 
   void archive(Archive& ar) {
-    ar(voltage_, bridge_, free_, whole_, brake_rad_, brake_Nm_, temperature_, brake_states_);
+    ar(voltage_, bridge_, free_, whole_, brake_rad_, brake_Nm_, temperature_, brake_states_,
+       friction_anchors_rad_);
   }
 
  private:
-  /// What a brake is; torque_Nm is 0 where there is none.
-  struct Brake {
+  /// The law at fit_brake(); torque_Nm is 0 where there is none.
+  struct DryFriction {
     double torque_Nm = 0.0, stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;
+
+    static DryFriction fit(double torque_Nm, double inertia_kg_m2, double substep_s);
+    [[nodiscard]] double torque(double anchor_rad, double position_rad,
+                                double velocity_rad_s) const noexcept;
+    void drag(double& anchor_rad, double position_rad) const noexcept;
+  };
+  struct Brake {
+    DryFriction law;
     std::int64_t release_ns = 0, engage_ns = 0;
   };
   struct BrakeState {  // wide flags: no padding in a snapshot
@@ -149,13 +163,14 @@ class Actuators {
     std::int64_t coil = 0, closed = 0;
   };
   void obey_coil(std::size_t joint, double position_rad) noexcept;
-  [[nodiscard]] double brake_torque(std::size_t joint, double position_rad,
-                                    double velocity_rad_s) const noexcept;
+  [[nodiscard]] double dry_torque(std::size_t joint, double position_rad,
+                                  double velocity_rad_s) const noexcept;
   [[nodiscard]] double current(std::size_t joint, double velocity_rad_s) const noexcept;
   [[nodiscard]] double rigid_brake(std::size_t joint, double q, double qd) const noexcept;
 
-  /// A robot's actuators are all of order 2 and without brakes as a rule: then all joints at once,
-  /// with the bits of the loops over joints. One array for each constant of ActuatorModel.
+  /// A robot's actuators are all of order 2 and without brakes and dry friction as a rule: then all
+  /// joints at once, with the bits of the loops over joints. One array for each constant of
+  /// ActuatorModel.
   template <class Array>
   struct Elastic {
     Array torque_per_A, back_emf, friction, resistance, inertia, spring, spring_damping;
@@ -163,7 +178,9 @@ class Actuators {
     Array heating;        ///< thermal_resistance_K_W * resistance_ohm
   };
   [[nodiscard]] static Elastic<const double*> pointers(const Elastic<std::vector<double>>& m);
-  [[nodiscard]] bool all_elastic() const noexcept { return all_elastic_ && !any_brake_; }
+  [[nodiscard]] bool all_elastic() const noexcept {
+    return all_elastic_ && !any_brake_ && frictions_.empty();
+  }
   void evaluate_elastic(const double* q, const double* qd, MotorStateView motor, double* torque_Nm,
                         MotorState rate) const noexcept;
   void step_elastic(double h_s, MotorStateView rate, MotorState motor) const noexcept;
@@ -179,7 +196,9 @@ class Actuators {
   std::vector<Brake> brakes_;
   std::vector<BrakeState> brake_states_;
   bool any_brake_ = false;
-  std::vector<double> cooling_;  // exp(-h / time constant) of the last step length
+  std::vector<DryFriction> frictions_;        // (n), empty where no joint has any
+  std::vector<double> friction_anchors_rad_;  // alike
+  std::vector<double> cooling_;               // exp(-h / time constant) of the last step length
   double cooling_h_s_ = 0.0;
   double ambient_C_;
   bool feeds_through_ = false;

@@ -58,9 +58,11 @@ Result<Plant> Plant::create(const PlantConfig& config) {
   plant.actuators_ = Actuators(in_model_order(config));
   for (std::size_t j = 0; j < config.joints.size(); ++j) {
     const PlantJoint& joint = config.joints[j];
-    if (!joint.brake) continue;
-    plant.actuators_.fit_brake(plant.map_[j], *joint.brake,
-                               static_cast<double>(config.substep_ns) * 1e-9);
+    const double substep_s = static_cast<double>(config.substep_ns) * 1e-9;
+    if (joint.brake) plant.actuators_.fit_brake(plant.map_[j], *joint.brake, substep_s);
+    if (!(joint.actuator.friction_Nm > 0.0)) continue;
+    plant.actuators_.fit_friction(plant.map_[j], joint.actuator.friction_Nm,
+                                  joint.actuator.inertia_kg_m2, substep_s);
   }
   if (Status status = plant.place_contact(config); !status) return std::unexpected(status.error());
   if (Status status = plant.make_loops(config); !status) return std::unexpected(status.error());
@@ -205,6 +207,7 @@ Status Plant::start(const PlantConfig& config) {
   for (std::size_t j = 0; j < passive_.size(); ++j)
     q[base_q_ + passive_[j]] = config.passive[j].position_rad;
   if (Status status = close_loops(q.data()); !status) return status;
+  fit_passive_friction(config, q);
   set_state(q, v);
   place_surroundings(config);
 
@@ -227,6 +230,22 @@ Status Plant::start(const PlantConfig& config) {
   released_ = config.held ? 0 : 1;
   if (config.held && base_q_ != 0) hold(q.data(), load);
   return {};
+}
+
+/// A joint without a rotor has a share of the least inertia that it shows: together they are never
+/// stiffer than the links allow.
+void Plant::fit_passive_friction(const PlantConfig& config, std::span<const double> q) {
+  const auto has = [](const hal::PassiveConfig& joint) { return joint.friction_Nm > 0.0; };
+  const std::ptrdiff_t count = std::ranges::count_if(config.passive, has);
+  if (count == 0) return;
+  const auto inertias =
+      joint_inertias(*kernels_, postures_within(*kernels_, q, config.ranges, 128));
+  for (std::size_t j = 0; j < passive_.size(); ++j) {
+    if (!has(config.passive[j])) continue;
+    actuators_.fit_friction(passive_[j], config.passive[j].friction_Nm,
+                            inertias[passive_[j]].least / static_cast<double>(count),
+                            static_cast<double>(config.substep_ns) * 1e-9);
+  }
 }
 
 void Plant::place_surroundings(const PlantConfig& config) {

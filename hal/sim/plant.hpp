@@ -186,6 +186,7 @@ class Plant {
   Status make_loops(const PlantConfig& config);
   Status open_engine(const PlantConfig& config);
   Status start(const PlantConfig& config);
+  void fit_passive_friction(const PlantConfig& config, std::span<const double> q);
   void place_surroundings(const PlantConfig& config);
   Status close_loops(double* q);
   void hold(const double* q, std::span<const double> load);

@@ -176,7 +176,8 @@ Result<dds::Value> decode_message(std::string_view encoding, std::string_view wa
   if (encoding == "json") return decode_json(definition, bytes);
   if (encoding == "ros1") return dds::decode_ros1(definition, bytes);
   const Compression compression = packed_by(bytes);  // plain CDR begins with 0
-  if (compression == Compression::kNone) return dds::decode(definition, bytes);
+  if (compression == Compression::kNone || compression == Compression::kGzip)
+    return dds::decode(definition, bytes);
   const Result<Bytes> plain = unpacked(compression, bytes);
   if (!plain) return std::unexpected(plain.error());
   return dds::decode(definition, *plain);

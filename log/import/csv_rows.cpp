@@ -49,6 +49,10 @@ class DateReader {
     rest_.remove_prefix(digits);
     return value;
   }
+  int one_or_two() {
+    const bool two = rest_.size() > 1 && rest_[1] >= '0' && rest_[1] <= '9';
+    return number(two ? 2 : 1);
+  }
   /// One of these characters. @return 0: none of them is next
   char any(std::string_view of) {
     if (rest_.empty() || of.find(rest_.front()) == std::string_view::npos) return '\0';
@@ -74,14 +78,17 @@ class DateReader {
 
 }  // namespace
 
-std::optional<std::int64_t> iso_time_ns(std::string_view text) {
+std::optional<std::int64_t> date_time_ns(std::string_view text) {
   using namespace std::chrono;
   DateReader in(text);
-  const int y = in.number(4);
-  in.need("-/");
-  const int m = in.number(2);
-  in.need("-/");
-  const int d = in.number(2);
+  const bool day_first = text.substr(0, 3).find('.') != std::string_view::npos;
+  const std::string_view between = day_first ? "." : "-/";
+  const int first = day_first ? in.one_or_two() : in.number(4);
+  in.need(between);
+  const int m = day_first ? in.one_or_two() : in.number(2);
+  in.need(between);
+  const int last = in.number(day_first ? 4 : 2);
+  const int y = day_first ? last : first, d = day_first ? first : last;
   in.need("T t");
   const int hour = in.number(2);
   in.need(":");
@@ -104,6 +111,21 @@ std::optional<std::int64_t> iso_time_ns(std::string_view text) {
   const auto since =
       sys_days(date).time_since_epoch() + hours(hour) + minutes(minute) - east + seconds(second);
   return duration_cast<nanoseconds>(since).count() + rest_ns;
+}
+
+bool is_ambiguous_date(std::string_view text) {
+  const auto digits = [&text](std::size_t most) {
+    std::size_t count = 0;
+    while (count < most && count < text.size() && text[count] >= '0' && text[count] <= '9') ++count;
+    text.remove_prefix(count);
+    return count;
+  };
+  const auto slash = [&text] {
+    const bool there = text.starts_with('/');
+    if (there) text.remove_prefix(1);
+    return there;
+  };
+  return digits(2) > 0 && slash() && digits(2) > 0 && slash() && digits(4) == 4;
 }
 
 Result<CsvRows> CsvRows::open(std::string_view text, const std::string& file,
@@ -200,7 +222,7 @@ std::optional<double> CsvRows::number(std::size_t column) const {
 }
 
 std::optional<std::int64_t> CsvRows::time_ns(std::size_t column, std::int64_t unit_ns) const {
-  if (unit_ns == 0) return iso_time_ns(cells_[column]);
+  if (unit_ns == 0) return date_time_ns(cells_[column]);
   const auto value = whole_number<long double>(digits_of(column));
   constexpr long double kMost = 9.2e18L;
   if (!value) return std::nullopt;

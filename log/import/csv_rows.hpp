@@ -16,8 +16,12 @@ namespace tandem::log {
 
 /// A date of ISO 8601 as nanoseconds since 1970 in UTC: "2026-11-26T22:02:12.5Z", with a blank for
 /// the T, with a comma, without seconds, with "+01:00" or "+0100" for the Z; without either it is
-/// taken for UTC. None: it is no such date.
-[[nodiscard]] std::optional<std::int64_t> iso_time_ns(std::string_view text);
+/// taken for UTC. Instead of the year first with dashes or slashes also the day first with dots:
+/// "26.11.2026 22:02:12". None: it is no such date.
+[[nodiscard]] std::optional<std::int64_t> date_time_ns(std::string_view text);
+
+/// Whether it begins as "11/12/2026": nobody knows which is the day.
+[[nodiscard]] bool is_ambiguous_date(std::string_view text);
 
 /// Reads the lines of a text in order. A byte order mark, CRLF and quotes about a cell are
 /// tolerated; a delimiter at the end of every line as well.
@@ -40,7 +44,7 @@ class CsvRows {
   [[nodiscard]] int line() const { return line_; }
   /// A cell's number; NaN for an empty cell, nan and inf; none: it is no number.
   [[nodiscard]] std::optional<double> number(std::size_t column) const;
-  /// A time in units of `unit_ns`, rounded to a nanosecond; of unit 0 a date (iso_time_ns()).
+  /// A time in units of `unit_ns`, rounded to a nanosecond; of unit 0 a date (date_time_ns()).
   /// None: no number, or no date; beyond 292 years.
   [[nodiscard]] std::optional<std::int64_t> time_ns(std::size_t column, std::int64_t unit_ns) const;
 

@@ -8,6 +8,7 @@
 
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 #include "log/import/csv_rows.hpp"
 #include "log/import/sources.hpp"
 
@@ -216,6 +217,16 @@ class CsvSource {
     if (!time_) return number * map_.period_ns;
     const CsvRows& rows = rows_[time_->file];
     if (const auto time = rows.time_ns(time_->column, map_.time_unit_ns)) return *time;
+    const std::string_view cell = rows.cells()[time_->column];
+    if (is_ambiguous_date(cell)) {
+      return std::unexpected(
+          at(time_->file,
+             "'" + shown(cell) + "' is no date that everybody reads alike: which is the day?",
+             "write the year first; where the day is first: sed -E "
+             "'s#([0-9]+)/([0-9]+)/([0-9]{4})#\\1.\\2.\\3#' FILE > NEW; where the month is: sed -E "
+             "'s#([0-9]+)/([0-9]+)/([0-9]{4})#\\2.\\1.\\3#' FILE > NEW",
+             *map_.time_column));
+    }
     const bool dates = map_.time_unit_ns == 0;
     const bool date = !dates && rows.time_ns(time_->column, 0).has_value();
     return std::unexpected(

@@ -137,7 +137,7 @@ Result<bool> is_bag(const ImportFile& file) {
   if (begins(first, "#ROSBAG V")) {
     return refuse("is a bag of ROS 1", "convert it: mcap convert");
   }
-  if (begins(first, "\x1F\x8B")) return refuse("is compressed", "decompress it: gunzip");
+  if (begins(first, "\x1F\x8B")) return refuse("is compressed twice", "decompress it: gunzip");
   const auto magic = std::as_bytes(std::span(head)).first(kMagicBytes);
   if (first.size() >= kMagicBytes && std::ranges::equal(magic, kMagic)) return true;
   if (path.ends_with(".mcap") || path.find(".mcap.") != std::string::npos) {

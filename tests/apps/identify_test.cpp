@@ -33,7 +33,9 @@ class Identify : public Program {
 };
 
 TEST_F(Identify, FindsWhatTheDescriptionGotWrongAndWritesARobotThatRuns) {
+  edit("robot.toml", "damping_Nms_rad = 0.17", "damping_Nms_rad = 0.17\nfriction_Nm = 0.04");
   record("robot.toml");
+  edit("robot.toml", "friction_Nm = 0.04\n", "");
   EXPECT_LT(json("excite.json")["condition_number"].get<double>(), 200.0);
   // The description to start from has another mass, and a centre of mass that is elsewhere.
   std::filesystem::copy_file(folder_ / "robot.toml", folder_ / "wrong.toml");
@@ -51,6 +53,7 @@ TEST_F(Identify, FindsWhatTheDescriptionGotWrongAndWritesARobotThatRuns) {
   for (const auto& [name, joint] : result["joints"].items()) {
     EXPECT_LT(joint["relative_error"].get<double>(), 0.05) << name;
     EXPECT_NEAR(joint["viscous_Nms_rad"].get<double>(), 0.17 - 0.16, 0.01) << name;
+    EXPECT_NEAR(joint["coulomb_Nm"].get<double>(), 0.04, 0.004) << name;
   }
   // JSON alone said that an arm's torques do not show its total mass.
   EXPECT_FALSE(result["total_mass_kg"]["identifiable"].get<bool>());
@@ -69,6 +72,7 @@ TEST_F(Identify, FindsWhatTheDescriptionGotWrongAndWritesARobotThatRuns) {
     return at == std::string::npos ? 0.0 : std::stod(robot.substr(at + key.size() + 4));
   };
   EXPECT_NEAR(number("damping_Nms_rad"), 0.17, 0.01);
+  EXPECT_NEAR(number("friction_Nm"), 0.04, 0.004);
   EXPECT_NEAR(number("inertia_kg_m2"), 0.002, 1e-5);
   // Measured, simulated as described, simulated with what was found: three curves of one run.
   const Outcome again = tandem("run found/excite.toml --quiet --duration 8 --log again");

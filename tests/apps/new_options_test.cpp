@@ -15,7 +15,7 @@ const char kCart[] = R"(<robot name="cart">
 <link name="tool"><collision><geometry><mesh filename="tool.dae"/></geometry></collision></link>
 <joint name="drive" type="planar"><parent link="world"/><child link="base"/></joint>
 <joint name="shoulder" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 0 0.1"/>
-<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="60" velocity="3"/><dynamics damping="0.5"/></joint>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="60" velocity="3"/><dynamics damping="0.5" friction="0.25"/></joint>
 <joint name="wrist" type="revolute"><parent link="arm"/><child link="hand"/><origin xyz="0 0 0.4"/>
 <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="5" velocity="3"/><dynamics damping="0.1"/></joint>
 <joint name="grip" type="prismatic"><parent link="hand"/><child link="tool"/><axis xyz="1 0 0"/>
@@ -83,9 +83,88 @@ TEST_F(NewOption, PutsTheDescriptionsDampingIntoTheDrives) {
   ASSERT_EQ(with.status, 0) << with.err;
   EXPECT_NE(without.err.find("<dynamics>"), std::string::npos) << without.err;
   EXPECT_EQ(with.err.find("<dynamics>"), std::string::npos) << with.err;
-  EXPECT_NE(read_text(folder_ / "with/robot.toml").find("0.5 of its damping the description's"),
-            std::string::npos);
+  const std::string robot = read_text(folder_ / "with/robot.toml");
+  EXPECT_NE(robot.find("0.5 of its damping the description's, its friction the description's"),
+            std::string::npos)
+      << robot;
+  EXPECT_NE(robot.find("\nfriction_Nm = 0.25  # the description's\n"), std::string::npos) << robot;
   checks("with");
+  edit("cart.urdf", "friction=\"0.25\"", "friction=\"40\"");
+  const Outcome much = tandem("new cart.urdf -o much --dynamics" + flags);
+  EXPECT_NE(much.err.find("the friction of 1 joint (<dynamics>) is not used: it would take more "
+                          "than half of the effort"),
+            std::string::npos)
+      << much.err;
+}
+
+/// The command of a message that has " --WHAT" in it: all between its quotes.
+std::string command_in(const std::string& text, const std::string& what) {
+  const std::size_t at = text.find(" --" + what);
+  if (at == std::string::npos) return {};
+  const std::size_t begin = text.rfind('`', at) + 1;
+  return text.substr(begin, text.find('`', begin) - begin);
+}
+
+// A caster got a guessed drive without a word, and the hint of a weak one did not name --lock.
+TEST_F(NewOption, NamesCommandsForJointsWithoutAMotorThatWork) {
+  write_text(folder_ / "cart.urdf", kCart);
+  edit("cart.urdf", "effort=\"5\" velocity=\"3\"", "effort=\"0\" velocity=\"3\"");
+  const Outcome made = tandem("new cart.urdf -o 'my cart' --lock drive --drop grip --density 1000");
+  ASSERT_EQ(made.status, 0) << made.err;
+  EXPECT_NE(made.err.find("joint wrist: its <limit effort> is 0, and 1 joint has more"),
+            std::string::npos)
+      << made.err;
+  EXPECT_NE(made.err.find("my cart/cart.urdf:"), std::string::npos)
+      << "the lines are those of the copy: " << made.err;
+  for (const std::string what : {"lock", "drop"}) {
+    const std::string command = command_in(made.err, what + " wrist");
+    ASSERT_TRUE(command.starts_with("tandem new cart.urdf -o ")) << what << made.err;
+    const Outcome again = tandem(command.substr(7));
+    ASSERT_EQ(again.status, 0) << command << again.err;
+    EXPECT_EQ(again.err.find("joint wrist"), std::string::npos) << again.err;
+    const std::string robot = read_text(folder_ / "my cart/robot.toml");
+    EXPECT_EQ(robot.find("\"wrist\""), std::string::npos) << "it is no [[joint]]: " << robot;
+    checks("'my cart'");
+  }
+  // One that carries another joint, and is too weak: it is locked where it is.
+  write_text(folder_ / "weak.urdf", kCart);
+  edit("weak.urdf", "effort=\"60\"", "effort=\"0.05\"");
+  edit("weak.urdf", "<origin xyz=\"0 0 0.2\"/>", "<origin xyz=\"0.4 0 0.1\"/>");  // never upright
+  const Outcome weak = tandem("new weak.urdf --lock drive --drop grip --density 1000");
+  ASSERT_EQ(weak.status, 0) << weak.err;
+  const std::string command = command_in(weak.err, "lock shoulder=");
+  ASSERT_FALSE(command.empty()) << weak.err;
+  const Outcome again = tandem(command.substr(7));
+  ASSERT_EQ(again.status, 0) << command << again.err;
+  EXPECT_EQ(again.err.find("shoulder"), std::string::npos) << again.err;
+  checks("weak");
+}
+
+TEST_F(NewOption, GivesErrorsOfAChangedDescriptionNoLinesOfTheFile) {
+  write_text(folder_ / "cart.urdf", kCart);
+  const Outcome refused = tandem("new cart.urdf --lock drive --drop wrist");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("cart.urdf: joint shoulder"), std::string::npos) << refused.err;
+  EXPECT_EQ(refused.err.find("cart.urdf:1"), std::string::npos) << refused.err;
+}
+
+TEST_F(NewOption, ListsMassesAndWhatTheyAreFrom) {
+  write_text(folder_ / "cart.urdf", kCart);
+  write_text(folder_ / "tool.dae", "<COLLADA/>");
+  edit("cart.urdf", "<link name=\"hand\">",
+       "<link name=\"hand\"><inertial><mass value=\"0.5\"/><inertia ixx=\"0.001\" ixy=\"0\" "
+       "ixz=\"0\" iyy=\"0.001\" iyz=\"0\" izz=\"0.001\"/></inertial>");
+  const Outcome made = tandem("new cart.urdf --lock drive --lock grip --density 1000 --json j");
+  ASSERT_EQ(made.status, 0) << made.err;
+  const nlohmann::json masses = json("j")["masses"];
+  EXPECT_NEAR(masses["arm"]["mass_kg"].get<double>(), 1000.0 * M_PI * 0.05 * 0.05 * 0.4, 1e-6);
+  EXPECT_EQ(masses["arm"]["from"], "density");
+  EXPECT_NEAR(masses["base"]["mass_kg"].get<double>(), 40.0, 1e-6);
+  EXPECT_EQ(masses["hand"]["from"], "urdf");
+  EXPECT_EQ(masses["hand"]["mass_kg"], 0.5);
+  EXPECT_TRUE(masses["tool"]["mass_kg"].is_null());
+  EXPECT_EQ(masses["tool"]["note"], "none, for its mesh tool.dae: this is no STL");
+  EXPECT_EQ(masses.size(), 4U);
 }
 
 TEST_F(NewOption, ExpandsXacroByTheProgramOrSaysTheCommand) {

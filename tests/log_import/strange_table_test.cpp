@@ -103,23 +103,75 @@ TEST_F(StrangeTable, WhoseTimesAreDatesIsRead) {
              "a.csv:2: t: this time is no date of ISO 8601, such as 2026-11-26T22:02:12.5Z");
 }
 
+// "is no date" was all that was said, and nothing of which of the two it is.
+TEST_F(StrangeTable, OfDatesWithSlashesIsRefusedWithTheCommandThatRewritesThem) {
+  const auto of = [](int i) {
+    return row("3/11/2026 12:00:00.%02d,%.17g,%.17g", i, std::sin(0.01 * i), std::cos(0.01 * i));
+  };
+  const std::string file = rows(99, of);
+  for (const char* unit : {"iso", "s"})
+    EXPECT_HAS(refusal({file}, map_of(unit)),
+               "a.csv:2: t: '3/11/2026 12:00:00.00' is no date that");
+  const std::string said = refusal({file}, map_of("iso"));
+  const std::string new_file = write("new.csv", "");
+  std::vector<std::int64_t> begins;
+  for (std::size_t at = said.find("sed -E '"); at != std::string::npos;
+       at = said.find("sed -E '", at + 1)) {
+    const std::string command = said.substr(at, said.find(" FILE > NEW", at) - at);
+    ASSERT_EQ(std::system((command + " '" + file + "' > '" + new_file + "'").c_str()), 0)
+        << command;
+    begins.push_back(imported({new_file}, map_of("iso")).begin_ns);
+  }
+  EXPECT_EQ(begins,
+            (std::vector{*date_time_ns("2026-11-03T12:00Z"), *date_time_ns("2026-03-11T12:00Z")}));
+}
+
+// source: file.csv.gz, which every logging program can write; it was "decompress it: gunzip"
+TEST_F(StrangeTable, InGzipIsRead) {
+  const auto of = [](int i) {
+    return row("%.2f,%.17g,%.17g", 0.01 * i, std::sin(0.01 * i), std::cos(0.01 * i));
+  };
+  const std::string file = rows(5000, of);
+  ASSERT_EQ(std::system(("gzip -nk '" + file + "' && head -c 2000 '" + file + ".gz' > '" + file +
+                         ".cut.gz' && gzip -c '" + file + ".gz' > '" + file + ".twice.gz'")
+                            .c_str()),
+            0);
+  const ImportSummary plain = imported({file}, map_of());
+  const ImportSummary done = imported({file + ".gz"}, map_of());
+  EXPECT_EQ(done.cycles, 5000U);
+  EXPECT_EQ(done.cycles, plain.cycles);
+  EXPECT_HAS(refusal({file + ".cut.gz"}, map_of()), "its compressed data are damaged or cut");
+  EXPECT_HAS(refusal({file + ".twice.gz"}, map_of()), "is compressed twice");
+  // Members one after the other, as appending programs leave them; far more than it is.
+  ASSERT_EQ(std::system(("cd '" + path("") +
+                         "' && head -n 100 a.csv | gzip > m.gz && tail -n +101 a.csv | "
+                         "gzip >> m.gz && head -c 300000000 /dev/zero | gzip > zeros.gz")
+                            .c_str()),
+            0);
+  EXPECT_EQ(imported({path("m.gz")}, map_of()).cycles, 5000U);
+  EXPECT_HAS(refusal({path("zeros.gz")}, map_of()), "zeros.gz: has more than 500 times its size");
+}
+
 TEST(IsoTime, IsReadAsPeopleWriteIt) {
   constexpr std::int64_t kSecond = 1'000'000'000;
   constexpr std::int64_t kNoon = 1'700'049'600 * kSecond;  // date -u -d 2023-11-15T12:00:00Z +%s
   for (const char* text :
        {"2023-11-15T12:00:00Z", "2023-11-15 12:00:00", "2023-11-15T12:00", "2023-11-15t12:00:00z",
         "2023-11-15T13:00:00+01:00", "2023-11-15 06:30:00.000 -0530", "2023-11-15T14:00+02",
-        "2023/11/15 12:00:00"}) {
-    EXPECT_EQ(iso_time_ns(text), kNoon) << text;
+        "2023/11/15 12:00:00", "15.11.2023 12:00:00", "15.11.2023 12:00",
+        "15.11.2023T13:00:00.0+01:00"}) {
+    EXPECT_EQ(date_time_ns(text), kNoon) << text;
   }
-  EXPECT_EQ(iso_time_ns("2023-11-15T12:00:00.123456789Z"), kNoon + 123'456'789);
-  EXPECT_EQ(iso_time_ns("2023-11-15T12:00:00,5"), kNoon + 500'000'000);
-  EXPECT_EQ(iso_time_ns("2023-11-15T12:00:00.1234567899999"), kNoon + 123'456'789);
-  EXPECT_EQ(iso_time_ns("1969-12-31T23:59:59.5Z"), -500'000'000);
-  for (const char* text : {"", "1.5", "2023-11-15", "2023-02-30T12:00:00Z", "2023-11-15T25:00:00Z",
-                           "15.11.2023 12:00", "2023-11-15T12:00:00Zx", "2023-11-15T12:00:00+",
-                           "99999-11-15T12:00:00", "2023-11-15T12:0a"}) {
-    EXPECT_FALSE(iso_time_ns(text)) << text;
+  EXPECT_EQ(date_time_ns("2023-11-15T12:00:00.123456789Z"), kNoon + 123'456'789);
+  EXPECT_EQ(date_time_ns("2023-11-15T12:00:00,5"), kNoon + 500'000'000);
+  EXPECT_EQ(date_time_ns("2023-11-15T12:00:00.1234567899999"), kNoon + 123'456'789);
+  EXPECT_EQ(date_time_ns("5.1.2024 00:00"), date_time_ns("2024-01-05T00:00Z"));
+  EXPECT_EQ(date_time_ns("1969-12-31T23:59:59.5Z"), -500'000'000);
+  for (const char* text :
+       {"", "1.5", "2023-11-15", "2023-02-30T12:00:00Z", "2023-11-15T25:00:00Z", "15.13.2023 12:00",
+        "15.11.23 12:00", "11/15/2023 12:00", "2023-11-15T12:00:00Zx", "2023-11-15T12:00:00+",
+        "99999-11-15T12:00:00", "2023-11-15T12:0a"}) {
+    EXPECT_FALSE(date_time_ns(text)) << text;
   }
 }
 
