@@ -101,6 +101,13 @@ bool AxisMaster::ignores_quick_stop(std::int64_t now_ns) const noexcept TANDEM_R
          now_ns - since_ns_ >= kQuickStopPatienceNs;
 }
 
+/// Without 605A = 2 a drive may stay in Quick Stop Active: it is let go when its ramp is over.
+bool AxisMaster::rests_in_quick_stop(std::int64_t now_ns) const noexcept TANDEM_RT {
+  return drive() == WireState::kQuickStopActive && age_cycles_ == 0 &&
+         now_ns - since_ns_ >= kQuickStopRestNs &&
+         std::abs(feedback_.velocity) < kRestVelocity_rad_s * scale_.velocity_per_rad_s;
+}
+
 /// In every mode of a drive that is enabled and wanted so.
 ErrorCode AxisMaster::excess(std::int64_t now_ns) noexcept {
   const bool wanted = target_ == TargetState::kFollow || target_ == TargetState::kHold;
@@ -218,8 +225,9 @@ bool AxisMaster::command(const CommandImage* image, std::size_t joint,
       raw_.controlword = controlword::kCommandDisableVoltage;
       return false;
     case TargetState::kQuickStop:
-      raw_.controlword = ignores_quick_stop(now_ns) ? controlword::kCommandDisableVoltage
-                                                    : controlword::kCommandQuickStop;
+      raw_.controlword = ignores_quick_stop(now_ns) || rests_in_quick_stop(now_ns)
+                             ? controlword::kCommandDisableVoltage
+                             : controlword::kCommandQuickStop;
       return false;
     case TargetState::kHold:
       // A drive that is not enabled stays as it is: holding must not switch anything on.
@@ -338,7 +346,7 @@ void AxisMaster::walk_up(bool clears_faults, std::int64_t now_ns) noexcept {
     raw_.controlword = reset_controlword();
   } else if (state == WireState::kQuickStopActive) {
     // The ramp ends by itself (605A = 2). A drive that stays, as 605A = 5 to 8 have it, is let go.
-    const bool stays = now_ns - since_ns_ >= kEnableTimeoutNs / 2;
+    const bool stays = now_ns - since_ns_ >= kQuickStopRestNs;
     raw_.controlword = stays ? controlword::kCommandDisableVoltage : controlword::kCommandQuickStop;
   } else if (state == WireState::kOperationEnabled) {
     raw_.controlword = enable_operation();

@@ -68,6 +68,10 @@ class AxisMaster {
   /// When a drive that stays in Operation Enabled in spite of a quick stop is sent "disable
   /// voltage", which it may obey.
   static constexpr std::int64_t kQuickStopPatienceNs = 300'000'000;
+  /// When a drive that stays in Quick Stop Active is let go, if it is slower than this [rad/s,
+  /// m/s].
+  static constexpr std::int64_t kQuickStopRestNs = 1'000'000'000;
+  static constexpr double kRestVelocity_rad_s = 0.01;
   static constexpr std::uint32_t kObeyCycles = 4;  ///< at least so many samples in any of them
   /// A fault reset's bit 7 changes every so many cycles, so that a board that looks seldom sees it.
   static constexpr std::uint32_t kResetToggleCycles = 4;
@@ -171,6 +175,7 @@ class AxisMaster {
  private:
   void follow(const CommandImage& image, std::size_t joint, std::int64_t now_ns) noexcept;
   [[nodiscard]] bool ignores_quick_stop(std::int64_t now_ns) const noexcept TANDEM_RT;
+  [[nodiscard]] bool rests_in_quick_stop(std::int64_t now_ns) const noexcept TANDEM_RT;
   void walk_up(bool clears_faults, std::int64_t now_ns) noexcept;
   [[nodiscard]] bool unknown_cause() const noexcept TANDEM_RT {
     return error_ == AxisError::kDriveFault &&

@@ -62,7 +62,14 @@ void DriveMaster::Impl::end_watch(Node& node) noexcept TANDEM_RT {
   };
   const auto armed = std::ranges::find_if(node.master.steps(), watches);
   const bool off = std::ranges::all_of(node.plan.joints, [&](auto j) { return axes[j].off(); });
-  if (!node.master.running() || armed == node.master.steps().end() || !off) return;
+  const NodeMaster& master = node.master;
+  const auto place = static_cast<std::size_t>(armed - master.steps().begin());
+  // A start that failed has armed those that came so far; a node that is lost is to notice it.
+  const bool lost = master.stage() == NodeStage::kDown &&
+                    master.error() != NodeError::kNotOperational &&
+                    master.error() != NodeError::kSdoAbort;
+  const bool reached = master.running() || master.step() > place;
+  if (lost || !reached || armed == master.steps().end() || !off) return;
   static constexpr std::array<std::uint8_t, 4> kNobody{};
   node.master.sdo().download(armed->index, armed->sub, std::span(kNobody).first(armed->size),
                              ports[node.plan.bus].sink);

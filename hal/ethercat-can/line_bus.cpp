@@ -54,6 +54,19 @@ bool follows_sync0(const canopen::DataSheet* sheet) {
   return std::ranges::any_of(sheet->dc_modes, &canopen::SheetDcMode::sync0);
 }
 
+/// What the slave's information memory has to say, where its object 1018 cannot.
+ethercat::sii::Identity identity_of(const BoardConfig& board) {
+  const canopen::DataSheet& sheet = *board.sheet;
+  const auto told = [&](canopen::IdentitySub sub, std::optional<std::uint32_t> configured,
+                        std::optional<std::uint32_t> of_sheet) {
+    const std::uint32_t wanted = configured.value_or(of_sheet.value_or(0));
+    return is_disputed(sheet, sub, wanted) ? wanted : 0;
+  };
+  return {.vendor = told(canopen::kVendor, board.vendor_id, sheet.vendor),
+          .product = told(canopen::kProduct, board.product_code, sheet.product),
+          .revision = told(canopen::kRevision, board.revision, sheet.revision)};
+}
+
 ecat::SlavePlan plan_of(const NodePlan& node, const canopen::DataSheet* sheet,
                         std::int64_t period_ns) {
   ecat::SlavePlan plan{.name = node.name,
@@ -82,6 +95,9 @@ Result<std::unique_ptr<LineBus>> LineBus::create(const RobotConfig& robot, std::
         node->board >= 0 ? robot.boards[static_cast<std::size_t>(node->board)].sheet.get()
                          : nullptr;
     plans.push_back(plan_of(*node, sheet, config.period_ns));
+    if (sheet != nullptr) {
+      plans.back().identity = identity_of(robot.boards[static_cast<std::size_t>(node->board)]);
+    }
     Slave& slave = slaves.emplace_back();
     slave.id = node->id;
     slave.heartbeat_ns = std::int64_t{node->heartbeat_ms} * 1'000'000;

@@ -29,7 +29,9 @@ void add_check(Steps& steps, std::uint16_t index, std::uint8_t sub, std::uint32_
 }
 
 /// What the configuration says, else the sheet; what neither tells is not looked at.
-void add_identity(Steps& steps, const BoardConfig& board) {
+/// On EtherCAT what the object 1018 would contradict by the sheet is left to the information
+/// memory.
+void add_identity(Steps& steps, const BoardConfig& board, bool line) {
   const DataSheet& sheet = *board.sheet;
   // A drive by its objects may say another profile, or none: then just what its sheet says.
   const auto type = sheet.value(object::kDeviceType, 0, 0).value_or(kDriveDeviceType);
@@ -37,7 +39,8 @@ void add_identity(Steps& steps, const BoardConfig& board) {
   const auto check = [&](IdentitySub sub, std::optional<std::uint32_t> configured,
                          std::optional<std::uint32_t> of_sheet, SdoUse use) {
     const auto wanted = configured ? configured : of_sheet;
-    if (wanted) add_check(steps, object::kIdentity, sub, *wanted, use);
+    const bool disputed = wanted && line && is_disputed(sheet, sub, *wanted);
+    if (wanted && !disputed) add_check(steps, object::kIdentity, sub, *wanted, use);
   };
   check(kVendor, board.vendor_id, sheet.vendor, SdoUse::kCheck);
   check(kProduct, board.product_code, sheet.product, SdoUse::kCheck);
@@ -367,13 +370,18 @@ void add_watching(Steps& steps, const NodePlan& node, const DataSheet* sheet);
 
 }  // namespace
 
+bool is_disputed(const DataSheet& sheet, std::uint8_t sub, std::uint32_t wanted) {
+  const SheetEntry* entry = sheet.find(object::kIdentity, sub);
+  return entry != nullptr && entry->value && entry->value->number != wanted;
+}
+
 std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan& node) {
   Steps steps;
   const BoardConfig* board =
       node.board >= 0 ? &robot.boards[static_cast<std::size_t>(node.board)] : nullptr;
   const DataSheet* sheet = board != nullptr ? board->sheet.get() : nullptr;
   if (board != nullptr) {
-    add_identity(steps, *board);
+    add_identity(steps, *board, node.ethercat);
     if (board->keeps_configuration) add_names(steps, SdoUse::kVerify);
   } else {
     add_sensor_identity(steps);

@@ -64,6 +64,11 @@ template <class T>
 [[nodiscard]] std::vector<SdoStep> make_configuration(const RobotConfig& robot,
                                                       const NodePlan& node);
 
+/// Whether the sheet's dictionary has another value of 1018:sub than the device is to have. Files
+/// of EtherCAT slaves have such: then the slave's information memory tells, and not the object.
+[[nodiscard]] bool is_disputed(const canopen::DataSheet& sheet, std::uint8_t sub,
+                               std::uint32_t wanted);
+
 /// Fills 1020's two numbers in, where they are: a hash of every write that the drive keeps. So they
 /// change with the configuration, and with nothing else.
 void name_configuration(std::span<SdoStep> steps) noexcept TANDEM_RT;

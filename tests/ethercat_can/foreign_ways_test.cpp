@@ -86,6 +86,43 @@ TEST(ForeignWays, SoItIsAtTheEndOfARun) {
   EXPECT_EQ(rig.master->status_text(), "") << "it obeyed";
 }
 
+/// A CANopenNode drive without 605A: at the end of a run the watch over the master was still armed.
+TEST(ForeignWays, ADriveThatStaysInQuickStopActiveIsLetGoAtTheEnd) {
+  SheetRig rig(servo().remove(0x605A));
+  rig.drive.stays_in_quick_stop = true;
+  ASSERT_TRUE(rig.bring_up());
+  int taken = 0;
+  while (!rig.end() && taken < 4000) ++taken;
+  rig.exchange();
+  EXPECT_LT(taken, 1100);
+  EXPECT_EQ(rig.drive.value(0x6041), 0x0250);
+  EXPECT_EQ(rig.drive.value(0x1016, 1), 0) << "a silent master would be its error 8130";
+}
+
+TEST(ForeignWays, AfterAStopItIsLetGoWhenItsRampIsOver) {
+  SheetRig rig(servo().remove(0x605A));
+  rig.drive.stays_in_quick_stop = true;
+  ASSERT_TRUE(rig.bring_up());
+  rig.master->stop(StopCategory::kCategory1);
+  rig.drive.value(0x606C) = 6000;  // its ramp: 6000 counts/s are 1 rad/s
+  rig.steps(1500);
+  EXPECT_EQ(rig.drive.value(0x6041), 0x0217);
+  rig.drive.value(0x606C) = 0;
+  rig.steps(5);
+  EXPECT_EQ(rig.drive.value(0x6041), 0x0250);
+  EXPECT_EQ(rig.state.fault()[0], 0U);
+}
+
+TEST(ForeignWays, AfterAStartThatFailedNobodyWatchesTheMasterEither) {
+  SheetRig rig(servo());
+  rig.drive.refuses_operation = true;
+  EXPECT_FALSE(rig.bring_up());
+  EXPECT_NE(rig.drive.value(0x1016, 1), 0);
+  for (int i = 0; i < 4000 && !rig.end(); ++i) continue;
+  rig.exchange();
+  EXPECT_EQ(rig.drive.value(0x1016, 1), 0);
+}
+
 TEST(ForeignWays, AFaultsCauseIsAskedForWhereNoPdoTellsIt) {
   SheetRig rig(servo().add(0x603F, 0, kUnsigned16, canopen::kRead));
   ASSERT_TRUE(rig.bring_up());

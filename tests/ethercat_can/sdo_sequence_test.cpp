@@ -45,6 +45,27 @@ TEST(SdoSequence, MapsAPdoByTheStandardsProcedure) {
   EXPECT_EQ(find(steps, 0x1600, 3)->bytes, (std::array<std::uint8_t, 4>{0x20, 0x00, 0x7A, 0x60}));
 }
 
+/// KickCAT's ESI of a drive has product 03B11002, and 32 in the dictionary's 1018.
+TEST(SdoSequence, AnIdentityThatTheSheetContradictsIsTheInformationMemorysOnALine) {
+  RobotConfig robot = robot_config();
+  canopen::DataSheet sheet = *robot.boards[0].sheet;
+  sheet.product = 0x03B11002;
+  const auto layout = make_pdo_layout(robot);
+  ASSERT_TRUE(layout);
+  NodePlan node = layout->nodes[0];
+  for (const bool line : {false, true}) {
+    for (const std::uint32_t told : {0x32u, 0x03B11002u}) {
+      for (canopen::SheetEntry& entry : sheet.entries) {
+        if (entry.index == 0x1018 && entry.sub == 2) entry.value = canopen::SheetValue{told};
+      }
+      robot.boards[0].sheet = std::make_shared<const canopen::DataSheet>(sheet);
+      node.ethercat = line;
+      const SdoStep* check = find(make_configuration(robot, node), 0x1018, 2);
+      EXPECT_EQ(check == nullptr, line && told == 0x32) << line << told;
+    }
+  }
+}
+
 TEST(SdoSequence, WritesTheProtections) {
   RobotConfig robot = robot_config();
   robot.actuators[0].continuous_current_A = 12.0;

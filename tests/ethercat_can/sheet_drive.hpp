@@ -37,6 +37,8 @@ class SheetDrive {
   bool tells_states = false;             ///< its heartbeat comes at each change of state, too
   int first_syncs_unanswered = 0;        ///< after each start
   bool ignores_quick_stop = false;       ///< while it is enabled
+  bool stays_in_quick_stop = false;      ///< as 605A = 5 to 8 have it
+  bool refuses_operation = false;        ///< it stays pre-operational
   int error = 0x8611;                    ///< 603F in a fault
   int set_point_ms = 0;                  ///< mode 1: from bit 4 until it takes one
   bool takes_set_points = true;          ///< mode 1
@@ -121,7 +123,7 @@ class SheetDrive {
   }
   void on_nmt(int command) {
     if (command == 0x81 || command == 0x82) power_on();
-    if (command == 1) nmt_ = 5;
+    if (command == 1 && !refuses_operation) nmt_ = 5;
     if (command == 2) nmt_ = 4;
     if (command == 0x80) nmt_ = 127;
     if (command == 1) unanswered_ = first_syncs_unanswered;
@@ -230,24 +232,27 @@ class SheetDrive {
       out.push_back(frame);
     }
   }
-  /// CiA 402's states: 1 switch-on disabled, 2 ready, 3 switched on, 4 enabled, 5 fault.
+  /// CiA 402's states: 1 switch-on disabled, 2 ready, 3 switched on, 4 enabled, 5 fault, 6 quick
+  /// stop.
   void machine(int axis) {
     const int at = 0x800 * axis;
     int& state = state_[axis];
     const auto cw = static_cast<unsigned>(value(0x6040 + at));
     if (state == 5) {
       if ((cw & 0x80) != 0 && (last_controlword_[axis] & 0x80) == 0) state = 1;
+    } else if ((cw & 0x06) == 0x02 && stays_in_quick_stop && (state == 4 || state == 6)) {
+      state = 6;
     } else if ((cw & 0x02) == 0 || ((cw & 0x04) == 0 && !(ignores_quick_stop && state == 4))) {
       state = 1;
     } else if ((cw & 0x0F) == 0x06 && state <= 3) {
       state = 2;
-    } else if ((cw & 0x0F) == 0x07 && state >= 2) {
+    } else if ((cw & 0x0F) == 0x07 && state >= 2 && state <= 4) {
       state = 3;
-    } else if ((cw & 0x0F) == 0x0F && state >= 3) {
+    } else if ((cw & 0x0F) == 0x0F && state >= 3 && state <= 4) {
       state = 4;
     }
     last_controlword_[axis] = cw;
-    constexpr std::array<int, 6> kStatusword{0, 0x0250, 0x0231, 0x0233, 0x0237, 0x0218};
+    constexpr std::array<int, 7> kStatusword{0, 0x0250, 0x0231, 0x0233, 0x0237, 0x0218, 0x0217};
     value(0x6041 + at) = kStatusword[static_cast<std::size_t>(state)];
     if (axis == 0 && state == 4 && value(0x6061) == 6) value(0x6041) |= home(cw);
     if (axis == 0 && value(0x6061) == 1) value(0x6041) |= take_set_point(cw);

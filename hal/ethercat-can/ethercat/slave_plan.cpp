@@ -79,7 +79,9 @@ bool matches(const SlavePlan& plan, const ethercat::sii::Identity& found) noexce
   const bool revision =
       wanted.revision == 0 || (found.revision >> 16 == wanted.revision >> 16 &&
                                (found.revision & 0xFFFF) >= (wanted.revision & 0xFFFF));
-  return same(wanted.vendor, found.vendor) && same(wanted.product, found.product) && revision &&
+  const bool vendor =
+      same(wanted.vendor, found.vendor) || found.vendor == ethercat::sii::kNobodysVendor;
+  return vendor && same(wanted.product, found.product) && revision &&
          same(wanted.serial, found.serial);
 }
 
