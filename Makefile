@@ -7,17 +7,20 @@ FUZZ_RUNS ?=
 FUZZ_JOBS ?= 4
 FUZZ_TARGETS ?= urdf robot experiment message request sample sheet frames ethercat line mcap import
 
-.PHONY: demo robot test test-all bench unit anywhere hil sanitized rtsan asan tsan fuzz format lint tidy mutations clean help
+.PHONY: demo robot test proof test-all bench unit built real anywhere hil sanitized rtsan asan tsan fuzz format lint \
+  tidy hooks mutations clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
 	@echo "make robot  the program for a robot PC: the fastest, in build/robot (12 minutes)"
-	@echo "make test   install what is missing, build everything, run every test"
-	@echo "make test-all  that, and the proofs that take long"
+	@echo "make test   install what is missing, build everything, run the unit tests (12 minutes the first time)"
+	@echo "make proof  that build in strange surroundings and on a CAN stack, fuzzers, real-time sanitizer (15 minutes)"
+	@echo "make test-all  both, and the proofs that take long (hours)"
 	@echo "make bench  times this build; AGAINST=../old/build/release: beside another one"
 	@echo "make fuzz   the fuzzers, a minute each, four at a time; FUZZ_RUNS=1000000: so many inputs each"
 	@echo "make mutations  whether the tests notice 200 broken lines (hours)"
 	@echo "make format  lay out every source; make lint: whether they are (part of make test)"
+	@echo "make hooks  lay out what is committed, at each commit"
 	@echo "make clean  remove build/ and runs/"
 
 # Installs missing packages (root or sudo only then), builds what the demo needs, runs it.
@@ -38,21 +41,27 @@ robot:
 	@scripts/install-dependencies demo
 	@JOBS=$(JOBS) scripts/build-robot
 
-# What CI runs (.ci/run, in a fresh clone): all tests; some of them in strange surroundings; the tests
-# on a real CAN stack, which take one core, and beside them thirteen seconds of each fuzz target and
-# the real-time proof. The last lines say what ran and what did not. Strange surroundings want the
-# build folder for themselves.
+# Layout, build and unit tests. The last lines say what ran and what did not.
 test:
 	@rm -f build/summary
 	@$(MAKE) --no-print-directory lint
 	@$(MAKE) --no-print-directory unit
-	@$(MAKE) --no-print-directory anywhere
-	@$(MAKE) --no-print-directory --jobs 2 --output-sync=line hil sanitized
+	@echo
+	@cat build/summary
+
+# What tests alone do not show, on what `make test` built. What meets the machine takes one core, and
+# beside it thirteen seconds of each fuzz target and the real-time proof. CI runs both (.ci/run).
+proof:
+	@rm -f build/summary
+	@$(MAKE) --no-print-directory built
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync=line real sanitized
 	@echo
 	@cat build/summary
 
 # What takes too long for every change.
-test-all: test
+test-all:
+	@$(MAKE) --no-print-directory test
+	@$(MAKE) --no-print-directory proof
 	@scripts/install-dependencies engines
 	@cmake --preset release --log-level=WARNING && cmake --build --preset release --parallel $(JOBS)
 	@build/release/bin/engines_test --gtest_brief=1
@@ -81,23 +90,31 @@ bench:
 	@cmake --build --preset release --parallel $(JOBS)
 	@bench/compare $(AGAINST) --row
 
+built:
+	@scripts/install-dependencies test
+	@cmake --preset release --log-level=WARNING
+	@cmake --build --preset release --parallel $(JOBS)
+
 unit:
 	@scripts/install-dependencies test
 	@scripts/install-node-modules
-	@cmake --preset release --log-level=WARNING
-	@cmake --build --preset release --parallel $(JOBS)
+	@$(MAKE) --no-print-directory built
 	@TITLE=unit scripts/run-tests build/release $(TEST_JOBS) -LE hil
+
+# One after the other: both want the build folder for themselves. Without ANYWHERE only the second,
+# for who runs the first as root (.ci/run).
+ANYWHERE ?= yes
+real:
+	@$(if $(ANYWHERE),scripts/test-anywhere build/release)
+	@TITLE=hil scripts/run-tests build/release 1 -L hil --verbose
 
 # A choice of the unit tests, as `unit` built them, as another user and with other surroundings.
 anywhere:
 	@scripts/test-anywhere build/release
 
 # On this machine's kernel if it has CAN, else in a User-Mode-Linux one: tests/hil/README.md.
-hil:
-	@scripts/install-dependencies test
-	@cmake --preset release --log-level=WARNING
-	@cmake --build --preset release --parallel $(JOBS)
-	@TITLE=hil scripts/run-tests build/release 1 -L hil --verbose
+hil: built
+	@$(MAKE) --no-print-directory real ANYWHERE=
 
 # One after the other: each takes two cores. The fuzzers take forty seconds, however many they are.
 sanitized:
