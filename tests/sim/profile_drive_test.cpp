@@ -197,7 +197,7 @@ TEST_P(ProfileChain, VelocityIsProfileVelocity) {
 
 INSTANTIATE_TEST_SUITE_P(Wires, ProfileChain,
                          ::testing::Values(Wire{"Can", can_robot}, Wire{"EtherCat", line_robot}),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& wire) { return wire.param.name; });
 
 }  // namespace
 }  // namespace tandem::sim
