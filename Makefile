@@ -1,7 +1,7 @@
 # Two commands: `make demo` and `make test`. Thin covers over the CMake presets.
 JOBS ?= $(shell nproc)
-# Some tests wait for other processes.
-TEST_JOBS ?= $(shell echo $$(($(JOBS) + 1)))
+# Many tests wait for other processes.
+TEST_JOBS ?= $(shell echo $$(($(JOBS) + 2)))
 FUZZ_SECONDS ?= 60
 FUZZ_RUNS ?=
 FUZZ_JOBS ?= 4
@@ -158,6 +158,11 @@ format:
 lint:
 	@scripts/install-dependencies test
 	@$(SOURCES) | xargs $(CLANG_FORMAT) --dry-run -Werror
+
+# At each commit, what is committed is laid out.
+hooks:
+	@git config core.hooksPath scripts/hooks
+	@echo "git config --unset core.hooksPath takes it away again"
 
 # Over the sources as `unit` compiles them. The precompiled header, which clang reads as text, wants
 # Eigen's folder everywhere.
