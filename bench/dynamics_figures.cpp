@@ -177,7 +177,7 @@ std::expected<std::vector<Robot>, Diagnostics> bundled() {
   std::vector<Robot> robots;
   std::set<std::string> known;
   for (const fs::path& file : files) {
-    auto read = runtime::read_robot(file.string());
+    auto read = robot::read_complete_robot(file.string());
     if (!read) return std::unexpected(read.error());
     Robot robot{read->config.name, std::move(read->description.tree),
                 sim::model_spec(read->config)};

@@ -179,7 +179,7 @@ void print(const TimedTap& tap) {
 Result<std::unique_ptr<dds::Publisher>> make_publisher(const Rig& rig, const sim::SimRobot& robot,
                                                        dds::Participant& node) {
   const runtime::Experiment& e = rig.experiment;
-  const auto description = runtime::read_robot(e.robot_file);
+  const auto description = robot::read_complete_robot(e.robot_file);
   if (!description) return std::unexpected(description.error().front());
   return dds::Publisher::create(node, {.robot = e.robot,
                                        .tree = description->description.tree,

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -132,6 +133,17 @@ struct Tree {
     for (std::size_t i = 0; i < joints.size(); ++i)
       if (joints[i].name == joint) return static_cast<int>(i);
     return -1;
+  }
+  /// Joints that move `body`, the root's side first; a follower's leader stands for it.
+  [[nodiscard]] std::vector<int> path_to(int body) const {
+    std::vector<int> path;
+    for (; body > 0; body = joints[static_cast<std::size_t>(body - 1)].parent) {
+      const Joint& joint = joints[static_cast<std::size_t>(body - 1)];
+      const int moves = joint.follows() ? joint.leader : body - 1;
+      if (std::ranges::find(path, moves) == path.end()) path.push_back(moves);
+    }
+    std::ranges::reverse(path);
+    return path;
   }
 };
 

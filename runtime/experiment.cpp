@@ -6,10 +6,10 @@
 #include <ranges>
 
 #include "base/nearest.hpp"
+#include "robot/posture.hpp"
 #include "runtime/estimation_options.hpp"
 #include "runtime/experiment_tables.hpp"
 #include "runtime/robot_layout.hpp"
-#include "runtime/standing_height.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -140,7 +140,7 @@ void add_parallel(Experiment& e, TomlTable& root, Diagnostics& errors) {
                 "give the path of a robot's TOML, from the experiment's folder");
     return;
   }
-  auto read = read_robot(parallel.robot_file);
+  auto read = robot::read_complete_robot(parallel.robot_file);
   if (!read) {
     errors.insert(errors.end(), read.error().begin(), read.error().end());
     return;
@@ -167,6 +167,12 @@ void add_parallel(Experiment& e, TomlTable& root, Diagnostics& errors) {
 
 }  // namespace
 
+std::shared_ptr<const model::Tree> Experiment::tree() const {
+  return description == nullptr
+             ? nullptr
+             : std::shared_ptr<const model::Tree>(description, &description->tree);
+}
+
 std::uint64_t Experiment::cycles() const {
   return static_cast<std::uint64_t>(
       std::llround(duration_s * 1e9 / static_cast<double>(loop.period_ns)));
@@ -184,8 +190,8 @@ FallLimits Experiment::fall_limits() const {
   limits.watched = falls_are_faults;
   limits.ground_m = robot.contact.height_m;
   limits.standing_m = limits.highest_m = start->base_height_m - limits.ground_m;
-  if (tree == nullptr) return limits;
-  if (const auto touching = standing(robot, *start, *tree)) {
+  if (description == nullptr) return limits;
+  if (const auto touching = robot::standing(robot, *start, description->tree)) {
     limits.standing_m = touching->base_height_m - limits.ground_m;
     limits.highest_m = std::max(limits.highest_m, limits.standing_m);
   }
@@ -206,7 +212,7 @@ sim::SimRobotConfig Experiment::sim_robot_config() const {
           .bus_timing = sim.bus_timing,
           .bus_latency_ns = sim.bus_latency_ns,
           .answer_window_ns = std::llround(hal.answer_window * static_cast<double>(loop.period_ns)),
-          .tree = tree};
+          .tree = tree()};
 }
 
 std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) {
@@ -217,11 +223,10 @@ std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) 
   e.files = {{file, document->text()}};
   Diagnostics robot_errors;
   if (!e.robot_file.empty()) {
-    if (auto robot = read_robot(e.robot_file)) {
+    if (auto robot = robot::read_complete_robot(e.robot_file)) {
       e.robot = std::move(robot->config);
       for (auto& one : robot->files) e.files.push_back(std::move(one));
-      e.warnings = std::move(robot->description.warnings);
-      e.tree = std::make_shared<const model::Tree>(std::move(robot->description.tree));
+      e.description = std::make_shared<const model::UrdfModel>(std::move(robot->description));
       combine(e, root);
       add_parallel(e, root, robot_errors);
     } else {

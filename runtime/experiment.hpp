@@ -18,10 +18,10 @@
 #include "hal/config/robot_config.hpp"
 #include "hal/sim/sim_robot.hpp"
 #include "model/urdf.hpp"
+#include "robot/complete_robot.hpp"
 #include "rt/cyclic_loop.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/after_stop.hpp"
-#include "runtime/complete_robot.hpp"
 #include "runtime/controller_spec.hpp"
 #include "runtime/fall_watch.hpp"
 #include "runtime/teleoperation.hpp"
@@ -105,13 +105,12 @@ struct ParallelOptions {
 
 /// The whole experiment.toml with the robot it names.
 struct Experiment {
-  std::string file;                         ///< the TOML's path
-  std::string robot_file;                   ///< resolved against the TOML's folder
-  hal::RobotConfig robot;                   ///< completed from its description
-  FileTexts files;                          ///< all that was read, the TOML itself first
-  Diagnostics warnings;                     ///< what was tolerated in the description
-  std::shared_ptr<const model::Tree> tree;  ///< the description; null when none was read
-  double duration_s = 0.0;                  ///< that controllers run, after the bring-up
+  std::string file;        ///< the TOML's path
+  std::string robot_file;  ///< resolved against the TOML's folder
+  hal::RobotConfig robot;  ///< completed from its description
+  robot::FileTexts files;  ///< all that was read, the TOML itself first
+  std::shared_ptr<const model::UrdfModel> description;  ///< null when none was read
+  double duration_s = 0.0;  ///< that controllers run, after the bring-up
   std::uint64_t seed = 1;
   std::string posture;         ///< where the robot starts; empty: every joint at 0
   std::string kernel_variant;  ///< empty: the best that this CPU runs
@@ -135,6 +134,8 @@ struct Experiment {
   std::vector<ControllerSpec> controllers;
   TomlDocument document;  ///< its diagnostics() grow while controllers read parameters
 
+  /// The description's tree; null when none was read.
+  [[nodiscard]] std::shared_ptr<const model::Tree> tree() const;
   /// Cycles that controllers run: duration over period, rounded.
   [[nodiscard]] std::uint64_t cycles() const;
   /// Cycles that every joint is held before they do: settle_s over period, rounded up.

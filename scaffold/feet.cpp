@@ -77,7 +77,7 @@ std::vector<int> lowest_ends(const Tree& tree, const Posed& neutral) {
 /// The length of the leg that ends in `body`, along its joints.
 double leg_length(const Tree& tree, const Posed& neutral, int body) {
   double length = 0.0;
-  const std::vector<int> path = path_to(tree, body);
+  const std::vector<int> path = tree.path_to(body);
   for (std::size_t i = 1; i < path.size(); ++i) {
     length += (neutral.origin(path[i]) - neutral.origin(path[i - 1])).norm();
   }
@@ -125,7 +125,7 @@ double ball_radius(const model::Inertia& inertia) {
 /// A limb that ends far beyond its last joint ends in a point: it has no joint left that would keep
 /// a sole level. Without points when it does not.
 ContactPatch shank_end(const Tree& tree, const Posed& neutral, int body, int& link) {
-  if (path_to(tree, body).size() > kMostWithoutAnkle) return {};
+  if (tree.path_to(body).size() > kMostWithoutAnkle) return {};
   const Vector3d knee = neutral.origin(body - 1);
   const double leg = leg_length(tree, neutral, body);
   Vector3d end = 2.0 * (neutral.body(body) * tree.bodies[body].inertia).com_m - knee;
@@ -145,7 +145,7 @@ ContactPatch shank_end(const Tree& tree, const Posed& neutral, int body, int& li
 
 /// No sole stays level at the end of a shank.
 void stand_on_the_middle(const Tree& tree, const Posed& neutral, Foot& foot, ContactPatch& patch) {
-  if (patch.points.size() < 3 || path_to(tree, foot.body).size() > kFewJoints) return;
+  if (patch.points.size() < 3 || tree.path_to(foot.body).size() > kFewJoints) return;
   int link = foot.link;
   if (shank_end(tree, neutral, foot.body, link).points.empty()) return;
   Vector3d middle = Vector3d::Zero();
@@ -247,7 +247,7 @@ Vector3d direction_down(const Tree& tree, const std::vector<Foot>& feet, const P
   double length = 0.0;
   for (const Foot& foot : feet) {
     const Vector3d leg = (neutral.body(foot.body) * tree.bodies[foot.body].inertia).com_m -
-                         neutral.origin(path_to(tree, foot.body).front());
+                         neutral.origin(tree.path_to(foot.body).front());
     way += leg;
     length += leg.norm();
   }

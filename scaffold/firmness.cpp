@@ -170,7 +170,7 @@ std::optional<Error> falls_over(const NewRobot& robot, const VectorXd& q) {
   if (!times || *times < 1.0) return std::nullopt;
   std::vector<int> legs;
   for (const Foot& foot : robot.feet) {
-    for (const int j : path_to(robot.tree, foot.body)) {
+    for (const int j : robot.tree.path_to(foot.body)) {
       if (robot.tree.joints[j].type != model::JointType::kPrismatic) legs.push_back(j);
     }
   }

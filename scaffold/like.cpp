@@ -159,7 +159,7 @@ class Chooser {
   [[nodiscard]] double lasting(const hal::JointConfig& theirs, double larger) const {
     hal::JointConfig unlimited;
     unlimited.max_torque_Nm = std::numeric_limits<double>::infinity();
-    return scale_ * larger * lasting_strength_of(unlimited, like_.config.actuator_of(theirs));
+    return scale_ * larger * hal::lasting_strength_of(unlimited, like_.config.actuator_of(theirs));
   }
   /// The drive that gives way least short of too much; the firmest of all when none is enough.
   [[nodiscard]] const hal::JointConfig& firm_enough(const hal::JointConfig& first,
@@ -214,7 +214,7 @@ void take_drives(const Like& like, const std::vector<JointLoad>& loads,
   const Chooser chooser(like, robot, s);
   const auto in_leg = [&](int joint) {
     return std::ranges::any_of(robot.feet, [&](const Foot& foot) {
-      return std::ranges::count(path_to(robot.tree, foot.body), joint) > 0;
+      return std::ranges::count(robot.tree.path_to(foot.body), joint) > 0;
     });
   };
   using Names = std::pair<std::string, std::string>;  // of the drive and of its gains

@@ -69,7 +69,7 @@ void add_stance(const Tree& tree, const std::vector<Foot>& feet, const Posed& st
                 std::vector<JointLoad>& loads) {
   const double share_kg = stance.whole().mass_kg / static_cast<double>(feet.size());
   for (const Foot& foot : feet) {
-    const std::vector<int> path = path_to(tree, foot.body);
+    const std::vector<int> path = tree.path_to(foot.body);
     const Vector3d sole = (stance.link(foot.link) * foot.sole_in_link).p;
     const double length = (stance.origin(path.front()) - sole).norm();
     const double height = (stance.whole().com_m - sole).norm();

@@ -91,13 +91,13 @@ class Swinging {
       if (in_leg(j)) continue;
       const hal::ActuatorConfig& drive = robot_.config.actuator_of(joint);
       const double all = posed.gravity_load(j) + torque[j] + drive.inertia_kg_m2 * qdd[j];
-      shares[j] = std::abs(all) / strength_of(joint, drive);
+      shares[j] = std::abs(all) / hal::strength_of(joint, drive);
     }
     return shares;
   }
   [[nodiscard]] bool in_leg(int joint) const {
     return std::ranges::any_of(robot_.feet, [&](const Foot& foot) {
-      const std::vector<int> path = path_to(robot_.tree, foot.body);
+      const std::vector<int> path = robot_.tree.path_to(foot.body);
       return std::ranges::find(path, joint) != path.end();
     });
   }

@@ -142,15 +142,4 @@ MatrixXd Posed::com_jacobian() const {
   return of_coordinates(std::move(J));
 }
 
-std::vector<int> path_to(const model::Tree& tree, int body) {
-  std::vector<int> path;
-  for (; body > 0; body = tree.joints[body - 1].parent) {
-    const model::Joint& joint = tree.joints[body - 1];
-    const int moves = joint.follows() ? joint.leader : body - 1;
-    if (std::ranges::find(path, moves) == path.end()) path.push_back(moves);
-  }
-  std::ranges::reverse(path);
-  return path;
-}
-
 }  // namespace tandem::scaffold

@@ -61,7 +61,4 @@ class Posed {
   std::vector<model::Inertia> beyond_;  ///< per body: its own and all that hangs on it
 };
 
-/// Joints that move `body`, the root's side first; a follower's leader stands for it.
-[[nodiscard]] std::vector<int> path_to(const model::Tree& tree, int body);
-
 }  // namespace tandem::scaffold

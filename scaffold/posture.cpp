@@ -29,7 +29,7 @@ constexpr double kClear_m = 0.05;     // over the base's plane, of a waiting pos
 /// The joints that a body's dexterity is judged by. Slides move it in their direction in every
 /// posture, and hide that the joints that turn are stretched: they count where fewer than two turn.
 std::vector<int> judged_by(const Posed& posed, const Tree& tree, int body) {
-  const std::vector<int> path = path_to(tree, body);
+  const std::vector<int> path = tree.path_to(body);
   std::vector<int> turning = path;
   std::erase_if(turning, [&posed](int joint) { return posed.slides(joint); });
   return turning.size() < 2 ? path : turning;

@@ -39,7 +39,7 @@ Standing::Standing(const Tree& tree, const std::vector<Foot>& feet, const Vector
   in_leg_.assign(tree.joints.size(), false);
   const Posed neutral(tree, neutral_);
   for (const Foot& foot : feet_) {
-    for (const int j : path_to(tree, foot.body)) in_leg_[j] = true;
+    for (const int j : tree.path_to(foot.body)) in_leg_[j] = true;
     Vector3d home = (neutral.link(foot.link) * foot.sole_in_link).p;
     const Knee knee = knee_of(foot);
     if (!foot.flat() && knee.hip >= 0) {  // a point foot stands under its hip
@@ -71,7 +71,7 @@ Standing::Knee Standing::knee_of(const Foot& foot) const {
   const Vector3d left = level_.col(1);
   const Vector3d sole = (neutral.link(foot.link) * foot.sole_in_link).p;
   std::vector<int> pitch;
-  for (const int j : path_to(tree_, foot.body)) {
+  for (const int j : tree_.path_to(foot.body)) {
     if (!neutral.slides(j) && std::abs(neutral.axis(j).dot(left)) > 0.7) pitch.push_back(j);
   }
   Knee found;

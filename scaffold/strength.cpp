@@ -12,23 +12,7 @@ namespace {
 
 constexpr double kReserve = 0.9;  // of a strength: more than that leaves nothing to balance with
 
-double per_ampere(const hal::ActuatorConfig& drive) {
-  return drive.gear_ratio * drive.torque_constant_Nm_A;
-}
-
 }  // namespace
-
-double strength_of(const hal::JointConfig& joint, const hal::ActuatorConfig& drive) {
-  const double by_voltage = drive.voltage_limit_V / drive.resistance_ohm;
-  return std::min(joint.max_torque_Nm,
-                  per_ampere(drive) * std::min(drive.current_limit_A, by_voltage));
-}
-
-double lasting_strength_of(const hal::JointConfig& joint, const hal::ActuatorConfig& drive) {
-  const double most = strength_of(joint, drive);
-  if (!(drive.continuous_current_A > 0.0)) return most;
-  return std::min(most, per_ampere(drive) * drive.continuous_current_A);
-}
 
 Diagnostics weak_drives(const NewRobot& robot, const std::vector<double>& torques) {
   Diagnostics weak;
@@ -36,7 +20,7 @@ Diagnostics weak_drives(const NewRobot& robot, const std::vector<double>& torque
     const int j = robot.tree.joint_index(joint.name);
     const hal::ActuatorConfig& drive = robot.config.actuator_of(joint);
     const double needs = std::abs(torques[static_cast<std::size_t>(j)]);
-    const double has = lasting_strength_of(joint, drive);
+    const double has = hal::lasting_strength_of(joint, drive);
     if (needs <= kReserve * has) continue;
     const bool by_limit = has >= joint.max_torque_Nm;
     const bool slides = robot.tree.joints[j].type == model::JointType::kPrismatic;

@@ -8,7 +8,7 @@
 #include <ctime>
 #include <fstream>
 
-#include "apps/robot/robot_files.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 namespace {

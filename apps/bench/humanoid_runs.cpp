@@ -45,7 +45,7 @@ class Scratch {
 /// The experiment with its robot by an absolute path and with the entry's [sim].
 std::string experiment_text(const std::string& folder, const std::string& name,
                             const EngineEntry& entry) {
-  std::string text = text_of(folder + "/" + name);
+  std::string text = robot::text_of(folder + "/" + name);
   const std::string robot = "robot = \"";
   text.insert(text.find(robot) + robot.size(), folder + "/");
   text += fmt::format("\n[sim]\nengine = \"{}\"\n", entry.engine);
@@ -124,7 +124,7 @@ StandRow stand(const EngineEntry& entry, sim::HeldRobot coman, double weight_N) 
 Result<std::vector<StandRow>> measure_stand(const std::vector<EngineEntry>& entries) {
   const auto folder = bundled_folder("coman");
   if (!folder) return std::unexpected(folder.error());
-  const auto coman = read_robot(*folder + "/robot.toml");
+  const auto coman = robot::read_robot(*folder + "/robot.toml");
   if (!coman) return std::unexpected(coman.error().front());
   const auto kernels = supply_kernels(*coman, {}, MissingKernels::kBuild);
   if (!kernels) return std::unexpected(kernels.error());
@@ -162,9 +162,9 @@ Result<std::vector<HumanoidRow>> measure_humanoid(const std::string& experiment,
                .output = scratch.file("said")});
     if (!child) return std::unexpected(child.error());
     (void)wait_for(*child);  // the JSON says how it went
-    const Json run = Json::parse(text_of(json), nullptr, false);
+    const Json run = Json::parse(robot::text_of(json), nullptr, false);
     if (run.is_discarded()) {
-      rows.push_back({.entry = &entry, .refusal = text_of(scratch.file("said"))});
+      rows.push_back({.entry = &entry, .refusal = robot::text_of(scratch.file("said"))});
     } else {
       rows.push_back(row_of(entry, run));
     }

@@ -25,7 +25,7 @@ std::array<double, 3> box_inertia(double mass, double x, double y, double z) {
           mass / 12.0 * (x * x + y * y)};
 }
 
-Result<Subject> finish(RobotFiles robot) {
+Result<Subject> finish(robot::RobotFiles robot) {
   auto kernels = supply_kernels(robot, {}, MissingKernels::kBuild);
   if (!kernels) return std::unexpected(kernels.error());
   Subject subject{std::move(robot), std::move(*kernels)};
@@ -35,7 +35,7 @@ Result<Subject> finish(RobotFiles robot) {
 
 Result<Subject> from_urdf(const std::string& name, const std::string& body, bool floating,
                           const hal::RobotConfig& config) {
-  RobotFiles robot;
+  robot::RobotFiles robot;
   robot.config = config;
   robot.config.name = name;
   robot.config.model.floating_base = floating;
@@ -126,7 +126,7 @@ Result<Subject> make_block(double friction, std::array<double, 3> gravity_m_s2) 
 Result<Subject> make_flyer(double gravity_m_s2) {
   const auto folder = bundled_folder("coman");
   if (!folder) return std::unexpected(folder.error());
-  auto robot = read_robot(*folder + "/robot.toml");
+  auto robot = robot::read_robot(*folder + "/robot.toml");
   if (!robot) return std::unexpected(robot.error().front());
   robot->config.contact = {};
   robot->config.joints.clear();

@@ -7,16 +7,16 @@
 #include <string>
 
 #include "apps/bench/engine_entries.hpp"
-#include "apps/robot/robot_files.hpp"
 #include "base/result.hpp"
 #include "hal/sim/plant.hpp"
 #include "model/kernel_library.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 
 /// A robot, its kernels, and what its plants are made from.
 struct Subject {
-  RobotFiles robot;
+  robot::RobotFiles robot;
   model::KernelLibrary kernels;
   std::array<double, 3> gravity_m_s2{0.0, 0.0, -9.81};
 

@@ -6,9 +6,9 @@
 #include "apps/can/can_sockets.hpp"
 #include "apps/machine/commands.hpp"
 #include "apps/machine/doctor.hpp"
-#include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -89,7 +89,7 @@ Exit doctor_command(const DoctorOptions& options) {
                       .error());
   }
   if (!options.robot.empty()) {
-    auto robot = read_robot(options.robot);
+    auto robot = robot::read_robot(options.robot);
     if (!robot) return refuse(robot.error());
     if (Status done = replace_interfaces(robot->config, options.interfaces); !done) {
       return refuse(done.error());

@@ -74,7 +74,8 @@ std::vector<std::string> model_folders() {
   return folders;
 }
 
-Result<model::KernelLibrary> find_kernels(const RobotFiles& robot, const std::string& variant) {
+Result<model::KernelLibrary> find_kernels(const robot::RobotFiles& robot,
+                                          const std::string& variant) {
   return find(robot.config.name, model::description_hash(robot.tree, robot.spec), variant,
               "run: tandem model build " + shell_word(robot.config.file));
 }

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/robot/robot_files.hpp"
 #include "base/result.hpp"
 #include "model/kernel_library.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 
@@ -36,7 +36,7 @@ inline constexpr std::size_t kHashDigits = 16;
 /// @param variant  empty: the best that this CPU runs.
 /// Errors: no library, or none made from these files (with the command that makes it); a variant
 /// that the library or this CPU lacks; a robot's name that is no file name.
-[[nodiscard]] Result<model::KernelLibrary> find_kernels(const RobotFiles& robot,
+[[nodiscard]] Result<model::KernelLibrary> find_kernels(const robot::RobotFiles& robot,
                                                         const std::string& variant);
 
 /// The same for a robot that is known by name and hash only, as a log knows it.

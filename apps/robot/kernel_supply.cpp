@@ -32,7 +32,8 @@ class BuildProgress {
 
 }  // namespace
 
-Result<model::BuildReport> build_shown(const RobotFiles& robot, model::BuildOptions options) {
+Result<model::BuildReport> build_shown(const robot::RobotFiles& robot,
+                                       model::BuildOptions options) {
   BuildProgress progress;
   options.progress = [&progress](int done, int total, const std::string& file) {
     progress.show(done, total, file);
@@ -44,8 +45,8 @@ Result<model::BuildReport> build_shown(const RobotFiles& robot, model::BuildOpti
   return model::build_kernels(robot.tree, robot.spec, options);
 }
 
-Result<model::KernelLibrary> supply_kernels(const RobotFiles& robot, const std::string& variant,
-                                            MissingKernels missing) {
+Result<model::KernelLibrary> supply_kernels(const robot::RobotFiles& robot,
+                                            const std::string& variant, MissingKernels missing) {
   auto found = find_kernels(robot, variant);
   if (found || missing == MissingKernels::kRefuse) return found;
   if (!variant.empty() && find_kernels(robot, {})) return found;

@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <string>
 
-#include "apps/robot/robot_files.hpp"
 #include "base/result.hpp"
 #include "model/kernel_build.hpp"
 #include "model/kernel_library.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 
@@ -29,13 +29,13 @@ enum class MissingKernels : std::uint8_t {
 /// The library that find_kernels() finds, or what `missing` says. A library that fits and lacks
 /// the variant is an error, for no building mends that.
 /// Errors: find_kernels()'s, user_library()'s, build_kernels()'s.
-[[nodiscard]] Result<model::KernelLibrary> supply_kernels(const RobotFiles& robot,
+[[nodiscard]] Result<model::KernelLibrary> supply_kernels(const robot::RobotFiles& robot,
                                                           const std::string& variant,
                                                           MissingKernels missing);
 
 /// build_kernels() of this robot, its progress on standard error: one line that is redrawn on a
 /// terminal, a line for each quarter elsewhere.
-[[nodiscard]] Result<model::BuildReport> build_shown(const RobotFiles& robot,
+[[nodiscard]] Result<model::BuildReport> build_shown(const robot::RobotFiles& robot,
                                                      model::BuildOptions options);
 
 }  // namespace tandem::apps

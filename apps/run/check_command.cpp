@@ -6,10 +6,7 @@
 #include "apps/can/bus_table.hpp"
 #include "apps/control/fault_table.hpp"
 #include "apps/robot/loop_facts.hpp"
-#include "apps/robot/ringing_loops.hpp"
 #include "apps/robot/scale_facts.hpp"
-#include "apps/robot/start_height.hpp"
-#include "apps/robot/start_torque.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/composition.hpp"
@@ -75,12 +72,9 @@ void add_simulation_facts(const runtime::Experiment& e, Facts& facts) {
 }
 
 /// How many joints move the link: they alone feel a wrench at it.
-int joints_before(const model::Tree& tree, const std::string& link) {
-  int joints = 0;
-  for (int at = tree.link_index(link); at >= 0;
-       at = tree.links[static_cast<std::size_t>(at)].parent)
-    joints += tree.links[static_cast<std::size_t>(at)].moving >= 0 ? 1 : 0;
-  return joints;
+std::size_t joints_before(const model::Tree& tree, const std::string& link) {
+  const int index = tree.link_index(link);
+  return index < 0 ? 0 : tree.path_to(tree.links[static_cast<std::size_t>(index)].body).size();
 }
 
 /// What [estimation] adds.
@@ -95,27 +89,27 @@ void add_estimation_facts(const runtime::Experiment& e, Facts& facts) {
   }
   for (const estimation::WrenchConfig& wrench : config.wrenches) {
     const auto site = std::ranges::find(e.robot.model.sites, wrench.site, &hal::SiteConfig::name);
-    const int joints = e.tree == nullptr || site == e.robot.model.sites.end()
-                           ? 6
-                           : joints_before(*e.tree, site->link);
-    facts.add("estimates",
-              "the wrench at " + wrench.site +
-                  (joints >= 6
-                       ? ""
-                       : fmt::format(": {} see at most {} of its 6 numbers, and the least wrench "
-                                     "that explains those is shown",
-                                     counted(static_cast<std::size_t>(joints), "joint"), joints)));
+    const std::size_t joints = e.description == nullptr || site == e.robot.model.sites.end()
+                                   ? 6
+                                   : joints_before(e.description->tree, site->link);
+    facts.add(
+        "estimates",
+        "the wrench at " + wrench.site +
+            (joints >= 6 ? ""
+                         : fmt::format(": {} see at most {} of its 6 numbers, and the least wrench "
+                                       "that explains those is shown",
+                                       counted(joints, "joint"), joints)));
   }
 }
 
 /// What a run would do.
-void print_plan(const Composition& c, const LoopStudy& loops, std::FILE* out) {
+void print_plan(const Composition& c, std::FILE* out) {
   const runtime::Experiment& e = c.experiment;
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
   Facts facts;
   add_robot_facts(e.robot, facts);
   add_kernel_facts(c.kernels, e.robot.file, facts);
-  add_loop_facts(e.robot, loops, facts);
+  add_loop_facts(e.robot, c.loops, facts);
   facts.add("backend", backend_text(e.hal.backend));
   facts.add("start", e.posture.empty() ? "every joint at 0" : "posture " + e.posture);
   for (const ControllerNote& note : c.notes) {
@@ -138,8 +132,8 @@ void print_plan(const Composition& c, const LoopStudy& loops, std::FILE* out) {
   facts.print(out);
 }
 
-void print_robot(const RobotFiles& robot, const model::KernelLibrary& kernels,
-                 const LoopStudy& loops, bool warned, std::FILE* out) {
+void print_robot(const robot::RobotFiles& robot, const model::KernelLibrary& kernels,
+                 const robot::LoopStudy& loops, bool warned, std::FILE* out) {
   Facts facts;
   add_robot_facts(robot.config, facts);
   add_kernel_facts(kernels, robot.config.file, facts);
@@ -153,53 +147,36 @@ void print_robot(const RobotFiles& robot, const model::KernelLibrary& kernels,
   facts.print(out);
 }
 
-/// What `--bus` shows, before anything is refused: a robot's own file has no period.
+/// The loop's period that `--bus` counts with for a robot's own file, which has none.
+constexpr std::int64_t kBusPeriod_ns = 1'000'000;
+
+/// What `--bus` shows, before anything is refused.
 Diagnostics check_buses(const std::string& file, bool robot_only, std::FILE* out, Json& json) {
-  constexpr std::int64_t kPeriodNs = 1'000'000;
   if (!robot_only) {
     const auto experiment = runtime::read_experiment(file);
     if (!experiment) return {};  // composing reports it
     return show_buses(experiment->robot, experiment->loop.period_ns, out, json);
   }
-  const auto robot = read_robot(file);
+  const auto robot = robot::read_robot(file);
   if (!robot) return {};
-  Diagnostics errors = show_buses(robot->config, kPeriodNs, out, json);
-  if (!errors.empty()) return errors;
-  return hal::can::check_bus_load(robot->config, kPeriodNs);
-}
-
-/// What may be meant, of a robot by itself: a posture need not be one to start from.
-Diagnostics warnings_of(const RobotFiles& robot) {
-  Diagnostics warnings = robot.warnings;
-  for (const hal::PostureConfig& posture : robot.config.postures) {
-    if (auto error = wrong_start_height(robot, posture.name)) warnings.push_back(std::move(*error));
-    if (auto error = too_weak_at(robot, posture.name)) warnings.push_back(std::move(*error));
-    const Diagnostics buried = buried_links(robot, posture.name);
-    warnings.insert(warnings.end(), buried.begin(), buried.end());
-  }
-  if (auto error = upward_gravity(robot.config)) warnings.push_back(std::move(*error));
-  const auto& postures = robot.config.postures;
-  const std::string first = postures.empty() ? "" : postures.front().name;
-  if (auto error = ringing_loops(robot, first)) warnings.push_back(std::move(*error));
-  return warnings;
+  return show_buses(robot->config, kBusPeriod_ns, out, json);
 }
 
 Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                         Json& json) {
-  const auto robot = read_robot(options.file, options.repair);
+  const auto robot = robot::read_robot(options.file, options.repair);
   if (!robot) return robot.error();
-  const auto of_drives = hal::can::drive_warnings(robot->config);
-  if (!of_drives) return {of_drives.error()};
-  warnings = warnings_of(*robot);
-  warnings.insert(warnings.end(), of_drives->begin(), of_drives->end());
+  const robot::Findings found =
+      robot::check(*robot, robot::use_alone(robot->config, options.bus ? kBusPeriod_ns : 0));
+  warnings = robot->warnings;
+  warnings.insert(warnings.end(), found.warnings.begin(), found.warnings.end());
   print_warnings(warnings);
-  const LoopStudy loops = study_loops(robot->config, robot->tree, postures_of(robot->config));
-  add_loop_json(robot->config, loops, json);
+  add_loop_json(robot->config, found.loops, json);
   add_scale_json(robot->config, json);
-  if (!loops.errors.empty()) return loops.errors;
+  if (!found.errors.empty()) return found.errors;
   const auto kernels = supply_kernels(*robot, {}, MissingKernels::kTolerate);
   if (!kernels) return {kernels.error()};
-  print_robot(*robot, *kernels, loops, !warnings.empty(), out);
+  print_robot(*robot, *kernels, found.loops, !warnings.empty(), out);
   json["kernels"] = kernels->path();
   return {};
 }
@@ -221,15 +198,14 @@ Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagno
                              Json& json) {
   const auto composition = compose(options.file, {.missing_kernels = MissingKernels::kTolerate});
   if (!composition) return composition.error();
-  warnings = (*composition)->experiment.warnings;
+  warnings = (*composition)->experiment.description->warnings;
   warnings.insert(warnings.end(), (*composition)->warnings.begin(), (*composition)->warnings.end());
   warn_of_archives(**composition, warnings);
   print_warnings(warnings);
   const runtime::Experiment& e = (*composition)->experiment;
-  const LoopStudy loops = study_loops(e.robot, (*composition)->tree, {&e.posture, 1});
-  add_loop_json(e.robot, loops, json);
+  add_loop_json(e.robot, (*composition)->loops, json);
   add_scale_json(e.robot, json);
-  print_plan(**composition, loops, out);
+  print_plan(**composition, out);
   add_engine_json(e, json);
   json["kernels"] = (*composition)->kernels.path();
   return {};
@@ -239,7 +215,7 @@ Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagno
 
 Exit check_command(const CheckOptions& options) {
   std::FILE* out = human_output(options.json);
-  const bool robot_only = is_robot(options.file);
+  const bool robot_only = robot::is_robot(options.file);
   Json json{{"ok", true}, {"errors", Json::array()}};
   Diagnostics errors, warnings;
   const auto wrong = options.repair

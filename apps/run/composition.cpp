@@ -8,9 +8,6 @@
 #include <filesystem>
 
 #include "apps/clients/dds_client.hpp"
-#include "apps/robot/loop_facts.hpp"
-#include "apps/robot/start_height.hpp"
-#include "apps/robot/start_torque.hpp"
 #include "apps/run/late_plans.hpp"
 #include "apps/run/operator_link.hpp"
 #include "apps/run/retreats.hpp"
@@ -18,14 +15,10 @@
 #include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
-#include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
-#include "hal/ethercat-can/drive_use.hpp"
-#include "hal/ethercat-can/interpolation_period.hpp"
 #include "hal/ethercat-can/line_bus.hpp"
 #include "hal/sim/engine_loader.hpp"
 #include "hal/sim/scenario.hpp"
-#include "hal/sim/setup.hpp"
 #include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
@@ -107,7 +100,7 @@ void add_estimator(Composition& c, Collector& errors) {
 /// The robot's kernels, and the host of controllers. They are built after all that can be checked
 /// without them, for it takes a while.
 /// @return false: there are errors, and no more to find
-bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overrides,
+bool add_kernels(Composition& c, const robot::RobotFiles& robot, const Overrides& overrides,
                  Collector& errors) {
   const runtime::Experiment& e = c.experiment;
   const bool builds = overrides.missing_kernels != MissingKernels::kRefuse;
@@ -145,8 +138,8 @@ bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overr
 
 /// What to serve: an experiment, or a robot in the first of its postures.
 std::expected<runtime::Experiment, Diagnostics> read_served(const std::string& file) {
-  if (!is_robot(file)) return runtime::read_experiment(file);
-  auto robot = read_robot(file);
+  if (!robot::is_robot(file)) return runtime::read_experiment(file);
+  auto robot = robot::read_complete_robot(file);
   if (!robot) return std::unexpected(robot.error());
   std::string text = "robot = \"robot.toml\"\nduration_s = 1.0\n";  // is not followed
   if (!robot->config.postures.empty()) {
@@ -156,7 +149,9 @@ std::expected<runtime::Experiment, Diagnostics> read_served(const std::string& f
   auto experiment = runtime::parse_experiment(text, file, robot->config);
   if (experiment) {
     experiment->robot_file = file;
-    experiment->files = robot->files;
+    experiment->files = std::move(robot->files);
+    experiment->description =
+        std::make_shared<const model::UrdfModel>(std::move(robot->description));
   }
   return experiment;
 }
@@ -351,6 +346,7 @@ void keep_to_own_end(runtime::Experiment& e, const Overrides& overrides) {
 
 /// An error of the simulation, with the place of its key.
 Error in_its_file(Error error, const runtime::Experiment& e) {
+  if (!error.file.empty()) return error;
   constexpr std::string_view kOurs = "sim.";  // keys of the experiment
   const bool of_experiment = error.key.starts_with(kOurs);
   error.file = of_experiment ? e.file : e.robot.file;
@@ -360,54 +356,26 @@ Error in_its_file(Error error, const runtime::Experiment& e) {
   return error;
 }
 
-/// What the description says of the robot and of where it starts.
-/// Other engines have one coefficient for soles that stick and that slide.
-std::optional<Error> other_friction(const runtime::Experiment& e) {
-  const hal::ContactConfig& contact = e.robot.contact;
-  if (e.sim.engine == sim::kOwnEngine || contact.feet.empty()) return {};
-  if (contact.static_friction == contact.sliding_friction) return {};
-  return in_its_file(
-      {.message = fmt::format("the engine '{}' has one coefficient of friction, "
-                              "static_friction = {:g}: sliding_friction = {:g} is "
-                              "not used",
-                              e.sim.engine, contact.static_friction, contact.sliding_friction),
-       .hint = "to compare slides with Tandem's own, make both alike in [contact]",
-       .file = {},
-       .key = "sim.engine"},
-      e);
-}
-
-void add_description(Composition& c, const RobotFiles& robot, Collector& errors) {
-  runtime::Experiment& e = c.experiment;
-  c.tree = robot.tree;
-  e.tree = std::make_shared<const model::Tree>(robot.tree);
-  if (e.hal.backend == runtime::BackendKind::kSim) {
-    if (auto error = wrong_start_height(robot, e.posture)) errors.add(std::move(*error), {}, 0);
-    c.warnings = buried_links(robot, e.posture);
-    if (auto warning = falls_for_ever(e.robot)) c.warnings.push_back(std::move(*warning));
-    errors.add(study_loops(e.robot, robot.tree, {&e.posture, 1}).errors);
-    if (const Status boards = sim::check_firmware(e.robot); !boards) {
-      errors.add(boards.error(), {}, 0);
-    }
-    const Status engine = sim::check_engine(e.robot, e.sim_robot_config());
-    if (!engine) errors.add(in_its_file(engine.error(), e), {}, 0);
-    if (auto warning = other_friction(e)) c.warnings.push_back(std::move(*warning));
-  }
-  if (e.hal.backend != runtime::BackendKind::kDds) {
-    std::ranges::move(start_warnings(robot, e.posture), std::back_inserter(c.warnings));
-    if (auto drives = hal::can::drive_warnings(e.robot)) {
-      std::ranges::move(*drives, std::back_inserter(c.warnings));
-    }
-    errors.add(hal::can::check_interpolation(e.robot, e.loop.period_ns));
-  }
-  errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
+/// What is wrong, or odd, with the robot where it starts.
+void check_robot(Composition& c, const robot::RobotFiles& robot, Collector& errors) {
+  const runtime::Experiment& e = c.experiment;
+  const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
+  robot::Findings found =
+      robot::check(robot, {.plant = simulated,
+                           .drives = e.hal.backend != runtime::BackendKind::kDds,
+                           .postures = {e.posture},
+                           .period_ns = e.loop.period_ns,
+                           .simulation = e.sim_robot_config()});
+  for (Error& error : found.errors) errors.add(in_its_file(std::move(error), e), {}, 0);
+  for (Error& warning : found.warnings) c.warnings.push_back(in_its_file(std::move(warning), e));
+  c.loops = std::move(found.loops);
 }
 
 /// The second robot of [parallel], and its kernels. Scenarios are the first robot's.
 Diagnostics add_parallel(Composition& c, const Overrides& overrides) {
   runtime::Experiment& e = c.experiment;
   if (!e.parallel || c.kernels.get() == nullptr) return {};
-  const auto robot = with_description(std::move(e.parallel->robot), e.files);
+  const auto robot = robot::with_description(std::move(e.parallel->robot), e.files);
   if (!robot) return robot.error();
   e.parallel->robot = robot->config;
   auto kernels = supply_kernels(*robot, e.kernel_variant, overrides.missing_kernels);
@@ -469,10 +437,10 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
     return std::unexpected(Diagnostics{done.error()});
   }
   if (auto flags = without_effect(e, overrides); !flags.empty()) return std::unexpected(flags);
-  const auto robot = with_description(e.robot, e.files);
+  const auto robot = robot::join(e.robot, *e.description, e.files);
   if (!robot) return std::unexpected(robot.error());
   Collector errors;
-  add_description(*c, *robot, errors);
+  check_robot(*c, *robot, errors);
   if (!add_kernels(*c, *robot, overrides, errors)) return errors.give();
   if (!overrides.serves) add_controllers(*c, errors);
   add_owner(*c, errors);

@@ -12,7 +12,6 @@
 
 #include "apps/can/can_sockets.hpp"
 #include "apps/robot/kernel_supply.hpp"
-#include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "base/result.hpp"
 #include "controllers/plugin_loader.hpp"
@@ -25,6 +24,7 @@
 #include "hal/sim/sim_robot.hpp"
 #include "internal_model/prediction_service.hpp"
 #include "model/kernel_library.hpp"
+#include "robot/check.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/experiment.hpp"
 #include "runtime/local_controllers.hpp"
@@ -60,7 +60,6 @@ struct ControllerNote {
 
 struct Composition {
   runtime::Experiment experiment;       ///< overrides applied; its robot is completed
-  model::Tree tree;                     ///< the robot's description
   model::KernelLibrary kernels;         ///< empty with kTolerate: then there is no more than notes
   std::unique_ptr<CanSockets> sockets;  ///< of the CAN backend
   std::unique_ptr<hal::can::FrameRecord> frames;  ///< of the CAN backend, when it was asked for
@@ -81,9 +80,10 @@ struct Composition {
   std::shared_ptr<runtime::OwnerController> owner;  ///< null: nobody may own the robot from afar
   std::size_t owner_slot = 0;                       ///< its in `controllers`
   std::vector<ControllerNote> notes;
-  /// start_warnings(), links that start inside the ground, a category 2 that nobody can carry out,
-  /// late_plans() unless the command line says how long
+  /// robot::check()'s, a category 2 that nobody can carry out, late_plans() unless the command line
+  /// says how long
   Diagnostics warnings;
+  robot::LoopStudy loops;  ///< where the loops close, in a simulation
 
   /// Empty without a CAN backend.
   [[nodiscard]] std::span<const OpenBus> open_buses() const {

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "apps/robot/robot_files.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -33,8 +33,8 @@ Result<std::unique_ptr<DdsRun>> DdsRun::open(const Composition& c, const std::st
   if (!participant) return std::unexpected(participant.error());
   auto publisher = dds::Publisher::create(
       **participant, {.robot = e.robot,
-                      .tree = c.tree,
-                      .urdf = runtime::text_in(e.files, e.robot.model.urdf),
+                      .tree = *c.experiment.tree(),
+                      .urdf = robot::text_in(e.files, e.robot.model.urdf),
                       .hal = hal_name(e),
                       .version = TANDEM_VERSION,
                       .description_hash = c.kernels->description_hash,

@@ -4,9 +4,6 @@
 #include "apps/can/bus_watch.hpp"
 #include "apps/can/can_sockets.hpp"
 #include "apps/robot/kernel_supply.hpp"
-#include "apps/robot/loop_facts.hpp"
-#include "apps/robot/robot_files.hpp"
-#include "apps/robot/start_height.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/inject.hpp"
@@ -14,11 +11,10 @@
 #include "apps/text/console.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "base/counted.hpp"
-#include "hal/ethercat-can/bus_load.hpp"
 #include "hal/sim/emulator.hpp"
 #include "hal/sim/line_boards.hpp"
 #include "hal/sim/scenario.hpp"
-#include "hal/sim/setup.hpp"
+#include "robot/check.hpp"
 #include "rt/stop_signal.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/experiment.hpp"
@@ -29,6 +25,7 @@ namespace {
 /// What is emulated, from a robot's file or an experiment's.
 struct Subject {
   hal::RobotConfig robot;
+  model::UrdfModel description;
   sim::SimRobotConfig sim;
   rt::ThreadConfig thread;
 };
@@ -39,10 +36,11 @@ std::expected<Subject, Diagnostics> read_subject(const EmulateOptions& options) 
     return std::unexpected(Diagnostics{std::move(*wrong)});
   }
   Subject subject;
-  if (is_robot(options.file)) {
-    auto robot = read_robot(options.file);
+  if (robot::is_robot(options.file)) {
+    auto robot = robot::read_complete_robot(options.file);
     if (!robot) return std::unexpected(robot.error());
     subject.robot = std::move(robot->config);
+    subject.description = std::move(robot->description);
     if (!subject.robot.postures.empty()) subject.sim.posture = subject.robot.postures[0].name;
     subject.thread = {.policy = rt::SchedulingPolicy::kOther, .lock_memory = false};
   } else {
@@ -51,6 +49,7 @@ std::expected<Subject, Diagnostics> read_subject(const EmulateOptions& options) 
     subject.sim = experiment->sim_robot_config();
     subject.thread = experiment->thread;
     subject.robot = std::move(experiment->robot);
+    subject.description = *experiment->description;
   }
   subject.sim.posture = options.posture.value_or(subject.sim.posture);
   subject.sim.seed = options.seed.value_or(subject.sim.seed);
@@ -89,27 +88,18 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   e->subject = std::move(*subject);
   const hal::RobotConfig& robot = e->subject.robot;
   const std::int64_t period_ns = e->subject.sim.period_ns;
-  if (Diagnostics errors = hal::can::check_bus_load(robot, period_ns); !errors.empty()) {
-    return std::unexpected(std::move(errors));
-  }
-  const auto description = with_description(robot);
-  if (!description) return std::unexpected(description.error());
-  if (auto error = wrong_start_height(*description, e->subject.sim.posture)) {
-    return std::unexpected(Diagnostics{std::move(*error)});
-  }
-  const std::string& posture = e->subject.sim.posture;
-  if (LoopStudy loops = study_loops(robot, description->tree, {&posture, 1});
-      !loops.errors.empty()) {
-    return std::unexpected(std::move(loops.errors));
-  }
-  e->subject.sim.tree = std::make_shared<const model::Tree>(description->tree);
-  if (const Status boards = sim::check_firmware(robot); !boards) {
-    return std::unexpected(Diagnostics{boards.error()});
-  }
-  if (const Status engine = sim::check_engine(robot, e->subject.sim); !engine) {
-    return std::unexpected(in_file(engine.error(), options.file));
-  }
-  auto kernels = supply_kernels(*description, options.kernel_variant,
+  e->subject.sim.tree = std::make_shared<const model::Tree>(e->subject.description.tree);
+  const auto joined = robot::join(robot, e->subject.description);
+  if (!joined) return std::unexpected(joined.error());
+  robot::Findings found = robot::check(*joined, {.plant = true,
+                                                 .postures = {e->subject.sim.posture},
+                                                 .period_ns = period_ns,
+                                                 .simulation = e->subject.sim});
+  for (Error& error : found.errors) error = in_file(std::move(error), options.file).front();
+  if (!found.errors.empty()) return std::unexpected(std::move(found.errors));
+  for (Error& warning : found.warnings) warning = in_file(std::move(warning), options.file).front();
+  if (!options.quiet) print_warnings(found.warnings);
+  auto kernels = supply_kernels(*joined, options.kernel_variant,
                                 missing_kernels(options.no_build, options.quiet));
   if (!kernels) return std::unexpected(in_file(kernels.error(), robot.file));
   e->kernels = std::move(*kernels);

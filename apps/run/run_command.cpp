@@ -8,7 +8,7 @@
 
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
-#include "apps/robot/gains_judge.hpp"
+#include "apps/robot/gains_opinion.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/composition.hpp"
@@ -255,7 +255,8 @@ class Session {
           internal_model::ParallelParts{
               *c_.backend, *c_.parallel,
               experiment().sim.ground_truth ? &c_.parallel->truth() : nullptr, recorder_.get(),
-              c_.sim != nullptr && c_.tree.floating_base ? &c_.sim->truth() : nullptr},
+              c_.sim != nullptr && c_.experiment.robot.model.floating_base ? &c_.sim->truth()
+                                                                           : nullptr},
           experiment().robot.shape(), c_.controllers->gains(), experiment().loop.period_ns);
     }
     waits_ = config.after_stop == runtime::AfterStop::kWait;
@@ -295,12 +296,13 @@ class Session {
   /// What may be asked of the run, and the ways in: the control socket and the services over DDS.
   Status open_inputs() {
     const runtime::Experiment& e = experiment();
-    const auto judge = std::make_shared<const GainsJudge>(e.robot, c_.kernels.get());
-    add_run_commands(commands_, *cycle_, e.robot,
-                     [judge](std::size_t joint, hal::PidLoop loop, const GainsJudge::Gains& gains,
-                             const std::vector<double>& position_rad) {
-                       return judge->opinion(joint, loop, gains, position_rad);
-                     });
+    const auto judge = std::make_shared<const robot::GainsJudge>(e.robot, c_.kernels.get());
+    add_run_commands(
+        commands_, *cycle_, e.robot,
+        [judge](std::size_t joint, hal::PidLoop loop, const robot::GainsJudge::Gains& gains,
+                const std::vector<double>& position_rad) {
+          return opinion(*judge, joint, loop, gains, position_rad);
+        });
     add_predict(commands_, c_.predictor.get(), e.robot);
     if (dds_ != nullptr) {
       admission_.add_to(commands_);
@@ -440,7 +442,7 @@ class Session {
 /// What is simulated is then not quite what the description says. `tandem check` has the details.
 void warn_of_inertias(const runtime::Experiment& e) {
   std::vector<std::string> links;
-  for (const Error& warning : e.warnings) {
+  for (const Error& warning : e.description->warnings) {
     if (warning.key.starts_with("link ")) links.push_back(warning.key.substr(5));
   }
   if (links.empty()) return;

@@ -134,9 +134,10 @@ Result<std::pair<std::string, Descriptor>> claim_file(const std::string& folder,
 log::RecorderOptions recorder_options(const Composition& c) {
   const runtime::Experiment& e = c.experiment;
   log::RecorderOptions options;
-  options.viewed.urdf = runtime::text_in(e.files, e.robot.model.urdf);
-  options.viewed.followers = dds::followers_of(e.robot, c.tree);
-  if (c.tree.floating_base) options.viewed.base_link = c.tree.links.front().name;
+  options.viewed.urdf = robot::text_in(e.files, e.robot.model.urdf);
+  options.viewed.followers = dds::followers_of(e.robot, *e.tree());
+  if (e.description->tree.floating_base)
+    options.viewed.base_link = e.description->tree.links.front().name;
   switch (e.log.compression) {
     case runtime::LogCompression::kNone:
       options.writer.compression = log::Compression::kNone;

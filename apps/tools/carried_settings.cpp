@@ -29,7 +29,7 @@ void carry_table(TomlTable& root, const std::string& name, const Names& wanted,
 }
 
 /// The joints between the base and these feet.
-Names leg_joints(const RobotFiles& robot, const Names& feet) {
+Names leg_joints(const robot::RobotFiles& robot, const Names& feet) {
   Names names;
   const model::Tree& tree = robot.tree;
   for (const hal::SiteConfig& site : robot.config.model.sites) {
@@ -45,7 +45,8 @@ Names leg_joints(const RobotFiles& robot, const Names& feet) {
 }
 
 /// Adds the damping by one [[controller]] of the log's experiment.
-void carry_damping(TomlTable& controller, const RobotFiles& robot, CarriedSettings& carried) {
+void carry_damping(TomlTable& controller, const robot::RobotFiles& robot,
+                   CarriedSettings& carried) {
   const std::string plugin = std::filesystem::path(controller.text_or("plugin", "")).stem();
   if (!controller.boolean_or("active", true)) return;
   TomlTable parameters = controller.table_or_empty("parameters");
@@ -83,7 +84,7 @@ std::optional<TomlDocument> experiment_of(const log::RunInfo& info) {
   return std::nullopt;
 }
 
-CarriedSettings carried_settings(const log::RunInfo& info, const RobotFiles& robot) {
+CarriedSettings carried_settings(const log::RunInfo& info, const robot::RobotFiles& robot) {
   CarriedSettings carried;
   const std::optional<TomlDocument> experiment = experiment_of(info);
   if (!experiment) return carried;

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/robot/robot_files.hpp"
 #include "base/toml_reader.hpp"
 #include "log/info.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 
@@ -30,6 +30,7 @@ struct CarriedSettings {
 /// `link_damping_Nms_rad` of the bundled controllers that were active. Not what runs and watches a
 /// robot without being a part of it: [estimation], [clock], [dds] and others.
 /// @param robot  that replays it
-[[nodiscard]] CarriedSettings carried_settings(const log::RunInfo& info, const RobotFiles& robot);
+[[nodiscard]] CarriedSettings carried_settings(const log::RunInfo& info,
+                                               const robot::RobotFiles& robot);
 
 }  // namespace tandem::apps

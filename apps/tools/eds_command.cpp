@@ -3,13 +3,13 @@
 
 #include <filesystem>
 
-#include "apps/robot/robot_files.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/eds_files.hpp"
 #include "apps/tools/eds_show.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -18,7 +18,7 @@ Diagnostics write_sheets(const EdsOptions& options, std::vector<EdsFile>& files)
   if (auto wrong = wrong_kind(options.robot, Takes::kRobot, "tandem eds")) {
     return {std::move(*wrong)};
   }
-  const auto robot = read_robot(options.robot);
+  const auto robot = robot::read_robot(options.robot);
   if (!robot) return robot.error();
   auto made = make_eds_files(robot->config);
   if (!made) {

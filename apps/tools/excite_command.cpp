@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
@@ -15,6 +14,7 @@
 #include "base/quoting.hpp"
 #include "identification/excite.hpp"
 #include "identification/identify.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -118,7 +118,7 @@ struct Found {
 };
 
 /// @param file  to write it to; its robot's path is from options.output
-Result<Found> search(const RobotFiles& robot, const ExciteOptions& options,
+Result<Found> search(const robot::RobotFiles& robot, const ExciteOptions& options,
                      const std::string& posture, const std::string& file, const Trial& trial) {
   identification::ExciteRequest request{.posture = posture,
                                         .joints = options.joints,
@@ -148,7 +148,7 @@ Result<Found> search(const RobotFiles& robot, const ExciteOptions& options,
               "give another --seed, a longer --period, or --share less");
 }
 
-Facts facts_of(const RobotFiles& robot, const ExciteOptions& options, const Found& found) {
+Facts facts_of(const robot::RobotFiles& robot, const ExciteOptions& options, const Found& found) {
   const identification::Excitation& result = found.excitation;
   Facts facts;
   facts.add("experiment", options.output);
@@ -210,7 +210,7 @@ Exit excite_command(const ExciteOptions& given, const Trial& trial) {
               0,
               {}});
   }
-  const auto robot = read_robot(options.robot);
+  const auto robot = robot::read_robot(options.robot);
   if (!robot) return refuse(robot.error());
   if (const Status s =
           check_overwrites(options.output, kExciteHead, "experiment of `tandem excite`");

@@ -123,7 +123,7 @@ void set_number(std::vector<std::string>& lines, std::ptrdiff_t head, const std:
 }
 
 /// What of the joints robot.toml cannot say, in a sentence each.
-std::vector<std::string> not_carried(const RobotFiles& written,
+std::vector<std::string> not_carried(const robot::RobotFiles& written,
                                      const identification::Identification& result,
                                      const std::vector<ActuatorFigures>& figures) {
   std::vector<std::string> notes;
@@ -160,7 +160,8 @@ std::vector<std::string> not_carried(const RobotFiles& written,
   return notes;
 }
 
-Status check_read_back(const RobotFiles& read, const identification::Identification& result) {
+Status check_read_back(const robot::RobotFiles& read,
+                       const identification::Identification& result) {
   for (const identification::LinkResult& link : result.links) {
     const int index = read.tree.link_index(link.name);
     if (index < 0) continue;
@@ -210,7 +211,7 @@ std::vector<std::pair<std::string, std::string>> experiments_of(
 
 }  // namespace
 
-Status check_identified(const RobotFiles& robot, const std::vector<std::string>& logs,
+Status check_identified(const robot::RobotFiles& robot, const std::vector<std::string>& logs,
                         const std::string& folder) {
   const std::string urdf = robot.config.model.urdf;
   std::vector<std::string> names{"robot.toml", fs::path(urdf).filename().string(), "report.html"};
@@ -219,7 +220,7 @@ Status check_identified(const RobotFiles& robot, const std::vector<std::string>&
     const std::string file = folder + "/" + name;
     std::error_code none;
     if (!fs::is_regular_file(file, none)) continue;
-    const std::string text = text_of(file);
+    const std::string text = robot::text_of(file);
     const bool ours = text.empty() || text.find(kIdentifyMark) != std::string::npos ||
                       (name == "report.html" && text.find(kIdentifyPage) != std::string::npos);
     const bool source =
@@ -291,7 +292,7 @@ std::string with_actuators(const std::string& text, const std::vector<ActuatorFi
   return out;
 }
 
-Result<IdentifiedFiles> write_identified(const RobotFiles& robot,
+Result<IdentifiedFiles> write_identified(const robot::RobotFiles& robot,
                                          const identification::Identification& result,
                                          const std::vector<std::string>& logs,
                                          const std::string& folder) {
@@ -300,7 +301,7 @@ Result<IdentifiedFiles> write_identified(const RobotFiles& robot,
   for (const identification::LinkResult& link : result.links)
     inertias.emplace_back(link.name, link.identified);
   const Result<std::string> urdf =
-      model::with_inertias(runtime::text_in(robot.files, config.model.urdf), inertias);
+      model::with_inertias(robot::text_in(robot.files, config.model.urdf), inertias);
   if (!urdf) return std::unexpected(urdf.error());
   const std::string description = fs::path(config.model.urdf).filename().string();
   const std::string name =
@@ -308,7 +309,7 @@ Result<IdentifiedFiles> write_identified(const RobotFiles& robot,
   const std::vector<ActuatorFigures> figures = actuator_figures(config, result);
   std::vector<std::pair<std::string, std::string>> files{
       {"robot.toml",
-       with_actuators(moved_robot(runtime::text_in(robot.files, config.file),
+       with_actuators(moved_robot(robot::text_in(robot.files, config.file),
                                   fs::path(config.file).parent_path().string(), name, description),
                       figures)},
       {description, *urdf}};
@@ -320,7 +321,7 @@ Result<IdentifiedFiles> write_identified(const RobotFiles& robot,
     if (const Status s = write_file(written.paths.back(), whole); !s)
       return std::unexpected(s.error());
   }
-  const auto read = read_robot(written.paths.front());
+  const auto read = robot::read_robot(written.paths.front());
   if (!read) return std::unexpected(read.error().front());
   if (const Status s = check_read_back(*read, result); !s) return std::unexpected(s.error());
   written.notes = not_carried(*read, result, figures);

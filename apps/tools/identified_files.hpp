@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/robot/robot_files.hpp"
 #include "base/result.hpp"
 #include "identification/identify.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 
@@ -36,7 +36,8 @@ struct ActuatorFigures {
 /// already was written by `tandem identify`, and is neither the robot nor its description.
 ///
 /// Errors: the first file that would be lost.
-[[nodiscard]] Status check_identified(const RobotFiles& robot, const std::vector<std::string>& logs,
+[[nodiscard]] Status check_identified(const robot::RobotFiles& robot,
+                                      const std::vector<std::string>& logs,
                                       const std::string& folder);
 
 /// Writes into `folder`: ROBOT.urdf, the description with the identified inertias; robot.toml, the
@@ -45,7 +46,7 @@ struct ActuatorFigures {
 /// back. Each of these files says that `tandem identify` wrote it.
 ///
 /// Errors: a file cannot be written; what was written does not read back as what was identified.
-[[nodiscard]] Result<IdentifiedFiles> write_identified(const RobotFiles& robot,
+[[nodiscard]] Result<IdentifiedFiles> write_identified(const robot::RobotFiles& robot,
                                                        const identification::Identification& result,
                                                        const std::vector<std::string>& logs,
                                                        const std::string& folder);

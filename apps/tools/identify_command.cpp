@@ -3,7 +3,6 @@
 
 #include <cmath>
 
-#include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
@@ -11,6 +10,7 @@
 #include "apps/tools/identify_page.hpp"
 #include "base/process.hpp"
 #include "identification/identify.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -157,7 +157,7 @@ void print_result(std::FILE* out, const Identification& result) {
 Exit identify_command(const IdentifyOptions& options) {
   Result<Draft> draft = Draft::folder(options.output);  // first: an interrupt has its word
   if (!draft) return refuse(draft.error());
-  const auto robot = read_robot(options.robot);
+  const auto robot = robot::read_robot(options.robot);
   if (!robot) return refuse(robot.error());
   if (const Status s = check_identified(*robot, options.logs, options.output); !s)
     return refuse(s.error());

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
@@ -13,13 +12,14 @@
 #include "dds/followers.hpp"
 #include "log/import/import_log.hpp"
 #include "model/generate.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 namespace {
 
 namespace fs = std::filesystem;
 
-log::RunInfo info_of(const RobotFiles& robot) {
+log::RunInfo info_of(const robot::RobotFiles& robot) {
   log::RunInfo info;
   info.version = TANDEM_VERSION;
   info.robot = robot.config.name;
@@ -142,14 +142,14 @@ Json summary_json(const log::ImportSummary& summary) {
 }  // namespace
 
 Exit log_import_command(const LogOptions& options) {
-  const auto robot = read_robot(options.robot);
+  const auto robot = robot::read_robot(options.robot);
   if (!robot) return refuse(robot.error());
   const Result<std::string> output = output_of(options, robot->config.name);
   if (!output) return refuse(output.error());
   Draft draft = Draft::file(*output);
   auto summary = log::import_log(
       {options.files, options.map, draft.path(), dds::followers_of(robot->config, robot->tree)},
-      robot->config, info_of(*robot), runtime::text_in(robot->files, robot->config.model.urdf));
+      robot->config, info_of(*robot), robot::text_in(robot->files, robot->config.model.urdf));
   if (!summary) {
     for (Error& error : summary.error()) error = draft.placed(std::move(error));
     return refuse(summary.error());

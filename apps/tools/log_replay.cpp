@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/tools/carried_settings.hpp"
@@ -18,6 +17,7 @@
 #include "controllers/motion_plan.hpp"
 #include "hal/config/capabilities.hpp"
 #include "log/joint_motion.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -113,7 +113,7 @@ Error with_options(Error error) {
 
 /// Reads and checks everything, as the run will.
 Result<Replay> plan(const LogOptions& options) {
-  const auto files = read_robot(options.robot);
+  const auto files = robot::read_robot(options.robot);
   if (!files) return std::unexpected(files.error().front());
   const auto file = log::LogFile::open(options.log);
   if (!file) return std::unexpected(file.error());

@@ -3,18 +3,18 @@
 
 #include "apps/robot/kernel_store.hpp"
 #include "apps/robot/kernel_supply.hpp"
-#include "apps/robot/robot_files.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/text/console.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/kernel_sizes.hpp"
 #include "apps/tools/right_angles.hpp"
 #include "base/counted.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 namespace {
 
-Status build(const RobotFiles& robot, const ModelOptions& options) {
+Status build(const robot::RobotFiles& robot, const ModelOptions& options) {
   model::BuildOptions build;
   build.library = options.output;
   if (options.output.empty()) {
@@ -62,7 +62,7 @@ std::uint64_t text_bytes_of(const std::string& kernel,
   return sum;
 }
 
-Status info(const RobotFiles& robot, const ModelOptions& options) {
+Status info(const robot::RobotFiles& robot, const ModelOptions& options) {
   const auto library = find_kernels(robot, options.kernel_variant);
   if (!library) return std::unexpected(library.error());
   const tandem_kernels& k = **library;
@@ -109,7 +109,7 @@ Exit model_command(const ModelOptions& options) {
   const bool builds = options.action == ModelOptions::Action::kBuild;
   const char* command = builds ? "tandem model build" : "tandem model info";
   if (const auto wrong = wrong_kind(options.robot, Takes::kRobot, command)) return refuse(*wrong);
-  const auto robot = read_robot(options.robot);
+  const auto robot = robot::read_robot(options.robot);
   if (!robot) return refuse(robot.error());
   const Status done = builds ? build(*robot, options) : info(*robot, options);
   if (done) return Exit::kDone;

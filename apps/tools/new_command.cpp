@@ -7,7 +7,6 @@
 #include <filesystem>
 
 #include "apps/robot/bundled.hpp"
-#include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
@@ -21,6 +20,7 @@
 #include "base/utf8.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "model/tree.hpp"
+#include "robot/check.hpp"
 #include "scaffold/new_robot.hpp"
 
 namespace tandem::apps {
@@ -74,7 +74,7 @@ std::expected<scaffold::Like, Diagnostics> read_like(const std::string& name) {
         one("there is no bundled robot '" + name + "'",
             suggest(name, bundled_robots()) + "; or give the path of its robot.toml", name));
   }
-  auto robot = read_robot(file);
+  auto robot = robot::read_robot(file);
   if (!robot) return std::unexpected(robot.error());
   return scaffold::Like{std::move(robot->config), std::move(robot->tree)};
 }
@@ -86,7 +86,8 @@ using Kept = std::vector<std::pair<std::string, std::string>>;
 Status keep(const fs::path& old, const fs::path& next, Kept& kept) {
   std::error_code problem;
   if (!fs::exists(fs::symlink_status(old, problem))) return {};
-  if (fs::is_regular_file(old, problem) && text_of(old.string()) == text_of(next.string())) {
+  if (fs::is_regular_file(old, problem) &&
+      robot::text_of(old.string()) == robot::text_of(next.string())) {
     return {};
   }
   fs::path copy = old.string() + "~";
@@ -110,8 +111,8 @@ Diagnostics placed(const Draft& draft, Diagnostics errors) {
 }
 
 /// Writes everything into the draft, and reads it back as `tandem run` would.
-std::expected<RobotFiles, Diagnostics> write(const scaffold::NewRobot& robot,
-                                             const NewSource& source, const Draft& draft) {
+std::expected<robot::RobotFiles, Diagnostics> write(const scaffold::NewRobot& robot,
+                                                    const NewSource& source, const Draft& draft) {
   const fs::path folder = draft.path();
   const std::string& copy = source.copy;
   for (const auto& [name, text] :
@@ -122,10 +123,11 @@ std::expected<RobotFiles, Diagnostics> write(const scaffold::NewRobot& robot,
     if (Status written = write_file(folder / name, text); !written)
       return std::unexpected(placed(draft, {written.error()}));
   }
-  auto read = read_robot((folder / "robot.toml").string());
+  auto read = robot::read_robot((folder / "robot.toml").string());
   if (!read) return std::unexpected(placed(draft, read.error()));
-  Diagnostics errors = hal::can::check_bus_load(read->config, kPeriod_ns);
-  if (!errors.empty()) return std::unexpected(placed(draft, std::move(errors)));
+  robot::Findings found = robot::check(*read, robot::use_alone(read->config, kPeriod_ns));
+  if (!found.errors.empty()) return std::unexpected(placed(draft, std::move(found.errors)));
+  read->warnings = placed(draft, std::move(found.warnings));
   return read;
 }
 
@@ -227,7 +229,7 @@ Diagnostics check_input(const std::string& file) {
     const Result<Descriptor> opened = open_to_read(file, "name a .urdf file", kMostUrdfBytes);
     return opened ? Diagnostics() : Diagnostics{opened.error()};
   }
-  if (is_robot(file)) {
+  if (robot::is_robot(file)) {
     return one("this is a robot.toml already: `tandem new` makes one, from a URDF",
                "`tandem check " + shell_word(file) +
                    "` reads it, `tandem run` takes the experiments beside "
@@ -294,6 +296,7 @@ Diagnostics run(const NewOptions& options) {
     return {done.error()};
   }
   print_warnings(robot->warnings);
+  print_warnings(written->warnings);
   std::FILE* const out = human_output(options.json);
   for (const auto& [old, copy] : kept) {
     facts.add("kept", fmt::format("{} that was there is {} now", old, copy));

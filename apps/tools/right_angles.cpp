@@ -23,18 +23,18 @@ void add_perhaps(const model::RightAngles& found, Facts& facts, Json& json) {
 
 }  // namespace
 
-Status add_right_angles(const RobotFiles& robot, Facts& facts, Json& json) {
+Status add_right_angles(const robot::RobotFiles& robot, Facts& facts, Json& json) {
   add_perhaps(robot.right_angles, facts, json);
   if (robot.right_angles.count == 0) return {};
   hal::RobotConfig other = robot.config;
   other.model.exact_right_angles = !robot.config.model.exact_right_angles;
-  const auto turned = with_description(std::move(other), robot.files);
+  const auto turned = robot::with_description(std::move(other), robot.files);
   if (!turned) return std::unexpected(turned.error().front());
   const bool exact = robot.config.model.exact_right_angles;
-  const RobotFiles& exactly = exact ? robot : *turned;
-  const RobotFiles& written = exact ? *turned : robot;
+  const robot::RobotFiles& exactly = exact ? robot : *turned;
+  const robot::RobotFiles& written = exact ? *turned : robot;
   const model::Displacement moved = model::largest_displacement(written.tree, exactly.tree);
-  const auto count = [](const RobotFiles& files) {
+  const auto count = [](const robot::RobotFiles& files) {
     return model::count_kernel(model::Kernel::kForwardDynamics, files.tree, files.spec);
   };
   const Result<model::OperationCount> before = count(written);

@@ -2,8 +2,8 @@
 // Layer: apps/tools.  Thread: main.
 #pragma once
 
-#include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 
@@ -11,7 +11,7 @@ namespace tandem::apps {
 /// the robot; nothing when there are none, and no facts when exact ones save nothing. Generates the
 /// dynamics both ways, and compiles nothing.
 ///
-/// Errors: those of with_description() and of model::count_kernel().
-[[nodiscard]] Status add_right_angles(const RobotFiles& robot, Facts& facts, Json& json);
+/// Errors: those of robot::with_description() and of model::count_kernel().
+[[nodiscard]] Status add_right_angles(const robot::RobotFiles& robot, Facts& facts, Json& json);
 
 }  // namespace tandem::apps

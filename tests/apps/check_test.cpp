@@ -453,5 +453,27 @@ TEST_F(Check, RefusesAStartInsideTheGroundAndSaysWhichHeightTouches) {
   EXPECT_EQ(tandem("check hold.toml").status, 0);
 }
 
+/// Each command had a list of its own: a robot by itself was not told of its back-EMF, and
+/// `emulate` was silent.
+TEST_F(Check, SaysTheSameOfARobotWhoeverAsks) {
+  edit("robot.toml", "damping_Nms_rad = 0.17", "damping_Nms_rad = 0.05");
+  edit("robot.toml", "[model]\n", "[model]\ngravity_m_s2 = [0, 0, 9.81]\n");
+  edit("robot.toml", "kp = 6.0", "kp = 600.0");
+  for (const std::string command :
+       {"check robot.toml", "check hold.toml", "run hold.toml --duration 0.01 --no-log",
+        "emulate robot.toml --interface can0=none", "emulate hold.toml --interface can0=none"}) {
+    const Outcome outcome = tandem(command);
+    for (const std::string warning :
+         {"actuator.motor.damping_Nms_rad: is 0.05, and the back-EMF alone is", "gravity points up",
+          "the position loop will probably oscillate"}) {
+      const std::size_t at = outcome.err.find(warning);
+      EXPECT_NE(at, std::string::npos) << command << ": " << warning << "\nin: " << outcome.err;
+      if (at != std::string::npos) {
+        EXPECT_EQ(outcome.err.find(warning, at + 1), std::string::npos) << command << ": twice";
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tandem::apps

@@ -1,6 +1,6 @@
 // Gains against the model: the board's own code in a simulation of its own, a frequency response
 // that was written by hand, the bundled robots, and the two cases that once ran without a fault.
-#include "apps/robot/gains_judge.hpp"
+#include "robot/gains_judge.hpp"
 
 #include <fmt/format.h>
 
@@ -12,12 +12,13 @@
 #include <string>
 #include <vector>
 
-#include "apps/robot/loop_margin.hpp"
-#include "apps/robot/robot_files.hpp"
+#include "apps/robot/gains_opinion.hpp"
 #include "firmware_emu/estimator.hpp"
 #include "firmware_emu/joint_controller.hpp"
 #include "hal/config/capabilities.hpp"
 #include "model/interpreted_kernels.hpp"
+#include "robot/loop_margin.hpp"
+#include "robot/robot_files.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -41,7 +42,7 @@ hal::ActuatorConfig motor(int order) {
 /// A joint whose board is firmware::JointController, whose physics are integrated by Runge-Kutta.
 class SimulatedLoop {
  public:
-  SimulatedLoop(const LoopPlant& plant, double inertia_kg_m2)
+  SimulatedLoop(const robot::LoopPlant& plant, double inertia_kg_m2)
       : plant_(plant), inertia_(inertia_kg_m2) {
     const hal::ActuatorConfig& a = plant.actuator;
     const auto pid = [](const hal::PidConfig& of) {
@@ -140,7 +141,7 @@ class SimulatedLoop {
     for (int i = 0; i < kSteps; ++i) integrate(plant_.period_s / kSteps);
   }
 
-  const LoopPlant& plant_;
+  const robot::LoopPlant& plant_;
   double inertia_;
   firmware::JointController board_;
   firmware::FilteredDifference link_rate_, motor_rate_, torque_rate_;
@@ -171,11 +172,11 @@ TEST(LoopMargin, IsWhatTheBoardsOwnCodeDoes) {
     gains.velocity.gains = {between(1, 1e3), maybe(between(1, 1e4)), maybe(between(0.01, 1))};
     gains.torque.gains = {maybe(between(1e-3, 1)), maybe(between(1e-2, 10)),
                           maybe(between(1e-4, 1e-2))};
-    const LoopPlant plant{static_cast<PidLoop>(random() % 3), actuator, gains,
-                          i % 5 == 0 ? 4e-3 : 1e-3};
+    const robot::LoopPlant plant{static_cast<PidLoop>(random() % 3), actuator, gains,
+                                 i % 5 == 0 ? 4e-3 : 1e-3};
     const double inertia = between(0.05, 20.0);
     const std::array inertias{inertia};
-    const LoopVerdict verdict = judge_loop(plant, inertias, false);
+    const robot::LoopVerdict verdict = robot::judge_loop(plant, inertias, false);
     const double simulated = SimulatedLoop(plant, inertia).growth(8000);
     const std::string what = fmt::format(
         "{}: order {} {} loop, kp {:g} {:g} {:g}, {:g} {:g} {:g}; torque {:g} {:g} {:g}, J {:g}", i,
@@ -224,7 +225,8 @@ TEST(LoopMargin, IsTheTextbooksOfARigidJoint) {
     }
     const double margin_deg = 180.0 + std::arg(gain(low)) * 180.0 / std::numbers::pi;
     const std::array inertias{J};
-    const LoopVerdict verdict = judge_loop({PidLoop::kPosition, actuator, gains, T}, inertias);
+    const robot::LoopVerdict verdict =
+        robot::judge_loop({PidLoop::kPosition, actuator, gains, T}, inertias);
     EXPECT_TRUE(verdict.stable());
     EXPECT_NEAR(verdict.crossover_rad_s, low, 0.01 * low);
     EXPECT_NEAR(verdict.phase_margin_deg, margin_deg, 1.5);
@@ -235,14 +237,14 @@ TEST(LoopMargin, IsTheTextbooksOfARigidJoint) {
 
 struct Judged {
   explicit Judged(const std::string& name)
-      : files(*read_robot(TANDEM_SOURCE_DIR "/config/" + name + "/robot.toml")),
+      : files(*robot::read_robot(TANDEM_SOURCE_DIR "/config/" + name + "/robot.toml")),
         kernels(*model::make_mechanism(files.tree, files.spec, model::Frames::kAsDescribed), name),
         judge(files.config, kernels.get()),
         image(hal::initial_parameters(files.config)),
         at(files.config.joints.size(), 0.0) {}
 
-  [[nodiscard]] GainsJudge::Gains gains(std::size_t joint) const {
-    GainsJudge::Gains out;
+  [[nodiscard]] robot::GainsJudge::Gains gains(std::size_t joint) const {
+    robot::GainsJudge::Gains out;
     for (std::size_t l = 0; l < out.size(); ++l) {
       out[l] = image.gains(joint, static_cast<PidLoop>(l));
     }
@@ -250,14 +252,14 @@ struct Judged {
   }
   [[nodiscard]] Json opinion(const std::string& joint, const hal::PidGains& position) const {
     const auto j = static_cast<std::size_t>(files.config.joint_index(joint));
-    GainsJudge::Gains all = gains(j);
+    robot::GainsJudge::Gains all = gains(j);
     all[0] = position;
-    return judge.opinion(j, PidLoop::kPosition, all, at);
+    return apps::opinion(judge, j, PidLoop::kPosition, all, at);
   }
 
-  RobotFiles files;
+  robot::RobotFiles files;
   model::InterpretedKernels kernels;
-  GainsJudge judge;
+  robot::GainsJudge judge;
   hal::ParameterImage image;
   std::vector<double> at;
 };
@@ -298,13 +300,13 @@ TEST(GainsJudge, FindsAnIntegralThatIsTooMuch) {
 }
 
 TEST(GainsJudge, SaysWhyItDoesNotJudge) {
-  const auto loops = read_robot(TANDEM_SOURCE_DIR "/config/four_bar/robot.toml");
-  const GainsJudge closed(loops->config, nullptr);
+  const auto loops = robot::read_robot(TANDEM_SOURCE_DIR "/config/four_bar/robot.toml");
+  const robot::GainsJudge closed(loops->config, nullptr);
   EXPECT_NE(closed.unknown(0).find("no model"), std::string::npos);
   for (const auto& [name, why] :
        {std::pair{"four_bar", "closed loops"}, {"panda_classic", "not ours"}}) {
     const Judged robot(name);
-    const Json said = robot.judge.opinion(0, PidLoop::kPosition, robot.gains(0), robot.at);
+    const Json said = apps::opinion(robot.judge, 0, PidLoop::kPosition, robot.gains(0), robot.at);
     EXPECT_EQ(said["judged"], false) << name;
     EXPECT_NE(said["why"].get<std::string>().find(why), std::string::npos) << said;
   }

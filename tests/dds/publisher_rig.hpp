@@ -21,8 +21,8 @@ namespace tandem::dds::test {
 using tandem::test::eventually;
 
 /// @param follows  its last joint has no drive, and goes by -2 times its first one, plus 0.5
-inline runtime::CompleteRobot robot_of(const std::string& name, bool follows = false) {
-  auto robot = runtime::read_robot(TANDEM_SOURCE_DIR "/config/" + name + "/robot.toml");
+inline robot::CompleteRobot robot_of(const std::string& name, bool follows = false) {
+  auto robot = robot::read_complete_robot(TANDEM_SOURCE_DIR "/config/" + name + "/robot.toml");
   EXPECT_TRUE(robot) << robot.error().front().to_string();
   if (follows) {
     model::Tree& tree = robot->description.tree;
@@ -142,7 +142,7 @@ struct PublisherRig {
   }
 
   static constexpr std::int64_t kPeriod_ns = 1'000'000;
-  runtime::CompleteRobot robot;
+  robot::CompleteRobot robot;
   hal::StateImage state;
   hal::CommandImage command;
   hal::TruthImage truth;

@@ -17,7 +17,7 @@ TEST_P(BundledRobot, IsCompleteWithItsDescription) {
   const std::string file = std::string(TANDEM_SOURCE_DIR "/config/") + GetParam() + "/robot.toml";
   auto bundled = hal::read_robot_config(file);
   ASSERT_TRUE(bundled.has_value()) << bundled.error()[0].to_string();
-  const auto description = complete_robot(*bundled);
+  const auto description = robot::complete_robot(*bundled);
   ASSERT_TRUE(description.has_value()) << description.error()[0].to_string();
   for (const Error& warning : description->warnings) EXPECT_EQ(warning.key, "dynamics");
   EXPECT_EQ(description->tree.joints.size(), bundled->joints.size() + bundled->passive.size());
@@ -30,7 +30,8 @@ TEST_P(BundledRobot, IsCompleteWithItsDescription) {
 
 TEST(BundledRobots, HaveThePandasPublishedAccelerationsAndElseTheVelocityIn50Milliseconds) {
   const auto robot = [](const char* name) {
-    auto read = read_robot(std::string(TANDEM_SOURCE_DIR "/config/") + name + "/robot.toml");
+    auto read = robot::read_complete_robot(std::string(TANDEM_SOURCE_DIR "/config/") + name +
+                                           "/robot.toml");
     EXPECT_TRUE(read) << name;
     return read->config;
   };
@@ -63,7 +64,7 @@ TEST(ComanHands, IsTheSameRobot) {
   }
   const auto after_name = [](const std::string& text) { return text.substr(text.find("[model]")); };
   EXPECT_EQ(after_name(hands), after_name(plain));
-  EXPECT_TRUE(read_robot(TANDEM_SOURCE_DIR "/config/coman/robot_hands.toml"));
+  EXPECT_TRUE(robot::read_complete_robot(TANDEM_SOURCE_DIR "/config/coman/robot_hands.toml"));
 }
 
 /// A bundled humanoid whose posture leaves the base's height to the description: that height, less
@@ -76,7 +77,7 @@ double sunk_height_m(const std::string& name, const std::string& given) {
       text.replace(text.find(before), before.size(), "base_height_m = \"auto\""), file);
   EXPECT_TRUE(robot.has_value()) << robot.error()[0].to_string();
   EXPECT_TRUE(std::isnan(robot->posture("stand")->base_height_m));
-  const auto description = complete_robot(*robot);
+  const auto description = robot::complete_robot(*robot);
   EXPECT_TRUE(description.has_value()) << description.error()[0].to_string();
   double weight_N = 0.0;
   for (const model::Body& body : description->tree.bodies) weight_N += 9.81 * body.inertia.mass_kg;

@@ -16,7 +16,7 @@ constexpr double kPastTheEnd_rad = 0.05;  // that docs/simulation.md allows
 struct Collapse : Squat {
   explicit Collapse(const std::string& robot, const std::string& name)
       : Squat(robot, 1'000'000, 0.0, nullptr, false, name, {.after_stop = AfterStop::kWait}) {
-    ranges = sim::mechanical_ranges(experiment->robot, *experiment->tree);
+    ranges = sim::mechanical_ranges(experiment->robot, *experiment->tree());
   }
   [[nodiscard]] const sim::Plant& plant() const { return backend->plant(); }
 
@@ -142,8 +142,8 @@ TEST(Collapse, LiesOnForcesThatAreTheSlopeOfTheGroundsEnergy) {
   const tandem_kernels& k = *squat.kernels.get();
   const double* start = squat.backend->plant().q();
   const auto postures = sim::postures_within(
-      k, {start, k.nq}, sim::mechanical_ranges(robot, *squat.experiment->tree));
-  sim::BodyContact bodies(robot, *squat.experiment->tree, k, start, postures, 250'000);
+      k, {start, k.nq}, sim::mechanical_ranges(robot, *squat.experiment->tree()));
+  sim::BodyContact bodies(robot, *squat.experiment->tree(), k, start, postures, 250'000);
   const std::vector<double> rest(k.nv, 0.0);
   const auto energy_at = [&](const std::vector<double>& q) {
     bodies.lost();

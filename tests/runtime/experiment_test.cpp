@@ -453,7 +453,8 @@ TEST_F(ExperimentFiles, ReportTheErrorsOfBothFiles) {
 TEST_F(ExperimentFiles, ReportARobotsErrorsAndThoseAgainstItsDescriptionTogether) {
   write("arm.urdf", kUrdf);
   const std::string wrong = replaced(kRobot, "name = \"elbow\"", "name = \"elbwo\"");
-  const auto robot = read_robot(write("robot.toml", replaced(wrong, "kp = 6", "kp = -6")));
+  const auto robot =
+      robot::read_complete_robot(write("robot.toml", replaced(wrong, "kp = 6", "kp = -6")));
   ASSERT_FALSE(robot.has_value());
   std::string all;
   for (const Error& error : robot.error())
@@ -477,7 +478,7 @@ TEST_F(ExperimentFiles, NameThemselvesWhenMissing) {
 TEST_F(ExperimentFiles, TakeLimitsFromTheRobotWhereTheDescriptionHasNone) {
   write("arm.urdf",
         replaced(kUrdf, "<limit lower=\"-1\" upper=\"2\" velocity=\"3\" effort=\"4\"/>", ""));
-  const auto none = read_robot(write("robot.toml", kRobot));
+  const auto none = robot::read_complete_robot(write("robot.toml", kRobot));
   ASSERT_FALSE(none.has_value());
   EXPECT_EQ(none.error()[0].to_string(),
             (folder_ / "robot.toml") +
@@ -487,18 +488,18 @@ TEST_F(ExperimentFiles, TakeLimitsFromTheRobotWhereTheDescriptionHasNone) {
                 ":4 has no <limit>) (set min_position_rad, "
                 "max_position_rad, max_velocity_rad_s and max_torque_Nm)");
   EXPECT_EQ(none.error().size(), 1u) << "one <limit> is missing";
-  const auto given =
-      read_robot(write("robot.toml", replaced(kRobot, "board = \"board\"",
-                                              "board = \"board\"\nmin_position_rad = -2\n"
-                                              "max_position_rad = 2\nmax_velocity_rad_s = 3\n"
-                                              "max_torque_Nm = 4")));
+  const auto given = robot::read_complete_robot(
+      write("robot.toml", replaced(kRobot, "board = \"board\"",
+                                   "board = \"board\"\nmin_position_rad = -2\n"
+                                   "max_position_rad = 2\nmax_velocity_rad_s = 3\n"
+                                   "max_torque_Nm = 4")));
   ASSERT_TRUE(given.has_value()) << given.error()[0].to_string();
   EXPECT_EQ(given->config.joints[0].min_position_rad, -2.0);
 }
 
 TEST_F(ExperimentFiles, ReportAWrongMassOfALinkWithoutWhatFollowsForItsInertia) {
   write("arm.urdf", kUrdf);
-  const auto robot = read_robot(
+  const auto robot = robot::read_complete_robot(
       write("robot.toml", replaced(kRobot, "[actuator.motor]",
                                    "[model.link.upper]\nmass_kg = -2\n"
                                    "inertia_kg_m2 = [1, 0, 0, 1, 0, 1.5]\n[actuator.motor]")));
@@ -519,17 +520,17 @@ TEST_F(ExperimentFiles, ReportControllersInATableOfAnotherNameOnce) {
 
 TEST_F(ExperimentFiles, TakeMassAndInertiaFromTheRobot) {
   write("arm.urdf", replaced(kUrdf, "izz=\"1\"", "izz=\"9\""));
-  EXPECT_FALSE(read_robot(write("robot.toml", kRobot)).has_value());
-  const auto given = read_robot(
+  EXPECT_FALSE(robot::read_complete_robot(write("robot.toml", kRobot)).has_value());
+  const auto given = robot::read_complete_robot(
       write("robot.toml", replaced(kRobot, "[actuator.motor]",
                                    "[model.link.upper]\nmass_kg = 2\n"
                                    "inertia_kg_m2 = [1, 0, 0, 1, 0, 1.5]\n[actuator.motor]")));
   ASSERT_TRUE(given.has_value()) << given.error()[0].to_string();
   EXPECT_EQ(given->description.tree.bodies[1].inertia.mass_kg, 2.0);
   EXPECT_EQ(given->description.tree.bodies[1].inertia.about_com_kg_m2(2, 2), 1.5);
-  const auto unknown =
-      read_robot(write("robot.toml", replaced(kRobot, "[actuator.motor]",
-                                              "[model.link.uper]\nmass_kg = 2\n[actuator.motor]")));
+  const auto unknown = robot::read_complete_robot(write(
+      "robot.toml",
+      replaced(kRobot, "[actuator.motor]", "[model.link.uper]\nmass_kg = 2\n[actuator.motor]")));
   ASSERT_FALSE(unknown.has_value());
   EXPECT_EQ(unknown.error()[0].to_string(), (folder_ / "robot.toml") +
                                                 ":5: model.link.uper: the description has no link "
@@ -538,9 +539,9 @@ TEST_F(ExperimentFiles, TakeMassAndInertiaFromTheRobot) {
 
 TEST_F(ExperimentFiles, RepairInertiasWhenTheRobotSaysSo) {
   write("arm.urdf", replaced(kUrdf, "izz=\"1\"", "izz=\"9\""));
-  const auto repaired =
-      read_robot(write("robot.toml", replaced(kRobot, "base = \"fixed\"",
-                                              "base = \"fixed\"\ninertia = \"repair\"")));
+  const auto repaired = robot::read_complete_robot(
+      write("robot.toml",
+            replaced(kRobot, "base = \"fixed\"", "base = \"fixed\"\ninertia = \"repair\"")));
   ASSERT_TRUE(repaired.has_value()) << repaired.error()[0].to_string();
   EXPECT_EQ(std::ranges::count(repaired->description.warnings, "link upper", &Error::key), 1)
       << "and one that the link is smaller than its inertia";

@@ -28,7 +28,7 @@ struct Shipped {
   std::string library;
 
   explicit Shipped(const std::string& robot) {
-    auto read = read_robot(TANDEM_SOURCE_DIR "/config/" + robot + "/robot.toml");
+    auto read = robot::read_complete_robot(TANDEM_SOURCE_DIR "/config/" + robot + "/robot.toml");
     if (!read) throw std::runtime_error(read.error().front().to_string());
     tree = std::move(read->description.tree);
     spec = sim::model_spec(read->config);

@@ -55,7 +55,8 @@ void watch(const Hand& hand, std::uint64_t seed, Seen& seen) {
   EstimatedRun run(hand.robot, "hold",
                    {.seed = seed, .noise = false, .estimation = config, .change = [&](auto& e) {
                       const std::string folder = std::string(TANDEM_SOURCE_DIR) + "/config/";
-                      e.robot = read_robot(folder + hand.robot + "/" + hand.file)->config;
+                      e.robot =
+                          robot::read_complete_robot(folder + hand.robot + "/" + hand.file)->config;
                       add_noise(e.robot);
                       e.duration_s = 5.0;
                     }});

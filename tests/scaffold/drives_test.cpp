@@ -55,7 +55,7 @@ TEST_P(DrivesOfPublicRobots, KeepWhatStandsOnALegFromFalling) {
   const NewRobot robot = made(GetParam());
   for (const Foot& foot : robot.feet) {
     const double share_kg = robot.mass_kg / static_cast<double>(robot.feet.size());
-    for (const int j : path_to(robot.tree, foot.body)) {
+    for (const int j : robot.tree.path_to(foot.body)) {
       const hal::JointConfig& joint =
           robot.config.joints[robot.config.joint_index(robot.tree.joints[j].name)];
       const hal::ActuatorConfig& a = robot.config.actuator_of(joint);

@@ -48,7 +48,7 @@ std::string trouble_with(const NewRobot& robot, const std::string& urdf) {
   std::ofstream(file, std::ios::binary) << "<robot name='made'>\n" << urdf << "</robot>\n";
   auto read = hal::parse_robot_config(robot_text(robot, file, file), "robot.toml");
   if (!read) return read.error().front().to_string();
-  const auto complete = runtime::complete_robot(*read);
+  const auto complete = robot::complete_robot(*read);
   if (!complete) return complete.error().front().to_string();
   for (const std::string& text : {hold_text(robot), move_text(robot)}) {
     const auto experiment = runtime::parse_experiment(text, "experiment.toml", *read);

@@ -60,7 +60,7 @@ TEST_P(EveryPublicRobot, GetsFilesThatAreReadBackAsTheyWereMeant) {
   auto read =
       hal::parse_robot_config(robot_text(robot, path_of(GetParam()), "x.urdf"), "robot.toml");
   ASSERT_TRUE(read) << read.error().front().to_string();
-  const auto description = runtime::complete_robot(*read);
+  const auto description = robot::complete_robot(*read);
   ASSERT_TRUE(description) << description.error().front().to_string();
   EXPECT_TRUE(hal::can::check_bus_load(*read, 1'000'000).empty());
   ASSERT_EQ(read->joints.size(), robot.config.joints.size());
@@ -220,7 +220,7 @@ TEST(NewRobot, TakesTheBaseThatItIsTold) {
 TEST(NewRobot, TakesSpringsInProportionFromAnother) {
   auto read = hal::read_robot_config(TANDEM_SOURCE_DIR "/config/coman/robot.toml");
   ASSERT_TRUE(read);
-  auto description = runtime::complete_robot(*read);
+  auto description = robot::complete_robot(*read);
   ASSERT_TRUE(description);
   const Like coman{*read, description->tree};
   const auto same =
@@ -243,7 +243,7 @@ TEST(NewRobot, TakesSpringsInProportionFromAnother) {
 TEST(NewRobot, WarnsOfSpringsOnWhichItWouldFallOver) {
   auto read = hal::read_robot_config(TANDEM_SOURCE_DIR "/config/coman/robot.toml");
   ASSERT_TRUE(read);
-  auto description = runtime::complete_robot(*read);
+  auto description = robot::complete_robot(*read);
   ASSERT_TRUE(description);
   const auto firmness = [&](const PublicRobot& robot, double springs) {
     Like like{*read, description->tree};

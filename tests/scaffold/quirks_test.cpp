@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "hal/config/robot_config.hpp"
-#include "runtime/complete_robot.hpp"
+#include "robot/complete_robot.hpp"
 #include "scaffold/new_robot.hpp"
 #include "tests/support/scratch_folder.hpp"
 
@@ -291,7 +291,7 @@ TEST_P(EveryQuirk, IsTakenOrRefusedWithTheseWords) {
     for (const std::string& remark : robot->remarks) said += remark + "\n";
     said += toml;
     std::ofstream(folder / "robot.toml", std::ios::binary) << toml;
-    const auto read = runtime::read_robot(folder / "robot.toml");
+    const auto read = robot::read_complete_robot(folder / "robot.toml");
     EXPECT_TRUE(read.has_value()) << joined(read.error()) << toml;
   }
   for (const std::string& words : quirk.words)

@@ -14,7 +14,7 @@ constexpr double kRadius_m = 0.04;
 
 model::Mechanism mechanism_of(hal::RobotConfig robot, const std::string& name,
                               const Eigen::Vector3d& in_link_m) {
-  model::Tree tree = runtime::complete_robot(robot)->tree;
+  model::Tree tree = robot::complete_robot(robot)->tree;
   const model::Link& link = tree.links.at(static_cast<std::size_t>(tree.link_index(name)));
   model::Inertia& body = tree.bodies[static_cast<std::size_t>(link.body)].inertia;
   body =

@@ -27,7 +27,7 @@ TestRobot load_test_robot(const std::string& name) {
   TestRobot out;
   out.robot = take(
       hal::read_robot_config(std::string(TANDEM_SOURCE_DIR) + "/config/" + name + "/robot.toml"));
-  const model::UrdfModel urdf = take(runtime::complete_robot(out.robot));
+  const model::UrdfModel urdf = take(robot::complete_robot(out.robot));
   const std::string folder = std::string(TANDEM_BINARY_DIR) + "/lib/models";
   out.kernels =
       take(model::load_kernels(model::library_path(folder, out.robot.name),

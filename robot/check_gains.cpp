@@ -1,26 +1,25 @@
-#include "apps/robot/ringing_loops.hpp"
-
+// Position and velocity loops that will probably oscillate, at the period in which their boards
+// compute them.
 #include <fmt/format.h>
 
 #include <cmath>
 #include <numbers>
 #include <vector>
 
-#include "apps/robot/gains_judge.hpp"
 #include "base/counted.hpp"
 #include "hal/config/capabilities.hpp"
-#include "model/interpreted_kernels.hpp"
+#include "robot/check_rows.hpp"
+#include "robot/gains_judge.hpp"
 
-namespace tandem::apps {
+namespace tandem::robot {
 
-std::optional<Error> ringing_loops(const RobotFiles& robot, const std::string& posture) {
-  const hal::RobotConfig& config = robot.config;
+namespace {
+
+std::optional<Error> ringing_loops(const hal::RobotConfig& config, const tandem_kernels& kernels,
+                                   const std::string& posture) {
   const hal::PostureConfig* start = config.posture(posture);
   if (start == nullptr && !posture.empty()) return {};  // has been said elsewhere
-  auto mechanism = model::make_mechanism(robot.tree, robot.spec, model::Frames::kAsDescribed);
-  if (!mechanism) return {};  // is said when the kernels are made
-  const model::InterpretedKernels kernels(std::move(*mechanism), config.name);
-  const GainsJudge judge(config, kernels.get());
+  const GainsJudge judge(config, &kernels);
   const hal::ParameterImage now = hal::initial_parameters(config);
   std::vector<double> position_rad(config.joints.size(), 0.0);
   if (start != nullptr) position_rad = start->position_rad;
@@ -59,4 +58,12 @@ std::optional<Error> ringing_loops(const RobotFiles& robot, const std::string& p
       .key = "joint." + worst_joint->name + ".gains"};
 }
 
-}  // namespace tandem::apps
+}  // namespace
+
+void check_gains(const Subject& s, Findings& findings) {
+  if (s.kernels == nullptr || s.use.postures.empty()) return;
+  auto warning = ringing_loops(s.robot.config, *s.kernels, s.use.postures.front());
+  if (warning) findings.warn(std::move(*warning));
+}
+
+}  // namespace tandem::robot

@@ -1,12 +1,12 @@
-#include "runtime/complete_robot.hpp"
+#include "robot/complete_robot.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-#include "runtime/standing_height.hpp"
+#include "robot/posture.hpp"
 
-namespace tandem::runtime {
+namespace tandem::robot {
 
 namespace {
 
@@ -78,7 +78,8 @@ std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& ro
   return found;
 }
 
-std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file, bool repair) {
+std::expected<CompleteRobot, Diagnostics> read_complete_robot(const std::string& file,
+                                                              bool repair) {
   Diagnostics errors;
   std::vector<hal::JointReference> loose;
   const Result<TomlDocument> document = TomlDocument::load(file);
@@ -103,4 +104,4 @@ std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file, bo
   return std::unexpected(errors);
 }
 
-}  // namespace tandem::runtime
+}  // namespace tandem::robot

@@ -1,14 +1,14 @@
-#include "apps/robot/start_height.hpp"
-
+// Whether a posture starts inside the ground.
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "hal/sim/link_points.hpp"
-#include "runtime/standing_height.hpp"
+#include "robot/check_rows.hpp"
+#include "robot/posture.hpp"
 
-namespace tandem::apps {
+namespace tandem::robot {
 namespace {
 
 constexpr double kHighest = 10.0;  // of the height at which it touches: more is a slip of units
@@ -25,13 +25,11 @@ double pressed_in(const RobotFiles& robot) {
   return mass_kg * std::hypot(x, y, z) / (contact.stiffness_N_m * static_cast<double>(points));
 }
 
-}  // namespace
-
 std::optional<Error> wrong_start_height(const RobotFiles& robot, const std::string& posture) {
   const hal::PostureConfig zero{};
   const hal::PostureConfig* start = posture.empty() ? &zero : robot.config.posture(posture);
   if (start == nullptr) return {};  // has been said elsewhere
-  const auto touching = runtime::standing(robot.config, *start, robot.tree);
+  const auto touching = standing(robot.config, *start, robot.tree);
   if (!touching) return {};
   const bool floats = robot.tree.floating_base;
   const double depth_m = touching->base_height_m - (floats ? start->base_height_m : 0.0);
@@ -62,7 +60,7 @@ Diagnostics buried_links(const RobotFiles& robot, const std::string& posture) {
   const hal::PostureConfig zero{};
   const hal::PostureConfig* start = posture.empty() ? &zero : robot.config.posture(posture);
   if (start == nullptr || !(robot.config.contact.stiffness_N_m > 0.0)) return warnings;
-  const auto bodies = runtime::bodies_in(robot.config, *start, robot.tree);
+  const auto bodies = bodies_in(robot.config, *start, robot.tree);
   const double base_m = robot.tree.floating_base ? start->base_height_m : 0.0;
   for (const sim::LinkPoints& points : sim::link_points(robot.config, robot.tree)) {
     if (points.guessed) continue;  // nobody wrote it
@@ -88,4 +86,20 @@ Diagnostics buried_links(const RobotFiles& robot, const std::string& posture) {
   return warnings;
 }
 
-}  // namespace tandem::apps
+}  // namespace
+
+void check_start_heights(const Subject& s, Findings& findings) {
+  for (const std::string& posture : s.use.postures) {
+    auto error = wrong_start_height(s.robot, posture);
+    if (!error) continue;
+    (s.use.alone ? findings.warnings : findings.errors).push_back(std::move(*error));
+  }
+}
+
+void check_buried_links(const Subject& s, Findings& findings) {
+  for (const std::string& posture : s.use.postures) {
+    for (Error& warning : buried_links(s.robot, posture)) findings.warn(std::move(warning));
+  }
+}
+
+}  // namespace tandem::robot

@@ -1,6 +1,6 @@
 // Whether a loop of a joint's drive is stable, and by how much: motor, spring and link with the
 // board's law, sampled at its control period.
-// Layer: apps/robot.  Thread: any; pure.
+// Layer: robot.  Thread: any; pure.
 #pragma once
 
 #include <limits>
@@ -8,7 +8,7 @@
 
 #include "hal/config/robot_config.hpp"
 
-namespace tandem::apps {
+namespace tandem::robot {
 
 /// One loop of one joint, of our own boards. Linear: limits of voltage, current and torque, gravity
 /// and the ground are not looked at, nor what other joints' loops do.
@@ -46,4 +46,4 @@ struct LoopVerdict {
 [[nodiscard]] LoopVerdict judge_loop(const LoopPlant& plant, std::span<const double> inertias_kg_m2,
                                      bool with_margin = true);
 
-}  // namespace tandem::apps
+}  // namespace tandem::robot

@@ -1,5 +1,5 @@
-// How high a robot's base is when it stands.
-// Layer: runtime.  Thread: non-RT only.
+// A robot in a posture: its coordinates, its bodies, and how high its base is when it stands.
+// Layer: robot.  Thread: non-RT only.
 #pragma once
 
 #include <optional>
@@ -7,10 +7,17 @@
 #include <vector>
 
 #include "hal/config/robot_config.hpp"
+#include "model/kernels.h"
 #include "model/placements.hpp"
 #include "model/tree.hpp"
 
-namespace tandem::runtime {
+namespace tandem::robot {
+
+/// The model's coordinates (nq) in a posture, the base upright and passive joints where they start
+/// from; null: every joint at 0.
+[[nodiscard]] std::vector<double> coordinates_at(const hal::RobotConfig& robot,
+                                                 const tandem_kernels& kernels,
+                                                 const hal::PostureConfig* posture);
 
 /// Where a robot touches the ground.
 struct Standing {
@@ -29,4 +36,4 @@ struct Standing {
                                                const hal::PostureConfig& posture,
                                                const model::Tree& tree);
 
-}  // namespace tandem::runtime
+}  // namespace tandem::robot

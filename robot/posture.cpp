@@ -1,8 +1,25 @@
-#include "runtime/standing_height.hpp"
+#include "robot/posture.hpp"
 
 #include <algorithm>
 
-namespace tandem::runtime {
+namespace tandem::robot {
+
+std::vector<double> coordinates_at(const hal::RobotConfig& robot, const tandem_kernels& kernels,
+                                   const hal::PostureConfig* posture) {
+  const std::size_t first = kernels.floating_base != 0 ? 7 : 0;
+  std::vector<double> q(kernels.nq, 0.0);
+  if (first != 0) q[6] = 1.0;
+  for (std::size_t i = 0; i < kernels.joints; ++i) {
+    const int driven = robot.joint_index(kernels.joint_names[i]);
+    const auto passive =
+        std::ranges::find(robot.passive, kernels.joint_names[i], &hal::PassiveConfig::name);
+    if (passive != robot.passive.end()) q[first + i] = passive->position_rad;
+    if (driven >= 0 && posture != nullptr) {
+      q[first + i] = posture->position_rad[static_cast<std::size_t>(driven)];
+    }
+  }
+  return q;
+}
 
 std::vector<model::Placement> bodies_in(const hal::RobotConfig& robot,
                                         const hal::PostureConfig& posture,
@@ -39,4 +56,4 @@ std::optional<Standing> standing(const hal::RobotConfig& robot, const hal::Postu
   return highest;
 }
 
-}  // namespace tandem::runtime
+}  // namespace tandem::robot

@@ -1,5 +1,5 @@
 // Judges the gains of a robot's drives against its model.
-// Layer: apps/robot.  Thread: any, one at a time; not the loop's.
+// Layer: robot.  Thread: any, one at a time; not the loop's.
 #pragma once
 
 #include <array>
@@ -8,12 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "apps/robot/loop_margin.hpp"
-#include "apps/text/console.hpp"
 #include "hal/config/robot_config.hpp"
 #include "model/kernels.h"
+#include "robot/loop_margin.hpp"
 
-namespace tandem::apps {
+namespace tandem::robot {
 
 /// A margin below is worth a warning [deg].
 inline constexpr double kLowMargin_deg = 30.0;
@@ -40,10 +39,10 @@ class GainsJudge {
                                                  std::span<const double> position_rad,
                                                  bool with_margin = true) const;
 
-  /// What `tandem joint gains` answers, `stability` of docs/json.md: with `remedy` when the gains
-  /// are unstable.
-  [[nodiscard]] Json opinion(std::size_t joint, hal::PidLoop loop, const Gains& gains,
-                             std::span<const double> position_rad) const;
+  /// Gains near these that have a phase margin of kLowMargin_deg, in words; empty: none are found.
+  /// @pre as judge()'s
+  [[nodiscard]] std::string remedy(std::size_t joint, hal::PidLoop loop, const Gains& gains,
+                                   std::span<const double> position_rad) const;
 
  private:
   /// What a joint feels of the mass matrix: all else free, and all else locked.
@@ -51,8 +50,6 @@ class GainsJudge {
     double free_kg_m2 = 0.0, locked_kg_m2 = 0.0;
   };
   [[nodiscard]] std::vector<Inertias> inertias_at(std::span<const double> position_rad) const;
-  [[nodiscard]] std::string remedy(std::size_t joint, hal::PidLoop loop, const Gains& gains,
-                                   std::span<const double> position_rad) const;
 
   const hal::RobotConfig& robot_;
   const tandem_kernels* kernels_;
@@ -60,4 +57,4 @@ class GainsJudge {
   std::vector<Inertias> range_;                   ///< the same: the least free, the most locked
 };
 
-}  // namespace tandem::apps
+}  // namespace tandem::robot

@@ -1,13 +1,12 @@
-#include "apps/robot/unused_limits.hpp"
-
+// Limits of a description that its robot.toml goes beyond.
 #include <cmath>
 #include <vector>
 
-#include "apps/robot/robot_files.hpp"
 #include "base/counted.hpp"
 #include "model/urdf_extras.hpp"
+#include "robot/check_rows.hpp"
 
-namespace tandem::apps {
+namespace tandem::robot {
 namespace {
 
 constexpr double kRounding = 1e-5;  // of a limit: robot.toml has six digits
@@ -26,8 +25,10 @@ void warn(const std::string& what, const std::vector<std::string>& joints, const
 
 }  // namespace
 
-Diagnostics unused_limits(const hal::RobotConfig& robot, const model::Tree& tree) {
-  const auto extras = model::joint_extras(text_of(robot.model.urdf));
+void check_unused_limits(const Subject& s, Findings& findings) {
+  const hal::RobotConfig& robot = s.robot.config;
+  const model::Tree& tree = s.robot.tree;
+  const auto extras = model::joint_extras(text_in(s.robot.files, robot.model.urdf));
   std::vector<std::string> soft, rates;
   for (const hal::JointConfig& joint : robot.joints) {
     const auto own = extras.find(joint.name);
@@ -43,12 +44,10 @@ Diagnostics unused_limits(const hal::RobotConfig& robot, const model::Tree& tree
       rates.push_back(joint.name);
     }
   }
-  Diagnostics warnings;
   warn("the soft limit (<safety_controller>)", soft, "min_position_rad and max_position_rad", tree,
-       warnings);
+       findings.warnings);
   warn("the acceleration or jerk of <limit>", rates, "max_acceleration_rad_s2 and max_jerk_rad_s3",
-       tree, warnings);
-  return warnings;
+       tree, findings.warnings);
 }
 
-}  // namespace tandem::apps
+}  // namespace tandem::robot

@@ -1,5 +1,5 @@
 // A robot.toml completed by the URDF that it names.
-// Layer: runtime.  Thread: non-RT.
+// Layer: robot.  Thread: non-RT.
 #pragma once
 
 #include <expected>
@@ -11,7 +11,7 @@
 #include "hal/config/robot_config.hpp"
 #include "model/urdf.hpp"
 
-namespace tandem::runtime {
+namespace tandem::robot {
 
 /// Files by their paths, as they were read: what is run, whatever stands there later.
 using FileTexts = std::vector<std::pair<std::string, std::string>>;
@@ -29,8 +29,8 @@ struct CompleteRobot {
 /// Reads a robot.toml and its URDF. Errors: those of both at once, read_robot_config()'s and
 /// complete_robot()'s.
 /// @param repair  as if it said inertia = "repair"
-[[nodiscard]] std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file,
-                                                                   bool repair = false);
+[[nodiscard]] std::expected<CompleteRobot, Diagnostics> read_complete_robot(const std::string& file,
+                                                                            bool repair = false);
 
 /// Reads the robot's URDF and fills from it what robot.toml left out: limits, and the heights of
 /// postures that are "auto". Errors: read_urdf()'s and complete_from_description()'s. The answer
@@ -40,4 +40,4 @@ struct CompleteRobot {
 [[nodiscard]] std::expected<model::UrdfModel, Diagnostics> complete_robot(
     hal::RobotConfig& robot, const FileTexts& read = {});
 
-}  // namespace tandem::runtime
+}  // namespace tandem::robot

@@ -1,4 +1,4 @@
-#include "apps/robot/gains_judge.hpp"
+#include "robot/gains_judge.hpp"
 
 #include <fmt/format.h>
 
@@ -9,9 +9,9 @@
 #include <numbers>
 #include <random>
 
-#include "apps/robot/start_torque.hpp"
+#include "robot/posture.hpp"
 
-namespace tandem::apps {
+namespace tandem::robot {
 namespace {
 
 using hal::PidLoop;
@@ -155,25 +155,4 @@ std::string GainsJudge::remedy(std::size_t joint, PidLoop loop, const Gains& gai
                      kLowMargin_deg);
 }
 
-Json GainsJudge::opinion(std::size_t joint, PidLoop loop, const Gains& gains,
-                         std::span<const double> position_rad) const {
-  std::string why = unknown(joint);
-  if (why.empty() && loop == PidLoop::kCurrent) why = "current loops are not judged";
-  if (!why.empty()) return {{"judged", false}, {"why", why}};
-  const auto verdict = judge(joint, loop, gains, position_rad);
-  if (!verdict) return {{"judged", false}, {"why", "no loop of this joint has gains"}};
-  const auto known = [](double value) { return std::isnan(value) ? Json(nullptr) : Json(value); };
-  const double rate_1_s = std::log(verdict->growth) / verdict->period_s;
-  Json out{
-      {"judged", true},
-      {"stable", verdict->stable()},
-      {"loop", hal::to_string(verdict->loop)},
-      {"phase_margin_deg", known(verdict->phase_margin_deg)},
-      {"crossover_rad_s", known(verdict->crossover_rad_s)},
-      {"inertia_kg_m2", verdict->inertia_kg_m2},
-      {"doubles_in_s", verdict->stable() ? Json(nullptr) : Json(std::numbers::ln2 / rate_1_s)}};
-  if (!verdict->stable()) out["remedy"] = remedy(joint, loop, gains, position_rad);
-  return out;
-}
-
-}  // namespace tandem::apps
+}  // namespace tandem::robot

@@ -1,9 +1,8 @@
-// A robot's files together: its TOML, its description, and what kernels are made from.
-// Layer: apps/robot.  Thread: main.
+// A robot's files together: its TOML, its description, its drives' data sheets, and what kernels
+// are made from. Layer: robot.  Thread: main.
 #pragma once
 
 #include <expected>
-#include <optional>
 #include <string>
 
 #include "base/result.hpp"
@@ -11,9 +10,9 @@
 #include "model/model_spec.hpp"
 #include "model/right_angles.hpp"
 #include "model/tree.hpp"
-#include "runtime/complete_robot.hpp"
+#include "robot/complete_robot.hpp"
 
-namespace tandem::apps {
+namespace tandem::robot {
 
 struct RobotFiles {
   hal::RobotConfig config;  ///< completed from the description
@@ -21,17 +20,20 @@ struct RobotFiles {
   model::ModelSpec spec;
   model::RightAngles right_angles;  ///< what the description has of few digits
   Diagnostics warnings;             ///< what the description's reader tolerated
-  runtime::FileTexts files{};       ///< what was read
+  FileTexts files{};                ///< what was read
 };
 
-/// A warning for a floating base that nothing carries.
-[[nodiscard]] std::optional<Error> falls_for_ever(const hal::RobotConfig& robot);
+/// Joins a completed robot and its description: whether its loops close anything, and whether its
+/// dynamics can be solved, model::check_regular() with every posture. Nothing is read.
+/// @param files  what the two were read from
+[[nodiscard]] std::expected<RobotFiles, Diagnostics> join(hal::RobotConfig config,
+                                                          const model::UrdfModel& description,
+                                                          FileTexts files = {});
 
-/// Reads the description that `config` names, checks the two against each other, and that the
-/// robot's dynamics can be solved: model::check_regular(), with every posture.
+/// Reads the description that `config` names, completes the robot by it and joins the two.
 /// @param read  files that were read before, which are not read again
 [[nodiscard]] std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config,
-                                                                      runtime::FileTexts read = {});
+                                                                      FileTexts read = {});
 
 /// Whether the file is a robot's: a robot has a [model], an experiment names a robot.
 [[nodiscard]] bool is_robot(const std::string& file);
@@ -39,9 +41,9 @@ struct RobotFiles {
 /// A file's bytes; empty when it cannot be read.
 [[nodiscard]] std::string text_of(const std::string& file);
 
-/// Reads a robot.toml and its description.
+/// Reads a robot.toml and its description, and joins them.
 /// @param repair  as if it said inertia = "repair"
 [[nodiscard]] std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file,
                                                                 bool repair = false);
 
-}  // namespace tandem::apps
+}  // namespace tandem::robot

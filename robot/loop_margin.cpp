@@ -1,6 +1,6 @@
 // A loop is one linear map from a period's state to the next one's. Its matrices are found by
 // applying it to unit vectors: closed for its eigenvalues, opened for its frequency response.
-#include "apps/robot/loop_margin.hpp"
+#include "robot/loop_margin.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 #include "firmware_emu/setup.hpp"
 
-namespace tandem::apps {
+namespace tandem::robot {
 namespace {
 
 using Complex = std::complex<double>;
@@ -243,4 +243,4 @@ LoopVerdict judge_loop(const LoopPlant& plant, std::span<const double> inertias_
   return *worst;
 }
 
-}  // namespace tandem::apps
+}  // namespace tandem::robot
