@@ -1,7 +1,7 @@
 # Two commands: `make demo` and `make test`. Thin covers over the CMake presets.
 JOBS ?= $(shell nproc)
-# Some tests wait for other processes.
-TEST_JOBS ?= $(shell echo $$(($(JOBS) + 1)))
+# Many tests wait for other processes.
+TEST_JOBS ?= $(shell echo $$(($(JOBS) + 2)))
 FUZZ_SECONDS ?= 60
 FUZZ_RUNS ?=
 FUZZ_JOBS ?= 4
@@ -13,8 +13,8 @@ FUZZ_TARGETS ?= urdf robot experiment message request sample sheet frames etherc
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
 	@echo "make robot  the program for a robot PC: the fastest, in build/robot (12 minutes)"
-	@echo "make test   install what is missing, build everything, run the unit tests (12 minutes the first time)"
-	@echo "make proof  that build in strange surroundings and on a CAN stack, fuzzers, real-time sanitizer (15 minutes)"
+	@echo "make test   install what is missing, build everything, run the unit tests (about 12 minutes the first time)"
+	@echo "make proof  that build in strange surroundings and on a CAN stack, fuzzers, real-time sanitizer (about 15 minutes)"
 	@echo "make test-all  both, and the proofs that take long (hours)"
 	@echo "make bench  times this build; AGAINST=../old/build/release: beside another one"
 	@echo "make fuzz   the fuzzers, a minute each, four at a time; FUZZ_RUNS=1000000: so many inputs each"
@@ -158,6 +158,11 @@ format:
 lint:
 	@scripts/install-dependencies test
 	@$(SOURCES) | xargs $(CLANG_FORMAT) --dry-run -Werror
+
+# At each commit, what is committed is laid out.
+hooks:
+	@git config core.hooksPath scripts/hooks
+	@echo "git config --unset core.hooksPath takes it away again"
 
 # Over the sources as `unit` compiles them. The precompiled header, which clang reads as text, wants
 # Eigen's folder everywhere.

@@ -118,14 +118,24 @@ function(tandem_test_program name)
     TANDEM_BINARY_DIR="${PROJECT_BINARY_DIR}")
 endfunction()
 
-# tandem_test(NAME SOURCES … LINKS … [LABEL unit|sim|rt]): a test program each of whose cases is
-# a ctest of its own.
+# tandem_test(NAME SOURCES … LINKS … [LABEL unit|sim|rt] [WAITS] [OFF_CYCLE]): a test program each
+# of whose cases is a ctest of its own. WAITS: some of its cases mostly wait, and long: ctest starts
+# them first, and beside them those that compute. (Once it has run, it knows by itself what takes
+# long.) OFF_CYCLE: nothing that it calls runs in the cycle, and RealtimeSanitizer would see nothing.
 function(tandem_test name)
-  cmake_parse_arguments(TEST "" "LABEL" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(TEST "WAITS;OFF_CYCLE" "LABEL" "SOURCES;LINKS" ${ARGN})
+  if(TEST_OFF_CYCLE AND TANDEM_SANITIZE STREQUAL "realtime")
+    add_custom_target(${name})  # for add_dependencies()
+    return()
+  endif()
   if(NOT TEST_LABEL)
     set(TEST_LABEL unit)
   endif()
+  set(cost)
+  if(TEST_WAITS)
+    set(cost COST 10)
+  endif()
   tandem_test_program(${name} SOURCES ${TEST_SOURCES} LINKS ${TEST_LINKS})
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
-    PROPERTIES LABELS ${TEST_LABEL} TIMEOUT 300)
+    PROPERTIES LABELS ${TEST_LABEL} TIMEOUT 300 ${cost})
 endfunction()

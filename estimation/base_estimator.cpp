@@ -102,10 +102,7 @@ void BaseEstimator::update(const hal::StateImage& state,
   const auto values = state.sensor_values(imu_sensor_);
   const Sample sample{ConstVec3(values.data() + 4), ConstVec3(values.data() + 7)};
   if (!sample.gyro.allFinite() || !sample.force.allFinite()) return;  // the last estimate stays
-  const Mat3 R =
-      started()
-          ? filter_.R()
-          : Eigen::Quaterniond::FromTwoVectors(sample.force, Vec3::UnitZ()).toRotationMatrix();
+  const Mat3 R = started() ? filter_.R() : shortest_turn(sample.force, Vec3::UnitZ());
   weigh_feet(state, R);
   if (started()) {
     step(sample);
@@ -163,8 +160,7 @@ void BaseEstimator::rest(const Sample& sample) noexcept {
   if (static_cast<double>(rested_) * step_s_ < config_.rest_s) return;
   const auto n = static_cast<double>(rested_);
   // The base's x axis is forward at the start: W's yaw is chosen for that.
-  const Mat3 tilt =
-      Eigen::Quaterniond::FromTwoVectors(force_sum_, Vec3::UnitZ()).toRotationMatrix();
+  const Mat3 tilt = shortest_turn(force_sum_, Vec3::UnitZ());
   const ConstMat3 R_base_imu(pose_.data() + 12 * imu_site_);
   const Vec3 forward = tilt * R_base_imu.transpose() * Vec3::UnitX();
   const Mat3 R = rotation_by({0.0, 0.0, -std::atan2(forward.y(), forward.x())}) * tilt;

@@ -32,6 +32,20 @@ Mat3 rotation_by(const Vec3& r) noexcept TANDEM_RT {
   return Mat3::Identity() + a * K + b * (K * K);
 }
 
+Mat3 shortest_turn(const Vec3& from, const Vec3& to) noexcept TANDEM_RT {
+  const Vec3 a = from.normalized(), b = to.normalized();
+  const Vec3 across = a.cross(b);
+  const double cosine = b.dot(a);
+  if (cosine < -1.0 + 1e-6) {  // their sum is rounding, and what is across may be nothing
+    const double sine = across.norm();
+    const Vec3 axis = sine > 0.0 ? Vec3(across / sine) : a.unitOrthogonal();
+    return rotation_by(std::atan2(sine, cosine) * axis);
+  }
+  const double twice_cos_half = std::sqrt((1.0 + cosine) * 2.0);
+  const Vec3 axis = across * (1.0 / twice_cos_half);
+  return Eigen::Quaterniond(twice_cos_half * 0.5, axis.x(), axis.y(), axis.z()).toRotationMatrix();
+}
+
 ContactFilter::ContactFilter(std::size_t feet, const FilterNoise& noise, const Vec3& gravity_m_s2,
                              double step_s)
     : noise_(noise),

@@ -20,6 +20,10 @@ using Mat3 = Eigen::Matrix3d;
 [[nodiscard]] Mat3 skew(const Vec3& a) noexcept TANDEM_RT;
 /// The rotation by the vector `r` [rad].
 [[nodiscard]] Mat3 rotation_by(const Vec3& r) noexcept TANDEM_RT;
+/// The least rotation from one direction to another; of opposites one of the least. Eigen's
+/// FromTwoVectors gives the same bits more than two milliradians off, but compiles a
+/// singular value decomposition.
+[[nodiscard]] Mat3 shortest_turn(const Vec3& from, const Vec3& to) noexcept TANDEM_RT;
 
 /// Deviations of a sample of the inertial sensor, and per root of a second of what walks.
 struct FilterNoise {

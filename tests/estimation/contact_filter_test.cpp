@@ -180,5 +180,20 @@ TEST(ContactFilter, ContinuesFromItsArchiveWithTheSameBits) {
   EXPECT_EQ(copy.covariance(), rig.filter.covariance());
 }
 
+/// Of opposites, too, as where a sensor hangs head down: there is a turn, and it is one.
+TEST(ShortestTurn, LeadsFromOneDirectionToTheOther) {
+  const Vec3 up = Vec3::UnitZ();
+  for (const Vec3& from : {Vec3(0.3, -0.4, 9.7), Vec3(0.0, 0.0, 2.0), Vec3(7.0, 1.0, -3.0),
+                           Vec3(0.0, 0.0, -9.81), Vec3(1e-8, 0.0, -1.0), Vec3(3e-6, 1e-7, -1.0)}) {
+    const Mat3 R = shortest_turn(from, up);
+    EXPECT_LT((R * from.normalized() - up).norm(), 1e-9) << from.transpose();
+    EXPECT_LT((R * R.transpose() - Mat3::Identity()).norm(), 1e-14) << from.transpose();
+    EXPECT_NEAR(R.determinant(), 1.0, 1e-14) << from.transpose();
+    const double angle = std::atan2(from.cross(up).norm(), from.dot(up));
+    EXPECT_NEAR(std::acos(0.5 * (R.trace() - 1.0)), angle, 1e-6)
+        << "none is less: " << from.transpose();
+  }
+}
+
 }  // namespace
 }  // namespace tandem::estimation
