@@ -7,6 +7,7 @@
 
 #include "canopen/frame.hpp"
 #include "canopen/objects.hpp"
+#include "canopen/sheet_mappings.hpp"
 
 namespace tandem::hal::can {
 
@@ -24,6 +25,19 @@ std::uint32_t entry_of(const MappedField& field) {
 const MappedField* find(const std::vector<MappedField>& in, std::uint32_t entry) {
   const auto found = std::ranges::find(in, entry, entry_of);
   return found != in.end() ? &*found : nullptr;
+}
+
+/// Of an output that is no field of the master, and may not rest at 0.
+std::string why_unknown(const canopen::DataSheet& sheet, std::uint32_t entry) {
+  const canopen::SheetEntry* object =
+      sheet.find(static_cast<std::uint16_t>(entry >> 16), static_cast<std::uint8_t>(entry >> 8));
+  const int own = object != nullptr ? canopen::bits_of(*object) : 0;
+  const auto bits = static_cast<int>(entry & 0xFF);
+  if (own > 0 && own != bits) {
+    return "has " + std::to_string(own) + " bits, and is there with " + std::to_string(bits);
+  }
+  return "has no value in the sheet, and 0 may ask for something: where its Object in the "
+         "Dictionary has a DefaultValue, that is sent";
 }
 
 }  // namespace
@@ -240,7 +254,7 @@ bool BoardPacker::fills_line(const PdoSlot& slot, PdoGroup group) {
     const MappedField* known = find(known_, entry);
     if (known != nullptr && bits % 8 != 0) return refuse("begins within a byte", entry);
     if (known == nullptr && group == PdoGroup::kCommand && !resting_value(sheet_, entry)) {
-      return refuse("has no value that is known to ask for nothing", entry);
+      return refuse(why_unknown(sheet_, entry), entry);
     }
     bytes += known != nullptr ? known->size : 0U;
     bits += entry & 0xFF;

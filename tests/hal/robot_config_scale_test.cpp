@@ -1,7 +1,9 @@
 // The scale of a joint on a drive of another make: its sheet's, where that says one, or
 // robot.toml's.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 
 #include "hal/config/joint_scale.hpp"
@@ -241,6 +243,33 @@ TEST_F(BoardScale, OfJointsWithTheSameSheetIsDoubtedOnce) {
   EXPECT_NE(warned(*robot).find("joint.elbow."), std::string::npos) << warned(*robot);
   EXPECT_NE(warned(*robot).find("; so it is of 1 other joint"), std::string::npos)
       << warned(*robot);
+}
+
+/// One key with one homing: "give it a homing" had led to the same error, and to another one.
+TEST_F(BoardScale, AnEncodersTurnAndAHomingAreOneOfTwo) {
+  const std::string turn = "encoder_turn_counts = 2048\n";
+  const std::string counts = "encoder_counts_per_rev = 4096\n";
+  const std::string homing =
+      "homing = { method = 35, speed_rad_s = 0.2, acceleration_rad_s2 = 1.0 }\n";
+  const auto line_of = [](const std::string& text, const std::string& key) {
+    return std::count(text.begin(), text.begin() + static_cast<long>(text.find(key)), '\n') + 1;
+  };
+  const std::string wide =
+      with(joint_with(counts + turn), "max_position_rad = 1.5", "max_position_rad = 3.0");
+  const std::string alone = refused(wide);
+  EXPECT_NE(alone.find(fmt::format("robot.toml:{}: ", line_of(wide, "encoder_turn_counts"))),
+            std::string::npos)
+      << alone;
+  EXPECT_NE(alone.find("replace this key by a `homing`"), std::string::npos) << alone;
+  const std::string both = refused(
+      with(joint_with(counts + turn + homing), "max_position_rad = 1.5", "max_position_rad = 3.0"));
+  EXPECT_NE(both.find("(remove this key)"), std::string::npos) << both;
+  EXPECT_EQ(refused(with(joint_with(counts + homing), "max_position_rad = 1.5",
+                         "max_position_rad = 3.0")),
+            "taken")
+      << "what both texts ask for";
+  const std::string narrow = refused(joint_with(counts + turn + homing));
+  EXPECT_NE(narrow.find("remove this key, or set required = false"), std::string::npos) << narrow;
 }
 
 }  // namespace
