@@ -2,6 +2,7 @@
 #include "hal/ethercat-can/drive_lacks.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -96,6 +97,20 @@ void drop_untargeted(NodePlan& node) {
   }
 }
 
+namespace {
+
+/// What the sheet's remarks say of it: a PDO of another sync manager is not there for the rest.
+std::string hindrances_of(const canopen::DataSheet& sheet) {
+  constexpr std::size_t kMost = 4;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kMost, sheet.hindrances.size()); ++i) {
+    text += fmt::format("; line {}: {}", sheet.hindrances[i].line, sheet.hindrances[i].text);
+  }
+  return text;
+}
+
+}  // namespace
+
 std::string lacks_of(const NodePlan& node, const canopen::DataSheet& sheet, std::size_t axis) {
   std::vector<std::string> missing;
   for (const auto& [field, need] : {std::pair{WireField::kControlword, kControl},
@@ -104,15 +119,18 @@ std::string lacks_of(const NodePlan& node, const canopen::DataSheet& sheet, std:
     if (node.carries(axis, field)) continue;
     missing.push_back(with_reason(need, axis, reason(sheet, need, axis)));
   }
-  if (!missing.empty()) return fmt::format("not {}", fmt::join(missing, " and not "));
+  if (!missing.empty()) {
+    return fmt::format("not {}", fmt::join(missing, " and not ")) + hindrances_of(sheet);
+  }
   const canopen::DriveAbilities& can = node.abilities[axis];
   const Mode first = canopen::first_mode(can);
   if (first == Mode::kNone) {
-    return "no position, velocity or torque target of a cyclic mode" + odd_targets(sheet, axis);
+    return "no position, velocity or torque target of a cyclic mode" + odd_targets(sheet, axis) +
+           hindrances_of(sheet);
   }
   if (node.carries(axis, target_of(can, first))) return {};
   return fmt::format("no target of its mode {}", static_cast<int>(first)) +
-         odd_targets(sheet, axis);
+         odd_targets(sheet, axis) + hindrances_of(sheet);
 }
 
 }  // namespace tandem::hal::can

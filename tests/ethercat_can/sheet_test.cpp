@@ -213,9 +213,17 @@ TEST(Sheet, AMappingThatStaysWithATargetInAnotherLengthIsRefused) {
   s.add(0x1600, 2, kUnsigned32, canopen::kRead, 0x607A0010);
   const SheetRig rig(s);
   EXPECT_EQ(rig.master, nullptr);
-  EXPECT_NE(rig.error.find("[1600sub2] maps 607A:00, which has 32 bits, with 16"),
+  EXPECT_NE(rig.error.find("1600 is not used: 607A:00 has 32 bits, and is there with 16"),
             std::string::npos)
       << rig.error;
+  // In a PDO of its own the rest is there, and the target is what is missing.
+  s.add(0x1600, 0, kUnsigned8, canopen::kRead, 1);
+  s.add(0x1601, 0, kUnsigned8, canopen::kRead, 1);
+  s.add(0x1601, 1, kUnsigned32, canopen::kRead, 0x607A0010);
+  const SheetRig apart(s);
+  EXPECT_NE(apart.error.find("[1601sub1] maps 607A:00, which has 32 bits, with 16"),
+            std::string::npos)
+      << apart.error;
 }
 
 TEST(Sheet, VelocityIsThePositionsDifferenceWhereTheDriveTellsNone) {
