@@ -257,6 +257,28 @@ class SheetReader {
   std::set<std::uint16_t> listed_;
 };
 
+/// What a file begins with that is no text, and what to do about it.
+struct OtherFile {
+  std::string_view begin;
+  const char* what;
+  const char* hint;
+};
+constexpr std::array kOtherFiles{
+    OtherFile{"PK\x03\x04", "is a ZIP archive", "unpack it, and name the EDS, DCF or ESI in it"},
+    OtherFile{"\x1F\x8B", "is a gzip archive", "unpack it, and name the EDS, DCF or ESI in it"},
+    OtherFile{"Rar!", "is a RAR archive", "unpack it, and name the EDS, DCF or ESI in it"},
+    OtherFile{"7z\xBC\xAF", "is a 7z archive", "unpack it, and name the EDS, DCF or ESI in it"},
+    OtherFile{"%PDF", "is a PDF, and no data sheet for programs",
+              "ask the maker for the drive's EDS, DCF or ESI"},
+};
+
+Status refuse_other_file(std::string_view text) {
+  for (const OtherFile& other : kOtherFiles) {
+    if (text.starts_with(other.begin)) return fail(other.what, other.hint);
+  }
+  return {};
+}
+
 }  // namespace
 
 int SheetEntry::size() const noexcept { return sheet_type_size(type); }
@@ -283,6 +305,10 @@ std::optional<std::int64_t> DataSheet::value(std::uint16_t index, std::uint8_t s
 
 Result<DataSheet> read_data_sheet(std::string_view text, std::string_view file,
                                   const DeviceChoice& choice) {
+  if (Status other = refuse_other_file(text); !other) {
+    other.error().file = file;
+    return std::unexpected(std::move(other.error()));
+  }
   auto sheet = is_xml(text) ? read_esi(text, file, choice) : SheetReader(file).read(text);
   if (!sheet) sheet.error().file = file;
   return sheet;

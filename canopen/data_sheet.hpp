@@ -74,6 +74,12 @@ struct SheetWrite {
   std::vector<std::uint8_t> bytes;  ///< one to four
 };
 
+/// What of an ESI keeps the master from using the drive as its file means it.
+struct SheetHindrance {
+  int line = 0;
+  std::string text;
+};
+
 /// A data sheet that was read. Entries are sorted by index and sub-index.
 struct DataSheet {
   std::string file;
@@ -99,7 +105,8 @@ struct DataSheet {
   std::vector<SheetDcMode> dc_modes;
   std::vector<SheetWrite> writes;
   std::vector<std::pair<std::uint16_t, std::uint16_t>> excludes;  ///< PDOs, of which one at a time
-  std::vector<std::uint16_t> mandatory;  ///< PDOs that are always among the process data
+  std::vector<std::uint16_t> mandatory;    ///< PDOs that are always among the process data
+  std::vector<SheetHindrance> hindrances;  ///< each is among the remarks, too
   /// What contradicts itself or CiA 306 and was read all the same: "line 12: …".
   std::vector<std::string> remarks;
 

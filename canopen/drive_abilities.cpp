@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "canopen/eds.hpp"
+#include "canopen/pdo.hpp"
 
 namespace tandem::canopen {
 
@@ -34,10 +35,11 @@ bool remappable(const DataSheet& sheet, std::uint16_t parameter) {
 namespace {
 
 /// Whether one of the first PDOs of a direction (of a slave: any) can be mapped, or has the entry
-/// from power-on.
+/// from power-on, in its own length.
 bool carried(const DataSheet& sheet, const SheetEntry& entry, Access right) {
   const bool receive = right == kMapRpdo;
   constexpr int kPdosOfSlave = 0x200;
+  const std::uint32_t wanted = mapping_entry(entry.index, entry.sub, entry.size());
   const int pdos = sheet.ethercat ? kPdosOfSlave : kPdosPerNode;
   for (int i = 0; i < pdos; ++i) {
     const auto parameter =
@@ -47,8 +49,7 @@ bool carried(const DataSheet& sheet, const SheetEntry& entry, Access right) {
         static_cast<std::uint16_t>((receive ? object::kRpdoMapping : object::kTpdoMapping) + i);
     const auto count = sheet.value(mapping, 0, 0).value_or(0);
     for (int sub = 1; sub <= count; ++sub) {
-      const auto mapped = sheet.value(mapping, static_cast<std::uint8_t>(sub), 0).value_or(0);
-      if (mapped >> 8 == (entry.index << 8 | entry.sub)) return true;
+      if (sheet.value(mapping, static_cast<std::uint8_t>(sub), 0) == wanted) return true;
     }
   }
   return false;

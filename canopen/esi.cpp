@@ -10,6 +10,7 @@
 #include "canopen/esi_text.hpp"
 #include "canopen/object_dictionary.hpp"
 #include "canopen/objects.hpp"
+#include "canopen/sheet_mappings.hpp"
 
 namespace tandem::canopen {
 namespace {
@@ -96,6 +97,7 @@ class EsiReader {
     if (esi_.error) return std::unexpected(std::move(*esi_.error));
     DataSheet& sheet = esi_.sheet;
     for (auto& [key, entry] : esi_.entries) sheet.entries.push_back(std::move(entry));
+    for (const OddMapping& odd : odd_mappings(sheet)) esi_.remarks.add(odd.line, odd.text);
     sheet.remarks = esi_.remarks.take();
     return std::move(sheet);
   }
@@ -211,15 +213,30 @@ class EsiReader {
     read_slots(device);
     add_esi_assignment(esi_, device);
     add_profile(device);
+    add_written(device);
     read_clock(device);
+  }
+
+  /// What an InitCmd writes is an object, also where the file has no dictionary, or none of it
+  /// there. It has that value whenever the drive is in use.
+  void add_written(const EsiElement& device) {
+    for (const SheetWrite& write : esi_.sheet.writes) {
+      if (esi_.entries.contains({write.index, write.sub})) continue;
+      SheetEntry& entry = esi_.entry(write.index, write.sub, device);
+      entry.type = esi_unsigned(8 * write.bytes.size());
+      entry.access = kReadWrite;
+      entry.name = "InitCmd";
+      std::int64_t value = 0;
+      for (std::size_t i = write.bytes.size(); i-- > 0;) value = value << 8 | write.bytes[i];
+      entry.value = SheetValue{.number = value};
+    }
   }
 
   void read_mailbox(const EsiElement& device) {
     const EsiElement* mailbox = device.FirstChildElement("Mailbox");
     const EsiElement* coe = child(mailbox, "CoE");
     if (coe == nullptr) {
-      esi_.remarks.add(device.GetLineNum(),
-                       "no CoE is said: without it the drive cannot be set up");
+      esi_.hinder(device, "no CoE is said (Mailbox/CoE): without it the drive cannot be set up");
       return;
     }
     esi_.assigns = esi_flag(*coe, "PdoAssign");
@@ -248,9 +265,9 @@ class EsiReader {
     }
     std::array<char, 16> name{};
     (void)std::snprintf(name.data(), name.size(), "%04X:%02X", unsigned{index}, unsigned{sub});
-    esi_.remarks.add(e.GetLineNum(), std::string("InitCmd of ") + name.data() +
-                                         " is not sent: it is no value of one to four bytes on "
-                                         "the way from PREOP to SAFEOP");
+    esi_.hinder(e, std::string("InitCmd of ") + name.data() +
+                       " is not sent: it is no value of one to four bytes on the way from PREOP to "
+                       "SAFEOP");
   }
 
   void read_managers(const EsiElement& device) {

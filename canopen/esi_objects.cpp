@@ -224,8 +224,8 @@ void read_esi_objects(EsiSheet& esi, const EsiElement& parent, EsiShift shift) {
   for (const EsiElement* profile = parent.FirstChildElement("Profile"); profile != nullptr;
        profile = profile->NextSiblingElement("Profile")) {
     if (const EsiElement* other = profile->FirstChildElement("DictionaryFile")) {
-      esi.remarks.add(other->GetLineNum(), "the objects are in '" + printable(esi_text(*other)) +
-                                               "': only those of PDOs are known");
+      esi.hinder(*other, "the objects are in '" + printable(esi_text(*other)) +
+                             "': only those of PDOs are known");
     }
     if (const EsiElement* own = profile->FirstChildElement("Dictionary")) {
       read_dictionary(esi, *own, shift);

@@ -2,6 +2,8 @@
 // 1C13, and what the PDOs carry.
 #include <algorithm>
 #include <array>
+#include <cstdio>
+#include <string>
 
 #include "base/bounds.hpp"
 #include "canopen/esi_text.hpp"
@@ -22,17 +24,6 @@ void set_number(SheetEntry& entry, DataType type, std::uint8_t access, std::int6
   entry.value = SheetValue{.number = value};
 }
 
-/// By the length alone.
-std::uint16_t unsigned_type(std::uint64_t bits) {
-  switch (bits) {
-    case 1: return static_cast<std::uint16_t>(DataType::kBoolean);
-    case 8: return static_cast<std::uint16_t>(DataType::kUnsigned8);
-    case 16: return static_cast<std::uint16_t>(DataType::kUnsigned16);
-    case 32: return static_cast<std::uint16_t>(DataType::kUnsigned32);
-    default: return 0;
-  }
-}
-
 class PdoReader {
  public:
   PdoReader(EsiSheet& esi, const EsiElement& pdo, bool receive, EsiShift shift)
@@ -45,6 +36,7 @@ class PdoReader {
       return esi_.fail(pdo_, "its index is none of a PDO in this direction",
                        receive_ ? "expected is #x1600 to #x17FF" : "expected is #x1A00 to #x1BFF");
     }
+    if (of_another_manager()) return;
     if (++esi_.pdos > bounds::kEsiPdos.most) {
       return esi_.fail(pdo_, beyond(bounds::kEsiPdos).message, "is this the file of a slave?");
     }
@@ -84,7 +76,7 @@ class PdoReader {
     SheetEntry& object = esi_.entry(index, sub, entry);
     if (!known || object.type == 0) {
       const std::uint16_t named = esi_type(esi_text(entry, "DataType"));
-      object.type = named != 0 ? named : unsigned_type(bits);
+      object.type = named != 0 ? named : esi_unsigned(bits);
       object.name = printable(esi_text(entry, "Name"));
     }
     if (!known && receive_) object.access = kReadWrite;
@@ -110,19 +102,23 @@ class PdoReader {
     }
   }
 
-  /// The sync manager that has it from power-on, and the PDOs that it does not go with.
+  /// 1C12 and 1C13 have those of sync managers 2 and 3 alone.
+  bool of_another_manager() {
+    if (pdo_.Attribute("Sm") == nullptr) return false;
+    const std::uint64_t own = receive_ ? 2 : 3;
+    const std::uint64_t manager = esi_.attribute(pdo_, "Sm", 0xFF);
+    if (manager == own) return false;
+    std::array<char, 8> name{};
+    (void)std::snprintf(name.data(), name.size(), "%04X", unsigned{index_});
+    esi_.hinder(pdo_, std::string("PDO ") + name.data() + " is not used: it is of sync manager " +
+                          std::to_string(manager) + " (Sm), and " +
+                          (receive_ ? "outputs are of 2" : "inputs are of 3"));
+    return true;
+  }
+
+  /// Whether it is among the process data from power-on, and the PDOs that it does not go with.
   void add_rules() {
-    const std::uint16_t assignment = receive_ ? kAssignOutputs : kAssignInputs;
-    const int own = receive_ ? 2 : 3;
-    if (pdo_.Attribute("Sm") != nullptr) {
-      const auto manager = static_cast<int>(esi_.attribute(pdo_, "Sm", 0xFF));
-      if (manager == own) {
-        assign(assignment);
-      } else {
-        esi_.remarks.add(pdo_.GetLineNum(), "PDO of sync manager " + std::to_string(manager) +
-                                                ": not used, as the process data are of 2 and 3");
-      }
-    }
+    if (pdo_.Attribute("Sm") != nullptr) assign(receive_ ? kAssignOutputs : kAssignInputs);
     if (esi_flag(pdo_, "Mandatory")) esi_.sheet.mandatory.push_back(index_);
     for (const EsiElement* other = pdo_.FirstChildElement("Exclude"); other != nullptr;
          other = other->NextSiblingElement("Exclude")) {

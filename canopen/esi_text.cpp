@@ -94,6 +94,16 @@ std::uint16_t esi_type(std::string_view name) noexcept {
   return string ? kVisibleString : 0;
 }
 
+std::uint16_t esi_unsigned(std::uint64_t bits) noexcept {
+  switch (bits) {
+    case 1: return static_cast<std::uint16_t>(DataType::kBoolean);
+    case 8: return static_cast<std::uint16_t>(DataType::kUnsigned8);
+    case 16: return static_cast<std::uint16_t>(DataType::kUnsigned16);
+    case 32: return static_cast<std::uint16_t>(DataType::kUnsigned32);
+    default: return 0;
+  }
+}
+
 void EsiSheet::fail(const EsiElement& at, std::string message, std::string hint) {
   if (error) return;
   error = Error{.message = std::move(message),
@@ -101,6 +111,13 @@ void EsiSheet::fail(const EsiElement& at, std::string message, std::string hint)
                 .file = sheet.file,
                 .line = at.GetLineNum(),
                 .key = path_of(at)};
+}
+
+void EsiSheet::hinder(const EsiElement& at, std::string text) {
+  remarks.add(at.GetLineNum(), text);
+  if (sheet.hindrances.size() < bounds::kSheetRemarks.most) {
+    sheet.hindrances.push_back({at.GetLineNum(), std::move(text)});
+  }
 }
 
 std::uint64_t EsiSheet::number(const EsiElement& e, const char* child, std::uint64_t most,

@@ -50,6 +50,8 @@ struct EsiSheet {
   std::array<std::int64_t, 2> assigned{};  ///< PDOs from power-on: outputs, inputs
 
   void fail(const EsiElement& at, std::string message, std::string hint = {});
+  /// A remark that `tandem check` warns of.
+  void hinder(const EsiElement& at, std::string text);
   /// A number of a child. @param missing  where there is no such child; none: that is an error
   std::uint64_t number(const EsiElement& e, const char* child, std::uint64_t most,
                        std::optional<std::uint64_t> missing = {});
@@ -63,6 +65,9 @@ struct EsiSheet {
 
 /// The data type's number in CiA 301 by its name in IEC 61131 or in ETG's lists; 0: no plain one.
 [[nodiscard]] std::uint16_t esi_type(std::string_view name) noexcept;
+
+/// The unsigned type of this length, or BOOLEAN for a bit; 0: there is none.
+[[nodiscard]] std::uint16_t esi_unsigned(std::uint64_t bits) noexcept;
 
 /// The objects of Profile/Dictionary below `parent`, a Device or Module.
 void read_esi_objects(EsiSheet& esi, const EsiElement& parent, EsiShift shift);

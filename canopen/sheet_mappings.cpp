@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "canopen/frame.hpp"
+#include "canopen/object_dictionary.hpp"
 #include "canopen/objects.hpp"
 
 namespace tandem::canopen {
@@ -21,7 +22,7 @@ std::string section(std::uint16_t index) {
   return text.data();
 }
 
-/// An object that the sheet has not, or of another length. Fillers are data types, not objects.
+/// An object that the sheet has not, or in another length. Fillers are data types, not objects.
 void check_entry(const DataSheet& sheet, const SheetEntry& entry, std::vector<OddMapping>& odd) {
   const auto mapped = static_cast<std::uint32_t>(entry.value->number);
   const auto index = static_cast<std::uint16_t>(mapped >> 16);
@@ -33,11 +34,13 @@ void check_entry(const DataSheet& sheet, const SheetEntry& entry, std::vector<Od
                 index, sub);
   const SheetEntry* object = sheet.find(index, sub);
   if (object == nullptr) {
-    odd.push_back({entry.line, std::string(text.data()) + "which the sheet does not define"});
-  } else if (object->size() > 0 && bits > 8 * object->size()) {
-    odd.push_back({entry.line, std::string(text.data()) + "which has " +
-                                   std::to_string(8 * object->size()) + " bits, with " +
-                                   std::to_string(bits)});
+    odd.push_back(
+        {entry.line, std::string(text.data()) + "which the sheet does not define", mapped});
+  } else if (const int own = bits_of(*object); own > 0 && bits != own) {
+    odd.push_back({entry.line,
+                   std::string(text.data()) + "which has " + std::to_string(own) + " bits, with " +
+                       std::to_string(bits),
+                   mapped});
   }
 }
 
@@ -73,6 +76,11 @@ void check(const DataSheet& sheet, const SheetEntry& count, std::vector<OddMappi
 }
 
 }  // namespace
+
+int bits_of(const SheetEntry& object) noexcept {
+  // A boolean is mapped with one bit as often as with eight.
+  return object.type == static_cast<std::uint16_t>(DataType::kBoolean) ? 0 : 8 * object.size();
+}
 
 std::vector<OddMapping> odd_mappings(const DataSheet& sheet) {
   std::vector<OddMapping> odd;

@@ -103,6 +103,7 @@ void upward_gravity(const Subject& s, Findings& findings) {
 
 /// What drives of other makes miss. A layout that cannot be made is an error of the bus' load, too.
 void drives(const Subject& s, Findings& findings) {
+  add(hal::can::sheet_warnings(s.robot.config), findings.warnings);
   const auto found = hal::can::drive_warnings(s.robot.config);
   if (found) return add(*found, findings.warnings);
   if (s.use.period_ns == 0) findings.add_error(found.error());

@@ -190,6 +190,7 @@ struct JointConfig {
   std::int32_t zero_counts = 0;             ///< what the drive counts where the joint is at 0
   /// Counts after which the encoder repeats itself at power-on (a single-turn one); 0: it does not.
   std::int32_t encoder_turn_counts = 0;
+  int turn_line = 0;  ///< of the key encoder_turn_counts
   StopOptions stop_options = {};
   /// The drive's velocity units at one revolution of the joint per second; 0: its counts per
   /// second.

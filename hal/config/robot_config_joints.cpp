@@ -112,6 +112,7 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
                        std::numeric_limits<std::int32_t>::max()));
   joint.encoder_turn_counts = static_cast<std::int32_t>(
       table.integer_or("encoder_turn_counts", 0, 0, std::numeric_limits<std::int32_t>::max()));
+  joint.turn_line = table.line("encoder_turn_counts");
   joint.torque_noise_Nm = table.number_or("torque_noise_Nm", 0.0, kNotNegative);
   joint.following_error_rad =
       table.number_or("following_error_rad", joint.following_error_rad, kNotNegative);

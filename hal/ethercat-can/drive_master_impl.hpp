@@ -151,6 +151,7 @@ struct DriveMaster::Impl {
   [[nodiscard]] std::string status() const;
   [[nodiscard]] std::string node_text(const Node& node) const;
   [[nodiscard]] std::string step_text(const Node& node, const SdoStep& step) const;
+  [[nodiscard]] std::string origin_text(const Node& node, const SdoStep& step) const;
   [[nodiscard]] std::string axis_text(std::size_t joint) const;
   [[nodiscard]] std::string joint_name(std::size_t joint) const;
   [[nodiscard]] std::vector<std::string> warnings() const;

@@ -60,6 +60,16 @@ std::string DriveMaster::Impl::step_text(const Node& node, const SdoStep& step) 
                : fmt::format("{} {} (node {})", label(node.plan), node.plan.name, node.plan.id));
 }
 
+/// Who asks for a step, where it is not the master.
+std::string DriveMaster::Impl::origin_text(const Node& node, const SdoStep& step) const {
+  if (!step.of_file || node.plan.board < 0) return {};
+  const std::string& file = robot.boards[static_cast<std::size_t>(node.plan.board)].eds;
+  return fmt::format(
+      "; an InitCmd of {} asks for it: is it the file of this drive and of its firmware? An "
+      "InitCmd with Disabled=\"1\" is not sent",
+      file);
+}
+
 // NOLINTNEXTLINE(readability-function-size): a table
 std::string DriveMaster::Impl::node_text(const Node& node) const {
   const NodeMaster& m = node.master;
@@ -94,10 +104,10 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
     }
     case NodeError::kSdoAbort: {
       const SdoStep& step = m.steps()[m.step()];
-      return fmt::format("{} {} failed: {} (abort code 0x{:08X})",
+      return fmt::format("{} {} failed: {} (abort code 0x{:08X}){}",
                          step.use != SdoUse::kWrite ? "reading" : "writing", step_text(node, step),
                          canopen::to_string(m.abort_code()),
-                         static_cast<std::uint32_t>(m.abort_code()));
+                         static_cast<std::uint32_t>(m.abort_code()), origin_text(node, step));
     }
     case NodeError::kNotOperational:
       return fmt::format("{}: stays {} after NMT start", who, canopen::to_string(m.nmt_state()));

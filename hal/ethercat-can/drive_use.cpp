@@ -199,6 +199,29 @@ void warn_of_mappings(const DataSheet& sheet, Diagnostics& warnings) {
   }
 }
 
+/// Modes of the sheet whose target is in no PDO that is used: a joint that is asked for one would
+/// not move.
+void warn_of_modes(const NodePlan& node, const BoardConfig& board, const std::string& file,
+                   Diagnostics& warnings) {
+  for (std::size_t axis = 0; axis < node.abilities.size(); ++axis) {
+    const auto of_sheet = canopen::abilities_of(*board.sheet, static_cast<int>(axis));
+    const canopen::DriveAbilities& can = node.abilities[axis];
+    for (const auto& [said, has] :
+         {std::pair{of_sheet.velocity, can.velocity}, {of_sheet.torque, can.torque}}) {
+      if (said == has) continue;
+      warnings.push_back({.message = fmt::format(
+                              "axis {}: no PDO that is used has a target of mode {}, which its "
+                              "sheet has: a controller that asks for it does not move the joint",
+                              axis, static_cast<int>(said)),
+                          .hint = "use the drive in its mode " +
+                                  std::to_string(static_cast<int>(canopen::first_mode(can))),
+                          .file = file,
+                          .line = board.line,
+                          .key = "board '" + board.name + "'"});
+    }
+  }
+}
+
 /// A drive by its objects that does not call itself one.
 void warn_of_profile(const DataSheet& sheet, Diagnostics& warnings) {
   const canopen::SheetEntry* type = sheet.find(object::kDeviceType);
@@ -301,6 +324,22 @@ std::vector<DriveFact> drive_facts(const RobotConfig& robot) {
   return facts;
 }
 
+Diagnostics sheet_warnings(const RobotConfig& robot) {
+  Diagnostics warnings;
+  std::set<std::string> seen;
+  for (const BoardConfig& board : robot.boards) {
+    if (board.eds.empty() || !seen.insert(board.eds).second) continue;
+    for (const canopen::SheetHindrance& one : board.sheet->hindrances) {
+      warnings.push_back({.message = one.text,
+                          .hint = "ask the drive's maker for its whole file, or correct it",
+                          .file = board.eds,
+                          .line = one.line,
+                          .key = {}});
+    }
+  }
+  return warnings;
+}
+
 Result<Diagnostics> drive_warnings(const RobotConfig& robot) {
   const auto layout = make_pdo_layout(robot);
   if (!layout) return std::unexpected(layout.error());
@@ -315,6 +354,7 @@ Result<Diagnostics> drive_warnings(const RobotConfig& robot) {
       warn_of_profile(*board.sheet, warnings);
       std::ranges::move(limit_warnings(node, *board.sheet), std::back_inserter(warnings));
     }
+    warn_of_modes(node, board, robot.file, warnings);
     const auto bus = std::ranges::find(robot.buses, board.bus, &BusConfig::name);
     const bool line = bus != robot.buses.end() && bus->kind == BusKind::kEthercat;
     if (bus != robot.buses.end() && !line) warn_of_bit_rate(*bus, board, robot.file, warnings);

@@ -34,6 +34,9 @@ struct DriveUse {
 /// own boards: joints, and what their drive does.
 [[nodiscard]] std::vector<DriveFact> drive_facts(const RobotConfig& robot);
 
+/// What keeps the master from using a drive as its file means it, whether it can drive it or not.
+[[nodiscard]] Diagnostics sheet_warnings(const RobotConfig& robot);
+
 /// What the drives of other makes miss that their joints' safety rests on, each with its board;
 /// scale_warnings() and limit_warnings().
 /// Errors: those of make_pdo_layout().

@@ -9,6 +9,7 @@
 #include "canopen/drive_abilities.hpp"
 #include "canopen/frame.hpp"
 #include "canopen/objects.hpp"
+#include "hal/ethercat-can/drive_lacks.hpp"
 #include "hal/ethercat-can/pdo_packer.hpp"
 
 namespace tandem::hal::can {
@@ -148,20 +149,17 @@ Status check_drive(const RobotConfig& robot, const NodePlan& node, const canopen
                    const std::string& unused) {
   using canopen::Mode;
   for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
-    const canopen::DriveAbilities& can = node.abilities[axis];
-    const auto has = [&](WireField field) { return node.carries(axis, field); };
-    const bool seen =
-        has(WireField::kControlword) && has(WireField::kStatusword) && has(WireField::kPosition);
-    const bool moves = canopen::first_mode(can) != Mode::kNone;
-    if (seen && moves) continue;
-    std::string what = seen ? "no position, velocity or torque target of a cyclic mode"
-                            : "not 6040, 6041 and 6064";
+    const std::string what = lacks_of(node, sheet, axis);
+    if (what.empty()) continue;
+    const bool moves = canopen::first_mode(node.abilities[axis]) != Mode::kNone;
     return std::unexpected(node_error(
         robot, node,
-        "cannot be driven in every cycle: the PDOs of its sheet " + sheet.file + " carry " + what +
-            " of axis " + std::to_string(axis) + unused + (moves ? "" : profile_modes(sheet, axis)),
-        "`tandem eds show` lists what the drive offers; a PDO whose "
-        "COB-ID is read only keeps its mapping"));
+        "cannot be driven in every cycle: the PDOs of its sheet " + sheet.file + " carry of axis " +
+            std::to_string(axis) + " " + what + unused + (moves ? "" : profile_modes(sheet, axis)),
+        node.ethercat ? "`tandem eds show` lists what the drive offers; a PDO that is Fixed, or "
+                        "whose CoE has no PdoConfig, keeps its entries"
+                      : "`tandem eds show` lists what the drive offers; a PDO whose COB-ID is read "
+                        "only keeps its mapping"));
   }
   return {};
 }
@@ -252,6 +250,7 @@ Status pack_board(const RobotConfig& robot, const BoardConfig& board, bool fd, N
   }
   node.watch = node.ethercat ? NodeWatch::kHeartbeat : watch_of(sheet);
   node.boot_time_ns = board.boot_time_ns;
+  drop_untargeted(node);
   return check_drive(robot, node, sheet, unused);
 }
 

@@ -7,6 +7,7 @@
 
 #include "canopen/frame.hpp"
 #include "canopen/objects.hpp"
+#include "canopen/sheet_mappings.hpp"
 
 namespace tandem::hal::can {
 
@@ -24,6 +25,24 @@ std::uint32_t entry_of(const MappedField& field) {
 const MappedField* find(const std::vector<MappedField>& in, std::uint32_t entry) {
   const auto found = std::ranges::find(in, entry, entry_of);
   return found != in.end() ? &*found : nullptr;
+}
+
+/// "", or that the entry has other bits than its object.
+std::string odd_length(const canopen::DataSheet& sheet, std::uint32_t entry) {
+  const canopen::SheetEntry* object =
+      sheet.find(static_cast<std::uint16_t>(entry >> 16), static_cast<std::uint8_t>(entry >> 8));
+  const int own = object != nullptr ? canopen::bits_of(*object) : 0;
+  const auto bits = static_cast<int>(entry & 0xFF);
+  if (own == 0 || own == bits) return {};
+  return "has " + std::to_string(own) + " bits, and is there with " + std::to_string(bits);
+}
+
+/// Of an output that is no field of the master, and may not rest at 0.
+std::string why_unknown(const canopen::DataSheet& sheet, std::uint32_t entry) {
+  const std::string length = odd_length(sheet, entry);
+  if (!length.empty()) return length;
+  return "has no value in the sheet, and 0 may ask for something: give its Object in the "
+         "Dictionary the DefaultValue that the drive has from power-on, and that is sent";
 }
 
 }  // namespace
@@ -170,7 +189,7 @@ void BoardPacker::pack(std::span<const MappedField> block) {
   if (!packer_.add(block)) left_.insert(left_.end(), block.begin(), block.end());
 }
 
-/// Whether the PDO can be used as it is; of a slave's the reason is kept where it cannot.
+/// Whether the PDO can be used as it is; the reason is kept where it cannot.
 bool BoardPacker::fits(const PdoSlot& slot, PdoGroup group) {
   return node_.ethercat ? fills_line(slot, group) : fills(slot, group);
 }
@@ -210,43 +229,48 @@ bool BoardPacker::has_mappable() const {
                              [](const PdoSlot& slot) { return slot.mappable && slot.timely; });
 }
 
+/// Keeps the reason.
+bool BoardPacker::refuse(const PdoSlot& slot, std::uint32_t entry, std::string_view why) {
+  std::array<char, 48> text{};
+  const bool receive = packer_.direction() == PdoDirection::kReceive;
+  (void)std::snprintf(
+      text.data(), text.size(), "; %04X is not used: %04X:%02X ",
+      (receive ? canopen::object::kRpdoMapping : canopen::object::kTpdoMapping) + slot.number - 1,
+      entry >> 16, entry >> 8 & 0xFF);
+  const std::string all = std::string(text.data()) + std::string(why);
+  if (unused_.find(all) == std::string::npos) unused_ += all;
+  return false;
+}
+
 /// Whether the master can send or take every byte of the PDO.
-bool BoardPacker::fills(const PdoSlot& slot, PdoGroup group) const {
+bool BoardPacker::fills(const PdoSlot& slot, PdoGroup group) {
   std::size_t bits = 0;
-  bool known = true;
   for (const std::uint32_t entry : slot.mapping) {
     bits += entry & 0xFF;
-    known = known && (find(known_, entry) != nullptr || entry >> 16 <= kLastDummy);
+    const bool known = find(known_, entry) != nullptr || entry >> 16 <= kLastDummy;
+    if (known || group != PdoGroup::kCommand) continue;
+    const std::string length = odd_length(sheet_, entry);
+    return refuse(slot, entry, length.empty() ? "is no object that the master sends" : length);
   }
-  return bits <= 8 * canopen::kClassicFrameBytes && (known || group != PdoGroup::kCommand);
+  return bits <= 8 * canopen::kClassicFrameBytes;
 }
 
 /// The same of a slave: gaps and objects of no use to the master pass, and its outputs rest.
 bool BoardPacker::fills_line(const PdoSlot& slot, PdoGroup group) {
-  const auto refuse = [&](std::string_view why, std::uint32_t entry) {
-    std::array<char, 48> text{};
-    const bool receive = packer_.direction() == PdoDirection::kReceive;
-    (void)std::snprintf(
-        text.data(), text.size(), "; %04X is not used: %04X:%02X ",
-        (receive ? canopen::object::kRpdoMapping : canopen::object::kTpdoMapping) + slot.number - 1,
-        entry >> 16, entry >> 8 & 0xFF);
-    const std::string all = std::string(text.data()) + std::string(why);
-    if (unused_.find(all) == std::string::npos) unused_ += all;
-    return false;
-  };
   std::size_t bits = 0;
   std::size_t bytes = 0;
   for (const std::uint32_t entry : slot.mapping) {
     const MappedField* known = find(known_, entry);
-    if (known != nullptr && bits % 8 != 0) return refuse("begins within a byte", entry);
+    if (known != nullptr && bits % 8 != 0) return refuse(slot, entry, "begins within a byte");
     if (known == nullptr && group == PdoGroup::kCommand && !resting_value(sheet_, entry)) {
-      return refuse("has no value that is known to ask for nothing", entry);
+      return refuse(slot, entry, why_unknown(sheet_, entry));
     }
     bytes += known != nullptr ? known->size : 0U;
     bits += entry & 0xFF;
   }
-  if (bits % 8 != 0) return refuse("ends within a byte", slot.mapping.back());
-  if (bytes > canopen::kMaxFrameBytes) return refuse("is beyond 64 bytes", slot.mapping.back());
+  if (bits % 8 != 0) return refuse(slot, slot.mapping.back(), "ends within a byte");
+  if (bytes > canopen::kMaxFrameBytes)
+    return refuse(slot, slot.mapping.back(), "is beyond 64 bytes");
   return true;
 }
 

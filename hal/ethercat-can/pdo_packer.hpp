@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "canopen/data_sheet.hpp"
@@ -78,18 +79,19 @@ class BoardPacker {
   void use_fixed(PdoGroup group);
 
   [[nodiscard]] bool has_mappable() const;
-  /// A slave's PDOs that stay as they are and cannot be used: "; 1701 is not used: …".
+  /// PDOs that stay as they are and cannot be used: "; 1701 is not used: …".
   [[nodiscard]] const std::string& unused() const { return unused_; }
   /// What is in no PDO.
   [[nodiscard]] const std::vector<MappedField>& left() const { return left_; }
 
  private:
   void pack(std::span<const MappedField> block);
-  [[nodiscard]] bool fills(const PdoSlot& slot, PdoGroup group) const;
+  [[nodiscard]] bool fills(const PdoSlot& slot, PdoGroup group);
   [[nodiscard]] std::size_t taken_by(const PdoSlot& slot) const;
   void take_fixed(const PdoSlot& slot, PdoGroup group);
   [[nodiscard]] bool fills_line(const PdoSlot& slot, PdoGroup group);
   [[nodiscard]] bool fits(const PdoSlot& slot, PdoGroup group);
+  bool refuse(const PdoSlot& slot, std::uint32_t entry, std::string_view why);
 
   NodePlan& node_;
   const canopen::DataSheet& sheet_;

@@ -73,6 +73,7 @@ void add_writes(Steps& steps, const DataSheet& sheet) {
     SdoStep step{.sub = write.sub, .index = write.index};
     step.size = static_cast<std::uint8_t>(std::min(write.bytes.size(), step.bytes.size()));
     std::copy_n(write.bytes.begin(), step.size, step.bytes.begin());
+    step.of_file = true;
     steps.push_back(step);
   }
 }

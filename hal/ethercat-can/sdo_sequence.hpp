@@ -36,7 +36,7 @@ struct SdoStep {
   std::uint8_t size = 0;
   std::array<std::uint8_t, 4> bytes{};
   InterpolationLimits period{};  ///< of 60C2: what its drive takes
-  std::uint8_t reserved = 0;     ///< no padding in a snapshot
+  bool of_file = false;          ///< a slave's file asks for it (InitCmd)
 
   [[nodiscard]] std::span<const std::uint8_t> value() const noexcept {
     return {bytes.data(), size};

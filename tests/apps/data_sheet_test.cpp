@@ -218,5 +218,62 @@ TEST_F(DataSheets, BeyondUseAreRefusedWithOneMessage) {
   }
 }
 
+/// The double pendulum on EtherCAT, with a copy of its drives' file to spoil.
+class SlaveFile : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    const std::filesystem::path source = TANDEM_SOURCE_DIR "/config/double_pendulum_ethercat";
+    for (const char* file : {"robot.toml", "trajectory.toml"}) {
+      write_text(folder_ / file, read_text(source / file));
+    }
+    write_text(folder_ / "drive.xml", read_text(TANDEM_SOURCE_DIR "/config/drives/line_servo.xml"));
+    edit("robot.toml", "../double_pendulum/", "");
+    for (int i = 0; i < 3; ++i) edit("robot.toml", "../drives/line_servo.xml", "drive.xml");
+  }
+  static constexpr const char* kRun = "run trajectory.toml --no-log --duration 0.2";
+};
+
+/// What `tandem eds show` remarks, and keeps the drive from being used as its file means it.
+TEST_F(SlaveFile, ThatHindersTheMasterIsWarnedOfByCheckAndRun) {
+  EXPECT_EQ(tandem("check trajectory.toml").err.find("drive.xml:"), std::string::npos);
+  edit("drive.xml", R"(<CoE SdoInfo="1" PdoAssign="1" PdoConfig="1" />)", "");
+  for (const char* command : {"check trajectory.toml", "check robot.toml", kRun}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    const std::size_t at = outcome.err.find("no CoE is said (Mailbox/CoE)");
+    ASSERT_NE(at, std::string::npos) << command << outcome.err;
+    EXPECT_EQ(outcome.err.find("no CoE is said", at + 1), std::string::npos) << "once a file";
+    EXPECT_NE(outcome.err.find("warning: drive.xml:"), std::string::npos) << outcome.err;
+  }
+}
+
+/// They had been used all the same.
+TEST_F(SlaveFile, PdosOfOtherSyncManagersAreNotUsed) {
+  edit("drive.xml", R"(<RxPdo Sm="2">)", R"(<RxPdo Sm="3">)");
+  for (const char* command : {"check trajectory.toml", kRun}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_NE(outcome.err.find("PDO 1600 is not used: it is of sync manager 3 (Sm), and outputs "
+                               "are of 2"),
+              std::string::npos)
+        << outcome.err;
+    EXPECT_NE(outcome.err.find("carry of axis 0 not 6040"), std::string::npos) << outcome.err;
+  }
+  EXPECT_EQ(tandem("eds show drive.xml").out.find("outputs 1600"), std::string::npos);
+}
+
+/// A value for an object that the file itself makes read only.
+TEST_F(SlaveFile, AnInitCmdThatTheDriveRefusesIsNamed) {
+  edit("drive.xml", R"(<CoE SdoInfo="1" PdoAssign="1" PdoConfig="1" />)",
+       R"(<CoE SdoInfo="1" PdoAssign="1" PdoConfig="1"><InitCmd><Transition>PS</Transition>)"
+       R"(<Index>#x6502</Index><SubIndex>0</SubIndex><Data>01000000</Data></InitCmd></CoE>)");
+  const Outcome outcome = tandem(kRun);
+  EXPECT_EQ(outcome.status, 1) << outcome.err;
+  EXPECT_NE((outcome.out + outcome.err).find("an InitCmd of drive.xml asks for it"),
+            std::string::npos)
+      << outcome.out << outcome.err;
+}
+
 }  // namespace
 }  // namespace tandem::apps

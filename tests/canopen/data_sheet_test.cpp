@@ -394,6 +394,7 @@ TEST(DataSheet, RemarksWhatContradictsItself) {
            {mapping(1, "", 1, "0x77770010"),
             "[1A00sub1] maps 7777:00, which the sheet does not define"},
            {mapping(1, "", 1, "0x10180140"), "[1A00sub1] maps 1018:01, which has 32 bits, with 64"},
+           {mapping(1, "", 1, "0x10180110"), "[1A00sub1] maps 1018:01, which has 32 bits, with 16"},
            {mapping(3, "", 3, "0x604000FF"), "[1A00] maps 765 bits, and a frame has at most 64\n"},
        }) {
     const auto sheet = read_data_sheet(row.text, "drive.eds");
@@ -420,6 +421,9 @@ TEST(DataSheet, RefusesWithFileLineSectionAndKey) {
            {"", "drive.eds: has no section of an object, such as [1000]: it is no data sheet"},
            {"[model]\nurdf = \"arm.urdf\"\nurdf = 2\n[[bus]]\n", "it is no data sheet"},
            {std::string("[1000]\0\n", 8), "drive.eds: has a zero byte"},
+           {"PK\x03\x04 drive", "drive.eds: is a ZIP archive (unpack it, and name"},
+           {"\x1F\x8B\x08", "drive.eds: is a gzip archive"},
+           {"%PDF-1.4\n", "drive.eds: is a PDF, and no data sheet for programs (ask the maker"},
            {with(kSheet, "ObjectType=0x9", "ObjectType=0x1"),
             "drive.eds:43: [1018] ObjectType: '0x1' is no type of object (expected is 0x7"},
            {with(kSheet, "ObjectType=0x9", "ObjectType=record"),

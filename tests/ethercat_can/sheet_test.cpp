@@ -201,6 +201,31 @@ TEST(Sheet, AMappingThatCannotBeWrittenIsUsedAsItIs) {
   EXPECT_EQ(rig.drive.value(0x1401, 1) & 0x80000000, 0x80000000) << "nobody fills it";
 }
 
+TEST(Sheet, AMappingThatStaysWithATargetInAnotherLengthIsRefused) {
+  Sheet s = servo().remove(0x60B1).remove(0x60B2).remove(0x60FF).remove(0x6071);
+  for (const int map : {0x1600, 0x1601, 0x1602, 0x1603}) {
+    for (int sub = 0; sub <= 8; ++sub) {
+      s.add(map, sub, sub == 0 ? kUnsigned8 : kUnsigned32, canopen::kRead, 0);
+    }
+  }
+  s.add(0x1600, 0, kUnsigned8, canopen::kRead, 2);
+  s.add(0x1600, 1, kUnsigned32, canopen::kRead, 0x60400010);
+  s.add(0x1600, 2, kUnsigned32, canopen::kRead, 0x607A0010);
+  const SheetRig rig(s);
+  EXPECT_EQ(rig.master, nullptr);
+  EXPECT_NE(rig.error.find("1600 is not used: 607A:00 has 32 bits, and is there with 16"),
+            std::string::npos)
+      << rig.error;
+  // In a PDO of its own the rest is there, and the target is what is missing.
+  s.add(0x1600, 0, kUnsigned8, canopen::kRead, 1);
+  s.add(0x1601, 0, kUnsigned8, canopen::kRead, 1);
+  s.add(0x1601, 1, kUnsigned32, canopen::kRead, 0x607A0010);
+  const SheetRig apart(s);
+  EXPECT_NE(apart.error.find("[1601sub1] maps 607A:00, which has 32 bits, with 16"),
+            std::string::npos)
+      << apart.error;
+}
+
 TEST(Sheet, VelocityIsThePositionsDifferenceWhereTheDriveTellsNone) {
   SheetRig rig(servo().remove(0x606C));
   ASSERT_TRUE(rig.bring_up());
@@ -272,7 +297,10 @@ TEST(Sheet, WithoutTheCyclicObjectsItIsRefusedBeforeAnythingIsSent) {
   EXPECT_NE(no_target.error.find("no position, velocity or torque target"), std::string::npos)
       << no_target.error;
   const SheetRig no_status(servo().remove(0x6041));
-  EXPECT_NE(no_status.error.find("not 6040, 6041 and 6064"), std::string::npos) << no_status.error;
+  EXPECT_NE(no_status.error.find("carry of axis 0 not 6041 (the sheet does not have it)"),
+            std::string::npos)
+      << no_status.error;
+  EXPECT_NE(no_status.error.find("COB-ID"), std::string::npos) << no_status.error;
 }
 
 TEST(Sheet, AFaultOfTheDriveIsLatchedAndResetByAnEdge) {

@@ -1,9 +1,12 @@
 // The scale of a joint on a drive of another make: its sheet's, where that says one, or
 // robot.toml's.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 
+#include "hal/config/drive_ranges.hpp"
 #include "hal/config/joint_scale.hpp"
 #include "tests/hal/board_sheet.hpp"
 
@@ -241,6 +244,38 @@ TEST_F(BoardScale, OfJointsWithTheSameSheetIsDoubtedOnce) {
   EXPECT_NE(warned(*robot).find("joint.elbow."), std::string::npos) << warned(*robot);
   EXPECT_NE(warned(*robot).find("; so it is of 1 other joint"), std::string::npos)
       << warned(*robot);
+}
+
+/// One key with one homing: "give it a homing" had led to the same error, and to another one.
+TEST_F(BoardScale, AnEncodersTurnAndAHomingAreOneOfTwo) {
+  const std::string turn = "encoder_turn_counts = 2048\n";
+  const std::string counts = "encoder_counts_per_rev = 4096\n";
+  const std::string homing =
+      "homing = { method = 35, speed_rad_s = 0.2, acceleration_rad_s2 = 1.0 }\n";
+  const auto line_of = [](const std::string& text, const std::string& key) {
+    return std::count(text.begin(), text.begin() + static_cast<long>(text.find(key)), '\n') + 1;
+  };
+  const auto said = [&](const std::string& text) {
+    const auto robot = read(text);
+    EXPECT_TRUE(robot.has_value()) << robot.error()[0].to_string();
+    std::string all;
+    for (const Error& one : check_drive_ranges(*robot, robot->joints[0])) all += one.to_string();
+    return all;
+  };
+  const auto wide = [&](const std::string& lines) {
+    return with(joint_with(lines), "max_position_rad = 1.5", "max_position_rad = 12.0");
+  };
+  const std::string text = wide(counts + turn);
+  const std::string alone = said(text);
+  EXPECT_NE(alone.find(fmt::format("robot.toml:{}: ", line_of(text, "encoder_turn_counts"))),
+            std::string::npos)
+      << alone;
+  EXPECT_NE(alone.find("replace this key by a `homing`"), std::string::npos) << alone;
+  const std::string both = said(wide(counts + turn + homing));
+  EXPECT_NE(both.find("(remove this key)"), std::string::npos) << both;
+  EXPECT_EQ(said(wide(counts + homing)), "") << "what both texts ask for";
+  const std::string narrow = said(joint_with(counts + turn + homing));
+  EXPECT_NE(narrow.find("remove this key, or set required = false"), std::string::npos) << narrow;
 }
 
 }  // namespace

@@ -179,6 +179,108 @@ TEST(LineDrive, AnOutputOfUnknownValueIsRefusedWithItsName) {
   expect_follows(with(drive(pdos, "PdoAssign=\"1\"", known)));
 }
 
+/// Each object that a drive is switched on, seen and moved by, in a PDO with another length than
+/// the dictionary's, or than a master needs where there is none: such a drive had been enabled, and
+/// got no target.
+TEST(LineDrive, AnObjectInAnotherLengthIsRefusedWithItsEntryAndBothLengths) {
+  const auto refusal = [](const std::string& outputs, const std::string& inputs,
+                          const std::string& dictionary) {
+    const auto layout = hal::can::make_pdo_layout(
+        with(drive(pdo("RxPdo", "1600", "Fixed=\"1\" Sm=\"2\"", outputs) +
+                       pdo("TxPdo", "1A00", "Fixed=\"1\" Sm=\"3\"", inputs),
+                   "PdoAssign=\"1\"", dictionary)));
+    return layout ? "it is taken" : layout.error().to_string();
+  };
+  const auto object = [](const char* index, const char* type, const char* map) {
+    return fmt::format(
+        "<Object><Index>#x{}</Index><Type>{}</Type><Flags><Access>rw</Access><PdoMapping>{}"
+        "</PdoMapping></Flags></Object>",
+        index, type, map);
+  };
+  struct Row {
+    std::string outputs, inputs, dictionary, said;
+  };
+  const std::string outputs = kControl + kTarget + kMode;
+  const std::string inputs = kStatus + kPosition;
+  for (const Row& row : {
+           Row{kControl + entry("607A", 16, "INT") + kMode, inputs, object("607A", "DINT", "R"),
+               "[1600sub2] maps 607A:00, which has 32 bits, with 16"},
+           Row{kControl + kTarget + kMode, inputs, object("607A", "INT", "R"),
+               "607A (it has 16 bits, and 32 are needed)"},
+           Row{kControl + entry("607A", 16, "INT") + kMode, inputs, "",
+               "607A (it has 16 bits, and 32 are needed)"},
+           Row{kControl + entry("607A", 16, "DINT") + kMode, inputs, "",
+               "[1600sub2] maps 607A:00, which has 32 bits, with 16"},
+           Row{entry("6040", 8, "USINT") + kTarget + kMode, inputs, object("6040", "UINT", "R"),
+               "[1600sub1] maps 6040:00, which has 16 bits, with 8"},
+           Row{kControl + kTarget + entry("6060", 16, "INT"), inputs, object("6060", "SINT", "R"),
+               "1600 is not used: 6060:00 has 8 bits, and is there with 16"},
+           Row{outputs, entry("6041", 8, "USINT") + kPosition, object("6041", "UINT", "T"),
+               "carry of axis 0 not 6041 ([1A00sub1] maps 6041:00, which has 16 bits, with 8)"},
+           Row{outputs, entry("6041", 8, "USINT") + kPosition, "",
+               "carry of axis 0 not 6041 (it has 8 bits, and 16 are needed) (`tandem eds"},
+           Row{outputs, kStatus + entry("6064", 16, "INT"), "",
+               "carry of axis 0 not 6064 (it has 16 bits, and 32 are needed) (`tandem eds"},
+           Row{outputs, kStatus, "",
+               "carry of axis 0 not 6064 (the sheet does not have it) (`tandem eds"},
+       }) {
+    const std::string error = refusal(row.outputs, row.inputs, row.dictionary);
+    EXPECT_NE(error.find(row.said), std::string::npos) << error << "\nwanted: " << row.said;
+    EXPECT_EQ(error.find("COB-ID"), std::string::npos) << "a slave's PDOs have none: " << error;
+  }
+  EXPECT_EQ(refusal(outputs, inputs, object("607A", "DINT", "R")), "it is taken");
+}
+
+/// The mode that the drive is switched on in has its target; the others are not promised.
+TEST(LineDrive, AModeWhoseTargetIsNotThereIsLeftOutAndWarnedOf) {
+  const std::string speed = entry("60FF", 32, "DINT");
+  const std::string in = pdo("TxPdo", "1A00", "Fixed=\"1\" Sm=\"3\"", kStatus + kPosition);
+  // Two PDOs that exclude each other: one has the one target, one the other.
+  const auto apart =
+      with(drive(pdo("RxPdo", "1600", "Fixed=\"1\" Sm=\"2\"",
+                     "<Exclude>#x1601</Exclude>" + kControl + kMode + kTarget) +
+                 pdo("RxPdo", "1601", "Fixed=\"1\"", kControl + kMode + speed) + in));
+  const auto layout = hal::can::make_pdo_layout(apart);
+  ASSERT_TRUE(layout.has_value()) << layout.error().to_string();
+  EXPECT_EQ(layout->nodes[0].abilities[0].position, canopen::Mode::kCsp);
+  EXPECT_EQ(layout->nodes[0].abilities[0].velocity, canopen::Mode::kNone);
+  const auto texts = [](const hal::RobotConfig& robot) {
+    std::string all;
+    const auto warnings = hal::can::drive_warnings(robot);
+    EXPECT_TRUE(warnings.has_value()) << warnings.error().to_string();
+    for (const Error& one : warnings.value_or(Diagnostics{})) all += one.to_string() + "\n";
+    return all;
+  };
+  EXPECT_NE(texts(apart).find("no PDO that is used has a target of mode 9"), std::string::npos)
+      << texts(apart);
+  // In another length: the sheet's abilities know already, and the mapping is named.
+  const auto narrow = with(drive(pdo("RxPdo", "1600", "Fixed=\"1\" Sm=\"2\"",
+                                     kControl + kMode + kTarget + entry("60FF", 16, "DINT")) +
+                                 in));
+  EXPECT_NE(texts(narrow).find("[1600sub4] maps 60FF:00, which has 32 bits, with 16"),
+            std::string::npos)
+      << texts(narrow);
+}
+
+/// Makers' files write what no PDO has and no dictionary tells; the stand-in had lacked it.
+TEST(LineDrive, WhatAnInitCmdWritesIsThere) {
+  const auto command = [](const char* index, const char* sub, const char* data) {
+    return fmt::format(
+        "<InitCmd><Transition>PS</Transition><Index>#x{}</Index><SubIndex>{}</SubIndex>"
+        "<Data>{}</Data></InitCmd>",
+        index, sub, data);
+  };
+  const DataSheet sheet =
+      drive(pdo("RxPdo", "1600", "Fixed=\"1\" Sm=\"2\"", kControl + kTarget + kMode) +
+                pdo("TxPdo", "1A00", "Fixed=\"1\" Sm=\"3\"", kStatus + kPosition),
+            "PdoAssign=\"1\">" + command("60C2", "1", "01") + command("2100", "1", "0102") +
+                command("2101", "0", "01020304") + "</CoE><FoE");
+  ASSERT_EQ(sheet.writes.size(), 3U);
+  EXPECT_EQ(sheet.value(0x2100, 1, 0), 0x0201) << "little-endian";
+  EXPECT_EQ(sheet.find(0x2101)->size(), 4);
+  expect_follows(with(sheet));
+}
+
 /// The default PDO and another one exclude each other.
 TEST(LineDrive, PdosThatExcludeEachOtherAreNotUsedTogether) {
   const std::string first = pdo("RxPdo", "1600", "Fixed=\"1\" Sm=\"2\"",
