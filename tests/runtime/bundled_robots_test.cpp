@@ -93,6 +93,18 @@ TEST(StandingHeight, IsWhereTheLowestPointOfTheSolesTouchesTheGround) {
   EXPECT_NEAR(sunk_height_m("walkman", "1.079"), 1.079, 0.5e-3);
 }
 
+TEST(Followers, OfTheDescriptionAreTheRobots) {
+  const auto panda = robot::read_complete_robot(TANDEM_SOURCE_DIR "/config/panda/robot.toml");
+  ASSERT_TRUE(panda);
+  const hal::Robot known = hal::robot_of(panda->config);
+  ASSERT_EQ(known.followers.size(), 1U);
+  EXPECT_EQ(known.no_joint("panda_finger_joint2").to_string(),
+            "panda_finger_joint2: the joint 'panda_finger_joint2' follows 'panda_finger_joint1' "
+            "(mimic) (command 'panda_finger_joint1')");
+  EXPECT_EQ(panda->config.no_joint("panda_finger_joint3").hint,
+            "did you mean 'panda_finger_joint1'?");
+}
+
 TEST_P(BundledRobot, HasExperimentsThatCanBeRead) {
   const std::filesystem::path folder = std::string(TANDEM_SOURCE_DIR "/config/") + GetParam();
   int read = 0;
