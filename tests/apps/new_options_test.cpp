@@ -185,6 +185,15 @@ TEST_F(NewOption, SaysWhyALinkGetsNoMassWhereThatIsWhatItNeeds) {
       << made.out;
 }
 
+TEST_F(NewOption, TakesADensityThatNoLinkNeeds) {
+  edit("double_pendulum.urdf", "</robot>",
+       "<link name='frame'/><joint name='to_frame' type='fixed'><parent link='link1'/><child "
+       "link='frame'/></joint></robot>");
+  const Outcome made = tandem("new double_pendulum.urdf -o d --density 1000");
+  EXPECT_EQ(made.status, 0) << made.err;
+  EXPECT_NE(made.out.find("frame: none, for it has no"), std::string::npos) << made.out;
+}
+
 TEST_F(NewOption, LeavesOutOrLocksALeaderOrAFollower) {
   write_text(folder_ / "cart.urdf", kCart);
   edit("cart.urdf", "</robot>",
