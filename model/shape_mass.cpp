@@ -193,8 +193,7 @@ class Masses {
       ++(mesh != nullptr ? meshes : shapes);
       whole = whole + shape.in_link * found->inertia;
     }
-    if (link.FirstChildElement(role) == nullptr)
-      out_.without.emplace_back(name, "it has no <collision> and no <visual>");
+    if (link.FirstChildElement(role) == nullptr) out_.without.emplace_back(name, kNoShape);
     if (shapes + meshes == 0) return;
     std::string from = shapes == 0 ? "" : counted(shapes, "shape");
     if (meshes != 0) from += (from.empty() ? "" : ", ") + counted(meshes, "mesh", "meshes");
@@ -206,15 +205,15 @@ class Masses {
     char size[32];
     std::snprintf(size, sizeof size, "%.3g m long", longest_m);
     if (mesh == nullptr) {
-      out_.errors.push_back({std::string("its shape is ") + size + ", and takes no mass from that",
+      out_.errors.push_back({std::string("its shape is ") + size + ", more than any robot's",
                              "lengths are in metres", file_, element.GetLineNum(), "link " + link});
       return;
     }
     const char* const name = mesh->Attribute("filename");
-    out_.errors.push_back(
-        {std::string("its mesh ") + (name == nullptr ? "" : name) + " is " + size +
-             ", and takes no mass from that: it is in millimetres, most likely",
-         "give the <mesh> scale=\"0.001 0.001 0.001\"", file_, mesh->GetLineNum(), "link " + link});
+    out_.errors.push_back({std::string("its mesh ") + (name == nullptr ? "" : name) + " is " +
+                               size + ", more than any robot's: it is in millimetres, most likely",
+                           "give the <mesh> scale=\"0.001 0.001 0.001\"", file_, mesh->GetLineNum(),
+                           "link " + link});
   }
 
   const std::string& file_;

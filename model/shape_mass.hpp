@@ -18,6 +18,8 @@ struct ShapeMass {
   std::string from;  ///< "2 boxes", "1 mesh"
 };
 
+inline constexpr const char* kNoShape = "it has no <collision> and no <visual>";
+
 struct ShapeMasses {
   std::vector<ShapeMass> links;
   /// Links without mass that stay so, and why: "tool: its mesh tool.dae is no STL".

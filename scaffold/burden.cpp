@@ -54,9 +54,9 @@ std::optional<Burden> overburdened(const NewRobot& robot, const std::vector<Join
   found.grams = worst.times() > kFarTooMuch && worst.times() < kGrams && is_too_dense(robot);
   found.told.message = fmt::format(
       "the drives cannot carry the robot everywhere: gravity takes up to {:.3g} {} of joint '{}', "
-      "and it gives {:.3g} {} for long{}",
+      "which gives {:.3g} {} for long{}",
       worst.needs, unit, joint.name, worst.has, unit,
-      weak.size() == 1 ? "" : fmt::format("; too much, too, of {} more", weak.size() - 1));
+      weak.size() == 1 ? "" : fmt::format(", and so with {} more", weak.size() - 1));
   found.told.hint =
       "correct masses (kg) or <limit effort> (Nm, or N) in the URDF and make the robot anew; or "
       "give stronger drives in robot.toml; or keep to postures in which they carry it";

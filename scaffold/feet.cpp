@@ -145,7 +145,7 @@ ContactPatch shank_end(const Tree& tree, const Posed& neutral, int body, int& li
 
 /// No sole stays level at the end of a shank.
 void stand_on_the_middle(const Tree& tree, const Posed& neutral, Foot& foot, ContactPatch& patch) {
-  if (patch.points.size() < 2 || tree.path_to(foot.body).size() > kFewJoints) return;
+  if (patch.points.size() < 3 || tree.path_to(foot.body).size() > kFewJoints) return;
   int link = foot.link;
   if (shank_end(tree, neutral, foot.body, link).points.empty()) return;
   Vector3d middle = Vector3d::Zero();

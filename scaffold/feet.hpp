@@ -24,8 +24,6 @@ struct Foot {
   [[nodiscard]] Eigen::Vector3d line() const {
     return points.size() == 2 ? Eigen::Vector3d(points[0] - points[1]) : Eigen::Vector3d::Zero();
   }
-  /// What a posture has to fulfil for it to stand: place, and what keeps it level.
-  [[nodiscard]] int conditions() const { return flat() ? 6 : points.size() == 2 ? 4 : 3; }
 };
 
 enum class FeetBy : std::uint8_t {

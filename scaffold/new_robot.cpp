@@ -407,15 +407,16 @@ void Maker::find_overloaded(const std::vector<double>& torques) {
 void Maker::warn_of_weakness(const std::vector<JointLoad>& loads,
                              const std::vector<double>& torques) {
   std::ranges::move(undriven(robot_), std::back_inserter(robot_.warnings));
+  Diagnostics weak = weak_drives(robot_, torques);
   if (const auto burden = overburdened(robot_, loads)) {
     const bool still = !robot_.move.swings && robot_.move.squat_m == 0.0;
     std::string remark = burden->told.message + (still ? "; move.toml keeps still." : ".");
     remark[0] = 'T';
     robot_.remarks.push_back(std::move(remark));
-    robot_.warnings.push_back(burden->told);
+    if (burden->grams || weak.empty()) robot_.warnings.push_back(burden->told);
     if (burden->grams) return;  // all else is wrong because of it
   }
-  std::ranges::move(weak_drives(robot_, torques), std::back_inserter(robot_.warnings));
+  std::ranges::move(weak, std::back_inserter(robot_.warnings));
   if (!standing_) return;
   if (auto warning = falls_over(robot_, q_)) robot_.warnings.push_back(std::move(*warning));
 }

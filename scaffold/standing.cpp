@@ -40,6 +40,7 @@ Standing::Standing(const Tree& tree, const std::vector<Foot>& feet, const Vector
   const Posed neutral(tree, neutral_);
   for (const Foot& foot : feet_) {
     for (const int j : tree.path_to(foot.body)) in_leg_[j] = true;
+    lines_.push_back(levels_line(foot, neutral));
     Vector3d home = (neutral.link(foot.link) * foot.sole_in_link).p;
     const Knee knee = knee_of(foot);
     if (!foot.flat() && knee.hip >= 0) {  // a point foot stands under its hip
@@ -49,6 +50,22 @@ Standing::Standing(const Tree& tree, const std::vector<Foot>& feet, const Vector
     middle_home_ += (home + best_load(foot, neutral)) / static_cast<double>(feet_.size());
   }
   q_ = neutral_;
+}
+
+/// Place takes two of the joints that tilt a line, so it needs a third one.
+bool Standing::levels_line(const Foot& foot, const Posed& neutral) const {
+  const Vector3d line = (neutral.link(foot.link) * foot.sole_in_link).R * foot.line();
+  if (!(line.norm() > 0.0)) return false;
+  const Vector3d about = Vector3d::UnitZ().cross(line).normalized();
+  const std::vector<int> path = tree_.path_to(foot.body);
+  return std::ranges::count_if(path, [&](int j) {
+           return !neutral.slides(j) && std::abs(neutral.axis(j).dot(about)) > 0.7;
+         }) > 2;
+}
+
+int Standing::conditions(std::size_t foot) const {
+  if (feet_[foot].flat()) return 6;
+  return lines_[foot] ? 4 : 3;
 }
 
 /// From the sole's middle to where a load asks least of the ankle: under it, as far as that is
@@ -138,7 +155,7 @@ std::vector<std::vector<double>> Standing::patterns() const {
 /// mass counts little.
 double Standing::residual(const Posed& posed, double height_m, VectorXd& r, MatrixXd* J) const {
   Eigen::Index rows = 0;
-  for (const Foot& foot : feet_) rows += foot.conditions();
+  for (std::size_t f = 0; f < feet_.size(); ++f) rows += conditions(f);
   if (loose_) rows += 2;
   r.resize(rows);
   if (J != nullptr) J->setZero(rows, static_cast<Eigen::Index>(tree_.joints.size()));
@@ -172,7 +189,7 @@ double Standing::residual(const Posed& posed, double height_m, VectorXd& r, Matr
       J->middleRows<3>(at) = posed.point_jacobian(foot.body, sole.p) - way;
     }
     at += 3;
-    if (foot.points.size() == 2) {  // its line is level
+    if (lines_[f]) {
       const Vector3d line = (sole.R * foot.line()).normalized();
       r[at] = -kTurnWeight_m * line.z();
       if (J != nullptr) {
@@ -280,9 +297,9 @@ bool Standing::settle(VectorXd q) {
 
 /// Legs that have fewer joints than their feet have conditions cannot fulfil all of them.
 bool Standing::lacks_joints() const {
-  std::ptrdiff_t conditions = 0;
-  for (const Foot& foot : feet_) conditions += foot.conditions();
-  return std::ranges::count(in_leg_, true) < conditions;
+  std::ptrdiff_t needed = 0;
+  for (std::size_t f = 0; f < feet_.size(); ++f) needed += conditions(f);
+  return std::ranges::count(in_leg_, true) < needed;
 }
 
 bool Standing::search() {

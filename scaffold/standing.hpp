@@ -51,6 +51,8 @@ class Standing {
     bool front = true;
   };
   [[nodiscard]] Knee knee_of(const Foot& foot) const;
+  [[nodiscard]] bool levels_line(const Foot& foot, const Posed& neutral) const;
+  [[nodiscard]] int conditions(std::size_t foot) const;
   [[nodiscard]] Eigen::Vector3d best_load(const Foot& foot, const Posed& neutral) const;
   [[nodiscard]] Eigen::VectorXd bent(const std::vector<double>& sides) const;
   [[nodiscard]] std::vector<std::vector<double>> patterns() const;
@@ -68,6 +70,7 @@ class Standing {
   Eigen::Matrix3d level_;  ///< of a sole: x ahead, z up
   Bounds bounds_;
   std::vector<bool> in_leg_;
+  std::vector<bool> lines_;  ///< feet that touch in a line, which their legs can keep level
   std::vector<Eigen::Vector3d> homes_;  ///< of the feet in the neutral posture
   Eigen::Vector3d middle_home_ = Eigen::Vector3d::Zero();
   Eigen::VectorXd neutral_, q_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -113,8 +114,10 @@ Status add_masses(const NewOptions& options, NewSource& source) {
   for (const auto& [link, why] : found.without)
     source.masses.emplace_back(link, fmt::format("none, for {}", why));
   if (inertias.empty()) {
-    if (found.without.empty()) return {};
-    return failed(options.urdf, "no link gets a mass by --density: " + found.without[0].second,
+    const auto shaped = std::ranges::find_if(
+        found.without, [](const auto& one) { return one.second != model::kNoShape; });
+    if (shaped == found.without.end()) return {};  // frames; a joint that needs more says so
+    return failed(options.urdf, "no link gets a mass by --density: " + shaped->second,
                   "give boxes, cylinders, spheres or STL meshes as <collision>");
   }
   auto text = model::with_inertias(source.text, inertias);

@@ -164,7 +164,56 @@ TEST_F(NewOption, ListsMassesAndWhatTheyAreFrom) {
   EXPECT_EQ(masses["hand"]["mass_kg"], 0.5);
   EXPECT_TRUE(masses["tool"]["mass_kg"].is_null());
   EXPECT_EQ(masses["tool"]["note"], "none, for its mesh tool.dae: this is no STL");
-  EXPECT_EQ(masses.size(), 4U);
+  EXPECT_EQ(masses["world"]["note"], "none, for it has no <collision> and no <visual>");
+  EXPECT_EQ(masses.size(), 5U);
+}
+
+TEST_F(NewOption, SaysWhyALinkGetsNoMassWhereThatIsWhatItNeeds) {
+  write_text(folder_ / "cart.urdf", kCart);
+  edit("cart.urdf", "<collision><geometry><sphere radius=\"0.05\"/></geometry></collision>", "");
+  const std::string flags = " --lock drive --drop grip --density 1000";
+  const Outcome refused = tandem("new cart.urdf" + flags);
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("joint wrist: the joint moves nothing that has mass: --density gives "
+                             "link 'hand' none, for it has no <collision> and no <visual>"),
+            std::string::npos)
+      << refused.err;
+  EXPECT_EQ(refused.err.find("has --density"), std::string::npos) << refused.err;
+  const Outcome made = tandem("new cart.urdf --lock wrist" + flags);
+  ASSERT_EQ(made.status, 0) << made.err;
+  EXPECT_NE(made.out.find("hand, world: none, for it has no <collision>"), std::string::npos)
+      << made.out;
+}
+
+TEST_F(NewOption, TakesADensityThatNoLinkNeeds) {
+  edit("double_pendulum.urdf", "</robot>",
+       "<link name='frame'/><joint name='to_frame' type='fixed'><parent link='link1'/><child "
+       "link='frame'/></joint></robot>");
+  const Outcome made = tandem("new double_pendulum.urdf -o d --density 1000");
+  EXPECT_EQ(made.status, 0) << made.err;
+  EXPECT_NE(made.out.find("frame: none, for it has no"), std::string::npos) << made.out;
+}
+
+TEST_F(NewOption, LeavesOutOrLocksALeaderOrAFollower) {
+  write_text(folder_ / "cart.urdf", kCart);
+  edit("cart.urdf", "</robot>",
+       "<link name='thumb'><collision><geometry><sphere radius='0.02'/></geometry></collision>"
+       "</link><joint name='pinch' type='prismatic'><parent link='hand'/><child link='thumb'/>"
+       "<axis xyz='1 0 0'/><limit lower='0' upper='0.1' effort='5' velocity='0.1'/>"
+       "<mimic joint='grip'/></joint></robot>");
+  const std::string flags = " --force -o c --lock drive --density 1000";
+  const Outcome refused = tandem("new cart.urdf --drop grip" + flags);
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("--drop: joint 'pinch' mimics joint 'grip', which goes away (leave "
+                             "it out, too: --drop pinch; or let it stand still: --lock pinch)"),
+            std::string::npos)
+      << refused.err;
+  for (const char* remedy : {" --drop grip --drop pinch", " --drop grip --lock pinch",
+                             " --drop pinch --lock grip", " --lock pinch --lock grip"}) {
+    const Outcome made = tandem("new cart.urdf" + flags + remedy);
+    EXPECT_EQ(made.status, 0) << remedy << made.err;
+    checks("c");
+  }
 }
 
 TEST_F(NewOption, ExpandsXacroByTheProgramOrSaysTheCommand) {

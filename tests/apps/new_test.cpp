@@ -370,6 +370,26 @@ TEST_F(New, SaysThatALimitWhichEveryJointHasIsLikelyAPlaceholder) {
       << placeholder.out;
 }
 
+TEST_F(New, DoesNotCallALimitThatItReplacesTheRobots) {
+  std::string arm = read_text(TANDEM_SOURCE_DIR "/config/ur5e/ur5e.urdf");
+  for (const std::string from :
+       {"velocity=\"3.141592653589793\"", "velocity=\"2.0943951023931953\"", "effort=\"150.0\"",
+        "effort=\"28.0\""}) {
+    const std::string huge = from.substr(0, from.find('"')) + "\"1e9\"";
+    for (std::size_t at = arm.find(from); at != std::string::npos; at = arm.find(from))
+      arm.replace(at, from.size(), huge);
+  }
+  write_text(folder_ / "arm.urdf", arm);
+  const Outcome made = tandem("new arm.urdf -o x");
+  ASSERT_EQ(made.status, 0) << made.err;
+  EXPECT_EQ(made.out.find("likely a placeholder"), std::string::npos) << made.out;
+  EXPECT_NE(
+      made.out.find("Limits are guessed: an effort of 1e+09 Nm and a speed of 1e+09 rad/s are "
+                    "none (joint shoulder_pan_joint), and so with 5 more."),
+      std::string::npos)
+      << made.out;
+}
+
 TEST_F(New, SaysWhichLimitsItHadToGuessAndWhy) {
   std::string arm = read_text(TANDEM_SOURCE_DIR "/config/ur5e/ur5e.urdf");
   arm.replace(arm.find("lower=\"-"), 8, "lower=\"9");

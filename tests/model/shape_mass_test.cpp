@@ -145,6 +145,26 @@ TEST(ShapeMass, SaysWhichMeshItCannotRead) {
   }
 }
 
+TEST(ShapeMass, TakesNoneFromWhatIsInMillimetres) {
+  const test::ScratchFolder folder;
+  std::ofstream(folder / "arm.stl", std::ios::binary) << binary_stl(box_of({50.0, 50.0, 300.0}));
+  const auto errors = [&folder](const std::string& shape) {
+    return masses_from_shapes(link(shape), folder / "r.urdf", 1000.0).errors;
+  };
+  const Diagnostics mesh = errors("<mesh filename='arm.stl'/>");
+  ASSERT_EQ(mesh.size(), 1u);
+  EXPECT_NE(mesh[0].message.find("its mesh arm.stl is 300 m long"), std::string::npos)
+      << mesh[0].message;
+  EXPECT_NE(mesh[0].hint.find("scale=\"0.001 0.001 0.001\""), std::string::npos);
+  EXPECT_TRUE(errors("<mesh filename='arm.stl' scale='0.001 0.001 0.001'/>").empty());
+  for (const char* shape : {"<box size='50 50 300'/>", "<sphere radius='50'/>",
+                            "<cylinder radius='5' length='300'/>"}) {
+    ASSERT_EQ(errors(shape).size(), 1u) << shape;
+    EXPECT_EQ(errors(shape)[0].hint, "lengths are in metres");
+  }
+  EXPECT_TRUE(errors("<box size='1 1 9'/>").empty());
+}
+
 TEST(ShapeMass, LeavesLinksThatHaveMassAndTakesVisualsWhereNothingCollides) {
   const ShapeMasses masses = masses_from_shapes(
       "<robot name='r'><link name='heavy'><inertial><mass value='1'/></inertial><collision>"
@@ -154,6 +174,8 @@ TEST(ShapeMass, LeavesLinksThatHaveMassAndTakesVisualsWhereNothingCollides) {
   ASSERT_EQ(masses.links.size(), 1u);
   EXPECT_EQ(masses.links[0].link, "seen");
   EXPECT_EQ(masses.links[0].from, "1 shape");
+  ASSERT_EQ(masses.without.size(), 1u);
+  EXPECT_EQ(masses.without[0].first, "frame");
 }
 
 TEST(Stl, IsReadAsText) {

@@ -160,7 +160,7 @@ TEST(UrdfDynamics, SaysHowManyJointsDampingIsNotUsed) {
   ASSERT_TRUE(model.has_value());
   EXPECT_EQ(to_text(model->warnings),
             "arm.urdf:29: dynamics: the damping and friction of 2 joints (<dynamics>) is not used: "
-            "a joint's damping is its actuator's (damping_Nms_rad of [actuator.NAME] in "
+            "a joint's are its actuator's (damping_Nms_rad and friction_Nm of [actuator.NAME] in "
             "robot.toml)\n");
   const auto none = parse_urdf(
       with("effort=\"4\"/>", "effort=\"4\"/>\n<dynamics damping=\"0.0\" friction=\"0\"/>"),

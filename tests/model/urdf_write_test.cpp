@@ -89,5 +89,24 @@ TEST(UrdfWrite, LeavesOutALimbByItsLinkOrItsJoint) {
   EXPECT_EQ(without_limbs(robot, {"tol"}).error().hint, "did you mean 'tool'?");
 }
 
+TEST(UrdfWrite, LeavesNoFollowerWithoutItsLeader) {
+  const std::string left =
+      "<joint name='l' type='revolute'><parent link='b'/><child link='lf'/></joint>";
+  const std::string right =
+      "<joint name='r' type='revolute'><parent link='b'/><child link='rf'/><mimic "
+      "joint='l'/></joint>";
+  const std::string robot = "<robot name='g'><link name='b'/><link name='lf'/><link name='rf'/>" +
+                            left + right + "</robot>";
+  const auto refused = without_limbs(robot, {"lf"});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message, "joint 'r' mimics joint 'l', which goes away");
+  EXPECT_NE(refused.error().hint.find("--drop r"), std::string::npos);
+  EXPECT_EQ(without_limbs(robot, {"lf"}, {"r"}).value_or(""),
+            "<robot name='g'><link name='b'/><link name='rf'/><joint name='r' "
+            "type='revolute'><parent link='b'/><child link='rf'/></joint></robot>");
+  EXPECT_TRUE(without_limbs(robot, {"rf"})) << "a leader needs no follower";
+  EXPECT_TRUE(without_limbs(robot, {"l", "r"}));
+}
+
 }  // namespace
 }  // namespace tandem::model

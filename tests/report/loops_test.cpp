@@ -197,6 +197,16 @@ TEST(Ankle, IsDrawnWithItsRods) {
   EXPECT_EQ(rods, 2);
 }
 
+/// The first sample of a log is a cycle before its start.
+TEST(Ankle, BeginsAtNoNegativeZero) {
+  const test::TestRobot robot = test::load_test_robot("parallel_ankle");
+  const auto tree =
+      model::read_urdf(TANDEM_SOURCE_DIR "/config/parallel_ankle/parallel_ankle.urdf", {})->tree;
+  const std::vector<PostureSample> first{{"", -0.001, {}, {0.0, 0.0, 0.0, 0.0}}};
+  const Figure figure = posture_figure(tree, robot.robot, first);
+  EXPECT_TRUE(std::ranges::any_of(figure.notes, [](const Note& n) { return n.text == "0.00 s"; }));
+}
+
 /// The Panda, whose second finger follows the first.
 class Gripper : public testing::Test {
  protected:

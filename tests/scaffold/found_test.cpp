@@ -245,5 +245,153 @@ TEST(Found, LegsAreAsFirmAsTheWholeNeedsToStand) {
   for (const Error& warning : robot->warnings) ADD_FAILURE() << warning.to_string();
 }
 
+bool says(const std::vector<std::string>& remarks, const std::string& words) {
+  return std::ranges::any_of(remarks, [&words](const std::string& remark) {
+    return remark.find(words) != std::string::npos;
+  });
+}
+
+/// Two links of a cylinder's mass and inertia, in kg or `unit` times that.
+std::string heavy_arm(double unit, double effort) {
+  const std::string limit =
+      fmt::format("lower='-1.5' upper='1.5' effort='{}' velocity='2'", effort);
+  return "<link name='base'/>" + link("l1", 1.5 * unit, "0 0 0.15", 0.012 * unit) +
+         link("l2", 0.9 * unit, "0 0 0.15", 0.003 * unit) +
+         joint("j1", "revolute", "base", "l1", "xyz='0 0 0.3'", "0 1 0", limit) +
+         joint("j2", "revolute", "l1", "l2", "xyz='0 0 0.3'", "0 1 0", limit);
+}
+
+/// It waits where gravity asks for nothing, so no posture of its own tells.
+TEST(Found, ARobotThatItsDrivesCannotCarryIsSaid) {
+  const Made right = tried(heavy_arm(1.0, 50.0));
+  ASSERT_TRUE(right) << right.error().front().to_string();
+  EXPECT_FALSE(says(right->remarks, "cannot carry"));
+  const Made grams = tried(heavy_arm(1000.0, 50.0));
+  ASSERT_TRUE(grams) << grams.error().front().to_string();
+  EXPECT_TRUE(says(grams->remarks, "Its 2400 kg look like grams"));
+  EXPECT_TRUE(says(grams->remarks, "move.toml keeps still"));
+  const auto told = std::ranges::find_if(grams->warnings, [](const Error& warning) {
+    return warning.hint.find("by 1000 in the URDF") != std::string::npos;
+  });
+  EXPECT_NE(told, grams->warnings.end());
+  const Made weak = tried(heavy_arm(1.0, 2.0));
+  ASSERT_TRUE(weak) << weak.error().front().to_string();
+  EXPECT_TRUE(says(weak->remarks, "The drives cannot carry the robot everywhere"));
+  EXPECT_FALSE(says(weak->remarks, "grams"));
+}
+
+TEST(Found, ABipedInGramsGetsOneRemedyAndNoOther) {
+  std::string urdf = biped(0.0);
+  for (std::size_t at = 0; (at = urdf.find("<mass value='", at)) != std::string::npos; at += 13)
+    urdf.insert(urdf.find("'", at + 13), "e3");
+  const Made robot = tried(urdf);
+  ASSERT_TRUE(robot) << robot.error().front().to_string();
+  EXPECT_TRUE(says(robot->remarks, "look like grams"));
+  for (const Error& warning : robot->warnings)
+    EXPECT_EQ(warning.message.find("falls over"), std::string::npos) << warning.to_string();
+}
+
+/// Rigid drives have no spring that could be stiffer.
+TEST(Found, AdviceIsForKeysThatTheDriveHas) {
+  Made robot = tried(biped(0.0));
+  ASSERT_TRUE(robot) << robot.error().front().to_string();
+  for (hal::GainsConfig& gains : robot->config.gains) gains.position.gains.kp *= 0.05;
+  Eigen::VectorXd q(static_cast<Eigen::Index>(robot->tree.joints.size()));
+  for (std::size_t j = 0; j < robot->config.joints.size(); ++j) {
+    q[robot->tree.joint_index(robot->config.joints[j].name)] =
+        robot->config.postures[0].position_rad[j];
+  }
+  const auto falls = falls_over(*robot, q);
+  ASSERT_TRUE(falls);
+  EXPECT_EQ(falls->hint.find("spring_Nm_rad"), std::string::npos) << falls->hint;
+  EXPECT_NE(falls->hint.find("make [gains."), std::string::npos) << falls->hint;
+}
+
+TEST(Found, AFloatingArmIsRefusedWithARemedyThatWorks) {
+  const std::string arm =
+      "<link name='world'/>" + link("base", 5.0, "0 0 0.1", 0.05) +
+      link("l1", 1.0, "0 0 0.1", 0.01) +
+      "<joint name='root' type='floating'><parent link='world'/><child link='base'/></joint>" +
+      joint("j1", "revolute", "base", "l1", "xyz='0 0 0.3'", "0 1 0",
+            "lower='-1' upper='1' effort='20' velocity='3'");
+  for (const Base base : {Base::kAuto, Base::kFixed}) {
+    const Made robot = tried(arm, base);
+    ASSERT_FALSE(robot);
+    EXPECT_NE(robot.error().front().hint.find("--lock root"), std::string::npos)
+        << robot.error().front().to_string();
+  }
+  const test::ScratchFolder folder;
+  const std::string file = folder / "made.urdf";
+  std::ofstream(file, std::ios::binary) << "<robot name='made'>\n" << arm << "</robot>\n";
+  EXPECT_TRUE(
+      make_robot({.urdf = file, .name = "made", .base = Base::kFixed, .lock = {{"root", 0.0}}}));
+}
+
+/// A biped of graphics programs: y up, z ahead. Its feet are cylinders that lie along z.
+std::string graphics_biped() {
+  std::string urdf = link("pelvis", 6.0, "0 0 0", 0.05);
+  const std::string limit = "lower='-1.5' upper='1.5' effort='50' velocity='2'";
+  const std::string sole =
+      "<collision><origin xyz='0 0 0.15'/><geometry><cylinder radius='0.05' length='0.3'/>"
+      "</geometry></collision>";
+  for (const auto& [side, x] : {std::pair{"l", "0.1"}, {"r", "-0.1"}}) {
+    const std::string s = side, down = "xyz='0 -0.3 0'";
+    urdf += link(s + "_thigh", 2.0, "0 -0.15 0", 0.015) +
+            link(s + "_shank", 1.5, "0 -0.15 0", 0.012) +
+            link(s + "_foot", 0.5, "0 0 0.15", 0.004, sole);
+    urdf += joint(s + "_hip", "revolute", "pelvis", s + "_thigh", fmt::format("xyz='{} 0 0'", x),
+                  "1 0 0", limit) +
+            joint(s + "_knee", "revolute", s + "_thigh", s + "_shank", down, "1 0 0", limit) +
+            joint(s + "_ankle", "revolute", s + "_shank", s + "_foot", down, "1 0 0", limit);
+  }
+  return urdf;
+}
+
+TEST(Found, TheRemedyForYUpKeepsAheadAndLinesAreLevel) {
+  const std::string lying = graphics_biped();
+  const Made refused = tried(lying);
+  ASSERT_FALSE(refused);
+  const std::string& hint = refused.error().front().hint;
+  EXPECT_NE(hint.find("looks along its +z"), std::string::npos) << hint;
+  const std::size_t begin = hint.find("<link name="), end = hint.find("</joint>");
+  ASSERT_NE(end, std::string::npos) << hint;
+  const Made robot = tried(lying + hint.substr(begin, end + 8 - begin));
+  ASSERT_TRUE(robot) << robot.error().front().to_string();
+  ASSERT_EQ(robot->feet.size(), 2U);
+  EXPECT_EQ(robot->feet[0].name, "left_foot");
+  EXPECT_EQ(robot->feet[1].name, "right_foot");
+  Eigen::VectorXd q(static_cast<Eigen::Index>(robot->tree.joints.size()));
+  for (std::size_t j = 0; j < robot->config.joints.size(); ++j) {
+    q[robot->tree.joint_index(robot->config.joints[j].name)] =
+        robot->config.postures[0].position_rad[j];
+  }
+  const Posed posed(robot->tree, q);
+  for (const Foot& foot : robot->feet) {
+    ASSERT_EQ(foot.points.size(), 2U);
+    const model::Placement sole = posed.link(foot.link) * foot.sole_in_link;
+    for (const Eigen::Vector3d& p : foot.points)
+      EXPECT_NEAR((sole.R * p + sole.p).z(), -robot->stands_m, 2e-4);
+  }
+}
+
+TEST(Found, LegsInOneLineAreNamedByTheirLinksAndTheirFeetByTheKind) {
+  std::string urdf = biped(0.0);
+  for (const std::string from : {"xyz='0 0.1 -0.1'", "xyz='0 -0.1 -0.1'"})
+    urdf.replace(urdf.find(from), from.size(),
+                 from == "xyz='0 0.1 -0.1'" ? "xyz='0.2 0 -0.1'" : "xyz='-0.2 0 -0.1'");
+  const Made robot = tried(urdf);
+  ASSERT_TRUE(robot) << robot.error().front().to_string();
+  EXPECT_EQ(robot->feet[0].name, "l_sole");
+  EXPECT_EQ(robot->feet[1].name, "r_sole");
+  for (std::size_t at = 0; (at = urdf.find("'l_", at)) != std::string::npos;)
+    urdf.replace(at, 3, "'a_");
+  for (std::size_t at = 0; (at = urdf.find("'r_", at)) != std::string::npos;)
+    urdf.replace(at, 3, "'b_");
+  const Made unnamed = tried(urdf);
+  ASSERT_TRUE(unnamed) << unnamed.error().front().to_string();
+  EXPECT_EQ(unnamed->feet[0].name, "sole");
+  EXPECT_EQ(unnamed->feet[1].name, "sole_2");
+}
+
 }  // namespace
 }  // namespace tandem::scaffold
