@@ -277,6 +277,7 @@ TEST(LineDrive, WhatAnInitCmdWritesIsThere) {
                 command("2101", "0", "01020304") + "</CoE><FoE");
   ASSERT_EQ(sheet.writes.size(), 3U);
   EXPECT_EQ(sheet.value(0x2100, 1, 0), 0x0201) << "little-endian";
+  ASSERT_NE(sheet.find(0x2101), nullptr);
   EXPECT_EQ(sheet.find(0x2101)->size(), 4);
   expect_follows(with(sheet));
 }
