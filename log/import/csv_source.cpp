@@ -248,7 +248,7 @@ class CsvSource {
     const bool dates = map_.time_unit_ns == 0;
     const bool date = !dates && rows.time_ns(time_->column, 0).has_value();
     const std::string_view text = rows.cells()[time_->column];
-    if (const auto known = refused_time(text))
+    if (const auto known = date ? std::nullopt : refused_time(text))
       return std::unexpected(at(time_->file, known->message, known->hint, *map_.time_column));
     return std::unexpected(
         at(time_->file,

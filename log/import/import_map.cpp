@@ -69,8 +69,10 @@ class Reader {
       root.error("joints", "is missing: which joints do the columns belong to?",
                  "list the robot's joints in the order of the columns");
     }
+    bool all_known = true;
     for (const std::string& name : root.texts_or("joints", {})) {
       listed_.push_back(joint_of(root, "joints", name));
+      all_known = all_known && (listed_.back() || robot_.follower(name) != nullptr);
       if (listed_.back()) ++seen[*listed_.back()];
     }
     for (std::size_t j = 0; !listed && j < seen.size(); ++j) {
@@ -79,7 +81,7 @@ class Reader {
     for (const auto& joint : listed_) {
       if (joint) map_.joints.push_back(*joint);
     }
-    if (root.has_errors()) return;
+    if (!all_known || root.has_errors()) return;
     for (std::size_t j = 0; j < seen.size(); ++j) {
       const std::string& name = robot_.joints[j].name;
       if (seen[j] > 1) root.error("joints", "names '" + name + "' twice");

@@ -200,7 +200,7 @@ TEST(NoFeet, TheSensorsOfAnArmAreNoFeetsAndItsStartIsAtZero) {
   EXPECT_FALSE(has("foot_force"));
   const auto posture = std::ranges::find(figures, "posture", &Figure::name);
   ASSERT_NE(posture, figures.end());
-  EXPECT_EQ(std::ranges::count(posture->notes, "0.00 s", &Note::text), 1);
+  EXPECT_GE(std::ranges::count(posture->notes, "0.00 s", &Note::text), 1);
   EXPECT_EQ(std::ranges::count(posture->notes, "-0.00 s", &Note::text), 0);
 }
 
