@@ -351,7 +351,13 @@ std::string TomlTable::text_or(std::string_view key, std::string value) {
 }
 
 std::string TomlTable::choice(std::string_view key, const std::vector<std::string>& allowed) {
-  return require(key) == nullptr ? std::string() : choice_or(key, {}, allowed);
+  const std::size_t errors = shared_->diagnostics.size();
+  if (require(key) != nullptr) return choice_or(key, {}, allowed);
+  if (shared_->diagnostics.size() > errors) {
+    std::string& hint = shared_->diagnostics.back().hint;
+    for (const std::string& one : allowed) hint += (&one == &allowed.front() ? ": " : ", ") + one;
+  }
+  return {};
 }
 
 std::string TomlTable::choice_or(std::string_view key, std::string value,

@@ -16,6 +16,7 @@ set(TANDEM_PLUGIN_HEADERS
   hal/devices.hpp
   hal/estimate.hpp
   hal/estimate_fields.inc
+  hal/follower.hpp
   hal/image.hpp
   hal/joint_capabilities.hpp
   hal/joint_devices.hpp

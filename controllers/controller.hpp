@@ -142,7 +142,7 @@ class Controller {
 
 /// Version of what a plugin sees: this header and those that it includes. Raised with every change
 /// of them after which a plugin has to be built again. How a robot is wired is in none of them.
-inline constexpr std::uint32_t kControllerInterface = 13;
+inline constexpr std::uint32_t kControllerInterface = 14;
 
 /// FNV-1a of some numbers, folded to 16 bits.
 [[nodiscard]] constexpr std::uint32_t hash_of(std::initializer_list<std::size_t> numbers) noexcept {
@@ -156,11 +156,11 @@ inline constexpr std::uint32_t kControllerInterface = 13;
 inline constexpr std::uint32_t kControllerAbi =
     kControllerInterface << 16 |
     hash_of({sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::Robot),
-             sizeof(hal::Joint), sizeof(hal::PassiveJoint), sizeof(hal::Sensor), sizeof(hal::Site),
-             sizeof(hal::Foot), sizeof(hal::Posture), sizeof(model::LoopSpec),
-             sizeof(hal::StateImage), sizeof(hal::EstimateImage), sizeof(hal::CommandImage),
-             sizeof(hal::ParameterImage), sizeof(hal::Prediction), sizeof(hal::CycleTime),
-             sizeof(TomlTable), sizeof(tandem_kernels)});
+             sizeof(hal::Joint), sizeof(hal::PassiveJoint), sizeof(hal::Follower),
+             sizeof(hal::Sensor), sizeof(hal::Site), sizeof(hal::Foot), sizeof(hal::Posture),
+             sizeof(model::LoopSpec), sizeof(hal::StateImage), sizeof(hal::EstimateImage),
+             sizeof(hal::CommandImage), sizeof(hal::ParameterImage), sizeof(hal::Prediction),
+             sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels)});
 
 /// Whether `Class` has members of its own, but no archive(): what a snapshot may lack.
 template <class Class>

@@ -39,13 +39,12 @@ Motion cubic(const log::JointTrack& track, std::size_t i, double share) {
   return {p + x * (m0 + x * (b + x * c)), (m0 + x * (2.0 * b + x * 3.0 * c)) / T, 0.0};
 }
 
-std::unexpected<Error> beyond(const hal::Joint& joint, double at_s, const char* what, double value,
-                              double low, double high, const char* unit, std::string hint) {
+std::unexpected<Error> beyond(const hal::Joint& joint, const std::string& when, const char* what,
+                              double value, double low, double high, const char* unit,
+                              std::string hint) {
   char text[200];
-  std::snprintf(text, sizeof text,
-                " would %s %.6g %s at %.3f s of the recording, its limits are "
-                "%.6g and %.6g",
-                what, value, unit, at_s, low, high);
+  std::snprintf(text, sizeof text, " would %s %.6g %s %s, its limits are %.6g and %.6g", what,
+                value, unit, when.c_str(), low, high);
   return fail("joint '" + joint.name + "'" + text, std::move(hint));
 }
 
@@ -143,6 +142,22 @@ void MotionPlan::ramp(std::size_t joint, double rest_rad_s) {
   }
 }
 
+std::string MotionPlan::when(const log::JointMotion& motion, std::size_t cycle) const {
+  const double since_s = (static_cast<double>(cycle) - static_cast<double>(run_up_)) * period_s_;
+  const double after_s = since_s - static_cast<double>(recorded_ - 1) * period_s_;
+  char text[100];
+  if (cycle < run_up_) {
+    std::snprintf(text, sizeof text, "%.3f s before the recording, on the way to its first speed",
+                  -since_s);
+  } else if (cycle >= run_up_ + recorded_) {
+    std::snprintf(text, sizeof text, "%.3f s after the recording, on the way to rest", after_s);
+  } else {
+    std::snprintf(text, sizeof text, "at %.3f s of the recording",
+                  static_cast<double>(motion.begin_ns) * 1e-9 + since_s * speed_);
+  }
+  return text;
+}
+
 Status MotionPlan::check(const log::JointMotion& motion, const hal::Joint& limits,
                          std::size_t joint) const {
   const char* const unit = limits.slides ? "m" : "rad";
@@ -157,21 +172,19 @@ Status MotionPlan::check(const log::JointMotion& motion, const hal::Joint& limit
   const double fastest = limits.max_velocity_rad_s;
   const double strongest = limits.max_torque_Nm;
   for (std::size_t cycle = 0; cycle < cycles_; ++cycle) {
-    const double at_s =
-        static_cast<double>(motion.begin_ns) * 1e-9 +
-        (static_cast<double>(cycle) - static_cast<double>(run_up_)) * period_s_ * speed_;
     const double here = position(joint, cycle);
     if (here < limits.min_position_rad - kRounding || here > limits.max_position_rad + kRounding) {
-      return beyond(limits, at_s, "be at", here, limits.min_position_rad, limits.max_position_rad,
-                    unit, where);
+      return beyond(limits, when(motion, cycle), "be at", here, limits.min_position_rad,
+                    limits.max_position_rad, unit, where);
     }
     const double step = cycle == 0 ? 0.0 : (here - position(joint, cycle - 1)) / period_s_;
     for (const double speed : {step, velocity(joint, cycle)}) {
       if (std::abs(speed) <= fastest * (1.0 + kRounding) + kRounding) continue;
-      return beyond(limits, at_s, "move with", speed, -fastest, fastest, speed_unit, slower);
+      return beyond(limits, when(motion, cycle), "move with", speed, -fastest, fastest, speed_unit,
+                    slower);
     }
     if (!has_torque() || std::abs(torque(joint, cycle)) <= strongest * (1.0 + kRounding)) continue;
-    return beyond(limits, at_s, "get", torque(joint, cycle), -strongest, strongest,
+    return beyond(limits, when(motion, cycle), "get", torque(joint, cycle), -strongest, strongest,
                   limits.slides ? "N" : "Nm", "play it without: torque = false");
   }
   return {};

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/realtime.hpp"
@@ -54,6 +55,8 @@ class MotionPlan {
  private:
   void sample(const log::JointTrack& track, std::size_t joint, std::int64_t begin_ns);
   void ramp(std::size_t joint, double rest_rad_s);
+  /// Where a cycle is in the recording, or how long before or after it.
+  [[nodiscard]] std::string when(const log::JointMotion& motion, std::size_t cycle) const;
   [[nodiscard]] Status check(const log::JointMotion& motion, const hal::Joint& limits,
                              std::size_t joint) const;
 

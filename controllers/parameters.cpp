@@ -19,8 +19,8 @@ std::vector<std::size_t> joints_parameter(ControllerSetup& setup) {
   for (const std::string& name : setup.parameters.texts_or("joints", known)) {
     const int index = setup.robot.joint_index(name);
     if (index < 0) {
-      setup.parameters.error("joints", "the robot has no joint '" + name + "'",
-                             suggest(name, known));
+      const Error none = setup.robot.no_joint(name);
+      setup.parameters.error("joints", none.message, none.hint);
     } else if (std::ranges::find(joints, static_cast<std::size_t>(index)) != joints.end()) {
       setup.parameters.error("joints", "joint '" + name + "' stands twice", "name it once");
     } else {

@@ -40,7 +40,7 @@ std::vector<std::string> joint_names(const hal::RobotConfig& robot) {
 
 std::vector<std::string> names_with_followers(const RunDescription& run) {
   std::vector<std::string> names = joint_names(run.robot);
-  for (const hal::Follower& one : followers_of(run.robot, run.tree)) names.push_back(one.name);
+  for (const hal::Follower& one : run.robot.followers) names.push_back(one.name);
   return names;
 }
 
@@ -54,7 +54,7 @@ std::vector<std::string> interface_names() {
 
 JointTopics::JointTopics(OutputMaker& maker, const RunDescription& run)
     : tells_(hal::motor_feedback(run.robot)),
-      followers_(followers_of(run.robot, run.tree)),
+      followers_(run.robot.followers),
       joints_(joint_names(run.robot)),
       joints_and_followers_(names_with_followers(run)),
       interfaces_(interface_names()),

@@ -4,7 +4,6 @@
 
 #include <vector>
 
-#include "dds/followers.hpp"
 #include "dds/message_parts.hpp"
 #include "dds/topic_group.hpp"
 #include "hal/config/capabilities.hpp"

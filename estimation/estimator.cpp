@@ -21,8 +21,6 @@ Result<std::vector<double>> thresholds(const hal::Robot& robot, const CollisionC
   const std::size_t joints = robot.joints.size();
   std::vector<double> all(joints + (of_base ? kBaseChannels.size() : 0),
                           std::numeric_limits<double>::infinity());
-  std::vector<std::string> names;
-  for (const hal::Joint& joint : robot.joints) names.push_back(joint.name);
   for (const auto& [joint, torque_Nm] : config.thresholds) {
     const int at = robot.joint_index(joint);
     const auto channel = std::ranges::find(kBaseChannels, joint) - kBaseChannels.begin();
@@ -30,7 +28,7 @@ Result<std::vector<double>> thresholds(const hal::Robot& robot, const CollisionC
       all[joints + static_cast<std::size_t>(channel)] = torque_Nm;
       continue;
     }
-    if (at < 0) return fail("the robot has no joint '" + joint + "'", suggest(joint, names));
+    if (at < 0) return std::unexpected(robot.no_joint(joint));
     all[static_cast<std::size_t>(at)] = torque_Nm;
   }
   return all;

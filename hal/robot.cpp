@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "base/nearest.hpp"
+
 namespace tandem::hal {
 namespace {
 
@@ -18,6 +20,27 @@ ImageShape Robot::shape() const {
   ImageShape shape{.joints = joints.size(), .sensor_channels = {}};
   for (const Sensor& sensor : sensors) shape.sensor_channels.push_back(sensor.channels());
   return shape;
+}
+
+Error no_joint(std::string_view name, std::span<const std::string> joints,
+               std::span<const Follower> followers) {
+  Error error{.message = {}, .hint = {}, .file = {}, .line = 0, .key = std::string(name)};
+  const auto found = std::ranges::find(followers, name, &Follower::name);
+  if (found == followers.end() || found->leader >= joints.size()) {
+    error.message = "the robot has no joint '" + error.key + "'";
+    error.hint = suggest(name, joints);
+    return error;
+  }
+  const std::string& leader = joints[found->leader];
+  error.message = "the joint '" + error.key + "' follows '" + leader + "' (mimic)";
+  error.hint = "command '" + leader + "'";
+  return error;
+}
+
+Error Robot::no_joint(std::string_view name_in) const {
+  std::vector<std::string> names;
+  for (const Joint& joint : joints) names.push_back(joint.name);
+  return hal::no_joint(name_in, names, followers);
 }
 
 int Robot::joint_index(std::string_view name_in) const { return place_of(joints, name_in); }

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "hal/follower.hpp"
 #include "hal/image.hpp"
 #include "hal/joint_capabilities.hpp"
 #include "model/loop_spec.hpp"
@@ -73,6 +74,7 @@ struct Robot {
   bool floating_base = false;
   std::vector<Joint> joints = {};          ///< in the image's order
   std::vector<PassiveJoint> passive = {};  ///< in the dynamics, not in the image
+  std::vector<Follower> followers = {};    ///< the same: they go with joints of the image
   std::vector<model::LoopSpec> loops = {};
   std::vector<Sensor> sensors = {};  ///< in the image's order
   std::vector<Site> sites = {};
@@ -82,6 +84,8 @@ struct Robot {
   [[nodiscard]] ImageShape shape() const;
   /// Index in `joints`, or -1.
   [[nodiscard]] int joint_index(std::string_view name) const;
+  /// What to say of a name that is not in `joints`: of a follower, whom it follows.
+  [[nodiscard]] Error no_joint(std::string_view name) const;
   [[nodiscard]] int sensor_index(std::string_view name) const;
   [[nodiscard]] bool is_passive(std::string_view name) const;
   [[nodiscard]] std::vector<std::string> passive_names() const;

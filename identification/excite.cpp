@@ -427,6 +427,7 @@ Result<Excitation> excite(const hal::RobotConfig& robot, const model::Tree& tree
         posture->position_rad[static_cast<std::size_t>(identified->facts.joint[c])];
   for (const std::string& name : request.joints) {
     if (std::ranges::find(names, name) != names.end()) continue;
+    if (robot.follower(name) != nullptr) return std::unexpected(robot.no_joint(name));
     return fail("the robot has no joint '" + name + "'", suggest(name, names));
   }
   std::vector<Index> free;

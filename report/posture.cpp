@@ -21,6 +21,9 @@ namespace {
 
 constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
 
+/// For two decimals, without a sign before 0.
+double hundredths(double value) { return std::round(value * 100.0) / 100.0 + 0.0; }
+
 /// Limbs end where the tree branches. A limb is the bodies from a branch (or the root) on.
 struct Limb {
   std::vector<int> bodies;  ///< the first is where it starts from
@@ -409,7 +412,7 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configure
     const double x = begin_m + row.middle_m[s];
     figure.notes.push_back({samples[s].label, x, up_m.low - row.line_m});
     figure.notes.push_back(
-        {fmt::format("{:.2f} s", samples[s].time_s), x, up_m.low - 2.0 * row.line_m});
+        {fmt::format("{:.2f} s", hundredths(samples[s].time_s)), x, up_m.low - 2.0 * row.line_m});
   }
   if (legged) figure.levels.push_back({"ground", robot.contact.height_m});
   for (Curve* curve : {&sticks.others, &sticks.trunk, &sticks.legs}) {

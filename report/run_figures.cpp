@@ -212,7 +212,7 @@ Figure force_figure(const RunData& run, const OtherRuns& others, const std::vect
   const std::vector<Force> forces = foot_forces(run, sensors);
   const std::size_t feet = run.robot.contact.feet.size();
   Figure figure;
-  figure.name = "foot_force";
+  figure.name = sensors.empty() || legged(run) ? "foot_force" : "sensor_force";
   figure.title = sensors.empty() ? "Vertical force of the ground on the feet (simulated)"
                                  : fmt::format("Vertical force in the {}six-axis sensors",
                                                legged(run) ? "legs' " : "");

@@ -63,6 +63,17 @@ std::string text_in(const FileTexts& files, const std::string& path) {
   return found == files.end() ? std::string() : found->second;
 }
 
+std::vector<hal::Follower> followers_of(const hal::RobotConfig& robot, const model::Tree& tree) {
+  std::vector<hal::Follower> all;
+  for (const model::Joint& joint : tree.joints) {
+    if (!joint.follows()) continue;
+    const int leader = robot.joint_index(tree.joints[static_cast<std::size_t>(joint.leader)].name);
+    if (leader < 0) continue;  // it has no drive either
+    all.push_back({joint.name, static_cast<std::size_t>(leader), joint.multiplier, joint.offset});
+  }
+  return all;
+}
+
 std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot,
                                                             const FileTexts& read) {
   auto found = read_description(robot, read);
@@ -70,6 +81,7 @@ std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& ro
   Diagnostics errors = hal::complete_from_description(robot, plain(*found));
   sort_by_line(errors);
   if (!errors.empty()) return std::unexpected(std::move(errors));
+  robot.followers = followers_of(robot, found->tree);
   for (hal::PostureConfig& posture : robot.postures) {
     if (!std::isnan(posture.base_height_m)) continue;
     const std::optional<Standing> touching = standing(robot, posture, found->tree);

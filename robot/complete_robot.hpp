@@ -26,15 +26,19 @@ struct CompleteRobot {
   FileTexts files;  ///< both
 };
 
+/// The joints of the description that follow a joint of the image.
+[[nodiscard]] std::vector<hal::Follower> followers_of(const hal::RobotConfig& robot,
+                                                      const model::Tree& tree);
+
 /// Reads a robot.toml and its URDF. Errors: those of both at once, read_robot_config()'s and
 /// complete_robot()'s.
 /// @param repair  as if it said inertia = "repair"
 [[nodiscard]] std::expected<CompleteRobot, Diagnostics> read_complete_robot(const std::string& file,
                                                                             bool repair = false);
 
-/// Reads the robot's URDF and fills from it what robot.toml left out: limits, and the heights of
-/// postures that are "auto". Errors: read_urdf()'s and complete_from_description()'s. The answer
-/// holds the tree and what was tolerated in it.
+/// Reads the robot's URDF and fills from it what robot.toml left out: limits, the heights of
+/// postures that are "auto", and its followers. Errors: read_urdf()'s and
+/// complete_from_description()'s. The answer holds the tree and what was tolerated in it.
 ///
 /// @param read  files that were read before: when the URDF is one of them, it is not read again
 [[nodiscard]] std::expected<model::UrdfModel, Diagnostics> complete_robot(

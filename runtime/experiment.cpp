@@ -117,8 +117,12 @@ void combine(Experiment& e, TomlTable& root) {
                "add joints, boards and a bus to " + e.robot.file);
   }
   TomlTable report = root.table_or_empty("report");
-  check_reference(report, "position_of", e.report.position_of, e.robot.joints, "joint");
-  check_reference(report, "torque_of", e.report.torque_of, e.robot.joints, "joint");
+  for (const auto& [key, joint] : {std::pair{"position_of", e.report.position_of},
+                                   std::pair{"torque_of", e.report.torque_of}}) {
+    if (joint.empty() || e.robot.joint_index(joint) >= 0) continue;
+    const Error none = e.robot.no_joint(joint);
+    report.error(key, none.message, none.hint);
+  }
   check_reference(report, "foot", e.report.foot, e.robot.sensors, "sensor");
   if (e.sim.hoist_lift_m > 0.0 && !e.robot.model.floating_base) {
     root.table("sim").table("hoist").error("lift_m", "a fixed base cannot be lifted",

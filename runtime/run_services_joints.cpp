@@ -95,9 +95,7 @@ Status check_move(const std::string& joint, const MoveRequest& wish,
 Result<std::size_t> RunServices::joint_of(const std::string& name) const {
   const int index = robot_->joint_index(name);
   if (index >= 0) return static_cast<std::size_t>(index);
-  std::vector<std::string> names;
-  for (const hal::JointConfig& joint : robot_->joints) names.push_back(joint.name);
-  return fail_at(name, "the robot has no joint '" + name + "'", suggest(name, names));
+  return std::unexpected(robot_->no_joint(name));
 }
 
 /// The joint's index, when the run can still be asked for something.

@@ -347,8 +347,18 @@ Exit tell_homing(const JointOptions& options, const Json& joint) {
 /// list and show: those joints that are named.
 Exit show(const JointOptions& options, Json answer) {
   const bool one = options.action == JointOptions::Action::kShow;
-  const Result<Json> some =
-      named(answer["joints"], "joint", one ? std::vector{options.joint} : options.joints);
+  const std::vector<std::string> names = one ? std::vector{options.joint} : options.joints;
+  const Json followers = answer.value("followers", Json::object());
+  for (const std::string& name : names) {
+    if (!followers.contains(name)) continue;
+    const auto leader = followers[name].get<std::string>();
+    return refuse(Error{"the joint '" + name + "' follows '" + leader + "' (mimic)",
+                        "name '" + leader + "'",
+                        {},
+                        0,
+                        {}});
+  }
+  const Result<Json> some = named(answer["joints"], "joint", names);
   if (!some) return refuse(some.error());
   answer["joints"] = *some;
   if (one) answer = some->front();

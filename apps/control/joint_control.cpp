@@ -129,7 +129,10 @@ Json list(const Run& run) {
     cycle = joint.look.cycle;
     all.push_back(joint_json(run, joint, all.size()));
   }
-  return {{"cycle", cycle}, {"joints", std::move(all)}};
+  Json followers = Json::object();
+  for (const hal::Follower& one : run.robot.followers)
+    followers[one.name] = run.robot.joints[one.leader].name;
+  return {{"cycle", cycle}, {"joints", std::move(all)}, {"followers", std::move(followers)}};
 }
 
 /// What was done, and what the joint is now. A controller's own joints are its own.

@@ -13,7 +13,6 @@
 #include <utility>
 
 #include "base/open_file.hpp"
-#include "dds/followers.hpp"
 #include "hal/sim/engine_loader.hpp"
 
 namespace tandem::apps {
@@ -135,7 +134,7 @@ log::RecorderOptions recorder_options(const Composition& c) {
   const runtime::Experiment& e = c.experiment;
   log::RecorderOptions options;
   options.viewed.urdf = robot::text_in(e.files, e.robot.model.urdf);
-  options.viewed.followers = dds::followers_of(e.robot, *e.tree());
+  options.viewed.followers = e.robot.followers;
   if (e.description->tree.floating_base)
     options.viewed.base_link = e.description->tree.links.front().name;
   switch (e.log.compression) {

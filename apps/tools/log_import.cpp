@@ -9,7 +9,6 @@
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "base/counted.hpp"
-#include "dds/followers.hpp"
 #include "log/import/import_log.hpp"
 #include "model/generate.hpp"
 #include "robot/robot_files.hpp"
@@ -147,9 +146,9 @@ Exit log_import_command(const LogOptions& options) {
   const Result<std::string> output = output_of(options, robot->config.name);
   if (!output) return refuse(output.error());
   Draft draft = Draft::file(*output);
-  auto summary = log::import_log(
-      {options.files, options.map, draft.path(), dds::followers_of(robot->config, robot->tree)},
-      robot->config, info_of(*robot), robot::text_in(robot->files, robot->config.model.urdf));
+  auto summary =
+      log::import_log({options.files, options.map, draft.path()}, robot->config, info_of(*robot),
+                      robot::text_in(robot->files, robot->config.model.urdf));
   if (!summary) {
     for (Error& error : summary.error()) error = draft.placed(std::move(error));
     return refuse(summary.error());

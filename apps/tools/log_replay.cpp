@@ -81,8 +81,10 @@ Result<std::vector<std::size_t>> joints_of(const LogOptions& options, const hal:
   for (const std::string& name : names) {
     const int index = robot.joint_index(name);
     if (index < 0) {
-      return std::unexpected(
-          Error{"the robot has no joint '" + name + "'", suggest(name, known), robot.file, 0, {}});
+      Error none = robot.no_joint(name);
+      none.file = robot.file;
+      none.key.clear();
+      return std::unexpected(std::move(none));
     }
     if (std::ranges::find(joints, static_cast<std::size_t>(index)) != joints.end()) {
       return fail("joint '" + name + "' stands twice", "name it once in --joints");

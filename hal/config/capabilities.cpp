@@ -76,6 +76,7 @@ Robot robot_of(const RobotConfig& config) {
   for (const PassiveConfig& joint : config.passive) {
     robot.passive.push_back({joint.name, joint.position_rad});
   }
+  robot.followers = config.followers;
   robot.loops = config.loop_specs();
   for (const SensorConfig& sensor : config.sensors) {
     robot.sensors.push_back({sensor.name, sensor.type, sensor.joint, sensor.link});

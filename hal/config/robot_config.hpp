@@ -311,6 +311,7 @@ struct RobotConfig {
   std::vector<BoardConfig> boards;
   std::vector<JointConfig> joints;  ///< the process image's order
   std::vector<PassiveConfig> passive;
+  std::vector<Follower> followers;  ///< of the description, once that completed this
   std::vector<LoopConfig> loops;
   std::vector<SensorConfig> sensors;  ///< the process image's order
   ContactConfig contact;
@@ -321,6 +322,8 @@ struct RobotConfig {
   [[nodiscard]] ImageShape shape() const;
   /// Index in `joints`, or -1.
   [[nodiscard]] int joint_index(std::string_view name) const;
+  /// What to say of a name that is not in `joints`: of a follower, whom it follows.
+  [[nodiscard]] Error no_joint(std::string_view name) const;
   [[nodiscard]] int sensor_index(std::string_view name) const;
   [[nodiscard]] const ActuatorConfig& actuator_of(const JointConfig& joint) const;
   [[nodiscard]] const GainsConfig& gains_of(const JointConfig& joint) const;
@@ -338,6 +341,8 @@ struct RobotConfig {
     const StopCategory own = joints[joint].on_fault;
     return cause == FaultCause::kIgnoresStop ? std::min(own, StopCategory::kCategory1) : own;
   }
+  /// Null when no joint of that name follows another.
+  [[nodiscard]] const Follower* follower(std::string_view name) const;
   [[nodiscard]] const BoardConfig* board(std::string_view name) const;
   [[nodiscard]] const BusConfig* bus(std::string_view name) const;
   [[nodiscard]] const PostureConfig* posture(std::string_view name) const;

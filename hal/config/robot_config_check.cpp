@@ -37,12 +37,18 @@ ImageShape RobotConfig::shape() const {
   return shape;
 }
 
+Error RobotConfig::no_joint(std::string_view joint) const {
+  return hal::no_joint(joint, names_of(joints), followers);
+}
 int RobotConfig::joint_index(std::string_view joint) const { return index_of(joints, joint); }
 int RobotConfig::sensor_index(std::string_view sensor) const { return index_of(sensors, sensor); }
 bool RobotConfig::is_passive(std::string_view joint) const {
   return find(passive, joint) != nullptr;
 }
 std::vector<std::string> RobotConfig::passive_names() const { return names_of(passive); }
+const Follower* RobotConfig::follower(std::string_view wanted) const {
+  return find(followers, wanted);
+}
 const BoardConfig* RobotConfig::board(std::string_view wanted) const {
   return find(boards, wanted);
 }

@@ -196,9 +196,13 @@ class BagSource {
     for (const char* field : {"position", "velocity", "effort"}) {
       const std::size_t size = list(field).size();
       if (size == 0 || size == names.size()) continue;
+      if (map_.excludes(Trouble::kInvalid)) {
+        invalid_.push_back(message_);
+        return {};
+      }
       return refuse(where(topic) + " has " + std::to_string(names.size()) + " names and " +
                         std::to_string(size) + " of " + field,
-                    "its publisher is at fault: leave it out of the recording");
+                    "its publisher is at fault; exclude = [\"invalid\"] leaves such messages out");
     }
     std::vector<std::size_t> joints;  // of the robot, in the message's order
     for (const dds::Value& one : names) {
@@ -253,7 +257,7 @@ class BagSource {
     if (ignored.size() == bounds::kLogNames.most)
       return std::unexpected(beyond(bounds::kLogNames, path_, 0, name));
     ignored.push_back(name);
-    const bool follows = std::ranges::find(map_.followers, name) != map_.followers.end();
+    const bool follows = robot_.follower(name) != nullptr;
     if (follows || listed("*") || listed(name.c_str())) return {};
     std::vector<std::string> known;
     for (const hal::JointConfig& joint : robot_.joints) known.push_back(joint.name);

@@ -1,6 +1,7 @@
 #include "log/import/csv_rows.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -8,6 +9,7 @@
 #include <utility>
 
 #include "base/bounds.hpp"
+#include "base/quoting.hpp"
 
 namespace tandem::log {
 namespace {
@@ -71,6 +73,21 @@ class DateReader {
  private:
   std::string_view rest_;
 };
+
+/// A date in the basic form of ISO 8601, 20261126T220212.5Z, in its usual one, and Z for UTC and
+/// GMT at the end; any other text as it is.
+std::string usual_form(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789";
+  std::string out(text);
+  if (out.ends_with("UTC") || out.ends_with("GMT")) out.replace(out.size() - 3, 3, "Z");
+  const auto digits = [&](std::size_t from) {
+    return std::min(out.find_first_not_of(kDigits, from), out.size()) - from;
+  };
+  const bool date = digits(0) == 8 && out.size() > 9 && std::string_view("Tt ").contains(out[8]);
+  if (!date || (digits(9) != 4 && digits(9) != 6)) return out;
+  if (digits(9) == 6) out.insert(13, ":");
+  return out.insert(11, ":").insert(6, "-").insert(4, "-");
+}
 
 }  // namespace
 
@@ -200,13 +217,42 @@ std::optional<double> CsvRows::number(std::size_t column) const {
 }
 
 std::optional<std::int64_t> CsvRows::time_ns(std::size_t column, std::int64_t unit_ns) const {
-  if (unit_ns == 0) return iso_time_ns(cells_[column]);
+  if (unit_ns == 0) return iso_time_ns(usual_form(cells_[column]));
   const auto value = whole_number<long double>(digits_of(column));
   constexpr long double kMost = 9.2e18L;
   if (!value) return std::nullopt;
   const long double ns = *value * static_cast<long double>(unit_ns);
   if (!(std::abs(ns) < kMost)) return std::nullopt;
   return std::llround(ns);
+}
+
+std::optional<Error> refused_time(std::string_view cell) {
+  const auto digits = [&](std::size_t from) {
+    return std::min(cell.find_first_not_of("0123456789", from), cell.size()) - from;
+  };
+  const auto refuse = [&](const std::string& what, std::string hint) {
+    return Error{"'" + shown(cell) + "' " + what, std::move(hint), {}, 0, {}};
+  };
+  const std::size_t colon = cell.find(':');
+  if (colon == std::string_view::npos) return std::nullopt;
+  std::size_t word = cell.size();
+  while (word > 0 && std::isalpha(static_cast<unsigned char>(cell[word - 1])) != 0) --word;
+  const std::string zone(cell.substr(word));
+  if (zone == "AM" || zone == "PM" || zone == "am" || zone == "pm")
+    return refuse("is a time of a 12-hour clock", "write the hours 0 to 23");
+  if (zone.size() > 1 && word > colon) {
+    return refuse(
+        "names a zone, and nobody knows which '" + zone + "' is meant",
+        "write how far it is from UTC, such as +01:00: sed 's/" + zone + "/+01:00/' FILE > NEW");
+  }
+  const bool bare = (colon == 1 || colon == 2) && digits(0) == colon && digits(colon + 1) == 2 &&
+                    cell.find_first_not_of("0123456789:.,") == std::string_view::npos;
+  if (!bare) return std::nullopt;
+  const bool whole = colon == 2 && cell.substr(colon + 3).starts_with(':');
+  return refuse("is a time without a date",
+                whole ? "put the date before it: sed -E 's#[0-9]{2}:[0-9]{2}:[0-9]{2}#2026-01-31 "
+                        "&#' FILE > NEW; after midnight it is the next"
+                      : "write a date and hours, minutes and seconds, or seconds alone");
 }
 
 }  // namespace tandem::log

@@ -57,4 +57,8 @@ class CsvRows {
   bool pending_ = false;  // the first row has been read with the header
 };
 
+/// What a time is that is not read, though people write it so, and what to do: one without a date,
+/// of a zone that is named, of a 12-hour clock. None: it is no such time.
+[[nodiscard]] std::optional<Error> refused_time(std::string_view cell);
+
 }  // namespace tandem::log

@@ -112,6 +112,11 @@ class CsvSource {
                 {signal.command, signal.field, map_.joints[j]}, signal.scale[j], signal.offset[j]);
         if (!added) return added;
       }
+      for (const std::string& name : signal.unused) {
+        const auto place = find(name, signal.line, signal.key + ".columns");
+        if (!place) return std::unexpected(place.error());
+        recording_.excluded.ignored.push_back(name);
+      }
     }
     for (const SensorMap& sensor : map_.sensors) {
       if (Status added = place_sensor(sensor); !added) return added;
@@ -146,7 +151,8 @@ class CsvSource {
         const std::string name = full_name(f, column);
         if (std::ranges::find(used_, name) != used_.end()) continue;
         recording_.excluded.ignored.push_back(name);
-        if (all || std::ranges::find(map_.ignore, name) != map_.ignore.end()) continue;
+        const bool follows = robot_.follower(column) != nullptr;
+        if (all || follows || std::ranges::find(map_.ignore, name) != map_.ignore.end()) continue;
         unused.push_back(name);
       }
     }
@@ -189,7 +195,7 @@ class CsvSource {
     for (;;) {
       const Result<bool> there = next_rows();
       if (!there) return std::unexpected(there.error());
-      if (!*there) return {};
+      if (!*there) break;
       const std::int64_t number = row_++;
       const auto odd = [&] {
         for (std::size_t f = 0; f < rows_.size(); ++f) {
@@ -198,18 +204,30 @@ class CsvSource {
         return rows_.size();
       }();
       if (odd < rows_.size()) {
-        if (!map_.excludes(Trouble::kRagged)) {
-          return std::unexpected(at(odd,
-                                    "has " + std::to_string(rows_[odd].cells().size()) +
-                                        " cells, the others have " +
-                                        std::to_string(rows_[odd].names().size()),
-                                    "mend the file, or say exclude = [\"ragged\"]"));
-        }
-        ++recording_.excluded.ragged;
+        Status left =
+            leave_out(Trouble::kRagged, recording_.excluded.ragged,
+                      at(odd,
+                         "has " + counted(rows_[odd].cells().size(), "cell") +
+                             ", the others have " + std::to_string(rows_[odd].names().size()),
+                         map_.excludes(Trouble::kRagged)
+                             ? "no row has as many: are delimiter and header of [csv] right?"
+                             : "mend the file, or say exclude = [\"ragged\"]"));
+        if (!left) return left;
         continue;
       }
       if (Status read = read_row(number); !read) return read;
     }
+    if (series_.rows() == 0 && lost_) return std::unexpected(*lost_);
+    return {};
+  }
+
+  /// A row that the map wants left out; of the first one it is remembered what is wrong with it,
+  /// and what to do when none remains.
+  Status leave_out(Trouble trouble, std::uint64_t& count, Error error) {
+    if (!map_.excludes(trouble)) return std::unexpected(std::move(error));
+    ++count;
+    if (!lost_) lost_ = std::move(error);
+    return {};
   }
 
   Result<std::int64_t> time_of(std::int64_t number) const {
@@ -218,14 +236,30 @@ class CsvSource {
     if (const auto time = rows.time_ns(time_->column, map_.time_unit_ns)) return *time;
     const bool dates = map_.time_unit_ns == 0;
     const bool date = !dates && rows.time_ns(time_->column, 0).has_value();
+    const std::string_view text = rows.cells()[time_->column];
+    if (const auto known = date ? std::nullopt : refused_time(text))
+      return std::unexpected(at(time_->file, known->message, known->hint, *map_.time_column));
     return std::unexpected(
         at(time_->file,
            dates  ? "this time is no date of ISO 8601, such as 2026-11-26T22:02:12.5Z"
            : date ? "this time is a date"
                   : "this time is no number",
-           date ? "say unit = \"iso\" in [time] of the map"
-                : "mend the file, or leave such rows out by exclude = [\"invalid\"]",
+           date          ? "say unit = \"iso\" in [time] of the map"
+           : has_times() ? "mend the file, or leave such rows out by exclude = [\"invalid\"]"
+                         : "no row has one: are column and unit of [time] right?",
            *map_.time_column));
+  }
+
+  /// Whether a row has a time that is read: else leaving rows out leaves none. Where they are left
+  /// out, it is asked of none.
+  bool has_times() const {
+    if (map_.excludes(Trouble::kInvalid)) return false;
+    CsvRows rows = rows_[time_->file];
+    for (bool there = true; there; there = rows.next()) {
+      const bool whole = time_->column < rows.cells().size();
+      if (whole && rows.time_ns(time_->column, map_.time_unit_ns)) return true;
+    }
+    return series_.rows() > 0;
   }
 
   /// Most rows lack a cell that is used: each column has its own times, as a plotter's export has.
@@ -316,15 +350,21 @@ class CsvSource {
     return sensor;
   }
 
+  Error no_number(std::size_t file, const std::string& column) const {
+    return at(
+        file, "this cell is empty or not finite",
+        map_.excludes(Trouble::kInvalid)
+            ? "no row is without such a cell: is it the right column?"
+            : "mend the file, or leave such rows out by exclude = [\"invalid\"]; where columns "
+              "have their own times, say sparse = true in [csv] of the map",
+        column);
+  }
+
   Status read_row(std::int64_t number) {
     const auto time = time_of(number);
-    if (!time && map_.excludes(Trouble::kInvalid)) {
-      ++recording_.excluded.invalid;
-      return {};
-    }
-    if (!time) return std::unexpected(time.error());
+    if (!time) return leave_out(Trouble::kInvalid, recording_.excluded.invalid, time.error());
     values_.clear();
-    bool valid = true;
+    std::optional<Error> wrong;
     for (std::size_t i = 0; i < places_.size(); ++i) {
       const CsvPlace& place = places_[i];
       const auto value = rows_[place.file].number(place.column);
@@ -337,18 +377,13 @@ class CsvSource {
       }
       const double scaled = place.scale * *value + place.offset;
       const bool hole = sparse_ && rows_[place.file].empty(place.column);
-      if (!std::isfinite(scaled) && !hole && !map_.excludes(Trouble::kInvalid)) {
-        return std::unexpected(at(place.file, "this cell is empty or not finite",
-                                  "mend the file, or leave such rows out by exclude = "
-                                  "[\"invalid\"]; where columns have their own times, say sparse "
-                                  "= true in [csv] of the map",
-                                  name));
-      }
-      valid = valid && (hole || std::isfinite(scaled));
+      if (!std::isfinite(scaled) && !hole && !wrong) wrong = no_number(place.file, name);
       values_.push_back(scaled);
     }
-    if (!valid) ++recording_.excluded.invalid;
-    if (!valid && !sparse_) return {};
+    if (wrong) {
+      Status left = leave_out(Trouble::kInvalid, recording_.excluded.invalid, std::move(*wrong));
+      if (!left || !sparse_) return left;
+    }
     series_.time_ns.push_back(*time);
     series_.line.push_back(rows_[0].line());
     for (std::size_t i = 0; i < values_.size(); ++i) {
@@ -366,6 +401,7 @@ class CsvSource {
   std::vector<std::string> used_;
   std::vector<double> values_;  // of one row
   std::int64_t row_ = 0;
+  std::optional<Error> lost_;  // what is wrong with the first row that was left out
   bool sparse_ = false;
   Series series_;  // of all columns
   Recording recording_;

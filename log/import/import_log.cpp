@@ -120,6 +120,28 @@ Status is_text(const ImportFile& file) {
             {}});
 }
 
+/// Of a table. Errors: JSON, of objects or lists, as a whole or one on each line.
+Status is_no_json(const ImportFile& file) {
+  constexpr std::string_view kSpaces = " \t\r\n";
+  const std::string_view text = file.text;
+  const std::size_t begin = text.find_first_not_of(kSpaces);
+  if (begin == std::string_view::npos) return {};
+  const std::size_t second = text.find_first_not_of(kSpaces, begin + 1);
+  const char first = text[begin], next = second == std::string_view::npos ? '\0' : text[second];
+  const char last = text[text.find_last_not_of(kSpaces)];
+  const bool object = first == '{' && next == '"';
+  const bool list = first == '[' && last == ']' && (next == '{' || next == '[');
+  if (!object && !list) return {};
+  return std::unexpected(
+      Error{"is JSON, and no table",
+            "write a line of text for each sample; of a list of objects: jq -r '(.[0] | "
+            "keys_unsorted) as $k | $k, (.[] | [.[$k[]]]) | @csv' FILE > NEW; of objects one after "
+            "the other: the same with -rs",
+            file.path,
+            0,
+            {}});
+}
+
 bool begins(std::string_view text, std::string_view magic) { return text.starts_with(magic); }
 
 /// What a file is by its first bytes. Errors: a kind that is known and not read.
@@ -132,12 +154,18 @@ Result<bool> is_bag(const ImportFile& file) {
     return std::unexpected(Error{std::move(message), std::move(hint), path, 0, {}});
   };
   if (begins(first, "SQLite format 3")) {
-    return refuse("is a bag in SQLite", "convert it: ros2 bag convert, storage_id: mcap");
+    return refuse("is a bag in SQLite",
+                  "convert its folder: ros2 bag convert -i FOLDER -o NEW.yaml, where NEW.yaml says "
+                  "output_bags: [{uri: NEW, storage_id: mcap, all: true}]");
   }
   if (begins(first, "#ROSBAG V")) {
-    return refuse("is a bag of ROS 1", "convert it: mcap convert");
+    return refuse("is a bag of ROS 1", "convert it: mcap convert FILE.bag NEW.mcap");
   }
   if (begins(first, "\x1F\x8B")) return refuse("is compressed", "decompress it: gunzip");
+  if (begins(first, "PK\x03\x04")) {
+    return refuse("is a ZIP archive, as spreadsheets (.xlsx, .ods) are",
+                  "unpack it: unzip; of a spreadsheet: save it as CSV");
+  }
   const auto magic = std::as_bytes(std::span(head)).first(kMagicBytes);
   if (first.size() >= kMagicBytes && std::ranges::equal(magic, kMagic)) return true;
   if (path.ends_with(".mcap") || path.find(".mcap.") != std::string::npos) {
@@ -249,6 +277,7 @@ std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request
       file.text = std::move(*text);
     }
     if (Status text = is_text(file); !text) return refuse(text.error());
+    if (Status table = is_no_json(file); !table) return refuse(table.error());
     if (to_utf8(file.text)) latin1.push_back(path);
     files.push_back(std::move(file));
   }
@@ -259,7 +288,6 @@ std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request
   auto map = parse_import_map(imported.map_text, request.map, robot, imported.bag);
   if (!map) return std::unexpected(map.error());
   imported.map = std::move(*map);
-  for (const hal::Follower& one : request.followers) imported.map.followers.push_back(one.name);
   auto recording = imported.bag ? read_bag_recording(files, imported.map, robot)
                                 : read_csv_recording(files, imported.map, robot);
   if (!recording) return refuse(recording.error());
@@ -296,7 +324,7 @@ std::expected<ImportSummary, Diagnostics> import_log(const ImportRequest& reques
   RecorderOptions options;
   options.writer.compression = Compression::kLz4;
   options.viewed.urdf = urdf;
-  options.viewed.followers = request.followers;
+  options.viewed.followers = robot.followers;
   auto recorder = Recorder::open(request.output, info, options);
   if (!recorder) return refuse(recorder.error());
   write_cycles(*sampler, robot, has_command(imported->map), **recorder, summary);

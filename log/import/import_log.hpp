@@ -20,7 +20,6 @@ struct ImportRequest {
   std::vector<std::string> files;  ///< tables of text side by side, or bags one after the other
   std::string map;                 ///< path of the import map
   std::string output;              ///< path of the log
-  std::vector<hal::Follower> followers{};  ///< the robot's
 };
 
 /// A recording, read and cleaned.

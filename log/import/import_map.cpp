@@ -39,14 +39,14 @@ class Reader {
   }
 
  private:
+  /// None: an error was said, or it follows another.
   std::optional<std::size_t> joint_of(TomlTable& table, std::string_view key,
                                       const std::string& name) {
     const int index = robot_.joint_index(name);
     if (index >= 0) return static_cast<std::size_t>(index);
-    std::vector<std::string> names;
-    for (const hal::JointConfig& joint : robot_.joints) names.push_back(joint.name);
-    table.error(key, "the robot '" + robot_.name + "' has no joint '" + name + "'",
-                suggest(name, names));
+    if (robot_.follower(name) != nullptr) return std::nullopt;
+    const Error none = robot_.no_joint(name);
+    table.error(key, none.message, none.hint);
     return std::nullopt;
   }
 
@@ -56,6 +56,9 @@ class Reader {
     for (const std::string& name : missing.keys()) {
       const double position = missing.number(name);
       const auto joint = joint_of(missing, name, name);
+      if (robot_.follower(name) != nullptr)
+        missing.error(name, robot_.no_joint(name).message,
+                      "remove it: its leader says where it is");
       if (!joint) continue;
       map_.missing[*joint] = position;
       ++seen[*joint];
@@ -68,15 +71,19 @@ class Reader {
     }
     bool all_known = true;
     for (const std::string& name : root.texts_or("joints", {})) {
-      const auto joint = joint_of(root, "joints", name);
-      all_known = all_known && joint;
-      map_.joints.push_back(joint.value_or(0));
-      if (joint) ++seen[*joint];
+      listed_.push_back(joint_of(root, "joints", name));
+      all_known = all_known && (listed_.back() || robot_.follower(name) != nullptr);
+      if (listed_.back()) ++seen[*listed_.back()];
+    }
+    for (std::size_t j = 0; !listed && j < seen.size(); ++j) {
+      if (seen[j] == 0) listed_.emplace_back(j);
+    }
+    for (const auto& joint : listed_) {
+      if (joint) map_.joints.push_back(*joint);
     }
     if (!all_known || root.has_errors()) return;
     for (std::size_t j = 0; j < seen.size(); ++j) {
       const std::string& name = robot_.joints[j].name;
-      if (!listed && seen[j] == 0) map_.joints.push_back(j);
       if (seen[j] > 1) root.error("joints", "names '" + name + "' twice");
       if (listed && seen[j] == 0) {
         root.error("joints", "lacks the robot's joint '" + name + "'",
@@ -185,7 +192,9 @@ class Reader {
     if (bag.has("stamp")) map_.stamp = bag.choice("stamp", {"header", "log"});
     TomlTable names = bag.table_or_empty("names");
     for (const std::string& name : names.keys()) {
-      const auto joint = joint_of(names, name, names.text(name));
+      const std::string leads_to = names.text(name);
+      const auto joint = joint_of(names, name, leads_to);
+      if (robot_.follower(leads_to) != nullptr) map_.ignore.push_back(name);
       if (!joint) continue;
       const bool twice =
           std::ranges::any_of(map_.names, [&](const auto& one) { return one.second == *joint; });
@@ -271,12 +280,13 @@ class Reader {
   }
 
   std::vector<std::string> units_of(TomlTable& table, const Signal& signal) {
-    const std::size_t count = map_.joints.size();
+    const std::size_t count = listed_.size();
     const std::vector<std::string> known = unit_names(signal);
     if (bag_ && !table.has("unit")) {  // what sensor_msgs/JointState declares
       std::vector<std::string> units;
-      for (const std::size_t joint : map_.joints) {
-        const Motion of = robot_.joints[joint].slides ? Motion::kSlides : Motion::kTurns;
+      for (const auto& joint : listed_) {
+        const bool slides = joint && robot_.joints[*joint].slides;
+        const Motion of = slides ? Motion::kSlides : Motion::kTurns;
         const auto unit = std::ranges::find(signal.units, of, &Unit::of);
         units.emplace_back(unit->name);
       }
@@ -306,10 +316,11 @@ class Reader {
                   .key = {},
                   .line = table.line(),
                   .columns = {},
+                  .unused = {},
                   .scale = {},
                   .offset = {}};
     one.key = (command ? "command." : "") + std::string(signal.key);
-    const std::size_t count = map_.joints.size();
+    const std::size_t count = listed_.size();
     if (bag_ && given && !signal.in_bag) {
       parent.error(signal.key, "a bag's joint states have position, velocity and effort only",
                    "remove this table");
@@ -330,7 +341,8 @@ class Reader {
     one.unwrap = position && table.boolean_or("unwrap", false);
     const std::vector<double> counts = per_joint(table, "counts_per_turn", count, 0.0);
     for (std::size_t j = 0; j < count && j < one.scale.size() && j < counts.size(); ++j) {
-      const double factor = factor_of(table, signal, units[j], map_.joints[j]);
+      if (!listed_[j]) continue;
+      const double factor = factor_of(table, signal, units[j], *listed_[j]);
       const bool raw = std::isnan(factor);
       if (raw && !table.has("scale") && counts[j] == 0.0) {
         table.error("scale", "is missing: the unit is raw",
@@ -339,8 +351,23 @@ class Reader {
       if (!raw) one.scale[j] *= factor;
       if (counts[j] != 0.0) one.scale[j] = 360.0 * kDegree / counts[j];
     }
+    leave_followers(one);
     table.finish();
     map_.signals.push_back(std::move(one));
+  }
+
+  /// What the lists have for joints that follow others is not used.
+  void leave_followers(SignalMap& one) const {
+    const auto keep = [this](auto& list, auto* others) {
+      auto all = std::exchange(list, {});
+      for (std::size_t j = 0; j < all.size() && j < listed_.size(); ++j) {
+        if (listed_[j]) list.push_back(std::move(all[j]));
+        if (!listed_[j] && others != nullptr) others->push_back(std::move(all[j]));
+      }
+    };
+    keep(one.columns, &one.unused);
+    keep(one.scale, static_cast<std::vector<double>*>(nullptr));
+    keep(one.offset, static_cast<std::vector<double>*>(nullptr));
   }
 
   void read_command(TomlTable& root) {
@@ -434,6 +461,8 @@ class Reader {
 
   const hal::RobotConfig& robot_;
   bool bag_;
+  /// The joints that the map's lists are of; none: one that follows another, or an error
+  std::vector<std::optional<std::size_t>> listed_;
   ImportMap map_;
 };
 

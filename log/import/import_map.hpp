@@ -34,10 +34,11 @@ enum class Sampling : std::uint8_t {
 /// One signal of every joint: a table [position], [command.torque], …
 struct SignalMap {
   bool command = false;
-  std::string field;                  ///< of the image, on the wire
-  std::string key;                    ///< of its table, for messages
-  int line = 0;                       ///< the same
-  std::vector<std::string> columns;   ///< (joints) of a CSV; empty in a bag
+  std::string field;                 ///< of the image, on the wire
+  std::string key;                   ///< of its table, for messages
+  int line = 0;                      ///< the same
+  std::vector<std::string> columns;  ///< (joints) of a CSV; empty in a bag
+  std::vector<std::string> unused;   ///< columns of joints that follow others: whose leaders say it
   std::vector<double> scale, offset;  ///< (joints) SI = scale * recorded + offset
   bool unwrap = false;                ///< of positions: they were kept within a turn
 };
@@ -84,8 +85,6 @@ struct ImportMap {
   std::vector<std::string> joint_topics;     ///< empty: all of their type
   std::string stamp;                         ///< "header", "log"; empty: not said
   std::map<std::string, std::size_t> names;  ///< a bag's joint -> the robot's
-
-  std::vector<std::string> followers;  ///< joints of the robot whose leaders say where they are
 
   std::vector<SignalMap> signals;
   std::vector<SensorMap> sensors;

@@ -2,6 +2,7 @@
 // Layer: log/import.  Thread: any, non-RT.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -24,6 +25,11 @@ struct ImportedColumn {
   std::string file;  ///< for messages
   Target target;
   std::vector<double> values;
+
+  /// Of a joint, as measured.
+  [[nodiscard]] bool is_position() const {
+    return !target.command && target.field == "position_rad";
+  }
 };
 
 /// Columns that were measured at the same times: those of a CSV, or of one joint or sensor in a
@@ -39,12 +45,17 @@ struct Series {
   std::vector<std::size_t> quaternions;  ///< the first of four columns that are one
 
   [[nodiscard]] std::size_t rows() const { return time_ns.size(); }
+  /// The log's cycles are where the positions are. Any other series has what it has there.
+  [[nodiscard]] bool has_positions() const {
+    return std::ranges::any_of(columns, &ImportedColumn::is_position);
+  }
 };
 
 /// What was left out, because the map says so. Counted for the summary and the log: rows of a
 /// table, messages of a bag, each once, whatever number of joints it has.
 struct Exclusions {
-  std::uint64_t invalid = 0;         ///< with a cell that is empty or not finite, a joint twice
+  std::uint64_t invalid =
+      0;  ///< with a cell that is empty or not finite, a joint twice, lists of other lengths
   std::uint64_t ragged = 0;          ///< with too few or too many cells
   std::uint64_t duplicates = 0;      ///< whose time is the row's before
   std::uint64_t backwards = 0;       ///< whose time is before that of an earlier row

@@ -118,10 +118,16 @@ void crop(Recording& recording, const ImportMap& map) {
   }
 }
 
+/// The usual step; 0 of a single sample.
+std::int64_t median_step(const std::vector<std::int64_t>& sorted) {
+  return sorted.empty() ? 0 : sorted[sorted.size() / 2];
+}
+
 std::int64_t max_gap_of(const Series& series, const ImportMap& map) {
-  if (map.max_gap_ns != 0) return map.max_gap_ns;
-  const std::vector<std::int64_t> steps = sorted_steps(series);
-  return kGapSteps * std::max(steps[steps.size() / 2], map.period_ns);
+  if (map.max_gap_ns != 0 && series.has_positions()) return map.max_gap_ns;
+  // A column may be slower than the positions, whose gaps the map speaks of.
+  const std::int64_t usual = std::max(median_step(sorted_steps(series)), map.period_ns);
+  return std::max(map.max_gap_ns, kGapSteps * usual);
 }
 
 Status check_gaps(const Series& series, const ImportMap& map, Exclusions& excluded) {
@@ -168,13 +174,14 @@ Status check_frozen(Series& series, const ImportMap& map, Exclusions& excluded) 
 }
 
 /// A unit of time or a period that is off by orders of magnitude: almost no row would be used, or
-/// almost every cycle would be made up.
+/// almost every cycle would be made up. The positions say it: other columns may be slower.
 Status check_period(const Series& series, const ImportMap& map) {
-  const std::vector<std::int64_t> steps = sorted_steps(series);
-  const std::int64_t step = std::max<std::int64_t>(1, steps[steps.size() / 2]);
+  if (!series.has_positions()) return {};
+  const std::int64_t step = std::max<std::int64_t>(1, median_step(sorted_steps(series)));
   if (map.period_ns / kMostRatio < step && step / kMostRatio < map.period_ns) return {};
-  return std::unexpected(Error{"a cycle of the log is " + in_seconds(map.period_ns) +
-                                   ", and the recording has a sample every " + in_seconds(step),
+  const auto position = std::ranges::find_if(series.columns, &ImportedColumn::is_position);
+  return std::unexpected(Error{"a cycle of the log is " + in_seconds(map.period_ns) + ", and '" +
+                                   position->name + "' has a sample every " + in_seconds(step),
                                "are [time] unit and period_s right?", map.file, 0,
                                "time.period_s"});
 }
@@ -368,10 +375,12 @@ Status clean(Recording& recording, const ImportMap& map, const hal::RobotConfig&
   recording.excluded.backwards = distinct(std::move(left_out.backwards));
   crop(recording, map);
   for (Series& series : recording.series) continue_turns(series, map, robot);
-  for (Series& series : recording.series) {
-    if (series.rows() >= 2) continue;
+  for (const Series& series : recording.series) {
+    if (series.rows() >= (series.has_positions() ? 2U : 1U)) continue;
     return std::unexpected(
-        Error{"has less than two samples that can be used", "is [time] begin_s before its end?",
+        Error{series.has_positions() ? "has less than two samples that can be used"
+                                     : "has no sample that can be used",
+              "is [time] begin_s before its end?",
               series.columns.empty() ? "" : series.columns.front().file, 0, series.name});
   }
   if (map.period_ns == 0) {
@@ -383,9 +392,7 @@ Status clean(Recording& recording, const ImportMap& map, const hal::RobotConfig&
               "say [time] period_s", map.file, 0, "time.period_s"});
   }
   for (Series& series : recording.series) {
-    if (!series.joints.empty()) {
-      if (Status s = check_period(series, map); !s) return s;
-    }
+    if (Status s = check_period(series, map); !s) return s;
     if (Status s = check_range(series, map, robot); !s) return s;
     if (Status s = check_gaps(series, map, recording.excluded); !s) return s;
     if (Status s = check_torques(series, map, robot); !s) return s;
@@ -401,12 +408,12 @@ std::vector<Spacing> spacings(const Recording& recording) {
   std::vector<Spacing> all;
   for (const Series& series : recording.series) {
     const std::vector<std::int64_t> steps = sorted_steps(series);
-    const std::int64_t median_ns = steps[steps.size() / 2];
+    const std::int64_t median_ns = median_step(steps);
     const double in_time_ns = Spacing::kLateSteps * static_cast<double>(median_ns);
     const auto late = std::ranges::count_if(
         steps, [=](std::int64_t step) { return static_cast<double>(step) > in_time_ns; });
-    all.push_back({series.name, series.rows(), median_ns, steps.front(), steps.back(),
-                   static_cast<std::size_t>(late)});
+    all.push_back({series.name, series.rows(), median_ns, steps.empty() ? 0 : steps.front(),
+                   steps.empty() ? 0 : steps.back(), static_cast<std::size_t>(late)});
   }
   return all;
 }
@@ -448,7 +455,7 @@ Result<Sampler> Sampler::create(const Recording& recording, const ImportMap& map
   std::int64_t begin = std::numeric_limits<std::int64_t>::min();
   std::int64_t end = std::numeric_limits<std::int64_t>::max();
   for (const Series& series : recording.series) {
-    if (series.joints.empty()) continue;
+    if (!series.has_positions()) continue;
     samples = std::max(samples, series.rows());
     begin = std::max(begin, series.time_ns.front());
     end = std::min(end, series.time_ns.back());
@@ -492,6 +499,7 @@ bool Sampler::fill_series(std::size_t index, std::int64_t now_ns, hal::StateImag
   const std::int64_t most_ns = max_gap_ns_[index];
   const std::int64_t step_ns = last ? most_ns : series.time_ns[row + 1] - series.time_ns[row];
   const bool hole = since_ns > 0 && (step_ns > most_ns || since_ns > step_ns);
+  if (hole && !series.has_positions() && series.sensors.empty()) return false;
   const double share = hole ? 0.0 : static_cast<double>(since_ns) / static_cast<double>(step_ns);
   for (std::size_t c = 0; c < series.columns.size(); ++c) {
     const ImportedColumn& column = series.columns[c];
@@ -500,7 +508,9 @@ bool Sampler::fill_series(std::size_t index, std::int64_t now_ns, hal::StateImag
   }
   const bool held = hole || map_.sampling == Sampling::kPrevious;
   const auto age = static_cast<std::uint32_t>(held ? since_ns / map_.period_ns : 0);
-  for (const std::size_t joint : series.joints) state.age_cycles()[joint] = age;
+  for (const ImportedColumn& column : series.columns) {
+    if (column.is_position()) state.age_cycles()[column.target.index] = age;
+  }
   for (const std::size_t sensor : series.sensors) state.sensor_age_cycles()[sensor] = age;
   if (share > 0.0) normalise(index, state);
   return !hole;
@@ -529,7 +539,7 @@ bool Sampler::fill(std::uint64_t cycle, hal::StateImage& state, hal::CommandImag
   bool whole = true;
   for (std::size_t s = 0; s < recording_.series.size(); ++s) {
     const bool there = fill_series(s, begin_ns_ + since_ns, state, command);
-    if (!there && !recording_.series[s].joints.empty()) whole = false;
+    if (!there && recording_.series[s].has_positions()) whole = false;
   }
   return whole;
 }

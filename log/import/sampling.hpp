@@ -34,11 +34,11 @@ struct Spacing {
 /// and after end_s without a word, the others counted.
 ///
 /// Errors, with file and line or the sample's number: time that goes back, duplicates, gaps,
-/// columns that never change, as far as the map does not exclude them; a series of less than two
-/// samples; no period_s, with what the recording's own is, or one that is 50 times as long or as
-/// short; a position further outside of its joint's range than that is wide; a position
-/// that leaps by a turn; a torque above a hundred times its joint's; a velocity that is not the
-/// rate of its position, within a factor of two, where the joint moves.
+/// columns that never change, as far as the map does not exclude them; positions with less than
+/// two samples, other columns without any; no period_s, with what the positions' own is, or one
+/// that is 50 times as long or as short; a position further outside of its joint's range than that
+/// is wide; a position that leaps by a turn; a torque above a hundred times its joint's; a velocity
+/// that is not the rate of its position, within a factor of two, where the joint moves.
 [[nodiscard]] Status clean(Recording& recording, const ImportMap& map,
                            const hal::RobotConfig& robot);
 
@@ -48,7 +48,7 @@ struct Spacing {
 /// Fills the images of one cycle after another.
 class Sampler {
  public:
-  /// Errors: the joints' samples have no time in common.
+  /// Errors: the joints' positions have no time in common.
   [[nodiscard]] static Result<Sampler> create(const Recording& recording, const ImportMap& map,
                                               const hal::RobotConfig& robot);
 
@@ -58,7 +58,7 @@ class Sampler {
 
   /// Cycle `cycle`, which must not be before the last one asked for.
   /// Numbers that the recording does not have are NaN.
-  /// @return false: a joint has a gap here; the images are not to be used
+  /// @return false: a joint's position has a gap here; the images are not to be used
   [[nodiscard]] bool fill(std::uint64_t cycle, hal::StateImage& state, hal::CommandImage& command);
 
  private:

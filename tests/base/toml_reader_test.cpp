@@ -108,6 +108,16 @@ TEST(TomlReader, TakesWhatATableLacksFromItsDefaults) {
   EXPECT_EQ(document.diagnostics()[1].hint, "add it to the table, or to [defaults] for all");
 }
 
+// "add it to the table" sent its reader to the manual for what may stand there.
+TEST(TomlReader, ListsTheChoicesOfAMissingKey) {
+  const TomlDocument document = parse("[time]\n");
+  TomlTable root = document.root();
+  TomlTable time = root.table("time");
+  EXPECT_EQ(time.choice("unit", {"s", "ms"}), "");
+  ASSERT_EQ(document.diagnostics().size(), 1U);
+  EXPECT_EQ(document.diagnostics()[0].hint, "add it to the table: s, ms");
+}
+
 TEST(TomlReader, ReportsAFaultOfTheDefaultsOnce) {
   const TomlDocument document = parse("[defaults]\nb = -2\n[t]\n[u]\n");
   TomlTable root = document.root();

@@ -84,6 +84,15 @@ TEST(Hold, NamesTheLineAndTheNearestOfAWrongName) {
   EXPECT_NE(test::Harness(robot(), "hold", "joints = ['wrist', 'wrist']\n").problem(), "");
 }
 
+// "the robot has no joint 'finger'", which the robot has.
+TEST(Hold, NamesTheLeaderOfAJointThatFollows) {
+  hal::RobotConfig config = robot();
+  config.followers = {{"finger", 1, -1.0, 0.0}};
+  EXPECT_EQ(test::Harness(config, "hold", "joints = ['wrist', 'finger']\n").problem(),
+            "experiment.toml:1: joints: the joint 'finger' follows 'elbow' (mimic) (command "
+            "'elbow')");
+}
+
 TEST(Hold, RefusesAPostureBeyondAJointsLimits) {
   EXPECT_EQ(test::Harness(robot(), "hold", "posture = 'wrong'\n").problem(),
             "experiment.toml:1: posture: is beyond the limits of joint 'elbow' (choose another "

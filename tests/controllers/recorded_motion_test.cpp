@@ -381,8 +381,14 @@ TEST_F(RecordedMotion, RefusesWhatItsRobotCannotDo) {
       "experiment.toml:1: log: LOG: joint 'shoulder' would move with 2.41367 rad/s at 0.500 s");
   EXPECT_NE(
       problem(record([](int, Cycle& c) { c.command.torque_Nm()[1] = 21.0; }), "torque = true\n")
-          .find("joint 'elbow' would get 21 Nm at -0.500 s"),
+          .find("joint 'elbow' would get 21 Nm 0.500 s before the recording, on the way to its "
+                "first speed"),
       std::string::npos);
+  // "at 1.499 s of the recording", which ends at 1.0
+  EXPECT_NE(problem(record([](int i, Cycle& c) {
+              c.command.position_rad()[0] = 1.498 + std::min(0.0, 1.5e-3 * (i - kCycles));
+            })).find(" s after the recording, on the way to rest, its limits"),
+            std::string::npos);
   joints_ = {"shoulder", "elbow", "hand"};
   const std::string other = record();
   EXPECT_EQ(problem(other),

@@ -31,6 +31,7 @@ inline robot::CompleteRobot robot_of(const std::string& name, bool follows = fal
     last.multiplier = -2.0;
     last.offset = 0.5;
     robot->config.joints.pop_back();
+    robot->config.followers = robot::followers_of(robot->config, tree);
   }
   return std::move(*robot);
 }

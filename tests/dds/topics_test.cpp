@@ -2,7 +2,6 @@
 #include <Eigen/Geometry>
 #include <map>
 
-#include "dds/followers.hpp"
 #include "hal/config/capabilities.hpp"
 #include "model/dynamics.hpp"
 #include "model/mechanism.hpp"
@@ -67,14 +66,14 @@ TEST(JointTopics, AFollowersPlaceIsItsMultiplierAndItsOffset) {
   tree.joints[2].leader = 1;
   tree.joints[2].multiplier = -2.0;
   tree.joints[2].offset = 0.5;
-  const auto found = followers_of(robot, tree);
+  const auto found = robot::followers_of(robot, tree);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].name, "c");
   EXPECT_EQ(found[0].leader, 1U) << "in the image, not in the tree";
   EXPECT_EQ(found[0].multiplier, -2.0);
   EXPECT_EQ(found[0].offset, 0.5);
   tree.joints[2].leader = 0;
-  EXPECT_TRUE(followers_of(robot, tree).empty());
+  EXPECT_TRUE(robot::followers_of(robot, tree).empty());
 }
 
 /// A second robot that is always one cycle behind.

@@ -482,7 +482,7 @@ TEST_F(Csv, ImpossibleNumbersAreRefused) {
     return map.replace(map.find(line), line.size(), by);
   };
   EXPECT_HAS(refusal({file}, with("unit = \"s\"", "unit = \"ms\"")),
-             "time.period_s: a cycle of the log is 0.010000 s, and the recording has a sample");
+             "time.period_s: a cycle of the log is 0.010000 s, and 'q1' has a sample");
   EXPECT_HAS(refusal({file}, with("period_s = 0.01", "period_s = 10.0")), "time.period_s");
   EXPECT_HAS(refusal({file}, with("period_s = 0.01", "period_s = 1e-6")), "time.period_s");
 }

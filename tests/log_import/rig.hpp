@@ -62,8 +62,7 @@ class Import : public testing::Test {
                  .joints = {"joint1", "joint2"},
                  .sensors = {{"ft", 6}, {"imu", 10}}};
     std::filesystem::remove(path("out.mcap"));
-    return import_log({files, write("map.toml", map), path("out.mcap"), followers_}, robot_, info,
-                      "");
+    return import_log({files, write("map.toml", map), path("out.mcap")}, robot_, info, "");
   }
   /// That succeeds.
   ImportSummary imported(const std::vector<std::string>& files, const std::string& map) const {
@@ -96,7 +95,6 @@ class Import : public testing::Test {
 
   tandem::test::ScratchFolder folder_;
   hal::RobotConfig robot_ = pendulum();
-  std::vector<hal::Follower> followers_;
 };
 
 #define EXPECT_HAS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)

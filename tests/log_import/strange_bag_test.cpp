@@ -294,8 +294,28 @@ TEST_F(StrangeBag, TheRobotsFollowersAreKnown) {
   const Names names{{"joint1", "joint2", "finger"}, {0, 1, 0}};
   const std::string file = bag({{.encode = [&](int i) { return cdr(i, names); }}});
   EXPECT_HAS(refusal({file}, kStamped), "the recording's joint 'finger' is none of the robot's");
-  followers_ = {{"finger", 0, 1.0, 0.0}};
+  robot_.followers = {{"finger", 0, 1.0, 0.0}};
   expect_motion(file);
+}
+
+TEST_F(StrangeBag, TheRobotsFollowersMayHaveOtherNames) {
+  const Names names{{"joint1", "joint2", "f2"}, {0, 1, 0}};
+  robot_.followers = {{"finger", 0, 1.0, 0.0}};
+  const std::string file = bag({{.encode = [&](int i) { return cdr(i, names); }}});
+  const std::string named = kStamped + "[bag.names]\nf2 = \"finger\"\n";
+  EXPECT_EQ(imported({file}, named).excluded.ignored, std::vector<std::string>{"f2"});
+}
+
+// The advice was to leave it out of the recording.
+TEST_F(StrangeBag, WhoseListsDifferInLengthLeavesMessagesOut) {
+  const std::string file = bag({{.encode = [](int i) {
+    return i == 7 ? cdr(i, {{"joint1", "joint2"}, {0}}) : cdr(i);
+  }}});
+  EXPECT_HAS(refusal({file}, kStamped),
+             "message 8 of /joint_states has 2 names and 1 of position (its publisher is at fault; "
+             "exclude = [\"invalid\"] leaves such messages out)");
+  const ImportSummary done = imported({file}, "exclude = [\"invalid\"]\n" + kStamped);
+  EXPECT_EQ(done.excluded.invalid, 1U);
 }
 
 TEST_F(StrangeBag, ThatNamesMoreJointsThanAnyRobotHasIsRefused) {

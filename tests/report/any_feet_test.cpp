@@ -176,5 +176,33 @@ TEST(NoFeet, ArmsAreDrawnByTheJointsThatMoveMost) {
   EXPECT_EQ(figures[1].title, run.robot.joints[2].name + ": torque, measured");
 }
 
+// foot_force.png of an arm, and "-0.00 s" below its first posture.
+TEST(NoFeet, TheSensorsOfAnArmAreNoFeetsAndItsStartIsAtZero) {
+  RunData run;
+  const test::Walker walker{"", 1, kLeg, {{0, 0, 0}}};
+  run.robot = test::walker_robot(walker);
+  run.robot.model.floating_base = false;
+  run.robot.contact.feet.clear();
+  run.robot.sensors = {{}};
+  run.robot.sensors[0].name = "wrist";
+  run.robot.sensors[0].type = hal::SensorType::kForceTorque;
+  run.tree = model::parse_urdf(test::walker_urdf(walker), "walker.urdf", {}).value().tree;
+  run.step_s = 0.001;
+  run.time_s = {-0.001, 1.0};
+  run.position_rad = {{0.0, 0.1}, {0.0, 0.3}, {0.0, 0.2}};
+  run.velocity_rad_s = run.torque_Nm = run.reference_rad = run.position_rad;
+  run.sensor.assign(6, {0.0, 1.0});
+  const std::vector<Figure> figures = figures_of(run, {}, nullptr);
+  const auto has = [&](const char* name) {
+    return std::ranges::find(figures, name, &Figure::name) != figures.end();
+  };
+  EXPECT_TRUE(has("sensor_force"));
+  EXPECT_FALSE(has("foot_force"));
+  const auto posture = std::ranges::find(figures, "posture", &Figure::name);
+  ASSERT_NE(posture, figures.end());
+  EXPECT_GE(std::ranges::count(posture->notes, "0.00 s", &Note::text), 1);
+  EXPECT_EQ(std::ranges::count(posture->notes, "-0.00 s", &Note::text), 0);
+}
+
 }  // namespace
 }  // namespace tandem::report

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "hal/config/capabilities.hpp"
 #include "runtime/experiment.hpp"
 
 namespace tandem::runtime {
@@ -91,6 +92,26 @@ TEST(StandingHeight, IsWhereTheLowestPointOfTheSolesTouchesTheGround) {
   // The given figures are those of a robot that the ground carries, rounded to a millimetre.
   EXPECT_NEAR(sunk_height_m("coman", "0.502"), 0.502, 0.5e-3);
   EXPECT_NEAR(sunk_height_m("walkman", "1.079"), 1.079, 0.5e-3);
+}
+
+TEST(Followers, OfTheDescriptionAreTheRobots) {
+  auto config = hal::read_robot_config(TANDEM_SOURCE_DIR "/config/double_pendulum/robot.toml");
+  ASSERT_TRUE(config);
+  std::ifstream in(config->model.urdf);
+  std::string urdf{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  urdf.insert(urdf.rfind("</robot>"), R"(
+    <link name="tip"><inertial><mass value="0.01"/>
+      <inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="finger" type="revolute"><parent link="link2"/><child link="tip"/>
+      <axis xyz="0 1 0"/><mimic joint="joint2" multiplier="-2"/></joint>)");
+  const auto description = robot::complete_robot(*config, {{config->model.urdf, urdf}});
+  ASSERT_TRUE(description) << description.error()[0].to_string();
+  const hal::Robot known = hal::robot_of(*config);
+  ASSERT_EQ(known.followers.size(), 1U);
+  EXPECT_EQ(known.followers[0].multiplier, -2.0);
+  EXPECT_EQ(known.no_joint("finger").to_string(),
+            "finger: the joint 'finger' follows 'joint2' (mimic) (command 'joint2')");
+  EXPECT_EQ(config->no_joint("joint3").message, "the robot has no joint 'joint3'");
 }
 
 TEST_P(BundledRobot, HasExperimentsThatCanBeRead) {

@@ -174,6 +174,18 @@ TEST_F(JointServices, RefuseWhatAJointCannotDoAndNameTheLimit) {
   EXPECT_EQ(services().joints()[1].gains[0].kp, 200.0);
 }
 
+// "the robot has no joint 'finger' (did you mean 'finger_l'?)", which /joint_states shows.
+TEST(JointServicesOf, AFollowersNameNameItsLeader) {
+  hal::RobotConfig robot = hal::test::fake_robot();
+  robot.followers = {{"finger", 1, -1.0, 0.0}};
+  JointRun run(robot);
+  run.begin({.settle_cycles = 20});
+  run.steps(100);
+  EXPECT_EQ(
+      run.text(run.services().move_joint("finger", {.target_rad = 0.1}, RunServices::Patience{0})),
+      "finger: the joint 'finger' follows 'elbow' (mimic) (command 'elbow')");
+}
+
 TEST(JointServicesOf, AJointWithoutALoopRefuseItsModeAndItsGains) {
   hal::RobotConfig robot = hal::test::fake_robot();
   robot.gains[0].current = {};
