@@ -181,7 +181,7 @@ TEST_F(NewOption, SaysWhyALinkGetsNoMassWhereThatIsWhatItNeeds) {
   EXPECT_EQ(refused.err.find("has --density"), std::string::npos) << refused.err;
   const Outcome made = tandem("new cart.urdf --lock wrist" + flags);
   ASSERT_EQ(made.status, 0) << made.err;
-  EXPECT_NE(made.out.find("hand, world: none, for it has no <collision>"), std::string::npos)
+  EXPECT_NE(made.out.find("world, hand: none, for it has no <collision>"), std::string::npos)
       << made.out;
 }
 
