@@ -19,7 +19,8 @@ namespace tandem::apps {
 using runtime::ControllerNote;
 using runtime::Overrides;
 
-struct Composition : runtime::Composition {
+/// What a backend speaks over.
+struct Wires {
   std::unique_ptr<CanSockets> sockets;            ///< of the CAN backend
   std::unique_ptr<hal::can::FrameRecord> frames;  ///< of the CAN backend, when it was asked for
   std::unique_ptr<dds::Participant> participant;  ///< of the DDS backend
@@ -30,6 +31,9 @@ struct Composition : runtime::Composition {
     return sockets->open_buses();
   }
 };
+
+/// The wires come first, for they outlive the backend: it says goodbye over them.
+struct Composition : Wires, runtime::Composition {};
 
 /// "EtherCAT" when the robot has no other bus, else "CAN".
 [[nodiscard]] std::string wire_name(const hal::RobotConfig& robot);
