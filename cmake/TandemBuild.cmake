@@ -10,6 +10,11 @@ set(CMAKE_LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
 if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release)
 endif()
+# Its depfiles name headers with the apostrophe as it is, which ninja takes for the end of a name.
+if(CMAKE_GENERATOR MATCHES "Ninja" AND PROJECT_BINARY_DIR MATCHES "'")
+  message(WARNING "The path ${PROJECT_BINARY_DIR} has an apostrophe: ninja 1.11 builds everything "
+    "anew each time. Move the folder, or use ninja of a later version if it does better.")
+endif()
 find_program(TANDEM_CCACHE ccache)
 if(TANDEM_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   # Sloppy about what a precompiled header is made of, without which ccache refuses to store its users.
