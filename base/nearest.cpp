@@ -76,7 +76,7 @@ std::string nearest(std::string_view name, std::span<const std::string> candidat
 std::string suggest(std::string_view name, std::span<const std::string> candidates,
                     std::size_t most) {
   const Best best = best_of(name, candidates);
-  // Of "category0" and "category1" neither is meant by "category3": all are listed.
+  // "category3" is as near to "category0" as to "category1", and means neither: all are listed.
   if (best.count == 1) return "did you mean '" + std::string(best.name) + "'?";
   if (candidates.empty()) return {};
   std::string text = "known: ";

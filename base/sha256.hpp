@@ -27,7 +27,7 @@ class Sha256 {
   std::unique_ptr<evp_md_ctx_st, Free> context_;
 };
 
-/// Of one block.
+/// Digest of one block.
 [[nodiscard]] std::string sha256(std::span<const std::byte> bytes);
 [[nodiscard]] inline std::string sha256(std::string_view text) {
   return sha256(std::as_bytes(std::span(text)));

@@ -6,7 +6,7 @@
 namespace tandem {
 namespace {
 
-/// Of a tag: the equals signs outside of its quotes.
+/// Number of a tag's attributes: the equals signs outside of its quotes.
 std::size_t attributes_in(std::string_view tag) {
   std::size_t count = 0;
   char quote = '\0';

@@ -29,7 +29,7 @@ namespace tandem::canopen {
 /// @param parameter  14xx or 18xx; its mapping is 200h above
 [[nodiscard]] bool remappable(const DataSheet& sheet, std::uint16_t parameter);
 
-/// Of one axis.
+/// Modes and features that one axis of a drive has.
 struct DriveAbilities {
   bool machine = false;  ///< 6040 and 6041 can be in PDOs: it is a CiA 402 drive
   /// For positions kCsp, kIp or kPp; for velocities kCsv or kPv; for torques kCst; each kNone: not

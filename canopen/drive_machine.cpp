@@ -160,7 +160,7 @@ void DriveMachine::from_quick_stop(std::uint16_t word, const DriveInputs& inputs
   }
 }
 
-/// Of a stop that opens the bridge. A ramp that came to rest goes on with the shorted winding.
+/// Whether a stop that opens the bridge ended. A ramp at rest goes on with the shorted winding.
 bool DriveMachine::stop_ended(const DriveInputs& inputs) noexcept {
   if (!ramp_ended(inputs)) return false;
   if (motion_ != DriveMotion::kQuickStop || inputs.has_brake || !inputs.standstill) return true;

@@ -403,7 +403,7 @@ class JointTrajectory : public Controller {
   double link_damping_Nms_rad_ = 0.0;
   bool joints_known_ = false;  // else their number says nothing of the way-points
   bool incomplete_ = false;    // some way-point is
-  // Of all way-points; what is between them follows from these.
+  // Mistakes at way-points; those between them follow from these.
   Mistake wrong_number_, beyond_;
   std::vector<std::size_t> joints_;
   std::vector<hal::Joint> limits_;                // of these

@@ -20,7 +20,7 @@ class LoadedController {
   [[nodiscard]] Controller* operator->() const noexcept { return controller_.get(); }
   [[nodiscard]] const ControllerPlugin& plugin() const noexcept { return *plugin_; }
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
-  /// Of its file as it was opened; empty: it could not be read.
+  /// Digest of its file as it was opened; empty: it could not be read.
   [[nodiscard]] const std::string& sha256() const noexcept { return sha256_; }
 
  private:

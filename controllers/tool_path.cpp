@@ -189,7 +189,7 @@ class ToolPath : public Controller {
     first_m_ = site_m();
   }
 
-  /// Of the references, in the base's frame.
+  /// Place of the site at the references, in the base's frame.
   Eigen::Vector3d site_m() noexcept TANDEM_RT {
     map_.positions_to_q(reference_, q_);
     sines_.take(q_.data());

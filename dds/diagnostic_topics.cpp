@@ -30,7 +30,7 @@ std::vector<double> temperature_limits(const hal::RobotConfig& robot) {
   return limits;
 }
 
-/// Of the newest fault of `name` that is latched; empty: there is none.
+/// Text of the newest fault of `name` that is latched; empty: there is none.
 std::string latched_text(const std::vector<FaultEntry>& faults, const std::string& name) {
   for (auto fault = faults.rbegin(); fault != faults.rend(); ++fault) {
     if (fault->latched && fault->joint == name) return fault->text;

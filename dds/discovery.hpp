@@ -17,7 +17,7 @@ struct TopicInfo {
   std::string type;   ///< DDS name: "sensor_msgs::msg::dds_::JointState_"
   std::size_t writers = 0;
   std::size_t readers = 0;
-  /// Of the writers, or of the readers when there is none: what every one of them offers.
+  /// Least QoS of the writers, or of the readers when there is no writer: what each of them has.
   Qos qos;
 
   /// "/joint_states"; empty when it is no topic of ROS 2 (a service's, or the graph's).

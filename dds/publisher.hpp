@@ -48,12 +48,12 @@ class Publisher final : public hal::CycleObserver {
 
  private:
   static constexpr std::size_t kTopics = kTopicRates.size();
-  /// Of every cycle.
+  /// Record of every cycle.
   struct Times {
     std::uint64_t number;  // of take()'s calls
     hal::CycleTimes times;
   };
-  /// Of a cycle that some topic is due in; then the images follow.
+  /// Record of a cycle that some topic is due in; then the images follow.
   struct Head {
     std::uint64_t number;
     hal::CycleTime time;

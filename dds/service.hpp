@@ -55,7 +55,7 @@ using ParticipantId = std::array<std::uint8_t, 12>;
 [[nodiscard]] ParticipantId id_of(const Participant& participant);
 /// "010f5a…": 24 hexadecimal digits.
 [[nodiscard]] std::string to_text(const ParticipantId& participant);
-/// Of these digits, between which dots may stand; what follows them is left out. Empty: of others.
+/// Reads these digits, between which dots may stand; leaves out what follows. Empty: no such id.
 [[nodiscard]] std::optional<ParticipantId> parse_participant(std::string_view text);
 /// Who wrote what this reader got by this handle; empty when the writer is gone.
 [[nodiscard]] std::optional<ParticipantId> participant_of(dds_entity_t reader,

@@ -28,7 +28,7 @@ class FalseAlarms {
   /// One cycle. @param external_torque_Nm  by joint
   void look(std::span<const double> external_torque_Nm);
 
-  /// Of whole blocks.
+  /// Cycles in whole blocks.
   [[nodiscard]] std::uint64_t cycles() const { return blocks_.size() * block_; }
   /// With all thresholds multiplied by `factor`.
   [[nodiscard]] std::uint64_t alarms(double factor) const;
@@ -51,7 +51,7 @@ class DetectionTimes {
   /// One cycle of the push; the first is number 1.
   void look(std::span<const double> external_torque_Nm);
 
-  /// Of all pushes, with one factor.
+  /// Detection of all pushes, with one factor.
   struct Summary {
     std::size_t pushes = 0, found = 0;
     double median = 0.0, worst = 0.0;  ///< [cycles]; infinite when that push was not found

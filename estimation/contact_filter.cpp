@@ -131,7 +131,7 @@ void ContactFilter::move_covariance() noexcept {
   for (std::size_t i = 0; i < feet_; ++i) uncouple(foot_at(i), dR[i]);
 }
 
-/// Of what walks, and of the accelerometer.
+/// Adds the variances of what walks (biases, feet) and of the accelerometer to P_.
 void ContactFilter::add_noise() noexcept {
   const double walk = std::sqrt(step_s_);
   const auto squared = [](double x) { return x * x; };

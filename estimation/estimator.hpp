@@ -66,7 +66,7 @@ class Estimator {
   void observe(const hal::StateImage& state) noexcept;
   void explain() noexcept;
 
-  /// Of the joints' positions: the base's estimate has them.
+  /// Sines of the joints' positions: from the base's estimate when there is one.
   [[nodiscard]] const double* sines() const noexcept {
     return base_ ? base_->sines() : sines_.data();
   }

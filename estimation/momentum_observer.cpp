@@ -7,7 +7,7 @@
 namespace tandem::estimation {
 namespace {
 
-/// Of a pole: its frequency over that at which two of them let 1 / sqrt(2) through.
+/// Frequency of a pole over that at which two of them let 1 / sqrt(2) through.
 const double kPole = 1.0 / std::sqrt(std::numbers::sqrt2 - 1.0);
 
 }  // namespace

@@ -24,7 +24,7 @@ inline constexpr std::uint16_t kPositionMargin = 0x2037;  // f32 [rad]
 inline constexpr std::uint16_t kMismatch = 0x2038;        // f32: MismatchSub
 inline constexpr std::uint16_t kTelemetry = 0x2040;       // f32: TelemetrySub
 inline constexpr std::uint16_t kRefusedValues = 0x2041;   // u32: values by PDO not taken
-/// Of the board, not of an axis.
+/// Object of the board, not of an axis.
 inline constexpr std::uint16_t kIgnoredFrames = 0x2050;  // u32: no frame of CAN or CAN FD
 }  // namespace object
 

@@ -41,7 +41,7 @@ class HomingSearch {
   /// kFailed: there is no such switch or index pulse between the limit switches.
   [[nodiscard]] Result step(const HomingSenses& seen) noexcept TANDEM_RT;
 
-  /// Of the motion until the next step: +1 or -1; with 6099:2 or with 6099:1.
+  /// Motion until the next step: direction +1 or -1; slow() with 6099:2, else with 6099:1.
   [[nodiscard]] int direction() const noexcept { return direction_; }
   [[nodiscard]] bool slow() const noexcept { return step_ == Step::kEdge || step_ == Step::kIndex; }
   /// The step() before began another leg, from rest.

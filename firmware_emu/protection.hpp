@@ -48,7 +48,7 @@ struct ProtectionInputs {
   double link_velocity_rad_s = 0.0;
   double motor_velocity_rad_s = 0.0;
   double torque_Nm = 0.0;  ///< measured, of the link
-  // Of loops that follow a motion; see SwingWatch.
+  // Inputs from loops that follow a motion; see SwingWatch.
   double deviation_rad_s = 0.0;
   double asked_torque_Nm = 0.0;
   bool follows_motion = false;    ///< the last two mean something

@@ -36,8 +36,8 @@ struct Bound {
   Start start;
 };
 
-// Of the device profile. Scales, limits and protections are the robot.toml's: what the sheet has of
-// those is a plain value.
+// Objects of the device profile. Scales, limits and protections are the robot.toml's: what the
+// sheet has of those is a plain value.
 constexpr std::array kOfAxis{
     Bound{co::kAbortConnectionOption, Start::kSheets},
     Bound{co::kErrorCode, Start::kBoards},

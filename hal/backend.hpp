@@ -120,7 +120,7 @@ class Backend {
   /// By how much the next cycle should begin later [ns], so that the loop keeps its place in the
   /// time of a wire that has a clock. On the wall clock only.
   [[nodiscard]] virtual std::int64_t clock_shift_ns() const noexcept TANDEM_RT { return 0; }
-  /// Of a link to a robot far away. A robot without one is heard in each cycle: kNone.
+  /// Loss on the link to a robot far away. A robot without one is heard in each cycle: kNone.
   [[nodiscard]] virtual LinkLoss link_loss() const noexcept TANDEM_RT { return LinkLoss::kNone; }
   /// The next fault that was injected and has begun since, for the log; kNone: no more. A robot
   /// that is not in this process reports nothing.

@@ -22,7 +22,7 @@ double acceleration_of(const JointCapabilities& limit) noexcept TANDEM_RT {
   return std::min(limit.max_acceleration_rad_s2, limit.max_velocity_rad_s / kFullScale_s);
 }
 
-/// Of a joint whose position loop closes; 0: it rests.
+/// Speed of a joint whose position loop closes; 0: it rests.
 double speed_of(const StateImage& state, std::size_t joint,
                 const JointCapabilities& limit) noexcept TANDEM_RT {
   const double most = limit.max_velocity_rad_s;

@@ -49,7 +49,7 @@ struct LimitCounters {
 ///   since goes on toward what was wanted.
 class CommandLimits {
  public:
-  /// Of its maximum velocity: the speed of a joint that is led back into its range.
+  /// Speed of a joint that is led back into its range, as a share of its maximum velocity.
   static constexpr double kRecoveryShare = 0.05;
 
   CommandLimits(const Robot& robot, std::int64_t period_ns);

@@ -26,7 +26,7 @@ class Devices {
   /// @param gains  of the drives' loops, as they are asked for: ControllerSetup::gains. Outlives
   ///               this.
   Devices(const Robot& robot, ParameterImage& gains, std::int64_t period_ns);
-  /// Of images that stay, and outlive this. Gives every compliant joint its default impedance.
+  /// Takes images that stay, and outlive this. Gives every compliant joint its default impedance.
   Devices(const Robot& robot, const StateImage& state, CommandImage& command, ParameterImage& gains,
           std::int64_t period_ns);
   Devices(const Devices&) = delete;

@@ -33,7 +33,7 @@ class EstimateImage : public Image {
   [[nodiscard]] bool has_base() const noexcept {
     return base_valid_.count != 0 && base_valid()[0] != 0;
   }
-  /// Of which the base is a part, started or not.
+  /// Whether the base is a part of the estimate, started or not.
   [[nodiscard]] bool estimates_base() const noexcept { return base_valid_.count != 0; }
   [[nodiscard]] std::size_t feet() const noexcept { return contact_probability_.count; }
   [[nodiscard]] std::size_t joints() const noexcept { return external_torque_Nm_.count; }

@@ -29,7 +29,7 @@ enum class Capability : std::uint8_t {
 /// a program.
 inline constexpr double kFullScale_s = 0.01;
 
-/// Of its largest velocity: a joint that is measured to move slower than that rests.
+/// Share of a joint's largest velocity: one that is measured to move slower than that rests.
 inline constexpr double kRestShare = 0.01;
 
 /// A joint's limits, link side, and its capabilities. Torque and
@@ -41,27 +41,27 @@ struct JointCapabilities {
   double max_acceleration_rad_s2 = std::numeric_limits<double>::infinity();  ///< of references
   double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();
   double max_torque_Nm = 0.0;
-  /// Of the torque reference, as declared; else its limit in kFullScale_s.
+  /// Rate of the torque reference, as declared; else its limit in kFullScale_s.
   double max_torque_rate_Nm_s = 0.0;
   double max_voltage_V = 0.0;
   double max_current_A = 0.0;  ///< the actuator's, or what gives max_torque_Nm where that is less
-  /// Of the references: their limit in kFullScale_s, and no faster than max_torque_rate_Nm_s gives.
+  /// Rates of references: their limit in kFullScale_s; no faster than max_torque_rate_Nm_s gives.
   double max_voltage_rate_V_s = std::numeric_limits<double>::infinity();
   double max_current_rate_A_s = std::numeric_limits<double>::infinity();
-  /// Of the virtual spring: the position loop's kp (softer than stiff control), or the
+  /// Limit of the virtual spring: the position loop's kp (softer than stiff control), or the
   /// configured default where that is larger.
   double max_stiffness_Nm_rad = 0.0;
-  /// Of the virtual damper: critical for the motor's inertia at max_stiffness, or the position
-  /// loop's kd or the configured default where they are larger.
+  /// Limit of the virtual damper: critical for the motor's inertia at max_stiffness, or the
+  /// position loop's kd or the configured default where they are larger.
   double max_damping_Nms_rad = 0.0;
   double stiffness_Nm_rad = 0.0;  ///< the gains table's default, when compliant
   double damping_Nms_rad = 0.0;
   std::uint8_t bits = 0;
   bool slides = false;  ///< prismatic: in every name read m for rad and N for Nm
-  /// Of each loop, by PidLoop: no gain can be more, in robot.toml or while it runs. Of an input at
-  /// its full range (1 rad, 1 rad/s, the torque limit, the current limit) a loop's kp asks for
-  /// 10^4, 100, 100 and 100 times the full output (torque limit or voltage limit): what is beyond
-  /// is a slip of digits or units. 0: no such loop.
+  /// Largest gains of each loop, by PidLoop, in robot.toml and while it runs. Of an input at its
+  /// full range (1 rad, 1 rad/s, the torque limit, the current limit) a loop's kp asks for 10^4,
+  /// 100, 100 and 100 times the full output (torque limit or voltage limit): what is beyond is a
+  /// slip of digits or units. 0: no such loop.
   std::array<PidGains, kPidLoops> most_gains{};
 
   [[nodiscard]] bool can(Capability capability) const noexcept TANDEM_RT {

@@ -45,7 +45,7 @@ class Encoders {
   [[nodiscard]] double acceleration_rad_s2(std::size_t j) const noexcept TANDEM_RT;
   /// Nominal time at which the sample was taken; -1 without such a joint.
   [[nodiscard]] std::int64_t timestamp_ns(std::size_t j) const noexcept TANDEM_RT;
-  /// Of the motor, reflected to the link.
+  /// Motion of the motor, reflected to the link.
   [[nodiscard]] double motor_position_rad(std::size_t j) const noexcept TANDEM_RT;
   [[nodiscard]] double motor_velocity_rad_s(std::size_t j) const noexcept TANDEM_RT;
 

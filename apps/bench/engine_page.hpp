@@ -27,7 +27,7 @@ class EnginePage {
   /// The page; its figures are in `folder`, relative to it.
   [[nodiscard]] std::string text(const std::string& folder) const;
   [[nodiscard]] const std::vector<report::Figure>& figures() const { return figures_; }
-  /// Of --json: one object for each scene, engine and step.
+  /// Results for --json: one object for each scene, engine and step.
   [[nodiscard]] const Json& json() const { return json_; }
   /// A line for each scene so far: who is the cheapest, what the others cost, and who is the most
   /// accurate.

@@ -30,7 +30,7 @@ struct ControlSearch {
 /// process' own control_folder().
 [[nodiscard]] Result<std::vector<std::string>> find_control_sockets(const std::string& kind);
 
-/// Of a socket of running_control_sockets(): the command line and the number of its process,
+/// Process behind a socket of running_control_sockets(): its command line and its number,
 /// "tandem run squat.toml (process 17566)"; `path` when it does not name the process.
 [[nodiscard]] std::string process_of(const std::string& path);
 

@@ -85,7 +85,7 @@ bool stopped_since(const Json& before, const Json& now) {
   return stops(now) > stops(before);
 }
 
-/// Of a joint whose faults only warn: the others are enabled.
+/// Error when a fault stays latched at a joint whose faults only warn: the others are enabled.
 Error still_there(const Json& answer) {
   return {.message = fmt::format("a cause is still there ({}): what it struck is not enabled, "
                                  "every other joint is",

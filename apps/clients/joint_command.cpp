@@ -24,7 +24,7 @@ namespace {
 
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
-// Of a joint whose reference has arrived: what is measured is this far off, and is reported.
+// Tolerance once a joint's reference has arrived: what is measured farther off is reported.
 constexpr double kFar_rad = 1.0 / kDegPerRad;
 constexpr double kFar_m = 0.01;
 

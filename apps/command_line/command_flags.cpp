@@ -164,7 +164,7 @@ CLI::Validator a_duration() {
   return {check, "above 0, to 1e6"};
 }
 
-/// Of the whole of `text`; CLI11's own cast lets a number overflow.
+/// Number that the whole of `text` is; CLI11's own cast lets a number overflow.
 std::optional<std::int64_t> whole_number(const std::string& text) {
   std::int64_t number = 0;
   const char* end = text.data() + text.size();

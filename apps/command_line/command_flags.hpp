@@ -16,12 +16,12 @@ inline constexpr char kSocketHelp[] =
 
 inline constexpr char kNameAFile[] = "name a file, or leave it out";
 
-/// Of an option whose text may not be empty.
+/// Check that an option's text is not empty.
 /// @param hint  what to give, or to leave out
 [[nodiscard]] CLI::Validator is_given(const std::string& hint);
-/// Of an option that is an experiment's `seed`.
+/// Check that an option can be an experiment's `seed`.
 [[nodiscard]] CLI::Validator is_seed();
-/// Of an option that is a whole number above 0.
+/// Check that an option is a whole number above 0.
 [[nodiscard]] CLI::Validator is_count();
 
 /// The flags that say which running process is asked, and by which way.

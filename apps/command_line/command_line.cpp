@@ -109,7 +109,7 @@ Exit report_usage_error(const CLI::App& app, const CLI::ParseError& error) {
                                                      : unknown_word(command, unknown.front()));
 }
 
-/// Of `tandem help joint move`, which is `tandem joint move --help`, and of this itself.
+/// Checks the words of `tandem joint move --help`, and so of `tandem help joint move`.
 /// @return the status, when one of the words should be a command, and is none
 std::optional<Exit> check_commands(const CLI::App& app, const std::vector<std::string>& words) {
   const CLI::App* command = &app;

@@ -24,8 +24,8 @@ enum class Exit : int {
   kFault = 1,  ///< the run ended in a fault; the logs that were compared differ
   kUsage = 2,  ///< wrong input or usage; nothing was run
 };
-/// Of a command that ended in order before its time, because of this signal: as of one that the
-/// signal killed, by a shell's count.
+/// Status of a command that ended in order before its time, because of this signal: as of one that
+/// the signal killed, by a shell's count.
 [[nodiscard]] constexpr Exit interrupted(int signal) { return static_cast<Exit>(128 + signal); }
 
 /// Keys in the order in which they are written.

@@ -153,7 +153,7 @@ std::unexpected<Error> problem_of(std::string what, const std::error_code& probl
                                {}});
 }
 
-/// Of a path that is not there: itself, or the first of the folders above it that are missing.
+/// First of the missing folders above a path that is not there, or the path when none is missing.
 fs::path first_missing(fs::path path) {
   std::error_code problem;
   while (path.has_relative_path() && !fs::exists(path.parent_path(), problem))

@@ -24,14 +24,14 @@ class Draft {
     kSameName,
     kAnyNumber,  ///< of names, too, that have other digits at their end: run-001 beside run-002
   };
-  /// Of the folder `final` and the parents that it lacks; of what is to be added to a folder that
-  /// is there. Errors: it is a file; the folder cannot be made.
+  /// Draft of the folder `final` and the parents that it lacks; of what is to be added to a folder
+  /// that is there. Errors: it is a file; the folder cannot be made.
   /// @param interrupted  what is said when a signal ends the process; empty: that nothing was
   ///                     written to `final`
   [[nodiscard]] static Result<Draft> folder(const std::string& final,
                                             Removes removes = Removes::kSameName,
                                             const std::string& interrupted = {});
-  /// Of the file `final`, with the same ending, and of the folders that it lacks. Nothing is
+  /// Draft of the file `final`, with the same ending, and of the folders that it lacks. Nothing is
   /// written yet, so it has no errors: who writes to path() meets them. What is no regular file, or
   /// in a folder that nothing may be added to, is its own draft.
   [[nodiscard]] static Draft file(const std::string& final);

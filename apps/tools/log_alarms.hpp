@@ -19,7 +19,7 @@ struct NamedTorques {
   ExternalTorques torques;
 };
 
-/// Of runs that the thresholds were not learned from.
+/// Alarms and detection times in runs that the thresholds were not learned from.
 struct AlarmTable {
   std::vector<double> factors;        ///< on the thresholds, rising to 1.25
   double free_s = 0.0;                ///< before each run's first push, in whole blocks of 0.2 s

@@ -208,7 +208,7 @@ void print_comparison(const log::Comparison& comparison, std::FILE* out) {
   fmt::print(out, "{}\n", comparison.equal() ? "the same, bit for bit" : "they differ");
 }
 
-/// Of logs that have other joints: their messages have other lengths, and no number in common.
+/// Says that two logs have other joints: then their messages have no length or number in common.
 void print_robots(const log::RunInfo& a, const log::RunInfo& b, std::FILE* out) {
   if (a.joints == b.joints) return;
   fmt::print(out, "these are logs of different robots: {} with {}, {} with {}\n", shown(a.robot),

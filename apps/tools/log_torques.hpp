@@ -17,7 +17,7 @@ struct ExternalTorques {
   std::vector<double> push_s;
   /// Rows before the first push: motion that touched nothing.
   [[nodiscard]] std::size_t free_rows() const;
-  /// Of all joints. @param row  of time_s
+  /// Torques of all channels. @param row  of time_s
   [[nodiscard]] std::vector<double> at(std::size_t row) const;
 };
 

@@ -51,7 +51,7 @@ Json kernel_json(const tandem_kernel_count& count, std::uint64_t text_bytes) {
           {"text_bytes", text_bytes}};
 }
 
-/// Of a kernel with all that it calls, as its operations are counted.
+/// Code size of a kernel with all that it calls, as its operations are counted.
 std::uint64_t text_bytes_of(const std::string& kernel,
                             const std::map<std::string, std::uint64_t>& bytes) {
   std::vector<std::string> parts{kernel};

@@ -17,7 +17,7 @@ struct SheetMode {
   std::string name;                ///< "cyclic synchronous position"
   std::vector<std::string> needs;  ///< objects: "607A", "60C1:1"
   std::vector<std::string> also;   ///< objects that help in this mode, and that the drive has
-  /// Of `needs`: "607A", or "607A in an RPDO" where a cyclic mode cannot get it.
+  /// Objects of `needs` it lacks: "607A", or "607A in an RPDO" where a cyclic mode cannot get it.
   std::vector<std::string> lacks;
 };
 

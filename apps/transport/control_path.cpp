@@ -18,7 +18,7 @@
 namespace tandem::apps {
 namespace {
 
-/// Of the user, in a place that every process of theirs has.
+/// Folder of the user, in a place that every process of theirs has.
 std::string temporary_folder() { return fmt::format("/tmp/tandem-{}", ::geteuid()); }
 
 /// Null: it is not set.

@@ -19,7 +19,7 @@ namespace tandem::hal {
 /// @pre  the joint's limits are known
 [[nodiscard]] JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& joint);
 
-/// Of every joint, in the image's order.
+/// Capabilities of every joint, in the image's order.
 [[nodiscard]] std::vector<JointCapabilities> joint_capabilities(const RobotConfig& robot);
 
 /// What a joint's drive tells besides the joint's position; its velocity then follows from that.
@@ -30,7 +30,7 @@ struct MotorFeedback {
   bool voltage = true;
   bool temperature = true;
 };
-/// Of every joint, as the data sheets of the drives say.
+/// Feedback of every joint, as the data sheets of the drives say.
 [[nodiscard]] std::vector<MotorFeedback> motor_feedback(const RobotConfig& robot);
 
 /// Whether a joint can be put into a mode; asked for every claim at configuration.

@@ -164,7 +164,7 @@ struct JointConfig {
   double max_position_rad = 0.0;  ///< them to the URDF, until complete_from_description()
   double max_velocity_rad_s = 0.0;
   double max_torque_Nm = 0.0;  ///< the torque reference's limit
-  /// Of references. Without the key: the largest velocity in kFullSpeed_s.
+  /// Limit of references. Without the key: the largest velocity in kFullSpeed_s.
   double max_acceleration_rad_s2 = std::numeric_limits<double>::infinity();
   double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();  ///< the same; not limited
   double rated_torque_Nm = 0.0;  ///< CiA 402 6076: torques travel as per mille of it;

@@ -46,7 +46,7 @@ inline std::string hex(std::uint32_t value) {
   return text.data();
 }
 
-/// Of a node.
+/// Heartbeat time of a node [ms].
 inline int read_heartbeat(TomlTable& table) {
   return static_cast<int>(table.integer_or("heartbeat_ms", 50, 1, 20'000));
 }

@@ -44,7 +44,7 @@ struct AxisScale {
   /// the middle of the joint's range.
   /// @param count  the drive's, when it is heard for the first time
   void find_turn(std::int32_t count) noexcept TANDEM_RT;
-  /// Of a joint on one of our own boards, whose 608F, 2033 and 6076 are whole numbers.
+  /// Scale of a joint on one of our own boards, whose 608F, 2033 and 6076 are whole numbers.
   [[nodiscard]] static AxisScale of(const JointConfig& joint);
   /// The same; on a drive of another make the joint's numbers as they are: a ratio of its sheet
   /// need not be whole.

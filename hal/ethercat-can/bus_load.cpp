@@ -24,7 +24,7 @@ using Kind = BusLoadRow::Kind;
 using Nodes = std::vector<const NodePlan*>;
 
 constexpr std::int64_t kEthernetRate = 100'000'000;
-/// Of an Ethernet frame: preamble, addresses, type, header, a datagram's 12, check sum, gap.
+/// Bytes beside a frame's data: preamble, addresses, type, header, a datagram's 12, check sum, gap.
 constexpr double kFrameOverhead = 8 + 14 + 2 + 12 + 4 + 12;
 constexpr double kDataPerFrame = 1400.0;  ///< of process data
 constexpr double kLeastData = 32.0;       ///< the shortest frame has 64 bytes

@@ -149,8 +149,8 @@ class DriveMaster {
   [[nodiscard]] std::vector<std::string> wire_texts() const;
   /// A measurement, no state: not in a snapshot.
   [[nodiscard]] const StartUp& start_up() const noexcept;
-  /// Of every board, in the configuration's order. A measurement, no state: not in a snapshot.
-  /// Not RT.
+  /// Round trips of every board, in the configuration's order. A measurement, no state: not in a
+  /// snapshot. Not RT.
   [[nodiscard]] std::vector<RoundTrip> round_trips() const;
 
   void archive(Archive& ar);

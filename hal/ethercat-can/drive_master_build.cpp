@@ -11,7 +11,7 @@ namespace {
 
 /// A sensor has no time-out of its own in the configuration.
 constexpr int kSensorTimeoutCycles = 10;
-/// Of each joint, by what its board's PDOs carry.
+/// Traits of each joint, by what its board's PDOs carry.
 std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& layout) {
   std::vector<AxisTraits> traits(robot.joints.size());
   for (const NodePlan& node : layout.nodes) {

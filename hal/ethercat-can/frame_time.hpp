@@ -12,7 +12,7 @@ namespace tandem::hal::can {
 
 inline constexpr std::int64_t kSecondNs = 1'000'000'000;
 
-/// Of one bus [bit/s].
+/// Bit rates of one bus [bit/s].
 struct BitRates {
   std::int64_t nominal = 1'000'000;  ///< arbitration; the whole of a classic frame
   std::int64_t data = 8'000'000;     ///< from ESI to the CRC of a frame with bit-rate switch

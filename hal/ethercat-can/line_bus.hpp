@@ -62,7 +62,7 @@ class LineBus final : public Bus {
   [[nodiscard]] bool gives_up(int node) const noexcept TANDEM_RT override;
   [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override;
   [[nodiscard]] std::string status_text() const override;
-  /// Of clocks and cycles.
+  /// Lost cycles, frames sent again, and how closely the clocks follow.
   [[nodiscard]] std::string measured_text() const override;
 
   /// Between two cycles, when every frame was taken.

@@ -37,7 +37,7 @@ std::string odd_length(const canopen::DataSheet& sheet, std::uint32_t entry) {
   return "has " + std::to_string(own) + " bits, and is there with " + std::to_string(bits);
 }
 
-/// Of an output that is no field of the master, and may not rest at 0.
+/// Reason to refuse an output that is no field of the master, and may not rest at 0.
 std::string why_unknown(const canopen::DataSheet& sheet, std::uint32_t entry) {
   const std::string length = odd_length(sheet, entry);
   if (!length.empty()) return length;

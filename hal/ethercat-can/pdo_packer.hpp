@@ -15,7 +15,7 @@
 
 namespace tandem::hal::can {
 
-/// Of a PDO: 64 on CAN FD, 8 on classic CAN.
+/// Bytes of the largest PDO: 64 on CAN FD, 8 on classic CAN.
 [[nodiscard]] std::size_t most_bytes(bool fd);
 
 /// Appends blocks to a node's PDOs: one block stays whole.

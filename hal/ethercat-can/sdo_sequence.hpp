@@ -58,7 +58,7 @@ template <class T>
 
 /// The node's identity, PDO mapping, axes and heartbeats, in the order in which they are sent; of
 /// all that a board's sheet lacks there is no step.
-/// Of a board that keeps its configuration, 1020 is left 0 until name_configuration().
+/// Object 1020 of a board that keeps its configuration is left 0 until name_configuration().
 /// A board's SYNC time-out (2052) and interpolation period (60C2) are left 0: the period is known
 /// when the first cycle begins.
 [[nodiscard]] std::vector<SdoStep> make_configuration(const RobotConfig& robot,

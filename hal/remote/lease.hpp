@@ -35,7 +35,7 @@ class Lease {
   [[nodiscard]] std::int64_t heard_ns() const noexcept TANDEM_RT {
     return heard_ns_.load(std::memory_order_relaxed);
   }
-  /// Of the owner, or of the last one.
+  /// Name of the owner, or of the last one.
   [[nodiscard]] std::string name() const;
   /// Leases given so far.
   [[nodiscard]] std::uint64_t given() const noexcept {

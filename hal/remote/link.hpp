@@ -51,7 +51,7 @@ struct Identity {
 struct RobotEnd {
   /// From a command's number to the state that shows it; 0: each command is followed at once.
   std::uint64_t playout_cycles = 0;
-  /// Of controllers beside the owner's, with their parameters: "NAME" and "NAME.KEY", sorted.
+  /// Controllers beside the owner's, with their parameters: "NAME" and "NAME.KEY", sorted.
   std::map<std::string, std::string> controllers = {};
 
   bool operator==(const RobotEnd&) const = default;

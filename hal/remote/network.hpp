@@ -16,7 +16,7 @@
 
 namespace tandem::remote {
 
-/// Of the delay about its mean (iproute2's netem/*.c).
+/// Distribution of the delay about its mean (iproute2's netem/*.c).
 enum class DelayDistribution : std::uint8_t {
   kUniform,       ///< mean +- jitter
   kNormal,        ///< standard deviation: jitter

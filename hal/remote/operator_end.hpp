@@ -29,7 +29,7 @@ struct TeleConfig {
   std::int64_t playout_ns = 0;  ///< a command takes effect so long after it was given
   std::int64_t correction_ns = 500'000'000;  ///< time constant of the prediction's correction
   std::int64_t brake_ns = 250'000'000;       ///< in which the robot stops when commands end
-  /// Of a robot that shows no newer command in force: the link is lost. It is reported.
+  /// Time without a state that shows a newer command in force: the link is lost. It is reported.
   std::int64_t unanswered_ns = 1'000'000'000;
   std::vector<Outage> outages;
 

@@ -214,7 +214,7 @@ void Actuators::advance_brakes(std::int64_t step_ns,
   }
 }
 
-/// Of the joint's brake and its friction.
+/// Torque of the joint's brake and its friction.
 double Actuators::dry_torque(std::size_t joint, double position_rad,
                              double velocity_rad_s) const noexcept {
   double torque_Nm = 0.0;

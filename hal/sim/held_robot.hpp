@@ -43,7 +43,7 @@ struct HeldRobot {
   hal::CommandImage command;
   hal::ParameterImage parameters;
   hal::CycleTime time;
-  // Of COMAN's legs, as config/coman/hold.toml has it.
+  // Damping of COMAN's legs, as config/coman/hold.toml has it.
   std::size_t damped_joints = 12;  ///< the first
   double link_damping_Nms_rad = 12.0;
 };

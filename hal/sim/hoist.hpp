@@ -26,7 +26,7 @@ class Hoist {
   void advance(std::int64_t step_ns) noexcept TANDEM_RT;
 
   [[nodiscard]] bool holding() const noexcept { return share_ > 0.0; }
-  /// Of the whole hoist that still acts, 1 to 0.
+  /// Share of the whole hoist that still acts, 1 to 0.
   [[nodiscard]] double share() const noexcept { return share_; }
 
   /// Adds the hoist's force and moment on the base, in the base's frame, to `wrench` (6).

@@ -17,9 +17,9 @@ struct LinkPoints {
   std::vector<Eigen::Vector3d> in_body_m{};  ///< in the frame of the link's body
 };
 
-/// Of a box its corners, of a cylinder four points of each rim, of a capsule its two ends and
-/// three points of each rim, of a sphere six. A link with mass and no such shape gets the corners
-/// of the homogeneous box with its mass and inertia, shrunk to 200 kg/m^3 where it is larger.
+/// Corners of a box, four points of each rim of a cylinder, the two ends of a capsule and three of
+/// each rim, six of a sphere. A link with mass and no such shape gets the corners of the
+/// homogeneous box with its mass and inertia, shrunk to 200 kg/m^3 where it is larger.
 ///
 /// Left out: what stands still, soles' links, and above each of them the ankle: links that are
 /// nearer to the one below than a fifth of the leg's length.

@@ -138,7 +138,7 @@ void read_frames(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) 
   }
 }
 
-/// Of an EtherCAT bus the cable that leads to a board can be cut; else that to the first slave.
+/// Reads the bus, and on EtherCAT the board whose cable is cut; without it, the first slave's is.
 void read_cable(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
   fault.bus = index_of(table, "bus", robot.buses);
   if (fault.bus < 0 || !table.has("board")) return;

@@ -17,7 +17,7 @@ struct SurveyedSlave {
   ethercat::sii::Identity identity;  ///< serial number left out
   bool settings_right = true;        ///< its SII's check sum is that of its settings
   bool has_clock = false;
-  // Of a clock that follows the reference, over the measured cycles:
+  // Measurements of a clock that follows the reference, over the measured cycles:
   std::uint64_t samples = 0;
   std::uint32_t delay_ns = 0;      ///< of a frame from the reference, one way
   std::int64_t difference_ns = 0;  ///< the largest, without its sign

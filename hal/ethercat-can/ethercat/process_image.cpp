@@ -7,7 +7,7 @@ namespace tandem::hal::ecat {
 
 namespace {
 
-// Of a frame, so that the datagrams of state and clock fit beside it.
+// Bytes of a frame that a group may fill, so that the datagrams of state and clock fit beside it.
 constexpr std::size_t kMostOfGroup = 1400;
 
 }  // namespace
