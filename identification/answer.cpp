@@ -160,8 +160,8 @@ class Answer {
     }
   }
 
-  /// Of the ten columns from `at`: a moment of inertia about the centre of mass shows by itself
-  /// when the mass, the first moments and the second ones do.
+  /// Says how the ten columns from `at` are seen: a moment of inertia about the centre of mass
+  /// shows by itself when the mass, the first moments and the second ones do.
   void describe_sight(Index at, LinkResult& link) const {
     const auto seen = [&](Index from, Index to) {
       bool any = false, alone = true;

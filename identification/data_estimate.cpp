@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kFaint = 1e-2;  // weight of the description where the data decide alone
-// Of a channel's mean square: errors of the model and of timing, which no length of a log averages.
+// Share of a channel's mean square: errors of model and timing, which no length of a log averages.
 constexpr double kModelError = 3e-6;
 constexpr double kLeast = 0.1;  // of a residual's mean square: its long-run variance
 constexpr int kReweightings = 4;

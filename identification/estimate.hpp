@@ -20,8 +20,8 @@ struct Prior {
 };
 [[nodiscard]] Prior make_prior(const IdentifiedRobot& robot);
 
-/// Of Prior::metric, as an inverse covariance: half a unit is the standard deviation. In 95 % of
-/// all cases a link's described mass is then off by no more than itself.
+/// Factor that makes Prior::metric an inverse covariance: half a unit is the standard deviation.
+/// In 95 % of all cases a link's described mass is then off by no more than itself.
 inline constexpr double kBelieved = 4.0;
 
 /// What the data say, and they alone: `mean` is the least-squares solution that is nearest to the

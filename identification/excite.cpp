@@ -331,7 +331,7 @@ class Search {
       gram.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
     }
     gram = MatrixXd(gram.selfadjointView<Eigen::Lower>());
-    // Of what moves: a joint that stands still has no friction to find.
+    // Columns of what moves: a joint that stands still has no friction to find.
     std::vector<Index> moving;
     for (Index i = 0; i < count; ++i)
       if (gram(i, i) > 1e-12) moving.push_back(i);

@@ -32,7 +32,7 @@ class LowPass {
     return sum(2, signal, at);
   }
 
-  /// Of value(), rate() and second_rate(): its variance when the signal is white noise of
+  /// Variance of value(), rate() or second_rate(), by `order`, when the signal is white noise of
   /// variance 1.
   [[nodiscard]] double noise(int order) const;
 

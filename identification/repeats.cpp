@@ -6,10 +6,10 @@
 namespace tandem::identification {
 namespace {
 
-// Of the variance that unrelated positions differ by.
+// Thresholds of difference(): up to kSame positions are the same, from kOther on they are others.
 constexpr double kSame = 0.01, kOther = 0.3;
 
-// Of these the median is known well enough, whatever the log's length.
+// Instants from which the median is known well enough, whatever the log's length.
 constexpr std::size_t kInstants = 2000;
 
 /// Positions every `stride` samples, each joint with mean 0 and variance 1: those that move.
@@ -33,8 +33,8 @@ std::vector<Signal> standardised(const std::vector<Signal>& position, std::size_
   return out;
 }
 
-/// Of positions `lag` apart: their squared difference, about 1 for unrelated ones. The median over
-/// time, so that a rest before or after does not count.
+/// Squared difference of positions `lag` apart, about 1 for unrelated ones. The median over time,
+/// so that a rest before or after does not count.
 double difference(const std::vector<Signal>& position, std::size_t lag) {
   std::vector<double> squares;
   const std::size_t n = position.front().size(), hop = 1 + (n - lag) / kInstants;
@@ -50,7 +50,7 @@ double difference(const std::vector<Signal>& position, std::size_t lag) {
   return *middle;
 }
 
-/// Of a cyclic or a straight sequence: long-run sum of squares by Bartlett's window.
+/// Long-run sum of squares of a cyclic or a straight sequence, by Bartlett's window.
 double long_run_sum(const Eigen::VectorXd& values, int lags, bool cyclic) {
   const Eigen::Index n = values.size();
   double sum = values.squaredNorm();

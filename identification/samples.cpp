@@ -26,11 +26,11 @@ std::unexpected<Error> cannot(const hal::RobotConfig& robot, std::string message
 
 /// Channels of an IMU: quaternion, angular velocity, specific force.
 constexpr std::size_t kGyro = 4, kAccelerometer = 7;
-/// Of the robot's weight: a force on the base that is larger has another cause than a wrong mass.
+/// Share of the robot's weight: a larger force on the base has another cause than a wrong mass.
 constexpr double kUnexplained = 0.3;
 /// Every so many instants it is computed what the IMU's noise does to the equations, six ways.
 constexpr std::size_t kNoiseEvery = 6;
-/// Of a control period: half of it a voltage may have been held, and when in it the torque was
+/// Share of unknown_hold_s: half of it a voltage may have been held, and when in it the torque was
 /// sampled is not known better than to another quarter.
 constexpr double kUnknownHold = 0.75;
 /// Standard deviations in half of a 95 % interval.

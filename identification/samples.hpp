@@ -65,7 +65,7 @@ struct ChannelRows {
 
   [[nodiscard]] Eigen::Index rows() const { return static_cast<Eigen::Index>(instant.size()); }
   void append(const Eigen::VectorXd& x, double value, double whole, std::size_t at);
-  /// Of the row that was appended last.
+  /// Sets the doubt of the row that was appended last.
   void doubt_last(double one_deviation);
 };
 

@@ -9,7 +9,7 @@
 
 namespace tandem::identification {
 
-/// Of each coordinate, whether its torques hold nothing of its described rotor, as those of a
+/// Whether each coordinate's torques hold nothing of its described rotor, as those of a
 /// sensor between gear and link do. The data say so where they know the rotor within a tenth of
 /// its description and find none; where they cannot say, it is as with the other joints, if these
 /// agree. No where the drive has a spring: then the rotor is behind it.

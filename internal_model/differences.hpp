@@ -18,7 +18,7 @@ struct Difference {
   void take(double difference) noexcept;
 };
 
-/// Of a joint, link side: [rad, rad/s, Nm], of a prismatic one [m, m/s, N].
+/// Differences of a joint, link side: [rad, rad/s, Nm], of a prismatic one [m, m/s, N].
 struct JointDifference {
   Difference position_rad, velocity_rad_s, torque_Nm;
 };
@@ -34,14 +34,14 @@ class Differences {
   /// Figures of a cycle in which both follow their command. @pre the same
   void take(const hal::StateImage& first, const hal::StateImage& second) noexcept;
 
-  /// Of the same cycle, where both bases are known. @param first, second  position [m], quaternion
+  /// Bases of the same cycle, where both are known. @param first, second  position [m], quaternion
   void take_base(std::span<const double, 7> first, std::span<const double, 7> second) noexcept;
 
   /// Cycles of compare().
   [[nodiscard]] std::uint64_t compared() const noexcept { return compared_; }
   /// Cycles of take().
   [[nodiscard]] std::uint64_t cycles() const noexcept { return cycles_; }
-  /// Of compare(): cycles in which the two images, every field of them, were not the same bytes.
+  /// Cycles of compare() in which the two images, every field of them, were not the same bytes.
   [[nodiscard]] std::uint64_t unequal() const noexcept { return unequal_; }
   /// The first of them; -1: there was none.
   [[nodiscard]] std::int64_t first_unequal() const noexcept { return first_unequal_; }

@@ -45,7 +45,7 @@ class DuplicatingBackend final : public hal::ForwardingBackend {
   bool home(std::size_t joint) noexcept TANDEM_RT override;
   void stop_homing(std::size_t joint) noexcept TANDEM_RT override;
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
-  /// Of two robots, one of which is on another thread: false.
+  /// Returns false: of the two robots one is on another thread.
   [[nodiscard]] bool archive(Archive&) override { return false; }
 
  private:

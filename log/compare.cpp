@@ -35,7 +35,7 @@ Difference difference_in(const hal::Layout& layout, const RunInfo& info, const M
               .b = element(field, b, i)};
     }
   }
-  // Of a type whose fields have no fixed place, such as sensor_msgs/JointState.
+  // Bytes of a type whose fields have no fixed place, such as sensor_msgs/JointState.
   const auto [in_a, in_b] = std::ranges::mismatch(a.body, b);
   return {.signal = "byte " + std::to_string(in_a - a.body.begin()),
           .a = static_cast<double>(*in_a),

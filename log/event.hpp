@@ -66,8 +66,8 @@ struct Event {
   hal::FaultTarget target = hal::FaultTarget::kNone;  ///< of an injected fault
   std::uint8_t reported = 0;                          ///< 1: a fault that stops nothing
   std::uint8_t padding = 0;
-  /// Of a motion: its target. Of a lost sensor, and of an injected fault's board, sensor or bus:
-  /// its index. In the log's text.
+  /// Target of a motion; index of a lost sensor, and of an injected fault's board, sensor or bus.
+  /// The log's text has it.
   float value = 0.0F;
 };
 static_assert(std::is_trivially_copyable_v<Event> && sizeof(Event) == 32);

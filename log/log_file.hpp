@@ -85,7 +85,7 @@ class LogFile {
   std::string data_sha256_;
 };
 
-/// Of a log whose data are another's to the last bit: it teaches nothing, and would make the rest
+/// Error for a log whose data are another's to the last bit: it teaches nothing, and would make the
 /// look better known than it is.
 [[nodiscard]] Error same_data(const std::string& path, const std::string& other);
 

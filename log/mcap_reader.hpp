@@ -56,7 +56,7 @@ class McapReader {
   [[nodiscard]] const std::string& profile() const { return profile_; }
   /// The end of the data is missing: the run was killed, or is still being written.
   [[nodiscard]] bool truncated() const { return truncated_; }
-  /// Of the whole file.
+  /// Size of the whole file.
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:

@@ -53,7 +53,7 @@ class McapWriter {
   [[nodiscard]] bool failed() const noexcept { return !error_.empty(); }
   /// "No space left on device", or empty.
   [[nodiscard]] const std::string& error() const noexcept { return error_; }
-  /// Of messages(), those that are not in the file: all of them when it was deleted.
+  /// Number of messages() that are not in the file: all of them when it was deleted.
   [[nodiscard]] std::uint64_t lost() const noexcept;
   [[nodiscard]] std::uint64_t bytes_written() const noexcept { return offset_; }
   [[nodiscard]] std::uint64_t messages() const noexcept { return statistics_.messages; }

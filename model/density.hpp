@@ -19,8 +19,8 @@ namespace tandem::model {
   return std::sqrt(std::max(0.0, solver.eigenvalues()[2]) / inertia.mass_kg);
 }
 
-/// Of the solid ball with this mass and largest radius of gyration [kg/m^3]: no more than the
-/// body's own. 0 without mass or without inertia.
+/// Density of the solid ball with this mass and largest radius of gyration [kg/m^3]: no more than
+/// the body's own. 0 without mass or without inertia.
 [[nodiscard]] inline double density_of_ball(const Inertia& inertia) {
   const double gyration_m = largest_gyration_m(inertia);
   if (!(gyration_m > 0.0)) return 0.0;

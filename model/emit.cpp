@@ -386,7 +386,7 @@ class Emitter {
     taken_.push_back(i);
     return slot_[i];
   }
-  // Of a pair: the first of two that are aligned.
+  // Takes two aligned slots for a pair, and gives the first of them.
   std::uint32_t take_slots(std::uint32_t i) {
     if (free_pairs_.empty()) {
       if (workspace_ % 2 != 0) free_.push(workspace_++);

@@ -22,7 +22,7 @@ class KernelLibrary {
   [[nodiscard]] const tandem_kernels* operator->() const { return kernels_; }
   [[nodiscard]] const tandem_kernels* get() const { return kernels_; }
   [[nodiscard]] const std::string& path() const { return path_; }
-  /// Of the file that was loaded, in hexadecimal digits.
+  /// SHA-256 of the file that was loaded, in hexadecimal digits.
   [[nodiscard]] const std::string& sha256() const { return sha256_; }
 
  private:

@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::uint32_t kNone = Lanes::kNone;
 
-// Of a kernel's operations in pairs: what is gathered from fewer of them into vectors costs as much
-// as the pairs save.
+// Least share of a kernel's operations in pairs: with fewer, what is gathered into vectors costs as
+// much as the pairs save.
 constexpr double kLeastShare = 0.05;
 
 constexpr std::size_t kMostLikes = 3;  // a quadruped has four legs
@@ -310,8 +310,8 @@ class Pairing {
       }
     });
   }
-  // Of what limbs of both sides share: a first limb may share with one second limb what its partner
-  // shares with another first one, as a quadruped's legs do across.
+  // Likes of what limbs of both sides share: a first limb may share with one second limb what its
+  // partner shares with another first one, as a quadruped's legs do across.
   void find_likes(std::uint32_t i) {
     for_matches(i, trunk_, [&](std::uint32_t, const std::vector<std::uint32_t>& matches) {
       for (const std::uint32_t other : matches)
@@ -333,9 +333,9 @@ class Pairing {
     lanes_.swapped[second] = is_binary(node.op) && node.op != Op::kDiv && no_constant(node.a) != a;
   }
 
-  // Of several that differ in their constant alone: as the limbs are built alike, the algorithm
-  // makes them in the same order. Where it makes more of them for one limb than for the other, as
-  // some are equal, the one with the nearest constant.
+  // Chooses among several that differ in their constant alone: as the limbs are built alike, the
+  // algorithm makes them in the same order. Where it makes more of them for one limb than for the
+  // other, as some are equal, the one with the nearest constant.
   std::uint32_t choose(std::uint32_t i, const std::vector<std::uint32_t>& others) const {
     if (!wanted_.empty() && std::ranges::count(others, wanted_[i]) != 0) return wanted_[i];
     const std::vector<std::uint32_t>& own = first_.at(own_key(i));
@@ -343,7 +343,7 @@ class Pairing {
     return others[static_cast<std::size_t>(std::ranges::find(own, i) - own.begin())];
   }
 
-  // Of those that are not paired yet; kNone: all are.
+  // Candidate with the nearest constant, of those that are not paired yet; kNone: all are.
   std::uint32_t nearest(double constant, const std::vector<std::uint32_t>& candidates) const {
     std::uint32_t best = kNone;
     double least = 0.0;

@@ -42,7 +42,7 @@ class Comparison {
     return tree_.bodies[static_cast<std::size_t>(index) + 1].inertia;
   }
 
-  /// Of two joints and their bodies.
+  /// Difference of two joints and their bodies.
   double difference_here(int a, int b) const {
     const bool slides = joint(a).type == JointType::kPrismatic;
     if (slides != (joint(b).type == JointType::kPrismatic)) return kUnlike;
@@ -66,7 +66,7 @@ class Comparison {
     return count;
   }
 
-  /// Of the subtrees behind two joints; where they are alike `pair` gets their joints.
+  /// Difference of the subtrees behind two joints; where they are alike `pair` gets their joints.
   double difference_of(int a, int b, LimbPair& pair) const {
     double sum = difference_here(a, b);
     if (sum == kUnlike || children_of(a).size() != children_of(b).size()) return kUnlike;

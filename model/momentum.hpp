@@ -236,13 +236,13 @@ class GeneralisedMomentum {
   }
 
  private:
-  // Of a body's origin, and gravity, in its frame.
+  // Motion of a body's origin, and gravity, in its frame.
   struct Motion {
     Vec3<S> angular{S(0.0), S(0.0), S(0.0)};
     Vec3<S> linear{S(0.0), S(0.0), S(0.0)};
     Vec3<S> gravity;
   };
-  // Of a body and all behind it, about its origin, in its frame.
+  // Sums over a body and all behind it, about its origin, in its frame.
   struct Total {
     Force<S> momentum;
     Moments<S> moments;

@@ -47,7 +47,7 @@ std::vector<NamedPosition> all_positions(const Tree& tree, const std::vector<Nam
   return all;
 }
 
-// Of the coordinates: a follower stands where its leader puts it.
+// Mass matrix of the coordinates: a follower stands where its leader puts it.
 RowMajor mass_matrix(const Tree& tree, const Mechanism& m, const std::vector<double>& position) {
   std::vector<double> q(static_cast<std::size_t>(m.kernel_nq()), 0.0);
   if (m.floating_base) q[6] = 1.0;

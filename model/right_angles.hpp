@@ -22,7 +22,7 @@ inline constexpr double kPerhapsRightAngle_rad = 2e-3;
 struct RightAngles {
   int count = 0;           ///< numbers or axes that are near one and not exact
   double worst_rad = 0.0;  ///< how far the furthest is off
-  // Of turns by about 90, 180 or 270 degrees that are further off.
+  // Turns by about 90, 180 or 270 degrees that are further off.
   int perhaps = 0;                 ///< numbers in `rpy`
   double perhaps_worst_rad = 0.0;  ///< how far the furthest is off
   std::string perhaps_first;       ///< the joint or link of the first

@@ -28,11 +28,11 @@ class SineTable {
     return kBlock * (angle / 4) + angle % 4;
   }
   [[nodiscard]] static std::uint32_t cosine(std::uint32_t angle) { return sine(angle) + 4; }
-  /// Of an even angle: its sine and, behind it, that of the next with the other sign.
+  /// Place of an even angle's sine and, behind it, that of the next with the other sign.
   [[nodiscard]] static std::uint32_t flipped(std::uint32_t angle) { return sine(angle) + 8; }
 
   [[nodiscard]] const std::vector<std::string>& angles() const { return angles_; }
-  /// Of the table, in doubles; never 0.
+  /// Size of the table, in doubles; never 0.
   [[nodiscard]] std::uint32_t doubles() const;
   /// Definitions of `sine_count` and of `void sines(const double* q, double* s)`.
   [[nodiscard]] std::string source() const;

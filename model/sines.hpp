@@ -19,7 +19,7 @@ namespace tandem::model {
 /// ```
 class Sines {
  public:
-  /// Of no robot: only to be replaced.
+  /// Sines of no robot: only to be replaced.
   Sines() = default;
   /// @param kernels  outlive it
   explicit Sines(const tandem_kernels& kernels)

@@ -158,7 +158,7 @@ class Ordering {
 
   Expr sum(std::uint32_t i) {
     const std::vector<Term> terms = sorted_terms(i);
-    // Of two products the compiler fuses the one that is made first with the sum.
+    // The compiler fuses the sum with that one of two products that is made first.
     const auto made = [&](const Term& term) {
       const Expr x = term.product ? product(term.node) : image_[term.node];
       if (term.product) keep(i, x);

@@ -61,7 +61,7 @@ struct Joint {
   [[nodiscard]] bool follows() const { return leader >= 0; }
   /// False for a continuous joint, and where the description gives no limits.
   [[nodiscard]] bool has_limits() const { return std::isfinite(lower) && std::isfinite(upper); }
-  /// Of a follower: where the leader keeps it within its limits.
+  /// Range in which the leader keeps a follower within its limits.
   [[nodiscard]] Range leaders_range() const {
     if (!has_limits()) return {};
     const double a = (lower - offset) / multiplier;

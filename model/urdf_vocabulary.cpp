@@ -19,7 +19,7 @@ struct Words {
   std::vector<std::string> elements, attributes;
 };
 
-/// Of the elements that are read; null: nobody reads what is in it.
+/// Words of an element that is read; null: nobody reads what is in it.
 const Words* known_in(std::string_view element) {
   static const std::map<std::string, Words, std::less<>> kWords{
       {"link", {{"inertial", "visual", "collision"}, {"name", "type"}}},

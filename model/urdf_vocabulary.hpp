@@ -18,7 +18,7 @@ class Vocabulary {
  public:
   explicit Vocabulary(const std::string& file) : file_(file) {}
 
-  /// Of `e` and what is in it.
+  /// Checks `e` and what is in it.
   /// @param key  "link NAME" or "joint NAME"
   void look_at(const tinyxml2::XMLElement& e, const std::string& key, Diagnostics& errors);
   /// Whether the name of an element in <robot> is in a namespace; then it is counted here.

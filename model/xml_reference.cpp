@@ -13,7 +13,7 @@ bool is_xml_character(std::uint32_t code) {
          (code >= 0xE000 && code < 0xFFFE) || (code >= 0x10000 && code < 0x110000);
 }
 
-/// Of `text` from "&#" on: its ";" included; up to 20 bytes where it has none.
+/// Reference that `text` begins with: "&#" to ";", or up to 20 bytes where it has none.
 std::string_view reference_at(std::string_view text) {
   constexpr std::size_t kLongest = 20;
   const std::size_t end = text.substr(0, kLongest).find_first_of(";\"'<>\n");

@@ -12,7 +12,7 @@ namespace tandem::report {
 
 constexpr double kKeyFont = 12.0;  // points
 
-/// Of values along an axis; none: low > high.
+/// Range of values along an axis; none: low > high.
 struct Extent {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();

@@ -92,7 +92,7 @@ PageTable tracking_table(const RunData& run, const std::string& side) {
   return table;
 }
 
-/// Of every closed loop, by the simulation's truth; without rows when the log has none.
+/// Table of every closed loop, by the simulation's truth; without rows when the log has none.
 PageTable loops_table(const RunData& run, const std::string& side) {
   PageTable table{"Closed loops" + side,
                   "How far and how fast a loop was open at most in the simulation, which closes it "
@@ -108,7 +108,7 @@ PageTable loops_table(const RunData& run, const std::string& side) {
   return table;
 }
 
-/// Of every foot, by the simulation's truth; without rows when the log has none.
+/// Table of every foot, by the simulation's truth; without rows when the log has none.
 PageTable feet_table(const RunData& run, const std::string& side) {
   PageTable table{"Feet" + side,
                   "Vertical force of the ground in the simulation, and the farthest that a foot "

@@ -44,7 +44,7 @@ struct RunFault {
   bool stops = true;    ///< false: it was reported, and the run went on
 };
 
-/// Of a run's faults, in the page and as lines in its figures.
+/// Faults of a run that are shown in the page, and as lines in its figures.
 inline constexpr std::size_t kFaultsShown = 5;
 
 /// A drive's error code in words.

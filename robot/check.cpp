@@ -71,8 +71,8 @@ void engine(const Subject& s, Findings& findings) {
        .key = "sim.engine"});
 }
 
-/// Of a drive that is given its bearings' friction alone, a common slip: its motor turned many
-/// times as fast as its voltage allows.
+/// Warns of a drive that is given its bearings' friction alone, a common slip: its motor turned
+/// many times as fast as its voltage allows.
 void back_emf(const Subject& s, Findings& findings) {
   for (const hal::ActuatorConfig& actuator : s.robot.config.actuators) {
     const double per_A = actuator.gear_ratio * actuator.torque_constant_Nm_A;

@@ -15,7 +15,7 @@ namespace tandem::rt {
 
 /// Simulated seconds per wall second; beside them 0, which is as fast as the machine goes.
 inline constexpr double kSlowest = 0.01, kFastest = 1000.0;
-/// Of one step().
+/// Cycles of one step(), at most.
 inline constexpr std::uint64_t kMostSteps = 1'000'000'000;
 
 /// Where simulated time stands.

@@ -85,9 +85,9 @@ class CyclicLoop {
   [[nodiscard]] std::uint64_t next_cycle() const noexcept { return next_cycle_; }
   [[nodiscard]] const LoopConfig& config() const noexcept { return config_; }
   [[nodiscard]] const LoopStatistics& statistics() const noexcept { return statistics_; }
-  /// Of the newest cycle that waited for a bus; -1: none did.
+  /// Bus time of the newest cycle that waited for one; -1: none did.
   [[nodiscard]] std::int64_t last_bus_ns() const noexcept { return last_bus_ns_; }
-  /// Of the newest cycle that finished.
+  /// Work time of the newest cycle that finished.
   [[nodiscard]] std::int64_t last_work_ns() const noexcept { return last_work_ns_; }
 
   /// External pacing: so many cycles went by unseen before the one that wait() has announced, which

@@ -42,7 +42,7 @@ std::array<Taken, 8> taken{{{.signal = SIGINT, .even_ignored = true},
                             {.signal = SIGPWR},
                             {.signal = SIGSTKFLT},
                             {.signal = SIGXCPU, .once_more = false}}};
-/// Of timers and libraries that have gone: nobody sends them to end anything.
+/// Signals of timers and libraries that have gone: nobody sends them to end anything.
 constexpr std::array kIgnored{SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGPIPE, SIGXFSZ};
 static_assert(std::atomic<std::int64_t>::is_always_lock_free);
 

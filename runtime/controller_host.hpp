@@ -122,7 +122,7 @@ class ControllerHost {
   /// The first joint that two of `active` claim.
   [[nodiscard]] static std::optional<ClaimConflict> find_conflict(
       const Table& table, ControllerSet active) noexcept TANDEM_RT;
-  /// Of a controller that is or was loaded.
+  /// Name of a controller that is or was loaded.
   [[nodiscard]] std::string name(std::size_t id) const;
   /// Who is active, and done, after the last cycle.
   struct Shown {

@@ -20,7 +20,7 @@ struct CycleConfig {
   std::uint64_t shut_down_cycles = 2'000;  ///< at most
   AfterStop after_stop = AfterStop::kEnd;
   AfterReset after_reset = AfterReset::kHold;
-  /// Of a controller that writes what it has not claimed, which never reaches a drive.
+  /// Reaction to a controller that writes what it has not claimed, which never reaches a drive.
   hal::StopCategory on_stray = hal::StopCategory::kWarn;
   std::uint64_t retreat_cycles = 5'000;  ///< at most, in a stop of category 2
   std::uint32_t lost_after_cycles = 10;  ///< feedback older than this is a lost joint or sensor

@@ -75,7 +75,7 @@ struct RemoteOptions {
   std::optional<RemoteCommand> command{};  ///< empty: off in `run`, local in `serve`
   std::optional<RemoteTrust> trust{};      ///< empty: the domain where DDS Security keeps it
   bool load = false;                       ///< controllers may be loaded over DDS, by name
-  // Of an owner (docs/remote.md).
+  // Settings for an owner (docs/remote.md).
   bool lockstep = false;               ///< each cycle waits for its command
   double lease_timeout_s = 1.0;        ///< one that is silent for so long has lost the robot
   double lockstep_timeout_s = 60.0;    ///< that a cycle waits for a command

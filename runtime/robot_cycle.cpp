@@ -95,7 +95,7 @@ void RobotCycle::read() noexcept TANDEM_RT {
   trace_.mark(CycleStage::kRead, *clock_);
 }
 
-/// Of the loop, the joints, the sensors, the body and the backend; then what time brings.
+/// Checks the loop, the joints, the sensors, the body and the backend; then what time brings.
 void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
   if (tick.skipped > 0) event(EventKind::kOverrun, -1, static_cast<std::uint32_t>(tick.skipped));
   if (tick.stop && !run_.in(RunPhase::kFaulted) && !run_.in(RunPhase::kShutDown)) {

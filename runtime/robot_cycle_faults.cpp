@@ -170,8 +170,8 @@ void RobotCycle::reset_failed() noexcept TANDEM_RT {
   progress_.failed_resets.fetch_add(1, std::memory_order_relaxed);
 }
 
-/// Of one drive. It is enabled only where nothing is latched that stops the robot, held where it
-/// is, and only for a joint that no controller would move on.
+/// Resets one drive. It is enabled only where nothing is latched that stops the robot, held where
+/// it is, and only for a joint that no controller would move on.
 LoopAnswer RobotCycle::reset_drive(std::size_t joint) noexcept TANDEM_RT {
   LoopAnswer answer{.joint = static_cast<std::int32_t>(joint)};
   if (!watch_.is_ill(state_, joint)) return answer;

@@ -30,7 +30,7 @@ namespace tandem::runtime {
 struct RequestResult {
   bool done = false;  ///< false: the loop has not come to it yet, and does it in its next cycle
   std::uint64_t cycle = 0;  ///< in which it was done
-  /// Of the run at the answer: in some phases a switch only selects who will start.
+  /// Phase of the run at the answer: in some phases a switch only selects who will start.
   hal::RunPhase phase = hal::RunPhase::kRunning;
 };
 

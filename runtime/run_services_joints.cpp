@@ -39,7 +39,7 @@ Status check_range(const std::string& joint, const char* what, double value, dou
                  fmt::format("give 0 to {:g}{}", max, unit));
 }
 
-/// Of what is asked for: NaN stays as it is.
+/// Checks what is asked for: NaN stays as it is.
 Status check_impedance(const std::string& joint, const JointRequest& wish,
                        const hal::JointCapabilities& limit) {
   const double stiffness = wish.stiffness_Nm_rad, damping = wish.damping_Nms_rad;
@@ -68,7 +68,7 @@ Status check_target(const std::string& joint, double target, const hal::JointCap
                                  min * kDegPerRad, max * kDegPerRad));
 }
 
-/// Of the speed and the acceleration, which are above 0. @param value  NaN: not given
+/// Checks a speed or an acceleration, which is above 0. @param value  NaN: not given
 Status check_rate_of_motion(const std::string& joint, const char* what, double value, double max,
                             bool slides, const char* per) {
   if (std::isnan(value) || (value > 0.0 && value <= max)) return {};

@@ -50,7 +50,7 @@ struct Peak {
   }
 };
 
-/// Of the wrench at one [[estimation.wrench]], or on the base: norms of force and moment.
+/// Peaks of the wrench at one [[estimation.wrench]], or on the base: norms of force and moment.
 struct WrenchFigures {
   Peak force_N, moment_Nm;
 };
@@ -58,8 +58,8 @@ struct WrenchFigures {
 /// What the loop estimated while the controllers ran.
 struct EstimateFigures {
   std::uint64_t base_cycles = 0;  ///< in which the base's estimate had started
-  /// Of these with a free base and a truth: the angle between the two estimates of what is
-  /// upwards, and of the base's height. 0 without a truth.
+  /// Cycles of these with a free base and a truth; in them the largest angle between the two
+  /// directions that are upwards, and error of the base's height. 0 without a truth.
   std::uint64_t compared = 0;
   double max_tilt_error_rad = 0.0;
   double max_height_error_m = 0.0;

@@ -79,7 +79,7 @@ Candidate candidate(const Shape& shape, const model::Placement& link) {
   return {};
 }
 
-/// Of many points the outermost in eight directions.
+/// Points that are the outermost of many in eight directions.
 std::vector<Vector3d> outermost(const std::vector<Vector3d>& points) {
   if (points.size() <= kMostPoints) return points;
   std::vector<Vector3d> kept;

@@ -11,7 +11,7 @@
 
 namespace tandem::scaffold {
 
-/// Of every encoder that is made up, per revolution of the link: 20 bits.
+/// Counts of every encoder that is made up, per revolution of the link: 20 bits.
 inline constexpr double kEncoderCounts = 1048576.0;
 
 /// A table of robot.toml, what it serves, and the remark that stands over it.

@@ -139,7 +139,7 @@ class Chooser {
     return choice;
   }
 
-  /// Of the joints that have a drive the one that is most alike.
+  /// Joint that is the most alike, of those that have a drive.
   [[nodiscard]] const hal::JointConfig& resembled(int joint) const {
     const auto far = [&](const hal::JointConfig& other) {
       return distance(theirs_[like_.tree.joint_index(other.name)], ours_[joint]);

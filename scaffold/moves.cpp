@@ -108,7 +108,7 @@ class Swinging {
   double floor_m_ = -std::numeric_limits<double>::infinity();
 };
 
-/// Of `way` to either side as much as the drives can carry: all of it, or each joint for itself,
+/// Part of `way` to either side that the drives can carry: all of it, or each joint for itself,
 /// from the ends of the limbs to the root, what leaves those before it theirs.
 VectorXd bearable(const NewRobot& robot, const VectorXd& posture, const VectorXd& way) {
   const Swinging swinging(robot, posture);

@@ -81,7 +81,7 @@ Vector3d Standing::best_load(const Foot& foot, const Posed& neutral) const {
   return sole.R * way;
 }
 
-/// Of the joints that bend the leg in its own plane the knee is the one that is far from both
+/// Finds the knee: of the joints that bend the leg in its own plane, the one that is far from both
 /// the first of them and the foot.
 Standing::Knee Standing::knee_of(const Foot& foot) const {
   const Posed neutral(tree_, neutral_);

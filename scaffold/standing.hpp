@@ -26,7 +26,7 @@ class Standing {
   [[nodiscard]] Status find();
 
   [[nodiscard]] const Eigen::VectorXd& q() const { return q_; }
-  /// Of the root's origin over the ground.
+  /// Height of the root's origin over the ground.
   [[nodiscard]] double height_m() const { return height_m_; }
   [[nodiscard]] double greatest_height_m() const { return greatest_m_; }
   /// How far the centre of mass is from where it should be, along the ground.

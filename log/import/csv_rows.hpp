@@ -33,14 +33,14 @@ class CsvRows {
   [[nodiscard]] static Result<CsvRows> open(std::string_view text, const std::string& file,
                                             const CsvFormat& format);
 
-  /// Of the columns: the header's, or c1, c2, …
+  /// Names of the columns: the header's, or c1, c2, …
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
   /// The next row's cells, without blanks and quotes; false at the end.
   [[nodiscard]] bool next();
   [[nodiscard]] bool empty(std::size_t column) const { return cells_[column].empty(); }
   /// As many as there are names, unless the row is ragged.
   [[nodiscard]] std::span<const std::string_view> cells() const { return cells_; }
-  /// Of the row in the file, from 1.
+  /// Line of the row in the file, from 1.
   [[nodiscard]] int line() const { return line_; }
   /// A cell's number; NaN for an empty cell, nan and inf; none: it is no number.
   [[nodiscard]] std::optional<double> number(std::size_t column) const;

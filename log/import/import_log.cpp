@@ -100,7 +100,7 @@ bool to_utf8(std::string& text) {
   return true;
 }
 
-/// Of a table. Errors: bytes that no text has, such as those of a picture or of UTF-16.
+/// Checks that a table is text. Errors: bytes that no text has, such as a picture's or UTF-16's.
 Status is_text(const ImportFile& file) {
   const auto control = [](char c) {
     return static_cast<unsigned char>(c) < 0x20 &&
@@ -120,7 +120,7 @@ Status is_text(const ImportFile& file) {
             {}});
 }
 
-/// Of a table. Errors: JSON, of objects or lists, as a whole or one on each line.
+/// Checks that a table is no JSON. Errors: objects or lists, as a whole or one on each line.
 Status is_no_json(const ImportFile& file) {
   constexpr std::string_view kSpaces = " \t\r\n";
   const std::string_view text = file.text;

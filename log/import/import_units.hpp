@@ -12,7 +12,7 @@ namespace tandem::log {
 
 inline constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// Of which joints.
+/// Joints that a unit is for, by how they move.
 enum class Motion : std::uint8_t { kAny, kTurns, kSlides };
 
 struct Unit {

@@ -26,7 +26,7 @@ struct ImportedColumn {
   Target target;
   std::vector<double> values;
 
-  /// Of a joint, as measured.
+  /// Whether it is a joint's position, as measured.
   [[nodiscard]] bool is_position() const {
     return !target.command && target.field == "position_rad";
   }

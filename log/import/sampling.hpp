@@ -42,7 +42,7 @@ struct Spacing {
 [[nodiscard]] Status clean(Recording& recording, const ImportMap& map,
                            const hal::RobotConfig& robot);
 
-/// Of each series. @pre clean() went well
+/// Spacing of each series. @pre clean() went well
 [[nodiscard]] std::vector<Spacing> spacings(const Recording& recording);
 
 /// Fills the images of one cycle after another.
@@ -53,7 +53,7 @@ class Sampler {
                                               const hal::RobotConfig& robot);
 
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
-  /// Of cycle 0, on the recording's clock.
+  /// Time of cycle 0, on the recording's clock.
   [[nodiscard]] std::int64_t begin_ns() const { return begin_ns_; }
 
   /// Cycle `cycle`, which must not be before the last one asked for.

@@ -71,7 +71,7 @@ void add_controllers(Composition& c, Collector& errors) {
   errors.add(c.experiment.document.diagnostics());
 }
 
-/// Of [estimation], with the line of its table.
+/// Refuses [estimation], with the line of its table.
 void refuse_estimation(const Experiment& e, const Error& error, Collector& errors) {
   TomlTable root = e.document.root();
   const std::string table = "estimation";
@@ -244,7 +244,7 @@ Diagnostics unfit_for_link(const Experiment& e, const Overrides& overrides) {
   return {};
 }
 
-/// Of flags that are for a bus or a server: they would change nothing, and look as if they did.
+/// Errors of flags for a bus or a server: they would change nothing, and look as if they did.
 Diagnostics without_effect(const Experiment& e, const Overrides& overrides) {
   const bool simulated = e.hal.backend == BackendKind::kSim;
   if (overrides.lockstep && simulated && !overrides.serves) {

@@ -388,7 +388,7 @@ TEST_F(DdsCommands, AStopAsksNobodyForAdmission) {
   std::string runtime = "/tmp/tandem_admission_XXXXXX";
   ASSERT_NE(::mkdtemp(runtime.data()), nullptr);
   ASSERT_EQ(::mkdir((runtime + "/tandem").c_str(), 0700), 0);
-  // Of a run that answers nothing. Bound by a relative path, which the kernel's table shows: so the
+  // Socket of a silent run, bound by a relative path, which the kernel's table shows: so the
   // commands of tests that run beside this one, which search all of it, do not ask it.
   sockaddr_un address{};
   address.sun_family = AF_UNIX;

@@ -190,8 +190,8 @@ TEST_F(LineRun, AHomingOverACableAndTheMotionBehindItAreTheInProcessRunBitForBit
   EXPECT_NEAR(second_rad, 0.4, 0.02);
 }
 
-/// Of a whole start and run of 21 slaves, power-on to INIT, every frame is one that a stranger's
-/// program reads.
+/// Frames of a whole start and run of 21 slaves, power-on to INIT: every one is one that a
+/// stranger's program reads.
 TEST_F(LineRun, TsharkReadsEveryFrameOfAStartAndARun) {
   if (std::system("command -v tshark > /dev/null") != 0) {
     GTEST_SKIP() << "tshark is not installed (scripts/packages.txt, section hil)";
@@ -251,7 +251,7 @@ TEST_F(LineRun, NodesThatAreNotOneBehindTheOtherAreRefused) {
       << outcome.err;
 }
 
-/// Of the boards that wait for a run, and of a cable with nobody at its end.
+/// Boards that wait for a run, and a cable with nobody at its end.
 TEST_F(LineRun, TheDoctorLooksAtTheSlaves) {
   edit("robot.toml", "interface = \"eth1\"",
        "interface = \"" + std::string(test::kMasterEnd) + "\"");

@@ -118,7 +118,7 @@ std::set<std::string> anchors_of(const fs::path& page) {
   return anchors;
 }
 
-/// Of the sources, or of an installation's pages ($TANDEM_PAGES).
+/// Links in the sources' pages, or in an installation's ($TANDEM_PAGES).
 TEST(Documentation, LinksLeadSomewhere) {
   const char* installed = std::getenv("TANDEM_PAGES");
   const fs::path root = installed == nullptr ? kRoot : fs::path(installed);

@@ -127,7 +127,7 @@ TEST(PluginLoader, RefusesALibraryThatIsCut) {
   const test::ScratchFolder folder;
   std::ifstream in(test::bundled_folder()[0] + "/hold.so", std::ios::binary);
   const std::string whole{std::istreambuf_iterator<char>(in), {}};
-  // Of what is loaded: behind it a library may have much that is not, such as its debugger's.
+  // Cuts in what is loaded: behind it a library may have much that is not, such as its debugger's.
   for (const std::size_t size : {0U, 100U, 2'000U, 20'000U, 60'000U}) {
     const std::string file = folder / ("cut" + std::to_string(size) + ".so");
     std::ofstream(file, std::ios::binary) << whole.substr(0, size);

@@ -25,7 +25,7 @@ std::string keys(const std::string& file, const std::string& more = "") {
   return "site = 'hand'\npath = '" + file + "'\n" + more;
 }
 
-/// Of the hand, for joints in the image's order, which is the model's here.
+/// Position of the hand, for joints in the image's order, which is the model's here.
 std::array<double, 3> hand_m(std::span<const double> q) {
   const tandem_kernels& kernels = *panda().kernels.get();
   std::vector<double> zero(kernels.nv), pose(12 * kernels.sites), motion(6 * kernels.sites);

@@ -19,8 +19,8 @@ struct Published {
   const char* hash;
 };
 
-/// Of public copies of what ROS 2's own generator wrote (…__description.c, …__struct.h), and of
-/// tables that others keep, by GitHub repository.
+/// Hashes from public copies of what ROS 2's own generator wrote (…__description.c, …__struct.h),
+/// and from tables that others keep, by GitHub repository.
 constexpr Published kDefinitions[] = {
     // kuenem/Group-12_MotionPlanning-New: build/tf2_msgs/…/tf_message__description.c
     {"tf2_msgs/msg/TFMessage", "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"},

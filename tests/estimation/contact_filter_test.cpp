@@ -180,7 +180,7 @@ TEST(ContactFilter, ContinuesFromItsArchiveWithTheSameBits) {
   EXPECT_EQ(copy.covariance(), rig.filter.covariance());
 }
 
-/// Of opposites, too, as where a sensor hangs head down: there is a turn, and it is one.
+/// Turns between opposites, too, as where a sensor hangs head down: there is one, and it is a turn.
 TEST(ShortestTurn, LeadsFromOneDirectionToTheOther) {
   const Vec3 up = Vec3::UnitZ();
   for (const Vec3& from : {Vec3(0.3, -0.4, 9.7), Vec3(0.0, 0.0, 2.0), Vec3(7.0, 1.0, -3.0),

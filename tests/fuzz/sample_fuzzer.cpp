@@ -71,7 +71,7 @@ class Input {
     bytes_ = bytes_.subspan(taken.size());
     return taken;
   }
-  /// Of any kind: small, huge, none.
+  /// Number of any kind: small, huge, none.
   double number() {
     switch (const std::uint8_t kind = byte(); kind % 8) {
       case 0: return std::numeric_limits<double>::quiet_NaN();
@@ -85,7 +85,7 @@ class Input {
   std::span<const std::uint8_t> bytes_;
 };
 
-/// Of its own, so that what is sent to one end does not reach the other.
+/// Domain of its own, so that what is sent to one end does not reach the other.
 std::shared_ptr<dds::Domain> another_domain() {
   dds::Config config;
   config.enabled = true;

@@ -58,7 +58,7 @@ class Bench {
   double last_[3];
 };
 
-/// Of a bound with and without jerk.
+/// Bounds with and without jerk.
 class Bounds : public testing::TestWithParam<double> {
  protected:
   MotionBounds bounds{

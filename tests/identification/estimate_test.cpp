@@ -107,7 +107,7 @@ TEST(Identify, IntervalsHoldTheTruthAsOftenAsTheySay) {
               inside.size(), 100.0 * share, name.c_str(), 100.0 * worst);
   EXPECT_GT(share, 0.90);
   EXPECT_LT(share, 0.995);  // intervals that are too wide are wrong, too
-  // Of 1,000 seeds an exact interval holds 950, give or take 7: not one may be under 900. (Of 100
+  // An exact interval holds 950 of 1,000 seeds, give or take 7: not one may be under 900. (Of 100
   // seeds one of 69 exact intervals is under 90 by chance alone.)
   if (seeds >= 1000) {
     EXPECT_GE(worst, 0.90) << name;
@@ -507,7 +507,7 @@ TEST(EstimateFromData, CountsAnErrorThatChannelsHaveInCommonOnce) {
   EXPECT_GE(inside, 88);
 }
 
-// Of noise alone there is no information, whatever the sums say.
+// Noise alone holds no information, whatever the sums say.
 TEST(EstimateFromData, SaysNothingOfAColumnThatIsNoise) {
   Plain plain(2, 0.0, 0.0, 1);
   std::mt19937_64 random(5);

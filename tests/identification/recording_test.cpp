@@ -206,7 +206,7 @@ TEST(Recording, UndoesTheHoldsOfASlowPdo) {
   EXPECT_EQ(smooth, copy);
 }
 
-// Of a robot that never moved 59 of 69 parameters were said to be known.
+// Parameters of a robot that never moved were said to be known: 59 of 69.
 TEST(Recording, OfATeleOperatorIsNoMeasurement) {
   const tandem::test::ScratchFolder folder;
   const std::string path = folder / "operator.mcap";

@@ -43,7 +43,7 @@ Equations equations_of(const Arm& ur5e, const Recording& recording) {
   return equations;
 }
 
-// Of a known hold the sensor's rows are corrected; of an unknown one they are doubted, as much.
+// Sensor rows of a known hold are corrected; those of an unknown one are doubted, as much.
 TEST(AddEquations, DoubtWhatSixAxisSensorsShowOfAnUnknownHold) {
   const Arm ur5e = arm("ur5e");
   Recording recording = ur5e_recording(ur5e);

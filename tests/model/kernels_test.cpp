@@ -338,7 +338,7 @@ TEST(KernelLibrary, SaysWhatIsWrongWithAFileAndWhatToDo) {
   EXPECT_NE(library.error().hint.find("baseline"), std::string::npos);
 }
 
-// Of 60 libraries with a damaged byte or a missing end 21 had ended the process by a signal.
+// Libraries with a damaged byte or a missing end had ended the process by a signal: 21 of 60.
 TEST(KernelLibrary, OpensNoDamagedOne) {
   std::ifstream in(built_library("double_pendulum"), std::ios::binary);
   const std::string whole{std::istreambuf_iterator<char>(in), {}};

@@ -266,7 +266,7 @@ TEST_F(LinkChecks, AStopIsCarriedOutEvenWithACommandThatIsNotTaken) {
   EXPECT_TRUE(eventually([this] { return served.phase() == RunPhase::kFaulted; }));
   ASSERT_EQ(served.cycle->faults().size(), 1U);
   EXPECT_EQ(served.cycle->faults()[0].text, "the remote owner asked for a stop");
-  // Of an owner who had not seen it: the stop wins, whichever sample came first.
+  // Reset by an owner who had not seen the stop: the stop wins, whichever sample came first.
   auto early = sample();
   early.cycle = served.cycle->progress().stopped_before.load() - 1;
   early.stops = 1;

@@ -115,7 +115,7 @@ TEST(Network, LosesByFourStates) {
   EXPECT_NEAR(share_of(lost), 0.05 / 1.05, 0.002);
   EXPECT_EQ(mean_burst(lost), 1.0) << "after one that is lost alone comes one that is not";
   config = {.loss_model = LossModel::kMarkov, .p13 = 0.01, .p31 = 0.1, .p32 = 0.1, .p23 = 0.5};
-  // Of 1: 3 has 0.01/0.1, 2 has that times 0.1/0.5.
+  // Shares relative to state 1: state 3 has 0.01/0.1, state 2 has that times 0.1/0.5.
   EXPECT_NEAR(mean_loss(config), 0.1 / (1.0 + 0.1 + 0.02), 1e-15);
   lost = losses(config);
   EXPECT_NEAR(share_of(lost), mean_loss(config), 0.006);
@@ -211,7 +211,7 @@ TEST(Network, ReordersAShareOfEveryGapth) {
     return static_cast<double>(network.counts().reordered) / 50'000.0;
   };
   EXPECT_NEAR(count(config), 0.25, 0.01);
-  // Of a run of `gap - 1` that are not, then each by 1/4: one of 4 + 4 messages.
+  // Messages stay in order for a run of `gap - 1`, then each is reordered by 1/4: one of 4 + 4.
   config.gap = 5;
   EXPECT_NEAR(count(config), 1.0 / 8.0, 0.005);
   EXPECT_FALSE(in_order(play(config, 1000)));

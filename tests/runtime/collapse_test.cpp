@@ -43,7 +43,7 @@ struct Collapse : Squat {
     plant().kernels().energy(plant().q(), plant().v(), energy);
     return energy[0];
   }
-  /// Of everything that moves or is stretched, but for the motors' own.
+  /// Energy of everything that moves or is stretched, but for the motors' own.
   [[nodiscard]] double energy_J() const {
     double energy[2];
     plant().kernels().energy(plant().q(), plant().v(), energy);

@@ -50,7 +50,7 @@ TEST_P(Collision, IsFoundSoonAndNotWithoutOne) {
   for (std::size_t place = 0; place < s.places.size(); ++place) {
     estimation::DetectionTimes times(thresholds, std::vector{1.0});
     times.begin_push();
-    // Of seeded directions: those of seed 1 do not pass through the axes.
+    // Directions are seeded: those of seed 1 do not pass through the axes.
     pushed(s, place, 50.0, 1, [&](std::span<const double> torque) { times.look(torque); });
     EXPECT_LE(times.with(0).worst, 20.0) << s.places[place].first;
   }

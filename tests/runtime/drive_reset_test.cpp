@@ -195,7 +195,7 @@ TEST_F(DriveReset, IsPartOfASnapshot) {
 }
 
 // The other motion that a fault forbids: tandem joint move.
-// Of a joint whose faults only warn: it was told to move, and lay where it was.
+// A joint whose faults only warn was told to move, and lay where it was.
 TEST_F(DriveReset, IsNeededBeforeTheJointIsMovedOrPutIntoAMode) {
   begin(hal::StopCategory::kWarn);
   trip(1);

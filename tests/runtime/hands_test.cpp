@@ -117,7 +117,7 @@ struct MovingRun {
   }
   [[nodiscard]] double reference() const { return cycle->command().position_rad()[0]; }
   [[nodiscard]] double speed() const { return (reference() - before_rad) * 1e3; }
-  /// Of a position loop that closes in this cycle.
+  /// Speed of a position loop that closes in this cycle.
   [[nodiscard]] double departs_at() const {
     return (reference() - cycle->state().position_rad()[0]) * 1e3;
   }

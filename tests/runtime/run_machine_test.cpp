@@ -17,8 +17,8 @@ constexpr RunPhase kPhases[] = {kBringUp,  kSettling, kRunning, kFaulted,   kRes
 
 using Table = std::map<std::pair<RunPhase, RunEvent>, RunPhase>;
 
-/// Of a run that neither settles nor waits, nor holds controllers back. What is not in it changes
-/// nothing.
+/// Transitions of a run that neither settles nor waits, nor holds controllers back. What is not in
+/// the table changes nothing.
 const Table kTable = {
     {{kBringUp, RunEvent::kEnabled}, kRunning},
     {{kBringUp, RunEvent::kStop}, kShutDown},

@@ -16,7 +16,7 @@ struct Hand {
   std::array<double, 3> at_m;  ///< there, in the link's frame: the site's origin
   std::array<double, 3> force_N = {12.0, -20.0, 15.0};
 
-  /// Of force and moment.
+  /// Component `k` of force and moment.
   [[nodiscard]] double truth(std::size_t k) const { return k < 3 ? force_N[k] : 0.0; }
 };
 const Hand kPanda{"panda", "robot.toml", "hand", "panda_joint7", {0, 0, 0.107}};

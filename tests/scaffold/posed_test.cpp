@@ -106,8 +106,8 @@ TEST_P(PosedOnPublicRobots, JacobiansAreTheDerivativesOfPositions) {
   }
 }
 
-/// Of b^k values in a row one lies in each of as many equal parts of 0 to 1, b the dimension's
-/// prime.
+/// Values in a row, b^k of them: one lies in each of as many equal parts of 0 to 1, b the
+/// dimension's prime.
 TEST(Halton, FillsEveryDimensionEvenly) {
   for (const auto& [dimension, parts] : {std::pair{0, 32}, {1, 27}, {2, 25}, {23, 89}, {24, 32}}) {
     std::vector<int> values(static_cast<std::size_t>(parts));

@@ -58,7 +58,7 @@ TEST_P(StandingRobots, KeepTheirMassOverTheirFeetAndTheirJointsWithinLimits) {
   const Eigen::VectorXd q = posture_of(robot);
   const Posed posed(robot.tree, q);
   const Eigen::Vector3d com = posed.whole().com_m;
-  // Of a convex polygon's corners some lie beyond the centre in every direction.
+  // A convex polygon around the centre of mass has corners beyond it in every direction.
   const std::vector<Eigen::Vector3d> points = points_of(robot, posed);
   for (double angle = 0.0; angle < 6.28; angle += 0.1) {
     const Eigen::Vector3d way(std::cos(angle), std::sin(angle), 0.0);

@@ -136,7 +136,7 @@ TEST(Plant, AFreeSpinningBodyFliesStraight) {
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(velocity_W[i], expected[i], 1e-6);
     EXPECT_NEAR(plant.q()[0], 2.0, 1e-6);
     EXPECT_NEAR(plant.q()[1], 0.0, 1e-6);
-    // Of order 1: h g t / 2 beside the parabola.
+    // Error of order 1: h g t / 2 beside the parabola.
     EXPECT_NEAR(plant.q()[2], 4.0 - 2.0 * kG, 3e-3);
   }
 }
