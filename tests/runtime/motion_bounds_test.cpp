@@ -295,7 +295,7 @@ class WildRun {
     return j % 3 < 2 && (running_ >> (j % 3) & 1U) != 0;
   }
   void violation(std::size_t j, const std::string& what) {
-    const auto& gains = cycle_->services().joints()[j].gains[0];
+    const auto gains = cycle_->services().joints()[j].gains[0];
     const std::size_t mode = index_of(cycle_->state().mode()[j], cycle_->state().interaction()[j]);
     found_.violations.push_back(
         fmt::format("seed {} cycle {}: {} in mode {}, position gains {:.4g} {:.4g} {:.4g}: {}",
