@@ -105,7 +105,7 @@ bool AxisMaster::ignores_quick_stop(std::int64_t now_ns) const noexcept TANDEM_R
 bool AxisMaster::rests_in_quick_stop(std::int64_t now_ns) const noexcept TANDEM_RT {
   return drive() == WireState::kQuickStopActive && age_cycles_ == 0 &&
          now_ns - since_ns_ >= kQuickStopRestNs &&
-         std::abs(feedback_.velocity) < kRestVelocity_rad_s * scale_.velocity_per_rad_s;
+         std::abs(feedback_.velocity / scale_.velocity_per_rad_s) < kRestVelocity_rad_s;
 }
 
 /// In every mode of a drive that is enabled and wanted so.

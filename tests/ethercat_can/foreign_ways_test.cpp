@@ -99,6 +99,20 @@ TEST(ForeignWays, ADriveThatStaysInQuickStopActiveIsLetGoAtTheEnd) {
   EXPECT_EQ(rig.drive.value(0x1016, 1), 0) << "a silent master would be its error 8130";
 }
 
+/// The scale of a joint that turns the other way round is negative: its drive was never let go.
+TEST(ForeignWays, ADriveOfAReversedJointIsLetGoToo) {
+  SheetRig rig(servo().remove(0x605A), [](RobotConfig& robot) { robot.joints[0].reversed = true; });
+  rig.drive.stays_in_quick_stop = true;
+  ASSERT_TRUE(rig.bring_up());
+  rig.master->stop(StopCategory::kCategory1);
+  rig.drive.value(0x606C) = 6000;
+  rig.steps(1500);
+  EXPECT_EQ(rig.drive.value(0x6041), 0x0217);
+  rig.drive.value(0x606C) = 0;
+  rig.steps(5);
+  EXPECT_EQ(rig.drive.value(0x6041), 0x0250);
+}
+
 TEST(ForeignWays, AfterAStopItIsLetGoWhenItsRampIsOver) {
   SheetRig rig(servo().remove(0x605A));
   rig.drive.stays_in_quick_stop = true;
