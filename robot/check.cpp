@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <optional>
 
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/drive_use.hpp"
@@ -21,8 +20,7 @@ void add(const Diagnostics& from, Diagnostics& to) {
 }
 
 void loops(const Subject& s, Findings& findings) {
-  if (s.kernels == nullptr) return;
-  findings.loops = study_loops(s.robot.config, *s.kernels, s.use.postures);
+  findings.loops = study_loops(s.robot.config, s.kernels, s.use.postures);
   add(findings.loops.errors, findings.errors);
 }
 
@@ -151,12 +149,15 @@ unsigned who(const RobotUse& use) {
 }  // namespace
 
 Findings check(const RobotFiles& robot, const RobotUse& use) {
-  std::optional<model::InterpretedKernels> kernels;
-  if (auto mechanism = model::make_mechanism(robot.tree, robot.spec, model::Frames::kAsDescribed)) {
-    kernels.emplace(std::move(*mechanism), robot.config.name);
-  }
-  const Subject subject{robot, use, kernels ? kernels->get() : nullptr};
   Findings findings;
+  auto mechanism = model::make_mechanism(robot.tree, robot.spec, model::Frames::kAsDescribed);
+  if (!mechanism) {
+    findings.add_error(mechanism.error());  // no kernels can be made of it, and little be checked
+    if (findings.errors.back().file.empty()) findings.errors.back().file = robot.config.file;
+    return findings;
+  }
+  const model::InterpretedKernels kernels(std::move(*mechanism), robot.config.name);
+  const Subject subject{robot, use, *kernels.get()};
   for (const Row& row : kRows) {
     if ((row.who & who(use)) != 0) row.look(subject, findings);
   }

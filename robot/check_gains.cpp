@@ -61,8 +61,8 @@ std::optional<Error> ringing_loops(const hal::RobotConfig& config, const tandem_
 }  // namespace
 
 void check_gains(const Subject& s, Findings& findings) {
-  if (s.kernels == nullptr || s.use.postures.empty()) return;
-  auto warning = ringing_loops(s.robot.config, *s.kernels, s.use.postures.front());
+  if (s.use.postures.empty()) return;
+  auto warning = ringing_loops(s.robot.config, s.kernels, s.use.postures.front());
   if (warning) findings.warn(std::move(*warning));
 }
 

@@ -11,7 +11,7 @@ namespace tandem::robot {
 struct Subject {
   const RobotFiles& robot;
   const RobotUse& use;
-  const tandem_kernels* kernels;  ///< null: they cannot be made, which is said when they are
+  const tandem_kernels& kernels;  ///< interpreted from the description
 };
 
 /// Postures whose lowest point of a sole is inside the ground: by more than 5 mm, and by more than

@@ -89,10 +89,8 @@ std::optional<Error> too_weak_at(const RobotFiles& robot, const tandem_kernels& 
 }  // namespace
 
 void check_torques(const Subject& s, Findings& findings) {
-  if (s.kernels == nullptr) return;
   for (const std::string& posture : s.use.postures) {
-    if (auto warning = too_weak_at(s.robot, *s.kernels, posture))
-      findings.warn(std::move(*warning));
+    if (auto warning = too_weak_at(s.robot, s.kernels, posture)) findings.warn(std::move(*warning));
   }
 }
 

@@ -1,4 +1,4 @@
-// What `tandem joint gains` is told of gains.
+// The judgement of gains that `tandem joint gains` prints.
 // Layer: apps/robot.  Thread: any, one at a time; not the loop's.
 #pragma once
 

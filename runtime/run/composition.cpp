@@ -2,10 +2,7 @@
 
 #include <fmt/core.h>
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <filesystem>
 
 #include "base/quoting.hpp"
 #include "controllers/hosted_call.hpp"

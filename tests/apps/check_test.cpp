@@ -475,5 +475,22 @@ TEST_F(Check, SaysTheSameOfARobotWhoeverAsks) {
   }
 }
 
+/// Once each, whoever finds it first: the check of the robot or the kernels' maker.
+TEST_F(Check, FindsWhatNoKernelsCanBeMadeOf) {
+  write_text(folder_ / "robot.toml", read_text(folder_ / "robot.toml") +
+                                         "\n[[sensor]]\nname = \"wrist\"\ntype = \"force_torque\"\n"
+                                         "bus = \"arm\"\nnode_id = 20\njoint = \"joint1\"\n"
+                                         "link = \"link2\"\n");
+  for (const std::string command :
+       {"check robot.toml", "check hold.toml", "run hold.toml", "emulate robot.toml"}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 2) << command;
+    const std::string error = "link 'link2' turns against both sides of joint 'joint1'";
+    const std::size_t at = outcome.err.find(error);
+    ASSERT_NE(at, std::string::npos) << command << outcome.err;
+    EXPECT_EQ(outcome.err.find(error, at + 1), std::string::npos) << command << ": twice";
+  }
+}
+
 }  // namespace
 }  // namespace tandem::apps

@@ -162,7 +162,8 @@ TEST(ProfileDrive, QuickStopDisablesIt) {
   rig.steps(100);
   ASSERT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
   EXPECT_TRUE(rig.drive.enabled());
-  ASSERT_FALSE(rig.drive.set_points.empty()) << "enabled anew, it is told its place anew";
+  ASSERT_FALSE(rig.drive.set_points.empty())
+      << "a drive that is enabled again gets a set-point again";
   EXPECT_NEAR(static_cast<double>(rig.drive.set_points.front()) * kRadPerCount, rest, 1e-9);
 }
 

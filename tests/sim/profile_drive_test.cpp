@@ -156,7 +156,7 @@ TEST_P(ProfileChain, QuickStopBringsItToRest) {
             hal::DriveState::kOperationEnabled);
 }
 
-/// A cut cable is to the drive what a dead controller is: nobody asks for a stop.
+/// A cut cable stands for a dead controller: the drive gets no request to stop.
 TEST_P(ProfileChain, ACutCableAndAnEmergencyStopBringItToRest) {
   for (const hal::FaultKind kind : {hal::FaultKind::kBusDown, hal::FaultKind::kEmergencyStop}) {
     for (const ControlMode mode : {ControlMode::kPosition, ControlMode::kVelocity}) {
