@@ -3,6 +3,7 @@
 // Layer: hal.  Thread: any.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace tandem::hal {
@@ -23,32 +24,23 @@ enum class StopCategory : std::uint8_t {
   return category != StopCategory::kCategory2 && category != StopCategory::kWarn;
 }
 
-/// Why a joint is in fault.
+/// Why a joint is in fault: a row each in hal/fault_causes.inc.
 enum class FaultCause : std::uint8_t {
-  kDrive,           ///< the drive itself: see its error code
-  kEmergencyInput,  ///< the emergency stop input of its board
-  kNotEnabled,      ///< it was not enabled in time
-  kLeftEnabled,     ///< it was disabled, and not by us
-  kBoardSilent,     ///< no feedback of its board
-  kHeartbeatLost,   ///< of its board
-  kBoardRebooted,
-  kBoardStopped,  ///< its board left NMT operational by itself
-  kBoardRefused,  ///< its board cannot be configured
-  kTwoBoards,     ///< two boards answer under its board's id
-  kNotFollowing,  ///< its position stays away from its command
-  kGuardingLost,  ///< its board does not answer node guarding any more
-  kIgnoresStop,   ///< its drive stays enabled after a stop; its board was told to stop
-  // Its motion, as the master measures it
-  kTooFast,      ///< faster than its maximum velocity
-  kTooStrong,    ///< its torque is beyond its maximum
-  kTooPowerful,  ///< its power is beyond that of both maxima
-  kSwings,       ///< its loop swings it about its reference
+#define TANDEM_FAULT_CAUSE(name, whose, text, meaning) name,
+#include "hal/fault_causes.inc"
+#undef TANDEM_FAULT_CAUSE
 };
 
-/// Whether the joint's board is the matter, and not its drive alone.
+/// Whether the joint's board is in trouble, and not its drive alone.
 [[nodiscard]] constexpr bool is_of_board(FaultCause cause) noexcept {
-  return cause >= FaultCause::kBoardSilent && cause != FaultCause::kNotFollowing &&
-         cause <= FaultCause::kIgnoresStop;
+  constexpr bool drive = false;
+  constexpr bool board = true;
+  constexpr bool kOfBoard[] = {
+#define TANDEM_FAULT_CAUSE(name, whose, text, meaning) whose,
+#include "hal/fault_causes.inc"
+#undef TANDEM_FAULT_CAUSE
+  };
+  return kOfBoard[static_cast<std::size_t>(cause)];
 }
 
 /// As the TOML has it: "category0".

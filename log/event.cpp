@@ -12,53 +12,6 @@
 
 namespace tandem::log {
 
-const char* to_string(EventKind kind) noexcept {
-  switch (kind) {
-    case EventKind::kStarted: return "started";
-    case EventKind::kBringUpDone: return "bring-up done";
-    case EventKind::kControllersDone: return "controllers done";
-    case EventKind::kFault: return "fault";
-    case EventKind::kSensorLost: return "sensor lost";
-    case EventKind::kLimited: return "command limited";
-    case EventKind::kOverrun: return "overrun";
-    case EventKind::kStopRequested: return "stop requested";
-    case EventKind::kShutDown: return "shut down";
-    case EventKind::kInjected: return "injected";
-    case EventKind::kEmergencyStop: return "emergency stop";
-    case EventKind::kResetRequested: return "reset requested";
-    case EventKind::kResetDone: return "reset done";
-    case EventKind::kResetFailed: return "reset failed";
-    case EventKind::kControllersSwitched: return "controllers switched";
-    case EventKind::kJointSet: return "mode or impedance set";
-    case EventKind::kGainsSet: return "gains set";
-    case EventKind::kFeedbackLost: return "fault: no feedback";
-    case EventKind::kUnclaimed: return "fault: unclaimed write";
-    case EventKind::kBringUpFailed: return "fault: the drives were not enabled in time";
-    case EventKind::kTooLate: return "fault: too many late cycles";
-    case EventKind::kOwnerLost: return "fault: the remote owner is gone, or late";
-    case EventKind::kFell: return "fault: the robot fell";
-    case EventKind::kMotionRequested: return "motion requested";
-    case EventKind::kMotionStopped: return "motion stopped";
-    case EventKind::kRecoveryRequested: return "recovery requested";
-    case EventKind::kCollision: return "fault: collision";
-    case EventKind::kGap: return "gap in the recording";
-    case EventKind::kHomingRequested: return "homing requested";
-    case EventKind::kHomed: return "homed";
-    case EventKind::kHomingFailed: return "homing failed";
-    case EventKind::kLinkLost: return "link lost";
-    case EventKind::kLinkBack: return "link back";
-  }
-  return "?";
-}
-
-bool is_fault(EventKind kind) noexcept {
-  return kind == EventKind::kFault || kind == EventKind::kEmergencyStop ||
-         kind == EventKind::kCollision ||
-         (kind >= EventKind::kFeedbackLost && kind <= EventKind::kFell);
-}
-
-bool is_stop(const Event& event) noexcept { return is_fault(event.kind) && event.reported == 0; }
-
 namespace {
 
 /// `before` and the name at `index`; empty where there is none.
@@ -78,8 +31,10 @@ std::string whose(const Event& event, const EventNames& names) {
   }
 }
 
+// What a text says of an event's code and value: the column `detail` of the table.
+
 /// ": to 0.5 rad (28.65 deg)", ": to 0.02 m".
-std::string target_text(const Event& event) {
+std::string target(const Event& event, const EventNames&) {
   char text[64];
   const double target = event.value;
   if (event.code == 1) {
@@ -91,52 +46,87 @@ std::string target_text(const Event& event) {
   return text;
 }
 
-/// What follows the name of an event whose code is not 0: the code in words, or as a number.
-std::string text_of(const Event& event, bool has_joint) {
-  switch (event.kind) {
-    case EventKind::kOverrun: return ": " + std::to_string(event.code) + " cycles skipped";
-    case EventKind::kGap: return ": " + std::to_string(event.code) + " cycles missing";
-    case EventKind::kSensorLost:
-    case EventKind::kFeedbackLost: return " for " + std::to_string(event.code) + " cycles";
-    case EventKind::kInjected:
-    case EventKind::kUnclaimed:
-    case EventKind::kBringUpFailed:
-    case EventKind::kTooLate:
-    case EventKind::kOwnerLost: return "";
-    case EventKind::kLinkLost:
-      return event.code == 1 ? ": the robot follows no command" : ": no state comes";
-    case EventKind::kCollision: {
-      const bool force = !has_joint && event.value >= -3.0F;  // -1 to -6: of the base
-      char torque[64];
-      std::snprintf(torque, sizeof torque, "%s: an external %s of %.3g %s",
-                    has_joint ? "" : " of the base", force ? "force" : "torque", 1e-3 * event.code,
-                    force ? "N" : "Nm");
-      return torque;
-    }
-    case EventKind::kHomingFailed:
-      return std::string(": ") + hal::to_string(static_cast<hal::HomingError>(event.code));
-    case EventKind::kFell: {
-      constexpr const char* kHow[] = {"",
-                                      ": its base is tilted",
-                                      ": its base is low",
-                                      ": its base is high",
-                                      ": no foot touches the ground",
-                                      ": a foot is below the ground"};
-      return event.code < std::size(kHow) ? kHow[event.code] : "";
-    }
-    case EventKind::kLimited:
-      return event.code == static_cast<std::uint32_t>(Code::kNotFinite) ? ": it was not finite"
-                                                                        : ": it was out of range";
-    case EventKind::kFault:
-      if (!has_joint) {
-        return std::string(": ") + tandem::to_string(static_cast<Code>(event.code));
-      }
-      [[fallthrough]];
-    default: break;
-  }
+std::string nothing(const Event&, const EventNames&) { return ""; }
+
+std::string hex_code(const Event& event, const EventNames&) {
   char code[16];
   std::snprintf(code, sizeof code, " (0x%04X)", event.code);
   return code;
+}
+
+std::string cycles_skipped(const Event& event, const EventNames&) {
+  return ": " + std::to_string(event.code) + " cycles skipped";
+}
+
+std::string cycles_missing(const Event& event, const EventNames&) {
+  return ": " + std::to_string(event.code) + " cycles missing";
+}
+
+std::string for_cycles(const Event& event, const EventNames&) {
+  return " for " + std::to_string(event.code) + " cycles";
+}
+
+std::string link(const Event& event, const EventNames&) {
+  return event.code == 1 ? ": the robot follows no command" : ": no state comes";
+}
+
+std::string homing(const Event& event, const EventNames&) {
+  return std::string(": ") + hal::to_string(static_cast<hal::HomingError>(event.code));
+}
+
+std::string limited(const Event& event, const EventNames&) {
+  return event.code == static_cast<std::uint32_t>(Code::kNotFinite) ? ": it was not finite"
+                                                                    : ": it was out of range";
+}
+
+std::string emergency(const Event& event, const EventNames&) {
+  return event.code == 1 ? " by a signal" : event.code == 3 ? " by the watchdog" : " on request";
+}
+
+bool has_joint(const Event& event, const EventNames& names) {
+  return event.joint >= 0 && static_cast<std::size_t>(event.joint) < names.joints.size();
+}
+
+std::string fault_code(const Event& event, const EventNames& names) {
+  if (has_joint(event, names)) return hex_code(event, names);
+  return std::string(": ") + tandem::to_string(static_cast<Code>(event.code));
+}
+
+std::string collision(const Event& event, const EventNames& names) {
+  const bool of_joint = has_joint(event, names);
+  const bool force = !of_joint && event.value >= -3.0F;  // -1 to -6: of the base
+  char torque[64];
+  std::snprintf(torque, sizeof torque, "%s: an external %s of %.3g %s",
+                of_joint ? "" : " of the base", force ? "force" : "torque", 1e-3 * event.code,
+                force ? "N" : "Nm");
+  return torque;
+}
+
+std::string fall(const Event& event, const EventNames&) {
+  constexpr const char* kHow[] = {"",
+                                  ": its base is tilted",
+                                  ": its base is low",
+                                  ": its base is high",
+                                  ": no foot touches the ground",
+                                  ": a foot is below the ground"};
+  return event.code < std::size(kHow) ? kHow[event.code] : "";
+}
+
+struct EventRow {
+  enum Role : std::uint8_t { note, fault } role;
+  const char* words;
+  std::string (*detail)(const Event&, const EventNames&);
+};
+constexpr EventRow kRows[] = {
+#define TANDEM_EVENT(name, role, words, detail, meaning) {EventRow::role, words, detail},
+#include "log/event_kinds.inc"
+#undef TANDEM_EVENT
+};
+
+/// Null of a kind that a file of another program has.
+const EventRow* row_of(EventKind kind) {
+  const auto index = static_cast<std::size_t>(kind);
+  return index < std::size(kRows) ? &kRows[index] : nullptr;
 }
 
 std::string what_happened(const Event& event, const EventNames& names) {
@@ -145,19 +135,26 @@ std::string what_happened(const Event& event, const EventNames& names) {
     text += " " + std::string(hal::to_string(static_cast<hal::FaultKind>(event.code)));
   }
   text += whose(event, names);
-  const bool has_joint =
-      event.joint >= 0 && static_cast<std::size_t>(event.joint) < names.joints.size();
-  if (event.kind == EventKind::kEmergencyStop) {
-    return text + (event.code == 1   ? " by a signal"
-                   : event.code == 3 ? " by the watchdog"
-                                     : " on request");
-  }
-  if (event.kind == EventKind::kMotionRequested) return text + target_text(event);
-  if (event.code == 0) return text;
-  return text + text_of(event, has_joint);
+  const EventRow* row = row_of(event.kind);
+  if (row == nullptr) return text;
+  // A motion's 0 is a unit, an emergency stop's a request: of others it says nothing.
+  const bool tells = event.code != 0 || row->detail == target || row->detail == emergency;
+  return tells ? text + row->detail(event, names) : text;
 }
 
 }  // namespace
+
+const char* to_string(EventKind kind) noexcept {
+  const EventRow* row = row_of(kind);
+  return row == nullptr ? "?" : row->words;
+}
+
+bool is_fault(EventKind kind) noexcept {
+  const EventRow* row = row_of(kind);
+  return row != nullptr && row->role == EventRow::fault;
+}
+
+bool is_stop(const Event& event) noexcept { return is_fault(event.kind) && event.reported == 0; }
 
 std::string describe(const Event& event, const EventNames& names) {
   return what_happened(event, names) + (event.reported != 0 ? ", reported" : "");

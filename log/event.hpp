@@ -14,40 +14,11 @@
 
 namespace tandem::log {
 
+/// A row each in log/event_kinds.inc.
 enum class EventKind : std::uint8_t {
-  kStarted = 0,          ///< the first cycle
-  kBringUpDone,          ///< every axis follows the command; controllers start
-  kControllersDone,      ///< the duration is over, or every controller is done
-  kFault,                ///< a joint, the backend or a controller is in fault
-  kSensorLost,           ///< a sensor's sample is too old
-  kLimited,              ///< a command was limited for the first time (per joint)
-  kOverrun,              ///< the loop skipped `code` cycles
-  kStopRequested,        ///< from outside: signal or caller
-  kShutDown,             ///< the drives are disabled
-  kInjected,             ///< a fault was injected: `code` is its hal::FaultKind
-  kEmergencyStop,        ///< `code`: 1 by a signal, 2 on request, 3 by the watchdog
-  kResetRequested,       ///< of the latched faults
-  kResetDone,            ///< every joint is enabled again
-  kResetFailed,          ///< a cause is still there
-  kControllersSwitched,  ///< on request: some were stopped, some started
-  kJointSet,             ///< on request: a joint's mode, interaction or impedance
-  kGainsSet,             ///< on request: gains of a joint's drive
-  kFeedbackLost,         ///< a fault: none of a joint for `code` cycles
-  kUnclaimed,            ///< a fault: a controller wrote to a joint that it had not claimed
-  kBringUpFailed,        ///< a fault: the drives were not enabled in time
-  kTooLate,              ///< a fault: too many late cycles
-  kOwnerLost,            ///< a fault: of the owner in another process; `code`: 0 it asked for it
-  kFell,                 ///< a fault: the robot fell; `code`: how (the text says it)
-  kMotionRequested,      ///< on request: of a joint to `value`; `code`: 0 in rad, 1 in m
-  kMotionStopped,        ///< on request: a joint brakes
-  kRecoveryRequested,    ///< on request: a joint goes back to its limits
-  kCollision,            ///< a fault: something pushes a joint; `code`: its torque [mNm or mN]
-  kGap,                  ///< of an imported log: `code` cycles are missing before this one
-  kHomingRequested,      ///< on request: a drive looks for its joint's place
-  kHomed,                ///< it has found it
-  kHomingFailed,         ///< `code`: its hal::HomingError
-  kLinkLost,             ///< to a robot far away; `code`: its hal::LinkLoss
-  kLinkBack,             ///< the robot follows commands again
+#define TANDEM_EVENT(name, role, words, detail, meaning) name,
+#include "log/event_kinds.inc"
+#undef TANDEM_EVENT
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 /// Whether it is a fault, of whatever, or an emergency stop.

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -11,27 +12,35 @@
 #include "base/realtime.hpp"
 #include "hal/backend.hpp"
 #include "hal/stop_category.hpp"
+#include "log/event.hpp"
 
 namespace tandem::runtime {
 
+/// A row each in runtime/fault_sources.inc.
 enum class FaultSource : std::uint8_t {
-  kDrive,          ///< a drive is in fault; `code` is its CiA 402 error code
-  kJointLost,      ///< no feedback of a joint for too long; `code` is its age in cycles
-  kSensorLost,     ///< the same of a sensor
-  kBackend,        ///< read, write or the backend as a whole; `code` is a Code
-  kController,     ///< a controller gave up; `code` is a Code
-  kCommand,        ///< a controller's command was not finite
-  kOverrun,        ///< too many late cycles
-  kBringUp,        ///< the drives were not enabled in time
-  kEmergencyStop,  ///< asked for from outside; `code` is an EmergencyInput
-  kOwner,          ///< the owner in another process; `code` is a hal::OwnerLoss, kNone: it asked
-  kStray,          ///< a controller wrote what it had not claimed; `index` joint, `code` controller
-  kNotHomed,       ///< controllers waited for a joint that was not homed; `code`: its HomingError
-  kFall,           ///< the robot fell; `code` is a FallKind, `index` its thousandths
-  kCollision,  ///< something pushes a joint; `code` is its external torque [mNm or mN]; a floating
-               ///< base: `index` is -1 - k, k of estimation::kBaseChannels
-  kLink,       ///< the link to a robot far away; `code` is a hal::LinkLoss
+#define TANDEM_FAULT(name, strikes, event, text, meaning) name,
+#include "runtime/fault_sources.inc"
+#undef TANDEM_FAULT
 };
+
+/// What a FaultRecord's `index` counts.
+enum class FaultStrikes : std::uint8_t { kRobot, kJoint, kSensor, kController };
+
+/// What follows from a fault's row.
+struct SourceRow {
+  FaultStrikes strikes;
+  log::EventKind event;
+};
+
+[[nodiscard]] constexpr SourceRow row_of(FaultSource source) noexcept TANDEM_RT {
+  constexpr SourceRow kRows[] = {
+#define TANDEM_FAULT(name, strikes, event, text, meaning) \
+  {FaultStrikes::strikes, log::EventKind::event},
+#include "runtime/fault_sources.inc"
+#undef TANDEM_FAULT
+  };
+  return kRows[static_cast<std::size_t>(source)];
+}
 
 /// Where an emergency stop came from. That of a board's input is a fault of its drives.
 enum class EmergencyInput : std::uint32_t {

@@ -10,8 +10,8 @@ namespace tandem::runtime {
 
 namespace {
 
-std::string emergency_text(EmergencyInput input) {
-  switch (input) {
+std::string emergency_text(const FaultRecord& record, const FaultContext&) {
+  switch (static_cast<EmergencyInput>(record.code)) {
     case EmergencyInput::kSignal: return "emergency stop by a signal";
     case EmergencyInput::kRequest: return "emergency stop on request";
     case EmergencyInput::kWatchdog: return "emergency stop by the watchdog: the loop hung";
@@ -19,8 +19,8 @@ std::string emergency_text(EmergencyInput input) {
   return {};
 }
 
-std::string owner_text(hal::OwnerLoss loss) {
-  switch (loss) {
+std::string owner_text(const FaultRecord& record, const FaultContext&) {
+  switch (static_cast<hal::OwnerLoss>(record.code)) {
     case hal::OwnerLoss::kNone: return "the remote owner asked for a stop";
     case hal::OwnerLoss::kSilent: return "the remote owner is gone: its lease has run out";
     case hal::OwnerLoss::kStale: return "the remote owner's commands stopped, or came too late";
@@ -29,8 +29,9 @@ std::string owner_text(hal::OwnerLoss loss) {
   return {};
 }
 
-std::string link_text(hal::LinkLoss loss) {
-  if (loss == hal::LinkLoss::kStates) return "the link is lost: no state of the robot comes";
+std::string link_text(const FaultRecord& record, const FaultContext&) {
+  if (static_cast<hal::LinkLoss>(record.code) == hal::LinkLoss::kStates)
+    return "the link is lost: no state of the robot comes";
   return "the link is lost: states of the robot come, but it follows no command";
 }
 
@@ -60,52 +61,73 @@ std::string not_homed_text(const FaultRecord& record, const FaultContext& about)
          ") failed: " + hal::to_string(error) + "; " + hal::next_step(error);
 }
 
-std::string text_of(const FaultRecord& record, const FaultContext& about) {
-  const std::string count = std::to_string(record.code);
-  const char* code = tandem::to_string(static_cast<Code>(record.code));
-  switch (record.source) {
-    case FaultSource::kDrive: return about.backend.fault_text(record.cause, record.code);
-    case FaultSource::kJointLost: return "no feedback for " + count + " cycles";
-    case FaultSource::kSensorLost: return "no sample for " + count + " cycles";
-    case FaultSource::kBackend: return "the robot answered " + std::string(code);
-    case FaultSource::kController:
-      return record.code > static_cast<std::uint32_t>(Code::kStopped)
-                 ? "the controller gave up, with a code that there is not: " + count
-                 : "the controller gave up: " + std::string(code);
-    case FaultSource::kCommand: return "a controller's command was not a finite number";
-    case FaultSource::kStray:
-      return "the controller '" + about.controllers.name(record.code) +
-             "' wrote to this joint, its mode or its gains without a claim, or what the joint "
-             "cannot do: taken back";
-    case FaultSource::kOverrun:
-      return std::to_string(about.config.loop.stop_late) + " of the last " +
-             std::to_string(about.config.loop.stop_window) + " cycles were late";
-    case FaultSource::kBringUp: return "the drives were not enabled in time";
-    case FaultSource::kNotHomed: return not_homed_text(record, about);
-    case FaultSource::kEmergencyStop:
-      return emergency_text(static_cast<EmergencyInput>(record.code));
-    case FaultSource::kOwner: return owner_text(static_cast<hal::OwnerLoss>(record.code));
-    case FaultSource::kLink: return link_text(static_cast<hal::LinkLoss>(record.code));
-    case FaultSource::kCollision:
-      return std::string("collision: an external ") +
-             (record.index < 0 && record.index > -4 ? "force" : "torque") + " of " +
-             in_units(record, about);
-    case FaultSource::kFall:
-      return fall_text({static_cast<FallKind>(record.code), record.index}, about.config.fall);
+std::string drive_text(const FaultRecord& record, const FaultContext& about) {
+  return about.backend.fault_text(record.cause, record.code);
+}
+
+std::string no_feedback(const FaultRecord& record, const FaultContext&) {
+  return "no feedback for " + std::to_string(record.code) + " cycles";
+}
+
+std::string no_sample(const FaultRecord& record, const FaultContext&) {
+  return "no sample for " + std::to_string(record.code) + " cycles";
+}
+
+std::string backend_text(const FaultRecord& record, const FaultContext&) {
+  return std::string("the robot answered ") + tandem::to_string(static_cast<Code>(record.code));
+}
+
+std::string controller_text(const FaultRecord& record, const FaultContext&) {
+  if (record.code > static_cast<std::uint32_t>(Code::kStopped)) {
+    return "the controller gave up, with a code that there is not: " + std::to_string(record.code);
   }
-  return {};
+  return std::string("the controller gave up: ") +
+         tandem::to_string(static_cast<Code>(record.code));
+}
+
+std::string command_text(const FaultRecord&, const FaultContext&) {
+  return "a controller's command was not a finite number";
+}
+
+std::string stray_text(const FaultRecord& record, const FaultContext& about) {
+  return "the controller '" + about.controllers.name(record.code) +
+         "' wrote to this joint, its mode or its gains without a claim, or what the joint cannot "
+         "do: taken back";
+}
+
+std::string overrun_text(const FaultRecord&, const FaultContext& about) {
+  return std::to_string(about.config.loop.stop_late) + " of the last " +
+         std::to_string(about.config.loop.stop_window) + " cycles were late";
+}
+
+std::string bring_up_text(const FaultRecord&, const FaultContext&) {
+  return "the drives were not enabled in time";
+}
+
+std::string collision_text(const FaultRecord& record, const FaultContext& about) {
+  const bool force = record.index < 0 && record.index > -4;
+  return std::string("collision: an external ") + (force ? "force" : "torque") + " of " +
+         in_units(record, about);
+}
+
+std::string fell_text(const FaultRecord& record, const FaultContext& about) {
+  return fall_text({static_cast<FallKind>(record.code), record.index}, about.config.fall);
+}
+
+std::string text_of(const FaultRecord& record, const FaultContext& about) {
+  static constexpr std::string (*kTexts[])(const FaultRecord&, const FaultContext&) = {
+#define TANDEM_FAULT(name, strikes, event, text, meaning) text,
+#include "runtime/fault_sources.inc"
+#undef TANDEM_FAULT
+  };
+  return kTexts[static_cast<std::size_t>(record.source)](record, about);
 }
 
 /// The joint, sensor or controller that the fault is about, and a joint's board.
 void name_it(const FaultRecord& record, const FaultContext& about, Fault& fault) {
   const auto index = static_cast<std::size_t>(record.index);
-  switch (record.source) {
-    case FaultSource::kDrive:
-    case FaultSource::kJointLost:
-    case FaultSource::kCommand:
-    case FaultSource::kStray:
-    case FaultSource::kCollision:
-    case FaultSource::kNotHomed:
+  switch (row_of(record.source).strikes) {
+    case FaultStrikes::kJoint:
       if (record.index < 0) {
         fault.joint = "base";
         break;
@@ -113,16 +135,13 @@ void name_it(const FaultRecord& record, const FaultContext& about, Fault& fault)
       fault.joint = about.robot.joints[index].name;
       fault.board = about.robot.joints[index].board;
       break;
-    case FaultSource::kSensorLost: fault.joint = about.robot.sensors[index].name; break;
-    case FaultSource::kController: fault.joint = about.controllers.name(index); break;
-    case FaultSource::kEmergencyStop:
-      if (static_cast<EmergencyInput>(record.code) == EmergencyInput::kWatchdog &&
-          record.index >= 0) {
-        fault.joint = about.controllers.name(index);
-      }
-      break;
-    default: break;
+    case FaultStrikes::kSensor: fault.joint = about.robot.sensors[index].name; break;
+    case FaultStrikes::kController: fault.joint = about.controllers.name(index); break;
+    case FaultStrikes::kRobot: break;
   }
+  const bool hung = record.source == FaultSource::kEmergencyStop &&
+                    static_cast<EmergencyInput>(record.code) == EmergencyInput::kWatchdog;
+  if (hung && record.index >= 0) fault.joint = about.controllers.name(index);
 }
 
 }  // namespace

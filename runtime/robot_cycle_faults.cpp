@@ -18,38 +18,17 @@ void RobotCycle::emergency_stop(EmergencyInput input, StopCategory category,
          .category = category});
 }
 
-namespace {
-
-EventKind event_of(FaultSource source) noexcept TANDEM_RT {
-  switch (source) {
-    case FaultSource::kJointLost: return EventKind::kFeedbackLost;
-    case FaultSource::kSensorLost: return EventKind::kSensorLost;
-    case FaultSource::kOverrun: return EventKind::kTooLate;
-    case FaultSource::kBringUp: return EventKind::kBringUpFailed;
-    case FaultSource::kOwner: return EventKind::kOwnerLost;
-    case FaultSource::kStray: return EventKind::kUnclaimed;
-    case FaultSource::kFall: return EventKind::kFell;
-    case FaultSource::kCollision: return EventKind::kCollision;
-    case FaultSource::kLink: return EventKind::kLinkLost;
-    default: return EventKind::kFault;
-  }
-}
-
-}  // namespace
-
 /// Notes it, and carries out what its category says.
 void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
-  const bool of_joint =
-      record.source == FaultSource::kDrive || record.source == FaultSource::kJointLost ||
-      record.source == FaultSource::kCommand || record.source == FaultSource::kStray ||
-      record.source == FaultSource::kCollision || record.source == FaultSource::kNotHomed;
+  const SourceRow row = row_of(record.source);
   record.cycle = time_.cycle;
   record.time_ns = time_.time_ns;
   if (record.source != FaultSource::kEmergencyStop) {
-    const bool of_sensor = record.source == FaultSource::kSensorLost;
-    const bool of_base = record.source == FaultSource::kCollision && record.index < 0;
-    log_.event(time_, event_of(record.source), of_joint && !of_base ? record.index : -1,
-               record.code, of_sensor || of_base ? static_cast<float>(record.index) : 0.0F,
+    const bool of_joint = row.strikes == FaultStrikes::kJoint;
+    const bool of_base = of_joint && record.index < 0;
+    const bool by_value = row.strikes == FaultStrikes::kSensor || of_base;
+    log_.event(time_, row.event, of_joint && !of_base ? record.index : -1, record.code,
+               by_value ? static_cast<float>(record.index) : 0.0F,
                record.category == StopCategory::kWarn);
   }
   if (record.category == StopCategory::kCategory2 && !run_.in(RunPhase::kRetreating) &&
