@@ -69,6 +69,13 @@ class FaultLog {
   // The loop's.
   void note(const FaultRecord& record) noexcept TANDEM_RT;
   void clear(std::size_t index, std::int64_t time_ns) noexcept TANDEM_RT;
+  /// Clears those latched ones that `which`, a function of a record, picks.
+  template <class Which>
+  void clear_latched(std::int64_t time_ns, const Which& which) noexcept TANDEM_RT {
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (cleared_ns(i) == kLatched && which(records_[i])) clear(i, time_ns);
+    }
+  }
   void archive(Archive& ar);
 
   // Any thread's.

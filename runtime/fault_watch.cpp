@@ -2,6 +2,7 @@
 #include "runtime/fault_watch.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace tandem::runtime {
 namespace {
@@ -113,6 +114,19 @@ std::optional<FaultRecord> FaultWatch::fall(const hal::TruthImage& truth) noexce
                      .code = static_cast<std::uint32_t>(found.kind),
                      .source = FaultSource::kFall,
                      .category = hal::StopCategory::kCategory1};
+}
+
+std::optional<FaultRecord> FaultWatch::collision(estimation::Estimator& estimator,
+                                                 bool counts) noexcept TANDEM_RT {
+  const auto found = estimator.collision();
+  if (!found || !counts) return std::nullopt;
+  const double thousandths = std::clamp(1e3 * std::abs(found->torque_Nm), 0.0, 4e9);
+  const auto joints = static_cast<std::int32_t>(estimator.image().joints());
+  const auto channel = static_cast<std::int32_t>(found->joint);
+  return FaultRecord{.index = channel < joints ? channel : joints - 1 - channel,
+                     .code = static_cast<std::uint32_t>(thousandths),
+                     .source = FaultSource::kCollision,
+                     .category = estimator.reaction()};
 }
 
 void FaultWatch::reset(const hal::StateImage& state) noexcept TANDEM_RT {

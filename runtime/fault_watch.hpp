@@ -8,6 +8,7 @@
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
+#include "estimation/estimator.hpp"
 #include "hal/backend.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/truth.hpp"
@@ -45,6 +46,10 @@ class FaultWatch {
   /// A robot with feet that has fallen. For cycles in which controllers run: what has been stopped
   /// may lie as it likes.
   [[nodiscard]] std::optional<FaultRecord> fall(const hal::TruthImage& truth) noexcept TANDEM_RT;
+  /// What pushes a robot that moves: one that lies, or that somebody holds, feels more than itself.
+  /// @param counts  false: it is under no control, and this is no collision of its motion
+  [[nodiscard]] static std::optional<FaultRecord> collision(estimation::Estimator& estimator,
+                                                            bool counts) noexcept TANDEM_RT;
   /// Controllers start: flight is counted from here.
   void controllers_start() noexcept TANDEM_RT { fall_.begin(); }
 

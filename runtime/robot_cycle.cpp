@@ -2,10 +2,10 @@
 #include "runtime/robot_cycle.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <utility>
 
 #include "rt/scoped_realtime.hpp"
+#include "rt/stop_signal.hpp"
+#include "runtime/fault_text.hpp"
 
 namespace tandem::runtime {
 
@@ -28,161 +28,153 @@ class AtWork {
   Heartbeat* heartbeat_;
 };
 
-bool follows_position(std::int8_t mode) noexcept TANDEM_RT {
-  return mode == static_cast<std::int8_t>(hal::ControlMode::kPosition);
-}
-
 }  // namespace
 
+RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
+    : now_(parts, config),
+      inbox_(config.loop),
+      loop_(config.loop, parts.clock, &inbox_.clock()),
+      resets_(now_),
+      homing_(now_, resets_),
+      limits_(hal::robot_of(parts.robot), config.loop.period_ns),
+      arbiter_(now_, limits_, resets_, homing_),
+      waiting_(now_, arbiter_, homing_),
+      response_(now_, loop_, resets_, arbiter_, waiting_),
+      owner_(now_, inbox_, loop_, arbiter_, response_),
+      requests_(now_, inbox_, resets_, homing_, arbiter_, waiting_, response_),
+      services_(parts.robot, parts.controllers, inbox_, now_.progress, parts.controllers.gains()),
+      shown_(now_, loop_, resets_, homing_, arbiter_, limits_, services_),
+      trace_(config.trace_cycles),
+      joint_limited_(parts.robot.joints.size()) {}
+
 bool RobotCycle::step() noexcept {
-  if (run_.in(RunPhase::kDone)) return false;
-  rt::Tick tick = wait();
-  exchange(tick);
+  if (now_.run.in(RunPhase::kDone)) return false;
+  wait();
+  exchange();
   {
     const AtWork now(heartbeat_);
     read();
-    check(tick);
+    check();
   }
-  await_owner();
+  owner_.await();
   {
     const AtWork now(heartbeat_);
     take_inbox();
-    update(tick);
+    update();
     limit();
     write();
     hand_over();
   }
-  return !run_.in(RunPhase::kDone);
+  return !now_.run.in(RunPhase::kDone);
 }
 
 /// May block, as the backend's exchange() may and nothing else: for the cycle's time and, when time
 /// is simulated, for the log, and while it is paused.
-rt::Tick RobotCycle::wait() noexcept {
+void RobotCycle::wait() noexcept {
   show_snapshot();
   // Four images, and every event that one cycle can bring.
-  const std::size_t most = 4 + 16 + Inbox::kCapacity + 3 * watch_.joints() + watch_.sensors();
-  if (config_.loop.pacing == rt::Pacing::kSimulated) log_.wait_for_space(most);
-  const rt::Tick tick = loop_.wait();
-  time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
-  begin_ns_ = tick.begin_ns;
-  wakeup_ns_ = tick.wakeup_ns;
-  trace_.begin(tick);
-  return tick;
+  const std::size_t most =
+      4 + 16 + Inbox::kCapacity + 3 * now_.watch.joints() + now_.watch.sensors();
+  if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
+  now_.tick = loop_.wait();
+  trace_.begin(now_.tick);
 }
 
 /// May block until the robot has answered, which does not count as the cycle's work.
-void RobotCycle::exchange(rt::Tick& tick) noexcept {
-  backend_->exchange(time_);
-  if (const std::uint64_t missed = backend_->missed(); missed > 0) {
-    loop_.skip(tick, missed);
-    time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
+void RobotCycle::exchange() noexcept {
+  const auto tell_time = [this] {
+    now_.time = {now_.tick.cycle, now_.tick.time_ns, now_.config.loop.period_ns};
+  };
+  tell_time();
+  now_.backend.exchange(now_.time);
+  if (const std::uint64_t missed = now_.backend.missed(); missed > 0) {
+    loop_.skip(now_.tick, missed);
+    tell_time();
   }
-  if (backend_->waits_for_bus()) trace_.mark(CycleStage::kExchange, loop_.exchanged());
+  if (now_.backend.waits_for_bus()) trace_.mark(CycleStage::kExchange, loop_.exchanged());
 }
 
 void RobotCycle::read() noexcept TANDEM_RT {
-  read_code_ = backend_->read(time_, state_);
-  loop_.shift(backend_->clock_shift_ns());
-  state_.cycle()[0] = time_.cycle;
-  state_.time_ns()[0] = time_.time_ns;
-  if (!started_) event(EventKind::kStarted);
+  now_.read_code = now_.backend.read(now_.time, now_.state);
+  loop_.shift(now_.backend.clock_shift_ns());
+  now_.state.cycle()[0] = now_.time.cycle;
+  now_.state.time_ns()[0] = now_.time.time_ns;
+  if (!started_) now_.event(EventKind::kStarted);
   started_ = true;
   for (int most = 4; most > 0; --most) {  // of a cycle, for there is only so much room in the log
-    const hal::InjectedFault injected = backend_->next_injected();
+    const hal::InjectedFault injected = now_.backend.next_injected();
     if (injected.kind == hal::FaultKind::kNone) break;
-    log_.event(time_, injected);
+    now_.log.event(now_.time, injected);
   }
-  trace_.mark(CycleStage::kRead, *clock_);
+  trace_.mark(CycleStage::kRead, now_.clock);
 }
 
 /// Checks the loop, the joints, the sensors, the body and the backend; then what time brings.
-void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
-  if (tick.skipped > 0) event(EventKind::kOverrun, -1, static_cast<std::uint32_t>(tick.skipped));
-  if (tick.stop && !run_.in(RunPhase::kFaulted) && !run_.in(RunPhase::kShutDown)) {
-    fault({.source = FaultSource::kOverrun, .category = StopCategory::kCategory1});
+void RobotCycle::check() noexcept TANDEM_RT {
+  const RunMachine& run = now_.run;
+  const rt::Tick& tick = now_.tick;
+  if (tick.skipped > 0) {
+    now_.event(EventKind::kOverrun, -1, static_cast<std::uint32_t>(tick.skipped));
   }
-  if (estimator_ != nullptr) estimator_->update(state_);
-  if (!run_.in(RunPhase::kBringUp) && !run_.in(RunPhase::kShutDown)) {
-    while (const auto found = watch_.next_joint(state_)) fault(*found);
-    while (const auto found = watch_.next_sensor(state_)) fault(*found);
-  } else if (run_.in(RunPhase::kShutDown)) {
-    while (const auto found = watch_.next_disobedient(state_)) fault(*found);
+  if (tick.stop && !run.in(RunPhase::kFaulted) && !run.in(RunPhase::kShutDown)) {
+    response_.raise({.source = FaultSource::kOverrun, .category = StopCategory::kCategory1});
   }
-  if (run_.controllers_run() && truth_ != nullptr) {
-    if (const auto found = watch_.fall(*truth_)) fault(*found);
+  if (now_.estimator != nullptr) now_.estimator->update(now_.state);
+  if (!run.in(RunPhase::kBringUp) && !run.in(RunPhase::kShutDown)) {
+    while (const auto found = now_.watch.next_joint(now_.state)) response_.raise(*found);
+    while (const auto found = now_.watch.next_sensor(now_.state)) response_.raise(*found);
+  } else if (run.in(RunPhase::kShutDown)) {
+    while (const auto found = now_.watch.next_disobedient(now_.state)) response_.raise(*found);
   }
-  check_collisions();
-  check_link();
-  check_backend(read_code_);
+  if (run.controllers_run() && now_.truth != nullptr) {
+    if (const auto found = now_.watch.fall(*now_.truth)) response_.raise(*found);
+  }
+  if (now_.estimator != nullptr && (run.controllers_run() || run.in(RunPhase::kHeld))) {
+    // What touches the robot already when an operator's motion begins is no collision of that
+    // motion: it may be what the robot is to be led away from.
+    const bool moves = run.controllers_run() || now_.controllers.leads();
+    if (const auto found = FaultWatch::collision(*now_.estimator, moves)) response_.raise(*found);
+  }
+  response_.check_link();
+  response_.check_backend(now_.read_code);
   advance_phase();
-  watch_drive_resets();
-  watch_homing();
-}
-
-/// While something moves: a robot that lies, or that somebody holds, feels more than itself. What
-/// touches it already when an operator's motion begins is no collision of that motion: it may be
-/// what the robot is to be led away from.
-void RobotCycle::check_collisions() noexcept TANDEM_RT {
-  const bool held = run_.in(RunPhase::kHeld);
-  if (estimator_ == nullptr || !(run_.controllers_run() || held)) return;
-  const auto found = estimator_->collision();
-  if (!found || (held && !controllers_->leads())) return;
-  const double thousandths = std::clamp(1e3 * std::abs(found->torque_Nm), 0.0, 4e9);
-  const auto joints = static_cast<std::int32_t>(estimator_->image().joints());
-  const auto channel = static_cast<std::int32_t>(found->joint);
-  fault({.index = channel < joints ? channel : joints - 1 - channel,
-         .code = static_cast<std::uint32_t>(thousandths),
-         .source = FaultSource::kCollision,
-         .category = estimator_->reaction()});
-}
-
-const hal::EstimateImage* RobotCycle::estimate() const noexcept TANDEM_RT {
-  return estimator_ == nullptr ? nullptr : &estimator_->image();
-}
-
-/// A missed sample shows as age, a lost command as the board's own time-out, and a drive's fault
-/// as its joint's: the joint's stop category decides then. All else stops the robot.
-void RobotCycle::check_backend(Code code) noexcept TANDEM_RT {
-  if (run_.in(RunPhase::kShutDown)) return;
-  if (code == Code::kDiverged) {
-    fault({.code = static_cast<std::uint32_t>(code),
-           .source = FaultSource::kBackend,
-           .category = StopCategory::kCategory1});
-    return on(RunEvent::kEnd);  // there is nothing left to wait for
-  }
-  if (run_.in(RunPhase::kFaulted) || run_.in(RunPhase::kResetting)) return;
-  if (backend_->phase() == hal::Phase::kFault && code == Code::kOk) code = Code::kFault;
-  if (code == Code::kOk || code == Code::kTimeout || code == Code::kQueueFull) return;
-  if (code == Code::kFault && watch_.joint_in_fault()) return;
-  fault({.code = static_cast<std::uint32_t>(code),
-         .source = FaultSource::kBackend,
-         .category = StopCategory::kCategory1});
+  arbiter_.tell_resets(false);
+  resets_.watch(arbiter_.command());
+  while (const auto ended = homing_.next_ended()) arbiter_.end_homing(*ended);
+  if (const auto failed = waiting_.home_at_start()) response_.raise(*failed);
 }
 
 /// The phase changes that nobody requests: when the backend is ready, and when time is over.
 void RobotCycle::advance_phase() noexcept TANDEM_RT {
-  const bool over = run_.time_is_over(time_.cycle);
-  switch (run_.phase()) {
+  const bool over = now_.run.time_is_over(now_.time.cycle);
+  switch (now_.run.phase()) {
     case RunPhase::kBringUp:
-      if (backend_->phase() == hal::Phase::kOperational) {
-        event(EventKind::kBringUpDone);
-        wait_for_homing();
-        on(RunEvent::kEnabled, held_back_ != 0);
+      if (now_.backend.phase() == hal::Phase::kOperational) {
+        now_.event(EventKind::kBringUpDone);
+        waiting_.wait_for_homing();
+        arbiter_.on(RunEvent::kEnabled, waiting_.any());
       } else if (over) {
-        fault({.source = FaultSource::kBringUp, .category = StopCategory::kCategory1});
+        response_.raise({.source = FaultSource::kBringUp, .category = StopCategory::kCategory1});
       }
       break;
     case RunPhase::kSettling:
-      if (over) on(RunEvent::kSettled);
+      if (over) arbiter_.on(RunEvent::kSettled);
       break;
-    case RunPhase::kResetting: watch_reset(); break;
+    case RunPhase::kResetting:
+      if (!response_.watch_reset()) break;
+      waiting_.hold_back();
+      arbiter_.on(RunEvent::kEnabled, waiting_.any());
+      break;
     case RunPhase::kRunning:
     case RunPhase::kFaulted:
     case RunPhase::kHeld:
       if (!over) break;
-      if (ends_unhomed()) break;
-      event(EventKind::kControllersDone);
-      on(RunEvent::kFinished);
+      if (const auto unhomed = waiting_.unhomed()) {
+        response_.raise(*unhomed);
+        break;
+      }
+      now_.event(EventKind::kControllersDone);
+      arbiter_.on(RunEvent::kFinished);
       break;
     case RunPhase::kRetreating:  // update() looks after this one,
     case RunPhase::kShutDown:    // and write() after this
@@ -190,307 +182,172 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
   }
 }
 
-void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
-  std::ranges::fill(written_, std::uint8_t{0});
-  ends_with_command_ = run_.controllers_run();
-  stamp(command_);
-  stamp(wanted_);
-  if (std::exchange(brakes_, false)) controllers_->brake(state_, command_);
-  switch (run_.phase()) {
-    case RunPhase::kBringUp:
-    case RunPhase::kResetting:
-      controllers_->release(command_);  // every reference follows its joint until it is enabled
-      controllers_->hold(state_, command_);
-      (void)go_on_from_robot();
-      break;
-    case RunPhase::kSettling:
-    case RunPhase::kHeld:
-      controllers_->hold(state_, command_);
-      hold_drives_in_reset(command_);
-      hold_unhomed(command_);
-      break;
-    case RunPhase::kRunning:
-      // Else the last command goes out once more.
-      if (!tick.hold || controllers_->changes_hands()) run_controllers();
-      break;
-    case RunPhase::kRetreating: retreat_further(); break;
-    case RunPhase::kFaulted:
-    case RunPhase::kShutDown:
-      if (run_.latched() == StopCategory::kCategory0) {
-        controllers_->release(command_);
-      } else {
-        controllers_->hold(state_, command_);
-      }
-      break;
-    case RunPhase::kDone: break;
+/// After everything that may change the phase. Stops come first, from wherever they come: a stop
+/// wins over all that was asked before it and in its cycle.
+void RobotCycle::take_inbox() noexcept TANDEM_RT {
+  const hal::RemoteCommand wish = owner_.follow();
+  const Inbox::Urgent asked = inbox_.take_urgent();
+  const StopCategory declared = now_.robot.emergency_stop;
+  if (asked.emergency_stop != StopCategory::kWarn) {
+    response_.emergency_stop(EmergencyInput::kRequest, asked.emergency_stop);
   }
-  trace_.mark(CycleStage::kUpdate, *clock_);
-}
-
-void RobotCycle::run_controllers() noexcept TANDEM_RT {
-  if (!controlling_) {
-    start_controllers();
-    take_from_owner();
-    watch_.controllers_start();
+  if (asked.by_watchdog) {
+    // Not category 2: who hung cannot be trusted to retreat.
+    response_.emergency_stop(EmergencyInput::kWatchdog,
+                             std::min(declared, StopCategory::kCategory1), asked.controller);
   }
-  controlling_ = true;
-  ++ran_;
-  offer_measured(controlled());
-  const Code code = controllers_->update(time_, state_, controlled());
-  note_written(controlled());
-  controllers_->lead_back(controlled());
-  hold_drives_in_reset(controlled());
-  hold_unhomed(controlled());
-  if (delay_.on()) delay_.pass(wanted_, command_);
-  controllers_answered(code);
-  if (const auto stray = controllers_->take_stray()) {
-    fault({.index = static_cast<std::int32_t>(stray->joint),
-           .code = stray->controller,
-           .source = FaultSource::kStray,
-           .category = config_.on_stray});
+  if (rt::take_emergency_stop()) response_.emergency_stop(EmergencyInput::kSignal, declared);
+  if (wish.reset) response_.begin_reset(wish.reset_cycle);
+  if (asked.reset) response_.begin_reset(asked.known);
+  const bool end = asked.end || rt::stop_requested();
+  if (end && !now_.run.in(RunPhase::kShutDown)) {
+    now_.event(EventKind::kStopRequested);
+    arbiter_.on(RunEvent::kEnd);
   }
+  requests_.carry_out();
+  trace_.mark(CycleStage::kCheck, now_.clock);
 }
 
-void RobotCycle::controllers_answered(Code code) noexcept TANDEM_RT {
-  if (code == Code::kOk) return;
-  if (code == Code::kStopped) {
-    event(EventKind::kControllersDone);
-    return on(RunEvent::kFinished);
+void RobotCycle::update() noexcept TANDEM_RT {
+  ends_with_command_ = now_.run.controllers_run();
+  const bool watches = now_.run.in(RunPhase::kRunning);
+  response_.check_controllers(arbiter_.write(now_.tick.hold));
+  const auto stray = watches ? now_.controllers.take_stray() : std::nullopt;
+  if (stray) {
+    response_.raise({.index = static_cast<std::int32_t>(stray->joint),
+                     .code = stray->controller,
+                     .source = FaultSource::kStray,
+                     .category = now_.config.on_stray});
   }
-  fault({.index = static_cast<std::int32_t>(controllers_->failed_controller()),
-         .code = static_cast<std::uint32_t>(code),
-         .source = FaultSource::kController,
-         .category = StopCategory::kCategory1});
-}
-
-/// The position reference of a joint outside position control is where it is, unless a controller
-/// writes another one in this cycle: what it wants the joint to follow by other means.
-void RobotCycle::offer_measured(hal::CommandImage& command) noexcept TANDEM_RT {
-  const auto measured = state_.position_rad();
-  const auto mode = command.mode();
-  for (std::size_t j = 0; j < written_.size(); ++j) {
-    const bool offers = !follows_position(mode[j]) && std::isfinite(measured[j]);
-    written_[j] = offers ? 1 : 0;
-    if (offers) command.position_rad()[j] = measured[j];
-  }
-}
-
-void RobotCycle::note_written(const hal::CommandImage& command) noexcept TANDEM_RT {
-  const auto measured = std::as_const(state_).position_rad(), reference = command.position_rad();
-  const auto mode = command.mode();
-  for (std::size_t j = 0; j < written_.size(); ++j) {
-    if (follows_position(mode[j]) || reference[j] == measured[j]) written_[j] = 0;
-  }
-}
-
-/// The command as log and statistics have it: what was sent, but for references that no drive
-/// follows.
-const hal::CommandImage& RobotCycle::told() noexcept TANDEM_RT {
-  if (std::ranges::none_of(written_, [](std::uint8_t one) { return one != 0; })) return command_;
-  told_.assign(command_);
-  for (std::size_t j = 0; j < written_.size(); ++j) {
-    if (written_[j] != 0) told_.position_rad()[j] = written_rad_[j];
-  }
-  return told_;
-}
-
-/// Until they have brought the robot to its posture, or their time is over.
-void RobotCycle::retreat_further() noexcept TANDEM_RT {
-  offer_measured(controlled());
-  const Code code = controllers_->update(time_, state_, controlled());
-  note_written(controlled());
-  if (delay_.on()) delay_.pass(wanted_, command_);
-  if (code != Code::kOk && code != Code::kStopped) return controllers_answered(code);
-  const bool late = run_.time_is_over(time_.cycle);
-  if (late || code == Code::kStopped) react(StopCategory::kCategory1);
-}
-
-/// The image that controllers write.
-hal::CommandImage& RobotCycle::controlled() noexcept TANDEM_RT {
-  return delay_.on() ? wanted_ : command_;
-}
-
-void RobotCycle::stamp(hal::CommandImage& command) const noexcept TANDEM_RT {
-  command.cycle()[0] = time_.cycle;
-  command.time_ns()[0] = time_.time_ns;
-}
-
-/// From what the robot follows, when that is another loop's. False: it is not.
-bool RobotCycle::go_on_from_robot() noexcept TANDEM_RT {
-  const bool is_others = backend_->command_in_force(command_);
-  stamp(command_);
-  return is_others;
-}
-
-void RobotCycle::start_controllers() noexcept TANDEM_RT {
-  if (go_on_from_robot()) limits_.follow(command_);
-  if (delay_.on()) {
-    controllers_->hold(state_, command_);
-    delay_.fill(command_);
-    wanted_.assign(command_);
-  }
-  controllers_->start(time_, state_, controlled());
+  trace_.mark(CycleStage::kUpdate, now_.clock);
 }
 
 void RobotCycle::limit() noexcept TANDEM_RT {
-  const auto asked = std::as_const(command_).position_rad();
-  for (std::size_t j = 0; j < written_.size(); ++j) {
-    const bool tells =
-        written_[j] != 0 && std::isfinite(asked[j]) && !follows_position(command_.mode()[j]);
-    written_[j] = tells ? 1 : 0;
-    written_rad_[j] = asked[j];
-  }
-  const Code limited = limits_.apply(state_, command_);
+  const Code limited = limits_.apply(now_.state, arbiter_.to_limit());
   const auto codes = limits_.codes();
   for (std::size_t j = 0; limited != Code::kOk && j < codes.size(); ++j) {
     if (codes[j] == Code::kOk) continue;
     const auto joint = static_cast<std::int32_t>(j);
     if (joint_limited_[j] == 0) {
-      event(EventKind::kLimited, joint, static_cast<std::uint32_t>(codes[j]));
+      now_.event(EventKind::kLimited, joint, static_cast<std::uint32_t>(codes[j]));
       joint_limited_[j] = 1;
     }
-    if (codes[j] == Code::kNotFinite && run_.controllers_run()) {
-      fault({.index = joint,
-             .code = static_cast<std::uint32_t>(codes[j]),
-             .source = FaultSource::kCommand,
-             .category = StopCategory::kCategory1});
+    if (codes[j] == Code::kNotFinite && now_.run.controllers_run()) {
+      response_.raise({.index = joint,
+                       .code = static_cast<std::uint32_t>(codes[j]),
+                       .source = FaultSource::kCommand,
+                       .category = StopCategory::kCategory1});
     }
   }
-  trace_.mark(CycleStage::kLimit, *clock_);
+  trace_.mark(CycleStage::kLimit, now_.clock);
 }
 
 void RobotCycle::write() noexcept TANDEM_RT {
-  if (!run_.in(RunPhase::kShutDown)) {
-    for (std::size_t j = 0; j < resets_.size(); ++j) {  // told once: the cause may stay
-      if (resets_[j] == reset_cycles_) command_.fault_reset()[j] = 1;
-    }
-    check_backend(backend_->write(command_, controllers_->gains()));
+  if (!now_.run.in(RunPhase::kShutDown)) {
+    arbiter_.tell_resets(true);
+    response_.check_backend(now_.backend.write(arbiter_.command(), now_.controllers.gains()));
   } else {
-    if (ends_with_command_) backend_->last_command(command_);
-    const bool disabled = backend_->shut_down();
-    if (disabled || run_.time_is_over(time_.cycle) || read_code_ == Code::kDiverged) {
-      while (const auto found = watch_.next_disobedient(state_)) fault(*found);
-      event(EventKind::kShutDown);
-      on(RunEvent::kDisabled);
+    if (ends_with_command_) now_.backend.last_command(arbiter_.command());
+    const bool disabled = now_.backend.shut_down();
+    const bool over = now_.run.time_is_over(now_.time.cycle);
+    if (disabled || over || now_.read_code == Code::kDiverged) {
+      while (const auto found = now_.watch.next_disobedient(now_.state)) response_.raise(*found);
+      now_.event(EventKind::kShutDown);
+      arbiter_.on(RunEvent::kDisabled);
     }
   }
-  trace_.mark(CycleStage::kWrite, *clock_);
+  trace_.mark(CycleStage::kWrite, now_.clock);
 }
 
 /// To the log, the threads that watch the run, and those that wait for an answer.
 void RobotCycle::hand_over() noexcept TANDEM_RT {
-  const hal::CommandImage& command = told();
-  if (run_.in(RunPhase::kRunning)) {
-    statistics_.take(state_, command, truth_, limits_.counters(), estimate());
-  }
-  if (!ends(run_.phase())) statistics_.take_base(truth_);
-  log_.images(time_, state_, command, truth_, estimate());
-  progress_.dropped.store(log_.dropped(), std::memory_order_relaxed);
-  progress_.phase.store(run_.phase(), std::memory_order_relaxed);
-  progress_.cycles.store(loop_.statistics().cycles, std::memory_order_relaxed);
-  progress_.time_ns.store(time_.time_ns, std::memory_order_relaxed);
-  progress_.running_cycles.store(ran_, std::memory_order_relaxed);
-  progress_.latched.store(faults_.latched(), std::memory_order_relaxed);
-  progress_.overruns.store(loop_.statistics().overruns, std::memory_order_relaxed);
-  show_joints();
-  show_sensors();
-  show();
-  inbox_.confirm(time_.cycle);
+  shown_.take();
+  inbox_.confirm(now_.time.cycle);
   trace_.end(loop_.finish());
 }
 
-void RobotCycle::show() noexcept TANDEM_RT {
-  if (observer_ == nullptr) return;
-  observer_->take({.time = time_,
-                   .phase = run_.phase(),
-                   .read_code = read_code_,
-                   .state = state_,
-                   .command = told(),
-                   .truth = truth_,
-                   .estimate = estimate(),
-                   .times = {.begin_ns = begin_ns_,
-                             .wakeup_ns = wakeup_ns_,
-                             .bus_ns = loop_.last_bus_ns(),
-                             .work_ns = loop_.last_work_ns(),
-                             .overruns = loop_.statistics().overruns,
-                             .skipped = loop_.statistics().skipped}});
+// Snapshots.
+
+void RobotCycle::archive(Archive& ar) {
+  std::uint64_t controllers = now_.controllers.fingerprint();
+  ar(controllers);  // first: restore() looks at it before anything changes
+  ar(now_, loop_, resets_, homing_, limits_, arbiter_, waiting_, response_);
+  ar(now_.controllers, shown_, started_, joint_limited_);
 }
 
-/// What is asked of a joint is what its owner wants, before a delay and a transfer.
-void RobotCycle::show_joints() noexcept TANDEM_RT {
-  const hal::CommandImage& wanted = controlling_ ? controlled() : command_;
-  const hal::StateImage& state = state_;
-  const auto position = state.position_rad(), velocity = state.velocity_rad_s();
-  const auto torque = state.torque_Nm(), acceleration = state.acceleration_rad_s2();
-  const auto motor_position = state.motor_position_rad();
-  const auto motor_velocity = state.motor_velocity_rad_s();
-  const auto current = state.current_A(), voltage = state.voltage_V();
-  const auto temperature = state.temperature_C();
-  const auto commanded = std::as_const(command_).position_rad();
-  const auto fault = state.fault(), age = state.age_cycles();
-  const auto drive_mode = state.mode();
-  const auto drive_state = state.drive_state();
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const auto impedance = controllers_->wanted_impedance(j, wanted);
-    JointStatus& joint = joints_[j];  // all of it, but field by field: g++ clears a whole one first
-    joint.cycle = time_.cycle;
-    joint.position_rad = position[j];
-    joint.velocity_rad_s = velocity[j];
-    joint.torque_Nm = torque[j];
-    joint.acceleration_rad_s2 = acceleration[j];
-    joint.motor_position_rad = motor_position[j];
-    joint.motor_velocity_rad_s = motor_velocity[j];
-    joint.current_A = current[j];
-    joint.voltage_V = voltage[j];
-    joint.temperature_C = temperature[j];
-    joint.commanded_rad = commanded[j];
-    joint.stiffness_Nm_rad = impedance.stiffness_Nm_rad;
-    joint.damping_Nms_rad = impedance.damping_Nms_rad;
-    joint.fault = fault[j];
-    joint.age_cycles = age[j];
-    joint.owner = controllers_->owner(j);
-    joint.mode = wanted.mode()[j];
-    joint.interaction = wanted.interaction()[j];
-    joint.drive_mode = drive_mode[j];
-    joint.drive_state = drive_state[j];
-    joint.moving = controllers_->leads(j) ? std::uint8_t{1} : std::uint8_t{0};
-    joint.resetting = resets_[j] != 0 ? std::uint8_t{1} : std::uint8_t{0};
-    joint.homing = homings_[j];
+bool RobotCycle::write_down(Archive& ar, bool backend) {
+  archive(ar);
+  return !backend || now_.backend.archive(ar);
+}
+
+/// Where a robot's cycle is not simulated, under the traps: this takes no heap.
+void RobotCycle::show_snapshot() noexcept {
+  SnapshotPort* const port = now_.snapshots;
+  if (port == nullptr || !port->wanted()) return;
+  const std::int64_t begin_ns = now_.clock.now_ns();
+  if (port->whole()) {
+    (void)write_down(port->archive(), true);
+  } else {
+    const rt::ScopedRealtime now;
+    (void)write_down(port->archive(), false);
   }
-  services_.show(joints_);
-  if (controllers_->gains().revision() != shown_gains_) show_gains();
+  port->taken(loop_.next_cycle(), now_.clock.now_ns() - begin_ns);
 }
 
-void RobotCycle::show_gains() noexcept TANDEM_RT {
-  services_.show(controllers_->gains());
-  shown_gains_ = controllers_->gains().revision();
-}
-
-void RobotCycle::show_sensors() noexcept TANDEM_RT {
-  for (std::size_t s = 0; s < sensors_.size(); ++s) {
-    SensorStatus& sensor = sensors_[s];
-    sensor.cycle = time_.cycle;
-    sensor.age_cycles = state_.sensor_age_cycles()[s];
-    // One that was never heard is older than the run.
-    sensor.valid =
-        sensor.age_cycles <= std::min<std::uint64_t>(config_.lost_after_cycles, time_.cycle);
-    std::ranges::copy(state_.sensor_values(s), sensor.values.begin());
+Result<std::vector<std::byte>> RobotCycle::save() {
+  Archive ar;
+  if (!write_down(ar, true)) {
+    return fail("this robot cannot be saved", "snapshots need a simulated robot");
   }
-  services_.show(sensors_);
+  return std::vector<std::byte>(ar.bytes().begin(), ar.bytes().end());
 }
 
-/// The next phase, if this is one. Controllers stop with it, but for a retreat, which they carry
-/// out. Joints that a stop finds in motion brake.
-void RobotCycle::on(RunEvent event, bool holds_back) noexcept TANDEM_RT {
-  if (!run_.on(event, time_.cycle, holds_back) || run_.in(RunPhase::kRetreating)) return;
-  if (controlling_) controllers_->stop();
-  if (controlling_ && delay_.on()) controllers_->was_sent_before(delay_.before());
-  controlling_ = false;
-  brakes_ = run_.in(RunPhase::kFaulted) || run_.in(RunPhase::kShutDown);
+Status RobotCycle::restore(std::span<const std::byte> snapshot) {
+  Archive ar(snapshot);
+  std::uint64_t controllers = 0;
+  Archive first(snapshot);
+  first(controllers);
+  if (controllers != now_.controllers.fingerprint()) {
+    return fail("the snapshot was taken with other controllers than are loaded now",
+                "load and unload, in the same order, what was loaded then");
+  }
+  if (!write_down(ar, true)) {
+    return fail("this robot cannot be rewound", "snapshots need a simulated robot");
+  }
+  if (ar.ok() && ar.at_end()) return {};
+  return fail("the snapshot is of another robot or experiment",
+              "restore it with the configuration that it was saved with");
 }
 
-void RobotCycle::event(EventKind kind, std::int32_t joint, std::uint32_t code) noexcept TANDEM_RT {
-  log_.event(time_, kind, joint, code);
+// Results.
+
+std::vector<Fault> RobotCycle::faults() const {
+  const FaultContext about{now_.robot, now_.backend, now_.controllers, now_.config};
+  const FaultLog& log = now_.faults;
+  std::vector<Fault> out;
+  for (std::size_t i = 0; i < log.size(); ++i)
+    out.push_back(in_words(log[i], log.cleared_ns(i), about));
+  // The backend's own words are the loop's until the loop has stopped.
+  if (now_.progress.phase.load() != RunPhase::kDone) return out;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const std::string status = out[i].latched ? now_.backend.status_text() : std::string();
+    if (status.empty()) continue;
+    if (log[i].source == FaultSource::kBackend) out[i].text = status;
+    if (log[i].source == FaultSource::kBringUp) out[i].text += ": " + status;
+  }
+  return out;
+}
+
+std::string RobotCycle::drive_fault(std::size_t joint, std::uint32_t code) const {
+  if (code == 0) return {};
+  const FaultLog& log = now_.faults;
+  hal::FaultCause cause = hal::FaultCause::kDrive;
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    const bool its =
+        log[i].source == FaultSource::kDrive && log[i].index == static_cast<std::int32_t>(joint);
+    if (its && log.cleared_ns(i) == FaultLog::kLatched) cause = log[i].cause;
+  }
+  return now_.backend.fault_text(cause, code);
 }
 
 }  // namespace tandem::runtime

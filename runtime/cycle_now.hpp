@@ -1,0 +1,78 @@
+// The parts that a cycle joins, and what they share: time, state, phase, faults and log.
+// Layer: runtime.  Thread: made non-RT; the loop's, but for faults and progress.
+#pragma once
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "base/result.hpp"
+#include "estimation/estimator.hpp"
+#include "hal/backend.hpp"
+#include "hal/config/robot_config.hpp"
+#include "hal/cycle_observer.hpp"
+#include "hal/truth.hpp"
+#include "log/recorder.hpp"
+#include "runtime/controller_host.hpp"
+#include "runtime/cycle_config.hpp"
+#include "runtime/cycle_log.hpp"
+#include "runtime/fault.hpp"
+#include "runtime/fault_watch.hpp"
+#include "runtime/owner_controller.hpp"
+#include "runtime/progress.hpp"
+#include "runtime/run_machine.hpp"
+#include "runtime/snapshot_port.hpp"
+
+namespace tandem::runtime {
+
+/// The parts that a cycle joins. All outlive it.
+struct CycleParts {
+  const hal::RobotConfig& robot;
+  hal::Backend& backend;
+  ControllerHost& controllers;
+  rt::Clock& clock;
+  log::Recorder* recorder = nullptr;           ///< null: nothing is logged. Not started yet.
+  const hal::TruthImage* truth = nullptr;      ///< the simulation's, filled by backend.read()
+  hal::CycleObserver* observer = nullptr;      ///< null: nobody watches
+  RemoteCommandParts owner = {};               ///< for one in another process
+  estimation::Estimator* estimator = nullptr;  ///< null: nothing is estimated
+  SnapshotPort* snapshots = nullptr;           ///< null: nobody wants any while it runs
+};
+
+/// What the parts of RobotCycle know of this cycle. RobotCycle fills it; they read it, note faults
+/// and log events.
+struct CycleNow : CycleParts {
+  /// Adds the recorder's channels and starts it.
+  CycleNow(const CycleParts& parts, const CycleConfig& how)
+      : CycleParts(parts),
+        config(how),
+        state(robot.shape()),
+        run(how),
+        watch(robot, backend, how.lost_after_cycles, how.fall),
+        log(recorder, state, hal::CommandImage(robot.shape()), truth, estimate()) {
+    progress.total_cycles = how.running_cycles;
+  }
+  /// Null where nothing is estimated.
+  [[nodiscard]] const hal::EstimateImage* estimate() const noexcept TANDEM_RT {
+    return estimator == nullptr ? nullptr : &estimator->image();
+  }
+  void event(log::EventKind kind, std::int32_t joint = -1,
+             std::uint32_t code = 0) noexcept TANDEM_RT {
+    log.event(time, kind, joint, code);
+  }
+  void archive(Archive& ar) {
+    ar(time, read_code, run, state, watch, faults);
+    if (estimator != nullptr) ar(*estimator);
+  }
+
+  const CycleConfig config;
+  rt::Tick tick;
+  hal::CycleTime time;
+  Code read_code = Code::kOk;  ///< of the backend's read()
+  hal::StateImage state;
+  RunMachine run;
+  FaultWatch watch;
+  FaultLog faults;
+  CycleLog log;
+  Progress progress;
+};
+
+}  // namespace tandem::runtime

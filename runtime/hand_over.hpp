@@ -1,0 +1,51 @@
+// What every cycle leaves behind: for the log, the statistics, and the threads that watch the run.
+// Layer: runtime.  Thread: made non-RT; the loop's.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "rt/cyclic_loop.hpp"
+#include "runtime/joint_arbiter.hpp"
+#include "runtime/run_services.hpp"
+#include "runtime/run_statistics.hpp"
+
+namespace tandem::runtime {
+
+class HandOver {
+ public:
+  /// All outlive it.
+  HandOver(CycleNow& now, const rt::CyclicLoop& loop, const DriveResets& resets,
+           const JointHoming& homing, JointArbiter& arbiter, const hal::CommandLimits& limits,
+           RunServices& services);
+
+  /// Each cycle, when its command is out.
+  void take() noexcept TANDEM_RT;
+  [[nodiscard]] const RunStatistics& statistics() const noexcept { return statistics_; }
+  /// After the controllers, whose gains it shows once they are read.
+  void archive(Archive& ar) {
+    ar(statistics_);
+    if (ar.reading()) show_gains();
+  }
+
+ private:
+  void show_progress() noexcept TANDEM_RT;
+  void show_joints() noexcept TANDEM_RT;
+  void show_sensors() noexcept TANDEM_RT;
+  void show_gains() noexcept TANDEM_RT;
+  void show(const hal::CommandImage& told) noexcept TANDEM_RT;
+
+  CycleNow& now_;
+  const rt::CyclicLoop& loop_;
+  const DriveResets& resets_;
+  const JointHoming& homing_;
+  JointArbiter& arbiter_;
+  const hal::CommandLimits& limits_;
+  RunServices& services_;
+  RunStatistics statistics_;
+  std::vector<JointStatus> joints_;  // as services_ shows them
+  std::vector<SensorStatus> sensors_;
+  std::uint64_t shown_gains_ = 0;  // their revision
+};
+
+}  // namespace tandem::runtime
