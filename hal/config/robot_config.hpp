@@ -82,6 +82,9 @@ struct ActuatorConfig {
   double thermal_time_s = 30.0;        ///< time constant of that watch
   double temperature_limit_C = 120.0;  ///< of the winding
   int damping_line = 0;                ///< in the TOML, for messages
+
+  /// N K, at the link: also the back-EMF [Vs/rad].
+  [[nodiscard]] double torque_per_A() const noexcept { return gear_ratio * torque_constant_Nm_A; }
 };
 
 /// What its order lacks ("inductance_H must be positive"), or empty.
