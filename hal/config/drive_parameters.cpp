@@ -46,7 +46,7 @@ canopen::DriveParameters drive_parameters(const RobotConfig& robot, const JointC
   const GainsConfig& gains = robot.gains_of(joint);
   const BoardConfig* board = robot.board(joint.board);
   const bool ours = board == nullptr || canopen::abilities_of(*board->sheet, joint.axis).settings;
-  auto p = canopen::DriveParameters::unsaid();
+  canopen::DriveParameters p = joint.drive;
   set_scales(joint, ours, p);
   set_motor(motor, gains, p);
   p.torque_slope_Nm_s = torque_rate_Nm_s(joint);
@@ -64,7 +64,6 @@ canopen::DriveParameters drive_parameters(const RobotConfig& robot, const JointC
   p.following_window_rad = joint.following_error_rad;
   p.following_timeout_s = joint.following_timeout_s;
   p.oscillation_limit_Nm = oscillation_limit_Nm(joint, motor);
-  p.oscillation_time_s = joint.oscillation_time_s;
   p.excess_share = joint.max_excess;
   p.excess_time_s = joint.excess_time_s;
   p.swing_limit_rad_s = joint.max_swing * joint.max_velocity_rad_s;
