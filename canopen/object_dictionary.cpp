@@ -27,7 +27,24 @@ void decode_as(const std::uint8_t* in, void* data) noexcept {
   std::memcpy(data, &value, sizeof value);
 }
 
-double as_double(DataType type, const std::uint8_t* bytes) noexcept {
+}  // namespace
+
+std::uint16_t size_of(DataType type) noexcept TANDEM_RT {
+  switch (type) {
+    case DataType::kBoolean:
+    case DataType::kInteger8:
+    case DataType::kUnsigned8: return 1;
+    case DataType::kInteger16:
+    case DataType::kUnsigned16: return 2;
+    case DataType::kInteger32:
+    case DataType::kUnsigned32:
+    case DataType::kReal32: return 4;
+    case DataType::kVisibleString: break;
+  }
+  return 0;
+}
+
+double as_double(DataType type, const std::uint8_t* bytes) noexcept TANDEM_RT {
   switch (type) {
     case DataType::kBoolean:
     case DataType::kUnsigned8: return get<std::uint8_t>(bytes);
@@ -41,8 +58,6 @@ double as_double(DataType type, const std::uint8_t* bytes) noexcept {
   }
   return 0.0;
 }
-
-}  // namespace
 
 void ObjectEntry::encode(std::uint8_t* out) const noexcept TANDEM_RT {
   if (type == DataType::kVisibleString) {
@@ -71,15 +86,15 @@ ObjectDictionary::ObjectDictionary(std::size_t capacity) : capacity_(capacity) {
 
 bool ObjectDictionary::add_string(std::uint16_t index, std::uint8_t sub, std::string_view text) {
   // The characters are only ever read: kVisibleString has no write access.
-  return insert({.index = index,
-                 .sub = sub,
-                 .type = DataType::kVisibleString,
-                 .access = kRead,
-                 .size = static_cast<std::uint16_t>(text.size()),
-                 .data = const_cast<char*>(text.data())});
+  return add(ObjectEntry{.index = index,
+                         .sub = sub,
+                         .type = DataType::kVisibleString,
+                         .access = kRead,
+                         .size = static_cast<std::uint16_t>(text.size()),
+                         .data = const_cast<char*>(text.data())});
 }
 
-bool ObjectDictionary::insert(const ObjectEntry& entry) {
+bool ObjectDictionary::add(const ObjectEntry& entry) {
   if (entries_.size() == capacity_) return false;
   const std::uint32_t wanted = key(entry.index, entry.sub);
   const auto at = std::ranges::lower_bound(

@@ -46,6 +46,11 @@ struct ObjectRange {
   double max = 3.5e38;
 };
 
+/// Bytes of a number on the wire; 0 of a string.
+[[nodiscard]] std::uint16_t size_of(DataType type) noexcept TANDEM_RT;
+/// A number of this type, from the wire.
+[[nodiscard]] double as_double(DataType type, const std::uint8_t* bytes) noexcept TANDEM_RT;
+
 struct ObjectEntry;
 
 /// Called before and after a write by SDO, and before a read; for objects that are more than a
@@ -120,33 +125,35 @@ class ObjectDictionary {
   ObjectDictionary(const ObjectDictionary&) = delete;
   ObjectDictionary& operator=(const ObjectDictionary&) = delete;
 
+  /// @return false when the dictionary is full or already has the entry.
+  bool add(const ObjectEntry& entry);
   /// An entry over the application's `variable`.
   /// @return false when the dictionary is full or already has the entry.
   template <class T>
   bool add(std::uint16_t index, std::uint8_t sub, T& variable, std::uint8_t access,
            ObjectRange range = {}, ObjectOwner* owner = nullptr) {
-    return insert({.index = index,
-                   .sub = sub,
-                   .type = detail::data_type<T>(),
-                   .access = access,
-                   .size = sizeof(T),
-                   .data = &variable,
-                   .range = range,
-                   .owner = owner});
+    return add(ObjectEntry{.index = index,
+                           .sub = sub,
+                           .type = detail::data_type<T>(),
+                           .access = access,
+                           .size = sizeof(T),
+                           .data = &variable,
+                           .range = range,
+                           .owner = owner});
   }
   /// An entry whose value the dictionary holds itself (and archives).
   template <class T>
   bool add_value(std::uint16_t index, std::uint8_t sub, T value, std::uint8_t access = kRead,
                  ObjectRange range = {}, ObjectOwner* owner = nullptr) {
     void* slot = store(&value, sizeof value);
-    return slot != nullptr && insert({.index = index,
-                                      .sub = sub,
-                                      .type = detail::data_type<T>(),
-                                      .access = access,
-                                      .size = sizeof(T),
-                                      .data = slot,
-                                      .range = range,
-                                      .owner = owner});
+    return slot != nullptr && add(ObjectEntry{.index = index,
+                                              .sub = sub,
+                                              .type = detail::data_type<T>(),
+                                              .access = access,
+                                              .size = sizeof(T),
+                                              .data = slot,
+                                              .range = range,
+                                              .owner = owner});
   }
   /// A constant string. `text` must outlive the dictionary.
   bool add_string(std::uint16_t index, std::uint8_t sub, std::string_view text);
@@ -197,7 +204,6 @@ class ObjectDictionary {
   void archive(Archive& ar) { ar(slots_); }
 
  private:
-  bool insert(const ObjectEntry& entry);
   bool set_variable(std::uint16_t index, std::uint8_t sub, DataType type, void* data);
   void* store(const void* value, std::size_t size);
 

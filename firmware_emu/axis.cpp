@@ -2,6 +2,7 @@
 // controller; and the checks of what SDOs write to its objects.
 #include "firmware_emu/axis.hpp"
 
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -36,14 +37,13 @@ Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDic
       modes_(setup.modes),
       reversed_(setup.reversed),
       velocity_units_(setup.velocity_units_per_rev > 0.0
-                          ? setup.velocity_units_per_rev / setup.link_counts_per_rev
+                          ? setup.velocity_units_per_rev / setup.parameters.link_counts_per_rev
                           : 1.0),
       acceleration_units_(setup.acceleration_units_per_rev > 0.0
-                              ? setup.acceleration_units_per_rev / setup.link_counts_per_rev
+                              ? setup.acceleration_units_per_rev /
+                                    setup.parameters.link_counts_per_rev
                               : velocity_units_),
-      exact_link_counts_(board.sheet != nullptr ? setup.link_counts_per_rev : 0.0),
-      exact_motor_counts_(board.sheet != nullptr ? setup.motor_counts_per_rev : 0.0),
-      exact_rated_Nm_(board.sheet != nullptr ? setup.rated_torque_Nm : 0.0),
+      stands_in_(board.sheet != nullptr),
       zero_at_power_on_(setup.zero_counts),
       zero_counts_(setup.zero_counts),
       turn_counts_(setup.turn_counts),
@@ -53,10 +53,10 @@ Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDic
       index_pitch_rad_(setup.index_pitch_rad),
       counts_from_power_on_(setup.counts_from_power_on),
       at_power_on_(setup.counts_from_power_on || setup.turn_counts != 0),
-      power_on_(AxisObjects::from(setup, board.command_timeout_syncs)),
-      objects_(power_on_),
+      power_on_(setup.parameters),
       torque_sensor_({.noise = setup.torque_noise_Nm, .quantum = setup.torque_quantum_Nm},
                      NoiseGenerator::stream(board.seed, static_cast<std::uint64_t>(index))) {
+  objects_.set(power_on_);
   objects_.add_to(od, index, *this);
   profile_.allow_homing(setup.homing_methods);
   if ((modes_ & kProfileModes) != 0) profile_.add_to(od, index, modes_);
@@ -65,7 +65,8 @@ Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDic
 }
 
 void Axis::power_on() noexcept TANDEM_RT {
-  objects_ = power_on_;
+  objects_ = {};
+  objects_.set(power_on_);
   zero_counts_ = zero_at_power_on_;
   at_power_on_ = counts_from_power_on_ || turn_counts_ != 0;
   profile_.power_on();
@@ -85,45 +86,20 @@ void Axis::power_on() noexcept TANDEM_RT {
 }
 
 void Axis::apply_settings() noexcept TANDEM_RT {
-  const ControllerConfig config = objects_.controller();
-  controller_.configure(config, period_s_);
-  link_encoder_.set_resolution(exact_link_counts_ > 0.0 ? exact_link_counts_
-                                                        : objects_.link_counts);
-  motor_encoder_.set_resolution(exact_motor_counts_ > 0.0 ? exact_motor_counts_
-                                                          : objects_.motor_counts);
-  link_velocity_.configure(objects_.cutoffs_Hz[kLinkVelocityCutoff - 1], period_s_);
-  motor_velocity_.configure(objects_.cutoffs_Hz[kMotorVelocityCutoff - 1], period_s_);
-  torque_rate_.configure(objects_.cutoffs_Hz[kTorqueRateCutoff - 1], period_s_);
-  protection_config_ = {
-      .min_position_rad = config.min_position_rad,
-      .max_position_rad = config.max_position_rad,
-      .position_margin_rad = objects_.position_margin_rad,
-      .following_window_rad = objects_.following_window == 0xFFFFFFFFU
-                                  ? 0.0
-                                  : objects_.following_window * objects_.rad_per_count(),
-      .following_timeout_s = objects_.following_timeout_ms * 1.0e-3,
-      .continuous_current_A = objects_.i2t[kContinuousCurrent - 1],
-      .thermal_time_s = objects_.i2t[kThermalTime - 1],
-      .temperature_limit_C = objects_.temperature_limit * 0.1,
-      .undervoltage_V = objects_.undervoltage_V,
-      .mismatch_window_rad = objects_.mismatch[kMismatchWindow - 1],
-      .mismatch_timeout_s = objects_.mismatch[kMismatchTimeout - 1],
-      .oscillation_limit_Nm = objects_.oscillation[canopen::kOscillationLimit - 1],
-      .oscillation_time_s = objects_.oscillation[canopen::kOscillationTime - 1],
-      .swing_limit_rad_s = objects_.swing};
-  watch_limits(config);
+  DriveParameters& now = parameters_;
+  now = objects_.parameters();
+  if (stands_in_) {
+    now.link_counts_per_rev = power_on_.link_counts_per_rev;
+    now.motor_counts_per_rev = power_on_.motor_counts_per_rev;
+    now.rated_torque_Nm = power_on_.rated_torque_Nm;
+  }
+  controller_.configure(now, period_s_);
+  link_encoder_.set_resolution(now.link_counts_per_rev);
+  motor_encoder_.set_resolution(now.motor_counts_per_rev);
+  link_velocity_.configure(now.link_velocity_cutoff_Hz, period_s_);
+  motor_velocity_.configure(now.motor_velocity_cutoff_Hz, period_s_);
+  torque_rate_.configure(now.torque_rate_cutoff_Hz, period_s_);
   settings_changed_ = false;
-}
-
-/// What motion may be, as a share more than the limits.
-void Axis::watch_limits(const ControllerConfig& config) noexcept {
-  const double share = objects_.excess[canopen::kExcessShare - 1];
-  if (!(share > 0.0)) return;
-  ProtectionConfig& c = protection_config_;
-  c.excess_velocity_rad_s = (1.0 + share) * config.velocity_limit_rad_s;
-  c.excess_torque_Nm = (1.0 + share) * config.torque_limit_Nm;
-  c.excess_power_W = (1.0 + share) * config.velocity_limit_rad_s * config.torque_limit_Nm;
-  c.excess_time_s = objects_.excess[canopen::kExcessTime - 1];
 }
 
 void Axis::sample(const AxisSense& sense) noexcept TANDEM_RT {
@@ -200,7 +176,8 @@ void Axis::show_actual() noexcept {
       clamp_round<std::int32_t>(shown_shift_rad() * motor_encoder_.counts_per_rad()));
   o.motor_velocity =
       clamp_round<std::int32_t>(measured_.motor_velocity_rad_s * motor_encoder_.counts_per_rad());
-  o.torque = clamp_round<std::int16_t>(sign * measured_.torque_Nm * 1.0e3 / rated_torque_Nm());
+  o.torque =
+      clamp_round<std::int16_t>(sign * measured_.torque_Nm * 1.0e3 / parameters_.rated_torque_Nm);
   o.current = clamp_round<std::int16_t>(measured_.current_A * 100.0);
   o.temperature = clamp_round<std::int16_t>(temperature_C_ * 10.0);
 }
@@ -214,42 +191,42 @@ void Axis::take_demands() noexcept {
   }
   objects_.mode_display = static_cast<std::int8_t>(mode_);
   // By PDO these come unchecked.
-  const auto take = [this](float& object, double& value) {
-    if (std::isfinite(object) && object >= 0.0F) {
-      value = object;
+  const auto take = [this](std::uint32_t& object, double& value) {
+    const auto asked = std::bit_cast<float>(object);
+    if (std::isfinite(asked) && asked >= 0.0F) {
+      value = asked;
     } else {
-      object = static_cast<float>(value);
+      object = std::bit_cast<std::uint32_t>(static_cast<float>(value));
       ++objects_.refused_values;
     }
   };
-  take(objects_.stiffness, stiffness_Nm_rad_);
-  take(objects_.damping, damping_Nms_rad_);
+  take(objects_.settings[drive_row(canopen::object::kStiffness, 0)], stiffness_Nm_rad_);
+  take(objects_.settings[drive_row(canopen::object::kDamping, 0)], damping_Nms_rad_);
 }
 
 ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
   const bool follows =
       machine_.motion() == DriveMotion::kFollow && ProfileModes::cyclic(mode_) == Mode::kCsp;
-  const ErrorCode cause = protection_.update(
-      protection_config_,
-      {.link_position_rad = measured_.link_position_rad,
-       .position_error_rad = controller_.terms().position_error_rad,
-       .current_A = measured_.current_A,
-       .temperature_C = temperature_C_,
-       .bus_voltage_V = measured_.bus_voltage_V,
-       .mismatch_rad = mismatch_rad(),
-       .motor_torque_Nm =
-           objects_.motor_data[canopen::kMotorTorqueConstant - 1] * measured_.current_A,
-       .link_velocity_rad_s = measured_.link_velocity_rad_s,
-       .motor_velocity_rad_s = measured_.motor_velocity_rad_s,
-       .torque_Nm = measured_.torque_Nm,
-       .deviation_rad_s = controller_.terms().deviation_rad_s,
-       .asked_torque_Nm = controller_.terms().torque_reference_Nm,
-       .follows_motion = controller_.follows_motion(),
-       .sensors_valid = sensors_valid_,
-       .powered = powered(),
-       .drives = action() != Action::kOff && action() != Action::kBrake,
-       .follows_position = follows},
-      period_s_);
+  const ErrorCode cause =
+      protection_.update(parameters_,
+                         {.link_position_rad = measured_.link_position_rad,
+                          .position_error_rad = controller_.terms().position_error_rad,
+                          .current_A = measured_.current_A,
+                          .temperature_C = temperature_C_,
+                          .bus_voltage_V = measured_.bus_voltage_V,
+                          .mismatch_rad = mismatch_rad(),
+                          .motor_torque_Nm = parameters_.motor_constant_Nm_A * measured_.current_A,
+                          .link_velocity_rad_s = measured_.link_velocity_rad_s,
+                          .motor_velocity_rad_s = measured_.motor_velocity_rad_s,
+                          .torque_Nm = measured_.torque_Nm,
+                          .deviation_rad_s = controller_.terms().deviation_rad_s,
+                          .asked_torque_Nm = controller_.terms().torque_reference_Nm,
+                          .follows_motion = controller_.follows_motion(),
+                          .sensors_valid = sensors_valid_,
+                          .powered = powered(),
+                          .drives = action() != Action::kOff && action() != Action::kBrake,
+                          .follows_position = follows},
+                         period_s_);
   const bool interlock = (objects_.digital_inputs & canopen::digital_input::kInterlock) != 0;
   if (interlock) return ErrorCode::kEmergencyInput;
   if (cause != ErrorCode::kNone) return cause;
@@ -259,7 +236,7 @@ ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
 }
 
 double Axis::mismatch_rad() const noexcept {
-  const double spring = objects_.motor_data[canopen::kMotorSpring - 1];
+  const double spring = parameters_.spring_Nm_rad;
   const double twist = spring > 0.0 ? measured_.torque_Nm / spring : 0.0;
   return measured_.motor_position_rad - measured_.link_position_rad - twist;
 }
@@ -285,7 +262,7 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
        .follows_command = profile ? profiled_.bit_12 : mode_ != Mode::kNone,
        .following_error = mode_ == Mode::kHm ? profiled_.bit_13 : protection_.lagging(),
        .target_reached = profile && profiled_.target_reached,
-       .warning = protection_.warning(protection_config_),
+       .warning = protection_.warning(parameters_),
        .has_brake = has_brake(),
        .brake_moved = brake_moved()},
       objects_.options);
@@ -319,10 +296,8 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
 HomingSenses Axis::senses() noexcept {
   if (mode_ != Mode::kHm) return {};
   const double at_rad = measured_.link_position_rad;
-  const AxisObjects& o = objects_;
-  const ControllerConfig config = o.controller();
-  const bool at_min = at_rad <= config.min_position_rad + kSwitch_rad;
-  const bool at_max = at_rad >= config.max_position_rad - kSwitch_rad;
+  const bool at_min = at_rad <= parameters_.min_position_rad + kSwitch_rad;
+  const bool at_max = at_rad >= parameters_.max_position_rad - kSwitch_rad;
   HomingSenses seen{
       .at_low_switch = reversed_ ? at_max : at_min,
       .at_high_switch = reversed_ ? at_min : at_max,
@@ -381,14 +356,15 @@ void Axis::watch_stop() noexcept {
 
 // Gravity keeps a shorted motor turning: a brake need not wait for a rest that does not come.
 bool Axis::stopped() const noexcept {
-  return resting_s_ >= kRestTime_s || stopping_s_ >= objects_.stop_time_s ||
+  return resting_s_ >= kRestTime_s || stopping_s_ >= parameters_.stop_time_s ||
          (has_brake() && stalled_s_ >= kRestTime_s);
 }
 
 bool Axis::brake_moved() const noexcept {
-  const std::size_t sub = machine_.brake_set() ? canopen::kBrakeEngage : canopen::kBrakeRelease;
+  const double takes_ms =
+      machine_.brake_set() ? parameters_.brake_engage_ms : parameters_.brake_release_ms;
   constexpr double kRounding = 1.0e-6;  // a time of whole periods takes no more of them
-  const double periods = objects_.brake[sub - 1] * 1.0e-3 / period_s_;
+  const double periods = takes_ms * 1.0e-3 / period_s_;
   return static_cast<double>(brake_periods_) >= periods - kRounding;
 }
 
@@ -413,7 +389,7 @@ Action Axis::action() const noexcept {
 // A stop by the position loop needs its gain, the sensors and the supply, and a loop that is not
 // itself the fault.
 bool Axis::can_ramp() const noexcept {
-  if (!sensors_valid_ || !(objects_.gains[0][kPidKp - 1] > 0.0F)) return false;
+  if (!sensors_valid_ || !(parameters_.position.kp > 0.0)) return false;
   if (machine_.state() != DriveState::kFaultReactionActive) return true;
   switch (static_cast<ErrorCode>(objects_.error_code)) {
     case ErrorCode::kPositionSensor:
@@ -430,7 +406,7 @@ Reference Axis::reference() const noexcept {
   const AxisObjects& o = objects_;
   const double sign = reversed_ ? -1.0 : 1.0;
   const double rad = link_encoder_.rad_per_count();
-  const double Nm = rated_torque_Nm() * 1.0e-3;
+  const double Nm = parameters_.rated_torque_Nm * 1.0e-3;
   const bool profile = ProfileModes::has(mode_);
   const bool by_velocity = mode_ == Mode::kCsv || mode_ == Mode::kVelocityImpedance;
   const std::int64_t asked =
@@ -470,8 +446,8 @@ void Axis::show_controller() noexcept {
                         static_cast<float>(controller_.velocity_loop().state.i),
                         static_cast<float>(controller_.torque_loop().state.i),
                         static_cast<float>(controller_.electrical_loop().state.i),
-                        static_cast<float>(protection_.load(protection_config_)),
-                        static_cast<float>(protection_.oscillation(protection_config_))};
+                        static_cast<float>(protection_.load(parameters_)),
+                        static_cast<float>(protection_.oscillation(parameters_))};
 }
 
 AbortCode Axis::check(const ObjectEntry& entry, const std::uint8_t* bytes) noexcept TANDEM_RT {
@@ -491,9 +467,10 @@ AbortCode Axis::check(const ObjectEntry& entry, const std::uint8_t* bytes) noexc
 }
 
 AbortCode Axis::check_limits(const ObjectEntry& entry, const std::uint8_t* bytes) const noexcept {
+  constexpr std::size_t kMin = drive_row(canopen::object::kSoftwareLimits, 1);
   const auto limit = get<std::int32_t>(bytes);
-  const bool inverted =
-      entry.sub == 1 ? limit > objects_.max_position : limit < objects_.min_position;
+  const auto other = static_cast<std::int32_t>(objects_.settings[entry.sub == 1 ? kMin + 1 : kMin]);
+  const bool inverted = entry.sub == 1 ? limit > other : limit < other;
   return inverted ? AbortCode::kMaxBelowMin : AbortCode::kNone;
 }
 

@@ -42,6 +42,7 @@ class Axis final : private canopen::ObjectOwner {
   void power_on() noexcept TANDEM_RT;
 
   [[nodiscard]] const AxisObjects& objects() const noexcept { return objects_; }
+  [[nodiscard]] const canopen::DriveParameters& parameters() const noexcept { return parameters_; }
   [[nodiscard]] const canopen::DriveMachine& machine() const noexcept { return machine_; }
   [[nodiscard]] const JointController& controller() const noexcept { return controller_; }
   [[nodiscard]] const Measurement& measured() const noexcept { return measured_; }
@@ -56,7 +57,6 @@ class Axis final : private canopen::ObjectOwner {
                                                 const std::uint8_t* bytes) const noexcept;
 
   void apply_settings() noexcept TANDEM_RT;
-  void watch_limits(const ControllerConfig& config) noexcept;
   [[nodiscard]] bool supported(std::int8_t mode) const noexcept;
   /// Counts of the joint's encoder as 6064 shows them, and back.
   /// A count as a single-turn encoder tells it at power-on.
@@ -65,9 +65,6 @@ class Axis final : private canopen::ObjectOwner {
   [[nodiscard]] std::int32_t from_wire(std::int32_t value) const noexcept;
   /// By what 6064 is off until homing has found the joint's place: shown minus true [rad].
   [[nodiscard]] double shown_shift_rad() const noexcept;
-  [[nodiscard]] double rated_torque_Nm() const noexcept TANDEM_RT {
-    return exact_rated_Nm_ > 0.0 ? exact_rated_Nm_ : objects_.rated_torque_Nm();
-  }
   /// The modes in which the drive makes its own way: one period of them.
   void run_profile() noexcept;
   /// Switches and index pulses, in the drive's direction.
@@ -78,9 +75,7 @@ class Axis final : private canopen::ObjectOwner {
   void seed_references() noexcept;
   void watch_stop() noexcept;
   [[nodiscard]] bool stopped() const noexcept;
-  [[nodiscard]] bool has_brake() const noexcept {
-    return objects_.brake[canopen::kBrakeFitted - 1] != 0;
-  }
+  [[nodiscard]] bool has_brake() const noexcept { return parameters_.brake_fitted != 0.0; }
   /// Whether the brake has had the time that its last command takes.
   [[nodiscard]] bool brake_moved() const noexcept;
   void watch_brake(bool was_set) noexcept;
@@ -101,10 +96,7 @@ class Axis final : private canopen::ObjectOwner {
   bool reversed_;
   double velocity_units_;      ///< in a count per second
   double acceleration_units_;  ///< in a count per second and second
-  /// A stand-in's own scales, which need not be whole; 0: those of its objects.
-  double exact_link_counts_;
-  double exact_motor_counts_;
-  double exact_rated_Nm_;
+  bool stands_in_;             ///< for a drive of another make, whose scales need not be whole
   std::int32_t zero_at_power_on_;
   std::int32_t zero_counts_;  ///< homing changes it
   std::int32_t turn_counts_;  ///< AxisSetup::turn_counts
@@ -114,9 +106,9 @@ class Axis final : private canopen::ObjectOwner {
   double index_pitch_rad_;
   bool counts_from_power_on_;
   bool at_power_on_;  ///< no sample yet, from which it counts
-  AxisObjects power_on_;
+  canopen::DriveParameters power_on_;
+  canopen::DriveParameters parameters_;  ///< in force; of objects_
   AxisObjects objects_;
-  ProtectionConfig protection_config_;
   JointController controller_;
   ProfileModes profile_;
   ProfileOutputs profiled_;  ///< of the last period

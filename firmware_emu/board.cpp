@@ -37,61 +37,27 @@ Status bad(std::string key, std::string message) {
   return fail_at(std::move(key), std::move(message), "correct the board's setup");
 }
 
-bool not_negative(const Pid::Config& pid) {
-  const auto good = [](double x) { return std::isfinite(x) && x >= 0.0; };
-  return good(pid.kp) && good(pid.ki) && good(pid.kd) && good(pid.output_limit);
+/// A setting that may be infinite is one that means "no limit" then.
+bool good(const DriveObject& object, double value) {
+  const bool limit = object.unit == WireUnit::kCounts || object.unit == WireUnit::kMille;
+  const bool is_signed = object.type == DataType::kInteger16 || object.type == DataType::kInteger32;
+  return (is_signed || value >= 0.0) && (limit ? !std::isnan(value) : std::isfinite(value));
 }
 
 Status check_axis(const AxisSetup& axis, const std::string& key) {
-  const ControllerConfig& c = axis.controller;
-  for (const Pid::Config& pid : {c.position, c.velocity, c.torque, c.current}) {
-    if (!not_negative(pid)) return bad(key, "a gain is negative or not finite");
+  const DriveParameters& p = axis.parameters;
+  for (const DriveObject& object : kDriveObjects) {
+    if (!good(object, object.of(p))) return bad(key, "a setting is negative or not finite");
   }
-  for (const double value : {c.torque_to_voltage_V_Nm,
-                             c.emf_compensation_Vs_rad,
-                             c.resistance_ohm,
-                             c.motor_constant_Nm_A,
-                             c.spring_Nm_rad,
-                             c.voltage_limit_V,
-                             c.current_limit_A,
-                             c.torque_limit_Nm,
-                             c.velocity_limit_rad_s,
-                             c.transfer_time_s,
-                             axis.stiffness_Nm_rad,
-                             axis.damping_Nms_rad,
-                             axis.torque_noise_Nm,
-                             axis.torque_quantum_Nm,
-                             axis.link_velocity_cutoff_Hz,
-                             axis.motor_velocity_cutoff_Hz,
-                             axis.torque_rate_cutoff_Hz,
-                             axis.position_margin_rad,
-                             axis.following_window_rad,
-                             axis.following_timeout_s,
-                             axis.continuous_current_A,
-                             axis.thermal_time_s,
-                             axis.undervoltage_V,
-                             axis.stop_time_s,
-                             axis.quick_stop_rad_s2,
-                             axis.mismatch_window_rad,
-                             axis.mismatch_timeout_s,
-                             axis.oscillation_limit_Nm,
-                             axis.oscillation_time_s,
-                             axis.excess_share,
-                             axis.excess_time_s,
-                             axis.swing_limit_rad_s}) {
-    if (!std::isfinite(value) || value < 0.0) {
-      return bad(key, "a setting is negative or not finite");
-    }
+  if (!(axis.torque_noise_Nm >= 0.0) || !(axis.torque_quantum_Nm >= 0.0)) {
+    return bad(key, "the torque's noise or step is negative or not finite");
   }
-  for (const double value : {axis.link_counts_per_rev, axis.motor_counts_per_rev}) {
+  for (const double value : {p.link_counts_per_rev, p.motor_counts_per_rev}) {
     if (!(value >= 1.0 && value < 4294967296.0)) return bad(key, "an encoder has no resolution");
   }
-  if (!(axis.rated_torque_Nm >= 1.0e-3) || !std::isfinite(axis.rated_torque_Nm)) {
-    return bad(key, "the rated torque is below 1 mNm");
-  }
-  if (!(c.torque_slope_Nm_s > 0.0)) return bad(key, "the torque's slope is not positive");
-  if (!(c.min_position_rad < c.max_position_rad)) return bad(key, "position limits are inverted");
-  if (!std::isfinite(axis.temperature_limit_C)) return bad(key, "no temperature limit");
+  if (p.rated_torque_Nm < 1.0e-3) return bad(key, "the rated torque is below 1 mNm");
+  if (!(p.torque_slope_Nm_s > 0.0)) return bad(key, "the torque's slope is not positive");
+  if (!(p.min_position_rad < p.max_position_rad)) return bad(key, "position limits are inverted");
   return {};
 }
 
@@ -106,7 +72,6 @@ Status check(const BoardSetup& setup) {
   if (setup.sheet != nullptr) {
     if (Status status = check_sheet(*setup.sheet, setup.axes.size()); !status) return status;
   }
-  if (setup.command_timeout_syncs < 0) return bad("command_timeout_syncs", "is negative");
   for (std::size_t i = 0; i < setup.axes.size(); ++i) {
     if (Status status = check_axis(setup.axes[i], "axes[" + std::to_string(i) + "]"); !status) {
       return status;
@@ -254,7 +219,8 @@ void Board::clear_when_well() noexcept {
 }
 
 ErrorCode Board::connection(std::size_t axis) const noexcept {
-  const std::uint32_t allowed = axes_[axis]->objects().command_timeout;
+  const std::uint32_t allowed =
+      static_cast<std::uint32_t>(axes_[axis]->parameters().command_timeout_syncs);
   const std::int64_t by_period_us = std::int64_t{allowed + 1} * *sync_period_us_;
   const std::int64_t most_us = sync_timeout_us_ != 0 ? sync_timeout_us_ : by_period_us;
   const bool silent = allowed != 0 && most_us > 0 && since_sync_ns_ > most_us * kNsPerUs;

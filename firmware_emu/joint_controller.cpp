@@ -26,7 +26,7 @@ constexpr double kTaperTo = 1.1;
 
 }  // namespace
 
-void JointController::configure(const ControllerConfig& config,
+void JointController::configure(const canopen::DriveParameters& config,
                                 double period_s) noexcept TANDEM_RT {
   config_ = config;
   period_s_ = period_s;
@@ -136,7 +136,7 @@ JointController::Outer JointController::position_outer(double position_rad, doub
   terms_.position_error_rad = link_error;
   double error = link_error;
   double rate = velocity_rad_s - measured.link_velocity_rad_s;
-  if (config_.position_feedback == PositionFeedback::kMotor) {
+  if (config_.motor_feedback != 0.0) {
     const double deflection = config_.spring_Nm_rad > 0.0 ? torque_Nm / config_.spring_Nm_rad : 0.0;
     error = q_ref + deflection - measured.motor_position_rad;
     rate = velocity_rad_s - measured.motor_velocity_rad_s;

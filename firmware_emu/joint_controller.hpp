@@ -3,43 +3,13 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 
 #include "base/realtime.hpp"
+#include "canopen/drive_parameters.hpp"
 #include "canopen/objects.hpp"
 #include "firmware_emu/pid.hpp"
 
 namespace tandem::firmware {
-
-/// Which encoder the stiff position loop's proportional and derivative terms act on.
-enum class PositionFeedback : std::uint8_t {
-  kLink = 0,   ///< e = q_ref - q
-  kMotor = 1,  ///< e = q_ref + tau_ff / Ks - theta, collocated; the integral stays on the link
-};
-
-/// What the controller has to know of its joint. Link side; the motor reflected to the link.
-struct ControllerConfig {
-  Pid::Config position;                  ///< [Nm/rad, Nm/(rad s), Nms/rad, Nm]
-  Pid::Config velocity;                  ///< [Nms/rad, Nm/rad, Nms^2/rad, Nm]
-  Pid::Config torque;                    ///< [V/Nm, V/(Nm s), Vs/Nm, V]
-  Pid::Config current;                   ///< [V/A, V/(A s), Vs/A, V]
-  double torque_to_voltage_V_Nm = 0.0;   ///< feed-forward, times the torque reference
-  double emf_compensation_Vs_rad = 0.0;  ///< times the motor velocity
-  double resistance_ohm = 0.0;           ///< 0: unknown, the current is not limited by it
-  double motor_constant_Nm_A = 0.0;      ///< N K: also the back-EMF [Vs/rad]
-  double spring_Nm_rad = 0.0;            ///< Ks; 0: rigid
-  double voltage_limit_V = 0.0;
-  double current_limit_A = 0.0;
-  double torque_limit_Nm = 0.0;
-  /// By how much the torque reference may change: the limit of its rate.
-  double torque_slope_Nm_s = std::numeric_limits<double>::infinity();
-  double velocity_limit_rad_s = 0.0;  ///< of velocity references and of the motion; 0: none
-  double min_position_rad = -std::numeric_limits<double>::infinity();  ///< of references
-  double max_position_rad = std::numeric_limits<double>::infinity();
-  double stop_deceleration_rad_s2 = 20.0;  ///< of kRamp
-  double transfer_time_s = 0.02;           ///< in which the voltage step of a mode change decays
-  PositionFeedback position_feedback = PositionFeedback::kLink;
-};
 
 /// What a mode is to follow. A field that the mode does not use is ignored; torque_Nm is the
 /// feed-forward of every mode but CST, where it is the reference.
@@ -96,7 +66,7 @@ class JointController {
 
   /// Takes new settings; the integrals stay, and the voltage goes over to them as in a change
   /// of mode. @pre every number finite, but the positions.
-  void configure(const ControllerConfig& config, double period_s) noexcept TANDEM_RT;
+  void configure(const canopen::DriveParameters& config, double period_s) noexcept TANDEM_RT;
 
   /// One control period. A change of `action` or `mode` is made without a step of the voltage:
   /// integrals are seeded, what is left decays over the transfer time.
@@ -118,7 +88,7 @@ class JointController {
     return terms_.voltage_saturation != 0 || terms_.torque_saturation != 0 ||
            terms_.reference_limited != 0;
   }
-  [[nodiscard]] const ControllerConfig& config() const noexcept { return config_; }
+  [[nodiscard]] const canopen::DriveParameters& config() const noexcept { return config_; }
 
   /// All but the configuration, which the board makes again from its object dictionary.
   template <class Archive>
@@ -167,7 +137,7 @@ class JointController {
   [[nodiscard]] double most_current_A(double way, const Measurement& measured) const noexcept;
   void integrate(const Step& step, Saturation voltage_cut) noexcept;
 
-  ControllerConfig config_;
+  canopen::DriveParameters config_;
   double period_s_ = 1.0e-3;
   double transfer_decay_ = 0.0;
   Pid position_;

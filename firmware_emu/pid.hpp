@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "base/realtime.hpp"
+#include "canopen/drive_parameters.hpp"
 
 namespace tandem::firmware {
 
@@ -31,13 +32,7 @@ enum class Saturation : std::int8_t { kLow = -1, kNone = 0, kHigh = 1 };
 /// first find out whether anything downstream has saturated: a step that would push further
 /// into a saturation, the loop's own or one downstream, is left out (conditional integration).
 struct Pid {
-  /// Units: output per error, per error and second, per error rate, output.
-  struct Config {
-    double kp = 0.0;
-    double ki = 0.0;
-    double kd = 0.0;
-    double output_limit = 0.0;  ///< of output and integral, both signs; 0: none
-  };
+  using Config = canopen::LoopGains;
   /// The terms of the last apply(), all in the unit of the output.
   struct State {
     double p = 0.0;

@@ -5,36 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <numbers>
 
 #include "base/realtime.hpp"
 #include "base/swing_watch.hpp"
+#include "canopen/drive_parameters.hpp"
 #include "canopen/objects.hpp"
 
 namespace tandem::firmware {
-
-struct ProtectionConfig {
-  double min_position_rad = -std::numeric_limits<double>::infinity();
-  double max_position_rad = std::numeric_limits<double>::infinity();
-  double position_margin_rad = 0.0;
-  double following_window_rad = 0.0;  ///< 0: not watched
-  double following_timeout_s = 0.0;
-  double continuous_current_A = 0.0;  ///< 0: not watched
-  double thermal_time_s = 1.0;
-  double temperature_limit_C = 0.0;
-  double undervoltage_V = 0.0;       ///< 0: not watched
-  double mismatch_window_rad = 0.0;  ///< 0: not watched
-  double mismatch_timeout_s = 0.0;
-  double oscillation_limit_Nm = 0.0;  ///< 0: not watched
-  double oscillation_time_s = 1.0;
-  double swing_limit_rad_s = 0.0;  ///< 0: not watched
-  // What motion may not be beyond for longer than excess_time_s; 0: not watched.
-  double excess_velocity_rad_s = 0.0;
-  double excess_torque_Nm = 0.0;
-  double excess_power_W = 0.0;
-  double excess_time_s = 0.0;
-};
 
 struct ProtectionInputs {
   double link_position_rad = 0.0;
@@ -94,7 +72,7 @@ class Protection {
 
   /// @return kNone, or the first of: position sensor, sensor mismatch, I2t, temperature,
   ///         under-voltage, oscillation, velocity, torque, power, following error, position limit.
-  canopen::ErrorCode update(const ProtectionConfig& config, const ProtectionInputs& in,
+  canopen::ErrorCode update(const canopen::DriveParameters& config, const ProtectionInputs& in,
                             double dt_s) noexcept TANDEM_RT {
     using canopen::ErrorCode;
     if (!in.sensors_valid) return ErrorCode::kPositionSensor;
@@ -127,16 +105,16 @@ class Protection {
   }
 
   /// I2t as a share of what trips it; 0 when not watched.
-  [[nodiscard]] double load(const ProtectionConfig& config) const noexcept {
+  [[nodiscard]] double load(const canopen::DriveParameters& config) const noexcept {
     const double bearable = config.continuous_current_A * config.continuous_current_A;
     return bearable > 0.0 ? state_.heat_A2 / bearable : 0.0;
   }
   /// The mean square of the fast torque as a share of what trips it; 0 when not watched.
-  [[nodiscard]] double oscillation(const ProtectionConfig& config) const noexcept {
+  [[nodiscard]] double oscillation(const canopen::DriveParameters& config) const noexcept {
     const double limit = config.oscillation_limit_Nm * config.oscillation_limit_Nm;
     return limit > 0.0 ? state_.fast_Nm2 / limit : 0.0;
   }
-  [[nodiscard]] bool warning(const ProtectionConfig& config) const noexcept {
+  [[nodiscard]] bool warning(const canopen::DriveParameters& config) const noexcept {
     return state_.warm != 0 || load(config) > kWarningShare;
   }
   /// True while the following error is beyond its window, time-out or not.
@@ -159,7 +137,7 @@ class Protection {
     std::int64_t warm = 0;
   };
 
-  void watch_oscillation(const ProtectionConfig& config, const ProtectionInputs& in,
+  void watch_oscillation(const canopen::DriveParameters& config, const ProtectionInputs& in,
                          double dt_s) noexcept {
     if (!in.drives) {
       state_.slow_Nm = in.motor_torque_Nm;
@@ -173,7 +151,7 @@ class Protection {
     state_.fast_Nm2 +=
         (fast * fast - state_.fast_Nm2) * std::min(1.0, dt_s / config.oscillation_time_s);
   }
-  bool swings_slowly(const ProtectionConfig& config, const ProtectionInputs& in,
+  bool swings_slowly(const canopen::DriveParameters& config, const ProtectionInputs& in,
                      double dt_s) noexcept {
     if (in.drives && in.follows_motion) {
       return swing_.update(in.deviation_rad_s, in.asked_torque_Nm, config.swing_limit_rad_s,
@@ -182,19 +160,23 @@ class Protection {
     swing_.restart();
     return false;
   }
-  canopen::ErrorCode watch_excess(const ProtectionConfig& config, const ProtectionInputs& in,
-                                  double dt_s) noexcept {
+  canopen::ErrorCode watch_excess(const canopen::DriveParameters& config,
+                                  const ProtectionInputs& in, double dt_s) noexcept {
+    const double share = 1.0 + config.excess_share;
     const auto lasts = [&](double& since_s, double value, double limit) {
-      const bool beyond = in.drives && limit > 0.0 && value > limit;
+      const bool watched = in.drives && config.excess_share > 0.0 && limit > 0.0;
+      const bool beyond = watched && value > limit;
       since_s = std::max(0.0, since_s + (beyond ? dt_s : -dt_s));
       return since_s > config.excess_time_s;
     };
     const double speed =
         std::max(std::abs(in.link_velocity_rad_s), std::abs(in.motor_velocity_rad_s));
     const double power_W = std::abs(in.torque_Nm * in.link_velocity_rad_s);
-    const bool fast = lasts(state_.too_fast_s, speed, config.excess_velocity_rad_s);
-    const bool strong = lasts(state_.too_strong_s, std::abs(in.torque_Nm), config.excess_torque_Nm);
-    const bool powerful = lasts(state_.too_powerful_s, power_W, config.excess_power_W);
+    const bool fast = lasts(state_.too_fast_s, speed, share * config.velocity_limit_rad_s);
+    const bool strong =
+        lasts(state_.too_strong_s, std::abs(in.torque_Nm), share * config.torque_limit_Nm);
+    const bool powerful = lasts(state_.too_powerful_s, power_W,
+                                share * config.velocity_limit_rad_s * config.torque_limit_Nm);
     return fast       ? canopen::ErrorCode::kVelocityControl
            : strong   ? canopen::ErrorCode::kExcessTorque
            : powerful ? canopen::ErrorCode::kExcessPower
@@ -204,7 +186,7 @@ class Protection {
     if (value >= on) flag = 1;
     if (value < off) flag = 0;
   }
-  bool leaves_limits(const ProtectionConfig& config, const ProtectionInputs& in) noexcept {
+  bool leaves_limits(const canopen::DriveParameters& config, const ProtectionInputs& in) noexcept {
     const double position = in.link_position_rad;
     if (!in.powered) state_.lower_rad = state_.upper_rad = position;
     state_.lower_rad = std::min(config.min_position_rad, std::max(state_.lower_rad, position));

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "canopen/data_sheet.hpp"
+#include "canopen/drive_parameters.hpp"
 #include "canopen/objects.hpp"
-#include "firmware_emu/joint_controller.hpp"
 
 namespace tandem::firmware {
 
@@ -32,8 +32,9 @@ struct AxisDrive {
   bool brake_open = false;  ///< the brake's coil has current; without power it is set
 };
 
-/// Power-on values of one axis: its object dictionary starts with them.
+/// One axis: its settings at power-on, and what its sensors and switches are.
 struct AxisSetup {
+  canopen::DriveParameters parameters{};
   std::uint32_t modes = canopen::kTandemModes;  ///< it takes these: bits of 6502
   bool reversed = false;         ///< 6064 counts down, and 6077 too, as the joint's angle grows
   std::int32_t zero_counts = 0;  ///< 6064 where the joint is at 0; its range may wrap around
@@ -50,43 +51,14 @@ struct AxisSetup {
   /// The motor's encoder gives an index pulse here, and every so often of the link's way; 0: none.
   double index_rad = 0.0;
   double index_pitch_rad = 0.0;
-  double link_counts_per_rev = 524288.0;  ///< 608F
   /// Velocity units (606C, 60FF, 60B1, 6081, 6099) at one revolution of the link per second; 0:
   /// counts per second.
   double velocity_units_per_rev = 0.0;
   /// Acceleration units (6083, 6084, 609A) at one revolution per second and second; 0: velocity
   /// units per second.
   double acceleration_units_per_rev = 0.0;
-  double motor_counts_per_rev = 819200.0;  ///< 2033, per revolution of the link
-  double rated_torque_Nm = 1.0;            ///< 6076
-  /// Gains, motor data, limits. Position limits (607D) may be infinite: no limit.
-  ControllerConfig controller{};
-  double stiffness_Nm_rad = 0.0;            ///< 2010
-  double damping_Nms_rad = 0.0;             ///< 2011
-  double torque_noise_Nm = 0.0;             ///< standard deviation of the torque's measurement
-  double torque_quantum_Nm = 0.0;           ///< step of the torque's measurement; 0: none
-  double link_velocity_cutoff_Hz = 150.0;   ///< 2027:1; 0: plain difference
-  double motor_velocity_cutoff_Hz = 150.0;  ///< 2027:2
-  double torque_rate_cutoff_Hz = 150.0;     ///< 2027:3
-  double position_margin_rad = 0.1;         ///< 2037: beyond 607D, until a fault
-  double following_window_rad = 0.5;        ///< 6065; 0: not watched
-  double following_timeout_s = 0.1;         ///< 6066
-  double continuous_current_A = 0.0;        ///< 2031:1; 0: not watched
-  double thermal_time_s = 30.0;             ///< 2031:2
-  double temperature_limit_C = 120.0;       ///< 2034
-  double undervoltage_V = 0.0;              ///< 2035; 0: not watched
-  double mismatch_window_rad = 0.0;         ///< 2038:1; 0: not watched
-  double mismatch_timeout_s = 0.01;         ///< 2038:2
-  double oscillation_limit_Nm = 0.0;        ///< 2039:1; 0: not watched
-  double oscillation_time_s = 1.0;          ///< 2039:2
-  double excess_share = 0.0;                ///< 203B:1; 0: not watched
-  double excess_time_s = 0.1;               ///< 203B:2
-  double swing_limit_rad_s = 0.0;           ///< 203C; 0: not watched
-  bool brake = false;                       ///< 203A:1: the motor has a spring-applied brake
-  std::uint16_t brake_release_ms = 0;       ///< 203A:2
-  std::uint16_t brake_engage_ms = 0;        ///< 203A:3
-  double quick_stop_rad_s2 = 20.0;          ///< 6085
-  double stop_time_s = 1.0;                 ///< 2036: longest stop until the bridge opens
+  double torque_noise_Nm = 0.0;    ///< standard deviation of the torque's measurement
+  double torque_quantum_Nm = 0.0;  ///< step of the torque's measurement; 0: none
 };
 
 /// A board with one or more axes: 1 to canopen::kMaxAxes.
@@ -99,7 +71,6 @@ struct BoardSetup {
   std::uint32_t serial = 0;
   std::int64_t control_period_ns = 1'000'000;
   std::size_t max_pdo_bytes = 64;  ///< 8 on a bus without CAN FD
-  int command_timeout_syncs = 10;  ///< 2032; 0: never
   std::uint64_t seed = 1;          ///< of the torque sensors' noise
   std::vector<AxisSetup> axes;
   /// The board stands in for the drive of this sheet, whose dictionary it has; null: one of ours.

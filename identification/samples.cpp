@@ -117,7 +117,7 @@ Result<IdentifiedRobot> make_identified_robot(const model::Tree& tree,
     const hal::ActuatorConfig& actuator = robot.actuator_of(config);
     facts.rigid.push_back(actuator.order < 2);
     facts.rotor_kg_m2.push_back(actuator.inertia_kg_m2);
-    facts.torque_per_A.push_back(actuator.gear_ratio * actuator.torque_constant_Nm_A);
+    facts.torque_per_A.push_back(actuator.torque_per_A());
     facts.damping_Nms_rad.push_back(actuator.damping_Nms_rad);
     facts.max_torque_Nm.push_back(config.max_torque_Nm);
     facts.max_velocity_rad_s.push_back(config.max_velocity_rad_s);

@@ -73,7 +73,7 @@ void engine(const Subject& s, Findings& findings) {
 /// many times as fast as its voltage allows.
 void back_emf(const Subject& s, Findings& findings) {
   for (const hal::ActuatorConfig& actuator : s.robot.config.actuators) {
-    const double per_A = actuator.gear_ratio * actuator.torque_constant_Nm_A;
+    const double per_A = actuator.torque_per_A();
     const double whole = per_A * per_A / actuator.resistance_ohm;
     if (!(actuator.damping_Nms_rad < 0.5 * whole)) continue;
     findings.warn(

@@ -50,7 +50,7 @@ enum Memory : Eigen::Index {
 /// The motor's constants as hal/sim/actuator.hpp derives them: D is friction and back-EMF together.
 struct Motor {
   explicit Motor(const hal::ActuatorConfig& a)
-      : torque_per_A(a.gear_ratio * a.torque_constant_Nm_A),
+      : torque_per_A(a.torque_per_A()),
         back_emf(std::min(torque_per_A, a.damping_Nms_rad * a.resistance_ohm / torque_per_A)),
         friction(std::max(0.0, a.damping_Nms_rad - torque_per_A * back_emf / a.resistance_ohm)),
         resistance(a.resistance_ohm),
@@ -115,9 +115,9 @@ double sample(const LoopPlant& plant, Eigen::VectorXd& x, std::optional<double> 
   };
   const double torque_Nm = torque_of(a, motor, x);
   const double link_rate_before = x(kLinkEstimate);
-  estimate(kMotorEstimate, kLastMotor, x(kMotor), board.motor_velocity_cutoff_Hz);
-  estimate(kLinkEstimate, kLastLink, x(kLink), board.link_velocity_cutoff_Hz);
-  estimate(kTorqueEstimate, kLastTorque, torque_Nm, board.torque_rate_cutoff_Hz);
+  estimate(kMotorEstimate, kLastMotor, x(kMotor), board.parameters.motor_velocity_cutoff_Hz);
+  estimate(kLinkEstimate, kLastLink, x(kLink), board.parameters.link_velocity_cutoff_Hz);
+  estimate(kTorqueEstimate, kLastTorque, torque_Nm, board.parameters.torque_rate_cutoff_Hz);
 
   double reference_Nm = 0.0;
   const bool of_motor = g.position_feedback == hal::PositionFeedback::kMotor;

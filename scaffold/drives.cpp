@@ -84,7 +84,7 @@ PositionGains position_gains(const hal::ActuatorConfig& drive, const Range& iner
                              const Tuning& tuning) {
   const double period_s = tuning.period_s;
   const double crossover = kLagMargin / (0.5 * period_s + estimator_lag_s(period_s));
-  const double motor_constant = drive.gear_ratio * drive.torque_constant_Nm_A;
+  const double motor_constant = drive.torque_per_A();
   const double emf = motor_constant * motor_constant / drive.resistance_ohm;
   const double effort = motor_constant * drive.current_limit_A / kCurrentMargin;
   PositionGains g;

@@ -268,7 +268,7 @@ std::vector<ActuatorFigures> actuator_figures(const hal::RobotConfig& robot,
       friction.add(motors ? joint.viscous_Nms_rad : joint.motor_viscous_Nms_rad);
       coulomb.add(motors ? joint.coulomb_Nm : joint.motor_coulomb_Nm);
     }
-    const double per_A = actuator.gear_ratio * actuator.torque_constant_Nm_A;
+    const double per_A = actuator.torque_per_A();
     const double back_emf =  // of a data sheet that has less, less
         std::min(per_A * per_A / actuator.resistance_ohm, actuator.damping_Nms_rad);
     ActuatorFigures figures{actuator.name, inertia.value(), friction.value(), coulomb.value()};

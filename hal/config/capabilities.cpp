@@ -51,7 +51,7 @@ std::array<PidGains, kPidLoops> most_gains(double torque, double voltage, double
 /// Current and voltage, which no torque reference limits: by the torque that they drive.
 void bound_direct_drive(const JointConfig& joint, const ActuatorConfig& motor,
                         JointCapabilities& out) {
-  const double constant_Nm_A = motor.gear_ratio * motor.torque_constant_Nm_A;
+  const double constant_Nm_A = motor.torque_per_A();
   const bool known = joint.max_torque_Nm > 0.0 && constant_Nm_A > 0.0;
   if (known) out.max_current_A = std::min(out.max_current_A, joint.max_torque_Nm / constant_Nm_A);
   out.max_current_rate_A_s = out.max_current_A / kFullScale_s;

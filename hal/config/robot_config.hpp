@@ -20,6 +20,7 @@
 #include "base/toml_reader.hpp"
 #include "canopen/board_sheet.hpp"
 #include "canopen/data_sheet.hpp"
+#include "canopen/drive_parameters.hpp"
 #include "hal/image.hpp"
 #include "hal/robot.hpp"
 #include "hal/stop_category.hpp"
@@ -82,6 +83,9 @@ struct ActuatorConfig {
   double thermal_time_s = 30.0;        ///< time constant of that watch
   double temperature_limit_C = 120.0;  ///< of the winding
   int damping_line = 0;                ///< in the TOML, for messages
+
+  /// N K, at the link: also the back-EMF [Vs/rad].
+  [[nodiscard]] double torque_per_A() const noexcept { return gear_ratio * torque_constant_Nm_A; }
 };
 
 /// What its order lacks ("inductance_H must be positive"), or empty.
@@ -176,9 +180,10 @@ struct JointConfig {
   double following_error_rad = 0.5;    ///< in CSP, beyond it for longer than the next: a fault;
   double following_timeout_s = 0.1;    ///< 0 rad: not watched
   bool following_error_given = false;  ///< following_error_rad is the file's, not its default
-  double max_oscillation = 0.35;    ///< RMS of the motor torque's fast part over the most that the
-                                    ///< drive gives; 0: not watched
-  double oscillation_time_s = 1.0;  ///< of that mean
+  /// Settings of its drive that are keys as they are; NaN: no key. See drive_parameters().
+  canopen::DriveParameters drive = canopen::DriveParameters::unsaid();
+  double max_oscillation = 0.35;  ///< RMS of the motor torque's fast part over the most that the
+                                  ///< drive gives; 0: not watched
   double max_swing =
       0.25;  ///< of the maximum velocity: a swing about the reference; 0: not watched
   double max_excess = 0.25;    ///< by which motion may be beyond its limits; 0: not watched

@@ -77,7 +77,7 @@ std::string actuator_problem(const ActuatorConfig& a) {
   if (electrical && a.inductance_H <= 0.0) return "inductance_H must be positive";
   if (mechanical && a.inertia_kg_m2 <= 0.0) return "inertia_kg_m2 must be positive";
   if (mechanical && a.spring_Nm_rad <= 0.0) return "spring_Nm_rad must be positive";
-  const double emf = a.gear_ratio * a.torque_constant_Nm_A;
+  const double emf = a.torque_per_A();
   if (electrical && a.resistance_ohm > 0.0 && a.damping_Nms_rad < emf * emf / a.resistance_ohm) {
     return "damping_Nms_rad must include the back-EMF's share N^2 K^2 / R = " +
            std::to_string(emf * emf / a.resistance_ohm);
@@ -91,8 +91,7 @@ double torque_rate_Nm_s(const JointConfig& joint) noexcept {
 }
 
 double oscillation_limit_Nm(const JointConfig& joint, const ActuatorConfig& actuator) {
-  const double most_Nm =
-      actuator.gear_ratio * actuator.torque_constant_Nm_A * actuator.current_limit_A;
+  const double most_Nm = actuator.torque_per_A() * actuator.current_limit_A;
   return joint.max_oscillation * std::min(joint.max_torque_Nm, most_Nm);
 }
 

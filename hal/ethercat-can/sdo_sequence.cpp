@@ -3,10 +3,12 @@
 #include "hal/ethercat-can/sdo_sequence.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "canopen/drive_abilities.hpp"
 #include "canopen/objects.hpp"
+#include "hal/config/drive_parameters.hpp"
 #include "hal/ethercat-can/axis_codec.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "hal/ethercat-can/pdo_slots.hpp"
@@ -19,8 +21,6 @@ namespace {
 using namespace canopen;
 namespace object = canopen::object;
 using Steps = std::vector<SdoStep>;
-
-float to_float(double value) { return static_cast<float>(value); }
 
 void add_check(Steps& steps, std::uint16_t index, std::uint8_t sub, std::uint32_t value,
                SdoUse use = SdoUse::kCheck) {
@@ -132,87 +132,30 @@ class AxisSteps {
   void operator()(std::uint16_t index, std::uint8_t sub, T value) {
     steps_.push_back(write_step(of_axis(index, axis_), sub, value, axis_));
   }
+  void operator()(const DriveObject& object, const DriveParameters& parameters) {
+    steps_.push_back({.sub = object.sub,
+                      .index = of_axis(object.index, axis_),
+                      .axis = static_cast<std::int8_t>(axis_),
+                      .size = static_cast<std::uint8_t>(object.size()),
+                      .bytes = object.encode(parameters)});
+  }
 
  private:
   Steps& steps_;
   int axis_;
 };
 
-void add_scales(AxisSteps& add, const JointConfig& joint) {
-  const AxisScale scale = AxisScale::of(joint);
-  const double rated_Nm = joint.rated_torque_Nm;
-  add(object::kEncoderResolution, 1, clamp_round<std::uint32_t>(joint.encoder_counts_per_rev));
-  add(object::kMotorResolution, 0, clamp_round<std::uint32_t>(joint.motor_encoder_counts_per_rev));
-  add(object::kRatedTorque, 0, clamp_round<std::uint32_t>(1000.0 * rated_Nm));
-  add(object::kMaxTorque, 0, clamp_round<std::uint16_t>(1000.0 * joint.max_torque_Nm / rated_Nm));
-  add(object::kTorqueSlope, 0,
-      std::max(1U, clamp_round<std::uint32_t>(1000.0 * torque_rate_Nm_s(joint) / rated_Nm)));
-  // By way of "no upper limit", so that no order of old and new limits is refused.
-  add(object::kSoftwareLimits, 2, std::numeric_limits<std::int32_t>::max());
-  add(object::kSoftwareLimits, 1,
-      clamp_round<std::int32_t>(joint.min_position_rad * scale.counts_per_rad));
-  add(object::kSoftwareLimits, 2,
-      clamp_round<std::int32_t>(joint.max_position_rad * scale.counts_per_rad));
-}
-
-void add_loops(AxisSteps& add, const JointConfig& joint, const ActuatorConfig& motor,
-               const GainsConfig& gains) {
-  const auto loop = [&](std::uint16_t index, const PidConfig& pid, double own_limit) {
-    add(index, kPidKp, to_float(pid.gains.kp));
-    add(index, kPidKi, to_float(pid.gains.ki));
-    add(index, kPidKd, to_float(pid.gains.kd));
-    add(index, kPidOutputLimit, to_float(pid.output_limit > 0.0 ? pid.output_limit : own_limit));
-  };
-  loop(object::kPositionGains, gains.position, joint.max_torque_Nm);
-  loop(object::kVelocityGains, gains.velocity, joint.max_torque_Nm);
-  loop(object::kTorqueGains, gains.torque, motor.voltage_limit_V);
-  loop(object::kCurrentGains, gains.current, motor.voltage_limit_V);
-  const double constant_Nm_A = motor.gear_ratio * motor.torque_constant_Nm_A;
-  const double voltage_per_Nm = constant_Nm_A > 0.0 ? motor.resistance_ohm / constant_Nm_A : 0.0;
-  add(object::kFeedForward, kTorqueToVoltage, to_float(gains.torque_feedforward * voltage_per_Nm));
-  add(object::kFeedForward, kEmfCompensation, to_float(gains.emf_compensation * constant_Nm_A));
-  add(object::kPositionFeedback, 0, static_cast<std::uint8_t>(gains.position_feedback));
-  add(object::kMotorData, kMotorResistance, to_float(motor.resistance_ohm));
-  add(object::kMotorData, kMotorTorqueConstant, to_float(constant_Nm_A));
-  const bool elastic = motor.order >= 2;
-  add(object::kMotorData, kMotorSpring, to_float(elastic ? motor.spring_Nm_rad : 0.0));
-  add(object::kStiffness, 0, to_float(gains.stiffness_Nm_rad));
-  add(object::kDamping, 0, to_float(gains.damping_Nms_rad));
-}
-
-void add_protections(AxisSteps& add, const JointConfig& joint, const ActuatorConfig& motor) {
-  add(object::kI2t, kContinuousCurrent, to_float(motor.continuous_current_A));
-  add(object::kI2t, kThermalTime, to_float(motor.thermal_time_s));
-  add(object::kTemperatureLimit, 0,
-      clamp_round<std::int16_t>(motor.temperature_limit_C / kKelvinPerUnit));
-  add(object::kFollowingErrorWindow, 0,
-      clamp_round<std::uint32_t>(joint.following_error_rad * AxisScale::of(joint).counts_per_rad));
-  add(object::kFollowingErrorTimeout, 0,
-      clamp_round<std::uint16_t>(1000.0 * joint.following_timeout_s));
-  add(object::kOscillation, kOscillationLimit, to_float(oscillation_limit_Nm(joint, motor)));
-  add(object::kOscillation, kOscillationTime, to_float(joint.oscillation_time_s));
-  add(object::kExcess, kExcessShare, to_float(joint.max_excess));
-  add(object::kExcess, kExcessTime, to_float(joint.excess_time_s));
-  add(object::kSwing, 0, to_float(joint.max_swing * joint.max_velocity_rad_s));
-  if (!joint.brake) return;
-  add(object::kBrake, kBrakeFitted, std::uint16_t{1});
-  add(object::kBrake, kBrakeRelease, static_cast<std::uint16_t>(joint.brake->release_ms));
-  add(object::kBrake, kBrakeEngage, static_cast<std::uint16_t>(joint.brake->engage_ms));
-}
-
 /// What a robot.toml sets in our own boards. Another drive keeps what it was commissioned with.
-void add_settings(AxisSteps& add, const RobotConfig& robot, const NodePlan& node,
-                  const JointConfig& joint) {
-  const ActuatorConfig& motor = robot.actuator_of(joint);
-  add_scales(add, joint);
-  add_loops(add, joint, motor, robot.gains_of(joint));
-  add(object::kLimits, kVoltageLimit, to_float(motor.voltage_limit_V));
-  add(object::kLimits, kCurrentLimit, to_float(motor.current_limit_A));
-  add(object::kLimits, kTorqueLimit, to_float(joint.max_torque_Nm));
-  add(object::kLimits, kVelocityLimit, to_float(joint.max_velocity_rad_s));
-  add_protections(add, joint, motor);
-  const BoardConfig& board = robot.boards[static_cast<std::size_t>(node.board)];
-  add(object::kCommandTimeout, 0, clamp_round<std::uint16_t>(board.command_timeout_cycles));
+void add_settings(AxisSteps& add, const RobotConfig& robot, const JointConfig& joint) {
+  const DriveParameters parameters = drive_parameters(robot, joint);
+  for (const DriveObject& object : kDriveObjects) {
+    if (std::isnan(object.of(parameters))) continue;
+    // By way of "no upper limit", so that no order of old and new limits is refused.
+    if (object.index == object::kSoftwareLimits && object.sub == 1) {
+      add(object::kSoftwareLimits, 2, std::numeric_limits<std::int32_t>::max());
+    }
+    add(object, parameters);
+  }
 }
 
 /// The modes that the axis is used in must be among those that the drive itself names.
@@ -304,7 +247,7 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   const JointConfig& joint = robot.joints[node.joints[axis]];
   add_stop_options(add, joint.stop_options);
   if (joint.homing) add_homing(add, sheet, AxisScale::of(robot, joint), joint);
-  if (can.settings) return add_settings(add, robot, node, joint);
+  if (can.settings) return add_settings(add, robot, joint);
   add_mode_check(steps, can, joint.homing.has_value(), static_cast<int>(axis));
   add_unit_checks(steps, sheet, joint);
   if (moves_by_profile(can)) add_profile(add, sheet, AxisScale::of(robot, joint), joint);

@@ -68,7 +68,7 @@ Result<ActuatorModel> make_actuator(const hal::ActuatorConfig& config) {
   }
   ActuatorModel model;
   model.order = config.order;
-  model.torque_per_A = config.gear_ratio * config.torque_constant_Nm_A;
+  model.torque_per_A = config.torque_per_A();
   model.resistance_ohm = config.resistance_ohm;
   const double emf = std::min(model.torque_per_A,
                               config.damping_Nms_rad * model.resistance_ohm / model.torque_per_A);

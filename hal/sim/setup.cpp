@@ -1,5 +1,4 @@
-// robot.toml to the set-ups of firmware_emu and to the model's specification: gains, limits,
-// protections, noise seeds.
+// robot.toml to the set-ups of firmware_emu and to the model's specification.
 #include "hal/sim/setup.hpp"
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include "canopen/drive_abilities.hpp"
 #include "canopen/frame.hpp"
 #include "firmware_emu/sheet_dictionary.hpp"
+#include "hal/config/drive_parameters.hpp"
 #include "hal/sim/actuator.hpp"
 #include "hal/sim/sensors.hpp"
 
@@ -35,13 +35,6 @@ std::size_t pdo_bytes(const hal::RobotConfig& robot, const std::string& name) {
   return bus == nullptr || bus->fd ? canopen::kMaxFrameBytes : canopen::kClassicFrameBytes;
 }
 
-firmware::Pid::Config pid(const hal::PidConfig& config, double limit) {
-  return {.kp = config.gains.kp,
-          .ki = config.gains.ki,
-          .kd = config.gains.kd,
-          .output_limit = config.output_limit > 0.0 ? config.output_limit : limit};
-}
-
 /// Where a joint's home switch is active: as robot.toml says, else from the middle of its range to
 /// the end that the method means, or 0.05 rad about the middle. Upper and lower are the drive's.
 std::array<double, 2> home_switch_rad(const hal::JointConfig& joint) {
@@ -60,59 +53,14 @@ std::array<double, 2> home_switch_rad(const hal::JointConfig& joint) {
   return {middle, kEnd};
 }
 
-firmware::ControllerConfig controller_config(const hal::JointConfig& joint,
-                                             const hal::ActuatorConfig& actuator,
-                                             const hal::GainsConfig& gains) {
-  const double motor_constant = actuator.gear_ratio * actuator.torque_constant_Nm_A;
-  firmware::ControllerConfig c;
-  c.position = pid(gains.position, joint.max_torque_Nm);
-  c.velocity = pid(gains.velocity, joint.max_torque_Nm);
-  c.torque = pid(gains.torque, actuator.voltage_limit_V);
-  c.current = pid(gains.current, actuator.voltage_limit_V);
-  c.torque_to_voltage_V_Nm = gains.torque_feedforward * actuator.resistance_ohm / motor_constant;
-  c.emf_compensation_Vs_rad = gains.emf_compensation * motor_constant;
-  c.resistance_ohm = actuator.resistance_ohm;
-  c.motor_constant_Nm_A = motor_constant;
-  c.spring_Nm_rad = actuator.order >= 2 ? actuator.spring_Nm_rad : 0.0;
-  c.voltage_limit_V = actuator.voltage_limit_V;
-  c.current_limit_A = actuator.current_limit_A;
-  c.torque_limit_Nm = joint.max_torque_Nm;
-  c.torque_slope_Nm_s = hal::torque_rate_Nm_s(joint);
-  c.velocity_limit_rad_s = joint.max_velocity_rad_s;
-  c.min_position_rad = joint.min_position_rad;
-  c.max_position_rad = joint.max_position_rad;
-  c.position_feedback = gains.position_feedback == hal::PositionFeedback::kMotor
-                            ? firmware::PositionFeedback::kMotor
-                            : firmware::PositionFeedback::kLink;
-  return c;
-}
-
 firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointConfig& joint) {
   const hal::ActuatorConfig& actuator = robot.actuator_of(joint);
-  const hal::GainsConfig& gains = robot.gains_of(joint);
   firmware::AxisSetup axis;
-  axis.link_counts_per_rev = joint.encoder_counts_per_rev;
-  axis.motor_counts_per_rev = joint.motor_encoder_counts_per_rev;
-  axis.rated_torque_Nm = joint.rated_torque_Nm;
-  axis.stiffness_Nm_rad = gains.stiffness_Nm_rad;
-  axis.damping_Nms_rad = gains.damping_Nms_rad;
+  axis.parameters.mismatch_window_rad = kMismatchWindow_rad;
+  axis.parameters.stop_deceleration_rad_s2 = joint.max_velocity_rad_s / kQuickestStop_s;
+  axis.parameters.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
+  axis.parameters.take(hal::drive_parameters(robot, joint));
   axis.torque_noise_Nm = joint.torque_noise_Nm;
-  axis.following_window_rad = joint.following_error_rad;
-  axis.following_timeout_s = joint.following_timeout_s;
-  axis.continuous_current_A = actuator.continuous_current_A;
-  axis.thermal_time_s = actuator.thermal_time_s;
-  axis.temperature_limit_C = actuator.temperature_limit_C;
-  axis.mismatch_window_rad = kMismatchWindow_rad;
-  axis.oscillation_limit_Nm = hal::oscillation_limit_Nm(joint, actuator);
-  axis.oscillation_time_s = joint.oscillation_time_s;
-  axis.swing_limit_rad_s = joint.max_swing * joint.max_velocity_rad_s;
-  axis.excess_share = joint.max_excess;
-  axis.excess_time_s = joint.excess_time_s;
-  axis.brake = joint.brake.has_value();
-  if (joint.brake) {
-    axis.brake_release_ms = static_cast<std::uint16_t>(joint.brake->release_ms);
-    axis.brake_engage_ms = static_cast<std::uint16_t>(joint.brake->engage_ms);
-  }
   axis.reversed = joint.reversed;
   axis.zero_counts = joint.zero_counts;
   axis.turn_counts = joint.encoder_turn_counts;
@@ -124,20 +72,15 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   axis.index_rad = joint.homing ? joint.homing->index_rad : 0.0;
   axis.index_pitch_rad = 2.0 * std::numbers::pi / actuator.gear_ratio;
   axis.counts_from_power_on = joint.homing && joint.homing->required;
-  axis.quick_stop_rad_s2 = joint.max_velocity_rad_s / kQuickestStop_s;
-  axis.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
-  axis.controller = controller_config(joint, actuator, gains);
   return axis;
 }
 
-/// The board has the drive's dictionary. Such a drive has no time-out of commands: it stops when it
-/// is told to, or when the master is not heard any more.
+/// The board has the drive's dictionary.
 void stand_in_for(const hal::BoardConfig& config, firmware::BoardSetup& board) {
   board.sheet = config.sheet;
   board.vendor = config.vendor_id.value_or(config.sheet->vendor.value_or(0));
   board.product = config.product_code.value_or(config.sheet->product.value_or(0));
   board.revision = config.revision.value_or(config.sheet->revision.value_or(0));
-  board.command_timeout_syncs = 0;
   board.max_pdo_bytes =
       std::min(board.max_pdo_bytes, static_cast<std::size_t>(config.sheet->most_pdo_bytes));
   for (std::size_t a = 0; a < board.axes.size(); ++a) {
@@ -248,7 +191,6 @@ firmware::BoardSetup board_setup(const hal::RobotConfig& robot, std::size_t inde
   board.serial = config.serial.value_or(static_cast<std::uint32_t>(index + 1));
   board.control_period_ns = config.control_period_ns;
   board.max_pdo_bytes = pdo_bytes(robot, config.bus);
-  board.command_timeout_syncs = config.command_timeout_cycles;
   board.seed = seed_of(seed, 1, index);
   for (const std::size_t joint : joints_of(robot, config)) {
     board.axes.push_back(axis_setup(robot, robot.joints[joint]));

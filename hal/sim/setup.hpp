@@ -31,7 +31,7 @@ namespace tandem::sim {
 [[nodiscard]] std::vector<std::size_t> joints_of(const hal::RobotConfig& robot,
                                                  const hal::BoardConfig& board);
 
-/// The power-on values of board `index`. The drive master writes the same values again by SDO.
+/// Board `index`. Its settings at power-on are those that the drive master writes, too.
 /// @param seed  of the run; every board draws its own numbers from it
 [[nodiscard]] firmware::BoardSetup board_setup(const hal::RobotConfig& robot, std::size_t index,
                                                std::uint64_t seed);

@@ -48,7 +48,7 @@ class SimulatedLoop {
     const auto pid = [](const hal::PidConfig& of) {
       return firmware::Pid::Config{of.gains.kp, of.gains.ki, of.gains.kd, 0.0};
     };
-    firmware::ControllerConfig c;
+    canopen::DriveParameters c;
     c.position = pid(plant.gains.position);
     c.velocity = pid(plant.gains.velocity);
     c.torque = pid(plant.gains.torque);
@@ -57,7 +57,7 @@ class SimulatedLoop {
     c.motor_constant_Nm_A = kt();
     c.spring_Nm_rad = a.order >= 2 ? a.spring_Nm_rad : 0.0;
     c.voltage_limit_V = c.torque_limit_Nm = 1e300;
-    c.position_feedback = static_cast<firmware::PositionFeedback>(plant.gains.position_feedback);
+    c.motor_feedback = static_cast<double>(plant.gains.position_feedback);
     board_.configure(c, plant.period_s);
     for (auto* filter : {&link_rate_, &motor_rate_, &torque_rate_}) {
       filter->configure(150.0, plant.period_s);

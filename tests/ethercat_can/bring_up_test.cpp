@@ -30,18 +30,19 @@ TEST(BringUp, EnablesThreeBoardsOfTwoAxesWithoutMovingAJoint) {
 TEST(BringUp, ConfiguresScalesLimitsGainsAndHeartbeats) {
   Rig rig;
   rig.bring_up();
-  const firmware::AxisObjects& axis = rig.axis(3).objects();
-  EXPECT_EQ(axis.link_counts, 36000u);
-  EXPECT_EQ(axis.motor_counts, 360000u);
-  EXPECT_EQ(axis.rated_torque_mNm, 50000u);
-  EXPECT_EQ(axis.max_torque, 2000);
-  EXPECT_EQ(axis.min_position, -11459);  // -2 rad
-  EXPECT_EQ(axis.max_position, 11459);
-  EXPECT_EQ(axis.gains[0], (std::array<float, 4>{400.0F, 10.0F, 40.0F, 100.0F}));
-  EXPECT_EQ(axis.gains[2], (std::array<float, 4>{0.2F, 2.0F, 0.0F, 40.0F}));
-  EXPECT_EQ(axis.feed_forward[0], 0.125F);  // R / (N K) = 0.5 / 4
-  EXPECT_EQ(axis.motor_data, (std::array<float, 3>{0.5F, 4.0F, 400.0F}));
-  EXPECT_EQ(axis.command_timeout, 10);
+  EXPECT_EQ(rig.object<std::uint32_t>(3, 0x608F, 1), 36000u);
+  EXPECT_EQ(rig.object<std::uint32_t>(3, 0x2033), 360000u);
+  EXPECT_EQ(rig.object<std::uint32_t>(3, 0x6076), 50000u);
+  EXPECT_EQ(rig.object<std::uint16_t>(3, 0x6072), 2000);
+  EXPECT_EQ(rig.object<std::int32_t>(3, 0x607D, 1), -11459);  // -2 rad
+  EXPECT_EQ(rig.object<std::int32_t>(3, 0x607D, 2), 11459);
+  EXPECT_EQ(rig.gains(3, 0x2020), (std::array<float, 4>{400.0F, 10.0F, 40.0F, 100.0F}));
+  EXPECT_EQ(rig.gains(3, 0x2022), (std::array<float, 4>{0.2F, 2.0F, 0.0F, 40.0F}));
+  EXPECT_EQ(rig.object<float>(3, 0x2024, 1), 0.125F);  // R / (N K) = 0.5 / 4
+  EXPECT_EQ(rig.object<float>(3, 0x2026, 1), 0.5F);
+  EXPECT_EQ(rig.object<float>(3, 0x2026, 2), 4.0F);
+  EXPECT_EQ(rig.object<float>(3, 0x2026, 3), 400.0F);
+  EXPECT_EQ(rig.object<std::uint16_t>(3, 0x2032), 10);
   const canopen::ObjectDictionary& od = rig.boards[1]->dictionary();
   EXPECT_EQ(od.value<std::uint32_t>(0x1016, 1), 0x007F0096u) << "the master, 150 ms";
   EXPECT_EQ(od.value<std::uint16_t>(0x1017, 0), 50);

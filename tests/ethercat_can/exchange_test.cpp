@@ -72,8 +72,8 @@ TEST(Exchange, SlowCommandsAreSentWhenTheyChange) {
   rig.command.current_A()[0] = 1.5;
   rig.steps(2);
   const firmware::AxisObjects& axis = rig.axis(0).objects();
-  EXPECT_EQ(axis.stiffness, 250.0F);
-  EXPECT_EQ(axis.damping, 5.0F);
+  EXPECT_EQ(rig.object<float>(0, 0x2010), 250.0F);
+  EXPECT_EQ(rig.object<float>(0, 0x2011), 5.0F);
   EXPECT_EQ(axis.target_voltage, -1234);
   EXPECT_EQ(axis.target_current, 150);
   EXPECT_GE(quiet, 7u) << "SYNC, three commands, three feedbacks";
@@ -137,12 +137,12 @@ TEST(Exchange, GainsThatChangeTravelBySdoOneACycle) {
   rig.parameters.set_gains(3, PidLoop::kPosition, {.kp = 500.0, .ki = 11.0, .kd = 41.0});
   rig.parameters.set_gains(3, PidLoop::kTorque, {.kp = 0.3, .ki = 2.0, .kd = 0.0});
   rig.steps(2);
-  EXPECT_EQ(rig.axis(3).objects().gains[0][0], 500.0F);
-  EXPECT_EQ(rig.axis(3).objects().gains[0][1], 10.0F) << "one object at a time";
+  EXPECT_EQ(rig.gains(3, 0x2020)[0], 500.0F);
+  EXPECT_EQ(rig.gains(3, 0x2020)[1], 10.0F) << "one object at a time";
   rig.steps(8);
-  EXPECT_EQ(rig.axis(3).objects().gains[0], (std::array<float, 4>{500.0F, 11.0F, 41.0F, 100.0F}));
-  EXPECT_EQ(rig.axis(3).objects().gains[2], (std::array<float, 4>{0.3F, 2.0F, 0.0F, 40.0F}));
-  EXPECT_EQ(rig.axis(2).objects().gains[0][0], 400.0F) << "of this joint alone";
+  EXPECT_EQ(rig.gains(3, 0x2020), (std::array<float, 4>{500.0F, 11.0F, 41.0F, 100.0F}));
+  EXPECT_EQ(rig.gains(3, 0x2022), (std::array<float, 4>{0.3F, 2.0F, 0.0F, 40.0F}));
+  EXPECT_EQ(rig.gains(2, 0x2020)[0], 400.0F) << "of this joint alone";
   EXPECT_EQ(rig.master->parameter_error(), "");
 }
 

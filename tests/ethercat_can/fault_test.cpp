@@ -199,8 +199,8 @@ TEST(Fault, ABoardThatRebootsIsConfiguredAnewByTheReset) {
   rig.leave(Phase::kFault, 2000);
   ASSERT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
   rig.steps(10);
-  EXPECT_EQ(rig.axis(5).objects().link_counts, 36000u);
-  EXPECT_EQ(rig.axis(5).objects().gains[0][0], 500.0F) << "what was set at run time is sent again";
+  EXPECT_EQ(rig.object<std::uint32_t>(5, 0x608F, 1), 36000u);
+  EXPECT_EQ(rig.gains(5, 0x2020)[0], 500.0F) << "what was set at run time is sent again";
 }
 
 TEST(Fault, ABoardThatCountsAsLostButStillHearsIsStoppedWithTheNextSync) {
@@ -320,7 +320,7 @@ TEST(Stop, IsResetTogetherWithTheFaultsOfDrivesAndBoards) {
   rig.master->reset();
   rig.leave(Phase::kBringUp, 2000);
   ASSERT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
-  EXPECT_EQ(rig.axis(5).objects().link_counts, 36000u) << "configured anew";
+  EXPECT_EQ(rig.object<std::uint32_t>(5, 0x608F, 1), 36000u) << "configured anew";
 }
 
 TEST(Stop, IsNotResetWhileACauseIsStillThere) {

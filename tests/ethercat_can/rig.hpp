@@ -96,9 +96,9 @@ inline firmware::BoardSetup board_setup(const RobotConfig& robot, std::size_t b)
   setup.node_id = robot.boards[b].node_id;
   setup.name = robot.boards[b].name;
   firmware::AxisSetup axis;  // everything else comes by SDO
-  axis.controller.voltage_limit_V = 40.0;
-  axis.controller.current_limit_A = 50.0;
-  axis.controller.torque_limit_Nm = 100.0;
+  axis.parameters.voltage_limit_V = 40.0;
+  axis.parameters.current_limit_A = 50.0;
+  axis.parameters.torque_limit_Nm = 100.0;
   setup.axes.assign(robot.joints.size() / robot.boards.size(), axis);
   return setup;
 }
@@ -191,6 +191,16 @@ class Rig {
       command.position_rad()[j] = state.position_rad()[j];
     }
     steps(5);
+  }
+  /// What a joint's drive has, whatever the bus says.
+  template <class T>
+  [[nodiscard]] T object(std::size_t joint, std::uint16_t index, std::uint8_t sub = 0) const {
+    const int axis = static_cast<int>(joint % axes());
+    return boards[joint / axes()]->dictionary().value<T>(canopen::of_axis(index, axis), sub);
+  }
+  [[nodiscard]] std::array<float, 4> gains(std::size_t joint, std::uint16_t index) const {
+    return {object<float>(joint, index, 1), object<float>(joint, index, 2),
+            object<float>(joint, index, 3), object<float>(joint, index, 4)};
   }
   [[nodiscard]] const firmware::Axis& axis(std::size_t joint) const {
     return boards[joint / axes()]->axis(joint % axes());

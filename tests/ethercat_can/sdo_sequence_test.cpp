@@ -73,7 +73,7 @@ TEST(SdoSequence, WritesTheProtections) {
   robot.actuators[0].temperature_limit_C = 110.0;
   robot.joints[1].following_error_rad = 0.25 * test::kPi;
   robot.joints[1].following_timeout_s = 0.05;
-  robot.joints[1].oscillation_time_s = 0.5;
+  robot.joints[1].drive.oscillation_time_s = 0.5;
   robot.joints[1].max_excess = 0.5;
   robot.joints[1].excess_time_s = 0.25;
   robot.joints[1].max_swing = 0.125;

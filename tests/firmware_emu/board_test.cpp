@@ -298,20 +298,20 @@ TEST(Board, IsRefusedWithABadSetup) {
   setup = board_setup(9);
   EXPECT_FALSE(check(setup).has_value());
   setup = board_setup(2);
-  setup.axes[1].controller.torque.kp = -0.1;
+  setup.axes[1].parameters.torque.kp = -0.1;
   ASSERT_FALSE(check(setup).has_value());
   EXPECT_EQ(check(setup).error().key, "axes[1]");
   setup = board_setup();
-  setup.axes[0].controller.resistance_ohm = std::numeric_limits<double>::quiet_NaN();
+  setup.axes[0].parameters.resistance_ohm = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(check(setup).has_value());
   setup = board_setup();
-  setup.axes[0].link_counts_per_rev = 0.0;
+  setup.axes[0].parameters.link_counts_per_rev = 0.0;
   EXPECT_FALSE(check(setup).has_value());
   setup = board_setup();
   setup.control_period_ns = 0;
   EXPECT_FALSE(check(setup).has_value());
   setup = board_setup();
-  std::swap(setup.axes[0].controller.min_position_rad, setup.axes[0].controller.max_position_rad);
+  std::swap(setup.axes[0].parameters.min_position_rad, setup.axes[0].parameters.max_position_rad);
   EXPECT_FALSE(check(setup).has_value());
 }
 

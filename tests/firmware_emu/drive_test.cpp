@@ -282,9 +282,9 @@ TEST_F(Drive, LeavesNoTraceOfTheSessionAfterAnNmtReset) {
 /// An axis with a brake that opens in 7 and closes in 5 periods.
 BoardSetup braked_setup() {
   BoardSetup setup = board_setup();
-  setup.axes[0].brake = true;
-  setup.axes[0].brake_release_ms = 7;
-  setup.axes[0].brake_engage_ms = 5;
+  setup.axes[0].parameters.brake_fitted = 1.0;
+  setup.axes[0].parameters.brake_release_ms = 7;
+  setup.axes[0].parameters.brake_engage_ms = 5;
   return setup;
 }
 

@@ -11,8 +11,10 @@ using canopen::Mode;
 
 constexpr double kDt = 1.0e-3;
 
-ControllerConfig config() {
-  return {.position = {.kp = 100.0, .ki = 50.0, .kd = 4.0},
+canopen::DriveParameters config() {
+  return {.min_position_rad = -1.0,
+          .max_position_rad = 1.5,
+          .position = {.kp = 100.0, .ki = 50.0, .kd = 4.0},
           .velocity = {.kp = 20.0, .ki = 30.0, .kd = 0.5},
           .torque = {.kp = 0.2, .ki = 3.0, .kd = 0.01},
           .current = {.kp = 0.3, .ki = 40.0},
@@ -25,8 +27,6 @@ ControllerConfig config() {
           .current_limit_A = 50.0,
           .torque_limit_Nm = 60.0,
           .velocity_limit_rad_s = 5.0,
-          .min_position_rad = -1.0,
-          .max_position_rad = 1.5,
           .transfer_time_s = 0.0};  // the laws themselves: no transfer
 }
 
@@ -53,9 +53,9 @@ Reference reference() {
 }
 
 /// A controller in its steady action and mode, its integrals at zero.
-JointController settled(const ControllerConfig& c, Mode mode, const Measurement& m,
+JointController settled(const canopen::DriveParameters& c, Mode mode, const Measurement& m,
                         const Reference& r) {
-  ControllerConfig quiet = c;
+  canopen::DriveParameters quiet = c;
   for (Pid::Config* pid : {&quiet.position, &quiet.velocity, &quiet.torque, &quiet.current}) {
     pid->ki = 0.0;
   }
@@ -69,13 +69,15 @@ JointController settled(const ControllerConfig& c, Mode mode, const Measurement&
 }
 
 /// V = ff tau_ref + emf th' + kp (tau_ref - tau) + I - kd dtau/dt
-double cascade(const ControllerConfig& c, double torque_ref, const Measurement& m, double I) {
+double cascade(const canopen::DriveParameters& c, double torque_ref, const Measurement& m,
+               double I) {
   return c.torque_to_voltage_V_Nm * torque_ref +
          c.emf_compensation_Vs_rad * m.motor_velocity_rad_s +
          c.torque.kp * (torque_ref - m.torque_Nm) + I - c.torque.kd * m.torque_rate_Nm_s;
 }
 
-void expect_law(Mode mode, const ControllerConfig& c, double torque_ref, double outer_I = 0.0) {
+void expect_law(Mode mode, const canopen::DriveParameters& c, double torque_ref,
+                double outer_I = 0.0) {
   JointController controller = settled(c, mode, measured(), reference());
   const double I = controller.torque_loop().state.i;
   const double V = controller.update(Action::kFollow, mode, reference(), measured());
@@ -90,8 +92,8 @@ TEST(JointController, ObeysThePositionLawOnTheLink) {
 }
 
 TEST(JointController, ObeysThePositionLawOnTheMotorWithTheIntegralOnTheLink) {
-  ControllerConfig c = config();
-  c.position_feedback = PositionFeedback::kMotor;
+  canopen::DriveParameters c = config();
+  c.motor_feedback = 1.0;
   expect_law(Mode::kCsp, c, 100.0 * (0.4 + 2.0 / 500.0 - 0.31) + 4.0 * (0.5 - 0.25) + 2.0,
              50.0 * 0.1 * kDt);
 }
@@ -138,7 +140,7 @@ TEST(JointController, ShortsTheWindingInBrakeAndOpensTheBridgeInOff) {
 }
 
 TEST(JointController, LimitsTheVoltageToTheSupplyAndToItsSetting) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.torque_limit_Nm = 1000.0;
   c.velocity_limit_rad_s = 0.0;
   Reference r = reference();
@@ -154,7 +156,7 @@ TEST(JointController, LimitsTheVoltageToTheSupplyAndToItsSetting) {
 }
 
 TEST(JointController, LimitsTheCurrentThatTheVoltageWouldDrive) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.current_limit_A = 10.0;
   Reference r = reference();
   r.voltage_V = -30.0;
@@ -166,7 +168,7 @@ TEST(JointController, LimitsTheCurrentThatTheVoltageWouldDrive) {
 }
 
 TEST(JointController, TakesTheDrivingCurrentAwayTowardsTheVelocityLimitInEveryMode) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.voltage_limit_V = 1000.0;
   c.torque_to_voltage_V_Nm = 100.0;  // the cascade asks for all that there is
   Reference r = reference();
@@ -223,7 +225,7 @@ TEST(JointController, KeepsReferencesWithinPositionAndVelocityLimits) {
 }
 
 TEST(JointController, LetsAJointThatStandsOutsideOfItsRangeStayAndComeInButNotGoOutAgain) {
-  ControllerConfig c = config();  // up to 1.5 rad
+  canopen::DriveParameters c = config();  // up to 1.5 rad
   Measurement m = measured();
   m.link_position_rad = 1.8;
   Reference r = reference();
@@ -244,7 +246,7 @@ TEST(JointController, LetsAJointThatStandsOutsideOfItsRangeStayAndComeInButNotGo
 }
 
 TEST(JointController, WindsUpNoIntegralOfTheCascadeAgainstTheVoltage) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.voltage_limit_V = 5.0;
   Reference r = reference();
   r.position_rad = 1.4;
@@ -258,7 +260,7 @@ TEST(JointController, WindsUpNoIntegralOfTheCascadeAgainstTheVoltage) {
 }
 
 TEST(JointController, WindsUpNoIntegralAgainstTheTorqueLimit) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.torque_limit_Nm = 3.0;
   JointController controller = settled(c, Mode::kCsp, measured(), reference());
   const double I = controller.position_loop().state.i;
@@ -270,7 +272,7 @@ TEST(JointController, WindsUpNoIntegralAgainstTheTorqueLimit) {
 }
 
 TEST(JointController, DoesNotRunAwayFromABlockedJointInVelocityImpedance) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.torque_limit_Nm = 10.0;
   JointController controller = settled(c, Mode::kVelocityImpedance, measured(), reference());
   for (int k = 0; k < 20000; ++k) {
@@ -280,7 +282,7 @@ TEST(JointController, DoesNotRunAwayFromABlockedJointInVelocityImpedance) {
 }
 
 TEST(JointController, ChangesBetweenAnyTwoModesWithoutAStepOfTheVoltage) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.transfer_time_s = 0.02;
   const Mode modes[] = {Mode::kCsp,
                         Mode::kCsv,
@@ -310,7 +312,7 @@ TEST(JointController, ChangesBetweenAnyTwoModesWithoutAStepOfTheVoltage) {
 
 // A subnormal number changes nothing either, but CPUs are slow with it, for the rest of the run.
 TEST(JointController, ForgetsAStepOfTheVoltageAfterALongTime) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.transfer_time_s = 0.02;
   JointController controller;
   controller.configure(c, kDt);
@@ -325,7 +327,7 @@ TEST(JointController, ForgetsAStepOfTheVoltageAfterALongTime) {
 }
 
 TEST(JointController, SeedsTheIntegralThatTheNewModeHas) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.transfer_time_s = 0.02;
   JointController controller;
   controller.configure(c, kDt);
@@ -338,7 +340,7 @@ TEST(JointController, SeedsTheIntegralThatTheNewModeHas) {
 }
 
 TEST(JointController, StartsAtTheBackEmfWhenTheBridgeCloses) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.transfer_time_s = 0.02;
   JointController controller;
   controller.configure(c, kDt);
@@ -349,7 +351,7 @@ TEST(JointController, StartsAtTheBackEmfWhenTheBridgeCloses) {
 }
 
 TEST(JointController, TakesNewGainsWithoutAStepOfTheVoltage) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.transfer_time_s = 0.02;
   JointController controller;
   controller.configure(c, kDt);
@@ -374,7 +376,7 @@ TEST(JointController, HoldsWhereItWasWhenItHasToStop) {
 }
 
 TEST(JointController, HoldsAtRest) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.position.ki = 0.0;
   JointController controller = settled(c, Mode::kCst, measured(), reference());
   controller.update(Action::kHold, Mode::kCst, reference(), measured());
@@ -387,7 +389,7 @@ TEST(JointController, ChangesTheTorqueReferenceNoFasterThanItsSlopeInEveryMode) 
   for (const Mode mode :
        {Mode::kCsp, Mode::kCsv, Mode::kCst, Mode::kImpedance, Mode::kVelocityImpedance}) {
     SCOPED_TRACE(static_cast<int>(mode));
-    ControllerConfig c = config();
+    canopen::DriveParameters c = config();
     c.torque_slope_Nm_s = 5000.0;
     JointController controller = settled(c, mode, measured(), reference());
     double last = controller.terms().torque_reference_Nm;
@@ -424,7 +426,7 @@ TEST(JointController, ShowsNoTorqueReferenceThatIsNotInForce) {
 }
 
 TEST(JointController, DelaysNeitherBrakeNorOpenBridgeNorALoweredLimitByTheSlope) {
-  ControllerConfig c = config();
+  canopen::DriveParameters c = config();
   c.torque_slope_Nm_s = 10.0;
   Reference full = reference();
   full.torque_Nm = 60.0;

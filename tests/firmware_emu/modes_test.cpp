@@ -138,7 +138,7 @@ TEST_F(Modes, WithoutAModeTheMotorIsShorted) {
 
 TEST_F(Modes, NeverDriveMoreThanTheLimits) {
   BoardSetup setup = board_setup();
-  setup.axes[0].controller.current_limit_A = 8.0;
+  setup.axes[0].parameters.current_limit_A = 8.0;
   for (const int mode : {8, 9, 10, -1, -2, -3, -4}) {
     Rig hard(setup);
     hard.joints[0].link_inertia = 0.5;

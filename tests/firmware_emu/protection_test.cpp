@@ -52,8 +52,8 @@ struct Guard : ::testing::Test {
 
 TEST_F(Guard, StopsOnAFollowingErrorAfterItsTime) {
   BoardSetup setup = board_setup();
-  setup.axes[0].following_window_rad = 0.1;
-  setup.axes[0].following_timeout_s = 0.05;
+  setup.axes[0].parameters.following_window_rad = 0.1;
+  setup.axes[0].parameters.following_timeout_s = 0.05;
   start(setup);
   Rig& r = *rig_owner;
   r.enable();
@@ -67,8 +67,8 @@ TEST_F(Guard, StopsOnAFollowingErrorAfterItsTime) {
 
 TEST_F(Guard, TellsOfAFollowingErrorBeforeItIsAFault) {
   BoardSetup setup = board_setup();
-  setup.axes[0].following_window_rad = 0.1;
-  setup.axes[0].following_timeout_s = 0.05;
+  setup.axes[0].parameters.following_window_rad = 0.1;
+  setup.axes[0].parameters.following_timeout_s = 0.05;
   start(setup);
   Rig& r = *rig_owner;
   r.enable();
@@ -106,10 +106,8 @@ TEST_F(Guard, StopsAJointThatLeavesItsPositionLimits) {
 /// A measured velocity is never quite still, and a pendulum takes long to stop.
 TEST(PositionLimits, AreWhereAJointThatIsPoweredBeyondThemStandsAndFollowItIn) {
   Protection protection;
-  const ProtectionConfig config{.min_position_rad = -1.0,
-                                .max_position_rad = 2.0,
-                                .position_margin_rad = 0.1,
-                                .temperature_limit_C = 100.0};
+  const canopen::DriveParameters config{
+      .min_position_rad = -1.0, .max_position_rad = 2.0, .position_margin_rad = 0.1};
   const auto at = [&](double position_rad, bool powered) {
     return protection.update(config, {.link_position_rad = position_rad, .powered = powered}, 1e-3);
   };
@@ -130,8 +128,8 @@ TEST(PositionLimits, AreWhereAJointThatIsPoweredBeyondThemStandsAndFollowItIn) {
 
 TEST_F(Guard, StopsOnI2tAfterTheTimeOfTheModelAndWarnsBefore) {
   BoardSetup setup = board_setup();
-  setup.axes[0].continuous_current_A = 5.0;
-  setup.axes[0].thermal_time_s = 2.0;
+  setup.axes[0].parameters.continuous_current_A = 5.0;
+  setup.axes[0].parameters.thermal_time_s = 2.0;
   start(setup);
   Rig& r = *rig_owner;
   r.enable(-3);
@@ -148,9 +146,9 @@ TEST_F(Guard, StopsOnI2tAfterTheTimeOfTheModelAndWarnsBefore) {
 
 TEST_F(Guard, ResetsI2tOnlyWhenTheWindingHasCooled) {
   BoardSetup setup = board_setup();
-  setup.axes[0].continuous_current_A = 5.0;
-  setup.axes[0].thermal_time_s = 20.0;
-  setup.axes[0].stop_time_s = 0.01;
+  setup.axes[0].parameters.continuous_current_A = 5.0;
+  setup.axes[0].parameters.thermal_time_s = 20.0;
+  setup.axes[0].parameters.stop_time_s = 0.01;
   start(setup);
   Rig& r = *rig_owner;
   r.enable(-3);
@@ -180,7 +178,7 @@ TEST_F(Guard, StopsOnOverTemperatureUntilItHasCooled) {
 
 TEST_F(Guard, StopsOnUnderVoltage) {
   BoardSetup setup = board_setup();
-  setup.axes[0].undervoltage_V = 24.0;
+  setup.axes[0].parameters.undervoltage_V = 24.0;
   start(setup);
   Rig& r = *rig_owner;
   r.enable();
@@ -194,8 +192,8 @@ TEST_F(Guard, StopsOnUnderVoltage) {
 
 TEST_F(Guard, StopsWhenEncodersAndSpringContradictEachOther) {
   BoardSetup setup = board_setup();
-  setup.axes[0].mismatch_window_rad = 0.02;
-  setup.axes[0].mismatch_timeout_s = 0.005;
+  setup.axes[0].parameters.mismatch_window_rad = 0.02;
+  setup.axes[0].parameters.mismatch_timeout_s = 0.005;
   start(setup);
   Rig& r = *rig_owner;
   r.enable();
@@ -214,9 +212,9 @@ TEST_F(Guard, StopsWhenEncodersAndSpringContradictEachOther) {
 /// The link's encoder jumps far: its limits are left at once, and the contradiction is found later.
 TEST_F(Guard, NamesWhatIsStillThereBehindTheFaultThatItFoundFirst) {
   BoardSetup setup = board_setup();
-  setup.axes[0].mismatch_window_rad = 0.02;
-  setup.axes[0].mismatch_timeout_s = 0.01;
-  setup.axes[0].undervoltage_V = 24.0;
+  setup.axes[0].parameters.mismatch_window_rad = 0.02;
+  setup.axes[0].parameters.mismatch_timeout_s = 0.01;
+  setup.axes[0].parameters.undervoltage_V = 24.0;
   start(setup);
   Rig& r = *rig_owner;
   r.enable();
@@ -419,8 +417,8 @@ TEST_F(Guard, ClearsTheEmergencyWhenTheLastFaultIsReset) {
 /// A board that watches oscillation as robot.toml's defaults have it.
 BoardSetup watched_setup() {
   BoardSetup setup = board_setup();
-  setup.axes[0].oscillation_limit_Nm = 0.35 * 60.0;
-  setup.axes[0].oscillation_time_s = 1.0;
+  setup.axes[0].parameters.oscillation_limit_Nm = 0.35 * 60.0;
+  setup.axes[0].parameters.oscillation_time_s = 1.0;
   return setup;
 }
 
@@ -459,7 +457,7 @@ TEST_F(Guard, StopsAJointThatRingsInEveryModeWhoseGainsAreTooHigh) {
 // x = r^2 (1 - exp(-t / T)) reaches limit^2 after -T ln(1 - limit^2 / r^2).
 TEST_F(Guard, FindsASquareWaveAfterTheTimeOfTheFormula) {
   BoardSetup setup = watched_setup();
-  setup.axes[0].oscillation_limit_Nm = 8.0;
+  setup.axes[0].parameters.oscillation_limit_Nm = 8.0;
   start(setup);
   Rig& r = *rig_owner;
   r.joints[0].J = 1.0e6;  // the rotor stands: u = N K V / R
@@ -514,12 +512,12 @@ TEST_F(Guard, LeavesHonestMotionsAlone) {
 /// joint at 24 rad/s; its limit is 8.
 BoardSetup bounded_setup() {
   BoardSetup setup = watched_setup();
-  setup.axes[0].excess_share = 0.25;
-  setup.axes[0].excess_time_s = 0.1;
-  setup.axes[0].swing_limit_rad_s = 0.25 * 8.0;
-  setup.axes[0].controller.voltage_limit_V = 100.0;
-  setup.axes[0].controller.min_position_rad = -1e3;
-  setup.axes[0].controller.max_position_rad = 1e3;
+  setup.axes[0].parameters.excess_share = 0.25;
+  setup.axes[0].parameters.excess_time_s = 0.1;
+  setup.axes[0].parameters.swing_limit_rad_s = 0.25 * 8.0;
+  setup.axes[0].parameters.voltage_limit_V = 100.0;
+  setup.axes[0].parameters.min_position_rad = -1e3;
+  setup.axes[0].parameters.max_position_rad = 1e3;
   return setup;
 }
 
@@ -572,7 +570,7 @@ TEST_F(Guard, ChangesCurrentAndVoltageNoFasterThanTheTorquesSlope) {
   for (const int mode : {-2, -3}) {
     SCOPED_TRACE(mode);
     BoardSetup setup = bounded_setup();
-    setup.axes[0].controller.torque_slope_Nm_s = 1000.0;  // 1 Nm/ms
+    setup.axes[0].parameters.torque_slope_Nm_s = 1000.0;  // 1 Nm/ms
     start(setup);
     Rig& r = *rig_owner;
     r.joints[0].link_inertia = 0.2;
@@ -604,11 +602,10 @@ TEST_F(Guard, StopsAJointThatItsLoadDrivesBeyondItsVelocity) {
 }
 
 TEST(Excess, OfVelocityTorqueAndPowerIsAFaultAfterItsTimeWhileTheMotorDrives) {
-  const ProtectionConfig config{.temperature_limit_C = 100.0,
-                                .excess_velocity_rad_s = 10.0,
-                                .excess_torque_Nm = 75.0,
-                                .excess_power_W = 600.0,
-                                .excess_time_s = 0.1};
+  const canopen::DriveParameters config{.torque_limit_Nm = 60.0,
+                                        .velocity_limit_rad_s = 8.0,
+                                        .excess_share = 0.25,
+                                        .excess_time_s = 0.1};
   struct Case {
     ProtectionInputs in;
     ErrorCode code;
@@ -638,7 +635,7 @@ TEST(Excess, OfVelocityTorqueAndPowerIsAFaultAfterItsTimeWhileTheMotorDrives) {
 
 TEST_F(Guard, StopsAJointThatItsOwnLoopKeepsSwinging) {
   BoardSetup setup = bounded_setup();
-  setup.axes[0].following_window_rad = 0.0;
+  setup.axes[0].parameters.following_window_rad = 0.0;
   start(setup);
   Rig& r = *rig_owner;
   r.joints[0].link_inertia = 0.4;

@@ -53,25 +53,25 @@ struct TestJoint {
 /// A soft leg joint of the humanoid, 1 kHz.
 inline AxisSetup axis_setup() {
   AxisSetup axis;
-  axis.rated_torque_Nm = 50.0;
-  axis.stiffness_Nm_rad = 100.0;
-  axis.damping_Nms_rad = 5.0;
-  axis.controller = {.position = {.kp = 400.0, .ki = 400.0, .kd = 40.0},
+  axis.parameters = {.rated_torque_Nm = 50.0,
+                     .min_position_rad = -2.0,
+                     .max_position_rad = 2.0,
+                     .position = {.kp = 400.0, .ki = 400.0, .kd = 40.0},
                      .velocity = {.kp = 5.0, .ki = 20.0},
                      .torque = {.kp = 0.2, .ki = 2.0, .kd = 0.01},
                      .current = {.kp = 0.5, .ki = 200.0},
                      .torque_to_voltage_V_Nm = 0.664 / 4.1,
                      .emf_compensation_Vs_rad = 0.9 * 4.1,
+                     .motor_feedback = 1.0,
                      .resistance_ohm = 0.664,
                      .motor_constant_Nm_A = 4.1,
                      .spring_Nm_rad = 395.46,
+                     .stiffness_Nm_rad = 100.0,
+                     .damping_Nms_rad = 5.0,
                      .voltage_limit_V = 40.0,
                      .current_limit_A = 50.0,
                      .torque_limit_Nm = 60.0,
-                     .velocity_limit_rad_s = 8.0,
-                     .min_position_rad = -2.0,
-                     .max_position_rad = 2.0,
-                     .position_feedback = PositionFeedback::kMotor};
+                     .velocity_limit_rad_s = 8.0};
   return axis;
 }
 

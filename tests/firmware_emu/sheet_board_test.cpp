@@ -65,7 +65,7 @@ BoardSetup stand_in(DataSheet sheet) {
   setup.vendor = setup.sheet->vendor.value_or(0);
   setup.product = setup.sheet->product.value_or(0);
   setup.max_pdo_bytes = 8;
-  setup.command_timeout_syncs = 0;
+  setup.axes[0].parameters.command_timeout_syncs = 0.0;
   setup.axes[0].modes = emulated_modes(*setup.sheet, 0);
   return setup;
 }
@@ -306,7 +306,7 @@ TEST(SheetBoard, RampsAProfileTorqueByItsSlope) {
 
 TEST(SheetBoard, HomesAtTheEndOfItsRange) {
   BoardSetup setup = stand_in(servo_with_profiles());
-  setup.axes[0].controller.min_position_rad = -0.3;
+  setup.axes[0].parameters.min_position_rad = -0.3;
   StandIn rig(setup);
   rig.enable_by_sdo(6);
   EXPECT_FALSE(rig.bit(12));
@@ -353,9 +353,9 @@ TEST(SheetBoard, AHomingMethodThatItHasNotIsAHomingError) {
 /// Nothing of it is in the sheet: a brake is the drive's own affair.
 TEST(SheetBoard, ItsBrakeHoldsUntilItIsEnabledAndBeforeItIsDisabled) {
   BoardSetup setup = stand_in(sheet_of("servo.eds"));
-  setup.axes[0].brake = true;
-  setup.axes[0].brake_release_ms = 40;
-  setup.axes[0].brake_engage_ms = 30;
+  setup.axes[0].parameters.brake_fitted = 1.0;
+  setup.axes[0].parameters.brake_release_ms = 40;
+  setup.axes[0].parameters.brake_engage_ms = 30;
   StandIn rig(setup);
   ASSERT_EQ(rig.write(0x6060, 0, std::int8_t{8}), 0U);
   ASSERT_EQ(rig.write(0x605A, 0, std::int16_t{2}), 0U);
@@ -382,7 +382,7 @@ TEST(SheetBoard, TellsAndTakesVelocitiesInItsOwnUnits) {
   rig.cycles(500);
   const std::int32_t from = rig.position();
   rig.cycles(100);
-  const double turned = (rig.position() - from) / setup.axes[0].link_counts_per_rev;
+  const double turned = (rig.position() - from) / setup.axes[0].parameters.link_counts_per_rev;
   EXPECT_NEAR(turned, 0.01, 0.001);
   EXPECT_NEAR(rig.object<std::int32_t>(0x606C), 300, 30);
 }
@@ -419,7 +419,7 @@ TEST(SheetBoard, EnabledAnewItForgetsTheSetPointOfBefore) {
 
 TEST(SheetBoard, CountsByAScaleThatIsNotWhole) {
   BoardSetup setup = stand_in(servo_with_profiles());
-  setup.axes[0].link_counts_per_rev = 1000.0 / 3.0;
+  setup.axes[0].parameters.link_counts_per_rev = 1000.0 / 3.0;
   StandIn rig(setup);
   rig.joints[0].q = rig.joints[0].th = 100.0;
   rig.cycles(2);

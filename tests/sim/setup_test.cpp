@@ -32,11 +32,11 @@ TEST(Setup, EveryJointIsOneAxisOfItsOwnBoard) {
 TEST(Setup, FirmwareKnowsTheMotorBehindItsJoint) {
   const hal::RobotConfig coman = robot();
   const firmware::AxisSetup hip = board_setup(coman, 0, 1).axes[0];
-  EXPECT_NEAR(hip.controller.motor_constant_Nm_A, 4.1, 1e-12);
-  EXPECT_NEAR(hip.controller.torque_to_voltage_V_Nm, 0.664 / 4.1, 1e-12);
-  EXPECT_EQ(hip.controller.spring_Nm_rad, 395.46);
-  EXPECT_EQ(hip.controller.voltage_limit_V, 40.0);
-  EXPECT_EQ(hip.link_counts_per_rev, 262144.0);
+  EXPECT_NEAR(hip.parameters.motor_constant_Nm_A, 4.1, 1e-12);
+  EXPECT_NEAR(hip.parameters.torque_to_voltage_V_Nm, 0.664 / 4.1, 1e-12);
+  EXPECT_EQ(hip.parameters.spring_Nm_rad, 395.46);
+  EXPECT_EQ(hip.parameters.voltage_limit_V, 40.0);
+  EXPECT_EQ(hip.parameters.link_counts_per_rev, 262144.0);
 }
 
 TEST(Setup, EveryNodeDrawsNumbersOfItsOwn) {
