@@ -142,6 +142,12 @@ static void figures(Figures& f, const JointFigures& joint) {
     "in which a limit changed the controller's command: [controllers.md](controllers.md#limits)");
 }
 
+static void figures(Figures& f, const runtime::WorkFigures& work) {
+  f("done_J", work.done_J, "of the joints that drove");
+  f("taken_J", work.taken_J, "of those that braked");
+  f("max_power_W", work.max_power_W, "of all together; braking ones count negative");
+}
+
 static void figures(Figures& f, const runtime::GroundFigures& ground) {
   f("weight_N", ground.weight_N, "mass times gravity");
   f("mean_vertical_force_N", ground.mean_vertical_force_N, "of all feet together");
@@ -252,6 +258,10 @@ void figures(Figures& f, const RunSummary* s) {
       "buses", [&] { return s->composition.open_buses(); }, "of a CAN backend");
   f(
       "joints", [&] { return joints_of(*s); }, "");
+  f(
+      "work",
+      [&] { return s->cycle.statistics().work(static_cast<double>(e().loop.period_ns) * 1e-9); },
+      "torque times velocity, as measured; null: no drive tells them");
   f(
       "ground", [&] { return s->cycle.statistics().ground(weight_N(*s->composition.kernels)); },
       "by the plant's truth, of a floating base with feet");
@@ -377,6 +387,9 @@ void add_motion_facts(const Json& run, Facts& facts) {
                 "{ground.mean_vertical_force_N:.2f N} on average, weight {ground.weight_N:.2f N}" +
                     fmt::format(" ({:+.3f} %)", 100.0 * share));
   }
+  add_figures(
+      facts, run, "work of the joints",
+      "{work.done_J:.1f J}, {work.taken_J:.1f J} taken back, {work.max_power_W:.0f W} at most");
   add_figures(facts, run, "feet slip", "{ground.max_foot_slip_m:.3f mm} at most");
   if (run["base"].is_null()) return;
   constexpr double kStands_rad = 20.0 / kDegrees;  // more says that it fell, or nearly did
