@@ -48,6 +48,7 @@ void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& 
     errors_[j].max = std::max(errors_[j].max, std::abs(error));
     ++errors_[j].count;
   }
+  take_work(state);
   for (std::size_t l = 0; l < loops_.size(); ++l) {
     LoopFigures& one = loops_[l];
     one.max_position_error_m =
@@ -88,6 +89,22 @@ void RunStatistics::take_estimate(const hal::EstimateImage& estimate,
   tilt_error_rad_ = std::max(tilt_error_rad_, angle);
   height_error_m_ = std::max(height_error_m_,
                              std::abs(estimate.base_position_m()[2] - truth->base_position_m()[2]));
+}
+
+void RunStatistics::take_work(const hal::StateImage& state) noexcept TANDEM_RT {
+  double driving_W = 0.0, braking_W = 0.0;
+  bool told = false;
+  for (std::size_t j = 0; j < errors_.size(); ++j) {
+    const double power_W = state.torque_Nm()[j] * state.velocity_rad_s()[j];
+    if (std::isnan(power_W)) continue;  // its drive does not tell
+    told = true;
+    (power_W > 0.0 ? driving_W : braking_W) += std::abs(power_W);
+  }
+  if (!told) return;
+  ++powered_;
+  driving_W_ += driving_W;
+  braking_W_ += braking_W;
+  max_power_W_ = std::max(max_power_W_, driving_W - braking_W);
 }
 
 void RunStatistics::take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT {
@@ -133,6 +150,11 @@ std::vector<std::uint64_t> RunStatistics::limited_cycles() const {
   return cycles;
 }
 
+std::optional<WorkFigures> RunStatistics::work(double period_s) const {
+  if (powered_ == 0) return std::nullopt;
+  return WorkFigures{driving_W_ * period_s, braking_W_ * period_s, max_power_W_};
+}
+
 std::optional<GroundFigures> RunStatistics::ground(double weight_N) const {
   if (free_cycles_ == 0 || feet_.empty()) return std::nullopt;
   return GroundFigures{weight_N, force_sum_N_ / static_cast<double>(free_cycles_), slip_m_};
@@ -149,9 +171,9 @@ EstimateFigures RunStatistics::estimate() const {
 }
 
 void RunStatistics::archive(Archive& ar) {
-  ar(errors_, limited_, cycles_, feet_, loops_, base_cycles_, compared_, tilt_error_rad_,
-     height_error_m_, external_Nm_, base_wrench_, wrenches_, unexplained_Nm_, free_cycles_,
-     force_sum_N_, slip_m_, base_, base_free_);
+  ar(errors_, limited_, cycles_, driving_W_, braking_W_, max_power_W_, powered_, feet_, loops_,
+     base_cycles_, compared_, tilt_error_rad_, height_error_m_, external_Nm_, base_wrench_,
+     wrenches_, unexplained_Nm_, free_cycles_, force_sum_N_, slip_m_, base_, base_free_);
 }
 
 }  // namespace tandem::runtime

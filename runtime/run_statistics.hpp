@@ -25,6 +25,14 @@ struct TrackingError {
   std::uint64_t cycles = 0;
 };
 
+/// What the joints did: torque times velocity, as measured, over the cycles in which controllers
+/// ran.
+struct WorkFigures {
+  double done_J = 0.0;       ///< sum over the joints that drove
+  double taken_J = 0.0;      ///< sum over those that braked, positive
+  double max_power_W = 0.0;  ///< the largest of all joints together: braking ones count negative
+};
+
 /// From the plant's truth, over the cycles in which controllers ran and the base was free.
 struct GroundFigures {
   double weight_N = 0.0;               ///< mass times gravity, from the model
@@ -93,6 +101,8 @@ class RunStatistics {
   [[nodiscard]] std::vector<TrackingError> tracking() const;
   /// Per joint: cycles in which a controller's command was not what the joint was given.
   [[nodiscard]] std::vector<std::uint64_t> limited_cycles() const;
+  /// Empty when no joint told its torque and velocity.
+  [[nodiscard]] std::optional<WorkFigures> work(double period_s) const;
   /// Empty when there was no truth, no foot, or no cycle with a free base.
   [[nodiscard]] std::optional<GroundFigures> ground(double weight_N) const;
   [[nodiscard]] std::optional<BaseFigures> base() const;
@@ -118,6 +128,7 @@ class RunStatistics {
     double anchor_x = 0.0, anchor_y = 0.0;  // where it touched down
     std::uint64_t touching = 0;
   };
+  void take_work(const hal::StateImage& state) noexcept TANDEM_RT;
   void take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT;
   void take_estimate(const hal::EstimateImage& estimate,
                      const hal::TruthImage* truth) noexcept TANDEM_RT;
@@ -125,6 +136,8 @@ class RunStatistics {
   std::vector<Error> errors_;
   std::vector<Limited> limited_;
   std::uint64_t cycles_ = 0;
+  double driving_W_ = 0.0, braking_W_ = 0.0, max_power_W_ = 0.0;  // sums over cycles; the largest
+  std::uint64_t powered_ = 0;                                     // cycles with a joint's power
   std::vector<Foot> feet_;
   std::vector<LoopFigures> loops_;
   std::uint64_t base_cycles_ = 0, compared_ = 0;  // of the estimate

@@ -21,6 +21,12 @@ const char* kind_name(BusLoadRow::Kind kind) {
   return "";
 }
 
+/// With the period that it is a load of.
+struct BusRow {
+  BusLoadRow row;
+  double period_us = 0.0;
+};
+
 std::string rates(const BusLoad& load) {
   const double nominal = static_cast<double>(load.rates.nominal) / kMega;
   const bool two = load.kind == hal::BusKind::kCan && load.fd;
@@ -49,32 +55,34 @@ void print(const BusLoad& load, std::FILE* out) {
   fmt::print(out, "{}\n\n", load.fits() ? "fits" : "does not fit; " + load.remedy);
 }
 
-Json to_json(const BusLoad& load) {
-  Json rows = Json::array();
-  for (const BusLoadRow& row : load.rows) {
-    rows.push_back({{"what", row.what},
-                    {"kind", kind_name(row.kind)},
-                    {"frames", row.frames},
-                    {"bits", row.bits},
-                    {"time_us", row.time_us},
-                    {"load", row.time_us / load.period_us()}});
-  }
-  return {{"bus", load.bus},
-          {"kind", load.kind == hal::BusKind::kCan ? "can" : "ethercat"},
-          {"fd", load.kind == hal::BusKind::kCan && load.fd},
-          {"bitrate", load.rates.nominal},
-          {"data_bitrate", load.rates.data},
-          {"period_us", load.period_us()},
-          {"rows", rows},
-          {"urgent_us", load.urgent_us},
-          {"load", load.load},
-          {"load_if_all_changed", load.most_load},
-          {"max_load", load.max_load},
-          {"ok", load.fits()},
-          {"remedy", load.remedy}};
+}  // namespace
+
+static void figures(Figures& f, const BusRow& row) {
+  f("what", row.row.what, "");
+  f("kind", std::string(kind_name(row.row.kind)), "`urgent`, `mean`, `on_change`");
+  f("frames", row.row.frames, "per cycle, as the next three");
+  f("bits", row.row.bits, "");
+  f("time_us", row.row.time_us, "");
+  f("load", row.row.time_us / row.period_us, "a share of the cycle");
 }
 
-}  // namespace
+void figures(Figures& f, const BusLoad& load) {
+  std::vector<BusRow> rows;
+  for (const BusLoadRow& row : load.rows) rows.push_back({row, load.period_us()});
+  f("bus", load.bus, "");
+  f("kind", std::string(load.kind == hal::BusKind::kCan ? "can" : "ethercat"), "`can`, `ethercat`");
+  f("fd", load.kind == hal::BusKind::kCan && load.fd, "");
+  f("bitrate", load.rates.nominal, "");
+  f("data_bitrate", load.rates.data, "");
+  f("period_us", load.period_us(), "");
+  f("rows", rows, "one kind of traffic each: [wire.md](wire.md#bus-load)");
+  f("urgent_us", load.urgent_us, "what every cycle must carry");
+  f("load", load.load, "a share");
+  f("load_if_all_changed", load.most_load, "a share, with every slow command in every cycle");
+  f("max_load", load.max_load, "of robot.toml");
+  f("ok", load.fits(), "");
+  f("remedy", load.remedy, "empty when it fits");
+}
 
 Diagnostics show_buses(const hal::RobotConfig& robot, std::int64_t period_ns, std::FILE* out,
                        Json& json) {
@@ -87,7 +95,7 @@ Diagnostics show_buses(const hal::RobotConfig& robot, std::int64_t period_ns, st
   }
   for (const BusLoad& load : *loads) {
     print(load, out);
-    json.push_back(to_json(load));
+    json.push_back(figures_json(load));
   }
   return {};
 }

@@ -24,37 +24,31 @@ void BusWatch::look() {
   }
 }
 
-Json buses_json(std::span<const OpenBus> buses) {
-  Json all = Json::array();
-  for (const OpenBus& bus : buses) {
-    const BusStatistics s = bus.end->statistics();
-    Json json;
-    json["interface"] = bus.interface;
-    json["status"] = bus.end->status_text();
-    json["sent"] = s.sent;
-    json["received"] = s.received;
-    json["send_refused"] = s.send_refused;
-    json["queue_full"] = s.queue_full;
-    json["receive_lost"] = s.receive_lost;
-    json["error_frames"] = s.error_frames;
-    json["ignored"] = s.ignored;
-    json["recoveries"] = s.recoveries;
-    all.push_back(std::move(json));
-  }
-  return all;
+void figures(Figures& f, const OpenBus& bus) {
+  const BusStatistics s = bus.end == nullptr ? BusStatistics{} : bus.end->statistics();
+  f("interface", bus.interface, "");
+  f(
+      "status", [&] { return bus.end->status_text(); }, "empty: good");
+  f("sent", s.sent, "frames");
+  f("received", s.received, "frames");
+  f("send_refused", s.send_refused, "frames not accepted");
+  f("queue_full", s.queue_full, "times");
+  f("receive_lost", s.receive_lost, "frames");
+  f("error_frames", s.error_frames, "");
+  f("ignored", s.ignored, "frames: 29-bit, remote or malformed");
+  f("recoveries", s.recoveries, "");
 }
 
 void add_bus_facts(std::span<const OpenBus> buses, Facts& facts) {
   for (const OpenBus& bus : buses) {
     const BusStatistics s = bus.end->statistics();
-    const std::string status = bus.end->status_text();
+    const Json json = figures_json(bus);
     if (s.send_refused + s.receive_lost + s.error_frames + s.recoveries > 0) {
-      facts.add(bus.interface,
-                fmt::format("{} frames not sent, {} lost on the way in, {} error frames, {} "
-                            "recoveries",
-                            s.send_refused, s.receive_lost, s.error_frames, s.recoveries));
+      add_figures(facts, json, bus.interface,
+                  "{send_refused} frames not sent, {receive_lost} lost on the way in, "
+                  "{error_frames} error frames, {recoveries} recoveries");
     }
-    if (!status.empty()) facts.add(bus.interface, status);
+    if (json["status"] != "") add_figures(facts, json, bus.interface, "{status}");
   }
 }
 

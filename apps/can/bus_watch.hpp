@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "apps/can/can_sockets.hpp"
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
 
 namespace tandem::apps {
 
@@ -32,8 +32,7 @@ class BusWatch {
   std::vector<Told> told_;
 };
 
-/// docs/json.md. For when the buses' thread has ended, as bus_facts().
-[[nodiscard]] Json buses_json(std::span<const OpenBus> buses);
+void figures(Figures& f, const OpenBus& bus);
 /// A line for every bus that lost frames or was not well.
 void add_bus_facts(std::span<const OpenBus> buses, Facts& facts);
 

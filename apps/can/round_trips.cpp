@@ -50,21 +50,15 @@ rt::Percentiles cycles_of(const RoundTrip& trip) {
   return {at(0.5), at(0.99), at(0.999), at(1.0)};
 }
 
-Json round_trips_json(std::span<const RoundTrip> trips) {
-  Json list = Json::array();
-  for (const RoundTrip& trip : trips) {
-    Json one;
-    one["node"] = trip.node;
-    one["bus"] = trip.bus;
-    one["id"] = trip.id;
-    one["echoes"] = echoes(trip);
-    one["cycles"] = percentiles_json(cycles_of(trip));
-    one["cycles_histogram"] = trip.cycles;
-    one["time_ns"] =
-        trip.time.count() > 0 ? percentiles_json(trip.time.percentiles()) : Json(nullptr);
-    list.push_back(std::move(one));
-  }
-  return list;
+void figures(Figures& f, const RoundTrip& trip) {
+  f("node", trip.node, "");
+  f("bus", trip.bus, "");
+  f("id", trip.id, "");
+  f("echoes", echoes(trip), "answers that named the command they followed");
+  f("cycles", cycles_of(trip), "in cycles: 1 is on time");
+  f("cycles_histogram", trip.cycles, "index: cycles; the last: that many or more");
+  f("time_ns", trip.time,
+    "from handing the command over to the answer's arrival; null where the bus has no timestamps");
 }
 
 void print_slowest_nodes(std::span<const RoundTrip> trips, std::FILE* out) {

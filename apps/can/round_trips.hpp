@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <span>
 
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "rt/histogram.hpp"
 
@@ -15,8 +15,7 @@ namespace tandem::apps {
 /// Percentiles of RoundTrip::cycles, in cycles; all 0 when no echo came.
 [[nodiscard]] rt::Percentiles cycles_of(const hal::can::RoundTrip& trip);
 
-/// docs/json.md
-[[nodiscard]] Json round_trips_json(std::span<const hal::can::RoundTrip> trips);
+void figures(Figures& f, const hal::can::RoundTrip& trip);
 
 /// The nodes whose slowest answers are the slowest, five at most; nothing when no echo came.
 void print_slowest_nodes(std::span<const hal::can::RoundTrip> trips, std::FILE* out);

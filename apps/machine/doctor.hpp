@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/machine/machine.hpp"
+#include "apps/text/figures.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/ethercat/line_survey.hpp"
 
@@ -49,20 +50,21 @@ struct ClockFinding {
 };
 
 /// The slaves behind an interface, and their clocks.
-struct LineFindings {
+struct DoctorResult {
   std::vector<Finding> findings;
   std::vector<ClockFinding> clocks;
 };
+void figures(Figures& f, const DoctorResult& result);
 
 /// What a survey says about the bus: another master, slaves that are not there or are others than
 /// robot.toml's, clocks that do not follow.
 /// @param bus  an EtherCAT one of `robot`
-[[nodiscard]] LineFindings judge_line(const hal::RobotConfig& robot, const hal::BusConfig& bus,
+[[nodiscard]] DoctorResult judge_line(const hal::RobotConfig& robot, const hal::BusConfig& bus,
                                       const hal::ecat::SurveyTiming& timing,
                                       const hal::ecat::LineSurvey& survey);
 
 /// Surveys the line behind the bus' interface; moves nothing, and sends nothing while another
 /// master is at work.
-[[nodiscard]] LineFindings look_at_line(const hal::RobotConfig& robot, const hal::BusConfig& bus);
+[[nodiscard]] DoctorResult look_at_line(const hal::RobotConfig& robot, const hal::BusConfig& bus);
 
 }  // namespace tandem::apps

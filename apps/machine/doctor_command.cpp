@@ -11,36 +11,35 @@
 #include "robot/robot_files.hpp"
 
 namespace tandem::apps {
+
+static void figures(Figures& f, const Finding& one) {
+  f("name", one.name, "");
+  f("health", std::string(to_string(one.health)), "`ok`, `warning`, `missing`");
+  f("value", one.value, "as found");
+  f("why", one.why, "what it means; empty when all is well");
+  f("mend", one.mend, "the command that fixes it; empty when there is none");
+}
+
+static void figures(Figures& f, const ClockFinding& one) {
+  f("bus", one.bus, "");
+  f("slave", one.slave, "its place, from 0");
+  f("name", one.name, "");
+  f("delay_ns", one.delay_ns, "of a frame from the reference clock, one way");
+  f("difference_ns", one.difference_ns, "the largest, without its sign");
+  f("jitter_ns", one.jitter_ns, "standard deviation of the difference");
+}
+
+void figures(Figures& f, const DoctorResult& result) {
+  f("findings", result.findings, "");
+  f("clocks", result.clocks,
+    "of each EtherCAT slave whose clock was measured and that follows another");
+}
+
 namespace {
 
-Json findings_json(const std::vector<Finding>& findings) {
-  Json list = Json::array();
-  for (const Finding& one : findings) {
-    list.push_back({{"name", one.name},
-                    {"health", to_string(one.health)},
-                    {"value", one.value},
-                    {"why", one.why},
-                    {"mend", one.mend}});
-  }
-  return list;
-}
-
-Json clocks_json(const std::vector<ClockFinding>& clocks) {
-  Json list = Json::array();
-  for (const ClockFinding& one : clocks) {
-    list.push_back({{"bus", one.bus},
-                    {"slave", one.slave},
-                    {"name", one.name},
-                    {"delay_ns", one.delay_ns},
-                    {"difference_ns", one.difference_ns},
-                    {"jitter_ns", one.jitter_ns}});
-  }
-  return list;
-}
-
 /// Looks at the slaves behind each EtherCAT interface that frames can be sent on.
-void look_at_lines(const hal::RobotConfig& robot, std::vector<Finding>& findings,
-                   std::vector<ClockFinding>& clocks) {
+void look_at_lines(const hal::RobotConfig& robot, DoctorResult& result) {
+  std::vector<Finding>& findings = result.findings;
   for (const hal::BusConfig& bus : robot.buses) {
     if (bus.kind != hal::BusKind::kEthercat) continue;
     const bool bad = std::ranges::any_of(findings, [&bus](const Finding& one) {
@@ -48,9 +47,9 @@ void look_at_lines(const hal::RobotConfig& robot, std::vector<Finding>& findings
              (one.name == bus.interface || one.name.starts_with(bus.interface + " "));
     });
     if (bad) continue;
-    const LineFindings line = look_at_line(robot, bus);
+    const DoctorResult line = look_at_line(robot, bus);
     findings.insert(findings.end(), line.findings.begin(), line.findings.end());
-    clocks.insert(clocks.end(), line.clocks.begin(), line.clocks.end());
+    result.clocks.insert(result.clocks.end(), line.clocks.begin(), line.clocks.end());
   }
 }
 
@@ -81,8 +80,8 @@ void print_verdict(const std::vector<Finding>& findings, std::FILE* out) {
 Exit doctor_command(const DoctorOptions& options) {
   if (const Status s = check_writable(options.json); !s) return refuse(s.error());
   const Machine machine(options.root);
-  std::vector<Finding> findings = examine_machine(machine);
-  std::vector<ClockFinding> clocks;
+  DoctorResult result{.findings = examine_machine(machine), .clocks = {}};
+  std::vector<Finding>& findings = result.findings;
   if (options.robot.empty() && !options.interfaces.empty()) {
     return refuse(fail("--interface replaces those of a robot, and none is named",
                        "tandem doctor ROBOT.toml --interface " + options.interfaces.front())
@@ -100,14 +99,12 @@ Exit doctor_command(const DoctorOptions& options) {
     }
     const std::vector<Finding> more = examine_interfaces(machine, robot->config);
     findings.insert(findings.end(), more.begin(), more.end());
-    if (options.root == "/") look_at_lines(robot->config, findings, clocks);
+    if (options.root == "/") look_at_lines(robot->config, result);
   }
   std::FILE* out = human_output(options.json);
   print_findings(findings, out);
   print_verdict(findings, out);
-  Json json{{"findings", findings_json(findings)}};
-  json["clocks"] = clocks_json(clocks);
-  if (const Status s = write_json(options.json, json); !s) return refuse(s.error());
+  if (const Status s = write_json(options.json, figures_json(result)); !s) return refuse(s.error());
   return Exit::kDone;
 }
 

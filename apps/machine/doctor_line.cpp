@@ -176,7 +176,7 @@ Finding worst_clock(const hal::BusConfig& bus, const hal::ecat::SurveyTiming& ti
 
 /// All clocks, and of them the worst.
 void clocks(const hal::BusConfig& bus, const std::vector<SlavePlan>& plans,
-            const hal::ecat::SurveyTiming& timing, const LineSurvey& survey, LineFindings& out) {
+            const hal::ecat::SurveyTiming& timing, const LineSurvey& survey, DoctorResult& out) {
   const std::size_t count = std::min(plans.size(), survey.slaves.size());
   const std::string name = bus.interface + " clocks";
   if (survey.reference >= count) {
@@ -230,9 +230,9 @@ Finding losses(const hal::BusConfig& bus, const LineSurvey& survey) {
 
 }  // namespace
 
-LineFindings judge_line(const hal::RobotConfig& robot, const hal::BusConfig& bus,
+DoctorResult judge_line(const hal::RobotConfig& robot, const hal::BusConfig& bus,
                         const hal::ecat::SurveyTiming& timing, const LineSurvey& survey) {
-  LineFindings out;
+  DoctorResult out;
   const std::vector<SlavePlan> plans = expected_on(robot, bus.name);
   out.findings.push_back(masters(bus, timing, survey));
   if (survey.strangers != 0 || plans.empty()) return out;
@@ -248,9 +248,9 @@ LineFindings judge_line(const hal::RobotConfig& robot, const hal::BusConfig& bus
   return out;
 }
 
-LineFindings look_at_line(const hal::RobotConfig& robot, const hal::BusConfig& bus) {
+DoctorResult look_at_line(const hal::RobotConfig& robot, const hal::BusConfig& bus) {
   const auto refused = [&bus](const char* what, const Error& error) {
-    return LineFindings{{{bus.interface + " " + what, Health::kMissing, "not looked at",
+    return DoctorResult{{{bus.interface + " " + what, Health::kMissing, "not looked at",
                           error.message, error.hint}},
                         {}};
   };

@@ -186,7 +186,7 @@ Result<Json> measure_and_draw(const LatencyOptions& options, Draft& draft) {
     print_latency(*plan, *samples, out);
   }
   draw(*plan, *samples, draft, out, options.quiet);
-  return latency_json(*plan, *samples);
+  return figures_json(LatencyResult{*plan, *samples});
 }
 
 }  // namespace

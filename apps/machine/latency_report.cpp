@@ -77,37 +77,30 @@ std::vector<Row> rows_of(const LatencySample& sample) {
 const Row kHeader{"load",     "program",    "CPU",      "p50 [us]",
                   "p99 [us]", "p99.9 [us]", "max [us]", "wake-ups"};
 
-Json program_json(const rt::Percentiles& p, std::uint64_t wakeups, const std::vector<int>& cpus,
-                  const Bins& bins) {
-  Json histogram = Json::array();
-  for (const rt::HistogramBin& bin : bins) histogram.push_back({bin.upper_ns, bin.count});
-  return {{"latency_ns", percentiles_json(p)},
-          {"wakeups", wakeups},
-          {"cpus", cpus},
-          {"histogram_ns", std::move(histogram)}};
+/// What one program measured.
+struct ProgramFigures {
+  rt::Percentiles latency_ns;
+  std::uint64_t wakeups = 0;
+  std::vector<int> cpus;
+  Bins bins;
+};
+struct OwnFigures : ProgramFigures {
+  std::uint64_t skipped = 0;
+};
+
+OwnFigures ours(const LatencySample& s) {
+  return {{s.tandem.percentiles(), s.tandem.count(), s.tandem_cpus, s.tandem.bins()}, s.skipped};
 }
 
-Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+std::optional<ProgramFigures> theirs(const LatencySample& s) {
+  if (!s.cyclictest) return std::nullopt;
+  return ProgramFigures{s.cyclictest->percentiles(), s.cyclictest->cycles, s.cyclictest_cpus,
+                        s.cyclictest->bins};
+}
 
-Json sample_json(const LatencySample& sample) {
-  const rt::Percentiles ours = sample.tandem.percentiles();
-  Json json;
-  json["load"] = sample.load;
-  json["tandem"] =
-      program_json(ours, sample.tandem.count(), sample.tandem_cpus, sample.tandem.bins());
-  json["tandem"]["skipped"] = sample.skipped;
-  json["cyclictest"] = nullptr;
-  json["ratio"] = nullptr;
-  if (!sample.cyclictest) return json;
-  const CyclictestResult& other = *sample.cyclictest;
-  json["cyclictest"] =
-      program_json(other.percentiles(), other.cycles, sample.cyclictest_cpus, other.bins);
-  const LatencyRatio r = ratio_of(ours, other.percentiles());
-  json["ratio"] = {{"p50", number_or_null(r.p50)},
-                   {"p99", number_or_null(r.p99)},
-                   {"p999", number_or_null(r.p999)},
-                   {"max", number_or_null(r.max)}};
-  return json;
+std::optional<LatencyRatio> ratio(const LatencySample& s) {
+  if (!s.cyclictest) return std::nullopt;
+  return ratio_of(s.tandem.percentiles(), s.cyclictest->percentiles());
 }
 
 /// Both programs' latencies in the same bins: whole microseconds, 10 % wide from 10 us on.
@@ -218,16 +211,42 @@ void print_latency(const LatencyPlan& plan, std::span<const LatencySample> sampl
   facts.print(out);
 }
 
-Json latency_json(const LatencyPlan& plan, std::span<const LatencySample> samples) {
-  Json json;
-  json["kernel"] = kernel();
-  json["period_ns"] = plan.period_us * 1000;
-  json["scheduling"] = policy_text(plan);
-  json["mode"] = to_string(plan.mode);
-  json["slices"] = plan.slices;
-  json["loads"] = Json::array();
-  for (const LatencySample& sample : samples) json["loads"].push_back(sample_json(sample));
-  return json;
+static void figures(Figures& f, const ProgramFigures& one) {
+  std::vector<std::pair<std::int64_t, std::uint64_t>> histogram;
+  for (const rt::HistogramBin& bin : one.bins) histogram.emplace_back(bin.upper_ns, bin.count);
+  f("latency_ns", one.latency_ns, "");
+  f("wakeups", one.wakeups, "");
+  f("cpus", one.cpus, "slice by slice");
+  f("histogram_ns", Json(histogram), "list of upper end of a bucket and count");
+}
+
+static void figures(Figures& f, const OwnFigures& one) {
+  figures(f, static_cast<const ProgramFigures&>(one));
+  f("skipped", one.skipped, "grid points that our loop missed completely");
+}
+
+static void figures(Figures& f, const LatencyRatio& ratio) {
+  const auto finite = [](double value) { return known(std::isfinite(value), value); };
+  f("p50", finite(ratio.p50), "");
+  f("p99", finite(ratio.p99), "");
+  f("p999", finite(ratio.p999), "");
+  f("max", finite(ratio.max), "");
+}
+
+static void figures(Figures& f, const LatencySample& sample) {
+  f("load", sample.load, "`idle` or `stress`");
+  f("tandem", ours(sample), "");
+  f("cyclictest", theirs(sample), "null when it is not installed or may not run");
+  f("ratio", ratio(sample), "tandem to cyclictest");
+}
+
+void figures(Figures& f, const LatencyResult& result) {
+  f("kernel", kernel(), "of this machine");
+  f("period_ns", result.plan.period_us * 1000, "of both programs");
+  f("scheduling", policy_text(result.plan), "policy and priority of both");
+  f("mode", std::string(to_string(result.plan.mode)), "`swap`, `together` or `turns`");
+  f("slices", result.plan.slices, "parts of each measurement");
+  f("loads", result.samples, "");
 }
 
 std::vector<report::Figure> latency_figures(std::span<const LatencySample> samples) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "apps/machine/latency_measure.hpp"
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
 #include "base/result.hpp"
 #include "report/figure.hpp"
 #include "report/report.hpp"
@@ -23,8 +23,12 @@ struct LatencyRatio {
 
 void print_latency(const LatencyPlan& plan, std::span<const LatencySample> samples, std::FILE* out);
 
-/// docs/json.md
-[[nodiscard]] Json latency_json(const LatencyPlan& plan, std::span<const LatencySample> samples);
+/// What `tandem latency` measured.
+struct LatencyResult {
+  LatencyPlan plan;
+  std::span<const LatencySample> samples;
+};
+void figures(Figures& f, const LatencyResult& result);
 
 /// Per load a histogram, and the share of wake-ups that come later than a time.
 [[nodiscard]] std::vector<report::Figure> latency_figures(std::span<const LatencySample> samples);

@@ -207,7 +207,7 @@ Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagno
   add_loop_json(e.robot, (*composition)->loops, json);
   add_scale_json(e.robot, json);
   print_plan(**composition, out);
-  add_engine_json(e, json);
+  json.update(figures_json(&e));
   json["kernels"] = (*composition)->kernels.path();
   return {};
 }

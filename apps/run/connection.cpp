@@ -32,11 +32,18 @@ std::string hal_name(const runtime::Experiment& e) {
   return hal.lockstep ? name + " lockstep" : name;
 }
 
-void add_engine_json(const runtime::Experiment& e, Json& json) {
-  const bool here = e.hal.backend == runtime::BackendKind::kSim;
-  const std::string version = here ? sim::engine_version(e.sim.engine) : "";
-  json["engine"] = here ? Json(e.sim.engine) : Json();
-  json["engine_version"] = version.empty() ? Json() : Json(version);
+void figures(Figures& f, const runtime::Experiment* e) {
+  const auto here = [e] { return e->hal.backend == runtime::BackendKind::kSim; };
+  f(
+      "engine", [&] { return known(here(), e->sim.engine); },
+      "`[sim] engine`; null where no plant is in this process");
+  f(
+      "engine_version",
+      [&] {
+        const std::string version = here() ? sim::engine_version(e->sim.engine) : "";
+        return known(!version.empty(), version);
+      },
+      "null of Tandem's own");
 }
 
 std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& experiment,

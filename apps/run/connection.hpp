@@ -8,7 +8,7 @@
 #include <string>
 
 #include "apps/can/can_sockets.hpp"
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
 #include "dds/domain.hpp"
 #include "dds/participant.hpp"
 #include "hal/ethercat-can/frame_record.hpp"
@@ -41,8 +41,8 @@ struct Composition : Wires, runtime::Composition {};
 /// "sim", "can", "can lockstep", "ethercat", "dds", "dds lockstep", for logs and summaries.
 [[nodiscard]] std::string hal_name(const runtime::Experiment& e);
 
-/// The keys `engine` and `engine_version` of JSON; null where no plant is in this process.
-void add_engine_json(const runtime::Experiment& e, Json& json);
+/// Who moves the bodies: `engine` and `engine_version`.
+void figures(Figures& f, const runtime::Experiment* e);
 
 /// runtime::compose() of a new one.
 [[nodiscard]] std::expected<std::unique_ptr<Composition>, Diagnostics> compose(

@@ -160,7 +160,7 @@ Json summary_json(const Emulation& e, bool lockstep) {
   json["frames_in"] = s.frames_in;
   json["frames_out"] = s.frames_out;
   json["frames_lost"] = s.frames_lost;
-  json["buses"] = buses_json(e.sockets->open_buses());
+  json["buses"] = figures_json(e.sockets->open_buses());
   json["all_enabled"] = e.robot->all_enabled();
   json["diverged"] = e.robot->plant().diverged();
   return json;

@@ -8,23 +8,16 @@
 #include <string>
 #include <vector>
 
-#include "base/counted.hpp"
-
 namespace tandem::apps {
 namespace {
 
 using internal_model::Difference;
 using internal_model::Differences;
 using internal_model::JointDifference;
-using internal_model::ParallelResult;
 
 constexpr double kDegreesApart = 180.0 / std::numbers::pi;
 constexpr double kMillimetresApart = 1e3;
 constexpr std::size_t kJointsApart = 5;
-
-Json figures_json(const Differences& all, const Difference& one) {
-  return {{"rms", all.rms(one)}, {"max", one.max}};
-}
 
 void print_joints_apart(const hal::RobotConfig& robot, const Differences& all, std::FILE* out) {
   std::vector<std::size_t> order(all.joints().size());
@@ -96,66 +89,112 @@ void print_bases_apart(const Differences& all, std::FILE* out) {
   table.print(out);
 }
 
-std::string sameness(const Differences& all) {
-  if (all.unequal() == 0) {
-    return fmt::format("the same bits in all {}", counted(all.compared(), "cycle"));
+struct Apart {
+  double rms = 0.0, max = 0.0;
+};
+struct JointApart {
+  Apart position_rad, velocity_rad_s, torque_Nm;
+};
+struct BaseApart {
+  Apart position_m, angle_rad;
+};
+
+Apart apart(const Differences& all, const Difference& one) { return {all.rms(one), one.max}; }
+
+std::optional<BaseApart> base_apart(const Differences& all) {
+  if (all.base_position_m() == nullptr) return std::nullopt;
+  return BaseApart{apart(all, *all.base_position_m()), apart(all, *all.base_angle_rad())};
+}
+
+Named<JointApart> joints_apart(const ParallelSummary& s) {
+  Named<JointApart> joints;
+  for (const JointDifference& one : s.all->joints()) {
+    joints.emplace_back(
+        s.second->joints[joints.size()].name,
+        JointApart{apart(*s.all, one.position_rad), apart(*s.all, one.velocity_rad_s),
+                   apart(*s.all, one.torque_Nm)});
   }
-  return fmt::format("differs in {} of {}, first in cycle {}", all.unequal(),
-                     counted(all.compared(), "cycle"), all.first_unequal());
+  return joints;
+}
+
+Named<std::vector<Apart>> sensors_apart(const ParallelSummary& s) {
+  Named<std::vector<Apart>> sensors;
+  std::size_t channel = 0;
+  for (const hal::SensorConfig& sensor : s.second->sensors) {
+    std::vector<Apart> channels;
+    for (std::size_t i = 0; i < sensor.channels(); ++i)
+      channels.push_back(apart(*s.all, s.all->channels()[channel++]));
+    sensors.emplace_back(sensor.name, std::move(channels));
+  }
+  return sensors;
 }
 
 }  // namespace
 
-Json parallel_json(const hal::RobotConfig& second, const ParallelResult& result,
-                   const Differences& all) {
-  Json json{{"robot", second.file},
-            {"cycles", result.cycles},
-            {"compared", all.compared()},
-            {"both_followed", all.cycles()},
-            {"unequal", all.unequal()},
-            {"first_unequal", all.first_unequal() < 0 ? Json() : Json(all.first_unequal())},
-            {"missed", result.missed},
-            {"most_behind", result.most_behind},
-            {"fault", result.fault.empty() ? Json() : Json(result.fault)},
-            {"base", Json()},
-            {"joints", Json::object()},
-            {"sensors", Json::object()}};
-  if (all.base_position_m() != nullptr) {
-    json["base"] = {{"position_m", figures_json(all, *all.base_position_m())},
-                    {"angle_rad", figures_json(all, *all.base_angle_rad())}};
-  }
-  for (std::size_t j = 0; j < all.joints().size(); ++j) {
-    const JointDifference& one = all.joints()[j];
-    json["joints"][second.joints[j].name] = {
-        {"position_rad", figures_json(all, one.position_rad)},
-        {"velocity_rad_s", figures_json(all, one.velocity_rad_s)},
-        {"torque_Nm", figures_json(all, one.torque_Nm)}};
-  }
-  std::size_t channel = 0;
-  for (const hal::SensorConfig& sensor : second.sensors) {
-    Json channels = Json::array();
-    for (std::size_t i = 0; i < sensor.channels(); ++i) {
-      channels.push_back(figures_json(all, all.channels()[channel++]));
-    }
-    json["sensors"][sensor.name] = std::move(channels);
-  }
-  return json;
+static void figures(Figures& f, const Apart& one) {
+  f("rms", one.rms, "of first minus second");
+  f("max", one.max, "");
 }
 
-void print_parallel(const hal::RobotConfig& second, const ParallelResult& result,
-                    const Differences& all, std::FILE* out) {
+static void figures(Figures& f, const JointApart& joint) {
+  f("position_rad", joint.position_rad, "");
+  f("velocity_rad_s", joint.velocity_rad_s, "");
+  f("torque_Nm", joint.torque_Nm, "");
+}
+
+static void figures(Figures& f, const BaseApart& base) {
+  f("position_m", base.position_m, "how far the two are apart");
+  f("angle_rad", base.angle_rad, "by which they are turned");
+}
+
+void figures(Figures& f, const ParallelSummary& s) {
+  f(
+      "robot", [&] { return s.second->file; }, "its file");
+  f(
+      "cycles", [&] { return s.result->cycles; }, "that it made");
+  f(
+      "compared", [&] { return s.all->compared(); }, "");
+  f(
+      "both_followed", [&] { return s.all->cycles(); },
+      "cycles in which both followed their command, of which the figures are");
+  f(
+      "unequal", [&] { return s.all->unequal(); },
+      "of those compared: any field of the state differs");
+  f(
+      "first_unequal", [&] { return known(s.all->first_unequal() >= 0, s.all->first_unequal()); },
+      "number of the first such cycle");
+  f(
+      "missed", [&] { return s.result->missed; }, "commands that it never got");
+  f(
+      "most_behind", [&] { return s.result->most_behind; }, "cycles");
+  f(
+      "fault", [&] { return known(!s.result->fault.empty(), s.result->fault); }, "");
+  f(
+      "base", [&] { return base_apart(*s.all); },
+      "null where one of the two truths is not known, or nothing floats");
+  f(
+      "joints", [&] { return joints_apart(s); }, "");
+  f(
+      "sensors", [&] { return sensors_apart(s); }, "each channel");
+}
+
+void print_parallel(const ParallelSummary& summary, std::FILE* out) {
+  const Differences& all = *summary.all;
   if (all.unequal() > 0) {
-    print_joints_apart(second, all, out);
-    print_sensors_apart(second, all, out);
+    print_joints_apart(*summary.second, all, out);
+    print_sensors_apart(*summary.second, all, out);
     print_bases_apart(all, out);
   }
   fmt::print(out, "\n");
   Facts facts;
-  facts.add("parallel robot", sameness(all));
-  facts.add("behind the first",
-            fmt::format("{} at most, {} missed", counted(result.most_behind, "cycle"),
-                        counted(result.missed, "command")));
-  if (!result.fault.empty()) facts.add("parallel robot's fault", result.fault);
+  const Json json = figures_json(summary);
+  add_figures(facts, json, "parallel robot",
+              all.unequal() == 0
+                  ? "the same bits in all {compared|cycle}"
+                  : "differs in {unequal} of {compared|cycle}, first in cycle {first_unequal}");
+  add_figures(facts, json, "behind the first",
+              "{most_behind|cycle} at most, {missed|command} missed");
+  add_figures(facts, json, "parallel robot's fault", "{fault}");
   facts.print(out);
 }
 

@@ -4,19 +4,21 @@
 
 #include <cstdio>
 
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
 #include "hal/config/robot_config.hpp"
 #include "internal_model/parallel_robot.hpp"
 
 namespace tandem::apps {
 
-/// docs/json.md, "parallel"
-[[nodiscard]] Json parallel_json(const hal::RobotConfig& second,
-                                 const internal_model::ParallelResult& result,
-                                 const internal_model::Differences& differences);
+struct ParallelSummary {
+  const hal::RobotConfig* second = nullptr;
+  const internal_model::ParallelResult* result = nullptr;
+  const internal_model::Differences* all = nullptr;
+};
+
+void figures(Figures& f, const ParallelSummary& s);
 
 /// The joints and sensors that differ most, or that nothing does.
-void print_parallel(const hal::RobotConfig& second, const internal_model::ParallelResult& result,
-                    const internal_model::Differences& differences, std::FILE* out);
+void print_parallel(const ParallelSummary& summary, std::FILE* out);
 
 }  // namespace tandem::apps

@@ -2,8 +2,6 @@
 
 #include <fmt/core.h>
 
-#include "base/counted.hpp"
-
 namespace tandem::apps {
 namespace {
 
@@ -12,21 +10,11 @@ using remote::Verdict;
 constexpr Verdict kVerdicts[] = {Verdict::kTaken, Verdict::kNoLease, Verdict::kOutOfOrder,
                                  Verdict::kStale, Verdict::kMalformed};
 
-std::string microseconds(const rt::Histogram& histogram) {
-  const rt::Percentiles p = histogram.percentiles();
-  const auto us = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
-  return fmt::format("{:.1f} / {:.1f} / {:.1f} / {:.1f} us", us(p.p50), us(p.p99), us(p.p999),
-                     us(p.max));
-}
-
-std::string counts(const remote::Server& server) {
-  std::string text;
-  for (const Verdict verdict : kVerdicts) {
-    const std::uint64_t count = server.count(verdict);
-    if (count == 0 && verdict != Verdict::kTaken) continue;
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, to_string(verdict));
-  }
-  return text;
+Named<std::uint64_t> counts(const remote::Server& server) {
+  Named<std::uint64_t> counts;
+  for (const Verdict verdict : kVerdicts)
+    counts.emplace_back(to_string(verdict), server.count(verdict));
+  return counts;
 }
 
 }  // namespace
@@ -79,47 +67,86 @@ void tell_faults(remote::Server& server, const runtime::RobotCycle& cycle) {
   });
 }
 
-Json remote_json(const remote::Server* server, const remote::RemoteBackend* client) {
-  if (client != nullptr) {
-    return {{"turn_around_ns", percentiles_json(client->turn_around())},
-            {"missed_cycles", client->missed_cycles()}};
-  }
-  if (server == nullptr) return nullptr;
-  Json commands = Json::object();
-  for (const Verdict verdict : kVerdicts) commands[to_string(verdict)] = server->count(verdict);
-  Json playout = nullptr;
-  if (server->playout() != nullptr) {
-    playout = {{"starved_cycles", server->playout()->starved_cycles()},
-               {"holds", server->playout()->holds()}};
-  }
-  return {{"leases", server->lease().given()},
-          {"losses", server->losses()},
-          {"commands", commands},
-          {"playout", playout},
-          {"dropped", server->dropped()},
-          {"age_ns", percentiles_json(server->age())},
-          {"age_cycles", percentiles_json(server->age_cycles())}};
+static void figures(Figures& f, const remote::Playout* playout) {
+  f(
+      "starved_cycles", [&] { return playout->starved_cycles(); }, "in which there was no command");
+  f(
+      "holds", [&] { return playout->holds(); }, "how often that began");
 }
 
-void add_remote_facts(const remote::Server* server, const remote::RemoteBackend* client,
-                      Facts& facts) {
-  if (client != nullptr) {
-    if (client->turn_around().count() > 0) {
-      facts.add("turn-around p50/p99/p99.9/max", microseconds(client->turn_around()));
+void figures(Figures& f, const remote::RemoteBackend* client) {
+  f(
+      "turn_around_ns", [&] { return client->turn_around(); },
+      "from sending a command to the state that shows it");
+  f(
+      "missed_cycles", [&] { return client->missed_cycles(); }, "of the server");
+}
+
+void figures(Figures& f, const remote::Server* server) {
+  f(
+      "leases", [&] { return server->lease().given(); }, "given");
+  f(
+      "losses", [&] { return server->losses(); }, "owners that lost the robot");
+  f(
+      "commands", [&] { return counts(*server); },
+      "counts: `taken`, `without_lease`, `out_of_order`, `stale`, `malformed`");
+  f(
+      "playout", [&] { return server->playout(); }, "with `[teleoperation]`: the robot's end");
+  f(
+      "dropped", [&] { return server->dropped(); }, "cycles that were not published");
+  f(
+      "age_ns", [&] { return server->age(); }, "of the state that each command answers");
+  f(
+      "age_cycles", [&] { return server->age_cycles(); }, "the same, in cycles");
+}
+
+static void figures(Figures& f, const remote::Network::Counts& messages) {
+  f("sent", messages.sent, "messages");
+  f("lost", messages.lost, "");
+  f("dropped", messages.dropped, "");
+  f("duplicated", messages.duplicated, "");
+  f("reordered", messages.reordered, "");
+  f("delivered", messages.delivered, "");
+}
+
+void figures(Figures& f, const remote::TeleFigures& link) {
+  f("up", link.up, "to the robot");
+  f("down", link.down, "from it");
+  f("starved_cycles", known(link.robot_end, link.starved_cycles),
+    "in which the robot had no command; null when the robot's end is another process: "
+    "`remote.playout` there");
+  f("holds", known(link.robot_end, link.holds), "how often that began");
+  f("silent_cycles", link.silent_cycles, "until the end, since a state of the robot last came");
+  f("most_silent_cycles", link.most_silent_cycles, "the longest time without one");
+  f("unanswered_cycles", link.unanswered_cycles,
+    "until the end, since a state came that showed a newer command in force");
+  f("most_unanswered_cycles", link.most_unanswered_cycles, "the longest such time");
+  f("clock_cycles", link.clock_cycles,
+    "in real time: by which the commands' numbers followed the robot's clock");
+  f("compared", link.compared, "states that were held against their prediction");
+  f("worst_prediction_rad", known(link.compared > 0, link.worst_prediction_rad),
+    "of a joint of these: the state less its prediction");
+}
+
+void add_remote_facts(const Json& run, Facts& facts) {
+  const Json& remote = run["remote"];
+  const auto row = [&](const char* name, std::string_view text) {
+    add_figures(facts, remote, name, text);
+  };
+  row("turn-around p50/p99/p99.9/max", "{turn_around_ns:.1f us}");
+  row("missed", "{missed_cycles} cycles of the server");
+  row("owners", "{leases}, {losses} lost");
+  if (remote.contains("commands")) {
+    std::string text;
+    for (const auto& [verdict, count] : remote["commands"].items()) {
+      if (count == 0 && !text.empty()) continue;
+      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count.get<std::uint64_t>(), verdict);
     }
-    facts.add("missed", fmt::format("{} cycles of the server", client->missed_cycles()));
+    facts.add("commands", text);
   }
-  if (server == nullptr) return;
-  facts.add("owners", fmt::format("{}, {} lost", server->lease().given(), server->losses()));
-  facts.add("commands", counts(*server));
-  if (server->playout() != nullptr) {
-    facts.add("without commands", fmt::format("{} cycles, {}", server->playout()->starved_cycles(),
-                                              counted(server->playout()->holds(), "time")));
-  }
-  if (server->age().count() == 0) return;
-  facts.add("age of their state p50/p99/p99.9/max", microseconds(server->age()));
-  const rt::Percentiles p = server->age_cycles().percentiles();
-  facts.add("in cycles", fmt::format("{} / {} / {} / {}", p.p50, p.p99, p.p999, p.max));
+  row("without commands", "{playout.starved_cycles} cycles, {playout.holds|time}");
+  row("age of their state p50/p99/p99.9/max", "{age_ns:.1f us}");
+  row("in cycles", "{age_cycles}");
 }
 
 }  // namespace tandem::apps

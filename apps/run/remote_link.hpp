@@ -7,7 +7,7 @@
 
 #include "apps/run/connection.hpp"
 #include "apps/run/dds_run.hpp"
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
 #include "apps/transport/dds_admission.hpp"
 #include "hal/remote/server.hpp"
 #include "runtime/robot_cycle.hpp"
@@ -26,8 +26,11 @@ namespace tandem::apps {
 void tell_faults(remote::Server& server, const runtime::RobotCycle& cycle);
 
 // Results, of either end; null: there is none.
-[[nodiscard]] Json remote_json(const remote::Server* server, const remote::RemoteBackend* client);
-void add_remote_facts(const remote::Server* server, const remote::RemoteBackend* client,
-                      Facts& facts);
+/// docs/json.md, `remote` and `teleoperation`
+void figures(Figures& f, const remote::Server* server);
+void figures(Figures& f, const remote::RemoteBackend* client);
+void figures(Figures& f, const remote::TeleFigures& link);
+/// Rows of `remote`, of a run's figures.
+void add_remote_facts(const Json& run, Facts& facts);
 
 }  // namespace tandem::apps

@@ -30,125 +30,307 @@ double weight_N(const tandem_kernels& k) {
   return k.mass_kg * std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
 }
 
-Json log_json(const std::optional<log::RecordingResult>& log) {
-  if (!log) return nullptr;
-  return {{"path", log->path},
-          {"messages", log->messages},
-          {"dropped", log->dropped},
-          {"data_sha256", log->data_sha256}};
-}
-
-Json frames_json(const std::optional<hal::can::FrameRecord::Result>& frames) {
-  if (!frames) return nullptr;
-  return {{"path", frames->path}, {"frames", frames->frames}, {"lost", frames->lost}};
-}
-
-Json dds_json(const std::optional<DdsResult>& dds) {
-  if (!dds) return nullptr;
-  return {{"domain", dds->domain},
-          {"samples", dds->counts.sent},
-          {"refused", dds->counts.refused},
-          {"dropped", dds->counts.dropped},
-          {"requests", dds->services.requests},
-          {"requests_dropped", dds->services.dropped},
-          {"replies", dds->services.replies},
-          {"replies_unclaimed", dds->services.unclaimed}};
-}
-
-Json ground_json(const std::optional<runtime::GroundFigures>& ground) {
-  if (!ground) return nullptr;
-  return {{"weight_N", ground->weight_N},
-          {"mean_vertical_force_N", ground->mean_vertical_force_N},
-          {"max_foot_slip_m", ground->max_foot_slip_m}};
-}
-
-Json base_json(const std::optional<runtime::BaseFigures>& base) {
-  if (!base) return nullptr;
-  return {{"min_height_m", base->min_height_m},
-          {"max_height_m", base->max_height_m},
-          {"final_tilt_rad", base->final_tilt_rad},
-          {"max_tilt_rad", base->max_tilt_rad}};
-}
-
-double seconds(const runtime::Peak& peak) { return static_cast<double>(peak.time_ns) * 1e-9; }
-
-Json wrench_json(const runtime::WrenchFigures& one) {
-  return {{"max_force_N", one.force_N.value},
-          {"max_force_s", seconds(one.force_N)},
-          {"max_moment_Nm", one.moment_Nm.value},
-          {"max_moment_s", seconds(one.moment_Nm)}};
-}
-
-std::string wrench_text(const runtime::WrenchFigures& one) {
-  return fmt::format("{:.1f} N at most at {:.3f} s, {:.2f} Nm at {:.3f} s", one.force_N.value,
-                     seconds(one.force_N), one.moment_Nm.value, seconds(one.moment_Nm));
-}
-
 /// Whether what touches the base was estimated: on a floating base, once its estimate had started.
 bool has_base_wrench(const hal::EstimateImage& image, const runtime::EstimateFigures& figures) {
   return !image.external_base_wrench().empty() && figures.base_cycles > 0;
 }
 
-/// What was estimated; null without [estimation].
-Json estimate_json(const Composition& c, const runtime::EstimateFigures& figures, bool ran) {
-  if (c.estimator == nullptr) return nullptr;
+struct JointFigures {
+  runtime::TrackingError error;
+  std::uint64_t limited_cycles = 0;
+};
+
+Named<JointFigures> joints_of(const RunSummary& s) {
+  Named<JointFigures> joints;
+  const auto tracking = s.cycle.statistics().tracking();
+  const auto limited = s.cycle.statistics().limited_cycles();
+  for (std::size_t j = 0; j < tracking.size(); ++j) {
+    joints.emplace_back(s.composition.experiment.robot.joints[j].name,
+                        JointFigures{tracking[j], limited[j]});
+  }
+  return joints;
+}
+
+Named<runtime::LoopFigures> loops_of(const RunSummary& s) {
+  Named<runtime::LoopFigures> loops;
+  for (const runtime::LoopFigures& one : s.cycle.statistics().loops())
+    loops.emplace_back(s.composition.experiment.robot.loops[loops.size()].name, one);
+  return loops;
+}
+
+/// What was estimated.
+struct EstimateSummary {
+  std::optional<runtime::EstimateFigures> base{};
+  std::optional<Named<double>> external_torque_Nm{};
+  std::optional<runtime::WrenchFigures> external_base_wrench{};
+  Named<std::optional<runtime::WrenchFigures>> wrenches{};
+  std::optional<double> unexplained_torque_Nm{};
+};
+
+/// Nothing without [estimation].
+std::optional<EstimateSummary> estimate_of(const RunSummary& s) {
+  const Composition& c = s.composition;
+  if (c.estimator == nullptr) return std::nullopt;
   const hal::EstimateImage& image = c.estimator->image();
-  Json json{{"base", nullptr},
-            {"external_torque_Nm", nullptr},
-            {"external_base_wrench", nullptr},
-            {"wrenches", Json::object()},
-            {"unexplained_torque_Nm", nullptr}};
-  if (image.estimates_base()) {
-    json["base"] = {{"cycles", figures.base_cycles},
-                    {"max_tilt_error_rad", nullptr},
-                    {"max_height_error_m", nullptr}};
-    if (figures.compared > 0) {
-      json["base"]["max_tilt_error_rad"] = figures.max_tilt_error_rad;
-      json["base"]["max_height_error_m"] = figures.max_height_error_m;
-    }
-  }
+  const runtime::EstimateFigures figures = s.cycle.statistics().estimate();
   // Without an estimate of the base nothing was looked for.
-  const bool looked = image.estimates_base() ? figures.base_cycles > 0 : ran;
-  for (std::size_t j = 0; looked && j < image.joints(); ++j) {
-    json["external_torque_Nm"][c.experiment.robot.joints[j].name] = figures.max_external_Nm[j];
+  const bool looked =
+      image.estimates_base() ? figures.base_cycles > 0 : s.cycle.running_cycles() > 0;
+  EstimateSummary summary{
+      .base = known(image.estimates_base(), figures),
+      .external_torque_Nm = known(looked && image.joints() > 0, Named<double>()),
+      .external_base_wrench = known(has_base_wrench(image, figures), figures.base_wrench),
+      .unexplained_torque_Nm =
+          known(looked && !figures.wrenches.empty(), figures.unexplained_Nm.value)};
+  for (std::size_t j = 0; summary.external_torque_Nm && j < image.joints(); ++j) {
+    summary.external_torque_Nm->emplace_back(c.experiment.robot.joints[j].name,
+                                             figures.max_external_Nm[j]);
   }
-  if (has_base_wrench(image, figures))
-    json["external_base_wrench"] = wrench_json(figures.base_wrench);
   for (std::size_t i = 0; i < figures.wrenches.size(); ++i) {
-    json["wrenches"][c.experiment.estimation.wrenches[i].site] =
-        looked ? wrench_json(figures.wrenches[i]) : Json(nullptr);
+    summary.wrenches.emplace_back(c.experiment.estimation.wrenches[i].site,
+                                  known(looked, figures.wrenches[i]));
   }
-  if (looked && !figures.wrenches.empty())
-    json["unexplained_torque_Nm"] = figures.unexplained_Nm.value;
-  return json;
+  return summary;
 }
 
-Json loops_json(const hal::RobotConfig& robot, const std::vector<runtime::LoopFigures>& loops) {
-  Json json = Json::object();
-  for (std::size_t l = 0; l < loops.size(); ++l) {
-    json[robot.loops[l].name] = {{"max_position_error_m", loops[l].max_position_error_m},
-                                 {"max_velocity_error_m_s", loops[l].max_velocity_error_m_s}};
-  }
-  return json;
+std::optional<hal::can::StartUp> start_of(const hal::can::DriveMaster* master) {
+  if (master == nullptr || master->start_up().duration_ns == 0) return std::nullopt;
+  return master->start_up();
 }
 
-void print_loops(const RunSummary& s, std::FILE* out) {
-  const std::vector<runtime::LoopFigures>& loops = s.cycle.statistics().loops();
+constexpr char kStart[] =
+    "{axes|axis|axes} enabled after {seconds:.3f s}, {frames_sent} frames sent and "
+    "{frames_received} received";
+
+std::vector<std::string> wire_of(const hal::can::DriveMaster* master) {
+  return master == nullptr ? std::vector<std::string>() : master->wire_texts();
+}
+
+}  // namespace
+
+static void figures(Figures& f, const log::RecordingResult& log) {
+  f("path", log.path, "");
+  f("messages", log.messages, "in the file");
+  f("dropped", log.dropped, "the ring was full");
+  f("data_sha256", log.data_sha256, "of the messages' data, in order");
+}
+
+static void figures(Figures& f, const hal::can::FrameRecord::Result& frames) {
+  f("path", frames.path, "");
+  f("frames", frames.frames, "in the file");
+  f("lost", frames.lost, "the file was too slow for them");
+}
+
+static void figures(Figures& f, const DdsResult& dds) {
+  f("domain", dds.domain, "");
+  f("samples", dds.counts.sent, "sent, of all topics");
+  f("refused", dds.counts.refused, "by DDS: a reader was too far behind");
+  f("dropped", dds.counts.dropped, "cycles that were due but found no room in the ring");
+  f("requests", dds.services.requests, "to its services");
+  f("requests_dropped", dds.services.dropped, "the queue was full");
+  f("replies", dds.services.replies, "");
+  f("replies_unclaimed", dds.services.unclaimed, "the client was gone");
+}
+
+static void figures(Figures& f, const JointFigures& joint) {
+  const bool tracked = joint.error.cycles > 0;
+  f("rms_tracking_error_rad", known(tracked, joint.error.rms_rad),
+    "against the position reference, also one that a controller writes in another mode than "
+    "position control; null: there was none");
+  f("max_tracking_error_rad", known(tracked, joint.error.max_rad), "of the absolute value");
+  f("limited_cycles", joint.limited_cycles,
+    "in which a limit changed the controller's command: [controllers.md](controllers.md#limits)");
+}
+
+static void figures(Figures& f, const runtime::WorkFigures& work) {
+  f("done_J", work.done_J, "of the joints that drove");
+  f("taken_J", work.taken_J, "of those that braked");
+  f("max_power_W", work.max_power_W, "of all together; braking ones count negative");
+}
+
+static void figures(Figures& f, const runtime::GroundFigures& ground) {
+  f("weight_N", ground.weight_N, "mass times gravity");
+  f("mean_vertical_force_N", ground.mean_vertical_force_N, "of all feet together");
+  f("max_foot_slip_m", ground.max_foot_slip_m, "way of a foot since it touched down");
+}
+
+static void figures(Figures& f, const runtime::LoopFigures& loop) {
+  f("max_position_error_m", loop.max_position_error_m, "over all cycles");
+  f("max_velocity_error_m_s", loop.max_velocity_error_m_s, "");
+}
+
+static void figures(Figures& f, const runtime::BaseFigures& base) {
+  f("min_height_m", base.min_height_m, "");
+  f("max_height_m", base.max_height_m, "");
+  f("final_tilt_rad", base.final_tilt_rad, "between the base's z axis and the world's");
+  f("max_tilt_rad", base.max_tilt_rad, "");
+}
+
+static void figures(Figures& f, const runtime::WrenchFigures& one) {
+  const auto seconds = [](const runtime::Peak& p) { return static_cast<double>(p.time_ns) * 1e-9; };
+  f("max_force_N", one.force_N.value, "norm");
+  f("max_force_s", seconds(one.force_N), "when: the cycle's nominal time");
+  f("max_moment_Nm", one.moment_Nm.value, "norm");
+  f("max_moment_s", seconds(one.moment_Nm), "when");
+}
+
+static void figures(Figures& f, const runtime::EstimateFigures& base) {
+  f("cycles", base.base_cycles, "with an estimate");
+  f("max_tilt_error_rad", known(base.compared > 0, base.max_tilt_error_rad),
+    "against the truth; null without one");
+  f("max_height_error_m", known(base.compared > 0, base.max_height_error_m), "the same");
+}
+
+static void figures(Figures& f, const EstimateSummary& estimate) {
+  f("base", estimate.base, "null: it estimates none");
+  f("external_torque_Nm", estimate.external_torque_Nm,
+    "by joint the largest; null without an observer, and where nothing was estimated");
+  f("external_base_wrench", estimate.external_base_wrench,
+    "on the floating base beside its feet, about its origin; null on a fixed base, without an "
+    "observer, and when the base's estimate never started");
+  f("wrenches", estimate.wrenches, "by site of each `[[estimation.wrench]]`");
+  f("unexplained_torque_Nm", estimate.unexplained_torque_Nm,
+    "the largest that the wrenches do not explain; null without a wrench");
+}
+
+static void figures(Figures& f, const hal::can::StartUp& start) {
+  f("axes", start.axes, "");
+  f("seconds", static_cast<double>(start.duration_ns) * 1e-9, "");
+  f("frames_sent", start.sent, "on all buses; Ethernet frames on EtherCAT");
+  f("frames_received", start.received, "the same");
+}
+
+void figures(Figures& f, const RunSummary* s) {
+  const auto e = [s]() -> const runtime::Experiment& { return s->composition.experiment; };
+  const auto loop = [s]() -> const rt::LoopStatistics& { return s->cycle.loop(); };
+  const auto master = [s] { return s->composition.master; };
+  f(
+      "robot", [&] { return e().robot.name; }, "`name` of the robot.toml");
+  f(
+      "hal", [&] { return hal_name(e()); }, "backend: `sim`, `can`, `ethercat`, `dds`, …");
+  f(
+      "seed", [&] { return e().seed; }, "of every random generator");
+  f(
+      "ended", [&] { return s->ended(); },
+      "`as planned`; `interrupted by SIGINT` (or another signal); `on request` (`run.stop`); `by a "
+      "fault`; `nobody reads its output any more`");
+  f(
+      "planned_cycles", [&] { return known(s->planned_cycles() > 0, s->planned_cycles()); },
+      "of the whole run; null: it has no planned end");
+  f(
+      "cycles", [&] { return s->cycle.running_cycles(); }, "of the loop while controllers ran");
+  f(
+      "period_ns", [&] { return e().loop.period_ns; }, "nominal");
+  f(
+      "sim_seconds", [&] { return s->sim_s(); }, "`cycles * period_ns`");
+  f(
+      "wall_seconds", [&] { return s->times.running_s; }, "of those cycles on the wall clock");
+  f(
+      "stopped_seconds", [&] { return s->times.stopped_s; },
+      "on the wall clock: in fault, in a reset, or held after it");
+  f(
+      "stood_seconds", [&] { return s->times.stood_s; },
+      "on the wall clock, of simulated time: paused, or the process suspended, for half a second "
+      "or "
+      "more");
+  f(
+      "realtime_factor", [&] { return known(s->times.running_s > 0.0, s->realtime_factor()); },
+      "`sim_seconds / wall_seconds`");
+  f(
+      "overruns", [&] { return loop().overruns; },
+      "cycles that ended after the next one's start (paced runs)");
+  f(
+      "skipped", [&] { return loop().skipped; }, "cycles, because of that (wall clock)");
+  f(
+      "wakeup_ns", [&] { return loop().wakeup; }, "wake-up latency; null in a free run");
+  f(
+      "bus_ns", [&] { return known(s->composition.backend->waits_for_bus(), loop().bus); },
+      "waiting for the answers on the bus; null without one");
+  f(
+      "cycle_ns", [&] { return loop().work; }, "of a cycle's own work; null: no cycle was made");
+  f(
+      "log", [&] { return s->log; }, "null: nothing was logged");
+  f(
+      "frames", [&] { return s->frames; }, "of `--record-frames`");
+  f(
+      "dds", [&] { return s->dds; }, "with `[dds]`");
+  f(
+      "buses", [&] { return s->composition.open_buses(); }, "of a CAN backend");
+  f(
+      "joints", [&] { return joints_of(*s); }, "");
+  f(
+      "work",
+      [&] { return s->cycle.statistics().work(static_cast<double>(e().loop.period_ns) * 1e-9); },
+      "torque times velocity, as measured; null: no drive tells them");
+  f(
+      "ground", [&] { return s->cycle.statistics().ground(weight_N(*s->composition.kernels)); },
+      "by the plant's truth, of a floating base with feet");
+  f(
+      "loops", [&] { return loops_of(*s); }, "of a robot with closed loops in simulation");
+  f(
+      "parallel", [&] { return s->parallel_summary(); }, "of `[parallel]`");
+  f(
+      "base", [&] { return s->cycle.statistics().base(); },
+      "until the drives are disabled at the end, so a fall after a fault counts; floating base "
+      "with "
+      "known truth");
+  f(
+      "estimate", [&] { return estimate_of(*s); }, "with `[estimation]`, while controllers ran");
+  f(
+      "round_trips",
+      [&] {
+        return master() == nullptr ? std::vector<hal::can::RoundTrip>() : master()->round_trips();
+      },
+      "per board");
+  f(
+      "start", [&] { return start_of(master()); },
+      "what the first start took, power-on to every axis enabled; null before that, and where the "
+      "drive master is another process'");
+  f(
+      "wire", [&] { return wire_of(master()); }, "what EtherCAT buses tell of cycles and clocks");
+  f(
+      "remote", [&] { return static_cast<const remote::RemoteBackend*>(s->composition.remote); },
+      "of `run --hal dds`");
+  f(
+      "remote", [&] { return s->server; }, "of `serve`, and of a `run` that others may own");
+  f(
+      "teleoperation",
+      [&] {
+        return s->composition.tele == nullptr ? std::optional<remote::TeleFigures>()
+                                              : s->composition.tele->figures();
+      },
+      "with `[teleoperation]`");
+  f(
+      "faults", [&] { return s->faults; },
+      "that are still latched, and of a log that failed; empty when the run ended well");
+  f(
+      "warnings", [&] { return s->warnings(); },
+      "tolerated anomalies: missing feedback, counted by node; commands that a bus did not accept; "
+      "a "
+      "refused value");
+  f(
+      "fault_log", [&] { return faults_json(s->cycle.faults()); },
+      "every fault: `time_s`, `cycle`, `joint` (or the sensor, or the controller; empty: the robot "
+      "as a whole), `board` (empty: none), `cause`, `category` (`category0`, `category1`, "
+      "`category2`, `hold`, `warn`), `reaction`, `latched`, `cleared_s` (null while it is "
+      "latched)");
+  f(
+      "kernel_variant", [&] { return std::string(s->composition.kernels->variant); },
+      "of the generated kernels that ran");
+  figures(f, s == nullptr ? nullptr : &e());
+}
+
+namespace {
+
+void print_loops(const Json& loops, std::FILE* out) {
   if (loops.empty()) return;
   Table table({"closed loops", "open at most [m]", "opening at most [m/s]"});
-  for (std::size_t l = 0; l < loops.size(); ++l) {
-    table.add({s.composition.experiment.robot.loops[l].name,
-               fmt::format("{:.1e}", loops[l].max_position_error_m),
-               fmt::format("{:.1e}", loops[l].max_velocity_error_m_s)});
+  for (const auto& [name, one] : loops.items()) {
+    table.add({name, *figures_text("{max_position_error_m:.1e}", one),
+               *figures_text("{max_velocity_error_m_s:.1e}", one)});
   }
   fmt::print(out, "\n");
   table.print(out);
-}
-
-std::string microseconds(const rt::Percentiles& p) {
-  const auto us = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
-  return fmt::format("{:.1f} / {:.1f} / {:.1f} / {:.1f} us", us(p.p50), us(p.p99), us(p.p999),
-                     us(p.max));
 }
 
 void print_worst_joints(const RunSummary& s, std::FILE* out) {
@@ -196,38 +378,38 @@ void add_limited(const RunSummary& s, Facts& facts) {
                         joints > 1 ? ", " + counted(joints - 1, "more joint") : ""));
 }
 
-/// What the robot did: on the ground, and its floating base.
-void add_motion_facts(const RunSummary& summary, Facts& facts) {
-  if (const auto ground =
-          summary.cycle.statistics().ground(weight_N(*summary.composition.kernels))) {
-    facts.add("force on the ground",
-              fmt::format("{:.2f} N on average, weight {:.2f} N ({:+.3f} %)",
-                          ground->mean_vertical_force_N, ground->weight_N,
-                          100.0 * (ground->mean_vertical_force_N / ground->weight_N - 1.0)));
-    facts.add("feet slip", fmt::format("{:.3f} mm at most", ground->max_foot_slip_m * 1e3));
+/// What the robot did on the ground, and its floating base.
+void add_motion_facts(const Json& run, Facts& facts) {
+  if (const Json& ground = run["ground"]; !ground.is_null()) {
+    const double share =
+        ground["mean_vertical_force_N"].get<double>() / ground["weight_N"].get<double>() - 1.0;
+    add_figures(facts, run, "force on the ground",
+                "{ground.mean_vertical_force_N:.2f N} on average, weight {ground.weight_N:.2f N}" +
+                    fmt::format(" ({:+.3f} %)", 100.0 * share));
   }
-  if (const auto base = summary.cycle.statistics().base()) {
-    constexpr double kStands_deg = 20.0;  // more says that it fell, or nearly did
-    const double most_deg = base->max_tilt_rad * kDegrees;
-    facts.add("base height",
-              fmt::format("{:.4f} to {:.4f} m, tilted {:.3f} deg at the end{}", base->min_height_m,
-                          base->max_height_m, base->final_tilt_rad * kDegrees,
-                          most_deg < kStands_deg ? std::string()
-                                                 : fmt::format(", {:.0f} deg at most", most_deg)));
-  }
+  add_figures(
+      facts, run, "work of the joints",
+      "{work.done_J:.1f J}, {work.taken_J:.1f J} taken back, {work.max_power_W:.0f W} at most");
+  add_figures(facts, run, "feet slip", "{ground.max_foot_slip_m:.3f mm} at most");
+  if (run["base"].is_null()) return;
+  constexpr double kStands_rad = 20.0 / kDegrees;  // more says that it fell, or nearly did
+  const bool stood = run["base"]["max_tilt_rad"].get<double>() < kStands_rad;
+  add_figures(facts, run, "base height",
+              "{base.min_height_m:.4f} to {base.max_height_m:.4f m}, tilted "
+              "{base.final_tilt_rad:.3f deg} at the end" +
+                  std::string(stood ? "" : ", {base.max_tilt_rad:.0f deg} at most"));
 }
 
 /// What the loop estimated: against the truth, where there is one.
-void add_estimate_facts(const RunSummary& summary, Facts& facts) {
+void add_estimate_facts(const RunSummary& summary, const Json& run, Facts& facts) {
   const Composition& c = summary.composition;
   if (c.estimator == nullptr) return;
   const runtime::EstimateFigures figures = summary.cycle.statistics().estimate();
   const hal::EstimateImage& image = c.estimator->image();
-  if (figures.compared > 0) {
-    facts.add("base estimate",
-              fmt::format("off by {:.3f} deg of tilt and {:.1f} mm of height at most",
-                          figures.max_tilt_error_rad * kDegrees, figures.max_height_error_m * 1e3));
-  } else if (image.has_base()) {
+  add_figures(facts, run, "base estimate",
+              "off by {estimate.base.max_tilt_error_rad:.3f deg} of tilt and "
+              "{estimate.base.max_height_error_m:.1f mm} of height at most");
+  if (figures.compared == 0 && image.has_base()) {
     const auto deviation = image.base_deviation();
     facts.add("base estimate",
               fmt::format("standard deviation {:.3f} deg of tilt, {:.1f} mm of height at the end",
@@ -239,136 +421,70 @@ void add_estimate_facts(const RunSummary& summary, Facts& facts) {
   const hal::JointConfig& joint = c.experiment.robot.joints[j];
   facts.add("external torque",
             fmt::format("{:.2f} {} at most ({})", *most, joint.slides ? "N" : "Nm", joint.name));
-  if (has_base_wrench(image, figures))
-    facts.add("external wrench on base", wrench_text(figures.base_wrench));
-  for (std::size_t i = 0; i < figures.wrenches.size(); ++i) {
-    facts.add("wrench at " + c.experiment.estimation.wrenches[i].site,
-              wrench_text(figures.wrenches[i]));
-  }
-  if (!figures.wrenches.empty())
-    facts.add("not explained by them",
-              fmt::format("{:.2f} Nm at most", figures.unexplained_Nm.value));
-}
-
-/// The time that is not in the line above: nothing has run then.
-void add_stopped(const LoopTimes& times, Facts& facts) {
-  std::string text;
-  if (times.stopped_s > 0.0)
-    text = fmt::format("{:.2f} s of the clock in fault or held", times.stopped_s);
-  if (times.stood_s > 0.0) {
-    text += fmt::format("{}{:.2f} s paused or suspended", text.empty() ? "" : ", ", times.stood_s);
-  }
-  if (!text.empty()) facts.add("not running", text);
+  constexpr char kWrench[] =
+      "{max_force_N:.1f N} at most at {max_force_s:.3f s}, {max_moment_Nm:.2f Nm} at "
+      "{max_moment_s:.3f s}";
+  const Json& estimate = run["estimate"];
+  add_figures(facts, estimate["external_base_wrench"], "external wrench on base", kWrench);
+  for (const auto& [site, one] : estimate["wrenches"].items())
+    add_figures(facts, one, "wrench at " + site, kWrench);
+  add_figures(facts, run, "not explained by them",
+              "{estimate.unexplained_torque_Nm:.2f Nm} at most");
 }
 
 /// How long cycles took, and whether they were in time.
-Json start_json(const hal::can::DriveMaster* master) {
-  if (master == nullptr || master->start_up().duration_ns == 0) return nullptr;
-  const hal::can::StartUp& start = master->start_up();
-  return {{"axes", start.axes},
-          {"seconds", static_cast<double>(start.duration_ns) * 1e-9},
-          {"frames_sent", start.sent},
-          {"frames_received", start.received}};
-}
-
-void add_timing_facts(const RunSummary& summary, Facts& facts) {
-  const std::string start = start_text(summary.composition.master);
-  if (!start.empty()) facts.add("start", start);
-  if (summary.composition.master != nullptr) {
-    for (const std::string& text : summary.composition.master->wire_texts()) {
-      facts.add("wire", text);
-    }
-  }
-  const rt::LoopStatistics& loop = summary.cycle.loop();
+void add_timing_facts(const RunSummary& summary, const Json& run, Facts& facts) {
+  const auto row = [&](const char* name, const char* text) { add_figures(facts, run, name, text); };
+  add_figures(facts, run["start"], "start", kStart);
+  for (const Json& text : run["wire"]) facts.add("wire", text.get<std::string>());
   const bool wall_clock = summary.composition.experiment.loop.pacing != rt::Pacing::kSimulated;
   if (wall_clock) {
-    facts.add("ran", fmt::format("{:.3f} s, {}, {} skipped", summary.times.running_s,
-                                 counted(summary.cycle.running_cycles(), "cycle"), loop.skipped));
+    row("ran", "{wall_seconds:.3f s}, {cycles|cycle}, {skipped} skipped");
   } else {
-    facts.add("simulated", fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", summary.sim_s(),
-                                       summary.times.running_s, summary.realtime_factor()));
+    row("simulated",
+        "{sim_seconds:.3f s} in {wall_seconds:.2f s}: {realtime_factor:.1f} x real time");
   }
-  add_stopped(summary.times, facts);
-  facts.add("cycle p50/p99/p99.9/max", microseconds(summary.cycle.loop().work.percentiles()));
-  if (summary.composition.backend->waits_for_bus()) {
-    facts.add("bus p50/p99/p99.9/max", microseconds(summary.cycle.loop().bus.percentiles()));
-  }
-  const bool woken = loop.wakeup.count() > 0;  // not by a server's cycles
-  if (woken) facts.add("wake-up p50/p99/p99.9/max", microseconds(loop.wakeup.percentiles()));
-  if (wall_clock || woken) facts.add("overruns", std::to_string(loop.overruns));
-}
-
-std::string counts_text(const remote::Network::Counts& counts) {
-  return fmt::format("{} messages, {} lost, {} dropped, {} reordered, {} delivered", counts.sent,
-                     counts.lost, counts.dropped, counts.reordered, counts.delivered);
+  // The time that is not in the line above: nothing has run then.
+  if (summary.times.stopped_s > 0.0)
+    row("not running", "{stopped_seconds:.2f s} of the clock in fault or held");
+  if (summary.times.stood_s > 0.0) row("not running", "{stood_seconds:.2f s} paused or suspended");
+  row("cycle p50/p99/p99.9/max", "{cycle_ns:.1f us}");
+  row("bus p50/p99/p99.9/max", "{bus_ns:.1f us}");
+  row("wake-up p50/p99/p99.9/max", "{wakeup_ns:.1f us}");  // not of a server's cycles
+  if (wall_clock || !run["wakeup_ns"].is_null()) row("overruns", "{overruns}");
 }
 
 /// The link to the robot, and what both ends made of it.
-void add_link_facts(const remote::OperatorEnd* link, double period_s, Facts& facts) {
-  if (link == nullptr) return;
-  const remote::TeleFigures figures = link->figures();
-  facts.add("commands over the link", counts_text(figures.up));
-  facts.add("states over the link", counts_text(figures.down));
-  if (figures.robot_end) {
-    facts.add("without commands",
-              fmt::format("{:.3f} s, {}", static_cast<double>(figures.starved_cycles) * period_s,
-                          counted(figures.holds, "time")));
-  }
-  const auto at_most = [period_s](std::uint64_t cycles) {
-    return fmt::format("{:.3f} s at most", static_cast<double>(cycles) * period_s);
+void add_link_facts(const Json& run, Facts& facts) {
+  const Json& link = run["teleoperation"];
+  if (link.is_null()) return;
+  constexpr char kCounts[] =
+      "{sent} messages, {lost} lost, {dropped} dropped, {reordered} reordered, {delivered} "
+      "delivered";
+  add_figures(facts, link["up"], "commands over the link", kCounts);
+  add_figures(facts, link["down"], "states over the link", kCounts);
+  const auto seconds = [&](const char* cycles) {
+    return fmt::format("{:.3f} s",
+                       link[cycles].get<double>() * run["period_ns"].get<double>() * 1e-9);
   };
-  facts.add("without a state", at_most(figures.most_silent_cycles));
-  facts.add("without a newer command in force", at_most(figures.most_unanswered_cycles));
-}
-
-Json link_json(const remote::OperatorEnd* link) {
-  if (link == nullptr) return nullptr;
-  const remote::TeleFigures figures = link->figures();
-  const auto counts = [](const remote::Network::Counts& one) {
-    return Json{{"sent", one.sent},           {"lost", one.lost},
-                {"dropped", one.dropped},     {"duplicated", one.duplicated},
-                {"reordered", one.reordered}, {"delivered", one.delivered}};
-  };
-  Json json;
-  json["up"] = counts(figures.up);
-  json["down"] = counts(figures.down);
-  json["starved_cycles"] = figures.robot_end ? Json(figures.starved_cycles) : Json(nullptr);
-  json["holds"] = figures.robot_end ? Json(figures.holds) : Json(nullptr);
-  json["silent_cycles"] = figures.silent_cycles;
-  json["most_silent_cycles"] = figures.most_silent_cycles;
-  json["unanswered_cycles"] = figures.unanswered_cycles;
-  json["most_unanswered_cycles"] = figures.most_unanswered_cycles;
-  json["clock_cycles"] = figures.clock_cycles;
-  json["compared"] = figures.compared;
-  json["worst_prediction_rad"] = nullptr;
-  if (figures.compared > 0) json["worst_prediction_rad"] = figures.worst_prediction_rad;
-  return json;
+  if (!link["holds"].is_null())
+    add_figures(facts, link, "without commands", seconds("starved_cycles") + ", {holds|time}");
+  facts.add("without a state", seconds("most_silent_cycles") + " at most");
+  facts.add("without a newer command in force", seconds("most_unanswered_cycles") + " at most");
 }
 
 /// What the run wrote and published.
-void add_output_facts(const RunSummary& summary, Facts& facts) {
+void add_output_facts(const RunSummary& summary, const Json& run, Facts& facts) {
   if (summary.log) {
-    facts.add("log", fmt::format("{} ({} messages, {} dropped, {:.1f} MB)", summary.log->path,
-                                 summary.log->messages, summary.log->dropped,
-                                 static_cast<double>(summary.log->bytes) * 1e-6));
+    add_figures(facts, run, "log",
+                "{log.path} ({log.messages} messages, {log.dropped} dropped, " +
+                    fmt::format("{:.1f} MB)", static_cast<double>(summary.log->bytes) * 1e-6));
   }
-  if (summary.dds) {
-    facts.add("DDS", fmt::format("domain {}: {} samples, {} refused; {} cycles dropped",
-                                 summary.dds->domain, summary.dds->counts.sent,
-                                 summary.dds->counts.refused, summary.dds->counts.dropped));
-    if (summary.dds->services.requests > 0) {
-      facts.add("requests over DDS", fmt::format("{}, {} dropped", summary.dds->services.requests,
-                                                 summary.dds->services.dropped));
-    }
-  }
-}
-
-/// The frames that were recorded.
-void add_frame_facts(const RunSummary& summary, Facts& facts) {
-  if (!summary.frames) return;
-  const std::string trouble = summary.frames->error.empty() ? "" : "; " + summary.frames->error;
-  facts.add("frames", fmt::format("{} ({} frames, {} lost{})", summary.frames->path,
-                                  summary.frames->frames, summary.frames->lost, trouble));
+  add_figures(facts, run, "DDS",
+              "domain {dds.domain}: {dds.samples} samples, {dds.refused} refused; {dds.dropped} "
+              "cycles dropped");
+  if (summary.dds && summary.dds->services.requests > 0)
+    add_figures(facts, run, "requests over DDS", "{dds.requests}, {dds.requests_dropped} dropped");
 }
 
 }  // namespace
@@ -377,17 +493,12 @@ log::StringMap result_of(const hal::can::DriveMaster* master) {
   log::StringMap result;
   const std::string start = start_text(master);
   if (!start.empty()) result.emplace_back("start", start);
-  if (master == nullptr) return result;
-  for (const std::string& text : master->wire_texts()) result.emplace_back("wire", text);
+  for (const std::string& text : wire_of(master)) result.emplace_back("wire", text);
   return result;
 }
 
 std::string start_text(const hal::can::DriveMaster* master) {
-  if (master == nullptr || master->start_up().duration_ns == 0) return "";
-  const hal::can::StartUp& start = master->start_up();
-  return fmt::format("{} enabled after {:.3f} s, {} frames sent and {} received",
-                     counted(start.axes, "axis", "axes"),
-                     static_cast<double>(start.duration_ns) * 1e-9, start.sent, start.received);
+  return figures_text(kStart, figures_json(start_of(master))).value_or("");
 }
 
 std::uint64_t RunSummary::planned_cycles() const { return composition.experiment.cycles(); }
@@ -413,64 +524,15 @@ double RunSummary::sim_s() const {
   return static_cast<double>(cycles * composition.experiment.loop.period_ns) / 1e9;
 }
 
-double RunSummary::realtime_factor() const {
-  return times.running_s > 0.0 ? sim_s() / times.running_s : 0.0;
+std::optional<ParallelSummary> RunSummary::parallel_summary() const {
+  if (!parallel) return std::nullopt;
+  return ParallelSummary{&composition.experiment.parallel->robot, &*parallel, differences};
 }
 
-Json RunSummary::json() const {
-  const runtime::Experiment& e = composition.experiment;
-  const rt::LoopStatistics& loop = cycle.loop();
-  Json json;
-  json["robot"] = e.robot.name;
-  json["hal"] = hal_name(e);
-  json["seed"] = e.seed;
-  json["ended"] = ended();
-  json["planned_cycles"] = planned_cycles() > 0 ? Json(planned_cycles()) : Json(nullptr);
-  json["cycles"] = cycle.running_cycles();
-  json["period_ns"] = e.loop.period_ns;
-  json["sim_seconds"] = sim_s();
-  json["wall_seconds"] = times.running_s;
-  json["stopped_seconds"] = times.stopped_s;
-  json["stood_seconds"] = times.stood_s;
-  json["realtime_factor"] = times.running_s > 0.0 ? Json(realtime_factor()) : Json(nullptr);
-  json["overruns"] = loop.overruns;
-  json["skipped"] = loop.skipped;
-  json["wakeup_ns"] = percentiles_json(loop.wakeup);
-  json["bus_ns"] =
-      composition.backend->waits_for_bus() ? percentiles_json(loop.bus) : Json(nullptr);
-  json["cycle_ns"] = percentiles_json(loop.work);
-  json["log"] = log_json(log);
-  json["frames"] = frames_json(frames);
-  json["dds"] = dds_json(dds);
-  json["buses"] = buses_json(composition.open_buses());
-  json["joints"] = Json::object();
-  const auto tracking = cycle.statistics().tracking();
-  const auto limited = cycle.statistics().limited_cycles();
-  for (std::size_t i = 0; i < tracking.size(); ++i) {
-    const bool tracked = tracking[i].cycles > 0;
-    json["joints"][e.robot.joints[i].name] = {
-        {"rms_tracking_error_rad", tracked ? Json(tracking[i].rms_rad) : Json()},
-        {"max_tracking_error_rad", tracked ? Json(tracking[i].max_rad) : Json()},
-        {"limited_cycles", limited[i]}};
-  }
-  json["ground"] = ground_json(cycle.statistics().ground(weight_N(*composition.kernels)));
-  json["loops"] = loops_json(e.robot, cycle.statistics().loops());
-  json["parallel"] = parallel ? parallel_json(e.parallel->robot, *parallel, *differences) : Json();
-  json["base"] = base_json(cycle.statistics().base());
-  json["estimate"] =
-      estimate_json(composition, cycle.statistics().estimate(), cycle.running_cycles() > 0);
-  const hal::can::DriveMaster* master = composition.master;
-  json["round_trips"] = master == nullptr ? Json::array() : round_trips_json(master->round_trips());
-  json["start"] = start_json(master);
-  json["wire"] = master == nullptr ? std::vector<std::string>() : master->wire_texts();
-  json["remote"] = remote_json(server, composition.remote);
-  json["teleoperation"] = link_json(composition.tele);
-  json["faults"] = faults;
-  json["warnings"] = warnings();
-  json["fault_log"] = faults_json(cycle.faults());
-  json["kernel_variant"] = composition.kernels->variant;
-  add_engine_json(e, json);
-  return json;
+Json RunSummary::json() const { return figures_json(this); }
+
+double RunSummary::realtime_factor() const {
+  return times.running_s > 0.0 ? sim_s() / times.running_s : 0.0;
 }
 
 namespace {
@@ -519,12 +581,12 @@ std::vector<std::string> RunSummary::warnings() const {
 }
 
 void RunSummary::print(std::FILE* out) const {
+  const Json run = json();
   print_worst_joints(*this, out);
-  print_loops(*this, out);
+  print_loops(run["loops"], out);
   if (!cycle.faults().empty()) fmt::print(out, "\n");
-  print_faults(faults_json(cycle.faults()), out);
-  if (parallel)
-    print_parallel(composition.experiment.parallel->robot, *parallel, *differences, out);
+  print_faults(run["fault_log"], out);
+  if (const auto second = parallel_summary()) print_parallel(*second, out);
   fmt::print(out, "\n");
   if (composition.master != nullptr && composition.backend->waits_for_bus()) {
     print_slowest_nodes(composition.master->round_trips(), out);
@@ -534,21 +596,23 @@ void RunSummary::print(std::FILE* out) const {
   if (cut_short()) {
     const auto planned = static_cast<double>(planned_cycles()) *
                          static_cast<double>(composition.experiment.loop.period_ns) * 1e-9;
-    facts.add("ended", fmt::format("{} after {:.3f} of {:.3f} s", ended(), sim_s(), planned));
+    add_figures(facts, run, "ended",
+                "{ended} after {sim_seconds:.3f} of " + fmt::format("{:.3f} s", planned));
   }
   add_limited(*this, facts);
-  add_motion_facts(*this, facts);
-  add_estimate_facts(*this, facts);
-  add_timing_facts(*this, facts);
-  add_remote_facts(server, composition.remote, facts);
-  add_link_facts(composition.tele,
-                 static_cast<double>(composition.experiment.loop.period_ns) * 1e-9, facts);
-  facts.add("kernels", composition.kernels->variant);
+  add_motion_facts(run, facts);
+  add_estimate_facts(*this, run, facts);
+  add_timing_facts(*this, run, facts);
+  add_remote_facts(run, facts);
+  add_link_facts(run, facts);
+  add_figures(facts, run, "kernels", "{kernel_variant}");
   const std::string engine = sim::engine_text(composition.experiment.sim.engine);
   if (composition.sim != nullptr && !engine.empty()) facts.add("engine", engine);
-  add_output_facts(*this, facts);
+  add_output_facts(*this, run, facts);
   add_bus_facts(composition.open_buses(), facts);
-  add_frame_facts(*this, facts);
+  add_figures(facts, run, "frames",
+              "{frames.path} ({frames.frames} frames, {frames.lost} lost" +
+                  std::string(frames && !frames->error.empty() ? "; " + frames->error : "") + ")");
   facts.print(out);
 }
 

@@ -10,6 +10,7 @@
 #include "apps/run/connection.hpp"
 #include "apps/run/dds_run.hpp"
 #include "apps/run/loop_thread.hpp"
+#include "apps/run/parallel_summary.hpp"
 #include "apps/text/console.hpp"
 #include "hal/remote/server.hpp"
 #include "internal_model/parallel_robot.hpp"
@@ -48,11 +49,15 @@ struct RunSummary {
   [[nodiscard]] double sim_s() const;
   /// Simulated by wall clock, while controllers ran; 0: they did not.
   [[nodiscard]] double realtime_factor() const;
-  /// docs/json.md
+  [[nodiscard]] std::optional<ParallelSummary> parallel_summary() const;
+  /// Its figures.
   [[nodiscard]] Json json() const;
   void print(std::FILE* out) const;
   /// What was tolerated: missing feedback, refused values; a link that was silent at the end.
   [[nodiscard]] std::vector<std::string> warnings() const;
 };
+
+/// docs/json.md, `tandem run`
+void figures(Figures& f, const RunSummary* s);
 
 }  // namespace tandem::apps

@@ -40,12 +40,12 @@ class DoctorLine : public MachineTree {
                        .difference_ns = 25,
                        .jitter_ns = 6.4}};
   }
-  [[nodiscard]] LineFindings judge() const {
+  [[nodiscard]] DoctorResult judge() const {
     return judge_line(robot_, robot_.buses[0], {}, survey_);
   }
   void expect(const std::string& name, Health health, const std::string& value,
               const std::string& mend) const {
-    const LineFindings line = judge();
+    const DoctorResult line = judge();
     const Finding& one = named(line.findings, name);
     EXPECT_EQ(to_string(one.health), std::string(to_string(health))) << name;
     EXPECT_NE(one.value.find(value), std::string::npos) << one.value;
@@ -63,7 +63,7 @@ TEST_F(DoctorLine, NamesAMemoryWhoseCheckSumIsWrong) {
 }
 
 TEST_F(DoctorLine, FindsNothingWrongWithAGoodOne) {
-  const LineFindings line = judge();
+  const DoctorResult line = judge();
   for (const Finding& one : line.findings) {
     EXPECT_EQ(to_string(one.health), std::string("ok")) << one.name << ": " << one.why;
   }
@@ -136,7 +136,7 @@ TEST_F(DoctorLine, SendsNothingWhileARunHasTheInterface) {
   robot_.buses[0].interface = "doctor" + std::to_string(::getpid());
   const auto held = InterfaceLock::take(robot_.buses[0].interface, hal::can::SocketSide::kMaster);
   ASSERT_TRUE(held);
-  const LineFindings line = look_at_line(robot_, robot_.buses[0]);
+  const DoctorResult line = look_at_line(robot_, robot_.buses[0]);
   ASSERT_EQ(line.findings.size(), 1U);
   const Finding& one = line.findings[0];
   EXPECT_EQ(one.name, robot_.buses[0].interface + " master");

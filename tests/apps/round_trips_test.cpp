@@ -42,7 +42,7 @@ TEST(RoundTrips, AreListedWithTheirTimesWhereTheBusKnowsThem) {
   RoundTrip timed = trip("hip", {0, 2, 0, 0});
   timed.time.record(60);
   timed.time.record(40);
-  const Json json = round_trips_json(std::vector{timed, trip("knee", {0, 7, 0, 0})});
+  const Json json = figures_json(std::vector{timed, trip("knee", {0, 7, 0, 0})});
   ASSERT_EQ(json.size(), 2U);
   EXPECT_EQ(json[0]["node"], "hip");
   EXPECT_EQ(json[0]["bus"], "leg");

@@ -64,16 +64,13 @@ TEST(Documentation, OfTheConfigurationHasEveryKey) {
 
 TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
   const std::string page = text_of(kRoot / "docs/json.md");
-  for (const char* file : {"apps/run/run_summary.cpp",        "apps/run/connection.cpp",
-                           "apps/can/bus_table.cpp",          "apps/run/check_command.cpp",
-                           "apps/tools/model_command.cpp",    "apps/tools/new_command.cpp",
-                           "apps/tools/log_command.cpp",      "apps/tools/log_import.cpp",
-                           "apps/tools/log_replay.cpp",       "apps/tools/log_thresholds.cpp",
-                           "apps/tools/eds_command.cpp",      "apps/tools/eds_show.cpp",
-                           "apps/machine/latency_report.cpp", "apps/machine/doctor_command.cpp",
-                           "apps/can/round_trips.cpp",        "apps/control/controller_control.cpp",
-                           "apps/control/joint_control.cpp",  "apps/control/sensor_control.cpp",
-                           "apps/clients/topic_command.cpp",  "apps/clients/topic_rate.cpp"}) {
+  for (const char* file :
+       {"apps/run/check_command.cpp", "apps/tools/model_command.cpp", "apps/tools/new_command.cpp",
+        "apps/tools/log_command.cpp", "apps/tools/log_import.cpp", "apps/tools/log_replay.cpp",
+        "apps/tools/log_thresholds.cpp", "apps/tools/eds_command.cpp", "apps/tools/eds_show.cpp",
+        "apps/control/controller_control.cpp", "apps/control/joint_control.cpp",
+        "apps/control/sensor_control.cpp", "apps/clients/topic_command.cpp",
+        "apps/clients/topic_rate.cpp"}) {
     const std::string source = text_of(kRoot / file);
     for (const char* pattern : {"json\\[\"(\\w+)\"\\]", "\\{\"(\\w+)\", [^}\"]"}) {
       for (const std::string& key : matches(source, pattern)) {

@@ -52,6 +52,27 @@ TEST_F(RunStatisticsOfTwo, GivesRmsAndMaximumOfTheTrackingError) {
   EXPECT_EQ(tracking[1].rms_rad, 0.0);  // never in position control
 }
 
+TEST_F(RunStatisticsOfTwo, SumTheWorkOfJointsThatDriveAndOfThoseThatBrake) {
+  EXPECT_FALSE(statistics_.work(1e-3));
+  const auto power = [&](std::size_t joint, double torque_Nm, double velocity_rad_s) {
+    state_.torque_Nm()[joint] = torque_Nm;
+    state_.velocity_rad_s()[joint] = velocity_rad_s;
+  };
+  power(0, std::nan(""), 3.0);
+  power(1, std::nan(""), 3.0);
+  take(0.0, 0.0);
+  EXPECT_FALSE(statistics_.work(1e-3));  // no drive tells its torque
+  power(0, 2.0, 3.0);
+  take(0.0, 0.0);
+  power(1, -1.0, 4.0);
+  take(0.0, 0.0);
+  const auto work = statistics_.work(0.5);
+  ASSERT_TRUE(work);
+  EXPECT_DOUBLE_EQ(work->done_J, 2.0 * 6.0 * 0.5);
+  EXPECT_DOUBLE_EQ(work->taken_J, 4.0 * 0.5);
+  EXPECT_DOUBLE_EQ(work->max_power_W, 6.0);
+}
+
 TEST_F(RunStatisticsOfTwo, KeepTheLargestWrenchOfEachPlaceAndItsTime) {
   hal::EstimateImage estimate({.joints = 2, .wrenches = 2});
   RunStatistics statistics(2, 2, 0, 2);

@@ -1,0 +1,124 @@
+// docs/json.md against the declarations of figures: its tables are written from them.
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
+
+#include "apps/can/bus_table.hpp"
+#include "apps/machine/doctor.hpp"
+#include "apps/machine/latency_report.hpp"
+#include "apps/run/run_summary.hpp"
+
+namespace tandem::apps {
+namespace {
+
+const std::string kPage = std::string(TANDEM_SOURCE_DIR) + "/docs/json.md";
+
+std::string file_text(const std::string& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+/// What docs/json.md documents by tables: the name in the comment before each, and its figures.
+const Named<std::vector<Figures::Row>> kTables{
+    {"run", Figures::rows_of<const RunSummary*>()},
+    {"bus", Figures::rows_of<hal::can::BusLoad>()},
+    {"doctor", Figures::rows_of<DoctorResult>()},
+    {"latency", Figures::rows_of<LatencyResult>()},
+};
+
+std::string table_text(const std::vector<Figures::Row>& rows) {
+  std::string text = "| key | type | meaning |\n|---|---|---|\n";
+  for (const Figures::Row& row : rows)
+    text += fmt::format("| `{}` | {} | {} |\n", row.path, row.type, row.words);
+  return std::regex_replace(text, std::regex("  \\|"), " |");
+}
+
+/// The page with every table as the declarations have it.
+std::string page_as_declared(std::string page) {
+  for (const auto& [name, rows] : kTables) {
+    const std::string begin = "<!-- figures: " + name + " -->\n";
+    const std::size_t at = page.find(begin);
+    const std::size_t end = page.find("<!-- end -->", at);
+    if (end == std::string::npos) {
+      ADD_FAILURE() << kPage << " has no place for the figures of " << name << ": " << begin;
+      continue;
+    }
+    page.replace(at + begin.size(), end - at - begin.size(), table_text(rows));
+  }
+  return page;
+}
+
+TEST(Documentation, OfTheJsonIsWhatTheFiguresDeclare) {
+  const std::string page = file_text(kPage);
+  const std::string declared = page_as_declared(page);
+  if (std::getenv("TANDEM_WRITE_DOCS") != nullptr) {
+    std::ofstream(kPage) << declared;
+    GTEST_SKIP() << "docs/json.md is written";
+  }
+  EXPECT_TRUE(page == declared)
+      << "docs/json.md is not what the figures declare: scripts/json-docs writes it";
+}
+
+TEST(Documentation, OfTheJsonHasNoKeyTwice) {
+  for (const auto& [name, rows] : kTables) {
+    std::set<std::string> paths;
+    EXPECT_GT(rows.size(), 3U);
+    for (const Figures::Row& row : rows) {
+      const bool again = row.path == "remote";  // of two alternatives
+      EXPECT_TRUE(paths.insert(row.path).second || again) << name << ": " << row.path;
+    }
+  }
+}
+
+/// A row with a figure that nobody declares would never be shown.
+TEST(Documentation, OfTheJsonHasEveryFigureThatRowsShow) {
+  std::set<std::string> declared;
+  for (const auto& [name, rows] : kTables) {
+    for (const Figures::Row& row : rows) {
+      declared.insert(row.path);
+      for (std::size_t dot = row.path.find('.'); dot != std::string::npos;
+           dot = row.path.find('.', dot + 1))
+        declared.insert(row.path.substr(dot + 1));  // of rows of a part
+    }
+  }
+  const std::regex place("\\{([a-z][\\w.]*)(?:[:|][^}\"]*)?\\}");
+  for (const char* file : {"run/run_summary.cpp", "run/remote_link.cpp", "can/bus_watch.cpp",
+                           "run/parallel_summary.cpp"}) {
+    std::size_t seen = 0;
+    std::istringstream lines(file_text(std::string(TANDEM_SOURCE_DIR) + "/apps/" + file));
+    for (std::string line; std::getline(lines, line);) {
+      std::string text = line.substr(std::min(line.size(), line.find('"')));
+      for (std::smatch found; std::regex_search(text, found, place); text = found.suffix()) {
+        EXPECT_TRUE(declared.contains(found[1])) << file << " shows {" << found[1] << "}";
+        ++seen;
+      }
+    }
+    EXPECT_GT(seen, 3U) << file;
+  }
+}
+
+TEST(FiguresText, ConvertsIntoTheUnitThatIsShown) {
+  const Json json{{"slip_m", 0.0123},
+                  {"tilt_rad", 0.5},
+                  {"axes", 1},
+                  {"none", nullptr},
+                  {"cycle_ns", {{"p50", 1500}, {"p99", 2000}, {"p999", 2500}, {"max", 9000}}},
+                  {"log", {{"path", "a.mcap"}, {"share", 0.5}}}};
+  EXPECT_EQ(figures_text("{slip_m:.1f mm}, {slip_m:.4f m}, {tilt_rad:.2f deg}", json),
+            "12.3 mm, 0.0123 m, 28.65 deg");
+  EXPECT_EQ(figures_text("{axes|axis|axes} of {log.path}: {log.share:.0f %}", json),
+            "1 axis of a.mcap: 50 %");
+  EXPECT_EQ(figures_text("{cycle_ns:.1f us}", json), "1.5 / 2.0 / 2.5 / 9.0 us");
+  EXPECT_EQ(figures_text("{cycle_ns}", json), "1500 / 2000 / 2500 / 9000");
+  EXPECT_EQ(figures_text("in {none:.1f mm}", json), std::nullopt);
+  EXPECT_EQ(figures_text("in {log.nothing}", json), std::nullopt);
+}
+
+}  // namespace
+}  // namespace tandem::apps
