@@ -4,24 +4,12 @@
 #include <chrono>
 #include <thread>
 
-#include "apps/clients/commands.hpp"
-#include "apps/clients/control_client.hpp"
+#include "apps/clients/asked.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
 
 namespace tandem::apps {
 namespace {
-
-Json question_of(const ClockOptions& options) {
-  switch (options.action) {
-    case ClockOptions::Action::kShow: return {{"do", "clock.show"}};
-    case ClockOptions::Action::kPause: return {{"do", "clock.pause"}};
-    case ClockOptions::Action::kResume: return {{"do", "clock.resume"}};
-    case ClockOptions::Action::kStep: return {{"do", "clock.step"}, {"cycles", options.cycles}};
-    case ClockOptions::Action::kRate: return {{"do", "clock.rate"}, {"rate", options.rate}};
-  }
-  return {};
-}
 
 /// What the clock shows once it stands; before that, when somebody lets it go on or the run ends.
 Result<Json> wait_until_it_stands(ControlClient& run, std::FILE* out) {
@@ -66,27 +54,21 @@ void print_answer(const Json& answer) {
   facts.print(stdout);
 }
 
-Result<Json> carry_out(const ClockOptions& options) {
-  const auto run = ControlClient::open(options.target, "run");
-  if (!run) return std::unexpected(run.error());
-  Result<Json> answer = (*run)->ask(question_of(options));
-  const bool waits = options.action == ClockOptions::Action::kPause ||
-                     options.action == ClockOptions::Action::kStep;
-  if (!answer || !waits) return answer;
-  Result<Json> stands = wait_until_it_stands(**run, human_output(options.json));
-  if (!stands) return fail("the run ended before its clock stood still", "its own output says why");
-  if (answer->contains("dropped_steps")) (*stands)["dropped_steps"] = (*answer)["dropped_steps"];
-  return stands;
-}
-
 }  // namespace
 
-Exit clock_command(const ClockOptions& options) {
-  const Result<Json> answer = carry_out(options);
-  if (!answer) return refuse(answer.error());
-  if (options.json != "-") print_answer(*answer);
-  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
+Result<Exit> tell_clock(Asked& asked) {
+  if (asked.prints()) print_answer(asked.answer);
   return Exit::kDone;
+}
+
+Result<Exit> tell_clock_at_rest(Asked& asked) {
+  Result<Json> stands = wait_until_it_stands(asked.run, human_output(asked.options.json));
+  if (!stands) return fail("the run ended before its clock stood still", "its own output says why");
+  if (asked.answer.contains("dropped_steps")) {
+    (*stands)["dropped_steps"] = asked.answer["dropped_steps"];
+  }
+  asked.answer = std::move(*stands);
+  return tell_clock(asked);
 }
 
 }  // namespace tandem::apps
