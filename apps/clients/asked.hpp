@@ -36,28 +36,28 @@ void tell_done(const Json& answer);
 Status ask_for_load(const AskedOptions& options, Json& question);
 Status ask_for_start(const AskedOptions& options, Json& question);
 Status ask_for_stop(const AskedOptions& options, Json& question);
-Status ask_for_fault(const AskedOptions& options, Json& question);
 Status ask_for_list(const AskedOptions& options, Json& question);
 Status ask_for_motion(const AskedOptions& options, Json& question);
 
+// Each prints an answer.
+void print_clock(const Json& answer);
+void print_controllers(const Json& answer);
+void print_switched(const Json& answer);
+void print_latched(const Json& answer);
+void print_joint_gains(const Json& joint);
+void print_joint_set(const Json& joint);
+void print_joint_stop(const Json& joint);
+void print_recovery(const Json& joint);
+
 // Each prints an answer, waits for what is to come, and puts that into the answer. Exit::kFault: it
 // did not come. An error: the command was refused.
-Result<Exit> tell_clock(Asked& asked);
 Result<Exit> tell_clock_at_rest(Asked& asked);
-Result<Exit> tell_controllers(Asked& asked);
 Result<Exit> tell_loaded(Asked& asked);
-Result<Exit> tell_switched(Asked& asked);
-Result<Exit> tell_faults(Asked& asked);
 Result<Exit> tell_fault_reset(Asked& asked);
-Result<Exit> tell_injected(Asked& asked);
 Result<Exit> tell_joints(Asked& asked);
-Result<Exit> tell_joint_set(Asked& asked);
 Result<Exit> tell_motion(Asked& asked);
-Result<Exit> tell_joint_stop(Asked& asked);
 Result<Exit> tell_homing(Asked& asked);
-Result<Exit> tell_recovery(Asked& asked);
 Result<Exit> tell_joint_reset(Asked& asked);
-Result<Exit> tell_gains(Asked& asked);
 Result<Exit> tell_prediction(Asked& asked);
 Result<Exit> tell_sensors(Asked& asked);
 

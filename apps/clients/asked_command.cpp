@@ -15,39 +15,57 @@
 namespace tandem::apps {
 namespace {
 
-/// A command that does more than send its row's keys and print a short answer.
+Status ask_for_fault(const AskedOptions& options, Json& question) {
+  question["scenario"] =
+      sim::scenario_of_words(options.given["fault"].get<std::vector<std::string>>());
+  return {};
+}
+
+void print_injected(const Json& answer) {
+  fmt::print("{} injected\n", answer.value("injected", 0) == 1 ? "the fault is" : "the faults are");
+}
+
+/// A command that does more than send its row's keys, and print tell_done().
 struct Form {
   std::string_view name;
-  Status (*ask)(const AskedOptions&, Json& question) = nullptr;
+  void (*print)(const Json& answer) = nullptr;
   Result<Exit> (*tell)(Asked&) = nullptr;
+  Status (*ask)(const AskedOptions&, Json& question) = nullptr;
 };
 constexpr Form kForms[]{
     {"clock.pause", nullptr, &tell_clock_at_rest},
-    {"clock.rate", nullptr, &tell_clock},
-    {"clock.resume", nullptr, &tell_clock},
-    {"clock.show", nullptr, &tell_clock},
+    {"clock.rate", &print_clock},
+    {"clock.resume", &print_clock},
+    {"clock.show", &print_clock},
     {"clock.step", nullptr, &tell_clock_at_rest},
-    {"controller.list", nullptr, &tell_controllers},
-    {"controller.load", &ask_for_load, &tell_loaded},
-    {"controller.start", &ask_for_start, &tell_switched},
-    {"controller.stop", &ask_for_stop, &tell_switched},
-    {"controller.switch", nullptr, &tell_switched},
-    {"controller.unload", nullptr, &tell_switched},
+    {"controller.list", &print_controllers},
+    {"controller.load", nullptr, &tell_loaded, &ask_for_load},
+    {"controller.start", &print_switched, nullptr, &ask_for_start},
+    {"controller.stop", &print_switched, nullptr, &ask_for_stop},
+    {"controller.switch", &print_switched},
+    {"controller.unload", &print_switched},
     {"fault.reset", nullptr, &tell_fault_reset},
-    {"fault.show", nullptr, &tell_faults},
-    {"inject", &ask_for_fault, &tell_injected},
-    {"joint.gains", nullptr, &tell_gains},
-    {"joint.home", &ask_for_motion, &tell_homing},
-    {"joint.list", &ask_for_list, &tell_joints},
-    {"joint.move", &ask_for_motion, &tell_motion},
-    {"joint.recover", nullptr, &tell_recovery},
+    {"fault.show", &print_latched},
+    {"inject", &print_injected, nullptr, &ask_for_fault},
+    {"joint.gains", &print_joint_gains},
+    {"joint.home", nullptr, &tell_homing, &ask_for_motion},
+    {"joint.list", nullptr, &tell_joints, &ask_for_list},
+    {"joint.move", nullptr, &tell_motion, &ask_for_motion},
+    {"joint.recover", &print_recovery},
     {"joint.reset", nullptr, &tell_joint_reset},
-    {"joint.set", nullptr, &tell_joint_set},
+    {"joint.set", &print_joint_set},
     {"joint.show", nullptr, &tell_joints},
-    {"joint.stop", nullptr, &tell_joint_stop},
+    {"joint.stop", &print_joint_stop},
     {"predict", nullptr, &tell_prediction},
     {"sensor.list", nullptr, &tell_sensors},
 };
+
+/// The form of a command; of one that has none a plain one.
+const Form& form_of(const CommandRow& row) {
+  static constexpr Form kPlain{"", &tell_done};
+  const auto* form = std::ranges::find(kForms, row.name, &Form::name);
+  return form == std::end(kForms) ? kPlain : *form;
+}
 
 struct Unit {
   const char* name;
@@ -104,9 +122,9 @@ Status add_quantity(Json& question, const ControlKey& key, const std::string& te
                   per(key.unit)));
 }
 
-Result<Json> question_of(const AskedOptions& options, const Form* form) {
+Result<Json> question_of(const AskedOptions& options, const Form& form) {
   const CommandRow& row = *options.row;
-  Json question{{"do", row.asks.empty() ? row.name : row.asks}};
+  Json question{{"do", row.more.asks.empty() ? row.name : row.more.asks}};
   for (const ControlKey& key : row.keys) {
     const auto given = options.given.find(key.name);
     if (!key.sent || given == options.given.end()) continue;
@@ -116,8 +134,8 @@ Result<Json> question_of(const AskedOptions& options, const Form* form) {
       return std::unexpected(added.error());
     }
   }
-  if (form != nullptr && form->ask != nullptr) {
-    if (Status asked = form->ask(options, question); !asked) return std::unexpected(asked.error());
+  if (form.ask != nullptr) {
+    if (Status asked = form.ask(options, question); !asked) return std::unexpected(asked.error());
   }
   return question;
 }
@@ -129,34 +147,20 @@ void tell_done(const Json& answer) {
   if (answer.contains("note")) fmt::print("{}\n", shown(answer.value("note", ""), 2'000));
 }
 
-Status ask_for_fault(const AskedOptions& options, Json& question) {
-  question["scenario"] =
-      sim::scenario_of_words(options.given["fault"].get<std::vector<std::string>>());
-  return {};
-}
-
-Result<Exit> tell_injected(Asked& asked) {
-  const bool one = asked.answer.value("injected", 0) == 1;
-  if (asked.prints()) fmt::print("{} injected\n", one ? "the fault is" : "the faults are");
-  return Exit::kDone;
-}
-
 Exit asked_command(const AskedOptions& options) {
   if (options.row->effect == ControlEffect::kStops) return estop_command(options);
-  const auto* form = std::ranges::find(kForms, options.row->name, &Form::name);
-  if (form == std::end(kForms)) form = nullptr;
+  const Form& form = form_of(*options.row);
   Result<Json> question = question_of(options, form);
   if (!question) return refuse(question.error());
-  const auto run = ControlClient::open(options.target, options.row->any_process ? "" : "run");
+  const auto run = ControlClient::open(options.target, options.row->more.any_process ? "" : "run");
   if (!run) return refuse(run.error());
   Result<Json> answer = (*run)->ask(*question);
   if (!answer) return refuse(answer.error());
   Asked asked{options, **run, std::move(*question), std::move(*answer)};
   Exit exit = Exit::kDone;
-  if (form == nullptr) {
-    if (asked.prints()) tell_done(asked.answer);
-  } else {
-    const Result<Exit> told = form->tell(asked);
+  if (asked.prints() && form.print != nullptr) form.print(asked.answer);
+  if (form.tell != nullptr) {
+    const Result<Exit> told = form.tell(asked);
     if (!told) return refuse(told.error());
     exit = *told;
   }

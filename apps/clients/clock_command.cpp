@@ -41,7 +41,9 @@ std::string state_text(const Json& answer) {
   return steps > 0 ? "paused, " + counted(steps, "cycle") + " to go" : "paused after this cycle";
 }
 
-void print_answer(const Json& answer) {
+}  // namespace
+
+void print_clock(const Json& answer) {
   Facts facts;
   facts.add("time", fmt::format("{:.6f} s", answer.value("time_s", 0.0)));
   facts.add("cycles", std::to_string(answer.value("cycles", std::uint64_t{0})));
@@ -54,13 +56,6 @@ void print_answer(const Json& answer) {
   facts.print(stdout);
 }
 
-}  // namespace
-
-Result<Exit> tell_clock(Asked& asked) {
-  if (asked.prints()) print_answer(asked.answer);
-  return Exit::kDone;
-}
-
 Result<Exit> tell_clock_at_rest(Asked& asked) {
   Result<Json> stands = wait_until_it_stands(asked.run, human_output(asked.options.json));
   if (!stands) return fail("the run ended before its clock stood still", "its own output says why");
@@ -68,7 +63,8 @@ Result<Exit> tell_clock_at_rest(Asked& asked) {
     (*stands)["dropped_steps"] = asked.answer["dropped_steps"];
   }
   asked.answer = std::move(*stands);
-  return tell_clock(asked);
+  if (asked.prints()) print_clock(asked.answer);
+  return Exit::kDone;
 }
 
 }  // namespace tandem::apps

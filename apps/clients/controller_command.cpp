@@ -13,40 +13,6 @@
 namespace tandem::apps {
 namespace {
 
-void print_list(const Json& controllers) {
-  Table table({"controller", "state", "joints", "plugin"});
-  table.align_left();
-  for (const Json& one : controllers) {
-    const bool active = one.value("active", false);
-    const char* state = !active ? "inactive" : one.value("finished", false) ? "done" : "active";
-    std::vector<std::string> joints;
-    for (const Json& claim : one["claims"]) joints.push_back(claim.value("joint", ""));
-    const std::size_t count = joints.size();
-    if (count > 4) joints.resize(3);
-    std::string text = fmt::format("{}", fmt::join(joints, ", "));
-    if (count > joints.size()) text += fmt::format(" and {} more", count - joints.size());
-    table.add({one.value("name", ""), state, text,
-               std::filesystem::path(one.value("plugin", "")).filename().string()});
-  }
-  table.print(stdout);
-}
-
-/// "done in cycle 1200; active: squat"; "selected in cycle 1200: squat; not started yet: …".
-void print_done(const Json& answer) {
-  const std::vector<std::string> active =
-      answer.value("active", Json::array()).get<std::vector<std::string>>();
-  const std::string names =
-      active.empty() ? "none" : shown(fmt::format("{}", fmt::join(active, ", ")), 2'000);
-  const std::string note = shown(answer.value("note", ""), 2'000);
-  if (answer.value("done", false) && !note.empty()) {
-    fmt::print("selected in cycle {}: {}; {}\n", answer.value("cycle", 0), names, note);
-  } else if (answer.value("done", false)) {
-    fmt::print("done in cycle {}; active: {}\n", answer.value("cycle", 0), names);
-  } else {
-    fmt::print("{}; active so far: {}\n", note, names);
-  }
-}
-
 /// Where the first table of a TOML file begins, behind which no line belongs to its top level; its
 /// end, when it has none or is no TOML (the run then says where it is wrong).
 std::size_t end_of_top_level(const std::string& text, const std::string& file) {
@@ -98,14 +64,38 @@ Status ask_for_stop(const AskedOptions& options, Json& question) {
   return {};
 }
 
-Result<Exit> tell_controllers(Asked& asked) {
-  if (asked.prints()) print_list(asked.answer["controllers"]);
-  return Exit::kDone;
+void print_controllers(const Json& answer) {
+  Table table({"controller", "state", "joints", "plugin"});
+  table.align_left();
+  for (const Json& one : answer["controllers"]) {
+    const bool active = one.value("active", false);
+    const char* state = !active ? "inactive" : one.value("finished", false) ? "done" : "active";
+    std::vector<std::string> joints;
+    for (const Json& claim : one["claims"]) joints.push_back(claim.value("joint", ""));
+    const std::size_t count = joints.size();
+    if (count > 4) joints.resize(3);
+    std::string text = fmt::format("{}", fmt::join(joints, ", "));
+    if (count > joints.size()) text += fmt::format(" and {} more", count - joints.size());
+    table.add({one.value("name", ""), state, text,
+               std::filesystem::path(one.value("plugin", "")).filename().string()});
+  }
+  table.print(stdout);
 }
 
-Result<Exit> tell_switched(Asked& asked) {
-  if (asked.prints()) print_done(asked.answer);
-  return Exit::kDone;
+/// "done in cycle 1200; active: squat"; "selected in cycle 1200: squat; not started yet: …".
+void print_switched(const Json& answer) {
+  const std::vector<std::string> active =
+      answer.value("active", Json::array()).get<std::vector<std::string>>();
+  const std::string names =
+      active.empty() ? "none" : shown(fmt::format("{}", fmt::join(active, ", ")), 2'000);
+  const std::string note = shown(answer.value("note", ""), 2'000);
+  if (answer.value("done", false) && !note.empty()) {
+    fmt::print("selected in cycle {}: {}; {}\n", answer.value("cycle", 0), names, note);
+  } else if (answer.value("done", false)) {
+    fmt::print("done in cycle {}; active: {}\n", answer.value("cycle", 0), names);
+  } else {
+    fmt::print("{}; active so far: {}\n", note, names);
+  }
 }
 
 Result<Exit> tell_loaded(Asked& asked) {
@@ -115,7 +105,8 @@ Result<Exit> tell_loaded(Asked& asked) {
     if (!started) return std::unexpected(started.error());
     asked.answer = std::move(*started);
   }
-  return tell_switched(asked);
+  if (asked.prints()) print_switched(asked.answer);
+  return Exit::kDone;
 }
 
 }  // namespace tandem::apps

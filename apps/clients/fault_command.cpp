@@ -26,12 +26,6 @@ const char kAsked[] =
     "simulated time stands: it is asked for in the next cycle (tandem clock resume, then tandem "
     "fault show)";
 
-void print_latched(const Json& answer) {
-  fmt::print("phase {}, {} latched\n", shown(answer.value("phase", "?")),
-             answer.value("latched", 0));
-  print_faults(answer.value("faults", Json::array()), stdout);
-}
-
 /// "RKneeSag: position sensor (error code 0x7300); …": what is latched; of each joint the last,
 /// which is what is there now.
 std::string causes_of(const Json& answer) {
@@ -241,9 +235,10 @@ Exit stop_all(const Json& question) {
 
 }  // namespace
 
-Result<Exit> tell_faults(Asked& asked) {
-  if (asked.prints()) print_latched(asked.answer);
-  return Exit::kDone;
+void print_latched(const Json& answer) {
+  fmt::print("phase {}, {} latched\n", shown(answer.value("phase", "?")),
+             answer.value("latched", 0));
+  print_faults(answer.value("faults", Json::array()), stdout);
 }
 
 Result<Exit> tell_fault_reset(Asked& asked) {

@@ -32,12 +32,6 @@ bool in_degrees(const Asked& asked) {
   return asked.text("target_rad").find("deg") != std::string::npos;
 }
 
-/// @param answer  the joint after the stop, where the stop is `done`
-const char* outcome_of_stop(bool done, const Json& answer) {
-  if (!done) return "brakes then; a motion that has not begun is taken back";
-  return answer.value("moving", false) ? "brakes, and stays where it comes to rest" : "is at rest";
-}
-
 /// The joint, and the cycle of what is said of it.
 Result<Json> look(ControlClient& run, const std::string& name) {
   const Result<Json> answer = run.ask({{"do", "joint.list"}});
@@ -253,37 +247,34 @@ Result<Exit> tell_joints(Asked& asked) {
   return Exit::kDone;
 }
 
-Result<Exit> tell_joint_set(Asked& asked) {
-  if (!begin_to_tell(asked)) return Exit::kDone;
-  const Json& joint = asked.answer;
+void print_joint_set(const Json& joint) {
+  tell_done(joint);
   Facts facts;
   facts.add("mode", mode_of(joint));
   const std::string torque = torque_unit_of(joint), unit = unit_of(joint);
   facts.add("stiffness", number_of(joint, "stiffness_Nm_rad") + " " + torque + "/" + unit);
   facts.add("damping", number_of(joint, "damping_Nms_rad") + " " + torque + "s/" + unit);
   facts.print(stdout);
-  return Exit::kDone;
 }
 
-Result<Exit> tell_gains(Asked& asked) {
-  if (begin_to_tell(asked)) print_gains(Json::array({asked.answer}));
-  return Exit::kDone;
+void print_joint_gains(const Json& joint) {
+  tell_done(joint);
+  print_gains(Json::array({joint}));
 }
 
-Result<Exit> tell_joint_stop(Asked& asked) {
-  if (begin_to_tell(asked)) {
-    const bool done = asked.answer.value("done", false);
-    fmt::print("{} {}\n", joint_of(asked), outcome_of_stop(done, asked.answer));
-  }
-  return Exit::kDone;
+void print_joint_stop(const Json& joint) {
+  tell_done(joint);
+  const char* outcome = !joint.value("done", false)
+                            ? "brakes then; a motion that has not begun is taken back"
+                        : joint.value("moving", false) ? "brakes, and stays where it comes to rest"
+                                                       : "is at rest";
+  fmt::print("{} {}\n", joint.value("joint", ""), outcome);
 }
 
-Result<Exit> tell_recovery(Asked& asked) {
-  if (begin_to_tell(asked)) {
-    fmt::print("{} comes back from {} {} to its limit: tandem joint list {}\n", joint_of(asked),
-               number_of(asked.answer, "position_rad"), unit_of(asked.answer), joint_of(asked));
-  }
-  return Exit::kDone;
+void print_recovery(const Json& joint) {
+  tell_done(joint);
+  fmt::print("{0} comes back from {1} {2} to its limit: tandem joint list {0}\n",
+             joint.value("joint", ""), number_of(joint, "position_rad"), unit_of(joint));
 }
 
 Result<Exit> tell_motion(Asked& asked) {

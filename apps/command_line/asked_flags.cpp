@@ -168,7 +168,7 @@ void add_asked(CLI::App& app, AskedOptions& o) {
     std::vector<std::string> verbs;
     for (const CommandRow& row : command_rows()) {
       const std::size_t dot = std::min(row.name.find('.'), row.name.size());
-      if (!row.on_line || row.name.substr(0, dot) != group.name) continue;
+      if (!row.more.on_line || row.name.substr(0, dot) != group.name) continue;
       if (dot == row.name.size()) {
         add_row(*first, row, group.examples, o);
         continue;

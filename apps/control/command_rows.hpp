@@ -63,11 +63,13 @@ struct CommandRow {
   ControlEffect effect = ControlEffect::kReads;
   std::string doc;  ///< one line
   std::vector<ControlKey> keys{};
-  bool takes_long = false;   ///< no other command waits for it, but itself
-  bool on_line = true;       ///< false: only by `tandem ask`
-  bool any_process = false;  ///< not only a run is asked
-  /// What is asked instead: the command line has two forms of one question. Empty: its name.
-  std::string asks{};
+  struct More {
+    bool takes_long = false;   ///< no other command waits for it, but itself
+    bool on_line = true;       ///< false: only by `tandem ask`
+    bool any_process = false;  ///< not only a run is asked
+    /// What is asked instead: the command line has two forms of one question. Empty: its name.
+    std::string asks{};
+  } more{};
 };
 
 [[nodiscard]] const std::vector<CommandRow>& command_rows();

@@ -119,7 +119,7 @@ Result<Json> ControlRegistry::run(std::string_view question, const Asked& asked)
   }
   const bool urgent =
       command.effect == ControlEffect::kStops || command.effect == ControlEffect::kEnds;
-  std::unique_lock lock(command.takes_long ? working_long_ : working_, std::defer_lock);
+  std::unique_lock lock(command.more.takes_long ? working_long_ : working_, std::defer_lock);
   if (!urgent) lock.lock();
   if (Status in_time = check_stops(command, asked); !in_time) {
     return std::unexpected(in_time.error());
@@ -154,7 +154,7 @@ ControlTurn ControlRegistry::turn_of(std::string_view question) const {
   const bool urgent =
       command->effect == ControlEffect::kStops || command->effect == ControlEffect::kEnds;
   if (urgent) return ControlTurn::kUrgent;
-  return command->takes_long ? ControlTurn::kLong : ControlTurn::kOrdinary;
+  return command->more.takes_long ? ControlTurn::kLong : ControlTurn::kOrdinary;
 }
 
 Json ControlRegistry::answer(std::string_view question, const Asked& asked) const {

@@ -12,6 +12,7 @@
 
 #include "apps/control/controller_control.hpp"
 #include "hal/config/capabilities.hpp"
+#include "hal/motion_limits.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -191,8 +192,7 @@ double shortest(const Run& run, const std::string& name, double target_rad) {
   if (joint == joints.end() || limit == nullptr) return target_rad;
   const double turns = std::round((joint->look.commanded_rad - target_rad) / kTurn_rad);
   const double nearest = target_rad + turns * kTurn_rad;
-  return nearest < limit->min_position_rad || nearest > limit->max_position_rad ? target_rad
-                                                                                : nearest;
+  return hal::reaches(*limit, nearest) ? nearest : target_rad;
 }
 
 Result<Json> move(const Run& run, const Json& request) {
