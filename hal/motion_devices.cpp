@@ -4,11 +4,15 @@
 #include "base/archive.hpp"
 #include "hal/joint_access.hpp"
 #include "hal/joint_devices.hpp"
+#include "hal/motion_limits.hpp"
 
 namespace tandem::hal {
 namespace {
 
-constexpr double kSmallest = std::numeric_limits<double>::min();
+Code checked_rate(double value, double most) noexcept TANDEM_RT {
+  if (!std::isfinite(value)) return Code::kNotFinite;
+  return is_rate_within(value, most) ? Code::kOk : Code::kOutOfRange;
+}
 
 double seconds(const JointAccess& io) noexcept { return static_cast<double>(io.period_ns) * 1e-9; }
 
@@ -34,9 +38,8 @@ PositionControl::PositionControl(JointAccess& access)
 
 Code PositionControl::position_move(std::size_t j, double target_rad) noexcept TANDEM_RT {
   if (j >= motions_.size() || !in_mode(io_, j, ControlMode::kPosition)) return Code::kOutOfRange;
-  const JointCapabilities& limit = io_.joints[j];
-  const Code code = checked(io_, j, target_rad, limit.min_position_rad, limit.max_position_rad);
-  if (code != Code::kOk) return code;
+  if (!std::isfinite(target_rad)) return Code::kNotFinite;
+  if (!reaches(io_.joints[j], target_rad)) return Code::kOutOfRange;
   Motion& motion = motions_[j];
   if (motion.phase == kResting) {
     motion.reference = {io_.command->position_rad()[j], 0.0};
@@ -63,7 +66,7 @@ bool PositionControl::check_motion_done() const noexcept TANDEM_RT {
 
 Code PositionControl::set_ref_speed(std::size_t j, double rad_s) noexcept TANDEM_RT {
   const double max = j < motions_.size() ? io_.joints[j].max_velocity_rad_s : 0.0;
-  const Code code = checked(io_, j, rad_s, kSmallest, max);
+  const Code code = checked_rate(rad_s, max);
   if (code == Code::kOk) motions_[j].speed_rad_s = rad_s;
   return code;
 }
@@ -72,7 +75,7 @@ double PositionControl::ref_speed_rad_s(std::size_t j) const noexcept TANDEM_RT 
 }
 
 Code PositionControl::set_ref_acceleration(std::size_t j, double rad_s2) noexcept TANDEM_RT {
-  const Code code = checked(io_, j, rad_s2, kSmallest, most_acceleration_rad_s2(io_, j));
+  const Code code = checked_rate(rad_s2, most_acceleration_rad_s2(io_, j));
   if (code == Code::kOk) motions_[j].acceleration_rad_s2 = rad_s2;
   return code;
 }
@@ -153,7 +156,7 @@ double VelocityControl::target_velocity_rad_s(std::size_t j) const noexcept TAND
 }
 
 Code VelocityControl::set_ref_acceleration(std::size_t j, double rad_s2) noexcept TANDEM_RT {
-  const Code code = checked(io_, j, rad_s2, kSmallest, most_acceleration_rad_s2(io_, j));
+  const Code code = checked_rate(rad_s2, most_acceleration_rad_s2(io_, j));
   if (code == Code::kOk) ramps_[j].acceleration_rad_s2 = rad_s2;
   return code;
 }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hal/motion_limits.hpp"
 #include "runtime/controller_host.hpp"
 
 namespace tandem::runtime {
@@ -293,7 +294,6 @@ LoopAnswer ControllerHost::move(std::size_t joint, const MoveRequest& wish,
   LoopAnswer answer{.joint = static_cast<std::int32_t>(joint), .one = owner_[joint]};
   hal::PositionControl& motions = operator_.position;
   const hal::JointCapabilities& limit = capabilities_[joint];
-  const double reference = command.position_rad()[joint];
   operator_.begin(state, command);
   if (owner_[joint] >= 0) {
     answer.reason = RejectReason::kClaimed;
@@ -303,7 +303,7 @@ LoopAnswer ControllerHost::move(std::size_t joint, const MoveRequest& wish,
     (void)motions.stop(joint);
   } else if (recovers_[joint] != 0) {
     answer.reason = RejectReason::kRecovering;
-  } else if (reference < limit.min_position_rad || reference > limit.max_position_rad) {
+  } else if (!hal::reaches(limit, command.position_rad()[joint])) {
     answer.reason = RejectReason::kOutside;  // the limits would slow it down, and then let it rush
   } else {
     const double most = limit.max_velocity_rad_s;
@@ -336,9 +336,7 @@ LoopAnswer ControllerHost::recover(std::size_t joint,
   if (owner_[joint] >= 0) {
     return {.reason = RejectReason::kClaimed, .joint = index, .one = owner_[joint]};
   }
-  const hal::JointCapabilities& limit = capabilities_[joint];
-  const double reference = command.position_rad()[joint];
-  const bool within = reference >= limit.min_position_rad && reference <= limit.max_position_rad;
+  const bool within = hal::reaches(capabilities_[joint], command.position_rad()[joint]);
   if (command.mode()[joint] != kPositionMode)
     return {.reason = RejectReason::kOtherMode, .joint = index};
   if (within || recovers_[joint] != 0) return {.reason = RejectReason::kWithin, .joint = index};

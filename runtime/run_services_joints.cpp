@@ -7,7 +7,7 @@
 #include <thread>
 #include <utility>
 
-#include "base/nearest.hpp"
+#include "hal/motion_limits.hpp"
 #include "runtime/run_services.hpp"
 
 namespace tandem::runtime {
@@ -58,8 +58,8 @@ Status check_impedance(const std::string& joint, const JointRequest& wish,
 }
 
 Status check_target(const std::string& joint, double target, const hal::JointCapabilities& limit) {
+  if (std::isnan(target) || hal::reaches(limit, target)) return {};
   const double min = limit.min_position_rad, max = limit.max_position_rad;
-  if (!(target < min || target > max)) return {};
   return fail_at(
       joint,
       fmt::format("the target {} is beyond the joint's limits", quantity(target, limit.slides, "")),
@@ -71,7 +71,7 @@ Status check_target(const std::string& joint, double target, const hal::JointCap
 /// Checks a speed or an acceleration, which is above 0. @param value  NaN: not given
 Status check_rate_of_motion(const std::string& joint, const char* what, double value, double max,
                             bool slides, const char* per) {
-  if (std::isnan(value) || (value > 0.0 && value <= max)) return {};
+  if (std::isnan(value) || hal::is_rate_within(value, max)) return {};
   std::string hint = "give more than 0";
   if (std::isfinite(max)) hint += ", at most " + quantity(max, slides, per);
   return fail_at(

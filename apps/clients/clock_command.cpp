@@ -4,24 +4,12 @@
 #include <chrono>
 #include <thread>
 
-#include "apps/clients/commands.hpp"
-#include "apps/clients/control_client.hpp"
+#include "apps/clients/asked.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
 
 namespace tandem::apps {
 namespace {
-
-Json question_of(const ClockOptions& options) {
-  switch (options.action) {
-    case ClockOptions::Action::kShow: return {{"do", "clock.show"}};
-    case ClockOptions::Action::kPause: return {{"do", "clock.pause"}};
-    case ClockOptions::Action::kResume: return {{"do", "clock.resume"}};
-    case ClockOptions::Action::kStep: return {{"do", "clock.step"}, {"cycles", options.cycles}};
-    case ClockOptions::Action::kRate: return {{"do", "clock.rate"}, {"rate", options.rate}};
-  }
-  return {};
-}
 
 /// What the clock shows once it stands; before that, when somebody lets it go on or the run ends.
 Result<Json> wait_until_it_stands(ControlClient& run, std::FILE* out) {
@@ -53,7 +41,9 @@ std::string state_text(const Json& answer) {
   return steps > 0 ? "paused, " + counted(steps, "cycle") + " to go" : "paused after this cycle";
 }
 
-void print_answer(const Json& answer) {
+}  // namespace
+
+void print_clock(const Json& answer) {
   Facts facts;
   facts.add("time", fmt::format("{:.6f} s", answer.value("time_s", 0.0)));
   facts.add("cycles", std::to_string(answer.value("cycles", std::uint64_t{0})));
@@ -66,26 +56,14 @@ void print_answer(const Json& answer) {
   facts.print(stdout);
 }
 
-Result<Json> carry_out(const ClockOptions& options) {
-  const auto run = ControlClient::open(options.target, "run");
-  if (!run) return std::unexpected(run.error());
-  Result<Json> answer = (*run)->ask(question_of(options));
-  const bool waits = options.action == ClockOptions::Action::kPause ||
-                     options.action == ClockOptions::Action::kStep;
-  if (!answer || !waits) return answer;
-  Result<Json> stands = wait_until_it_stands(**run, human_output(options.json));
+Result<Exit> tell_clock_at_rest(Asked& asked) {
+  Result<Json> stands = wait_until_it_stands(asked.run, human_output(asked.options.json));
   if (!stands) return fail("the run ended before its clock stood still", "its own output says why");
-  if (answer->contains("dropped_steps")) (*stands)["dropped_steps"] = (*answer)["dropped_steps"];
-  return stands;
-}
-
-}  // namespace
-
-Exit clock_command(const ClockOptions& options) {
-  const Result<Json> answer = carry_out(options);
-  if (!answer) return refuse(answer.error());
-  if (options.json != "-") print_answer(*answer);
-  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
+  if (asked.answer.contains("dropped_steps")) {
+    (*stands)["dropped_steps"] = asked.answer["dropped_steps"];
+  }
+  asked.answer = std::move(*stands);
+  if (asked.prints()) print_clock(asked.answer);
   return Exit::kDone;
 }
 

@@ -8,8 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "apps/clients/commands.hpp"
-#include "apps/clients/control_client.hpp"
+#include "apps/clients/asked.hpp"
 #include "apps/clients/dds_client.hpp"
 #include "apps/control/fault_table.hpp"
 #include "apps/text/console.hpp"
@@ -26,20 +25,6 @@ const char kKept[] = "simulated time stands: it is done in the next cycle (tande
 const char kAsked[] =
     "simulated time stands: it is asked for in the next cycle (tandem clock resume, then tandem "
     "fault show)";
-
-void print_latched(const Json& answer) {
-  fmt::print("phase {}, {} latched\n", shown(answer.value("phase", "?")),
-             answer.value("latched", 0));
-  print_faults(answer.value("faults", Json::array()), stdout);
-}
-
-Exit show(const FaultOptions& options) {
-  const Result<Json> answer = ask(options.target, "run", {{"do", "fault.show"}});
-  if (!answer) return refuse(answer.error());
-  if (options.json != "-") print_latched(*answer);
-  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
-  return Exit::kDone;
-}
 
 /// "RKneeSag: position sensor (error code 0x7300); …": what is latched; of each joint the last,
 /// which is what is there now.
@@ -130,42 +115,6 @@ Result<Json> wait_for_reset(ControlClient& run, const Json& before) {
   }
 }
 
-Exit reset(const FaultOptions& options) {
-  const auto run = ControlClient::open(options.target, "run");
-  if (!run) return refuse(run.error());
-  const Result<Json> asked = (*run)->ask({{"do", "fault.reset"}});
-  if (!asked) return refuse(asked.error());
-  Json answer = *asked;
-  const bool nothing = asked->value("latched", 0) == 0;
-  const bool kept = !nothing && asked->value("paused", false);
-  if (!nothing && !kept) {
-    const Result<Json> through = wait_for_reset(**run, *asked);
-    if (!through) {  // it was asked for, and nobody knows what came of it
-      print_errors({through.error()});
-      return Exit::kFault;
-    }
-    answer = *through;
-  }
-  const bool done = answer.value("resets", 0) > asked->value("resets", 0);
-  const bool held = answer.value("phase", "") == "held";
-  const bool again = done && answer.value("latched", 0) > 0;
-  const bool stays = again && stayed(*asked, answer);
-  if (options.json != "-") {
-    if (nothing) fmt::print("nothing is latched\n");
-    if (kept) fmt::print("{}\n", kAsked);
-    if (done && !stays) fmt::print("reset: every joint is enabled where it is\n");
-    if (!nothing) print_latched(answer);
-    if (done && held) fmt::print("held: `tandem controller start` starts the controllers again\n");
-  }
-  if (!nothing && !kept && !done) {
-    const bool through = answer.value("failed_resets", 0) > asked->value("failed_resets", 0);
-    print_errors({failed_reset(answer, through, !stopped_since(*asked, answer))});
-  }
-  if (again) print_errors({stays ? still_there(answer) : faulted_again(answer)});
-  if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
-  return nothing || kept || (done && !again) ? Exit::kDone : Exit::kFault;
-}
-
 /// @param who  whose answer it is; empty: of the one that was named
 Exit tell_stop(const Result<Json>& answer, const Json& question, const std::string& who) {
   if (!answer) {
@@ -234,11 +183,11 @@ Exit tell_missing(const OwnRuns& own, const DdsAnswers& answers, const ControlTa
 
 /// Stops every run that serves in the DDS domain, and in the namespace when one is named. Whose
 /// word counts is asked meanwhile: it delays no stop.
-Exit stop_all_over_dds(const EstopOptions& options, const Json& question) {
-  auto asked = std::async(std::launch::async, [all = options.trust_domain] {
-    return all ? OwnRuns{} : own_runs_on_dds();
-  });
-  const auto answers = stop_all_by_dds(options.target, question);
+/// @param trusts  everybody's word counts
+Exit stop_all_over_dds(const ControlTarget& target, const Json& question, bool trusts) {
+  auto asked = std::async(std::launch::async,
+                          [all = trusts] { return all ? OwnRuns{} : own_runs_on_dds(); });
+  const auto answers = stop_all_by_dds(target, question);
   if (!answers) {
     for (const std::string& socket : running_control_sockets("run")) {
       fmt::print(stderr, "warning: {} is not stopped: tandem estop, without --dds\n",
@@ -252,12 +201,12 @@ Exit stop_all_over_dds(const EstopOptions& options, const Json& question) {
     const bool is_own =
         one.participant &&
         std::ranges::find(own.runs, *one.participant, &OwnRun::participant) != own.runs.end();
-    const bool vouched = is_own || answers->secured || options.trust_domain;
+    const bool vouched = is_own || answers->secured || trusts;
     const Exit told =
         one.answer && !vouched ? tell_unvouched(one) : tell_stop(one.answer, question, one.who);
     if (told != Exit::kDone) exit = Exit::kFault;
   }
-  return tell_missing(own, *answers, options.target) == Exit::kDone ? exit : Exit::kFault;
+  return tell_missing(own, *answers, target) == Exit::kDone ? exit : Exit::kFault;
 }
 
 /// Stops every run of this user on this machine. All are asked at once: one that hangs must not
@@ -286,14 +235,52 @@ Exit stop_all(const Json& question) {
 
 }  // namespace
 
-Exit fault_command(const FaultOptions& options) {
-  return options.action == FaultOptions::Action::kShow ? show(options) : reset(options);
+void print_latched(const Json& answer) {
+  fmt::print("phase {}, {} latched\n", shown(answer.value("phase", "?")),
+             answer.value("latched", 0));
+  print_faults(answer.value("faults", Json::array()), stdout);
 }
 
-Exit estop_command(const EstopOptions& options) {
+Result<Exit> tell_fault_reset(Asked& asked) {
+  const Json before = asked.answer;
+  Json& answer = asked.answer;
+  const bool nothing = before.value("latched", 0) == 0;
+  const bool kept = !nothing && before.value("paused", false);
+  if (!nothing && !kept) {
+    const Result<Json> through = wait_for_reset(asked.run, before);
+    if (!through) {  // it was asked for, and nobody knows what came of it
+      print_errors({through.error()});
+      return Exit::kFault;
+    }
+    answer = *through;
+  }
+  const bool done = answer.value("resets", 0) > before.value("resets", 0);
+  const bool held = answer.value("phase", "") == "held";
+  const bool again = done && answer.value("latched", 0) > 0;
+  const bool stays = again && stayed(before, answer);
+  if (asked.prints()) {
+    if (nothing) fmt::print("nothing is latched\n");
+    if (kept) fmt::print("{}\n", kAsked);
+    if (done && !stays) fmt::print("reset: every joint is enabled where it is\n");
+    if (!nothing) print_latched(answer);
+    if (done && held) fmt::print("held: `tandem controller start` starts the controllers again\n");
+  }
+  if (!nothing && !kept && !done) {
+    const bool through = answer.value("failed_resets", 0) > before.value("failed_resets", 0);
+    print_errors({failed_reset(answer, through, !stopped_since(before, answer))});
+  }
+  if (again) print_errors({stays ? still_there(answer) : faulted_again(answer)});
+  return nothing || kept || (done && !again) ? Exit::kDone : Exit::kFault;
+}
+
+Exit estop_command(const AskedOptions& options) {
   Json question{{"do", "estop"}};
-  if (options.category) question["category"] = *options.category;
-  if (options.target.dds) return stop_all_over_dds(options, question);
+  if (options.given.contains("category")) question["category"] = options.given["category"];
+  const bool trusts = options.given.value("trust-domain", false);
+  if (trusts && !options.target.dds) {
+    return refuse(Error{"--trust-domain requires --dds", "leave it out", {}, 0, {}});
+  }
+  if (options.target.dds) return stop_all_over_dds(options.target, question, trusts);
   if (options.target.socket.empty()) return stop_all(question);
   return tell_stop(ask(options.target, "run", question), question, {});
 }

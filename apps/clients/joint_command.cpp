@@ -1,18 +1,15 @@
 // tandem joint: what it asks a running run, and its answer.
 #include <fmt/core.h>
 
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
 #include <string_view>
 #include <thread>
-#include <tuple>
 #include <vector>
 
-#include "apps/clients/commands.hpp"
-#include "apps/clients/control_client.hpp"
+#include "apps/clients/asked.hpp"
 #include "apps/clients/joint_print.hpp"
 #include "apps/clients/named.hpp"
 #include "apps/text/console.hpp"
@@ -28,165 +25,11 @@ constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 constexpr double kFar_rad = 1.0 / kDegPerRad;
 constexpr double kFar_m = 0.01;
 
-struct Unit {
-  const char* name;
-  double si;         ///< one of it, in SI units
-  const char* kind;  ///< for the run, which knows whether the joint turns or slides
-};
-
-std::string_view without_blanks_around(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(' ');
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(' ') - first + 1);
-}
-
-/// Adds `text`, such as "30deg" or "30 deg" with `per` "", "20deg/s" with "/s", to the question.
-Status add_quantity(Json& question, const char* key, const char* flag, const std::string& text,
-                    const std::string& per) {
-  if (text.empty()) return {};
-  double number = 0.0;
-  std::string_view trimmed = without_blanks_around(text);
-  // std::from_chars() knows no plus sign.
-  if (trimmed.starts_with('+') && !trimmed.starts_with("+-")) trimmed.remove_prefix(1);
-  const char* last = trimmed.data() + trimmed.size();
-  const auto [end, error] = std::from_chars(trimmed.data(), last, number);
-  const std::string_view unit = without_blanks_around({end, last});
-  const auto wrong = [&] {
-    return fail_at(
-        flag, fmt::format("'{}' is no number with a unit", text),
-        fmt::format("write 30deg{0}, 0.5rad{0}, 20mm{0}, 2cm{0}, 0.02m{0}, or a number in SI units",
-                    per));
-  };
-  const bool read = error == std::errc();
-  if (error == std::errc::result_out_of_range || (read && !std::isfinite(number))) {
-    return fail_at(flag, fmt::format("'{}' is not finite", text), "give a finite number");
-  }
-  if (!read) return wrong();
-  question[key] = number;
-  if (unit.empty()) return {};
-  for (const Unit& known : {Unit{"deg", std::numbers::pi / 180.0, "angle"},
-                            {"rad", 1.0, "angle"},
-                            {"mm", 1e-3, "length"},
-                            {"cm", 1e-2, "length"},
-                            {"m", 1.0, "length"}}) {
-    if (unit != known.name + per) continue;
-    question[key] = number * known.si;
-    if (question.value("unit", known.kind) != known.kind) {
-      return fail_at(flag, fmt::format("'{}' is of another kind than the other values", text),
-                     "give angles or lengths, not both");
-    }
-    question["unit"] = known.kind;
-    return {};
-  }
-  return wrong();
-}
-
-/// Whether there is something to do.
-Status check_asked(const JointOptions& o) {
-  if (o.action == JointOptions::Action::kSet && o.mode.empty() && o.interaction.empty() &&
-      !o.stiffness_Nm_rad && !o.damping_Nms_rad) {
-    return fail("nothing is to be set", "give --mode, --interaction, --stiffness or --damping");
-  }
-  if (o.action == JointOptions::Action::kGains && !o.kp && !o.ki && !o.kd) {
-    return fail("nothing is to be set", "give --kp, --ki or --kd");
-  }
-  return {};
-}
-
-Result<Json> question_of(const JointOptions& o) {
-  if (Status asked = check_asked(o); !asked) return std::unexpected(asked.error());
-  Json question{{"do", "joint.list"}};
-  switch (o.action) {
-    case JointOptions::Action::kList:
-    case JointOptions::Action::kShow: return question;
-    case JointOptions::Action::kSet: question["do"] = "joint.set"; break;
-    case JointOptions::Action::kMove: question["do"] = "joint.move"; break;
-    case JointOptions::Action::kStop: question["do"] = "joint.stop"; break;
-    case JointOptions::Action::kHome: question["do"] = "joint.home"; break;
-    case JointOptions::Action::kRecover: question["do"] = "joint.recover"; break;
-    case JointOptions::Action::kReset: question["do"] = "joint.reset"; break;
-    case JointOptions::Action::kGains: question["do"] = "joint.gains"; break;
-  }
-  question["joint"] = o.joint;
-  if (o.shortest) question["shortest"] = true;
-  if (!o.mode.empty()) question["mode"] = o.mode;
-  if (!o.interaction.empty()) question["interaction"] = o.interaction;
-  if (o.stiffness_Nm_rad) question["stiffness_Nm_rad"] = *o.stiffness_Nm_rad;
-  if (o.damping_Nms_rad) question["damping_Nms_rad"] = *o.damping_Nms_rad;
-  if (!o.loop.empty()) question["loop"] = o.loop;
-  if (o.kp) question["kp"] = *o.kp;
-  if (o.ki) question["ki"] = *o.ki;
-  if (o.kd) question["kd"] = *o.kd;
-  if (o.anyway) question["anyway"] = true;
-  for (const auto& [key, flag, text, per] :
-       {std::tuple{"target_rad", "--to", &o.to, ""},
-        {"speed_rad_s", "--speed", &o.speed, "/s"},
-        {"acceleration_rad_s2", "--acceleration", &o.acceleration, "/s2"}}) {
-    if (Status added = add_quantity(question, key, flag, *text, per); !added) {
-      return std::unexpected(added.error());
-    }
-  }
-  return question;
-}
+std::string joint_of(const Asked& asked) { return asked.text("joint"); }
 
 /// Whether the target was written in degrees: it is shown in them, too.
-bool in_degrees(const JointOptions& options) { return options.to.find("deg") != std::string::npos; }
-
-/// @param answer  the joint after the stop, where the stop is `done`
-const char* outcome_of_stop(bool done, const Json& answer) {
-  if (!done) return "brakes then; a motion that has not begun is taken back";
-  return answer.value("moving", false) ? "brakes, and stays where it comes to rest" : "is at rest";
-}
-
-void print_answer(const JointOptions& options, const Json& answer, const Json& question) {
-  using Action = JointOptions::Action;
-  if (options.action == Action::kList) {
-    const Json& joints = answer["joints"];
-    options.gains    ? print_gains(joints)
-    : options.drives ? print_drives(joints)
-                     : print_joints(joints);
-    return;
-  }
-  if (options.action == Action::kShow) return print_joint(answer);
-  const bool done = answer.value("done", false) && options.action != Action::kReset;
-  if (done) fmt::print("done in cycle {}\n", answer.value("cycle", 0));
-  if (answer.contains("note")) fmt::print("{}\n", shown(answer.value("note", ""), 2'000));
-  switch (options.action) {
-    case Action::kList:
-    case Action::kShow: break;
-    case Action::kReset:
-      if (!answer.value("latched", false)) {
-        fmt::print(
-            "{}: its drive has no fault; what the run has latched stays until `tandem fault "
-            "reset`\n",
-            options.joint);
-      }
-      break;
-    case Action::kGains: print_gains(Json::array({answer})); break;
-    case Action::kMove:
-      fmt::print("{} {} from {} to {}: tandem joint list {}\n", options.joint,
-                 done ? "moves" : "will move",
-                 place_of(answer, answer["position_rad"], in_degrees(options)),
-                 place_of(answer, question["target_rad"], in_degrees(options)), options.joint);
-      break;
-    case Action::kStop: fmt::print("{} {}\n", options.joint, outcome_of_stop(done, answer)); break;
-    case Action::kHome:
-      fmt::print("{}: its drive {} for its place: tandem joint show {}\n", options.joint,
-                 done ? "looks" : "will look", options.joint);
-      break;
-    case Action::kRecover:
-      fmt::print("{} comes back from {} {} to its limit: tandem joint list {}\n", options.joint,
-                 number_of(answer, "position_rad"), unit_of(answer), options.joint);
-      break;
-    case Action::kSet: {
-      Facts facts;
-      facts.add("mode", mode_of(answer));
-      const std::string torque = torque_unit_of(answer), unit = unit_of(answer);
-      facts.add("stiffness", number_of(answer, "stiffness_Nm_rad") + " " + torque + "/" + unit);
-      facts.add("damping", number_of(answer, "damping_Nms_rad") + " " + torque + "s/" + unit);
-      facts.print(stdout);
-    }
-  }
+bool in_degrees(const Asked& asked) {
+  return asked.text("target_rad").find("deg") != std::string::npos;
 }
 
 /// The joint, and the cycle of what is said of it.
@@ -247,49 +90,49 @@ Result<Json> wait_for_homing(ControlClient& run, const std::string& name) {
 }
 
 /// The reference has arrived: what is measured may lag, or rest against something.
-void warn_if_far(const JointOptions& options, const Json& joint) {
+void warn_if_far(const Asked& asked, const Json& joint) {
   if (!joint["position_rad"].is_number()) return;
   const double off =
       std::abs(joint["position_rad"].get<double>() - joint["commanded_position_rad"].get<double>());
   if (off <= (slides(joint) ? kFar_m : kFar_rad)) return;
   print_warnings(
       {{.message = fmt::format("what is measured is {} off", place_of(joint, off, !slides(joint))),
-        .hint = "it lags, or something holds it: tandem joint show " + options.joint,
+        .hint = "it lags, or something holds it: tandem joint show " + joint_of(asked),
         .file = {},
-        .key = options.joint}});
+        .key = joint_of(asked)}});
 }
 
 /// What came of a motion that was waited for.
 /// @param begun  false: Ctrl-C ended the waiting before the loop took the request
-Exit tell_motion(const JointOptions& options, const Json& joint, double target, bool begun) {
-  const bool degrees = in_degrees(options);
+Exit tell_end_of_motion(const Asked& asked, const Json& joint, double target, bool begun) {
+  const bool degrees = in_degrees(asked);
   const std::string at = place_of(joint, joint["commanded_position_rad"], degrees) + ", measured " +
                          place_of(joint, joint["position_rad"], degrees);
   if (joint.value("arrived", false)) {
-    if (options.json != "-") fmt::print("{} has arrived: {}\n", options.joint, at);
+    if (asked.prints()) fmt::print("{} has arrived: {}\n", joint_of(asked), at);
     std::fflush(stdout);  // before the warning
-    warn_if_far(options, joint);
+    warn_if_far(asked, joint);
     return Exit::kDone;
   }
   if (joint.value("moving", false)) {  // Ctrl-C
-    fmt::print(stderr, "{0} still moves to {1}: `tandem joint stop {0}` brakes it\n", options.joint,
-               place_of(joint, target, degrees));
+    fmt::print(stderr, "{0} still moves to {1}: `tandem joint stop {0}` brakes it\n",
+               joint_of(asked), place_of(joint, target, degrees));
     return Exit::kFault;
   }
   if (!begun) {
     fmt::print(stderr,
                "{0} has not begun to move to {1}: it begins when the run goes on (tandem clock "
                "resume); `tandem joint stop {0}` takes the motion back\n",
-               options.joint, place_of(joint, target, degrees));
+               joint_of(asked), place_of(joint, target, degrees));
     return Exit::kFault;
   }
   const std::string owner = joint.value("controller", "");
   const bool enabled = joint.value("drive_state", "") == "operation enabled";
   Error error{.message = fmt::format("its motion to {} has ended at {}",
                                      place_of(joint, target, degrees), at),
-              .hint = "it was stopped, or sent elsewhere: tandem joint show " + options.joint,
+              .hint = "it was stopped, or sent elsewhere: tandem joint show " + joint_of(asked),
               .file = {},
-              .key = options.joint};
+              .key = joint_of(asked)};
   if (!owner.empty()) error.hint = fmt::format("the controller '{}' has it now", owner);
   if (!enabled) error.hint = "its drive is not enabled any more: tandem fault show";
   print_errors({error});
@@ -297,39 +140,39 @@ Exit tell_motion(const JointOptions& options, const Json& joint, double target, 
 }
 
 /// What came of the reset of a drive.
-Exit tell_reset(const JointOptions& options, const Json& joint) {
+Exit tell_end_of_reset(const Asked& asked, const Json& joint) {
   if (const std::string fault = joint.value("fault_text", ""); !fault.empty()) {
     print_errors({{.message = fmt::format("the reset failed, its cause is still there: {}", fault),
                    .hint = "remove the cause, then `tandem joint reset " +
-                           shell_word(options.joint) + "` again",
+                           shell_word(joint_of(asked)) + "` again",
                    .file = {},
-                   .key = options.joint}});
+                   .key = joint_of(asked)}});
     return Exit::kFault;
   }
-  if (options.json == "-") return Exit::kDone;
+  if (!asked.prints()) return Exit::kDone;
   if (joint.value("drive_state", "") == "operation enabled") {
-    fmt::print("{}: its fault is cleared, and it is held where it is\n", options.joint);
+    fmt::print("{}: its fault is cleared, and it is held where it is\n", joint_of(asked));
   } else {
     fmt::print(
         "{}: its fault is cleared, its drive stays disabled: `tandem fault reset` enables every "
         "joint where it is\n",
-        options.joint);
+        joint_of(asked));
   }
   return Exit::kDone;
 }
 
 /// What came of a homing.
-Exit tell_homing(const JointOptions& options, const Json& joint) {
+Exit tell_end_of_homing(const Asked& asked, const Json& joint) {
   const std::string state = joint.value("homing", "");
   if (state == "homed") {
-    if (options.json == "-") return Exit::kDone;
-    fmt::print("{} is homed: it is at {}\n", options.joint,
+    if (!asked.prints()) return Exit::kDone;
+    fmt::print("{} is homed: it is at {}\n", joint_of(asked),
                place_of(joint, joint["position_rad"], !slides(joint)));
     return Exit::kDone;
   }
   if (state == "under way") {  // Ctrl-C
     fmt::print(stderr, "{0} is still being homed: `tandem joint stop {0}` ends that\n",
-               options.joint);
+               joint_of(asked));
     return Exit::kFault;
   }
   const Json method = joint.value("homing_method", Json());
@@ -338,75 +181,153 @@ Exit tell_homing(const JointOptions& options, const Json& joint) {
   const std::string advice = joint.value("homing_advice", "");
   print_errors({{.message = "the homing " + which + "failed: " + joint.value("homing_error", ""),
                  .hint = (advice.empty() ? "" : advice + "; ") + "tandem joint home " +
-                         options.joint + " tries again",
+                         joint_of(asked) + " tries again",
                  .file = {},
-                 .key = options.joint}});
+                 .key = joint_of(asked)}});
   return Exit::kFault;
 }
 
-/// list and show: those joints that are named.
-Exit show(const JointOptions& options, Json answer) {
-  const bool one = options.action == JointOptions::Action::kShow;
-  const std::vector<std::string> names = one ? std::vector{options.joint} : options.joints;
-  const Json followers = answer.value("followers", Json::object());
-  for (const std::string& name : names) {
-    if (!followers.contains(name)) continue;
-    const auto leader = followers[name].get<std::string>();
-    return refuse(Error{"the joint '" + name + "' follows '" + leader + "' (mimic)",
-                        "name '" + leader + "'",
-                        {},
-                        0,
-                        {}});
+/// Takes what the joint is now into the answer; the cycle of the request stays.
+void take(Asked& asked, const Json& joint) {
+  for (const auto& [key, value] : joint.items()) {
+    if (key != "cycle") asked.answer[key] = value;
   }
-  const Result<Json> some = named(answer["joints"], "joint", names);
-  if (!some) return refuse(some.error());
-  answer["joints"] = *some;
-  if (one) answer = some->front();
-  if (options.json != "-") print_answer(options, answer, {});
-  if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
-  return Exit::kDone;
+}
+
+/// Nobody knows what came of it.
+Exit not_known(const Error& error) {
+  print_errors({error});
+  return Exit::kFault;
+}
+
+/// Prints what every answer of a change has. @return whether more is to be printed
+bool begin_to_tell(const Asked& asked) {
+  if (asked.prints()) tell_done(asked.answer);
+  return asked.prints();
 }
 
 }  // namespace
 
-Exit joint_command(const JointOptions& options) {
-  using Action = JointOptions::Action;
-  Result<Json> question = question_of(options);
-  if (!question) return refuse(question.error());
-  const auto run = ControlClient::open(options.target, "run");
-  if (!run) return refuse(run.error());
-  const bool moves = options.action == Action::kMove && options.wait;
-  const bool homes = options.action == Action::kHome;
-  if (moves || homes) rt::install_stop_signals();
-  const Result<Json> asked = (*run)->ask(*question);
-  if (!asked) return refuse(asked.error());
-  Json answer = *asked;
-  if (answer.contains("target_rad")) (*question)["target_rad"] = answer["target_rad"];
-  if (answer.contains("joints")) return show(options, answer);
-  if (options.json != "-") print_answer(options, answer, *question);
-  Exit exit = Exit::kDone;
-  const bool resets = options.action == Action::kReset && answer.value("latched", false) &&
-                      answer.value("done", false);
-  bool begun = answer.value("done", false);
-  if (moves || resets || (homes && begun)) {
-    std::fflush(stdout);  // before the waiting
-    const Result<Json> joint =
-        moves   ? wait_for_motion(**run, options.joint, (*question)["target_rad"], begun)
-        : homes ? wait_for_homing(**run, options.joint)
-                : wait_for_reset(**run, options.joint);
-    if (!joint) {
-      print_errors({joint.error()});
-      return Exit::kFault;
-    }
-    for (const auto& [key, value] : joint->items()) {
-      if (key != "cycle") answer[key] = value;  // that of the request stays
-    }
-    exit = moves   ? tell_motion(options, *joint, (*question)["target_rad"], begun)
-           : homes ? tell_homing(options, *joint)
-                   : tell_reset(options, *joint);
+Status ask_for_list(const AskedOptions& options, Json&) {
+  if (!options.given.contains("drives") || !options.given.contains("gains")) return {};
+  return fail("--drives excludes --gains", "leave one out");
+}
+
+/// Its waiting ends with Ctrl-C.
+Status ask_for_motion(const AskedOptions& options, Json&) {
+  if (options.given.contains("wait") || options.row->name == "joint.home") {
+    rt::install_stop_signals();
   }
-  if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
-  return exit;
+  return {};
+}
+
+/// list and show: those joints that are named.
+Result<Exit> tell_joints(Asked& asked) {
+  const bool one = asked.options.given.contains("joint");
+  const std::vector<std::string> names = one ? std::vector{joint_of(asked)} : asked.texts("joints");
+  const Json followers = asked.answer.value("followers", Json::object());
+  for (const std::string& name : names) {
+    if (!followers.contains(name)) continue;
+    const auto leader = followers[name].get<std::string>();
+    return fail("the joint '" + name + "' follows '" + leader + "' (mimic)",
+                "name '" + leader + "'");
+  }
+  const Result<Json> some = named(asked.answer["joints"], "joint", names);
+  if (!some) return std::unexpected(some.error());
+  if (one) {
+    asked.answer = some->front();
+  } else {
+    asked.answer["joints"] = *some;
+  }
+  if (!asked.prints()) return Exit::kDone;
+  one                   ? print_joint(asked.answer)
+  : asked.has("gains")  ? print_gains(*some)
+  : asked.has("drives") ? print_drives(*some)
+                        : print_joints(*some);
+  return Exit::kDone;
+}
+
+void print_joint_set(const Json& joint) {
+  tell_done(joint);
+  Facts facts;
+  facts.add("mode", mode_of(joint));
+  const std::string torque = torque_unit_of(joint), unit = unit_of(joint);
+  facts.add("stiffness", number_of(joint, "stiffness_Nm_rad") + " " + torque + "/" + unit);
+  facts.add("damping", number_of(joint, "damping_Nms_rad") + " " + torque + "s/" + unit);
+  facts.print(stdout);
+}
+
+void print_joint_gains(const Json& joint) {
+  tell_done(joint);
+  print_gains(Json::array({joint}));
+}
+
+void print_joint_stop(const Json& joint) {
+  tell_done(joint);
+  const char* outcome = !joint.value("done", false)
+                            ? "brakes then; a motion that has not begun is taken back"
+                        : joint.value("moving", false) ? "brakes, and stays where it comes to rest"
+                                                       : "is at rest";
+  fmt::print("{} {}\n", joint.value("joint", ""), outcome);
+}
+
+void print_recovery(const Json& joint) {
+  tell_done(joint);
+  fmt::print("{0} comes back from {1} {2} to its limit: tandem joint list {0}\n",
+             joint.value("joint", ""), number_of(joint, "position_rad"), unit_of(joint));
+}
+
+Result<Exit> tell_motion(Asked& asked) {
+  bool begun = asked.answer.value("done", false);
+  const Json target = asked.answer.value("target_rad", asked.question["target_rad"]);
+  if (begin_to_tell(asked)) {
+    const bool degrees = in_degrees(asked);
+    fmt::print("{} {} from {} to {}: tandem joint list {}\n", joint_of(asked),
+               begun ? "moves" : "will move",
+               place_of(asked.answer, asked.answer["position_rad"], degrees),
+               place_of(asked.answer, target, degrees), joint_of(asked));
+  }
+  if (!asked.has("wait")) return Exit::kDone;
+  std::fflush(stdout);  // before the waiting
+  const Result<Json> joint = wait_for_motion(asked.run, joint_of(asked), target, begun);
+  if (!joint) return not_known(joint.error());
+  take(asked, *joint);
+  return tell_end_of_motion(asked, *joint, target, begun);
+}
+
+Result<Exit> tell_homing(Asked& asked) {
+  const bool done = asked.answer.value("done", false);
+  if (begin_to_tell(asked)) {
+    fmt::print("{}: its drive {} for its place: tandem joint show {}\n", joint_of(asked),
+               done ? "looks" : "will look", joint_of(asked));
+  }
+  if (!done) return Exit::kDone;
+  std::fflush(stdout);  // before the waiting
+  const Result<Json> joint = wait_for_homing(asked.run, joint_of(asked));
+  if (!joint) return not_known(joint.error());
+  take(asked, *joint);
+  return tell_end_of_homing(asked, *joint);
+}
+
+Result<Exit> tell_joint_reset(Asked& asked) {
+  const bool latched = asked.answer.value("latched", false);
+  if (asked.prints()) {
+    if (asked.answer.contains("note")) {
+      fmt::print("{}\n", shown(asked.answer.value("note", ""), 2'000));
+    }
+    if (!latched) {
+      fmt::print(
+          "{}: its drive has no fault; what the run has latched stays until `tandem fault "
+          "reset`\n",
+          joint_of(asked));
+    }
+  }
+  if (!latched || !asked.answer.value("done", false)) return Exit::kDone;
+  std::fflush(stdout);  // before the waiting
+  const Result<Json> joint = wait_for_reset(asked.run, joint_of(asked));
+  if (!joint) return not_known(joint.error());
+  take(asked, *joint);
+  return tell_end_of_reset(asked, *joint);
 }
 
 }  // namespace tandem::apps

@@ -6,8 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "apps/clients/commands.hpp"
-#include "apps/clients/control_client.hpp"
+#include "apps/clients/asked.hpp"
 #include "apps/text/console.hpp"
 
 namespace tandem::apps {
@@ -86,18 +85,9 @@ void print_prediction(const Json& answer) {
 
 }  // namespace
 
-Exit predict_command(const PredictOptions& options) {
-  if (!std::isfinite(options.horizon_s)) {
-    return refuse(Error{"--horizon is no number of seconds", "from one cycle to 10 s", {}, 0, {}});
-  }
-  const auto run = ControlClient::open(options.target, "run");
-  if (!run) return refuse(run.error());
-  Json question{{"do", "predict"}, {"horizon_s", options.horizon_s}};
-  if (options.every_cycles > 0) question["every_cycles"] = options.every_cycles;
-  const Result<Json> answer = (*run)->ask(question);
-  if (!answer) return refuse(answer.error());
-  if (options.json != "-") print_prediction(*answer);
-  for (const Json& name : answer->value("unarchived_controllers", Json::array())) {
+Result<Exit> tell_prediction(Asked& asked) {
+  if (asked.prints()) print_prediction(asked.answer);
+  for (const Json& name : asked.answer.value("unarchived_controllers", Json::array())) {
     print_warnings({{.message = fmt::format("the controller '{}' has no archive(): its copy began "
                                             "anew, and what it would do may be something else",
                                             name.get<std::string>()),
@@ -105,7 +95,6 @@ Exit predict_command(const PredictOptions& options) {
                      .file = {},
                      .key = {}}});
   }
-  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
   return Exit::kDone;
 }
 

@@ -5,8 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/clients/commands.hpp"
-#include "apps/clients/control_client.hpp"
+#include "apps/clients/asked.hpp"
 #include "apps/clients/named.hpp"
 #include "apps/text/console.hpp"
 
@@ -53,14 +52,11 @@ void print_sensors(const Json& sensors) {
 
 }  // namespace
 
-Exit sensor_command(const SensorOptions& options) {
-  Result<Json> answer = ask(options.target, "run", {{"do", "sensor.list"}});
-  if (!answer) return refuse(answer.error());
-  const Result<Json> some = named((*answer)["sensors"], "sensor", options.sensors);
-  if (!some) return refuse(some.error());
-  (*answer)["sensors"] = *some;
-  if (options.json != "-") print_sensors(*some);
-  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
+Result<Exit> tell_sensors(Asked& asked) {
+  const Result<Json> some = named(asked.answer["sensors"], "sensor", asked.texts("sensors"));
+  if (!some) return std::unexpected(some.error());
+  asked.answer["sensors"] = *some;
+  if (asked.prints()) print_sensors(*some);
   return Exit::kDone;
 }
 

@@ -29,40 +29,6 @@ const char kRunExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --trace squat.json    open it on https://ui.perfetto.dev
 The same experiment and seed give the same bytes at every rate.)";
 
-const char kFaultExamples[] = R"(Examples:
-  tandem fault show                                  what has been latched, and what was cleared
-  tandem fault reset                                 clears and holds; exit status 1: it failed
-  tandem controller start                            then starts the controllers again
-  tandem fault show --dds --namespace left           of the run with this [dds] namespace
-Without --socket or --dds it is the only `tandem run` of this user.)";
-
-const char kEstopExamples[] = R"(Examples:
-  tandem estop                                       every run of this user on this machine, with
-                                                     the category of robot.toml's [safety]
-  tandem estop --socket /tmp/run.sock                this one alone
-  tandem estop --category 0                          take the torque away at once
-  tandem estop --category 2                          a safe posture first, where a controller has one
-Exit status: 0 each loop has carried it out (or simulated time is paused, and it is next); 1 a stop
-is not confirmed, or there is no run. Over DDS what confirms is a run of this user on this machine,
-or whoever DDS Security has authenticated. `kill -USR1 PID` asks for the same without a socket, and gets
-no answer.)";
-
-const char kPredictExamples[] = R"(Examples:
-  tandem predict                                     one second ahead, of the run that goes on
-  tandem predict --horizon 0.2 --json -              every row, for programs
-  tandem predict --horizon 5 --every 50              a row every 50 cycles
-A simulated robot is predicted by a copy of it, a real one by the robot of [parallel]:
-docs/internal-model.md)";
-const char kClockExamples[] = R"(Examples:
-  tandem clock show                                  time, paused or not, rate, measured speed
-  tandem clock pause
-  tandem clock step 10                               ten cycles, then paused again
-  tandem clock rate 0.1                              ten times slower than real time
-  tandem clock rate 0                                as fast as possible
-  tandem clock resume
-The results are the same bits. Only simulated time can be paused; on a robot it is refused.
-Without --socket or --dds it is the only `tandem run` of this user.)";
-
 const char kAskExamples[] = R"(Examples:
   tandem ask '{"do": "help"}'                        what the running process can be asked
   tandem ask '{"do": "status"}' --socket /tmp/run.sock
@@ -129,14 +95,6 @@ const char kNoBuildHelp[] = "Refuse when the robot's kernels are missing, instea
 const char kInterfaceHelp[] = "Another interface than robot.toml's: can0=vcan0; may be repeated";
 
 const char kScenarioHelp[] = "Faults to inject: TOML (docs/configuration.md, scenario.toml)";
-
-const char kInjectExamples[] = R"(Examples:
-  tandem inject kind=board_kill board=left_leg_1 for_s=0.5
-  tandem inject kind=encoder_jump joint=LKneeSag rad=0.05
-  tandem inject kind=frame_drop board=left_arm_1 direction=to_master probability=0.01
-  tandem inject 'kind = "bus_down"
-                 bus = "left_leg"'
-Every kind and key: docs/configuration.md, scenario.toml. Reactions: docs/faults.md.)";
 
 const char kEmulateExamples[] = R"(Examples:
   tandem emulate config/coman/squat.toml --lockstep        in one terminal, and in another
@@ -303,71 +261,10 @@ void add_flags(CLI::App& app, ServeOptions& o) {
   app.footer(kServeExamples);
 }
 
-void add_flags(CLI::App& app, FaultOptions& o) {
-  app.require_subcommand(1);
-  app.footer(kFaultExamples);  // its subcommands', too
-  CLI::App* show = app.add_subcommand("show", "Every fault of the run: latched, or cleared when");
-  CLI::App* reset = app.add_subcommand("reset", "Clear latched faults and hold every joint");
-  for (CLI::App* one : {show, reset}) {
-    add_target(*one, o.target);
-    one->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
-  }
-  show->callback([&o] { o.action = FaultOptions::Action::kShow; });
-  reset->callback([&o] { o.action = FaultOptions::Action::kReset; });
-}
-
-void add_flags(CLI::App& app, EstopOptions& o) {
-  app.add_option("--category", o.category, "0, 1 or 2, instead of the robot's [safety]")
-      ->check(CLI::IsMember({0, 1, 2}));
-  add_target(app, o.target);
-  app.add_flag("--trust-domain", o.trust_domain,
-               "Believe whoever answers in the DDS domain, where nobody but robots is")
-      ->needs("--dds");
-  app.footer(kEstopExamples);
-}
-
-void add_flags(CLI::App& app, PredictOptions& o) {
-  app.add_option("--horizon", o.horizon_s, "Seconds ahead, from one cycle to 10 (default: 1)");
-  app.add_option("--every", o.every_cycles, "Cycles between two rows (default: about 100 rows)")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000}));
-  add_target(app, o.target);
-  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
-  app.footer(kPredictExamples);
-}
-
-void add_flags(CLI::App& app, ClockOptions& o) {
-  using Action = ClockOptions::Action;
-  app.require_subcommand(1);
-  app.footer(kClockExamples);  // its subcommands', too
-  const auto add = [&](const char* name, const char* doc, Action action) {
-    CLI::App* one = app.add_subcommand(name, doc);
-    add_target(*one, o.target);
-    one->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
-    one->callback([&o, action] { o.action = action; });
-    return one;
-  };
-  add("show", "Time, paused or not, rate, measured speed", Action::kShow);
-  add("pause", "Pause after the current cycle", Action::kPause);
-  add("resume", "Continue at the rate", Action::kResume);
-  add("step", "While paused: run so many cycles, then pause again", Action::kStep)
-      ->add_option("cycles", o.cycles, "Cycles (default: 1)")
-      ->check(CLI::Range(std::uint64_t{1}, rt::kMostSteps));
-  add("rate", "Simulated seconds per wall second", Action::kRate)
-      ->add_option("rate", o.rate, "0.01 to 1000; 0: as fast as possible")
-      ->required()
-      ->check(is_rate());
-}
-
 void add_flags(CLI::App& app, AskOptions& o) {
   app.add_option("question", o.question, "JSON object, \"do\" names the command")->required();
   add_target(app, o.target);
   app.footer(kAskExamples);
-}
-
-void add_flags(CLI::App& app, InjectOptions& o) {
-  app.add_option("fault", o.fault, "key=value words, or TOML")->required();
-  add_target(app, o.target);
-  app.footer(kInjectExamples);
 }
 
 void add_flags(CLI::App& app, EmulateOptions& o) {

@@ -34,15 +34,7 @@ CLI::Option* add_place(CLI::App& app, DdsPlace& place, CLI::Option* dds = nullpt
 /// has to outlive the parsing.
 void add_flags(CLI::App& app, RunOptions& o);
 void add_flags(CLI::App& app, ServeOptions& o);
-void add_flags(CLI::App& app, FaultOptions& o);
-void add_flags(CLI::App& app, EstopOptions& o);
-void add_flags(CLI::App& app, ClockOptions& o);
-void add_flags(CLI::App& app, PredictOptions& o);
 void add_flags(CLI::App& app, AskOptions& o);
-void add_flags(CLI::App& app, InjectOptions& o);
-void add_flags(CLI::App& app, ControllerOptions& o);
-void add_flags(CLI::App& app, JointOptions& o);
-void add_flags(CLI::App& app, SensorOptions& o);
 void add_flags(CLI::App& app, EmulateOptions& o);
 void add_flags(CLI::App& app, CheckOptions& o);
 void add_flags(CLI::App& app, ModelOptions& o);
@@ -56,5 +48,9 @@ void add_flags(CLI::App& app, LatencyOptions& o);
 void add_flags(CLI::App& app, BenchOptions& o);
 void add_flags(CLI::App& app, DoctorOptions& o);
 void add_flags(CLI::App& app, TopicOptions& o);
+
+/// The commands to a running process: those of command_rows(), in their groups. `o` gets the one
+/// that was named.
+void add_asked(CLI::App& app, AskedOptions& o);
 
 }  // namespace tandem::apps

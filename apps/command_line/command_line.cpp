@@ -154,6 +154,15 @@ class Subcommands {
       return *options;
     });
   }
+  /// Every command to a running process.
+  void add_asked() {
+    const auto options = std::make_shared<AskedOptions>();
+    apps::add_asked(app_, *options);
+    choices_.push_back([options]() -> std::optional<Command> {
+      if (options->row == nullptr) return std::nullopt;
+      return *options;
+    });
+  }
   [[nodiscard]] Command chosen() const {
     for (const auto& choice : choices_) {
       if (auto command = choice()) return std::move(*command);
@@ -179,18 +188,8 @@ void add_all(Subcommands& commands) {
   commands.add<ModelOptions>("model", "A robot's generated kernels: build, info");
   commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
   commands.add<EdsOptions>("eds", "Data sheets (EDS): write those of a robot's nodes, show one");
-  commands.add<FaultOptions>("fault", "Faults of a running run: show, reset");
-  commands.add<EstopOptions>("estop", "Emergency stop of every run of this user");
-  commands.add<ControllerOptions>(
-      "controller", "Controllers of a running run: list, load, unload, start, stop, switch");
-  commands.add<JointOptions>(
-      "joint", "Joints of a running run: list, show, move, home, stop, set, gains, reset, recover");
-  commands.add<SensorOptions>("sensor", "Sensors of a running run: list");
-  commands.add<ClockOptions>("clock", "Simulated time of a run: show, pause, resume, step, rate");
-  commands.add<PredictOptions>("predict", "What a running robot will do: runs its model ahead");
+  commands.add_asked();
   commands.add<TopicOptions>("topic", "Topics of ROS 2 and DDS: list, echo, hz");
-  commands.add<InjectOptions>("inject",
-                              "Inject a fault into a running emulated or simulated robot");
   commands.add<AskOptions>("ask", "Ask a running process, in JSON");
   commands.add<DoctorOptions>("doctor", "Is this machine fit for real time?");
   commands.add<BenchOptions>("bench", "Measure this build: engines");

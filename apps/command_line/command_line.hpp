@@ -10,6 +10,7 @@
 
 #include "apps/command_line/control_target.hpp"
 #include "apps/command_line/dds_place.hpp"
+#include "apps/control/command_rows.hpp"
 #include "apps/text/console.hpp"
 
 namespace tandem::apps {
@@ -50,102 +51,18 @@ struct ServeOptions {
   RunOptions run;  ///< with what fits to it
 };
 
-/// tandem fault show|reset
-struct FaultOptions {
-  enum class Action : std::uint8_t { kShow, kReset } action = Action::kShow;
+/// A command to a running process, `tandem joint move …`: one of command_rows().
+struct AskedOptions {
+  const CommandRow* row = nullptr;
+  /// By the keys of the row: what stood on the line; a number with a unit as it was written.
+  Json given = Json::object();
   ControlTarget target{};
   std::string json{};
-};
-
-/// tandem estop
-struct EstopOptions {
-  std::optional<int> category;  ///< 0, 1, 2; empty: the robot's
-  ControlTarget target;
-  bool trust_domain = false;  ///< over DDS whoever answers is believed
-};
-
-/// tandem controller list|load|unload|start|stop|switch
-struct ControllerOptions {
-  enum class Action : std::uint8_t {
-    kList,
-    kLoad,
-    kUnload,
-    kStart,
-    kSwitch
-  } action = Action::kList;
-  std::string plugin;              ///< load: name or path
-  std::string name;                ///< load, unload; empty: the plugin's
-  std::string parameters;          ///< load: TOML file; empty: none
-  std::vector<std::string> set;    ///< load: lines of TOML, after those of the file
-  std::vector<std::string> start;  ///< start, switch; load --start
-  std::vector<std::string> stop;   ///< stop, switch
-  bool start_it = false;           ///< load: start it, too
-  ControlTarget target;
-  std::string json;
-};
-
-/// tandem joint list|show|set|move|stop|recover|reset|gains
-struct JointOptions {
-  enum class Action : std::uint8_t {
-    kList,
-    kShow,
-    kSet,
-    kMove,
-    kStop,
-    kHome,
-    kRecover,
-    kReset,
-    kGains
-  } action = Action::kList;
-  std::vector<std::string> joints{};          ///< list: only these; empty: all
-  bool gains = false;                         ///< list: the gains instead of what is measured
-  bool anyway = false;                        ///< gains: also unstable ones
-  bool drives = false;                        ///< list: motors and drives instead of joints
-  std::string joint{};                        ///< all but list
-  std::string to{}, speed{}, acceleration{};  ///< move: with or without a unit; empty: default
-  bool shortest = false;                      ///< move: by whole turns to the nearest angle
-  bool wait = false;                          ///< move: until it has ended
-  std::string mode{}, interaction{};          ///< empty: as it is
-  std::optional<double> stiffness_Nm_rad{}, damping_Nms_rad{};
-  std::string loop{};
-  std::optional<double> kp{}, ki{}, kd{};
-  ControlTarget target{};
-  std::string json{};
-};
-
-/// tandem sensor list
-struct SensorOptions {
-  std::vector<std::string> sensors{};  ///< only these; empty: all
-  ControlTarget target{};
-  std::string json{};
-};
-
-/// tandem clock show|pause|resume|step|rate
-struct ClockOptions {
-  enum class Action : std::uint8_t { kShow, kPause, kResume, kStep, kRate } action = Action::kShow;
-  std::uint64_t cycles = 1;  ///< step
-  double rate = 0.0;         ///< rate; 0: as fast as it goes
-  ControlTarget target;
-  std::string json;
-};
-
-/// tandem predict
-struct PredictOptions {
-  double horizon_s = 1.0;
-  std::uint64_t every_cycles = 0;  ///< between two rows; 0: about 100 rows
-  ControlTarget target;
-  std::string json;
 };
 
 /// tandem ask QUESTION
 struct AskOptions {
   std::string question;  ///< JSON
-  ControlTarget target;
-};
-
-/// tandem inject FAULT
-struct InjectOptions {
-  std::vector<std::string> fault;  ///< key=value words, or TOML
   ControlTarget target;
 };
 
@@ -321,12 +238,10 @@ struct TopicOptions {
 
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
 // clang-format off: one a line, so that additions meet without conflict
-using Command =
-    std::variant<Exit, RunOptions, ServeOptions, AskOptions, FaultOptions, EstopOptions,
-                 ClockOptions, ControllerOptions, JointOptions, InjectOptions, CheckOptions,
-                 ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, IdentifyOptions,
-                 ExciteOptions, LatencyOptions, DoctorOptions, EmulateOptions, TopicOptions,
-                 SensorOptions, BenchOptions, PredictOptions>;
+using Command = std::variant<Exit, RunOptions, ServeOptions, AskOptions, AskedOptions, CheckOptions,
+                             ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions,
+                             IdentifyOptions, ExciteOptions, LatencyOptions, DoctorOptions,
+                             EmulateOptions, TopicOptions, BenchOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

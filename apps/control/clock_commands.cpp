@@ -55,9 +55,7 @@ Result<Json> pause(runtime::RobotCycle& cycle) {
 }
 
 Result<Json> step(runtime::RobotCycle& cycle, const Json& request) {
-  const auto cycles = request["cycles"].get<std::int64_t>();
-  const auto positive = static_cast<std::uint64_t>(std::max<std::int64_t>(cycles, 0));
-  return answer(cycle, cycle.inbox().clock().step(positive));
+  return answer(cycle, cycle.inbox().clock().step(request.value("cycles", std::uint64_t{1})));
 }
 
 }  // namespace
@@ -67,30 +65,15 @@ bool time_stands(const runtime::RobotCycle& cycle) {
 }
 
 void add_clock_commands(ControlRegistry& registry, runtime::RobotCycle& cycle) {
-  registry.add("clock.show", ControlEffect::kReads, "where the clock stands, and how fast it is",
-               {}, [&cycle](const Json&) -> Result<Json> { return look(cycle); });
-  registry.add("clock.pause", ControlEffect::kChanges,
-               "simulated time stands after the cycle at work", {},
-               [&cycle](const Json&) { return pause(cycle); });
-  registry.add("clock.resume", ControlEffect::kChanges, "simulated time continues at its rate", {},
+  registry.add("clock.show", [&cycle](const Json&) -> Result<Json> { return look(cycle); });
+  registry.add("clock.pause", [&cycle](const Json&) { return pause(cycle); });
+  registry.add("clock.resume",
                [&cycle](const Json&) { return answer(cycle, cycle.inbox().clock().resume()); });
-  registry.add("clock.step", ControlEffect::kChanges,
-               "while paused: so many cycles, then it stands again",
-               {{.name = "cycles",
-                 .type = ControlKey::Type::kInteger,
-                 .required = true,
-                 .doc = "1 to 1000000000"}},
-               [&cycle](const Json& request) { return step(cycle, request); });
-  registry.add("clock.rate", ControlEffect::kChanges,
-               "simulated seconds per wall second, from the next cycle on",
-               {{.name = "rate",
-                 .type = ControlKey::Type::kNumber,
-                 .required = true,
-                 .doc = "0.01 to 1000; 0: as fast as possible"}},
-               [&cycle](const Json& request) {
-                 const auto rate = request["rate"].get<double>();
-                 return answer(cycle, cycle.inbox().clock().set_rate(rate));
-               });
+  registry.add("clock.step", [&cycle](const Json& request) { return step(cycle, request); });
+  registry.add("clock.rate", [&cycle](const Json& request) {
+    const auto rate = request["rate"].get<double>();
+    return answer(cycle, cycle.inbox().clock().set_rate(rate));
+  });
 }
 
 }  // namespace tandem::apps

@@ -12,34 +12,6 @@
 namespace tandem::apps {
 namespace {
 
-const char* to_string(ControlKey::Type type) {
-  switch (type) {
-    case ControlKey::Type::kText: return "text";
-    case ControlKey::Type::kInteger: return "integer";
-    case ControlKey::Type::kNumber: return "number";
-    case ControlKey::Type::kBoolean: return "true or false";
-    case ControlKey::Type::kObject: return "object";
-    case ControlKey::Type::kTexts: return "list of texts";
-    case ControlKey::Type::kTextOrObject: return "text or object";
-  }
-  return "?";
-}
-
-bool is_of(const Json& value, ControlKey::Type type) {
-  switch (type) {
-    case ControlKey::Type::kText: return value.is_string();
-    case ControlKey::Type::kInteger: return value.is_number_integer();
-    case ControlKey::Type::kNumber: return value.is_number();
-    case ControlKey::Type::kBoolean: return value.is_boolean();
-    case ControlKey::Type::kObject: return value.is_object();
-    case ControlKey::Type::kTexts:
-      return value.is_array() &&
-             std::ranges::all_of(value, [](const Json& one) { return one.is_string(); });
-    case ControlKey::Type::kTextOrObject: return value.is_string() || value.is_object();
-  }
-  return false;
-}
-
 Result<Json> parse(std::string_view text, bool known) {
   if (text.size() > kMaxQuestion) {
     return fail(fmt::format("a question of more than {} bytes", kMaxQuestion), "ask shorter ones");
@@ -61,24 +33,25 @@ std::string shown(const std::string& word) {
 Status check_keys(const Json& request, const std::string& command,
                   const std::vector<ControlKey>& keys, bool known_asker) {
   std::vector<std::string> names;
-  for (const ControlKey& key : keys) names.push_back(key.name);
+  for (const ControlKey& key : keys) {
+    if (key.sent) names.push_back(key.name);
+  }
   for (const auto& [name, value] : request.items()) {
     if (name == "do") continue;
     const auto known = std::ranges::find(keys, name, &ControlKey::name);
-    if (known == keys.end()) {
+    if (known == keys.end() || !known->sent) {
       return fail(fmt::format("{}: unknown key \"{}\"", command, shown(name)),
                   names.empty() ? "it takes none"
                   : known_asker ? suggest(name, names)
                                 : R"({"do": "help"} lists them)");
     }
-    if (!is_of(value, known->type)) {
-      return fail(
-          fmt::format("{}: \"{}\" is not of type {}", command, name, to_string(known->type)),
-          known->doc);
+    if (Status fits = check_value(*known, value); !fits) {
+      return fail(fmt::format("{}: \"{}\" {}", command, name, fits.error().message),
+                  fits.error().hint);
     }
   }
   for (const ControlKey& key : keys) {
-    if (key.required && !request.contains(key.name)) {
+    if (key.required && key.sent && !request.contains(key.name)) {
       return fail(fmt::format("{}: \"{}\" is missing", command, key.name), key.doc);
     }
   }
@@ -87,43 +60,25 @@ Status check_keys(const Json& request, const std::string& command,
 
 }  // namespace
 
-const char* to_string(ControlEffect effect) {
-  switch (effect) {
-    case ControlEffect::kReads: return "reads";
-    case ControlEffect::kChanges: return "changes";
-    case ControlEffect::kEnds: return "ends";
-    case ControlEffect::kStops: return "stops";
-  }
-  return "?";
-}
-
 ControlRegistry::ControlRegistry() {
-  add("help", ControlEffect::kReads, "lists the commands", {},
-      [this](const Json&) { return help(); });
+  add("help", [this](const Json&) { return help(); });
 }
 
-void ControlRegistry::add(std::string name, ControlEffect effect, std::string doc,
-                          std::vector<ControlKey> keys, Handler handler) {
-  add(std::move(name), effect, std::move(doc), std::move(keys),
+void ControlRegistry::add(CommandRow row, Handler handler) {
+  add(std::move(row),
       AskedHandler([handler = std::move(handler)](const Json& request, std::uint64_t) {
         return handler(request);
       }));
 }
 
-void ControlRegistry::add(std::string name, ControlEffect effect, std::string doc,
-                          std::vector<ControlKey> keys, AskedHandler handler) {
-  commands_.push_back(
-      {std::move(name), effect, std::move(doc), std::move(keys), std::move(handler)});
+void ControlRegistry::add(CommandRow row, AskedHandler handler) {
+  commands_.push_back({std::move(row), std::move(handler)});
 }
 
 std::optional<ControlEffect> ControlRegistry::effect(std::string_view name) const {
   const auto found = std::ranges::find(commands_, name, &Command::name);
   if (found == commands_.end()) return std::nullopt;
   return found->effect;
-}
-
-void ControlRegistry::takes_long(std::string_view name) {
-  std::ranges::find(commands_, name, &Command::name)->takes_long = true;
 }
 
 Result<const ControlRegistry::Command*> ControlRegistry::find(const Json& request,
@@ -164,7 +119,7 @@ Result<Json> ControlRegistry::run(std::string_view question, const Asked& asked)
   }
   const bool urgent =
       command.effect == ControlEffect::kStops || command.effect == ControlEffect::kEnds;
-  std::unique_lock lock(command.takes_long ? working_long_ : working_, std::defer_lock);
+  std::unique_lock lock(command.more.takes_long ? working_long_ : working_, std::defer_lock);
   if (!urgent) lock.lock();
   if (Status in_time = check_stops(command, asked); !in_time) {
     return std::unexpected(in_time.error());
@@ -199,7 +154,7 @@ ControlTurn ControlRegistry::turn_of(std::string_view question) const {
   const bool urgent =
       command->effect == ControlEffect::kStops || command->effect == ControlEffect::kEnds;
   if (urgent) return ControlTurn::kUrgent;
-  return command->takes_long ? ControlTurn::kLong : ControlTurn::kOrdinary;
+  return command->more.takes_long ? ControlTurn::kLong : ControlTurn::kOrdinary;
 }
 
 Json ControlRegistry::answer(std::string_view question, const Asked& asked) const {
@@ -221,8 +176,7 @@ Json ControlRegistry::help() const {
   for (const Command& command : commands_) {
     Json keys = Json::object();
     for (const ControlKey& key : command.keys) {
-      keys[key.name] =
-          fmt::format("{}{}: {}", to_string(key.type), key.required ? "" : ", optional", key.doc);
+      if (key.sent) keys[key.name] = words_of(key);
     }
     list.push_back({{"do", command.name},
                     {"effect", to_string(command.effect)},

@@ -12,24 +12,11 @@
 #include <string_view>
 #include <vector>
 
+#include "apps/control/command_rows.hpp"
 #include "apps/text/console.hpp"
 #include "base/result.hpp"
 
 namespace tandem::apps {
-
-/// What a command does to the process that is asked, which decides who may ask for it.
-enum class ControlEffect : std::uint8_t {
-  kReads,    ///< nothing
-  kChanges,  ///< something: not for everybody over a network
-  kEnds,     ///< it ends the process' work in order: the same, but it waits for no other
-  kStops,    ///< it takes the robot to a stop, which everybody may always
-};
-
-[[nodiscard]] const char* to_string(ControlEffect effect);
-/// Whether not everybody over a network may ask for it.
-[[nodiscard]] constexpr bool is_guarded(ControlEffect effect) {
-  return effect == ControlEffect::kChanges || effect == ControlEffect::kEnds;
-}
 
 /// In whose turn a question is answered. Each transport has a thread for each.
 enum class ControlTurn : std::uint8_t {
@@ -48,23 +35,6 @@ inline constexpr std::size_t kMaxStrangersQuestion = 4096;
 /// How long an emergency stop waits for its answer: who asks has to know soon that nothing stops
 /// the robot. More than the longest time in which a run looks for the loop's confirmation.
 inline constexpr std::chrono::milliseconds kStopAnswer{3000};
-/// A key of a command's request, beside "do".
-struct ControlKey {
-  enum class Type : std::uint8_t {
-    kText,
-    kInteger,
-    kNumber,
-    kBoolean,
-    kObject,
-    kTexts,         ///< a list of texts
-    kTextOrObject,  ///< TOML, or the same as an object
-  };
-
-  std::string name;
-  Type type = Type::kText;
-  bool required = false;
-  std::string doc;  ///< one line, with unit and range
-};
 
 /// A question is a JSON object, {"do": "estop", "category": 0}. Its answer is one, too:
 /// {"ok": true, …} with what the command found, or {"ok": false, "error": …, "hint": …}.
@@ -92,13 +62,11 @@ class ControlRegistry {
 
   /// One handler runs at a time, except those that stop or end: they wait for no other, so they
   /// have to be safe beside them, and a stop holds up who carries it until the loop has confirmed.
-  /// @param doc  one line, for "help".  @pre `name` is new
-  void add(std::string name, ControlEffect effect, std::string doc, std::vector<ControlKey> keys,
-           Handler handler);
-  void add(std::string name, ControlEffect effect, std::string doc, std::vector<ControlKey> keys,
-           AskedHandler handler);
-  /// No other command waits for this one, but for itself. @pre it is there
-  void takes_long(std::string_view name);
+  /// @pre its name is new
+  void add(CommandRow row, Handler handler);
+  void add(CommandRow row, AskedHandler handler);
+  /// The command `name` of command_rows(): a row there, its function here. @pre the row is there
+  void add(std::string_view name, Handler handler) { add(*command_row(name), std::move(handler)); }
   /// Who counts the stops of the robot: what changes something and was asked before one is refused.
   void stops_by(std::function<std::uint64_t()> last_stop) { last_stop_ = std::move(last_stop); }
   [[nodiscard]] std::uint64_t last_stop() const { return last_stop_ ? last_stop_() : 0; }
@@ -120,13 +88,8 @@ class ControlRegistry {
   [[nodiscard]] ControlTurn turn_of(std::string_view question) const;
 
  private:
-  struct Command {
-    std::string name;
-    ControlEffect effect;
-    std::string doc;
-    std::vector<ControlKey> keys;
+  struct Command : CommandRow {
     AskedHandler handler;
-    bool takes_long = false;
   };
   [[nodiscard]] Result<Json> run(std::string_view question, const Asked& asked) const;
   [[nodiscard]] const Command* named(std::string_view question) const;

@@ -15,12 +15,6 @@ namespace {
 using runtime::RunServices;
 using Names = std::vector<std::string>;
 
-const ControlKey kName{.name = "name", .required = true, .doc = "of a loaded controller"};
-
-ControlKey names_key(const char* name, const char* doc) {
-  return {.name = name, .type = ControlKey::Type::kTexts, .doc = doc};
-}
-
 Json list(RunServices& services, const hal::RobotConfig& robot) {
   Json all = Json::array();
   for (const runtime::ControllerStatus& one : services.controllers()) {
@@ -128,45 +122,26 @@ Json asked_json(const runtime::RequestResult& asked) {
 
 void add_controller_commands(ControlRegistry& registry, RunServices& services,
                              const hal::RobotConfig& robot) {
-  registry.add("controller.list", ControlEffect::kReads, "every loaded controller and its claims",
-               {}, [&services, &robot](const Json&) -> Result<Json> {
-                 return Json{{"controllers", list(services, robot)}};
-               });
-  registry.add("controller.load", ControlEffect::kChanges, "loads a controller, inactive",
-               {{.name = "plugin", .required = true, .doc = "its name, or the path of its library"},
-                {.name = "name", .doc = "default: the plugin's"},
-                {.name = "parameters",
-                 .type = ControlKey::Type::kTextOrObject,
-                 .doc = "[controller.parameters]: TOML, or an object"},
-                {.name = "parameters_file", .doc = "what errors call them: parameters"}},
+  registry.add("controller.list", [&services, &robot](const Json&) -> Result<Json> {
+    return Json{{"controllers", list(services, robot)}};
+  });
+  registry.add("controller.load",
                [&services](const Json& request) { return load(services, request); });
-  registry.add("controller.unload", ControlEffect::kChanges, "frees an inactive controller",
-               {kName}, [&services](const Json& request) {
-                 return tell(services, services.unload(request["name"].get<std::string>()));
-               });
-  registry.add("controller.start", ControlEffect::kChanges,
-               "starts a controller, or all that a reset holds back",
-               {{.name = "name",
-                 .doc = "of a loaded controller; else those that were active before "
-                        "the reset"}},
-               [&services](const Json& request) {
-                 if (!request.contains("name")) return tell(services, services.go_on());
-                 const Names names{request["name"].get<std::string>()};
-                 return switch_by_hand(services, {}, names);
-               });
-  registry.add("controller.stop", ControlEffect::kChanges,
-               "stops a controller; its joints are held", {kName},
-               [&services](const Json& request) {
-                 const Names names{request["name"].get<std::string>()};
-                 return switch_by_hand(services, names, {});
-               });
-  registry.add("controller.switch", ControlEffect::kChanges,
-               "stops some and starts others in one cycle, all or none",
-               {names_key("stop", "controllers to stop"), names_key("start", "and to start")},
-               [&services](const Json& request) {
-                 return switch_by_hand(services, names_of(request, "stop"),
-                                       names_of(request, "start"));
-               });
+  registry.add("controller.unload", [&services](const Json& request) {
+    return tell(services, services.unload(request["name"].get<std::string>()));
+  });
+  registry.add("controller.start", [&services](const Json& request) {
+    if (!request.contains("name")) return tell(services, services.go_on());
+    const Names names{request["name"].get<std::string>()};
+    return switch_by_hand(services, {}, names);
+  });
+  registry.add("controller.stop", [&services](const Json& request) {
+    const Names names{request["name"].get<std::string>()};
+    return switch_by_hand(services, names, {});
+  });
+  registry.add("controller.switch", [&services](const Json& request) {
+    return switch_by_hand(services, names_of(request, "stop"), names_of(request, "start"));
+  });
 }
 
 }  // namespace tandem::apps

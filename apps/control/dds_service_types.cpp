@@ -68,21 +68,6 @@ void fill_controller(const Json& from, tandem_msgs_msg_dds__Controller_& to, Rep
 
 }  // namespace
 
-Json emergency_stop_question(const dds::std_srvs::Trigger_Request&) { return {{"do", "estop"}}; }
-
-Json clear_faults_question(const dds::std_srvs::Trigger_Request&) {
-  return {{"do", "fault.reset"}};
-}
-
-/// Those that a reset holds back.
-Json start_controllers_question(const dds::std_srvs::Trigger_Request&) {
-  return {{"do", "controller.start"}};
-}
-
-Json list_controllers_question(const ListControllers_Request&) {
-  return {{"do", "controller.list"}};
-}
-
 Json load_controller_question(const LoadController_Request& request) {
   Json question{{"do", "controller.load"}, {"plugin", request.plugin}};
   add_text(question, "name", request.name);

@@ -10,11 +10,6 @@
 
 namespace tandem::apps {
 
-[[nodiscard]] Json emergency_stop_question(const dds::std_srvs::Trigger_Request& request);
-[[nodiscard]] Json clear_faults_question(const dds::std_srvs::Trigger_Request& request);
-[[nodiscard]] Json start_controllers_question(const dds::std_srvs::Trigger_Request& request);
-[[nodiscard]] Json list_controllers_question(
-    const dds::tandem_msgs::ListControllers_Request& request);
 [[nodiscard]] Json load_controller_question(
     const dds::tandem_msgs::LoadController_Request& request);
 [[nodiscard]] Json unload_controller_question(

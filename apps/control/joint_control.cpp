@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "apps/control/controller_control.hpp"
-#include "base/nearest.hpp"
 #include "hal/config/capabilities.hpp"
+#include "hal/motion_limits.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -27,9 +27,6 @@ constexpr std::array kInteractions{InteractionMode::kStiff, InteractionMode::kCo
 constexpr std::array kLoops{hal::PidLoop::kPosition, hal::PidLoop::kVelocity, hal::PidLoop::kTorque,
                             hal::PidLoop::kCurrent};
 constexpr double kLowMargin_deg = 30.0;
-const ControlKey kJoint{.name = "joint", .required = true, .doc = "its name"};
-
-using Type = ControlKey::Type;
 
 /// The run, its robot, how far each joint goes and what its drive tells.
 struct Run {
@@ -49,16 +46,10 @@ struct Run {
   }
 };
 
-/// The value of `known` that `request[key]` names.
+/// The value of `known` that a request names: one of its key's choices.
 template <class Enum, std::size_t N>
-Result<Enum> choice(const Json& request, const char* key, const std::array<Enum, N>& known) {
-  const auto wanted = request[key].get<std::string>();
-  std::vector<std::string> names;
-  for (const Enum value : known) {
-    names.emplace_back(hal::to_string(value));
-    if (names.back() == wanted) return value;
-  }
-  return fail(fmt::format("\"{}\": there is no '{}'", key, wanted), suggest(wanted, names));
+Enum choice(const Json& name, const std::array<Enum, N>& known) {
+  return *std::ranges::find_if(known, [&](Enum value) { return name == hal::to_string(value); });
 }
 
 /// What the figures of a joint are worth. A drive says by the codes 73xx of CiA 402 that one of its
@@ -168,17 +159,14 @@ void note_held_impedance(const runtime::JointRequest& wish, Json& answer) {
 
 Result<Json> set(const Run& run, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
-  if (request.size() == 2) return fail("joint.set: nothing is to be set", "name a value");
+  if (request.size() == 2)
+    return fail("joint.set: nothing is to be set", "give mode, interaction, stiffness or damping");
   runtime::JointRequest wish;
   if (request.contains("mode")) {
-    const auto mode = choice(request, "mode", kModes);
-    if (!mode) return std::unexpected(mode.error());
-    wish.mode = static_cast<std::int32_t>(*mode);
+    wish.mode = static_cast<std::int32_t>(choice(request["mode"], kModes));
   }
   if (request.contains("interaction")) {
-    const auto interaction = choice(request, "interaction", kInteractions);
-    if (!interaction) return std::unexpected(interaction.error());
-    wish.interaction = static_cast<std::int32_t>(*interaction);
+    wish.interaction = static_cast<std::int32_t>(choice(request["interaction"], kInteractions));
   }
   wish.stiffness_Nm_rad = request.value("stiffness_Nm_rad", wish.stiffness_Nm_rad);
   wish.damping_Nms_rad = request.value("damping_Nms_rad", wish.damping_Nms_rad);
@@ -204,8 +192,7 @@ double shortest(const Run& run, const std::string& name, double target_rad) {
   if (joint == joints.end() || limit == nullptr) return target_rad;
   const double turns = std::round((joint->look.commanded_rad - target_rad) / kTurn_rad);
   const double nearest = target_rad + turns * kTurn_rad;
-  return nearest < limit->min_position_rad || nearest > limit->max_position_rad ? target_rad
-                                                                                : nearest;
+  return hal::reaches(*limit, nearest) ? nearest : target_rad;
 }
 
 Result<Json> move(const Run& run, const Json& request) {
@@ -304,8 +291,7 @@ Result<Json> judged(Run& run, const std::string& name, hal::PidLoop loop,
 
 Result<Json> set_gains(Run& run, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
-  const auto loop = choice(request, "loop", kLoops);
-  if (!loop) return std::unexpected(loop.error());
+  const hal::PidLoop loop = choice(request["loop"], kLoops);
   runtime::GainsRequest wish;
   if (request.contains("kp")) wish.kp = request["kp"].get<double>();
   if (request.contains("ki")) wish.ki = request["ki"].get<double>();
@@ -313,15 +299,15 @@ Result<Json> set_gains(Run& run, const Json& request) {
   if (!wish.kp && !wish.ki && !wish.kd) {
     return fail("joint.gains: nothing is to be set", "give kp, ki or kd");
   }
-  if (Status fits = run.cycle.services().check_gains(joint, *loop, wish); !fits) {
+  if (Status fits = run.cycle.services().check_gains(joint, loop, wish); !fits) {
     return std::unexpected(fits.error());
   }
   hal::PidGains wanted;
-  const auto stability = judged(run, joint, *loop, wish, request.value("anyway", false), wanted);
+  const auto stability = judged(run, joint, loop, wish, request.value("anyway", false), wanted);
   if (!stability) return stability;
-  auto answer = tell(run, joint, run.cycle.services().set_gains(joint, *loop, wish));
+  auto answer = tell(run, joint, run.cycle.services().set_gains(joint, loop, wish));
   if (!answer) return answer;
-  const std::pair key{static_cast<std::size_t>(run.robot.joint_index(joint)), *loop};
+  const std::pair key{static_cast<std::size_t>(run.robot.joint_index(joint)), loop};
   if (answer->value("done", false)) {
     run.waiting.erase(key);
   } else {
@@ -334,39 +320,19 @@ Result<Json> set_gains(Run& run, const Json& request) {
 
 /// The commands by which a joint moves by itself: to a target, to its place, back into its limits.
 void add_moves(ControlRegistry& registry, const std::shared_ptr<const Run>& run) {
-  registry.add(
-      "joint.move", ControlEffect::kChanges,
-      "moves a joint that no active controller claims, with a trapezoidal velocity profile",
-      {kJoint,
-       {.name = "target_rad", .type = Type::kNumber, .required = true, .doc = "m of a slide"},
-       {.name = "speed_rad_s", .type = Type::kNumber, .doc = "else a quarter of its limit"},
-       {.name = "acceleration_rad_s2",
-        .type = Type::kNumber,
-        .doc = "else it reaches the speed in half a second"},
-       {.name = "unit", .doc = "angle, length: what the joint has to be"},
-       {.name = "shortest",
-        .type = Type::kBoolean,
-        .doc = "the target by whole turns nearest to the joint, within its limits"}},
-      [run](const Json& request) { return move(*run, request); });
-  registry.add("joint.stop", ControlEffect::kChanges,
-               "brakes a joint that joint.move or joint.home leads", {kJoint},
-               [run](const Json& request) {
-                 const auto name = request["joint"].get<std::string>();
-                 return tell(*run, name, run->cycle.services().move_joint(name, {}));
-               });
-  registry.add(
-      "joint.home", ControlEffect::kChanges,
-      "lets the drive of a joint find the joint's place, as its `homing` in robot.toml says",
-      {kJoint}, [run](const Json& request) {
-        const auto name = request["joint"].get<std::string>();
-        return tell(*run, name, run->cycle.services().home_joint(name));
-      });
-  registry.add("joint.recover", ControlEffect::kChanges,
-               "leads a joint that stands outside its limits back, at a twentieth of its velocity",
-               {kJoint}, [run](const Json& request) {
-                 const auto name = request["joint"].get<std::string>();
-                 return tell(*run, name, run->cycle.services().recover(name));
-               });
+  registry.add("joint.move", [run](const Json& request) { return move(*run, request); });
+  registry.add("joint.stop", [run](const Json& request) {
+    const auto name = request["joint"].get<std::string>();
+    return tell(*run, name, run->cycle.services().move_joint(name, {}));
+  });
+  registry.add("joint.home", [run](const Json& request) {
+    const auto name = request["joint"].get<std::string>();
+    return tell(*run, name, run->cycle.services().home_joint(name));
+  });
+  registry.add("joint.recover", [run](const Json& request) {
+    const auto name = request["joint"].get<std::string>();
+    return tell(*run, name, run->cycle.services().recover(name));
+  });
 }
 
 }  // namespace
@@ -375,32 +341,13 @@ void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle, const hal:
                         JudgeGains judge) {
   const auto run = std::make_shared<Run>(Run{cycle, robot, hal::joint_capabilities(robot),
                                              hal::motor_feedback(robot), std::move(judge)});
-  registry.add("joint.list", ControlEffect::kReads,
-               "every joint: who has it, what it does, what is measured", {},
-               [run](const Json&) -> Result<Json> { return list(*run); });
-  registry.add("joint.set", ControlEffect::kChanges,
-               "mode and interaction of a joint that no active controller claims, impedance of any",
-               {kJoint,
-                {.name = "mode", .doc = "idle, position, velocity, torque, open_loop, current"},
-                {.name = "interaction", .doc = "stiff, compliant"},
-                {.name = "stiffness_Nm_rad", .type = Type::kNumber, .doc = "of the virtual spring"},
-                {.name = "damping_Nms_rad", .type = Type::kNumber, .doc = "of the virtual damper"}},
-               [run](const Json& request) { return set(*run, request); });
+  registry.add("joint.list", [run](const Json&) -> Result<Json> { return list(*run); });
+  registry.add("joint.set", [run](const Json& request) { return set(*run, request); });
   add_moves(registry, run);
-  registry.add(
-      "joint.reset", ControlEffect::kChanges,
-      "clears the fault of one drive; while the run is faulted nothing is enabled", {kJoint},
-      [run](const Json& request) { return reset(*run, request["joint"].get<std::string>()); });
-  registry.add("joint.gains", ControlEffect::kChanges, "gains of a loop in a joint's drive, by SDO",
-               {kJoint,
-                {.name = "loop", .required = true, .doc = "position, velocity, torque, current"},
-                {.name = "kp", .type = Type::kNumber, .doc = "as in [gains]; it stays if left out"},
-                {.name = "ki", .type = Type::kNumber, .doc = "the same"},
-                {.name = "kd", .type = Type::kNumber, .doc = "the same"},
-                {.name = "anyway",
-                 .type = Type::kBoolean,
-                 .doc = "true: also when the model finds the loop unstable"}},
-               [run](const Json& request) { return set_gains(*run, request); });
+  registry.add("joint.reset", [run](const Json& request) {
+    return reset(*run, request["joint"].get<std::string>());
+  });
+  registry.add("joint.gains", [run](const Json& request) { return set_gains(*run, request); });
 }
 
 }  // namespace tandem::apps

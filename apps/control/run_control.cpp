@@ -79,9 +79,7 @@ hal::StopCategory carried_out_category(const runtime::RobotCycle& cycle, std::ui
 
 Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCategory category) {
   if (request.contains("category")) {
-    const auto number = request["category"].get<std::int64_t>();
-    if (number < 0 || number > 2) return fail("estop: \"category\" is not 0, 1 or 2");
-    category = static_cast<hal::StopCategory>(number);
+    category = static_cast<hal::StopCategory>(request["category"].get<std::int64_t>());
   }
   const std::uint32_t number = cycle.inbox().emergency_stop(category);
   const rt::ClockState clock = cycle.inbox().clock().state();
@@ -116,30 +114,23 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                       const hal::RobotConfig& robot, JudgeGains judge) {
   registry.stops_by([&cycle] { return cycle.progress().stopped_before.load(); });
-  registry.add("status", ControlEffect::kReads, "phase and counts of the run", {},
-               [&cycle](const Json&) -> Result<Json> { return status(cycle); });
-  registry.add("fault.show", ControlEffect::kReads, "every fault of the run, latched or cleared",
-               {}, [&cycle](const Json&) -> Result<Json> {
-                 Json answer = status(cycle);
-                 answer["faults"] = faults_json(cycle.faults());
-                 answer["lost"] = cycle.fault_log().lost();
-                 return answer;
-               });
-  registry.add(
-      "fault.reset", ControlEffect::kChanges,
-      "clears what is latched; resets or failed_resets counts on when done", {},
-      [&cycle](const Json&, std::uint64_t after_stop) { return reset(cycle, after_stop); });
-  registry.add(
-      "estop", ControlEffect::kStops, "emergency stop, latched; waits until the loop confirms it",
-      {{.name = "category",
-        .type = ControlKey::Type::kInteger,
-        .doc = "0, 1 or 2; else what robot.toml's [safety] says"}},
-      [&cycle, &robot](const Json& request) { return stop(cycle, request, robot.emergency_stop); });
-  registry.add("run.stop", ControlEffect::kEnds, "ends the run in order", {},
-               [&cycle](const Json&) -> Result<Json> {
-                 cycle.inbox().end_run();
-                 return Json::object();
-               });
+  registry.add("status", [&cycle](const Json&) -> Result<Json> { return status(cycle); });
+  registry.add("fault.show", [&cycle](const Json&) -> Result<Json> {
+    Json answer = status(cycle);
+    answer["faults"] = faults_json(cycle.faults());
+    answer["lost"] = cycle.fault_log().lost();
+    return answer;
+  });
+  registry.add(*command_row("fault.reset"), [&cycle](const Json&, std::uint64_t after_stop) {
+    return reset(cycle, after_stop);
+  });
+  registry.add("estop", [&cycle, &robot](const Json& request) {
+    return stop(cycle, request, robot.emergency_stop);
+  });
+  registry.add("run.stop", [&cycle](const Json&) -> Result<Json> {
+    cycle.inbox().end_run();
+    return Json::object();
+  });
   add_controller_commands(registry, cycle.services(), robot);
   add_joint_commands(registry, cycle, robot, std::move(judge));
   add_sensor_commands(registry, cycle.services());

@@ -46,9 +46,7 @@ Json list(const runtime::RunServices& services) {
 }  // namespace
 
 void add_sensor_commands(ControlRegistry& registry, const runtime::RunServices& services) {
-  registry.add("sensor.list", ControlEffect::kReads,
-               "every sensor: where it is, what it measures, how old that is", {},
-               [&services](const Json&) -> Result<Json> { return list(services); });
+  registry.add("sensor.list", [&services](const Json&) -> Result<Json> { return list(services); });
 }
 
 }  // namespace tandem::apps

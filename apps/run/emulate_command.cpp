@@ -261,7 +261,7 @@ Exit emulate_command(const EmulateOptions& options) {
   TaskQueue tasks;
   ControlRegistry commands;
   commands.add(
-      "status", ControlEffect::kReads, "steps, frames and simulated time so far", {},
+      {"status", ControlEffect::kReads, "steps, frames and simulated time so far"},
       [&](const Json&) { return tasks.run([&] { return summary_json(e, options.lockstep); }); });
   add_inject(commands, e.subject.robot, e.subject.sim.period_ns, [&](const sim::Fault& fault) {
     const auto done = tasks.run([&]() -> Result<Json> {

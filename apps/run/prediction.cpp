@@ -164,13 +164,7 @@ void add_predict(ControlRegistry& registry, internal_model::PredictionService* s
                  const hal::RobotConfig& robot, std::function<std::int64_t()> now_ns) {
   if (!now_ns) now_ns = [] { return clock_ns(CLOCK_MONOTONIC); };
   registry.add(
-      "predict", ControlEffect::kReads, "what the robot will do, by running its model ahead",
-      {{.name = "horizon_s",
-        .type = ControlKey::Type::kNumber,
-        .doc = "[s] from one cycle to 10; default 1"},
-       {.name = "every_cycles",
-        .type = ControlKey::Type::kInteger,
-        .doc = "cycles between two rows of the answer; default: about 100 rows"}},
+      "predict",
       [service, &robot, now_ns = std::move(now_ns),
        limit = RateLimit(kPredictionsPerSecond)](const Json& request) mutable -> Result<Json> {
         if (service == nullptr) {
@@ -182,9 +176,6 @@ void add_predict(ControlRegistry& registry, internal_model::PredictionService* s
         constexpr double kMost_s = 1e6;  // what no number of nanoseconds overflows
         if (!std::isfinite(horizon_s) || std::abs(horizon_s) > kMost_s) {
           return fail("predict: \"horizon_s\" is out of range", "from one cycle to 10 s");
-        }
-        if (request.contains("every_cycles") && every < 1) {
-          return fail("predict: \"every_cycles\" is less than 1");
         }
         if (!limit.take(now_ns())) {
           return fail(fmt::format("predict: more than {} were asked for in a second",
@@ -205,7 +196,6 @@ void add_predict(ControlRegistry& registry, internal_model::PredictionService* s
         }
         return answer_json(*answer, robot, step);
       });
-  registry.takes_long("predict");  // it waits for the loop, and runs the robot ahead
 }
 
 }  // namespace tandem::apps

@@ -171,9 +171,7 @@ void add_identity(ControlRegistry& commands, const dds::Participant& participant
   Json is{{"participant", dds::to_text(dds::id_of(participant))},
           {"domain", participant.config().domain},
           {"namespace", participant.config().name_space}};
-  commands.add("dds.show", ControlEffect::kReads,
-               "this process in its DDS domain: its participant's GUID", {},
-               [is](const Json&) -> Result<Json> { return is; });
+  commands.add("dds.show", [is](const Json&) -> Result<Json> { return is; });
 }
 
 /// Null without DDS.

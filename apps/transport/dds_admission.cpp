@@ -18,23 +18,16 @@ void DdsAdmission::admit(const dds::ParticipantId& participant) {
 }
 
 void DdsAdmission::add_to(ControlRegistry& registry) {
-  registry.add("dds.admit", ControlEffect::kChanges,
-               "lets a participant of the DDS domain change what [remote] command allows",
-               {{.name = "participant",
-                 .type = ControlKey::Type::kText,
-                 .required = true,
-                 .doc = "its GUID's first 12 bytes in hexadecimal digits: those of `ros2 topic "
-                        "info -v`, dots and what follows are left out"}},
-               [this](const Json& request) -> Result<Json> {
-                 const auto text = request["participant"].get<std::string>();
-                 const auto participant = dds::parse_participant(text);
-                 if (!participant) {
-                   return fail("participant: '" + text + "' is no GUID",
-                               "give 24 hexadecimal digits or more, as 01.0f.… or 010f…");
-                 }
-                 admit(*participant);
-                 return Json{{"participant", dds::to_text(*participant)}};
-               });
+  registry.add("dds.admit", [this](const Json& request) -> Result<Json> {
+    const auto text = request["participant"].get<std::string>();
+    const auto participant = dds::parse_participant(text);
+    if (!participant) {
+      return fail("participant: '" + text + "' is no GUID",
+                  "give 24 hexadecimal digits or more, as 01.0f.… or 010f…");
+    }
+    admit(*participant);
+    return Json{{"participant", dds::to_text(*participant)}};
+  });
 }
 
 }  // namespace tandem::apps

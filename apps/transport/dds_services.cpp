@@ -49,20 +49,21 @@ dds::ServiceServer::Counts DdsServices::counts() const {
 Status DdsServices::add_stops() {
   if (!registry_->effect("estop")) return {};
   if (Status added = add_ask(*stops_, "tandem/stop", true); !added) return added;
-  return add(*stops_, "tandem/emergency_stop", "estop", &emergency_stop_question,
-             &fill_emergency_stop);
+  using Trigger = dds::std_srvs::Trigger_Request;
+  return add<Trigger>(*stops_, "tandem/emergency_stop", "estop", nullptr, &fill_emergency_stop);
 }
 
 Status DdsServices::add_all() {
   using namespace dds::tandem_msgs;
+  using Trigger = dds::std_srvs::Trigger_Request;
   const Status added[]{
       add_ask(*server_, "tandem/ask", false),
-      add(*server_, "tandem/clear_faults", "fault.reset", &clear_faults_question,
-          &fill_clear_faults),
-      add(*server_, "tandem/start_controllers", "controller.start", &start_controllers_question,
-          &fill_start_controllers),
-      add(*server_, "tandem/list_controllers", "controller.list", &list_controllers_question,
-          &fill_controllers),
+      add<Trigger>(*server_, "tandem/clear_faults", "fault.reset", nullptr, &fill_clear_faults),
+      // Those that a reset holds back.
+      add<Trigger>(*server_, "tandem/start_controllers", "controller.start", nullptr,
+                   &fill_start_controllers),
+      add<ListControllers_Request>(*server_, "tandem/list_controllers", "controller.list", nullptr,
+                                   &fill_controllers),
       add(*server_, "tandem/load_controller", "controller.load", &load_controller_question,
           &fill_switched<LoadController_Response>),
       add(*server_, "tandem/unload_controller", "controller.unload", &unload_controller_question,
@@ -134,7 +135,8 @@ Status DdsServices::add(dds::ServiceServer& server, const char* name, const char
   return server.add<Request, Response>(name, [=, this, guarded = is_guarded(*effect)](
                                                  const Request& request, const dds::Asker& asker) {
     const bool read = !guarded || admission_->admits(asker);
-    const std::string text = json_text(read ? question(request) : Json{{"do", needs}});
+    const std::string text =
+        json_text(read && question != nullptr ? question(request) : Json{{"do", needs}});
     return dds::ServiceWork<Response>{
         .at_once = registry_->turn_of(text) == ControlTurn::kUrgent,
         .answer = [this, text, fill, asker, after_stop = registry_->last_stop()](

@@ -35,6 +35,7 @@ class DdsServices {
   Status add_all();
   Status add_ask(dds::ServiceServer& server, const char* name, bool only_stops);
   /// Adds a service that asks for a command, when the registry has `needs`.
+  /// @param question  null: `needs` without keys
   template <class Request, class Response>
   Status add(dds::ServiceServer& server, const char* name, const char* needs,
              Json (*question)(const Request&),

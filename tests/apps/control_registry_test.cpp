@@ -59,13 +59,13 @@ TEST_F(Answers, RefuseWhatTheGateOfWhoAsksDoesNotLetThrough) {
 
 TEST_F(Answers, ToAStopComeWhileAnotherCommandIsAtWork) {
   std::atomic<bool> at_work{false}, stopped{false};
-  registry.add("slow", ControlEffect::kChanges, "ends after a stop", {},
+  registry.add({"slow", ControlEffect::kChanges, "ends after a stop", {}},
                [&](const Json&) -> Result<Json> {
                  at_work = true;
                  while (!stopped) std::this_thread::yield();
                  return Json::object();
                });
-  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+  registry.add({"stop", ControlEffect::kStops, "stops", {}}, [&](const Json&) -> Result<Json> {
     stopped = true;
     return Json::object();
   });

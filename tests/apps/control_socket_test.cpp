@@ -90,17 +90,17 @@ TEST_F(Socket, GivesTheQuietestClientsPlaceToANewOne) {
 TEST_F(Socket, DropsWhatAClientAskedForThatHasGone) {
   std::atomic<bool> at_work{false}, released{false};
   std::atomic<int> moved{0};
-  registry.add("slow", ControlEffect::kChanges, "takes its time", {},
+  registry.add({"slow", ControlEffect::kChanges, "takes its time", {}},
                [&](const Json&) -> Result<Json> {
                  at_work = true;
                  while (!released) std::this_thread::yield();
                  return Json{{"text", "slow"}};
                });
-  registry.add("move", ControlEffect::kChanges, "moves", {}, [&](const Json&) -> Result<Json> {
+  registry.add({"move", ControlEffect::kChanges, "moves", {}}, [&](const Json&) -> Result<Json> {
     ++moved;
     return Json{{"text", "move"}};
   });
-  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+  registry.add({"stop", ControlEffect::kStops, "stops", {}}, [&](const Json&) -> Result<Json> {
     return Json{{"text", "stop"}};
   });
   const auto socket = open(path);
@@ -128,17 +128,17 @@ TEST_F(Socket, DropsWhatAClientAskedForThatHasGone) {
 TEST_F(Socket, StopsWhileAnotherCommandIsAtWorkAndManyHaveGone) {
   std::atomic<bool> at_work{false}, stopped{false};
   std::atomic<int> begun{0};
-  registry.add("begin", ControlEffect::kChanges, "begins", {}, [&](const Json&) -> Result<Json> {
+  registry.add({"begin", ControlEffect::kChanges, "begins", {}}, [&](const Json&) -> Result<Json> {
     ++begun;
     return Json{};
   });
-  registry.add("slow", ControlEffect::kChanges, "ends after a stop", {},
+  registry.add({"slow", ControlEffect::kChanges, "ends after a stop", {}},
                [&](const Json&) -> Result<Json> {
                  at_work = true;
                  while (!stopped) std::this_thread::yield();
                  return Json{{"text", "slow"}};
                });
-  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+  registry.add({"stop", ControlEffect::kStops, "stops", {}}, [&](const Json&) -> Result<Json> {
     return Json{{"text", "stop"}};
   });
   const auto socket = open(path);
@@ -165,7 +165,7 @@ TEST_F(Socket, StopsWhileAnotherCommandIsAtWorkAndManyHaveGone) {
 // One unknown command of 100 kB had held up the thread that stops for 1.35 s.
 TEST_F(Socket, StopsWhileManyAskLongQuestionsThatNobodyUnderstands) {
   std::atomic<int> stops{0};
-  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+  registry.add({"stop", ControlEffect::kStops, "stops", {}}, [&](const Json&) -> Result<Json> {
     ++stops;
     return Json{{"text", "stop"}};
   });
@@ -201,11 +201,10 @@ TEST_F(Socket, HasAThreadForEachTurn) {
       return Json{{"number", number}};
     };
   };
-  registry.add("stop", ControlEffect::kStops, "stops", {}, waits(1));
-  registry.add("end", ControlEffect::kEnds, "ends", {}, waits(1));
-  registry.add("predict", ControlEffect::kReads, "takes long", {}, waits(3));
-  registry.takes_long("predict");
-  registry.add("move", ControlEffect::kChanges, "moves", {}, waits(2));
+  registry.add({"stop", ControlEffect::kStops, "stops", {}}, waits(1));
+  registry.add({"end", ControlEffect::kEnds, "ends", {}}, waits(1));
+  registry.add({"predict", ControlEffect::kReads, "takes long", {}, {.takes_long = true}}, waits(3));
+  registry.add({"move", ControlEffect::kChanges, "moves", {}}, waits(2));
   const auto socket = open(path);
   std::vector<int> clients;
   for (const char* name : {"stop", "end", "predict", "move"}) {
@@ -226,7 +225,7 @@ TEST_F(Socket, HasAThreadForEachTurn) {
 // Its place had been the quietest one.
 TEST_F(Socket, LeavesAClientThatStopsItsPlace) {
   std::atomic<bool> released{false};
-  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+  registry.add({"stop", ControlEffect::kStops, "stops", {}}, [&](const Json&) -> Result<Json> {
     while (!released) std::this_thread::yield();
     return Json{{"text", "stop"}};
   });
@@ -248,17 +247,17 @@ TEST_F(Socket, RefusesWhatWasAskedBeforeAStopAndComesToItsTurnAfterIt) {
   std::atomic<std::uint64_t> stops{0};
   std::atomic<int> resets{0};
   registry.stops_by([&] { return stops.load(); });
-  registry.add("slow", ControlEffect::kReads, "takes its time", {},
+  registry.add({"slow", ControlEffect::kReads, "takes its time", {}},
                [&](const Json&) -> Result<Json> {
                  at_work = true;
                  while (!released) std::this_thread::yield();
                  return Json{{"text", "slow"}};
                });
-  registry.add("reset", ControlEffect::kChanges, "resets", {}, [&](const Json&) -> Result<Json> {
+  registry.add({"reset", ControlEffect::kChanges, "resets", {}}, [&](const Json&) -> Result<Json> {
     ++resets;
     return Json{{"text", "reset"}};
   });
-  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+  registry.add({"stop", ControlEffect::kStops, "stops", {}}, [&](const Json&) -> Result<Json> {
     ++stops;
     return Json{{"text", "stop"}};
   });

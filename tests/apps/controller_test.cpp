@@ -139,9 +139,9 @@ TEST_F(Controllers, JointsAreSetWhenNobodyHasThem) {
          "joint2: the stiffness 1e+06 Nm/rad is beyond");
   expect(refused("joint set joint2 --damping -1"), "joint2: the damping -1 Nms/rad is beyond");
   expect(refused("joint set jiont2 --mode idle"), "did you mean 'joint2'?");
-  expect(refused("joint set joint2 --mode fast"), "there is no 'fast'");
+  expect(refused("joint set joint2 --mode fast"), "cannot be 'fast'");
   expect(refused("joint set joint2"),
-         "nothing is to be set (give --mode, --interaction, --stiffness or --damping)");
+         "nothing is to be set (give mode, interaction, stiffness or damping)");
   expect(to_run("joint list joint1").out, "joint1           -  velocity");
   EXPECT_EQ(end(), 0);
 }
@@ -250,8 +250,8 @@ TEST_F(Controllers, GainsAreKeptAndShown) {
   EXPECT_EQ(gains["gains"]["position"]["ki"], 12.0) << "what is not named stays";
   expect(to_run("joint list joint1 --gains").out, "joint1  position   7.5    12  0.25");
   expect(refused("joint gains joint1 position --kp -1"), "joint1: kp -1 is beyond");
-  expect(refused("joint gains joint1 speed --kp 1"), "there is no 'speed'");
-  expect(refused("joint gains joint1 position"), "nothing is to be set (give --kp, --ki or --kd)");
+  expect(refused("joint gains joint1 speed --kp 1"), "cannot be 'speed'");
+  expect(refused("joint gains joint1 position"), "nothing is to be set (give kp, ki or kd)");
   EXPECT_EQ(end(), 0);
 }
 

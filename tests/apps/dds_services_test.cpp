@@ -420,8 +420,10 @@ TEST_F(DdsCommands, AStopAsksNobodyForAdmission) {
 struct SecondRun {
   explicit SecondRun(dds::Participant& participant) {
     registry.add(
-        "estop", ControlEffect::kStops, "stops",
-        {{.name = "category", .type = ControlKey::Type::kInteger, .doc = "0 to 2"}},
+        {"estop",
+         ControlEffect::kStops,
+         "stops",
+         {{.name = "category", .type = ControlKey::Type::kInteger, .doc = "0 to 2"}}},
         [this](const Json& request) -> Result<Json> {
           ++stops;
           if (refuses) return fail("its loop hangs", "press its emergency stop");

@@ -7,8 +7,10 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "apps/clients/commands.hpp"
+#include "apps/command_line/command_line.hpp"
 #include "apps/control/run_control.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "rt/clock.hpp"
@@ -60,16 +62,24 @@ struct Answered : ::testing::Test {
   [[nodiscard]] Json joint(std::size_t index) {
     return answer(R"({"do": "joint.list"})")["joints"][index];
   }
+  /// A command line as it is asked of `socket`.
+  [[nodiscard]] static Exit perform(const std::vector<std::string>& words,
+                                    const std::string& socket) {
+    std::vector<const char*> line{"tandem"};
+    for (const std::string& word : words) line.push_back(word.c_str());
+    line.insert(line.end(), {"--socket", socket.c_str()});
+    const Command command = parse_command_line(static_cast<int>(line.size()), line.data());
+    const auto* asked = std::get_if<AskedOptions>(&command);
+    return asked == nullptr ? Exit::kUsage : asked_command(*asked);
+  }
   /// Runs a command against the run's socket; `out` and `err` are what it printed.
-  template <class Options>
-  Exit command(Exit (*run)(const Options&), Options options) {
+  Exit command(const std::vector<std::string>& words) {
     const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-joints.sock";
     const auto socket = ControlSocket::open(path, registry);
     EXPECT_TRUE(socket) << socket.error().to_string();
-    options.target.socket = path;
     ::testing::internal::CaptureStdout();
     ::testing::internal::CaptureStderr();
-    const Exit status = while_cycling([&] { return run(options); });
+    const Exit status = while_cycling([&] { return perform(words, path); });
     out = ::testing::internal::GetCapturedStdout();
     err = ::testing::internal::GetCapturedStderr();
     return status;
@@ -109,13 +119,13 @@ TEST_F(SensorAnswers, NameFrameValuesAndAge) {
   EXPECT_EQ(sensors[1]["angular_velocity_rad_s"].size(), 3U);
   EXPECT_EQ(sensors[1]["specific_force_m_s2"], Json({0.0, 0.0, 9.81}));
 
-  EXPECT_EQ(command(sensor_command, SensorOptions{}), Exit::kDone) << err;
+  EXPECT_EQ(command({"sensor", "list"}), Exit::kDone) << err;
   has(out, "palm");
   has(out, "0  0  9.81");
   has(out, "fresh");
-  EXPECT_EQ(command(sensor_command, SensorOptions{.sensors = {"imu"}}), Exit::kDone);
+  EXPECT_EQ(command({"sensor", "list", "imu"}), Exit::kDone);
   EXPECT_EQ(out.find("palm"), std::string::npos) << out;
-  EXPECT_EQ(command(sensor_command, SensorOptions{.sensors = {"hnad"}}), Exit::kUsage);
+  EXPECT_EQ(command({"sensor", "list", "hnad"}), Exit::kUsage);
   has(err, "the robot has no sensor 'hnad' (did you mean 'hand'?)");
 }
 
@@ -126,7 +136,7 @@ TEST_F(JointAnswers, OfASensorThatIsSilentAreNotValid) {
   const Json imu = answer(R"({"do": "sensor.list"})")["sensors"][1];
   EXPECT_EQ(imu["valid"], false);
   EXPECT_GE(imu["age_cycles"].get<int>(), 20);
-  EXPECT_EQ(command(sensor_command, SensorOptions{}), Exit::kDone);
+  EXPECT_EQ(command({"sensor", "list"}), Exit::kDone);
   has(out, "no sample for ");
 }
 
@@ -142,10 +152,7 @@ TEST_F(JointAnswers, RefuseAnAngleForAJointThatSlides) {
   EXPECT_EQ(joint(2)["slides"], false);
   EXPECT_EQ(refused(R"({"do": "joint.move", "joint": "wrist", "target_rad": 0, "unit": "length"})"),
             "wrist: this joint turns (give an angle: 30deg, 0.5rad)");
-  JointOptions options{.action = JointOptions::Action::kMove};
-  options.joint = "elbow";
-  options.to = "30deg";
-  EXPECT_EQ(command(joint_command, options), Exit::kUsage);
+  EXPECT_EQ(command({"joint", "move", "elbow", "--to", "30deg"}), Exit::kUsage);
   has(err, "elbow: this joint slides");
 }
 
@@ -166,37 +173,30 @@ TEST_F(JointAnswers, RefuseAMotionWhileAFaultIsLatched) {
 
 TEST_F(JointAnswers, WaitForAMotionUntilItHasArrived) {
   begin();
-  JointOptions options{.action = JointOptions::Action::kMove};
-  options.joint = "wrist";
-  options.to = "0.3";
-  options.speed = "2";
-  options.wait = true;
-  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  const std::vector<std::string> move{"joint", "move",    "wrist", "--to",
+                                      "0.3",   "--speed", "2",     "--wait"};
+  EXPECT_EQ(command(move), Exit::kDone) << err;
   has(out, "wrist moves from 0.1");  // it may have begun before the answer is written
   has(out, " rad to 0.3 rad: ");
   has(out, "wrist has arrived: 0.3 rad, measured 0.");
   EXPECT_EQ(err, "");
   EXPECT_EQ(joint(2)["commanded_position_rad"], 0.3);
-  EXPECT_EQ(command(joint_command, options), Exit::kDone) << "it is there already" << err;
+  EXPECT_EQ(command(move), Exit::kDone) << "it is there already" << err;
 }
 
 TEST_F(JointAnswers, WarnOfAMotionThatHasArrivedWhenTheJointHasNot) {
   backend.sag_rad = 0.05;
   begin();
-  JointOptions options{.action = JointOptions::Action::kMove};
-  options.joint = "wrist";
-  options.to = "20deg";
-  options.speed = "2";
-  options.wait = true;
-  EXPECT_EQ(command(joint_command, options), Exit::kDone);
+  const auto move = [this](const char* joint, const char* to) {
+    return command({"joint", "move", joint, "--to", to, "--speed", "2", "--wait"});
+  };
+  EXPECT_EQ(move("wrist", "20deg"), Exit::kDone);
   has(out, " rad (");
   has(out, "to 0.3491 rad (20 deg): tandem joint list wrist");
   has(out, "wrist has arrived: 0.3491 rad (20 deg), measured ");
   has(err, "warning: wrist: what is measured is 0.05");
   has(err, "it lags, or something holds it: tandem joint show wrist");
-  options.joint = "elbow";  // it slides
-  options.to = "0.4";
-  EXPECT_EQ(command(joint_command, options), Exit::kDone);
+  EXPECT_EQ(move("elbow", "0.4"), Exit::kDone) << "it slides";
   has(out, "to 0.4 m: ");
   has(err, "warning: elbow: what is measured is 0.05");
 }
@@ -225,25 +225,18 @@ TEST_F(JointAnswers, SayTheLimitsWithTheirUnits) {
 /// Those that turn and those that slide have no unit in common.
 TEST_F(JointAnswers, ShowEachJointInItsUnits) {
   begin();
-  JointOptions options{.action = JointOptions::Action::kList};
-  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  EXPECT_EQ(command({"joint", "list"}), Exit::kDone) << err;
   for (const char* words : {"position  ", "0.1 rad  ", "0.1 m  ", " rad/s  ", " m/s  "}) {
     has(out, words);
   }
   EXPECT_EQ(out.find('['), std::string::npos) << out;
-  options.joints = {"elbow"};
-  EXPECT_EQ(command(joint_command, options), Exit::kDone);
+  EXPECT_EQ(command({"joint", "list", "elbow"}), Exit::kDone);
   has(out, "position [m]  velocity [m/s]  torque [N]");
-  options.drives = true;
-  EXPECT_EQ(command(joint_command, options), Exit::kDone);
+  EXPECT_EQ(command({"joint", "list", "elbow", "--drives"}), Exit::kDone);
   has(out, "motor [m]");
-  options.joints = {"wrist", "shoulder"};
-  EXPECT_EQ(command(joint_command, options), Exit::kDone);
+  EXPECT_EQ(command({"joint", "list", "wrist", "shoulder", "--drives"}), Exit::kDone);
   has(out, "motor [rad]");
-  JointOptions set{.action = JointOptions::Action::kSet};
-  set.joint = "elbow";
-  set.stiffness_Nm_rad = 40.0;
-  EXPECT_EQ(command(joint_command, set), Exit::kDone) << err;
+  EXPECT_EQ(command({"joint", "set", "elbow", "--stiffness", "40"}), Exit::kDone) << err;
   has(out, " N/m\n");
   has(out, " Ns/m");
 }
@@ -283,10 +276,8 @@ TEST_F(JointAnswers, OfASetWhileJointsAreHeldSayWhenItIsInForce) {
 TEST_F(JointAnswers, SayThatTheFiguresOfAFaultySensorAreNotLive) {
   for (hal::JointConfig& joint : robot.joints) joint.on_fault = hal::StopCategory::kWarn;
   begin();
-  JointOptions options{.action = JointOptions::Action::kShow};
-  options.joint = "elbow";
-  const auto shown = [&] {
-    EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  const auto shown = [&](const char* verb = "show") {
+    EXPECT_EQ(command({"joint", verb, "elbow"}), Exit::kDone) << err;
     return out;
   };
   EXPECT_EQ(joint(1)["feedback"], "fresh");
@@ -297,9 +288,7 @@ TEST_F(JointAnswers, SayThatTheFiguresOfAFaultySensorAreNotLive) {
   EXPECT_EQ(joint(1)["feedback"], "sensor_fault");
   EXPECT_EQ(joint(0)["feedback"], "fresh");
   has(shown(), "sample          a sensor is in fault: what it measures is not valid");
-  options.action = JointOptions::Action::kList;
-  has(shown(), "fault (0x7300), sensor");
-  options.action = JointOptions::Action::kShow;
+  has(shown("list"), "fault (0x7300), sensor");
   backend.fault_code = 0x8611;  // it says nothing of the sensors
   steps(2);
   has(shown(), "sample          fresh");
@@ -321,34 +310,26 @@ TEST_F(JointAnswers, SayNothingOfAJointThatWasNeverHeard) {
     EXPECT_TRUE(joints[1][key].is_null()) << key;
     EXPECT_TRUE(joints[0][key].is_number()) << key;
   }
-  JointOptions options{.action = JointOptions::Action::kShow};
-  options.joint = joints[1]["joint"];
-  (void)command(joint_command, options);
+  (void)command({"joint", "show", joints[1]["joint"]});
   has(out, "position        - ");
 }
 
 TEST_F(JointAnswers, TakeQuantitiesWithABlankAndInCentimetres) {
   begin();
-  JointOptions options{.action = JointOptions::Action::kMove};
-  options.joint = "wrist";
   for (const char* text : {"30 deg", "30deg", " 30  deg ", "0.5235987755982988 rad"}) {
-    options.to = text;
-    options.speed = "20 deg/s";
-    options.acceleration = "40 deg/s2";
-    EXPECT_EQ(command(joint_command, options), Exit::kDone) << text << ": " << err;
+    EXPECT_EQ(command({"joint", "move", "wrist", "--to", text, "--speed", "20 deg/s",
+                       "--acceleration", "40 deg/s2"}),
+              Exit::kDone)
+        << text << ": " << err;
     has(out, "0.5236 rad");
   }
-  options.joint = "elbow";  // it slides
-  for (const char* text : {"5cm", "5 cm", "50 mm", "50mm", "0.05 m", "0.05"}) {
-    options.to = text;
-    options.speed = "10 cm/s";
-    options.acceleration.clear();
-    EXPECT_EQ(command(joint_command, options), Exit::kDone) << text << ": " << err;
+  for (const char* text : {"5cm", "5 cm", "50 mm", "50mm", "0.05 m", "0.05"}) {  // it slides
+    EXPECT_EQ(command({"joint", "move", "elbow", "--to", text, "--speed", "10 cm/s"}), Exit::kDone)
+        << text << ": " << err;
     has(out, " to 0.05 m");
   }
   for (const char* text : {"5 c m", "5 km", "cm", " ", "5 5", "5 deg rad"}) {
-    options.to = text;
-    EXPECT_EQ(command(joint_command, options), Exit::kUsage) << text;
+    EXPECT_EQ(command({"joint", "move", "elbow", "--to", text}), Exit::kUsage) << text;
     has(err, "is no number with a unit");
     has(err, "2cm");
   }
@@ -356,17 +337,14 @@ TEST_F(JointAnswers, TakeQuantitiesWithABlankAndInCentimetres) {
 
 TEST_F(JointAnswers, TellAWaiterThatTheRunHasEnded) {
   begin();
-  JointOptions options{.action = JointOptions::Action::kMove};
-  options.joint = "wrist";
-  options.to = "-1.2";
-  options.speed = "0.01";
-  options.wait = true;
-  options.target.socket = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-end.sock";
-  auto socket = ControlSocket::open(options.target.socket, registry);
+  const std::vector<std::string> move{"joint", "move",    "wrist", "--to",
+                                      "-1.2",  "--speed", "0.01",  "--wait"};
+  const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-end.sock";
+  auto socket = ControlSocket::open(path, registry);
   ASSERT_TRUE(socket) << socket.error().to_string();
   ::testing::internal::CaptureStderr();
   ::testing::internal::CaptureStdout();
-  auto waits = std::async(std::launch::async, [&] { return joint_command(options); });
+  auto waits = std::async(std::launch::async, [&] { return perform(move, path); });
   for (int i = 0; i < 20'000 && joint(2)["moving"] == false; ++i) steps(1);
   while_cycling([&] {  // until what is asked for is answered
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -382,18 +360,14 @@ TEST_F(JointAnswers, TellAWaiterThatTheRunHasEnded) {
 /// Somebody else stops it, or a fault does.
 TEST_F(JointAnswers, EndTheWaitingWithStatus1WhenTheMotionEndsElsewhere) {
   begin();
-  JointOptions options{.action = JointOptions::Action::kMove};
-  options.joint = "wrist";
-  options.to = "-1.2";
-  options.speed = "0.01";
-  options.wait = true;
+  const std::vector<std::string> move{"joint", "move",    "wrist", "--to",
+                                      "-1.2",  "--speed", "0.01",  "--wait"};
   const auto wait_and = [&](const std::function<void()>& meanwhile) {
     const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-wait.sock";
     const auto socket = ControlSocket::open(path, registry);
-    options.target.socket = path;
     ::testing::internal::CaptureStdout();
     ::testing::internal::CaptureStderr();
-    auto waits = std::async(std::launch::async, [&] { return joint_command(options); });
+    auto waits = std::async(std::launch::async, [&] { return perform(move, path); });
     for (int i = 0; i < 20'000 && joint(2)["moving"] == false; ++i) steps(1);
     meanwhile();
     while (waits.wait_for(std::chrono::microseconds(100)) != std::future_status::ready) steps(1);
@@ -417,19 +391,15 @@ TEST_F(JointAnswers, EndTheWaitingWithStatus1WhenTheMotionEndsElsewhere) {
 
 TEST_F(JointAnswers, ShowOneJointWithItsDrive) {
   begin();
-  JointOptions options{.action = JointOptions::Action::kShow};
-  options.joint = "elbow";
-  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  EXPECT_EQ(command({"joint", "show", "elbow"}), Exit::kDone) << err;
   for (const char* words :
        {"elbow, slides", "motor position", " m at the joint", "N/m", "operation enabled",
         "fault           none", " degC", "fresh", "limits          -1.5 to 1.5 m, 2 m/s, 20 N"}) {
     has(out, words);
   }
-  options.joint = "wrist";
-  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  EXPECT_EQ(command({"joint", "show", "wrist"}), Exit::kDone) << err;
   has(out, "limits          -1.5 to 1.5 rad (-85.94 to 85.94 deg), 2 rad/s, 20 Nm");
-  options.joint = "elbwo";
-  EXPECT_EQ(command(joint_command, options), Exit::kUsage);
+  EXPECT_EQ(command({"joint", "show", "elbwo"}), Exit::kUsage);
   has(err, "the robot has no joint 'elbwo' (did you mean 'elbow'?)");
 }
 
@@ -479,29 +449,28 @@ TEST_F(JointAnswers, SayThatGainsWithoutAModelAreNotJudged) {
 TEST_F(JointAnswers, ResetOneDrive) {
   for (hal::JointConfig& joint : robot.joints) joint.on_fault = hal::StopCategory::kWarn;
   begin();
-  JointOptions options{.action = JointOptions::Action::kReset};
-  options.joint = "elbow";
-  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  const std::vector<std::string> reset{"joint", "reset", "elbow"};
+  EXPECT_EQ(command(reset), Exit::kDone) << err;
   has(out,
       "elbow: its drive has no fault; what the run has latched stays until `tandem fault reset`");
   backend.faulted_joint = 1;
   steps(2);
   EXPECT_EQ(joint(1)["fault"], 0x7310);
   has(joint(1)["fault_text"], "0x7310");
-  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  EXPECT_EQ(command(reset), Exit::kDone) << err;
   has(out, "elbow: its fault is cleared, and it is held where it is");
   EXPECT_EQ(joint(1)["fault_text"], "");
 
   backend.reset_clears = false;
   backend.faulted_joint = 1;
   steps(2);
-  EXPECT_EQ(command(joint_command, options), Exit::kFault) << out;
+  EXPECT_EQ(command(reset), Exit::kFault) << out;
   has(err, "error: elbow: the reset failed, its cause is still there: ");
 
   backend.reset_clears = true;
   (void)cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
   steps(1);
-  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  EXPECT_EQ(command(reset), Exit::kDone) << err;
   has(out, "its drive stays disabled: `tandem fault reset` enables every joint where it is");
   EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
   EXPECT_EQ(answer(R"({"do": "fault.show"})")["latched"], 2) << "until the run is reset";

@@ -40,11 +40,11 @@ struct AnsweredRun : ::testing::Test {
   /// `tandem fault reset` of a run whose joint `trips` is in fault when it looks; -1: none.
   Exit reset(int trips) {
     ControlRegistry served;
-    served.add("fault.reset", ControlEffect::kChanges, "as the run's", {},
+    served.add({"fault.reset", ControlEffect::kChanges, "as the run's", {}},
                [this](const Json&) -> Result<Json> {
                  return registry.answer(R"({"do": "fault.reset"})");
                });
-    served.add("fault.show", ControlEffect::kReads, "as the run's, some cycles later", {},
+    served.add({"fault.show", ControlEffect::kReads, "as the run's, some cycles later", {}},
                [this, trips](const Json&) -> Result<Json> {
                  steps(20);
                  if (trips >= 0) backend.faulted_joint = trips;
@@ -62,7 +62,7 @@ struct AnsweredRun : ::testing::Test {
     ::testing::internal::CaptureStdout();
     ::testing::internal::CaptureStderr();
     const Exit status =
-        fault_command({.action = FaultOptions::Action::kReset, .target = {.socket = path}});
+        asked_command({.row = command_row("fault.reset"), .target = {.socket = path}});
     out = ::testing::internal::GetCapturedStdout();
     err = ::testing::internal::GetCapturedStderr();
     return status;
@@ -139,9 +139,9 @@ TEST_F(AnsweredRun, EndsAResetThatIsNotAnsweredToTheEndWithStatus1) {
   steps(1);
   ControlRegistry served;
   served.add(
-      "fault.reset", ControlEffect::kChanges, "as the run's", {},
+      {"fault.reset", ControlEffect::kChanges, "as the run's", {}},
       [this](const Json&) -> Result<Json> { return registry.answer(R"({"do": "fault.reset"})"); });
-  served.add("fault.show", ControlEffect::kReads, "ended meanwhile", {},
+  served.add({"fault.show", ControlEffect::kReads, "ended meanwhile", {}},
              [](const Json&) -> Result<Json> { return fail("the run has ended"); });
   EXPECT_EQ(reset_of(served), Exit::kFault) << err;
   EXPECT_NE(err.find("error: the run has ended"), std::string::npos) << err;

@@ -18,19 +18,21 @@
 namespace tandem::apps::test {
 
 inline void add_commands(ControlRegistry& registry) {
-  registry.add("echo", ControlEffect::kChanges, "says it again",
-               {{.name = "text", .required = true, .doc = "what to say"},
-                {.name = "times", .type = ControlKey::Type::kInteger, .doc = "1 to 3"}},
+  registry.add({"echo",
+                ControlEffect::kChanges,
+                "says it again",
+                {{.name = "text", .required = true, .doc = "what to say"},
+                 {.name = "times", .type = ControlKey::Type::kInteger, .doc = "1 to 3"}}},
                [](const Json& request) -> Result<Json> {
                  const int times = request.value("times", 1);
                  if (times > 3) return fail("too often", "three times at most");
                  return Json{{"text", request["text"]}, {"times", times}};
                });
-  registry.add("long", ControlEffect::kReads, "an answer of 200 kB", {},
+  registry.add({"long", ControlEffect::kReads, "an answer of 200 kB", {}},
                [](const Json&) -> Result<Json> {
                  return Json{{"text", std::string(200'000, 'x')}};
                });
-  registry.add("throw", ControlEffect::kReads, "throws", {},
+  registry.add({"throw", ControlEffect::kReads, "throws", {}},
                [](const Json&) -> Result<Json> { throw std::runtime_error("out of luck"); });
 }
 

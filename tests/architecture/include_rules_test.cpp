@@ -58,7 +58,7 @@ const Rules& rules() {
         "estimation", "log", "runtime", "internal_model"}},
       {"scaffold", {"base", "model", "hal", "hal/config", "hal/ethercat-can"}},
       {"apps/text", {"base", "rt"}},
-      {"apps/command_line", {"base", "rt", "apps/text"}},
+      {"apps/command_line", {"base", "rt", "apps/text", "apps/control"}},
       {"apps/can",
        {"base", "rt", "hal", "hal/config", "hal/ethercat-can", "hal/ethercat-can/ethercat",
         "apps/text"}},

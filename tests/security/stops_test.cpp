@@ -36,8 +36,10 @@ using tandem::test::eventually;
 /// Serves tandem/ask, tandem/stop and tandem/emergency_stop, and confirms every stop.
 struct Liar {
   explicit Liar(dds::Participant& participant) {
-    registry.add("estop", ControlEffect::kStops, "stops nothing",
-                 {{.name = "category", .type = ControlKey::Type::kInteger, .doc = "0 to 2"}},
+    registry.add({"estop",
+                  ControlEffect::kStops,
+                  "stops nothing",
+                  {{.name = "category", .type = ControlKey::Type::kInteger, .doc = "0 to 2"}}},
                  [this](const Json&) -> Result<Json> {
                    ++asked;
                    return Json{{"category", "category1"}, {"confirmed", true}, {"cycle", 1}};

@@ -1,0 +1,223 @@
+#include "apps/control/command_rows.hpp"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/nearest.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using Type = ControlKey::Type;
+using Unit = ControlKey::Unit;
+using enum ControlEffect;
+
+const char* to_string(Type type) {
+  switch (type) {
+    case Type::kText: return "text";
+    case Type::kInteger: return "integer";
+    case Type::kNumber: return "number";
+    case Type::kBoolean: return "true or false";
+    case Type::kObject: return "object";
+    case Type::kTexts: return "list of texts";
+    case Type::kTextOrObject: return "text or object";
+  }
+  return "?";
+}
+
+bool is_of(const Json& value, Type type) {
+  switch (type) {
+    case Type::kText: return value.is_string();
+    case Type::kInteger: return value.is_number_integer();
+    case Type::kNumber: return value.is_number();
+    case Type::kBoolean: return value.is_boolean();
+    case Type::kObject: return value.is_object();
+    case Type::kTexts:
+      return value.is_array() &&
+             std::ranges::all_of(value, [](const Json& one) { return one.is_string(); });
+    case Type::kTextOrObject: return value.is_string() || value.is_object();
+  }
+  return false;
+}
+
+ControlKey text(const char* name, const char* line, const char* doc) {
+  return {.name = name, .doc = doc, .line = line};
+}
+ControlKey number(const char* name, const char* line, const char* doc) {
+  return {.name = name, .type = Type::kNumber, .doc = doc, .line = line};
+}
+ControlKey with_unit(Unit unit, const char* name, const char* line, const char* doc) {
+  return {.name = name, .type = Type::kNumber, .doc = doc, .line = line, .unit = unit};
+}
+ControlKey integer(const char* name, const char* line, double min, double max, const char* doc) {
+  return {.name = name, .type = Type::kInteger, .doc = doc, .line = line, .min = min, .max = max};
+}
+ControlKey texts(const char* name, const char* line, const char* doc) {
+  return {.name = name, .type = Type::kTexts, .doc = doc, .line = line};
+}
+ControlKey flag(const char* name, const char* line, const char* doc) {
+  return {.name = name, .type = Type::kBoolean, .doc = doc, .line = line};
+}
+/// One of some texts, which it lists.
+ControlKey choice(const char* name, const char* line, std::vector<std::string> of) {
+  return {.name = name, .doc = fmt::format("{}", fmt::join(of, ", ")), .line = line, .choices = of};
+}
+ControlKey need(ControlKey key) { return key.required = true, key; }
+/// Of the command line alone.
+ControlKey local(ControlKey key) { return key.sent = false, key; }
+
+const ControlKey kJoint = need(text("joint", "joint", "its name"));
+const char kLoaded[] = "of a loaded controller";
+
+// clang-format off
+const std::vector<CommandRow> kRows{
+    {"help", kReads, "lists the commands", {}, {.on_line = false}},
+    {"status", kReads, "phase and counts of the run", {}, {.on_line = false}},
+    {"fault.show", kReads, "every fault of the run, latched or cleared"},
+    {"fault.reset", kChanges, "clears what is latched; resets or failed_resets counts on when done"},
+    {"estop", kStops, "emergency stop, latched; waits until the loop confirms it",
+     {integer("category", "--category", 0, 2, "0, 1 or 2; else what robot.toml's [safety] says"),
+      local(flag("trust-domain", "--trust-domain",
+                 "believe whoever answers in the DDS domain, where nobody but robots is"))}},
+    {"run.stop", kEnds, "ends the run in order", {}, {.on_line = false}},
+
+    {"controller.list", kReads, "every loaded controller and its claims"},
+    {"controller.load", kChanges, "loads a controller, inactive",
+     {need(text("plugin", "plugin", "its name, or the path of its library")),
+      text("name", "--name", "default: the plugin's"),
+      {.name = "parameters", .type = Type::kTextOrObject,
+       .doc = "[controller.parameters]: TOML, or an object"},
+      text("parameters_file", "--parameters",
+           "the file of them, in errors: parameters; the command line reads it: TOML"),
+      local(texts("set", "--set", "one parameter, 'key = value', beside the file's; repeatable")),
+      local(flag("start", "--start", "start it as well"))}},
+    {"controller.unload", kChanges, "frees an inactive controller",
+     {need(text("name", "name", kLoaded))}},
+    {"controller.start", kChanges, "starts a controller, or all that a reset holds back",
+     {text("name", "", "of a loaded controller; else those that were active before the reset"),
+      local(texts("names", "names", "none: those that were active before the reset"))}},
+    {"controller.stop", kChanges, "stops a controller; its joints are held",
+     {need(text("name", "", kLoaded)), need(local(texts("names", "names", "of controllers")))}},
+    {"controller.switch", kChanges, "stops some and starts others in one cycle, all or none",
+     {texts("stop", "--stop", "controllers to stop"), texts("start", "--start", "and to start")}},
+
+    {"joint.list", kReads, "every joint: who has it, what it does, what is measured",
+     {local(texts("joints", "joints", "only these")),
+      local(flag("drives", "--drives", "motor position, current, voltage and winding instead")),
+      local(flag("gains", "--gains", "the gains of its drive's loops instead"))}},
+    {"joint.show", kReads, "one joint: encoders on both sides, drive, its fault in words",
+     {local(kJoint)}, {.asks = "joint.list"}},
+    {"joint.set", kChanges,
+     "mode and interaction of a joint that no active controller claims, impedance of any",
+     {kJoint,
+      choice("mode", "--mode",
+             {"idle", "position", "velocity", "torque", "open_loop", "current"}),
+      choice("interaction", "--interaction", {"stiff", "compliant"}),
+      number("stiffness_Nm_rad", "--stiffness", "of the virtual spring [Nm/rad, of a slide N/m]"),
+      number("damping_Nms_rad", "--damping", "of the virtual damper [Nms/rad, of a slide Ns/m]")}},
+    {"joint.move", kChanges,
+     "moves a joint that no active controller claims, with a trapezoidal velocity profile",
+     {kJoint,
+      need(with_unit(Unit::kPlace, "target_rad", "--to", "where to [rad, of a slide m]")),
+      with_unit(Unit::kSpeed, "speed_rad_s", "--speed", "else a quarter of its limit"),
+      with_unit(Unit::kAcceleration, "acceleration_rad_s2", "--acceleration",
+                "else it reaches the speed in half a second"),
+      choice("unit", "", {"angle", "length"}),
+      flag("shortest", "--shortest",
+           "the target by whole turns nearest to the joint, within its limits"),
+      local(flag("wait", "--wait",
+                 "until it has arrived: status 0; 1 when the motion ended elsewhere. Ctrl-C ends "
+                 "the waiting, not the motion: tandem joint stop"))}},
+    {"joint.stop", kChanges, "brakes a joint that joint.move or joint.home leads", {kJoint}},
+    {"joint.home", kChanges,
+     "lets the drive of a joint find the joint's place, as its `homing` in robot.toml says; the "
+     "command line waits for that: status 1 when it failed", {kJoint}},
+    {"joint.recover", kChanges,
+     "leads a joint that stands outside its limits back, at a twentieth of its velocity", {kJoint}},
+    {"joint.reset", kChanges,
+     "clears the fault of one drive; while the run is faulted nothing is enabled", {kJoint}},
+    {"joint.gains", kChanges, "gains of a loop in a joint's drive, by SDO",
+     {kJoint, need(choice("loop", "loop", {"position", "velocity", "torque", "current"})),
+      number("kp", "--kp", "as in [gains]; it stays if left out"),
+      number("ki", "--ki", "of the integral: kp's units per second"),
+      number("kd", "--kd", "of the derivative: kp's units times seconds"),
+      flag("anyway", "--anyway", "true: also when the model finds the loop unstable")}},
+
+    {"sensor.list", kReads, "every sensor: where it is, what it measures, how old that is",
+     {local(texts("sensors", "sensors", "only these"))}},
+    {"clock.show", kReads, "where the clock stands, and how fast it is"},
+    {"clock.pause", kChanges, "simulated time stands after the cycle at work"},
+    {"clock.resume", kChanges, "simulated time continues at its rate"},
+    {"clock.step", kChanges, "while paused: so many cycles, then it stands again",
+     {integer("cycles", "cycles", 1, 1e9, "1 to 1000000000; default 1")}},
+    {"clock.rate", kChanges, "simulated seconds per wall second, from the next cycle on",
+     {{.name = "rate", .type = Type::kNumber, .required = true,
+       .doc = "0.01 to 1000; 0: as fast as possible", .line = "rate",
+       .min = 0.01, .max = 1000, .or_zero = true}}},
+    {"predict", kReads, "what the robot will do, by running its model ahead",
+     {number("horizon_s", "--horizon", "[s] from one cycle to 10; default 1"),
+      integer("every_cycles", "--every", 1, 1e9,
+              "cycles between two rows of the answer; default: about 100 rows")},
+     {.takes_long = true}},
+    {"inject", kChanges, "inject faults, from the next cycle on",
+     {need(text("scenario", "", "[[fault]] tables, TOML")),
+      need(local(texts("fault", "fault", "key=value words, or TOML")))},
+     {.any_process = true}},
+    {"dds.show", kReads, "the participant by which this process is on DDS", {},
+     {.on_line = false}},
+    {"dds.admit", kChanges, "lets a participant of the DDS domain change what [remote] allows",
+     {need(text("participant", "", "its GUID's first 12 bytes in hexadecimal digits: those of "
+                "`ros2 topic info -v`, dots and what follows are left out"))},
+     {.on_line = false}},
+};
+// clang-format on
+
+}  // namespace
+
+const char* to_string(ControlEffect effect) {
+  switch (effect) {
+    case kReads: return "reads";
+    case kChanges: return "changes";
+    case kEnds: return "ends";
+    case kStops: return "stops";
+  }
+  return "?";
+}
+
+const std::vector<CommandRow>& command_rows() { return kRows; }
+
+const CommandRow* command_row(std::string_view name) {
+  const auto found = std::ranges::find(command_rows(), name, &CommandRow::name);
+  return found == command_rows().end() ? nullptr : &*found;
+}
+
+Status check_value(const ControlKey& key, const Json& value) {
+  if (!is_of(value, key.type)) {
+    return fail(fmt::format("is not of type {}", to_string(key.type)), key.doc);
+  }
+  if (value.is_string() && !key.choices.empty()) {
+    const auto wanted = value.get<std::string>();
+    if (std::ranges::find(key.choices, wanted) == key.choices.end()) {
+      return fail(fmt::format("cannot be '{}'", wanted.substr(0, kMostNamed)),
+                  suggest(wanted, key.choices));
+    }
+  }
+  if (!value.is_number()) return {};
+  const auto number = value.get<double>();
+  if (!std::isfinite(key.min)) {
+    return std::isfinite(number) ? Status() : fail("is no finite number", key.doc);
+  }
+  if ((number >= key.min && number <= key.max) || (key.or_zero && number == 0.0)) return {};
+  return fail(
+      fmt::format("is {}from {} to {}", key.or_zero ? "neither 0 nor " : "not ", key.min, key.max),
+      key.doc);
+}
+
+std::string words_of(const ControlKey& key) {
+  return fmt::format("{}{}: {}", to_string(key.type), key.required ? "" : ", optional", key.doc);
+}
+
+}  // namespace tandem::apps
