@@ -42,10 +42,11 @@ const char kEstopExamples[] = R"(Examples:
   tandem estop --socket /tmp/run.sock                this one alone
   tandem estop --category 0                          take the torque away at once
   tandem estop --category 2                          a safe posture first, where a controller has one
-Exit status: 0 each loop has carried it out (or simulated time is paused, and it is next); 1 a stop
-is not confirmed, or there is no run. Over DDS what confirms is a run of this user on this machine,
-or whoever DDS Security has authenticated. `kill -USR1 PID` asks for the same without a socket, and gets
-no answer.)";
+
+Exit status: 0 each loop has carried it out, or does so first when its paused time goes on.
+1 a stop is not confirmed, or there is no run. Over DDS, a confirmation counts from a run of this
+user on this machine, or from one that DDS Security has authenticated. `kill -USR1 PID` asks for the
+same without a socket, and gets no answer.)";
 
 const char kPredictExamples[] = R"(Examples:
   tandem predict                                     one second ahead, of the run that goes on
@@ -321,7 +322,7 @@ void add_flags(CLI::App& app, EstopOptions& o) {
       ->check(CLI::IsMember({0, 1, 2}));
   add_target(app, o.target);
   app.add_flag("--trust-domain", o.trust_domain,
-               "Believe whoever answers in the DDS domain, where nobody but robots is")
+               "Believe every answer in the DDS domain: for a domain with robots only")
       ->needs("--dds");
   app.footer(kEstopExamples);
 }
