@@ -13,7 +13,7 @@
 namespace tandem::rt {
 namespace {
 
-/// Simulated time that is late by less makes it good, which holds the rate where a sleep is long
+/// Simulated time that is late by less catches up, which holds the rate where a sleep is long
 /// against a cycle; by more, and the grid moves: there is never a burst.
 constexpr std::int64_t kMostMadeGood_ns = 1'000'000;
 
