@@ -158,8 +158,7 @@ format:
 lint:
 	@scripts/install-dependencies test
 	@$(SOURCES) | xargs $(CLANG_FORMAT) --dry-run -Werror
-	@! git grep -nE '//[/!]?<? Of ' -- '*.cpp' '*.hpp' '*.c' '*.h' || \
-	  { echo 'make lint: no comment begins with "Of": name its subject first ("Row that …")' >&2; exit 1; }
+	@scripts/lint-english
 
 # At each commit, what is committed is laid out.
 hooks:

@@ -83,9 +83,9 @@ Result<std::shared_ptr<Domain>> Domain::open(const Config& config) {
   const bool any_ports = !has_free_ports(config.domain);
   if (any_ports) {
     fmt::print(stderr,
-               "warning: all UDP ports of the DDS domain {} on this machine are taken, by {}: who "
-               "does not look for this process by multicast finds it only when this one finds them "
-               "(`ss -lunp` as root names the processes; another domain: --domain, [dds] domain)\n",
+               "warning: all UDP ports of the DDS domain {} on this machine are taken, by {}. "
+               "A peer without multicast is found only if this process looks for it. `ss -lunp` as "
+               "root names the processes; another domain: --domain, [dds] domain\n",
                config.domain, port_holders(config.domain));
   }
   auto log = std::make_unique<DdsLog>();

@@ -58,10 +58,10 @@ void warn_of_intervals(const std::vector<Recording>& recordings, const Identifie
   }
   if (names.empty()) return;
   out.remarks.push_back(fmt::format(
-      "the log does not say for how long a motor's voltage was held, and in such a time the "
-      "back-EMF looks like rotor inertia, and what is sampled at its end is not the mean: the "
-      "intervals of these joints' rotors, and of what six-axis sensors measure behind them, allow "
-      "for a hold of up to {:.3g} ms: {}",
+      "the log does not say for how long a motor's voltage was held. During a hold the back-EMF "
+      "looks like rotor inertia, and a sample at its end is not the mean. So the intervals of "
+      "these joints' rotors, and of six-axis sensors behind them, allow for a hold of up to "
+      "{:.3g} ms: {}",
       1e3 * hold_s, names));
 }
 

@@ -67,7 +67,7 @@ class Resolver {
     if (again != joint.name) return;  // it leads into a ring: those that make it are reported
     if (joint.mimic == joint.name) return error(joint, "mimics itself", "name another joint");
     error(joint, "mimics joint '" + joint.mimic + "', and in the end itself",
-          "one joint of the ring must follow nobody");
+          "one joint of the ring must not follow another");
   }
 
   const std::string& file_;

@@ -13,9 +13,9 @@
 namespace tandem::rt {
 namespace {
 
-/// Simulated time that is late by less makes it good, which holds the rate where a sleep is long
-/// against a cycle; by more, and the grid moves: there is never a burst.
-constexpr std::int64_t kMostMadeGood_ns = 1'000'000;
+/// Simulated time that is late by less catches up, which keeps the rate where a sleep is long
+/// compared with a cycle. Beyond it the grid shifts: there is never a burst of cycles.
+constexpr std::int64_t kMostCaughtUp_ns = 1'000'000;
 
 std::int64_t scaled(std::int64_t period_ns, double rate) {
   if (rate <= 0.0) return 0;
@@ -98,7 +98,7 @@ bool CyclicLoop::pace(Tick& tick) noexcept {
     const std::int64_t missed = (begin_ns_ - grid_ns_ + step_ns_ - 1) / step_ns_;
     judge(tick, static_cast<std::uint64_t>(missed));
     if (config_.pacing == Pacing::kSimulated) {
-      grid_ns_ = std::max(grid_ns_, begin_ns_ - kMostMadeGood_ns);
+      grid_ns_ = std::max(grid_ns_, begin_ns_ - kMostCaughtUp_ns);
       return true;
     }
     grid_ns_ += missed * step_ns_;

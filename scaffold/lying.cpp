@@ -36,10 +36,9 @@ Error lies(const std::string& root, const Eigen::Vector3d& down, const Eigen::Ve
           .hint = fmt::format(
               "put a root with z up before it: <link name=\"upright\"/> <joint "
               "name=\"to_upright\" type=\"fixed\"><origin rpy=\"{}\"/><parent "
-              "link=\"upright\"/><child link=\"{}\"/></joint> (it looks along its {}, as its "
-              "joints and "
-              "feet have it; to another side with another last number); or give --base floating "
-              "to take it as it is, --base fixed to do without feet",
+              "link=\"upright\"/><child link=\"{}\"/></joint>. Its front is then its {}, as joints "
+              "and feet suggest; the last number turns it. Or give --base floating to take it as "
+              "it is, --base fixed to do without feet",
               upright_rpy(down, ahead), root, axis_name(ahead)),
           .file = {},
           .line = 0,

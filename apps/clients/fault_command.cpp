@@ -148,7 +148,7 @@ Error nobody_to_stop(const ControlSearch& search) {
 Exit tell_unvouched(const DdsAnswer& one) {
   print_errors({{.message = fmt::format(
                      "{}: the stop was sent, and participant {} says that it is carried out, for "
-                     "whom nobody vouches: it is no confirmation",
+                     "whom there is no proof: it is no confirmation",
                      one.who, one.participant ? dds::to_text(*one.participant) : "unknown"),
                  .hint = "if the robot moves, press its emergency stop or cut its power. What "
                          "confirms is a run of this user on this machine, or DDS Security "

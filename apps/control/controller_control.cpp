@@ -72,7 +72,7 @@ Result<Json> switch_by_hand(RunServices& services, const Names& stop, const Name
     const auto named = std::ranges::count(stop, one.name) + std::ranges::count(start, one.name);
     if (named == 0) continue;
     return fail("'" + one.name + "' is the owner in another process: it comes and goes by itself",
-                "end the owner's run; `tandem estop` stops the robot whoever has it");
+                "end the owner's run; `tandem estop` stops the robot in any case");
   }
   const auto asked = services.switch_controllers(stop, start);
   auto answer = tell(services, asked);

@@ -114,7 +114,7 @@ void print_modes(std::FILE* out, const SheetFacts& facts) {
   fmt::print(out, "\n{}\n",
              facts.modes_said
                  ? "Modes of operation, by 6502:"
-                 : "Modes that the objects allow; which the drive has is told by its 6502 alone:");
+                 : "Modes that the objects allow (only the drive's 6502 says which it has):");
   Table table({"mode", "", "needs", "lacks", "has also"});
   table.align_left();
   for (const SheetMode& mode : facts.modes) {

@@ -144,7 +144,7 @@ Result<Found> search(const robot::RobotFiles& robot, const ExciteOptions& option
     found.refused = std::move(*end);
     request.share *= kGentler;
   }
-  return fail("no experiment runs through in simulation; the gentlest ended with: " + found.refused,
+  return fail("no experiment completes in simulation; the gentlest ended with: " + found.refused,
               "give another --seed, a longer --period, or --share less");
 }
 

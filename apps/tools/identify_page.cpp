@@ -101,8 +101,9 @@ report::PageTable links_table(const Identification& result) {
   report::PageTable table{
       "Links",
       "In the axes of each link, with 95 % intervals from the data and from a description that is "
-      "doubted; Δ: difference from the description. (d): the data alone do not determine it, the "
-      "value follows from the description and from physical consistency. Most such numbers are no "
+      "doubted. Δ: difference from the description. What is marked (d) is not determined by the "
+      "data alone; the value follows from the description and from physical consistency. Most such "
+      "numbers are no "
       "fault of the log: the robot's joints show them only in sums with those of other links. The "
       "last column has the known sums: the next table has their values.",
       {"link", "mass [kg]", "Δ mass [kg]", "com [mm]", "Δ com [mm]", "Ixx Iyy Izz [g m2]",

@@ -264,7 +264,7 @@ std::optional<Error> refused_time(std::string_view cell) {
     return refuse("is a time of a 12-hour clock", "write the hours 0 to 23");
   if (zone.size() > 1 && word > colon) {
     return refuse(
-        "names a zone, and nobody knows which '" + zone + "' is meant",
+        "names the zone '" + zone + "', which has several meanings",
         "write how far it is from UTC, such as +01:00: sed 's/" + zone + "/+01:00/' FILE > NEW");
   }
   const bool bare = (colon == 1 || colon == 2) && digits(0) == colon && digits(colon + 1) == 2 &&

@@ -352,7 +352,7 @@ TEST(Found, TheRemedyForYUpKeepsAheadAndLinesAreLevel) {
   const Made refused = tried(lying);
   ASSERT_FALSE(refused);
   const std::string& hint = refused.error().front().hint;
-  EXPECT_NE(hint.find("looks along its +z"), std::string::npos) << hint;
+  EXPECT_NE(hint.find("Its front is then its +z"), std::string::npos) << hint;
   const std::size_t begin = hint.find("<link name="), end = hint.find("</joint>");
   ASSERT_NE(end, std::string::npos) << hint;
   const Made robot = tried(lying + hint.substr(begin, end + 8 - begin));
