@@ -1,4 +1,4 @@
-// The parts that a cycle joins, and what they share: time, state, phase, faults and log.
+// The parts that a cycle joins, and what they share: time, state, phase, limits, faults and log.
 // Layer: runtime.  Thread: made non-RT; the loop's, but for faults and progress.
 #pragma once
 
@@ -7,15 +7,18 @@
 #include "base/result.hpp"
 #include "estimation/estimator.hpp"
 #include "hal/backend.hpp"
+#include "hal/command_limits.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/cycle_observer.hpp"
 #include "hal/truth.hpp"
 #include "log/recorder.hpp"
+#include "rt/cyclic_loop.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/cycle_config.hpp"
 #include "runtime/cycle_log.hpp"
 #include "runtime/fault.hpp"
 #include "runtime/fault_watch.hpp"
+#include "runtime/inbox.hpp"
 #include "runtime/owner_controller.hpp"
 #include "runtime/progress.hpp"
 #include "runtime/run_machine.hpp"
@@ -44,8 +47,11 @@ struct CycleNow : CycleParts {
   CycleNow(const CycleParts& parts, const CycleConfig& how)
       : CycleParts(parts),
         config(how),
+        inbox(how.loop),
+        loop(how.loop, clock, &inbox.clock()),
         state(robot.shape()),
         run(how),
+        limits(hal::robot_of(robot), how.loop.period_ns),
         watch(robot, backend, how.lost_after_cycles, how.fall),
         log(recorder, state, hal::CommandImage(robot.shape()), truth, estimate()) {
     progress.total_cycles = how.running_cycles;
@@ -59,16 +65,19 @@ struct CycleNow : CycleParts {
     log.event(time, kind, joint, code);
   }
   void archive(Archive& ar) {
-    ar(time, read_code, run, state, watch, faults);
+    ar(loop, time, read_code, run, limits, state, watch, faults);
     if (estimator != nullptr) ar(*estimator);
   }
 
   const CycleConfig config;
+  Inbox inbox;
+  rt::CyclicLoop loop;
   rt::Tick tick;
   hal::CycleTime time;
   Code read_code = Code::kOk;  ///< of the backend's read()
   hal::StateImage state;
   RunMachine run;
+  hal::CommandLimits limits;
   FaultWatch watch;
   FaultLog faults;
   CycleLog log;

@@ -141,7 +141,7 @@ void FaultResponse::reset_done() noexcept TANDEM_RT {
   now_.faults.clear_latched(
       now_.time.time_ns, [this](const FaultRecord& fault) { return !now_.watch.is_there(fault); });
   now_.run.unlatch();
-  loop_.forget_late();
+  now_.loop.forget_late();
   now_.event(EventKind::kResetDone);
   now_.progress.resets.fetch_add(1, std::memory_order_relaxed);
 }

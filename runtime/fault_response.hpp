@@ -2,7 +2,6 @@
 // Layer: runtime.  Thread: the loop's.
 #pragma once
 
-#include "rt/cyclic_loop.hpp"
 #include "runtime/waiting_controllers.hpp"
 
 namespace tandem::runtime {
@@ -10,9 +9,9 @@ namespace tandem::runtime {
 class FaultResponse {
  public:
   /// All outlive it.
-  FaultResponse(CycleNow& now, rt::CyclicLoop& loop, DriveResets& resets, JointArbiter& arbiter,
+  FaultResponse(CycleNow& now, DriveResets& resets, JointArbiter& arbiter,
                 WaitingControllers& waiting)
-      : now_(now), loop_(loop), resets_(resets), arbiter_(arbiter), waiting_(waiting) {}
+      : now_(now), resets_(resets), arbiter_(arbiter), waiting_(waiting) {}
 
   /// Notes a fault of this cycle, and carries out what its category says.
   void raise(FaultRecord record) noexcept TANDEM_RT;
@@ -50,7 +49,6 @@ class FaultResponse {
   void reset_failed() noexcept TANDEM_RT;
 
   CycleNow& now_;
-  rt::CyclicLoop& loop_;
   DriveResets& resets_;
   JointArbiter& arbiter_;
   WaitingControllers& waiting_;

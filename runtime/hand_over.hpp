@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "rt/cyclic_loop.hpp"
 #include "runtime/joint_arbiter.hpp"
 #include "runtime/run_services.hpp"
 #include "runtime/run_statistics.hpp"
@@ -15,9 +14,8 @@ namespace tandem::runtime {
 class HandOver {
  public:
   /// All outlive it.
-  HandOver(CycleNow& now, const rt::CyclicLoop& loop, const DriveResets& resets,
-           const JointHoming& homing, JointArbiter& arbiter, const hal::CommandLimits& limits,
-           RunServices& services);
+  HandOver(CycleNow& now, const DriveResets& resets, const JointHoming& homing,
+           JointArbiter& arbiter, RunServices& services);
 
   /// Each cycle, when its command is out.
   void take() noexcept TANDEM_RT;
@@ -36,11 +34,9 @@ class HandOver {
   void show(const hal::CommandImage& told) noexcept TANDEM_RT;
 
   CycleNow& now_;
-  const rt::CyclicLoop& loop_;
   const DriveResets& resets_;
   const JointHoming& homing_;
   JointArbiter& arbiter_;
-  const hal::CommandLimits& limits_;
   RunServices& services_;
   RunStatistics statistics_;
   std::vector<JointStatus> joints_;  // as services_ shows them

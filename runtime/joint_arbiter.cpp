@@ -5,10 +5,8 @@
 
 namespace tandem::runtime {
 
-JointArbiter::JointArbiter(CycleNow& now, hal::CommandLimits& limits, const DriveResets& resets,
-                           const JointHoming& homing)
+JointArbiter::JointArbiter(CycleNow& now, const DriveResets& resets, const JointHoming& homing)
     : now_(now),
-      limits_(limits),
       resets_(resets),
       homing_(homing),
       leads_(now.robot.joints.size()),
@@ -95,7 +93,7 @@ bool JointArbiter::retreat() noexcept TANDEM_RT {
 }
 
 void JointArbiter::follow_robot() noexcept TANDEM_RT {
-  if (go_on_from_robot()) limits_.follow(command_);
+  if (go_on_from_robot()) now_.limits.follow(command_);
 }
 
 /// False: it follows no other loop.

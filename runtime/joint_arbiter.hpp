@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "hal/command_limits.hpp"
 #include "runtime/command_delay.hpp"
 #include "runtime/joint_homing.hpp"
 #include "runtime/joint_lead.hpp"
@@ -19,8 +18,7 @@ namespace tandem::runtime {
 class JointArbiter {
  public:
   /// All outlive it.
-  JointArbiter(CycleNow& now, hal::CommandLimits& limits, const DriveResets& resets,
-               const JointHoming& homing);
+  JointArbiter(CycleNow& now, const DriveResets& resets, const JointHoming& homing);
 
   /// Who leads `joint` in this cycle; before write(): in the last one.
   [[nodiscard]] JointLead lead(std::size_t joint) const noexcept TANDEM_RT { return leads_[joint]; }
@@ -94,7 +92,6 @@ class JointArbiter {
   void fill_delay() noexcept TANDEM_RT;
 
   CycleNow& now_;
-  hal::CommandLimits& limits_;
   const DriveResets& resets_;
   const JointHoming& homing_;
 

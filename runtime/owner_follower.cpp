@@ -5,16 +5,13 @@ namespace tandem::runtime {
 using hal::StopCategory;
 using log::EventKind;
 
-OwnerFollower::OwnerFollower(CycleNow& now, Inbox& inbox, rt::CyclicLoop& loop,
-                             JointArbiter& arbiter, FaultResponse& response)
+OwnerFollower::OwnerFollower(CycleNow& now, JointArbiter& arbiter, FaultResponse& response)
     : now_(now),
-      inbox_(inbox),
-      loop_(loop),
       arbiter_(arbiter),
       response_(response),
       port_(now.owner.port),
       causes_(now.robot.joints.size()) {
-  if (port_ != nullptr) port_->on_news([this] { inbox_.bell().ring(); });
+  if (port_ != nullptr) port_->on_news([this] { now_.inbox.bell().ring(); });
 }
 
 OwnerFollower::~OwnerFollower() {
@@ -40,13 +37,13 @@ void OwnerFollower::await() noexcept {
   const hal::PortView shown = view();
   port_->send(shown);
   for (;;) {
-    const std::uint32_t seen = inbox_.bell().count();
-    if (inbox_.bell().ended() || inbox_.is_urgent()) break;
+    const std::uint32_t seen = now_.inbox.bell().count();
+    if (now_.inbox.bell().ended() || now_.inbox.is_urgent()) break;
     const std::int64_t until_ns = port_->wait_until_ns(shown);
     if (until_ns == 0) break;
-    inbox_.bell().wait(seen, until_ns);
+    now_.inbox.bell().wait(seen, until_ns);
   }
-  loop_.exchanged();  // waiting is no work of the cycle's own
+  now_.loop.exchanged();  // waiting is no work of the cycle's own
 }
 
 hal::RemoteCommand OwnerFollower::follow() noexcept TANDEM_RT {

@@ -7,7 +7,6 @@
 
 #include "hal/remote_command.hpp"
 #include "runtime/fault_response.hpp"
-#include "runtime/inbox.hpp"
 
 namespace tandem::runtime {
 
@@ -15,8 +14,7 @@ namespace tandem::runtime {
 class OwnerFollower {
  public:
   /// All outlive it.
-  OwnerFollower(CycleNow& now, Inbox& inbox, rt::CyclicLoop& loop, JointArbiter& arbiter,
-                FaultResponse& response);
+  OwnerFollower(CycleNow& now, JointArbiter& arbiter, FaultResponse& response);
   ~OwnerFollower();
 
   /// In lockstep: blocks until the owner's command for this cycle is there, or there is something
@@ -32,8 +30,6 @@ class OwnerFollower {
   [[nodiscard]] hal::PortView view() noexcept TANDEM_RT;
 
   CycleNow& now_;
-  Inbox& inbox_;
-  rt::CyclicLoop& loop_;
   JointArbiter& arbiter_;
   FaultResponse& response_;
   hal::RemoteCommandPort* port_;

@@ -32,18 +32,16 @@ class AtWork {
 
 RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
     : now_(parts, config),
-      inbox_(config.loop),
-      loop_(config.loop, parts.clock, &inbox_.clock()),
       resets_(now_),
       homing_(now_, resets_),
-      limits_(hal::robot_of(parts.robot), config.loop.period_ns),
-      arbiter_(now_, limits_, resets_, homing_),
+      arbiter_(now_, resets_, homing_),
       waiting_(now_, arbiter_, homing_),
-      response_(now_, loop_, resets_, arbiter_, waiting_),
-      owner_(now_, inbox_, loop_, arbiter_, response_),
-      requests_(now_, inbox_, resets_, homing_, arbiter_, waiting_, response_),
-      services_(parts.robot, parts.controllers, inbox_, now_.progress, parts.controllers.gains()),
-      shown_(now_, loop_, resets_, homing_, arbiter_, limits_, services_),
+      response_(now_, resets_, arbiter_, waiting_),
+      owner_(now_, arbiter_, response_),
+      requests_{now_, resets_, homing_, arbiter_, waiting_, response_},
+      services_(parts.robot, parts.controllers, now_.inbox, now_.progress,
+                parts.controllers.gains()),
+      shown_(now_, resets_, homing_, arbiter_, services_),
       trace_(config.trace_cycles),
       joint_limited_(parts.robot.joints.size()) {}
 
@@ -76,7 +74,7 @@ void RobotCycle::wait() noexcept {
   const std::size_t most =
       4 + 16 + Inbox::kCapacity + 3 * now_.watch.joints() + now_.watch.sensors();
   if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
-  now_.tick = loop_.wait();
+  now_.tick = now_.loop.wait();
   trace_.begin(now_.tick);
 }
 
@@ -88,15 +86,15 @@ void RobotCycle::exchange() noexcept {
   tell_time();
   now_.backend.exchange(now_.time);
   if (const std::uint64_t missed = now_.backend.missed(); missed > 0) {
-    loop_.skip(now_.tick, missed);
+    now_.loop.skip(now_.tick, missed);
     tell_time();
   }
-  if (now_.backend.waits_for_bus()) trace_.mark(CycleStage::kExchange, loop_.exchanged());
+  if (now_.backend.waits_for_bus()) trace_.mark(CycleStage::kExchange, now_.loop.exchanged());
 }
 
 void RobotCycle::read() noexcept TANDEM_RT {
   now_.read_code = now_.backend.read(now_.time, now_.state);
-  loop_.shift(now_.backend.clock_shift_ns());
+  now_.loop.shift(now_.backend.clock_shift_ns());
   now_.state.cycle()[0] = now_.time.cycle;
   now_.state.time_ns()[0] = now_.time.time_ns;
   if (!started_) now_.event(EventKind::kStarted);
@@ -186,7 +184,7 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
 /// wins over all that was asked before it and in its cycle.
 void RobotCycle::take_inbox() noexcept TANDEM_RT {
   const hal::RemoteCommand wish = owner_.follow();
-  const Inbox::Urgent asked = inbox_.take_urgent();
+  const Inbox::Urgent asked = now_.inbox.take_urgent();
   const StopCategory declared = now_.robot.emergency_stop;
   if (asked.emergency_stop != StopCategory::kWarn) {
     response_.emergency_stop(EmergencyInput::kRequest, asked.emergency_stop);
@@ -223,8 +221,8 @@ void RobotCycle::update() noexcept TANDEM_RT {
 }
 
 void RobotCycle::limit() noexcept TANDEM_RT {
-  const Code limited = limits_.apply(now_.state, arbiter_.to_limit());
-  const auto codes = limits_.codes();
+  const Code limited = now_.limits.apply(now_.state, arbiter_.to_limit());
+  const auto codes = now_.limits.codes();
   for (std::size_t j = 0; limited != Code::kOk && j < codes.size(); ++j) {
     if (codes[j] == Code::kOk) continue;
     const auto joint = static_cast<std::int32_t>(j);
@@ -262,8 +260,8 @@ void RobotCycle::write() noexcept TANDEM_RT {
 /// To the log, the threads that watch the run, and those that wait for an answer.
 void RobotCycle::hand_over() noexcept TANDEM_RT {
   shown_.take();
-  inbox_.confirm(now_.time.cycle);
-  trace_.end(loop_.finish());
+  now_.inbox.confirm(now_.time.cycle);
+  trace_.end(now_.loop.finish());
 }
 
 // Snapshots.
@@ -271,7 +269,7 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
 void RobotCycle::archive(Archive& ar) {
   std::uint64_t controllers = now_.controllers.fingerprint();
   ar(controllers);  // first: restore() looks at it before anything changes
-  ar(now_, loop_, resets_, homing_, limits_, arbiter_, waiting_, response_);
+  ar(now_, resets_, homing_, arbiter_, waiting_, response_);
   ar(now_.controllers, shown_, started_, joint_limited_);
 }
 
@@ -291,7 +289,7 @@ void RobotCycle::show_snapshot() noexcept {
     const rt::ScopedRealtime now;
     (void)write_down(port->archive(), false);
   }
-  port->taken(loop_.next_cycle(), now_.clock.now_ns() - begin_ns);
+  port->taken(now_.loop.next_cycle(), now_.clock.now_ns() - begin_ns);
 }
 
 Result<std::vector<std::byte>> RobotCycle::save() {

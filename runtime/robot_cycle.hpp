@@ -31,8 +31,8 @@ class RobotCycle {
     }
   }
   /// For any thread: the end of the run, a reset, an emergency stop; simulated time.
-  [[nodiscard]] Inbox& inbox() noexcept { return inbox_; }
-  [[nodiscard]] const Inbox& inbox() const noexcept { return inbox_; }
+  [[nodiscard]] Inbox& inbox() noexcept { return now_.inbox; }
+  [[nodiscard]] const Inbox& inbox() const noexcept { return now_.inbox; }
   /// For any other thread: controllers and joints, while the run goes on.
   [[nodiscard]] RunServices& services() noexcept { return services_; }
   /// For any thread: whether the loop still cycles.
@@ -54,7 +54,7 @@ class RobotCycle {
   [[nodiscard]] std::string drive_fault(std::size_t joint, std::uint32_t code) const;
 
   // Results, for when the run has stopped.
-  [[nodiscard]] const rt::LoopStatistics& loop() const noexcept { return loop_.statistics(); }
+  [[nodiscard]] const rt::LoopStatistics& loop() const noexcept { return now_.loop.statistics(); }
   [[nodiscard]] const RunStatistics& statistics() const noexcept { return shown_.statistics(); }
   [[nodiscard]] const CycleConfig& config() const noexcept { return now_.config; }
   [[nodiscard]] std::uint64_t running_cycles() const noexcept { return arbiter_.running_cycles(); }
@@ -87,11 +87,8 @@ class RobotCycle {
   void archive(Archive& ar);
 
   CycleNow now_;
-  Inbox inbox_;
-  rt::CyclicLoop loop_;
   DriveResets resets_;
   JointHoming homing_;
-  hal::CommandLimits limits_;
   JointArbiter arbiter_;
   WaitingControllers waiting_;
   FaultResponse response_;

@@ -1,6 +1,6 @@
 // What a run can be asked for while it goes on: controllers come, go and change; joints are set.
 // Start here to command a running loop from another thread.
-// Layer: runtime.  Thread: any but the loop's; the loop's part is robot_cycle_inbox.cpp.
+// Layer: runtime.  Thread: any but the loop's; the loop's part is loop_requests.cpp.
 #pragma once
 
 #include <array>
