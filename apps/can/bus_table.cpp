@@ -58,30 +58,30 @@ void print(const BusLoad& load, std::FILE* out) {
 }  // namespace
 
 static void figures(Figures& f, const BusRow& row) {
-  f("what", row.row.what, "");
-  f("kind", std::string(kind_name(row.row.kind)), "`urgent`, `mean`, `on_change`");
-  f("frames", row.row.frames, "per cycle, as the next three");
-  f("bits", row.row.bits, "");
-  f("time_us", row.row.time_us, "");
-  f("load", row.row.time_us / row.period_us, "a share of the cycle");
+  f("what", row.row.what);
+  f("kind", "`urgent`, `mean`, `on_change`", std::string(kind_name(row.row.kind)));
+  f("frames", "per cycle, as the next three", row.row.frames);
+  f("bits", row.row.bits);
+  f("time_us", row.row.time_us);
+  f("load", "a share of the cycle", row.row.time_us / row.period_us);
 }
 
 void figures(Figures& f, const BusLoad& load) {
   std::vector<BusRow> rows;
   for (const BusLoadRow& row : load.rows) rows.push_back({row, load.period_us()});
-  f("bus", load.bus, "");
-  f("kind", std::string(load.kind == hal::BusKind::kCan ? "can" : "ethercat"), "`can`, `ethercat`");
-  f("fd", load.kind == hal::BusKind::kCan && load.fd, "");
-  f("bitrate", load.rates.nominal, "");
-  f("data_bitrate", load.rates.data, "");
-  f("period_us", load.period_us(), "");
-  f("rows", rows, "one kind of traffic each: [wire.md](wire.md#bus-load)");
-  f("urgent_us", load.urgent_us, "what every cycle must carry");
-  f("load", load.load, "a share");
-  f("load_if_all_changed", load.most_load, "a share, with every slow command in every cycle");
-  f("max_load", load.max_load, "of robot.toml");
-  f("ok", load.fits(), "");
-  f("remedy", load.remedy, "empty when it fits");
+  f("bus", load.bus);
+  f("kind", "`can`, `ethercat`", std::string(load.kind == hal::BusKind::kCan ? "can" : "ethercat"));
+  f("fd", load.kind == hal::BusKind::kCan && load.fd);
+  f("bitrate", load.rates.nominal);
+  f("data_bitrate", load.rates.data);
+  f("period_us", load.period_us());
+  f("rows", "one kind of traffic each: [wire.md](wire.md#bus-load)", rows);
+  f("urgent_us", "what every cycle must carry", load.urgent_us);
+  f("load", "a share", load.load);
+  f("load_if_all_changed", "a share, with every slow command in every cycle", load.most_load);
+  f("max_load", "of robot.toml", load.max_load);
+  f("ok", load.fits());
+  f("remedy", "empty when it fits", load.remedy);
 }
 
 Diagnostics show_buses(const hal::RobotConfig& robot, std::int64_t period_ns, std::FILE* out,

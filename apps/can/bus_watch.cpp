@@ -26,17 +26,16 @@ void BusWatch::look() {
 
 void figures(Figures& f, const OpenBus& bus) {
   const BusStatistics s = bus.end == nullptr ? BusStatistics{} : bus.end->statistics();
-  f("interface", bus.interface, "");
-  f(
-      "status", [&] { return bus.end->status_text(); }, "empty: good");
-  f("sent", s.sent, "frames");
-  f("received", s.received, "frames");
-  f("send_refused", s.send_refused, "frames not accepted");
-  f("queue_full", s.queue_full, "times");
-  f("receive_lost", s.receive_lost, "frames");
-  f("error_frames", s.error_frames, "");
-  f("ignored", s.ignored, "frames: 29-bit, remote or malformed");
-  f("recoveries", s.recoveries, "");
+  f("interface", bus.interface);
+  f("status", "empty: good", [&] { return bus.end->status_text(); });
+  f("sent", "frames", s.sent);
+  f("received", "frames", s.received);
+  f("send_refused", "frames not accepted", s.send_refused);
+  f("queue_full", "times", s.queue_full);
+  f("receive_lost", "frames", s.receive_lost);
+  f("error_frames", s.error_frames);
+  f("ignored", "frames: 29-bit, remote or malformed", s.ignored);
+  f("recoveries", s.recoveries);
 }
 
 void add_bus_facts(std::span<const OpenBus> buses, Facts& facts) {

@@ -51,14 +51,15 @@ rt::Percentiles cycles_of(const RoundTrip& trip) {
 }
 
 void figures(Figures& f, const RoundTrip& trip) {
-  f("node", trip.node, "");
-  f("bus", trip.bus, "");
-  f("id", trip.id, "");
-  f("echoes", echoes(trip), "answers that named the command they followed");
-  f("cycles", cycles_of(trip), "in cycles: 1 is on time");
-  f("cycles_histogram", trip.cycles, "index: cycles; the last: that many or more");
-  f("time_ns", trip.time,
-    "from handing the command over to the answer's arrival; null where the bus has no timestamps");
+  f("node", trip.node);
+  f("bus", trip.bus);
+  f("id", trip.id);
+  f("echoes", "answers that named the command they followed", echoes(trip));
+  f("cycles", "in cycles: 1 is on time", cycles_of(trip));
+  f("cycles_histogram", "index: cycles; the last: that many or more", trip.cycles);
+  f("time_ns",
+    "from handing the command over to the answer's arrival; null where the bus has no timestamps",
+    trip.time);
 }
 
 void print_slowest_nodes(std::span<const RoundTrip> trips, std::FILE* out) {

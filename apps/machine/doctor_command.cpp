@@ -13,26 +13,26 @@
 namespace tandem::apps {
 
 static void figures(Figures& f, const Finding& one) {
-  f("name", one.name, "");
-  f("health", std::string(to_string(one.health)), "`ok`, `warning`, `missing`");
-  f("value", one.value, "as found");
-  f("why", one.why, "what it means; empty when all is well");
-  f("mend", one.mend, "the command that fixes it; empty when there is none");
+  f("name", one.name);
+  f("health", "`ok`, `warning`, `missing`", std::string(to_string(one.health)));
+  f("value", "as found", one.value);
+  f("why", "what it means; empty when all is well", one.why);
+  f("mend", "the command that fixes it; empty when there is none", one.mend);
 }
 
 static void figures(Figures& f, const ClockFinding& one) {
-  f("bus", one.bus, "");
-  f("slave", one.slave, "its place, from 0");
-  f("name", one.name, "");
-  f("delay_ns", one.delay_ns, "of a frame from the reference clock, one way");
-  f("difference_ns", one.difference_ns, "the largest, without its sign");
-  f("jitter_ns", one.jitter_ns, "standard deviation of the difference");
+  f("bus", one.bus);
+  f("slave", "its place, from 0", one.slave);
+  f("name", one.name);
+  f("delay_ns", "of a frame from the reference clock, one way", one.delay_ns);
+  f("difference_ns", "the largest, without its sign", one.difference_ns);
+  f("jitter_ns", "standard deviation of the difference", one.jitter_ns);
 }
 
 void figures(Figures& f, const DoctorResult& result) {
-  f("findings", result.findings, "");
-  f("clocks", result.clocks,
-    "of each EtherCAT slave whose clock was measured and that follows another");
+  f("findings", result.findings);
+  f("clocks", "of each EtherCAT slave whose clock was measured and that follows another",
+    result.clocks);
 }
 
 namespace {

@@ -214,39 +214,39 @@ void print_latency(const LatencyPlan& plan, std::span<const LatencySample> sampl
 static void figures(Figures& f, const ProgramFigures& one) {
   std::vector<std::pair<std::int64_t, std::uint64_t>> histogram;
   for (const rt::HistogramBin& bin : one.bins) histogram.emplace_back(bin.upper_ns, bin.count);
-  f("latency_ns", one.latency_ns, "");
-  f("wakeups", one.wakeups, "");
-  f("cpus", one.cpus, "slice by slice");
-  f("histogram_ns", Json(histogram), "list of upper end of a bucket and count");
+  f("latency_ns", one.latency_ns);
+  f("wakeups", one.wakeups);
+  f("cpus", "slice by slice", one.cpus);
+  f("histogram_ns", "list of upper end of a bucket and count", Json(histogram));
 }
 
 static void figures(Figures& f, const OwnFigures& one) {
   figures(f, static_cast<const ProgramFigures&>(one));
-  f("skipped", one.skipped, "grid points that our loop missed completely");
+  f("skipped", "grid points that our loop missed completely", one.skipped);
 }
 
 static void figures(Figures& f, const LatencyRatio& ratio) {
   const auto finite = [](double value) { return known(std::isfinite(value), value); };
-  f("p50", finite(ratio.p50), "");
-  f("p99", finite(ratio.p99), "");
-  f("p999", finite(ratio.p999), "");
-  f("max", finite(ratio.max), "");
+  f("p50", finite(ratio.p50));
+  f("p99", finite(ratio.p99));
+  f("p999", finite(ratio.p999));
+  f("max", finite(ratio.max));
 }
 
 static void figures(Figures& f, const LatencySample& sample) {
-  f("load", sample.load, "`idle` or `stress`");
-  f("tandem", ours(sample), "");
-  f("cyclictest", theirs(sample), "null when it is not installed or may not run");
-  f("ratio", ratio(sample), "tandem to cyclictest");
+  f("load", "`idle` or `stress`", sample.load);
+  f("tandem", ours(sample));
+  f("cyclictest", "null when it is not installed or may not run", theirs(sample));
+  f("ratio", "tandem to cyclictest", ratio(sample));
 }
 
 void figures(Figures& f, const LatencyResult& result) {
-  f("kernel", kernel(), "of this machine");
-  f("period_ns", result.plan.period_us * 1000, "of both programs");
-  f("scheduling", policy_text(result.plan), "policy and priority of both");
-  f("mode", std::string(to_string(result.plan.mode)), "`swap`, `together` or `turns`");
-  f("slices", result.plan.slices, "parts of each measurement");
-  f("loads", result.samples, "");
+  f("kernel", "of this machine", kernel());
+  f("period_ns", "of both programs", result.plan.period_us * 1000);
+  f("scheduling", "policy and priority of both", policy_text(result.plan));
+  f("mode", "`swap`, `together` or `turns`", std::string(to_string(result.plan.mode)));
+  f("slices", "parts of each measurement", result.plan.slices);
+  f("loads", result.samples);
 }
 
 std::vector<report::Figure> latency_figures(std::span<const LatencySample> samples) {

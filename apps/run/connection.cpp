@@ -34,16 +34,12 @@ std::string hal_name(const runtime::Experiment& e) {
 
 void figures(Figures& f, const runtime::Experiment* e) {
   const auto here = [e] { return e->hal.backend == runtime::BackendKind::kSim; };
-  f(
-      "engine", [&] { return known(here(), e->sim.engine); },
-      "`[sim] engine`; null where no plant is in this process");
-  f(
-      "engine_version",
-      [&] {
-        const std::string version = here() ? sim::engine_version(e->sim.engine) : "";
-        return known(!version.empty(), version);
-      },
-      "null of Tandem's own");
+  f("engine", "`[sim] engine`; null where no plant is in this process",
+    [&] { return known(here(), e->sim.engine); });
+  f("engine_version", "null of Tandem's own", [&] {
+    const std::string version = here() ? sim::engine_version(e->sim.engine) : "";
+    return known(!version.empty(), version);
+  });
 }
 
 std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& experiment,

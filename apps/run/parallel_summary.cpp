@@ -132,50 +132,38 @@ Named<std::vector<Apart>> sensors_apart(const ParallelSummary& s) {
 }  // namespace
 
 static void figures(Figures& f, const Apart& one) {
-  f("rms", one.rms, "of first minus second");
-  f("max", one.max, "");
+  f("rms", "of first minus second", one.rms);
+  f("max", one.max);
 }
 
 static void figures(Figures& f, const JointApart& joint) {
-  f("position_rad", joint.position_rad, "");
-  f("velocity_rad_s", joint.velocity_rad_s, "");
-  f("torque_Nm", joint.torque_Nm, "");
+  f("position_rad", joint.position_rad);
+  f("velocity_rad_s", joint.velocity_rad_s);
+  f("torque_Nm", joint.torque_Nm);
 }
 
 static void figures(Figures& f, const BaseApart& base) {
-  f("position_m", base.position_m, "how far the two are apart");
-  f("angle_rad", base.angle_rad, "by which they are turned");
+  f("position_m", "how far the two are apart", base.position_m);
+  f("angle_rad", "by which they are turned", base.angle_rad);
 }
 
 void figures(Figures& f, const ParallelSummary& s) {
-  f(
-      "robot", [&] { return s.second->file; }, "its file");
-  f(
-      "cycles", [&] { return s.result->cycles; }, "that it made");
-  f(
-      "compared", [&] { return s.all->compared(); }, "");
-  f(
-      "both_followed", [&] { return s.all->cycles(); },
-      "cycles in which both followed their command, of which the figures are");
-  f(
-      "unequal", [&] { return s.all->unequal(); },
-      "of those compared: any field of the state differs");
-  f(
-      "first_unequal", [&] { return known(s.all->first_unequal() >= 0, s.all->first_unequal()); },
-      "number of the first such cycle");
-  f(
-      "missed", [&] { return s.result->missed; }, "commands that it never got");
-  f(
-      "most_behind", [&] { return s.result->most_behind; }, "cycles");
-  f(
-      "fault", [&] { return known(!s.result->fault.empty(), s.result->fault); }, "");
-  f(
-      "base", [&] { return base_apart(*s.all); },
-      "null where one of the two truths is not known, or nothing floats");
-  f(
-      "joints", [&] { return joints_apart(s); }, "");
-  f(
-      "sensors", [&] { return sensors_apart(s); }, "each channel");
+  f("robot", "its file", [&] { return s.second->file; });
+  f("cycles", "that it made", [&] { return s.result->cycles; });
+  f("compared", [&] { return s.all->compared(); });
+  f("both_followed", "cycles in which both followed their command, of which the figures are",
+    [&] { return s.all->cycles(); });
+  f("unequal", "of those compared: any field of the state differs",
+    [&] { return s.all->unequal(); });
+  f("first_unequal", "number of the first such cycle",
+    [&] { return known(s.all->first_unequal() >= 0, s.all->first_unequal()); });
+  f("missed", "commands that it never got", [&] { return s.result->missed; });
+  f("most_behind", "cycles", [&] { return s.result->most_behind; });
+  f("fault", [&] { return known(!s.result->fault.empty(), s.result->fault); });
+  f("base", "null where one of the two truths is not known, or nothing floats",
+    [&] { return base_apart(*s.all); });
+  f("joints", [&] { return joints_apart(s); });
+  f("sensors", "each channel", [&] { return sensors_apart(s); });
 }
 
 void print_parallel(const ParallelSummary& summary, std::FILE* out) {

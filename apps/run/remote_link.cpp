@@ -68,64 +68,54 @@ void tell_faults(remote::Server& server, const runtime::RobotCycle& cycle) {
 }
 
 static void figures(Figures& f, const remote::Playout* playout) {
-  f(
-      "starved_cycles", [&] { return playout->starved_cycles(); }, "in which there was no command");
-  f(
-      "holds", [&] { return playout->holds(); }, "how often that began");
+  f("starved_cycles", "in which there was no command", [&] { return playout->starved_cycles(); });
+  f("holds", "how often that began", [&] { return playout->holds(); });
 }
 
 void figures(Figures& f, const remote::RemoteBackend* client) {
-  f(
-      "turn_around_ns", [&] { return client->turn_around(); },
-      "from sending a command to the state that shows it");
-  f(
-      "missed_cycles", [&] { return client->missed_cycles(); }, "of the server");
+  f("turn_around_ns", "from sending a command to the state that shows it",
+    [&] { return client->turn_around(); });
+  f("missed_cycles", "of the server", [&] { return client->missed_cycles(); });
 }
 
 void figures(Figures& f, const remote::Server* server) {
-  f(
-      "leases", [&] { return server->lease().given(); }, "given");
-  f(
-      "losses", [&] { return server->losses(); }, "owners that lost the robot");
-  f(
-      "commands", [&] { return counts(*server); },
-      "counts: `taken`, `without_lease`, `out_of_order`, `stale`, `malformed`");
-  f(
-      "playout", [&] { return server->playout(); }, "with `[teleoperation]`: the robot's end");
-  f(
-      "dropped", [&] { return server->dropped(); }, "cycles that were not published");
-  f(
-      "age_ns", [&] { return server->age(); }, "of the state that each command answers");
-  f(
-      "age_cycles", [&] { return server->age_cycles(); }, "the same, in cycles");
+  f("leases", "given", [&] { return server->lease().given(); });
+  f("losses", "owners that lost the robot", [&] { return server->losses(); });
+  f("commands", "counts: `taken`, `without_lease`, `out_of_order`, `stale`, `malformed`",
+    [&] { return counts(*server); });
+  f("playout", "with `[teleoperation]`: the robot's end", [&] { return server->playout(); });
+  f("dropped", "cycles that were not published", [&] { return server->dropped(); });
+  f("age_ns", "of the state that each command answers", [&] { return server->age(); });
+  f("age_cycles", "the same, in cycles", [&] { return server->age_cycles(); });
 }
 
 static void figures(Figures& f, const remote::Network::Counts& messages) {
-  f("sent", messages.sent, "messages");
-  f("lost", messages.lost, "");
-  f("dropped", messages.dropped, "");
-  f("duplicated", messages.duplicated, "");
-  f("reordered", messages.reordered, "");
-  f("delivered", messages.delivered, "");
+  f("sent", "messages", messages.sent);
+  f("lost", messages.lost);
+  f("dropped", messages.dropped);
+  f("duplicated", messages.duplicated);
+  f("reordered", messages.reordered);
+  f("delivered", messages.delivered);
 }
 
 void figures(Figures& f, const remote::TeleFigures& link) {
-  f("up", link.up, "to the robot");
-  f("down", link.down, "from it");
-  f("starved_cycles", known(link.robot_end, link.starved_cycles),
+  f("up", "to the robot", link.up);
+  f("down", "from it", link.down);
+  f("starved_cycles",
     "in which the robot had no command; null when the robot's end is another process: "
-    "`remote.playout` there");
-  f("holds", known(link.robot_end, link.holds), "how often that began");
-  f("silent_cycles", link.silent_cycles, "until the end, since a state of the robot last came");
-  f("most_silent_cycles", link.most_silent_cycles, "the longest time without one");
-  f("unanswered_cycles", link.unanswered_cycles,
-    "until the end, since a state came that showed a newer command in force");
-  f("most_unanswered_cycles", link.most_unanswered_cycles, "the longest such time");
-  f("clock_cycles", link.clock_cycles,
-    "in real time: by which the commands' numbers followed the robot's clock");
-  f("compared", link.compared, "states that were held against their prediction");
-  f("worst_prediction_rad", known(link.compared > 0, link.worst_prediction_rad),
-    "of a joint of these: the state less its prediction");
+    "`remote.playout` there",
+    known(link.robot_end, link.starved_cycles));
+  f("holds", "how often that began", known(link.robot_end, link.holds));
+  f("silent_cycles", "until the end, since a state of the robot last came", link.silent_cycles);
+  f("most_silent_cycles", "the longest time without one", link.most_silent_cycles);
+  f("unanswered_cycles", "until the end, since a state came that showed a newer command in force",
+    link.unanswered_cycles);
+  f("most_unanswered_cycles", "the longest such time", link.most_unanswered_cycles);
+  f("clock_cycles", "in real time: by which the commands' numbers followed the robot's clock",
+    link.clock_cycles);
+  f("compared", "states that were held against their prediction", link.compared);
+  f("worst_prediction_rad", "of a joint of these: the state less its prediction",
+    known(link.compared > 0, link.worst_prediction_rad));
 }
 
 void add_remote_facts(const Json& run, Facts& facts) {

@@ -1,4 +1,4 @@
-// Figures of a result, each declared in one line: key, value, words. The JSON, the rows for people
+// Figures of a result, each declared in one line: key, words, value. The JSON, the rows for people
 // and the tables of docs/json.md follow from it.
 // Layer: apps/text.  Thread: main.
 #pragma once
@@ -39,7 +39,7 @@ template <class T>
 /// function, which is not called then.
 ///
 ///   void figures(Figures& f, const StartUp& start) {
-///     f("axes", start.axes, "that were enabled");
+///     f("axes", "that were enabled", start.axes);
 ///   }
 class Figures {
  public:
@@ -49,17 +49,22 @@ class Figures {
 
   /// One figure.
   /// @param key    ends with the unit; its order is that of the calls
+  /// @param words  for docs/json.md: what key and type do not say
   /// @param value  number, text, list, percentiles, a declared result, Named or optional of these;
   ///               or a function that returns one
-  /// @param words  for docs/json.md: what unit and type do not say
   template <class V>
-  void operator()(const char* key, const V& value, const char* words) {
+  void operator()(const char* key, const char* words, const V& value) {
     if constexpr (std::invocable<const V&>) {
       using Value = std::remove_cvref_t<std::invoke_result_t<const V&>>;
       documents_ ? describe<Value>(path_ + key, words, "") : set(key, value);
     } else {
       documents_ ? describe<V>(path_ + key, words, "") : set(key, [&] { return value; });
     }
+  }
+
+  template <class V>
+  void operator()(const char* key, const V& value) {
+    (*this)(key, "", value);
   }
 
   template <class V>
