@@ -46,7 +46,7 @@ canopen::DriveParameters drive_parameters(const RobotConfig& robot, const JointC
   const GainsConfig& gains = robot.gains_of(joint);
   const BoardConfig* board = robot.board(joint.board);
   const bool ours = board == nullptr || canopen::abilities_of(*board->sheet, joint.axis).settings;
-  auto p = canopen::DriveParameters::unsaid();
+  canopen::DriveParameters p = joint.drive;
   set_scales(joint, ours, p);
   set_motor(motor, gains, p);
   p.torque_slope_Nm_s = torque_rate_Nm_s(joint);

@@ -20,6 +20,7 @@
 #include "base/toml_reader.hpp"
 #include "canopen/board_sheet.hpp"
 #include "canopen/data_sheet.hpp"
+#include "canopen/drive_parameters.hpp"
 #include "hal/image.hpp"
 #include "hal/robot.hpp"
 #include "hal/stop_category.hpp"
@@ -179,6 +180,8 @@ struct JointConfig {
   double following_error_rad = 0.5;    ///< in CSP, beyond it for longer than the next: a fault;
   double following_timeout_s = 0.1;    ///< 0 rad: not watched
   bool following_error_given = false;  ///< following_error_rad is the file's, not its default
+  /// Settings of its drive that are keys as they are; NaN: no key. See drive_parameters().
+  canopen::DriveParameters drive = canopen::DriveParameters::unsaid();
   double max_oscillation = 0.35;    ///< RMS of the motor torque's fast part over the most that the
                                     ///< drive gives; 0: not watched
   double oscillation_time_s = 1.0;  ///< of that mean

@@ -56,10 +56,10 @@ std::array<double, 2> home_switch_rad(const hal::JointConfig& joint) {
 firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointConfig& joint) {
   const hal::ActuatorConfig& actuator = robot.actuator_of(joint);
   firmware::AxisSetup axis;
-  axis.parameters.take(hal::drive_parameters(robot, joint));
   axis.parameters.mismatch_window_rad = kMismatchWindow_rad;
   axis.parameters.stop_deceleration_rad_s2 = joint.max_velocity_rad_s / kQuickestStop_s;
   axis.parameters.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
+  axis.parameters.take(hal::drive_parameters(robot, joint));
   axis.torque_noise_Nm = joint.torque_noise_Nm;
   axis.reversed = joint.reversed;
   axis.zero_counts = joint.zero_counts;
