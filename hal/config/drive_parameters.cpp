@@ -64,6 +64,7 @@ canopen::DriveParameters drive_parameters(const RobotConfig& robot, const JointC
   p.following_window_rad = joint.following_error_rad;
   p.following_timeout_s = joint.following_timeout_s;
   p.oscillation_limit_Nm = oscillation_limit_Nm(joint, motor);
+  p.oscillation_time_s = joint.oscillation_time_s;
   p.excess_share = joint.max_excess;
   p.excess_time_s = joint.excess_time_s;
   p.swing_limit_rad_s = joint.max_swing * joint.max_velocity_rad_s;

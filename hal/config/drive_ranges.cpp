@@ -33,6 +33,7 @@ class RangeCheck {
     check_option("disable", stop.disable, kDisableOption);
     check_option("halt", stop.halt, kHaltOption);
     check_option("fault", stop.fault, kFaultReactionOption);
+    check_stop_deceleration();
     return std::move(errors_);
   }
 
@@ -46,6 +47,11 @@ class RangeCheck {
     const double per_rev = joint_.velocity_units_per_rev > 0.0 ? joint_.velocity_units_per_rev
                                                                : joint_.encoder_counts_per_rev;
     return rad_s * per_rev / (2.0 * std::numbers::pi);
+  }
+
+  [[nodiscard]] double acceleration_units(double rad_s2) const {
+    const double per_rev = joint_.acceleration_units_per_rev;
+    return per_rev > 0.0 ? rad_s2 * per_rev / (2.0 * std::numbers::pi) : velocity_units(rad_s2);
   }
 
   /// Where the joint's range is too much for its encoders, their counts are as often the slip.
@@ -124,11 +130,7 @@ class RangeCheck {
     using namespace canopen::object;
     if (!canopen::moves_by_profile(canopen::abilities_of(*board->sheet, joint_.axis))) return;
     const double velocity = velocity_units(joint_.max_velocity_rad_s);
-    const double acceleration = joint_.acceleration_units_per_rev > 0.0
-                                    ? joint_.max_acceleration_rad_s2 *
-                                          joint_.acceleration_units_per_rev /
-                                          (2.0 * std::numbers::pi)
-                                    : velocity_units(joint_.max_acceleration_rad_s2);
+    const double acceleration = acceleration_units(joint_.max_acceleration_rad_s2);
     check_rate("velocity", velocity, {kMaxProfileVelocity, kProfileVelocity});
     check_rate("acceleration", acceleration, {kProfileAcceleration, kProfileDeceleration});
   }
@@ -156,6 +158,28 @@ class RangeCheck {
                         what == "velocity" ? "velocity_rad_s" : "acceleration_rad_s2"));
       return;
     }
+  }
+
+  void check_stop_deceleration() {
+    const double asked = joint_.drive.stop_deceleration_rad_s2;
+    const BoardConfig* board = robot_.board(joint_.board);
+    if (std::isnan(asked) || board == nullptr) return;
+    const auto index = canopen::of_axis(canopen::object::kQuickStopDeceleration, joint_.axis);
+    if (!board->eds.empty() && !canopen::writable(*board->sheet, index, 0)) {
+      error(joint_.line, "stop_deceleration_rad_s2",
+            fmt::format("{:04X} cannot be written in {}", index, board->sheet->file),
+            "remove it: the drive stops as it was commissioned");
+      return;
+    }
+    const canopen::SheetEntry* entry = board->sheet->find(index);
+    const bool limited = entry != nullptr && entry->high.value_or(0) > 0;
+    const double most = limited ? static_cast<double>(*entry->high) : kMost32;
+    const double units = acceleration_units(asked);
+    if (units >= 0.5 && units <= most) return;
+    error(joint_.line, "stop_deceleration_rad_s2",
+          fmt::format("{:.6g} would be {:.3g} of the drive's units, and {:04X} takes 1 to {:.0f}",
+                      asked, units, index, most),
+          "give a value between these, or correct the joint's units");
   }
 
   void check_homing(const HomingConfig& homing) {

@@ -182,8 +182,9 @@ struct JointConfig {
   bool following_error_given = false;  ///< following_error_rad is the file's, not its default
   /// Settings of its drive that are keys as they are; NaN: no key. See drive_parameters().
   canopen::DriveParameters drive = canopen::DriveParameters::unsaid();
-  double max_oscillation = 0.35;  ///< RMS of the motor torque's fast part over the most that the
-                                  ///< drive gives; 0: not watched
+  double max_oscillation = 0.35;    ///< RMS of the motor torque's fast part over the most that the
+                                    ///< drive gives; 0: not watched
+  double oscillation_time_s = 1.0;  ///< of that mean
   double max_swing =
       0.25;  ///< of the maximum velocity: a swing about the reference; 0: not watched
   double max_excess = 0.25;    ///< by which motion may be beyond its limits; 0: not watched

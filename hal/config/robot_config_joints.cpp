@@ -120,10 +120,13 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   joint.following_timeout_s =
       table.number_or("following_timeout_s", joint.following_timeout_s, {0.0, 65.0});
   joint.max_oscillation = table.number_or("max_oscillation", joint.max_oscillation, {0.0, 10.0});
-  joint.drive.oscillation_time_s = table.number_or("oscillation_time_s", 1.0, {0.01, 60.0});
+  joint.oscillation_time_s =
+      table.number_or("oscillation_time_s", joint.oscillation_time_s, {0.01, 60.0});
   joint.max_swing = table.number_or("max_swing", joint.max_swing, {0.0, 10.0});
   joint.max_excess = table.number_or("max_excess", joint.max_excess, {0.0, 10.0});
   joint.excess_time_s = table.number_or("excess_time_s", joint.excess_time_s, {0.0, 60.0});
+  joint.drive.stop_deceleration_rad_s2 =
+      table.number_or("stop_deceleration_rad_s2", kUnset, kPositive);
   joint.brake = read_brake(table);
   joint.homing = read_homing(table);
   joint.stop_options = read_stop_options(table);

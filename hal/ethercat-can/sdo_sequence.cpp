@@ -250,6 +250,11 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   if (can.settings) return add_settings(add, robot, joint);
   add_mode_check(steps, can, joint.homing.has_value(), static_cast<int>(axis));
   add_unit_checks(steps, sheet, joint);
+  if (!std::isnan(joint.drive.stop_deceleration_rad_s2)) {
+    add(object::kQuickStopDeceleration, 0,
+        rate_units(AxisScale::of(robot, joint).acceleration_per_rad_s2,
+                   joint.drive.stop_deceleration_rad_s2));
+  }
   if (moves_by_profile(can)) add_profile(add, sheet, AxisScale::of(robot, joint), joint);
   if (takes(object::kInterpolationPeriod, 1) && takes(object::kInterpolationPeriod, 2)) {
     const auto limits = InterpolationLimits::of(sheet, static_cast<int>(axis));

@@ -73,7 +73,7 @@ TEST(SdoSequence, WritesTheProtections) {
   robot.actuators[0].temperature_limit_C = 110.0;
   robot.joints[1].following_error_rad = 0.25 * test::kPi;
   robot.joints[1].following_timeout_s = 0.05;
-  robot.joints[1].drive.oscillation_time_s = 0.5;
+  robot.joints[1].oscillation_time_s = 0.5;
   robot.joints[1].max_excess = 0.5;
   robot.joints[1].excess_time_s = 0.25;
   robot.joints[1].max_swing = 0.125;
@@ -100,6 +100,27 @@ TEST(SdoSequence, WritesTheProtections) {
   EXPECT_EQ(value(0x283A, 2), 40u);
   EXPECT_EQ(value(0x283A, 3), 10u);
   EXPECT_EQ(find(steps, 0x203A, 1), nullptr) << "axis 0 has no brake: nothing is written";
+}
+
+/// 2 pi rad/s^2 of 36000 counts a revolution: on our boards, and on a drive by its sheet.
+TEST(SdoSequence, WritesTheDecelerationOfAQuickStopWhereItIsGiven) {
+  for (const bool ours : {true, false}) {
+    RobotConfig robot = robot_config();
+    canopen::DataSheet sheet = *robot.boards[0].sheet;
+    if (!ours)
+      std::erase_if(sheet.entries, [](const auto& e) { return (e.index & 0x7FF) == 0x33; });
+    robot.boards[0].sheet = std::make_shared<const canopen::DataSheet>(sheet);
+    robot.joints[1].drive.stop_deceleration_rad_s2 = 2.0 * test::kPi;
+    const auto layout = make_pdo_layout(robot);
+    ASSERT_TRUE(layout);
+    ASSERT_EQ(layout->nodes[0].abilities[1].settings, ours);
+    const auto steps = make_configuration(robot, layout->nodes[0]);
+    const SdoStep* step = find(steps, 0x6885, 0);
+    ASSERT_NE(step, nullptr) << ours;
+    EXPECT_EQ(step->size, 4);
+    EXPECT_EQ(step->bytes, (std::array<std::uint8_t, 4>{0xA0, 0x8C, 0x00, 0x00}));
+    EXPECT_EQ(find(steps, 0x6085, 0), nullptr) << "axis 0 keeps its own";
+  }
 }
 
 TEST(SdoSequence, WritesTheSecondAxis800Higher) {

@@ -256,6 +256,30 @@ TEST_F(BoardSheet, OfOurOwnHasStopOptions) {
   EXPECT_EQ(errors[1].key, "joint.elbow.stop_options.fault");
 }
 
+TEST_F(BoardSheet, TakesADecelerationOfQuickStopsThatTheDriveHas) {
+  const auto errors = [&](const std::string& rad_s2, bool ours) {
+    std::string text = joint_with(
+        "encoder_counts_per_rev = 36000\n"
+        "motor_encoder_counts_per_rev = 36000\n"
+        "stop_deceleration_rad_s2 = " +
+        rad_s2 + "\n");
+    if (ours) text = with(text, "eds = \"drive.eds\"\n", "");
+    const auto robot = read(text);
+    EXPECT_TRUE(robot) << robot.error()[0].to_string();
+    EXPECT_EQ(robot->joints[0].drive.stop_deceleration_rad_s2, std::stod(rad_s2));
+    return check_drive_ranges(*robot, robot->joints[0]);
+  };
+  EXPECT_TRUE(errors("20", true).empty());
+  const Diagnostics small = errors("1e-5", true);
+  ASSERT_EQ(small.size(), 1U);
+  EXPECT_EQ(small[0].key, "joint.elbow.stop_deceleration_rad_s2");
+  EXPECT_EQ(errors("1e9", true).size(), 1U) << "more than 32 bits";
+  const Diagnostics none = errors("20", false);
+  ASSERT_EQ(none.size(), 1U) << "the sheet has no 6085";
+  EXPECT_NE(none[0].message.find("6085 cannot be written"), std::string::npos) << none[0].message;
+  EXPECT_NE(refused(joint_with("stop_deceleration_rad_s2 = 0\n")), "");
+}
+
 TEST_F(BoardSheet, KeepsAConfigurationWhereItCan) {
   const std::string why = refused(board_with("keeps_configuration = true\n"));
   EXPECT_NE(why.find("its drive cannot: 1010:1 is missing"), std::string::npos) << why;
