@@ -66,7 +66,7 @@ ControlKey choice(const char* name, const char* line, std::vector<std::string> o
   return {.name = name, .doc = fmt::format("{}", fmt::join(of, ", ")), .line = line, .choices = of};
 }
 ControlKey need(ControlKey key) { return key.required = true, key; }
-/// Of the command line alone.
+/// The same for the command line alone.
 ControlKey local(ControlKey key) { return key.sent = false, key; }
 
 const ControlKey kJoint = need(text("joint", "joint", "its name"));
