@@ -215,6 +215,21 @@ Result<Json> move(const Run& run, const Json& request) {
   return answer;
 }
 
+/// Brakes what an operator leads; a joint of a controller is that one's.
+Result<Json> halt(const Run& run) {
+  Json halted = Json::array();
+  bool done = true;
+  for (const runtime::JointInfo& joint : run.cycle.services().joints()) {
+    const bool homes = joint.look.homing.state == hal::HomingState::kHoming;
+    if (!joint.owner.empty() || (joint.look.moving == 0 && !homes)) continue;
+    const auto asked = run.cycle.services().move_joint(joint.name, {});
+    if (!asked) return std::unexpected(asked.error());
+    done = done && asked->done;
+    halted.push_back(joint.name);
+  }
+  return Json{{"done", done}, {"joints", std::move(halted)}};
+}
+
 Result<Json> reset(const Run& run, const std::string& name) {
   const auto joints = run.cycle.services().joints();
   const auto joint = std::ranges::find(joints, name, &runtime::JointInfo::name);
@@ -331,6 +346,7 @@ void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle, const hal:
     const auto name = request["joint"].get<std::string>();
     return tell(*run, name, run->cycle.services().move_joint(name, {}));
   });
+  registry.add("joint.halt", [run](const Json&) { return halt(*run); });
   using Services = runtime::RunServices;
   const auto asks = [run](Result<runtime::RequestResult> (Services::*what)(const std::string&,
                                                                            Services::Patience)) {
