@@ -194,7 +194,7 @@ Code JointArbiter::run_controllers() noexcept TANDEM_RT {
   unfollowed_.offer(now_.state, led());
   const Code code = now_.controllers.update(now_.time, now_.state, led());
   unfollowed_.take(now_.state, led());
-  now_.controllers.lead_back(led());
+  if (now_.run.in(RunPhase::kRunning)) now_.controllers.lead_back(led());  // a retreat waits
   return code;
 }
 

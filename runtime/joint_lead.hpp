@@ -49,7 +49,7 @@ struct JointSituation {
   if (joint.resetting && !claimed) return JointLead::kReset;
   if (claimed && retreats) return JointLead::kRetreat;
   if (claimed) return joint.owned ? JointLead::kOwner : JointLead::kController;
-  return joint.moving ? JointLead::kOperator : JointLead::kHold;
+  return joint.moving && !retreats ? JointLead::kOperator : JointLead::kHold;
 }
 
 }  // namespace tandem::runtime

@@ -159,7 +159,9 @@ class RunServices {
   /// Errors: unknown joint; claimed; within its limits; not in position control; not in the phases
   /// held or running.
   [[nodiscard]] Result<RequestResult> recover(const std::string& joint,
-                                              Patience patience = kPatience);
+                                              Patience patience = kPatience) {
+    return ask_of_joint(LoopRequest::Kind::kRecover, joint, patience);
+  }
   /// Moves a joint that no active controller claims, on a trapezoid of speed; one under way goes
   /// over into it. Without a target it brakes. Done means begun.
   /// Errors: unknown joint; claimed; a target, speed or acceleration beyond its limits (which are
@@ -172,14 +174,18 @@ class RunServices {
   /// Errors: unknown joint; claimed, while controllers run; its board is lost; the drives are
   /// another process'; another phase than faulted, held, settling, running.
   [[nodiscard]] Result<RequestResult> reset_joint(const std::string& joint,
-                                                  Patience patience = kPatience);
+                                                  Patience patience = kPatience) {
+    return ask_of_joint(LoopRequest::Kind::kReset, joint, patience);
+  }
   /// Lets the drive of a joint find the joint's place, as its `homing` in robot.toml says.
   /// Meanwhile nothing else moves the joint; stop it by move_joint() without a target. How it ends,
   /// joints() tells. Errors: unknown joint; it has no homing; claimed, while controllers run; its
   /// drive is in fault or not enabled; another process drives the robot; not in the phases held and
   /// running.
   [[nodiscard]] Result<RequestResult> home_joint(const std::string& joint,
-                                                 Patience patience = kPatience);
+                                                 Patience patience = kPatience) {
+    return ask_of_joint(LoopRequest::Kind::kHome, joint, patience);
+  }
   /// Gains of one of its drive's loops; they travel by SDO, within some ten cycles.
   /// Errors: unknown joint; a loop that it lacks; a gain that is negative, or no 32-bit number.
   [[nodiscard]] Result<RequestResult> set_gains(const std::string& joint, hal::PidLoop loop,
@@ -202,6 +208,9 @@ class RunServices {
   [[nodiscard]] Result<RequestResult> load(std::unique_ptr<HostedController> controller,
                                            Patience patience);
   [[nodiscard]] Status check_name(const std::string& name);
+  /// Asks for what needs no more than a joint.
+  [[nodiscard]] Result<RequestResult> ask_of_joint(LoopRequest::Kind kind, const std::string& joint,
+                                                   Patience patience);
   [[nodiscard]] Result<RequestResult> ask(Lock& lock, LoopRequest request, Patience patience);
   void collect();
   void free_what_left(const LoopRequest& request, const LoopAnswer& answer);

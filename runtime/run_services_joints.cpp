@@ -191,39 +191,23 @@ Result<RequestResult> RunServices::set_joint(const std::string& joint, const Joi
              patience);
 }
 
-Result<RequestResult> RunServices::recover(const std::string& joint, Patience patience) {
-  Lock lock(mutex_);
-  const Result<std::size_t> index = joint_to_change(joint);
-  if (!index) return std::unexpected(index.error());
-  if (Status free = check_free_to_move(*index); !free) return std::unexpected(free.error());
-  return ask(lock,
-             {.kind = LoopRequest::Kind::kRecover, .joint = static_cast<std::uint32_t>(*index)},
-             patience);
-}
-
-Result<RequestResult> RunServices::reset_joint(const std::string& joint, Patience patience) {
-  Lock lock(mutex_);
-  const Result<std::size_t> index = joint_to_change(joint);
-  if (!index) return std::unexpected(index.error());
-  return ask(lock, {.kind = LoopRequest::Kind::kReset, .joint = static_cast<std::uint32_t>(*index)},
-             patience);
-}
-
-Result<RequestResult> RunServices::home_joint(const std::string& joint, Patience patience) {
+Result<RequestResult> RunServices::ask_of_joint(LoopRequest::Kind kind, const std::string& joint,
+                                                Patience patience) {
   Lock lock(mutex_);
   const Result<std::size_t> index = joint_to_change(joint);
   if (!index) return std::unexpected(index.error());
   const hal::JointConfig& config = robot_->joints[*index];
-  if (!config.homing) {
+  if (kind == LoopRequest::Kind::kHome && !config.homing) {
     return std::unexpected(Error{.message = "has no homing: its encoder is taken for absolute",
                                  .hint = "give its [[joint]] the key `homing`",
                                  .file = robot_->file,
                                  .line = config.line,
                                  .key = joint});
   }
-  if (Status free = check_free_to_move(*index); !free) return std::unexpected(free.error());
-  return ask(lock, {.kind = LoopRequest::Kind::kHome, .joint = static_cast<std::uint32_t>(*index)},
-             patience);
+  if (kind != LoopRequest::Kind::kReset) {
+    if (Status free = check_free_to_move(*index); !free) return std::unexpected(free.error());
+  }
+  return ask(lock, {.kind = kind, .joint = static_cast<std::uint32_t>(*index)}, patience);
 }
 
 Result<RequestResult> RunServices::move_joint(const std::string& joint, const MoveRequest& wish,

@@ -28,8 +28,7 @@ struct Asked {
   }
 };
 
-/// "done in cycle 7", a note, and every single value of an answer: of a command that has no words
-/// of its own.
+/// "done in cycle 7", and the note.
 void tell_done(const Json& answer);
 
 // Each completes a question.

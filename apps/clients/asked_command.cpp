@@ -1,5 +1,6 @@
 // A command to a running process: its question by its row, and who tells its answer.
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
@@ -25,7 +26,25 @@ void print_injected(const Json& answer) {
   fmt::print("{} injected\n", answer.value("injected", 0) == 1 ? "the fault is" : "the faults are");
 }
 
-/// A command that does more than send its row's keys, and print tell_done().
+/// Every single value and list of an answer: of a command that has no words of its own.
+void print_values(const Json& answer) {
+  tell_done(answer);
+  Facts facts;
+  for (const auto& [key, value] : answer.items()) {
+    if (key == "ok" || key == "done" || key == "cycle" || key == "note") continue;
+    if (value.is_array()) {
+      std::vector<std::string> all;
+      for (const Json& one : value)
+        all.push_back(one.is_string() ? one.get<std::string>() : one.dump());
+      facts.add(key, all.empty() ? "-" : fmt::format("{}", fmt::join(all, ", ")));
+    } else if (!value.is_object()) {
+      facts.add(key, value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  }
+  facts.print(stdout);
+}
+
+/// A command that does more than send its row's keys, and print_values().
 struct Form {
   std::string_view name;
   void (*print)(const Json& answer) = nullptr;
@@ -62,7 +81,7 @@ constexpr Form kForms[]{
 
 /// The form of a command; of one that has none a plain one.
 const Form& form_of(const CommandRow& row) {
-  static constexpr Form kPlain{"", &tell_done};
+  static constexpr Form kPlain{"", &print_values};
   const auto* form = std::ranges::find(kForms, row.name, &Form::name);
   return form == std::end(kForms) ? kPlain : *form;
 }

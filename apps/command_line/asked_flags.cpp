@@ -124,7 +124,8 @@ CLI::Validator fits(const ControlKey& key) {
 CLI::Option* add_key(CLI::App& app, const ControlKey& key, Json& given) {
   using Type = ControlKey::Type;
   Json& to = given;
-  const std::string doc = sentence(key.doc) + unit_words(key.unit);
+  const std::string doc =
+      (key.choices.empty() ? sentence(key.doc) : key.doc) + unit_words(key.unit);
   const auto put = [&to, &key](const auto& value) { to[key.name] = value; };
   const bool flag = key.line.starts_with("--");
   if (key.type == Type::kBoolean) {

@@ -66,7 +66,7 @@ ControlKey choice(const char* name, const char* line, std::vector<std::string> o
   return {.name = name, .doc = fmt::format("{}", fmt::join(of, ", ")), .line = line, .choices = of};
 }
 ControlKey need(ControlKey key) { return key.required = true, key; }
-/// Of the command line alone.
+/// The same for the command line alone.
 ControlKey local(ControlKey key) { return key.sent = false, key; }
 
 const ControlKey kJoint = need(text("joint", "joint", "its name"));
@@ -132,6 +132,7 @@ const std::vector<CommandRow> kRows{
                  "until it has arrived: status 0; 1 when the motion ended elsewhere. Ctrl-C ends "
                  "the waiting, not the motion: tandem joint stop"))}},
     {"joint.stop", kChanges, "brakes a joint that joint.move or joint.home leads", {kJoint}},
+    {"joint.halt", kChanges, "brakes every joint that joint.move or joint.home leads"},
     {"joint.home", kChanges,
      "lets the drive of a joint find the joint's place, as its `homing` in robot.toml says; the "
      "command line waits for that: status 1 when it failed", {kJoint}},

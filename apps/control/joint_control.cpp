@@ -215,6 +215,21 @@ Result<Json> move(const Run& run, const Json& request) {
   return answer;
 }
 
+/// Brakes what an operator leads; a joint of a controller is that one's.
+Result<Json> halt(const Run& run) {
+  Json halted = Json::array();
+  bool done = true;
+  for (const runtime::JointInfo& joint : run.cycle.services().joints()) {
+    const bool homes = joint.look.homing.state == hal::HomingState::kHoming;
+    if (!joint.owner.empty() || (joint.look.moving == 0 && !homes)) continue;
+    const auto asked = run.cycle.services().move_joint(joint.name, {});
+    if (!asked) return std::unexpected(asked.error());
+    done = done && asked->done;
+    halted.push_back(joint.name);
+  }
+  return Json{{"done", done}, {"joints", std::move(halted)}};
+}
+
 Result<Json> reset(const Run& run, const std::string& name) {
   const auto joints = run.cycle.services().joints();
   const auto joint = std::ranges::find(joints, name, &runtime::JointInfo::name);
@@ -318,23 +333,6 @@ Result<Json> set_gains(Run& run, const Json& request) {
   return answer;
 }
 
-/// The commands by which a joint moves by itself: to a target, to its place, back into its limits.
-void add_moves(ControlRegistry& registry, const std::shared_ptr<const Run>& run) {
-  registry.add("joint.move", [run](const Json& request) { return move(*run, request); });
-  registry.add("joint.stop", [run](const Json& request) {
-    const auto name = request["joint"].get<std::string>();
-    return tell(*run, name, run->cycle.services().move_joint(name, {}));
-  });
-  registry.add("joint.home", [run](const Json& request) {
-    const auto name = request["joint"].get<std::string>();
-    return tell(*run, name, run->cycle.services().home_joint(name));
-  });
-  registry.add("joint.recover", [run](const Json& request) {
-    const auto name = request["joint"].get<std::string>();
-    return tell(*run, name, run->cycle.services().recover(name));
-  });
-}
-
 }  // namespace
 
 void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle, const hal::RobotConfig& robot,
@@ -343,7 +341,22 @@ void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle, const hal:
                                              hal::motor_feedback(robot), std::move(judge)});
   registry.add("joint.list", [run](const Json&) -> Result<Json> { return list(*run); });
   registry.add("joint.set", [run](const Json& request) { return set(*run, request); });
-  add_moves(registry, run);
+  registry.add("joint.move", [run](const Json& request) { return move(*run, request); });
+  registry.add("joint.stop", [run](const Json& request) {
+    const auto name = request["joint"].get<std::string>();
+    return tell(*run, name, run->cycle.services().move_joint(name, {}));
+  });
+  registry.add("joint.halt", [run](const Json&) { return halt(*run); });
+  using Services = runtime::RunServices;
+  const auto asks = [run](Result<runtime::RequestResult> (Services::*what)(const std::string&,
+                                                                           Services::Patience)) {
+    return [run, what](const Json& request) {
+      const auto name = request["joint"].get<std::string>();
+      return tell(*run, name, (run->cycle.services().*what)(name, Services::kPatience));
+    };
+  };
+  registry.add("joint.home", asks(&Services::home_joint));
+  registry.add("joint.recover", asks(&Services::recover));
   registry.add("joint.reset", [run](const Json& request) {
     return reset(*run, request["joint"].get<std::string>());
   });

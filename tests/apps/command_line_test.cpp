@@ -1,4 +1,5 @@
 // Help that teaches, and messages for what was mistyped.
+#include <cstdlib>
 #include <map>
 #include <string>
 #include <vector>
@@ -129,6 +130,22 @@ TEST_F(CommandLine, OfNumbersThatAreNotFiniteAreRefused) {
       EXPECT_NE(outcome.err.find(number), std::string::npos) << command << ": " << outcome.err;
     }
   }
+}
+
+TEST_F(CommandLine, IsCompletedByBashFromItsHelp) {
+  const auto completed = [this](const std::string& words, int word) {
+    const std::string script =
+        "source " + shell_word(TANDEM_SOURCE_DIR "/scripts/completion.bash") + "; COMP_WORDS=(" +
+        shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " " + words +
+        ") COMP_CWORD=" + std::to_string(word) + "; _tandem; echo -n ${COMPREPLY[@]}";
+    const std::string file = (folder_ / "completed.txt").string();
+    EXPECT_EQ(std::system(("bash -c " + shell_word(script) + " > " + shell_word(file)).c_str()), 0);
+    return read_text(file);
+  };
+  EXPECT_EQ(completed("joi", 1), "joint");
+  EXPECT_EQ(completed("joint mo", 2), "move");
+  EXPECT_EQ(completed("joint move elbow --sp", 4), "--speed");
+  EXPECT_EQ(completed("joint move elbow --to 30deg --w", 6), "--wait");
 }
 
 TEST_F(CommandLine, RateAndRealTimeExcludeEachOther) {

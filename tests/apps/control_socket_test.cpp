@@ -203,7 +203,8 @@ TEST_F(Socket, HasAThreadForEachTurn) {
   };
   registry.add({"stop", ControlEffect::kStops, "stops", {}}, waits(1));
   registry.add({"end", ControlEffect::kEnds, "ends", {}}, waits(1));
-  registry.add({"predict", ControlEffect::kReads, "takes long", {}, {.takes_long = true}}, waits(3));
+  registry.add({"predict", ControlEffect::kReads, "takes long", {}, {.takes_long = true}},
+               waits(3));
   registry.add({"move", ControlEffect::kChanges, "moves", {}}, waits(2));
   const auto socket = open(path);
   std::vector<int> clients;

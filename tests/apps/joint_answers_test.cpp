@@ -357,6 +357,21 @@ TEST_F(JointAnswers, TellAWaiterThatTheRunHasEnded) {
             "error: the run has ended (its own output and its log say how)\n");
 }
 
+TEST_F(JointAnswers, HaltEveryMotionOfAnOperator) {
+  begin();
+  for (const char* joint : {"elbow", "wrist"}) {
+    ASSERT_EQ(command({"joint", "move", joint, "--to", "-1.2", "--speed", "0.1"}), Exit::kDone);
+  }
+  EXPECT_EQ(command({"joint", "halt"}), Exit::kDone) << err;
+  has(out, "joints  elbow, wrist");
+  steps(2000);
+  for (const std::size_t j : {1U, 2U}) {
+    EXPECT_EQ(joint(j)["moving"], false);
+    EXPECT_GT(joint(j)["commanded_position_rad"].get<double>(), -1.0);
+  }
+  EXPECT_EQ(answer(R"({"do": "joint.halt"})")["joints"], Json::array()) << "nothing is led";
+}
+
 /// Somebody else stops it, or a fault does.
 TEST_F(JointAnswers, EndTheWaitingWithStatus1WhenTheMotionEndsElsewhere) {
   begin();
