@@ -64,6 +64,18 @@ TEST(Documentation, OfTheConfigurationHasEveryKey) {
   }
 }
 
+TEST(Documentation, OfImportsHasEveryKeyOfAMap) {
+  const std::string page = text_of(kRoot / "docs/import.md");
+  const auto keys = matches(text_of(kRoot / "log/import/import_map.cpp"),
+                            "\\w\\.(?:number|integer|text|choice|boolean|numbers|texts|table|"
+                            "tables)(?:_or|_or_empty)?\\(\"(\\w+)\"");
+  EXPECT_GT(keys.size(), 20U);
+  for (const std::string& key : keys) {
+    EXPECT_TRUE(std::regex_search(page, std::regex("\\b" + key + "\\b")))
+        << "docs/import.md does not know the key " << key;
+  }
+}
+
 TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
   const std::string page = text_of(kRoot / "docs/json.md");
   for (const char* file : {"apps/run/run_summary.cpp",        "apps/run/connection.cpp",
