@@ -12,6 +12,17 @@
 namespace tandem::dds {
 namespace {
 
+// A key a line.
+// clang-format off
+constexpr Key<Config> kKeys[] = {
+  key<&Config::enabled>("enabled", "`--dds` and `--no-dds` override it").by_default("`true`"),
+  key<&Config::domain>("domain", {0, 232}, "DDS domain, ROS 2's `ROS_DOMAIN_ID`. `--domain` overrides it"),
+  key<&Config::name_space>("namespace", "before the names of topics and services").by_default("none").within("`\"left\"`, `\"robots/left\"`"),
+  key<&Config::interfaces>("interfaces", "network interfaces; with `lo` alone nothing leaves this machine").by_default("`[\"lo\"]`").within("names or addresses"),
+  key<&Config::peers>("peers", "where to look for others, beside multicast").by_default("`[]`").within("addresses"),
+};
+// clang-format on
+
 /// What is larger is not received: a peer must not have this process allocate without limit.
 constexpr const char* kMostSampleBytes = "16 MiB";
 
@@ -121,25 +132,24 @@ std::string security_xml(const SecurityConfig& s) {
 
 Config read_config(TomlTable table, const std::string& folder) {
   Config config;
-  config.enabled = table.boolean_or("enabled", true);
-  config.domain = static_cast<int>(table.integer_or("domain", config.domain, 0, 232));
-  config.name_space = table.text_or("namespace", config.name_space);
+  config.enabled = true;
+  read_keys(table, kKeys, config);
   if (!config.name_space.empty()) {
     check_all(table, "namespace", {config.name_space}, &is_name_space,
               "letters, digits and _, in parts with / between: \"left\", \"robots/left\"");
   }
-  config.interfaces = table.texts_or("interfaces", config.interfaces);
   if (config.interfaces.empty()) {
     table.error("interfaces", "is empty", "[\"lo\"] keeps all on this machine");
   }
   check_all(table, "interfaces", config.interfaces, &is_address, "`ip link` lists the interfaces");
-  config.peers = table.texts_or("peers", config.peers);
   check_all(table, "peers", config.peers, &is_address, "addresses: \"192.168.1.20\"");
   if (table.has("security")) config.security = read_security(table.table("security"), folder);
   read_every(table.table_or_empty("every"), config);
   table.finish();
   return config;
 }
+
+void describe_keys(KeyPage& page) { page.add("[dds]", kKeys); }
 
 std::uint64_t Config::cycles_between(Topic topic, std::int64_t period_ns) const {
   const auto index = static_cast<std::size_t>(topic);

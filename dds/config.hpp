@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "base/keys.hpp"
 #include "base/result.hpp"
-#include "base/toml_reader.hpp"
 
 namespace tandem::dds {
 
@@ -84,6 +84,8 @@ struct Config {
 /// Reads the table; errors go to its document. An absent table gives the default.
 /// @param folder  of the TOML: the security files' paths are relative to it
 [[nodiscard]] Config read_config(TomlTable table, const std::string& folder);
+/// The keys of [dds], for docs/configuration.md.
+void describe_keys(KeyPage& page);
 
 /// Cyclone DDS' configuration of that: XML.
 /// @param any_ports  its UDP ports are any that are free, where others do not look for it

@@ -14,32 +14,25 @@ using estimation::CollisionConfig;
 using estimation::ObserverConfig;
 using estimation::WrenchConfig;
 
-BaseConfig read_base(TomlTable table) {
-  BaseConfig base;
-  base.imu = table.text_or("imu", {});
-  const auto positive = [&](const char* key, double& value, double most) {
-    value = table.number_or(key, value, {1e-9, most});
-  };
-  positive("gyro_noise_rad_s", base.gyro_noise_rad_s, 1.0);
-  positive("accelerometer_noise_m_s2", base.accelerometer_noise_m_s2, 10.0);
-  positive("gyro_drift_rad_s2", base.gyro_drift_rad_s2, 1.0);
-  positive("accelerometer_drift_m_s3", base.accelerometer_drift_m_s3, 10.0);
-  positive("gyro_bias_rad_s", base.gyro_bias_rad_s, 1.0);
-  positive("accelerometer_bias_m_s2", base.accelerometer_bias_m_s2, 10.0);
-  positive("foot_noise_m", base.foot_noise_m, 0.1);
-  positive("foot_slip_m_s", base.foot_slip_m_s, 10.0);
-  if (table.has("contact_force_N")) positive("contact_force_N", base.contact_force_N, 1e5);
-  base.rest_s = table.number_or("rest_s", base.rest_s, {0.01, 60.0});
-  table.finish();
-  return base;
-}
-
-ObserverConfig read_observer(TomlTable table) {
-  ObserverConfig observer;
-  observer.bandwidth_Hz = table.number_or("bandwidth_Hz", observer.bandwidth_Hz, {0.1, 1000.0});
-  table.finish();
-  return observer;
-}
+// A key a line.
+// clang-format off
+constexpr Key<BaseConfig> kBase[] = {
+  key<&BaseConfig::imu>("imu", "name of the sensor").by_default("the only one"),
+  key<&BaseConfig::gyro_noise_rad_s>("gyro_noise_rad_s", {1e-9, 1.0}, "of the IMU"),
+  key<&BaseConfig::accelerometer_noise_m_s2>("accelerometer_noise_m_s2", {1e-9, 10.0}, "of the IMU"),
+  key<&BaseConfig::gyro_drift_rad_s2>("gyro_drift_rad_s2", {1e-9, 1.0}, "random walk of the bias, per root of a second"),
+  key<&BaseConfig::accelerometer_drift_m_s3>("accelerometer_drift_m_s3", {1e-9, 10.0}, "random walk of the bias, per root of a second"),
+  key<&BaseConfig::gyro_bias_rad_s>("gyro_bias_rad_s", {1e-9, 1.0}, "deviation of the bias at the start"),
+  key<&BaseConfig::accelerometer_bias_m_s2>("accelerometer_bias_m_s2", {1e-9, 10.0}, "deviation of the bias at the start"),
+  key<&BaseConfig::foot_noise_m>("foot_noise_m", {1e-9, 0.1}, "of a foot's place as the encoders give it"),
+  key<&BaseConfig::foot_slip_m_s>("foot_slip_m_s", {1e-9, 10.0}, "random walk of a standing foot, per root of a second"),
+  key<&BaseConfig::contact_force_N>("contact_force_N", {1e-9, 1e5}, "vertical force at which a foot stands as likely as not").by_default("a tenth of the weight"),
+  key<&BaseConfig::rest_s>("rest_s", {0.01, 60.0}, "the estimate starts after so long at rest on its feet"),
+};
+constexpr Key<ObserverConfig> kObserver[] = {
+  key<&ObserverConfig::bandwidth_Hz>("bandwidth_Hz", {0.1, 1000.0}, "of the external torques: a low pass of second order, −3 dB there"),
+};
+// clang-format on
 
 CollisionConfig read_collision(TomlTable table, const hal::RobotConfig& robot) {
   CollisionConfig collision;
@@ -103,12 +96,23 @@ std::vector<WrenchConfig> read_wrenches(TomlTable& parent, const hal::RobotConfi
 
 estimation::EstimationConfig read_estimation(TomlTable table, const hal::RobotConfig& robot) {
   estimation::EstimationConfig config;
-  if (table.has("base")) config.base = read_base(table.table("base"));
-  if (table.has("observer")) config.observer = read_observer(table.table("observer"));
+  const auto whole = [&](const char* key, const auto& keys, auto& part) {
+    if (!table.has(key)) return;
+    TomlTable one = table.table(key);
+    read_keys(one, keys, part.emplace());
+    one.finish();
+  };
+  whole("base", kBase, config.base);
+  whole("observer", kObserver, config.observer);
   if (table.has("collision")) config.collision = read_collision(table.table("collision"), robot);
   if (table.has("wrench")) config.wrenches = read_wrenches(table, robot);
   table.finish();
   return config;
+}
+
+void describe_estimation(KeyPage& page) {
+  page.add("`[estimation.base]`", kBase);
+  page.add("`[estimation.observer]`", kObserver);
 }
 
 }  // namespace tandem::runtime

@@ -2,7 +2,7 @@
 // Layer: runtime.  Thread: non-RT only.
 #pragma once
 
-#include "base/toml_reader.hpp"
+#include "base/keys.hpp"
 #include "estimation/config.hpp"
 #include "hal/config/robot_config.hpp"
 
@@ -13,5 +13,8 @@ namespace tandem::runtime {
 /// says.
 [[nodiscard]] estimation::EstimationConfig read_estimation(TomlTable table,
                                                            const hal::RobotConfig& robot);
+
+/// The keys of [estimation.base] and [estimation.observer], for docs/configuration.md.
+void describe_estimation(KeyPage& page);
 
 }  // namespace tandem::runtime

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <limits>
 
 #include "base/file_name.hpp"
 #include "rt/clock_control.hpp"
@@ -11,46 +10,120 @@
 namespace tandem::runtime {
 namespace {
 
-using Names = std::vector<std::string>;
+// A key a line.
+// clang-format off
+constexpr Key<Experiment> kRoot[] = {
+  required(key<&Experiment::robot_file>("robot", "path of the robot.toml")),
+  required(key<&Experiment::duration_s>("duration_s", {0.0, 1e6, true}, "running time of the controllers, after the drives' bring-up. `--duration` overrides it")),
+  key<&Experiment::seed>("seed", {0.0, 9.3e18}, "of every random generator. `--seed` overrides it"),
+  key<&Experiment::posture>("posture", "where the simulated robot starts; required for a floating base").by_default("every joint at 0").within("a `[posture]` of the robot"),
+  key<&Experiment::kernel_variant>("kernel_variant", "of the dynamics' library. `--kernel-variant` overrides it").by_default("the best that the CPU supports"),
+};
+constexpr Key<rt::LoopConfig> kPeriod[] = {
+  key<&rt::LoopConfig::period_ns>("period_ns", {10'000, 1e9}, "of the loop; it and each board's `control_period_ns` divide one another, and drives of other makers can be set to it ([drives.md](drives.md#what-the-master-does-with-a-sheet))"),
+};
+constexpr Key<ControllerSpec> kController[] = {
+  required(key<&ControllerSpec::plugin>("plugin", "a bundled controller (`\"hold\"`, `\"squat\"`, …), or the path of a shared library, with a `/`: `\"./my.so\"` is beside this file")),
+  key<&ControllerSpec::name>("name", "unique; 1 to 64 bytes, no control characters, no comma").by_default("the plugin's"),
+  key<&ControllerSpec::active>("active", "`false`: it is loaded and checked, and waits for `tandem controller start`. Only active ones may not claim the same joint"),
+  by_hand<ControllerSpec>("parameters", "–", "table", "the controller's own: [controllers.md](controllers.md); an unknown key is an error"),
+};
+constexpr Key<HalOptions> kHal[] = {
+  key<&HalOptions::lockstep>("lockstep", "`\"can\"`: wait for an emulated robot's answers without a time limit, at any speed; `\"dds\"`: the same for a server in lockstep"),
+  key<&HalOptions::delay_cycles>("delay_cycles", {0, 1000}, "the references reach the limits this many cycles later; until the first every joint is held. `--delay-cycles` overrides it; `tandem serve` has none"),
+  key<&HalOptions::answer_window>("answer_window", {0.05, 0.95}, "`\"can\"` in real time, and `sim.bus_timing`: share of the period in which answers are awaited"),
+  key<&HalOptions::settle_s>("settle_s", {0.0, 600.0}, "every joint is held in place from the moment all drives are enabled until the controllers start").by_default("`hoist.release_s`, 0 without a hoist"),
+  by_hand<HalOptions>("backend", "`\"sim\"`", "`\"sim\"`, `\"can\"`, `\"ethercat\"`, `\"dds\"`", "the robot in this process, boards on their buses (`\"can\"` and `\"ethercat\"` mean the same; refused for a robot without such a bus), or a robot of another process ([remote.md](remote.md)). `--hal` overrides it"),
+};
+constexpr Key<SimOptions> kSim[] = {
+  choice<&SimOptions::engine>("engine", sim::kEngineChoices, "who moves the bodies and carries the soles: [simulation.md](simulation.md#engines-of-others). Others have to be installed, and may refuse the robot by name"),
+  choice<&SimOptions::integrator>("integrator", "semi_implicit|rk4", "of the plant; of another engine its usual one, or its own `rk4` if it has one"),
+  key<&SimOptions::substep_ns>("substep_ns", {1e3, 1e8}, "step of the integrator; divides the period and every control period"),
+  key<&SimOptions::order>("order", {0, 3}, "of every actuator; a change between {0, 1} and {2, 3} needs kernels made for it: a rigid joint carries its rotor").by_default("as robot.toml says"),
+  key<&SimOptions::noise>("noise", "`false`: no sensor has noise"),
+  key<&SimOptions::ground_truth>("ground_truth", "log the plant's true state beside the measured one"),
+  key<&SimOptions::bus_timing>("bus_timing", "frames take their time on a real bus, by identifier and bit rate ([wire.md](wire.md#bus-timing)); `false`: they arrive at once"),
+  key<&SimOptions::bus_latency_ns>("bus_latency_ns", {0, 1e7}, "with `bus_timing`: delay in every node's driver or firmware, before a frame takes part in the arbitration"),
+};
+constexpr Key<SimOptions> kHoist[] = {
+  key<&SimOptions::hoist>("enabled", "base and joints are held until every drive is enabled"),
+  key<&SimOptions::hoist_release_s>("release_s", {0.0, 60.0}, "the hoist's force fades to zero over this time: a robot that stands is loaded gently, one that hangs drops"),
+  key<&SimOptions::hoist_lift_m>("lift_m", {0.0, 10.0}, "more than 0, of a floating base: it hangs so much higher than its posture says, and is never lowered; on a real robot: the hoist stays ([identification.md](identification.md))"),
+};
+constexpr Key<rt::LoopConfig> kOverrun[] = {
+  choice<&rt::LoopConfig::on_overrun>("policy", "skip|hold|stop", "after a late cycle: continue at the next grid point; repeat the last command once; stop after `n` late cycles of the last `m`"),
+  key<&rt::LoopConfig::stop_late>("n", {1, 64}, "n ≤ m"),
+  key<&rt::LoopConfig::stop_window>("m", {1, 64}, "cycles"),
+};
+constexpr Key<rt::LoopConfig> kClock[] = {
+  key<&rt::LoopConfig::rate>("rate", {0.0, rt::kFastest}, "simulated seconds per wall second; 0 is as fast as possible. `--rate` and `--realtime` override it, `tandem clock rate` changes it").within("0, or 0.01 to 1000"),
+  key<&rt::LoopConfig::start_paused>("start_paused", "pause before the first cycle until `tandem clock step` or `resume`, as `--start-paused` does"),
+};
+constexpr Key<rt::ThreadConfig> kRealtime[] = {
+  choice<&rt::ThreadConfig::policy>("policy", "other|fifo|rr", "scheduling policy"),
+  key<&rt::ThreadConfig::priority>("priority", {1, 99}, "of `\"fifo\"` and `\"rr\"`"),
+  key<&rt::ThreadConfig::cpu>("cpu", {0, 1023}, "the only CPU to run on").by_default("any"),
+  key<&rt::ThreadConfig::lock_memory>("lock_memory", "lock all memory"),
+};
+constexpr Key<Experiment> kFaults[] = {
+  choice<&Experiment::after_stop>("after_stop", "end|wait", "after a stop of category 0 or 1: end the run with exit status 1, or wait for `tandem fault reset`; `run --on-fault` overrides it: [safety.md](safety.md)").by_default("`\"wait\"` on the wall clock, `\"end\"` in simulated time"),
+  choice<&Experiment::after_reset>("after_reset", "hold|continue", "after `tandem fault reset`: hold every joint until `tandem controller start`, or let the controllers continue: [safety.md](safety.md#the-reset)"),
+  choice<&Experiment::on_stray>("stray_writes", "category0|category1|category2|hold|warn", "reaction to a controller that writes to a joint, or a mode, that it has not claimed; the write is reverted in the same cycle and reported once ([controllers.md](controllers.md#claims))"),
+  key<&Experiment::retreat_s>("retreat_s", {0.1, 60.0}, "the longest time of a retreat, in a stop of category 2; then the drives stop ([safety.md](safety.md#category-2-a-safe-posture-first))"),
+  choice<&Experiment::falls_are_faults>("fall", "allow|stop", "a fall of a simulated robot is a fault of category 1, or allowed ([safety.md](safety.md#a-fall))"),
+  key<&Experiment::watchdog_s>("watchdog_s", {0.05, 3600.0}, "a loop that does not finish a cycle for this time hangs: emergency stop, and the end of the process ([safety.md](safety.md#a-loop-that-hangs))").by_default("0.5 on the wall clock, 5 in simulated time"),
+};
+constexpr Key<RemoteOptions> kRemote[] = {
+  choice<&RemoteOptions::command>("command", "off|local|network", "`\"off\"`: others may look and stop the robot, no more; `\"local\"`: change as well, which needs `dds.interfaces = [\"lo\"]`; `\"network\"`: from wherever `[dds]` reaches").by_default("`\"off\"`"),
+  choice<&RemoteOptions::trust>("trust", "admitted|domain", "whose changes are accepted: those of participants that this user or root has admitted over the control socket, or everybody's in the domain. `\"network\"` without `[dds.security]` has no default: [security.md](security.md)").by_default("`\"domain\"` with `[dds.security]`, else `\"admitted\"`"),
+  key<&RemoteOptions::load>("load", "controllers may be loaded over DDS as well, by the names of this process' own, never by path"),
+  key<&RemoteOptions::lockstep>("lockstep", "each cycle waits for its owner's command; simulated time only. `tandem serve --lockstep`"),
+  key<&RemoteOptions::lease_timeout_s>("lease_timeout_s", {0.05, 60.0}, "an owner that is silent for this time has lost the robot"),
+  key<&RemoteOptions::lockstep_timeout_s>("lockstep_timeout_s", {0.05, 3600.0}, "in lockstep: longest time that a cycle waits for the command of a live owner"),
+  key<&RemoteOptions::max_age_cycles>("max_age_cycles", {1, 1e5}, "in real time: a command that answers an older cycle is rejected, and an owner without a younger one has lost the robot. With `[teleoperation]` at least the way there and back, play-out and `lease_timeout_s`"),
+  // A robot that is held goes on: nothing is stopped.
+  choice<&RemoteOptions::on_lost>("on_lost", "category0|category1|||hold", "reaction to a lost owner: every joint brakes, stays where it comes to rest, and the next owner may come; or the stop of that category, latched"),
+};
+constexpr Key<LogOptions> kLog[] = {
+  key<&LogOptions::folder>("folder", "relative to the folder in which the command was started; `--log` overrides it"),
+  choice<&LogOptions::compression>("compression", "none|lz4|zstd", "of the MCAP file's chunks"),
+};
+constexpr Key<ReportOptions> kReport[] = {
+  key<&ReportOptions::position_of>("position_of", "joint: position with reference").by_default("[chosen by the report](log.md#the-report)"),
+  key<&ReportOptions::torque_of>("torque_of", "joint: torque beside inverse dynamics").by_default("chosen by the report"),
+  key<&ReportOptions::foot>("foot", "force/torque sensor: vertical force").by_default("chosen by the report"),
+};
+constexpr Key<ParallelOptions> kParallel[] = {
+  key<&ParallelOptions::robot_file>("robot", "its robot.toml: the same joints, sensors, feet, closed loops and passive joints in the same order; all else may differ. `[sim]`, `posture` and `seed` are for both").by_default("the experiment's"),
+  by_hand<ParallelOptions>("link", "–", "table", "`link.NAME`: as [`[model.link.NAME]`](#modellinkname-mass-and-inertia-instead-of-the-urdfs), in place of its robot.toml's"),
+};
+// clang-format on
 
-template <class Enum>
-Enum read_choice(TomlTable& table, const char* key, const Names& names, Enum value) {
-  const std::string& name = names[static_cast<std::size_t>(value)];
-  const auto found = std::ranges::find(names, table.choice_or(key, name, names));
-  return static_cast<Enum>(found - names.begin());
+/// A table that its rows describe as a whole.
+template <class Config, std::size_t kCount>
+void read_whole(TomlTable table, const Key<Config> (&keys)[kCount], Config& config) {
+  read_keys(table, keys, config);
+  table.finish();
 }
 
 /// @param sim  says how long the hoist needs, which is the default of settle_s
 HalOptions read_hal(TomlTable table, const SimOptions& sim) {
-  HalOptions hal;
+  HalOptions hal{.settle_s = sim.hoist ? sim.hoist_release_s : 0.0};
   const std::string backend = table.choice_or("backend", "sim", {"sim", "can", "ethercat", "dds"});
   if (backend == "dds") hal.backend = BackendKind::kDds;
   if (backend == "can" || backend == "ethercat") {
     hal.backend = BackendKind::kWire;
     hal.wire = backend;
   }
-  hal.lockstep = table.boolean_or("lockstep", hal.lockstep);
-  hal.delay_cycles = static_cast<std::uint32_t>(table.integer_or("delay_cycles", 0, 0, 1000));
-  hal.answer_window = table.number_or("answer_window", hal.answer_window, {0.05, 0.95});
-  hal.settle_s = table.number_or("settle_s", sim.hoist ? sim.hoist_release_s : 0.0, {0.0, 600.0});
-  table.finish();
+  read_whole(table, kHal, hal);
   return hal;
 }
 
 SimOptions read_sim(TomlTable table) {
   SimOptions sim;
-  sim.engine = table.choice_or("engine", sim.engine, sim::known_engines());
-  sim.integrator = read_choice(table, "integrator", {"semi_implicit", "rk4"}, sim.integrator);
-  sim.substep_ns = table.integer_or("substep_ns", sim.substep_ns, 1'000, 100'000'000);
-  sim.order = static_cast<int>(table.integer_or("order", -1, 0, 3));
-  sim.noise = table.boolean_or("noise", sim.noise);
-  sim.ground_truth = table.boolean_or("ground_truth", sim.ground_truth);
-  sim.bus_timing = table.boolean_or("bus_timing", sim.bus_timing);
-  sim.bus_latency_ns = table.integer_or("bus_latency_ns", sim.bus_latency_ns, 0, 10'000'000);
+  read_keys(table, kSim, sim);
   TomlTable hoist = table.table_or_empty("hoist");
-  sim.hoist = hoist.boolean_or("enabled", sim.hoist);
-  sim.hoist_release_s = hoist.number_or("release_s", sim.hoist_release_s, {0.0, 60.0});
-  sim.hoist_lift_m = hoist.number_or("lift_m", sim.hoist_lift_m, {0.0, 10.0});
+  read_keys(hoist, kHoist, sim);
   if (sim.hoist_lift_m > 0.0 && !sim.hoist)
     hoist.error("lift_m", "without a hoist nothing lifts the base", "leave out enabled = false");
   hoist.finish();
@@ -59,76 +132,28 @@ SimOptions read_sim(TomlTable table) {
 }
 
 void read_overrun(TomlTable table, rt::LoopConfig& loop) {
-  loop.on_overrun = read_choice(table, "policy", {"skip", "hold", "stop"}, loop.on_overrun);
-  loop.stop_late = static_cast<int>(table.integer_or("n", loop.stop_late, 1, 64));
-  loop.stop_window = static_cast<int>(table.integer_or("m", loop.stop_window, 1, 64));
+  read_whole(table, kOverrun, loop);
   if (loop.stop_late > loop.stop_window) {
     table.error("n", "is more than m", "the policy stops after n late cycles of the last m");
   }
-  table.finish();
 }
 
 void read_clock(TomlTable table, rt::LoopConfig& loop) {
-  loop.rate = table.number_or("rate", loop.rate, {0.0, rt::kFastest});
+  read_whole(table, kClock, loop);
   if (const Status right = rt::check_rate(loop.rate); !right) {
     table.error("rate", right.error().message, right.error().hint);
   }
-  loop.start_paused = table.boolean_or("start_paused", loop.start_paused);
-  table.finish();
 }
 
 rt::ThreadConfig read_realtime(TomlTable& root) {
   rt::ThreadConfig thread;
-  if (!root.has("realtime")) {
+  if (root.has("realtime")) {
+    read_whole(root.table("realtime"), kRealtime, thread);
+  } else {
     thread.policy = rt::SchedulingPolicy::kOther;
     thread.lock_memory = false;
-    return thread;
   }
-  TomlTable table = root.table("realtime");
-  thread.policy = read_choice(table, "policy", {"other", "fifo", "rr"}, thread.policy);
-  thread.priority = static_cast<int>(table.integer_or("priority", thread.priority, 1, 99));
-  thread.cpu = static_cast<int>(table.integer_or("cpu", thread.cpu, 0, 1023));
-  thread.lock_memory = table.boolean_or("lock_memory", thread.lock_memory);
-  table.finish();
   return thread;
-}
-
-void read_faults(TomlTable table, Experiment& e) {
-  if (table.has("after_stop")) {
-    const bool ends = table.choice("after_stop", {"end", "wait"}) == "end";
-    e.after_stop = ends ? AfterStop::kEnd : AfterStop::kWait;
-  }
-  e.after_reset = read_choice(table, "after_reset", {"hold", "continue"}, e.after_reset);
-  e.on_stray = read_choice(table, "stray_writes",
-                           {"category0", "category1", "category2", "hold", "warn"}, e.on_stray);
-  e.retreat_s = table.number_or("retreat_s", e.retreat_s, {0.1, 60.0});
-  if (table.has("fall")) e.falls_are_faults = table.choice("fall", {"stop", "allow"}) == "stop";
-  if (table.has("watchdog_s")) e.watchdog_s = table.number("watchdog_s", {0.05, 3600.0});
-  table.finish();
-}
-
-RemoteOptions read_remote(TomlTable table) {
-  RemoteOptions remote;
-  if (table.has("command")) {
-    remote.command =
-        read_choice(table, "command", {"off", "local", "network"}, RemoteCommand::kOff);
-  }
-  if (table.has("trust")) {
-    remote.trust = read_choice(table, "trust", {"admitted", "domain"}, RemoteTrust::kAdmitted);
-  }
-  remote.load = table.boolean_or("load", remote.load);
-  remote.lockstep = table.boolean_or("lockstep", remote.lockstep);
-  remote.lease_timeout_s = table.number_or("lease_timeout_s", remote.lease_timeout_s, {0.05, 60.0});
-  remote.lockstep_timeout_s =
-      table.number_or("lockstep_timeout_s", remote.lockstep_timeout_s, {0.05, 3600.0});
-  remote.max_age_cycles = static_cast<std::uint64_t>(table.integer_or(
-      "max_age_cycles", static_cast<std::int64_t>(remote.max_age_cycles), 1, 100'000));
-  const std::string on_lost =
-      table.choice_or("on_lost", "hold", {"hold", "category1", "category0"});
-  if (on_lost == "category1") remote.on_lost = hal::StopCategory::kCategory1;
-  if (on_lost == "category0") remote.on_lost = hal::StopCategory::kCategory0;
-  table.finish();
-  return remote;
 }
 
 /// @param remote  its table
@@ -146,29 +171,23 @@ void check_remote(Experiment& e, TomlTable remote) {
                "there command the robot");
 }
 
-LogOptions read_log(TomlTable table) {
-  LogOptions log;
-  log.folder = table.text_or("folder", log.folder);
-  log.compression = read_choice(table, "compression", {"none", "lz4", "zstd"}, log.compression);
-  table.finish();
-  return log;
-}
-
 void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers) {
   for (TomlTable& table : root.tables("controller")) {
-    const std::string plugin = table.text("plugin");
-    const std::string name = table.text_or("name", std::filesystem::path(plugin).stem().string());
+    ControllerSpec one{
+        .plugin = {}, .name = {}, .active = true, .parameters = table.table_or_empty("parameters")};
+    read_keys(table, kController, one);
+    if (!table.has("name")) one.name = std::filesystem::path(one.plugin).stem().string();
+    const std::string& name = one.name;
     for (const ControllerSpec& other : controllers) {
       if (name.empty() || other.name != name) continue;
       table.error("name", "two controllers are called '" + name + "'", "rename one of them");
     }
     if (const std::string problem = listed_name_problem(name);
-        !plugin.empty() && !problem.empty()) {
+        !one.plugin.empty() && !problem.empty()) {
       table.error("name", "the controller's name " + problem, "give it another name");
     }
-    const bool active = table.boolean_or("active", true);
-    controllers.push_back({plugin, name, active, table.table_or_empty("parameters")});
     table.finish();
+    controllers.push_back(std::move(one));
   }
   if (controllers.empty() && !root.has("controller")) {
     root.error("controller", "there is no controller",
@@ -176,23 +195,14 @@ void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers)
   }
 }
 
-ReportOptions read_report(TomlTable table) {
-  ReportOptions report;
-  report.position_of = table.text_or("position_of", {});
-  report.torque_of = table.text_or("torque_of", {});
-  report.foot = table.text_or("foot", {});
-  table.finish();
-  return report;
-}
-
 /// @param folder  of the experiment
 ParallelOptions read_parallel(TomlTable table, const std::string& file, const std::string& folder,
                               const std::string& own_robot) {
   ParallelOptions parallel;
-  const std::filesystem::path robot = table.text_or("robot", {});
-  parallel.robot_file = robot.empty()
-                            ? own_robot
-                            : (std::filesystem::path(folder) / robot).lexically_normal().string();
+  read_keys(table, kParallel, parallel);
+  std::string& robot = parallel.robot_file;
+  robot = robot.empty() ? own_robot
+                        : (std::filesystem::path(folder) / robot).lexically_normal().string();
   TomlTable links = table.table_or_empty("link");
   parallel.robot.model.links = hal::read_links(links);
   for (hal::LinkConfig& link : parallel.robot.model.links) {
@@ -203,10 +213,10 @@ ParallelOptions read_parallel(TomlTable table, const std::string& file, const st
   return parallel;
 }
 
-const Names kSections{"robot",     "duration_s", "seed",       "posture",       "kernel_variant",
-                      "period_ns", "sim",        "hal",        "overrun",       "clock",
-                      "realtime",  "faults",     "remote",     "log",           "report",
-                      "dds",       "controller", "estimation", "teleoperation", "parallel"};
+const std::vector<std::string> kSections{
+    "robot",  "duration_s", "seed",       "posture",    "kernel_variant", "period_ns", "sim",
+    "hal",    "overrun",    "clock",      "realtime",   "faults",         "remote",    "log",
+    "report", "dds",        "controller", "estimation", "teleoperation",  "parallel"};
 
 }  // namespace
 
@@ -215,26 +225,22 @@ Experiment read_tables(const TomlDocument& document, TomlTable& root) {
   e.document = document;
   e.file = document.file();
   const bool right = root.holds_only(kSections);
-  const std::filesystem::path robot = root.text("robot");
-  if (!robot.empty()) {
-    e.robot_file = (std::filesystem::path(document.folder()) / robot).lexically_normal().string();
+  read_keys(root, kRoot, e);
+  read_keys(root, kPeriod, e.loop);
+  if (!e.robot_file.empty()) {
+    const std::filesystem::path folder = document.folder();
+    e.robot_file = (folder / e.robot_file).lexically_normal().string();
   }
-  e.duration_s = root.number("duration_s", {0.0, 1e6, true});
-  e.seed = static_cast<std::uint64_t>(
-      root.integer_or("seed", 1, 0, std::numeric_limits<std::int64_t>::max()));
-  e.posture = root.text_or("posture", {});
-  e.kernel_variant = root.text_or("kernel_variant", {});
-  e.loop.period_ns = root.integer_or("period_ns", e.loop.period_ns, 10'000, 1'000'000'000);
   e.sim = read_sim(root.table_or_empty("sim"));
   e.hal = read_hal(root.table_or_empty("hal"), e.sim);
   read_overrun(root.table_or_empty("overrun"), e.loop);
   read_clock(root.table_or_empty("clock"), e.loop);
   e.thread = read_realtime(root);
-  read_faults(root.table_or_empty("faults"), e);
-  e.remote = read_remote(root.table_or_empty("remote"));
+  read_whole(root.table_or_empty("faults"), kFaults, e);
+  read_whole(root.table_or_empty("remote"), kRemote, e.remote);
   e.teleoperation = read_teleoperation(root);
-  e.log = read_log(root.table_or_empty("log"));
-  e.report = read_report(root.table_or_empty("report"));
+  read_whole(root.table_or_empty("log"), kLog, e.log);
+  read_whole(root.table_or_empty("report"), kReport, e.report);
   if (root.has("parallel")) {
     e.parallel = read_parallel(root.table("parallel"), e.file, document.folder(), e.robot_file);
   }
@@ -242,6 +248,24 @@ Experiment read_tables(const TomlDocument& document, TomlTable& root) {
   check_remote(e, root.table_or_empty("remote"));
   if (right) read_controllers(root, e.controllers);  // else they may be in a table of another name
   return e;
+}
+
+void describe_experiment(KeyPage& page) {
+  page.add("experiment.toml", kRoot);
+  page.add("experiment.toml", kPeriod);
+  const TomlTable none = TomlDocument::parse({}, {})->root();
+  page.add("[[controller]]", kController, {}, {{}, {}, true, none});
+  page.add("[hal]", kHal);
+  page.add("[sim]", kSim);
+  page.add("[sim]", kHoist, "hoist.");
+  page.add("[overrun]", kOverrun);
+  page.add("[clock]", kClock);
+  page.add("[faults]", kFaults);
+  page.add("[remote]", kRemote);
+  page.add("[realtime]", kRealtime);
+  page.add("[log]", kLog);
+  page.add("[report]", kReport);
+  page.add("[parallel]", kParallel);
 }
 
 }  // namespace tandem::runtime

@@ -2,7 +2,7 @@
 // Layer: runtime.  Thread: non-RT only.
 #pragma once
 
-#include "base/toml_reader.hpp"
+#include "base/keys.hpp"
 #include "runtime/experiment.hpp"
 
 namespace tandem::runtime {
@@ -12,5 +12,8 @@ namespace tandem::runtime {
 /// missing ones, types, ranges, contradictions between them.
 /// @param root  the document's; [estimation] is left in it
 [[nodiscard]] Experiment read_tables(const TomlDocument& document, TomlTable& root);
+
+/// The keys of an experiment's tables, for docs/configuration.md.
+void describe_experiment(KeyPage& page);
 
 }  // namespace tandem::runtime

@@ -4,27 +4,33 @@
 namespace tandem::hal {
 namespace {
 
+// A key a line.
+// clang-format off
+constexpr Key<ActuatorConfig> kActuator[] = {
+  key<&ActuatorConfig::order>("order", {0, 3}, "0 rigid, 1 electrical, 2 mechanical (spring), 3 both"),
+  required(key<&ActuatorConfig::resistance_ohm>("resistance_ohm", kPositive, "R, winding")),
+  key<&ActuatorConfig::inductance_H>("inductance_H", kNotNegative, "L, winding; orders 1 and 3 need it"),
+  required(key<&ActuatorConfig::torque_constant_Nm_A>("torque_constant_Nm_A", kPositive, "K, of the motor before the gear")),
+  required(key<&ActuatorConfig::gear_ratio>("gear_ratio", kPositive, "N")),
+  required(key<&ActuatorConfig::inertia_kg_m2>("inertia_kg_m2", kPositive, "J, reflected: N² times the rotor's. Of a rigid actuator (orders 0, 1) it is part of the joint's inertia, and its brake acts on it")),
+  required(key<&ActuatorConfig::damping_Nms_rad>("damping_Nms_rad", kNotNegative, "D, **including** the back-EMF's share N²K²/R, which is subtracted again where the current is a state (orders 1, 3: at least that). In orders 0 and 2 less lowers the back-EMF; below half of it `check` and `run` warn")),
+  key<&ActuatorConfig::friction_Nm>("friction_Nm", kNotNegative, "dry (Coulomb) friction, where D acts: on the rotor, reflected; on the joint where there is no spring (simulation: [simulation.md](simulation.md#dry-friction))"),
+  key<&ActuatorConfig::spring_Nm_rad>("spring_Nm_rad", kNotNegative, "Ks; orders 2 and 3 need it"),
+  key<&ActuatorConfig::spring_damping_Nms_rad>("spring_damping_Nms_rad", kNotNegative, "Ds"),
+  required(key<&ActuatorConfig::current_limit_A>("current_limit_A", kPositive, "saturation of the motor's current")),
+  required(key<&ActuatorConfig::voltage_limit_V>("voltage_limit_V", kPositive, "saturation of the motor's voltage")),
+  key<&ActuatorConfig::thermal_resistance_K_W>("thermal_resistance_K_W", kPositive, "winding to ambient"),
+  key<&ActuatorConfig::thermal_time_constant_s>("thermal_time_constant_s", kPositive, "of the winding"),
+  key<&ActuatorConfig::continuous_current_A>("continuous_current_A", kNotNegative, "the drive's I2t limit (2031): the permanently permissible current; 0: not monitored"),
+  key<&ActuatorConfig::thermal_time_s>("thermal_time_s", kPositive, "time constant of that monitor"),
+  key<&ActuatorConfig::temperature_limit_C>("temperature_limit_C", {-50.0, 3000.0}, "of the winding (2034): the drive faults above it"),
+};
+// clang-format on
+
 ActuatorConfig read_actuator(TomlTable& table) {
   ActuatorConfig a;
-  a.order = static_cast<int>(table.integer_or("order", 2, 0, 3));
-  a.resistance_ohm = table.number("resistance_ohm", kPositive);
-  a.inductance_H = table.number_or("inductance_H", 0.0, kNotNegative);
-  a.torque_constant_Nm_A = table.number("torque_constant_Nm_A", kPositive);
-  a.gear_ratio = table.number("gear_ratio", kPositive);
-  a.inertia_kg_m2 = table.number("inertia_kg_m2", kPositive);
-  a.damping_Nms_rad = table.number("damping_Nms_rad", kNotNegative);
+  read_keys(table, kActuator, a);
   a.damping_line = table.line("damping_Nms_rad");
-  a.friction_Nm = table.number_or("friction_Nm", 0.0, kNotNegative);
-  a.spring_Nm_rad = table.number_or("spring_Nm_rad", 0.0, kNotNegative);
-  a.spring_damping_Nms_rad = table.number_or("spring_damping_Nms_rad", 0.0, kNotNegative);
-  a.current_limit_A = table.number("current_limit_A", kPositive);
-  a.voltage_limit_V = table.number("voltage_limit_V", kPositive);
-  a.thermal_resistance_K_W = table.number_or("thermal_resistance_K_W", 1.0, kPositive);
-  a.thermal_time_constant_s = table.number_or("thermal_time_constant_s", 60.0, kPositive);
-  a.continuous_current_A = table.number_or("continuous_current_A", 0.0, kNotNegative);
-  a.thermal_time_s = table.number_or("thermal_time_s", a.thermal_time_s, kPositive);
-  a.temperature_limit_C =
-      table.number_or("temperature_limit_C", a.temperature_limit_C, {-50.0, 3000.0});
   return a;
 }
 
@@ -119,5 +125,7 @@ void read_drive_tables(TomlTable& root, RobotConfig& robot) {
   }
   gains.finish();
 }
+
+void describe_drives(KeyPage& page) { page.add("[actuator.NAME]", kActuator); }
 
 }  // namespace tandem::hal

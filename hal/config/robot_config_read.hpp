@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "base/file_name.hpp"
+#include "base/keys.hpp"
 #include "base/nearest.hpp"
-#include "base/toml_reader.hpp"
 #include "hal/config/robot_config.hpp"
 
 namespace tandem::hal {
@@ -149,6 +149,8 @@ struct AxisAssignment {
 
 /// [actuator.NAME], [gains.NAME] and their defaults.
 void read_drive_tables(TomlTable& root, RobotConfig& robot);
+/// The keys of [actuator.NAME], for docs/configuration.md.
+void describe_drives(KeyPage& page);
 /// A table of a bus' `sensors`, to be read after every board.
 struct SensorTable {
   TomlTable table;

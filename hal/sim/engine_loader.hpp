@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/keys.hpp"
 #include "base/result.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/sim/engine.hpp"
@@ -17,8 +18,9 @@ inline constexpr const char* kOwnEngine = "tandem";
 
 /// The names that `[sim] engine` knows, installed or not; kOwnEngine first. Debian's package of
 /// another one is libNAME-dev.
+inline constexpr const char* kEngineChoices = "tandem|mujoco|dart|bullet|ode|simbody";
 [[nodiscard]] inline std::vector<std::string> known_engines() {
-  return {kOwnEngine, "mujoco", "dart", "bullet", "ode", "simbody"};
+  return offered_words(kEngineChoices);
 }
 /// Those that were built with this program, in the same order, without kOwnEngine.
 [[nodiscard]] std::vector<std::string> installed_engines();

@@ -41,13 +41,15 @@ std::set<std::string> keys_read() {
        {"hal/config/robot_config.cpp", "hal/config/robot_config_drives.cpp",
         "hal/config/robot_config_loops.cpp", "hal/config/robot_config_joints.cpp",
         "hal/sim/scenario.cpp", "runtime/experiment_tables.cpp", "runtime/estimation_options.cpp",
-        "runtime/teleoperation.cpp", "dds/config.cpp"}) {
+        "runtime/teleoperation.cpp", "dds/config.cpp", "hal/config/robot_config_boards.cpp",
+        "hal/config/robot_config_read.hpp"}) {
     const std::string source = text_of(kRoot / file);
-    const auto found = matches(source,
-                               "(?:number|integer|text|choice|boolean|numbers|texts|rows|table|"
-                               "tables|vector3|gain|positive)"
-                               "(?:_or|_or_empty|_or_default)?\\((?:table, )?\"(\\w+)\"");
-    EXPECT_GT(found.size(), 5U) << file << " reads no keys: is the pattern right?";
+    auto found = matches(source,
+                         "(?:number|integer|text|choice|boolean|numbers|texts|rows|table|"
+                         "tables|vector3|gain|identity|channels)"
+                         "(?:_or|_or_empty|_or_default)?\\((?:table, )?\"(\\w+)\"");
+    found.merge(matches(source, "(?:key|choice|by_hand)<[^>]*>\\(\"(\\w+)\""));
+    EXPECT_GT(found.size(), 3U) << file << " reads no keys: is the pattern right?";
     keys.insert(found.begin(), found.end());
   }
   return keys;
@@ -59,6 +61,18 @@ TEST(Documentation, OfTheConfigurationHasEveryKey) {
     const std::regex word("\\b" + key + "\\b");
     EXPECT_TRUE(std::regex_search(page, word))
         << "docs/configuration.md does not know the key " << key;
+  }
+}
+
+TEST(Documentation, OfImportsHasEveryKeyOfAMap) {
+  const std::string page = text_of(kRoot / "docs/import.md");
+  const auto keys = matches(text_of(kRoot / "log/import/import_map.cpp"),
+                            "\\w\\.(?:number|integer|text|choice|boolean|numbers|texts|table|"
+                            "tables)(?:_or|_or_empty)?\\(\"(\\w+)\"");
+  EXPECT_GT(keys.size(), 20U);
+  for (const std::string& key : keys) {
+    EXPECT_TRUE(std::regex_search(page, std::regex("\\b" + key + "\\b")))
+        << "docs/import.md does not know the key " << key;
   }
 }
 
