@@ -27,7 +27,7 @@ constexpr Row kRows[] = {
      JointLead::kOperator},
     {"a retreat", {.phase = RunPhase::kRetreating, .claimed = true}, JointLead::kRetreat},
     {"beside it", {.phase = RunPhase::kRetreating}, JointLead::kHold},
-    {"moved beside it", {.phase = RunPhase::kRetreating, .moving = true}, JointLead::kOperator},
+    {"moved beside it", {.phase = RunPhase::kRetreating, .moving = true}, JointLead::kHold},
     {"its drive is reset",
      {.phase = RunPhase::kRunning, .moving = true, .resetting = true},
      JointLead::kReset},
