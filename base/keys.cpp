@@ -25,7 +25,7 @@ std::int64_t whole(double limit) {
 
 std::string shown_number(double value) {
   std::array<char, 32> out{};
-  const bool plain = std::abs(value) < 1e7 && value == std::trunc(value);
+  const bool plain = std::abs(value) < 1e15 && value == std::trunc(value);
   const auto end =
       plain ? std::to_chars(out.data(), out.data() + out.size(), static_cast<std::int64_t>(value))
             : std::to_chars(out.data(), out.data() + out.size(), value);

@@ -102,13 +102,18 @@ std::string shown_key(const KeyFacts& key, const Value& value) {
 
 template <class Config, class Value>
 Config config_of(Value Config::*);
+/// What the page says of a key whose range says nothing.
+template <class Config, class Value>
+constexpr std::string_view kind_of(Value Config::*) {
+  return std::is_same_v<Value, std::string> ? "text" : std::is_same_v<Value, bool> ? "boolean" : "";
+}
 
 /// The row of a key with a number in a range, or with anything.
 template <auto kMember>
 constexpr auto key(std::string_view name, Range range, std::string_view words) {
   using Config = decltype(config_of(kMember));
   return Key<Config>{
-      {.name = name, .range = range, .words = words},
+      {.name = name, .range = range, .words = words, .limits = kind_of(kMember)},
       [](TomlTable& table, const KeyFacts& row, Config& config) {
         read_key(table, row, config.*kMember);
       },
@@ -123,6 +128,7 @@ template <auto kMember>
 constexpr auto choice(std::string_view name, std::string_view choices, std::string_view words) {
   auto row = key<kMember>(name, words);
   row.choices = choices;
+  row.limits = {};
   return row;
 }
 /// The same of a key that has to be there.

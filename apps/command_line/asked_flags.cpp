@@ -29,10 +29,11 @@ Without --socket or --dds it is the only `tandem run` of this user.)"},
   tandem estop --socket /tmp/run.sock                this one alone
   tandem estop --category 0                          take the torque away at once
   tandem estop --category 2                          a safe posture first, where a controller has one
-Exit status: 0 each loop has carried it out (or simulated time is paused, and it is next); 1 a stop
-is not confirmed, or there is no run. Over DDS what confirms is a run of this user on this machine,
-or whoever DDS Security has authenticated. `kill -USR1 PID` asks for the same without a socket, and gets
-no answer.)"},
+
+Exit status: 0 each loop has carried it out, or does so first when its paused time goes on.
+1 a stop is not confirmed, or there is no run. Over DDS, a confirmation counts from a run of this
+user on this machine, or from one that DDS Security has authenticated. `kill -USR1 PID` asks for the
+same without a socket, and gets no answer.)"},
     {"controller", "Controllers of a running run", R"(Examples:
   tandem controller list                             loaded controllers, active or not, their joints
   tandem controller load hold --name rest --set 'duration_s = 2.0'

@@ -28,7 +28,8 @@ using hal::PidLoop;
 // --- The board's own code -------------------------------------------------------------------
 
 hal::ActuatorConfig motor(int order) {
-  return {.order = order,
+  return {.name = {},
+          .order = order,
           .resistance_ohm = 0.8,
           .inductance_H = 5e-4,
           .torque_constant_Nm_A = 0.05,

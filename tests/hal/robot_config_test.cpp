@@ -476,7 +476,7 @@ TEST(RobotConfig, ReadsTheWatchOfOscillationTheTorquesRateAndTheBrake) {
   const auto plain = parse_robot_config(kRobot, "leg.toml");
   ASSERT_TRUE(plain.has_value());
   EXPECT_EQ(plain->joints[0].max_oscillation, 0.35);
-  EXPECT_EQ(plain->joints[0].drive.oscillation_time_s, 1.0);
+  EXPECT_EQ(plain->joints[0].oscillation_time_s, 1.0);
   EXPECT_FALSE(plain->joints[0].max_torque_rate_Nm_s.has_value());
   EXPECT_FALSE(plain->joints[0].brake.has_value());
   const auto robot = parse_robot_config(
@@ -487,7 +487,7 @@ TEST(RobotConfig, ReadsTheWatchOfOscillationTheTorquesRateAndTheBrake) {
   ASSERT_TRUE(robot.has_value()) << robot.error()[0].to_string();
   const JointConfig& joint = robot->joints[1];
   EXPECT_EQ(joint.max_oscillation, 0.0);
-  EXPECT_EQ(joint.drive.oscillation_time_s, 0.5);
+  EXPECT_EQ(joint.oscillation_time_s, 0.5);
   EXPECT_EQ(torque_rate_Nm_s(joint), 9000.0);
   ASSERT_TRUE(joint.brake.has_value());
   EXPECT_EQ(joint.brake->torque_Nm, 120.5);

@@ -168,7 +168,7 @@ TEST_F(StopUnderAttack, OfARunIsNoSuccessBesideAStrangerWhoConfirms) {
   const Outcome stop = stop_over_dds();
   EXPECT_EQ(stop.status, 1);
   EXPECT_TRUE(has(stop.out, "emergency stop, category1")) << "the run's: " << stop.out;
-  EXPECT_TRUE(has(stop.err, "nobody vouches")) << stop.err;
+  EXPECT_TRUE(has(stop.err, "there is no proof")) << stop.err;
   EXPECT_EQ(status().value("phase", ""), "faulted");
 }
 
