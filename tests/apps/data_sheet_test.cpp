@@ -172,7 +172,8 @@ TEST_F(DataSheets, WithoutSupportedModesShowThoseThatTheObjectsAllow) {
   EXPECT_EQ(json["modes"][1]["mode"], 4) << "6071 and 6077 are there";
   EXPECT_EQ(json["modes"][2]["mode"], 7);
   EXPECT_EQ(json["pdos"][0]["mapping_writable"], false);
-  EXPECT_NE(outcome.err.find("only the drive's 6502 says which it has"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("only the drive's 6502 says which it has"), std::string::npos)
+      << outcome.err;
 }
 
 TEST_F(DataSheets, ShowWhatAModeLacks) {
