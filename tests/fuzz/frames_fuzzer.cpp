@@ -344,7 +344,7 @@ class Play {
     const firmware::AxisDrive& drive = wires_.drive[joint];
     const firmware::AxisSense& sense = wires_.sense[joint];
     const firmware::JointController& controller = wires_.axis(joint).controller();
-    const firmware::ControllerConfig& limits = controller.config();
+    const canopen::DriveParameters& limits = controller.config();
     require(std::isfinite(drive.voltage_V));
     require(drive.enabled || drive.voltage_V == 0.0);
     require(std::abs(drive.voltage_V) <= std::max(sense.bus_voltage_V, 0.0) + kRounding);
