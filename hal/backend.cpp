@@ -2,6 +2,7 @@
 #include "hal/backend.hpp"
 
 #include <cstdio>
+#include <iterator>
 
 namespace tandem::hal {
 
@@ -11,7 +12,9 @@ std::string Backend::fault_text(FaultCause cause, std::uint32_t code) const {
 #include "hal/fault_causes.inc"
 #undef TANDEM_FAULT_CAUSE
   };
-  if (cause != FaultCause::kDrive) return kTexts[static_cast<std::size_t>(cause)];
+  // One that comes over a network may be none.
+  const auto row = static_cast<std::size_t>(cause);
+  if (cause != FaultCause::kDrive && row < std::size(kTexts)) return kTexts[row];
   char text[48];
   std::snprintf(text, sizeof text, "the drive reports error 0x%04X", code);
   return text;

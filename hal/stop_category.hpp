@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 
 namespace tandem::hal {
 
@@ -40,7 +41,9 @@ enum class FaultCause : std::uint8_t {
 #include "hal/fault_causes.inc"
 #undef TANDEM_FAULT_CAUSE
   };
-  return kOfBoard[static_cast<std::size_t>(cause)];
+  // One that comes over a network may be none.
+  return static_cast<std::size_t>(cause) < std::size(kOfBoard) &&
+         kOfBoard[static_cast<std::size_t>(cause)];
 }
 
 /// As the TOML has it: "category0".

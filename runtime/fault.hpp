@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <string>
 
 #include "base/archive.hpp"
@@ -39,7 +40,9 @@ struct SourceRow {
 #include "runtime/fault_sources.inc"
 #undef TANDEM_FAULT
   };
-  return kRows[static_cast<std::size_t>(source)];
+  const auto row = static_cast<std::size_t>(source);  // bytes of a snapshot are anybody's
+  return row < std::size(kRows) ? kRows[row]
+                                : SourceRow{FaultStrikes::kRobot, log::EventKind::kFault};
 }
 
 /// Where an emergency stop came from. That of a board's input is a fault of its drives.

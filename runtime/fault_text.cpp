@@ -2,6 +2,7 @@
 #include "runtime/fault_text.hpp"
 
 #include <cstdio>
+#include <iterator>
 
 #include "estimation/collision.hpp"
 #include "hal/remote_command.hpp"
@@ -120,7 +121,8 @@ std::string text_of(const FaultRecord& record, const FaultContext& about) {
 #include "runtime/fault_sources.inc"
 #undef TANDEM_FAULT
   };
-  return kTexts[static_cast<std::size_t>(record.source)](record, about);
+  const auto row = static_cast<std::size_t>(record.source);
+  return row < std::size(kTexts) ? kTexts[row](record, about) : std::string();
 }
 
 /// The joint, sensor or controller that the fault is about, and a joint's board.
