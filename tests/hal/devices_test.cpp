@@ -283,5 +283,16 @@ TEST(Capabilities, NameTheJointAndTheGainsTableThatLackALoop) {
   EXPECT_NE(refused.error().hint.find("[gains.arm]"), std::string::npos);
 }
 
+/// It may come over a network.
+TEST(Faults, ACauseThatThereIsNotHasNoText) {
+  const auto none = static_cast<FaultCause>(253);
+  EXPECT_FALSE(is_of_board(none));
+  EXPECT_TRUE(is_of_board(FaultCause::kIgnoresStop));
+  EXPECT_FALSE(is_of_board(FaultCause::kNotFollowing));
+  const RobotConfig robot = test::fake_robot();
+  const test::FakeBackend backend(robot);
+  EXPECT_EQ(backend.fault_text(none, 0x7300), "the drive reports error 0x7300");
+}
+
 }  // namespace
 }  // namespace tandem::hal
