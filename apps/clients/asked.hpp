@@ -1,5 +1,5 @@
 // What a command to a running process has beside its row in command_rows(): how its line becomes a
-// question where that is more than the row's keys, and how its answer is told.
+// question where that is more than the row's keys, and how its answer is printed.
 // Layer: apps/clients.  Thread: main.
 #pragma once
 

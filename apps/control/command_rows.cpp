@@ -150,7 +150,7 @@ const std::vector<CommandRow> kRows{
     {"sensor.list", kReads, "every sensor: where it is, what it measures, how old that is",
      {local(texts("sensors", "sensors", "only these"))}},
     {"clock.show", kReads, "where the clock stands, and how fast it is"},
-    {"clock.pause", kChanges, "simulated time stands after the cycle at work"},
+    {"clock.pause", kChanges, "simulated time stands after this cycle"},
     {"clock.resume", kChanges, "simulated time continues at its rate"},
     {"clock.step", kChanges, "while paused: so many cycles, then it stands again",
      {integer("cycles", "cycles", 1, 1e9, "1 to 1000000000; default 1")}},

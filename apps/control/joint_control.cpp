@@ -215,19 +215,27 @@ Result<Json> move(const Run& run, const Json& request) {
   return answer;
 }
 
-/// Brakes what an operator leads; a joint of a controller is that one's.
+/// Brakes what an operator leads; a joint of a controller is that one's. A joint that refuses keeps
+/// no other one moving: its error comes after the others were asked.
 Result<Json> halt(const Run& run) {
   Json halted = Json::array();
   bool done = true;
+  std::uint64_t cycle = 0;
+  Status refused;
   for (const runtime::JointInfo& joint : run.cycle.services().joints()) {
     const bool homes = joint.look.homing.state == hal::HomingState::kHoming;
     if (!joint.owner.empty() || (joint.look.moving == 0 && !homes)) continue;
     const auto asked = run.cycle.services().move_joint(joint.name, {});
-    if (!asked) return std::unexpected(asked.error());
+    if (!asked) {
+      if (refused) refused = std::unexpected(asked.error());
+      continue;
+    }
     done = done && asked->done;
+    cycle = asked->cycle;
     halted.push_back(joint.name);
   }
-  return Json{{"done", done}, {"joints", std::move(halted)}};
+  if (!refused) return std::unexpected(refused.error());
+  return Json{{"done", done}, {"cycle", cycle}, {"joints", std::move(halted)}};
 }
 
 Result<Json> reset(const Run& run, const std::string& name) {
