@@ -1,5 +1,5 @@
 // The entries by rights: what a PDO carries, what a master sets, what it reads.
-#include "canopen/board_sheet.hpp"
+#include "canopen/data_sheet.hpp"
 
 #include <algorithm>
 #include <array>

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -139,5 +140,10 @@ inline constexpr std::size_t kMaxSheetEntries = bounds::kSheetEntries.most;
 /// larger than kMaxSheetBytes, of which nothing is read; "….xml": than bounds::kEsiBytes.
 [[nodiscard]] Result<DataSheet> load_data_sheet(const std::string& file,
                                                 const DeviceChoice& choice = {});
+
+/// Our firmware's objects that a master reads, writes or maps, for all eight axes; a board without
+/// a sheet of its own is one of these. What `tandem eds` writes has more: all that the firmware
+/// has.
+[[nodiscard]] std::shared_ptr<const DataSheet> tandem_board_sheet();
 
 }  // namespace tandem::canopen

@@ -1,3 +1,4 @@
+// tf, tf_static, odom and robot_description: where the robot's links are.
 // Transforms from the joints' measured positions; the base's from the run's estimate, or without
 // one from the simulation's truth.
 #include "dds/frame_topics.hpp"
@@ -5,6 +6,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dds/message_parts.hpp"
+#include "dds/topic_group.hpp"
 
 namespace tandem::dds {
 namespace {
@@ -72,6 +79,30 @@ model::Placement placement(const FrameEdge& edge, double position) {
   return edge.at_zero * model::Placement{turned, Eigen::Vector3d::Zero()};
 }
 
+namespace {
+
+/// A floating base stands in the frame "odom", where the simulation's truth has it; nobody knows
+/// where that of a real robot stands, and a fixed base is the root.
+class FrameTopics final : public TopicGroup {
+ public:
+  FrameTopics(OutputMaker& maker, const RunDescription& run);
+  void begin(std::int64_t stamp_ns) override;
+  void publish(const CycleSample& sample) override;
+
+ private:
+  using Stamped = geometry_msgs_msg_dds__TransformStamped_;
+  void publish_moving(const CycleSample& sample);
+  void publish_odometry(const CycleSample& sample);
+
+  FrameTree frames_;
+  std::string urdf_, odom_, base_;
+  bool base_known_;
+  std::vector<Stamped> transforms_;
+  Output<tf2_msgs::TFMessage> tf_, tf_static_;
+  Output<nav_msgs::Odometry> odometry_;
+  Output<std_msgs::String> description_;
+};
+
 FrameTopics::FrameTopics(OutputMaker& maker, const RunDescription& run)
     : frames_(frame_tree(run.tree, run.robot)),
       urdf_(run.urdf),
@@ -134,6 +165,12 @@ void FrameTopics::publish_odometry(const CycleSample& sample) {
   message.pose.pose = {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}};
   message.twist.twist = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
   odometry_.write(message);
+}
+
+}  // namespace
+
+std::unique_ptr<TopicGroup> frame_topics(OutputMaker& maker, const RunDescription& run) {
+  return std::make_unique<FrameTopics>(maker, run);
 }
 
 }  // namespace tandem::dds

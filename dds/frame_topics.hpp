@@ -1,12 +1,13 @@
-// tf, tf_static, odom and robot_description: where the robot's links are.
-// Layer: dds.  Thread: the publisher's.
+// The robot's links as a tree of frames, as tf has them.
+// Layer: dds.  Thread: any, non-RT.
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
-#include "dds/message_parts.hpp"
-#include "dds/topic_group.hpp"
+#include "hal/config/robot_config.hpp"
+#include "model/tree.hpp"
 
 namespace tandem::dds {
 
@@ -29,27 +30,5 @@ struct FrameTree {
 [[nodiscard]] FrameTree frame_tree(const model::Tree& tree, const hal::RobotConfig& robot);
 /// @param position  of `edge.joint`
 [[nodiscard]] model::Placement placement(const FrameEdge& edge, double position);
-
-/// A floating base stands in the frame "odom", where the simulation's truth has it; nobody knows
-/// where that of a real robot stands, and a fixed base is the root.
-class FrameTopics final : public TopicGroup {
- public:
-  FrameTopics(OutputMaker& maker, const RunDescription& run);
-  void begin(std::int64_t stamp_ns) override;
-  void publish(const CycleSample& sample) override;
-
- private:
-  using Stamped = geometry_msgs_msg_dds__TransformStamped_;
-  void publish_moving(const CycleSample& sample);
-  void publish_odometry(const CycleSample& sample);
-
-  FrameTree frames_;
-  std::string urdf_, odom_, base_;
-  bool base_known_;
-  std::vector<Stamped> transforms_;
-  Output<tf2_msgs::TFMessage> tf_, tf_static_;
-  Output<nav_msgs::Odometry> odometry_;
-  Output<std_msgs::String> description_;
-};
 
 }  // namespace tandem::dds

@@ -1,5 +1,11 @@
+// tandem/state, command, statistics, faults and robot: the whole truth, in types of our own.
 // Copies the images field by field into tandem_msgs, and the loop's histograms of every cycle.
-#include "dds/image_topics.hpp"
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dds/message_parts.hpp"
+#include "dds/topic_group.hpp"
 
 namespace tandem::dds {
 namespace {
@@ -34,7 +40,29 @@ void fill(auto& member, const auto& field) {
   }
 }
 
-}  // namespace
+class ImageTopics final : public TopicGroup {
+ public:
+  ImageTopics(OutputMaker& maker, const RunDescription& run);
+  void begin(std::int64_t stamp_ns) override;
+  void publish(const CycleSample& sample) override;
+  void publish_faults(const std::vector<FaultEntry>& faults, std::uint64_t lost) override;
+
+ private:
+  void publish_state(const CycleSample& sample);
+  void publish_command(const CycleSample& sample);
+  void publish_statistics(const CycleSample& sample);
+
+  std::uint64_t run_;
+  std::string robot_, version_, hal_, hash_;
+  std::int64_t period_ns_;
+  TextList joints_, sensors_;
+  std::vector<std::uint32_t> channels_;
+  Output<tandem_msgs::State> state_;
+  Output<tandem_msgs::Command> command_;
+  Output<tandem_msgs::LoopStatistics> statistics_;
+  Output<tandem_msgs::Robot> description_;
+  Output<tandem_msgs::Faults> faults_;
+};
 
 ImageTopics::ImageTopics(OutputMaker& maker, const RunDescription& run)
     : run_(run.run),
@@ -138,6 +166,12 @@ void ImageTopics::publish_faults(const std::vector<FaultEntry>& faults, std::uin
   refer(message.faults, std::span<const tandem_msgs_msg_dds__Fault_>(list));
   message.lost = lost;
   faults_.write(message);
+}
+
+}  // namespace
+
+std::unique_ptr<TopicGroup> image_topics(OutputMaker& maker, const RunDescription& run) {
+  return std::make_unique<ImageTopics>(maker, run);
 }
 
 }  // namespace tandem::dds

@@ -1,6 +1,11 @@
-#include "dds/parallel_topics.hpp"
-
+// parallel/joint_states and parallel/difference: a second robot that gets the same commands.
+#include <memory>
+#include <string>
 #include <vector>
+
+#include "dds/message_parts.hpp"
+#include "dds/topic_group.hpp"
+#include "hal/parallel_source.hpp"
 
 namespace tandem::dds {
 namespace {
@@ -11,7 +16,20 @@ std::vector<std::string> names_of_joints(const hal::RobotConfig& robot) {
   return names;
 }
 
-}  // namespace
+/// The newest cycle of the second robot when a sample is due: it may be some cycles older than the
+/// first's, and its stamp says so. A difference is the first robot's value less the second's.
+class ParallelTopics final : public TopicGroup {
+ public:
+  ParallelTopics(OutputMaker& maker, const RunDescription& run);
+  void show(hal::ParallelSource* second) override { source_ = second; }
+  void publish(const CycleSample& sample) override;
+
+ private:
+  hal::ParallelSource* source_ = nullptr;
+  TextList joints_;
+  std::string no_frame_;
+  Output<sensor_msgs::JointState> joint_states_, difference_;
+};
 
 ParallelTopics::ParallelTopics(OutputMaker& maker, const RunDescription& run)
     : joints_(names_of_joints(run.robot)),
@@ -37,6 +55,12 @@ void ParallelTopics::publish(const CycleSample& sample) {
   refer(message.velocity, std::span<const double>(view->velocity_rad_s));
   refer(message.effort, std::span<const double>(view->torque_Nm));
   if (difference_.wanted()) difference_.write(message);
+}
+
+}  // namespace
+
+std::unique_ptr<TopicGroup> parallel_topics(OutputMaker& maker, const RunDescription& run) {
+  return std::make_unique<ParallelTopics>(maker, run);
 }
 
 }  // namespace tandem::dds

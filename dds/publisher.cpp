@@ -8,13 +8,7 @@
 #include <set>
 
 #include "base/clock_ns.hpp"
-#include "dds/diagnostic_topics.hpp"
-#include "dds/frame_topics.hpp"
-#include "dds/image_topics.hpp"
-#include "dds/joint_topics.hpp"
 #include "dds/message_parts.hpp"
-#include "dds/sensor_topics.hpp"
-#include "dds/wrench_topics.hpp"
 
 namespace tandem::dds {
 namespace {
@@ -96,17 +90,11 @@ Publisher::Publisher(Participant& participant, const RunDescription& run)
     every_[static_cast<std::size_t>(Topic::kOdom)] = 0;
   if (!run.parallel) every_[static_cast<std::size_t>(Topic::kParallel)] = 0;
   if (run.simulated_time) clock_ = maker.periodic<rosgraph_msgs::Clock>(Topic::kClock, "clock");
-  groups_.push_back(std::make_unique<JointTopics>(maker, run));
-  groups_.push_back(std::make_unique<SensorTopics>(maker, run));
-  groups_.push_back(std::make_unique<WrenchTopics>(maker, run));
-  groups_.push_back(std::make_unique<FrameTopics>(maker, run));
-  groups_.push_back(std::make_unique<ImageTopics>(maker, run));
-  groups_.push_back(std::make_unique<DiagnosticTopics>(maker, run));
-  if (run.parallel) {
-    auto topics = std::make_unique<ParallelTopics>(maker, run);
-    parallel_ = topics.get();
-    groups_.push_back(std::move(topics));
+  for (MakeTopics* topics : {joint_topics, sensor_topics, wrench_topics, frame_topics, image_topics,
+                             diagnostic_topics}) {
+    groups_.push_back(topics(maker, run));
   }
+  if (run.parallel) groups_.push_back(parallel_topics(maker, run));
   error_ = maker.error();
 }
 
@@ -154,7 +142,7 @@ void Publisher::copy_due(const hal::CycleView& view, std::uint64_t number) noexc
 }
 
 void Publisher::start(FaultSource faults, hal::ParallelSource* parallel) {
-  if (parallel_ != nullptr) parallel_->show(parallel);
+  for (const auto& group : groups_) group->show(parallel);
   fault_source_ = std::move(faults);
   wall_offset_ns_ = wall_less_monotonic();
   offset_due_ = SteadyClock::now() + kOffsetGood;

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "base/spsc_ring.hpp"
-#include "dds/parallel_topics.hpp"
 #include "dds/topic_group.hpp"
 #include "hal/cycle_observer.hpp"
 
@@ -80,7 +79,6 @@ class Publisher final : public hal::CycleObserver {
   PublishCounts counts_;
   LoopRecord loop_;
   std::vector<std::unique_ptr<TopicGroup>> groups_;
-  ParallelTopics* parallel_ = nullptr;  // one of them
   Output<rosgraph_msgs::Clock> clock_;
   std::optional<Error> error_;
 

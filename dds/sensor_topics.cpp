@@ -1,10 +1,40 @@
+// imu/NAME and wrench/NAME: every sensor of the robot.
 // A sensor is published once per sample, with the sample's own time: late ones earlier than the
 // cycle.
-#include "dds/sensor_topics.hpp"
+#include <memory>
+#include <string>
+#include <vector>
 
 #include "dds/message_parts.hpp"
+#include "dds/topic_group.hpp"
 
 namespace tandem::dds {
+namespace {
+
+/// A sample goes out once, with the stamp at which it was taken: a sensor that is silent has none.
+class SensorTopics final : public TopicGroup {
+ public:
+  SensorTopics(OutputMaker& maker, const RunDescription& run);
+  void publish(const CycleSample& sample) override;
+
+ private:
+  template <class Message>
+  struct Sensor {
+    std::size_t index;  // in the image
+    std::string frame;
+    Output<Message> output;
+  };
+  /// When the sensor's sample of this cycle was taken, as a header's stamp; false: there is none
+  /// since the topic's last.
+  [[nodiscard]] bool taken(const CycleSample& sample, std::size_t sensor, std::uint64_t every,
+                           Time& stamp) const;
+  void publish_imu(const CycleSample& sample, Sensor<sensor_msgs::Imu>& sensor);
+  void publish_wrench(const CycleSample& sample, Sensor<geometry_msgs::WrenchStamped>& sensor);
+
+  std::uint64_t imu_every_, wrench_every_;
+  std::vector<Sensor<sensor_msgs::Imu>> imus_;
+  std::vector<Sensor<geometry_msgs::WrenchStamped>> wrenches_;
+};
 
 SensorTopics::SensorTopics(OutputMaker& maker, const RunDescription& run)
     : imu_every_(maker.every(Topic::kImu)), wrench_every_(maker.every(Topic::kWrench)) {
@@ -65,6 +95,12 @@ void SensorTopics::publish_wrench(const CycleSample& sample,
   message.header.frame_id = refer(sensor.frame);
   message.wrench = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
   sensor.output.write(message);
+}
+
+}  // namespace
+
+std::unique_ptr<TopicGroup> sensor_topics(OutputMaker& maker, const RunDescription& run) {
+  return std::make_unique<SensorTopics>(maker, run);
 }
 
 }  // namespace tandem::dds

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "dds/endpoint.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/cycle_observer.hpp"
+#include "hal/parallel_source.hpp"
 #include "hal/stop_category.hpp"
 #include "model/tree.hpp"
 #include "rt/histogram.hpp"
@@ -148,7 +150,15 @@ class TopicGroup {
   virtual void publish(const CycleSample& sample) = 0;
   /// Faults have come or gone.
   virtual void publish_faults(const std::vector<FaultEntry>& /*faults*/, std::uint64_t /*lost*/) {}
+  /// Where a second robot's cycles come from; null: nowhere. Before the first cycle.
+  virtual void show(hal::ParallelSource* /*second*/) {}
 };
+
+/// Makes the topics of one file, NAME_topics.cpp.
+using MakeTopics = std::unique_ptr<TopicGroup>(OutputMaker& maker, const RunDescription& run);
+MakeTopics joint_topics, sensor_topics, frame_topics, image_topics, diagnostic_topics,
+    parallel_topics;
+MakeTopics wrench_topics;  ///< @pre run.wrenches are sites of run.robot
 
 /// A name as ROS 2 allows it in a topic: what is no letter, digit or _ becomes _.
 [[nodiscard]] inline std::string ros_token(std::string name) {

@@ -1,7 +1,13 @@
-#include "dds/wrench_topics.hpp"
-
+// external_wrench/SITE: what the run estimates to touch the robot at declared places.
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dds/frame_topics.hpp"
+#include "dds/message_parts.hpp"
+#include "dds/topic_group.hpp"
 
 namespace tandem::dds {
 namespace {
@@ -30,7 +36,27 @@ Eigen::Matrix3d base_rotation(const hal::EstimateImage& estimate) {
   return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).toRotationMatrix();
 }
 
-}  // namespace
+/// The estimate has W's axes and the site's origin; a message has axes and origin of its frame, the
+/// site's link, so that viewers draw it where it acts. Nothing until a floating base's estimate has
+/// started.
+class WrenchTopics final : public TopicGroup {
+ public:
+  /// @pre run.wrenches are sites of run.robot
+  WrenchTopics(OutputMaker& maker, const RunDescription& run);
+  void publish(const CycleSample& sample) override;
+
+ private:
+  struct Place {
+    std::size_t index;            // in the image
+    std::string link;             // the message's frame
+    Eigen::Vector3d site_m;       // the site's origin in it
+    std::vector<FrameEdge> from;  // the link, up to the root
+    Output<geometry_msgs::WrenchStamped> output;
+  };
+  void publish(const CycleSample& sample, Place& place);
+
+  std::vector<Place> places_;
+};
 
 WrenchTopics::WrenchTopics(OutputMaker& maker, const RunDescription& run) {
   if (run.wrenches.empty()) return;
@@ -70,6 +96,12 @@ void WrenchTopics::publish(const CycleSample& sample, Place& place) {
   message.header = {ros_time(sample.stamp_ns), refer(place.link)};
   message.wrench = {{f.x(), f.y(), f.z()}, {m.x(), m.y(), m.z()}};
   place.output.write(message);
+}
+
+}  // namespace
+
+std::unique_ptr<TopicGroup> wrench_topics(OutputMaker& maker, const RunDescription& run) {
+  return std::make_unique<WrenchTopics>(maker, run);
 }
 
 }  // namespace tandem::dds

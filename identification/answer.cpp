@@ -8,7 +8,6 @@
 #include <limits>
 
 #include "identification/estimate.hpp"
-#include "identification/motor.hpp"
 
 namespace tandem::identification {
 namespace {

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "identification/answer.hpp"
+#include "identification/estimate.hpp"
 #include "identification/low_pass.hpp"
-#include "identification/torque_place.hpp"
 #include "log/log_file.hpp"
 
 namespace tandem::identification {
@@ -32,12 +32,12 @@ bool stands(const hal::RobotConfig& robot, const IdentifiedRobot& identified,
 /// Where the intervals are known to be too narrow, and which ones allow for what.
 void warn_of_intervals(const std::vector<Recording>& recordings, const IdentifiedRobot& identified,
                        double cutoff_Hz, Identification& out) {
-  if (cutoff_Hz != IdentifyOptions{}.cutoff_Hz) {
+  if (cutoff_Hz != kCutoff_Hz) {
     out.warnings.push_back(fmt::format(
         "the intervals were checked with a cut-off of {} Hz only, not with {} Hz: do not trust "
         "them. A higher one lets through errors of timing and of the model that are not in them, a "
         "lower one loses motion",
-        IdentifyOptions{}.cutoff_Hz, cutoff_Hz));
+        kCutoff_Hz, cutoff_Hz));
   }
   const double hold_s = std::ranges::max(recordings, {}, &Recording::unknown_hold_s).unknown_hold_s;
   if (!(hold_s > 0.0)) return;
@@ -78,23 +78,73 @@ void note_left_out(const Recording& recording, bool one_of_several, bool floatin
 }
 
 /// All equations anew.
-Status make_equations(const std::vector<Recording>& recordings, const IdentifyOptions& options,
+Status make_equations(const std::vector<Recording>& recordings, double cutoff_Hz,
                       IdentifiedRobot& identified, Equations& equations,
                       const Eigen::VectorXd& assumed = {}) {
   equations = Equations{};
   for (const Recording& recording : recordings) {
-    const Status s = add_equations(recording, options.cutoff_Hz, identified, equations, assumed);
+    const Status s = add_equations(recording, cutoff_Hz, identified, equations, assumed);
     if (!s) return s;
   }
   return {};
+}
+
+// What the data say of a described rotor.
+constexpr double kSureDeviations = 3.0;  // standard deviations
+constexpr double kNoShare = 0.05;        // of the described rotor: as good as none
+constexpr double kLittleShare = 0.1;     // more than that is not what was found
+constexpr double kOppositeShare = -0.5;  // less than that is a torque of the other sign
+
+enum class RotorFound : std::uint8_t { kNothing, kRotor, kNoRotor };
+
+RotorFound look_for_rotor(double described, double estimate, double deviation) {
+  const double doubt = kSureDeviations * deviation / described, share = estimate / described;
+  if (share - doubt > kNoShare) return RotorFound::kRotor;
+  const bool little = share < std::max(kNoShare, doubt) && share + doubt < kLittleShare;
+  if (little && share > kOppositeShare) return RotorFound::kNoRotor;
+  return RotorFound::kNothing;
+}
+
+/// Whether each coordinate's torques hold nothing of its described rotor, as those of a
+/// sensor between gear and link do. The data say so where they know the rotor within a tenth of
+/// its description and find none; where they cannot say, it is as with the other joints, if these
+/// agree. No where the drive has a spring: then the rotor is behind it.
+/// @param equations  of all logs, whose rotors are in the links' rows
+std::vector<bool> measured_behind_rotors(IdentifiedRobot& robot, const model::Tree& tree,
+                                         const Equations& equations) {
+  // The hold of a voltage, if there is one, looks like a tenth of a rotor or two: that is doubted
+  // of a value, and no reason to doubt this.
+  Equations undoubted = equations;
+  for (ChannelRows& channel : undoubted.channels) channel.doubt.clear();
+  const DataEstimate data =
+      estimate_from_data(undoubted, std::vector<bool>(equations.time_s.size(), true),
+                         make_prior(robot), structural_base(robot, tree));
+  const std::size_t joints = robot.facts.joint.size();
+  std::vector<RotorFound> found(joints, RotorFound::kNothing);
+  for (std::size_t c = 0; c < joints; ++c) {
+    const double described = robot.facts.rotor_kg_m2[c];
+    if (!robot.facts.rigid[c] || !(described > 0.0)) continue;
+    const Eigen::Index at = robot.regressor.columns() +
+                            kJointColumns * static_cast<Eigen::Index>(c) +
+                            static_cast<Eigen::Index>(JointColumn::kRotor);
+    found[c] = look_for_rotor(described, data.mean[at], std::sqrt(data.link_covariance(at, at)));
+  }
+  const bool any = std::ranges::find(found, RotorFound::kNoRotor) != found.end();
+  const bool agree = std::ranges::find(found, RotorFound::kRotor) == found.end();
+  std::vector<bool> behind(joints, false);
+  for (std::size_t c = 0; c < joints; ++c) {
+    behind[c] = robot.facts.rigid[c] && (found[c] == RotorFound::kNoRotor ||
+                                         (any && agree && found[c] == RotorFound::kNothing));
+  }
+  return behind;
 }
 
 /// A log of a real robot does not say whether its torques are the motors' or those of sensors
 /// behind the rotors. The data do: an arm of this kind was explained badly, with described rotors
 /// of 0.5 kg m2 that its torques knew nothing of.
 Status find_torque_place(const std::vector<Recording>& recordings, const model::Tree& tree,
-                         const IdentifyOptions& options, IdentifiedRobot& identified,
-                         Equations& equations, Identification& out) {
+                         double cutoff_Hz, IdentifiedRobot& identified, Equations& equations,
+                         Identification& out) {
   const bool recorded = std::ranges::all_of(recordings, [](const Recording& recording) {
     return recording.unknown_hold_s > 0.0 && !recording.out_of_step;
   });
@@ -113,19 +163,19 @@ Status find_torque_place(const std::vector<Recording>& recordings, const model::
       "these joints' torques hold nothing of their rotors, as those of sensors between gear and "
       "link: the rotors stay as described: " +
       names);
-  return make_equations(recordings, options, identified, equations);
+  return make_equations(recordings, cutoff_Hz, identified, equations);
 }
 
 /// Held voltages are corrected by the robot's inertia: once more by the one that was found.
 Status refine_holds(const std::vector<Recording>& recordings, const hal::RobotConfig& robot,
-                    const model::Tree& tree, const IdentifyOptions& options,
-                    IdentifiedRobot& identified, Equations& equations) {
+                    const model::Tree& tree, double cutoff_Hz, IdentifiedRobot& identified,
+                    Equations& equations) {
   const auto& rigid = identified.facts.rigid;
   const bool held = std::ranges::any_of(
       recordings, [](const Recording& recording) { return recording.voltage_hold_s > 0.0; });
   if (!held || std::ranges::find(rigid, true) == rigid.end()) return {};
   const Eigen::VectorXd found = fitted(robot, tree, identified, equations);
-  return make_equations(recordings, options, identified, equations, found);
+  return make_equations(recordings, cutoff_Hz, identified, equations, found);
 }
 
 /// A torque with the wrong sign is 200 % of itself away from every description of the robot.
@@ -146,23 +196,23 @@ void warn_of_signs(Identification& out) {
 
 }  // namespace
 
-double shortest_motion_s(const IdentifyOptions& options) {
+double shortest_motion_s(double cutoff_Hz) {
   constexpr double kPeriod_s = 1e-3;
-  const LowPass filter(kPeriod_s, options.cutoff_Hz);
+  const LowPass filter(kPeriod_s, cutoff_Hz);
   const double whole = kShortest_s + 2.0 * kPeriod_s * static_cast<double>(filter.reach());
   return std::ceil(10.0 * whole) / 10.0;
 }
 
 Result<Identification> identify(const std::vector<Recording>& recordings,
                                 const hal::RobotConfig& robot, const model::Tree& tree,
-                                const IdentifyOptions& options) {
+                                double cutoff_Hz) {
   auto identified = make_identified_robot(tree, robot);
   if (!identified) return std::unexpected(identified.error());
   Equations equations;
   Identification out;
   for (const Recording& recording : recordings)
     note_left_out(recording, recordings.size() > 1, identified->floating, out);
-  if (const Status s = make_equations(recordings, options, *identified, equations); !s)
+  if (const Status s = make_equations(recordings, cutoff_Hz, *identified, equations); !s)
     return std::unexpected(s.error());
   if (equations.usable_s < kShortest_s) {
     const std::string why = out.remarks.empty() ? "" : "; " + out.remarks.front();
@@ -191,20 +241,20 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
         "should say so: [sim] hoist.lift_m",
         equations.held_s));
   }
-  if (const Status s = find_torque_place(recordings, tree, options, *identified, equations, out);
+  if (const Status s = find_torque_place(recordings, tree, cutoff_Hz, *identified, equations, out);
       !s) {
     return std::unexpected(s.error());
   }
-  if (const Status s = refine_holds(recordings, robot, tree, options, *identified, equations); !s)
+  if (const Status s = refine_holds(recordings, robot, tree, cutoff_Hz, *identified, equations); !s)
     return std::unexpected(s.error());
   answer(robot, tree, *identified, equations, out);
   warn_of_signs(out);
-  warn_of_intervals(recordings, *identified, options.cutoff_Hz, out);
+  warn_of_intervals(recordings, *identified, cutoff_Hz, out);
   return out;
 }
 
 Result<Identification> identify(const std::vector<std::string>& logs, const hal::RobotConfig& robot,
-                                const model::Tree& tree, const IdentifyOptions& options) {
+                                const model::Tree& tree, double cutoff_Hz) {
   std::vector<Recording> recordings;
   for (const std::string& path : logs) {
     auto recording = read_recording(path, robot);
@@ -214,7 +264,7 @@ Result<Identification> identify(const std::vector<std::string>& logs, const hal:
     if (twin != recordings.end()) return std::unexpected(log::same_data(path, twin->path));
     recordings.push_back(std::move(*recording));
   }
-  return identify(recordings, robot, tree, options);
+  return identify(recordings, robot, tree, cutoff_Hz);
 }
 
 }  // namespace tandem::identification

@@ -17,9 +17,8 @@
 
 namespace tandem::identification {
 
-struct IdentifyOptions {
-  double cutoff_Hz = 10.0;  ///< of the low pass over every signal
-};
+/// Of the low pass over every signal, unless one asks for another.
+inline constexpr double kCutoff_Hz = 10.0;
 
 /// A number with half the width of its 95 % confidence interval, from the data alone. `ci95` is NaN
 /// where the data say nothing.
@@ -100,7 +99,7 @@ struct Identification {
 };
 
 /// How long a motion has to be at least: what is used, and what the filter loses at both ends.
-[[nodiscard]] double shortest_motion_s(const IdentifyOptions& options = {});
+[[nodiscard]] double shortest_motion_s(double cutoff_Hz = kCutoff_Hz);
 
 /// Identifies the robot from the first two thirds of every log, and compares on the last.
 ///
@@ -110,12 +109,12 @@ struct Identification {
 [[nodiscard]] Result<Identification> identify(const std::vector<std::string>& logs,
                                               const hal::RobotConfig& robot,
                                               const model::Tree& tree,
-                                              const IdentifyOptions& options = {});
+                                              double cutoff_Hz = kCutoff_Hz);
 /// The same of recordings at hand.
 [[nodiscard]] Result<Identification> identify(const std::vector<Recording>& recordings,
                                               const hal::RobotConfig& robot,
                                               const model::Tree& tree,
-                                              const IdentifyOptions& options = {});
+                                              double cutoff_Hz = kCutoff_Hz);
 
 /// Base parameters of all columns of the equations, those of joints but for the delays included.
 /// @param hung  of a floating base: of the joints' equations alone, with a base at rest

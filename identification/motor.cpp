@@ -1,4 +1,4 @@
-#include "identification/motor.hpp"
+#include "identification/answer.hpp"
 
 #include <Eigen/Cholesky>
 #include <cmath>

@@ -78,12 +78,12 @@ Result<Regressor> Regressor::create(const model::Tree& tree, const RegressorSpec
 }
 
 Status Regressor::take_sensors(const RegressorSpec& spec) {
-  for (const WrenchSensor& one : spec.sensors) {
+  for (const model::SensorSpec& one : spec.sensors) {
     const int child = tree_->child_link_index(one.joint);
-    const int link = tree_->link_index(one.link);
+    const int link = tree_->link_index(one.frame_link);
     if (child < 0 || link < 0) {
       return fail("the sensor '" + one.name + "' measures the joint '" + one.joint + "' in '" +
-                      one.link + "', which the description lacks",
+                      one.frame_link + "', which the description lacks",
                   "correct `joint` and `link` of [[sensor]]");
     }
     Sensor sensor;

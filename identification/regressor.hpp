@@ -9,20 +9,14 @@
 
 #include "base/result.hpp"
 #include "identification/inertial_parameters.hpp"
+#include "model/model_spec.hpp"
 #include "model/tree.hpp"
 
 namespace tandem::identification {
 
-/// A six-axis sensor in a joint of the description (docs/conventions.md has its sign).
-struct WrenchSensor {
-  std::string name;
-  std::string joint;  ///< moving or fixed; what lies beyond it is measured
-  std::string link;   ///< frame of its values
-};
-
 /// What there is besides the tree.
 struct RegressorSpec {
-  std::vector<WrenchSensor> sensors{};
+  std::vector<model::SensorSpec> sensors{};   ///< docs/conventions.md has their sign
   std::vector<std::string> ground_links{};    ///< on which the ground acts: unknown forces
   std::vector<std::string> without_torque{};  ///< joints whose torque nobody measures
 };

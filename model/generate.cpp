@@ -11,7 +11,6 @@
 #include "base/quoting.hpp"
 #include "model/emit.hpp"
 #include "model/kernel_sources.hpp"
-#include "model/solve_source.hpp"
 
 namespace tandem::model {
 namespace {

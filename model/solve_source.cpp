@@ -1,6 +1,6 @@
 // Which entries of the factor are not zero follows from those of M. Elimination is written row by
 // row without loops, for some columns of the right-hand side at a time, as vectors in registers.
-#include "model/solve_source.hpp"
+#include "model/emit.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "model/trace.hpp"
+#include "model/emit.hpp"
 
 namespace tandem::model {
 

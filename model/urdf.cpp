@@ -18,7 +18,6 @@
 #include "model/urdf_mimic.hpp"
 #include "model/urdf_outline.hpp"
 #include "model/urdf_override.hpp"
-#include "model/urdf_plausible.hpp"
 #include "model/urdf_repair.hpp"
 #include "model/urdf_shapes.hpp"
 

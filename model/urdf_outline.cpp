@@ -15,10 +15,8 @@
 #include "base/xml_scan.hpp"
 #include "model/urdf_limits.hpp"
 #include "model/urdf_numbers.hpp"
+#include "model/urdf_text.hpp"
 #include "model/urdf_vocabulary.hpp"
-#include "model/urdf_xacro.hpp"
-#include "model/xml_encoding.hpp"
-#include "model/xml_reference.hpp"
 
 namespace tandem::model {
 namespace {
@@ -83,10 +81,8 @@ class Reader {
       report_xml_error();
       return nullptr;
     }
-    if (const auto wrong = find_wrong_reference(plain)) {
-      error(wrong->line, "",
-            "the character reference '" + wrong->text + "' stands for no character",
-            "write the character itself, in UTF-8");
+    if (auto wrong = find_wrong_reference(plain, file_)) {
+      add_error(out_.errors, std::move(*wrong));
       return nullptr;
     }
     const XMLElement* robot = document_.RootElement();

@@ -76,4 +76,10 @@ struct Outline {
 /// is incomplete then), and takes a massless root out that nothing but a floating joint leaves.
 void check_topology(Outline& outline, const std::string& file);
 
+/// Masses and inertias that a body can have, but that this robot's links hardly do. One warning for
+/// each kind, with the first link and the number of the others: no mass between two joints that
+/// move; a radius of gyration beyond the link; a link far denser than lead.
+/// @pre the tree's links have their shapes
+void warn_of_odd_masses(const Tree& tree, const Outline& outline, Diagnostics& warnings);
+
 }  // namespace tandem::model

@@ -1,12 +1,11 @@
-#include "model/urdf_plausible.hpp"
-
+// Masses and inertias that a body can have, but that this robot's links hardly do.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 #include "base/counted.hpp"
 #include "model/density.hpp"
-#include "model/urdf.hpp"
+#include "model/urdf_outline.hpp"
 
 namespace tandem::model {
 namespace {

@@ -1,4 +1,5 @@
-#include "report/parallel_figures.hpp"
+// Figures and table of a robot and the one that was simulated beside it: first minus second.
+#include "report/run_figures.hpp"
 
 #include <fmt/core.h>
 
@@ -6,8 +7,6 @@
 #include <cmath>
 #include <numeric>
 #include <string>
-
-#include "report/run_figures.hpp"
 
 namespace tandem::report {
 namespace {

@@ -14,10 +14,8 @@
 #include "report/close_passive.hpp"
 #include "report/gnuplot.hpp"
 #include "report/page.hpp"
-#include "report/parallel_figures.hpp"
 #include "report/replay.hpp"
 #include "report/run_figures.hpp"
-#include "report/wrench_figures.hpp"
 
 namespace tandem::report {
 namespace {

@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "base/result.hpp"
 #include "model/kernels.h"
 #include "report/figure.hpp"
+#include "report/page.hpp"
 #include "report/run_data.hpp"
 
 namespace tandem::report {
@@ -39,5 +41,21 @@ inline constexpr std::size_t kMostOthers = 2;
 
 /// Upward force [N] that a six-axis sensor measured, turned into the world by the run's posture.
 [[nodiscard]] std::vector<double> vertical_force(const RunData& run, int sensor);
+
+// parallel_figures.cpp: a robot and the one that was simulated beside it, first minus second.
+
+/// Position and torque differences of the joints where they are largest, and the difference of the
+/// vertical force in the first six-axis sensor that is shown.
+[[nodiscard]] std::vector<Figure> difference_figures(const RunData& run, const RunData& second);
+
+/// Every joint's, the largest difference of torque first.
+[[nodiscard]] PageTable differences_table(const RunData& run, const RunData& second);
+
+// wrench_figures.cpp: what a run estimated at the places of its [[estimation.wrench]].
+
+/// Two figures of each place, "external_force_SITE" and "external_moment_SITE" (about the site's
+/// origin): x, y, z in W, over the run's own rows. None where nothing was declared.
+/// Errors: as log::LogFile::open() and read(), of a log that changed since the run was read.
+[[nodiscard]] Result<std::vector<Figure>> wrench_figures(const RunData& run);
 
 }  // namespace tandem::report

@@ -1,4 +1,5 @@
-#include "report/wrench_figures.hpp"
+// The forces and moments that a run estimated at the places of its [[estimation.wrench]].
+#include "report/run_figures.hpp"
 
 #include <algorithm>
 #include <iterator>

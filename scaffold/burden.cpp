@@ -1,6 +1,6 @@
 // The largest torque of gravity on each joint against its drive. Masses look like grams when most
 // of them are denser than any metal, and a thousandth of them is no burden.
-#include "scaffold/burden.hpp"
+#include "scaffold/steps.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "scaffold/described_dynamics.hpp"
+#include "scaffold/steps.hpp"
 
 #include <fmt/format.h>
 

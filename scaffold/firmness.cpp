@@ -1,6 +1,6 @@
 // Energy of springs, gains, ground and gravity to second order about rest; bisection finds the
 // factor on all stiffnesses from which the robot is stable and no contact point lifts off.
-#include "scaffold/firmness.hpp"
+#include "scaffold/steps.hpp"
 
 #include <fmt/format.h>
 

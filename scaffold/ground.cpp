@@ -1,5 +1,5 @@
 // Sites and [contact] in proportion to COMAN's, by the weight on each point.
-#include "scaffold/ground.hpp"
+#include "scaffold/steps.hpp"
 
 #include <cmath>
 

@@ -1,6 +1,6 @@
 // Matches joints by kind of limb, direction of the axis and place in the limb, and scales drive,
 // spring and gains by mass times reach.
-#include "scaffold/like.hpp"
+#include "scaffold/steps.hpp"
 
 #include <fmt/format.h>
 

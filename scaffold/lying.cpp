@@ -1,4 +1,4 @@
-#include "scaffold/lying.hpp"
+#include "scaffold/steps.hpp"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
 // Way-points about the posture, reduced joint by joint until no drive is overloaded and nothing
 // goes through the floor.
-#include "scaffold/moves.hpp"
+#include "scaffold/steps.hpp"
 
 #include <algorithm>
 #include <cmath>

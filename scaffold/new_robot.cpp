@@ -13,16 +13,9 @@
 #include "base/quoting.hpp"
 #include "hal/config/following_error.hpp"
 #include "model/urdf.hpp"
-#include "scaffold/burden.hpp"
-#include "scaffold/described_dynamics.hpp"
-#include "scaffold/firmness.hpp"
-#include "scaffold/ground.hpp"
-#include "scaffold/like.hpp"
-#include "scaffold/lying.hpp"
-#include "scaffold/moves.hpp"
 #include "scaffold/standing.hpp"
+#include "scaffold/steps.hpp"
 #include "scaffold/strength.hpp"
-#include "scaffold/wiring.hpp"
 
 namespace tandem::scaffold {
 namespace {
@@ -100,7 +93,6 @@ class Maker {
   const Request& request_;
   std::string text_;  ///< of the description
   NewRobot robot_;
-  Outfit outfit_;
   std::optional<Standing> standing_;
   Eigen::VectorXd q_;
   std::vector<Overload> overloaded_;
@@ -168,7 +160,6 @@ Diagnostics Maker::take(model::UrdfModel found) {
   }
   robot_.extras = model::joint_extras(text_);
   narrow_to_soft_limits();
-  outfit_ = read_outfit(text_);
   return {};
 }
 
@@ -298,7 +289,7 @@ Status Maker::choose_drives() {
     if (request_.dynamics) add_described_dynamics(robot_);
     robot_.gains = tune(robot_.drives, loads, {.period_s = kControlPeriod_s});
   }
-  robot_.sensors = find_sensors(robot_.tree, outfit_);
+  robot_.sensors = find_sensors(robot_.tree, text_);
   fill_model();
   fill_joints();
   find_overloaded(torques);

@@ -1,6 +1,8 @@
 // Force/torque sensors and IMUs by <sensor> type or name, one per wrench and one per body.
 #include "scaffold/sensors.hpp"
 
+#include <tinyxml2.h>
+
 #include <algorithm>
 
 #include "base/file_name.hpp"
@@ -16,6 +18,37 @@ bool is_force_torque(const std::string& name) {
   return has_word(name, "ft") || mentions(name, "force");
 }
 
+/// One <sensor>, as some simulators write it outside <gazebo>. urdfdom does not read it.
+struct SensorElement {
+  std::string name;
+  std::string type;
+  std::string parent;  // a joint or a link
+};
+
+std::string text_of(const tinyxml2::XMLElement& e, const char* attribute) {
+  const char* text = e.Attribute(attribute);
+  return text == nullptr ? "" : text;
+}
+
+/// What cannot be understood here is left out: it is only ever the ground of a guess.
+std::vector<SensorElement> read_elements(std::string_view description) {
+  std::vector<SensorElement> elements;
+  tinyxml2::XMLDocument document;
+  const bool parsed =
+      document.Parse(description.data(), description.size()) == tinyxml2::XML_SUCCESS;
+  const tinyxml2::XMLElement* robot = parsed ? document.FirstChildElement("robot") : nullptr;
+  if (robot == nullptr) return elements;
+  for (const auto* e = robot->FirstChildElement("sensor"); e != nullptr;
+       e = e->NextSiblingElement("sensor")) {
+    const tinyxml2::XMLElement* parent = e->FirstChildElement("parent");
+    if (parent == nullptr) continue;
+    const std::string joint = text_of(*parent, "joint");
+    elements.push_back({text_of(*e, "name"), text_of(*e, "type"),
+                        joint.empty() ? text_of(*parent, "link") : joint});
+  }
+  return elements;
+}
+
 class Finder {
  public:
   explicit Finder(const Tree& tree) : tree_(tree), mass_kg_(tree.links.size(), 0.0) {
@@ -25,8 +58,8 @@ class Finder {
     }
   }
 
-  std::vector<FoundSensor> run(const Outfit& outfit) {
-    for (const SensorElement& element : outfit.sensors) {
+  std::vector<FoundSensor> run(std::string_view description) {
+    for (const SensorElement& element : read_elements(description)) {
       if (!mentions(element.type, "force")) continue;
       add_wrench(tree_.child_link_index(element.parent), element.name, {});
     }
@@ -130,8 +163,8 @@ class Finder {
 
 }  // namespace
 
-std::vector<FoundSensor> find_sensors(const Tree& tree, const Outfit& outfit) {
-  return Finder(tree).run(outfit);
+std::vector<FoundSensor> find_sensors(const Tree& tree, std::string_view description) {
+  return Finder(tree).run(description);
 }
 
 }  // namespace tandem::scaffold

@@ -3,11 +3,11 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hal/config/robot_config.hpp"
 #include "model/tree.hpp"
-#include "scaffold/outfit.hpp"
 
 namespace tandem::scaffold {
 
@@ -21,6 +21,8 @@ struct FoundSensor {
 /// Force/torque sensors: <sensor> elements, and joints and links with "ft" or "force" in their
 /// names, one for each wrench. IMUs: links with "imu" in their names, one for each body; a
 /// floating base without any gets one at its root. Their names are such as topics may have.
-[[nodiscard]] std::vector<FoundSensor> find_sensors(const model::Tree& tree, const Outfit& outfit);
+/// @param description  its text, which model::parse_urdf() has accepted; may be empty
+[[nodiscard]] std::vector<FoundSensor> find_sensors(const model::Tree& tree,
+                                                    std::string_view description);
 
 }  // namespace tandem::scaffold

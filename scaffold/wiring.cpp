@@ -1,6 +1,6 @@
 // One bus per limb and two joints per board; a limb whose bus would be overloaded at 1 kHz is
 // split.
-#include "scaffold/wiring.hpp"
+#include "scaffold/steps.hpp"
 
 #include <algorithm>
 

@@ -161,8 +161,8 @@ Exit identify_command(const IdentifyOptions& options) {
   if (!robot) return refuse(robot.error());
   if (const Status s = check_identified(*robot, options.logs, options.output); !s)
     return refuse(s.error());
-  const auto result = identification::identify(options.logs, robot->config, robot->tree,
-                                               {.cutoff_Hz = options.cutoff_Hz});
+  const auto result =
+      identification::identify(options.logs, robot->config, robot->tree, options.cutoff_Hz);
   if (!result) return refuse(result.error());
   std::FILE* out = human_output(options.json);
   print_result(out, *result);

@@ -18,7 +18,6 @@
 
 #include "base/result.hpp"
 #include "base/toml_reader.hpp"
-#include "canopen/board_sheet.hpp"
 #include "canopen/data_sheet.hpp"
 #include "canopen/drive_parameters.hpp"
 #include "hal/image.hpp"

@@ -5,7 +5,7 @@
 
 #include <limits>
 
-#include "canopen/board_sheet.hpp"
+#include "canopen/data_sheet.hpp"
 #include "rig.hpp"
 
 namespace tandem::firmware::testing {

@@ -8,8 +8,8 @@
 #include <random>
 
 #include "runtime/experiment.hpp"
-#include "scaffold/firmness.hpp"
 #include "scaffold/new_robot.hpp"
+#include "scaffold/steps.hpp"
 #include "tests/support/scratch_folder.hpp"
 
 namespace tandem::scaffold {
