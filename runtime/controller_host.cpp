@@ -16,15 +16,9 @@ ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kern
       period_ns_(period_ns),
       capabilities_(robot_.joints.begin(), robot_.joints.end()),
       owner_(robot_.joints.size(), -1),
-      recovers_(robot_.joints.size()),
-      operator_(robot_, gains_, period_ns),
-      transfer_(capabilities_, period_ns),
+      references_(robot_, capabilities_, gains_, period_ns),
       at_rest_(robot_.shape()),
-      guard_(robot_.shape(), capabilities_, gains_) {
-  for (const hal::JointCapabilities& joint : capabilities_) {
-    impedance_.push_back({joint.stiffness_Nm_rad, joint.damping_Nms_rad});
-  }
-}
+      guard_(robot_.shape(), capabilities_, gains_) {}
 
 Status ControllerHost::add(const std::string& name, LoadedController plugin, TomlTable parameters,
                            bool active) {
@@ -204,53 +198,27 @@ void ControllerHost::set_active(ControllerSet active) noexcept TANDEM_RT {
     if (!is_active(slot)) continue;
     for (const auto& claim : table_[slot]->claims) {
       owner_[claim.joint] = static_cast<std::int32_t>(slot);
-      recovers_[claim.joint] = 0;
-      operator_.position.abandon(claim.joint);
+      references_.abandon(claim.joint);
     }
   }
   show();
 }
 
-void ControllerHost::start(const hal::CycleTime& time, const hal::StateImage& state,
-                           hal::CommandImage& command) noexcept TANDEM_RT {
-  transfer_.clear();
-  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
-    const bool held = command.interaction()[j] == 0 &&
-                      command.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition);
-    if (!held) continue;
-    if (owner_[j] >= 0) {  // an impedance that nobody felt is no step
-      command.stiffness_Nm_rad()[j] = impedance_[j].stiffness_Nm_rad;
-      command.damping_Nms_rad()[j] = impedance_[j].damping_Nms_rad;
-    }
-    transfer_.begin_from(j, state, command);
-  }
-  idle(command);  // so that every joint stays at its measured position
-  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
-    stay(j, state, command);
-    settle(j, state, command);
-  }
+void ControllerHost::start(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT {
+  references_.start(owner_, images);
   done_ = ended_ = 0;
-  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if (is_active(slot)) set_modes(*table_[slot], command);
-  }
-  const hal::StateImage& shown = at_rest(state, active_);
-  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if (is_active(slot)) call_start(*table_[slot], time, shown, command);
-  }
-  leave_calls();
+  call_starts(active_, time, images);
 }
 
-Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& state,
-                            hal::CommandImage& command) noexcept TANDEM_RT {
-  settle_ended(state, command);
-  transfer_.watch(command);
-  transfer_.before_update(command);
+Code ControllerHost::update(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT {
+  settle_ended(images);
+  references_.before_update(images.command);
   bool ends = active_ != 0;
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (!is_active(slot)) continue;
     HostedController& one = *table_[slot];
     if ((done_ & only(slot)) == 0) {
-      const Code code = call_update(one, time, state, command);
+      const Code code = call_update(one, time, images);
       if (code == Code::kStopped) {
         done_ |= only(slot);
         ended_ |= only(slot);
@@ -263,26 +231,52 @@ Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& s
     ends = ends && (done_ & only(slot)) != 0 && one.of_experiment;
   }
   leave_calls();
-  move_on(state, command);
-  transfer_.after_update(state, command);
+  references_.after_update(images);
   show();
   return ends ? Code::kStopped : Code::kOk;
 }
 
-void ControllerHost::call_start(HostedController& one, const hal::CycleTime& time,
-                                const hal::StateImage& state,
-                                hal::CommandImage& command) noexcept TANDEM_RT {
-  guard_.remember(command, gains_);
-  enter(one).start(time, state, command);
-  take_back(one, command);
+/// `state`, but with the joints that `start` claims, and that brake, where they come to rest.
+const hal::StateImage& ControllerHost::at_rest(const hal::StateImage& state,
+                                               ControllerSet start) noexcept TANDEM_RT {
+  bool brakes = false;
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((start & only(slot)) == 0 || table_[slot] == nullptr) continue;
+    for (const auto& claim : table_[slot]->claims) {
+      const double way_rad = references_.way_rad(claim, state);
+      if (way_rad == 0.0) continue;
+      if (!brakes) at_rest_.assign(state);
+      brakes = true;
+      at_rest_.position_rad()[claim.joint] += way_rad;
+      at_rest_.velocity_rad_s()[claim.joint] = 0.0;
+    }
+  }
+  return brakes ? at_rest_ : state;
+}
+
+/// Each in the modes of its claims.
+void ControllerHost::call_starts(ControllerSet start, const hal::CycleTime& time,
+                                 JointImages images) noexcept TANDEM_RT {
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((start & only(slot)) == 0) continue;
+    for (const auto& claim : table_[slot]->claims) references_.take_up(claim, images.command);
+  }
+  const hal::StateImage& shown = at_rest(images.state, start);
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((start & only(slot)) == 0) continue;
+    HostedController& one = *table_[slot];
+    guard_.remember(images.command, gains_);
+    enter(one).start(time, shown, images.command);
+    take_back(one, images.command);
+  }
+  leave_calls();
 }
 
 Code ControllerHost::call_update(HostedController& one, const hal::CycleTime& time,
-                                 const hal::StateImage& state,
-                                 hal::CommandImage& command) noexcept TANDEM_RT {
-  guard_.remember(command, gains_);
-  const Code code = enter(one).update(time, state, command);
-  take_back(one, command);
+                                 JointImages images) noexcept TANDEM_RT {
+  guard_.remember(images.command, gains_);
+  const Code code = enter(one).update(time, images.state, images.command);
+  take_back(one, images.command);
   return code;
 }
 
@@ -325,8 +319,7 @@ void ControllerHost::archive(Archive& ar) {
     one->controller->archive(ar);
     ar(one->strayed);
   }
-  ar(active_, done_, ended_, impedance_, recovers_, failed_controller_, transfer_, operator_,
-     gains_);
+  ar(active_, done_, ended_, failed_controller_, references_, gains_);
   if (ar.reading()) guard_.forget(gains_);
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (table_[slot] == nullptr) active_ &= ~only(slot);  // bytes of something else
