@@ -39,6 +39,16 @@ struct ControllerCode {
   std::string name, sha256, path;
 };
 
+/// A controller, and where it is from.
+struct ControllerSource {
+  template <class Pointer>  // to one of this program
+  ControllerSource(Pointer made) : controller(std::move(made)) {}
+  ControllerSource(LoadedController plugin);  ///< keeps its library open
+
+  std::shared_ptr<Controller> controller;
+  ControllerCode code = {};  ///< of a plugin; else empty
+};
+
 /// A configured controller.
 struct HostedController {
   std::string name;
@@ -89,15 +99,12 @@ class ControllerHost {
   /// Configures a controller and takes its claims.
   /// @param active  false: it is loaded, and waits for its start.
   ///
-  /// Errors (nothing has moved then): those of configure(); a joint that another active
-  /// controller claimed (both are named); too many controllers.
+  /// Errors (nothing has moved then): those of configure(), which a plugin has kStartTime for; a
+  /// joint that another active controller claimed (both are named); too many controllers. After a
+  /// plugin's exit(), or when it does not return, the host, and what it was given, must stay until
+  /// the process ends (a_hosted_call_goes_on()).
   /// Errors in `parameters` go to the document's diagnostics: the caller looks there, too.
-  [[nodiscard]] Status add(const std::string& name, std::shared_ptr<Controller> controller,
-                           TomlTable parameters, bool active = true);
-  /// The same for a plugin; the host keeps its library open.
-  /// Errors besides: its configure() calls exit(), or does not return within kStartTime. The host,
-  /// and what it was given, must then stay until the process ends (a_hosted_call_goes_on()).
-  [[nodiscard]] Status add(const std::string& name, LoadedController plugin, TomlTable parameters,
+  [[nodiscard]] Status add(const std::string& name, ControllerSource source, TomlTable parameters,
                            bool active = true);
 
   /// How long the opening of a library, and a configure(), may take before the run: nobody waits
@@ -109,14 +116,14 @@ class ControllerHost {
   /// Less than a client waits for an answer.
   static constexpr std::chrono::milliseconds kConfigureTime{4000};
   /// A controller that is ready to be inserted. The run goes on whatever its configure() does.
+  /// @param limit      empty: the caller waits for its configure(), however long that takes
+  /// @param start_rad  as start_from(); empty: not known
   /// Errors: what its configure() says; it throws, calls exit(), does not return within `limit`; a
   /// joint index or mode that the robot lacks; a joint that it claims twice.
   [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
-      const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
-      std::chrono::milliseconds limit = kConfigureTime);
-  [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
-      const std::string& name, LoadedController plugin, TomlTable parameters,
-      std::chrono::milliseconds limit = kConfigureTime);
+      const std::string& name, ControllerSource source, TomlTable parameters,
+      std::optional<std::chrono::milliseconds> limit = kConfigureTime,
+      std::span<const double> start_rad = {});
   /// The first joint that two of `active` claim.
   [[nodiscard]] static std::optional<ClaimConflict> find_conflict(
       const Table& table, ControllerSet active) noexcept TANDEM_RT;
@@ -192,12 +199,6 @@ class ControllerHost {
   void archive(Archive& ar);
 
  private:
-  [[nodiscard]] Status add(const std::string& name, std::shared_ptr<Controller> controller,
-                           TomlTable parameters, bool active,
-                           std::optional<std::chrono::milliseconds> limit);
-  [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
-      const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
-      std::span<const double> start_rad, std::optional<std::chrono::milliseconds> limit);
   [[nodiscard]] Status check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const;
   [[nodiscard]] std::uint32_t new_id(const std::string& name);
@@ -219,8 +220,6 @@ class ControllerHost {
     return *one.controller;
   }
   void leave_calls() noexcept TANDEM_RT { at_work_.store(-1, std::memory_order_relaxed); }
-
-  void note_code(const std::string& name, const LoadedController& plugin);
 
   const hal::RobotConfig* config_;
   const hal::Robot robot_;  // what the controllers see of it
