@@ -7,6 +7,14 @@
 #include "controllers/hosted_call.hpp"
 
 namespace tandem::runtime {
+namespace {
+
+LoopAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
+  return {.reason = why, .one = static_cast<std::int32_t>(one)};
+}
+
+}  // namespace
+
 ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kernels* kernels,
                                std::int64_t period_ns)
     : config_(&config),
@@ -16,44 +24,27 @@ ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kern
       period_ns_(period_ns),
       capabilities_(robot_.joints.begin(), robot_.joints.end()),
       owner_(robot_.joints.size(), -1),
-      recovers_(robot_.joints.size()),
-      operator_(robot_, gains_, period_ns),
-      transfer_(capabilities_, period_ns),
+      references_(robot_, capabilities_, gains_, period_ns),
       at_rest_(robot_.shape()),
-      guard_(robot_.shape(), capabilities_, gains_) {
-  for (const hal::JointCapabilities& joint : capabilities_) {
-    impedance_.push_back({joint.stiffness_Nm_rad, joint.damping_Nms_rad});
-  }
-}
+      guard_(robot_.shape(), capabilities_, gains_) {}
 
-Status ControllerHost::add(const std::string& name, LoadedController plugin, TomlTable parameters,
-                           bool active) {
-  const std::string path = plugin.path();
-  note_code(name, plugin);
+ControllerSource::ControllerSource(LoadedController plugin)
+    : code{.name = {}, .sha256 = plugin.sha256(), .path = plugin.path()} {
   auto owner = std::make_shared<LoadedController>(std::move(plugin));
-  const std::size_t slot = size();
-  Status added = add(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters),
-                     active, kStartTime);
-  if (added) owned_[slot]->plugin = path;
-  return added;
+  controller = std::shared_ptr<Controller>(owner, &**owner);
 }
 
-Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> controller,
-                           TomlTable parameters, bool active) {
-  return add(name, std::move(controller), std::move(parameters), active, std::nullopt);
-}
-
-Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> controller,
-                           TomlTable parameters, bool active,
-                           std::optional<std::chrono::milliseconds> limit) {
+Status ControllerHost::add(const std::string& name, ControllerSource source, TomlTable parameters,
+                           bool active) {
   const std::size_t slot = size();
   if (slot == kMostControllers) {
     return fail_at(name, "is one controller more than there can be",
                    "at most " + std::to_string(kMostControllers));
   }
-  auto made =
-      configure(name, std::move(controller), std::move(parameters),
-                active ? std::span<const double>(start_rad_) : std::span<const double>(), limit);
+  std::optional<std::chrono::milliseconds> limit;
+  if (!source.code.path.empty()) limit = kStartTime;
+  auto made = configure(name, std::move(source), std::move(parameters), limit,
+                        active ? std::span<const double>(start_rad_) : std::span<const double>());
   if (!made) return std::unexpected(made.error());
   table_[slot] = made->get();
   const ControllerSet after = active_ | only(slot);
@@ -70,41 +61,24 @@ Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> 
   return {};
 }
 
-void ControllerHost::note_code(const std::string& name, const LoadedController& plugin) {
-  const std::lock_guard lock(code_mutex_);
-  code_.push_back({name, plugin.sha256(), plugin.path()});
-}
-
 std::vector<ControllerCode> ControllerHost::code() const {
   const std::lock_guard lock(code_mutex_);
   return code_;
 }
 
 Result<std::unique_ptr<HostedController>> ControllerHost::configure(
-    const std::string& name, LoadedController plugin, TomlTable parameters,
-    std::chrono::milliseconds limit) {
-  const std::string path = plugin.path();
-  note_code(name, plugin);
-  auto owner = std::make_shared<LoadedController>(std::move(plugin));
-  auto made =
-      configure(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters), limit);
-  if (made) (*made)->plugin = path;
-  return made;
-}
-
-Result<std::unique_ptr<HostedController>> ControllerHost::configure(
-    const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
-    std::chrono::milliseconds limit) {
-  return configure(name, std::move(controller), std::move(parameters), {}, limit);
-}
-
-Result<std::unique_ptr<HostedController>> ControllerHost::configure(
-    const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
-    std::span<const double> start_rad, std::optional<std::chrono::milliseconds> limit) {
+    const std::string& name, ControllerSource source, TomlTable parameters,
+    std::optional<std::chrono::milliseconds> limit, std::span<const double> start_rad) {
+  if (!source.code.path.empty()) {
+    const std::lock_guard lock(code_mutex_);
+    code_.push_back({name, source.code.sha256, source.code.path});
+  }
   const auto shared =
       std::make_shared<ControllerSetup>(robot_, gains_, kernels_, period_ns_, std::move(parameters),
                                         start_rad, estimate_, predictor_);
-  const auto call = [controller, shared] { return controller->configure(*shared); };
+  const auto call = [controller = source.controller, shared] {
+    return controller->configure(*shared);
+  };
   const Status configured = limit ? bounded_call(name, *limit, call) : hosted_call(name, call);
   // Keys that it did not get to before it failed are not wrong.
   if (!configured) {
@@ -119,7 +93,8 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
   }
   auto made = std::make_unique<HostedController>();
   made->name = name;
-  made->controller = std::move(controller);
+  made->plugin = source.code.path;
+  made->controller = std::move(source.controller);
   made->claims.assign(setup.claims().begin(), setup.claims().end());
   made->plans.assign(setup.plans().begin(), setup.plans().end());
   made->claimed.assign(robot_.joints.size(), 0);
@@ -204,53 +179,106 @@ void ControllerHost::set_active(ControllerSet active) noexcept TANDEM_RT {
     if (!is_active(slot)) continue;
     for (const auto& claim : table_[slot]->claims) {
       owner_[claim.joint] = static_cast<std::int32_t>(slot);
-      recovers_[claim.joint] = 0;
-      operator_.position.abandon(claim.joint);
+      references_.abandon(claim.joint);
     }
   }
   show();
 }
 
-void ControllerHost::start(const hal::CycleTime& time, const hal::StateImage& state,
-                           hal::CommandImage& command) noexcept TANDEM_RT {
-  transfer_.clear();
-  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
-    const bool held = command.interaction()[j] == 0 &&
-                      command.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition);
-    if (!held) continue;
-    if (owner_[j] >= 0) {  // an impedance that nobody felt is no step
-      command.stiffness_Nm_rad()[j] = impedance_[j].stiffness_Nm_rad;
-      command.damping_Nms_rad()[j] = impedance_[j].damping_Nms_rad;
-    }
-    transfer_.begin_from(j, state, command);
-  }
-  idle(command);  // so that every joint stays at its measured position
-  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
-    stay(j, state, command);
-    settle(j, state, command);
-  }
-  done_ = ended_ = 0;
+std::int32_t ControllerHost::claimant(std::size_t joint,
+                                      ControllerSet by) const noexcept TANDEM_RT {
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if (is_active(slot)) set_modes(*table_[slot], command);
+    if ((by & only(slot)) == 0 || table_[slot] == nullptr) continue;
+    if (table_[slot]->claimed[joint] != 0) return static_cast<std::int32_t>(slot);
   }
-  const hal::StateImage& shown = at_rest(state, active_);
-  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if (is_active(slot)) call_start(*table_[slot], time, shown, command);
-  }
-  leave_calls();
+  return -1;
 }
 
-Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& state,
-                            hal::CommandImage& command) noexcept TANDEM_RT {
-  settle_ended(state, command);
-  transfer_.watch(command);
-  transfer_.before_update(command);
+LoopAnswer ControllerHost::insert(std::size_t slot,
+                                  HostedController& controller) noexcept TANDEM_RT {
+  table_[slot] = &controller;
+  return {};
+}
+
+LoopAnswer ControllerHost::remove(std::size_t slot) noexcept TANDEM_RT {
+  if (table_[slot] == nullptr) return refuse(RejectReason::kGone, slot);
+  if (is_active(slot)) return refuse(RejectReason::kActive, slot);
+  table_[slot] = nullptr;
+  return {};
+}
+
+LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, bool running,
+                                       const hal::CycleTime& time,
+                                       JointImages images) noexcept TANDEM_RT {
+  const ControllerSet after = (active_ & ~stop) | start;
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    const bool named = ((stop | start) & only(slot)) != 0;
+    if (named && table_[slot] == nullptr) return refuse(RejectReason::kGone, slot);
+    if (named && is_active(slot) != ((stop & only(slot)) != 0)) {
+      return refuse(RejectReason::kActive, slot);
+    }
+  }
+  if (const auto conflict = find_conflict(table_, after)) {
+    return {.reason = RejectReason::kConflict,
+            .joint = static_cast<std::int32_t>(conflict->joint),
+            .one = static_cast<std::int32_t>(conflict->one),
+            .other = static_cast<std::int32_t>(conflict->other)};
+  }
+  done_ &= ~(stop | start);
+  ended_ &= ~(stop | start);
+  set_active(after);
+  if (!running) return {};
+  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
+    if (claimant(j, stop | start) < 0) continue;
+    references_.transfer().begin(j, images.state, images.command);
+  }
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((stop & only(slot)) == 0) continue;
+    enter(*table_[slot]).stop();
+    for (const auto& claim : table_[slot]->claims) references_.release(claim.joint, images);
+  }
+  call_starts(start, time, images);
+  return {};
+}
+
+/// The joints of controllers that were done in the cycle before: one that ended in motion brakes.
+void ControllerHost::settle_ended(JointImages images) noexcept TANDEM_RT {
+  for (std::size_t slot = 0; ended_ != 0 && slot < table_.size(); ++slot) {
+    if ((ended_ & only(slot)) == 0 || table_[slot] == nullptr || !is_active(slot)) continue;
+    for (const auto& claim : table_[slot]->claims) references_.end(claim.joint, images);
+  }
+  ended_ = 0;
+}
+
+bool ControllerHost::retreat(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT {
+  ControllerSet retreating = 0;
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if (!is_active(slot) || (done_ & only(slot)) != 0) continue;
+    Controller& controller = enter(*table_[slot]);
+    if (controller.can_retreat() && controller.retreat(time, images.state))
+      retreating |= only(slot);
+  }
+  leave_calls();
+  if (retreating == 0) return false;
+  (void)switch_over(active_ & ~retreating, 0, true, time, images);
+  return true;
+}
+
+void ControllerHost::start(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT {
+  references_.start(owner_, images);
+  done_ = ended_ = 0;
+  call_starts(active_, time, images);
+}
+
+Code ControllerHost::update(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT {
+  settle_ended(images);
+  references_.before_update(images.command);
   bool ends = active_ != 0;
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (!is_active(slot)) continue;
     HostedController& one = *table_[slot];
     if ((done_ & only(slot)) == 0) {
-      const Code code = call_update(one, time, state, command);
+      const Code code = call_update(one, time, images);
       if (code == Code::kStopped) {
         done_ |= only(slot);
         ended_ |= only(slot);
@@ -263,26 +291,52 @@ Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& s
     ends = ends && (done_ & only(slot)) != 0 && one.of_experiment;
   }
   leave_calls();
-  move_on(state, command);
-  transfer_.after_update(state, command);
+  references_.after_update(images);
   show();
   return ends ? Code::kStopped : Code::kOk;
 }
 
-void ControllerHost::call_start(HostedController& one, const hal::CycleTime& time,
-                                const hal::StateImage& state,
-                                hal::CommandImage& command) noexcept TANDEM_RT {
-  guard_.remember(command, gains_);
-  enter(one).start(time, state, command);
-  take_back(one, command);
+/// `state`, but with the joints that `start` claims, and that brake, where they come to rest.
+const hal::StateImage& ControllerHost::at_rest(const hal::StateImage& state,
+                                               ControllerSet start) noexcept TANDEM_RT {
+  bool brakes = false;
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((start & only(slot)) == 0 || table_[slot] == nullptr) continue;
+    for (const auto& claim : table_[slot]->claims) {
+      const double way_rad = references_.way_rad(claim, state);
+      if (way_rad == 0.0) continue;
+      if (!brakes) at_rest_.assign(state);
+      brakes = true;
+      at_rest_.position_rad()[claim.joint] += way_rad;
+      at_rest_.velocity_rad_s()[claim.joint] = 0.0;
+    }
+  }
+  return brakes ? at_rest_ : state;
+}
+
+/// Each in the modes of its claims.
+void ControllerHost::call_starts(ControllerSet start, const hal::CycleTime& time,
+                                 JointImages images) noexcept TANDEM_RT {
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((start & only(slot)) == 0) continue;
+    for (const auto& claim : table_[slot]->claims) references_.take_up(claim, images.command);
+  }
+  const hal::StateImage& shown = at_rest(images.state, start);
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((start & only(slot)) == 0) continue;
+    HostedController& one = *table_[slot];
+    guard_.remember(images.command, gains_);
+    enter(one).start(time, shown, images.command);
+    take_back(one, images.command);
+  }
+  leave_calls();
 }
 
 Code ControllerHost::call_update(HostedController& one, const hal::CycleTime& time,
-                                 const hal::StateImage& state,
-                                 hal::CommandImage& command) noexcept TANDEM_RT {
-  guard_.remember(command, gains_);
-  const Code code = enter(one).update(time, state, command);
-  take_back(one, command);
+                                 JointImages images) noexcept TANDEM_RT {
+  guard_.remember(images.command, gains_);
+  const Code code = enter(one).update(time, images.state, images.command);
+  take_back(one, images.command);
   return code;
 }
 
@@ -325,8 +379,7 @@ void ControllerHost::archive(Archive& ar) {
     one->controller->archive(ar);
     ar(one->strayed);
   }
-  ar(active_, done_, ended_, impedance_, recovers_, failed_controller_, transfer_, operator_,
-     gains_);
+  ar(active_, done_, ended_, failed_controller_, references_, gains_);
   if (ar.reading()) guard_.forget(gains_);
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (table_[slot] == nullptr) active_ &= ~only(slot);  // bytes of something else

@@ -21,11 +21,10 @@
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/config/robot_config.hpp"
-#include "hal/devices.hpp"
 #include "hal/image.hpp"
 #include "hal/robot.hpp"
-#include "runtime/bumpless_transfer.hpp"
 #include "runtime/claim_guard.hpp"
+#include "runtime/joint_references.hpp"
 #include "runtime/loop_request.hpp"
 
 namespace tandem::runtime {
@@ -38,6 +37,16 @@ using ControllerSet = std::uint32_t;
 /// The code of a controller: which file it came from.
 struct ControllerCode {
   std::string name, sha256, path;
+};
+
+/// A controller, and where it is from.
+struct ControllerSource {
+  template <class Pointer>  // to one of this program
+  ControllerSource(Pointer made) : controller(std::move(made)) {}
+  ControllerSource(LoadedController plugin);  ///< keeps its library open
+
+  std::shared_ptr<Controller> controller;
+  ControllerCode code = {};  ///< of a plugin; else empty
 };
 
 /// A configured controller.
@@ -66,9 +75,8 @@ struct ClaimConflict {
   std::size_t one = 0, other = 0;  ///< slots
 };
 
-/// Controllers run in the order of their slots, each on the joints that it claimed. A joint that
-/// no active controller claims is held where it was measured when the controllers started, or is
-/// in the mode that an operator has given it since.
+/// Controllers run in the order of their slots, each on the joints that it claimed. What happens to
+/// a joint that no active controller claims, or that changes hands: JointReferences.
 class ControllerHost {
  public:
   using Table = std::array<HostedController*, kMostControllers>;
@@ -91,15 +99,12 @@ class ControllerHost {
   /// Configures a controller and takes its claims.
   /// @param active  false: it is loaded, and waits for its start.
   ///
-  /// Errors (nothing has moved then): those of configure(); a joint that another active
-  /// controller claimed (both are named); too many controllers.
+  /// Errors (nothing has moved then): those of configure(), which a plugin has kStartTime for; a
+  /// joint that another active controller claimed (both are named); too many controllers. After a
+  /// plugin's exit(), or when it does not return, the host, and what it was given, must stay until
+  /// the process ends (a_hosted_call_goes_on()).
   /// Errors in `parameters` go to the document's diagnostics: the caller looks there, too.
-  [[nodiscard]] Status add(const std::string& name, std::shared_ptr<Controller> controller,
-                           TomlTable parameters, bool active = true);
-  /// The same for a plugin; the host keeps its library open.
-  /// Errors besides: its configure() calls exit(), or does not return within kStartTime. The host,
-  /// and what it was given, must then stay until the process ends (a_hosted_call_goes_on()).
-  [[nodiscard]] Status add(const std::string& name, LoadedController plugin, TomlTable parameters,
+  [[nodiscard]] Status add(const std::string& name, ControllerSource source, TomlTable parameters,
                            bool active = true);
 
   /// How long the opening of a library, and a configure(), may take before the run: nobody waits
@@ -111,14 +116,14 @@ class ControllerHost {
   /// Less than a client waits for an answer.
   static constexpr std::chrono::milliseconds kConfigureTime{4000};
   /// A controller that is ready to be inserted. The run goes on whatever its configure() does.
+  /// @param limit      empty: the caller waits for its configure(), however long that takes
+  /// @param start_rad  as start_from(); empty: not known
   /// Errors: what its configure() says; it throws, calls exit(), does not return within `limit`; a
   /// joint index or mode that the robot lacks; a joint that it claims twice.
   [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
-      const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
-      std::chrono::milliseconds limit = kConfigureTime);
-  [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
-      const std::string& name, LoadedController plugin, TomlTable parameters,
-      std::chrono::milliseconds limit = kConfigureTime);
+      const std::string& name, ControllerSource source, TomlTable parameters,
+      std::optional<std::chrono::milliseconds> limit = kConfigureTime,
+      std::span<const double> start_rad = {});
   /// The first joint that two of `active` claim.
   [[nodiscard]] static std::optional<ClaimConflict> find_conflict(
       const Table& table, ControllerSet active) noexcept TANDEM_RT;
@@ -151,61 +156,24 @@ class ControllerHost {
   /// hands does so without a bump (BumplessTransfer): one that moves brakes, what nobody has is
   /// held where it comes to rest, and who starts sees the joint there. Else it is who will start.
   [[nodiscard]] LoopAnswer switch_over(ControllerSet stop, ControllerSet start, bool running,
-                                       const hal::CycleTime& time, const hal::StateImage& state,
-                                       hal::CommandImage& command) noexcept TANDEM_RT;
-  /// Sets a joint's impedance, and the mode of one that no active controller claims: position at
-  /// the measured one, velocity 0, torque (reference or feed-forward) the measured one.
-  [[nodiscard]] LoopAnswer set_joint(std::size_t joint, const JointRequest& wish, bool running,
-                                     const hal::StateImage& state,
-                                     hal::CommandImage& command) noexcept TANDEM_RT;
-
-  /// kRecovering when one of `start` claims a joint that recover() leads back: its start would end
-  /// that.
-  [[nodiscard]] LoopAnswer may_start(ControllerSet start) const noexcept TANDEM_RT;
-
-  /// Starts a motion of a joint that no active controller claims, in position control; one under
-  /// way goes over into it. A claim, another mode, a stop and a reset end it.
-  [[nodiscard]] LoopAnswer move(std::size_t joint, const MoveRequest& wish,
-                                const hal::StateImage& state,
-                                hal::CommandImage& command) noexcept TANDEM_RT;
-  /// Lets a joint that no active controller claims come back to its limits, by lead_back(), at the
-  /// speed that CommandLimits allows out there. A reset ends that.
-  [[nodiscard]] LoopAnswer recover(std::size_t joint,
-                                   const hal::CommandImage& command) noexcept TANDEM_RT;
+                                       const hal::CycleTime& time,
+                                       JointImages images) noexcept TANDEM_RT;
 
   // The cycle.
 
-  /// Each cycle in which joints are held, last: their references, toward their limits.
-  void lead_back(hal::CommandImage& command) noexcept TANDEM_RT;
-  /// Each cycle without update(): writes "stay where you are" for every joint: position control at
-  /// the measured position. A joint that is enabled and whose last command was in position control
-  /// keeps its reference and feed-forward; it goes on to brake, and with a motion of move().
-  void hold(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
-  /// The cycle in which a stop takes every joint from whoever has it, before hold(): those that
-  /// move brake as hard as their limits allow, and are held where they come to rest.
-  void brake(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
-  /// What hold() writes, for one joint; ends its motion.
-  void hold(std::size_t joint, const hal::StateImage& state,
-            hal::CommandImage& command) noexcept TANDEM_RT;
-  /// Every joint idle: no torque. Forgets whatever led a joint.
-  void release(hal::CommandImage& command) noexcept TANDEM_RT;
-
   /// First cycle: holds every joint, sets the claimed modes, lets the active controllers seed
   /// theirs. Joints go over from `command`, which may be in motion when another loop sent it.
-  void start(const hal::CycleTime& time, const hal::StateImage& state,
-             hal::CommandImage& command) noexcept TANDEM_RT;
+  void start(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT;
   /// Every cycle, the first included.
   /// @return kOk; kStopped when a controller is active, and every active one is done (one that is
   ///         done keeps its last references) and came with the experiment; else the first code
   ///         that is neither, failed_controller() says whose.
-  [[nodiscard]] Code update(const hal::CycleTime& time, const hal::StateImage& state,
-                            hal::CommandImage& command) noexcept TANDEM_RT;
+  [[nodiscard]] Code update(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT;
   /// Tells the active controllers.
   void stop() noexcept TANDEM_RT;
   /// A stop of category 2: those that can retreat go on to do so, the others are stopped.
   /// @return false: none can, and nothing has changed
-  [[nodiscard]] bool retreat(const hal::CycleTime& time, const hal::StateImage& state,
-                             hal::CommandImage& command) noexcept TANDEM_RT;
+  [[nodiscard]] bool retreat(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT;
   /// What was taken back in this cycle, of a controller and joint of which it is the first time.
   [[nodiscard]] std::optional<Stray> take_stray() noexcept TANDEM_RT {
     return std::exchange(stray_, std::nullopt);
@@ -223,75 +191,27 @@ class ControllerHost {
   [[nodiscard]] std::int32_t owner(std::size_t joint) const noexcept TANDEM_RT {
     return owner_[joint];
   }
-  /// Whether recover() leads `joint` back to its limits.
-  [[nodiscard]] bool recovers(std::size_t joint) const noexcept TANDEM_RT {
-    return recovers_[joint] != 0;
-  }
-  /// Whether move() or recover() leads `joint`. The rest of a transfer is no motion.
-  [[nodiscard]] bool leads(std::size_t joint) const noexcept TANDEM_RT {
-    return !operator_.position.check_motion_done(joint) || recovers_[joint] != 0;
-  }
-  /// Whether they lead any joint.
-  [[nodiscard]] bool leads() const noexcept TANDEM_RT {
-    for (std::size_t joint = 0; joint < recovers_.size(); ++joint) {
-      if (leads(joint)) return true;
-    }
-    return false;
-  }
-  /// What the joint's owner wants, which may be an operator: `command` goes over to it.
-  [[nodiscard]] BumplessTransfer::Impedance wanted_impedance(
-      std::size_t joint, const hal::CommandImage& command) const noexcept TANDEM_RT {
-    return transfer_.written(joint, command);
-  }
-  /// The command before the last one that was sent, where a delay has let others through than
-  /// update() saw: a brake() goes on from these two.
-  void was_sent_before(const hal::CommandImage& command) noexcept TANDEM_RT {
-    transfer_.watch(command);
-  }
-  /// What the controllers write is sent as it is: whoever has just got the joints has seen to it
-  /// that they go over from what was commanded.
-  void take_as_written(hal::CommandImage& command) noexcept TANDEM_RT { transfer_.cancel(command); }
-  /// Whether a joint has begun to change hands in this cycle: update() has to follow.
-  [[nodiscard]] bool changes_hands() const noexcept TANDEM_RT { return transfer_.has_begun(); }
-  /// Whether one of `by` claims `joint`.
-  [[nodiscard]] bool is_claimed(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
+  /// The slot of one of `by` that claims `joint`, or -1.
+  [[nodiscard]] std::int32_t claimant(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
+  [[nodiscard]] JointReferences& references() noexcept { return references_; }
   /// A number of what is loaded: slots, names and claims.
   [[nodiscard]] std::uint64_t fingerprint() const noexcept;
   void archive(Archive& ar);
 
  private:
-  [[nodiscard]] Status add(const std::string& name, std::shared_ptr<Controller> controller,
-                           TomlTable parameters, bool active,
-                           std::optional<std::chrono::milliseconds> limit);
-  [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
-      const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
-      std::span<const double> start_rad, std::optional<std::chrono::milliseconds> limit);
   [[nodiscard]] Status check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const;
   [[nodiscard]] std::uint32_t new_id(const std::string& name);
-  void move_on(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
-  void idle(hal::CommandImage& command) noexcept TANDEM_RT;
-  void stay(std::size_t joint, const hal::StateImage& state,
-            hal::CommandImage& command) const noexcept TANDEM_RT;
-  void settle(std::size_t joint, const hal::StateImage& state,
-              hal::CommandImage& command) const noexcept TANDEM_RT;
-  void settle_ended(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
+  void settle_ended(JointImages images) noexcept TANDEM_RT;
   [[nodiscard]] const hal::StateImage& at_rest(const hal::StateImage& state,
                                                ControllerSet start) noexcept TANDEM_RT;
-  void assign(std::size_t joint, hal::ControlMode mode, hal::InteractionMode interaction,
-              const hal::StateImage& state, hal::CommandImage& command) const noexcept TANDEM_RT;
-  void release(std::size_t joint, const hal::StateImage& state,
-               hal::CommandImage& command) const noexcept TANDEM_RT;
-  void set_modes(const HostedController& one, hal::CommandImage& command) const noexcept TANDEM_RT;
+  void call_starts(ControllerSet start, const hal::CycleTime& time,
+                   JointImages images) noexcept TANDEM_RT;
   [[nodiscard]] bool is_active(std::size_t slot) const noexcept TANDEM_RT {
     return (active_ & only(slot)) != 0;
   }
-  /// The two calls in which a controller writes, each followed by what is taken back.
-  void call_start(HostedController& one, const hal::CycleTime& time, const hal::StateImage& state,
-                  hal::CommandImage& command) noexcept TANDEM_RT;
   [[nodiscard]] Code call_update(HostedController& one, const hal::CycleTime& time,
-                                 const hal::StateImage& state,
-                                 hal::CommandImage& command) noexcept TANDEM_RT;
+                                 JointImages images) noexcept TANDEM_RT;
   void take_back(HostedController& one, hal::CommandImage& command) noexcept TANDEM_RT;
   void set_active(ControllerSet active) noexcept TANDEM_RT;
   void show() noexcept TANDEM_RT;
@@ -300,9 +220,6 @@ class ControllerHost {
     return *one.controller;
   }
   void leave_calls() noexcept TANDEM_RT { at_work_.store(-1, std::memory_order_relaxed); }
-
-  using Impedance = BumplessTransfer::Impedance;
-  void note_code(const std::string& name, const LoadedController& plugin);
 
   const hal::RobotConfig* config_;
   const hal::Robot robot_;  // what the controllers see of it
@@ -319,12 +236,9 @@ class ControllerHost {
   // The loop's.
   Table table_{};
   ControllerSet active_ = 0, done_ = 0;
-  ControllerSet ended_ = 0;             // of done_: in the last cycle
-  std::vector<std::int32_t> owner_;     // by joint: an active one's slot, or -1
-  std::vector<Impedance> impedance_;    // by joint: that a start gives it
-  std::vector<std::uint8_t> recovers_;  // by joint: it is led back to its limits
-  hal::Devices operator_;               // moves joints that nobody claims
-  BumplessTransfer transfer_;
+  ControllerSet ended_ = 0;          // of done_: in the last cycle
+  std::vector<std::int32_t> owner_;  // by joint: an active one's slot, or -1
+  JointReferences references_;
   hal::StateImage at_rest_;  // what a start sees of joints that brake
   ClaimGuard guard_;
   std::optional<Stray> stray_;

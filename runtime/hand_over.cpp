@@ -61,8 +61,9 @@ void HandOver::show(const hal::CommandImage& told) noexcept TANDEM_RT {
 void HandOver::show_joints() noexcept TANDEM_RT {
   const hal::CommandImage& wanted = arbiter_.wanted();
   const hal::StateImage& state = now_.state;
+  JointReferences& references = now_.controllers.references();
   for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const auto impedance = now_.controllers.wanted_impedance(j, wanted);
+    const auto impedance = references.transfer().written(j, wanted);
     JointStatus& joint = joints_[j];  // all of it, but field by field: g++ clears a whole one first
     joint.cycle = now_.time.cycle;
     joint.position_rad = state.position_rad()[j];
@@ -84,7 +85,7 @@ void HandOver::show_joints() noexcept TANDEM_RT {
     joint.interaction = wanted.interaction()[j];
     joint.drive_mode = state.mode()[j];
     joint.drive_state = state.drive_state()[j];
-    joint.moving = now_.controllers.leads(j) ? std::uint8_t{1} : std::uint8_t{0};
+    joint.moving = references.leads(j) ? std::uint8_t{1} : std::uint8_t{0};
     joint.resetting = resets_.is_on(j) ? std::uint8_t{1} : std::uint8_t{0};
     joint.homing = homing_.of(j);
   }

@@ -7,6 +7,7 @@ namespace tandem::runtime {
 
 JointArbiter::JointArbiter(CycleNow& now, const DriveResets& resets, const JointHoming& homing)
     : now_(now),
+      references_(now.controllers.references()),
       resets_(resets),
       homing_(homing),
       leads_(now.robot.joints.size()),
@@ -26,7 +27,7 @@ void JointArbiter::decide() noexcept TANDEM_RT {
                          .released = now_.run.latched() == hal::StopCategory::kCategory0,
                          .claimed = slot >= 0,
                          .owned = slot == remote,
-                         .moving = now_.controllers.leads(j),
+                         .moving = references_.leads(j),
                          .resetting = resets_.is_on(j),
                          .homing = homing_.is_on(j),
                          .unhomed = homing_.is_needed(j)});
@@ -48,18 +49,22 @@ LoopAnswer JointArbiter::may_lead(std::size_t joint, bool drives) const noexcept
 }
 
 LoopAnswer JointArbiter::may_start(ControllerSet start) const noexcept TANDEM_RT {
-  const auto refused = [](RejectReason why, std::size_t joint) {
-    return LoopAnswer{.reason = why, .joint = static_cast<std::int32_t>(joint)};
+  const auto refused = [](RejectReason why, std::size_t joint, std::int32_t one = -1) {
+    return LoopAnswer{.reason = why, .joint = static_cast<std::int32_t>(joint), .one = one};
   };
-  const auto claimed = [&](std::size_t j) { return now_.controllers.is_claimed(j, start); };
+  const auto claimant = [&](std::size_t j) { return now_.controllers.claimant(j, start); };
   for (std::size_t j = 0; j < leads_.size(); ++j) {
-    if (resets_.is_on(j) && claimed(j)) return refused(RejectReason::kResetting, j);
+    if (resets_.is_on(j) && claimant(j) >= 0) return refused(RejectReason::kResetting, j);
   }
   for (const std::size_t j : homing_.joints()) {
-    if (homing_.is_on(j) && claimed(j)) return refused(RejectReason::kHoming, j);
-    if (homing_.is_needed(j) && claimed(j)) return refused(RejectReason::kNotHomed, j);
+    if (homing_.is_on(j) && claimant(j) >= 0) return refused(RejectReason::kHoming, j);
+    if (homing_.is_needed(j) && claimant(j) >= 0) return refused(RejectReason::kNotHomed, j);
   }
-  return now_.controllers.may_start(start);
+  for (std::size_t j = 0; j < leads_.size(); ++j) {  // a start would end that
+    if (!references_.recovers(j) || claimant(j) < 0) continue;
+    return refused(RejectReason::kRecovering, j, claimant(j));
+  }
+  return {};
 }
 
 // Changes.
@@ -68,20 +73,21 @@ void JointArbiter::on(RunEvent event, bool holds_back) noexcept TANDEM_RT {
   const bool changes = now_.run.on(event, now_.time.cycle, holds_back);
   if (!changes || now_.run.in(RunPhase::kRetreating)) return;
   if (controls_) now_.controllers.stop();
-  if (is_delayed()) now_.controllers.was_sent_before(delay_.before());
+  // A delay has let others through than the controllers saw: a brake goes on from these.
+  if (is_delayed()) references_.transfer().watch(delay_.before());
   controls_ = false;
   brakes_ = now_.run.in(RunPhase::kFaulted) || now_.run.in(RunPhase::kShutDown);
 }
 
 LoopAnswer JointArbiter::switch_over(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT {
-  return now_.controllers.switch_over(stop, start, controls_, now_.time, now_.state, led());
+  return now_.controllers.switch_over(stop, start, controls_, now_.time, led());
 }
 
 LoopAnswer JointArbiter::leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT {
   fill_delay();
   hal::CommandImage& command = delay_.on() ? wanted_ : command_;
   const LoopAnswer answer =
-      now_.controllers.switch_over(stop, start, true, now_.time, now_.state, command);
+      now_.controllers.switch_over(stop, start, true, now_.time, {now_.state, command});
   if (answer.reason != RejectReason::kNone) return answer;
   on(RunEvent::kStart);
   controls_ = true;  // they are started
@@ -89,7 +95,7 @@ LoopAnswer JointArbiter::leave_hold(ControllerSet stop, ControllerSet start) noe
 }
 
 bool JointArbiter::retreat() noexcept TANDEM_RT {
-  return controls_ && now_.controllers.retreat(now_.time, now_.state, led());
+  return controls_ && now_.controllers.retreat(now_.time, led());
 }
 
 void JointArbiter::follow_robot() noexcept TANDEM_RT {
@@ -107,24 +113,46 @@ void JointArbiter::take_from_owner() noexcept TANDEM_RT {
   const RemoteCommandParts& owner = now_.owner;
   const bool owned = (now_.controllers.shown().active & only(owner.slot)) != 0;
   if (owner.port != nullptr && owner.port->lockstep() && owned) {
-    now_.controllers.take_as_written(led());
+    references_.transfer().cancel(led().command);
   }
 }
 
+/// kClaimed where a controller has the joint.
+LoopAnswer JointArbiter::owner_of(std::size_t joint) const noexcept TANDEM_RT {
+  const std::int32_t owner = now_.controllers.owner(joint);
+  return {.reason = owner < 0 ? RejectReason::kNone : RejectReason::kClaimed,
+          .joint = static_cast<std::int32_t>(joint),
+          .one = owner};
+}
+
 LoopAnswer JointArbiter::set_joint(std::size_t joint, const JointRequest& wish) noexcept TANDEM_RT {
-  return now_.controllers.set_joint(joint, wish, controls_, now_.state, led());
+  LoopAnswer answer = owner_of(joint);
+  if (!wish.switches()) {
+    answer.reason = RejectReason::kNone;  // an impedance is a claimed joint's, too
+  } else if (answer.reason == RejectReason::kNone && !controls_) {
+    answer.reason = RejectReason::kNotRunning;
+  }
+  if (answer.reason != RejectReason::kNone) return answer;
+  answer.reason = references_.set(joint, wish, controls_, led());
+  return answer;
 }
 
 LoopAnswer JointArbiter::move(std::size_t joint, const MoveRequest& wish) noexcept TANDEM_RT {
-  return now_.controllers.move(joint, wish, now_.state, led());
+  LoopAnswer answer = owner_of(joint);
+  if (answer.reason == RejectReason::kNone) answer.reason = references_.move(joint, wish, led());
+  return answer;
 }
 
 LoopAnswer JointArbiter::recover(std::size_t joint) noexcept TANDEM_RT {
-  return now_.controllers.recover(joint, led());
+  LoopAnswer answer = owner_of(joint);
+  if (answer.reason == RejectReason::kNone) {
+    answer.reason = references_.recover(joint, led().command);
+  }
+  return answer;
 }
 
 void JointArbiter::end_homing(std::size_t joint) noexcept TANDEM_RT {
-  now_.controllers.hold(joint, now_.state, led());
+  references_.hold(joint, led());
   // The end of the range may be a little outside of the limits: the homing ends inside.
   if (homing_.of(joint).state == hal::HomingState::kHomed) (void)recover(joint);
 }
@@ -143,47 +171,46 @@ void JointArbiter::fill_delay() noexcept TANDEM_RT {
 }
 
 Code JointArbiter::write(bool repeats) noexcept TANDEM_RT {
-  ControllerHost& host = now_.controllers;
   Code code = Code::kOk;
   unfollowed_.begin();
   stamp(command_);
   stamp(wanted_);
   decide();
-  if (std::exchange(brakes_, false)) host.brake(now_.state, command_);
+  if (std::exchange(brakes_, false)) references_.brake(sent());
   switch (now_.run.phase()) {
     case RunPhase::kBringUp:
     case RunPhase::kResetting:
-      host.release(command_);
-      host.hold(now_.state, command_);
+      references_.release(command_);
+      references_.hold(sent());
       (void)go_on_from_robot();
       break;
     case RunPhase::kSettling:
-    case RunPhase::kHeld: host.hold(now_.state, command_); break;
+    case RunPhase::kHeld: references_.hold(sent()); break;
     case RunPhase::kRunning:
-      if (repeats && !host.changes_hands()) return code;
+      if (repeats && !references_.transfer().has_begun()) return code;
       [[fallthrough]];
     case RunPhase::kRetreating: code = run_controllers(); break;
     case RunPhase::kFaulted:
     case RunPhase::kShutDown:
       if (now_.run.latched() == hal::StopCategory::kCategory0) {
-        host.release(command_);
+        references_.release(command_);
       } else {
-        host.hold(now_.state, command_);
+        references_.hold(sent());
       }
       break;
     case RunPhase::kDone: break;
   }
-  overrule(led());
+  overrule();
   if (is_delayed()) delay_.pass(wanted_, command_);
   return code;
 }
 
 void JointArbiter::start_controllers() noexcept TANDEM_RT {
   follow_robot();
-  if (delay_.on()) now_.controllers.hold(now_.state, command_);
+  if (delay_.on()) references_.hold(sent());
   fill_delay();
   controls_ = true;
-  now_.controllers.start(now_.time, now_.state, led());
+  now_.controllers.start(now_.time, led());
   take_from_owner();
   now_.watch.controllers_start();
 }
@@ -191,20 +218,20 @@ void JointArbiter::start_controllers() noexcept TANDEM_RT {
 Code JointArbiter::run_controllers() noexcept TANDEM_RT {
   if (!controls_) start_controllers();
   if (now_.run.in(RunPhase::kRunning)) ++ran_;
-  unfollowed_.offer(now_.state, led());
-  const Code code = now_.controllers.update(now_.time, now_.state, led());
-  unfollowed_.take(now_.state, led());
-  if (now_.run.in(RunPhase::kRunning)) now_.controllers.lead_back(led());  // a retreat waits
+  unfollowed_.offer(now_.state, led().command);
+  const Code code = now_.controllers.update(now_.time, led());
+  unfollowed_.take(now_.state, led().command);
+  if (now_.run.in(RunPhase::kRunning)) references_.lead_back(led().command);  // a retreat waits
   return code;
 }
 
 /// Joints that nobody may lead, whoever has written: they stay where they are.
-void JointArbiter::overrule(hal::CommandImage& command) noexcept TANDEM_RT {
+void JointArbiter::overrule() noexcept TANDEM_RT {
   for (std::size_t j = 0; j < leads_.size(); ++j) {
     if (leads_[j] < JointLead::kReset) continue;
-    now_.controllers.hold(j, now_.state, command);
+    references_.hold(j, led());
     if (leads_[j] != JointLead::kHoming) continue;
-    command.mode()[j] = static_cast<std::int8_t>(hal::ControlMode::kIdle);
+    led().command.mode()[j] = static_cast<std::int8_t>(hal::ControlMode::kIdle);
   }
 }
 

@@ -43,7 +43,8 @@ class JointArbiter {
   [[nodiscard]] LoopAnswer may_lead(std::size_t joint, bool drives) const noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer may_start(ControllerSet start) const noexcept TANDEM_RT;
 
-  // Changes of who leads, between check and update. What they answer: ControllerHost.
+  // Changes of who leads, between check and update. What they answer: ControllerHost, and
+  // JointReferences for what an operator asks for.
 
   /// The run's next phase, if this leads to one. Controllers stop with it, but for a retreat, which
   /// they carry out. Joints that a stop finds in motion brake.
@@ -80,18 +81,23 @@ class JointArbiter {
 
  private:
   [[nodiscard]] bool is_delayed() const noexcept TANDEM_RT { return controls_ && delay_.on(); }
-  [[nodiscard]] hal::CommandImage& led() noexcept TANDEM_RT {
-    return is_delayed() ? wanted_ : command_;
+  /// What those who lead the joints write.
+  [[nodiscard]] JointImages led() noexcept TANDEM_RT {
+    return {now_.state, is_delayed() ? wanted_ : command_};
   }
+  /// What is sent, whatever delay there is.
+  [[nodiscard]] JointImages sent() noexcept TANDEM_RT { return {now_.state, command_}; }
+  [[nodiscard]] LoopAnswer owner_of(std::size_t joint) const noexcept TANDEM_RT;
   void stamp(hal::CommandImage& command) const noexcept TANDEM_RT;
   void decide() noexcept TANDEM_RT;
   void start_controllers() noexcept TANDEM_RT;
   [[nodiscard]] Code run_controllers() noexcept TANDEM_RT;
-  void overrule(hal::CommandImage& command) noexcept TANDEM_RT;
+  void overrule() noexcept TANDEM_RT;
   [[nodiscard]] bool go_on_from_robot() noexcept TANDEM_RT;
   void fill_delay() noexcept TANDEM_RT;
 
   CycleNow& now_;
+  JointReferences& references_;
   const DriveResets& resets_;
   const JointHoming& homing_;
 

@@ -23,7 +23,7 @@ bool JointHoming::is_needed(std::size_t joint) const noexcept TANDEM_RT {
 
 bool JointHoming::is_needed_by(ControllerSet controllers) const noexcept TANDEM_RT {
   return std::ranges::any_of(joints_, [&](std::size_t joint) {
-    return is_needed(joint) && now_.controllers.is_claimed(joint, controllers);
+    return is_needed(joint) && now_.controllers.claimant(joint, controllers) >= 0;
   });
 }
 

@@ -20,6 +20,7 @@ struct JointRequest {
   std::int32_t mode = -1;         ///< hal::ControlMode
   std::int32_t interaction = -1;  ///< hal::InteractionMode
 
+  [[nodiscard]] bool switches() const noexcept { return mode >= 0 || interaction >= 0; }
   /// Whether it asks for a mode in which the drive drives.
   [[nodiscard]] bool drives() const noexcept { return mode > 0 || interaction >= 0; }
 };

@@ -107,7 +107,8 @@ void LoopRequests::carry_out() noexcept TANDEM_RT {
     const std::optional<LoopRequest> request = now.inbox.take_request();
     if (!request) return;
     const bool ending = ends(now.run.phase());
-    const bool at_rest = stops_motion(*request) && !now.controllers.leads(request->joint);
+    const bool at_rest =
+        stops_motion(*request) && !now.controllers.references().leads(request->joint);
     const bool too_late = response.stops_now() && !only_hosts(*request);
     LoopAnswer answer = ending     ? LoopAnswer{.reason = RejectReason::kEnding}
                         : too_late ? LoopAnswer{.reason = RejectReason::kStopped}

@@ -130,7 +130,7 @@ void RobotCycle::check() noexcept TANDEM_RT {
   if (now_.estimator != nullptr && (run.controllers_run() || run.in(RunPhase::kHeld))) {
     // What touches the robot already when an operator's motion begins is no collision of that
     // motion: it may be what the robot is to be led away from.
-    const bool moves = run.controllers_run() || now_.controllers.leads();
+    const bool moves = run.controllers_run() || now_.controllers.references().leads();
     if (const auto found = FaultWatch::collision(*now_.estimator, moves)) response_.raise(*found);
   }
   response_.check_link();

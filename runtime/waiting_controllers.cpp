@@ -33,7 +33,7 @@ std::optional<FaultRecord> WaitingControllers::home_at_start() noexcept TANDEM_R
   if (!homes_at_start_ || !now_.run.in(RunPhase::kHeld)) return std::nullopt;
   for (const std::size_t joint : homing_.joints()) {
     const hal::Homing is = homing_.of(joint);
-    if (homing_.is_on(joint) || now_.controllers.recovers(joint)) return std::nullopt;
+    if (homing_.is_on(joint) || now_.controllers.references().recovers(joint)) return std::nullopt;
     if (!now_.robot.joints[joint].homing->at_start || is.state == HomingState::kHomed) continue;
     const bool failed = is.error != hal::HomingError::kNone;
     homes_at_start_ = !failed && homing_.begin(joint).reason == RejectReason::kNone;
@@ -52,7 +52,7 @@ std::optional<FaultRecord> WaitingControllers::unhomed() const noexcept TANDEM_R
   if (!now_.run.in(RunPhase::kHeld)) return std::nullopt;
   for (const std::size_t j : homing_.joints()) {
     const bool homed = homing_.of(j).state == HomingState::kHomed;
-    const bool waits = now_.controllers.is_claimed(j, waiting_);
+    const bool waits = now_.controllers.claimant(j, waiting_) >= 0;
     if (now_.robot.joints[j].homing->required && !homed && waits) return not_homed(j);
   }
   return std::nullopt;

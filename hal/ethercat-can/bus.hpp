@@ -75,4 +75,39 @@ class Bus {
   [[nodiscard]] virtual std::string status_text() const { return {}; }
 };
 
+/// Passes every call on to `to`, which outlives it. Who stands between a master and its bus derives
+/// from it and overrides what it changes, so that a call that is new in Bus reaches the wire.
+class ForwardingBus : public Bus {
+ public:
+  explicit ForwardingBus(Bus& to) noexcept : to_(&to) {}
+
+  std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override {
+    return to_->send(frames);
+  }
+  std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override {
+    return to_->receive(frames);
+  }
+  [[nodiscard]] BusState state() const noexcept TANDEM_RT override { return to_->state(); }
+  void ask_again() noexcept TANDEM_RT override { to_->ask_again(); }
+  [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override {
+    return to_->clock_shift_ns();
+  }
+  [[nodiscard]] bool gives_up(int node) const noexcept TANDEM_RT override {
+    return to_->gives_up(node);
+  }
+  void end_step() noexcept TANDEM_RT override { to_->end_step(); }
+  [[nodiscard]] std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT override {
+    return to_->received_ns();
+  }
+  [[nodiscard]] std::int64_t sent_ns() const noexcept TANDEM_RT override { return to_->sent_ns(); }
+  [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override {
+    return to_->statistics();
+  }
+  [[nodiscard]] std::string measured_text() const override { return to_->measured_text(); }
+  [[nodiscard]] std::string status_text() const override { return to_->status_text(); }
+
+ private:
+  Bus* to_;
+};
+
 }  // namespace tandem::hal::can

@@ -21,7 +21,7 @@ constexpr std::int64_t kPatienceNs = 500'000'000;
 }  // namespace
 
 CanBackend::Collected::Collected(Bus& bus, std::size_t index)
-    : bus_(&bus), index_(index), frames_(kCollected), frames_ns_(kCollected) {}
+    : ForwardingBus(bus), index_(index), frames_(kCollected), frames_ns_(kCollected) {}
 
 void CanBackend::Collected::begin_cycle() noexcept {
   times_ = 0;
@@ -38,8 +38,8 @@ void CanBackend::Collected::collect(const DriveMaster& master) noexcept {
   while (count_ < frames_.size()) {
     const std::size_t room = std::min(kBatch, frames_.size() - count_);
     const std::span<Frame> batch = std::span(frames_).subspan(count_, room);
-    const std::size_t got = bus_->receive(batch);
-    const std::span<const std::int64_t> stamps = bus_->received_ns();
+    const std::size_t got = ForwardingBus::receive(batch);
+    const std::span<const std::int64_t> stamps = ForwardingBus::received_ns();
     std::size_t kept = count_;
     for (std::size_t i = 0; i < got; ++i) {
       if (batch[i].id == canopen::cob::kTime) {
@@ -88,7 +88,7 @@ Result<std::unique_ptr<CanBackend>> CanBackend::create(const RobotConfig& robot,
 CanBackend::CanBackend(std::vector<std::unique_ptr<Collected>> buses,
                        std::unique_ptr<DriveMaster> master, FrameWait& wait,
                        const CanBackendConfig& config)
-    : buses_(std::move(buses)), master_(std::move(master)), wait_(&wait), config_(config) {}
+    : DriveBackend(std::move(master)), buses_(std::move(buses)), wait_(&wait), config_(config) {}
 
 Phase CanBackend::phase() const noexcept { return silent_ ? Phase::kFault : master_->phase(); }
 
@@ -133,7 +133,7 @@ void CanBackend::exchange(const CycleTime& time) noexcept {
     }
     const std::int64_t now_ns = wait_->now_ns();
     if (!config_.lockstep && !asked_again && now_ns >= deadline_ns - window_ns / 2) {
-      buses_[waiting - 1]->bus().ask_again();
+      buses_[waiting - 1]->ask_again();
       asked_again = true;
     }
     if (now_ns >= deadline_ns) {
@@ -165,7 +165,7 @@ Code CanBackend::write(const CommandImage& command,
 
 std::int64_t CanBackend::clock_shift_ns() const noexcept TANDEM_RT {
   for (const auto& bus : buses_) {
-    if (const std::int64_t shift_ns = bus->bus().clock_shift_ns(); shift_ns != 0) return shift_ns;
+    if (const std::int64_t shift_ns = bus->clock_shift_ns(); shift_ns != 0) return shift_ns;
   }
   return 0;
 }

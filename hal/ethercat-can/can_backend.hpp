@@ -8,10 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "hal/backend.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/bus.hpp"
-#include "hal/ethercat-can/drive_master.hpp"
+#include "hal/ethercat-can/drive_backend.hpp"
 #include "hal/ethercat-can/frame_wait.hpp"
 
 namespace tandem::hal::can {
@@ -28,7 +27,7 @@ struct CanBackendConfig {
 /// CAN in several TPDOs, or when the answer window is over: a sample that comes whole after it
 /// counts in the next cycle, as one that is a cycle old. In lockstep it ends when TIME (COB-ID 100)
 /// has come on every bus, by which an emulated robot says that it has answered.
-class CanBackend final : public Backend {
+class CanBackend final : public DriveBackend {
  public:
   /// @param buses  the master's end of each of robot.buses, in that order; outlive it
   /// @param wait   wakes up for frames of any of them; outlives it
@@ -48,31 +47,15 @@ class CanBackend final : public Backend {
   [[nodiscard]] Code read(const CycleTime& time, StateImage& state) noexcept TANDEM_RT override;
   [[nodiscard]] Code write(const CommandImage& command,
                            const ParameterImage& parameters) noexcept TANDEM_RT override;
-  [[nodiscard]] FaultCause fault_cause(std::size_t joint) const noexcept TANDEM_RT override {
-    return master_->fault_cause(joint);
-  }
-  [[nodiscard]] std::string fault_text(FaultCause cause, std::uint32_t code) const override {
-    return cause == FaultCause::kDrive ? DriveMaster::error_text(code)
-                                       : Backend::fault_text(cause, code);
-  }
   /// The first EtherCAT bus'.
   [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override;
-  void stop(StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
-  void reset() noexcept TANDEM_RT override { master_->reset(); }
-  bool home(std::size_t joint) noexcept TANDEM_RT override { return master_->home(joint); }
-  void stop_homing(std::size_t joint) noexcept TANDEM_RT override { master_->stop_homing(joint); }
-  [[nodiscard]] Homing homing(std::size_t joint) const noexcept TANDEM_RT override {
-    return master_->homing(joint);
-  }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
   /// The robot cannot be rewound: false.
   [[nodiscard]] bool archive(Archive& ar) override;
 
-  [[nodiscard]] const DriveMaster& master() const noexcept { return *master_; }
-
  private:
   /// A bus whose frames exchange() has taken already. Sending goes straight on.
-  class Collected final : public Bus {
+  class Collected final : public ForwardingBus {
    public:
     Collected(Bus& bus, std::size_t index);
     /// Takes what has come. @return how many frames are new.
@@ -81,30 +64,13 @@ class CanBackend final : public Backend {
     [[nodiscard]] bool answered() const noexcept { return times_ > 0; }
     [[nodiscard]] const DriveMaster::NodeSet& sampled() const noexcept { return sampled_; }
     void begin_cycle() noexcept;
-    [[nodiscard]] Bus& bus() const noexcept { return *bus_; }
 
-    std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override {
-      return bus_->send(frames);
-    }
     std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override;
-    [[nodiscard]] BusState state() const noexcept TANDEM_RT override { return bus_->state(); }
-    [[nodiscard]] bool gives_up(int node) const noexcept TANDEM_RT override {
-      return bus_->gives_up(node);
-    }
     [[nodiscard]] std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT override {
       return given_ns_;
     }
-    [[nodiscard]] std::int64_t sent_ns() const noexcept TANDEM_RT override {
-      return bus_->sent_ns();
-    }
-    [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override {
-      return bus_->statistics();
-    }
-    [[nodiscard]] std::string status_text() const override { return bus_->status_text(); }
-    [[nodiscard]] std::string measured_text() const override { return bus_->measured_text(); }
 
    private:
-    Bus* bus_;
     std::size_t index_;  ///< of the bus
     std::vector<canopen::Frame> frames_;
     std::vector<std::int64_t> frames_ns_;
@@ -119,7 +85,6 @@ class CanBackend final : public Backend {
   [[nodiscard]] bool answered(std::size_t bus) const noexcept;
 
   std::vector<std::unique_ptr<Collected>> buses_;
-  std::unique_ptr<DriveMaster> master_;
   FrameWait* wait_;
   CanBackendConfig config_;
   bool begun_ = false;

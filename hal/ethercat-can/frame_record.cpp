@@ -75,17 +75,17 @@ Bus& FrameRecord::watch(Bus& bus, const std::string& name) {
 }
 
 std::size_t FrameRecord::Watched::send(std::span<const Frame> frames) noexcept TANDEM_RT {
-  const std::size_t taken = bus_.send(frames);
-  const std::int64_t known_ns = bus_.sent_ns();
-  const std::int64_t sent_ns = known_ns != 0 ? known_ns : clock_ns(CLOCK_MONOTONIC);
-  for (const Frame& frame : frames.first(taken)) record_.push(sent_ns, index_, frame);
+  const std::size_t taken = ForwardingBus::send(frames);
+  const std::int64_t known_ns = sent_ns();
+  const std::int64_t at_ns = known_ns != 0 ? known_ns : clock_ns(CLOCK_MONOTONIC);
+  for (const Frame& frame : frames.first(taken)) record_.push(at_ns, index_, frame);
   return taken;
 }
 
 std::size_t FrameRecord::Watched::receive(std::span<Frame> frames) noexcept TANDEM_RT {
-  const std::size_t count = bus_.receive(frames);
+  const std::size_t count = ForwardingBus::receive(frames);
   if (count == 0) return 0;
-  const auto stamps = bus_.received_ns();
+  const auto stamps = received_ns();
   const std::int64_t now = stamps.empty() ? clock_ns(CLOCK_MONOTONIC) : 0;
   for (std::size_t i = 0; i < count; ++i) {
     record_.push(stamps.empty() ? now : stamps[i], index_, frames[i]);

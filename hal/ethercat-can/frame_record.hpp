@@ -59,36 +59,15 @@ class FrameRecord {
     std::size_t bus;       ///< in watched_
     canopen::Frame frame;
   };
-  class Watched final : public Bus {
+  class Watched final : public ForwardingBus {
    public:
     Watched(FrameRecord& record, Bus& bus, std::size_t index) noexcept
-        : record_(record), bus_(bus), index_(index) {}
+        : ForwardingBus(bus), record_(record), index_(index) {}
     std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override;
     std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override;
-    [[nodiscard]] BusState state() const noexcept TANDEM_RT override { return bus_.state(); }
-    [[nodiscard]] bool gives_up(int node) const noexcept TANDEM_RT override {
-      return bus_.gives_up(node);
-    }
-    void ask_again() noexcept TANDEM_RT override { bus_.ask_again(); }
-    void end_step() noexcept TANDEM_RT override { bus_.end_step(); }
-    [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override {
-      return bus_.clock_shift_ns();
-    }
-    [[nodiscard]] std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT override {
-      return bus_.received_ns();
-    }
-    [[nodiscard]] std::int64_t sent_ns() const noexcept TANDEM_RT override {
-      return bus_.sent_ns();
-    }
-    [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override {
-      return bus_.statistics();
-    }
-    [[nodiscard]] std::string status_text() const override { return bus_.status_text(); }
-    [[nodiscard]] std::string measured_text() const override { return bus_.measured_text(); }
 
    private:
     FrameRecord& record_;
-    Bus& bus_;
     std::size_t index_;
   };
 

@@ -1,9 +1,10 @@
-// The backend's calls in the cycle. Connecting: remote_connect.cpp.
 #include "hal/remote/remote_backend.hpp"
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstring>
+#include <span>
 
 #include "hal/run_phase.hpp"
 
@@ -16,7 +17,122 @@ namespace {
 
 constexpr auto kSlice = std::chrono::milliseconds(20);  // exchange() looks around so often
 
+/// For the first state, of a server that is connected: paused it sends none.
+constexpr auto kFirstState = std::chrono::milliseconds(500);
+
+bool all_finite(std::span<const double> values) {
+  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
+}
+
+/// Whether every number of it is one, and every state one that there is.
+bool is_sound(const hal::StateImage& state) {
+  for (const auto values :
+       {state.position_rad(), state.velocity_rad_s(), state.acceleration_rad_s2(),
+        state.torque_Nm(), state.motor_position_rad(), state.motor_velocity_rad_s(),
+        state.current_A(), state.voltage_V(), state.temperature_C(), state.sensor()}) {
+    if (!all_finite(values)) return false;
+  }
+  const auto up_to = [](auto last) {
+    return [last](std::uint8_t one) { return one <= static_cast<std::uint8_t>(last); };
+  };
+  return std::ranges::all_of(state.drive_state(), up_to(hal::DriveState::kFault)) &&
+         std::ranges::all_of(state.homing(), up_to(hal::HomingState::kHomed));
+}
+
 }  // namespace
+
+Result<std::unique_ptr<RemoteBackend>> RemoteBackend::connect(dds::Participant& participant,
+                                                              const hal::Robot& robot,
+                                                              const Identity& identity,
+                                                              const ClientConfig& config) {
+  auto contact = ServerContact::find(participant, identity, config);
+  if (!contact) return std::unexpected(contact.error());
+  auto states = dds::Reader<tandem_msgs::LinkState>::create(
+      participant, participant.topic_name(kStateTopic), link_qos());
+  if (!states) return std::unexpected(states.error());
+  auto commands = dds::Writer<tandem_msgs::LinkCommand>::create(
+      participant, participant.topic_name(kCommandTopic), link_qos());
+  if (!commands) return std::unexpected(commands.error());
+  std::unique_ptr<RemoteBackend> made(
+      new RemoteBackend(std::move(*contact), std::move(*states), std::move(*commands), robot));
+  if (Status leased = made->contact_->take_lease(); !leased) {
+    return std::unexpected(leased.error());
+  }
+  return made;
+}
+
+RemoteBackend::RemoteBackend(std::unique_ptr<ServerContact> contact,
+                             dds::Reader<tandem_msgs::LinkState> states,
+                             dds::Writer<tandem_msgs::LinkCommand> commands,
+                             const hal::Robot& robot)
+    : contact_(std::move(contact)),
+      config_(contact_->config()),
+      states_(std::move(states)),
+      commands_(std::move(commands)),
+      joints_(robot.joints.size()),
+      senders_(states_.endpoint().get()),
+      newest_(Seen{hal::StateImage(robot.shape()), hal::CommandImage(robot.shape()),
+                   std::vector<std::uint8_t>(robot.joints.size())}),
+      command_(robot.shape()),
+      gains_(robot.joints.size() * 3 * hal::kPidLoops),
+      revisions_(robot.joints.size()) {
+  on_states_.emplace(states_.endpoint().get(), [this] { take_states(); });
+}
+
+std::string RemoteBackend::status_text() const {
+  return contact_->status_text(static_cast<RunPhase>(phase_.load()));
+}
+
+bool RemoteBackend::first_state(hal::StateImage& state) {
+  std::unique_lock lock(contact_->news().mutex);
+  const auto seen = [this] {
+    (void)newest_.refresh();
+    return newest_.front().is_one;
+  };
+  if (!contact_->news().came.wait_for(lock, kFirstState, seen)) return false;
+  state.assign(newest_.front().state);
+  return true;
+}
+
+void RemoteBackend::take_states() {
+  {
+    const std::lock_guard lock(contact_->news().mutex);
+    states_.take([this](const tandem_msgs::LinkState& sample, const auto& info) {
+      if (!contact_->is_from(sample.run, senders_.of(info)) || !unpack(sample)) return;
+      newest_.publish();
+    });
+  }
+  contact_->news().came.notify_all();
+}
+
+/// False: not this robot's, or no numbers, which no server of it sends.
+bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
+  // The server goes on by itself after `done`: its next state is this run's last.
+  if (left_in_ && sample.cycle > *left_in_ + 1) return false;
+  Seen& to = newest_.back();
+  if (sample.state._length != to.state.bytes().size() ||
+      sample.command._length != to.command.bytes().size() || sample.causes._length != joints_) {
+    return false;
+  }
+  std::memcpy(to.state.bytes().data(), sample.state._buffer, sample.state._length);
+  std::memcpy(to.command.bytes().data(), sample.command._buffer, sample.command._length);
+  if (!is_sound(to.state) || !is_sound(to.command)) return false;
+  if (sample.reaction > static_cast<std::uint8_t>(StopCategory::kWarn)) return false;
+  to.causes.assign(sample.causes._buffer, sample.causes._buffer + joints_);
+  to.cycle = sample.cycle;
+  to.owner = sample.owner;
+  to.answered_cycle = sample.answered_cycle;
+  to.source_cycle = sample.source_cycle;
+  to.answered_ns = sample.answered_ns;
+  to.sent_ns = sample.sent_ns;
+  to.phase = sample.phase;
+  to.code = sample.code;
+  to.reaction = static_cast<hal::StopCategory>(sample.reaction);
+  to.is_one = true;
+  phase_ = sample.phase;
+  contact_->heard();
+  return true;
+}
 
 /// Whether exchange() has what it waits for, or waits in vain.
 bool RemoteBackend::there() noexcept {
@@ -25,46 +141,30 @@ bool RemoteBackend::there() noexcept {
     fresh_ = first_ || seen.cycle > last_cycle_;
   }
   // One more state comes after `done`, whatever is heard of the lease meanwhile.
-  if (fresh_ || (!left_in_ && (ending_ || lost_))) return true;
-  const auto timeout_ns = static_cast<std::int64_t>(config_.server_timeout_s * 1e9);
-  const std::int64_t heard_ns = heard_ns_.load(std::memory_order_relaxed);
-  if (silence_.of(heard_ns, clock_ns(CLOCK_MONOTONIC), timeout_ns / 4) > timeout_ns) gone_ = true;
-  return gone_ || (config_.interrupted && config_.interrupted());
+  if (fresh_ || (!left_in_ && contact_->is_over())) return true;
+  return contact_->check_silence() || (config_.interrupted && config_.interrupted());
 }
 
 void RemoteBackend::exchange(const hal::CycleTime&) noexcept {
   if (done_ && config_.lockstep && !left_in_) {
-    const std::lock_guard lock(mutex_);
+    const std::lock_guard lock(contact_->news().mutex);
     left_in_ = last_cycle_;
   }
   if (pending_) send();
-  if (config_.own_pace) return look();
   fresh_ = false;
   missed_now_ = 0;
   {
-    std::unique_lock lock(mutex_);
-    while (!there()) news_.wait_for(lock, kSlice);
+    std::unique_lock lock(contact_->news().mutex);
+    while (!there() && !config_.own_pace) contact_->news().came.wait_for(lock, kSlice);
     // Nobody gives the beat any more.
-    if (!fresh_) news_.wait_for(lock, std::chrono::milliseconds(1));
+    if (!fresh_ && !config_.own_pace)
+      contact_->news().came.wait_for(lock, std::chrono::milliseconds(1));
   }
   if (!fresh_) return;
   const std::uint64_t cycle = newest_.front().cycle;
-  missed_now_ = first_ || config_.lockstep ? 0 : cycle - last_cycle_ - 1;
-  missed_ += first_ || done_ ? 0 : cycle - last_cycle_ - 1;
-  last_cycle_ = cycle;
-  first_ = false;
-}
-
-/// For a state that is there, without waiting for one.
-void RemoteBackend::look() noexcept {
-  fresh_ = false;
-  {
-    const std::lock_guard lock(mutex_);
-    (void)there();
-  }
-  if (!fresh_) return;
-  const std::uint64_t cycle = newest_.front().cycle;
-  missed_ += first_ || done_ ? 0 : cycle - last_cycle_ - 1;
+  const std::uint64_t unseen = first_ ? 0 : cycle - last_cycle_ - 1;
+  missed_now_ = config_.lockstep || config_.own_pace ? 0 : unseen;
+  missed_ += done_ ? 0 : unseen;
   last_cycle_ = cycle;
   first_ = false;
 }
@@ -79,7 +179,7 @@ Code RemoteBackend::read(const hal::CycleTime& time, hal::StateImage& state) noe
   if (!fresh_) {
     for (std::uint32_t& age : state.age_cycles()) ++age;
     for (std::uint32_t& age : state.sensor_age_cycles()) ++age;
-    return is_gone() ? Code::kBusOff : Code::kTimeout;
+    return contact_->is_gone() ? Code::kBusOff : Code::kTimeout;
   }
   state.assign(seen.state);
   cycles_ahead_ = seen.cycle - time.cycle;
@@ -93,18 +193,13 @@ Code RemoteBackend::read(const hal::CycleTime& time, hal::StateImage& state) noe
   return static_cast<Code>(seen.code) == Code::kTimeout ? Code::kTimeout : Code::kOk;
 }
 
-bool RemoteBackend::is_gone() const noexcept TANDEM_RT {
-  return gone_.load(std::memory_order_relaxed) || lost_.load(std::memory_order_relaxed) ||
-         ending_.load(std::memory_order_relaxed);
-}
-
 hal::Phase RemoteBackend::phase() const noexcept {
-  if (is_gone() || latched_ != StopCategory::kWarn) return hal::Phase::kFault;
+  if (contact_->is_gone() || latched_ != StopCategory::kWarn) return hal::Phase::kFault;
   const Seen& seen = newest_.front();
   if (resetting_ || !seen.is_one) return hal::Phase::kBringUp;
   switch (static_cast<RunPhase>(seen.phase)) {
     case RunPhase::kRunning:
-      return seen.owner == client_ ? hal::Phase::kOperational : hal::Phase::kBringUp;
+      return seen.owner == contact_->client() ? hal::Phase::kOperational : hal::Phase::kBringUp;
     case RunPhase::kBringUp:
     case RunPhase::kSettling:
     case RunPhase::kResetting:
@@ -159,7 +254,7 @@ void RemoteBackend::last_command(const hal::CommandImage& command) noexcept TAND
 bool RemoteBackend::shut_down() noexcept TANDEM_RT {
   const Seen& seen = newest_.front();
   const bool ends = seen.is_one && hal::ends(static_cast<RunPhase>(seen.phase));
-  if (is_gone() || ends || (done_ && seen.owner != client_)) return true;
+  if (contact_->is_gone() || ends || (done_ && seen.owner != contact_->client())) return true;
   if (!done_) {
     live_ = live_ && ends_with_command_;
     pending_ = true;
@@ -172,8 +267,8 @@ void RemoteBackend::send() noexcept {
   const Seen& seen = newest_.front();
   pending_ = false;
   tandem_msgs::LinkCommand sample{};
-  sample.run = run_;
-  sample.client = client_;
+  sample.run = contact_->run();
+  sample.client = contact_->client();
   sample.sequence_number = ++sequence_;
   sample.cycle = seen.cycle;
   sample.state_ns = seen.sent_ns;
@@ -191,7 +286,7 @@ void RemoteBackend::send() noexcept {
     sample.gains._length = sample.gains._maximum = static_cast<std::uint32_t>(gains_.size());
     gains_pending_ = false;
   }
-  (void)endpoints_.commands.write(sample);
+  (void)commands_.write(sample);
 }
 
 bool RemoteBackend::command_in_force(hal::CommandImage& command) const noexcept TANDEM_RT {

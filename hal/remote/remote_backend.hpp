@@ -3,37 +3,19 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
-#include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "base/result.hpp"
 #include "base/triple_buffer.hpp"
 #include "hal/backend.hpp"
-#include "hal/remote/lease.hpp"
 #include "hal/remote/link.hpp"
+#include "hal/remote/server_contact.hpp"
 #include "rt/histogram.hpp"
 
 namespace tandem::remote {
-
-struct ClientConfig {
-  std::string name;                          ///< for people: "tandem run squat.toml, process 312"
-  bool lockstep = false;                     ///< must be the server's
-  bool own_pace = false;                     ///< the loop waits for no state; not in lockstep
-  RobotEnd robot_end = {};                   ///< that the server must have
-  std::uint64_t server = 0;                  ///< Server::number(); 0: the only one there is
-  double connect_timeout_s = 10;             ///< for a server to be found, and to give the lease
-  double server_timeout_s = 3;               ///< a server that is not heard for so long is gone
-  std::function<void()> before_asking = {};  ///< for the lease; called before each attempt
-  std::function<bool()> interrupted = {};    ///< true: exchange() waits no longer
-  /// A drive's error code in words; empty: as Backend::fault_text() has it.
-  std::function<std::string(std::uint32_t)> error_text = {};
-};
 
 /// Bring-up, limits and reactions to faults are the server's. phase() is kOperational while the
 /// server runs and the lease is this client's.
@@ -47,9 +29,6 @@ class RemoteBackend final : public hal::Backend {
                                                                       const hal::Robot& robot,
                                                                       const Identity& identity,
                                                                       const ClientConfig& config);
-  /// Gives the robot back.
-  ~RemoteBackend() override;
-
   [[nodiscard]] hal::Pace pace() const noexcept override {
     if (config_.own_pace) return hal::Pace::kWallClock;
     return config_.lockstep ? hal::Pace::kSimulatedClock : hal::Pace::kBus;
@@ -105,63 +84,27 @@ class RemoteBackend final : public hal::Backend {
     hal::StopCategory reaction = hal::StopCategory::kWarn;
     bool is_one = false;  // not only what stands here before the first
   };
-  /// What the server says of itself.
-  struct Told {
-    Identity identity;
-    std::uint64_t run = 0, owner = 0;
-    std::optional<Sender> sender;
-    std::string owner_name, status;
-    double lease_timeout_s = 1.0;
-    bool lockstep = false, ending = false;
-  };
-  struct Endpoints {
-    dds::Reader<tandem_msgs::LinkServer> server;
-    dds::Reader<tandem_msgs::LinkRobotEnd> robot_end;
-    dds::Reader<tandem_msgs::LinkState> state;
-    dds::Writer<tandem_msgs::LinkRequest> requests;
-    dds::Writer<tandem_msgs::LinkCommand> commands;
-  };
-
-  RemoteBackend(Endpoints endpoints, const hal::Robot& robot, ClientConfig config);
-  [[nodiscard]] Status find_server(const Identity& identity);
-  [[nodiscard]] Status same_robot_end();
-  [[nodiscard]] Status take_lease();
-  void ask(Action action);
-  void renew();
-  void take_told();
-  void take_robot_end();
+  RemoteBackend(std::unique_ptr<ServerContact> contact, dds::Reader<tandem_msgs::LinkState> states,
+                dds::Writer<tandem_msgs::LinkCommand> commands, const hal::Robot& robot);
   void take_states();
   [[nodiscard]] bool unpack(const tandem_msgs::LinkState& sample);
   [[nodiscard]] bool there() noexcept;
-  void look() noexcept;
-  [[nodiscard]] bool is_gone() const noexcept TANDEM_RT;
   void send() noexcept;
   void keep(const hal::CommandImage& command) noexcept TANDEM_RT;
 
-  Endpoints endpoints_;
-  ClientConfig config_;
-  std::uint64_t client_ = draw_number();
+  std::unique_ptr<ServerContact> contact_;  // gives the robot back, last
+  const ClientConfig& config_;              // the contact's
+  dds::Reader<tandem_msgs::LinkState> states_;
+  dds::Writer<tandem_msgs::LinkCommand> commands_;
   std::size_t joints_;
 
-  mutable std::mutex mutex_;  // of what follows
-  std::condition_variable news_, closes_;
-  Senders server_senders_, robot_end_senders_, state_senders_;
-  std::optional<Sender> server_;  // once it is chosen
-  std::optional<Told> told_;
-  std::uint64_t told_count_ = 0;
-  bool several_ = false;  // servers were heard before one was chosen
-  bool closing_ = false;
-  std::optional<RobotEnd> robot_end_;     // the server's
+  // Under the contact's mutex: what the server's states bring, for the loop.
+  Senders senders_;
   std::optional<std::uint64_t> left_in_;  // in lockstep: the server's cycle that `done` answers
-  // Written by DDS' threads, read by any.
-  std::atomic<std::uint64_t> run_{0};
-  std::atomic<std::int64_t> heard_ns_{0};
-  std::atomic<std::uint8_t> phase_{0};  // the server's run's
-  std::atomic<bool> leased_{false}, lost_{false}, ending_{false}, gone_{false};
   TripleBuffer<Seen> newest_;
+  std::atomic<std::uint8_t> phase_{0};  // the server's run's; any thread's
 
   // The loop's.
-  Silence silence_;  // of the server
   bool fresh_ = false, first_ = true, pending_ = false, live_ = false, done_ = false;
   bool ends_with_command_ = false;  // `done` comes with the controllers' last one
   std::uint64_t cycles_ahead_ = 0;  // of this loop, the server's count is
@@ -180,8 +123,7 @@ class RemoteBackend final : public hal::Backend {
   std::int64_t answered_ns_ = 0;
   rt::Histogram turn_around_;
 
-  std::thread renewing_;
-  std::optional<OnData> on_told_, on_robot_end_, on_states_;  // last: they call the others
+  std::optional<OnData> on_states_;  // last: it calls the others
 };
 
 }  // namespace tandem::remote

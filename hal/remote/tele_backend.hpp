@@ -40,8 +40,6 @@ class TeleBackend final : public OperatorEnd {
   [[nodiscard]] bool archive(Archive& ar) override;
 
   [[nodiscard]] TeleFigures figures() const noexcept override;
-  /// The robot's own state in this cycle, which the operator has not seen yet.
-  [[nodiscard]] const hal::StateImage& robot_state() const noexcept { return robot_state_; }
   /// What the robot follows in this cycle.
   [[nodiscard]] const hal::CommandImage& robot_command() const noexcept { return robot_command_; }
 

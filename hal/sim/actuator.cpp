@@ -103,10 +103,7 @@ Actuators::Actuators(std::vector<ActuatorModel> models, double ambient_C)
   cooling_.assign(n, 1.0);
   brakes_.resize(n);
   brake_states_.resize(n);
-  for (const ActuatorModel& model : models_) {
-    feeds_through_ |= model.order == 0;
-    all_elastic_ &= model.order == 2;
-  }
+  for (const ActuatorModel& model : models_) all_elastic_ &= model.order == 2;
   const auto array = [&](auto value) {
     std::vector<double> values(n);
     std::ranges::transform(models_, values.begin(),

@@ -75,8 +75,6 @@ class Actuators {
   [[nodiscard]] const ActuatorModel& model(std::size_t joint) const noexcept {
     return models_[joint];
   }
-  /// True when a voltage acts on the link at once (order 0), without a state in between.
-  [[nodiscard]] bool feeds_through() const noexcept { return feeds_through_; }
 
   /// What the power stage does from now on. `voltage_V` is saturated. With the bridge off the
   /// winding is open: no current, no back-EMF damping.
@@ -201,7 +199,6 @@ class Actuators {
   std::vector<double> cooling_;               // exp(-h / time constant) of the last step length
   double cooling_h_s_ = 0.0;
   double ambient_C_;
-  bool feeds_through_ = false;
 };
 
 }  // namespace tandem::sim

@@ -34,9 +34,9 @@ Result<std::unique_ptr<SimRobot>> SimRobot::create(const hal::RobotConfig& robot
 SimRobot::SimRobot(std::unique_ptr<EmulatedRobot> robot,
                    std::vector<std::unique_ptr<InProcessLine>> lines,
                    std::unique_ptr<hal::can::DriveMaster> master, bool keep_truth)
-    : robot_(std::move(robot)),
+    : DriveBackend(std::move(master)),
+      robot_(std::move(robot)),
       lines_(std::move(lines)),
-      master_(std::move(master)),
       truth_filler_(robot_->plant()),
       truth_(robot_->plant().joints(), robot_->plant().contact().feet(),
              robot_->plant().loops().equations().loops(), robot_->plant().passive().size()),
@@ -77,11 +77,6 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
   if (keep_truth_) truth_filler_.fill(plant(), time, truth_);
   hook_(SimStage::kTruth);
   return code;
-}
-
-Code SimRobot::write(const hal::CommandImage& command,
-                     const hal::ParameterImage& parameters) noexcept TANDEM_RT {
-  return master_->send(command, parameters);
 }
 
 bool SimRobot::post(const Fault& fault) {

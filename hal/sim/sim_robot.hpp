@@ -7,8 +7,7 @@
 #include <string>
 
 #include "base/spsc_ring.hpp"
-#include "hal/backend.hpp"
-#include "hal/ethercat-can/drive_master.hpp"
+#include "hal/ethercat-can/drive_backend.hpp"
 #include "hal/sim/emulated_robot.hpp"
 #include "hal/sim/in_process_line.hpp"
 #include "hal/sim/truth.hpp"
@@ -16,7 +15,7 @@
 namespace tandem::sim {
 
 /// The emulated robot with its master: in lock step, SYNC k starts a step.
-class SimRobot final : public hal::Backend {
+class SimRobot final : public hal::can::DriveBackend {
  public:
   /// Errors: those of EmulatedRobot and DriveMaster.
   [[nodiscard]] static Result<std::unique_ptr<SimRobot>> create(const hal::RobotConfig& robot,
@@ -28,30 +27,12 @@ class SimRobot final : public hal::Backend {
   [[nodiscard]] std::string status_text() const override;
   [[nodiscard]] Code read(const hal::CycleTime& time,
                           hal::StateImage& state) noexcept TANDEM_RT override;
-  [[nodiscard]] Code write(const hal::CommandImage& command,
-                           const hal::ParameterImage& parameters) noexcept TANDEM_RT override;
-  [[nodiscard]] hal::FaultCause fault_cause(std::size_t joint) const noexcept TANDEM_RT override {
-    return master_->fault_cause(joint);
-  }
-  [[nodiscard]] std::string fault_text(hal::FaultCause cause, std::uint32_t code) const override {
-    return cause == hal::FaultCause::kDrive ? hal::can::DriveMaster::error_text(code)
-                                            : Backend::fault_text(cause, code);
-  }
-  void stop(hal::StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
-  void reset() noexcept TANDEM_RT override { master_->reset(); }
-  bool home(std::size_t joint) noexcept TANDEM_RT override { return master_->home(joint); }
-  void stop_homing(std::size_t joint) noexcept TANDEM_RT override { master_->stop_homing(joint); }
-  [[nodiscard]] hal::Homing homing(std::size_t joint) const noexcept TANDEM_RT override {
-    return master_->homing(joint);
-  }
-  [[nodiscard]] bool shut_down() noexcept TANDEM_RT override { return master_->shut_down(); }
   [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override;
   [[nodiscard]] bool archive(Archive& ar) override;
 
   /// The true state at the last read(), when `truth` was asked for.
   [[nodiscard]] const hal::TruthImage& truth() const noexcept { return truth_; }
   [[nodiscard]] const Plant& plant() const noexcept { return robot_->plant(); }
-  [[nodiscard]] const hal::can::DriveMaster& master() const noexcept { return *master_; }
   [[nodiscard]] EmulatedRobot& robot() noexcept { return *robot_; }
 
   /// Injects a fault from one other thread: it is added before the next cycle.
@@ -69,7 +50,6 @@ class SimRobot final : public hal::Backend {
 
   std::unique_ptr<EmulatedRobot> robot_;
   std::vector<std::unique_ptr<InProcessLine>> lines_;  ///< EtherCAT
-  std::unique_ptr<hal::can::DriveMaster> master_;
   TruthFiller truth_filler_;
   hal::TruthImage truth_;
   bool keep_truth_;

@@ -101,10 +101,10 @@ class StrayWrites : public ControllerHostOfFake {
     test::Stray& writer = *made;
     EXPECT_TRUE(host_.add("writer", std::move(made), parameters()));
     state_.position_rad()[0] = 0.3;
-    host_.start({}, state_, command_);
+    host_.start({}, {state_, command_});
     return writer;
   }
-  void update() { EXPECT_EQ(host_.update({}, state_, command_), Code::kOk); }
+  void update() { EXPECT_EQ(host_.update({}, {state_, command_}), Code::kOk); }
   /// Told of these joints, one a cycle, and then of nothing more.
   void expect_told(const std::vector<std::size_t>& joints) {
     for (const std::size_t joint : joints) {
@@ -162,7 +162,7 @@ TEST(StrayWritesOfAWeakJoint, GetNoModeThatItCannotDo) {
   ASSERT_TRUE(host.add("writer", std::move(writer), parameters()));
   const hal::StateImage state{robot.shape()};
   hal::CommandImage command{robot.shape()};
-  host.start({}, state, command);
+  host.start({}, {state, command});
   EXPECT_EQ(command.mode()[0], static_cast<std::int8_t>(ControlMode::kPosition));
   EXPECT_EQ(host.take_stray()->joint, 1U) << "other joints' first";
 }
@@ -171,19 +171,19 @@ TEST_F(ControllerHostOfFake, HoldsJointsThatNobodyClaimedWhereTheyAre) {
   ASSERT_TRUE(add("one", {1}, ControlMode::kTorque));
   state_.position_rad()[0] = 0.3;
   state_.position_rad()[2] = -0.4;
-  host_.start({}, state_, command_);
+  host_.start({}, {state_, command_});
   EXPECT_EQ(mode(0), static_cast<int>(ControlMode::kPosition));
   EXPECT_EQ(mode(1), static_cast<int>(ControlMode::kTorque));
   EXPECT_EQ(mode(2), static_cast<int>(ControlMode::kPosition));
   state_.position_rad()[0] = 0.35;  // pushed away: the reference stays
-  EXPECT_EQ(host_.update({}, state_, command_), Code::kOk);
+  EXPECT_EQ(host_.update({}, {state_, command_}), Code::kOk);
   EXPECT_EQ(command_.position_rad()[0], 0.3);
   EXPECT_EQ(command_.position_rad()[2], -0.4);
 }
 
 TEST_F(ControllerHostOfFake, GivesCompliantJointsTheirDefaultStiffness) {
   ASSERT_TRUE(add("one", {1}));
-  host_.start({}, state_, command_);
+  host_.start({}, {state_, command_});
   EXPECT_EQ(command_.stiffness_Nm_rad()[1], 50.0);
   EXPECT_EQ(command_.damping_Nms_rad()[1], 15.0);
 }
@@ -193,21 +193,21 @@ TEST_F(ControllerHostOfFake, IsDoneWhenEveryControllerIs) {
   Sine* one = last_;
   ASSERT_TRUE(add("two", {1}));
   Sine* two = last_;
-  host_.start({}, state_, command_);
+  host_.start({}, {state_, command_});
   one->answer = Code::kStopped;
-  EXPECT_EQ(host_.update({}, state_, command_), Code::kOk);
-  EXPECT_EQ(host_.update({}, state_, command_), Code::kOk);
+  EXPECT_EQ(host_.update({}, {state_, command_}), Code::kOk);
+  EXPECT_EQ(host_.update({}, {state_, command_}), Code::kOk);
   EXPECT_EQ(one->updates, 1);  // a controller that is done is not called again
   two->answer = Code::kStopped;
-  EXPECT_EQ(host_.update({}, state_, command_), Code::kStopped);
+  EXPECT_EQ(host_.update({}, {state_, command_}), Code::kStopped);
 }
 
 TEST_F(ControllerHostOfFake, NamesTheControllerThatGaveUp) {
   ASSERT_TRUE(add("one", {0}));
   ASSERT_TRUE(add("two", {1}));
   last_->answer = Code::kNotFinite;
-  host_.start({}, state_, command_);
-  EXPECT_EQ(host_.update({}, state_, command_), Code::kNotFinite);
+  host_.start({}, {state_, command_});
+  EXPECT_EQ(host_.update({}, {state_, command_}), Code::kNotFinite);
   EXPECT_EQ(host_.name(host_.failed_controller()), "two");
 }
 
@@ -221,7 +221,7 @@ TEST_F(ControllerHostOfFake, HoldKeepsAPositionReferenceAndItsFeedForward) {
   state_.position_rad()[0] = 0.45;
   state_.position_rad()[1] = -0.2;
   state_.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kOperationEnabled);
-  host_.hold(state_, command_);
+  host_.references().hold({state_, command_});
   EXPECT_EQ(command_.position_rad()[0], 0.5);
   EXPECT_EQ(command_.torque_Nm()[0], 7.0);
   EXPECT_EQ(command_.velocity_rad_s()[0], 0.0);
@@ -236,7 +236,7 @@ TEST_F(ControllerHostOfFake, HoldFollowsAJointWhoseDriveIsOff) {
   command_.torque_Nm()[0] = 7.0;
   state_.position_rad()[0] = 0.45;
   state_.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kFault);
-  host_.hold(state_, command_);
+  host_.references().hold({state_, command_});
   EXPECT_EQ(command_.position_rad()[0], 0.45);
   EXPECT_EQ(command_.torque_Nm()[0], 0.0);
 }

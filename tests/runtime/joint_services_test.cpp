@@ -134,11 +134,12 @@ TEST_F(JointServices, LeaveTheOtherValueOfAnImpedanceAsTheControllerWroteIt) {
   hal::CommandImage command = cycle->command();
   command.stiffness_Nm_rad()[0] = 1.0;
   command.damping_Nms_rad()[0] = 0.05;
-  (void)host.set_joint(0, {.stiffness_Nm_rad = 0.5}, true, cycle->state(), command);
+  JointReferences& references = host.references();
+  (void)references.set(0, {.stiffness_Nm_rad = 0.5}, true, {cycle->state(), command});
   EXPECT_EQ(command.stiffness_Nm_rad()[0], 0.5);
   EXPECT_EQ(command.damping_Nms_rad()[0], 0.05);
   command.stiffness_Nm_rad()[0] = 1.0;
-  (void)host.set_joint(0, {.damping_Nms_rad = 0.09}, true, cycle->state(), command);
+  (void)references.set(0, {.damping_Nms_rad = 0.09}, true, {cycle->state(), command});
   EXPECT_EQ(command.stiffness_Nm_rad()[0], 1.0);
   EXPECT_EQ(command.damping_Nms_rad()[0], 0.09);
 }
