@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -28,13 +29,33 @@ bool program_exists(const std::string& program) {
   return false;
 }
 
-Result<pid_t> spawn(const Spawn& what) {
-  std::vector<char*> arguments;
-  for (const std::string& word : what.command) {
-    arguments.push_back(const_cast<char*>(word.c_str()));
-  }
-  arguments.push_back(nullptr);
+namespace {
 
+/// As exec() wants them; `words` outlives them.
+std::vector<char*> arguments_of(const std::vector<std::string>& words) {
+  std::vector<char*> arguments;
+  for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  return arguments;
+}
+
+}  // namespace
+
+std::string program_beside(const std::string& name) {
+  std::error_code ignored;
+  return std::filesystem::read_symlink("/proc/self/exe", ignored).replace_filename(name).string();
+}
+
+Error become(const std::string& program, const std::vector<std::string>& words) {
+  ::execv(program.c_str(), arguments_of(words).data());
+  return {.message = std::string("cannot be started: ") + std::strerror(errno),
+          .hint = {},
+          .file = program,
+          .key = {}};
+}
+
+Result<pid_t> spawn(const Spawn& what) {
+  const std::vector<char*> arguments = arguments_of(what.command);
   const Result<Descriptor> output = open_output(what.output, 0644);
   if (!output) {
     return fail(what.command.front() + " could not be started: " + what.output + ": " +

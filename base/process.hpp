@@ -27,6 +27,14 @@ struct Spawn {
 /// Errors: the program cannot be started.
 [[nodiscard]] Result<pid_t> spawn(const Spawn& what);
 
+/// The program of this name in the folder of this one.
+[[nodiscard]] std::string program_beside(const std::string& name);
+
+/// Becomes another program, with this process' number and descriptors.
+/// @param words  its arguments, its name first
+/// @return only an error: it cannot be started
+[[nodiscard]] Error become(const std::string& program, const std::vector<std::string>& words);
+
 /// Waits until it has ended.
 /// @return its exit status; 128 + signal when a signal ended it; -1: it is no child of ours
 [[nodiscard]] int wait_for(pid_t child);

@@ -8,6 +8,7 @@
 #include "base/counted.hpp"
 #include "base/xml_scan.hpp"
 #include "canopen/esi_text.hpp"
+#include "canopen/frame.hpp"
 #include "canopen/object_dictionary.hpp"
 #include "canopen/objects.hpp"
 #include "canopen/sheet_mappings.hpp"

@@ -105,7 +105,7 @@ function(tandem_kernels robot toml)
     return()
   endif()
   add_custom_target(kernels_${robot}
-    COMMAND tandem model build ${toml} -o ${PROJECT_BINARY_DIR}/${library}
+    COMMAND tandem-tools model build ${toml} -o ${PROJECT_BINARY_DIR}/${library}
     JOB_POOL kernels VERBATIM
     COMMENT "Kernels of ${robot}")
 endfunction()

@@ -1,4 +1,4 @@
-# What `cmake --install` lays down: the program, its controllers and robots with the kernels that
+# What `cmake --install` lays down: the programs, their controllers and robots with the kernels that
 # are built, and what it takes to build a controller elsewhere.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -32,7 +32,7 @@ set(TANDEM_PLUGIN_HEADERS
 # tandem_install(): to be called when every target is there. The program looks for its parts beside
 # itself, in ../lib and ../share, whatever a system calls its folders.
 function(tandem_install)
-  install(TARGETS tandem RUNTIME DESTINATION bin)
+  install(TARGETS tandem tandem-tools RUNTIME DESTINATION bin)
   foreach(name IN LISTS TANDEM_BUNDLED_CONTROLLERS)
     install(TARGETS controller_${name} DESTINATION lib/tandem/controllers)
   endforeach()

@@ -59,5 +59,8 @@ file(WRITE ${strange}/sway.toml "${experiment}")
 set(ENV{TANDEM_CONTROLLERS} ${strange}/build/lib/controllers)
 execute_process(COMMAND ${prefix}/bin/tandem run --no-log --duration 2 sway.toml
   WORKING_DIRECTORY ${strange} COMMAND_ERROR_IS_FATAL ANY)
+# It becomes the second installed program.
+execute_process(COMMAND ${prefix}/bin/tandem model info
+  ${prefix}/share/tandem/config/double_pendulum/robot.toml OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND ${prefix}/bin/tandem check ${prefix}/share/tandem/config/double_pendulum/hold.toml
   COMMAND_ERROR_IS_FATAL ANY)

@@ -156,7 +156,7 @@ Result<std::vector<HumanoidRow>> measure_humanoid(const std::string& experiment,
     if (Status written = write_file(file, experiment_text(*folder, experiment, entry)); !written)
       return std::unexpected(written.error());
     const Result<pid_t> child =
-        spawn({.command = {fs::read_symlink("/proc/self/exe").string(), "run", file, "--no-log",
+        spawn({.command = {program_beside("tandem"), "run", file, "--no-log",
                            "--no-dds", "--no-socket", "--quiet", "--duration",
                            fmt::format("{}", duration_s), "--json", json},
                .output = scratch.file("said")});

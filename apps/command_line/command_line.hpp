@@ -163,6 +163,9 @@ struct ReportOptions {
   std::string log;
   std::vector<std::string> others;  ///< up to two, laid over `log`
   std::string output;               ///< folder; empty: beside the log
+  std::optional<int> after_run;     ///< drawn by `run --report`, which ends with this status
+  std::string interrupted;          ///< is said when a signal ends it; empty: as of any draft
+  bool quiet = false;               ///< says not where it is
   std::string json;
 };
 

@@ -171,6 +171,10 @@ void add_flags(CLI::App& app, ReportOptions& o) {
   app.add_option("others", o.others, "One or two more logs, laid over the first")->expected(0, 2);
   app.add_option("-o,--output", o.output, "Folder to write (default: beside the log)");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  // Which a run gives, and no help shows.
+  app.add_option("--after-run", o.after_run)->group("");
+  app.add_option("--interrupted", o.interrupted)->group("");
+  app.add_flag("--quiet", o.quiet)->group("");
   app.footer(kReportExamples);
 }
 

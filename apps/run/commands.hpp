@@ -4,13 +4,15 @@
 #pragma once
 
 #include "apps/command_line/command_line.hpp"
+#include "apps/run/tools_program.hpp"
 
 namespace tandem::apps {
 
 /// Reads every file first, and runs only when all is right.
-[[nodiscard]] Exit run_command(const RunOptions& options);
+/// @param report  what is to be drawn afterwards
+[[nodiscard]] Exit run_command(const RunOptions& options, ReportOfRun& report);
 /// Runs a robot without controllers of its own, for owners in other processes.
-[[nodiscard]] Exit serve_command(const ServeOptions& options);
+[[nodiscard]] Exit serve_command(const ServeOptions& options, ReportOfRun& report);
 /// The robot on the other end of the wire, until it is asked to stop.
 [[nodiscard]] Exit emulate_command(const EmulateOptions& options);
 /// Reads every file, says what a run would do, moves nothing.

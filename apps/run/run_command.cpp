@@ -22,9 +22,9 @@
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_log.hpp"
 #include "apps/run/run_summary.hpp"
+#include "apps/run/tools_program.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
-#include "apps/tools/draw_report.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "apps/transport/dds_admission.hpp"
 #include "apps/transport/dds_services.hpp"
@@ -120,31 +120,6 @@ Status check_pace(const Composition& c, const RunOptions& options) {
   if (options.rate.value_or(1.0) == 1.0) return {};
   return fail("boards on a bus keep real time, so --rate cannot be other than 1",
               "leave --rate out, or add --lockstep for emulated boards");
-}
-
-/// Draws the report of `log` and prints where it is; one that cannot be drawn is no fault of the
-/// run. A signal ends it, and with it the program: there is nothing else to do.
-/// @param whole  the log has every message
-void add_report(const RunOptions& options, const std::string& log, bool whole) {
-  if (!options.report || log.empty()) return;
-  std::fflush(nullptr);  // a signal that ends the program writes nothing more
-  rt::remove_stop_signals();
-  const auto files = draw_report(
-      log, {}, {},
-      fmt::format("the report was not drawn. The log {} is {}; `tandem report {}` draws "
-                  "its report",
-                  log, whole ? "whole" : "closed", shell_word(log)));
-  if (!files) {
-    print_errors({files.error()});
-    return;
-  }
-  for (const std::string& remark : files->remarks)
-    fmt::print(stderr, "note: {}\n", shown(remark, 2'000));
-  if (options.quiet) return;
-  Facts facts;
-  facts.add("report", files->page);
-  facts.add("plots", files->images.back());
-  facts.print(human_output(options.json));
 }
 
 /// Writes what --trace asks for, and says how much of the run it is.
@@ -437,10 +412,11 @@ void warn_of_inertias(const runtime::Experiment& e) {
 
 }  // namespace
 
-Exit run_command(const RunOptions& options) {
+Exit run_command(const RunOptions& options, ReportOfRun& report) {
   for (const std::string& file : {options.json, options.trace}) {
     if (const Status writable = check_writable(file); !writable) return refuse(writable.error());
   }
+  if (const Status there = check_tools(); options.report && !there) return refuse(there.error());
   const auto wrong = options.serves
                          ? wrong_kind(options.experiment, Takes::kEither, "tandem serve")
                          : wrong_kind(options.experiment, Takes::kExperiment, "tandem run");
@@ -472,25 +448,21 @@ Exit run_command(const RunOptions& options) {
     return refuse(errors);
   print_warnings((*composition)->warnings);
   if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
-  Exit exit = Exit::kDone;
-  std::string log;
-  bool whole = true;
-  {
-    auto session = std::make_unique<Session>(**composition, options);
-    exit = session->run();
-    log = session->log();
-    whole = session->log_is_whole();
-    const EndGuard in_time;
-    session.reset();
+  auto session = std::make_unique<Session>(**composition, options);
+  const Exit exit = session->run();
+  if (options.report) {
+    report = {session->log(), session->log_is_whole(),
+              options.quiet ? nullptr : human_output(options.json)};
   }
-  add_report(options, log, whole);
+  const EndGuard in_time;
+  session.reset();
   return exit;
 }
 
-Exit serve_command(const ServeOptions& options) {
+Exit serve_command(const ServeOptions& options, ReportOfRun& report) {
   RunOptions run = options.run;
   run.serves = true;
-  return run_command(run);
+  return run_command(run, report);
 }
 
 }  // namespace tandem::apps

@@ -148,6 +148,43 @@ TEST_F(CommandLine, IsCompletedByBashFromItsHelp) {
   EXPECT_EQ(completed("joint move elbow --to 30deg --w", 6), "--wait");
 }
 
+// What `tandem` does without `tandem-tools`: a copy of it alone.
+TEST_F(CommandLine, WithoutTheToolsItSaysWhatToBuildBeforeAnythingRuns) {
+  std::filesystem::create_directory(folder_ / "bin");
+  std::filesystem::copy_file(TANDEM_BINARY_DIR "/bin/tandem", folder_ / "bin/tandem");
+  const auto alone = [this](const std::string& arguments) {
+    const std::string command = "cd " + shell_word(folder_.string()) + " && bin/tandem " +
+                                arguments + " >out.txt 2>err.txt </dev/null";
+    const int raw = std::system(command.c_str());
+    return Outcome{WIFEXITED(raw) ? WEXITSTATUS(raw) : -1, read_text(folder_ / "out.txt"),
+                   read_text(folder_ / "err.txt")};
+  };
+  for (const char* command :
+       {"log info a.mcap --json failed.json", "new double_pendulum.urdf", "doctor",
+        "run hold.toml --duration 0.1 --log runs --report", "report a.mcap"}) {
+    const Outcome outcome = alone(command);
+    EXPECT_EQ(outcome.status, 2) << command;
+    EXPECT_NE(outcome.err.find("bin/tandem-tools: "), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find("--target tandem-tools"), std::string::npos) << outcome.err;
+  }
+  EXPECT_EQ(json("failed.json")["ok"], false);
+  EXPECT_FALSE(has_log());
+  EXPECT_EQ(alone("check hold.toml").status, 0);
+  EXPECT_EQ(alone("log info --help").out, tandem("log info --help").out);
+  EXPECT_NE(alone("log csb").err.find("did you mean 'csv'?"), std::string::npos);
+}
+
+TEST_F(CommandLine, TheToolsAloneRunNoRobot) {
+  const std::string tools = shell_word(TANDEM_BINARY_DIR "/bin/tandem-tools");
+  const std::string file = shell_word((folder_ / "said.txt").string());
+  for (const char* command : {" run hold.toml", " clock show", " topic list"}) {
+    const int raw = std::system((tools + command + " > " + file + " 2>&1").c_str());
+    EXPECT_EQ(WEXITSTATUS(raw), 2) << command;
+    EXPECT_NE(read_text(folder_ / "said.txt").find("say `tandem`"), std::string::npos) << command;
+  }
+  EXPECT_EQ(std::system((tools + " eds show --help > " + file).c_str()), 0);
+}
+
 TEST_F(CommandLine, RateAndRealTimeExcludeEachOther) {
   EXPECT_EQ(tandem("run hold.toml --rate 2 --realtime").status, 2);
 }

@@ -151,6 +151,23 @@ TEST_F(LogAndReport, ReportTellsTheFaultAtTheTimeThatTheRunTold) {
   EXPECT_NE(page.find("<dt>controllers started</dt>"), std::string::npos);
 }
 
+// The report is drawn by another program, and says where it is as the run would.
+TEST_F(LogAndReport, ReportOfARunIsNamedWhereTheRunsTableIs) {
+  const std::string run = "run hold.toml --duration 0.2 --log ";
+  const std::string page = "report  a/double_pendulum-hold-001/report.html";
+  const Outcome told = tandem(run + "a --report");
+  EXPECT_EQ(told.status, 0) << told.err;
+  EXPECT_GT(told.out.find("\n  " + page + "\n  plots   "), told.out.find("real time")) << told.out;
+  const Outcome beside = tandem(run + "b --report --json -");
+  EXPECT_EQ(beside.status, 0);
+  EXPECT_TRUE(nlohmann::json::parse(beside.out).contains("log"));
+  EXPECT_NE(beside.err.find("  report  b/"), std::string::npos) << beside.err;
+  const Outcome quiet = tandem(run + "c --report --quiet");
+  EXPECT_EQ(quiet.status, 0);
+  EXPECT_EQ(quiet.out + quiet.err, "");
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "c/double_pendulum-hold-001/report.html"));
+}
+
 TEST_F(LogAndReport, ReportOfClosedLoopsHasTheirErrorsAndTheTorqueThroughThem) {
   const Outcome run =
       tandem("run " + shell_word(TANDEM_SOURCE_DIR "/config/parallel_ankle/move.toml") +

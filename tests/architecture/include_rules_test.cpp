@@ -107,6 +107,23 @@ TEST(Architecture, NoArrowRunsBackUp) {
     ADD_FAILURE() << room << "/ may include what includes it";
 }
 
+TEST(Architecture, TheRobotsProgramReachesNoOfflineRoom) {
+  std::set<std::string> reached;
+  std::vector<std::string> next{"apps"};
+  while (!next.empty()) {
+    const std::string room = room_of(next.back() + "/");
+    next.pop_back();
+    if (!reached.insert(room).second || room.empty()) continue;
+    next.insert(next.end(), rules().at(room).begin(), rules().at(room).end());
+  }
+  EXPECT_TRUE(reached.contains("apps/run"));
+  for (const char* room : {"identification", "scaffold", "report", "log/import", "apps/tools",
+                           "apps/machine", "apps/bench", "apps/offline"}) {
+    EXPECT_TRUE(rules().contains(room)) << room;
+    EXPECT_FALSE(reached.contains(room)) << "`tandem` may include " << room << "/";
+  }
+}
+
 TEST(Architecture, IncludesAreWrittenFromTheRoot) {
   for (const auto& [room, allowed] : rules()) {
     for (const auto& [file, line, included] : includes_of(room)) {
@@ -147,7 +164,7 @@ TEST(Architecture, FilesAreOpenedByBaseAlone) {
   const std::set<std::string> kernels_own{
       // which no user names
       "apps/bench/engine_page.cpp", "apps/clients/control_search.cpp", "apps/machine/machine.cpp",
-      "apps/main.cpp"};
+      "apps/offline/main.cpp"};
   const std::regex opens(R"(\bi?o?fstream\b|\bfopen\(|\bdlopen\()");
   const fs::path root = TANDEM_SOURCE_DIR;
   std::set<std::string> found;
@@ -173,7 +190,7 @@ TEST(Architecture, RuleRefusesARoomAboveAndAcceptsOneBelow) {
   EXPECT_FALSE(may_include("hal", "hal/config/robot_config.hpp"));
   EXPECT_FALSE(may_include("controllers", "hal/config/robot_config.hpp"));
   EXPECT_FALSE(may_include("base", "rt/loop.hpp"));
-  EXPECT_TRUE(may_include("apps/run", "apps/tools/draw_report.hpp"));
+  EXPECT_TRUE(may_include("apps/offline", "apps/tools/commands.hpp"));
   EXPECT_FALSE(may_include("apps/run", "apps/tools/commands.hpp"));
   EXPECT_FALSE(may_include("apps/control", "apps/clients/control_client.hpp"));
   EXPECT_FALSE(may_include("apps/text", "apps/main.hpp"));
