@@ -46,16 +46,12 @@ std::optional<FaultRecord> FaultWatch::next_joint(const hal::StateImage& state) 
     joint_told_[j] = now;
     code_told_[j] = code;
     joint_in_fault_ = true;
-    FaultRecord record{.index = static_cast<std::int32_t>(j),
-                       .code = state.age_cycles()[j],
-                       .source = FaultSource::kJointLost};
-    if (drive_in_fault(state, j)) {
-      record.source = FaultSource::kDrive;
-      record.code = state.fault()[j];
-      record.cause = backend_->fault_cause(j);
-    }
-    record.category = robot_->category_of(j, record.cause);
-    return record;
+    const bool faulted = drive_in_fault(state, j);
+    const auto cause = faulted ? backend_->fault_cause(j) : hal::FaultCause::kJointLost;
+    return FaultRecord{.index = static_cast<std::int32_t>(j),
+                       .code = faulted ? code : state.age_cycles()[j],
+                       .cause = cause,
+                       .category = robot_->category_of(j, cause)};
   }
   return std::nullopt;
 }
@@ -69,7 +65,6 @@ std::optional<FaultRecord> FaultWatch::next_disobedient(
     joint_in_fault_ = true;
     return FaultRecord{.index = static_cast<std::int32_t>(j),
                        .code = state.fault()[j],
-                       .source = FaultSource::kDrive,
                        .cause = kCause,
                        .category = robot_->category_of(j, kCause)};
   }
@@ -86,34 +81,28 @@ std::optional<FaultRecord> FaultWatch::next_sensor(
     if (!is_new) continue;
     return FaultRecord{.index = static_cast<std::int32_t>(s),
                        .code = ages[s],
-                       .source = FaultSource::kSensorLost,
-                       .category = hal::StopCategory::kWarn};
+                       .cause = hal::FaultCause::kSensorLost};
   }
   return std::nullopt;
 }
 
 std::optional<FaultRecord> FaultWatch::lost_link() noexcept TANDEM_RT {
-  const hal::LinkLoss loss = backend_->link_loss();
-  if (link_lost_ || loss == hal::LinkLoss::kNone) return std::nullopt;
+  const hal::FaultCause loss = backend_->link_loss();
+  if (link_lost_ || loss == hal::FaultCause::kNone) return std::nullopt;
   link_lost_ = true;
-  return FaultRecord{.code = static_cast<std::uint32_t>(loss),
-                     .source = FaultSource::kLink,
-                     .category = hal::StopCategory::kWarn};
+  return FaultRecord{.cause = loss};
 }
 
 bool FaultWatch::link_is_back() noexcept TANDEM_RT {
-  if (!link_lost_ || backend_->link_loss() != hal::LinkLoss::kNone) return false;
+  if (!link_lost_ || backend_->link_loss() != hal::FaultCause::kNone) return false;
   link_lost_ = false;
   return true;
 }
 
 std::optional<FaultRecord> FaultWatch::fall(const hal::TruthImage& truth) noexcept TANDEM_RT {
   const Fall found = fall_.look(truth);
-  if (found.kind == FallKind::kNone) return std::nullopt;
-  return FaultRecord{.index = found.thousandths,
-                     .code = static_cast<std::uint32_t>(found.kind),
-                     .source = FaultSource::kFall,
-                     .category = hal::StopCategory::kCategory1};
+  if (found.cause == hal::FaultCause::kNone) return std::nullopt;
+  return FaultRecord{.index = found.thousandths, .cause = found.cause};
 }
 
 std::optional<FaultRecord> FaultWatch::collision(estimation::Estimator& estimator,
@@ -125,7 +114,7 @@ std::optional<FaultRecord> FaultWatch::collision(estimation::Estimator& estimato
   const auto channel = static_cast<std::int32_t>(found->joint);
   return FaultRecord{.index = channel < joints ? channel : joints - 1 - channel,
                      .code = static_cast<std::uint32_t>(thousandths),
-                     .source = FaultSource::kCollision,
+                     .cause = hal::FaultCause::kCollision,
                      .category = estimator.reaction()};
 }
 
@@ -146,13 +135,9 @@ void FaultWatch::forget(std::size_t joint) noexcept TANDEM_RT {
 
 bool FaultWatch::is_there(const FaultRecord& record) const noexcept TANDEM_RT {
   const auto index = static_cast<std::size_t>(record.index);
-  switch (record.source) {
-    case FaultSource::kDrive:
-    case FaultSource::kJointLost: return joint_told_[index] != 0;
-    case FaultSource::kSensorLost: return sensor_told_[index] != 0;
-    case FaultSource::kLink: return link_lost_;
-    default: return false;
-  }
+  if (hal::is_of_drive(record.cause)) return joint_told_[index] != 0;
+  if (record.cause == hal::FaultCause::kSensorLost) return sensor_told_[index] != 0;
+  return is_of_link(record) && link_lost_;
 }
 
 }  // namespace tandem::runtime
