@@ -38,8 +38,7 @@ class DiagnosticTopics final : public TopicGroup {
 
   const hal::RobotConfig& robot_;
   std::string hal_, no_frame_;
-  std::vector<hal::MotorFeedback> tells_;    // of each joint's drive
-  std::vector<double> temperature_limit_C_;  // of each joint's winding
+  std::vector<hal::MotorFeedback> tells_;  // of each joint's drive
   std::uint64_t told_overruns_ = 0, told_dropped_ = 0;
   Output<diagnostic_msgs::DiagnosticArray> output_;
 };
