@@ -5,11 +5,13 @@
 
 namespace tandem::hal {
 
-std::string Backend::fault_text(FaultCause cause, std::uint32_t code) const {
+std::string sentence_of(FaultCause cause) {
   const CauseRow row = row_of(cause);
-  if (*row.words != 0) {
-    return std::string(row.words) + (*row.advice != 0 ? ": " : "") + row.advice;
-  }
+  return std::string(row.words) + (*row.advice != 0 ? ": " : "") + row.advice;
+}
+
+std::string Backend::fault_text(FaultCause cause, std::uint32_t code) const {
+  if (std::string said = sentence_of(cause); !said.empty()) return said;
   char text[48];
   std::snprintf(text, sizeof text, "the drive reports error 0x%04X", code);
   return text;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <string>
 
 namespace tandem::hal {
 
@@ -58,6 +59,8 @@ inline constexpr CauseRow kCauseRows[] = {
 [[nodiscard]] constexpr bool strikes_joint(FaultStrikes strikes) noexcept {
   return strikes <= FaultStrikes::kJoint;
 }
+/// Its words and its advice.
+[[nodiscard]] std::string sentence_of(FaultCause cause);
 /// Whether the joint's board is in trouble, and not its drive alone.
 [[nodiscard]] constexpr bool is_of_board(FaultCause cause) noexcept {
   return row_of(cause).strikes == FaultStrikes::kBoard;

@@ -70,7 +70,7 @@ std::string text_of(const FaultRecord& record, const FaultContext& about) {
   if (log::event_of(record.cause) == log::EventKind::kFell) {
     return fall_text({record.cause, record.index}, about.config.fall);
   }
-  return fmt::format(fmt::runtime(hal::row_of(record.cause).words), fmt::arg("code", record.code),
+  return fmt::format(fmt::runtime(hal::sentence_of(record.cause)), fmt::arg("code", record.code),
                      fmt::arg("detail", detail_of(record, about)));
 }
 

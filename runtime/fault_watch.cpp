@@ -13,6 +13,12 @@ bool drive_in_fault(const hal::StateImage& state, std::size_t joint) noexcept TA
          state.fault()[joint] != 0;
 }
 
+/// Of a joint, what is heavier is news. A stop that is not obeyed is, of one in fault, too.
+int weight_of(hal::FaultCause cause) noexcept TANDEM_RT {
+  if (cause == hal::FaultCause::kNone) return 0;
+  return cause == hal::FaultCause::kIgnoresStop ? 2 : 1;
+}
+
 }  // namespace
 
 FaultWatch::FaultWatch(const hal::RobotConfig& robot, const hal::Backend& backend,
@@ -21,7 +27,7 @@ FaultWatch::FaultWatch(const hal::RobotConfig& robot, const hal::Backend& backen
       backend_(&backend),
       lost_after_cycles_(lost_after_cycles),
       fall_(fall),
-      joint_told_(robot.joints.size()),
+      joint_told_(robot.joints.size(), hal::FaultCause::kNone),
       code_told_(robot.joints.size()),
       sensor_told_(robot.sensors.size()) {}
 
@@ -29,29 +35,25 @@ bool FaultWatch::is_ill(const hal::StateImage& state, std::size_t joint) const n
   return drive_in_fault(state, joint) || state.age_cycles()[joint] > lost_after_cycles_;
 }
 
-/// A stop that is not obeyed is news of a joint that was in fault before, too.
-FaultWatch::Told FaultWatch::found(const hal::StateImage& state, std::size_t joint) const noexcept {
-  if (!is_ill(state, joint)) return kNothing;
-  const bool disobeys =
-      state.fault()[joint] != 0 && backend_->fault_cause(joint) == hal::FaultCause::kIgnoresStop;
-  return disobeys ? kDisobedient : kFault;
+hal::FaultCause FaultWatch::found(const hal::StateImage& state, std::size_t joint) const noexcept {
+  if (drive_in_fault(state, joint)) return backend_->fault_cause(joint);
+  return is_ill(state, joint) ? hal::FaultCause::kJointLost : hal::FaultCause::kNone;
 }
 
 std::optional<FaultRecord> FaultWatch::next_joint(const hal::StateImage& state) noexcept TANDEM_RT {
   for (std::size_t j = 0; j < joint_told_.size(); ++j) {
-    const Told now = found(state, j);
+    const hal::FaultCause now = found(state, j);
     const std::uint32_t code = state.fault()[j];
-    const bool another = now == kFault && code_told_[j] != 0 && code != 0 && code != code_told_[j];
-    if (now <= joint_told_[j] && !another) continue;
+    const bool another =
+        weight_of(now) == 1 && code_told_[j] != 0 && code != 0 && code != code_told_[j];
+    if (weight_of(now) <= weight_of(joint_told_[j]) && !another) continue;
     joint_told_[j] = now;
     code_told_[j] = code;
     joint_in_fault_ = true;
-    const bool faulted = drive_in_fault(state, j);
-    const auto cause = faulted ? backend_->fault_cause(j) : hal::FaultCause::kJointLost;
     return FaultRecord{.index = static_cast<std::int32_t>(j),
-                       .code = faulted ? code : state.age_cycles()[j],
-                       .cause = cause,
-                       .category = robot_->category_of(j, cause)};
+                       .code = now == hal::FaultCause::kJointLost ? state.age_cycles()[j] : code,
+                       .cause = now,
+                       .category = robot_->category_of(j, now)};
   }
   return std::nullopt;
 }
@@ -60,8 +62,8 @@ std::optional<FaultRecord> FaultWatch::next_disobedient(
     const hal::StateImage& state) noexcept TANDEM_RT {
   for (std::size_t j = 0; j < joint_told_.size(); ++j) {
     constexpr auto kCause = hal::FaultCause::kIgnoresStop;
-    if (joint_told_[j] == kDisobedient || backend_->fault_cause(j) != kCause) continue;
-    joint_told_[j] = kDisobedient;
+    if (joint_told_[j] == kCause || backend_->fault_cause(j) != kCause) continue;
+    joint_told_[j] = kCause;
     joint_in_fault_ = true;
     return FaultRecord{.index = static_cast<std::int32_t>(j),
                        .code = state.fault()[j],
@@ -122,20 +124,21 @@ void FaultWatch::reset(const hal::StateImage& state) noexcept TANDEM_RT {
   joint_in_fault_ = false;
   for (std::size_t j = 0; j < joint_told_.size(); ++j) {
     joint_told_[j] = found(state, j);
-    code_told_[j] = joint_told_[j] == kNothing ? 0 : state.fault()[j];
-    joint_in_fault_ = joint_in_fault_ || joint_told_[j] != 0;
+    const bool in_fault = weight_of(joint_told_[j]) > 0;
+    code_told_[j] = in_fault ? state.fault()[j] : 0;
+    joint_in_fault_ = joint_in_fault_ || in_fault;
   }
 }
 
 void FaultWatch::forget(std::size_t joint) noexcept TANDEM_RT {
-  joint_told_[joint] = kNothing;
+  joint_told_[joint] = hal::FaultCause::kNone;
   code_told_[joint] = 0;
-  joint_in_fault_ = std::ranges::any_of(joint_told_, [](auto told) { return told != kNothing; });
+  joint_in_fault_ = std::ranges::any_of(joint_told_, [](auto told) { return weight_of(told) > 0; });
 }
 
 bool FaultWatch::is_there(const FaultRecord& record) const noexcept TANDEM_RT {
   const auto index = static_cast<std::size_t>(record.index);
-  if (hal::is_of_drive(record.cause)) return joint_told_[index] != 0;
+  if (hal::is_of_drive(record.cause)) return weight_of(joint_told_[index]) > 0;
   if (record.cause == hal::FaultCause::kSensorLost) return sensor_told_[index] != 0;
   return is_of_link(record) && link_lost_;
 }
