@@ -13,10 +13,15 @@ bool drive_in_fault(const hal::StateImage& state, std::size_t joint) noexcept TA
          state.fault()[joint] != 0;
 }
 
-/// Of a joint, what is heavier is news. A stop that is not obeyed is, of one in fault, too.
+/// Shares of a winding's limit: where it is hot, and where it is not any more.
+constexpr double kHotShare = 0.9, kCooledShare = 0.85;
+
+constexpr int kWarning = 1, kFault = 2, kDisobedient = 3;
+
+/// What is heavier is news of a joint. A stop that is not obeyed is, of one in fault, too.
 int weight_of(hal::FaultCause cause) noexcept TANDEM_RT {
-  if (cause == hal::FaultCause::kNone) return 0;
-  return cause == hal::FaultCause::kIgnoresStop ? 2 : 1;
+  if (cause == hal::FaultCause::kIgnoresStop) return kDisobedient;
+  return hal::is_of_drive(cause) ? kFault : cause == hal::FaultCause::kHot ? kWarning : 0;
 }
 
 }  // namespace
@@ -37,7 +42,11 @@ bool FaultWatch::is_ill(const hal::StateImage& state, std::size_t joint) const n
 
 hal::FaultCause FaultWatch::found(const hal::StateImage& state, std::size_t joint) const noexcept {
   if (drive_in_fault(state, joint)) return backend_->fault_cause(joint);
-  return is_ill(state, joint) ? hal::FaultCause::kJointLost : hal::FaultCause::kNone;
+  if (is_ill(state, joint)) return hal::FaultCause::kJointLost;
+  const double share = joint_told_[joint] == hal::FaultCause::kHot ? kCooledShare : kHotShare;
+  const double limit_C = robot_->joints[joint].drive.temperature_limit_C;  // NaN: not known
+  return limit_C > 0.0 && state.temperature_C()[joint] >= share * limit_C ? hal::FaultCause::kHot
+                                                                          : hal::FaultCause::kNone;
 }
 
 std::optional<FaultRecord> FaultWatch::next_joint(const hal::StateImage& state) noexcept TANDEM_RT {
@@ -45,9 +54,18 @@ std::optional<FaultRecord> FaultWatch::next_joint(const hal::StateImage& state) 
     const hal::FaultCause now = found(state, j);
     const std::uint32_t code = state.fault()[j];
     const bool another =
-        weight_of(now) == 1 && code_told_[j] != 0 && code != 0 && code != code_told_[j];
+        weight_of(now) == kFault && code_told_[j] != 0 && code != 0 && code != code_told_[j];
+    if (now == hal::FaultCause::kNone && weight_of(joint_told_[j]) == kWarning) {
+      joint_told_[j] = now;  // it has cooled down: the next time is news
+    }
     if (weight_of(now) <= weight_of(joint_told_[j]) && !another) continue;
     joint_told_[j] = now;
+    if (now == hal::FaultCause::kHot) {
+      return FaultRecord{
+          .index = static_cast<std::int32_t>(j),
+          .code = static_cast<std::uint32_t>(std::min(state.temperature_C()[j], 1e6)),
+          .cause = now};
+    }
     code_told_[j] = code;
     joint_in_fault_ = true;
     return FaultRecord{.index = static_cast<std::int32_t>(j),
@@ -124,7 +142,7 @@ void FaultWatch::reset(const hal::StateImage& state) noexcept TANDEM_RT {
   joint_in_fault_ = false;
   for (std::size_t j = 0; j < joint_told_.size(); ++j) {
     joint_told_[j] = found(state, j);
-    const bool in_fault = weight_of(joint_told_[j]) > 0;
+    const bool in_fault = weight_of(joint_told_[j]) >= kFault;
     code_told_[j] = in_fault ? state.fault()[j] : 0;
     joint_in_fault_ = joint_in_fault_ || in_fault;
   }
@@ -133,12 +151,14 @@ void FaultWatch::reset(const hal::StateImage& state) noexcept TANDEM_RT {
 void FaultWatch::forget(std::size_t joint) noexcept TANDEM_RT {
   joint_told_[joint] = hal::FaultCause::kNone;
   code_told_[joint] = 0;
-  joint_in_fault_ = std::ranges::any_of(joint_told_, [](auto told) { return weight_of(told) > 0; });
+  joint_in_fault_ =
+      std::ranges::any_of(joint_told_, [](auto told) { return weight_of(told) >= kFault; });
 }
 
 bool FaultWatch::is_there(const FaultRecord& record) const noexcept TANDEM_RT {
   const auto index = static_cast<std::size_t>(record.index);
-  if (hal::is_of_drive(record.cause)) return weight_of(joint_told_[index]) > 0;
+  if (hal::is_of_drive(record.cause)) return weight_of(joint_told_[index]) >= kFault;
+  if (record.cause == hal::FaultCause::kHot) return joint_told_[index] == record.cause;
   if (record.cause == hal::FaultCause::kSensorLost) return sensor_told_[index] != 0;
   return is_of_link(record) && link_lost_;
 }
