@@ -24,23 +24,16 @@ constexpr double kHotShare = 0.9;           // of the winding's limit
 using KeyValue = diagnostic_msgs_msg_dds__KeyValue_;
 using StatusMessage = diagnostic_msgs_msg_dds__DiagnosticStatus_;
 
-std::vector<double> temperature_limits(const hal::RobotConfig& robot) {
-  std::vector<double> limits;
-  for (const hal::JointConfig& joint : robot.joints) {
-    const auto actuator =
-        std::ranges::find(robot.actuators, joint.actuator, &hal::ActuatorConfig::name);
-    limits.push_back(actuator == robot.actuators.end() ? std::numeric_limits<double>::infinity()
-                                                       : actuator->temperature_limit_C);
+/// The newest fault of `name` that is latched, a warning only where there is nothing else; null:
+/// there is none.
+const FaultEntry* latched(const std::vector<FaultEntry>& faults, const std::string& name) {
+  const FaultEntry* found = nullptr;
+  for (const FaultEntry& fault : faults) {
+    if (!fault.latched || fault.joint != name) continue;
+    const bool warns = fault.category == hal::StopCategory::kWarn;
+    if (found == nullptr || !warns || found->category == hal::StopCategory::kWarn) found = &fault;
   }
-  return limits;
-}
-
-/// Text of the newest fault of `name` that is latched; empty: there is none.
-std::string latched_text(const std::vector<FaultEntry>& faults, const std::string& name) {
-  for (auto fault = faults.rbegin(); fault != faults.rend(); ++fault) {
-    if (fault->latched && fault->joint == name) return fault->text;
-  }
-  return {};
+  return found;
 }
 
 std::string percentiles(const rt::Histogram& histogram) {
@@ -76,8 +69,7 @@ class DiagnosticTopics final : public TopicGroup {
 
   const hal::RobotConfig& robot_;
   std::string hal_, no_frame_;
-  std::vector<hal::MotorFeedback> tells_;    // of each joint's drive
-  std::vector<double> temperature_limit_C_;  // of each joint's winding
+  std::vector<hal::MotorFeedback> tells_;  // of each joint's drive
   std::uint64_t told_overruns_ = 0, told_dropped_ = 0;
   Output<diagnostic_msgs::DiagnosticArray> output_;
 };
@@ -86,7 +78,6 @@ DiagnosticTopics::DiagnosticTopics(OutputMaker& maker, const RunDescription& run
     : robot_(run.robot),
       hal_(run.hal),
       tells_(hal::motor_feedback(run.robot)),
-      temperature_limit_C_(temperature_limits(run.robot)),
       output_(
           maker.periodic<diagnostic_msgs::DiagnosticArray>(Topic::kDiagnostics, "diagnostics")) {}
 
@@ -166,18 +157,21 @@ HealthStatus DiagnosticTopics::joint(const CycleSample& sample, std::size_t inde
   if (homing != hal::HomingState::kNone) {
     status.values.push_back({"homing", hal::to_string(homing)});
   }
-  const std::string fault = latched_text(sample.faults, config.name);
-  if (state.fault()[index] != 0 || !fault.empty()) {
-    status.level = Level::kError;
-    status.message = fault.empty() ? fmt::format("fault 0x{:04X}", state.fault()[index]) : fault;
+  const FaultEntry* const fault = latched(sample.faults, config.name);
+  if (state.fault()[index] != 0 || fault != nullptr) {
+    const bool warns = state.fault()[index] == 0 && age <= kStaleCycles &&
+                       fault->category == hal::StopCategory::kWarn;
+    status.level = warns ? Level::kWarn : Level::kError;
+    status.message =
+        fault == nullptr ? fmt::format("fault 0x{:04X}", state.fault()[index]) : fault->text;
   } else if (drive == hal::DriveState::kUnknown || age > kStaleCycles) {
     status.level = Level::kStale;
     status.message = fmt::format("no feedback for {} cycles", age);
   } else if (tells_[index].temperature &&
-             temperature_C >= kHotShare * temperature_limit_C_[index]) {
+             temperature_C >= kHotShare * config.drive.temperature_limit_C) {
     status.level = Level::kWarn;
     status.message = fmt::format("the winding is hot: {:.0f} of at most {:.0f} C", temperature_C,
-                                 temperature_limit_C_[index]);
+                                 config.drive.temperature_limit_C);
   } else if (drive == hal::DriveState::kQuickStopActive) {
     status.level = Level::kWarn;
   } else if (homing == hal::HomingState::kNotHomed && config.homing && config.homing->required) {
@@ -195,10 +189,9 @@ HealthStatus DiagnosticTopics::sensor(const CycleSample& sample, std::size_t ind
                       .message = "fresh",
                       .hardware_id = fmt::format("{} node {}", config.bus, config.node_id),
                       .values = {{"age [cycles]", std::to_string(age)}}};
-  const std::string fault = latched_text(sample.faults, config.name);
-  if (!fault.empty()) {
+  if (const FaultEntry* const fault = latched(sample.faults, config.name); fault != nullptr) {
     status.level = Level::kError;
-    status.message = fault;
+    status.message = fault->text;
   } else if (age > kStaleCycles) {
     status.level = Level::kStale;
     status.message = fmt::format("no feedback for {} cycles", age);

@@ -22,50 +22,34 @@ const char* to_string(Command command) noexcept {
   return number < kNames.size() ? kNames[number] : "?";
 }
 
-const char* to_string(WireError error) noexcept {
-  switch (error) {
-    case WireError::kNone: return "nothing";
-    case WireError::kTooShort: return "too short for a frame";
-    case WireError::kTooLong: return "longer than Ethernet allows";
-    case WireError::kNotEtherCat: return "not EtherCAT";
-    case WireError::kNotCommands: return "not of type 1";
-    case WireError::kLength: return "the header's length does not fit the frame";
-    case WireError::kCommand: return "unknown command";
-    case WireError::kTruncated: return "a datagram ends after the frame";
-    case WireError::kTrailing: return "bytes after the last datagram";
-    case WireError::kMissing: return "the announced datagram is missing";
-  }
-  return "unknown error";
-}
-
 FrameReader::FrameReader(std::span<std::uint8_t> frame) noexcept TANDEM_RT {
   if (frame.size() < kFrameHeaderBytes) {
-    refuse(WireError::kTooShort);
+    refuse(LineError::kTooShort);
     return;
   }
   if (frame.size() > kMaxFrameBytes) {
-    refuse(WireError::kTooLong);
+    refuse(LineError::kTooLong);
     return;
   }
   if (frame[12] != (kEtherType >> 8) || frame[13] != (kEtherType & 0xFF)) {
-    refuse(WireError::kNotEtherCat);
+    refuse(LineError::kNotEtherCat);
     return;
   }
   const auto header = canopen::get<std::uint16_t>(&frame[kEthernetHeaderBytes]);
   const std::size_t length = header & kLengthMask;
   if ((header & kTypeMask) != kTypeCommands) {
-    refuse(WireError::kNotCommands);
+    refuse(LineError::kNotCommands);
     return;
   }
   if (length < kDatagramOverhead || length > frame.size() - kFrameHeaderBytes) {
-    refuse(WireError::kLength);
+    refuse(LineError::kLength);
     return;
   }
   left_ = frame.subspan(kFrameHeaderBytes, length);
   more_ = true;
 }
 
-bool FrameReader::refuse(WireError error) noexcept {
+bool FrameReader::refuse(LineError error) noexcept {
   error_ = error;
   left_ = {};
   more_ = false;
@@ -73,19 +57,19 @@ bool FrameReader::refuse(WireError error) noexcept {
 }
 
 bool FrameReader::next(Datagram& datagram) noexcept TANDEM_RT {
-  if (!more_) return left_.empty() ? false : refuse(WireError::kTrailing);
-  if (left_.empty()) return refuse(WireError::kMissing);
-  if (left_.size() < kDatagramOverhead) return refuse(WireError::kTruncated);
-  if (left_[0] >= kCommands) return refuse(WireError::kCommand);
+  if (!more_) return left_.empty() ? false : refuse(LineError::kTrailing);
+  if (left_.empty()) return refuse(LineError::kMissing);
+  if (left_.size() < kDatagramOverhead) return refuse(LineError::kTruncated);
+  if (left_[0] >= kCommands) return refuse(LineError::kCommand);
   const std::size_t length = canopen::get<std::uint16_t>(&left_[6]) & kLengthMask;
-  if (length + kDatagramOverhead > left_.size()) return refuse(WireError::kTruncated);
+  if (length + kDatagramOverhead > left_.size()) return refuse(LineError::kTruncated);
   datagram = Datagram(left_.first(length + kDatagramOverhead));
   left_ = left_.subspan(length + kDatagramOverhead);
   more_ = datagram.more();
   return true;
 }
 
-WireError check_frame(std::span<std::uint8_t> frame) noexcept TANDEM_RT {
+LineError check_frame(std::span<std::uint8_t> frame) noexcept TANDEM_RT {
   FrameReader reader(frame);
   Datagram datagram;
   while (reader.next(datagram)) {

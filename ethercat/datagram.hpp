@@ -9,6 +9,7 @@
 
 #include "base/realtime.hpp"
 #include "canopen/bytes.hpp"
+#include "ethercat/errors.hpp"
 
 // A frame (everything of EtherCAT is little-endian, everything of Ethernet is not):
 //   destination (6), source (6), 88 A4                                        Ethernet
@@ -64,22 +65,6 @@ inline constexpr std::uint8_t kCommands = 15;
 [[nodiscard]] constexpr bool is_logical(Command command) noexcept {
   return command == Command::kLrd || command == Command::kLwr || command == Command::kLrw;
 }
-
-/// What is wrong with bytes that were taken for a frame.
-enum class WireError : std::uint8_t {
-  kNone = 0,
-  kTooShort,     ///< no room for the headers
-  kTooLong,      ///< more than Ethernet carries
-  kNotEtherCat,  ///< another EtherType
-  kNotCommands,  ///< EtherCAT, but not type 1
-  kLength,       ///< the header's length is not there, or is too little for a datagram
-  kCommand,      ///< a datagram with a command that does not exist
-  kTruncated,    ///< a datagram is longer than what is left of the frame
-  kTrailing,     ///< bytes after the last datagram
-  kMissing,      ///< another datagram is announced, and none is there
-};
-/// The error in words.
-[[nodiscard]] const char* to_string(WireError error) noexcept;
 
 /// The address of a slave's register: by position or station in the low half, register above.
 [[nodiscard]] constexpr std::uint32_t register_address(std::uint16_t slave,
@@ -146,18 +131,18 @@ class FrameReader {
   /// The next datagram.
   /// @return false after the last one, and when error() is not kNone
   [[nodiscard]] bool next(Datagram& datagram) noexcept TANDEM_RT;
-  [[nodiscard]] WireError error() const noexcept { return error_; }
+  [[nodiscard]] LineError error() const noexcept { return error_; }
 
  private:
-  bool refuse(WireError error) noexcept;
+  bool refuse(LineError error) noexcept;
 
   std::span<std::uint8_t> left_;
-  WireError error_ = WireError::kNone;
+  LineError error_ = LineError::kNone;
   bool more_ = false;
 };
 
 /// What is wrong with a whole frame; kNone when every datagram can be read.
-[[nodiscard]] WireError check_frame(std::span<std::uint8_t> frame) noexcept TANDEM_RT;
+[[nodiscard]] LineError check_frame(std::span<std::uint8_t> frame) noexcept TANDEM_RT;
 
 /// Builds one frame in place.
 class FrameWriter {

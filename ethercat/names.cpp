@@ -1,5 +1,9 @@
 // States and status codes of the application layer in words.
+#include "ethercat/errors.hpp"
 #include "ethercat/registers.hpp"
+
+#include <cstddef>
+#include <iterator>
 
 namespace tandem::ethercat {
 
@@ -60,5 +64,25 @@ const char* to_string(AlCode code) noexcept {
   }
   return "unknown code";
 }
+
+namespace {
+struct LineErrorRow {
+  bool lasts;
+  const char* words;
+};
+constexpr LineErrorRow kLineErrors[] = {
+#define TANDEM_LINE_ERROR(name, lasts, words) {lasts, words},
+#include "ethercat/errors.inc"
+#undef TANDEM_LINE_ERROR
+};
+
+const LineErrorRow& row_of(LineError error) noexcept {
+  const auto row = static_cast<std::size_t>(error);  // bytes of a snapshot are anybody's
+  return kLineErrors[row < std::size(kLineErrors) ? row : 0];
+}
+}  // namespace
+
+const char* to_string(LineError error) noexcept { return row_of(error).words; }
+bool lasts(LineError error) noexcept TANDEM_RT { return row_of(error).lasts; }
 
 }  // namespace tandem::ethercat

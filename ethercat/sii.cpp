@@ -54,24 +54,24 @@ std::vector<std::uint8_t> managers(const Content& content) {
   return data;
 }
 
-Error read_name(Bytes strings, std::uint8_t number, std::string& name) {
-  if (strings.empty()) return Error::kContent;
+LineError read_name(Bytes strings, std::uint8_t number, std::string& name) {
+  if (strings.empty()) return LineError::kSiiContent;
   std::size_t at = 1;
   for (int left = strings[0], one = 1; left > 0; --left, ++one) {
-    if (at >= strings.size()) return Error::kContent;
+    if (at >= strings.size()) return LineError::kSiiContent;
     const std::size_t length = strings[at++];
-    if (length > strings.size() - at) return Error::kContent;
+    if (length > strings.size() - at) return LineError::kSiiContent;
     if (one == number) {
       name.assign(reinterpret_cast<const char*>(&strings[at - 1]) + 1, length);
     }
     at += length;
   }
-  return Error::kNone;
+  return LineError::kNone;
 }
 
-Error read_managers(Bytes data, std::vector<SyncManagerInfo>& out) {
-  if (data.size() % kManagerBytes != 0) return Error::kContent;
-  if (data.size() / kManagerBytes > kMaxSyncManagers) return Error::kContent;
+LineError read_managers(Bytes data, std::vector<SyncManagerInfo>& out) {
+  if (data.size() % kManagerBytes != 0) return LineError::kSiiContent;
+  if (data.size() / kManagerBytes > kMaxSyncManagers) return LineError::kSiiContent;
   out.clear();
   for (; !data.empty(); data = data.subspan(kManagerBytes)) {
     const std::uint8_t use = data[7];
@@ -81,7 +81,7 @@ Error read_managers(Bytes data, std::vector<SyncManagerInfo>& out) {
                    .enabled = (data[6] & 1) != 0,
                    .use = use <= 4 ? static_cast<SyncManagerUse>(use) : SyncManagerUse::kUnused});
   }
-  return Error::kNone;
+  return LineError::kNone;
 }
 
 /// The categories that we want, found in one walk.
@@ -89,36 +89,25 @@ struct Found {
   Bytes strings, general, managers;
 };
 
-Error find_categories(Bytes bytes, Found& found) {
+LineError find_categories(Bytes bytes, Found& found) {
   std::size_t at = 2 * kFixedWords;
   while (bytes.size() >= at + 2) {
     const auto type = static_cast<Category>(canopen::get<std::uint16_t>(&bytes[at]));
-    if (type == Category::kEnd) return Error::kNone;
-    if (bytes.size() < at + 4) return Error::kCategory;
+    if (type == Category::kEnd) return LineError::kNone;
+    if (bytes.size() < at + 4) return LineError::kSiiCategory;
     const std::size_t length = 2 * std::size_t{canopen::get<std::uint16_t>(&bytes[at + 2])};
     at += 4;
-    if (length > bytes.size() - at) return Error::kCategory;
+    if (length > bytes.size() - at) return LineError::kSiiCategory;
     const Bytes data = bytes.subspan(at, length);
     if (type == Category::kStrings) found.strings = data;
     if (type == Category::kGeneral) found.general = data;
     if (type == Category::kSyncManagers) found.managers = data;
     at += length;
   }
-  return Error::kCategory;
+  return LineError::kSiiCategory;
 }
 
 }  // namespace
-
-const char* to_string(Error error) noexcept {
-  switch (error) {
-    case Error::kNone: return "no error";
-    case Error::kTooShort: return "the SII is too short";
-    case Error::kCheckSum: return "the SII's check sum is wrong";
-    case Error::kCategory: return "the SII's categories have no end";
-    case Error::kContent: return "a category of the SII does not fit its own lengths";
-  }
-  return "unknown error";
-}
 
 std::uint8_t check_sum(Bytes settings) noexcept {
   unsigned crc = 0xFF;
@@ -159,11 +148,11 @@ std::vector<std::uint8_t> build(const Content& content) {
   return out;
 }
 
-Error parse(Bytes bytes, Content& content) {
+LineError parse(Bytes bytes, Content& content) {
   content.name.clear();  // and not the whole, which would free what a caller has reserved
   content.managers.clear();
-  if (bytes.size() < 2 * kFixedWords) return Error::kTooShort;
-  if (bytes[14] != check_sum(bytes)) return Error::kCheckSum;
+  if (bytes.size() < 2 * kFixedWords) return LineError::kSiiTooShort;
+  if (bytes[14] != check_sum(bytes)) return LineError::kSiiCheckSum;
   const auto word = [&](std::size_t at) { return canopen::get<std::uint16_t>(&bytes[2 * at]); };
   const auto wide = [&](std::size_t at) { return canopen::get<std::uint32_t>(&bytes[2 * at]); };
   content.alias = word(4);
@@ -173,11 +162,12 @@ Error parse(Bytes bytes, Content& content) {
       .out_start = word(24), .out_bytes = word(25), .in_start = word(26), .in_bytes = word(27)};
   content.protocols = word(28);
   Found found;
-  if (const Error error = find_categories(bytes, found); error != Error::kNone) return error;
+  if (const LineError error = find_categories(bytes, found); error != LineError::kNone)
+    return error;
   const std::uint8_t name = found.general.size() >= 4 ? found.general[3] : 0;
   if (name != 0) {
-    const Error error = read_name(found.strings, name, content.name);
-    if (error != Error::kNone) return error;
+    const LineError error = read_name(found.strings, name, content.name);
+    if (error != LineError::kNone) return error;
   }
   return read_managers(found.managers, content.managers);
 }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "ethercat/errors.hpp"
 #include "ethercat/registers.hpp"
 
 // Words of 16 bits. Fixed: 0-6 settings, 7 check sum of them, 8 vendor, 10 product, 12 revision,
@@ -74,17 +75,6 @@ struct Content {
   bool operator==(const Content&) const = default;
 };
 
-/// What is wrong with an SII.
-enum class Error : std::uint8_t {
-  kNone = 0,
-  kTooShort,  ///< it ends within the fixed part
-  kCheckSum,  ///< of the settings
-  kCategory,  ///< a category ends after the SII, or there is no last one
-  kContent,   ///< a category's own lengths do not fit it
-};
-/// The error in words.
-[[nodiscard]] const char* to_string(Error error) noexcept;
-
 /// The settings' check sum: CRC-8 with polynomial 07 and start value FF over the first 14 bytes.
 [[nodiscard]] std::uint8_t check_sum(std::span<const std::uint8_t> settings) noexcept;
 
@@ -92,6 +82,6 @@ enum class Error : std::uint8_t {
 [[nodiscard]] std::vector<std::uint8_t> build(const Content& content);
 /// Reads `bytes`; `content` is only complete after kNone. Allocates nothing when `content.name` has
 /// room for 255 characters and `content.managers` for kMaxSyncManagers.
-[[nodiscard]] Error parse(std::span<const std::uint8_t> bytes, Content& content);
+[[nodiscard]] LineError parse(std::span<const std::uint8_t> bytes, Content& content);
 
 }  // namespace tandem::ethercat::sii

@@ -35,13 +35,6 @@ enum class Phase : std::uint8_t {
   kFault,        ///< latched; `status_text()` says the cause
 };
 
-/// What no longer passes a link, as its operator's end sees it.
-enum class LinkLoss : std::uint8_t {
-  kNone,
-  kCommands,  ///< states come, of a robot that follows no newer command
-  kStates,    ///< nothing comes: of commands nothing is known
-};
-
 /// A robot: simulated, emulated behind a bus, or real.
 class Backend {
  public:
@@ -121,7 +114,9 @@ class Backend {
   /// time of a wire that has a clock. On the wall clock only.
   [[nodiscard]] virtual std::int64_t clock_shift_ns() const noexcept TANDEM_RT { return 0; }
   /// Loss on the link to a robot far away. A robot without one is heard in each cycle: kNone.
-  [[nodiscard]] virtual LinkLoss link_loss() const noexcept TANDEM_RT { return LinkLoss::kNone; }
+  [[nodiscard]] virtual FaultCause link_loss() const noexcept TANDEM_RT {
+    return FaultCause::kNone;
+  }
   /// The next fault that was injected and has begun since, for the log; kNone: no more. A robot
   /// that is not in this process reports nothing.
   [[nodiscard]] virtual InjectedFault next_injected() noexcept TANDEM_RT { return {}; }

@@ -54,7 +54,9 @@ class ForwardingBackend : public Backend {
   [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override {
     return to_->clock_shift_ns();
   }
-  [[nodiscard]] LinkLoss link_loss() const noexcept TANDEM_RT override { return to_->link_loss(); }
+  [[nodiscard]] FaultCause link_loss() const noexcept TANDEM_RT override {
+    return to_->link_loss();
+  }
   [[nodiscard]] InjectedFault next_injected() noexcept TANDEM_RT override {
     return to_->next_injected();
   }

@@ -4,6 +4,8 @@
 
 #include <cstdint>
 
+#include "hal/stop_category.hpp"
+
 namespace tandem::hal {
 
 enum class HomingState : std::uint8_t {
@@ -15,24 +17,9 @@ enum class HomingState : std::uint8_t {
 /// For JSON and tables: "none", "not homed", "under way", "homed".
 [[nodiscard]] const char* to_string(HomingState state) noexcept;
 
-/// Why the last homing did not find the joint's place.
-enum class HomingError : std::uint8_t {
-  kNone = 0,
-  kDrive,        ///< the drive says so: bit 13 of its statusword
-  kTimeout,      ///< its time was over
-  kMode,         ///< the drive did not go into the homing mode
-  kStopped,      ///< on request
-  kInterrupted,  ///< by a fault, a stop of the robot, or a drive that was switched off
-};
-/// "the drive reports a homing error"; empty for kNone.
-[[nodiscard]] const char* to_string(HomingError error) noexcept;
-
-/// What to do about it: "give homing.method …"; empty for kNone.
-[[nodiscard]] const char* next_step(HomingError error) noexcept;
-
 struct Homing {
   HomingState state = HomingState::kNone;
-  HomingError error = HomingError::kNone;  ///< of the last one
+  FaultCause error = FaultCause::kNone;  ///< why the last one did not find the joint's place
 };
 
 }  // namespace tandem::hal

@@ -25,20 +25,12 @@ struct PortView {
   std::span<const std::uint8_t> causes;  ///< (n) FaultCause of every joint in fault
 };
 
-/// Why an owner lost the robot.
-enum class OwnerLoss : std::uint8_t {
-  kNone,
-  kSilent,  ///< its lease has run out
-  kStale,   ///< its newest command answers too old a cycle
-  kLate,    ///< in lockstep: no command for this cycle in time
-};
-
 /// What the owner wants in a cycle. Pointers are good until the next exchange().
 struct RemoteCommand {
-  bool live = false;                  ///< `command` is to be followed
-  bool done = false;                  ///< it gives the robot back; live: with `command` as its last
-  bool ends_run = false;              ///< with `done`: nobody else is waited for
-  OwnerLoss loss = OwnerLoss::kNone;  ///< reported once
+  bool live = false;      ///< `command` is to be followed
+  bool done = false;      ///< it gives the robot back; live: with `command` as its last
+  bool ends_run = false;  ///< with `done`: nobody else is waited for
+  FaultCause loss = FaultCause::kNone;         ///< why the owner lost the robot, reported once
   StopCategory on_loss = StopCategory::kWarn;  ///< with `loss`: kWarn holds every joint
   StopCategory stop = StopCategory::kWarn;     ///< asked for since the last exchange()
   bool reset = false;                          ///< asked for since the last exchange()

@@ -1,11 +1,12 @@
-// Why a joint is in fault, and how the robot is stopped: the categories of IEC 60204-1, and two
-// that stop less.
+// What is wrong, and how the robot is stopped: the categories of IEC 60204-1, and two that stop
+// less.
 // Layer: hal.  Thread: any.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <string>
 
 namespace tandem::hal {
 
@@ -25,25 +26,48 @@ enum class StopCategory : std::uint8_t {
   return category != StopCategory::kCategory2 && category != StopCategory::kWarn;
 }
 
-/// Why a joint is in fault: a row each in hal/fault_causes.inc.
+/// What a fault's index counts. Drives and boards are of joints; a board is every joint of it.
+enum class FaultStrikes : std::uint8_t { kDrive, kBoard, kJoint, kSensor, kController, kRobot };
+
+/// What is wrong: a row each in hal/fault_causes.inc.
 enum class FaultCause : std::uint8_t {
-#define TANDEM_FAULT_CAUSE(name, whose, text, meaning) name,
+#define TANDEM_FAULT_CAUSE(name, strikes, category, event, number, brief, words, advice) name,
+#include "hal/fault_causes.inc"
+#undef TANDEM_FAULT_CAUSE
+  kNone = 0xFF
+};
+
+/// What follows from a cause's row; log::event_of() is its event.
+struct CauseRow {
+  FaultStrikes strikes = FaultStrikes::kRobot;
+  StopCategory category = StopCategory::kWarn;
+  std::uint32_t number = 0;
+  const char *brief = "", *words = "", *advice = "";
+};
+inline constexpr CauseRow kCauseRows[] = {
+#define TANDEM_FAULT_CAUSE(name, strikes, category, event, number, brief, words, advice) \
+  {FaultStrikes::strikes, StopCategory::category, number, brief, words, advice},
 #include "hal/fault_causes.inc"
 #undef TANDEM_FAULT_CAUSE
 };
 
+/// One without words for kNone, and for what a network or a snapshot may say.
+[[nodiscard]] constexpr CauseRow row_of(FaultCause cause) noexcept {
+  const auto row = static_cast<std::size_t>(cause);
+  return row < std::size(kCauseRows) ? kCauseRows[row] : CauseRow{};
+}
+[[nodiscard]] constexpr bool strikes_joint(FaultStrikes strikes) noexcept {
+  return strikes <= FaultStrikes::kJoint;
+}
+/// Its words and its advice.
+[[nodiscard]] std::string sentence_of(FaultCause cause);
 /// Whether the joint's board is in trouble, and not its drive alone.
 [[nodiscard]] constexpr bool is_of_board(FaultCause cause) noexcept {
-  constexpr bool drive = false;
-  constexpr bool board = true;
-  constexpr bool kOfBoard[] = {
-#define TANDEM_FAULT_CAUSE(name, whose, text, meaning) whose,
-#include "hal/fault_causes.inc"
-#undef TANDEM_FAULT_CAUSE
-  };
-  // One that comes over a network may be none.
-  return static_cast<std::size_t>(cause) < std::size(kOfBoard) &&
-         kOfBoard[static_cast<std::size_t>(cause)];
+  return row_of(cause).strikes == FaultStrikes::kBoard;
+}
+/// Whether the joint's drive or board is in trouble.
+[[nodiscard]] constexpr bool is_of_drive(FaultCause cause) noexcept {
+  return row_of(cause).strikes == FaultStrikes::kDrive || is_of_board(cause);
 }
 
 /// As the TOML has it: "category0".

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "base/realtime.hpp"
-#include "hal/homing.hpp"
 #include "log/cdr_writer.hpp"
 
 namespace tandem::log {
@@ -66,21 +65,16 @@ std::string for_cycles(const Event& event, const EventNames&) {
   return " for " + std::to_string(event.code) + " cycles";
 }
 
-std::string link(const Event& event, const EventNames&) {
-  return event.code == 1 ? ": the robot follows no command" : ": no state comes";
-}
-
-std::string homing(const Event& event, const EventNames&) {
-  return std::string(": ") + hal::to_string(static_cast<hal::HomingError>(event.code));
+std::string cause(const Event& event, const EventNames&) {
+  const hal::CauseRow row = hal::row_of(cause_of(event.kind, event.code));
+  const char* const why = *row.brief != 0 ? row.brief : row.words;
+  if (*why == 0) return "";
+  return (event.kind == EventKind::kEmergencyStop ? " " : ": ") + std::string(why);
 }
 
 std::string limited(const Event& event, const EventNames&) {
   return event.code == static_cast<std::uint32_t>(Code::kNotFinite) ? ": it was not finite"
                                                                     : ": it was out of range";
-}
-
-std::string emergency(const Event& event, const EventNames&) {
-  return event.code == 1 ? " by a signal" : event.code == 3 ? " by the watchdog" : " on request";
 }
 
 bool has_joint(const Event& event, const EventNames& names) {
@@ -100,16 +94,6 @@ std::string collision(const Event& event, const EventNames& names) {
                 of_joint ? "" : " of the base", force ? "force" : "torque", 1e-3 * event.code,
                 force ? "N" : "Nm");
   return torque;
-}
-
-std::string fall(const Event& event, const EventNames&) {
-  constexpr const char* kHow[] = {"",
-                                  ": its base is tilted",
-                                  ": its base is low",
-                                  ": its base is high",
-                                  ": no foot touches the ground",
-                                  ": a foot is below the ground"};
-  return event.code < std::size(kHow) ? kHow[event.code] : "";
 }
 
 struct EventRow {
@@ -137,8 +121,7 @@ std::string what_happened(const Event& event, const EventNames& names) {
   text += whose(event, names);
   const EventRow* row = row_of(event.kind);
   if (row == nullptr) return text;
-  // A motion's 0 is a unit, an emergency stop's a request: of others it says nothing.
-  const bool tells = event.code != 0 || row->detail == target || row->detail == emergency;
+  const bool tells = event.code != 0 || row->detail == target;  // a motion's 0 is a unit
   return tells ? text + row->detail(event, names) : text;
 }
 
@@ -147,6 +130,25 @@ std::string what_happened(const Event& event, const EventNames& names) {
 const char* to_string(EventKind kind) noexcept {
   const EventRow* row = row_of(kind);
   return row == nullptr ? "?" : row->words;
+}
+
+EventKind event_of(hal::FaultCause cause) noexcept TANDEM_RT {
+  static constexpr EventKind kEvents[] = {
+#define TANDEM_FAULT_CAUSE(name, strikes, category, event, number, brief, words, advice) \
+  EventKind::event,
+#include "hal/fault_causes.inc"
+#undef TANDEM_FAULT_CAUSE
+  };
+  const auto row = static_cast<std::size_t>(cause);  // bytes of a snapshot are anybody's
+  return row < std::size(kEvents) ? kEvents[row] : EventKind::kFault;
+}
+
+hal::FaultCause cause_of(EventKind kind, std::uint32_t number) noexcept {
+  for (std::size_t i = 0; i < std::size(hal::kCauseRows); ++i) {
+    const auto cause = static_cast<hal::FaultCause>(i);
+    if (event_of(cause) == kind && hal::kCauseRows[i].number == number) return cause;
+  }
+  return hal::FaultCause::kNone;
 }
 
 bool is_fault(EventKind kind) noexcept {

@@ -8,8 +8,10 @@
 #include <type_traits>
 #include <vector>
 
+#include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "hal/fault_kind.hpp"
+#include "hal/stop_category.hpp"
 #include "log/bytes.hpp"
 
 namespace tandem::log {
@@ -21,6 +23,10 @@ enum class EventKind : std::uint8_t {
 #undef TANDEM_EVENT
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
+/// The event of a cause of faults.
+[[nodiscard]] EventKind event_of(hal::FaultCause cause) noexcept TANDEM_RT;
+/// The cause that has `number` among those of `kind`; kNone: there is none.
+[[nodiscard]] hal::FaultCause cause_of(EventKind kind, std::uint32_t number) noexcept;
 /// Whether it is a fault, of whatever, or an emergency stop.
 [[nodiscard]] bool is_fault(EventKind kind) noexcept;
 struct Event;

@@ -63,9 +63,7 @@ void DriveResets::fail() noexcept TANDEM_RT {
 void DriveResets::clear_fault(std::size_t joint) noexcept TANDEM_RT {
   now_.watch.forget(joint);
   now_.faults.clear_latched(now_.time.time_ns, [joint](const FaultRecord& fault) {
-    const bool of_drive =
-        fault.source == FaultSource::kDrive || fault.source == FaultSource::kJointLost;
-    return of_drive && fault.index == static_cast<std::int32_t>(joint);
+    return hal::is_of_drive(fault.cause) && fault.index == static_cast<std::int32_t>(joint);
   });
 }
 

@@ -9,6 +9,7 @@
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
+#include "hal/stop_category.hpp"
 #include "hal/truth.hpp"
 
 namespace tandem::runtime {
@@ -25,11 +26,9 @@ struct FallLimits {
   std::int64_t airborne_ns = 1'000'000'000;        ///< no foot touches for so long
 };
 
-enum class FallKind : std::uint32_t { kNone = 0, kTilted, kLow, kHigh, kAirborne, kSunk };
-
 /// What was found, in whole thousandths: of a degree, a metre, a second.
 struct Fall {
-  FallKind kind = FallKind::kNone;
+  hal::FaultCause cause = hal::FaultCause::kNone;
   std::int32_t thousandths = 0;
 };
 

@@ -6,62 +6,31 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <iterator>
 #include <string>
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
-#include "hal/backend.hpp"
 #include "hal/stop_category.hpp"
-#include "log/event.hpp"
 
 namespace tandem::runtime {
-
-/// A row each in runtime/fault_sources.inc.
-enum class FaultSource : std::uint8_t {
-#define TANDEM_FAULT(name, strikes, event, text, meaning) name,
-#include "runtime/fault_sources.inc"
-#undef TANDEM_FAULT
-};
-
-/// What a FaultRecord's `index` counts.
-enum class FaultStrikes : std::uint8_t { kRobot, kJoint, kSensor, kController };
-
-/// What follows from a fault's row.
-struct SourceRow {
-  FaultStrikes strikes;
-  log::EventKind event;
-};
-
-[[nodiscard]] constexpr SourceRow row_of(FaultSource source) noexcept TANDEM_RT {
-  constexpr SourceRow kRows[] = {
-#define TANDEM_FAULT(name, strikes, event, text, meaning) \
-  {FaultStrikes::strikes, log::EventKind::event},
-#include "runtime/fault_sources.inc"
-#undef TANDEM_FAULT
-  };
-  const auto row = static_cast<std::size_t>(source);  // bytes of a snapshot are anybody's
-  return row < std::size(kRows) ? kRows[row]
-                                : SourceRow{FaultStrikes::kRobot, log::EventKind::kFault};
-}
-
-/// Where an emergency stop came from. That of a board's input is a fault of its drives.
-enum class EmergencyInput : std::uint32_t {
-  kSignal = 1,
-  kRequest = 2,
-  kWatchdog = 3,  ///< the loop hung, in the controller `index`; -1: in none
-};
 
 struct FaultRecord {
   std::uint64_t cycle = 0;
   std::int64_t time_ns = 0;
-  std::int32_t index = -1;  ///< joint, sensor or controller, as the source says
-  std::uint32_t code = 0;
-  FaultSource source = FaultSource::kBackend;
-  hal::FaultCause cause = hal::FaultCause::kDrive;  ///< kDrive only
-  hal::StopCategory category = hal::StopCategory::kWarn;
-  std::uint8_t padding[5] = {};
+  /// Joint, sensor or controller, as the cause's row says. A collision of the base: -1 - k, k of
+  /// estimation::kBaseChannels; a fall: thousandths of what was found.
+  std::int32_t index = -1;
+  std::uint32_t code = 0;  ///< of a drive, a controller or the backend, an age: as the row says
+  hal::FaultCause cause = hal::FaultCause::kBackend;
+  hal::StopCategory category = hal::row_of(cause).category;
+  std::uint8_t padding[6] = {};
 };
+
+/// Whether it is of the link to a robot far away.
+[[nodiscard]] constexpr bool is_of_link(const FaultRecord& record) noexcept {
+  return record.cause == hal::FaultCause::kLinkCommands ||
+         record.cause == hal::FaultCause::kLinkStates;
+}
 
 /// Every fault of a run, in the order of their times. What does not fit is counted.
 class FaultLog {

@@ -7,27 +7,17 @@ namespace tandem::runtime {
 using hal::StopCategory;
 using log::EventKind;
 
-void FaultResponse::emergency_stop(EmergencyInput input, StopCategory category,
-                                   std::int32_t controller) noexcept TANDEM_RT {
-  now_.event(EventKind::kEmergencyStop, -1, static_cast<std::uint32_t>(input));
-  raise({.index = controller,
-         .code = static_cast<std::uint32_t>(input),
-         .source = FaultSource::kEmergencyStop,
-         .category = category});
-}
-
 void FaultResponse::raise(FaultRecord record) noexcept TANDEM_RT {
-  const SourceRow row = row_of(record.source);
+  const hal::CauseRow row = hal::row_of(record.cause);
   record.cycle = now_.time.cycle;
   record.time_ns = now_.time.time_ns;
-  if (record.source != FaultSource::kEmergencyStop) {
-    const bool of_joint = row.strikes == FaultStrikes::kJoint;
-    const bool of_base = of_joint && record.index < 0;
-    const bool by_value = row.strikes == FaultStrikes::kSensor || of_base;
-    now_.log.event(now_.time, row.event, of_joint && !of_base ? record.index : -1, record.code,
-                   by_value ? static_cast<float>(record.index) : 0.0F,
-                   record.category == StopCategory::kWarn);
-  }
+  const bool of_joint = hal::strikes_joint(row.strikes);
+  const bool of_base = of_joint && record.index < 0;
+  const bool by_value = row.strikes == hal::FaultStrikes::kSensor || of_base;
+  now_.log.event(now_.time, log::event_of(record.cause), of_joint && !of_base ? record.index : -1,
+                 row.number != 0 ? row.number : record.code,
+                 by_value ? static_cast<float>(record.index) : 0.0F,
+                 record.category == StopCategory::kWarn);
   if (record.category == StopCategory::kCategory2 && !now_.run.in(RunPhase::kRetreating) &&
       !retreat()) {
     record.category = StopCategory::kCategory1;  // nobody can
@@ -38,9 +28,7 @@ void FaultResponse::raise(FaultRecord record) noexcept TANDEM_RT {
 
 void FaultResponse::check_backend(Code code) noexcept TANDEM_RT {
   const auto stop = [&] {
-    raise({.code = static_cast<std::uint32_t>(code),
-           .source = FaultSource::kBackend,
-           .category = StopCategory::kCategory1});
+    raise({.code = static_cast<std::uint32_t>(code), .cause = hal::FaultCause::kBackend});
   };
   if (now_.run.in(RunPhase::kShutDown)) return;
   if (code == Code::kDiverged) {
@@ -59,9 +47,7 @@ void FaultResponse::check_link() noexcept TANDEM_RT {
   if (const auto lost = now_.watch.lost_link()) raise(*lost);
   if (!now_.watch.link_is_back()) return;
   now_.event(EventKind::kLinkBack);
-  now_.faults.clear_latched(now_.time.time_ns, [](const FaultRecord& fault) {
-    return fault.source == FaultSource::kLink;
-  });
+  now_.faults.clear_latched(now_.time.time_ns, is_of_link);
 }
 
 void FaultResponse::check_controllers(Code code) noexcept TANDEM_RT {
@@ -69,8 +55,7 @@ void FaultResponse::check_controllers(Code code) noexcept TANDEM_RT {
   if (code != Code::kOk && !done) {
     return raise({.index = static_cast<std::int32_t>(now_.controllers.failed_controller()),
                   .code = static_cast<std::uint32_t>(code),
-                  .source = FaultSource::kController,
-                  .category = StopCategory::kCategory1});
+                  .cause = hal::FaultCause::kController});
   }
   if (now_.run.in(RunPhase::kRetreating)) {  // to the posture, or until its time is over
     if (done || now_.run.time_is_over(now_.time.cycle)) react(StopCategory::kCategory1);

@@ -15,8 +15,6 @@ class FaultResponse {
 
   /// Notes a fault of this cycle, and carries out what its category says.
   void raise(FaultRecord record) noexcept TANDEM_RT;
-  void emergency_stop(EmergencyInput input, hal::StopCategory category,
-                      std::int32_t controller = -1) noexcept TANDEM_RT;
   /// What read() or write() of the backend answered. A missed sample shows as age, a lost command
   /// as the board's own time-out, and a drive's fault as its joint's: the joint's stop category
   /// decides then. All else stops the robot.

@@ -1,40 +1,19 @@
 // What users read of a fault: one sentence for each source, with the names of what it struck.
 #include "runtime/fault_text.hpp"
 
+#include <fmt/format.h>
+
 #include <cstdio>
-#include <iterator>
 
 #include "estimation/collision.hpp"
-#include "hal/remote_command.hpp"
+#include "log/event.hpp"
 
 namespace tandem::runtime {
 
+using hal::FaultCause;
+using hal::FaultStrikes;
+
 namespace {
-
-std::string emergency_text(const FaultRecord& record, const FaultContext&) {
-  switch (static_cast<EmergencyInput>(record.code)) {
-    case EmergencyInput::kSignal: return "emergency stop by a signal";
-    case EmergencyInput::kRequest: return "emergency stop on request";
-    case EmergencyInput::kWatchdog: return "emergency stop by the watchdog: the loop hung";
-  }
-  return {};
-}
-
-std::string owner_text(const FaultRecord& record, const FaultContext&) {
-  switch (static_cast<hal::OwnerLoss>(record.code)) {
-    case hal::OwnerLoss::kNone: return "the remote owner asked for a stop";
-    case hal::OwnerLoss::kSilent: return "the remote owner is gone: its lease has run out";
-    case hal::OwnerLoss::kStale: return "the remote owner's commands stopped, or came too late";
-    case hal::OwnerLoss::kLate: return "the remote owner gave no command for this cycle in time";
-  }
-  return {};
-}
-
-std::string link_text(const FaultRecord& record, const FaultContext&) {
-  if (static_cast<hal::LinkLoss>(record.code) == hal::LinkLoss::kStates)
-    return "the link is lost: no state of the robot comes";
-  return "the link is lost: states of the robot come, but it follows no command";
-}
 
 /// "12.3 Nm"
 std::string in_units(const FaultRecord& record, const FaultContext& about) {
@@ -51,84 +30,56 @@ std::string in_units(const FaultRecord& record, const FaultContext& about) {
   return text;
 }
 
-std::string not_homed_text(const FaultRecord& record, const FaultContext& about) {
-  const auto error = static_cast<hal::HomingError>(record.code);
+std::string not_homed(const FaultRecord& record, const FaultContext& about) {
   const auto& homing = about.robot.joints[static_cast<std::size_t>(record.index)].homing;
-  if (error == hal::HomingError::kNone || !homing) {
+  if (record.code == 0 || !homing) {
     return std::string("it was not homed, for which the controllers waited: tandem joint home") +
            (homing && homing->at_start ? ", or a longer run" : ", or homing.at_start = true");
   }
-  return "its homing (method " + std::to_string(homing->method) +
-         ") failed: " + hal::to_string(error) + "; " + hal::next_step(error);
+  const hal::CauseRow why = hal::row_of(log::cause_of(log::EventKind::kHomingFailed, record.code));
+  return fmt::format("its homing (method {}) failed: {}; {}", homing->method, why.words,
+                     why.advice);
 }
 
-std::string drive_text(const FaultRecord& record, const FaultContext& about) {
-  return about.backend.fault_text(record.cause, record.code);
-}
-
-std::string no_feedback(const FaultRecord& record, const FaultContext&) {
-  return "no feedback for " + std::to_string(record.code) + " cycles";
-}
-
-std::string no_sample(const FaultRecord& record, const FaultContext&) {
-  return "no sample for " + std::to_string(record.code) + " cycles";
-}
-
-std::string backend_text(const FaultRecord& record, const FaultContext&) {
-  return std::string("the robot answered ") + tandem::to_string(static_cast<Code>(record.code));
-}
-
-std::string controller_text(const FaultRecord& record, const FaultContext&) {
-  if (record.code > static_cast<std::uint32_t>(Code::kStopped)) {
-    return "the controller gave up, with a code that there is not: " + std::to_string(record.code);
+/// What the words of a cause have besides its code.
+std::string detail_of(const FaultRecord& record, const FaultContext& about) {
+  const bool is_code = record.code <= static_cast<std::uint32_t>(Code::kStopped);
+  const char* const code = is_code ? tandem::to_string(static_cast<Code>(record.code)) : "";
+  switch (record.cause) {
+    case FaultCause::kBackend: return code;
+    case FaultCause::kController:
+      return is_code ? std::string(": ") + code
+                     : ", with a code that there is not: " + std::to_string(record.code);
+    case FaultCause::kStray: return about.controllers.name(record.code);
+    case FaultCause::kOverrun:
+      return fmt::format("{} of the last {}", about.config.loop.stop_late,
+                         about.config.loop.stop_window);
+    case FaultCause::kCollision: {
+      const bool force = record.index < 0 && record.index > -4;
+      return std::string(force ? "force" : "torque") + " of " + in_units(record, about);
+    }
+    case FaultCause::kNotHomed: return not_homed(record, about);
+    default: return {};
   }
-  return std::string("the controller gave up: ") +
-         tandem::to_string(static_cast<Code>(record.code));
-}
-
-std::string command_text(const FaultRecord&, const FaultContext&) {
-  return "a controller's command was not a finite number";
-}
-
-std::string stray_text(const FaultRecord& record, const FaultContext& about) {
-  return "the controller '" + about.controllers.name(record.code) +
-         "' wrote to this joint, its mode or its gains without a claim, or what the joint cannot "
-         "do: taken back";
-}
-
-std::string overrun_text(const FaultRecord&, const FaultContext& about) {
-  return std::to_string(about.config.loop.stop_late) + " of the last " +
-         std::to_string(about.config.loop.stop_window) + " cycles were late";
-}
-
-std::string bring_up_text(const FaultRecord&, const FaultContext&) {
-  return "the drives were not enabled in time";
-}
-
-std::string collision_text(const FaultRecord& record, const FaultContext& about) {
-  const bool force = record.index < 0 && record.index > -4;
-  return std::string("collision: an external ") + (force ? "force" : "torque") + " of " +
-         in_units(record, about);
-}
-
-std::string fell_text(const FaultRecord& record, const FaultContext& about) {
-  return fall_text({static_cast<FallKind>(record.code), record.index}, about.config.fall);
 }
 
 std::string text_of(const FaultRecord& record, const FaultContext& about) {
-  static constexpr std::string (*kTexts[])(const FaultRecord&, const FaultContext&) = {
-#define TANDEM_FAULT(name, strikes, event, text, meaning) text,
-#include "runtime/fault_sources.inc"
-#undef TANDEM_FAULT
-  };
-  const auto row = static_cast<std::size_t>(record.source);
-  return row < std::size(kTexts) ? kTexts[row](record, about) : std::string();
+  if (hal::is_of_drive(record.cause) && record.cause != FaultCause::kJointLost) {
+    return about.backend.fault_text(record.cause, record.code);
+  }
+  if (log::event_of(record.cause) == log::EventKind::kFell) {
+    return fall_text({record.cause, record.index}, about.config.fall);
+  }
+  return fmt::format(fmt::runtime(hal::sentence_of(record.cause)), fmt::arg("code", record.code),
+                     fmt::arg("detail", detail_of(record, about)));
 }
 
 /// The joint, sensor or controller that the fault is about, and a joint's board.
 void name_it(const FaultRecord& record, const FaultContext& about, Fault& fault) {
   const auto index = static_cast<std::size_t>(record.index);
-  switch (row_of(record.source).strikes) {
+  switch (hal::row_of(record.cause).strikes) {
+    case FaultStrikes::kDrive:
+    case FaultStrikes::kBoard:
     case FaultStrikes::kJoint:
       if (record.index < 0) {
         fault.joint = "base";
@@ -138,12 +89,11 @@ void name_it(const FaultRecord& record, const FaultContext& about, Fault& fault)
       fault.board = about.robot.joints[index].board;
       break;
     case FaultStrikes::kSensor: fault.joint = about.robot.sensors[index].name; break;
-    case FaultStrikes::kController: fault.joint = about.controllers.name(index); break;
+    case FaultStrikes::kController:
+      if (record.index >= 0) fault.joint = about.controllers.name(index);
+      break;
     case FaultStrikes::kRobot: break;
   }
-  const bool hung = record.source == FaultSource::kEmergencyStop &&
-                    static_cast<EmergencyInput>(record.code) == EmergencyInput::kWatchdog;
-  if (hung && record.index >= 0) fault.joint = about.controllers.name(index);
 }
 
 }  // namespace

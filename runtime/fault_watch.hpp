@@ -74,17 +74,15 @@ class FaultWatch {
   }
 
  private:
-  /// What has been reported of a joint.
-  enum Told : std::uint8_t { kNothing = 0, kFault = 1, kDisobedient = 2 };
-
-  [[nodiscard]] Told found(const hal::StateImage& state, std::size_t joint) const noexcept;
+  [[nodiscard]] hal::FaultCause found(const hal::StateImage& state,
+                                      std::size_t joint) const noexcept;
 
   const hal::RobotConfig* robot_;
   const hal::Backend* backend_;
   std::uint32_t lost_after_cycles_;
   FallWatch fall_;
-  std::vector<std::uint8_t> joint_told_;  ///< a Told each
-  std::vector<std::uint32_t> code_told_;  ///< of a drive's fault; another one is news
+  std::vector<hal::FaultCause> joint_told_;  ///< kNone: nothing
+  std::vector<std::uint32_t> code_told_;     ///< of a drive's fault; another one is news
   std::vector<std::uint8_t> sensor_told_;
   bool joint_in_fault_ = false, link_lost_ = false;
 };

@@ -58,7 +58,7 @@ std::optional<std::size_t> JointHoming::next_ended() noexcept TANDEM_RT {
     if (!was_on || is_on(j)) continue;
     const bool homed = is.state == HomingState::kHomed;
     now_.event(homed ? EventKind::kHomed : EventKind::kHomingFailed, static_cast<std::int32_t>(j),
-               homed ? 0 : static_cast<std::uint32_t>(is.error));
+               homed ? 0 : hal::row_of(is.error).number);
     return j;
   }
   return std::nullopt;

@@ -59,33 +59,12 @@ struct LoopRequest {
   MoveRequest move{};
 };
 
-/// Why the loop did not do it. Nothing has changed then.
+/// Why the loop did not do it: a row each in runtime/refusals.inc. Nothing has changed then.
 enum class RejectReason : std::uint32_t {
-  kNone,        ///< it is done
-  kEnding,      ///< the run shuts down
-  kNotRunning,  ///< joints are held in this phase
-  kConflict,    ///< `joint` would be claimed by `one` and `other`
-  kGone,        ///< there is no such controller any more
-  kActive,      ///< `one` is active, or is not, as asked for already
-  kClaimed,     ///< `joint` is `one`'s
-  kIncapable,   ///< `joint` lacks the mode
-  kWithin,      ///< `joint` is within its limits
-  kOtherMode,   ///< `joint` is not in position control
-  kOutside,     ///< `joint` stands outside its limits
-  kBeyond,      ///< a value is beyond `joint`'s limits
-  kNotEnabled,  ///< nothing moves in this phase
-  kNotHeld,     ///< no reset holds controllers back
-  kRecovering,  ///< `joint`, which `one` claims, is on its way back to its limits
-  kResetting,   ///< the drive of `joint` is being reset
-  kNotNow,      ///< no drive is reset in this phase
-  kBoardLost,   ///< not the drive of `joint`, its board has to come back, with all its joints
-  kServed,      ///< another process resets the drives
-  kDriveFault,  ///< the drive of `joint` is in fault, or its board is lost
-  kNotHomed,    ///< `joint` has to be homed first
-  kHoming,      ///< `joint` is being homed
-  kHomedThere,  ///< another process homes the drives
-  kDisabled,    ///< the drive of `joint` is not enabled
-  kStopped,     ///< the robot was stopped in the same cycle
+  kNone,  ///< it is done
+#define TANDEM_REFUSAL(name, words, hint) name,
+#include "runtime/refusals.inc"
+#undef TANDEM_REFUSAL
 };
 
 struct LoopAnswer {

@@ -55,12 +55,10 @@ hal::RemoteCommand OwnerFollower::follow() noexcept TANDEM_RT {
   const bool stops_already =
       now_.run.in(RunPhase::kShutDown) && wish.stop >= StopCategory::kCategory1;
   if (wish.stop != StopCategory::kWarn && !stops_already) {
-    response_.raise({.source = FaultSource::kOwner, .category = wish.stop});
+    response_.raise({.cause = hal::FaultCause::kOwnerAsked, .category = wish.stop});
   }
-  if (wish.loss != hal::OwnerLoss::kNone && !now_.run.in(RunPhase::kShutDown)) {  // else it may
-    response_.raise({.code = static_cast<std::uint32_t>(wish.loss),               // leave
-                     .source = FaultSource::kOwner,
-                     .category = wish.on_loss});
+  if (wish.loss != hal::FaultCause::kNone && !now_.run.in(RunPhase::kShutDown)) {  // else it may
+    response_.raise({.cause = wish.loss, .category = wish.on_loss});               // leave
   }
   const bool ends = wish.done && wish.ends_run;
   if (ends && !wish.live && now_.run.in(RunPhase::kRunning) && is_active()) {

@@ -9,6 +9,7 @@
 
 namespace tandem::runtime {
 
+using hal::FaultCause;
 using hal::StopCategory;
 using log::EventKind;
 
@@ -115,7 +116,7 @@ void RobotCycle::check() noexcept TANDEM_RT {
     now_.event(EventKind::kOverrun, -1, static_cast<std::uint32_t>(tick.skipped));
   }
   if (tick.stop && !run.in(RunPhase::kFaulted) && !run.in(RunPhase::kShutDown)) {
-    response_.raise({.source = FaultSource::kOverrun, .category = StopCategory::kCategory1});
+    response_.raise({.cause = FaultCause::kOverrun});
   }
   if (now_.estimator != nullptr) now_.estimator->update(now_.state);
   if (!run.in(RunPhase::kBringUp) && !run.in(RunPhase::kShutDown)) {
@@ -152,7 +153,7 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
         waiting_.wait_for_homing();
         arbiter_.on(RunEvent::kEnabled, waiting_.any());
       } else if (over) {
-        response_.raise({.source = FaultSource::kBringUp, .category = StopCategory::kCategory1});
+        response_.raise({.cause = FaultCause::kBringUp});
       }
       break;
     case RunPhase::kSettling:
@@ -187,14 +188,17 @@ void RobotCycle::take_inbox() noexcept TANDEM_RT {
   const Inbox::Urgent asked = now_.inbox.take_urgent();
   const StopCategory declared = now_.robot.emergency_stop;
   if (asked.emergency_stop != StopCategory::kWarn) {
-    response_.emergency_stop(EmergencyInput::kRequest, asked.emergency_stop);
+    response_.raise({.cause = FaultCause::kByRequest, .category = asked.emergency_stop});
   }
   if (asked.by_watchdog) {
     // Not category 2: who hung cannot be trusted to retreat.
-    response_.emergency_stop(EmergencyInput::kWatchdog,
-                             std::min(declared, StopCategory::kCategory1), asked.controller);
+    response_.raise({.index = asked.controller,
+                     .cause = FaultCause::kByWatchdog,
+                     .category = std::min(declared, StopCategory::kCategory1)});
   }
-  if (rt::take_emergency_stop()) response_.emergency_stop(EmergencyInput::kSignal, declared);
+  if (rt::take_emergency_stop()) {
+    response_.raise({.cause = FaultCause::kBySignal, .category = declared});
+  }
   if (wish.reset) response_.begin_reset(wish.reset_cycle);
   if (asked.reset) response_.begin_reset(asked.known);
   const bool end = asked.end || rt::stop_requested();
@@ -214,7 +218,7 @@ void RobotCycle::update() noexcept TANDEM_RT {
   if (stray) {
     response_.raise({.index = static_cast<std::int32_t>(stray->joint),
                      .code = stray->controller,
-                     .source = FaultSource::kStray,
+                     .cause = FaultCause::kStray,
                      .category = now_.config.on_stray});
   }
   trace_.mark(CycleStage::kUpdate, now_.clock);
@@ -233,8 +237,7 @@ void RobotCycle::limit() noexcept TANDEM_RT {
     if (codes[j] == Code::kNotFinite && now_.run.controllers_run()) {
       response_.raise({.index = joint,
                        .code = static_cast<std::uint32_t>(codes[j]),
-                       .source = FaultSource::kCommand,
-                       .category = StopCategory::kCategory1});
+                       .cause = FaultCause::kCommand});
     }
   }
   trace_.mark(CycleStage::kLimit, now_.clock);
@@ -330,8 +333,8 @@ std::vector<Fault> RobotCycle::faults() const {
   for (std::size_t i = 0; i < out.size(); ++i) {
     const std::string status = out[i].latched ? now_.backend.status_text() : std::string();
     if (status.empty()) continue;
-    if (log[i].source == FaultSource::kBackend) out[i].text = status;
-    if (log[i].source == FaultSource::kBringUp) out[i].text += ": " + status;
+    if (log[i].cause == FaultCause::kBackend) out[i].text = status;
+    if (log[i].cause == FaultCause::kBringUp) out[i].text += ": " + status;
   }
   return out;
 }
@@ -339,10 +342,10 @@ std::vector<Fault> RobotCycle::faults() const {
 std::string RobotCycle::drive_fault(std::size_t joint, std::uint32_t code) const {
   if (code == 0) return {};
   const FaultLog& log = now_.faults;
-  hal::FaultCause cause = hal::FaultCause::kDrive;
+  FaultCause cause = FaultCause::kDrive;
   for (std::size_t i = 0; i < log.size(); ++i) {
-    const bool its =
-        log[i].source == FaultSource::kDrive && log[i].index == static_cast<std::int32_t>(joint);
+    const bool its = hal::is_of_drive(log[i].cause) && log[i].cause != FaultCause::kJointLost &&
+                     log[i].index == static_cast<std::int32_t>(joint);
     if (its && log.cleared_ns(i) == FaultLog::kLatched) cause = log[i].cause;
   }
   return now_.backend.fault_text(cause, code);

@@ -62,62 +62,15 @@ Words not_yet(RunPhase phase) {
   return {};
 }
 
-/// {0} is the joint; {1}, {2} the controllers that stand in the way; {3} the phase; {4} who asked.
-struct WordsOf {
-  RejectReason reason;
-  const char* message;
-  const char* hint;
-};
 using enum RejectReason;
-// clang-format off
-constexpr WordsOf kWords[]{
-    {kEnding, "the run shuts down", "start another run"},
-    {kNotRunning, "every joint is held until the controllers run",
-     "ask again in the phase running; after a fault: tandem fault reset first"},
-    {kConflict, "is claimed by the controllers '{1}' and '{2}'",
-     "stop one of them in the same switch"},
-    {kGone, "there is no such controller any more", "tandem controller list shows what is loaded"},
-    {kActive, "the controller '{1}' is active, or is not, already",
-     "tandem controller list shows which are"},
-    {kClaimed, "is claimed by the controller '{1}', which sets its mode",
-     "stop it first: tandem controller stop {1}"},
-    {kIncapable, "cannot be put into this mode", "its [gains] table lacks the loop"},
-    {kWithin, "is within its limits already, or on its way", "tandem joint list shows where it is"},
-    {kOtherMode, "is not in position control, which it needs for this",
-     "tandem joint set {0} --mode position"},
-    {kOutside, "stands outside its limits", "lead it back first: tandem joint recover {0}"},
-    {kBeyond, "cannot go there, or not at this speed", "its limits are in robot.toml"},
-    {kNotEnabled, "nothing is moved before the joints are enabled, or while a fault is latched",
-     "tandem fault reset, then ask again"},
-    {kNotHeld, "no controllers are held back by a reset", "name those to start"},
-    {kRecovering, "is on its way back to its limits, which {4} would end",
-     "ask again when it is inside: tandem joint list {0} shows where it is"},
-    {kResetting, "its drive is being reset", "ask again when that is over: tandem joint show {0}"},
-    {kNotNow, "its drive is not reset in the phase {3}",
-     "ask again when the run is faulted, held or running"},
-    {kBoardLost, "its board is lost, and would come back with all of its joints",
-     "tandem fault reset brings them back together"},
-    {kServed, "its drive is reset by the process that serves the robot",
-     "ask that one, or reset every drive: tandem fault reset"},
-    {kDriveFault, "its drive is in fault, or gives no feedback",
-     "see why: tandem joint show {0}; then tandem joint reset {0}"},
-    {kNotHomed, "has to be homed first: its position is not known", "tandem joint home {0}"},
-    {kHoming, "is being homed",
-     "ask again when that is over: tandem joint show {0}; tandem joint stop {0} ends it"},
-    {kHomedThere, "is homed by the process that serves the robot", "ask that one"},
-    {kDisabled, "its drive is not enabled", "tandem joint set {0} --mode position"},
-    {kStopped, "the robot was stopped in the same cycle, and a stop comes first",
-     "tandem fault reset, then ask again"},
+constexpr struct {
+  const char *message, *hint;
+} kWords[]{
+    {"", ""},
+#define TANDEM_REFUSAL(name, words, hint) {words, hint},
+#include "runtime/refusals.inc"
+#undef TANDEM_REFUSAL
 };
-// clang-format on
-constexpr bool has_a_row_of_each_reason() {
-  std::uint32_t next = 0;
-  for (const WordsOf& row : kWords) {
-    if (row.reason != static_cast<RejectReason>(++next)) return false;
-  }
-  return static_cast<RejectReason>(next) == kStopped;  // the last
-}
-static_assert(has_a_row_of_each_reason(), "a row of each, in the order of RejectReason");
 
 /// @param one, other  controllers that stand in the way; empty where there is none
 Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
@@ -136,7 +89,7 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
     if (Words yet = not_yet(phase); !yet.message.empty()) return yet;
   }
   const std::string who = one.empty() ? "this" : "the controller '" + one + "'";
-  const WordsOf& row = kWords[static_cast<std::size_t>(reason) - 1];
+  const auto& row = kWords[static_cast<std::size_t>(reason)];
   const auto filled = [&](const char* words) {
     return fmt::format(fmt::runtime(words), joint, one, other, to_string(phase), who);
   };

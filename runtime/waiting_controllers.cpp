@@ -35,7 +35,7 @@ std::optional<FaultRecord> WaitingControllers::home_at_start() noexcept TANDEM_R
     const hal::Homing is = homing_.of(joint);
     if (homing_.is_on(joint) || now_.controllers.references().recovers(joint)) return std::nullopt;
     if (!now_.robot.joints[joint].homing->at_start || is.state == HomingState::kHomed) continue;
-    const bool failed = is.error != hal::HomingError::kNone;
+    const bool failed = is.error != hal::FaultCause::kNone;
     homes_at_start_ = !failed && homing_.begin(joint).reason == RejectReason::kNone;
     if (homes_at_start_) {
       now_.event(log::EventKind::kHomingRequested, static_cast<std::int32_t>(joint));
@@ -60,9 +60,8 @@ std::optional<FaultRecord> WaitingControllers::unhomed() const noexcept TANDEM_R
 
 FaultRecord WaitingControllers::not_homed(std::size_t joint) const noexcept TANDEM_RT {
   return {.index = static_cast<std::int32_t>(joint),
-          .code = static_cast<std::uint32_t>(homing_.of(joint).error),
-          .source = FaultSource::kNotHomed,
-          .category = hal::StopCategory::kCategory1};
+          .code = hal::row_of(homing_.of(joint).error).number,
+          .cause = hal::FaultCause::kNotHomed};
 }
 
 LoopAnswer WaitingControllers::go_on() noexcept TANDEM_RT {

@@ -105,9 +105,9 @@ Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t ind
           {"fault_text", run.cycle.drive_fault(index, look.fault)},
           {"resetting", look.resetting != 0},
           {"homing", hal::to_string(look.homing.state)},
-          {"homing_error", hal::to_string(look.homing.error)},
+          {"homing_error", hal::row_of(look.homing.error).words},
           {"homing_method", homing ? Json(homing->method) : Json(nullptr)},
-          {"homing_advice", hal::next_step(look.homing.error)},
+          {"homing_advice", hal::row_of(look.homing.error).advice},
           {"age_cycles", look.age_cycles},
           {"feedback", feedback_of(look)},
           {"gains", std::move(gains)}};

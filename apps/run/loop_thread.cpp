@@ -52,18 +52,18 @@ class HomingNote {
     failures_.resize(robot.joints.size());
     const auto joints = cycle.services().joints();
     for (std::size_t j = 0; j < joints.size(); ++j) {
-      const hal::HomingError error = joints[j].look.homing.error;
-      if (std::exchange(failures_[j], error) == error || error == hal::HomingError::kNone) continue;
+      const hal::FaultCause error = joints[j].look.homing.error;
+      if (std::exchange(failures_[j], error) == error || error == hal::FaultCause::kNone) continue;
       restart_line(stderr);
       fmt::print(stderr,
                  "{}: the homing (method {}) failed: {}; {}; tandem joint home {} tries again\n",
                  joints[j].name, robot.joints[j].homing ? robot.joints[j].homing->method : 0,
-                 hal::to_string(error), hal::next_step(error), joints[j].name);
+                 hal::row_of(error).words, hal::row_of(error).advice, joints[j].name);
     }
   }
 
   bool told_ = false;
-  std::vector<hal::HomingError> failures_;  // by joint: of its last homing
+  std::vector<hal::FaultCause> failures_;  // by joint: of its last homing
 };
 
 /// Prints each warning when it happens; in a run that waits for its reset each fault, too.

@@ -23,7 +23,7 @@ std::size_t SlaveLine::reached() const noexcept {
 bool SlaveLine::pass(std::span<std::uint8_t> frame, std::int64_t now_ns) noexcept TANDEM_RT {
   const std::size_t count = reached();
   if (count == 0) return false;
-  if (ethercat::check_frame(frame) != ethercat::WireError::kNone) {
+  if (ethercat::check_frame(frame) != ethercat::LineError::kNone) {
     ++malformed_;
     return true;
   }

@@ -100,6 +100,10 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   JointConfig joint;
   joint.actuator = table.text("actuator");
   check_reference(table, "actuator", joint.actuator, robot.actuators, "actuator");
+  const auto motor = std::ranges::find(robot.actuators, joint.actuator, &ActuatorConfig::name);
+  if (motor != robot.actuators.end()) {
+    joint.drive.temperature_limit_C = motor->temperature_limit_C;
+  }
   joint.gains = table.text_or("gains", joint.actuator);
   read_limits(table, joint);
   joint.encoder_counts_per_rev = table.number_or("encoder_counts_per_rev", kUnset, kCounts);

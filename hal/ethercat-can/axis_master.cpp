@@ -21,6 +21,15 @@ bool is_stiff_position(const CommandImage& image, std::size_t joint) noexcept TA
          image.interaction()[joint] == static_cast<std::uint8_t>(InteractionMode::kStiff);
 }
 
+FaultCause cause_beyond(ErrorCode code) noexcept TANDEM_RT {
+  switch (code) {
+    case ErrorCode::kVelocityControl: return FaultCause::kTooFast;
+    case ErrorCode::kExcessTorque: return FaultCause::kTooStrong;
+    case ErrorCode::kExcessPower: return FaultCause::kTooPowerful;
+    default: return FaultCause::kSwings;
+  }
+}
+
 }  // namespace
 
 void AxisMaster::received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT {
@@ -55,34 +64,35 @@ bool AxisMaster::check(std::int64_t now_ns) noexcept TANDEM_RT {
   if (!heard_) return false;
   const WireState state = drive();
   const bool faulted = state == WireState::kFault || state == WireState::kFaultReactionActive;
-  if (error_ != AxisError::kNone) {
+  if (error_ != FaultCause::kNone) {
     // The error code may come later than the statusword, for it travels in the slow PDO. It may be
     // another one than at first: what is there now is what a reset has to do with.
-    if (error_ != AxisError::kNodeLost && faulted && feedback_.error_code != 0) {
-      error_ = AxisError::kDriveFault;
+    if (!is_of_board(error_) && faulted && feedback_.error_code != 0) {
+      error_ = FaultCause::kDrive;
       fault_code_ = feedback_.error_code;
     }
     return false;
   }
   if (faulted && target_ != TargetState::kReset && target_ != TargetState::kBringUp) {
     const std::uint16_t code = feedback_.error_code != 0 ? feedback_.error_code : emergency_code_;
-    latch(AxisError::kDriveFault,
-          code != 0 ? code : static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
+    latch(FaultCause::kDrive, code != 0 ? code : static_cast<std::uint16_t>(ErrorCode::kGeneric),
+          now_ns);
     return true;
   }
   const bool stays_enabled = target_ == TargetState::kFollow || target_ == TargetState::kHold ||
                              target_ == TargetState::kHome;
   if (was_enabled_ && state != WireState::kOperationEnabled && stays_enabled) {
-    latch(AxisError::kLeftEnabled, static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
+    latch(FaultCause::kLeftEnabled, static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
     return true;
   }
   if (lags(now_ns)) {
-    latch(AxisError::kNotFollowing, static_cast<std::uint16_t>(ErrorCode::kFollowingError), now_ns);
+    latch(FaultCause::kNotFollowing, static_cast<std::uint16_t>(ErrorCode::kFollowingError),
+          now_ns);
     return true;
   }
   const ErrorCode beyond = excess(now_ns);
   if (beyond == ErrorCode::kNone) return false;
-  latch(AxisError::kBeyondLimits, static_cast<std::uint16_t>(beyond), now_ns);
+  latch(cause_beyond(beyond), static_cast<std::uint16_t>(beyond), now_ns);
   return true;
 }
 
@@ -178,7 +188,7 @@ double AxisMaster::position_error_rad() const noexcept {
   return std::min(link_rad, outside(before_rad - wound_rad, last_rad - wound_rad));
 }
 
-void AxisMaster::latch(AxisError error, std::uint16_t code,
+void AxisMaster::latch(FaultCause error, std::uint16_t code,
                        std::int64_t now_ns) noexcept TANDEM_RT {
   error_ = error;
   asked_ = false;
@@ -286,7 +296,7 @@ std::int64_t AxisMaster::step_from(std::int32_t target) const noexcept TANDEM_RT
 }
 
 bool AxisMaster::home(std::int64_t timeout_ns, std::int64_t now_ns) noexcept TANDEM_RT {
-  const bool follows = target_ == TargetState::kFollow && error_ == AxisError::kNone && enabled();
+  const bool follows = target_ == TargetState::kFollow && error_ == FaultCause::kNone && enabled();
   const bool again = target_ == TargetState::kHome && !homing_.under_way();
   if (!traits_.homes || !(follows || again)) return false;
   target_ = TargetState::kHome;
@@ -421,12 +431,12 @@ void AxisMaster::seed() noexcept {
 }
 
 bool AxisMaster::enable_is_late(std::int64_t now_ns) noexcept {
-  const bool late = !was_enabled_ && !enabled() && error_ == AxisError::kNone &&
+  const bool late = !was_enabled_ && !enabled() && error_ == FaultCause::kNone &&
                     now_ns - since_ns_ >= kEnableTimeoutNs;
   if (!late) return false;
   const bool fault = drive() == WireState::kFault;
   const std::uint16_t code = feedback_.error_code;
-  latch(fault ? AxisError::kDriveFault : AxisError::kNotEnabled,
+  latch(fault ? FaultCause::kDrive : FaultCause::kNotEnabled,
         fault && code != 0 ? code : static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
   return true;
 }
@@ -470,7 +480,7 @@ void AxisMaster::fill(StateImage& state, std::size_t joint) const noexcept TANDE
   state.homing()[joint] = static_cast<std::uint8_t>(homing().state);
   state.acceleration_rad_s2()[joint] = acceleration_rad_s2_;
   state.age_cycles()[joint] = age_cycles_;
-  state.fault()[joint] = error_ != AxisError::kNone ? fault_code_ : 0u;
+  state.fault()[joint] = error_ != FaultCause::kNone ? fault_code_ : 0u;
 }
 
 void AxisMaster::forget() noexcept TANDEM_RT {
@@ -484,7 +494,7 @@ void AxisMaster::forget() noexcept TANDEM_RT {
 
 void AxisMaster::archive(Archive& ar) {
   ar(motion_, watched_error_rad_, watched_ns_, watched_mode_);
-  ar(homing_, was_idle_, held_cycles_, lag_, previous_target_, longest_step_, ignored_stop_, asked_,
+  ar(homing_, was_idle_, held_cycles_, lag_, previous_target_, longest_step_, asked_,
      disobedient_cycles_);
   ar(feedback_, raw_, target_, error_, heard_, was_enabled_, fault_code_, emergency_code_,
      age_cycles_, reset_cycles_, previous_velocity_, sample_ns_, trouble_ns_, since_ns_,

@@ -18,16 +18,11 @@
 
 namespace tandem::hal::can {
 
-/// Why an axis does not follow its command.
-enum class AxisError : std::uint8_t {
-  kNone = 0,
-  kDriveFault,    ///< the drive says so; the code is CiA 402's error code
-  kNotEnabled,    ///< it did not reach Operation Enabled in time
-  kLeftEnabled,   ///< it left Operation Enabled by itself
-  kNodeLost,      ///< its board is not in operation any more
-  kNotFollowing,  ///< its position stays away from its command
-  kBeyondLimits,  ///< it moves faster, harder or more to and fro than it may; the code says which
-};
+/// Whether the drive has no fault of its own, and can brake.
+[[nodiscard]] constexpr bool is_of_motion(FaultCause cause) noexcept {
+  return cause == FaultCause::kNotFollowing ||
+         (cause >= FaultCause::kTooFast && cause <= FaultCause::kSwings);
+}
 
 /// What a drive tells and can, where drives differ.
 struct AxisTraits {
@@ -121,13 +116,8 @@ class AxisMaster {
   bool check(std::int64_t now_ns) noexcept TANDEM_RT;
   /// Whether the drive stays enabled in spite of a stop: once a cycle, after received().
   [[nodiscard]] bool ignores_stop(std::int64_t now_ns) noexcept TANDEM_RT;
-  /// It did, before its board was lost for it.
-  [[nodiscard]] bool ignored_stop() const noexcept { return ignored_stop_; }
-  void latch_ignored_stop(std::uint16_t code, std::int64_t now_ns) noexcept TANDEM_RT {
-    latch(AxisError::kNodeLost, code, now_ns);
-    ignored_stop_ = true;
-  }
-  void latch(AxisError error, std::uint16_t code, std::int64_t now_ns) noexcept TANDEM_RT;
+  /// @param error  of a board: one of its causes; the node says which
+  void latch(FaultCause error, std::uint16_t code, std::int64_t now_ns) noexcept TANDEM_RT;
 
   void set_target(TargetState target, std::int64_t now_ns) noexcept TANDEM_RT;
   /// Homes an axis that follows. Afterwards, however it ends, the axis is held where it stands,
@@ -160,13 +150,10 @@ class AxisMaster {
   [[nodiscard]] bool in_reset() const noexcept TANDEM_RT;
   /// True when no torque can come from the drive any more.
   [[nodiscard]] bool off() const noexcept TANDEM_RT;
-  [[nodiscard]] AxisError error() const noexcept { return error_; }
+  [[nodiscard]] FaultCause error() const noexcept { return error_; }
   [[nodiscard]] std::uint16_t fault_code() const noexcept { return fault_code_; }
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
-  void clear_error() noexcept {
-    error_ = AxisError::kNone;
-    ignored_stop_ = false;
-  }
+  void clear_error() noexcept { error_ = FaultCause::kNone; }
   /// The node is configured anew: nothing of what was heard holds any more.
   void forget() noexcept TANDEM_RT;
 
@@ -178,7 +165,7 @@ class AxisMaster {
   [[nodiscard]] bool rests_in_quick_stop(std::int64_t now_ns) const noexcept TANDEM_RT;
   void walk_up(bool clears_faults, std::int64_t now_ns) noexcept;
   [[nodiscard]] bool unknown_cause() const noexcept TANDEM_RT {
-    return error_ == AxisError::kDriveFault &&
+    return error_ == FaultCause::kDrive &&
            fault_code_ == static_cast<std::uint16_t>(canopen::ErrorCode::kGeneric);
   }
   [[nodiscard]] std::uint16_t enable_operation() noexcept;
@@ -208,7 +195,7 @@ class AxisMaster {
   RawFeedback sample_;  ///< what has come of this cycle's sample; no state
   RawCommand raw_;
   TargetState target_ = TargetState::kNothing;
-  AxisError error_ = AxisError::kNone;
+  FaultCause error_ = FaultCause::kNone;
   HomingSequence homing_;
   FollowWatch lag_;
   MotionWatch motion_;
@@ -223,7 +210,6 @@ class AxisMaster {
   std::int64_t longest_step_ = 0;  ///< kHold: that the target may go in a cycle [counts]
   bool was_idle_ = false;          ///< kHome: the image has had the joint idle since
   bool heard_ = false;
-  bool ignored_stop_ = false;
   bool asked_ = false;        ///< for the cause of the fault that is latched
   bool was_enabled_ = false;  ///< reached Operation Enabled under the present wish to be
   std::uint16_t fault_code_ = 0;

@@ -133,7 +133,7 @@ void DriveMaster::Impl::watch_doubles(Node& node) noexcept TANDEM_RT {
   node.doubled_cycles = node.answers > 1 ? node.doubled_cycles + 1 : 0;
   node.answers = 0;
   if (node.master.running() && node.doubled_cycles > kDoubledCycles) {
-    node.master.fail(NodeError::kTwoNodes, now_ns);
+    node.master.fail(FaultCause::kTwoBoards, now_ns);
   }
 }
 
@@ -150,7 +150,7 @@ void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
   for (Node& node : nodes) {
     const bool waits = node.master.stage() == NodeStage::kWaitBootUp;
     if (waits && ports[node.plan.bus].bus->gives_up(node.plan.id)) {
-      node.master.fail(NodeError::kNoBootUp, now_ns);
+      node.master.fail(FaultCause::kNoBootUp, now_ns);
     }
     node.master.process(now_ns, dt_ns, ports[node.plan.bus].sink);
     const bool complete =
@@ -165,7 +165,7 @@ void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
     node.unanswered = complete || !node.master.running() ? 0 : node.unanswered + 1;
     if (node.timeout_cycles == 0) continue;
     if (node.unanswered > static_cast<std::uint32_t>(node.timeout_cycles)) {
-      node.master.fail(NodeError::kFeedbackLost, now_ns);
+      node.master.fail(FaultCause::kBoardSilent, now_ns);
     }
   }
   for (Node& node : nodes) stop_when_lost(node);

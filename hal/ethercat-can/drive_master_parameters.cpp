@@ -66,8 +66,8 @@ void DriveMaster::Impl::end_watch(Node& node) noexcept TANDEM_RT {
   const auto place = static_cast<std::size_t>(armed - master.steps().begin());
   // A start that failed has armed those that came so far; a node that is lost is to notice it.
   const bool lost = master.stage() == NodeStage::kDown &&
-                    master.error() != NodeError::kNotOperational &&
-                    master.error() != NodeError::kSdoAbort;
+                    master.error() != FaultCause::kNotOperational &&
+                    master.error() != FaultCause::kBoardRefused;
   const bool reached = master.running() || master.step() > place;
   if (lost || !reached || armed == master.steps().end() || !off) return;
   static constexpr std::array<std::uint8_t, 4> kNobody{};

@@ -30,33 +30,8 @@ constexpr std::int64_t kShutDownNs = 3'000'000'000;
 /// When a drive that was enabled, and is not heard any more, counts as still enabled there.
 constexpr std::int64_t kUnheardNs = 1'500'000'000;
 
-FaultCause node_cause(NodeError error) noexcept {
-  switch (error) {
-    case NodeError::kHeartbeatLost: return FaultCause::kHeartbeatLost;
-    case NodeError::kGuardingLost: return FaultCause::kGuardingLost;
-    case NodeError::kRebooted: return FaultCause::kBoardRebooted;
-    case NodeError::kLeftOperational: return FaultCause::kBoardStopped;
-    case NodeError::kWrongIdentity:
-    case NodeError::kSdoAbort:
-    case NodeError::kNotOperational: return FaultCause::kBoardRefused;
-    case NodeError::kTwoNodes: return FaultCause::kTwoBoards;
-    case NodeError::kIgnoresStop:  // of its joints that had obeyed
-    case NodeError::kNone:
-    case NodeError::kNoBootUp:
-    case NodeError::kFeedbackLost: return FaultCause::kBoardSilent;
-  }
-  return FaultCause::kBoardSilent;
-}
-
-FaultCause beyond_cause(std::uint16_t code) noexcept {
-  switch (static_cast<canopen::ErrorCode>(code)) {
-    case canopen::ErrorCode::kVelocityControl: return FaultCause::kTooFast;
-    case canopen::ErrorCode::kExcessTorque: return FaultCause::kTooStrong;
-    case canopen::ErrorCode::kExcessPower: return FaultCause::kTooPowerful;
-    default: return FaultCause::kSwings;
-  }
-}
-
+/// What an axis has whose board is lost, until its node says more.
+constexpr FaultCause kNodeLost = FaultCause::kBoardSilent;
 constexpr auto kNodeLostCode = static_cast<std::uint16_t>(canopen::ErrorCode::kHeartbeatLost);
 
 }  // namespace
@@ -104,13 +79,13 @@ void DriveMaster::Impl::enable_again() noexcept TANDEM_RT {
   }
   bool all = true;
   for (AxisMaster& axis : axes) {
-    if (axis.error() != AxisError::kNone) continue;  // "warn": the others go on without it
+    if (axis.error() != FaultCause::kNone) continue;  // "warn": the others go on without it
     axis.set_target(TargetState::kEnable, now_ns);
     all = all && axis.enabled();
   }
   if (!all) return;
   for (AxisMaster& axis : axes) {
-    if (axis.error() == AxisError::kNone) axis.set_target(TargetState::kFollow, now_ns);
+    if (axis.error() == FaultCause::kNone) axis.set_target(TargetState::kFollow, now_ns);
   }
   reaction = StopCategory::kWarn;
   stage = MasterStage::kRunning;
@@ -118,26 +93,25 @@ void DriveMaster::Impl::enable_again() noexcept TANDEM_RT {
 
 /// A joint whose category is "warn" never keeps the others from moving.
 bool DriveMaster::Impl::stands_in_the_way(std::size_t joint) const noexcept TANDEM_RT {
-  return axes[joint].error() != AxisError::kNone && category(joint) != StopCategory::kWarn;
+  return axes[joint].error() != FaultCause::kNone && category(joint) != StopCategory::kWarn;
 }
 
 FaultCause DriveMaster::Impl::cause(std::size_t joint) const noexcept TANDEM_RT {
   const AxisMaster& axis = axes[joint];
-  switch (axis.error()) {
-    case AxisError::kNone: break;
-    case AxisError::kDriveFault:
-      return axis.fault_code() == static_cast<std::uint16_t>(canopen::ErrorCode::kEmergencyInput)
-                 ? FaultCause::kEmergencyInput
-                 : FaultCause::kDrive;
-    case AxisError::kNotEnabled: return FaultCause::kNotEnabled;
-    case AxisError::kLeftEnabled: return FaultCause::kLeftEnabled;
-    case AxisError::kNotFollowing: return FaultCause::kNotFollowing;
-    case AxisError::kBeyondLimits: return beyond_cause(axis.fault_code());
-    case AxisError::kNodeLost:
-      if (axis.ignored_stop()) return FaultCause::kIgnoresStop;
-      return node_cause(nodes[joint_node[joint]].master.error());
+  constexpr auto kInput = static_cast<std::uint16_t>(canopen::ErrorCode::kEmergencyInput);
+  FaultCause cause = axis.error();
+  if (is_of_board(cause) && cause != FaultCause::kIgnoresStop) {
+    cause = nodes[joint_node[joint]].master.error();
+    // Links know fewer causes than the node: the rest is in its own text.
+    const bool refused =
+        cause == FaultCause::kWrongIdentity || cause == FaultCause::kNotOperational;
+    const bool known = cause != FaultCause::kNone && cause != FaultCause::kNoBootUp &&
+                       cause != FaultCause::kIgnoresStop;  // its joints that had obeyed
+    return refused ? FaultCause::kBoardRefused : known ? cause : kNodeLost;
   }
-  return FaultCause::kDrive;
+  if (cause == FaultCause::kDrive && axis.fault_code() == kInput)
+    return FaultCause::kEmergencyInput;
+  return cause == FaultCause::kNone ? FaultCause::kDrive : cause;
 }
 
 /// reset() is through when every joint follows again, or when nothing is under way any more and a
@@ -148,10 +122,10 @@ void DriveMaster::Impl::watch_reset() noexcept TANDEM_RT {
     const AxisMaster& axis = axes[joint];
     const Node& node = node_of(joint);
     const bool node_starts =
-        axis.error() == AxisError::kNodeLost && (node.recovering || node.master.running());
+        is_of_board(axis.error()) && (node.recovering || node.master.running());
     if (axis.target() == TargetState::kReset || node_starts) return;
     if (stage == MasterStage::kFaulted && stands_in_the_way(joint)) under_way = false;
-    if (stage == MasterStage::kRunning && axis.error() == AxisError::kNone &&
+    if (stage == MasterStage::kRunning && axis.error() == FaultCause::kNone &&
         axis.target() != TargetState::kFollow) {
       under_way = true;
     }
@@ -183,8 +157,8 @@ void DriveMaster::Impl::watch() noexcept TANDEM_RT {
     AxisMaster& axis = axes[joint];
     const Node& node = node_of(joint);
     bool is_new = false;
-    if (node.master.stage() == NodeStage::kDown && axis.error() != AxisError::kNodeLost) {
-      axis.latch(AxisError::kNodeLost, kNodeLostCode, now_ns);
+    if (node.master.stage() == NodeStage::kDown && !is_of_board(axis.error())) {
+      axis.latch(kNodeLost, kNodeLostCode, now_ns);
       axis.set_target(TargetState::kNothing, now_ns);
       is_new = true;
     } else {
@@ -201,8 +175,8 @@ void DriveMaster::Impl::watch_stops() noexcept TANDEM_RT {
   const bool ends = shutting_down && now_ns - shut_down_since_ns >= kUnheardNs;
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
     AxisMaster& axis = axes[joint];
-    const bool unheard = ends && axis.enabled() && axis.error() == AxisError::kNone &&
-                         node_of(joint).master.error() != NodeError::kRebooted;
+    const bool unheard = ends && axis.enabled() && axis.error() == FaultCause::kNone &&
+                         node_of(joint).master.error() != FaultCause::kBoardRebooted;
     if (axis.ignores_stop(now_ns) || unheard) ignored_stop(joint);
   }
 }
@@ -210,10 +184,10 @@ void DriveMaster::Impl::watch_stops() noexcept TANDEM_RT {
 /// What its commands do not reach, NMT stop may: the board reacts as to a lost connection.
 void DriveMaster::Impl::ignored_stop(std::size_t joint) noexcept TANDEM_RT {
   Node& node = node_of(joint);
-  axes[joint].latch_ignored_stop(kNodeLostCode, now_ns);
+  axes[joint].latch(FaultCause::kIgnoresStop, kNodeLostCode, now_ns);
   axes[joint].set_target(TargetState::kNothing, now_ns);
   if (node.master.stage() != NodeStage::kDown) {
-    node.master.fail(NodeError::kIgnoresStop, now_ns);
+    node.master.fail(FaultCause::kIgnoresStop, now_ns);
     node.counters_sent = 0;
     ports[node.plan.bus].sink.push(canopen::make_nmt(canopen::NmtCommand::kStop, node.plan.id));
   }
@@ -229,10 +203,8 @@ bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
                                                                     : TargetState::kHold;
   bool changed = false;
   for (AxisMaster& axis : axes) {
-    TargetState its = axis.error() == AxisError::kNone ? target : TargetState::kNothing;
-    const bool can_brake =
-        axis.error() == AxisError::kNotFollowing || axis.error() == AxisError::kBeyondLimits;
-    if (can_brake && target != TargetState::kNothing) {
+    TargetState its = axis.error() == FaultCause::kNone ? target : TargetState::kNothing;
+    if (is_of_motion(axis.error()) && target != TargetState::kNothing) {
       its = TargetState::kQuickStop;  // it has no fault of its own: it can brake
     }
     changed = changed || axis.target() != its;
@@ -287,7 +259,7 @@ void DriveMaster::Impl::recover() noexcept TANDEM_RT {
   }
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
     AxisMaster& axis = axes[joint];
-    if (axis.error() == AxisError::kNodeLost) {
+    if (is_of_board(axis.error())) {
       if (node_of(joint).master.running() && axis.heard()) axis.clear_error();
     } else if (axis.target() == TargetState::kReset) {
       if (axis.in_reset()) continue;
@@ -296,7 +268,7 @@ void DriveMaster::Impl::recover() noexcept TANDEM_RT {
     }
     const bool idle_alone = stage == MasterStage::kRunning &&
                             axis.target() == TargetState::kNothing &&
-                            axis.error() == AxisError::kNone;
+                            axis.error() == FaultCause::kNone;
     if (idle_alone) axis.set_target(TargetState::kEnable, now_ns);
     if (stage == MasterStage::kRunning && axis.target() == TargetState::kEnable && axis.enabled()) {
       axis.set_target(TargetState::kFollow, now_ns);
@@ -313,8 +285,8 @@ void DriveMaster::Impl::take_resets(const CommandImage& command) noexcept TANDEM
 /// Begins to clear what is latched of a joint; recover() goes on with it.
 void DriveMaster::Impl::reset_joint(std::size_t joint) noexcept TANDEM_RT {
   AxisMaster& axis = axes[joint];
-  if (axis.error() == AxisError::kNone) return;
-  if (axis.error() != AxisError::kNodeLost) {
+  if (axis.error() == FaultCause::kNone) return;
+  if (!is_of_board(axis.error())) {
     axis.set_target(TargetState::kReset, now_ns);
     return;
   }
@@ -366,15 +338,16 @@ bool DriveMaster::Impl::shut_down() noexcept TANDEM_RT {
     set_targets(reaction == StopCategory::kCategory0 ? TargetState::kNothing
                                                      : TargetState::kQuickStop);
   }
-  const bool at_rest = std::ranges::all_of(
-      axes, [](const AxisMaster& axis) { return axis.off() || axis.ignored_stop(); });
+  const bool at_rest = std::ranges::all_of(axes, [](const AxisMaster& axis) {
+    return axis.off() || axis.error() == FaultCause::kIgnoresStop;
+  });
   const bool done = at_rest || now_ns - shut_down_since_ns >= kShutDownNs;
   if (done) set_targets(TargetState::kNothing);
   make_commands(nullptr);
   write_pdos();
   if (!done) return false;
   for (Node& node : nodes) {
-    if (node.master.error() == NodeError::kIgnoresStop) continue;  // stopped it stays
+    if (node.master.error() == FaultCause::kIgnoresStop) continue;  // stopped it stays
     end_watch(node);
     ports[node.plan.bus].sink.push(
         canopen::make_nmt(canopen::NmtCommand::kEnterPreOperational, node.plan.id));

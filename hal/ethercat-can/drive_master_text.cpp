@@ -77,13 +77,13 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
                                       node.plan.id, robot.buses[node.plan.bus].name);
   const double limit_s = seconds(2 * node.plan.boot_time_ns);
   switch (m.error()) {
-    case NodeError::kNone: break;
-    case NodeError::kNoBootUp:
+    case FaultCause::kNone: break;
+    case FaultCause::kNoBootUp:
       return fmt::format(
           "{}: no boot-up message within {:.0f} s; is it powered and connected, "
           "and is its node id {}?",
           who, limit_s, node.plan.id);
-    case NodeError::kWrongIdentity: {
+    case FaultCause::kWrongIdentity: {
       const SdoStep& step = m.steps()[m.step()];
       if (step.use == SdoUse::kCheckBits) {
         return fmt::format(
@@ -102,39 +102,40 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
                          identity_name(step), step.index, step.sub, m.read_value(), number(step),
                          allowed(step.use));
     }
-    case NodeError::kSdoAbort: {
+    case FaultCause::kBoardRefused: {
       const SdoStep& step = m.steps()[m.step()];
       return fmt::format("{} {} failed: {} (abort code 0x{:08X}){}",
                          step.use != SdoUse::kWrite ? "reading" : "writing", step_text(node, step),
                          canopen::to_string(m.abort_code()),
                          static_cast<std::uint32_t>(m.abort_code()), origin_text(node, step));
     }
-    case NodeError::kNotOperational:
+    case FaultCause::kNotOperational:
       return fmt::format("{}: stays {} after NMT start", who, canopen::to_string(m.nmt_state()));
-    case NodeError::kRebooted:
+    case FaultCause::kBoardRebooted:
       return fmt::format("{}: booted again by itself at {:.3f} s", who,
                          seconds(m.trouble_time_ns()));
-    case NodeError::kHeartbeatLost:
+    case FaultCause::kHeartbeatLost:
       return fmt::format("{}: heartbeat lost at {:.3f} s (none for {} ms)", who,
                          seconds(m.trouble_time_ns()), kHeartbeatPeriods * node.plan.heartbeat_ms);
-    case NodeError::kGuardingLost:
+    case FaultCause::kGuardingLost:
       return fmt::format("{}: guarding lost at {:.3f} s (no answer to node guarding for {} ms)",
                          who, seconds(m.trouble_time_ns()),
                          kHeartbeatPeriods * node.plan.heartbeat_ms);
-    case NodeError::kLeftOperational:
+    case FaultCause::kBoardStopped:
       return fmt::format("{}: went to {} by itself at {:.3f} s", who,
                          canopen::to_string(m.nmt_state()), seconds(m.trouble_time_ns()));
-    case NodeError::kTwoNodes:
+    case FaultCause::kTwoBoards:
       return fmt::format("{}: two nodes answer under this id at {:.3f} s; give one of them another",
                          who, seconds(m.trouble_time_ns()));
-    case NodeError::kIgnoresStop:
+    case FaultCause::kIgnoresStop:
       return fmt::format(
           "{}: a drive does not obey the stop at {:.3f} s: NMT stop was sent; cut its power "
           "(emergency stop, STO)",
           who, seconds(m.trouble_time_ns()));
-    case NodeError::kFeedbackLost:
+    case FaultCause::kBoardSilent:
       return fmt::format("{}: no complete TPDO for {} cycles at {:.3f} s", who, node.timeout_cycles,
                          seconds(m.trouble_time_ns()));
+    default: break;
   }
   switch (m.stage()) {
     case NodeStage::kWaitBootUp: return who + ": waiting for its boot-up message";
@@ -150,37 +151,39 @@ std::string DriveMaster::Impl::axis_text(std::size_t joint) const {
   const AxisMaster& axis = axes[joint];
   const double at_s = seconds(axis.trouble_time_ns());
   switch (axis.error()) {
-    case AxisError::kNone: return {};
-    case AxisError::kDriveFault:
+    case FaultCause::kNone: return {};
+    case FaultCause::kDrive:
       return fmt::format("{}: {} at {:.3f} s", joint_name(joint), error_text(axis.fault_code()),
                          at_s);
-    case AxisError::kNotEnabled:
+    case FaultCause::kNotEnabled:
       return fmt::format(
           "{}: stays in '{}' (statusword {:04X}:00 = 0x{:04X}) after controlword "
           "0x{:04X}",
           joint_name(joint), canopen::to_string(axis.drive()),
           canopen::of_axis(canopen::object::kStatusword, robot.joints[joint].axis),
           axis.feedback().statusword, axis.raw().controlword);
-    case AxisError::kLeftEnabled:
+    case FaultCause::kLeftEnabled:
       return fmt::format("{}: left 'operation enabled' for '{}' by itself at {:.3f} s",
                          joint_name(joint), canopen::to_string(axis.drive()), at_s);
-    case AxisError::kNotFollowing:
+    case FaultCause::kNotFollowing:
       return fmt::format(
           "{}: does not follow its command at {:.3f} s: is the joint blocked, does the drive get "
           "its commands?",
           joint_name(joint), at_s);
-    case AxisError::kBeyondLimits:
+    case FaultCause::kTooFast:
+    case FaultCause::kTooStrong:
+    case FaultCause::kTooPowerful:
+    case FaultCause::kSwings:
       return fmt::format(
           "{}: moves beyond its limits at {:.3f} s, and its drive does not stop it: "
           "{}",
           joint_name(joint), at_s, error_text(axis.fault_code()));
-    case AxisError::kNodeLost: {
+    default: {
       const std::string cause = node_text(nodes[joint_node[joint]]);
       return fmt::format("{}: board lost at {:.3f} s{}{}", joint_name(joint), at_s,
                          cause.empty() ? "" : ": ", cause);
     }
   }
-  return {};
 }
 
 std::string DriveMaster::Impl::status() const {
@@ -194,7 +197,7 @@ std::string DriveMaster::Impl::status() const {
     const bool told = !causes.empty() && node.plan.board >= 0;
     const bool waits = stage == MasterStage::kBooting ? node.master.stage() != NodeStage::kReady
                                                       : !node.master.running();
-    const bool has_error = node.master.error() != NodeError::kNone;
+    const bool has_error = node.master.error() != FaultCause::kNone;
     if (told || (!has_error && (!waits || stage == MasterStage::kFailed))) continue;
     if (std::string text = node_text(node); !text.empty()) causes.push_back(std::move(text));
   }

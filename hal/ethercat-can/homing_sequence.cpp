@@ -20,7 +20,7 @@ constexpr std::int64_t kHaltNs = 500'000'000;    // to rest
 
 void HomingSequence::begin(std::int64_t now_ns, std::int64_t timeout_ns) noexcept TANDEM_RT {
   homed_ = false;
-  error_ = HomingError::kNone;
+  error_ = FaultCause::kNone;
   begun_ns_ = now_ns;
   timeout_ns_ = timeout_ns;
   enter(Step::kMode, now_ns);
@@ -28,12 +28,12 @@ void HomingSequence::begin(std::int64_t now_ns, std::int64_t timeout_ns) noexcep
 
 void HomingSequence::stop(std::int64_t now_ns) noexcept TANDEM_RT {
   const bool seeks = step_ == Step::kMode || step_ == Step::kSeeks;
-  if (seeks) fail(HomingError::kStopped, now_ns);
+  if (seeks) fail(FaultCause::kHomingStopped, now_ns);
 }
 
 void HomingSequence::interrupt() noexcept TANDEM_RT {
   if (!under_way()) return;
-  if (error_ == HomingError::kNone) error_ = HomingError::kInterrupted;
+  if (error_ == FaultCause::kNone) error_ = FaultCause::kHomingInterrupted;
   homed_ = false;
   step_ = Step::kOver;
 }
@@ -55,17 +55,17 @@ std::uint16_t HomingSequence::step(std::uint16_t word, bool shows_mode,
       if (answered && shows_mode) {
         enter(Step::kSeeks, now_ns);
       } else if (in_step_ns >= kModeNs) {
-        fail(HomingError::kMode, now_ns);
+        fail(FaultCause::kHomingMode, now_ns);
       }
       break;
     case Step::kSeeks:
       if (answered && (word & statusword::kHomingError) != 0) {
-        fail(HomingError::kDrive, now_ns);
+        fail(FaultCause::kHomingDrive, now_ns);
       } else if (answered && reached && (word & statusword::kHomingAttained) != 0) {
         homed_ = true;
         enter(Step::kEnds, now_ns);
       } else if (now_ns - begun_ns_ >= timeout_ns_) {
-        fail(HomingError::kTimeout, now_ns);
+        fail(FaultCause::kHomingTimeout, now_ns);
       }
       break;
     case Step::kEnds:
@@ -85,7 +85,7 @@ void HomingSequence::enter(Step step, std::int64_t now_ns) noexcept {
   since_ns_ = now_ns;
 }
 
-void HomingSequence::fail(HomingError error, std::int64_t now_ns) noexcept {
+void HomingSequence::fail(FaultCause error, std::int64_t now_ns) noexcept {
   error_ = error;
   enter(Step::kEnds, now_ns);
 }

@@ -43,16 +43,16 @@ class HomingSequence {
 
   [[nodiscard]] bool under_way() const noexcept { return step_ != Step::kOver; }
   [[nodiscard]] bool homed() const noexcept { return homed_; }
-  [[nodiscard]] HomingError error() const noexcept { return error_; }
+  [[nodiscard]] FaultCause error() const noexcept { return error_; }
 
   void archive(Archive& ar);
 
  private:
   void enter(Step step, std::int64_t now_ns) noexcept;
-  void fail(HomingError error, std::int64_t now_ns) noexcept;
+  void fail(FaultCause error, std::int64_t now_ns) noexcept;
 
   Step step_ = Step::kOver;
-  HomingError error_ = HomingError::kNone;
+  FaultCause error_ = FaultCause::kNone;
   bool homed_ = false;
   std::uint32_t cycles_ = 0;     ///< of the step
   std::int64_t since_ns_ = 0;    ///< the step's begin

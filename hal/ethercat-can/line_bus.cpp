@@ -18,7 +18,7 @@ using canopen::Frame;
 using canopen::NmtState;
 using canopen::PdoDirection;
 using ecat::CoeClient;
-using ecat::SlaveError;
+using ecat::LineError;
 using ecat::SlaveMaster;
 using ecat::SlaveStage;
 
@@ -313,7 +313,7 @@ void LineBus::tell_state(std::size_t i) noexcept {
   const SlaveMaster& master = line_->slave(i);
   const bool there =
       !(master.stage() == SlaveStage::kDown &&
-        (master.error() == SlaveError::kGone || master.error() == SlaveError::kNoAnswer));
+        (master.error() == LineError::kGone || master.error() == LineError::kNoAnswer));
   if (!slave.booted) {
     if (!master.waiting()) return;
     slave.booted = true;

@@ -51,7 +51,7 @@ void NodeMaster::set_times(std::int64_t period_ns,
 
 void NodeMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
   enter(NodeStage::kWaitBootUp, now_ns);
-  error_ = NodeError::kNone;
+  error_ = FaultCause::kNone;
   next_reset_ns_ = now_ns;
   reboots_ = 0;
 }
@@ -63,18 +63,18 @@ void NodeMaster::on_heartbeat(NmtState state, std::int64_t now_ns) noexcept TAND
     if (stage_ == NodeStage::kDown) return;
     const bool again = booted_ns_ == now_ns;  // no node boots twice in a cycle
     booted_ns_ = now_ns;
-    if (again) return fail(NodeError::kTwoNodes, now_ns);
+    if (again) return fail(FaultCause::kTwoBoards, now_ns);
     const bool expected = stage_ == NodeStage::kWaitBootUp;
     const bool too_often = !expected && ++reboots_ > kReboots;
-    if (stage_ == NodeStage::kRunning || too_often) return fail(NodeError::kRebooted, now_ns);
+    if (stage_ == NodeStage::kRunning || too_often) return fail(FaultCause::kBoardRebooted, now_ns);
     return enter(NodeStage::kConfigure, now_ns);
   }
   if (stage_ == NodeStage::kStarting && state == NmtState::kOperational) {
     enter(NodeStage::kRunning, now_ns);
   } else if (stage_ == NodeStage::kStarting && state == NmtState::kStopped) {
-    fail(NodeError::kNotOperational, now_ns);
+    fail(FaultCause::kNotOperational, now_ns);
   } else if (stage_ == NodeStage::kRunning && state != NmtState::kOperational) {
-    fail(NodeError::kLeftOperational, now_ns);
+    fail(FaultCause::kBoardStopped, now_ns);
   }
 }
 
@@ -93,7 +93,7 @@ void NodeMaster::process(std::int64_t now_ns, std::int64_t dt_ns,
                          FrameSink& out) noexcept TANDEM_RT {
   switch (stage_) {
     case NodeStage::kWaitBootUp:
-      if (now_ns - since_ns_ >= 2 * boot_time_ns_) return fail(NodeError::kNoBootUp, now_ns);
+      if (now_ns - since_ns_ >= 2 * boot_time_ns_) return fail(FaultCause::kNoBootUp, now_ns);
       if (now_ns < next_reset_ns_) return;
       out.push(canopen::make_nmt(canopen::NmtCommand::kResetNode, id_));
       next_reset_ns_ = now_ns + boot_time_ns_;
@@ -105,7 +105,7 @@ void NodeMaster::process(std::int64_t now_ns, std::int64_t dt_ns,
       guard(now_ns, out);
       watch_heartbeat(now_ns);
       if (stage_ == NodeStage::kStarting && now_ns - since_ns_ >= start_time_ns_) {
-        fail(NodeError::kNotOperational, now_ns);
+        fail(FaultCause::kNotOperational, now_ns);
       }
       return;
     case NodeStage::kRunning:
@@ -165,7 +165,7 @@ bool NodeMaster::step_passed(std::int64_t now_ns) noexcept {
     const bool need_not_exist = step.use == SdoUse::kCheckBits && code == AbortCode::kNoObject;
     if (need_not_exist || step.use == SdoUse::kStore || step.use == SdoUse::kVerify) return true;
     abort_code_ = code;
-    fail(NodeError::kSdoAbort, now_ns);
+    fail(FaultCause::kBoardRefused, now_ns);
     return false;
   }
   if (step.use == SdoUse::kWrite || step.use == SdoUse::kStore) return true;
@@ -178,7 +178,7 @@ bool NodeMaster::step_passed(std::int64_t now_ns) noexcept {
   std::array<std::uint8_t, 4> bytes{};
   std::copy_n(sdo_.value().begin(), std::min<std::size_t>(4, sdo_.value().size()), bytes.begin());
   read_value_ = canopen::get<std::uint32_t>(bytes.data());
-  fail(NodeError::kWrongIdentity, now_ns);
+  fail(FaultCause::kWrongIdentity, now_ns);
   return false;
 }
 
@@ -198,10 +198,10 @@ void NodeMaster::watch_heartbeat(std::int64_t now_ns) noexcept {
   if (watch_ == NodeWatch::kNothing) return;
   if (now_ns - heard_ns_ < heartbeat_timeout_ns_) return;
   const bool guarded = watch_ == NodeWatch::kGuarding;
-  fail(guarded ? NodeError::kGuardingLost : NodeError::kHeartbeatLost, now_ns);
+  fail(guarded ? FaultCause::kGuardingLost : FaultCause::kHeartbeatLost, now_ns);
 }
 
-void NodeMaster::fail(NodeError error, std::int64_t now_ns) noexcept TANDEM_RT {
+void NodeMaster::fail(FaultCause error, std::int64_t now_ns) noexcept TANDEM_RT {
   error_ = error;
   trouble_ns_ = now_ns;
   stage_ = NodeStage::kDown;

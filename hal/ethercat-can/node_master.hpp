@@ -9,24 +9,9 @@
 #include "canopen/messages.hpp"
 #include "canopen/sdo.hpp"
 #include "hal/ethercat-can/sdo_sequence.hpp"
+#include "hal/stop_category.hpp"
 
 namespace tandem::hal::can {
-
-/// Why a node is not, or no longer, in operation.
-enum class NodeError : std::uint8_t {
-  kNone = 0,
-  kNoBootUp,        ///< it never said that it is there
-  kWrongIdentity,   ///< a check step read something else
-  kSdoAbort,        ///< a configuration step was refused, or not answered
-  kNotOperational,  ///< it did not follow NMT start
-  kRebooted,        ///< it booted again by itself
-  kHeartbeatLost,
-  kGuardingLost,     ///< it does not answer the requests for its state
-  kLeftOperational,  ///< its heartbeat says another NMT state
-  kFeedbackLost,     ///< its heartbeat is there, its TPDOs are not
-  kTwoNodes,         ///< two answer under its id
-  kIgnoresStop,      ///< a drive of it stays enabled after a stop
-};
 
 /// How far a node is brought up.
 enum class NodeStage : std::uint8_t {
@@ -67,14 +52,14 @@ class NodeMaster {
   /// NMT start. @pre stage() == kReady
   void start(std::int64_t now_ns, canopen::FrameSink& out) noexcept TANDEM_RT;
   /// Takes it out of operation with this error; nothing is sent.
-  void fail(NodeError error, std::int64_t now_ns) noexcept TANDEM_RT;
+  void fail(FaultCause error, std::int64_t now_ns) noexcept TANDEM_RT;
 
   /// The client for transfers at run time. @pre stage() == kRunning
   [[nodiscard]] canopen::SdoClient& sdo() noexcept { return sdo_; }
 
   [[nodiscard]] NodeStage stage() const noexcept { return stage_; }
   [[nodiscard]] bool running() const noexcept { return stage_ == NodeStage::kRunning; }
-  [[nodiscard]] NodeError error() const noexcept { return error_; }
+  [[nodiscard]] FaultCause error() const noexcept { return error_; }
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
   [[nodiscard]] canopen::NmtState nmt_state() const noexcept { return nmt_; }
   [[nodiscard]] canopen::AbortCode abort_code() const noexcept { return abort_code_; }
@@ -107,7 +92,7 @@ class NodeMaster {
   std::vector<SdoStep> steps_;
 
   NodeStage stage_ = NodeStage::kWaitBootUp;
-  NodeError error_ = NodeError::kNone;
+  FaultCause error_ = FaultCause::kNone;
   canopen::NmtState nmt_ = canopen::NmtState::kBootUp;
   bool requested_ = false;  ///< the step's request is out
   bool unchanged_ = false;

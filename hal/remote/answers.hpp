@@ -42,9 +42,9 @@ class Answers {
     most_unanswered_ = std::max(most_unanswered_, unanswered());
   }
 
-  [[nodiscard]] hal::LinkLoss loss() const noexcept TANDEM_RT {
-    if (unanswered() <= limit_) return hal::LinkLoss::kNone;
-    return 2 * silent() > limit_ ? hal::LinkLoss::kStates : hal::LinkLoss::kCommands;
+  [[nodiscard]] hal::FaultCause loss() const noexcept TANDEM_RT {
+    if (unanswered() <= limit_) return hal::FaultCause::kNone;
+    return 2 * silent() > limit_ ? hal::FaultCause::kLinkStates : hal::FaultCause::kLinkCommands;
   }
   /// Since a state came.
   [[nodiscard]] std::uint64_t silent() const noexcept TANDEM_RT { return now_ - heard_; }

@@ -81,8 +81,8 @@ class OperatorEnd : public hal::ForwardingBackend {
   /// Nothing is homed over the link: a command is on its way for too long.
   bool home(std::size_t /*joint*/) noexcept TANDEM_RT override { return false; }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
-  [[nodiscard]] hal::LinkLoss link_loss() const noexcept TANDEM_RT override {
-    return linked_ ? answers_.loss() : hal::LinkLoss::kNone;
+  [[nodiscard]] hal::FaultCause link_loss() const noexcept TANDEM_RT override {
+    return linked_ ? answers_.loss() : hal::FaultCause::kNone;
   }
 
   /// What a run's table, JSON and report ask.

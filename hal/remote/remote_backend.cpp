@@ -315,7 +315,8 @@ void RemoteBackend::reset() noexcept TANDEM_RT {
 }
 
 hal::FaultCause RemoteBackend::fault_cause(std::size_t joint) const noexcept TANDEM_RT {
-  return static_cast<hal::FaultCause>(newest_.front().causes[joint]);
+  const auto told = static_cast<hal::FaultCause>(newest_.front().causes[joint]);
+  return hal::is_of_drive(told) ? told : hal::FaultCause::kDrive;  // a network says anything
 }
 
 std::string RemoteBackend::fault_text(hal::FaultCause cause, std::uint32_t code) const {

@@ -7,7 +7,7 @@
 
 namespace tandem::remote {
 
-using hal::OwnerLoss;
+using hal::FaultCause;
 using hal::RunPhase;
 using hal::StopCategory;
 
@@ -216,18 +216,18 @@ bool Server::unpack(const tandem_msgs::LinkCommand& sample) {
   return true;
 }
 
-OwnerLoss Server::loss_of(const hal::PortView& view, std::uint64_t owner) noexcept TANDEM_RT {
+FaultCause Server::loss_of(const hal::PortView& view, std::uint64_t owner) noexcept TANDEM_RT {
   const std::int64_t now = clock_ns(CLOCK_MONOTONIC), lease = ns(config_.lease_timeout_s);
-  if (silence_.of(lease_.heard_ns(), now, lease / 4) > lease) return OwnerLoss::kSilent;
+  if (silence_.of(lease_.heard_ns(), now, lease / 4) > lease) return FaultCause::kOwnerSilent;
   const Taken& taken = newest_.front();
   if (config_.lockstep) {
     const bool there = taken.client == owner && taken.cycle == view.time.cycle;
     const bool late =
         waits_since_ns_ != 0 && now - waits_since_ns_ > ns(config_.lockstep_timeout_s);
-    return late && !there ? OwnerLoss::kLate : OwnerLoss::kNone;
+    return late && !there ? FaultCause::kOwnerLate : FaultCause::kNone;
   }
   const bool old = led_by_ == owner && view.time.cycle - taken.cycle > config_.max_age_cycles;
-  return old ? OwnerLoss::kStale : OwnerLoss::kNone;
+  return old ? FaultCause::kOwnerStale : FaultCause::kNone;
 }
 
 std::int64_t Server::wait_until_ns(const hal::PortView& view) noexcept {
@@ -244,7 +244,7 @@ std::int64_t Server::wait_until_ns(const hal::PortView& view) noexcept {
   newest_.refresh();
   const Taken& taken = newest_.front();
   if (taken.client == owner && taken.cycle == view.time.cycle) return 0;
-  if (loss_of(view, owner) != OwnerLoss::kNone) return 0;
+  if (loss_of(view, owner) != FaultCause::kNone) return 0;
   return now + kLook_ns;
 }
 
@@ -276,12 +276,12 @@ hal::RemoteCommand Server::exchange(const hal::PortView& view) noexcept TANDEM_R
     if (taken.done && !config_.ends_with_owner) wish.live = false;
   }
   if (owner != 0 && !wish.done) wish.loss = loss_of(view, owner);
-  if (wish.loss != OwnerLoss::kNone) wish.live = false;
-  if (owner != 0 && (wish.done || wish.loss != OwnerLoss::kNone)) {
+  if (wish.loss != FaultCause::kNone) wish.live = false;
+  if (owner != 0 && (wish.done || wish.loss != FaultCause::kNone)) {
     (void)lease_.release(owner);
-    if (wish.loss != OwnerLoss::kNone) losses_.fetch_add(1, std::memory_order_relaxed);
+    if (wish.loss != FaultCause::kNone) losses_.fetch_add(1, std::memory_order_relaxed);
     // One that has commanded nothing yet leaves nothing behind.
-    if (led_by_ != owner) wish.loss = OwnerLoss::kNone;
+    if (led_by_ != owner) wish.loss = FaultCause::kNone;
   }
   if (wish.live) source_cycle_ = taken.command.cycle()[0];
   if (playout_) play(view, led_by_ != owner, wish);

@@ -133,8 +133,8 @@ class Server final : public hal::RemoteCommandPort {
   [[nodiscard]] bool unpack(const tandem_msgs::LinkCommand& sample);
   void keep_for_playout(const Taken& taken);
   void note_stops(const tandem_msgs::LinkCommand& sample);
-  [[nodiscard]] hal::OwnerLoss loss_of(const hal::PortView& view,
-                                       std::uint64_t owner) noexcept TANDEM_RT;
+  [[nodiscard]] hal::FaultCause loss_of(const hal::PortView& view,
+                                        std::uint64_t owner) noexcept TANDEM_RT;
   void play(const hal::PortView& view, bool begins, hal::RemoteCommand& wish) noexcept TANDEM_RT;
   void measure(const hal::PortView& view, const Taken& taken) noexcept TANDEM_RT;
 

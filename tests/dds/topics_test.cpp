@@ -471,8 +471,12 @@ TEST(Topics, OfDiagnosticsSayWhichJointAndBoardIsNotWell) {
   rig.robot.config.joints[10].homing = hal::HomingConfig{};
   rig.state.homing()[10] = static_cast<std::uint8_t>(hal::HomingState::kNotHomed);
   rig.state.homing()[11] = static_cast<std::uint8_t>(hal::HomingState::kHomed);
-  rig.set_faults({{12, 0.012, joints[12].name, joints[12].board, "following error",
-                   hal::StopCategory::kCategory1, true, 0.0}});
+  rig.set_faults(
+      {{12, 0.012, joints[12].name, joints[12].board, "following error",
+        hal::StopCategory::kCategory1, true, 0.0},
+       {13, 0.013, joints[12].name, joints[12].board, "hot, too", hal::StopCategory::kWarn, true,
+        0.0},
+       {13, 0.013, joints[13].name, joints[13].board, "hot", hal::StopCategory::kWarn, true, 0.0}});
   auto reader = rig.reader<diagnostic_msgs::DiagnosticArray>("diagnostics");
   auto faults = rig.reader<tandem_msgs::Faults>("tandem/faults", true);
   rig.start();
@@ -495,6 +499,9 @@ TEST(Topics, OfDiagnosticsSayWhichJointAndBoardIsNotWell) {
       EXPECT_EQ(of(10).first, 1);
       EXPECT_TRUE(of(10).second.ends_with(", not homed")) << of(10).second;
       EXPECT_EQ(of(11).first, 0);
+      if (told) {
+        EXPECT_EQ(of(13), (std::pair<int, std::string>(1, "hot"))) << "it stops nothing";
+      }
       EXPECT_EQ(found.at("tandem: run").first, 2);
       EXPECT_EQ(found.at("tandem: board " + joints[0].board).first, 2);
       EXPECT_EQ(found.at("tandem: board " + joints[0].board).second,

@@ -72,7 +72,7 @@ TEST(Datagram, EveryCommandIsWrittenAndReadBackAsItsNumber) {
     EXPECT_EQ(datagram.offset(), 0x0130);
     EXPECT_EQ(is_logical(command), number >= 10 && number <= 12);
     EXPECT_FALSE(reader.next(datagram));
-    EXPECT_EQ(reader.error(), WireError::kNone);
+    EXPECT_EQ(reader.error(), LineError::kNone);
   }
   EXPECT_STREQ(to_string(Command::kArmw), "ARMW");
   EXPECT_STREQ(to_string(static_cast<Command>(15)), "?");
@@ -120,26 +120,26 @@ TEST(Datagram, WhatDoesNotFitIsNotAppended) {
   EXPECT_TRUE(frame.writer.add(Command::kNop, 0, 0, 1).empty());
   auto bytes = frame.finish();
   EXPECT_EQ(bytes.size(), 1514u);
-  EXPECT_EQ(check_frame(bytes), WireError::kNone);
+  EXPECT_EQ(check_frame(bytes), LineError::kNone);
 }
 
 TEST(Datagram, WhatIsNoFrameIsRefusedWithItsReason) {
   const auto error = [](std::vector<std::uint8_t> bytes) { return check_frame(bytes); };
   const std::string brd = "07 80 00 00 00 00 01 00 00 00 00 00 00";
-  EXPECT_EQ(error(padded(hex(kEthernet + "0D 10 " + brd))), WireError::kNone);
-  EXPECT_EQ(error({}), WireError::kTooShort);
-  EXPECT_EQ(error(hex(kEthernet + "0D")), WireError::kTooShort);
-  EXPECT_EQ(error(std::vector<std::uint8_t>(1515, 0)), WireError::kTooLong);
-  EXPECT_EQ(error(std::vector<std::uint8_t>(60, 0)), WireError::kNotEtherCat);
-  EXPECT_EQ(error(padded(hex(kEthernet + "0D 40 " + brd))), WireError::kNotCommands);
-  EXPECT_EQ(error(padded(hex(kEthernet + "0B 10 " + brd))), WireError::kLength);
-  EXPECT_EQ(error(padded(hex(kEthernet + "2D 10 " + brd))), WireError::kLength);
-  EXPECT_EQ(error(padded(hex(kEthernet + "0D 10 0F" + brd.substr(2)))), WireError::kCommand);
-  EXPECT_EQ(error(padded(hex(kEthernet + "0C 10 " + brd))), WireError::kTruncated);
-  EXPECT_EQ(error(padded(hex(kEthernet + "0E 10 " + brd))), WireError::kTrailing);
+  EXPECT_EQ(error(padded(hex(kEthernet + "0D 10 " + brd))), LineError::kNone);
+  EXPECT_EQ(error({}), LineError::kTooShort);
+  EXPECT_EQ(error(hex(kEthernet + "0D")), LineError::kTooShort);
+  EXPECT_EQ(error(std::vector<std::uint8_t>(1515, 0)), LineError::kTooLong);
+  EXPECT_EQ(error(std::vector<std::uint8_t>(60, 0)), LineError::kNotEtherCat);
+  EXPECT_EQ(error(padded(hex(kEthernet + "0D 40 " + brd))), LineError::kNotCommands);
+  EXPECT_EQ(error(padded(hex(kEthernet + "0B 10 " + brd))), LineError::kLength);
+  EXPECT_EQ(error(padded(hex(kEthernet + "2D 10 " + brd))), LineError::kLength);
+  EXPECT_EQ(error(padded(hex(kEthernet + "0D 10 0F" + brd.substr(2)))), LineError::kCommand);
+  EXPECT_EQ(error(padded(hex(kEthernet + "0C 10 " + brd))), LineError::kTruncated);
+  EXPECT_EQ(error(padded(hex(kEthernet + "0E 10 " + brd))), LineError::kTrailing);
   const std::string announces = "07 80 00 00 00 00 01 80 00 00 00 00 00";
-  EXPECT_EQ(error(padded(hex(kEthernet + "0D 10 " + announces))), WireError::kMissing);
-  EXPECT_EQ(error(padded(hex(kEthernet + "14 10 " + announces))), WireError::kTruncated);
+  EXPECT_EQ(error(padded(hex(kEthernet + "0D 10 " + announces))), LineError::kMissing);
+  EXPECT_EQ(error(padded(hex(kEthernet + "14 10 " + announces))), LineError::kTruncated);
 }
 
 TEST(Datagram, AFrameCutAnywhereIsRefused) {
@@ -149,7 +149,7 @@ TEST(Datagram, AFrameCutAnywhereIsRefused) {
   const auto whole = frame.finish();
   for (std::size_t size = 0; size < whole.size(); ++size) {
     std::vector<std::uint8_t> cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
-    EXPECT_NE(check_frame(cut), WireError::kNone) << size;
+    EXPECT_NE(check_frame(cut), LineError::kNone) << size;
   }
 }
 

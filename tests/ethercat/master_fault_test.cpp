@@ -11,7 +11,6 @@ namespace {
 using hal::ecat::FrameFate;
 using hal::ecat::LineError;
 using hal::ecat::LineStatistics;
-using hal::ecat::SlaveError;
 using hal::ecat::SlaveStage;
 
 /// Three slaves in OP.
@@ -111,7 +110,7 @@ TEST_F(MasterFault, AWorkingCounterThatIsShortOnceKeepsTheOldInputs) {
 TEST_F(MasterFault, AWorkingCounterThatStaysShortLeadsToTheSlaveWithoutItsMap) {
   rig.set_fmmu(1, 1, {});
   cycles(20);
-  EXPECT_EQ(master->slave(1).error(), SlaveError::kMappingLost);
+  EXPECT_EQ(master->slave(1).error(), LineError::kMappingLost);
   EXPECT_TRUE(says("slave 1 (rig1): its FMMUs were changed"));
   EXPECT_TRUE(master->slave(0).running() && master->slave(2).running());
   EXPECT_TRUE(master->cycle().valid) << "the others go on";
@@ -124,8 +123,8 @@ TEST_F(MasterFault, ACutCableIsNamedAndAMendedOneIsSeen) {
   EXPECT_EQ(master->broken_cable(), 1u);
   EXPECT_TRUE(says("the cable from slave 0 (rig0) to slave 1 (rig1) is cut")) << master->text();
   EXPECT_TRUE(master->slave(0).running());
-  EXPECT_EQ(master->slave(1).error(), SlaveError::kGone);
-  EXPECT_EQ(master->slave(2).error(), SlaveError::kGone);
+  EXPECT_EQ(master->slave(1).error(), LineError::kGone);
+  EXPECT_EQ(master->slave(2).error(), LineError::kGone);
   EXPECT_TRUE(master->cycle().valid) << "the slave before it goes on";
   rig.line->set_cable(1, true);
   cycles(10);
@@ -172,7 +171,7 @@ TEST_F(MasterFault, ASlaveThatRestartsIsFoundAndComesBack) {
   rig.line->set_power(2, true, rig.now_ns);
   cycles(30);
   EXPECT_EQ(master->slave(2).stage(), SlaveStage::kDown);
-  EXPECT_EQ(master->slave(2).error(), SlaveError::kGone) << "its address is gone";
+  EXPECT_EQ(master->slave(2).error(), LineError::kGone) << "its address is gone";
   EXPECT_TRUE(master->slave(0).running() && master->slave(1).running());
   master->restart(2, rig.now_ns);
   EXPECT_TRUE(to_op()) << master->text();
@@ -181,7 +180,7 @@ TEST_F(MasterFault, ASlaveThatRestartsIsFoundAndComesBack) {
 TEST_F(MasterFault, ASlaveThatLeavesOpIsToldWithItsCode) {
   rig.slaves[1]->slave->fail(ethercat::AlState::kSafeOp, ethercat::AlCode::kSynchronisation);
   cycles(10);
-  EXPECT_EQ(master->slave(1).error(), SlaveError::kLeftState);
+  EXPECT_EQ(master->slave(1).error(), LineError::kLeftState);
   EXPECT_TRUE(says("slave 1 (rig1): is in SAFEOP: synchronisation error (AL status code 001A)"))
       << master->text();
   EXPECT_TRUE(master->slave(0).running() && master->slave(2).running());
@@ -191,7 +190,7 @@ TEST_F(MasterFault, TheSlavesWatchdogsAreToldAfterAPauseOfTheMaster) {
   for (int i = 0; i < 150; ++i) rig.step();
   cycles(10);
   for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(master->slave(i).error(), SlaveError::kLeftState);
+    EXPECT_EQ(master->slave(i).error(), LineError::kLeftState);
     EXPECT_EQ(master->slave(i).al_code(), ethercat::AlCode::kWatchdog);
   }
   EXPECT_TRUE(says("process data watchdog: no outputs came in time"));

@@ -8,7 +8,6 @@ namespace {
 
 using hal::ecat::LineError;
 using hal::ecat::LineMaster;
-using hal::ecat::SlaveError;
 using hal::ecat::SlaveStage;
 
 class MasterStart : public testing::TestWithParam<std::size_t> {};
@@ -83,7 +82,7 @@ TEST(MasterStart, AnotherDeviceIsRefusedBeforeItIsWrittenTo) {
   setups[1].identity.vendor = 0x1234;
   MasterRig rig(setups, rig_plan());
   EXPECT_FALSE(rig.to_op());
-  EXPECT_EQ(rig.master->slave(1).error(), SlaveError::kWrongIdentity);
+  EXPECT_EQ(rig.master->slave(1).error(), LineError::kWrongIdentity);
   EXPECT_NE(rig.master->text().find("slave 1 (rig1): is another device: vendor 00001234"),
             std::string::npos)
       << rig.master->text();
@@ -98,7 +97,7 @@ TEST(MasterStart, ARefusedStateIsToldWithItsCodeInWords) {
   plan.outputs[0].entries = {0x60400010};  // the slave has six bytes
   MasterRig rig(setups, plan);
   EXPECT_FALSE(rig.to_op());
-  EXPECT_EQ(rig.master->slave(0).error(), SlaveError::kRefused);
+  EXPECT_EQ(rig.master->slave(0).error(), LineError::kRefused);
   EXPECT_NE(rig.master->text().find("refused SAFEOP: invalid output configuration (AL status code "
                                     "001D)"),
             std::string::npos)
@@ -124,7 +123,7 @@ TEST(MasterStart, ASlowSlaveIsWaitedForAndATooSlowOneIsNot) {
   plan.state_time_ns = 100 * kMs;
   MasterRig too_slow(setups, plan);
   EXPECT_FALSE(too_slow.to_op());
-  EXPECT_EQ(too_slow.master->slave(0).error(), SlaveError::kStateTimeout);
+  EXPECT_EQ(too_slow.master->slave(0).error(), LineError::kStateTimeout);
 }
 
 TEST(MasterStart, SaysHowManySlavesAnswer) {

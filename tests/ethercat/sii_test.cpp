@@ -48,7 +48,7 @@ TEST(Sii, HasIdentityMailboxAndCategoriesAtTheirWords) {
 
 TEST(Sii, WhatIsBuiltIsReadBack) {
   Content read;
-  EXPECT_EQ(parse(build(example()), read), Error::kNone);
+  EXPECT_EQ(parse(build(example()), read), LineError::kNone);
   EXPECT_EQ(read, example());
 }
 
@@ -56,7 +56,7 @@ TEST(Sii, OneThatIsCutAnywhereIsRefused) {
   const std::vector<std::uint8_t> whole = build(example());
   Content read;
   for (std::size_t size = 0; size + 2 < whole.size(); ++size) {  // two bytes of the end suffice
-    EXPECT_NE(parse({whole.data(), size}, read), Error::kNone) << size;
+    EXPECT_NE(parse({whole.data(), size}, read), LineError::kNone) << size;
   }
 }
 
@@ -64,21 +64,21 @@ TEST(Sii, EachKindOfErrorIsNamed) {
   Content read;
   std::vector<std::uint8_t> bytes = build(example());
   bytes[0] ^= 1;
-  EXPECT_EQ(parse(bytes, read), Error::kCheckSum);
+  EXPECT_EQ(parse(bytes, read), LineError::kSiiCheckSum);
   bytes = build(example());
   bytes[0x81] = 0x7F;  // another type
   bytes[0x82] = 0xFF;  // longer than all
-  EXPECT_EQ(parse(bytes, read), Error::kCategory);
+  EXPECT_EQ(parse(bytes, read), LineError::kSiiCategory);
   bytes = build(example());
   bytes[0x85] = 40;  // the string
-  EXPECT_EQ(parse(bytes, read), Error::kContent);
-  EXPECT_STREQ(to_string(Error::kTooShort), "the SII is too short");
+  EXPECT_EQ(parse(bytes, read), LineError::kSiiContent);
+  EXPECT_STREQ(to_string(LineError::kSiiTooShort), "the SII is too short");
 }
 
 TEST(Sii, EmptyMemoryOfAChipFromTheFactoryIsRefused) {
   Content read;
-  EXPECT_NE(parse(std::vector<std::uint8_t>(512, 0xFF), read), Error::kNone);
-  EXPECT_NE(parse(std::vector<std::uint8_t>(512, 0x00), read), Error::kNone);
+  EXPECT_NE(parse(std::vector<std::uint8_t>(512, 0xFF), read), LineError::kNone);
+  EXPECT_NE(parse(std::vector<std::uint8_t>(512, 0x00), read), LineError::kNone);
 }
 
 }  // namespace

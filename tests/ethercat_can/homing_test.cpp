@@ -125,7 +125,7 @@ TEST(Homing, ADrivesErrorIsToldAndTheJointIsHeld) {
   rig.begin();
   rig.homes();
   EXPECT_EQ(rig.master->homing(0).state, HomingState::kNotHomed);
-  EXPECT_EQ(rig.master->homing(0).error, HomingError::kDrive);
+  EXPECT_EQ(rig.master->homing(0).error, FaultCause::kHomingDrive);
   rig.steps(20);
   EXPECT_EQ(rig.drive.value(0x6060), 8);
   EXPECT_EQ(rig.drive.value(0x6064), 1000);
@@ -136,7 +136,7 @@ TEST(Homing, ADrivesErrorIsToldAndTheJointIsHeld) {
   rig.begin();
   rig.homes();
   EXPECT_EQ(rig.master->homing(0).state, HomingState::kHomed) << "the next one may succeed";
-  EXPECT_EQ(rig.master->homing(0).error, HomingError::kNone);
+  EXPECT_EQ(rig.master->homing(0).error, FaultCause::kNone);
 }
 
 TEST(Homing, EndsWhenItsTimeIsOver) {
@@ -145,7 +145,7 @@ TEST(Homing, EndsWhenItsTimeIsOver) {
   rig.drive.homing_ms = -1;
   rig.begin();
   const int taken = rig.homes();
-  EXPECT_EQ(rig.master->homing(0).error, HomingError::kTimeout);
+  EXPECT_EQ(rig.master->homing(0).error, FaultCause::kHomingTimeout);
   EXPECT_GE(taken, 2000);
   EXPECT_LT(taken, 2600) << "2 s, and half a second of halt";
   EXPECT_EQ(rig.drive.value(0x6040) & 0x10, 0);
@@ -162,7 +162,7 @@ TEST(Homing, HaltsWhenItIsStopped) {
   rig.steps(2);
   EXPECT_EQ(rig.drive.value(0x6040) & 0x110, 0x100) << "halt, and no bit 4";
   rig.homes();
-  EXPECT_EQ(rig.master->homing(0).error, HomingError::kStopped);
+  EXPECT_EQ(rig.master->homing(0).error, FaultCause::kHomingStopped);
   EXPECT_EQ(rig.drive.value(0x6064), 1000);
 }
 
@@ -172,7 +172,7 @@ TEST(Homing, ADriveThatDoesNotChangeItsModeIsToldOf) {
   rig.drive.knows_homing = false;
   rig.begin();
   rig.homes();
-  EXPECT_EQ(rig.master->homing(0).error, HomingError::kMode);
+  EXPECT_EQ(rig.master->homing(0).error, FaultCause::kHomingMode);
 }
 
 TEST(Homing, AFaultAndAStopInterruptIt) {
@@ -185,7 +185,7 @@ TEST(Homing, AFaultAndAStopInterruptIt) {
     by_drive ? rig.drive.fault() : rig.master->stop(StopCategory::kCategory1);
     rig.steps(5);
     EXPECT_EQ(rig.master->homing(0).state, HomingState::kNotHomed) << by_drive;
-    EXPECT_EQ(rig.master->homing(0).error, HomingError::kInterrupted) << by_drive;
+    EXPECT_EQ(rig.master->homing(0).error, FaultCause::kHomingInterrupted) << by_drive;
     EXPECT_EQ(rig.master->phase(), Phase::kFault) << by_drive;
     EXPECT_FALSE(rig.master->home(0)) << "not before a reset";
   }

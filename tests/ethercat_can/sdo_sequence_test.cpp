@@ -190,9 +190,9 @@ TEST_F(ScriptedNode, IsResetOnceMoreWhenItDoesNotBootInItsTimeAndThenGivenUp) {
   EXPECT_TRUE(wait(499).empty());
   EXPECT_EQ(wait(1).size(), 1u);
   (void)wait(499);
-  EXPECT_EQ(node.error(), NodeError::kNone);
+  EXPECT_EQ(node.error(), FaultCause::kNone);
   (void)wait(1);
-  EXPECT_EQ(node.error(), NodeError::kNoBootUp);
+  EXPECT_EQ(node.error(), FaultCause::kNoBootUp);
 }
 
 TEST_F(ScriptedNode, IsAskedThreeTimesBeforeTheSdoTimesOut) {
@@ -203,7 +203,7 @@ TEST_F(ScriptedNode, IsAskedThreeTimesBeforeTheSdoTimesOut) {
     for (const Frame& frame : wait(1)) requests += frame.data[0] == 0x40 ? 1 : 0;
   }
   EXPECT_EQ(requests, 2) << "besides the first";
-  EXPECT_EQ(node.error(), NodeError::kSdoAbort);
+  EXPECT_EQ(node.error(), FaultCause::kBoardRefused);
   EXPECT_EQ(node.abort_code(), canopen::AbortCode::kTimeout);
 }
 
@@ -212,7 +212,7 @@ TEST_F(ScriptedNode, IsRefusedWithAnotherIdentity) {
   (void)wait(1);
   answer({0x43, 0x18, 0x10, 0x02, 0x03, 0x04, 0, 0});
   (void)wait(1);
-  EXPECT_EQ(node.error(), NodeError::kWrongIdentity);
+  EXPECT_EQ(node.error(), FaultCause::kWrongIdentity);
   EXPECT_EQ(node.read_value(), 0x403u);
 }
 
@@ -224,7 +224,7 @@ TEST_F(ScriptedNode, ThatDoesNotStartIsReported) {
     node.on_heartbeat(canopen::NmtState::kPreOperational, now_ns);
     (void)wait(50);
   }
-  EXPECT_EQ(node.error(), NodeError::kNotOperational);
+  EXPECT_EQ(node.error(), FaultCause::kNotOperational);
 }
 
 TEST_F(ScriptedNode, ThatLeavesOperationalByItselfIsReported) {
@@ -232,7 +232,7 @@ TEST_F(ScriptedNode, ThatLeavesOperationalByItselfIsReported) {
   node.start(now_ns, sink);
   node.on_heartbeat(canopen::NmtState::kOperational, now_ns);
   node.on_heartbeat(canopen::NmtState::kPreOperational, now_ns);
-  EXPECT_EQ(node.error(), NodeError::kLeftOperational);
+  EXPECT_EQ(node.error(), FaultCause::kBoardStopped);
 }
 
 TEST_F(ScriptedNode, ThatRebootsAgainAndAgainIsGivenUp) {
@@ -244,13 +244,13 @@ TEST_F(ScriptedNode, ThatRebootsAgainAndAgainIsGivenUp) {
   }
   now_ns += 1'000'000;
   boot();
-  EXPECT_EQ(node.error(), NodeError::kRebooted);
+  EXPECT_EQ(node.error(), FaultCause::kBoardRebooted);
 }
 
 TEST_F(ScriptedNode, ThatBootsTwiceInACycleIsTwoNodes) {
   boot();
   boot();
-  EXPECT_EQ(node.error(), NodeError::kTwoNodes);
+  EXPECT_EQ(node.error(), FaultCause::kTwoBoards);
 }
 
 }  // namespace

@@ -57,7 +57,7 @@ class Wire final : public ethercat::Medium {
     ethercat::Datagram datagram;
     for (std::size_t left = byte() % 8; reader.next(datagram) && left > 0; --left) {
     }
-    if (reader.error() != ethercat::WireError::kNone) return;
+    if (reader.error() != ethercat::LineError::kNone) return;
     const std::span<std::uint8_t> data = datagram.data();
     const std::size_t from = data.empty() ? 0 : byte() % data.size();
     const std::size_t count = byte() % 32;
@@ -111,8 +111,8 @@ struct Ends {
 
 void read_sii(std::span<const std::uint8_t> bytes) {
   ethercat::sii::Content content;
-  const ethercat::sii::Error error = ethercat::sii::parse(bytes, content);
-  require(error != ethercat::sii::Error::kNone ||
+  const ethercat::LineError error = ethercat::sii::parse(bytes, content);
+  require(error != ethercat::LineError::kNone ||
           content.managers.size() <= ethercat::sii::kMaxSyncManagers);
 }
 

@@ -294,5 +294,32 @@ TEST(Faults, ACauseThatThereIsNotHasNoText) {
   EXPECT_EQ(backend.fault_text(none, 0x7300), "the drive reports error 0x7300");
 }
 
+/// They pass links, and are in logs.
+TEST(Faults, KeepTheirNumbers) {
+  EXPECT_EQ(static_cast<int>(FaultCause::kBoardRefused), 8);
+  EXPECT_EQ(static_cast<int>(FaultCause::kIgnoresStop), 12);
+  EXPECT_EQ(static_cast<int>(FaultCause::kSwings), 16);
+  EXPECT_EQ(row_of(FaultCause::kByWatchdog).number, 3U);
+  EXPECT_EQ(row_of(FaultCause::kOwnerLate).number, 3U);
+  EXPECT_EQ(row_of(FaultCause::kLinkStates).number, 2U);
+  EXPECT_EQ(row_of(FaultCause::kSunk).number, 5U);
+  EXPECT_EQ(row_of(FaultCause::kHomingInterrupted).number, 5U);
+}
+
+TEST(Faults, OfADriveOrABoardHaveWordsWithTheirAdvice) {
+  const RobotConfig robot = test::fake_robot();
+  const test::FakeBackend backend(robot);
+  EXPECT_EQ(backend.fault_text(FaultCause::kIgnoresStop, 0x8130),
+            "its drive does not obey the stop, and may still be enabled: cut its power (emergency "
+            "stop, STO)");
+  for (std::size_t i = 1; i < std::size(kCauseRows); ++i) {
+    const auto cause = static_cast<FaultCause>(i);
+    if (!is_of_drive(cause) || cause == FaultCause::kJointLost) continue;
+    const std::string text = backend.fault_text(cause, 0x8130);
+    EXPECT_FALSE(text.empty()) << i;
+    EXPECT_EQ(text.find_first_of("{}"), std::string::npos) << text;
+  }
+}
+
 }  // namespace
 }  // namespace tandem::hal

@@ -18,6 +18,25 @@ TEST(Event, SaysWhatHappenedInOneLine) {
   EXPECT_EQ(describe(event, kNames), "fault: no feedback of hip for 11 cycles");
   event = {.code = 1, .kind = EventKind::kFell};
   EXPECT_EQ(describe(event, kNames), "fault: the robot fell: its base is tilted");
+  event.code = 5;
+  EXPECT_EQ(describe(event, kNames), "fault: the robot fell: a foot is below the ground");
+  event.code = 6;
+  EXPECT_EQ(describe(event, kNames), "fault: the robot fell") << "of a newer program";
+  event = {.code = 1, .kind = EventKind::kEmergencyStop};
+  EXPECT_EQ(describe(event, kNames), "emergency stop by a signal");
+  event.code = 2;
+  EXPECT_EQ(describe(event, kNames), "emergency stop on request");
+  event.code = 3;
+  EXPECT_EQ(describe(event, kNames), "emergency stop by the watchdog");
+  event = {.code = 1, .kind = EventKind::kLinkLost};
+  EXPECT_EQ(describe(event, kNames), "link lost: the robot follows no command");
+  event.code = 2;
+  EXPECT_EQ(describe(event, kNames), "link lost: no state comes");
+  event = {.code = 108, .joint = 1, .kind = EventKind::kHot, .reported = 1};
+  EXPECT_EQ(describe(event, kNames), "hot winding of knee, reported");
+  event = {.code = 1, .joint = 0, .kind = EventKind::kHomingFailed};
+  EXPECT_EQ(describe(event, kNames),
+            "homing failed of hip: the drive reports a homing error (statusword bit 13)");
   event = {.code = static_cast<std::uint32_t>(Code::kOutOfRange),
            .joint = 1,
            .kind = EventKind::kLimited};

@@ -33,7 +33,8 @@ struct OddServer : testing::Test {
     ASSERT_TRUE(writer->write(sample));
   }
   void show(hal::StateImage& state, hal::CommandImage& command,
-            hal::StopCategory reaction = hal::StopCategory::kWarn) {
+            hal::StopCategory reaction = hal::StopCategory::kWarn,
+            hal::FaultCause cause = hal::FaultCause::kDrive) {
     const auto bytes = [](auto& image) {
       const auto size = static_cast<std::uint32_t>(image.bytes().size());
       return dds_sequence_octet{size, size, reinterpret_cast<std::uint8_t*>(image.bytes().data()),
@@ -46,7 +47,7 @@ struct OddServer : testing::Test {
     sample.reaction = static_cast<std::uint8_t>(reaction);
     sample.state = bytes(state);
     sample.command = bytes(command);
-    std::vector<std::uint8_t> causes(robot.joints.size());
+    std::vector<std::uint8_t> causes(robot.joints.size(), static_cast<std::uint8_t>(cause));
     const auto joints = static_cast<std::uint32_t>(causes.size());
     sample.causes = {joints, joints, causes.data(), false};
     say(kStateTopic, sample);
@@ -86,6 +87,20 @@ TEST_F(OddServer, ShowsNoNumbersAndIsNotFollowed) {
   show(good, command);
   ASSERT_TRUE(test::eventually([&] { return next(seen) == Code::kOk; }));
   EXPECT_EQ(seen.position_rad()[1], 0.25);
+}
+
+TEST_F(OddServer, TellsACauseThatNoDriveHas) {
+  using hal::FaultCause;
+  hal::StateImage state(robot.shape()), seen(robot.shape());
+  hal::CommandImage command(robot.shape());
+  const auto told = [&](FaultCause cause) {
+    show(state, command, hal::StopCategory::kWarn, cause);
+    EXPECT_TRUE(test::eventually([&] { return next(seen) == Code::kOk; }));
+    return owner->fault_cause(1);
+  };
+  EXPECT_EQ(told(FaultCause::kHeartbeatLost), FaultCause::kHeartbeatLost);
+  EXPECT_EQ(told(FaultCause::kOverrun), FaultCause::kDrive);
+  EXPECT_EQ(told(FaultCause::kNone), FaultCause::kDrive);
 }
 
 // Builds that number the stop categories in different ways had driven each other's robots.

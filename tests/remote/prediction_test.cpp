@@ -43,7 +43,7 @@ TEST(Prediction, AStateUnderACommandWhoseTwinIsNotKnownCorrectsNothing) {
 }
 
 TEST(Answers, TellStatesThatShowNoNewerCommandFromSilence) {
-  using hal::LinkLoss;
+  using hal::FaultCause;
   Answers answers(100);
   answers.start(1000);
   for (std::uint64_t cycle = 1000; cycle <= 1400; ++cycle) {
@@ -51,20 +51,20 @@ TEST(Answers, TellStatesThatShowNoNewerCommandFromSilence) {
       answers.take(std::min<std::uint64_t>(cycle - 300, 750), cycle);
     answers.count(cycle);
     if (cycle == 1150) {
-      EXPECT_EQ(answers.loss(), LinkLoss::kNone);
+      EXPECT_EQ(answers.loss(), FaultCause::kNone);
     }
     if (cycle == 1200) {
-      EXPECT_EQ(answers.loss(), LinkLoss::kStates);
+      EXPECT_EQ(answers.loss(), FaultCause::kLinkStates);
     }
     if (cycle == 1400) {
-      EXPECT_EQ(answers.loss(), LinkLoss::kCommands);
+      EXPECT_EQ(answers.loss(), FaultCause::kLinkCommands);
     }
   }
   EXPECT_EQ(answers.most_silent(), 200U);
   EXPECT_EQ(answers.most_unanswered(), 350U) << "since command 750 was seen in force";
   answers.take(751, 1401);
   answers.count(1401);
-  EXPECT_EQ(answers.loss(), LinkLoss::kNone);
+  EXPECT_EQ(answers.loss(), FaultCause::kNone);
 }
 
 TEST(Answers, ALoopThatStoodBlamesNobody) {
@@ -72,7 +72,7 @@ TEST(Answers, ALoopThatStoodBlamesNobody) {
   answers.start(0);
   answers.left_out(5000);
   answers.count(5050);
-  EXPECT_EQ(answers.loss(), hal::LinkLoss::kNone);
+  EXPECT_EQ(answers.loss(), hal::FaultCause::kNone);
   EXPECT_EQ(answers.silent(), 50U);
 }
 

@@ -286,6 +286,21 @@ TEST_P(FaultRow, MotorOverheats) {
   expect_stopped(rig, "0x4310");
 }
 
+TEST_P(FaultRow, MotorGetsHot) {
+  RowRig rig(GetParam());
+  rig.run();
+  Fault fault = of(FaultKind::kMotorOverheat);
+  fault.value = 110.0;
+  rig.inject(fault);
+  expect_row(rig.watch(200));
+  EXPECT_EQ(rig.cycle->phase(), RunPhase::kRunning) << "the run continues";
+  const std::vector<runtime::Fault> told = rig.cycle->faults();
+  ASSERT_EQ(told.size(), 1U) << "once";
+  EXPECT_EQ(told[0].joint, rig.robot.joints[0].name);
+  EXPECT_EQ(told[0].category, hal::StopCategory::kWarn);
+  EXPECT_TRUE(told[0].text.starts_with("its motor's winding is hot, 110 degC: ")) << told[0].text;
+}
+
 TEST_P(FaultRow, SupplySags) {
   RowRig rig(GetParam());
   rig.run();

@@ -28,7 +28,7 @@ struct FakeOwner : hal::RemoteCommandPort {
   std::int64_t wait_until_ns(const hal::PortView&) noexcept override { return 0; }
   void on_news(std::function<void()>) override {}
   hal::RemoteCommand exchange(const hal::PortView& view) noexcept override {
-    if (!here) return {.loss = std::exchange(loss, hal::OwnerLoss::kNone)};
+    if (!here) return {.loss = std::exchange(loss, hal::FaultCause::kNone)};
     if (std::exchange(comes, false)) {
       command.assign(view.command);
       command.position_rad()[0] = view.state.position_rad()[0];
@@ -44,7 +44,7 @@ struct FakeOwner : hal::RemoteCommandPort {
   hal::CommandImage command;
   bool here = false, comes = true;
   double speed_rad_s = kSpeed_rad_s;
-  hal::OwnerLoss loss = hal::OwnerLoss::kNone;
+  hal::FaultCause loss = hal::FaultCause::kNone;
 };
 
 /// In other modes than position control its first joint turns at kSpeed_rad_s.
@@ -155,7 +155,7 @@ void owner_comes(MovingRun& run) {
   run.owner.here = true;
 }
 void owner_is_lost(MovingRun& run) {
-  run.owner.loss = hal::OwnerLoss::kSilent;
+  run.owner.loss = hal::FaultCause::kOwnerSilent;
   run.owner.here = false;
 }
 

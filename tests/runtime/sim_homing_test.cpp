@@ -18,8 +18,8 @@
 namespace tandem::runtime {
 namespace {
 
+using hal::FaultCause;
 using hal::FaultKind;
-using hal::HomingError;
 using hal::HomingState;
 
 constexpr double kLowSwitch_rad = -2.995;
@@ -133,7 +133,7 @@ struct HomedSwing : ::testing::TestWithParam<Kind> {
     home();
     until_homed(30'000);
     EXPECT_EQ(homing().state, HomingState::kHomed)
-        << "method " << method << ": " << hal::to_string(homing().error);
+        << "method " << method << ": " << hal::row_of(homing().error).words;
     return 0.25 - off_rad();
   }
 
@@ -159,7 +159,7 @@ TEST_P(HomedSwing, IsHeldUntilItIsHomedAndThenKnowsWhereItIs) {
     steps(1);
     fastest = std::max(fastest, std::abs(backend->plant().joint(0).velocity_rad_s));
   }
-  ASSERT_EQ(homing().state, HomingState::kHomed) << hal::to_string(homing().error);
+  ASSERT_EQ(homing().state, HomingState::kHomed) << hal::row_of(homing().error).words;
   EXPECT_LT(fastest, 1.0);
   const double off = off_rad();
   EXPECT_NEAR(off, 0.0, 5e-4) << "at 0.1 rad/s a period's way past the switch's edge";
@@ -209,7 +209,7 @@ TEST_P(HomedSwing, StopsWhereItIsWhenTheHomingIsStopped) {
   ASSERT_TRUE(cycle->services().move_joint("swing", {}, RunServices::Patience{0}));
   until_homed();
   EXPECT_EQ(homing().state, HomingState::kNotHomed);
-  EXPECT_EQ(homing().error, HomingError::kStopped);
+  EXPECT_EQ(homing().error, FaultCause::kHomingStopped);
   const double rest = backend->plant().joint(0).position_rad;
   steps(500);
   EXPECT_NEAR(backend->plant().joint(0).position_rad, rest, 0.05);
@@ -232,7 +232,7 @@ TEST_P(HomedSwing, AFaultEndsTheHomingAndNothingMovesOn) {
   ASSERT_EQ(backend->robot().inject(fault), Code::kOk);
   until(RunPhase::kFaulted);
   EXPECT_EQ(homing().state, HomingState::kNotHomed);
-  EXPECT_EQ(homing().error, HomingError::kInterrupted);
+  EXPECT_EQ(homing().error, FaultCause::kHomingInterrupted);
   EXPECT_FALSE(home_refused().empty());
   steps(15'000);  // it swings out
   cycle->inbox().reset_faults();
@@ -336,7 +336,7 @@ TEST_P(HomedSwing, ThatHasNoHomeSwitchIsNotHomed) {
   home();
   until_homed(20'000);
   EXPECT_EQ(homing().state, HomingState::kNotHomed);
-  EXPECT_EQ(homing().error, HomingError::kDrive);
+  EXPECT_EQ(homing().error, FaultCause::kHomingDrive);
   EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
 }
 

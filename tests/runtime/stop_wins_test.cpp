@@ -106,7 +106,7 @@ std::vector<Stop> stops() {
         {in_words("owner"), category, [category](Robot& r) { r.port.wish.stop = category; }});
     all.push_back({in_words("signal"), category, [](Robot&) { (void)std::raise(SIGUSR1); }});
     all.push_back({in_words("owner that is lost"), category, [category](Robot& r) {
-                     r.port.wish.loss = hal::OwnerLoss::kSilent;
+                     r.port.wish.loss = hal::FaultCause::kOwnerSilent;
                      r.port.wish.on_loss = category;
                    }});
   }

@@ -97,7 +97,7 @@ bool LineMaster::collect() noexcept TANDEM_RT {
 }
 
 void LineMaster::take_frame(FrameBuffer& frame) noexcept {
-  if (ethercat::check_frame(frame.frame()) != ethercat::WireError::kNone) {
+  if (ethercat::check_frame(frame.frame()) != ethercat::LineError::kNone) {
     ++statistics_.malformed;
     return;
   }
@@ -308,7 +308,7 @@ void LineMaster::judge(std::int64_t now_ns) noexcept {
 void LineMaster::judge_line(std::int64_t now_ns) noexcept {
   if (cycle_.lost_in_row >= kSilentCycles && error_ != LineError::kSilent) {
     error_ = LineError::kSilent;
-    for (SlaveMaster& slave : slaves_) slave.fail(SlaveError::kGone, now_ns);
+    for (SlaveMaster& slave : slaves_) slave.fail(LineError::kGone, now_ns);
     return;
   }
   if (!watch_back_) return;
@@ -319,7 +319,7 @@ void LineMaster::judge_line(std::int64_t now_ns) noexcept {
     error_ = LineError::kCable;
     broken_cable_ = cycle_.reached;
     for (std::size_t i = broken_cable_; i < size(); ++i) {
-      if (slaves_[i].stage() != SlaveStage::kDown) slaves_[i].fail(SlaveError::kGone, now_ns);
+      if (slaves_[i].stage() != SlaveStage::kDown) slaves_[i].fail(LineError::kGone, now_ns);
     }
   }
   if (error_ != LineError::kNone && full_reach_ >= kCertain) {
@@ -366,10 +366,7 @@ std::string LineMaster::text() const {
     case LineError::kTooMany:
       say(std::to_string(found_) + " slaves answer, " + expected + " are described");
       break;
-    case LineError::kSecondMaster:
-      say("another master is at work on the wire; end it: two masters would take the slaves from "
-          "each other");
-      return all;
+    case LineError::kSecondMaster: say(to_string(error_)); return all;
     case LineError::kCable:
       say(broken_cable_ == 0
               ? std::string("the cable from the master to slave 0 is cut")
@@ -378,6 +375,7 @@ std::string LineMaster::text() const {
                     std::to_string(broken_cable_) + " (" + slaves_[broken_cable_].plan().name +
                     ") is cut, or the latter has no power");
       break;
+    default: break;
   }
   if (statistics_.strangers != 0) say("a second master is on the wire");
   for (const SlaveMaster& slave : slaves_) {

@@ -18,16 +18,6 @@ class Archive;
 
 namespace tandem::hal::ecat {
 
-/// What is wrong with the line as a whole.
-enum class LineError : std::uint8_t {
-  kNone = 0,
-  kSilent,        ///< no frame comes back
-  kTooFew,        ///< slaves, at the scan
-  kTooMany,       ///< slaves, at the scan
-  kCable,         ///< broken_cable()
-  kSecondMaster,  ///< frames of another one passed before any slave was spoken to
-};
-
 /// What a cycle brought.
 struct CycleReport {
   bool complete = false;           ///< every frame of process data came back

@@ -79,7 +79,7 @@ void Surveyor::take_frames() {
     count = link_->receive(came_);
     for (std::size_t i = 0; i < count; ++i) {
       const std::span<std::uint8_t> frame = came_[i].frame();
-      if (ethercat::check_frame(frame) != ethercat::WireError::kNone) continue;
+      if (ethercat::check_frame(frame) != ethercat::LineError::kNone) continue;
       ethercat::MacAddress source{};
       std::copy_n(frame.begin() + 6, source.size(), source.begin());
       source[0] &= static_cast<std::uint8_t>(~ethercat::kProcessedMark);

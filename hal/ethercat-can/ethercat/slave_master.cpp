@@ -35,7 +35,7 @@ SlaveMaster::SlaveMaster(const SlavePlan& plan, std::size_t position, const Slav
 }
 
 void SlaveMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
-  error_ = SlaveError::kNone;
+  error_ = LineError::kNone;
   look_wanted_ = difference_wanted_ = is_reference_ = goes_on_ = false;
   difference_ns_ = 0;
   enter(SlaveStage::kReset, now_ns);
@@ -57,18 +57,13 @@ void SlaveMaster::enter_state(SlaveStage stage, AlState state, std::int64_t now_
   wanted_ = state;
 }
 
-void SlaveMaster::fail(SlaveError error, std::int64_t now_ns) noexcept TANDEM_RT {
+void SlaveMaster::fail(LineError error, std::int64_t now_ns) noexcept TANDEM_RT {
   error_ = error;
   trouble_ns_ = now_ns;
   stage_ = SlaveStage::kDown;
 }
 
-bool SlaveMaster::hopeless() const noexcept {
-  if (stage_ != SlaveStage::kDown) return false;
-  return (error_ == SlaveError::kSii && sii_error_ != sii::Error::kNone) ||
-         error_ == SlaveError::kWrongIdentity || error_ == SlaveError::kNoMailbox ||
-         error_ == SlaveError::kNoMemory;
-}
+bool SlaveMaster::hopeless() const noexcept { return stage_ == SlaveStage::kDown && lasts(error_); }
 
 void SlaveMaster::clocks_latched(std::int64_t now_ns) noexcept TANDEM_RT {
   enter(SlaveStage::kClock, now_ns);
@@ -90,7 +85,7 @@ void SlaveMaster::process(std::int64_t now_ns, Exchange& exchange,
   const Request& request = exchange.at(position_);
   if (request.state == Request::State::kLost) {
     exchange.release(position_);
-    return fail(SlaveError::kNoAnswer, now_ns);
+    return fail(LineError::kNoAnswer, now_ns);
   }
   if (request.state == Request::State::kDone) {
     if (request.counter == 1) {
@@ -107,7 +102,7 @@ void SlaveMaster::process(std::int64_t now_ns, Exchange& exchange,
 void SlaveMaster::missed(std::int64_t now_ns) noexcept {
   if (mapped()) look_wanted_ |= std::exchange(part_, 0) >= 2;  // once more from its beginning
   if (++misses_ < kMisses) return;
-  fail(stage_ == SlaveStage::kRunning ? SlaveError::kGone : SlaveError::kNoAnswer, now_ns);
+  fail(stage_ == SlaveStage::kRunning ? LineError::kGone : LineError::kNoAnswer, now_ns);
 }
 
 void SlaveMaster::take(const Request& request, std::int64_t now_ns,
@@ -117,7 +112,7 @@ void SlaveMaster::take(const Request& request, std::int64_t now_ns,
     case SlaveStage::kReset:
       // Part 2 is the state; before it station address and control, after it all is switched off.
       if (part_ == 2 && state_of(get<std::uint16_t>(data.data())) != AlState::kInit) {
-        if (now_ns - since_ns_ >= plan_.state_time_ns) fail(SlaveError::kStateTimeout, now_ns);
+        if (now_ns - since_ns_ >= plan_.state_time_ns) fail(LineError::kStateTimeout, now_ns);
         return;
       }
       if (++part_ == 5) enter(SlaveStage::kFeatures, now_ns);
@@ -125,7 +120,6 @@ void SlaveMaster::take(const Request& request, std::int64_t now_ns,
     case SlaveStage::kFeatures:
       has_clock_ = (get<std::uint16_t>(&data[8]) & ethercat::kFeatureDc) != 0;
       sii_.clear();
-      sii_error_ = sii::Error::kNone;
       category_at_ = 2 * sii::kFixedWords;
       return enter(SlaveStage::kSii, now_ns);
     case SlaveStage::kSii: return take_sii(data, now_ns);
@@ -149,7 +143,7 @@ void SlaveMaster::take(const Request& request, std::int64_t now_ns,
                           reference.time_ns > sync0_start_ns_ + 2 * static_cast<std::uint64_t>(
                                                                         plan_.sync0_cycle_ns);
       if (off <= kSettledNs && pulses) return enter_state(SlaveStage::kOp, AlState::kOp, now_ns);
-      if (now_ns - since_ns_ >= kSettleTimeNs) fail(SlaveError::kClock, now_ns);
+      if (now_ns - since_ns_ >= kSettleTimeNs) fail(LineError::kClock, now_ns);
       return;
     }
     case SlaveStage::kReady:
@@ -165,11 +159,11 @@ void SlaveMaster::take_sii(Data data, std::int64_t now_ns) noexcept {
   }
   const auto control = get<std::uint16_t>(data.data());
   if ((control & ethercat::kSiiBusy) != 0) {
-    if (now_ns - since_ns_ >= plan_.state_time_ns) fail(SlaveError::kSii, now_ns);
+    if (now_ns - since_ns_ >= plan_.state_time_ns) fail(LineError::kSiiUnread, now_ns);
     return;
   }
   part_ = 0;
-  if ((control & ethercat::kSiiRefused) != 0) return fail(SlaveError::kSii, now_ns);
+  if ((control & ethercat::kSiiRefused) != 0) return fail(LineError::kSiiUnread, now_ns);
   const std::size_t size = (control & ethercat::kSiiReads8Bytes) != 0 ? 8 : 4;
   const Data part = data.subspan(kSiiAnswerAt, size);
   sii_.insert(sii_.end(), part.begin(), part.end());
@@ -183,9 +177,9 @@ void SlaveMaster::take_sii(Data data, std::int64_t now_ns) noexcept {
 }
 
 void SlaveMaster::read_sii_end(std::int64_t now_ns) noexcept {
-  sii_error_ = sii::parse(sii_, content_);
-  if (sii_error_ != sii::Error::kNone) return fail(SlaveError::kSii, now_ns);
-  if (!matches(plan_, content_.identity)) return fail(SlaveError::kWrongIdentity, now_ns);
+  const LineError unread = sii::parse(sii_, content_);
+  if (unread != LineError::kNone) return fail(unread, now_ns);
+  if (!matches(plan_, content_.identity)) return fail(LineError::kWrongIdentity, now_ns);
   const sii::Mailbox& box = content_.mailbox;
   const auto usable = [](std::size_t bytes) {
     return bytes >= ethercat::kMinMailboxBytes && bytes <= ethercat::kMaxMailboxBytes;
@@ -193,8 +187,8 @@ void SlaveMaster::read_sii_end(std::int64_t now_ns) noexcept {
   const bool coe = (content_.protocols & sii::kProtocolCoe) != 0 && usable(box.out_bytes) &&
                    usable(box.in_bytes);
   const bool asked = plan_.waits_in_preop || !steps_.empty();
-  if (!coe && asked) return fail(SlaveError::kNoMailbox, now_ns);
-  if (!find_memory()) return fail(SlaveError::kNoMemory, now_ns);
+  if (!coe && asked) return fail(LineError::kNoMailbox, now_ns);
+  if (!find_memory()) return fail(LineError::kNoMemory, now_ns);
   coe_.reset(station_, box);
   enter_state(SlaveStage::kPreOp, AlState::kPreOp, now_ns);
 }
@@ -217,9 +211,9 @@ void SlaveMaster::take_state(Data data, std::int64_t now_ns, SlaveStage next) no
   const auto status = get<std::uint16_t>(data.data());
   al_state_ = state_of(status);
   al_code_ = static_cast<AlCode>(get<std::uint16_t>(&data[4]));
-  if ((status & ethercat::kAlError) != 0) return fail(SlaveError::kRefused, now_ns);
+  if ((status & ethercat::kAlError) != 0) return fail(LineError::kRefused, now_ns);
   if (al_state_ == wanted_) return enter(next, now_ns);
-  if (now_ns - since_ns_ >= plan_.state_time_ns) fail(SlaveError::kStateTimeout, now_ns);
+  if (now_ns - since_ns_ >= plan_.state_time_ns) fail(LineError::kStateTimeout, now_ns);
 }
 
 void SlaveMaster::configure(std::int64_t now_ns, Exchange& exchange) noexcept {
@@ -240,7 +234,7 @@ void SlaveMaster::configure(std::int64_t now_ns, Exchange& exchange) noexcept {
   const CoeStep& step = steps_[step_];
   const bool good = coe_.status() == CoeClient::Status::kDone &&
                     (step.use == CoeUse::kWrite || std::ranges::equal(step.bytes, coe_.value()));
-  if (!good) return fail(SlaveError::kSdo, now_ns);
+  if (!good) return fail(LineError::kSdo, now_ns);
   ++step_;
   started_step_ = false;
 }
@@ -297,14 +291,14 @@ void SlaveMaster::take_running(Data data, std::int64_t now_ns) noexcept {
     al_code_ = static_cast<AlCode>(get<std::uint16_t>(&data[4]));
     const AlState right = stage_ == SlaveStage::kReady ? AlState::kSafeOp : AlState::kOp;
     if (al_state_ != right || (status & ethercat::kAlError) != 0) {
-      return fail(SlaveError::kLeftState, now_ns);
+      return fail(LineError::kLeftState, now_ns);
     }
     part_ = 3;
     return;
   }
   std::array<std::uint8_t, 2 * ethercat::kFmmuBytes> right{};
   put_fmmus(right);
-  if (part == 3 && !std::ranges::equal(data, right)) fail(SlaveError::kMappingLost, now_ns);
+  if (part == 3 && !std::ranges::equal(data, right)) fail(LineError::kMappingLost, now_ns);
 }
 
 }  // namespace tandem::hal::ecat

@@ -19,22 +19,7 @@ class Archive;
 
 namespace tandem::hal::ecat {
 
-/// Why a slave is not, or no longer, in OP.
-enum class SlaveError : std::uint8_t {
-  kNone = 0,
-  kNoAnswer,       ///< a register of it could not be read or written
-  kSii,            ///< its information memory cannot be read: sii_error()
-  kWrongIdentity,  ///< content() says what it is
-  kNoMailbox,      ///< it has none for CoE, and the plan has SDO steps
-  kSdo,            ///< a step was refused, or a check read something else: step(), abort_code()
-  kNoMemory,       ///< its SII names no memory for the process data
-  kRefused,        ///< it did not enter a state: wanted(), al_code()
-  kStateTimeout,   ///< it neither entered a state nor refused it: wanted()
-  kClock,          ///< its clock did not follow the reference
-  kLeftState,      ///< it left OP: al_state(), al_code()
-  kMappingLost,    ///< its FMMUs were changed: by a second master, or a restart
-  kGone,           ///< frames do not reach it
-};
+using ethercat::LineError;
 
 /// How far a slave is brought up.
 enum class SlaveStage : std::uint8_t {
@@ -106,7 +91,7 @@ class SlaveMaster {
   void go_on() noexcept TANDEM_RT { goes_on_ = true; }
   /// Lets it go to OP. @pre stage() == kReady, and its process data is exchanged every cycle
   void start(std::int64_t now_ns) noexcept TANDEM_RT;
-  void fail(SlaveError error, std::int64_t now_ns) noexcept TANDEM_RT;
+  void fail(LineError error, std::int64_t now_ns) noexcept TANDEM_RT;
   /// Something is wrong in the line: looks whether it is this slave. @pre stage() == kRunning
   void look() noexcept TANDEM_RT;
   /// Reads how far its clock is off, when it has nothing else to do.
@@ -120,12 +105,11 @@ class SlaveMaster {
   [[nodiscard]] bool mapped() const noexcept {
     return stage_ >= SlaveStage::kReady && stage_ != SlaveStage::kDown;
   }
-  [[nodiscard]] SlaveError error() const noexcept { return error_; }
+  [[nodiscard]] LineError error() const noexcept { return error_; }
   /// Whether it is down for what it is: another start finds the same.
   [[nodiscard]] bool hopeless() const noexcept;
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
   [[nodiscard]] const ethercat::sii::Content& content() const noexcept { return content_; }
-  [[nodiscard]] ethercat::sii::Error sii_error() const noexcept { return sii_error_; }
   [[nodiscard]] ethercat::AlState wanted() const noexcept { return wanted_; }
   [[nodiscard]] ethercat::AlState al_state() const noexcept { return al_state_; }
   [[nodiscard]] ethercat::AlCode al_code() const noexcept { return al_code_; }
@@ -174,7 +158,7 @@ class SlaveMaster {
   std::uint16_t station_;
 
   SlaveStage stage_ = SlaveStage::kWait;
-  SlaveError error_ = SlaveError::kNone;
+  LineError error_ = LineError::kNone;
   int part_ = 0;  ///< of the stage
   int misses_ = 0;
   std::int64_t since_ns_ = 0;  ///< when the stage began
@@ -192,7 +176,6 @@ class SlaveMaster {
   std::size_t step_ = 0;
   std::vector<std::uint8_t> sii_;
   std::size_t category_at_ = 0;  ///< bytes
-  ethercat::sii::Error sii_error_ = ethercat::sii::Error::kNone;
   ethercat::sii::Content content_;
   std::uint16_t outputs_memory_ = 0;
   std::uint16_t inputs_memory_ = 0;

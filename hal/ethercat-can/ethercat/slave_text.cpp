@@ -35,35 +35,29 @@ std::string SlaveMaster::text() const {
     return fmt::format("slave {} ({}): {}", position_, plan_.name, what);
   };
   switch (error_) {
-    case SlaveError::kNone: break;
-    case SlaveError::kNoAnswer: return say("does not answer under its address");
-    case SlaveError::kSii:
-      return say(sii_error_ == ethercat::sii::Error::kNone ? "its SII cannot be read"
-                                                           : to_string(sii_error_));
-    case SlaveError::kWrongIdentity:
+    case LineError::kWrongIdentity:
       return say("is another device: " + identity_text(content_.identity) + "; expected " +
                  identity_text(plan_.identity));
-    case SlaveError::kNoMailbox: return say("has no CoE mailbox, and is to be set up by SDO");
-    case SlaveError::kSdo: return say(step_text(steps_[step_], coe_));
-    case SlaveError::kNoMemory: return say("its SII names no memory for the process data");
-    case SlaveError::kRefused:
+    case LineError::kSdo: return say(step_text(steps_[step_], coe_));
+    case LineError::kRefused:
       return say(fmt::format("refused {}: {}", to_string(wanted_), code_text(al_code_)));
-    case SlaveError::kStateTimeout:
+    case LineError::kStateTimeout:
       return say(fmt::format("did not enter {} in time", to_string(wanted_)));
-    case SlaveError::kClock:
+    case LineError::kClock:
       return say(
           fmt::format("its clock, {} ns off the reference, or its SYNC0 was not ready in "
                       "time (a master in lockstep needs `tandem emulate --lockstep`)",
                       difference_ns_));
-    case SlaveError::kLeftState:
+    case LineError::kLeftState:
       return say(fmt::format("is in {}: {}", to_string(al_state_), code_text(al_code_)));
-    case SlaveError::kMappingLost: return say("its FMMUs were changed, by a second master perhaps");
-    case SlaveError::kGone:
-      return say(position_ == 0 ? "is gone: its cable from the master is cut, or it has no power"
-                                : fmt::format("is gone: a cable before it is cut, or there is no "
-                                              "power; see the line"));
+    case LineError::kGone:
+      if (position_ == 0) {
+        return say("is gone: its cable from the master is cut, or it has no power");
+      }
+      break;
+    default: break;
   }
-  return {};
+  return error_ == LineError::kNone ? std::string() : say(to_string(error_));
 }
 
 }  // namespace tandem::hal::ecat

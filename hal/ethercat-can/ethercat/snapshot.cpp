@@ -30,8 +30,8 @@ void ProcessImage::archive(Archive& ar) {
 void SlaveMaster::archive(Archive& ar) {
   ar(stage_, error_, part_, misses_, since_ns_, trouble_ns_, has_clock_, is_reference_,
      state_written_, look_wanted_, difference_wanted_, started_step_, goes_on_, wanted_, al_state_,
-     al_code_, step_, category_at_, sii_error_, outputs_memory_, inputs_memory_, behind_, delay_ns_,
-     offset_ns_, sync0_start_ns_, difference_ns_, coe_);
+     al_code_, step_, category_at_, outputs_memory_, inputs_memory_, behind_, delay_ns_, offset_ns_,
+     sync0_start_ns_, difference_ns_, coe_);
   ar(reference_times_.arrived, reference_times_.returned, reference_times_.behind,
      reference_times_.local_ns);
   std::size_t size = sii_.size();
