@@ -10,11 +10,24 @@
 namespace tandem::runtime {
 namespace {
 
+/// The row of a duration that may be "endless".
+constexpr Key<Experiment> or_endless(Key<Experiment> row) {
+  row.read = [](TomlTable& table, const KeyFacts& key, Experiment& e) {
+    if (!table.is_text(key.name)) return read_key(table, key, e.duration_s);
+    e.duration_s = kEndless_s;
+    const std::string word = table.text(key.name);
+    if (word == "endless") return;
+    table.error(key.name, "'" + word + "' is neither a number of seconds nor \"endless\"",
+                "write duration_s = 10.0, or \"endless\" for a run until it is stopped");
+  };
+  return row;
+}
+
 // A key a line.
 // clang-format off
 constexpr Key<Experiment> kRoot[] = {
   required(key<&Experiment::robot_file>("robot", "path of the robot.toml")),
-  required(key<&Experiment::duration_s>("duration_s", {0.0, 1e6, true}, "running time of the controllers, after the drives' bring-up. `--duration` overrides it")),
+  or_endless(required(key<&Experiment::duration_s>("duration_s", {0.0, 1e6, true}, "running time of the controllers, after the drives' bring-up; `\"endless\"`: until the run is stopped, or its controllers are done. `--duration` overrides it").within("> 0 to 1000000, or `\"endless\"`"))),
   key<&Experiment::seed>("seed", {0.0, 9.3e18}, "of every random generator. `--seed` overrides it"),
   key<&Experiment::posture>("posture", "where the simulated robot starts; required for a floating base").by_default("every joint at 0").within("a `[posture]` of the robot"),
   key<&Experiment::kernel_variant>("kernel_variant", "of the dynamics' library. `--kernel-variant` overrides it").by_default("the best that the CPU supports"),
