@@ -300,6 +300,7 @@ LoopAnswer ControllerHost::move(std::size_t joint, const MoveRequest& wish,
   } else if (command.mode()[joint] != kPositionMode) {
     answer.reason = RejectReason::kOtherMode;
   } else if (!std::isfinite(wish.target_rad)) {
+    recovers_[joint] = 0;
     (void)motions.stop(joint);
   } else if (recovers_[joint] != 0) {
     answer.reason = RejectReason::kRecovering;

@@ -214,7 +214,8 @@ void figures(Figures& f, const RunSummary* s) {
   f("ended",
     "`as planned`; `interrupted by SIGINT` (or another signal), in a run without an end `stopped "
     "by "
-    "SIGINT`; `on request` (`run.stop`); `by a fault`; `nobody reads its output any more`",
+    "SIGINT`; `on request` (`run.stop`); `its controllers were done` before the planned end; `by a "
+    "fault`; `nobody reads its output any more`",
     [&] { return s->ended(); });
   f("planned_cycles", "of the whole run; null: it has no planned end",
     [&] { return known(s->planned_cycles() > 0, s->planned_cycles()); });
@@ -481,7 +482,9 @@ std::string RunSummary::ended() const {
   }
   if (!faults.empty()) return "by a fault";
   if (early && rt::stop_requested()) return "nobody reads its output any more";
-  return early ? "on request" : "as planned";
+  if (!early) return "as planned";
+  const bool asked = server != nullptr || cycle.inbox().bell().ended();
+  return asked ? "on request" : "its controllers were done";
 }
 
 double RunSummary::sim_s() const {
