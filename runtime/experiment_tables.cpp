@@ -79,7 +79,7 @@ constexpr Key<rt::ThreadConfig> kRealtime[] = {
   key<&rt::ThreadConfig::lock_memory>("lock_memory", "lock all memory"),
 };
 constexpr Key<Experiment> kFaults[] = {
-  choice<&Experiment::after_stop>("after_stop", "end|wait", "after a stop of category 0 or 1: end the run with exit status 1, or wait for `tandem fault reset`; `run --on-fault` overrides it: [safety.md](safety.md)").by_default("`\"wait\"` on the wall clock, `\"end\"` in simulated time"),
+  choice<&Experiment::after_stop>("after_stop", "end|wait", "after a stop of category 0 or 1: end the run with exit status 1, or wait for `tandem fault reset`; `run --on-fault` overrides it: [safety.md](safety.md)").by_default("`\"wait\"` with boards on a bus in real time, `\"end\"` in simulation, with `--realtime`, too"),
   choice<&Experiment::after_reset>("after_reset", "hold|continue", "after `tandem fault reset`: hold every joint until `tandem controller start`, or let the controllers continue: [safety.md](safety.md#the-reset)"),
   choice<&Experiment::on_stray>("stray_writes", "category0|category1|category2|hold|warn", "reaction to a controller that writes to a joint, or a mode, that it has not claimed; the write is reverted in the same cycle and reported once ([controllers.md](controllers.md#claims))"),
   key<&Experiment::retreat_s>("retreat_s", {0.1, 60.0}, "the longest time of a retreat, in a stop of category 2; then the drives stop ([safety.md](safety.md#category-2-a-safe-posture-first))"),

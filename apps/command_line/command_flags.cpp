@@ -255,8 +255,8 @@ void add_flags(CLI::App& app, RunOptions& o) {
   app.add_flag("--report", o.report, "Draw the report after the run, from its log")
       ->excludes("--no-log");
   app.add_option("--on-fault", o.on_fault,
-                 "After a stop: end the run, or wait for `tandem fault reset` (default: wait on "
-                 "the wall clock, else end)")
+                 "After a stop: end the run, or wait for `tandem fault reset` (default: wait with "
+                 "boards on a bus in real time; end in simulation, with --realtime, too)")
       ->check(CLI::IsMember({"end", "wait"}));
   CLI::Option* dds = app.add_flag_callback(
       "--dds", [&o] { o.dds = true; }, "Publish the robot to ROS 2 and `tandem topic`");
