@@ -10,7 +10,10 @@
 #include <cerrno>
 #include <climits>
 #include <cstring>
+#include <filesystem>
 #include <vector>
+
+#include "base/nearest.hpp"
 
 namespace tandem {
 namespace {
@@ -41,6 +44,19 @@ unsigned long file_system(int descriptor) {
 
 bool is_kernels(unsigned long file_system) {
   return std::ranges::find(kKernelFiles, file_system) != kKernelFiles.end();
+}
+
+/// What to do about a file that is not there: the nearest name of its folder, if there is one.
+std::string where_else(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.parent_path();
+  std::vector<std::string> names;
+  std::error_code problem;
+  for (std::filesystem::directory_iterator at(folder.empty() ? "." : folder, problem), end;
+       !problem && at != end && names.size() < kMostLooked; at.increment(problem)) {
+    names.push_back(at->path().filename().string());
+  }
+  const std::string meant = nearest(file.filename().string(), names);
+  return meant.empty() ? kAway : "did you mean '" + (folder / meant).string() + "'?";
 }
 
 /// Empty, or why it is not read.
@@ -115,7 +131,8 @@ Result<Descriptor> open_to_read(const std::string& path, const std::string& hint
                                 std::uint64_t most_bytes) {
   constexpr const char* kCannot = "cannot read this file";
   struct stat found {};
-  if (::stat(path.c_str(), &found) != 0) return refusal(path, kCannot, kAway);
+  if (::stat(path.c_str(), &found) != 0)
+    return refusal(path, kCannot, errno == ENOENT ? where_else(path) : kAway);
   if (std::string why = unreadable(found); !why.empty()) return refusal(path, why, hint);
   Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
   if (!file.valid() || ::fstat(file.get(), &found) != 0) return refusal(path, kCannot, kAway);

@@ -178,6 +178,7 @@ std::shared_ptr<const model::Tree> Experiment::tree() const {
 }
 
 std::uint64_t Experiment::cycles() const {
+  if (endless()) return 0;
   return static_cast<std::uint64_t>(
       std::llround(duration_s * 1e9 / static_cast<double>(loop.period_ns)));
 }

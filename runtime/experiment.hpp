@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <expected>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -103,6 +104,9 @@ struct ParallelOptions {
   hal::RobotConfig robot;  ///< with [parallel.link.NAME]; to be completed with those
 };
 
+/// The length of a run that has no end: it runs until it is stopped.
+inline constexpr double kEndless_s = std::numeric_limits<double>::infinity();
+
 /// The whole experiment.toml with the robot it names.
 struct Experiment {
   std::string file;        ///< the TOML's path
@@ -110,7 +114,7 @@ struct Experiment {
   hal::RobotConfig robot;  ///< completed from its description
   robot::FileTexts files;  ///< all that was read, the TOML itself first
   std::shared_ptr<const model::UrdfModel> description;  ///< null when none was read
-  double duration_s = 0.0;  ///< that controllers run, after the bring-up
+  double duration_s = 0.0;  ///< that controllers run, after the bring-up; or kEndless_s
   std::uint64_t seed = 1;
   std::string posture;         ///< where the robot starts; empty: every joint at 0
   std::string kernel_variant;  ///< empty: the best that this CPU runs
@@ -136,7 +140,8 @@ struct Experiment {
 
   /// The description's tree; null when none was read.
   [[nodiscard]] std::shared_ptr<const model::Tree> tree() const;
-  /// Cycles that controllers run: duration over period, rounded.
+  [[nodiscard]] bool endless() const { return duration_s == kEndless_s; }
+  /// Cycles that controllers run: duration over period, rounded; 0 in a run without an end.
   [[nodiscard]] std::uint64_t cycles() const;
   /// Cycles that every joint is held before they do: settle_s over period, rounded up.
   [[nodiscard]] std::uint64_t settle_cycles() const;

@@ -10,11 +10,24 @@
 namespace tandem::runtime {
 namespace {
 
+/// The row of a duration that may be "endless".
+constexpr Key<Experiment> or_endless(Key<Experiment> row) {
+  row.read = [](TomlTable& table, const KeyFacts& key, Experiment& e) {
+    if (!table.is_text(key.name)) return read_key(table, key, e.duration_s);
+    e.duration_s = kEndless_s;
+    const std::string word = table.text(key.name);
+    if (word == "endless") return;
+    table.error(key.name, "'" + word + "' is neither a number of seconds nor \"endless\"",
+                "write duration_s = 10.0, or \"endless\" for a run until it is stopped");
+  };
+  return row;
+}
+
 // A key a line.
 // clang-format off
 constexpr Key<Experiment> kRoot[] = {
   required(key<&Experiment::robot_file>("robot", "path of the robot.toml")),
-  required(key<&Experiment::duration_s>("duration_s", {0.0, 1e6, true}, "running time of the controllers, after the drives' bring-up. `--duration` overrides it")),
+  or_endless(required(key<&Experiment::duration_s>("duration_s", {0.0, 1e6, true}, "running time of the controllers, after the drives' bring-up; `\"endless\"`: until the run is stopped, or its controllers are done. `--duration` overrides it").within("> 0 to 1000000, or `\"endless\"`"))),
   key<&Experiment::seed>("seed", {0.0, 9.3e18}, "of every random generator. `--seed` overrides it"),
   key<&Experiment::posture>("posture", "where the simulated robot starts; required for a floating base").by_default("every joint at 0").within("a `[posture]` of the robot"),
   key<&Experiment::kernel_variant>("kernel_variant", "of the dynamics' library. `--kernel-variant` overrides it").by_default("the best that the CPU supports"),
@@ -66,7 +79,7 @@ constexpr Key<rt::ThreadConfig> kRealtime[] = {
   key<&rt::ThreadConfig::lock_memory>("lock_memory", "lock all memory"),
 };
 constexpr Key<Experiment> kFaults[] = {
-  choice<&Experiment::after_stop>("after_stop", "end|wait", "after a stop of category 0 or 1: end the run with exit status 1, or wait for `tandem fault reset`; `run --on-fault` overrides it: [safety.md](safety.md)").by_default("`\"wait\"` on the wall clock, `\"end\"` in simulated time"),
+  choice<&Experiment::after_stop>("after_stop", "end|wait", "after a stop of category 0 or 1: end the run with exit status 1, or wait for `tandem fault reset`; `run --on-fault` overrides it: [safety.md](safety.md)").by_default("`\"wait\"` with boards on a bus in real time, `\"end\"` in simulation, with `--realtime`, too"),
   choice<&Experiment::after_reset>("after_reset", "hold|continue", "after `tandem fault reset`: hold every joint until `tandem controller start`, or let the controllers continue: [safety.md](safety.md#the-reset)"),
   choice<&Experiment::on_stray>("stray_writes", "category0|category1|category2|hold|warn", "reaction to a controller that writes to a joint, or a mode, that it has not claimed; the write is reverted in the same cycle and reported once ([controllers.md](controllers.md#claims))"),
   key<&Experiment::retreat_s>("retreat_s", {0.1, 60.0}, "the longest time of a retreat, in a stop of category 2; then the drives stop ([safety.md](safety.md#category-2-a-safe-posture-first))"),

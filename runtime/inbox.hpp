@@ -134,6 +134,7 @@ class Inbox {
   }
   void answer(const LoopAnswer& answer) noexcept TANDEM_RT { (void)put(answers_, answer); }
   [[nodiscard]] rt::Doorbell& bell() noexcept { return bell_; }
+  [[nodiscard]] const rt::Doorbell& bell() const noexcept { return bell_; }
 
  private:
   // One word: flags below, the count of emergency stops above them.

@@ -246,6 +246,7 @@ RejectReason JointReferences::move(std::size_t joint, const MoveRequest& wish,
   operator_.begin(state, command);
   if (command.mode()[joint] != kPositionMode) return RejectReason::kOtherMode;
   if (!std::isfinite(wish.target_rad)) {
+    recovers_[joint] = 0;
     (void)motions.stop(joint);
     return RejectReason::kNone;
   }

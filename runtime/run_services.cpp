@@ -24,7 +24,10 @@ Status errors_of(const TomlDocument& document) {
   const Diagnostics& errors = document.diagnostics();
   std::string all;
   for (std::size_t i = 0; i < std::min(kMost, errors.size()); ++i) {
-    all += (all.empty() ? "" : "; ") + errors[i].to_string();
+    Error one = errors[i];
+    if (one.hint.starts_with("add it to the table"))
+      one.hint = "give it with --set or --parameters";
+    all += (all.empty() ? "" : "; ") + one.to_string();
   }
   if (errors.size() > kMost) all += "; and " + std::to_string(errors.size() - kMost) + " more";
   if (all.empty()) return {};

@@ -162,7 +162,8 @@ Result<Json> question_of(const AskedOptions& options, const Form& form) {
 }  // namespace
 
 void tell_done(const Json& answer) {
-  if (answer.value("done", false)) fmt::print("done in cycle {}\n", answer.value("cycle", 0));
+  if (answer.value("done", false) && answer.contains("cycle"))
+    fmt::print("done in cycle {}\n", answer.value("cycle", 0));
   if (answer.contains("note")) fmt::print("{}\n", shown(answer.value("note", ""), 2'000));
 }
 

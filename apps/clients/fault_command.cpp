@@ -125,7 +125,8 @@ Exit tell_stop(const Result<Json>& answer, const Json& question, const std::stri
   }
   const std::string category = shown(answer->value("category", "?"));
   const bool no_retreat = question.value("category", -1) == 2 && category == "category1";
-  fmt::print("{}{}emergency stop, {}{}\n", shown(who), who.empty() ? "" : ": ", category,
+  fmt::print("{}{}emergency stop, {}{}\n", shown(who), who.empty() ? "" : ": ",
+             category_words(category),
              no_retreat ? ": no active controller can bring the robot to a safe posture" : "");
   if (answer->value("paused", false)) fmt::print("{}\n", kKept);
   std::fflush(stdout);  // before an error of the next run

@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -122,6 +123,15 @@ CLI::Validator a_duration() {
   return {check, "above 0, to 1e6"};
 }
 
+/// The length of a run: a duration, or "endless".
+CLI::Validator a_run_length() {
+  const auto check = [](std::string& text) -> std::string {
+    const std::string problem = text == "endless" ? "" : a_duration()(text);
+    return problem.empty() ? "" : problem + ", nor endless";
+  };
+  return {check, "above 0, to 1e6, or endless"};
+}
+
 /// Number that the whole of `text` is; CLI11's own cast lets a number overflow.
 std::optional<std::int64_t> whole_number(const std::string& text) {
   std::int64_t number = 0;
@@ -225,8 +235,15 @@ void add_target(CLI::App& app, ControlTarget& target) {
 void add_flags(CLI::App& app, RunOptions& o) {
   app.add_option("experiment", o.experiment, "Experiment TOML")->required();
   add_loop_flags(app, o);
-  app.add_option("--duration", o.duration_s, "Seconds to run, instead of the experiment's")
-      ->check(a_duration());
+  const auto run_for = [&o](const std::string& text) {
+    double seconds = std::numeric_limits<double>::infinity();  // which no number may be
+    if (text != "endless") CLI::detail::lexical_cast(text, seconds);
+    o.duration_s = seconds;
+  };
+  app.add_option_function<std::string>("--duration", run_for,
+                                       "Seconds to run, or endless, instead of the experiment's")
+      ->type_name("SECONDS")
+      ->check(a_run_length());
   app.add_option("--hal", o.hal, "Backend: where the robot is (default: the experiment's, or sim)")
       ->check(CLI::IsMember({"sim", "can", "ethercat", "dds"}));
   app.add_flag(
@@ -238,8 +255,8 @@ void add_flags(CLI::App& app, RunOptions& o) {
   app.add_flag("--report", o.report, "Draw the report after the run, from its log")
       ->excludes("--no-log");
   app.add_option("--on-fault", o.on_fault,
-                 "After a stop: end the run, or wait for `tandem fault reset` (default: wait on "
-                 "the wall clock, else end)")
+                 "After a stop: end the run, or wait for `tandem fault reset` (default: wait with "
+                 "boards on a bus in real time; end in simulation, with --realtime, too)")
       ->check(CLI::IsMember({"end", "wait"}));
   CLI::Option* dds = app.add_flag_callback(
       "--dds", [&o] { o.dds = true; }, "Publish the robot to ROS 2 and `tandem topic`");

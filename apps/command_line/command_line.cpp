@@ -76,6 +76,22 @@ bool has_its_argument(const CLI::App& app) {
   return !options.empty();
 }
 
+/// "tandem model build": as typed, for the pointer to its help.
+std::string path_of(const CLI::App& app) {
+  const CLI::App* parent = app.get_parent();
+  return parent == nullptr ? app.get_name() : path_of(*parent) + " " + app.get_name();
+}
+
+/// "LOG, OTHER": the arguments that are no flags, as the help names them.
+std::string arguments_of(const CLI::App& app) {
+  std::string names;
+  for (const CLI::Option* option : app.get_options()) {
+    if (!option->get_positional()) continue;
+    names += (names.empty() ? "" : ", ") + option->get_name();
+  }
+  return names;
+}
+
 /// The message for words that fit nowhere, with the nearest that would.
 std::string unknown_word(const CLI::App& app, const std::string& word) {
   const bool flag = word.starts_with('-');
@@ -83,16 +99,13 @@ std::string unknown_word(const CLI::App& app, const std::string& word) {
   const std::string name = word.substr(0, word.find('='));
   if (!flag && (known.empty() || has_its_argument(app))) {
     const std::string takes = flag_that_takes(app, word);
-    return fmt::format("'{}' is one argument too many{}", word,
-                       takes.empty() ? "" : fmt::format(": did you mean {} {}?", takes, word));
+    const std::string named = arguments_of(app);
+    return fmt::format("'{}' is one argument too many: {}", word,
+                       !takes.empty()  ? fmt::format("did you mean {} {}?", takes, word)
+                       : named.empty() ? path_of(app) + " takes none"
+                                       : path_of(app) + " takes " + named);
   }
   return fmt::format("unknown {} '{}': {}", flag ? "flag" : "command", name, suggest(name, known));
-}
-
-/// "tandem model build": as typed, for the pointer to its help.
-std::string path_of(const CLI::App& app) {
-  const CLI::App* parent = app.get_parent();
-  return parent == nullptr ? app.get_name() : path_of(*parent) + " " + app.get_name();
 }
 
 Exit report_usage_error(const CLI::App& command, const std::string& message) {

@@ -131,8 +131,8 @@ const std::vector<CommandRow> kRows{
       local(flag("wait", "--wait",
                  "until it has arrived: status 0; 1 when the motion ended elsewhere. Ctrl-C ends "
                  "the waiting, not the motion: tandem joint stop"))}},
-    {"joint.stop", kChanges, "brakes a joint that joint.move or joint.home leads", {kJoint}},
-    {"joint.halt", kChanges, "brakes every joint that joint.move or joint.home leads"},
+    {"joint.stop", kChanges, "brakes a joint that `joint move`, `home` or `recover` leads", {kJoint}},
+    {"joint.halt", kChanges, "brakes every joint that `joint move`, `home` or `recover` leads"},
     {"joint.home", kChanges,
      "lets the drive of a joint find the joint's place, as its `homing` in robot.toml says; the "
      "command line waits for that: status 1 when it failed", {kJoint}},

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <span>
 
+#include "apps/control/fault_table.hpp"
+
 namespace tandem::apps {
 namespace {
 
@@ -120,8 +122,9 @@ void fill_emergency_stop(const Json& answer, dds::std_srvs::Trigger_Response& re
                          ReplyMemory& memory) {
   reply.success = answer.value("ok", false);
   const std::string category = answer.value("category", std::string());
-  reply.message = memory.text(reply.success ? "emergency stop, " + category + when(answer)
-                                            : message_of(answer));
+  reply.message =
+      memory.text(reply.success ? "emergency stop, " + category_words(category) + when(answer)
+                                : message_of(answer));
 }
 
 void fill_clear_faults(const Json& answer, dds::std_srvs::Trigger_Response& reply,

@@ -15,6 +15,12 @@ const char* reaction_text(hal::StopCategory category) {
   return "?";
 }
 
+std::string category_words(std::string category) {
+  if (!category.empty() && category.back() >= '0' && category.back() <= '9')
+    category.insert(category.size() - 1, " ");
+  return category;
+}
+
 Json faults_json(const std::vector<runtime::Fault>& faults) {
   Json list = Json::array();
   for (const runtime::Fault& fault : faults) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdio>
+#include <string>
 #include <vector>
 
 #include "apps/text/console.hpp"
@@ -12,6 +13,9 @@ namespace tandem::apps {
 
 /// "every joint held".
 [[nodiscard]] const char* reaction_text(hal::StopCategory category);
+
+/// "category 1" of the JSON's "category1".
+[[nodiscard]] std::string category_words(std::string category);
 
 /// A list of objects: docs/json.md, `fault_log`.
 [[nodiscard]] Json faults_json(const std::vector<runtime::Fault>& faults);

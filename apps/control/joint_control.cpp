@@ -235,6 +235,11 @@ Result<Json> halt(const Run& run) {
     halted.push_back(joint.name);
   }
   if (!refused) return std::unexpected(refused.error());
+  if (halted.empty()) {
+    return Json{{"done", true},
+                {"note", "nothing has moved by joint move, home or recover"},
+                {"joints", std::move(halted)}};
+  }
   return Json{{"done", done}, {"cycle", cycle}, {"joints", std::move(halted)}};
 }
 

@@ -118,8 +118,10 @@ void print_plan(const Composition& c, std::FILE* out) {
   if (c.controllers == nullptr) {
     facts.add("", "their parameters and claims are checked when there are kernels");
   }
-  facts.add("loop", fmt::format("{:.3g} kHz, {}, {:.3f} s after bring-up", 1e-3 / period_s,
-                                counted(e.cycles(), "cycle"), e.duration_s));
+  const std::string length =
+      e.endless() ? "after bring-up " + length_text(e)
+                  : counted(e.cycles(), "cycle") + ", " + length_text(e) + " after bring-up";
+  facts.add("loop", fmt::format("{:.3g} kHz, {}", 1e-3 / period_s, length));
   add_simulation_facts(e, facts);
   facts.add("seed", std::to_string(e.seed));
   add_estimation_facts(e, facts);

@@ -32,6 +32,11 @@ std::string hal_name(const runtime::Experiment& e) {
   return hal.lockstep ? name + " lockstep" : name;
 }
 
+std::string length_text(const runtime::Experiment& e) {
+  if (e.endless()) return "until it is stopped";
+  return fmt::format("{:.3f} s", static_cast<double>(e.cycles() * e.loop.period_ns) * 1e-9);
+}
+
 void figures(Figures& f, const runtime::Experiment* e) {
   const auto here = [e] { return e->hal.backend == runtime::BackendKind::kSim; };
   f("engine", "`[sim] engine`; null where no plant is in this process",

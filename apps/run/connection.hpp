@@ -41,6 +41,9 @@ struct Composition : Wires, runtime::Composition {};
 /// "sim", "can", "can lockstep", "ethercat", "dds", "dds lockstep", for logs and summaries.
 [[nodiscard]] std::string hal_name(const runtime::Experiment& e);
 
+/// How long it runs: "5.000 s", "until it is stopped".
+[[nodiscard]] std::string length_text(const runtime::Experiment& e);
+
 /// Who moves the bodies: `engine` and `engine_version`.
 void figures(Figures& f, const runtime::Experiment* e);
 

@@ -87,11 +87,6 @@ std::string pace_text(const Composition& c) {
          (loop.start_paused ? ", paused: tandem clock resume" : "");
 }
 
-std::string length_text(const runtime::Experiment& e) {
-  if (e.cycles() == 0) return "until it is stopped";
-  return fmt::format("{:.3f} s", static_cast<double>(e.cycles() * e.loop.period_ns) * 1e-9);
-}
-
 std::string served_text(const runtime::Experiment& e) {
   return fmt::format("served in DDS domain {}, {}", e.dds.domain,
                      e.remote.lockstep ? "in lockstep, " : "");
@@ -250,7 +245,9 @@ class Session {
                counted(e.robot.joints.size(), "joint"), length_text(e),
                1e6 / static_cast<double>(e.loop.period_ns), options_.serves ? served_text(e) : "",
                pace_text(c_));
-    if (recorder_ != nullptr) fmt::print(out_, "log: {}\n", recorder_->path());
+    if (recorder_ == nullptr) return;
+    fmt::print(out_, "log: {}\n", recorder_->path());
+    if (e.endless()) fmt::print(out_, "     {}\n", log_growth(c_, recorder_->path()));
   }
 
   /// What may be asked of the run, and the ways in: the control socket and the services over DDS.

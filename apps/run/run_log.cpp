@@ -61,11 +61,10 @@ log::RunInfo info_of(const Composition& c) {
   return info;
 }
 
-/// Bytes that the run will write at most: what is compressed takes less.
-std::uint64_t bytes_needed(const Composition& c) {
+/// Bytes that a cycle adds to the log at most: what is compressed takes less.
+double bytes_per_cycle(const Composition& c) {
   const runtime::Experiment& e = c.experiment;
   constexpr std::uint64_t kMessageOverhead = 64;
-  constexpr std::uint64_t kFixed = 1'000'000;
   std::uint64_t cycle_bytes = hal::StateImage(e.robot.shape()).bytes().size() +
                               hal::CommandImage(e.robot.shape()).bytes().size();
   if (c.sim != nullptr && e.sim.ground_truth) cycle_bytes += c.sim->truth().bytes().size();
@@ -78,9 +77,8 @@ std::uint64_t bytes_needed(const Composition& c) {
   const std::uint64_t view_bytes = 4 * kMessageOverhead + 64 * e.robot.joints.size();
   const auto cycles_per_view =
       std::max<std::int64_t>(1, log::RobotView::kPeriod_ns / e.loop.period_ns);
-  const std::uint64_t views = e.cycles() / static_cast<std::uint64_t>(cycles_per_view) + 1;
-  const std::uint64_t whole =
-      e.cycles() * (cycle_bytes + 3 * kMessageOverhead) + views * view_bytes + kFixed;
+  const double whole = static_cast<double>(cycle_bytes + 3 * kMessageOverhead) +
+                       static_cast<double>(view_bytes) / static_cast<double>(cycles_per_view);
   switch (e.log.compression) {
     case runtime::LogCompression::kNone: return whole;
     case runtime::LogCompression::kLz4: return whole / 2;  // a third and more of a robot that moves
@@ -88,6 +86,9 @@ std::uint64_t bytes_needed(const Composition& c) {
   }
   return whole;
 }
+
+/// What a file has beside its cycles, and one without an end at the least.
+constexpr std::uint64_t kFixed_bytes = 1'000'000;
 
 Error folder_error(const std::string& folder, std::string message) {
   return {.message = std::move(message),
@@ -151,6 +152,17 @@ log::RecorderOptions recorder_options(const Composition& c) {
 
 }  // namespace
 
+std::string log_growth(const Composition& c, const std::string& path) {
+  const double rate = bytes_per_cycle(c) * 1e9 / static_cast<double>(c.experiment.loop.period_ns);
+  struct statvfs disk {};
+  std::string room;
+  if (statvfs(path.c_str(), &disk) == 0) {
+    const double free = static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize);
+    room = fmt::format("; the disk has room for {:.1f} h of it", free / rate / 3600.0);
+  }
+  return fmt::format("at most {:.2f} MB for each second{}", rate * 1e-6, room);
+}
+
 std::vector<std::string> controller_lines(const runtime::ControllerHost& host) {
   std::vector<std::string> lines;
   for (const runtime::ControllerCode& one : host.code()) {
@@ -160,7 +172,10 @@ std::vector<std::string> controller_lines(const runtime::ControllerHost& host) {
 }
 
 Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& folder) {
-  if (const Status s = check_folder(folder, bytes_needed(c)); !s) return std::unexpected(s.error());
+  const auto cycles = static_cast<double>(c.experiment.cycles());
+  const std::uint64_t needed =
+      static_cast<std::uint64_t>(cycles * bytes_per_cycle(c)) + kFixed_bytes;
+  if (const Status s = check_folder(folder, needed); !s) return std::unexpected(s.error());
   const std::string name =
       c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
   auto claimed = claim_file(folder, name);

@@ -20,6 +20,10 @@ namespace tandem::apps {
 [[nodiscard]] Result<std::unique_ptr<log::Recorder>> open_log(const Composition& composition,
                                                               const std::string& folder);
 
+/// How fast the log at `path` grows, and for how long there is room: "at most 0.84 MB for each
+/// second; the disk has room for 6.1 h of it".
+[[nodiscard]] std::string log_growth(const Composition& composition, const std::string& path);
+
 /// "NAME SHA256 PATH" of every plugin that a host was given.
 [[nodiscard]] std::vector<std::string> controller_lines(const runtime::ControllerHost& host);
 

@@ -212,7 +212,9 @@ void figures(Figures& f, const RunSummary* s) {
   f("hal", "backend: `sim`, `can`, `ethercat`, `dds`, …", [&] { return hal_name(e()); });
   f("seed", "of every random generator", [&] { return e().seed; });
   f("ended",
-    "`as planned`; `interrupted by SIGINT` (or another signal); `on request` (`run.stop`); `by a "
+    "`as planned`; `interrupted by SIGINT` (or another signal), in a run without an end `stopped "
+    "by "
+    "SIGINT`; `on request` (`run.stop`); `its controllers were done` before the planned end; `by a "
     "fault`; `nobody reads its output any more`",
     [&] { return s->ended(); });
   f("planned_cycles", "of the whole run; null: it has no planned end",
@@ -473,13 +475,16 @@ bool RunSummary::cut_short() const {
 std::string RunSummary::ended() const {
   const bool early = planned_cycles() == 0 || cycle.running_cycles() < planned_cycles();
   if (early && interrupted_by != 0) {
+    const char* how = planned_cycles() == 0 ? "stopped" : "interrupted";
     const char* name = ::sigabbrev_np(interrupted_by);
-    if (name != nullptr) return fmt::format("interrupted by SIG{}", name);
-    return fmt::format("interrupted by SIGRTMIN+{}", interrupted_by - SIGRTMIN);
+    if (name != nullptr) return fmt::format("{} by SIG{}", how, name);
+    return fmt::format("{} by SIGRTMIN+{}", how, interrupted_by - SIGRTMIN);
   }
   if (!faults.empty()) return "by a fault";
   if (early && rt::stop_requested()) return "nobody reads its output any more";
-  return early ? "on request" : "as planned";
+  if (!early) return "as planned";
+  const bool asked = server != nullptr || cycle.inbox().bell().ended();
+  return asked ? "on request" : "its controllers were done";
 }
 
 double RunSummary::sim_s() const {
@@ -556,7 +561,9 @@ void RunSummary::print(std::FILE* out) const {
     fmt::print(out, "\n");
   }
   Facts facts;
-  if (cut_short()) {
+  if (composition.experiment.endless()) {
+    add_figures(facts, run, "ended", "{ended} after {sim_seconds:.3f s}");
+  } else if (cut_short()) {
     const auto planned = static_cast<double>(planned_cycles()) *
                          static_cast<double>(composition.experiment.loop.period_ns) * 1e-9;
     add_figures(facts, run, "ended",

@@ -359,15 +359,32 @@ std::vector<std::string> broken(const std::string& text, std::size_t most) {
   return lines;
 }
 
-/// Makes the widest column so narrow that a line has at most 100 characters, or it has 24.
-void narrow(std::vector<std::size_t>& columns) {
+/// The longest word of a column, where no line can be broken.
+std::size_t longest_word(const std::vector<std::vector<std::string>>& rows, std::size_t column) {
+  std::size_t longest = 0;
+  for (const auto& row : rows) {
+    if (column >= row.size()) continue;
+    std::istringstream words(row[column]);
+    for (std::string word; words >> word;) longest = std::max(longest, width(word));
+  }
+  return longest;
+}
+
+/// Makes the widest column that has blanks so narrow that a line has at most 100 characters, or it
+/// has 24, or its longest word.
+void narrow(std::vector<std::size_t>& columns, const std::vector<std::vector<std::string>>& rows) {
   constexpr std::size_t kLine = 100;
   constexpr std::size_t kLeast = 24;
   std::size_t line = 0;
   for (const std::size_t column : columns) line += column + 2;
-  const auto widest = std::ranges::max_element(columns);
-  if (line <= kLine || *widest <= kLeast) return;
-  *widest = std::max(kLeast, *widest - std::min(*widest, line - kLine));
+  std::size_t widest = 0, gain = 0;
+  for (std::size_t i = 0; line > kLine && i < columns.size(); ++i) {
+    const std::size_t least = std::max(kLeast, longest_word(rows, i));
+    if (columns[i] <= least || (gain > 0 && columns[i] <= columns[widest])) continue;
+    widest = i;
+    gain = columns[i] - least;
+  }
+  if (gain > 0) columns[widest] -= std::min(gain, line - kLine);
 }
 
 }  // namespace
@@ -383,7 +400,7 @@ void Table::print(std::FILE* out) const {
     columns.resize(std::max(columns.size(), row.size()), 0);
     for (std::size_t i = 0; i < row.size(); ++i) columns[i] = std::max(columns[i], width(row[i]));
   }
-  if (left_) narrow(columns);
+  if (left_) narrow(columns, rows_);
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     if (rows_[r].empty()) continue;
     std::vector<std::vector<std::string>> cells;

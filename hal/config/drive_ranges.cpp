@@ -6,6 +6,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <numbers>
+#include <tuple>
 
 #include "canopen/data_sheet.hpp"
 #include "canopen/drive_abilities.hpp"
@@ -196,10 +197,14 @@ class RangeCheck {
       wrong("zero_speed_rad_s", "is more than speed_rad_s",
             "the last way, to the zero, is the slower one");
     }
-    for (const auto& [key, value] : {std::pair{"speed_rad_s", homing.speed_rad_s},
-                                     {"zero_speed_rad_s", homing.zero_speed_rad_s},
-                                     {"acceleration_rad_s2", homing.acceleration_rad_s2}}) {
-      const double units = velocity_units(value);
+    const auto of_velocity = [&](const char* key, double value) {
+      return std::tuple(key, value, velocity_units(value));
+    };
+    for (const auto& [key, value, units] :
+         {of_velocity("speed_rad_s", homing.speed_rad_s),
+          of_velocity("zero_speed_rad_s", homing.zero_speed_rad_s),
+          std::tuple("acceleration_rad_s2", homing.acceleration_rad_s2,
+                     acceleration_units(homing.acceleration_rad_s2))}) {
       if (units >= 0.5 && units <= kMost) continue;
       wrong(
           key,

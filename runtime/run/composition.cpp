@@ -153,7 +153,7 @@ std::expected<Experiment, Diagnostics> read_served(const std::string& file) {
 /// Without controllers and without an end; DDS is what it is for.
 void serve_only(Experiment& e, bool lockstep) {
   e.controllers.clear();
-  e.duration_s = 0.0;
+  e.duration_s = kEndless_s;
   e.hal.delay_cycles = 0;  // the owner's is in its commands
   e.dds.enabled = true;
   e.remote.command = e.remote.command.value_or(RemoteCommand::kLocal);
@@ -261,7 +261,7 @@ Diagnostics without_effect(const Experiment& e, const Overrides& overrides) {
 
 /// Why it cannot be run, whatever the robot.
 Diagnostics unfit(const Experiment& e, const Overrides& overrides) {
-  if (e.cycles() == 0) {
+  if (!e.endless() && e.cycles() == 0) {
     return {{.message = fmt::format("{} s are less than half a cycle of the loop", e.duration_s),
              .hint = fmt::format("run for {} s or longer",
                                  static_cast<double>(e.loop.period_ns) * 1e-9),

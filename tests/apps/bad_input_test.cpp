@@ -133,10 +133,12 @@ TEST_F(BadInput, AnExperimentInPlaceOfARobotIsRefusedWithTheRobotsCommand) {
 }
 
 TEST_F(BadInput, ADurationThatIsNoneIsRefusedInOneShortLine) {
-  for (const std::string text : {"0", "-3", "nan", "inf", "1e300", "soon"}) {
+  for (const std::string text : {"0", "-3", "nan", "inf", "1e300", "endles", "Endless"}) {
     const Outcome outcome = tandem("run hold.toml --duration " + text);
     EXPECT_EQ(outcome.status, 2) << outcome.err;
-    EXPECT_NE(outcome.err.find("--duration: '" + text + "' is no number of seconds above 0"),
+    EXPECT_NE(outcome.err.find("--duration: '" + text +
+                               "' is no number of seconds above 0, and up to 1000000, "
+                               "nor endless"),
               std::string::npos)
         << outcome.err;
     EXPECT_LT(outcome.err.size(), 150U) << outcome.err;
@@ -154,6 +156,35 @@ TEST_F(BadInput, AnEmptyNameIsRefusedAsOne) {
 
 TEST_F(BadInput, AMissingRobotIsNoExperimentToRepair) {
   expect_refused({"error: nothing.toml: cannot read this file"}, "check nothing.toml --repair");
+}
+
+TEST_F(BadInput, AFileThatIsNotThereIsRefusedWithTheNearestName) {
+  expect_refused({"hodl.toml: cannot read this file (did you mean 'hold.toml'?)"}, "run hodl.toml");
+  expect_refused({"../hodl.toml: cannot read this file (check the path and its permissions)"},
+                 "run ../hodl.toml");
+  expect_refused({"/rbot.toml: cannot read this file (did you mean '", "/robot.toml'?)"},
+                 "model info " + shell_word((folder_ / "rbot.toml").string()));
+  edit("hold.toml", "robot.toml", "robots.toml");
+  expect_refused({"robots.toml: cannot read this file (did you mean 'robot.toml'?"},
+                 "check hold.toml");
+}
+
+// `log diff *.mcap` of three logs had said which one is too many, and not how many it takes.
+TEST_F(BadInput, AnArgumentTooManyIsRefusedWithThoseThatThereAre) {
+  const Outcome diff = tandem("log diff a.mcap b.mcap c.mcap");
+  EXPECT_EQ(diff.status, 2);
+  EXPECT_NE(diff.err.find("'c.mcap' is one argument too many: tandem log diff takes log, other\n"),
+            std::string::npos)
+      << diff.err;
+  const Outcome list = tandem("joint halt joint1");
+  EXPECT_NE(list.err.find("'joint1' is one argument too many: tandem joint halt takes none"),
+            std::string::npos)
+      << list.err;
+}
+
+// With --realtime, which is a simulation, a run ends; the help had said that it waits.
+TEST_F(BadInput, OfARunsHelpSaysWhatARealtimeSimulationDoesAfterAStop) {
+  EXPECT_NE(tandem("run --help").out.find("with --realtime, too"), std::string::npos);
 }
 
 TEST_F(BadInput, AnEmptyFileIsRefusedAsOne) {

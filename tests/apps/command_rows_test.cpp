@@ -26,6 +26,14 @@ TEST(CommandRows, HaveNamesAndKeysThatAreUnlikeEachOther) {
   }
 }
 
+/// `joint halt` had spoken of "joint.move", which nobody can type.
+TEST(CommandRows, SpeakOfCommandsAsTheyAreTyped) {
+  for (const CommandRow& row : command_rows()) {
+    for (const CommandRow& other : command_rows())
+      EXPECT_EQ(row.doc.find(other.name + " "), std::string::npos) << row.name << ": " << row.doc;
+  }
+}
+
 /// Words in backticks of the cells that show requests, in the section of what a process is asked.
 std::set<std::string> documented() {
   std::ifstream file(TANDEM_SOURCE_DIR "/docs/json.md");

@@ -60,6 +60,8 @@ TEST_F(Controllers, ThatAreBrokenAreRefusedWhileTheRunGoesOn) {
   for (const char* name : {"exits", "exits_when_made"})  // it had ended the run
     expect(refused(broken(name)), "the controller called exit()");
   expect(refused("controller load hodl"), "did you mean 'hold'?");
+  expect(refused("controller load recorded_motion"),
+         "log: this key is missing (give it with --set or --parameters)");
   expect(refused("controller load hold"), "of this name is loaded already");
   expect(refused("controller load hold --name x --set 'durtion_s = 2'"), "durtion_s");
   expect(refused("controller load hold --name x --set 'durtion_s = '"), "parameters:1");

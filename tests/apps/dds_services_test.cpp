@@ -130,7 +130,7 @@ TEST_F(RunOverDds, ChangeNothingUnlessTheExperimentAllowsIt) {
             std::string::npos);
   EXPECT_NE(active_after({"hold"}, {})[0].find("takes no commands"), std::string::npos);
   EXPECT_EQ(ask_local(R"({"do": "controller.list"})")["controllers"][0]["active"], true);
-  EXPECT_EQ(trigger("emergency_stop"), "yes: emergency stop, category1");
+  EXPECT_EQ(trigger("emergency_stop"), "yes: emergency stop, category 1");
   until(R"("phase": "faulted")");
   EXPECT_EQ(end(), 1) << "it is latched";
 }
@@ -155,7 +155,7 @@ TEST_F(RunOverDds, ChangesForAStrangerWaitUntilHeIsAdmitted) {
   EXPECT_EQ(ask_local(admit)["ok"], true);
   EXPECT_EQ(ask(R"({"do": "controller.stop", "name": "hold"})")["ok"], true);
   EXPECT_EQ(ask_local(R"({"do": "controller.list"})")["controllers"][0]["active"], false);
-  EXPECT_EQ(trigger("emergency_stop"), "yes: emergency stop, category1");
+  EXPECT_EQ(trigger("emergency_stop"), "yes: emergency stop, category 1");
   until(R"("phase": "faulted")");
   EXPECT_EQ(end(), 1) << "it is latched";
 }
@@ -283,7 +283,7 @@ TEST_F(RunOverDds, PauseStepAndScaleTime) {
   const auto local = ask_local(R"({"do": "clock.show"})");
   EXPECT_EQ(last.time_s, local["time_s"]);
   EXPECT_EQ(last.cycles, local["cycles"]);
-  EXPECT_EQ(trigger("emergency_stop").find("yes: emergency stop, category1, in the next cycle"),
+  EXPECT_EQ(trigger("emergency_stop").find("yes: emergency stop, category 1, in the next cycle"),
             0U);
   EXPECT_FALSE(clock("rewind", 0, 0.0));
   EXPECT_NE(message.find("unknown command \"clock.rewind\""), std::string::npos) << message;
@@ -356,7 +356,7 @@ TEST_F(DdsCommands, AreAnsweredAsOverTheSocket) {
   EXPECT_EQ(over_dds("inject kind=supply_sag board=board1 volts=10").status, 2) << "no such board";
   const std::string stop = over_dds("estop --trust-domain --category 0").out;
   EXPECT_TRUE(stop.starts_with("tandem_run (process ")) << stop;
-  EXPECT_TRUE(stop.ends_with("): emergency stop, category0\n")) << stop;
+  EXPECT_TRUE(stop.ends_with("): emergency stop, category 0\n")) << stop;
   until(R"("phase": "faulted")");
   const Outcome reset = over_dds("fault reset");
   EXPECT_EQ(reset.status, 0) << reset.err;
@@ -448,7 +448,7 @@ TEST_F(DdsCommands, AStopIsForAllOfSeveralRuns) {
   EXPECT_EQ(stop.status, 0) << stop.err;
   EXPECT_NE(stop.out.find("tandem_run (process "), std::string::npos) << stop.out;
   EXPECT_NE(stop.out.find("tester (process " + std::to_string(::getpid()) +
-                          "): emergency stop, category0\n"),
+                          "): emergency stop, category 0\n"),
             std::string::npos)
       << stop.out;
   EXPECT_EQ(second.stops, 1);

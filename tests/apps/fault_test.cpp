@@ -11,7 +11,7 @@ class Faults : public Running {};
 TEST_F(Faults, AreShownAndResetWhileTheRunWaits) {
   begin("--on-fault wait");
   EXPECT_EQ(to_run("fault reset").out, "nothing is latched\n");
-  EXPECT_EQ(to_run("estop --category 0").out, "emergency stop, category0\n");
+  EXPECT_EQ(to_run("estop --category 0").out, "emergency stop, category 0\n");
   until(R"("phase": "faulted")");
   const Outcome shown = to_run("fault show");
   for (const char* text : {"phase faulted, 1 latched", "emergency stop on request", "torque off"}) {
@@ -105,7 +105,7 @@ TEST_F(Faults, LeaveAJointBeyondItsLimitWhereItIsUntilItIsRecovered) {
 TEST_F(Faults, OfCategory2AreCategory1WhereNoControllerCanRetreat) {
   begin("--on-fault wait");
   EXPECT_EQ(to_run("estop --category 2").out,
-            "emergency stop, category1: no active controller can bring the robot to a safe "
+            "emergency stop, category 1: no active controller can bring the robot to a safe "
             "posture\n");
   const Outcome shown = to_run("fault show --json -");
   const auto answer = nlohmann::json::parse(shown.out, nullptr, false);
@@ -214,6 +214,56 @@ TEST_F(Faults, ARunThatASignalEndsBeforeItsTimeIsNotDone) {
             0);
   EXPECT_EQ(json("run.json")["ended"], "as planned");
   EXPECT_EQ(json("run.json")["planned_cycles"], 100);
+}
+
+// Whoever wanted a robot that stands until it is stopped gave a large number, and a stop in order
+// looked like a failure.
+TEST_F(Faults, AnEndlessRunThatASignalStopsIsDone) {
+  edit("hold.toml", "duration_s = 5.0", "duration_s = \"endless\"");
+  const std::string plan = tandem("check hold.toml").out;
+  EXPECT_NE(plan.find(" 1 kHz, after bring-up until it is stopped\n"), std::string::npos) << plan;
+  for (const std::string name : {"INT", "TERM"}) {
+    start("--quiet=false >table.txt");
+    until(R"("running_cycles": 9)");
+    const auto status = nlohmann::json::parse(to_run("ask '{\"do\": \"status\"}'").out);
+    EXPECT_EQ(status["total_cycles"], 0);
+    signal(name);
+    EXPECT_EQ(join(), 0) << read_text(folder_ / "run.txt");
+    const nlohmann::json result = json("run.json");
+    EXPECT_EQ(result["ended"], "stopped by SIG" + name);
+    EXPECT_TRUE(result["planned_cycles"].is_null());
+    EXPECT_TRUE(result["faults"].empty());
+    const std::string out = read_text(folder_ / "table.txt");
+    for (const std::string text : {std::string("2 joints, until it is stopped at 1 kHz"),
+                                   "stopped by SIG" + name + " after "}) {
+      EXPECT_NE(out.find(text), std::string::npos) << text << "\nin: " << out;
+    }
+    EXPECT_EQ(out.find(" % "), std::string::npos) << "a share of what has no end: " << out;
+  }
+}
+
+TEST_F(Faults, AnEndlessRunEndsByAFaultAndOnRequest) {
+  start("--duration endless");
+  until(R"("phase": "running")");
+  EXPECT_EQ(to_run("predict --horizon 0.1").status, 0);
+  EXPECT_EQ(to_run("estop").status, 0);
+  EXPECT_EQ(join(), 1);
+  EXPECT_EQ(json("run.json")["ended"], "by a fault");
+  start("--duration endless");
+  until(R"("phase": "running")");
+  EXPECT_EQ(end(), 0);
+  EXPECT_EQ(json("run.json")["ended"], "on request");
+}
+
+// It had said that somebody asked for it.
+TEST_F(Faults, AnEndlessRunEndsWhenItsControllersAreDone) {
+  edit("trajectory.toml", "duration_s = 5.0", "duration_s = \"endless\"");
+  edit("trajectory.toml", "[controller.parameters]\n",
+       "[controller.parameters]\nstop_at_end = true\n");
+  const Outcome run = tandem("run trajectory.toml --no-log --no-socket --json run.json");
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(json("run.json")["ended"], "its controllers were done");
+  EXPECT_NE(run.out.find("its controllers were done after 4.8"), std::string::npos) << run.out;
 }
 
 TEST_F(Faults, OfARunThatASignalEndsAreItsStatus) {

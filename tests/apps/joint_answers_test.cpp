@@ -370,6 +370,9 @@ TEST_F(JointAnswers, HaltEveryMotionOfAnOperator) {
     EXPECT_GT(joint(j)["commanded_position_rad"].get<double>(), -1.0);
   }
   EXPECT_EQ(answer(R"({"do": "joint.halt"})")["joints"], Json::array()) << "nothing is led";
+  EXPECT_EQ(command({"joint", "halt"}), Exit::kDone) << err;
+  EXPECT_EQ(out.find("cycle"), std::string::npos) << "it had said: done in cycle 0\n" << out;
+  has(out, "nothing has moved by joint move, home or recover");
 }
 
 /// Somebody else stops it, or a fault does.

@@ -67,19 +67,19 @@ TEST_F(SeveralRuns, AreAllStopped) {
   const Outcome stop = ask("estop --category 0");
   EXPECT_EQ(stop.status, 0) << stop.err;
   expect(stop.out, "tandem run hold.toml --duration 2000 --on-fault wait");
-  expect(stop.out, process(first) + ": emergency stop, category0\n");
+  expect(stop.out, process(first) + ": emergency stop, category 0\n");
   expect(stop.out, "tandem run trajectory.toml");
-  expect(stop.out, process(second) + ": emergency stop, category0\n");
+  expect(stop.out, process(second) + ": emergency stop, category 0\n");
   for (const pid_t run : {first, second}) EXPECT_TRUE(until(run, "\"phase\": \"faulted\""));
 }
 
-// It printed "emergency stop, category1" and did not say of what.
+// It printed "emergency stop, category 1" and did not say of what.
 TEST_F(SeveralRuns, AreNamedEvenWhenThereIsOne) {
   const pid_t only = begin("run hold.toml --duration 2000 --on-fault wait");
   const Outcome stop = ask("estop");
   EXPECT_EQ(stop.status, 0) << stop.err;
   expect(stop.out, "tandem run hold.toml --duration 2000 --on-fault wait");
-  expect(stop.out, process(only) + ": emergency stop, category1\n");
+  expect(stop.out, process(only) + ": emergency stop, category 1\n");
 }
 
 // "no running `tandem run` (start one …)": while a robot moves, that is no help.
@@ -99,7 +99,7 @@ TEST_F(SeveralRuns, AreStoppedBesideOneThatDoesNotAnswer) {
   const Outcome stop = ask("estop");
   EXPECT_EQ(stop.status, 1) << "one did not confirm";
   expect(stop.err, process(dumb) + ": no answer within 3 s");
-  expect(stop.out, process(other) + ": emergency stop, category1\n");
+  expect(stop.out, process(other) + ": emergency stop, category 1\n");
   EXPECT_TRUE(until(other, "\"phase\": \"faulted\""));
   ASSERT_EQ(::kill(dumb, SIGCONT), 0);
   EXPECT_TRUE(until(dumb, "\"phase\": \"faulted\"")) << "it carries the stop out later";
@@ -114,7 +114,7 @@ TEST_F(SeveralRuns, AreListedWithWhatTheyAreForEveryOtherCommand) {
   expect(list.err, "--socket " + socket(first) + "  tandem run hold.toml");
   expect(list.err, "--socket " + socket(second) + "  tandem run trajectory.toml");
   const Outcome stop = ask("estop --socket " + socket(first));
-  EXPECT_EQ(stop.out, "emergency stop, category1\n") << stop.err;
+  EXPECT_EQ(stop.out, "emergency stop, category 1\n") << stop.err;
   EXPECT_TRUE(until(second, "\"phase\": \"running\"")) << "it was not named";
 }
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "apps/clients/topic_print.hpp"
 #include "apps/clients/topic_rate.hpp"
@@ -52,6 +53,29 @@ TEST(TopicPrint, WritesYamlAsRosDoes) {
             "  - 2\n"
             "note: \"it's\\nlong\"\n"
             "word: 'true'\n");
+}
+
+/// A column of words without blanks had been made narrower than they are: its rows stood apart.
+TEST(TopicList, AlignsLongNamesOfTypes) {
+  Table table({"topic", "type", "quality of service"});
+  table.align_left();
+  table.add({"/a", "diagnostic_msgs/msg/DiagnosticArrayOfAVeryLongNameThatNobodyBreaks",
+             "reliable, transient local, last 1"});
+  table.add({"/b", "tandem_msgs/msg/State", "best effort, last 1"});
+  ::testing::internal::CaptureStdout();
+  table.print(stdout);
+  std::fflush(stdout);
+  std::istringstream out(::testing::internal::GetCapturedStdout());
+  std::vector<std::size_t> begins;
+  for (std::string line; std::getline(out, line);) {
+    for (const char* word : {"quality", "reliable,", "best"}) {
+      const std::size_t at = line.find(word);
+      if (at != std::string::npos) begins.push_back(at);
+    }
+  }
+  ASSERT_EQ(begins.size(), 3U);
+  EXPECT_EQ(begins[0], begins[1]);
+  EXPECT_EQ(begins[1], begins[2]);
 }
 
 TEST(TopicPrint, WritesJsonWithNullForWhatIsNotFinite) {

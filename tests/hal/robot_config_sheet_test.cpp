@@ -165,6 +165,27 @@ TEST_F(BoardSheet, ThatListsHomingMethodsHasNoOther) {
   EXPECT_NE(error.find("lists 35, -3"), std::string::npos) << error;
 }
 
+/// It had been looked at in the drive's units of velocity.
+TEST_F(BoardSheet, RefusesAHomingsAccelerationThatIsNothingInTheDrivesUnitsOfAcceleration) {
+  const std::string homing =
+      "homing = { method = 17, speed_rad_s = 0.5, acceleration_rad_s2 = 2.0 }\n";
+  const auto problems = [&](const std::string& units) {
+    auto robot = read(joint_with("acceleration_units_per_rev = " + units + "\n" + homing)).value();
+    JointConfig& joint = robot.joints[0];
+    joint.min_position_rad = -1.0;
+    joint.max_position_rad = 1.0;
+    joint.max_velocity_rad_s = 2.0;
+    std::string all;
+    for (const Error& one : check_drive_ranges(robot, joint)) all += one.to_string() + "\n";
+    return all;
+  };
+  EXPECT_EQ(problems("100.0"), "");
+  const std::string error = problems("0.1");
+  EXPECT_NE(error.find("homing.acceleration_rad_s2: 2 would be 0.0318 of the drive's units"),
+            std::string::npos)
+      << error;
+}
+
 TEST_F(BoardSheet, RefusesAHomingThatIsNoneOrThatTheDriveHasNot) {
   const std::string homing =
       "homing = { method = 17, speed_rad_s = 0.5, acceleration_rad_s2 = 2.0 }\n";

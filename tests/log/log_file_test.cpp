@@ -85,6 +85,43 @@ TEST_F(LogFileOfThree, WritesCsvWithTheNamesOfJointsAndSensors) {
             "0.5,2,0.1,-2.5e-300,0.3333333333333333,2\n");
 }
 
+/// Until a joint or a sensor was heard, its zeros are no measurements: the first rows had them.
+TEST(LogFileOfAStart, LeavesTheCellsOfWhatWasNeverMeasuredEmpty) {
+  const ScratchFolder folder;
+  const RunInfo info{
+      .robot = "two", .joints = {"hip", "knee"}, .sensors = {{"imu", 1}}, .period_ns = 1000};
+  auto recorder = Recorder::open(folder / "run.mcap", info, {});
+  ASSERT_TRUE(recorder);
+  hal::Layout layout;
+  layout.add("cycle", hal::FieldType::kU64, 1, "");
+  layout.add("position_rad", hal::FieldType::kF64, 2, "");
+  layout.add("sensor", hal::FieldType::kF64, 1, "");
+  layout.add("age_cycles", hal::FieldType::kU32, 2, "");
+  layout.add("sensor_age_cycles", hal::FieldType::kU32, 1, "");
+  const auto channel = (*recorder)->add_channel("/tandem/state", "tandem/msg/State", layout);
+  (*recorder)->start();
+  for (std::uint32_t cycle = 0; cycle < 3; ++cycle) {
+    struct {
+      std::uint64_t cycle;
+      double numbers[3];
+      std::uint32_t ages[4];
+    } message{cycle, {0.5, 0.0, 0.25}, {0, cycle + 1, cycle < 2 ? cycle + 1 : 1, 0}};
+    (*recorder)->push(channel, cycle * 1'000'000,
+                      std::as_bytes(std::span(&message, 1)).first(layout.bytes()));
+  }
+  const std::string path = (*recorder)->close().path;
+  const auto log = LogFile::open(path);
+  ASSERT_TRUE(log);
+  std::ostringstream out;
+  ASSERT_TRUE(write_csv(*log, "/tandem/state", 1, out));
+  EXPECT_EQ(out.str(),
+            "time_s,cycle,position_rad.hip,position_rad.knee,sensor,age_cycles.hip,age_cycles.knee,"
+            "sensor_age_cycles.0\n"
+            "0,0,0.5,,,0,1,1\n"
+            "0.001,1,0.5,,,0,2,2\n"
+            "0.002,2,0.5,,0.25,0,3,1\n");
+}
+
 TEST_F(LogFileOfThree, WritesOnlyTheFieldsAskedFor) {
   std::ostringstream out;
   const std::vector<std::string> fields{"position_rad"};

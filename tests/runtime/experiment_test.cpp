@@ -364,6 +364,26 @@ TEST(Experiment, RefusesLocalCommandsOverANetwork) {
   EXPECT_NE(errors_of(with("[remote]\ncommand = 'all'")).find("remote.command"), std::string::npos);
 }
 
+TEST(Experiment, MayBeEndless) {
+  const std::string key = "duration_s = 2.5";
+  const auto e =
+      parse_experiment(replaced(kExperiment, key, "duration_s = 'endless'"), "x", robot());
+  ASSERT_TRUE(e.has_value());
+  EXPECT_TRUE(e->endless());
+  EXPECT_EQ(e->cycles(), 0U) << "which is a run until it is stopped";
+  EXPECT_EQ(
+      errors_of(replaced(kExperiment, key, "duration_s = 'endles'")),
+      "arm/x.toml:2: duration_s: 'endles' is neither a number of seconds nor \"endless\" (write "
+      "duration_s = 10.0, or \"endless\" for a run until it is stopped)\n");
+  for (const std::string value :
+       {"''", "'5'", "-1", "0", "inf", "nan", "1e7", "true", "['endless']"}) {
+    EXPECT_NE(errors_of(replaced(kExperiment, key, "duration_s = " + value))
+                  .find("arm/x.toml:2: duration_s: "),
+              std::string::npos)
+        << value;
+  }
+}
+
 TEST(Experiment, RefusesARunWithoutController) {
   EXPECT_NE(errors_of("robot = 'robot.toml'\nduration_s = 1\n").find("there is no controller"),
             std::string::npos);

@@ -54,6 +54,24 @@ TEST_F(JointRecovery, LeadsAJointSlowlyToItsLimitWhenItIsAsked) {
   EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
 }
 
+/// `joint stop` had left it on its way, with "done".
+TEST_F(JointRecovery, IsEndedByAStopAndCanBeginAnew) {
+  stop_at(1.6);
+  reset();
+  EXPECT_EQ(recover("elbow"), "asked");
+  steps(100);
+  EXPECT_TRUE(services().move_joint("elbow", {}, RunServices::Patience{0}).has_value());
+  steps(1);
+  const double stopped = reference(1);
+  EXPECT_GT(stopped, 1.5);
+  EXPECT_LT(stopped, 1.6);
+  steps(100);
+  EXPECT_EQ(reference(1), stopped);
+  EXPECT_EQ(recover("elbow"), "asked");
+  steps(2000);
+  EXPECT_EQ(reference(1), 1.5);
+}
+
 /// A start had ended it without a word. Outside, the joint takes 15,000 cycles.
 TEST_F(JointRecovery, IsNotEndedByTheStartOfAControllerThatClaimsTheJoint) {
   stop_at(3.0);

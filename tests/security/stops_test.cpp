@@ -129,11 +129,11 @@ TEST_F(StopUnderAttack, IsConfirmedOverDdsByTheRunThatItsSocketVouchesFor) {
   begin("--rate 20 --dds" + domain());
   const Outcome stop = stop_over_dds();
   EXPECT_EQ(stop.status, 0) << stop.err;
-  EXPECT_TRUE(has(stop.out, "emergency stop, category1")) << stop.out;
+  EXPECT_TRUE(has(stop.out, "emergency stop, category 1")) << stop.out;
   EXPECT_EQ(status().value("phase", ""), "faulted");
 }
 
-// It printed "tandem_run (process …): emergency stop, category1", with status 0; the run went on.
+// It printed "tandem_run (process …): emergency stop, category 1", with status 0; the run went on.
 TEST_F(StopUnderAttack, IsNotConfirmedByAStrangerWhileTheRunIsSuspended) {
   begin("--rate 20 --dds" + domain());
   signal(SIGSTOP);
@@ -167,7 +167,7 @@ TEST_F(StopUnderAttack, OfARunIsNoSuccessBesideAStrangerWhoConfirms) {
   Liar liar(*participant);
   const Outcome stop = stop_over_dds();
   EXPECT_EQ(stop.status, 1);
-  EXPECT_TRUE(has(stop.out, "emergency stop, category1")) << "the run's: " << stop.out;
+  EXPECT_TRUE(has(stop.out, "emergency stop, category 1")) << "the run's: " << stop.out;
   EXPECT_TRUE(has(stop.err, "there is no proof")) << stop.err;
   EXPECT_EQ(status().value("phase", ""), "faulted");
 }
