@@ -202,7 +202,6 @@ Status rate(const TopicOptions& options, Subscription& subscription) {
     if (!done) return done;
   }
   Facts facts;
-  facts.add("samples", std::to_string(rate.samples()));
   rate.add_to(facts);
   facts.print(out);
   return write_json(options.json, rate.json());

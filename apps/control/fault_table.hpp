@@ -3,9 +3,8 @@
 #pragma once
 
 #include <cstdio>
-#include <vector>
 
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
 #include "runtime/fault.hpp"
 
 namespace tandem::apps {
@@ -13,10 +12,10 @@ namespace tandem::apps {
 /// "every joint held".
 [[nodiscard]] const char* reaction_text(hal::StopCategory category);
 
-/// A list of objects: docs/json.md, `fault_log`.
-[[nodiscard]] Json faults_json(const std::vector<runtime::Fault>& faults);
+/// docs/json.md, `fault_log`
+void figures(Figures& f, const runtime::Fault& fault);
 
-/// The table of such a list; nothing when it is empty.
+/// The table of a JSON list of faults; nothing when it is empty.
 void print_faults(const Json& faults, std::FILE* out);
 
 }  // namespace tandem::apps

@@ -5,8 +5,10 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "apps/command_line/command_line.hpp"
+#include "apps/text/figures.hpp"
 #include "base/result.hpp"
 
 namespace tandem::apps {
@@ -30,5 +32,11 @@ using Trial = std::function<Result<std::string>(const std::string& experiment)>;
 [[nodiscard]] Exit excite_command(const ExciteOptions& options, const Trial& trial);
 /// Masses, inertias and friction from logs; writes a robot with them, and a page.
 [[nodiscard]] Exit identify_command(const IdentifyOptions& options);
+
+/// What their JSON has, for docs/json.md.
+[[nodiscard]] std::vector<Figures::Row> eds_figures();
+[[nodiscard]] std::vector<Figures::Row> excite_figures();
+[[nodiscard]] std::vector<Figures::Row> identify_figures();
+[[nodiscard]] std::vector<Figures::Row> import_figures();
 
 }  // namespace tandem::apps

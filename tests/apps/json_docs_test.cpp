@@ -9,9 +9,12 @@
 #include <sstream>
 
 #include "apps/can/bus_table.hpp"
+#include "apps/clients/topic_rate.hpp"
 #include "apps/machine/doctor.hpp"
 #include "apps/machine/latency_report.hpp"
+#include "apps/run/commands.hpp"
 #include "apps/run/run_summary.hpp"
+#include "apps/tools/commands.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -30,6 +33,12 @@ const Named<std::vector<Figures::Row>> kTables{
     {"bus", Figures::rows_of<hal::can::BusLoad>()},
     {"doctor", Figures::rows_of<DoctorResult>()},
     {"latency", Figures::rows_of<LatencyResult>()},
+    {"topic hz", Figures::rows_of<RateFigures>()},
+    {"emulate", emulate_figures()},
+    {"eds show", eds_figures()},
+    {"excite", excite_figures()},
+    {"identify", identify_figures()},
+    {"log import", import_figures()},
 };
 
 std::string table_text(const std::vector<Figures::Row>& rows) {
