@@ -76,13 +76,12 @@ std::string TopicRate::line() const {
 }
 
 void TopicRate::add_to(Facts& facts) const {
-  const auto row = [&facts, json = json()](const char* name, const std::string& text) {
-    add_figures(facts, json, name, text);
-  };
-  row("samples", "{samples}");
-  row("rate", "{rate_Hz:.2f Hz}, of the last {window} intervals");
-  row("min/max/std", "{min_s:.3f} / {max_s:.3f} / {deviation_s:.3f ms}");
-  row("interval p50/p99/p99.9/max", fmt::format("{{interval_ns:.3f ms}}, of all {}", all_.count()));
+  add_figures(facts, json(),
+              {{"samples", "{samples}"},
+               {"rate", "{rate_Hz:.2f Hz}, of the last {window} intervals"},
+               {"min/max/std", "{min_s:.3f} / {max_s:.3f} / {deviation_s:.3f ms}"},
+               {"interval p50/p99/p99.9/max",
+                fmt::format("{{interval_ns:.3f ms}}, of all {}", all_.count())}});
   const auto missing = lost();
   facts.add("lost",
             missing ? fmt::format("{} of {}, by the cycles' numbers", *missing, told_ + *missing)

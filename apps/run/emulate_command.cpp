@@ -147,14 +147,14 @@ std::vector<BoardReport> boards_of(const Emulation& e) {
 
 void print_summary(const Emulation& e, const Json& json, std::FILE* out) {
   Facts facts;
-  add_figures(facts, json, "simulated",
-              "{sim_seconds:.3f s} in {steps} steps, {steps_without_sync} of them without SYNC, "
-              "{slipped} slipped");
-  add_figures(facts, json, "frames", "{frames_in} in, {frames_out} out, {frames_lost} lost");
+  add_figures(facts, json,
+              {{"simulated",
+                "{sim_seconds:.3f s} in {steps} steps, {steps_without_sync} of them without SYNC, "
+                "{slipped} slipped"},
+               {"frames", "{frames_in} in, {frames_out} out, {frames_lost} lost"}});
   add_bus_facts(e.sockets->open_buses(), facts);
-  if (e.robot->plant().diverged()) {
+  if (e.robot->plant().diverged())
     facts.add("the simulation diverged", e.robot->plant().diverged_text());
-  }
   if (e.emulator->statistics().silent_steps > 0) {
     add_figures(facts, json, "without SYNC at the end",
                 "{silent_steps} steps; no motor drove after {safe_after_steps}, every bridge was "
@@ -225,8 +225,7 @@ static void figures(Figures& f, const Emulation* e) {
   f("slipped", "skipped because they were too many to catch up", s.slipped);
   f("sim_seconds", [&] { return static_cast<double>(e->emulator->time_ns()) * 1e-9; });
   f("silent_steps", "since the last SYNC on any bus", s.silent_steps);
-  f("safe_after_steps", "of these, until no motor drove any more; 0: not (yet)",
-    s.safe_after_steps);
+  f("safe_after_steps", "of these, until no motor drove; 0: not (yet)", s.safe_after_steps);
   f("open_after_steps", "the same, until every bridge was open", s.open_after_steps);
   f("boards", "each alone, since the last SYNC on its own bus", [&] { return boards_of(*e); });
   f("injected", "faults that have begun", [&] { return e->injected; });

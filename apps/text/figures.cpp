@@ -99,6 +99,11 @@ void add_figures(Facts& facts, const Json& figures, const std::string& name,
   if (const auto shown = figures_text(text, figures)) facts.add(name, *shown);
 }
 
+void add_figures(Facts& facts, const Json& figures,
+                 std::initializer_list<std::pair<const char*, std::string>> rows) {
+  for (const auto& [name, text] : rows) add_figures(facts, figures, name, text);
+}
+
 Table figures_table(const std::vector<Column>& columns, const Json& results) {
   std::vector<std::string> header;
   for (const Column& column : columns) header.push_back(column.header);

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <concepts>
+#include <initializer_list>
 #include <optional>
 #include <ranges>
 #include <string>
@@ -229,6 +230,9 @@ template <class T>
 
 /// Adds such a text, if there is one.
 void add_figures(Facts& facts, const Json& figures, const std::string& name, std::string_view text);
+/// Adds several.
+void add_figures(Facts& facts, const Json& figures,
+                 std::initializer_list<std::pair<const char*, std::string>> rows);
 
 /// A column of a table of results.
 struct Column {

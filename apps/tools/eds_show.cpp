@@ -1,6 +1,4 @@
 // `tandem eds show`: what a drive is and can, by its data sheet.
-#include "apps/tools/eds_show.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -336,8 +334,7 @@ static void figures(Figures& f, const SheetReport& report) {
   f("heartbeat_consumers", "sub-indices of 1016", facts.heartbeat_consumers);
   f("heartbeat_producer", "1017", facts.heartbeat_producer);
   f("node_guarding", "100C and 100D", facts.node_guarding);
-  f("modes_said", "`modes` are those of 6502; `false`: those that the objects allow",
-    facts.modes_said);
+  f("modes_said", "by 6502; `false`: `modes` are what the objects allow", facts.modes_said);
   f("modes", "of the first axis", facts.modes);
   f("own_modes", "the manufacturer's bits of 6502", facts.own_modes);
   f("master", "what Tandem's master does with the drive", [&](Figures& master) {
@@ -352,9 +349,7 @@ static void figures(Figures& f, const SheetReport& report) {
     stand_in("modes", "6060, of the first axis", can.modes);
     stand_in("remarks", "what it lacks, or takes otherwise than the sheet says", can.remarks);
   });
-  f("lacks",
-    "what every mode needs, and the drive lacks: of 6040 in an RPDO, 6041 in a TPDO, 6060 and 6061",
-    facts.lacks);
+  f("lacks", "of every mode's 6040 in an RPDO, 6041 in a TPDO, 6060 and 6061", facts.lacks);
   f("pdos", facts.pdos);
   f("into_rpdo", "objects", facts.into_rpdo);
   f("into_tpdo", "objects", facts.into_tpdo);

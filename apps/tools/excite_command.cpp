@@ -159,16 +159,13 @@ static void figures(Figures& f, const Found& found) {
   f("base_parameters", "how many there are", result.base_parameters);
   f("joints", "that move", result.joints);
   f("held", "that do not", result.still);
-  f("position_share", "the largest share of a joint's way to its limit that is used",
-    result.position_share);
+  f("position_share", "largest share of a joint's way to its limit", result.position_share);
   f("speed_share", "the same of its speed", result.speed_share);
   f("torque_share", "and of its torque", result.torque_share);
   f("share", "`--share`, or less: what ran through in simulation", found.share);
   f("lift_m", "by which a robot that hangs is lifted; else 0", result.lift_m);
-  f("room_m", "self-distance beyond the 2 cm that are required; null: no pair of links to look at",
-    result.room_m);
-  f("margin_m",
-    "how far the point of zero moment stays inside the feet; 0 with a fixed base, or hanging",
+  f("room_m", "self-distance beyond the 2 cm required; null: no links to look at", result.room_m);
+  f("margin_m", "of the point of zero moment inside the feet; 0: it does not stand",
     result.margin_m);
 }
 
@@ -177,20 +174,18 @@ std::vector<Figures::Row> excite_figures() { return Figures::rows_of<Found>(); }
 static void print_found(const robot::RobotFiles& robot, const ExciteOptions& options,
                         const Found& found, const Json& json) {
   Facts facts;
-  const auto row = [&](const char* name, const char* text) {
-    add_figures(facts, json, name, text);
-  };
-  row("experiment", "{experiment}");
-  facts.add("condition number", condition_text(found.excitation));
-  facts.add("joints",
-            fmt::format("{} move, {} are held", json["joints"].size(), json["held"].size()));
-  row("way to limits", "{position_share:.0f %} at most");
-  row("speed", "{speed_share:.0f %} of a limit at most");
-  row("torque", "{torque_share:.0f %} of a limit at most");
-  row("self-distance", "{room_m:.0f mm} more than required");
-  if (options.hung) row("hoist", "lifts it {lift_m:.2f m}");
+  add_figures(
+      facts, json,
+      {{"experiment", "{experiment}"},
+       {"condition number", condition_text(found.excitation)},
+       {"joints", fmt::format("{} move, {} are held", json["joints"].size(), json["held"].size())},
+       {"way to limits", "{position_share:.0f %} at most"},
+       {"speed", "{speed_share:.0f %} of a limit at most"},
+       {"torque", "{torque_share:.0f %} of a limit at most"},
+       {"self-distance", "{room_m:.0f mm} more than required"}});
+  if (options.hung) add_figures(facts, json, "hoist", "lifts it {lift_m:.2f m}");
   if (robot.tree.floating_base && !options.hung)
-    row("balance", "{margin_m:.0f mm} inside the feet");
+    add_figures(facts, json, "balance", "{margin_m:.0f mm} inside the feet");
   if (robot.tree.floating_base && options.output != "-") {
     facts.add("simulated",
               found.refused.empty()

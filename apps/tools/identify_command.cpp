@@ -114,16 +114,16 @@ static void print_result(std::FILE* out, const Identification& result, const Jso
                 json["joints"])
       .print(out);
   fmt::print(out, "\n");
-  Facts facts;
-  add_figures(facts, json, "used", "{used_s:.1f s}, {held_back_s:.1f s} of them held back");
-  add_figures(facts, json, "condition number", "{condition_number:.1f}");
   const auto in_data =
       std::ranges::count_if(result.base, [](const auto& one) { return one.estimate.identifiable; });
-  facts.add("base parameters",
-            fmt::format("{} of {} known by the data", in_data, result.base.size()));
-  add_figures(facts, json, "mass",
-              "{total_mass_kg.value:.4f kg}, described {total_mass_kg.described:.4f kg}" +
-                  mass_note(result));
+  Facts facts;
+  add_figures(
+      facts, json,
+      {{"used", "{used_s:.1f s}, {held_back_s:.1f s} of them held back"},
+       {"condition number", "{condition_number:.1f}"},
+       {"base parameters", fmt::format("{} of {} known by the data", in_data, result.base.size())},
+       {"mass", "{total_mass_kg.value:.4f kg}, described {total_mass_kg.described:.4f kg}" +
+                    mass_note(result)}});
   facts.print(out);
 }
 

@@ -101,15 +101,13 @@ std::vector<Figures::Row> import_figures() { return Figures::rows_of<log::Import
 
 static void print_summary(const log::ImportSummary& summary, const Json& json, std::FILE* out) {
   Facts facts;
-  const auto row = [&](const char* name, const char* text) {
-    add_figures(facts, json, name, text);
-  };
   facts.add("log", fmt::format("{} ({}, {:.1f} MB)", summary.log.path,
                                counted(summary.log.messages, "message"),
                                static_cast<double>(summary.log.bytes) * 1e-6));
-  row("cycles", "{cycles} of {period_ns:g s}");
-  row("time 0", "{begin_ns} ns of the recording's clock");
-  row("fields", "{fields}");
+  add_figures(facts, json,
+              {{"cycles", "{cycles} of {period_ns:g s}"},
+               {"time 0", "{begin_ns} ns of the recording's clock"},
+               {"fields", "{fields}"}});
   const log::Exclusions& left = summary.excluded;
   for (const std::string& note : summary.notes) facts.add("taken", note);
   const auto rows = [&](const char* what, std::uint64_t count) {
@@ -126,9 +124,10 @@ static void print_summary(const log::ImportSummary& summary, const Json& json, s
   if (left.gaps > 0) {
     facts.add("left out", counted(left.gap_cycles, "cycle") + " in " + counted(left.gaps, "gap"));
   }
-  row("frozen, left out", "{excluded.frozen}");
-  row("not used", "{ignored}");
-  row("joints without data", "{missing_joints}");
+  add_figures(facts, json,
+              {{"frozen, left out", "{excluded.frozen}"},
+               {"not used", "{ignored}"},
+               {"joints without data", "{missing_joints}"}});
   facts.print(out);
   fmt::print(out, "\n");
   figures_table({{"samples of", "{name}"},
