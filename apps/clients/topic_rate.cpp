@@ -59,10 +59,7 @@ void figures(Figures& f, const RateFigures& rate) {
   f("max_s", rate.max_s);
   f("deviation_s", "standard deviation", rate.deviation_s);
   f("interval_ns", "of all intervals", rate.interval);
-  f("lost",
-    "samples missing between the first and the last, by their cycle numbers; null for types "
-    "without cycle numbers",
-    rate.lost);
+  f("lost", "by the cycles' numbers; null: the type has none", rate.lost);
 }
 
 Json TopicRate::json() const { return figures_json(figures()); }

@@ -22,8 +22,8 @@ void figures(Figures& f, const runtime::Fault& fault) {
   f("board", "empty: none", fault.board);
   f("cause", fault.text);
   f("category", "`category0`, `category1`, `category2`, `hold`, `warn`",
-    std::string(hal::to_string(fault.category)));
-  f("reaction", "the category in words", std::string(reaction_text(fault.category)));
+    hal::to_string(fault.category));
+  f("reaction", "the category in words", reaction_text(fault.category));
   f("latched", fault.latched);
   f("cleared_s", "null while it is latched", known(!fault.latched, fault.cleared_s));
 }

@@ -133,17 +133,9 @@ std::string interfaces_of(const hal::RobotConfig& robot) {
 }
 
 /// How a board stopped without SYNC.
-struct BoardReport {
+struct BoardReport : sim::BoardStop {
   std::string name;
-  sim::BoardStop stop;
 };
-
-std::vector<BoardReport> boards_of(const Emulation& e) {
-  std::vector<BoardReport> boards;
-  for (const sim::BoardStop& stop : e.emulator->statistics().boards)
-    boards.push_back({e.subject.robot.boards[boards.size()].name, stop});
-  return boards;
-}
 
 void print_summary(const Emulation& e, const Json& json, std::FILE* out) {
   Facts facts;
@@ -155,11 +147,10 @@ void print_summary(const Emulation& e, const Json& json, std::FILE* out) {
   add_bus_facts(e.sockets->open_buses(), facts);
   if (e.robot->plant().diverged())
     facts.add("the simulation diverged", e.robot->plant().diverged_text());
-  if (e.emulator->statistics().silent_steps > 0) {
+  if (e.emulator->statistics().silent_steps > 0)
     add_figures(facts, json, "without SYNC at the end",
                 "{silent_steps} steps; no motor drove after {safe_after_steps}, every bridge was "
                 "open after {open_after_steps}");
-  }
   facts.print(out);
 }
 
@@ -211,9 +202,9 @@ void emulate(Emulation& e, TaskQueue& tasks, std::FILE* out, bool quiet) {
 
 static void figures(Figures& f, const BoardReport& board) {
   f("name", board.name);
-  f("silent_steps", board.stop.silent_steps);
-  f("safe_after_steps", board.stop.safe_after_steps);
-  f("open_after_steps", board.stop.open_after_steps);
+  f("silent_steps", board.silent_steps);
+  f("safe_after_steps", board.safe_after_steps);
+  f("open_after_steps", board.open_after_steps);
 }
 
 static void figures(Figures& f, const Emulation* e) {
@@ -227,7 +218,12 @@ static void figures(Figures& f, const Emulation* e) {
   f("silent_steps", "since the last SYNC on any bus", s.silent_steps);
   f("safe_after_steps", "of these, until no motor drove; 0: not (yet)", s.safe_after_steps);
   f("open_after_steps", "the same, until every bridge was open", s.open_after_steps);
-  f("boards", "each alone, since the last SYNC on its own bus", [&] { return boards_of(*e); });
+  f("boards", "each alone, since the last SYNC on its own bus", [&] {
+    std::vector<BoardReport> boards;
+    for (const sim::BoardStop& stop : s.boards)
+      boards.push_back({stop, e->subject.robot.boards[boards.size()].name});
+    return boards;
+  });
   f("injected", "faults that have begun", [&] { return e->injected; });
   f("frames_in", s.frames_in);
   f("frames_out", s.frames_out);
@@ -283,9 +279,8 @@ Exit emulate_command(const EmulateOptions& options) {
   emulate(e, tasks, out, options.quiet);
   const Json summary = figures_json(&e);
   if (!options.quiet) print_summary(e, summary, out);
-  if (const Status written = write_json(options.json, summary); !written)
-    return refuse(written.error());
-  return e.robot->plant().diverged() ? Exit::kFault : Exit::kDone;
+  return end_with_json(options.json, summary,
+                       e.robot->plant().diverged() ? Exit::kFault : Exit::kDone);
 }
 
 }  // namespace tandem::apps

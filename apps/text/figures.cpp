@@ -18,6 +18,7 @@ struct ShownUnit {
 constexpr ShownUnit kShownUnits[] = {{"_rad", "deg", 180.0 / std::numbers::pi},
                                      {"_m", "mm", 1e3},
                                      {"_s", "ms", 1e3},
+                                     {"_bytes", "kB", 1e-3},
                                      {"_ns", "us", 1e-3},
                                      {"_ns", "ms", 1e-6},
                                      {"_ns", "s", 1e-9},

@@ -164,7 +164,7 @@ class Figures {
     if constexpr (kOptional<V>) {
       describe<typename V::value_type>(path, words, " or null");
     } else {
-      const bool null = std::is_pointer_v<V> || std::same_as<V, rt::Histogram>;
+      const bool null = (std::is_pointer_v<V> && Declared<V>) || std::same_as<V, rt::Histogram>;
       rows_.push_back({path, type_of<V>() + (null ? " or null" : or_null), words});
       describe_inside<V>(path);
     }

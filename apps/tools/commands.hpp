@@ -40,5 +40,7 @@ using Trial = std::function<Result<std::string>(const std::string& experiment)>;
 [[nodiscard]] std::vector<Figures::Row> excite_figures();
 [[nodiscard]] std::vector<Figures::Row> identify_figures();
 [[nodiscard]] std::vector<Figures::Row> import_figures();
+[[nodiscard]] std::vector<Figures::Row> log_figures();
+[[nodiscard]] std::vector<Figures::Row> replay_figures();
 
 }  // namespace tandem::apps

@@ -368,8 +368,7 @@ Exit eds_show(const EdsOptions& options) {
   report.use = hal::can::use_of(report.sheet);
   report.simulated = stand_in_of(report.sheet, report.facts);
   print_sheet(human_output(options.json), report);
-  const Status written = write_json(options.json, figures_json(report));
-  return written ? Exit::kDone : refuse(written.error());
+  return end_with_json(options.json, figures_json(report));
 }
 
 }  // namespace tandem::apps

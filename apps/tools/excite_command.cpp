@@ -236,8 +236,7 @@ Exit excite_command(const ExciteOptions& given, const Trial& trial) {
   found->refused = draft.placed(found->refused);
   const Json json = figures_json(*found);
   print_found(*robot, options, *found, json);
-  if (const Status s = write_json(options.json, json); !s) return refuse(s.error());
-  return Exit::kDone;
+  return end_with_json(options.json, json);
 }
 
 }  // namespace tandem::apps

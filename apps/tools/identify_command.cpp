@@ -24,7 +24,7 @@ static void figures(Figures& f, const identification::LinkResult& link) {
       one("value", value);
       one("ci95", ci95);
       one("identifiable", identifiable);
-      one("seen", std::string(identification::to_string(seen)));
+      one("seen", identification::to_string(seen));
     });
   };
   const auto numbers = [](const auto& of) { return std::vector<double>(of.begin(), of.end()); };
@@ -33,8 +33,7 @@ static void figures(Figures& f, const identification::LinkResult& link) {
            link.mass_seen);
   quantity("com_m", "in the link's frame", numbers(link.identified.com_m), numbers(link.com_ci95),
            link.com_identifiable, link.com_seen);
-  quantity("inertia_kg_m2",
-           "about the centre of mass, along the link's axes: ixx ixy ixz iyy iyz izz",
+  quantity("inertia_kg_m2", "about `com_m`, along the link's axes: ixx ixy ixz iyy iyz izz",
            std::vector{I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)},
            numbers(link.inertia_ci95), link.inertia_identifiable, link.inertia_seen);
   f("base_parameters", "names of those that have a parameter of this link", link.base_parameters);
@@ -51,14 +50,9 @@ static void figures(Figures& f, const identification::JointResult& joint) {
     add("offset_Nm", joint.offset_Nm);
   };
   estimates(f, &Estimate::value);
-  f("behind_rotor",
-    "the torques hold nothing of the rotor of this drive without a spring, as those of a sensor "
-    "between gear and link: it is in no equation, and stays as described",
-    joint.behind_rotor);
-  f("rotor_from",
-    "`data`: found; `description`: the data say nothing, so the description's is assumed, in the "
-    "written robot, too",
-    std::string(joint.rotor_inertia_kg_m2.identifiable ? "data" : "description"));
+  f("behind_rotor", "no equation has this drive's rotor", joint.behind_rotor);
+  f("rotor_from", "`data` or `description`",
+    joint.rotor_inertia_kg_m2.identifiable ? "data" : "description");
   f("ci95", "of these four", [&](Figures& of) { estimates(of, &Estimate::ci95); });
   f("delay_s", "by which the torque is later than the position, as fitted", joint.delay_s);
   f("rms_Nm", "of the torque's residual on held-out data", joint.rms_Nm);
@@ -68,10 +62,7 @@ static void figures(Figures& f, const identification::JointResult& joint) {
 
 static void figures(Figures& f, const identification::BaseParameter& one) {
   f("name", one.name);
-  f("terms",
-    "parameter and factor: `LINK.mass_kg`, `LINK.hx_kg_m` = mass times centre of mass, "
-    "`LINK.ixx_kg_m2` about the link's origin, `JOINT.viscous_Nms_rad`, …",
-    one.terms);
+  f("terms", "parameter and factor", one.terms);
   f("value", one.estimate.value);
   f("ci95", one.estimate.ci95);
   f("identifiable", one.estimate.identifiable);
@@ -102,8 +93,7 @@ static void figures(Figures& f, const Identification& result) {
   f("held_back_s", "of that", result.held_out_s);
   f("left_out", "stretches of a signal that were not used", result.left_out);
   f("notes", "everything that was left out, assumed, or could not be written", result.remarks);
-  f("warnings", "what to look at before the result is used; empty: nothing was found",
-    result.warnings);
+  f("warnings", "what to look at before the result is used", result.warnings);
 }
 
 static void print_result(std::FILE* out, const Identification& result, const Json& json) {
@@ -162,9 +152,7 @@ Exit identify_command(const IdentifyOptions& options) {
   }
   if (const Status placed = draft->place(); !placed) return refuse(placed.error());
   files.print(out);
-  if (const Status s = write_json(options.json, figures_json(*result)); !s)
-    return refuse(s.error());
-  return Exit::kDone;
+  return end_with_json(options.json, figures_json(*result));
 }
 
 }  // namespace tandem::apps

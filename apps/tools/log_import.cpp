@@ -76,7 +76,7 @@ static void figures(Figures& f, const log::Spacing& one) {
 static void figures(Figures& f, const log::ImportSummary& summary) {
   const log::Exclusions& left = summary.excluded;
   f("log", "the file that was written", summary.log.path);
-  f("format", "`csv` or `mcap`", std::string(summary.bag ? "mcap" : "csv"));
+  f("format", "`csv` or `mcap`", summary.bag ? "mcap" : "csv");
   f("cycles", "in the log", summary.cycles);
   f("period_ns", summary.period_ns);
   f("begin_ns", "of cycle 0, on the recording's clock", summary.begin_ns);
@@ -156,10 +156,7 @@ Exit log_import_command(const LogOptions& options) {
   const Json json = figures_json(*summary);
   print_summary(*summary, json, human_output(options.json));
   print_warnings(warnings_of(*summary, options.files.front()));
-  if (const Status written = write_json(options.json, json); !written) {
-    return refuse(written.error());
-  }
-  return Exit::kDone;
+  return end_with_json(options.json, json);
 }
 
 }  // namespace tandem::apps

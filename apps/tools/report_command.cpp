@@ -18,9 +18,7 @@ Exit report_command(const ReportOptions& options) {
   for (const std::string& image : files->images) facts.add("image", image);
   facts.print(out);
   const Json json{{"report", files->page}, {"images", files->images}};
-  if (const Status written = write_json(options.json, json); !written)
-    return refuse(written.error());
-  return Exit::kDone;
+  return end_with_json(options.json, json);
 }
 
 }  // namespace tandem::apps
