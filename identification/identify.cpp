@@ -70,7 +70,7 @@ void note_left_out(const Recording& recording, bool one_of_several, bool floatin
                    Identification& out) {
   for (const std::string& remark : recording.remarks)
     out.remarks.push_back(one_of_several ? recording.path + ": " + remark : remark);
-  for (const LeftOut& one : recording.left_out) out.left_out.emplace_back(recording.path, one);
+  out.left_out.insert(out.left_out.end(), recording.left_out.begin(), recording.left_out.end());
   if (!recording.hangs || !floating) return;
   out.remarks.push_back(recording.path +
                         ": the robot hangs from a hoist, whose force is not known: the base's "

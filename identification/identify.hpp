@@ -91,9 +91,8 @@ struct Identification {
   double usable_s = 0.0;          ///< of the logs, without what was excluded
   double held_out_s = 0.0;
   double described_mass_kg = 0.0, identified_mass_kg = 0.0;  ///< of everything that moves
-  Estimate mass_kg;  ///< the same, as far as the equations reach
-  /// Stretches of a signal that were left out, with the path of their log.
-  std::vector<std::pair<std::string, LeftOut>> left_out;
+  Estimate mass_kg;                   ///< the same, as far as the equations reach
+  std::vector<LeftOut> left_out;      ///< stretches of a signal that were left out
   std::vector<std::string> remarks;   ///< what was excluded, and what was assumed
   std::vector<std::string> warnings;  ///< what to look at before the result is used
 };

@@ -66,7 +66,7 @@ void remark(Recording& recording, const std::string& what, const std::vector<Str
   if (stretches.empty()) return;
   std::size_t samples = 0;
   for (const Stretch& one : stretches) samples += one.end - one.begin;
-  const LeftOut left{what, static_cast<double>(samples) * recording.period_s,
+  const LeftOut left{recording.path, what, static_cast<double>(samples) * recording.period_s,
                      recording.time_s[stretches[0].begin], recording.time_s[stretches[0].end - 1]};
   recording.remarks.push_back(
       fmt::format("{}: {:.3f} s excluded, the first from {:.3f} to {:.3f} s", what, left.sum_s,

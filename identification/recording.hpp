@@ -17,6 +17,7 @@ using Signal = std::vector<double>;  ///< a sample per grid time
 
 /// What of a log was left out, for one reason.
 struct LeftOut {
+  std::string log;                                ///< its path
   std::string what;                               ///< which signal, and why
   double sum_s = 0.0;                             ///< of all its stretches
   double first_begin_s = 0.0, first_end_s = 0.0;  ///< of the first one, since the log's time 0

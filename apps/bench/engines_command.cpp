@@ -204,8 +204,7 @@ Result<Json> compare(const BenchOptions& options) {
 Exit bench_command(const BenchOptions& options) {
   const Result<Json> results = compare(options);
   if (!results) return refuse(results.error());
-  if (const Status s = write_json(options.json, *results); !s) return refuse(s.error());
-  return Exit::kDone;
+  return end_with_json(options.json, *results);
 }
 
 }  // namespace tandem::apps

@@ -59,7 +59,7 @@ void print(const BusLoad& load, std::FILE* out) {
 
 static void figures(Figures& f, const BusRow& row) {
   f("what", row.row.what);
-  f("kind", "`urgent`, `mean`, `on_change`", std::string(kind_name(row.row.kind)));
+  f("kind", "`urgent`, `mean`, `on_change`", kind_name(row.row.kind));
   f("frames", "per cycle, as the next three", row.row.frames);
   f("bits", row.row.bits);
   f("time_us", row.row.time_us);
@@ -70,7 +70,7 @@ void figures(Figures& f, const BusLoad& load) {
   std::vector<BusRow> rows;
   for (const BusLoadRow& row : load.rows) rows.push_back({row, load.period_us()});
   f("bus", load.bus);
-  f("kind", "`can`, `ethercat`", std::string(load.kind == hal::BusKind::kCan ? "can" : "ethercat"));
+  f("kind", "`can`, `ethercat`", load.kind == hal::BusKind::kCan ? "can" : "ethercat");
   f("fd", load.kind == hal::BusKind::kCan && load.fd);
   f("bitrate", load.rates.nominal);
   f("data_bitrate", load.rates.data);

@@ -1,7 +1,5 @@
 #include "apps/can/round_trips.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -17,15 +15,6 @@ constexpr std::size_t kNodesShown = 5;
 
 std::uint64_t echoes(const RoundTrip& trip) {
   return std::accumulate(trip.cycles.begin(), trip.cycles.end(), std::uint64_t{0});
-}
-
-std::string four(const rt::Percentiles& p, double unit, const char* format) {
-  std::string text;
-  for (const std::int64_t value : {p.p50, p.p99, p.p999, p.max}) {
-    text += (text.empty() ? "" : " / ") +
-            fmt::format(fmt::runtime(format), static_cast<double>(value) * unit);
-  }
-  return text;
 }
 
 /// What the slowest are sorted by.
@@ -63,22 +52,17 @@ void figures(Figures& f, const RoundTrip& trip) {
 }
 
 void print_slowest_nodes(std::span<const RoundTrip> trips, std::FILE* out) {
-  std::vector<const RoundTrip*> order;
-  for (const RoundTrip& trip : trips) {
-    if (echoes(trip) > 0) order.push_back(&trip);
-  }
+  std::vector<RoundTrip> order;
+  std::ranges::copy_if(trips, std::back_inserter(order),
+                       [](const RoundTrip& trip) { return echoes(trip) > 0; });
   if (order.empty()) return;
-  std::ranges::stable_sort(order, std::ranges::greater{},
-                           [](const RoundTrip* trip) { return slowness(*trip); });
-  Table table({"slowest nodes", "round trip p50/p99/p99.9/max [cycles]", "[us]"});
-  for (std::size_t i = 0; i < std::min(kNodesShown, order.size()); ++i) {
-    const RoundTrip& trip = *order[i];
-    const bool timed = trip.time.count() > 0;
-    table.add({fmt::format("{} (node {} on {})", trip.node, trip.id, trip.bus),
-               four(cycles_of(trip), 1.0, "{:.0f}"),
-               timed ? four(trip.time.percentiles(), 1e-3, "{:.0f}") : "-"});
-  }
-  table.print(out);
+  std::ranges::stable_sort(order, std::ranges::greater{}, slowness);
+  order.resize(std::min(kNodesShown, order.size()));
+  figures_table({{"slowest nodes", "{node} (node {id} on {bus})"},
+                 {"round trip p50/p99/p99.9/max [cycles]", "{cycles:.0f}"},
+                 {"[us]", "{time_ns:.0f}"}},
+                figures_json(order))
+      .print(out);
 }
 
 }  // namespace tandem::apps

@@ -184,10 +184,7 @@ Exit asked_command(const AskedOptions& options) {
     if (!told) return refuse(told.error());
     exit = *told;
   }
-  if (Status written = write_json(options.json, asked.answer); !written) {
-    return refuse(written.error());
-  }
-  return exit;
+  return end_with_json(options.json, asked.answer, exit);
 }
 
 }  // namespace tandem::apps

@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "apps/clients/asked.hpp"
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
 #include "base/counted.hpp"
 
 namespace tandem::apps {
@@ -45,14 +45,11 @@ std::string state_text(const Json& answer) {
 
 void print_clock(const Json& answer) {
   Facts facts;
-  facts.add("time", fmt::format("{:.6f} s", answer.value("time_s", 0.0)));
-  facts.add("cycles", std::to_string(answer.value("cycles", std::uint64_t{0})));
-  facts.add("phase", answer.value("phase", "?"));
+  add_figures(facts, answer,
+              {{"time", "{time_s:.6f s}"}, {"cycles", "{cycles}"}, {"phase", "{phase}"}});
   facts.add("clock", state_text(answer));
   facts.add("rate", rate_text(answer));
-  const Json& factor = answer["realtime_factor"];
-  facts.add("measured",
-            factor.is_number() ? fmt::format("{:.3g} x real time", factor.get<double>()) : "-");
+  facts.add("measured", figures_text("{realtime_factor:.3g} x real time", answer).value_or("-"));
   facts.print(stdout);
 }
 

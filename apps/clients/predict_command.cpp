@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "apps/clients/asked.hpp"
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -57,7 +57,7 @@ void print_prediction(const Json& answer) {
   const auto period_s = static_cast<double>(answer.value("period_ns", std::int64_t{0})) * 1e-9;
   const double ahead_s = static_cast<double>(answer.value("cycles", std::uint64_t{0})) * period_s;
   Facts facts;
-  facts.add("from", fmt::format("{:.3f} s", answer.value("from_s", 0.0)));
+  add_figures(facts, answer, "from", "{from_s:.3f s}");
   const std::string end = answer.value("end", "?");
   facts.add("ahead", fmt::format("{:.3f} s, {}", ahead_s,
                                  end == "horizon"    ? "as far as was asked for"
@@ -65,10 +65,7 @@ void print_prediction(const Json& answer) {
                                                      : "then it diverges"));
   facts.add("computed in", fmt::format("{:.1f} ms of one core: {:.0f} x real time", cpu_s * 1e3,
                                        cpu_s > 0.0 ? ahead_s / cpu_s : 0.0));
-  facts.add("cost the loop",
-            fmt::format("{:.1f} us, {:.1f} kB written down",
-                        static_cast<double>(answer.value("loop_ns", std::int64_t{0})) * 1e-3,
-                        static_cast<double>(answer.value("loop_bytes", std::uint64_t{0})) * 1e-3));
+  add_figures(facts, answer, "cost the loop", "{loop_ns:.1f us}, {loop_bytes:.1f kB} written down");
   const Json& base = answer["base"];
   if (base.is_object() && !base["position_m"].empty()) {
     facts.add("base height",
@@ -78,8 +75,8 @@ void print_prediction(const Json& answer) {
   facts.add("faults to come", std::to_string(answer["faults"].size()));
   facts.print(stdout);
   for (const Json& fault : answer["faults"]) {
-    fmt::print("fault: {:.3f} s: {}\n", fault.value("time_s", 0.0),
-               shown(fault.value("text", ""), 2'000));
+    fmt::print("fault: {}\n",
+               shown(figures_text("{time_s:.3f s}: {cause}", fault).value_or(""), 2'000));
   }
 }
 

@@ -91,9 +91,7 @@ Exit print_list(const TopicOptions& options, const Part& part) {
   } else {
     fmt::print(out, "no topic {}: {}\n", where(part), kSilence);
   }
-  if (const Status written = write_json(options.json, json); !written)
-    return refuse(written.error());
-  return Exit::kDone;
+  return end_with_json(options.json, json);
 }
 
 /// The topic that was named, once somebody writes it.
@@ -202,7 +200,6 @@ Status rate(const TopicOptions& options, Subscription& subscription) {
     if (!done) return done;
   }
   Facts facts;
-  facts.add("samples", std::to_string(rate.samples()));
   rate.add_to(facts);
   facts.print(out);
   return write_json(options.json, rate.json());

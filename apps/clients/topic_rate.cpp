@@ -6,12 +6,6 @@
 #include <cmath>
 
 namespace tandem::apps {
-namespace {
-
-double ms(std::int64_t ns) { return static_cast<double>(ns) * 1e-6; }
-
-}  // namespace
-
 void TopicRate::arrived(std::int64_t time_ns, std::optional<std::uint64_t> cycle) {
   if (samples_++ > 0) {
     intervals_ns_.push_back(time_ns - last_ns_);
@@ -38,8 +32,9 @@ std::optional<std::uint64_t> TopicRate::lost() const {
   return sent > told_ ? sent - told_ : 0;
 }
 
-TopicRate::Figures TopicRate::figures() const {
-  Figures f;
+RateFigures TopicRate::figures() const {
+  RateFigures f{
+      .samples = samples_, .window = intervals_ns_.size(), .interval = all_, .lost = lost()};
   if (intervals_ns_.empty()) return f;
   const auto count = static_cast<double>(intervals_ns_.size());
   double sum = 0.0, squares = 0.0;
@@ -49,46 +44,41 @@ TopicRate::Figures TopicRate::figures() const {
     const double off = static_cast<double>(ns) * 1e-9 - mean;
     squares += off * off;
   }
-  f.rate_Hz = mean > 0.0 ? 1.0 / mean : 0.0;
+  f.rate_Hz = 1.0 / mean;
   f.min_s = static_cast<double>(*std::ranges::min_element(intervals_ns_)) * 1e-9;
   f.max_s = static_cast<double>(*std::ranges::max_element(intervals_ns_)) * 1e-9;
   f.deviation_s = std::sqrt(squares / count);
   return f;
 }
 
-std::string TopicRate::line() const {
-  if (samples_ < 2) return "waiting for samples";
-  const Figures f = figures();
-  return fmt::format("{:.2f} Hz   min {:.3f} ms   max {:.3f} ms   std {:.3f} ms   window {}",
-                     f.rate_Hz, f.min_s * 1e3, f.max_s * 1e3, f.deviation_s * 1e3,
-                     intervals_ns_.size());
+void figures(Figures& f, const RateFigures& rate) {
+  f("samples", "received", rate.samples);
+  f("window", "number of newest intervals used for the next four", rate.window);
+  f("rate_Hz", "inverse of the mean interval", rate.rate_Hz);
+  f("min_s", rate.min_s);
+  f("max_s", rate.max_s);
+  f("deviation_s", "standard deviation", rate.deviation_s);
+  f("interval_ns", "of all intervals", rate.interval);
+  f("lost", "by the cycles' numbers; null: the type has none", rate.lost);
 }
 
-Json TopicRate::json() const {
-  const Figures f = figures();
-  const auto missing = lost();
-  Json json;
-  json["samples"] = samples_;
-  json["window"] = intervals_ns_.size();
-  json["rate_Hz"] = f.rate_Hz;
-  json["min_s"] = f.min_s;
-  json["max_s"] = f.max_s;
-  json["deviation_s"] = f.deviation_s;
-  json["interval_ns"] = percentiles_json(all_);
-  json["lost"] = missing ? Json(*missing) : Json(nullptr);
-  return json;
+Json TopicRate::json() const { return figures_json(figures()); }
+
+std::string TopicRate::line() const {
+  return figures_text(
+             "{rate_Hz:.2f Hz}   min {min_s:.3f ms}   max {max_s:.3f ms}   std {deviation_s:.3f ms}"
+             "   window {window}",
+             json())
+      .value_or("waiting for samples");
 }
 
 void TopicRate::add_to(Facts& facts) const {
-  const Figures f = figures();
-  const rt::Percentiles p = all_.percentiles();
-  facts.add("rate",
-            fmt::format("{:.2f} Hz, of the last {} intervals", f.rate_Hz, intervals_ns_.size()));
-  facts.add("min/max/std", fmt::format("{:.3f} / {:.3f} / {:.3f} ms", f.min_s * 1e3, f.max_s * 1e3,
-                                       f.deviation_s * 1e3));
-  facts.add("interval p50/p99/p99.9/max",
-            fmt::format("{:.3f} / {:.3f} / {:.3f} / {:.3f} ms, of all {}", ms(p.p50), ms(p.p99),
-                        ms(p.p999), ms(p.max), all_.count()));
+  add_figures(facts, json(),
+              {{"samples", "{samples}"},
+               {"rate", "{rate_Hz:.2f Hz}, of the last {window} intervals"},
+               {"min/max/std", "{min_s:.3f} / {max_s:.3f} / {deviation_s:.3f ms}"},
+               {"interval p50/p99/p99.9/max",
+                fmt::format("{{interval_ns:.3f ms}}, of all {}", all_.count())}});
   const auto missing = lost();
   facts.add("lost",
             missing ? fmt::format("{} of {}, by the cycles' numbers", *missing, told_ + *missing)

@@ -2,15 +2,26 @@
 // Layer: apps/clients.  Thread: main.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <optional>
 #include <string>
 
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
 #include "rt/histogram.hpp"
 
 namespace tandem::apps {
+
+/// Not a number: there was no interval yet.
+struct RateFigures {
+  std::uint64_t samples = 0;
+  std::size_t window = 0;                                             ///< newest intervals
+  double rate_Hz = NAN, min_s = NAN, max_s = NAN, deviation_s = NAN;  ///< of these
+  rt::Histogram interval;                                             ///< of all
+  std::optional<std::uint64_t> lost;  ///< nothing: there are no cycle numbers
+};
+void figures(Figures& f, const RateFigures& rate);
 
 /// Arrivals of one topic's samples.
 class TopicRate {
@@ -33,10 +44,7 @@ class TopicRate {
   void add_to(Facts& facts) const;
 
  private:
-  struct Figures {
-    double rate_Hz = 0.0, min_s = 0.0, max_s = 0.0, deviation_s = 0.0;
-  };
-  [[nodiscard]] Figures figures() const;
+  [[nodiscard]] RateFigures figures() const;
 
   std::size_t window_;
   std::uint64_t samples_ = 0;

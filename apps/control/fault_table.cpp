@@ -21,20 +21,17 @@ std::string category_words(std::string category) {
   return category;
 }
 
-Json faults_json(const std::vector<runtime::Fault>& faults) {
-  Json list = Json::array();
-  for (const runtime::Fault& fault : faults) {
-    list.push_back({{"time_s", fault.time_s},
-                    {"cycle", fault.cycle},
-                    {"joint", fault.joint},
-                    {"board", fault.board},
-                    {"cause", fault.text},
-                    {"category", hal::to_string(fault.category)},
-                    {"reaction", reaction_text(fault.category)},
-                    {"latched", fault.latched},
-                    {"cleared_s", fault.latched ? Json(nullptr) : Json(fault.cleared_s)}});
-  }
-  return list;
+void figures(Figures& f, const runtime::Fault& fault) {
+  f("time_s", fault.time_s);
+  f("cycle", fault.cycle);
+  f("joint", "or the sensor, or the controller; empty: the robot as a whole", fault.joint);
+  f("board", "empty: none", fault.board);
+  f("cause", fault.text);
+  f("category", "`category0`, `category1`, `category2`, `hold`, `warn`",
+    hal::to_string(fault.category));
+  f("reaction", "the category in words", reaction_text(fault.category));
+  f("latched", fault.latched);
+  f("cleared_s", "null while it is latched", known(!fault.latched, fault.cleared_s));
 }
 
 void print_faults(const Json& faults, std::FILE* out) {

@@ -4,9 +4,8 @@
 
 #include <cstdio>
 #include <string>
-#include <vector>
 
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
 #include "runtime/fault.hpp"
 
 namespace tandem::apps {
@@ -17,10 +16,10 @@ namespace tandem::apps {
 /// "category 1" of the JSON's "category1".
 [[nodiscard]] std::string category_words(std::string category);
 
-/// A list of objects: docs/json.md, `fault_log`.
-[[nodiscard]] Json faults_json(const std::vector<runtime::Fault>& faults);
+/// docs/json.md, `fault_log`
+void figures(Figures& f, const runtime::Fault& fault);
 
-/// The table of such a list; nothing when it is empty.
+/// The table of a JSON list of faults; nothing when it is empty.
 void print_faults(const Json& faults, std::FILE* out);
 
 }  // namespace tandem::apps

@@ -62,7 +62,7 @@ Result<Json> reset(runtime::RobotCycle& cycle, std::uint64_t after_stop) {
     return fail(fmt::format("the run is in the phase {}", runtime::to_string(phase)),
                 "a fault is reset while the run waits for it: tandem run --on-fault wait");
   }
-  answer["faults"] = faults_json(cycle.faults());  // before it
+  answer["faults"] = figures_json(cycle.faults());  // before it
   cycle.inbox().reset_faults(after_stop);
   return answer;
 }
@@ -117,7 +117,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
   registry.add("status", [&cycle](const Json&) -> Result<Json> { return status(cycle); });
   registry.add("fault.show", [&cycle](const Json&) -> Result<Json> {
     Json answer = status(cycle);
-    answer["faults"] = faults_json(cycle.faults());
+    answer["faults"] = figures_json(cycle.faults());
     answer["lost"] = cycle.fault_log().lost();
     return answer;
   });

@@ -104,8 +104,7 @@ Exit doctor_command(const DoctorOptions& options) {
   std::FILE* out = human_output(options.json);
   print_findings(findings, out);
   print_verdict(findings, out);
-  if (const Status s = write_json(options.json, figures_json(result)); !s) return refuse(s.error());
-  return Exit::kDone;
+  return end_with_json(options.json, figures_json(result));
 }
 
 }  // namespace tandem::apps

@@ -200,8 +200,7 @@ Exit latency_command(const LatencyOptions& options) {
     measured = measure_and_draw(options, *draft);
   }
   if (!measured) return refuse(measured.error());
-  if (const Status s = write_json(options.json, *measured); !s) return refuse(s.error());
-  return Exit::kDone;
+  return end_with_json(options.json, *measured);
 }
 
 }  // namespace tandem::apps

@@ -244,7 +244,7 @@ void figures(Figures& f, const LatencyResult& result) {
   f("kernel", "of this machine", kernel());
   f("period_ns", "of both programs", result.plan.period_us * 1000);
   f("scheduling", "policy and priority of both", policy_text(result.plan));
-  f("mode", "`swap`, `together` or `turns`", std::string(to_string(result.plan.mode)));
+  f("mode", "`swap`, `together` or `turns`", to_string(result.plan.mode));
   f("slices", "parts of each measurement", result.plan.slices);
   f("loads", result.samples);
 }

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <iterator>
 #include <vector>
 
 #include "base/counted.hpp"
@@ -18,24 +19,41 @@ bool on_sheet(const hal::RobotConfig& robot, const hal::JointConfig& joint) {
   return board != nullptr && !board->eds.empty();
 }
 
-std::string scale_text(const hal::JointConfig& joint) {
-  const std::string velocity =
-      joint.velocity_units_per_rev > 0.0
-          ? fmt::format("{:.10g} velocity units at one per second ({})",
-                        joint.velocity_units_per_rev, source(joint.velocity_of_sheet))
-          : std::string("velocities in counts per second");
-  const std::string acceleration = joint.acceleration_units_per_rev > 0.0
-                                       ? fmt::format("{:.10g} acceleration units (robot.toml), ",
-                                                     joint.acceleration_units_per_rev)
-                                       : std::string();
-  return fmt::format("{:.10g} counts per {} ({}), {}, {}rated {:.6g} {} ({}){}",
-                     joint.encoder_counts_per_rev, joint.slides ? "2 pi m" : "revolution",
-                     source(joint.counts_of_sheet), velocity, acceleration, joint.rated_torque_Nm,
-                     joint.slides ? "N" : "Nm", source(joint.torque_of_sheet),
-                     joint.reversed ? ", reversed" : "");
+}  // namespace
+
+static void figures(Figures& f, const hal::JointConfig& joint) {
+  const bool own = joint.velocity_units_per_rev > 0.0;
+  const double velocity = own ? joint.velocity_units_per_rev : joint.encoder_counts_per_rev;
+  const double acceleration = joint.acceleration_units_per_rev;
+  f("joint", joint.name);
+  f("slides", joint.slides);
+  f("encoder_counts_per_rev", "of a slide per 2 pi m", joint.encoder_counts_per_rev);
+  f("encoder_counts_from", "who says that: `robot.toml`, `sheet`", source(joint.counts_of_sheet));
+  f("velocity_units_per_rev", velocity);
+  f("velocity_units_from", "the same, or `counts`: they are counts per second",
+    own ? source(joint.velocity_of_sheet) : "counts");
+  f("acceleration_units_per_rev", acceleration > 0.0 ? acceleration : velocity);
+  f("rated_torque_Nm", "of a slide in N", joint.rated_torque_Nm);
+  f("rated_torque_from", source(joint.torque_of_sheet));
+  f("reversed", joint.reversed);
+  f("zero_counts", joint.zero_counts);
+  f("encoder_turn_counts", joint.encoder_turn_counts);
 }
 
-}  // namespace
+static std::string scale_text(const hal::JointConfig& joint) {
+  const std::string text = fmt::format(
+      "{{encoder_counts_per_rev:.10g}} counts per {} ({{encoder_counts_from}}), {}, {}rated "
+      "{{rated_torque_Nm:.6g}} {} ({{rated_torque_from}}){}",
+      joint.slides ? "2 pi m" : "revolution",
+      joint.velocity_units_per_rev > 0.0
+          ? "{velocity_units_per_rev:.10g} velocity units at one per second ({velocity_units_from})"
+          : "velocities in counts per second",
+      joint.acceleration_units_per_rev > 0.0
+          ? "{acceleration_units_per_rev:.10g} acceleration units (robot.toml), "
+          : "",
+      joint.slides ? "N" : "Nm", joint.reversed ? ", reversed" : "");
+  return figures_text(text, figures_json(joint)).value_or("");
+}
 
 void add_scale_facts(const hal::RobotConfig& robot, Facts& facts) {
   struct Scale {
@@ -61,30 +79,13 @@ void add_scale_facts(const hal::RobotConfig& robot, Facts& facts) {
   }
 }
 
+std::vector<Figures::Row> scale_figures() { return Figures::rows_of<hal::JointConfig>(); }
+
 void add_scale_json(const hal::RobotConfig& robot, Json& json) {
-  Json scales = Json::array();
-  for (const hal::JointConfig& joint : robot.joints) {
-    if (!on_sheet(robot, joint)) continue;
-    const bool own_velocity = joint.velocity_units_per_rev > 0.0;
-    scales.push_back(
-        {{"joint", joint.name},
-         {"slides", joint.slides},
-         {"encoder_counts_per_rev", joint.encoder_counts_per_rev},
-         {"encoder_counts_from", source(joint.counts_of_sheet)},
-         {"velocity_units_per_rev",
-          own_velocity ? joint.velocity_units_per_rev : joint.encoder_counts_per_rev},
-         {"velocity_units_from", own_velocity ? source(joint.velocity_of_sheet) : "counts"},
-         {"acceleration_units_per_rev", joint.acceleration_units_per_rev > 0.0
-                                            ? joint.acceleration_units_per_rev
-                                        : own_velocity ? joint.velocity_units_per_rev
-                                                       : joint.encoder_counts_per_rev},
-         {"rated_torque_Nm", joint.rated_torque_Nm},
-         {"rated_torque_from", source(joint.torque_of_sheet)},
-         {"reversed", joint.reversed},
-         {"zero_counts", joint.zero_counts},
-         {"encoder_turn_counts", joint.encoder_turn_counts}});
-  }
-  if (!scales.empty()) json["scales"] = std::move(scales);
+  std::vector<hal::JointConfig> joints;
+  std::ranges::copy_if(robot.joints, std::back_inserter(joints),
+                       [&](const hal::JointConfig& joint) { return on_sheet(robot, joint); });
+  if (!joints.empty()) json["scales"] = figures_json(joints);
 }
 
 }  // namespace tandem::apps

@@ -235,9 +235,7 @@ Exit check_command(const CheckOptions& options) {
   json["ok"] = errors.empty();
   json["errors"] = errors_json(errors);
   json["warnings"] = errors_json(warnings);
-  if (const Status written = write_json(options.json, json); !written)
-    return refuse(written.error());
-  return errors.empty() ? Exit::kDone : Exit::kUsage;
+  return end_with_json(options.json, json, errors.empty() ? Exit::kDone : Exit::kUsage);
 }
 
 }  // namespace tandem::apps

@@ -3,7 +3,10 @@
 // Layer: apps/run.  Thread: main.
 #pragma once
 
+#include <vector>
+
 #include "apps/command_line/command_line.hpp"
+#include "apps/text/figures.hpp"
 #include "apps/run/tools_program.hpp"
 
 namespace tandem::apps {
@@ -15,6 +18,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit serve_command(const ServeOptions& options, ReportOfRun& report);
 /// The robot on the other end of the wire, until it is asked to stop.
 [[nodiscard]] Exit emulate_command(const EmulateOptions& options);
+/// What its JSON has, for docs/json.md.
+[[nodiscard]] std::vector<Figures::Row> emulate_figures();
 /// Reads every file, says what a run would do, moves nothing.
 [[nodiscard]] Exit check_command(const CheckOptions& options);
 

@@ -73,6 +73,7 @@ struct Emulation {
   std::unique_ptr<CanSockets> sockets;
   std::unique_ptr<sim::Emulator> emulator;
   std::uint64_t injected = 0;  ///< faults that have begun
+  bool lockstep = false;
 };
 
 Diagnostics in_file(Error error, const std::string& file) {
@@ -86,6 +87,7 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   auto subject = read_subject(options);
   if (!subject) return std::unexpected(subject.error());
   e->subject = std::move(*subject);
+  e->lockstep = options.lockstep;
   const hal::RobotConfig& robot = e->subject.robot;
   const std::int64_t period_ns = e->subject.sim.period_ns;
   e->subject.sim.tree = std::make_shared<const model::Tree>(e->subject.description.tree);
@@ -130,59 +132,25 @@ std::string interfaces_of(const hal::RobotConfig& robot) {
   return names;
 }
 
-/// How each board stopped without SYNC.
-Json boards_json(const Emulation& e) {
-  const std::vector<sim::BoardStop>& stops = e.emulator->statistics().boards;
-  Json list = Json::array();
-  for (std::size_t b = 0; b < stops.size(); ++b) {
-    list.push_back({{"name", e.subject.robot.boards[b].name},
-                    {"silent_steps", stops[b].silent_steps},
-                    {"safe_after_steps", stops[b].safe_after_steps},
-                    {"open_after_steps", stops[b].open_after_steps}});
-  }
-  return list;
-}
+/// How a board stopped without SYNC.
+struct BoardReport : sim::BoardStop {
+  std::string name;
+};
 
-Json summary_json(const Emulation& e, bool lockstep) {
-  const sim::EmulatorStatistics& s = e.emulator->statistics();
-  Json json;
-  json["robot"] = e.subject.robot.name;
-  json["lockstep"] = lockstep;
-  json["steps"] = s.steps;
-  json["steps_without_sync"] = s.steps_without_sync;
-  json["slipped"] = s.slipped;
-  json["sim_seconds"] = static_cast<double>(e.emulator->time_ns()) * 1e-9;
-  json["silent_steps"] = s.silent_steps;
-  json["safe_after_steps"] = s.safe_after_steps;
-  json["open_after_steps"] = s.open_after_steps;
-  json["boards"] = boards_json(e);
-  json["injected"] = e.injected;
-  json["frames_in"] = s.frames_in;
-  json["frames_out"] = s.frames_out;
-  json["frames_lost"] = s.frames_lost;
-  json["buses"] = figures_json(e.sockets->open_buses());
-  json["all_enabled"] = e.robot->all_enabled();
-  json["diverged"] = e.robot->plant().diverged();
-  return json;
-}
-
-void print_summary(const Emulation& e, std::FILE* out) {
-  const sim::EmulatorStatistics& s = e.emulator->statistics();
+void print_summary(const Emulation& e, const Json& json, std::FILE* out) {
   Facts facts;
-  facts.add("simulated", fmt::format("{:.3f} s in {} steps, {} of them without SYNC, {} slipped",
-                                     static_cast<double>(e.emulator->time_ns()) * 1e-9, s.steps,
-                                     s.steps_without_sync, s.slipped));
-  facts.add("frames",
-            fmt::format("{} in, {} out, {} lost", s.frames_in, s.frames_out, s.frames_lost));
+  add_figures(facts, json,
+              {{"simulated",
+                "{sim_seconds:.3f s} in {steps} steps, {steps_without_sync} of them without SYNC, "
+                "{slipped} slipped"},
+               {"frames", "{frames_in} in, {frames_out} out, {frames_lost} lost"}});
   add_bus_facts(e.sockets->open_buses(), facts);
-  if (e.robot->plant().diverged()) {
+  if (e.robot->plant().diverged())
     facts.add("the simulation diverged", e.robot->plant().diverged_text());
-  }
-  if (s.silent_steps > 0) {
-    facts.add("without SYNC at the end",
-              fmt::format("{} steps; no motor drove after {}, every bridge was open after {}",
-                          s.silent_steps, s.safe_after_steps, s.open_after_steps));
-  }
+  if (e.emulator->statistics().silent_steps > 0)
+    add_figures(facts, json, "without SYNC at the end",
+                "{silent_steps} steps; no motor drove after {safe_after_steps}, every bridge was "
+                "open after {open_after_steps}");
   facts.print(out);
 }
 
@@ -232,6 +200,41 @@ void emulate(Emulation& e, TaskQueue& tasks, std::FILE* out, bool quiet) {
 
 }  // namespace
 
+static void figures(Figures& f, const BoardReport& board) {
+  f("name", board.name);
+  f("silent_steps", board.silent_steps);
+  f("safe_after_steps", board.safe_after_steps);
+  f("open_after_steps", board.open_after_steps);
+}
+
+static void figures(Figures& f, const Emulation* e) {
+  const auto s = e == nullptr ? sim::EmulatorStatistics() : e->emulator->statistics();
+  f("robot", [&] { return e->subject.robot.name; });
+  f("lockstep", [&] { return e->lockstep; });
+  f("steps", "of the boards' time", s.steps);
+  f("steps_without_sync", "made by the boards' own clocks", s.steps_without_sync);
+  f("slipped", "skipped because they were too many to catch up", s.slipped);
+  f("sim_seconds", [&] { return static_cast<double>(e->emulator->time_ns()) * 1e-9; });
+  f("silent_steps", "since the last SYNC on any bus", s.silent_steps);
+  f("safe_after_steps", "of these, until no motor drove; 0: not (yet)", s.safe_after_steps);
+  f("open_after_steps", "the same, until every bridge was open", s.open_after_steps);
+  f("boards", "each alone, since the last SYNC on its own bus", [&] {
+    std::vector<BoardReport> boards;
+    for (const sim::BoardStop& stop : s.boards)
+      boards.push_back({stop, e->subject.robot.boards[boards.size()].name});
+    return boards;
+  });
+  f("injected", "faults that have begun", [&] { return e->injected; });
+  f("frames_in", s.frames_in);
+  f("frames_out", s.frames_out);
+  f("frames_lost", s.frames_lost);
+  f("buses", "as in `run`", [&] { return e->sockets->open_buses(); });
+  f("all_enabled", [&] { return e->robot->all_enabled(); });
+  f("diverged", [&] { return e->robot->plant().diverged(); });
+}
+
+std::vector<Figures::Row> emulate_figures() { return Figures::rows_of<const Emulation*>(); }
+
 Exit emulate_command(const EmulateOptions& options) {
   outlive_files();
   std::FILE* out = human_output(options.json);
@@ -260,9 +263,8 @@ Exit emulate_command(const EmulateOptions& options) {
   }
   TaskQueue tasks;
   ControlRegistry commands;
-  commands.add(
-      {"status", ControlEffect::kReads, "steps, frames and simulated time so far"},
-      [&](const Json&) { return tasks.run([&] { return summary_json(e, options.lockstep); }); });
+  commands.add({"status", ControlEffect::kReads, "steps, frames and simulated time so far"},
+               [&](const Json&) { return tasks.run([&] { return figures_json(&e); }); });
   add_inject(commands, e.subject.robot, e.subject.sim.period_ns, [&](const sim::Fault& fault) {
     const auto done = tasks.run([&]() -> Result<Json> {
       if (Status added = injected(e.robot->inject(fault)); !added) {
@@ -275,10 +277,10 @@ Exit emulate_command(const EmulateOptions& options) {
   const auto socket =
       serve(commands, {.path = options.socket, .kind = "emulate", .wanted = !options.no_socket});
   emulate(e, tasks, out, options.quiet);
-  if (!options.quiet) print_summary(e, out);
-  if (const Status written = write_json(options.json, summary_json(e, options.lockstep)); !written)
-    return refuse(written.error());
-  return e.robot->plant().diverged() ? Exit::kFault : Exit::kDone;
+  const Json summary = figures_json(&e);
+  if (!options.quiet) print_summary(e, summary, out);
+  return end_with_json(options.json, summary,
+                       e.robot->plant().diverged() ? Exit::kFault : Exit::kDone);
 }
 
 }  // namespace tandem::apps

@@ -77,14 +77,14 @@ void print_sensors_apart(const hal::RobotConfig& robot, const Differences& all, 
   table.print(out);
 }
 
-void print_bases_apart(const Differences& all, std::FILE* out) {
-  if (all.base_position_m() == nullptr) return;
-  const Difference &place = *all.base_position_m(), &angle = *all.base_angle_rad();
+void print_bases_apart(const Json& base, std::FILE* out) {
+  if (base.is_null()) return;
+  const auto text = [&base](const char* figure) {
+    return figures_text(figure, base).value_or("-");
+  };
   Table table({"base", "rms", "max"});
-  table.add({"apart", fmt::format("{:.3f} mm", all.rms(place) * kMillimetresApart),
-             fmt::format("{:.3f} mm", place.max * kMillimetresApart)});
-  table.add({"turned", fmt::format("{:.4f} deg", all.rms(angle) * kDegreesApart),
-             fmt::format("{:.4f} deg", angle.max * kDegreesApart)});
+  table.add({"apart", text("{position_m.rms:.3f mm}"), text("{position_m.max:.3f mm}")});
+  table.add({"turned", text("{angle_rad.rms:.4f deg}"), text("{angle_rad.max:.4f deg}")});
   fmt::print(out, "\n");
   table.print(out);
 }
@@ -168,14 +168,14 @@ void figures(Figures& f, const ParallelSummary& s) {
 
 void print_parallel(const ParallelSummary& summary, std::FILE* out) {
   const Differences& all = *summary.all;
+  const Json json = figures_json(summary);
   if (all.unequal() > 0) {
     print_joints_apart(*summary.second, all, out);
     print_sensors_apart(*summary.second, all, out);
-    print_bases_apart(all, out);
+    print_bases_apart(json["base"], out);
   }
   fmt::print(out, "\n");
   Facts facts;
-  const Json json = figures_json(summary);
   add_figures(facts, json, "parallel robot",
               all.unequal() == 0
                   ? "the same bits in all {compared|cycle}"

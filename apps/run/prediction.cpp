@@ -91,7 +91,7 @@ Json answer_json(const internal_model::Answer& answer, const hal::RobotConfig& r
             {"wall_s", p.wall_s},
             {"loop_bytes", answer.loop_bytes},
             {"loop_ns", answer.loop_ns},
-            {"faults", faults_json(answer.faults)},
+            {"faults", figures_json(answer.faults)},
             {"unarchived_controllers", answer.unarchived},
             {"joints", Json::object()},
             {"base", nullptr}};

@@ -120,12 +120,10 @@ void figures(Figures& f, const remote::TeleFigures& link) {
 
 void add_remote_facts(const Json& run, Facts& facts) {
   const Json& remote = run["remote"];
-  const auto row = [&](const char* name, std::string_view text) {
-    add_figures(facts, remote, name, text);
-  };
-  row("turn-around p50/p99/p99.9/max", "{turn_around_ns:.1f us}");
-  row("missed", "{missed_cycles} cycles of the server");
-  row("owners", "{leases}, {losses} lost");
+  add_figures(facts, remote,
+              {{"turn-around p50/p99/p99.9/max", "{turn_around_ns:.1f us}"},
+               {"missed", "{missed_cycles} cycles of the server"},
+               {"owners", "{leases}, {losses} lost"}});
   if (remote.contains("commands")) {
     std::string text;
     for (const auto& [verdict, count] : remote["commands"].items()) {
@@ -134,9 +132,10 @@ void add_remote_facts(const Json& run, Facts& facts) {
     }
     facts.add("commands", text);
   }
-  row("without commands", "{playout.starved_cycles} cycles, {playout.holds|time}");
-  row("age of their state p50/p99/p99.9/max", "{age_ns:.1f us}");
-  row("in cycles", "{age_cycles}");
+  add_figures(facts, remote,
+              {{"without commands", "{playout.starved_cycles} cycles, {playout.holds|time}"},
+               {"age of their state p50/p99/p99.9/max", "{age_ns:.1f us}"},
+               {"in cycles", "{age_cycles}"}});
 }
 
 }  // namespace tandem::apps

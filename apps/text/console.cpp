@@ -301,6 +301,11 @@ void write_failure(const std::string& file) {
   (void)write_json(file, {{"ok", false}, {"errors", errors_json(reported)}});
 }
 
+Exit end_with_json(const std::string& file, const Json& value, Exit exit) {
+  const Status written = write_json(file, value);
+  return written ? exit : refuse(written.error());
+}
+
 Json percentiles_json(const rt::Histogram& of) {
   if (of.count() == 0) return nullptr;
   return percentiles_json(of.percentiles());

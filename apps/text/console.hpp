@@ -76,6 +76,11 @@ void outlive_files();
 [[nodiscard]] Status check_overwrites(const std::string& file, std::string_view begins,
                                       const std::string& what);
 
+/// Writes the JSON of a command that has done its work.
+/// @return `exit`, or that of a JSON that cannot be written, after its error was printed
+[[nodiscard]] Exit end_with_json(const std::string& file, const Json& value,
+                                 Exit exit = Exit::kDone);
+
 /// p50, p99, p999, max; all [ns].
 [[nodiscard]] Json percentiles_json(const rt::Percentiles& p);
 /// The same; null when nothing was measured.

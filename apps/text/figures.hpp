@@ -3,7 +3,9 @@
 // Layer: apps/text.  Thread: main.
 #pragma once
 
+#include <cmath>
 #include <concepts>
+#include <initializer_list>
 #include <optional>
 #include <ranges>
 #include <string>
@@ -28,6 +30,14 @@ concept Declared = requires(Figures& f, const T& of) {
 template <class T>
 using Named = std::vector<std::pair<std::string, T>>;
 
+/// Results that have a name, by it.
+template <class T>
+[[nodiscard]] Named<T> by_name(const std::vector<T>& results) {
+  Named<T> named;
+  for (const T& one : results) named.emplace_back(one.name, one);
+  return named;
+}
+
 /// `value`; nothing (null in JSON) where it was not measured.
 template <class T>
 [[nodiscard]] std::optional<T> known(bool is_known, T value) {
@@ -50,11 +60,14 @@ class Figures {
   /// One figure.
   /// @param key    ends with the unit; its order is that of the calls
   /// @param words  for docs/json.md: what key and type do not say
-  /// @param value  number, text, list, percentiles, a declared result, Named or optional of these;
-  ///               or a function that returns one
+  /// @param value  number (null unless it is finite), text, list, percentiles, a declared result,
+  ///               Named or optional of these; or a function that returns one, or that takes the
+  ///               declarations of an object
   template <class V>
   void operator()(const char* key, const char* words, const V& value) {
-    if constexpr (std::invocable<const V&>) {
+    if constexpr (std::invocable<const V&, Figures&>) {
+      group(key, words, value);
+    } else if constexpr (std::invocable<const V&>) {
       using Value = std::remove_cvref_t<std::invoke_result_t<const V&>>;
       documents_ ? describe<Value>(path_ + key, words, "") : set(key, value);
     } else {
@@ -85,6 +98,8 @@ class Figures {
       return all;
     } else if constexpr (kPercentiles<V>) {
       return percentiles_json(value);
+    } else if constexpr (std::floating_point<V>) {
+      return std::isfinite(value) ? Json(value) : Json();
     } else {
       return Json(value);
     }
@@ -126,6 +141,17 @@ class Figures {
     return std::move(f.json_);
   }
 
+  template <class V>
+  void group(const char* key, const char* words, const V& declare) {
+    if (documents_) rows_.push_back({path_ + key, "object", words});
+    Json outer = std::exchange(json_, Json::object());
+    const std::string outside = std::exchange(path_, path_ + key + ".");
+    declare(*this);
+    path_ = outside;
+    outer[key] = std::exchange(json_, Json());
+    json_ = std::move(outer);
+  }
+
   /// Null replaces nothing: of two alternatives that have one key.
   template <class V>
   void set(const char* key, const V& value) {
@@ -138,7 +164,7 @@ class Figures {
     if constexpr (kOptional<V>) {
       describe<typename V::value_type>(path, words, " or null");
     } else {
-      const bool null = std::is_pointer_v<V> || std::same_as<V, rt::Histogram>;
+      const bool null = (std::is_pointer_v<V> && Declared<V>) || std::same_as<V, rt::Histogram>;
       rows_.push_back({path, type_of<V>() + (null ? " or null" : or_null), words});
       describe_inside<V>(path);
     }
@@ -194,12 +220,26 @@ template <class T>
 }
 
 /// A text for people, in which "{ground.max_foot_slip_m:.3f mm}" is a figure of a result's JSON:
-/// its path, format and unit, into which it is converted. Percentiles are four numbers;
-/// "{axes|axis|axes}" is a number with what it counts.
-/// @return nothing where one of the figures is null or absent
-[[nodiscard]] std::optional<std::string> figures_text(std::string_view text, const Json& figures);
+/// its path, format and unit, into which it is converted; without a unit into that of the next one
+/// that has it ("{from_ns:.1f} to {to_ns:.1f s}"). Percentiles are four numbers, a list is its
+/// elements; "{axes|axis|axes}" is a number with what it counts.
+/// @param unit  into which figures are converted that no unit follows; it is not shown
+/// @return nothing where one of the figures is null, absent or an empty list
+[[nodiscard]] std::optional<std::string> figures_text(std::string_view text, const Json& figures,
+                                                      std::string_view unit = {});
 
 /// Adds such a text, if there is one.
 void add_figures(Facts& facts, const Json& figures, const std::string& name, std::string_view text);
+/// Adds several.
+void add_figures(Facts& facts, const Json& figures,
+                 std::initializer_list<std::pair<const char*, std::string>> rows);
+
+/// A column of a table of results.
+struct Column {
+  std::string header;     ///< ends with the unit: "from [s]"
+  std::string_view text;  ///< as of figures_text(); empty: the result's name
+};
+/// A table with a row for each result of a list, or by name; "-" where there is no such text.
+[[nodiscard]] Table figures_table(const std::vector<Column>& columns, const Json& results);
 
 }  // namespace tandem::apps

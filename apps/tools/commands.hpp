@@ -5,8 +5,10 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "apps/command_line/command_line.hpp"
+#include "apps/text/figures.hpp"
 #include "base/result.hpp"
 
 namespace tandem::apps {
@@ -21,6 +23,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit log_replay_command(const LogOptions& options);
 /// Writes a data sheet per type of board and sensor; with `show`, prints what a sheet says.
 [[nodiscard]] Exit eds_command(const EdsOptions& options);
+/// A part of it: what a drive is and can, by its data sheet.
+[[nodiscard]] Exit eds_show(const EdsOptions& options);
 [[nodiscard]] Exit report_command(const ReportOptions& options);
 /// Simulates the experiment in a file. @return what ended it early; empty: nothing
 /// Errors: it cannot be started.
@@ -30,5 +34,13 @@ using Trial = std::function<Result<std::string>(const std::string& experiment)>;
 [[nodiscard]] Exit excite_command(const ExciteOptions& options, const Trial& trial);
 /// Masses, inertias and friction from logs; writes a robot with them, and a page.
 [[nodiscard]] Exit identify_command(const IdentifyOptions& options);
+
+/// What their JSON has, for docs/json.md.
+[[nodiscard]] std::vector<Figures::Row> eds_figures();
+[[nodiscard]] std::vector<Figures::Row> excite_figures();
+[[nodiscard]] std::vector<Figures::Row> identify_figures();
+[[nodiscard]] std::vector<Figures::Row> import_figures();
+[[nodiscard]] std::vector<Figures::Row> log_figures();
+[[nodiscard]] std::vector<Figures::Row> replay_figures();
 
 }  // namespace tandem::apps

@@ -8,7 +8,6 @@
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/eds_files.hpp"
-#include "apps/tools/eds_show.hpp"
 #include "robot/robot_files.hpp"
 
 namespace tandem::apps {

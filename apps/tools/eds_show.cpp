@@ -1,12 +1,11 @@
 // `tandem eds show`: what a drive is and can, by its data sheet.
-#include "apps/tools/eds_show.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <memory>
 
-#include "apps/text/console.hpp"
+#include "apps/text/figures.hpp"
+#include "apps/tools/commands.hpp"
 #include "apps/tools/sheet_facts.hpp"
 #include "base/counted.hpp"
 #include "canopen/data_sheet.hpp"
@@ -242,8 +241,16 @@ void print_stand_in(std::FILE* out, const Result<StandIn>& simulated) {
   for (const std::string& text : simulated->remarks) fmt::print(out, "  {}\n", text);
 }
 
-void print_sheet(std::FILE* out, const DataSheet& sheet, const SheetFacts& facts,
-                 const Result<hal::can::DriveUse>& use, const Result<StandIn>& simulated) {
+/// What is told of a sheet.
+struct SheetReport {
+  DataSheet sheet{};
+  SheetFacts facts{};
+  Result<hal::can::DriveUse> use{};
+  Result<StandIn> simulated{};
+};
+
+void print_sheet(std::FILE* out, const SheetReport& report) {
+  const auto& [sheet, facts, use, simulated] = report;
   print_facts(out, sheet, facts);
   print_modes(out, facts);
   print_use(out, use);
@@ -257,125 +264,111 @@ void print_sheet(std::FILE* out, const DataSheet& sheet, const SheetFacts& facts
   for (const std::string& remark : sheet.remarks) fmt::print(out, "  {}\n", remark);
 }
 
+std::int64_t number_of(const canopen::SheetValue& value) { return value.number; }
+
 template <class T>
-Json known(const std::optional<T>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-Json modes_json(const SheetFacts& facts) {
-  Json list = Json::array();
-  for (const SheetMode& mode : facts.modes) {
-    list.push_back({{"mode", mode.number},
-                    {"name", mode.name},
-                    {"needs", mode.needs},
-                    {"lacks", mode.lacks},
-                    {"has_also", mode.also}});
-  }
-  return list;
-}
-
-Json pdos_json(const SheetFacts& facts) {
-  Json list = Json::array();
-  for (const SheetPdo& pdo : facts.pdos) {
-    list.push_back({{"pdo", fmt::format("{} {}", pdo.receive ? "RPDO" : "TPDO", pdo.number)},
-                    {"cob_id", pdo.cob_id ? Json(pdo.cob_id->number) : Json(nullptr)},
-                    {"plus_node_id", pdo.cob_id && pdo.cob_id->plus_node_id},
-                    {"cob_id_writable", pdo.cob_id_writable},
-                    {"transmission", known(pdo.transmission)},
-                    {"transmission_writable", pdo.transmission_writable},
-                    {"entries", pdo.entries},
-                    {"mapping_writable", pdo.mapping_writable},
-                    {"assigned", pdo.assigned},
-                    {"carries", pdo.carries}});
-  }
-  return list;
-}
-
-Json objects_json(const std::vector<const SheetEntry*>& entries) {
-  Json list = Json::array();
-  for (const SheetEntry* entry : entries) {
-    list.push_back({{"object", object_text(*entry)},
-                    {"name", entry->name},
-                    {"size_bytes", entry->size()},
-                    {"value", entry->value ? Json(entry->value->number) : Json(nullptr)}});
-  }
-  return list;
-}
-
-Json use_json(const Result<hal::can::DriveUse>& use) {
-  if (!use)
-    return {{"refused", use.error().message}, {"does", Json::array()}, {"misses", Json::array()}};
-  Json does = Json::array();
-  for (const hal::can::DriveFact& fact : use->does) {
-    does.push_back({{"what", fact.what}, {"how", fact.how}});
-  }
-  return {{"refused", nullptr}, {"does", does}, {"misses", use->misses}};
-}
-
-Json stand_in_json(const Result<StandIn>& simulated) {
-  if (!simulated) {
-    return {{"refused", simulated.error().message},
-            {"modes", Json::array()},
-            {"remarks", Json::array()}};
-  }
-  return {{"refused", nullptr}, {"modes", simulated->modes}, {"remarks", simulated->remarks}};
-}
-
-Json dc_modes_json(const DataSheet& sheet) {
-  Json list = Json::array();
-  for (const canopen::SheetDcMode& mode : sheet.dc_modes) {
-    list.push_back({{"name", mode.name}, {"assign_activate", mode.activate}});
-  }
-  return list;
-}
-
-Json sheet_json(const DataSheet& sheet, const SheetFacts& facts,
-                const Result<hal::can::DriveUse>& use, const Result<StandIn>& simulated) {
-  Json json{{"file", sheet.file},
-            {"vendor_name", sheet.vendor_name},
-            {"product_name", sheet.product_name},
-            {"description", sheet.description},
-            {"vendor", known(sheet.vendor)},
-            {"product", known(sheet.product)},
-            {"revision", known(sheet.revision)},
-            {"device_type", known(facts.device_type)},
-            {"axes", facts.axes},
-            {"sheet_entries", sheet.entries.size()},
-            {"node_id", known(sheet.node_id)},
-            {"bit_rate_kbit_s", known(sheet.bit_rate_kbit_s)},
-            {"bit_rates_kbit_s", sheet.bit_rates_kbit_s},
-            {"lss", sheet.lss},
-            {"ethercat", sheet.ethercat},
-            {"dc_modes", dc_modes_json(sheet)},
-            {"heartbeat_consumers", facts.heartbeat_consumers},
-            {"heartbeat_producer", facts.heartbeat_producer},
-            {"node_guarding", facts.node_guarding}};
-  json["modes_said"] = facts.modes_said;
-  json["modes"] = modes_json(facts);
-  json["own_modes"] = facts.own_modes;
-  json["master"] = use_json(use);
-  json["simulation"] = stand_in_json(simulated);
-  json["lacks"] = facts.lacks;
-  json["pdos"] = pdos_json(facts);
-  json["into_rpdo"] = objects_json(facts.into_rpdo);
-  json["into_tpdo"] = objects_json(facts.into_tpdo);
-  json["units"] = objects_json(facts.units);
-  json["remarks"] = sheet.remarks;
-  return json;
+std::optional<std::string> refused(const Result<T>& result) {
+  return result ? std::nullopt : std::optional(result.error().message);
 }
 
 }  // namespace
 
+static void figures(Figures& f, const canopen::SheetDcMode& mode) {
+  f("name", mode.name);
+  f("assign_activate", "bit 9 SYNC0, bit 10 SYNC1", mode.activate);
+}
+
+static void figures(Figures& f, const SheetMode& mode) {
+  f("mode", "6060", mode.number);
+  f("name", mode.name);
+  f("needs", "objects", mode.needs);
+  f("lacks", mode.lacks);
+  f("has_also", mode.also);
+}
+
+static void figures(Figures& f, const hal::can::DriveFact& fact) {
+  f("what", fact.what);
+  f("how", fact.how);
+}
+
+static void figures(Figures& f, const SheetPdo& pdo) {
+  f("pdo", "`RPDO 1`", fmt::format("{} {}", pdo.receive ? "RPDO" : "TPDO", pdo.number));
+  f("cob_id", "null: not said; with bits 30 and 31", pdo.cob_id.transform(number_of));
+  f("plus_node_id", "the id is added to it", pdo.cob_id && pdo.cob_id->plus_node_id);
+  f("cob_id_writable", pdo.cob_id_writable);
+  f("transmission", "null: not said", pdo.transmission);
+  f("transmission_writable", pdo.transmission_writable);
+  f("entries", "at most", pdo.entries);
+  f("mapping_writable", pdo.mapping_writable);
+  f("assigned", "of an ESI: it is among the process data from power-on", pdo.assigned);
+  f("carries", "objects; of an ESI also gaps, `(8 bit)`", pdo.carries);
+}
+
+static void figures(Figures& f, const SheetEntry* entry) {
+  f("object", "`60C1:1`", [&] { return object_text(*entry); });
+  f("name", [&] { return entry->name; });
+  f("size_bytes", "0: not fixed", [&] { return entry->size(); });
+  f("value", "without the node's id; reals as bits; null: not said",
+    [&] { return entry->value.transform(number_of); });
+}
+
+static void figures(Figures& f, const SheetReport& report) {
+  const DataSheet& sheet = report.sheet;
+  const SheetFacts& facts = report.facts;
+  f("file", sheet.file);
+  f("vendor_name", "may be empty, as the next two", sheet.vendor_name);
+  f("product_name", sheet.product_name);
+  f("description", sheet.description);
+  f("vendor", "1018, else `[DeviceInfo]`; null: not said", sheet.vendor);
+  f("product", sheet.product);
+  f("revision", sheet.revision);
+  f("device_type", "1000; its low 16 bits are the profile's number", facts.device_type);
+  f("axes", "controlwords (6040, 6840, …); 0: no drive", facts.axes);
+  f("sheet_entries", "sub-indices", sheet.entries.size());
+  f("node_id", "a DCF's own", sheet.node_id);
+  f("bit_rate_kbit_s", "a DCF's own", sheet.bit_rate_kbit_s);
+  f("bit_rates_kbit_s", "that the device takes", sheet.bit_rates_kbit_s);
+  f("lss", "its id can be set over the bus", sheet.lss);
+  f("ethercat", "it is the file of an EtherCAT slave (ESI)", sheet.ethercat);
+  f("dc_modes", "of an ESI", sheet.dc_modes);
+  f("heartbeat_consumers", "sub-indices of 1016", facts.heartbeat_consumers);
+  f("heartbeat_producer", "1017", facts.heartbeat_producer);
+  f("node_guarding", "100C and 100D", facts.node_guarding);
+  f("modes_said", "by 6502; `false`: `modes` are what the objects allow", facts.modes_said);
+  f("modes", "of the first axis", facts.modes);
+  f("own_modes", "the manufacturer's bits of 6502", facts.own_modes);
+  f("master", "what Tandem's master does with the drive", [&](Figures& master) {
+    const hal::can::DriveUse can = report.use.value_or(hal::can::DriveUse());
+    master("refused", "why it cannot drive it; null: it can", refused(report.use));
+    master("does", can.does);
+    master("misses", can.misses);
+  });
+  f("simulation", "the drive in simulation", [&](Figures& stand_in) {
+    const StandIn can = report.simulated.value_or(StandIn());
+    stand_in("refused", "why it cannot be simulated; null: it can", refused(report.simulated));
+    stand_in("modes", "6060, of the first axis", can.modes);
+    stand_in("remarks", "what it lacks, or takes otherwise than the sheet says", can.remarks);
+  });
+  f("lacks", "of every mode's 6040 in an RPDO, 6041 in a TPDO, 6060 and 6061", facts.lacks);
+  f("pdos", facts.pdos);
+  f("into_rpdo", "objects", facts.into_rpdo);
+  f("into_tpdo", "objects", facts.into_tpdo);
+  f("units", "objects", facts.units);
+  f("remarks", "what is odd in the sheet", sheet.remarks);
+}
+
+std::vector<Figures::Row> eds_figures() { return Figures::rows_of<SheetReport>(); }
+
 Exit eds_show(const EdsOptions& options) {
-  const auto sheet = canopen::load_data_sheet(
-      options.sheet, {.product = options.product, .revision = options.revision});
+  auto sheet = canopen::load_data_sheet(options.sheet,
+                                        {.product = options.product, .revision = options.revision});
   if (!sheet) return refuse(sheet.error());
-  const SheetFacts facts = sheet_facts(*sheet);
-  const auto use = hal::can::use_of(*sheet);
-  const auto simulated = stand_in_of(*sheet, facts);
-  print_sheet(human_output(options.json), *sheet, facts, use, simulated);
-  const Status written = write_json(options.json, sheet_json(*sheet, facts, use, simulated));
-  return written ? Exit::kDone : refuse(written.error());
+  SheetReport report{.sheet = std::move(*sheet)};
+  report.facts = sheet_facts(report.sheet);
+  report.use = hal::can::use_of(report.sheet);
+  report.simulated = stand_in_of(report.sheet, report.facts);
+  print_sheet(human_output(options.json), report);
+  return end_with_json(options.json, figures_json(report));
 }
 
 }  // namespace tandem::apps

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
+#include "apps/text/figures.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/listed_names.hpp"
 #include "apps/tools/relative_path.hpp"
@@ -112,9 +112,10 @@ constexpr int kTrials = 8;
 constexpr double kGentler = 0.8;
 
 struct Found {
-  identification::Excitation excitation;
+  std::string experiment{};  // its path
+  identification::Excitation excitation{};
   double share = 0.0;
-  std::string refused;  // what ended the last trial that failed
+  std::string refused{};  // what ended the last trial that failed
 };
 
 /// @param file  to write it to; its robot's path is from options.output
@@ -128,7 +129,7 @@ Result<Found> search(const robot::RobotFiles& robot, const ExciteOptions& option
                                         .share = options.share,
                                         .tries = options.tries,
                                         .hung = options.hung};
-  Found found;
+  Found found{.experiment = options.output};
   for (int attempt = 0; attempt < kTrials; ++attempt) {
     auto result = identification::excite(robot.config, robot.tree, request);
     if (!result && found.refused.empty()) return std::unexpected(result.error());
@@ -148,21 +149,43 @@ Result<Found> search(const robot::RobotFiles& robot, const ExciteOptions& option
               "give another --seed, a longer --period, or --share less");
 }
 
-Facts facts_of(const robot::RobotFiles& robot, const ExciteOptions& options, const Found& found) {
+}  // namespace
+
+static void figures(Figures& f, const Found& found) {
   const identification::Excitation& result = found.excitation;
+  f("experiment", "path of the experiment", found.experiment);
+  f("condition_number", "of the base parameters' columns, each of unit length; null: infinite",
+    result.condition_number);
+  f("base_parameters", "how many there are", result.base_parameters);
+  f("joints", "that move", result.joints);
+  f("held", "that do not", result.still);
+  f("position_share", "largest share of a joint's way to its limit", result.position_share);
+  f("speed_share", "the same of its speed", result.speed_share);
+  f("torque_share", "and of its torque", result.torque_share);
+  f("share", "`--share`, or less: what ran through in simulation", found.share);
+  f("lift_m", "by which a robot that hangs is lifted; else 0", result.lift_m);
+  f("room_m", "self-distance beyond the 2 cm required; null: no links to look at", result.room_m);
+  f("margin_m", "of the point of zero moment inside the feet; 0: it does not stand",
+    result.margin_m);
+}
+
+std::vector<Figures::Row> excite_figures() { return Figures::rows_of<Found>(); }
+
+static void print_found(const robot::RobotFiles& robot, const ExciteOptions& options,
+                        const Found& found, const Json& json) {
   Facts facts;
-  facts.add("experiment", options.output);
-  facts.add("condition number", condition_text(result));
-  facts.add("joints",
-            fmt::format("{} move, {} are held", result.joints.size(), result.still.size()));
-  facts.add("way to limits", fmt::format("{:.0f} % at most", 100.0 * result.position_share));
-  facts.add("speed", fmt::format("{:.0f} % of a limit at most", 100.0 * result.speed_share));
-  facts.add("torque", fmt::format("{:.0f} % of a limit at most", 100.0 * result.torque_share));
-  if (std::isfinite(result.room_m))
-    facts.add("self-distance", fmt::format("{:.0f} mm more than required", 1e3 * result.room_m));
-  if (options.hung) facts.add("hoist", fmt::format("lifts it {:.2f} m", result.lift_m));
+  add_figures(
+      facts, json,
+      {{"experiment", "{experiment}"},
+       {"condition number", condition_text(found.excitation)},
+       {"joints", fmt::format("{} move, {} are held", json["joints"].size(), json["held"].size())},
+       {"way to limits", "{position_share:.0f %} at most"},
+       {"speed", "{speed_share:.0f %} of a limit at most"},
+       {"torque", "{torque_share:.0f %} of a limit at most"},
+       {"self-distance", "{room_m:.0f mm} more than required"}});
+  if (options.hung) add_figures(facts, json, "hoist", "lifts it {lift_m:.2f m}");
   if (robot.tree.floating_base && !options.hung)
-    facts.add("balance", fmt::format("{:.0f} mm inside the feet", 1e3 * result.margin_m));
+    add_figures(facts, json, "balance", "{margin_m:.0f mm} inside the feet");
   if (robot.tree.floating_base && options.output != "-") {
     facts.add("simulated",
               found.refused.empty()
@@ -170,29 +193,8 @@ Facts facts_of(const robot::RobotFiles& robot, const ExciteOptions& options, con
                   : fmt::format("it runs through with --share {:.3g}; more ended with: {}",
                                 found.share, found.refused));
   }
-  return facts;
+  facts.print(human_output(options.json));
 }
-
-Json to_json(const ExciteOptions& options, const Found& found) {
-  const identification::Excitation& result = found.excitation;
-  const auto number = [](double value) {
-    return std::isfinite(value) ? Json(value) : Json(nullptr);
-  };
-  return {{"experiment", options.output},
-          {"condition_number", number(result.condition_number)},
-          {"base_parameters", result.base_parameters},
-          {"joints", result.joints},
-          {"held", result.still},
-          {"position_share", result.position_share},
-          {"speed_share", result.speed_share},
-          {"torque_share", result.torque_share},
-          {"share", found.share},
-          {"lift_m", result.lift_m},
-          {"room_m", number(result.room_m)},
-          {"margin_m", result.margin_m}};
-}
-
-}  // namespace
 
 Exit excite_command(const ExciteOptions& given, const Trial& trial) {
   ExciteOptions options = given;
@@ -232,10 +234,9 @@ Exit excite_command(const ExciteOptions& given, const Trial& trial) {
   }
   if (const Status placed = draft.place(); !placed) return refuse(placed.error());
   found->refused = draft.placed(found->refused);
-  facts_of(*robot, options, *found).print(human_output(options.json));
-  if (const Status s = write_json(options.json, to_json(options, *found)); !s)
-    return refuse(s.error());
-  return Exit::kDone;
+  const Json json = figures_json(*found);
+  print_found(*robot, options, *found, json);
+  return end_with_json(options.json, json);
 }
 
 }  // namespace tandem::apps

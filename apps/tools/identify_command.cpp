@@ -1,10 +1,10 @@
 // tandem identify: logs to parameters, files and a page.
 #include <fmt/core.h>
 
-#include <cmath>
+#include <algorithm>
 
-#include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
+#include "apps/text/figures.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/identified_files.hpp"
 #include "apps/tools/identify_page.hpp"
@@ -13,146 +13,111 @@
 #include "robot/robot_files.hpp"
 
 namespace tandem::apps {
-namespace {
-
 using identification::Estimate;
 using identification::Identification;
+using identification::Seen;
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-template <class Vector>
-Json numbers(const Vector& values) {
-  Json list = Json::array();
-  for (const double value : values) list.push_back(number(value));
-  return list;
-}
-
-Json links_json(const Identification& result) {
-  Json links = Json::object();
-  for (const identification::LinkResult& link : result.links) {
-    const Eigen::Matrix3d& I = link.identified.about_com_kg_m2;
-    const double moments[] = {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)};
-    links[link.name] = {{"mass_kg",
-                         {{"value", link.identified.mass_kg},
-                          {"ci95", number(link.mass_ci95)},
-                          {"identifiable", link.mass_identifiable},
-                          {"seen", identification::to_string(link.mass_seen)}}},
-                        {"com_m",
-                         {{"value", numbers(link.identified.com_m)},
-                          {"ci95", numbers(link.com_ci95)},
-                          {"identifiable", link.com_identifiable},
-                          {"seen", identification::to_string(link.com_seen)}}},
-                        {"inertia_kg_m2",
-                         {{"value", numbers(moments)},
-                          {"ci95", numbers(link.inertia_ci95)},
-                          {"identifiable", link.inertia_identifiable},
-                          {"seen", identification::to_string(link.inertia_seen)}}},
-                        {"base_parameters", link.base_parameters}};
-  }
-  return links;
-}
-
-Json joints_json(const Identification& result) {
-  const auto known = [](const Estimate& one) {
-    return one.identifiable ? number(one.value) : Json(nullptr);
+static void figures(Figures& f, const identification::LinkResult& link) {
+  const auto quantity = [&f](const char* key, const char* words, const auto& value,
+                             const auto& ci95, bool identifiable, Seen seen) {
+    f(key, words, [&](Figures& one) {
+      one("value", value);
+      one("ci95", ci95);
+      one("identifiable", identifiable);
+      one("seen", identification::to_string(seen));
+    });
   };
-  const auto interval = [](const Estimate& one) {
-    return one.identifiable ? number(one.ci95) : Json(nullptr);
-  };
-  Json joints = Json::object();
-  for (const identification::JointResult& joint : result.joints) {
-    joints[joint.name] = {
-        {"viscous_Nms_rad", known(joint.viscous_Nms_rad)},
-        {"coulomb_Nm", known(joint.coulomb_Nm)},
-        {"rotor_inertia_kg_m2", known(joint.rotor_inertia_kg_m2)},
-        {"offset_Nm", known(joint.offset_Nm)},
-        {"behind_rotor", joint.behind_rotor},
-        {"rotor_from", joint.rotor_inertia_kg_m2.identifiable ? "data" : "description"},
-        {"ci95",
-         {{"viscous_Nms_rad", interval(joint.viscous_Nms_rad)},
-          {"coulomb_Nm", interval(joint.coulomb_Nm)},
-          {"rotor_inertia_kg_m2", interval(joint.rotor_inertia_kg_m2)},
-          {"offset_Nm", interval(joint.offset_Nm)}}},
-        {"delay_s", number(joint.delay_s)},
-        {"rms_Nm", number(joint.rms_Nm)},
-        {"relative_error", number(joint.relative_error)},
-        {"described_relative_error", number(joint.described_relative_error)}};
-  }
-  return joints;
+  const auto numbers = [](const auto& of) { return std::vector<double>(of.begin(), of.end()); };
+  const Eigen::Matrix3d& I = link.identified.about_com_kg_m2;
+  quantity("mass_kg", "", link.identified.mass_kg, link.mass_ci95, link.mass_identifiable,
+           link.mass_seen);
+  quantity("com_m", "in the link's frame", numbers(link.identified.com_m), numbers(link.com_ci95),
+           link.com_identifiable, link.com_seen);
+  quantity("inertia_kg_m2", "about `com_m`, along the link's axes: ixx ixy ixz iyy iyz izz",
+           std::vector{I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)},
+           numbers(link.inertia_ci95), link.inertia_identifiable, link.inertia_seen);
+  f("base_parameters", "names of those that have a parameter of this link", link.base_parameters);
 }
 
-Json base_json(const Identification& result) {
-  Json base = Json::array();
-  for (const identification::BaseParameter& one : result.base) {
-    Json terms = Json::object();
-    for (const auto& [name, factor] : one.terms) terms[name] = factor;
-    base.push_back({{"name", one.name},
-                    {"terms", terms},
-                    {"value", one.estimate.value},
-                    {"ci95", one.estimate.ci95},
-                    {"identifiable", one.estimate.identifiable},
-                    {"described", one.described}});
-  }
-  return base;
-}
-
-Json left_out_json(const Identification& result) {
-  Json list = Json::array();
-  for (const auto& [log, left] : result.left_out) {
-    list.push_back({{"log", log},
-                    {"what", left.what},
-                    {"sum_s", left.sum_s},
-                    {"first_begin_s", left.first_begin_s},
-                    {"first_end_s", left.first_end_s}});
-  }
-  return list;
-}
-
-Json result_json(const Identification& result, const std::vector<std::string>& file_notes) {
-  std::vector<std::string> notes = result.remarks;
-  notes.insert(notes.end(), file_notes.begin(), file_notes.end());
-  return {{"links", links_json(result)},
-          {"joints", joints_json(result)},
-          {"condition_number", number(result.condition_number)},
-          {"base_parameters", base_json(result)},
-          {"total_mass_kg",
-           {{"value", result.identified_mass_kg},
-            {"ci95", number(result.mass_kg.ci95)},
-            {"identifiable", result.mass_kg.identifiable},
-            {"described", result.described_mass_kg}}},
-          {"used_s", result.usable_s},
-          {"held_back_s", result.held_out_s},
-          {"left_out", left_out_json(result)},
-          {"notes", notes},
-          {"warnings", result.warnings}};
-}
-
-void print_result(std::FILE* out, const Identification& result) {
-  Table table({"joint", "rms [Nm]", "left over [%]", "by description [%]"});
-  for (const identification::JointResult& joint : result.joints) {
-    const auto percent = [](double part) {
-      return std::isfinite(part) ? fmt::format("{:.2f}", 100.0 * part) : "-";
+static void figures(Figures& f, const identification::JointResult& joint) {
+  const auto estimates = [&joint](Figures& to, double Estimate::*part) {
+    const auto add = [&](const char* key, const Estimate& one) {
+      to(key, known(one.identifiable, one.*part));
     };
-    table.add({joint.name, std::isfinite(joint.rms_Nm) ? fmt::format("{:.4f}", joint.rms_Nm) : "-",
-               percent(joint.relative_error), percent(joint.described_relative_error)});
-  }
-  table.print(out);
+    add("viscous_Nms_rad", joint.viscous_Nms_rad);
+    add("coulomb_Nm", joint.coulomb_Nm);
+    add("rotor_inertia_kg_m2", joint.rotor_inertia_kg_m2);
+    add("offset_Nm", joint.offset_Nm);
+  };
+  estimates(f, &Estimate::value);
+  f("behind_rotor", "no equation has this drive's rotor", joint.behind_rotor);
+  f("rotor_from", "`data` or `description`",
+    joint.rotor_inertia_kg_m2.identifiable ? "data" : "description");
+  f("ci95", "of these four", [&](Figures& of) { estimates(of, &Estimate::ci95); });
+  f("delay_s", "by which the torque is later than the position, as fitted", joint.delay_s);
+  f("rms_Nm", "of the torque's residual on held-out data", joint.rms_Nm);
+  f("relative_error", "the same over the torque, both as RMS", joint.relative_error);
+  f("described_relative_error", "the same by the description", joint.described_relative_error);
+}
+
+static void figures(Figures& f, const identification::BaseParameter& one) {
+  f("name", one.name);
+  f("terms", "parameter and factor", one.terms);
+  f("value", one.estimate.value);
+  f("ci95", one.estimate.ci95);
+  f("identifiable", one.estimate.identifiable);
+  f("described", one.described);
+}
+
+static void figures(Figures& f, const identification::LeftOut& left) {
+  f("log", left.log);
+  f("what", "signal and reason", left.what);
+  f("sum_s", "of all", left.sum_s);
+  f("first_begin_s", "of the first, since the log's time 0", left.first_begin_s);
+  f("first_end_s", left.first_end_s);
+}
+
+static void figures(Figures& f, const Identification& result) {
+  f("links", "with mass", by_name(result.links));
+  f("joints", by_name(result.joints));
+  f("condition_number", "of the base parameters' columns, weighted, each of unit length",
+    result.condition_number);
+  f("base_parameters", result.base);
+  f("total_mass_kg", "of the whole robot", [&](Figures& mass) {
+    mass("value", result.identified_mass_kg);
+    mass("ci95", "of what the equations reach, by the data alone", result.mass_kg.ci95);
+    mass("identifiable", "that is within 5 %", result.mass_kg.identifiable);
+    mass("described", result.described_mass_kg);
+  });
+  f("used_s", "of the logs", result.usable_s);
+  f("held_back_s", "of that", result.held_out_s);
+  f("left_out", "stretches of a signal that were not used", result.left_out);
+  f("notes", "everything that was left out, assumed, or could not be written", result.remarks);
+  f("warnings", "what to look at before the result is used", result.warnings);
+}
+
+static void print_result(std::FILE* out, const Identification& result, const Json& json) {
+  figures_table({{"joint", ""},
+                 {"rms [Nm]", "{rms_Nm:.4f}"},
+                 {"left over [%]", "{relative_error:.2f}"},
+                 {"by description [%]", "{described_relative_error:.2f}"}},
+                json["joints"])
+      .print(out);
   fmt::print(out, "\n");
+  const auto in_data =
+      std::ranges::count_if(result.base, [](const auto& one) { return one.estimate.identifiable; });
   Facts facts;
-  facts.add("used", fmt::format("{:.1f} s, {:.1f} s of them held back", result.usable_s,
-                                result.held_out_s));
-  facts.add("condition number", fmt::format("{:.1f}", result.condition_number));
-  std::size_t known = 0;
-  for (const identification::BaseParameter& one : result.base)
-    known += one.estimate.identifiable ? 1 : 0;
-  facts.add("base parameters",
-            fmt::format("{} of {} known by the data", known, result.base.size()));
-  facts.add("mass", fmt::format("{:.4f} kg, described {:.4f} kg{}", result.identified_mass_kg,
-                                result.described_mass_kg, mass_note(result)));
+  add_figures(
+      facts, json,
+      {{"used", "{used_s:.1f s}, {held_back_s:.1f s} of them held back"},
+       {"condition number", "{condition_number:.1f}"},
+       {"base parameters", fmt::format("{} of {} known by the data", in_data, result.base.size())},
+       {"mass", "{total_mass_kg.value:.4f kg}, described {total_mass_kg.described:.4f kg}" +
+                    mass_note(result)}});
   facts.print(out);
 }
 
-}  // namespace
+std::vector<Figures::Row> identify_figures() { return Figures::rows_of<Identification>(); }
 
 Exit identify_command(const IdentifyOptions& options) {
   Result<Draft> draft = Draft::folder(options.output);  // first: an interrupt has its word
@@ -161,11 +126,11 @@ Exit identify_command(const IdentifyOptions& options) {
   if (!robot) return refuse(robot.error());
   if (const Status s = check_identified(*robot, options.logs, options.output); !s)
     return refuse(s.error());
-  const auto result =
+  auto result =
       identification::identify(options.logs, robot->config, robot->tree, options.cutoff_Hz);
   if (!result) return refuse(result.error());
   std::FILE* out = human_output(options.json);
-  print_result(out, *result);
+  print_result(out, *result, figures_json(*result));
   for (const std::string& remark : result->remarks)
     fmt::print(stderr, "note: {}\n", shown(remark, 2'000));
   for (const std::string& warning : result->warnings)
@@ -173,8 +138,10 @@ Exit identify_command(const IdentifyOptions& options) {
   const auto written = write_identified(*robot, *result, options.logs, draft->path());
   if (!written) return refuse(draft->placed(written.error()));
   Facts files;
-  for (const std::string& note : written->notes)
+  for (const std::string& note : written->notes) {
     fmt::print(stderr, "note: {}\n", shown(note, 2'000));
+    result->remarks.push_back(note);
+  }
   for (const std::string& file : written->paths) files.add("written", draft->placed(file));
   if (program_exists("gnuplot")) {
     const auto page = write_identify_page(*result, robot->config.name, draft->path());
@@ -185,9 +152,7 @@ Exit identify_command(const IdentifyOptions& options) {
   }
   if (const Status placed = draft->place(); !placed) return refuse(placed.error());
   files.print(out);
-  if (const Status s = write_json(options.json, result_json(*result, written->notes)); !s)
-    return refuse(s.error());
-  return Exit::kDone;
+  return end_with_json(options.json, figures_json(*result));
 }
 
 }  // namespace tandem::apps

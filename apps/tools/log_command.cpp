@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <iostream>
 
-#include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
+#include "apps/text/figures.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/log_thresholds.hpp"
 #include "base/counted.hpp"
@@ -18,59 +18,52 @@
 #include "log/log_file.hpp"
 
 namespace tandem::apps {
-namespace {
-
-Json topic_json(const log::Topic& topic) {
-  Json fields = Json::array();
+static void figures(Figures& f, const log::Topic& topic) {
+  std::vector<std::string> fields;
   for (const hal::Field& field : topic.layout.fields()) fields.push_back(field.name);
-  return {{"messages", topic.messages}, {"schema", topic.type}, {"fields", fields}};
+  f("messages", topic.messages);
+  f("schema", topic.type);
+  f("fields", fields);
 }
 
-Json info_json(const log::LogFile& file) {
-  Json json;
-  json["path"] = file.path();
-  json["complete"] = !file.truncated();
+static void figures(Figures& f, const log::LogFile* file) {
   std::optional<std::int64_t> start_ns, end_ns;
-  for (const log::Topic& topic : file.topics()) {
+  for (const log::Topic& topic : file == nullptr ? std::vector<log::Topic>() : file->topics()) {
     if (topic.messages == 0) continue;
     start_ns = std::min(start_ns.value_or(topic.first_ns), topic.first_ns);
     end_ns = std::max(end_ns.value_or(topic.last_ns), topic.last_ns);
   }
-  json["start_ns"] = start_ns ? Json(*start_ns) : Json(nullptr);
-  json["end_ns"] = end_ns ? Json(*end_ns) : Json(nullptr);
-  json["messages"] = file.messages();
-  json["data_sha256"] = file.data_sha256();
-  json["metadata"] = Json::object();
-  for (const auto& [key, value] : log::to_map(file.info())) json["metadata"][key] = value;
-  for (const auto& [key, value] : file.result()) json["metadata"][key] = value;
-  json["topics"] = Json::object();
-  for (const log::Topic& topic : file.topics()) json["topics"][topic.name] = topic_json(topic);
-  return json;
+  f("path", [&] { return file->path(); });
+  f("complete", "false after a killed run", [&] { return !file->truncated(); });
+  f("start_ns", "nominal time of the first message", start_ns);
+  f("end_ns", "of the last", end_ns);
+  f("messages", [&] { return file->messages(); });
+  f("data_sha256", "of the messages' data, in order", [&] { return file->data_sha256(); });
+  f("metadata", "what the run recorded about itself: [log.md](log.md#metadata)", [&] {
+    log::StringMap all = log::to_map(file->info());
+    all.insert(all.end(), file->result().begin(), file->result().end());
+    return all;
+  });
+  f("topics", [&] { return by_name(file->topics()); });
 }
+
+std::vector<Figures::Row> log_figures() { return Figures::rows_of<const log::LogFile*>(); }
+
+namespace {
 
 std::string cut_text(const log::LogFile& file) {
   return fmt::format("cut after {} bytes: its run was killed, or the copy is not whole",
                      file.bytes());
 }
 
-/// What of a log that is cut can be used.
-std::string readable_text(const log::LogFile& file) {
-  std::int64_t end_ns = 0;
-  for (const log::Topic& topic : file.topics()) {
-    if (topic.messages > 0) end_ns = std::max(end_ns, topic.last_ns);
-  }
-  if (file.messages() == 0) return "the settings of its run, and no message";
-  return fmt::format("{}, up to {:.3f} s", counted(file.messages(), "message"),
-                     static_cast<double>(end_ns) * 1e-9);
-}
-
-void print_info(const log::LogFile& file, std::FILE* out) {
+void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
   const log::RunInfo& info = file.info();
   fmt::print(out, "{}\n", shown(file.path(), 4'096));
   Facts facts;
   if (file.truncated()) {
     facts.add("not whole", cut_text(file));
-    facts.add("readable", readable_text(file));
+    facts.add("readable", figures_text("{messages|message}, up to {end_ns:.3f s}", json)
+                              .value_or("the settings of its run, and no message"));
   }
   facts.add("robot", fmt::format("{}, {}, {}", info.robot, counted(info.joints.size(), "joint"),
                                  counted(info.sensors.size(), "sensor")));
@@ -249,10 +242,11 @@ Exit log_command(const LogOptions& options) {
     if (!compared) done = std::unexpected(compared.error());
   } else if (!options.topic.empty()) {
     done = print_fields(*file, full_topic(options.topic), human_output(options.json));
-    if (done) done = write_json(options.json, info_json(*file));
+    if (done) done = write_json(options.json, figures_json(&*file));
   } else {
-    print_info(*file, human_output(options.json));
-    done = write_json(options.json, info_json(*file));
+    const Json json = figures_json(&*file);
+    print_info(*file, json, human_output(options.json));
+    done = write_json(options.json, json);
   }
   if (done) return exit;
   return refuse(done.error());

@@ -1,12 +1,11 @@
 // `tandem log import`: a recording of another program as a log of a robot of ours.
 #include <fmt/core.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
 
-#include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
+#include "apps/text/figures.hpp"
 #include "apps/tools/commands.hpp"
 #include "base/counted.hpp"
 #include "log/import/import_log.hpp"
@@ -44,52 +43,6 @@ Result<std::string> output_of(const LogOptions& options, const std::string& robo
       Error{"is there already", "name another file with -o, or remove this one", path, 0, {}});
 }
 
-std::string spacing_text(const log::Spacing& one) {
-  return fmt::format("{:.6g} ({:.6g} to {:.6g})", static_cast<double>(one.median_ns) * 1e-6,
-                     static_cast<double>(one.least_ns) * 1e-6,
-                     static_cast<double>(one.most_ns) * 1e-6);
-}
-
-void print_summary(const log::ImportSummary& summary, std::FILE* out) {
-  Facts facts;
-  facts.add("log", fmt::format("{} ({}, {:.1f} MB)", summary.log.path,
-                               counted(summary.log.messages, "message"),
-                               static_cast<double>(summary.log.bytes) * 1e-6));
-  const double period_s = static_cast<double>(summary.period_ns) * 1e-9;
-  facts.add("cycles", fmt::format("{} of {:g} s", summary.cycles, period_s));
-  facts.add("time 0", fmt::format("{} ns of the recording's clock", summary.begin_ns));
-  facts.add("fields", fmt::format("{}", fmt::join(summary.fields, ", ")));
-  const log::Exclusions& left = summary.excluded;
-  for (const std::string& note : summary.notes) facts.add("taken", note);
-  const auto rows = [&](const char* what, std::uint64_t count) {
-    const char* of = summary.bag ? "message" : "row";
-    if (count > 0) facts.add("left out", counted(count, of) + ": " + what);
-  };
-  rows(summary.bag ? "a value is not finite, or a joint is there twice"
-                   : "a cell is empty or not finite",
-       left.invalid);
-  rows("too few or too many cells", left.ragged);
-  rows(summary.bag ? "the same time as the one before" : "the same time as the row before",
-       left.duplicates);
-  rows("time goes back", left.backwards);
-  if (left.gaps > 0) {
-    facts.add("left out", counted(left.gap_cycles, "cycle") + " in " + counted(left.gaps, "gap"));
-  }
-  const auto names = [&](const char* what, const std::vector<std::string>& list) {
-    if (!list.empty()) facts.add(what, fmt::format("{}", fmt::join(list, ", ")));
-  };
-  names("frozen, left out", left.frozen);
-  names("not used", left.ignored);
-  names("joints without data", summary.missing);
-  facts.print(out);
-  Table table({"samples of", "number", "every [ms]", "late"});
-  for (const log::Spacing& one : summary.series) {
-    table.add({one.name, std::to_string(one.rows), spacing_text(one), std::to_string(one.late)});
-  }
-  fmt::print(out, "\n");
-  table.print(out);
-}
-
 /// One, of the series with the largest share of late samples.
 Diagnostics warnings_of(const log::ImportSummary& summary, const std::string& file) {
   const auto share = [](const log::Spacing& one) {
@@ -109,36 +62,81 @@ Diagnostics warnings_of(const log::ImportSummary& summary, const std::string& fi
        .key = worst->name}};
 }
 
-Json summary_json(const log::ImportSummary& summary) {
-  Json json;
-  json["log"] = summary.log.path;
-  json["format"] = summary.bag ? "mcap" : "csv";
-  json["cycles"] = summary.cycles;
-  json["period_ns"] = summary.period_ns;
-  json["begin_ns"] = summary.begin_ns;
-  json["data_sha256"] = summary.log.data_sha256;
-  json["fields"] = summary.fields;
-  json["missing_joints"] = summary.missing;
-  const log::Exclusions& left = summary.excluded;
-  json["taken"] = summary.notes;
-  json["ignored"] = left.ignored;
-  json["excluded"] = {
-      {"invalid", left.invalid},     {"ragged", left.ragged}, {"duplicates", left.duplicates},
-      {"backwards", left.backwards}, {"gaps", left.gaps},     {"gap_cycles", left.gap_cycles},
-      {"frozen", left.frozen}};
-  json["series"] = Json::array();
-  for (const log::Spacing& one : summary.series) {
-    json["series"].push_back({{"name", one.name},
-                              {"samples", one.rows},
-                              {"median_ns", one.median_ns},
-                              {"least_ns", one.least_ns},
-                              {"most_ns", one.most_ns},
-                              {"late", one.late}});
-  }
-  return json;
+}  // namespace
+
+static void figures(Figures& f, const log::Spacing& one) {
+  f("name", one.name);
+  f("samples", one.rows);
+  f("median_ns", "from one sample to the next", one.median_ns);
+  f("least_ns", one.least_ns);
+  f("most_ns", one.most_ns);
+  f("late", "samples that came more than 1.5 medians after the one before", one.late);
 }
 
-}  // namespace
+static void figures(Figures& f, const log::ImportSummary& summary) {
+  const log::Exclusions& left = summary.excluded;
+  f("log", "the file that was written", summary.log.path);
+  f("format", "`csv` or `mcap`", summary.bag ? "mcap" : "csv");
+  f("cycles", "in the log", summary.cycles);
+  f("period_ns", summary.period_ns);
+  f("begin_ns", "of cycle 0, on the recording's clock", summary.begin_ns);
+  f("data_sha256", "of the log's messages", summary.log.data_sha256);
+  f("fields", "what the recording fills: `position_rad`, `command torque_nm`, …", summary.fields);
+  f("missing_joints", "joints without data", summary.missing);
+  f("taken", "how, in words: several topics, empty cells, Latin-1", summary.notes);
+  f("ignored", "columns, or a bag's joints, that are not used", left.ignored);
+  f("excluded", "what was left out: rows of a table, messages of a bag", [&](Figures& out) {
+    out("invalid", left.invalid);
+    out("ragged", left.ragged);
+    out("duplicates", left.duplicates);
+    out("backwards", left.backwards);
+    out("gaps", left.gaps);
+    out("gap_cycles", "in them", left.gap_cycles);
+    out("frozen", "columns", left.frozen);
+  });
+  f("series", summary.series);
+}
+
+std::vector<Figures::Row> import_figures() { return Figures::rows_of<log::ImportSummary>(); }
+
+static void print_summary(const log::ImportSummary& summary, const Json& json, std::FILE* out) {
+  Facts facts;
+  facts.add("log", fmt::format("{} ({}, {:.1f} MB)", summary.log.path,
+                               counted(summary.log.messages, "message"),
+                               static_cast<double>(summary.log.bytes) * 1e-6));
+  add_figures(facts, json,
+              {{"cycles", "{cycles} of {period_ns:g s}"},
+               {"time 0", "{begin_ns} ns of the recording's clock"},
+               {"fields", "{fields}"}});
+  const log::Exclusions& left = summary.excluded;
+  for (const std::string& note : summary.notes) facts.add("taken", note);
+  const auto rows = [&](const char* what, std::uint64_t count) {
+    const char* of = summary.bag ? "message" : "row";
+    if (count > 0) facts.add("left out", counted(count, of) + ": " + what);
+  };
+  rows(summary.bag ? "a value is not finite, or a joint is there twice"
+                   : "a cell is empty or not finite",
+       left.invalid);
+  rows("too few or too many cells", left.ragged);
+  rows(summary.bag ? "the same time as the one before" : "the same time as the row before",
+       left.duplicates);
+  rows("time goes back", left.backwards);
+  if (left.gaps > 0) {
+    facts.add("left out", counted(left.gap_cycles, "cycle") + " in " + counted(left.gaps, "gap"));
+  }
+  add_figures(facts, json,
+              {{"frozen, left out", "{excluded.frozen}"},
+               {"not used", "{ignored}"},
+               {"joints without data", "{missing_joints}"}});
+  facts.print(out);
+  fmt::print(out, "\n");
+  figures_table({{"samples of", "{name}"},
+                 {"number", "{samples}"},
+                 {"every [ms]", "{median_ns:.6g} ({least_ns:.6g} to {most_ns:.6g})"},
+                 {"late", "{late}"}},
+                json["series"])
+      .print(out);
+}
 
 Exit log_import_command(const LogOptions& options) {
   const auto robot = robot::read_robot(options.robot);
@@ -155,12 +153,10 @@ Exit log_import_command(const LogOptions& options) {
   }
   if (const Status placed = draft.place(); !placed) return refuse(placed.error());
   summary->log.path = *output;
-  print_summary(*summary, human_output(options.json));
+  const Json json = figures_json(*summary);
+  print_summary(*summary, json, human_output(options.json));
   print_warnings(warnings_of(*summary, options.files.front()));
-  if (const Status written = write_json(options.json, summary_json(*summary)); !written) {
-    return refuse(written.error());
-  }
-  return Exit::kDone;
+  return end_with_json(options.json, json);
 }
 
 }  // namespace tandem::apps

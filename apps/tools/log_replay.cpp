@@ -5,8 +5,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
+#include "apps/text/figures.hpp"
 #include "apps/tools/carried_settings.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/listed_names.hpp"
@@ -28,6 +28,7 @@ constexpr double kHeld_s = 1.0;                // at the end
 
 /// All that the experiment says.
 struct Replay {
+  LogOptions options;
   hal::Robot robot;
   std::vector<std::size_t> joints;
   log::MotionRequest request;
@@ -120,6 +121,7 @@ Result<Replay> plan(const LogOptions& options) {
   const auto file = log::LogFile::open(options.log);
   if (!file) return std::unexpected(file.error());
   Replay replay;
+  replay.options = options;
   replay.robot = hal::robot_of(files->config);
   replay.data_sha256 = file->data_sha256();
   replay.carried = carried_settings(file->info(), *files);
@@ -228,16 +230,36 @@ std::string experiment_text(const Replay& replay, const LogOptions& options) {
   return text + "joints = [" + names + "]\n";
 }
 
-void print_facts(const Replay& replay, const LogOptions& options, std::FILE* out) {
+}  // namespace
+
+static void figures(Figures& f, const Replay& replay) {
+  f("experiment", "path of the experiment", replay.options.output);
+  f("log", "the recording", replay.options.log);
+  f("data_sha256", replay.data_sha256);
+  f("source", "`command` or `state`", log::to_string(replay.motion.source));
+  f("from_ns", "what is played, of the recording's time", replay.motion.begin_ns);
+  f("to_ns", replay.motion.end_ns);
+  f("joints", "that are led", replay.request.joints);
+  f("speed", "times as fast as recorded", replay.options.speed);
+  f("torque", "whether torques are played", replay.options.torque);
+  f("posture", "that the run starts in; empty: every joint at 0", replay.posture);
+  f("carried", "keys of the recording's experiment that it takes over", replay.carried.keys);
+  f("lead_in_s", "from the start of the controllers to the recording's first sample",
+    replay.approach_s + log::kReplayRunUp_s);
+  f("duration_s", "of the experiment", replay.duration_s);
+}
+
+std::vector<Figures::Row> replay_figures() { return Figures::rows_of<Replay>(); }
+
+static void print_facts(const Replay& replay, const Json& json, std::FILE* out) {
+  const LogOptions& options = replay.options;
   Facts facts;
   const bool commanded = replay.motion.source == log::MotionSource::kCommand;
-  facts.add("experiment", options.output);
-  facts.add("plays", fmt::format("{:.3f} to {:.3f} s of {}",
-                                 static_cast<double>(replay.motion.begin_ns) * 1e-9,
-                                 static_cast<double>(replay.motion.end_ns) * 1e-9, options.log));
-  if (options.speed != 1.0) {
-    facts.add("speed", fmt::format("{:.4g} times as fast as recorded", options.speed));
-  }
+  add_figures(
+      facts, json,
+      {{"experiment", "{experiment}"}, {"plays", "{from_ns:.3f} to {to_ns:.3f s} of {log}"}});
+  if (options.speed != 1.0)
+    add_figures(facts, json, "speed", "{speed:.4g} times as fast as recorded");
   facts.add("references", commanded ? "the recorded commands (--source state: what was measured)"
                                     : "what was measured of the joints");
   const std::size_t held = replay.robot.joints.size() - replay.joints.size();
@@ -248,34 +270,13 @@ void print_facts(const Replay& replay, const LogOptions& options, std::FILE* out
             fmt::format("{:.1f} s after the controllers, from {}",
                         replay.approach_s + log::kReplayRunUp_s,
                         replay.posture.empty() ? "every joint at 0" : "posture " + replay.posture));
-  if (!replay.carried.keys.empty())
-    facts.add("as recorded", fmt::format("{}", fmt::join(replay.carried.keys, ", ")));
+  add_figures(facts, json, "as recorded", "{carried}");
   facts.add("next", "tandem run " + shell_word(options.output));
   facts.add("", fmt::format("tandem report {} RUN, RUN being the log that this writes: one over "
                             "the other",
                             shell_word(options.log)));
   facts.print(out);
 }
-
-Json replay_json(const Replay& replay, const LogOptions& options) {
-  Json json;
-  json["experiment"] = options.output;
-  json["log"] = options.log;
-  json["data_sha256"] = replay.data_sha256;
-  json["source"] = log::to_string(replay.motion.source);
-  json["from_ns"] = replay.motion.begin_ns;
-  json["to_ns"] = replay.motion.end_ns;
-  json["joints"] = replay.request.joints;
-  json["speed"] = options.speed;
-  json["torque"] = options.torque;
-  json["posture"] = replay.posture;
-  json["carried"] = replay.carried.keys;
-  json["lead_in_s"] = replay.approach_s + log::kReplayRunUp_s;
-  json["duration_s"] = replay.duration_s;
-  return json;
-}
-
-}  // namespace
 
 Exit log_replay_command(const LogOptions& options) {
   const auto replay = plan(options);
@@ -290,11 +291,9 @@ Exit log_replay_command(const LogOptions& options) {
     return refuse(draft.placed(s.error()));
   }
   if (const Status s = draft.place(); !s) return refuse(s.error());
-  print_facts(*replay, options, human_output(options.json));
-  if (const Status s = write_json(options.json, replay_json(*replay, options)); !s) {
-    return refuse(s.error());
-  }
-  return Exit::kDone;
+  const Json json = figures_json(*replay);
+  print_facts(*replay, json, human_output(options.json));
+  return end_with_json(options.json, json);
 }
 
 }  // namespace tandem::apps

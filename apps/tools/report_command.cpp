@@ -27,9 +27,7 @@ Exit report_command(const ReportOptions& options) {
   }
   if (!options.quiet) facts.print(out);
   const Json json{{"report", files->page}, {"images", files->images}};
-  if (const Status written = write_json(options.json, json); !written)
-    return refuse(written.error());
-  return done;
+  return end_with_json(options.json, json, done);
 }
 
 }  // namespace tandem::apps

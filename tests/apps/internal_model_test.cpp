@@ -144,6 +144,23 @@ TEST_F(Predict, SaysWhatTheRunWillDo) {
   EXPECT_EQ(end(), 0);
 }
 
+TEST_F(Predict, SaysWhichFaultsWillCome) {
+  begin("");
+  ASSERT_EQ(to_run("clock rate 0.01").status, 0);
+  const auto clock = nlohmann::json::parse(to_run("clock show --json -").out);
+  const double soon_s = clock["time_s"].get<double>() + 3.0;
+  ASSERT_EQ(to_run("inject kind=board_kill board=board_1 at_s=" + std::to_string(soon_s)).status,
+            0);
+  const Outcome table = to_run("predict --horizon 9");
+  ASSERT_EQ(table.status, 0) << table.err;
+  const auto answer = nlohmann::json::parse(to_run("predict --horizon 9 --json -").out);
+  ASSERT_FALSE(answer["faults"].empty());
+  for (const auto& fault : answer["faults"])
+    EXPECT_NE(table.out.find(" s: " + fault["cause"].get<std::string>()), std::string::npos)
+        << table.out;
+  EXPECT_EQ(end(), 0);
+}
+
 /// A copy of it begins anew: `hangs` counts its cycles, and has no archive().
 TEST_F(Predict, NamesAControllerThatItCannotCopy) {
   edit("hold.toml", "plugin = \"hold\"",

@@ -1,0 +1,282 @@
+// The figures of a run, each declared once: docs/json.md, `tandem run`.
+#include <cmath>
+
+#include "apps/can/bus_watch.hpp"
+#include "apps/can/round_trips.hpp"
+#include "apps/control/fault_table.hpp"
+#include "apps/run/remote_link.hpp"
+#include "apps/run/run_summary.hpp"
+
+namespace tandem::apps {
+namespace {
+
+double weight_N(const tandem_kernels& k) {
+  const double* g = k.gravity_m_s2;
+  return k.mass_kg * std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+}
+
+/// Whether what touches the base was estimated: on a floating base, once its estimate had started.
+bool has_base_wrench(const hal::EstimateImage& image, const runtime::EstimateFigures& figures) {
+  return !image.external_base_wrench().empty() && figures.base_cycles > 0;
+}
+
+struct JointFigures {
+  runtime::TrackingError error;
+  std::uint64_t limited_cycles = 0;
+};
+
+Named<JointFigures> joints_of(const RunSummary& s) {
+  Named<JointFigures> joints;
+  const auto tracking = s.cycle.statistics().tracking();
+  const auto limited = s.cycle.statistics().limited_cycles();
+  for (std::size_t j = 0; j < tracking.size(); ++j) {
+    joints.emplace_back(s.composition.experiment.robot.joints[j].name,
+                        JointFigures{tracking[j], limited[j]});
+  }
+  return joints;
+}
+
+Named<runtime::LoopFigures> loops_of(const RunSummary& s) {
+  Named<runtime::LoopFigures> loops;
+  for (const runtime::LoopFigures& one : s.cycle.statistics().loops())
+    loops.emplace_back(s.composition.experiment.robot.loops[loops.size()].name, one);
+  return loops;
+}
+
+/// What was estimated.
+struct EstimateSummary {
+  std::optional<runtime::EstimateFigures> base{};
+  std::optional<Named<double>> external_torque_Nm{};
+  std::optional<runtime::WrenchFigures> external_base_wrench{};
+  Named<std::optional<runtime::WrenchFigures>> wrenches{};
+  std::optional<double> unexplained_torque_Nm{};
+};
+
+/// Nothing without [estimation].
+std::optional<EstimateSummary> estimate_of(const RunSummary& s) {
+  const Composition& c = s.composition;
+  if (c.estimator == nullptr) return std::nullopt;
+  const hal::EstimateImage& image = c.estimator->image();
+  const runtime::EstimateFigures figures = s.cycle.statistics().estimate();
+  // Without an estimate of the base nothing was looked for.
+  const bool looked =
+      image.estimates_base() ? figures.base_cycles > 0 : s.cycle.running_cycles() > 0;
+  EstimateSummary summary{
+      .base = known(image.estimates_base(), figures),
+      .external_torque_Nm = known(looked && image.joints() > 0, Named<double>()),
+      .external_base_wrench = known(has_base_wrench(image, figures), figures.base_wrench),
+      .unexplained_torque_Nm =
+          known(looked && !figures.wrenches.empty(), figures.unexplained_Nm.value)};
+  for (std::size_t j = 0; summary.external_torque_Nm && j < image.joints(); ++j) {
+    summary.external_torque_Nm->emplace_back(c.experiment.robot.joints[j].name,
+                                             figures.max_external_Nm[j]);
+  }
+  for (std::size_t i = 0; i < figures.wrenches.size(); ++i) {
+    summary.wrenches.emplace_back(c.experiment.estimation.wrenches[i].site,
+                                  known(looked, figures.wrenches[i]));
+  }
+  return summary;
+}
+
+std::optional<hal::can::StartUp> start_of(const hal::can::DriveMaster* master) {
+  if (master == nullptr || master->start_up().duration_ns == 0) return std::nullopt;
+  return master->start_up();
+}
+
+std::vector<std::string> wire_of(const hal::can::DriveMaster* master) {
+  return master == nullptr ? std::vector<std::string>() : master->wire_texts();
+}
+
+}  // namespace
+
+static void figures(Figures& f, const log::RecordingResult& log) {
+  f("path", log.path);
+  f("messages", "in the file", log.messages);
+  f("dropped", "the ring was full", log.dropped);
+  f("data_sha256", "of the messages' data, in order", log.data_sha256);
+}
+
+static void figures(Figures& f, const hal::can::FrameRecord::Result& frames) {
+  f("path", frames.path);
+  f("frames", "in the file", frames.frames);
+  f("lost", "the file was too slow for them", frames.lost);
+}
+
+static void figures(Figures& f, const DdsResult& dds) {
+  f("domain", dds.domain);
+  f("samples", "sent, of all topics", dds.counts.sent);
+  f("refused", "by DDS: a reader was too far behind", dds.counts.refused);
+  f("dropped", "cycles that were due but found no room in the ring", dds.counts.dropped);
+  f("requests", "to its services", dds.services.requests);
+  f("requests_dropped", "the queue was full", dds.services.dropped);
+  f("replies", dds.services.replies);
+  f("replies_unclaimed", "the client was gone", dds.services.unclaimed);
+}
+
+static void figures(Figures& f, const JointFigures& joint) {
+  const bool tracked = joint.error.cycles > 0;
+  f("rms_tracking_error_rad",
+    "against the position reference, also one that a controller writes in another mode than "
+    "position control; null: there was none",
+    known(tracked, joint.error.rms_rad));
+  f("max_tracking_error_rad", "of the absolute value", known(tracked, joint.error.max_rad));
+  f("limited_cycles",
+    "in which a limit changed the controller's command: [controllers.md](controllers.md#limits)",
+    joint.limited_cycles);
+}
+
+static void figures(Figures& f, const runtime::WorkFigures& work) {
+  f("done_J", "of the joints that drove", work.done_J);
+  f("taken_J", "of those that braked", work.taken_J);
+  f("max_power_W", "of all together; braking ones count negative", work.max_power_W);
+}
+
+static void figures(Figures& f, const runtime::GroundFigures& ground) {
+  f("weight_N", "mass times gravity", ground.weight_N);
+  f("mean_vertical_force_N", "of all feet together", ground.mean_vertical_force_N);
+  f("max_foot_slip_m", "way of a foot since it touched down", ground.max_foot_slip_m);
+}
+
+static void figures(Figures& f, const runtime::LoopFigures& loop) {
+  f("max_position_error_m", "over all cycles", loop.max_position_error_m);
+  f("max_velocity_error_m_s", loop.max_velocity_error_m_s);
+}
+
+static void figures(Figures& f, const runtime::BaseFigures& base) {
+  f("min_height_m", base.min_height_m);
+  f("max_height_m", base.max_height_m);
+  f("final_tilt_rad", "between the base's z axis and the world's", base.final_tilt_rad);
+  f("max_tilt_rad", base.max_tilt_rad);
+}
+
+static void figures(Figures& f, const runtime::WrenchFigures& one) {
+  const auto seconds = [](const runtime::Peak& p) { return static_cast<double>(p.time_ns) * 1e-9; };
+  f("max_force_N", "norm", one.force_N.value);
+  f("max_force_s", "when: the cycle's nominal time", seconds(one.force_N));
+  f("max_moment_Nm", "norm", one.moment_Nm.value);
+  f("max_moment_s", "when", seconds(one.moment_Nm));
+}
+
+static void figures(Figures& f, const runtime::EstimateFigures& base) {
+  f("cycles", "with an estimate", base.base_cycles);
+  f("max_tilt_error_rad", "against the truth; null without one",
+    known(base.compared > 0, base.max_tilt_error_rad));
+  f("max_height_error_m", "the same", known(base.compared > 0, base.max_height_error_m));
+}
+
+static void figures(Figures& f, const EstimateSummary& estimate) {
+  f("base", "null: it estimates none", estimate.base);
+  f("external_torque_Nm",
+    "by joint the largest; null without an observer, and where nothing was estimated",
+    estimate.external_torque_Nm);
+  f("external_base_wrench",
+    "on the floating base beside its feet, about its origin; null on a fixed base, without an "
+    "observer, and when the base's estimate never started",
+    estimate.external_base_wrench);
+  f("wrenches", "by site of each `[[estimation.wrench]]`", estimate.wrenches);
+  f("unexplained_torque_Nm", "the largest that the wrenches do not explain; null without a wrench",
+    estimate.unexplained_torque_Nm);
+}
+
+static void figures(Figures& f, const hal::can::StartUp& start) {
+  f("axes", start.axes);
+  f("seconds", static_cast<double>(start.duration_ns) * 1e-9);
+  f("frames_sent", "on all buses; Ethernet frames on EtherCAT", start.sent);
+  f("frames_received", "the same", start.received);
+}
+
+void figures(Figures& f, const RunSummary* s) {
+  const auto e = [s]() -> const runtime::Experiment& { return s->composition.experiment; };
+  const auto loop = [s]() -> const rt::LoopStatistics& { return s->cycle.loop(); };
+  const auto master = [s] { return s->composition.master; };
+  f("robot", "`name` of the robot.toml", [&] { return e().robot.name; });
+  f("hal", "backend: `sim`, `can`, `ethercat`, `dds`, …", [&] { return hal_name(e()); });
+  f("seed", "of every random generator", [&] { return e().seed; });
+  f("ended",
+    "`as planned`; `interrupted by SIGINT` (or another signal), in a run without an end `stopped "
+    "by SIGINT`; `on request` (`run.stop`); `its controllers were done` before the planned end; "
+    "`by a fault`; `nobody reads its output any more`",
+    [&] { return s->ended(); });
+  f("planned_cycles", "of the whole run; null: it has no planned end",
+    [&] { return known(s->planned_cycles() > 0, s->planned_cycles()); });
+  f("cycles", "of the loop while controllers ran", [&] { return s->cycle.running_cycles(); });
+  f("period_ns", "nominal", [&] { return e().loop.period_ns; });
+  f("sim_seconds", "`cycles * period_ns`", [&] { return s->sim_s(); });
+  f("wall_seconds", "of those cycles on the wall clock", [&] { return s->times.running_s; });
+  f("stopped_seconds", "on the wall clock: in fault, in a reset, or held after it",
+    [&] { return s->times.stopped_s; });
+  f("stood_seconds",
+    "on the wall clock, of simulated time: paused, or the process suspended, for half a second or "
+    "more",
+    [&] { return s->times.stood_s; });
+  f("realtime_factor", "`sim_seconds / wall_seconds`",
+    [&] { return known(s->times.running_s > 0.0, s->realtime_factor()); });
+  f("overruns", "cycles that ended after the next one's start (paced runs)",
+    [&] { return loop().overruns; });
+  f("skipped", "cycles, because of that (wall clock)", [&] { return loop().skipped; });
+  f("wakeup_ns", "wake-up latency; null in a free run", [&] { return loop().wakeup; });
+  f("bus_ns", "waiting for the answers on the bus; null without one",
+    [&] { return known(s->composition.backend->waits_for_bus(), loop().bus); });
+  f("cycle_ns", "of a cycle's own work; null: no cycle was made", [&] { return loop().work; });
+  f("log", "null: nothing was logged", [&] { return s->log; });
+  f("frames", "of `--record-frames`", [&] { return s->frames; });
+  f("dds", "with `[dds]`", [&] { return s->dds; });
+  f("buses", "of a CAN backend", [&] { return s->composition.open_buses(); });
+  f("joints", [&] { return joints_of(*s); });
+  f("work", "torque times velocity, as measured; null: no drive tells them",
+    [&] { return s->cycle.statistics().work(static_cast<double>(e().loop.period_ns) * 1e-9); });
+  f("ground", "by the plant's truth, of a floating base with feet",
+    [&] { return s->cycle.statistics().ground(weight_N(*s->composition.kernels)); });
+  f("loops", "of a robot with closed loops in simulation", [&] { return loops_of(*s); });
+  f("parallel", "of `[parallel]`", [&] { return s->parallel_summary(); });
+  f("base",
+    "until the drives are disabled at the end, so a fall after a fault counts; floating base with "
+    "known truth",
+    [&] { return s->cycle.statistics().base(); });
+  f("estimate", "with `[estimation]`, while controllers ran", [&] { return estimate_of(*s); });
+  f("round_trips", "per board", [&] {
+    return master() == nullptr ? std::vector<hal::can::RoundTrip>() : master()->round_trips();
+  });
+  f("start",
+    "what the first start took, power-on to every axis enabled; null before that, and where the "
+    "drive master is another process'",
+    [&] { return start_of(master()); });
+  f("wire", "what EtherCAT buses tell of cycles and clocks", [&] { return wire_of(master()); });
+  f("remote", "of `run --hal dds`",
+    [&] { return static_cast<const remote::RemoteBackend*>(s->composition.remote); });
+  f("remote", "of `serve`, and of a `run` that others may own", [&] { return s->server; });
+  f("teleoperation", "with `[teleoperation]`", [&] {
+    return s->composition.tele == nullptr ? std::optional<remote::TeleFigures>()
+                                          : s->composition.tele->figures();
+  });
+  f("faults", "that are still latched, and of a log that failed; empty when the run ended well",
+    [&] { return s->faults; });
+  f("warnings",
+    "tolerated anomalies: missing feedback, counted by node; commands that a bus did not accept; a "
+    "refused value",
+    [&] { return s->warnings(); });
+  f("fault_log", "every fault", [&] { return s->cycle.faults(); });
+  f("kernel_variant", "of the generated kernels that ran",
+    [&] { return std::string(s->composition.kernels->variant); });
+  figures(f, s == nullptr ? nullptr : &e());
+}
+
+Json RunSummary::json() const { return figures_json(this); }
+
+log::StringMap result_of(const hal::can::DriveMaster* master) {
+  log::StringMap result;
+  const std::string start = start_text(master);
+  if (!start.empty()) result.emplace_back("start", start);
+  for (const std::string& text : wire_of(master)) result.emplace_back("wire", text);
+  return result;
+}
+
+std::string start_text(const hal::can::DriveMaster* master) {
+  return figures_text(
+             "{axes|axis|axes} enabled after {seconds:.3f s}, {frames_sent} frames sent and "
+             "{frames_received} received",
+             figures_json(start_of(master)))
+      .value_or("");
+}
+
+}  // namespace tandem::apps
