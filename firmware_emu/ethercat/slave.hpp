@@ -69,7 +69,6 @@ class Slave {
   [[nodiscard]] Esc& controller() noexcept { return esc_; }
   [[nodiscard]] const Esc& controller() const noexcept { return esc_; }
   [[nodiscard]] ethercat::AlState state() const noexcept { return state_; }
-  [[nodiscard]] bool in_error() const noexcept { return error_; }
   [[nodiscard]] ethercat::AlCode code() const noexcept { return code_; }
   /// Times that new outputs were taken.
   [[nodiscard]] std::uint64_t outputs_taken() const noexcept { return taken_; }

@@ -351,7 +351,6 @@ std::size_t DriveMaster::completes(std::size_t bus, const Frame& frame) const no
   return impl_->ports[bus].last_tpdo[node] == (frame.id & 0x780) ? node : 0;
 }
 
-double DriveMaster::progress() const noexcept { return impl_->progress(); }
 std::string DriveMaster::status_text() const { return impl_->status(); }
 std::string DriveMaster::parameter_error() const { return impl_->refused_text(); }
 

@@ -133,8 +133,6 @@ class DriveMaster {
   /// 0: nobody's.
   [[nodiscard]] std::size_t completes(std::size_t bus,
                                       const canopen::Frame& frame) const noexcept TANDEM_RT;
-  /// Share of the bring-up that is done, 0 to 1.
-  [[nodiscard]] double progress() const noexcept;
   /// What bring-up waits for, or the cause of a fault: names node, board, joint and object.
   [[nodiscard]] std::string status_text() const;
   /// Values that a node refused at run time (gains), with the object and why; empty when none.

@@ -157,7 +157,6 @@ struct DriveMaster::Impl {
   [[nodiscard]] std::vector<std::string> warnings() const;
   void add_emergencies(std::vector<std::string>& texts) const;
   [[nodiscard]] std::string refused_text() const;
-  [[nodiscard]] double progress() const noexcept;
 
   void archive(Archive& ar);
 

@@ -10,8 +10,6 @@ namespace tandem::hal::can {
 
 namespace {
 
-/// Share of the bring-up that the configuration of the nodes makes; the rest is the enabling.
-constexpr double kConfigurationShare = 0.9;
 constexpr std::size_t kMostCauses = 8;  // named in one text
 
 const char* label(const NodePlan& plan) { return plan.board >= 0 ? "board" : "sensor"; }
@@ -270,21 +268,6 @@ std::string DriveMaster::Impl::refused_text() const {
   return fmt::format("{}: {} (abort code 0x{:08X})",
                      step_text(nodes[static_cast<std::size_t>(refused_node)], refused_step),
                      canopen::to_string(refused_code), static_cast<std::uint32_t>(refused_code));
-}
-
-double DriveMaster::Impl::progress() const noexcept {
-  if (stage == MasterStage::kRunning || stage == MasterStage::kFaulted) return 1.0;
-  std::size_t done = 0;
-  std::size_t all = 0;
-  for (const Node& node : nodes) {
-    all += node.master.steps().size();
-    done += node.master.step();
-  }
-  const auto enabled = std::ranges::count_if(axes, &AxisMaster::enabled);
-  const double configured = all == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(all);
-  const double up =
-      axes.empty() ? 1.0 : static_cast<double>(enabled) / static_cast<double>(axes.size());
-  return kConfigurationShare * configured + (1.0 - kConfigurationShare) * up;
 }
 
 }  // namespace tandem::hal::can
