@@ -54,7 +54,7 @@ RateFigures TopicRate::figures() const {
 void figures(Figures& f, const RateFigures& rate) {
   f("samples", "received", rate.samples);
   f("window", "number of newest intervals used for the next four", rate.window);
-  f("rate_Hz", "inverse of the mean interval", rate.rate_Hz);
+  f("rate_Hz", "1 / mean interval; null, as the next three: no interval", rate.rate_Hz);
   f("min_s", rate.min_s);
   f("max_s", rate.max_s);
   f("deviation_s", "standard deviation", rate.deviation_s);

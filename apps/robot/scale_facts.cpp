@@ -30,8 +30,7 @@ static void figures(Figures& f, const hal::JointConfig& joint) {
   f("encoder_counts_per_rev", "of a slide per 2 pi m", joint.encoder_counts_per_rev);
   f("encoder_counts_from", "who says that: `robot.toml`, `sheet`", source(joint.counts_of_sheet));
   f("velocity_units_per_rev", velocity);
-  f("velocity_units_from", "the same, or `counts`: they are counts per second",
-    own ? source(joint.velocity_of_sheet) : "counts");
+  f("velocity_units_from", "or `counts`", own ? source(joint.velocity_of_sheet) : "counts");
   f("acceleration_units_per_rev", acceleration > 0.0 ? acceleration : velocity);
   f("rated_torque_Nm", "of a slide in N", joint.rated_torque_Nm);
   f("rated_torque_from", source(joint.torque_of_sheet));
@@ -66,11 +65,10 @@ void add_scale_facts(const hal::RobotConfig& robot, Facts& facts) {
     if (!on_sheet(robot, joint)) continue;
     std::string text = scale_text(joint);
     const auto same = std::ranges::find(scales, text, &Scale::text);
-    if (same != scales.end()) {
-      ++same->joints;
-    } else {
+    if (same == scales.end())
       scales.push_back({.text = std::move(text), .joint = joint.name});
-    }
+    else
+      ++same->joints;
   }
   for (const Scale& scale : scales) {
     const std::string others =

@@ -154,8 +154,7 @@ Result<Found> search(const robot::RobotFiles& robot, const ExciteOptions& option
 static void figures(Figures& f, const Found& found) {
   const identification::Excitation& result = found.excitation;
   f("experiment", "path of the experiment", found.experiment);
-  f("condition_number", "of the base parameters' columns, each of unit length; null: infinite",
-    result.condition_number);
+  f("condition_number", "of columns of unit length; null: infinite", result.condition_number);
   f("base_parameters", "how many there are", result.base_parameters);
   f("joints", "that move", result.joints);
   f("held", "that do not", result.still);
@@ -165,8 +164,7 @@ static void figures(Figures& f, const Found& found) {
   f("share", "`--share`, or less: what ran through in simulation", found.share);
   f("lift_m", "by which a robot that hangs is lifted; else 0", result.lift_m);
   f("room_m", "self-distance beyond the 2 cm required; null: no links to look at", result.room_m);
-  f("margin_m", "of the point of zero moment inside the feet; 0: it does not stand",
-    result.margin_m);
+  f("margin_m", "zero-moment point inside the feet; 0: it does not stand", result.margin_m);
 }
 
 std::vector<Figures::Row> excite_figures() { return Figures::rows_of<Found>(); }
