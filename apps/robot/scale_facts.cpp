@@ -19,20 +19,20 @@ bool on_sheet(const hal::RobotConfig& robot, const hal::JointConfig& joint) {
 }
 
 std::string scale_text(const hal::JointConfig& joint) {
-  const std::string velocity =
-      joint.velocity_units_per_rev > 0.0
-          ? fmt::format("{:.10g} velocity units at one per second ({})",
-                        joint.velocity_units_per_rev, source(joint.velocity_of_sheet))
-          : std::string("velocities in counts per second");
+  const std::string velocity = joint.velocity_units_per_rev > 0.0
+                                   ? fmt::format("{:.10g} velocity units at one per second ({})",
+                                                 joint.velocity_units_per_rev.value,
+                                                 source(joint.velocity_units_per_rev.of_sheet))
+                                   : std::string("velocities in counts per second");
   const std::string acceleration = joint.acceleration_units_per_rev > 0.0
                                        ? fmt::format("{:.10g} acceleration units (robot.toml), ",
                                                      joint.acceleration_units_per_rev)
                                        : std::string();
   return fmt::format("{:.10g} counts per {} ({}), {}, {}rated {:.6g} {} ({}){}",
-                     joint.encoder_counts_per_rev, joint.slides ? "2 pi m" : "revolution",
-                     source(joint.counts_of_sheet), velocity, acceleration, joint.rated_torque_Nm,
-                     joint.slides ? "N" : "Nm", source(joint.torque_of_sheet),
-                     joint.reversed ? ", reversed" : "");
+                     joint.encoder_counts_per_rev.value, joint.slides ? "2 pi m" : "revolution",
+                     source(joint.encoder_counts_per_rev.of_sheet), velocity, acceleration,
+                     joint.rated_torque_Nm.value, joint.slides ? "N" : "Nm",
+                     source(joint.rated_torque_Nm.of_sheet), joint.reversed ? ", reversed" : "");
 }
 
 }  // namespace
@@ -65,24 +65,24 @@ void add_scale_json(const hal::RobotConfig& robot, Json& json) {
   Json scales = Json::array();
   for (const hal::JointConfig& joint : robot.joints) {
     if (!on_sheet(robot, joint)) continue;
+    const double counts = joint.encoder_counts_per_rev;
     const bool own_velocity = joint.velocity_units_per_rev > 0.0;
+    const double velocity = own_velocity ? joint.velocity_units_per_rev.value : counts;
     scales.push_back(
         {{"joint", joint.name},
          {"slides", joint.slides},
-         {"encoder_counts_per_rev", joint.encoder_counts_per_rev},
-         {"encoder_counts_from", source(joint.counts_of_sheet)},
-         {"velocity_units_per_rev",
-          own_velocity ? joint.velocity_units_per_rev : joint.encoder_counts_per_rev},
-         {"velocity_units_from", own_velocity ? source(joint.velocity_of_sheet) : "counts"},
-         {"acceleration_units_per_rev", joint.acceleration_units_per_rev > 0.0
-                                            ? joint.acceleration_units_per_rev
-                                        : own_velocity ? joint.velocity_units_per_rev
-                                                       : joint.encoder_counts_per_rev},
-         {"rated_torque_Nm", joint.rated_torque_Nm},
-         {"rated_torque_from", source(joint.torque_of_sheet)},
-         {"reversed", joint.reversed},
+         {"encoder_counts_per_rev", counts},
+         {"encoder_counts_from", source(joint.encoder_counts_per_rev.of_sheet)},
+         {"velocity_units_per_rev", velocity},
+         {"velocity_units_from",
+          own_velocity ? source(joint.velocity_units_per_rev.of_sheet) : "counts"},
+         {"acceleration_units_per_rev",
+          joint.acceleration_units_per_rev > 0.0 ? joint.acceleration_units_per_rev : velocity},
+         {"rated_torque_Nm", joint.rated_torque_Nm.value},
+         {"rated_torque_from", source(joint.rated_torque_Nm.of_sheet)},
+         {"reversed", joint.reversed.value},
          {"zero_counts", joint.zero_counts},
-         {"encoder_turn_counts", joint.encoder_turn_counts}});
+         {"encoder_turn_counts", joint.encoder_turn_counts.value}});
   }
   if (!scales.empty()) json["scales"] = std::move(scales);
 }
