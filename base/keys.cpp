@@ -87,6 +87,10 @@ void read_key(TomlTable& table, const KeyFacts& key, std::vector<std::string>& v
   value = table.texts_or(key.name, value);
 }
 
+void read_key(TomlTable& table, const KeyFacts& key, std::vector<double>& value) {
+  value = table.numbers_or(key.name, value, key.range);
+}
+
 void read_key(TomlTable& table, const KeyFacts& key, double* values, std::size_t count) {
   std::vector<double> numbers(values, values + count);
   numbers = key.required ? table.numbers(key.name, count, key.range)
@@ -115,11 +119,10 @@ std::string shown_choice(const KeyFacts& key, std::size_t value) {
 
 void KeyPage::add_row(const std::string& title, const std::string& prefix, const KeyFacts& key,
                       const std::string& value) {
-  if (tables.empty() || tables.back().title != title) tables.push_back({title, {}, {}});
+  if (tables.empty() || tables.back().title != title) tables.push_back({title, {}});
   const std::string otherwise = key.required            ? "required"
                                 : key.otherwise.empty() ? value
                                                         : std::string(key.otherwise);
-  tables.back().keys.emplace_back(key.name);
   tables.back().rows.push_back("| `" + prefix + std::string(key.name) + "` | " + otherwise + " | " +
                                range_text(key) + " | " + std::string(key.words) + " |");
 }

@@ -28,6 +28,7 @@ struct KeyFacts {
   std::string_view otherwise = {};  ///< for the page: the default, where no value is it
   std::string_view limits = {};     ///< for the page: the range, where the row's does not say it
   bool required = false;
+  bool own = false;  ///< of one table alone: tables of defaults do not have it
 };
 
 /// A row of a table whose values go to a Config. Without `read` ordinary code reads the key.
@@ -57,6 +58,7 @@ void read_key(TomlTable& table, const KeyFacts& key, double& value);
 void read_key(TomlTable& table, const KeyFacts& key, std::int64_t& value);
 void read_key(TomlTable& table, const KeyFacts& key, std::string& value);
 void read_key(TomlTable& table, const KeyFacts& key, std::vector<std::string>& value);
+void read_key(TomlTable& table, const KeyFacts& key, std::vector<double>& value);
 /// @return index of the one that is there; `value` when none is
 [[nodiscard]] std::size_t read_choice(TomlTable& table, const KeyFacts& key, std::size_t value);
 /// @param count  of numbers in the list
@@ -82,11 +84,20 @@ template <class Value>
 void read_key(TomlTable& table, const KeyFacts& key, std::optional<Value>& value) {
   if (table.has(key.name)) read_key(table, key, value.emplace());
 }
+template <class Value>
+void read_key(TomlTable& table, const KeyFacts& key, Given<Value>& given) {
+  read_key(table, key, given.value);
+  if (table.has(key.name)) given.line = table.line(key.name);
+}
 
 /// A default as the page has it; empty for what is none.
 [[nodiscard]] std::string shown_key(const KeyFacts& key, double value);
 [[nodiscard]] std::string shown_key(const KeyFacts& key, const std::string& value);
 [[nodiscard]] std::string shown_choice(const KeyFacts& key, std::size_t value);
+template <class Value>
+std::string shown_key(const KeyFacts& key, const Given<Value>& given) {
+  return shown_key(key, given.value);
+}
 template <class Value>
 std::string shown_key(const KeyFacts& key, const Value& value) {
   if constexpr (std::is_same_v<Value, bool>) {
@@ -137,6 +148,12 @@ constexpr Key<Config> required(Key<Config> row) {
   row.required = true;
   return row;
 }
+/// The same of a key that tables of defaults do not have.
+template <class Config>
+constexpr Key<Config> own(Key<Config> row) {
+  row.own = true;
+  return row;
+}
 /// The row of a key that ordinary code reads.
 template <class Config>
 constexpr Key<Config> by_hand(std::string_view name, std::string_view otherwise,
@@ -144,21 +161,27 @@ constexpr Key<Config> by_hand(std::string_view name, std::string_view otherwise,
   return {{.name = name, .words = words, .otherwise = otherwise, .limits = limits}};
 }
 
-/// Reads every row's key in their order.
+/// Reads every row's key in their order; of a table of defaults those that it may have.
 template <class Config, std::size_t kCount>
 void read_keys(TomlTable& table, const Key<Config> (&keys)[kCount],
                std::type_identity_t<Config>& config) {
   for (const Key<Config>& key : keys) {
-    if (key.read != nullptr) key.read(table, key, config);
+    if (key.read != nullptr && !(key.own && table.is_partial())) key.read(table, key, config);
   }
+}
+/// The same of a table that its rows describe as a whole.
+template <class Config, std::size_t kCount>
+void read_whole(TomlTable table, const Key<Config> (&keys)[kCount],
+                std::type_identity_t<Config>& config) {
+  read_keys(table, keys, config);
+  table.finish();
 }
 
 /// The tables of keys of a page.
 struct KeyPage {
   struct Table {
     std::string title;              ///< as its heading begins: "[sim]"
-    std::vector<std::string> keys;  ///< names
-    std::vector<std::string> rows;  ///< of Markdown, beside them
+    std::vector<std::string> rows;  ///< of Markdown
   };
   std::vector<Table> tables;
 

@@ -66,9 +66,10 @@ std::string header_of(std::string path) {
 }
 
 /// What an entry of an array of tables is called; empty: by no name that can be shown.
-std::string name_of(const toml::table& entry) {
+/// @param named_by  key of the name of one that has no `name`
+std::string name_of(const toml::table& entry, std::string_view named_by) {
   const bool named = entry.contains("name");
-  const auto* text = entry[named ? "name" : "plugin"].as_string();
+  const auto* text = entry[named ? "name" : named_by].as_string();
   if (text == nullptr || !shown_name_problem(text->get()).empty()) return {};
   const bool path = !named && text->get().find('/') != std::string::npos;
   return path ? std::string() : text->get();
@@ -460,9 +461,8 @@ TomlTable TomlTable::table_or_empty(std::string_view key) {
   return {shared_, &kBroken, dotted(key), line(key)};
 }
 
-/// Errors call an entry by its `name` (a controller without one by its plugin), which no other of
-/// the list has, and else by its number.
-std::vector<TomlTable> TomlTable::tables(std::string_view key) {
+/// Errors call an entry by a name that no other of the list has, and else by its number.
+std::vector<TomlTable> TomlTable::tables(std::string_view key, std::string_view named_by) {
   const toml::node* node = find(key);
   if (node == nullptr) return {};
   const toml::array* array = node->as_array();
@@ -476,7 +476,7 @@ std::vector<TomlTable> TomlTable::tables(std::string_view key) {
     return {};
   }
   std::vector<std::string> names;
-  for (const toml::node& entry : *array) names.push_back(name_of(*entry.as_table()));
+  for (const toml::node& entry : *array) names.push_back(name_of(*entry.as_table(), named_by));
   std::vector<TomlTable> found;
   for (std::size_t i = 0; i < array->size(); ++i) {
     const toml::table* table = array->get(i)->as_table();
@@ -522,7 +522,7 @@ std::string quoted_line(std::string_view text, std::size_t number) {
 
 }  // namespace
 
-Result<TomlDocument> TomlDocument::load(const std::string& file) {
+Result<TomlDocument> TomlDocument::load(const std::string& file, const char* of_xml) {
   if (file.empty()) {
     return std::unexpected(Error{"the file's name is empty", "name a .toml file", {}, 0, {}});
   }
@@ -531,14 +531,14 @@ Result<TomlDocument> TomlDocument::load(const std::string& file) {
   if (text->find_first_not_of(" \t\r\n") == std::string::npos) {
     return std::unexpected(Error{"the file is empty", "name another, or write it", file, 0, {}});
   }
-  return parse(*text, file);
+  return parse(*text, file, of_xml);
 }
 
-Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::string& file) {
+Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::string& file,
+                                         const char* of_xml) {
   if (const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
       first != std::string_view::npos && text[first] == '<') {
-    return std::unexpected(
-        Error{"this is XML, not TOML", "`tandem new FILE` makes a robot of a URDF", file, 1, {}});
+    return std::unexpected(Error{"this is XML, not TOML", of_xml, file, 1, {}});
   }
   if (Status within = check_toml_bounds(text, file); !within)
     return std::unexpected(within.error());

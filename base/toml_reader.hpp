@@ -32,6 +32,20 @@ inline constexpr Range kAnyNumber{};
 inline constexpr Range kPositive{0.0, std::numeric_limits<double>::max(), true};
 inline constexpr Range kNotNegative{0.0, std::numeric_limits<double>::max(), false};
 
+/// A key's value, and who gave it.
+template <class Value>
+struct Given {
+  Value value{};
+  int line = 0;           ///< of the key; 0: the file does not give it
+  bool of_sheet = false;  ///< the drive's data sheet gave it
+
+  operator const Value&() const noexcept { return value; }
+  Given& operator=(const Value& other) {
+    value = other;
+    return *this;
+  }
+};
+
 /// One table of a TOML file, read key by key.
 ///
 /// A getter that meets a missing key without default, a wrong type, a number that is not finite
@@ -72,7 +86,9 @@ class TomlTable {
   /// required of it is still an error, at this table's line.
   [[nodiscard]] TomlTable table_or_empty(std::string_view key);
   /// The array of tables [[key]] in the order of the file; empty when it is missing.
-  [[nodiscard]] std::vector<TomlTable> tables(std::string_view key);
+  /// @param named_by  the key whose value names one in errors that has no `name`, unless it is a
+  ///                  path
+  [[nodiscard]] std::vector<TomlTable> tables(std::string_view key, std::string_view named_by = {});
   /// Every key of this table itself, sorted; marks none as read. For free-form maps (posture.home)
   /// and tables of tables ([actuator.NAME]).
   [[nodiscard]] std::vector<std::string> keys() const;
@@ -86,6 +102,7 @@ class TomlTable {
   void inherit(const TomlTable& defaults);
   /// From now on a key that is missing is no error: a table of defaults need not be whole.
   void make_partial() { partial_ = true; }
+  [[nodiscard]] bool is_partial() const { return partial_; }
 
   /// Reports an error of the caller's own at `key` (or at the table when empty). The same error
   /// twice is one.
@@ -139,9 +156,11 @@ class TomlTable {
 class TomlDocument {
  public:
   /// Errors: the file cannot be read; the text is no TOML (with line).
-  [[nodiscard]] static Result<TomlDocument> load(const std::string& file);
+  /// @param of_xml  the hint for a file that is XML
+  [[nodiscard]] static Result<TomlDocument> load(const std::string& file, const char* of_xml = "");
   /// The same from memory; `file` only names it in errors. Errors: beyond a bound of bounds.hpp.
-  [[nodiscard]] static Result<TomlDocument> parse(std::string_view text, const std::string& file);
+  [[nodiscard]] static Result<TomlDocument> parse(std::string_view text, const std::string& file,
+                                                  const char* of_xml = "");
 
   [[nodiscard]] TomlTable root() const;
   [[nodiscard]] const Diagnostics& diagnostics() const;

@@ -94,7 +94,7 @@ std::expected<CompleteRobot, Diagnostics> read_complete_robot(const std::string&
                                                               bool repair) {
   Diagnostics errors;
   std::vector<hal::JointReference> loose;
-  const Result<TomlDocument> document = TomlDocument::load(file);
+  const Result<TomlDocument> document = TomlDocument::load(file, hal::kRobotOfXml);
   hal::RobotConfig config = hal::read_robot_config(document, errors, loose);
   config.model.repair_inertia = config.model.repair_inertia || repair;
   if (errors.empty() && loose.empty()) {

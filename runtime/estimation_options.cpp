@@ -97,10 +97,7 @@ std::vector<WrenchConfig> read_wrenches(TomlTable& parent, const hal::RobotConfi
 estimation::EstimationConfig read_estimation(TomlTable table, const hal::RobotConfig& robot) {
   estimation::EstimationConfig config;
   const auto whole = [&](const char* key, const auto& keys, auto& part) {
-    if (!table.has(key)) return;
-    TomlTable one = table.table(key);
-    read_keys(one, keys, part.emplace());
-    one.finish();
+    if (table.has(key)) read_whole(table.table(key), keys, part.emplace());
   };
   whole("base", kBase, config.base);
   whole("observer", kObserver, config.observer);

@@ -221,7 +221,7 @@ sim::SimRobotConfig Experiment::sim_robot_config() const {
 }
 
 std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) {
-  const auto document = TomlDocument::load(file);
+  const auto document = TomlDocument::load(file, hal::kRobotOfXml);
   if (!document) return std::unexpected(Diagnostics{document.error()});
   TomlTable root = document->root();
   Experiment e = read_tables(*document, root);

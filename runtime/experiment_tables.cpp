@@ -112,13 +112,6 @@ constexpr Key<ParallelOptions> kParallel[] = {
 };
 // clang-format on
 
-/// A table that its rows describe as a whole.
-template <class Config, std::size_t kCount>
-void read_whole(TomlTable table, const Key<Config> (&keys)[kCount], Config& config) {
-  read_keys(table, keys, config);
-  table.finish();
-}
-
 /// @param sim  says how long the hoist needs, which is the default of settle_s
 HalOptions read_hal(TomlTable table, const SimOptions& sim) {
   HalOptions hal{.settle_s = sim.hoist ? sim.hoist_release_s : 0.0};
@@ -185,7 +178,7 @@ void check_remote(Experiment& e, TomlTable remote) {
 }
 
 void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers) {
-  for (TomlTable& table : root.tables("controller")) {
+  for (TomlTable& table : root.tables("controller", "plugin")) {
     ControllerSpec one{
         .plugin = {}, .name = {}, .active = true, .parameters = table.table_or_empty("parameters")};
     read_keys(table, kController, one);

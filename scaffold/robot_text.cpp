@@ -216,7 +216,7 @@ class Writer {
     line("\n# --- joints: their order is that of the boards");
     line("[joint_defaults]");
     line("encoder_counts_per_rev = {:.0f}  # guess: 20 bits; put your encoders' counts here",
-         robot_.config.joints[0].encoder_counts_per_rev);
+         robot_.config.joints[0].encoder_counts_per_rev.value);
     line("motor_encoder_counts_per_rev = {:.0f}{}",
          robot_.config.joints[0].motor_encoder_counts_per_rev, kGuess);
     for (const GainSet& set : robot_.gains) {

@@ -23,20 +23,23 @@ bool on_sheet(const hal::RobotConfig& robot, const hal::JointConfig& joint) {
 
 static void figures(Figures& f, const hal::JointConfig& joint) {
   const bool own = joint.velocity_units_per_rev > 0.0;
-  const double velocity = own ? joint.velocity_units_per_rev : joint.encoder_counts_per_rev;
+  const double velocity =
+      own ? joint.velocity_units_per_rev.value : joint.encoder_counts_per_rev.value;
   const double acceleration = joint.acceleration_units_per_rev;
   f("joint", joint.name);
   f("slides", joint.slides);
-  f("encoder_counts_per_rev", "of a slide per 2 pi m", joint.encoder_counts_per_rev);
-  f("encoder_counts_from", "who says that: `robot.toml`, `sheet`", source(joint.counts_of_sheet));
+  f("encoder_counts_per_rev", "of a slide per 2 pi m", joint.encoder_counts_per_rev.value);
+  f("encoder_counts_from", "who says that: `robot.toml`, `sheet`",
+    source(joint.encoder_counts_per_rev.of_sheet));
   f("velocity_units_per_rev", velocity);
-  f("velocity_units_from", "or `counts`", own ? source(joint.velocity_of_sheet) : "counts");
+  f("velocity_units_from", "or `counts`",
+    own ? source(joint.velocity_units_per_rev.of_sheet) : "counts");
   f("acceleration_units_per_rev", acceleration > 0.0 ? acceleration : velocity);
-  f("rated_torque_Nm", "of a slide in N", joint.rated_torque_Nm);
-  f("rated_torque_from", source(joint.torque_of_sheet));
-  f("reversed", joint.reversed);
+  f("rated_torque_Nm", "of a slide in N", joint.rated_torque_Nm.value);
+  f("rated_torque_from", source(joint.rated_torque_Nm.of_sheet));
+  f("reversed", joint.reversed.value);
   f("zero_counts", joint.zero_counts);
-  f("encoder_turn_counts", joint.encoder_turn_counts);
+  f("encoder_turn_counts", joint.encoder_turn_counts.value);
 }
 
 static std::string scale_text(const hal::JointConfig& joint) {

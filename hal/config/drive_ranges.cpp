@@ -89,11 +89,11 @@ class RangeCheck {
         2.0 * std::numbers::pi * joint_.encoder_turn_counts / joint_.encoder_counts_per_rev;
     const bool beyond = joint_.max_position_rad - joint_.min_position_rad >= turn_rad;
     if (joint_.homing && joint_.homing->required) {
-      error(joint_.turn_line, "encoder_turn_counts",
+      error(joint_.encoder_turn_counts.line, "encoder_turn_counts",
             "a joint that is homed finds its place so, and not by its encoder's turn",
             beyond ? "remove this key" : "remove this key, or set required = false in `homing`");
     } else if (beyond) {
-      error(joint_.turn_line, "encoder_turn_counts",
+      error(joint_.encoder_turn_counts.line, "encoder_turn_counts",
             fmt::format("an encoder that repeats itself after {:.6g} {} does not tell where in its "
                         "range, {:.6g} to {:.6g}, the joint is at power-on",
                         turn_rad, joint_.slides ? "m" : "rad", joint_.min_position_rad,

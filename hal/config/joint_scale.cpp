@@ -27,19 +27,19 @@ class ScaleCheck {
   /// A sheet's objects are of shafts. How far one revolution of them moves a slide, none tells.
   void check_slide() {
     const std::string slides = fmt::format("joint '{}' slides, and ", joint_.name);
-    if (joint_.counts_of_sheet) {
+    if (joint_.encoder_counts_per_rev.of_sheet) {
       error("encoder_counts_per_rev",
             fmt::format("{}608F, 6091 and 6092 of {} are per revolution of a shaft: they do not "
                         "say how far it moves the joint",
                         slides, board_.eds),
             "set it to the drive's position units in 2 pi m (6.2832 m) of travel");
     }
-    if (joint_.velocity_of_sheet) {
+    if (joint_.velocity_units_per_rev.of_sheet) {
       error("velocity_units_per_rev",
             fmt::format("{}60A9 of {} is in revolutions of the motor", slides, board_.eds),
             "set it to the drive's velocity units at 2 pi m/s (6.2832 m/s)");
     }
-    if (joint_.torque_of_sheet) {
+    if (joint_.rated_torque_Nm.of_sheet) {
       error("rated_torque_Nm",
             fmt::format("{}6076 of {} is a torque: it does not say what force that is", slides,
                         board_.eds),

@@ -2,6 +2,7 @@
 // readers of the other tables in the order in which tables refer to each other.
 #include "hal/config/robot_config.hpp"
 
+#include <cmath>
 #include <filesystem>
 #include <limits>
 
@@ -13,13 +14,9 @@ namespace {
 void read_site(TomlTable table, ModelConfig& model) {
   SiteConfig site;
   site.line = table.line();
-  site.name = read_own_name(table);
+  read_whole(table, keys::kSite, site);
+  check_own_name(table, site.name);
   check_unique(table, model.sites, site.name, "site");
-  site.link = table.text("link");
-  site.xyz_m = vector3(table, "xyz_m", {});
-  site.rpy_rad = vector3(table, "rpy_rad", {});
-  site.wrench = table.boolean_or("wrench", false);
-  table.finish();
   model.sites.push_back(site);
 }
 
@@ -27,42 +24,22 @@ LinkConfig read_link(TomlTable table, const std::string& name) {
   LinkConfig link;
   link.name = name;
   link.line = table.line();
-  const double mass_kg = table.number_or("mass_kg", 0.0, kNotNegative);
-  const std::array<double, 3> com_m = vector3(table, "com_m", {});
-  const std::vector<double> inertia =
-      table.numbers_or("inertia_kg_m2", std::vector<double>(6, 0.0), kAnyNumber, 6);
+  const LinkConfig unchanged = link;
+  read_keys(table, keys::kLink, link);
   if (table.keys().empty()) {
     table.error("", "gives nothing", "give mass_kg, com_m or inertia_kg_m2, or remove it");
   }
   table.finish();
-  if (table.has_errors()) return link;  // what the link then is follows from them
-  if (table.has("mass_kg")) link.mass_kg = mass_kg;
-  if (table.has("com_m")) link.com_m = com_m;
-  if (table.has("inertia_kg_m2")) {
-    std::ranges::copy(inertia, link.inertia_kg_m2.emplace().begin());
-  }
-  return link;
+  return table.has_errors() ? unchanged : link;  // what the link then is follows from them
 }
 
 ModelConfig read_model(TomlTable& root, const std::string& folder) {
   ModelConfig model;
   TomlTable table = root.table("model");
-  const std::filesystem::path urdf = table.text("urdf");
-  if (!urdf.empty()) {
-    const auto path = urdf.is_absolute() ? urdf : std::filesystem::path(folder) / urdf;
-    model.urdf = path.lexically_normal().string();
-  }
-  model.floating_base = table.choice("base", {"floating", "fixed"}) == "floating";
-  model.mimic_independent =
-      table.choice_or("mimic", "follow", {"follow", "independent"}) == "independent";
-  model.repair_inertia = table.choice_or("inertia", "strict", {"strict", "repair"}) == "repair";
-  model.exact_right_angles =
-      table.choice_or("right_angles", "as_written", {"as_written", "exact"}) == "exact";
-  model.derivatives = table.boolean_or("derivatives", false);
-  constexpr Range kGravity{.min = -1000.0, .max = 1000.0};  // three times the Sun's
-  const std::vector<double> gravity = table.numbers_or(
-      "gravity_m_s2", {model.gravity_m_s2.begin(), model.gravity_m_s2.end()}, kGravity, 3);
-  if (gravity.size() == 3) std::ranges::copy(gravity, model.gravity_m_s2.begin());
+  read_keys(table, keys::kModel, model);
+  const std::filesystem::path urdf = model.urdf;
+  if (!urdf.empty())
+    model.urdf = (std::filesystem::path(folder) / urdf).lexically_normal().string();
   model.gravity_line = table.line("gravity_m_s2");
   TomlTable lock = table.table_or_empty("lock");
   for (const std::string& joint : lock.keys()) {
@@ -76,40 +53,34 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
   return model;
 }
 
-std::vector<double> read_channels(TomlTable& table, const char* key, std::size_t channels,
-                                  Range range) {
-  std::vector<double> values = table.numbers_or(key, {}, range);
-  if (!values.empty() && values.size() != channels) {
-    table.error(key, "has " + std::to_string(values.size()) + " numbers",
-                "give one for each of the " + std::to_string(channels) + " channels");
-  }
-  return values;
+void check_channels(TomlTable& table, const char* key, const std::vector<double>& values,
+                    std::size_t channels) {
+  if (values.empty() || values.size() == channels) return;
+  table.error(key, "has " + std::to_string(values.size()) + " numbers",
+              "give one for each of the " + std::to_string(channels) + " channels");
 }
 
 /// @param bus  whose table holds this one; empty for a [[sensor]]
 void read_sensor(TomlTable table, const std::string& bus, NodeIds& ids, RobotConfig& robot) {
   SensorConfig sensor;
   sensor.line = table.line();
-  sensor.name = table.text("name");
+  read_keys(table, keys::kSensor, sensor);
   if (const std::string problem = topic_name_problem(sensor.name);
       !problem.empty() && !sensor.name.empty()) {
     table.error("name", "'" + sensor.name + "' " + problem + ", but it becomes part of a topic",
                 "use letters, digits and _");
   }
   check_unique(table, robot.sensors, sensor.name, "sensor");
-  const bool imu = table.choice("type", {"force_torque", "imu"}) == "imu";
-  sensor.type = imu ? SensorType::kImu : SensorType::kForceTorque;
   sensor.bus = read_bus_name(table, bus);
   check_reference(table, "bus", sensor.bus, robot.buses, "bus");
   sensor.node_id = ids.read(table, sensor.bus);
-  if (imu && table.has("joint")) {
+  if (sensor.type == SensorType::kForceTorque) {
+    sensor.joint = table.text("joint");
+  } else if (table.has("joint")) {
     table.error("joint", "an imu measures at a link, not through a joint", "remove this key");
   }
-  sensor.joint = imu ? table.text_or("joint", {}) : table.text("joint");
-  sensor.link = table.text("link");
-  sensor.noise = read_channels(table, "noise", sensor.channels(), kNotNegative);
-  sensor.bias = read_channels(table, "bias", sensor.channels(), kAnyNumber);
-  sensor.heartbeat_ms = read_heartbeat(table);
+  check_channels(table, "noise", sensor.noise, sensor.channels());
+  check_channels(table, "bias", sensor.bias, sensor.channels());
   table.finish();
   robot.sensors.push_back(sensor);
 }
@@ -141,17 +112,12 @@ void read_contact(TomlTable& root, RobotConfig& robot) {
   ContactConfig& c = robot.contact;
   TomlTable table = root.table("contact");
   for (const std::string& key : table.keys()) c.lines.emplace(key, table.line(key));
-  c.height_m = table.number_or("height_m", 0.0);
-  c.stiffness_N_m = table.number("stiffness_N_m", kPositive);
-  c.damping_s_m = table.number("damping_s_m", kNotNegative);
-  c.tangential_stiffness_N_m = table.number("tangential_stiffness_N_m", kPositive);
-  c.tangential_damping_Ns_m = table.number("tangential_damping_Ns_m", kNotNegative);
-  c.sliding_friction = table.number("sliding_friction", kNotNegative);
-  c.static_friction = table.number_or("static_friction", c.sliding_friction, kNotNegative);
+  c.static_friction = kUnset;
+  read_keys(table, keys::kContact, c);
+  if (std::isnan(c.static_friction)) c.static_friction = c.sliding_friction;
   if (c.static_friction < c.sliding_friction) {
     table.error("static_friction", "is less than sliding_friction", "raise it or lower the other");
   }
-  c.stick_velocity_m_s = table.number_or("stick_velocity_m_s", 0.01, kPositive);
   for (TomlTable& foot : table.tables("foot")) c.feet.push_back(read_foot(foot, robot));
   if (c.feet.empty() && robot.model.floating_base) {
     table.error("", "has no foot", "add [[contact.foot]] or remove [contact]");
@@ -214,27 +180,6 @@ void read_posture(TomlTable table, const std::string& name, bool fixed_base, Rob
   robot.postures.push_back(posture);
 }
 
-void read_safety(TomlTable table, RobotConfig& robot) {
-  const std::string stop =
-      table.choice_or("emergency_stop", "category1", {"category0", "category1", "category2"});
-  robot.emergency_stop = stop == "category0"   ? StopCategory::kCategory0
-                         : stop == "category2" ? StopCategory::kCategory2
-                                               : StopCategory::kCategory1;
-  robot.emergency_stop_line = table.line("emergency_stop");
-  table.finish();
-}
-
-/// The robot's name becomes part of its kernels' and logs' file names.
-std::string read_name(TomlTable& root) {
-  std::string name = root.text("name");
-  if (name.empty()) return name;  // has been said
-  if (const std::string problem = file_name_problem(name); !problem.empty()) {
-    root.error("name", "'" + name + "' " + problem + ", but it becomes part of file names",
-               "use letters, digits, _, - and ., at most " + std::to_string(kLongestFileName));
-  }
-  return name;
-}
-
 const std::vector<std::string> kSections{
     "name",         "model",          "site",    "actuator",       "actuator_defaults",
     "gains",        "gains_defaults", "bus",     "board",          "sensor",
@@ -255,7 +200,8 @@ RobotConfig read(const TomlDocument& document, std::vector<JointReference>& loos
   RobotConfig robot;
   robot.file = document.file();
   TomlTable root = document.root();
-  robot.name = read_name(root);
+  read_keys(root, keys::kRoot, robot);
+  check_own_name(root, robot.name);
   const bool right = sections_are_right(root);
   robot.model = read_model(root, document.folder());
   if (!right) return robot;
@@ -288,7 +234,7 @@ RobotConfig read(const TomlDocument& document, std::vector<JointReference>& loos
       (robot.joints.empty() && !document.diagnostics().empty())) {
     loose.clear();  // which joints there are is not known
   }
-  read_safety(root.table_or_empty("safety"), robot);
+  read_whole(root.table_or_empty("safety"), keys::kSafety, robot);
   return robot;
 }
 
@@ -324,7 +270,7 @@ std::vector<LinkConfig> read_links(TomlTable links) {
 }
 
 std::expected<RobotConfig, Diagnostics> read_robot_config(const std::string& file) {
-  return finish(TomlDocument::load(file));
+  return finish(TomlDocument::load(file, kRobotOfXml));
 }
 
 RobotConfig read_robot_config(const Result<TomlDocument>& loaded, Diagnostics& errors,

@@ -27,6 +27,9 @@
 
 namespace tandem::hal {
 
+/// What to say to a URDF in the place of a robot.toml.
+inline constexpr const char* kRobotOfXml = "`tandem new FILE` makes a robot of a URDF";
+
 /// [[site]]: a named frame of the model.
 struct SiteConfig : Site {
   int line = 0;  ///< in the TOML, for messages
@@ -156,6 +159,9 @@ struct StopOptions {
 /// experiments move, softer than a step.
 inline constexpr double kFullSpeed_s = 0.05;
 
+/// What a table leaves open, until the description or a drive's sheet completes it.
+inline constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
+
 /// [[joint]]
 struct JointConfig {
   std::string name;  ///< URDF joint
@@ -163,22 +169,22 @@ struct JointConfig {
   int axis = 0;  ///< on its board, from 0
   std::string actuator;
   std::string gains;
-  double min_position_rad = 0.0;  ///< this and the next three: NaN when the TOML leaves
-  double max_position_rad = 0.0;  ///< them to the URDF, until complete_from_description()
-  double max_velocity_rad_s = 0.0;
-  double max_torque_Nm = 0.0;  ///< the torque reference's limit
+  double min_position_rad = kUnset;  ///< this and the next three: until
+  double max_position_rad = kUnset;  ///< complete_from_description() the URDF's
+  double max_velocity_rad_s = kUnset;
+  double max_torque_Nm = kUnset;  ///< the torque reference's limit
   /// Limit of references. Without the key: the largest velocity in kFullSpeed_s.
   double max_acceleration_rad_s2 = std::numeric_limits<double>::infinity();
   double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();  ///< the same; not limited
-  double rated_torque_Nm = 0.0;  ///< CiA 402 6076: torques travel as per mille of it;
-                                 ///< default: max_torque_Nm
+  /// CiA 402 6076: torques travel as per mille of it; default: max_torque_Nm.
+  Given<double> rated_torque_Nm = {kUnset};
   std::optional<double> max_torque_rate_Nm_s = {};  ///< of the torque reference
-  double encoder_counts_per_rev = 0.0;              ///< link encoder
-  double motor_encoder_counts_per_rev = 0.0;        ///< motor encoder, per revolution at the link
-  double torque_noise_Nm = 0.0;        ///< standard deviation of the spring torque's measurement
-  double following_error_rad = 0.5;    ///< in CSP, beyond it for longer than the next: a fault;
-  double following_timeout_s = 0.1;    ///< 0 rad: not watched
-  bool following_error_given = false;  ///< following_error_rad is the file's, not its default
+  Given<double> encoder_counts_per_rev = {kUnset};  ///< link encoder
+  double motor_encoder_counts_per_rev = kUnset;     ///< motor encoder, per revolution at the link
+  double torque_noise_Nm = 0.0;  ///< standard deviation of the spring torque's measurement
+  /// In CSP, beyond it for longer than the next: a fault; 0 rad: not watched.
+  Given<double> following_error_rad = {0.5};
+  double following_timeout_s = 0.1;
   /// Settings of its drive that are keys as they are; NaN: no key. See drive_parameters().
   canopen::DriveParameters drive = canopen::DriveParameters::unsaid();
   double max_oscillation = 0.35;    ///< RMS of the motor torque's fast part over the most that the
@@ -190,24 +196,18 @@ struct JointConfig {
   double excess_time_s = 0.1;  ///< for which it may
   std::optional<BrakeConfig> brake = {};
   std::optional<HomingConfig> homing = {};  ///< none: its encoder is absolute
-  bool reversed = false;                    ///< the drive counts down as the joint's angle grows
-  bool reversed_given = false;              ///< robot.toml has `reversed`, whatever it says
+  Given<bool> reversed = {};                ///< the drive counts down as the joint's angle grows
   std::int32_t zero_counts = 0;             ///< what the drive counts where the joint is at 0
   /// Counts after which the encoder repeats itself at power-on (a single-turn one); 0: it does not.
-  std::int32_t encoder_turn_counts = 0;
-  int turn_line = 0;  ///< of the key encoder_turn_counts
+  Given<std::int32_t> encoder_turn_counts = {};
   StopOptions stop_options = {};
   /// The drive's velocity units at one revolution of the joint per second; 0: its counts per
   /// second.
-  double velocity_units_per_rev = 0.0;
+  Given<double> velocity_units_per_rev = {};
   double acceleration_units_per_rev = 0.0;  ///< of its accelerations; 0: the former per second
-  bool velocity_of_sheet = false;  ///< velocity_units_per_rev is what the drive's sheet says
-  bool counts_of_sheet = false;    ///< encoder_counts_per_rev is what the drive's sheet says
-  bool torque_of_sheet = false;    ///< rated_torque_Nm is
   bool slides = false;  ///< prismatic: m and N; the URDF's, by complete_from_description()
-  StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
-  int on_fault_line = 0;                             ///< in the TOML, for messages
-  int line = 0;                                      ///< the same
+  Given<StopCategory> on_fault = {StopCategory::kCategory1};  ///< when its board dies or faults
+  int line = 0;                                               ///< in the TOML, for messages
 };
 
 /// By how much a drive lets its torque reference change (6087): max_torque_rate_Nm_s, or without
@@ -265,6 +265,7 @@ struct BoardConfig {
   std::int64_t boot_time_ns = 1'500'000'000;   ///< from a reset to the boot-up message, at most
   int slow_pdo_every = 1;                      ///< motor velocity, current, … every n-th SYNC
   bool keeps_configuration = false;  ///< it stores (1010) and names (1020) what it was written
+  bool fd = false;                   ///< of a drive of another make: it takes PDOs of CAN FD
   std::string eds;  ///< path of its data sheet, against the TOML's folder; empty: one of our own
   std::shared_ptr<const canopen::DataSheet> sheet = canopen::tandem_board_sheet();
   // 1018, as the board has to identify itself; without a value that of the sheet, or any serial
@@ -326,8 +327,7 @@ struct RobotConfig {
   std::vector<SensorConfig> sensors;  ///< the process image's order
   ContactConfig contact;
   std::vector<PostureConfig> postures;
-  StopCategory emergency_stop = StopCategory::kCategory1;  ///< [safety]; 0, 1 or 2
-  int emergency_stop_line = 0;                             ///< in the TOML, for messages
+  Given<StopCategory> emergency_stop = {StopCategory::kCategory1};  ///< [safety]; 0, 1 or 2
 
   [[nodiscard]] ImageShape shape() const;
   /// Index in `joints`, or -1.

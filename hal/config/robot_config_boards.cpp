@@ -20,21 +20,16 @@ constexpr double kSheetBoot_s = 6.0;  // drives that need five are known
 
 BusConfig read_bus(TomlTable& table) {
   BusConfig bus;
-  const bool ethercat = table.choice_or("kind", "can", {"can", "ethercat"}) == "ethercat";
-  bus.kind = ethercat ? BusKind::kEthercat : BusKind::kCan;
-  bus.fd = table.boolean_or("fd", true);
-  bus.bitrate = table.integer_or("bitrate", bus.bitrate, 10'000, 1'000'000);
-  bus.data_bitrate = table.integer_or("data_bitrate", bus.data_bitrate, 10'000, 12'000'000);
-  bus.max_load = table.number_or("max_load", bus.max_load, {0.01, 1.0});
+  read_keys(table, keys::kBus, bus);
   return bus;
 }
 
 void add_bus(TomlTable& table, RobotConfig& robot) {
   BusConfig bus = read_bus(table);
   bus.line = table.line();
-  bus.name = read_own_name(table);
+  check_own_name(table, bus.name);
   check_unique(table, robot.buses, bus.name, "bus");
-  bus.interface = table.text_or("interface", bus.name);
+  if (!table.has("interface")) bus.interface = bus.name;
   const std::string problem = interface_name_problem(bus.interface);
   if (table.has("interface") && !problem.empty()) {
     table.error("interface", "'" + bus.interface + "' " + problem,
@@ -55,26 +50,11 @@ void add_bus(TomlTable& table, RobotConfig& robot) {
   robot.buses.push_back(bus);
 }
 
-std::optional<std::uint32_t> read_identity(TomlTable& table, const char* key) {
-  if (!table.has(key)) return {};
-  return static_cast<std::uint32_t>(table.integer(key, 0, 0xFFFFFFFF));
-}
-
 BoardConfig read_board(TomlTable& table) {
   BoardConfig board;
-  board.control_period_ns =
-      table.integer_or("control_period_ns", board.control_period_ns, 10'000, 100'000'000);
-  board.heartbeat_ms = read_heartbeat(table);
-  board.command_timeout_cycles =
-      static_cast<int>(table.integer_or("command_timeout_cycles", 10, 1, 10'000));
-  board.slow_pdo_every = static_cast<int>(table.integer_or("slow_pdo_every", 1, 1, 240));
-  board.eds = table.text_or("eds", "");
-  board.keeps_configuration = table.boolean_or("keeps_configuration", false);
+  read_keys(table, keys::kBoard, board);
   const double usual_s = board.eds.empty() ? kOwnBoot_s : kSheetBoot_s;
   board.boot_time_ns = std::llround(1e9 * table.number_or("boot_time_s", usual_s, {0.1, 60.0}));
-  board.vendor_id = read_identity(table, "vendor_id");
-  board.product_code = read_identity(table, "product_code");
-  board.revision = read_identity(table, "revision");
   return board;
 }
 
@@ -98,7 +78,7 @@ class Sheets {
     if (!known->second) return;
     board.eds = path;
     auto sheet = std::make_shared<canopen::DataSheet>(*known->second);
-    if (table.boolean_or("fd", false)) {
+    if (board.fd) {
       sheet->most_pdo_bytes = static_cast<int>(canopen::kMaxFrameBytes);
     }
     board.sheet = std::move(sheet);
@@ -148,14 +128,12 @@ void check_identity(TomlTable& table, const BoardConfig& board) {
 void check_drive_keys(TomlTable& table, const RobotConfig& robot, const BoardConfig& board) {
   const BusConfig* bus = robot.bus(board.bus);
   if (table.has("fd") && board.eds.empty()) {
-    (void)table.boolean_or("fd", false);
     table.error("fd", "is for drives of other makers: our own boards take what their bus has",
                 "remove this key, or set fd of the bus");
-  } else if (table.has("fd") && table.boolean_or("fd", false) && bus != nullptr &&
-             bus->kind == BusKind::kEthercat) {
+  } else if (board.fd && bus != nullptr && bus->kind == BusKind::kEthercat) {
     table.error("fd", "its bus '" + bus->name + "' is EtherCAT: PDOs are as long as the drive's",
                 "remove this key");
-  } else if (table.has("fd") && table.boolean_or("fd", false) && bus != nullptr && !bus->fd) {
+  } else if (board.fd && bus != nullptr && !bus->fd) {
     table.error("fd", "its bus '" + bus->name + "' is no CAN FD bus",
                 "remove this key, or set fd = true of the bus");
   }
@@ -200,7 +178,7 @@ void add_board(TomlTable table, const std::string& bus, NodeIds& ids,
                std::vector<BoardTable>& boards, Sheets& sheets, RobotConfig& robot) {
   BoardConfig board = read_board(table);
   board.line = table.line();
-  board.name = read_own_name(table);
+  check_own_name(table, board.name);
   check_unique(table, robot.boards, board.name, "board");
   sheets.read(table, robot.file, board);
   check_identity(table, board);
@@ -209,7 +187,6 @@ void add_board(TomlTable table, const std::string& bus, NodeIds& ids,
   set_wire(table, robot, board);
   check_drive_keys(table, robot, board);
   board.node_id = ids.read(table, board.bus);
-  board.serial = read_identity(table, "serial");
   std::vector<std::string> joints = read_list(table, board.name, boards);
   table.finish();
   boards.push_back({std::move(table), board.name, std::move(joints)});

@@ -247,7 +247,7 @@ class Completion : private Check {
 
   static double countable_rad(const JointConfig& joint) {
     const double counts =
-        std::max(joint.encoder_counts_per_rev, joint.motor_encoder_counts_per_rev);
+        std::max(joint.encoder_counts_per_rev.value, joint.motor_encoder_counts_per_rev);
     return kMostCounts / counts * 2.0 * std::numbers::pi;
   }
 
@@ -291,24 +291,24 @@ class Completion : private Check {
     if (!std::isfinite(joint.max_acceleration_rad_s2)) {
       joint.max_acceleration_rad_s2 = joint.max_velocity_rad_s / kFullSpeed_s;
     }
-    if (joint.slides && !joint.following_error_given) {
+    if (joint.slides && joint.following_error_rad.line == 0) {
       joint.following_error_rad = slide_following_error_m(joint);
     }
-    if (std::isnan(joint.rated_torque_Nm)) joint.rated_torque_Nm = joint.max_torque_Nm;
+    if (std::isnan(joint.rated_torque_Nm.value)) joint.rated_torque_Nm = joint.max_torque_Nm;
     if (joint.max_torque_Nm > 32.0 * joint.rated_torque_Nm) {
       error(joint.line, key + ".rated_torque_Nm",
             "max_torque_Nm is more than 32 times the rated torque, the range of the wire",
             "raise rated_torque_Nm");
-    } else if (joint.torque_of_sheet &&
+    } else if (joint.rated_torque_Nm.of_sheet &&
                joint.rated_torque_Nm > kLikelyOverrated * joint.max_torque_Nm) {
       error(joint.line, key + ".rated_torque_Nm",
             fmt::format("6076 of the sheet of board '{}', in mNm and with the gear, is {:.10g} Nm, "
                         "{:.3g} times max_torque_Nm: is it in uNm there?",
-                        joint.board, joint.rated_torque_Nm,
+                        joint.board, joint.rated_torque_Nm.value,
                         joint.rated_torque_Nm / joint.max_torque_Nm),
             fmt::format("set this key: to {:.10g} if the drive's 6076 is in uNm, to {:.10g} if it "
                         "is in mNm",
-                        1e-3 * joint.rated_torque_Nm, joint.rated_torque_Nm));
+                        1e-3 * joint.rated_torque_Nm, joint.rated_torque_Nm.value));
     } else if (joint.rated_torque_Nm > 100.0 * joint.max_torque_Nm) {
       error(joint.line, key + ".rated_torque_Nm",
             "torques go over the wire in thousandths of it, and max_torque_Nm has less than ten "

@@ -4,50 +4,26 @@
 namespace tandem::hal {
 namespace {
 
-// A key a line.
-// clang-format off
-constexpr Key<ActuatorConfig> kActuator[] = {
-  key<&ActuatorConfig::order>("order", {0, 3}, "0 rigid, 1 electrical, 2 mechanical (spring), 3 both"),
-  required(key<&ActuatorConfig::resistance_ohm>("resistance_ohm", kPositive, "R, winding")),
-  key<&ActuatorConfig::inductance_H>("inductance_H", kNotNegative, "L, winding; orders 1 and 3 need it"),
-  required(key<&ActuatorConfig::torque_constant_Nm_A>("torque_constant_Nm_A", kPositive, "K, of the motor before the gear")),
-  required(key<&ActuatorConfig::gear_ratio>("gear_ratio", kPositive, "N")),
-  required(key<&ActuatorConfig::inertia_kg_m2>("inertia_kg_m2", kPositive, "J, reflected: N² times the rotor's. Of a rigid actuator (orders 0, 1) it is part of the joint's inertia, and its brake acts on it")),
-  required(key<&ActuatorConfig::damping_Nms_rad>("damping_Nms_rad", kNotNegative, "D, **including** the back-EMF's share N²K²/R, which is subtracted again where the current is a state (orders 1, 3: at least that). In orders 0 and 2 less lowers the back-EMF; below half of it `check` and `run` warn")),
-  key<&ActuatorConfig::friction_Nm>("friction_Nm", kNotNegative, "dry (Coulomb) friction, where D acts: on the rotor, reflected; on the joint where there is no spring (simulation: [simulation.md](simulation.md#dry-friction))"),
-  key<&ActuatorConfig::spring_Nm_rad>("spring_Nm_rad", kNotNegative, "Ks; orders 2 and 3 need it"),
-  key<&ActuatorConfig::spring_damping_Nms_rad>("spring_damping_Nms_rad", kNotNegative, "Ds"),
-  required(key<&ActuatorConfig::current_limit_A>("current_limit_A", kPositive, "saturation of the motor's current")),
-  required(key<&ActuatorConfig::voltage_limit_V>("voltage_limit_V", kPositive, "saturation of the motor's voltage")),
-  key<&ActuatorConfig::thermal_resistance_K_W>("thermal_resistance_K_W", kPositive, "winding to ambient"),
-  key<&ActuatorConfig::thermal_time_constant_s>("thermal_time_constant_s", kPositive, "of the winding"),
-  key<&ActuatorConfig::continuous_current_A>("continuous_current_A", kNotNegative, "the drive's I2t limit (2031): the permanently permissible current; 0: not monitored"),
-  key<&ActuatorConfig::thermal_time_s>("thermal_time_s", kPositive, "time constant of that monitor"),
-  key<&ActuatorConfig::temperature_limit_C>("temperature_limit_C", {-50.0, 3000.0}, "of the winding (2034): the drive faults above it"),
-};
-// clang-format on
-
 ActuatorConfig read_actuator(TomlTable& table) {
   ActuatorConfig a;
-  read_keys(table, kActuator, a);
+  read_keys(table, keys::kActuator, a);
   a.damping_line = table.line("damping_Nms_rad");
   return a;
 }
 
-double read_gain(TomlTable& table, const char* key) {
-  const double gain = table.number_or(key, 0.0);
-  if (gain < 0.0) {
-    table.error(key, "this gain has the wrong sign",
-                "gains are not negative: they act on reference minus measurement");
-  }
-  return gain;
+void check_sign(TomlTable& table, const char* key, double gain) {
+  if (gain >= 0.0) return;
+  table.error(key, "this gain has the wrong sign",
+              "gains are not negative: they act on reference minus measurement");
 }
 
 PidConfig read_pid(TomlTable table) {
   PidConfig pid;
-  pid.gains = {read_gain(table, "kp"), read_gain(table, "ki"), read_gain(table, "kd")};
-  pid.output_limit = table.number_or("output_limit", 0.0, kNotNegative);
-  table.finish();
+  read_keys(table, keys::kPid, pid.gains);
+  read_whole(table, keys::kPidLimit, pid);
+  check_sign(table, "kp", pid.gains.kp);
+  check_sign(table, "ki", pid.gains.ki);
+  check_sign(table, "kd", pid.gains.kd);
   return pid;
 }
 
@@ -57,13 +33,9 @@ GainsConfig read_gains(TomlTable& table) {
   g.velocity = read_pid(table.table_or_empty("velocity"));
   g.torque = read_pid(table.table_or_empty("torque"));
   g.current = read_pid(table.table_or_empty("current"));
-  g.position_feedback = table.choice_or("position_feedback", "link", {"link", "motor"}) == "link"
-                            ? PositionFeedback::kLink
-                            : PositionFeedback::kMotor;
-  g.torque_feedforward = table.number_or("torque_feedforward", 1.0, {0.0, 2.0});
-  g.emf_compensation = table.number_or("emf_compensation", 0.0, {0.0, 1.0});
-  g.stiffness_Nm_rad = read_gain(table, "stiffness_Nm_rad");
-  g.damping_Nms_rad = read_gain(table, "damping_Nms_rad");
+  read_keys(table, keys::kGains, g);
+  check_sign(table, "stiffness_Nm_rad", g.stiffness_Nm_rad);
+  check_sign(table, "damping_Nms_rad", g.damping_Nms_rad);
   return g;
 }
 
@@ -125,7 +97,5 @@ void read_drive_tables(TomlTable& root, RobotConfig& robot) {
   }
   gains.finish();
 }
-
-void describe_drives(KeyPage& page) { page.add("[actuator.NAME]", kActuator); }
 
 }  // namespace tandem::hal

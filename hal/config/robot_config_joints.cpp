@@ -1,8 +1,6 @@
 // [[joint]]: limits, brake, encoders and reaction to faults, for one joint or for a list of them.
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <limits>
 
 #include "canopen/drive_abilities.hpp"
 #include "hal/config/robot_config_read.hpp"
@@ -10,134 +8,46 @@
 namespace tandem::hal {
 namespace {
 
-StopCategory read_stop_category(TomlTable& table) {
-  static const std::vector<std::string> kNames{"category0", "category1", "category2", "hold",
-                                               "warn"};
-  const auto found = std::ranges::find(kNames, table.choice_or("on_fault", "category1", kNames));
-  return static_cast<StopCategory>(found - kNames.begin());
-}
-
-void read_limits(TomlTable& table, JointConfig& joint) {
-  joint.min_position_rad = table.number_or("min_position_rad", kUnset);
-  joint.max_position_rad = table.number_or("max_position_rad", kUnset);
-  joint.max_velocity_rad_s = table.number_or("max_velocity_rad_s", kUnset, kPositive);
-  joint.max_torque_Nm = table.number_or("max_torque_Nm", kUnset, kPositive);
-  joint.max_acceleration_rad_s2 =
-      table.number_or("max_acceleration_rad_s2", joint.max_acceleration_rad_s2, kPositive);
-  joint.max_jerk_rad_s3 = table.number_or("max_jerk_rad_s3", joint.max_jerk_rad_s3, kPositive);
-  if (table.has("max_jerk_rad_s3") && !table.has("max_acceleration_rad_s2")) {
-    table.error("max_jerk_rad_s3", "needs a max_acceleration_rad_s2",
-                "give both, or the acceleration alone");
-  }
-  joint.rated_torque_Nm = table.number_or("rated_torque_Nm", kUnset, kPositive);
-  if (table.has("max_torque_rate_Nm_s")) {
-    joint.max_torque_rate_Nm_s = table.number("max_torque_rate_Nm_s", kPositive);
-  }
-}
-
-std::optional<BrakeConfig> read_brake(TomlTable& table) {
-  if (!table.has("brake")) return {};
-  constexpr std::int64_t kLongest_ms = 1'000;
-  TomlTable brake = table.table("brake");
-  BrakeConfig b;
-  b.torque_Nm = brake.number("torque_Nm", kPositive);
-  b.release_ms = static_cast<int>(brake.integer("release_ms", 0, kLongest_ms));
-  b.engage_ms = static_cast<int>(brake.integer("engage_ms", 0, kLongest_ms));
-  brake.finish();
-  return b;
-}
-
 std::optional<HomingConfig> read_homing(TomlTable& table) {
   if (!table.has("homing")) return {};
   TomlTable homing = table.table("homing");
   HomingConfig h;
   h.line = table.line("homing");
-  h.method = static_cast<int>(homing.integer("method", -128, 127));
+  h.zero_speed_rad_s = kUnset;
+  read_keys(homing, keys::kHoming, h);
   if (h.method == 0 && !homing.has_errors()) {
     homing.error("method", "0 is no homing", "give the number of a method that the drive has");
   }
-  h.speed_rad_s = homing.number("speed_rad_s", kPositive);
-  h.zero_speed_rad_s = homing.number_or("zero_speed_rad_s", 0.1 * h.speed_rad_s, kPositive);
-  h.acceleration_rad_s2 = homing.number("acceleration_rad_s2", kPositive);
-  h.position_rad = homing.number_or("position_rad", 0.0);
-  h.timeout_s = homing.number_or("timeout_s", h.timeout_s, {0.1, 3600.0});
-  h.required = homing.boolean_or("required", true);
-  h.at_start = homing.boolean_or("at_start", false);
+  if (std::isnan(h.zero_speed_rad_s)) h.zero_speed_rad_s = 0.1 * h.speed_rad_s;
   if (h.at_start && !h.required) {
     homing.error("at_start", "goes with required = true", "remove one of the two");
   }
-  if (homing.has("home_switch_rad")) {
-    const std::vector<double> at = homing.numbers_or("home_switch_rad", {}, kAnyNumber, 2);
-    if (at.size() == 2 && at[0] < at[1]) {
-      h.home_switch_rad = {at[0], at[1]};
-    } else if (!homing.has_errors()) {
+  if (const auto& at = h.home_switch_rad; at && !((*at)[0] < (*at)[1])) {
+    if (!homing.has_errors()) {
       homing.error("home_switch_rad", "is no range", "give the lower angle first: [0.1, 0.2]");
     }
+    h.home_switch_rad.reset();
   }
-  h.index_rad = homing.number_or("index_rad", 0.0);
   homing.finish();
   return h;
-}
-
-StopOptions read_stop_options(TomlTable& table) {
-  StopOptions options;
-  if (!table.has("stop_options")) return options;
-  TomlTable keys = table.table("stop_options");
-  const auto read = [&](const char* key) -> std::optional<int> {
-    if (!keys.has(key)) return {};
-    return static_cast<int>(keys.integer(key, -32768, 32767));
-  };
-  options = {.shutdown = read("shutdown"),
-             .disable = read("disable"),
-             .halt = read("halt"),
-             .fault = read("fault")};
-  keys.finish();
-  return options;
 }
 
 /// What joints may have in common.
 JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   JointConfig joint;
-  joint.actuator = table.text("actuator");
+  read_keys(table, keys::kJoint, joint);
+  read_keys(table, keys::kDrive, joint.drive);
   check_reference(table, "actuator", joint.actuator, robot.actuators, "actuator");
   const auto motor = std::ranges::find(robot.actuators, joint.actuator, &ActuatorConfig::name);
-  if (motor != robot.actuators.end()) {
-    joint.drive.temperature_limit_C = motor->temperature_limit_C;
+  if (motor != robot.actuators.end()) joint.drive.temperature_limit_C = motor->temperature_limit_C;
+  if (!table.has("gains")) joint.gains = joint.actuator;
+  if (table.has("max_jerk_rad_s3") && !table.has("max_acceleration_rad_s2")) {
+    table.error("max_jerk_rad_s3", "needs a max_acceleration_rad_s2",
+                "give both, or the acceleration alone");
   }
-  joint.gains = table.text_or("gains", joint.actuator);
-  read_limits(table, joint);
-  joint.encoder_counts_per_rev = table.number_or("encoder_counts_per_rev", kUnset, kCounts);
-  joint.motor_encoder_counts_per_rev =
-      table.number_or("motor_encoder_counts_per_rev", kUnset, kCounts);
-  joint.reversed = table.boolean_or("reversed", false);
-  joint.reversed_given = table.has("reversed");
-  joint.zero_counts = static_cast<std::int32_t>(
-      table.integer_or("zero_counts", 0, std::numeric_limits<std::int32_t>::min(),
-                       std::numeric_limits<std::int32_t>::max()));
-  joint.encoder_turn_counts = static_cast<std::int32_t>(
-      table.integer_or("encoder_turn_counts", 0, 0, std::numeric_limits<std::int32_t>::max()));
-  joint.turn_line = table.line("encoder_turn_counts");
-  joint.torque_noise_Nm = table.number_or("torque_noise_Nm", 0.0, kNotNegative);
-  joint.following_error_rad =
-      table.number_or("following_error_rad", joint.following_error_rad, kNotNegative);
-  joint.following_error_given = table.has("following_error_rad");
-  joint.following_timeout_s =
-      table.number_or("following_timeout_s", joint.following_timeout_s, {0.0, 65.0});
-  joint.max_oscillation = table.number_or("max_oscillation", joint.max_oscillation, {0.0, 10.0});
-  joint.oscillation_time_s =
-      table.number_or("oscillation_time_s", joint.oscillation_time_s, {0.01, 60.0});
-  joint.max_swing = table.number_or("max_swing", joint.max_swing, {0.0, 10.0});
-  joint.max_excess = table.number_or("max_excess", joint.max_excess, {0.0, 10.0});
-  joint.excess_time_s = table.number_or("excess_time_s", joint.excess_time_s, {0.0, 60.0});
-  joint.drive.stop_deceleration_rad_s2 =
-      table.number_or("stop_deceleration_rad_s2", kUnset, kPositive);
-  joint.brake = read_brake(table);
+  if (table.has("brake")) read_whole(table.table("brake"), keys::kBrake, joint.brake.emplace());
   joint.homing = read_homing(table);
-  joint.stop_options = read_stop_options(table);
-  joint.velocity_units_per_rev = table.number_or("velocity_units_per_rev", 0.0, kPositive);
-  joint.acceleration_units_per_rev = table.number_or("acceleration_units_per_rev", 0.0, kPositive);
-  joint.on_fault = read_stop_category(table);
-  joint.on_fault_line = table.line("on_fault");
+  read_whole(table.table_or_empty("stop_options"), keys::kStopOptions, joint.stop_options);
   return joint;
 }
 
@@ -169,8 +79,6 @@ std::vector<std::string> read_names(TomlTable& table) {
 /// Its board and axis: where a board lists it, or as its table says.
 void read_axis(TomlTable& table, std::span<const AxisAssignment> listed, const RobotConfig& robot,
                JointConfig& joint, std::vector<JointReference>& loose) {
-  const std::string board = table.text_or("board", {});
-  const int axis = static_cast<int>(table.integer_or("axis", 0, 0, 7));
   const auto found = std::ranges::find(listed, joint.name, &AxisAssignment::joint);
   if (found != listed.end()) {
     joint.board = found->board;
@@ -181,6 +89,7 @@ void read_axis(TomlTable& table, std::span<const AxisAssignment> listed, const R
                   "remove this key");
     }
   } else if (table.has("names")) {
+    joint.board.clear();
     loose.push_back(
         {joint.name, table.error_at("names", "no board lists joint '" + joint.name + "'",
                                     "add it to the joints of its board")});
@@ -189,9 +98,7 @@ void read_axis(TomlTable& table, std::span<const AxisAssignment> listed, const R
       table.error("board", "this key is missing",
                   "add it to the table, or the joint to the joints of its board");
     }
-    joint.board = board;
-    joint.axis = axis;
-    check_reference(table, "board", board, robot.boards, "board");
+    check_reference(table, "board", joint.board, robot.boards, "board");
   }
 }
 

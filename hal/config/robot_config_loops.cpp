@@ -9,22 +9,18 @@ namespace {
 void read_passive(TomlTable table, RobotConfig& robot) {
   PassiveConfig passive;
   passive.line = table.line();
-  passive.name = table.text("name");
+  read_whole(table, keys::kPassive, passive);
   check_unique(table, robot.passive, passive.name, "passive joint");
   if (robot.joint_index(passive.name) >= 0) {
     table.error("name", "the joint '" + passive.name + "' has a motor: it is a [[joint]] too",
                 "remove one of the two");
   }
   check_not_locked(table, "name", passive.name, robot);
-  passive.position_rad = table.number_or("position_rad", 0.0);
-  passive.damping_Nms_rad = table.number_or("damping_Nms_rad", 0.0, {0.0, 1e6});
-  passive.friction_Nm = table.number_or("friction_Nm", 0.0, {0.0, 1e6});
-  table.finish();
   robot.passive.push_back(passive);
 }
 
 void read_axis(TomlTable& table, LoopConfig& loop) {
-  const std::array<double, 3> axis = vector3(table, "axis", loop.axis);
+  const std::vector<double> axis = table.numbers_or("axis", {0.0, 0.0, 1.0}, kAnyNumber, 3);
   const double length = std::hypot(axis[0], axis[1], axis[2]);
   if (!table.has("axis")) {
     table.error("axis", "a revolute loop needs its axis",
@@ -39,12 +35,9 @@ void read_axis(TomlTable& table, LoopConfig& loop) {
 void read_loop(TomlTable table, RobotConfig& robot) {
   LoopConfig loop;
   loop.line = table.line();
-  loop.name = read_own_name(table);
+  read_keys(table, keys::kLoop, loop);
+  check_own_name(table, loop.name);
   check_unique(table, robot.loops, loop.name, "loop");
-  const std::string type = table.choice("type", {"ball", "revolute", "rod"});
-  loop.type = type == "revolute" ? model::LoopType::kRevolute
-              : type == "rod"    ? model::LoopType::kRod
-                                 : model::LoopType::kBall;
   const std::vector<std::string> sites = table.texts_or("sites", {});
   if (table.has_errors("sites")) {
     // what it holds is no list of texts
@@ -67,7 +60,8 @@ void read_loop(TomlTable table, RobotConfig& robot) {
   }
   if (loop.type == model::LoopType::kRevolute) read_axis(table, loop);
   if (loop.type == model::LoopType::kRod) loop.length_m = table.number("length_m", {1e-4, 100.0});
-  if (type.empty()) {  // either key may belong to the one that is meant
+  if (!table.has("type") ||
+      table.has_errors("type")) {  // either key may belong to the one that is meant
     (void)table.numbers_or("axis", {});
     (void)table.number_or("length_m", 0.0);
   }

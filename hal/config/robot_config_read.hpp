@@ -16,9 +16,9 @@
 #include <vector>
 
 #include "base/file_name.hpp"
-#include "base/keys.hpp"
 #include "base/nearest.hpp"
 #include "hal/config/robot_config.hpp"
+#include "hal/config/robot_keys.hpp"
 
 namespace tandem::hal {
 
@@ -29,14 +29,12 @@ std::vector<std::string> names_of(const std::vector<T>& items) {
   return names;
 }
 
-/// The `name` of what robot.toml itself gives a name to: it may stand in files and messages.
-inline std::string read_own_name(TomlTable& table) {
-  std::string name = table.text("name");
-  if (name.empty()) return name;  // has been said
-  if (const std::string problem = file_name_problem(name); !problem.empty()) {
-    table.error("name", "'" + name + "' " + problem, "use letters, digits, _, - and .");
-  }
-  return name;
+/// Reports a `name` that robot.toml itself gives and that cannot stand in files and messages.
+inline void check_own_name(TomlTable& table, const std::string& name) {
+  const std::string problem = name.empty() ? "" : file_name_problem(name);
+  if (problem.empty()) return;  // an empty one has been said
+  table.error("name", "'" + name + "' " + problem + ", but it becomes part of file names",
+              "use letters, digits, _, - and ., at most " + std::to_string(kLongestFileName));
 }
 
 /// "0x00000192"
@@ -44,11 +42,6 @@ inline std::string hex(std::uint32_t value) {
   std::array<char, 16> text{};
   (void)std::snprintf(text.data(), text.size(), "0x%08X", value);
   return text.data();
-}
-
-/// Heartbeat time of a node [ms].
-inline int read_heartbeat(TomlTable& table) {
-  return static_cast<int>(table.integer_or("heartbeat_ms", 50, 1, 20'000));
 }
 
 /// The bus of a board or sensor. @param bus  whose table holds this one; empty: `bus` names it
@@ -90,13 +83,6 @@ inline void check_not_locked(TomlTable& table, std::string_view key, const std::
   if (!robot.model.lock_lines.contains(joint)) return;
   table.error(key, "the joint '" + joint + "' is locked in [model.lock]",
               "remove it here, or the lock");
-}
-
-inline std::array<double, 3> vector3(TomlTable& table, std::string_view key,
-                                     std::array<double, 3> value) {
-  const std::vector<double> found =
-      table.numbers_or(key, {value.begin(), value.end()}, kAnyNumber, value.size());
-  return {found[0], found[1], found[2]};
 }
 
 /// Reads [KIND_defaults] once by itself, so that each of its keys is checked whoever uses it.
@@ -149,8 +135,6 @@ struct AxisAssignment {
 
 /// [actuator.NAME], [gains.NAME] and their defaults.
 void read_drive_tables(TomlTable& root, RobotConfig& robot);
-/// The keys of [actuator.NAME], for docs/configuration.md.
-void describe_drives(KeyPage& page);
 /// A table of a bus' `sensors`, to be read after every board.
 struct SensorTable {
   TomlTable table;
@@ -162,10 +146,6 @@ struct SensorTable {
                                                  std::vector<SensorTable>& sensors);
 /// The joints that boards list, in that order.
 [[nodiscard]] std::vector<AxisAssignment> axes_listed_by(std::span<const BoardTable> boards);
-/// What a table leaves open, until the description or a drive's sheet completes it.
-inline constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
-/// Encoder counts per revolution; bits (20) would be far below.
-inline constexpr Range kCounts{100.0, 1e12};
 /// The units of a drive of another make: the joint's table's, else those of its sheet. Reports what
 /// neither says, and keys that are not for our own boards.
 void complete_units(TomlTable& table, const RobotConfig& robot, JointConfig& joint);

@@ -21,12 +21,12 @@ class FromSheet {
         units_(canopen::units_of(*board.sheet, joint.axis)) {}
 
   void complete() {
-    if (std::isnan(joint_.encoder_counts_per_rev)) take_counts();
+    if (std::isnan(joint_.encoder_counts_per_rev.value)) take_counts();
     if (joint_.velocity_units_per_rev <= 0.0) take_velocity();
     if (std::isnan(joint_.motor_encoder_counts_per_rev)) {
       joint_.motor_encoder_counts_per_rev = joint_.encoder_counts_per_rev;
     }
-    if (std::isnan(joint_.rated_torque_Nm)) take_torque();
+    if (std::isnan(joint_.rated_torque_Nm.value)) take_torque();
   }
 
  private:
@@ -38,8 +38,9 @@ class FromSheet {
   void take_counts() {
     // Many sheets say 1, which the drive replaces when it is commissioned.
     const double counts = units_.counts_per_rev.value_or(0.0);
-    joint_.counts_of_sheet = counts >= kCounts.min && counts <= kCounts.max;
-    if (joint_.counts_of_sheet) {
+    joint_.encoder_counts_per_rev.of_sheet =
+        counts >= keys::kCounts.min && counts <= keys::kCounts.max;
+    if (joint_.encoder_counts_per_rev.of_sheet) {
       joint_.encoder_counts_per_rev = counts;
       return;
     }
@@ -53,7 +54,7 @@ class FromSheet {
   }
 
   void take_velocity() {
-    joint_.velocity_of_sheet = units_.velocity_per_rev.has_value();
+    joint_.velocity_units_per_rev.of_sheet = units_.velocity_per_rev.has_value();
     joint_.velocity_units_per_rev = units_.velocity_per_rev.value_or(0.0);
     if (units_.unknown_velocity == 0) return;
     table_.error("velocity_units_per_rev",
@@ -65,8 +66,8 @@ class FromSheet {
 
   void take_torque() {
     joint_.rated_torque_Nm = units_.rated_torque_Nm.value_or(kUnset);
-    joint_.torque_of_sheet = units_.rated_torque_Nm.has_value();
-    if (joint_.torque_of_sheet) return;
+    joint_.rated_torque_Nm.of_sheet = units_.rated_torque_Nm.has_value();
+    if (joint_.rated_torque_Nm.of_sheet) return;
     table_.error("rated_torque_Nm",
                  "neither this table nor the drive's sheet says what the torques of joint '" +
                      joint_.name +

@@ -82,7 +82,7 @@ class JointScale {
   }
 
   void doubt_positions() {
-    if (!joint_.counts_of_sheet) return;
+    if (!joint_.encoder_counts_per_rev.of_sheet) return;
     if (factor(object::kPositionFactor).value_or(1.0) != 1.0) {
       warn_of_factor("encoder_counts_per_rev", object::kPositionFactor, "position factor",
                      "the drive converts positions, and the joint's counts are without that");
@@ -98,7 +98,7 @@ class JointScale {
                     unit, board_.eds,
                     per_rev ? fmt::format("{:.10g} position units per revolution", *per_rev)
                             : std::string("no increments"),
-                    joint_.encoder_counts_per_rev),
+                    joint_.encoder_counts_per_rev.value),
         "set this key to the drive's position units per revolution of the joint");
   }
 
@@ -124,7 +124,7 @@ class JointScale {
 
   void doubt_direction() {
     const std::uint32_t bits = value(object::kPolarity);
-    if (bits == 0 || joint_.reversed_given) return;
+    if (bits == 0 || joint_.reversed.line > 0) return;
     warn("reversed",
          fmt::format("607E (polarity) is 0x{:02X} in {}: the drive turns its counts round itself",
                      bits, board_.eds),
@@ -157,12 +157,12 @@ class JointScale {
                        used, *said, *said / used, values, board_.eds),
            "is the gear in both? This file's number is used: correct it, or the sheet");
     };
-    if (!joint_.counts_of_sheet) {
+    if (!joint_.encoder_counts_per_rev.of_sheet) {
       against("encoder_counts_per_rev", joint_.encoder_counts_per_rev, sheets_counts(),
               {object::kEncoderResolution, object::kGearRatio, object::kFeedConstant,
                object::kPositionUnit});
     }
-    if (!joint_.velocity_of_sheet && joint_.velocity_units_per_rev > 0.0) {
+    if (!joint_.velocity_units_per_rev.of_sheet && joint_.velocity_units_per_rev > 0.0) {
       against("velocity_units_per_rev", joint_.velocity_units_per_rev, units_.velocity_per_rev,
               {object::kVelocityUnit, object::kGearRatio});
     }
@@ -171,7 +171,7 @@ class JointScale {
     const bool in_uNm = !differ(ratio, 1000.0) &&
                         joint_.max_torque_Nm < 32.0 * joint_.rated_torque_Nm &&
                         joint_.rated_torque_Nm < 32.0 * joint_.max_torque_Nm;
-    if (!joint_.torque_of_sheet && !in_uNm) {
+    if (!joint_.rated_torque_Nm.of_sheet && !in_uNm) {
       against("rated_torque_Nm", joint_.rated_torque_Nm, units_.rated_torque_Nm,
               {object::kRatedTorque, object::kGearRatio});
     }

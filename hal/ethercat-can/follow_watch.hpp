@@ -28,7 +28,7 @@ struct FollowLimits {
   [[nodiscard]] static FollowLimits of(const JointConfig& joint, bool limited) {
     double error_rad = joint.following_error_rad;
     const double lag_rad = kLag_s * joint.max_velocity_rad_s;
-    if (!limited && !joint.following_error_given && lag_rad > 0.0) {
+    if (!limited && joint.following_error_rad.line == 0 && lag_rad > 0.0) {
       error_rad = std::min(error_rad, lag_rad);
     }
     return {.window_rad = kMargin * error_rad,

@@ -177,9 +177,9 @@ void add_unit_checks(Steps& steps, const DataSheet& sheet, const JointConfig& jo
       steps.back().axis = static_cast<std::int8_t>(joint.axis);
     }
   };
-  if (joint.counts_of_sheet) check(units.position);
-  if (joint.torque_of_sheet) check(units.torque);
-  if (joint.velocity_of_sheet) check(units.velocity);
+  if (joint.encoder_counts_per_rev.of_sheet) check(units.position);
+  if (joint.rated_torque_Nm.of_sheet) check(units.torque);
+  if (joint.velocity_units_per_rev.of_sheet) check(units.velocity);
 }
 
 /// At least 1, in the drive's units.

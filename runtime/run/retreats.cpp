@@ -33,10 +33,10 @@ Diagnostics missing_retreats(const Composition& c) {
   const hal::RobotConfig& robot = c.experiment.robot;
   std::vector<std::pair<int, std::string>> keys;  // by line
   if (robot.emergency_stop == StopCategory::kCategory2)
-    keys.emplace_back(robot.emergency_stop_line, "safety.emergency_stop");
+    keys.emplace_back(robot.emergency_stop.line, "safety.emergency_stop");
   for (const hal::JointConfig& joint : robot.joints) {
     if (joint.on_fault == StopCategory::kCategory2)
-      keys.emplace_back(joint.on_fault_line, "joint." + joint.name + ".on_fault");
+      keys.emplace_back(joint.on_fault.line, "joint." + joint.name + ".on_fault");
   }
   if (!keys.empty()) {
     std::ranges::sort(keys);

@@ -183,7 +183,7 @@ TEST(TomlReader, CallsAnEntryOfAListByItsNameWhereItHasOneOfItsOwn) {
       "= 'a/b.so'\nx = 1\n");
   TomlTable root = document.root();
   for (const char* list : {"joint", "run"}) {
-    for (TomlTable& entry : root.tables(list)) {
+    for (TomlTable& entry : root.tables(list, "plugin")) {
       entry.error("x", "is wrong");
       EXPECT_TRUE(entry.has_errors());
       EXPECT_TRUE(entry.has_errors("x"));
@@ -195,6 +195,14 @@ TEST(TomlReader, CallsAnEntryOfAListByItsNameWhereItHasOneOfItsOwn) {
   EXPECT_EQ(keys, (std::vector<std::string>{"joint.hip.x", "joint.hip.part.a.y", "joint[1].x",
                                             "joint[2].x", "joint[3].x", "joint[4].x", "joint[5].x",
                                             "run.hold.x", "run[1].x"}));
+}
+
+TEST(TomlReader, KnowsNoNameOfAnEntryAndNoWayOutOfXmlByItself) {
+  const TomlDocument document = parse("[[run]]\nplugin = 'hold'\n");
+  TomlTable root = document.root();
+  EXPECT_EQ(root.tables("run").at(0).error_at("plugin", "").key, "run[0].plugin");
+  EXPECT_EQ(TomlDocument::parse("<robot/>", "x.urdf").error().hint, "");
+  EXPECT_EQ(TomlDocument::parse("<robot/>", "x.urdf", "import it").error().hint, "import it");
 }
 
 TEST(TomlReader, AKeyRequiredOfAnOptionalTableIsAnErrorAtTheTableAbove) {

@@ -40,7 +40,7 @@ TEST(Following, WithoutALimitInTheFileIsTheWayOfATenthOfASecond) {
   EXPECT_EQ(slow.until_fault(), 204) << "0.1 s of 0.5 rad/s, and half as much";
   DeafRig given([](RobotConfig& robot) {
     robot.joints[0].max_velocity_rad_s = 0.5;
-    robot.joints[0].following_error_given = true;
+    robot.joints[0].following_error_rad.line = 1;
   });
   given.go_deaf(0.08);
   given.steps(1000);

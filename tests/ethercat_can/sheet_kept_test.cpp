@@ -114,7 +114,7 @@ TEST(SheetKept, VelocitiesInRpmAreConverted) {
   EXPECT_DOUBLE_EQ(*units.velocity_per_rev, 3000.0);
   SheetRig rig(s, [](RobotConfig& robot) {
     robot.joints[0].velocity_units_per_rev = 3000.0;
-    robot.joints[0].velocity_of_sheet = true;
+    robot.joints[0].velocity_units_per_rev.of_sheet = true;
   });
   ASSERT_TRUE(rig.bring_up());
   rig.drive.value(0x606C) = -1500;

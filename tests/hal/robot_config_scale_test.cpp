@@ -72,14 +72,14 @@ TEST_F(BoardScale, AsksForAVelocityUnitThatItDoesNotKnow) {
   const auto rpm = read();
   ASSERT_TRUE(rpm) << rpm.error()[0].to_string();
   EXPECT_EQ(rpm->joints[0].velocity_units_per_rev, 3000.0) << "60 times the gear";
-  EXPECT_TRUE(rpm->joints[0].velocity_of_sheet);
+  EXPECT_TRUE(rpm->joints[0].velocity_units_per_rev.of_sheet);
   sheet = with(sheet, "0x00B44700", "0x00010300");
   const std::string why = refused();
   EXPECT_NE(why.find("velocity_units_per_rev"), std::string::npos) << why;
   EXPECT_NE(why.find("60A9 is 0x00010300"), std::string::npos) << why;
   const auto told = read(joint_with("velocity_units_per_rev = 1000\n"));
   ASSERT_TRUE(told) << told.error()[0].to_string();
-  EXPECT_FALSE(told->joints[0].velocity_of_sheet);
+  EXPECT_FALSE(told->joints[0].velocity_units_per_rev.of_sheet);
 }
 
 /// The only warning, or how many there are.

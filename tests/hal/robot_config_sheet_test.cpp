@@ -20,7 +20,8 @@ TEST_F(BoardSheet, GivesTheDrivesIdentityAndUnits) {
   const JointConfig& joint = robot->joints[0];
   EXPECT_EQ(joint.encoder_counts_per_rev, 4096.0 * 50.0) << "608F times 6091";
   EXPECT_EQ(joint.rated_torque_Nm, 25.0) << "0.5 Nm at the motor, 6076, times 6091";
-  EXPECT_TRUE(joint.counts_of_sheet && joint.torque_of_sheet) << "to be compared with the drive";
+  EXPECT_TRUE(joint.encoder_counts_per_rev.of_sheet && joint.rated_torque_Nm.of_sheet)
+      << "to be compared with the drive";
 }
 
 TEST_F(BoardSheet, IsOverruledByTheRobotsUnits) {
@@ -31,7 +32,7 @@ TEST_F(BoardSheet, IsOverruledByTheRobotsUnits) {
   const JointConfig& joint = robot->joints[0];
   EXPECT_EQ(joint.encoder_counts_per_rev, 36000.0);
   EXPECT_EQ(joint.rated_torque_Nm, 12.0);
-  EXPECT_FALSE(joint.counts_of_sheet || joint.torque_of_sheet);
+  EXPECT_FALSE(joint.encoder_counts_per_rev.of_sheet || joint.rated_torque_Nm.of_sheet);
 }
 
 TEST_F(BoardSheet, LetsAJointHaveADirectionAndAZero) {
@@ -312,6 +313,9 @@ TEST_F(BoardSheet, TakesFramesOfCanFdWhereTheBusHasThem) {
   const auto robot = read(with(board_with("fd = true\n"), "fd = false", "fd = true"));
   ASSERT_TRUE(robot) << robot.error()[0].to_string();
   EXPECT_EQ(robot->boards[0].sheet->most_pdo_bytes, 64);
+  const auto all = read(with(kArm, "fd = false", "fd = true") + "[board_defaults]\nfd = true\n");
+  ASSERT_TRUE(all) << all.error()[0].to_string();
+  EXPECT_EQ(all->boards[0].sheet->most_pdo_bytes, 64);
   const std::string ours = with(board_with("fd = true\n"), "eds = \"drive.eds\"\n", "");
   EXPECT_FALSE(read(ours));
 }

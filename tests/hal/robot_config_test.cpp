@@ -42,6 +42,17 @@ TEST(RobotConfig, IsReadWithItsDefaults) {
   EXPECT_EQ(robot->posture("away"), nullptr);
 }
 
+TEST(RobotConfig, KnowsWhichKeysTheFileGivesAndWhere) {
+  const auto robot = parse_robot_config(
+      std::string(kRobot) + "[safety]\nemergency_stop = \"category1\"\n", "leg.toml");
+  ASSERT_TRUE(robot.has_value());
+  EXPECT_EQ(robot->joints[0].on_fault.line, 0);
+  EXPECT_EQ(robot->joints[1].on_fault.line, 50);
+  EXPECT_EQ(robot->joints[1].encoder_counts_per_rev.line, 35) << "where [joint_defaults] gives it";
+  EXPECT_EQ(robot->joints[1].following_error_rad.line, 0);
+  EXPECT_EQ(robot->emergency_stop.line, 74) << "the same as without the key";
+}
+
 TEST(RobotConfig, ReadsTheIdentityOfABoardAndProtections) {
   std::string text = with(kRobot, "[joint_defaults]", "product_code = 0x77\nserial = 5\n");
   text = with(text, "[gains.big]", "continuous_current_A = 12\nthermal_time_s = 60\n");
