@@ -196,8 +196,7 @@ void warn_of_archives(const Composition& c, Diagnostics& warnings) {
 
 Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                              Json& json) {
-  const auto composition =
-      compose(options.file, {.missing_kernels = robot::MissingKernels::kTolerate});
+  const auto composition = compose(options.file, {}, {.tolerates = true});
   if (!composition) return composition.error();
   warnings = (*composition)->experiment.description->warnings;
   warnings.insert(warnings.end(), (*composition)->warnings.begin(), (*composition)->warnings.end());

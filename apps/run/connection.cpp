@@ -42,10 +42,11 @@ void figures(Figures& f, const runtime::Experiment* e) {
   });
 }
 
-std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& experiment,
-                                                                 const Overrides& overrides) {
+std::expected<std::unique_ptr<Composition>, Diagnostics> compose(
+    const std::string& experiment, const Overrides& overrides,
+    const runtime::KernelSupply& kernels) {
   auto c = std::make_unique<Composition>();
-  Diagnostics errors = runtime::compose(*c, experiment, overrides);
+  Diagnostics errors = runtime::compose(*c, experiment, overrides, kernels);
   if (errors.empty()) return c;
   if (a_hosted_call_goes_on()) (void)c.release();  // it uses what it was given
   return std::unexpected(std::move(errors));

@@ -46,7 +46,8 @@ void figures(Figures& f, const runtime::Experiment* e);
 
 /// runtime::compose() of a new one.
 [[nodiscard]] std::expected<std::unique_ptr<Composition>, Diagnostics> compose(
-    const std::string& experiment, const Overrides& overrides);
+    const std::string& experiment, const Overrides& overrides,
+    const runtime::KernelSupply& kernels = {});
 
 /// Opens the CAN interfaces and makes the CAN backend, or finds the server of the DDS backend and
 /// gets its robot; the simulation has nothing to connect.

@@ -68,7 +68,7 @@ std::uint64_t bytes_needed(const Composition& c) {
   constexpr std::uint64_t kFixed = 1'000'000;
   std::uint64_t cycle_bytes = hal::StateImage(e.robot.shape()).bytes().size() +
                               hal::CommandImage(e.robot.shape()).bytes().size();
-  if (c.sim != nullptr && e.sim.ground_truth) cycle_bytes += c.sim->truth().bytes().size();
+  if (const hal::TruthImage* truth = runtime::truth_of(c)) cycle_bytes += truth->bytes().size();
   if (c.estimator != nullptr) cycle_bytes += c.estimator->image().bytes().size();
   if (c.parallel != nullptr) {
     cycle_bytes += hal::StateImage(e.robot.shape()).bytes().size() + 2 * kMessageOverhead;

@@ -56,8 +56,7 @@ TEST_F(EmbeddedRun, SaysWhyItCannotBe) {
     return run ? std::string() : run.error().front().to_string();
   };
   EXPECT_NE(refused("nothing.toml", {}).find("nothing.toml: cannot read"), std::string::npos);
-  EXPECT_NE(refused("hold.toml", {.backend = runtime::BackendKind::kWire, .wire = "can"})
-                .find("its robot is not in this process"),
+  EXPECT_NE(refused("hold.toml", {.hal = "can"}).find("its robot is not in this process"),
             std::string::npos);
   edit("hold.toml", "plugin = \"hold\"", "plugin = \"hodl\"");
   EXPECT_NE(refused("hold.toml", {}).find("did you mean 'hold'"), std::string::npos)
