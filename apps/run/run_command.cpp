@@ -397,7 +397,8 @@ Exit run_command(const RunOptions& given) {
                          ? wrong_kind(options.experiment, Takes::kEither, "tandem serve")
                          : wrong_kind(options.experiment, Takes::kExperiment, "tandem run");
   if (wrong) return refuse(*wrong);
-  const auto composition = compose(options.experiment, options, {.build = builder(options.quiet)});
+  const auto composition = runtime::composed<Composition>(options.experiment, options,
+                                                          {.build = builder(options.quiet)});
   if (!composition) return refuse(composition.error());
   warn_of_inertias((*composition)->experiment);
   print_warnings(std::exchange((*composition)->warnings, {}));

@@ -93,21 +93,20 @@ void add_estimator(Composition& c, Collector& errors) {
 /// The robot's kernels, and the host of controllers. They are built after all that can be checked
 /// without them, for it takes a while.
 /// @return false: there are errors, and no more to find
-bool add_kernels(Composition& c, const robot::RobotFiles& robot, const Overrides& overrides,
+bool add_kernels(Composition& c, const robot::RobotFiles& robot, bool serves,
                  const KernelSupply& supply, Collector& errors) {
   const Experiment& e = c.experiment;
-  const bool refused = overrides.no_build && !supply.tolerates;
+  const bool builds = supply.missing != robot::MissingKernels::kRefuse;
   auto kernels = robot::supply_kernels(
       robot, e.kernel_variant,
-      refused ? robot::MissingKernels::kRefuse : robot::MissingKernels::kTolerate);
-  if (kernels && kernels->get() == nullptr && !supply.tolerates) {
-    if (!overrides.serves) add_controllers(c, errors);
+      builds ? robot::MissingKernels::kTolerate : robot::MissingKernels::kRefuse);
+  if (kernels && kernels->get() == nullptr && supply.missing != robot::MissingKernels::kTolerate) {
+    if (!serves) add_controllers(c, errors);
     const Status needs = estimation::Estimator::check(hal::robot_of(e.robot), e.estimation);
     if (!needs) refuse_estimation(e, needs.error(), errors);
     if (!errors.empty()) return false;
     c.notes.clear();
-    kernels =
-        robot::supply_kernels(robot, e.kernel_variant, robot::MissingKernels::kBuild, supply.build);
+    kernels = robot::supply_kernels(robot, e.kernel_variant, supply.missing, supply.build);
   }
   if (!kernels) {
     errors.add(kernels.error(), e.robot.file, 0);
@@ -202,25 +201,21 @@ namespace {
 
 /// What the caller wants of the experiment.
 Diagnostics override_experiment(Experiment& e, const Overrides& overrides) {
-  const auto is_one_of = [](const std::string& asked, std::initializer_list<const char*> known) {
-    return asked.empty() || std::ranges::find(known, asked) != known.end();
-  };
-  if (!is_one_of(overrides.hal, {"sim", "can", "ethercat", "dds"})) {
-    return {fail("hal: '" + overrides.hal + "'", "one of sim, can, ethercat, dds").error()};
+  const std::string& hal = overrides.hal;
+  if (hal == "can" || hal == "ethercat") {
+    e.hal.backend = BackendKind::kWire;
+    e.hal.wire = hal;
+  } else if (hal == "sim" || hal == "dds") {
+    e.hal.backend = hal == "sim" ? BackendKind::kSim : BackendKind::kDds;
+    e.hal.wire.clear();
+  } else if (!hal.empty()) {
+    return {fail("hal: '" + hal + "'", "one of sim, can, ethercat, dds").error()};
   }
-  if (!is_one_of(overrides.on_fault, {"end", "wait"})) {
-    return {fail("on_fault: '" + overrides.on_fault + "'", "one of end, wait").error()};
-  }
+  if (overrides.on_fault == "end") e.after_stop = AfterStop::kEnd;
+  if (overrides.on_fault == "wait") e.after_stop = AfterStop::kWait;
   e.seed = overrides.seed.value_or(e.seed);
   e.duration_s = overrides.duration_s.value_or(e.duration_s);
   if (!overrides.kernel_variant.empty()) e.kernel_variant = overrides.kernel_variant;
-  const bool wire = overrides.hal == "can" || overrides.hal == "ethercat";
-  if (!overrides.hal.empty()) {
-    e.hal.backend = wire                     ? BackendKind::kWire
-                    : overrides.hal == "dds" ? BackendKind::kDds
-                                             : BackendKind::kSim;
-    e.hal.wire = wire ? overrides.hal : "";
-  }
   e.hal.lockstep = e.hal.lockstep || overrides.lockstep;
   e.dds.enabled = overrides.dds.value_or(e.dds.enabled);
   e.dds.domain = overrides.domain.value_or(e.dds.domain);
@@ -356,16 +351,13 @@ void check_robot(Composition& c, const robot::RobotFiles& robot, Collector& erro
 }
 
 /// The second robot of [parallel], and its kernels. Scenarios are the first robot's.
-Diagnostics add_parallel(Composition& c, const Overrides& overrides, const KernelSupply& supply) {
+Diagnostics add_parallel(Composition& c, const KernelSupply& supply) {
   Experiment& e = c.experiment;
   if (!e.parallel || c.kernels.get() == nullptr) return {};
   const auto robot = robot::with_description(std::move(e.parallel->robot), e.files);
   if (!robot) return robot.error();
   e.parallel->robot = robot->config;
-  const auto missing = supply.tolerates     ? robot::MissingKernels::kTolerate
-                       : overrides.no_build ? robot::MissingKernels::kRefuse
-                                            : robot::MissingKernels::kBuild;
-  auto kernels = robot::supply_kernels(*robot, e.kernel_variant, missing, supply.build);
+  auto kernels = robot::supply_kernels(*robot, e.kernel_variant, supply.missing, supply.build);
   if (!kernels) {
     return {{.message = "the parallel robot has no kernels: " + kernels.error().message,
              .hint = "leave --no-build out: the run builds them",
@@ -411,7 +403,10 @@ Diagnostics add_simulation(Composition& c, const Overrides& overrides) {
 }  // namespace
 
 Diagnostics compose(Composition& c, const std::string& file, const Overrides& overrides,
-                    const KernelSupply& kernels) {
+                    KernelSupply kernels) {
+  if (overrides.no_build && kernels.missing == robot::MissingKernels::kBuild) {
+    kernels.missing = robot::MissingKernels::kRefuse;
+  }
   auto experiment = overrides.serves ? read_served(file) : read_experiment(file);
   if (!experiment) return experiment.error();
   Experiment& e = c.experiment;
@@ -427,7 +422,7 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   if (!robot) return robot.error();
   Collector errors;
   check_robot(c, *robot, errors);
-  if (!add_kernels(c, *robot, overrides, kernels, errors)) return errors.give().error();
+  if (!add_kernels(c, *robot, overrides.serves, kernels, errors)) return errors.give().error();
   if (!overrides.serves) add_controllers(c, errors);
   add_owner(c, errors);
   if (!errors.empty()) {
@@ -437,7 +432,7 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   if (c.controllers != nullptr && !overrides.duration_s && !overrides.serves) {
     std::ranges::move(late_plans(c), std::back_inserter(c.warnings));
   }
-  if (auto failed = add_parallel(c, overrides, kernels); !failed.empty()) return failed;
+  if (auto failed = add_parallel(c, kernels); !failed.empty()) return failed;
   const bool simulated = e.hal.backend == BackendKind::kSim;
   if (!simulated || c.kernels.get() == nullptr) return {};
   return add_simulation(c, overrides);
@@ -464,8 +459,6 @@ CycleConfig cycle_config(Composition& c, const Overrides& overrides) {
   const bool on_wall_clock = pace == hal::Pace::kWallClock && c.remote == nullptr;
   if (overrides.serves || on_wall_clock) config.after_stop = AfterStop::kWait;
   config.after_stop = e.after_stop.value_or(config.after_stop);
-  if (overrides.on_fault == "end") config.after_stop = AfterStop::kEnd;
-  if (overrides.on_fault == "wait") config.after_stop = AfterStop::kWait;
   if (c.remote != nullptr) config.bring_up_cycles = ~std::uint64_t{0};  // the server's is limited
   config.trace_cycles = overrides.trace_cycles;
   config.after_reset = e.after_reset;

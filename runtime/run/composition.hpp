@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "estimation/estimator.hpp"
 #include "hal/remote/operator_end.hpp"
@@ -31,7 +32,7 @@ namespace tandem::runtime {
 
 /// What happens where a robot has no kernels.
 struct KernelSupply {
-  bool tolerates = false;          ///< nothing is to run: what can be checked without is
+  robot::MissingKernels missing = robot::MissingKernels::kBuild;
   robot::BuildKernels build = {};  ///< empty: silently
 };
 
@@ -83,7 +84,18 @@ struct Composition {
 /// claims. Without kernels, which MissingKernels::kTolerate admits, the last two are not checked.
 /// On errors `c` is half made. @return the errors; empty: it is whole, but for a wire's backend
 [[nodiscard]] Diagnostics compose(Composition& c, const std::string& experiment,
-                                  const Overrides& overrides, const KernelSupply& kernels = {});
+                                  const Overrides& overrides, KernelSupply kernels = {});
+
+/// compose() of a new one. A plugin that does not return keeps what it was given.
+template <class C = Composition>
+[[nodiscard]] std::expected<std::unique_ptr<C>, Diagnostics> composed(
+    const std::string& experiment, const Overrides& overrides, const KernelSupply& kernels = {}) {
+  auto c = std::make_unique<C>();
+  Diagnostics errors = compose(*c, experiment, overrides, kernels);
+  if (errors.empty()) return c;
+  if (a_hosted_call_goes_on()) (void)c.release();
+  return std::unexpected(std::move(errors));
+}
 
 /// How the cycle of what is connected goes; the experiment's loop becomes it.
 [[nodiscard]] CycleConfig cycle_config(Composition& c, const Overrides& overrides);

@@ -60,19 +60,25 @@ class Run {
   [[nodiscard]] const tandem_kernels& kernels() const noexcept { return *c_->kernels.get(); }
   [[nodiscard]] const hal::StateImage& state() const noexcept { return cycle_->state(); }
   [[nodiscard]] const hal::CommandImage& command() const noexcept { return cycle_->command(); }
-  /// What the plant has, beside what is measured. @pre robot()'s
+  /// What the plant has, beside what is measured. @pre is_simulated()
   [[nodiscard]] const hal::TruthImage& truth() const noexcept { return c_->sim->truth(); }
   /// @pre the experiment has [estimation]
   [[nodiscard]] const hal::EstimateImage& estimate() const noexcept {
     return c_->estimator->image();
   }
-  /// @pre it is simulated in this process
+  /// Whether the robot is the simulation in this process.
+  [[nodiscard]] bool is_simulated() const noexcept { return c_->sim != nullptr; }
+  /// @pre is_simulated()
   [[nodiscard]] sim::SimRobot& robot() noexcept { return *c_->sim; }
   /// More of them may be added before the first cycle.
   [[nodiscard]] ControllerHost& controllers() noexcept { return *c_->controllers; }
   /// The second robot, whose figures are there after its finish(); null without [parallel].
   [[nodiscard]] internal_model::ParallelRobot* parallel() noexcept {
     return parallel_ ? &*parallel_ : nullptr;
+  }
+  /// What will happen, asked from another thread than step()'s; null: there is no model to ask.
+  [[nodiscard]] internal_model::PredictionService* predictions() noexcept {
+    return c_->predictor.get();
   }
   /// Faults, statistics, requests, save() and restore().
   [[nodiscard]] RobotCycle& cycle() noexcept { return *cycle_; }
