@@ -2,7 +2,7 @@
 // master, frames, sockets' batches, all of it as `tandem run --hal can` runs it. The system calls
 // lead to an emulated robot in this process (fake_can_kernel.hpp), and the time within them is
 // left out. Cycles in which the controllers run are counted.
-//   can_cycle_bench [EXPERIMENT] [KERNELS.so] [--seconds S] [--repeats N] [--cpu N] [--json FILE]
+//   can_cycle_bench [EXPERIMENT] [--seconds S] [--repeats N] [--cpu N] [--json FILE]
 // Two ways: one cycle after the other, and at the loop's period on the wall clock, where the rest
 // of the machine has used the caches in between.
 #include <fmt/core.h>
@@ -11,15 +11,14 @@
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "apps/can/can_sockets.hpp"
 #include "bench/fake_can_kernel.hpp"
 #include "bench/rig.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
-#include "rt/clock.hpp"
 #include "rt/histogram.hpp"
 #include "rt/thread_setup.hpp"
-#include "runtime/robot_cycle.hpp"
 
 namespace tandem::bench {
 namespace {
@@ -28,7 +27,6 @@ using Json = nlohmann::ordered_json;
 
 struct Options {
   std::string experiment = TANDEM_CONFIG_FOLDER "/coman/hold.toml";
-  std::string library = TANDEM_MODEL_FOLDER "/coman_kernels.so";
   double seconds = 10.0;
   int repeats = 5;
   int cpu = -1;
@@ -38,12 +36,11 @@ struct Options {
 /// The wall clock, standing still within system calls.
 class OwnClock final : public rt::Clock {
  public:
-  explicit OwnClock(const FakeCanKernel& kernel) : kernel_(kernel) {}
-  std::int64_t now_ns() noexcept TANDEM_RT override { return wall_.now_ns() - kernel_.inside_ns(); }
+  std::int64_t now_ns() noexcept TANDEM_RT override { return wall_.now_ns() - kernel->inside_ns(); }
   void sleep_until(std::int64_t /*deadline_ns*/) noexcept override {}  // one after the other
+  const FakeCanKernel* kernel = nullptr;
 
  private:
-  const FakeCanKernel& kernel_;
   rt::WallClock wall_;
 };
 
@@ -63,9 +60,8 @@ struct Sample {
 enum class Way : std::uint8_t { kFree, kPaced };
 
 /// The run's cycles, one by one, with the time of those in which controllers run.
-Result<Sample> take(runtime::RobotCycle& cycle, const FakeCanKernel& kernel, Way way,
-                    std::int64_t period_ns) {
-  OwnClock own(kernel);
+Result<Sample> take(runtime::RobotCycle& cycle, OwnClock& own, Way way, std::int64_t period_ns) {
+  const FakeCanKernel& kernel = *own.kernel;
   rt::WallClock wall;
   Sample sample;
   std::uint64_t calls = 0;
@@ -95,31 +91,46 @@ Result<Sample> take(runtime::RobotCycle& cycle, const FakeCanKernel& kernel, Way
   return sample;
 }
 
-/// The run, on an emulated robot behind sockets that are not the kernel's.
-Result<Sample> measure(const Options& options, Way way, bool traced) {
-  auto rig = make_rig(options.experiment, options.library);
-  if (!rig) return std::unexpected(rig.error());
-  runtime::Experiment& e = (*rig)->experiment;
-  auto robot = sim::EmulatedRobot::create(e.robot, (*rig)->kernels.get(), e.sim_robot_config());
-  if (!robot) return std::unexpected(robot.error());
-  std::vector<std::string> names;
-  for (const hal::BusConfig& bus : e.robot.buses) names.push_back(bus.interface);
-  FakeCanKernel kernel(**robot, names, e.loop.period_ns);
+/// An emulated robot behind sockets that are not the kernel's.
+struct Wire {
+  std::unique_ptr<sim::EmulatedRobot> robot;
+  std::optional<FakeCanKernel> kernel;
+  std::unique_ptr<apps::CanSockets> sockets;
+  OwnClock clock;
 
-  auto sockets = apps::CanSockets::open(e.robot, hal::can::SocketSide::kMaster, true);
-  if (!sockets) return std::unexpected(sockets.error().front());
-  auto backend = hal::can::CanBackend::create(e.robot, (*sockets)->buses(), **sockets, {});
-  if (!backend) return std::unexpected(backend.error());
-  OwnClock clock(kernel);
-  e.loop.pacing = rt::Pacing::kSimulated;
-  const auto cycles = static_cast<std::uint64_t>(options.seconds * 1e9) /
-                      static_cast<std::uint64_t>(e.loop.period_ns);
-  runtime::RobotCycle cycle({e.robot, **backend, *(*rig)->host, clock},
-                            {.loop = e.loop,
-                             .running_cycles = cycles,
-                             .settle_cycles = e.settle_cycles(),
-                             .trace_cycles = traced ? cycles : 0});
-  return take(cycle, kernel, way, e.loop.period_ns);
+  Diagnostics connect(runtime::Composition& c) {
+    const runtime::Experiment& e = c.experiment;
+    auto made = sim::EmulatedRobot::create(e.robot, c.kernels.get(), e.sim_robot_config());
+    if (!made) return {made.error()};
+    robot = std::move(*made);
+    std::vector<std::string> names;
+    for (const hal::BusConfig& bus : e.robot.buses) names.push_back(bus.interface);
+    clock.kernel = &kernel.emplace(*robot, names, e.loop.period_ns);
+    auto opened = apps::CanSockets::open(e.robot, hal::can::SocketSide::kMaster, true);
+    if (!opened) return opened.error();
+    sockets = std::move(*opened);
+    auto backend = hal::can::CanBackend::create(e.robot, sockets->buses(), *sockets, {});
+    if (!backend) return {backend.error()};
+    c.backend = std::move(*backend);
+    return {};
+  }
+};
+
+Result<Sample> measure(const Options& options, Way way, bool traced) {
+  const auto e = runtime::read_experiment(options.experiment);
+  if (!e) return std::unexpected(e.error().front());
+  const auto cycles =
+      static_cast<std::size_t>(options.seconds * 1e9) / static_cast<std::size_t>(e->loop.period_ns);
+  Wire wire;
+  const auto run =
+      open_run(options.experiment,
+               {.duration_s = options.seconds,
+                .hal = "can",
+                .on_fault = "end",
+                .trace_cycles = traced ? cycles : 0},
+               {.clock = &wire.clock}, [&](runtime::Composition& c) { return wire.connect(c); });
+  if (!run) return std::unexpected(run.error());
+  return take((*run)->cycle(), wire.clock, way, e->loop.period_ns);
 }
 
 /// Cycle by cycle the median of all runs: they compute the same, so that what only one of them has
@@ -200,7 +211,6 @@ int main(int count, char** arguments) {
   CLI::App app{"The cost of a cycle over SocketCAN, without the kernel's"};
   app.add_option("experiment", options.experiment,
                  "Experiment TOML (default: COMAN holding its joints)");
-  app.add_option("kernels", options.library, "The robot's kernels (default: COMAN's)");
   app.add_option("--seconds", options.seconds, "Of each run")->check(CLI::PositiveNumber);
   app.add_option("--repeats", options.repeats, "Runs of each way")->check(CLI::Range(1, 1000));
   app.add_option("--cpu", options.cpu, "The CPU to run on (default: any)");

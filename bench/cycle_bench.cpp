@@ -1,8 +1,7 @@
 // Where the time of a cycle goes: a squat as `tandem run` runs it, stage by stage, the stages of
 // the simulation inside `read` as well; and what tracing the stages costs.
-//   cycle_bench [EXPERIMENT] [KERNELS.so]      (default: COMAN's squat)
-//   cycle_bench EXPERIMENT KERNELS.so --paced   one cycle per period of the wall clock, 15 s at
-//   most
+//   cycle_bench [EXPERIMENT]          (default: COMAN's squat)
+//   cycle_bench EXPERIMENT --paced    one cycle per period of the wall clock, 15 s at most
 // Times mean something on an idle machine only; the head says which one it was.
 #include <fmt/core.h>
 
@@ -12,7 +11,7 @@
 #include <numeric>
 #include <vector>
 
-#include "bench/sim_rig.hpp"
+#include "bench/rig.hpp"
 #include "estimation/estimator.hpp"
 #include "hal/config/capabilities.hpp"
 
@@ -75,9 +74,9 @@ void print_stages(const runtime::RobotCycle& cycle, const SimStages& sim) {
 
 /// One run, printed. @return the exit status.
 /// @param paced  a cycle begins when its period does: the caches are the simulation's by then
-int run(const std::string& file, const std::string& library, bool logged, bool paced) {
-  auto rig = make_sim_rig(file, library);
-  if (!rig) return fail_with(rig.error());
+int run(const std::string& file, bool logged, bool paced) {
+  const auto e = runtime::read_experiment(file);
+  if (!e) return fail_with(e.error().front());
   const std::string path = std::filesystem::temp_directory_path() / "tandem_cycle_bench.mcap";
   std::unique_ptr<log::Recorder> recorder;
   if (logged) {
@@ -86,20 +85,22 @@ int run(const std::string& file, const std::string& library, bool logged, bool p
     recorder = std::move(*opened);
   }
   SimStages stages;
-  (*rig)->robot->set_stage_hook({SimStages::hook, &stages});
-  const runtime::Experiment& e = (*rig)->run->experiment;
-  const auto cycle = (*rig)->cycle(e.cycles() + e.cycles() / 2, recorder.get());
+  const auto opened =
+      open_run(file, {.trace_cycles = e->cycles() + e->cycles() / 2}, {.recorder = recorder.get()});
+  if (!opened) return fail_with(opened.error());
+  (*opened)->robot().set_stage_hook({SimStages::hook, &stages});
+  runtime::RobotCycle& cycle = (*opened)->cycle();
   const std::int64_t begin_ns = stages.clock.now_ns();
   bool more = true;
   for (std::int64_t i = 1; more && !(paced && i > 15'000); ++i) {
-    if (paced) stages.clock.sleep_until(begin_ns + i * e.loop.period_ns);
+    if (paced) stages.clock.sleep_until(begin_ns + i * e->loop.period_ns);
     stages.last_ns = stages.clock.now_ns();
-    more = cycle->step();
+    more = cycle.step();
   }
   const double wall_s = static_cast<double>(stages.clock.now_ns() - begin_ns) * 1e-9;
   const double sim_s =
-      static_cast<double>(cycle->loop().cycles) * static_cast<double>(e.loop.period_ns) * 1e-9;
-  print_stages(*cycle, stages);
+      static_cast<double>(cycle.loop().cycles) * static_cast<double>(e->loop.period_ns) * 1e-9;
+  print_stages(cycle, stages);
   fmt::print("{} log: {:.3f} s simulated in {:.3f} s, {:.1f} x real time\n",
              logged ? "with" : "without", sim_s, wall_s, sim_s / wall_s);
   if (recorder != nullptr) (void)recorder->close();
@@ -109,13 +110,13 @@ int run(const std::string& file, const std::string& library, bool logged, bool p
 }
 
 /// What tracing costs: two equal runs, one of them traced, in turns of 20 cycles.
-int trace_cost(const std::string& file, const std::string& library) {
+int trace_cost(const std::string& file) {
   constexpr int kTurn = 20;
-  auto plain_rig = make_sim_rig(file, library);
-  auto traced_rig = make_sim_rig(file, library);
-  if (!plain_rig || !traced_rig) return fail_with((plain_rig ? traced_rig : plain_rig).error());
-  const auto plain = (*plain_rig)->cycle(0, nullptr);
-  const auto traced = (*traced_rig)->cycle(10'000, nullptr);
+  const auto plain_run = open_run(file, {});
+  const auto traced_run = open_run(file, {.trace_cycles = 10'000});
+  if (!plain_run || !traced_run) return fail_with((plain_run ? traced_run : plain_run).error());
+  runtime::RobotCycle& plain = (*plain_run)->cycle();
+  runtime::RobotCycle& traced = (*traced_run)->cycle();
   rt::WallClock clock;
   const auto turn_us = [&clock](runtime::RobotCycle& cycle) {
     const std::int64_t begin_ns = clock.now_ns();
@@ -123,10 +124,10 @@ int trace_cost(const std::string& file, const std::string& library) {
     return us(clock.now_ns() - begin_ns) / kTurn;
   };
   std::vector<double> plain_us, traced_us, difference_us;
-  for (int i = 0; traced->phase() != runtime::RunPhase::kDone; ++i) {
+  for (int i = 0; traced.phase() != runtime::RunPhase::kDone; ++i) {
     const bool plain_first = i % 2 == 0;
-    const double first = turn_us(plain_first ? *plain : *traced);
-    const double second = turn_us(plain_first ? *traced : *plain);
+    const double first = turn_us(plain_first ? plain : traced);
+    const double second = turn_us(plain_first ? traced : plain);
     plain_us.push_back(plain_first ? first : second);
     traced_us.push_back(plain_first ? second : first);
     difference_us.push_back(traced_us.back() - plain_us.back());
@@ -142,10 +143,10 @@ int trace_cost(const std::string& file, const std::string& library) {
 
 /// What estimation costs: beside a squat, each part takes every cycle's image right after the
 /// cycle, when the caches hold the cycle's things and not its own.
-int estimation_cost(const std::string& file, const std::string& library) {
-  auto rig = make_sim_rig(file, library);
-  if (!rig) return fail_with(rig.error());
-  const runtime::Experiment& e = (*rig)->run->experiment;
+int estimation_cost(const std::string& file) {
+  const auto run = open_run(file, {});
+  if (!run) return fail_with(run.error());
+  const runtime::Experiment& e = (*run)->experiment();
   const hal::Robot robot = hal::robot_of(e.robot);
   const bool floats = robot.floating_base;
   enum Parts { kBase, kObserver, kWrenches };
@@ -155,7 +156,7 @@ int estimation_cost(const std::string& file, const std::string& library) {
     if (parts >= kObserver) config.observer.emplace();
     if (parts >= kWrenches && !robot.sites.empty())
       config.wrenches.push_back({.site = robot.sites.front().name});
-    return estimation::Estimator::make(robot, (*rig)->run->kernels.get(), config, e.loop.period_ns);
+    return estimation::Estimator::make(robot, &(*run)->kernels(), config, e.loop.period_ns);
   };
   auto base = make(floats ? kBase : kObserver);
   auto both = make(kObserver);
@@ -165,13 +166,13 @@ int estimation_cost(const std::string& file, const std::string& library) {
     fmt::print("\nestimation none: {}\n", one->error().to_string());
     return 0;
   }
-  const auto cycle = (*rig)->cycle(0, nullptr);
+  runtime::RobotCycle& cycle = (*run)->cycle();
   rt::WallClock clock;
   std::vector<double> base_us, both_us, all_us;
-  for (int i = 0; cycle->step() && i < 12'000; ++i) {
+  for (int i = 0; cycle.step() && i < 12'000; ++i) {
     const auto time = [&](estimation::Estimator& one, std::vector<double>& times) {
       const std::int64_t begin_ns = clock.now_ns();
-      one.update(cycle->state());
+      one.update(cycle.state());
       if (i > 4000) times.push_back(us(clock.now_ns() - begin_ns));
     };
     if (i % 2 == 0) time(**base, base_us);
@@ -195,13 +196,12 @@ int estimation_cost(const std::string& file, const std::string& library) {
 
 int main(int count, char** arguments) {
   const std::string file = count > 1 ? arguments[1] : TANDEM_CONFIG_FOLDER "/coman/squat.toml";
-  const std::string library = count > 2 ? arguments[2] : TANDEM_MODEL_FOLDER "/coman_kernels.so";
   fmt::print("{}", tandem::bench::machine_text());
-  if (count > 3) return tandem::bench::run(file, library, false, true);
+  if (count > 2) return tandem::bench::run(file, false, true);
   for (const bool logged : {false, true}) {
-    const int status = tandem::bench::run(file, library, logged, false);
+    const int status = tandem::bench::run(file, logged, false);
     if (status != 0) return status;
   }
-  const int status = tandem::bench::estimation_cost(file, library);
-  return status != 0 ? status : tandem::bench::trace_cost(file, library);
+  const int status = tandem::bench::estimation_cost(file);
+  return status != 0 ? status : tandem::bench::trace_cost(file);
 }

@@ -6,8 +6,7 @@
 
 #include <algorithm>
 #include <fstream>
-
-#include "controllers/plugin_loader.hpp"
+#include <utility>
 
 namespace tandem::bench {
 namespace {
@@ -22,24 +21,13 @@ std::string first_value(const char* file, const std::string& key) {
 
 }  // namespace
 
-Result<std::unique_ptr<Rig>> make_rig(const std::string& file, const std::string& library) {
-  auto rig = std::make_unique<Rig>();
-  auto e = runtime::read_experiment(file);
-  if (!e) return std::unexpected(e.error().front());
-  rig->experiment = std::move(*e);
-  auto kernels = model::load_kernels(library);
-  if (!kernels) return std::unexpected(kernels.error());
-  rig->kernels = std::move(*kernels);
-  const runtime::Experiment& experiment = rig->experiment;
-  rig->host = std::make_unique<runtime::ControllerHost>(experiment.robot, rig->kernels.get(),
-                                                        experiment.loop.period_ns);
-  for (const runtime::ControllerSpec& spec : experiment.controllers) {
-    auto plugin = load_controller(spec.plugin, {TANDEM_CONTROLLER_FOLDER});
-    if (!plugin) return std::unexpected(plugin.error());
-    const Status added = rig->host->add(spec.name, std::move(*plugin), spec.parameters);
-    if (!added) return std::unexpected(added.error());
-  }
-  return rig;
+Result<std::unique_ptr<runtime::Run>> open_run(const std::string& experiment,
+                                               const runtime::Overrides& overrides,
+                                               const runtime::RunParts& parts,
+                                               const runtime::Run::Connect& connect) {
+  auto run = runtime::Run::open(experiment, overrides, parts, connect);
+  if (!run) return std::unexpected(run.error().front());
+  return std::move(*run);
 }
 
 std::string machine_text() {

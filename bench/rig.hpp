@@ -1,4 +1,4 @@
-// What the benchmarks of the cycle share: an experiment with its kernels and controllers.
+// What the benchmarks of the cycle share.
 #pragma once
 
 #include <cstdint>
@@ -7,22 +7,14 @@
 #include <vector>
 
 #include "base/result.hpp"
-#include "model/kernel_library.hpp"
-#include "runtime/controller_host.hpp"
-#include "runtime/experiment.hpp"
+#include "runtime/run/run.hpp"
 
 namespace tandem::bench {
 
-/// Everything of a run but its robot and its loop.
-struct Rig {
-  runtime::Experiment experiment;
-  model::KernelLibrary kernels;
-  std::unique_ptr<runtime::ControllerHost> host;
-};
-
-/// @param library  of the robot's kernels. Errors: those of each part.
-[[nodiscard]] Result<std::unique_ptr<Rig>> make_rig(const std::string& experiment,
-                                                    const std::string& library);
+/// The run of an experiment, as Run::open(). Errors: its first.
+[[nodiscard]] Result<std::unique_ptr<runtime::Run>> open_run(
+    const std::string& experiment, const runtime::Overrides& overrides,
+    const runtime::RunParts& parts = {}, const runtime::Run::Connect& connect = {});
 
 /// CPU, kernel and scheduler, a line each: a time means nothing without them.
 [[nodiscard]] std::string machine_text();

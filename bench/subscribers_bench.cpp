@@ -2,7 +2,7 @@
 //   - nobody subscribes,
 //   - 20 subscribers of another process join and leave,
 //   - five that never read what they asked for, and a flood of packets that are no RTPS.
-//   subscribers_bench [EXPERIMENT] [KERNELS.so] [--blocks N] [--seconds S] [--cpu N] [--domain N]
+//   subscribers_bench [EXPERIMENT] [--blocks N] [--seconds S] [--cpu N] [--domain N]
 // What is compared is the work of each cycle: from the return of the wait to the hand-over's end.
 #include <fmt/core.h>
 #include <netinet/in.h>
@@ -18,18 +18,14 @@
 
 #include "bench/rig.hpp"
 #include "dds/publisher.hpp"
-#include "hal/sim/sim_robot.hpp"
-#include "rt/clock.hpp"
 #include "rt/histogram.hpp"
 #include "rt/thread_setup.hpp"
-#include "runtime/robot_cycle.hpp"
 
 namespace tandem::bench {
 namespace {
 
 struct Options {
   std::string experiment = TANDEM_CONFIG_FOLDER "/coman/hold.toml";
-  std::string library = TANDEM_MODEL_FOLDER "/coman_kernels.so";
   int blocks = 6;  ///< of each kind
   double seconds = 5.0;
   int cpu = -1;
@@ -137,19 +133,16 @@ int be_subscribers(int domain_number) {
 /// The publisher, with the time of each cycle's work kept in the block's histogram.
 class TimedTap final : public hal::CycleObserver {
  public:
-  explicit TimedTap(hal::CycleObserver& tap) : tap_(tap) {}
   void take(const hal::CycleView& view) noexcept TANDEM_RT override {
     const std::size_t block = view.time.cycle / cycles_per_block;
     const bool settled = view.time.cycle % cycles_per_block > 100;  // the other process has changed
     if (settled && block < blocks.size()) blocks[block].record(view.times.work_ns);
-    tap_.take(view);
+    to->take(view);
   }
 
   std::uint64_t cycles_per_block = 1;
   std::vector<rt::Histogram> blocks;
-
- private:
-  hal::CycleObserver& tap_;
+  hal::CycleObserver* to = nullptr;
 };
 
 void print(const TimedTap& tap) {
@@ -176,9 +169,9 @@ void print(const TimedTap& tap) {
 }
 
 /// Its topics are those of a run.
-Result<std::unique_ptr<dds::Publisher>> make_publisher(const Rig& rig, const sim::SimRobot& robot,
+Result<std::unique_ptr<dds::Publisher>> make_publisher(const runtime::Run& run,
                                                        dds::Participant& node) {
-  const runtime::Experiment& e = rig.experiment;
+  const runtime::Experiment& e = run.experiment();
   const auto description = robot::read_complete_robot(e.robot_file);
   if (!description) return std::unexpected(description.error().front());
   return dds::Publisher::create(node, {.robot = e.robot,
@@ -186,10 +179,10 @@ Result<std::unique_ptr<dds::Publisher>> make_publisher(const Rig& rig, const sim
                                        .urdf = {},
                                        .hal = "sim",
                                        .version = "bench",
-                                       .description_hash = rig.kernels->description_hash,
+                                       .description_hash = run.kernels().description_hash,
                                        .period_ns = e.loop.period_ns,
                                        .simulated_time = true,
-                                       .truth = &robot.truth(),
+                                       .truth = &run.truth(),
                                        .run = 1});
 }
 
@@ -212,35 +205,22 @@ void step_through(runtime::RobotCycle& cycle, const TimedTap& tap, int cpu,
 }
 
 int run(const Options& options, const char* program) {
-  auto rig = make_rig(options.experiment, options.library);
-  if (!rig) return fail_with(rig.error());
-  runtime::Experiment& e = (*rig)->experiment;
-  auto robot = sim::SimRobot::create(e.robot, (*rig)->kernels.get(), e.sim_robot_config());
-  if (!robot) return fail_with(robot.error());
+  TimedTap tap;
+  const auto opened =
+      open_run(options.experiment, {.duration_s = 1e6, .rate = 1.0}, {.observer = &tap});
+  if (!opened) return fail_with(opened.error());
+  const runtime::Experiment& e = (*opened)->experiment();
   const auto domain = dds::Domain::open(config_of(options.domain));
   if (!domain) return fail_with(domain.error());
   const auto node = dds::Participant::open(*domain, "subscribers_bench");
   if (!node) return fail_with(node.error());
-  const auto publisher = make_publisher(**rig, **robot, **node);
+  const auto publisher = make_publisher(**opened, **node);
   if (!publisher) return fail_with(publisher.error());
 
-  TimedTap tap(**publisher);
+  tap.to = publisher->get();
   tap.blocks.resize(kKinds.size() * static_cast<std::size_t>(options.blocks));
   tap.cycles_per_block =
       static_cast<std::uint64_t>(options.seconds * 1e9 / static_cast<double>(e.loop.period_ns));
-  rt::WallClock clock;
-  runtime::CycleConfig config;
-  config.loop = e.loop;
-  config.loop.pacing = rt::Pacing::kSimulated;
-  config.loop.rate = 1.0;
-  config.settle_cycles = e.settle_cycles();
-  runtime::RobotCycle cycle({.robot = e.robot,
-                             .backend = **robot,
-                             .controllers = *(*rig)->host,
-                             .clock = clock,
-                             .truth = &(*robot)->truth(),
-                             .observer = &tap},
-                            config);
   const std::string others = fmt::format("{} --subscribers --domain {}", program, options.domain);
   std::FILE* subscribers = ::popen(others.c_str(), "w");
   if (subscribers == nullptr) return fail_with(fail("cannot start the subscribers").error());
@@ -250,7 +230,7 @@ int run(const Options& options, const char* program) {
       ->start({.version = [] { return std::uint64_t{0}; },
                .faults = [] { return std::vector<dds::FaultEntry>(); },
                .lost = [] { return std::uint64_t{0}; }});
-  step_through(cycle, tap, options.cpu, subscribers);
+  step_through((*opened)->cycle(), tap, options.cpu, subscribers);
   ::pclose(subscribers);
   const dds::PublishCounts counts = (*publisher)->stop();
   print(tap);
@@ -267,7 +247,6 @@ int main(int argc, char** argv) {
   Options options;
   CLI::App app{"What subscribers that join and leave do to the loop"};
   app.add_option("experiment", options.experiment, "default: COMAN holding");
-  app.add_option("kernels", options.library, "library of the robot's kernels");
   app.add_option("--blocks", options.blocks, "of each kind")->check(CLI::Range(1, 1000));
   app.add_option("--seconds", options.seconds, "of a block")->check(CLI::Range(0.5, 600.0));
   app.add_option("--cpu", options.cpu, "the loop's; the rest of the process may be anywhere");

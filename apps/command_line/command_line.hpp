@@ -12,38 +12,25 @@
 #include "apps/command_line/dds_place.hpp"
 #include "apps/control/command_rows.hpp"
 #include "apps/text/console.hpp"
+#include "runtime/run/overrides.hpp"
 
 namespace tandem::apps {
 
 /// tandem run EXPERIMENT
-struct RunOptions {
+struct RunOptions : runtime::Overrides {
+  RunOptions() { trace_cycles = 10'000; }
+
   std::string experiment;
-  std::optional<double> rate;         ///< 1: real time, 0: as fast as it goes; else as [clock]
-  bool start_paused = false;          ///< true: whatever the experiment says
-  std::optional<std::uint64_t> seed;  ///< instead of the experiment's
-  std::optional<double> duration_s;   ///< instead of the experiment's
-  std::string log_folder;             ///< empty: the experiment's
-  std::string scenario;               ///< TOML of faults to inject; empty: none
+  std::string log_folder;  ///< empty: the experiment's
   bool no_log = false;
-  std::string kernel_variant;  ///< empty: the best that this CPU runs
-  bool no_build = false;       ///< missing kernels are an error
-  std::string hal;             ///< "sim", "can", "dds"; empty: the experiment's
-  bool lockstep = false;       ///< CAN, DDS: wait for the other end; serve: for an owner
-  std::optional<std::uint32_t> delay_cycles;  ///< instead of the experiment's
-  bool serves = false;                        ///< `tandem serve`: no controllers but an owner's
-  bool once = false;                          ///< ends when an owner gives the robot back
-  std::vector<std::string> interfaces;        ///< "can0=vcan0"
-  std::string record_frames;                  ///< file of the bus' frames; empty: none
-  bool report = false;                        ///< draw the report after the run
-  std::string trace;                          ///< file of trace events; empty: none
-  std::size_t trace_cycles = 10'000;          ///< the last that `trace` holds
-  bool quiet = false;                         ///< neither progress nor table
-  std::string json;                           ///< file, "-" for standard output, empty for none
-  std::string socket;  ///< of the run's control; empty: default_control_path("run")
+  bool once = false;          ///< ends when an owner gives the robot back
+  std::string record_frames;  ///< file of the bus' frames; empty: none
+  bool report = false;        ///< draw the report after the run
+  std::string trace;          ///< file of trace events, of the last `trace_cycles`; empty: none
+  bool quiet = false;         ///< neither progress nor table
+  std::string json;           ///< file, "-" for standard output, empty for none
+  std::string socket;         ///< of the run's control; empty: default_control_path("run")
   bool no_socket = false;
-  std::string on_fault;       ///< "end", "wait"; empty: the experiment's
-  std::optional<bool> dds;    ///< instead of the experiment's
-  std::optional<int> domain;  ///< of DDS, instead of the experiment's
 };
 
 /// tandem serve EXPERIMENT|ROBOT

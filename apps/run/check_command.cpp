@@ -198,8 +198,8 @@ void warn_of_archives(const Composition& c, Diagnostics& warnings) {
 
 Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                              Json& json) {
-  const auto composition =
-      compose(options.file, {.missing_kernels = robot::MissingKernels::kTolerate});
+  const auto composition = runtime::composed<Composition>(
+      options.file, {}, {.missing = robot::MissingKernels::kTolerate});
   if (!composition) return composition.error();
   warnings = (*composition)->experiment.description->warnings;
   warnings.insert(warnings.end(), (*composition)->warnings.begin(), (*composition)->warnings.end());

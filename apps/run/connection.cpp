@@ -7,7 +7,6 @@
 #include <filesystem>
 
 #include "apps/clients/dds_client.hpp"
-#include "controllers/hosted_call.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
 #include "hal/ethercat-can/line_bus.hpp"
 #include "hal/sim/engine_loader.hpp"
@@ -45,15 +44,6 @@ void figures(Figures& f, const runtime::Experiment* e) {
     const std::string version = here() ? sim::engine_version(e->sim.engine) : "";
     return known(!version.empty(), version);
   });
-}
-
-std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& experiment,
-                                                                 const Overrides& overrides) {
-  auto c = std::make_unique<Composition>();
-  Diagnostics errors = runtime::compose(*c, experiment, overrides);
-  if (errors.empty()) return c;
-  if (a_hosted_call_goes_on()) (void)c.release();  // it uses what it was given
-  return std::unexpected(std::move(errors));
 }
 
 namespace {

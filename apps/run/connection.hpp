@@ -2,7 +2,6 @@
 // Layer: apps/run.  Thread: main.
 #pragma once
 
-#include <expected>
 #include <memory>
 #include <span>
 #include <string>
@@ -17,7 +16,6 @@
 namespace tandem::apps {
 
 using runtime::ControllerNote;
-using runtime::Overrides;
 
 /// What a backend speaks over.
 struct Wires {
@@ -46,10 +44,6 @@ struct Composition : Wires, runtime::Composition {};
 
 /// Who moves the bodies: `engine` and `engine_version`.
 void figures(Figures& f, const runtime::Experiment* e);
-
-/// runtime::compose() of a new one.
-[[nodiscard]] std::expected<std::unique_ptr<Composition>, Diagnostics> compose(
-    const std::string& experiment, const Overrides& overrides);
 
 /// Opens the CAN interfaces and makes the CAN backend, or finds the server of the DDS backend and
 /// gets its robot; the simulation has nothing to connect.

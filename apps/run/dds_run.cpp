@@ -23,8 +23,7 @@ std::vector<dds::FaultEntry> entries(const std::vector<runtime::Fault>& faults) 
 
 }  // namespace
 
-Result<std::unique_ptr<DdsRun>> DdsRun::open(const Composition& c, const std::string& node,
-                                             const hal::TruthImage* truth) {
+Result<std::unique_ptr<DdsRun>> DdsRun::open(const Composition& c, const std::string& node) {
   const runtime::Experiment& e = c.experiment;
   if (!e.dds.enabled) return nullptr;
   auto domain = dds::Domain::open(e.dds);
@@ -40,7 +39,7 @@ Result<std::unique_ptr<DdsRun>> DdsRun::open(const Composition& c, const std::st
                       .description_hash = c.kernels->description_hash,
                       .period_ns = e.loop.period_ns,
                       .simulated_time = c.backend->pace() == hal::Pace::kSimulatedClock,
-                      .truth = truth,
+                      .truth = runtime::truth_of(c),
                       .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image(),
                       .wrenches = e.estimation.wrench_sites(),
                       .parallel = c.parallel != nullptr,

@@ -26,13 +26,11 @@ class DdsRun {
   /// Enters the domain of the experiment's [dds] and makes the topics, before anything has moved;
   /// null when it is off.
   ///
-  /// @param node   this process in ROS 2's graph: "tandem_run"
-  /// @param truth  the cycle's; null: there is none
-  /// @pre   the composition is connected and outlives this
+  /// @param node  this process in ROS 2's graph: "tandem_run"
+  /// @pre the composition is connected and outlives this
   /// Errors: Domain::open()'s, Participant::open()'s and Publisher::create()'s.
   [[nodiscard]] static Result<std::unique_ptr<DdsRun>> open(const Composition& composition,
-                                                            const std::string& node,
-                                                            const hal::TruthImage* truth);
+                                                            const std::string& node);
 
   /// For others that talk DDS in this run, such as services. Outlived by this.
   [[nodiscard]] dds::Participant& participant() { return *participant_; }

@@ -12,44 +12,12 @@
 #include "apps/control/rate_limit.hpp"
 #include "base/clock_ns.hpp"
 #include "base/counted.hpp"
-#include "hal/config/capabilities.hpp"
-#include "rt/clock.hpp"
-#include "runtime/run/operator_link.hpp"
 
 namespace tandem::apps {
 namespace {
 
 constexpr std::size_t kRowsAnswered = 100;        // unless asked otherwise
 constexpr std::size_t kNumbersAnswered = 90'000;  // an answer of more is read by no client
-
-struct RunFork final : internal_model::Fork {
-  [[nodiscard]] bool diverged() const override { return robot->plant().diverged(); }
-
-  internal_model::NoPredictor nobody;
-  rt::WallClock clock;
-  std::unique_ptr<runtime::ControllerHost> controllers;
-  std::unique_ptr<estimation::Estimator> estimator;  // as the run's, or null
-  std::unique_ptr<hal::Backend> backend;
-  sim::SimRobot* robot = nullptr;  // the backend, or behind its link
-  std::unique_ptr<runtime::RobotCycle> own;
-};
-
-/// The same controllers in the same order.
-Status add_controllers_again(const Composition& c, RunFork& fork) {
-  runtime::ControllerHost& host = *fork.controllers;
-  const runtime::Experiment& e = c.experiment;
-  for (const runtime::ControllerSpec& spec : e.controllers) {
-    auto plugin = runtime::load_plugin(e, spec);
-    if (!plugin) return std::unexpected(plugin.error());
-    if (plugin->plugin().lacks_archive) fork.unarchived.push_back(spec.name);
-    const Status added = host.add(spec.name, std::move(*plugin), spec.parameters, spec.active);
-    if (!added) return added;
-  }
-  if (c.owner == nullptr) return {};
-  const auto nothing = TomlDocument::parse("", e.file);
-  return host.add(runtime::kOwnerController, std::make_shared<runtime::OwnerController>(),
-                  nothing->root(), false);
-}
 
 /// Every `every`th cycle of `cycles`, and the last one.
 std::vector<std::size_t> rows_answered(std::size_t cycles, std::size_t every) {
@@ -109,56 +77,6 @@ Json answer_json(const internal_model::Answer& answer, const hal::RobotConfig& r
 }
 
 }  // namespace
-
-Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
-                                                        const runtime::CycleConfig& config) {
-  const runtime::Experiment& e = c.experiment;
-  auto fork = std::make_unique<RunFork>();
-  fork->controllers =
-      std::make_unique<runtime::ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
-  fork->controllers->start_from(runtime::start_of(e));
-  fork->controllers->predict_by(&fork->nobody);
-  if (c.estimator != nullptr) {
-    auto estimator = estimation::Estimator::make(hal::robot_of(e.robot), c.kernels.get(),
-                                                 e.estimation, e.loop.period_ns);
-    if (!estimator) return std::unexpected(estimator.error());
-    fork->estimator = std::move(*estimator);
-    fork->controllers->show_estimate(&fork->estimator->image());
-  }
-  if (const Status added = add_controllers_again(c, *fork); !added) {
-    return std::unexpected(added.error());
-  }
-  const bool beside = c.parallel != nullptr;
-  sim::SimRobotConfig sim = c.simulation;
-  sim.truth = true;
-  auto robot = sim::SimRobot::create(beside ? e.parallel->robot : e.robot,
-                                     (beside ? c.parallel_kernels : c.kernels).get(), sim);
-  if (!robot) return std::unexpected(robot.error());
-  fork->robot = robot->get();
-  fork->truth = &fork->robot->truth();
-  fork->backend = std::move(*robot);
-  if (c.tele != nullptr && !beside) {  // the operator's loop: its link and its robot
-    auto link = runtime::link_to(c, std::move(fork->backend));
-    if (!link) return std::unexpected(link.error().front());
-    fork->backend = std::move(*link);
-  }
-  runtime::CycleConfig ahead = config;
-  ahead.loop.pacing = rt::Pacing::kSimulated;
-  ahead.loop.rate = 0.0;
-  ahead.loop.start_paused = false;
-  ahead.trace_cycles = 0;
-  const bool run_has_truth = c.sim != nullptr && e.sim.ground_truth;
-  fork->own = std::make_unique<runtime::RobotCycle>(
-      runtime::CycleParts{.robot = e.robot,
-                          .backend = *fork->backend,
-                          .controllers = *fork->controllers,
-                          .clock = fork->clock,
-                          .truth = run_has_truth ? fork->truth : nullptr,
-                          .estimator = fork->estimator.get()},
-      ahead);
-  fork->cycle = fork->own.get();
-  return fork;
-}
 
 void add_predict(ControlRegistry& registry, internal_model::PredictionService* service,
                  const hal::RobotConfig& robot, std::function<std::int64_t()> now_ns) {

@@ -30,11 +30,9 @@
 #include "apps/transport/dds_services.hpp"
 #include "base/counted.hpp"
 #include "base/quoting.hpp"
-#include "internal_model/parallel_robot.hpp"
-#include "rt/clock.hpp"
 #include "rt/cpu_latency.hpp"
 #include "rt/stop_signal.hpp"
-#include "runtime/robot_cycle.hpp"
+#include "runtime/run/run.hpp"
 #include "runtime/trace_file.hpp"
 
 namespace tandem::apps {
@@ -53,24 +51,6 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
         fmt::format("the log lost {}: {}", counted(log->failed, "message"), log->error));
   }
   return texts;
-}
-
-/// The experiment's, with what the command line says of pace and stops.
-runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
-  runtime::Experiment& e = c.experiment;
-  const bool simulated = c.backend->pace() == hal::Pace::kSimulatedClock;
-  e.loop.rate = options.rate.value_or(simulated ? e.loop.rate : 0.0);
-  e.loop.start_paused = simulated && (options.start_paused || e.loop.start_paused);
-  runtime::CycleConfig config = runtime::cycle_config(e, c.backend->pace());
-  e.loop = config.loop;
-  const bool waits =
-      options.serves || (e.loop.pacing == rt::Pacing::kWallClock && c.remote == nullptr);
-  if (!e.after_stop && waits) config.after_stop = runtime::AfterStop::kWait;
-  if (c.remote != nullptr) config.bring_up_cycles = ~std::uint64_t{0};  // the server's is limited
-  if (options.on_fault == "end") config.after_stop = runtime::AfterStop::kEnd;
-  if (options.on_fault == "wait") config.after_stop = runtime::AfterStop::kWait;
-  config.trace_cycles = options.trace.empty() ? 0 : options.trace_cycles;
-  return config;
 }
 
 std::string pace_text(const Composition& c) {
@@ -186,8 +166,7 @@ class Session {
 
   /// DDS, the log, and the door for an owner over DDS.
   Status open_outputs() {
-    if (c_.sim != nullptr && experiment().sim.ground_truth) truth_ = &c_.sim->truth();
-    auto dds = DdsRun::open(c_, options_.serves ? "tandem_serve" : "tandem_run", truth_);
+    auto dds = DdsRun::open(c_, options_.serves ? "tandem_serve" : "tandem_run");
     if (!dds) return std::unexpected(dds.error());
     dds_ = std::move(*dds);
     if (!options_.no_log) {
@@ -204,38 +183,12 @@ class Session {
   }
 
   void make_cycle() {
-    const runtime::CycleConfig config = cycle_config(c_, options_);
-    if (c_.parallel != nullptr) {
-      parallel_.emplace(
-          internal_model::ParallelParts{
-              *c_.backend, *c_.parallel,
-              experiment().sim.ground_truth ? &c_.parallel->truth() : nullptr, recorder_.get(),
-              c_.sim != nullptr && c_.experiment.robot.model.floating_base ? &c_.sim->truth()
-                                                                           : nullptr},
-          experiment().robot.shape(), c_.controllers->gains(), experiment().loop.period_ns);
-    }
-    waits_ = config.after_stop == runtime::AfterStop::kWait;
-    cycle_.emplace(runtime::CycleParts{.robot = experiment().robot,
-                                       .backend = loops_backend(),
-                                       .controllers = *c_.controllers,
-                                       .clock = clock_,
-                                       .recorder = recorder_.get(),
-                                       .truth = truth_,
-                                       .observer = dds_ == nullptr ? nullptr : &dds_->tap(),
-                                       .owner = {server_.get(), c_.owner.get(), c_.owner_slot},
-                                       .estimator = c_.estimator.get(),
-                                       .snapshots = c_.predictor.get()},
-                   config);
-    if (c_.predictor != nullptr) {
-      c_.predictor->attach(*cycle_, parallel_ ? &*parallel_ : nullptr,
-                           [this, config] { return make_fork(c_, config); });
-    }
+    run_.emplace(c_, options_,
+                 runtime::RunParts{.recorder = recorder_.get(),
+                                   .observer = dds_ == nullptr ? nullptr : &dds_->tap(),
+                                   .owner = server_.get()});
+    cycle_ = &run_->cycle();
     if (server_ != nullptr) tell_faults(*server_, *cycle_);
-  }
-
-  /// With a second robot: what passes every call on to the first, and tapes it.
-  hal::Backend& loops_backend() {
-    return parallel_ ? static_cast<hal::Backend&>(parallel_->backend()) : *c_.backend;
   }
 
   void announce() const {
@@ -296,12 +249,12 @@ class Session {
     rt::install_emergency_signal();
     std::optional<rt::NoCpuSleep> awake;
     if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
-    if (dds_ != nullptr) dds_->start(*cycle_, parallel_ ? &*parallel_ : nullptr);
+    if (dds_ != nullptr) dds_->start(*cycle_, run_->parallel());
     auto guard = LoopGuard::open(c_, *cycle_);
     if (!guard) return std::unexpected(guard.error());
-    if (parallel_) parallel_->start();
     LoopThread thread(*cycle_, e.thread);
-    watch(*cycle_, thread, c_, **guard, recorder_.get(), out_, waits_, options_.quiet);
+    watch(*cycle_, thread, c_, **guard, recorder_.get(), out_,
+          cycle_->config().after_stop == runtime::AfterStop::kWait, options_.quiet);
     if ((*guard)->gave_up()) end_without_loop(**guard);
     thread.join();
     const EndGuard in_time([this] { close_log(); });
@@ -338,9 +291,9 @@ class Session {
     RunSummary summary{c_, *cycle_, times, std::nullopt, std::nullopt, {}, {}, {}};
     summary.server = server_.get();
     summary.interrupted_by = rt::stop_signal();
-    if (parallel_) {
-      summary.parallel = parallel_->finish();
-      summary.differences = &parallel_->differences();
+    if (auto* parallel = run_->parallel(); parallel != nullptr) {
+      summary.parallel = parallel->finish();
+      summary.differences = &parallel->differences();
     }
     if (dds_ != nullptr) {
       const EndGuard in_time([this] { close_log(); });
@@ -379,7 +332,6 @@ class Session {
   Composition& c_;
   const RunOptions& options_;
   std::FILE* out_;
-  const hal::TruthImage* truth_ = nullptr;
   std::size_t plugins_at_start_ = 0;  // in the log's first record
   std::unique_ptr<DdsRun> dds_;
   std::unique_ptr<log::Recorder> recorder_;
@@ -387,10 +339,8 @@ class Session {
   bool log_is_whole_ = true;
   DdsAdmission admission_;
   std::unique_ptr<remote::Server> server_;
-  rt::WallClock clock_;
-  std::optional<internal_model::ParallelRobot> parallel_;
-  std::optional<runtime::RobotCycle> cycle_;
-  bool waits_ = false;  // for a reset, after a fault
+  std::optional<runtime::Run> run_;
+  runtime::RobotCycle* cycle_ = nullptr;  // its
   ControlRegistry commands_;
   std::unique_ptr<ControlSocket> socket_;
   std::unique_ptr<DdsServices> services_;
@@ -409,7 +359,9 @@ void warn_of_inertias(const runtime::Experiment& e) {
 
 }  // namespace
 
-Exit run_command(const RunOptions& options, ReportOfRun& report) {
+Exit run_command(const RunOptions& given, ReportOfRun& report) {
+  RunOptions options = given;
+  if (options.trace.empty()) options.trace_cycles = 0;
   for (const std::string& file : {options.json, options.trace}) {
     if (const Status writable = check_writable(file); !writable) return refuse(writable.error());
   }
@@ -418,24 +370,8 @@ Exit run_command(const RunOptions& options, ReportOfRun& report) {
                          ? wrong_kind(options.experiment, Takes::kEither, "tandem serve")
                          : wrong_kind(options.experiment, Takes::kExperiment, "tandem run");
   if (wrong) return refuse(*wrong);
-  Overrides overrides{.seed = options.seed,
-                      .duration_s = options.duration_s,
-                      .kernel_variant = options.kernel_variant,
-                      .missing_kernels = missing_kernels(options.no_build),
-                      .build_kernels = builder(options.quiet),
-                      .lockstep = options.lockstep,
-                      .interfaces = options.interfaces,
-                      .scenario = options.scenario,
-                      .delay_cycles = options.delay_cycles,
-                      .serves = options.serves,
-                      .dds = options.dds,
-                      .domain = options.domain};
-  const bool wire = options.hal == "can" || options.hal == "ethercat";
-  if (wire) overrides.backend = runtime::BackendKind::kWire;
-  if (wire) overrides.wire = options.hal;
-  if (options.hal == "sim") overrides.backend = runtime::BackendKind::kSim;
-  if (options.hal == "dds") overrides.backend = runtime::BackendKind::kDds;
-  const auto composition = compose(options.experiment, overrides);
+  const auto composition = runtime::composed<Composition>(options.experiment, options,
+                                                          {.build = builder(options.quiet)});
   if (!composition) return refuse(composition.error());
   warn_of_inertias((*composition)->experiment);
   print_warnings(std::exchange((*composition)->warnings, {}));

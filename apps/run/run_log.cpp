@@ -67,7 +67,7 @@ double bytes_per_cycle(const Composition& c) {
   constexpr std::uint64_t kMessageOverhead = 64;
   std::uint64_t cycle_bytes = hal::StateImage(e.robot.shape()).bytes().size() +
                               hal::CommandImage(e.robot.shape()).bytes().size();
-  if (c.sim != nullptr && e.sim.ground_truth) cycle_bytes += c.sim->truth().bytes().size();
+  if (const hal::TruthImage* truth = runtime::truth_of(c)) cycle_bytes += truth->bytes().size();
   if (c.estimator != nullptr) cycle_bytes += c.estimator->image().bytes().size();
   if (c.parallel != nullptr) {
     cycle_bytes += hal::StateImage(e.robot.shape()).bytes().size() + 2 * kMessageOverhead;

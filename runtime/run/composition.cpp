@@ -93,22 +93,20 @@ void add_estimator(Composition& c, Collector& errors) {
 /// The robot's kernels, and the host of controllers. They are built after all that can be checked
 /// without them, for it takes a while.
 /// @return false: there are errors, and no more to find
-bool add_kernels(Composition& c, const robot::RobotFiles& robot, const Overrides& overrides,
-                 Collector& errors) {
+bool add_kernels(Composition& c, const robot::RobotFiles& robot, bool serves,
+                 const KernelSupply& supply, Collector& errors) {
   const Experiment& e = c.experiment;
-  const bool builds = overrides.missing_kernels != robot::MissingKernels::kRefuse;
+  const bool builds = supply.missing != robot::MissingKernels::kRefuse;
   auto kernels = robot::supply_kernels(
       robot, e.kernel_variant,
       builds ? robot::MissingKernels::kTolerate : robot::MissingKernels::kRefuse);
-  if (kernels && kernels->get() == nullptr &&
-      overrides.missing_kernels != robot::MissingKernels::kTolerate) {
-    if (!overrides.serves) add_controllers(c, errors);
+  if (kernels && kernels->get() == nullptr && supply.missing != robot::MissingKernels::kTolerate) {
+    if (!serves) add_controllers(c, errors);
     const Status needs = estimation::Estimator::check(hal::robot_of(e.robot), e.estimation);
     if (!needs) refuse_estimation(e, needs.error(), errors);
     if (!errors.empty()) return false;
     c.notes.clear();
-    kernels = robot::supply_kernels(robot, e.kernel_variant, overrides.missing_kernels,
-                                    overrides.build_kernels);
+    kernels = robot::supply_kernels(robot, e.kernel_variant, supply.missing, supply.build);
   }
   if (!kernels) {
     errors.add(kernels.error(), e.robot.file, 0);
@@ -201,17 +199,29 @@ Result<LoadedController> load_plugin(const Experiment& e, const ControllerSpec& 
 
 namespace {
 
-/// What the command line wants of the experiment.
-void override_experiment(Experiment& e, const Overrides& overrides) {
+/// What the caller wants of the experiment.
+Diagnostics override_experiment(Experiment& e, const Overrides& overrides) {
+  const std::string& hal = overrides.hal;
+  if (hal == "can" || hal == "ethercat") {
+    e.hal.backend = BackendKind::kWire;
+    e.hal.wire = hal;
+  } else if (hal == "sim" || hal == "dds") {
+    e.hal.backend = hal == "sim" ? BackendKind::kSim : BackendKind::kDds;
+    e.hal.wire.clear();
+  } else if (!hal.empty()) {
+    return {fail("hal: '" + hal + "'", "one of sim, can, ethercat, dds").error()};
+  }
+  if (overrides.on_fault == "end") e.after_stop = AfterStop::kEnd;
+  if (overrides.on_fault == "wait") e.after_stop = AfterStop::kWait;
   e.seed = overrides.seed.value_or(e.seed);
   e.duration_s = overrides.duration_s.value_or(e.duration_s);
   if (!overrides.kernel_variant.empty()) e.kernel_variant = overrides.kernel_variant;
-  e.hal.backend = overrides.backend.value_or(e.hal.backend);
-  if (overrides.backend) e.hal.wire = overrides.wire;
   e.hal.lockstep = e.hal.lockstep || overrides.lockstep;
   e.dds.enabled = overrides.dds.value_or(e.dds.enabled);
   e.dds.domain = overrides.domain.value_or(e.dds.domain);
   e.hal.delay_cycles = overrides.delay_cycles.value_or(e.hal.delay_cycles);
+  if (overrides.change) overrides.change(e);
+  return {};
 }
 
 /// Why [teleoperation] cannot be done: empty if it can, or is not wanted.
@@ -341,14 +351,13 @@ void check_robot(Composition& c, const robot::RobotFiles& robot, Collector& erro
 }
 
 /// The second robot of [parallel], and its kernels. Scenarios are the first robot's.
-Diagnostics add_parallel(Composition& c, const Overrides& overrides) {
+Diagnostics add_parallel(Composition& c, const KernelSupply& supply) {
   Experiment& e = c.experiment;
   if (!e.parallel || c.kernels.get() == nullptr) return {};
   const auto robot = robot::with_description(std::move(e.parallel->robot), e.files);
   if (!robot) return robot.error();
   e.parallel->robot = robot->config;
-  auto kernels = robot::supply_kernels(*robot, e.kernel_variant, overrides.missing_kernels,
-                                       overrides.build_kernels);
+  auto kernels = robot::supply_kernels(*robot, e.kernel_variant, supply.missing, supply.build);
   if (!kernels) {
     return {{.message = "the parallel robot has no kernels: " + kernels.error().message,
              .hint = "leave --no-build out: the run builds them",
@@ -393,12 +402,16 @@ Diagnostics add_simulation(Composition& c, const Overrides& overrides) {
 
 }  // namespace
 
-Diagnostics compose(Composition& c, const std::string& file, const Overrides& overrides) {
+Diagnostics compose(Composition& c, const std::string& file, const Overrides& overrides,
+                    KernelSupply kernels) {
+  if (overrides.no_build && kernels.missing == robot::MissingKernels::kBuild) {
+    kernels.missing = robot::MissingKernels::kRefuse;
+  }
   auto experiment = overrides.serves ? read_served(file) : read_experiment(file);
   if (!experiment) return experiment.error();
   Experiment& e = c.experiment;
   e = std::move(*experiment);
-  override_experiment(e, overrides);
+  if (auto unknown = override_experiment(e, overrides); !unknown.empty()) return unknown;
   if (auto reasons = unfit(e, overrides); !reasons.empty()) return reasons;
   keep_to_own_end(e, overrides);
   if (Status done = hal::replace_interfaces(e.robot, overrides.interfaces); !done) {
@@ -409,7 +422,7 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   if (!robot) return robot.error();
   Collector errors;
   check_robot(c, *robot, errors);
-  if (!add_kernels(c, *robot, overrides, errors)) return errors.give().error();
+  if (!add_kernels(c, *robot, overrides.serves, kernels, errors)) return errors.give().error();
   if (!overrides.serves) add_controllers(c, errors);
   add_owner(c, errors);
   if (!errors.empty()) {
@@ -419,25 +432,35 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   if (c.controllers != nullptr && !overrides.duration_s && !overrides.serves) {
     std::ranges::move(late_plans(c), std::back_inserter(c.warnings));
   }
-  if (auto failed = add_parallel(c, overrides); !failed.empty()) return failed;
+  if (auto failed = add_parallel(c, kernels); !failed.empty()) return failed;
   const bool simulated = e.hal.backend == BackendKind::kSim;
   if (!simulated || c.kernels.get() == nullptr) return {};
-  if (auto failed = add_simulation(c, overrides); !failed.empty()) {
-    return failed;
-  }
-  return {};
+  return add_simulation(c, overrides);
 }
 
-CycleConfig cycle_config(const Experiment& e, hal::Pace pace) {
+const hal::TruthImage* truth_of(const Composition& c) {
+  return c.sim != nullptr && c.experiment.sim.ground_truth ? &c.sim->truth() : nullptr;
+}
+
+CycleConfig cycle_config(Composition& c, const Overrides& overrides) {
+  Experiment& e = c.experiment;
+  const hal::Pace pace = c.backend->pace();
+  const bool simulated = pace == hal::Pace::kSimulatedClock;
+  e.loop.rate = overrides.rate.value_or(simulated ? e.loop.rate : 0.0);
+  e.loop.start_paused = simulated && (overrides.start_paused || e.loop.start_paused);
+  e.loop.pacing = simulated                       ? rt::Pacing::kSimulated
+                  : pace == hal::Pace::kWallClock ? rt::Pacing::kWallClock
+                                                  : rt::Pacing::kExternal;
   CycleConfig config;
   config.loop = e.loop;
-  config.loop.pacing = rt::Pacing::kSimulated;
-  if (pace == hal::Pace::kWallClock) config.loop.pacing = rt::Pacing::kWallClock;
-  if (pace == hal::Pace::kBus) config.loop.pacing = rt::Pacing::kExternal;
   config.running_cycles = e.cycles();
   config.settle_cycles = e.settle_cycles();
   config.delay_cycles = e.hal.delay_cycles;
-  if (e.after_stop) config.after_stop = *e.after_stop;
+  const bool on_wall_clock = pace == hal::Pace::kWallClock && c.remote == nullptr;
+  if (overrides.serves || on_wall_clock) config.after_stop = AfterStop::kWait;
+  config.after_stop = e.after_stop.value_or(config.after_stop);
+  if (c.remote != nullptr) config.bring_up_cycles = ~std::uint64_t{0};  // the server's is limited
+  config.trace_cycles = overrides.trace_cycles;
   config.after_reset = e.after_reset;
   config.on_stray = e.on_stray;
   config.retreat_cycles =

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "estimation/estimator.hpp"
 #include "hal/remote/operator_end.hpp"
@@ -25,25 +26,14 @@
 #include "runtime/experiment.hpp"
 #include "runtime/local_controllers.hpp"
 #include "runtime/owner_controller.hpp"
+#include "runtime/run/overrides.hpp"
 
 namespace tandem::runtime {
 
-/// What the caller, or the command line, says instead of the experiment.
-struct Overrides {
-  std::optional<std::uint64_t> seed = std::nullopt;
-  std::optional<double> duration_s = std::nullopt;
-  std::string kernel_variant = {};
-  robot::MissingKernels missing_kernels = robot::MissingKernels::kBuild;
-  robot::BuildKernels build_kernels = {};  ///< empty: silently
-  std::optional<BackendKind> backend = std::nullopt;
-  std::string wire = {};                     ///< with kWire: "can", "ethercat"
-  bool lockstep = false;                     ///< true: whatever the experiment says
-  std::vector<std::string> interfaces = {};  ///< "can0=vcan0"
-  std::string scenario = {};                 ///< faults to inject into the simulation
-  std::optional<std::uint32_t> delay_cycles = std::nullopt;
-  bool serves = false;  ///< no controllers of its own, and no end
-  std::optional<bool> dds = std::nullopt;
-  std::optional<int> domain = std::nullopt;  ///< of DDS
+/// What happens where a robot has no kernels.
+struct KernelSupply {
+  robot::MissingKernels missing = robot::MissingKernels::kBuild;
+  robot::BuildKernels build = {};  ///< empty: silently
 };
 
 /// A controller as `check` lists it.
@@ -80,6 +70,9 @@ struct Composition {
   robot::LoopStudy loops;  ///< where the loops close, in a simulation
 };
 
+/// What the cycle may show of the plant: null where nothing is simulated here, or it is not wanted.
+[[nodiscard]] const hal::TruthImage* truth_of(const Composition& c);
+
 /// Where the joints stand when the run starts, as far as the experiment says.
 [[nodiscard]] std::vector<double> start_of(const Experiment& e);
 
@@ -91,9 +84,20 @@ struct Composition {
 /// claims. Without kernels, which MissingKernels::kTolerate admits, the last two are not checked.
 /// On errors `c` is half made. @return the errors; empty: it is whole, but for a wire's backend
 [[nodiscard]] Diagnostics compose(Composition& c, const std::string& experiment,
-                                  const Overrides& overrides);
+                                  const Overrides& overrides, KernelSupply kernels = {});
 
-/// How the experiment's cycle goes, with a backend of this pace.
-[[nodiscard]] CycleConfig cycle_config(const Experiment& e, hal::Pace pace);
+/// compose() of a new one. A plugin that does not return keeps what it was given.
+template <class C = Composition>
+[[nodiscard]] std::expected<std::unique_ptr<C>, Diagnostics> composed(
+    const std::string& experiment, const Overrides& overrides, const KernelSupply& kernels = {}) {
+  auto c = std::make_unique<C>();
+  Diagnostics errors = compose(*c, experiment, overrides, kernels);
+  if (errors.empty()) return c;
+  if (a_hosted_call_goes_on()) (void)c.release();
+  return std::unexpected(std::move(errors));
+}
+
+/// How the cycle of what is connected goes; the experiment's loop becomes it.
+[[nodiscard]] CycleConfig cycle_config(Composition& c, const Overrides& overrides);
 
 }  // namespace tandem::runtime

@@ -1,6 +1,10 @@
 // runtime::Run: what a program of one's own gets is what `tandem run` has.
 #include "runtime/run/run.hpp"
 
+#include <chrono>
+#include <future>
+#include <map>
+
 #include "log/log_file.hpp"
 #include "tests/apps/program.hpp"
 
@@ -50,15 +54,91 @@ TEST_F(EmbeddedRun, HasTheBitsOfTandemRun) {
   }));
 }
 
+TEST_F(EmbeddedRun, HasTheSecondRobotOfParallel) {
+  write_text(path("trajectory.toml"), read_text(path("trajectory.toml")) + "\n[parallel]\n");
+  const auto run = runtime::Run::open(path("trajectory.toml"), {.duration_s = 0.5});
+  ASSERT_TRUE(run) << run.error().front().to_string();
+  while ((*run)->step()) {
+  }
+  ASSERT_NE((*run)->parallel(), nullptr);
+  EXPECT_EQ((*run)->parallel()->finish().cycles, (*run)->cycle().loop().cycles);
+  EXPECT_GT((*run)->parallel()->differences().cycles(), 500U);
+  EXPECT_EQ((*run)->parallel()->differences().unequal(), 0U);
+}
+
+TEST_F(EmbeddedRun, PredictsWhatItDoes) {
+  const auto run = runtime::Run::open(path("trajectory.toml"));
+  ASSERT_TRUE(run) << run.error().front().to_string();
+  std::map<std::uint64_t, double> references;
+  const auto step = [&] {
+    ASSERT_TRUE((*run)->step());
+    references[(*run)->state().cycle()[0]] = (*run)->command().position_rad()[1];
+  };
+  while ((*run)->cycle().running_cycles() < 300) step();
+  auto asked =
+      std::async(std::launch::async, [&] { return (*run)->predictions()->predict(50'000'000); });
+  while (asked.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready) step();
+  const auto answer = asked.get();
+  ASSERT_TRUE(answer) << answer.error().to_string();
+  const hal::Prediction& p = answer->prediction;
+  ASSERT_EQ(p.cycles, 50U);
+  while (references.rbegin()->first < p.first_cycle + p.cycles) step();
+  for (std::size_t i = 0; i < p.cycles; ++i) {
+    EXPECT_EQ(p.row(p.reference_rad, i)[1], references.at(p.first_cycle + i)) << i;
+  }
+}
+
+/// Leaves every joint as it is, and counts.
+struct Counting final : Controller {
+  Status configure(ControllerSetup&) override { return {}; }
+  void start(const hal::CycleTime&, const hal::StateImage&, hal::CommandImage&) noexcept override {}
+  Code update(const hal::CycleTime&, const hal::StateImage&, hal::CommandImage&) noexcept override {
+    ++updates;
+    return Code::kOk;
+  }
+  int updates = 0;
+};
+
+TEST_F(EmbeddedRun, RunsWhatItsProgramChangesAndAdds) {
+  const auto run = runtime::Run::open(path("hold.toml"), {.change = [](runtime::Experiment& e) {
+                                        e.duration_s = 0.2;
+                                        e.controllers.clear();
+                                      }});
+  ASSERT_TRUE(run) << run.error().front().to_string();
+  const auto own = std::make_shared<Counting>();
+  ASSERT_TRUE((*run)->controllers().add("own", own, TomlDocument::parse("", "own")->root()));
+  while ((*run)->step()) {
+  }
+  EXPECT_EQ((*run)->cycle().running_cycles(), 200U);
+  EXPECT_EQ(own->updates, 200);
+}
+
+TEST_F(EmbeddedRun, RunsTheRobotThatItsProgramConnects) {
+  const auto run =
+      runtime::Run::open(path("hold.toml"), {.duration_s = 0.1, .hal = "can", .lockstep = true}, {},
+                         [](runtime::Composition& c) -> Diagnostics {
+                           auto made = sim::SimRobot::create(c.experiment.robot, c.kernels.get(),
+                                                             c.experiment.sim_robot_config());
+                           if (!made) return {made.error()};
+                           c.backend = std::move(*made);
+                           return {};
+                         });
+  ASSERT_TRUE(run) << run.error().front().to_string();
+  EXPECT_FALSE((*run)->is_simulated());
+  while ((*run)->step()) {
+  }
+  EXPECT_EQ((*run)->cycle().running_cycles(), 100U);
+}
+
 TEST_F(EmbeddedRun, SaysWhyItCannotBe) {
   const auto refused = [&](const std::string& file, const runtime::Overrides& overrides) {
     const auto run = runtime::Run::open(path(file), overrides);
     return run ? std::string() : run.error().front().to_string();
   };
   EXPECT_NE(refused("nothing.toml", {}).find("nothing.toml: cannot read"), std::string::npos);
-  EXPECT_NE(refused("hold.toml", {.backend = runtime::BackendKind::kWire, .wire = "can"})
-                .find("its robot is not in this process"),
+  EXPECT_NE(refused("hold.toml", {.hal = "can"}).find("its robot is not in this process"),
             std::string::npos);
+  EXPECT_NE(refused("hold.toml", {.hal = "cam"}).find("one of sim, can"), std::string::npos);
   edit("hold.toml", "plugin = \"hold\"", "plugin = \"hodl\"");
   EXPECT_NE(refused("hold.toml", {}).find("did you mean 'hold'"), std::string::npos)
       << refused("hold.toml", {});

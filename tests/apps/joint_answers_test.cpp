@@ -2,8 +2,6 @@
 // `tandem sensor` and `tandem joint` print of them.
 #include <unistd.h>
 
-#include <chrono>
-#include <future>
 #include <memory>
 #include <string>
 #include <thread>
@@ -13,11 +11,7 @@
 #include "apps/command_line/command_line.hpp"
 #include "apps/control/run_control.hpp"
 #include "apps/transport/control_socket.hpp"
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/hal/fake_backend.hpp"
-#include "tests/runtime/first_order_robot.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -33,23 +27,13 @@ hal::RobotConfig with_a_slide() {
 /// A run without controllers whose cycles are made while somebody waits for an answer. Its elbow
 /// slides.
 template <class Backend>
-struct Answered : ::testing::Test {
+struct Answered : ::testing::Test, runtime::test::LoopRun {
+  Answered() : LoopRun(with_a_slide()) {}
   void begin(RunPhase in = RunPhase::kRunning) {
-    cycle = std::make_unique<runtime::RobotCycle>(
-        runtime::CycleParts{robot, backend, host, clock},
-        runtime::CycleConfig{.after_stop = runtime::AfterStop::kWait});
+    LoopRun::begin(backend, {.after_stop = runtime::AfterStop::kWait});
     steps(100);
     ASSERT_EQ(cycle->phase(), in);
     add_run_commands(registry, *cycle, robot, judge);
-  }
-  void steps(int count) {
-    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
-  }
-  template <class Ask>
-  auto while_cycling(const Ask& ask) {
-    auto asked = std::async(std::launch::async, ask);
-    while (asked.wait_for(std::chrono::microseconds(100)) != std::future_status::ready) steps(1);
-    return asked.get();
   }
   [[nodiscard]] Json answer(const std::string& question) {
     return while_cycling([&] { return registry.answer(question); });
@@ -88,11 +72,7 @@ struct Answered : ::testing::Test {
     EXPECT_NE(text.find(words), std::string::npos) << text;
   }
 
-  hal::RobotConfig robot = with_a_slide();
   Backend backend{robot};
-  runtime::ControllerHost host{robot, nullptr, 1'000'000};
-  rt::WallClock clock;
-  std::unique_ptr<runtime::RobotCycle> cycle;
   JudgeGains judge;
   ControlRegistry registry;
   std::string out, err;  // of the last command

@@ -8,11 +8,7 @@
 #include "apps/clients/commands.hpp"
 #include "apps/control/run_control.hpp"
 #include "apps/transport/control_socket.hpp"
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/hal/fake_backend.hpp"
-#include "tests/runtime/first_order_robot.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -20,23 +16,14 @@ namespace {
 using runtime::RunPhase;
 
 /// A run whose cycles a test makes itself, and whose controller can retreat.
-struct AnsweredRun : ::testing::Test {
+struct AnsweredRun : ::testing::Test, runtime::test::JointRun {
   void SetUp() override {
-    auto sine = std::make_unique<runtime::test::Sine>(std::vector<std::size_t>{0});
-    controller = sine.get();
     controller->retreats = true;
-    ASSERT_TRUE(host.add("able", std::move(sine), runtime::test::parameters()));
-    cycle = std::make_unique<runtime::RobotCycle>(
-        runtime::CycleParts{robot, backend, host, clock},
-        runtime::CycleConfig{.after_stop = runtime::AfterStop::kWait, .retreat_cycles = 200});
+    begin({.after_stop = runtime::AfterStop::kWait, .retreat_cycles = 200});
     steps(100);
     ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
     add_run_commands(registry, *cycle, robot);
   }
-  void steps(int count) {
-    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
-  }
-
   /// `tandem fault reset` of a run whose joint `trips` is in fault when it looks; -1: none.
   Exit reset(int trips) {
     ControlRegistry served;
@@ -68,12 +55,7 @@ struct AnsweredRun : ::testing::Test {
     return status;
   }
 
-  hal::RobotConfig robot = hal::test::fake_robot();
-  runtime::test::FirstOrderRobot backend{robot};
-  runtime::ControllerHost host{robot, nullptr, 1'000'000};
-  rt::WallClock clock;
-  runtime::test::Sine* controller = nullptr;
-  std::unique_ptr<runtime::RobotCycle> cycle;
+  runtime::test::Sine* controller = add_sine({0}, "able");
   ControlRegistry registry;
   std::string out, err;  // of the last command
 };

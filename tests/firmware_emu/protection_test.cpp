@@ -15,9 +15,10 @@ using canopen::ErrorCode;
 struct Guard : ::testing::Test {
   Rig rig;
 
-  void start(const BoardSetup& setup) {
+  Rig& start(const BoardSetup& setup) {
     rig_owner = std::make_unique<Rig>(setup);
     rig_owner->start();
+    return *rig_owner;
   }
   /// Cycles until the axis has a fault. @return how many it took, `most` when it has none
   static int until_fault(Rig& r, int most) {
@@ -54,8 +55,7 @@ TEST_F(Guard, StopsOnAFollowingErrorAfterItsTime) {
   BoardSetup setup = board_setup();
   setup.axes[0].parameters.following_window_rad = 0.1;
   setup.axes[0].parameters.following_timeout_s = 0.05;
-  start(setup);
-  Rig& r = *rig_owner;
+  Rig& r = start(setup);
   r.enable();
   r.commands[0].position = Rig::counts(0.5);  // the link stands still
   const int taken = until_fault(r, 200);
@@ -69,8 +69,7 @@ TEST_F(Guard, TellsOfAFollowingErrorBeforeItIsAFault) {
   BoardSetup setup = board_setup();
   setup.axes[0].parameters.following_window_rad = 0.1;
   setup.axes[0].parameters.following_timeout_s = 0.05;
-  start(setup);
-  Rig& r = *rig_owner;
+  Rig& r = start(setup);
   r.enable();
   r.commands[0].position = Rig::counts(0.5);
   r.cycles(20);
@@ -130,8 +129,7 @@ TEST_F(Guard, StopsOnI2tAfterTheTimeOfTheModelAndWarnsBefore) {
   BoardSetup setup = board_setup();
   setup.axes[0].parameters.continuous_current_A = 5.0;
   setup.axes[0].parameters.thermal_time_s = 2.0;
-  start(setup);
-  Rig& r = *rig_owner;
+  Rig& r = start(setup);
   r.enable(-3);
   r.joints[0].Ks = 1.0e5;                                 // holds the motor
   ASSERT_EQ(r.write<std::int16_t>(0x2013, 0, 1000), 0U);  // 10 A
@@ -149,8 +147,7 @@ TEST_F(Guard, ResetsI2tOnlyWhenTheWindingHasCooled) {
   setup.axes[0].parameters.continuous_current_A = 5.0;
   setup.axes[0].parameters.thermal_time_s = 20.0;
   setup.axes[0].parameters.stop_time_s = 0.01;
-  start(setup);
-  Rig& r = *rig_owner;
+  Rig& r = start(setup);
   r.enable(-3);
   r.joints[0].Ks = 1.0e5;
   ASSERT_EQ(r.write<std::int16_t>(0x2013, 0, 2000), 0U);
@@ -179,8 +176,7 @@ TEST_F(Guard, StopsOnOverTemperatureUntilItHasCooled) {
 TEST_F(Guard, StopsOnUnderVoltage) {
   BoardSetup setup = board_setup();
   setup.axes[0].parameters.undervoltage_V = 24.0;
-  start(setup);
-  Rig& r = *rig_owner;
+  Rig& r = start(setup);
   r.enable();
   r.joints[0].bus_V = 20.0;
   ASSERT_LT(until_fault(r, 3), 3);
@@ -194,8 +190,7 @@ TEST_F(Guard, StopsWhenEncodersAndSpringContradictEachOther) {
   BoardSetup setup = board_setup();
   setup.axes[0].parameters.mismatch_window_rad = 0.02;
   setup.axes[0].parameters.mismatch_timeout_s = 0.005;
-  start(setup);
-  Rig& r = *rig_owner;
+  Rig& r = start(setup);
   r.enable();
   r.cycles(50);
   ASSERT_EQ(r.error(), 0) << "a healthy joint";
@@ -215,8 +210,7 @@ TEST_F(Guard, NamesWhatIsStillThereBehindTheFaultThatItFoundFirst) {
   setup.axes[0].parameters.mismatch_window_rad = 0.02;
   setup.axes[0].parameters.mismatch_timeout_s = 0.01;
   setup.axes[0].parameters.undervoltage_V = 24.0;
-  start(setup);
-  Rig& r = *rig_owner;
+  Rig& r = start(setup);
   r.enable();
   r.cycles(50);
   r.seen.clear();
@@ -432,8 +426,7 @@ TEST_F(Guard, StopsAJointThatRingsInEveryModeWhoseGainsAreTooHigh) {
        {Case{8, 0x2020, 1000.0F}, Case{9, 0x2021, 1000.0F}, Case{10, 0x2022, 1000.0F},
         Case{-1, 0x2022, 1000.0F}, Case{-3, 0x2023, 1000.0F}}) {
     SCOPED_TRACE(static_cast<int>(one.mode));
-    start(watched_setup());
-    Rig& r = *rig_owner;
+    Rig& r = start(watched_setup());
     r.joints[0].link_inertia = 0.2;
     r.enable(one.mode);
     r.cycles(500);
@@ -458,8 +451,7 @@ TEST_F(Guard, StopsAJointThatRingsInEveryModeWhoseGainsAreTooHigh) {
 TEST_F(Guard, FindsASquareWaveAfterTheTimeOfTheFormula) {
   BoardSetup setup = watched_setup();
   setup.axes[0].parameters.oscillation_limit_Nm = 8.0;
-  start(setup);
-  Rig& r = *rig_owner;
+  Rig& r = start(setup);
   r.joints[0].J = 1.0e6;  // the rotor stands: u = N K V / R
   r.enable(-2);
   r.cycles(20);
@@ -491,8 +483,7 @@ TEST_F(Guard, LeavesHonestMotionsAlone) {
     }
   }
   for (const double amplitude_rad : {1.5, 0.5}) {  // sines at the joint's velocity limit, 8 rad/s
-    start(watched_setup());
-    Rig& r = *rig_owner;
+    Rig& r = start(watched_setup());
     r.joints[0].link_inertia = 0.2;
     r.enable();
     const double w = 8.0 / amplitude_rad;
@@ -524,8 +515,7 @@ BoardSetup bounded_setup() {
 TEST_F(Guard, KeepsAFreeJointWithinItsVelocityInEveryMode) {
   for (const int mode : {10, -1, -2, -3, -4}) {
     SCOPED_TRACE(mode);
-    start(bounded_setup());
-    Rig& r = *rig_owner;
+    Rig& r = start(bounded_setup());
     r.joints[0].link_inertia = 1.0;
     r.joints[0].bus_V = 100.0;
     r.enable(static_cast<std::int8_t>(mode));
@@ -550,8 +540,7 @@ TEST_F(Guard, KeepsAFreeJointWithinItsVelocityInEveryMode) {
 TEST_F(Guard, HoldsTheTorqueOfCurrentAndOpenLoopWithinItsLimit) {
   for (const int mode : {-2, -3}) {
     SCOPED_TRACE(mode);
-    start(bounded_setup());
-    Rig& r = *rig_owner;
+    Rig& r = start(bounded_setup());
     r.joints[0].bus_V = 100.0;
     r.enable(static_cast<std::int8_t>(mode));
     if (mode == -2) {
@@ -571,8 +560,7 @@ TEST_F(Guard, ChangesCurrentAndVoltageNoFasterThanTheTorquesSlope) {
     SCOPED_TRACE(mode);
     BoardSetup setup = bounded_setup();
     setup.axes[0].parameters.torque_slope_Nm_s = 1000.0;  // 1 Nm/ms
-    start(setup);
-    Rig& r = *rig_owner;
+    Rig& r = start(setup);
     r.joints[0].link_inertia = 0.2;
     r.joints[0].bus_V = 100.0;
     r.enable(static_cast<std::int8_t>(mode));
@@ -591,8 +579,7 @@ TEST_F(Guard, ChangesCurrentAndVoltageNoFasterThanTheTorquesSlope) {
 TEST_F(Guard, StopsAJointThatItsLoadDrivesBeyondItsVelocity) {
   for (const int mode : {8, 9, 10, -1, -2, -3}) {
     SCOPED_TRACE(mode);
-    start(bounded_setup());
-    Rig& r = *rig_owner;
+    Rig& r = start(bounded_setup());
     r.joints[0].link_inertia = 0.2;
     r.enable(static_cast<std::int8_t>(mode));
     r.joints[0].load_Nm = 90.0;  // more than it may give against it
@@ -636,8 +623,7 @@ TEST(Excess, OfVelocityTorqueAndPowerIsAFaultAfterItsTimeWhileTheMotorDrives) {
 TEST_F(Guard, StopsAJointThatItsOwnLoopKeepsSwinging) {
   BoardSetup setup = bounded_setup();
   setup.axes[0].parameters.following_window_rad = 0.0;
-  start(setup);
-  Rig& r = *rig_owner;
+  Rig& r = start(setup);
   r.joints[0].link_inertia = 0.4;
   r.enable();
   r.cycles(300);
@@ -651,8 +637,7 @@ TEST_F(Guard, StopsAJointThatItsOwnLoopKeepsSwinging) {
 }
 
 TEST_F(Guard, LeavesPushesAndStepsAlone) {
-  start(bounded_setup());
-  Rig& r = *rig_owner;
+  Rig& r = start(bounded_setup());
   r.joints[0].link_inertia = 0.2;
   r.enable();
   for (int k = 0; k < 8000; ++k) {

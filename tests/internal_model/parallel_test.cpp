@@ -63,7 +63,7 @@ TEST(ParallelRobot, GetsStopsResetsAndGainsAsTheFirstDoes) {
   run.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
   run.steps(300);
   ASSERT_EQ(run.cycle->phase(), RunPhase::kFaulted);
-  run.host.gains().set_gains(0, hal::PidLoop::kPosition, {.kp = 500.0, .ki = 200.0, .kd = 20.0});
+  run.host->gains().set_gains(0, hal::PidLoop::kPosition, {.kp = 500.0, .ki = 200.0, .kd = 20.0});
   run.cycle->inbox().reset_faults();
   run.steps(600);
   EXPECT_EQ(run.cycle->phase(), RunPhase::kHeld);
@@ -114,16 +114,14 @@ TEST(ParallelRobot, BesideARobotOnAWireIsTheSameToTheLastBit) {
   runtime::test::LockstepRobot wire(robot, tandem::test::swing_kernels(2), sim);
   auto second = sim::SimRobot::create(robot, tandem::test::swing_kernels(2), sim);
   ASSERT_TRUE(second);
-  runtime::ControllerHost host(robot, tandem::test::swing_kernels(2), test::kPeriod_ns);
-  ASSERT_TRUE(host.add("sine", std::make_unique<runtime::test::Sine>(std::vector<std::size_t>{0}),
-                       runtime::test::parameters("amplitude_rad = 0.1")));
-  ParallelRobot beside({*wire.backend, **second}, robot.shape(), host.gains(), test::kPeriod_ns);
+  runtime::test::LoopRun run(robot, tandem::test::swing_kernels(2));
+  run.add_sine({0}, "sine", true, "amplitude_rad = 0.1");
+  ParallelRobot beside({*wire.backend, **second}, robot.shape(), run.host->gains(),
+                       test::kPeriod_ns);
   beside.start();
-  rt::WallClock clock;
-  runtime::RobotCycle cycle({robot, beside.backend(), host, clock, nullptr, nullptr},
-                            {.loop = {.pacing = rt::Pacing::kSimulated}, .running_cycles = 600});
-  cycle.run();
-  EXPECT_EQ(beside.finish().cycles, cycle.loop().cycles);
+  run.begin(beside.backend(), {.running_cycles = 600});
+  run.cycle->run();
+  EXPECT_EQ(beside.finish().cycles, run.cycle->loop().cycles);
   EXPECT_GT(beside.differences().cycles(), 599U);
   expect_same(beside.differences());
 }

@@ -142,12 +142,13 @@ TEST(Prediction, OfARunThatEndsMeanwhileIsAnErrorAndNothingHangs) {
 TEST(Prediction, OfARunWithOtherControllersIsAnError) {
   Predicted one({.cycles = 100'000, .beside = false});
   one.run.run_to(RunPhase::kRunning);
-  auto more = one.run.host.configure(
+  auto more = one.run.host->configure(
       "more", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{}),
       runtime::test::parameters("amplitude_rad = 0.1"));
   ASSERT_TRUE(more) << more.error().to_string();
-  one.run.host.owned()[1] = std::move(*more);
-  ASSERT_EQ(one.run.host.insert(1, *one.run.host.owned()[1]).reason, runtime::RejectReason::kNone);
+  one.run.host->owned()[1] = std::move(*more);
+  ASSERT_EQ(one.run.host->insert(1, *one.run.host->owned()[1]).reason,
+            runtime::RejectReason::kNone);
   const auto answer = one.ask();
   ASSERT_FALSE(answer);
   EXPECT_NE(answer.error().message.find("other controllers"), std::string::npos)

@@ -14,9 +14,8 @@
 #include "hal/forwarding_backend.hpp"
 #include "internal_model/parallel_robot.hpp"
 #include "internal_model/prediction_service.hpp"
-#include "runtime/robot_cycle.hpp"
 #include "tests/rt/fake_clock.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 #include "tests/sim/swing_robot.hpp"
 
 namespace tandem::internal_model::test {
@@ -68,25 +67,24 @@ struct RunOptions {
 };
 
 /// The first swing on a sine, and the second.
-struct SwingRun {
-  explicit SwingRun(const RunOptions& options = {}, runtime::SnapshotPort* snapshots = nullptr)
-      : robot(swing(options)),
+struct SwingRun : runtime::test::LoopRun {
+  explicit SwingRun(const RunOptions& options = {}, runtime::SnapshotPort* its_snapshots = nullptr)
+      : LoopRun(swing(options), tandem::test::swing_kernels(2)),
         second_robot(robot),
-        host(robot, tandem::test::swing_kernels(2), kPeriod_ns),
         first(make_swing(robot)),
         dressed(*first, options.pace) {
     if (options.kp > 0.0) second_robot.gains.front().position.gains.kp = options.kp;
-    host.predict_by(options.predictor);
+    host->predict_by(options.predictor);
     std::shared_ptr<Controller> moves = options.controller;
     if (moves == nullptr) {
       moves = std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0});
     }
-    EXPECT_TRUE(host.add("sine", moves, runtime::test::parameters("amplitude_rad = 0.1")));
+    add("sine", moves, true, "amplitude_rad = 0.1");
     if (options.beside) {
       second = make_swing(second_robot);
       second_dressed.emplace(*second, hal::Pace::kSimulatedClock, options.slow);
       beside.emplace(ParallelParts{dressed, *second_dressed, &second->truth(), options.recorder},
-                     robot.shape(), host.gains(), kPeriod_ns);
+                     robot.shape(), host->gains(), kPeriod_ns);
       beside->start();
     }
     config.loop.period_ns = kPeriod_ns;
@@ -94,16 +92,15 @@ struct SwingRun {
         options.pace == hal::Pace::kWallClock ? rt::Pacing::kWallClock : rt::Pacing::kSimulated;
     config.running_cycles = options.cycles;
     config.after_stop = runtime::AfterStop::kWait;
-    cycle = std::make_unique<RobotCycle>(
-        runtime::CycleParts{.robot = robot,
-                            .backend = beside ? static_cast<hal::Backend&>(beside->backend())
-                                              : static_cast<hal::Backend&>(dressed),
-                            .controllers = host,
-                            .clock = clock,
-                            .recorder = options.recorder,
-                            .truth = &first->truth(),
-                            .snapshots = snapshots},
-        config);
+    clock = &no_time;
+    recorder = options.recorder;
+    truth = &first->truth();
+    snapshots = its_snapshots;
+    if (beside) {
+      begin(beside->backend(), config);
+    } else {
+      begin(dressed, config);
+    }
   }
   static hal::RobotConfig swing(const RunOptions& options) {
     hal::RobotConfig robot = tandem::test::swing_robot();
@@ -119,19 +116,14 @@ struct SwingRun {
     }
     ASSERT_EQ(cycle->phase(), phase) << first->status_text();
   }
-  void steps(int count) {
-    for (int i = 0; i < count; ++i) ASSERT_TRUE(cycle->step());
-  }
 
-  hal::RobotConfig robot, second_robot;
-  runtime::ControllerHost host;
+  hal::RobotConfig second_robot;
   std::unique_ptr<sim::SimRobot> first, second;
   Dressed dressed;
   std::optional<Dressed> second_dressed;
-  rt::FakeClock clock;  // whose sleeps take no time
+  rt::FakeClock no_time;  // whose sleeps take none
   runtime::CycleConfig config;
   std::optional<ParallelRobot> beside;
-  std::unique_ptr<RobotCycle> cycle;
 };
 
 /// What a run is run ahead in.

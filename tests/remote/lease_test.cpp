@@ -297,7 +297,7 @@ class LinkLoss : public LinkChecks {
   /// Commands until they are followed, and then no more.
   void lead() {
     ASSERT_TRUE(eventually([this] {
-      if (served.host.shown().active != 0 || served.server->losses() > 0) return true;
+      if (served.host->shown().active != 0 || served.server->losses() > 0) return true;
       commands_->write(sample());
       return false;
     }));
@@ -322,7 +322,7 @@ TEST_F(LinkLossHeld, HoldsEveryJointAndTakesTheNextOwner) {
   lead();
   ASSERT_TRUE(eventually([this] { return !served.cycle->faults().empty(); }));
   EXPECT_EQ(served.phase(), RunPhase::kRunning);
-  EXPECT_TRUE(eventually([this] { return served.host.shown().active == 0; }));
+  EXPECT_TRUE(eventually([this] { return served.host->shown().active == 0; }));
   acquire(5000);
   EXPECT_TRUE(eventually([this] { return served.server->lease().owner() == 5000U; }));
 }

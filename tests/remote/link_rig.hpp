@@ -15,11 +15,7 @@
 #include "hal/config/capabilities.hpp"
 #include "hal/remote/remote_backend.hpp"
 #include "hal/remote/server.hpp"
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/hal/fake_backend.hpp"
-#include "tests/runtime/first_order_robot.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 #include "tests/support/dds_domain.hpp"
 
 namespace tandem::remote::test {
@@ -115,15 +111,14 @@ class Record final : public hal::CycleObserver {
 };
 
 /// A robot in this process with its loop on a thread, for owners in others.
-class Served {
+class Served : public runtime::test::JointRun {
  public:
   /// @param kept  participant to use; null: one of its own
   explicit Served(const ServerConfig& config, runtime::CycleConfig cycle_config = {},
-                  hal::CycleObserver* tap = nullptr, hal::RobotConfig of = hal::test::fake_robot(),
+                  hal::CycleObserver* tap = nullptr,
+                  hal::RobotConfig its_robot = hal::test::fake_robot(),
                   dds::Participant* kept = nullptr)
-      : robot(std::move(of)),
-        backend(robot),
-        host(robot, nullptr, kPeriod_ns),
+      : JointRun(std::move(its_robot)),
         participant_(kept == nullptr ? participant("served") : nullptr) {
     const hal::Robot known = hal::robot_of(robot);
     auto made =
@@ -131,20 +126,19 @@ class Served {
                      identity_of(known, "hash", kPeriod_ns), config);
     EXPECT_TRUE(made) << made.error().to_string();
     server = std::move(*made);
-    owner = std::make_shared<runtime::OwnerController>();
-    EXPECT_TRUE(host.add("remote", owner, runtime::test::parameters(), false));
+    const auto remote = std::make_shared<runtime::OwnerController>();
+    add("remote", remote, false);
     cycle_config.after_stop = runtime::AfterStop::kWait;
-    cycle =
-        std::make_unique<RobotCycle>(runtime::CycleParts{.robot = robot,
-                                                         .backend = backend,
-                                                         .controllers = host,
-                                                         .clock = clock,
-                                                         .truth = &backend.truth,
-                                                         .observer = tap,
-                                                         .owner = {server.get(), owner.get(), 0}},
-                                     cycle_config);
+    clock = &sleepy;
+    truth = &backend.truth;
+    observer = tap;
+    owner = {server.get(), remote.get(), 0};
+    JointRun::begin(cycle_config);
   }
-  ~Served() { end(); }
+  ~Served() {
+    end();
+    cycle.reset();  // it lets the server go
+  }
   void begin() {
     thread_ = std::thread([this] { cycle->run(); });
   }
@@ -159,21 +153,16 @@ class Served {
   }
   [[nodiscard]] RunPhase phase() const { return cycle->progress().phase.load(); }
 
-  hal::RobotConfig robot;
-  runtime::test::FirstOrderRobot backend;
-  runtime::ControllerHost host;
-  SleepyClock clock;
+  SleepyClock sleepy;
   std::unique_ptr<dds::Participant> participant_;
   std::unique_ptr<Server> server;
-  std::shared_ptr<runtime::OwnerController> owner;
-  std::unique_ptr<RobotCycle> cycle;
 
  private:
   std::thread thread_;
 };
 
 /// An owner: a loop with a sine on joint 0, over the link.
-class Owner {
+class Owner : public runtime::test::LoopRun {
  public:
   static Result<std::unique_ptr<RemoteBackend>> connect(dds::Participant& participant,
                                                         ClientConfig config,
@@ -185,30 +174,21 @@ class Owner {
   }
 
   explicit Owner(const ClientConfig& config, runtime::CycleConfig cycle_config = {},
-                 hal::RobotConfig of = hal::test::fake_robot(), double amplitude_rad = 0.2)
-      : robot(std::move(of)), participant_(participant("owner")), host(robot, nullptr, kPeriod_ns) {
+                 hal::RobotConfig its_robot = hal::test::fake_robot(), double amplitude_rad = 0.2)
+      : LoopRun(std::move(its_robot)), participant_(participant("owner")) {
     auto made = connect(*participant_, config, robot);
     EXPECT_TRUE(made) << made.error().to_string();
     if (!made) return;
     backend = std::move(*made);
-    auto sine = std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0});
-    controller = sine.get();
-    EXPECT_TRUE(
-        host.add("sine", sine,
-                 runtime::test::parameters("amplitude_rad = " + std::to_string(amplitude_rad))));
+    controller = add_sine({0}, "sine", true, "amplitude_rad = " + std::to_string(amplitude_rad));
     cycle_config.bring_up_cycles = ~std::uint64_t{0};
     cycle_config.loop.pacing = config.lockstep ? rt::Pacing::kSimulated : rt::Pacing::kExternal;
-    cycle = std::make_unique<RobotCycle>(runtime::CycleParts{robot, *backend, host, clock},
-                                         cycle_config);
+    begin(*backend, cycle_config);
   }
 
-  hal::RobotConfig robot;
   std::unique_ptr<dds::Participant> participant_;
   std::unique_ptr<RemoteBackend> backend;
-  runtime::ControllerHost host;
   runtime::test::Sine* controller = nullptr;
-  rt::WallClock clock;
-  std::unique_ptr<RobotCycle> cycle;
 };
 
 }  // namespace tandem::remote::test

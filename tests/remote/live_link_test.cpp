@@ -45,12 +45,11 @@ class StrictTwin final : public runtime::test::FirstOrderRobot {
 };
 
 /// An operator's loop with a sine on joint 0.
-class Operator {
+class Operator : public runtime::test::LoopRun {
  public:
   Operator(bool predict, std::uint64_t running, std::vector<Outage> outages = {})
-      : robot(hal::test::fake_robot()),
+      : LoopRun(hal::test::fake_robot()),
         participant_(participant("operator")),
-        host(robot, nullptr, kPeriod_ns),
         record(robot, 20'000) {
     ClientConfig client;
     client.own_pace = true;
@@ -66,17 +65,13 @@ class Operator {
     if (predict) twin.robot = std::make_unique<StrictTwin>(robot);
     link = std::make_unique<LiveLink>(hal::robot_of(robot), std::move(*made), std::move(twin),
                                       config, 100'000'000, kPlayout, kPeriod_ns);
-    EXPECT_TRUE(host.add("sine", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
-                         runtime::test::parameters("amplitude_rad = 0.2")));
+    add_sine();
     runtime::CycleConfig wanted = real_time(running);
     wanted.bring_up_cycles = ~std::uint64_t{0};
     wanted.loop.pacing = rt::Pacing::kWallClock;
-    cycle = std::make_unique<RobotCycle>(runtime::CycleParts{.robot = robot,
-                                                             .backend = *link,
-                                                             .controllers = host,
-                                                             .clock = clock,
-                                                             .observer = &record},
-                                         wanted);
+    clock = &sleepy;
+    observer = &record;
+    begin(*link, wanted);
   }
   /// RMS difference of what the operator saw and what it asked for, of joint 0 [rad], once the
   /// first command can have been seen.
@@ -92,13 +87,10 @@ class Operator {
     return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, count)));
   }
 
-  hal::RobotConfig robot;
   std::unique_ptr<dds::Participant> participant_;
-  runtime::ControllerHost host;
   Record record;
   std::unique_ptr<LiveLink> link;
-  SleepyClock clock;
-  std::unique_ptr<RobotCycle> cycle;
+  SleepyClock sleepy;
 };
 
 TEST(LiveLink, TheOperatorSeesThePredictedRobot) {
@@ -129,7 +121,7 @@ TEST(LiveLink, APauseOfTheOperatorsProcessEndsNothing) {
   Served served(robots_end(), real_time());
   served.begin();
   Operator one(true, 1200);
-  one.clock.at_sleep(700, [&one] { one.clock.oversleep(30 * kPeriod_ns); });
+  one.sleepy.at_sleep(700, [&one] { one.sleepy.oversleep(30 * kPeriod_ns); });
   one.cycle->run();
   served.end();
   EXPECT_GE(one.cycle->loop().skipped, 20U);
@@ -143,7 +135,7 @@ TEST(LiveLink, TheNumbersFollowAJumpOfTheRobotsClock) {
   Served served(robots_end(), real_time());
   served.begin();
   Operator one(true, 2000);
-  one.clock.at_sleep(500, [&served] { served.clock.oversleep(150 * kPeriod_ns); });
+  one.sleepy.at_sleep(500, [&served] { served.sleepy.oversleep(150 * kPeriod_ns); });
   one.cycle->run();
   served.end();
   for (const runtime::Fault& fault : one.cycle->faults()) EXPECT_FALSE(fault.latched) << fault.text;

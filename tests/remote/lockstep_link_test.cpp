@@ -13,22 +13,14 @@ constexpr std::uint64_t kRunning = 300, kSettling = 40;
 
 void in_process(Record& record, std::uint32_t delay, std::uint64_t running = kRunning,
                 double sag_rad = 0.0) {
-  const hal::RobotConfig robot = hal::test::fake_robot();
-  runtime::test::FirstOrderRobot backend(robot);
-  backend.sag_rad = sag_rad;
-  runtime::ControllerHost host(robot, nullptr, kPeriod_ns);
-  EXPECT_TRUE(host.add("sine", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
-                       runtime::test::parameters()));
-  rt::WallClock clock;
-  RobotCycle cycle({.robot = robot,
-                    .backend = backend,
-                    .controllers = host,
-                    .clock = clock,
-                    .truth = &backend.truth,
-                    .observer = &record},
-                   {.running_cycles = running, .settle_cycles = kSettling, .delay_cycles = delay});
-  cycle.run();
-  EXPECT_TRUE(cycle.faults().empty());
+  runtime::test::JointRun run;
+  run.backend.sag_rad = sag_rad;
+  run.truth = &run.backend.truth;
+  run.observer = &record;
+  run.add_sine();
+  run.begin({.running_cycles = running, .settle_cycles = kSettling, .delay_cycles = delay});
+  run.cycle->run();
+  EXPECT_TRUE(run.cycle->faults().empty());
 }
 
 void over_the_link(Record& record, std::uint32_t delay, std::uint64_t running = kRunning,
@@ -116,7 +108,7 @@ TEST(LockstepLink, AnOwnersGainsAreTheServedRobots) {
   ClientConfig config;
   config.lockstep = true;
   Owner owner(config, {.running_cycles = 20});
-  hal::ParameterImage& gains = owner.host.gains();
+  hal::ParameterImage& gains = owner.host->gains();
   const hal::PidGains soft{.kp = 0.5, .ki = 0.0, .kd = 12.5};
   ASSERT_NE(gains.gains(1, hal::PidLoop::kPosition), soft);
   gains.set_gains(1, hal::PidLoop::kPosition, soft);
@@ -126,7 +118,7 @@ TEST(LockstepLink, AnOwnersGainsAreTheServedRobots) {
   for (std::size_t j = 0; j < gains.joints(); ++j) {
     for (std::size_t i = 0; i < hal::kPidLoops; ++i) {
       const auto loop = static_cast<hal::PidLoop>(i);
-      EXPECT_EQ(served.host.gains().gains(j, loop), gains.gains(j, loop)) << j << ", loop " << i;
+      EXPECT_EQ(served.host->gains().gains(j, loop), gains.gains(j, loop)) << j << ", loop " << i;
     }
   }
 }

@@ -11,20 +11,14 @@
 #include <vector>
 
 #include "controllers/model_map.hpp"
-#include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/remote/tele_backend.hpp"
-#include "model/kernel_library.hpp"
-#include "rt/clock.hpp"
-#include "runtime/experiment.hpp"
-#include "runtime/local_controllers.hpp"
-#include "runtime/robot_cycle.hpp"
+#include "runtime/run/operator_link.hpp"
+#include "tests/runtime/bundled_run.hpp"
 #include "tests/support/payload_kernels.hpp"
 
 namespace tandem::remote {
 namespace {
-
-using runtime::RobotCycle;
 
 /// One cycle in which controllers ran.
 struct Row {
@@ -50,69 +44,51 @@ const Led& led(const std::string& robot) {
   return robot == "panda" ? panda : coman;
 }
 
-/// A bundled robot's teleoperation.toml with a link of one's own.
-class Operated {
- public:
-  Operated(const std::string& robot, double one_way_s, double loss, bool predict,
-           double seconds = 8.0, std::vector<Outage> outages = {}, const Real& of = {}) {
-    auto read =
-        runtime::read_experiment(TANDEM_SOURCE_DIR "/config/" + robot + "/teleoperation.toml");
-    EXPECT_TRUE(read) << read.error().front().to_string();
-    experiment_ = std::make_unique<runtime::Experiment>(std::move(*read));
-    runtime::Experiment& e = *experiment_;
-    kernels_ =
-        *model::load_kernels(TANDEM_BINARY_DIR "/lib/models/" + e.robot.name + "_kernels.so");
-    map_ = *ModelMap::make(hal::robot_of(e.robot), kernels_.get());
-    site_ = *site_index(*kernels_, led(robot).site);
-    TeleConfig config = e.teleoperation->link;
-    config.up = config.down = NetworkConfig{.delay_s = one_way_s, .loss = loss, .limit = 10'000};
-    config.playout_ns = std::llround(1e9 * (one_way_s + 0.02));
-    config.predict = predict;
-    config.outages = std::move(outages);
-    host_ = std::make_unique<runtime::ControllerHost>(e.robot, kernels_.get(), e.loop.period_ns);
-    for (const runtime::ControllerSpec& spec : e.controllers) {
-      auto plugin = load_controller(spec.plugin, {TANDEM_BINARY_DIR "/lib/controllers"});
-      EXPECT_TRUE(plugin) << plugin.error().to_string();
-      EXPECT_TRUE(host_->add(spec.name, std::move(*plugin), spec.parameters));
-    }
-    hal::RobotConfig real = e.robot;  // which the twin need not be like
+/// The robot at the far end, which its twin need not be like.
+struct RealRobot {
+  Diagnostics connect(runtime::Composition& c, const std::string& robot, const Real& of) {
+    const runtime::Experiment& e = c.experiment;
+    hal::RobotConfig real = e.robot;
     for (hal::GainsConfig& gains : real.gains) gains.position.gains.kp *= of.gain;
     if (of.payload)
-      loaded_ =
+      loaded =
           std::make_unique<test::PayloadKernels>(real, led(robot).link, led(robot).ball_in_link);
-    auto far = sim::SimRobot::create(real, of.payload ? loaded_->get() : kernels_.get(),
+    auto far = sim::SimRobot::create(real, of.payload ? loaded->get() : c.kernels.get(),
                                      e.sim_robot_config());
-    far_ = far->get();
-    OperatorEnd::End robot_end{std::move(*far), side()};
-    OperatorEnd::End twin;
-    if (predict) {
-      auto sim = e.sim_robot_config();
-      sim.seed = e.seed + 1;
-      twin = {std::move(*sim::SimRobot::create(e.robot, kernels_.get(), sim)), side()};
-    }
-    link = std::make_unique<TeleBackend>(hal::robot_of(e.robot), std::move(robot_end),
-                                         std::move(twin), config, e.loop.period_ns);
-    runtime::CycleConfig wanted;
-    wanted.loop = e.loop;
-    wanted.running_cycles =
-        static_cast<std::uint64_t>(seconds * 1e9) / static_cast<std::uint64_t>(e.loop.period_ns);
-    wanted.settle_cycles = e.settle_cycles();
-    cycle = std::make_unique<RobotCycle>(
-        runtime::CycleParts{e.robot, *link, *host_, clock_, nullptr, &far_->truth()}, wanted);
+    if (!far) return {far.error()};
+    c.sim = far->get();
+    auto made = runtime::link_to(c, std::move(*far));
+    if (!made) return made.error();
+    c.tele = made->get();
+    c.backend = std::move(*made);
+    link = static_cast<TeleBackend*>(c.tele);
+    return {};
   }
 
-  std::unique_ptr<RobotSide> side() const {
-    const runtime::Experiment& e = *experiment_;
-    auto made =
-        std::make_unique<runtime::LocalControllers>(e.robot, kernels_.get(), e.loop.period_ns);
-    for (const runtime::ControllerSpec& spec : e.teleoperation->robot_controllers) {
-      auto plugin = load_controller(spec.plugin, {TANDEM_BINARY_DIR "/lib/controllers"});
-      EXPECT_TRUE(made->add(spec.name, std::move(*plugin), spec.parameters));
-    }
-    return made;
-  }
+  std::unique_ptr<test::PayloadKernels> loaded;
+  TeleBackend* link = nullptr;
+};
 
-  void run() {
+/// A bundled robot's teleoperation.toml with a link of one's own.
+class Operated : public RealRobot, public runtime::BundledRun {
+ public:
+  Operated(const std::string& robot, double one_way_s, double loss, bool predict,
+           double seconds = 8.0, std::vector<Outage> outages = {}, const Real& of = {})
+      : BundledRun(robot, "teleoperation",
+                   {.duration_s = seconds,
+                    .change =
+                        [&](runtime::Experiment& e) {
+                          TeleConfig& config = e.teleoperation->link;
+                          config.up = config.down =
+                              NetworkConfig{.delay_s = one_way_s, .loss = loss, .limit = 10'000};
+                          config.playout_ns = std::llround(1e9 * (one_way_s + 0.02));
+                          config.predict = predict;
+                          config.outages = std::move(outages);
+                        }},
+                   {}, [&](runtime::Composition& c) { return connect(c, robot, of); }),
+        map_(*ModelMap::make(hal::robot_of(experiment->robot), &run->kernels())),
+        site_(*site_index(run->kernels(), led(robot).site)) {}
+  void operate() {
     while (cycle->step()) {
       if (cycle->phase() != runtime::RunPhase::kRunning) continue;
       Row row;
@@ -121,12 +97,12 @@ class Operated {
       };
       row.hand = copy(cycle->command().position_rad());
       row.seen = copy(cycle->state().position_rad());
-      row.robot = copy(far_->truth().position_rad());
-      row.robot_velocity = copy(far_->truth().velocity_rad_s());
+      row.robot = copy(run->truth().position_rad());
+      row.robot_velocity = copy(run->truth().velocity_rad_s());
       row.reference = copy(link->robot_command().position_rad());
-      const auto q = far_->truth().base_quaternion();
+      const auto q = run->truth().base_quaternion();
       row.tilt = 2.0 * std::asin(std::min(1.0, std::hypot(q[0], q[1])));
-      row.height_m = far_->truth().base_position_m()[2];
+      row.height_m = run->truth().base_position_m()[2];
       rows.push_back(std::move(row));
     }
     for (const runtime::Fault& fault : cycle->faults()) EXPECT_FALSE(fault.latched) << fault.text;
@@ -154,12 +130,10 @@ class Operated {
   double return_step_rad() const {
     double fastest_rad_s = 0.0;
     for (const std::size_t joint : moved())
-      fastest_rad_s = std::max(fastest_rad_s, experiment_->robot.joints[joint].max_velocity_rad_s);
-    return 0.25 * fastest_rad_s * 1e-9 * static_cast<double>(experiment_->loop.period_ns);
+      fastest_rad_s = std::max(fastest_rad_s, experiment->robot.joints[joint].max_velocity_rad_s);
+    return 0.25 * fastest_rad_s * 1e-9 * static_cast<double>(experiment->loop.period_ns);
   }
 
-  std::unique_ptr<TeleBackend> link;
-  std::unique_ptr<RobotCycle> cycle;
   std::vector<Row> rows;
 
  private:
@@ -174,23 +148,17 @@ class Operated {
   }
   /// In the base's frame, of joints in the image's order.
   Eigen::Vector3d hand_m(const std::vector<double>& image) const {
-    std::vector<double> q(kernels_->nq), zero(kernels_->nv);
-    std::vector<double> pose(12 * kernels_->sites), motion(6 * kernels_->sites);
-    if (kernels_->floating_base != 0) q[6] = 1.0;
+    const tandem_kernels& k = run->kernels();
+    std::vector<double> q(k.nq), zero(k.nv);
+    std::vector<double> pose(12 * k.sites), motion(6 * k.sites);
+    if (k.floating_base != 0) q[6] = 1.0;
     map_.positions_to_q(image, q);
-    kernels_->site_motion(q.data(), zero.data(), zero.data(), pose.data(), motion.data(),
-                          motion.data());
+    k.site_motion(q.data(), zero.data(), zero.data(), pose.data(), motion.data(), motion.data());
     return Eigen::Map<const Eigen::Vector3d>(&pose[12 * site_ + 9]);
   }
 
-  std::unique_ptr<runtime::Experiment> experiment_;
-  model::KernelLibrary kernels_;
   ModelMap map_;
-  std::size_t site_ = 0;
-  std::unique_ptr<test::PayloadKernels> loaded_;
-  std::unique_ptr<runtime::ControllerHost> host_;
-  sim::SimRobot* far_ = nullptr;
-  rt::WallClock clock_;
+  std::size_t site_;
 };
 
 std::size_t cycles_of(double seconds) {
@@ -203,8 +171,8 @@ INSTANTIATE_TEST_SUITE_P(Robots, Teleoperation, testing::Values("panda", "coman"
 
 TEST_P(Teleoperation, PredictionShowsTheHandAtAQuarterOfASecond) {
   Operated predicted(GetParam(), 0.25, 0.1, true), plain(GetParam(), 0.25, 0.1, false);
-  predicted.run();
-  plain.run();
+  predicted.operate();
+  plain.operate();
   const double with = predicted.error(&Row::seen), without = plain.error(&Row::seen);
   // The robot does what the hand did, later by the time of play-out, whatever is lost.
   const std::size_t later = cycles_of(0.27);
@@ -223,10 +191,10 @@ TEST_P(Teleoperation, PredictionShowsTheHandAtAQuarterOfASecond) {
 /// A robot that differs from its model: what the operator sees is what it does a moment later.
 void expect_corrected(const std::string& robot, const Real& real, double seconds,
                       const char* what) {
-  Operated operated(robot, 0.25, 0.1, true, seconds, {}, real);
   Operated plain(robot, 0.25, 0.1, false, seconds);
-  operated.run();
-  plain.run();
+  Operated operated(robot, 0.25, 0.1, true, seconds, {}, real);  // last: kernels of one payload
+  operated.operate();
+  plain.operate();
   const double with = operated.error(&Row::seen), without = plain.error(&Row::seen);
   const double differs = operated.prediction_error(cycles_of(0.27));
   fmt::print(
@@ -275,8 +243,8 @@ Worst worst_of(const Operated& operated) {
 TEST_P(Teleoperation, HoldsWhenTheLinkIsGoneAndReturnsWithoutAStep) {
   Operated operated(GetParam(), 0.1, 0.1, true, 8.0, {{4'500'000'000, 6'500'000'000}});
   Operated whole(GetParam(), 0.1, 0.1, true, 8.0);
-  operated.run();
-  whole.run();
+  operated.operate();
+  whole.operate();
   const TeleFigures figures = operated.link->figures();
   EXPECT_EQ(figures.holds, 1U);
   EXPECT_NEAR(static_cast<double>(figures.starved_cycles), 2000.0, 60.0);
@@ -300,8 +268,8 @@ TEST_P(Teleoperation, HoldsWhenTheLinkIsGoneAndReturnsWithoutAStep) {
 
 TEST(TeleoperationLink, IsAFunctionOfItsSeed) {
   Operated a("panda", 0.05, 0.2, true, 2.0), b("panda", 0.05, 0.2, true, 2.0);
-  a.run();
-  b.run();
+  a.operate();
+  b.operate();
   ASSERT_EQ(a.rows.size(), b.rows.size());
   for (std::size_t i = 0; i < a.rows.size(); ++i) {
     ASSERT_EQ(a.rows[i].seen, b.rows[i].seen) << i;
@@ -315,7 +283,7 @@ TEST(TeleoperationTable, OfDelaysAndLosses) {
   if (file == nullptr)
     GTEST_SKIP() << "in make test-all: TANDEM_TELEOPERATION names no file for the table";
   std::ofstream out(file);
-  out << "robot delay_ms loss predicted_mm plain_mm robot_mm prediction_mm loaded_prediction_mm "
+  out << "robot delay_ms loss predicted_mm plain_mm robot_mm prediction_mm loadedprediction_mm "
          "starved_ms\n";
   for (const char* robot : {"panda", "coman"}) {
     for (const double delay_s : {0.0, 0.1, 0.25, 0.5}) {
@@ -323,7 +291,7 @@ TEST(TeleoperationTable, OfDelaysAndLosses) {
         Operated predicted(robot, delay_s, loss, true, 12.0);
         Operated plain(robot, delay_s, loss, false, 12.0);
         Operated carries(robot, delay_s, loss, true, 12.0, {}, {.payload = true});
-        for (Operated* one : {&predicted, &plain, &carries}) one->run();
+        for (Operated* one : {&predicted, &plain, &carries}) one->operate();
         EXPECT_EQ(predicted.link->figures().starved_cycles, 0U) << robot << " " << delay_s;
         const double with = predicted.error(&Row::seen);
         const double without = plain.error(&Row::seen);

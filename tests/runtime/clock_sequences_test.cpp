@@ -12,11 +12,7 @@
 #include <random>
 #include <thread>
 
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/hal/fake_backend.hpp"
-#include "tests/runtime/first_order_robot.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -157,17 +153,13 @@ class Watchdog {
 };
 
 /// One run of the sequence; the loop's thread lives from construction to done().
-struct Played {
-  explicit Played(const Sequence& s)
-      : robot(hal::test::fake_robot()), backend(robot), host(robot, nullptr, 1'000'000) {
+struct Played : test::JointRun {
+  explicit Played(const Sequence& s) {
     backend.bring_up_cycles = kBringUp;
     backend.shut_down_cycles = kShutDown;
-    EXPECT_TRUE(host.add("sine", std::make_unique<test::Sine>(std::vector<std::size_t>{0}),
-                         test::parameters()));
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{.robot = robot, .backend = backend, .controllers = host, .clock = clock},
-        CycleConfig{.loop = {.rate = s.rate, .start_paused = s.start_paused},
-                    .running_cycles = s.running_cycles});
+    add_sine();
+    begin({.loop = {.rate = s.rate, .start_paused = s.start_paused},
+           .running_cycles = s.running_cycles});
     loop = std::thread([this] {
       cycle->run();
       over.store(true);
@@ -178,11 +170,6 @@ struct Played {
   /// Cycles at which it stands; empty when the run was over before.
   std::optional<std::uint64_t> pause();
 
-  hal::RobotConfig robot;
-  test::FirstOrderRobot backend;
-  ControllerHost host;
-  rt::WallClock clock;
-  std::unique_ptr<RobotCycle> cycle;
   std::atomic<std::uint64_t> asked_for{0}, dropped{0};  // cycles of steps
   std::atomic<bool> over{false};
   std::thread loop;

@@ -5,7 +5,7 @@
 
 #include "hal/sim/rotation.hpp"
 #include "hal/sim/setup.hpp"
-#include "tests/runtime/squat_run.hpp"
+#include "tests/runtime/bundled_run.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -13,9 +13,9 @@ namespace {
 constexpr double kPastTheEnd_rad = 0.05;  // that docs/simulation.md allows
 
 /// An experiment whose faults wait for a reset, and what is watched of it every cycle.
-struct Collapse : Squat {
+struct Collapse : BundledRun {
   explicit Collapse(const std::string& robot, const std::string& name)
-      : Squat(robot, 1'000'000, 0.0, nullptr, false, name, {.after_stop = AfterStop::kWait}) {
+      : BundledRun(robot, name, {.duration_s = 1000.0, .on_fault = "wait"}) {
     ranges = sim::mechanical_ranges(experiment->robot, *experiment->tree());
   }
   [[nodiscard]] const sim::Plant& plant() const { return backend->plant(); }
@@ -135,11 +135,11 @@ TEST(Collapse, OfComanGainsNoEnergyAndIsFromItsLowestPointAfterARetreat) {
 // Without dampers and friction the ground's forces are the slope of its springs' energy: an
 // independent way to every entry of J^T f.
 TEST(Collapse, LiesOnForcesThatAreTheSlopeOfTheGroundsEnergy) {
-  Squat squat("coman");
+  BundledRun squat("coman", "squat");
   hal::RobotConfig robot = squat.experiment->robot;
   robot.contact.damping_s_m = robot.contact.tangential_damping_Ns_m = 0.0;
   robot.contact.static_friction = robot.contact.sliding_friction = 0.0;
-  const tandem_kernels& k = *squat.kernels.get();
+  const tandem_kernels& k = squat.run->kernels();
   const double* start = squat.backend->plant().q();
   const auto postures = sim::postures_within(
       k, {start, k.nq}, sim::mechanical_ranges(robot, *squat.experiment->tree()));
@@ -174,15 +174,23 @@ TEST(Collapse, LiesOnForcesThatAreTheSlopeOfTheGroundsEnergy) {
   }
 }
 
+/// Ground that its file does not know of: the robot sank to -6.4 m, with status 0.
+Diagnostics on_soft_ground(Composition& c) {
+  hal::RobotConfig robot = c.experiment.robot;
+  robot.contact.stiffness_N_m *= 1e-4;
+  auto made = sim::SimRobot::create(robot, c.kernels.get(), c.experiment.sim_robot_config());
+  if (!made) return {made.error()};
+  c.sim = made->get();
+  c.backend = std::move(*made);
+  return {};
+}
+
 TEST(Collapse, OfARunningRobotIsAFaultWithItsTime) {
   for (const bool allowed : {false, true}) {
-    Squat squat("coman", 4000);
-    squat.experiment->falls_are_faults = !allowed;
-    squat.wanted.fall = squat.experiment->fall_limits();
-    squat.experiment->robot.contact.stiffness_N_m *= 1e-4;  // it sank to -6.4 m, with status 0
-    squat.host.reset();
-    squat.cycle.reset();
-    squat.compose("coman", 4000, nullptr);
+    BundledRun squat(
+        "coman", "squat",
+        {.duration_s = 4.0, .change = [=](Experiment& e) { e.falls_are_faults = !allowed; }}, {},
+        on_soft_ground);
     squat.cycle->run();
     const auto faults = squat.cycle->faults();
     if (allowed) {

@@ -17,10 +17,9 @@ TEST(Push, IsTheTransposedJacobianTimesItsForce) {
       push_on(run.experiment->robot, "panda_joint7", force_N, 2.0, 2.0, {0, 0, 0.107});
   ASSERT_EQ(run.backend->robot().inject(push), Code::kOk);
   run.run_to(RunPhase::kRunning);
-  while (run.backend->robot().faults()[0].active == 0 && run.cycle->step()) {
-  }
+  run.run_to_fault();
   for (int i = 0; i < 300; ++i) run.cycle->step();
-  const tandem_kernels& k = *run.kernels;
+  const tandem_kernels& k = run.run->kernels();
   std::vector<double> J(6 * k.nv * k.sites), expected(k.nv), found(k.nv);
   constexpr int kCycles = 1500;  // the drives' torques are coarse: single values differ by 0.3 Nm
   for (int i = 0; i < kCycles; ++i) {
@@ -68,8 +67,7 @@ TEST(Collision, ThatNoJointFeelsIsFoundAtTheBase) {
   const sim::Fault push =
       push_on(run.experiment->robot, "LHipYaw", {-9.0, 2.0, 49.0}, 3.0, 0.2, {0.0, 0.0, -0.1});
   ASSERT_EQ(run.backend->robot().inject(push), Code::kOk);
-  while (run.cycle->step() && run.backend->robot().faults()[0].active == 0) {
-  }
+  run.run_to_fault();
   ASSERT_TRUE(run.cycle->faults().empty()) << run.cycle->faults()[0].text;
   for (int i = 0; i < 50; ++i) ASSERT_TRUE(run.cycle->step());
   EXPECT_EQ(run.estimate().base_collided()[0], 1);
@@ -89,8 +87,7 @@ TEST(Push, OnAHumanoidIsTheBasesExternalForce) {
   ASSERT_EQ(run.backend->robot().inject(
                 push_on(run.experiment->robot, "LShLat", force_N, 3.0, 0.5, {0.0, 0.0, -0.1})),
             Code::kOk);
-  while (run.cycle->step() && run.backend->robot().faults()[0].active == 0) {
-  }
+  run.run_to_fault();
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (int i = 0; i < 400; ++i) {
     ASSERT_TRUE(run.cycle->step());

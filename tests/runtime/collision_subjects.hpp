@@ -107,8 +107,7 @@ void pushed(const Subject& s, std::size_t place, double force_N, std::uint64_t s
   const sim::Fault push =
       push_on(run.experiment->robot, joint, {way.x(), way.y(), way.z()}, at_s, 0.2, point);
   ASSERT_EQ(run.backend->robot().inject(push), Code::kOk);
-  while (run.cycle->step() && run.backend->robot().faults()[0].active == 0) {
-  }
+  run.run_to_fault();
   see(felt(run));
   for (int i = 1; i < 200 && run.cycle->step(); ++i) see(felt(run));
 }

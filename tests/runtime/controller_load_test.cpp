@@ -86,8 +86,8 @@ TEST(ControllerLoad, LeavesAControllerBehindThatDoesNotComeBack) {
   run.run();
   for (const bool exits : {false, true}) {
     const auto made =
-        run.host.configure("lost", std::make_shared<Lost>(exits), document_of("").root(),
-                           std::chrono::milliseconds(exits ? 60'000 : 100));
+        run.host->configure("lost", std::make_shared<Lost>(exits), document_of("").root(),
+                            std::chrono::milliseconds(exits ? 60'000 : 100));
     ASSERT_FALSE(made);
     EXPECT_EQ(made.error().key, "lost");
     EXPECT_EQ(made.error().message, exits ? "the controller called exit()"

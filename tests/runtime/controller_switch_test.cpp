@@ -93,15 +93,15 @@ TEST(ControllerSwitch, IsAllOrNothing) {
 TEST(ControllerSwitch, HoldsWhatAStoppedControllerLeaves) {
   SwitchRun run;
   run.run();
-  const double before = run.position(0);
+  const double before = run.reference(0);
   run.steps(1);
-  const double last = run.position(0);
+  const double last = run.reference(0);
   ASSERT_TRUE(run.change({"left"}, {}));
   run.steps(300);
-  const double rest = run.position(0);
+  const double rest = run.reference(0);
   EXPECT_NEAR(rest - last, (last - before) * (1.0 + 250.0 / 2.0), 1e-9) << "it brakes for 0.25 s";
   run.steps(300);
-  EXPECT_EQ(run.position(0), rest);
+  EXPECT_EQ(run.reference(0), rest);
   EXPECT_EQ(run.cycle->command().velocity_rad_s()[0], 0.0);
   EXPECT_EQ(run.cycle->command().mode()[0], static_cast<std::int8_t>(ControlMode::kPosition));
 }

@@ -5,12 +5,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "runtime/robot_cycle.hpp"
 #include "runtime/trace_file.hpp"
-#include "tests/hal/fake_backend.hpp"
 #include "tests/log/scratch_folder.hpp"
-#include "tests/runtime/first_order_robot.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 #include "tests/support/rt_trap.hpp"
 
 // Linked with the real-time trap: a cycle that allocates, locks or blocks fails its test.
@@ -45,13 +42,14 @@ class BusRobot final : public test::FirstOrderRobot {
   TickingClock* clock_;
 };
 
-class TracedRun : public testing::Test {
+class TracedRun : public testing::Test, protected test::LoopRun {
  protected:
+  TracedRun() : LoopRun(hal::test::fake_robot()) { clock = &ticking; }
   void make(CycleConfig config, bool waits = true) {
     backend.waits = waits;
     config.running_cycles = 100;
     config.loop.pacing = rt::Pacing::kWallClock;
-    cycle = std::make_unique<RobotCycle>(CycleParts{robot, backend, host, clock}, config);
+    begin(backend, config);
   }
   Json written() {
     const std::string file = folder / "trace.json";
@@ -70,11 +68,8 @@ class TracedRun : public testing::Test {
   }
 
   const log::ScratchFolder folder;
-  hal::RobotConfig robot = hal::test::fake_robot();
-  TickingClock clock;
-  BusRobot backend{robot, clock};
-  ControllerHost host{robot, nullptr, 1'000'000};
-  std::unique_ptr<RobotCycle> cycle;
+  TickingClock ticking;
+  BusRobot backend{robot, ticking};
 };
 
 TEST_F(TracedRun, KeepsTheLastCyclesWithTheirStagesInOrder) {
@@ -194,7 +189,7 @@ TEST_F(TracedRun, CountsWakeUpLatencyAndWorkPerCycle) {
 TEST_F(TracedRun, MarksOverrunsAndFaults) {
   make({.trace_cycles = 1000});
   for (int i = 0; i < 60; ++i) (void)cycle->step();
-  clock.now += 2'500'000;
+  ticking.now += 2'500'000;
   (void)cycle->step();
   backend.faulted_joint = 1;
   cycle->run();

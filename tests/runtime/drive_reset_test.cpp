@@ -1,38 +1,23 @@
 // The reset of one joint's drive, on first-order joints: what it does in each phase, and to whom it
 // is refused. The whole chain: sim_reset_test.cpp.
-#include <chrono>
-#include <future>
-
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/hal/fake_backend.hpp"
-#include "tests/runtime/first_order_robot.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 
 namespace tandem::runtime {
 namespace {
 
 /// The shoulder is a controller's, elbow and wrist are nobody's.
-struct DriveReset : testing::Test {
+struct DriveReset : testing::Test, test::JointRun {
   void begin(hal::StopCategory on_fault) {
     for (hal::JointConfig& joint : robot.joints) joint.on_fault = on_fault;
-    ASSERT_TRUE(host.add("sine", std::make_shared<test::Sine>(std::vector<std::size_t>{0}),
-                         test::parameters()));
-    cycle = std::make_unique<RobotCycle>(CycleParts{robot, backend, host, clock},
-                                         CycleConfig{.after_stop = AfterStop::kWait});
+    add_sine();
+    JointRun::begin({.after_stop = AfterStop::kWait});
     steps(100);
     ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
-  }
-  void steps(int count) {
-    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
   }
   /// What the loop answers to `ask`, called on another thread.
   template <class Ask>
   [[nodiscard]] std::string answered(const Ask& ask) {
-    auto asked = std::async(std::launch::async, [&] { return ask(cycle->services()); });
-    while (asked.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready) steps(1);
-    const Result<RequestResult> answer = asked.get();
-    return answer ? std::string("done") : answer.error().to_string();
+    return text(while_cycling([&] { return ask(services()); }), "done");
   }
   [[nodiscard]] std::string reset(const std::string& joint) {
     return answered([&](RunServices& services) { return services.reset_joint(joint); });
@@ -42,18 +27,9 @@ struct DriveReset : testing::Test {
     steps(2);
     ASSERT_EQ(cycle->fault_log().latched(), 1U);
   }
-  [[nodiscard]] JointStatus look(std::size_t joint) {
-    return cycle->services().joints()[joint].look;
-  }
   static void has(const std::string& text, const char* words) {
     EXPECT_NE(text.find(words), std::string::npos) << text;
   }
-
-  hal::RobotConfig robot = hal::test::fake_robot();
-  test::FirstOrderRobot backend{robot};
-  ControllerHost host{robot, nullptr, 1'000'000};
-  rt::WallClock clock;
-  std::unique_ptr<RobotCycle> cycle;
 };
 
 TEST_F(DriveReset, OfAFaultedRunClearsOneDriveAndLeavesTheRunStopped) {

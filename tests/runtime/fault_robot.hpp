@@ -12,9 +12,7 @@
 #include "hal/ethercat-can/drive_master.hpp"
 #include "hal/sim/emulated_robot.hpp"
 #include "hal/sim/in_process_line.hpp"
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 
 namespace tandem::runtime::test {
 
@@ -126,20 +124,16 @@ struct Outcome {
 };
 
 /// A whole run: one joint moves on a sine, the others are held.
-struct FaultRig {
-  FaultRig(hal::RobotConfig config, const tandem_kernels* kernels, const std::string& posture,
+struct FaultRig : LoopRun {
+  FaultRig(hal::RobotConfig config, const tandem_kernels* its_kernels, const std::string& posture,
            std::vector<sim::Fault> scenario = {}, std::int64_t release_ns = 100'000'000)
-      : robot(std::move(config)), host(robot, kernels, 1'000'000) {
+      : LoopRun(std::move(config), its_kernels) {
     backend = std::make_unique<FaultRobot>(
         robot, kernels,
         sim::SimRobotConfig{
             .posture = posture, .release_ns = release_ns, .faults = std::move(scenario)});
-    auto moves = std::make_shared<Sine>(std::vector<std::size_t>{0});
-    sine = moves.get();
-    EXPECT_TRUE(host.add("sine", std::move(moves), parameters("amplitude_rad = 0.1")));
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{robot, *backend, host, clock},
-        CycleConfig{.loop = {.pacing = rt::Pacing::kSimulated}, .settle_cycles = 150});
+    sine = add_sine({0}, "sine", true, "amplitude_rad = 0.1");
+    begin(*backend, {.settle_cycles = 150});
   }
   /// Into the motion, at its fastest.
   void run() {
@@ -192,12 +186,8 @@ struct FaultRig {
     return all;
   }
 
-  hal::RobotConfig robot;
-  ControllerHost host;
   std::unique_ptr<FaultRobot> backend;
   Sine* sine;
-  rt::WallClock clock;
-  std::unique_ptr<RobotCycle> cycle;
 };
 
 }  // namespace tandem::runtime::test

@@ -20,16 +20,18 @@ struct PushedRun : EstimatedRun {
     if (robot != "coman") config.base.reset();
     config.collision.emplace();
     config.collision->reaction = reaction;
-    auto loaded = read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/" + robot +
-                                  (robot == "coman" ? "/squat.toml" : "/trajectory.toml"));
-    for (const hal::JointConfig& one : loaded->robot.joints)
-      config.collision->thresholds.push_back({one.name, 1.0});
-    return {.noise = false, .estimation = config, .cycle = {.after_stop = AfterStop::kWait}};
+    return {.noise = false,
+            .estimation = config,
+            .change =
+                [](Experiment& e) {
+                  for (const hal::JointConfig& one : e.robot.joints)
+                    e.estimation.collision->thresholds.push_back({one.name, 1.0});
+                },
+            .on_fault = "wait"};
   }
   Outcome watch() {
     run_to(RunPhase::kRunning);
-    while (backend->robot().faults()[0].active == 0 && cycle->step()) {
-    }
+    run_to_fault();
     EXPECT_TRUE(cycle->faults().empty()) << cycle->faults()[0].text;
     Outcome found;
     for (int i = 1; i <= 4000 && found.open < 0; ++i) {
@@ -92,8 +94,8 @@ TEST(CollisionInAnOperatorsMove, StopsTheRobot) {
   for (int i = 0; i < 1000; ++i) run.cycle->step();
   EXPECT_EQ(run.cycle->phase(), RunPhase::kHeld) << "somebody touches it";
   EXPECT_EQ(run.cycle->faults().size(), before);
-  ASSERT_TRUE(run.cycle->services().move_joint(
-      "elbow_joint", {.target_rad = 0.5, .speed_rad_s = 0.1}, RunServices::Patience{0}));
+  ASSERT_TRUE(run.cycle->services().move_joint("elbow_joint",
+                                               {.target_rad = 0.5, .speed_rad_s = 0.1}, kNow));
   int cycles = 0;
   while (run.backend->robot().faults()[2].active == 0) run.cycle->step();
   while (run.cycle->phase() == RunPhase::kHeld && ++cycles < 200) run.cycle->step();

@@ -7,8 +7,8 @@
 #include "canopen/messages.hpp"
 #include "rt/stop_signal.hpp"
 #include "runtime/loop_watchdog.hpp"
+#include "tests/runtime/bundled_run.hpp"
 #include "tests/runtime/fault_row.hpp"
-#include "tests/runtime/squat_run.hpp"
 #include "tests/support/eventually.hpp"
 
 namespace tandem::runtime {
@@ -17,18 +17,16 @@ namespace {
 using namespace test;
 
 /// COMAN's squat, with faults that wait for a reset.
-struct ComanRig : Squat {
-  explicit ComanRig(const CycleConfig& config = {.after_stop = AfterStop::kWait})
-      : Squat("coman", 1'000'000, 0.0, nullptr, false, "squat", config) {}
+struct ComanRig : BundledRun {
+  explicit ComanRig(std::function<void(Experiment&)> change = {})
+      : BundledRun("coman", "squat",
+                   {.duration_s = 1000.0, .on_fault = "wait", .change = std::move(change)}) {}
 
   /// Into the first descent.
-  void run() {
+  void descend() {
     run_to(RunPhase::kRunning);
     steps(2000);
     ASSERT_TRUE(cycle->faults().empty()) << cycle->faults()[0].text;
-  }
-  void steps(int count) {
-    for (int i = 0; i < count; ++i) (void)cycle->step();
   }
   [[nodiscard]] sim::EmulatedRobot& robot() { return backend->robot(); }
   /// A period passes without the master.
@@ -87,26 +85,19 @@ struct ComanRig : Squat {
 
 /// COMAN with a controller of the test instead of its squat.
 struct OtherRig : ComanRig {
-  OtherRig(const CycleConfig& config, const char* name, std::shared_ptr<Controller> controller,
+  OtherRig(const char* name, std::shared_ptr<Controller> controller,
            const std::string& its_parameters = "")
-      : ComanRig(config) {
-    wanted.fall = experiment->fall_limits();
-    cycle.reset();
-    Experiment& e = *experiment;
-    host = std::make_unique<ControllerHost>(e.robot, kernels.get(), e.loop.period_ns);
-    EXPECT_TRUE(host->add(name, std::move(controller), parameters(its_parameters)));
-    CycleConfig all = wanted;
-    all.loop = e.loop;
-    all.running_cycles = 1'000'000;
-    all.settle_cycles = e.settle_cycles();
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{e.robot, *backend, *host, clock, nullptr, &backend->truth()}, all);
+      : ComanRig([](Experiment& e) {
+          e.controllers.clear();
+          e.on_stray = hal::StopCategory::kCategory1;
+        }) {
+    EXPECT_TRUE(run->controllers().add(name, std::move(controller), parameters(its_parameters)));
   }
 };
 
 TEST(FaultRow, MasterOfComanDies) {
   ComanRig rig;
-  rig.run();
+  rig.descend();
   ASSERT_TRUE(rig.robot().all_enabled());
   expect_row(rig.watch_without_master());
   for (std::size_t b = 0; b < rig.boards(); ++b) {
@@ -125,8 +116,8 @@ TEST(FaultRow, ControllerOfComanHangs) {
       {.limit = std::chrono::milliseconds(50), .grace = std::chrono::hours(1)},
       {.on_hang =
            [&](bool) {
-             hung_in = rig.host.at_work();
-             rig.cycle->inbox().watchdog_stop(rig.host.at_work());
+             hung_in = rig.host->at_work();
+             rig.cycle->inbox().watchdog_stop(rig.host->at_work());
            },
        .on_return = [&] { back = true; },
        .on_given_up = [&] { given_up = true; }});
@@ -143,7 +134,7 @@ TEST(FaultRow, ControllerOfComanHangs) {
     rig.note(found, i, noticed);
   }
   expect_row(found);
-  EXPECT_EQ(rig.host.name(static_cast<std::size_t>(hung_in)), "sine");
+  EXPECT_EQ(rig.host->name(static_cast<std::size_t>(hung_in)), "sine");
   rig.sine->hangs = false;
   loop.join();
   EXPECT_TRUE(tandem::test::eventually([&] { return back.load(); }));
@@ -156,7 +147,7 @@ TEST(FaultRow, ControllerOfComanHangs) {
 
 TEST(FaultRow, AnotherMasterStopsTheNodesOfComan) {
   ComanRig rig;
-  rig.run();
+  rig.descend();
   rig.command_nodes(canopen::NmtCommand::kStop);
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("no complete TPDO for 10 cycles"), std::string::npos) << rig.causes();
@@ -164,7 +155,7 @@ TEST(FaultRow, AnotherMasterStopsTheNodesOfComan) {
 
 TEST(FaultRow, AnotherMasterResetsTheNodesOfComan) {
   ComanRig rig;
-  rig.run();
+  rig.descend();
   rig.command_nodes(canopen::NmtCommand::kResetNode);
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("booted again by itself"), std::string::npos) << rig.causes();
@@ -175,7 +166,7 @@ TEST(FaultRow, TerminalOfComanIsClosed) {
   rt::clear_stop();
   rt::install_stop_signals();
   ComanRig rig;
-  rig.run();
+  rig.descend();
   ASSERT_EQ(::raise(SIGHUP), 0);
   Outcome found = rig.watch();
   EXPECT_EQ(found.noticed, -1) << "it is no fault";
@@ -187,8 +178,7 @@ TEST(FaultRow, TerminalOfComanIsClosed) {
 TEST(FaultRow, ControllerOfComanWritesWithoutAClaim) {
   auto stray = std::make_shared<test::Stray>(0, false);
   stray->scribbles = false;
-  OtherRig rig({.after_stop = AfterStop::kWait, .on_stray = hal::StopCategory::kCategory1}, "stray",
-               stray);
+  OtherRig rig("stray", stray);
   rig.run_to(RunPhase::kRunning);
   rig.steps(100);
   ASSERT_FALSE(rig.noticed()) << rig.causes();
@@ -200,9 +190,9 @@ TEST(FaultRow, ControllerOfComanWritesWithoutAClaim) {
 
 TEST(FaultRow, JointOfComanRings) {
   ComanRig rig;
-  rig.run();
-  const auto set = rig.cycle->services().set_gains(
-      "RElbj", hal::PidLoop::kPosition, {.kp = 4e5, .kd = 4e3}, RunServices::Patience{0});
+  rig.descend();
+  const auto set = rig.cycle->services().set_gains("RElbj", hal::PidLoop::kPosition,
+                                                   {.kp = 4e5, .kd = 4e3}, kNow);
   ASSERT_TRUE(set) << set.error().to_string();
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("the joint oscillates"), std::string::npos) << rig.causes();
@@ -212,7 +202,7 @@ TEST(FaultRow, JointOfComanRings) {
 double retreat(ComanRig& rig) {
   rig.run_to(RunPhase::kRunning);
   const double standing_m = rig.height_m();
-  rig.run();
+  rig.descend();
   (void)rig.cycle->inbox().emergency_stop(hal::StopCategory::kCategory2);
   Outcome found;
   double stopped_m = 0.0;
@@ -232,29 +222,25 @@ TEST(FaultRow, RetreatOfComan) {
 }
 
 TEST(FaultRow, RetreatOfComanWithBrakes) {
-  ComanRig rig;
-  for (hal::JointConfig& joint : rig.experiment->robot.joints) {
-    joint.brake = hal::BrakeConfig{.torque_Nm = 60.0, .release_ms = 30, .engage_ms = 30};
-  }
-  rig.cycle.reset();
-  rig.compose("coman", 1'000'000, nullptr);
+  ComanRig rig([](Experiment& e) {
+    for (hal::JointConfig& joint : e.robot.joints) {
+      joint.brake = hal::BrakeConfig{.torque_Nm = 60.0, .release_ms = 30, .engage_ms = 30};
+    }
+  });
   const double stopped_m = retreat(rig);
   rig.steps(3000);
   EXPECT_NEAR(rig.height_m(), stopped_m, 0.01) << "it stays in its squat";
   rig.reset();
-  ASSERT_TRUE(rig.cycle->services().go_on(RunServices::Patience{0}));
+  ASSERT_TRUE(rig.cycle->services().go_on(kNow));
   rig.steps(3000);
   EXPECT_EQ(rig.cycle->phase(), RunPhase::kRunning) << rig.causes();
 }
 
 TEST(FaultRow, ResetOfComanHolds) {
-  ComanRig rig;
-  for (hal::JointConfig& joint : rig.experiment->robot.joints) {
-    joint.on_fault = hal::StopCategory::kHold;
-  }
-  rig.cycle.reset();
-  rig.compose("coman", 1'000'000, nullptr);
-  rig.run();
+  ComanRig rig([](Experiment& e) {
+    for (hal::JointConfig& joint : e.robot.joints) joint.on_fault = hal::StopCategory::kHold;
+  });
+  rig.descend();
   sim::Fault fault = of(FaultKind::kEncoderUnplug);
   fault.duration_ns = 5'000'000;
   ASSERT_EQ(rig.robot().inject(fault), Code::kOk);
@@ -272,7 +258,7 @@ TEST(FaultRow, ResetOfComanHolds) {
   EXPECT_TRUE(std::ranges::equal(rig.cycle->command().position_rad(), references))
       << "no reference moves";
   EXPECT_NEAR(rig.height_m(), before_m, 0.005) << "it stands where it was stopped";
-  ASSERT_TRUE(rig.cycle->services().go_on(RunServices::Patience{0}));
+  ASSERT_TRUE(rig.cycle->services().go_on(kNow));
   rig.steps(10);
   EXPECT_EQ(rig.cycle->phase(), RunPhase::kRunning);
   EXPECT_FALSE(std::ranges::equal(rig.cycle->command().position_rad(), references));
@@ -282,15 +268,14 @@ TEST(FaultRow, ComanFalls) {
   const auto lowered = tandem::test::load_test_robot("coman").robot.joints;
   const auto knee = std::ranges::find(lowered, "LKneeSag", &hal::JointConfig::name);
   OtherRig rig(
-      {.after_stop = AfterStop::kWait}, "sine",
-      std::make_shared<Sine>(std::vector{static_cast<std::size_t>(knee - lowered.begin())}),
+      "sine", std::make_shared<Sine>(std::vector{static_cast<std::size_t>(knee - lowered.begin())}),
       "amplitude_rad = 1.0");
   rig.run_to(RunPhase::kRunning);
   // The fault acts when the base passes what counts as fallen.
-  const double limit_m = rig.wanted.fall.lowest_share * rig.wanted.fall.standing_m;
+  const FallLimits& fall = rig.cycle->config().fall;
+  const double limit_m = fall.lowest_share * fall.standing_m;
   int until = 0;
-  while (until < 5000 &&
-         tilt_of(rig.backend->truth().base_quaternion()) <= rig.wanted.fall.tilt_rad &&
+  while (until < 5000 && tilt_of(rig.backend->truth().base_quaternion()) <= fall.tilt_rad &&
          rig.backend->truth().base_position_m()[2] >= limit_m) {
     ASSERT_FALSE(rig.noticed()) << rig.causes() << " after " << until;
     (void)rig.cycle->step();
@@ -308,10 +293,7 @@ TEST(FaultRow, ComanFalls) {
 
 TEST(FaultRow, ComanLiesAfterAnEmergencyStop) {
   ComanRig rig;
-  rig.wanted.fall = rig.experiment->fall_limits();
-  rig.cycle.reset();
-  rig.compose("coman", 1'000'000, nullptr);
-  rig.run();
+  rig.descend();
   const double standing_m = rig.height_m();
   rig.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
   rig.steps(6000);
@@ -320,7 +302,7 @@ TEST(FaultRow, ComanLiesAfterAnEmergencyStop) {
   rig.reset();
   rig.steps(1000);
   EXPECT_EQ(rig.cycle->phase(), RunPhase::kHeld) << "it may lie there";
-  ASSERT_TRUE(rig.cycle->services().go_on(RunServices::Patience{0}));
+  ASSERT_TRUE(rig.cycle->services().go_on(kNow));
   Outcome found;
   for (int i = 1; i <= 4000 && found.open < 0; ++i) {
     (void)rig.cycle->step();

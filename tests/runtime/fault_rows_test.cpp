@@ -236,8 +236,8 @@ TEST_P(FaultRow, EncoderFreezesAtRest) {
   expect_running(rig);
   expect_row({});
   const double from_rad = rig.cycle->command().position_rad()[2];
-  ASSERT_TRUE(rig.cycle->services().move_joint(
-      rig.robot.joints[2].name, {.target_rad = from_rad + 0.05}, RunServices::Patience{0}));
+  ASSERT_TRUE(rig.cycle->services().move_joint(rig.robot.joints[2].name,
+                                               {.target_rad = from_rad + 0.05}, kNow));
   EXPECT_GT(rig.watch().safe, 0) << "it did freeze";
   EXPECT_NE(rig.causes().find("0x7320"), std::string::npos) << rig.causes();
 }
@@ -319,8 +319,7 @@ TEST_P(FaultRow, JointRings) {
   ASSERT_NE(gains, rig.robot.gains.end());
   ASSERT_TRUE(rig.cycle->services().set_gains(
       joint.name, hal::PidLoop::kPosition,
-      {.kp = 175.0 * gains->position.gains.kp, .kd = 50.0 * gains->position.gains.kd},
-      RunServices::Patience{0}));
+      {.kp = 175.0 * gains->position.gains.kp, .kd = 50.0 * gains->position.gains.kd}, kNow));
   expect_row(rig.watch());
   expect_stopped(rig, "0xFF03");
   EXPECT_NE(rig.causes().find("the joint oscillates"), std::string::npos) << rig.causes();
@@ -330,8 +329,7 @@ TEST(FaultRow, JointSwings) {
   RowRig rig("ur5e");
   rig.run();
   ASSERT_TRUE(rig.cycle->services().set_gains(rig.robot.joints[1].name, hal::PidLoop::kPosition,
-                                              {.kp = 1000.0, .ki = 8000.0, .kd = 0.0},
-                                              RunServices::Patience{0}));
+                                              {.kp = 1000.0, .ki = 8000.0, .kd = 0.0}, kNow));
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("the joint oscillates"), std::string::npos) << rig.causes();
 }
@@ -340,8 +338,7 @@ TEST(FaultRow, JointSwingsOfPanda) {
   RowRig rig("panda");
   rig.run();
   ASSERT_TRUE(rig.cycle->services().set_gains(rig.robot.joints[2].name, hal::PidLoop::kPosition,
-                                              {.kp = 400.0, .ki = 8000.0, .kd = 0.0},
-                                              RunServices::Patience{0}));
+                                              {.kp = 400.0, .ki = 8000.0, .kd = 0.0}, kNow));
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("the joint oscillates"), std::string::npos) << rig.causes();
 }

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <functional>
 
-#include "tests/runtime/joint_run.hpp"
+#include "tests/runtime/loop_run.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -11,7 +11,6 @@ using hal::ControlMode;
 using test::Keeper;
 using test::Runner;
 
-constexpr RunServices::Patience kAtOnce{0};
 constexpr double kSpeed_rad_s = 1.0;
 constexpr double kMostAcceleration_rad_s2 = 20.0;
 
@@ -75,8 +74,8 @@ hal::RobotConfig wide_robot() {
 /// What has joint 0, and moves it.
 enum class By { kController, kSilentController, kOperator, kVelocityMode, kTorqueMode, kOwner };
 
-struct MovingRun {
-  explicit MovingRun(By by, std::uint32_t delay_cycles = 0) : by_(by) {
+struct MovingRun : test::LoopRun {
+  explicit MovingRun(By by, std::uint32_t delay_cycles = 0) : LoopRun(wide_robot()), by_(by) {
     runner = std::make_shared<Runner>(kSpeed_rad_s, by != By::kSilentController);
     const bool controlled = by == By::kController || by == By::kSilentController;
     add("runner", runner, controlled);
@@ -86,29 +85,25 @@ struct MovingRun {
     add("at_once", std::make_shared<test::Sine>(std::vector<std::size_t>{0}), false);
     add("retreater", std::make_shared<Retreater>(), true);
     auto remote = std::make_shared<OwnerController>();
-    const RemoteCommandParts parts{&owner, remote.get(), host.size()};
+    LoopRun::owner = {&owner, remote.get(), host->size()};
     add(kOwnerController, remote, false);
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{robot, backend, host, clock, nullptr, nullptr, nullptr, parts},
-        CycleConfig{
-            .settle_cycles = 20, .after_stop = AfterStop::kWait, .delay_cycles = delay_cycles});
+    begin(backend,
+          {.settle_cycles = 20, .after_stop = AfterStop::kWait, .delay_cycles = delay_cycles});
     steps(100);
     if (by == By::kOperator) {
       EXPECT_TRUE(cycle->services().move_joint(
-          "shoulder", {.target_rad = 40.0, .speed_rad_s = kSpeed_rad_s}, kAtOnce));
+          "shoulder", {.target_rad = 40.0, .speed_rad_s = kSpeed_rad_s}, test::kNow));
     } else if (by == By::kOwner) {
       owner.here = true;
     } else if (!controlled) {
       const auto mode = by == By::kVelocityMode ? ControlMode::kVelocity : ControlMode::kTorque;
       EXPECT_TRUE(cycle->services().set_joint("shoulder", {.mode = static_cast<std::int32_t>(mode)},
-                                              kAtOnce));
+                                              test::kNow));
     }
     steps(700);
     EXPECT_NEAR(speed(), kSpeed_rad_s, 1e-6);
   }
-  void add(const std::string& name, std::shared_ptr<Controller> controller, bool active) {
-    ASSERT_TRUE(host.add(name, std::move(controller), test::parameters(), active));
-  }
+  ~MovingRun() { cycle.reset(); }  // it lets the owner go
   void steps(int count) {
     for (int i = 0; i < count; ++i) {
       before_rad = reference();
@@ -126,13 +121,9 @@ struct MovingRun {
   }
 
   By by_;
-  hal::RobotConfig robot = wide_robot();
   Coasting backend{robot};
   FakeOwner owner{robot.shape()};
-  ControllerHost host{robot, nullptr, 1'000'000};
-  rt::WallClock clock;
   std::shared_ptr<Runner> runner;
-  std::unique_ptr<RobotCycle> cycle;
   double before_rad = 0.0;
 };
 
@@ -168,11 +159,11 @@ void switched(MovingRun& run, const char* to) {
   if (run.by_ == By::kOwner) {
     run.owner.here = false;
   } else if (!controlled && to == nullptr && run.moves_by_position()) {
-    ASSERT_TRUE(run.cycle->services().move_joint("shoulder", {}, kAtOnce));
+    ASSERT_TRUE(run.cycle->services().move_joint("shoulder", {}, test::kNow));
   } else if (!controlled && to == nullptr) {
-    ASSERT_TRUE(run.cycle->services().set_joint("shoulder", {.mode = 1}, kAtOnce));
+    ASSERT_TRUE(run.cycle->services().set_joint("shoulder", {.mode = 1}, test::kNow));
   } else {
-    ASSERT_TRUE(run.cycle->services().switch_controllers(stop, start, kAtOnce));
+    ASSERT_TRUE(run.cycle->services().switch_controllers(stop, start, test::kNow));
   }
 }
 

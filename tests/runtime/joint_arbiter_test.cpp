@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "tests/runtime/joint_run.hpp"
+#include "tests/runtime/loop_run.hpp"
 
 namespace tandem::runtime {
 namespace {

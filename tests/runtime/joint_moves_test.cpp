@@ -2,14 +2,16 @@
 #include <cmath>
 #include <limits>
 
-#include "tests/runtime/joint_run.hpp"
+#include "tests/runtime/loop_run.hpp"
 
 namespace tandem::runtime {
 namespace {
 
+using test::kNow;
+
 struct JointMoves : test::JointServices {
   [[nodiscard]] std::string move(const std::string& joint, const MoveRequest& wish) const {
-    return text(services().move_joint(joint, wish, RunServices::Patience{0}), "asked");
+    return text(services().move_joint(joint, wish, kNow), "asked");
   }
   /// By the loop, to what was asked last.
   [[nodiscard]] std::string answered(const std::string& joint, const MoveRequest& wish) {
@@ -91,10 +93,10 @@ TEST_F(JointMoves, EndWhenAControllerTakesTheJoint) {
   }));
   EXPECT_EQ(move("elbow", {.target_rad = from + 1.0, .speed_rad_s = 0.5}), "asked");
   steps(1000);
-  ASSERT_TRUE(services().switch_controllers({}, {"wave"}, RunServices::Patience{0}));
+  ASSERT_TRUE(services().switch_controllers({}, {"wave"}, kNow));
   steps(500);
   EXPECT_LT(std::abs(cycle->command().position_rad()[1] - cycle->state().position_rad()[1]), 0.2);
-  ASSERT_TRUE(services().switch_controllers({"wave"}, {}, RunServices::Patience{0}));
+  ASSERT_TRUE(services().switch_controllers({"wave"}, {}, kNow));
   steps(300);  // it brakes
   const double left = reference(1);
   steps(1000);
@@ -118,13 +120,13 @@ TEST(JointMove, KeepsTheJointsAccelerationWhatIsAskedForAndWhatIsNot) {
   hal::RobotConfig config = hal::test::fake_robot();
   config.joints[1].max_acceleration_rad_s2 = 1.0;
   test::JointRun run(config);
-  run.add_sine(0);
+  run.add_sine();
   run.begin({.settle_cycles = 20});
   run.steps(100);
   const auto move = [&](double acceleration) {
     return test::JointRun::text(run.services().move_joint(
         "elbow", {.target_rad = 1.4, .speed_rad_s = 1.0, .acceleration_rad_s2 = acceleration},
-        RunServices::Patience{0}));
+        kNow));
   };
   EXPECT_NE(move(1e9).find("the acceleration 1e+09 rad/s2"), std::string::npos);
   EXPECT_NE(move(1.01).find("give more than 0, at most 1 rad/s2"), std::string::npos);

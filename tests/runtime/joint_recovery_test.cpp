@@ -1,19 +1,21 @@
 // How an operator leads a joint back that stands outside its limits: tandem joint recover.
 #include <functional>
 
-#include "tests/runtime/joint_run.hpp"
+#include "tests/runtime/loop_run.hpp"
 
 namespace tandem::runtime {
 namespace {
 
+using test::kNow;
+
 /// The elbow's range ends at 1.5 rad, its velocity at 2 rad/s. A controller has it.
 struct JointRecovery : testing::Test, test::JointRun {
   JointRecovery() {
-    add_sine(1);
+    add_sine({1});
     begin({.after_stop = AfterStop::kWait});
   }
   [[nodiscard]] std::string recover(const std::string& joint) const {
-    return text(services().recover(joint, RunServices::Patience{0}), "asked");
+    return text(services().recover(joint, kNow), "asked");
   }
   /// By the loop, to what was asked last.
   [[nodiscard]] double answered() {

@@ -4,10 +4,12 @@
 
 #include "log/log_file.hpp"
 #include "tests/log/scratch_folder.hpp"
-#include "tests/runtime/joint_run.hpp"
+#include "tests/runtime/loop_run.hpp"
 
 namespace tandem::runtime {
 namespace {
+
+using test::kNow;
 
 using hal::ControlMode;
 using hal::InteractionMode;
@@ -47,7 +49,7 @@ TEST_F(JointServices, SetInteractionAndImpedanceTogether) {
                            {.stiffness_Nm_rad = 20.0,
                             .damping_Nms_rad = 3.0,
                             .interaction = static_cast<std::int32_t>(InteractionMode::kCompliant)},
-                           RunServices::Patience{0}));
+                           kNow));
   steps(1);
   EXPECT_EQ(look(2).interaction, static_cast<std::uint8_t>(InteractionMode::kCompliant));
   EXPECT_EQ(cycle->command().stiffness_Nm_rad()[2], 20.0);
@@ -55,10 +57,9 @@ TEST_F(JointServices, SetInteractionAndImpedanceTogether) {
 }
 
 TEST_F(JointServices, LeadAStiffnessOverWhileItYields) {
-  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 20.0, .interaction = 1},
-                                   RunServices::Patience{0}));
+  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 20.0, .interaction = 1}, kNow));
   steps(200);
-  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 50.0}, RunServices::Patience{0}));
+  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 50.0}, kNow));
   steps(1);
   EXPECT_EQ(cycle->command().stiffness_Nm_rad()[2], 20.0);
   double before = 20.0;
@@ -74,11 +75,10 @@ TEST_F(JointServices, LeadAStiffnessOverWhileItYields) {
 
 // For 0.1 s the answer of `tandem joint set` was the old stiffness, and the joint was "moving".
 TEST_F(JointServices, ShowWhatWasAskedForWhileTheCommandGoesOverToIt) {
-  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 20.0, .interaction = 1},
-                                   RunServices::Patience{0}));
+  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 20.0, .interaction = 1}, kNow));
   steps(200);
-  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 50.0, .damping_Nms_rad = 3.0},
-                                   RunServices::Patience{0}));
+  ASSERT_TRUE(
+      services().set_joint("wrist", {.stiffness_Nm_rad = 50.0, .damping_Nms_rad = 3.0}, kNow));
   for (int i = 0; i < 120; ++i) {
     steps(1);
     EXPECT_EQ(look(2).stiffness_Nm_rad, 50.0) << i;
@@ -89,7 +89,7 @@ TEST_F(JointServices, ShowWhatWasAskedForWhileTheCommandGoesOverToIt) {
     }
   }
   EXPECT_EQ(cycle->command().stiffness_Nm_rad()[2], 50.0);
-  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, RunServices::Patience{0}));
+  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, kNow));
   steps(1);
   EXPECT_EQ(look(0).moving, 0) << "nobody asked for a motion";
 }
@@ -99,8 +99,7 @@ TEST(JointServicesOf, ADelayedRunShowWhatWasAskedForAtOnce) {
   run.begin({.delay_cycles = 5});
   run.steps(50);
   ASSERT_EQ(run.cycle->phase(), RunPhase::kRunning);
-  ASSERT_TRUE(run.services().set_joint("elbow", {.stiffness_Nm_rad = 9.0, .interaction = 1},
-                                       RunServices::Patience{0}));
+  ASSERT_TRUE(run.services().set_joint("elbow", {.stiffness_Nm_rad = 9.0, .interaction = 1}, kNow));
   run.steps(1);
   const JointStatus look = run.look(1);
   EXPECT_EQ(look.stiffness_Nm_rad, 9.0);
@@ -111,20 +110,19 @@ TEST_F(JointServices, RefuseTheModeOfAClaimedJointAndNameItsController) {
   const std::string refused = text(mode("shoulder", ControlMode::kTorque));
   EXPECT_NE(refused.find("shoulder: is claimed by the controller 'sine'"), std::string::npos)
       << refused;
-  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, RunServices::Patience{0}));
+  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, kNow));
   EXPECT_TRUE(mode("shoulder", ControlMode::kTorque)) << "nobody will have it";
   steps(1);
   EXPECT_EQ(look(0).mode, static_cast<std::int8_t>(ControlMode::kTorque));
 }
 
 TEST_F(JointServices, GiveAClaimedJointTheImpedanceThatItsControllerDoesNotWrite) {
-  ASSERT_TRUE(
-      services().set_joint("shoulder", {.stiffness_Nm_rad = 30.0}, RunServices::Patience{0}));
+  ASSERT_TRUE(services().set_joint("shoulder", {.stiffness_Nm_rad = 30.0}, kNow));
   steps(150);
   EXPECT_EQ(cycle->command().stiffness_Nm_rad()[0], 30.0);
-  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, RunServices::Patience{0}));
+  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, kNow));
   steps(1);
-  ASSERT_TRUE(services().switch_controllers({}, {"sine"}, RunServices::Patience{0}));
+  ASSERT_TRUE(services().switch_controllers({}, {"sine"}, kNow));
   steps(150);
   EXPECT_EQ(cycle->command().stiffness_Nm_rad()[0], 30.0) << "a start keeps it";
 }
@@ -134,7 +132,7 @@ TEST_F(JointServices, LeaveTheOtherValueOfAnImpedanceAsTheControllerWroteIt) {
   hal::CommandImage command = cycle->command();
   command.stiffness_Nm_rad()[0] = 1.0;
   command.damping_Nms_rad()[0] = 0.05;
-  JointReferences& references = host.references();
+  JointReferences& references = host->references();
   (void)references.set(0, {.stiffness_Nm_rad = 0.5}, true, {cycle->state(), command});
   EXPECT_EQ(command.stiffness_Nm_rad()[0], 0.5);
   EXPECT_EQ(command.damping_Nms_rad()[0], 0.05);
@@ -146,7 +144,7 @@ TEST_F(JointServices, LeaveTheOtherValueOfAnImpedanceAsTheControllerWroteIt) {
 
 // "asked for" was the answer while time stood, and the joint never moved.
 TEST_F(JointServices, RefuseToMoveAClaimedJointWithoutAskingTheLoop) {
-  EXPECT_NE(text(services().move_joint("shoulder", {.target_rad = 0.3}, RunServices::Patience{0}))
+  EXPECT_NE(text(services().move_joint("shoulder", {.target_rad = 0.3}, kNow))
                 .find("is claimed by the controller 'sine'"),
             std::string::npos);
 }
@@ -155,8 +153,7 @@ TEST_F(JointServices, RefuseWhatAJointCannotDoAndNameTheLimit) {
   EXPECT_NE(text(mode("elbwo", ControlMode::kIdle)).find("did you mean 'elbow'?"),
             std::string::npos);
   const auto stiff = [&](double value) {
-    return text(
-        services().set_joint("elbow", {.stiffness_Nm_rad = value}, RunServices::Patience{0}));
+    return text(services().set_joint("elbow", {.stiffness_Nm_rad = value}, kNow));
   };
   EXPECT_NE(stiff(201.0).find("elbow: the stiffness 201 Nm/rad is beyond the joint's limit (give 0 "
                               "to 200 Nm/rad)"),
@@ -165,8 +162,7 @@ TEST_F(JointServices, RefuseWhatAJointCannotDoAndNameTheLimit) {
   EXPECT_NE(stiff(-1.0).find("beyond"), std::string::npos);
   EXPECT_NE(stiff(std::numeric_limits<double>::infinity()).find("beyond"), std::string::npos);
   const auto gain = [&](double kp) {
-    return text(
-        services().set_gains("elbow", PidLoop::kPosition, {.kp = kp}, RunServices::Patience{0}));
+    return text(services().set_gains("elbow", PidLoop::kPosition, {.kp = kp}, kNow));
   };
   EXPECT_NE(gain(-1.0).find("elbow: kp -1 is beyond"), std::string::npos);
   EXPECT_NE(gain(1e30).find("beyond the joint's limit"), std::string::npos) << "taken live before";
@@ -182,9 +178,8 @@ TEST(JointServicesOf, AFollowersNameNameItsLeader) {
   JointRun run(robot);
   run.begin({.settle_cycles = 20});
   run.steps(100);
-  EXPECT_EQ(
-      run.text(run.services().move_joint("finger", {.target_rad = 0.1}, RunServices::Patience{0})),
-      "finger: the joint 'finger' follows 'elbow' (mimic) (command 'elbow')");
+  EXPECT_EQ(run.text(run.services().move_joint("finger", {.target_rad = 0.1}, kNow)),
+            "finger: the joint 'finger' follows 'elbow' (mimic) (command 'elbow')");
 }
 
 TEST(JointServicesOf, AJointWithoutALoopRefuseItsModeAndItsGains) {
@@ -193,13 +188,11 @@ TEST(JointServicesOf, AJointWithoutALoopRefuseItsModeAndItsGains) {
   JointRun run(robot);
   run.begin({});
   run.steps(50);
-  const auto mode =
-      run.services().set_joint("elbow", {.mode = static_cast<std::int32_t>(ControlMode::kCurrent)},
-                               RunServices::Patience{0});
+  const auto mode = run.services().set_joint(
+      "elbow", {.mode = static_cast<std::int32_t>(ControlMode::kCurrent)}, kNow);
   ASSERT_FALSE(mode);
   EXPECT_EQ(mode.error().message, "joint 'elbow' has no current control (stiff)");
-  const auto gains =
-      run.services().set_gains("elbow", PidLoop::kCurrent, {.kp = 1.0}, RunServices::Patience{0});
+  const auto gains = run.services().set_gains("elbow", PidLoop::kCurrent, {.kp = 1.0}, kNow);
   ASSERT_FALSE(gains);
   EXPECT_EQ(gains.error().message, "this joint has no current loop");
 }
@@ -209,14 +202,12 @@ TEST(JointServicesOf, ARunThatDoesNotControlYetRefuseModes) {
   run.begin({.settle_cycles = 50});
   run.steps(30);
   ASSERT_EQ(run.cycle->phase(), RunPhase::kSettling);
-  const auto mode = run.services().set_joint("elbow", {.mode = 3}, RunServices::Patience{0});
+  const auto mode = run.services().set_joint("elbow", {.mode = 3}, kNow);
   ASSERT_FALSE(mode);
   EXPECT_EQ(mode.error().hint,
             "ask again in the phase running; after a fault: tandem fault reset first");
-  EXPECT_TRUE(
-      run.services().set_joint("elbow", {.stiffness_Nm_rad = 9.0}, RunServices::Patience{0}));
-  EXPECT_TRUE(
-      run.services().set_gains("elbow", PidLoop::kPosition, {.kd = 9.0}, RunServices::Patience{0}));
+  EXPECT_TRUE(run.services().set_joint("elbow", {.stiffness_Nm_rad = 9.0}, kNow));
+  EXPECT_TRUE(run.services().set_gains("elbow", PidLoop::kPosition, {.kd = 9.0}, kNow));
   run.steps(1);
   EXPECT_EQ(run.services().joints()[1].gains[0].kd, 9.0);
   EXPECT_EQ(run.services().joints()[1].gains[0].kp, 200.0) << "what is not named stays";
@@ -226,15 +217,13 @@ TEST(JointServicesOf, ARunThatDoesNotControlYetRefuseModes) {
 hal::PidGains gains_after(std::size_t joint, hal::PidGains wanted, std::vector<Fault>& faults,
                           const GainsRequest& operators = {}) {
   JointRun run;
-  EXPECT_TRUE(
-      run.host.add("tuner", std::make_unique<test::Tuner>(joint, 1, wanted), test::parameters()));
+  run.add("tuner", std::make_shared<test::Tuner>(joint, 1, wanted));
   run.begin({});
   run.steps(50);
-  EXPECT_TRUE(
-      run.services().set_gains("elbow", PidLoop::kPosition, operators, RunServices::Patience{0}));
+  EXPECT_TRUE(run.services().set_gains("elbow", PidLoop::kPosition, operators, kNow));
   run.steps(1);
   faults = run.cycle->faults();
-  EXPECT_EQ(run.services().joints()[1].gains[0], run.host.gains().gains(1, PidLoop::kPosition))
+  EXPECT_EQ(run.services().joints()[1].gains[0], run.host->gains().gains(1, PidLoop::kPosition))
       << "what is shown is in force";
   return run.services().joints()[1].gains[0];
 }
@@ -276,7 +265,7 @@ TEST_F(JointServices, HoldJointsAgainAfterAReset) {
   steps(60);
   ASSERT_EQ(cycle->phase(), RunPhase::kHeld);
   EXPECT_FALSE(mode("elbow", ControlMode::kTorque)) << "and so they are after the reset";
-  ASSERT_TRUE(cycle->services().go_on(RunServices::Patience{0}));
+  ASSERT_TRUE(cycle->services().go_on(kNow));
   steps(1);
   ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
   EXPECT_EQ(look(1).mode, static_cast<std::int8_t>(ControlMode::kPosition));
@@ -289,15 +278,15 @@ TEST(JointServicesOf, ALoggedRunAreInItsLog) {
       log::Recorder::open(folder / "run.mcap", {.joints = {"shoulder", "elbow", "wrist"}}, {});
   ASSERT_TRUE(recorder);
   JointRun run;
-  run.add_sine(0, false);
-  run.begin({.running_cycles = 100}, recorder->get());
+  run.recorder = recorder->get();
+  run.add_sine({0}, "sine", false);
+  run.begin({.running_cycles = 100});
   run.steps(50);
-  ASSERT_TRUE(run.services().switch_controllers({}, {"sine"}, RunServices::Patience{0}));
-  ASSERT_TRUE(run.services().set_joint("elbow", {.mode = 3}, RunServices::Patience{0}));
-  ASSERT_TRUE(run.services().set_gains("wrist", PidLoop::kPosition, {.kp = 150.0},
-                                       RunServices::Patience{0}));
+  ASSERT_TRUE(run.services().switch_controllers({}, {"sine"}, kNow));
+  ASSERT_TRUE(run.services().set_joint("elbow", {.mode = 3}, kNow));
+  ASSERT_TRUE(run.services().set_gains("wrist", PidLoop::kPosition, {.kp = 150.0}, kNow));
   const auto move = [&](const MoveRequest& wish) {
-    return run.services().move_joint("wrist", wish, RunServices::Patience{0});
+    return run.services().move_joint("wrist", wish, kNow);
   };
   ASSERT_TRUE(move({.target_rad = 0.5}));
   ASSERT_TRUE(move({}));

@@ -4,69 +4,54 @@
 #include <algorithm>
 
 #include "base/archive.hpp"
-#include "hal/sim/sim_robot.hpp"
 #include "log/compare.hpp"
-#include "model/kernel_library.hpp"
-#include "rt/clock.hpp"
 #include "rt/scoped_realtime.hpp"
-#include "runtime/experiment.hpp"
-#include "runtime/robot_cycle.hpp"
 #include "tests/log/scratch_folder.hpp"
+#include "tests/runtime/bundled_run.hpp"
 
 namespace tandem::runtime {
 namespace {
 
 using test::LockstepRobot;
 
-/// One squat of a robot with its log, in process or over the wire.
-class Squat {
- public:
-  explicit Squat(const std::string& robot) {
-    auto read =
-        read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/" + robot + "/squat.toml");
-    if (!read) {
-      ADD_FAILURE() << read.error().at(0).to_string();
-      return;
-    }
-    e = std::move(*read);
-    auto loaded = model::load_kernels(std::string(TANDEM_BINARY_DIR) + "/lib/models/" + robot +
-                                      "_kernels.so");
-    EXPECT_TRUE(loaded) << loaded.error().to_string();
-    kernels = *loaded;
-    host = std::make_unique<ControllerHost>(e.robot, kernels.get(), e.loop.period_ns);
-    for (const ControllerSpec& spec : e.controllers) {
-      auto plugin =
-          load_controller(spec.plugin, {std::string(TANDEM_BINARY_DIR) + "/lib/controllers"});
-      EXPECT_TRUE(plugin) << plugin.error().to_string();
-      EXPECT_TRUE(host->add(spec.name, std::move(*plugin), spec.parameters));
-    }
+/// Puts the wire and its emulated robot, made in `place`, before a run.
+Run::Connect over(std::optional<LockstepRobot>& place, bool lockstep = true) {
+  return [&place, lockstep](Composition& c) -> Diagnostics {
+    place.emplace(c.experiment.robot, c.kernels.get(), c.experiment.sim_robot_config(), lockstep);
+    c.backend = std::move(place->backend);
+    return {};
+  };
+}
+
+/// A squat with its log, in process or over `wire`; `cycles` 0: all of it.
+struct LoggedSquat {
+  LoggedSquat(const std::string& robot, const std::string& path, std::uint64_t cycles,
+              std::optional<LockstepRobot>* wire, bool bus_timing = false)
+      : path_(path), recorder(log::Recorder::open(path, {.robot = robot}, {})) {
+    Overrides overrides{.change = [=](Experiment& e) {
+      e.sim.bus_timing = bus_timing;
+      e.sim.ground_truth = false;
+      if (cycles > 0) e.duration_s = 1e-3 * static_cast<double>(cycles);
+    }};
+    if (wire != nullptr) overrides.hal = "can";
+    overrides.lockstep = wire != nullptr;
+    squat = std::make_unique<BundledRun>(robot, "squat", overrides,
+                                         RunParts{.recorder = recorder.value().get()},
+                                         wire == nullptr ? Run::Connect() : over(*wire));
   }
-  log::LogFile run(hal::Backend& backend, const std::string& path, std::uint64_t cycles = 0) {
-    log::RunInfo info{.robot = e.robot.name, .period_ns = e.loop.period_ns};
-    for (const hal::JointConfig& joint : e.robot.joints) info.joints.push_back(joint.name);
-    for (const hal::SensorConfig& sensor : e.robot.sensors) {
-      info.sensors.push_back({sensor.name, sensor.channels()});
-    }
-    auto recorder = log::Recorder::open(path, info, {});
-    EXPECT_TRUE(recorder) << recorder.error().to_string();
-    rt::WallClock clock;
-    RobotCycle cycle({e.robot, backend, *host, clock, recorder->get(), nullptr},
-                     {.loop = e.loop,
-                      .running_cycles = cycles == 0 ? e.cycles() : cycles,
-                      .settle_cycles = e.settle_cycles()});
-    cycle.run();
-    for (const Fault& fault : cycle.faults()) ADD_FAILURE() << fault.text;
-    EXPECT_GT(cycle.running_cycles(), 0U) << backend.status_text();
-    const log::RecordingResult result = (*recorder)->close();
-    EXPECT_EQ(result.dropped, 0U);
-    auto file = log::LogFile::open(path);
+  log::LogFile run() {
+    squat->cycle->run();
+    for (const Fault& fault : squat->cycle->faults()) ADD_FAILURE() << fault.text;
+    EXPECT_GT(squat->cycle->running_cycles(), 0U);
+    EXPECT_EQ((*recorder)->close().dropped, 0U);
+    auto file = log::LogFile::open(path_);
     EXPECT_TRUE(file) << file.error().to_string();
     return *file;
   }
 
-  Experiment e;
-  model::KernelLibrary kernels;
-  std::unique_ptr<ControllerHost> host;
+  std::string path_;
+  Result<std::unique_ptr<log::Recorder>> recorder;
+  std::unique_ptr<BundledRun> squat;
 };
 
 /// The plants, to the last bit: what the log of a run over CAN does not have.
@@ -80,29 +65,35 @@ void expect_same_robot(sim::EmulatedRobot& a, sim::EmulatedRobot& b) {
 class Lockstep : public testing::TestWithParam<const char*> {};
 
 /// `cycles` of a squat in process and over the wire, compared; 0: all of it.
-void expect_same_squat(const std::string& name, std::uint64_t cycles, bool bus_timing) {
+void expect_same_squat(const std::string& name, std::uint64_t cycles, bool bus_timing,
+                       const std::vector<sim::Fault>& faults = {}) {
   const log::ScratchFolder folder;
-  Squat in_process(name);
-  sim::SimRobotConfig config = in_process.e.sim_robot_config();
-  config.bus_timing = bus_timing;
-  auto sim = sim::SimRobot::create(in_process.e.robot, in_process.kernels.get(), config);
-  ASSERT_TRUE(sim) << sim.error().to_string();
-  const log::LogFile a = in_process.run(**sim, folder / "a.mcap", cycles);
-
-  Squat over_wire(name);
-  LockstepRobot robot(over_wire.e.robot, over_wire.kernels.get(), config);
-  const log::LogFile b = over_wire.run(*robot.backend, folder / "b.mcap", cycles);
-
+  std::optional<LockstepRobot> wire;
+  LoggedSquat in_process(name, folder / "a.mcap", cycles, nullptr, bus_timing);
+  LoggedSquat over_wire(name, folder / "b.mcap", cycles, &wire, bus_timing);
+  sim::EmulatedRobot& robot = in_process.squat->backend->robot();
+  for (const sim::Fault& fault : faults) {
+    ASSERT_EQ(robot.inject(fault), Code::kOk);
+    ASSERT_EQ(wire->emulated->inject(fault), Code::kOk);
+  }
+  const log::LogFile a = in_process.run();
+  const log::LogFile b = over_wire.run();
   const auto compared = log::compare(a, b);
   ASSERT_TRUE(compared) << compared.error().to_string();
   ASSERT_EQ(compared->topics.size(), 3U);
   for (const log::TopicComparison& topic : compared->topics) {
+    // Injected faults are known in process only.
+    if (!faults.empty() && topic.topic == "/tandem/event") continue;
     ASSERT_FALSE(topic.first) << topic.topic << ", message " << topic.first->message << ": "
                               << topic.first->signal << " is " << topic.first->a << " and "
                               << topic.first->b;
     EXPECT_EQ(topic.messages_a, topic.messages_b) << topic.topic;
   }
-  expect_same_robot((*sim)->robot(), *robot.emulated);
+  expect_same_robot(robot, *wire->emulated);
+  ASSERT_EQ(robot.faults().size(), faults.size());
+  for (const sim::FaultSlot& slot : robot.faults()) {
+    EXPECT_GT(slot.struck, 5U) << hal::to_string(slot.fault.kind);
+  }
 }
 
 TEST_P(Lockstep, ASquatFromPowerOnIsTheInProcessRunBitForBit) {
@@ -114,8 +105,6 @@ TEST_P(Lockstep, TheTimeOfFramesOnTheWireIsTheSameOnEitherSide) {
 }
 
 TEST_P(Lockstep, AScenariosFaultsAreTheSameBitsOnEitherSide) {
-  const log::ScratchFolder folder;
-  Squat in_process(GetParam());
   std::vector<sim::Fault> faults(3);
   faults[0].kind = hal::FaultKind::kFrameDrop;
   faults[0].probability = 0.01;
@@ -132,29 +121,7 @@ TEST_P(Lockstep, AScenariosFaultsAreTheSameBitsOnEitherSide) {
     fault.start_ns = 1'200'000'000;
     fault.duration_ns = 500'000'000;
   }
-  sim::SimRobotConfig config = in_process.e.sim_robot_config();
-  config.faults = faults;
-  auto sim = sim::SimRobot::create(in_process.e.robot, in_process.kernels.get(), config);
-  ASSERT_TRUE(sim) << sim.error().to_string();
-  const log::LogFile a = in_process.run(**sim, folder / "a.mcap", 1000);
-
-  Squat over_wire(GetParam());
-  LockstepRobot robot(over_wire.e.robot, over_wire.kernels.get(), config);
-  const log::LogFile b = over_wire.run(*robot.backend, folder / "b.mcap", 1000);
-
-  const auto compared = log::compare(a, b);
-  ASSERT_TRUE(compared) << compared.error().to_string();
-  for (const log::TopicComparison& topic : compared->topics) {
-    if (topic.topic == "/tandem/event") continue;  // the injected ones are known in process only
-    EXPECT_FALSE(topic.first) << topic.topic << ", message " << topic.first->message << ": "
-                              << topic.first->signal;
-    EXPECT_EQ(topic.messages_a, topic.messages_b) << topic.topic;
-  }
-  expect_same_robot((*sim)->robot(), *robot.emulated);
-  ASSERT_EQ((*sim)->robot().faults().size(), faults.size());
-  for (const sim::FaultSlot& slot : (*sim)->robot().faults()) {
-    EXPECT_GT(slot.struck, 5U) << hal::to_string(slot.fault.kind);
-  }
+  expect_same_squat(GetParam(), 1000, false, faults);
 }
 
 INSTANTIATE_TEST_SUITE_P(Robots, Lockstep, testing::Values("coman", "walkman"),
@@ -163,11 +130,12 @@ INSTANTIATE_TEST_SUITE_P(Robots, Lockstep, testing::Values("coman", "walkman"),
 // exchange() may block, so the cycle's trap leaves it out. What waits here is the emulator's step,
 // which may not allocate either: so the whole of it can stand under the trap.
 TEST(LockstepRun, TheExchangeItselfAllocatesAndLocksNothing) {
-  Squat squat("coman");
-  LockstepRobot robot(squat.e.robot, squat.kernels.get(), squat.e.sim_robot_config());
-  hal::StateImage state(squat.e.robot.shape());
-  const hal::CommandImage idle(squat.e.robot.shape());
-  const hal::ParameterImage gains = hal::initial_parameters(squat.e.robot);
+  BundledRun squat("coman", "squat");
+  const Experiment& e = *squat.experiment;
+  LockstepRobot robot(e.robot, &squat.run->kernels(), e.sim_robot_config());
+  hal::StateImage state(e.robot.shape());
+  const hal::CommandImage idle(e.robot.shape());
+  const hal::ParameterImage gains = hal::initial_parameters(e.robot);
   hal::CycleTime time;
   for (; time.cycle < 500; ++time.cycle) {
     time.time_ns = static_cast<std::int64_t>(time.cycle) * time.period_ns;
@@ -182,13 +150,11 @@ TEST(LockstepRun, TheExchangeItselfAllocatesAndLocksNothing) {
 }
 
 TEST(LockstepRun, AnEmulatorThatIsGoneIsAFaultThatSaysWhatToDo) {
-  const log::ScratchFolder folder;
-  Squat squat("coman");
-  LockstepRobot robot(squat.e.robot, squat.kernels.get(), squat.e.sim_robot_config());
-  robot.emulator_runs = false;
-  rt::WallClock clock;
-  RobotCycle cycle({squat.e.robot, *robot.backend, *squat.host, clock, nullptr, nullptr},
-                   {.running_cycles = 10});
+  std::optional<LockstepRobot> wire;
+  BundledRun squat("coman", "squat", {.duration_s = 0.01, .hal = "can", .lockstep = true}, {},
+                   over(wire));
+  wire->emulator_runs = false;
+  RobotCycle& cycle = *squat.cycle;
   cycle.run();
   ASSERT_FALSE(cycle.faults().empty());
   EXPECT_NE(cycle.faults()[0].text.find("start `tandem emulate"), std::string::npos)
@@ -197,11 +163,10 @@ TEST(LockstepRun, AnEmulatorThatIsGoneIsAFaultThatSaysWhatToDo) {
 }
 
 TEST(RealTimeRun, DoesNotTakeALateAnswerForTheNextOne) {
-  Squat squat("coman");
-  LockstepRobot robot(squat.e.robot, squat.kernels.get(), squat.e.sim_robot_config(), false);
-  rt::WallClock clock;
-  RobotCycle cycle({squat.e.robot, *robot.backend, *squat.host, clock, nullptr, nullptr},
-                   {.running_cycles = 100});
+  std::optional<LockstepRobot> wire;
+  BundledRun squat("coman", "squat", {.duration_s = 0.1, .hal = "can"}, {}, over(wire, false));
+  LockstepRobot& robot = *wire;
+  RobotCycle& cycle = *squat.cycle;
   while (cycle.phase() == RunPhase::kBringUp) {
     ASSERT_TRUE(cycle.step());
     (void)robot.emulator->poll(0);  // boards that nobody waits for answer all the same
@@ -231,9 +196,9 @@ struct SetClock final : hal::can::FrameWait {
 // A master that is late and dies between its SYNCs: the boards of the other buses stop sooner than
 // the last SYNC would say.
 TEST(RealTimeEmulator, CountsABoardsSilenceFromTheLastSyncOfItsOwnBus) {
-  Squat squat("coman");
-  auto robot =
-      sim::EmulatedRobot::create(squat.e.robot, squat.kernels.get(), squat.e.sim_robot_config());
+  BundledRun squat("coman", "squat");
+  const Experiment& e = *squat.experiment;
+  auto robot = sim::EmulatedRobot::create(e.robot, &squat.run->kernels(), e.sim_robot_config());
   ASSERT_TRUE(robot) << robot.error().to_string();
   std::vector<std::unique_ptr<hal::can::LoopbackBus>> wires;
   std::vector<hal::can::Bus*> far;
@@ -242,7 +207,7 @@ TEST(RealTimeEmulator, CountsABoardsSilenceFromTheLastSyncOfItsOwnBus) {
     far.push_back(&wires.back()->boards());
   }
   SetClock clock;
-  const std::int64_t period_ns = squat.e.loop.period_ns;
+  const std::int64_t period_ns = e.loop.period_ns;
   sim::Emulator emulator(**robot, far, clock, {period_ns, false});
   const auto sync = [&](std::size_t buses) {
     const canopen::Frame frame = canopen::make_sync();

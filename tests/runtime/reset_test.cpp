@@ -2,14 +2,10 @@
 #include <csignal>
 
 #include "log/log_file.hpp"
-#include "rt/clock.hpp"
 #include "rt/stop_signal.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/hal/fake_backend.hpp"
 #include "tests/log/scratch_folder.hpp"
 #include "tests/rt/fake_clock.hpp"
-#include "tests/runtime/first_order_robot.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 #include "tests/support/rt_trap.hpp"
 
 namespace tandem::runtime {
@@ -18,8 +14,8 @@ namespace {
 using hal::StopCategory;
 
 /// Past bring-up, with faults that wait for a reset.
-struct Waiting : ::testing::Test {
-  Waiting() {
+struct Waiting : ::testing::Test, test::LoopRun {
+  Waiting() : LoopRun(hal::test::fake_robot()) {
     start({.settle_cycles = 10,
            .after_stop = AfterStop::kWait,
            .after_reset = AfterReset::kContinue});
@@ -27,42 +23,23 @@ struct Waiting : ::testing::Test {
   ~Waiting() override { (void)rt::take_emergency_stop(); }
 
   void start(CycleConfig config, StopCategory category = StopCategory::kCategory1,
-             rt::Clock* other_clock = nullptr, log::Recorder* recorder = nullptr) {
-    robot = hal::test::fake_robot();
-    for (hal::JointConfig& joint : robot.joints) joint.on_fault = category;
+             rt::Clock* other_clock = nullptr, log::Recorder* its_recorder = nullptr) {
+    hal::RobotConfig config_of = hal::test::fake_robot();
+    for (hal::JointConfig& joint : config_of.joints) joint.on_fault = category;
+    of(std::move(config_of));
     backend = std::make_unique<test::FirstOrderRobot>(robot);
     backend->latch_on_fault = category != StopCategory::kWarn;
-    host = std::make_unique<ControllerHost>(robot, nullptr, 1'000'000);
-    auto sine = std::make_unique<test::Sine>(std::vector<std::size_t>{0});
-    controller = sine.get();
-    ASSERT_TRUE(host->add("sine", std::move(sine), test::parameters()));
+    controller = add_sine();
     if (config.running_cycles == 0) config.running_cycles = 1000;
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{robot, *backend, *host, other_clock == nullptr ? clock : *other_clock, recorder},
-        config);
+    if (other_clock != nullptr) clock = other_clock;
+    recorder = its_recorder;
+    begin(*backend, config);
     steps(100);
     ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
   }
-  void steps(int count) {
-    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
-  }
-  /// Until `phase` is reached. @return cycles taken
-  int until(RunPhase phase, int most = 200) {
-    int taken = 0;
-    while (taken < most && cycle->phase() != phase) {
-      (void)cycle->step();
-      ++taken;
-    }
-    EXPECT_EQ(cycle->phase(), phase);
-    return taken;
-  }
 
-  hal::RobotConfig robot;
-  rt::WallClock clock;
   std::unique_ptr<test::FirstOrderRobot> backend;
-  std::unique_ptr<ControllerHost> host;
   test::Sine* controller = nullptr;
-  std::unique_ptr<RobotCycle> cycle;
 };
 
 TEST_F(Waiting, AFaultLatchesAndTheLoopGoesOn) {
@@ -394,9 +371,7 @@ TEST_F(Waiting, AnEmergencyStopEndsARunThatDoesNotWait) {
 
 TEST_F(Waiting, AFaultDuringBringUpEndsTheRun) {
   backend = std::make_unique<test::FirstOrderRobot>(robot);
-  cycle = std::make_unique<RobotCycle>(
-      CycleParts{robot, *backend, *host, clock},
-      CycleConfig{.after_stop = AfterStop::kWait, .after_reset = AfterReset::kContinue});
+  begin(*backend, {.after_stop = AfterStop::kWait, .after_reset = AfterReset::kContinue});
   steps(5);
   cycle->inbox().emergency_stop(StopCategory::kCategory1);
   until(RunPhase::kDone);

@@ -3,11 +3,7 @@
 #include <cmath>
 #include <csignal>
 
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/hal/fake_backend.hpp"
-#include "tests/runtime/first_order_robot.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 #include "tests/support/rt_trap.hpp"
 
 namespace tandem::runtime {
@@ -16,38 +12,22 @@ namespace {
 using hal::StopCategory;
 
 /// `able` has joint 0 and can retreat, `other` has joint 1 and cannot.
-struct RetreatRun : ::testing::Test {
+struct RetreatRun : ::testing::Test, test::JointRun {
   void begin(bool can = true, AfterReset after_reset = AfterReset::kHold) {
-    const auto add = [this](const char* name, std::size_t joint) {
-      auto sine = std::make_unique<test::Sine>(std::vector<std::size_t>{joint});
-      test::Sine* made = sine.get();
-      EXPECT_TRUE(host.add(name, std::move(sine), test::parameters()));
-      return made;
-    };
-    able = add("able", 0);
-    other = add("other", 1);
+    able = add_sine({0}, "able");
+    other = add_sine({1}, "other");
     able->retreats = can;
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{robot, backend, host, clock},
-        CycleConfig{
-            .after_stop = AfterStop::kWait, .after_reset = after_reset, .retreat_cycles = 200});
+    JointRun::begin(
+        {.after_stop = AfterStop::kWait, .after_reset = after_reset, .retreat_cycles = 200});
     steps(100);
     ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
-  }
-  void steps(int count) {
-    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
   }
   void stop(StopCategory category) {
     (void)cycle->inbox().emergency_stop(category);
     steps(1);
   }
 
-  hal::RobotConfig robot = hal::test::fake_robot();
-  test::FirstOrderRobot backend{robot};
-  ControllerHost host{robot, nullptr, 1'000'000};
-  rt::WallClock clock;
   test::Sine *able = nullptr, *other = nullptr;
-  std::unique_ptr<RobotCycle> cycle;
 };
 
 TEST_F(RetreatRun, GoesOnUntilThePostureIsReachedAndStopsThen) {

@@ -3,12 +3,9 @@
 #include <thread>
 
 #include "log/log_file.hpp"
-#include "rt/clock.hpp"
-#include "tests/hal/fake_backend.hpp"
 #include "tests/log/scratch_folder.hpp"
 #include "tests/rt/fake_clock.hpp"
-#include "tests/runtime/first_order_robot.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 #include "tests/support/rt_trap.hpp"
 
 // Linked with the real-time trap: a cycle that allocates, locks or blocks fails its test.
@@ -22,28 +19,19 @@ using test::Sine;
 constexpr std::uint64_t kRunning = 500;
 
 /// A run of the fake robot's configuration on first-order joints; one controller moves joint 0.
-struct TestRun {
-  explicit TestRun(CycleConfig config = {}, log::Recorder* recorder = nullptr,
-                   rt::Clock* other_clock = nullptr, hal::RobotConfig of = hal::test::fake_robot())
-      : robot(std::move(of)), backend(robot), host(robot, nullptr, 1'000'000) {
-    auto sine = std::make_unique<Sine>(std::vector<std::size_t>{0});
-    controller = sine.get();
-    EXPECT_TRUE(host.add("sine", std::move(sine), test::parameters()));
+struct TestRun : test::JointRun {
+  explicit TestRun(CycleConfig config = {}, log::Recorder* its_recorder = nullptr,
+                   rt::Clock* other_clock = nullptr,
+                   hal::RobotConfig its_robot = hal::test::fake_robot())
+      : JointRun(std::move(its_robot)) {
     if (config.running_cycles == 0) config.running_cycles = kRunning;
-    rt::Clock& used = other_clock == nullptr ? clock : *other_clock;
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{robot, backend, host, used, recorder, &backend.truth}, config);
-  }
-  void steps(std::uint64_t count) {
-    for (std::uint64_t i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
+    if (other_clock != nullptr) clock = other_clock;
+    recorder = its_recorder;
+    truth = &backend.truth;
+    begin(config);
   }
 
-  hal::RobotConfig robot;
-  FirstOrderRobot backend;
-  ControllerHost host;
-  rt::WallClock clock;
-  Sine* controller = nullptr;
-  std::unique_ptr<RobotCycle> cycle;
+  Sine* controller = add_sine();
 };
 
 TEST(RobotCycle, GoesThroughBringUpRunningAndShutDown) {
@@ -87,7 +75,7 @@ TEST(RobotCycle, HoldsEveryJointUntilTheRobotHasSettled) {
 
 /// The sine moves joint 0; this writes to all three, and has joint 1.
 void run_with_stray(TestRun& run) {
-  EXPECT_TRUE(run.host.add("stray", std::make_unique<test::Stray>(1, false), test::parameters()));
+  EXPECT_TRUE(run.host->add("stray", std::make_unique<test::Stray>(1, false), test::parameters()));
   run.steps(30);
   EXPECT_NE(run.cycle->command().position_rad()[0], 0.07);
   EXPECT_EQ(run.cycle->command().mode()[2], static_cast<std::int8_t>(hal::ControlMode::kPosition));
@@ -187,13 +175,9 @@ class Silent : public Controller {
 /// It was lost: the tracking error of a controller with a loop of its own was 0.
 TEST(RobotCycle, KeepsThePositionThatAControllerWantsInTorqueMode) {
   for (const std::uint32_t delay : {0U, 3U}) {
-    const hal::RobotConfig robot = hal::test::fake_robot();
-    FirstOrderRobot backend(robot);
-    ControllerHost host(robot, nullptr, 1'000'000);
-    rt::WallClock clock;
-    auto sine = std::make_unique<Sine>(std::vector<std::size_t>{0}, hal::ControlMode::kTorque);
-    ASSERT_TRUE(host.add("sine", std::move(sine), test::parameters()));
-    ASSERT_TRUE(host.add("silent", std::make_unique<Silent>(1), test::parameters()));
+    test::JointRun run;
+    run.add("sine", std::make_shared<Sine>(std::vector<std::size_t>{0}, hal::ControlMode::kTorque));
+    run.add("silent", std::make_shared<Silent>(1));
     struct Seen final : hal::CycleObserver {
       void take(const hal::CycleView& view) noexcept override {
         if (view.phase != RunPhase::kRunning) return;
@@ -203,14 +187,11 @@ TEST(RobotCycle, KeepsThePositionThatAControllerWantsInTorqueMode) {
       double shown_rad = 0.0;
       bool silent = true;
     } seen;
-    RobotCycle cycle(CycleParts{.robot = robot,
-                                .backend = backend,
-                                .controllers = host,
-                                .clock = clock,
-                                .observer = &seen},
-                     {.running_cycles = kRunning, .delay_cycles = delay});
-    while (cycle.phase() != RunPhase::kRunning) ASSERT_TRUE(cycle.step());
-    for (int i = 0; i < 250; ++i) ASSERT_TRUE(cycle.step());
+    run.observer = &seen;
+    run.begin({.running_cycles = kRunning, .delay_cycles = delay});
+    run.until(RunPhase::kRunning);
+    run.steps(250);
+    RobotCycle& cycle = *run.cycle;
     EXPECT_EQ(cycle.command().position_rad()[0], cycle.state().position_rad()[0]) << "is sent";
     cycle.run();
     const auto tracking = cycle.statistics().tracking();

@@ -2,18 +2,12 @@
 // by another maker's drive; until then nothing moves it.
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cmath>
 #include <functional>
-#include <future>
 #include <numbers>
 
 #include "canopen/data_sheet.hpp"
-#include "hal/sim/sim_robot.hpp"
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/runtime/test_controllers.hpp"
-#include "tests/sim/swing_robot.hpp"
+#include "tests/runtime/swing_loop.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -45,52 +39,32 @@ hal::RobotConfig others_robot() {
 }
 
 /// The swing, which hangs from its hoist at 0.5 rad; its low switch is at the end of its range.
-struct HomedSwing : ::testing::TestWithParam<Kind> {
+struct HomedSwing : ::testing::TestWithParam<Kind>, test::SwingLoop {
   /// @param cycles  that the run has; 0: it waits
   void begin(bool required = true, AfterReset after_reset = AfterReset::kHold,
              bool at_start = false, std::uint64_t cycles = 0) {
-    cycle.reset();  // of an earlier begin()
-    host.reset();
-    robot = GetParam().robot();
-    robot.joints[0].homing = hal::HomingConfig{.method = robot.joints[0].reversed ? 18 : 17,
-                                               .speed_rad_s = 1.5,
-                                               .zero_speed_rad_s = 0.1,
-                                               .acceleration_rad_s2 = 5.0,
-                                               .position_rad = kLowSwitch_rad,
-                                               .timeout_s = 10.0,
-                                               .required = required,
-                                               .at_start = at_start};
-    change(*robot.joints[0].homing);
-    auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
-                                      {.posture = "up", .release_ns = 100'000'000});
-    ASSERT_TRUE(made) << made.error().to_string();
-    backend = std::move(*made);
-    host = std::make_unique<ControllerHost>(robot, tandem::test::swing_kernels(2), 1'000'000);
-    ASSERT_TRUE(host->add("sine", std::make_unique<test::Sine>(std::vector<std::size_t>{0}),
-                          test::parameters("amplitude_rad = 0.2")));
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{robot, *backend, *host, clock},
-        CycleConfig{.running_cycles = cycles,
-                    .settle_cycles = 200,
-                    .after_stop = cycles == 0 ? AfterStop::kWait : AfterStop::kEnd,
-                    .after_reset = after_reset});
+    hal::RobotConfig config = GetParam().robot();
+    config.joints[0].homing = hal::HomingConfig{.method = config.joints[0].reversed ? 18 : 17,
+                                                .speed_rad_s = 1.5,
+                                                .zero_speed_rad_s = 0.1,
+                                                .acceleration_rad_s2 = 5.0,
+                                                .position_rad = kLowSwitch_rad,
+                                                .timeout_s = 10.0,
+                                                .required = required,
+                                                .at_start = at_start};
+    change(*config.joints[0].homing);
+    of(std::move(config));
+    add_sine();
+    SwingLoop::begin({.running_cycles = cycles,
+                      .settle_cycles = 200,
+                      .after_stop = cycles == 0 ? AfterStop::kWait : AfterStop::kEnd,
+                      .after_reset = after_reset});
   }
-  void steps(int count) {
-    for (int i = 0; i < count; ++i) ASSERT_TRUE(cycle->step());
-  }
-  void until(RunPhase phase, int most = 6000) {
-    for (int taken = 0; taken < most && cycle->phase() != phase; ++taken) {
-      ASSERT_TRUE(cycle->step());
-    }
-    ASSERT_EQ(cycle->phase(), phase) << backend->status_text();
-  }
+  void until(RunPhase phase, int most = 6000) { (void)LoopRun::until(phase, most); }
   /// What the loop answers to `ask`, called on another thread; empty: it is done.
   template <class Ask>
   [[nodiscard]] std::string refusal(const Ask& ask) {
-    auto asked = std::async(std::launch::async, [&] { return ask(cycle->services()); });
-    while (asked.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready) steps(1);
-    const Result<RequestResult> answer = asked.get();
-    return answer ? std::string() : answer.error().to_string();
+    return text(while_cycling([&] { return ask(services()); }), "");
   }
   [[nodiscard]] std::string home_refused() {
     return refusal([](RunServices& services) { return services.home_joint("swing"); });
@@ -138,11 +112,6 @@ struct HomedSwing : ::testing::TestWithParam<Kind> {
   }
 
   std::function<void(hal::HomingConfig&)> change = [](hal::HomingConfig&) {};
-  hal::RobotConfig robot;
-  std::unique_ptr<sim::SimRobot> backend;
-  std::unique_ptr<ControllerHost> host;
-  rt::WallClock clock;
-  std::unique_ptr<RobotCycle> cycle;
 };
 
 TEST_P(HomedSwing, IsHeldUntilItIsHomedAndThenKnowsWhereItIs) {
@@ -395,18 +364,15 @@ TEST(SingleTurn, OfADriveIsTheOneInWhichTheJointIs) {
   for (const double zero : {0.0, 0.02, 0.5, 0.98, 3.5, -2.4}) {  // [turns]
     SCOPED_TRACE(zero);
     robot.joints[0].zero_counts = static_cast<std::int32_t>(std::lround(zero * turn));
-    auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
-                                      {.posture = "up", .release_ns = 100'000'000'000});
-    ASSERT_TRUE(made) << made.error().to_string();
-    ControllerHost host(robot, tandem::test::swing_kernels(2), 1'000'000);
-    rt::WallClock clock;
-    RobotCycle cycle(CycleParts{robot, **made, host, clock},
-                     CycleConfig{.running_cycles = 300, .settle_cycles = 200});
-    const double begun_rad = (*made)->plant().joint(0).position_rad;
-    while (cycle.phase() != RunPhase::kRunning) ASSERT_TRUE(cycle.step());
-    for (int i = 0; i < 200; ++i) ASSERT_TRUE(cycle.step());
-    EXPECT_NEAR(cycle.state().position_rad()[0], (*made)->plant().joint(0).position_rad, 1e-3);
-    EXPECT_NEAR(cycle.state().position_rad()[0], begun_rad, 0.02);
+    test::SwingLoop run(robot);
+    run.begin({.running_cycles = 300, .settle_cycles = 200},
+              {.posture = "up", .release_ns = 100'000'000'000});
+    const double begun_rad = run.backend->plant().joint(0).position_rad;
+    run.run_to(RunPhase::kRunning);
+    run.steps(200);
+    const double seen_rad = run.cycle->state().position_rad()[0];
+    EXPECT_NEAR(seen_rad, run.backend->plant().joint(0).position_rad, 1e-3);
+    EXPECT_NEAR(seen_rad, begun_rad, 0.02);
   }
 }
 

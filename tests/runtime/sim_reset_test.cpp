@@ -1,9 +1,5 @@
 // Stop, reset and emergency stop through the whole chain, of a joint in motion under gravity.
-#include "hal/sim/sim_robot.hpp"
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/runtime/test_controllers.hpp"
-#include "tests/sim/swing_robot.hpp"
+#include "tests/runtime/swing_loop.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -12,37 +8,22 @@ using hal::FaultKind;
 using hal::StopCategory;
 
 /// The swing on a sine of 0.5 rad, whose faults wait for a reset.
-struct Swing : ::testing::Test {
+struct Swing : ::testing::Test, test::SwingLoop {
   void begin(StopCategory on_fault, AfterReset after_reset = AfterReset::kContinue) {
-    robot = tandem::test::swing_robot();
-    robot.joints[0].on_fault = on_fault;
-    robot.joints[0].min_position_rad = min_position_rad;
-    robot.emergency_stop =
+    hal::RobotConfig config = tandem::test::swing_robot();
+    config.joints[0].on_fault = on_fault;
+    config.joints[0].min_position_rad = min_position_rad;
+    config.emergency_stop =
         on_fault == StopCategory::kCategory0 ? on_fault : StopCategory::kCategory1;
-    auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
-                                      {.posture = "up", .release_ns = 100'000'000});
-    ASSERT_TRUE(made) << made.error().to_string();
-    backend = std::move(*made);
-    host = std::make_unique<ControllerHost>(robot, tandem::test::swing_kernels(2), 1'000'000);
-    ASSERT_TRUE(host->add("sine", std::make_unique<test::Sine>(std::vector<std::size_t>{0}),
-                          test::parameters("amplitude_rad = 0.2")));
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{robot, *backend, *host, clock},
-        CycleConfig{
-            .settle_cycles = 200, .after_stop = AfterStop::kWait, .after_reset = after_reset});
+    of(std::move(config));
+    add_sine();
+    SwingLoop::begin(
+        {.settle_cycles = 200, .after_stop = AfterStop::kWait, .after_reset = after_reset});
     until(RunPhase::kRunning);
     first_start_Nm = torque_step(50);
     steps(980);  // in full motion
   }
-  void steps(int count) {
-    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
-  }
-  int until(RunPhase phase, int most = 6000) {
-    int taken = 0;
-    while (taken < most && cycle->phase() != phase && cycle->step()) ++taken;
-    EXPECT_EQ(cycle->phase(), phase) << backend->status_text();
-    return taken;
-  }
+  int until(RunPhase phase) { return LoopRun::until(phase, 6000); }
   void inject(FaultKind kind, int cycles) {
     sim::Fault fault;
     fault.kind = kind;
@@ -58,27 +39,10 @@ struct Swing : ::testing::Test {
     }
     ASSERT_LT(std::abs(backend->plant().joint(0).velocity_rad_s), 1e-3);
   }
-  /// The largest change of the spring's torque in a cycle, over `count` cycles.
-  [[nodiscard]] double torque_step(int count) {
-    double largest = 0.0;
-    double before = cycle->state().torque_Nm()[0];
-    for (int i = 0; i < count; ++i) {
-      EXPECT_TRUE(cycle->step());
-      const double now = cycle->state().torque_Nm()[0];
-      largest = std::max(largest, std::abs(now - before));
-      before = now;
-    }
-    return largest;
-  }
   [[nodiscard]] bool powered() const {
     return backend->robot().board(0).axis(0).machine().motion() != canopen::DriveMotion::kNone;
   }
 
-  hal::RobotConfig robot;
-  std::unique_ptr<sim::SimRobot> backend;
-  std::unique_ptr<ControllerHost> host;
-  rt::WallClock clock;
-  std::unique_ptr<RobotCycle> cycle;
   double min_position_rad = -3.0;
   double first_start_Nm = 0.0;  ///< torque_step() of the controller's own beginning, at first
 };

@@ -2,12 +2,9 @@
 // plant and log, of a robot with one joint. Linked with the real-time trap; the preset rtsan
 // checks the same runs.
 #include "log/log_file.hpp"
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
 #include "tests/log/scratch_folder.hpp"
 #include "tests/runtime/played_clock.hpp"
-#include "tests/runtime/test_controllers.hpp"
-#include "tests/sim/swing_robot.hpp"
+#include "tests/runtime/swing_loop.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -17,33 +14,14 @@ using test::Sine;
 constexpr std::uint64_t kRunning = 600;
 
 /// The swing, moved on a sine for 0.6 s.
-struct SimRun {
-  explicit SimRun(std::uint64_t seed = 1, double rate = 0.0, log::Recorder* recorder = nullptr,
-                  bool start_paused = false)
-      : robot(tandem::test::swing_robot()), host(robot, tandem::test::swing_kernels(2), 1'000'000) {
-    auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
-                                      {.posture = "up", .release_ns = 100'000'000, .seed = seed});
-    EXPECT_TRUE(made) << made.error().to_string();
-    backend = std::move(*made);
-    EXPECT_TRUE(host.add("sine", std::make_unique<Sine>(std::vector<std::size_t>{0}),
-                         test::parameters("amplitude_rad = 0.1")));
-    const CycleConfig config{
-        .loop = {.pacing = rt::Pacing::kSimulated, .rate = rate, .start_paused = start_paused},
-        .running_cycles = kRunning};
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{robot, *backend, host, clock, recorder, &backend->truth()}, config);
+struct SimRun : test::SwingLoop {
+  explicit SimRun(std::uint64_t seed = 1, double rate = 0.0, log::Recorder* its_recorder = nullptr,
+                  bool start_paused = false) {
+    recorder = its_recorder;
+    add_sine({0}, "sine", true, "amplitude_rad = 0.1");
+    begin({.loop = {.rate = rate, .start_paused = start_paused}, .running_cycles = kRunning},
+          {.posture = "up", .release_ns = 100'000'000, .seed = seed});
   }
-  void run_to(RunPhase phase) {
-    while (cycle->phase() != phase && cycle->step()) {
-    }
-    ASSERT_EQ(cycle->phase(), phase) << backend->status_text();
-  }
-
-  hal::RobotConfig robot;
-  ControllerHost host;
-  std::unique_ptr<sim::SimRobot> backend;
-  rt::WallClock clock;
-  std::unique_ptr<RobotCycle> cycle;
 };
 
 TEST(SimRun, BringsTheDriveUpFollowsAndShutsDown) {

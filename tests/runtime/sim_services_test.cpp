@@ -4,10 +4,7 @@
 #include <functional>
 
 #include "canopen/objects.hpp"
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/runtime/test_controllers.hpp"
-#include "tests/sim/swing_robot.hpp"
+#include "tests/runtime/swing_loop.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -15,45 +12,22 @@ namespace {
 using hal::ControlMode;
 using hal::PidLoop;
 
-constexpr RunServices::Patience kNow{0};
+using test::kNow;
 
 /// The swing, led to a slope by a controller; then the joint is nobody's.
-struct SimServices : testing::Test {
+struct SimServices : testing::Test, test::SwingLoop {
   void SetUp() override {
-    auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
-                                      {.posture = "up", .release_ns = 100'000'000});
-    ASSERT_TRUE(made) << made.error().to_string();
-    backend = std::move(*made);
-    ASSERT_TRUE(host.add("sine", std::make_shared<test::Sine>(std::vector<std::size_t>{0}),
-                         test::parameters("amplitude_rad = 0.4")));
-    cycle = std::make_unique<RobotCycle>(CycleParts{robot, *backend, host, clock},
-                                         CycleConfig{.settle_cycles = 200});
-    while (cycle->phase() != RunPhase::kRunning && cycle->step()) {
-    }
+    add_sine({0}, "sine", true, "amplitude_rad = 0.4");
+    begin({.settle_cycles = 200});
+    run_to(RunPhase::kRunning);
     (void)torque_step(250);  // at the far end of the sine
     ASSERT_TRUE(cycle->services().switch_controllers({"sine"}, {}, kNow));
     (void)torque_step(1000);
     ASSERT_GT(std::abs(cycle->state().torque_Nm()[0]), 1.0) << "it carries nothing";
   }
-  /// The largest change of the spring's torque in a cycle, over `count` cycles.
-  double torque_step(int count) {
-    double largest = 0.0;
-    for (int i = 0; i < count; ++i) {
-      const double before = cycle->state().torque_Nm()[0];
-      EXPECT_TRUE(cycle->step());
-      largest = std::max(largest, std::abs(cycle->state().torque_Nm()[0] - before));
-    }
-    return largest;
-  }
   [[nodiscard]] float gain(std::uint16_t object, canopen::PidSub sub) const {
     return backend->robot().board(0).dictionary().value<float>(object, sub);
   }
-
-  const hal::RobotConfig robot = tandem::test::swing_robot();
-  ControllerHost host{robot, tandem::test::swing_kernels(2), 1'000'000};
-  std::unique_ptr<sim::SimRobot> backend;
-  rt::WallClock clock;
-  std::unique_ptr<RobotCycle> cycle;
 };
 
 TEST_F(SimServices, AJointThatCarriesAWeightChangesItsModeWithoutABump) {
@@ -105,23 +79,13 @@ struct Braking {
   double speed_rad_s = 0.0;  // at last: the true one; a count more in a cycle measures 0.015
 };
 
-struct MovingSwing {
-  MovingSwing() { begin(); }
-  void begin() {
-    auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
-                                      {.posture = "up", .release_ns = 100'000'000});
-    ASSERT_TRUE(made) << made.error().to_string();
-    backend = std::move(*made);
-    ASSERT_TRUE(host.add("runner", std::make_shared<test::Runner>(2.5), test::parameters(), false));
-    ASSERT_TRUE(host.add("keeper", std::make_shared<test::Keeper>(), test::parameters(), false));
-    cycle = std::make_unique<RobotCycle>(CycleParts{robot, *backend, host, clock},
-                                         CycleConfig{.settle_cycles = 200});
-    while (cycle->phase() != RunPhase::kRunning && cycle->step()) {
-    }
+struct MovingSwing : test::SwingLoop {
+  MovingSwing() {
+    add("runner", std::make_shared<test::Runner>(2.5), false);
+    add("keeper", std::make_shared<test::Keeper>(), false);
+    begin({.settle_cycles = 200});
+    run_to(RunPhase::kRunning);
     steps(1500);
-  }
-  void steps(int count) {
-    for (int i = 0; i < count; ++i) ASSERT_TRUE(cycle->step());
   }
   void by_controller() {
     ASSERT_TRUE(cycle->services().switch_controllers({}, {"runner"}, kNow));
@@ -145,12 +109,6 @@ struct MovingSwing {
     seen.speed_rad_s = backend->truth().velocity_rad_s()[0];
     return seen;
   }
-
-  const hal::RobotConfig robot = tandem::test::swing_robot();
-  ControllerHost host{robot, tandem::test::swing_kernels(2), 1'000'000};
-  std::unique_ptr<sim::SimRobot> backend;
-  rt::WallClock clock;
-  std::unique_ptr<RobotCycle> cycle;
 };
 
 TEST(MovingSwing, BrakesAsJointStopDoesWhoeverTakesItsHandOff) {

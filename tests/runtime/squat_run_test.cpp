@@ -9,12 +9,13 @@
 
 #include "log/log_file.hpp"
 #include "tests/log/scratch_folder.hpp"
+#include "tests/runtime/bundled_run.hpp"
 #include "tests/runtime/played_clock.hpp"
-#include "tests/runtime/squat_run.hpp"
 
 namespace tandem::runtime {
 namespace {
 
+constexpr double kRunning_s = 1.5;  // into the first descent
 constexpr double kDegree = std::numbers::pi / 180.0;
 
 struct Case {
@@ -84,12 +85,12 @@ class SquatWatch {
 };
 
 TEST_P(SquatOf, StaysOnItsFeetAndFollowsWithinADegree) {
-  Squat squat(GetParam().robot, 0, 0.0, nullptr, GetParam().bus_timing);
-  ASSERT_NE(squat.cycle, nullptr);
+  BundledRun squat(GetParam().robot, "squat",
+                   {.change = [](Experiment& e) { e.sim.bus_timing = GetParam().bus_timing; }});
   squat.run_to(RunPhase::kRunning);
   const Experiment& e = *squat.experiment;
   const hal::TruthImage& truth = squat.backend->truth();
-  SquatWatch watch(truth, squat.kernels->mass_kg, e.loop.period_ns, GetParam().depth_m);
+  SquatWatch watch(truth, squat.run->kernels().mass_kg, e.loop.period_ns, GetParam().depth_m);
   while (squat.cycle->step() && squat.cycle->phase() == RunPhase::kRunning) watch.take(truth);
   squat.cycle->run();
   for (const Fault& fault : squat.cycle->faults()) ADD_FAILURE() << fault.joint << fault.text;
@@ -102,7 +103,7 @@ TEST_P(SquatOf, StaysOnItsFeetAndFollowsWithinADegree) {
     EXPECT_LT(tracking[static_cast<std::size_t>(joint)].rms_rad, kDegree) << name;
   }
 
-  const double weight_N = squat.kernels->mass_kg * 9.81;
+  const double weight_N = squat.run->kernels().mass_kg * 9.81;
   const double share_N = weight_N / static_cast<double>(truth.feet());
   EXPECT_GT(watch.least_force_N, 0.8 * share_N) << "no foot leaves the ground";
   EXPECT_LT(watch.way_m, 0.001) << "nor does it slip";
@@ -124,8 +125,9 @@ TEST_P(SquatOf, StaysOnItsFeetAndFollowsWithinADegree) {
 /// more; when heartbeats come between, a forearm's sensor is a cycle late: once in 20 s of
 /// squatting.
 TEST(SquatRun, WithBusTimingIsOnTime) {
-  Squat squat("coman", kRunning, 0.0, nullptr, true);
-  ASSERT_NE(squat.cycle, nullptr);
+  BundledRun squat("coman", "squat", {.duration_s = kRunning_s, .change = [](Experiment& e) {
+                                        e.sim.bus_timing = true;
+                                      }});
   squat.run_to(RunPhase::kRunning);
   int late_cycles = 0;
   while (squat.cycle->step() && squat.cycle->phase() == RunPhase::kRunning) {
@@ -148,8 +150,8 @@ std::string hash_of_run(const std::string& path, double rate = 0.0, bool loaded 
                         bool played = false) {
   auto recorder = log::Recorder::open(path, {}, {});
   EXPECT_TRUE(recorder);
-  Squat squat("coman", kRunning, rate, recorder->get());
-  if (squat.cycle == nullptr) return {};
+  BundledRun squat("coman", "squat", {.duration_s = kRunning_s, .rate = rate},
+                   {.recorder = recorder->get()});
   std::atomic<bool> done{false};
   std::thread load([&] {
     double sum = 0.0;
@@ -178,24 +180,14 @@ TEST(SquatRun, LogsTheSameDataForTheSameSeedWhateverTheClockAndTheLoad) {
 }
 
 TEST(SquatRun, RepeatsItsBytesAfterARestore) {
-  Squat squat("coman");
-  ASSERT_NE(squat.cycle, nullptr);
+  BundledRun squat("coman", "squat", {.duration_s = kRunning_s});
   squat.run_to(RunPhase::kRunning);
-  for (int i = 0; i < 400; ++i) ASSERT_TRUE(squat.cycle->step());
+  squat.steps(400);
   const auto snapshot = squat.cycle->save();
   ASSERT_TRUE(snapshot) << snapshot.error().to_string();
-  std::vector<std::byte> bytes[2];
-  for (std::vector<std::byte>& all : bytes) {
-    for (int i = 0; i < 300; ++i) {
-      ASSERT_TRUE(squat.cycle->step());
-      for (const auto one : {squat.cycle->state().bytes(), squat.cycle->command().bytes(),
-                             squat.backend->truth().bytes()}) {
-        all.insert(all.end(), one.begin(), one.end());
-      }
-    }
-    ASSERT_TRUE(squat.cycle->restore(*snapshot));
-  }
-  EXPECT_TRUE(bytes[0] == bytes[1]);
+  const std::vector<std::byte> first = squat.bytes(300);
+  ASSERT_TRUE(squat.cycle->restore(*snapshot));
+  EXPECT_TRUE(squat.bytes(300) == first);
 }
 
 }  // namespace

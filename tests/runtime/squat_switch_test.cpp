@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/runtime/squat_run.hpp"
+#include "tests/runtime/bundled_run.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -29,12 +29,13 @@ struct Steps {
 void widen(double& most, double one, double other) { most = std::max(most, std::abs(other - one)); }
 
 /// Beside the squat there is "rest", which holds the joints without carrying the weight for them.
-struct SwitchedSquat : Squat {
-  SwitchedSquat() : Squat("coman", 20'000) {
-    auto rest = load_controller("hold", {std::string(TANDEM_BINARY_DIR) + "/lib/controllers"});
-    EXPECT_TRUE(rest.has_value());
-    const auto parameters = TomlDocument::parse("", "rest");
-    EXPECT_TRUE(host->add("rest", std::move(*rest), parameters->root(), false));
+struct SwitchedSquat : BundledRun {
+  SwitchedSquat()
+      : BundledRun("coman", "squat",
+                   {.duration_s = 20.0, .change = [](Experiment& e) {
+                      const auto none = TomlDocument::parse("", "rest");
+                      e.controllers.push_back({"hold", "rest", false, none->root()});
+                    }}) {
     capabilities = hal::joint_capabilities(experiment->robot);
     run_to(RunPhase::kRunning);
     (void)go(kFastest);
@@ -63,19 +64,6 @@ struct SwitchedSquat : Squat {
     const auto asked = cycle->services().switch_controllers(stop, start, kNow);
     ASSERT_TRUE(asked) << asked.error().to_string();
   }
-  /// State, command and truth of the next `count` cycles.
-  std::vector<std::byte> bytes(int count) {
-    std::vector<std::byte> all;
-    for (int i = 0; i < count; ++i) {
-      cycle->step();
-      for (const auto bytes : {std::as_const(*cycle).state().bytes(), cycle->command().bytes(),
-                               backend->truth().bytes()}) {
-        all.insert(all.end(), bytes.begin(), bytes.end());
-      }
-    }
-    return all;
-  }
-
   std::vector<hal::JointCapabilities> capabilities;
 };
 

@@ -4,12 +4,8 @@
 #include <functional>
 #include <string>
 
-#include "rt/clock.hpp"
 #include "rt/stop_signal.hpp"
-#include "runtime/robot_cycle.hpp"
-#include "tests/hal/fake_backend.hpp"
-#include "tests/runtime/first_order_robot.hpp"
-#include "tests/runtime/test_controllers.hpp"
+#include "tests/runtime/loop_run.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -34,57 +30,36 @@ struct PlayedOwner final : hal::RemoteCommandPort {
 
 /// A run past bring-up that waits for a reset after a stop, with two controllers (one active), an
 /// owner who may come, and room for more.
-struct Robot {
-  explicit Robot(StopCategory emergency_stop) : robot(hal::test::fake_robot()) {
-    robot.emergency_stop = emergency_stop;
+struct Robot : test::JointRun {
+  static hal::RobotConfig stopped_by(StopCategory category) {
+    hal::RobotConfig robot = hal::test::fake_robot();
+    robot.emergency_stop = category;
     for (hal::JointConfig& joint : robot.joints) {
-      joint.on_fault =
-          emergency_stop == StopCategory::kCategory2 ? StopCategory::kCategory1 : emergency_stop;
+      joint.on_fault = category == StopCategory::kCategory2 ? StopCategory::kCategory1 : category;
     }
-    backend = std::make_unique<test::FirstOrderRobot>(robot);
-    host = std::make_unique<ControllerHost>(robot, nullptr, 1'000'000);
-    auto sine = std::make_unique<test::Sine>(std::vector<std::size_t>{0});
-    active = sine.get();
-    EXPECT_TRUE(host->add("sine", std::move(sine), test::parameters()));
-    auto other = std::make_unique<test::Sine>(std::vector<std::size_t>{1});
-    second = other.get();
-    EXPECT_TRUE(host->add("second", std::move(other), test::parameters(), false));
-    auto owner = std::make_shared<OwnerController>();
-    EXPECT_TRUE(host->add("remote", owner, test::parameters(), false));
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{.robot = robot,
-                   .backend = *backend,
-                   .controllers = *host,
-                   .clock = clock,
-                   .owner = {&port, owner.get(), 2}},
-        CycleConfig{.after_stop = AfterStop::kWait, .after_reset = AfterReset::kHold});
+    return robot;
+  }
+  explicit Robot(StopCategory emergency_stop) : JointRun(stopped_by(emergency_stop)) {
+    active = add_sine();
+    second = add_sine({1}, "second", false);
+    auto remote = std::make_shared<OwnerController>();
+    add("remote", remote, false);
+    owner = {&port, remote.get(), 2};
+    begin({.after_stop = AfterStop::kWait, .after_reset = AfterReset::kHold});
     steps(50);
     EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
   }
-  void steps(int count) {
-    for (int i = 0; i < count; ++i) (void)cycle->step();
-  }
-  void until(RunPhase phase) {
-    for (int i = 0; i < 200 && cycle->phase() != phase; ++i) (void)cycle->step();
-    EXPECT_EQ(cycle->phase(), phase);
-  }
+  ~Robot() { cycle.reset(); }  // it lets the port go
   [[nodiscard]] bool enabled() const {
     for (const std::uint8_t drive : cycle->state().drive_state()) {
       if (drive == static_cast<std::uint8_t>(hal::DriveState::kOperationEnabled)) return true;
     }
     return false;
   }
-  [[nodiscard]] bool follows() const {
-    return enabled() && backend->latched == StopCategory::kWarn;
-  }
+  [[nodiscard]] bool follows() const { return enabled() && backend.latched == StopCategory::kWarn; }
 
-  hal::RobotConfig robot;
-  rt::WallClock clock;
   PlayedOwner port;
-  std::unique_ptr<test::FirstOrderRobot> backend;
-  std::unique_ptr<ControllerHost> host;
   test::Sine *active = nullptr, *second = nullptr;
-  std::unique_ptr<RobotCycle> cycle;
 };
 
 /// What a stop comes to, and how it is given.
@@ -115,8 +90,8 @@ std::vector<Stop> stops() {
   for (const StopCategory category :
        {StopCategory::kCategory0, StopCategory::kCategory1, StopCategory::kHold}) {
     all.push_back({"board input, " + std::string(hal::to_string(category)), category, [](Robot& r) {
-                     r.backend->fault_code = 0xFF02;
-                     r.backend->faulted_joint = 2;
+                     r.backend.fault_code = 0xFF02;
+                     r.backend.faulted_joint = 2;
                    }});
   }
   return all;
@@ -190,10 +165,10 @@ void expect_stopped(Robot& r, const Stop& stop, const Other& other) {
   EXPECT_GE(r.cycle->progress().latched.load(), 1U);
   EXPECT_EQ(r.active->updates + r.second->updates, updates) << "no controller runs";
   // There is nobody who can retreat: category 2 is category 1.
-  EXPECT_LE(r.backend->latched, std::min(stop.category, StopCategory::kHold));
+  EXPECT_LE(r.backend.latched, std::min(stop.category, StopCategory::kHold));
   EXPECT_FALSE(r.follows());
   EXPECT_TRUE(stop.category == StopCategory::kHold || !r.enabled());
-  EXPECT_EQ(r.backend->single_resets, 0U);
+  EXPECT_EQ(r.backend.single_resets, 0U);
 }
 
 TEST(AStop, WinsOverEverythingOfItsCycleWhateverComesFirst) {
@@ -232,7 +207,7 @@ TEST(AStop, AndTheEndOfTheRunAreBothCarriedOut) {
       r.cycle->inbox().end_run();
       if (!stop_first) stop.give(r);
       r.steps(1);
-      EXPECT_LE(r.backend->latched, std::min(stop.category, StopCategory::kHold));
+      EXPECT_LE(r.backend.latched, std::min(stop.category, StopCategory::kHold));
       r.until(RunPhase::kDone);
       EXPECT_GE(r.cycle->progress().latched.load(), 1U);
     }
@@ -272,7 +247,7 @@ TEST(AStop, EndsAResetInEachOfItsCycles) {
       r.steps(300);
       EXPECT_EQ(r.cycle->phase(), RunPhase::kFaulted);
       EXPECT_FALSE(r.follows());
-      EXPECT_LE(r.backend->latched, std::min(stop.category, StopCategory::kHold));
+      EXPECT_LE(r.backend.latched, std::min(stop.category, StopCategory::kHold));
     }
   }
 }
@@ -282,8 +257,8 @@ TEST(AStop, EndsTheResetOfOneDrive) {
   for (int into = 0; into < 6; ++into) {
     Robot r(StopCategory::kCategory1);
     for (hal::JointConfig& joint : r.robot.joints) joint.on_fault = StopCategory::kWarn;
-    r.backend->reset_clears = false;
-    r.backend->faulted_joint = 2;
+    r.backend.reset_clears = false;
+    r.backend.faulted_joint = 2;
     r.steps(5);
     ASSERT_EQ(r.cycle->phase(), RunPhase::kRunning);
     EXPECT_TRUE(r.cycle->inbox().ask({.number = 1, .kind = Kind::kReset, .joint = 2}));
@@ -293,9 +268,9 @@ TEST(AStop, EndsTheResetOfOneDrive) {
     r.cycle->inbox().emergency_stop(StopCategory::kCategory0);
     r.steps(1);
     EXPECT_EQ(r.cycle->services().joints()[2].look.resetting, 0);
-    const std::uint64_t told = r.backend->single_resets;
+    const std::uint64_t told = r.backend.single_resets;
     r.steps(100);
-    EXPECT_EQ(r.backend->single_resets, told) << "the drive is told no more";
+    EXPECT_EQ(r.backend.single_resets, told) << "the drive is told no more";
     EXPECT_EQ(r.cycle->phase(), RunPhase::kFaulted);
     EXPECT_FALSE(r.enabled());
   }
@@ -313,7 +288,7 @@ TEST(AStop, WinsOverAResetThatWasAskedForBeforeItAndComesLater) {
     EXPECT_GT(known, 0U);
     stop.give(r);
     r.steps(20);
-    r.backend->faulted_joint = -1;
+    r.backend.faulted_joint = -1;
     r.cycle->inbox().reset_faults(known);  // it waited in a queue until now
     r.steps(50);
     EXPECT_EQ(r.cycle->phase(), RunPhase::kFaulted);

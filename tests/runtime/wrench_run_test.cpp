@@ -55,16 +55,17 @@ void watch(const Hand& hand, std::uint64_t seed, Seen& seen) {
   EstimatedRun run(hand.robot, "hold",
                    {.seed = seed, .noise = false, .estimation = config, .change = [&](auto& e) {
                       const std::string folder = std::string(TANDEM_SOURCE_DIR) + "/config/";
-                      e.robot =
-                          robot::read_complete_robot(folder + hand.robot + "/" + hand.file)->config;
+                      auto read = robot::read_complete_robot(folder + hand.robot + "/" + hand.file);
+                      e.robot = std::move(read->config);
+                      e.description =
+                          std::make_shared<const model::UrdfModel>(std::move(read->description));
                       add_noise(e.robot);
                       e.duration_s = 5.0;
                     }});
   ASSERT_EQ(run.backend->robot().inject(
                 push_on(run.experiment->robot, hand.joint, hand.force_N, 3.0, 2.0, hand.at_m)),
             Code::kOk);
-  while (run.backend->robot().faults()[0].active == 0 && run.cycle->step()) {
-  }
+  run.run_to_fault();
   const std::int64_t pushed_ns = run.estimate().time_ns()[0];
   for (int i = 0; i < 1300; ++i) {
     ASSERT_TRUE(run.cycle->step());

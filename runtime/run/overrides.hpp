@@ -1,0 +1,37 @@
+// What a caller, or the command line, says instead of an experiment.
+// Layer: runtime/run.  Thread: plain data.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tandem::runtime {
+
+struct Experiment;
+
+struct Overrides {
+  std::optional<std::uint64_t> seed = std::nullopt;
+  std::optional<double> duration_s = std::nullopt;
+  std::optional<double> rate = std::nullopt;  ///< 1: real time, 0: as fast as it goes
+  bool start_paused = false;                  ///< true: whatever the experiment says
+  std::string kernel_variant = {};            ///< empty: the best that this CPU runs
+  bool no_build = false;                      ///< missing kernels are an error
+  std::string hal = {};                       ///< "sim", "can", "ethercat", "dds"
+  bool lockstep = false;                      ///< true: whatever the experiment says
+  std::vector<std::string> interfaces = {};   ///< "can0=vcan0"
+  std::string scenario = {};                  ///< faults to inject into the simulation
+  std::optional<std::uint32_t> delay_cycles = std::nullopt;
+  bool serves = false;  ///< no controllers of its own, and no end
+  std::optional<bool> dds = std::nullopt;
+  std::optional<int> domain = std::nullopt;  ///< of DDS
+  std::string on_fault = {};                 ///< "end", "wait"
+  std::size_t trace_cycles = 0;              ///< the last whose stages' times are kept
+  /// Any other change of what was read, before it is checked. Robot and period stay valid.
+  std::function<void(Experiment&)> change = {};
+};
+
+}  // namespace tandem::runtime
