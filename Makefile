@@ -77,6 +77,7 @@ test-all:
 	@TANDEM_HIL_SECONDS=30 tests/hil/run build/release/bin/hil_test --gtest_filter='*HilLockstep*'
 	@scripts/test-anywhere --paths
 	@scripts/test-build-types
+	@cmake --preset dev --log-level=WARNING && cmake --build --preset dev --parallel $(JOBS)
 	@$(MAKE) --no-print-directory fuzz FUZZ_SECONDS=600
 	@$(MAKE) --no-print-directory asan
 	@$(MAKE) --no-print-directory tsan

@@ -47,7 +47,7 @@ std::string program_beside(const std::string& name) {
 }
 
 Error become(const std::string& program, const std::vector<std::string>& words) {
-  ::execv(program.c_str(), arguments_of(words).data());
+  ::execvp(program.c_str(), arguments_of(words).data());
   return {.message = std::string("cannot be started: ") + std::strerror(errno),
           .hint = {},
           .file = program,

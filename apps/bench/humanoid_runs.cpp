@@ -155,11 +155,10 @@ Result<std::vector<HumanoidRow>> measure_humanoid(const std::string& experiment,
   for (const EngineEntry& entry : entries) {
     if (Status written = write_file(file, experiment_text(*folder, experiment, entry)); !written)
       return std::unexpected(written.error());
-    const Result<pid_t> child =
-        spawn({.command = {program_beside("tandem"), "run", file, "--no-log",
-                           "--no-dds", "--no-socket", "--quiet", "--duration",
-                           fmt::format("{}", duration_s), "--json", json},
-               .output = scratch.file("said")});
+    const Result<pid_t> child = spawn(
+        {.command = {program_beside("tandem"), "run", file, "--no-log", "--no-dds", "--no-socket",
+                     "--quiet", "--duration", fmt::format("{}", duration_s), "--json", json},
+         .output = scratch.file("said")});
     if (!child) return std::unexpected(child.error());
     (void)wait_for(*child);  // the JSON says how it went
     const Json run = Json::parse(robot::text_of(json), nullptr, false);

@@ -169,7 +169,7 @@ TEST_F(CommandLine, WithoutTheToolsItSaysWhatToBuildBeforeAnythingRuns) {
   }
   EXPECT_EQ(json("failed.json")["ok"], false);
   EXPECT_FALSE(has_log());
-  EXPECT_EQ(alone("check hold.toml").status, 0);
+  EXPECT_EQ(alone("check robot.toml").status, 0);
   EXPECT_EQ(alone("log info --help").out, tandem("log info --help").out);
   EXPECT_NE(alone("log csb").err.find("did you mean 'csv'?"), std::string::npos);
 }
