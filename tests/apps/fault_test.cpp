@@ -234,7 +234,7 @@ TEST_F(Faults, AnEndlessRunThatASignalStopsIsDone) {
     EXPECT_TRUE(result["planned_cycles"].is_null());
     EXPECT_TRUE(result["faults"].empty());
     const std::string out = read_text(folder_ / "table.txt");
-    for (const std::string text : {std::string("2 joints, until it is stopped at 1 kHz"),
+    for (const std::string& text : {std::string("2 joints, until it is stopped at 1 kHz"),
                                    "stopped by SIG" + name + " after "}) {
       EXPECT_NE(out.find(text), std::string::npos) << text << "\nin: " << out;
     }

@@ -238,8 +238,8 @@ TEST_F(JointAnswers, OfASetAreTheValuesThatWereAskedFor) {
 
 /// The impedance of a joint that is held stays: the answer says when the other one comes.
 TEST_F(JointAnswers, OfASetWhileJointsAreHeldSayWhenItIsInForce) {
-  ASSERT_TRUE(host.add("sine", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
-                       runtime::test::parameters()));
+  ASSERT_TRUE(host->add("sine", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
+                        runtime::test::parameters()));
   begin();
   (void)cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
   steps(2);

@@ -380,10 +380,10 @@ TEST_F(Waiting, AFaultDuringBringUpEndsTheRun) {
 
 TEST_F(Waiting, EveryStepIsAnEventOfTheLog) {
   const log::ScratchFolder folder;
-  auto recorder = log::Recorder::open(folder / "a.mcap", {}, {});
-  ASSERT_TRUE(recorder);
+  auto log_file = log::Recorder::open(folder / "a.mcap", {}, {});
+  ASSERT_TRUE(log_file);
   start({.after_stop = AfterStop::kWait, .after_reset = AfterReset::kContinue},
-        StopCategory::kCategory1, nullptr, recorder->get());
+        StopCategory::kCategory1, nullptr, log_file->get());
   cycle->inbox().emergency_stop(StopCategory::kCategory1);
   until(RunPhase::kFaulted);
   backend->reset_clears = false;
@@ -395,7 +395,7 @@ TEST_F(Waiting, EveryStepIsAnEventOfTheLog) {
   until(RunPhase::kRunning);
   cycle->inbox().end_run();
   until(RunPhase::kDone);
-  (void)(*recorder)->close();
+  (void)(*log_file)->close();
   const auto log = log::LogFile::open(folder / "a.mcap");
   ASSERT_TRUE(log);
   std::vector<std::string> texts;
