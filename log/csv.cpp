@@ -112,21 +112,27 @@ Status write_csv(const LogFile& log, const std::string& topic, std::size_t every
   const hal::Field* cycle = found == nullptr ? nullptr : found->layout.find("cycle");
   std::string line;
   std::size_t count = 0;
+  bool begun = false;  // rows before the first measurement are left out
   Status done = log.for_each(topic, [&](std::int64_t time_ns, std::span<const std::byte> body) {
     if (count++ % every != 0) return;
     line.clear();
     append_number(line, static_cast<double>(time_ns) * 1e-9);
+    bool measures = false, measured = false;
     for (std::size_t f = 0; f < chosen->size(); ++f) {
       const hal::Field& field = *(*chosen)[f];
       const Ages& age = ages[f];
       for (std::size_t i = 0; i < field.count; ++i) {
         line += ',';
-        const bool unmeasured = age.field != nullptr && cycle != nullptr &&
-                                element(*age.field, body, age.of[i]) > element(*cycle, body, 0);
+        const bool has_age = age.field != nullptr && cycle != nullptr;
+        const bool unmeasured =
+            has_age && element(*age.field, body, age.of[i]) > element(*cycle, body, 0);
         if (!unmeasured) append_number(line, element(field, body, i));
+        measures |= has_age;
+        measured |= has_age && !unmeasured;
       }
     }
-    out << line << "\n";
+    begun |= measured || !measures;
+    if (begun) out << line << "\n";
   });
   if (!done) return done;
   out.flush();

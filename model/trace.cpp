@@ -1,3 +1,4 @@
+// Kernels as expressions: each algorithm once, run over the nodes of a graph.
 #include "model/emit.hpp"
 
 namespace tandem::model {

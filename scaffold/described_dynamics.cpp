@@ -1,3 +1,4 @@
+// Damping and friction of the description's joints, put into their drives.
 #include "scaffold/steps.hpp"
 
 #include <fmt/format.h>

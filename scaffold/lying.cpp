@@ -1,3 +1,4 @@
+// A robot whose legs do not lie along -z of its root, and what to do about it.
 #include "scaffold/steps.hpp"
 
 #include <fmt/format.h>

@@ -29,8 +29,10 @@ TEST(CommandRows, HaveNamesAndKeysThatAreUnlikeEachOther) {
 /// `joint halt` had spoken of "joint.move", which nobody can type.
 TEST(CommandRows, SpeakOfCommandsAsTheyAreTyped) {
   for (const CommandRow& row : command_rows()) {
-    for (const CommandRow& other : command_rows())
+    for (const CommandRow& other : command_rows()) {
+      if (!other.name.contains('.')) continue;  // a word of English
       EXPECT_EQ(row.doc.find(other.name + " "), std::string::npos) << row.name << ": " << row.doc;
+    }
   }
 }
 

@@ -27,6 +27,14 @@ class LogImport : public Program {
   std::string log_;
 };
 
+/// A table without its times: an import's begin at 0, a run's when something was measured.
+std::string measured(const std::string& table) {
+  std::istringstream in(table);
+  std::string rows;
+  for (std::string line; std::getline(in, line);) rows += line.substr(line.find(',')) + "\n";
+  return rows;
+}
+
 TEST_F(LogImport, GivesARunsTableBackAndAReport) {
   const Outcome done =
       tandem("log import run.csv --robot robot.toml --map map.toml --json summary.json");
@@ -37,7 +45,7 @@ TEST_F(LogImport, GivesARunsTableBackAndAReport) {
   ASSERT_EQ(
       tandem("log csv runs/double_pendulum-run.mcap --fields " + kFields + " -o again.csv").status,
       0);
-  EXPECT_EQ(read_text(folder_ / "run.csv"), read_text(folder_ / "again.csv"));
+  EXPECT_EQ(measured(read_text(folder_ / "run.csv")), measured(read_text(folder_ / "again.csv")));
   EXPECT_EQ(tandem("log diff " + log_ + " runs/double_pendulum-run.mcap").status, 1)
       << "the run's has more";
   const Outcome report = tandem("report runs/double_pendulum-run.mcap");
