@@ -286,7 +286,11 @@ Code DriveMaster::send(const CommandImage& command,
   m.brakes = m.holds();
   m.make_commands(&command);
   m.write_pdos();
-  if (m.stage == Impl::MasterStage::kRunning) m.send_parameters(parameters);
+  for (Impl::Node& node : m.nodes) {
+    if (m.stage != Impl::MasterStage::kRunning || !node.master.running() || node.asking >= 0)
+      continue;
+    node.gains.send(parameters, node.master.sdo(), m.ports[node.plan.bus].sink);
+  }
   const bool taken = m.flush();
   if (m.stage == Impl::MasterStage::kFaulted) return Code::kFault;
   if (!taken) ++m.unsent;
@@ -352,7 +356,6 @@ std::size_t DriveMaster::completes(std::size_t bus, const Frame& frame) const no
 }
 
 std::string DriveMaster::status_text() const { return impl_->status(); }
-std::string DriveMaster::parameter_error() const { return impl_->refused_text(); }
 
 std::vector<std::string> DriveMaster::warnings() const { return impl_->warnings(); }
 
@@ -384,13 +387,12 @@ void DriveMaster::archive(Archive& ar) { impl_->archive(ar); }
 
 void DriveMaster::Impl::archive(Archive& ar) {
   ar(stage, reaction, brakes, latched, resetting, begun, shutting_down, counter, now_ns, dt_ns,
-     shut_down_since_ns, refused_node, refused_step, refused_code, axes, sent_revision);
-  for (PidGains& gains : sent_gains) ar(gains.kp, gains.ki, gains.kd);
+     shut_down_since_ns, axes);
   for (Port& port : ports) ar(port.next_heartbeat_ns);
   for (Node& node : nodes) {
     for (Send& pdo : node.sends) ar(pdo.frame, pdo.sent);
     ar(node.master, node.channels, node.silent_cycles, node.unanswered, node.doubled_cycles,
-       node.counters_sent, node.recovering, node.sending, node.asking, node.next_item);
+       node.counters_sent, node.recovering, node.asking, node.gains);
   }
 }
 

@@ -1,6 +1,7 @@
 // From the layout to what a cycle runs through: ports, nodes, axes, lists of copies.
 #include <algorithm>
 
+#include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/drive_master_impl.hpp"
 
 namespace tandem::hal::can {
@@ -42,10 +43,12 @@ std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& lay
 
 }  // namespace
 
-DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout)
+DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout,
+                              const ParameterImage& initial)
     : plan(std::move(node_plan)),
       master(plan.id, plan.heartbeat_ms, plan.boot_time_ns, plan.watch, std::move(steps),
              plan.start_time_ns),
+      gains(plan.joints, initial),
       timeout_cycles(timeout) {
   for (const PdoPlan& pdo : plan.pdos)
     if (pdo.group == PdoGroup::kSensor) channels.resize(channels.size() + pdo.fields.size());
@@ -54,10 +57,7 @@ DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, in
 
 DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
                         std::span<Bus* const> buses)
-    : robot(robot_config),
-      joint_node(robot.joints.size()),
-      joint_fresh(robot.joints.size()),
-      sent_revision(robot.joints.size()) {
+    : robot(robot_config), joint_node(robot.joints.size()), joint_fresh(robot.joints.size()) {
   const std::size_t frames = 16 + layout.nodes.size() * 8;
   for (Bus* bus : buses) ports.emplace_back(*bus, frames);
   const std::vector<AxisTraits> traits = traits_of(robot, layout);
@@ -65,12 +65,8 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
     const GainsConfig& gains = robot.gains_of(robot.joints[j]);
     axes.emplace_back(AxisScale::of(robot, robot.joints[j]), traits[j], gains.stiffness_Nm_rad,
                       gains.damping_Nms_rad);
-    for (const PidConfig* loop :
-         {&gains.position, &gains.velocity, &gains.torque, &gains.current}) {
-      file_gains.push_back(loop->gains);
-    }
   }
-  sent_gains = file_gains;
+  const ParameterImage initial = initial_parameters(robot);
   std::size_t channel = 0;
   for (NodePlan& plan : layout.nodes) {
     Port& port = ports[plan.bus];
@@ -89,7 +85,7 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
     const int timeout =
         plan.board < 0 ? kSensorTimeoutCycles
                        : robot.boards[static_cast<std::size_t>(plan.board)].command_timeout_cycles;
-    Node& node = nodes.emplace_back(std::move(plan), std::move(steps), timeout);
+    Node& node = nodes.emplace_back(std::move(plan), std::move(steps), timeout, initial);
     node.first_channel = channel;
     channel += node.channels.size();
   }

@@ -12,6 +12,7 @@
 #include "canopen/pdo_copy.hpp"
 #include "hal/ethercat-can/axis_master.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
+#include "hal/ethercat-can/gain_sender.hpp"
 #include "hal/ethercat-can/node_master.hpp"
 #include "hal/ethercat-can/pdo_layout.hpp"
 
@@ -61,9 +62,11 @@ struct DriveMaster::Impl {
     int part = -1;           ///< of the NodePlan::parts of a sample; -1: of none
   };
   struct Node {
-    Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout);
+    Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout,
+         const ParameterImage& initial);
     NodePlan plan;
     NodeMaster master;
+    GainSender gains;
     int timeout_cycles;                                     ///< without feedback; 0: never
     std::vector<Send> sends;                                ///< in the plan's order
     std::array<Receive, canopen::kPdosPerNode> receives{};  ///< by number - 1
@@ -78,10 +81,7 @@ struct DriveMaster::Impl {
     std::uint8_t counters_sent = 0;    ///< since its start; stays at 255
     std::uint8_t echo = 0;             ///< the counter that came last; no state
     bool recovering = false;           ///< a lost node that is configured anew
-    // Parameters at run time
-    std::int16_t sending = -1;  ///< item under way: see parameter_items
-    std::int16_t asking = -1;   ///< axis whose error code is being read
-    std::size_t next_item = 0;
+    std::int16_t asking = -1;          ///< axis whose error code is being read
     // Measurements, no state
     std::array<std::uint64_t, RoundTrip::kMostCycles> trip_cycles{};
     rt::Histogram trip_time;
@@ -109,8 +109,6 @@ struct DriveMaster::Impl {
   void process_nodes() noexcept TANDEM_RT;
   void fill(StateImage& state) noexcept TANDEM_RT;
   void write_pdos() noexcept TANDEM_RT;
-  void send_parameters(const ParameterImage& parameters) noexcept TANDEM_RT;
-  void send_parameter(Node& node, const ParameterImage& parameters) noexcept TANDEM_RT;
   [[nodiscard]] bool flush() noexcept TANDEM_RT;
   [[nodiscard]] Code receive_code() const noexcept TANDEM_RT;
 
@@ -156,7 +154,6 @@ struct DriveMaster::Impl {
   [[nodiscard]] std::string joint_name(std::size_t joint) const;
   [[nodiscard]] std::vector<std::string> warnings() const;
   void add_emergencies(std::vector<std::string>& texts) const;
-  [[nodiscard]] std::string refused_text() const;
 
   void archive(Archive& ar);
 
@@ -167,9 +164,6 @@ struct DriveMaster::Impl {
   std::vector<AxisMaster> axes;            ///< by joint
   std::vector<std::size_t> joint_node;     ///< by joint: index in nodes
   std::vector<std::uint8_t> joint_fresh;   ///< by joint: a whole sample came in this cycle
-  std::vector<PidGains> file_gains;        ///< by joint and loop: what the configuration writes
-  std::vector<PidGains> sent_gains;        ///< by joint and loop: what the drive has
-  std::vector<std::uint32_t> sent_revision;
 
   MasterStage stage = MasterStage::kBooting;
   StopCategory reaction = StopCategory::kWarn;  ///< the hardest that is carried out
@@ -182,10 +176,6 @@ struct DriveMaster::Impl {
   std::int64_t now_ns = 0;
   std::int64_t dt_ns = 0;
   std::int64_t shut_down_since_ns = 0;
-  // The last value that a node refused at run time
-  std::int32_t refused_node = -1;
-  SdoStep refused_step;
-  canopen::AbortCode refused_code = canopen::AbortCode::kNone;
   StartUp start_up;             ///< no state
   std::int64_t started_ns = 0;  ///< time of the first cycle; no state
   std::uint64_t unsent = 0;     ///< cycles whose commands a bus did not take whole; no state

@@ -194,6 +194,56 @@ void DriveMaster::Impl::ignored_stop(std::size_t joint) noexcept TANDEM_RT {
   if (!shutting_down && stage == MasterStage::kFaulted) (void)react(category(joint));
 }
 
+/// A fault whose cause no PDO tells: 603F has it, and on EtherCAT the emergency that waits in the
+/// mailbox comes first.
+void DriveMaster::Impl::ask_cause(Node& node) noexcept TANDEM_RT {
+  canopen::SdoClient& sdo = node.master.sdo();
+  if (!node.master.running()) {
+    node.asking = -1;
+    return;
+  }
+  if (sdo.status() == canopen::SdoClient::Status::kBusy) return;
+  if (node.asking >= 0) {
+    const std::size_t joint = node.plan.joints[static_cast<std::size_t>(node.asking)];
+    node.asking = -1;
+    const bool read = sdo.status() == canopen::SdoClient::Status::kDone && sdo.value().size() >= 2;
+    if (read) axes[joint].take_cause(canopen::get<std::uint16_t>(sdo.value().data()));
+  }
+  for (std::size_t axis = 0; axis < node.plan.joints.size(); ++axis) {
+    AxisMaster& asked = axes[node.plan.joints[axis]];
+    if (!asked.wants_cause()) continue;
+    asked.cause_asked();
+    node.asking = static_cast<std::int16_t>(axis);
+    node.gains.give_way();
+    sdo.upload(canopen::of_axis(canopen::object::kErrorCode, static_cast<int>(axis)), 0,
+               ports[node.plan.bus].sink);
+    return;
+  }
+}
+
+/// A master that falls silent without this is an error to the node (8130), though the run ends as
+/// it should. NMT pre-operational follows at once, in which the node answers SDOs too.
+void DriveMaster::Impl::end_watch(Node& node) noexcept TANDEM_RT {
+  const auto watches = [](const SdoStep& step) {
+    const bool guards = step.index == canopen::object::kHeartbeatConsumer ||
+                        step.index == canopen::object::kLifeTimeFactor;
+    return guards && step.use == SdoUse::kWrite;
+  };
+  const auto armed = std::ranges::find_if(node.master.steps(), watches);
+  const bool off = std::ranges::all_of(node.plan.joints, [&](auto j) { return axes[j].off(); });
+  const NodeMaster& master = node.master;
+  const auto place = static_cast<std::size_t>(armed - master.steps().begin());
+  // A start that failed has armed those that came so far; a node that is lost is to notice it.
+  const bool lost = master.stage() == NodeStage::kDown &&
+                    master.error() != FaultCause::kNotOperational &&
+                    master.error() != FaultCause::kBoardRefused;
+  const bool reached = master.running() || master.step() > place;
+  if (lost || !reached || armed == master.steps().end() || !off) return;
+  static constexpr std::array<std::uint8_t, 4> kNobody{};
+  node.master.sdo().download(armed->index, armed->sub, std::span(kNobody).first(armed->size),
+                             ports[node.plan.bus].sink);
+}
+
 /// @return whether an axis is to do something else than before.
 bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
   reaction = std::min(reaction, category);  // the lower the number, the harder the stop
@@ -293,14 +343,10 @@ void DriveMaster::Impl::reset_joint(std::size_t joint) noexcept TANDEM_RT {
   Node& node = node_of(joint);
   if (node.recovering || node.master.stage() != NodeStage::kDown) return;
   node.recovering = true;
-  node.sending = node.asking = -1;
+  node.asking = -1;
   node.master.restart(now_ns);
-  for (const std::size_t lost : node.plan.joints) {
-    axes[lost].forget();
-    // The configuration goes back to the file's gains; what was set since is sent again.
-    std::copy_n(&file_gains[lost * kPidLoops], kPidLoops, &sent_gains[lost * kPidLoops]);
-    sent_revision[lost] = 0;
-  }
+  node.gains.restart();
+  for (const std::size_t lost : node.plan.joints) axes[lost].forget();
 }
 
 void DriveMaster::Impl::set_targets(TargetState target) noexcept TANDEM_RT {

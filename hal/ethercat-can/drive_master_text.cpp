@@ -238,7 +238,13 @@ std::vector<std::string> DriveMaster::Impl::warnings() const {
   add_emergencies(texts);
   if (unsent > 0)
     texts.push_back(fmt::format("a bus did not take the commands of {} cycles", unsent));
-  if (refused_node >= 0) texts.push_back("a value was refused: " + refused_text());
+  for (const Node& node : nodes) {
+    const auto& [step, code] = node.gains.refused();
+    if (step.index == 0) continue;
+    texts.push_back(fmt::format("a value was refused: {}: {} (abort code 0x{:08X})",
+                                step_text(node, step), canopen::to_string(code),
+                                static_cast<std::uint32_t>(code)));
+  }
   return texts;
 }
 
@@ -261,13 +267,6 @@ void DriveMaster::Impl::add_emergencies(std::vector<std::string>& texts) const {
           fmt::format("{}: an emergency without a fault: {}", joint_name(joint), error_text(code)));
     }
   }
-}
-
-std::string DriveMaster::Impl::refused_text() const {
-  if (refused_node < 0) return {};
-  return fmt::format("{}: {} (abort code 0x{:08X})",
-                     step_text(nodes[static_cast<std::size_t>(refused_node)], refused_step),
-                     canopen::to_string(refused_code), static_cast<std::uint32_t>(refused_code));
 }
 
 }  // namespace tandem::hal::can
