@@ -6,8 +6,6 @@
 
 namespace tandem::hal::can {
 
-using canopen::PdoDirection;
-
 namespace {
 
 /// A sensor has no time-out of its own in the configuration.
@@ -49,11 +47,7 @@ DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, in
       master(plan.id, plan.heartbeat_ms, plan.boot_time_ns, plan.watch, std::move(steps),
              plan.start_time_ns),
       gains(plan.joints, initial),
-      timeout_cycles(timeout) {
-  for (const PdoPlan& pdo : plan.pdos)
-    if (pdo.group == PdoGroup::kSensor) channels.resize(channels.size() + pdo.fields.size());
-  sample.resize(channels.size());
-}
+      timeout_cycles(timeout) {}
 
 DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
                         std::span<Bus* const> buses)
@@ -67,7 +61,6 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
                       gains.damping_Nms_rad);
   }
   const ParameterImage initial = initial_parameters(robot);
-  std::size_t channel = 0;
   for (NodePlan& plan : layout.nodes) {
     Port& port = ports[plan.bus];
     const std::int64_t heartbeat_ns = std::int64_t{plan.heartbeat_ms} * 1'000'000;
@@ -85,59 +78,13 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
     const int timeout =
         plan.board < 0 ? kSensorTimeoutCycles
                        : robot.boards[static_cast<std::size_t>(plan.board)].command_timeout_cycles;
-    Node& node = nodes.emplace_back(std::move(plan), std::move(steps), timeout, initial);
+    nodes.emplace_back(std::move(plan), std::move(steps), timeout, initial);
+  }
+  std::size_t channel = 0;
+  for (Node& node : nodes) {  // nodes and axes keep their places from now on
+    node.exchange.connect(node.plan, axes, counter, ports[node.plan.bus].sent_ns);
     node.first_channel = channel;
-    channel += node.channels.size();
-  }
-  for (Node& node : nodes) compile_exchanges(node);  // nodes and axes keep their places from now on
-}
-
-/// The variable behind a field of a PDO.
-void* DriveMaster::Impl::variable(Node& node, const PdoPlan& pdo, const MappedField& field) {
-  switch (field.field) {
-    case WireField::kSensorChannel: return &node.sample[field.axis];
-    case WireField::kCycleEcho: return &node.echo;
-    case WireField::kCycleCounter: return &counter;
-    default: break;
-  }
-  AxisMaster& axis = axes[node.plan.joints[field.axis]];
-  if (pdo.direction == PdoDirection::kReceive) return axis.command_variable(field.field);
-  return pdo.group == PdoGroup::kSlowFeedback || !is_sampled(field.field)
-             ? axis.slow_variable(field.field)
-             : axis.sample_variable(field.field);
-}
-
-void DriveMaster::Impl::compile_exchanges(Node& node) {
-  for (const PdoPlan& pdo : node.plan.pdos) {
-    std::vector<canopen::PdoCopy> copies;
-    for (const MappedField& field : pdo.fields)
-      copies.push_back(
-          {.data = variable(node, pdo, field), .offset = field.offset, .size = field.size});
-    if (pdo.direction == PdoDirection::kReceive) {
-      Send& send = node.sends.emplace_back();
-      send.copies = std::move(copies);
-      send.in_every_cycle = pdo.group == PdoGroup::kCommand;
-      send.frame.id = pdo.cob_id;
-      send.frame.length = canopen::frame_length(pdo.bytes);
-      if (send.frame.length > canopen::kClassicFrameBytes)
-        send.frame.flags = canopen::kFlagFd | canopen::kFlagBrs;
-      continue;
-    }
-    Receive& receive = node.receives[static_cast<std::size_t>(pdo.number - 1)];
-    receive = {.copies = std::move(copies),
-               .in_use = true,
-               .channels = pdo.group == PdoGroup::kSensor,
-               .bytes = pdo.bytes,
-               .part = pdo.group == PdoGroup::kSlowFeedback ? -1 : pdo.part};
-    for (const MappedField& field : pdo.fields) {
-      receive.echo |= field.field == WireField::kCycleEcho;
-      if (pdo.group != PdoGroup::kFeedback || field.field == WireField::kCycleEcho) continue;
-      const std::size_t joint = node.plan.joints[field.axis];
-      if (std::ranges::find(receive.joints, joint) == receive.joints.end())
-        receive.joints.push_back(joint);
-    }
-    // A sample of several parts is that of all axes, and its last part makes it whole.
-    if (pdo.group == PdoGroup::kFeedback && node.plan.parts > 1) receive.joints = node.plan.joints;
+    channel += node.exchange.channels().size();
   }
 }
 

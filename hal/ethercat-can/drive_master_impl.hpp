@@ -9,10 +9,10 @@
 
 #include "canopen/frame.hpp"
 #include "canopen/messages.hpp"
-#include "canopen/pdo_copy.hpp"
 #include "hal/ethercat-can/axis_master.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "hal/ethercat-can/gain_sender.hpp"
+#include "hal/ethercat-can/node_exchange.hpp"
 #include "hal/ethercat-can/node_master.hpp"
 #include "hal/ethercat-can/pdo_layout.hpp"
 
@@ -40,26 +40,9 @@ struct DriveMaster::Impl {
     std::array<std::int16_t, canopen::kMaxNodeId + 1> nodes{};  ///< by id: index in `nodes`
     /// By id: the function code of the TPDO that ends a sample, the one with the highest number.
     std::array<std::uint32_t, canopen::kMaxNodeId + 1> last_tpdo{};
-    std::array<std::int64_t, 256> sent_ns{};  ///< by counter: when its commands were handed over
+    NodeExchange::SentTimes sent_ns{};  ///< by counter: when its commands were handed over
     std::int64_t heartbeat_ns = 0;
     std::int64_t next_heartbeat_ns = 0;
-  };
-  /// An RPDO's plan, compiled.
-  struct Send {
-    canopen::Frame frame;  ///< identifier and length; of what is sent when it changes, the last one
-    std::vector<canopen::PdoCopy> copies{};
-    bool in_every_cycle = true;
-    std::uint8_t sent = 0;  ///< since the node's start; of what is sent when it changes
-  };
-  /// A TPDO's.
-  struct Receive {
-    std::vector<canopen::PdoCopy> copies{};
-    std::vector<std::size_t> joints{};  ///< of a sample: whose
-    bool in_use = false;
-    bool echo = false;       ///< one of the copies is Node::echo
-    bool channels = false;   ///< they are a sensor's
-    std::uint8_t bytes = 0;  ///< mapped
-    int part = -1;           ///< of the NodePlan::parts of a sample; -1: of none
   };
   struct Node {
     Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout,
@@ -67,24 +50,13 @@ struct DriveMaster::Impl {
     NodePlan plan;
     NodeMaster master;
     GainSender gains;
-    int timeout_cycles;                                     ///< without feedback; 0: never
-    std::vector<Send> sends;                                ///< in the plan's order
-    std::array<Receive, canopen::kPdosPerNode> receives{};  ///< by number - 1
-    std::vector<float> channels;                            ///< a sensor's
-    std::vector<float> sample;      ///< of them, while it is not whole; no state
-    std::size_t first_channel = 0;  ///< of them in StateImage::sensor()
-    int next_part = 0;              ///< of this cycle's sample
-    std::uint32_t silent_cycles = 0;
-    std::uint32_t unanswered = 0;      ///< the same, in operation alone: a time-out counts these
-    std::uint32_t answers = 0;         ///< this cycle's first TPDOs
-    std::uint32_t doubled_cycles = 0;  ///< in succession, with several of them
-    std::uint8_t counters_sent = 0;    ///< since its start; stays at 255
-    std::uint8_t echo = 0;             ///< the counter that came last; no state
-    bool recovering = false;           ///< a lost node that is configured anew
-    std::int16_t asking = -1;          ///< axis whose error code is being read
+    NodeExchange exchange;
+    int timeout_cycles;             ///< without feedback; 0: never
+    std::size_t first_channel = 0;  ///< of a sensor's in StateImage::sensor()
+    std::uint32_t unanswered = 0;   ///< cycles of operation without a whole sample
+    bool recovering = false;        ///< a lost node that is configured anew
+    std::int16_t asking = -1;       ///< axis whose error code is being read
     // Measurements, no state
-    std::array<std::uint64_t, RoundTrip::kMostCycles> trip_cycles{};
-    rt::Histogram trip_time;
     std::uint64_t missed = 0;             ///< cycles of operation without its whole feedback
     std::uint64_t emergencies = 0;        ///< that name none of its axes
     canopen::EmergencyMessage emergency;  ///< the last of them
@@ -92,21 +64,14 @@ struct DriveMaster::Impl {
 
   Impl(const RobotConfig& robot_config, PdoLayout layout, std::span<Bus* const> buses);
 
-  // From the layout: drive_master_build.cpp
-  void compile_exchanges(Node& node);
-  [[nodiscard]] void* variable(Node& node, const PdoPlan& pdo, const MappedField& field);
-
   // Exchange: drive_master.cpp
   void begin(const CycleTime& time) noexcept TANDEM_RT;
   void take_frames(Port& port) noexcept TANDEM_RT;
   void dispatch(Port& port, const canopen::Frame& frame, std::int64_t at_ns) noexcept TANDEM_RT;
-  void on_tpdo(Node& node, int number, const canopen::Frame& frame,
-               std::int64_t at_ns) noexcept TANDEM_RT;
-  void on_echo(Node& node, std::uint8_t echo, std::int64_t at_ns) noexcept TANDEM_RT;
   void on_emergency(Node& node, const canopen::Frame& frame) noexcept TANDEM_RT;
-  void watch_doubles(Node& node) noexcept TANDEM_RT;
   void stop_when_lost(Node& node) noexcept TANDEM_RT;
   void process_nodes() noexcept TANDEM_RT;
+  void ask_cause(Node& node) noexcept TANDEM_RT;
   void fill(StateImage& state) noexcept TANDEM_RT;
   void write_pdos() noexcept TANDEM_RT;
   [[nodiscard]] bool flush() noexcept TANDEM_RT;
@@ -117,7 +82,6 @@ struct DriveMaster::Impl {
   void boot() noexcept TANDEM_RT;
   void watch() noexcept TANDEM_RT;
   void watch_stops() noexcept TANDEM_RT;
-  void ask_cause(Node& node) noexcept TANDEM_RT;
   void end_watch(Node& node) noexcept TANDEM_RT;
   void ignored_stop(std::size_t joint) noexcept TANDEM_RT;
   bool react(StopCategory category) noexcept TANDEM_RT;

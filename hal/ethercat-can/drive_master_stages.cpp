@@ -188,37 +188,10 @@ void DriveMaster::Impl::ignored_stop(std::size_t joint) noexcept TANDEM_RT {
   axes[joint].set_target(TargetState::kNothing, now_ns);
   if (node.master.stage() != NodeStage::kDown) {
     node.master.fail(FaultCause::kIgnoresStop, now_ns);
-    node.counters_sent = 0;
+    (void)node.exchange.end_commands();
     ports[node.plan.bus].sink.push(canopen::make_nmt(canopen::NmtCommand::kStop, node.plan.id));
   }
   if (!shutting_down && stage == MasterStage::kFaulted) (void)react(category(joint));
-}
-
-/// A fault whose cause no PDO tells: 603F has it, and on EtherCAT the emergency that waits in the
-/// mailbox comes first.
-void DriveMaster::Impl::ask_cause(Node& node) noexcept TANDEM_RT {
-  canopen::SdoClient& sdo = node.master.sdo();
-  if (!node.master.running()) {
-    node.asking = -1;
-    return;
-  }
-  if (sdo.status() == canopen::SdoClient::Status::kBusy) return;
-  if (node.asking >= 0) {
-    const std::size_t joint = node.plan.joints[static_cast<std::size_t>(node.asking)];
-    node.asking = -1;
-    const bool read = sdo.status() == canopen::SdoClient::Status::kDone && sdo.value().size() >= 2;
-    if (read) axes[joint].take_cause(canopen::get<std::uint16_t>(sdo.value().data()));
-  }
-  for (std::size_t axis = 0; axis < node.plan.joints.size(); ++axis) {
-    AxisMaster& asked = axes[node.plan.joints[axis]];
-    if (!asked.wants_cause()) continue;
-    asked.cause_asked();
-    node.asking = static_cast<std::int16_t>(axis);
-    node.gains.give_way();
-    sdo.upload(canopen::of_axis(canopen::object::kErrorCode, static_cast<int>(axis)), 0,
-               ports[node.plan.bus].sink);
-    return;
-  }
 }
 
 /// A master that falls silent without this is an error to the node (8130), though the run ends as
@@ -302,7 +275,7 @@ void DriveMaster::Impl::recover() noexcept TANDEM_RT {
       node.master.start(now_ns, ports[node.plan.bus].sink);
     } else if (node.master.running()) {
       node.recovering = false;
-      for (Send& pdo : node.sends) pdo.sent = 0;
+      node.exchange.restart();
     } else if (node.master.stage() == NodeStage::kDown) {
       node.recovering = false;  // a new reset may try again
     }
