@@ -284,9 +284,6 @@ Homing DriveMaster::homing(std::size_t joint) const noexcept TANDEM_RT {
   return impl_->axes[joint].homing();
 }
 
-void DriveMaster::stop(StopCategory category) noexcept TANDEM_RT { impl_->stop(category); }
-void DriveMaster::reset() noexcept TANDEM_RT { impl_->reset(); }
-
 bool DriveMaster::shut_down() noexcept TANDEM_RT {
   const bool done = impl_->shut_down();
   (void)impl_->flush();
@@ -323,10 +320,6 @@ std::size_t DriveMaster::completes(std::size_t bus, const Frame& frame) const no
   return impl_->ports[bus].last_tpdo[node] == (frame.id & 0x780) ? node : 0;
 }
 
-std::string DriveMaster::status_text() const { return impl_->status(); }
-
-std::vector<std::string> DriveMaster::warnings() const { return impl_->warnings(); }
-
 std::vector<std::string> DriveMaster::wire_texts() const {
   std::vector<std::string> texts;
   for (std::size_t b = 0; b < impl_->ports.size(); ++b) {
@@ -351,13 +344,12 @@ std::vector<RoundTrip> DriveMaster::round_trips() const {
   return trips;
 }
 
-void DriveMaster::archive(Archive& ar) { impl_->archive(ar); }
-
-void DriveMaster::Impl::archive(Archive& ar) {
-  ar(stage, reaction, brakes, latched, resetting, begun, shutting_down, counter, now_ns, dt_ns,
-     shut_down_since_ns, axes);
-  for (Port& port : ports) ar(port.next_heartbeat_ns);
-  for (Node& node : nodes) {
+void DriveMaster::archive(Archive& ar) {
+  Impl& m = *impl_;
+  ar(m.stage, m.reaction, m.brakes, m.latched, m.resetting, m.begun, m.shutting_down, m.counter,
+     m.now_ns, m.dt_ns, m.shut_down_since_ns, m.axes);
+  for (Impl::Port& port : m.ports) ar(port.next_heartbeat_ns);
+  for (Impl::Node& node : m.nodes) {
     ar(node.master, node.exchange, node.gains, node.unanswered, node.recovering, node.asking);
   }
 }

@@ -86,8 +86,6 @@ struct DriveMaster::Impl {
   void ignored_stop(std::size_t joint) noexcept TANDEM_RT;
   bool react(StopCategory category) noexcept TANDEM_RT;
   void recover() noexcept TANDEM_RT;
-  void stop(StopCategory category) noexcept TANDEM_RT;
-  void reset() noexcept TANDEM_RT;
   void reset_joint(std::size_t joint) noexcept TANDEM_RT;
   void take_resets(const CommandImage& command) noexcept TANDEM_RT;
   void enable_again() noexcept TANDEM_RT;
@@ -110,16 +108,12 @@ struct DriveMaster::Impl {
   [[nodiscard]] Node& node_of(std::size_t joint) noexcept { return nodes[joint_node[joint]]; }
 
   // Texts: drive_master_text.cpp
-  [[nodiscard]] std::string status() const;
   [[nodiscard]] std::string node_text(const Node& node) const;
   [[nodiscard]] std::string step_text(const Node& node, const SdoStep& step) const;
   [[nodiscard]] std::string origin_text(const Node& node, const SdoStep& step) const;
   [[nodiscard]] std::string axis_text(std::size_t joint) const;
   [[nodiscard]] std::string joint_name(std::size_t joint) const;
-  [[nodiscard]] std::vector<std::string> warnings() const;
   void add_emergencies(std::vector<std::string>& texts) const;
-
-  void archive(Archive& ar);
 
   RobotConfig robot;
   std::vector<Port> ports;

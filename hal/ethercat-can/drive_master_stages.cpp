@@ -236,29 +236,33 @@ bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
   return changed;
 }
 
-void DriveMaster::Impl::stop(StopCategory category) noexcept TANDEM_RT {
-  if (category == StopCategory::kWarn || shutting_down) return;
-  latched = std::min(latched, category);
-  resetting = false;
-  if (stage == MasterStage::kFailed) return;
-  if (stage == MasterStage::kBooting || stage == MasterStage::kEnabling) {
-    fail();
-  } else if (!react(category)) {
+void DriveMaster::stop(StopCategory category) noexcept TANDEM_RT {
+  Impl& m = *impl_;
+  if (category == StopCategory::kWarn || m.shutting_down) return;
+  m.latched = std::min(m.latched, category);
+  m.resetting = false;
+  if (m.stage == Impl::MasterStage::kFailed) return;
+  if (m.stage == Impl::MasterStage::kBooting || m.stage == Impl::MasterStage::kEnabling) {
+    m.fail();
+  } else if (!m.react(category)) {
     return;  // it has been reported
   }
-  make_commands(nullptr);  // this cycle's SYNC is over: the next one makes it take effect
-  write_pdos();
-  (void)flush();
+  m.make_commands(nullptr);  // this cycle's SYNC is over: the next one makes it take effect
+  m.write_pdos();
+  (void)m.flush();
 }
 
-void DriveMaster::Impl::reset() noexcept TANDEM_RT {
-  if (shutting_down || (stage != MasterStage::kFaulted && stage != MasterStage::kRunning)) return;
-  latched = StopCategory::kWarn;
-  resetting = true;
-  for (std::size_t joint = 0; joint < axes.size(); ++joint) {
-    if (axes[joint].target() == TargetState::kHome)
-      axes[joint].set_target(TargetState::kEnable, now_ns);
-    reset_joint(joint);
+void DriveMaster::reset() noexcept TANDEM_RT {
+  Impl& m = *impl_;
+  if (m.shutting_down ||
+      (m.stage != Impl::MasterStage::kFaulted && m.stage != Impl::MasterStage::kRunning))
+    return;
+  m.latched = StopCategory::kWarn;
+  m.resetting = true;
+  for (std::size_t joint = 0; joint < m.axes.size(); ++joint) {
+    if (m.axes[joint].target() == TargetState::kHome)
+      m.axes[joint].set_target(TargetState::kEnable, m.now_ns);
+    m.reset_joint(joint);
   }
 }
 
