@@ -7,12 +7,12 @@
 namespace tandem::hal::can {
 namespace {
 
-constexpr std::size_t kItemsPerLoop = 3;
-constexpr std::size_t kItemsPerAxis = kPidLoops * kItemsPerLoop;
-
-double& value_of(PidGains& gains, std::size_t which) noexcept {
-  return which == 0 ? gains.kp : which == 1 ? gains.ki : gains.kd;
-}
+/// By PidLoop: the object of axis 0, whose entries 1 and on are the values.
+constexpr std::array kObjects{canopen::object::kPositionGains, canopen::object::kVelocityGains,
+                              canopen::object::kTorqueGains, canopen::object::kCurrentGains};
+static_assert(kObjects.size() == kPidLoops);
+constexpr std::array kValues{&PidGains::kp, &PidGains::ki, &PidGains::kd};
+constexpr std::size_t kItemsPerAxis = kPidLoops * kValues.size();
 
 }  // namespace
 
@@ -20,8 +20,8 @@ GainSender::GainSender(const std::vector<std::size_t>& joints, const ParameterIm
   for (const std::size_t joint : joints) {
     Axis& axis = axes_.emplace_back(Axis{.joint = joint});
     std::ranges::copy(initial.all().subspan(joint * kPidLoops, kPidLoops), axis.initial.begin());
-    axis.sent = axis.initial;
   }
+  restart();
 }
 
 void GainSender::send(const ParameterImage& parameters, canopen::SdoClient& sdo,
@@ -45,13 +45,13 @@ void GainSender::send(const ParameterImage& parameters, canopen::SdoClient& sdo,
     const std::size_t number = now / kItemsPerAxis;
     Axis& axis = axes_[number];
     if (!changed(axis)) continue;
-    const auto loop = static_cast<PidLoop>(now % kItemsPerAxis / kItemsPerLoop);
-    const std::size_t which = now % kItemsPerLoop;
-    PidGains wanted = parameters.gains(axis.joint, loop);
-    double& sent = value_of(axis.sent[static_cast<std::size_t>(loop)], which);
-    if (value_of(wanted, which) == sent) continue;
-    sent = value_of(wanted, which);
-    const SdoStep step = write_step(canopen::of_axis(gains_object(loop), static_cast<int>(number)),
+    const std::size_t loop = now % kItemsPerAxis / kValues.size();
+    const std::size_t which = now % kValues.size();
+    const double wanted = parameters.gains(axis.joint, static_cast<PidLoop>(loop)).*kValues[which];
+    double& sent = axis.sent[loop].*kValues[which];
+    if (wanted == sent) continue;
+    sent = wanted;
+    const SdoStep step = write_step(canopen::of_axis(kObjects[loop], static_cast<int>(number)),
                                     static_cast<std::uint8_t>(which + 1), static_cast<float>(sent));
     sdo.download(step.index, step.sub, step.value(), out);
     sending_ = static_cast<std::int16_t>(now);
@@ -64,8 +64,7 @@ void GainSender::send(const ParameterImage& parameters, canopen::SdoClient& sdo,
 void GainSender::restart() noexcept TANDEM_RT {
   give_way();
   for (Axis& axis : axes_) {
-    axis.sent = axis.initial;
-    axis.revision = 0;
+    axis = {.joint = axis.joint, .initial = axis.initial, .sent = axis.initial};
   }
 }
 
