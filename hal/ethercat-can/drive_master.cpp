@@ -3,7 +3,6 @@
 #include "hal/ethercat-can/drive_master.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <utility>
 
 #include "base/archive.hpp"
@@ -13,14 +12,6 @@
 namespace tandem::hal::can {
 
 using canopen::Frame;
-using canopen::PdoDirection;
-
-namespace {
-
-/// Cycles in succession with two answers of one node that are tolerated.
-constexpr std::uint32_t kDoubledCycles = 10;
-
-}  // namespace
 
 void DriveMaster::Impl::begin(const CycleTime& time) noexcept TANDEM_RT {
   dt_ns = begun ? time.time_ns - now_ns : time.period_ns;
@@ -70,7 +61,14 @@ void DriveMaster::Impl::dispatch(Port& port, const Frame& frame,
     case 0x180:
     case 0x280:
     case 0x380:
-    case 0x480: on_tpdo(node, static_cast<int>(function >> 8), frame, at_ns); break;
+    case 0x480: {
+      const bool listening = node.master.running() || node.master.stage() == NodeStage::kStarting;
+      const auto number = static_cast<int>(function >> 8);
+      if (listening && node.exchange.take(number, frame, at_ns, joint_fresh)) {
+        node.master.on_tpdo(now_ns);
+      }
+      break;
+    }
     case cob::kSdoResponse: node.master.on_sdo(frame, port.sink); break;
     case cob::kHeartbeat:
       if (const auto message = parse_heartbeat(frame)) {
@@ -79,35 +77,6 @@ void DriveMaster::Impl::dispatch(Port& port, const Frame& frame,
       break;
     default: break;
   }
-}
-
-/// The parts of a sample count only one after the other in one cycle: one that is late, or whose
-/// predecessor is missing, is left out, so that no sample is made of two.
-void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame,
-                                std::int64_t at_ns) noexcept TANDEM_RT {
-  const Receive& pdo = node.receives[static_cast<std::size_t>(number - 1)];
-  const bool listening = node.master.running() || node.master.stage() == NodeStage::kStarting;
-  if (!pdo.in_use || !listening || frame.length < pdo.bytes) return;
-  if (number == 1) ++node.answers;
-  node.master.on_tpdo(now_ns);
-  if (pdo.part >= 0) {
-    if (pdo.part != 0 && pdo.part != node.next_part) return;
-    node.next_part = pdo.part + 1;
-  }
-  const bool whole = node.next_part == node.plan.parts;
-  for (const canopen::PdoCopy& copy : pdo.copies) copy.from_wire(frame.data.data());
-  for (const std::size_t joint : pdo.joints) joint_fresh[joint] = whole ? 1 : 0;
-  if (pdo.echo) on_echo(node, node.echo, at_ns);
-  if (pdo.channels && whole) node.channels = node.sample;
-}
-
-void DriveMaster::Impl::on_echo(Node& node, std::uint8_t echo,
-                                std::int64_t at_ns) noexcept TANDEM_RT {
-  const auto trip = static_cast<std::uint8_t>(counter - echo);
-  if (trip == 0 || trip > node.counters_sent) return;  // it has not had a command yet
-  ++node.trip_cycles[std::min<std::size_t>(trip, RoundTrip::kMostCycles - 1)];
-  const std::int64_t sent_ns = ports[node.plan.bus].sent_ns[echo];
-  if (trip == 1 && sent_ns != 0 && at_ns > sent_ns) node.trip_time.record(at_ns - sent_ns);
 }
 
 /// Byte 3 is the axis on our boards, and the maker's own on others: without an axis of that number
@@ -128,20 +97,10 @@ void DriveMaster::Impl::on_emergency(Node& node, const Frame& frame) noexcept TA
   node.emergency = *message;
 }
 
-/// A late answer and the next may come in one cycle; time and again it is two nodes that answer.
-void DriveMaster::Impl::watch_doubles(Node& node) noexcept TANDEM_RT {
-  node.doubled_cycles = node.answers > 1 ? node.doubled_cycles + 1 : 0;
-  node.answers = 0;
-  if (node.master.running() && node.doubled_cycles > kDoubledCycles) {
-    node.master.fail(FaultCause::kTwoBoards, now_ns);
-  }
-}
-
 /// A board whose answers or heartbeats are lost may hear and move on: it stops by itself now, not
 /// when it has missed its commands for long enough.
 void DriveMaster::Impl::stop_when_lost(Node& node) noexcept TANDEM_RT {
-  if (node.master.stage() != NodeStage::kDown || node.counters_sent == 0) return;
-  node.counters_sent = 0;
+  if (node.master.stage() != NodeStage::kDown || !node.exchange.end_commands()) return;
   if (shutting_down || node.plan.board < 0) return;
   ports[node.plan.bus].sink.push(canopen::make_nmt(canopen::NmtCommand::kStop, node.plan.id));
 }
@@ -153,13 +112,10 @@ void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
       node.master.fail(FaultCause::kNoBootUp, now_ns);
     }
     node.master.process(now_ns, dt_ns, ports[node.plan.bus].sink);
-    const bool complete =
-        node.plan.board >= 0
-            ? std::ranges::all_of(node.plan.joints, [&](auto j) { return joint_fresh[j] != 0; })
-            : node.next_part == node.plan.parts;
-    node.next_part = 0;
-    watch_doubles(node);
-    node.silent_cycles = complete ? 0 : node.silent_cycles + 1;
+    const bool complete = node.exchange.end_cycle(joint_fresh);
+    if (node.master.running() && node.exchange.doubled()) {
+      node.master.fail(FaultCause::kTwoBoards, now_ns);
+    }
     if (!complete && stage == MasterStage::kRunning && !shutting_down) ++node.missed;
     // A node may tell that it runs before the SYNC that its first sample answers.
     node.unanswered = complete || !node.master.running() ? 0 : node.unanswered + 1;
@@ -180,34 +136,45 @@ void DriveMaster::Impl::fill(StateImage& state) noexcept TANDEM_RT {
   for (const Node& node : nodes) {
     if (node.plan.sensor < 0) continue;
     const auto sensor = static_cast<std::size_t>(node.plan.sensor);
-    for (std::size_t i = 0; i < node.channels.size(); ++i) {
-      state.sensor()[node.first_channel + i] = static_cast<double>(node.channels[i]);
-    }
-    state.sensor_age_cycles()[sensor] = node.silent_cycles;
+    std::ranges::copy(node.exchange.channels(), state.sensor().subspan(node.first_channel).begin());
+    state.sensor_age_cycles()[sensor] = node.exchange.silent_cycles();
   }
 }
 
 void DriveMaster::Impl::write_pdos() noexcept TANDEM_RT {
   for (Node& node : nodes) {
-    if (!node.master.running()) {
-      node.counters_sent = 0;
-      continue;
+    if (node.master.running()) {
+      node.exchange.write(ports[node.plan.bus].sink);
+    } else {
+      (void)node.exchange.end_commands();
     }
-    if (node.counters_sent < 0xFF) ++node.counters_sent;
-    for (Send& pdo : node.sends) {
-      const bool due = pdo.in_every_cycle || pdo.sent == 0 ||
-                       std::ranges::any_of(pdo.copies, [&](const canopen::PdoCopy& copy) {
-                         return copy.differs(pdo.frame.data.data());
-                       });
-      if (!due) continue;
-      Frame* frame = ports[node.plan.bus].sink.next();
-      if (frame == nullptr) continue;
-      *frame = pdo.frame;
-      for (const canopen::PdoCopy& copy : pdo.copies) copy.to_wire(frame->data.data());
-      if (pdo.in_every_cycle) continue;
-      for (const canopen::PdoCopy& copy : pdo.copies) copy.to_wire(pdo.frame.data.data());
-      pdo.sent = 1;
-    }
+  }
+}
+
+/// A fault whose cause no PDO tells: 603F has it, and on EtherCAT the emergency that waits in the
+/// mailbox comes first.
+void DriveMaster::Impl::ask_cause(Node& node) noexcept TANDEM_RT {
+  canopen::SdoClient& sdo = node.master.sdo();
+  if (!node.master.running()) {
+    node.asking = -1;
+    return;
+  }
+  if (sdo.status() == canopen::SdoClient::Status::kBusy) return;
+  if (node.asking >= 0) {
+    const std::size_t joint = node.plan.joints[static_cast<std::size_t>(node.asking)];
+    node.asking = -1;
+    const bool read = sdo.status() == canopen::SdoClient::Status::kDone && sdo.value().size() >= 2;
+    if (read) axes[joint].take_cause(canopen::get<std::uint16_t>(sdo.value().data()));
+  }
+  for (std::size_t axis = 0; axis < node.plan.joints.size(); ++axis) {
+    AxisMaster& asked = axes[node.plan.joints[axis]];
+    if (!asked.wants_cause()) continue;
+    asked.cause_asked();
+    node.asking = static_cast<std::int16_t>(axis);
+    node.gains.give_way();
+    sdo.upload(canopen::of_axis(canopen::object::kErrorCode, static_cast<int>(axis)), 0,
+               ports[node.plan.bus].sink);
+    return;
   }
 }
 
@@ -230,7 +197,8 @@ Code DriveMaster::Impl::receive_code() const noexcept TANDEM_RT {
   }
   if (stage == MasterStage::kFaulted || stage == MasterStage::kFailed) return Code::kFault;
   if (stage != MasterStage::kRunning) return Code::kOk;
-  const bool silent = std::ranges::any_of(nodes, [](const Node& n) { return n.silent_cycles > 0; });
+  const bool silent =
+      std::ranges::any_of(nodes, [](const Node& n) { return n.exchange.silent_cycles() > 0; });
   return silent ? Code::kTimeout : Code::kOk;
 }
 
@@ -286,7 +254,11 @@ Code DriveMaster::send(const CommandImage& command,
   m.brakes = m.holds();
   m.make_commands(&command);
   m.write_pdos();
-  if (m.stage == Impl::MasterStage::kRunning) m.send_parameters(parameters);
+  for (Impl::Node& node : m.nodes) {
+    const bool idle = node.master.running() && node.asking < 0;
+    if (m.stage != Impl::MasterStage::kRunning || !idle) continue;
+    node.gains.send(parameters, node.master.sdo(), m.ports[node.plan.bus].sink);
+  }
   const bool taken = m.flush();
   if (m.stage == Impl::MasterStage::kFaulted) return Code::kFault;
   if (!taken) ++m.unsent;
@@ -311,9 +283,6 @@ void DriveMaster::stop_homing(std::size_t joint) noexcept TANDEM_RT {
 Homing DriveMaster::homing(std::size_t joint) const noexcept TANDEM_RT {
   return impl_->axes[joint].homing();
 }
-
-void DriveMaster::stop(StopCategory category) noexcept TANDEM_RT { impl_->stop(category); }
-void DriveMaster::reset() noexcept TANDEM_RT { impl_->reset(); }
 
 bool DriveMaster::shut_down() noexcept TANDEM_RT {
   const bool done = impl_->shut_down();
@@ -351,11 +320,6 @@ std::size_t DriveMaster::completes(std::size_t bus, const Frame& frame) const no
   return impl_->ports[bus].last_tpdo[node] == (frame.id & 0x780) ? node : 0;
 }
 
-std::string DriveMaster::status_text() const { return impl_->status(); }
-std::string DriveMaster::parameter_error() const { return impl_->refused_text(); }
-
-std::vector<std::string> DriveMaster::warnings() const { return impl_->warnings(); }
-
 std::vector<std::string> DriveMaster::wire_texts() const {
   std::vector<std::string> texts;
   for (std::size_t b = 0; b < impl_->ports.size(); ++b) {
@@ -374,23 +338,19 @@ std::vector<RoundTrip> DriveMaster::round_trips() const {
     trips.push_back({.node = node.plan.name,
                      .bus = impl_->robot.buses[node.plan.bus].name,
                      .id = node.plan.id,
-                     .cycles = node.trip_cycles,
-                     .time = node.trip_time});
+                     .cycles = node.exchange.round_trip().cycles,
+                     .time = node.exchange.round_trip().time});
   }
   return trips;
 }
 
-void DriveMaster::archive(Archive& ar) { impl_->archive(ar); }
-
-void DriveMaster::Impl::archive(Archive& ar) {
-  ar(stage, reaction, brakes, latched, resetting, begun, shutting_down, counter, now_ns, dt_ns,
-     shut_down_since_ns, refused_node, refused_step, refused_code, axes, sent_revision);
-  for (PidGains& gains : sent_gains) ar(gains.kp, gains.ki, gains.kd);
-  for (Port& port : ports) ar(port.next_heartbeat_ns);
-  for (Node& node : nodes) {
-    for (Send& pdo : node.sends) ar(pdo.frame, pdo.sent);
-    ar(node.master, node.channels, node.silent_cycles, node.unanswered, node.doubled_cycles,
-       node.counters_sent, node.recovering, node.sending, node.asking, node.next_item);
+void DriveMaster::archive(Archive& ar) {
+  Impl& m = *impl_;
+  ar(m.stage, m.reaction, m.brakes, m.latched, m.resetting, m.begun, m.shutting_down, m.counter,
+     m.now_ns, m.dt_ns, m.shut_down_since_ns, m.axes);
+  for (Impl::Port& port : m.ports) ar(port.next_heartbeat_ns);
+  for (Impl::Node& node : m.nodes) {
+    ar(node.master, node.exchange, node.gains, node.unanswered, node.recovering, node.asking);
   }
 }
 

@@ -135,12 +135,10 @@ class DriveMaster {
                                       const canopen::Frame& frame) const noexcept TANDEM_RT;
   /// What bring-up waits for, or the cause of a fault: names node, board, joint and object.
   [[nodiscard]] std::string status_text() const;
-  /// Values that a node refused at run time (gains), with the object and why; empty when none.
-  [[nodiscard]] std::string parameter_error() const;
 
   /// What went wrong and was tolerated, a sentence each: feedback that did not come, counted by
-  /// node; commands that a bus did not take; a refused value. Empty when nothing did. A
-  /// measurement, no state: not in a snapshot. Not RT.
+  /// node; commands that a bus did not take; the last gain that a board refused, with the object
+  /// and why. Empty when nothing did. A measurement, no state: not in a snapshot. Not RT.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
   /// "bus line: …" of every bus that has something to tell of its wire. Not RT.

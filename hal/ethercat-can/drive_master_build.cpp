@@ -1,11 +1,10 @@
 // From the layout to what a cycle runs through: ports, nodes, axes, lists of copies.
 #include <algorithm>
 
+#include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/drive_master_impl.hpp"
 
 namespace tandem::hal::can {
-
-using canopen::PdoDirection;
 
 namespace {
 
@@ -42,22 +41,17 @@ std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& lay
 
 }  // namespace
 
-DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout)
+DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout,
+                              const ParameterImage& initial)
     : plan(std::move(node_plan)),
       master(plan.id, plan.heartbeat_ms, plan.boot_time_ns, plan.watch, std::move(steps),
              plan.start_time_ns),
-      timeout_cycles(timeout) {
-  for (const PdoPlan& pdo : plan.pdos)
-    if (pdo.group == PdoGroup::kSensor) channels.resize(channels.size() + pdo.fields.size());
-  sample.resize(channels.size());
-}
+      gains(plan.joints, initial),
+      timeout_cycles(timeout) {}
 
 DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
                         std::span<Bus* const> buses)
-    : robot(robot_config),
-      joint_node(robot.joints.size()),
-      joint_fresh(robot.joints.size()),
-      sent_revision(robot.joints.size()) {
+    : robot(robot_config), joint_node(robot.joints.size()), joint_fresh(robot.joints.size()) {
   const std::size_t frames = 16 + layout.nodes.size() * 8;
   for (Bus* bus : buses) ports.emplace_back(*bus, frames);
   const std::vector<AxisTraits> traits = traits_of(robot, layout);
@@ -65,13 +59,8 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
     const GainsConfig& gains = robot.gains_of(robot.joints[j]);
     axes.emplace_back(AxisScale::of(robot, robot.joints[j]), traits[j], gains.stiffness_Nm_rad,
                       gains.damping_Nms_rad);
-    for (const PidConfig* loop :
-         {&gains.position, &gains.velocity, &gains.torque, &gains.current}) {
-      file_gains.push_back(loop->gains);
-    }
   }
-  sent_gains = file_gains;
-  std::size_t channel = 0;
+  const ParameterImage initial = initial_parameters(robot);
   for (NodePlan& plan : layout.nodes) {
     Port& port = ports[plan.bus];
     const std::int64_t heartbeat_ns = std::int64_t{plan.heartbeat_ms} * 1'000'000;
@@ -89,59 +78,13 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
     const int timeout =
         plan.board < 0 ? kSensorTimeoutCycles
                        : robot.boards[static_cast<std::size_t>(plan.board)].command_timeout_cycles;
-    Node& node = nodes.emplace_back(std::move(plan), std::move(steps), timeout);
+    nodes.emplace_back(std::move(plan), std::move(steps), timeout, initial);
+  }
+  std::size_t channel = 0;
+  for (Node& node : nodes) {  // nodes and axes keep their places from now on
+    node.exchange.connect(node.plan, axes, counter, ports[node.plan.bus].sent_ns);
     node.first_channel = channel;
-    channel += node.channels.size();
-  }
-  for (Node& node : nodes) compile_exchanges(node);  // nodes and axes keep their places from now on
-}
-
-/// The variable behind a field of a PDO.
-void* DriveMaster::Impl::variable(Node& node, const PdoPlan& pdo, const MappedField& field) {
-  switch (field.field) {
-    case WireField::kSensorChannel: return &node.sample[field.axis];
-    case WireField::kCycleEcho: return &node.echo;
-    case WireField::kCycleCounter: return &counter;
-    default: break;
-  }
-  AxisMaster& axis = axes[node.plan.joints[field.axis]];
-  if (pdo.direction == PdoDirection::kReceive) return axis.command_variable(field.field);
-  return pdo.group == PdoGroup::kSlowFeedback || !is_sampled(field.field)
-             ? axis.slow_variable(field.field)
-             : axis.sample_variable(field.field);
-}
-
-void DriveMaster::Impl::compile_exchanges(Node& node) {
-  for (const PdoPlan& pdo : node.plan.pdos) {
-    std::vector<canopen::PdoCopy> copies;
-    for (const MappedField& field : pdo.fields)
-      copies.push_back(
-          {.data = variable(node, pdo, field), .offset = field.offset, .size = field.size});
-    if (pdo.direction == PdoDirection::kReceive) {
-      Send& send = node.sends.emplace_back();
-      send.copies = std::move(copies);
-      send.in_every_cycle = pdo.group == PdoGroup::kCommand;
-      send.frame.id = pdo.cob_id;
-      send.frame.length = canopen::frame_length(pdo.bytes);
-      if (send.frame.length > canopen::kClassicFrameBytes)
-        send.frame.flags = canopen::kFlagFd | canopen::kFlagBrs;
-      continue;
-    }
-    Receive& receive = node.receives[static_cast<std::size_t>(pdo.number - 1)];
-    receive = {.copies = std::move(copies),
-               .in_use = true,
-               .channels = pdo.group == PdoGroup::kSensor,
-               .bytes = pdo.bytes,
-               .part = pdo.group == PdoGroup::kSlowFeedback ? -1 : pdo.part};
-    for (const MappedField& field : pdo.fields) {
-      receive.echo |= field.field == WireField::kCycleEcho;
-      if (pdo.group != PdoGroup::kFeedback || field.field == WireField::kCycleEcho) continue;
-      const std::size_t joint = node.plan.joints[field.axis];
-      if (std::ranges::find(receive.joints, joint) == receive.joints.end())
-        receive.joints.push_back(joint);
-    }
-    // A sample of several parts is that of all axes, and its last part makes it whole.
-    if (pdo.group == PdoGroup::kFeedback && node.plan.parts > 1) receive.joints = node.plan.joints;
+    channel += node.exchange.channels().size();
   }
 }
 

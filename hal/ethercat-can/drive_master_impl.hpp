@@ -9,9 +9,10 @@
 
 #include "canopen/frame.hpp"
 #include "canopen/messages.hpp"
-#include "canopen/pdo_copy.hpp"
 #include "hal/ethercat-can/axis_master.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
+#include "hal/ethercat-can/gain_sender.hpp"
+#include "hal/ethercat-can/node_exchange.hpp"
 #include "hal/ethercat-can/node_master.hpp"
 #include "hal/ethercat-can/pdo_layout.hpp"
 
@@ -39,52 +40,23 @@ struct DriveMaster::Impl {
     std::array<std::int16_t, canopen::kMaxNodeId + 1> nodes{};  ///< by id: index in `nodes`
     /// By id: the function code of the TPDO that ends a sample, the one with the highest number.
     std::array<std::uint32_t, canopen::kMaxNodeId + 1> last_tpdo{};
-    std::array<std::int64_t, 256> sent_ns{};  ///< by counter: when its commands were handed over
+    NodeExchange::SentTimes sent_ns{};  ///< by counter: when its commands were handed over
     std::int64_t heartbeat_ns = 0;
     std::int64_t next_heartbeat_ns = 0;
   };
-  /// An RPDO's plan, compiled.
-  struct Send {
-    canopen::Frame frame;  ///< identifier and length; of what is sent when it changes, the last one
-    std::vector<canopen::PdoCopy> copies{};
-    bool in_every_cycle = true;
-    std::uint8_t sent = 0;  ///< since the node's start; of what is sent when it changes
-  };
-  /// A TPDO's.
-  struct Receive {
-    std::vector<canopen::PdoCopy> copies{};
-    std::vector<std::size_t> joints{};  ///< of a sample: whose
-    bool in_use = false;
-    bool echo = false;       ///< one of the copies is Node::echo
-    bool channels = false;   ///< they are a sensor's
-    std::uint8_t bytes = 0;  ///< mapped
-    int part = -1;           ///< of the NodePlan::parts of a sample; -1: of none
-  };
   struct Node {
-    Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout);
+    Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout,
+         const ParameterImage& initial);
     NodePlan plan;
     NodeMaster master;
-    int timeout_cycles;                                     ///< without feedback; 0: never
-    std::vector<Send> sends;                                ///< in the plan's order
-    std::array<Receive, canopen::kPdosPerNode> receives{};  ///< by number - 1
-    std::vector<float> channels;                            ///< a sensor's
-    std::vector<float> sample;      ///< of them, while it is not whole; no state
-    std::size_t first_channel = 0;  ///< of them in StateImage::sensor()
-    int next_part = 0;              ///< of this cycle's sample
-    std::uint32_t silent_cycles = 0;
-    std::uint32_t unanswered = 0;      ///< the same, in operation alone: a time-out counts these
-    std::uint32_t answers = 0;         ///< this cycle's first TPDOs
-    std::uint32_t doubled_cycles = 0;  ///< in succession, with several of them
-    std::uint8_t counters_sent = 0;    ///< since its start; stays at 255
-    std::uint8_t echo = 0;             ///< the counter that came last; no state
-    bool recovering = false;           ///< a lost node that is configured anew
-    // Parameters at run time
-    std::int16_t sending = -1;  ///< item under way: see parameter_items
-    std::int16_t asking = -1;   ///< axis whose error code is being read
-    std::size_t next_item = 0;
+    GainSender gains;
+    NodeExchange exchange;
+    int timeout_cycles;             ///< without feedback; 0: never
+    std::size_t first_channel = 0;  ///< of a sensor's in StateImage::sensor()
+    std::uint32_t unanswered = 0;   ///< cycles of operation without a whole sample
+    bool recovering = false;        ///< a lost node that is configured anew
+    std::int16_t asking = -1;       ///< axis whose error code is being read
     // Measurements, no state
-    std::array<std::uint64_t, RoundTrip::kMostCycles> trip_cycles{};
-    rt::Histogram trip_time;
     std::uint64_t missed = 0;             ///< cycles of operation without its whole feedback
     std::uint64_t emergencies = 0;        ///< that name none of its axes
     canopen::EmergencyMessage emergency;  ///< the last of them
@@ -92,25 +64,16 @@ struct DriveMaster::Impl {
 
   Impl(const RobotConfig& robot_config, PdoLayout layout, std::span<Bus* const> buses);
 
-  // From the layout: drive_master_build.cpp
-  void compile_exchanges(Node& node);
-  [[nodiscard]] void* variable(Node& node, const PdoPlan& pdo, const MappedField& field);
-
   // Exchange: drive_master.cpp
   void begin(const CycleTime& time) noexcept TANDEM_RT;
   void take_frames(Port& port) noexcept TANDEM_RT;
   void dispatch(Port& port, const canopen::Frame& frame, std::int64_t at_ns) noexcept TANDEM_RT;
-  void on_tpdo(Node& node, int number, const canopen::Frame& frame,
-               std::int64_t at_ns) noexcept TANDEM_RT;
-  void on_echo(Node& node, std::uint8_t echo, std::int64_t at_ns) noexcept TANDEM_RT;
   void on_emergency(Node& node, const canopen::Frame& frame) noexcept TANDEM_RT;
-  void watch_doubles(Node& node) noexcept TANDEM_RT;
   void stop_when_lost(Node& node) noexcept TANDEM_RT;
   void process_nodes() noexcept TANDEM_RT;
+  void ask_cause(Node& node) noexcept TANDEM_RT;
   void fill(StateImage& state) noexcept TANDEM_RT;
   void write_pdos() noexcept TANDEM_RT;
-  void send_parameters(const ParameterImage& parameters) noexcept TANDEM_RT;
-  void send_parameter(Node& node, const ParameterImage& parameters) noexcept TANDEM_RT;
   [[nodiscard]] bool flush() noexcept TANDEM_RT;
   [[nodiscard]] Code receive_code() const noexcept TANDEM_RT;
 
@@ -119,13 +82,10 @@ struct DriveMaster::Impl {
   void boot() noexcept TANDEM_RT;
   void watch() noexcept TANDEM_RT;
   void watch_stops() noexcept TANDEM_RT;
-  void ask_cause(Node& node) noexcept TANDEM_RT;
   void end_watch(Node& node) noexcept TANDEM_RT;
   void ignored_stop(std::size_t joint) noexcept TANDEM_RT;
   bool react(StopCategory category) noexcept TANDEM_RT;
   void recover() noexcept TANDEM_RT;
-  void stop(StopCategory category) noexcept TANDEM_RT;
-  void reset() noexcept TANDEM_RT;
   void reset_joint(std::size_t joint) noexcept TANDEM_RT;
   void take_resets(const CommandImage& command) noexcept TANDEM_RT;
   void enable_again() noexcept TANDEM_RT;
@@ -148,17 +108,12 @@ struct DriveMaster::Impl {
   [[nodiscard]] Node& node_of(std::size_t joint) noexcept { return nodes[joint_node[joint]]; }
 
   // Texts: drive_master_text.cpp
-  [[nodiscard]] std::string status() const;
   [[nodiscard]] std::string node_text(const Node& node) const;
   [[nodiscard]] std::string step_text(const Node& node, const SdoStep& step) const;
   [[nodiscard]] std::string origin_text(const Node& node, const SdoStep& step) const;
   [[nodiscard]] std::string axis_text(std::size_t joint) const;
   [[nodiscard]] std::string joint_name(std::size_t joint) const;
-  [[nodiscard]] std::vector<std::string> warnings() const;
   void add_emergencies(std::vector<std::string>& texts) const;
-  [[nodiscard]] std::string refused_text() const;
-
-  void archive(Archive& ar);
 
   RobotConfig robot;
   std::vector<Port> ports;
@@ -167,9 +122,6 @@ struct DriveMaster::Impl {
   std::vector<AxisMaster> axes;            ///< by joint
   std::vector<std::size_t> joint_node;     ///< by joint: index in nodes
   std::vector<std::uint8_t> joint_fresh;   ///< by joint: a whole sample came in this cycle
-  std::vector<PidGains> file_gains;        ///< by joint and loop: what the configuration writes
-  std::vector<PidGains> sent_gains;        ///< by joint and loop: what the drive has
-  std::vector<std::uint32_t> sent_revision;
 
   MasterStage stage = MasterStage::kBooting;
   StopCategory reaction = StopCategory::kWarn;  ///< the hardest that is carried out
@@ -182,10 +134,6 @@ struct DriveMaster::Impl {
   std::int64_t now_ns = 0;
   std::int64_t dt_ns = 0;
   std::int64_t shut_down_since_ns = 0;
-  // The last value that a node refused at run time
-  std::int32_t refused_node = -1;
-  SdoStep refused_step;
-  canopen::AbortCode refused_code = canopen::AbortCode::kNone;
   StartUp start_up;             ///< no state
   std::int64_t started_ns = 0;  ///< time of the first cycle; no state
   std::uint64_t unsent = 0;     ///< cycles whose commands a bus did not take whole; no state

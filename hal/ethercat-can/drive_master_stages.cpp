@@ -188,10 +188,33 @@ void DriveMaster::Impl::ignored_stop(std::size_t joint) noexcept TANDEM_RT {
   axes[joint].set_target(TargetState::kNothing, now_ns);
   if (node.master.stage() != NodeStage::kDown) {
     node.master.fail(FaultCause::kIgnoresStop, now_ns);
-    node.counters_sent = 0;
+    (void)node.exchange.end_commands();
     ports[node.plan.bus].sink.push(canopen::make_nmt(canopen::NmtCommand::kStop, node.plan.id));
   }
   if (!shutting_down && stage == MasterStage::kFaulted) (void)react(category(joint));
+}
+
+/// A master that falls silent without this is an error to the node (8130), though the run ends as
+/// it should. NMT pre-operational follows at once, in which the node answers SDOs too.
+void DriveMaster::Impl::end_watch(Node& node) noexcept TANDEM_RT {
+  const auto watches = [](const SdoStep& step) {
+    const bool guards = step.index == canopen::object::kHeartbeatConsumer ||
+                        step.index == canopen::object::kLifeTimeFactor;
+    return guards && step.use == SdoUse::kWrite;
+  };
+  const auto armed = std::ranges::find_if(node.master.steps(), watches);
+  const bool off = std::ranges::all_of(node.plan.joints, [&](auto j) { return axes[j].off(); });
+  const NodeMaster& master = node.master;
+  const auto place = static_cast<std::size_t>(armed - master.steps().begin());
+  // A start that failed has armed those that came so far; a node that is lost is to notice it.
+  const bool lost = master.stage() == NodeStage::kDown &&
+                    master.error() != FaultCause::kNotOperational &&
+                    master.error() != FaultCause::kBoardRefused;
+  const bool reached = master.running() || master.step() > place;
+  if (lost || !reached || armed == master.steps().end() || !off) return;
+  static constexpr std::array<std::uint8_t, 4> kNobody{};
+  node.master.sdo().download(armed->index, armed->sub, std::span(kNobody).first(armed->size),
+                             ports[node.plan.bus].sink);
 }
 
 /// @return whether an axis is to do something else than before.
@@ -213,29 +236,33 @@ bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
   return changed;
 }
 
-void DriveMaster::Impl::stop(StopCategory category) noexcept TANDEM_RT {
-  if (category == StopCategory::kWarn || shutting_down) return;
-  latched = std::min(latched, category);
-  resetting = false;
-  if (stage == MasterStage::kFailed) return;
-  if (stage == MasterStage::kBooting || stage == MasterStage::kEnabling) {
-    fail();
-  } else if (!react(category)) {
+void DriveMaster::stop(StopCategory category) noexcept TANDEM_RT {
+  Impl& m = *impl_;
+  if (category == StopCategory::kWarn || m.shutting_down) return;
+  m.latched = std::min(m.latched, category);
+  m.resetting = false;
+  if (m.stage == Impl::MasterStage::kFailed) return;
+  if (m.stage == Impl::MasterStage::kBooting || m.stage == Impl::MasterStage::kEnabling) {
+    m.fail();
+  } else if (!m.react(category)) {
     return;  // it has been reported
   }
-  make_commands(nullptr);  // this cycle's SYNC is over: the next one makes it take effect
-  write_pdos();
-  (void)flush();
+  m.make_commands(nullptr);  // this cycle's SYNC is over: the next one makes it take effect
+  m.write_pdos();
+  (void)m.flush();
 }
 
-void DriveMaster::Impl::reset() noexcept TANDEM_RT {
-  if (shutting_down || (stage != MasterStage::kFaulted && stage != MasterStage::kRunning)) return;
-  latched = StopCategory::kWarn;
-  resetting = true;
-  for (std::size_t joint = 0; joint < axes.size(); ++joint) {
-    if (axes[joint].target() == TargetState::kHome)
-      axes[joint].set_target(TargetState::kEnable, now_ns);
-    reset_joint(joint);
+void DriveMaster::reset() noexcept TANDEM_RT {
+  Impl& m = *impl_;
+  if (m.shutting_down ||
+      (m.stage != Impl::MasterStage::kFaulted && m.stage != Impl::MasterStage::kRunning))
+    return;
+  m.latched = StopCategory::kWarn;
+  m.resetting = true;
+  for (std::size_t joint = 0; joint < m.axes.size(); ++joint) {
+    if (m.axes[joint].target() == TargetState::kHome)
+      m.axes[joint].set_target(TargetState::kEnable, m.now_ns);
+    m.reset_joint(joint);
   }
 }
 
@@ -252,7 +279,7 @@ void DriveMaster::Impl::recover() noexcept TANDEM_RT {
       node.master.start(now_ns, ports[node.plan.bus].sink);
     } else if (node.master.running()) {
       node.recovering = false;
-      for (Send& pdo : node.sends) pdo.sent = 0;
+      node.exchange.restart();
     } else if (node.master.stage() == NodeStage::kDown) {
       node.recovering = false;  // a new reset may try again
     }
@@ -293,14 +320,10 @@ void DriveMaster::Impl::reset_joint(std::size_t joint) noexcept TANDEM_RT {
   Node& node = node_of(joint);
   if (node.recovering || node.master.stage() != NodeStage::kDown) return;
   node.recovering = true;
-  node.sending = node.asking = -1;
+  node.asking = -1;
   node.master.restart(now_ns);
-  for (const std::size_t lost : node.plan.joints) {
-    axes[lost].forget();
-    // The configuration goes back to the file's gains; what was set since is sent again.
-    std::copy_n(&file_gains[lost * kPidLoops], kPidLoops, &sent_gains[lost * kPidLoops]);
-    sent_revision[lost] = 0;
-  }
+  node.gains.restart();
+  for (const std::size_t lost : node.plan.joints) axes[lost].forget();
 }
 
 void DriveMaster::Impl::set_targets(TargetState target) noexcept TANDEM_RT {

@@ -184,30 +184,33 @@ std::string DriveMaster::Impl::axis_text(std::size_t joint) const {
   }
 }
 
-std::string DriveMaster::Impl::status() const {
+std::string DriveMaster::status_text() const {
+  const Impl& m = *impl_;
   std::vector<std::string> causes;
-  if (stage != MasterStage::kBooting && stage != MasterStage::kEnabling) {
-    for (std::size_t j = 0; j < axes.size(); ++j) {
-      if (std::string text = axis_text(j); !text.empty()) causes.push_back(std::move(text));
+  if (m.stage != Impl::MasterStage::kBooting && m.stage != Impl::MasterStage::kEnabling) {
+    for (std::size_t j = 0; j < m.axes.size(); ++j) {
+      if (std::string text = m.axis_text(j); !text.empty()) causes.push_back(std::move(text));
     }
   }
-  for (const Node& node : nodes) {
+  for (const Impl::Node& node : m.nodes) {
     const bool told = !causes.empty() && node.plan.board >= 0;
-    const bool waits = stage == MasterStage::kBooting ? node.master.stage() != NodeStage::kReady
-                                                      : !node.master.running();
+    const bool waits = m.stage == Impl::MasterStage::kBooting
+                           ? node.master.stage() != NodeStage::kReady
+                           : !node.master.running();
     const bool has_error = node.master.error() != FaultCause::kNone;
-    if (told || (!has_error && (!waits || stage == MasterStage::kFailed))) continue;
-    if (std::string text = node_text(node); !text.empty()) causes.push_back(std::move(text));
+    if (told || (!has_error && (!waits || m.stage == Impl::MasterStage::kFailed))) continue;
+    if (std::string text = m.node_text(node); !text.empty()) causes.push_back(std::move(text));
   }
-  for (std::size_t j = 0; stage == MasterStage::kEnabling && j < axes.size(); ++j) {
-    if (axes[j].enabled()) continue;
-    causes.push_back(fmt::format("{}: waiting for 'operation enabled', is in '{}'", joint_name(j),
-                                 canopen::to_string(axes[j].drive())));
+  for (std::size_t j = 0; m.stage == Impl::MasterStage::kEnabling && j < m.axes.size(); ++j) {
+    if (m.axes[j].enabled()) continue;
+    causes.push_back(fmt::format("{}: waiting for 'operation enabled', is in '{}'", m.joint_name(j),
+                                 canopen::to_string(m.axes[j].drive())));
   }
-  if (causes.empty() && latched != StopCategory::kWarn) {
-    return fmt::format("stopped by request ({})", to_string(latched));
+  if (causes.empty() && m.latched != StopCategory::kWarn) {
+    return fmt::format("stopped by request ({})", to_string(m.latched));
   }
-  if (causes.empty()) return stage == MasterStage::kFaulted ? "enabling every axis again" : "";
+  if (causes.empty())
+    return m.stage == Impl::MasterStage::kFaulted ? "enabling every axis again" : "";
   std::string text;
   for (std::size_t i = 0; i < std::min(causes.size(), kMostCauses); ++i) {
     if (i > 0) text += '\n';
@@ -219,26 +222,33 @@ std::string DriveMaster::Impl::status() const {
   return text;
 }
 
-std::vector<std::string> DriveMaster::Impl::warnings() const {
+std::vector<std::string> DriveMaster::warnings() const {
+  const Impl& m = *impl_;
   std::vector<std::string> texts;
-  for (const Node& node : nodes) {
+  for (const Impl::Node& node : m.nodes) {
     if (node.missed == 0) continue;
     texts.push_back(fmt::format("{} (node {} on bus {}): {} cycles without its feedback",
-                                node.plan.name, node.plan.id, robot.buses[node.plan.bus].name,
+                                node.plan.name, node.plan.id, m.robot.buses[node.plan.bus].name,
                                 node.missed));
   }
-  for (const Node& node : nodes) {
+  for (const Impl::Node& node : m.nodes) {
     if (node.master.store_code() == canopen::AbortCode::kNone) continue;
     texts.push_back(fmt::format(
         "{} (node {} on bus {}) does not store its configuration (1010:1): {}; it is written again "
         "at the next start",
-        node.plan.name, node.plan.id, robot.buses[node.plan.bus].name,
+        node.plan.name, node.plan.id, m.robot.buses[node.plan.bus].name,
         canopen::to_string(node.master.store_code())));
   }
-  add_emergencies(texts);
-  if (unsent > 0)
-    texts.push_back(fmt::format("a bus did not take the commands of {} cycles", unsent));
-  if (refused_node >= 0) texts.push_back("a value was refused: " + refused_text());
+  m.add_emergencies(texts);
+  if (m.unsent > 0)
+    texts.push_back(fmt::format("a bus did not take the commands of {} cycles", m.unsent));
+  for (const Impl::Node& node : m.nodes) {
+    const auto& [step, code] = node.gains.refused();
+    if (step.index == 0) continue;
+    texts.push_back(fmt::format("a value was refused: {}: {} (abort code 0x{:08X})",
+                                m.step_text(node, step), canopen::to_string(code),
+                                static_cast<std::uint32_t>(code)));
+  }
   return texts;
 }
 
@@ -261,13 +271,6 @@ void DriveMaster::Impl::add_emergencies(std::vector<std::string>& texts) const {
           fmt::format("{}: an emergency without a fault: {}", joint_name(joint), error_text(code)));
     }
   }
-}
-
-std::string DriveMaster::Impl::refused_text() const {
-  if (refused_node < 0) return {};
-  return fmt::format("{}: {} (abort code 0x{:08X})",
-                     step_text(nodes[static_cast<std::size_t>(refused_node)], refused_step),
-                     canopen::to_string(refused_code), static_cast<std::uint32_t>(refused_code));
 }
 
 }  // namespace tandem::hal::can

@@ -403,14 +403,4 @@ void name_configuration(std::span<SdoStep> steps) noexcept TANDEM_RT {
   }
 }
 
-std::uint16_t gains_object(PidLoop loop) noexcept TANDEM_RT {
-  switch (loop) {
-    case PidLoop::kPosition: return object::kPositionGains;
-    case PidLoop::kVelocity: return object::kVelocityGains;
-    case PidLoop::kTorque: return object::kTorqueGains;
-    case PidLoop::kCurrent: return object::kCurrentGains;
-  }
-  return object::kPositionGains;
-}
-
 }  // namespace tandem::hal::can

@@ -73,9 +73,6 @@ template <class T>
 /// change with the configuration, and with nothing else.
 void name_configuration(std::span<SdoStep> steps) noexcept TANDEM_RT;
 
-/// The object of a loop's gains on axis 0 (2020 to 2023).
-[[nodiscard]] std::uint16_t gains_object(PidLoop loop) noexcept TANDEM_RT;
-
 /// How many of a heartbeat's periods may pass without it.
 inline constexpr int kHeartbeatPeriods = 3;
 

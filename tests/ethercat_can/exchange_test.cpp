@@ -143,20 +143,24 @@ TEST(Exchange, GainsThatChangeTravelBySdoOneACycle) {
   EXPECT_EQ(rig.gains(3, 0x2020), (std::array<float, 4>{500.0F, 11.0F, 41.0F, 100.0F}));
   EXPECT_EQ(rig.gains(3, 0x2022), (std::array<float, 4>{0.3F, 2.0F, 0.0F, 40.0F}));
   EXPECT_EQ(rig.gains(2, 0x2020)[0], 400.0F) << "of this joint alone";
-  EXPECT_EQ(rig.master->parameter_error(), "");
+  EXPECT_TRUE(rig.master->warnings().empty());
 }
 
-TEST(Exchange, AGainThatTheDriveRefusesIsNamed) {
+TEST(Exchange, AGainThatTheDriveRefusesIsNamedOfEachBoard) {
   Rig rig;
   rig.bring_up();
   rig.parameters.set_gains(3, PidLoop::kVelocity, {.kp = -1.0, .ki = 0.0, .kd = 0.0});
   rig.steps(10);
-  EXPECT_EQ(rig.master->parameter_error(),
-            "object 2821:01 of joint Joint3 (board board_1, node 11, axis 1): value too low "
-            "(abort code 0x06090032)");
+  const std::string refused =
+      "a value was refused: object 2821:01 of joint Joint3 (board board_1, node 11, axis 1): "
+      "value too low (abort code 0x06090032)";
+  EXPECT_EQ(rig.master->warnings(), std::vector{refused});
   EXPECT_EQ(rig.master->phase(), Phase::kOperational);
-  ASSERT_EQ(rig.master->warnings().size(), 1u);
-  EXPECT_EQ(rig.master->warnings()[0], "a value was refused: " + rig.master->parameter_error());
+  rig.parameters.set_gains(0, PidLoop::kCurrent, {.kp = 0.0, .ki = 0.0, .kd = -1.0});
+  rig.steps(20);
+  ASSERT_EQ(rig.master->warnings().size(), 2u);
+  EXPECT_TRUE(rig.master->warnings()[0].starts_with("a value was refused: object 2023:03 of"));
+  EXPECT_EQ(rig.master->warnings()[1], refused);
 }
 
 TEST(Exchange, FeedbackThatDoesNotComeIsCountedByNode) {

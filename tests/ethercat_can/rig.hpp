@@ -12,6 +12,7 @@
 #include "base/archive.hpp"
 #include "firmware_emu/board.hpp"
 #include "firmware_emu/sensor_board.hpp"
+#include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "hal/ethercat-can/loopback.hpp"
 #include "rt/scoped_realtime.hpp"
@@ -120,7 +121,7 @@ class Rig {
       : robot(std::move(config)),
         state(robot.shape()),
         command(robot.shape()),
-        parameters(file_gains(robot)),
+        parameters(initial_parameters(robot)),
         position_rad(robot.joints.size(), 0.0) {
     for (std::size_t b = 0; b < robot.boards.size(); ++b) {
       firmware::BoardSetup setup = board_setup(robot, b);
@@ -137,17 +138,6 @@ class Rig {
       command.damping_Nms_rad()[j] = 5.0;
       command.mode()[j] = static_cast<std::int8_t>(ControlMode::kPosition);
     }
-  }
-
-  static ParameterImage file_gains(const RobotConfig& robot) {
-    std::vector<PidGains> gains;
-    for (const JointConfig& joint : robot.joints) {
-      const GainsConfig& g = robot.gains_of(joint);
-      for (const PidConfig* loop : {&g.position, &g.velocity, &g.torque, &g.current}) {
-        gains.push_back(loop->gains);
-      }
-    }
-    return ParameterImage(gains);
   }
 
   /// SYNC, boards, receive.

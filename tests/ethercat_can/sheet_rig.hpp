@@ -113,7 +113,7 @@ struct SheetRig {
         drive(s.sheet, 5),
         state(robot.shape()),
         command(robot.shape()),
-        parameters(Rig::file_gains(robot)) {
+        parameters(initial_parameters(robot)) {
     const std::array<Bus*, 2> ends{&bus.master(), &other.master()};
     auto created = DriveMaster::create(robot, ends);
     if (!created) {

@@ -38,7 +38,7 @@ struct Encounter {
       : script({kNode, kFolder + "/answer_master.mjs", kSheet, std::to_string(kNodeId)}),
         state(robot.shape()),
         command(robot.shape()),
-        parameters(test::Rig::file_gains(robot)) {
+        parameters(initial_parameters(robot)) {
     const std::array<Bus*, 2> ends{&bus.master(), &other.master()};
     auto created = DriveMaster::create(robot, ends);
     EXPECT_TRUE(created.has_value()) << created.error().to_string();

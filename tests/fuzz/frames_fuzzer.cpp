@@ -206,7 +206,6 @@ class Play {
     while (input_.more() && cycles_ < kMostCycles) act();
     cycle();
     (void)wires_.master->warnings();
-    (void)wires_.master->parameter_error();
     if (wires_.master->phase() == hal::Phase::kFault) {
       require(!wires_.master->status_text().empty());
     }
