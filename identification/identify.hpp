@@ -17,7 +17,7 @@
 
 namespace tandem::identification {
 
-/// Of the low pass over every signal, unless one asks for another.
+/// The cut-off of the low pass over every signal, unless one asks for another.
 inline constexpr double kCutoff_Hz = 10.0;
 
 /// A number with half the width of its 95 % confidence interval, from the data alone. `ci95` is NaN
