@@ -54,15 +54,17 @@ struct ActuatorModel {
 [[nodiscard]] double armature(const hal::ActuatorConfig& config);
 
 /// The motors' part of the plant's state and its derivative, one block of three arrays each.
-struct MotorState {
-  double* position_rad;    ///< (n) th; of a rigid joint a copy of q
-  double* velocity_rad_s;  ///< (n) th'
-  double* current_A;       ///< (n) i
-};
 struct MotorStateView {
-  const double* position_rad;
-  const double* velocity_rad_s;
-  const double* current_A;
+  const double* position_rad;    ///< (n) th; of a rigid joint a copy of q
+  const double* velocity_rad_s;  ///< (n) th'
+  const double* current_A;       ///< (n) i
+};
+struct MotorState {
+  double* position_rad;
+  double* velocity_rad_s;
+  double* current_A;
+
+  operator MotorStateView() const noexcept { return {position_rad, velocity_rad_s, current_A}; }
 };
 
 /// All joints' actuators. Arrays are in the model's joint order. What the drives apply (voltage,

@@ -79,18 +79,17 @@ Plant::Plant(const PlantConfig& config)
       release_ns_(config.release_ns),
       lifted_(config.lift_m != 0.0),
       rate_limit_(config.rate_limit),
-      base_q_(config.kernels->floating_base != 0 ? 7 : 0),
       base_v_(config.kernels->floating_base != 0 ? 6 : 0),
-      actuators_({}) {
-  const std::size_t n = kernels_->joints;
-  const std::size_t size = kernels_->nq + kernels_->nv + 3 * n;
-  for (auto* block : {&x_, &stage_, &k1_, &k2_, &k3_, &k4_}) block->assign(size, 0.0);
+      actuators_({}),
+      x_(*config.kernels),
+      rate_(x_),
+      stage_(x_),
+      sum_(x_) {
   for (auto* block : {&tau_, &forces_, &applied_tau_, &vdot_}) block->assign(kernels_->nv, 0.0);
   wrench_.assign(6 * kernels_->wrenches, 0.0);
-  motor_rate_.assign(3 * n, 0.0);
   pose_.assign(12 * kernels_->sites, 0.0);
   twist_.assign(6 * kernels_->sites, 0.0);
-  damping_.assign(n, 0.0);
+  damping_.assign(kernels_->joints, 0.0);
 }
 
 Status Plant::map_joints(const PlantConfig& config) {
@@ -196,39 +195,37 @@ Status Plant::close_loops(double* q) {
 }
 
 Status Plant::start(const PlantConfig& config) {
-  std::vector<double> q(kernels_->nq, 0.0);
-  const std::vector<double> v(kernels_->nv, 0.0);
-  if (base_q_ != 0) {
-    q[2] = config.base_height_m + config.lift_m;
-    q[6] = 1.0;
+  PlantState at(*kernels_);
+  if (base_v_ != 0) {
+    at.q()[2] = config.base_height_m + config.lift_m;
+    at.q()[6] = 1.0;
   }
   for (std::size_t j = 0; j < map_.size(); ++j)
-    q[base_q_ + map_[j]] = config.joints[j].position_rad;
+    at.joint_q()[map_[j]] = config.joints[j].position_rad;
   for (std::size_t j = 0; j < passive_.size(); ++j)
-    q[base_q_ + passive_[j]] = config.passive[j].position_rad;
-  if (Status status = close_loops(q.data()); !status) return status;
+    at.joint_q()[passive_[j]] = config.passive[j].position_rad;
+  if (Status status = close_loops(at.q()); !status) return status;
+  const std::span<const double> q(at.q(), kernels_->nq), v(at.v(), kernels_->nv);
   fit_passive_friction(config, q);
   set_state(q, v);
   place_surroundings(config);
 
   // Springs and hoist start with the load that keeps everything at rest.
-  touch_ground(x_.data(), true);
+  touch_ground(x_, true);
   std::vector<double> load(kernels_->nv, 0.0);
   kernels_->inverse_dynamics(q.data(), v.data(), v.data(), wrench_.data(), load.data());
   loops_.equations().carry_passive(load.data());
-  const MotorState at_start = motor(x_.data());
   for (const std::size_t i : map_) {
     const double joint_load = load[base_v_ + i];
     const ActuatorModel& model = actuators_.model(i);
     if (config.held && model.elastic()) {
-      at_start.position_rad[i] += joint_load / model.spring_Nm_rad;
+      x_.motor().position_rad[i] += joint_load / model.spring_Nm_rad;
     }
-    actuators_.set_brake(i, config.held, q[base_q_ + i], joint_load);
+    actuators_.set_brake(i, config.held, at.joint_q()[i], joint_load);
   }
-  actuators_.seat_brakes(at_start.position_rad);
-  held_ = config.held ? 1 : 0;
+  actuators_.seat_brakes(x_.motor().position_rad);
   released_ = config.held ? 0 : 1;
-  if (config.held && base_q_ != 0) hold(q.data(), load);
+  if (config.held && base_v_ != 0) hold(q.data(), load);
   return {};
 }
 
@@ -255,8 +252,8 @@ void Plant::place_surroundings(const PlantConfig& config) {
   for (JointRange& range : ranges) {
     const std::size_t joint = joint_of(*kernels_, range.joint);
     if (joint == kernels_->joints) continue;
-    range.lower_rad = std::min(range.lower_rad, q()[base_q_ + joint]);
-    range.upper_rad = std::max(range.upper_rad, q()[base_q_ + joint]);
+    range.lower_rad = std::min(range.lower_rad, x_.joint_q()[joint]);
+    range.upper_rad = std::max(range.upper_rad, x_.joint_q()[joint]);
   }
   const auto postures = postures_within(*kernels_, {q(), kernels_->nq}, ranges);
   stops_ = EndStops(*kernels_, ranges, joint_inertias(*kernels_, postures), substep_ns_);
@@ -286,15 +283,8 @@ void Plant::hold(const double* q, std::span<const double> load) {
 }
 
 void Plant::set_state(std::span<const double> q, std::span<const double> v) noexcept {
-  std::fill(x_.begin(), x_.end(), 0.0);
-  std::copy(q.begin(), q.end(), x_.begin());
-  std::copy(v.begin(), v.end(), x_.begin() + kernels_->nq);
-  const MotorState motors = motor(x_.data());
-  for (std::size_t i = 0; i < kernels_->joints; ++i) {
-    motors.position_rad[i] = q[base_q_ + i];
-    motors.velocity_rad_s[i] = v[base_v_ + i];
-  }
-  actuators_.seat_brakes(motors.position_rad);
+  x_.place(q, v);
+  actuators_.seat_brakes(x_.motor().position_rad);
   loops_.changed();
   bodies_.lost();
   light_.lost();
@@ -308,7 +298,7 @@ void Plant::set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexc
   actuators_.set_drive(i, voltage_V, bridge_on);
   const bool brake = !bridge_on;  // between power-on and release
   if (released_ != 0 || actuators_.braked(i) == brake) return;
-  actuators_.set_brake(i, brake, x_[base_q_ + i], tau_[base_v_ + i]);
+  actuators_.set_brake(i, brake, x_.joint_q()[i], tau_[base_v_ + i]);
 }
 
 void Plant::release() noexcept TANDEM_RT {
@@ -320,12 +310,12 @@ void Plant::release() noexcept TANDEM_RT {
 
 JointReading Plant::joint(std::size_t joint) const noexcept TANDEM_RT {
   const std::size_t i = map_[joint];
-  const MotorStateView motors = motor(x_.data());
-  return {x_[base_q_ + i],
-          v()[base_v_ + i],
+  const MotorStateView motors = x_.motor();
+  return {x_.joint_q()[i],
+          x_.joint_v()[i],
           motors.position_rad[i],
           motors.velocity_rad_s[i],
-          tau_[base_v_ + i] + damping_[i] * v()[base_v_ + i],
+          tau_[base_v_ + i] + damping_[i] * x_.joint_v()[i],
           motors.current_A[i],
           actuators_.voltage_V()[i],
           actuators_.temperature_C()[i]};
@@ -345,20 +335,10 @@ std::string Plant::diverged_text() const {
 
 void Plant::archive(Archive& ar) {
   ar(actuators_, contact_, bodies_, hoist_, loops_, light_, x_, tau_, applied_tau_, vdot_, wrench_,
-     motor_rate_, pose_, twist_, time_ns_, held_, released_, contact_fresh_, vdot_fresh_, diverged_,
-     diverged_rate_, point_forces_W_, pushes_);
+     pose_, twist_, time_ns_, released_, contact_fresh_, vdot_fresh_, diverged_, diverged_rate_,
+     point_forces_W_, pushes_);
   if (ar.reading()) sines_.take(q());
   if (engine_) engine_->archive(ar);
-}
-
-MotorState Plant::motor(double* x) const noexcept {
-  double* th = x + kernels_->nq + kernels_->nv;
-  return {th, th + kernels_->joints, th + 2 * kernels_->joints};
-}
-
-MotorStateView Plant::motor(const double* x) const noexcept {
-  const double* th = x + kernels_->nq + kernels_->nv;
-  return {th, th + kernels_->joints, th + 2 * kernels_->joints};
 }
 
 }  // namespace tandem::sim

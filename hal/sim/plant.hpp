@@ -22,6 +22,7 @@
 #include "hal/sim/hoist.hpp"
 #include "hal/sim/light_joints.hpp"
 #include "hal/sim/loop_forces.hpp"
+#include "hal/sim/plant_state.hpp"
 #include "hal/sim/push.hpp"
 #include "model/kernels.h"
 #include "model/sines.hpp"
@@ -79,16 +80,8 @@ struct JointReading {
   double current_A, voltage_V, temperature_C;
 };
 
-/// The plant's state, as a table:
-///
-///   q       (nq)  [p_W, quaternion xyzw of the base, joints] or [joints]
-///   v       (nv)  [linear, angular of the base in its own frame, joint rates]
-///   th      (n)   motor positions on the link side
-///   th'     (n)   motor velocities
-///   i       (n)   winding currents
-///   T       (n)   winding temperatures                     (in Actuators)
-///   anchors       of the contact points                    (in Contact)
-///   hoist         how far it is released                   (in Hoist)
+/// Its state: PlantState, temperatures of windings (in Actuators), anchors of the contact points
+/// (in Contact), how far the hoist is released (in Hoist).
 ///
 /// Inputs, held over a sub-step: voltage, bridge and brake of every joint. Joints are numbered
 /// as in PlantConfig; inside, and in q() and v(), they stand in the kernels' order, the passive
@@ -151,8 +144,8 @@ class Plant {
 
   // Views for sensors, truth and tests. Those that are forces need evaluate().
   [[nodiscard]] const tandem_kernels& kernels() const noexcept { return *kernels_; }
-  [[nodiscard]] const double* q() const noexcept { return x_.data(); }
-  [[nodiscard]] const double* v() const noexcept { return x_.data() + kernels_->nq; }
+  [[nodiscard]] const double* q() const noexcept { return x_.q(); }
+  [[nodiscard]] const double* v() const noexcept { return x_.v(); }
   /// For the kernels' _at forms at q(). @pre evaluate() since the last advance()
   [[nodiscard]] const double* sines() const noexcept { return sines_.data(); }
   [[nodiscard]] const double* vdot() const noexcept { return vdot_.data(); }
@@ -191,20 +184,13 @@ class Plant {
   Status close_loops(double* q);
   void hold(const double* q, std::span<const double> load);
 
-  void touch_ground(const double* x, bool move_anchors) noexcept;
-  void rates(const double* x, MotorState motor_rate) noexcept;
-  [[nodiscard]] const std::vector<double>& with_ends_and_ground(const double* q,
-                                                                const double* v) noexcept;
+  void touch_ground(const PlantState& x, bool move_anchors) noexcept;
+  void rates(const PlantState& x) noexcept;
+  [[nodiscard]] const std::vector<double>& with_ends_and_ground(const PlantState& x) noexcept;
   void accelerate(const double* q, const double* v, const double* forces) noexcept;
-  void step_semi_implicit(double h_s) noexcept;
-  void step_base(double h_s, double* q, double* v) noexcept;
   void step_runge_kutta(double h_s) noexcept;
   void step_engine(double h_s) noexcept;
-  void step_motors(double h_s) noexcept;
-  void state_rate(const double* x, double* rate) noexcept;
   [[nodiscard]] bool plausible() noexcept;
-  [[nodiscard]] MotorState motor(double* x) const noexcept;
-  [[nodiscard]] MotorStateView motor(const double* x) const noexcept;
 
   const tandem_kernels* kernels_;
   model::Sines sines_;  // of the last touch_ground()'s posture
@@ -212,7 +198,7 @@ class Plant {
   std::int64_t substep_ns_, release_ns_;
   bool lifted_;  // the hoist holds the base to the end
   double rate_limit_;
-  std::size_t base_q_, base_v_;       // 7 and 6, or 0 and 0
+  std::size_t base_v_;                // 6, or 0
   std::vector<std::size_t> map_;      // joint -> model joint
   std::vector<std::size_t> passive_;  // passive joint -> model joint
   std::vector<double> damping_;       // model order
@@ -226,15 +212,15 @@ class Plant {
   LoopForces loops_;
   std::unique_ptr<Engine> engine_;  // null: our own
 
-  std::vector<double> x_;       // q, v, th, th', i
-  std::vector<double> tau_;     // of actuators, joint friction and hoist
-  std::vector<double> forces_;  // with what else acts, where anything does
-  std::vector<double> applied_tau_, vdot_, wrench_, motor_rate_;
-  std::vector<double> pose_, twist_;               // of the sites
-  std::vector<double> stage_, k1_, k2_, k3_, k4_;  // scratch of Runge-Kutta
-  std::vector<double> point_forces_W_;             // of another engine's last step
+  PlantState x_;
+  PlantState rate_, stage_, sum_;  // scratch: of the last rates(); of Runge-Kutta
+  std::vector<double> tau_;        // of actuators, joint friction and hoist
+  std::vector<double> forces_;     // with what else acts, where anything does
+  std::vector<double> applied_tau_, vdot_, wrench_;
+  std::vector<double> pose_, twist_;    // of the sites
+  std::vector<double> point_forces_W_;  // of another engine's last step
   std::int64_t time_ns_ = 0;
-  std::uint8_t held_ = 0, released_ = 0;
+  std::uint8_t released_ = 0;
   std::uint8_t contact_fresh_ = 0, vdot_fresh_ = 0;  // evaluated at the present state
   std::int32_t diverged_ = -1;                       // index in v
   double diverged_rate_ = 0.0;

@@ -6,48 +6,46 @@
 
 #include "base/wide.hpp"
 #include "hal/sim/plant.hpp"
-#include "hal/sim/rotation.hpp"
 
 namespace tandem::sim {
 
 /// Everything at x that does not need the forces.
-void Plant::touch_ground(const double* x, bool move_anchors) noexcept {
-  sines_.take(x);
-  bodies_.evaluate(x, x + kernels_->nq, move_anchors);
+void Plant::touch_ground(const PlantState& x, bool move_anchors) noexcept {
+  sines_.take(x.q());
+  bodies_.evaluate(x.q(), x.v(), move_anchors);
   if (contact_.feet() == 0) return;
-  kernels_->site_twists_at(sines(), x, x + kernels_->nq, pose_.data(), twist_.data());
+  kernels_->site_twists_at(sines(), x.q(), x.v(), pose_.data(), twist_.data());
   if (engine_) return contact_.take(pose_.data(), point_forces_W_.data(), wrench_.data());
   contact_.evaluate(pose_.data(), twist_.data(), move_anchors, wrench_.data());
 }
 
-void Plant::rates(const double* x, MotorState motor_rate) noexcept {
-  const double* q = x;
-  const double* v = x + kernels_->nq;
-  actuators_.evaluate(q + base_q_, v + base_v_, motor(x), tau_.data() + base_v_, motor_rate);
-  for (std::size_t i = 0; i < kernels_->joints; ++i) {
-    tau_[base_v_ + i] -= damping_[i] * v[base_v_ + i];
-  }
+/// Forces at x, vdot_ and the motors' part of rate_.
+void Plant::rates(const PlantState& x) noexcept {
+  const double* joint_v = x.joint_v();
+  double* joint_tau = tau_.data() + base_v_;
+  actuators_.evaluate(x.joint_q(), joint_v, x.motor(), joint_tau, rate_.motor());
+  for (std::size_t i = 0; i < kernels_->joints; ++i) joint_tau[i] -= damping_[i] * joint_v[i];
   if (base_v_ != 0) {
     std::fill_n(tau_.begin(), 6, 0.0);
-    hoist_.add_wrench(q, v, tau_.data());
+    hoist_.add_wrench(x.q(), x.v(), tau_.data());
   }
   // The same state with the same torques (elastic joints between two cycles): nothing to do.
-  const std::vector<double>& forces = with_ends_and_ground(q, v);
+  const std::vector<double>& forces = with_ends_and_ground(x);
   const std::size_t bytes = forces.size() * sizeof(double);
   if (vdot_fresh_ != 0 && std::memcmp(forces.data(), applied_tau_.data(), bytes) == 0) return;
-  accelerate(q, v, forces.data());
+  accelerate(x.q(), x.v(), forces.data());
   applied_tau_ = forces;
 }
 
 /// tau_ itself, to the bit, while no joint is at an end, only soles touch the ground and nobody
 /// pushes.
-const std::vector<double>& Plant::with_ends_and_ground(const double* q, const double* v) noexcept {
-  const bool ends = stops_.touched(q + base_q_);
+const std::vector<double>& Plant::with_ends_and_ground(const PlantState& x) noexcept {
+  const bool ends = stops_.touched(x.joint_q());
   if (!ends && !bodies_.touching() && !pushes_.any()) return tau_;
   forces_ = tau_;
-  if (ends) stops_.add_torques(q + base_q_, v + base_v_, forces_.data() + base_v_);
+  if (ends) stops_.add_torques(x.joint_q(), x.joint_v(), forces_.data() + base_v_);
   if (bodies_.touching()) bodies_.add_forces(forces_.data());
-  if (pushes_.any()) pushes_.add_forces(q, v, forces_.data());
+  if (pushes_.any()) pushes_.add_forces(x.q(), x.v(), forces_.data());
   return forces_;
 }
 
@@ -63,11 +61,9 @@ void Plant::accelerate(const double* q, const double* v, const double* forces) n
 }
 
 void Plant::evaluate() noexcept TANDEM_RT {
-  if (contact_fresh_ == 0) touch_ground(x_.data(), true);
+  if (contact_fresh_ == 0) touch_ground(x_, true);
   contact_fresh_ = 1;
-  const std::size_t n = kernels_->joints;
-  double* rate = motor_rate_.data();
-  rates(x_.data(), {rate, rate + n, rate + 2 * n});
+  rates(x_);
   vdot_fresh_ = 1;
 }
 
@@ -85,13 +81,14 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
     } else if (integrator_ == Integrator::kRungeKutta4) {
       step_runge_kutta(h_s);
     } else {
-      step_semi_implicit(h_s);
+      x_.step_bodies(h_s, vdot_.data());
+      actuators_.step_semi_implicit(h_s, rate_.motor(), x_.motor());
     }
-    if (!loops_.none()) loops_.project(x_.data(), x_.data() + kernels_->nq);
+    if (!loops_.none()) loops_.project(x_.q(), x_.v());
     bodies_.moved(v(), h_s);
     contact_fresh_ = vdot_fresh_ = 0;
-    actuators_.finish_step(h_s, q() + base_q_, v() + base_v_, motor(x_.data()));
-    actuators_.advance_brakes(step_ns, motor(x_.data()).position_rad);
+    actuators_.finish_step(h_s, x_.joint_q(), x_.joint_v(), x_.motor());
+    actuators_.advance_brakes(step_ns, x_.motor().position_rad);
     hoist_.advance(step_ns);
     time_ns_ += step_ns;
     duration_ns -= step_ns;
@@ -100,86 +97,33 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
   return Code::kOk;
 }
 
-void Plant::step_semi_implicit(double h_s) noexcept {
-  double* q = x_.data();
-  double* v = q + kernels_->nq;
-  if (base_q_ != 0) step_base(h_s, q, v);
-  for (std::size_t i = base_v_; i < kernels_->nv; ++i) {
-    v[i] += h_s * vdot_[i];
-    q[base_q_ - base_v_ + i] += h_s * v[i];
-  }
-  step_motors(h_s);
-}
-
-/// Velocities along B's axes change by B's turning too. A step of these would lengthen them by
-/// (w h)^2 / 2, so the base's velocity is stepped along W's, where that of a free body stays.
-void Plant::step_base(double h_s, double* q, double* v) noexcept {
-  const Vec3 turning = cross({v[3], v[4], v[5]}, {v[0], v[1], v[2]});
-  for (std::size_t i = 0; i < 3; ++i) v[i] += h_s * (vdot_[i] + turning[i]);
-  const Vec3 velocity_W = rotate(rotation_of(q + 3).data(), v);
-  for (std::size_t i = 0; i < 3; ++i) {
-    q[i] += h_s * velocity_W[i];
-    v[3 + i] += h_s * vdot_[3 + i];
-  }
-  turn_quaternion(q + 3, v + 3, h_s);
-  const Vec3 velocity_B = rotate_back(rotation_of(q + 3).data(), velocity_W.data());
-  std::ranges::copy(velocity_B, v);
-}
-
-void Plant::step_motors(double h_s) noexcept {
-  const std::size_t n = kernels_->joints;
-  const double* rate = motor_rate_.data();
-  actuators_.step_semi_implicit(h_s, {rate, rate + n, rate + 2 * n}, motor(x_.data()));
-}
-
 void Plant::step_engine(double h_s) noexcept {
-  double* q = x_.data();
-  double* v = q + kernels_->nq;
+  double* v = x_.v();
   std::copy_n(v, kernels_->nv, vdot_.begin());
   try {
-    engine_->step(h_s, applied_tau_.data(), q, v, point_forces_W_.data());
+    engine_->step(h_s, applied_tau_.data(), x_.q(), v, point_forces_W_.data());
   } catch (...) {  // whatever its library throws: a state that is not plausible ends the run
     std::fill_n(v, kernels_->nv, std::numeric_limits<double>::quiet_NaN());
   }
   for (std::size_t i = 0; i < kernels_->nv; ++i) vdot_[i] = (v[i] - vdot_[i]) / h_s;
-  step_motors(h_s);
+  actuators_.step_semi_implicit(h_s, rate_.motor(), x_.motor());
 }
 
-/// The whole state's rate of change at `x`, forces given. A quaternion off unit length turns as
-/// its normalised self would, which keeps its length and the integrator's order.
-void Plant::state_rate(const double* x, double* rate) noexcept {
-  rates(x, motor(rate));
-  const double* v = x + kernels_->nq;
-  if (base_q_ != 0) {
-    const Mat3 R = rotation_of(x + 3);
-    const Vec3 velocity_W = rotate(R.data(), v);
-    std::copy(velocity_W.begin(), velocity_W.end(), rate);
-    const double half_w[4] = {0.5 * v[3], 0.5 * v[4], 0.5 * v[5], 0.0};
-    const std::array<double, 4> turn = quaternion_product(x + 3, half_w);
-    std::copy(turn.begin(), turn.end(), rate + 3);
-  }
-  std::copy_n(v + base_v_, kernels_->joints, rate + base_q_);
-  std::copy(vdot_.begin(), vdot_.end(), rate + kernels_->nq);
-}
-
+/// @pre rate_ and vdot_ are those of evaluate()
 void Plant::step_runge_kutta(double h_s) noexcept {
-  const std::size_t size = x_.size();
-  const auto stage = [&](const std::vector<double>& k, double h, std::vector<double>& rate) {
-    for (std::size_t i = 0; i < size; ++i) stage_[i] = x_[i] + h * k[i];
-    if (base_q_ != 0) normalise_quaternion(stage_.data() + 3);
-    loops_.changed();
-    touch_ground(stage_.data(), false);
-    state_rate(stage_.data(), rate.data());
-  };
-  state_rate(x_.data(), k1_.data());  // forces of evaluate() still stand
   vdot_fresh_ = 0;
-  stage(k1_, 0.5 * h_s, k2_);
-  stage(k2_, 0.5 * h_s, k3_);
-  stage(k3_, h_s, k4_);
-  for (std::size_t i = 0; i < size; ++i) {
-    x_[i] += h_s / 6.0 * (k1_[i] + 2.0 * k2_[i] + 2.0 * k3_[i] + k4_[i]);
+  rate_.follow(x_, vdot_.data());
+  sum_ = rate_;
+  constexpr double kStages[3][2] = {{0.5, 2.0}, {0.5, 2.0}, {1.0, 1.0}};  // how far in h, weight
+  for (const auto& [ahead, weight] : kStages) {
+    stage_.move(x_, ahead * h_s, rate_);
+    loops_.changed();
+    touch_ground(stage_, false);
+    rates(stage_);
+    rate_.follow(stage_, vdot_.data());
+    sum_.add(weight, rate_);
   }
-  if (base_q_ != 0) normalise_quaternion(x_.data() + 3);
+  x_.move(x_, h_s / 6.0, sum_);
 }
 
 /// Whether every |v[i]| is within `limit`: not with NaN.
@@ -190,7 +134,7 @@ TANDEM_WIDE static bool all_within(double limit, const double* v, std::size_t n)
 }
 
 bool Plant::plausible() noexcept {
-  const double* v = x_.data() + kernels_->nq;
+  const double* v = x_.v();
   if (all_within(rate_limit_, v, kernels_->nv)) return true;
   for (std::size_t i = 0; i < kernels_->nv; ++i) {
     if (std::abs(v[i]) <= rate_limit_) continue;

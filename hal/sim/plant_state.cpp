@@ -1,0 +1,67 @@
+// A floating base turns: its steps and rates, and then all that is alike for every number.
+#include "hal/sim/plant_state.hpp"
+
+#include <algorithm>
+
+#include "hal/sim/rotation.hpp"
+
+namespace tandem::sim {
+
+void PlantState::place(std::span<const double> q, std::span<const double> v) noexcept TANDEM_RT {
+  std::copy(q.begin(), q.end(), this->q());
+  std::copy(v.begin(), v.end(), this->v());
+  std::copy_n(joint_q(), joints_, motor().position_rad);
+  std::copy_n(joint_v(), joints_, motor().velocity_rad_s);
+  std::fill_n(motor().current_A, joints_, 0.0);
+}
+
+void PlantState::step_bodies(double h_s, const double* vdot) noexcept TANDEM_RT {
+  if (floating()) step_base(h_s, vdot);
+  double* q = joint_q();
+  double* v = this->v() + (nv_ - joints_);
+  vdot += nv_ - joints_;
+  for (std::size_t i = 0; i < joints_; ++i) {
+    v[i] += h_s * vdot[i];
+    q[i] += h_s * v[i];
+  }
+}
+
+/// Velocities along B's axes change by B's turning too. A step of these would lengthen them by
+/// (w h)^2 / 2, so the base's velocity is stepped along W's, where that of a free body stays.
+void PlantState::step_base(double h_s, const double* vdot) noexcept {
+  double* q = this->q();
+  double* v = this->v();
+  const Vec3 turning = cross({v[3], v[4], v[5]}, {v[0], v[1], v[2]});
+  for (std::size_t i = 0; i < 3; ++i) v[i] += h_s * (vdot[i] + turning[i]);
+  const Vec3 velocity_W = rotate(rotation_of(q + 3).data(), v);
+  for (std::size_t i = 0; i < 3; ++i) {
+    q[i] += h_s * velocity_W[i];
+    v[3 + i] += h_s * vdot[3 + i];
+  }
+  turn_quaternion(q + 3, v + 3, h_s);
+  const Vec3 velocity_B = rotate_back(rotation_of(q + 3).data(), velocity_W.data());
+  std::ranges::copy(velocity_B, v);
+}
+
+void PlantState::move(const PlantState& from, double h_s,
+                      const PlantState& rate) noexcept TANDEM_RT {
+  for (std::size_t i = 0; i < x_.size(); ++i) x_[i] = from.x_[i] + h_s * rate.x_[i];
+  if (floating()) normalise_quaternion(q() + 3);
+}
+
+void PlantState::follow(const PlantState& x, const double* vdot) noexcept TANDEM_RT {
+  if (floating()) {
+    const double* v = x.v();
+    std::ranges::copy(rotate(rotation_of(x.q() + 3).data(), v), q());
+    const double half_w[4] = {0.5 * v[3], 0.5 * v[4], 0.5 * v[5], 0.0};
+    std::ranges::copy(quaternion_product(x.q() + 3, half_w), q() + 3);
+  }
+  std::copy_n(x.joint_v(), joints_, joint_q());
+  std::copy_n(vdot, nv_, v());
+}
+
+void PlantState::add(double weight, const PlantState& rate) noexcept TANDEM_RT {
+  for (std::size_t i = 0; i < x_.size(); ++i) x_[i] += weight * rate.x_[i];
+}
+
+}  // namespace tandem::sim
