@@ -24,21 +24,15 @@ std::int64_t ns(double seconds) { return static_cast<std::int64_t>(seconds * 1e9
 Result<std::unique_ptr<Server>> Server::open(dds::Participant& participant, const hal::Robot& robot,
                                              const hal::ParameterImage& gains, Identity identity,
                                              const ServerConfig& config) {
-  const auto name = [&](const char* topic) { return participant.topic_name(topic); };
-  auto server =
-      dds::Writer<tandem_msgs::LinkServer>::create(participant, name(kServerTopic), link_qos());
+  auto server = open_end<dds::Writer<tandem_msgs::LinkServer>>(participant, kServerTopic);
   if (!server) return std::unexpected(server.error());
-  auto robot_end =
-      dds::Writer<tandem_msgs::LinkRobotEnd>::create(participant, name(kRobotEndTopic), link_qos());
+  auto robot_end = open_end<dds::Writer<tandem_msgs::LinkRobotEnd>>(participant, kRobotEndTopic);
   if (!robot_end) return std::unexpected(robot_end.error());
-  auto state =
-      dds::Writer<tandem_msgs::LinkState>::create(participant, name(kStateTopic), link_qos());
+  auto state = open_end<dds::Writer<tandem_msgs::LinkState>>(participant, kStateTopic);
   if (!state) return std::unexpected(state.error());
-  auto requests =
-      dds::Reader<tandem_msgs::LinkRequest>::create(participant, name(kRequestTopic), link_qos());
+  auto requests = open_end<dds::Reader<tandem_msgs::LinkRequest>>(participant, kRequestTopic);
   if (!requests) return std::unexpected(requests.error());
-  auto commands =
-      dds::Reader<tandem_msgs::LinkCommand>::create(participant, name(kCommandTopic), link_qos());
+  auto commands = open_end<dds::Reader<tandem_msgs::LinkCommand>>(participant, kCommandTopic);
   if (!commands) return std::unexpected(commands.error());
   return std::unique_ptr<Server>(new Server(
       {std::move(*server), std::move(*robot_end), std::move(*state)},
