@@ -165,10 +165,10 @@ Finding worst_clock(const hal::BusConfig& bus, const hal::ecat::SurveyTiming& ti
     finding.value = silent + " was not heard";
     finding.why = "frames are lost, or its clock cannot be read";
     finding.mend = "look at the cables: ethtool -S " + bus.interface;
-  } else if (worst.difference_ns > hal::ecat::SlaveMaster::kSettledNs) {
+  } else if (worst.difference_ns > hal::ecat::SlaveClock::kSettledNs) {
     finding.health = Health::kWarning;
-    finding.why = fmt::format("a run waits until a clock is within {} ns",
-                              hal::ecat::SlaveMaster::kSettledNs);
+    finding.why =
+        fmt::format("a run waits until a clock is within {} ns", hal::ecat::SlaveClock::kSettledNs);
     finding.mend = "replace " + slave + " or the cable before it";
   }
   return finding;

@@ -410,8 +410,9 @@ std::string LineBus::measured_text() const {
   std::int32_t most_ns = -1;
   for (std::size_t i = 0; i < slaves_.size(); ++i) {
     const SlaveMaster& slave = line_->slave(i);
-    const std::int32_t off_ns = std::max(-slave.clock().least, slave.clock().most);
-    if (slave.clock().count == 0 || off_ns <= most_ns) continue;
+    const ecat::ClockFigures& off = slave.clock().figures();
+    const std::int32_t off_ns = std::max(-off.least, off.most);
+    if (off.count == 0 || off_ns <= most_ns) continue;
     worst = &slave;
     most_ns = off_ns;
   }
@@ -419,7 +420,8 @@ std::string LineBus::measured_text() const {
   return text + fmt::format(
                     "; the clocks follow the first slave's within {} ns, worst {} with {} "
                     "to {} ns",
-                    most_ns, worst->plan().name, worst->clock().least, worst->clock().most);
+                    most_ns, worst->plan().name, worst->clock().figures().least,
+                    worst->clock().figures().most);
 }
 
 BusStatistics LineBus::statistics() const noexcept TANDEM_RT {

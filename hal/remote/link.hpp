@@ -66,6 +66,11 @@ inline constexpr const char* kStateTopic = "tandem/link/state";
 inline constexpr const char* kCommandTopic = "tandem/link/command";
 /// Late joiners get the last sample; nobody is waited for.
 [[nodiscard]] dds::Qos link_qos();
+/// A dds::Writer or Reader of the link. Errors: Endpoint::create()'s.
+template <class End>
+[[nodiscard]] Result<End> open_end(dds::Participant& participant, const char* topic) {
+  return End::create(participant, participant.topic_name(topic), link_qos());
+}
 
 enum class Action : std::uint8_t { kAcquire = 0, kRenew = 1, kRelease = 2 };
 

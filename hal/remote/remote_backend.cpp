@@ -47,11 +47,9 @@ Result<std::unique_ptr<RemoteBackend>> RemoteBackend::connect(dds::Participant& 
                                                               const ClientConfig& config) {
   auto contact = ServerContact::find(participant, identity, config);
   if (!contact) return std::unexpected(contact.error());
-  auto states = dds::Reader<tandem_msgs::LinkState>::create(
-      participant, participant.topic_name(kStateTopic), link_qos());
+  auto states = open_end<dds::Reader<tandem_msgs::LinkState>>(participant, kStateTopic);
   if (!states) return std::unexpected(states.error());
-  auto commands = dds::Writer<tandem_msgs::LinkCommand>::create(
-      participant, participant.topic_name(kCommandTopic), link_qos());
+  auto commands = open_end<dds::Writer<tandem_msgs::LinkCommand>>(participant, kCommandTopic);
   if (!commands) return std::unexpected(commands.error());
   std::unique_ptr<RemoteBackend> made(
       new RemoteBackend(std::move(*contact), std::move(*states), std::move(*commands), robot));

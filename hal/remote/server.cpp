@@ -1,4 +1,4 @@
-// The loop's side of the link, and the checks of what arrives. What goes out: server_send.cpp.
+// The loop's side of the link, and the checks of what arrives.
 #include "hal/remote/server.hpp"
 
 #include <algorithm>
@@ -14,9 +14,8 @@ using hal::StopCategory;
 namespace {
 
 constexpr std::int64_t kLook_ns = 50'000'000;  // a waiting cycle looks around so often
-constexpr std::size_t kRingCycles = 64;
-constexpr std::size_t kCommands = 256;       // that may come within one cycle
-constexpr std::uint64_t kMostMadeUp = 1000;  // cycles of the loop that play-out makes up
+constexpr std::size_t kCommands = 256;         // that may come within one cycle
+constexpr std::uint64_t kMostMadeUp = 1000;    // cycles of the loop that play-out makes up
 
 std::int64_t ns(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
 
@@ -25,53 +24,53 @@ std::int64_t ns(double seconds) { return static_cast<std::int64_t>(seconds * 1e9
 Result<std::unique_ptr<Server>> Server::open(dds::Participant& participant, const hal::Robot& robot,
                                              const hal::ParameterImage& gains, Identity identity,
                                              const ServerConfig& config) {
-  const auto name = [&](const char* topic) { return participant.topic_name(topic); };
-  auto server =
-      dds::Writer<tandem_msgs::LinkServer>::create(participant, name(kServerTopic), link_qos());
+  auto server = open_end<dds::Writer<tandem_msgs::LinkServer>>(participant, kServerTopic);
   if (!server) return std::unexpected(server.error());
-  auto robot_end =
-      dds::Writer<tandem_msgs::LinkRobotEnd>::create(participant, name(kRobotEndTopic), link_qos());
+  auto robot_end = open_end<dds::Writer<tandem_msgs::LinkRobotEnd>>(participant, kRobotEndTopic);
   if (!robot_end) return std::unexpected(robot_end.error());
-  auto state =
-      dds::Writer<tandem_msgs::LinkState>::create(participant, name(kStateTopic), link_qos());
+  auto state = open_end<dds::Writer<tandem_msgs::LinkState>>(participant, kStateTopic);
   if (!state) return std::unexpected(state.error());
-  auto requests =
-      dds::Reader<tandem_msgs::LinkRequest>::create(participant, name(kRequestTopic), link_qos());
+  auto requests = open_end<dds::Reader<tandem_msgs::LinkRequest>>(participant, kRequestTopic);
   if (!requests) return std::unexpected(requests.error());
-  auto commands =
-      dds::Reader<tandem_msgs::LinkCommand>::create(participant, name(kCommandTopic), link_qos());
+  auto commands = open_end<dds::Reader<tandem_msgs::LinkCommand>>(participant, kCommandTopic);
   if (!commands) return std::unexpected(commands.error());
-  return std::unique_ptr<Server>(
-      new Server({std::move(*server), std::move(*robot_end), std::move(*state),
-                  std::move(*requests), std::move(*commands)},
-                 robot, gains, std::move(identity), config));
+  return std::unique_ptr<Server>(new Server(
+      {std::move(*server), std::move(*robot_end), std::move(*state)},
+      {std::move(*requests), std::move(*commands)}, robot, gains, std::move(identity), config));
 }
 
-Server::Server(Endpoints endpoints, const hal::Robot& robot, const hal::ParameterImage& gains,
-               Identity identity, const ServerConfig& config)
-    : endpoints_(std::move(endpoints)),
-      identity_(std::move(identity)),
+Server::Server(ServerPublisher::Writers writers, Readers readers, const hal::Robot& robot,
+               const hal::ParameterImage& gains, Identity identity, const ServerConfig& config)
+    : identity_(std::move(identity)),
       config_(config),
-      request_senders_(endpoints_.requests.endpoint().get()),
-      command_senders_(endpoints_.commands.endpoint().get()),
+      readers_(std::move(readers)),
+      capabilities_(robot.joints.begin(), robot.joints.end()),
+      request_senders_(readers_.requests.endpoint().get()),
+      command_senders_(readers_.commands.endpoint().get()),
       gains_(gains),
       newest_(Taken{hal::CommandImage(robot.shape()), gains_}),
       stop_(static_cast<std::uint8_t>(StopCategory::kWarn)),
       played_(robot.shape()),
       received_(robot.shape()),
-      ring_(sizeof(Shown) + identity_.state_bytes + identity_.command_bytes + robot.joints.size(),
-            kRingCycles),
-      joints_(robot.joints.size()),
-      capabilities_(robot.joints.begin(), robot.joints.end()),
-      thread_([this] { run(); }) {
+      publisher_(std::move(writers), identity_, config_, lease_, robot.joints.size()) {
   if (config_.playout) {
     commands_.emplace(sizeof(std::uint64_t) + identity_.command_bytes, kCommands);
     playout_.emplace(robot, config_.playout->delay_cycles, config_.playout->brake_cycles,
                      identity_.period_ns);
   }
-  tell_robot_end();
-  on_requests_.emplace(endpoints_.requests.endpoint().get(), [this] { take_requests(); });
-  on_commands_.emplace(endpoints_.commands.endpoint().get(), [this] { take_commands(); });
+  on_requests_.emplace(readers_.requests.endpoint().get(), [this] { take_requests(); });
+  on_commands_.emplace(readers_.commands.endpoint().get(), [this] { take_commands(); });
+}
+
+Server::~Server() {
+  on_news({});
+  close();
+}
+
+void Server::close() {
+  on_requests_.reset();
+  on_commands_.reset();
+  publisher_.close();
 }
 
 void Server::on_news(std::function<void()> ring) {
@@ -85,8 +84,8 @@ void Server::ring() {
 }
 
 void Server::take_requests() {
-  endpoints_.requests.take([this](const tandem_msgs::LinkRequest& sample, const auto& info) {
-    if (sample.run != run_ || sample.client == 0) return;
+  readers_.requests.take([this](const tandem_msgs::LinkRequest& sample, const auto& info) {
+    if (sample.run != number() || sample.client == 0) return;
     const std::optional<Sender>& sender = request_senders_.of(info);
     switch (static_cast<Action>(sample.action)) {
       case Action::kAcquire: acquire(sample, sender); break;
@@ -98,11 +97,7 @@ void Server::take_requests() {
         break;
       default: return;
     }
-    {
-      const std::lock_guard lock(mutex_);
-      news_ = true;
-    }
-    wake_.notify_one();
+    publisher_.tell_news();
   });
   ring();
 }
@@ -124,7 +119,7 @@ bool Server::is_owner(std::uint64_t client, const std::optional<Sender>& sender)
 void Server::take_commands() {
   {
     const std::lock_guard lock(in_mutex_);
-    endpoints_.commands.take([this](const tandem_msgs::LinkCommand& sample, const auto& info) {
+    readers_.commands.take([this](const tandem_msgs::LinkCommand& sample, const auto& info) {
       const Verdict verdict = judge(sample, command_senders_.of(info));
       counts_[static_cast<std::size_t>(verdict)].fetch_add(1, std::memory_order_relaxed);
     });
@@ -134,7 +129,7 @@ void Server::take_commands() {
 
 /// Whether a sample may reach the loop; hands it over then.
 Verdict Server::judge(const tandem_msgs::LinkCommand& sample, const std::optional<Sender>& sender) {
-  if (sample.run != run_ || !is_owner(sample.client, sender)) return Verdict::kNoLease;
+  if (sample.run != number() || !is_owner(sample.client, sender)) return Verdict::kNoLease;
   if (sample.client != gate_client_) {
     gate_client_ = sample.client;
     gate_sequence_ = 0;
@@ -143,7 +138,7 @@ Verdict Server::judge(const tandem_msgs::LinkCommand& sample, const std::optiona
   if (sample.sequence_number <= gate_sequence_) return Verdict::kOutOfOrder;
   gate_sequence_ = sample.sequence_number;
   note_stops(sample);  // whatever else is wrong with it
-  const std::uint64_t cycle = cycle_.load(std::memory_order_acquire);
+  const std::uint64_t cycle = publisher_.cycle();
   if (sample.cycle > cycle || cycle - sample.cycle > config_.max_age_cycles) {
     return Verdict::kStale;
   }
@@ -185,7 +180,7 @@ bool Server::unpack(const tandem_msgs::LinkCommand& sample) {
   Taken& to = newest_.back();
   if (sample.command._length != to.command.bytes().size()) return false;
   const std::uint32_t gains = sample.gains._length;
-  if (gains != 0 && gains != joints_ * kGainsPerJoint) return false;
+  if (gains != 0 && gains != capabilities_.size() * kGainsPerJoint) return false;
   std::memcpy(to.command.bytes().data(), sample.command._buffer, sample.command._length);
   if (!is_sound(to.command)) return false;
   const double* value = sample.gains._buffer;
@@ -249,7 +244,7 @@ std::int64_t Server::wait_until_ns(const hal::PortView& view) noexcept {
 }
 
 hal::RemoteCommand Server::exchange(const hal::PortView& view) noexcept TANDEM_RT {
-  if (!config_.lockstep) push(view);
+  if (!config_.lockstep) publisher_.push(view, answered_);
   hal::RemoteCommand wish;
   wish.on_loss = config_.on_lost;
   constexpr auto kNone = static_cast<std::uint8_t>(StopCategory::kWarn);
@@ -263,7 +258,7 @@ hal::RemoteCommand Server::exchange(const hal::PortView& view) noexcept TANDEM_R
   newest_.refresh();
   const Taken& taken = newest_.front();
   const std::uint64_t owner = lease_.owner();
-  if (taken.client != owner) answered_ns_ = 0;  // not of this owner
+  if (taken.client != owner) answered_.sent_ns = 0;  // not of this owner
   if (owner != 0 && taken.client == owner && done_client_ != owner) {
     measure(view, taken);
     wish.live = taken.live;
@@ -283,7 +278,7 @@ hal::RemoteCommand Server::exchange(const hal::PortView& view) noexcept TANDEM_R
     // One that has commanded nothing yet leaves nothing behind.
     if (led_by_ != owner) wish.loss = FaultCause::kNone;
   }
-  if (wish.live) source_cycle_ = taken.command.cycle()[0];
+  if (wish.live) answered_.source_cycle = taken.command.cycle()[0];
   if (playout_) play(view, led_by_ != owner, wish);
   led_by_ = wish.live ? owner : 0;
   waits_since_ns_ = 0;
@@ -316,15 +311,15 @@ void Server::play(const hal::PortView& view, bool begins,
   const std::uint64_t first = std::max(played_cycle_ + 1, cycle - std::min(cycle, kMostMadeUp));
   for (std::uint64_t one = first; one <= cycle; ++one) playout_->play(one, played_);
   played_cycle_ = cycle;
-  source_cycle_ = playout_->source_cycle();
+  answered_.source_cycle = playout_->source_cycle();
   wish.command = &played_;
 }
 
 void Server::measure(const hal::PortView& view, const Taken& taken) noexcept TANDEM_RT {
-  if (taken.sequence == answered_sequence_ && taken.sent_ns == answered_ns_) return;
+  if (taken.sequence == answered_sequence_ && taken.sent_ns == answered_.sent_ns) return;
   answered_sequence_ = taken.sequence;
-  answered_cycle_ = taken.cycle;
-  answered_ns_ = taken.sent_ns;
+  answered_.cycle = taken.cycle;
+  answered_.sent_ns = taken.sent_ns;
   age_.record(clock_ns(CLOCK_MONOTONIC) - taken.state_ns);
   age_cycles_.record(static_cast<std::int64_t>(view.time.cycle - taken.cycle));
 }

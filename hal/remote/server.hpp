@@ -4,13 +4,11 @@
 
 #include <array>
 #include <atomic>
-#include <condition_variable>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "base/result.hpp"
 #include "base/spsc_ring.hpp"
@@ -18,6 +16,7 @@
 #include "hal/remote/lease.hpp"
 #include "hal/remote/link.hpp"
 #include "hal/remote/playout.hpp"
+#include "hal/remote/server_publisher.hpp"
 #include "hal/remote_command.hpp"
 #include "rt/histogram.hpp"
 
@@ -59,25 +58,25 @@ class Server final : public hal::RemoteCommandPort {
   ~Server() override;
 
   /// What a client whose robot is in fault is sent; called on another thread until close().
-  void set_status(std::function<std::string()> status);
+  void set_status(std::function<std::string()> status) { publisher_.set_status(std::move(status)); }
   /// Announces that the run is over, and takes nothing any more. The loop has stopped.
   void close();
 
   [[nodiscard]] bool lockstep() const noexcept override { return config_.lockstep; }
-  void send(const hal::PortView& view) noexcept override;
+  void send(const hal::PortView& view) noexcept override { publisher_.send(view, answered_); }
   [[nodiscard]] std::int64_t wait_until_ns(const hal::PortView& view) noexcept override;
   [[nodiscard]] hal::RemoteCommand exchange(const hal::PortView& view) noexcept TANDEM_RT override;
   void on_news(std::function<void()> ring) override;
 
   /// Its number among the servers of a domain, drawn at the start.
-  [[nodiscard]] std::uint64_t number() const noexcept { return run_; }
+  [[nodiscard]] std::uint64_t number() const noexcept { return publisher_.run(); }
   /// For any thread.
   [[nodiscard]] const Lease& lease() const noexcept { return lease_; }
   [[nodiscard]] std::uint64_t count(Verdict verdict) const noexcept {
     return counts_[static_cast<std::size_t>(verdict)].load(std::memory_order_relaxed);
   }
   /// Cycles that were not shown, because the thread that sends was behind.
-  [[nodiscard]] std::uint64_t dropped() const noexcept { return ring_.dropped(); }
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return publisher_.dropped(); }
   [[nodiscard]] std::uint64_t losses() const noexcept {
     return losses_.load(std::memory_order_relaxed);
   }
@@ -98,31 +97,14 @@ class Server final : public hal::RemoteCommandPort {
     std::uint64_t gains_number = 0;  // another one: other gains
     bool live = false, done = false;
   };
-  /// A cycle on its way to the thread that sends; the images follow it.
-  struct Shown {
-    std::uint64_t cycle, answered_cycle, source_cycle, owner;
-    std::int64_t time_ns, sent_ns, answered_ns;
-    std::uint8_t phase, code, reaction, padding[5];
-  };
-  struct Endpoints {
-    dds::Writer<tandem_msgs::LinkServer> server;
-    dds::Writer<tandem_msgs::LinkRobotEnd> robot_end;
-    dds::Writer<tandem_msgs::LinkState> state;
+  struct Readers {
     dds::Reader<tandem_msgs::LinkRequest> requests;
     dds::Reader<tandem_msgs::LinkCommand> commands;
   };
 
-  Server(Endpoints endpoints, const hal::Robot& robot, const hal::ParameterImage& gains,
-         Identity identity, const ServerConfig& config);
+  Server(ServerPublisher::Writers writers, Readers readers, const hal::Robot& robot,
+         const hal::ParameterImage& gains, Identity identity, const ServerConfig& config);
 
-  void run();
-  void tell();
-  void tell_robot_end();
-  void send_shown();
-  void write_state(const Shown& shown, std::span<const std::byte> state,
-                   std::span<const std::byte> command, std::span<const std::uint8_t> causes);
-  [[nodiscard]] Shown shown_of(const hal::PortView& view) noexcept TANDEM_RT;
-  void push(const hal::PortView& view) noexcept TANDEM_RT;
   void ring();
   void take_requests();
   void take_commands();
@@ -138,10 +120,10 @@ class Server final : public hal::RemoteCommandPort {
   void play(const hal::PortView& view, bool begins, hal::RemoteCommand& wish) noexcept TANDEM_RT;
   void measure(const hal::PortView& view, const Taken& taken) noexcept TANDEM_RT;
 
-  Endpoints endpoints_;
   Identity identity_;
   ServerConfig config_;
-  std::uint64_t run_ = draw_number();
+  Readers readers_;
+  std::vector<hal::JointCapabilities> capabilities_;
   Lease lease_;
   std::array<std::atomic<std::uint64_t>, kVerdicts> counts_{};
   std::atomic<std::uint64_t> losses_{0};
@@ -164,27 +146,18 @@ class Server final : public hal::RemoteCommandPort {
   std::function<void()> on_news_;
 
   // The loop's.
-  std::atomic<std::uint64_t> cycle_{0};  // shown last; read by DDS' threads
-  std::uint64_t led_by_ = 0;             // client whose commands are followed; 0: nobody's
-  std::uint64_t answered_sequence_ = 0, answered_cycle_ = 0, done_client_ = 0;
+  std::uint64_t led_by_ = 0;  // client whose commands are followed; 0: nobody's
+  Answered answered_;
+  std::uint64_t answered_sequence_ = 0, done_client_ = 0;
   std::uint64_t gains_taken_ = 0;
-  std::uint64_t source_cycle_ = 0;  // of the command that the joints are under
   std::optional<Playout> playout_;
   std::uint64_t played_cycle_ = 0;
   hal::CommandImage played_, received_;
-  std::int64_t answered_ns_ = 0, waits_since_ns_ = 0;
+  std::int64_t waits_since_ns_ = 0;
   Silence silence_;  // of the owner
   rt::Histogram age_, age_cycles_;
 
-  // The sending thread's.
-  SpscRing ring_;
-  std::size_t joints_;
-  std::vector<hal::JointCapabilities> capabilities_;
-  std::mutex mutex_;  // of what follows
-  std::condition_variable wake_;
-  std::function<std::string()> status_;
-  bool news_ = true, ending_ = false, stopping_ = false;
-  std::thread thread_;
+  ServerPublisher publisher_;
   std::optional<OnData> on_requests_, on_commands_;  // last: they call the others
 };
 

@@ -50,15 +50,11 @@ std::unexpected<Error> stopped() {
 Result<std::unique_ptr<ServerContact>> ServerContact::find(dds::Participant& participant,
                                                            const Identity& identity,
                                                            const ClientConfig& config) {
-  const auto name = [&](const char* topic) { return participant.topic_name(topic); };
-  auto server =
-      dds::Reader<tandem_msgs::LinkServer>::create(participant, name(kServerTopic), link_qos());
+  auto server = open_end<dds::Reader<tandem_msgs::LinkServer>>(participant, kServerTopic);
   if (!server) return std::unexpected(server.error());
-  auto robot_end =
-      dds::Reader<tandem_msgs::LinkRobotEnd>::create(participant, name(kRobotEndTopic), link_qos());
+  auto robot_end = open_end<dds::Reader<tandem_msgs::LinkRobotEnd>>(participant, kRobotEndTopic);
   if (!robot_end) return std::unexpected(robot_end.error());
-  auto requests =
-      dds::Writer<tandem_msgs::LinkRequest>::create(participant, name(kRequestTopic), link_qos());
+  auto requests = open_end<dds::Writer<tandem_msgs::LinkRequest>>(participant, kRequestTopic);
   if (!requests) return std::unexpected(requests.error());
   std::unique_ptr<ServerContact> made(
       new ServerContact({std::move(*server), std::move(*robot_end), std::move(*requests)}, config));

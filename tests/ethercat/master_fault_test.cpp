@@ -191,9 +191,9 @@ TEST_F(MasterFault, TheSlavesWatchdogsAreToldAfterAPauseOfTheMaster) {
   cycles(10);
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(master->slave(i).error(), LineError::kLeftState);
-    EXPECT_EQ(master->slave(i).al_code(), ethercat::AlCode::kWatchdog);
+    const std::string text = master->slave(i).text();
+    EXPECT_NE(text.find("process data watchdog: no outputs came in time"), text.npos) << text;
   }
-  EXPECT_TRUE(says("process data watchdog: no outputs came in time"));
   master->restart(rig.now_ns);
   EXPECT_TRUE(to_op()) << master->text();
 }

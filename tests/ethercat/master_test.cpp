@@ -39,10 +39,10 @@ TEST(MasterClock, MeasuresTheWayAndHoldsTheClocksTogether) {
   const std::int64_t reference =
       rig.rig.slaves[0]->slave->controller().system_time_ns(rig.rig.now_ns);
   for (std::size_t i = 0; i < 5; ++i) {
-    EXPECT_NEAR(rig.master->slave(i).delay_ns(), 300.0 * static_cast<double>(i), 25.0);
+    EXPECT_NEAR(rig.master->slave(i).clock().delay_ns(), 300.0 * static_cast<double>(i), 25.0);
     const std::int64_t time = rig.rig.slaves[i]->slave->controller().system_time_ns(rig.rig.now_ns);
     EXPECT_LT(std::abs(time - reference), 200) << i;
-    EXPECT_LT(std::abs(rig.master->slave(i).difference_ns()), 200) << i;
+    EXPECT_LT(std::abs(rig.master->slave(i).clock().difference_ns()), 200) << i;
   }
 }
 

@@ -103,10 +103,8 @@ template <class T>
 class Peer {
  public:
   Peer(dds::Participant& participant, const char* topic)
-      : writer_(
-            must(dds::Writer<T>::create(participant, participant.topic_name(topic), link_qos()))) {
-    auto reader =
-        must(dds::Reader<T>::create(participant, participant.topic_name(topic), link_qos()));
+      : writer_(must(open_end<dds::Writer<T>>(participant, topic))) {
+    auto reader = must(open_end<dds::Reader<T>>(participant, topic));
     T sample{};
     require(writer_.write(sample));
     dds_sample_info_t info;

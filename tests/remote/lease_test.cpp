@@ -70,14 +70,10 @@ class LinkChecks : public testing::Test {
 
   void SetUp() override {
     participant_ = participant("talker");
-    const auto name = [&](const char* topic) { return participant_->topic_name(topic); };
     using dds::Reader, dds::Writer;
-    told_.emplace(
-        *Reader<tandem_msgs::LinkServer>::create(*participant_, name(kServerTopic), link_qos()));
-    requests_.emplace(
-        *Writer<tandem_msgs::LinkRequest>::create(*participant_, name(kRequestTopic), link_qos()));
-    commands_.emplace(
-        *Writer<tandem_msgs::LinkCommand>::create(*participant_, name(kCommandTopic), link_qos()));
+    told_.emplace(*open_end<Reader<tandem_msgs::LinkServer>>(*participant_, kServerTopic));
+    requests_.emplace(*open_end<Writer<tandem_msgs::LinkRequest>>(*participant_, kRequestTopic));
+    commands_.emplace(*open_end<Writer<tandem_msgs::LinkCommand>>(*participant_, kCommandTopic));
     image_.assign(served.cycle->command());  // as it is before the first cycle
     begin();
     ASSERT_TRUE(eventually([this] { return look() != 0; }));
@@ -161,11 +157,8 @@ TEST_F(LinkChecks, AClientOfAnotherVersionGetsNoLease) {
 TEST_F(LinkChecks, WhoKnowsTheOwnersNumberIsNotTheOwner) {
   expect(Verdict::kTaken, sample());
   const auto impostor = participant("impostor");
-  const auto name = [&](const char* topic) { return impostor->topic_name(topic); };
-  auto commands =
-      *dds::Writer<tandem_msgs::LinkCommand>::create(*impostor, name(kCommandTopic), link_qos());
-  auto requests =
-      *dds::Writer<tandem_msgs::LinkRequest>::create(*impostor, name(kRequestTopic), link_qos());
+  auto commands = *open_end<dds::Writer<tandem_msgs::LinkCommand>>(*impostor, kCommandTopic);
+  auto requests = *open_end<dds::Writer<tandem_msgs::LinkRequest>>(*impostor, kRequestTopic);
   ASSERT_TRUE(eventually(
       [&] { return commands.endpoint().matched() == 1 && requests.endpoint().matched() == 1; }));
   const std::uint64_t refused = served.server->count(Verdict::kNoLease);

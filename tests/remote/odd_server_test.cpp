@@ -27,7 +27,7 @@ struct OddServer : testing::Test {
   }
   template <class T>
   void say(const char* topic, const T& sample) {
-    auto writer = dds::Writer<T>::create(*at_robot, at_robot->topic_name(topic), link_qos());
+    auto writer = open_end<dds::Writer<T>>(*at_robot, topic);
     ASSERT_TRUE(writer);
     ASSERT_TRUE(test::eventually([&] { return writer->endpoint().matched() > 0; }));
     ASSERT_TRUE(writer->write(sample));

@@ -7,11 +7,9 @@ namespace tandem::hal::ecat {
 
 using canopen::AbortCode;
 using ethercat::CoeService;
-using ethercat::Command;
 using ethercat::kSdoAt;
 using ethercat::kSdoDataAt;
 using ethercat::kSegmentDataAt;
-using ethercat::register_address;
 namespace reg = ethercat::reg;
 namespace command = ethercat::sdo;
 
@@ -39,7 +37,6 @@ void CoeClient::begin(std::uint16_t index, std::uint8_t sub, bool uploading) noe
   index_ = index;
   sub_ = sub;
   abort_code_ = AbortCode::kNone;
-  mailbox_error_ = ethercat::MailboxError::kNone;
   position_ = 0;
 }
 
@@ -122,20 +119,17 @@ void CoeClient::process(std::int64_t now_ns, Exchange& exchange,
 void CoeClient::ask(Exchange& exchange, std::size_t channel) noexcept {
   switch (step_) {
     case Step::kWrite:
-      return exchange.write(channel, Command::kFpwr, register_address(station_, mailbox_.out_start),
-                            {message_.data(), mailbox_.out_bytes});
+      return exchange.write_at(channel, station_, mailbox_.out_start,
+                               {message_.data(), mailbox_.out_bytes});
     case Step::kLook:
     case Step::kWaitAgain:
-      return exchange.read(channel, Command::kFprd, register_address(station_, kInManager),
-                           ethercat::kSyncManagerBytes);
+      return exchange.read_at(channel, station_, kInManager, ethercat::kSyncManagerBytes);
     case Step::kRead:  // once only: a mailbox that has been read is empty
-      return exchange.read(channel, Command::kFprd, register_address(station_, mailbox_.in_start),
-                           mailbox_.in_bytes, 1);
+      return exchange.read_at(channel, station_, mailbox_.in_start, mailbox_.in_bytes, 1);
     case Step::kAskAgain: {
       const std::array<std::uint8_t, 1> control{static_cast<std::uint8_t>(
           ethercat::kSmEnable | (repeat_ ? 0u : unsigned{ethercat::kSmRepeat}))};
-      return exchange.write(channel, Command::kFpwr, register_address(station_, kInManager + 6),
-                            control);
+      return exchange.write_at(channel, station_, kInManager + 6, control);
     }
   }
 }
@@ -171,8 +165,6 @@ void CoeClient::take(Bytes message) noexcept {
   if (!ethercat::read_mailbox(message, header)) return;
   message = message.first(ethercat::kMailboxHeaderBytes + header.length);
   if (header.type == ethercat::MailboxType::kError && header.length >= 4) {
-    mailbox_error_ = static_cast<ethercat::MailboxError>(
-        canopen::get<std::uint16_t>(&message[ethercat::kMailboxHeaderBytes + 2]));
     return abort(AbortCode::kGeneral);
   }
   if (header.type != ethercat::MailboxType::kCoe || message.size() <= kSdoAt) return;

@@ -48,8 +48,6 @@ class CoeClient {
   [[nodiscard]] bool busy() const noexcept { return status_ == Status::kBusy; }
   [[nodiscard]] Status status() const noexcept { return status_; }
   [[nodiscard]] canopen::AbortCode abort_code() const noexcept { return abort_code_; }
-  /// Why the slave refused the last message as such; kNone when it did not.
-  [[nodiscard]] ethercat::MailboxError mailbox_error() const noexcept { return mailbox_error_; }
   [[nodiscard]] std::span<const std::uint8_t> value() const noexcept {
     return {buffer_.data(), length_};
   }
@@ -91,7 +89,6 @@ class CoeClient {
   std::array<std::uint8_t, 8> emergency_{};
   std::uint32_t emergencies_ = 0;
   canopen::AbortCode abort_code_ = canopen::AbortCode::kNone;
-  ethercat::MailboxError mailbox_error_ = ethercat::MailboxError::kNone;
   std::size_t expected_ = 0;
   std::size_t length_ = 0;
   std::size_t position_ = 0;

@@ -93,6 +93,16 @@ class Exchange {
   /// Asks for a write of `data`. @pre idle(channel)
   void write(std::size_t channel, ethercat::Command command, std::uint32_t address,
              std::span<const std::uint8_t> data) noexcept TANDEM_RT;
+  /// As read() and write(): a register of the slave with that station address.
+  void read_at(std::size_t channel, std::uint16_t station, std::uint16_t offset, std::size_t length,
+               std::uint8_t tries = kTries) noexcept TANDEM_RT {
+    read(channel, ethercat::Command::kFprd, ethercat::register_address(station, offset), length,
+         tries);
+  }
+  void write_at(std::size_t channel, std::uint16_t station, std::uint16_t offset,
+                std::span<const std::uint8_t> data) noexcept TANDEM_RT {
+    write(channel, ethercat::Command::kFpwr, ethercat::register_address(station, offset), data);
+  }
   /// Forgets the channel's request: a later answer is ignored.
   void release(std::size_t channel) noexcept TANDEM_RT;
 

@@ -294,7 +294,7 @@ std::vector<std::pair<bool, std::int32_t>> Surveyor::cycle(std::int64_t period_n
 
 void Surveyor::measure(const SurveyTiming& timing) {
   const auto near = [](const auto& one) {
-    return std::abs(std::int64_t{one.second}) <= SlaveMaster::kSettledNs;
+    return std::abs(std::int64_t{one.second}) <= SlaveClock::kSettledNs;
   };
   constexpr int kNearCycles = 20;  // the difference may pass through 0 on its way
   const std::int64_t until_ns = now_ns_ + timing.settle_ns;

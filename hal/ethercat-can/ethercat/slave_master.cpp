@@ -28,7 +28,8 @@ SlaveMaster::SlaveMaster(const SlavePlan& plan, std::size_t position, const Slav
       position_(position),
       mapping_(mapping),
       steps_(make_steps(plan)),
-      station_(static_cast<std::uint16_t>(kFirstStation + position)) {
+      station_(static_cast<std::uint16_t>(kFirstStation + position)),
+      clock_(station_, plan.sync0_cycle_ns) {
   sii_.reserve(2 * sii::kMaxWords + 8);
   content_.name.reserve(kLongestName);
   content_.managers.reserve(sii::kMaxSyncManagers);
@@ -36,8 +37,8 @@ SlaveMaster::SlaveMaster(const SlavePlan& plan, std::size_t position, const Slav
 
 void SlaveMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
   error_ = LineError::kNone;
-  look_wanted_ = difference_wanted_ = is_reference_ = goes_on_ = false;
-  difference_ns_ = 0;
+  look_wanted_ = difference_wanted_ = goes_on_ = false;
+  clock_.restart();
   enter(SlaveStage::kReset, now_ns);
   wanted_ = AlState::kInit;
 }
@@ -118,7 +119,7 @@ void SlaveMaster::take(const Request& request, std::int64_t now_ns,
       if (++part_ == 5) enter(SlaveStage::kFeatures, now_ns);
       return;
     case SlaveStage::kFeatures:
-      has_clock_ = (get<std::uint16_t>(&data[8]) & ethercat::kFeatureDc) != 0;
+      clock_.found((get<std::uint16_t>(&data[8]) & ethercat::kFeatureDc) != 0);
       sii_.clear();
       category_at_ = 2 * sii::kFixedWords;
       return enter(SlaveStage::kSii, now_ns);
@@ -130,22 +131,19 @@ void SlaveMaster::take(const Request& request, std::int64_t now_ns,
       }
       return take_state(data, now_ns, SlaveStage::kConfigure);
     case SlaveStage::kProcessData:
-      if (++part_ == 2) enter(has_clock_ ? SlaveStage::kWaitClock : SlaveStage::kSafeOp, now_ns);
+      if (++part_ == 2) enter(has_clock() ? SlaveStage::kWaitClock : SlaveStage::kSafeOp, now_ns);
       if (stage_ == SlaveStage::kSafeOp) wanted_ = AlState::kSafeOp;
       return;
-    case SlaveStage::kClock: return take_clock(data, now_ns, reference);
+    case SlaveStage::kClock:
+      if (!clock_.take(part_++, data, now_ns, reference)) return;
+      return enter_state(SlaveStage::kSafeOp, AlState::kSafeOp, now_ns);
     case SlaveStage::kSafeOp: return take_state(data, now_ns, SlaveStage::kReady);
     case SlaveStage::kOp: return take_state(data, now_ns, SlaveStage::kRunning);
-    case SlaveStage::kSettle: {
-      take_difference(data);
-      const std::int64_t off = difference_ns_ < 0 ? -std::int64_t{difference_ns_} : difference_ns_;
-      const bool pulses = plan_.sync0_cycle_ns == 0 ||
-                          reference.time_ns > sync0_start_ns_ + 2 * static_cast<std::uint64_t>(
-                                                                        plan_.sync0_cycle_ns);
-      if (off <= kSettledNs && pulses) return enter_state(SlaveStage::kOp, AlState::kOp, now_ns);
+    case SlaveStage::kSettle:
+      clock_.take_difference(data, false);
+      if (clock_.settled(reference)) return enter_state(SlaveStage::kOp, AlState::kOp, now_ns);
       if (now_ns - since_ns_ >= kSettleTimeNs) fail(LineError::kClock, now_ns);
       return;
-    }
     case SlaveStage::kReady:
     case SlaveStage::kRunning: return take_running(data, now_ns);
     default: return;
@@ -239,52 +237,9 @@ void SlaveMaster::configure(std::int64_t now_ns, Exchange& exchange) noexcept {
   started_step_ = false;
 }
 
-void SlaveMaster::take_clock(Data data, std::int64_t now_ns, ClockReference& reference) noexcept {
-  const auto latched = [&](bool behind) {
-    return Latched{.arrived = get<std::uint32_t>(&data[0]),
-                   .returned = get<std::uint32_t>(&data[4]),
-                   .behind = behind,
-                   .local_ns = get<std::uint64_t>(&data[0x18])};
-  };
-  switch (part_) {
-    case 0: behind_ = (get<std::uint16_t>(data.data()) & ethercat::open_bit(1)) != 0; break;
-    case 1: reference_times_ = latched(reference.station != station_ || behind_); break;
-    case 2: {
-      const Latched own = latched(behind_);
-      is_reference_ = reference.station == station_;
-      if (is_reference_) {  // its system time is the loop's
-        reference.offset_ns = static_cast<std::uint64_t>(now_ns) - own.local_ns;
-      }
-      delay_ns_ = ecat::delay_ns(reference_times_, own);
-      offset_ns_ = ecat::offset_ns(reference_times_, reference.offset_ns, own);
-      break;
-    }
-    case 3: reference.set |= is_reference_; break;
-    case 6:
-      sync0_start_ns_ = ecat::sync0_start_ns(get<std::uint64_t>(data.data()), kSync0LeadNs,
-                                             static_cast<std::uint64_t>(plan_.sync0_cycle_ns));
-      break;
-    default: break;
-  }
-  ++part_;
-  const bool done = part_ == 9 || (part_ == 6 && plan_.sync0_cycle_ns == 0);
-  if (done) enter_state(SlaveStage::kSafeOp, AlState::kSafeOp, now_ns);
-}
-
-void SlaveMaster::take_difference(Data data) noexcept {
-  if (is_reference_) return;  // the register has what an earlier reference left there
-  const auto raw = get<std::uint32_t>(data.data());
-  const auto size = static_cast<std::int32_t>(raw & ~ethercat::kDifferenceSign);
-  difference_ns_ = (raw & ethercat::kDifferenceSign) != 0 ? -size : size;
-  if (stage_ != SlaveStage::kRunning) return;
-  clock_.least = clock_.count == 0 ? difference_ns_ : std::min(clock_.least, difference_ns_);
-  clock_.most = clock_.count == 0 ? difference_ns_ : std::max(clock_.most, difference_ns_);
-  ++clock_.count;
-}
-
 void SlaveMaster::take_running(Data data, std::int64_t now_ns) noexcept {
   const int part = std::exchange(part_, 0);
-  if (part == 1) return take_difference(data);
+  if (part == 1) return clock_.take_difference(data, running());
   if (part == 2) {
     const auto status = get<std::uint16_t>(data.data());
     al_state_ = state_of(status);

@@ -8,9 +8,9 @@
 
 #include "ethercat/registers.hpp"
 #include "ethercat/sii.hpp"
-#include "hal/ethercat-can/ethercat/clock_times.hpp"
 #include "hal/ethercat-can/ethercat/coe_client.hpp"
 #include "hal/ethercat-can/ethercat/exchange.hpp"
+#include "hal/ethercat-can/ethercat/slave_clock.hpp"
 #include "hal/ethercat-can/ethercat/slave_plan.hpp"
 
 namespace tandem {
@@ -48,28 +48,11 @@ struct SlaveMapping {
   std::uint16_t inputs = 0;
 };
 
-/// The reference clock, for those that follow it.
-struct ClockReference {
-  std::uint16_t station = 0;  ///< 0: there is none
-  bool set = false;           ///< whether its offset has been written
-  std::uint64_t offset_ns = 0;
-  std::uint64_t time_ns = 0;  ///< its system time in the last cycle
-};
-
-/// How far a slave's clock was ahead of the reference in OP [ns]. A measurement, no state.
-struct ClockFigures {
-  std::int32_t least = 0;
-  std::int32_t most = 0;
-  std::uint64_t count = 0;
-};
-
 /// Non-blocking: one request at a time, on the channel that is its position.
 class SlaveMaster {
  public:
   static constexpr std::uint16_t kFirstStation = 0x1001;
   static constexpr int kMisses = 3;  ///< working counters of 0 until it does not answer
-  static constexpr std::uint64_t kSync0LeadNs = 100'000'000;
-  static constexpr std::uint32_t kSettledNs = 1'000;
   static constexpr std::int64_t kSettleTimeNs = 10'000'000'000;
 
   SlaveMaster(const SlavePlan& plan, std::size_t position, const SlaveMapping& mapping);
@@ -95,7 +78,7 @@ class SlaveMaster {
   /// Something is wrong in the line: looks whether it is this slave. @pre stage() == kRunning
   void look() noexcept TANDEM_RT;
   /// Reads how far its clock is off, when it has nothing else to do.
-  void ask_difference() noexcept TANDEM_RT { difference_wanted_ = has_clock_; }
+  void ask_difference() noexcept TANDEM_RT { difference_wanted_ = clock_.present(); }
 
   /// For transfers of others. @pre waiting(), or stage() == kReady or kRunning
   [[nodiscard]] CoeClient& sdo() noexcept { return coe_; }
@@ -111,15 +94,10 @@ class SlaveMaster {
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
   [[nodiscard]] const ethercat::sii::Content& content() const noexcept { return content_; }
   [[nodiscard]] ethercat::AlState wanted() const noexcept { return wanted_; }
-  [[nodiscard]] ethercat::AlState al_state() const noexcept { return al_state_; }
-  [[nodiscard]] ethercat::AlCode al_code() const noexcept { return al_code_; }
   [[nodiscard]] canopen::AbortCode abort_code() const noexcept { return coe_.abort_code(); }
   [[nodiscard]] const CoeStep& step() const noexcept { return steps_[step_]; }
-  [[nodiscard]] bool has_clock() const noexcept { return has_clock_; }
-  [[nodiscard]] std::uint32_t delay_ns() const noexcept { return delay_ns_; }
-  /// By how much its clock was ahead of the reference when it was last asked.
-  [[nodiscard]] std::int32_t difference_ns() const noexcept { return difference_ns_; }
-  [[nodiscard]] const ClockFigures& clock() const noexcept { return clock_; }
+  [[nodiscard]] bool has_clock() const noexcept { return clock_.present(); }
+  [[nodiscard]] const SlaveClock& clock() const noexcept { return clock_; }
   [[nodiscard]] std::uint16_t station() const noexcept { return station_; }
   [[nodiscard]] std::size_t position() const noexcept { return position_; }
   [[nodiscard]] const SlavePlan& plan() const noexcept { return plan_; }
@@ -135,14 +113,11 @@ class SlaveMaster {
   void ask_sii(Exchange& exchange) noexcept;
   void ask_state(Exchange& exchange) noexcept;
   void ask_process_data(Exchange& exchange) noexcept;
-  void ask_clock(Exchange& exchange, const ClockReference& reference) noexcept;
   void ask_running(Exchange& exchange) noexcept;
   void take(const Request& request, std::int64_t now_ns, ClockReference& reference) noexcept;
   void take_sii(Data data, std::int64_t now_ns) noexcept;
   void take_state(Data data, std::int64_t now_ns, SlaveStage next) noexcept;
-  void take_clock(Data data, std::int64_t now_ns, ClockReference& reference) noexcept;
   void take_running(Data data, std::int64_t now_ns) noexcept;
-  void take_difference(Data data) noexcept;
   void configure(std::int64_t now_ns, Exchange& exchange) noexcept;
   void missed(std::int64_t now_ns) noexcept;
   void read_sii_end(std::int64_t now_ns) noexcept;
@@ -163,8 +138,6 @@ class SlaveMaster {
   int misses_ = 0;
   std::int64_t since_ns_ = 0;  ///< when the stage began
   std::int64_t trouble_ns_ = 0;
-  bool has_clock_ = false;
-  bool is_reference_ = false;
   bool state_written_ = false;
   bool look_wanted_ = false;
   bool difference_wanted_ = false;
@@ -179,13 +152,7 @@ class SlaveMaster {
   ethercat::sii::Content content_;
   std::uint16_t outputs_memory_ = 0;
   std::uint16_t inputs_memory_ = 0;
-  Latched reference_times_;
-  bool behind_ = false;
-  std::uint32_t delay_ns_ = 0;
-  std::uint64_t offset_ns_ = 0;
-  std::uint64_t sync0_start_ns_ = 0;
-  std::int32_t difference_ns_ = 0;
-  ClockFigures clock_;
+  SlaveClock clock_;
   CoeClient coe_;
 };
 

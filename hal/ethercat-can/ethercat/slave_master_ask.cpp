@@ -16,20 +16,8 @@ namespace {
 
 constexpr std::size_t kSiiAnswer = 14;
 constexpr std::size_t kAlAnswer = 6;
-constexpr std::size_t kLatched = 0x20;
 constexpr std::size_t kManagersUsed = 4;
 constexpr std::size_t kFmmusUsed = 3;
-constexpr std::uint16_t kSpeedStart = 0x1000;
-
-void read(Exchange& exchange, std::size_t channel, std::uint16_t station, std::uint16_t offset,
-          std::size_t size) noexcept {
-  exchange.read(channel, Command::kFprd, register_address(station, offset), size);
-}
-
-void write(Exchange& exchange, std::size_t channel, std::uint16_t station, std::uint16_t offset,
-           std::span<const std::uint8_t> data) noexcept {
-  exchange.write(channel, Command::kFpwr, register_address(station, offset), data);
-}
 
 template <class T>
 std::array<std::uint8_t, sizeof(T)> bytes(T value) noexcept {
@@ -44,7 +32,7 @@ void SlaveMaster::ask(std::int64_t now_ns, Exchange& exchange,
                       const ClockReference& reference) noexcept {
   switch (stage_) {
     case SlaveStage::kReset: return ask_reset(exchange);
-    case SlaveStage::kFeatures: return read(exchange, position_, station_, reg::kType, 10);
+    case SlaveStage::kFeatures: return exchange.read_at(position_, station_, reg::kType, 10);
     case SlaveStage::kSii: return ask_sii(exchange);
     case SlaveStage::kPreOp:
       if (part_ != 0) return ask_state(exchange);
@@ -60,15 +48,15 @@ void SlaveMaster::ask(std::int64_t now_ns, Exchange& exchange,
                                     .length = box.in_bytes,
                                     .control = ethercat::kControlMailboxIn,
                                     .active = box.in_bytes != 0});
-        return write(exchange, position_, station_, reg::kSyncManager, managers);
+        return exchange.write_at(position_, station_, reg::kSyncManager, managers);
       }
     case SlaveStage::kProcessData: return ask_process_data(exchange);
-    case SlaveStage::kClock: return ask_clock(exchange, reference);
+    case SlaveStage::kClock: return clock_.ask(part_, exchange, position_, reference);
     case SlaveStage::kSafeOp:
     case SlaveStage::kOp: return ask_state(exchange);
     case SlaveStage::kSettle:
-      if (!has_clock_) return enter_state(SlaveStage::kOp, AlState::kOp, now_ns);
-      return read(exchange, position_, station_, reg::kTimeDifference, 4);
+      if (!has_clock()) return enter_state(SlaveStage::kOp, AlState::kOp, now_ns);
+      return exchange.read_at(position_, station_, reg::kTimeDifference, 4);
     case SlaveStage::kReady:
     case SlaveStage::kRunning: return ask_running(exchange);
     default: return;
@@ -84,26 +72,27 @@ void SlaveMaster::ask_reset(Exchange& exchange) noexcept {
                             register_address(ethercat::at_position(position_), reg::kStation),
                             bytes(station_));
     case 1:
-      return write(exchange, position_, station_, reg::kAlControl,
-                   bytes(std::uint16_t{std::to_underlying(AlState::kInit) | ethercat::kAlError}));
-    case 2: return read(exchange, position_, station_, reg::kAlStatus, kAlAnswer);
-    case 3: return write(exchange, position_, station_, reg::kSyncManager, kNone);
-    default: return write(exchange, position_, station_, reg::kFmmu, kNoMap);
+      return exchange.write_at(
+          position_, station_, reg::kAlControl,
+          bytes(std::uint16_t{std::to_underlying(AlState::kInit) | ethercat::kAlError}));
+    case 2: return exchange.read_at(position_, station_, reg::kAlStatus, kAlAnswer);
+    case 3: return exchange.write_at(position_, station_, reg::kSyncManager, kNone);
+    default: return exchange.write_at(position_, station_, reg::kFmmu, kNoMap);
   }
 }
 
 void SlaveMaster::ask_sii(Exchange& exchange) noexcept {
-  if (part_ == 1) return read(exchange, position_, station_, reg::kSiiControl, kSiiAnswer);
+  if (part_ == 1) return exchange.read_at(position_, station_, reg::kSiiControl, kSiiAnswer);
   std::array<std::uint8_t, 6> command{};
   canopen::put(&command[0], std::uint16_t{ethercat::kSiiRead});
   canopen::put(&command[2], static_cast<std::uint32_t>(sii_.size() / 2));
-  write(exchange, position_, station_, reg::kSiiControl, command);
+  exchange.write_at(position_, station_, reg::kSiiControl, command);
 }
 
 void SlaveMaster::ask_state(Exchange& exchange) noexcept {
-  if (state_written_) return read(exchange, position_, station_, reg::kAlStatus, kAlAnswer);
-  write(exchange, position_, station_, reg::kAlControl,
-        bytes(std::uint16_t{std::to_underlying(wanted_)}));
+  if (state_written_) return exchange.read_at(position_, station_, reg::kAlStatus, kAlAnswer);
+  exchange.write_at(position_, station_, reg::kAlControl,
+                    bytes(std::uint16_t{std::to_underlying(wanted_)}));
 }
 
 void SlaveMaster::put_fmmus(std::span<std::uint8_t> out) const noexcept {
@@ -123,7 +112,7 @@ void SlaveMaster::ask_process_data(Exchange& exchange) noexcept {
   if (part_ == 1) {
     std::array<std::uint8_t, 2 * ethercat::kFmmuBytes> fmmus{};
     put_fmmus(fmmus);
-    return write(exchange, position_, station_, reg::kFmmu, fmmus);
+    return exchange.write_at(position_, station_, reg::kFmmu, fmmus);
   }
   std::array<std::uint8_t, 2 * ethercat::kSyncManagerBytes> managers{};
   ethercat::put_sync_manager(&managers[0], {.start = outputs_memory_,
@@ -135,49 +124,22 @@ void SlaveMaster::ask_process_data(Exchange& exchange) noexcept {
                               .length = mapping_.inputs,
                               .control = ethercat::kControlInputs,
                               .active = mapping_.inputs != 0});
-  write(exchange, position_, station_, reg::kSyncManager + 2 * ethercat::kSyncManagerBytes,
-        managers);
-}
-
-void SlaveMaster::ask_clock(Exchange& exchange, const ClockReference& reference) noexcept {
-  static constexpr std::array<std::uint8_t, 2> kOff{};
-  static constexpr std::array<std::uint8_t, 2> kOn{
-      0, std::uint8_t{ethercat::kSyncCyclic} | std::uint8_t{ethercat::kSync0On}};
-  switch (part_) {
-    case 0: return read(exchange, position_, station_, reg::kDlStatus, 2);
-    case 1: return read(exchange, position_, reference.station, reg::kReceiveTime, kLatched);
-    case 2: return read(exchange, position_, station_, reg::kReceiveTime, kLatched);
-    case 3: {
-      std::array<std::uint8_t, 12> times{};
-      canopen::put(&times[0], offset_ns_);
-      canopen::put(&times[8], delay_ns_);
-      return write(exchange, position_, station_, reg::kTimeOffset, times);
-    }
-    case 4: return write(exchange, position_, station_, reg::kSpeedStart, bytes(kSpeedStart));
-    case 5: return write(exchange, position_, station_, reg::kSyncControl, kOff);
-    case 6: return read(exchange, position_, station_, reg::kSystemTime, 8);
-    case 7: {
-      std::array<std::uint8_t, 24> times{};  // start (8), others (8), cycles of SYNC0 and SYNC1
-      canopen::put(&times[0], sync0_start_ns_);
-      canopen::put(&times[16], static_cast<std::uint32_t>(plan_.sync0_cycle_ns));
-      return write(exchange, position_, station_, reg::kSyncStart, times);
-    }
-    default: return write(exchange, position_, station_, reg::kSyncControl, kOn);
-  }
+  exchange.write_at(position_, station_, reg::kSyncManager + 2 * ethercat::kSyncManagerBytes,
+                    managers);
 }
 
 void SlaveMaster::ask_running(Exchange& exchange) noexcept {
   if (part_ == 3) {
-    return read(exchange, position_, station_, reg::kFmmu, 2 * ethercat::kFmmuBytes);
+    return exchange.read_at(position_, station_, reg::kFmmu, 2 * ethercat::kFmmuBytes);
   }
   part_ = 0;
   if (std::exchange(look_wanted_, false)) {
     part_ = 2;
-    return read(exchange, position_, station_, reg::kAlStatus, kAlAnswer);
+    return exchange.read_at(position_, station_, reg::kAlStatus, kAlAnswer);
   }
   if (std::exchange(difference_wanted_, false)) {
     part_ = 1;
-    return read(exchange, position_, station_, reg::kTimeDifference, 4);
+    return exchange.read_at(position_, station_, reg::kTimeDifference, 4);
   }
 }
 

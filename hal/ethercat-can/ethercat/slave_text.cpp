@@ -47,7 +47,7 @@ std::string SlaveMaster::text() const {
       return say(
           fmt::format("its clock, {} ns off the reference, or its SYNC0 was not ready in "
                       "time (a master in lockstep needs `tandem emulate --lockstep`)",
-                      difference_ns_));
+                      clock_.difference_ns()));
     case LineError::kLeftState:
       return say(fmt::format("is in {}: {}", to_string(al_state_), code_text(al_code_)));
     case LineError::kGone:

@@ -18,8 +18,7 @@ void Exchange::archive(Archive& ar) {
 void CoeClient::archive(Archive& ar) {
   ar(station_, mailbox_.out_start, mailbox_.out_bytes, mailbox_.in_start, mailbox_.in_bytes,
      status_, step_, uploading_, segments_, toggle_, repeat_, counter_, sub_, index_, emergency_,
-     emergencies_, abort_code_, mailbox_error_, expected_, length_, position_, since_ns_, buffer_,
-     message_);
+     emergencies_, abort_code_, expected_, length_, position_, since_ns_, buffer_, message_);
 }
 
 void ProcessImage::archive(Archive& ar) {
@@ -27,13 +26,16 @@ void ProcessImage::archive(Archive& ar) {
   ar(out_, in_, index_);
 }
 
-void SlaveMaster::archive(Archive& ar) {
-  ar(stage_, error_, part_, misses_, since_ns_, trouble_ns_, has_clock_, is_reference_,
-     state_written_, look_wanted_, difference_wanted_, started_step_, goes_on_, wanted_, al_state_,
-     al_code_, step_, category_at_, outputs_memory_, inputs_memory_, behind_, delay_ns_, offset_ns_,
-     sync0_start_ns_, difference_ns_, coe_);
-  ar(reference_times_.arrived, reference_times_.returned, reference_times_.behind,
+void SlaveClock::archive(Archive& ar) {
+  ar(present_, is_reference_, behind_, delay_ns_, offset_ns_, sync0_start_ns_, difference_ns_,
+     reference_times_.arrived, reference_times_.returned, reference_times_.behind,
      reference_times_.local_ns);
+}
+
+void SlaveMaster::archive(Archive& ar) {
+  ar(stage_, error_, part_, misses_, since_ns_, trouble_ns_, state_written_, look_wanted_,
+     difference_wanted_, started_step_, goes_on_, wanted_, al_state_, al_code_, step_, category_at_,
+     outputs_memory_, inputs_memory_, clock_, coe_);
   std::size_t size = sii_.size();
   ar(size);
   if (ar.reading()) sii_.resize(std::min(size, sii_.capacity()));
