@@ -12,8 +12,8 @@
 #include "apps/can/interface_lock.hpp"
 #include "base/result.hpp"
 #include "hal/config/robot_config.hpp"
-#include "hal/ethercat-can/ethercat/packet_link.hpp"
 #include "hal/ethercat-can/frame_wait.hpp"
+#include "hal/ethercat-can/line/packet_link.hpp"
 #include "hal/ethercat-can/socket_can_bus.hpp"
 
 namespace tandem::apps {

@@ -9,7 +9,7 @@
 #include "apps/machine/machine.hpp"
 #include "apps/text/figures.hpp"
 #include "hal/config/robot_config.hpp"
-#include "hal/ethercat-can/ethercat/line_survey.hpp"
+#include "hal/ethercat-can/line/line_survey.hpp"
 
 namespace tandem::apps {
 

@@ -8,8 +8,8 @@
 #include "apps/machine/doctor.hpp"
 #include "canopen/data_sheet.hpp"
 #include "canopen/objects.hpp"
-#include "hal/ethercat-can/ethercat/packet_link.hpp"
-#include "hal/ethercat-can/ethercat/slave_master.hpp"
+#include "hal/ethercat-can/line/packet_link.hpp"
+#include "hal/ethercat-can/line/slave_master.hpp"
 #include "hal/ethercat-can/socket_can_bus.hpp"
 #include "rt/clock.hpp"
 

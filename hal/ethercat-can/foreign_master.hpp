@@ -9,7 +9,7 @@
 #include "canopen/frame.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/bus.hpp"
-#include "hal/ethercat-can/ethercat/link.hpp"
+#include "hal/ethercat-can/line/link.hpp"
 
 namespace tandem::hal::can {
 

@@ -13,7 +13,7 @@
 #include "canopen/messages.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/bus.hpp"
-#include "hal/ethercat-can/ethercat/line_master.hpp"
+#include "hal/ethercat-can/line/line_master.hpp"
 #include "hal/ethercat-can/pdo_layout.hpp"
 
 namespace tandem {

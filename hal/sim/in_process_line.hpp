@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "base/result.hpp"
-#include "hal/ethercat-can/ethercat/loopback_link.hpp"
+#include "hal/ethercat-can/line/loopback_link.hpp"
 #include "hal/ethercat-can/line_bus.hpp"
 #include "hal/sim/line_boards.hpp"
 

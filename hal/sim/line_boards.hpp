@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "canopen/frame.hpp"
-#include "firmware_emu/ethercat/board_data.hpp"
-#include "firmware_emu/ethercat/slave_line.hpp"
+#include "firmware_emu/slaves/board_data.hpp"
+#include "firmware_emu/slaves/slave_line.hpp"
 #include "hal/ethercat-can/bus.hpp"
-#include "hal/ethercat-can/ethercat/link.hpp"
 #include "hal/ethercat-can/frame_wait.hpp"
+#include "hal/ethercat-can/line/link.hpp"
 #include "hal/sim/emulated_robot.hpp"
 
 namespace tandem::sim {

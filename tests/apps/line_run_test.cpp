@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "ethercat/datagram.hpp"
-#include "hal/ethercat-can/ethercat/packet_link.hpp"
+#include "hal/ethercat-can/line/packet_link.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/ethercat/own_network.hpp"
 #include "tests/hil/process.hpp"

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "base/own_system_call.hpp"
-#include "hal/ethercat-can/ethercat/packet_link.hpp"
+#include "hal/ethercat-can/line/packet_link.hpp"
 #include "tests/ethercat/master_rig.hpp"
 #include "tests/ethercat/own_network.hpp"
 #include "tests/support/needs_root.hpp"

@@ -1,10 +1,10 @@
 // The master's SDO client against an emulated slave, with frames lost at every place.
-#include "hal/ethercat-can/ethercat/coe_client.hpp"
+#include "hal/ethercat-can/line/coe_client.hpp"
 
 #include <gtest/gtest.h>
 
-#include "hal/ethercat-can/ethercat/in_process_link.hpp"
-#include "hal/ethercat-can/ethercat/slave_plan.hpp"
+#include "hal/ethercat-can/line/in_process_link.hpp"
+#include "hal/ethercat-can/line/slave_plan.hpp"
 #include "tests/ethercat/line_rig.hpp"
 
 namespace tandem::test {

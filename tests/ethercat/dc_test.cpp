@@ -3,7 +3,7 @@
 
 #include <cstdlib>
 
-#include "firmware_emu/ethercat/dc_clock.hpp"
+#include "firmware_emu/slaves/dc_clock.hpp"
 #include "tests/ethercat/line_rig.hpp"
 
 namespace tandem::test {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "ethercat/datagram.hpp"
-#include "firmware_emu/ethercat/slave_line.hpp"
+#include "firmware_emu/slaves/slave_line.hpp"
 
 namespace tandem::test {
 

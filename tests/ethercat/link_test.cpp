@@ -8,8 +8,8 @@
 #include <array>
 #include <cstdlib>
 
-#include "hal/ethercat-can/ethercat/in_process_link.hpp"
-#include "hal/ethercat-can/ethercat/packet_link.hpp"
+#include "hal/ethercat-can/line/in_process_link.hpp"
+#include "hal/ethercat-can/line/packet_link.hpp"
 #include "tests/ethercat/line_rig.hpp"
 #include "tests/ethercat/own_network.hpp"
 #include "tests/support/needs_root.hpp"

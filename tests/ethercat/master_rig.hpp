@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "hal/ethercat-can/ethercat/in_process_link.hpp"
-#include "hal/ethercat-can/ethercat/line_master.hpp"
+#include "hal/ethercat-can/line/in_process_link.hpp"
+#include "hal/ethercat-can/line/line_master.hpp"
 #include "rt/scoped_realtime.hpp"
 #include "tests/ethercat/line_rig.hpp"
 

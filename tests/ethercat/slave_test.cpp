@@ -1,5 +1,5 @@
 // The emulated slave's application: states and their codes, SDOs, process data, archive.
-#include "firmware_emu/ethercat/slave.hpp"
+#include "firmware_emu/slaves/slave.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,9 +5,9 @@
 #include <atomic>
 #include <thread>
 
-#include "hal/ethercat-can/ethercat/in_process_link.hpp"
-#include "hal/ethercat-can/ethercat/line_survey.hpp"
-#include "hal/ethercat-can/ethercat/packet_link.hpp"
+#include "hal/ethercat-can/line/in_process_link.hpp"
+#include "hal/ethercat-can/line/line_survey.hpp"
+#include "hal/ethercat-can/line/packet_link.hpp"
 #include "rt/clock.hpp"
 #include "tests/ethercat/master_rig.hpp"
 #include "tests/ethercat/own_network.hpp"

@@ -7,7 +7,7 @@
 
 #include "canopen/messages.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
-#include "hal/ethercat-can/ethercat/loopback_link.hpp"
+#include "hal/ethercat-can/line/loopback_link.hpp"
 #include "hal/ethercat-can/loopback.hpp"
 #include "tests/hal/fake_backend.hpp"
 

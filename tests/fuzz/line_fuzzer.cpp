@@ -10,7 +10,7 @@
 
 #include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
-#include "hal/ethercat-can/ethercat/loopback_link.hpp"
+#include "hal/ethercat-can/line/loopback_link.hpp"
 #include "hal/ethercat-can/line_bus.hpp"
 #include "hal/sim/line_boards.hpp"
 #include "tests/fuzz/require.hpp"

@@ -9,7 +9,7 @@
 #include "ethercat/mailbox.hpp"
 #include "ethercat/registers.hpp"
 #include "hal/ethercat-can/drive_use.hpp"
-#include "hal/ethercat-can/ethercat/loopback_link.hpp"
+#include "hal/ethercat-can/line/loopback_link.hpp"
 #include "hal/ethercat-can/pdo_layout.hpp"
 #include "hal/sim/line_boards.hpp"
 #include "tests/sim/swing_loop.hpp"

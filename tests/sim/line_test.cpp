@@ -1,7 +1,7 @@
 // The swing with its board and sensors on an EtherCAT line, in process.
 #include "base/archive.hpp"
-#include "hal/ethercat-can/ethercat/in_process_link.hpp"
-#include "hal/ethercat-can/ethercat/loopback_link.hpp"
+#include "hal/ethercat-can/line/in_process_link.hpp"
+#include "hal/ethercat-can/line/loopback_link.hpp"
 #include "tests/ethercat/line_rig.hpp"
 #include "tests/ethercat/spoilt_memory.hpp"
 #include "tests/sim/swing_loop.hpp"
