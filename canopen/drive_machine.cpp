@@ -27,57 +27,58 @@ bool disables_operation(std::uint16_t word) noexcept {
 
 }  // namespace
 
-const char* to_string(DriveState state) noexcept {
+const char* to_string(DriveMachineState state) noexcept {
   switch (state) {
-    case DriveState::kNotReadyToSwitchOn: return "not ready to switch on";
-    case DriveState::kSwitchOnDisabled: return "switch on disabled";
-    case DriveState::kReadyToSwitchOn: return "ready to switch on";
-    case DriveState::kSwitchedOn: return "switched on";
-    case DriveState::kOperationEnabled: return "operation enabled";
-    case DriveState::kQuickStopActive: return "quick stop active";
-    case DriveState::kFaultReactionActive: return "fault reaction active";
-    case DriveState::kFault: return "fault";
+    case DriveMachineState::kNotReadyToSwitchOn: return "not ready to switch on";
+    case DriveMachineState::kSwitchOnDisabled: return "switch on disabled";
+    case DriveMachineState::kReadyToSwitchOn: return "ready to switch on";
+    case DriveMachineState::kSwitchedOn: return "switched on";
+    case DriveMachineState::kOperationEnabled: return "operation enabled";
+    case DriveMachineState::kQuickStopActive: return "quick stop active";
+    case DriveMachineState::kFaultReactionActive: return "fault reaction active";
+    case DriveMachineState::kFault: return "fault";
   }
   return "unknown";
 }
 
-DriveState drive_state(std::uint16_t word) noexcept TANDEM_RT {
+DriveMachineState drive_state(std::uint16_t word) noexcept TANDEM_RT {
   switch (word & 0x4F) {
-    case 0x40: return DriveState::kSwitchOnDisabled;
-    case 0x0F: return DriveState::kFaultReactionActive;
-    case 0x08: return DriveState::kFault;
+    case 0x40: return DriveMachineState::kSwitchOnDisabled;
+    case 0x0F: return DriveMachineState::kFaultReactionActive;
+    case 0x08: return DriveMachineState::kFault;
     default: break;
   }
   switch (word & 0x6F) {
-    case 0x21: return DriveState::kReadyToSwitchOn;
-    case 0x23: return DriveState::kSwitchedOn;
-    case 0x27: return DriveState::kOperationEnabled;
-    case 0x07: return DriveState::kQuickStopActive;
-    default: return DriveState::kNotReadyToSwitchOn;
+    case 0x21: return DriveMachineState::kReadyToSwitchOn;
+    case 0x23: return DriveMachineState::kSwitchedOn;
+    case 0x27: return DriveMachineState::kOperationEnabled;
+    case 0x07: return DriveMachineState::kQuickStopActive;
+    default: return DriveMachineState::kNotReadyToSwitchOn;
   }
 }
 
-std::uint16_t controlword_towards_enabled(DriveState state) noexcept TANDEM_RT {
+std::uint16_t controlword_towards_enabled(DriveMachineState state) noexcept TANDEM_RT {
   switch (state) {
-    case DriveState::kSwitchOnDisabled: return kCommandShutdown;  // 2
-    case DriveState::kReadyToSwitchOn: return kCommandSwitchOn;   // 3
-    case DriveState::kSwitchedOn:                                 // 4
-    case DriveState::kOperationEnabled: return kCommandEnableOperation;
-    case DriveState::kNotReadyToSwitchOn:   // transition 1 is the drive's own
-    case DriveState::kQuickStopActive:      // transition 12
-    case DriveState::kFaultReactionActive:  // transition 14 is the drive's own
-    case DriveState::kFault: return kCommandDisableVoltage;
+    case DriveMachineState::kSwitchOnDisabled: return kCommandShutdown;  // 2
+    case DriveMachineState::kReadyToSwitchOn: return kCommandSwitchOn;   // 3
+    case DriveMachineState::kSwitchedOn:                                 // 4
+    case DriveMachineState::kOperationEnabled: return kCommandEnableOperation;
+    case DriveMachineState::kNotReadyToSwitchOn:   // transition 1 is the drive's own
+    case DriveMachineState::kQuickStopActive:      // transition 12
+    case DriveMachineState::kFaultReactionActive:  // transition 14 is the drive's own
+    case DriveMachineState::kFault: return kCommandDisableVoltage;
   }
   return kCommandDisableVoltage;
 }
 
-DriveState DriveMachine::step(std::uint16_t word, const DriveInputs& inputs,
-                              const DriveOptions& options) noexcept TANDEM_RT {
+DriveMachineState DriveMachine::step(std::uint16_t word, const DriveInputs& inputs,
+                                     const DriveOptions& options) noexcept TANDEM_RT {
   fault_was_reset_ = false;
-  const bool in_fault = state_ == DriveState::kFault || state_ == DriveState::kFaultReactionActive;
+  const bool in_fault =
+      state_ == DriveMachineState::kFault || state_ == DriveMachineState::kFaultReactionActive;
   if (inputs.fault && !in_fault) {  // transition 13
     const bool powered = motion_ != DriveMotion::kNone;
-    enter(DriveState::kFaultReactionActive);
+    enter(DriveMachineState::kFaultReactionActive);
     if (powered && options.fault_reaction == 1) motion_ = DriveMotion::kSlowDown;
     if (powered && options.fault_reaction == 2) motion_ = DriveMotion::kQuickStop;
     if (powered && options.fault_reaction == -1) motion_ = DriveMotion::kShorted;
@@ -93,38 +94,41 @@ DriveState DriveMachine::step(std::uint16_t word, const DriveInputs& inputs,
 void DriveMachine::follow(std::uint16_t word, const DriveInputs& inputs,
                           const DriveOptions& options) noexcept {
   switch (state_) {
-    case DriveState::kNotReadyToSwitchOn: enter(DriveState::kSwitchOnDisabled); break;  // 1
-    case DriveState::kSwitchOnDisabled:
-      if (shuts_down(word)) enter(DriveState::kReadyToSwitchOn);  // 2
+    case DriveMachineState::kNotReadyToSwitchOn:
+      enter(DriveMachineState::kSwitchOnDisabled);
+      break;  // 1
+    case DriveMachineState::kSwitchOnDisabled:
+      if (shuts_down(word)) enter(DriveMachineState::kReadyToSwitchOn);  // 2
       break;
-    case DriveState::kReadyToSwitchOn:
+    case DriveMachineState::kReadyToSwitchOn:
       if (disables_voltage(word) || quick_stops(word)) {
-        enter(DriveState::kSwitchOnDisabled);  // 7
+        enter(DriveMachineState::kSwitchOnDisabled);  // 7
       } else if (switches_on(word)) {
-        enter(DriveState::kSwitchedOn);  // 3
+        enter(DriveMachineState::kSwitchedOn);  // 3
       }
       break;
-    case DriveState::kSwitchedOn:
+    case DriveMachineState::kSwitchedOn:
       if (disables_voltage(word) || quick_stops(word)) {
-        enter(DriveState::kSwitchOnDisabled);  // 10
+        enter(DriveMachineState::kSwitchOnDisabled);  // 10
       } else if (shuts_down(word)) {
-        enter(DriveState::kReadyToSwitchOn);  // 6
+        enter(DriveMachineState::kReadyToSwitchOn);  // 6
       } else if (!enables(word)) {
         motion_ = DriveMotion::kNone;
       } else if (!inputs.has_brake || (!brake_set_ && inputs.brake_moved)) {
-        enter(DriveState::kOperationEnabled);  // 4
+        enter(DriveMachineState::kOperationEnabled);  // 4
       } else {
         motion_ = DriveMotion::kSlowDown;  // holds while the brake opens
       }
       break;
-    case DriveState::kOperationEnabled: from_enabled(word, inputs, options); break;
-    case DriveState::kQuickStopActive: from_quick_stop(word, inputs, options); break;
-    case DriveState::kFaultReactionActive:
-      if (motion_ == DriveMotion::kNone || stop_ended(inputs)) enter(DriveState::kFault);  // 14
+    case DriveMachineState::kOperationEnabled: from_enabled(word, inputs, options); break;
+    case DriveMachineState::kQuickStopActive: from_quick_stop(word, inputs, options); break;
+    case DriveMachineState::kFaultReactionActive:
+      if (motion_ == DriveMotion::kNone || stop_ended(inputs))
+        enter(DriveMachineState::kFault);  // 14
       break;
-    case DriveState::kFault:
+    case DriveMachineState::kFault:
       if ((word & kFaultReset) != 0 && !last_reset_bit_ && !inputs.fault) {
-        enter(DriveState::kSwitchOnDisabled);  // 15
+        enter(DriveMachineState::kSwitchOnDisabled);  // 15
         fault_was_reset_ = true;
       }
       break;
@@ -134,15 +138,15 @@ void DriveMachine::follow(std::uint16_t word, const DriveInputs& inputs,
 void DriveMachine::from_enabled(std::uint16_t word, const DriveInputs& inputs,
                                 const DriveOptions& options) noexcept {
   if (disables_voltage(word)) {
-    enter(DriveState::kSwitchOnDisabled);  // 9
+    enter(DriveMachineState::kSwitchOnDisabled);  // 9
   } else if (quick_stops(word)) {
     quick_stop(options);  // 11
-  } else if (after_ramp_ != DriveState::kOperationEnabled) {
+  } else if (after_ramp_ != DriveMachineState::kOperationEnabled) {
     if (ramp_ended(inputs)) enter(after_ramp_);  // 5 or 8 ends
   } else if (shuts_down(word)) {
-    slow_down_to(DriveState::kReadyToSwitchOn, options.shutdown);  // 8
+    slow_down_to(DriveMachineState::kReadyToSwitchOn, options.shutdown);  // 8
   } else if (disables_operation(word)) {
-    slow_down_to(DriveState::kSwitchedOn, options.disable_operation);  // 5
+    slow_down_to(DriveMachineState::kSwitchedOn, options.disable_operation);  // 5
   } else if ((word & kHalt) != 0) {
     motion_ = options.halt == 2 ? DriveMotion::kQuickStop : DriveMotion::kSlowDown;
   } else {
@@ -154,9 +158,9 @@ void DriveMachine::from_quick_stop(std::uint16_t word, const DriveInputs& inputs
                                    const DriveOptions& options) noexcept {
   const bool stays = options.quick_stop >= 5;
   if (disables_voltage(word) || (!stays && stop_ended(inputs))) {
-    enter(DriveState::kSwitchOnDisabled);  // 12
+    enter(DriveMachineState::kSwitchOnDisabled);  // 12
   } else if (stays && enables(word)) {
-    enter(DriveState::kOperationEnabled);  // 16
+    enter(DriveMachineState::kOperationEnabled);  // 16
   }
 }
 
@@ -173,9 +177,9 @@ bool DriveMachine::ramp_ended(const DriveInputs& inputs) const noexcept {
 }
 
 void DriveMachine::command_brake(const DriveInputs& inputs, const DriveOptions& options) noexcept {
-  const bool ramp = state_ == DriveState::kFaultReactionActive ||
-                    (state_ == DriveState::kQuickStopActive && options.quick_stop < 5) ||
-                    after_ramp_ != DriveState::kOperationEnabled;
+  const bool ramp = state_ == DriveMachineState::kFaultReactionActive ||
+                    (state_ == DriveMachineState::kQuickStopActive && options.quick_stop < 5) ||
+                    after_ramp_ != DriveMachineState::kOperationEnabled;
   if (motion_ == DriveMotion::kNone || (ramp && inputs.at_rest)) {
     brake_set_ = true;
   } else if (!ramp) {
@@ -185,10 +189,10 @@ void DriveMachine::command_brake(const DriveInputs& inputs, const DriveOptions& 
 
 void DriveMachine::quick_stop(const DriveOptions& options) noexcept {
   if (options.quick_stop == 0) {
-    enter(DriveState::kSwitchOnDisabled);
+    enter(DriveMachineState::kSwitchOnDisabled);
     return;
   }
-  enter(DriveState::kQuickStopActive);
+  enter(DriveMachineState::kQuickStopActive);
   switch (options.quick_stop) {
     case 1:
     case 5: motion_ = DriveMotion::kSlowDown; break;
@@ -197,7 +201,7 @@ void DriveMachine::quick_stop(const DriveOptions& options) noexcept {
   }
 }
 
-void DriveMachine::slow_down_to(DriveState state, std::int16_t option) noexcept {
+void DriveMachine::slow_down_to(DriveMachineState state, std::int16_t option) noexcept {
   if (option == 0) {
     enter(state);
     return;
@@ -208,22 +212,23 @@ void DriveMachine::slow_down_to(DriveState state, std::int16_t option) noexcept 
 
 void DriveMachine::abort_connection(std::int16_t option,
                                     const DriveOptions& options) noexcept TANDEM_RT {
-  if (state_ != DriveState::kOperationEnabled) return;
-  if (option == 2) enter(DriveState::kSwitchOnDisabled);
+  if (state_ != DriveMachineState::kOperationEnabled) return;
+  if (option == 2) enter(DriveMachineState::kSwitchOnDisabled);
   if (option == 3) quick_stop(options);
 }
 
-void DriveMachine::enter(DriveState state) noexcept {
+void DriveMachine::enter(DriveMachineState state) noexcept {
   state_ = state;
-  after_ramp_ = DriveState::kOperationEnabled;
-  motion_ = state == DriveState::kOperationEnabled ? DriveMotion::kFollow : DriveMotion::kNone;
+  after_ramp_ = DriveMachineState::kOperationEnabled;
+  motion_ =
+      state == DriveMachineState::kOperationEnabled ? DriveMotion::kFollow : DriveMotion::kNone;
 }
 
 /// Halt, or a quick stop that waits for a command.
 bool DriveMachine::stop_stays(const DriveOptions& options) const noexcept {
-  if (state_ == DriveState::kQuickStopActive) return options.quick_stop >= 5;
-  return state_ == DriveState::kOperationEnabled && motion_ != DriveMotion::kFollow &&
-         after_ramp_ == DriveState::kOperationEnabled;
+  if (state_ == DriveMachineState::kQuickStopActive) return options.quick_stop >= 5;
+  return state_ == DriveMachineState::kOperationEnabled && motion_ != DriveMotion::kFollow &&
+         after_ramp_ == DriveMachineState::kOperationEnabled;
 }
 
 void DriveMachine::compose_statusword(const DriveInputs& inputs,
@@ -231,27 +236,29 @@ void DriveMachine::compose_statusword(const DriveInputs& inputs,
   using namespace statusword;
   std::uint16_t word = kRemote | kVoltageEnabled;
   switch (state_) {
-    case DriveState::kNotReadyToSwitchOn: break;
-    case DriveState::kSwitchOnDisabled: word |= kSwitchOnDisabled; break;
-    case DriveState::kReadyToSwitchOn: word |= kReadyToSwitchOn | statusword::kQuickStop; break;
-    case DriveState::kSwitchedOn:
+    case DriveMachineState::kNotReadyToSwitchOn: break;
+    case DriveMachineState::kSwitchOnDisabled: word |= kSwitchOnDisabled; break;
+    case DriveMachineState::kReadyToSwitchOn:
+      word |= kReadyToSwitchOn | statusword::kQuickStop;
+      break;
+    case DriveMachineState::kSwitchedOn:
       word |= kReadyToSwitchOn | kSwitchedOn | statusword::kQuickStop;
       break;
-    case DriveState::kOperationEnabled:
+    case DriveMachineState::kOperationEnabled:
       word |= kReadyToSwitchOn | kSwitchedOn | kOperationEnabled | statusword::kQuickStop;
       break;
-    case DriveState::kQuickStopActive:
+    case DriveMachineState::kQuickStopActive:
       word |= kReadyToSwitchOn | kSwitchedOn | kOperationEnabled;
       break;
-    case DriveState::kFaultReactionActive:
+    case DriveMachineState::kFaultReactionActive:
       word |= kReadyToSwitchOn | kSwitchedOn | kOperationEnabled | statusword::kFault;
       break;
-    case DriveState::kFault: word |= statusword::kFault; break;
+    case DriveMachineState::kFault: word |= statusword::kFault; break;
   }
   if (inputs.warning) word |= kWarning;
   if (inputs.internal_limit) word |= kInternalLimit;
   if (inputs.standstill && stop_stays(options)) word |= kTargetReached;
-  if (state_ == DriveState::kOperationEnabled) {
+  if (state_ == DriveMachineState::kOperationEnabled) {
     if (inputs.follows_command && motion_ == DriveMotion::kFollow) word |= kFollowsCommand;
     if (inputs.target_reached && motion_ == DriveMotion::kFollow) word |= kTargetReached;
     if (inputs.following_error) word |= statusword::kFollowingError;

@@ -14,7 +14,7 @@ class Archive;
 namespace tandem::canopen {
 
 /// Numbered as the images and the log number them, where 0 is a drive that was not heard yet.
-enum class DriveState : std::uint8_t {
+enum class DriveMachineState : std::uint8_t {
   kNotReadyToSwitchOn = 1,  ///< statusword x0xx 0000
   kSwitchOnDisabled,        ///< x1xx 0000
   kReadyToSwitchOn,         ///< x01x 0001
@@ -24,15 +24,15 @@ enum class DriveState : std::uint8_t {
   kFaultReactionActive,     ///< x0xx 1111
   kFault,                   ///< x0xx 1000
 };
-[[nodiscard]] const char* to_string(DriveState state) noexcept;
+[[nodiscard]] const char* to_string(DriveMachineState state) noexcept;
 
 /// The state in a statusword; bits 4, 7 to 15 play no part. A pattern of no state (none
 /// is sent by a conforming drive) counts as kNotReadyToSwitchOn.
-[[nodiscard]] DriveState drive_state(std::uint16_t statusword) noexcept TANDEM_RT;
+[[nodiscard]] DriveMachineState drive_state(std::uint16_t statusword) noexcept TANDEM_RT;
 
 /// The controlword that brings a drive one transition nearer to Operation Enabled, from any state
 /// but a fault; in Fault 0x0000, so that fault reset gets its rising edge.
-[[nodiscard]] std::uint16_t controlword_towards_enabled(DriveState state) noexcept TANDEM_RT;
+[[nodiscard]] std::uint16_t controlword_towards_enabled(DriveMachineState state) noexcept TANDEM_RT;
 
 /// What the drive has to do with its motor.
 enum class DriveMotion : std::uint8_t {
@@ -85,12 +85,12 @@ class DriveMachine {
  public:
   /// Takes the controlword in force, makes the transition that it or the inputs ask for.
   /// A fault reset is a rising edge of bit 7 and works only when `inputs.fault` is gone.
-  DriveState step(std::uint16_t controlword, const DriveInputs& inputs,
-                  const DriveOptions& options) noexcept TANDEM_RT;
+  DriveMachineState step(std::uint16_t controlword, const DriveInputs& inputs,
+                         const DriveOptions& options) noexcept TANDEM_RT;
   /// The loss of the connection, as option code 6007 has it: 2 disable voltage, 3 quick stop.
   void abort_connection(std::int16_t option, const DriveOptions& options) noexcept TANDEM_RT;
 
-  [[nodiscard]] DriveState state() const noexcept { return state_; }
+  [[nodiscard]] DriveMachineState state() const noexcept { return state_; }
   [[nodiscard]] DriveMotion motion() const noexcept { return motion_; }
   /// Whether the brake is to hold: its coil has no current.
   [[nodiscard]] bool brake_set() const noexcept { return brake_set_; }
@@ -110,16 +110,17 @@ class DriveMachine {
   void from_quick_stop(std::uint16_t controlword, const DriveInputs& inputs,
                        const DriveOptions& options) noexcept;
   void quick_stop(const DriveOptions& options) noexcept;
-  void slow_down_to(DriveState state, std::int16_t option) noexcept;
-  void enter(DriveState state) noexcept;
+  void slow_down_to(DriveMachineState state, std::int16_t option) noexcept;
+  void enter(DriveMachineState state) noexcept;
   [[nodiscard]] bool stop_stays(const DriveOptions& options) const noexcept;
   [[nodiscard]] bool stop_ended(const DriveInputs& inputs) noexcept;
   [[nodiscard]] bool ramp_ended(const DriveInputs& inputs) const noexcept;
   void command_brake(const DriveInputs& inputs, const DriveOptions& options) noexcept;
   void compose_statusword(const DriveInputs& inputs, const DriveOptions& options) noexcept;
 
-  DriveState state_ = DriveState::kNotReadyToSwitchOn;
-  DriveState after_ramp_ = DriveState::kOperationEnabled;  ///< where a ramp in progress leads
+  DriveMachineState state_ = DriveMachineState::kNotReadyToSwitchOn;
+  DriveMachineState after_ramp_ =
+      DriveMachineState::kOperationEnabled;  ///< where a ramp in progress leads
   DriveMotion motion_ = DriveMotion::kNone;
   bool last_reset_bit_ = true;  ///< a bit that is set from the beginning is no edge
   bool fault_was_reset_ = false;

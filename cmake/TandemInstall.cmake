@@ -27,7 +27,7 @@ set(TANDEM_PLUGIN_HEADERS
   hal/state_fields.inc
   hal/trapezoid.hpp
   model/kernels.h
-  model/loop_spec.hpp)
+  model/kinematic_loop.hpp)
 
 # tandem_install(): to be called when every target is there. The program looks for its parts beside
 # itself, in ../lib and ../share, whatever a system calls its folders.

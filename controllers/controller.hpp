@@ -156,9 +156,9 @@ inline constexpr std::uint32_t kControllerInterface = 14;
 inline constexpr std::uint32_t kControllerAbi =
     kControllerInterface << 16 |
     hash_of({sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::Robot),
-             sizeof(hal::Joint), sizeof(hal::PassiveJoint), sizeof(hal::Follower),
+             sizeof(hal::DrivenJoint), sizeof(hal::PassiveJoint), sizeof(hal::Follower),
              sizeof(hal::Sensor), sizeof(hal::Site), sizeof(hal::Foot), sizeof(hal::Posture),
-             sizeof(model::LoopSpec), sizeof(hal::StateImage), sizeof(hal::EstimateImage),
+             sizeof(model::KinematicLoop), sizeof(hal::StateImage), sizeof(hal::EstimateImage),
              sizeof(hal::CommandImage), sizeof(hal::ParameterImage), sizeof(hal::Prediction),
              sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels)});
 

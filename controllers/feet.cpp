@@ -15,7 +15,7 @@ namespace tandem {
 namespace {
 
 /// Middle, shape and axis from the points: their spread along its principal axes.
-void describe(Foot& foot) {
+void describe(FootContact& foot) {
   using Vector3 = Eigen::Vector3d;
   const auto count = static_cast<double>(foot.points_m.size());
   Vector3 middle = Vector3::Zero();
@@ -47,35 +47,37 @@ std::vector<std::string> foot_names(const hal::Robot& robot) {
   return names;
 }
 
-Result<std::vector<Foot>> find_feet(const hal::Robot& robot, const tandem_kernels& kernels,
-                                    std::span<const std::string> names) {
+Result<std::vector<FootContact>> find_feet(const hal::Robot& robot, const tandem_kernels& kernels,
+                                           std::span<const std::string> names) {
   if (names.empty()) {
     return fail("the robot has no foot to stand on",
                 "give each a [[contact.foot]] in " + robot.file + ": its site and its points");
   }
-  std::vector<Foot> feet;
+  std::vector<FootContact> feet;
   for (const std::string& name : names) {
     const auto found = std::ranges::find(robot.feet, name, &hal::Foot::site);
     if (found == robot.feet.end()) {
       return fail("the robot has no foot '" + name + "'", suggest(name, foot_names(robot)));
     }
-    if (std::ranges::find(feet, name, &Foot::name) != feet.end()) {
+    if (std::ranges::find(feet, name, &FootContact::name) != feet.end()) {
       return fail("the foot '" + name + "' stands twice", "name it once");
     }
     const Result<std::size_t> site = site_index(kernels, name);
     if (!site) return std::unexpected(site.error());
-    Foot& foot = feet.emplace_back(Foot{.name = name, .site = *site, .points_m = found->points_m});
+    FootContact& foot =
+        feet.emplace_back(FootContact{.name = name, .site = *site, .points_m = found->points_m});
     if (foot.points_m.empty()) foot.points_m.emplace_back();
     describe(foot);
   }
   return feet;
 }
 
-GroundFrame ground_under(std::span<const Foot> feet,
+GroundFrame ground_under(std::span<const FootContact> feet,
                          std::span<const double> pose) noexcept TANDEM_RT {
   using Eigen::Vector3d;
   using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const auto in_frame = [&](const Foot& foot, const std::array<double, 3>& point) -> Vector3d {
+  const auto in_frame = [&](const FootContact& foot,
+                            const std::array<double, 3>& point) -> Vector3d {
     const Eigen::Map<const RowMajor3> R(&pose[12 * foot.site]);
     return R * Eigen::Map<const Vector3d>(point.data()) +
            Eigen::Map<const Vector3d>(&pose[12 * foot.site + 9]);
@@ -83,7 +85,7 @@ GroundFrame ground_under(std::span<const Foot> feet,
   GroundFrame ground{Eigen::Matrix3d::Identity(), Vector3d::Zero()};
   Vector3d middle = Vector3d::Zero();
   double count = 0.0;
-  for (const Foot& foot : feet) {
+  for (const FootContact& foot : feet) {
     ground.origin_m += in_frame(foot, foot.middle_m) / static_cast<double>(feet.size());
     for (const auto& point : foot.points_m) {
       middle += in_frame(foot, point);
@@ -92,7 +94,7 @@ GroundFrame ground_under(std::span<const Foot> feet,
   }
   middle /= count;
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const Foot& foot : feet) {
+  for (const FootContact& foot : feet) {
     for (const auto& point : foot.points_m) {
       const Vector3d from = in_frame(foot, point) - middle;
       spread += from * from.transpose() / count;

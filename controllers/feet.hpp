@@ -24,7 +24,7 @@ enum class FootShape : std::uint8_t {
 };
 
 /// One [[contact.foot]]. Points, middle and axis stand in the site's frame.
-struct Foot {
+struct FootContact {
   std::string name;      ///< of its site
   std::size_t site = 0;  ///< among the kernels' sites
   std::vector<std::array<double, 3>> points_m;
@@ -39,9 +39,9 @@ inline constexpr double kFootExtent_m = 0.005;
 /// The feet of these names, in their order.
 /// Errors: no name at all, one that is no [[contact.foot]], one twice, a site that the kernels
 /// lack.
-[[nodiscard]] Result<std::vector<Foot>> find_feet(const hal::Robot& robot,
-                                                  const tandem_kernels& kernels,
-                                                  std::span<const std::string> names);
+[[nodiscard]] Result<std::vector<FootContact>> find_feet(const hal::Robot& robot,
+                                                         const tandem_kernels& kernels,
+                                                         std::span<const std::string> names);
 
 /// The names of every [[contact.foot]], in the file's order.
 [[nodiscard]] std::vector<std::string> foot_names(const hal::Robot& robot);
@@ -58,7 +58,7 @@ struct GroundFrame {
 ///
 /// @param pose  (12 * sites) of the kernels, with the base along the frame
 /// @rt    no allocation, lock or throw.
-[[nodiscard]] GroundFrame ground_under(std::span<const Foot> feet,
+[[nodiscard]] GroundFrame ground_under(std::span<const FootContact> feet,
                                        std::span<const double> pose) noexcept TANDEM_RT;
 
 }  // namespace tandem

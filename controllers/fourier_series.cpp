@@ -58,7 +58,7 @@ void FourierSeries::check(ControllerSetup& setup, TomlTable& first,
                           const std::vector<std::size_t>& joints) const {
   const bool known = !setup.start_position_rad.empty();
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    const hal::Joint& joint = setup.robot.joints[joints[j]];
+    const hal::DrivenJoint& joint = setup.robot.joints[joints[j]];
     const double start = known ? setup.start_position_rad[joints[j]] : 0.0;
     double low = 0.0, high = 0.0, fastest = 0.0;
     for (int i = 0; i < kChecked; ++i) {

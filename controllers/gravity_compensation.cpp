@@ -56,7 +56,7 @@ class GravityCompensation : public Controller {
   void start(const hal::CycleTime& time, const hal::StateImage& state,
              hal::CommandImage&) noexcept TANDEM_RT override {
     start_ns_ = time.time_ns;
-    for (Joint& joint : joints_) {
+    for (ClaimedJoint& joint : joints_) {
       joint.position_rad = state.position_rad()[joint.index];
       joint.torque_Nm = state.torque_Nm()[joint.index];
     }
@@ -67,7 +67,7 @@ class GravityCompensation : public Controller {
     weigh(state);
     const double since_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
     const double share = min_jerk(since_s / ramp_s_).s;
-    for (const Joint& joint : joints_) {
+    for (const ClaimedJoint& joint : joints_) {
       const std::size_t j = joint.index;
       const double weight = tau_[map_.v_index(j)];
       if (compliant_) command.position_rad()[j] = joint.position_rad;
@@ -82,7 +82,7 @@ class GravityCompensation : public Controller {
   void archive(Archive& ar) override { ar(start_ns_, joints_, q_); }
 
  private:
-  struct Joint {
+  struct ClaimedJoint {
     std::size_t index = 0;
     double stiffness_Nm_rad = 0.0;
     double damping_Nms_rad = 0.0;
@@ -94,7 +94,7 @@ class GravityCompensation : public Controller {
     if (kernels_->floating_base == 0) return {};
     const std::vector<std::string> names =
         setup.parameters.texts_or("feet", foot_names(setup.robot));
-    const Result<std::vector<Foot>> feet = find_feet(setup.robot, *kernels_, names);
+    const Result<std::vector<FootContact>> feet = find_feet(setup.robot, *kernels_, names);
     if (!feet) return std::unexpected(feet.error());
     support_.emplace(*feet);
     for (std::size_t i = 0; i < setup.robot.sensors.size(); ++i) {
@@ -108,7 +108,7 @@ class GravityCompensation : public Controller {
   }
 
   void claim_joints(ControllerSetup& setup) {
-    const std::vector<hal::Joint>& limits = setup.robot.joints;
+    const std::vector<hal::DrivenJoint>& limits = setup.robot.joints;
     // Negative: the key is missing, each joint has its own.
     const double stiffness = setup.parameters.number_or("stiffness_Nm_rad", -1.0, kNotNegative);
     const double damping = setup.parameters.number_or("damping_Nms_rad", -1.0, kNotNegative);
@@ -118,9 +118,10 @@ class GravityCompensation : public Controller {
       } else {
         setup.claim(j, hal::ControlMode::kTorque);
       }
-      Joint joint{.index = j,
-                  .stiffness_Nm_rad = stiffness < 0.0 ? limits[j].stiffness_Nm_rad : stiffness,
-                  .damping_Nms_rad = damping < 0.0 ? limits[j].damping_Nms_rad : damping};
+      ClaimedJoint joint{
+          .index = j,
+          .stiffness_Nm_rad = stiffness < 0.0 ? limits[j].stiffness_Nm_rad : stiffness,
+          .damping_Nms_rad = damping < 0.0 ? limits[j].damping_Nms_rad : damping};
       joints_.push_back(joint);
       if (joint.stiffness_Nm_rad > limits[j].max_stiffness_Nm_rad) {
         setup.parameters.error("stiffness_Nm_rad", "is too much for joint '" + limits[j].name + "'",
@@ -191,7 +192,7 @@ class GravityCompensation : public Controller {
   bool compliant_ = true;
   double ramp_s_ = 1.0;
   std::int64_t start_ns_ = 0;
-  std::vector<Joint> joints_;
+  std::vector<ClaimedJoint> joints_;
   std::vector<double> q_, rest_, tau_, pose_, twist_, J_;
 };
 

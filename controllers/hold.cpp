@@ -23,7 +23,7 @@ class Hold : public Controller {
       moves_.push_back({joint, 0.0, 0.0});
       if (posture_ == nullptr) continue;  // start() makes the measured position the target
       const double target = moves_.back().to_rad = posture_->position_rad.at(joint);
-      const hal::Joint& limit = setup.robot.joints[joint];
+      const hal::DrivenJoint& limit = setup.robot.joints[joint];
       if (target < limit.min_position_rad || target > limit.max_position_rad) {
         setup.parameters.error("posture", "is beyond the limits of joint '" + limit.name + "'",
                                "choose another posture, or leave the joint out of `joints`");

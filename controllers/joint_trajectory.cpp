@@ -63,7 +63,7 @@ class JointTrajectory : public Controller {
     check_ends(tables);
     if (!planned_start_) {  // the measured positions, at the start
       times_s_.insert(times_s_.begin(), 0.0);
-      points_.insert(points_.begin(), joints_.size(), Motion{});
+      points_.insert(points_.begin(), joints_.size(), TrajectoryPoint{});
     }
     const bool known = !setup.start_position_rad.empty();  // else it is left to the limits
     if (known && !tables.empty() && !incomplete_) begin_at(setup.start_position_rad);
@@ -102,8 +102,9 @@ class JointTrajectory : public Controller {
     const std::size_t last = times_s_.size() - 1;
     while (segment_ < last && plan_s >= times_s_[segment_ + 1]) ++segment_;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
-      const Motion now = segment_ == last ? Motion{point(last, k).position, 0.0, 0.0}
-                                          : at(segment_, k, plan_s - times_s_[segment_]);
+      const TrajectoryPoint now = segment_ == last
+                                      ? TrajectoryPoint{point(last, k).position, 0.0, 0.0}
+                                      : at(segment_, k, plan_s - times_s_[segment_]);
       command.position_rad()[joints_[k]] = now.position + turned_rad_[k];
       command.velocity_rad_s()[joints_[k]] = now.velocity;
     }
@@ -236,9 +237,9 @@ class JointTrajectory : public Controller {
     } else if (!first && time_s < times_s_.back()) {
       table.error("time_s", "is not later than the way-point before", "sort them by time");
     }
-    std::vector<const hal::Joint*> beyond;
+    std::vector<const hal::DrivenJoint*> beyond;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
-      const hal::Joint& joint = limits_[k];
+      const hal::DrivenJoint& joint = limits_[k];
       if (wraps_ && each_has_one) positions[k] = turned(k, positions[k]);
       if (each_has_one &&
           (positions[k] < joint.min_position_rad || positions[k] > joint.max_position_rad)) {
@@ -247,7 +248,7 @@ class JointTrajectory : public Controller {
       points_.push_back({positions[k], velocities[k], accelerations[k]});
     }
     if (!beyond.empty()) {
-      const hal::Joint& one = *beyond.front();
+      const hal::DrivenJoint& one = *beyond.front();
       const std::string others = beyond.size() == 1 ? " leaves its limits"
                                                     : " and " + std::to_string(beyond.size() - 1) +
                                                           " more leave their limits";
@@ -260,7 +261,7 @@ class JointTrajectory : public Controller {
 
   /// The angle by whole turns that is nearest to the way-point before, and within the limits.
   double turned(std::size_t k, double rad) {
-    const hal::Joint& limit = limits_[k];
+    const hal::DrivenJoint& limit = limits_[k];
     if (!limit.slides && !times_s_.empty()) {
       const double before = point(times_s_.size() - 1, k).position;
       const double nearest = rad + kTurn_rad * std::round((before - rad) / kTurn_rad);
@@ -288,7 +289,7 @@ class JointTrajectory : public Controller {
     const auto moves = [&](std::size_t i) {
       const auto at = points_.begin() + static_cast<std::ptrdiff_t>(i * joints_.size());
       return std::any_of(at, at + static_cast<std::ptrdiff_t>(joints_.size()),
-                         [](const Motion& one) { return one.velocity != 0.0; });
+                         [](const TrajectoryPoint& one) { return one.velocity != 0.0; });
     };
     if (planned_start_ && moves(0)) {
       tables.front().error("velocity_rad_s", "the plan begins in motion, the joints at rest",
@@ -319,11 +320,11 @@ class JointTrajectory : public Controller {
     double fastest = 0.0;
     bool inside = true;
   };
-  Way way_of(const hal::Joint& joint, std::size_t segment, std::size_t k) {
+  Way way_of(const hal::DrivenJoint& joint, std::size_t segment, std::size_t k) {
     const double duration = times_s_[segment + 1] - times_s_[segment];
     Way way;
     for (int i = 0; i <= kSamples; ++i) {
-      const Motion now = at(segment, k, duration * i / kSamples);
+      const TrajectoryPoint now = at(segment, k, duration * i / kSamples);
       way.fastest = std::max(way.fastest, std::abs(now.velocity));
       const double position = now.position + turned_rad_[k];
       way.inside =
@@ -340,7 +341,7 @@ class JointTrajectory : public Controller {
     double worst = 1.0;  // of the limit
     std::string text;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
-      const hal::Joint& joint = setup.robot.joints[joints_[k]];
+      const hal::DrivenJoint& joint = setup.robot.joints[joints_[k]];
       const Way way = way_of(joint, segment, k);
       const double share = way.fastest / joint.max_velocity_rad_s;
       if (share > 1.0) ++too_fast;
@@ -383,12 +384,13 @@ class JointTrajectory : public Controller {
     return text;
   }
 
-  [[nodiscard]] Motion& point(std::size_t i, std::size_t k) noexcept {
+  [[nodiscard]] TrajectoryPoint& point(std::size_t i, std::size_t k) noexcept {
     return points_[i * joints_.size() + k];
   }
-  [[nodiscard]] Motion at(std::size_t segment, std::size_t k, double t_s) noexcept TANDEM_RT {
+  [[nodiscard]] TrajectoryPoint at(std::size_t segment, std::size_t k,
+                                   double t_s) noexcept TANDEM_RT {
     const double duration = times_s_[segment + 1] - times_s_[segment];
-    const Motion &from = point(segment, k), &to = point(segment + 1, k);
+    const TrajectoryPoint &from = point(segment, k), &to = point(segment + 1, k);
     if (with_acceleration_.value_or(false)) return quintic_through(from, to, duration, t_s);
     if (with_velocity_.value_or(false)) return cubic(from, to, duration, t_s);
     return quintic(from, to, duration, t_s);
@@ -406,10 +408,10 @@ class JointTrajectory : public Controller {
   // Mistakes at way-points; those between them follow from these.
   Mistake wrong_number_, beyond_;
   std::vector<std::size_t> joints_;
-  std::vector<hal::Joint> limits_;                // of these
+  std::vector<hal::DrivenJoint> limits_;          // of these
   std::vector<double> lowest_rad_, highest_rad_;  // of the way-points, where angles wrap around
   std::vector<double> times_s_;                   // of every point, the start at 0 first
-  std::vector<Motion> points_;                    // per time, per joint
+  std::vector<TrajectoryPoint> points_;           // per time, per joint
   std::vector<double> here_rad_;                  // where the joints were at the start
   std::vector<double> turned_rad_;                // by which the path is turned
   double approach_s_ = 0.0;                       // to a planned start

@@ -24,7 +24,7 @@ Result<ModelMap> ModelMap::make(const hal::Robot& robot, const tandem_kernels* k
   const std::vector<std::string> model = names_of(kernels->joint_names, kernels->joints);
   ModelMap map;
   map.base_ = kernels->floating_base != 0 ? 6 : 0;
-  for (const hal::Joint& joint : robot.joints) {
+  for (const hal::DrivenJoint& joint : robot.joints) {
     const auto found = std::ranges::find(model, joint.name);
     if (found == model.end()) {
       return fail(

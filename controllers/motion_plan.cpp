@@ -29,7 +29,7 @@ double line(const std::vector<double>& values, std::size_t i, double share) {
 }
 
 /// Position and velocity of the cubic from sample `i` to the next, at `share` of the way.
-Motion cubic(const log::JointTrack& track, std::size_t i, double share) {
+TrajectoryPoint cubic(const log::JointTrack& track, std::size_t i, double share) {
   if (share == 0.0) return {track.position_rad[i], slope(track, i), 0.0};
   const double T = static_cast<double>(track.time_ns[i + 1] - track.time_ns[i]) * 1e-9;
   const double p = track.position_rad[i], way = track.position_rad[i + 1] - p;
@@ -39,9 +39,9 @@ Motion cubic(const log::JointTrack& track, std::size_t i, double share) {
   return {p + x * (m0 + x * (b + x * c)), (m0 + x * (2.0 * b + x * 3.0 * c)) / T, 0.0};
 }
 
-std::unexpected<Error> beyond(const hal::Joint& joint, const std::string& when, const char* what,
-                              double value, double low, double high, const char* unit,
-                              std::string hint) {
+std::unexpected<Error> beyond(const hal::DrivenJoint& joint, const std::string& when,
+                              const char* what, double value, double low, double high,
+                              const char* unit, std::string hint) {
   char text[200];
   std::snprintf(text, sizeof text, " would %s %.6g %s %s, its limits are %.6g and %.6g", what,
                 value, unit, when.c_str(), low, high);
@@ -105,7 +105,7 @@ void MotionPlan::sample(const log::JointTrack& track, std::size_t joint, std::in
       share = static_cast<double>(t_ns - track.time_ns[i]) /
               static_cast<double>(track.time_ns[i + 1] - track.time_ns[i]);
     }
-    const Motion now = cubic(track, i, share);
+    const TrajectoryPoint now = cubic(track, i, share);
     const std::size_t at = (run_up_ + cycle) * joints_ + joint;
     position_rad_[at] = now.position;
     velocity_rad_s_[at] =
@@ -126,18 +126,19 @@ void MotionPlan::ramp(std::size_t joint, double rest_rad_s) {
     return std::abs(speed) > rest_rad_s ? speed : 0.0;
   };
   const double from = position(joint, first), to = position(joint, last);
-  const Motion begin{from, moving(position(joint, first + over) - from), 0.0};
-  const Motion end{to, moving(to - position(joint, last - over)), 0.0};
-  const Motion before{begin.position - 0.5 * ramp_s * begin.velocity, 0.0, 0.0};
-  const Motion after{end.position + 0.5 * ramp_s * end.velocity, 0.0, 0.0};
-  const auto put = [&](std::size_t cycle, const Motion& now, std::size_t torque_of) {
+  const TrajectoryPoint begin{from, moving(position(joint, first + over) - from), 0.0};
+  const TrajectoryPoint end{to, moving(to - position(joint, last - over)), 0.0};
+  const TrajectoryPoint before{begin.position - 0.5 * ramp_s * begin.velocity, 0.0, 0.0};
+  const TrajectoryPoint after{end.position + 0.5 * ramp_s * end.velocity, 0.0, 0.0};
+  const auto put = [&](std::size_t cycle, const TrajectoryPoint& now, std::size_t torque_of) {
     position_rad_[cycle * joints_ + joint] = now.position;
     velocity_rad_s_[cycle * joints_ + joint] = now.velocity;
     if (has_torque()) torque_Nm_[cycle * joints_ + joint] = torque(joint, torque_of);
   };
   for (std::size_t k = 0; k < run_up_; ++k) {
     put(k, quintic(before, begin, ramp_s, static_cast<double>(k) * period_s_), first);
-    const Motion down = quintic(end, after, ramp_s, static_cast<double>(k + 1) * period_s_);
+    const TrajectoryPoint down =
+        quintic(end, after, ramp_s, static_cast<double>(k + 1) * period_s_);
     put(last + 1 + k, k + 1 == run_up_ ? after : down, last);
   }
 }
@@ -158,7 +159,7 @@ std::string MotionPlan::when(const log::JointMotion& motion, std::size_t cycle) 
   return text;
 }
 
-Status MotionPlan::check(const log::JointMotion& motion, const hal::Joint& limits,
+Status MotionPlan::check(const log::JointMotion& motion, const hal::DrivenJoint& limits,
                          std::size_t joint) const {
   const char* const unit = limits.slides ? "m" : "rad";
   const char* const speed_unit = limits.slides ? "m/s" : "rad/s";
@@ -190,7 +191,7 @@ Status MotionPlan::check(const log::JointMotion& motion, const hal::Joint& limit
   return {};
 }
 
-double approach_time_s(double way_rad, const hal::Joint& joint) noexcept TANDEM_RT {
+double approach_time_s(double way_rad, const hal::DrivenJoint& joint) noexcept TANDEM_RT {
   constexpr double kPeakAcceleration = 5.7736;  // 10 / sqrt 3: of the profile, by way / T^2
   constexpr double kPeakJerk = 60.0;            // by way / T^3
   const double way = std::abs(way_rad);

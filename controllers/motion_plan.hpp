@@ -57,7 +57,7 @@ class MotionPlan {
   void ramp(std::size_t joint, double rest_rad_s);
   /// Where a cycle is in the recording, or how long before or after it.
   [[nodiscard]] std::string when(const log::JointMotion& motion, std::size_t cycle) const;
-  [[nodiscard]] Status check(const log::JointMotion& motion, const hal::Joint& limits,
+  [[nodiscard]] Status check(const log::JointMotion& motion, const hal::DrivenJoint& limits,
                              std::size_t joint) const;
 
   std::size_t joints_ = 0, cycles_ = 0, run_up_ = 0, recorded_ = 0;
@@ -68,6 +68,7 @@ class MotionPlan {
 
 /// How long a minimum-jerk motion takes that uses at most half of a joint's speed, and no more than
 /// what it declares of acceleration and jerk.
-[[nodiscard]] double approach_time_s(double way_rad, const hal::Joint& joint) noexcept TANDEM_RT;
+[[nodiscard]] double approach_time_s(double way_rad,
+                                     const hal::DrivenJoint& joint) noexcept TANDEM_RT;
 
 }  // namespace tandem

@@ -9,7 +9,7 @@ namespace tandem {
 
 std::vector<std::string> joint_names(const hal::Robot& robot) {
   std::vector<std::string> names;
-  for (const hal::Joint& joint : robot.joints) names.push_back(joint.name);
+  for (const hal::DrivenJoint& joint : robot.joints) names.push_back(joint.name);
   return names;
 }
 

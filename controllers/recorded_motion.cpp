@@ -168,7 +168,7 @@ class RecordedMotion : public Controller {
   }
 
   std::vector<std::size_t> joints_;
-  std::vector<hal::Joint> limits_;
+  std::vector<hal::DrivenJoint> limits_;
   std::vector<double> link_damping_Nms_rad_;  // by joint, as `joints_`
   MotionPlan plan_;
   double approach_s_ = 0.0, speed_ = 1.0;

@@ -7,7 +7,7 @@
 namespace tandem {
 
 /// Position, velocity and acceleration at one instant.
-struct Motion {
+struct TrajectoryPoint {
   double position = 0.0;
   double velocity = 0.0;
   double acceleration = 0.0;
@@ -17,8 +17,8 @@ struct Motion {
 /// acceleration there. At rest at both ends it is the minimum-jerk profile.
 ///
 /// @param t_s  0 to duration_s
-[[nodiscard]] inline Motion quintic(const Motion& from, const Motion& to, double duration_s,
-                                    double t_s) noexcept TANDEM_RT {
+[[nodiscard]] inline TrajectoryPoint quintic(const TrajectoryPoint& from, const TrajectoryPoint& to,
+                                             double duration_s, double t_s) noexcept TANDEM_RT {
   const double T = duration_s;
   const double x = t_s / T;
   const double way = to.position - from.position;
@@ -33,13 +33,15 @@ struct Motion {
 }
 
 /// The same with the accelerations of both ends: what a planner's points say.
-[[nodiscard]] inline Motion quintic_through(const Motion& from, const Motion& to, double duration_s,
-                                            double t_s) noexcept TANDEM_RT {
+[[nodiscard]] inline TrajectoryPoint quintic_through(const TrajectoryPoint& from,
+                                                     const TrajectoryPoint& to, double duration_s,
+                                                     double t_s) noexcept TANDEM_RT {
   const double T = duration_s;
   const double x = t_s / T;
   const double a0 = from.acceleration * T * T / 2.0, a1 = to.acceleration * T * T / 2.0;
-  const Motion bent{a0, 2.0 * a0 / T, 0.0};  // at the end, of a0 x^2, whose rest quintic() makes
-  const Motion rest =
+  const TrajectoryPoint bent{a0, 2.0 * a0 / T,
+                             0.0};  // at the end, of a0 x^2, whose rest quintic() makes
+  const TrajectoryPoint rest =
       quintic({from.position, from.velocity, 0.0},
               {to.position - bent.position, to.velocity - bent.velocity, 0.0}, T, t_s);
   // x^3 (x - 1)^2 is at rest at both ends, and its acceleration is 2 at the second.
@@ -50,8 +52,8 @@ struct Motion {
 }
 
 /// The third-order polynomial that meets position and velocity at both ends.
-[[nodiscard]] inline Motion cubic(const Motion& from, const Motion& to, double duration_s,
-                                  double t_s) noexcept TANDEM_RT {
+[[nodiscard]] inline TrajectoryPoint cubic(const TrajectoryPoint& from, const TrajectoryPoint& to,
+                                           double duration_s, double t_s) noexcept TANDEM_RT {
   const double T = duration_s;
   const double x = t_s / T;
   const double way = to.position - from.position;

@@ -249,7 +249,7 @@ class Squat : public Controller {
     stance_->carry(vdot_);
     const ModelMap& map = stance_->map();
     for (std::size_t j = 0; j < map.joints(); ++j) {
-      const hal::Joint& joint = robot.joints[j];
+      const hal::DrivenJoint& joint = robot.joints[j];
       const double q = stance_->q()[map.q_index(j)];
       if (q < joint.min_position_rad || q > joint.max_position_rad) {
         return "joint '" + joint.name + "' leaves its limits";

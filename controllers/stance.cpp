@@ -81,7 +81,7 @@ Matrix3d shortest_turn(const Vector3d& from, const Vector3d& to) noexcept TANDEM
 
 }  // namespace
 
-Stance::Stance(const tandem_kernels& kernels, ModelMap map, std::vector<Foot> feet)
+Stance::Stance(const tandem_kernels& kernels, ModelMap map, std::vector<FootContact> feet)
     : kernels_(&kernels),
       sines_(kernels),
       map_(std::move(map)),
@@ -105,7 +105,7 @@ Result<Stance> Stance::make(const hal::Robot& robot, const tandem_kernels* kerne
   if (kernels->floating_base == 0) {
     return fail("only a robot with a floating base stands on feet", "choose another controller");
   }
-  Result<std::vector<Foot>> found = find_feet(robot, *kernels, feet);
+  Result<std::vector<FootContact>> found = find_feet(robot, *kernels, feet);
   if (!found) return std::unexpected(found.error());
   Stance stance(*kernels, std::move(*map), std::move(*found));
   if (const Status legs = stance.find_legs(robot); !legs) return std::unexpected(legs.error());
@@ -215,7 +215,7 @@ double Stance::place(std::span<const double> position_rad) noexcept TANDEM_RT {
 
 /// Where foot `i` is turned to on the ground: as it is, but level.
 void Stance::level(std::size_t i, const Matrix3d& base_G) noexcept TANDEM_RT {
-  const Foot& foot = feet_[i];
+  const FootContact& foot = feet_[i];
   Matrix3d turn = base_G.transpose() * rotation(pose_, foot.site);
   Vector3d across = Vector3d::UnitX();
   if (foot.shape != FootShape::kPoint) {

@@ -93,7 +93,7 @@ class Stance {
     std::array<double, 3> across{};      ///< to a line, level
   };
 
-  Stance(const tandem_kernels& kernels, ModelMap map, std::vector<Foot> feet);
+  Stance(const tandem_kernels& kernels, ModelMap map, std::vector<FootContact> feet);
   [[nodiscard]] Status find_legs(const hal::Robot& robot);
   [[nodiscard]] std::vector<Row> all_rows() const;
   void choose(const std::vector<std::size_t>& columns);
@@ -111,7 +111,7 @@ class Stance {
   const tandem_kernels* kernels_;
   model::Sines sines_;
   ModelMap map_;
-  std::vector<Foot> feet_;
+  std::vector<FootContact> feet_;
   Support support_;
   std::vector<Placed> placed_;
   std::vector<Row> rows_;                        // that are solved

@@ -28,8 +28,8 @@ Vector2d solve(const Eigen::Matrix2d& S, const Vector2d& e) noexcept TANDEM_RT {
 
 }  // namespace
 
-Support::Support(std::span<const Foot> feet) {
-  for (const Foot& foot : feet) {
+Support::Support(std::span<const FootContact> feet) {
+  for (const FootContact& foot : feet) {
     for (const auto& point : foot.points_m) {
       points_.push_back({.foot = sites_.size(),
                          .weight = 1.0 / static_cast<double>(foot.points_m.size()),

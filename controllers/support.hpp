@@ -25,7 +25,7 @@ namespace tandem {
 class Support {
  public:
   /// @param feet  at least one
-  explicit Support(std::span<const Foot> feet);
+  explicit Support(std::span<const FootContact> feet);
 
   /// Takes the ground's share out of inverse dynamics: the wrench on the base, which no motor can
   /// give, must come from the ground.

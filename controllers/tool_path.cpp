@@ -247,7 +247,7 @@ class ToolPath : public Controller {
       if (std::abs(move_[k]) > most) share = std::min(share, most / std::abs(move_[k]));
     }
     for (std::size_t k = 0; k < joints_.size(); ++k) {
-      const hal::Joint& joint = robot_->joints[joints_[k]];
+      const hal::DrivenJoint& joint = robot_->joints[joints_[k]];
       double& reference = reference_[joints_[k]];
       double& move = move_[static_cast<Eigen::Index>(k)];
       const double to = std::clamp(reference + share * move, joint.min_position_rad,

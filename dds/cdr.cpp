@@ -76,28 +76,28 @@ class Cursor {
 
 Value::Message message(Cursor& cursor, const MessageDefinition& definition);
 
-Value element(Cursor& cursor, const Field& field) {
+Value element(Cursor& cursor, const MessageField& field) {
   switch (field.type) {
-    case FieldType::kMessage: return {message(cursor, *field.message)};
-    case FieldType::kInt8: return {std::int64_t{cursor.number<std::int8_t>()}};
-    case FieldType::kInt16: return {std::int64_t{cursor.number<std::int16_t>()}};
-    case FieldType::kInt32: return {std::int64_t{cursor.number<std::int32_t>()}};
-    case FieldType::kInt64: return {cursor.number<std::int64_t>()};
-    case FieldType::kByte:
-    case FieldType::kUint8: return {std::uint64_t{cursor.number<std::uint8_t>()}};
-    case FieldType::kUint16: return {std::uint64_t{cursor.number<std::uint16_t>()}};
-    case FieldType::kUint32: return {std::uint64_t{cursor.number<std::uint32_t>()}};
-    case FieldType::kUint64: return {cursor.number<std::uint64_t>()};
-    case FieldType::kFloat32: return {double{cursor.number<float>()}};
-    case FieldType::kFloat64: return {cursor.number<double>()};
-    case FieldType::kBool: return {cursor.boolean()};
-    case FieldType::kString:
-    case FieldType::kBoundedString: return {cursor.text(field.string_capacity)};
+    case MessageFieldType::kMessage: return {message(cursor, *field.message)};
+    case MessageFieldType::kInt8: return {std::int64_t{cursor.number<std::int8_t>()}};
+    case MessageFieldType::kInt16: return {std::int64_t{cursor.number<std::int16_t>()}};
+    case MessageFieldType::kInt32: return {std::int64_t{cursor.number<std::int32_t>()}};
+    case MessageFieldType::kInt64: return {cursor.number<std::int64_t>()};
+    case MessageFieldType::kByte:
+    case MessageFieldType::kUint8: return {std::uint64_t{cursor.number<std::uint8_t>()}};
+    case MessageFieldType::kUint16: return {std::uint64_t{cursor.number<std::uint16_t>()}};
+    case MessageFieldType::kUint32: return {std::uint64_t{cursor.number<std::uint32_t>()}};
+    case MessageFieldType::kUint64: return {cursor.number<std::uint64_t>()};
+    case MessageFieldType::kFloat32: return {double{cursor.number<float>()}};
+    case MessageFieldType::kFloat64: return {cursor.number<double>()};
+    case MessageFieldType::kBool: return {cursor.boolean()};
+    case MessageFieldType::kString:
+    case MessageFieldType::kBoundedString: return {cursor.text(field.string_capacity)};
   }
   return {};
 }
 
-Value field_value(Cursor& cursor, const Field& field) {
+Value field_value(Cursor& cursor, const MessageField& field) {
   if (field.repeat == Repeat::kOne) return element(cursor, field);
   std::uint64_t count = field.capacity;
   if (field.repeat != Repeat::kArray) {
@@ -128,7 +128,7 @@ Value::Message message(Cursor& cursor, const MessageDefinition& definition) {
   if (cursor.wire() == Wire::kRos1 && definition.name == "std_msgs/msg/Header") {
     (void)cursor.number<std::uint32_t>();
   }
-  for (const Field& field : definition.fields) {
+  for (const MessageField& field : definition.fields) {
     if (cursor.failed()) break;
     add(field.name, field_value(cursor, field));
   }

@@ -79,8 +79,8 @@ SecurityConfig read_security(TomlTable table, const std::string& folder) {
 }
 
 void read_every(TomlTable table, Config& config) {
-  for (std::size_t i = 0; i < kTopicRates.size(); ++i) {
-    const std::string_view key = kTopicRates[i].key;
+  for (std::size_t i = 0; i < kTopicPeriods.size(); ++i) {
+    const std::string_view key = kTopicPeriods[i].key;
     const std::int64_t cycles = table.integer_or(key, -1, 0, 1'000'000);  // -1: it is not there
     if (cycles >= 0) config.every[i] = static_cast<std::uint64_t>(cycles);
   }
@@ -154,7 +154,7 @@ void describe_keys(KeyPage& page) { page.add("[dds]", kKeys); }
 std::uint64_t Config::cycles_between(Topic topic, std::int64_t period_ns) const {
   const auto index = static_cast<std::size_t>(topic);
   if (every[index]) return *every[index];
-  const std::int64_t wanted = kTopicRates[index].default_ns;
+  const std::int64_t wanted = kTopicPeriods[index].default_ns;
   if (wanted == 0) return 0;
   return static_cast<std::uint64_t>(std::max<std::int64_t>(1, wanted / period_ns));
 }

@@ -42,11 +42,11 @@ enum class Topic : std::uint8_t {
   kStatistics,
   kParallel,  ///< of the robot beside this one, when there is one
 };
-struct TopicRate {
+struct TopicPeriod {
   std::string_view key;     ///< of [dds.every]
   std::int64_t default_ns;  ///< between two samples, unless the key says otherwise; 0: none
 };
-inline constexpr std::array<TopicRate, 12> kTopicRates{{
+inline constexpr std::array<TopicPeriod, 12> kTopicPeriods{{
     {"joint_states", 10'000'000},
     {"dynamic_joint_states", 0},
     {"imu", 10'000'000},
@@ -69,8 +69,8 @@ struct Config {
   std::vector<std::string> interfaces{"lo"};  ///< names or addresses of network interfaces
   std::vector<std::string> peers;             ///< addresses to look for others at, beside multicast
   SecurityConfig security;
-  /// [dds.every]: cycles of the loop between two samples, 0: none; empty: kTopicRates' default.
-  std::array<std::optional<std::uint64_t>, kTopicRates.size()> every;
+  /// [dds.every]: cycles of the loop between two samples, 0: none; empty: kTopicPeriods' default.
+  std::array<std::optional<std::uint64_t>, kTopicPeriods.size()> every;
 
   /// A sample of `topic` belongs to every cycle whose number this divides; 0: to none.
   [[nodiscard]] std::uint64_t cycles_between(Topic topic, std::int64_t period_ns) const;

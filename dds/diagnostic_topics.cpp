@@ -44,11 +44,11 @@ std::string percentiles(const rt::Histogram& histogram) {
 }
 
 /// diagnostic_msgs/DiagnosticStatus' levels.
-enum class Level : std::uint8_t { kOk = 0, kWarn = 1, kError = 2, kStale = 3 };
+enum class HealthLevel : std::uint8_t { kOk = 0, kWarn = 1, kError = 2, kStale = 3 };
 
 /// One status before it becomes a message.
 struct HealthStatus {
-  Level level = Level::kOk;
+  HealthLevel level = HealthLevel::kOk;
   std::string name, message, hardware_id;
   std::vector<std::pair<std::string, std::string>> values;
 };
@@ -82,7 +82,7 @@ DiagnosticTopics::DiagnosticTopics(OutputMaker& maker, const RunDescription& run
           maker.periodic<diagnostic_msgs::DiagnosticArray>(Topic::kDiagnostics, "diagnostics")) {}
 
 HealthStatus DiagnosticTopics::run(const CycleSample& sample) const {
-  HealthStatus status{.level = Level::kOk,
+  HealthStatus status{.level = HealthLevel::kOk,
                       .name = "tandem: run",
                       .message = hal::to_string(sample.phase),
                       .hardware_id = robot_.name,
@@ -97,16 +97,16 @@ HealthStatus DiagnosticTopics::run(const CycleSample& sample) const {
       status.message = fault.joint + (fault.joint.empty() ? "" : ": ") + fault.text;
     }
     const bool warned = fault.category == hal::StopCategory::kWarn;
-    status.level = std::max(status.level, warned ? Level::kWarn : Level::kError);
+    status.level = std::max(status.level, warned ? HealthLevel::kWarn : HealthLevel::kError);
   }
   status.values.emplace_back("latched faults", std::to_string(latched));
-  if (sample.phase == hal::RunPhase::kFaulted) status.level = Level::kError;
+  if (sample.phase == hal::RunPhase::kFaulted) status.level = HealthLevel::kError;
   return status;
 }
 
 HealthStatus DiagnosticTopics::loop(const CycleSample& sample) {
-  const LoopRecord& loop = sample.loop;
-  HealthStatus status{.level = Level::kOk,
+  const CycleRecord& loop = sample.loop;
+  HealthStatus status{.level = HealthLevel::kOk,
                       .name = "tandem: loop",
                       .message = "on time",
                       .hardware_id = robot_.name,
@@ -120,12 +120,12 @@ HealthStatus DiagnosticTopics::loop(const CycleSample& sample) {
     status.values.emplace_back("bus p50/p99/p99.9/max [us]", percentiles(loop.bus));
   }
   if (loop.dropped > told_dropped_) {
-    status.level = Level::kWarn;
+    status.level = HealthLevel::kWarn;
     status.message =
         fmt::format("{} cycles were not published: DDS is too slow", loop.dropped - told_dropped_);
   }
   if (loop.overruns > told_overruns_) {
-    status.level = Level::kWarn;
+    status.level = HealthLevel::kWarn;
     status.message = fmt::format("{} overruns", loop.overruns - told_overruns_);
   }
   told_dropped_ = loop.dropped;
@@ -140,7 +140,7 @@ HealthStatus DiagnosticTopics::joint(const CycleSample& sample, std::size_t inde
   const std::uint32_t age = state.age_cycles()[index];
   const double temperature_C = state.temperature_C()[index];
   HealthStatus status{
-      .level = Level::kOk,
+      .level = HealthLevel::kOk,
       .name = "tandem: joint " + config.name,
       .message = hal::to_string(drive),
       .hardware_id = config.board,
@@ -161,21 +161,21 @@ HealthStatus DiagnosticTopics::joint(const CycleSample& sample, std::size_t inde
   if (state.fault()[index] != 0 || fault != nullptr) {
     const bool warns = state.fault()[index] == 0 && age <= kStaleCycles &&
                        fault->category == hal::StopCategory::kWarn;
-    status.level = warns ? Level::kWarn : Level::kError;
+    status.level = warns ? HealthLevel::kWarn : HealthLevel::kError;
     status.message =
         fault == nullptr ? fmt::format("fault 0x{:04X}", state.fault()[index]) : fault->text;
   } else if (drive == hal::DriveState::kUnknown || age > kStaleCycles) {
-    status.level = Level::kStale;
+    status.level = HealthLevel::kStale;
     status.message = fmt::format("no feedback for {} cycles", age);
   } else if (tells_[index].temperature &&
              temperature_C >= kHotShare * config.drive.temperature_limit_C) {
-    status.level = Level::kWarn;
+    status.level = HealthLevel::kWarn;
     status.message = fmt::format("the winding is hot: {:.0f} of at most {:.0f} C", temperature_C,
                                  config.drive.temperature_limit_C);
   } else if (drive == hal::DriveState::kQuickStopActive) {
-    status.level = Level::kWarn;
+    status.level = HealthLevel::kWarn;
   } else if (homing == hal::HomingState::kNotHomed && config.homing && config.homing->required) {
-    status.level = Level::kWarn;
+    status.level = HealthLevel::kWarn;
     status.message += ", not homed";
   }
   return status;
@@ -184,16 +184,16 @@ HealthStatus DiagnosticTopics::joint(const CycleSample& sample, std::size_t inde
 HealthStatus DiagnosticTopics::sensor(const CycleSample& sample, std::size_t index) const {
   const hal::SensorConfig& config = robot_.sensors[index];
   const std::uint32_t age = sample.state.sensor_age_cycles()[index];
-  HealthStatus status{.level = Level::kOk,
+  HealthStatus status{.level = HealthLevel::kOk,
                       .name = "tandem: sensor " + config.name,
                       .message = "fresh",
                       .hardware_id = fmt::format("{} node {}", config.bus, config.node_id),
                       .values = {{"age [cycles]", std::to_string(age)}}};
   if (const FaultEntry* const fault = latched(sample.faults, config.name); fault != nullptr) {
-    status.level = Level::kError;
+    status.level = HealthLevel::kError;
     status.message = fault->text;
   } else if (age > kStaleCycles) {
-    status.level = Level::kStale;
+    status.level = HealthLevel::kStale;
     status.message = fmt::format("no feedback for {} cycles", age);
   }
   return status;
@@ -203,7 +203,7 @@ std::vector<HealthStatus> DiagnosticTopics::statuses(const CycleSample& sample) 
   std::vector<HealthStatus> joints, boards;
   for (std::size_t j = 0; j < robot_.joints.size(); ++j) joints.push_back(joint(sample, j));
   for (const hal::BoardConfig& board : robot_.boards) {
-    HealthStatus status{.level = Level::kOk,
+    HealthStatus status{.level = HealthLevel::kOk,
                         .name = "tandem: board " + board.name,
                         .message = "every axis is well",
                         .hardware_id = fmt::format("{} node {}", board.bus, board.node_id),

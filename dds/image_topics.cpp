@@ -130,7 +130,7 @@ void ImageTopics::publish_command(const CycleSample& sample) {
 }
 
 void ImageTopics::publish_statistics(const CycleSample& sample) {
-  const LoopRecord& loop = sample.loop;
+  const CycleRecord& loop = sample.loop;
   std::vector<Bin> wakeup, bus, work;
   tandem_msgs::LoopStatistics message{};
   message.run = run_;

@@ -16,17 +16,17 @@ namespace {
 
 struct Word {
   std::string_view text;
-  FieldType type;
+  MessageFieldType type;
 };
 
 constexpr std::array kWords{
-    Word{"bool", FieldType::kBool},       Word{"byte", FieldType::kByte},
-    Word{"char", FieldType::kUint8},      Word{"int8", FieldType::kInt8},
-    Word{"uint8", FieldType::kUint8},     Word{"int16", FieldType::kInt16},
-    Word{"uint16", FieldType::kUint16},   Word{"int32", FieldType::kInt32},
-    Word{"uint32", FieldType::kUint32},   Word{"int64", FieldType::kInt64},
-    Word{"uint64", FieldType::kUint64},   Word{"float32", FieldType::kFloat32},
-    Word{"float64", FieldType::kFloat64}, Word{"string", FieldType::kString},
+    Word{"bool", MessageFieldType::kBool},       Word{"byte", MessageFieldType::kByte},
+    Word{"char", MessageFieldType::kUint8},      Word{"int8", MessageFieldType::kInt8},
+    Word{"uint8", MessageFieldType::kUint8},     Word{"int16", MessageFieldType::kInt16},
+    Word{"uint16", MessageFieldType::kUint16},   Word{"int32", MessageFieldType::kInt32},
+    Word{"uint32", MessageFieldType::kUint32},   Word{"int64", MessageFieldType::kInt64},
+    Word{"uint64", MessageFieldType::kUint64},   Word{"float32", MessageFieldType::kFloat32},
+    Word{"float64", MessageFieldType::kFloat64}, Word{"string", MessageFieldType::kString},
 };
 
 bool is_name(std::string_view text) {
@@ -52,7 +52,7 @@ std::string_view trimmed(std::string_view text) {
 std::string_view package_of(std::string_view name) { return name.substr(0, name.find('/')); }
 
 /// "[]", "[<=3]", "[3]" at the end of a type; false when it is malformed.
-bool read_repeat(std::string_view& type, Field& field) {
+bool read_repeat(std::string_view& type, MessageField& field) {
   const auto open = type.find('[');
   if (open == std::string_view::npos) return true;
   if (type.back() != ']') return false;
@@ -70,10 +70,10 @@ bool read_repeat(std::string_view& type, Field& field) {
 }
 
 /// What stands before the brackets: "float64", "string<=8", "Wrench", "std_msgs/Header".
-bool read_element(std::string_view type, std::string_view package, Field& field) {
+bool read_element(std::string_view type, std::string_view package, MessageField& field) {
   constexpr std::string_view kBounded = "string<=";
   if (type.starts_with(kBounded)) {
-    field.type = FieldType::kBoundedString;
+    field.type = MessageFieldType::kBoundedString;
     field.string_capacity = number(type.substr(kBounded.size()));
     return field.string_capacity > 0;
   }
@@ -82,7 +82,7 @@ bool read_element(std::string_view type, std::string_view package, Field& field)
     field.type = word->type;
     return true;
   }
-  field.type = FieldType::kMessage;
+  field.type = MessageFieldType::kMessage;
   const auto slash = type.find('/');
   const std::string_view own = slash == std::string_view::npos ? package : type.substr(0, slash);
   const std::string_view message = slash == std::string_view::npos ? type : type.substr(slash + 1);
@@ -91,7 +91,7 @@ bool read_element(std::string_view type, std::string_view package, Field& field)
 }
 
 /// One line without its comment: a field, or false; a constant is none but well.
-Result<bool> read_line(std::string_view line, std::string_view package, Field& field) {
+Result<bool> read_line(std::string_view line, std::string_view package, MessageField& field) {
   const auto space = line.find_first_of(" \t");
   if (space == std::string_view::npos) return fail("a type without a name", "float64 x");
   std::string_view type = line.substr(0, space);
@@ -107,9 +107,10 @@ Result<bool> read_line(std::string_view line, std::string_view package, Field& f
 }
 
 /// ROS 2 gives a message without fields one, since IDL has no empty structure.
-Field placeholder() {
-  return {
-      .name = "structure_needs_at_least_one_member", .type = FieldType::kUint8, .message_name = {}};
+MessageField placeholder() {
+  return {.name = "structure_needs_at_least_one_member",
+          .type = MessageFieldType::kUint8,
+          .message_name = {}};
 }
 
 Result<MessageDefinition> read_message(std::string name, std::string_view text, int& line_number) {
@@ -120,7 +121,7 @@ Result<MessageDefinition> read_message(std::string name, std::string_view text, 
     text.remove_prefix(std::min(text.size(), line.size() + 1));
     const std::string_view content = trimmed(line.substr(0, line.find('#')));
     if (content.empty()) continue;
-    Field field{.name = {}, .type = FieldType::kBool, .message_name = {}};
+    MessageField field{.name = {}, .type = MessageFieldType::kBool, .message_name = {}};
     const Result<bool> is_field = read_line(content, package_of(message.name), field);
     if (!is_field) {
       Error error = is_field.error();
@@ -134,9 +135,9 @@ Result<MessageDefinition> read_message(std::string name, std::string_view text, 
   return message;
 }
 
-Field message_field(std::string name, std::string type, Repeat repeat = Repeat::kOne) {
+MessageField message_field(std::string name, std::string type, Repeat repeat = Repeat::kOne) {
   return {.name = std::move(name),
-          .type = FieldType::kMessage,
+          .type = MessageFieldType::kMessage,
           .repeat = repeat,
           .capacity = repeat == Repeat::kOne ? 0u : 1u,
           .message_name = std::move(type)};
@@ -160,7 +161,7 @@ void add_service(std::vector<MessageDefinition>& out, const std::string& name) {
 /// Every message in it, at any depth, once, in the order of their names.
 using References = std::map<std::string, const MessageDefinition*>;
 void collect(const MessageDefinition& definition, References& out) {
-  for (const Field& field : definition.fields) {
+  for (const MessageField& field : definition.fields) {
     if (field.message == nullptr || out.contains(field.message_name)) continue;
     out.emplace(field.message_name, field.message);
     collect(*field.message, out);
@@ -169,7 +170,7 @@ void collect(const MessageDefinition& definition, References& out) {
 
 std::string description(const MessageDefinition& definition) {
   std::string fields;
-  for (const Field& field : definition.fields) {
+  for (const MessageField& field : definition.fields) {
     fields += fmt::format(
         R"({}{{"name": "{}", "type": {{"type_id": {}, "capacity": {}, "string_capacity": {}, )"
         R"("nested_type_name": "{}"}}}})",
@@ -213,8 +214,8 @@ Result<std::vector<MessageDefinition>> parse_definition(std::string_view name,
 Status resolve(std::vector<MessageDefinition>& definitions) {
   std::ranges::sort(definitions, {}, &MessageDefinition::name);
   for (MessageDefinition& definition : definitions) {
-    for (Field& field : definition.fields) {
-      if (field.type != FieldType::kMessage) continue;
+    for (MessageField& field : definition.fields) {
+      if (field.type != MessageFieldType::kMessage) continue;
       const auto found =
           std::ranges::lower_bound(definitions, field.message_name, {}, &MessageDefinition::name);
       if (found == definitions.end() || found->name != field.message_name) {

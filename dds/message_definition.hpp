@@ -15,7 +15,7 @@
 namespace tandem::dds {
 
 /// What one element of a field is. The numbers are those of ROS 2's type descriptions.
-enum class FieldType : std::uint8_t {
+enum class MessageFieldType : std::uint8_t {
   kMessage = 1,
   kInt8 = 2,
   kUint8 = 3,
@@ -43,9 +43,9 @@ enum class Repeat : std::uint8_t {
 
 struct MessageDefinition;
 
-struct Field {
+struct MessageField {
   std::string name;
-  FieldType type;
+  MessageFieldType type;
   Repeat repeat = Repeat::kOne;
   std::uint64_t capacity = 0;         ///< elements: of an array; at most, of a bounded sequence
   std::uint64_t string_capacity = 0;  ///< characters at most, of a bounded string
@@ -55,9 +55,9 @@ struct Field {
 
 /// One message, or a service's request, response or event, or (of its three) a service.
 struct MessageDefinition {
-  std::string name;           ///< "sensor_msgs/msg/JointState"
-  std::string text;           ///< of the definition, without those that it needs
-  std::vector<Field> fields;  ///< in the order of the wire; never empty
+  std::string name;                  ///< "sensor_msgs/msg/JointState"
+  std::string text;                  ///< of the definition, without those that it needs
+  std::vector<MessageField> fields;  ///< in the order of the wire; never empty
   /// On the wire 16 bytes precede the fields: who asked, and the request's number.
   bool request_or_response = false;
 };

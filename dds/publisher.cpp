@@ -141,7 +141,7 @@ void Publisher::copy_due(const hal::CycleView& view, std::uint64_t number) noexc
   image_ring_.end_push();
 }
 
-void Publisher::start(FaultSource faults, hal::ParallelSource* parallel) {
+void Publisher::start(FaultFeed faults, hal::ParallelSource* parallel) {
   for (const auto& group : groups_) group->show(parallel);
   fault_source_ = std::move(faults);
   wall_offset_ns_ = wall_less_monotonic();

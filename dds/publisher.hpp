@@ -19,7 +19,7 @@
 namespace tandem::dds {
 
 /// Source of the run's faults; called on the publisher's thread.
-struct FaultSource {
+struct FaultFeed {
   std::function<std::uint64_t()>
       version;  ///< 0: there are none; another one: some have come or gone
   std::function<std::vector<FaultEntry>()> faults;
@@ -38,7 +38,7 @@ class Publisher final : public hal::CycleObserver {
 
   /// Publishes what does not change, and starts the thread.
   /// @param parallel  the second robot of RunDescription::parallel; null: there is none
-  void start(FaultSource faults, hal::ParallelSource* parallel = nullptr);
+  void start(FaultFeed faults, hal::ParallelSource* parallel = nullptr);
   /// Publishes what is in the ring, and ends the thread. Once, when no cycle comes any more.
   PublishCounts stop();
 
@@ -46,7 +46,7 @@ class Publisher final : public hal::CycleObserver {
   void take(const hal::CycleView& view) noexcept TANDEM_RT override;
 
  private:
-  static constexpr std::size_t kTopics = kTopicRates.size();
+  static constexpr std::size_t kTopics = kTopicPeriods.size();
   /// Record of every cycle.
   struct Times {
     std::uint64_t number;  // of take()'s calls
@@ -77,7 +77,7 @@ class Publisher final : public hal::CycleObserver {
   bool simulated_time_;
   std::array<std::uint64_t, kTopics> every_{};
   PublishCounts counts_;
-  LoopRecord loop_;
+  CycleRecord loop_;
   std::vector<std::unique_ptr<TopicGroup>> groups_;
   Output<rosgraph_msgs::Clock> clock_;
   std::optional<Error> error_;
@@ -91,7 +91,7 @@ class Publisher final : public hal::CycleObserver {
   SpscRing times_ring_, image_ring_;
   std::uint64_t taken_ = 0;  // the loop's
 
-  FaultSource fault_source_;
+  FaultFeed fault_source_;
   std::uint64_t fault_version_ = 0;
   std::vector<FaultEntry> faults_;
   std::int64_t clock_ns_ = 0;               // that `clock` publishes next

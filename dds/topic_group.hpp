@@ -50,7 +50,7 @@ struct RunDescription {
 };
 
 /// The loop's times, of every cycle so far.
-struct LoopRecord {
+struct CycleRecord {
   std::uint64_t cycles = 0;  ///< counted here
   std::uint64_t overruns = 0;
   std::uint64_t skipped = 0;
@@ -69,7 +69,7 @@ struct CycleSample {
   const hal::CommandImage& command;
   const hal::TruthImage* truth;        ///< null: none
   const hal::EstimateImage* estimate;  ///< null: none
-  const LoopRecord& loop;
+  const CycleRecord& loop;
   const std::vector<FaultEntry>& faults;
 
   [[nodiscard]] bool is_due(Topic topic) const {

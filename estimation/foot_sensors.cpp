@@ -89,7 +89,7 @@ Result<FootSensors> FootSensors::make(const hal::Robot& robot, const tandem_kern
   FootSensors feet;
   Probe probe(kernels);
   for (const hal::Foot& declared : robot.feet) {
-    Foot foot;
+    SensedFoot foot;
     foot.site = static_cast<std::size_t>(
         index_of(kernels.site_names, kernels.sites, declared.site));  // the plant has checked it
     foot.wrench =
@@ -131,7 +131,7 @@ Result<FootSensors> FootSensors::make(const hal::Robot& robot, const tandem_kern
 
 Wrench FootSensors::ground(std::size_t foot, const hal::StateImage& state,
                            const Eigen::Vector3d& gravity) const noexcept TANDEM_RT {
-  const Foot& one = feet_[foot];
+  const SensedFoot& one = feet_[foot];
   const Eigen::Map<const Wrench> reading(state.sensor_values(one.sensor).data());
   return one.from_sensor * (reading - one.weight * gravity);
 }

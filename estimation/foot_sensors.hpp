@@ -41,12 +41,12 @@ class FootSensors {
                               const Eigen::Vector3d& gravity) const noexcept TANDEM_RT;
 
  private:
-  struct Foot {
+  struct SensedFoot {
     std::size_t site = 0, wrench = 0, sensor = 0;  // sensor: of the image
     Eigen::Matrix<double, 6, 6> from_sensor;       // A^-1
     Eigen::Matrix<double, 6, 3> weight;            // G
   };
-  std::vector<Foot> feet_;
+  std::vector<SensedFoot> feet_;
 };
 
 }  // namespace tandem::estimation

@@ -28,7 +28,7 @@ Result<ModelJoints> ModelJoints::make(const hal::Robot& robot, const tandem_kern
   }
   if (!robot.passive.empty()) return std::unexpected(passive_joint(robot));
   ModelJoints map;
-  for (const hal::Joint& joint : robot.joints) {
+  for (const hal::DrivenJoint& joint : robot.joints) {
     const int at = index_of(kernels->joint_names, kernels->joints, joint.name);
     if (at < 0) {
       return fail(

@@ -207,26 +207,26 @@ void Axis::take_demands() noexcept {
 ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
   const bool follows =
       machine_.motion() == DriveMotion::kFollow && ProfileModes::cyclic(mode_) == Mode::kCsp;
-  const ErrorCode cause =
-      protection_.update(parameters_,
-                         {.link_position_rad = measured_.link_position_rad,
-                          .position_error_rad = controller_.terms().position_error_rad,
-                          .current_A = measured_.current_A,
-                          .temperature_C = temperature_C_,
-                          .bus_voltage_V = measured_.bus_voltage_V,
-                          .mismatch_rad = mismatch_rad(),
-                          .motor_torque_Nm = parameters_.motor_constant_Nm_A * measured_.current_A,
-                          .link_velocity_rad_s = measured_.link_velocity_rad_s,
-                          .motor_velocity_rad_s = measured_.motor_velocity_rad_s,
-                          .torque_Nm = measured_.torque_Nm,
-                          .deviation_rad_s = controller_.terms().deviation_rad_s,
-                          .asked_torque_Nm = controller_.terms().torque_reference_Nm,
-                          .follows_motion = controller_.follows_motion(),
-                          .sensors_valid = sensors_valid_,
-                          .powered = powered(),
-                          .drives = action() != Action::kOff && action() != Action::kBrake,
-                          .follows_position = follows},
-                         period_s_);
+  const ErrorCode cause = protection_.update(
+      parameters_,
+      {.link_position_rad = measured_.link_position_rad,
+       .position_error_rad = controller_.terms().position_error_rad,
+       .current_A = measured_.current_A,
+       .temperature_C = temperature_C_,
+       .bus_voltage_V = measured_.bus_voltage_V,
+       .mismatch_rad = mismatch_rad(),
+       .motor_torque_Nm = parameters_.motor_constant_Nm_A * measured_.current_A,
+       .link_velocity_rad_s = measured_.link_velocity_rad_s,
+       .motor_velocity_rad_s = measured_.motor_velocity_rad_s,
+       .torque_Nm = measured_.torque_Nm,
+       .deviation_rad_s = controller_.terms().deviation_rad_s,
+       .asked_torque_Nm = controller_.terms().torque_reference_Nm,
+       .follows_motion = controller_.follows_motion(),
+       .sensors_valid = sensors_valid_,
+       .powered = powered(),
+       .drives = action() != BridgeAction::kOff && action() != BridgeAction::kBrake,
+       .follows_position = follows},
+      period_s_);
   const bool interlock = (objects_.digital_inputs & canopen::digital_input::kInterlock) != 0;
   if (interlock) return ErrorCode::kEmergencyInput;
   if (cause != ErrorCode::kNone) return cause;
@@ -251,9 +251,9 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
   const ErrorCode cause = present_cause(connection);
   watch_stop();
   const bool profile = ProfileModes::has(mode_);
-  const DriveState before = machine_.state();
+  const DriveMachineState before = machine_.state();
   const bool brake_was_set = machine_.brake_set();
-  const DriveState now = machine_.step(
+  const DriveMachineState now = machine_.step(
       objects_.controlword,
       {.fault = cause != ErrorCode::kNone,
        .at_rest = stopped(),
@@ -273,9 +273,9 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
   // Once it rests, and whenever a reset is asked for, the fault is what is there now: it may be
   // another cause than the one that was found first. Of a connection the first loss is the cause.
   const bool asks = (objects_.controlword & canopen::controlword::kFaultReset) != 0;
-  const bool settled = now == DriveState::kFault && (before != now || asks) &&
+  const bool settled = now == DriveMachineState::kFault && (before != now || asks) &&
                        cause != ErrorCode::kNone && cause != connection;
-  if ((now == DriveState::kFaultReactionActive && before != now) ||
+  if ((now == DriveMachineState::kFaultReactionActive && before != now) ||
       (settled && objects_.error_code != static_cast<std::uint16_t>(cause))) {
     events.raised = cause;
     objects_.error_code = static_cast<std::uint16_t>(cause);
@@ -284,7 +284,7 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
     events.reset = true;
     objects_.error_code = 0;
   }
-  if (now == DriveState::kOperationEnabled && before != now) {
+  if (now == DriveMachineState::kOperationEnabled && before != now) {
     seed_references();
     profile_.forget_target();
   }
@@ -375,22 +375,23 @@ void Axis::watch_brake(bool was_set) noexcept {
   objects_.digital_outputs = shown ? canopen::digital_output::kSetBrake : 0;
 }
 
-Action Axis::action() const noexcept {
+BridgeAction Axis::action() const noexcept {
   switch (machine_.motion()) {
-    case DriveMotion::kNone: return Action::kOff;
-    case DriveMotion::kFollow: return mode_ == Mode::kNone ? Action::kBrake : Action::kFollow;
-    case DriveMotion::kSlowDown: return can_ramp() ? Action::kHold : Action::kBrake;
-    case DriveMotion::kQuickStop: return can_ramp() ? Action::kRamp : Action::kBrake;
-    case DriveMotion::kShorted: return Action::kBrake;
+    case DriveMotion::kNone: return BridgeAction::kOff;
+    case DriveMotion::kFollow:
+      return mode_ == Mode::kNone ? BridgeAction::kBrake : BridgeAction::kFollow;
+    case DriveMotion::kSlowDown: return can_ramp() ? BridgeAction::kHold : BridgeAction::kBrake;
+    case DriveMotion::kQuickStop: return can_ramp() ? BridgeAction::kRamp : BridgeAction::kBrake;
+    case DriveMotion::kShorted: return BridgeAction::kBrake;
   }
-  return Action::kOff;
+  return BridgeAction::kOff;
 }
 
 // A stop by the position loop needs its gain, the sensors and the supply, and a loop that is not
 // itself the fault.
 bool Axis::can_ramp() const noexcept {
   if (!sensors_valid_ || !(parameters_.position.kp > 0.0)) return false;
-  if (machine_.state() != DriveState::kFaultReactionActive) return true;
+  if (machine_.state() != DriveMachineState::kFaultReactionActive) return true;
   switch (static_cast<ErrorCode>(objects_.error_code)) {
     case ErrorCode::kPositionSensor:
     case ErrorCode::kSensorMismatch:
@@ -426,12 +427,12 @@ Reference Axis::reference() const noexcept {
 }
 
 AxisDrive Axis::control() noexcept TANDEM_RT {
-  const Action doing = action();
+  const BridgeAction doing = action();
   const double voltage_V =
       controller_.update(doing, ProfileModes::cyclic(mode_), reference(), measured_);
   show_controller();
   return {.voltage_V = voltage_V,
-          .enabled = doing != Action::kOff,
+          .enabled = doing != BridgeAction::kOff,
           .brake_open = !machine_.brake_set()};
 }
 

@@ -83,7 +83,7 @@ class Axis final : private canopen::ObjectOwner {
   /// By how much motor angle, link angle and the spring's torque contradict each other.
   [[nodiscard]] double mismatch_rad() const noexcept;
   [[nodiscard]] Reference reference() const noexcept;
-  [[nodiscard]] Action action() const noexcept;
+  [[nodiscard]] BridgeAction action() const noexcept;
   [[nodiscard]] bool can_ramp() const noexcept;
   [[nodiscard]] bool powered() const noexcept {
     return machine_.motion() != canopen::DriveMotion::kNone;

@@ -36,15 +36,15 @@ void JointController::configure(const canopen::DriveParameters& config,
 }
 
 bool JointController::cascaded() const noexcept {
-  if (action_ == Action::kHold || action_ == Action::kRamp) return true;
-  return action_ == Action::kFollow && mode_ != Mode::kOpenLoop && mode_ != Mode::kCurrent &&
+  if (action_ == BridgeAction::kHold || action_ == BridgeAction::kRamp) return true;
+  return action_ == BridgeAction::kFollow && mode_ != Mode::kOpenLoop && mode_ != Mode::kCurrent &&
          mode_ != Mode::kNone;
 }
 
-double JointController::update(Action action, Mode mode, const Reference& reference,
+double JointController::update(BridgeAction action, Mode mode, const Reference& reference,
                                const Measurement& measured) noexcept TANDEM_RT {
-  if (action == Action::kOff) {
-    action_ = Action::kOff;
+  if (action == BridgeAction::kOff) {
+    action_ = BridgeAction::kOff;
     mode_ = mode;
     terms_ = {};
     retuned_ = false;
@@ -52,11 +52,11 @@ double JointController::update(Action action, Mode mode, const Reference& refere
   }
   terms_.reference_limited = 0;
   terms_.torque_saturation = 0;
-  const bool change = action != action_ || (action == Action::kFollow && mode != mode_);
+  const bool change = action != action_ || (action == BridgeAction::kFollow && mode != mode_);
   double held_V = terms_.voltage_V;
   if (change) {
     // An open bridge shows the back-EMF at its terminals: that is the voltage without a current.
-    if (action_ == Action::kOff) {
+    if (action_ == BridgeAction::kOff) {
       held_V = config_.motor_constant_Nm_A * measured.motor_velocity_rad_s;
     }
     begin(action, mode, measured);
@@ -66,9 +66,9 @@ double JointController::update(Action action, Mode mode, const Reference& refere
     cascade(reference, measured, change, step);
   } else {
     terms_.torque_reference_Nm = 0.0;
-    if (action_ == Action::kFollow && mode_ == Mode::kCurrent) {
+    if (action_ == BridgeAction::kFollow && mode_ == Mode::kCurrent) {
       current_loop(reference.current_A, measured, step);
-    } else if (action_ == Action::kFollow && mode_ == Mode::kOpenLoop) {
+    } else if (action_ == BridgeAction::kFollow && mode_ == Mode::kOpenLoop) {
       step.voltage_V = reference.voltage_V;
     }
   }
@@ -84,7 +84,7 @@ double JointController::update(Action action, Mode mode, const Reference& refere
   return step.voltage_V;
 }
 
-void JointController::begin(Action action, Mode mode, const Measurement& measured) noexcept {
+void JointController::begin(BridgeAction action, Mode mode, const Measurement& measured) noexcept {
   if (!cascaded()) {  // the cascade starts from the torque that the spring carries now
     terms_.torque_reference_Nm = measured.torque_Nm;
     torque_.reset();
@@ -174,10 +174,10 @@ double JointController::impedance_torque(double position_rad, double velocity_ra
 JointController::Outer JointController::outer_loop(const Reference& reference,
                                                    const Measurement& measured) noexcept {
   terms_.position_error_rad = 0.0;
-  if (action_ == Action::kHold) {
+  if (action_ == BridgeAction::kHold) {
     return position_outer(terms_.held_position_rad, 0.0, reference.torque_Nm, measured);
   }
-  if (action_ == Action::kRamp) {
+  if (action_ == BridgeAction::kRamp) {
     advance_ramp();
     return position_outer(terms_.held_position_rad, terms_.ramp_velocity_rad_s, reference.torque_Nm,
                           measured);
@@ -206,7 +206,7 @@ void JointController::cascade(const Reference& reference, const Measurement& mea
   const double error_rad = terms_.position_error_rad;
   Outer& outer = step.outer;
   outer = outer_loop(reference, measured);
-  const bool by_velocity = action_ == Action::kFollow && mode_ == Mode::kCsv;
+  const bool by_velocity = action_ == BridgeAction::kFollow && mode_ == Mode::kCsv;
   const double approached_rad = change ? 0.0 : error_rad - terms_.position_error_rad;
   terms_.deviation_rad_s = by_velocity ? -outer.integrand : approached_rad / period_s_;
   if (change && outer.loop != nullptr && outer.config->ki > 0.0) {
@@ -253,10 +253,11 @@ double JointController::most_current_A(double way, const Measurement& measured) 
   const double of_torque_A =
       limits_torque ? std::min(config_.current_limit_A, config_.torque_limit_Nm / constant)
                     : config_.current_limit_A;
-  const bool direct = action_ == Action::kFollow && !cascaded();  // no torque reference to limit
+  const bool direct =
+      action_ == BridgeAction::kFollow && !cascaded();  // no torque reference to limit
   const double most_A = direct ? of_torque_A : config_.current_limit_A;
   // A shorted winding brakes without a sensor.
-  if (!(config_.velocity_limit_rad_s > 0.0) || action_ == Action::kBrake) return most_A;
+  if (!(config_.velocity_limit_rad_s > 0.0) || action_ == BridgeAction::kBrake) return most_A;
   // The motor's, which the current moves: by the link's a spring would be driven into swinging.
   const double share = way * measured.motor_velocity_rad_s / config_.velocity_limit_rad_s;
   if (share <= kTaperFrom) return most_A;
@@ -271,7 +272,7 @@ Saturation JointController::limit_voltage(double& voltage_V,
     const double emf_V = config_.motor_constant_Nm_A * measured.motor_velocity_rad_s;
     double low_A = -most_current_A(-1.0, measured);
     double high_A = most_current_A(1.0, measured);
-    const bool direct = action_ == Action::kFollow && !cascaded() && mode_ != Mode::kNone;
+    const bool direct = action_ == BridgeAction::kFollow && !cascaded() && mode_ != Mode::kNone;
     if (direct && config_.motor_constant_Nm_A > 0.0) {  // as the torque reference's slope
       const double step_A = config_.torque_slope_Nm_s / config_.motor_constant_Nm_A * period_s_;
       const double last_A = std::clamp(terms_.drive_current_A, low_A, high_A);
@@ -292,7 +293,7 @@ void JointController::integrate(const Step& step, Saturation voltage_cut) noexce
                                    : voltage_cut;
   if (step.outer.loop != nullptr) {
     step.outer.loop->integrate(*step.outer.config, step.outer.integrand, period_s_, outer_cut);
-  } else if (action_ == Action::kFollow && mode_ == Mode::kVelocityImpedance) {
+  } else if (action_ == BridgeAction::kFollow && mode_ == Mode::kVelocityImpedance) {
     const double move = step.outer.integrand * period_s_;
     const bool winds_up = static_cast<double>(outer_cut) * move > 0.0;
     if (!winds_up) terms_.held_position_rad = limited_position(terms_.held_position_rad + move);

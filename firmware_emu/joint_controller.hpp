@@ -37,7 +37,7 @@ struct Measurement {
 };
 
 /// What the bridge is to do.
-enum class Action : std::uint8_t {
+enum class BridgeAction : std::uint8_t {
   kOff,     ///< bridge open
   kFollow,  ///< the mode's reference
   kHold,    ///< the position where this action began, by the position loop
@@ -71,13 +71,13 @@ class JointController {
   /// One control period. A change of `action` or `mode` is made without a step of the voltage:
   /// integrals are seeded, what is left decays over the transfer time.
   /// @return motor voltage [V]; 0 when kOff.
-  double update(Action action, canopen::Mode mode, const Reference& reference,
+  double update(BridgeAction action, canopen::Mode mode, const Reference& reference,
                 const Measurement& measured) noexcept TANDEM_RT;
 
   [[nodiscard]] const Terms& terms() const noexcept { return terms_; }
   /// Whether the last update() led the joint to a position or velocity.
   [[nodiscard]] bool follows_motion() const noexcept {
-    return cascaded() && (action_ != Action::kFollow || mode_ != canopen::Mode::kCst);
+    return cascaded() && (action_ != BridgeAction::kFollow || mode_ != canopen::Mode::kCst);
   }
   [[nodiscard]] const Pid& position_loop() const noexcept { return position_; }
   [[nodiscard]] const Pid& velocity_loop() const noexcept { return velocity_; }
@@ -114,7 +114,7 @@ class JointController {
   };
 
   [[nodiscard]] bool cascaded() const noexcept;
-  void begin(Action action, canopen::Mode mode, const Measurement& measured) noexcept;
+  void begin(BridgeAction action, canopen::Mode mode, const Measurement& measured) noexcept;
   [[nodiscard]] Outer outer_loop(const Reference& reference, const Measurement& measured) noexcept;
   [[nodiscard]] Outer position_outer(double position_rad, double velocity_rad_s, double torque_Nm,
                                      const Measurement& measured) noexcept;
@@ -145,7 +145,7 @@ class JointController {
   Pid torque_;
   Pid current_;
   Terms terms_;
-  Action action_ = Action::kOff;
+  BridgeAction action_ = BridgeAction::kOff;
   canopen::Mode mode_ = canopen::Mode::kNone;
   bool retuned_ = false;
 };

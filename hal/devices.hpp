@@ -66,7 +66,7 @@ class Devices {
   PidControl pid;
   ImpedanceControl impedance;
   AmplifierControl amplifier;
-  Clock clock;
+  RobotClock clock;
 };
 
 }  // namespace tandem::hal

@@ -39,7 +39,7 @@ Error no_joint(std::string_view name, std::span<const std::string> joints,
 
 Error Robot::no_joint(std::string_view name_in) const {
   std::vector<std::string> names;
-  for (const Joint& joint : joints) names.push_back(joint.name);
+  for (const DrivenJoint& joint : joints) names.push_back(joint.name);
   return hal::no_joint(name_in, names, followers);
 }
 

@@ -14,12 +14,12 @@
 #include "hal/follower.hpp"
 #include "hal/image.hpp"
 #include "hal/joint_capabilities.hpp"
-#include "model/loop_spec.hpp"
+#include "model/kinematic_loop.hpp"
 
 namespace tandem::hal {
 
 /// A driven joint.
-struct Joint : JointCapabilities {
+struct DrivenJoint : JointCapabilities {
   std::string name;  ///< of the URDF
 };
 
@@ -72,10 +72,10 @@ struct Robot {
   std::string name;
   std::string file;  ///< the robot.toml's path, for messages
   bool floating_base = false;
-  std::vector<Joint> joints = {};          ///< in the image's order
+  std::vector<DrivenJoint> joints = {};    ///< in the image's order
   std::vector<PassiveJoint> passive = {};  ///< in the dynamics, not in the image
   std::vector<Follower> followers = {};    ///< the same: they go with joints of the image
-  std::vector<model::LoopSpec> loops = {};
+  std::vector<model::KinematicLoop> loops = {};
   std::vector<Sensor> sensors = {};  ///< in the image's order
   std::vector<Site> sites = {};
   std::vector<Foot> feet = {};

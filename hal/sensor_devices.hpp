@@ -65,9 +65,9 @@ class Imu : public AnalogSensor {
 };
 
 /// The robot's time: a count of cycles, simulated or not.
-class Clock {
+class RobotClock {
  public:
-  explicit Clock(const JointAccess& access) : io_(&access) {}
+  explicit RobotClock(const JointAccess& access) : io_(&access) {}
   [[nodiscard]] std::uint64_t cycle() const noexcept TANDEM_RT { return io_->state->cycle()[0]; }
   /// Nominal time since the start.
   [[nodiscard]] std::int64_t now_ns() const noexcept TANDEM_RT { return io_->state->time_ns()[0]; }

@@ -51,9 +51,9 @@ struct Moment {
 /// One candidate: a series of the base's pose (standing) and of the free coordinates; what the legs
 /// do follows.
 struct Candidate {
-  Series base;   // (6), of a robot that stands
-  Series free;   // of the coordinates that move by themselves
-  Series whole;  // of all coordinates
+  ExcitingSeries base;   // (6), of a robot that stands
+  ExcitingSeries free;   // of the coordinates that move by themselves
+  ExcitingSeries whole;  // of all coordinates
   Excitation figures;
   double condition = std::numeric_limits<double>::infinity();
 };
@@ -140,7 +140,7 @@ class Search {
     Candidate next;
     next.free = best.free;
     next.base = best.base;
-    for (Series* series : {&next.free, &next.base}) {
+    for (ExcitingSeries* series : {&next.free, &next.base}) {
       for (MatrixXd* coefficients : {&series->a, &series->b}) {
         const double size = coefficients->size() > 0 ? coefficients->cwiseAbs().mean() : 0.0;
         for (double& one : coefficients->reshaped()) one += 0.5 * size * uniform();
@@ -164,10 +164,11 @@ class Search {
                    std::numeric_limits<double>::infinity());
     }
   }
-  static void scale_column(Series& series, Index column, double down, double up, double speed) {
+  static void scale_column(ExcitingSeries& series, Index column, double down, double up,
+                           double speed) {
     double low = 0.0, high = 0.0, fastest = 0.0;
     for (int k = 0; k < kSamples; ++k) {
-      const Series::State now = series.at(series.period_s * k / kSamples);
+      const ExcitingSeries::State now = series.at(series.period_s * k / kSamples);
       const double way = now.x[column] - series.start[column];
       low = std::min(low, way);
       high = std::max(high, way);
@@ -203,7 +204,7 @@ class Search {
       for (std::size_t i = 0; i < legs.size(); ++i)
         positions(k, static_cast<Index>(i)) = q[legs[i]];
     }
-    const Series follow = series_through(positions, harmonics, request_.period_s);
+    const ExcitingSeries follow = series_through(positions, harmonics, request_.period_s);
     for (std::size_t i = 0; i < legs.size(); ++i) {
       candidate.whole.a.col(legs[i]) = follow.a.col(static_cast<Index>(i));
       candidate.whole.b.col(legs[i]) = follow.b.col(static_cast<Index>(i));
@@ -213,7 +214,7 @@ class Search {
 
   [[nodiscard]] Moment at(const Candidate& candidate, double t_s) const {
     Moment out;
-    const Series::State now = candidate.whole.at(t_s);
+    const ExcitingSeries::State now = candidate.whole.at(t_s);
     out.instant.q = now.x;
     out.instant.v = now.v;
     out.instant.vdot = now.acceleration;
@@ -223,9 +224,11 @@ class Search {
     out.instant.wrenches.assign(identified_.regressor.sensor_count(),
                                 Eigen::Matrix<double, 6, 1>::Zero());
     if (!stands()) return out;
-    const Series::State base = candidate.base.at(t_s);
+    const ExcitingSeries::State base = candidate.base.at(t_s);
     out.pose = base.x;
-    const auto turned = [&](double t) { return Standing::placement(candidate.base.at(t).x).R; };
+    const auto turned = [&](double t) {
+      return StandingMotion::placement(candidate.base.at(t).x).R;
+    };
     const Eigen::Matrix3d before = turned(t_s - kStep_s), here = turned(t_s),
                           after = turned(t_s + kStep_s);
     const auto vee = [](const Eigen::Matrix3d& S) {
@@ -245,7 +248,7 @@ class Search {
     scale(candidate);
     for (int attempt = 0; attempt < 14; ++attempt) {
       if (make_whole(candidate) && keeps_limits(candidate)) return true;
-      for (Series* series : {&candidate.free, &candidate.base}) {
+      for (ExcitingSeries* series : {&candidate.free, &candidate.base}) {
         series->a *= 0.85;
         series->b *= 0.85;
       }
@@ -266,7 +269,7 @@ class Search {
       VectorXd torque = Y * described_ + known;
       if (feet_) out.lowest_m = std::min(out.lowest_m, feet_->lowest(now.instant.q));
       if (stands()) {
-        const Standing::Load load = feet_->load(now.pose, now.instant.q, torque.head<6>());
+        const StandingMotion::Load load = feet_->load(now.pose, now.instant.q, torque.head<6>());
         out.margin_m = std::min(out.margin_m, load.margin_m);
         if (load.slip > kSlip || load.least_share < kLeastShare) return false;
         torque.tail(start_.size()) += load.foot_torque;
@@ -344,7 +347,7 @@ class Search {
 
   Status check_start() {
     Candidate rest = random_candidate();
-    for (Series* series : {&rest.free, &rest.base}) {
+    for (ExcitingSeries* series : {&rest.free, &rest.base}) {
       series->a.setZero();
       series->b.setZero();
     }
@@ -399,7 +402,7 @@ class Search {
   SelfDistance distance_;
   BaseParameters base_;
   std::uint64_t seed_;
-  std::optional<Standing> feet_;  // of a floating base
+  std::optional<StandingMotion> feet_;  // of a floating base
   std::vector<Index> free_;
 };
 

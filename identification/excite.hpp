@@ -26,7 +26,7 @@ struct ExciteRequest {
 
 struct Excitation {
   std::vector<std::string> joints;  ///< of the robot's image that move, in its order
-  Series series;                    ///< of them
+  ExcitingSeries series;            ///< of them
   double condition_number = 0.0;    ///< of the base parameters' columns, each of unit length, rows
                                     ///< over the joints' largest torques
   std::size_t base_parameters = 0;

@@ -60,7 +60,7 @@ class Columns {
  public:
   static Result<Columns> read(const log::LogFile& file, const std::string& topic,
                               const std::vector<std::pair<std::string, std::size_t>>& fields) {
-    const log::Topic* found = file.find(topic);
+    const log::LoggedTopic* found = file.find(topic);
     std::vector<log::Column> wanted;
     Columns columns;
     for (const auto& [field, count] : fields) {
@@ -81,7 +81,7 @@ class Columns {
   }
 
  private:
-  log::Table table_;
+  log::TimeSeries table_;
   std::map<std::string, std::size_t> first_;
 };
 

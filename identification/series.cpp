@@ -14,7 +14,7 @@ double uniform(std::uint64_t& seed) {
 
 }  // namespace
 
-Series::State Series::at(double t_s) const {
+ExcitingSeries::State ExcitingSeries::at(double t_s) const {
   State state{start, Eigen::VectorXd::Zero(start.size()), Eigen::VectorXd::Zero(start.size())};
   const double w = 2.0 * std::numbers::pi / period_s;
   for (Eigen::Index k = 0; k < a.rows(); ++k) {
@@ -28,17 +28,17 @@ Series::State Series::at(double t_s) const {
   return state;
 }
 
-void Series::rest_at_the_ends() {
+void ExcitingSeries::rest_at_the_ends() {
   Eigen::VectorXd k = Eigen::VectorXd::LinSpaced(a.rows(), 1.0, static_cast<double>(a.rows()));
   b -= k * (k.transpose() * b) / k.squaredNorm();
   k = k.cwiseAbs2().eval();
   a -= k * (k.transpose() * a) / k.squaredNorm();
 }
 
-Series random_series(const Eigen::VectorXd& start, int harmonics, double period_s,
-                     std::uint64_t& seed) {
-  Series series{period_s, start, Eigen::MatrixXd(harmonics, start.size()),
-                Eigen::MatrixXd(harmonics, start.size())};
+ExcitingSeries random_series(const Eigen::VectorXd& start, int harmonics, double period_s,
+                             std::uint64_t& seed) {
+  ExcitingSeries series{period_s, start, Eigen::MatrixXd(harmonics, start.size()),
+                        Eigen::MatrixXd(harmonics, start.size())};
   for (Eigen::Index j = 0; j < start.size(); ++j) {
     for (Eigen::Index k = 0; k < harmonics; ++k) {
       series.a(k, j) = uniform(seed) / static_cast<double>(k + 1);
@@ -49,10 +49,11 @@ Series random_series(const Eigen::VectorXd& start, int harmonics, double period_
   return series;
 }
 
-Series series_through(const Eigen::MatrixXd& values, int harmonics, double period_s) {
+ExcitingSeries series_through(const Eigen::MatrixXd& values, int harmonics, double period_s) {
   const Eigen::Index n = values.rows();
-  Series series{period_s, values.row(0).transpose(), Eigen::MatrixXd(harmonics, values.cols()),
-                Eigen::MatrixXd(harmonics, values.cols())};
+  ExcitingSeries series{period_s, values.row(0).transpose(),
+                        Eigen::MatrixXd(harmonics, values.cols()),
+                        Eigen::MatrixXd(harmonics, values.cols())};
   for (Eigen::Index k = 0; k < harmonics; ++k) {
     Eigen::VectorXd c(n), s(n);
     for (Eigen::Index i = 0; i < n; ++i) {

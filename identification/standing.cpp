@@ -68,7 +68,7 @@ MatrixXd grasp_of(std::span<const Vector3d> soles_m, double ground_m) {
 
 }  // namespace
 
-model::Placement Standing::placement(const BasePose& pose) {
+model::Placement StandingMotion::placement(const BasePose& pose) {
   model::Placement base;
   base.p = pose.head<3>();
   const Vector3d r = pose.tail<3>();
@@ -76,8 +76,8 @@ model::Placement Standing::placement(const BasePose& pose) {
   return base;
 }
 
-Standing::Standing(const model::Tree& tree, const hal::RobotConfig& robot,
-                   const Regressor& regressor, const VectorXd& start)
+StandingMotion::StandingMotion(const model::Tree& tree, const hal::RobotConfig& robot,
+                               const Regressor& regressor, const VectorXd& start)
     : tree_(&tree) {
   for (const model::Joint& joint : tree.joints) {
     const std::string& name =
@@ -114,13 +114,13 @@ Standing::Standing(const model::Tree& tree, const hal::RobotConfig& robot,
   hull_ = hull_of(std::move(points));
 }
 
-std::vector<double> Standing::spread(const VectorXd& q) const {
+std::vector<double> StandingMotion::spread(const VectorXd& q) const {
   std::vector<double> position;
   for (const Index c : coordinate_) position.push_back(q[c]);
   return position;
 }
 
-bool Standing::solve_leg(const Leg& leg, const model::Placement& base, VectorXd& q) const {
+bool StandingMotion::solve_leg(const Leg& leg, const model::Placement& base, VectorXd& q) const {
   const auto n = static_cast<Index>(leg.joints.size());
   const Index rows = n >= 6 ? 6 : 3;  // a leg of few joints keeps its foot's place only
   for (int step = 0; step < 30; ++step) {
@@ -153,12 +153,12 @@ bool Standing::solve_leg(const Leg& leg, const model::Placement& base, VectorXd&
   return false;
 }
 
-bool Standing::solve_legs(const BasePose& pose, VectorXd& q) const {
+bool StandingMotion::solve_legs(const BasePose& pose, VectorXd& q) const {
   const model::Placement base = placement(pose);
   return std::ranges::all_of(standing_, [&](const Leg& leg) { return solve_leg(leg, base, q); });
 }
 
-double Standing::lowest(const VectorXd& q) const {
+double StandingMotion::lowest(const VectorXd& q) const {
   const std::vector<model::Placement> at = model::place_bodies(*tree_, spread(q));
   double lowest = std::numeric_limits<double>::infinity();
   for (const Leg& leg : standing_) {
@@ -169,8 +169,8 @@ double Standing::lowest(const VectorXd& q) const {
   return lowest - ground_m_;
 }
 
-Standing::Load Standing::load(const BasePose& pose, const VectorXd& q,
-                              const Eigen::Matrix<double, 6, 1>& wrench) const {
+StandingMotion::Load StandingMotion::load(const BasePose& pose, const VectorXd& q,
+                                          const Eigen::Matrix<double, 6, 1>& wrench) const {
   const model::Placement base = placement(pose);
   const std::vector<model::Placement> at = model::place_bodies(*tree_, spread(q), base);
   const Vector3d f = base.R * wrench.head<3>();

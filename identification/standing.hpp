@@ -15,11 +15,11 @@ namespace tandem::identification {
 /// The base relative to its start: displacement in the start's axes [m] and rotation vector [rad].
 using BasePose = Eigen::Matrix<double, 6, 1>;
 
-class Standing {
+class StandingMotion {
  public:
   /// @param start  position of every coordinate
-  Standing(const model::Tree& tree, const hal::RobotConfig& robot, const Regressor& regressor,
-           const Eigen::VectorXd& start);
+  StandingMotion(const model::Tree& tree, const hal::RobotConfig& robot, const Regressor& regressor,
+                 const Eigen::VectorXd& start);
 
   /// Coordinates on the way from the base to a foot: they follow from the base's pose.
   [[nodiscard]] const std::vector<Eigen::Index>& leg_coordinates() const { return legs_; }

@@ -5,7 +5,7 @@
 
 namespace tandem::internal_model {
 
-void Difference::take(double difference) noexcept {
+void SignalDifference::take(double difference) noexcept {
   max = std::max(max, std::abs(difference));
   square_sum += difference * difference;
 }
@@ -42,7 +42,7 @@ void Differences::take_base(std::span<const double, 7> first,
   base_angle_rad_.take(2.0 * std::atan2(std::hypot(x, y, z), std::abs(w)));
 }
 
-double Differences::rms(const Difference& one) const noexcept {
+double Differences::rms(const SignalDifference& one) const noexcept {
   return std::sqrt(one.square_sum / static_cast<double>(std::max<std::uint64_t>(cycles_, 1)));
 }
 

@@ -11,7 +11,7 @@
 namespace tandem::internal_model {
 
 /// First minus second of one signal, over the cycles that were taken.
-struct Difference {
+struct SignalDifference {
   double max = 0.0;  ///< of the absolute value
   double square_sum = 0.0;
 
@@ -20,7 +20,7 @@ struct Difference {
 
 /// Differences of a joint, link side: [rad, rad/s, Nm], of a prismatic one [m, m/s, N].
 struct JointDifference {
-  Difference position_rad, velocity_rad_s, torque_Nm;
+  SignalDifference position_rad, velocity_rad_s, torque_Nm;
 };
 
 /// Figures of two robots' states.
@@ -47,21 +47,21 @@ class Differences {
   [[nodiscard]] std::int64_t first_unequal() const noexcept { return first_unequal_; }
   [[nodiscard]] const std::vector<JointDifference>& joints() const noexcept { return joints_; }
   /// All sensors' channels, one sensor after another, in their own units.
-  [[nodiscard]] const std::vector<Difference>& channels() const noexcept { return channels_; }
+  [[nodiscard]] const std::vector<SignalDifference>& channels() const noexcept { return channels_; }
   /// How far the bases are apart [m], and by which angle they are turned [rad]. Null: not known.
-  [[nodiscard]] const Difference* base_position_m() const noexcept {
+  [[nodiscard]] const SignalDifference* base_position_m() const noexcept {
     return bases_ ? &base_position_m_ : nullptr;
   }
-  [[nodiscard]] const Difference* base_angle_rad() const noexcept {
+  [[nodiscard]] const SignalDifference* base_angle_rad() const noexcept {
     return bases_ ? &base_angle_rad_ : nullptr;
   }
   /// The root of the mean square of one of them.
-  [[nodiscard]] double rms(const Difference& one) const noexcept;
+  [[nodiscard]] double rms(const SignalDifference& one) const noexcept;
 
  private:
   std::vector<JointDifference> joints_;
-  std::vector<Difference> channels_;
-  Difference base_position_m_, base_angle_rad_;
+  std::vector<SignalDifference> channels_;
+  SignalDifference base_position_m_, base_angle_rad_;
   bool bases_ = false;
   std::uint64_t compared_ = 0, cycles_ = 0, unequal_ = 0;
   std::int64_t first_unequal_ = -1;

@@ -38,7 +38,7 @@ using MakeFork = std::function<Result<std::unique_ptr<Fork>>()>;
 /// An answer to a tool.
 struct Answer {
   hal::Prediction prediction;
-  std::vector<runtime::Fault> faults;  ///< that will come
+  std::vector<runtime::FaultReport> faults;  ///< that will come
   /// Controllers whose copies began anew instead of where the run's are: they lack an archive().
   std::vector<std::string> unarchived;
   std::size_t loop_bytes = 0;  ///< that the loop wrote down for it

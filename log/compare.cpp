@@ -17,8 +17,8 @@ struct Message {
 };
 
 /// The first element whose bytes differ. @pre one does
-Difference difference_in(const hal::Layout& layout, const RunInfo& info, const Message& a,
-                         std::span<const std::byte> b) {
+FirstDifference difference_in(const hal::Layout& layout, const RunInfo& info, const Message& a,
+                              std::span<const std::byte> b) {
   if (a.body.size() != b.size()) {
     return {.signal = "length",
             .a = static_cast<double>(a.body.size()),
@@ -52,7 +52,8 @@ Result<std::vector<Message>> messages_of(const LogFile& file, const std::string&
   return all;
 }
 
-Result<TopicComparison> compare_topic(const LogFile& a, const LogFile& b, const Topic& topic) {
+Result<TopicComparison> compare_topic(const LogFile& a, const LogFile& b,
+                                      const LoggedTopic& topic) {
   TopicComparison result{.topic = topic.name, .first = {}};
   const auto all = messages_of(a, topic.name);
   if (!all) return std::unexpected(all.error());
@@ -63,9 +64,9 @@ Result<TopicComparison> compare_topic(const LogFile& a, const LogFile& b, const 
         if (result.first || index >= all->size()) return;
         const Message& message = (*all)[index];
         if (message.time_ns == time_ns && std::ranges::equal(message.body, body)) return;
-        Difference found{.signal = "time",
-                         .a = static_cast<double>(message.time_ns) * 1e-9,
-                         .b = static_cast<double>(time_ns) * 1e-9};
+        FirstDifference found{.signal = "time",
+                              .a = static_cast<double>(message.time_ns) * 1e-9,
+                              .b = static_cast<double>(time_ns) * 1e-9};
         if (message.time_ns == time_ns)
           found = difference_in(topic.layout, a.info(), message, body);
         found.message = index;
@@ -84,7 +85,7 @@ bool Comparison::equal() const {
 
 Result<Comparison> compare(const LogFile& a, const LogFile& b) {
   Comparison result;
-  for (const Topic& topic : a.topics()) {
+  for (const LoggedTopic& topic : a.topics()) {
     if (b.find(topic.name) == nullptr) {
       result.only_a.push_back(topic.name);
       continue;
@@ -93,7 +94,7 @@ Result<Comparison> compare(const LogFile& a, const LogFile& b) {
     if (!compared) return std::unexpected(compared.error());
     result.topics.push_back(std::move(*compared));
   }
-  for (const Topic& topic : b.topics()) {
+  for (const LoggedTopic& topic : b.topics()) {
     if (a.find(topic.name) == nullptr) result.only_b.push_back(topic.name);
   }
   return result;

@@ -12,7 +12,7 @@
 namespace tandem::log {
 
 /// The first number of a topic that two logs do not share.
-struct Difference {
+struct FirstDifference {
   std::uint64_t message = 0;  ///< of the topic, from 0
   std::int64_t time_ns = 0;   ///< of the first log's message
   /// "position_rad.LHipSag"; "time", "length"; without a field "byte 56" of the body
@@ -23,7 +23,7 @@ struct Difference {
 struct TopicComparison {
   std::string topic;
   std::uint64_t messages_a = 0, messages_b = 0;
-  std::optional<Difference> first;
+  std::optional<FirstDifference> first;
 
   [[nodiscard]] bool equal() const { return !first && messages_a == messages_b; }
 };

@@ -46,7 +46,7 @@ Status write_events(const LogFile& log, std::ostream& out) {
 }
 
 /// The topic's fields that `names` asks for; all when it asks for none.
-Result<std::vector<const hal::Field*>> choose(const Topic* topic,
+Result<std::vector<const hal::Field*>> choose(const LoggedTopic* topic,
                                               std::span<const std::string> names) {
   std::vector<const hal::Field*> chosen;
   if (topic == nullptr) return chosen;  // for_each() says so
@@ -98,7 +98,7 @@ Ages ages_of(const hal::Layout& layout, const hal::Field& field, const RunInfo& 
 Status write_csv(const LogFile& log, const std::string& topic, std::size_t every, std::ostream& out,
                  std::span<const std::string> fields) {
   if (topic == "/tandem/event") return write_events(log, out);
-  const Topic* found = log.find(topic);
+  const LoggedTopic* found = log.find(topic);
   if (found != nullptr && found->layout.fields().empty()) {
     return fail("the messages of '" + topic + "' are no numbers of a fixed count",
                 "take another topic, /tandem/state for one, or a ROS viewer");

@@ -52,7 +52,8 @@ struct Stretch {
   std::int64_t begin_ns, end_ns;
 };
 
-Result<Stretch> stretch_of(const LogFile& file, const Topic& topic, const MotionRequest& request) {
+Result<Stretch> stretch_of(const LogFile& file, const LoggedTopic& topic,
+                           const MotionRequest& request) {
   if (topic.messages < 2) {
     return refuse(file,
                   "has " + counted(topic.messages, "message") + " of " + topic.name + ": " +
@@ -127,7 +128,7 @@ class Rows {
   }
 
  private:
-  Table table_;
+  TimeSeries table_;
   std::vector<std::int64_t> time_ns_;
   std::size_t fields_ = 0;
 };

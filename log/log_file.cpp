@@ -13,8 +13,8 @@
 namespace tandem::log {
 namespace {
 
-Topic topic_of(const McapReader& reader, const ChannelRecord& channel) {
-  Topic topic;
+LoggedTopic topic_of(const McapReader& reader, const ChannelRecord& channel) {
+  LoggedTopic topic;
   topic.name = channel.topic;
   topic.encoding = channel.message_encoding;
   const auto schema = reader.schemas().find(channel.schema_id);
@@ -35,7 +35,7 @@ Error at(const std::string& file, std::string message, std::string hint = {}) {
 }
 
 /// Whether the topic's messages can be a period apart, some of them being left out.
-bool fits(const Topic& topic, std::int64_t period_ns) {
+bool fits(const LoggedTopic& topic, std::int64_t period_ns) {
   const double apart_ns = static_cast<double>(topic.last_ns) - static_cast<double>(topic.first_ns);
   const double cycles = apart_ns / static_cast<double>(period_ns);
   return topic.messages < 2 || cycles / static_cast<double>(topic.messages) <=
@@ -54,7 +54,7 @@ Result<LogFile> LogFile::open(const std::string& path) {
   log.file_ = std::make_shared<const Descriptor>(std::move(*file));
   auto reader = McapReader::open(log.file_, path);
   if (!reader) return std::unexpected(reader.error());
-  std::map<std::uint16_t, Topic> by_channel;
+  std::map<std::uint16_t, LoggedTopic> by_channel;
   DataHash hash;
   for (;;) {
     auto message = reader->next();
@@ -75,7 +75,7 @@ Result<LogFile> LogFile::open(const std::string& path) {
   }
   for (auto& [id, topic] : by_channel) log.topics_.push_back(std::move(topic));
   log.info_ = info_from(metadata_of(*reader, kInfoRecord));
-  for (const Topic& topic : log.topics_)
+  for (const LoggedTopic& topic : log.topics_)
     if (topic.name == "/tandem/state" && !fits(topic, log.info_.period_ns)) log.info_.period_ns = 0;
   log.info_.configuration = metadata_of(*reader, kConfigurationRecord);
   log.result_ = metadata_of(*reader, kResultRecord);
@@ -91,8 +91,8 @@ Result<LogFile> LogFile::open(const std::string& path) {
   return log;
 }
 
-const Topic* LogFile::find(std::string_view name) const {
-  for (const Topic& topic : topics_) {
+const LoggedTopic* LogFile::find(std::string_view name) const {
+  for (const LoggedTopic& topic : topics_) {
     if (topic.name == name) return &topic;
   }
   return nullptr;
@@ -100,12 +100,12 @@ const Topic* LogFile::find(std::string_view name) const {
 
 std::uint64_t LogFile::messages() const {
   std::uint64_t count = 0;
-  for (const Topic& topic : topics_) count += topic.messages;
+  for (const LoggedTopic& topic : topics_) count += topic.messages;
   return count;
 }
 
-Result<const Topic*> LogFile::require(const std::string& name) const {
-  if (const Topic* topic = find(name)) return topic;
+Result<const LoggedTopic*> LogFile::require(const std::string& name) const {
+  if (const LoggedTopic* topic = find(name)) return topic;
   if (truncated_) {
     return std::unexpected(at(path_,
                               "the log is cut after " + std::to_string(bytes_) +
@@ -113,7 +113,7 @@ Result<const Topic*> LogFile::require(const std::string& name) const {
                               kCutHint));
   }
   std::vector<std::string> names;
-  for (const Topic& topic : topics_) names.push_back(topic.name);
+  for (const LoggedTopic& topic : topics_) names.push_back(topic.name);
   return std::unexpected(at(path_, "has no topic '" + name + "'", suggest(name, names)));
 }
 
@@ -138,8 +138,8 @@ Status LogFile::for_each(
   }
 }
 
-Result<Table> LogFile::read(const std::string& name, const std::vector<Column>& columns,
-                            std::size_t every) const {
+Result<TimeSeries> LogFile::read(const std::string& name, const std::vector<Column>& columns,
+                                 std::size_t every) const {
   const auto topic = require(name);
   if (!topic) return std::unexpected(topic.error());
   std::vector<const hal::Field*> fields;
@@ -157,7 +157,7 @@ Result<Table> LogFile::read(const std::string& name, const std::vector<Column>& 
     }
     fields.push_back(field);
   }
-  Table table;
+  TimeSeries table;
   table.columns.resize(columns.size());
   std::size_t count = 0;
   const Status done = for_each(name, [&](std::int64_t time_ns, std::span<const std::byte> body) {

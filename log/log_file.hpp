@@ -18,7 +18,7 @@
 namespace tandem::log {
 
 /// A topic of the file.
-struct Topic {
+struct LoggedTopic {
   std::string name;      ///< "/tandem/state"
   std::string type;      ///< "tandem/msg/State"
   std::string encoding;  ///< "cdr"
@@ -35,7 +35,7 @@ struct Column {
 };
 
 /// Columns over time.
-struct Table {
+struct TimeSeries {
   std::vector<double> time_s;
   std::vector<std::vector<double>> columns;  ///< as asked for
 };
@@ -50,11 +50,11 @@ class LogFile {
   [[nodiscard]] const RunInfo& info() const { return info_; }
   /// The metadata record "result"; empty when the run was killed.
   [[nodiscard]] const StringMap& result() const { return result_; }
-  [[nodiscard]] const std::vector<Topic>& topics() const { return topics_; }
-  [[nodiscard]] const Topic* find(std::string_view topic) const;
+  [[nodiscard]] const std::vector<LoggedTopic>& topics() const { return topics_; }
+  [[nodiscard]] const LoggedTopic* find(std::string_view topic) const;
   /// The same. Error: the log has no such topic, or is cut before
   /// its first message.
-  [[nodiscard]] Result<const Topic*> require(const std::string& topic) const;
+  [[nodiscard]] Result<const LoggedTopic*> require(const std::string& topic) const;
   /// True when the run was killed: the data end where its last chunk ended.
   [[nodiscard]] bool truncated() const { return truncated_; }
   /// The file's size.
@@ -65,8 +65,9 @@ class LogFile {
 
   /// The columns of every message of `topic`, or of every `every`-th.
   /// Errors: no such topic, field (the nearest is suggested) or index; damaged data.
-  [[nodiscard]] Result<Table> read(const std::string& topic, const std::vector<Column>& columns,
-                                   std::size_t every = 1) const;
+  [[nodiscard]] Result<TimeSeries> read(const std::string& topic,
+                                        const std::vector<Column>& columns,
+                                        std::size_t every = 1) const;
   [[nodiscard]] Result<std::vector<EventText>> events() const;
 
   /// Calls `visit(time_ns, CDR body)` for each message of `topic`, in order.
@@ -79,7 +80,7 @@ class LogFile {
   std::shared_ptr<const Descriptor> file_;  // read again and again: always the same
   RunInfo info_;
   StringMap result_;
-  std::vector<Topic> topics_;
+  std::vector<LoggedTopic> topics_;
   bool truncated_ = false;
   std::uint64_t bytes_ = 0;
   std::string data_sha256_;

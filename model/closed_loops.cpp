@@ -36,13 +36,13 @@ Result<std::size_t> find(const std::vector<std::string>& all, const std::string&
             .key = name});
 }
 
-std::size_t equations_of(LoopType type) {
-  return type == LoopType::kRod ? 1 : type == LoopType::kBall ? 3 : 5;
+std::size_t equations_of(KinematicLoopType type) {
+  return type == KinematicLoopType::kRod ? 1 : type == KinematicLoopType::kBall ? 3 : 5;
 }
 
 }  // namespace
 
-std::string LoopGap::to_string() const {
+std::string ClosureGap::to_string() const {
   constexpr double kSmall = 1e-9;
   const double degrees = axis_rad * 180.0 / std::numbers::pi;
   std::string axes = fmt::format("its axes are {:.4g} degrees apart", degrees);
@@ -51,13 +51,13 @@ std::string LoopGap::to_string() const {
   return axes + fmt::format(", and a gap of {:.4g} m is left", position_m);
 }
 
-Result<ClosedLoops> ClosedLoops::create(const std::vector<LoopSpec>& loops,
+Result<ClosedLoops> ClosedLoops::create(const std::vector<KinematicLoop>& loops,
                                         const std::vector<std::string>& passive,
                                         const tandem_kernels& kernels) {
   ClosedLoops result;
   result.kernels_ = &kernels;
   result.sines_ = Sines(kernels);
-  for (const LoopSpec& loop : loops)
+  for (const KinematicLoop& loop : loops)
     if (Status status = result.add(loop); !status) return std::unexpected(status.error());
   const std::vector<std::string> joints = names(kernels.joint_names, kernels.joints);
   const std::size_t base = kernels.floating_base != 0 ? 6 : 0;
@@ -80,7 +80,7 @@ Result<ClosedLoops> ClosedLoops::create(const std::vector<LoopSpec>& loops,
   return result;
 }
 
-Status ClosedLoops::add(const LoopSpec& spec) {
+Status ClosedLoops::add(const KinematicLoop& spec) {
   Loop loop{.spec = spec, .axis = Vector3d(spec.axis.data()).normalized(), .across = {}};
   loop.across[0] = loop.axis.unitOrthogonal();
   loop.across[1] = loop.axis.cross(loop.across[0]);
@@ -95,7 +95,7 @@ Status ClosedLoops::add(const LoopSpec& spec) {
     loop.site[i] = *site;
     loop.wrench[i] = *wrench;
   }
-  rows_.resize(rows_.size() + equations_of(spec.type), LoopEquation{.loop = loops_.size()});
+  rows_.resize(rows_.size() + equations_of(spec.type), ClosureEquation{.loop = loops_.size()});
   loops_.push_back(std::move(loop));
   return {};
 }
@@ -105,20 +105,20 @@ void ClosedLoops::move(const double* q, const double* v) noexcept TANDEM_RT {
   sines_.take(q);
   kernels_->site_motion_at(sines(), q, v, zero_.data(), pose_.data(), twist_.data(),
                            acceleration_.data());
-  LoopEquation* row = rows_.data();
+  ClosureEquation* row = rows_.data();
   for (const Loop& loop : loops_) {
-    if (loop.spec.type == LoopType::kRod) {
+    if (loop.spec.type == KinematicLoopType::kRod) {
       write_rod(loop, *row);
     } else {
       write_point(loop, row);
-      if (loop.spec.type == LoopType::kRevolute) write_axis(loop, row + 3);
+      if (loop.spec.type == KinematicLoopType::kRevolute) write_axis(loop, row + 3);
     }
     row += equations_of(loop.spec.type);
   }
 }
 
 // c = |d| - L with d = p1 - p2.
-void ClosedLoops::write_rod(const Loop& loop, LoopEquation& row) const noexcept {
+void ClosedLoops::write_rod(const Loop& loop, ClosureEquation& row) const noexcept {
   const auto [a, b] = loop.site;
   const Vector3d d = Map3(&pose_[12 * a + 9]) - Map3(&pose_[12 * b + 9]);
   const Vector3d rate = Map3(&twist_[6 * a]) - Map3(&twist_[6 * b]);
@@ -131,7 +131,7 @@ void ClosedLoops::write_rod(const Loop& loop, LoopEquation& row) const noexcept 
 }
 
 // c = p1 - p2, in W.
-void ClosedLoops::write_point(const Loop& loop, LoopEquation* rows) const noexcept {
+void ClosedLoops::write_point(const Loop& loop, ClosureEquation* rows) const noexcept {
   const auto [a, b] = loop.site;
   for (std::size_t i = 0; i < 3; ++i) {
     rows[i].f = Vector3d::Unit(static_cast<Eigen::Index>(i));
@@ -141,7 +141,7 @@ void ClosedLoops::write_point(const Loop& loop, LoopEquation* rows) const noexce
 }
 
 // c = t . z2 for two directions t of body 1 across the axis; c' = (t x z2) . (w1 - w2).
-void ClosedLoops::write_axis(const Loop& loop, LoopEquation* rows) const noexcept {
+void ClosedLoops::write_axis(const Loop& loop, ClosureEquation* rows) const noexcept {
   const auto [a, b] = loop.site;
   const Vector3d z2 = MapR(&pose_[12 * b]) * loop.axis;
   const Vector3d w1 = Map3(&twist_[6 * a + 3]);
@@ -164,7 +164,7 @@ void ClosedLoops::differentiate(const double* q) noexcept TANDEM_RT {
   kernels_->site_jacobians_at(sines(), q, J_.data());
   const std::size_t nv = kernels_->nv;
   for (std::size_t r = 0; r < rows_.size(); ++r) {
-    const LoopEquation& row = rows_[r];
+    const ClosureEquation& row = rows_[r];
     const auto [a, b] = loops_[row.loop].site;
     for (std::size_t k = 0; k < nv; ++k) {
       double sum = 0.0;
@@ -180,17 +180,18 @@ void ClosedLoops::differentiate(const double* q) noexcept TANDEM_RT {
 
 double ClosedLoops::position_error_m(std::size_t loop) const noexcept TANDEM_RT {
   double sum = 0.0;
-  for (const LoopEquation& row : rows_)
+  for (const ClosureEquation& row : rows_)
     if (row.loop == loop) sum += row.error * row.error;
   return std::sqrt(sum);
 }
 
-LoopGap ClosedLoops::gap(std::size_t loop) const noexcept TANDEM_RT {
+ClosureGap ClosedLoops::gap(std::size_t loop) const noexcept TANDEM_RT {
   const Loop& one = loops_[loop];
   const auto [a, b] = one.site;
   const Vector3d d = Map3(&pose_[12 * a + 9]) - Map3(&pose_[12 * b + 9]);
-  if (one.spec.type == LoopType::kRod) return {std::abs(d.norm() - one.spec.length_m), 0.0};
-  if (one.spec.type == LoopType::kBall) return {d.norm(), 0.0};
+  if (one.spec.type == KinematicLoopType::kRod)
+    return {std::abs(d.norm() - one.spec.length_m), 0.0};
+  if (one.spec.type == KinematicLoopType::kBall) return {d.norm(), 0.0};
   const Vector3d z1 = MapR(&pose_[12 * a]) * one.axis;
   const Vector3d z2 = MapR(&pose_[12 * b]) * one.axis;
   return {d.norm(), std::atan2(z1.cross(z2).norm(), z1.dot(z2))};
@@ -258,7 +259,7 @@ bool ClosedLoops::close(double* q, int most_steps) noexcept TANDEM_RT {
     move(q, zero_.data());
     differentiate(q);
     double open = 0.0;  // NaN stays NaN
-    for (const LoopEquation& row : rows_) open += std::abs(row.error);
+    for (const ClosureEquation& row : rows_) open += std::abs(row.error);
     if (open < kClosed_m) return true;
     if (step == most_steps || !std::isfinite(open)) return false;
     for (std::size_t r = 0; r < rows_.size(); ++r) lambda_[r] = rows_[r].error;

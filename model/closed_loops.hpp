@@ -11,7 +11,7 @@
 #include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "model/kernels.h"
-#include "model/loop_spec.hpp"
+#include "model/kinematic_loop.hpp"
 #include "model/semidefinite.hpp"
 #include "model/sines.hpp"
 
@@ -19,7 +19,7 @@ namespace tandem::model {
 
 /// One equation c(q) = 0 with its derivative: c' = f . (v1 - v2) + m . (w1 - w2), where v and w
 /// are the velocities of the loop's two sites in W.
-struct LoopEquation {
+struct ClosureEquation {
   std::size_t loop = 0;
   double error = 0.0;  ///< c [m]
   double bias = 0.0;   ///< c'' at vdot = 0 [m/s^2]
@@ -28,7 +28,7 @@ struct LoopEquation {
 };
 
 /// How far a loop is from closed.
-struct LoopGap {
+struct ClosureGap {
   double position_m = 0.0;  ///< between its sites; of a rod, how much it is too long or short
   double axis_rad = 0.0;    ///< between the axes of a revolute loop, 0 to pi
   /// "a gap of 0.01 m is left", "its axes are 90 degrees apart", or both.
@@ -49,7 +49,7 @@ class ClosedLoops {
   ClosedLoops() = default;
   /// Errors: a site or joint that the kernels lack, a site where no wrench may act (the kernels
   /// are of another robot.toml).
-  [[nodiscard]] static Result<ClosedLoops> create(const std::vector<LoopSpec>& loops,
+  [[nodiscard]] static Result<ClosedLoops> create(const std::vector<KinematicLoop>& loops,
                                                   const std::vector<std::string>& passive,
                                                   const tandem_kernels& kernels);
 
@@ -58,7 +58,7 @@ class ClosedLoops {
   [[nodiscard]] const std::string& name(std::size_t loop) const noexcept {
     return loops_[loop].spec.name;
   }
-  [[nodiscard]] std::span<const LoopEquation> equations() const noexcept { return rows_; }
+  [[nodiscard]] std::span<const ClosureEquation> equations() const noexcept { return rows_; }
   /// A (rows x nv, row-major) of c' = A v, as of differentiate().
   [[nodiscard]] std::span<const double> jacobian() const noexcept { return A_; }
   /// Per passive joint, its index in v.
@@ -77,7 +77,7 @@ class ClosedLoops {
   /// How far a loop is open, as of move() [m]; for a rod, how much too long or short.
   [[nodiscard]] double position_error_m(std::size_t loop) const noexcept TANDEM_RT;
   /// The same, by position and direction.
-  [[nodiscard]] LoopGap gap(std::size_t loop) const noexcept TANDEM_RT;
+  [[nodiscard]] ClosureGap gap(std::size_t loop) const noexcept TANDEM_RT;
   /// How fast it opens, as of differentiate(). @param v (nv)
   [[nodiscard]] double velocity_error_m_s(std::size_t loop,
                                           const double* v) const noexcept TANDEM_RT;
@@ -100,22 +100,22 @@ class ClosedLoops {
 
  private:
   struct Loop {
-    LoopSpec spec;
+    KinematicLoop spec;
     std::size_t site[2] = {0, 0};
     std::size_t wrench[2] = {0, 0};
     Eigen::Vector3d axis, across[2];  // revolute: of unit length, in the site's frame
   };
-  Status add(const LoopSpec& spec);
-  void write_rod(const Loop& loop, LoopEquation& row) const noexcept;
-  void write_point(const Loop& loop, LoopEquation* rows) const noexcept;
-  void write_axis(const Loop& loop, LoopEquation* rows) const noexcept;
+  Status add(const KinematicLoop& spec);
+  void write_rod(const Loop& loop, ClosureEquation& row) const noexcept;
+  void write_point(const Loop& loop, ClosureEquation* rows) const noexcept;
+  void write_axis(const Loop& loop, ClosureEquation* rows) const noexcept;
   void factorise_passive() noexcept;
   void step_passive(double* unknown) noexcept;
 
   const tandem_kernels* kernels_ = nullptr;
   Sines sines_;  // of move()'s posture
   std::vector<Loop> loops_;
-  std::vector<LoopEquation> rows_;
+  std::vector<ClosureEquation> rows_;
   std::vector<std::size_t> passive_;
   std::vector<double> A_, J_, pose_, twist_, acceleration_, zero_;
   std::vector<double> N_, unknown_, lambda_;  // of the passive joints

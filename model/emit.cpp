@@ -112,7 +112,7 @@ class Emitter {
 
   // An angle that is a sum or product of positions and constants: known before the first part.
   bool is_early(std::uint32_t i, int depth = 0) const {
-    const Node& node = nodes_[i];
+    const GraphNode& node = nodes_[i];
     if (node.op == Op::kInput) return kernel_.shape.inputs[node.a].name == kPosture;
     if (!is_operation(node.op)) return true;
     if (node.op != Op::kAdd && node.op != Op::kSub && node.op != Op::kMul) return false;
@@ -231,7 +231,7 @@ class Emitter {
 
   // A node's own value.
   std::string operand(std::uint32_t i) {
-    const Node& node = nodes_[i];
+    const GraphNode& node = nodes_[i];
     if (node.op == Op::kConstant) return literal(node.value);
     if (node.op == Op::kInput)
       return kernel_.shape.inputs[node.a].name + "[" + std::to_string(node.b) + "]";
@@ -250,7 +250,7 @@ class Emitter {
   }
 
   std::string expression(std::uint32_t i) {
-    const Node& node = nodes_[i];
+    const GraphNode& node = nodes_[i];
     std::string a = operand(node.a);
     switch (node.op) {
       case Op::kAdd: return a + " + " + operand(node.b);
@@ -289,8 +289,8 @@ class Emitter {
   // Two operations as one. Which operands correspond, and which signs lane 1 needs of them.
   std::string pair_expression(std::uint32_t i) {
     const std::uint32_t other = lanes_.second(i);
-    const Node& x = nodes_[i];
-    const Node& y = nodes_[other];
+    const GraphNode& x = nodes_[i];
+    const GraphNode& y = nodes_[other];
     const bool swapped = lanes_.swapped[other];
     const std::uint32_t a = swapped ? y.b : y.a;
     const std::uint32_t b = swapped ? y.a : y.b;
@@ -445,7 +445,7 @@ class Emitter {
   }
   // An angle in full, its operands too: nothing is computed before it.
   std::string early(std::uint32_t i) {
-    const Node& node = nodes_[i];
+    const GraphNode& node = nodes_[i];
     const auto value = [&](std::uint32_t k) {
       return is_operation(nodes_[k].op) ? "(" + early(k) + ")" : operand(k);
     };
@@ -457,7 +457,7 @@ class Emitter {
     }
   }
 
-  std::span<const Node> nodes_;
+  std::span<const GraphNode> nodes_;
   const TracedKernel& kernel_;
   Lanes lanes_;
   SineTable& sines_;

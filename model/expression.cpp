@@ -19,11 +19,11 @@ Expr make(Graph* graph, Op op, std::uint32_t a, std::uint32_t b, bool negative) 
 
 bool is_zero(const Expr& a) { return a.is_constant() && a.value() == 0.0; }
 
-const Node& node_of(const Expr& a) { return a.graph()->nodes()[a.node()]; }
+const GraphNode& node_of(const Expr& a) { return a.graph()->nodes()[a.node()]; }
 
 // An operand of a node: a constant folds again.
 Expr operand_of(Graph* graph, std::uint32_t node, bool negative) {
-  const Node& operand = graph->nodes()[node];
+  const GraphNode& operand = graph->nodes()[node];
   if (operand.op != Op::kConstant) return {graph, node, negative};
   return negative ? -operand.value : operand.value;
 }
@@ -31,7 +31,7 @@ Expr operand_of(Graph* graph, std::uint32_t node, bool negative) {
 // x in (x + y) - y, (x - y) + y and y - (y - x): sum is a node, term a node or constant.
 bool cancels(const Expr& sum, const Expr& term, Expr& left) {
   if (sum.is_constant() || term.is_constant()) return false;
-  const Node& node = node_of(sum);
+  const GraphNode& node = node_of(sum);
   if (node.op != Op::kAdd && node.op != Op::kSub) return false;
   const bool b_negative = sum.negative() != (node.op == Op::kSub);
   if (node.a == term.node() && sum.negative() != term.negative()) {
@@ -48,9 +48,9 @@ bool cancels(const Expr& sum, const Expr& term, Expr& left) {
 // x and k of k x.
 bool is_multiple(const Expr& product, std::uint32_t& x, double& k) {
   if (product.is_constant()) return false;
-  const Node& node = node_of(product);
+  const GraphNode& node = node_of(product);
   if (node.op != Op::kMul) return false;
-  const Node& factor = product.graph()->nodes()[node.b];
+  const GraphNode& factor = product.graph()->nodes()[node.b];
   if (factor.op != Op::kConstant) return false;
   x = node.a;
   k = product.negative() ? -factor.value : factor.value;
@@ -68,7 +68,7 @@ std::size_t Graph::Hash::operator()(const std::array<std::uint64_t, 3>& key) con
   return hash;
 }
 
-std::uint32_t Graph::intern(const Node& node) {
+std::uint32_t Graph::intern(const GraphNode& node) {
   const std::array<std::uint64_t, 3> key{static_cast<std::uint64_t>(node.op),
                                          (static_cast<std::uint64_t>(node.a) << 32) | node.b,
                                          std::bit_cast<std::uint64_t>(node.value)};
@@ -84,7 +84,7 @@ Expr Graph::input(std::uint32_t array, std::uint32_t index) {
 Expr Graph::as_node(const Expr& expr) {
   if (!expr.is_constant()) return expr;
   const double value = expr.value();
-  const Node node{.op = Op::kConstant, .a = 0, .b = 0, .value = std::abs(value)};
+  const GraphNode node{.op = Op::kConstant, .a = 0, .b = 0, .value = std::abs(value)};
   return {this, intern(node), std::signbit(value)};
 }
 
@@ -122,7 +122,7 @@ Expr operator*(const Expr& a, const Expr& b) {
     if (b.value() == 0.0) return 0.0;
     if (b.value() == 1.0) return a;
     if (b.value() == -1.0) return -a;
-    const Node node = node_of(a);  // k1 * (k2 * x) = (k1 k2) * x
+    const GraphNode node = node_of(a);  // k1 * (k2 * x) = (k1 k2) * x
     if (node.op == Op::kMul && graph->nodes()[node.b].op == Op::kConstant) {
       const double k = graph->nodes()[node.b].value * b.value();
       return Expr(graph, node.a, a.negative()) * k;
@@ -206,7 +206,7 @@ std::vector<double> evaluate(const Graph& graph, std::span<const Expr> outputs,
   const auto nodes = graph.nodes();
   std::vector<double> value(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const Node& node = nodes[i];
+    const GraphNode& node = nodes[i];
     switch (node.op) {
       case Op::kInput: value[i] = inputs[node.a][node.b]; break;
       case Op::kConstant: value[i] = node.value; break;

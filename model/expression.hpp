@@ -16,7 +16,7 @@ enum class Op : std::uint8_t { kInput, kConstant, kAdd, kSub, kMul, kDiv, kSqrt,
 
 /// One operation. Operands are indices of earlier nodes, so indices are an evaluation order.
 /// No node is the negative of another: signs live on references and end up at the outputs.
-struct Node {
+struct GraphNode {
   Op op = Op::kConstant;
   std::uint32_t a = 0;  ///< kInput: the array
   std::uint32_t b = 0;  ///< kInput: the element; unused by kSqrt, kSin, kCos
@@ -85,10 +85,10 @@ class Graph {
 
   /// Element `index` of input array `array`.
   [[nodiscard]] Expr input(std::uint32_t array, std::uint32_t index);
-  [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }
+  [[nodiscard]] std::span<const GraphNode> nodes() const { return nodes_; }
 
   /// The node of these contents, made when there is none. For the arithmetic of Expr.
-  [[nodiscard]] std::uint32_t intern(const Node& node);
+  [[nodiscard]] std::uint32_t intern(const GraphNode& node);
   /// `expr` as a node and a sign; a constant becomes a node.
   [[nodiscard]] Expr as_node(const Expr& expr);
 
@@ -96,7 +96,7 @@ class Graph {
   struct Hash {
     std::size_t operator()(const std::array<std::uint64_t, 3>& key) const;
   };
-  std::vector<Node> nodes_;
+  std::vector<GraphNode> nodes_;
   std::unordered_map<std::array<std::uint64_t, 3>, std::uint32_t, Hash> known_;  // look-up only
 };
 

@@ -179,7 +179,7 @@ class Pairing {
       return side == Side::kTrunk ? 4 : side == Side::kFirst ? 1 : 2;
     };
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      const Node& node = nodes_[i];
+      const GraphNode& node = nodes_[i];
       if (node.op == Op::kInput)
         from[i] = bit(elements_.side(kernel_.shape.inputs[node.a], static_cast<int>(node.b)));
       if (!is_operation(node.op)) continue;
@@ -229,7 +229,7 @@ class Pairing {
     for (std::uint32_t i = 0; i < nodes_.size(); ++i)
       if (nodes_[i].op == Op::kInput) inputs[{nodes_[i].a, nodes_[i].b}] = i;
     for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
-      const Node& node = nodes_[i];
+      const GraphNode& node = nodes_[i];
       if (node.op != Op::kInput || side_[i] != Side::kFirst) continue;
       const int other = elements_.partner(kernel_.shape.inputs[node.a], static_cast<int>(node.b));
       const auto found = inputs.find({node.a, static_cast<std::uint32_t>(other)});
@@ -247,7 +247,7 @@ class Pairing {
     return nodes_[i].op == Op::kConstant ? kNone : i;
   }
   Key own_key(std::uint32_t i) const {
-    const Node& node = nodes_[i];
+    const GraphNode& node = nodes_[i];
     return key(node.op, no_constant(node.a), is_binary(node.op) ? no_constant(node.b) : 0);
   }
   void list_operations() {
@@ -271,7 +271,7 @@ class Pairing {
     return images;
   }
   double constant_of(std::uint32_t i) const {
-    const Node& node = nodes_[i];
+    const GraphNode& node = nodes_[i];
     if (nodes_[node.a].op == Op::kConstant) return nodes_[node.a].value;
     if (is_binary(node.op) && nodes_[node.b].op == Op::kConstant) return nodes_[node.b].value;
     return 0.0;
@@ -281,7 +281,7 @@ class Pairing {
   // operands, `a` for the first.
   template <class Act>
   void for_matches(std::uint32_t i, const Operations& operations, const Act& act) const {
-    const Node& node = nodes_[i];
+    const GraphNode& node = nodes_[i];
     if (!is_operation(node.op)) return;
     for (const std::uint32_t a : images_of_first(node.a)) {
       for (const std::uint32_t b : is_binary(node.op) ? images_of_first(node.b) : kNoOperand) {
@@ -329,7 +329,7 @@ class Pairing {
   // `a`: the operand of the second that is like the first operand of the first.
   void make_alike(std::uint32_t first, std::uint32_t second, std::uint32_t a) {
     lanes_.like_of[second] = first;
-    const Node& node = nodes_[second];
+    const GraphNode& node = nodes_[second];
     lanes_.swapped[second] = is_binary(node.op) && node.op != Op::kDiv && no_constant(node.a) != a;
   }
 
@@ -360,8 +360,8 @@ class Pairing {
 
   // The second operands in the order of the first ones.
   std::array<std::array<std::uint32_t, 2>, 2> operands(std::uint32_t i) const {
-    const Node& x = nodes_[i];
-    const Node& y = nodes_[lanes_.second_of[i]];
+    const GraphNode& x = nodes_[i];
+    const GraphNode& y = nodes_[lanes_.second_of[i]];
     return lanes_.swapped[lanes_.second_of[i]]
                ? std::array{std::array{x.a, y.b}, std::array{x.b, y.a}}
                : std::array{std::array{x.a, y.a}, std::array{x.b, y.b}};
@@ -427,7 +427,7 @@ class Pairing {
     sign_[i] = std::move(own);
   }
 
-  std::span<const Node> nodes_;
+  std::span<const GraphNode> nodes_;
   const TracedKernel& kernel_;
   std::span<const std::uint32_t> wanted_;
   Elements elements_;

@@ -15,7 +15,7 @@ constexpr int kMultiply = 4;  // or a multiplication with an addition
 constexpr int kDivide = 14;
 constexpr int kRoot = 18;
 
-bool is_sum(const Node& node) { return node.op == Op::kAdd || node.op == Op::kSub; }
+bool is_sum(const GraphNode& node) { return node.op == Op::kAdd || node.op == Op::kSub; }
 
 class Ordering {
  public:
@@ -92,7 +92,7 @@ class Ordering {
   }
 
   Expr image_of(std::uint32_t i) {
-    const Node& node = from_[i];
+    const GraphNode& node = from_[i];
     if (is_sum(node)) return sum(i);
     switch (node.op) {
       case Op::kInput: return known_at(to_.input(node.a, node.b), 0);
@@ -110,7 +110,7 @@ class Ordering {
     return {};
   }
   Expr product(std::uint32_t i) {
-    const Node& node = from_[i];
+    const GraphNode& node = from_[i];
     return known_at(image_[node.a] * image_[node.b], std::max(at(node.a), at(node.b)) + kMultiply);
   }
 
@@ -123,7 +123,7 @@ class Ordering {
 
   // The same places for a pair.
   void collect(std::uint32_t i, bool negative, std::vector<Term>& terms) const {
-    const Node& node = from_[i];
+    const GraphNode& node = from_[i];
     std::array operands{std::pair(node.a, negative),
                         std::pair(node.b, negative != (node.op == Op::kSub))};
     if (lanes_.like(i) != Lanes::kNone && lanes_.swapped[i]) std::swap(operands[0], operands[1]);
@@ -131,7 +131,7 @@ class Ordering {
       if (is_part(operand) && is_sum(from_[operand])) {
         collect(operand, minus, terms);
       } else if (is_part(operand)) {
-        const Node& factors = from_[operand];
+        const GraphNode& factors = from_[operand];
         terms.push_back({operand, minus, std::max(at(factors.a), at(factors.b)), true});
       } else {
         terms.push_back({operand, minus, at(operand), false});
@@ -176,7 +176,7 @@ class Ordering {
     return result;
   }
 
-  std::span<const Node> from_;
+  std::span<const GraphNode> from_;
   std::span<const Expr> outputs_;
   const Lanes& lanes_;
   Graph& to_;

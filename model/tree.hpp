@@ -33,7 +33,7 @@ struct Inertia {
 
 enum class JointType : std::uint8_t { kRevolute, kContinuous, kPrismatic };
 
-struct Range {
+struct Travel {
   double lower = -std::numeric_limits<double>::infinity();
   double upper = std::numeric_limits<double>::infinity();
 };
@@ -62,11 +62,11 @@ struct Joint {
   /// False for a continuous joint, and where the description gives no limits.
   [[nodiscard]] bool has_limits() const { return std::isfinite(lower) && std::isfinite(upper); }
   /// Range in which the leader keeps a follower within its limits.
-  [[nodiscard]] Range leaders_range() const {
+  [[nodiscard]] Travel leaders_range() const {
     if (!has_limits()) return {};
     const double a = (lower - offset) / multiplier;
     const double b = (upper - offset) / multiplier;
-    return a < b ? Range{a, b} : Range{b, a};
+    return a < b ? Travel{a, b} : Travel{b, a};
   }
 };
 

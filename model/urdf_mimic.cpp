@@ -105,7 +105,7 @@ class Narrowing {
   void narrow_range(Diagnostics& warnings) {
     constexpr double kNoWay = 1e-3;  // of what the narrower of the two has by itself
     if (!follower_.has_limits()) return;
-    const Range range = follower_.leaders_range();
+    const Travel range = follower_.leaders_range();
     // fmax() and fmin() take the follower's where the leader has none.
     const double lower = std::fmax(leader_.lower, range.lower);
     const double upper = std::fmin(leader_.upper, range.upper);

@@ -135,7 +135,7 @@ std::string axes_text(const Figure& figure, const Axes& axes) {
 /// Everything of one figure but terminal and output.
 std::string body(const Figure& figure, std::size_t index, const Cell& cell) {
   Axes axes = axes_of(figure);
-  const Layout at = layout_of(figure, axes, cell);
+  const FigureLayout at = layout_of(figure, axes, cell);
   if (figure.equal_axes) make_equal(axes, at);
   const auto x = [&cell](double pixels) { return pixels / cell.picture_width; };
   const auto y = [&cell](double pixels) { return pixels / cell.picture_height; };

@@ -86,7 +86,7 @@ std::vector<Pair> find_pairs(const tandem_kernels& k, const double* q) {
 
 }  // namespace
 
-bool wrenches_known(const tandem_kernels& k, const Motion& motion) {
+bool wrenches_known(const tandem_kernels& k, const SampledMotion& motion) {
   if (k.wrenches == 0 || !motion.wrenches.empty()) return true;
   std::vector<bool> seen(k.wrenches, false);
   for (const Pair pair : find_pairs(k, motion.q.front().data())) seen[pair.site] = true;
@@ -112,7 +112,8 @@ std::vector<double> derivative(std::span<const double> values, double step_s, st
   return out;
 }
 
-std::vector<std::vector<double>> inverse_dynamics(const tandem_kernels& k, const Motion& motion) {
+std::vector<std::vector<double>> inverse_dynamics(const tandem_kernels& k,
+                                                  const SampledMotion& motion) {
   const std::size_t rows = motion.q.size();
   std::vector<std::vector<double>> tau(rows, std::vector<double>(k.nv, 0.0));
   if (rows < 2) return tau;

@@ -11,7 +11,7 @@
 namespace tandem::report {
 
 /// A motion sampled at a constant step, row after row.
-struct Motion {
+struct SampledMotion {
   double step_s = 0.0;
   std::vector<std::vector<double>> q;        ///< rows of nq, model order
   std::vector<std::vector<double>> v;        ///< rows of nv
@@ -23,13 +23,13 @@ struct Motion {
 
 /// Whether the wrench at every wrench site can be known: a six-axis sensor sees it and no other,
 /// or the motion has it. If not, inverse_dynamics() would be wrong by what acts there.
-[[nodiscard]] bool wrenches_known(const tandem_kernels& kernels, const Motion& motion);
+[[nodiscard]] bool wrenches_known(const tandem_kernels& kernels, const SampledMotion& motion);
 
 /// tau (nv) of each row: inverse dynamics with the acceleration differenced from v. The wrench at
 /// a wrench site is the one that explains what its six-axis sensor measured; at a site without a
 /// sensor of its own it is the motion's, or none.
 [[nodiscard]] std::vector<std::vector<double>> inverse_dynamics(const tandem_kernels& kernels,
-                                                                const Motion& motion);
+                                                                const SampledMotion& motion);
 
 /// Derivative of a signal with a constant step: the slope of the line fitted to `half` samples on
 /// both sides, fewer at the ends (Savitzky and Golay, 1964: first order).

@@ -126,10 +126,10 @@ Axes axes_of(const Figure& figure) {
   return axes;
 }
 
-Layout layout_of(const Figure& figure, const Axes& axes, const Cell& cell) {
+FigureLayout layout_of(const Figure& figure, const Axes& axes, const Cell& cell) {
   const double font = cell.font;
   const double line = 1.35 * font;
-  Layout at{};
+  FigureLayout at{};
   at.label_x = cell.left + 0.9 * font;
   at.left = at.label_x + 1.3 * font + kLetter * font * static_cast<double>(axes.widest) + font;
   at.right = cell.left + cell.width - 1.6 * font;
@@ -150,7 +150,7 @@ Layout layout_of(const Figure& figure, const Axes& axes, const Cell& cell) {
   return at;
 }
 
-void make_equal(Axes& axes, const Layout& at) {
+void make_equal(Axes& axes, const FigureLayout& at) {
   const double aspect = (at.right - at.left) / (at.top - at.bottom);
   const double wide =
       std::max(1.12 * (axes.x.high - axes.x.low), aspect * (axes.y.high - axes.y.low));

@@ -41,7 +41,7 @@ struct Cell {
 };
 
 /// Where things of one figure stand, in pixels as Cell.
-struct Layout {
+struct FigureLayout {
   double left, right, bottom, top;  ///< of the axes
   double title_y, key_y, label_x;   ///< middle of the title, top of the key, middle of y's label
   double title_font;                ///< points
@@ -52,9 +52,9 @@ struct Layout {
 [[nodiscard]] Axes axes_of(const Figure& figure);
 
 /// The margins are what numbers, labels, title and key need, so that none lies on another.
-[[nodiscard]] Layout layout_of(const Figure& figure, const Axes& axes, const Cell& cell);
+[[nodiscard]] FigureLayout layout_of(const Figure& figure, const Axes& axes, const Cell& cell);
 
 /// With equal axes the room beside the figure is shared on both sides.
-void make_equal(Axes& axes, const Layout& at);
+void make_equal(Axes& axes, const FigureLayout& at);
 
 }  // namespace tandem::report

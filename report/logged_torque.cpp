@@ -73,7 +73,8 @@ Result<model::ClosedLoops> loops_of(const RunData& run, const tandem_kernels& ke
 
 /// The motion's next row, with the passive joints' velocities that keep the loops closed.
 void add_row(const RunData& run, std::size_t row, const tandem_kernels& kernels,
-             const std::vector<std::size_t>& order, model::ClosedLoops& loops, Motion& motion) {
+             const std::vector<std::size_t>& order, model::ClosedLoops& loops,
+             SampledMotion& motion) {
   std::vector<double> q, v, sensors;
   if (kernels.floating_base != 0) {
     for (std::size_t i = 0; i < 7; ++i) q.push_back(run.base[i][row]);
@@ -99,13 +100,13 @@ void add_row(const RunData& run, std::size_t row, const tandem_kernels& kernels,
 
 /// The rows [begin, end), between which none is missing, a few milliseconds apart.
 /// @param times  get those of the motion's rows
-Motion motion_of(const RunData& run, std::size_t begin, std::size_t end,
-                 const tandem_kernels& kernels, const std::vector<std::size_t>& order,
-                 model::ClosedLoops& loops, std::vector<double>& times) {
+SampledMotion motion_of(const RunData& run, std::size_t begin, std::size_t end,
+                        const tandem_kernels& kernels, const std::vector<std::size_t>& order,
+                        model::ClosedLoops& loops, std::vector<double>& times) {
   const auto stride = static_cast<std::size_t>(std::max(1.0, kMotionStep_s / run.step_s));
   const std::vector<int> feet = feet_of_wrenches(run, kernels);
   const bool ground_known = run.motion_known() || run.robot.contact.feet.empty();
-  Motion motion;
+  SampledMotion motion;
   motion.step_s = run.step_s * static_cast<double>(stride);
   for (std::size_t row = begin; row < end; row += stride) {
     add_row(run, row, kernels, order, loops, motion);
@@ -132,7 +133,8 @@ Result<Curve> inverse_dynamics_curve(const RunData& run, int joint, const tandem
   ends.push_back(times.size());
   Curve curve{"inverse dynamics", CurveStyle::kComputed, {}, {}};
   for (std::size_t i = 0; i + 1 < ends.size(); ++i) {
-    const Motion motion = motion_of(run, ends[i], ends[i + 1], kernels, *order, *loops, curve.x);
+    const SampledMotion motion =
+        motion_of(run, ends[i], ends[i + 1], kernels, *order, *loops, curve.x);
     if (!wrenches_known(kernels, motion)) return fail("the log lacks the ground's forces");
     std::vector<std::vector<double>> torques = inverse_dynamics(kernels, motion);
     const bool has_rates = torques.size() > 1;

@@ -121,17 +121,17 @@ std::vector<FootPoints> feet_of(const model::Tree& tree, const hal::RobotConfig&
 
 /// What closes a loop: from the last joint on one side over both sites to the other side's. The
 /// sites coincide, or a rod is between them.
-struct LoopLine {
+struct ClosureLine {
   std::array<std::size_t, 2> bodies{};
   bool leg = false;
   std::vector<Eigen::Vector3d> points_m;
 };
 
-std::vector<LoopLine> loops_of(const model::Tree& tree, const hal::RobotConfig& robot,
-                               std::span<const model::Placement> bodies) {
+std::vector<ClosureLine> loops_of(const model::Tree& tree, const hal::RobotConfig& robot,
+                                  std::span<const model::Placement> bodies) {
   const std::vector<bool> leg = leg_bodies(tree, robot);
-  std::vector<LoopLine> lines;
-  for (const model::LoopSpec& loop : robot.loops) {
+  std::vector<ClosureLine> lines;
+  for (const model::KinematicLoop& loop : robot.loops) {
     const auto a = place_of(loop.sites[0], tree, robot, bodies);
     const auto b = place_of(loop.sites[1], tree, robot, bodies);
     if (!a || !b) continue;
@@ -150,7 +150,7 @@ std::vector<Eigen::Vector3d> drawn_points(const model::Tree& tree, const hal::Ro
   for (const FootPoints& foot : feet_of(tree, robot, bodies)) {
     points.insert(points.end(), foot.points_m.begin(), foot.points_m.end());
   }
-  for (const LoopLine& loop : loops_of(tree, robot, bodies)) {
+  for (const ClosureLine& loop : loops_of(tree, robot, bodies)) {
     points.insert(points.end(), loop.points_m.begin(), loop.points_m.end());
   }
   return points;
@@ -233,7 +233,7 @@ void end_line(Curve& curve) {
 /// One figure. A limb ends at its last body's foot, its loops or else its centre of mass.
 void add_figure(Sticks& sticks, std::span<const Limb> limbs, const model::Tree& tree,
                 const hal::RobotConfig& robot, std::span<const model::Placement> bodies) {
-  const std::vector<LoopLine> loops = loops_of(tree, robot, bodies);
+  const std::vector<ClosureLine> loops = loops_of(tree, robot, bodies);
   const bool legged = !robot.contact.feet.empty();
   for (const Limb& limb : limbs) {
     Curve& curve = limb.leg ? sticks.legs : (limb.trunk || !legged ? sticks.trunk : sticks.others);
@@ -247,7 +247,7 @@ void add_figure(Sticks& sticks, std::span<const Limb> limbs, const model::Tree& 
       add_point(curve, bodies[static_cast<std::size_t>(body)].p);
     }
     const auto tip = static_cast<std::size_t>(limb.bodies.back());
-    const bool goes_on = std::ranges::any_of(loops, [tip](const LoopLine& loop) {
+    const bool goes_on = std::ranges::any_of(loops, [tip](const ClosureLine& loop) {
       return loop.bodies[0] == tip || loop.bodies[1] == tip;
     });
     if (!limb.leg && !goes_on) {
@@ -255,7 +255,7 @@ void add_figure(Sticks& sticks, std::span<const Limb> limbs, const model::Tree& 
     }
     end_line(curve);
   }
-  for (const LoopLine& loop : loops) {
+  for (const ClosureLine& loop : loops) {
     Curve& curve = loop.leg ? sticks.legs : sticks.trunk;
     for (const Eigen::Vector3d& point : loop.points_m) add_point(curve, point);
     end_line(curve);

@@ -91,8 +91,8 @@ std::vector<log::Column> columns_of(std::initializer_list<Wanted> fields) {
 }
 
 /// Some columns of a topic. Errors: LogFile::read()'s; times that go back.
-Result<log::Table> read_columns(const log::LogFile& file, const std::string& topic,
-                                std::initializer_list<Wanted> fields) {
+Result<log::TimeSeries> read_columns(const log::LogFile& file, const std::string& topic,
+                                     std::initializer_list<Wanted> fields) {
   auto table = file.read(topic, columns_of(fields));
   if (!table || std::ranges::is_sorted(table->time_s)) return table;
   return std::unexpected(Error{"the messages of " + topic + " are not in the order of their times",
@@ -103,14 +103,14 @@ Result<log::Table> read_columns(const log::LogFile& file, const std::string& top
 }
 
 /// Moves `count` columns from `from` on.
-Columns take(log::Table& table, std::size_t from, std::size_t count) {
+Columns take(log::TimeSeries& table, std::size_t from, std::size_t count) {
   const auto begin = table.columns.begin() + static_cast<std::ptrdiff_t>(from);
   return {std::make_move_iterator(begin),
           std::make_move_iterator(begin + static_cast<std::ptrdiff_t>(count))};
 }
 
 /// Drops the rows of `table` outside [begin_s, end_s].
-void crop(log::Table& table, double begin_s, double end_s) {
+void crop(log::TimeSeries& table, double begin_s, double end_s) {
   const auto first = std::ranges::lower_bound(table.time_s, begin_s) - table.time_s.begin();
   const auto last = std::ranges::upper_bound(table.time_s, end_s) - table.time_s.begin();
   const auto cut = [first, last](std::vector<double>& values) {
@@ -142,7 +142,8 @@ std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
   return faults;
 }
 
-Result<log::Table> state_columns(const log::LogFile& file, const char* topic, const RunData& run) {
+Result<log::TimeSeries> state_columns(const log::LogFile& file, const char* topic,
+                                      const RunData& run) {
   const std::size_t n = run.robot.joints.size();
   const std::size_t channels = run.first_channel(run.robot.sensors.size());
   return read_columns(
@@ -151,7 +152,7 @@ Result<log::Table> state_columns(const log::LogFile& file, const char* topic, co
 }
 
 /// What was measured in the window.
-Status read_rows(log::Table& table, const log::RunWindow& window, RunData& run) {
+Status read_rows(log::TimeSeries& table, const log::RunWindow& window, RunData& run) {
   const std::size_t n = run.robot.joints.size();
   const std::size_t channels = run.first_channel(run.robot.sensors.size());
   crop(table, window.begin_s, window.end_s);
@@ -206,7 +207,7 @@ Status read_command(const log::LogFile& file, RunData& run) {
 
 /// Rows that the run and a table of another topic have alike: the log of a killed run may end
 /// between a state and its truth. 0: they do not fit.
-std::size_t shared_rows(const RunData& run, const log::Table& table) {
+std::size_t shared_rows(const RunData& run, const log::TimeSeries& table) {
   const std::size_t rows = std::min(run.rows(), table.time_s.size());
   const bool same =
       std::equal(run.time_s.begin(), run.time_s.begin() + static_cast<std::ptrdiff_t>(rows),

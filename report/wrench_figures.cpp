@@ -19,7 +19,7 @@ struct Quantity {
 constexpr Quantity kQuantities[] = {{"force", "external_force_n", "N"},
                                     {"moment", "external_moment_nm", "Nm"}};
 
-Figure figure_of(const std::string& site, const Quantity& what, log::Table& table,
+Figure figure_of(const std::string& site, const Quantity& what, log::TimeSeries& table,
                  std::size_t first) {
   constexpr std::pair<const char*, CurveStyle> kAxes[] = {
       {"x", CurveStyle::kMeasured}, {"y", CurveStyle::kSecond}, {"z", CurveStyle::kFourth}};

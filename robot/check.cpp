@@ -19,13 +19,13 @@ void add(const Diagnostics& from, Diagnostics& to) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
-void loops(const Subject& s, Findings& findings) {
+void loops(const CheckedRobot& s, Findings& findings) {
   findings.loops = study_loops(s.robot.config, s.kernels, s.use.postures);
   add(findings.loops.errors, findings.errors);
 }
 
 /// A floating base that nothing carries.
-void falls_for_ever(const Subject& s, Findings& findings) {
+void falls_for_ever(const CheckedRobot& s, Findings& findings) {
   const hal::RobotConfig& robot = s.robot.config;
   const bool pulled =
       std::ranges::any_of(robot.model.gravity_m_s2, [](double g) { return g != 0.0; });
@@ -38,7 +38,7 @@ void falls_for_ever(const Subject& s, Findings& findings) {
 }
 
 /// Whether its boards can be emulated.
-void firmware(const Subject& s, Findings& findings) {
+void firmware(const CheckedRobot& s, Findings& findings) {
   const Status boards = sim::check_firmware(s.robot.config);
   if (boards) return;
   if (!s.use.alone) return findings.add_error(boards.error());
@@ -49,7 +49,7 @@ void firmware(const Subject& s, Findings& findings) {
 
 /// Whether the engine takes the robot. Other engines have one coefficient for soles that stick and
 /// that slide.
-void engine(const Subject& s, Findings& findings) {
+void engine(const CheckedRobot& s, Findings& findings) {
   sim::SimRobotConfig simulation = s.use.simulation;
   if (simulation.engine == sim::kOwnEngine) return;
   if (simulation.tree == nullptr) {
@@ -71,7 +71,7 @@ void engine(const Subject& s, Findings& findings) {
 
 /// Warns of a drive that is given its bearings' friction alone, a common slip: its motor turned
 /// many times as fast as its voltage allows.
-void back_emf(const Subject& s, Findings& findings) {
+void back_emf(const CheckedRobot& s, Findings& findings) {
   for (const hal::ActuatorConfig& actuator : s.robot.config.actuators) {
     const double per_A = actuator.torque_per_A();
     const double whole = per_A * per_A / actuator.resistance_ohm;
@@ -88,7 +88,7 @@ void back_emf(const Subject& s, Findings& findings) {
 }
 
 /// Gravity with z > 0: legal, and nearly always a slip of sign.
-void upward_gravity(const Subject& s, Findings& findings) {
+void upward_gravity(const CheckedRobot& s, Findings& findings) {
   const hal::RobotConfig& robot = s.robot.config;
   if (!(robot.model.gravity_m_s2[2] > 0.0)) return;
   findings.warn(
@@ -100,19 +100,19 @@ void upward_gravity(const Subject& s, Findings& findings) {
 }
 
 /// What drives of other makes miss. A layout that cannot be made is an error of the bus' load, too.
-void drives(const Subject& s, Findings& findings) {
+void drives(const CheckedRobot& s, Findings& findings) {
   add(hal::can::sheet_warnings(s.robot.config), findings.warnings);
   const auto found = hal::can::drive_warnings(s.robot.config);
   if (found) return add(*found, findings.warnings);
   if (s.use.period_ns == 0) findings.add_error(found.error());
 }
 
-void interpolation(const Subject& s, Findings& findings) {
+void interpolation(const CheckedRobot& s, Findings& findings) {
   if (s.use.period_ns == 0) return;
   add(hal::can::check_interpolation(s.robot.config, s.use.period_ns), findings.errors);
 }
 
-void bus_load(const Subject& s, Findings& findings) {
+void bus_load(const CheckedRobot& s, Findings& findings) {
   if (s.use.period_ns == 0) return;
   add(hal::can::check_bus_load(s.robot.config, s.use.period_ns), findings.errors);
 }
@@ -122,7 +122,7 @@ enum Who : unsigned { kAlone = 1, kPlant = 2, kDrives = 4, kAll = 8 };
 
 struct Row {
   unsigned who;
-  void (*look)(const Subject& subject, Findings& findings);
+  void (*look)(const CheckedRobot& subject, Findings& findings);
 };
 
 constexpr Row kRows[] = {
@@ -157,7 +157,7 @@ Findings check(const RobotFiles& robot, const RobotUse& use) {
     return findings;
   }
   const model::InterpretedKernels kernels(std::move(*mechanism), robot.config.name);
-  const Subject subject{robot, use, *kernels.get()};
+  const CheckedRobot subject{robot, use, *kernels.get()};
   for (const Row& row : kRows) {
     if ((row.who & who(use)) != 0) row.look(subject, findings);
   }

@@ -8,7 +8,7 @@
 
 #include "base/result.hpp"
 #include "hal/sim/emulated_robot.hpp"
-#include "robot/loop_study.hpp"
+#include "robot/closure_study.hpp"
 #include "robot/robot_files.hpp"
 
 namespace tandem::robot {
@@ -26,7 +26,7 @@ struct RobotUse {
 struct Findings {
   Diagnostics errors;
   Diagnostics warnings;  ///< beside RobotFiles::warnings
-  LoopStudy loops;       ///< of `alone` and `plant`
+  ClosureStudy loops;    ///< of `alone` and `plant`
 
   void add_error(Error error) { errors.push_back(std::move(error)); }
   void warn(Error warning) { warnings.push_back(std::move(warning)); }

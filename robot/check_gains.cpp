@@ -60,7 +60,7 @@ std::optional<Error> ringing_loops(const hal::RobotConfig& config, const tandem_
 
 }  // namespace
 
-void check_gains(const Subject& s, Findings& findings) {
+void check_gains(const CheckedRobot& s, Findings& findings) {
   if (s.use.postures.empty()) return;
   auto warning = ringing_loops(s.robot.config, s.kernels, s.use.postures.front());
   if (warning) findings.warn(std::move(*warning));

@@ -88,7 +88,7 @@ Diagnostics buried_links(const RobotFiles& robot, const std::string& posture) {
 
 }  // namespace
 
-void check_start_heights(const Subject& s, Findings& findings) {
+void check_start_heights(const CheckedRobot& s, Findings& findings) {
   for (const std::string& posture : s.use.postures) {
     auto error = wrong_start_height(s.robot, posture);
     if (!error) continue;
@@ -96,7 +96,7 @@ void check_start_heights(const Subject& s, Findings& findings) {
   }
 }
 
-void check_buried_links(const Subject& s, Findings& findings) {
+void check_buried_links(const CheckedRobot& s, Findings& findings) {
   for (const std::string& posture : s.use.postures) {
     for (Error& warning : buried_links(s.robot, posture)) findings.warn(std::move(warning));
   }

@@ -25,7 +25,7 @@ void warn(const std::string& what, const std::vector<std::string>& joints, const
 
 }  // namespace
 
-void check_unused_limits(const Subject& s, Findings& findings) {
+void check_unused_limits(const CheckedRobot& s, Findings& findings) {
   const hal::RobotConfig& robot = s.robot.config;
   const model::Tree& tree = s.robot.tree;
   const auto extras = model::joint_extras(text_in(s.robot.files, robot.model.urdf));

@@ -88,7 +88,7 @@ std::optional<Error> too_weak_at(const RobotFiles& robot, const tandem_kernels& 
 
 }  // namespace
 
-void check_torques(const Subject& s, Findings& findings) {
+void check_torques(const CheckedRobot& s, Findings& findings) {
   for (const std::string& posture : s.use.postures) {
     if (auto warning = too_weak_at(s.robot, s.kernels, posture)) findings.warn(std::move(*warning));
   }

@@ -39,7 +39,7 @@ hal::RobotDescription plain(const model::UrdfModel& model) {
   for (const model::Joint& joint : model.tree.joints) {
     if (joint.follows()) {
       const model::Joint& leader = model.tree.joints[static_cast<std::size_t>(joint.leader)];
-      const model::Range range = joint.leaders_range();
+      const model::Travel range = joint.leaders_range();
       description.followers.push_back({joint.name, leader.name, range.lower, range.upper});
       continue;
     }
@@ -84,7 +84,7 @@ std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& ro
   robot.followers = followers_of(robot, found->tree);
   for (hal::PostureConfig& posture : robot.postures) {
     if (!std::isnan(posture.base_height_m)) continue;
-    const std::optional<Standing> touching = standing(robot, posture, found->tree);
+    const std::optional<StandingHeight> touching = standing(robot, posture, found->tree);
     posture.base_height_m = touching ? touching->base_height_m : 0.0;
   }
   return found;

@@ -36,10 +36,10 @@ std::vector<model::Placement> bodies_in(const hal::RobotConfig& robot,
   return model::place_bodies(tree, position);
 }
 
-std::optional<Standing> standing(const hal::RobotConfig& robot, const hal::PostureConfig& posture,
-                                 const model::Tree& tree) {
+std::optional<StandingHeight> standing(const hal::RobotConfig& robot,
+                                       const hal::PostureConfig& posture, const model::Tree& tree) {
   const std::vector<model::Placement> bodies = bodies_in(robot, posture, tree);
-  std::optional<Standing> highest;
+  std::optional<StandingHeight> highest;
   for (const hal::Foot& foot : robot.contact.feet) {
     const auto site = std::ranges::find(robot.model.sites, foot.site, &hal::SiteConfig::name);
     const int index = site == robot.model.sites.end() ? -1 : tree.link_index(site->link);
@@ -50,7 +50,7 @@ std::optional<Standing> standing(const hal::RobotConfig& robot, const hal::Postu
     for (const auto& [x, y, z] : foot.points_m) {
       const double below = -(sole.R * Eigen::Vector3d(x, y, z) + sole.p).z();
       const double height = robot.contact.height_m + below;
-      if (!highest || height > highest->base_height_m) highest = Standing{height, foot.site};
+      if (!highest || height > highest->base_height_m) highest = StandingHeight{height, foot.site};
     }
   }
   return highest;

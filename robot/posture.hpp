@@ -20,7 +20,7 @@ namespace tandem::robot {
                                                  const hal::PostureConfig* posture);
 
 /// Where a robot touches the ground.
-struct Standing {
+struct StandingHeight {
   double base_height_m = 0.0;  ///< of the upright base's origin above W's
   std::string foot;            ///< the site of the foot that touches
 };
@@ -32,8 +32,8 @@ struct Standing {
 
 /// The height of an upright base at which the lowest point of the feet touches the ground in this
 /// posture. Feet on links that the description lacks are passed over; nothing without any.
-[[nodiscard]] std::optional<Standing> standing(const hal::RobotConfig& robot,
-                                               const hal::PostureConfig& posture,
-                                               const model::Tree& tree);
+[[nodiscard]] std::optional<StandingHeight> standing(const hal::RobotConfig& robot,
+                                                     const hal::PostureConfig& posture,
+                                                     const model::Tree& tree);
 
 }  // namespace tandem::robot

@@ -4,7 +4,7 @@
 #include "base/toml_reader.hpp"
 #include "hal/sim/setup.hpp"
 #include "model/regular.hpp"
-#include "robot/loop_study.hpp"
+#include "robot/closure_study.hpp"
 
 namespace tandem::robot {
 

@@ -13,7 +13,7 @@ Status check_rate(double rate) {
               "it is simulated seconds per wall second; 0 runs as fast as the machine goes");
 }
 
-ClockControl::ClockControl(const LoopConfig& config, Doorbell& bell)
+ClockControl::ClockControl(const CyclicLoopConfig& config, Doorbell& bell)
     : pacing_(config.pacing),
       bell_(&bell),
       gated_(config.start_paused && config.pacing == Pacing::kSimulated),

@@ -44,7 +44,7 @@ class ClockControl {
  public:
   /// Pacing, rate and start_paused of the loop. `bell` is what the loop waits by; it outlives
   /// this, and everything asked for rings it.
-  ClockControl(const LoopConfig& config, Doorbell& bell);
+  ClockControl(const CyclicLoopConfig& config, Doorbell& bell);
 
   /// No cycle begins any more; the one at work ends. Nothing to do is no error.
   /// @return the cycles of steps that were still to begin: they are dropped.

@@ -22,7 +22,7 @@ std::int64_t scaled(std::int64_t period_ns, double rate) {
   return std::max<std::int64_t>(1, std::llround(static_cast<double>(period_ns) / rate));
 }
 
-std::int64_t grid_step(const LoopConfig& config) {
+std::int64_t grid_step(const CyclicLoopConfig& config) {
   switch (config.pacing) {
     case Pacing::kWallClock: return config.period_ns;
     case Pacing::kSimulated: return scaled(config.period_ns, config.rate);
@@ -33,7 +33,7 @@ std::int64_t grid_step(const LoopConfig& config) {
 
 }  // namespace
 
-CyclicLoop::CyclicLoop(const LoopConfig& config, Clock& clock, ClockControl* control)
+CyclicLoop::CyclicLoop(const CyclicLoopConfig& config, Clock& clock, ClockControl* control)
     : config_(config),
       clock_(&clock),
       control_(config.pacing == Pacing::kSimulated ? control : nullptr),

@@ -31,7 +31,7 @@ enum class OverrunPolicy : std::uint8_t {
   kStop,  ///< as kSkip, until `stop_late` of the last `stop_window` cycles were late
 };
 
-struct LoopConfig {
+struct CyclicLoopConfig {
   std::int64_t period_ns = 1'000'000;
   Pacing pacing = Pacing::kSimulated;
   double rate = 0.0;          ///< simulated only: times real time; 0 runs as fast as it can
@@ -54,7 +54,7 @@ struct Tick {
 };
 
 /// Counts and histograms of one run.
-struct LoopStatistics {
+struct CycleStatistics {
   std::uint64_t cycles = 0;    ///< started
   std::uint64_t overruns = 0;  ///< cycles whose work ended after the next grid point
   std::uint64_t skipped = 0;   ///< grid points without a cycle (wall clock)
@@ -69,7 +69,7 @@ class CyclicLoop {
  public:
   /// @pre config.period_ns > 0, rate >= 0, 1 <= stop_late <= stop_window <= 64.
   /// Clock and control outlive the loop; null: nobody pauses it. Real time obeys no control.
-  CyclicLoop(const LoopConfig& config, Clock& clock, ClockControl* control = nullptr);
+  CyclicLoop(const CyclicLoopConfig& config, Clock& clock, ClockControl* control = nullptr);
 
   /// Blocks until the next cycle's start. The first call starts the grid and returns cycle
   /// `next_cycle()` at once, and so does the first after a pause, which is no overrun. One sleep
@@ -83,8 +83,8 @@ class CyclicLoop {
 
   /// The number that the next wait() gives when nothing is late.
   [[nodiscard]] std::uint64_t next_cycle() const noexcept { return next_cycle_; }
-  [[nodiscard]] const LoopConfig& config() const noexcept { return config_; }
-  [[nodiscard]] const LoopStatistics& statistics() const noexcept { return statistics_; }
+  [[nodiscard]] const CyclicLoopConfig& config() const noexcept { return config_; }
+  [[nodiscard]] const CycleStatistics& statistics() const noexcept { return statistics_; }
   /// Bus time of the newest cycle that waited for one; -1: none did.
   [[nodiscard]] std::int64_t last_bus_ns() const noexcept { return last_bus_ns_; }
   /// Work time of the newest cycle that finished.
@@ -111,7 +111,7 @@ class CyclicLoop {
   bool pace(Tick& tick) noexcept;
   void judge(Tick& tick, std::uint64_t missed) noexcept TANDEM_RT;
 
-  LoopConfig config_;
+  CyclicLoopConfig config_;
   Clock* clock_;
   ClockControl* control_;
   std::int64_t step_ns_ = 0;  // between grid points on the clock; 0: not paced
@@ -121,7 +121,7 @@ class CyclicLoop {
   std::int64_t begin_ns_ = 0;  // clock time at which the current cycle's work began
   std::int64_t last_bus_ns_ = -1, last_work_ns_ = 0;
   std::uint64_t late_mask_ = 0;  // bit 0: the newest cycle was late
-  LoopStatistics statistics_;
+  CycleStatistics statistics_;
 };
 
 }  // namespace tandem::rt

@@ -76,7 +76,7 @@ void BumplessTransfer::begin_from(std::size_t joint, const hal::StateImage& stat
 void BumplessTransfer::begin(std::size_t joint, const hal::StateImage& state,
                              hal::CommandImage& command, double speed_rad_s,
                              Pace pace) noexcept TANDEM_RT {
-  Joint& of = joints_[joint];
+  JointTransfer& of = joints_[joint];
   if (of.left > 0 && of.known == 0) {  // of this cycle: `command` is not the last one any more
     of.pace = std::max(of.pace, pace);
     return;
@@ -98,7 +98,7 @@ void BumplessTransfer::begin(std::size_t joint, const hal::StateImage& state,
 BumplessTransfer::Brake BumplessTransfer::brake(
     std::size_t joint, const hal::StateImage& state, ControlMode mode,
     InteractionMode interaction) const noexcept TANDEM_RT {
-  const Joint& of = joints_[joint];
+  const JointTransfer& of = joints_[joint];
   Brake brake{.from_rad = state.position_rad()[joint]};
   const bool moved =
       of.left > 0 && of.known == 0 && of.enabled != 0 && !is(of.mode, ControlMode::kIdle);
@@ -148,7 +148,7 @@ std::int64_t BumplessTransfer::fade_cycles(std::size_t joint,
 
 BumplessTransfer::Impedance BumplessTransfer::written(
     std::size_t joint, const hal::CommandImage& command) const noexcept TANDEM_RT {
-  const Joint& of = joints_[joint];
+  const JointTransfer& of = joints_[joint];
   if (of.left > 0 && of.known != 0) return {of.written[kStiffness], of.written[kDamping]};
   return {command.stiffness_Nm_rad()[joint], command.damping_Nms_rad()[joint]};
 }
@@ -166,7 +166,7 @@ void BumplessTransfer::before_update(hal::CommandImage& command) const noexcept 
 
 void BumplessTransfer::find_offset(std::size_t index, const hal::StateImage& state,
                                    const hal::CommandImage& command) noexcept TANDEM_RT {
-  Joint& joint = joints_[index];
+  JointTransfer& joint = joints_[index];
   const auto mode = static_cast<ControlMode>(command.mode()[index]);
   const auto interaction = static_cast<InteractionMode>(command.interaction()[index]);
   const Brake from = brake(index, state, mode, interaction);
@@ -218,7 +218,7 @@ bool BumplessTransfer::sets_out(std::size_t index, double from_rad,
 void BumplessTransfer::lead_from(std::size_t index, double from_rad, double speed_rad_s,
                                  double owner_rad_s, std::int64_t cycles) noexcept TANDEM_RT {
   constexpr double kAnyRoom = std::numeric_limits<double>::infinity();
-  Joint& joint = joints_[index];
+  JointTransfer& joint = joints_[index];
   const double speed = speed_rad_s - owner_rad_s;
   joint.since = 0;
   joint.known = 1;
@@ -235,7 +235,7 @@ void BumplessTransfer::lead_from(std::size_t index, double from_rad, double spee
 /// An owner may move its position reference and leave the velocity's alone: its second one tells.
 void BumplessTransfer::notice_unwritten_speed(std::size_t index,
                                               const References& first) noexcept TANDEM_RT {
-  Joint& joint = joints_[index];
+  JointTransfer& joint = joints_[index];
   joint.known = 2;
   const double most = limits_[index].max_velocity_rad_s;
   const double speed = (joint.written[kPosition] - first[kPosition]) / period_s_;
@@ -252,7 +252,8 @@ void BumplessTransfer::notice_unwritten_speed(std::size_t index,
   joint.offset[kVelocity] += unwritten;
 }
 
-BumplessTransfer::References BumplessTransfer::sum(const Joint& joint) const noexcept TANDEM_RT {
+BumplessTransfer::References BumplessTransfer::sum(
+    const JointTransfer& joint) const noexcept TANDEM_RT {
   const auto cycles = static_cast<double>(joint.since);
   const MinJerk fade = min_jerk(cycles / static_cast<double>(joint.fade_cycles));
   const double share = 1.0 - fade.s;  // position and torque carry a load together
@@ -264,8 +265,9 @@ BumplessTransfer::References BumplessTransfer::sum(const Joint& joint) const noe
   sum[kVelocity] -= fade.ds / fade_s * joint.offset[kPosition];
   if (joint.speed_rad_s != 0.0 && joint.since < joint.brake_cycles) {
     const double brake_s = static_cast<double>(joint.brake_cycles) * period_s_;
-    const Motion left = quintic({-joint.speed_rad_s * brake_s / 2.0, joint.speed_rad_s, 0.0}, {},
-                                brake_s, cycles * period_s_);
+    const TrajectoryPoint left =
+        quintic({-joint.speed_rad_s * brake_s / 2.0, joint.speed_rad_s, 0.0}, {}, brake_s,
+                cycles * period_s_);
     sum[kPosition] += left.position;
     sum[kVelocity] += left.velocity;
   }
@@ -276,7 +278,7 @@ void BumplessTransfer::after_update(const hal::StateImage& state,
                                     hal::CommandImage& command) noexcept TANDEM_RT {
   if (going_ == 0) return;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
-    Joint& joint = joints_[j];
+    JointTransfer& joint = joints_[j];
     if (joint.left == 0) continue;
     const References before = joint.written;
     joint.written = read(command, j);
@@ -303,7 +305,7 @@ void BumplessTransfer::cancel(hal::CommandImage& command) noexcept TANDEM_RT {
 }
 
 void BumplessTransfer::clear() noexcept TANDEM_RT {
-  for (Joint& joint : joints_) joint.left = 0;
+  for (JointTransfer& joint : joints_) joint.left = 0;
   going_ = begun_ = 0;
 }
 

@@ -92,7 +92,7 @@ class BumplessTransfer {
  private:
   static constexpr std::size_t kReferences = 5;
   using References = std::array<double, kReferences>;
-  struct Joint {
+  struct JointTransfer {
     References offset{};       // that fades; before it is known, the last command
     References written{};      // by the owner, without the offset
     double speed_rad_s = 0.0;  // that the brake takes away; before that is known, the last one
@@ -123,14 +123,14 @@ class BumplessTransfer {
   void lead_from(std::size_t joint, double from_rad, double speed_rad_s, double owner_rad_s,
                  std::int64_t brake_cycles) noexcept TANDEM_RT;
   void notice_unwritten_speed(std::size_t joint, const References& first) noexcept TANDEM_RT;
-  [[nodiscard]] References sum(const Joint& joint) const noexcept TANDEM_RT;
+  [[nodiscard]] References sum(const JointTransfer& joint) const noexcept TANDEM_RT;
 
   std::span<const hal::JointCapabilities> limits_;
   double period_s_;
   std::int64_t cycles_;      // that kTime is
   std::uint64_t going_ = 0;  // joints with cycles left
   std::uint64_t begun_ = 0;  // of these, whose offset is not known
-  std::vector<Joint> joints_;
+  std::vector<JointTransfer> joints_;
   std::vector<double> before_rad_;  // what was sent before the last command
 };
 

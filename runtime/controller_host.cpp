@@ -9,7 +9,7 @@
 namespace tandem::runtime {
 namespace {
 
-LoopAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
+CycleAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
   return {.reason = why, .one = static_cast<std::int32_t>(one)};
 }
 
@@ -194,22 +194,22 @@ std::int32_t ControllerHost::claimant(std::size_t joint,
   return -1;
 }
 
-LoopAnswer ControllerHost::insert(std::size_t slot,
-                                  HostedController& controller) noexcept TANDEM_RT {
+CycleAnswer ControllerHost::insert(std::size_t slot,
+                                   HostedController& controller) noexcept TANDEM_RT {
   table_[slot] = &controller;
   return {};
 }
 
-LoopAnswer ControllerHost::remove(std::size_t slot) noexcept TANDEM_RT {
+CycleAnswer ControllerHost::remove(std::size_t slot) noexcept TANDEM_RT {
   if (table_[slot] == nullptr) return refuse(RejectReason::kGone, slot);
   if (is_active(slot)) return refuse(RejectReason::kActive, slot);
   table_[slot] = nullptr;
   return {};
 }
 
-LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, bool running,
-                                       const hal::CycleTime& time,
-                                       JointImages images) noexcept TANDEM_RT {
+CycleAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, bool running,
+                                        const hal::CycleTime& time,
+                                        JointImages images) noexcept TANDEM_RT {
   const ControllerSet after = (active_ & ~stop) | start;
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     const bool named = ((stop | start) & only(slot)) != 0;

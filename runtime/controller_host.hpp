@@ -24,8 +24,8 @@
 #include "hal/image.hpp"
 #include "hal/robot.hpp"
 #include "runtime/claim_guard.hpp"
+#include "runtime/cycle_request.hpp"
 #include "runtime/joint_references.hpp"
-#include "runtime/loop_request.hpp"
 
 namespace tandem::runtime {
 
@@ -149,15 +149,15 @@ class ControllerHost {
 
   // The loop's, at a cycle's boundary. Each answers why it did nothing.
 
-  [[nodiscard]] LoopAnswer insert(std::size_t slot,
-                                  HostedController& controller) noexcept TANDEM_RT;
-  [[nodiscard]] LoopAnswer remove(std::size_t slot) noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer insert(std::size_t slot,
+                                   HostedController& controller) noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer remove(std::size_t slot) noexcept TANDEM_RT;
   /// Stops and starts controllers, all or none. When they are `running`, every joint that changes
   /// hands does so without a bump (BumplessTransfer): one that moves brakes, what nobody has is
   /// held where it comes to rest, and who starts sees the joint there. Else it is who will start.
-  [[nodiscard]] LoopAnswer switch_over(ControllerSet stop, ControllerSet start, bool running,
-                                       const hal::CycleTime& time,
-                                       JointImages images) noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer switch_over(ControllerSet stop, ControllerSet start, bool running,
+                                        const hal::CycleTime& time,
+                                        JointImages images) noexcept TANDEM_RT;
 
   // The cycle.
 

@@ -12,7 +12,7 @@
 namespace tandem::runtime {
 
 struct CycleConfig {
-  rt::LoopConfig loop{};
+  rt::CyclicLoopConfig loop{};
   std::uint64_t running_cycles = 0;  ///< that controllers run; 0: until stopped
   std::uint64_t bring_up_cycles =
       20'000;                       ///< at most, then the run ends in a fault; of a reset, too

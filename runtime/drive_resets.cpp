@@ -16,8 +16,8 @@ DriveResets::DriveResets(CycleNow& now)
       cycles_(static_cast<std::uint64_t>(kDriveReset_ns / now.config.loop.period_ns)),
       left_(now.robot.joints.size()) {}
 
-LoopAnswer DriveResets::begin(std::size_t joint) noexcept TANDEM_RT {
-  LoopAnswer answer{.joint = static_cast<std::int32_t>(joint)};
+CycleAnswer DriveResets::begin(std::size_t joint) noexcept TANDEM_RT {
+  CycleAnswer answer{.joint = static_cast<std::int32_t>(joint)};
   if (!now_.watch.is_ill(now_.state, joint)) return answer;
   const bool controlled = now_.run.in(RunPhase::kRunning) || now_.run.in(RunPhase::kSettling);
   if (!controlled && !now_.run.in(RunPhase::kHeld) && !now_.run.in(RunPhase::kFaulted)) {

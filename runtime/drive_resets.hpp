@@ -16,7 +16,7 @@ class DriveResets {
 
   /// A drive is enabled only where nothing is latched that stops the robot, is held where it is,
   /// and only for a joint that no controller would move on.
-  [[nodiscard]] LoopAnswer begin(std::size_t joint) noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer begin(std::size_t joint) noexcept TANDEM_RT;
   /// Each cycle. While the run is stopped the drive stays disabled, and its fault latched in the
   /// run. @param command  the last one
   void watch(const hal::CommandImage& command) noexcept TANDEM_RT;

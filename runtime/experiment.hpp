@@ -62,7 +62,7 @@ struct SimOptions {
 };
 
 /// [remote]: what peers may ask over DDS. Reading, and stopping the robot, they may always.
-enum class RemoteCommand : std::uint8_t {
+enum class RemoteAccess : std::uint8_t {
   kOff,      ///< nothing that changes the run
   kLocal,    ///< everything; nobody on another machine can reach it, or the files are refused
   kNetwork,  ///< everything, from wherever [dds] reaches
@@ -73,9 +73,9 @@ enum class RemoteTrust : std::uint8_t {
   kDomain,    ///< everybody in the domain
 };
 struct RemoteOptions {
-  std::optional<RemoteCommand> command{};  ///< empty: off in `run`, local in `serve`
-  std::optional<RemoteTrust> trust{};      ///< empty: the domain where DDS Security keeps it
-  bool load = false;                       ///< controllers may be loaded over DDS, by name
+  std::optional<RemoteAccess> command{};  ///< empty: off in `run`, local in `serve`
+  std::optional<RemoteTrust> trust{};     ///< empty: the domain where DDS Security keeps it
+  bool load = false;                      ///< controllers may be loaded over DDS, by name
   // Settings for an owner (docs/remote.md).
   bool lockstep = false;               ///< each cycle waits for its command
   double lease_timeout_s = 1.0;        ///< one that is silent for so long has lost the robot
@@ -86,13 +86,13 @@ struct RemoteOptions {
 
 /// [log]
 enum class LogCompression : std::uint8_t { kNone, kLz4, kZstd };
-struct LogOptions {
+struct LogConfig {
   std::string folder = "runs";  ///< relative to the working directory
   LogCompression compression = LogCompression::kNone;
 };
 
 /// [report]: what the four plots show. Empty: the report chooses.
-struct ReportOptions {
+struct ReportConfig {
   std::string position_of;  ///< joint whose position is drawn, with its reference
   std::string torque_of;    ///< joint whose torque is drawn, beside inverse dynamics
   std::string foot;         ///< force/torque sensor
@@ -120,8 +120,8 @@ struct Experiment {
   std::string kernel_variant;  ///< empty: the best that this CPU runs
   HalOptions hal;
   SimOptions sim;
-  rt::LoopConfig loop;      ///< period, [overrun] and [clock]; the caller sets the pacing
-  rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
+  rt::CyclicLoopConfig loop;  ///< period, [overrun] and [clock]; the caller sets the pacing
+  rt::ThreadConfig thread;    ///< [realtime]; nothing is asked for without that table
   std::optional<AfterStop> after_stop;  ///< [faults]; empty: wait on the wall clock, else end
   AfterReset after_reset = AfterReset::kHold;  ///< [faults]
   double retreat_s = 5.0;                      ///< [faults]: at most, in a stop of category 2
@@ -130,8 +130,8 @@ struct Experiment {
   std::optional<double> watchdog_s;  ///< [faults]; empty: 0.5 on the wall clock, else 5
   RemoteOptions remote;
   std::optional<Teleoperation> teleoperation;  ///< empty: the robot is at hand
-  LogOptions log;
-  ReportOptions report;
+  LogConfig log;
+  ReportConfig report;
   estimation::EstimationConfig estimation;  ///< nothing without the table
   std::optional<ParallelOptions> parallel;  ///< empty: there is no second robot
   dds::Config dds;                          ///< off without the table

@@ -32,8 +32,8 @@ constexpr Key<Experiment> kRoot[] = {
   key<&Experiment::posture>("posture", "where the simulated robot starts; required for a floating base").by_default("every joint at 0").within("a `[posture]` of the robot"),
   key<&Experiment::kernel_variant>("kernel_variant", "of the dynamics' library. `--kernel-variant` overrides it").by_default("the best that the CPU supports"),
 };
-constexpr Key<rt::LoopConfig> kPeriod[] = {
-  key<&rt::LoopConfig::period_ns>("period_ns", {10'000, 1e9}, "of the loop; it and each board's `control_period_ns` divide one another, and drives of other makers can be set to it ([drives.md](drives.md#what-the-master-does-with-a-sheet))"),
+constexpr Key<rt::CyclicLoopConfig> kPeriod[] = {
+  key<&rt::CyclicLoopConfig::period_ns>("period_ns", {10'000, 1e9}, "of the loop; it and each board's `control_period_ns` divide one another, and drives of other makers can be set to it ([drives.md](drives.md#what-the-master-does-with-a-sheet))"),
 };
 constexpr Key<ControllerSpec> kController[] = {
   required(key<&ControllerSpec::plugin>("plugin", "a bundled controller (`\"hold\"`, `\"squat\"`, …), or the path of a shared library, with a `/`: `\"./my.so\"` is beside this file")),
@@ -63,14 +63,14 @@ constexpr Key<SimOptions> kHoist[] = {
   key<&SimOptions::hoist_release_s>("release_s", {0.0, 60.0}, "the hoist's force fades to zero over this time: a robot that stands is loaded gently, one that hangs drops"),
   key<&SimOptions::hoist_lift_m>("lift_m", {0.0, 10.0}, "more than 0, of a floating base: it hangs so much higher than its posture says, and is never lowered; on a real robot: the hoist stays ([identification.md](identification.md))"),
 };
-constexpr Key<rt::LoopConfig> kOverrun[] = {
-  choice<&rt::LoopConfig::on_overrun>("policy", "skip|hold|stop", "after a late cycle: continue at the next grid point; repeat the last command once; stop after `n` late cycles of the last `m`"),
-  key<&rt::LoopConfig::stop_late>("n", {1, 64}, "n ≤ m"),
-  key<&rt::LoopConfig::stop_window>("m", {1, 64}, "cycles"),
+constexpr Key<rt::CyclicLoopConfig> kOverrun[] = {
+  choice<&rt::CyclicLoopConfig::on_overrun>("policy", "skip|hold|stop", "after a late cycle: continue at the next grid point; repeat the last command once; stop after `n` late cycles of the last `m`"),
+  key<&rt::CyclicLoopConfig::stop_late>("n", {1, 64}, "n ≤ m"),
+  key<&rt::CyclicLoopConfig::stop_window>("m", {1, 64}, "cycles"),
 };
-constexpr Key<rt::LoopConfig> kClock[] = {
-  key<&rt::LoopConfig::rate>("rate", {0.0, rt::kFastest}, "simulated seconds per wall second; 0 is as fast as possible. `--rate` and `--realtime` override it, `tandem clock rate` changes it").within("0, or 0.01 to 1000"),
-  key<&rt::LoopConfig::start_paused>("start_paused", "pause before the first cycle until `tandem clock step` or `resume`, as `--start-paused` does"),
+constexpr Key<rt::CyclicLoopConfig> kClock[] = {
+  key<&rt::CyclicLoopConfig::rate>("rate", {0.0, rt::kFastest}, "simulated seconds per wall second; 0 is as fast as possible. `--rate` and `--realtime` override it, `tandem clock rate` changes it").within("0, or 0.01 to 1000"),
+  key<&rt::CyclicLoopConfig::start_paused>("start_paused", "pause before the first cycle until `tandem clock step` or `resume`, as `--start-paused` does"),
 };
 constexpr Key<rt::ThreadConfig> kRealtime[] = {
   choice<&rt::ThreadConfig::policy>("policy", "other|fifo|rr", "scheduling policy"),
@@ -97,14 +97,14 @@ constexpr Key<RemoteOptions> kRemote[] = {
   // A robot that is held goes on: nothing is stopped.
   choice<&RemoteOptions::on_lost>("on_lost", "category0|category1|||hold", "reaction to a lost owner: every joint brakes, stays where it comes to rest, and the next owner may come; or the stop of that category, latched"),
 };
-constexpr Key<LogOptions> kLog[] = {
-  key<&LogOptions::folder>("folder", "relative to the folder in which the command was started; `--log` overrides it"),
-  choice<&LogOptions::compression>("compression", "none|lz4|zstd", "of the MCAP file's chunks"),
+constexpr Key<LogConfig> kLog[] = {
+  key<&LogConfig::folder>("folder", "relative to the folder in which the command was started; `--log` overrides it"),
+  choice<&LogConfig::compression>("compression", "none|lz4|zstd", "of the MCAP file's chunks"),
 };
-constexpr Key<ReportOptions> kReport[] = {
-  key<&ReportOptions::position_of>("position_of", "joint: position with reference").by_default("[chosen by the report](log.md#the-report)"),
-  key<&ReportOptions::torque_of>("torque_of", "joint: torque beside inverse dynamics").by_default("chosen by the report"),
-  key<&ReportOptions::foot>("foot", "force/torque sensor: vertical force").by_default("chosen by the report"),
+constexpr Key<ReportConfig> kReport[] = {
+  key<&ReportConfig::position_of>("position_of", "joint: position with reference").by_default("[chosen by the report](log.md#the-report)"),
+  key<&ReportConfig::torque_of>("torque_of", "joint: torque beside inverse dynamics").by_default("chosen by the report"),
+  key<&ReportConfig::foot>("foot", "force/torque sensor: vertical force").by_default("chosen by the report"),
 };
 constexpr Key<ParallelOptions> kParallel[] = {
   key<&ParallelOptions::robot_file>("robot", "its robot.toml: the same joints, sensors, feet, closed loops and passive joints in the same order; all else may differ. `[sim]`, `posture` and `seed` are for both").by_default("the experiment's"),
@@ -137,14 +137,14 @@ SimOptions read_sim(TomlTable table) {
   return sim;
 }
 
-void read_overrun(TomlTable table, rt::LoopConfig& loop) {
+void read_overrun(TomlTable table, rt::CyclicLoopConfig& loop) {
   read_whole(table, kOverrun, loop);
   if (loop.stop_late > loop.stop_window) {
     table.error("n", "is more than m", "the policy stops after n late cycles of the last m");
   }
 }
 
-void read_clock(TomlTable table, rt::LoopConfig& loop) {
+void read_clock(TomlTable table, rt::CyclicLoopConfig& loop) {
   read_whole(table, kClock, loop);
   if (const Status right = rt::check_rate(loop.rate); !right) {
     table.error("rate", right.error().message, right.error().hint);
@@ -166,12 +166,12 @@ rt::ThreadConfig read_realtime(TomlTable& root) {
 void check_remote(Experiment& e, TomlTable remote) {
   const bool secured = e.dds.security.on();
   if (!e.remote.trust && secured) e.remote.trust = RemoteTrust::kDomain;
-  if (e.remote.command == RemoteCommand::kNetwork && !e.remote.trust) {
+  if (e.remote.command == RemoteAccess::kNetwork && !e.remote.trust) {
     remote.error("command", "\"network\", but nothing says whose commands these would be",
                  "give [dds.security] keys; or trust = \"domain\" for everybody who reaches the "
                  "domain, \"admitted\" for participants admitted on this machine");
   }
-  if (e.remote.command != RemoteCommand::kLocal || e.dds.loopback_only()) return;
+  if (e.remote.command != RemoteAccess::kLocal || e.dds.loopback_only()) return;
   remote.error("command", "\"local\", but [dds] reaches beyond this machine",
                "set interfaces = [\"lo\"] in [dds], or command = \"network\" to let every machine "
                "there command the robot");

@@ -74,7 +74,7 @@ class FaultLog {
 };
 
 /// A fault in words.
-struct Fault {
+struct FaultReport {
   std::uint64_t cycle = 0;
   double time_s = 0.0;
   std::string joint;  ///< joint, sensor or controller; empty when the robot as a whole

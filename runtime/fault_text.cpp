@@ -75,7 +75,7 @@ std::string text_of(const FaultRecord& record, const FaultContext& about) {
 }
 
 /// The joint, sensor or controller that the fault is about, and a joint's board.
-void name_it(const FaultRecord& record, const FaultContext& about, Fault& fault) {
+void name_it(const FaultRecord& record, const FaultContext& about, FaultReport& fault) {
   const auto index = static_cast<std::size_t>(record.index);
   switch (hal::row_of(record.cause).strikes) {
     case FaultStrikes::kDrive:
@@ -98,8 +98,9 @@ void name_it(const FaultRecord& record, const FaultContext& about, Fault& fault)
 
 }  // namespace
 
-Fault in_words(const FaultRecord& record, std::int64_t cleared_ns, const FaultContext& about) {
-  Fault fault;
+FaultReport in_words(const FaultRecord& record, std::int64_t cleared_ns,
+                     const FaultContext& about) {
+  FaultReport fault;
   fault.cycle = record.cycle;
   fault.time_s = static_cast<double>(record.time_ns) * 1e-9;
   fault.category = record.category;

@@ -17,7 +17,7 @@ struct FaultContext {
 };
 
 /// @param cleared_ns  of FaultLog
-[[nodiscard]] Fault in_words(const FaultRecord& record, std::int64_t cleared_ns,
-                             const FaultContext& about);
+[[nodiscard]] FaultReport in_words(const FaultRecord& record, std::int64_t cleared_ns,
+                                   const FaultContext& about);
 
 }  // namespace tandem::runtime

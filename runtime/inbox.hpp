@@ -13,7 +13,7 @@
 #include "hal/stop_category.hpp"
 #include "rt/clock_control.hpp"
 #include "rt/doorbell.hpp"
-#include "runtime/loop_request.hpp"
+#include "runtime/cycle_request.hpp"
 
 namespace tandem::runtime {
 
@@ -33,7 +33,7 @@ class Inbox {
   static constexpr std::uint64_t kNow = ~std::uint64_t{0};
 
   /// Pacing, rate and start_paused of the loop.
-  explicit Inbox(const rt::LoopConfig& loop) : clock_(loop, bell_) {}
+  explicit Inbox(const rt::CyclicLoopConfig& loop) : clock_(loop, bell_) {}
 
   // Urgent: any thread, signal handlers included.
 
@@ -82,10 +82,10 @@ class Inbox {
   // Requests: one thread at a time (RunServices' mutex).
 
   /// False when the loop has not taken the last kCapacity requests.
-  [[nodiscard]] bool ask(const LoopRequest& request) noexcept { return put(requests_, request); }
+  [[nodiscard]] bool ask(const CycleRequest& request) noexcept { return put(requests_, request); }
   /// The next answer, if there is one.
-  [[nodiscard]] std::optional<LoopAnswer> take_answer() noexcept {
-    return get<LoopAnswer>(answers_);
+  [[nodiscard]] std::optional<CycleAnswer> take_answer() noexcept {
+    return get<CycleAnswer>(answers_);
   }
 
   /// Any thread, not in a signal handler; the loop waits by it.
@@ -129,10 +129,10 @@ class Inbox {
     confirmed_cycle_.store(cycle, std::memory_order_relaxed);
     confirmed_.store(taken_, std::memory_order_release);
   }
-  [[nodiscard]] std::optional<LoopRequest> take_request() noexcept TANDEM_RT {
-    return get<LoopRequest>(requests_);
+  [[nodiscard]] std::optional<CycleRequest> take_request() noexcept TANDEM_RT {
+    return get<CycleRequest>(requests_);
   }
-  void answer(const LoopAnswer& answer) noexcept TANDEM_RT { (void)put(answers_, answer); }
+  void answer(const CycleAnswer& answer) noexcept TANDEM_RT { (void)put(answers_, answer); }
   [[nodiscard]] rt::Doorbell& bell() noexcept { return bell_; }
   [[nodiscard]] const rt::Doorbell& bell() const noexcept { return bell_; }
 
@@ -173,9 +173,9 @@ class Inbox {
   std::atomic<std::uint64_t> confirmed_cycle_{0};
   static_assert(std::atomic<std::uint32_t>::is_always_lock_free);
 
-  SpscRing requests_{sizeof(LoopRequest), kCapacity};
+  SpscRing requests_{sizeof(CycleRequest), kCapacity};
   // Every request that waits has room for its answer, and so have those that nobody awaits.
-  SpscRing answers_{sizeof(LoopAnswer), 8 * kCapacity};
+  SpscRing answers_{sizeof(CycleAnswer), 8 * kCapacity};
 };
 
 }  // namespace tandem::runtime

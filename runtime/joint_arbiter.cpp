@@ -34,8 +34,8 @@ void JointArbiter::decide() noexcept TANDEM_RT {
   }
 }
 
-LoopAnswer JointArbiter::may_lead(std::size_t joint, bool drives) const noexcept TANDEM_RT {
-  LoopAnswer answer{.joint = static_cast<std::int32_t>(joint)};
+CycleAnswer JointArbiter::may_lead(std::size_t joint, bool drives) const noexcept TANDEM_RT {
+  CycleAnswer answer{.joint = static_cast<std::int32_t>(joint)};
   if (resets_.is_on(joint)) {
     answer.reason = RejectReason::kResetting;
   } else if (drives && now_.watch.is_ill(now_.state, joint)) {
@@ -48,9 +48,9 @@ LoopAnswer JointArbiter::may_lead(std::size_t joint, bool drives) const noexcept
   return answer;
 }
 
-LoopAnswer JointArbiter::may_start(ControllerSet start) const noexcept TANDEM_RT {
+CycleAnswer JointArbiter::may_start(ControllerSet start) const noexcept TANDEM_RT {
   const auto refused = [](RejectReason why, std::size_t joint, std::int32_t one = -1) {
-    return LoopAnswer{.reason = why, .joint = static_cast<std::int32_t>(joint), .one = one};
+    return CycleAnswer{.reason = why, .joint = static_cast<std::int32_t>(joint), .one = one};
   };
   const auto claimant = [&](std::size_t j) { return now_.controllers.claimant(j, start); };
   for (std::size_t j = 0; j < leads_.size(); ++j) {
@@ -79,14 +79,14 @@ void JointArbiter::on(RunEvent event, bool holds_back) noexcept TANDEM_RT {
   brakes_ = now_.run.in(RunPhase::kFaulted) || now_.run.in(RunPhase::kShutDown);
 }
 
-LoopAnswer JointArbiter::switch_over(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT {
+CycleAnswer JointArbiter::switch_over(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT {
   return now_.controllers.switch_over(stop, start, controls_, now_.time, led());
 }
 
-LoopAnswer JointArbiter::leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT {
+CycleAnswer JointArbiter::leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT {
   fill_delay();
   hal::CommandImage& command = delay_.on() ? wanted_ : command_;
-  const LoopAnswer answer =
+  const CycleAnswer answer =
       now_.controllers.switch_over(stop, start, true, now_.time, {now_.state, command});
   if (answer.reason != RejectReason::kNone) return answer;
   on(RunEvent::kStart);
@@ -118,15 +118,16 @@ void JointArbiter::take_from_owner() noexcept TANDEM_RT {
 }
 
 /// kClaimed where a controller has the joint.
-LoopAnswer JointArbiter::owner_of(std::size_t joint) const noexcept TANDEM_RT {
+CycleAnswer JointArbiter::owner_of(std::size_t joint) const noexcept TANDEM_RT {
   const std::int32_t owner = now_.controllers.owner(joint);
   return {.reason = owner < 0 ? RejectReason::kNone : RejectReason::kClaimed,
           .joint = static_cast<std::int32_t>(joint),
           .one = owner};
 }
 
-LoopAnswer JointArbiter::set_joint(std::size_t joint, const JointRequest& wish) noexcept TANDEM_RT {
-  LoopAnswer answer = owner_of(joint);
+CycleAnswer JointArbiter::set_joint(std::size_t joint,
+                                    const JointRequest& wish) noexcept TANDEM_RT {
+  CycleAnswer answer = owner_of(joint);
   if (!wish.switches()) {
     answer.reason = RejectReason::kNone;  // an impedance is a claimed joint's, too
   } else if (answer.reason == RejectReason::kNone && !controls_) {
@@ -137,14 +138,14 @@ LoopAnswer JointArbiter::set_joint(std::size_t joint, const JointRequest& wish) 
   return answer;
 }
 
-LoopAnswer JointArbiter::move(std::size_t joint, const MoveRequest& wish) noexcept TANDEM_RT {
-  LoopAnswer answer = owner_of(joint);
+CycleAnswer JointArbiter::move(std::size_t joint, const MoveRequest& wish) noexcept TANDEM_RT {
+  CycleAnswer answer = owner_of(joint);
   if (answer.reason == RejectReason::kNone) answer.reason = references_.move(joint, wish, led());
   return answer;
 }
 
-LoopAnswer JointArbiter::recover(std::size_t joint) noexcept TANDEM_RT {
-  LoopAnswer answer = owner_of(joint);
+CycleAnswer JointArbiter::recover(std::size_t joint) noexcept TANDEM_RT {
+  CycleAnswer answer = owner_of(joint);
   if (answer.reason == RejectReason::kNone) {
     answer.reason = references_.recover(joint, led().command);
   }

@@ -40,8 +40,8 @@ class JointArbiter {
   // Whether somebody may lead.
 
   /// @param drives  what is asked for needs a drive that is well
-  [[nodiscard]] LoopAnswer may_lead(std::size_t joint, bool drives) const noexcept TANDEM_RT;
-  [[nodiscard]] LoopAnswer may_start(ControllerSet start) const noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer may_lead(std::size_t joint, bool drives) const noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer may_start(ControllerSet start) const noexcept TANDEM_RT;
 
   // Changes of who leads, between check and update. What they answer: ControllerHost, and
   // JointReferences for what an operator asks for.
@@ -49,19 +49,19 @@ class JointArbiter {
   /// The run's next phase, if this leads to one. Controllers stop with it, but for a retreat, which
   /// they carry out. Joints that a stop finds in motion brake.
   void on(RunEvent event, bool holds_back = false) noexcept TANDEM_RT;
-  [[nodiscard]] LoopAnswer switch_over(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer switch_over(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT;
   /// From held joints to controllers, which run from now on: no joint jumps.
-  [[nodiscard]] LoopAnswer leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT;
   [[nodiscard]] bool retreat() noexcept TANDEM_RT;
   /// Goes on from what the robot follows, when that is another loop's.
   void follow_robot() noexcept TANDEM_RT;
   /// In lockstep the owner's end has led its joints over from what is in force here, and its delay
   /// and its limits have passed that on: what arrives is the command, to the last bit.
   void take_from_owner() noexcept TANDEM_RT;
-  [[nodiscard]] LoopAnswer set_joint(std::size_t joint,
-                                     const JointRequest& wish) noexcept TANDEM_RT;
-  [[nodiscard]] LoopAnswer move(std::size_t joint, const MoveRequest& wish) noexcept TANDEM_RT;
-  [[nodiscard]] LoopAnswer recover(std::size_t joint) noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer set_joint(std::size_t joint,
+                                      const JointRequest& wish) noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer move(std::size_t joint, const MoveRequest& wish) noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer recover(std::size_t joint) noexcept TANDEM_RT;
   /// Its homing has ended: it is held where it is.
   void end_homing(std::size_t joint) noexcept TANDEM_RT;
 
@@ -87,7 +87,7 @@ class JointArbiter {
   }
   /// What is sent, whatever delay there is.
   [[nodiscard]] JointImages sent() noexcept TANDEM_RT { return {now_.state, command_}; }
-  [[nodiscard]] LoopAnswer owner_of(std::size_t joint) const noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer owner_of(std::size_t joint) const noexcept TANDEM_RT;
   void stamp(hal::CommandImage& command) const noexcept TANDEM_RT;
   void decide() noexcept TANDEM_RT;
   void start_controllers() noexcept TANDEM_RT;

@@ -27,8 +27,8 @@ bool JointHoming::is_needed_by(ControllerSet controllers) const noexcept TANDEM_
   });
 }
 
-LoopAnswer JointHoming::begin(std::size_t joint) noexcept TANDEM_RT {
-  LoopAnswer answer{.joint = static_cast<std::int32_t>(joint)};
+CycleAnswer JointHoming::begin(std::size_t joint) noexcept TANDEM_RT {
+  CycleAnswer answer{.joint = static_cast<std::int32_t>(joint)};
   const bool controlled = now_.run.in(RunPhase::kRunning);
   if (!controlled && !now_.run.in(RunPhase::kHeld)) {
     answer.reason = RejectReason::kNotEnabled;

@@ -17,7 +17,7 @@ class JointHoming {
   JointHoming(CycleNow& now, const DriveResets& resets);
 
   /// Begins the homing of a joint that nobody leads.
-  [[nodiscard]] LoopAnswer begin(std::size_t joint) noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer begin(std::size_t joint) noexcept TANDEM_RT;
   /// Each cycle, again until there is nothing more: a joint whose homing has ended.
   [[nodiscard]] std::optional<std::size_t> next_ended() noexcept TANDEM_RT;
 

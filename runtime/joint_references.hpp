@@ -11,7 +11,7 @@
 #include "hal/image.hpp"
 #include "hal/robot.hpp"
 #include "runtime/bumpless_transfer.hpp"
-#include "runtime/loop_request.hpp"
+#include "runtime/cycle_request.hpp"
 
 namespace tandem::runtime {
 

@@ -17,7 +17,7 @@ class OwnerController final : public Controller {
  public:
   [[nodiscard]] Status configure(ControllerSetup& setup) override {
     using enum hal::ControlMode;
-    const std::vector<hal::Joint>& joints = setup.robot.joints;
+    const std::vector<hal::DrivenJoint>& joints = setup.robot.joints;
     for (std::size_t j = 0; j < joints.size(); ++j) {
       for (const hal::ControlMode mode : {kPosition, kVelocity, kTorque, kOpenLoop, kCurrent}) {
         if (!joints[j].can(mode, hal::InteractionMode::kStiff)) continue;

@@ -84,8 +84,8 @@ bool OwnerFollower::is_active() const noexcept TANDEM_RT {
 void OwnerFollower::assign(bool owned) noexcept TANDEM_RT {
   if (owned == is_active()) return;
   const ControllerSet owner = only(now_.owner.slot);
-  const LoopAnswer answer = owned ? arbiter_.switch_over(now_.controllers.shown().active, owner)
-                                  : arbiter_.switch_over(owner, 0);
+  const CycleAnswer answer = owned ? arbiter_.switch_over(now_.controllers.shown().active, owner)
+                                   : arbiter_.switch_over(owner, 0);
   if (answer.reason == RejectReason::kNone && arbiter_.controls()) {
     now_.event(EventKind::kControllersSwitched);
   }

@@ -322,10 +322,10 @@ Status RobotCycle::restore(std::span<const std::byte> snapshot) {
 
 // Results.
 
-std::vector<Fault> RobotCycle::faults() const {
+std::vector<FaultReport> RobotCycle::faults() const {
   const FaultContext about{now_.robot, now_.backend, now_.controllers, now_.config};
   const FaultLog& log = now_.faults;
-  std::vector<Fault> out;
+  std::vector<FaultReport> out;
   for (std::size_t i = 0; i < log.size(); ++i)
     out.push_back(in_words(log[i], log.cleared_ns(i), about));
   // The backend's own words are the loop's until the loop has stopped.

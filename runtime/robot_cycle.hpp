@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "runtime/cycle_requests.hpp"
 #include "runtime/cycle_trace.hpp"
 #include "runtime/hand_over.hpp"
 #include "runtime/heartbeat.hpp"
-#include "runtime/loop_requests.hpp"
 #include "runtime/owner_follower.hpp"
 
 namespace tandem::runtime {
@@ -47,14 +47,14 @@ class RobotCycle {
   [[nodiscard]] JointLead lead(std::size_t joint) const noexcept { return arbiter_.lead(joint); }
 
   /// Every fault so far, in the order of their times. Any thread.
-  [[nodiscard]] std::vector<Fault> faults() const;
+  [[nodiscard]] std::vector<FaultReport> faults() const;
   [[nodiscard]] const FaultLog& fault_log() const noexcept { return now_.faults; }
   /// A drive's error code in words, with the cause that the run has latched of its joint; empty for
   /// 0. Any thread.
   [[nodiscard]] std::string drive_fault(std::size_t joint, std::uint32_t code) const;
 
   // Results, for when the run has stopped.
-  [[nodiscard]] const rt::LoopStatistics& loop() const noexcept { return now_.loop.statistics(); }
+  [[nodiscard]] const rt::CycleStatistics& loop() const noexcept { return now_.loop.statistics(); }
   [[nodiscard]] const RunStatistics& statistics() const noexcept { return shown_.statistics(); }
   [[nodiscard]] const CycleConfig& config() const noexcept { return now_.config; }
   [[nodiscard]] std::uint64_t running_cycles() const noexcept { return arbiter_.running_cycles(); }
@@ -93,7 +93,7 @@ class RobotCycle {
   WaitingControllers waiting_;
   FaultResponse response_;
   OwnerFollower owner_;
-  LoopRequests requests_;
+  CycleRequests requests_;
   RunServices services_;
   HandOver shown_;
   CycleTrace trace_;

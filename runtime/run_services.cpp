@@ -131,8 +131,8 @@ void RunServices::collect() {
   }
 }
 
-void RunServices::free_what_left(const LoopRequest& request, const LoopAnswer& answer) {
-  using Kind = LoopRequest::Kind;
+void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer& answer) {
+  using Kind = CycleRequest::Kind;
   const bool done = answer.reason == RejectReason::kNone;
   if ((request.kind == Kind::kInsert && !done) || (request.kind == Kind::kRemove && done)) {
     host_->owned()[request.slot].reset();
@@ -141,11 +141,11 @@ void RunServices::free_what_left(const LoopRequest& request, const LoopAnswer& a
   }
 }
 
-Result<RequestResult> RunServices::ask(Lock& lock, LoopRequest request, Patience patience) {
+Result<RequestResult> RunServices::ask(Lock& lock, CycleRequest request, Patience patience) {
   request.number = ++number_;
   if (!inbox_->ask(request)) {
-    if (request.kind == LoopRequest::Kind::kInsert) host_->owned()[request.slot].reset();
-    if (request.kind == LoopRequest::Kind::kRemove) host_->owned()[request.slot]->leaves = false;
+    if (request.kind == CycleRequest::Kind::kInsert) host_->owned()[request.slot].reset();
+    if (request.kind == CycleRequest::Kind::kRemove) host_->owned()[request.slot]->leaves = false;
     return fail(
         "the loop has not come to the last " + std::to_string(Inbox::kCapacity) + " requests",
         "is it paused? Let it go on");
@@ -165,7 +165,7 @@ Result<RequestResult> RunServices::ask(Lock& lock, LoopRequest request, Patience
   while (answer && looks().front().cycle < answer->cycle && SteadyClock::now() < deadline) {
     std::this_thread::sleep_for(kLook);
   }
-  const std::optional<LoopAnswer> found = answer;
+  const std::optional<CycleAnswer> found = answer;
   awaited_.erase(request.number);
   if (!found) {
     if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
@@ -181,7 +181,7 @@ std::string RunServices::controller_name(std::int32_t slot) const {
   return one == nullptr ? std::string() : one->name;
 }
 
-Error RunServices::refusal(const LoopAnswer& answer) const {
+Error RunServices::refusal(const CycleAnswer& answer) const {
   const std::string joint =
       answer.joint < 0 ? "" : robot_->joints[static_cast<std::size_t>(answer.joint)].name;
   Words words = words_of(answer.reason, progress_->phase.load(), joint, controller_name(answer.one),
@@ -226,7 +226,7 @@ Result<std::size_t> RunServices::slot_of(const std::string& name) const {
 ControllerSet RunServices::planned() const {
   ControllerSet active = host_->shown().active;
   for (const auto& [number, request] : asked_) {
-    if (request.kind != LoopRequest::Kind::kSwitch) continue;
+    if (request.kind != CycleRequest::Kind::kSwitch) continue;
     active = (active & ~request.stop) | request.start;
   }
   return active;
@@ -275,9 +275,9 @@ Result<RequestResult> RunServices::load(std::unique_ptr<HostedController> contro
         "unload one first");
   }
   controller->of_experiment = false;
-  LoopRequest request{.kind = LoopRequest::Kind::kInsert,
-                      .slot = static_cast<std::uint32_t>(free - owned.begin()),
-                      .controller = controller.get()};
+  CycleRequest request{.kind = CycleRequest::Kind::kInsert,
+                       .slot = static_cast<std::uint32_t>(free - owned.begin()),
+                       .controller = controller.get()};
   *free = std::move(controller);
   return ask(lock, request, patience);
 }
@@ -293,7 +293,7 @@ Result<RequestResult> RunServices::unload(const std::string& name, Patience pati
                    "stop it first: tandem controller stop " + name);
   }
   host_->owned()[*slot]->leaves = true;
-  return ask(lock, {.kind = LoopRequest::Kind::kRemove, .slot = static_cast<std::uint32_t>(*slot)},
+  return ask(lock, {.kind = CycleRequest::Kind::kRemove, .slot = static_cast<std::uint32_t>(*slot)},
              patience);
 }
 
@@ -370,7 +370,7 @@ Result<RequestResult> RunServices::switch_controllers(const std::vector<std::str
     return fail("no controller is named", "name those to stop, to start, or both");
   }
   if (Status able = check_switch(*leaving, *coming); !able) return std::unexpected(able.error());
-  return ask(lock, {.kind = LoopRequest::Kind::kSwitch, .start = *coming, .stop = *leaving},
+  return ask(lock, {.kind = CycleRequest::Kind::kSwitch, .start = *coming, .stop = *leaving},
              patience);
 }
 
@@ -378,7 +378,7 @@ Result<RequestResult> RunServices::go_on(Patience patience) {
   Lock lock(mutex_);
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
-  return ask(lock, {.kind = LoopRequest::Kind::kGoOn}, patience);
+  return ask(lock, {.kind = CycleRequest::Kind::kGoOn}, patience);
 }
 
 }  // namespace tandem::runtime

@@ -1,6 +1,6 @@
 // What a run can be asked for while it goes on: controllers come, go and change; joints are set.
 // Start here to command a running loop from another thread.
-// Layer: runtime.  Thread: any but the loop's; the loop's part is loop_requests.cpp.
+// Layer: runtime.  Thread: any but the loop's; the loop's part is cycle_requests.cpp.
 #pragma once
 
 #include <array>
@@ -86,7 +86,7 @@ struct SensorStatus {
 };
 
 /// The same with what is known of it besides.
-struct SensorInfo {
+struct SensorReport {
   std::string name;
   hal::SensorType type = hal::SensorType::kForceTorque;
   std::string joint;  ///< force_torque: measures the wrench through this joint
@@ -147,7 +147,7 @@ class RunServices {
   /// Every joint, in the image's order.
   [[nodiscard]] std::vector<JointInfo> joints();
   /// Every sensor, in the image's order.
-  [[nodiscard]] std::vector<SensorInfo> sensors() const;
+  [[nodiscard]] std::vector<SensorReport> sensors() const;
   /// Mode and interaction of a joint that no active controller claims, impedance of any. A joint
   /// that has to be homed, or is being homed, is refused, here and by what follows.
   /// Errors: unknown joint; claimed (the controller is named); not while controllers run; a mode
@@ -160,7 +160,7 @@ class RunServices {
   /// held or running.
   [[nodiscard]] Result<RequestResult> recover(const std::string& joint,
                                               Patience patience = kPatience) {
-    return ask_of_joint(LoopRequest::Kind::kRecover, joint, patience);
+    return ask_of_joint(CycleRequest::Kind::kRecover, joint, patience);
   }
   /// Moves a joint that no active controller claims, on a trapezoid of speed; one under way goes
   /// over into it. Without a target it brakes. Done means begun.
@@ -175,7 +175,7 @@ class RunServices {
   /// another process'; another phase than faulted, held, settling, running.
   [[nodiscard]] Result<RequestResult> reset_joint(const std::string& joint,
                                                   Patience patience = kPatience) {
-    return ask_of_joint(LoopRequest::Kind::kReset, joint, patience);
+    return ask_of_joint(CycleRequest::Kind::kReset, joint, patience);
   }
   /// Lets the drive of a joint find the joint's place, as its `homing` in robot.toml says.
   /// Meanwhile nothing else moves the joint; stop it by move_joint() without a target. How it ends,
@@ -184,7 +184,7 @@ class RunServices {
   /// running.
   [[nodiscard]] Result<RequestResult> home_joint(const std::string& joint,
                                                  Patience patience = kPatience) {
-    return ask_of_joint(LoopRequest::Kind::kHome, joint, patience);
+    return ask_of_joint(CycleRequest::Kind::kHome, joint, patience);
   }
   /// Gains of one of its drive's loops; they travel by SDO, within some ten cycles.
   /// Errors: unknown joint; a loop that it lacks; a gain that is negative, or no 32-bit number.
@@ -209,12 +209,12 @@ class RunServices {
                                            Patience patience);
   [[nodiscard]] Status check_name(const std::string& name);
   /// Asks for what needs no more than a joint.
-  [[nodiscard]] Result<RequestResult> ask_of_joint(LoopRequest::Kind kind, const std::string& joint,
-                                                   Patience patience);
-  [[nodiscard]] Result<RequestResult> ask(Lock& lock, LoopRequest request, Patience patience);
+  [[nodiscard]] Result<RequestResult> ask_of_joint(CycleRequest::Kind kind,
+                                                   const std::string& joint, Patience patience);
+  [[nodiscard]] Result<RequestResult> ask(Lock& lock, CycleRequest request, Patience patience);
   void collect();
-  void free_what_left(const LoopRequest& request, const LoopAnswer& answer);
-  [[nodiscard]] Error refusal(const LoopAnswer& answer) const;
+  void free_what_left(const CycleRequest& request, const CycleAnswer& answer);
+  [[nodiscard]] Error refusal(const CycleAnswer& answer) const;
   [[nodiscard]] Status check_phase() const;
   [[nodiscard]] Result<std::size_t> slot_of(const std::string& name) const;
   [[nodiscard]] Result<ControllerSet> set_of(const std::vector<std::string>& names) const;
@@ -242,8 +242,8 @@ class RunServices {
 
   std::mutex mutex_;          // of all below, and of the asking side of inbox and host
   std::uint64_t number_ = 0;  // of the last request
-  std::map<std::uint64_t, LoopRequest> asked_;                  // not answered yet
-  std::map<std::uint64_t, std::optional<LoopAnswer>> awaited_;  // that somebody waits for
+  std::map<std::uint64_t, CycleRequest> asked_;                  // not answered yet
+  std::map<std::uint64_t, std::optional<CycleAnswer>> awaited_;  // that somebody waits for
 };
 
 }  // namespace tandem::runtime

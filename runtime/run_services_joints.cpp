@@ -130,10 +130,10 @@ std::vector<JointInfo> RunServices::joints() {
   return all;
 }
 
-std::vector<SensorInfo> RunServices::sensors() const {
+std::vector<SensorReport> RunServices::sensors() const {
   std::vector<SensorStatus> now(robot_->sensors.size());
   while (!sensor_looks_.read(now)) std::this_thread::yield();
-  std::vector<SensorInfo> all;
+  std::vector<SensorReport> all;
   for (std::size_t s = 0; s < now.size(); ++s) {
     const hal::SensorConfig& sensor = robot_->sensors[s];
     all.push_back({sensor.name, sensor.type, sensor.joint, sensor.link, now[s]});
@@ -185,26 +185,26 @@ Result<RequestResult> RunServices::set_joint(const std::string& joint, const Joi
     return std::unexpected(fits.error());
   }
   return ask(lock,
-             {.kind = LoopRequest::Kind::kJoint,
+             {.kind = CycleRequest::Kind::kJoint,
               .joint = static_cast<std::uint32_t>(*index),
               .wish = wish},
              patience);
 }
 
-Result<RequestResult> RunServices::ask_of_joint(LoopRequest::Kind kind, const std::string& joint,
+Result<RequestResult> RunServices::ask_of_joint(CycleRequest::Kind kind, const std::string& joint,
                                                 Patience patience) {
   Lock lock(mutex_);
   const Result<std::size_t> index = joint_to_change(joint);
   if (!index) return std::unexpected(index.error());
   const hal::JointConfig& config = robot_->joints[*index];
-  if (kind == LoopRequest::Kind::kHome && !config.homing) {
+  if (kind == CycleRequest::Kind::kHome && !config.homing) {
     return std::unexpected(Error{.message = "has no homing: its encoder is taken for absolute",
                                  .hint = "give its [[joint]] the key `homing`",
                                  .file = robot_->file,
                                  .line = config.line,
                                  .key = joint});
   }
-  if (kind != LoopRequest::Kind::kReset) {
+  if (kind != CycleRequest::Kind::kReset) {
     if (Status free = check_free_to_move(*index); !free) return std::unexpected(free.error());
   }
   return ask(lock, {.kind = kind, .joint = static_cast<std::uint32_t>(*index)}, patience);
@@ -226,10 +226,11 @@ Result<RequestResult> RunServices::move_joint(const std::string& joint, const Mo
     return fail_at(joint, "is compliant without stiffness: nothing would move it",
                    fmt::format("tandem joint set {} --stiffness, or --interaction stiff", joint));
   }
-  return ask(
-      lock,
-      {.kind = LoopRequest::Kind::kMove, .joint = static_cast<std::uint32_t>(*index), .move = wish},
-      patience);
+  return ask(lock,
+             {.kind = CycleRequest::Kind::kMove,
+              .joint = static_cast<std::uint32_t>(*index),
+              .move = wish},
+             patience);
 }
 
 Result<std::size_t> RunServices::gains_fit(const std::string& joint, hal::PidLoop loop,
@@ -265,7 +266,7 @@ Result<RequestResult> RunServices::set_gains(const std::string& joint, hal::PidL
   constexpr double kStays = std::numeric_limits<double>::quiet_NaN();
   return ask(
       lock,
-      {.kind = LoopRequest::Kind::kGains,
+      {.kind = CycleRequest::Kind::kGains,
        .joint = static_cast<std::uint32_t>(*index),
        .loop = loop,
        .gains = {wish.kp.value_or(kStays), wish.ki.value_or(kStays), wish.kd.value_or(kStays)}},

@@ -50,7 +50,7 @@ void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& 
   }
   take_work(state);
   for (std::size_t l = 0; l < loops_.size(); ++l) {
-    LoopFigures& one = loops_[l];
+    ClosureFigures& one = loops_[l];
     one.max_position_error_m =
         std::max(one.max_position_error_m, truth->loop_position_error_m()[l]);
     one.max_velocity_error_m_s =
@@ -111,7 +111,7 @@ void RunStatistics::take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT
   for (std::size_t f = 0; f < feet_.size(); ++f) {
     const double* at = &truth.foot_position_m()[3 * f];
     const double force_N = truth.foot_force_N()[3 * f + 2];
-    Foot& foot = feet_[f];
+    FootSlip& foot = feet_[f];
     force_sum_N_ += force_N;
     if (force_N > 0.0 && foot.touching == 0) {
       foot.anchor_x = at[0];

@@ -78,7 +78,7 @@ struct EstimateFigures {
 };
 
 /// From the plant's truth: how far one closed loop was open at most, over every cycle.
-struct LoopFigures {
+struct ClosureFigures {
   double max_position_error_m = 0.0;
   double max_velocity_error_m_s = 0.0;
 };
@@ -110,7 +110,7 @@ class RunStatistics {
   [[nodiscard]] EstimateFigures estimate() const;
 
   /// Per loop; empty when there was no truth.
-  [[nodiscard]] const std::vector<LoopFigures>& loops() const { return loops_; }
+  [[nodiscard]] const std::vector<ClosureFigures>& loops() const { return loops_; }
 
   void archive(Archive& ar);
 
@@ -124,7 +124,7 @@ class RunStatistics {
     std::uint64_t count = 0;   // of CommandLimits, in the last cycle that was taken
     std::uint64_t cycles = 0;  // in which it grew
   };
-  struct Foot {
+  struct FootSlip {
     double anchor_x = 0.0, anchor_y = 0.0;  // where it touched down
     std::uint64_t touching = 0;
   };
@@ -138,8 +138,8 @@ class RunStatistics {
   std::uint64_t cycles_ = 0;
   double driving_W_ = 0.0, braking_W_ = 0.0, max_power_W_ = 0.0;  // sums over cycles; the largest
   std::uint64_t powered_ = 0;                                     // cycles with a joint's power
-  std::vector<Foot> feet_;
-  std::vector<LoopFigures> loops_;
+  std::vector<FootSlip> feet_;
+  std::vector<ClosureFigures> loops_;
   std::uint64_t base_cycles_ = 0, compared_ = 0;  // of the estimate
   double tilt_error_rad_ = 0.0, height_error_m_ = 0.0;
   std::vector<double> external_Nm_;  // of each joint: the largest

@@ -71,8 +71,8 @@ void write_cycle(Events& events, const CycleStamps& stamps) {
   events.counter("work [us]", woken_ns, done_ns - end_of(CycleStage::kExchange));
 }
 
-void write_faults(Events& events, const CycleStamps& stamps, std::span<const Fault> faults) {
-  for (const Fault& fault : faults) {
+void write_faults(Events& events, const CycleStamps& stamps, std::span<const FaultReport> faults) {
+  for (const FaultReport& fault : faults) {
     if (fault.cycle != stamps.cycle) continue;
     const std::string where = fault.joint.empty() ? "" : fault.joint + ": ";
     events.instant("fault: " + where + fault.text,
@@ -89,7 +89,7 @@ Error write_error(const std::string& file, const std::string& reason) {
 
 /// Throws std::system_error, as fmt::print() does, when `out` takes no more.
 void write_all(std::FILE* out, const std::string& robot, const CycleTrace& trace,
-               std::span<const Fault> faults) {
+               std::span<const FaultReport> faults) {
   const std::vector<CycleStamps> cycles = trace.cycles();
   fmt::print(out, "{{\"displayTimeUnit\":\"ns\",\"otherData\":{{\"robot\":{},\"cycles\":{},",
              quoted_text(robot), cycles.size());
@@ -107,7 +107,7 @@ void write_all(std::FILE* out, const std::string& robot, const CycleTrace& trace
 }  // namespace
 
 Status write_trace(const std::string& file, const std::string& robot, const CycleTrace& trace,
-                   std::span<const Fault> faults) {
+                   std::span<const FaultReport> faults) {
   Result<Descriptor> opened = open_output(file);
   if (!opened) return std::unexpected(write_error(file, opened.error().message));
   std::FILE* out = ::fdopen(opened->release(), "wb");

@@ -16,6 +16,6 @@ namespace tandem::runtime {
 /// before overran, and one for each fault. Counters: wake-up latency and work, in us.
 /// Errors: the file cannot be written.
 [[nodiscard]] Status write_trace(const std::string& file, const std::string& robot,
-                                 const CycleTrace& trace, std::span<const Fault> faults);
+                                 const CycleTrace& trace, std::span<const FaultReport> faults);
 
 }  // namespace tandem::runtime

@@ -64,18 +64,18 @@ FaultRecord WaitingControllers::not_homed(std::size_t joint) const noexcept TAND
           .cause = hal::FaultCause::kNotHomed};
 }
 
-LoopAnswer WaitingControllers::go_on() noexcept TANDEM_RT {
+CycleAnswer WaitingControllers::go_on() noexcept TANDEM_RT {
   const bool stopped = now_.run.in(RunPhase::kFaulted) || now_.run.in(RunPhase::kResetting);
   if (stopped) return {.reason = RejectReason::kNotEnabled};
   if (!now_.run.in(RunPhase::kHeld)) return {.reason = RejectReason::kNotHeld};
   if (!any()) return {.reason = RejectReason::kGone};
-  const LoopAnswer no = arbiter_.may_start(waiting_);
+  const CycleAnswer no = arbiter_.may_start(waiting_);
   return no.reason == RejectReason::kNone ? leave_hold(0, waiting_) : no;
 }
 
-LoopAnswer WaitingControllers::leave_hold(ControllerSet stop,
-                                          ControllerSet start) noexcept TANDEM_RT {
-  const LoopAnswer answer = arbiter_.leave_hold(stop, start);
+CycleAnswer WaitingControllers::leave_hold(ControllerSet stop,
+                                           ControllerSet start) noexcept TANDEM_RT {
+  const CycleAnswer answer = arbiter_.leave_hold(stop, start);
   if (answer.reason == RejectReason::kNone) waiting_ = 0;
   return answer;
 }

@@ -37,9 +37,9 @@ class WaitingControllers {
   [[nodiscard]] std::optional<FaultRecord> unhomed() const noexcept TANDEM_RT;
 
   /// Starts those that wait.
-  [[nodiscard]] LoopAnswer go_on() noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer go_on() noexcept TANDEM_RT;
   /// From held joints to these controllers: nobody waits any more.
-  [[nodiscard]] LoopAnswer leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT;
+  [[nodiscard]] CycleAnswer leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT;
 
   void archive(Archive& ar) { ar(waiting_, before_retreat_, homes_at_start_); }
 

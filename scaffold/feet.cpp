@@ -144,7 +144,8 @@ ContactPatch shank_end(const Tree& tree, const Posed& neutral, int body, int& li
 }
 
 /// No sole stays level at the end of a shank.
-void stand_on_the_middle(const Tree& tree, const Posed& neutral, Foot& foot, ContactPatch& patch) {
+void stand_on_the_middle(const Tree& tree, const Posed& neutral, FoundFoot& foot,
+                         ContactPatch& patch) {
   if (patch.points.size() < 3 || tree.path_to(foot.body).size() > kFewJoints) return;
   int link = foot.link;
   if (shank_end(tree, neutral, foot.body, link).points.empty()) return;
@@ -175,7 +176,7 @@ ContactPatch wheel(const Tree& tree, const Posed& neutral, int body) {
 }
 
 /// A level link called sole says where the ground is better than a box around the foot does.
-void use_sole_link(const Tree& tree, const Posed& neutral, Foot& foot, ContactPatch& patch) {
+void use_sole_link(const Tree& tree, const Posed& neutral, FoundFoot& foot, ContactPatch& patch) {
   for (std::size_t i = 0; i < tree.links.size(); ++i) {
     const model::Link& link = tree.links[i];
     if (link.body != foot.body || !mentions(link.name, "sole")) continue;
@@ -189,8 +190,8 @@ void use_sole_link(const Tree& tree, const Posed& neutral, Foot& foot, ContactPa
   }
 }
 
-Foot make_foot(const Tree& tree, const Posed& neutral, int body) {
-  Foot foot;
+FoundFoot make_foot(const Tree& tree, const Posed& neutral, int body) {
+  FoundFoot foot;
   foot.body = body;
   foot.link = best_link(tree, body);
   ContactPatch patch = wheel(tree, neutral, body);
@@ -234,18 +235,19 @@ Foot make_foot(const Tree& tree, const Posed& neutral, int body) {
 
 }  // namespace
 
-std::vector<Foot> find_feet(const Tree& tree, const Posed& neutral, FeetBy by) {
-  std::vector<Foot> feet;
+std::vector<FoundFoot> find_feet(const Tree& tree, const Posed& neutral, FeetBy by) {
+  std::vector<FoundFoot> feet;
   for (const int body : by == FeetBy::kName ? named_feet(tree) : lowest_ends(tree, neutral)) {
     feet.push_back(make_foot(tree, neutral, body));
   }
   return feet;
 }
 
-Vector3d direction_down(const Tree& tree, const std::vector<Foot>& feet, const Posed& neutral) {
+Vector3d direction_down(const Tree& tree, const std::vector<FoundFoot>& feet,
+                        const Posed& neutral) {
   Vector3d way = Vector3d::Zero();
   double length = 0.0;
-  for (const Foot& foot : feet) {
+  for (const FoundFoot& foot : feet) {
     const Vector3d leg = (neutral.body(foot.body) * tree.bodies[foot.body].inertia).com_m -
                          neutral.origin(tree.path_to(foot.body).front());
     way += leg;
@@ -257,10 +259,10 @@ Vector3d direction_down(const Tree& tree, const std::vector<Foot>& feet, const P
   return Vector3d::Unit(axis) * (way[axis] > 0.0 ? 1.0 : -1.0);
 }
 
-Vector3d direction_ahead_of(const Tree& tree, const std::vector<Foot>& feet, const Posed& neutral,
-                            const Vector3d& down) {
+Vector3d direction_ahead_of(const Tree& tree, const std::vector<FoundFoot>& feet,
+                            const Posed& neutral, const Vector3d& down) {
   Vector3d turning = Vector3d::Zero(), reach = Vector3d::Zero();
-  for (const Foot& foot : feet) {
+  for (const FoundFoot& foot : feet) {
     for (const int j : tree.path_to(foot.body))
       if (!neutral.slides(j)) turning += neutral.axis(j).cwiseAbs();
     reach += (neutral.body(foot.body) * tree.bodies[foot.body].inertia).com_m -
@@ -274,9 +276,9 @@ Vector3d direction_ahead_of(const Tree& tree, const std::vector<Foot>& feet, con
   return reach.dot(along) < -kLeast_m * static_cast<double>(feet.size()) ? Vector3d(-along) : along;
 }
 
-Vector3d direction_ahead(const std::vector<Foot>& feet, const Posed& neutral) {
+Vector3d direction_ahead(const std::vector<FoundFoot>& feet, const Posed& neutral) {
   std::vector<model::FootReach> reach;
-  for (const Foot& foot : feet) {
+  for (const FoundFoot& foot : feet) {
     if (!foot.flat()) continue;
     reach.push_back(
         {neutral.origin(foot.body - 1), (neutral.link(foot.link) * foot.sole_in_link).p});
@@ -284,8 +286,8 @@ Vector3d direction_ahead(const std::vector<Foot>& feet, const Posed& neutral) {
   return model::direction_ahead(reach);
 }
 
-void face_ahead(const Vector3d& ahead, const Posed& neutral, std::vector<Foot>& feet) {
-  for (Foot& foot : feet) {
+void face_ahead(const Vector3d& ahead, const Posed& neutral, std::vector<FoundFoot>& feet) {
+  for (FoundFoot& foot : feet) {
     const Placement sole = neutral.link(foot.link) * foot.sole_in_link;
     const Vector3d up = sole.R.col(2);
     const Vector3d x = (ahead - up * up.dot(ahead)).normalized();
@@ -296,8 +298,8 @@ void face_ahead(const Vector3d& ahead, const Posed& neutral, std::vector<Foot>& 
   }
 }
 
-void settle_balls(const Vector3d& ahead, const Posed& standing, std::vector<Foot>& feet) {
-  for (Foot& foot : feet) {
+void settle_balls(const Vector3d& ahead, const Posed& standing, std::vector<FoundFoot>& feet) {
+  for (FoundFoot& foot : feet) {
     if (foot.flat()) continue;
     const Placement link = standing.link(foot.link);
     Eigen::Matrix3d R;

@@ -114,7 +114,7 @@ class AtRest {
   }
   [[nodiscard]] std::vector<Vector3d> points(const Posed& posed) const {
     std::vector<Vector3d> all;
-    for (const Foot& foot : robot_.feet) {
+    for (const FoundFoot& foot : robot_.feet) {
       const model::Placement sole = posed.link(foot.link) * foot.sole_in_link;
       for (const Vector3d& p : foot.points) all.push_back(sole.R * p + sole.p);
     }
@@ -169,7 +169,7 @@ std::optional<Error> falls_over(const NewRobot& robot, const VectorXd& q) {
   const std::optional<double> times = needed_firmness(robot, q);
   if (!times || *times < 1.0) return std::nullopt;
   std::vector<int> legs;
-  for (const Foot& foot : robot.feet) {
+  for (const FoundFoot& foot : robot.feet) {
     for (const int j : robot.tree.path_to(foot.body)) {
       if (robot.tree.joints[j].type != model::JointType::kPrismatic) legs.push_back(j);
     }

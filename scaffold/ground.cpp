@@ -18,7 +18,7 @@ double clean(double value, double step) {
   return result == 0.0 ? 0.0 : result;
 }
 
-hal::SiteConfig site_of(const model::Tree& tree, const Foot& foot) {
+hal::SiteConfig site_of(const model::Tree& tree, const FoundFoot& foot) {
   hal::SiteConfig site;
   site.name = foot.name;
   site.link = tree.links[foot.link].name;
@@ -39,7 +39,7 @@ hal::SiteConfig site_of(const model::Tree& tree, const Foot& foot) {
 void fill_ground(const hal::RobotConfig* like, NewRobot& robot) {
   hal::ContactConfig& contact = robot.config.contact;
   double points = 0.0;
-  for (const Foot& foot : robot.feet) {
+  for (const FoundFoot& foot : robot.feet) {
     robot.config.model.sites.push_back(site_of(robot.tree, foot));
     hal::Foot config;
     config.site = foot.name;

@@ -116,7 +116,7 @@ class Chooser {
   Chooser(const Like& like, const NewRobot& robot, double scale)
       : like_(like), scale_(scale), ours_(traits_of(robot.tree, robot.limbs, robot.ahead)) {
     const Posed neutral(like.tree, neutral_posture(like.tree));
-    std::vector<Foot> feet = find_feet(like.tree, neutral, FeetBy::kName);
+    std::vector<FoundFoot> feet = find_feet(like.tree, neutral, FeetBy::kName);
     const std::vector<Limb> limbs = split_limbs(like.tree, feet, neutral, Vector3d::UnitX());
     theirs_ = traits_of(like.tree, limbs, Vector3d::UnitX());
   }
@@ -213,7 +213,7 @@ void take_drives(const Like& like, const std::vector<JointLoad>& loads,
   const double s = scale_of(robot.tree, like.tree);
   const Chooser chooser(like, robot, s);
   const auto in_leg = [&](int joint) {
-    return std::ranges::any_of(robot.feet, [&](const Foot& foot) {
+    return std::ranges::any_of(robot.feet, [&](const FoundFoot& foot) {
       return std::ranges::count(robot.tree.path_to(foot.body), joint) > 0;
     });
   };

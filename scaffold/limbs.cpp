@@ -159,7 +159,7 @@ std::string foot_name(const std::string& limb, bool flat, std::size_t feet) {
 
 }  // namespace
 
-std::vector<Limb> split_limbs(const Tree& tree, std::vector<Foot>& feet, const Posed& neutral,
+std::vector<Limb> split_limbs(const Tree& tree, std::vector<FoundFoot>& feet, const Posed& neutral,
                               const Vector3d& ahead) {
   std::vector<Limb> limbs = Splitter(tree, neutral).run();
   for (std::size_t f = 0; f < feet.size(); ++f) {
@@ -183,7 +183,7 @@ std::vector<Limb> split_limbs(const Tree& tree, std::vector<Foot>& feet, const P
     limbs[i].name = names[i];
     std::erase_if(limbs[i].joints, [&](int j) { return tree.joints[j].follows(); });
     if (limbs[i].foot < 0) continue;
-    Foot& foot = feet[static_cast<std::size_t>(limbs[i].foot)];
+    FoundFoot& foot = feet[static_cast<std::size_t>(limbs[i].foot)];
     foot.name = foot_name(names[i], foot.flat(), feet.size());
   }
   std::erase_if(limbs, [](const Limb& limb) { return limb.joints.empty(); });

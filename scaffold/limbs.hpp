@@ -17,7 +17,7 @@ struct Limb {
 
 /// Splits the tree at its root, and where two heavy branches part (a torso under its arms). A
 /// hand stays with its arm. Names the feet after their limbs.
-[[nodiscard]] std::vector<Limb> split_limbs(const model::Tree& tree, std::vector<Foot>& feet,
+[[nodiscard]] std::vector<Limb> split_limbs(const model::Tree& tree, std::vector<FoundFoot>& feet,
                                             const Posed& neutral, const Eigen::Vector3d& ahead);
 
 }  // namespace tandem::scaffold

@@ -67,10 +67,10 @@ void raise_to_neighbours(const Tree& tree, std::vector<JointLimits>& limits) {
 }
 
 /// A leg whose foot stands swings the robot above it: its share of the whole, as a point mass.
-void add_stance(const Tree& tree, const std::vector<Foot>& feet, const Posed& stance,
+void add_stance(const Tree& tree, const std::vector<FoundFoot>& feet, const Posed& stance,
                 std::vector<JointLoad>& loads) {
   const double share_kg = stance.whole().mass_kg / static_cast<double>(feet.size());
-  for (const Foot& foot : feet) {
+  for (const FoundFoot& foot : feet) {
     const std::vector<int> path = tree.path_to(foot.body);
     const Vector3d sole = (stance.link(foot.link) * foot.sole_in_link).p;
     const double length = (stance.origin(path.front()) - sole).norm();
@@ -90,7 +90,7 @@ void add_stance(const Tree& tree, const std::vector<Foot>& feet, const Posed& st
 
 }  // namespace
 
-std::vector<JointLoad> loads_of(const Tree& tree, const std::vector<Foot>& feet,
+std::vector<JointLoad> loads_of(const Tree& tree, const std::vector<FoundFoot>& feet,
                                 const Posed* stance) {
   const Bounds bounds = bounds_of(tree);
   std::vector<JointLoad> loads(tree.joints.size());
@@ -115,14 +115,14 @@ std::vector<JointLoad> loads_of(const Tree& tree, const std::vector<Foot>& feet,
   return loads;
 }
 
-std::vector<double> torques_at(const Tree& tree, const std::vector<Foot>& feet,
+std::vector<double> torques_at(const Tree& tree, const std::vector<FoundFoot>& feet,
                                const Posed& posed) {
   const auto n = static_cast<Eigen::Index>(tree.joints.size());
   Eigen::VectorXd torque = Eigen::VectorXd::Zero(n);
   for (Eigen::Index j = 0; j < n; ++j) {
     if (!tree.joints[j].follows()) torque[j] = posed.gravity_load(static_cast<int>(j));
   }
-  for (const Foot& foot : feet) {
+  for (const FoundFoot& foot : feet) {
     const double share_N = posed.whole().mass_kg * kGravity_m_s2 / static_cast<double>(feet.size());
     const Vector3d sole = (posed.link(foot.link) * foot.sole_in_link).p;
     torque -= share_N * posed.point_jacobian(foot.body, sole).row(2).transpose();

@@ -25,7 +25,8 @@ struct JointLoad {
 
 /// @param stance  the standing posture; null: the base is fixed
 [[nodiscard]] std::vector<JointLoad> loads_of(const model::Tree& tree,
-                                              const std::vector<Foot>& feet, const Posed* stance);
+                                              const std::vector<FoundFoot>& feet,
+                                              const Posed* stance);
 
 /// The limits that drives are made for.
 struct JointLimits {
@@ -40,7 +41,8 @@ struct JointLimits {
 /// weight that hangs on it, less what the ground carries, on every foot the same share. 0 for a
 /// follower; its leader's has it.
 /// @param feet  empty: the base is fixed
-[[nodiscard]] std::vector<double> torques_at(const model::Tree& tree, const std::vector<Foot>& feet,
+[[nodiscard]] std::vector<double> torques_at(const model::Tree& tree,
+                                             const std::vector<FoundFoot>& feet,
                                              const Posed& posed);
 
 /// The description's, where they can be: a limit of zero, or far beyond what the robot's weight

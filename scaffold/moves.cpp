@@ -96,7 +96,7 @@ class Swinging {
     return shares;
   }
   [[nodiscard]] bool in_leg(int joint) const {
-    return std::ranges::any_of(robot_.feet, [&](const Foot& foot) {
+    return std::ranges::any_of(robot_.feet, [&](const FoundFoot& foot) {
       const std::vector<int> path = robot_.tree.path_to(foot.body);
       return std::ranges::find(path, joint) != path.end();
     });
@@ -143,7 +143,7 @@ struct Lowered {
   VectorXd q;
   double share = 0.0;
 };
-std::optional<Lowered> as_low_as_it_goes(const Standing& standing, const VectorXd& q,
+std::optional<Lowered> as_low_as_it_goes(const StandingPosture& standing, const VectorXd& q,
                                          double down_m) {
   for (const double share : {1.0, 0.5, 0.25, 0.0}) {
     if (const auto found = standing.lowered(q, share * down_m)) return Lowered{*found, share};
@@ -166,7 +166,7 @@ Move swing(const NewRobot& robot, const VectorXd& posture) {
   return move;
 }
 
-Move squat_and_swing(const NewRobot& robot, const Standing& standing) {
+Move squat_and_swing(const NewRobot& robot, const StandingPosture& standing) {
   const VectorXd& posture = standing.q();
   VectorXd wanted = kStandingShare * amplitudes(robot, posture);
   for (Eigen::Index j = 0; j < wanted.size(); ++j) {

@@ -93,7 +93,7 @@ class Maker {
   const Request& request_;
   std::string text_;  ///< of the description
   NewRobot robot_;
-  std::optional<Standing> standing_;
+  std::optional<StandingPosture> standing_;
   Eigen::VectorXd q_;
   std::vector<Overload> overloaded_;
   std::string floating_;  ///< the description's floating joint at its root, or empty
@@ -192,7 +192,7 @@ Status Maker::choose_base() {
     robot_.feet = find_feet(robot_.tree, posed, FeetBy::kName);
     if (robot_.feet.empty() && asked) {
       robot_.feet = find_feet(robot_.tree, posed, FeetBy::kStructure);
-      for (Foot& foot : robot_.feet) {
+      for (FoundFoot& foot : robot_.feet) {
         const std::string chosen = "no link is called a foot: this is one of the lowest ends";
         foot.guess = foot.guess.empty() ? chosen : chosen + "; " + foot.guess;
       }

@@ -66,7 +66,7 @@ struct NewRobot {
   model::Tree tree;
   hal::RobotConfig config;
   std::vector<Limb> limbs;
-  std::vector<Foot> feet;
+  std::vector<FoundFoot> feet;
   Eigen::Vector3d ahead = Eigen::Vector3d::UnitX();  ///< where it looks; one of the root's axes
   std::vector<FoundSensor> sensors;
   std::vector<JointLimits> limits;                   ///< by the tree's joints

@@ -32,13 +32,13 @@ constexpr int kSamples = 64;
 
 }  // namespace
 
-Standing::Standing(const Tree& tree, const std::vector<Foot>& feet, const Vector3d& ahead,
-                   VectorXd start)
+StandingPosture::StandingPosture(const Tree& tree, const std::vector<FoundFoot>& feet,
+                                 const Vector3d& ahead, VectorXd start)
     : tree_(tree), feet_(feet), bounds_(bounds_of(tree)), neutral_(std::move(start)) {
   level_ << ahead, Vector3d::UnitZ().cross(ahead), Vector3d::UnitZ();
   in_leg_.assign(tree.joints.size(), false);
   const Posed neutral(tree, neutral_);
-  for (const Foot& foot : feet_) {
+  for (const FoundFoot& foot : feet_) {
     for (const int j : tree.path_to(foot.body)) in_leg_[j] = true;
     lines_.push_back(levels_line(foot, neutral));
     Vector3d home = (neutral.link(foot.link) * foot.sole_in_link).p;
@@ -53,7 +53,7 @@ Standing::Standing(const Tree& tree, const std::vector<Foot>& feet, const Vector
 }
 
 /// Place takes two of the joints that tilt a line, so it needs a third one.
-bool Standing::levels_line(const Foot& foot, const Posed& neutral) const {
+bool StandingPosture::levels_line(const FoundFoot& foot, const Posed& neutral) const {
   const Vector3d line = (neutral.link(foot.link) * foot.sole_in_link).R * foot.line();
   if (!(line.norm() > 0.0)) return false;
   const Vector3d about = Vector3d::UnitZ().cross(line).normalized();
@@ -63,14 +63,14 @@ bool Standing::levels_line(const Foot& foot, const Posed& neutral) const {
          }) > 2;
 }
 
-int Standing::conditions(std::size_t foot) const {
+int StandingPosture::conditions(std::size_t foot) const {
   if (feet_[foot].flat()) return 6;
   return lines_[foot] ? 4 : 3;
 }
 
 /// From the sole's middle to where a load asks least of the ankle: under it, as far as that is
 /// in the sole's middle half.
-Vector3d Standing::best_load(const Foot& foot, const Posed& neutral) const {
+Vector3d StandingPosture::best_load(const FoundFoot& foot, const Posed& neutral) const {
   if (!foot.flat()) return Vector3d::Zero();
   const Placement sole = neutral.link(foot.link) * foot.sole_in_link;
   Vector3d most = Vector3d::Zero();
@@ -83,7 +83,7 @@ Vector3d Standing::best_load(const Foot& foot, const Posed& neutral) const {
 
 /// Finds the knee: of the joints that bend the leg in its own plane, the one that is far from both
 /// the first of them and the foot.
-Standing::Knee Standing::knee_of(const Foot& foot) const {
+StandingPosture::Knee StandingPosture::knee_of(const FoundFoot& foot) const {
   const Posed neutral(tree_, neutral_);
   const Vector3d left = level_.col(1);
   const Vector3d sole = (neutral.link(foot.link) * foot.sole_in_link).p;
@@ -106,13 +106,13 @@ Standing::Knee Standing::knee_of(const Foot& foot) const {
   return found;
 }
 
-std::vector<int> Standing::hip_and_knee() const {
+std::vector<int> StandingPosture::hip_and_knee() const {
   const Knee knee = knee_of(feet_.front());
   return knee.knee < 0 ? std::vector<int>{} : std::vector<int>{knee.hip, knee.knee};
 }
 
 /// Knees bent: +1 points them ahead, -1 back.
-VectorXd Standing::bent(const std::vector<double>& sides) const {
+VectorXd StandingPosture::bent(const std::vector<double>& sides) const {
   const Posed neutral(tree_, neutral_);
   VectorXd q = neutral_;
   for (std::size_t f = 0; f < feet_.size(); ++f) {
@@ -132,14 +132,14 @@ VectorXd Standing::bent(const std::vector<double>& sides) const {
 
 /// Which way each knee may point, the likeliest first: a biped's ahead, a quadruped's to its
 /// middle; then all that are left.
-std::vector<std::vector<double>> Standing::patterns() const {
+std::vector<std::vector<double>> StandingPosture::patterns() const {
   std::vector<std::vector<double>> found;
   using Pair = std::pair<double, double>;  // of the front and of the hind legs
   for (const auto& [front, hind] : feet_.size() > 2
                                        ? std::vector<Pair>{{-1, 1}, {-1, -1}, {1, 1}, {1, -1}}
                                        : std::vector<Pair>{{1, 1}, {-1, -1}}) {
     std::vector<double> sides;
-    for (const Foot& foot : feet_) sides.push_back(knee_of(foot).front ? front : hind);
+    for (const FoundFoot& foot : feet_) sides.push_back(knee_of(foot).front ? front : hind);
     found.push_back(std::move(sides));
   }
   for (unsigned bits = 0; feet_.size() <= kMostLegs && bits < 1U << feet_.size(); ++bits) {
@@ -153,7 +153,8 @@ std::vector<std::vector<double>> Standing::patterns() const {
 /// Each foot's way to where it has to be, under a centre of mass that moves with the legs; and
 /// how it changes with the joints. Loose: about the feet's own middle, whose way to the centre of
 /// mass counts little.
-double Standing::residual(const Posed& posed, double height_m, VectorXd& r, MatrixXd* J) const {
+double StandingPosture::residual(const Posed& posed, double height_m, VectorXd& r,
+                                 MatrixXd* J) const {
   Eigen::Index rows = 0;
   for (std::size_t f = 0; f < feet_.size(); ++f) rows += conditions(f);
   if (loose_) rows += 2;
@@ -180,7 +181,7 @@ double Standing::residual(const Posed& posed, double height_m, VectorXd& r, Matr
   }
   if (J != nullptr) way.row(2).setZero();
   for (std::size_t f = 0; f < feet_.size(); ++f) {
-    const Foot& foot = feet_[f];
+    const FoundFoot& foot = feet_[f];
     const Placement sole = posed.link(foot.link) * foot.sole_in_link;
     Vector3d target = homes_[f] + com - middle_home_;
     target.z() = -height_m + foot.radius_m;
@@ -210,8 +211,8 @@ double Standing::residual(const Posed& posed, double height_m, VectorXd& r, Matr
 
 /// The smallest step of the legs' joints that leads there; joints that would leave their limits
 /// stay, and the others do without them.
-VectorXd Standing::leg_step(MatrixXd J, const VectorXd& r, double damping,
-                            const VectorXd& q) const {
+VectorXd StandingPosture::leg_step(MatrixXd J, const VectorXd& r, double damping,
+                                   const VectorXd& q) const {
   for (Eigen::Index j = 0; j < J.cols(); ++j) {
     if (!in_leg_[j]) J.col(j).setZero();
   }
@@ -236,7 +237,7 @@ VectorXd Standing::leg_step(MatrixXd J, const VectorXd& r, double damping,
 
 /// Damped least squares: the smallest step of the legs' joints that leads there, cut to the
 /// limits. From where `q` is, and always the same.
-bool Standing::solve(double height_m, VectorXd& q) const {
+bool StandingPosture::solve(double height_m, VectorXd& q) const {
   VectorXd r;
   MatrixXd J;
   VectorXd best = q;
@@ -263,10 +264,10 @@ bool Standing::solve(double height_m, VectorXd& q) const {
 }
 
 /// From a bent posture up until the feet leave the ground, and down again to a share of that.
-bool Standing::settle(VectorXd q) {
+bool StandingPosture::settle(VectorXd q) {
   const Posed start(tree_, q);
   double height = 0.0;
-  for (const Foot& foot : feet_) {
+  for (const FoundFoot& foot : feet_) {
     height += (foot.radius_m - (start.link(foot.link) * foot.sole_in_link).p.z()) /
               static_cast<double>(feet_.size());
   }
@@ -296,13 +297,13 @@ bool Standing::settle(VectorXd q) {
 }
 
 /// Legs that have fewer joints than their feet have conditions cannot fulfil all of them.
-bool Standing::lacks_joints() const {
+bool StandingPosture::lacks_joints() const {
   std::ptrdiff_t needed = 0;
   for (std::size_t f = 0; f < feet_.size(); ++f) needed += conditions(f);
   return std::ranges::count(in_leg_, true) < needed;
 }
 
-bool Standing::search() {
+bool StandingPosture::search() {
   for (const std::vector<double>& sides : patterns()) {
     if (settle(bent(sides))) return true;
   }
@@ -317,7 +318,7 @@ bool Standing::search() {
   return false;
 }
 
-Status Standing::find() {
+Status StandingPosture::find() {
   loose_ = lacks_joints();
   if (search()) return {};
   if (!loose_) {
@@ -328,14 +329,14 @@ Status Standing::find() {
               "give --base fixed, and edit what is written");
 }
 
-double Standing::beside_m() const {
+double StandingPosture::beside_m() const {
   if (!loose_) return 0.0;
   VectorXd r;
   static_cast<void>(residual(Posed(tree_, q_), height_m_, r, nullptr));
   return r.head<2>().norm() / kLooseWeight;
 }
 
-void Standing::stay_on(const std::vector<Foot>& settled) {
+void StandingPosture::stay_on(const std::vector<FoundFoot>& settled) {
   feet_ = settled;
   const Posed posed(tree_, q_);
   for (std::size_t f = 0; f < feet_.size(); ++f) {
@@ -344,7 +345,7 @@ void Standing::stay_on(const std::vector<Foot>& settled) {
   middle_home_ = posed.whole().com_m;
 }
 
-Result<VectorXd> Standing::lowered(const VectorXd& q, double down_m) const {
+Result<VectorXd> StandingPosture::lowered(const VectorXd& q, double down_m) const {
   VectorXd found = q;
   if (solve(height_m_ - down_m, found)) return found;
   return fail("the legs cannot lower the robot so far");

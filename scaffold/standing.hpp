@@ -13,11 +13,11 @@ namespace tandem::scaffold {
 
 /// A robot on its feet: soles level and where they are, the centre of mass over
 /// their ankles, or over the sole's middle half when those are beside it.
-class Standing {
+class StandingPosture {
  public:
   /// @param start  what is no leg stays as it is here; legs begin here
-  Standing(const model::Tree& tree, const std::vector<Foot>& feet, const Eigen::Vector3d& ahead,
-           Eigen::VectorXd start);
+  StandingPosture(const model::Tree& tree, const std::vector<FoundFoot>& feet,
+                  const Eigen::Vector3d& ahead, Eigen::VectorXd start);
 
   /// Finds a posture with bent knees: 0.94 of the greatest height over the
   /// ground, or up to 0.98 where limits leave no more. Where legs have too few joints to shift the
@@ -34,7 +34,7 @@ class Standing {
 
   /// Takes the feet as they are now, in the posture found, for those that stay where they are:
   /// after settle_balls() the simulated contact is a point of the shank, which turns with it.
-  void stay_on(const std::vector<Foot>& settled);
+  void stay_on(const std::vector<FoundFoot>& settled);
 
   /// The posture `down_m` lower, from `q`, whose joints that are not in a leg stay.
   /// Errors: the legs cannot do it.
@@ -50,10 +50,10 @@ class Standing {
     int hip = -1, knee = -1, ankle = -1;  ///< joints; -1: none
     bool front = true;
   };
-  [[nodiscard]] Knee knee_of(const Foot& foot) const;
-  [[nodiscard]] bool levels_line(const Foot& foot, const Posed& neutral) const;
+  [[nodiscard]] Knee knee_of(const FoundFoot& foot) const;
+  [[nodiscard]] bool levels_line(const FoundFoot& foot, const Posed& neutral) const;
   [[nodiscard]] int conditions(std::size_t foot) const;
-  [[nodiscard]] Eigen::Vector3d best_load(const Foot& foot, const Posed& neutral) const;
+  [[nodiscard]] Eigen::Vector3d best_load(const FoundFoot& foot, const Posed& neutral) const;
   [[nodiscard]] Eigen::VectorXd bent(const std::vector<double>& sides) const;
   [[nodiscard]] std::vector<std::vector<double>> patterns() const;
   [[nodiscard]] bool solve(double height_m, Eigen::VectorXd& q) const;
@@ -66,7 +66,7 @@ class Standing {
   [[nodiscard]] bool search();
 
   const model::Tree& tree_;
-  std::vector<Foot> feet_;
+  std::vector<FoundFoot> feet_;
   Eigen::Matrix3d level_;  ///< of a sole: x ahead, z up
   Bounds bounds_;
   std::vector<bool> in_leg_;

@@ -107,6 +107,6 @@ struct Burden {
 
 /// The same for what is no leg, while the legs lower the robot twice and keep its centre of mass
 /// over the feet.
-[[nodiscard]] Move squat_and_swing(const NewRobot& robot, const Standing& standing);
+[[nodiscard]] Move squat_and_swing(const NewRobot& robot, const StandingPosture& standing);
 
 }  // namespace tandem::scaffold

@@ -61,7 +61,7 @@ bool advance(sim::Plant& plant, double duration_s) {
   return true;
 }
 
-Result<SlopeResult> slide(const Slope& slope, const Subject& block, const EngineEntry& entry,
+Result<SlopeResult> slide(const Slope& slope, const BenchRobot& block, const EngineEntry& entry,
                           std::int64_t step_ns) {
   Result<sim::Plant> plant = block.plant(entry, step_ns);
   if (!plant) return std::unexpected(plant.error());
@@ -79,7 +79,7 @@ Result<SlopeResult> slide(const Slope& slope, const Subject& block, const Engine
                      .cost_us_per_ms = 1e3 * cost_s / kSlopeTime_s};
 }
 
-Result<DropRow> drop(const Subject& block, const EngineEntry& entry, std::int64_t step_ns) {
+Result<DropRow> drop(const BenchRobot& block, const EngineEntry& entry, std::int64_t step_ns) {
   Result<sim::Plant> plant = block.plant(entry, step_ns);
   if (!plant) return std::unexpected(plant.error());
   constexpr double kHeight_m = 0.05, kTime_s = 2.0, kAtRest_m_s = 1e-3;

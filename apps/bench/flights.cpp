@@ -139,7 +139,7 @@ std::vector<RandomState> random_states(const tandem_kernels& k) {
 
 using Accelerate = std::function<void(const RandomState&, double* vdot)>;
 
-Result<Accelerate> accelerate_by(const Subject& subject, const EngineEntry& entry) {
+Result<Accelerate> accelerate_by(const BenchRobot& subject, const EngineEntry& entry) {
   if (entry.ours()) {
     const tandem_kernels& k = *subject.kernels;
     const std::vector<double> none(6 * k.wrenches + 1, 0.0);
@@ -216,7 +216,7 @@ Result<std::vector<FlightRow>> measure(const Flight& flight,
   return rows;
 }
 
-std::vector<AccelerationRow> measure_accelerations(const Subject& subject,
+std::vector<AccelerationRow> measure_accelerations(const BenchRobot& subject,
                                                    const std::vector<EngineEntry>& entries) {
   const std::vector<RandomState> states = random_states(*subject.kernels);
   std::vector<std::vector<double>> ours, theirs;

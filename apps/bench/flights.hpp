@@ -17,7 +17,7 @@ struct Flight {
   std::string name;   ///< of its figure's file
   std::string title;  ///< of its section
   std::string text;   ///< what happens, in a sentence or two
-  const Subject* subject = nullptr;
+  const BenchRobot* subject = nullptr;
   double duration_s = 1.0;
   bool keeps_energy = true;    ///< no torques: energy is conserved
   bool keeps_momentum = true;  ///< no gravity and a free base: momentum is conserved
@@ -58,7 +58,7 @@ struct AccelerationRow {
   std::string refusal{};  ///< why it refused; empty: it did not
 };
 [[nodiscard]] std::vector<AccelerationRow> measure_accelerations(
-    const Subject& subject, const std::vector<EngineEntry>& entries);
+    const BenchRobot& subject, const std::vector<EngineEntry>& entries);
 
 /// Processor time of the calling thread [s].
 [[nodiscard]] double thread_time_s();

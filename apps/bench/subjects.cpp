@@ -25,16 +25,16 @@ std::array<double, 3> box_inertia(double mass, double x, double y, double z) {
           mass / 12.0 * (x * x + y * y)};
 }
 
-Result<Subject> finish(robot::RobotFiles robot) {
+Result<BenchRobot> finish(robot::RobotFiles robot) {
   auto kernels = robot::supply_kernels(robot, {}, robot::MissingKernels::kBuild, build_once);
   if (!kernels) return std::unexpected(kernels.error());
-  Subject subject{std::move(robot), std::move(*kernels)};
+  BenchRobot subject{std::move(robot), std::move(*kernels)};
   subject.gravity_m_s2 = subject.robot.config.model.gravity_m_s2;
   return subject;
 }
 
-Result<Subject> from_urdf(const std::string& name, const std::string& body, bool floating,
-                          const hal::RobotConfig& config) {
+Result<BenchRobot> from_urdf(const std::string& name, const std::string& body, bool floating,
+                             const hal::RobotConfig& config) {
   robot::RobotFiles robot;
   robot.config = config;
   robot.config.name = name;
@@ -59,7 +59,7 @@ hal::ActuatorConfig torque_source() {
 
 }  // namespace
 
-Result<sim::Plant> Subject::plant(const EngineEntry& entry, std::int64_t step_ns) const {
+Result<sim::Plant> BenchRobot::plant(const EngineEntry& entry, std::int64_t step_ns) const {
   sim::PlantConfig config;
   config.kernels = kernels.get();
   config.engine = entry.engine;
@@ -76,14 +76,14 @@ Result<sim::Plant> Subject::plant(const EngineEntry& entry, std::int64_t step_ns
   return sim::Plant::create(config);
 }
 
-Result<Subject> make_box() {
+Result<BenchRobot> make_box() {
   hal::RobotConfig config;
   config.model.gravity_m_s2 = {0.0, 0.0, 0.0};
   return from_urdf("bench_box", link("box", 1.0, {}, box_inertia(1.0, 0.1, 0.2, 0.4)), true,
                    config);
 }
 
-Result<Subject> make_chain(int links) {
+Result<BenchRobot> make_chain(int links) {
   const double mass = 1.0 / links, length = 1.0 / links, thick = 0.05;
   std::string body = R"(<link name="world"/>)";
   for (int i = 1; i <= links; ++i) {
@@ -98,7 +98,7 @@ Result<Subject> make_chain(int links) {
   return from_urdf(fmt::format("bench_chain{}", links), body, false, {});
 }
 
-Result<Subject> make_block(double friction, std::array<double, 3> gravity_m_s2) {
+Result<BenchRobot> make_block(double friction, std::array<double, 3> gravity_m_s2) {
   constexpr double kHalf = 0.5 * kBlockEdge_m;
   hal::RobotConfig config;
   config.model.gravity_m_s2 = gravity_m_s2;
@@ -123,7 +123,7 @@ Result<Subject> make_block(double friction, std::array<double, 3> gravity_m_s2) 
       config);
 }
 
-Result<Subject> make_flyer(double gravity_m_s2) {
+Result<BenchRobot> make_flyer(double gravity_m_s2) {
   const auto folder = bundled_folder("coman");
   if (!folder) return std::unexpected(folder.error());
   auto robot = robot::read_robot(*folder + "/robot.toml");

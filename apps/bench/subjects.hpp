@@ -15,7 +15,7 @@
 namespace tandem::apps {
 
 /// A robot, its kernels, and what its plants are made from.
-struct Subject {
+struct BenchRobot {
   robot::RobotFiles robot;
   model::KernelLibrary kernels;
   std::array<double, 3> gravity_m_s2{0.0, 0.0, -9.81};
@@ -28,16 +28,16 @@ struct Subject {
 };
 
 /// A free box of 1 kg, 0.1 x 0.2 x 0.4 m, without gravity.
-[[nodiscard]] Result<Subject> make_box();
+[[nodiscard]] Result<BenchRobot> make_box();
 /// A chain of rods of 1 kg and 1 m in all, hung from the world at its end; they lie along x at
 /// q = 0 and turn about y and z in turns.
-[[nodiscard]] Result<Subject> make_chain(int links);
+[[nodiscard]] Result<BenchRobot> make_chain(int links);
 /// A cube of 1 kg and 0.1 m on four points of the friction `friction`. Gravity that leans makes a
 /// slope of the ground.
-[[nodiscard]] Result<Subject> make_block(double friction, std::array<double, 3> gravity_m_s2);
+[[nodiscard]] Result<BenchRobot> make_block(double friction, std::array<double, 3> gravity_m_s2);
 /// COMAN in the air: its 29 joints driven by torques, no ground.
 /// @param gravity_m_s2  0 or 9.81, downwards
-[[nodiscard]] Result<Subject> make_flyer(double gravity_m_s2);
+[[nodiscard]] Result<BenchRobot> make_flyer(double gravity_m_s2);
 
 /// The bundled robot's folder.
 /// Errors: it is not there.

@@ -28,7 +28,7 @@ struct OpenBus {
 
 /// Makes this side's end of the line of [[bus]] `index`.
 using MakeLine = std::function<Result<std::unique_ptr<hal::can::Bus>>(
-    std::size_t index, hal::ecat::Link& link, hal::can::FrameWait& wait)>;
+    std::size_t index, hal::ecat::DataLink& link, hal::can::FrameWait& wait)>;
 
 /// One socket per [[bus]], in robot.toml's order, and the wait for all of them.
 class CanSockets final : public hal::can::FrameWait {

@@ -21,7 +21,7 @@ std::string category_words(std::string category) {
   return category;
 }
 
-void figures(Figures& f, const runtime::Fault& fault) {
+void figures(Figures& f, const runtime::FaultReport& fault) {
   f("time_s", fault.time_s);
   f("cycle", fault.cycle);
   f("joint", "or the sensor, or the controller; empty: the robot as a whole", fault.joint);

@@ -17,7 +17,7 @@ namespace tandem::apps {
 [[nodiscard]] std::string category_words(std::string category);
 
 /// docs/json.md, `fault_log`
-void figures(Figures& f, const runtime::Fault& fault);
+void figures(Figures& f, const runtime::FaultReport& fault);
 
 /// The table of a JSON list of faults; nothing when it is empty.
 void print_faults(const Json& faults, std::FILE* out);

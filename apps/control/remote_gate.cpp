@@ -24,11 +24,11 @@ Status check_load(bool allowed, const Json& request) {
 
 ControlRegistry::Gate remote_gate(const runtime::RemoteOptions& remote,
                                   std::function<std::string()> owner) {
-  const auto command = remote.command.value_or(runtime::RemoteCommand::kOff);
+  const auto command = remote.command.value_or(runtime::RemoteAccess::kOff);
   return [command, load = remote.load, owner = std::move(owner)](
              const std::string& name, ControlEffect effect, const Json& request) -> Status {
     if (!is_guarded(effect)) return {};
-    if (command == runtime::RemoteCommand::kOff) {
+    if (command == runtime::RemoteAccess::kOff) {
       return fail(name + ": this process takes no commands over DDS",
                   "[remote] command = \"local\" in its experiment allows them; its control socket "
                   "takes them on its own machine");

@@ -71,7 +71,7 @@ Result<Json> reset(runtime::RobotCycle& cycle, std::uint64_t after_stop) {
 hal::StopCategory carried_out_category(const runtime::RobotCycle& cycle, std::uint64_t at_cycle,
                                        hal::StopCategory asked) {
   if (asked != hal::StopCategory::kCategory2) return asked;
-  for (const runtime::Fault& fault : cycle.faults()) {
+  for (const runtime::FaultReport& fault : cycle.faults()) {
     if (fault.cycle == at_cycle && fault.category == asked) return asked;
   }
   return hal::StopCategory::kCategory1;

@@ -7,14 +7,14 @@ namespace {
 
 /// `count` of a sensor's channels from `first` on; null of one that was never heard, whose age is
 /// more than the run's.
-Json channels(const runtime::SensorInfo& sensor, std::size_t first, std::size_t count) {
+Json channels(const runtime::SensorReport& sensor, std::size_t first, std::size_t count) {
   if (sensor.look.age_cycles > sensor.look.cycle) {
     return std::vector<Json>(count);  // a client prints them one by one
   }
   return std::span(sensor.look.values).subspan(first, count);
 }
 
-Json sensor_json(const runtime::SensorInfo& sensor) {
+Json sensor_json(const runtime::SensorReport& sensor) {
   const bool imu = sensor.type == hal::SensorType::kImu;
   Json json{{"sensor", sensor.name},
             {"type", imu ? "imu" : "force_torque"},
@@ -36,7 +36,7 @@ Json sensor_json(const runtime::SensorInfo& sensor) {
 Json list(const runtime::RunServices& services) {
   Json all = Json::array();
   std::uint64_t cycle = 0;
-  for (const runtime::SensorInfo& sensor : services.sensors()) {
+  for (const runtime::SensorReport& sensor : services.sensors()) {
     cycle = sensor.look.cycle;
     all.push_back(sensor_json(sensor));
   }

@@ -26,9 +26,9 @@ std::string written_to(const std::string& file) {
 }
 
 /// Our loop for one slice, on a thread of its own.
-class Loop {
+class MeasuredCycle {
  public:
-  Loop(const LatencyPlan& plan, int cpu, std::uint64_t cycles)
+  MeasuredCycle(const LatencyPlan& plan, int cpu, std::uint64_t cycles)
       : loop_({.period_ns = plan.period_us * 1000, .pacing = rt::Pacing::kWallClock}, clock_),
         thread_([this, &plan, cpu, cycles] {
           (void)rt::set_up_thread({.policy = plan.policy, .priority = plan.priority, .cpu = cpu});
@@ -38,9 +38,9 @@ class Loop {
           }
           done_.store(true, std::memory_order_release);
         }) {}
-  ~Loop() { thread_.join(); }
-  Loop(const Loop&) = delete;
-  Loop& operator=(const Loop&) = delete;
+  ~MeasuredCycle() { thread_.join(); }
+  MeasuredCycle(const MeasuredCycle&) = delete;
+  MeasuredCycle& operator=(const MeasuredCycle&) = delete;
 
   [[nodiscard]] bool done() const { return done_.load(std::memory_order_acquire); }
   /// @pre done()
@@ -103,7 +103,7 @@ class Measurement {
   }
 
   void run_loop(LatencySample& sample, int cpu) {
-    const Loop loop(plan_, cpu, cycles_);
+    const MeasuredCycle loop(plan_, cpu, cycles_);
     while (!loop.done()) tell();
     loop.add_to(sample);
     sample.tandem_cpus.push_back(cpu);

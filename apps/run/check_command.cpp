@@ -103,7 +103,7 @@ void add_estimation_facts(const runtime::Experiment& e, Facts& facts) {
 }
 
 /// What a run would do.
-void print_plan(const Composition& c, std::FILE* out) {
+void print_plan(const WiredComposition& c, std::FILE* out) {
   const runtime::Experiment& e = c.experiment;
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
   Facts facts;
@@ -135,7 +135,7 @@ void print_plan(const Composition& c, std::FILE* out) {
 }
 
 void print_robot(const robot::RobotFiles& robot, const model::KernelLibrary& kernels,
-                 const robot::LoopStudy& loops, bool warned, std::FILE* out) {
+                 const robot::ClosureStudy& loops, bool warned, std::FILE* out) {
   Facts facts;
   add_robot_facts(robot.config, facts);
   add_kernel_facts(kernels, robot.config.file, facts);
@@ -184,7 +184,7 @@ Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics
 }
 
 /// Controllers that a prediction cannot continue: a run by itself is right.
-void warn_of_archives(const Composition& c, Diagnostics& warnings) {
+void warn_of_archives(const WiredComposition& c, Diagnostics& warnings) {
   for (const ControllerNote& note : c.notes) {
     if (!note.lacks_archive) continue;
     warnings.push_back({.message = "has members but no archive(): predictions and snapshots leave "
@@ -198,7 +198,7 @@ void warn_of_archives(const Composition& c, Diagnostics& warnings) {
 
 Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                              Json& json) {
-  const auto composition = runtime::composed<Composition>(
+  const auto composition = runtime::composed<WiredComposition>(
       options.file, {}, {.missing = robot::MissingKernels::kTolerate});
   if (!composition) return composition.error();
   warnings = (*composition)->experiment.description->warnings;

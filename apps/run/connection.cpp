@@ -49,7 +49,7 @@ void figures(Figures& f, const runtime::Experiment* e) {
 namespace {
 
 /// The robot of a server in the experiment's domain.
-Diagnostics connect_remote(Composition& c) {
+Diagnostics connect_remote(WiredComposition& c) {
   const runtime::Experiment& e = c.experiment;
   auto domain = dds::Domain::open(e.dds);
   if (!domain) return {domain.error()};
@@ -83,7 +83,7 @@ Diagnostics connect_remote(Composition& c) {
 
 }  // namespace
 
-Diagnostics connect(Composition& c, const std::string& record_frames) {
+Diagnostics connect(WiredComposition& c, const std::string& record_frames) {
   const runtime::Experiment& e = c.experiment;
   if (e.hal.backend == runtime::BackendKind::kDds && record_frames.empty()) {
     return connect_remote(c);
@@ -94,7 +94,7 @@ Diagnostics connect(Composition& c, const std::string& record_frames) {
                  "add --hal can, and start tandem emulate")
                 .error()};
   }
-  const auto make_line = [&e](std::size_t bus, hal::ecat::Link& link,
+  const auto make_line = [&e](std::size_t bus, hal::ecat::DataLink& link,
                               hal::can::FrameWait&) -> Result<std::unique_ptr<hal::can::Bus>> {
     auto made = hal::can::LineBus::create(
         e.robot, bus, link, {.period_ns = e.loop.period_ns, .lockstep = e.hal.lockstep});

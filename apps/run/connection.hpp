@@ -31,7 +31,7 @@ struct Wires {
 };
 
 /// The wires come first, for they outlive the backend: it says goodbye over them.
-struct Composition : Wires, runtime::Composition {};
+struct WiredComposition : Wires, runtime::Composition {};
 
 /// "EtherCAT" when the robot has no other bus, else "CAN".
 [[nodiscard]] std::string wire_name(const hal::RobotConfig& robot);
@@ -50,6 +50,6 @@ void figures(Figures& f, const runtime::Experiment* e);
 /// @param record_frames  file that every frame is written to; empty: none
 /// Errors: CanSockets::open()'s; a record that cannot be made, or without a bus; Domain::open()'s,
 /// RemoteBackend::connect()'s.
-[[nodiscard]] Diagnostics connect(Composition& composition, const std::string& record_frames);
+[[nodiscard]] Diagnostics connect(WiredComposition& composition, const std::string& record_frames);
 
 }  // namespace tandem::apps

@@ -12,9 +12,9 @@ std::uint64_t draw_run() {
   return (std::uint64_t{device()} << 32) | device();
 }
 
-std::vector<dds::FaultEntry> entries(const std::vector<runtime::Fault>& faults) {
+std::vector<dds::FaultEntry> entries(const std::vector<runtime::FaultReport>& faults) {
   std::vector<dds::FaultEntry> all;
-  for (const runtime::Fault& fault : faults) {
+  for (const runtime::FaultReport& fault : faults) {
     all.push_back({fault.cycle, fault.time_s, fault.joint, fault.board, fault.text, fault.category,
                    fault.latched, fault.cleared_s});
   }
@@ -23,7 +23,7 @@ std::vector<dds::FaultEntry> entries(const std::vector<runtime::Fault>& faults) 
 
 }  // namespace
 
-Result<std::unique_ptr<DdsRun>> DdsRun::open(const Composition& c, const std::string& node) {
+Result<std::unique_ptr<DdsRun>> DdsRun::open(const WiredComposition& c, const std::string& node) {
   const runtime::Experiment& e = c.experiment;
   if (!e.dds.enabled) return nullptr;
   auto domain = dds::Domain::open(e.dds);

@@ -29,7 +29,7 @@ class DdsRun {
   /// @param node  this process in ROS 2's graph: "tandem_run"
   /// @pre the composition is connected and outlives this
   /// Errors: Domain::open()'s, Participant::open()'s and Publisher::create()'s.
-  [[nodiscard]] static Result<std::unique_ptr<DdsRun>> open(const Composition& composition,
+  [[nodiscard]] static Result<std::unique_ptr<DdsRun>> open(const WiredComposition& composition,
                                                             const std::string& node);
 
   /// For others that talk DDS in this run, such as services. Outlived by this.

@@ -108,7 +108,7 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   auto emulated = sim::EmulatedRobot::create(robot, e->kernels.get(), e->subject.sim);
   if (!emulated) return std::unexpected(in_file(emulated.error(), robot.file));
   e->robot = std::move(*emulated);
-  const auto make_line = [&](std::size_t bus, hal::ecat::Link& link,
+  const auto make_line = [&](std::size_t bus, hal::ecat::DataLink& link,
                              hal::can::FrameWait& wait) -> Result<std::unique_ptr<hal::can::Bus>> {
     const sim::LineBoards::Config config{.period_ns = period_ns,
                                          .seed = e->subject.sim.seed,
@@ -155,7 +155,7 @@ void print_summary(const Emulation& e, const Json& json, std::FILE* out) {
 }
 
 /// " of joint1", " of board leg_1"; empty of what strikes every frame.
-std::string whose(const sim::Fault& fault, const hal::RobotConfig& robot) {
+std::string whose(const sim::ScenarioFault& fault, const hal::RobotConfig& robot) {
   const hal::InjectedFault injected = sim::injected(fault);
   const auto index = static_cast<std::size_t>(injected.index);
   switch (injected.target) {
@@ -170,7 +170,7 @@ std::string whose(const sim::Fault& fault, const hal::RobotConfig& robot) {
 
 /// Faults that have begun since.
 void tell_injected(Emulation& e, std::FILE* out, bool quiet) {
-  while (const sim::Fault* fault = e.robot->next_begun_fault()) {
+  while (const sim::ScenarioFault* fault = e.robot->next_begun_fault()) {
     ++e.injected;
     if (quiet) continue;
     fmt::print(out, "{:.3f} s: injected {}{}\n", static_cast<double>(e.emulator->time_ns()) * 1e-9,
@@ -265,15 +265,16 @@ Exit emulate_command(const EmulateOptions& options) {
   ControlRegistry commands;
   commands.add({"status", ControlEffect::kReads, "steps, frames and simulated time so far"},
                [&](const Json&) { return tasks.run([&] { return figures_json(&e); }); });
-  add_inject(commands, e.subject.robot, e.subject.sim.period_ns, [&](const sim::Fault& fault) {
-    const auto done = tasks.run([&]() -> Result<Json> {
-      if (Status added = injected(e.robot->inject(fault)); !added) {
-        return std::unexpected(added.error());
-      }
-      return Json::object();
-    });
-    return done ? Status() : Status(std::unexpected(done.error()));
-  });
+  add_inject(commands, e.subject.robot, e.subject.sim.period_ns,
+             [&](const sim::ScenarioFault& fault) {
+               const auto done = tasks.run([&]() -> Result<Json> {
+                 if (Status added = injected(e.robot->inject(fault)); !added) {
+                   return std::unexpected(added.error());
+                 }
+                 return Json::object();
+               });
+               return done ? Status() : Status(std::unexpected(done.error()));
+             });
   const auto socket =
       serve(commands, {.path = options.socket, .kind = "emulate", .wanted = !options.no_socket});
   emulate(e, tasks, out, options.quiet);

@@ -9,13 +9,13 @@
 namespace tandem::apps {
 
 void add_inject(ControlRegistry& registry, const hal::RobotConfig& robot, std::int64_t period_ns,
-                std::function<Status(const sim::Fault&)> add) {
+                std::function<Status(const sim::ScenarioFault&)> add) {
   registry.add(
       "inject", [&robot, period_ns, add = std::move(add)](const Json& request) -> Result<Json> {
         const auto faults =
             sim::parse_scenario(request["scenario"].get<std::string>(), "inject", robot, period_ns);
         if (!faults) return std::unexpected(faults.error().front());
-        for (const sim::Fault& fault : *faults) {
+        for (const sim::ScenarioFault& fault : *faults) {
           if (Status added = add(fault); !added) return std::unexpected(added.error());
         }
         return Json{{"injected", faults->size()}};

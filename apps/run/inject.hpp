@@ -14,7 +14,7 @@ namespace tandem::apps {
 /// registry, and hands each of its faults to `add`.
 /// @param add  answers an error when the fault cannot be added
 void add_inject(ControlRegistry& registry, const hal::RobotConfig& robot, std::int64_t period_ns,
-                std::function<Status(const sim::Fault&)> add);
+                std::function<Status(const sim::ScenarioFault&)> add);
 
 /// What the codes of EmulatedRobot::inject() mean.
 [[nodiscard]] Status injected(Code code);

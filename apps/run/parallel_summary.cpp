@@ -11,9 +11,9 @@
 namespace tandem::apps {
 namespace {
 
-using internal_model::Difference;
 using internal_model::Differences;
 using internal_model::JointDifference;
+using internal_model::SignalDifference;
 
 constexpr double kDegreesApart = 180.0 / std::numbers::pi;
 constexpr double kMillimetresApart = 1e3;
@@ -67,7 +67,7 @@ void print_sensors_apart(const hal::RobotConfig& robot, const Differences& all, 
     const auto begin = all.channels().begin() + static_cast<std::ptrdiff_t>(first);
     const auto end = begin + static_cast<std::ptrdiff_t>(sensor.channels());
     first += sensor.channels();
-    const auto most = std::ranges::max_element(begin, end, {}, &Difference::square_sum);
+    const auto most = std::ranges::max_element(begin, end, {}, &SignalDifference::square_sum);
     if (most == end || most->max == 0.0) continue;
     table.add({sensor.name, channel_name(sensor.type, static_cast<std::size_t>(most - begin)),
                fmt::format("{:.3g}", all.rms(*most)), fmt::format("{:.3g}", most->max)});
@@ -99,7 +99,7 @@ struct BaseApart {
   Apart position_m, angle_rad;
 };
 
-Apart apart(const Differences& all, const Difference& one) { return {all.rms(one), one.max}; }
+Apart apart(const Differences& all, const SignalDifference& one) { return {all.rms(one), one.max}; }
 
 std::optional<BaseApart> base_apart(const Differences& all) {
   if (all.base_position_m() == nullptr) return std::nullopt;

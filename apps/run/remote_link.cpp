@@ -19,8 +19,8 @@ Named<std::uint64_t> counts(const remote::Server& server) {
 
 }  // namespace
 
-Result<std::unique_ptr<remote::Server>> open_server(const Composition& c, DdsRun* dds, bool once,
-                                                    const DdsAdmission& admission) {
+Result<std::unique_ptr<remote::Server>> open_server(const WiredComposition& c, DdsRun* dds,
+                                                    bool once, const DdsAdmission& admission) {
   if (c.owner == nullptr || dds == nullptr) return nullptr;
   const runtime::Experiment& e = c.experiment;
   if (e.remote.lockstep && c.backend->pace() != hal::Pace::kSimulatedClock) {
@@ -58,7 +58,7 @@ Result<std::unique_ptr<remote::Server>> open_server(const Composition& c, DdsRun
 void tell_faults(remote::Server& server, const runtime::RobotCycle& cycle) {
   server.set_status([&cycle] {
     std::string text;
-    for (const runtime::Fault& fault : cycle.faults()) {
+    for (const runtime::FaultReport& fault : cycle.faults()) {
       if (!fault.latched) continue;
       if (!text.empty()) text += "; ";
       text += fault.joint.empty() ? fault.text : fault.joint + ": " + fault.text;

@@ -18,9 +18,8 @@ namespace tandem::apps {
 /// @param once       the run ends when an owner gives the robot back
 /// @param admission  of owners; outlives the server
 /// Errors: Server::open()'s; lockstep in real time.
-[[nodiscard]] Result<std::unique_ptr<remote::Server>> open_server(const Composition& composition,
-                                                                  DdsRun* dds, bool once,
-                                                                  const DdsAdmission& admission);
+[[nodiscard]] Result<std::unique_ptr<remote::Server>> open_server(
+    const WiredComposition& composition, DdsRun* dds, bool once, const DdsAdmission& admission);
 
 /// What the server publishes of the run's faults.
 void tell_faults(remote::Server& server, const runtime::RobotCycle& cycle);

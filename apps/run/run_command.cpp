@@ -13,11 +13,11 @@
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/connection.hpp"
+#include "apps/run/cycle_guard.hpp"
+#include "apps/run/cycle_thread.hpp"
 #include "apps/run/dds_run.hpp"
 #include "apps/run/end_guard.hpp"
 #include "apps/run/inject.hpp"
-#include "apps/run/loop_guard.hpp"
-#include "apps/run/loop_thread.hpp"
 #include "apps/run/prediction.hpp"
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_log.hpp"
@@ -41,7 +41,7 @@ namespace {
 std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
                                      const std::optional<log::RecordingResult>& log) {
   std::vector<std::string> texts;
-  for (const runtime::Fault& fault : cycle.faults()) {
+  for (const runtime::FaultReport& fault : cycle.faults()) {
     if (!fault.latched) continue;
     texts.push_back(fmt::format("{:.3f} s: {}{}{}", fault.time_s, fault.joint,
                                 fault.joint.empty() ? "" : ": ", fault.text));
@@ -53,7 +53,7 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
   return texts;
 }
 
-std::string pace_text(const Composition& c) {
+std::string pace_text(const WiredComposition& c) {
   const runtime::HalOptions& hal = c.experiment.hal;
   std::string where = hal.backend == runtime::BackendKind::kWire
                           ? "over " + wire_name(c.experiment.robot) + ", "
@@ -62,7 +62,7 @@ std::string pace_text(const Composition& c) {
   if (c.backend->pace() == hal::Pace::kBus) return where + "at the server's pace";
   if (c.backend->pace() == hal::Pace::kWallClock) return where + "in real time";
   const std::string how = hal.lockstep && !where.empty() ? "in lockstep, " : "";
-  const rt::LoopConfig& loop = c.experiment.loop;
+  const rt::CyclicLoopConfig& loop = c.experiment.loop;
   return where + how + (loop.rate > 0.0 ? fmt::format("rate {:g}", loop.rate) : "free running") +
          (loop.start_paused ? ", paused: tandem clock resume" : "");
 }
@@ -73,7 +73,7 @@ std::string served_text(const runtime::Experiment& e) {
 }
 
 /// Boards have clocks of their own, and so has the robot of a server.
-Status check_pace(const Composition& c, const RunOptions& options) {
+Status check_pace(const WiredComposition& c, const RunOptions& options) {
   const bool simulated = c.backend->pace() == hal::Pace::kSimulatedClock;
   if (options.serves && c.experiment.teleoperation && simulated &&
       options.rate.value_or(c.experiment.loop.rate) != 1.0) {
@@ -140,7 +140,7 @@ Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlReg
 /// A run, or a server: the loop and all that talks to it. Taken apart in reverse order.
 class Session {
  public:
-  Session(Composition& composition, const RunOptions& options)
+  Session(WiredComposition& composition, const RunOptions& options)
       : c_(composition),
         options_(options),
         out_(human_output(options.json)),
@@ -219,10 +219,12 @@ class Session {
       add_identity(commands_, dds_->participant());
     }
     if (c_.sim != nullptr) {
-      add_inject(commands_, e.robot, e.loop.period_ns, [this](const sim::Fault& fault) -> Status {
-        if (fault.kind == hal::FaultKind::kBoardDuplicate) return injected(Code::kOutOfRange);
-        return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
-      });
+      add_inject(commands_, e.robot, e.loop.period_ns,
+                 [this](const sim::ScenarioFault& fault) -> Status {
+                   if (fault.kind == hal::FaultKind::kBoardDuplicate)
+                     return injected(Code::kOutOfRange);
+                   return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
+                 });
     }
     const bool on_robot = e.hal.backend == runtime::BackendKind::kWire && !e.hal.lockstep;
     auto socket = serve(commands_, {.path = options_.socket,
@@ -243,16 +245,16 @@ class Session {
   }
 
   /// The run itself, from the first cycle to the last. Answers the time that it took.
-  Result<LoopTimes> loop() {
+  Result<RunTimes> loop() {
     const runtime::Experiment& e = experiment();
     rt::install_stop_signals();
     rt::install_emergency_signal();
     std::optional<rt::NoCpuSleep> awake;
     if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
     if (dds_ != nullptr) dds_->start(*cycle_, run_->parallel());
-    auto guard = LoopGuard::open(c_, *cycle_);
+    auto guard = CycleGuard::open(c_, *cycle_);
     if (!guard) return std::unexpected(guard.error());
-    LoopThread thread(*cycle_, e.thread);
+    CycleThread thread(*cycle_, e.thread);
     watch(*cycle_, thread, c_, **guard, recorder_.get(), out_,
           cycle_->config().after_stop == runtime::AfterStop::kWait, options_.quiet);
     if ((*guard)->gave_up()) end_without_loop(**guard);
@@ -273,7 +275,7 @@ class Session {
 
   /// The loop was given up. Its thread is still there, and may go on at any time: what it uses
   /// stays.
-  [[noreturn]] void end_without_loop(const LoopGuard& guard) {
+  [[noreturn]] void end_without_loop(const CycleGuard& guard) {
     const std::string& fault = guard.fault();
     std::string log;
     if (recorder_ != nullptr) log = recorder_->close({{"ended", fault}}).path;
@@ -287,7 +289,7 @@ class Session {
   }
 
   /// Closes what the loop wrote to, and prints what the run amounts to.
-  Exit finish(const LoopTimes& times) {
+  Exit finish(const RunTimes& times) {
     RunSummary summary{c_, *cycle_, times, std::nullopt, std::nullopt, {}, {}, {}};
     summary.server = server_.get();
     summary.interrupted_by = rt::stop_signal();
@@ -329,7 +331,7 @@ class Session {
     return summary.cut_short() ? interrupted(summary.interrupted_by) : Exit::kDone;
   }
 
-  Composition& c_;
+  WiredComposition& c_;
   const RunOptions& options_;
   std::FILE* out_;
   std::size_t plugins_at_start_ = 0;  // in the log's first record
@@ -370,8 +372,8 @@ Exit run_command(const RunOptions& given, ReportOfRun& report) {
                          ? wrong_kind(options.experiment, Takes::kEither, "tandem serve")
                          : wrong_kind(options.experiment, Takes::kExperiment, "tandem run");
   if (wrong) return refuse(*wrong);
-  const auto composition = runtime::composed<Composition>(options.experiment, options,
-                                                          {.build = builder(options.quiet)});
+  const auto composition = runtime::composed<WiredComposition>(options.experiment, options,
+                                                               {.build = builder(options.quiet)});
   if (!composition) return refuse(composition.error());
   warn_of_inertias((*composition)->experiment);
   print_warnings(std::exchange((*composition)->warnings, {}));

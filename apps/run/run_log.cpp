@@ -33,7 +33,7 @@ void add_place_and_time(log::RunInfo& info) {
   if (std::strftime(text.data(), text.size(), "%z %Z", &local) > 0) info.time_zone = text.data();
 }
 
-log::RunInfo info_of(const Composition& c) {
+log::RunInfo info_of(const WiredComposition& c) {
   const runtime::Experiment& e = c.experiment;
   log::RunInfo info;
   info.version = TANDEM_VERSION;
@@ -62,7 +62,7 @@ log::RunInfo info_of(const Composition& c) {
 }
 
 /// Bytes that a cycle adds to the log at most: what is compressed takes less.
-double bytes_per_cycle(const Composition& c) {
+double bytes_per_cycle(const WiredComposition& c) {
   const runtime::Experiment& e = c.experiment;
   constexpr std::uint64_t kMessageOverhead = 64;
   std::uint64_t cycle_bytes = hal::StateImage(e.robot.shape()).bytes().size() +
@@ -131,7 +131,7 @@ Result<std::pair<std::string, Descriptor>> claim_file(const std::string& folder,
   }
 }
 
-log::RecorderOptions recorder_options(const Composition& c) {
+log::RecorderOptions recorder_options(const WiredComposition& c) {
   const runtime::Experiment& e = c.experiment;
   log::RecorderOptions options;
   options.viewed.urdf = robot::text_in(e.files, e.robot.model.urdf);
@@ -152,7 +152,7 @@ log::RecorderOptions recorder_options(const Composition& c) {
 
 }  // namespace
 
-std::string log_growth(const Composition& c, const std::string& path) {
+std::string log_growth(const WiredComposition& c, const std::string& path) {
   const double rate = bytes_per_cycle(c) * 1e9 / static_cast<double>(c.experiment.loop.period_ns);
   struct statvfs disk {};
   std::string room;
@@ -171,7 +171,8 @@ std::vector<std::string> controller_lines(const runtime::ControllerHost& host) {
   return lines;
 }
 
-Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& folder) {
+Result<std::unique_ptr<log::Recorder>> open_log(const WiredComposition& c,
+                                                const std::string& folder) {
   const auto cycles = static_cast<double>(c.experiment.cycles());
   const std::uint64_t needed =
       static_cast<std::uint64_t>(cycles * bytes_per_cycle(c)) + kFixed_bytes;

@@ -17,12 +17,12 @@ namespace tandem::apps {
 /// @param folder  created when it is missing.
 /// Errors, before anything has moved: the folder cannot be made or written; the disk has less
 /// room than the run will write.
-[[nodiscard]] Result<std::unique_ptr<log::Recorder>> open_log(const Composition& composition,
+[[nodiscard]] Result<std::unique_ptr<log::Recorder>> open_log(const WiredComposition& composition,
                                                               const std::string& folder);
 
 /// How fast the log at `path` grows, and for how long there is room: "at most 0.84 MB for each
 /// second; the disk has room for 6.1 h of it".
-[[nodiscard]] std::string log_growth(const Composition& composition, const std::string& path);
+[[nodiscard]] std::string log_growth(const WiredComposition& composition, const std::string& path);
 
 /// "NAME SHA256 PATH" of every plugin that a host was given.
 [[nodiscard]] std::vector<std::string> controller_lines(const runtime::ControllerHost& host);

@@ -48,7 +48,8 @@ double RunSummary::realtime_factor() const {
 namespace {
 
 /// The faults of the scenario that were due after the run's end.
-std::vector<std::string> never_injected(const Composition& c, const runtime::RobotCycle& cycle) {
+std::vector<std::string> never_injected(const WiredComposition& c,
+                                        const runtime::RobotCycle& cycle) {
   std::vector<std::string> all;
   if (c.sim == nullptr) return all;
   const double ended_s = static_cast<double>(cycle.state().time_ns()[0]) * 1e-9;

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "apps/run/connection.hpp"
+#include "apps/run/cycle_thread.hpp"
 #include "apps/run/dds_run.hpp"
-#include "apps/run/loop_thread.hpp"
 #include "apps/run/parallel_summary.hpp"
 #include "apps/text/console.hpp"
 #include "hal/remote/server.hpp"
@@ -26,9 +26,9 @@ namespace tandem::apps {
 [[nodiscard]] log::StringMap result_of(const hal::can::DriveMaster* master);
 
 struct RunSummary {
-  const Composition& composition;
+  const WiredComposition& composition;
   const runtime::RobotCycle& cycle;
-  LoopTimes times;
+  RunTimes times;
   std::optional<log::RecordingResult> log;                   ///< empty: nothing was logged
   std::optional<hal::can::FrameRecord::Result> frames;       ///< empty: none were recorded
   std::vector<std::string> faults;                           ///< the log's trouble included

@@ -36,9 +36,9 @@ Named<JointFigures> joints_of(const RunSummary& s) {
   return joints;
 }
 
-Named<runtime::LoopFigures> loops_of(const RunSummary& s) {
-  Named<runtime::LoopFigures> loops;
-  for (const runtime::LoopFigures& one : s.cycle.statistics().loops())
+Named<runtime::ClosureFigures> loops_of(const RunSummary& s) {
+  Named<runtime::ClosureFigures> loops;
+  for (const runtime::ClosureFigures& one : s.cycle.statistics().loops())
     loops.emplace_back(s.composition.experiment.robot.loops[loops.size()].name, one);
   return loops;
 }
@@ -54,7 +54,7 @@ struct EstimateSummary {
 
 /// Nothing without [estimation].
 std::optional<EstimateSummary> estimate_of(const RunSummary& s) {
-  const Composition& c = s.composition;
+  const WiredComposition& c = s.composition;
   if (c.estimator == nullptr) return std::nullopt;
   const hal::EstimateImage& image = c.estimator->image();
   const runtime::EstimateFigures figures = s.cycle.statistics().estimate();
@@ -137,7 +137,7 @@ static void figures(Figures& f, const runtime::GroundFigures& ground) {
   f("max_foot_slip_m", "way of a foot since it touched down", ground.max_foot_slip_m);
 }
 
-static void figures(Figures& f, const runtime::LoopFigures& loop) {
+static void figures(Figures& f, const runtime::ClosureFigures& loop) {
   f("max_position_error_m", "over all cycles", loop.max_position_error_m);
   f("max_velocity_error_m_s", loop.max_velocity_error_m_s);
 }
@@ -187,7 +187,7 @@ static void figures(Figures& f, const hal::can::StartUp& start) {
 
 void figures(Figures& f, const RunSummary* s) {
   const auto e = [s]() -> const runtime::Experiment& { return s->composition.experiment; };
-  const auto loop = [s]() -> const rt::LoopStatistics& { return s->cycle.loop(); };
+  const auto loop = [s]() -> const rt::CycleStatistics& { return s->cycle.loop(); };
   const auto master = [s] { return s->composition.master; };
   f("robot", "`name` of the robot.toml", [&] { return e().robot.name; });
   f("hal", "backend: `sim`, `can`, `ethercat`, `dds`, …", [&] { return hal_name(e()); });

@@ -90,7 +90,7 @@ void add_motion_facts(const Json& run, Facts& facts) {
 
 /// What the loop estimated: against the truth, where there is one.
 void add_estimate_facts(const RunSummary& summary, const Json& run, Facts& facts) {
-  const Composition& c = summary.composition;
+  const WiredComposition& c = summary.composition;
   if (c.estimator == nullptr) return;
   const runtime::EstimateFigures figures = summary.cycle.statistics().estimate();
   const hal::EstimateImage& image = c.estimator->image();

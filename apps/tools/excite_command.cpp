@@ -24,7 +24,7 @@ constexpr const char* kExciteHead = "# Excites the dynamics for `tandem identify
 constexpr double kDamped_s = 0.03;
 
 /// One controller: these joints along their series.
-std::string controller_text(const std::string& name, const identification::Series& series,
+std::string controller_text(const std::string& name, const identification::ExcitingSeries& series,
                             const std::vector<std::string>& all,
                             const std::vector<std::string>& joints, int periods,
                             double link_damping_Nms_rad) {

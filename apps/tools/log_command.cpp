@@ -18,7 +18,7 @@
 #include "log/log_file.hpp"
 
 namespace tandem::apps {
-static void figures(Figures& f, const log::Topic& topic) {
+static void figures(Figures& f, const log::LoggedTopic& topic) {
   std::vector<std::string> fields;
   for (const hal::Field& field : topic.layout.fields()) fields.push_back(field.name);
   f("messages", topic.messages);
@@ -28,7 +28,8 @@ static void figures(Figures& f, const log::Topic& topic) {
 
 static void figures(Figures& f, const log::LogFile* file) {
   std::optional<std::int64_t> start_ns, end_ns;
-  for (const log::Topic& topic : file == nullptr ? std::vector<log::Topic>() : file->topics()) {
+  for (const log::LoggedTopic& topic :
+       file == nullptr ? std::vector<log::LoggedTopic>() : file->topics()) {
     if (topic.messages == 0) continue;
     start_ns = std::min(start_ns.value_or(topic.first_ns), topic.first_ns);
     end_ns = std::max(end_ns.value_or(topic.last_ns), topic.last_ns);
@@ -90,7 +91,7 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
   facts.print(out);
   if (file.topics().empty()) return;
   Table table({"topic", "messages", "from [s]", "to [s]", "fields"});
-  for (const log::Topic& topic : file.topics()) {
+  for (const log::LoggedTopic& topic : file.topics()) {
     table.add({topic.name, std::to_string(topic.messages),
                fmt::format("{:.3f}", static_cast<double>(topic.first_ns) * 1e-9),
                fmt::format("{:.3f}", static_cast<double>(topic.last_ns) * 1e-9),

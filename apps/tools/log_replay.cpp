@@ -64,7 +64,7 @@ Result<std::string> posture_of(const LogOptions& options, const hal::Robot& robo
 Result<std::vector<std::size_t>> joints_of(const LogOptions& options, const hal::Robot& robot,
                                            const log::RunInfo& info) {
   std::vector<std::string> known;
-  for (const hal::Joint& joint : robot.joints) known.push_back(joint.name);
+  for (const hal::DrivenJoint& joint : robot.joints) known.push_back(joint.name);
   std::vector<std::string> names = listed_names(options.joints, known);
   if (names.empty()) {
     names = known;

@@ -61,7 +61,7 @@ std::vector<double> ExternalTorques::at(std::size_t row) const {
 
 std::vector<std::string> felt_channels(const log::LogFile& file) {
   std::vector<std::string> names = file.info().joints;
-  const log::Topic* topic = file.find("/tandem/estimate");
+  const log::LoggedTopic* topic = file.find("/tandem/estimate");
   const hal::Field* field = topic == nullptr ? nullptr : topic->layout.find(kBase);
   if (field != nullptr && field->count == estimation::kBaseChannels.size())
     names.insert(names.end(), estimation::kBaseChannels.begin(), estimation::kBaseChannels.end());
@@ -70,7 +70,7 @@ std::vector<std::string> felt_channels(const log::LogFile& file) {
 
 Result<ExternalTorques> read_external_torques(const log::LogFile& file, double from_s) {
   const std::vector<std::string>& joints = file.info().joints;
-  const log::Topic* topic = file.find("/tandem/estimate");
+  const log::LoggedTopic* topic = file.find("/tandem/estimate");
   const hal::Field* field = topic == nullptr ? nullptr : topic->layout.find(kField);
   if (field == nullptr || field->count != joints.size() || joints.empty()) {
     return log_error(file, "this log has no external torques",

@@ -149,7 +149,7 @@ Json masses_json(const scaffold::NewRobot& robot, const NewSource& source) {
 
 Json to_json(const scaffold::NewRobot& robot, const NewSource& source, const std::string& folder) {
   Json feet = Json::array(), sensors = Json::array(), drives = Json::array();
-  for (const scaffold::Foot& foot : robot.feet) feet.push_back(foot.name);
+  for (const scaffold::FoundFoot& foot : robot.feet) feet.push_back(foot.name);
   for (const scaffold::FoundSensor& sensor : robot.sensors) sensors.push_back(sensor.config.name);
   for (const scaffold::DriveSize& drive : robot.drives) drives.push_back(drive.actuator.name);
   return {{"folder", folder},
@@ -220,7 +220,7 @@ void add_facts(const scaffold::NewRobot& robot, const NewSource& source, Facts& 
   for (const std::string& remark : robot.remarks) facts.add("", remark);
   add_masses(source, facts);
   for (std::size_t f = 0; f < robot.feet.size(); ++f) {
-    const scaffold::Foot& foot = robot.feet[f];
+    const scaffold::FoundFoot& foot = robot.feet[f];
     facts.add("foot " + foot.name, fmt::format("{}, {}{}", robot.tree.links[foot.link].name,
                                                counted(foot.points.size(), "contact point"),
                                                foot.guess.empty() ? "" : " (guess)"));

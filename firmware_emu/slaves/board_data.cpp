@@ -17,22 +17,23 @@ namespace {
 constexpr std::uint16_t kPdoObjects = 0x200;  // of a direction
 constexpr std::uint32_t kGap8 = 8;
 
-std::uint16_t first_mapping(Direction direction) {
-  return direction == Direction::kOutputs ? object::kRpdoMapping : object::kTpdoMapping;
+std::uint16_t first_mapping(ProcessDirection direction) {
+  return direction == ProcessDirection::kOutputs ? object::kRpdoMapping : object::kTpdoMapping;
 }
 
 /// Appends the object, if a PDO of this direction may carry it.
-void map_if_there(const canopen::ObjectDictionary& board, Direction direction, std::uint16_t index,
-                  std::uint8_t sub, PdoSetup& pdo) {
+void map_if_there(const canopen::ObjectDictionary& board, ProcessDirection direction,
+                  std::uint16_t index, std::uint8_t sub, PdoSetup& pdo) {
   const canopen::ObjectEntry* entry = board.find(index, sub);
-  const auto right = direction == Direction::kOutputs ? canopen::kMapRpdo : canopen::kMapTpdo;
+  const auto right =
+      direction == ProcessDirection::kOutputs ? canopen::kMapRpdo : canopen::kMapTpdo;
   if (entry == nullptr || (entry->access & right) == 0) return;
   if (pdo.entries.size() == kMaxPdoEntries) return;
   pdo.entries.push_back(canopen::mapping_entry(index, sub, entry->size));
 }
 
 /// An axis as most drives have it, or a sensor's channels.
-PdoSetup usual_pdo(Direction direction, const canopen::ObjectDictionary& board, int number) {
+PdoSetup usual_pdo(ProcessDirection direction, const canopen::ObjectDictionary& board, int number) {
   constexpr std::array kOutputs{object::kControlword, object::kTargetPosition, object::kMode};
   constexpr std::array kInputs{object::kStatusword, object::kPosition, object::kVelocity,
                                object::kTorque, object::kModeDisplay};
@@ -42,8 +43,8 @@ PdoSetup usual_pdo(Direction direction, const canopen::ObjectDictionary& board, 
   const auto map = [&](std::uint16_t index) {
     map_if_there(board, direction, canopen::of_axis(index, number), 0, pdo);
   };
-  if (direction == Direction::kOutputs) std::ranges::for_each(kOutputs, map);
-  if (direction == Direction::kInputs) std::ranges::for_each(kInputs, map);
+  if (direction == ProcessDirection::kOutputs) std::ranges::for_each(kOutputs, map);
+  if (direction == ProcessDirection::kInputs) std::ranges::for_each(kInputs, map);
   std::uint32_t bits = 0;
   for (const std::uint32_t entry : pdo.entries) bits += entry & 0xFF;
   if (bits % 16 == 8) pdo.entries.push_back(kGap8);  // as drives do whose processors want words
@@ -54,7 +55,7 @@ PdoSetup usual_pdo(Direction direction, const canopen::ObjectDictionary& board, 
   return pdo;
 }
 
-std::vector<PdoSetup> pdos_of_sheet(Direction direction, const canopen::DataSheet& sheet) {
+std::vector<PdoSetup> pdos_of_sheet(ProcessDirection direction, const canopen::DataSheet& sheet) {
   const std::uint16_t assignment = assignment_object(direction);
   const std::uint16_t first = first_mapping(direction);
   std::vector<PdoSetup> pdos;
@@ -86,7 +87,7 @@ std::vector<PdoSetup> pdos_of_sheet(Direction direction, const canopen::DataShee
 
 }  // namespace
 
-std::vector<PdoSetup> power_on_pdos(Direction direction, const canopen::DataSheet* sheet,
+std::vector<PdoSetup> power_on_pdos(ProcessDirection direction, const canopen::DataSheet* sheet,
                                     const canopen::ObjectDictionary& board) {
   std::vector<PdoSetup> pdos;
   if (sheet != nullptr) {
@@ -107,7 +108,7 @@ std::vector<PdoSetup> power_on_pdos(Direction direction, const canopen::DataShee
   return pdos;
 }
 
-BoardData::BoardData(Direction direction, std::span<const PdoSetup> pdos, bool assigns,
+BoardData::BoardData(ProcessDirection direction, std::span<const PdoSetup> pdos, bool assigns,
                      canopen::ObjectDictionary& board, int node_id)
     : ProcessData(direction, pdos, assigns), board_(&board), node_(node_id) {}
 
@@ -118,13 +119,13 @@ bool BoardData::add_to(canopen::ObjectDictionary& od) {
 }
 
 std::uint32_t BoardData::cob_id(int number) const noexcept {
-  return direction() == Direction::kOutputs ? canopen::cob::rpdo(number, node_)
-                                            : canopen::cob::tpdo(number, node_);
+  return direction() == ProcessDirection::kOutputs ? canopen::cob::rpdo(number, node_)
+                                                   : canopen::cob::tpdo(number, node_);
 }
 
 void BoardData::switch_pdo(int number, bool on) noexcept {
   const int first =
-      direction() == Direction::kOutputs ? object::kRpdoParameter : object::kTpdoParameter;
+      direction() == ProcessDirection::kOutputs ? object::kRpdoParameter : object::kTpdoParameter;
   const auto parameter = static_cast<std::uint16_t>(first + number - 1);
   std::array<std::uint8_t, 4> id{};
   canopen::put(id.data(), cob_id(number) | (on ? 0 : canopen::cob::kInvalid));

@@ -18,7 +18,7 @@ namespace tandem::firmware::esc {
 /// that can be mapped. Where the sheet assigns none, the first ones are, an axis each: 6040, 607A,
 /// 6060 and a gap; 6041, 6064, 606C, 6077, 6061 and a gap; of a sensor its channels.
 /// @param sheet  null: a board or a sensor of ours
-[[nodiscard]] std::vector<PdoSetup> power_on_pdos(Direction direction,
+[[nodiscard]] std::vector<PdoSetup> power_on_pdos(ProcessDirection direction,
                                                   const canopen::DataSheet* sheet,
                                                   const canopen::ObjectDictionary& board);
 
@@ -35,7 +35,7 @@ class BoardData final : public ProcessData {
   };
 
   /// @param board  the board's dictionary; outlives this
-  BoardData(Direction direction, std::span<const PdoSetup> pdos, bool assigns,
+  BoardData(ProcessDirection direction, std::span<const PdoSetup> pdos, bool assigns,
             canopen::ObjectDictionary& board, int node_id);
 
   bool add_to(canopen::ObjectDictionary& od) override;

@@ -17,7 +17,7 @@ bool is_gap(std::uint32_t mapped) noexcept { return mapped >> 16 < 0x1000; }
 
 }  // namespace
 
-ProcessData::ProcessData(Direction direction, std::span<const PdoSetup> pdos, bool assigns)
+ProcessData::ProcessData(ProcessDirection direction, std::span<const PdoSetup> pdos, bool assigns)
     : direction_(direction), assigns_(assigns) {
   std::size_t most = 1;
   for (const PdoSetup& setup : pdos.first(std::min(pdos.size(), kMaxPdoObjects))) {
@@ -102,7 +102,7 @@ AbortCode ProcessData::check_entry(std::uint32_t mapped, std::size_t at) const n
   const ObjectEntry* entry = od_->find(index, sub);
   if (entry == nullptr) return od_->exists(index, sub);
   const std::uint8_t right =
-      direction_ == Direction::kOutputs ? canopen::kMapRpdo : canopen::kMapTpdo;
+      direction_ == ProcessDirection::kOutputs ? canopen::kMapRpdo : canopen::kMapTpdo;
   const bool fits = (entry->access & right) != 0 && bits == 8u * entry->size && at % 8 == 0;
   return fits ? AbortCode::kNone : AbortCode::kNotMappable;
 }

@@ -19,11 +19,11 @@ inline constexpr std::size_t kMaxPdos = 4;  ///< that are the process data at a 
 /// What the memory of one direction has room for, three buffers of it.
 inline constexpr std::size_t kMaxProcessBytes = 1024;
 
-enum class Direction : std::uint8_t { kOutputs, kInputs };
+enum class ProcessDirection : std::uint8_t { kOutputs, kInputs };
 
 /// The object that assigns PDOs: 1C12 or 1C13.
-[[nodiscard]] constexpr std::uint16_t assignment_object(Direction direction) noexcept {
-  return direction == Direction::kOutputs ? 0x1C12 : 0x1C13;
+[[nodiscard]] constexpr std::uint16_t assignment_object(ProcessDirection direction) noexcept {
+  return direction == ProcessDirection::kOutputs ? 0x1C12 : 0x1C13;
 }
 
 /// One direction of a slave's process data: which objects say what it is, and what becomes of it.
@@ -70,7 +70,7 @@ struct PdoSetup {
 class ProcessData : public ProcessObjects, public canopen::ObjectOwner {
  public:
   /// @param assigns  the assignment can be written
-  ProcessData(Direction direction, std::span<const PdoSetup> pdos, bool assigns = true);
+  ProcessData(ProcessDirection direction, std::span<const PdoSetup> pdos, bool assigns = true);
   /// Entries that add_to() adds.
   [[nodiscard]] static std::size_t objects(std::span<const PdoSetup> pdos) noexcept;
 
@@ -105,7 +105,7 @@ class ProcessData : public ProcessObjects, public canopen::ObjectOwner {
   [[nodiscard]] std::span<const Copy> copies() const noexcept { return {copy_.data(), copies_}; }
   [[nodiscard]] std::size_t assigned() const noexcept { return assigned_count_; }
   [[nodiscard]] bool is_open() const noexcept { return open_; }
-  [[nodiscard]] Direction direction() const noexcept { return direction_; }
+  [[nodiscard]] ProcessDirection direction() const noexcept { return direction_; }
   /// The dictionary of the objects that are mapped; by default the one of add_to().
   void map_from(const canopen::ObjectDictionary& od) noexcept { od_ = &od; }
   void archive_objects(Archive& ar);
@@ -123,7 +123,7 @@ class ProcessData : public ProcessObjects, public canopen::ObjectOwner {
   [[nodiscard]] canopen::AbortCode check_entry(std::uint32_t mapped, std::size_t at) const noexcept;
   [[nodiscard]] static std::size_t bits_of(const Pdo& pdo) noexcept;
 
-  Direction direction_;
+  ProcessDirection direction_;
   bool assigns_;
   bool open_ = false;
   const canopen::ObjectDictionary* od_ = nullptr;

@@ -79,8 +79,8 @@ sii::Content sii_content(const SlaveSetup& setup) {
 }
 
 Slave::Slave(const SlaveSetup& setup, canopen::ObjectDictionary& od)
-    : Slave(setup, od, od, std::make_unique<ProcessData>(Direction::kOutputs, setup.outputs),
-            std::make_unique<ProcessData>(Direction::kInputs, setup.inputs)) {}
+    : Slave(setup, od, od, std::make_unique<ProcessData>(ProcessDirection::kOutputs, setup.outputs),
+            std::make_unique<ProcessData>(ProcessDirection::kInputs, setup.inputs)) {}
 
 Slave::Slave(const SlaveSetup& setup, canopen::ObjectDictionary& od,
              canopen::ObjectDictionary& application, std::unique_ptr<ProcessObjects> outputs,

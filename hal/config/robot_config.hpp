@@ -23,7 +23,7 @@
 #include "hal/image.hpp"
 #include "hal/robot.hpp"
 #include "hal/stop_category.hpp"
-#include "model/loop_spec.hpp"
+#include "model/kinematic_loop.hpp"
 
 namespace tandem::hal {
 
@@ -229,7 +229,7 @@ struct PassiveConfig {
 };
 
 /// [[loop]]
-struct LoopConfig : model::LoopSpec {
+struct KinematicLoopConfig : model::KinematicLoop {
   int line = 0;  ///< in the TOML, for messages
 };
 
@@ -323,7 +323,7 @@ struct RobotConfig {
   std::vector<JointConfig> joints;  ///< the process image's order
   std::vector<PassiveConfig> passive;
   std::vector<Follower> followers;  ///< of the description, once that completed this
-  std::vector<LoopConfig> loops;
+  std::vector<KinematicLoopConfig> loops;
   std::vector<SensorConfig> sensors;  ///< the process image's order
   ContactConfig contact;
   std::vector<PostureConfig> postures;
@@ -340,7 +340,7 @@ struct RobotConfig {
   /// Whether a [[passive]] names this joint.
   [[nodiscard]] bool is_passive(std::string_view name) const;
   /// The loops without their lines, and the passive joints' names, as the model takes them.
-  [[nodiscard]] std::vector<model::LoopSpec> loop_specs() const {
+  [[nodiscard]] std::vector<model::KinematicLoop> loop_specs() const {
     return {loops.begin(), loops.end()};
   }
   [[nodiscard]] std::vector<std::string> passive_names() const;

@@ -19,7 +19,7 @@ void read_passive(TomlTable table, RobotConfig& robot) {
   robot.passive.push_back(passive);
 }
 
-void read_axis(TomlTable& table, LoopConfig& loop) {
+void read_axis(TomlTable& table, KinematicLoopConfig& loop) {
   const std::vector<double> axis = table.numbers_or("axis", {0.0, 0.0, 1.0}, kAnyNumber, 3);
   const double length = std::hypot(axis[0], axis[1], axis[2]);
   if (!table.has("axis")) {
@@ -33,7 +33,7 @@ void read_axis(TomlTable& table, LoopConfig& loop) {
 }
 
 void read_loop(TomlTable table, RobotConfig& robot) {
-  LoopConfig loop;
+  KinematicLoopConfig loop;
   loop.line = table.line();
   read_keys(table, keys::kLoop, loop);
   check_own_name(table, loop.name);
@@ -58,8 +58,9 @@ void read_loop(TomlTable table, RobotConfig& robot) {
     table.error("sites", "must name two [[site]]s, and names " + std::to_string(sites.size()),
                 "sites = [\"one\", \"other\"]");
   }
-  if (loop.type == model::LoopType::kRevolute) read_axis(table, loop);
-  if (loop.type == model::LoopType::kRod) loop.length_m = table.number("length_m", {1e-4, 100.0});
+  if (loop.type == model::KinematicLoopType::kRevolute) read_axis(table, loop);
+  if (loop.type == model::KinematicLoopType::kRod)
+    loop.length_m = table.number("length_m", {1e-4, 100.0});
   if (!table.has("type") ||
       table.has_errors("type")) {  // either key may belong to the one that is meant
     (void)table.numbers_or("axis", {});

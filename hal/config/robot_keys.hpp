@@ -160,9 +160,9 @@ inline constexpr Key<PassiveConfig> kPassive[] = {
   key<&PassiveConfig::damping_Nms_rad>("damping_Nms_rad", {0.0, 1e6}, "of the joint (simulation)"),
   key<&PassiveConfig::friction_Nm>("friction_Nm", {0.0, 1e6}, "its dry friction (simulation: [simulation.md](simulation.md#dry-friction))"),
 };
-inline constexpr Key<model::LoopSpec> kLoop[] = {
-  required(key<&model::LoopSpec::name>("name", "for messages and logs").within("unique")),
-  required(choice<&model::LoopSpec::type>("type", "ball|revolute|rod", "the sites' origins coincide; origins and axes coincide; or the sites keep their distance (a massless rod with a ball joint at either end)")),
+inline constexpr Key<model::KinematicLoop> kLoop[] = {
+  required(key<&model::KinematicLoop::name>("name", "for messages and logs").within("unique")),
+  required(choice<&model::KinematicLoop::type>("type", "ball|revolute|rod", "the sites' origins coincide; origins and axes coincide; or the sites keep their distance (a massless rod with a ball joint at either end)")),
 };
 inline constexpr Key<SensorConfig> kSensor[] = {
   required(key<&SensorConfig::name>("name", "part of its topic").within("unique")),

@@ -17,9 +17,9 @@ using canopen::Mode;
 namespace {
 
 // An image takes the bus' drive states as they are numbered.
-static_assert(static_cast<int>(canopen::DriveState::kNotReadyToSwitchOn) ==
+static_assert(static_cast<int>(canopen::DriveMachineState::kNotReadyToSwitchOn) ==
                   static_cast<int>(DriveState::kNotReadyToSwitchOn) &&
-              static_cast<int>(canopen::DriveState::kFault) ==
+              static_cast<int>(canopen::DriveMachineState::kFault) ==
                   static_cast<int>(DriveState::kFault));
 
 /// A gain on the wire: a number, whatever the caller computed.
@@ -188,7 +188,7 @@ void decode_feedback(const AxisScale& scale, const RawFeedback& raw, std::size_t
   const auto drive = canopen::drive_state(raw.statusword);
   state.drive_state()[joint] = static_cast<std::uint8_t>(drive);
   auto [mode, interaction] = image_mode(raw.mode_display);
-  if (drive != canopen::DriveState::kOperationEnabled) mode = ControlMode::kIdle;
+  if (drive != canopen::DriveMachineState::kOperationEnabled) mode = ControlMode::kIdle;
   state.mode()[joint] = static_cast<std::int8_t>(mode);
   state.interaction()[joint] = static_cast<std::uint8_t>(interaction);
 }

@@ -11,7 +11,7 @@
 namespace tandem::hal::can {
 
 using canopen::ErrorCode;
-using WireState = canopen::DriveState;
+using WireState = canopen::DriveMachineState;
 namespace controlword = canopen::controlword;
 
 namespace {

@@ -140,11 +140,11 @@ class AxisMaster {
   [[nodiscard]] TargetState target() const noexcept { return target_; }
   [[nodiscard]] bool heard() const noexcept { return heard_; }
   [[nodiscard]] std::uint32_t age_cycles() const noexcept { return age_cycles_; }
-  [[nodiscard]] canopen::DriveState drive() const noexcept {
+  [[nodiscard]] canopen::DriveMachineState drive() const noexcept {
     return canopen::drive_state(feedback_.statusword);
   }
   [[nodiscard]] bool enabled() const noexcept {
-    return heard_ && drive() == canopen::DriveState::kOperationEnabled;
+    return heard_ && drive() == canopen::DriveMachineState::kOperationEnabled;
   }
   /// kReset is not through: the drive is in fault, or has not been disabled yet.
   [[nodiscard]] bool in_reset() const noexcept TANDEM_RT;

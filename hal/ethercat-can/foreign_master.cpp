@@ -47,7 +47,7 @@ Status expect_no_master(Bus& bus, const std::string& name) {
   return {};
 }
 
-Status expect_silence(ecat::Link& link, const std::string& name) {
+Status expect_silence(ecat::DataLink& link, const std::string& name) {
   std::vector<ecat::FrameBuffer> frames(1);
   if (link.receive(frames) == 0) return {};
   return fail(fmt::format("another master is at work on {}: EtherCAT frames pass", name),

@@ -30,6 +30,6 @@ namespace tandem::hal::can {
 /// The same of an EtherCAT interface: slaves say nothing by themselves, so every frame is a
 /// master's.
 /// @param link  nothing was sent through it
-[[nodiscard]] Status expect_silence(ecat::Link& link, const std::string& name);
+[[nodiscard]] Status expect_silence(ecat::DataLink& link, const std::string& name);
 
 }  // namespace tandem::hal::can

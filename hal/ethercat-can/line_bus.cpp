@@ -73,7 +73,7 @@ ecat::SlavePlan plan_of(const NodePlan& node, const canopen::DataSheet* sheet,
                        .waits_in_preop = true,
                        .sync0_cycle_ns = follows_sync0(sheet) ? period_ns : 0};
   for (const PdoPlan& pdo : node.pdos) {
-    ecat::PdoPlan one{.index = mapping_object(pdo), .entries = entries_of(pdo), .fixed = true};
+    ecat::SlavePdo one{.index = mapping_object(pdo), .entries = entries_of(pdo), .fixed = true};
     (pdo.direction == PdoDirection::kReceive ? plan.outputs : plan.inputs)
         .push_back(std::move(one));
   }
@@ -83,7 +83,7 @@ ecat::SlavePlan plan_of(const NodePlan& node, const canopen::DataSheet* sheet,
 }  // namespace
 
 Result<std::unique_ptr<LineBus>> LineBus::create(const RobotConfig& robot, std::size_t bus,
-                                                 ecat::Link& link, const Config& config) {
+                                                 ecat::DataLink& link, const Config& config) {
   const auto layout = make_pdo_layout(robot);
   if (!layout) return std::unexpected(layout.error());
   const auto nodes = in_order(robot, *layout, bus);
@@ -136,7 +136,7 @@ void LineBus::add_pdo(const PdoPlan& plan, const canopen::DataSheet* sheet, std:
   }
 }
 
-LineBus::LineBus(ecat::Link& link, std::unique_ptr<ecat::LineMaster> line,
+LineBus::LineBus(ecat::DataLink& link, std::unique_ptr<ecat::LineMaster> line,
                  std::vector<Slave> slaves, const Config& config)
     : link_(&link),
       line_(std::move(line)),

@@ -48,7 +48,8 @@ class LineBus final : public Bus {
   /// @param link  to the first slave; outlives the bus
   /// Errors: those of make_pdo_layout(); node ids with a gap; process data that is too long.
   [[nodiscard]] static Result<std::unique_ptr<LineBus>> create(const RobotConfig& robot,
-                                                               std::size_t bus, ecat::Link& link,
+                                                               std::size_t bus,
+                                                               ecat::DataLink& link,
                                                                const Config& config);
 
   std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override;
@@ -108,7 +109,7 @@ class LineBus final : public Bus {
 
   static void add_pdo(const PdoPlan& plan, const canopen::DataSheet* sheet, std::size_t& bits,
                       Slave& slave);
-  LineBus(ecat::Link& link, std::unique_ptr<ecat::LineMaster> line, std::vector<Slave> slaves,
+  LineBus(ecat::DataLink& link, std::unique_ptr<ecat::LineMaster> line, std::vector<Slave> slaves,
           const Config& config);
   void command(const canopen::Frame& frame) noexcept;
   void command(std::size_t slave, std::uint8_t nmt) noexcept;
@@ -123,7 +124,7 @@ class LineBus final : public Bus {
   void tell_sdo(std::size_t slave) noexcept;
   void tell_inputs(std::size_t slave) noexcept;
 
-  ecat::Link* link_;
+  ecat::DataLink* link_;
   std::unique_ptr<ecat::LineMaster> line_;
   std::vector<Slave> slaves_;  ///< by their place in the line
   Config config_;

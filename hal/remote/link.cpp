@@ -28,9 +28,9 @@ void on_data(dds_entity_t, void* call) { (*static_cast<std::function<void()>*>(c
 
 }  // namespace
 
-Identity identity_of(const hal::Robot& robot, std::string description_hash,
-                     std::int64_t period_ns) {
-  Identity identity;
+LinkIdentity identity_of(const hal::Robot& robot, std::string description_hash,
+                         std::int64_t period_ns) {
+  LinkIdentity identity;
   identity.robot = robot.name;
   identity.description_hash = std::move(description_hash);
   identity.period_ns = period_ns;
@@ -42,7 +42,7 @@ Identity identity_of(const hal::Robot& robot, std::string description_hash,
   return identity;
 }
 
-std::string difference(const Identity& here, const Identity& there) {
+std::string difference(const LinkIdentity& here, const LinkIdentity& there) {
   if (here.robot != there.robot) {
     return "the robot is '" + there.robot + "' there and '" + here.robot + "' here";
   }

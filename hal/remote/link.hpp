@@ -30,7 +30,7 @@ inline constexpr std::size_t kGainsPerJoint = 3 * hal::kPidLoops;
 inline constexpr std::uint32_t kLinkProtocol = 7;
 
 /// What two processes must agree on before one drives the other's robot.
-struct Identity {
+struct LinkIdentity {
   std::uint32_t protocol = kLinkProtocol;
   std::string robot;
   std::string description_hash;  ///< of everything its kernels are made from
@@ -40,12 +40,12 @@ struct Identity {
   std::uint32_t state_bytes = 0;  ///< of its images
   std::uint32_t command_bytes = 0;
 
-  bool operator==(const Identity&) const = default;
+  bool operator==(const LinkIdentity&) const = default;
 };
-[[nodiscard]] Identity identity_of(const hal::Robot& robot, std::string description_hash,
-                                   std::int64_t period_ns);
+[[nodiscard]] LinkIdentity identity_of(const hal::Robot& robot, std::string description_hash,
+                                       std::int64_t period_ns);
 /// What `there` has otherwise than `here`, in words; empty: nothing. @pre one protocol
-[[nodiscard]] std::string difference(const Identity& here, const Identity& there);
+[[nodiscard]] std::string difference(const LinkIdentity& here, const LinkIdentity& there);
 
 /// What a server does at the robot's end of a link, and its owner counts with.
 struct RobotEnd {
@@ -72,7 +72,7 @@ template <class End>
   return End::create(participant, participant.topic_name(topic), link_qos());
 }
 
-enum class Action : std::uint8_t { kAcquire = 0, kRenew = 1, kRelease = 2 };
+enum class LeaseAction : std::uint8_t { kAcquire = 0, kRenew = 1, kRelease = 2 };
 
 /// A number that no other process draws; not 0.
 [[nodiscard]] std::uint64_t draw_number();

@@ -71,7 +71,7 @@ class LiveLink final : public OperatorEnd {
   ImageNetwork up_, down_;
   hal::StateImage robot_state_, twin_state_, arrived_;
   hal::CommandImage sent_, twin_command_, twin_goal_;
-  Prediction prediction_;
+  TwinCorrection prediction_;
   bool twin_failed_ = false;  // and not the robot
   hal::CycleTime now_, twin_now_;
   std::int64_t linked_ns_ = 0;

@@ -35,7 +35,8 @@ Playout::Playout(const hal::Robot& robot, std::uint64_t delay_cycles, std::uint6
       last_(robot.shape()),
       brake_velocity_(robot.joints.size()),
       offset_(robot.joints.size()) {
-  for (const hal::Joint& joint : robot.joints) max_velocity_.push_back(joint.max_velocity_rad_s);
+  for (const hal::DrivenJoint& joint : robot.joints)
+    max_velocity_.push_back(joint.max_velocity_rad_s);
 }
 
 void Playout::start(std::uint64_t cycle, const hal::CommandImage& command) noexcept TANDEM_RT {

@@ -5,8 +5,8 @@
 
 namespace tandem::remote {
 
-Prediction::Prediction(std::size_t joints, std::uint64_t past_commands, std::int64_t correction_ns,
-                       std::int64_t period_ns)
+TwinCorrection::TwinCorrection(std::size_t joints, std::uint64_t past_commands,
+                               std::int64_t correction_ns, std::int64_t period_ns)
     : joints_(joints),
       past_commands_(past_commands),
       correction_ns_(correction_ns),
@@ -15,20 +15,20 @@ Prediction::Prediction(std::size_t joints, std::uint64_t past_commands, std::int
       past_(past_commands * 3 * joints),
       correction_(3 * joints) {}
 
-void Prediction::start() noexcept TANDEM_RT {
+void TwinCorrection::start() noexcept TANDEM_RT {
   std::ranges::fill(kept_, std::uint64_t{0});
   std::ranges::fill(correction_, 0.0);
 }
 
-void Prediction::assume(const hal::StateImage& robot,
-                        const hal::StateImage& twin) noexcept TANDEM_RT {
+void TwinCorrection::assume(const hal::StateImage& robot,
+                            const hal::StateImage& twin) noexcept TANDEM_RT {
   for (std::size_t j = 0; j < joints_; ++j) {
     correction_[j] = robot.position_rad()[j] - twin.position_rad()[j];
     correction_[2 * joints_ + j] = robot.torque_Nm()[j] - twin.torque_Nm()[j];
   }
 }
 
-void Prediction::keep(std::uint64_t number, const hal::StateImage& twin) noexcept TANDEM_RT {
+void TwinCorrection::keep(std::uint64_t number, const hal::StateImage& twin) noexcept TANDEM_RT {
   kept_[number % past_commands_] = number + 1;
   double* to = past(number);
   std::ranges::copy(twin.position_rad(), to);
@@ -36,8 +36,8 @@ void Prediction::keep(std::uint64_t number, const hal::StateImage& twin) noexcep
   std::ranges::copy(twin.torque_Nm(), to + 2 * joints_);
 }
 
-void Prediction::correct(const hal::StateImage& arrived, std::uint64_t number,
-                         std::uint64_t passed) noexcept TANDEM_RT {
+void TwinCorrection::correct(const hal::StateImage& arrived, std::uint64_t number,
+                             std::uint64_t passed) noexcept TANDEM_RT {
   const std::uint64_t same = number + 1;  // the twin was read after that command
   if (kept_[same % past_commands_] != same + 1) return;
   ++compared_;
@@ -57,8 +57,8 @@ void Prediction::correct(const hal::StateImage& arrived, std::uint64_t number,
   }
 }
 
-void Prediction::show(const hal::StateImage& arrived,
-                      hal::StateImage& state) const noexcept TANDEM_RT {
+void TwinCorrection::show(const hal::StateImage& arrived,
+                          hal::StateImage& state) const noexcept TANDEM_RT {
   for (std::size_t j = 0; j < joints_; ++j) {
     state.position_rad()[j] += correction_[j];
     state.velocity_rad_s()[j] += correction_[joints_ + j];

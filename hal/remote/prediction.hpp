@@ -15,13 +15,13 @@ namespace tandem::remote {
 /// under a command is kept until the state of the robot comes in which that command was due. The
 /// difference of the two passes a low pass, and is added to the twin from then on. Commands are
 /// known by their numbers, which grow.
-class Prediction {
+class TwinCorrection {
  public:
   /// @param past_commands  of which the twin's states are kept; states of the robot under older
   /// ones correct nothing
   /// @param correction_ns  time constant of the low pass
-  Prediction(std::size_t joints, std::uint64_t past_commands, std::int64_t correction_ns,
-             std::int64_t period_ns);
+  TwinCorrection(std::size_t joints, std::uint64_t past_commands, std::int64_t correction_ns,
+                 std::int64_t period_ns);
 
   /// Nothing is kept, and nothing is corrected yet.
   void start() noexcept TANDEM_RT;

@@ -43,7 +43,7 @@ bool is_sound(const hal::StateImage& state) {
 
 Result<std::unique_ptr<RemoteBackend>> RemoteBackend::connect(dds::Participant& participant,
                                                               const hal::Robot& robot,
-                                                              const Identity& identity,
+                                                              const LinkIdentity& identity,
                                                               const ClientConfig& config) {
   auto contact = ServerContact::find(participant, identity, config);
   if (!contact) return std::unexpected(contact.error());

@@ -27,7 +27,7 @@ class RemoteBackend final : public hal::Backend {
   /// somebody else, who is named; another play-out, or other controllers at the robot's end.
   [[nodiscard]] static Result<std::unique_ptr<RemoteBackend>> connect(dds::Participant& participant,
                                                                       const hal::Robot& robot,
-                                                                      const Identity& identity,
+                                                                      const LinkIdentity& identity,
                                                                       const ClientConfig& config);
   [[nodiscard]] hal::Pace pace() const noexcept override {
     if (config_.own_pace) return hal::Pace::kWallClock;

@@ -22,8 +22,8 @@ std::int64_t ns(double seconds) { return static_cast<std::int64_t>(seconds * 1e9
 }  // namespace
 
 Result<std::unique_ptr<Server>> Server::open(dds::Participant& participant, const hal::Robot& robot,
-                                             const hal::ParameterImage& gains, Identity identity,
-                                             const ServerConfig& config) {
+                                             const hal::ParameterImage& gains,
+                                             LinkIdentity identity, const ServerConfig& config) {
   auto server = open_end<dds::Writer<tandem_msgs::LinkServer>>(participant, kServerTopic);
   if (!server) return std::unexpected(server.error());
   auto robot_end = open_end<dds::Writer<tandem_msgs::LinkRobotEnd>>(participant, kRobotEndTopic);
@@ -40,7 +40,7 @@ Result<std::unique_ptr<Server>> Server::open(dds::Participant& participant, cons
 }
 
 Server::Server(ServerPublisher::Writers writers, Readers readers, const hal::Robot& robot,
-               const hal::ParameterImage& gains, Identity identity, const ServerConfig& config)
+               const hal::ParameterImage& gains, LinkIdentity identity, const ServerConfig& config)
     : identity_(std::move(identity)),
       config_(config),
       readers_(std::move(readers)),
@@ -87,12 +87,12 @@ void Server::take_requests() {
   readers_.requests.take([this](const tandem_msgs::LinkRequest& sample, const auto& info) {
     if (sample.run != number() || sample.client == 0) return;
     const std::optional<Sender>& sender = request_senders_.of(info);
-    switch (static_cast<Action>(sample.action)) {
-      case Action::kAcquire: acquire(sample, sender); break;
-      case Action::kRenew:
+    switch (static_cast<LeaseAction>(sample.action)) {
+      case LeaseAction::kAcquire: acquire(sample, sender); break;
+      case LeaseAction::kRenew:
         if (is_owner(sample.client, sender)) lease_.heard(clock_ns(CLOCK_MONOTONIC));
         return;
-      case Action::kRelease:
+      case LeaseAction::kRelease:
         if (is_owner(sample.client, sender)) (void)lease_.release(sample.client);
         break;
       default: return;

@@ -53,7 +53,7 @@ class Server final : public hal::RemoteCommandPort {
   [[nodiscard]] static Result<std::unique_ptr<Server>> open(dds::Participant& participant,
                                                             const hal::Robot& robot,
                                                             const hal::ParameterImage& gains,
-                                                            Identity identity,
+                                                            LinkIdentity identity,
                                                             const ServerConfig& config);
   ~Server() override;
 
@@ -103,7 +103,7 @@ class Server final : public hal::RemoteCommandPort {
   };
 
   Server(ServerPublisher::Writers writers, Readers readers, const hal::Robot& robot,
-         const hal::ParameterImage& gains, Identity identity, const ServerConfig& config);
+         const hal::ParameterImage& gains, LinkIdentity identity, const ServerConfig& config);
 
   void ring();
   void take_requests();
@@ -120,7 +120,7 @@ class Server final : public hal::RemoteCommandPort {
   void play(const hal::PortView& view, bool begins, hal::RemoteCommand& wish) noexcept TANDEM_RT;
   void measure(const hal::PortView& view, const Taken& taken) noexcept TANDEM_RT;
 
-  Identity identity_;
+  LinkIdentity identity_;
   ServerConfig config_;
   Readers readers_;
   std::vector<hal::JointCapabilities> capabilities_;

@@ -48,7 +48,7 @@ std::unexpected<Error> stopped() {
 }  // namespace
 
 Result<std::unique_ptr<ServerContact>> ServerContact::find(dds::Participant& participant,
-                                                           const Identity& identity,
+                                                           const LinkIdentity& identity,
                                                            const ClientConfig& config) {
   auto server = open_end<dds::Reader<tandem_msgs::LinkServer>>(participant, kServerTopic);
   if (!server) return std::unexpected(server.error());
@@ -82,11 +82,11 @@ ServerContact::~ServerContact() {
   on_told_.reset();
   on_robot_end_.reset();
   if (!leased_ || gone_) return;
-  ask(Action::kRelease);
+  ask(LeaseAction::kRelease);
   dds_wait_for_acks(endpoints_.requests.endpoint().get(), DDS_MSECS(500));
 }
 
-Status ServerContact::find_server(const Identity& identity) {
+Status ServerContact::find_server(const LinkIdentity& identity) {
   const auto deadline = in_seconds(config_.connect_timeout_s);
   std::unique_lock lock(news_.mutex);
   const auto found = [this] { return told_ && !told_->ending; };
@@ -158,7 +158,7 @@ Status ServerContact::take_lease() {
     const std::uint64_t before = told_count_;
     lock.unlock();
     if (config_.before_asking) config_.before_asking();
-    ask(Action::kAcquire);
+    ask(LeaseAction::kAcquire);
     lock.lock();
     news_.came.wait_for(lock, kAgain, [&] { return told_count_ != before; });
   }
@@ -167,7 +167,7 @@ Status ServerContact::take_lease() {
   return {};
 }
 
-void ServerContact::ask(Action action) {
+void ServerContact::ask(LeaseAction action) {
   tandem_msgs::LinkRequest sample{};
   sample.run = run_;
   sample.client = client_;
@@ -182,7 +182,7 @@ void ServerContact::renew() {
   while (!closing_) {
     const std::chrono::duration<double> pause(told_->lease_timeout_s / 4.0);
     lock.unlock();
-    if (!lost_) ask(Action::kRenew);
+    if (!lost_) ask(LeaseAction::kRenew);
     lock.lock();
     closes_.wait_for(lock, pause, [this] { return closing_; });
   }

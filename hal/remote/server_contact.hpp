@@ -44,7 +44,7 @@ class ServerContact {
   /// Finds the server, compares robots and the robot's ends of the link.
   /// Errors: RemoteBackend::connect()'s, but for the lease.
   [[nodiscard]] static Result<std::unique_ptr<ServerContact>> find(dds::Participant& participant,
-                                                                   const Identity& identity,
+                                                                   const LinkIdentity& identity,
                                                                    const ClientConfig& config);
   /// Gives the robot back.
   ~ServerContact();
@@ -84,7 +84,7 @@ class ServerContact {
  private:
   /// What the server says of itself.
   struct Told {
-    Identity identity;
+    LinkIdentity identity;
     std::uint64_t run = 0, owner = 0;
     std::optional<Sender> sender;
     std::string owner_name, status;
@@ -98,10 +98,10 @@ class ServerContact {
   };
 
   ServerContact(Endpoints endpoints, ClientConfig config);
-  [[nodiscard]] Status find_server(const Identity& identity);
+  [[nodiscard]] Status find_server(const LinkIdentity& identity);
   [[nodiscard]] Status same_robot_end();
   [[nodiscard]] bool interrupted() const { return config_.interrupted && config_.interrupted(); }
-  void ask(Action action);
+  void ask(LeaseAction action);
   void renew();
   void take_told();
   void take_robot_end();

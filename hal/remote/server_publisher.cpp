@@ -28,7 +28,7 @@ std::vector<char*> pointers(const std::vector<std::string>& texts) {
 
 }  // namespace
 
-ServerPublisher::ServerPublisher(Writers writers, const Identity& identity,
+ServerPublisher::ServerPublisher(Writers writers, const LinkIdentity& identity,
                                  const ServerConfig& config, const Lease& lease, std::size_t joints)
     : writers_(std::move(writers)),
       identity_(identity),

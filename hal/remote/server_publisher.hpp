@@ -34,7 +34,7 @@ class ServerPublisher {
   };
 
   /// Begins to publish. What it is given outlives it.
-  ServerPublisher(Writers writers, const Identity& identity, const ServerConfig& config,
+  ServerPublisher(Writers writers, const LinkIdentity& identity, const ServerConfig& config,
                   const Lease& lease, std::size_t joints);
   ~ServerPublisher() { close(); }
 
@@ -69,7 +69,7 @@ class ServerPublisher {
                                                  const Answered& answered) noexcept TANDEM_RT;
 
   Writers writers_;
-  const Identity& identity_;
+  const LinkIdentity& identity_;
   const ServerConfig& config_;
   const Lease& lease_;
   std::uint64_t run_ = draw_number();

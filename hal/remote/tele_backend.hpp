@@ -61,7 +61,7 @@ class TeleBackend final : public OperatorEnd {
   std::int64_t linked_ns_ = 0;       // when it began
   std::uint64_t arrived_cycle_ = 0;  // of the newest state that the operator has
   std::uint64_t playout_cycles_;
-  Prediction prediction_;
+  TwinCorrection prediction_;
 };
 
 }  // namespace tandem::remote

@@ -22,7 +22,7 @@ class Shares {
   std::uint64_t state_ = 0;
 };
 
-Posture posture_at(const tandem_kernels& kernels, std::vector<double> q) {
+PostureInertia posture_at(const tandem_kernels& kernels, std::vector<double> q) {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   RowMajor M(kernels.nv, kernels.nv);
   kernels.mass_matrix(q.data(), M.data());
@@ -38,10 +38,11 @@ std::size_t joint_of(const tandem_kernels& kernels, const std::string& name) {
       kernels.joint_names);
 }
 
-std::vector<Posture> postures_within(const tandem_kernels& kernels, std::span<const double> start,
-                                     std::span<const JointRange> ranges, int more) {
+std::vector<PostureInertia> postures_within(const tandem_kernels& kernels,
+                                            std::span<const double> start,
+                                            std::span<const JointRange> ranges, int more) {
   const std::size_t first = kernels.nq - kernels.joints;
-  std::vector<Posture> postures;
+  std::vector<PostureInertia> postures;
   postures.push_back(posture_at(kernels, {start.begin(), start.end()}));
   Shares shares;
   for (int n = 0; n < more; ++n) {
@@ -60,10 +61,10 @@ std::vector<Posture> postures_within(const tandem_kernels& kernels, std::span<co
 }
 
 std::vector<JointInertia> joint_inertias(const tandem_kernels& kernels,
-                                         std::span<const Posture> postures) {
+                                         std::span<const PostureInertia> postures) {
   const Eigen::Index base = kernels.nv - kernels.joints;
   std::vector<JointInertia> all(kernels.joints, {std::numeric_limits<double>::infinity(), 0.0});
-  for (const Posture& posture : postures) {
+  for (const PostureInertia& posture : postures) {
     for (std::size_t i = 0; i < all.size(); ++i) {
       const Eigen::Index at = base + static_cast<Eigen::Index>(i);
       all[i].least = std::min(all[i].least, 1.0 / posture.mobility(at, at));
@@ -73,7 +74,7 @@ std::vector<JointInertia> joint_inertias(const tandem_kernels& kernels,
   return all;
 }
 
-double point_mass(const Posture& posture, const PointJacobian& J) {
+double point_mass(const PostureInertia& posture, const PointJacobian& J) {
   PointJacobian moved(J.rows(), 3);  // by a unit force along each axis
   for (Eigen::Index axis = 0; axis < 3; ++axis)
     moved.col(axis).noalias() = posture.mobility * J.col(axis);

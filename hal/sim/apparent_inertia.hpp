@@ -23,7 +23,7 @@ struct JointRange {
 };
 
 /// A posture, its mass matrix, and the inverse of that.
-struct Posture {
+struct PostureInertia {
   std::vector<double> q;  ///< (nq)
   Eigen::MatrixXd M;      ///< (nv, nv)
   Eigen::MatrixXd mobility;
@@ -31,10 +31,10 @@ struct Posture {
 
 /// `start` (nq) and `more`, drawn from a generator with a fixed seed: each joint evenly within
 /// its range, or a turn about its start where it has none.
-[[nodiscard]] std::vector<Posture> postures_within(const tandem_kernels& kernels,
-                                                   std::span<const double> start,
-                                                   std::span<const JointRange> ranges,
-                                                   int more = 16);
+[[nodiscard]] std::vector<PostureInertia> postures_within(const tandem_kernels& kernels,
+                                                          std::span<const double> start,
+                                                          std::span<const JointRange> ranges,
+                                                          int more = 16);
 
 /// Along one joint, on the link side [kg m^2 or kg].
 struct JointInertia {
@@ -44,13 +44,13 @@ struct JointInertia {
 
 /// Per joint of the kernels.
 [[nodiscard]] std::vector<JointInertia> joint_inertias(const tandem_kernels& kernels,
-                                                       std::span<const Posture> postures);
+                                                       std::span<const PostureInertia> postures);
 
 /// A point's Jacobian, transposed: (nv, 3), a column for each axis of W.
 using PointJacobian = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
 /// The mass that a point shows where it is lightest [kg].
-[[nodiscard]] double point_mass(const Posture& posture, const PointJacobian& J);
+[[nodiscard]] double point_mass(const PostureInertia& posture, const PointJacobian& J);
 
 /// The kernels' joint of this name; `kernels.joints` when there is none.
 [[nodiscard]] std::size_t joint_of(const tandem_kernels& kernels, const std::string& name);

@@ -22,7 +22,7 @@ double length_1(const double* v) noexcept {
 
 BodyContact::BodyContact(const hal::RobotConfig& robot, const model::Tree& tree,
                          const tandem_kernels& kernels, const double* q,
-                         std::span<const Posture> postures, std::int64_t substep_ns)
+                         std::span<const PostureInertia> postures, std::int64_t substep_ns)
     : config_(robot.contact) {
   if (!(config_.stiffness_N_m > 0.0)) return;
   motion_ = TreeMotion(tree, kernels);
@@ -75,7 +75,7 @@ void BodyContact::add_reach(const model::Tree& tree) {
   }
   reach_m_.assign(generalized_.size() - (motion_.floating() ? 6 : 0), 0.0);
   for (std::size_t j = motion_.joints().size(); j-- > 0;) {
-    const TreeMotion::Joint& joint = motion_.joints()[j];
+    const TreeMotion::JointFrame& joint = motion_.joints()[j];
     const double beyond = reach[j + 1];
     if (!(beyond > 0.0)) continue;
     const model::Joint& described = tree.joints[j];
@@ -106,24 +106,24 @@ void BodyContact::add_sensors(const hal::RobotConfig& robot, const model::Tree& 
   }
 }
 
-void BodyContact::fit(const tandem_kernels& kernels, std::span<const Posture> postures,
+void BodyContact::fit(const tandem_kernels& kernels, std::span<const PostureInertia> postures,
                       std::int64_t substep_ns) {
   const double h_s = static_cast<double>(substep_ns) * 1e-9;
   const std::size_t base = motion_.floating() ? 6 : 0;
   const std::vector<double> rest(kernels.nv, 0.0);
   std::vector<double> mass(points_.size(), std::numeric_limits<double>::infinity());
-  for (const Posture& posture : postures) {
+  for (const PostureInertia& posture : postures) {
     motion_.place(posture.q.data(), rest.data());
     for (const Group& group : groups_) {
       for (std::size_t i = group.begin; i < group.end; ++i) {
         PointJacobian J = PointJacobian::Zero(kernels.nv, 3);
         const Vec3 lever = rotate(motion_.bodies()[group.body].R.data(), points_[i].data());
         const Vec3 at = sum(motion_.bodies()[group.body].p, lever);
-        const auto to = [&at](const TreeMotion::Body& body) -> Vec3 {
+        const auto to = [&at](const TreeMotion::BodyMotion& body) -> Vec3 {
           return {at[0] - body.p[0], at[1] - body.p[1], at[2] - body.p[2]};
         };
         for (std::size_t body = group.body; body > 0; body = motion_.joints()[body - 1].parent) {
-          const TreeMotion::Joint& joint = motion_.joints()[body - 1];
+          const TreeMotion::JointFrame& joint = motion_.joints()[body - 1];
           const Vec3& axis = motion_.bodies()[body].axis;
           const Vec3 way = joint.prismatic ? axis : cross(axis, to(motion_.bodies()[body]));
           J.row(static_cast<Eigen::Index>(base + joint.coordinate)) +=
@@ -172,7 +172,7 @@ void BodyContact::evaluate(const double* q, const double* v, bool move_anchors) 
   double nearest_m = std::numeric_limits<double>::infinity();
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
-    const TreeMotion::Body& body = motion_.bodies()[group.body];
+    const TreeMotion::BodyMotion& body = motion_.bodies()[group.body];
     const double clearance = body.p[2] +
                              dot({body.R[6], body.R[7], body.R[8]}, group.center.data()) -
                              group.radius - config_.height_m;
@@ -191,7 +191,7 @@ void BodyContact::evaluate(const double* q, const double* v, bool move_anchors) 
 }
 
 void BodyContact::touch(const Group& group, double* force, bool move_anchors) noexcept {
-  const TreeMotion::Body& body = motion_.bodies()[group.body];
+  const TreeMotion::BodyMotion& body = motion_.bodies()[group.body];
   for (std::size_t i = group.begin; i < group.end; ++i) {
     const Vec3 lever = rotate(body.R.data(), points_[i].data());
     const Vec3 at = sum(body.p, lever);
@@ -233,7 +233,7 @@ void BodyContact::add_beyond(std::size_t sensor, double* channels) const noexcep
       moment[i] += groups_force_[6 * g + 3 + i];
     }
   }
-  const TreeMotion::Body& body = motion_.bodies()[beyond.body];
+  const TreeMotion::BodyMotion& body = motion_.bodies()[beyond.body];
   const Mat3 R = product(body.R, beyond.R);
   const Vec3 moved = cross(sum(body.p, rotate(body.R.data(), beyond.p.data())), force);
   for (std::size_t i = 0; i < 3; ++i) moment[i] -= moved[i];

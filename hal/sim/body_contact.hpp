@@ -35,7 +35,7 @@ class BodyContact {
   /// Points that are inside the ground at `q` (nq) are left out: `tandem check` names their links.
   /// @param sensors  robot.toml's, for add_beyond()
   BodyContact(const hal::RobotConfig& robot, const model::Tree& tree, const tandem_kernels& kernels,
-              const double* q, std::span<const Posture> postures, std::int64_t substep_ns);
+              const double* q, std::span<const PostureInertia> postures, std::int64_t substep_ns);
 
   /// Computes the ground's forces at this state. Cheap while nothing is near.
   /// @param move_anchors  true exactly once per sub-step, at its first evaluation
@@ -78,7 +78,7 @@ class BodyContact {
   void add_groups(const model::Tree& tree, const std::vector<LinkPoints>& points);
   void add_reach(const model::Tree& tree);
   void add_sensors(const hal::RobotConfig& robot, const model::Tree& tree);
-  void fit(const tandem_kernels& kernels, std::span<const Posture> postures,
+  void fit(const tandem_kernels& kernels, std::span<const PostureInertia> postures,
            std::int64_t substep_ns);
   void touch(const Group& group, double* force, bool move_anchors) noexcept;
   void generalize() noexcept;

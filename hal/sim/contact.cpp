@@ -13,7 +13,7 @@ std::unexpected<Error> bad(const char* key, const char* message, const char* hin
 
 }  // namespace
 
-Result<Contact> Contact::create(const hal::ContactConfig& config, const std::vector<Foot>& feet) {
+Result<Contact> Contact::create(const hal::ContactConfig& config, const std::vector<Sole>& feet) {
   Contact contact;
   contact.config_ = config;
   if (feet.empty()) return contact;
@@ -35,7 +35,7 @@ Result<Contact> Contact::create(const hal::ContactConfig& config, const std::vec
   if (!(config.stick_velocity_m_s > 0.0)) {
     return bad("contact.stick_velocity_m_s", "has to be above 0", "0.01 is usual");
   }
-  for (const Foot& foot : feet) {
+  for (const Sole& foot : feet) {
     const std::size_t begin = contact.x_.size();
     for (const std::array<double, 3>& point : foot.points_m) {
       contact.x_.push_back(point[0]);
@@ -59,7 +59,7 @@ void Contact::evaluate(const double* pose, const double* twist, bool move_anchor
                            .tangential_damping_Ns_m = config_.tangential_damping_Ns_m};
   energy_J_ = 0.0;
   for (std::size_t f = 0; f < feet_.size(); ++f) {
-    const Range& foot = feet_[f];
+    const SolePoints& foot = feet_[f];
     const double* R = pose + 12 * foot.site;
     const double* p = R + 9;
     const double* v = twist + 6 * foot.site;

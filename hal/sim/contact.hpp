@@ -29,7 +29,7 @@ namespace tandem::sim {
 /// mu = sliding + (static - sliding) / (1 + (s / stick_velocity)^2).
 class Contact {
  public:
-  struct Foot {
+  struct Sole {
     std::size_t site = 0;                         ///< index in the kernels' sites
     std::size_t wrench = 0;                       ///< index in the kernels' wrenches
     std::vector<std::array<double, 3>> points_m;  ///< in the site's frame
@@ -38,7 +38,7 @@ class Contact {
   Contact() = default;
   /// Errors: stiffness or friction that is not positive or finite, static below sliding.
   [[nodiscard]] static Result<Contact> create(const hal::ContactConfig& config,
-                                              const std::vector<Foot>& feet);
+                                              const std::vector<Sole>& feet);
 
   [[nodiscard]] std::size_t feet() const noexcept { return feet_.size(); }
   /// Index of foot `foot`'s sole among the kernels' sites.
@@ -68,7 +68,7 @@ class Contact {
   void archive(Archive& ar) { ar(anchor_x_, anchor_y_, touching_, wrench_W_, energy_J_); }
 
  private:
-  struct Range {
+  struct SolePoints {
     std::size_t site, wrench, begin, end;
   };
 
@@ -77,7 +77,7 @@ class Contact {
              double* wrench) noexcept;
 
   hal::ContactConfig config_;
-  std::vector<Range> feet_;
+  std::vector<SolePoints> feet_;
   std::vector<double> x_, y_, z_;            // points, site's frame
   std::vector<double> anchor_x_, anchor_y_;  // W
   std::vector<std::uint8_t> touching_;

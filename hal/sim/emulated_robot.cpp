@@ -113,7 +113,7 @@ Status check_step(const hal::RobotConfig& robot, const PlantConfig& config, cons
 
 // Where robot.toml has the loop that an error is about.
 Error placed(Error error, const hal::RobotConfig& robot) {
-  for (const hal::LoopConfig& loop : robot.loops) {
+  for (const hal::KinematicLoopConfig& loop : robot.loops) {
     if (error.key != "loop." + loop.name) continue;
     error.file = robot.file;
     error.line = loop.line;
@@ -262,8 +262,8 @@ std::vector<EmulatedRobot::Node> EmulatedRobot::nodes(std::size_t bus) {
 bool EmulatedRobot::all_enabled() const noexcept {
   return std::ranges::all_of(boards_, [](const BoardNode& node) {
     for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
-      const canopen::DriveState state = node.board->axis(axis).machine().state();
-      if (state != canopen::DriveState::kOperationEnabled) return false;
+      const canopen::DriveMachineState state = node.board->axis(axis).machine().state();
+      if (state != canopen::DriveMachineState::kOperationEnabled) return false;
     }
     return true;
   });
@@ -329,7 +329,7 @@ std::size_t EmulatedRobot::up_to_sync(std::span<const canopen::Frame> waiting) n
 void EmulatedRobot::deliver(bool at_sync) noexcept {
   for (std::size_t b = 0; b < buses_.size(); ++b) {
     canopen::Frame late;
-    while (at_sync && faults_.next_due(Direction::kToBoards, b, late)) receive(b, late);
+    while (at_sync && faults_.next_due(FrameDirection::kToBoards, b, late)) receive(b, late);
     if (!wires_.empty()) {
       Wire& wire = wires_[b];
       wire.answers_ns = now_ns_;
@@ -348,7 +348,7 @@ void EmulatedRobot::deliver(bool at_sync) noexcept {
 void EmulatedRobot::pass_to_boards(std::size_t bus, const canopen::Frame& frame) noexcept {
   if (!faults_.any() || attached_[bus].line) return receive(bus, frame);
   canopen::FrameSink out(passed_);
-  faults_.pass(Direction::kToBoards, bus, frame, out);
+  faults_.pass(FrameDirection::kToBoards, bus, frame, out);
   for (const canopen::Frame& one : out.frames()) receive(bus, one);
 }
 
@@ -404,7 +404,7 @@ void EmulatedRobot::answer(std::size_t bus, std::size_t sender,
   if (!faults_.any() || attached_[bus].line) return put_out(bus, sender, frames);
   for (const canopen::Frame& frame : frames) {
     canopen::FrameSink out(passed_);
-    faults_.pass(Direction::kToMaster, bus, frame, out);
+    faults_.pass(FrameDirection::kToMaster, bus, frame, out);
     put_out(bus, sender, out.frames());
   }
 }

@@ -38,7 +38,7 @@ struct SimRobotConfig {
   bool bus_timing = false;          ///< frames take the time that they need on a real bus
   std::int64_t bus_latency_ns = 0;  ///< with it: of every node's driver or firmware
   std::int64_t answer_window_ns = 500'000;  ///< with it: after SYNC, until the master goes on
-  std::vector<Fault> faults = {};           ///< a scenario: read_scenario()
+  std::vector<ScenarioFault> faults = {};   ///< a scenario: read_scenario()
   /// The description: end stops, and links that touch the ground. Null: there are neither.
   std::shared_ptr<const model::Tree> tree = {};
 };
@@ -141,9 +141,11 @@ class EmulatedRobot {
   /// Adds a fault, between two steps. A start that has passed is the next step.
   /// @return kOk; kQueueFull: there are FaultInjection::kMostFaults; kOutOfRange: a second board
   ///         with a node id has to be known when the robot is made.
-  [[nodiscard]] Code inject(const Fault& fault) noexcept TANDEM_RT;
+  [[nodiscard]] Code inject(const ScenarioFault& fault) noexcept TANDEM_RT;
   /// The next injected fault that has begun and was not given yet; null: none.
-  [[nodiscard]] const Fault* next_begun_fault() noexcept TANDEM_RT { return faults_.next_begun(); }
+  [[nodiscard]] const ScenarioFault* next_begun_fault() noexcept TANDEM_RT {
+    return faults_.next_begun();
+  }
   /// Every fault injected so far, and what it has done.
   [[nodiscard]] std::span<const FaultSlot> faults() const noexcept { return faults_.slots(); }
   /// For who emulates another wire: whose frames are struck there.

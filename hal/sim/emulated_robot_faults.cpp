@@ -24,7 +24,7 @@ double ramp(double from, double to, std::int64_t since_ns, std::int64_t ramp_ns)
 }  // namespace
 
 Status EmulatedRobot::add_faults(const hal::RobotConfig& robot, const SimRobotConfig& config) {
-  for (const Fault& fault : config.faults) {
+  for (const ScenarioFault& fault : config.faults) {
     if (!faults_.add(fault)) {
       return fail("a scenario has at most " + std::to_string(FaultInjection::kMostFaults) +
                   " faults");
@@ -45,9 +45,9 @@ Status EmulatedRobot::add_faults(const hal::RobotConfig& robot, const SimRobotCo
   return {};
 }
 
-Code EmulatedRobot::inject(const Fault& fault) noexcept TANDEM_RT {
+Code EmulatedRobot::inject(const ScenarioFault& fault) noexcept TANDEM_RT {
   if (fault.kind == FaultKind::kBoardDuplicate) return Code::kOutOfRange;
-  Fault added = fault;
+  ScenarioFault added = fault;
   const bool on_enabled = fault.from == FaultFrom::kEnabled;
   const bool counts = started_ != 0 && (!on_enabled || enabled_ns_ >= 0);
   const std::int64_t next_ns = now_ns_ - first_ns_ + period_ns_ - (on_enabled ? enabled_ns_ : 0);
@@ -74,7 +74,7 @@ void EmulatedRobot::begin_faults(std::int64_t time_ns) noexcept {
 }
 
 void EmulatedRobot::apply(const FaultSlot& slot, std::int64_t time_ns) noexcept {
-  const Fault& fault = slot.fault;
+  const ScenarioFault& fault = slot.fault;
   const std::int64_t from_ns = fault.from == FaultFrom::kEnabled ? enabled_ns_ : 0;
   const std::int64_t since_ns = time_ns - from_ns - fault.start_ns;
   if (fault.joint >= 0) {
@@ -95,7 +95,7 @@ void EmulatedRobot::apply(const FaultSlot& slot, std::int64_t time_ns) noexcept 
 
 /// What happens once, at the beginning or the end.
 void EmulatedRobot::apply_to_board(const FaultSlot& slot) noexcept {
-  const Fault& fault = slot.fault;
+  const ScenarioFault& fault = slot.fault;
   const bool reset = fault.kind == FaultKind::kBoardReset && slot.began != 0;
   const bool kill = fault.kind == FaultKind::kBoardKill;
   const auto act = [&](auto& node) {
@@ -120,7 +120,7 @@ void EmulatedRobot::apply_to_board(const FaultSlot& slot) noexcept {
 }
 
 void EmulatedRobot::apply_to_joint(const FaultSlot& slot, std::int64_t since_ns) noexcept {
-  const Fault& fault = slot.fault;
+  const ScenarioFault& fault = slot.fault;
   const auto j = static_cast<std::size_t>(fault.joint);
   const auto side = static_cast<std::size_t>(fault.encoder);
   Disturbance& one = disturbances_[j];
@@ -161,7 +161,7 @@ void EmulatedRobot::disturb(std::size_t joint, firmware::AxisSense& pins) const 
 void EmulatedRobot::release_late_answers() noexcept {
   for (std::size_t b = 0; b < buses_.size(); ++b) {
     canopen::Frame late;
-    while (faults_.next_due(Direction::kToMaster, b, late)) {
+    while (faults_.next_due(FrameDirection::kToMaster, b, late)) {
       put_out(b, other_sender(), {&late, 1});
     }
   }

@@ -17,11 +17,11 @@ namespace {
 
 constexpr std::uint64_t kNever = ~std::uint64_t{0};
 
-bool goes(Direction which, Direction frame) noexcept {
+bool goes(FrameDirection which, FrameDirection frame) noexcept {
   return (static_cast<unsigned>(which) & static_cast<unsigned>(frame)) != 0;
 }
 
-bool selects(const Fault& fault, Direction direction, std::size_t bus,
+bool selects(const ScenarioFault& fault, FrameDirection direction, std::size_t bus,
              const Frame& frame) noexcept {
   if (!goes(fault.direction, direction)) return false;
   if (fault.bus >= 0 && static_cast<std::size_t>(fault.bus) != bus) return false;
@@ -47,7 +47,7 @@ void corrupt(FaultSlot& slot, Frame& frame) noexcept {
 
 }  // namespace
 
-bool FaultInjection::add(const Fault& fault) noexcept TANDEM_RT {
+bool FaultInjection::add(const ScenarioFault& fault) noexcept TANDEM_RT {
   if (count_ == slots_.size()) return false;
   FaultSlot& slot = slots_[count_];
   slot = {};
@@ -61,7 +61,7 @@ bool FaultInjection::add(const Fault& fault) noexcept TANDEM_RT {
 void FaultInjection::begin_step(std::int64_t time_ns, std::int64_t enabled_ns) noexcept TANDEM_RT {
   ++step_;
   for (FaultSlot& slot : std::span(slots_).first(count_)) {
-    const Fault& fault = slot.fault;
+    const ScenarioFault& fault = slot.fault;
     const bool enabled = fault.from == FaultFrom::kEnabled;
     const std::int64_t since_ns = time_ns - (enabled ? enabled_ns : 0) - fault.start_ns;
     const bool begun = (!enabled || enabled_ns >= 0) && since_ns >= 0;
@@ -78,7 +78,7 @@ void FaultInjection::begin_step(std::int64_t time_ns, std::int64_t enabled_ns) n
 }
 
 bool FaultInjection::strikes(FaultSlot& slot) noexcept {
-  const Fault& fault = slot.fault;
+  const ScenarioFault& fault = slot.fault;
   if (fault.count != 0 && slot.struck >= fault.count) return false;
   if (fault.probability < 1.0) {
     const double share = static_cast<double>(split_mix(slot.random) >> 11) * 0x1p-53;
@@ -88,7 +88,7 @@ bool FaultInjection::strikes(FaultSlot& slot) noexcept {
   return true;
 }
 
-void FaultInjection::pass(Direction direction, std::size_t bus, const Frame& in,
+void FaultInjection::pass(FrameDirection direction, std::size_t bus, const Frame& in,
                           FrameSink& out) noexcept TANDEM_RT {
   Frame frame = in;
   Frame behind;  // that changes places with this one
@@ -118,7 +118,7 @@ void FaultInjection::pass(Direction direction, std::size_t bus, const Frame& in,
   if (follows) out.push(behind);
 }
 
-hal::FaultKind FaultInjection::fate(Direction direction, std::size_t bus) noexcept TANDEM_RT {
+hal::FaultKind FaultInjection::fate(FrameDirection direction, std::size_t bus) noexcept TANDEM_RT {
   for (FaultSlot& slot : std::span(slots_).first(count_)) {
     const bool wire = slot.fault.kind == FaultKind::kFrameDrop ||
                       slot.fault.kind == FaultKind::kFrameDelay ||
@@ -130,7 +130,7 @@ hal::FaultKind FaultInjection::fate(Direction direction, std::size_t bus) noexce
   return FaultKind::kNone;
 }
 
-bool FaultInjection::next_due(Direction direction, std::size_t bus,
+bool FaultInjection::next_due(FrameDirection direction, std::size_t bus,
                               Frame& frame) noexcept TANDEM_RT {
   for (std::size_t i = 0; i < held_count_; ++i) {
     const Held& held = held_[i];
@@ -144,8 +144,8 @@ bool FaultInjection::next_due(Direction direction, std::size_t bus,
   return false;
 }
 
-bool FaultInjection::hold(std::size_t slot, std::uint64_t due, Direction direction, std::size_t bus,
-                          const Frame& frame) noexcept {
+bool FaultInjection::hold(std::size_t slot, std::uint64_t due, FrameDirection direction,
+                          std::size_t bus, const Frame& frame) noexcept {
   if (held_count_ == held_.size()) return false;
   Held& held = held_[held_count_++];
   held = {};
@@ -165,7 +165,7 @@ void FaultInjection::take_held(std::size_t index, Frame& frame) noexcept {
 }
 
 /// Index in held_, or held_count_.
-std::size_t FaultInjection::held_by(std::size_t slot, Direction direction,
+std::size_t FaultInjection::held_by(std::size_t slot, FrameDirection direction,
                                     std::size_t bus) const noexcept {
   std::size_t i = 0;
   while (i < held_count_ &&
@@ -175,7 +175,7 @@ std::size_t FaultInjection::held_by(std::size_t slot, Direction direction,
   return i;
 }
 
-const Fault* FaultInjection::next_begun() noexcept TANDEM_RT {
+const ScenarioFault* FaultInjection::next_begun() noexcept TANDEM_RT {
   for (FaultSlot& slot : std::span(slots_).first(count_)) {
     if (slot.acted == 0 || slot.told != 0) continue;
     slot.told = 1;

@@ -18,7 +18,7 @@ class Archive;
 namespace tandem::sim {
 
 /// Which way a frame goes. A fault may act on both.
-enum class Direction : std::uint8_t { kToBoards = 1, kToMaster = 2, kBoth = 3 };
+enum class FrameDirection : std::uint8_t { kToBoards = 1, kToMaster = 2, kBoth = 3 };
 
 /// What a fault's time counts from.
 enum class FaultFrom : std::uint8_t {
@@ -29,7 +29,7 @@ enum class FaultFrom : std::uint8_t {
 enum class EncoderSide : std::uint8_t { kLink, kMotor };
 
 /// One fault, its target by index in the robot's configuration. Plain data without padding.
-struct Fault {
+struct ScenarioFault {
   std::int64_t start_ns = 0;        ///< after `from`
   std::int64_t duration_ns = -1;    ///< -1: for good
   std::int64_t ramp_ns = 0;         ///< in which a sag or a temperature is reached
@@ -52,14 +52,14 @@ struct Fault {
   std::uint32_t number = 0;    ///< product code, revision
   hal::FaultKind kind = hal::FaultKind::kNone;
   FaultFrom from = FaultFrom::kPowerOn;
-  Direction direction = Direction::kBoth;
+  FrameDirection direction = FrameDirection::kBoth;
   EncoderSide encoder = EncoderSide::kLink;
   std::uint32_t reserved = 0;
 };
-static_assert(sizeof(Fault) == 152);
+static_assert(sizeof(ScenarioFault) == 152);
 
 /// As the loop sees it: what it strikes, the narrowest that it names.
-[[nodiscard]] constexpr hal::InjectedFault injected(const Fault& fault) noexcept {
+[[nodiscard]] constexpr hal::InjectedFault injected(const ScenarioFault& fault) noexcept {
   using hal::FaultTarget;
   if (fault.joint >= 0) return {fault.kind, FaultTarget::kJoint, fault.joint};
   if (fault.board >= 0) return {fault.kind, FaultTarget::kBoard, fault.board};
@@ -74,7 +74,7 @@ static_assert(sizeof(Fault) == 152);
 
 /// A fault with where it stands.
 struct FaultSlot {
-  Fault fault;
+  ScenarioFault fault;
   std::uint64_t random = 0;  ///< its generator's state
   std::uint32_t struck = 0;  ///< frames
   std::uint8_t active = 0;
@@ -103,7 +103,7 @@ class FaultInjection {
   explicit FaultInjection(std::uint64_t seed) noexcept : seed_(seed) {}
 
   /// @return false: there are kMostFaults already.
-  [[nodiscard]] bool add(const Fault& fault) noexcept TANDEM_RT;
+  [[nodiscard]] bool add(const ScenarioFault& fault) noexcept TANDEM_RT;
 
   /// Begins and ends faults: those whose time has come act on the whole step to `time_ns`.
   /// @param time_ns     since the first SYNC
@@ -117,17 +117,17 @@ class FaultInjection {
   }
 
   /// What becomes of one frame, in `out`: at most kMostFramesOut.
-  void pass(Direction direction, std::size_t bus, const canopen::Frame& frame,
+  void pass(FrameDirection direction, std::size_t bus, const canopen::Frame& frame,
             canopen::FrameSink& out) noexcept TANDEM_RT;
   /// What happens to an Ethernet frame of an EtherCAT bus: kFrameDrop, kFrameDelay (it comes with
   /// the next cycle's), kFrameDuplicate, or kNone.
-  [[nodiscard]] hal::FaultKind fate(Direction direction, std::size_t bus) noexcept TANDEM_RT;
+  [[nodiscard]] hal::FaultKind fate(FrameDirection direction, std::size_t bus) noexcept TANDEM_RT;
   /// The next delayed frame whose step has come.
-  [[nodiscard]] bool next_due(Direction direction, std::size_t bus,
+  [[nodiscard]] bool next_due(FrameDirection direction, std::size_t bus,
                               canopen::Frame& frame) noexcept TANDEM_RT;
 
   /// The next fault that has begun and was not given yet; null: none.
-  [[nodiscard]] const Fault* next_begun() noexcept TANDEM_RT;
+  [[nodiscard]] const ScenarioFault* next_begun() noexcept TANDEM_RT;
 
   void archive(Archive& ar);
 
@@ -136,17 +136,17 @@ class FaultInjection {
     std::uint64_t due = 0;  ///< step
     std::uint32_t bus = 0;
     std::uint32_t slot = 0;
-    Direction direction = Direction::kToBoards;
+    FrameDirection direction = FrameDirection::kToBoards;
     std::array<std::uint8_t, 7> reserved{};
     canopen::Frame frame;
   };
   static_assert(sizeof(Held) == 96);
 
   [[nodiscard]] bool strikes(FaultSlot& slot) noexcept;
-  [[nodiscard]] bool hold(std::size_t slot, std::uint64_t due, Direction direction, std::size_t bus,
-                          const canopen::Frame& frame) noexcept;
+  [[nodiscard]] bool hold(std::size_t slot, std::uint64_t due, FrameDirection direction,
+                          std::size_t bus, const canopen::Frame& frame) noexcept;
   void take_held(std::size_t index, canopen::Frame& frame) noexcept;
-  [[nodiscard]] std::size_t held_by(std::size_t slot, Direction direction,
+  [[nodiscard]] std::size_t held_by(std::size_t slot, FrameDirection direction,
                                     std::size_t bus) const noexcept;
 
   std::array<FaultSlot, kMostFaults> slots_{};

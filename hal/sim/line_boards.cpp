@@ -31,7 +31,7 @@ std::uint32_t identity(const canopen::ObjectDictionary& dictionary, canopen::Ide
 
 }  // namespace
 
-LineBoards::LineBoards(EmulatedRobot& robot, std::size_t bus, hal::ecat::Link& link,
+LineBoards::LineBoards(EmulatedRobot& robot, std::size_t bus, hal::ecat::DataLink& link,
                        const Config& config)
     : robot_(&robot),
       bus_(bus),
@@ -54,7 +54,7 @@ LineBoards::LineBoards(EmulatedRobot& robot, std::size_t bus, hal::ecat::Link& l
 void LineBoards::add_seat(const EmulatedRobot::Node& node, const Config& config) {
   Seat& seat = seats_.emplace_back();
   seat.node = node;
-  using Way = firmware::esc::Direction;
+  using Way = firmware::esc::ProcessDirection;
   const auto pdos = [&](Way way) {
     return firmware::esc::power_on_pdos(way, node.sheet, *node.dictionary);
   };
@@ -149,13 +149,13 @@ void LineBoards::pass() noexcept {
 void LineBoards::pass(hal::ecat::FrameBuffer& frame) noexcept {
   using hal::FaultKind;
   FaultInjection& faults = robot_->injection();
-  const auto fate = [&](Direction direction) {
+  const auto fate = [&](FrameDirection direction) {
     return faults.any() ? faults.fate(direction, bus_) : FaultKind::kNone;
   };
-  const FaultKind out = fate(Direction::kToBoards);
+  const FaultKind out = fate(FrameDirection::kToBoards);
   if (out == FaultKind::kFrameDrop || !line_->pass(frame.frame(), now_ns_)) return;
   if (out == FaultKind::kFrameDuplicate) put_back(frame);
-  const FaultKind back = fate(Direction::kToMaster);
+  const FaultKind back = fate(FrameDirection::kToMaster);
   if (back == FaultKind::kFrameDrop) return;
   if (back == FaultKind::kFrameDuplicate) put_back(frame);
   if (out == FaultKind::kFrameDelay || back == FaultKind::kFrameDelay) {

@@ -39,7 +39,8 @@ class LineBoards final : public hal::can::Bus {
 
   /// @param robot  outlives it; has the boards and sensors of bus `bus`
   /// @param link   the slaves' end; outlives it
-  LineBoards(EmulatedRobot& robot, std::size_t bus, hal::ecat::Link& link, const Config& config);
+  LineBoards(EmulatedRobot& robot, std::size_t bus, hal::ecat::DataLink& link,
+             const Config& config);
 
   std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override;
   std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override;
@@ -79,7 +80,7 @@ class LineBoards final : public hal::can::Bus {
 
   EmulatedRobot* robot_;
   std::size_t bus_;
-  hal::ecat::Link* link_;
+  hal::ecat::DataLink* link_;
   Config config_;
   std::vector<Seat> seats_;  ///< by place
   std::unique_ptr<firmware::esc::SlaveLine> line_;

@@ -137,7 +137,7 @@ Status Plant::make_loops(const PlantConfig& config) {
   for (const hal::PassiveConfig& joint : config.passive) passive.push_back(joint.name);
   auto loops = model::ClosedLoops::create(config.loops, passive, *kernels_);
   if (!loops) return std::unexpected(loops.error());
-  loops_ = LoopForces(std::move(*loops), *kernels_);
+  loops_ = ClosureForces(std::move(*loops), *kernels_);
   return {};
 }
 
@@ -159,7 +159,7 @@ Status Plant::open_engine(const PlantConfig& config) {
 Status Plant::place_contact(const PlantConfig& config) {
   const std::vector<std::string> sites = names(kernels_->site_names, kernels_->sites);
   const std::vector<std::string> wrenches = names(kernels_->wrench_names, kernels_->wrenches);
-  std::vector<Contact::Foot> feet;
+  std::vector<Contact::Sole> feet;
   for (const hal::Foot& foot : config.contact.feet) {
     const int site = find(sites, foot.site);
     const int wrench = find(wrenches, foot.site);

@@ -16,12 +16,12 @@
 #include "hal/config/robot_config.hpp"
 #include "hal/sim/actuator.hpp"
 #include "hal/sim/body_contact.hpp"
+#include "hal/sim/closure_forces.hpp"
 #include "hal/sim/contact.hpp"
 #include "hal/sim/end_stops.hpp"
 #include "hal/sim/engine_loader.hpp"
 #include "hal/sim/hoist.hpp"
 #include "hal/sim/light_joints.hpp"
-#include "hal/sim/loop_forces.hpp"
 #include "hal/sim/plant_state.hpp"
 #include "hal/sim/push.hpp"
 #include "model/kernels.h"
@@ -62,7 +62,7 @@ struct PlantConfig {
   std::int64_t release_ns = 1'000'000'000;  ///< how long the hoist takes to let the base down
   double lift_m = 0.0;  ///< above base_height_m; not 0: the hoist never lets the base down
   std::vector<hal::PassiveConfig> passive;  ///< the kernels' joints without an actuator
-  std::vector<model::LoopSpec> loops;
+  std::vector<model::KinematicLoop> loops;
   /// Where joints end: of the kernels' joints, any of them. A passive joint whose loop starts it
   /// beyond its end ends there.
   std::vector<JointRange> ranges;
@@ -87,7 +87,7 @@ struct JointReading {
 /// as in PlantConfig; inside, and in q() and v(), they stand in the kernels' order, the passive
 /// ones (whose motor's state is that of the link) among them.
 ///
-/// Loops: the state lies on the closed loops, to LoopForces' bound, after every sub-step.
+/// Loops: the state lies on the closed loops, to ClosureForces' bound, after every sub-step.
 ///
 /// With another engine that one moves q and v, by its own integrator and with its own ground under
 /// the soles; vdot and the soles' wrenches are means over the last sub-step then. It allocates.
@@ -152,7 +152,7 @@ class Plant {
   [[nodiscard]] const double* tau() const noexcept { return tau_.data(); }
   [[nodiscard]] const double* wrench() const noexcept { return wrench_.data(); }
   [[nodiscard]] const double* pose() const noexcept { return pose_.data(); }
-  [[nodiscard]] const LoopForces& loops() const noexcept { return loops_; }
+  [[nodiscard]] const ClosureForces& loops() const noexcept { return loops_; }
   [[nodiscard]] const Contact& contact() const noexcept { return contact_; }
   [[nodiscard]] const BodyContact& bodies() const noexcept { return bodies_; }
   [[nodiscard]] const EndStops& end_stops() const noexcept { return stops_; }
@@ -209,7 +209,7 @@ class Plant {
   EndStops stops_;
   LightJoints light_;
   Hoist hoist_;
-  LoopForces loops_;
+  ClosureForces loops_;
   std::unique_ptr<Engine> engine_;  // null: our own
 
   PlantState x_;

@@ -23,7 +23,7 @@ void Pushes::add_forces(const double* q, const double* v, double* forces) noexce
   std::ranges::fill(body_force_, 0.0);
   for (std::size_t i = 0; i < count_; ++i) {
     const auto& [body, force, point] = pushes_[i];
-    const TreeMotion::Body& at = motion_.bodies()[body];
+    const TreeMotion::BodyMotion& at = motion_.bodies()[body];
     const Vec3 moment = cross(sum(at.p, rotate(at.R.data(), point.data())), force);
     for (std::size_t k = 0; k < 3; ++k) {
       body_force_[6 * body + k] += force[k];

@@ -42,7 +42,7 @@ std::int32_t index_of(TomlTable& table, const char* key, const Items& items) {
   return -1;
 }
 
-void read_times(TomlTable& table, const Context& context, Fault& fault) {
+void read_times(TomlTable& table, const Context& context, ScenarioFault& fault) {
   const bool at_s = table.has("at_s"), at_cycle = table.has("at_cycle");
   const bool after = table.has("after_enabled_s");
   if (at_s + at_cycle + after > 1) {
@@ -69,7 +69,7 @@ void read_times(TomlTable& table, const Context& context, Fault& fault) {
 }
 
 /// A board or a sensor: one of them has to be named.
-void read_node(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
+void read_node(TomlTable& table, const hal::RobotConfig& robot, ScenarioFault& fault) {
   const bool board = table.has("board");
   if (board && table.has("sensor")) {
     (void)table.text("sensor");
@@ -83,10 +83,10 @@ void read_node(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
 }
 
 /// Which way, how often: of frames on any wire.
-void read_share(TomlTable& table, Fault& fault) {
+void read_share(TomlTable& table, ScenarioFault& fault) {
   const std::string way = table.choice_or("direction", "both", {"to_boards", "to_master", "both"});
-  if (way == "to_boards") fault.direction = Direction::kToBoards;
-  if (way == "to_master") fault.direction = Direction::kToMaster;
+  if (way == "to_boards") fault.direction = FrameDirection::kToBoards;
+  if (way == "to_master") fault.direction = FrameDirection::kToMaster;
   fault.probability = table.number_or("probability", 1.0, {0.0, 1.0, true});
   fault.count = static_cast<std::uint32_t>(table.integer_or("count", 0, 0, kAnyU32));
   fault.seed = static_cast<std::uint64_t>(
@@ -94,7 +94,7 @@ void read_share(TomlTable& table, Fault& fault) {
 }
 
 /// On an EtherCAT bus a frame goes through every slave.
-void read_line_frames(TomlTable& table, Fault& fault) {
+void read_line_frames(TomlTable& table, ScenarioFault& fault) {
   if (fault.node_id != 0) {
     table.error(fault.board >= 0 ? "board" : "sensor", "an Ethernet frame is of no single node",
                 "name the bus; for one slave there is board_kill, board_reset and bus_down");
@@ -109,7 +109,7 @@ void read_line_frames(TomlTable& table, Fault& fault) {
   read_share(table, fault);
 }
 
-void read_frames(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
+void read_frames(TomlTable& table, const hal::RobotConfig& robot, ScenarioFault& fault) {
   if (table.has("bus")) fault.bus = index_of(table, "bus", robot.buses);
   if (table.has("board") || table.has("sensor")) {  // the node's frames, on its bus
     read_node(table, robot, fault);
@@ -139,7 +139,7 @@ void read_frames(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) 
 }
 
 /// Reads the bus, and on EtherCAT the board whose cable is cut; without it, the first slave's is.
-void read_cable(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
+void read_cable(TomlTable& table, const hal::RobotConfig& robot, ScenarioFault& fault) {
   fault.bus = index_of(table, "bus", robot.buses);
   if (fault.bus < 0 || !table.has("board")) return;
   const hal::BusConfig& bus = robot.buses[static_cast<std::size_t>(fault.bus)];
@@ -152,7 +152,7 @@ void read_cable(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
   }
 }
 
-void read_joint(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
+void read_joint(TomlTable& table, const hal::RobotConfig& robot, ScenarioFault& fault) {
   fault.joint = index_of(table, "joint", robot.joints);
   const bool encoder = fault.kind == FaultKind::kEncoderFreeze ||
                        fault.kind == FaultKind::kEncoderJump ||
@@ -173,7 +173,7 @@ void read_joint(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
 }
 
 /// On the joint's link, at its origin or another point of it.
-void read_push(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
+void read_push(TomlTable& table, const hal::RobotConfig& robot, ScenarioFault& fault) {
   fault.joint = index_of(table, "joint", robot.joints);
   const std::vector<double> force_N = table.numbers("force_N", 3, {-1e5, 1e5});
   const std::vector<double> point_m =
@@ -182,7 +182,7 @@ void read_push(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
   if (point_m.size() == 3) std::ranges::copy(point_m, fault.point_m.begin());
 }
 
-void read_target(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
+void read_target(TomlTable& table, const hal::RobotConfig& robot, ScenarioFault& fault) {
   switch (fault.kind) {
     case FaultKind::kNone: return;
     case FaultKind::kFrameDrop:
@@ -224,8 +224,8 @@ FaultKind read_kind(TomlTable& table) {
                               : static_cast<FaultKind>(found - known.begin() + 1);
 }
 
-Fault read_fault(TomlTable& table, const Context& context) {
-  Fault fault;
+ScenarioFault read_fault(TomlTable& table, const Context& context) {
+  ScenarioFault fault;
   fault.kind = read_kind(table);
   read_times(table, context, fault);
   read_target(table, context.robot, fault);
@@ -255,13 +255,13 @@ bool is_literal(std::string_view value) {
   return digit && number && starts;
 }
 
-std::expected<std::vector<Fault>, Diagnostics> read(Result<TomlDocument> document,
-                                                    const hal::RobotConfig& robot,
-                                                    std::int64_t period_ns) {
+std::expected<std::vector<ScenarioFault>, Diagnostics> read(Result<TomlDocument> document,
+                                                            const hal::RobotConfig& robot,
+                                                            std::int64_t period_ns) {
   if (!document) return std::unexpected(Diagnostics{document.error()});
   TomlTable root = document->root();
   const Context context{robot, period_ns};
-  std::vector<Fault> faults;
+  std::vector<ScenarioFault> faults;
   for (TomlTable& table : root.tables("fault")) faults.push_back(read_fault(table, context));
   if (faults.empty()) {
     root.error("fault", "there is no fault", "add [[fault]] with kind = \"board_kill\", for one");
@@ -280,16 +280,16 @@ std::expected<std::vector<Fault>, Diagnostics> read(Result<TomlDocument> documen
 
 }  // namespace
 
-std::expected<std::vector<Fault>, Diagnostics> read_scenario(const std::string& file,
-                                                             const hal::RobotConfig& robot,
-                                                             std::int64_t period_ns) {
+std::expected<std::vector<ScenarioFault>, Diagnostics> read_scenario(const std::string& file,
+                                                                     const hal::RobotConfig& robot,
+                                                                     std::int64_t period_ns) {
   return read(TomlDocument::load(file), robot, period_ns);
 }
 
-std::expected<std::vector<Fault>, Diagnostics> parse_scenario(std::string_view text,
-                                                              const std::string& file,
-                                                              const hal::RobotConfig& robot,
-                                                              std::int64_t period_ns) {
+std::expected<std::vector<ScenarioFault>, Diagnostics> parse_scenario(std::string_view text,
+                                                                      const std::string& file,
+                                                                      const hal::RobotConfig& robot,
+                                                                      std::int64_t period_ns) {
   return read(TomlDocument::parse(text, file), robot, period_ns);
 }
 

@@ -19,11 +19,11 @@ namespace tandem::sim {
 /// Errors, all of the file at once: as TOML's; a kind, board, sensor, joint or bus that is not
 /// there (with the nearest name); a key that the kind does not have; two beginnings; a broken
 /// spring where there is none; more faults than FaultInjection::kMostFaults.
-[[nodiscard]] std::expected<std::vector<Fault>, Diagnostics> read_scenario(
+[[nodiscard]] std::expected<std::vector<ScenarioFault>, Diagnostics> read_scenario(
     const std::string& file, const hal::RobotConfig& robot, std::int64_t period_ns);
 
 /// The same from memory; `file` names it in errors.
-[[nodiscard]] std::expected<std::vector<Fault>, Diagnostics> parse_scenario(
+[[nodiscard]] std::expected<std::vector<ScenarioFault>, Diagnostics> parse_scenario(
     std::string_view text, const std::string& file, const hal::RobotConfig& robot,
     std::int64_t period_ns);
 

@@ -121,7 +121,7 @@ model::ModelSpec model_spec(const hal::RobotConfig& robot) {
   spec.lock = robot.model.lock;
   spec.gravity_m_s2 = robot.model.gravity_m_s2;
   for (const hal::SiteConfig& site : robot.model.sites) {
-    const bool closes = std::ranges::any_of(robot.loops, [&](const hal::LoopConfig& loop) {
+    const bool closes = std::ranges::any_of(robot.loops, [&](const hal::KinematicLoopConfig& loop) {
       return std::ranges::count(loop.sites, site.name) != 0;
     });
     spec.sites.push_back({site.name, site.link, site.xyz_m, site.rpy_rad, site.wrench || closes});

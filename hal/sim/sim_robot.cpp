@@ -58,7 +58,7 @@ std::string SimRobot::status_text() const {
 
 Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
   for (auto waiting = posted_.front(); !waiting.empty(); waiting = posted_.front()) {
-    Fault fault;
+    ScenarioFault fault;
     std::memcpy(&fault, waiting.data(), sizeof fault);
     (void)robot_->inject(fault);  // beyond the most that there can be: left out
     posted_.pop();
@@ -79,7 +79,7 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
   return code;
 }
 
-bool SimRobot::post(const Fault& fault) {
+bool SimRobot::post(const ScenarioFault& fault) {
   const std::span<std::byte> slot = posted_.begin_push();
   if (slot.empty()) return false;
   std::memcpy(slot.data(), &fault, sizeof fault);
@@ -88,7 +88,7 @@ bool SimRobot::post(const Fault& fault) {
 }
 
 hal::InjectedFault SimRobot::next_injected() noexcept TANDEM_RT {
-  const Fault* fault = robot_->next_begun_fault();
+  const ScenarioFault* fault = robot_->next_begun_fault();
   return fault == nullptr ? hal::InjectedFault{} : injected(*fault);
 }
 

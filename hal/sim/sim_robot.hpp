@@ -37,7 +37,7 @@ class SimRobot final : public hal::can::DriveBackend {
 
   /// Injects a fault from one other thread: it is added before the next cycle.
   /// @return false: too many wait.
-  [[nodiscard]] bool post(const Fault& fault);
+  [[nodiscard]] bool post(const ScenarioFault& fault);
 
   void set_stage_hook(StageHook hook) noexcept {
     hook_ = hook;
@@ -53,7 +53,7 @@ class SimRobot final : public hal::can::DriveBackend {
   TruthFiller truth_filler_;
   hal::TruthImage truth_;
   bool keep_truth_;
-  SpscRing posted_{sizeof(Fault), 16};
+  SpscRing posted_{sizeof(ScenarioFault), 16};
   StageHook hook_;
 };
 

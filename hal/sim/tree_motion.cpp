@@ -47,7 +47,7 @@ void TreeMotion::place(const double* q, const double* v) noexcept TANDEM_RT {
   const double* at = q;
   const double* rate = v;
   if (floating_) {
-    Body& base = bodies_[0];
+    BodyMotion& base = bodies_[0];
     base.R = rotation_of(q + 3);
     base.p = {q[0], q[1], q[2]};
     base.v = rotate(base.R.data(), v);
@@ -56,9 +56,9 @@ void TreeMotion::place(const double* q, const double* v) noexcept TANDEM_RT {
     rate += 6;
   }
   for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const Joint& joint = joints_[j];
-    const Body& parent = bodies_[joint.parent];
-    Body& body = bodies_[j + 1];
+    const JointFrame& joint = joints_[j];
+    const BodyMotion& parent = bodies_[joint.parent];
+    BodyMotion& body = bodies_[j + 1];
     const double position = joint.multiplier * at[joint.coordinate] + joint.offset;
     const double speed = joint.multiplier * rate[joint.coordinate];
     const Mat3 before_joint = product(parent.R, joint.R);
@@ -87,8 +87,8 @@ void TreeMotion::add_generalized(double* body_force, double* forces) const noexc
   };
   double* joint_forces = forces + (floating_ ? 6 : 0);
   for (std::size_t j = joints_.size(); j-- > 0;) {
-    const Joint& joint = joints_[j];
-    const Body& body = bodies_[j + 1];
+    const JointFrame& joint = joints_[j];
+    const BodyMotion& body = bodies_[j + 1];
     const double* force = body_force + 6 * (j + 1);
     const Vec3 moment = about(force, body.p);
     joint_forces[joint.coordinate] +=

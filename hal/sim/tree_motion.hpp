@@ -29,7 +29,7 @@ namespace tandem::sim {
 /// Body 0 is the base, or what stands still; joint j moves body j + 1, as in model::Tree.
 class TreeMotion {
  public:
-  struct Joint {
+  struct JointFrame {
     std::size_t parent;      // body; this joint's is its own index + 1
     std::size_t coordinate;  // of the kernels' joints
     double multiplier, offset;
@@ -37,7 +37,7 @@ class TreeMotion {
     Vec3 axis, p;  // in the joint's frame; in the parent's body
     Mat3 R;
   };
-  struct Body {
+  struct BodyMotion {
     Mat3 R;
     Vec3 p, v, w;  // in W, of its origin
     Vec3 axis;     // of its joint, in W
@@ -55,13 +55,13 @@ class TreeMotion {
   void add_generalized(double* body_force, double* forces) const noexcept TANDEM_RT;
 
   [[nodiscard]] bool floating() const noexcept { return floating_; }
-  [[nodiscard]] const std::vector<Joint>& joints() const noexcept { return joints_; }
-  [[nodiscard]] const std::vector<Body>& bodies() const noexcept { return bodies_; }
+  [[nodiscard]] const std::vector<JointFrame>& joints() const noexcept { return joints_; }
+  [[nodiscard]] const std::vector<BodyMotion>& bodies() const noexcept { return bodies_; }
 
  private:
   bool floating_ = false;
-  std::vector<Joint> joints_;
-  std::vector<Body> bodies_;  // joints + 1
+  std::vector<JointFrame> joints_;
+  std::vector<BodyMotion> bodies_;  // joints + 1
 };
 
 }  // namespace tandem::sim

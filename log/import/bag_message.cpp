@@ -36,7 +36,7 @@ class JsonReader {
   dds::Value message(const Json& json, const dds::MessageDefinition& definition) {
     dds::Value::Message out;
     if (!json.is_object()) refuse(definition.name + " is no object");
-    for (const dds::Field& field : definition.fields) {
+    for (const dds::MessageField& field : definition.fields) {
       const Json* found = json.is_object() ? member_of(json, field.name) : nullptr;
       out.push_back({field.name, found == nullptr ? none_of(field) : value_of(*found, field)});
     }
@@ -50,8 +50,8 @@ class JsonReader {
   }
 
   /// What stands for a field that is not there.
-  dds::Value none_of(const dds::Field& field) {
-    dds::Field one = field;
+  dds::Value none_of(const dds::MessageField& field) {
+    dds::MessageField one = field;
     one.repeat = dds::Repeat::kOne;
     if (field.repeat == dds::Repeat::kArray) {
       return {dds::Value::List(field.capacity, element(Json(), one))};
@@ -60,7 +60,7 @@ class JsonReader {
     return element(Json(), field);
   }
 
-  dds::Value value_of(const Json& json, const dds::Field& field) {
+  dds::Value value_of(const Json& json, const dds::MessageField& field) {
     if (field.repeat == dds::Repeat::kOne) return element(json, field);
     if (json.is_null()) return none_of(field);
     const bool fits = field.repeat != dds::Repeat::kArray || json.size() == field.capacity;
@@ -74,22 +74,22 @@ class JsonReader {
   }
 
   /// @param json  null: it is not there
-  dds::Value element(const Json& json, const dds::Field& field) {
-    using dds::FieldType;
+  dds::Value element(const Json& json, const dds::MessageField& field) {
+    using dds::MessageFieldType;
     switch (field.type) {
-      case FieldType::kMessage:
+      case MessageFieldType::kMessage:
         return message(json.is_null() ? Json::object() : json, *field.message);
-      case FieldType::kString:
-      case FieldType::kBoundedString:
+      case MessageFieldType::kString:
+      case MessageFieldType::kBoundedString:
         if (!json.is_null() && !json.is_string()) refuse("'" + field.name + "' is no text");
         return {json.is_string() ? json.get<std::string>() : std::string()};
-      case FieldType::kFloat32:
-      case FieldType::kFloat64: return {real(json, field.name)};
-      case FieldType::kBool: return {json.is_boolean() && json.get<bool>()};
-      case FieldType::kInt8:
-      case FieldType::kInt16:
-      case FieldType::kInt32:
-      case FieldType::kInt64: return {std::int64_t{whole(json, field.name)}};
+      case MessageFieldType::kFloat32:
+      case MessageFieldType::kFloat64: return {real(json, field.name)};
+      case MessageFieldType::kBool: return {json.is_boolean() && json.get<bool>()};
+      case MessageFieldType::kInt8:
+      case MessageFieldType::kInt16:
+      case MessageFieldType::kInt32:
+      case MessageFieldType::kInt64: return {std::int64_t{whole(json, field.name)}};
       default: return {static_cast<std::uint64_t>(whole(json, field.name))};
     }
   }

@@ -63,7 +63,7 @@ class BagSource {
         topic_of_(robot.joints.size()),
         sensors_(map.sensors.size()) {}
 
-  Result<Recording> read() {
+  Result<ImportedRecording> read() {
     for (const ImportFile& file : files_) {
       path_ = file.path;
       if (Status done = read_one(file); !done) return std::unexpected(done.error());
@@ -79,11 +79,11 @@ class BagSource {
       }
     }
     if (Status done = check_joints(); !done) return std::unexpected(done.error());
-    for (Series& series : joints_) {
+    for (ImportedSeries& series : joints_) {
       if (series.rows() > 0) recording_.series.push_back(std::move(series));
     }
-    for (Series& series : sensors_) recording_.series.push_back(std::move(series));
-    for (Series& series : recording_.series) {
+    for (ImportedSeries& series : sensors_) recording_.series.push_back(std::move(series));
+    for (ImportedSeries& series : recording_.series) {
       if (Status done = drop_invalid(series); !done) return std::unexpected(done.error());
     }
     recording_.excluded.invalid = distinct(std::move(invalid_));
@@ -277,7 +277,7 @@ class BagSource {
 
   void add_joint(std::size_t joint, std::int64_t time_ns, std::array<double, 3> values,
                  const std::string& topic) {
-    Series& series = joints_[joint];
+    ImportedSeries& series = joints_[joint];
     if (series.columns.empty()) {
       const std::string& name = robot_.joints[joint].name;
       series.name = "joint " + name;
@@ -314,7 +314,7 @@ class BagSource {
                 "say frame = \"" + frame + "\" when the two have the same origin and axes",
                 map_.file, sensor.line, sensor.key + ".frame"});
     }
-    Series& series = sensors_[index];
+    ImportedSeries& series = sensors_[index];
     if (series.columns.empty()) start_sensor(series, sensor, channel.topic);
     series.time_ns.push_back(time_of(*value, message.time_ns));
     series.message.push_back(message_);
@@ -325,7 +325,8 @@ class BagSource {
     return {};
   }
 
-  void start_sensor(Series& series, const SensorMap& sensor, const std::string& topic) const {
+  void start_sensor(ImportedSeries& series, const SensorMap& sensor,
+                    const std::string& topic) const {
     const hal::SensorConfig& config = robot_.sensors[sensor.sensor];
     std::size_t first = 0;
     for (std::size_t s = 0; s < sensor.sensor; ++s) first += robot_.sensors[s].channels();
@@ -362,7 +363,8 @@ class BagSource {
       if (number_.contains(topic)) continue;
       return refuse("has no topic '" + topic + "'", suggest(topic, topics_), "bag.joint_states");
     }
-    const bool any = std::ranges::any_of(joints_, [](const Series& s) { return s.rows() > 0; });
+    const bool any =
+        std::ranges::any_of(joints_, [](const ImportedSeries& s) { return s.rows() > 0; });
     if (any) return {};
     if (!recording_.excluded.ignored.empty()) {
       return refuse("has no joint states of this robot: none of its joints is the robot's",
@@ -412,7 +414,7 @@ class BagSource {
 
   /// Columns without any number are absent (an interface that the robot does not have); rows with a
   /// hole in the others are errors, or left out.
-  Status drop_invalid(Series& series) {
+  Status drop_invalid(ImportedSeries& series) {
     std::erase_if(series.columns, [](const ImportedColumn& column) {
       return column.target.field != "sensor" && column.target.field != "position_rad" &&
              std::ranges::all_of(column.values, [](double one) { return std::isnan(one); });
@@ -440,9 +442,9 @@ class BagSource {
   const ImportMap& map_;
   const hal::RobotConfig& robot_;
   std::string path_;  // being read
-  std::vector<Series> joints_;
+  std::vector<ImportedSeries> joints_;
   std::vector<std::string> topic_of_;  // of each joint; empty: not met
-  std::vector<Series> sensors_;
+  std::vector<ImportedSeries> sensors_;
   std::vector<std::string> topics_, joint_topics_;  // in their order; those with joints taken
   std::string said_;                                // the topics with types and encodings
   std::map<std::string, std::uint64_t> number_;     // messages of each topic so far
@@ -450,13 +452,13 @@ class BagSource {
   std::vector<std::uint32_t> invalid_;              // of them
   std::vector<std::int64_t> behind_ns_;             // log time minus stamp
   bool stamped_ = false;
-  Recording recording_;
+  ImportedRecording recording_;
 };
 
 }  // namespace
 
-Result<Recording> read_bag_recording(std::span<const ImportFile> files, const ImportMap& map,
-                                     const hal::RobotConfig& robot) {
+Result<ImportedRecording> read_bag_recording(std::span<const ImportFile> files,
+                                             const ImportMap& map, const hal::RobotConfig& robot) {
   return BagSource(files, map, robot).read();
 }
 

@@ -26,7 +26,7 @@ class CsvSource {
   CsvSource(std::span<const ImportFile> files, const ImportMap& map, const hal::RobotConfig& robot)
       : files_(files), map_(map), robot_(robot) {}
 
-  Result<Recording> read() {
+  Result<ImportedRecording> read() {
     for (const ImportFile& file : files_) {
       auto rows = CsvRows::open(file.text, file.path, map_.csv);
       if (!rows) return std::unexpected(rows.error());
@@ -319,7 +319,7 @@ class CsvSource {
     if (rows.empty())
       return std::unexpected(Error{"has no number", "is it the right column? Leave it out",
                                    series_.columns[columns.front()].file, 0, first});
-    Series part;
+    ImportedSeries part;
     part.name = "column " + first;
     if (columns.size() > 1) part.name += " and " + counted(columns.size() - 1, "other");
     part.time_ns = series_.time_ns;
@@ -414,14 +414,14 @@ class CsvSource {
   std::int64_t row_ = 0;
   std::optional<Error> lost_;  // what is wrong with the first row that was left out
   bool sparse_ = false;
-  Series series_;  // of all columns
-  Recording recording_;
+  ImportedSeries series_;  // of all columns
+  ImportedRecording recording_;
 };
 
 }  // namespace
 
-Result<Recording> read_csv_recording(std::span<const ImportFile> files, const ImportMap& map,
-                                     const hal::RobotConfig& robot) {
+Result<ImportedRecording> read_csv_recording(std::span<const ImportFile> files,
+                                             const ImportMap& map, const hal::RobotConfig& robot) {
   return CsvSource(files, map, robot).read();
 }
 

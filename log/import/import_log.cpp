@@ -176,9 +176,9 @@ Result<bool> is_bag(const ImportFile& file) {
 }
 
 /// "position_rad", "command torque_nm": what the recording fills, each once.
-std::vector<std::string> filled_fields(const Recording& recording) {
+std::vector<std::string> filled_fields(const ImportedRecording& recording) {
   std::vector<std::string> fields;
-  for (const Series& series : recording.series) {
+  for (const ImportedSeries& series : recording.series) {
     for (const ImportedColumn& column : series.columns) {
       const std::string name = (column.target.command ? "command " : "") + column.target.field;
       if (std::ranges::find(fields, name) == fields.end()) fields.push_back(name);

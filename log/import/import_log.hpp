@@ -26,7 +26,7 @@ struct ImportRequest {
 struct Imported {
   ImportMap map;
   std::string map_text;
-  Recording recording;
+  ImportedRecording recording;
   bool bag = false;
   std::string sha256;  ///< of the files' bytes, one after another
 };

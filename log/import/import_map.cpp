@@ -262,7 +262,7 @@ class Reader {
     for (const Unit& one : signal.units) {
       if (one.name != unit) continue;
       const bool slides = robot_.joints[joint].slides;
-      if ((one.of == Motion::kTurns && slides) || (one.of == Motion::kSlides && !slides)) {
+      if ((one.of == UnitFor::kTurns && slides) || (one.of == UnitFor::kSlides && !slides)) {
         table.error("unit",
                     "is " + unit + ", but the joint '" + robot_.joints[joint].name + "' " +
                         (slides ? "slides" : "turns"),
@@ -286,7 +286,7 @@ class Reader {
       std::vector<std::string> units;
       for (const auto& joint : listed_) {
         const bool slides = joint && robot_.joints[*joint].slides;
-        const Motion of = slides ? Motion::kSlides : Motion::kTurns;
+        const UnitFor of = slides ? UnitFor::kSlides : UnitFor::kTurns;
         const auto unit = std::ranges::find(signal.units, of, &Unit::of);
         units.emplace_back(unit->name);
       }

@@ -13,32 +13,32 @@ namespace tandem::log {
 inline constexpr double kDegree = std::numbers::pi / 180.0;
 
 /// Joints that a unit is for, by how they move.
-enum class Motion : std::uint8_t { kAny, kTurns, kSlides };
+enum class UnitFor : std::uint8_t { kAny, kTurns, kSlides };
 
 struct Unit {
   std::string_view name;
   double factor;  ///< to SI; NaN: `scale` says it
-  Motion of = Motion::kAny;
+  UnitFor of = UnitFor::kAny;
 };
 
 inline constexpr double kAsked = std::numeric_limits<double>::quiet_NaN();
-inline constexpr Unit kPositions[] = {{"rad", 1.0, Motion::kTurns},
-                                      {"deg", kDegree, Motion::kTurns},
-                                      {"turn", 360.0 * kDegree, Motion::kTurns},
-                                      {"m", 1.0, Motion::kSlides},
-                                      {"mm", 1e-3, Motion::kSlides},
+inline constexpr Unit kPositions[] = {{"rad", 1.0, UnitFor::kTurns},
+                                      {"deg", kDegree, UnitFor::kTurns},
+                                      {"turn", 360.0 * kDegree, UnitFor::kTurns},
+                                      {"m", 1.0, UnitFor::kSlides},
+                                      {"mm", 1e-3, UnitFor::kSlides},
                                       {"raw", kAsked}};
 inline constexpr Unit kVelocities[] = {
-    {"rad/s", 1.0, Motion::kTurns},         {"deg/s", kDegree, Motion::kTurns},
-    {"rpm", 6.0 * kDegree, Motion::kTurns}, {"m/s", 1.0, Motion::kSlides},
-    {"mm/s", 1e-3, Motion::kSlides},        {"raw", kAsked}};
-inline constexpr Unit kAccelerations[] = {{"rad/s2", 1.0, Motion::kTurns},
-                                          {"deg/s2", kDegree, Motion::kTurns},
-                                          {"m/s2", 1.0, Motion::kSlides},
+    {"rad/s", 1.0, UnitFor::kTurns},         {"deg/s", kDegree, UnitFor::kTurns},
+    {"rpm", 6.0 * kDegree, UnitFor::kTurns}, {"m/s", 1.0, UnitFor::kSlides},
+    {"mm/s", 1e-3, UnitFor::kSlides},        {"raw", kAsked}};
+inline constexpr Unit kAccelerations[] = {{"rad/s2", 1.0, UnitFor::kTurns},
+                                          {"deg/s2", kDegree, UnitFor::kTurns},
+                                          {"m/s2", 1.0, UnitFor::kSlides},
                                           {"raw", kAsked}};
-inline constexpr Unit kTorques[] = {{"Nm", 1.0, Motion::kTurns},
-                                    {"mNm", 1e-3, Motion::kTurns},
-                                    {"N", 1.0, Motion::kSlides},
+inline constexpr Unit kTorques[] = {{"Nm", 1.0, UnitFor::kTurns},
+                                    {"mNm", 1e-3, UnitFor::kTurns},
+                                    {"N", 1.0, UnitFor::kSlides},
                                     {"raw", kAsked}};
 inline constexpr Unit kCurrents[] = {{"A", 1.0}, {"mA", 1e-3}, {"raw", kAsked}};
 inline constexpr Unit kVoltages[] = {{"V", 1.0}, {"mV", 1e-3}, {"raw", kAsked}};

@@ -34,7 +34,7 @@ struct ImportedColumn {
 
 /// Columns that were measured at the same times: those of a CSV, or of one joint or sensor in a
 /// bag.
-struct Series {
+struct ImportedSeries {
   std::string name;                      ///< for messages: "joint elbow"
   std::vector<std::size_t> joints;       ///< whose state they are
   std::vector<std::size_t> sensors;      ///< the same
@@ -66,14 +66,14 @@ struct Exclusions {
 };
 
 /// Drops all rows but these, which are in rising order.
-void keep_rows(Series& series, const std::vector<std::size_t>& rows);
+void keep_rows(ImportedSeries& series, const std::vector<std::size_t>& rows);
 
 /// How many different numbers there are.
 [[nodiscard]] std::uint64_t distinct(std::vector<std::uint32_t> numbers);
 
 /// A whole recording.
-struct Recording {
-  std::vector<Series> series;
+struct ImportedRecording {
+  std::vector<ImportedSeries> series;
   Exclusions excluded;
   std::vector<std::string> notes;  ///< what was taken how, for the summary
 };

@@ -26,7 +26,8 @@ std::string in_seconds(std::int64_t ns) {
 }
 
 /// What is wrong with a row, with its place.
-Error row_error(const Series& series, std::size_t row, std::string message, std::string hint) {
+Error row_error(const ImportedSeries& series, std::size_t row, std::string message,
+                std::string hint) {
   Error error{std::move(message), std::move(hint), series.columns.front().file, 0, series.name};
   if (row < series.line.size()) {
     error.line = series.line[row];
@@ -42,7 +43,7 @@ struct LeftOut {
 };
 
 /// Rows whose time is after that of every row before them.
-Status check_order(Series& series, const ImportMap& map, LeftOut& left_out) {
+Status check_order(ImportedSeries& series, const ImportMap& map, LeftOut& left_out) {
   std::vector<std::size_t> kept;
   for (std::size_t row = 0; row < series.rows(); ++row) {
     const std::int64_t time = series.time_ns[row];
@@ -67,7 +68,7 @@ Status check_order(Series& series, const ImportMap& map, LeftOut& left_out) {
   return {};
 }
 
-std::vector<std::int64_t> sorted_steps(const Series& series) {
+std::vector<std::int64_t> sorted_steps(const ImportedSeries& series) {
   std::vector<std::int64_t> steps;
   for (std::size_t row = 1; row < series.rows(); ++row) {
     steps.push_back(series.time_ns[row] - series.time_ns[row - 1]);
@@ -79,7 +80,7 @@ std::vector<std::int64_t> sorted_steps(const Series& series) {
 /// Positions that the map says were kept within a turn, as an angle from -pi to pi is, go on: each
 /// row is the nearest to the one before. The whole column then stands in the joint's range, where
 /// a number of turns brings it there.
-void continue_turns(Series& series, const ImportMap& map, const hal::RobotConfig& robot) {
+void continue_turns(ImportedSeries& series, const ImportMap& map, const hal::RobotConfig& robot) {
   constexpr double kTurn_rad = 2.0 * std::numbers::pi;
   for (ImportedColumn& column : series.columns) {
     const auto of = [&](const SignalMap& one) {
@@ -103,12 +104,12 @@ void continue_turns(Series& series, const ImportMap& map, const hal::RobotConfig
   }
 }
 
-void crop(Recording& recording, const ImportMap& map) {
+void crop(ImportedRecording& recording, const ImportMap& map) {
   std::int64_t start = std::numeric_limits<std::int64_t>::max();
-  for (const Series& series : recording.series) {
+  for (const ImportedSeries& series : recording.series) {
     if (series.rows() > 0) start = std::min(start, series.time_ns.front());
   }
-  for (Series& series : recording.series) {
+  for (ImportedSeries& series : recording.series) {
     std::vector<std::size_t> kept;
     for (std::size_t row = 0; row < series.rows(); ++row) {
       const std::int64_t since = series.time_ns[row] - start;
@@ -123,14 +124,14 @@ std::int64_t median_step(const std::vector<std::int64_t>& sorted) {
   return sorted.empty() ? 0 : sorted[sorted.size() / 2];
 }
 
-std::int64_t max_gap_of(const Series& series, const ImportMap& map) {
+std::int64_t max_gap_of(const ImportedSeries& series, const ImportMap& map) {
   if (map.max_gap_ns != 0 && series.has_positions()) return map.max_gap_ns;
   // A column may be slower than the positions, whose gaps the map speaks of.
   const std::int64_t usual = std::max(median_step(sorted_steps(series)), map.period_ns);
   return std::max(map.max_gap_ns, kGapSteps * usual);
 }
 
-Status check_gaps(const Series& series, const ImportMap& map, Exclusions& excluded) {
+Status check_gaps(const ImportedSeries& series, const ImportMap& map, Exclusions& excluded) {
   const std::int64_t most = max_gap_of(series, map);
   for (std::size_t row = 1; row < series.rows(); ++row) {
     const std::int64_t step = series.time_ns[row] - series.time_ns[row - 1];
@@ -146,7 +147,7 @@ Status check_gaps(const Series& series, const ImportMap& map, Exclusions& exclud
   return {};
 }
 
-Status check_frozen(Series& series, const ImportMap& map, Exclusions& excluded) {
+Status check_frozen(ImportedSeries& series, const ImportMap& map, Exclusions& excluded) {
   if (map.allow_frozen || series.rows() < kFewRows) return {};
   for (std::size_t c = 0; c < series.columns.size();) {
     const ImportedColumn& column = series.columns[c];
@@ -175,7 +176,7 @@ Status check_frozen(Series& series, const ImportMap& map, Exclusions& excluded) 
 
 /// A unit of time or a period that is off by orders of magnitude: almost no row would be used, or
 /// almost every cycle would be made up. The positions say it: other columns may be slower.
-Status check_period(const Series& series, const ImportMap& map) {
+Status check_period(const ImportedSeries& series, const ImportMap& map) {
   if (!series.has_positions()) return {};
   const std::int64_t step = std::max<std::int64_t>(1, median_step(sorted_steps(series)));
   if (map.period_ns / kMostRatio < step && step / kMostRatio < map.period_ns) return {};
@@ -187,7 +188,8 @@ Status check_period(const Series& series, const ImportMap& map) {
 }
 
 /// Positions further outside of a joint's range than it is wide: another unit, or no number of it.
-Status check_range(const Series& series, const ImportMap& map, const hal::RobotConfig& robot) {
+Status check_range(const ImportedSeries& series, const ImportMap& map,
+                   const hal::RobotConfig& robot) {
   for (const ImportedColumn& column : series.columns) {
     if (column.target.field != "position_rad") continue;
     const hal::JointConfig& joint = robot.joints[column.target.index];
@@ -211,7 +213,8 @@ Status check_range(const Series& series, const ImportMap& map, const hal::RobotC
 }
 
 /// Torques that no joint has.
-Status check_torques(const Series& series, const ImportMap& map, const hal::RobotConfig& robot) {
+Status check_torques(const ImportedSeries& series, const ImportMap& map,
+                     const hal::RobotConfig& robot) {
   constexpr double kMost = 100.0;  // times the joint's limit
   for (const ImportedColumn& column : series.columns) {
     if (column.target.command || column.target.field != "torque_nm") continue;
@@ -230,7 +233,8 @@ Status check_torques(const Series& series, const ImportMap& map, const hal::Robo
 }
 
 /// A position that goes on a turn further, as an encoder's does whose number is kept within one.
-Status check_leaps(const Series& series, const ImportMap& map, const hal::RobotConfig& robot) {
+Status check_leaps(const ImportedSeries& series, const ImportMap& map,
+                   const hal::RobotConfig& robot) {
   constexpr double kTurn_rad = 2.0 * std::numbers::pi, kNear_rad = 0.5;
   const std::int64_t longest_step_ns = max_gap_of(series, map);
   for (const ImportedColumn& column : series.columns) {
@@ -252,7 +256,8 @@ Status check_leaps(const Series& series, const ImportMap& map, const hal::RobotC
   return {};
 }
 
-const ImportedColumn* column_of(const Series& series, const std::string& field, std::size_t joint) {
+const ImportedColumn* column_of(const ImportedSeries& series, const std::string& field,
+                                std::size_t joint) {
   const auto found = std::ranges::find_if(series.columns, [&](const ImportedColumn& column) {
     return !column.target.command && column.target.field == field && column.target.index == joint;
   });
@@ -261,7 +266,7 @@ const ImportedColumn* column_of(const Series& series, const std::string& field, 
 
 /// A joint's velocities over the rate of its positions, sorted: a number for each tenth of a second
 /// in which it goes 5 mrad (or mm) or more. A leap, as when an encoder begins, is in one of them.
-std::vector<double> rates_of(const Series& series, const ImportedColumn& position,
+std::vector<double> rates_of(const ImportedSeries& series, const ImportedColumn& position,
                              const ImportedColumn& velocity) {
   constexpr std::int64_t kStretch_ns = 100'000'000;
   constexpr double kLeast = 5e-3;
@@ -282,7 +287,8 @@ std::vector<double> rates_of(const Series& series, const ImportedColumn& positio
 }
 
 /// A velocity that is not the rate of its position: one of them has another unit, sign or column.
-Status check_rates(const Series& series, const ImportMap& map, const hal::RobotConfig& robot) {
+Status check_rates(const ImportedSeries& series, const ImportMap& map,
+                   const hal::RobotConfig& robot) {
   constexpr std::size_t kFewRates = 5;
   for (const std::size_t joint : series.joints) {
     const ImportedColumn* position = column_of(series, "position_rad", joint);
@@ -311,7 +317,7 @@ Status check_rates(const Series& series, const ImportMap& map, const hal::RobotC
 }
 
 /// A quaternion and its negative are one rotation: neighbours get the signs that are near.
-void unwrap(Series& series) {
+void unwrap(ImportedSeries& series) {
   for (const std::size_t first : series.quaternions) {
     for (std::size_t row = 1; row < series.rows(); ++row) {
       double product = 0.0;
@@ -348,7 +354,7 @@ void blank(hal::Image& image) {
 
 }  // namespace
 
-void keep_rows(Series& series, const std::vector<std::size_t>& rows) {
+void keep_rows(ImportedSeries& series, const std::vector<std::size_t>& rows) {
   if (rows.size() == series.rows()) return;
   const auto keep = [&rows](auto& values) {
     if (values.empty()) return;
@@ -366,16 +372,16 @@ std::uint64_t distinct(std::vector<std::uint32_t> numbers) {
   return static_cast<std::uint64_t>(std::unique(numbers.begin(), numbers.end()) - numbers.begin());
 }
 
-Status clean(Recording& recording, const ImportMap& map, const hal::RobotConfig& robot) {
+Status clean(ImportedRecording& recording, const ImportMap& map, const hal::RobotConfig& robot) {
   LeftOut left_out;
-  for (Series& series : recording.series) {
+  for (ImportedSeries& series : recording.series) {
     if (Status s = check_order(series, map, left_out); !s) return s;
   }
   recording.excluded.duplicates = distinct(std::move(left_out.duplicates));
   recording.excluded.backwards = distinct(std::move(left_out.backwards));
   crop(recording, map);
-  for (Series& series : recording.series) continue_turns(series, map, robot);
-  for (const Series& series : recording.series) {
+  for (ImportedSeries& series : recording.series) continue_turns(series, map, robot);
+  for (const ImportedSeries& series : recording.series) {
     if (series.rows() >= (series.has_positions() ? 2U : 1U)) continue;
     return std::unexpected(
         Error{series.has_positions() ? "has less than two samples that can be used"
@@ -391,7 +397,7 @@ Status clean(Recording& recording, const ImportMap& map, const hal::RobotConfig&
                   in_seconds(first.most_ns) + ")",
               "say [time] period_s", map.file, 0, "time.period_s"});
   }
-  for (Series& series : recording.series) {
+  for (ImportedSeries& series : recording.series) {
     if (Status s = check_period(series, map); !s) return s;
     if (Status s = check_range(series, map, robot); !s) return s;
     if (Status s = check_gaps(series, map, recording.excluded); !s) return s;
@@ -404,9 +410,9 @@ Status clean(Recording& recording, const ImportMap& map, const hal::RobotConfig&
   return {};
 }
 
-std::vector<Spacing> spacings(const Recording& recording) {
+std::vector<Spacing> spacings(const ImportedRecording& recording) {
   std::vector<Spacing> all;
-  for (const Series& series : recording.series) {
+  for (const ImportedSeries& series : recording.series) {
     const std::vector<std::int64_t> steps = sorted_steps(series);
     const std::int64_t median_ns = median_step(steps);
     const double in_time_ns = Spacing::kLateSteps * static_cast<double>(median_ns);
@@ -418,7 +424,8 @@ std::vector<Spacing> spacings(const Recording& recording) {
   return all;
 }
 
-Sampler::Sampler(const Recording& recording, const ImportMap& map, const hal::RobotConfig& robot)
+Sampler::Sampler(const ImportedRecording& recording, const ImportMap& map,
+                 const hal::RobotConfig& robot)
     : recording_(recording),
       map_(map),
       blank_state_(robot.shape()),
@@ -436,7 +443,7 @@ Sampler::Sampler(const Recording& recording, const ImportMap& map, const hal::Ro
     if (!sensor.no_orientation) continue;
     std::ranges::fill(blank_state_.sensor_values(sensor.sensor).first(4), 0.0);
   }
-  for (const Series& series : recording.series) {
+  for (const ImportedSeries& series : recording.series) {
     max_gap_ns_.push_back(max_gap_of(series, map));
     std::vector<std::size_t>& offsets = offsets_.emplace_back();
     for (const ImportedColumn& column : series.columns) {
@@ -448,13 +455,13 @@ Sampler::Sampler(const Recording& recording, const ImportMap& map, const hal::Ro
   }
 }
 
-Result<Sampler> Sampler::create(const Recording& recording, const ImportMap& map,
+Result<Sampler> Sampler::create(const ImportedRecording& recording, const ImportMap& map,
                                 const hal::RobotConfig& robot) {
   Sampler made(recording, map, robot);
   std::size_t samples = 0;
   std::int64_t begin = std::numeric_limits<std::int64_t>::min();
   std::int64_t end = std::numeric_limits<std::int64_t>::max();
-  for (const Series& series : recording.series) {
+  for (const ImportedSeries& series : recording.series) {
     if (!series.has_positions()) continue;
     samples = std::max(samples, series.rows());
     begin = std::max(begin, series.time_ns.front());
@@ -490,7 +497,7 @@ double Sampler::value_of(const ImportedColumn& column, std::size_t row, double s
 /// Numbers and ages of one series. @return false: it has a hole here
 bool Sampler::fill_series(std::size_t index, std::int64_t now_ns, hal::StateImage& state,
                           hal::CommandImage& command) {
-  const Series& series = recording_.series[index];
+  const ImportedSeries& series = recording_.series[index];
   std::size_t& row = row_[index];
   while (row + 1 < series.rows() && series.time_ns[row + 1] <= now_ns) ++row;
   const std::int64_t since_ns = now_ns - series.time_ns[row];

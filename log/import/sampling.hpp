@@ -39,18 +39,18 @@ struct Spacing {
 /// that is 50 times as long or as short; a position further outside of its joint's range than that
 /// is wide; a position that leaps by a turn; a torque above a hundred times its joint's; a velocity
 /// that is not the rate of its position, within a factor of two, where the joint moves.
-[[nodiscard]] Status clean(Recording& recording, const ImportMap& map,
+[[nodiscard]] Status clean(ImportedRecording& recording, const ImportMap& map,
                            const hal::RobotConfig& robot);
 
 /// Spacing of each series. @pre clean() went well
-[[nodiscard]] std::vector<Spacing> spacings(const Recording& recording);
+[[nodiscard]] std::vector<Spacing> spacings(const ImportedRecording& recording);
 
 /// Fills the images of one cycle after another.
 class Sampler {
  public:
   /// Errors: the joints' positions have no time in common.
-  [[nodiscard]] static Result<Sampler> create(const Recording& recording, const ImportMap& map,
-                                              const hal::RobotConfig& robot);
+  [[nodiscard]] static Result<Sampler> create(const ImportedRecording& recording,
+                                              const ImportMap& map, const hal::RobotConfig& robot);
 
   [[nodiscard]] std::uint64_t cycles() const { return cycles_; }
   /// Time of cycle 0, on the recording's clock.
@@ -62,13 +62,13 @@ class Sampler {
   [[nodiscard]] bool fill(std::uint64_t cycle, hal::StateImage& state, hal::CommandImage& command);
 
  private:
-  Sampler(const Recording& recording, const ImportMap& map, const hal::RobotConfig& robot);
+  Sampler(const ImportedRecording& recording, const ImportMap& map, const hal::RobotConfig& robot);
   [[nodiscard]] double value_of(const ImportedColumn& column, std::size_t row, double share) const;
   bool fill_series(std::size_t index, std::int64_t now_ns, hal::StateImage& state,
                    hal::CommandImage& command);
   void normalise(std::size_t index, hal::StateImage& state) const;
 
-  const Recording& recording_;
+  const ImportedRecording& recording_;
   const ImportMap& map_;
   hal::StateImage blank_state_;  // a cycle of which nothing is known
   hal::CommandImage blank_command_;

@@ -28,9 +28,9 @@ struct ImportFile {
 /// Errors: no such column; a column that is neither used nor ignored; a cell that is no number; and
 /// what the map does not exclude: ragged rows, cells that are empty or not finite. Each with its
 /// file, line and column.
-[[nodiscard]] Result<Recording> read_csv_recording(std::span<const ImportFile> files,
-                                                   const ImportMap& map,
-                                                   const hal::RobotConfig& robot);
+[[nodiscard]] Result<ImportedRecording> read_csv_recording(std::span<const ImportFile> files,
+                                                           const ImportMap& map,
+                                                           const hal::RobotConfig& robot);
 
 /// Reads the bags `files` (MCAP), one after the other: sensor_msgs/JointState, and for each
 /// [sensor.NAME] of the map sensor_msgs/Imu or geometry_msgs/WrenchStamped, as decode_message()
@@ -40,8 +40,8 @@ struct ImportFile {
 /// that is not said; a joint that is neither the robot's, named nor ignored; joints that the
 /// recording lacks; a topic of another type; a frame that is not the sensor's link; a message whose
 /// lists differ in length.
-[[nodiscard]] Result<Recording> read_bag_recording(std::span<const ImportFile> files,
-                                                   const ImportMap& map,
-                                                   const hal::RobotConfig& robot);
+[[nodiscard]] Result<ImportedRecording> read_bag_recording(std::span<const ImportFile> files,
+                                                           const ImportMap& map,
+                                                           const hal::RobotConfig& robot);
 
 }  // namespace tandem::log

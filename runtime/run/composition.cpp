@@ -154,7 +154,7 @@ void serve_only(Experiment& e, bool lockstep) {
   e.duration_s = kEndless_s;
   e.hal.delay_cycles = 0;  // the owner's is in its commands
   e.dds.enabled = true;
-  e.remote.command = e.remote.command.value_or(RemoteCommand::kLocal);
+  e.remote.command = e.remote.command.value_or(RemoteAccess::kLocal);
   e.remote.lockstep = e.remote.lockstep || lockstep;
 }
 
@@ -169,8 +169,8 @@ void add_robot_side(Composition& c, OwnerController& owner, Collector& errors) {
 /// The controller that an owner in another process is.
 void add_owner(Composition& c, Collector& errors) {
   const Experiment& e = c.experiment;
-  const auto command = e.remote.command.value_or(RemoteCommand::kOff);
-  const bool may = command != RemoteCommand::kOff && e.dds.enabled;
+  const auto command = e.remote.command.value_or(RemoteAccess::kOff);
+  const bool may = command != RemoteAccess::kOff && e.dds.enabled;
   if (!may || c.controllers == nullptr || e.hal.backend == BackendKind::kDds) return;
   auto owner = std::make_shared<OwnerController>();
   c.owner_slot = c.controllers->size();

@@ -67,7 +67,7 @@ struct Composition {
   /// robot::check()'s, a category 2 that nobody can carry out, late_plans() unless the command line
   /// says how long
   Diagnostics warnings;
-  robot::LoopStudy loops;  ///< where the loops close, in a simulation
+  robot::ClosureStudy loops;  ///< where the loops close, in a simulation
 };
 
 /// What the cycle may show of the plant: null where nothing is simulated here, or it is not wanted.

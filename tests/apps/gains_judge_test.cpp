@@ -136,7 +136,7 @@ class SimulatedLoop {
     m.link_acceleration_rad_s2 = (m.link_velocity_rad_s - before) / plant_.period_s;
     m.torque_rate_Nm_s = torque_rate_.update(m.torque_Nm);
     const std::array modes{canopen::Mode::kCsp, canopen::Mode::kCsv, canopen::Mode::kCst};
-    voltage_ = board_.update(firmware::Action::kFollow,
+    voltage_ = board_.update(firmware::BridgeAction::kFollow,
                              modes[static_cast<std::size_t>(plant_.loop)], {}, m);
     constexpr int kSteps = 10;
     for (int i = 0; i < kSteps; ++i) integrate(plant_.period_s / kSteps);

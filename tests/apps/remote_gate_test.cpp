@@ -11,14 +11,14 @@ namespace {
 using std::string_literals::operator""s;
 
 TEST(RemoteGate, LetsReadingAndStopsThroughAndTheRestWhenItIsAllowed) {
-  using runtime::RemoteCommand;
-  const auto off = remote_gate({.command = RemoteCommand::kOff}, {});
+  using runtime::RemoteAccess;
+  const auto off = remote_gate({.command = RemoteAccess::kOff}, {});
   EXPECT_TRUE(off("status", ControlEffect::kReads, {}));
   EXPECT_TRUE(off("estop", ControlEffect::kStops, {}));
   const Status refused = off("clock.pause", ControlEffect::kChanges, {});
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().hint.find("[remote] command"), std::string::npos);
-  for (const RemoteCommand command : {RemoteCommand::kLocal, RemoteCommand::kNetwork}) {
+  for (const RemoteAccess command : {RemoteAccess::kLocal, RemoteAccess::kNetwork}) {
     EXPECT_TRUE(remote_gate({.command = command}, {})("clock.pause", ControlEffect::kChanges, {}));
   }
 }
@@ -26,7 +26,7 @@ TEST(RemoteGate, LetsReadingAndStopsThroughAndTheRestWhenItIsAllowed) {
 // Another user of the machine had a library of theirs loaded, and its constructor ran as root.
 TEST(RemoteGate, LetsNoCodeInUnlessAskedForAndThenByNameOnly) {
   const auto error = [](bool load, const Json& request) {
-    const auto gate = remote_gate({.command = runtime::RemoteCommand::kLocal, .load = load}, {});
+    const auto gate = remote_gate({.command = runtime::RemoteAccess::kLocal, .load = load}, {});
     const Status status = gate("controller.load", ControlEffect::kChanges, request);
     return status ? "" : status.error().message;
   };
@@ -41,7 +41,7 @@ TEST(RemoteGate, LetsNoCodeInUnlessAskedForAndThenByNameOnly) {
 TEST(RemoteGate, RefusesChangesOfControllersAndJointsWhileSomebodyOwnsTheRobot) {
   std::string owner;
   const auto gate =
-      remote_gate({.command = runtime::RemoteCommand::kLocal}, [&owner] { return owner; });
+      remote_gate({.command = runtime::RemoteAccess::kLocal}, [&owner] { return owner; });
   EXPECT_TRUE(gate("controller.stop", ControlEffect::kChanges, {}));
   owner = "squat on robot-pc";
   for (const char* name : {"controller.stop", "joint.set", "joint.reset"}) {

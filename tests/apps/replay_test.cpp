@@ -30,16 +30,16 @@ class LogReplay : public Program {
     return json("run.json")["log"]["path"];
   }
   /// References of both joints.
-  [[nodiscard]] log::Table columns(const std::string& log, const std::string& topic) const {
+  [[nodiscard]] log::TimeSeries columns(const std::string& log, const std::string& topic) const {
     const auto file = log::LogFile::open(folder_ / log);
     EXPECT_TRUE(file) << log;
     if (!file) return {};
     auto table = file->read(topic, {{"position_rad", 0}, {"position_rad", 1}});
     EXPECT_TRUE(table);
-    return table ? *table : log::Table{};
+    return table ? *table : log::TimeSeries{};
   }
   /// How far `replay` is from `recorded` at most, both as long as the recording's motion.
-  [[nodiscard]] double apart(const log::Table& recorded, const log::Table& replay) const {
+  [[nodiscard]] double apart(const log::TimeSeries& recorded, const log::TimeSeries& replay) const {
     const auto played = json("replay.json");
     const double from_s = 1e-9 * played["from_ns"].get<double>();
     const double to_s = 1e-9 * played["to_ns"].get<double>();
@@ -64,7 +64,7 @@ class LogReplay : public Program {
     return most;
   }
   /// When the controllers started: the duration before the end.
-  [[nodiscard]] double start_of(const log::Table&) const {
+  [[nodiscard]] double start_of(const log::TimeSeries&) const {
     const auto file =
         log::LogFile::open(folder_ / json("run.json")["log"]["path"].get<std::string>());
     const auto events = file->events();
@@ -114,8 +114,8 @@ TEST_F(LogReplay, IsFoundWhereItsApproachTookLonger) {
   edit("far.toml", "approach_s = 3", "approach_s = 0.01");
   ASSERT_EQ(tandem("run far.toml --quiet --log again --json run.json").status, 0);
   const std::string run = json("run.json")["log"]["path"];
-  const log::Table recorded = columns(recording_, "/tandem/command");
-  const log::Table played = columns(run, "/tandem/command");
+  const log::TimeSeries recorded = columns(recording_, "/tandem/command");
+  const log::TimeSeries played = columns(run, "/tandem/command");
   const auto row = std::ranges::lower_bound(recorded.time_s, 2.5 - 1e-9) - recorded.time_s.begin();
   const auto at = static_cast<std::size_t>(row);
   std::size_t same = 0;  // the cycle with the same references
@@ -164,8 +164,8 @@ unit = "rad"
 TEST_F(LogReplay, PlaysAtHalfTheSpeed) {
   const std::string run = play(recording_, "--speed 0.5");
   EXPECT_EQ(json("replay.json")["speed"].get<double>(), 0.5);
-  const log::Table recorded = columns(recording_, "/tandem/command");
-  const log::Table played = columns(run, "/tandem/command");
+  const log::TimeSeries recorded = columns(recording_, "/tandem/command");
+  const log::TimeSeries played = columns(run, "/tandem/command");
   const double from_s = 1e-9 * json("replay.json")["from_ns"].get<double>();
   const double to_s = 1e-9 * json("replay.json")["to_ns"].get<double>();
   const double begin_s = start_of(played) + kLead_s;

@@ -14,7 +14,7 @@ TEST_F(RunLog, HasTheFilesThatAreRun) {
   const std::vector<std::string> names{"hold.toml", "robot.toml", "double_pendulum.urdf"};
   std::vector<std::string> texts;
   for (const std::string& name : names) texts.push_back(read_text(folder_ / name));
-  auto composition = runtime::composed<Composition>((folder_ / "hold.toml").string(), {});
+  auto composition = runtime::composed<WiredComposition>((folder_ / "hold.toml").string(), {});
   ASSERT_TRUE(composition) << composition.error().front().to_string();
   for (const std::string& name : names) write_text(folder_ / name, "another by now\n");
   auto recorder = open_log(**composition, (folder_ / "runs").string());

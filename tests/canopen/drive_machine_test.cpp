@@ -6,14 +6,14 @@
 namespace tandem::canopen {
 namespace {
 
-using enum DriveState;
+using enum DriveMachineState;
 
 struct Drive : testing::Test {
   DriveMachine drive;
   DriveInputs inputs;
   DriveOptions options;
 
-  DriveState step(int word) {
+  DriveMachineState step(int word) {
     return drive.step(static_cast<std::uint16_t>(word), inputs, options);
   }
   void enable() {
@@ -156,7 +156,7 @@ TEST_F(Drive, WithBit7NoOtherBitIsACommand) {
     for (int bits = 0; bits < 0x10; ++bits) {
       drive.reset();
       for (const int word : path) step(word);
-      const DriveState before = drive.state();
+      const DriveMachineState before = drive.state();
       const DriveMotion motion = drive.motion();
       for (int k = 0; k < 3; ++k) step(0x80 | bits);
       EXPECT_EQ(drive.state(), before) << std::hex << bits;
@@ -263,12 +263,12 @@ TEST_F(Drive, ShowsTheInputsInItsStatusword) {
 }
 
 TEST_F(Drive, TheMastersControlwordsLeadToOperationEnabled) {
-  std::vector<DriveState> path;
+  std::vector<DriveMachineState> path;
   for (int i = 0; i < 5; ++i) {
     path.push_back(step(controlword_towards_enabled(drive_state(drive.statusword()))));
   }
-  EXPECT_EQ(path, (std::vector<DriveState>{kSwitchOnDisabled, kReadyToSwitchOn, kSwitchedOn,
-                                           kOperationEnabled, kOperationEnabled}));
+  EXPECT_EQ(path, (std::vector<DriveMachineState>{kSwitchOnDisabled, kReadyToSwitchOn, kSwitchedOn,
+                                                  kOperationEnabled, kOperationEnabled}));
 }
 
 TEST_F(Drive, ArchiveRestoresARampInProgress) {
@@ -287,7 +287,7 @@ TEST_F(Drive, ArchiveRestoresARampInProgress) {
 
 struct Braked : Drive {
   Braked() { inputs.has_brake = true; }
-  DriveState step(int word, bool moved) {
+  DriveMachineState step(int word, bool moved) {
     inputs.brake_moved = moved;
     return Drive::step(word);
   }
@@ -326,7 +326,7 @@ TEST_F(Braked, KeepsTheBridgeUntilTheBrakeHoldsAfterEveryRamp) {
   struct Case {
     int word;
     bool fault;
-    DriveState during, after;
+    DriveMachineState during, after;
   };
   for (const Case& one : {Case{0x02, false, kQuickStopActive, kSwitchOnDisabled},
                           Case{0x07, false, kOperationEnabled, kSwitchedOn},

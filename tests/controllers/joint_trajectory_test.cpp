@@ -22,8 +22,8 @@ position_rad = [1.2, 0.0]
 )";
 
 TEST(Quintic, MeetsBothEndsAndIsItsOwnDerivative) {
-  const Motion from{0.3, -0.4, 0.0}, to{1.0, 0.7, 0.0};
-  const Motion first = quintic(from, to, 2.0, 0.0), last = quintic(from, to, 2.0, 2.0);
+  const TrajectoryPoint from{0.3, -0.4, 0.0}, to{1.0, 0.7, 0.0};
+  const TrajectoryPoint first = quintic(from, to, 2.0, 0.0), last = quintic(from, to, 2.0, 2.0);
   EXPECT_NEAR(first.position, 0.3, 1e-12);
   EXPECT_NEAR(first.velocity, -0.4, 1e-12);
   EXPECT_NEAR(last.position, 1.0, 1e-12);
@@ -32,8 +32,9 @@ TEST(Quintic, MeetsBothEndsAndIsItsOwnDerivative) {
   EXPECT_NEAR(last.acceleration, 0.0, 1e-12);
   const double h = 1e-6;
   for (const double t : {0.2, 0.9, 1.7}) {
-    const Motion before = quintic(from, to, 2.0, t - h), after = quintic(from, to, 2.0, t + h);
-    const Motion now = quintic(from, to, 2.0, t);
+    const TrajectoryPoint before = quintic(from, to, 2.0, t - h),
+                          after = quintic(from, to, 2.0, t + h);
+    const TrajectoryPoint now = quintic(from, to, 2.0, t);
     EXPECT_NEAR(now.velocity, (after.position - before.position) / (2 * h), 1e-8);
     EXPECT_NEAR(now.acceleration, (after.velocity - before.velocity) / (2 * h), 1e-7);
   }
@@ -198,11 +199,11 @@ TEST(JointTrajectory, GoesOnFromASnapshot) {
 }
 
 TEST(Segment, MeetsEverythingThatAPlannersPointSaysAndIsItsOwnDerivative) {
-  const Motion from{0.3, -0.4, 0.9}, to{1.0, 0.7, -1.3};
+  const TrajectoryPoint from{0.3, -0.4, 0.9}, to{1.0, 0.7, -1.3};
   const double h = 1e-6, T = 0.5;
   for (const auto& piece : {quintic_through, cubic}) {
     const bool bends = piece == quintic_through;
-    const Motion first = piece(from, to, T, 0.0), last = piece(from, to, T, T);
+    const TrajectoryPoint first = piece(from, to, T, 0.0), last = piece(from, to, T, T);
     EXPECT_NEAR(first.position, 0.3, 1e-12);
     EXPECT_NEAR(first.velocity, -0.4, 1e-12);
     EXPECT_NEAR(last.position, 1.0, 1e-12);
@@ -212,8 +213,8 @@ TEST(Segment, MeetsEverythingThatAPlannersPointSaysAndIsItsOwnDerivative) {
       EXPECT_NEAR(last.acceleration, -1.3, 1e-11);
     }
     for (const double t : {0.1, 0.25, 0.4}) {
-      const Motion before = piece(from, to, T, t - h), after = piece(from, to, T, t + h);
-      const Motion now = piece(from, to, T, t);
+      const TrajectoryPoint before = piece(from, to, T, t - h), after = piece(from, to, T, t + h);
+      const TrajectoryPoint now = piece(from, to, T, t);
       EXPECT_NEAR(now.velocity, (after.position - before.position) / (2 * h), 1e-7);
       EXPECT_NEAR(now.acceleration, (after.velocity - before.velocity) / (2 * h), 1e-6);
     }

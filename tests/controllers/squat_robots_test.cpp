@@ -94,7 +94,7 @@ TEST_P(SquatRobots, TheWholeSquatRunsWithinEveryLimit) {
   while (code == Code::kOk) {
     code = run.step();
     for (std::size_t j = 0; j < run.robot.joints.size(); ++j) {
-      const hal::Joint& joint = run.robot.joints[j];
+      const hal::DrivenJoint& joint = run.robot.joints[j];
       ASSERT_GE(run.command.position_rad()[j], joint.min_position_rad) << joint.name;
       ASSERT_LE(run.command.position_rad()[j], joint.max_position_rad) << joint.name;
       ASSERT_LE(std::abs(run.command.velocity_rad_s()[j]), joint.max_velocity_rad_s);

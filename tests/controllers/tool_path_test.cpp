@@ -64,7 +64,7 @@ TEST(ToolPath, KeepsTheJointsSpeedAndRange) {
   for (int i = 0; i < 5000; ++i) {
     ASSERT_EQ(run.step(), Code::kOk);
     for (std::size_t j = 0; j < before.size(); ++j) {
-      const hal::Joint& joint = run.robot.joints[j];
+      const hal::DrivenJoint& joint = run.robot.joints[j];
       const double now = run.command.position_rad()[j];
       ASSERT_LE(std::abs(now - before[j]), joint.max_velocity_rad_s * 1e-3 + 1e-12) << i;
       ASSERT_GE(now, joint.min_position_rad);

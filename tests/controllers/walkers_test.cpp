@@ -64,7 +64,7 @@ class Walkers : public testing::TestWithParam<Walker> {
     ASSERT_TRUE(stance.solve(height - down_m, 50).converged) << down_m;
     ASSERT_TRUE(stance.solve(height - down_m, 50).converged) << down_m;
   }
-  [[nodiscard]] std::vector<Foot> feet() const {
+  [[nodiscard]] std::vector<FootContact> feet() const {
     return find_feet(hal::robot_of(one.robot), kernels, foot_names(hal::robot_of(one.robot)))
         .value();
   }
@@ -103,7 +103,7 @@ TEST_P(Walkers, AreCarriedByTheirFeetAlone) {
   const std::vector<double> rest(kernels.nv);
   stance.carry(rest);
   // The same once more, with the forces on the points as wrenches on the feet.
-  const std::vector<Foot> all = feet();
+  const std::vector<FootContact> all = feet();
   Support support(all);
   std::vector<double> pose(12UL * kernels.sites), twist(6UL * kernels.sites), acc(twist);
   std::vector<double> J(6UL * kernels.nv * kernels.sites), tau(kernels.nv);
@@ -172,7 +172,7 @@ class SupportTest : public testing::Test {
   };
   static std::vector<Eigen::Vector3d> share(const std::vector<std::array<double, 2>>& places,
                                             const Load& load) {
-    std::vector<Foot> feet;
+    std::vector<FootContact> feet;
     std::vector<double> pose;
     for (const auto& at : places) {
       feet.push_back({.name = "foot", .site = feet.size(), .points_m = {{0, 0, 0}}});
@@ -250,10 +250,10 @@ TEST_F(SupportTest, PushAndTurnAreSharedAsTheFeetCarry) {
 TEST(Feet, HaveTheShapeOfTheirPoints) {
   const auto shape = [](std::vector<std::array<double, 3>> points) {
     test::WalkerRobot one(Walker{"", 1, kThree, std::move(points)});
-    const Foot foot = find_feet(hal::robot_of(one.robot), *one.kernels.get(),
-                                foot_names(hal::robot_of(one.robot)))
-                          .value()
-                          .front();
+    const FootContact foot = find_feet(hal::robot_of(one.robot), *one.kernels.get(),
+                                       foot_names(hal::robot_of(one.robot)))
+                                 .value()
+                                 .front();
     return std::pair{foot.shape, foot.axis};
   };
   EXPECT_EQ(shape(kBall).first, FootShape::kPoint);

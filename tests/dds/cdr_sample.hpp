@@ -49,7 +49,7 @@ class CdrWriter {
       number(filling_.next());
       number(filling_.next());
     }
-    for (const Field& field : definition.fields) {
+    for (const MessageField& field : definition.fields) {
       std::uint64_t count = field.repeat == Repeat::kOne ? 1 : field.capacity;
       if (field.repeat == Repeat::kSequence || field.repeat == Repeat::kBoundedSequence) {
         count = filling_.elements();
@@ -60,22 +60,22 @@ class CdrWriter {
     }
   }
 
-  void element(const Field& field) {
-    if (field.type == FieldType::kMessage) return message(*field.message);
+  void element(const MessageField& field) {
+    if (field.type == MessageFieldType::kMessage) return message(*field.message);
     const std::uint64_t n = filling_.next();
     switch (field.type) {
-      case FieldType::kInt8:
-      case FieldType::kUint8:
-      case FieldType::kByte: return number(static_cast<std::uint8_t>(n));
-      case FieldType::kInt16:
-      case FieldType::kUint16: return number(static_cast<std::uint16_t>(n));
-      case FieldType::kInt32:
-      case FieldType::kUint32: return number(static_cast<std::uint32_t>(n));
-      case FieldType::kInt64:
-      case FieldType::kUint64: return number(n);
-      case FieldType::kFloat32: return number(static_cast<float>(n) / 4.0f);
-      case FieldType::kFloat64: return number(static_cast<double>(n) / 4.0);
-      case FieldType::kBool: return number(static_cast<std::uint8_t>(n % 2));
+      case MessageFieldType::kInt8:
+      case MessageFieldType::kUint8:
+      case MessageFieldType::kByte: return number(static_cast<std::uint8_t>(n));
+      case MessageFieldType::kInt16:
+      case MessageFieldType::kUint16: return number(static_cast<std::uint16_t>(n));
+      case MessageFieldType::kInt32:
+      case MessageFieldType::kUint32: return number(static_cast<std::uint32_t>(n));
+      case MessageFieldType::kInt64:
+      case MessageFieldType::kUint64: return number(n);
+      case MessageFieldType::kFloat32: return number(static_cast<float>(n) / 4.0f);
+      case MessageFieldType::kFloat64: return number(static_cast<double>(n) / 4.0);
+      case MessageFieldType::kBool: return number(static_cast<std::uint8_t>(n % 2));
       default: return text(fmt::format("s{}", n));
     }
   }

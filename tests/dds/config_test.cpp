@@ -93,7 +93,7 @@ TEST(DdsConfig, OfEveryTopicIsDocumented) {
   std::ifstream in(TANDEM_SOURCE_DIR "/docs/configuration.md");
   std::ostringstream page;
   page << in.rdbuf();
-  for (const TopicRate& rate : kTopicRates) {
+  for (const TopicPeriod& rate : kTopicPeriods) {
     std::string key(1, '`');
     key.append(rate.key).append(1, '`');
     EXPECT_NE(page.str().find(key), std::string::npos) << key;

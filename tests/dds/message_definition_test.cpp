@@ -102,7 +102,7 @@ TEST(MessageDefinition, OfOursHasNamesThatRos2Allows) {
   for (const MessageDefinition& one : definitions()) {
     if (!one.name.starts_with("tandem_msgs/")) continue;
     EXPECT_TRUE(std::regex_match(one.name, type_name)) << one.name;
-    for (const Field& field : one.fields) {
+    for (const MessageField& field : one.fields) {
       EXPECT_TRUE(std::regex_match(field.name, field_name)) << one.name << ": " << field.name;
     }
   }
@@ -127,13 +127,13 @@ TEST(MessageDefinition, ReadsEveryFormOfAField) {
                                      "std_msgs/Header other\n");
   ASSERT_TRUE(read) << read.error().to_string();
   ASSERT_EQ(read->size(), 1u);
-  const std::vector<Field>& fields = read->front().fields;
+  const std::vector<MessageField>& fields = read->front().fields;
   ASSERT_EQ(fields.size(), 5u);
-  EXPECT_EQ(fields[0].type, FieldType::kFloat64);
-  EXPECT_EQ(fields[1].type, FieldType::kUint8);
+  EXPECT_EQ(fields[0].type, MessageFieldType::kFloat64);
+  EXPECT_EQ(fields[1].type, MessageFieldType::kUint8);
   EXPECT_EQ(fields[1].repeat, Repeat::kArray);
   EXPECT_EQ(fields[1].capacity, 4u);
-  EXPECT_EQ(fields[2].type, FieldType::kBoundedString);
+  EXPECT_EQ(fields[2].type, MessageFieldType::kBoundedString);
   EXPECT_EQ(fields[2].string_capacity, 8u);
   EXPECT_EQ(fields[2].repeat, Repeat::kBoundedSequence);
   EXPECT_EQ(fields[2].capacity, 2u);
@@ -159,25 +159,25 @@ TEST(MessageDefinition, RefusesWhatIsNoneWithItsLine) {
 
 // ---- the IDL of idlc and the definitions are two texts of one thing ----
 
-std::string idl_element(const Field& field) {
+std::string idl_element(const MessageField& field) {
   switch (field.type) {
-    case FieldType::kMessage: {
+    case MessageFieldType::kMessage: {
       return field.message_name.substr(field.message_name.rfind('/') + 1) + "_";
     }
-    case FieldType::kInt8: return "int8";
-    case FieldType::kUint8:
-    case FieldType::kByte: return "octet";
-    case FieldType::kInt16: return "short";
-    case FieldType::kUint16: return "unsigned short";
-    case FieldType::kInt32: return "long";
-    case FieldType::kUint32: return "unsigned long";
-    case FieldType::kInt64: return "long long";
-    case FieldType::kUint64: return "unsigned long long";
-    case FieldType::kFloat32: return "float";
-    case FieldType::kFloat64: return "double";
-    case FieldType::kBool: return "boolean";
-    case FieldType::kString: return "string";
-    case FieldType::kBoundedString: return fmt::format("string<{}>", field.string_capacity);
+    case MessageFieldType::kInt8: return "int8";
+    case MessageFieldType::kUint8:
+    case MessageFieldType::kByte: return "octet";
+    case MessageFieldType::kInt16: return "short";
+    case MessageFieldType::kUint16: return "unsigned short";
+    case MessageFieldType::kInt32: return "long";
+    case MessageFieldType::kUint32: return "unsigned long";
+    case MessageFieldType::kInt64: return "long long";
+    case MessageFieldType::kUint64: return "unsigned long long";
+    case MessageFieldType::kFloat32: return "float";
+    case MessageFieldType::kFloat64: return "double";
+    case MessageFieldType::kBool: return "boolean";
+    case MessageFieldType::kString: return "string";
+    case MessageFieldType::kBoundedString: return fmt::format("string<{}>", field.string_capacity);
   }
   return "";
 }
@@ -188,7 +188,7 @@ std::string idl_members(const MessageDefinition& definition) {
   if (definition.request_or_response) {
     out = "unsigned long long request_guid; long long request_sequence;";
   }
-  for (const Field& field : definition.fields) {
+  for (const MessageField& field : definition.fields) {
     const std::string element = idl_element(field);
     if (!out.empty()) out += " ";
     switch (field.repeat) {
@@ -233,7 +233,7 @@ std::map<std::string, std::string> structures() {
 TEST(MessageDefinition, HasFieldNamesThatRos2Allows) {
   const std::regex allowed("[a-z](_?[a-z0-9]+)*");
   for (const MessageDefinition& definition : definitions()) {
-    for (const Field& field : definition.fields) {
+    for (const MessageField& field : definition.fields) {
       EXPECT_TRUE(std::regex_match(field.name, allowed)) << definition.name << ": " << field.name;
     }
   }

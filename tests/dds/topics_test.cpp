@@ -211,7 +211,7 @@ TEST(ImageMessages, HaveEveryFieldOfTheImages) {
     const MessageDefinition* definition = find_definition(name);
     ASSERT_NE(definition, nullptr);
     for (const hal::Field& field : image->layout().fields()) {
-      const auto found = std::ranges::find(definition->fields, field.name, &Field::name);
+      const auto found = std::ranges::find(definition->fields, field.name, &MessageField::name);
       ASSERT_NE(found, definition->fields.end()) << name << " has no " << field.name;
       const bool one = found->repeat == Repeat::kOne;
       EXPECT_EQ(one, field.count == 1) << field.name;

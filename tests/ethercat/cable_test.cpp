@@ -17,7 +17,7 @@ using hal::ecat::FrameBuffer;
 using hal::ecat::PacketLink;
 
 /// Carries each frame over the cable to the slaves and back before it returns.
-class CableLink final : public hal::ecat::Link {
+class CableLink final : public hal::ecat::DataLink {
  public:
   CableLink(PacketLink& near, PacketLink& far, ethercat::Medium& slaves)
       : near_(&near), far_(&far), slaves_(&slaves), frames_(64) {}
@@ -66,7 +66,7 @@ class CableLink final : public hal::ecat::Link {
 
 /// A start and 50 cycles; every frame as it came to the slaves and as it left them.
 template <class SetTime>
-std::vector<Bytes> run(LineRig& rig, Tamper& tamper, hal::ecat::Link& link, SetTime set_time) {
+std::vector<Bytes> run(LineRig& rig, Tamper& tamper, hal::ecat::DataLink& link, SetTime set_time) {
   tamper.record = true;
   tamper.reserve(10'000);
   auto master = std::move(*hal::ecat::LineMaster::create(link, std::vector(3, rig_plan())));

@@ -33,7 +33,7 @@ FrameBuffer count_slaves(std::uint8_t index) {
 }
 
 /// Index and working counter of each frame that has come.
-std::vector<std::pair<int, int>> come(hal::ecat::Link& link) {
+std::vector<std::pair<int, int>> come(hal::ecat::DataLink& link) {
   std::vector<std::pair<int, int>> all;
   std::vector<FrameBuffer> frames(8);
   const std::size_t count = link.receive(frames);

@@ -213,9 +213,9 @@ TEST_F(MasterFault, ASecondMasterThatTakesTheSlavesIsNoticed) {
 }
 
 /// Makes frames another master's, and hands on the last one first.
-class SharedLink final : public hal::ecat::Link {
+class SharedLink final : public hal::ecat::DataLink {
  public:
-  explicit SharedLink(hal::ecat::Link& link) : link_(&link) {}
+  explicit SharedLink(hal::ecat::DataLink& link) : link_(&link) {}
   std::size_t send(std::span<const hal::ecat::FrameBuffer> frames) noexcept override {
     return link_->send(frames);
   }
@@ -234,7 +234,7 @@ class SharedLink final : public hal::ecat::Link {
   bool once = false;  ///< the next frame alone
 
  private:
-  hal::ecat::Link* link_;
+  hal::ecat::DataLink* link_;
 };
 
 /// A master of one slave behind such a link.

@@ -11,7 +11,7 @@
 namespace tandem::firmware::testing {
 namespace {
 
-using canopen::DriveState;
+using canopen::DriveMachineState;
 using canopen::Frame;
 
 TEST(Board, SaysBootUpAndAnswersWhoItIs) {
@@ -87,7 +87,7 @@ TEST(Board, TakesACommandAtTheSyncAfterIt) {
   EXPECT_EQ(rig.object<std::int32_t>(0x607A), 0x12345678);
   EXPECT_EQ(rig.object<std::int32_t>(0x60B1), -2);
   EXPECT_EQ(rig.object<std::int16_t>(0x60B2), -200);
-  EXPECT_EQ(rig.state(), DriveState::kReadyToSwitchOn);
+  EXPECT_EQ(rig.state(), DriveMachineState::kReadyToSwitchOn);
 }
 
 TEST(Board, IgnoresAndCountsWhatIsNoDataFrame) {
@@ -236,16 +236,16 @@ TEST(Board, RunsSeveralAxesEachWithItsOwnFault) {
   }
   rig.cycles(1500);
   for (int a = 0; a < 4; ++a) {
-    EXPECT_EQ(rig.state(a), DriveState::kOperationEnabled);
+    EXPECT_EQ(rig.state(a), DriveMachineState::kOperationEnabled);
     EXPECT_NEAR(rig.joints[a].torque(), 2.0 * a, 0.05);
   }
   rig.seen.clear();
   rig.joints[2].temperature_C = 150.0;
   rig.cycles(1200);
-  EXPECT_EQ(rig.state(2), DriveState::kFault);
+  EXPECT_EQ(rig.state(2), DriveMachineState::kFault);
   EXPECT_EQ(rig.error(2), 0x4310);
-  EXPECT_EQ(rig.state(1), DriveState::kOperationEnabled);
-  EXPECT_EQ(rig.state(3), DriveState::kOperationEnabled);
+  EXPECT_EQ(rig.state(1), DriveMachineState::kOperationEnabled);
+  EXPECT_EQ(rig.state(3), DriveMachineState::kOperationEnabled);
   const auto emergencies = rig.frames_of(0x085);
   ASSERT_EQ(emergencies.size(), 1U);
   EXPECT_EQ(emergencies[0].data[3], 2);  // the axis

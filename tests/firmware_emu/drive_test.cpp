@@ -8,7 +8,7 @@
 namespace tandem::firmware::testing {
 namespace {
 
-using canopen::DriveState;
+using canopen::DriveMachineState;
 
 struct Drive : ::testing::Test {
   Drive() { rig.start(); }
@@ -16,47 +16,47 @@ struct Drive : ::testing::Test {
     rig.commands[0].controlword = word;
     rig.cycles(cycles);
   }
-  [[nodiscard]] DriveState state() const { return rig.state(); }
+  [[nodiscard]] DriveMachineState state() const { return rig.state(); }
   [[nodiscard]] bool bridge() const { return rig.drives[0].enabled; }
   Rig rig;
 };
 
 TEST_F(Drive, StartsDisabledByItself) {  // 0, 1
   order(0x00);
-  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchOnDisabled);
   EXPECT_EQ(rig.statusword() & 0x4F, 0x40);
 }
 
 TEST_F(Drive, GoesUpAndDownOneStateAtATime) {  // 2, 3, 6, 7
   order(0x06);
-  EXPECT_EQ(state(), DriveState::kReadyToSwitchOn);
+  EXPECT_EQ(state(), DriveMachineState::kReadyToSwitchOn);
   EXPECT_EQ(rig.statusword() & 0x6F, 0x21);
   order(0x07);
-  EXPECT_EQ(state(), DriveState::kSwitchedOn);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchedOn);
   EXPECT_EQ(rig.statusword() & 0x6F, 0x23);
   EXPECT_FALSE(bridge());
   order(0x06);
-  EXPECT_EQ(state(), DriveState::kReadyToSwitchOn);
+  EXPECT_EQ(state(), DriveMachineState::kReadyToSwitchOn);
   order(0x00);
-  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchOnDisabled);
 }
 
 TEST_F(Drive, GoesFromSwitchedOnToDisabledOnDisableVoltageAndQuickStop) {  // 10
   order(0x06);
   order(0x07);
   order(0x02);
-  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchOnDisabled);
   order(0x06);
   order(0x07);
   order(0x00);
-  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchOnDisabled);
 }
 
 TEST_F(Drive, ClosesTheBridgeInOperationEnabledOnly) {  // 4
   order(0x06);
   order(0x07);
   order(0x0F);
-  EXPECT_EQ(state(), DriveState::kOperationEnabled);
+  EXPECT_EQ(state(), DriveMachineState::kOperationEnabled);
   EXPECT_EQ(rig.statusword() & 0x6F, 0x27);
   EXPECT_TRUE(bridge());
 }
@@ -65,7 +65,7 @@ TEST_F(Drive, OpensTheBridgeAtOnceOnDisableVoltage) {  // 9
   rig.enable();
   order(0x00, 1);  // takes effect at the next SYNC
   order(0x00, 1);
-  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchOnDisabled);
   EXPECT_FALSE(bridge());
   EXPECT_EQ(rig.drives[0].voltage_V, 0.0);
 }
@@ -73,7 +73,7 @@ TEST_F(Drive, OpensTheBridgeAtOnceOnDisableVoltage) {  // 9
 TEST_F(Drive, OpensTheBridgeAtOnceOnShutdown) {  // 8, option 605B = 0
   rig.enable();
   order(0x06, 2);
-  EXPECT_EQ(state(), DriveState::kReadyToSwitchOn);
+  EXPECT_EQ(state(), DriveMachineState::kReadyToSwitchOn);
   EXPECT_FALSE(bridge());
 }
 
@@ -83,10 +83,10 @@ TEST_F(Drive, ComesToRestBeforeItDisablesOperation) {  // 5, option 605C = 1
   rig.cycles(30);
   ASSERT_GT(rig.joints[0].w, 0.3);
   order(0x07, 4);
-  EXPECT_EQ(state(), DriveState::kOperationEnabled);  // still stopping
+  EXPECT_EQ(state(), DriveMachineState::kOperationEnabled);  // still stopping
   EXPECT_TRUE(bridge());
   order(0x07, 1100);
-  EXPECT_EQ(state(), DriveState::kSwitchedOn);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchedOn);
   EXPECT_FALSE(bridge());
 }
 
@@ -94,7 +94,7 @@ TEST_F(Drive, DisablesOperationAtOnceByOption) {  // 5, option 605C = 0
   ASSERT_EQ(rig.write<std::int16_t>(0x605C, 0, 0), 0U);
   rig.enable();
   order(0x07, 2);
-  EXPECT_EQ(state(), DriveState::kSwitchedOn);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchedOn);
 }
 
 TEST_F(Drive, BrakesOnQuickStopThenDisables) {  // 11, 12, option 605A = 2
@@ -102,10 +102,10 @@ TEST_F(Drive, BrakesOnQuickStopThenDisables) {  // 11, 12, option 605A = 2
   ASSERT_EQ(rig.write<std::int16_t>(0x2012, 0, 2000), 0U);
   rig.cycles(30);
   order(0x02, 3);
-  EXPECT_EQ(state(), DriveState::kQuickStopActive);
+  EXPECT_EQ(state(), DriveMachineState::kQuickStopActive);
   EXPECT_TRUE(bridge());
   order(0x02, 1100);
-  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchOnDisabled);
   EXPECT_FALSE(bridge());
 }
 
@@ -113,10 +113,10 @@ TEST_F(Drive, StaysInQuickStopByOptionAndComesBack) {  // 16, option 605A = 6
   ASSERT_EQ(rig.write<std::int16_t>(0x605A, 0, 6), 0U);
   rig.enable();
   order(0x02, 2000);
-  EXPECT_EQ(state(), DriveState::kQuickStopActive);
+  EXPECT_EQ(state(), DriveMachineState::kQuickStopActive);
   EXPECT_EQ(rig.drives[0].voltage_V, 0.0);
   order(0x0F, 3);
-  EXPECT_EQ(state(), DriveState::kOperationEnabled);
+  EXPECT_EQ(state(), DriveMachineState::kOperationEnabled);
 }
 
 /// A link with inertia that a load pulls, in velocity control at 0.5 rad/s upwards.
@@ -150,7 +150,7 @@ TEST(QuickStop, RampsDownAtTheDecelerationOf6085AndHolds) {
   const double first = one.travel(0x02, 250);
   EXPECT_NEAR(one.rig.joints[0].v, 0.25, 0.1) << "half of the ramp";
   EXPECT_NEAR(first + one.travel(0x02, 750), kRampWay_rad, 0.03);
-  EXPECT_EQ(one.rig.state(), DriveState::kQuickStopActive);
+  EXPECT_EQ(one.rig.state(), DriveMachineState::kQuickStopActive);
   EXPECT_NEAR(one.travel(0x02, 500), 0.0, 0.005) << "the load does not move it";
   EXPECT_EQ(one.rig.statusword() & 0x0400, 0x0400);
 }
@@ -166,16 +166,16 @@ TEST(QuickStop, KeepsTheTorqueWhileItRampsThenSinksAndIsDisabled) {
   EXPECT_NEAR(way, kRampWay_rad, 0.03);
   EXPECT_GT(ms, 400);
   EXPECT_EQ(motion(), canopen::DriveMotion::kShorted);
-  EXPECT_EQ(one.rig.state(), DriveState::kQuickStopActive);
+  EXPECT_EQ(one.rig.state(), DriveMachineState::kQuickStopActive);
   one.travel(0x02, 1000);
-  EXPECT_EQ(one.rig.state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(one.rig.state(), DriveMachineState::kSwitchOnDisabled);
   EXPECT_FALSE(one.rig.drives[0].enabled);
 }
 
 TEST(QuickStop, HaltOnTheRampHoldsInVelocityControl) {
   Loaded one(0x605D, 2);
   one.travel(0x10F, 1000);
-  EXPECT_EQ(one.rig.state(), DriveState::kOperationEnabled);
+  EXPECT_EQ(one.rig.state(), DriveMachineState::kOperationEnabled);
   EXPECT_NEAR(one.travel(0x10F, 500), 0.0, 0.005);
   EXPECT_EQ(one.rig.statusword() & 0x0400, 0x0400);
   EXPECT_GT(one.travel(0x0F, 1500), 0.3) << "and goes on";
@@ -201,7 +201,7 @@ TEST_F(Drive, DisablesAtOnceOnQuickStopByOption) {  // 11 with option 605A = 0
   ASSERT_EQ(rig.write<std::int16_t>(0x605A, 0, 0), 0U);
   rig.enable();
   order(0x02, 2);
-  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchOnDisabled);
 }
 
 TEST_F(Drive, HoldsOnHaltAndGoesOnAfterwards) {
@@ -209,7 +209,7 @@ TEST_F(Drive, HoldsOnHaltAndGoesOnAfterwards) {
   rig.commands[0].torque_offset = 100;
   rig.cycles(200);
   order(0x10F, 500);
-  EXPECT_EQ(state(), DriveState::kOperationEnabled);
+  EXPECT_EQ(state(), DriveMachineState::kOperationEnabled);
   EXPECT_NEAR(rig.joints[0].w, 0.0, 0.02);
   rig.joints[0].q += 0.001;
   order(0x0F, 3000);
@@ -220,16 +220,16 @@ TEST_F(Drive, ReactsToAFaultThenWaitsForTheResetEdge) {  // 13, 14, 15
   rig.enable();
   rig.joints[0].temperature_C = 200.0;
   rig.cycle();
-  EXPECT_EQ(state(), DriveState::kFaultReactionActive);
+  EXPECT_EQ(state(), DriveMachineState::kFaultReactionActive);
   EXPECT_TRUE(bridge());
   rig.cycles(1100);
-  EXPECT_EQ(state(), DriveState::kFault);
+  EXPECT_EQ(state(), DriveMachineState::kFault);
   EXPECT_FALSE(bridge());
   rig.joints[0].temperature_C = 25.0;
   order(0x0F, 10);
-  EXPECT_EQ(state(), DriveState::kFault);
+  EXPECT_EQ(state(), DriveMachineState::kFault);
   order(0x80, 3);
-  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchOnDisabled);
   EXPECT_EQ(rig.error(), 0);
 }
 
@@ -238,7 +238,7 @@ TEST_F(Drive, OpensTheBridgeAtOnceOnAFaultByOption) {  // 14, option 605E = 0
   rig.enable();
   rig.joints[0].temperature_C = 200.0;
   rig.cycles(2);
-  EXPECT_EQ(state(), DriveState::kFault);
+  EXPECT_EQ(state(), DriveMachineState::kFault);
   EXPECT_FALSE(bridge());
 }
 
@@ -253,7 +253,7 @@ TEST_F(Drive, SeedsTheReferenceWhereItIsWhenItIsEnabled) {
   rig.cycle();
   rig.send_commands = false;
   rig.cycle();
-  ASSERT_EQ(state(), DriveState::kOperationEnabled);
+  ASSERT_EQ(state(), DriveMachineState::kOperationEnabled);
   EXPECT_EQ(rig.object<std::int32_t>(0x607A), Rig::counts(0.4));
   EXPECT_LT(std::abs(rig.drives[0].voltage_V), 0.2);  // the stale reference would ask for 40 V
 }
@@ -276,7 +276,7 @@ TEST_F(Drive, LeavesNoTraceOfTheSessionAfterAnNmtReset) {
   rig.cycles(2);
   EXPECT_FALSE(bridge());
   EXPECT_EQ(rig.object<float>(0x2020, 1), 400.0F);
-  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(state(), DriveMachineState::kSwitchOnDisabled);
 }
 
 /// An axis with a brake that opens in 7 and closes in 5 periods.
@@ -301,7 +301,7 @@ TEST(Brake, OpensBeforeOperationIsEnabledAndClosesBeforeTheBridgeOpens) {
   rig.commands[0].controlword = 0x0F;
   rig.cycle();
   int open = 0;
-  for (; open < 50 && rig.state() != DriveState::kOperationEnabled; ++open) {
+  for (; open < 50 && rig.state() != DriveMachineState::kOperationEnabled; ++open) {
     rig.cycle();
     EXPECT_EQ(rig.drives[0].enabled, rig.drives[0].brake_open) << "it holds while it opens";
   }
@@ -316,7 +316,7 @@ TEST(Brake, OpensBeforeOperationIsEnabledAndClosesBeforeTheBridgeOpens) {
     ++until_off;
   }
   EXPECT_EQ(until_off - until_set, 5 + 1) << "5 ms with brake and bridge, then without";
-  EXPECT_EQ(rig.state(), DriveState::kSwitchedOn);
+  EXPECT_EQ(rig.state(), DriveMachineState::kSwitchedOn);
   EXPECT_EQ(set(), 1U);
 }
 
@@ -325,7 +325,7 @@ TEST(Brake, ClosesAtOnceWithTheBridgeInCategory0AndWithoutPower) {
   rig.start();
   rig.enable();
   rig.cycles(20);
-  ASSERT_EQ(rig.state(), DriveState::kOperationEnabled);
+  ASSERT_EQ(rig.state(), DriveMachineState::kOperationEnabled);
   rig.commands[0].controlword = 0x00;
   rig.cycle();
   rig.cycle();

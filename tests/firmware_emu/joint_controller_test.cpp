@@ -61,10 +61,10 @@ JointController settled(const canopen::DriveParameters& c, Mode mode, const Meas
   }
   JointController controller;
   controller.configure(quiet, kDt);
-  controller.update(Action::kFollow, mode, r, m);
-  controller.update(Action::kFollow, mode, r, m);
+  controller.update(BridgeAction::kFollow, mode, r, m);
+  controller.update(BridgeAction::kFollow, mode, r, m);
   controller.configure(c, kDt);
-  controller.update(Action::kFollow, mode, r, m);
+  controller.update(BridgeAction::kFollow, mode, r, m);
   return controller;
 }
 
@@ -80,7 +80,7 @@ void expect_law(Mode mode, const canopen::DriveParameters& c, double torque_ref,
                 double outer_I = 0.0) {
   JointController controller = settled(c, mode, measured(), reference());
   const double I = controller.torque_loop().state.i;
-  const double V = controller.update(Action::kFollow, mode, reference(), measured());
+  const double V = controller.update(BridgeAction::kFollow, mode, reference(), measured());
   EXPECT_NEAR(controller.terms().torque_reference_Nm, torque_ref + outer_I, 1.0e-12);
   EXPECT_NEAR(V, cascade(c, torque_ref + outer_I, measured(), I), 1.0e-12);
   EXPECT_NE(I, 0.0);
@@ -112,31 +112,32 @@ TEST(JointController, ObeysTheVelocityImpedanceLawAboutItsIntegratedReference) {
   JointController controller = settled(config(), Mode::kVelocityImpedance, measured(), reference());
   const double held = controller.terms().held_position_rad;
   EXPECT_NEAR(held, 0.3 + 3 * 0.5 * kDt, 1.0e-12);  // from where the joint was, three periods
-  controller.update(Action::kFollow, Mode::kVelocityImpedance, reference(), measured());
+  controller.update(BridgeAction::kFollow, Mode::kVelocityImpedance, reference(), measured());
   EXPECT_NEAR(controller.terms().torque_reference_Nm, 80.0 * (held - 0.3) + 6.0 * 0.3 + 2.0,
               1.0e-12);
 }
 
 TEST(JointController, GivesTheVoltageItIsTold) {
   JointController controller = settled(config(), Mode::kOpenLoop, measured(), reference());
-  EXPECT_DOUBLE_EQ(controller.update(Action::kFollow, Mode::kOpenLoop, reference(), measured()),
-                   6.0);
+  EXPECT_DOUBLE_EQ(
+      controller.update(BridgeAction::kFollow, Mode::kOpenLoop, reference(), measured()), 6.0);
 }
 
 TEST(JointController, ObeysTheCurrentLaw) {
   JointController controller = settled(config(), Mode::kCurrent, measured(), reference());
   const double I = controller.electrical_loop().state.i;
   EXPECT_NEAR(I, 40.0 * 1.8 * kDt, 1.0e-12);
-  EXPECT_NEAR(controller.update(Action::kFollow, Mode::kCurrent, reference(), measured()),
+  EXPECT_NEAR(controller.update(BridgeAction::kFollow, Mode::kCurrent, reference(), measured()),
               0.5 * 3.0 + 4.0 * 0.25 + 0.3 * 1.8 + I, 1.0e-12);
 }
 
 TEST(JointController, ShortsTheWindingInBrakeAndOpensTheBridgeInOff) {
   JointController controller = settled(config(), Mode::kCst, measured(), reference());
-  EXPECT_DOUBLE_EQ(controller.update(Action::kBrake, Mode::kCst, reference(), measured()),
+  EXPECT_DOUBLE_EQ(controller.update(BridgeAction::kBrake, Mode::kCst, reference(), measured()),
                    controller.terms().voltage_V);
-  EXPECT_DOUBLE_EQ(controller.update(Action::kBrake, Mode::kCst, reference(), measured()), 0.0);
-  EXPECT_DOUBLE_EQ(controller.update(Action::kOff, Mode::kCst, reference(), measured()), 0.0);
+  EXPECT_DOUBLE_EQ(controller.update(BridgeAction::kBrake, Mode::kCst, reference(), measured()),
+                   0.0);
+  EXPECT_DOUBLE_EQ(controller.update(BridgeAction::kOff, Mode::kCst, reference(), measured()), 0.0);
 }
 
 TEST(JointController, LimitsTheVoltageToTheSupplyAndToItsSetting) {
@@ -148,10 +149,10 @@ TEST(JointController, LimitsTheVoltageToTheSupplyAndToItsSetting) {
   Measurement m = measured();
   m.motor_velocity_rad_s = 6.0;  // the current is no limit here: 24 + 25 V
   JointController controller = settled(c, Mode::kOpenLoop, m, r);
-  EXPECT_DOUBLE_EQ(controller.update(Action::kFollow, Mode::kOpenLoop, r, m), 40.0);
+  EXPECT_DOUBLE_EQ(controller.update(BridgeAction::kFollow, Mode::kOpenLoop, r, m), 40.0);
   EXPECT_EQ(controller.terms().voltage_saturation, 1);
   m.bus_voltage_V = 30.0;
-  EXPECT_DOUBLE_EQ(controller.update(Action::kFollow, Mode::kOpenLoop, r, m), 30.0);
+  EXPECT_DOUBLE_EQ(controller.update(BridgeAction::kFollow, Mode::kOpenLoop, r, m), 30.0);
   EXPECT_TRUE(controller.limited());
 }
 
@@ -162,7 +163,7 @@ TEST(JointController, LimitsTheCurrentThatTheVoltageWouldDrive) {
   r.voltage_V = -30.0;
   const Measurement m = measured();
   JointController controller = settled(c, Mode::kOpenLoop, m, r);
-  const double V = controller.update(Action::kFollow, Mode::kOpenLoop, r, m);
+  const double V = controller.update(BridgeAction::kFollow, Mode::kOpenLoop, r, m);
   EXPECT_NEAR((V - 4.0 * m.motor_velocity_rad_s) / 0.5, -10.0, 1.0e-12);
   EXPECT_EQ(controller.terms().voltage_saturation, -1);
 }
@@ -189,7 +190,7 @@ TEST(JointController, TakesTheDrivingCurrentAwayTowardsTheVelocityLimitInEveryMo
             Case{1.1, 0.0}, Case{1.2, -0.5 * 15.0}, Case{2.0, -15.0}}) {
         m.link_velocity_rad_s = m.motor_velocity_rad_s = way * one.share * 5.0;
         JointController controller = settled(c, mode, m, r);
-        const double V = controller.update(Action::kFollow, mode, r, m);
+        const double V = controller.update(BridgeAction::kFollow, mode, r, m);
         EXPECT_NEAR(way * (V - 4.0 * m.motor_velocity_rad_s) / 0.5, one.most_A, 1e-9)
             << static_cast<int>(mode) << " " << way << " " << one.share;
         EXPECT_TRUE(controller.limited());
@@ -233,7 +234,7 @@ TEST(JointController, LetsAJointThatStandsOutsideOfItsRangeStayAndComeInButNotGo
   controller.configure(c, kDt);
   const auto error = [&](double position_rad) {
     r.position_rad = position_rad;
-    controller.update(Action::kFollow, Mode::kCsp, r, m);
+    controller.update(BridgeAction::kFollow, Mode::kCsp, r, m);
     return controller.terms().position_error_rad + m.link_position_rad;
   };
   EXPECT_DOUBLE_EQ(error(1.8), 1.8) << "no jump to 1.5";
@@ -253,7 +254,8 @@ TEST(JointController, WindsUpNoIntegralOfTheCascadeAgainstTheVoltage) {
   JointController controller = settled(c, Mode::kCsp, measured(), r);
   const double position_I = controller.position_loop().state.i;
   const double torque_I = controller.torque_loop().state.i;
-  for (int k = 0; k < 2000; ++k) controller.update(Action::kFollow, Mode::kCsp, r, measured());
+  for (int k = 0; k < 2000; ++k)
+    controller.update(BridgeAction::kFollow, Mode::kCsp, r, measured());
   EXPECT_EQ(controller.terms().voltage_saturation, 1);
   EXPECT_DOUBLE_EQ(controller.position_loop().state.i, position_I);
   EXPECT_DOUBLE_EQ(controller.torque_loop().state.i, torque_I);
@@ -265,7 +267,7 @@ TEST(JointController, WindsUpNoIntegralAgainstTheTorqueLimit) {
   JointController controller = settled(c, Mode::kCsp, measured(), reference());
   const double I = controller.position_loop().state.i;
   for (int k = 0; k < 2000; ++k) {
-    controller.update(Action::kFollow, Mode::kCsp, reference(), measured());
+    controller.update(BridgeAction::kFollow, Mode::kCsp, reference(), measured());
   }
   EXPECT_DOUBLE_EQ(controller.position_loop().state.i, I);
   EXPECT_DOUBLE_EQ(controller.terms().torque_reference_Nm, 3.0);
@@ -276,7 +278,7 @@ TEST(JointController, DoesNotRunAwayFromABlockedJointInVelocityImpedance) {
   c.torque_limit_Nm = 10.0;
   JointController controller = settled(c, Mode::kVelocityImpedance, measured(), reference());
   for (int k = 0; k < 20000; ++k) {
-    controller.update(Action::kFollow, Mode::kVelocityImpedance, reference(), measured());
+    controller.update(BridgeAction::kFollow, Mode::kVelocityImpedance, reference(), measured());
   }
   EXPECT_LT(80.0 * (controller.terms().held_position_rad - 0.3), 10.0);
 }
@@ -298,12 +300,13 @@ TEST(JointController, ChangesBetweenAnyTwoModesWithoutAStepOfTheVoltage) {
       controller.configure(c, kDt);
       double before = 0.0;
       for (int k = 0; k < 100; ++k) {
-        before = controller.update(Action::kFollow, from, reference(), measured());
+        before = controller.update(BridgeAction::kFollow, from, reference(), measured());
       }
-      EXPECT_NEAR(controller.update(Action::kFollow, to, reference(), measured()), before, 1e-12)
+      EXPECT_NEAR(controller.update(BridgeAction::kFollow, to, reference(), measured()), before,
+                  1e-12)
           << static_cast<int>(from) << " to " << static_cast<int>(to);
       for (int k = 0; k < 400; ++k) {
-        controller.update(Action::kFollow, to, reference(), measured());
+        controller.update(BridgeAction::kFollow, to, reference(), measured());
       }
       EXPECT_NEAR(controller.terms().transfer_V, 0.0, 1.0e-7);  // and it decays: exp(-20)
     }
@@ -316,11 +319,11 @@ TEST(JointController, ForgetsAStepOfTheVoltageAfterALongTime) {
   c.transfer_time_s = 0.02;
   JointController controller;
   controller.configure(c, kDt);
-  controller.update(Action::kFollow, Mode::kCst, reference(), measured());
-  controller.update(Action::kFollow, Mode::kCsp, reference(), measured());
+  controller.update(BridgeAction::kFollow, Mode::kCst, reference(), measured());
+  controller.update(BridgeAction::kFollow, Mode::kCsp, reference(), measured());
   ASSERT_NE(controller.terms().transfer_V, 0.0);
   for (int k = 0; k < 20'000; ++k) {
-    controller.update(Action::kFollow, Mode::kCsp, reference(), measured());
+    controller.update(BridgeAction::kFollow, Mode::kCsp, reference(), measured());
     ASSERT_NE(std::fpclassify(controller.terms().transfer_V), FP_SUBNORMAL);
   }
   EXPECT_EQ(controller.terms().transfer_V, 0.0);
@@ -331,9 +334,9 @@ TEST(JointController, SeedsTheIntegralThatTheNewModeHas) {
   c.transfer_time_s = 0.02;
   JointController controller;
   controller.configure(c, kDt);
-  controller.update(Action::kFollow, Mode::kCst, reference(), measured());
+  controller.update(BridgeAction::kFollow, Mode::kCst, reference(), measured());
   const double held = controller.terms().torque_reference_Nm;
-  controller.update(Action::kFollow, Mode::kCsp, reference(), measured());
+  controller.update(BridgeAction::kFollow, Mode::kCsp, reference(), measured());
   EXPECT_DOUBLE_EQ(controller.terms().torque_reference_Nm, held);
   EXPECT_NEAR(controller.position_loop().state.i,
               held - 2.0 - 100.0 * 0.1 - 4.0 * 0.3 + 50.0 * 0.1 * kDt, 1.0e-12);
@@ -344,8 +347,8 @@ TEST(JointController, StartsAtTheBackEmfWhenTheBridgeCloses) {
   c.transfer_time_s = 0.02;
   JointController controller;
   controller.configure(c, kDt);
-  controller.update(Action::kOff, Mode::kCsp, reference(), measured());
-  EXPECT_DOUBLE_EQ(controller.update(Action::kFollow, Mode::kCsp, reference(), measured()),
+  controller.update(BridgeAction::kOff, Mode::kCsp, reference(), measured());
+  EXPECT_DOUBLE_EQ(controller.update(BridgeAction::kFollow, Mode::kCsp, reference(), measured()),
                    4.0 * 0.25);                                   // no current
   EXPECT_DOUBLE_EQ(controller.terms().torque_reference_Nm, 5.0);  // what the spring carries
 }
@@ -357,21 +360,21 @@ TEST(JointController, TakesNewGainsWithoutAStepOfTheVoltage) {
   controller.configure(c, kDt);
   double before = 0.0;
   for (int k = 0; k < 200; ++k) {
-    before = controller.update(Action::kFollow, Mode::kImpedance, reference(), measured());
+    before = controller.update(BridgeAction::kFollow, Mode::kImpedance, reference(), measured());
   }
   c.torque.kp = 0.9;
   controller.configure(c, kDt);
-  EXPECT_DOUBLE_EQ(controller.update(Action::kFollow, Mode::kImpedance, reference(), measured()),
-                   before);
+  EXPECT_DOUBLE_EQ(
+      controller.update(BridgeAction::kFollow, Mode::kImpedance, reference(), measured()), before);
   EXPECT_NE(controller.terms().transfer_V, 0.0);
 }
 
 TEST(JointController, HoldsWhereItWasWhenItHasToStop) {
   JointController controller = settled(config(), Mode::kCst, measured(), reference());
-  controller.update(Action::kHold, Mode::kCst, reference(), measured());
+  controller.update(BridgeAction::kHold, Mode::kCst, reference(), measured());
   Measurement moved = measured();
   moved.link_position_rad += 0.05;
-  controller.update(Action::kHold, Mode::kCst, reference(), moved);
+  controller.update(BridgeAction::kHold, Mode::kCst, reference(), moved);
   EXPECT_NEAR(controller.terms().position_error_rad, -0.05, 1.0e-15);
 }
 
@@ -379,8 +382,8 @@ TEST(JointController, HoldsAtRest) {
   canopen::DriveParameters c = config();
   c.position.ki = 0.0;
   JointController controller = settled(c, Mode::kCst, measured(), reference());
-  controller.update(Action::kHold, Mode::kCst, reference(), measured());
-  controller.update(Action::kHold, Mode::kCst, reference(), measured());
+  controller.update(BridgeAction::kHold, Mode::kCst, reference(), measured());
+  controller.update(BridgeAction::kHold, Mode::kCst, reference(), measured());
   // 100 * 0 + 4 * (0 - 0.2) + 2
   EXPECT_NEAR(controller.terms().torque_reference_Nm, -4.0 * 0.2 + 2.0, 1.0e-12);
 }
@@ -400,7 +403,7 @@ TEST(JointController, ChangesTheTorqueReferenceNoFasterThanItsSlopeInEveryMode) 
       step.position_rad = side;
       step.velocity_rad_s = 5.0 * side;
       step.torque_Nm = 100.0 * side;
-      controller.update(Action::kFollow, mode, step, measured());
+      controller.update(BridgeAction::kFollow, mode, step, measured());
       const double now = controller.terms().torque_reference_Nm;
       most = std::max(most, std::abs(now - last));
       if (k == 20) {
@@ -417,9 +420,9 @@ TEST(JointController, ShowsNoTorqueReferenceThatIsNotInForce) {
   for (const Mode mode : {Mode::kCst, Mode::kCurrent, Mode::kOpenLoop}) {
     JointController controller;
     controller.configure(config(), kDt);
-    controller.update(Action::kFollow, Mode::kCst, reference(), measured());
+    controller.update(BridgeAction::kFollow, Mode::kCst, reference(), measured());
     ASSERT_NE(controller.terms().torque_reference_Nm, 0.0);
-    const Action then = mode == Mode::kCst ? Action::kBrake : Action::kFollow;
+    const BridgeAction then = mode == Mode::kCst ? BridgeAction::kBrake : BridgeAction::kFollow;
     controller.update(then, mode, reference(), measured());
     EXPECT_EQ(controller.terms().torque_reference_Nm, 0.0) << static_cast<int>(mode);
   }
@@ -435,13 +438,13 @@ TEST(JointController, DelaysNeitherBrakeNorOpenBridgeNorALoweredLimitByTheSlope)
   controller.configure(c, kDt);
   c.torque_limit_Nm = 20.0;
   controller.configure(c, kDt);
-  controller.update(Action::kFollow, Mode::kCst, full, measured());
+  controller.update(BridgeAction::kFollow, Mode::kCst, full, measured());
   EXPECT_EQ(controller.terms().torque_reference_Nm, 20.0);
-  controller.update(Action::kFollow, Mode::kCst, full, measured());
+  controller.update(BridgeAction::kFollow, Mode::kCst, full, measured());
   JointController braking = controller;
-  braking.update(Action::kBrake, Mode::kCst, full, measured());
-  EXPECT_EQ(braking.update(Action::kBrake, Mode::kCst, full, measured()), 0.0);
-  EXPECT_EQ(controller.update(Action::kOff, Mode::kCst, full, measured()), 0.0);
+  braking.update(BridgeAction::kBrake, Mode::kCst, full, measured());
+  EXPECT_EQ(braking.update(BridgeAction::kBrake, Mode::kCst, full, measured()), 0.0);
+  EXPECT_EQ(controller.update(BridgeAction::kOff, Mode::kCst, full, measured()), 0.0);
 }
 
 }  // namespace

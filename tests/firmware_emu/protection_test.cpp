@@ -9,7 +9,7 @@
 namespace tandem::firmware::testing {
 namespace {
 
-using canopen::DriveState;
+using canopen::DriveMachineState;
 using canopen::ErrorCode;
 
 struct Guard : ::testing::Test {
@@ -38,7 +38,7 @@ struct Guard : ::testing::Test {
     EXPECT_EQ(e.data[0] | (e.data[1] << 8), code);
     EXPECT_EQ(e.data[2] & (bits | 1), bits | 1);
     r.cycles(1100);
-    EXPECT_EQ(r.state(), DriveState::kFault);
+    EXPECT_EQ(r.state(), DriveMachineState::kFault);
     EXPECT_FALSE(r.drives[0].enabled);
   }
   static bool reset(Rig& r) {
@@ -46,7 +46,7 @@ struct Guard : ::testing::Test {
     r.cycles(3);
     r.commands[0].controlword = 0x80;
     r.cycles(3);
-    return r.state() == DriveState::kSwitchOnDisabled;
+    return r.state() == DriveMachineState::kSwitchOnDisabled;
   }
   std::unique_ptr<Rig> rig_owner;
 };
@@ -254,7 +254,7 @@ TEST_F(Guard, StopsInEveryModeWhenSyncsComeWithoutCommands) {
     Rig r;
     r.start();
     r.enable(static_cast<std::int8_t>(mode));
-    ASSERT_EQ(r.state(), DriveState::kOperationEnabled) << mode;
+    ASSERT_EQ(r.state(), DriveMachineState::kOperationEnabled) << mode;
     r.send_commands = false;
     const int taken = until_fault(r, 100);
     EXPECT_EQ(taken, 12) << mode;  // the last command is in force at the first, then 2032 = 10
@@ -277,7 +277,7 @@ TEST_F(Guard, DoesNotResetACommandTimeoutWithoutCommands) {
     ASSERT_EQ(rig.write(0x6040, 0, static_cast<std::uint16_t>(word)), 0U);
     rig.cycles(3);
   }
-  EXPECT_EQ(rig.state(), DriveState::kFault);
+  EXPECT_EQ(rig.state(), DriveMachineState::kFault);
 }
 
 TEST_F(Guard, StopsWhenSyncItselfStays) {
@@ -693,7 +693,7 @@ TEST(Emergency, InputFaultsEveryAxisAndIsNotResetWhileItIsActive) {
   rig.cycle();
   EXPECT_EQ(rig.object<std::uint32_t>(0x60FD), 0x8U);
   for (int axis = 0; axis < 2; ++axis) {
-    EXPECT_EQ(rig.state(axis), canopen::DriveState::kFaultReactionActive);
+    EXPECT_EQ(rig.state(axis), canopen::DriveMachineState::kFaultReactionActive);
     EXPECT_EQ(rig.error(axis), 0xFF02);
   }
   const auto told = rig.frames_of(0x085);
@@ -709,13 +709,13 @@ TEST(Emergency, InputFaultsEveryAxisAndIsNotResetWhileItIsActive) {
     }
   };
   reset();
-  EXPECT_EQ(rig.state(0), canopen::DriveState::kFault);
+  EXPECT_EQ(rig.state(0), canopen::DriveMachineState::kFault);
   rig.tamper = nullptr;
   rig.cycles(10);
-  EXPECT_EQ(rig.state(0), canopen::DriveState::kFault) << "latched";
+  EXPECT_EQ(rig.state(0), canopen::DriveMachineState::kFault) << "latched";
   reset();
-  EXPECT_EQ(rig.state(0), canopen::DriveState::kSwitchOnDisabled);
-  EXPECT_EQ(rig.state(1), canopen::DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(rig.state(0), canopen::DriveMachineState::kSwitchOnDisabled);
+  EXPECT_EQ(rig.state(1), canopen::DriveMachineState::kSwitchOnDisabled);
 }
 
 }  // namespace

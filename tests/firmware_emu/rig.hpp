@@ -220,7 +220,7 @@ class Rig {
   [[nodiscard]] std::uint16_t statusword(int axis = 0) const {
     return object<std::uint16_t>(static_cast<std::uint16_t>(0x6041 + 0x800 * axis));
   }
-  [[nodiscard]] canopen::DriveState state(int axis = 0) const {
+  [[nodiscard]] canopen::DriveMachineState state(int axis = 0) const {
     return canopen::drive_state(statusword(axis));
   }
   [[nodiscard]] std::uint16_t error(int axis = 0) const {

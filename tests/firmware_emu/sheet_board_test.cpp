@@ -86,7 +86,7 @@ class StandIn : public Rig {
   void enable_by_sdo(int mode) {
     ASSERT_EQ(write(0x6060, 0, static_cast<std::int8_t>(mode)), 0U);
     for (const int value : {0x06, 0x07, 0x0F}) word(value);
-    ASSERT_EQ(state(), canopen::DriveState::kOperationEnabled);
+    ASSERT_EQ(state(), canopen::DriveMachineState::kOperationEnabled);
   }
   [[nodiscard]] bool bit(int n) const { return (statusword() >> n & 1) != 0; }
   [[nodiscard]] std::int32_t position() const { return object<std::int32_t>(0x6064); }
@@ -360,9 +360,9 @@ TEST(SheetBoard, ItsBrakeHoldsUntilItIsEnabledAndBeforeItIsDisabled) {
   ASSERT_EQ(rig.write(0x6060, 0, std::int8_t{8}), 0U);
   ASSERT_EQ(rig.write(0x605A, 0, std::int16_t{2}), 0U);
   for (const int value : {0x06, 0x07, 0x0F}) rig.word(value);
-  EXPECT_EQ(rig.state(), canopen::DriveState::kSwitchedOn) << "the brake opens";
+  EXPECT_EQ(rig.state(), canopen::DriveMachineState::kSwitchedOn) << "the brake opens";
   rig.cycles(45);
-  EXPECT_EQ(rig.state(), canopen::DriveState::kOperationEnabled);
+  EXPECT_EQ(rig.state(), canopen::DriveMachineState::kOperationEnabled);
   EXPECT_TRUE(rig.drives[0].brake_open);
   rig.word(0x02, 25);  // quick stop: at rest after 20 ms
   EXPECT_FALSE(rig.drives[0].brake_open);

@@ -50,7 +50,7 @@ TEST(Snapshot, RunsOnToTheSameBitsInTheSameBoardAndInAnother) {
   const auto commands = rig.commands;
   const std::vector<double> first = go_on(rig);
   const std::vector<std::byte> end = bytes_of(rig.board);
-  EXPECT_EQ(rig.state(1), canopen::DriveState::kFaultReactionActive);
+  EXPECT_EQ(rig.state(1), canopen::DriveMachineState::kFaultReactionActive);
 
   Rig fresh(noisy());
   for (Rig* again : {&rig, &fresh}) {

@@ -24,9 +24,9 @@ using fuzz::require;
 constexpr int kMostCycles = 300;  // of an input
 
 /// The master's end of the cable; what comes back is as the input says.
-class Wire final : public hal::ecat::Link {
+class Wire final : public hal::ecat::DataLink {
  public:
-  explicit Wire(hal::ecat::Link& link) : link_(&link) {}
+  explicit Wire(hal::ecat::DataLink& link) : link_(&link) {}
 
   void follow(std::span<const std::uint8_t> input) { input_ = input; }
   [[nodiscard]] bool more() const { return !input_.empty(); }
@@ -63,7 +63,7 @@ class Wire final : public hal::ecat::Link {
     return at % std::max<std::size_t>(frame.size, 1);
   }
 
-  hal::ecat::Link* link_;
+  hal::ecat::DataLink* link_;
   std::span<const std::uint8_t> input_;
 };
 

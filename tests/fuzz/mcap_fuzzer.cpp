@@ -47,7 +47,7 @@ bool good(const Result<T>& result) {
 
 void check_topics(const log::LogFile& file) {
   std::size_t messages = 0;
-  for (const log::Topic& topic : file.topics()) {
+  for (const log::LoggedTopic& topic : file.topics()) {
     messages += topic.messages;
     std::ostringstream csv;
     (void)good(log::write_csv(file, topic.name, 1, csv));

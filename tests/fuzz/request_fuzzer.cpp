@@ -86,7 +86,7 @@ thread_local Run* waited_for = nullptr;
 /// Who asks.
 ControlRegistry::Gate gate(unsigned who) {
   runtime::RemoteOptions remote;
-  if (who != 1) remote.command = runtime::RemoteCommand::kLocal;
+  if (who != 1) remote.command = runtime::RemoteAccess::kLocal;
   remote.load = who == 2;
   if (who == 0) return {};
   return remote_gate(remote, [who] { return std::string(who == 3 ? "somebody" : ""); });

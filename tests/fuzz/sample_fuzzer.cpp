@@ -49,7 +49,7 @@ const hal::ParameterImage& gains() {
   static const hal::ParameterImage kGains = hal::initial_parameters(hal::test::fake_robot());
   return kGains;
 }
-Identity identity() { return identity_of(robot(), "hash", kPeriod_ns); }
+LinkIdentity identity() { return identity_of(robot(), "hash", kPeriod_ns); }
 
 class Input {
  public:
@@ -190,7 +190,7 @@ class Play {
       : end_(robots_end), owners_(owners_end), input_(input) {
     exchange();                     // the first input, too, answers a cycle that there was
     client_ = 1 + end_.turn++ % 2;  // another one than before: its numbers begin anew
-    request(end_.owner, Action::kAcquire, client_);
+    request(end_.owner, LeaseAction::kAcquire, client_);
     require(end_.server->lease().owner() == client_);
     end_.sequence = 0;
     command(end_.owner, true);
@@ -200,7 +200,7 @@ class Play {
     check_strangers_states();
     (void)owners_.backend->status_text();
     if (end_.server->lease().owner() != 0) {
-      request(end_.owner, Action::kRelease, end_.server->lease().owner());
+      request(end_.owner, LeaseAction::kRelease, end_.server->lease().owner());
     }
     require(end_.server->lease().owner() == 0);
   }
@@ -222,7 +222,7 @@ class Play {
         const std::uint8_t how = input_.byte();
         const std::uint64_t client = how & 4 ? how >> 3 : client_;
         if (&from == &end_.owner && client != client_) break;  // the owner knows its own number
-        request(from, static_cast<Action>(how & 3), client);
+        request(from, static_cast<LeaseAction>(how & 3), client);
         break;
       }
       case 3: command(from, false); break;
@@ -258,7 +258,7 @@ class Play {
     if (&from == &end_.stranger) require(end_.server->count(Verdict::kTaken) == taken);
   }
 
-  void request(Client& from, Action action, std::uint64_t client) {
+  void request(Client& from, LeaseAction action, std::uint64_t client) {
     char name[] = "fuzz";
     from.requests.write({.run = end_.server->number(),
                          .client = client,

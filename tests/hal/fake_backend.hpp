@@ -66,7 +66,7 @@ class FakeBackend : public Backend {
   Phase phase() const noexcept override {
     if (cycles_ < kBringUpCycles) return Phase::kBringUp;
     if (latched_ != StopCategory::kWarn) return Phase::kFault;
-    for (const Joint& joint : joints_) {
+    for (const DrivenJoint& joint : joints_) {
       if (joint.fault != 0) return Phase::kFault;
     }
     return Phase::kOperational;
@@ -101,7 +101,7 @@ class FakeBackend : public Backend {
   void stop(StopCategory category) noexcept override { latched_ = std::min(latched_, category); }
   void reset() noexcept override {
     latched_ = StopCategory::kWarn;
-    for (Joint& joint : joints_) joint.fault = 0;
+    for (DrivenJoint& joint : joints_) joint.fault = 0;
   }
   bool shut_down() noexcept override { return true; }
   bool archive(Archive& ar) override {
@@ -113,7 +113,7 @@ class FakeBackend : public Backend {
 
  private:
   static constexpr std::int64_t kBringUpCycles = 5;
-  struct Joint {
+  struct DrivenJoint {
     double position = 0.1, velocity = 0.0, acceleration = 0.0, torque = 0.0;
     double current = 0.0, voltage = 0.0, integral = 0.0, reference = 0.0;
     PidGains gains[kPidLoops];
@@ -121,14 +121,14 @@ class FakeBackend : public Backend {
   };
   static constexpr double kTorquePerCurrent = 5.0, kFriction = 1.0;
 
-  static double pid(Joint& joint, PidLoop loop, double error, double rate, double dt) {
+  static double pid(DrivenJoint& joint, PidLoop loop, double error, double rate, double dt) {
     const PidGains& gains = joint.gains[static_cast<std::size_t>(loop)];
     joint.integral += error * dt;
     return gains.kp * error + gains.ki * joint.integral - gains.kd * rate;
   }
 
   /// The torque that the joint's mode asks for.
-  double wanted(Joint& joint, std::size_t j, double dt) {
+  double wanted(DrivenJoint& joint, std::size_t j, double dt) {
     const double error = command_.position_rad()[j] - joint.position;
     const double slip = command_.velocity_rad_s()[j] - joint.velocity;
     const double forward = command_.torque_Nm()[j];
@@ -149,7 +149,7 @@ class FakeBackend : public Backend {
     }
   }
 
-  void follow_mode(Joint& joint, std::size_t j) {
+  void follow_mode(DrivenJoint& joint, std::size_t j) {
     if (command_.fault_reset()[j] != 0) joint.fault = 0;
     const bool changed = joint.mode != command_.mode()[j] ||
                          joint.interaction != command_.interaction()[j] || joint.enabled == 0;
@@ -164,7 +164,7 @@ class FakeBackend : public Backend {
   }
 
   void step(std::size_t j, double dt) {
-    Joint& joint = joints_[j];
+    DrivenJoint& joint = joints_[j];
     follow_mode(joint, j);
     const double emf = kTorquePerCurrent * joint.velocity;
     const double share = std::min(0.9, joint.gains[2].kp);  // how fast the torque follows
@@ -186,7 +186,7 @@ class FakeBackend : public Backend {
   }
 
   void publish(std::size_t j, StateImage& state) const {
-    const Joint& joint = joints_[j];
+    const DrivenJoint& joint = joints_[j];
     state.position_rad()[j] = joint.position;
     state.velocity_rad_s()[j] = joint.velocity;
     state.acceleration_rad_s2()[j] = joint.acceleration;
@@ -205,7 +205,7 @@ class FakeBackend : public Backend {
     state.drive_state()[j] = static_cast<std::uint8_t>(drive);
   }
 
-  std::vector<Joint> joints_;
+  std::vector<DrivenJoint> joints_;
   CommandImage command_;
   std::int64_t cycles_ = 0;
   StopCategory latched_ = StopCategory::kWarn;

@@ -31,7 +31,7 @@ length_m = 0.2
                                         "robots/leg.toml");
   ASSERT_TRUE(robot.has_value()) << robot.error().front().to_string();
   ASSERT_EQ(robot->loops.size(), 2u);
-  EXPECT_EQ(robot->loops[0].type, model::LoopType::kRevolute);
+  EXPECT_EQ(robot->loops[0].type, model::KinematicLoopType::kRevolute);
   EXPECT_EQ(robot->loops[0].axis, (std::array<double, 3>{0, 1, 0}));
   EXPECT_EQ(robot->loops[1].sites, (std::array<std::string, 2>{"eye", "pin"}));
   EXPECT_EQ(robot->loops[1].length_m, 0.2);

@@ -35,7 +35,7 @@ ConformanceRobot make(const Trial& trial) {
   made.voltage_V = trial.voltage_V;
   made.torque_share = trial.torque_share;
   made.provoke_fault = [raw = backend->get()](std::size_t j) {
-    sim::Fault unplugged;
+    sim::ScenarioFault unplugged;
     unplugged.kind = hal::FaultKind::kEncoderUnplug;
     unplugged.joint = static_cast<std::int32_t>(j);
     unplugged.duration_ns = 20'000'000;

@@ -56,7 +56,7 @@ class SwingOnCan {
     thread_ = std::jthread([this](const std::stop_token& stop) { answer(stop); });
   }
   /// For the boards' next step.
-  void inject(const sim::Fault& fault) {
+  void inject(const sim::ScenarioFault& fault) {
     const std::lock_guard lock(mutex_);
     faults_.push_back(fault);
   }
@@ -73,7 +73,8 @@ class SwingOnCan {
     constexpr std::int64_t kPatience_ns = 5'000'000;
     while (!stop.stop_requested() && emulator_->poll(kPatience_ns) != Code::kDiverged) {
       const std::lock_guard lock(mutex_);
-      for (const sim::Fault& fault : faults_) EXPECT_EQ(emulated_->inject(fault), Code::kOk);
+      for (const sim::ScenarioFault& fault : faults_)
+        EXPECT_EQ(emulated_->inject(fault), Code::kOk);
       faults_.clear();
     }
   }
@@ -82,7 +83,7 @@ class SwingOnCan {
   std::unique_ptr<apps::CanSockets> boards_;
   std::optional<sim::Emulator> emulator_;
   std::mutex mutex_;
-  std::vector<sim::Fault> faults_;
+  std::vector<sim::ScenarioFault> faults_;
   std::jthread thread_;  // ends first
 };
 
@@ -93,7 +94,7 @@ ConformanceRobot make_swing_on_can() {
   made.backend = opened(can::CanBackend::create(swing->robot, swing->master->buses(),
                                                 *swing->master, {.lockstep = true}));
   made.provoke_fault = [raw = swing.get()](std::size_t j) {
-    sim::Fault unplugged;
+    sim::ScenarioFault unplugged;
     unplugged.kind = hal::FaultKind::kEncoderUnplug;
     unplugged.joint = static_cast<std::int32_t>(j);
     unplugged.duration_ns = 3'000'000;

@@ -77,7 +77,7 @@ TEST(Identify, IntervalsHoldTheTruthAsOftenAsTheySay) {
   const int seeds = text == nullptr ? 6 : std::atoi(text);
   const Arm panda = arm("panda");
   const Reality reality = panda_reality();
-  const Series series = wide_series(panda, 3);
+  const ExcitingSeries series = wide_series(panda, 3);
   std::map<std::string, int> inside;
   int all = 0, held = 0;
   for (int seed = 1; seed <= seeds; ++seed) {
@@ -181,8 +181,8 @@ TEST(Identify, WarnsWhenTheResultIsWorseThanTheDescription) {
 }
 
 /// The arm's series, smaller by `share`, of all joints but the first `moving`.
-Series reduced(const Arm& arm, double share, Eigen::Index moving) {
-  Series series = wide_series(arm, 3);
+ExcitingSeries reduced(const Arm& arm, double share, Eigen::Index moving) {
+  ExcitingSeries series = wide_series(arm, 3);
   const Eigen::Index others = series.a.cols() - moving;
   series.a.rightCols(others) *= share;
   series.b.rightCols(others) *= share;

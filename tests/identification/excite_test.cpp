@@ -22,9 +22,9 @@ TEST(Excite, AnArmStaysWithinEveryLimitAndIsWellConditioned) {
   EXPECT_GT(result->condition_number, 1.0);
   EXPECT_GE(result->room_m, 0.0);
   EXPECT_GT(result->speed_share, 0.2);
-  const Series& series = result->series;
+  const ExcitingSeries& series = result->series;
   for (double t = 0.0; t <= series.period_s; t += 0.013) {
-    const Series::State now = series.at(t);
+    const ExcitingSeries::State now = series.at(t);
     for (std::size_t j = 0; j < 7; ++j) {
       const hal::JointConfig& joint = panda.robot.joints[j];
       const auto k = static_cast<Eigen::Index>(j);

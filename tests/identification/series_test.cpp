@@ -14,16 +14,17 @@ namespace {
 
 TEST(Series, StartsAndEndsAtRestAndIsItsOwnDerivative) {
   std::uint64_t seed = 5;
-  const Series series = random_series(Eigen::Vector3d(0.1, -0.2, 0.3), 5, 8.0, seed);
+  const ExcitingSeries series = random_series(Eigen::Vector3d(0.1, -0.2, 0.3), 5, 8.0, seed);
   for (const double t : {0.0, 8.0, 16.0}) {
-    const Series::State now = series.at(t);
+    const ExcitingSeries::State now = series.at(t);
     EXPECT_LT((now.x - series.start).norm(), 1e-12);
     EXPECT_LT(now.v.norm(), 1e-12);
     EXPECT_LT(now.acceleration.norm(), 1e-12);
   }
   for (const double t : {0.7, 3.3, 6.1}) {
     const double h = 1e-5;
-    const Series::State before = series.at(t - h), now = series.at(t), after = series.at(t + h);
+    const ExcitingSeries::State before = series.at(t - h), now = series.at(t),
+                                after = series.at(t + h);
     EXPECT_LT((now.v - (after.x - before.x) / (2 * h)).norm(), 1e-7);
     EXPECT_LT((now.acceleration - (after.v - before.v) / (2 * h)).norm(), 1e-7);
     EXPECT_GT(now.v.norm(), 1e-3);
@@ -32,10 +33,10 @@ TEST(Series, StartsAndEndsAtRestAndIsItsOwnDerivative) {
 
 TEST(Series, IsFoundAgainFromItsValues) {
   std::uint64_t seed = 6;
-  const Series series = random_series(Eigen::Vector2d(0.4, 0.0), 4, 10.0, seed);
+  const ExcitingSeries series = random_series(Eigen::Vector2d(0.4, 0.0), 4, 10.0, seed);
   Eigen::MatrixXd values(64, 2);
   for (int k = 0; k < 64; ++k) values.row(k) = series.at(10.0 * k / 64).x.transpose();
-  const Series found = series_through(values, 6, 10.0);
+  const ExcitingSeries found = series_through(values, 6, 10.0);
   EXPECT_LT((found.a.topRows(4) - series.a).norm(), 1e-12);
   EXPECT_LT((found.b.topRows(4) - series.b).norm(), 1e-12);
   EXPECT_LT(found.a.bottomRows(2).norm(), 1e-12);

@@ -27,7 +27,7 @@ struct Reality {
 };
 
 /// A fixed base; joints of the tree in the configuration's order.
-inline Recording synthetic_recording(const model::Tree& tree, const Series& series,
+inline Recording synthetic_recording(const model::Tree& tree, const ExcitingSeries& series,
                                      const Reality& reality, std::uint64_t seed) {
   constexpr double kPeriod_s = 2e-3;
   const auto mechanism = model::make_mechanism(tree, {});
@@ -46,7 +46,7 @@ inline Recording synthetic_recording(const model::Tree& tree, const Series& seri
   for (int k = 0; k * kPeriod_s < reality.duration_s; ++k) {
     const double t = k * kPeriod_s;
     r.time_s.push_back(t);
-    const Series::State now = series.at(t);
+    const ExcitingSeries::State now = series.at(t);
     const std::vector<double> q(now.x.begin(), now.x.end()), v(now.v.begin(), now.v.end()),
         a(now.acceleration.begin(), now.acceleration.end());
     const auto tau =
@@ -92,9 +92,9 @@ inline Arm arm(const std::string& name) {
 }
 
 /// All joints move, about a radian.
-inline Series wide_series(const Arm& arm, std::uint64_t seed) {
+inline ExcitingSeries wide_series(const Arm& arm, std::uint64_t seed) {
   const auto n = static_cast<Eigen::Index>(arm.robot.joints.size());
-  Series series = random_series(Eigen::VectorXd::Zero(n), 5, 10.0, seed);
+  ExcitingSeries series = random_series(Eigen::VectorXd::Zero(n), 5, 10.0, seed);
   series.a *= 0.8;
   series.b *= 0.8;
   return series;

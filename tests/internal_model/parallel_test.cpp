@@ -20,7 +20,7 @@ void expect_same(const Differences& differences) {
     EXPECT_EQ(joint.velocity_rad_s.max, 0.0);
     EXPECT_EQ(joint.torque_Nm.max, 0.0);
   }
-  for (const Difference& channel : differences.channels()) EXPECT_EQ(channel.max, 0.0);
+  for (const SignalDifference& channel : differences.channels()) EXPECT_EQ(channel.max, 0.0);
 }
 
 TEST(ParallelRobot, IsItsExactTwinToTheLastBitFromPowerOnToShutDown) {

@@ -50,7 +50,7 @@ class LogFileOfThree : public testing::Test {
 TEST_F(LogFileOfThree, ListsItsTopicsWithCountsAndTimes) {
   const LogFile log = open();
   ASSERT_EQ(log.topics().size(), 2U);
-  const Topic* state = log.find("/tandem/state");
+  const LoggedTopic* state = log.find("/tandem/state");
   ASSERT_NE(state, nullptr);
   EXPECT_EQ(state->type, "tandem/msg/State");
   EXPECT_EQ(state->messages, 3U);

@@ -49,7 +49,7 @@ struct View {
 
   [[nodiscard]] Counts counts() const {
     const auto of = [this](const char* topic) {
-      const Topic* found = log.find(topic);
+      const LoggedTopic* found = log.find(topic);
       return found == nullptr ? 0 : found->messages;
     };
     return {of("/joint_states"), of("/tf"), of("/robot_description")};

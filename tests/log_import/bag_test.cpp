@@ -26,12 +26,12 @@ TEST_F(Bag, WithZstdAndOtherNames) {
   EXPECT_EQ(done.cycles, 100U);
   EXPECT_EQ(done.begin_ns, 1'700'000'000'000'000'000);
   EXPECT_EQ(done.excluded.ignored, std::vector<std::string>{"finger"});
-  const Table read = table({{"position_rad", 0},
-                            {"position_rad", 1},
-                            {"velocity_rad_s", 0},
-                            {"torque_nm", 0},
-                            {"torque_nm", 1},
-                            {"age_cycles", 1}});
+  const TimeSeries read = table({{"position_rad", 0},
+                                 {"position_rad", 1},
+                                 {"velocity_rad_s", 0},
+                                 {"torque_nm", 0},
+                                 {"torque_nm", 1},
+                                 {"age_cycles", 1}});
   for (int i = 0; i < 100; ++i) {
     const double t = i * 0.01;
     EXPECT_NEAR(read.columns[0][i], position(0, t), 1e-15);
@@ -68,11 +68,11 @@ TEST_F(Bag, WithoutChunksInBigEndianFromSeveralPublishers) {
   const ImportSummary done = imported({file}, kTime);
   EXPECT_EQ(done.cycles, 100U);
   EXPECT_EQ(done.fields, (std::vector<std::string>{"position_rad", "torque_nm"}));
-  const Table read = table({{"position_rad", 0},
-                            {"position_rad", 1},
-                            {"torque_nm", 0},
-                            {"torque_nm", 1},
-                            {"velocity_rad_s", 0}});
+  const TimeSeries read = table({{"position_rad", 0},
+                                 {"position_rad", 1},
+                                 {"torque_nm", 0},
+                                 {"torque_nm", 1},
+                                 {"velocity_rad_s", 0}});
   for (int i = 0; i < 100; ++i) {
     const double t = i * 0.01;
     EXPECT_NEAR(read.columns[0][i], position(0, t), 1e-15);
@@ -106,13 +106,13 @@ TEST_F(Bag, WithSensorsAtRatesOfTheirOwn) {
   const std::string imu = "[sensor.imu]\ntopic = \"/imu\"\n";
   const ImportSummary done = imported({file}, head + ft + "frame = \"ft_frame\"\n" + imu);
   EXPECT_EQ(done.cycles, 60U);
-  const Table read = table({{"sensor", 0},
-                            {"sensor", 2},
-                            {"sensor", 4},
-                            {"sensor", 6},
-                            {"sensor", 9},
-                            {"sensor", 11},
-                            {"sensor", 14}});
+  const TimeSeries read = table({{"sensor", 0},
+                                 {"sensor", 2},
+                                 {"sensor", 4},
+                                 {"sensor", 6},
+                                 {"sensor", 9},
+                                 {"sensor", 11},
+                                 {"sensor", 14}});
   for (int i = 0; i < 59; ++i) {  // the last cycle has no IMU sample: it is held
     const double t = i * 0.01;
     EXPECT_NEAR(read.columns[0][i], -1 - t, 1e-15);

@@ -57,12 +57,12 @@ TEST_F(Csv, GivesItsNumbersBitForBit) {
   const ImportSummary done = imported({write("a.csv", plain_rows(50))}, kPlain);
   EXPECT_EQ(done.cycles, 50U);
   EXPECT_EQ(done.series.at(0).median_ns, 10'000'000);
-  const Table read = table({{"position_rad", 0},
-                            {"position_rad", 1},
-                            {"velocity_rad_s", 1},
-                            {"torque_nm", 0},
-                            {"motor_position_rad", 0},
-                            {"age_cycles", 0}});
+  const TimeSeries read = table({{"position_rad", 0},
+                                 {"position_rad", 1},
+                                 {"velocity_rad_s", 1},
+                                 {"torque_nm", 0},
+                                 {"motor_position_rad", 0},
+                                 {"age_cycles", 0}});
   ASSERT_EQ(read.time_s.size(), 50U);
   for (int i = 0; i < 50; ++i) {
     const double t = 0.01 * i;
@@ -141,14 +141,14 @@ counts_per_turn = [4096]
                   "1000;90;500;60;-60;1;2;4096;-1024\r\n"
                   "1010;91;501;61;-61;2;3;4097;-1025\r\n")},
            map + "[csv]\ndelimiter = \"semicolon\"\n");
-  const Table read = table({{"position_rad", 0},
-                            {"position_rad", 1},
-                            {"velocity_rad_s", 0},
-                            {"velocity_rad_s", 1},
-                            {"torque_nm", 0},
-                            {"torque_nm", 1},
-                            {"motor_position_rad", 1},
-                            {"motor_position_rad", 0}});
+  const TimeSeries read = table({{"position_rad", 0},
+                                 {"position_rad", 1},
+                                 {"velocity_rad_s", 0},
+                                 {"velocity_rad_s", 1},
+                                 {"torque_nm", 0},
+                                 {"torque_nm", 1},
+                                 {"motor_position_rad", 1},
+                                 {"motor_position_rad", 0}});
   constexpr double kPi = std::numbers::pi;
   const std::vector<double> expected{0.5,    kPi / 2 + 0.5, -2 * kPi, 2 * kPi,
                                      -26.52, 14.87,         2 * kPi,  -kPi / 2};
@@ -246,7 +246,7 @@ unit = "Nm"
 )";
   const auto files = std::vector{write("q.csv", q), write("tau.csv", tau)};
   EXPECT_EQ(imported(files, map).cycles, 30U);
-  const Table read = table({{"torque_nm", 1}});
+  const TimeSeries read = table({{"torque_nm", 1}});
   EXPECT_EQ(read.columns[0][10], -7.0);
   EXPECT_NEAR(read.time_s[10], 0.010, 1e-15);
   EXPECT_HAS(refusal({files[0], write("tau.csv", tau + "1,2\n")}, map),
@@ -298,7 +298,7 @@ unit = "rad"
   const std::string file = write("a.csv", text);
   const ImportSummary linear = imported({file}, map);
   EXPECT_EQ(linear.begin_ns, 1'000'000'000'000'000'000);
-  Table read = table({{"position_rad", 0}, {"position_rad", 1}});
+  TimeSeries read = table({{"position_rad", 0}, {"position_rad", 1}});
   ASSERT_EQ(read.time_s.size(), 391U);
   for (std::size_t i = 0; i < read.time_s.size(); ++i) {
     EXPECT_NEAR(read.columns[0][i], 0.001 * static_cast<double>(i), 2e-7);
@@ -353,12 +353,12 @@ moment_unit = "mNm"
   EXPECT_HAS(frozen, "a.csv: fz: never changes in 20 samples");
   const ImportSummary done = imported({file}, "allow_frozen = true\n" + map);
   EXPECT_EQ(done.missing, std::vector<std::string>{"joint2"});
-  Table read = table({{"position_rad", 1},
-                      {"sensor", 2},
-                      {"sensor", 5},
-                      {"sensor", 9},
-                      {"sensor", 10},
-                      {"sensor", 15}});
+  TimeSeries read = table({{"position_rad", 1},
+                           {"sensor", 2},
+                           {"sensor", 5},
+                           {"sensor", 9},
+                           {"sensor", 10},
+                           {"sensor", 15}});
   const std::vector<double> expected{0.25, 300.0, -1.0, 1.0, std::numbers::pi, 9.80665};
   for (std::size_t i = 0; i < expected.size(); ++i) {
     EXPECT_NEAR(read.columns[i][3], expected[i], 1e-15) << i;

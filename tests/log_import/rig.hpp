@@ -83,14 +83,14 @@ class Import : public testing::Test {
     }
     return text;
   }
-  Table table(const std::vector<Column>& columns,
-              const std::string& topic = "/tandem/state") const {
+  TimeSeries table(const std::vector<Column>& columns,
+                   const std::string& topic = "/tandem/state") const {
     const auto file = LogFile::open(path("out.mcap"));
     EXPECT_TRUE(file);
     if (!file) return {};
     auto read = file->read(topic, columns);
     EXPECT_TRUE(read) << read.error().to_string();
-    return read ? *read : Table{};
+    return read ? *read : TimeSeries{};
   }
 
   tandem::test::ScratchFolder folder_;

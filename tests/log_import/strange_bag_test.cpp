@@ -105,19 +105,19 @@ std::string packed(Compression by, const std::string& plain) {
 }
 
 using Encode = std::function<std::string(int)>;
-struct Topic {
+struct LoggedTopic {
   std::string name = "/joint_states", type = kType, encoding = "cdr";
   Encode encode = [](int i) { return cdr(i); };
 };
 
 class StrangeBag : public Import {
  protected:
-  std::string bag(const std::vector<Topic>& topics, int times = 1) const {
+  std::string bag(const std::vector<LoggedTopic>& topics, int times = 1) const {
     const std::string file = path("bag.mcap");
     McapWriter writer;
     EXPECT_TRUE(writer.open(file, {}));
     std::vector<std::uint16_t> channels;
-    for (const Topic& one : topics) {
+    for (const LoggedTopic& one : topics) {
       // Channels without a schema have the number 0 for it.
       const std::uint16_t schema =
           one.type.empty() ? std::uint16_t{0} : writer.add_schema(one.type, "ros2msg", "");
@@ -137,7 +137,8 @@ class StrangeBag : public Import {
   void expect_motion(const std::string& file, const std::string& map = kStamped) const {
     const ImportSummary done = imported({file}, map);
     EXPECT_EQ(done.cycles, static_cast<std::uint64_t>(kMessages));
-    const Table read = table({{"position_rad", 0}, {"position_rad", 1}, {"velocity_rad_s", 1}});
+    const TimeSeries read =
+        table({{"position_rad", 0}, {"position_rad", 1}, {"velocity_rad_s", 1}});
     ASSERT_EQ(read.columns.at(0).size(), static_cast<std::size_t>(kMessages));
     for (int i = 0; i < kMessages; ++i) {
       EXPECT_EQ(read.columns[0][i], angle_of(0, i));
@@ -240,7 +241,7 @@ TEST_F(StrangeBag, ThatUnpacksToFarMoreThanItIsIsRefused) {
              "a.mcap.zstd: has more than 500 times its size when unpacked");
 }
 
-Topic part(const std::string& name, std::size_t joint, const std::string& called) {
+LoggedTopic part(const std::string& name, std::size_t joint, const std::string& called) {
   return {.name = name, .encode = [=](int i) { return cdr(i, {{called}, {joint}}); }};
 }
 

@@ -47,7 +47,7 @@ TEST_F(StrangeTable, OfEmptyCellsHasASeriesForEachColumn) {
     EXPECT_EQ(done.series[0].rows, 51U);
     EXPECT_EQ(done.series[1].name, "column q2");
     ASSERT_EQ(done.notes.size(), 1U);
-    const Table read = table({{"position_rad", 0}, {"position_rad", 1}});
+    const TimeSeries read = table({{"position_rad", 0}, {"position_rad", 1}});
     for (int i = 0; i < 50; ++i) {
       const double t = 0.005 + 0.01 * i;
       EXPECT_NEAR(read.columns[0][i], std::sin(t), 2e-5) << "on the line between two samples";
@@ -185,7 +185,7 @@ TEST_F(StrangeTable, AnglesWithinATurnGoOn) {
   EXPECT_HAS(refusal({file}, map_of("s", "unit = \"deg\"")),
              "its number was kept within a turn: say unwrap = true in [position] of ");
   imported({file}, map_of("s", "unit = \"deg\"\nunwrap = true"));
-  const Table read = table({{"position_rad", 0}, {"position_rad", 1}});
+  const TimeSeries read = table({{"position_rad", 0}, {"position_rad", 1}});
   constexpr double kDegree = std::numbers::pi / 180;
   for (int i = 0; i < 100; ++i) {
     EXPECT_NEAR(read.columns[0][i], (-30 + 1.5 * i) * kDegree, 1e-8) << "330 deg is -30 deg here";
@@ -204,7 +204,7 @@ TEST_F(StrangeTable, AnglesOfAJointWithoutLimitsGoOn) {
                std::remainder(-0.05 * i, 2 * std::numbers::pi));
   };
   imported({rows(100, of)}, map_of("s", "unit = \"rad\"\nunwrap = true"));
-  const Table read = table({{"position_rad", 0}, {"position_rad", 1}});
+  const TimeSeries read = table({{"position_rad", 0}, {"position_rad", 1}});
   EXPECT_NEAR(read.columns[0][99], 0.05 * 99, 1e-8);
   EXPECT_NEAR(read.columns[1][99], -0.05 * 99, 1e-8);
 }

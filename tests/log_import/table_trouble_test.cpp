@@ -148,7 +148,7 @@ TEST_F(TableTrouble, ASlowColumnHasItsOwnTimesAndKeepsNothingBack) {
     EXPECT_EQ(done.series[1].name, "column T1 and 1 other");
     EXPECT_EQ(done.series[1].rows, 4U);
     EXPECT_EQ(done.series[1].median_ns, 1'000'000'000);
-    const Table read = Import::table({{"position_rad", 0}, {"temperature_c", 0}});
+    const TimeSeries read = Import::table({{"position_rad", 0}, {"temperature_c", 0}});
     const auto& warm = read.columns[1];
     ASSERT_EQ(warm.size(), 501U);
     EXPECT_NEAR(read.columns[0][500], q1(500), 1e-12);

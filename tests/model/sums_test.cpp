@@ -19,14 +19,14 @@ struct SumsTest : testing::Test {
   Expr order(const Expr& output) {
     return ordered_sums(written, std::vector{output}, {}, ordered).outputs[0];
   }
-  [[nodiscard]] const Node& node(std::uint32_t i) const { return ordered.nodes()[i]; }
+  [[nodiscard]] const GraphNode& node(std::uint32_t i) const { return ordered.nodes()[i]; }
 };
 
 // 1 / x0 is known last: the other four terms are added before.
 TEST_F(SumsTest, AddWhatIsKnownLastAtTheEnd) {
   const Expr late = Expr(1.0) / x[0];
   const Expr sum = order(late * x[1] - x[2] + x[3] * x[4] - x[5]);
-  const Node& last = node(sum.node());
+  const GraphNode& last = node(sum.node());
   ASSERT_TRUE(last.op == Op::kAdd || last.op == Op::kSub);
   const bool a = node(last.a).op == Op::kMul && node(node(last.a).a).op != Op::kInput;
   const bool b = node(last.b).op == Op::kMul && node(node(last.b).b).op != Op::kInput;

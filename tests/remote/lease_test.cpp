@@ -93,7 +93,7 @@ class LinkChecks : public testing::Test {
     return run_;
   }
   void acquire(std::uint64_t client, std::uint32_t protocol = kLinkProtocol,
-               Action action = Action::kAcquire) {
+               LeaseAction action = LeaseAction::kAcquire) {
     std::string name = "talker";
     tandem_msgs::LinkRequest sample{};
     sample.run = run_;
@@ -146,7 +146,7 @@ TEST_F(LinkChecks, ACommandOfItsOwnerIsTakenAndNobodyElses) {
 }
 
 TEST_F(LinkChecks, AClientOfAnotherVersionGetsNoLease) {
-  acquire(kClient, kLinkProtocol, Action::kRelease);
+  acquire(kClient, kLinkProtocol, LeaseAction::kRelease);
   ASSERT_TRUE(eventually([this] { return served.server->lease().owner() == 0; }));
   acquire(4712, kLinkProtocol + 1);
   acquire(4713);
@@ -171,7 +171,7 @@ TEST_F(LinkChecks, WhoKnowsTheOwnersNumberIsNotTheOwner) {
   request.protocol = kLinkProtocol;
   request.client = kClient;
   request.name = text.data();
-  for (const Action action : {Action::kAcquire, Action::kRelease}) {
+  for (const LeaseAction action : {LeaseAction::kAcquire, LeaseAction::kRelease}) {
     request.action = static_cast<std::uint8_t>(action);
     ASSERT_TRUE(requests.write(request));
   }

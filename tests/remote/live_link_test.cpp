@@ -125,8 +125,8 @@ TEST(LiveLink, APauseOfTheOperatorsProcessEndsNothing) {
   one.cycle->run();
   served.end();
   EXPECT_GE(one.cycle->loop().skipped, 20U);
-  for (const runtime::Fault& fault : one.cycle->faults()) ADD_FAILURE() << fault.text;
-  for (const runtime::Fault& fault : served.cycle->faults()) ADD_FAILURE() << fault.text;
+  for (const runtime::FaultReport& fault : one.cycle->faults()) ADD_FAILURE() << fault.text;
+  for (const runtime::FaultReport& fault : served.cycle->faults()) ADD_FAILURE() << fault.text;
   EXPECT_LT(one.link->figures().worst_prediction_rad, 0.05);
 }
 
@@ -138,7 +138,8 @@ TEST(LiveLink, TheNumbersFollowAJumpOfTheRobotsClock) {
   one.sleepy.at_sleep(500, [&served] { served.sleepy.oversleep(150 * kPeriod_ns); });
   one.cycle->run();
   served.end();
-  for (const runtime::Fault& fault : one.cycle->faults()) EXPECT_FALSE(fault.latched) << fault.text;
+  for (const runtime::FaultReport& fault : one.cycle->faults())
+    EXPECT_FALSE(fault.latched) << fault.text;
   EXPECT_TRUE(served.cycle->faults().empty());
   EXPECT_LT(one.link->figures().clock_cycles, -100);
   EXPECT_LT(one.link->figures().unanswered_cycles, 500U) << "the robot follows again";

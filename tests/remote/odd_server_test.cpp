@@ -108,7 +108,7 @@ TEST(OtherVersions, AreRefusedAndToldWhichIsOlder) {
   const hal::Robot robot = hal::robot_of(hal::test::fake_robot());
   const auto at_robot = test::participant("robot"), at_owner = test::participant("owner");
   const auto refusal = [&](std::uint32_t protocol) {
-    Identity identity = identity_of(robot, "hash", test::kPeriod_ns);
+    LinkIdentity identity = identity_of(robot, "hash", test::kPeriod_ns);
     identity.protocol = protocol;
     const auto server = Server::open(
         *at_robot, robot, hal::initial_parameters(hal::test::fake_robot()), identity, {});

@@ -17,7 +17,7 @@ hal::StateImage at(double position_rad) {
 }
 
 TEST(Prediction, ComparesAStateWithTheTwinUnderTheSameCommand) {
-  Prediction prediction(1, 10, kCycle_ns, kCycle_ns);
+  TwinCorrection prediction(1, 10, kCycle_ns, kCycle_ns);
   prediction.start();
   prediction.keep(5, at(1.0));  // after command 4
   prediction.keep(6, at(2.0));
@@ -28,7 +28,7 @@ TEST(Prediction, ComparesAStateWithTheTwinUnderTheSameCommand) {
 
 /// The operator's loop may leave numbers out: what stands in their places is of older commands.
 TEST(Prediction, AStateUnderACommandWhoseTwinIsNotKnownCorrectsNothing) {
-  Prediction prediction(1, 10, kCycle_ns, kCycle_ns);
+  TwinCorrection prediction(1, 10, kCycle_ns, kCycle_ns);
   prediction.start();
   for (std::uint64_t number = 0; number < 15; ++number) prediction.keep(number, at(1.0));
   for (std::uint64_t number = 22; number < 26; ++number) prediction.keep(number, at(1.0));

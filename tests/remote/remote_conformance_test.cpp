@@ -59,7 +59,7 @@ struct ServedUr5e {
     thread.join();
     server->close();
   }
-  [[nodiscard]] remote::Identity identity() const {
+  [[nodiscard]] remote::LinkIdentity identity() const {
     return remote::identity_of(hal::robot_of(loaded.robot), "hash", kPeriod_ns);
   }
 
@@ -81,7 +81,7 @@ ConformanceRobot make_remote_ur5e() {
   made.torque_Nm = 5.0;
   made.voltage_V = 1.0;
   made.provoke_fault = [sim = served->backend.get()](std::size_t j) {
-    sim::Fault unplugged;
+    sim::ScenarioFault unplugged;
     unplugged.kind = hal::FaultKind::kEncoderUnplug;
     unplugged.joint = static_cast<std::int32_t>(j);
     unplugged.duration_ns = 20'000'000;

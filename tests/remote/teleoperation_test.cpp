@@ -105,7 +105,8 @@ class Operated : public RealRobot, public runtime::BundledRun {
       row.height_m = run->truth().base_position_m()[2];
       rows.push_back(std::move(row));
     }
-    for (const runtime::Fault& fault : cycle->faults()) EXPECT_FALSE(fault.latched) << fault.text;
+    for (const runtime::FaultReport& fault : cycle->faults())
+      EXPECT_FALSE(fault.latched) << fault.text;
   }
 
   /// RMS distance of the hand, in the base's frame, from where it was led [m].

@@ -22,7 +22,7 @@ class AnyFeet : public testing::TestWithParam<int> {
   static constexpr std::size_t kRows = 41;
   explicit AnyFeet(int legs = GetParam()) : walker{"", legs, kLeg, {{0, 0, 0}}}, one(walker) {
     const tandem_kernels& kernels = *one.kernels.get();
-    const std::vector<Foot> feet =
+    const std::vector<FootContact> feet =
         find_feet(hal::robot_of(one.robot), kernels, foot_names(hal::robot_of(one.robot))).value();
     stance.place(one.robot.postures[0].position_rad);
     EXPECT_TRUE(stance.solve(0.7, 50).converged);
@@ -50,7 +50,7 @@ class AnyFeet : public testing::TestWithParam<int> {
   static std::vector<double> constant(double value) { return std::vector<double>(kRows, value); }
 
   /// The forces on the feet that carry the robot, as the simulation would log them.
-  void tell_the_ground(const std::vector<Foot>& feet) {
+  void tell_the_ground(const std::vector<FootContact>& feet) {
     const tandem_kernels& k = *one.kernels.get();
     std::vector<double> pose(12UL * k.sites), twist(6UL * k.sites), acc(twist), rest(k.nv);
     std::vector<double> J(6UL * k.nv * k.sites), tau(k.nv);

@@ -44,7 +44,7 @@ TEST(InverseDynamics, ExplainsTheSensorsByWrenchesAtTheSites) {
   cart.nq = cart.nv = cart.joints = cart.wrenches = cart.sensors = 1;
   cart.inverse_dynamics = cart_inverse_dynamics;
   cart.sensor_wrenches = cart_sensor;
-  Motion motion;
+  SampledMotion motion;
   motion.step_s = 0.01;
   for (int i = 0; i < 100; ++i) {
     motion.q.push_back({0.0});
@@ -70,7 +70,7 @@ TEST(InverseDynamics, TakesTheMotionsWrenchesWhereNoSensorMeasures) {
   cart.inverse_dynamics = cart_inverse_dynamics;
   cart.site_motion = upside_down;
   cart.sensor_wrenches = [](const double*, const double*, const double*, const double*, double*) {};
-  Motion motion{0.01, {{0.0}, {0.0}, {0.0}}, {{0.0}, {0.0}, {0.0}}, {{}, {}, {}}, {}};
+  SampledMotion motion{0.01, {{0.0}, {0.0}, {0.0}}, {{0.0}, {0.0}, {0.0}}, {{}, {}, {}}, {}};
   EXPECT_FALSE(wrenches_known(cart, motion));
   motion.wrenches.assign(3, {0, 0, 20.0, 0, 0, 0});
   EXPECT_TRUE(wrenches_known(cart, motion));
@@ -82,7 +82,7 @@ TEST(InverseDynamics, WithoutSensorsTakesNoWrench) {
   cart.nq = cart.nv = cart.joints = cart.wrenches = 1;
   cart.inverse_dynamics = cart_inverse_dynamics;
   cart.sensor_wrenches = [](const double*, const double*, const double*, const double*, double*) {};
-  Motion motion{0.01, {{0.0}, {0.0}, {0.0}}, {{0.0}, {0.03}, {0.06}}, {{}, {}, {}}, {}};
+  SampledMotion motion{0.01, {{0.0}, {0.0}, {0.0}}, {{0.0}, {0.03}, {0.06}}, {{}, {}, {}}, {}};
   EXPECT_NEAR(inverse_dynamics(cart, motion)[1][0], 2.0 * 3.0, 1e-9);
 }
 

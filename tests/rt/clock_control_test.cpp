@@ -24,7 +24,7 @@ struct Simulated {
     return tick;
   }
 
-  LoopConfig config;
+  CyclicLoopConfig config;
   FakeClock clock;
   Doorbell bell;
   ClockControl control{config, bell};
@@ -46,7 +46,7 @@ struct Threaded {
     thread.join();
   }
 
-  LoopConfig config;
+  CyclicLoopConfig config;
   WallClock clock;
   Doorbell bell;
   ClockControl control{config, bell};
@@ -139,7 +139,7 @@ TEST(ClockControl, RefusesEverythingInRealTime) {
 TEST(ClockControl, ALoopInRealTimeObeysNoControl) {
   FakeClock clock;
   Doorbell bell;
-  const LoopConfig simulated{.period_ns = kMs, .start_paused = true};
+  const CyclicLoopConfig simulated{.period_ns = kMs, .start_paused = true};
   ClockControl control(simulated, bell);
   CyclicLoop loop({.period_ns = kMs, .pacing = Pacing::kWallClock}, clock, &control);
   for (std::uint64_t i = 0; i < 3; ++i) EXPECT_EQ(loop.wait().cycle, i);

@@ -10,7 +10,7 @@ namespace {
 constexpr std::int64_t kMs_ns = 1'000'000;
 constexpr std::int64_t kStart = 1'000'000'000;
 
-LoopConfig wall(OverrunPolicy policy = OverrunPolicy::kSkip) {
+CyclicLoopConfig wall(OverrunPolicy policy = OverrunPolicy::kSkip) {
   return {.period_ns = kMs_ns, .pacing = Pacing::kWallClock, .on_overrun = policy};
 }
 
@@ -84,7 +84,7 @@ TEST(CyclicLoop, AsksToHoldOnlyInTheCycleAfterAnOverrun) {
 
 TEST(CyclicLoop, AsksToStopOnceTooManyOfTheLastCyclesWereLate) {
   FakeClock clock;
-  LoopConfig config = wall(OverrunPolicy::kStop);
+  CyclicLoopConfig config = wall(OverrunPolicy::kStop);
   config.stop_late = 3;
   config.stop_window = 5;
   CyclicLoop loop(config, clock);
@@ -98,7 +98,7 @@ TEST(CyclicLoop, AsksToStopOnceTooManyOfTheLastCyclesWereLate) {
 
 TEST(CyclicLoop, ForgetsLateCyclesThatLeftTheWindow) {
   FakeClock clock;
-  LoopConfig config = wall(OverrunPolicy::kStop);
+  CyclicLoopConfig config = wall(OverrunPolicy::kStop);
   config.stop_late = 2;
   config.stop_window = 3;
   CyclicLoop loop(config, clock);
@@ -131,7 +131,7 @@ TEST(CyclicLoop, ScalesSimulatedTimeByTheRate) {
 
 TEST(CyclicLoop, NeverMissesACycleOfSimulatedTimeHoweverLate) {
   FakeClock clock;
-  LoopConfig config{.period_ns = kMs_ns, .pacing = Pacing::kSimulated, .rate = 1.0};
+  CyclicLoopConfig config{.period_ns = kMs_ns, .pacing = Pacing::kSimulated, .rate = 1.0};
   config.on_overrun = OverrunPolicy::kStop;
   config.stop_late = 1;
   CyclicLoop loop(config, clock);

@@ -96,7 +96,7 @@ TEST(Brakes, AreOpenToTheCycleWhenOperationIsEnabled) {
   BrakedArm rig(1.0, 40, 20);
   const sim::Plant& plant = rig.backend->emulated->plant();
   int powered = 0;
-  while (rig.axis(0).machine().state() != canopen::DriveState::kOperationEnabled) {
+  while (rig.axis(0).machine().state() != canopen::DriveMachineState::kOperationEnabled) {
     ASSERT_TRUE(rig.cycle->step());
     if (rig.axis(0).machine().motion() == DriveMotion::kSlowDown) ++powered;
     if (powered > 0 && powered < 40) {

@@ -53,7 +53,7 @@ struct Collapse : BundledRun {
            plant().end_stops().elastic_energy_J(plant().q() + (k.nq - k.joints));
   }
   void expect_no_fault_but_the_stop() {
-    for (const Fault& fault : cycle->faults()) {
+    for (const FaultReport& fault : cycle->faults()) {
       EXPECT_EQ(fault.text, "emergency stop on request") << fault.joint << " at " << fault.time_s;
     }
   }
@@ -194,7 +194,7 @@ TEST(Collapse, OfARunningRobotIsAFaultWithItsTime) {
     squat.cycle->run();
     const auto faults = squat.cycle->faults();
     if (allowed) {
-      for (const Fault& fault : faults)
+      for (const FaultReport& fault : faults)
         EXPECT_FALSE(fault.text.starts_with("the robot")) << fault.text;
       continue;
     }

@@ -64,7 +64,7 @@ TEST(Collision, ThatNoJointFeelsIsFoundAtTheBase) {
   for (const char* channel : estimation::kBaseChannels)
     config.collision->thresholds.push_back({channel, 12.0});
   EstimatedRun run("coman", "squat", {.estimation = config});
-  const sim::Fault push =
+  const sim::ScenarioFault push =
       push_on(run.experiment->robot, "LHipYaw", {-9.0, 2.0, 49.0}, 3.0, 0.2, {0.0, 0.0, -0.1});
   ASSERT_EQ(run.backend->robot().inject(push), Code::kOk);
   run.run_to_fault();

@@ -104,7 +104,7 @@ void pushed(const Subject& s, std::size_t place, double force_N, std::uint64_t s
   const double at_s = 2.0 + 3.0 * std::uniform_real_distribution<double>()(random);
   const auto& [joint, point] = s.places[place];
   EstimatedRun run(s.robot, s.experiment, {.seed = seed + 100, .estimation = observer_of(s.robot)});
-  const sim::Fault push =
+  const sim::ScenarioFault push =
       push_on(run.experiment->robot, joint, {way.x(), way.y(), way.z()}, at_s, 0.2, point);
   ASSERT_EQ(run.backend->robot().inject(push), Code::kOk);
   run.run_to_fault();

@@ -94,7 +94,7 @@ TEST_F(TracedRun, SplitsTheCycleIntoWakeUpBusAndWork) {
   make({.trace_cycles = 1000});
   cycle->run();
   const auto cycles = cycle->trace().cycles();
-  const rt::LoopStatistics& loop = cycle->loop();
+  const rt::CycleStatistics& loop = cycle->loop();
   ASSERT_EQ(cycles.size(), loop.cycles);
   std::int64_t bus_ns = 0, work_ns = 0, wakeup_ns = 0;
   for (const CycleStamps& stamps : cycles) {

@@ -55,10 +55,10 @@ struct EstimatedRun : BundledRun {
 };
 
 /// A push on the body of a joint, from so long after the drives are enabled.
-inline sim::Fault push_on(const hal::RobotConfig& robot, const std::string& joint,
-                          std::array<double, 3> force_N, double after_enabled_s, double for_s,
-                          std::array<double, 3> point_m = {}) {
-  sim::Fault push;
+inline sim::ScenarioFault push_on(const hal::RobotConfig& robot, const std::string& joint,
+                                  std::array<double, 3> force_N, double after_enabled_s,
+                                  double for_s, std::array<double, 3> point_m = {}) {
+  sim::ScenarioFault push;
   push.kind = hal::FaultKind::kPush;
   push.from = sim::FaultFrom::kEnabled;
   push.joint = robot.joint_index(joint);

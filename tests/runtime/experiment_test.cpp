@@ -200,7 +200,7 @@ foot = "wrist_ft")"),
   EXPECT_EQ(e->after_reset, AfterReset::kContinue);
   EXPECT_EQ(e->on_stray, hal::StopCategory::kHold);
   EXPECT_EQ(e->watchdog_s, 0.25);
-  EXPECT_EQ(e->remote.command, RemoteCommand::kLocal);
+  EXPECT_EQ(e->remote.command, RemoteAccess::kLocal);
   EXPECT_EQ(e->log.folder, "logs");
   EXPECT_EQ(e->log.compression, LogCompression::kZstd);
   EXPECT_EQ(e->report.foot, "wrist_ft");
@@ -270,7 +270,7 @@ TEST(Experiment, ReadsTheNetworkProxysKeys) {
   ASSERT_TRUE(e) << e.error().front().to_string();
   EXPECT_EQ(e->hal.backend, BackendKind::kDds);
   EXPECT_EQ(e->hal.delay_cycles, 2U);
-  EXPECT_EQ(e->remote.command, RemoteCommand::kLocal);
+  EXPECT_EQ(e->remote.command, RemoteAccess::kLocal);
   EXPECT_TRUE(e->remote.lockstep);
   EXPECT_EQ(e->remote.lease_timeout_s, 0.5);
   EXPECT_EQ(e->remote.max_age_cycles, 20U);

@@ -5,7 +5,7 @@ namespace tandem::runtime {
 namespace {
 
 using namespace test;
-using sim::Fault;
+using sim::ScenarioFault;
 
 /// Every mode of operation is watched alike.
 struct ModeCase {
@@ -39,8 +39,9 @@ TEST_P(EveryMode, BoardsReachTheirSafeStateWithoutCommandsSyncOrHeartbeat) {
     const firmware::Axis& axis = made->emulated->board(0).axis(0);
     ASSERT_EQ(axis.objects().mode_display, GetParam().on_wire);
     ASSERT_EQ(axis.machine().motion(), DriveMotion::kFollow) << made->status_text();
-    Fault silent = of(FaultKind::kFrameDrop);  // all of the master's frames, SYNC perhaps not
-    silent.direction = sim::Direction::kToBoards;
+    ScenarioFault silent =
+        of(FaultKind::kFrameDrop);  // all of the master's frames, SYNC perhaps not
+    silent.direction = sim::FrameDirection::kToBoards;
     if (with_sync) silent.node_id = 1;
     ASSERT_EQ(made->emulated->inject(silent), Code::kOk);
     int noticed = -1, open = -1;
@@ -63,7 +64,7 @@ TEST_P(EveryMode, BoardsReachTheirSafeStateWithoutCommandsSyncOrHeartbeat) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Fault, EveryMode,
+    ScenarioFault, EveryMode,
     testing::Values(
         ModeCase{"csp", hal::ControlMode::kPosition, hal::InteractionMode::kStiff, 8},
         ModeCase{"csv", hal::ControlMode::kVelocity, hal::InteractionMode::kStiff, 9},

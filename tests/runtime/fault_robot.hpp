@@ -96,7 +96,7 @@ class FaultRobot final : public hal::Backend {
     return master->fault_cause(joint);
   }
   [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override {
-    const sim::Fault* fault = emulated->next_begun_fault();
+    const sim::ScenarioFault* fault = emulated->next_begun_fault();
     return fault == nullptr ? hal::InjectedFault{} : sim::injected(*fault);
   }
 
@@ -126,7 +126,7 @@ struct Outcome {
 /// A whole run: one joint moves on a sine, the others are held.
 struct FaultRig : LoopRun {
   FaultRig(hal::RobotConfig config, const tandem_kernels* its_kernels, const std::string& posture,
-           std::vector<sim::Fault> scenario = {}, std::int64_t release_ns = 100'000'000)
+           std::vector<sim::ScenarioFault> scenario = {}, std::int64_t release_ns = 100'000'000)
       : LoopRun(std::move(config), its_kernels) {
     backend = std::make_unique<FaultRobot>(
         robot, kernels,
@@ -147,7 +147,7 @@ struct FaultRig : LoopRun {
   void step() {
     if (!cycle->step()) backend->without_master();
   }
-  void inject(sim::Fault fault) { ASSERT_EQ(backend->emulated->inject(fault), Code::kOk); }
+  void inject(sim::ScenarioFault fault) { ASSERT_EQ(backend->emulated->inject(fault), Code::kOk); }
 
   [[nodiscard]] const firmware::Board& board(std::size_t b) const {
     return backend->emulated->board(b);
@@ -182,7 +182,7 @@ struct FaultRig : LoopRun {
   }
   [[nodiscard]] std::string causes() const {
     std::string all = backend->status_text();
-    for (const Fault& fault : cycle->faults()) all += "\n" + fault.joint + ": " + fault.text;
+    for (const FaultReport& fault : cycle->faults()) all += "\n" + fault.joint + ": " + fault.text;
     return all;
   }
 

@@ -13,7 +13,7 @@ namespace tandem::runtime::test {
 
 using canopen::DriveMotion;
 using hal::FaultKind;
-using sim::Fault;
+using sim::ScenarioFault;
 
 /// The page's line of the running test, cell by cell: fault | detected by | reaction | detected |
 /// safe | test.
@@ -78,7 +78,7 @@ struct LoadedRobot {
   tandem::test::TestRobot loaded;
 };
 struct RowRig : private LoadedRobot, FaultRig {
-  explicit RowRig(const std::string& name, std::vector<Fault> scenario = {},
+  explicit RowRig(const std::string& name, std::vector<ScenarioFault> scenario = {},
                   hal::StopCategory on_fault = hal::StopCategory::kCategory1)
       : LoadedRobot(name),
         FaultRig(with(loaded.robot, on_fault), loaded.kernels.get(),
@@ -90,8 +90,8 @@ struct RowRig : private LoadedRobot, FaultRig {
   }
 };
 
-inline Fault of(FaultKind kind) {
-  Fault fault;
+inline ScenarioFault of(FaultKind kind) {
+  ScenarioFault fault;
   fault.kind = kind;
   const bool joint = kind >= FaultKind::kEncoderFreeze && kind <= FaultKind::kSpringBreak;
   const bool board = kind >= FaultKind::kBoardKill && kind <= FaultKind::kSupplySag;
@@ -102,8 +102,8 @@ inline Fault of(FaultKind kind) {
 }
 
 /// `count` frames of one identifier are lost; 0: all from now on.
-inline Fault lose(std::uint32_t cob_id, std::uint32_t count) {
-  Fault fault = of(FaultKind::kFrameDrop);
+inline ScenarioFault lose(std::uint32_t cob_id, std::uint32_t count) {
+  ScenarioFault fault = of(FaultKind::kFrameDrop);
   fault.cob_id = cob_id;
   fault.cob_mask = 0x7FF;
   fault.count = count;

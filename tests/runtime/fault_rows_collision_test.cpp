@@ -70,7 +70,7 @@ TEST(FaultRow, CollisionTakesTheTorqueAway) {
 TEST(FaultRow, CollisionOfComanRetracts) {
   PushedRun run("coman", "squat", "LElbj", {30.0, 0.0, -40.0}, 0.1, hal::StopCategory::kCategory2);
   expect_row(run.watch());
-  for (const runtime::Fault& fault : run.cycle->faults())
+  for (const runtime::FaultReport& fault : run.cycle->faults())
     EXPECT_NE(fault.text.find("collision"), std::string::npos) << fault.text << ": it did not fall";
 }
 

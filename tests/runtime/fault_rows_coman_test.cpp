@@ -6,7 +6,7 @@
 
 #include "canopen/messages.hpp"
 #include "rt/stop_signal.hpp"
-#include "runtime/loop_watchdog.hpp"
+#include "runtime/cycle_watchdog.hpp"
 #include "tests/runtime/bundled_run.hpp"
 #include "tests/runtime/fault_row.hpp"
 #include "tests/support/eventually.hpp"
@@ -76,7 +76,7 @@ struct ComanRig : BundledRun {
   }
   [[nodiscard]] std::string causes() const {
     std::string all = backend->status_text();
-    for (const runtime::Fault& fault : cycle->faults())
+    for (const runtime::FaultReport& fault : cycle->faults())
       all += "\n" + fault.joint + ": " + fault.text;
     return all;
   }
@@ -111,7 +111,7 @@ TEST(FaultRow, ControllerOfComanHangs) {
   rig.run();
   std::atomic<std::int32_t> hung_in{-2};
   std::atomic<bool> back{false}, given_up{false};
-  const LoopWatchdog watchdog(
+  const CycleWatchdog watchdog(
       rig.cycle->heartbeat(),
       {.limit = std::chrono::milliseconds(50), .grace = std::chrono::hours(1)},
       {.on_hang =
@@ -241,7 +241,7 @@ TEST(FaultRow, ResetOfComanHolds) {
     for (hal::JointConfig& joint : e.robot.joints) joint.on_fault = hal::StopCategory::kHold;
   });
   rig.descend();
-  sim::Fault fault = of(FaultKind::kEncoderUnplug);
+  sim::ScenarioFault fault = of(FaultKind::kEncoderUnplug);
   fault.duration_ns = 5'000'000;
   ASSERT_EQ(rig.robot().inject(fault), Code::kOk);
   const Outcome found = rig.watch(200);

@@ -10,7 +10,7 @@ namespace tandem::runtime {
 namespace {
 
 using namespace test;
-using sim::Fault;
+using sim::ScenarioFault;
 
 /// Notices by the boards: an axis that is in a fault, or on its way into one.
 bool board_noticed(const FaultRig& rig) {
@@ -102,7 +102,7 @@ TEST_P(FaultRow, EmergencyStopByRequest) {
 TEST_P(FaultRow, EmergencyStopWhileHeldAfterAReset) {
   RowRig rig(GetParam(), {}, hal::StopCategory::kHold);
   rig.run();
-  Fault unplugged = of(FaultKind::kEncoderUnplug);
+  ScenarioFault unplugged = of(FaultKind::kEncoderUnplug);
   unplugged.duration_ns = 5'000'000;
   rig.inject(unplugged);
   for (int i = 0; i < 100; ++i) rig.step();
@@ -167,7 +167,7 @@ TEST_P(FaultRow, TwoBoardsShareANodeId) {
 TEST_P(FaultRow, AnswersComeTwice) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = lose(kFeedbackOfBoard0, 0);
+  ScenarioFault fault = lose(kFeedbackOfBoard0, 0);
   fault.kind = FaultKind::kFrameDuplicate;
   rig.inject(fault);
   expect_row(rig.watch());
@@ -175,7 +175,7 @@ TEST_P(FaultRow, AnswersComeTwice) {
 }
 
 TEST_P(FaultRow, WrongIdentity) {
-  Fault fault = of(FaultKind::kBoardIdentity);
+  ScenarioFault fault = of(FaultKind::kBoardIdentity);
   fault.number = 0x1234;
   RowRig rig(GetParam(), {fault});
   expect_row(rig.watch());
@@ -183,7 +183,7 @@ TEST_P(FaultRow, WrongIdentity) {
 }
 
 TEST_P(FaultRow, WrongFirmwareVersion) {
-  Fault fault = of(FaultKind::kBoardRevision);
+  ScenarioFault fault = of(FaultKind::kBoardRevision);
   fault.number = 0x00020000;
   RowRig rig(GetParam(), {fault});
   expect_row(rig.watch());
@@ -199,7 +199,7 @@ TEST_P(FaultRow, NodeMissingAtStart) {
 TEST_P(FaultRow, SensorNodeDies) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = of(FaultKind::kBoardKill);
+  ScenarioFault fault = of(FaultKind::kBoardKill);
   fault.board = -1;
   fault.sensor = 0;
   rig.inject(fault);
@@ -229,7 +229,7 @@ TEST_P(FaultRow, EncoderFreezes) {
 TEST_P(FaultRow, EncoderFreezesAtRest) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = of(FaultKind::kEncoderFreeze);
+  ScenarioFault fault = of(FaultKind::kEncoderFreeze);
   fault.joint = 2;  // is held
   rig.inject(fault);
   for (int i = 0; i < 500; ++i) rig.step();
@@ -245,7 +245,7 @@ TEST_P(FaultRow, EncoderFreezesAtRest) {
 TEST_P(FaultRow, EncoderJumps) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = of(FaultKind::kEncoderJump);
+  ScenarioFault fault = of(FaultKind::kEncoderJump);
   fault.value = 0.05;
   rig.inject(fault);
   expect_row(rig.watch());
@@ -279,7 +279,7 @@ TEST(FaultRow, SpringOfComanBreaks) {
 TEST_P(FaultRow, MotorOverheats) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = of(FaultKind::kMotorOverheat);
+  ScenarioFault fault = of(FaultKind::kMotorOverheat);
   fault.value = 130.0;
   rig.inject(fault);
   expect_row(rig.watch());
@@ -289,12 +289,12 @@ TEST_P(FaultRow, MotorOverheats) {
 TEST_P(FaultRow, MotorGetsHot) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = of(FaultKind::kMotorOverheat);
+  ScenarioFault fault = of(FaultKind::kMotorOverheat);
   fault.value = 110.0;
   rig.inject(fault);
   expect_row(rig.watch(200));
   EXPECT_EQ(rig.cycle->phase(), RunPhase::kRunning) << "the run continues";
-  const std::vector<runtime::Fault> told = rig.cycle->faults();
+  const std::vector<runtime::FaultReport> told = rig.cycle->faults();
   ASSERT_EQ(told.size(), 1U) << "once";
   EXPECT_EQ(told[0].joint, rig.robot.joints[0].name);
   EXPECT_EQ(told[0].category, hal::StopCategory::kWarn);
@@ -304,7 +304,7 @@ TEST_P(FaultRow, MotorGetsHot) {
 TEST_P(FaultRow, SupplySags) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = of(FaultKind::kSupplySag);
+  ScenarioFault fault = of(FaultKind::kSupplySag);
   fault.value = 20.0;  // of 48 V
   rig.inject(fault);
   expect_row(rig.watch());

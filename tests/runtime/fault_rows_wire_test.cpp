@@ -5,7 +5,7 @@ namespace tandem::runtime {
 namespace {
 
 using namespace test;
-using sim::Fault;
+using sim::ScenarioFault;
 
 // --- frames ---
 
@@ -108,7 +108,7 @@ TEST_P(FaultRow, HeartbeatOfABoardLost) {
 TEST_P(FaultRow, FrameCorruptedOnce) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = lose(kFeedbackOfBoard0, 1);
+  ScenarioFault fault = lose(kFeedbackOfBoard0, 1);
   fault.kind = FaultKind::kFrameCorrupt;
   fault.seed = 3;
   rig.inject(fault);
@@ -121,7 +121,7 @@ TEST_P(FaultRow, FrameCorruptedOnce) {
 TEST_P(FaultRow, FrameTooShort) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = lose(kCommandOfBoard0, 0);
+  ScenarioFault fault = lose(kCommandOfBoard0, 0);
   fault.kind = FaultKind::kFrameCorrupt;
   fault.length = 4;
   rig.inject(fault);
@@ -134,7 +134,7 @@ TEST_P(FaultRow, FrameTooShort) {
 TEST_P(FaultRow, FeedbackTooShort) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = lose(kFeedbackOfBoard0, 0);
+  ScenarioFault fault = lose(kFeedbackOfBoard0, 0);
   fault.kind = FaultKind::kFrameCorrupt;
   fault.length = 4;
   rig.inject(fault);
@@ -145,7 +145,7 @@ TEST_P(FaultRow, FeedbackTooShort) {
 TEST_P(FaultRow, FrameTwice) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = lose(kCommandOfBoard0, 100);
+  ScenarioFault fault = lose(kCommandOfBoard0, 100);
   fault.kind = FaultKind::kFrameDuplicate;
   rig.inject(fault);
   for (int i = 0; i < 200; ++i) rig.step();
@@ -157,7 +157,7 @@ TEST_P(FaultRow, FrameTwice) {
 TEST_P(FaultRow, FramesReordered) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = lose(kFeedbackOfBoard0, 10);
+  ScenarioFault fault = lose(kFeedbackOfBoard0, 10);
   fault.kind = FaultKind::kFrameReorder;
   rig.inject(fault);
   for (int i = 0; i < 200; ++i) rig.step();
@@ -180,7 +180,7 @@ TEST_P(FaultRow, BusDown) {
 TEST_P(FaultRow, BusDownForFiveCycles) {
   RowRig rig(GetParam());
   rig.run();
-  Fault fault = of(FaultKind::kBusDown);
+  ScenarioFault fault = of(FaultKind::kBusDown);
   fault.duration_ns = 5'000'000;
   rig.inject(fault);
   for (int i = 0; i < 5; ++i) rig.step();

@@ -13,7 +13,7 @@ namespace {
 using hal::StopCategory;
 
 struct Asking : ::testing::Test {
-  Inbox inbox{rt::LoopConfig{}};
+  Inbox inbox{rt::CyclicLoopConfig{}};
 };
 
 TEST_F(Asking, AStopIsConfirmedWhenItsCycleIsOverAndNotBefore) {

@@ -214,7 +214,7 @@ TEST(JointServicesOf, ARunThatDoesNotControlYetRefuseModes) {
 }
 
 /// Joint 1's position gains after a controller that has `joint` has set them.
-hal::PidGains gains_after(std::size_t joint, hal::PidGains wanted, std::vector<Fault>& faults,
+hal::PidGains gains_after(std::size_t joint, hal::PidGains wanted, std::vector<FaultReport>& faults,
                           const GainsRequest& operators = {}) {
   JointRun run;
   run.add("tuner", std::make_shared<test::Tuner>(joint, 1, wanted));
@@ -229,7 +229,7 @@ hal::PidGains gains_after(std::size_t joint, hal::PidGains wanted, std::vector<F
 }
 
 TEST(JointServicesOf, AControllerSetsTheGainsOfItsOwnJointsUpToTheirLimits) {
-  std::vector<Fault> faults;
+  std::vector<FaultReport> faults;
   EXPECT_EQ(gains_after(1, {.kp = 20.0, .ki = 1.0}, faults),
             (hal::PidGains{.kp = 20.0, .ki = 1.0}));
   EXPECT_TRUE(faults.empty());
@@ -246,7 +246,7 @@ TEST(JointServicesOf, AControllerSetsTheGainsOfItsOwnJointsUpToTheirLimits) {
 }
 
 TEST(JointServicesOf, AnOperatorsGainsLeaveWhatAControllerHasSet) {
-  std::vector<Fault> faults;
+  std::vector<FaultReport> faults;
   EXPECT_EQ(gains_after(1, {.kp = 20.0, .ki = 1.0}, faults, {.kd = 3.0}),
             (hal::PidGains{.kp = 20.0, .ki = 1.0, .kd = 3.0}));
 }

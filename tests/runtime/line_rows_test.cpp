@@ -6,13 +6,13 @@ namespace tandem::runtime {
 namespace {
 
 using namespace test;
-using sim::Fault;
+using sim::ScenarioFault;
 
 class LineRow : public testing::Test {};
 
 /// UR5e with its three boards in one line.
 struct LineRig : private LoadedRobot, FaultRig {
-  explicit LineRig(std::vector<Fault> scenario = {})
+  explicit LineRig(std::vector<ScenarioFault> scenario = {})
       : LoadedRobot("ur5e"),
         FaultRig(line(loaded.robot), loaded.kernels.get(), "ready", std::move(scenario),
                  RowRig::kHanging_ns) {}
@@ -31,7 +31,7 @@ struct LineRig : private LoadedRobot, FaultRig {
   }
   /// With this fault, and 0.5 s after its end: nothing has moved by itself, and after a reset the
   /// robot moves again.
-  void expect_recovery(const Fault& fault) {
+  void expect_recovery(const ScenarioFault& fault) {
     run();
     inject(fault);
     drive(1000);
@@ -54,15 +54,15 @@ struct LineRig : private LoadedRobot, FaultRig {
   hal::ParameterImage parameters = hal::initial_parameters(robot);
 };
 
-Fault frames(FaultKind kind, std::uint32_t count, sim::Direction direction) {
-  Fault fault = of(kind);
+ScenarioFault frames(FaultKind kind, std::uint32_t count, sim::FrameDirection direction) {
+  ScenarioFault fault = of(kind);
   fault.count = count;
   fault.direction = direction;
   return fault;
 }
 
-Fault cable_to(std::int32_t board, std::int64_t duration_ns = -1) {
-  Fault fault = of(FaultKind::kBusDown);
+ScenarioFault cable_to(std::int32_t board, std::int64_t duration_ns = -1) {
+  ScenarioFault fault = of(FaultKind::kBusDown);
   fault.board = board;
   fault.duration_ns = duration_ns;
   return fault;
@@ -72,7 +72,7 @@ Fault cable_to(std::int32_t board, std::int64_t duration_ns = -1) {
 TEST_F(LineRow, FramesOfACycleLost) {
   LineRig rig;
   rig.run();
-  rig.inject(frames(FaultKind::kFrameDrop, 2, sim::Direction::kToMaster));
+  rig.inject(frames(FaultKind::kFrameDrop, 2, sim::FrameDirection::kToMaster));
   std::uint32_t oldest = 0;
   for (int i = 0; i < 200; ++i) {
     rig.step();
@@ -88,7 +88,7 @@ TEST_F(LineRow, FramesOfACycleLost) {
 TEST_F(LineRow, FramesLostForEver) {
   LineRig rig;
   rig.run();
-  rig.inject(frames(FaultKind::kFrameDrop, 0, sim::Direction::kBoth));
+  rig.inject(frames(FaultKind::kFrameDrop, 0, sim::FrameDirection::kBoth));
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("no frame comes back"), std::string::npos) << rig.causes();
 }
@@ -96,7 +96,7 @@ TEST_F(LineRow, FramesLostForEver) {
 TEST_F(LineRow, FramesLate) {
   LineRig rig;
   rig.run();
-  rig.inject(frames(FaultKind::kFrameDelay, 1, sim::Direction::kToMaster));
+  rig.inject(frames(FaultKind::kFrameDelay, 1, sim::FrameDirection::kToMaster));
   for (int i = 0; i < 200; ++i) rig.step();
   expect_struck(rig, 1);
   expect_running(rig);
@@ -106,7 +106,7 @@ TEST_F(LineRow, FramesLate) {
 TEST_F(LineRow, FramesTwice) {
   LineRig rig;
   rig.run();
-  rig.inject(frames(FaultKind::kFrameDuplicate, 40, sim::Direction::kToMaster));
+  rig.inject(frames(FaultKind::kFrameDuplicate, 40, sim::FrameDirection::kToMaster));
   for (int i = 0; i < 200; ++i) rig.step();
   expect_struck(rig, 40);
   expect_running(rig);
@@ -137,7 +137,7 @@ TEST_F(LineRow, CableToTheFirstSlaveCut) {
 TEST_F(LineRow, SlaveWithoutPower) {
   LineRig rig;
   rig.run();
-  Fault fault = of(FaultKind::kBoardKill);
+  ScenarioFault fault = of(FaultKind::kBoardKill);
   fault.board = 2;  // the last one: the others are still reached
   fault.duration_ns = 500'000'000;
   rig.inject(fault);
@@ -148,7 +148,7 @@ TEST_F(LineRow, SlaveWithoutPower) {
 TEST_F(LineRow, BoardResets) {
   LineRig rig;
   rig.run();
-  Fault fault = of(FaultKind::kBoardReset);
+  ScenarioFault fault = of(FaultKind::kBoardReset);
   fault.board = 1;
   fault.duration_ns = 0;
   rig.inject(fault);
@@ -161,7 +161,7 @@ TEST_F(LineRow, BoardResets) {
 TEST_F(LineRow, FirstBoardResets) {
   LineRig rig;
   rig.run();
-  Fault fault = of(FaultKind::kBoardReset);
+  ScenarioFault fault = of(FaultKind::kBoardReset);
   fault.duration_ns = 0;
   rig.inject(fault);
   expect_row(rig.watch());
@@ -179,7 +179,7 @@ TEST_F(LineRow, FirstBoardResets) {
 }
 
 TEST_F(LineRow, WrongIdentity) {
-  Fault fault = of(FaultKind::kBoardIdentity);
+  ScenarioFault fault = of(FaultKind::kBoardIdentity);
   fault.board = 1;
   fault.number = 7;
   LineRig rig({fault});
@@ -193,7 +193,7 @@ TEST_F(LineRow, WrongIdentity) {
 }
 
 TEST_F(LineRow, WrongRevision) {
-  Fault fault = of(FaultKind::kBoardRevision);
+  ScenarioFault fault = of(FaultKind::kBoardRevision);
   fault.board = 1;
   fault.number = 0x00020000;
   LineRig rig({fault});
@@ -270,7 +270,7 @@ TEST_F(LineRow, WorkingCounterShortForEver) {
 TEST_F(LineRow, WatchdogOfTheOutputs) {
   LineRig rig;
   rig.run();
-  Fault fault = frames(FaultKind::kFrameDrop, 0, sim::Direction::kToBoards);
+  ScenarioFault fault = frames(FaultKind::kFrameDrop, 0, sim::FrameDirection::kToBoards);
   fault.duration_ns = 150'000'000;
   rig.inject(fault);
   expect_row(rig.watch());
@@ -283,7 +283,7 @@ TEST_F(LineRow, WatchdogOfTheOutputs) {
 }
 
 TEST_F(LineRow, SlaveMissingAtTheStart) {
-  Fault fault = of(FaultKind::kBoardKill);
+  ScenarioFault fault = of(FaultKind::kBoardKill);
   fault.board = 2;
   LineRig rig({fault});
   for (int i = 0; i < 8000 && !rig.noticed(); ++i) rig.step();

@@ -41,7 +41,7 @@ struct LoggedSquat {
   }
   log::LogFile run() {
     squat->cycle->run();
-    for (const Fault& fault : squat->cycle->faults()) ADD_FAILURE() << fault.text;
+    for (const FaultReport& fault : squat->cycle->faults()) ADD_FAILURE() << fault.text;
     EXPECT_GT(squat->cycle->running_cycles(), 0U);
     EXPECT_EQ((*recorder)->close().dropped, 0U);
     auto file = log::LogFile::open(path_);
@@ -66,13 +66,13 @@ class Lockstep : public testing::TestWithParam<const char*> {};
 
 /// `cycles` of a squat in process and over the wire, compared; 0: all of it.
 void expect_same_squat(const std::string& name, std::uint64_t cycles, bool bus_timing,
-                       const std::vector<sim::Fault>& faults = {}) {
+                       const std::vector<sim::ScenarioFault>& faults = {}) {
   const log::ScratchFolder folder;
   std::optional<LockstepRobot> wire;
   LoggedSquat in_process(name, folder / "a.mcap", cycles, nullptr, bus_timing);
   LoggedSquat over_wire(name, folder / "b.mcap", cycles, &wire, bus_timing);
   sim::EmulatedRobot& robot = in_process.squat->backend->robot();
-  for (const sim::Fault& fault : faults) {
+  for (const sim::ScenarioFault& fault : faults) {
     ASSERT_EQ(robot.inject(fault), Code::kOk);
     ASSERT_EQ(wire->emulated->inject(fault), Code::kOk);
   }
@@ -105,18 +105,18 @@ TEST_P(Lockstep, TheTimeOfFramesOnTheWireIsTheSameOnEitherSide) {
 }
 
 TEST_P(Lockstep, AScenariosFaultsAreTheSameBitsOnEitherSide) {
-  std::vector<sim::Fault> faults(3);
+  std::vector<sim::ScenarioFault> faults(3);
   faults[0].kind = hal::FaultKind::kFrameDrop;
   faults[0].probability = 0.01;
   faults[1].kind = hal::FaultKind::kFrameDelay;
-  faults[1].direction = sim::Direction::kToMaster;
+  faults[1].direction = sim::FrameDirection::kToMaster;
   faults[1].probability = 0.01;
   faults[1].steps = 2;
   faults[2].kind = hal::FaultKind::kFrameReorder;
   faults[2].cob_id = 0x180;
   faults[2].cob_mask = 0x780;
   faults[2].probability = 0.01;
-  for (sim::Fault& fault : faults) {
+  for (sim::ScenarioFault& fault : faults) {
     fault.from = sim::FaultFrom::kEnabled;
     fault.start_ns = 1'200'000'000;
     fault.duration_ns = 500'000'000;

@@ -1,5 +1,5 @@
 // The watchdog by itself: what is a hang, what is a wait, and what follows.
-#include "runtime/loop_watchdog.hpp"
+#include "runtime/cycle_watchdog.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/ptrace.h>
@@ -18,7 +18,7 @@ namespace {
 using std::chrono::milliseconds;
 
 struct Watched : ::testing::Test {
-  LoopWatchdog::Hooks hooks() {
+  CycleWatchdog::Hooks hooks() {
     return {.on_hang = [this](bool at_work) { (at_work ? hangs : waits) += 1; },
             .on_return = [this] { returns += 1; },
             .on_given_up = [this] { given_up += 1; }};
@@ -36,8 +36,8 @@ struct Watched : ::testing::Test {
 };
 
 TEST_F(Watched, ALoopThatDoesNotLeaveItsCycleHangsAndIsGivenUpOnce) {
-  const LoopWatchdog watchdog(heartbeat, {.limit = milliseconds(50), .grace = milliseconds(50)},
-                              hooks());
+  const CycleWatchdog watchdog(heartbeat, {.limit = milliseconds(50), .grace = milliseconds(50)},
+                               hooks());
   cycles(3);
   heartbeat.enter();
   EXPECT_TRUE(tandem::test::eventually([&] { return given_up == 1; }));
@@ -52,11 +52,11 @@ TEST_F(Watched, ALoopThatADebuggerHoldsHangsOnARobotOnly) {
     const pid_t child = ::fork();
     if (child == 0) {
       if (!tandem::test::eventually(is_debugged)) ::_exit(2);
-      const LoopWatchdog watchdog(heartbeat,
-                                  {.limit = milliseconds(50),
-                                   .grace = std::chrono::hours(1),
-                                   .waits_for_debugger = waits_for_debugger},
-                                  hooks());
+      const CycleWatchdog watchdog(heartbeat,
+                                   {.limit = milliseconds(50),
+                                    .grace = std::chrono::hours(1),
+                                    .waits_for_debugger = waits_for_debugger},
+                                   hooks());
       heartbeat.enter();
       if (!waits_for_debugger)
         ::_exit(tandem::test::eventually([&] { return hangs == 1; }) ? 0 : 1);
@@ -72,8 +72,8 @@ TEST_F(Watched, ALoopThatADebuggerHoldsHangsOnARobotOnly) {
 }
 
 TEST_F(Watched, ALoopThatStandsStillIsNotWaitedFor) {
-  const LoopWatchdog watchdog(heartbeat,
-                              {.limit = std::chrono::hours(1), .grace = milliseconds(50)}, hooks());
+  const CycleWatchdog watchdog(
+      heartbeat, {.limit = std::chrono::hours(1), .grace = milliseconds(50)}, hooks());
   cycles(3);
   heartbeat.enter();
   heartbeat.stand_still();
@@ -82,8 +82,8 @@ TEST_F(Watched, ALoopThatStandsStillIsNotWaitedFor) {
 }
 
 TEST_F(Watched, ALoopThatComesBackIsToldAndWatchedOn) {
-  const LoopWatchdog watchdog(heartbeat,
-                              {.limit = milliseconds(30), .grace = std::chrono::hours(1)}, hooks());
+  const CycleWatchdog watchdog(
+      heartbeat, {.limit = milliseconds(30), .grace = std::chrono::hours(1)}, hooks());
   for (int i = 1; i <= 2; ++i) {
     heartbeat.enter();
     EXPECT_TRUE(tandem::test::eventually([&] { return hangs == i; }));
@@ -95,14 +95,14 @@ TEST_F(Watched, ALoopThatComesBackIsToldAndWatchedOn) {
 
 TEST_F(Watched, AWaitIsAHangOnlyWhereItHasALimit) {
   {
-    const LoopWatchdog simulated(heartbeat, {.limit = milliseconds(20), .grace = milliseconds(20)},
-                                 hooks());
+    const CycleWatchdog simulated(heartbeat, {.limit = milliseconds(20), .grace = milliseconds(20)},
+                                  hooks());
     std::this_thread::sleep_for(milliseconds(100));  // the first cycle has not begun
     cycles(1);
     std::this_thread::sleep_for(milliseconds(200));
     EXPECT_EQ(hangs + waits, 0);
   }
-  const LoopWatchdog on_robot(
+  const CycleWatchdog on_robot(
       heartbeat,
       {.limit = milliseconds(20), .wait_limit = milliseconds(40), .grace = std::chrono::hours(1)},
       hooks());

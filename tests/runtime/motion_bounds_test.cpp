@@ -208,7 +208,7 @@ class WildRun {
   bool step() {
     const bool goes_on = cycle_->step();
     ++found_.cycles;
-    const std::vector<Fault> faults = cycle_->faults();
+    const std::vector<FaultReport> faults = cycle_->faults();
     for (; told_ < faults.size(); ++told_) {
       const auto& fault = faults[told_];
       const int joint = robot_.joint_index(fault.joint);

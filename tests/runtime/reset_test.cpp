@@ -192,7 +192,7 @@ TEST_F(Waiting, AResetHoldsEveryJointThenStartsTheControllersAgain) {
   EXPECT_EQ(until(RunPhase::kRunning), 10);
   EXPECT_EQ(controller->starts, 2);
   EXPECT_EQ(controller->updates, updates + 1);
-  const Fault fault = cycle->faults().at(0);
+  const FaultReport fault = cycle->faults().at(0);
   EXPECT_FALSE(fault.latched);
   EXPECT_DOUBLE_EQ(fault.time_s, 0.1);
   EXPECT_DOUBLE_EQ(fault.cleared_s, 0.155);

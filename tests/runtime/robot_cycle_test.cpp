@@ -80,7 +80,7 @@ void run_with_stray(TestRun& run) {
   EXPECT_NE(run.cycle->command().position_rad()[0], 0.07);
   EXPECT_EQ(run.cycle->command().mode()[2], static_cast<std::int8_t>(hal::ControlMode::kPosition));
   ASSERT_FALSE(run.cycle->faults().empty());
-  const Fault first = run.cycle->faults()[0];
+  const FaultReport first = run.cycle->faults()[0];
   EXPECT_EQ(first.cycle, 19U) << "the first in which controllers run";
   EXPECT_EQ(first.joint, run.robot.joints[0].name);
   EXPECT_EQ(first.text,

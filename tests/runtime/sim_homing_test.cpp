@@ -194,7 +194,7 @@ TEST_P(HomedSwing, AFaultEndsTheHomingAndNothingMovesOn) {
   until(RunPhase::kHeld);
   home();
   steps(500);
-  sim::Fault fault;
+  sim::ScenarioFault fault;
   fault.kind = FaultKind::kEncoderUnplug;
   fault.joint = 0;
   fault.duration_ns = 5'000'000;
@@ -223,7 +223,7 @@ TEST_P(HomedSwing, SurvivesAResetOfFaultsButNotTheBoardsPower) {
   steps(100);
   ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
   const auto fault_of = [&](FaultKind kind) {
-    sim::Fault fault;
+    sim::ScenarioFault fault;
     fault.kind = kind;
     (kind == FaultKind::kEncoderUnplug ? fault.joint : fault.board) = 0;
     fault.duration_ns = 5'000'000;

@@ -25,7 +25,7 @@ struct Swing : ::testing::Test, test::SwingLoop {
   }
   int until(RunPhase phase) { return LoopRun::until(phase, 6000); }
   void inject(FaultKind kind, int cycles) {
-    sim::Fault fault;
+    sim::ScenarioFault fault;
     fault.kind = kind;
     (kind == FaultKind::kEncoderUnplug ? fault.joint : fault.board) = 0;
     fault.duration_ns = std::int64_t{cycles} * 1'000'000;

@@ -116,7 +116,7 @@ TEST(SimRun, EndsInAFaultThatNamesTheJointWhenTheCableIsCut) {
   ASSERT_FALSE(faults.empty());
   EXPECT_LT(run.cycle->running_cycles(), 250U);
   bool named = false;
-  for (const Fault& fault : faults) {
+  for (const FaultReport& fault : faults) {
     named = named || fault.joint == "swing" || fault.text.find("swing") != std::string::npos;
   }
   EXPECT_TRUE(named) << faults[0].text;

@@ -93,7 +93,7 @@ TEST_P(SquatOf, StaysOnItsFeetAndFollowsWithinADegree) {
   SquatWatch watch(truth, squat.run->kernels().mass_kg, e.loop.period_ns, GetParam().depth_m);
   while (squat.cycle->step() && squat.cycle->phase() == RunPhase::kRunning) watch.take(truth);
   squat.cycle->run();
-  for (const Fault& fault : squat.cycle->faults()) ADD_FAILURE() << fault.joint << fault.text;
+  for (const FaultReport& fault : squat.cycle->faults()) ADD_FAILURE() << fault.joint << fault.text;
   EXPECT_EQ(squat.cycle->running_cycles(), e.cycles());
 
   const auto tracking = squat.cycle->statistics().tracking();

@@ -100,7 +100,7 @@ TEST(SquatSwitch, ChangesNothingInItsCycleAndNoMoreThanASquatInThoseAfterIt) {
     (void)run.go(change.then);
     std::printf(", tilt %.3f rad\n", run.cycle->statistics().base()->final_tilt_rad);
   }
-  for (const Fault& fault : run.cycle->faults()) ADD_FAILURE() << fault.joint << fault.text;
+  for (const FaultReport& fault : run.cycle->faults()) ADD_FAILURE() << fault.joint << fault.text;
   const auto base = run.cycle->statistics().base();
   ASSERT_TRUE(base);
   EXPECT_LT(base->final_tilt_rad, 0.05) << "it stands";

@@ -11,7 +11,7 @@ namespace tandem::runtime {
 namespace {
 
 using hal::StopCategory;
-using Kind = LoopRequest::Kind;
+using Kind = CycleRequest::Kind;
 
 /// An owner in another process, that a test speaks for.
 struct PlayedOwner final : hal::RemoteCommandPort {
@@ -108,7 +108,7 @@ std::vector<Other> others() {
       {"owner's reset", true, [](Robot& r) { r.port.wish.reset = true; }},
       {"owner's command", false, [](Robot& r) { r.port.wish.live = true; }},
   };
-  const auto request = [&](const char* name, LoopRequest one) {
+  const auto request = [&](const char* name, CycleRequest one) {
     one.number = 77;
     all.push_back({name, false, [one](Robot& r) { EXPECT_TRUE(r.cycle->inbox().ask(one)); }});
   };

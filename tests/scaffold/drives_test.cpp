@@ -53,7 +53,7 @@ TEST_P(DrivesOfPublicRobots, KeepTheirDistanceFromWhatLagMakesUnstable) {
 /// M s^3 + D s^2 + (kp - G) s + ki is stable for the heaviest load M that stands on a leg: Routh.
 TEST_P(DrivesOfPublicRobots, KeepWhatStandsOnALegFromFalling) {
   const NewRobot robot = made(GetParam());
-  for (const Foot& foot : robot.feet) {
+  for (const FoundFoot& foot : robot.feet) {
     const double share_kg = robot.mass_kg / static_cast<double>(robot.feet.size());
     for (const int j : robot.tree.path_to(foot.body)) {
       const hal::JointConfig& joint =

@@ -91,7 +91,7 @@ TEST(Found, LegsOfFiveJointsStandLevelThoughTheMassIsBesideTheMiddle) {
           robot->config.postures[0].position_rad[j];
     }
     const Posed posed(robot->tree, q);
-    for (const Foot& foot : robot->feet) {
+    for (const FoundFoot& foot : robot->feet) {
       const model::Placement sole = posed.link(foot.link) * foot.sole_in_link;
       EXPECT_GT(sole.R(2, 2), std::cos(1e-3)) << "level within 1 mrad";
       EXPECT_NEAR(sole.p.z(), -robot->stands_m, 2e-4);
@@ -147,7 +147,7 @@ TEST(Found, FeetWithoutUsableShapesArePointsWhereTheLegHasNoAnkle) {
     const Made robot = tried(quadruped(foot));
     ASSERT_TRUE(robot) << foot << robot.error().front().to_string();
     ASSERT_EQ(robot->feet.size(), 4U) << foot;
-    for (const Foot& one : robot->feet) {
+    for (const FoundFoot& one : robot->feet) {
       EXPECT_EQ(one.points.size(), 1U) << foot;
       EXPECT_EQ(one.guess.empty(), foot == kBall) << foot;
     }
@@ -176,8 +176,8 @@ TEST(Found, ARootWhoseYIsUpIsSaidWithARemedyThatWorks) {
   const Made straight = tried(quadruped(kBall));
   EXPECT_NEAR(upright->stands_m, straight->stands_m, 1e-3);
   std::vector<std::string> names, expected;
-  for (const Foot& foot : upright->feet) names.push_back(foot.name);
-  for (const Foot& foot : straight->feet) expected.push_back(foot.name);
+  for (const FoundFoot& foot : upright->feet) names.push_back(foot.name);
+  for (const FoundFoot& foot : straight->feet) expected.push_back(foot.name);
   EXPECT_EQ(names, expected) << "front and hind, left and right";
 
   const Made asked = tried(lying, Base::kFloating);
@@ -366,7 +366,7 @@ TEST(Found, TheRemedyForYUpKeepsAheadAndLinesAreLevel) {
         robot->config.postures[0].position_rad[j];
   }
   const Posed posed(robot->tree, q);
-  for (const Foot& foot : robot->feet) {
+  for (const FoundFoot& foot : robot->feet) {
     ASSERT_EQ(foot.points.size(), 2U);
     const model::Placement sole = posed.link(foot.link) * foot.sole_in_link;
     for (const Eigen::Vector3d& p : foot.points)

@@ -366,7 +366,7 @@ TEST(NewRobot, LeavesPointFeetWhereTheyAreWhileTheRobotGoesDown) {
   const auto spans = [&](const Eigen::VectorXd& q) {
     const Posed posed(anymal.tree, q);
     std::vector<double> found;
-    for (const Foot& foot : anymal.feet) {
+    for (const FoundFoot& foot : anymal.feet) {
       const model::Placement sole = posed.link(foot.link) * foot.sole_in_link;
       const model::Placement first = posed.link(anymal.feet[0].link) * anymal.feet[0].sole_in_link;
       found.push_back(
@@ -437,7 +437,7 @@ TEST(NewRobot, PutsContactPointsIntoThePlaneOfALevelSoleLink) {
 </robot>)";
   const NewRobot robot = made_of(std::regex_replace(kHopper, std::regex("</robot>"), sole));
   ASSERT_EQ(robot.feet.size(), 1U);
-  const Foot& foot = robot.feet[0];
+  const FoundFoot& foot = robot.feet[0];
   EXPECT_EQ(robot.tree.links[static_cast<std::size_t>(foot.link)].name, "sole");
   ASSERT_EQ(foot.points.size(), 4U);
   for (const Eigen::Vector3d& p : foot.points) {

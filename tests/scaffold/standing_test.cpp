@@ -25,7 +25,7 @@ Eigen::VectorXd posture_of(const NewRobot& robot) {
 /// Every contact point above the ground.
 std::vector<Eigen::Vector3d> points_of(const NewRobot& robot, const Posed& posed) {
   std::vector<Eigen::Vector3d> points;
-  for (const Foot& foot : robot.feet) {
+  for (const FoundFoot& foot : robot.feet) {
     const model::Placement sole = posed.link(foot.link) * foot.sole_in_link;
     for (const Eigen::Vector3d& p : foot.points) {
       points.emplace_back(sole.R * p + sole.p + Eigen::Vector3d(0.0, 0.0, robot.stands_m));

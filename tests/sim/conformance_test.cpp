@@ -11,7 +11,7 @@ ConformanceRobot make(RobotConfig robot, int order) {
   auto backend = sim::SimRobot::create(made.robot, tandem::test::swing_kernels(order), {});
   EXPECT_TRUE(backend.has_value()) << backend.error().to_string();
   made.provoke_fault = [raw = backend->get()](std::size_t j) {
-    sim::Fault unplugged;
+    sim::ScenarioFault unplugged;
     unplugged.kind = hal::FaultKind::kEncoderUnplug;
     unplugged.joint = static_cast<std::int32_t>(j);
     unplugged.duration_ns = 3'000'000;

@@ -19,10 +19,11 @@ Frame frame(std::uint32_t id, std::uint8_t first) {
 
 /// One bus with one fault; what comes out of a step, as first bytes.
 struct Line {
-  explicit Line(const Fault& fault, std::uint64_t seed = 1) : faults(seed) {
+  explicit Line(const ScenarioFault& fault, std::uint64_t seed = 1) : faults(seed) {
     EXPECT_TRUE(faults.add(fault));
   }
-  std::vector<Frame> step(const std::vector<Frame>& in, Direction way = Direction::kToMaster) {
+  std::vector<Frame> step(const std::vector<Frame>& in,
+                          FrameDirection way = FrameDirection::kToMaster) {
     faults.begin_step(time_ns, -1);
     time_ns += 1'000'000;
     std::vector<Frame> got;
@@ -46,8 +47,8 @@ struct Line {
   std::int64_t time_ns = 0;
 };
 
-Fault of(FaultKind kind) {
-  Fault fault;
+ScenarioFault of(FaultKind kind) {
+  ScenarioFault fault;
   fault.kind = kind;
   return fault;
 }
@@ -55,7 +56,7 @@ Fault of(FaultKind kind) {
 using Ints = std::vector<int>;
 
 TEST(FaultInjection, DropsWhatIsSelectedUntilItsCountIsReached) {
-  Fault fault = of(FaultKind::kFrameDrop);
+  ScenarioFault fault = of(FaultKind::kFrameDrop);
   fault.node_id = 1;
   fault.count = 2;
   Line line(fault);
@@ -64,21 +65,21 @@ TEST(FaultInjection, DropsWhatIsSelectedUntilItsCountIsReached) {
 }
 
 TEST(FaultInjection, SelectsByCobIdMaskDirectionAndTime) {
-  Fault fault = of(FaultKind::kFrameDrop);
+  ScenarioFault fault = of(FaultKind::kFrameDrop);
   fault.cob_id = 0x180;
   fault.cob_mask = 0x780;
-  fault.direction = Direction::kToMaster;
+  fault.direction = FrameDirection::kToMaster;
   fault.start_ns = 1'000'000;
   fault.duration_ns = 2'000'000;
   Line line(fault);
   EXPECT_EQ(line.step({frame(0x181, 1)}).size(), 1U) << "not yet";
   EXPECT_EQ(line.step({frame(0x181, 1), frame(0x281, 2)}).size(), 1U);
-  EXPECT_EQ(line.step({frame(0x181, 1)}, Direction::kToBoards).size(), 1U) << "the other way";
+  EXPECT_EQ(line.step({frame(0x181, 1)}, FrameDirection::kToBoards).size(), 1U) << "the other way";
   EXPECT_EQ(line.step({frame(0x181, 1)}).size(), 1U) << "over";
 }
 
 TEST(FaultInjection, DelaysByItsSteps) {
-  Fault fault = of(FaultKind::kFrameDelay);
+  ScenarioFault fault = of(FaultKind::kFrameDelay);
   fault.steps = 2;
   fault.count = 1;
   Line line(fault);
@@ -90,7 +91,7 @@ TEST(FaultInjection, DelaysByItsSteps) {
 TEST(FaultInjection, DuplicatesAndReorders) {
   Line twice(of(FaultKind::kFrameDuplicate));
   EXPECT_EQ(twice.bytes({frame(0x181, 1)}), (Ints{1, 1}));
-  Fault fault = of(FaultKind::kFrameReorder);
+  ScenarioFault fault = of(FaultKind::kFrameReorder);
   fault.cob_id = 0x181;
   fault.cob_mask = 0x7FF;
   Line line(fault);
@@ -99,7 +100,7 @@ TEST(FaultInjection, DuplicatesAndReorders) {
 }
 
 TEST(FaultInjection, AFrameThatWaitsForItsSuccessorComesWhenTheFaultEnds) {
-  Fault fault = of(FaultKind::kFrameReorder);
+  ScenarioFault fault = of(FaultKind::kFrameReorder);
   fault.duration_ns = 1'000'000;
   Line line(fault);
   EXPECT_EQ(line.bytes({frame(0x181, 1)}), Ints{});
@@ -107,7 +108,7 @@ TEST(FaultInjection, AFrameThatWaitsForItsSuccessorComesWhenTheFaultEnds) {
 }
 
 TEST(FaultInjection, FlipsBitsOrShortens) {
-  Fault fault = of(FaultKind::kFrameCorrupt);
+  ScenarioFault fault = of(FaultKind::kFrameCorrupt);
   Line line(fault);
   const Frame sent = frame(0x181, 0x55);
   const Frame got = line.step({sent}).at(0);
@@ -122,7 +123,7 @@ TEST(FaultInjection, FlipsBitsOrShortens) {
 }
 
 TEST(FaultInjection, ChanceIsTheSeedsAlone) {
-  Fault fault = of(FaultKind::kFrameDrop);
+  ScenarioFault fault = of(FaultKind::kFrameDrop);
   fault.probability = 0.3;
   const auto lost = [&](std::uint64_t seed) {
     Line line(fault, seed);
@@ -138,7 +139,7 @@ TEST(FaultInjection, ChanceIsTheSeedsAlone) {
 }
 
 TEST(FaultInjection, ABusThatIsDownPassesNothing) {
-  Fault fault = of(FaultKind::kBusDown);
+  ScenarioFault fault = of(FaultKind::kBusDown);
   fault.bus = 0;
   fault.duration_ns = 1'000'000;
   Line line(fault);
@@ -156,7 +157,7 @@ TEST(FaultInjection, TellsOfEachFaultOnceEvenOfTheShortest) {
 }
 
 TEST(FaultInjection, AFaultShorterThanAStepActsOnOneStep) {
-  Fault fault = of(FaultKind::kFrameDrop);
+  ScenarioFault fault = of(FaultKind::kFrameDrop);
   fault.start_ns = 500'000;
   fault.duration_ns = 1;
   Line line(fault);
@@ -167,7 +168,7 @@ TEST(FaultInjection, AFaultShorterThanAStepActsOnOneStep) {
 }
 
 TEST(FaultInjection, WaitsUntilAllIsEnabled) {
-  Fault fault = of(FaultKind::kFrameDrop);
+  ScenarioFault fault = of(FaultKind::kFrameDrop);
   fault.from = FaultFrom::kEnabled;
   fault.start_ns = 10;
   FaultInjection faults(1);
@@ -189,7 +190,7 @@ TEST(FaultInjection, MoreThanThereIsRoomForAreRefused) {
 }
 
 TEST(FaultInjection, ASnapshotHoldsWhatWaitsAndWhatIsRandom) {
-  Fault fault = of(FaultKind::kFrameDelay);
+  ScenarioFault fault = of(FaultKind::kFrameDelay);
   fault.steps = 3;
   fault.probability = 0.5;
   Line line(fault);

@@ -13,8 +13,8 @@ using hal::FaultKind;
 using Loop = test::SwingLoop;
 using test::swing_robot;
 
-Fault of(FaultKind kind) {
-  Fault fault;
+ScenarioFault of(FaultKind kind) {
+  ScenarioFault fault;
   fault.kind = kind;
   const bool joint = kind >= FaultKind::kEncoderFreeze && kind <= FaultKind::kSpringBreak;
   const bool board = kind >= FaultKind::kBoardKill && kind <= FaultKind::kSupplySag;
@@ -26,7 +26,7 @@ Fault of(FaultKind kind) {
 
 /// A swing that holds, and then has this fault.
 struct Faulty : Loop {
-  explicit Faulty(const Fault& fault, int order = 2)
+  explicit Faulty(const ScenarioFault& fault, int order = 2)
       : Loop(swing_robot(order), {.posture = "up"}, order) {
     bring_up();
     run(200);
@@ -47,7 +47,7 @@ TEST(InjectedFault, AFrozenEncoderStaysWhileTheJointMoves) {
 }
 
 TEST(InjectedFault, AnEncoderJumpsByItsAngleAndBack) {
-  Fault fault = of(FaultKind::kEncoderJump);
+  ScenarioFault fault = of(FaultKind::kEncoderJump);
   fault.value = 0.005;
   fault.duration_ns = 3'000'000;
   Faulty loop(fault);
@@ -60,7 +60,7 @@ TEST(InjectedFault, AnEncoderJumpsByItsAngleAndBack) {
 }
 
 TEST(InjectedFault, TheMotorsEncoderIsOneOfItsOwn) {
-  Fault fault = of(FaultKind::kEncoderUnplug);
+  ScenarioFault fault = of(FaultKind::kEncoderUnplug);
   fault.encoder = EncoderSide::kMotor;
   Faulty loop(fault);
   loop.step();
@@ -75,7 +75,7 @@ TEST(InjectedFault, ABrokenSpringCarriesNothingAndAddsNoEnergy) {
   loop.run(1500);
   EmulatedRobot& emulated = loop.sim_robot->robot();
   ASSERT_GT(std::abs(emulated.plant().joint(0).torque_Nm), 1.0) << "it carries the link";
-  Fault off = of(FaultKind::kBoardKill);  // nobody drives it any more
+  ScenarioFault off = of(FaultKind::kBoardKill);  // nobody drives it any more
   ASSERT_EQ(emulated.inject(off), Code::kOk);
   ASSERT_EQ(emulated.inject(of(FaultKind::kSpringBreak)), Code::kOk);
   const ActuatorModel& m = emulated.plant().actuators().model(0);
@@ -95,7 +95,7 @@ TEST(InjectedFault, ABrokenSpringCarriesNothingAndAddsNoEnergy) {
 }
 
 TEST(InjectedFault, AnOverheatedWindingIsMeasuredAndCools) {
-  Fault fault = of(FaultKind::kMotorOverheat);
+  ScenarioFault fault = of(FaultKind::kMotorOverheat);
   fault.value = 100.0;
   fault.ramp_ns = 10'000'000;
   fault.duration_ns = 20'000'000;
@@ -109,7 +109,7 @@ TEST(InjectedFault, AnOverheatedWindingIsMeasuredAndCools) {
 }
 
 TEST(InjectedFault, ASaggingSupplyIsMeasuredAndBoundsTheBridge) {
-  Fault fault = of(FaultKind::kSupplySag);
+  ScenarioFault fault = of(FaultKind::kSupplySag);
   fault.value = 30.0;
   fault.ramp_ns = 10'000'000;
   Faulty loop(fault);
@@ -123,7 +123,7 @@ TEST(InjectedFault, ASaggingSupplyIsMeasuredAndBoundsTheBridge) {
 }
 
 TEST(InjectedFault, ABoardWithoutPowerIsSilentAndBootsWhenItIsBack) {
-  Fault fault = of(FaultKind::kBoardKill);
+  ScenarioFault fault = of(FaultKind::kBoardKill);
   fault.duration_ns = 50'000'000;
   Faulty loop(fault);
   loop.run(1);
@@ -147,7 +147,7 @@ TEST(InjectedFault, AResetBoardForgetsItsConfiguration) {
 }
 
 TEST(InjectedFault, AnotherIdentityIsReadWhileItLasts) {
-  Fault fault = of(FaultKind::kBoardIdentity);
+  ScenarioFault fault = of(FaultKind::kBoardIdentity);
   fault.number = 0x1234;
   fault.duration_ns = 5'000'000;
   Faulty loop(fault);
@@ -189,7 +189,7 @@ TEST(InjectedFault, SnapshotsHoldEveryKindOfFault) {
        {FaultKind::kFrameDelay, FaultKind::kFrameReorder, FaultKind::kEncoderFreeze,
         FaultKind::kEncoderJump, FaultKind::kMotorOverheat, FaultKind::kSupplySag,
         FaultKind::kBoardDuplicate, FaultKind::kSpringBreak}) {
-    Fault fault = of(kind);
+    ScenarioFault fault = of(kind);
     fault.from = FaultFrom::kEnabled;
     fault.start_ns = 100'000'000;
     fault.value = kind == FaultKind::kEncoderJump ? 0.001 : 30.0;

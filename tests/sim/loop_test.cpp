@@ -176,13 +176,13 @@ TEST_F(FourBar, AcceleratesAsItsOneCoordinateDoes) {
 TEST_F(FourBar, TakesEquationsThatRepeatEachOther) {
   PlantConfig revolute = config({1.0});
   PlantConfig ball = revolute;
-  ball.loops[0].type = model::LoopType::kBall;
+  ball.loops[0].type = model::KinematicLoopType::kBall;
   const std::vector<double> v{2.0, 0.0, 0.0};
   std::vector<VectorXd> results;
   for (const PlantConfig& one : {revolute, ball}) {
     Plant plant = make(one);
     EXPECT_EQ(plant.loops().equations().rows(),
-              one.loops[0].type == model::LoopType::kBall ? 3u : 5u);
+              one.loops[0].type == model::KinematicLoopType::kBall ? 3u : 5u);
     model::ClosedLoops loops = plant.loops().equations();
     std::vector<double> rates = v;
     loops.move(plant.q(), rates.data());
@@ -227,7 +227,7 @@ TEST_F(FourBar, NeedsTheTorqueAtItsMotorThatItsWeightChangesBy) {
 
 TEST_F(FourBar, SaysWhichLoopAPostureCannotClose) {
   PlantConfig open = config({1.0});
-  open.loops[0].type = model::LoopType::kRod;
+  open.loops[0].type = model::KinematicLoopType::kRod;
   open.loops[0].length_m = 2.0;  // the bars reach 0.78 m
   const Result<Plant> plant = Plant::create(open);
   ASSERT_FALSE(plant);

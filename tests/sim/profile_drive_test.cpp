@@ -160,7 +160,7 @@ TEST_P(ProfileChain, QuickStopBringsItToRest) {
 TEST_P(ProfileChain, ACutCableAndAnEmergencyStopBringItToRest) {
   for (const hal::FaultKind kind : {hal::FaultKind::kBusDown, hal::FaultKind::kEmergencyStop}) {
     for (const ControlMode mode : {ControlMode::kPosition, ControlMode::kVelocity}) {
-      Fault fault{.start_ns = 1'900'000'000};
+      ScenarioFault fault{.start_ns = 1'900'000'000};
       fault.kind = kind;
       fault.from = FaultFrom::kEnabled;
       (kind == hal::FaultKind::kBusDown ? fault.bus : fault.board) = 0;

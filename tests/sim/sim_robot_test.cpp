@@ -145,7 +145,7 @@ TEST(SimRobot, FasterBoardsRunBetweenTheCycles) {
 TEST(SimRobot, AnUnpluggedEncoderIsThatJointsFault) {
   Loop loop(swing_robot());
   loop.bring_up();
-  Fault unplugged;
+  ScenarioFault unplugged;
   unplugged.kind = hal::FaultKind::kEncoderUnplug;
   unplugged.joint = 0;
   unplugged.duration_ns = 5'000'000;

@@ -102,11 +102,11 @@ void CoeClient::post(std::size_t bytes) noexcept {
 void CoeClient::process(std::int64_t now_ns, Exchange& exchange,
                         std::size_t channel) noexcept TANDEM_RT {
   if (status_ != Status::kBusy) return;
-  const Request& request = exchange.at(channel);
-  if (request.state == Request::State::kDone) {
+  const DatagramRequest& request = exchange.at(channel);
+  if (request.state == DatagramRequest::State::kDone) {
     answered(request);
     exchange.release(channel);
-  } else if (request.state == Request::State::kLost) {
+  } else if (request.state == DatagramRequest::State::kLost) {
     exchange.release(channel);
     lost();
   }
@@ -134,7 +134,7 @@ void CoeClient::ask(Exchange& exchange, std::size_t channel) noexcept {
   }
 }
 
-void CoeClient::answered(const Request& request) noexcept {
+void CoeClient::answered(const DatagramRequest& request) noexcept {
   if (request.counter != 1) {
     // The mailbox is still full, or was found empty; or the slave is gone, and time tells.
     if (step_ == Step::kRead) step_ = Step::kAskAgain;

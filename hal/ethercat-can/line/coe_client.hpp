@@ -64,7 +64,7 @@ class CoeClient {
   void begin(std::uint16_t index, std::uint8_t sub, bool uploading) noexcept;
   void post(std::size_t bytes) noexcept;
   void ask(Exchange& exchange, std::size_t channel) noexcept;
-  void answered(const Request& request) noexcept;
+  void answered(const DatagramRequest& request) noexcept;
   void lost() noexcept;
   void take(Bytes message) noexcept;
   void take_response(Bytes message) noexcept;

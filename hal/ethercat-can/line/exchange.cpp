@@ -5,7 +5,7 @@
 
 namespace tandem::hal::ecat {
 
-using State = Request::State;
+using State = DatagramRequest::State;
 
 void FrameBatch::begin(const ethercat::MacAddress& source) noexcept TANDEM_RT {
   used_ = 0;
@@ -30,7 +30,7 @@ std::span<const FrameBuffer> FrameBatch::finish() noexcept TANDEM_RT {
 
 void Exchange::read(std::size_t channel, ethercat::Command command, std::uint32_t address,
                     std::size_t length, std::uint8_t tries) noexcept TANDEM_RT {
-  Request& request = requests_[channel];
+  DatagramRequest& request = requests_[channel];
   request.state = State::kWanted;
   request.command = command;
   request.address = address;
@@ -50,7 +50,7 @@ void Exchange::release(std::size_t channel) noexcept TANDEM_RT {
 }
 
 bool Exchange::take(const ethercat::Datagram& datagram) noexcept TANDEM_RT {
-  for (Request& request : requests_) {
+  for (DatagramRequest& request : requests_) {
     if (request.state != State::kSent || request.index != datagram.index()) continue;
     if (request.command != datagram.command() || request.length != datagram.data().size()) {
       return false;
@@ -66,7 +66,7 @@ bool Exchange::take(const ethercat::Datagram& datagram) noexcept TANDEM_RT {
 }
 
 void Exchange::age(std::int64_t now_ns) noexcept TANDEM_RT {
-  for (Request& request : requests_) {
+  for (DatagramRequest& request : requests_) {
     if (request.state != State::kSent) continue;
     if (++request.waited < kLostCalls || now_ns - request.sent_ns < kLostNs) continue;
     request.state = request.tries_left == 0 ? State::kLost : State::kWanted;
@@ -78,7 +78,7 @@ void Exchange::collect(FrameBatch& batch, std::int64_t now_ns) noexcept TANDEM_R
   const std::size_t most = batch.size() + kMostFrames;
   for (std::size_t i = 0; i < requests_.size(); ++i) {
     const std::size_t channel = (first_ + i) % requests_.size();
-    Request& request = requests_[channel];
+    DatagramRequest& request = requests_[channel];
     if (request.state != State::kWanted) continue;
     const auto data = batch.size() > most ? std::span<std::uint8_t>{}
                                           : batch.add(request.command, next_index_, request.address,
@@ -98,8 +98,9 @@ void Exchange::collect(FrameBatch& batch, std::int64_t now_ns) noexcept TANDEM_R
 }
 
 bool Exchange::under_way() const noexcept TANDEM_RT {
-  return std::ranges::any_of(
-      requests_, [](const Request& request) { return request.state == Request::State::kSent; });
+  return std::ranges::any_of(requests_, [](const DatagramRequest& request) {
+    return request.state == DatagramRequest::State::kSent;
+  });
 }
 
 }  // namespace tandem::hal::ecat

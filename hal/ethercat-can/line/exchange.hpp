@@ -43,7 +43,7 @@ class FrameBatch {
 };
 
 /// One datagram of one asker.
-struct Request {
+struct DatagramRequest {
   enum class State : std::uint8_t {
     kIdle,    ///< nothing is asked for
     kWanted,  ///< to be sent
@@ -83,9 +83,11 @@ class Exchange {
   /// @param channels  fewer than kIndices
   explicit Exchange(std::size_t channels) : requests_(channels) {}
 
-  [[nodiscard]] const Request& at(std::size_t channel) const noexcept { return requests_[channel]; }
+  [[nodiscard]] const DatagramRequest& at(std::size_t channel) const noexcept {
+    return requests_[channel];
+  }
   [[nodiscard]] bool idle(std::size_t channel) const noexcept {
-    return requests_[channel].state == Request::State::kIdle;
+    return requests_[channel].state == DatagramRequest::State::kIdle;
   }
   /// Asks for a read of `length` bytes. @pre idle(channel); length <= kMaxMailboxBytes
   void read(std::size_t channel, ethercat::Command command, std::uint32_t address,
@@ -120,7 +122,7 @@ class Exchange {
   [[nodiscard]] std::uint64_t repeated() const noexcept { return repeated_; }
 
  private:
-  std::vector<Request> requests_;
+  std::vector<DatagramRequest> requests_;
   std::uint8_t next_index_ = 0;
   std::size_t first_ = 0;  ///< the channel that is served first
   std::uint64_t repeated_ = 0;

@@ -21,7 +21,7 @@ enum class FrameFate : std::uint8_t {
 };
 
 /// Deterministic: what comes back depends on the frames, the time and the fates alone.
-class InProcessLink final : public Link {
+class InProcessLink final : public DataLink {
  public:
   /// @param medium  outlives the link
   explicit InProcessLink(ethercat::Medium& medium);

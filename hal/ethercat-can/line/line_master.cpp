@@ -36,13 +36,13 @@ std::vector<SlaveMaster> make_slaves(const std::vector<SlavePlan>& plans,
 
 }  // namespace
 
-Result<std::unique_ptr<LineMaster>> LineMaster::create(Link& link,
+Result<std::unique_ptr<LineMaster>> LineMaster::create(DataLink& link,
                                                        const std::vector<SlavePlan>& plans) {
   if (const Status status = check(plans); !status) return std::unexpected(status.error());
   return std::unique_ptr<LineMaster>(new LineMaster(link, plans));
 }
 
-LineMaster::LineMaster(Link& link, const std::vector<SlavePlan>& plans)
+LineMaster::LineMaster(DataLink& link, const std::vector<SlavePlan>& plans)
     : link_(&link),
       image_(plans),
       slaves_(make_slaves(plans, image_)),
@@ -245,12 +245,12 @@ void LineMaster::scan(std::int64_t now_ns) noexcept {
 void LineMaster::clear(std::int64_t now_ns) noexcept {
   static constexpr std::array<std::uint8_t, 2> kZeros{};
   const std::size_t channel = size();
-  const Request& request = exchange_.at(channel);
-  if (request.state == Request::State::kDone) {
+  const DatagramRequest& request = exchange_.at(channel);
+  if (request.state == DatagramRequest::State::kDone) {
     part_ += request.counter == size() ? 1 : 0;
     exchange_.release(channel);
   }
-  if (request.state == Request::State::kLost) exchange_.release(channel);
+  if (request.state == DatagramRequest::State::kLost) exchange_.release(channel);
   if (now_ns - scan_ns_ >= 2 * kScanTimeNs) {
     error_ = LineError::kSilent;
     scan_ = Scan::kFailed;
@@ -270,10 +270,10 @@ void LineMaster::clear(std::int64_t now_ns) noexcept {
 // broadcast gives every slave that waits its time stamps; the reference reads its own first.
 void LineMaster::run_clocks(std::int64_t now_ns) noexcept {
   const std::size_t channel = size();
-  const Request& request = exchange_.at(channel);
-  if (latching_ && request.state != Request::State::kWanted &&
-      request.state != Request::State::kSent) {
-    const bool done = request.state == Request::State::kDone;
+  const DatagramRequest& request = exchange_.at(channel);
+  if (latching_ && request.state != DatagramRequest::State::kWanted &&
+      request.state != DatagramRequest::State::kSent) {
+    const bool done = request.state == DatagramRequest::State::kDone;
     exchange_.release(channel);
     latching_ = false;
     for (SlaveMaster& slave : slaves_) {

@@ -56,7 +56,7 @@ class LineMaster {
   /// @param link  outlives the master
   /// @return an error that names the slave whose plan cannot be
   [[nodiscard]] static Result<std::unique_ptr<LineMaster>> create(
-      Link& link, const std::vector<SlavePlan>& plans);
+      DataLink& link, const std::vector<SlavePlan>& plans);
 
   /// Begins, or begins again, with a scan.
   void restart(std::int64_t now_ns) noexcept TANDEM_RT;
@@ -109,7 +109,7 @@ class LineMaster {
  private:
   enum class Scan : std::uint8_t { kIdle, kCount, kClear, kDone, kFailed };
 
-  LineMaster(Link& link, const std::vector<SlavePlan>& plans);
+  LineMaster(DataLink& link, const std::vector<SlavePlan>& plans);
   void take_frame(FrameBuffer& frame) noexcept;
   bool take_own(const ethercat::Datagram& datagram) noexcept;
   void judge(std::int64_t now_ns) noexcept;
@@ -120,7 +120,7 @@ class LineMaster {
   void run_clocks(std::int64_t now_ns) noexcept;
   void add_watch() noexcept;
 
-  Link* link_;
+  DataLink* link_;
   ProcessImage image_;
   std::vector<SlaveMaster> slaves_;
   Exchange exchange_;

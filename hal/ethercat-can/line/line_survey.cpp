@@ -31,7 +31,7 @@ constexpr int kSiiTries = 100;  ///< questions whether the memory has been read
 
 class Surveyor {
  public:
-  Surveyor(Link& link, const SurveyWait& wait)
+  Surveyor(DataLink& link, const SurveyWait& wait)
       : link_(&link), wait_(&wait), exchange_(kMostSurveyed), batch_(kMostFrames), came_(8) {}
 
   void listen(std::int64_t time_ns);
@@ -64,7 +64,7 @@ class Surveyor {
 
   [[nodiscard]] std::size_t size() const { return survey_.slaves.size(); }
 
-  Link* link_;
+  DataLink* link_;
   const SurveyWait* wait_;
   Exchange exchange_;
   FrameBatch batch_;
@@ -109,8 +109,9 @@ void Surveyor::listen(std::int64_t time_ns) {
 void Surveyor::carry(std::int64_t until_ns) {
   const auto wanted = [this] {
     for (std::size_t i = 0; i < kMostSurveyed; ++i) {
-      const Request::State state = exchange_.at(i).state;
-      if (state == Request::State::kWanted || state == Request::State::kSent) return true;
+      const DatagramRequest::State state = exchange_.at(i).state;
+      if (state == DatagramRequest::State::kWanted || state == DatagramRequest::State::kSent)
+        return true;
     }
     return false;
   };
@@ -140,9 +141,9 @@ void Surveyor::write(std::size_t slave, std::uint16_t offset, Data data) {
 }
 
 std::vector<std::uint8_t> Surveyor::answer(std::size_t slave) {
-  const Request& request = exchange_.at(slave);
+  const DatagramRequest& request = exchange_.at(slave);
   std::vector<std::uint8_t> bytes;
-  if (request.state == Request::State::kDone && request.counter == 1) {
+  if (request.state == DatagramRequest::State::kDone && request.counter == 1) {
     bytes.assign(request.bytes().begin(), request.bytes().end());
   }
   exchange_.release(slave);
@@ -168,8 +169,8 @@ void Surveyor::count() {
   ++survey_.asked;
   exchange_.read(0, Command::kBrd, register_address(0, reg::kAlStatus), 2);
   carry();
-  const Request& request = exchange_.at(0);
-  if (request.state == Request::State::kDone) {
+  const DatagramRequest& request = exchange_.at(0);
+  if (request.state == DatagramRequest::State::kDone) {
     survey_.found = request.counter;
     survey_.states = request.bytes()[0];
   }
@@ -325,7 +326,7 @@ void Surveyor::measure(const SurveyTiming& timing) {
 
 }  // namespace
 
-LineSurvey survey_line(Link& link, const SurveyTiming& timing, const SurveyWait& wait) {
+LineSurvey survey_line(DataLink& link, const SurveyTiming& timing, const SurveyWait& wait) {
   Surveyor surveyor(link, wait);
   const LineSurvey& survey = surveyor.survey();
   const auto alone = [&survey] { return survey.strangers == 0; };

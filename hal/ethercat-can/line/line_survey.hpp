@@ -49,7 +49,7 @@ using SurveyWait = std::function<std::int64_t(std::int64_t at_most_ns)>;
 /// Listens first; sends only when no frame passes. No slave changes its state: memory and clocks
 /// are read as well in INIT. The clocks are only set when all slaves are in INIT, where no SYNC0
 /// depends on them; else there are no samples. The reference is the first slave with a clock.
-[[nodiscard]] LineSurvey survey_line(Link& link, const SurveyTiming& timing,
+[[nodiscard]] LineSurvey survey_line(DataLink& link, const SurveyTiming& timing,
                                      const SurveyWait& wait);
 
 }  // namespace tandem::hal::ecat

@@ -32,9 +32,9 @@ struct LinkStatistics {
 };
 
 /// One end of a line of slaves. Never blocks.
-class Link {
+class DataLink {
  public:
-  virtual ~Link() = default;
+  virtual ~DataLink() = default;
 
   /// Sends frames in order. @return how many were taken; the rest is dropped and counted
   virtual std::size_t send(std::span<const FrameBuffer> frames) noexcept TANDEM_RT = 0;

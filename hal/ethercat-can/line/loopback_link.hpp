@@ -21,8 +21,8 @@ class LoopbackLink {
   LoopbackLink(const LoopbackLink&) = delete;
   LoopbackLink& operator=(const LoopbackLink&) = delete;
 
-  [[nodiscard]] Link& master() noexcept { return master_; }
-  [[nodiscard]] Link& slaves() noexcept { return slaves_; }
+  [[nodiscard]] DataLink& master() noexcept { return master_; }
+  [[nodiscard]] DataLink& slaves() noexcept { return slaves_; }
   /// The frames that wait.
   void archive(Archive& ar);
 
@@ -35,7 +35,7 @@ class LoopbackLink {
     std::size_t count = 0;
     void archive(Archive& ar);
   };
-  class End final : public Link {
+  class End final : public DataLink {
    public:
     End(Queue& out, Queue& in) noexcept : out_(&out), in_(&in) {}
     std::size_t send(std::span<const FrameBuffer> frames) noexcept TANDEM_RT override;

@@ -13,7 +13,7 @@ namespace tandem::hal::ecat {
 
 /// Sends and receives many frames with one system call, and never waits. Either end may use it:
 /// the master, and emulated slaves.
-class PacketLink final : public Link {
+class PacketLink final : public DataLink {
  public:
   /// @return an error that names the interface and says what is missing: the interface, its link,
   ///         or the permission

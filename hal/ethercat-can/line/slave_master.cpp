@@ -83,12 +83,12 @@ void SlaveMaster::process(std::int64_t now_ns, Exchange& exchange,
   if (stage_ == SlaveStage::kConfigure || (mapped() && coe_.busy() && part_ == 0)) {
     return configure(now_ns, exchange);
   }
-  const Request& request = exchange.at(position_);
-  if (request.state == Request::State::kLost) {
+  const DatagramRequest& request = exchange.at(position_);
+  if (request.state == DatagramRequest::State::kLost) {
     exchange.release(position_);
     return fail(LineError::kNoAnswer, now_ns);
   }
-  if (request.state == Request::State::kDone) {
+  if (request.state == DatagramRequest::State::kDone) {
     if (request.counter == 1) {
       misses_ = 0;
       take(request, now_ns, reference);
@@ -106,7 +106,7 @@ void SlaveMaster::missed(std::int64_t now_ns) noexcept {
   fail(stage_ == SlaveStage::kRunning ? LineError::kGone : LineError::kNoAnswer, now_ns);
 }
 
-void SlaveMaster::take(const Request& request, std::int64_t now_ns,
+void SlaveMaster::take(const DatagramRequest& request, std::int64_t now_ns,
                        ClockReference& reference) noexcept {
   const Data data = request.bytes();
   switch (stage_) {

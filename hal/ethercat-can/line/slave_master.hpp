@@ -114,7 +114,8 @@ class SlaveMaster {
   void ask_state(Exchange& exchange) noexcept;
   void ask_process_data(Exchange& exchange) noexcept;
   void ask_running(Exchange& exchange) noexcept;
-  void take(const Request& request, std::int64_t now_ns, ClockReference& reference) noexcept;
+  void take(const DatagramRequest& request, std::int64_t now_ns,
+            ClockReference& reference) noexcept;
   void take_sii(Data data, std::int64_t now_ns) noexcept;
   void take_state(Data data, std::int64_t now_ns, SlaveStage next) noexcept;
   void take_running(Data data, std::int64_t now_ns) noexcept;

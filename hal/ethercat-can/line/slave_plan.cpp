@@ -13,10 +13,10 @@ constexpr std::size_t kMostSlaves = 100;
 constexpr std::size_t kMostBytes = 1024;  // of one slave, each way
 
 void add_assignment(std::vector<CoeStep>& steps, std::uint16_t assignment,
-                    const std::vector<PdoPlan>& pdos) {
+                    const std::vector<SlavePdo>& pdos) {
   steps.push_back(coe_write(assignment, 0, std::uint8_t{0}));
   std::uint8_t number = 0;
-  for (const PdoPlan& pdo : pdos) {
+  for (const SlavePdo& pdo : pdos) {
     if (!pdo.fixed) {
       std::uint8_t entry = 0;
       steps.push_back(coe_write(pdo.index, 0, std::uint8_t{0}));
@@ -32,9 +32,9 @@ void add_assignment(std::vector<CoeStep>& steps, std::uint16_t assignment,
 
 }  // namespace
 
-std::size_t bytes_of(const std::vector<PdoPlan>& pdos) {
+std::size_t bytes_of(const std::vector<SlavePdo>& pdos) {
   std::size_t bits = 0;
-  for (const PdoPlan& pdo : pdos) {
+  for (const SlavePdo& pdo : pdos) {
     for (const std::uint32_t entry : pdo.entries) bits += entry & 0xFF;
   }
   return (bits + 7) / 8;

@@ -35,7 +35,7 @@ template <class T>
 }
 
 /// A PDO: its object, and entries as index << 16 | sub << 8 | bits.
-struct PdoPlan {
+struct SlavePdo {
   std::uint16_t index = 0;  ///< 16xx or 1Axx
   std::vector<std::uint32_t> entries{};
   bool fixed = false;  ///< the slave has these entries and does not let them be written
@@ -44,8 +44,8 @@ struct PdoPlan {
 struct SlavePlan {
   std::string name;                    ///< for messages
   ethercat::sii::Identity identity{};  ///< 0: any; of the revision a later minor is right too
-  std::vector<PdoPlan> outputs{};      ///< to the slave
-  std::vector<PdoPlan> inputs{};
+  std::vector<SlavePdo> outputs{};     ///< to the slave
+  std::vector<SlavePdo> inputs{};
   std::vector<CoeStep> steps{};     ///< before the PDOs
   bool waits_in_preop = false;      ///< steps, mapping and assignment are another's; see go_on()
   std::int64_t sync0_cycle_ns = 0;  ///< 0: no SYNC0
@@ -54,7 +54,7 @@ struct SlavePlan {
 };
 
 /// Bytes of PDOs together.
-[[nodiscard]] std::size_t bytes_of(const std::vector<PdoPlan>& pdos);
+[[nodiscard]] std::size_t bytes_of(const std::vector<SlavePdo>& pdos);
 /// Whether a master can be built for these slaves; the error names the slave.
 [[nodiscard]] Status check(const std::vector<SlavePlan>& plans);
 /// plan.steps, then mapping and assignment of the PDOs in the order that slaves ask for. None for a

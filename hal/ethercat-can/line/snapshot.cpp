@@ -8,7 +8,7 @@
 namespace tandem::hal::ecat {
 
 void Exchange::archive(Archive& ar) {
-  for (Request& r : requests_) {
+  for (DatagramRequest& r : requests_) {
     ar(r.state, r.command, r.index, r.tries_left, r.length, r.counter, r.address, r.sent_ns,
        r.waited, r.data);
   }

@@ -23,7 +23,7 @@ struct WatchdogConfig {
 
 /// Counts the time that it has itself been awake for: a process that was stopped and goes on, or a
 /// machine that slept, has not hung.
-class LoopWatchdog {
+class CycleWatchdog {
  public:
   struct Hooks {
     /// The loop hangs: after its limit, or at once when it stands still (Heartbeat).
@@ -34,11 +34,11 @@ class LoopWatchdog {
   };
 
   /// The heartbeat outlives it. Nothing happens before the first beat.
-  LoopWatchdog(const Heartbeat& heartbeat, const WatchdogConfig& config, Hooks hooks);
+  CycleWatchdog(const Heartbeat& heartbeat, const WatchdogConfig& config, Hooks hooks);
   /// Waits for a hook that is running.
-  ~LoopWatchdog();
-  LoopWatchdog(const LoopWatchdog&) = delete;
-  LoopWatchdog& operator=(const LoopWatchdog&) = delete;
+  ~CycleWatchdog();
+  CycleWatchdog(const CycleWatchdog&) = delete;
+  CycleWatchdog& operator=(const CycleWatchdog&) = delete;
 
  private:
   void run();

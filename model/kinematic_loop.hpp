@@ -8,16 +8,16 @@
 
 namespace tandem::model {
 
-enum class LoopType : std::uint8_t {
+enum class KinematicLoopType : std::uint8_t {
   kBall,      ///< the two sites' origins coincide
   kRevolute,  ///< they coincide, and so does the axis, given in both sites' frames
   kRod,       ///< they keep their distance: a massless rod with a ball joint at either end
 };
 
 /// [[loop]]: what closes a loop of the tree between two sites.
-struct LoopSpec {
+struct KinematicLoop {
   std::string name;
-  LoopType type = LoopType::kBall;
+  KinematicLoopType type = KinematicLoopType::kBall;
   std::array<std::string, 2> sites;
   std::array<double, 3> axis{0.0, 0.0, 1.0};  ///< revolute: unit length, in both sites' frames
   double length_m = 0.0;                      ///< rod

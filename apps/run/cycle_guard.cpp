@@ -1,4 +1,4 @@
-#include "apps/run/loop_guard.hpp"
+#include "apps/run/cycle_guard.hpp"
 
 #include <fmt/core.h>
 #include <poll.h>
@@ -34,9 +34,9 @@ void say(const std::string& line) {
 
 }  // namespace
 
-Result<std::unique_ptr<LoopGuard>> LoopGuard::open(const Composition& composition,
-                                                   runtime::RobotCycle& cycle) {
-  std::unique_ptr<LoopGuard> guard(new LoopGuard(composition, cycle));
+Result<std::unique_ptr<CycleGuard>> CycleGuard::open(const WiredComposition& composition,
+                                                     runtime::RobotCycle& cycle) {
+  std::unique_ptr<CycleGuard> guard(new CycleGuard(composition, cycle));
   for (const OpenBus& bus : composition.open_buses()) {
     if (bus.can == nullptr) continue;  // without frames a slave's watchdog stops it
     auto sender = SocketCanBus::open({.interface = bus.interface,
@@ -52,26 +52,26 @@ Result<std::unique_ptr<LoopGuard>> LoopGuard::open(const Composition& compositio
   return guard;
 }
 
-void LoopGuard::start() {
-  const rt::LoopConfig& loop = composition_->experiment.loop;
+void CycleGuard::start() {
+  const rt::CyclicLoopConfig& loop = composition_->experiment.loop;
   const bool on_robot = loop.pacing == rt::Pacing::kWallClock;
   limit_s_ = composition_->experiment.watchdog_s.value_or(on_robot ? kOnRobot_s : kSimulated_s);
   const nanoseconds limit = seconds(limit_s_);
-  watchdog_ = std::make_unique<runtime::LoopWatchdog>(
+  watchdog_ = std::make_unique<runtime::CycleWatchdog>(
       cycle_->heartbeat(),
       runtime::WatchdogConfig{
           .limit = limit,
           .wait_limit = on_robot ? limit + nanoseconds(loop.period_ns) : nanoseconds{},
           .grace = kGrace,
           .waits_for_debugger = !on_robot},
-      runtime::LoopWatchdog::Hooks{
+      runtime::CycleWatchdog::Hooks{
           .on_hang = [this](bool at_work) { on_hang(at_work); },
           .on_return = [] { say("note: the loop cycles again; the run ends in order"); },
           .on_given_up = [this] { on_given_up(); }});
 }
 
 /// First what stops the robot, then what may wait.
-void LoopGuard::on_hang(bool at_work) {
+void CycleGuard::on_hang(bool at_work) {
   const std::int32_t controller = composition_->controllers->at_work();
   cycle_->inbox().watchdog_stop(controller);
   const std::string nodes = stop_nodes();
@@ -91,7 +91,7 @@ void LoopGuard::on_hang(bool at_work) {
                   where, nodes, kGrace.count(), crashed ? "" : " if the loop does not come back"));
 }
 
-std::string LoopGuard::stop_nodes() {
+std::string CycleGuard::stop_nodes() {
   const std::array<canopen::Frame, 1> stop{canopen::make_nmt(canopen::NmtCommand::kStop, 0)};
   std::string sent, refused;
   for (const auto& bus : buses_) {
@@ -107,7 +107,7 @@ std::string LoopGuard::stop_nodes() {
          (refused.empty() ? "" : "; NMT stop could not be sent on " + refused);
 }
 
-void LoopGuard::on_given_up() {
+void CycleGuard::on_given_up() {
   gave_up_.store(true, std::memory_order_release);
   std::this_thread::sleep_for(kLastWords);
   say("fault: the process could not end in order");

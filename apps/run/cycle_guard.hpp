@@ -9,7 +9,7 @@
 
 #include "apps/run/connection.hpp"
 #include "base/result.hpp"
-#include "runtime/loop_watchdog.hpp"
+#include "runtime/cycle_watchdog.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
@@ -22,34 +22,34 @@ namespace tandem::apps {
 /// 3. standard error says in which controller the loop is.
 /// A loop that is not back after kGrace is given up: gave_up(). Whoever owns the run then has
 /// kLastWords for the log, and ends the process; after that the guard does so, with status 1.
-class LoopGuard {
+class CycleGuard {
  public:
   static constexpr std::chrono::seconds kGrace{2};
   static constexpr std::chrono::seconds kLastWords{3};
 
   /// Both outlive it. Errors: SocketCanBus::open()'s.
-  [[nodiscard]] static Result<std::unique_ptr<LoopGuard>> open(const Composition& composition,
-                                                               runtime::RobotCycle& cycle);
+  [[nodiscard]] static Result<std::unique_ptr<CycleGuard>> open(const WiredComposition& composition,
+                                                                runtime::RobotCycle& cycle);
 
   [[nodiscard]] bool gave_up() const noexcept { return gave_up_.load(std::memory_order_acquire); }
   /// What the loop did: "the loop crashed in the controller 'squat'". For when it gave up.
   [[nodiscard]] const std::string& fault() const noexcept { return fault_; }
 
  private:
-  LoopGuard(const Composition& composition, runtime::RobotCycle& cycle)
+  CycleGuard(const WiredComposition& composition, runtime::RobotCycle& cycle)
       : composition_(&composition), cycle_(&cycle) {}
   void start();
   void on_hang(bool at_work);
   void on_given_up();
   [[nodiscard]] std::string stop_nodes();
 
-  const Composition* composition_;
+  const WiredComposition* composition_;
   runtime::RobotCycle* cycle_;
   std::vector<std::unique_ptr<hal::can::SocketCanBus>> buses_;
   double limit_s_ = 0.0;
   std::string fault_;
   std::atomic<bool> gave_up_{false};
-  std::unique_ptr<runtime::LoopWatchdog> watchdog_;  // last: its thread uses the others
+  std::unique_ptr<runtime::CycleWatchdog> watchdog_;  // last: its thread uses the others
 };
 
 }  // namespace tandem::apps

@@ -34,7 +34,7 @@ struct MoveRequest {
   double acceleration_rad_s2 = kDefault;
 };
 
-struct LoopRequest {
+struct CycleRequest {
   enum class Kind : std::uint32_t {
     kInsert,   ///< `controller` into `slot`
     kRemove,   ///< what is in `slot`
@@ -67,7 +67,7 @@ enum class RejectReason : std::uint32_t {
 #undef TANDEM_REFUSAL
 };
 
-struct LoopAnswer {
+struct CycleAnswer {
   std::uint64_t number = 0;  ///< the request's
   std::uint64_t cycle = 0;   ///< in which it was done
   RejectReason reason = RejectReason::kNone;

@@ -7,33 +7,33 @@
 #include <thread>
 
 #include "apps/run/connection.hpp"
-#include "apps/run/loop_guard.hpp"
+#include "apps/run/cycle_guard.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
 
 /// Where the time of a run went, by the wall clock.
-struct LoopTimes {
+struct RunTimes {
   double running_s = 0.0;  ///< controllers ran
   double stopped_s = 0.0;  ///< in fault, on the way to a safe posture, in a reset, or held after it
   double stood_s = 0.0;    ///< simulated time was paused, or the process suspended
 };
 
-class LoopThread {
+class CycleThread {
  public:
-  LoopThread(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
+  CycleThread(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
       : thread_([this, &cycle, config] { run(cycle, config); }) {}
   [[nodiscard]] bool done() const { return done_.load(std::memory_order_acquire); }
   void join() { thread_.join(); }
   // For when it has joined.
-  [[nodiscard]] const LoopTimes& times() const { return times_; }
+  [[nodiscard]] const RunTimes& times() const { return times_; }
   [[nodiscard]] const rt::ThreadReport& report() const { return report_; }
 
  private:
   void run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config);
 
-  LoopTimes times_;
+  RunTimes times_;
   rt::ThreadReport report_;
   std::atomic<bool> done_{false};
   std::thread thread_;  // last: it uses the others
@@ -43,8 +43,8 @@ class LoopThread {
 /// waits. Either way it warns when the log is lost.
 /// @param recorder  null: nothing is logged
 /// @param waits  the run waits after a fault: each is printed when it happens, not at the end alone
-void watch(runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
-           const LoopGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
+void watch(runtime::RobotCycle& cycle, const CycleThread& loop, const WiredComposition& c,
+           const CycleGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
            bool quiet);
 
 }  // namespace tandem::apps

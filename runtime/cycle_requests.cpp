@@ -1,45 +1,45 @@
-#include "runtime/loop_requests.hpp"
+#include "runtime/cycle_requests.hpp"
 
 #include <cmath>
 
 namespace tandem::runtime {
 
 using log::EventKind;
-using RequestKind = LoopRequest::Kind;
+using RequestKind = CycleRequest::Kind;
 
 namespace {
 
 /// Moves, starts and enables nothing: there it is whatever stops the robot.
-bool only_hosts(const LoopRequest& request) noexcept TANDEM_RT {
+bool only_hosts(const CycleRequest& request) noexcept TANDEM_RT {
   return request.kind == RequestKind::kInsert || request.kind == RequestKind::kRemove;
 }
 
 /// joint.stop
-bool stops_motion(const LoopRequest& request) noexcept TANDEM_RT {
+bool stops_motion(const CycleRequest& request) noexcept TANDEM_RT {
   return request.kind == RequestKind::kMove && !std::isfinite(request.move.target_rad);
 }
 
-LoopAnswer remove(LoopRequests& to, std::size_t slot) noexcept TANDEM_RT {
-  const LoopAnswer answer = to.now.controllers.remove(slot);
+CycleAnswer remove(CycleRequests& to, std::size_t slot) noexcept TANDEM_RT {
+  const CycleAnswer answer = to.now.controllers.remove(slot);
   if (answer.reason == RejectReason::kNone) to.waiting.forget(slot);
   return answer;
 }
 
-LoopAnswer switch_over(LoopRequests& to, const LoopRequest& request) noexcept TANDEM_RT {
-  const LoopAnswer no = to.arbiter.may_start(request.start);
+CycleAnswer switch_over(CycleRequests& to, const CycleRequest& request) noexcept TANDEM_RT {
+  const CycleAnswer no = to.arbiter.may_start(request.start);
   if (no.reason != RejectReason::kNone) return no;
   if (to.now.run.in(RunPhase::kHeld)) return to.waiting.leave_hold(request.stop, request.start);
   return to.arbiter.switch_over(request.stop, request.start);
 }
 
 /// A motion, its stop, and the way back to the limits.
-LoopAnswer move(LoopRequests& to, const LoopRequest& request) noexcept TANDEM_RT {
+CycleAnswer move(CycleRequests& to, const CycleRequest& request) noexcept TANDEM_RT {
   const bool stops = stops_motion(request);
   if (stops && to.homing.is_on(request.joint)) {
     to.now.backend.stop_homing(request.joint);
     return {};
   }
-  LoopAnswer no{.joint = static_cast<std::int32_t>(request.joint)};
+  CycleAnswer no{.joint = static_cast<std::int32_t>(request.joint)};
   if (!to.now.run.in(RunPhase::kHeld) && !to.now.run.in(RunPhase::kRunning)) {
     no.reason = RejectReason::kNotEnabled;
   } else {
@@ -51,7 +51,7 @@ LoopAnswer move(LoopRequests& to, const LoopRequest& request) noexcept TANDEM_RT
 }
 
 /// What is not named stays as it is now, whoever has set it.
-void set_gains(LoopRequests& to, const LoopRequest& request) noexcept TANDEM_RT {
+void set_gains(CycleRequests& to, const CycleRequest& request) noexcept TANDEM_RT {
   hal::ParameterImage& image = to.now.controllers.gains();
   const hal::PidGains now = image.gains(request.joint, request.loop);
   const auto or_now = [](double wanted, double has) { return std::isnan(wanted) ? has : wanted; };
@@ -61,7 +61,7 @@ void set_gains(LoopRequests& to, const LoopRequest& request) noexcept TANDEM_RT 
 }
 
 /// What comes and goes without moving anything is not logged.
-void log(CycleNow& now, const LoopRequest& request) noexcept TANDEM_RT {
+void log(CycleNow& now, const CycleRequest& request) noexcept TANDEM_RT {
   const auto joint = static_cast<std::int32_t>(request.joint);
   switch (request.kind) {
     case RequestKind::kSwitch:
@@ -79,7 +79,7 @@ void log(CycleNow& now, const LoopRequest& request) noexcept TANDEM_RT {
                 static_cast<float>(request.move.target_rad));
 }
 
-LoopAnswer carry_out(LoopRequests& to, const LoopRequest& request) noexcept TANDEM_RT {
+CycleAnswer carry_out(CycleRequests& to, const CycleRequest& request) noexcept TANDEM_RT {
   if (to.now.run.in(RunPhase::kRetreating)) return {.reason = RejectReason::kNotEnabled};
   switch (request.kind) {
     case RequestKind::kInsert: return to.now.controllers.insert(request.slot, *request.controller);
@@ -87,7 +87,7 @@ LoopAnswer carry_out(LoopRequests& to, const LoopRequest& request) noexcept TAND
     case RequestKind::kGoOn: return to.waiting.go_on();
     case RequestKind::kSwitch: return switch_over(to, request);
     case RequestKind::kJoint: {
-      const LoopAnswer no = to.arbiter.may_lead(request.joint, request.wish.drives());
+      const CycleAnswer no = to.arbiter.may_lead(request.joint, request.wish.drives());
       if (no.reason != RejectReason::kNone) return no;
       return to.arbiter.set_joint(request.joint, request.wish);
     }
@@ -102,17 +102,17 @@ LoopAnswer carry_out(LoopRequests& to, const LoopRequest& request) noexcept TAND
 
 }  // namespace
 
-void LoopRequests::carry_out() noexcept TANDEM_RT {
+void CycleRequests::carry_out() noexcept TANDEM_RT {
   for (std::size_t most = Inbox::kCapacity; most > 0; --most) {
-    const std::optional<LoopRequest> request = now.inbox.take_request();
+    const std::optional<CycleRequest> request = now.inbox.take_request();
     if (!request) return;
     const bool ending = ends(now.run.phase());
     const bool at_rest =
         stops_motion(*request) && !now.controllers.references().leads(request->joint);
     const bool too_late = response.stops_now() && !only_hosts(*request);
-    LoopAnswer answer = ending     ? LoopAnswer{.reason = RejectReason::kEnding}
-                        : too_late ? LoopAnswer{.reason = RejectReason::kStopped}
-                                   : runtime::carry_out(*this, *request);
+    CycleAnswer answer = ending     ? CycleAnswer{.reason = RejectReason::kEnding}
+                         : too_late ? CycleAnswer{.reason = RejectReason::kStopped}
+                                    : runtime::carry_out(*this, *request);
     if (answer.reason == RejectReason::kNone && !at_rest) log(now, *request);
     answer.number = request->number;
     answer.cycle = now.time.cycle;

@@ -1,6 +1,6 @@
 // M is factorised by Cholesky once per position; A M^-1 A^T by SemidefiniteSolver, since equations
 // may be redundant.
-#include "hal/sim/loop_forces.hpp"
+#include "hal/sim/closure_forces.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -25,7 +25,7 @@ void cholesky(std::vector<double>& M, std::size_t n) noexcept {
 
 }  // namespace
 
-LoopForces::LoopForces(model::ClosedLoops loops, const tandem_kernels& kernels)
+ClosureForces::ClosureForces(model::ClosedLoops loops, const tandem_kernels& kernels)
     : kernels_(&kernels), loops_(std::move(loops)), solver_(loops_.rows()) {
   const std::size_t rows = loops_.rows();
   M_.assign(std::size_t{kernels.nv} * kernels.nv, 0.0);
@@ -39,7 +39,7 @@ LoopForces::LoopForces(model::ClosedLoops loops, const tandem_kernels& kernels)
 }
 
 // What depends on q alone: A, M = L L^T, the rows W of A L^-T, and S = A M^-1 A^T = W W^T.
-void LoopForces::prepare(const double* q, const double* v) noexcept {
+void ClosureForces::prepare(const double* q, const double* v) noexcept {
   loops_.move(q, v);
   if (fresh_) return;
   fresh_ = true;
@@ -65,7 +65,7 @@ void LoopForces::prepare(const double* q, const double* v) noexcept {
 }
 
 // lambda_ = S^-1 change, step_ = M^-1 A^T lambda_: the change of A step_ with the least work.
-void LoopForces::impulse(const std::vector<double>& change) noexcept {
+void ClosureForces::impulse(const std::vector<double>& change) noexcept {
   const std::size_t n = kernels_->nv;
   lambda_ = change;
   solver_.solve(lambda_);
@@ -78,8 +78,8 @@ void LoopForces::impulse(const std::vector<double>& change) noexcept {
   }
 }
 
-void LoopForces::constrain(const double* q, const double* v, double* vdot,
-                           double* wrench) noexcept TANDEM_RT {
+void ClosureForces::constrain(const double* q, const double* v, double* vdot,
+                              double* wrench) noexcept TANDEM_RT {
   prepare(q, v);
   const std::size_t n = kernels_->nv;
   for (std::size_t r = 0; r < change_.size(); ++r) {
@@ -91,7 +91,7 @@ void LoopForces::constrain(const double* q, const double* v, double* vdot,
   loops_.to_wrenches(lambda_.data(), wrench);
 }
 
-void LoopForces::step_positions(double* q) const noexcept {
+void ClosureForces::step_positions(double* q) const noexcept {
   const std::size_t base = kernels_->floating_base != 0 ? 6 : 0;
   if (base != 0) {
     const Mat3 R = rotation_of(q + 3);
@@ -103,7 +103,7 @@ void LoopForces::step_positions(double* q) const noexcept {
     q[kernels_->nq - kernels_->joints + i] += step_[base + i];
 }
 
-void LoopForces::project(double* q, double* v) noexcept TANDEM_RT {
+void ClosureForces::project(double* q, double* v) noexcept TANDEM_RT {
   for (int step = 0;; ++step) {
     loops_.move(q, v);
     double open = 0.0;

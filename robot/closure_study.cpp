@@ -1,4 +1,4 @@
-#include "robot/loop_study.hpp"
+#include "robot/closure_study.hpp"
 
 #include <fmt/core.h>
 
@@ -47,7 +47,7 @@ class Study {
   Study(const hal::RobotConfig& robot, const tandem_kernels& kernels)
       : robot_(robot), kernels_(kernels), rest_(kernels.nv, 0.0) {}
 
-  LoopStudy run(std::span<const std::string> postures) {
+  ClosureStudy run(std::span<const std::string> postures) {
     if (!make(robot_.loop_specs(), loops_)) return std::move(out_);
     for (const std::string& name : postures) look_at(name);
     out_.open_freedom = kernels_.nv;
@@ -56,7 +56,7 @@ class Study {
   }
 
  private:
-  bool make(const std::vector<model::LoopSpec>& specs, model::ClosedLoops& loops) {
+  bool make(const std::vector<model::KinematicLoop>& specs, model::ClosedLoops& loops) {
     auto made = model::ClosedLoops::create(specs, robot_.passive_names(), kernels_);
     if (made) {
       loops = std::move(*made);
@@ -70,7 +70,7 @@ class Study {
   void look_at(const std::string& posture) {
     const std::vector<double> start = coordinates_at(robot_, kernels_, robot_.posture(posture));
     std::vector<double> q = start;
-    LoopClosing closing{.posture = posture, .passive = {}};
+    ClosureInPosture closing{.posture = posture, .passive = {}};
     loops_.move(q.data(), rest_.data());
     for (std::size_t l = 0; l < loops_.loops(); ++l) {
       closing.start_gap_m = std::max(closing.start_gap_m, loops_.gap(l).position_m);
@@ -89,9 +89,10 @@ class Study {
 
   /// Where the sites could meet, only the axes are wrong: then they alone are named.
   bool meets_but_for_axes(std::vector<double> q) {
-    std::vector<model::LoopSpec> balls = robot_.loop_specs();
-    for (model::LoopSpec& one : balls) {
-      if (one.type == model::LoopType::kRevolute) one.type = model::LoopType::kBall;
+    std::vector<model::KinematicLoop> balls = robot_.loop_specs();
+    for (model::KinematicLoop& one : balls) {
+      if (one.type == model::KinematicLoopType::kRevolute)
+        one.type = model::KinematicLoopType::kBall;
     }
     model::ClosedLoops loops;
     if (!make(balls, loops) || !loops.close(q.data(), kMostSteps)) return false;
@@ -102,7 +103,7 @@ class Study {
   Error open_loop(const std::string& posture, const std::vector<double>& start) {
     const bool axes = meets_but_for_axes(start);
     const std::size_t worst = widest(loops_);
-    const hal::LoopConfig& loop = robot_.loops[worst];
+    const hal::KinematicLoopConfig& loop = robot_.loops[worst];
     Error error;
     error.message = fmt::format("the loop does not close {}: {}", posture_text(posture),
                                 axes ? "where its sites meet, " + loops_.gap(worst).to_string()
@@ -110,7 +111,7 @@ class Study {
     error.hint = axes ? "axis is a direction in both sites' frames: correct it, or turn a site by "
                         "rpy_rad"
                       : "change the posture, position_rad of a [[passive]], or the sites' xyz_m";
-    if (!axes && loop.type == model::LoopType::kRod) error.hint += " or length_m";
+    if (!axes && loop.type == model::KinematicLoopType::kRod) error.hint += " or length_m";
     error.file = robot_.file;
     error.line = loop.line;
     error.key = "loop." + loop.name;
@@ -121,20 +122,20 @@ class Study {
   const tandem_kernels& kernels_;
   const std::vector<double> rest_;
   model::ClosedLoops loops_;
-  LoopStudy out_;
+  ClosureStudy out_;
 };
 
 }  // namespace
 
-LoopStudy study_loops(const hal::RobotConfig& robot, const tandem_kernels& kernels,
-                      std::span<const std::string> postures) {
+ClosureStudy study_loops(const hal::RobotConfig& robot, const tandem_kernels& kernels,
+                         std::span<const std::string> postures) {
   if (robot.loops.empty()) return {};
   return Study(robot, kernels).run(postures);
 }
 
 Diagnostics check_loop_bodies(const hal::RobotConfig& robot, const model::Tree& tree) {
   Diagnostics errors;
-  for (const hal::LoopConfig& loop : robot.loops) {
+  for (const hal::KinematicLoopConfig& loop : robot.loops) {
     const model::Link* links[2] = {nullptr, nullptr};
     for (std::size_t i = 0; i < 2; ++i) {
       const auto site = std::ranges::find(robot.model.sites, loop.sites[i], &hal::SiteConfig::name);

@@ -1,4 +1,4 @@
-#include "apps/run/loop_thread.hpp"
+#include "apps/run/cycle_thread.hpp"
 
 #include <fmt/core.h>
 
@@ -72,11 +72,11 @@ class FaultNotes {
   explicit FaultNotes(bool waits) : waits_(waits) {}
   void look(const runtime::RobotCycle& cycle) {
     if (cycle.fault_log().size() <= told_) return;
-    const std::vector<runtime::Fault> faults = cycle.faults();
+    const std::vector<runtime::FaultReport> faults = cycle.faults();
     restart_line(stderr);
     bool stopped = false;
     for (; told_ < faults.size(); ++told_) {
-      const runtime::Fault& fault = faults[told_];
+      const runtime::FaultReport& fault = faults[told_];
       const bool warns = fault.category == hal::StopCategory::kWarn;
       if (!warns && !waits_) continue;
       stopped = stopped || !warns;
@@ -102,7 +102,7 @@ double longest_cycle_s(runtime::RobotCycle& cycle) {
 }
 
 /// Adds the `seconds` of a cycle that began in `phase`.
-void count_time(LoopTimes& times, runtime::RunPhase phase, double seconds, double longest_s) {
+void count_time(RunTimes& times, runtime::RunPhase phase, double seconds, double longest_s) {
   using enum runtime::RunPhase;
   if (seconds > longest_s) {
     times.stood_s += seconds;
@@ -122,7 +122,7 @@ void warn_of_log(const log::Recorder& recorder) {
 
 }  // namespace
 
-void LoopThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config) {
+void CycleThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config) {
   stand_still_on_crash(cycle.heartbeat());
   report_ = rt::set_up_thread(config);
   const double longest_s = longest_cycle_s(cycle);
@@ -138,8 +138,8 @@ void LoopThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
   done_.store(true, std::memory_order_release);
 }
 
-void watch(runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
-           const LoopGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
+void watch(runtime::RobotCycle& cycle, const CycleThread& loop, const WiredComposition& c,
+           const CycleGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
            bool quiet) {
   const runtime::Experiment& e = c.experiment;
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;

@@ -12,10 +12,10 @@
 namespace tandem::sim {
 
 /// Works on the plant's q and v. Nothing here is state: everything follows from q and v.
-class LoopForces {
+class ClosureForces {
  public:
-  LoopForces() = default;
-  LoopForces(model::ClosedLoops loops, const tandem_kernels& kernels);
+  ClosureForces() = default;
+  ClosureForces(model::ClosedLoops loops, const tandem_kernels& kernels);
 
   [[nodiscard]] bool none() const noexcept { return loops_.loops() == 0; }
   [[nodiscard]] model::ClosedLoops& equations() noexcept { return loops_; }

@@ -17,15 +17,15 @@
 namespace tandem::robot {
 
 /// The loops in one posture.
-struct LoopClosing {
+struct ClosureInPosture {
   std::string posture;  ///< of robot.toml; empty: every joint at 0
   bool closed = false;
   double start_gap_m = 0.0;  ///< the widest, with the passive joints where they start from
   std::vector<std::pair<std::string, double>> passive;  ///< where they stand then [rad or m]
 };
 
-struct LoopStudy {
-  std::vector<LoopClosing> postures;
+struct ClosureStudy {
+  std::vector<ClosureInPosture> postures;
   std::size_t freedom = 0;       ///< degrees that remain with the loops closed
   std::size_t open_freedom = 0;  ///< of the tree that the loops close
   Diagnostics errors;  ///< a loop that does not close, with its line and what is left open
@@ -35,8 +35,8 @@ struct LoopStudy {
 ///
 /// @param kernels   any of the robot's, which know the sites of its loops
 /// @param postures  names of robot.toml; an empty name: every joint at 0
-[[nodiscard]] LoopStudy study_loops(const hal::RobotConfig& robot, const tandem_kernels& kernels,
-                                    std::span<const std::string> postures);
+[[nodiscard]] ClosureStudy study_loops(const hal::RobotConfig& robot, const tandem_kernels& kernels,
+                                       std::span<const std::string> postures);
 
 /// A loop between two sites of one body closes nothing.
 [[nodiscard]] Diagnostics check_loop_bodies(const hal::RobotConfig& robot, const model::Tree& tree);

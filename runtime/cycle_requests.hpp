@@ -1,4 +1,4 @@
-// What others ask of the loop (loop_request.hpp): done and answered once a cycle.
+// What others ask of the loop (cycle_request.hpp): done and answered once a cycle.
 // Layer: runtime.  Thread: the loop's.
 #pragma once
 
@@ -7,7 +7,7 @@
 namespace tandem::runtime {
 
 /// The requests of a run: joins what carries them out. All outlive it.
-struct LoopRequests {
+struct CycleRequests {
   CycleNow& now;
   DriveResets& resets;
   JointHoming& homing;

@@ -1,4 +1,4 @@
-#include "runtime/loop_watchdog.hpp"
+#include "runtime/cycle_watchdog.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -19,14 +19,14 @@ nanoseconds tick_of(nanoseconds limit) {
 
 }  // namespace
 
-LoopWatchdog::LoopWatchdog(const Heartbeat& heartbeat, const WatchdogConfig& config, Hooks hooks)
+CycleWatchdog::CycleWatchdog(const Heartbeat& heartbeat, const WatchdogConfig& config, Hooks hooks)
     : heartbeat_(&heartbeat),
       config_(config),
       hooks_(std::move(hooks)),
       tick_(tick_of(config.limit)),
       thread_([this] { run(); }) {}
 
-LoopWatchdog::~LoopWatchdog() {
+CycleWatchdog::~CycleWatchdog() {
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
@@ -36,12 +36,12 @@ LoopWatchdog::~LoopWatchdog() {
 }
 
 /// @return false: the watchdog is to end
-bool LoopWatchdog::sleep() {
+bool CycleWatchdog::sleep() {
   std::unique_lock lock(mutex_);
   return !ended_.wait_for(lock, tick_, [this] { return ending_; });
 }
 
-void LoopWatchdog::run() {
+void CycleWatchdog::run() {
   std::uint64_t seen = 0;
   nanoseconds silent{};
   bool hung = false;
