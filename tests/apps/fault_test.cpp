@@ -235,7 +235,7 @@ TEST_F(Faults, AnEndlessRunThatASignalStopsIsDone) {
     EXPECT_TRUE(result["faults"].empty());
     const std::string out = read_text(folder_ / "table.txt");
     for (const std::string& text : {std::string("2 joints, until it is stopped at 1 kHz"),
-                                   "stopped by SIG" + name + " after "}) {
+                                    "stopped by SIG" + name + " after "}) {
       EXPECT_NE(out.find(text), std::string::npos) << text << "\nin: " << out;
     }
     EXPECT_EQ(out.find(" % "), std::string::npos) << "a share of what has no end: " << out;
