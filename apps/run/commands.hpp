@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "apps/command_line/command_line.hpp"
-#include "apps/text/figures.hpp"
 #include "apps/run/tools_program.hpp"
+#include "apps/text/figures.hpp"
 
 namespace tandem::apps {
 
