@@ -44,7 +44,7 @@ inline RobotConfig fake_robot() {
                             .max_position_rad = 1.5,
                             .max_velocity_rad_s = 2.0,
                             .max_torque_Nm = 20.0,
-                            .rated_torque_Nm = 20.0});
+                            .rated_torque_Nm = {20.0}});
   }
   SensorConfig& hand = robot.sensors.emplace_back();
   hand.name = "hand";
