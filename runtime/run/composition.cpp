@@ -211,8 +211,16 @@ Diagnostics override_experiment(Experiment& e, const Overrides& overrides) {
   } else if (!hal.empty()) {
     return {fail("hal: '" + hal + "'", "one of sim, can, ethercat, dds").error()};
   }
-  if (overrides.on_fault == "end") e.after_stop = AfterStop::kEnd;
-  if (overrides.on_fault == "wait") e.after_stop = AfterStop::kWait;
+  const std::string& on_fault = overrides.on_fault;
+  if (!on_fault.empty() && on_fault != "end" && on_fault != "wait")
+    return {fail("on_fault: '" + on_fault + "'", "one of end, wait").error()};
+  if (on_fault == "end") e.after_stop = AfterStop::kEnd;
+  if (on_fault == "wait") e.after_stop = AfterStop::kWait;
+  const double duration_s = overrides.duration_s.value_or(kEndless_s);
+  if (!(duration_s > 0.0 && (duration_s <= 1e6 || duration_s == kEndless_s))) {
+    return {
+        fail(fmt::format("duration_s: {}", duration_s), "above 0, to 1e6, or kEndless_s").error()};
+  }
   e.seed = overrides.seed.value_or(e.seed);
   e.duration_s = overrides.duration_s.value_or(e.duration_s);
   if (!overrides.kernel_variant.empty()) e.kernel_variant = overrides.kernel_variant;

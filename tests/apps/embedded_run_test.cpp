@@ -2,6 +2,7 @@
 #include "runtime/run/run.hpp"
 
 #include <chrono>
+#include <cmath>
 #include <future>
 #include <map>
 
@@ -139,6 +140,11 @@ TEST_F(EmbeddedRun, SaysWhyItCannotBe) {
   EXPECT_NE(refused("hold.toml", {.hal = "can"}).find("its robot is not in this process"),
             std::string::npos);
   EXPECT_NE(refused("hold.toml", {.hal = "cam"}).find("one of sim, can"), std::string::npos);
+  EXPECT_NE(refused("hold.toml", {.on_fault = "go on"}).find("one of end, wait"),
+            std::string::npos);
+  for (const double s : {0.0, -1.0, 1e7, -runtime::kEndless_s, std::nan("")}) {
+    EXPECT_NE(refused("hold.toml", {.duration_s = s}).find("duration_s: "), std::string::npos) << s;
+  }
   edit("hold.toml", "plugin = \"hold\"", "plugin = \"hodl\"");
   EXPECT_NE(refused("hold.toml", {}).find("did you mean 'hold'"), std::string::npos)
       << refused("hold.toml", {});
