@@ -7,6 +7,7 @@
 #include "log/compare.hpp"
 #include "rt/scoped_realtime.hpp"
 #include "tests/log/scratch_folder.hpp"
+#include "tests/rt/fake_clock.hpp"
 #include "tests/runtime/bundled_run.hpp"
 
 namespace tandem::runtime {
@@ -164,7 +165,9 @@ TEST(LockstepRun, AnEmulatorThatIsGoneIsAFaultThatSaysWhatToDo) {
 
 TEST(RealTimeRun, DoesNotTakeALateAnswerForTheNextOne) {
   std::optional<LockstepRobot> wire;
-  BundledRun squat("coman", "squat", {.duration_s = 0.1, .hal = "can"}, {}, over(wire, false));
+  rt::FakeClock clock;  // never late, whatever else the computer does
+  BundledRun squat("coman", "squat", {.duration_s = 0.1, .hal = "can"}, {.clock = &clock},
+                   over(wire, false));
   LockstepRobot& robot = *wire;
   RobotCycle& cycle = *squat.cycle;
   while (cycle.phase() == RunPhase::kBringUp) {
