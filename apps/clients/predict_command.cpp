@@ -76,7 +76,11 @@ void print_prediction(const Json& answer) {
   facts.print(stdout);
   for (const Json& fault : answer["faults"]) {
     fmt::print("fault: {}\n",
-               shown(figures_text("{time_s:.3f s}: {cause}", fault).value_or(""), 2'000));
+               shown(figures_text(fault["joint"] == "" ? "{time_s:.3f s}: {cause}"
+                                                       : "{time_s:.3f s}: {joint}: {cause}",
+                                  fault)
+                         .value_or(""),
+                     2'000));
   }
 }
 

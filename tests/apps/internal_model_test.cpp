@@ -156,7 +156,9 @@ TEST_F(Predict, SaysWhichFaultsWillCome) {
   const auto answer = nlohmann::json::parse(to_run("predict --horizon 9 --json -").out);
   ASSERT_FALSE(answer["faults"].empty());
   for (const auto& fault : answer["faults"])
-    EXPECT_NE(table.out.find(" s: " + fault["cause"].get<std::string>()), std::string::npos)
+    EXPECT_NE(table.out.find(" s: " + fault["joint"].get<std::string>() + ": " +
+                             fault["cause"].get<std::string>()),
+              std::string::npos)
         << table.out;
   EXPECT_EQ(end(), 0);
 }
