@@ -15,7 +15,7 @@ enum class LineError : std::uint8_t {
 #undef TANDEM_LINE_ERROR
 };
 
-/// The error in words; empty for one that is told with figures.
+/// The error in words; empty where the caller writes them, with figures.
 [[nodiscard]] const char* to_string(LineError error) noexcept;
 /// Whether another try does not mend it.
 [[nodiscard]] bool lasts(LineError error) noexcept TANDEM_RT;

@@ -23,7 +23,7 @@ Exit become_tools(const std::vector<std::string>& words);
 struct ReportOfRun {
   std::string log;          ///< empty: nothing
   bool whole = true;        ///< the log has every message
-  std::FILE* out = stdout;  ///< says where the report is; null: nobody asks
+  std::FILE* out = stdout;  ///< where the report is named; null: nowhere
 };
 
 /// Becomes `tandem report`, which ends with the run's status: a report that cannot be drawn is no

@@ -199,7 +199,7 @@ class Figures {
       return "object by name";
     else if constexpr (kPercentiles<V>)
       return "percentiles";
-    else if constexpr (std::convertible_to<V, std::string>)
+    else if constexpr (std::convertible_to<V, std::string> && !std::same_as<V, Json>)
       return "text";
     else if constexpr (std::same_as<V, std::vector<std::string>>)
       return "list of text";

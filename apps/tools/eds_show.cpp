@@ -241,7 +241,7 @@ void print_stand_in(std::FILE* out, const Result<StandIn>& simulated) {
   for (const std::string& text : simulated->remarks) fmt::print(out, "  {}\n", text);
 }
 
-/// What is told of a sheet.
+/// The facts of a data sheet.
 struct SheetReport {
   DataSheet sheet{};
   SheetFacts facts{};

@@ -1,4 +1,4 @@
-// What is told of a joint, and when again.
+// Which causes are reported of a joint, and when they are reported again.
 #include "runtime/fault_watch.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ using hal::FaultCause;
 
 struct Joints : testing::Test {
   Joints() { robot.joints[1].drive.temperature_limit_C = 100.0; }
-  /// The causes that are told of the joints as they are now.
+  /// The causes that the joints report in their present state.
   std::vector<FaultCause> told() {
     std::vector<FaultCause> causes;
     while (const auto found = watch.next_joint(state)) {
