@@ -41,7 +41,10 @@ bool FaultWatch::is_ill(const hal::StateImage& state, std::size_t joint) const n
 }
 
 hal::FaultCause FaultWatch::found(const hal::StateImage& state, std::size_t joint) const noexcept {
-  if (drive_in_fault(state, joint)) return backend_->fault_cause(joint);
+  if (drive_in_fault(state, joint)) {
+    const hal::FaultCause cause = backend_->fault_cause(joint);
+    return hal::is_of_drive(cause) ? cause : hal::FaultCause::kDrive;
+  }
   if (is_ill(state, joint)) return hal::FaultCause::kJointLost;
   const double share = joint_told_[joint] == hal::FaultCause::kHot ? kCooledShare : kHotShare;
   const double limit_C = robot_->joints[joint].drive.temperature_limit_C;  // NaN: not known

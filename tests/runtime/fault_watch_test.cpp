@@ -30,7 +30,11 @@ struct Joints : testing::Test {
   }
 
   hal::RobotConfig robot = hal::test::fake_robot();
-  hal::test::FakeBackend backend{robot};
+  struct Backend : hal::test::FakeBackend {
+    using FakeBackend::FakeBackend;
+    FaultCause fault_cause(std::size_t) const noexcept override { return cause; }
+    FaultCause cause = FaultCause::kDrive;
+  } backend{robot};
   hal::StateImage state{robot.shape()};
   FaultWatch watch{robot, backend, 10, {}};
   FaultRecord last{};
@@ -51,6 +55,20 @@ TEST_F(Joints, AHotWindingIsToldOnceUntilItHasCooledDown) {
   state.temperature_C()[0] = 1e9;
   state.temperature_C()[1] = std::nan("");
   EXPECT_EQ(told(), nothing) << "without a limit, or a measurement, there is nothing to tell";
+}
+
+/// A fault is one by the drive's state, whatever its backend says of the cause.
+TEST_F(Joints, ADriveInFaultIsOneWhoseCauseIsNoDrives) {
+  state.fault()[1] = 0x4310;
+  for (const FaultCause cause : {FaultCause::kNone, FaultCause::kHot, FaultCause::kNotHomed}) {
+    backend.cause = cause;
+    EXPECT_EQ(told(), fault);
+    EXPECT_EQ(last.category, hal::StopCategory::kCategory1);
+    EXPECT_TRUE(watch.joint_in_fault());
+    state.fault()[1] = 0;
+    watch.reset(state);
+    state.fault()[1] = 0x4310;
+  }
 }
 
 TEST_F(Joints, AHotWindingDoesNotHideTheDrivesFault) {
