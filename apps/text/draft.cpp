@@ -16,6 +16,7 @@
 #include <csignal>
 #include <cstddef>
 #include <cstring>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -61,6 +62,23 @@ void on_end(int signal) {
   std::signal(signal, SIG_DFL);
   std::raise(signal);
 }
+
+/// Ends wait, as long as it lives: a draft is made, and known to the handler, or neither.
+class EndsWait {
+ public:
+  EndsWait() {
+    sigset_t ends;
+    ::sigemptyset(&ends);
+    for (const int signal : kEnds) ::sigaddset(&ends, signal);
+    ::pthread_sigmask(SIG_BLOCK, &ends, &before_);
+  }
+  ~EndsWait() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  EndsWait(const EndsWait&) = delete;
+  EndsWait& operator=(const EndsWait&) = delete;
+
+ private:
+  sigset_t before_{};
+};
 
 void copy_text(const std::string& text, std::span<char> out) {
   const std::size_t size = text.size() < out.size() ? text.size() : 0;
@@ -235,10 +253,12 @@ Result<Draft> Draft::folder(const std::string& final, Removes removes,
     if (!path.has_filename()) path = path.parent_path();
   }
   remove_left(root);
+  std::optional<EndsWait> waiting(std::in_place);
   if (problem = make_new(root); problem) {
     return problem_of("the folder cannot be made", problem, final);
   }
   Draft draft(final, root, path.string(), interrupted);
+  waiting.reset();
   fs::create_directories(path, problem);
   if (problem) return problem_of("the folder cannot be made", problem, final);
   draft.lock();
@@ -258,6 +278,7 @@ Draft Draft::file(const std::string& final) {
     const fs::path root = first.string() + suffix();
     const fs::path path = root / whole.lexically_relative(first);
     remove_left(root);
+    const EndsWait waiting;
     problem = make_new(root);  // who writes to it finds out
     Draft in_folder(final, problem ? fs::path() : root, path.string());
     if (!problem) fs::create_directories(path.parent_path(), problem);

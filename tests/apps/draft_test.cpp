@@ -2,8 +2,10 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -34,6 +36,26 @@ TEST(Draft, NamesWhatWasMeantWhereverAMessageNamesIt) {
   EXPECT_EQ(named.hint, "see " + final + " or " + final);
   EXPECT_EQ(named.file, final);
   EXPECT_EQ(draft.placed("another.toml"), "another.toml");
+}
+
+// An interrupt between the making of a draft and its being known to the handler left it behind.
+TEST(Draft, AnInterruptAtAnyTimeLeavesNothing) {
+  const tandem::test::ScratchFolder folder;
+  for (int i = 0; i < 200; ++i) {
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      ::close(STDERR_FILENO);
+      for (;;) (void)Draft::folder(folder / "found");
+    }
+    ::usleep(static_cast<useconds_t>(500 + 37 * i % 1000));
+    ASSERT_EQ(::kill(child, SIGINT), 0);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status));
+    for (const auto& left : fs::directory_iterator(folder / ""))
+      FAIL() << left.path() << " is left, interrupt " << i;
+  }
 }
 
 // A process that was killed may have had our number.
