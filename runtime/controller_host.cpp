@@ -95,6 +95,7 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
   made->name = name;
   made->plugin = source.code.path;
   made->controller = std::move(source.controller);
+  made->io = setup.io;
   made->claims.assign(setup.claims().begin(), setup.claims().end());
   made->plans.assign(setup.plans().begin(), setup.plans().end());
   made->claimed.assign(robot_.joints.size(), 0);
@@ -377,7 +378,7 @@ void ControllerHost::archive(Archive& ar) {
   for (HostedController* one : table_) {
     if (one == nullptr) continue;
     one->controller->archive(ar);
-    ar(one->strayed);
+    ar(*one->io, one->strayed);
   }
   ar(active_, done_, ended_, failed_controller_, references_, gains_);
   if (ar.reading()) guard_.forget(gains_);

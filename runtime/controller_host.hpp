@@ -54,6 +54,7 @@ struct HostedController {
   std::string name;
   std::string plugin;                      ///< its library's path; empty: it has none
   std::shared_ptr<Controller> controller;  ///< a plugin's shares its library's life
+  std::shared_ptr<ControllerIo> io;        ///< what it declared
   std::vector<ControllerSetup::Claim> claims;
   std::vector<ControllerSetup::Plan> plans;
   std::vector<std::uint8_t> claimed;  ///< by joint
