@@ -102,8 +102,9 @@ Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE
   if (options.trace.empty()) return {};
   const runtime::RobotCycle& cycle = summary.cycle;
   Draft draft = Draft::file(options.trace);
-  const Status written = runtime::write_trace(
-      draft.path(), summary.composition.experiment.robot.name, cycle.trace(), cycle.faults());
+  const Status written =
+      runtime::write_trace(draft.path(), summary.composition.experiment.robot.name, cycle.trace(),
+                           cycle.faults(), *summary.composition.controllers->names());
   if (!written) return std::unexpected(draft.placed(written.error()));
   if (const Status placed = draft.place(); !placed || options.quiet) return placed;
   const std::uint64_t all = cycle.trace().count();
