@@ -286,6 +286,7 @@ void figures(Figures& f, const RunSummary* s) {
     "tolerated anomalies: missing feedback, counted by node; commands that a bus did not accept; a "
     "refused value",
     [&] { return s->warnings(); });
+  f("gate", "with `--gate`: as `rules` of `tandem controller check`", [&] { return s->gate; });
   f("fault_log", "every fault", [&] { return s->cycle.faults(); });
   f("kernel_variant", "of the generated kernels that ran",
     [&] { return std::string(s->composition.kernels->variant); });
