@@ -102,7 +102,7 @@ class RewoundRun {
     if (const Parts again = parts_of_controllers(); again != parts) {
       for (std::size_t i = 0; i < parts.size(); ++i)
         if (again[i] != parts[i]) proof.archive = difference(parts[i], again[i]);
-    } else if (run_.cycle().save() != saved) {
+    } else if (const auto second = run_.cycle().save(); !second || *second != *saved) {
       proof.archive = "save, restore and save give other bytes";
     }
     proof.rewound = compare(once, commands());
@@ -209,7 +209,9 @@ Result<Proof> prove_on_thread(const WiredComposition& c, runtime::Run& run, Gate
     return proof;
   }
   thread.detach();
-  return Proof{.crashed = (*guard)->fault()};
+  const std::string fault = (*guard)->fault();
+  (void)guard->release();  // it still watches, and so what follows cannot last for ever
+  return Proof{.crashed = fault};
 }
 
 void add_proof(const Proof& proof, std::vector<GateResult>& results) {

@@ -62,12 +62,15 @@ TEST_F(ControllerCheck, NamesThePlaceOfEachBrokenRule) {
     ASSERT_TRUE(found.contains(one.name)) << one.rule << "\n" << said_;
     const auto& breach = found.at(one.name)["breaches"][0];
     EXPECT_EQ(breach["controller"], "breaks");
-    if (*one.call != '\0') EXPECT_EQ(breach["call"], one.call);
+    if (*one.call != '\0') {
+      EXPECT_EQ(breach["call"], one.call);
+    }
     EXPECT_TRUE(has_line(breach, one.function)) << breach.dump(1);
     EXPECT_NE(said_.find(one.function), std::string::npos) << said_;
     EXPECT_TRUE(has_line(breach, "breaks.cpp:")) << "file and line\n" << breach.dump(1);
-    if (one.rule == std::string("lock") || one.rule == std::string("system_call"))
+    if (one.rule == std::string("lock") || one.rule == std::string("system_call")) {
       EXPECT_EQ(found.size(), 1U) << said_;
+    }
   }
 }
 

@@ -54,7 +54,7 @@ class TracedRun : public testing::Test, protected test::LoopRun {
   Json written() {
     const std::string file = folder / "trace.json";
     const Status status =
-        write_trace(file, "three \"joints\"", cycle->trace(), cycle->faults(), *host.names());
+        write_trace(file, "three \"joints\"", cycle->trace(), cycle->faults(), *host->names());
     EXPECT_TRUE(status) << status.error().to_string();
     std::ifstream in(file);
     return Json::parse(in, nullptr, false);
@@ -262,7 +262,7 @@ TEST_F(TracedRun, TimesEachControllerAndNamesTheReasonOfAnOverrun) {
 TEST_F(TracedRun, SaysWhichFileCannotBeWritten) {
   make({.trace_cycles = 4});
   const Status status =
-      write_trace("/proc/nothing/trace.json", "r", cycle->trace(), {}, *host.names());
+      write_trace("/proc/nothing/trace.json", "r", cycle->trace(), {}, *host->names());
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().file, "/proc/nothing/trace.json");
   EXPECT_NE(status.error().message.find("No such file"), std::string::npos);
