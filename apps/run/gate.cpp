@@ -33,7 +33,7 @@ constexpr std::uint64_t kWarmCalls = 100;  // without locked memory: first touch
 constexpr std::uint64_t kFaultyCalls = 3;  // the same: with fewer it keeps the rule
 constexpr std::size_t kStackLines = 12;    // without those of the standard library's templates
 
-Gate* gate = nullptr;               // who is told
+Gate* told = nullptr;               // who is told
 thread_local bool in_call = false;  // of a controller, in the cycle
 
 struct RuleRow {
@@ -152,13 +152,13 @@ std::unique_ptr<Gate> Gate::open() {
   action.sa_sigaction = &on_system_call;
   action.sa_flags = SA_SIGINFO | SA_ONSTACK;
   ::sigaction(SIGSYS, &action, nullptr);
-  gate = opened.get();
+  told = opened.get();
   const auto tell = reinterpret_cast<void (*)(void (*)(const char*))>(::dlsym(RTLD_DEFAULT, kTell));
   if (tell != nullptr) tell(&on_call);
   return opened;
 }
 
-Gate::~Gate() { gate = nullptr; }
+Gate::~Gate() { told = nullptr; }
 
 void Gate::watch_system_calls() noexcept {
   no_dispatch_ = ::prctl(kDispatch, 1, 0UL, 0UL, &selector_) == 0 ? 0 : errno;
@@ -188,17 +188,17 @@ void Gate::leave() noexcept {
 
 /// On any thread, and inside malloc.
 void Gate::on_call(const char* call) {
-  if (gate == nullptr) return;
+  if (told == nullptr) return;
   if (in_call) {
     in_call = false;  // what follows is ours
-    const char watched = gate->selector_;
-    gate->selector_ = 0;
-    gate->note({.rule = rule_of(call),
-                .controller = static_cast<std::int32_t>(gate->controller_),
-                .function = gate->function_,
+    const char watched = told->selector_;
+    told->selector_ = 0;
+    told->note({.rule = rule_of(call),
+                .controller = static_cast<std::int32_t>(told->controller_),
+                .function = told->function_,
                 .call = call,
                 .stack = take_call_stack()});
-    gate->selector_ = watched;
+    told->selector_ = watched;
     in_call = true;
     return;
   }
@@ -207,18 +207,18 @@ void Gate::on_call(const char* call) {
   if (controller == nullptr) return;
   Note what{.rule = GateRule::kThread, .call = call, .stack = take_call_stack()};
   std::strncpy(what.named.data(), controller, what.named.size() - 1);
-  gate->note(what);
+  told->note(what);
 }
 
 /// The call is made once more after it, and the rest of the controller's call is not watched: there
 /// is one in a cycle, but never two for the same.
 void Gate::on_system_call(int, siginfo_t* about, void* context) {
-  if (gate == nullptr) return;
-  gate->selector_ = 0;
+  if (told == nullptr) return;
+  told->selector_ = 0;
   const bool ours = std::exchange(in_call, false);
-  gate->note({.rule = GateRule::kSystemCall,
-              .controller = static_cast<std::int32_t>(gate->controller_),
-              .function = gate->function_,
+  told->note({.rule = GateRule::kSystemCall,
+              .controller = static_cast<std::int32_t>(told->controller_),
+              .function = told->function_,
               .system_call = about->si_syscall,
               .stack = interrupted_call_stack(context)});
   in_call = ours;
