@@ -10,6 +10,8 @@ function(tandem_add_controller name)
   target_link_libraries(controller_${name} PRIVATE tandem::plugin ${PLUGIN_LINKS})
   if(TARGET tandem_pch)
     target_precompile_headers(controller_${name} REUSE_FROM tandem_pch)
+  else()
+    target_compile_options(controller_${name} PRIVATE -g1)  # lines, for the stack of a crash
   endif()
   # Nothing undefined that the loader would find missing, nothing exported but the entry point: a
   # symbol that is one for the whole process would keep a library from ever being closed.

@@ -33,6 +33,9 @@ set(TANDEM_PLUGIN_HEADERS
 # itself, in ../lib and ../share, whatever a system calls its folders.
 function(tandem_install)
   install(TARGETS tandem tandem-tools RUNTIME DESTINATION bin)
+  if(TARGET tandem_gate)
+    install(TARGETS tandem_gate DESTINATION lib/tandem)
+  endif()
   foreach(name IN LISTS TANDEM_BUNDLED_CONTROLLERS)
     install(TARGETS controller_${name} DESTINATION lib/tandem/controllers)
   endforeach()

@@ -21,6 +21,7 @@
 #include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "base/toml_reader.hpp"
+#include "controllers/controller_io.hpp"
 #include "hal/cycle_time.hpp"
 #include "hal/estimate.hpp"
 #include "hal/image.hpp"
@@ -63,6 +64,8 @@ class ControllerSetup {
   /// Runs the robot ahead of its time; null where the run has no model of it: a real robot without
   /// [parallel]. It outlives the controller. docs/internal-model.md
   hal::Predictor* predictor;
+  /// What the controller declares with the functions below; the host keeps it.
+  const std::shared_ptr<ControllerIo> io = std::make_shared<ControllerIo>();
 
   /// Claims a joint (index in the image) in a mode. Two controllers that claim one joint are an
   /// error before anything moves; a joint that nobody claims is held by the loop. What a controller

@@ -36,11 +36,14 @@ const FaultEntry* latched(const std::vector<FaultEntry>& faults, const std::stri
   return found;
 }
 
-std::string percentiles(const rt::Histogram& histogram) {
-  const rt::Percentiles p = histogram.percentiles();
+std::string percentiles(const rt::Percentiles& p) {
   const auto us = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
   return fmt::format("{:.1f} / {:.1f} / {:.1f} / {:.1f}", us(p.p50), us(p.p99), us(p.p999),
                      us(p.max));
+}
+
+std::string percentiles(const rt::Histogram& histogram) {
+  return percentiles(histogram.percentiles());
 }
 
 /// diagnostic_msgs/DiagnosticStatus' levels.
@@ -69,6 +72,7 @@ class DiagnosticTopics final : public TopicGroup {
 
   const hal::RobotConfig& robot_;
   std::string hal_, no_frame_;
+  const decltype(RunDescription::controllers) controllers_;
   std::vector<hal::MotorFeedback> tells_;  // of each joint's drive
   std::uint64_t told_overruns_ = 0, told_dropped_ = 0;
   Output<diagnostic_msgs::DiagnosticArray> output_;
@@ -77,6 +81,7 @@ class DiagnosticTopics final : public TopicGroup {
 DiagnosticTopics::DiagnosticTopics(OutputMaker& maker, const RunDescription& run)
     : robot_(run.robot),
       hal_(run.hal),
+      controllers_(run.controllers),
       tells_(hal::motor_feedback(run.robot)),
       output_(
           maker.periodic<diagnostic_msgs::DiagnosticArray>(Topic::kDiagnostics, "diagnostics")) {}
@@ -118,6 +123,10 @@ HealthStatus DiagnosticTopics::loop(const CycleSample& sample) {
                                  {"wake-up p50/p99/p99.9/max [us]", percentiles(loop.wakeup)}}};
   if (loop.bus.count() > 0) {
     status.values.emplace_back("bus p50/p99/p99.9/max [us]", percentiles(loop.bus));
+  }
+  if (controllers_) {
+    for (const auto& [name, times] : controllers_())
+      status.values.emplace_back(name + " p50/p99/p99.9/max [us]", percentiles(times));
   }
   if (loop.dropped > told_dropped_) {
     status.level = HealthLevel::kWarn;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -47,6 +48,8 @@ struct RunDescription {
   std::vector<std::string> wrenches{};           ///< sites of the estimate's wrenches, in its order
   bool parallel = false;                         ///< a second robot runs beside it
   std::uint64_t run = 0;                         ///< drawn at its start
+  /// How long each controller's calls take, by name; on the publisher's thread. Empty: not known.
+  std::function<std::vector<std::pair<std::string, rt::Percentiles>>()> controllers{};
 };
 
 /// The loop's times, of every cycle so far.

@@ -159,7 +159,10 @@ bool is_fault(EventKind kind) noexcept {
 bool is_stop(const Event& event) noexcept { return is_fault(event.kind) && event.reported == 0; }
 
 std::string describe(const Event& event, const EventNames& names) {
-  return what_happened(event, names) + (event.reported != 0 ? ", reported" : "");
+  std::string who;
+  if (event.controller != 0 && names.controller)
+    who = ", controller '" + names.controller(event.controller - 1U) + "'";
+  return what_happened(event, names) + who + (event.reported != 0 ? ", reported" : "");
 }
 
 const std::string& event_schema() {

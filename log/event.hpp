@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -42,7 +43,7 @@ struct Event {
   EventKind kind = EventKind::kStarted;
   hal::FaultTarget target = hal::FaultTarget::kNone;  ///< of an injected fault
   std::uint8_t reported = 0;                          ///< 1: a fault that stops nothing
-  std::uint8_t padding = 0;
+  std::uint8_t controller = 0;  ///< whose doing it is: 1 and its number; 0: nobody's
   /// Target of a motion; index of a lost sensor, and of an injected fault's board, sensor or bus.
   /// The log's text has it.
   float value = 0.0F;
@@ -55,6 +56,7 @@ struct EventNames {
   std::vector<std::string> boards{};
   std::vector<std::string> sensors{};
   std::vector<std::string> buses{};
+  std::function<std::string(std::size_t)> controller{};  ///< by number; any thread's
 };
 
 /// One line for people: "fault of LHipMot (0x7310)".

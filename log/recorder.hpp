@@ -66,6 +66,11 @@ class Recorder {
   /// further, or at the end: with a loop that is never further ahead than that, the file does not
   /// depend on the threads' pace. Before start().
   void open_side(std::int64_t lag_ns);
+  /// Who knows the controllers' names, for the events' texts; on the writer's thread. Before
+  /// start().
+  void name_controllers(std::function<std::string(std::size_t)> name) {
+    names_.controller = std::move(name);
+  }
   /// No more channels: allocates the ring and starts the writer's thread.
   void start();
 

@@ -2,10 +2,24 @@
 #include "rt/histogram.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 
 namespace tandem::rt {
+namespace {
+
+/// Others read while the one writer counts: plain loads and stores, but whole ones.
+template <class Number>
+Number look(const Number& number) noexcept {
+  return std::atomic_ref<Number>(const_cast<Number&>(number)).load(std::memory_order_relaxed);
+}
+template <class Number>
+void set(Number& number, Number value) noexcept TANDEM_RT {
+  std::atomic_ref<Number>(number).store(value, std::memory_order_relaxed);
+}
+
+}  // namespace
 
 std::size_t Histogram::bucket_of(std::uint64_t value) noexcept TANDEM_RT {
   // The bucket is the value's leading 1 and the kLinearBits bits after it.
@@ -25,24 +39,27 @@ std::int64_t Histogram::upper_end(std::size_t bucket) noexcept {
 
 void Histogram::record(std::int64_t duration_ns) noexcept TANDEM_RT {
   const std::int64_t value = std::max<std::int64_t>(duration_ns, 0);
-  ++counts_[bucket_of(static_cast<std::uint64_t>(value))];
-  ++count_;
-  sum_ns_ += value;
-  max_ns_ = std::max(max_ns_, value);
+  std::uint64_t& count = counts_[bucket_of(static_cast<std::uint64_t>(value))];
+  set(count, count + 1);
+  set(count_, count_ + 1);
+  set(sum_ns_, sum_ns_ + value);
+  if (value > max_ns_) set(max_ns_, value);
 }
 
 std::int64_t Histogram::percentile_ns(double fraction) const noexcept {
-  const auto wanted = static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(count_)));
+  const std::int64_t max_ns = look(max_ns_);
+  const auto wanted =
+      static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(look(count_))));
   std::uint64_t seen = 0;
   for (std::size_t bucket = 0; bucket < kBuckets; ++bucket) {
-    seen += counts_[bucket];
-    if (seen >= wanted && seen > 0) return std::min(upper_end(bucket), max_ns_);
+    seen += look(counts_[bucket]);
+    if (seen >= wanted && seen > 0) return std::min(upper_end(bucket), max_ns);
   }
-  return max_ns_;
+  return max_ns;
 }
 
 Percentiles Histogram::percentiles() const noexcept {
-  return {percentile_ns(0.5), percentile_ns(0.99), percentile_ns(0.999), max_ns_};
+  return {percentile_ns(0.5), percentile_ns(0.99), percentile_ns(0.999), look(max_ns_)};
 }
 
 void Histogram::add(const Histogram& other) noexcept {

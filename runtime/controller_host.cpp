@@ -15,6 +15,54 @@ CycleAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
 
 }  // namespace
 
+/// One call of the cycle into a controller: who is at work, and how long it takes.
+class ControllerHost::InCall {
+ public:
+  InCall(ControllerHost& host, HostedController& one,
+         ControllerFunction function) noexcept TANDEM_RT : host_(host),
+                                                           one_(one) {
+    host.at_work_.store(static_cast<std::int32_t>(one.id), std::memory_order_relaxed);
+    if (host.clock_ != nullptr) begin_ns_ = host.clock_->now_ns();
+    if (host.watch_ != nullptr) host.watch_->enter(one.id, function);
+  }
+  ~InCall() {
+    if (host_.watch_ != nullptr) host_.watch_->leave();
+    if (host_.clock_ != nullptr) note(host_.clock_->now_ns() - begin_ns_);
+    host_.at_work_.store(-1, std::memory_order_relaxed);
+  }
+  InCall(const InCall&) = delete;
+  InCall& operator=(const InCall&) = delete;
+
+  [[nodiscard]] Controller* operator->() const noexcept TANDEM_RT { return one_.controller.get(); }
+
+ private:
+  void note(std::int64_t took_ns) noexcept TANDEM_RT {
+    one_.times->calls.record(took_ns);
+    if (host_.called_ == host_.calls_.size()) return;
+    host_.calls_[host_.called_++] = {one_.id, begin_ns_, took_ns};
+  }
+
+  ControllerHost& host_;
+  HostedController& one_;
+  std::int64_t begin_ns_ = 0;
+};
+
+std::int32_t ControllerHost::begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT {
+  std::int64_t all_ns = 0;
+  for (const ControllerCall& call : calls()) all_ns += call.took_ns;
+  const auto longest = std::ranges::max_element(calls(), {}, &ControllerCall::took_ns);
+  std::int32_t reason = -1;
+  if (late_ns > 0 && called_ > 0 && 2 * all_ns >= late_ns) {
+    reason = static_cast<std::int32_t>(longest->controller);
+    for (const HostedController* one : table_) {
+      if (one != nullptr && one->id == longest->controller)
+        one->times->overruns.fetch_add(1, std::memory_order_relaxed);
+    }
+  }
+  called_ = 0;
+  return reason;
+}
+
 ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kernels* kernels,
                                std::int64_t period_ns)
     : config_(&config),
@@ -95,12 +143,14 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
   made->name = name;
   made->plugin = source.code.path;
   made->controller = std::move(source.controller);
+  made->io = setup.io;
   made->claims.assign(setup.claims().begin(), setup.claims().end());
   made->plans.assign(setup.plans().begin(), setup.plans().end());
   made->claimed.assign(robot_.joints.size(), 0);
   made->strayed.assign(robot_.joints.size(), 0);
   for (const auto& claim : made->claims) made->claimed[claim.joint] = 1;
-  made->id = new_id(name);
+  made->id = names_->add(name);
+  made->times = names_->all()[made->id];
   return made;
 }
 
@@ -145,17 +195,6 @@ std::optional<ClaimConflict> ControllerHost::find_conflict(
     }
   }
   return std::nullopt;
-}
-
-std::uint32_t ControllerHost::new_id(const std::string& name) {
-  const std::lock_guard lock(names_mutex_);
-  names_.push_back(name);
-  return static_cast<std::uint32_t>(names_.size() - 1);
-}
-
-std::string ControllerHost::name(std::size_t id) const {
-  const std::lock_guard lock(names_mutex_);
-  return names_.at(id);
 }
 
 std::size_t ControllerHost::size() const noexcept {
@@ -234,7 +273,7 @@ CycleAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start,
   }
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((stop & only(slot)) == 0) continue;
-    enter(*table_[slot]).stop();
+    InCall(*this, *table_[slot], ControllerFunction::kStop)->stop();
     for (const auto& claim : table_[slot]->claims) references_.release(claim.joint, images);
   }
   call_starts(start, time, images);
@@ -254,11 +293,10 @@ bool ControllerHost::retreat(const hal::CycleTime& time, JointImages images) noe
   ControllerSet retreating = 0;
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (!is_active(slot) || (done_ & only(slot)) != 0) continue;
-    Controller& controller = enter(*table_[slot]);
-    if (controller.can_retreat() && controller.retreat(time, images.state))
+    const InCall controller(*this, *table_[slot], ControllerFunction::kRetreat);
+    if (controller->can_retreat() && controller->retreat(time, images.state))
       retreating |= only(slot);
   }
-  leave_calls();
   if (retreating == 0) return false;
   (void)switch_over(active_ & ~retreating, 0, true, time, images);
   return true;
@@ -284,13 +322,11 @@ Code ControllerHost::update(const hal::CycleTime& time, JointImages images) noex
         ended_ |= only(slot);
       } else if (code != Code::kOk) {
         failed_controller_ = one.id;
-        leave_calls();
         return code;
       }
     }
     ends = ends && (done_ & only(slot)) != 0 && one.of_experiment;
   }
-  leave_calls();
   references_.after_update(images);
   show();
   return ends ? Code::kStopped : Code::kOk;
@@ -326,16 +362,16 @@ void ControllerHost::call_starts(ControllerSet start, const hal::CycleTime& time
     if ((start & only(slot)) == 0) continue;
     HostedController& one = *table_[slot];
     guard_.remember(images.command, gains_);
-    enter(one).start(time, shown, images.command);
+    InCall(*this, one, ControllerFunction::kStart)->start(time, shown, images.command);
     take_back(one, images.command);
   }
-  leave_calls();
 }
 
 Code ControllerHost::call_update(HostedController& one, const hal::CycleTime& time,
                                  JointImages images) noexcept TANDEM_RT {
   guard_.remember(images.command, gains_);
-  const Code code = enter(one).update(time, images.state, images.command);
+  const Code code =
+      InCall(*this, one, ControllerFunction::kUpdate)->update(time, images.state, images.command);
   take_back(one, images.command);
   return code;
 }
@@ -352,9 +388,8 @@ void ControllerHost::take_back(HostedController& one,
 
 void ControllerHost::stop() noexcept TANDEM_RT {
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if (is_active(slot)) enter(*table_[slot]).stop();
+    if (is_active(slot)) InCall(*this, *table_[slot], ControllerFunction::kStop)->stop();
   }
-  leave_calls();
 }
 
 std::uint64_t ControllerHost::fingerprint() const noexcept {
@@ -377,7 +412,7 @@ void ControllerHost::archive(Archive& ar) {
   for (HostedController* one : table_) {
     if (one == nullptr) continue;
     one->controller->archive(ar);
-    ar(one->strayed);
+    ar(*one->io, one->strayed);
   }
   ar(active_, done_, ended_, failed_controller_, references_, gains_);
   if (ar.reading()) guard_.forget(gains_);

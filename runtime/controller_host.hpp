@@ -23,7 +23,10 @@
 #include "hal/config/robot_config.hpp"
 #include "hal/image.hpp"
 #include "hal/robot.hpp"
+#include "rt/clock.hpp"
+#include "runtime/call_watch.hpp"
 #include "runtime/claim_guard.hpp"
+#include "runtime/controller_times.hpp"
 #include "runtime/cycle_request.hpp"
 #include "runtime/joint_references.hpp"
 
@@ -54,13 +57,15 @@ struct HostedController {
   std::string name;
   std::string plugin;                      ///< its library's path; empty: it has none
   std::shared_ptr<Controller> controller;  ///< a plugin's shares its library's life
+  std::shared_ptr<ControllerIo> io;        ///< what it declared
   std::vector<ControllerSetup::Claim> claims;
   std::vector<ControllerSetup::Plan> plans;
-  std::vector<std::uint8_t> claimed;  ///< by joint
-  std::vector<std::uint8_t> strayed;  ///< by joint: something was taken back, and reported
-  std::uint32_t id = 0;               ///< of its name, for the fault log
-  bool of_experiment = true;          ///< not loaded while the run went on
-  bool leaves = false;                ///< the asking side's: the loop was asked to let it go
+  std::vector<std::uint8_t> claimed;       ///< by joint
+  std::vector<std::uint8_t> strayed;       ///< by joint: something was taken back, and reported
+  std::uint32_t id = 0;                    ///< of its name, for the fault log
+  std::shared_ptr<ControllerTimes> times;  ///< of its calls in the cycle
+  bool of_experiment = true;               ///< not loaded while the run went on
+  bool leaves = false;                     ///< the asking side's: the loop was asked to let it go
 };
 
 /// A controller wrote what it had not claimed, and that was taken back.
@@ -96,6 +101,10 @@ class ControllerHost {
   void show_estimate(const hal::EstimateImage* estimate) { estimate_ = estimate; }
   /// What those who are added from now on may ask for what will happen; null: nobody.
   void predict_by(hal::Predictor* predictor) { predictor_ = predictor; }
+  /// Each call of the cycle is timed by it from now on; without a clock none is.
+  void time_by(rt::Clock& clock) { clock_ = &clock; }
+  /// Who is told of each call of the cycle; null: nobody.
+  void watch_calls(CallWatch* watch) { watch_ = watch; }
   /// Configures a controller and takes its claims.
   /// @param active  false: it is loaded, and waits for its start.
   ///
@@ -128,7 +137,9 @@ class ControllerHost {
   [[nodiscard]] static std::optional<ClaimConflict> find_conflict(
       const Table& table, ControllerSet active) noexcept TANDEM_RT;
   /// Name of a controller that is or was loaded.
-  [[nodiscard]] std::string name(std::size_t id) const;
+  [[nodiscard]] std::string name(std::size_t id) const { return names_->name(id); }
+  /// Names and times of all that are or were loaded.
+  [[nodiscard]] const std::shared_ptr<ControllerNames>& names() const noexcept { return names_; }
   /// Who is active, and done, after the last cycle.
   struct Shown {
     ControllerSet active = 0, done = 0;
@@ -161,6 +172,15 @@ class ControllerHost {
 
   // The cycle.
 
+  /// Its calls so far, in their order.
+  [[nodiscard]] std::span<const ControllerCall> calls() const noexcept TANDEM_RT {
+    return {calls_.data(), called_};
+  }
+  /// A cycle begins: the calls of the one before are forgotten. That one was late, and took
+  /// `late_ns`; 0: it was not.
+  /// @return for name(): who is the reason, as the controllers took at least half of it: the one
+  ///         with the longest call; -1: nobody is
+  std::int32_t begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT;
   /// First cycle: holds every joint, sets the claimed modes, lets the active controllers seed
   /// theirs. Joints go over from `command`, which may be in motion when another loop sent it.
   void start(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT;
@@ -191,6 +211,11 @@ class ControllerHost {
   [[nodiscard]] std::int32_t owner(std::size_t joint) const noexcept TANDEM_RT {
     return owner_[joint];
   }
+  /// The same for name().
+  [[nodiscard]] std::int32_t owner_id(std::size_t joint) const noexcept TANDEM_RT {
+    const std::int32_t slot = owner_[joint];
+    return slot < 0 ? -1 : static_cast<std::int32_t>(table_[static_cast<std::size_t>(slot)]->id);
+  }
   /// The slot of one of `by` that claims `joint`, or -1.
   [[nodiscard]] std::int32_t claimant(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
   [[nodiscard]] JointReferences& references() noexcept { return references_; }
@@ -201,7 +226,6 @@ class ControllerHost {
  private:
   [[nodiscard]] Status check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const;
-  [[nodiscard]] std::uint32_t new_id(const std::string& name);
   void settle_ended(JointImages images) noexcept TANDEM_RT;
   [[nodiscard]] const hal::StateImage& at_rest(const hal::StateImage& state,
                                                ControllerSet start) noexcept TANDEM_RT;
@@ -215,11 +239,7 @@ class ControllerHost {
   void take_back(HostedController& one, hal::CommandImage& command) noexcept TANDEM_RT;
   void set_active(ControllerSet active) noexcept TANDEM_RT;
   void show() noexcept TANDEM_RT;
-  [[nodiscard]] Controller& enter(const HostedController& one) noexcept TANDEM_RT {
-    at_work_.store(static_cast<std::int32_t>(one.id), std::memory_order_relaxed);
-    return *one.controller;
-  }
-  void leave_calls() noexcept TANDEM_RT { at_work_.store(-1, std::memory_order_relaxed); }
+  class InCall;
 
   const hal::RobotConfig* config_;
   const hal::Robot robot_;  // what the controllers see of it
@@ -245,9 +265,12 @@ class ControllerHost {
   std::size_t failed_controller_ = 0;
   std::atomic<std::uint64_t> shown_{0};  // active, and done in the upper half
   std::atomic<std::int32_t> at_work_{-1};
+  rt::Clock* clock_ = nullptr;
+  CallWatch* watch_ = nullptr;
+  std::array<ControllerCall, kMostControllers> calls_{};  // of this cycle; more are not kept
+  std::size_t called_ = 0;
 
-  mutable std::mutex names_mutex_;
-  std::vector<std::string> names_;  // by id; of all that ever were
+  const std::shared_ptr<ControllerNames> names_ = std::make_shared<ControllerNames>();
 
   Owned owned_;
 };

@@ -2,6 +2,14 @@
 #include "runtime/cycle_log.hpp"
 
 namespace tandem::runtime {
+namespace {
+
+/// As Event::controller has it; of what is loaded later than 254 others, nobody's.
+std::uint8_t controller_number(std::int32_t id) noexcept TANDEM_RT {
+  return id >= 0 && id < 255 ? static_cast<std::uint8_t>(id + 1) : std::uint8_t{0};
+}
+
+}  // namespace
 
 CycleLog::CycleLog(log::Recorder* recorder, const hal::StateImage& state,
                    const hal::CommandImage& command, const hal::TruthImage* truth,
@@ -21,7 +29,8 @@ CycleLog::CycleLog(log::Recorder* recorder, const hal::StateImage& state,
 }
 
 void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint,
-                     std::uint32_t code, float value, bool reported) noexcept TANDEM_RT {
+                     std::uint32_t code, float value, bool reported,
+                     std::int32_t controller) noexcept TANDEM_RT {
   if (recorder_ == nullptr) return;
   recorder_->push(log::Event{.cycle = time.cycle,
                              .time_ns = time.time_ns,
@@ -29,6 +38,7 @@ void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::int32
                              .joint = joint,
                              .kind = kind,
                              .reported = static_cast<std::uint8_t>(reported ? 1 : 0),
+                             .controller = controller_number(controller),
                              .value = value});
 }
 

@@ -29,8 +29,10 @@ class CycleLog {
   /// @param joint  -1: none
   /// @param value  of the kinds that have one
   /// @param reported  a fault that stops nothing
+  /// @param controller  whose doing it is; -1: nobody's
   void event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint = -1,
-             std::uint32_t code = 0, float value = 0.0F, bool reported = false) noexcept TANDEM_RT;
+             std::uint32_t code = 0, float value = 0.0F, bool reported = false,
+             std::int32_t controller = -1) noexcept TANDEM_RT;
   void event(const hal::CycleTime& time, const hal::InjectedFault& fault) noexcept TANDEM_RT;
   void images(const hal::CycleTime& time, const hal::StateImage& state,
               const hal::CommandImage& command, const hal::TruthImage* truth,

@@ -53,20 +53,30 @@ struct CycleNow : CycleParts {
         run(how),
         limits(hal::robot_of(robot), how.loop.period_ns),
         watch(robot, backend, how.lost_after_cycles, how.fall),
-        log(recorder, state, hal::CommandImage(robot.shape()), truth, estimate()) {
+        log(name_controllers(parts), state, hal::CommandImage(robot.shape()), truth, estimate()) {
     progress.total_cycles = how.running_cycles;
+    controllers.time_by(clock);
   }
   /// Null where nothing is estimated.
   [[nodiscard]] const hal::EstimateImage* estimate() const noexcept TANDEM_RT {
     return estimator == nullptr ? nullptr : &estimator->image();
   }
-  void event(log::EventKind kind, std::int32_t joint = -1,
-             std::uint32_t code = 0) noexcept TANDEM_RT {
-    log.event(time, kind, joint, code);
+  void event(log::EventKind kind, std::int32_t joint = -1, std::uint32_t code = 0,
+             std::int32_t controller = -1) noexcept TANDEM_RT {
+    log.event(time, kind, joint, code, 0.0F, false, controller);
   }
   void archive(Archive& ar) {
     ar(loop, time, read_code, run, limits, state, watch, faults);
     if (estimator != nullptr) ar(*estimator);
+  }
+
+  /// @return the recorder, which knows the controllers' names now
+  static log::Recorder* name_controllers(const CycleParts& parts) {
+    if (parts.recorder != nullptr) {
+      parts.recorder->name_controllers(
+          [names = parts.controllers.names()](std::size_t id) { return names->name(id); });
+    }
+    return parts.recorder;
   }
 
   const CycleConfig config;

@@ -28,6 +28,13 @@ void CycleTrace::begin(const rt::Tick& tick) noexcept TANDEM_RT {
   stamps_->wakeup_ns = tick.wakeup_ns;
   stamps_->skipped = tick.skipped;
   stamps_->late = tick.late;
+  stamps_->called = 0;
+}
+
+void CycleTrace::note(std::span<const ControllerCall> calls) noexcept TANDEM_RT {
+  if (stamps_ == nullptr) return;
+  stamps_->called = static_cast<std::uint32_t>(std::min(calls.size(), stamps_->calls.size()));
+  std::copy_n(calls.begin(), stamps_->called, stamps_->calls.begin());
 }
 
 std::vector<CycleStamps> CycleTrace::cycles() const {

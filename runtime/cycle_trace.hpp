@@ -4,10 +4,12 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/realtime.hpp"
 #include "rt/cyclic_loop.hpp"
+#include "runtime/controller_times.hpp"
 
 namespace tandem::runtime {
 
@@ -34,6 +36,8 @@ struct CycleStamps {
   std::int64_t wakeup_ns = -1;  ///< from the grid point to the end of the wait; -1: not paced
   std::uint64_t skipped = 0;    ///< grid points missed just before
   bool late = false;            ///< the cycle before overran into this one's grid point
+  std::uint32_t called = 0;     ///< of `calls`
+  std::array<ControllerCall, 32> calls{};  ///< of the controllers
 
   [[nodiscard]] std::int64_t stage_ns(CycleStage stage) const noexcept {
     const auto i = static_cast<std::size_t>(stage);
@@ -61,6 +65,8 @@ class CycleTrace {
   void mark(CycleStage stage, rt::Clock& clock) noexcept TANDEM_RT {
     if (stamps_ != nullptr) mark(stage, clock.now_ns());
   }
+  /// The calls of its controllers.
+  void note(std::span<const ControllerCall> calls) noexcept TANDEM_RT;
   /// The end of its last stage.
   void end(std::int64_t now_ns) noexcept TANDEM_RT {
     mark(CycleStage::kHandOver, now_ns);

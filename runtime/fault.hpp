@@ -23,7 +23,8 @@ struct FaultRecord {
   std::uint32_t code = 0;  ///< of a drive, a controller or the backend, an age: as the row says
   hal::FaultCause cause = hal::FaultCause::kBackend;
   hal::StopCategory category = hal::row_of(cause).category;
-  std::uint8_t padding[6] = {};
+  std::uint8_t padding[2] = {};
+  std::int32_t controller = -1;  ///< whose doing it is, for ControllerHost::name(); -1: nobody's
 };
 
 /// Whether it is of the link to a robot far away.
@@ -77,9 +78,10 @@ class FaultLog {
 struct FaultReport {
   std::uint64_t cycle = 0;
   double time_s = 0.0;
-  std::string joint;  ///< joint, sensor or controller; empty when the robot as a whole
-  std::string board;  ///< the joint's; may be empty
-  std::string text;   ///< one sentence, without `joint`
+  std::string joint;       ///< joint, sensor or controller; empty when the robot as a whole
+  std::string board;       ///< the joint's; may be empty
+  std::string text;        ///< one sentence, without `joint`
+  std::string controller;  ///< whose doing it is; empty: nobody's
   hal::StopCategory category = hal::StopCategory::kWarn;
   bool latched = true;
   double cleared_s = 0.0;  ///< when it is not latched

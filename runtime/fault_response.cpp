@@ -13,11 +13,12 @@ void FaultResponse::raise(FaultRecord record) noexcept TANDEM_RT {
   record.time_ns = now_.time.time_ns;
   const bool of_joint = hal::strikes_joint(row.strikes);
   const bool of_base = of_joint && record.index < 0;
+  if (row.strikes == hal::FaultStrikes::kController) record.controller = record.index;
   const bool by_value = row.strikes == hal::FaultStrikes::kSensor || of_base;
   now_.log.event(now_.time, log::event_of(record.cause), of_joint && !of_base ? record.index : -1,
                  row.number != 0 ? row.number : record.code,
                  by_value ? static_cast<float>(record.index) : 0.0F,
-                 record.category == StopCategory::kWarn);
+                 record.category == StopCategory::kWarn, record.controller);
   if (record.category == StopCategory::kCategory2 && !now_.run.in(RunPhase::kRetreating) &&
       !retreat()) {
     record.category = StopCategory::kCategory1;  // nobody can

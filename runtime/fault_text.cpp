@@ -41,6 +41,12 @@ std::string not_homed(const FaultRecord& record, const FaultContext& about) {
                      why.advice);
 }
 
+std::string name_of(const FaultRecord& record, const FaultContext& about) {
+  return record.controller < 0
+             ? std::string()
+             : about.controllers.name(static_cast<std::size_t>(record.controller));
+}
+
 /// What the words of a cause have besides its code.
 std::string detail_of(const FaultRecord& record, const FaultContext& about) {
   const bool is_code = record.code <= static_cast<std::uint32_t>(Code::kStopped);
@@ -67,11 +73,18 @@ std::string text_of(const FaultRecord& record, const FaultContext& about) {
   if (hal::is_of_drive(record.cause) && record.cause != FaultCause::kJointLost) {
     return about.backend.fault_text(record.cause, record.code);
   }
+  if (record.cause == FaultCause::kCommand && record.controller >= 0) {
+    return "the command of the controller '" + name_of(record, about) + "' was not a finite number";
+  }
   if (log::event_of(record.cause) == log::EventKind::kFell) {
     return fall_text({record.cause, record.index}, about.config.fall);
   }
-  return fmt::format(fmt::runtime(hal::sentence_of(record.cause)), fmt::arg("code", record.code),
-                     fmt::arg("detail", detail_of(record, about)));
+  std::string text =
+      fmt::format(fmt::runtime(hal::sentence_of(record.cause)), fmt::arg("code", record.code),
+                  fmt::arg("detail", detail_of(record, about)));
+  if (record.cause == FaultCause::kOverrun && record.controller >= 0)
+    text += "; in the last of them the controller '" + name_of(record, about) + "' took longest";
+  return text;
 }
 
 /// The joint, sensor or controller that the fault is about, and a joint's board.
@@ -107,6 +120,7 @@ FaultReport in_words(const FaultRecord& record, std::int64_t cleared_ns,
   fault.latched = cleared_ns == FaultLog::kLatched;
   fault.cleared_s = fault.latched ? 0.0 : static_cast<double>(cleared_ns) * 1e-9;
   fault.text = text_of(record, about);
+  fault.controller = name_of(record, about);
   name_it(record, about, fault);
   return fault;
 }

@@ -44,7 +44,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
                 parts.controllers.gains()),
       shown_(now_, resets_, homing_, arbiter_, services_),
       trace_(config.trace_cycles),
-      joint_limited_(parts.robot.joints.size()) {}
+      limited_(parts.robot.joints.size(), kNever) {}
 
 bool RobotCycle::step() noexcept {
   if (now_.run.in(RunPhase::kDone)) return false;
@@ -112,11 +112,12 @@ void RobotCycle::read() noexcept TANDEM_RT {
 void RobotCycle::check() noexcept TANDEM_RT {
   const RunMachine& run = now_.run;
   const rt::Tick& tick = now_.tick;
+  const std::int32_t slow = now_.controllers.begin_cycle(tick.late ? took_ns_ : 0);
   if (tick.skipped > 0) {
-    now_.event(EventKind::kOverrun, -1, static_cast<std::uint32_t>(tick.skipped));
+    now_.event(EventKind::kOverrun, -1, static_cast<std::uint32_t>(tick.skipped), slow);
   }
   if (tick.stop && !run.in(RunPhase::kFaulted) && !run.in(RunPhase::kShutDown)) {
-    response_.raise({.cause = FaultCause::kOverrun});
+    response_.raise({.cause = FaultCause::kOverrun, .controller = slow});
   }
   if (now_.estimator != nullptr) now_.estimator->update(now_.state);
   if (!run.in(RunPhase::kBringUp) && !run.in(RunPhase::kShutDown)) {
@@ -219,7 +220,8 @@ void RobotCycle::update() noexcept TANDEM_RT {
     response_.raise({.index = static_cast<std::int32_t>(stray->joint),
                      .code = stray->controller,
                      .cause = FaultCause::kStray,
-                     .category = now_.config.on_stray});
+                     .category = now_.config.on_stray,
+                     .controller = static_cast<std::int32_t>(stray->controller)});
   }
   trace_.mark(CycleStage::kUpdate, now_.clock);
 }
@@ -230,14 +232,16 @@ void RobotCycle::limit() noexcept TANDEM_RT {
   for (std::size_t j = 0; limited != Code::kOk && j < codes.size(); ++j) {
     if (codes[j] == Code::kOk) continue;
     const auto joint = static_cast<std::int32_t>(j);
-    if (joint_limited_[j] == 0) {
-      now_.event(EventKind::kLimited, joint, static_cast<std::uint32_t>(codes[j]));
-      joint_limited_[j] = 1;
+    const std::int32_t owner = now_.controllers.owner_id(j);
+    if (limited_[j] == kNever) {
+      now_.event(EventKind::kLimited, joint, static_cast<std::uint32_t>(codes[j]), owner);
+      limited_[j] = owner;
     }
     if (codes[j] == Code::kNotFinite && now_.run.controllers_run()) {
       response_.raise({.index = joint,
                        .code = static_cast<std::uint32_t>(codes[j]),
-                       .cause = FaultCause::kCommand});
+                       .cause = FaultCause::kCommand,
+                       .controller = owner});
     }
   }
   trace_.mark(CycleStage::kLimit, now_.clock);
@@ -264,7 +268,10 @@ void RobotCycle::write() noexcept TANDEM_RT {
 void RobotCycle::hand_over() noexcept TANDEM_RT {
   shown_.take();
   now_.inbox.confirm(now_.time.cycle);
-  trace_.end(now_.loop.finish());
+  const std::int64_t now_ns = now_.loop.finish();
+  took_ns_ = now_ns - now_.tick.begin_ns + std::max<std::int64_t>(now_.tick.wakeup_ns, 0);
+  trace_.note(now_.controllers.calls());
+  trace_.end(now_ns);
 }
 
 // Snapshots.
@@ -273,7 +280,7 @@ void RobotCycle::archive(Archive& ar) {
   std::uint64_t controllers = now_.controllers.fingerprint();
   ar(controllers);  // first: restore() looks at it before anything changes
   ar(now_, resets_, homing_, arbiter_, waiting_, response_);
-  ar(now_.controllers, shown_, started_, joint_limited_);
+  ar(now_.controllers, shown_, started_, limited_);
 }
 
 bool RobotCycle::write_down(Archive& ar, bool backend) {

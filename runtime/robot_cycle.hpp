@@ -2,6 +2,7 @@
 // Start here to read the runtime. Layer: runtime.  Thread: made non-RT; step() the RT thread's.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -45,6 +46,12 @@ class RobotCycle {
   [[nodiscard]] const hal::CommandImage& command() const noexcept { return arbiter_.command(); }
   /// Who led `joint` in the last cycle. Between two steps.
   [[nodiscard]] JointLead lead(std::size_t joint) const noexcept { return arbiter_.lead(joint); }
+
+  /// For ControllerHost::name(): whose command was the first of `joint` that a limit changed; -1:
+  /// no controller's. Between two steps.
+  [[nodiscard]] std::int32_t limited(std::size_t joint) const noexcept {
+    return std::max(limited_[joint], -1);
+  }
 
   /// Every fault so far, in the order of their times. Any thread.
   [[nodiscard]] std::vector<FaultReport> faults() const;
@@ -99,9 +106,11 @@ class RobotCycle {
   CycleTrace trace_;
   Heartbeat heartbeat_;
 
-  bool started_ = false;                     // the first cycle was
-  bool ends_with_command_ = false;           // controllers wrote in this cycle
-  std::vector<std::uint8_t> joint_limited_;  // noted once each
+  bool started_ = false;            // the first cycle was
+  bool ends_with_command_ = false;  // controllers wrote in this cycle
+  static constexpr std::int32_t kNever = -2;
+  std::vector<std::int32_t> limited_;  // by joint: noted once each, with whose command it was
+  std::int64_t took_ns_ = 0;           // of the last cycle, from its grid point
 };
 
 }  // namespace tandem::runtime

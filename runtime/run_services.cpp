@@ -206,6 +206,8 @@ std::vector<ControllerStatus> RunServices::controllers() {
                    .active = active,
                    .done = active && (shown.done & only(slot)) != 0,
                    .of_experiment = one->of_experiment,
+                   .call_ns = one->times->calls.percentiles(),
+                   .overruns = one->times->overruns.load(),
                    .claims = one->claims});
   }
   return all;

@@ -41,6 +41,8 @@ struct ControllerStatus {
   bool active = false;
   bool done = false;           ///< it is active, and says that its task is done
   bool of_experiment = false;  ///< it came with it
+  rt::Percentiles call_ns;     ///< of its calls in the cycle so far; 0: there was none
+  std::uint64_t overruns = 0;  ///< late cycles that it was the reason for
   std::vector<ControllerSetup::Claim> claims;
 };
 

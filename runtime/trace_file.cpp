@@ -21,10 +21,10 @@ class Events {
   void name(const char* what, const std::string& value) {
     event(fmt::format(R"("ph":"M","name":"{}","args":{{"name":{}}})", what, quoted_text(value)));
   }
-  void span(const char* name, std::int64_t begin_ns, std::int64_t end_ns,
+  void span(const std::string& name, std::int64_t begin_ns, std::int64_t end_ns,
             const std::string& arguments = {}) {
-    event(fmt::format(R"("ph":"X","name":"{}","ts":{},"dur":{}{})", name, us(begin_ns - zero_ns_),
-                      us(end_ns - begin_ns), arguments));
+    event(fmt::format(R"("ph":"X","name":{},"ts":{},"dur":{}{})", quoted_text(name),
+                      us(begin_ns - zero_ns_), us(end_ns - begin_ns), arguments));
   }
   void instant(const std::string& name, std::int64_t at_ns) {
     event(fmt::format(R"("ph":"i","s":"t","name":{},"ts":{})", quoted_text(name),
@@ -49,7 +49,7 @@ class Events {
   bool first_ = true;
 };
 
-void write_cycle(Events& events, const CycleStamps& stamps) {
+void write_cycle(Events& events, const CycleStamps& stamps, const ControllerNames& controllers) {
   const auto end_of = [&](CycleStage stage) {
     return stamps.end_ns[static_cast<std::size_t>(stage)];
   };
@@ -61,6 +61,10 @@ void write_cycle(Events& events, const CycleStamps& stamps) {
     const bool has_bus = end_of(CycleStage::kExchange) > woken_ns;
     if (static_cast<CycleStage>(i) == CycleStage::kExchange && !has_bus) continue;
     events.span(to_string(static_cast<CycleStage>(i)), stamps.end_ns[i - 1], stamps.end_ns[i]);
+  }
+  for (std::size_t i = 0; i < stamps.called; ++i) {
+    const ControllerCall& call = stamps.calls[i];
+    events.span(controllers.name(call.controller), call.begin_ns, call.begin_ns + call.took_ns);
   }
   if (stamps.late) {
     events.instant(stamps.skipped > 0 ? fmt::format("overrun: {} skipped", stamps.skipped)
@@ -89,7 +93,7 @@ Error write_error(const std::string& file, const std::string& reason) {
 
 /// Throws std::system_error, as fmt::print() does, when `out` takes no more.
 void write_all(std::FILE* out, const std::string& robot, const CycleTrace& trace,
-               std::span<const FaultReport> faults) {
+               std::span<const FaultReport> faults, const ControllerNames& controllers) {
   const std::vector<CycleStamps> cycles = trace.cycles();
   fmt::print(out, "{{\"displayTimeUnit\":\"ns\",\"otherData\":{{\"robot\":{},\"cycles\":{},",
              quoted_text(robot), cycles.size());
@@ -98,7 +102,7 @@ void write_all(std::FILE* out, const std::string& robot, const CycleTrace& trace
   events.name("process_name", "tandem: " + robot);
   events.name("thread_name", "loop");
   for (const CycleStamps& stamps : cycles) {
-    write_cycle(events, stamps);
+    write_cycle(events, stamps, controllers);
     write_faults(events, stamps, faults);
   }
   fmt::print(out, "\n]}}\n");
@@ -107,13 +111,13 @@ void write_all(std::FILE* out, const std::string& robot, const CycleTrace& trace
 }  // namespace
 
 Status write_trace(const std::string& file, const std::string& robot, const CycleTrace& trace,
-                   std::span<const FaultReport> faults) {
+                   std::span<const FaultReport> faults, const ControllerNames& controllers) {
   Result<Descriptor> opened = open_output(file);
   if (!opened) return std::unexpected(write_error(file, opened.error().message));
   std::FILE* out = ::fdopen(opened->release(), "wb");
   int problem = 0;
   try {
-    write_all(out, robot, trace, faults);
+    write_all(out, robot, trace, faults, controllers);
   } catch (const std::system_error& full) {
     problem = full.code().value();
   }

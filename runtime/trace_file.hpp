@@ -12,10 +12,11 @@
 namespace tandem::runtime {
 
 /// Writes `trace` to `file`. Time 0 is the first cycle's begin. On the track "loop": per cycle a
-/// span "cycle" and within it one of each stage, the wait before it, an instant where the cycle
-/// before overran, and one for each fault. Counters: wake-up latency and work, in us.
-/// Errors: the file cannot be written.
+/// span "cycle" and within it one of each stage and, in these, of each controller's call; the wait
+/// before it, an instant where the cycle before overran, and one for each fault. Counters: wake-up
+/// latency and work, in us. Errors: the file cannot be written.
 [[nodiscard]] Status write_trace(const std::string& file, const std::string& robot,
-                                 const CycleTrace& trace, std::span<const FaultReport> faults);
+                                 const CycleTrace& trace, std::span<const FaultReport> faults,
+                                 const ControllerNames& controllers);
 
 }  // namespace tandem::runtime

@@ -65,7 +65,8 @@ Status ask_for_stop(const AskedOptions& options, Json& question) {
 }
 
 void print_controllers(const Json& answer) {
-  Table table({"controller", "state", "joints", "plugin"});
+  Table table(
+      {"controller", "state", "joints", "plugin", "p50 [us]", "p99 [us]", "max [us]", "overruns"});
   table.align_left();
   for (const Json& one : answer["controllers"]) {
     const bool active = one.value("active", false);
@@ -76,8 +77,14 @@ void print_controllers(const Json& answer) {
     if (count > 4) joints.resize(3);
     std::string text = fmt::format("{}", fmt::join(joints, ", "));
     if (count > joints.size()) text += fmt::format(" and {} more", count - joints.size());
+    const Json times = one.value("call_ns", Json());
+    const auto us = [&](const char* which) {
+      return times.is_null() ? std::string("-")
+                             : fmt::format("{:.1f}", 1e-3 * times.value(which, 0.0));
+    };
     table.add({one.value("name", ""), state, text,
-               std::filesystem::path(one.value("plugin", "")).filename().string()});
+               std::filesystem::path(one.value("plugin", "")).filename().string(), us("p50"),
+               us("p99"), us("max"), fmt::format("{}", one.value("overruns", 0))});
   }
   table.print(stdout);
 }

@@ -43,6 +43,13 @@ const char kCheckExamples[] = R"(Examples:
   tandem check my_robot.toml --repair                what inertia = "repair" would make of it
   tandem check my_robot.toml --json -                errors with file, line, key and hint)";
 
+const char kControllerCheckExamples[] = R"(Examples:
+  tandem controller check ./nod.so --experiment nod.toml
+  tandem controller check ./nod.so --robot robot.toml --set 'joint = "joint2"' --set 'depth_rad = 0.3'
+It runs on a simulated robot: no heap, lock, system call, thread or page fault in its calls, and the
+same commands once more after a rewind. Exit status: 0 every rule is kept; 1 one is broken, or the
+run ended in a fault. docs/controllers.md#controller-check)";
+
 const char kNewExamples[] = R"(Examples:
   tandem new my_robot.urdf                           writes my_robot/, then
   tandem run my_robot/hold.toml                      the robot holds a posture, or stands
@@ -252,6 +259,9 @@ void add_flags(CLI::App& app, RunOptions& o) {
   app.add_option("--delay-cycles", o.delay_cycles,
                  "Whole cycles between controllers and limits (default: the experiment's, or 0)")
       ->check(CLI::Range(0, 1000));
+  app.add_flag("--gate", o.gate,
+               "Watch what controllers do in a cycle, as `tandem controller check` (status 1: a "
+               "rule is broken)");
   app.add_flag("--report", o.report, "Draw the report after the run, from its log")
       ->excludes("--no-log");
   app.add_option("--on-fault", o.on_fault,
@@ -312,6 +322,24 @@ void add_flags(CLI::App& app, CheckOptions& o) {
   app.add_flag("--repair", o.repair, "Read a robot as if it said inertia = \"repair\" in [model]");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kCheckExamples);
+}
+
+void add_flags(CLI::App& app, ControllerCheckOptions& o) {
+  app.add_option("plugin", o.plugin, "Shared library of the controller")->required();
+  CLI::Option* experiment =
+      app.add_option("--experiment", o.experiment, "Experiment that has it among its controllers")
+          ->check(is_given("name an experiment, or leave it out"));
+  app.add_option("--robot", o.robot, "Robot TOML (default: the bundled double_pendulum)")
+      ->check(is_given("name a robot.toml, or leave it out"))
+      ->excludes(experiment);
+  app.add_option("--set", o.set, "One of its parameters, KEY = VALUE as in TOML")
+      ->allow_extra_args(false)
+      ->excludes(experiment);
+  app.add_option("--duration", o.seconds, "Simulated seconds under the controllers (default: 2)")
+      ->check(CLI::Range(0.01, 3600.0));
+  app.add_flag("--quiet,-q", o.quiet, "No table");
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  app.footer(kControllerCheckExamples);
 }
 
 void add_flags(CLI::App& app, ModelOptions& o) {

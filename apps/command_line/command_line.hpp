@@ -26,6 +26,7 @@ struct RunOptions : runtime::Overrides {
   bool once = false;          ///< ends when an owner gives the robot back
   std::string record_frames;  ///< file of the bus' frames; empty: none
   bool report = false;        ///< draw the report after the run
+  bool gate = false;          ///< controllers under the traps of `controller check`
   std::string trace;          ///< file of trace events, of the last `trace_cycles`; empty: none
   bool quiet = false;         ///< neither progress nor table
   std::string json;           ///< file, "-" for standard output, empty for none
@@ -58,6 +59,17 @@ struct CheckOptions {
   std::string file;     ///< an experiment or a robot
   bool bus = false;     ///< show the load of every bus
   bool repair = false;  ///< of a robot: as if it said inertia = "repair"
+  std::string json;
+};
+
+/// tandem controller check PLUGIN
+struct ControllerCheckOptions {
+  std::string plugin;            ///< shared library
+  std::string robot;             ///< robot.toml; empty: a bundled one
+  std::string experiment;        ///< instead of robot and parameters; one of its controllers is it
+  std::vector<std::string> set;  ///< parameters, "depth_rad = 0.1"
+  double seconds = 2.0;          ///< simulated, under the controllers
+  bool quiet = false;
   std::string json;
 };
 
@@ -231,7 +243,7 @@ struct TopicOptions {
 using Command = std::variant<Exit, RunOptions, ServeOptions, AskOptions, AskedOptions, CheckOptions,
                              ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions,
                              IdentifyOptions, ExciteOptions, LatencyOptions, DoctorOptions,
-                             EmulateOptions, TopicOptions, BenchOptions>;
+                             EmulateOptions, TopicOptions, BenchOptions, ControllerCheckOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

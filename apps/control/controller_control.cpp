@@ -29,6 +29,8 @@ Json list(RunServices& services, const hal::RobotConfig& robot) {
                    {"active", one.active},
                    {"finished", one.done},
                    {"of_experiment", one.of_experiment},
+                   {"call_ns", one.call_ns.max == 0 ? Json() : percentiles_json(one.call_ns)},
+                   {"overruns", one.overruns},
                    {"claims", std::move(claims)}});
   }
   return all;

@@ -26,6 +26,7 @@ void figures(Figures& f, const runtime::FaultReport& fault) {
   f("cycle", fault.cycle);
   f("joint", "or the sensor, or the controller; empty: the robot as a whole", fault.joint);
   f("board", "empty: none", fault.board);
+  f("controller", "whose call, command or claim it was; empty: nobody's", fault.controller);
   f("cause", fault.text);
   f("category", "`category0`, `category1`, `category2`, `hold`, `warn`",
     hal::to_string(fault.category));

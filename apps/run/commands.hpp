@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/command_line/command_line.hpp"
+#include "apps/run/gate.hpp"
 #include "apps/run/tools_program.hpp"
 #include "apps/text/figures.hpp"
 
@@ -22,5 +23,15 @@ namespace tandem::apps {
 [[nodiscard]] std::vector<Figures::Row> emulate_figures();
 /// Reads every file, says what a run would do, moves nothing.
 [[nodiscard]] Exit check_command(const CheckOptions& options);
+
+/// Runs a controller's library under the gate's traps, and rewinds the run.
+[[nodiscard]] Exit controller_check_command(const ControllerCheckOptions& options);
+struct ControllerCheckResult {
+  std::string plugin;
+  bool kept = true;
+  std::vector<std::string> faults{};
+  std::vector<GateResult> rules{};
+};
+void figures(Figures& f, const ControllerCheckResult& result);
 
 }  // namespace tandem::apps

@@ -7,6 +7,7 @@
 #include <array>
 #include <thread>
 
+#include "apps/run/loop_crash.hpp"
 #include "apps/text/console.hpp"
 #include "base/quoting.hpp"
 #include "canopen/messages.hpp"
@@ -82,8 +83,8 @@ void CycleGuard::on_hang(bool at_work) {
       : at_work ? "in its cycle, in no controller"
                 : "between two cycles, in no controller";
   const bool crashed = cycle_->heartbeat().stands_still();
-  fault_ =
-      crashed ? "the loop crashed " + where : "the loop hung " + where + " and did not come back";
+  fault_ = crashed ? fmt::format("the loop crashed {}: {}", where, crash_reason())
+                   : "the loop hung " + where + " and did not come back";
   say(
       fmt::format("fault: the loop {}, it is {}. The emergency stop is latched{}; the process ends "
                   "in {} s{}",

@@ -12,6 +12,16 @@ std::uint64_t draw_run() {
   return (std::uint64_t{device()} << 32) | device();
 }
 
+std::vector<std::pair<std::string, rt::Percentiles>> times_of(
+    const runtime::ControllerNames& names) {
+  std::vector<std::pair<std::string, rt::Percentiles>> all;
+  for (const auto& one : names.all()) {
+    const rt::Percentiles times = one->calls.percentiles();
+    if (times.max > 0) all.emplace_back(one->name, times);
+  }
+  return all;
+}
+
 std::vector<dds::FaultEntry> entries(const std::vector<runtime::FaultReport>& faults) {
   std::vector<dds::FaultEntry> all;
   for (const runtime::FaultReport& fault : faults) {
@@ -31,19 +41,21 @@ Result<std::unique_ptr<DdsRun>> DdsRun::open(const WiredComposition& c, const st
   auto participant = dds::Participant::open(std::move(*domain), node);
   if (!participant) return std::unexpected(participant.error());
   auto publisher = dds::Publisher::create(
-      **participant, {.robot = e.robot,
-                      .tree = *c.experiment.tree(),
-                      .urdf = robot::text_in(e.files, e.robot.model.urdf),
-                      .hal = hal_name(e),
-                      .version = TANDEM_VERSION,
-                      .description_hash = c.kernels->description_hash,
-                      .period_ns = e.loop.period_ns,
-                      .simulated_time = c.backend->pace() == hal::Pace::kSimulatedClock,
-                      .truth = runtime::truth_of(c),
-                      .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image(),
-                      .wrenches = e.estimation.wrench_sites(),
-                      .parallel = c.parallel != nullptr,
-                      .run = draw_run()});
+      **participant,
+      {.robot = e.robot,
+       .tree = *c.experiment.tree(),
+       .urdf = robot::text_in(e.files, e.robot.model.urdf),
+       .hal = hal_name(e),
+       .version = TANDEM_VERSION,
+       .description_hash = c.kernels->description_hash,
+       .period_ns = e.loop.period_ns,
+       .simulated_time = c.backend->pace() == hal::Pace::kSimulatedClock,
+       .truth = runtime::truth_of(c),
+       .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image(),
+       .wrenches = e.estimation.wrench_sites(),
+       .parallel = c.parallel != nullptr,
+       .run = draw_run(),
+       .controllers = [names = c.controllers->names()] { return times_of(*names); }});
   if (!publisher) return std::unexpected(publisher.error());
   return std::unique_ptr<DdsRun>(new DdsRun(std::move(*participant), std::move(*publisher)));
 }

@@ -1,11 +1,11 @@
 // Handlers of std::terminate, of signals and of exit(), which stop the loop's thread in a cycle.
 #include "apps/run/loop_crash.hpp"
 
-#include <execinfo.h>
 #include <fmt/core.h>
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <csignal>
 #include <cstddef>
 #include <cstdio>
@@ -14,6 +14,7 @@
 #include <exception>
 #include <string>
 
+#include "base/call_stack.hpp"
 #include "controllers/hosted_call.hpp"
 
 namespace tandem::apps {
@@ -22,14 +23,19 @@ namespace {
 thread_local runtime::Heartbeat* loop_heartbeat = nullptr;  // null: another thread
 std::terminate_handler usual_end = nullptr;
 /// For a signal handler when the loop's own stack is full.
-alignas(std::max_align_t) std::array<std::byte, 16384> signal_stack;
+alignas(std::max_align_t) std::array<std::byte, 262144> signal_stack;
+std::atomic<const char*> reason{nullptr};
+constexpr char kTitle[] = "called from (innermost first):";
 
 bool in_cycle() noexcept {
   return loop_heartbeat != nullptr && runtime::Heartbeat::at_work(loop_heartbeat->beats());
 }
 
-[[noreturn]] void stand_still() {
+/// What stops the robot does not wait for the words.
+[[noreturn]] void stand_still(const char* why, const CallStack& stack) {
+  reason.store(why);
   loop_heartbeat->stand_still();
+  write_call_stack(STDERR_FILENO, kTitle, stack);
   while (true) ::pause();
 }
 
@@ -44,7 +50,7 @@ bool in_cycle() noexcept {
   } catch (...) {  // NOLINT(bugprone-empty-catch): `what` says so already
   }
   fmt::print(stderr, "fault: an exception left the loop, which stands still: {}\n", what);
-  stand_still();
+  stand_still("an exception", take_call_stack());
 }
 
 const char* name_of(int signal) {
@@ -68,17 +74,7 @@ void write_name(const char* name) {
   }
 }
 
-/// Where the calling handler's thread was: "plugin.so(+0x12a0)[0x7f…]", a line for each call.
-[[gnu::noinline]] void write_calls() {
-  std::array<void*, 12> calls;
-  const int count = ::backtrace(calls.data(), static_cast<int>(calls.size()));
-  constexpr int kHandlers = 3;  // this, on_signal(), and the system's call of it
-  write_text("called from (addr2line -Cife LIBRARY +0x… names the line):\n");
-  if (count > kHandlers)
-    ::backtrace_symbols_fd(calls.data() + kHandlers, count - kHandlers, STDERR_FILENO);
-}
-
-void on_signal(int signal) {
+void on_signal(int signal, siginfo_t*, void* context) {
   if (!in_cycle()) {
     if (const char* controller = hosted_controller()) {
       write_text("error: ");
@@ -86,6 +82,7 @@ void on_signal(int signal) {
       for (const char* part :
            {": the controller crashed before its first cycle: ", name_of(signal), "\n"})
         write_text(part);
+      write_call_stack(STDERR_FILENO, kTitle, interrupted_call_stack(context));
     }
     std::signal(signal, SIG_DFL);
     std::raise(signal);
@@ -94,33 +91,35 @@ void on_signal(int signal) {
   write_text("fault: the loop crashed, and stands still: ");
   write_text(name_of(signal));
   write_text("\n");
-  loop_heartbeat->stand_still();  // what stops the robot does not wait for the rest
-  write_calls();
-  stand_still();
+  stand_still(name_of(signal), interrupted_call_stack(context));
 }
 
 void on_exit() {
   if (!in_cycle()) return;
   write_text("fault: exit() was called in the loop, which stands still\n");
-  stand_still();
+  stand_still("exit()", take_call_stack());
 }
 
 void handle(int signal) {
   struct sigaction action {};
   ::sigaction(signal, nullptr, &action);
   if (action.sa_handler != SIG_DFL) return;
-  action.sa_handler = on_signal;
-  action.sa_flags = SA_ONSTACK;
+  action.sa_sigaction = on_signal;
+  action.sa_flags = SA_ONSTACK | SA_SIGINFO;
   ::sigaction(signal, &action, nullptr);
 }
 
 void handle_all() {
-  void* first = nullptr;
-  (void)::backtrace(&first, 1);  // loads what it needs, which a handler must not
+  prepare_call_stacks();
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) handle(signal);
 }
 
 }  // namespace
+
+const char* crash_reason() noexcept {
+  const char* why = reason.load();
+  return why == nullptr ? "" : why;
+}
 
 void name_crashing_controllers() { handle_all(); }
 

@@ -9,11 +9,15 @@ namespace tandem::apps {
 
 /// Keeps the process alive when the loop crashes. Call it on the loop's thread, before its first
 /// cycle. An exception, a signal such as SIGSEGV or exit() in the working part of a cycle then
-/// stops this thread only, which says why. The watchdog acts at once, as for a loop that hangs: it
-/// stops robot and nodes, names the controller and closes the log. The process still ends between
-/// two cycles, by _exit(), and by a signal that has another handler already, such as a sanitizer's.
+/// stops this thread only, which says why, and where with function, file and line. The watchdog
+/// acts at once, as for a loop that hangs: it stops robot and nodes, names the controller and
+/// closes the log. The process still ends between two cycles, by _exit(), and by a signal that has
+/// another handler already, such as a sanitizer's.
 /// @param heartbeat  the loop's; outlives it
 void stand_still_on_crash(runtime::Heartbeat& heartbeat);
+
+/// Why it stands still: "segmentation fault (SIGSEGV)", "an exception"; empty: it does not.
+[[nodiscard]] const char* crash_reason() noexcept;
 
 /// The process ends by SIGSEGV and the like as it did, but names the controller in whose code that
 /// happens outside of the cycle, as in configure(). Any thread's.

@@ -17,6 +17,7 @@
 #include "apps/run/cycle_thread.hpp"
 #include "apps/run/dds_run.hpp"
 #include "apps/run/end_guard.hpp"
+#include "apps/run/gate.hpp"
 #include "apps/run/inject.hpp"
 #include "apps/run/prediction.hpp"
 #include "apps/run/remote_link.hpp"
@@ -102,8 +103,9 @@ Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE
   if (options.trace.empty()) return {};
   const runtime::RobotCycle& cycle = summary.cycle;
   Draft draft = Draft::file(options.trace);
-  const Status written = runtime::write_trace(
-      draft.path(), summary.composition.experiment.robot.name, cycle.trace(), cycle.faults());
+  const Status written =
+      runtime::write_trace(draft.path(), summary.composition.experiment.robot.name, cycle.trace(),
+                           cycle.faults(), *summary.composition.controllers->names());
   if (!written) return std::unexpected(draft.placed(written.error()));
   if (const Status placed = draft.place(); !placed || options.quiet) return placed;
   const std::uint64_t all = cycle.trace().count();
@@ -140,9 +142,10 @@ Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlReg
 /// A run, or a server: the loop and all that talks to it. Taken apart in reverse order.
 class Session {
  public:
-  Session(WiredComposition& composition, const RunOptions& options)
+  Session(WiredComposition& composition, const RunOptions& options, Gate* gate)
       : c_(composition),
         options_(options),
+        gate_(gate),
         out_(human_output(options.json)),
         admission_(composition.experiment.remote.trust == runtime::RemoteTrust::kDomain) {}
 
@@ -183,6 +186,7 @@ class Session {
   }
 
   void make_cycle() {
+    c_.controllers->watch_calls(gate_);
     run_.emplace(c_, options_,
                  runtime::RunParts{.recorder = recorder_.get(),
                                    .observer = dds_ == nullptr ? nullptr : &dds_->tap(),
@@ -292,6 +296,7 @@ class Session {
   Exit finish(const RunTimes& times) {
     RunSummary summary{c_, *cycle_, times, std::nullopt, std::nullopt, {}, {}, {}};
     summary.server = server_.get();
+    if (gate_ != nullptr) summary.gate = gate_->results(*c_.controllers->names());
     summary.interrupted_by = rt::stop_signal();
     if (auto* parallel = run_->parallel(); parallel != nullptr) {
       summary.parallel = parallel->finish();
@@ -317,6 +322,10 @@ class Session {
     if (!options_.quiet) {
       fmt::print(out_, "\n");
       summary.print(out_);
+      if (summary.gate) {
+        fmt::print(out_, "\n");
+        print_gate(*summary.gate, out_);
+      }
     }
     for (const std::string& warning : summary.warnings()) {
       fmt::print(stderr, "warning: {}\n", shown(warning, 2'000));
@@ -327,12 +336,13 @@ class Session {
     const Status written = write_json(options_.json, summary.json());
     if (!traced) return refuse(traced.error());
     if (!written) return refuse(written.error());
-    if (!summary.faults.empty()) return Exit::kFault;
+    if (!summary.faults.empty() || (summary.gate && !kept(*summary.gate))) return Exit::kFault;
     return summary.cut_short() ? interrupted(summary.interrupted_by) : Exit::kDone;
   }
 
   WiredComposition& c_;
   const RunOptions& options_;
+  Gate* const gate_;  // null: without --gate
   std::FILE* out_;
   std::size_t plugins_at_start_ = 0;  // in the log's first record
   std::unique_ptr<DdsRun> dds_;
@@ -362,6 +372,11 @@ void warn_of_inertias(const runtime::Experiment& e) {
 }  // namespace
 
 Exit run_command(const RunOptions& given, ReportOfRun& report) {
+  std::unique_ptr<Gate> gate;
+  if (given.gate) {
+    if (const Status again = Gate::enter_process(); !again) return refuse(again.error());
+    gate = Gate::open();
+  }
   RunOptions options = given;
   if (options.trace.empty()) options.trace_cycles = 0;
   for (const std::string& file : {options.json, options.trace}) {
@@ -383,7 +398,7 @@ Exit run_command(const RunOptions& given, ReportOfRun& report) {
     return refuse(errors);
   print_warnings((*composition)->warnings);
   if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
-  auto session = std::make_unique<Session>(**composition, options);
+  auto session = std::make_unique<Session>(**composition, options, gate.get());
   const Exit exit = session->run();
   if (options.report) {
     report = {session->log(), session->log_is_whole(),

@@ -10,6 +10,7 @@
 #include "apps/run/connection.hpp"
 #include "apps/run/cycle_thread.hpp"
 #include "apps/run/dds_run.hpp"
+#include "apps/run/gate.hpp"
 #include "apps/run/parallel_summary.hpp"
 #include "apps/text/console.hpp"
 #include "hal/remote/server.hpp"
@@ -35,7 +36,8 @@ struct RunSummary {
   std::optional<DdsResult> dds;                              ///< empty: it was off
   std::optional<internal_model::ParallelResult> parallel;    ///< empty: there was no second robot
   const internal_model::Differences* differences = nullptr;  ///< with it
-  const remote::Server* server = nullptr;  ///< null: nobody could own the robot from afar
+  const remote::Server* server = nullptr;         ///< null: nobody could own the robot from afar
+  std::optional<std::vector<GateResult>> gate{};  ///< empty: without --gate
 
   int interrupted_by = 0;  ///< the signal that asked the run to end; 0: none did
 

@@ -23,15 +23,37 @@ bool has_base_wrench(const hal::EstimateImage& image, const runtime::EstimateFig
 struct JointFigures {
   runtime::TrackingError error;
   std::uint64_t limited_cycles = 0;
+  std::optional<std::string> limited_controller{};
 };
+
+struct ControllerFigures {
+  rt::Percentiles call_ns{};
+  std::uint64_t calls = 0, overruns = 0;
+};
+
+/// Also of those that are unloaded; by the name's last one.
+Named<std::optional<ControllerFigures>> controllers_of(const RunSummary& s) {
+  Named<std::optional<ControllerFigures>> all;
+  for (const auto& one : s.composition.controllers->names()->all()) {
+    all.emplace_back(one->name, known(one->calls.count() > 0,
+                                      ControllerFigures{one->calls.percentiles(),
+                                                        one->calls.count(), one->overruns.load()}));
+  }
+  return all;
+}
 
 Named<JointFigures> joints_of(const RunSummary& s) {
   Named<JointFigures> joints;
   const auto tracking = s.cycle.statistics().tracking();
   const auto limited = s.cycle.statistics().limited_cycles();
   for (std::size_t j = 0; j < tracking.size(); ++j) {
-    joints.emplace_back(s.composition.experiment.robot.joints[j].name,
-                        JointFigures{tracking[j], limited[j]});
+    const std::int32_t who = s.cycle.limited(j);
+    joints.emplace_back(
+        s.composition.experiment.robot.joints[j].name,
+        JointFigures{tracking[j], limited[j],
+                     known(who >= 0, who < 0 ? std::string()
+                                             : s.composition.controllers->name(
+                                                   static_cast<std::size_t>(who)))});
   }
   return joints;
 }
@@ -123,6 +145,14 @@ static void figures(Figures& f, const JointFigures& joint) {
   f("limited_cycles",
     "in which a limit changed the controller's command: [controllers.md](controllers.md#limits)",
     joint.limited_cycles);
+  f("limited_controller", "whose command was the first that a limit changed; null: none was",
+    joint.limited_controller);
+}
+
+static void figures(Figures& f, const ControllerFigures& one) {
+  f("call_ns", "of its calls in the cycle: `start`, `update`, `retreat`, `stop`", one.call_ns);
+  f("calls", one.calls);
+  f("overruns", "of which it is the reason: [realtime.md](realtime.md#who-was-slow)", one.overruns);
 }
 
 static void figures(Figures& f, const runtime::WorkFigures& work) {
@@ -218,6 +248,7 @@ void figures(Figures& f, const RunSummary* s) {
   f("bus_ns", "waiting for the answers on the bus; null without one",
     [&] { return known(s->composition.backend->waits_for_bus(), loop().bus); });
   f("cycle_ns", "of a cycle's own work; null: no cycle was made", [&] { return loop().work; });
+  f("controllers", "by name; null: it was never called", [&] { return controllers_of(*s); });
   f("log", "null: nothing was logged", [&] { return s->log; });
   f("frames", "of `--record-frames`", [&] { return s->frames; });
   f("dds", "with `[dds]`", [&] { return s->dds; });
@@ -255,6 +286,7 @@ void figures(Figures& f, const RunSummary* s) {
     "tolerated anomalies: missing feedback, counted by node; commands that a bus did not accept; a "
     "refused value",
     [&] { return s->warnings(); });
+  f("gate", "with `--gate`: as `rules` of `tandem controller check`", [&] { return s->gate; });
   f("fault_log", "every fault", [&] { return s->cycle.faults(); });
   f("kernel_variant", "of the generated kernels that ran",
     [&] { return std::string(s->composition.kernels->variant); });

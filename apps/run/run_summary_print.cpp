@@ -56,12 +56,16 @@ void add_limited(const RunSummary& s, Facts& facts) {
   const auto most = std::ranges::max_element(limited);
   if (most == limited.end() || *most == 0) return;
   const auto joints = limited.size() - static_cast<std::size_t>(std::ranges::count(limited, 0U));
+  const std::int32_t who = s.cycle.limited(static_cast<std::size_t>(most - limited.begin()));
+  const std::string whose =
+      who < 0 ? ""
+              : ", by '" + s.composition.controllers->name(static_cast<std::size_t>(who)) + "'";
   facts.add("commands limited",
-            fmt::format("{} in {} of {}{}",
+            fmt::format("{} in {} of {}{}{}",
                         s.composition.experiment.robot
                             .joints[static_cast<std::size_t>(most - limited.begin())]
                             .name,
-                        *most, counted(s.cycle.running_cycles(), "cycle"),
+                        *most, counted(s.cycle.running_cycles(), "cycle"), whose,
                         joints > 1 ? ", " + counted(joints - 1, "more joint") : ""));
 }
 
@@ -138,6 +142,12 @@ void add_timing_facts(const RunSummary& summary, const Json& run, Facts& facts) 
     row("not running", "{stopped_seconds:.2f s} of the clock in fault or held");
   if (summary.times.stood_s > 0.0) row("not running", "{stood_seconds:.2f s} paused or suspended");
   row("cycle p50/p99/p99.9/max", "{cycle_ns:.1f us}");
+  for (const auto& [name, figures] : run["controllers"].items()) {
+    if (figures.is_null()) continue;
+    add_figures(facts, figures, "  " + name,
+                figures.value("overruns", 0) > 0 ? "{call_ns:.1f us}, {overruns|overrun}"
+                                                 : "{call_ns:.1f us}");
+  }
   row("bus p50/p99/p99.9/max", "{bus_ns:.1f us}");
   row("wake-up p50/p99/p99.9/max", "{wakeup_ns:.1f us}");  // not of a server's cycles
   if (wall_clock || !run["wakeup_ns"].is_null()) row("overruns", "{overruns}");

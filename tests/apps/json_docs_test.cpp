@@ -31,6 +31,7 @@ std::string file_text(const std::string& file) {
 /// What docs/json.md documents by tables: the name in the comment before each, and its figures.
 const Named<std::vector<Figures::Row>> kTables{
     {"run", Figures::rows_of<const RunSummary*>()},
+    {"controller check", Figures::rows_of<ControllerCheckResult>()},
     {"bus", Figures::rows_of<hal::can::BusLoad>()},
     {"scales", scale_figures()},
     {"doctor", Figures::rows_of<DoctorResult>()},

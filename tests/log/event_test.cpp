@@ -43,6 +43,11 @@ TEST(Event, SaysWhatHappenedInOneLine) {
   EXPECT_EQ(describe(event, kNames), "command limited of knee: it was out of range");
   event = {.code = 3, .kind = EventKind::kOverrun};
   EXPECT_EQ(describe(event, kNames), "overrun: 3 cycles skipped");
+  EventNames names = kNames;
+  names.controller = [](std::size_t id) { return id == 4 ? "squat" : "?"; };
+  event.controller = 5;
+  EXPECT_EQ(describe(event, names), "overrun: 3 cycles skipped, controller 'squat'");
+  EXPECT_EQ(describe(event, kNames), "overrun: 3 cycles skipped") << "nobody knows its name";
   event = {.kind = EventKind::kBringUpDone};
   EXPECT_EQ(describe(event, kNames), "bring-up done");
   event = {.code = static_cast<std::uint32_t>(hal::FaultKind::kEncoderFreeze),

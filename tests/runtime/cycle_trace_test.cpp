@@ -53,7 +53,8 @@ class TracedRun : public testing::Test, protected test::LoopRun {
   }
   Json written() {
     const std::string file = folder / "trace.json";
-    const Status status = write_trace(file, "three \"joints\"", cycle->trace(), cycle->faults());
+    const Status status =
+        write_trace(file, "three \"joints\"", cycle->trace(), cycle->faults(), *host->names());
     EXPECT_TRUE(status) << status.error().to_string();
     std::ifstream in(file);
     return Json::parse(in, nullptr, false);
@@ -201,9 +202,67 @@ TEST_F(TracedRun, MarksOverrunsAndFaults) {
   EXPECT_NE(names[1].find("0x7310"), std::string::npos) << names[1];
 }
 
+/// Takes its time, on the loop's clock.
+class Slow final : public test::Sine {
+ public:
+  Slow(std::size_t joint, TickingClock& clock) : Sine({joint}), clock_(&clock) {}
+  Code update(const hal::CycleTime& time, const hal::StateImage& state,
+              hal::CommandImage& command) noexcept override {
+    clock_->now += takes_ns;
+    return Sine::update(time, state, command);
+  }
+  std::int64_t takes_ns = 10'000;
+
+ private:
+  TickingClock* clock_;
+};
+
+// An overrun had nobody's name, whichever controller took the time.
+TEST_F(TracedRun, TimesEachControllerAndNamesTheReasonOfAnOverrun) {
+  const auto quick = std::make_shared<Slow>(0, ticking);
+  const auto slow = std::make_shared<Slow>(1, ticking);
+  slow->takes_ns = 50'000;
+  add("quick", quick);
+  add("slow", slow);
+  make({.loop = {.on_overrun = rt::OverrunPolicy::kStop, .stop_late = 3, .stop_window = 10},
+        .trace_cycles = 1000},
+       false);
+  until(RunPhase::kRunning);
+  steps(30);
+  const auto times = host->names()->all();
+  EXPECT_GE(times[0]->calls.percentiles().p50, 10'000);
+  EXPECT_LT(times[0]->calls.percentiles().p50, 20'000);
+  EXPECT_GE(times[1]->calls.percentiles().p50, 50'000);
+  ticking.now += 3'000'000;  // not by a controller
+  steps(1);
+  EXPECT_EQ(times[0]->overruns + times[1]->overruns, 0U);
+  slow->takes_ns = 700'000;
+  quick->takes_ns = 600'000;
+  steps(1);
+  slow->takes_ns = 50'000;
+  quick->takes_ns = 10'000;
+  steps(1);
+  EXPECT_EQ(times[0]->overruns, 0U);
+  EXPECT_EQ(times[1]->overruns, 1U);
+  quick->takes_ns = 1'500'000;
+  steps(1);
+  (void)cycle->step();
+  EXPECT_EQ(times[0]->overruns, 1U);
+  ASSERT_EQ(cycle->faults().size(), 1U);
+  EXPECT_EQ(cycle->faults()[0].controller, "quick");
+  EXPECT_EQ(cycle->faults()[0].text,
+            "3 of the last 10 cycles were late; in the last of them the controller 'quick' took "
+            "longest");
+  std::map<std::string, int> spans;
+  for (const Json& span : events(written(), "X")) ++spans[span["name"]];
+  EXPECT_EQ(spans["quick"], spans["slow"]);
+  EXPECT_GT(spans["quick"], 30);
+}
+
 TEST_F(TracedRun, SaysWhichFileCannotBeWritten) {
   make({.trace_cycles = 4});
-  const Status status = write_trace("/proc/nothing/trace.json", "r", cycle->trace(), {});
+  const Status status =
+      write_trace("/proc/nothing/trace.json", "r", cycle->trace(), {}, *host->names());
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().file, "/proc/nothing/trace.json");
   EXPECT_NE(status.error().message.find("No such file"), std::string::npos);

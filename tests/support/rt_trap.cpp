@@ -8,6 +8,7 @@
 #include <cstdlib>
 
 #include "rt/scoped_realtime.hpp"
+#include "rt/trap_calls.hpp"
 
 namespace tandem::test {
 namespace {
@@ -64,7 +65,12 @@ std::vector<RtViolation> take_rt_violations() {
   return found;
 }
 
-void note_rt_call(const char* call) noexcept {
+bool rt_trap_active() noexcept { return rt::traps_calls(); }
+
+}  // namespace tandem::test
+
+void tandem::rt::note_trapped_call(const char* call) noexcept {
+  using namespace tandem::test;
   if (!rt::in_realtime() || noting) return;
   noting = true;
   const std::size_t index = caught_count.fetch_add(1);
@@ -74,5 +80,3 @@ void note_rt_call(const char* call) noexcept {
   }
   noting = false;
 }
-
-}  // namespace tandem::test

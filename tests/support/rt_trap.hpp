@@ -21,7 +21,4 @@ struct RtViolation {
 /// What was caught since the last take; the test no longer fails for it.
 [[nodiscard]] std::vector<RtViolation> take_rt_violations();
 
-/// For the interposed functions: notes `call` when the thread is in the cycle. Allocates nothing.
-void note_rt_call(const char* call) noexcept;
-
 }  // namespace tandem::test

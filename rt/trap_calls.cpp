@@ -1,4 +1,6 @@
 // The interposed functions. Each notes itself and calls the C library's own.
+#include "rt/trap_calls.hpp"
+
 #include <dlfcn.h>
 #include <pthread.h>
 #include <semaphore.h>
@@ -7,8 +9,6 @@
 #include <cerrno>
 #include <cstddef>
 #include <ctime>
-
-#include "tests/support/rt_trap.hpp"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define TANDEM_SANITIZED 1
@@ -21,17 +21,17 @@
 
 #ifdef TANDEM_SANITIZED
 
-namespace tandem::test {
-bool rt_trap_active() noexcept { return false; }
-}  // namespace tandem::test
+namespace tandem::rt {
+bool traps_calls() noexcept { return false; }
+}  // namespace tandem::rt
 
 #else
 
-namespace tandem::test {
-bool rt_trap_active() noexcept { return true; }
-}  // namespace tandem::test
+namespace tandem::rt {
+bool traps_calls() noexcept { return true; }
+}  // namespace tandem::rt
 
-using tandem::test::note_rt_call;
+using tandem::rt::note_trapped_call;
 
 // glibc's own entry points, which need no dlsym (dlsym allocates).
 extern "C" {
@@ -43,32 +43,32 @@ void __libc_free(void* block);
 
 // operator new and delete of libstdc++ come through these as well.
 void* malloc(std::size_t size) {
-  note_rt_call("malloc");
+  note_trapped_call("malloc");
   return __libc_malloc(size);
 }
 void* calloc(std::size_t count, std::size_t size) {
-  note_rt_call("calloc");
+  note_trapped_call("calloc");
   return __libc_calloc(count, size);
 }
 void* realloc(void* block, std::size_t size) {
-  note_rt_call("realloc");
+  note_trapped_call("realloc");
   return __libc_realloc(block, size);
 }
 void free(void* block) {
   if (block == nullptr) return;
-  note_rt_call("free");
+  note_trapped_call("free");
   __libc_free(block);
 }
 void* memalign(std::size_t alignment, std::size_t size) {
-  note_rt_call("memalign");
+  note_trapped_call("memalign");
   return __libc_memalign(alignment, size);
 }
 void* aligned_alloc(std::size_t alignment, std::size_t size) {
-  note_rt_call("aligned_alloc");
+  note_trapped_call("aligned_alloc");
   return __libc_memalign(alignment, size);
 }
 int posix_memalign(void** block, std::size_t alignment, std::size_t size) {
-  note_rt_call("posix_memalign");
+  note_trapped_call("posix_memalign");
   if (alignment < sizeof(void*) || (alignment & (alignment - 1)) != 0) return EINVAL;
   *block = __libc_memalign(alignment, size);
   return *block == nullptr ? ENOMEM : 0;
@@ -89,7 +89,7 @@ Function* next(const char* name) {
 #define TANDEM_TRAP(result, name, parameters, arguments)      \
   extern "C" result name parameters {                         \
     static auto* const real = next<result parameters>(#name); \
-    note_rt_call(#name);                                      \
+    note_trapped_call(#name);                                 \
     return real arguments;                                    \
   }
 
@@ -105,6 +105,9 @@ TANDEM_TRAP(int, pthread_cond_clockwait,
             (condition, mutex, clock, until))
 TANDEM_TRAP(int, pthread_rwlock_rdlock, (pthread_rwlock_t * lock), (lock))
 TANDEM_TRAP(int, pthread_rwlock_wrlock, (pthread_rwlock_t * lock), (lock))
+TANDEM_TRAP(int, pthread_create,
+            (pthread_t * thread, const pthread_attr_t* how, void* (*run)(void*), void* argument),
+            (thread, how, run, argument))
 TANDEM_TRAP(int, pthread_join, (pthread_t thread, void** result), (thread, result))
 TANDEM_TRAP(int, sem_wait, (sem_t * semaphore), (semaphore))
 TANDEM_TRAP(int, nanosleep, (const timespec* duration, timespec* rest), (duration, rest))

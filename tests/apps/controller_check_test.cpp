@@ -1,0 +1,150 @@
+// `tandem controller check` and `tandem run --gate` with a controller that breaks each rule, and
+// who is named where something is slow or wrong.
+#include <map>
+
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+const std::string kPlugins = TANDEM_BINARY_DIR "/tests/test_plugins/";
+const std::string kPlugin = kPlugins + "breaks.so";
+
+class ControllerCheck : public Program {
+ protected:
+  void SetUp() override {
+    if (TANDEM_SANITIZED != 0) GTEST_SKIP() << "a sanitizer interposes the same calls itself";
+    Program::SetUp();
+  }
+  /// The rules that are not kept, of a check with `rule`.
+  std::map<std::string, nlohmann::json> broken(const std::string& rule) {
+    const Outcome outcome = tandem(
+        "controller check " + shell_word(kPlugin) +
+        " --robot robot.toml --duration 0.5 --json check.json --set 'rule = \"" + rule + "\"'");
+    said_ = outcome.out;
+    EXPECT_EQ(outcome.err, "") << rule;
+    std::map<std::string, nlohmann::json> found;
+    for (const auto& one : json("check.json")["rules"])
+      if (one["kept"] != true) found[one["rule"]] = one;
+    EXPECT_EQ(outcome.status, found.empty() ? 0 : 1) << rule;
+    EXPECT_EQ(json("check.json")["kept"], found.empty());
+    return found;
+  }
+  std::string said_;
+};
+
+/// Whether a line of the stack has the function.
+bool has_line(const nlohmann::json& breach, const std::string& function) {
+  for (const auto& line : breach["stack"])
+    if (line.get<std::string>().find(function) != std::string::npos) return true;
+  return false;
+}
+
+TEST_F(ControllerCheck, PassesAControllerThatKeepsTheRules) {
+  const auto found = broken("none");
+  EXPECT_TRUE(found.empty()) << found.begin()->second.dump(1);
+  EXPECT_NE(said_.find("no allocation"), std::string::npos) << said_;
+}
+
+TEST_F(ControllerCheck, NamesThePlaceOfEachBrokenRule) {
+  const struct {
+    const char *rule, *name, *call, *function;
+  } cases[] = {
+      {"allocation", "no allocation", "malloc", "make_a_list"},
+      {"lock", "no lock", "pthread_mutex_lock", "take_a_lock"},
+      {"system_call", "no system call", "", "ask_the_kernel"},
+      {"thread", "no thread", "pthread_create", "misbehave"},
+      {"thread_in_configure", "no thread", "pthread_create", "configure"},
+      {"archive_allocates", "no allocation", "malloc", "archive"},
+  };
+  for (const auto& one : cases) {
+    const auto found = broken(one.rule);
+    ASSERT_TRUE(found.contains(one.name)) << one.rule << "\n" << said_;
+    const auto& breach = found.at(one.name)["breaches"][0];
+    EXPECT_EQ(breach["controller"], "breaks");
+    if (*one.call != '\0') {
+      EXPECT_EQ(breach["call"], one.call);
+    }
+    EXPECT_TRUE(has_line(breach, one.function)) << breach.dump(1);
+    EXPECT_NE(said_.find(one.function), std::string::npos) << said_;
+    EXPECT_TRUE(has_line(breach, "breaks.cpp:")) << "file and line\n" << breach.dump(1);
+    if (one.rule == std::string("lock") || one.rule == std::string("system_call")) {
+      EXPECT_EQ(found.size(), 1U) << said_;
+    }
+  }
+}
+
+TEST_F(ControllerCheck, CountsPageFaults) {
+  const auto found = broken("page_fault");
+  ASSERT_TRUE(found.contains("no page fault")) << said_;
+  EXPECT_EQ(found.at("no page fault")["breaches"][0]["function"], "update()");
+}
+
+TEST_F(ControllerCheck, ProvesTheArchive) {
+  auto found = broken("archive_reads_more");
+  ASSERT_TRUE(found.contains("save, restore, save")) << said_;
+  EXPECT_NE(found["save, restore, save"]["note"].dump().find("'breaks'"), std::string::npos);
+  found = broken("archive_forgets");
+  ASSERT_EQ(found.size(), 1U) << said_;
+  EXPECT_NE(found["a rewound run"]["note"].dump().find("joint1"), std::string::npos)
+      << found["a rewound run"];
+}
+
+TEST_F(ControllerCheck, RefusesWhatItCannotCheck) {
+  for (const auto& [arguments, text] : std::map<std::string, std::string>{
+           {"nothing.so", "there is no such library"},
+           {shell_word(kPlugin) + " --experiment hold.toml", "none of its controllers is"},
+           {shell_word(kPlugin) + " --robot robot.toml --set 'rule = \"no\"'", "rule"},
+           {shell_word(kPlugin) + " --robot none.toml", "none.toml"}}) {
+    const Outcome outcome = tandem("controller check " + arguments);
+    EXPECT_EQ(outcome.status, 2) << arguments;
+    EXPECT_NE(outcome.err.find(text), std::string::npos) << outcome.err;
+  }
+}
+
+TEST_F(ControllerCheck, TakesAnExperimentThatNamesThePlugin) {
+  edit("hold.toml", "plugin = \"hold\"", "plugin = \"breaks\"\nname = \"mine\"");
+  const Outcome outcome =
+      tandem("controller check " + shell_word(kPlugin) + " --experiment hold.toml --duration 0.3");
+  EXPECT_EQ(outcome.status, 0) << outcome.err << outcome.out;
+}
+
+TEST_F(ControllerCheck, IsTheGateOfARun) {
+  edit("hold.toml", "plugin = \"hold\"",
+       "plugin = \"" + kPlugin + "\"\nname = \"hold\"\nparameters = { rule = \"lock\" }");
+  const Outcome outcome =
+      tandem("run hold.toml --gate --no-log --no-socket --duration 0.5 --json run.json");
+  EXPECT_EQ(outcome.status, 1) << outcome.err;
+  const auto rules = json("run.json")["gate"];
+  ASSERT_EQ(rules.size(), 5U);
+  EXPECT_EQ(rules[1]["rule"], "no lock");
+  EXPECT_EQ(rules[1]["kept"], false);
+  EXPECT_TRUE(has_line(rules[1]["breaches"][0], "take_a_lock")) << rules;
+  EXPECT_NE(outcome.out.find("no lock: pthread_mutex_lock in hold: update()"), std::string::npos)
+      << outcome.out;
+}
+
+// An overrun, a NaN: the table and the log said which joint, and nobody's name.
+TEST_F(ControllerCheck, IsNotNeededToNameWhoWasSlowOrWrong) {
+  edit("hold.toml", "plugin = \"hold\"",
+       "plugin = \"" + kPlugin + "\"\nname = \"hold\"\nparameters = { rule = \"slow\" }");
+  Outcome outcome =
+      tandem("run hold.toml --realtime --no-socket --no-log --duration 0.5 --json run.json");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const auto slow = json("run.json")["controllers"]["hold"];
+  EXPECT_GT(slow["overruns"], 0) << slow;
+  EXPECT_GE(slow["call_ns"]["max"], 5'000'000);
+  EXPECT_LE(slow["overruns"], json("run.json")["overruns"]);
+  edit("hold.toml", "slow", "nan");
+  outcome = tandem("run hold.toml --no-socket --json run.json --log log");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_EQ(json("run.json")["fault_log"][0]["controller"], "hold");
+  EXPECT_NE(
+      outcome.err.find("joint2: the command of the controller 'hold' was not a finite number"),
+      std::string::npos)
+      << outcome.err;
+  EXPECT_EQ(json("run.json")["joints"]["joint2"]["limited_controller"], "hold");
+}
+
+}  // namespace
+}  // namespace tandem::apps
