@@ -69,6 +69,7 @@ function(tandem_install)
   set(package lib/cmake/tandem)
   install(EXPORT tandem NAMESPACE tandem:: FILE tandemTargets.cmake DESTINATION ${package})
   # In a folder of its own: find_package() would find it in the build folder, whose bin/ is in PATH.
+  set(TANDEM_ROBOTS_PATH "\${PACKAGE_PREFIX_DIR}/share/tandem/config")
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/tandemConfig.cmake.in
     ${PROJECT_BINARY_DIR}/installed/tandemConfig.cmake INSTALL_DESTINATION ${package})
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/installed/tandemConfigVersion.cmake
@@ -76,4 +77,14 @@ function(tandem_install)
   install(FILES ${PROJECT_BINARY_DIR}/installed/tandemConfig.cmake
     ${PROJECT_BINARY_DIR}/installed/tandemConfigVersion.cmake cmake/TandemController.cmake cmake/plugin.map
     DESTINATION ${package})
+
+  # The same of the build folder, for who names it by tandem_DIR, as `tandem controller new` does.
+  set(package ${PROJECT_BINARY_DIR}/package)
+  set(TANDEM_ROBOTS_PATH "${PROJECT_SOURCE_DIR}/config")
+  configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/tandemConfig.cmake.in
+    ${package}/tandemConfig.cmake INSTALL_DESTINATION package INSTALL_PREFIX ${PROJECT_BINARY_DIR})
+  foreach(file TandemController.cmake plugin.map)
+    configure_file(${PROJECT_SOURCE_DIR}/cmake/${file} ${package}/${file} COPYONLY)
+  endforeach()
+  export(EXPORT tandem NAMESPACE tandem:: FILE ${package}/tandemTargets.cmake)
 endfunction()
