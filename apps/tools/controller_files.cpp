@@ -189,9 +189,11 @@ execute_process(COMMAND ${tandem} run ${CMAKE_CURRENT_LIST_DIR}/@NAME@.toml
 if(NOT status EQUAL 0)
   message(FATAL_ERROR "the run ended with status ${status}")
 endif()
+
 file(READ ${json} result)
 string(JSON limited GET "${result}" joints ${joint} limited_cycles)
 string(JSON worst GET "${result}" joints ${joint} max_tracking_error_rad)
+
 message("${joint}: limited in ${limited} cycles, at most ${worst} rad from its reference")
 if(limited GREATER 0 OR worst GREATER 0.1)
   message(FATAL_ERROR "a limit changed its reference, or it does not follow")
