@@ -44,6 +44,7 @@ class CarriedState {
   bool give(Next& next) noexcept TANDEM_RT {
     given_ = fresh_;
     if (const std::size_t size = taken_.bytes().size(); size > 0) {
+      // Its own bytes, which are no constants: an Archive is filled in place.
       std::memcpy(const_cast<std::byte*>(given_.bytes().data()), taken_.bytes().data(), size);
     }
     next.archive(given_);
