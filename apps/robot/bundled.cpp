@@ -39,11 +39,13 @@ Result<fs::path> named_robot(const std::string& name) {
   }
   std::ranges::sort(names);
   names.erase(std::unique(names.begin(), names.end()), names.end());
-  return std::unexpected(Error{"there is no bundled robot '" + name + "'",
-                               suggest(name, names) + "; or give the path of its robot.toml",
-                               name,
-                               0,
-                               {}});
+  const std::string nearest = suggest(name, names);
+  return std::unexpected(
+      Error{"there is no bundled robot '" + name + "'",
+            (nearest.empty() ? nearest : nearest + "; or ") + "give the path of its robot.toml",
+            name,
+            0,
+            {}});
 }
 
 }  // namespace tandem::apps
