@@ -3,31 +3,21 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# All that a plugin may see: controllers/controller.hpp, hal/devices.hpp and what they include. The loader refuses a
-# plugin of another version of them (kControllerInterface).
-set(TANDEM_PLUGIN_HEADERS
-  base/archive.hpp
-  base/realtime.hpp
-  base/result.hpp
-  base/toml_reader.hpp
-  controllers/controller.hpp
-  hal/command_fields.inc
-  hal/cycle_time.hpp
-  hal/devices.hpp
-  hal/estimate.hpp
-  hal/estimate_fields.inc
-  hal/follower.hpp
-  hal/image.hpp
-  hal/joint_capabilities.hpp
-  hal/joint_devices.hpp
-  hal/predictor.hpp
-  hal/robot.hpp
-  hal/sensor_devices.hpp
-  hal/service_devices.hpp
-  hal/state_fields.inc
-  hal/trapezoid.hpp
-  model/kernels.h
-  model/kinematic_loop.hpp)
+# All that a plugin may see: these two and what they include. The loader refuses a plugin of another
+# version of them (kControllerInterface).
+set(TANDEM_PLUGIN_HEADERS)
+set(headers controllers/controller.hpp hal/devices.hpp)
+while(headers)
+  list(POP_FRONT headers header)
+  if(header IN_LIST TANDEM_PLUGIN_HEADERS)
+    continue()
+  endif()
+  list(APPEND TANDEM_PLUGIN_HEADERS ${header})
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${header})
+  file(STRINGS ${PROJECT_SOURCE_DIR}/${header} lines REGEX "^#include \"")
+  list(TRANSFORM lines REPLACE "^#include \"([^\"]*)\".*" "\\1")
+  list(APPEND headers ${lines})
+endwhile()
 
 # tandem_install(): to be called when every target is there. The program looks for its parts beside
 # itself, in ../lib and ../share, whatever a system calls its folders.
