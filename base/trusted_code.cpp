@@ -123,18 +123,23 @@ bool looks_beside_itself(const Descriptor& file) {
   });
 }
 
-/// A name of the descriptor's file, by which a debugger finds it, too. The loader takes a library
-/// that it has loaded by the same name for the same, and a descriptor's number comes again: so no
-/// two names are spelt alike. Empty: there is no /proc.
-std::string name_of(const Descriptor& file) {
+/// Leads nowhere: "/" and "/." in an order that comes once. The loader takes a library that it has
+/// loaded by the same name for the same, and a path, as a descriptor's number, comes again: so no
+/// two names are spelt alike.
+std::string another_spelling() {
   static std::atomic<std::uint32_t> names{0};
+  std::string way;
+  const std::uint32_t number = names.fetch_add(1);
+  for (std::uint32_t bit = 1U << 23; bit != 0; bit >>= 1) way += (number & bit) != 0 ? "/." : "/";
+  return way;
+}
+
+/// A name of the descriptor's file, by which a debugger finds it, too. Empty: there is no /proc.
+std::string name_of(const Descriptor& file) {
   std::error_code missing;
   const std::string process = fs::read_symlink("/proc/self", missing).string();
   if (missing) return {};
-  std::string name = "/proc/" + process;
-  const std::uint32_t number = names.fetch_add(1);
-  for (std::uint32_t bit = 1U << 23; bit != 0; bit >>= 1) name += (number & bit) != 0 ? "/." : "/";
-  return name + "/fd/" + std::to_string(file.get());
+  return "/proc/" + process + another_spelling() + "/fd/" + std::to_string(file.get());
 }
 
 /// Puts the real path in the place of the name that a library was loaded by: in debuggers, dladdr()
@@ -213,7 +218,7 @@ Status TrustedCode::check_seal() const {
 }
 
 Result<void*> TrustedCode::load(int flags) const {
-  const std::string name = looks_beside_itself(file_) ? real_ : name_of(file_);
+  const std::string name = looks_beside_itself(file_) ? another_spelling() + real_ : name_of(file_);
   if (name.empty()) {
     return refuse(path_, "cannot be loaded without /proc", "mount it: mount -t proc proc /proc");
   }

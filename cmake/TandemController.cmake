@@ -9,9 +9,12 @@ function(tandem_add_controller name)
   add_library(controller_${name} MODULE ${PLUGIN_SOURCES})
   target_link_libraries(controller_${name} PRIVATE tandem::plugin ${PLUGIN_LINKS})
   if(TARGET tandem_pch)
-    target_precompile_headers(controller_${name} REUSE_FROM tandem_pch)
+    target_precompile_headers(controller_${name} REUSE_FROM tandem_pch)  # with its flags
   else()
-    target_compile_options(controller_${name} PRIVATE -g1)  # lines, for the stack of a crash
+    # Nothing that is one for the whole process, which would keep a former build at work; and never
+    # without optimisation by oversight: that takes many times as long in every cycle.
+    target_compile_options(controller_${name} PRIVATE -g1  # lines, for the stack of a crash
+      $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique> $<$<STREQUAL:$<CONFIG>,>:-O2>)
   endif()
   # Nothing undefined that the loader would find missing, nothing exported but the entry point: a
   # symbol that is one for the whole process would keep a library from ever being closed.

@@ -3,31 +3,21 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# All that a plugin may see: controllers/controller.hpp, hal/devices.hpp and what they include. The loader refuses a
-# plugin of another version of them (kControllerInterface).
-set(TANDEM_PLUGIN_HEADERS
-  base/archive.hpp
-  base/realtime.hpp
-  base/result.hpp
-  base/toml_reader.hpp
-  controllers/controller.hpp
-  hal/command_fields.inc
-  hal/cycle_time.hpp
-  hal/devices.hpp
-  hal/estimate.hpp
-  hal/estimate_fields.inc
-  hal/follower.hpp
-  hal/image.hpp
-  hal/joint_capabilities.hpp
-  hal/joint_devices.hpp
-  hal/predictor.hpp
-  hal/robot.hpp
-  hal/sensor_devices.hpp
-  hal/service_devices.hpp
-  hal/state_fields.inc
-  hal/trapezoid.hpp
-  model/kernels.h
-  model/kinematic_loop.hpp)
+# All that a plugin may see: these two and what they include. The loader refuses a plugin of another
+# version of them (kControllerInterface).
+set(TANDEM_PLUGIN_HEADERS)
+set(headers controllers/controller.hpp hal/devices.hpp)
+while(headers)
+  list(POP_FRONT headers header)
+  if(header IN_LIST TANDEM_PLUGIN_HEADERS)
+    continue()
+  endif()
+  list(APPEND TANDEM_PLUGIN_HEADERS ${header})
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${header})
+  file(STRINGS ${PROJECT_SOURCE_DIR}/${header} lines REGEX "^#include \"")
+  list(TRANSFORM lines REPLACE "^#include \"([^\"]*)\".*" "\\1")
+  list(APPEND headers ${lines})
+endwhile()
 
 # tandem_install(): to be called when every target is there. The program looks for its parts beside
 # itself, in ../lib and ../share, whatever a system calls its folders.
@@ -72,6 +62,7 @@ function(tandem_install)
   set(package lib/cmake/tandem)
   install(EXPORT tandem NAMESPACE tandem:: FILE tandemTargets.cmake DESTINATION ${package})
   # In a folder of its own: find_package() would find it in the build folder, whose bin/ is in PATH.
+  set(TANDEM_ROBOTS_PATH "\${PACKAGE_PREFIX_DIR}/share/tandem/config")
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/tandemConfig.cmake.in
     ${PROJECT_BINARY_DIR}/installed/tandemConfig.cmake INSTALL_DESTINATION ${package})
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/installed/tandemConfigVersion.cmake
@@ -79,4 +70,14 @@ function(tandem_install)
   install(FILES ${PROJECT_BINARY_DIR}/installed/tandemConfig.cmake
     ${PROJECT_BINARY_DIR}/installed/tandemConfigVersion.cmake cmake/TandemController.cmake cmake/plugin.map
     DESTINATION ${package})
+
+  # The same of the build folder, for who names it by tandem_DIR, as `tandem controller new` does.
+  set(package ${PROJECT_BINARY_DIR}/package)
+  set(TANDEM_ROBOTS_PATH "${PROJECT_SOURCE_DIR}/config")
+  configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/tandemConfig.cmake.in
+    ${package}/tandemConfig.cmake INSTALL_DESTINATION package INSTALL_PREFIX ${PROJECT_BINARY_DIR})
+  foreach(file TandemController.cmake plugin.map)
+    configure_file(${PROJECT_SOURCE_DIR}/cmake/${file} ${package}/${file} COPYONLY)
+  endforeach()
+  export(EXPORT tandem NAMESPACE tandem:: FILE ${package}/tandemTargets.cmake)
 endfunction()

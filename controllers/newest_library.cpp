@@ -1,18 +1,40 @@
 // A former build may stay mapped; the new one is loaded beside it, and shares no variable with it.
+// What the linker would give it of the program, or of its own former parts, is looked for.
 #include "controllers/newest_library.hpp"
 
 #include <dlfcn.h>
 #include <elf.h>
+#include <link.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <mutex>
+#include <set>
 #include <tuple>
 #include <vector>
 
+#ifdef __has_feature
+#define TANDEM_HAS(sanitizer) __has_feature(sanitizer)
+#else
+#define TANDEM_HAS(sanitizer) 0
+#endif
+
 namespace tandem {
 namespace {
+
+namespace fs = std::filesystem;
+
+/// The sanitizers refuse it.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || \
+    TANDEM_HAS(address_sanitizer) || TANDEM_HAS(thread_sanitizer)
+constexpr int kApart = 0;
+#else
+constexpr int kApart = RTLD_DEEPBIND;
+#endif
 
 using Identity = std::tuple<dev_t, ino_t, time_t, long, off_t>;
 
@@ -31,26 +53,176 @@ std::vector<Item> items(const std::string& bytes, std::size_t offset, std::size_
   return all;
 }
 
-/// A variable of the library's own that is one for the whole process. Those of the C++ library,
-/// such as std::ranges::iter_move, hold nothing. Empty: there is none.
-std::string unique_variable(const TrustedCode& code) {
-  const std::string bytes =
-      read_all(code.file(), code.real_path(), kMostOtherBytes).value_or(std::string());
-  const auto header = items<Elf64_Ehdr>(bytes, 0, 1);
-  if (header.empty()) return {};
-  const auto sections = items<Elf64_Shdr>(bytes, header[0].e_shoff, header[0].e_shnum);
-  for (const Elf64_Shdr& one : sections) {
-    if (one.sh_type != SHT_DYNSYM || one.sh_link >= sections.size()) continue;
-    const Elf64_Shdr& names = sections[one.sh_link];
-    const auto text = items<char>(bytes, names.sh_offset, names.sh_size);
-    for (const auto& symbol :
-         items<Elf64_Sym>(bytes, one.sh_offset, one.sh_size / sizeof(Elf64_Sym))) {
-      if (ELF64_ST_BIND(symbol.st_info) != STB_GNU_UNIQUE || symbol.st_shndx == SHN_UNDEF) continue;
-      if (symbol.st_name >= text.size()) continue;
-      const std::string name(text.data() + symbol.st_name);
-      if (name.find("NSt") == std::string::npos && name.find("NKSt") == std::string::npos)
-        return name;
+/// A library's file by its sections, each with the names that it refers to.
+class Sections {
+ public:
+  explicit Sections(const TrustedCode& code)
+      : bytes_(read_all(code.file(), code.real_path(), kMostOtherBytes).value_or(std::string())) {
+    const auto header = items<Elf64_Ehdr>(bytes_, 0, 1);
+    if (!header.empty()) all_ = items<Elf64_Shdr>(bytes_, header[0].e_shoff, header[0].e_shnum);
+  }
+  /// Calls `take(entry, name_at)` for each entry of the sections of a type.
+  template <class Entry, class Take>
+  void each(std::uint32_t type, const Take& take) const {
+    for (const Elf64_Shdr& one : all_) {
+      if (one.sh_type != type || one.sh_link >= all_.size()) continue;
+      const Elf64_Shdr& names = all_[one.sh_link];
+      const auto text = items<char>(bytes_, names.sh_offset, names.sh_size);
+      const auto name_at = [&text](std::uint64_t at) {
+        return at < text.size() ? std::string(text.data() + at) : std::string();
+      };
+      for (const auto& entry : items<Entry>(bytes_, one.sh_offset, one.sh_size / sizeof(Entry)))
+        take(entry, name_at);
     }
+  }
+  /// Whether what a symbol names is written to, if only by the linker: it holds an address.
+  [[nodiscard]] bool is_written(const Elf64_Sym& symbol) const {
+    return symbol.st_shndx >= all_.size() || (all_[symbol.st_shndx].sh_flags & SHF_WRITE) != 0;
+  }
+
+ private:
+  std::string bytes_;
+  std::vector<Elf64_Shdr> all_;
+};
+
+/// Whether a mangled name is one of namespace std, not one that only has a type of std in it.
+bool is_of_std(std::string_view name) {
+  if (!name.starts_with("_Z")) return false;
+  name.remove_prefix(2);
+  if (name.starts_with("GV")) name.remove_prefix(2);
+  while (name.starts_with('Z') || name.starts_with('N') || name.starts_with('K'))
+    name.remove_prefix(1);
+  return name.starts_with("St");
+}
+
+/// A variable of the library's own that is one for the whole process. Constants of the C++ library,
+/// such as std::ranges::iter_move, are the same in every build; what it makes for types of the
+/// controller's may lead to its code, as a table of std::visit() does. Empty: there is none.
+std::string unique_variable(const Sections& file) {
+  std::string found;
+  file.each<Elf64_Sym>(SHT_DYNSYM, [&](const Elf64_Sym& symbol, const auto& name_at) {
+    if (ELF64_ST_BIND(symbol.st_info) != STB_GNU_UNIQUE || symbol.st_shndx == SHN_UNDEF) return;
+    const std::string name = name_at(symbol.st_name);
+    if (found.empty() && !(is_of_std(name) && !file.is_written(symbol))) found = name;
+  });
+  return found;
+}
+
+std::string file_name(const std::string& path) { return fs::path(path).filename().string(); }
+/// "libddsc" of "libddsc.so.0".
+std::string stem(const std::string& path) {
+  const std::string name = file_name(path);
+  return name.substr(0, name.find(".so"));
+}
+
+/// The paths of all libraries of this process.
+std::set<std::string> mapped_libraries() {
+  std::set<std::string> paths;
+  ::dl_iterate_phdr(
+      [](dl_phdr_info* info, std::size_t, void* to) {
+        const std::string path = info->dlpi_name;
+        if (path.find(".so") != std::string::npos)
+          static_cast<std::set<std::string>*>(to)->insert(path);
+        return 0;
+      },
+      &paths);
+  return paths;
+}
+
+/// What the program itself is linked to: its functions come before those of a controller's.
+class OfTheProgram {
+ public:
+  OfTheProgram() {
+    for (const std::string& path : mapped_libraries()) names_[stem(path)] = file_name(path);
+  }
+  [[nodiscard]] bool has(const std::string& path) const {
+    const auto found = names_.find(stem(path));
+    return found != names_.end() && found->second == file_name(path);
+  }
+  /// Its library that `path` is another version of; empty: there is none.
+  [[nodiscard]] std::string other_of(const std::string& path) const {
+    const auto found = names_.find(stem(path));
+    return found == names_.end() || has(path) ? std::string() : found->second;
+  }
+
+ private:
+  std::map<std::string, std::string> names_;  // by stem
+};
+
+/// Whether the library names one that it needs of which the program has another version.
+bool needs_apart(const Sections& file, const OfTheProgram& program) {
+  bool found = false;
+  file.each<Elf64_Dyn>(SHT_DYNAMIC, [&](const Elf64_Dyn& entry, const auto& name_at) {
+    if (entry.d_tag != DT_NEEDED) return;
+    found = found || !program.other_of(name_at(entry.d_un.d_val)).empty();
+  });
+  return found;
+}
+
+/// Files that are mapped, and that something else stands in the place of.
+std::set<std::string> replaced_files() {
+  const std::string mark = " (deleted)";
+  std::set<std::string> paths;
+  std::ifstream maps("/proc/self/maps");
+  for (std::string line; std::getline(maps, line);) {
+    if (!line.ends_with(mark)) continue;
+    line.resize(line.size() - mark.size());
+    const std::size_t at = line.find('/');
+    std::error_code gone;
+    if (at != std::string::npos && fs::exists(line.substr(at), gone)) paths.insert(line.substr(at));
+  }
+  return paths;
+}
+
+/// A library that this one needs, itself or by another one, and whose former build is mapped: by
+/// its name the linker takes that. Empty: there is none.
+std::string outdated_need(void* library, const OfTheProgram& program,
+                          const std::set<std::string>& replaced, int depth = 0) {
+  link_map* map = nullptr;
+  if (depth > 16 || ::dlinfo(library, RTLD_DI_LINKMAP, &map) != 0) return {};
+  const char* names = nullptr;
+  for (const ElfW(Dyn)* entry = map->l_ld; entry->d_tag != DT_NULL; ++entry)
+    if (entry->d_tag == DT_STRTAB) names = reinterpret_cast<const char*>(entry->d_un.d_ptr);
+  for (const ElfW(Dyn)* entry = map->l_ld; entry->d_tag != DT_NULL; ++entry) {
+    if (entry->d_tag != DT_NEEDED || names == nullptr) continue;
+    const std::string name = names + entry->d_un.d_val;
+    void* const needed =
+        program.has(name) ? nullptr : ::dlopen(name.c_str(), RTLD_LAZY | RTLD_NOLOAD);
+    if (needed == nullptr) continue;
+    link_map* its = nullptr;
+    std::error_code problem;
+    std::string found;
+    if (::dlinfo(needed, RTLD_DI_LINKMAP, &its) == 0) {
+      const std::string real = fs::canonical(its->l_name, problem).string();
+      found = replaced.contains(real) ? real : outdated_need(needed, program, replaced, depth + 1);
+    }
+    ::dlclose(needed);
+    if (!found.empty()) return found;
+  }
+  return {};
+}
+
+/// A library that came with this one, and whose calls would go to the program's version of it.
+std::string mixed_up(const std::set<std::string>& before, const OfTheProgram& program) {
+  for (const std::string& path : mapped_libraries())
+    if (!before.contains(path) && !program.other_of(path).empty()) return path;
+  return {};
+}
+
+/// What the linker has made of it. The library is closed when that will not do.
+Status check_needs(void* library, bool apart, const std::set<std::string>& before,
+                   const OfTheProgram& program) {
+  const std::string mixed = apart ? std::string() : mixed_up(before, program);
+  if (!mixed.empty()) {
+    dlclose(library);
+    return fail(
+        "brings " + mixed + ", whose calls would go to the program's " + program.other_of(mixed),
+        "link it to the controller itself, too: then both are kept apart");
+  }
+  if (const std::string need = outdated_need(library, program, replaced_files()); !need.empty()) {
+    dlclose(library);
+    return fail("needs " + need + ", which was built anew while its former code is in this process",
+                "end the run; or link its parts into the controller (STATIC)");
   }
   return {};
 }
@@ -61,11 +233,13 @@ Result<void*> load_newest(const TrustedCode& code) {
   static std::mutex mutex;
   static std::map<std::string, Identity> loaded;  // when it was loaded last, by its real path
   const std::lock_guard lock(mutex);
+  static const OfTheProgram program;
   const Identity now = identity_of(code.file());
   const auto [known, first] = loaded.try_emplace(code.real_path(), now);
   const void* former = !first && known->second != now ? code.loaded() : nullptr;
+  const Sections file(code);
   if (former != nullptr) {
-    if (const std::string name = unique_variable(code); !name.empty()) {
+    if (const std::string name = unique_variable(file); !name.empty()) {
       return fail(
           "was built anew, but its former code stays in this process, and the new one would "
           "use its variable " +
@@ -73,13 +247,17 @@ Result<void*> load_newest(const TrustedCode& code) {
           "end the run; build it by tandem_add_controller(), or with -fno-gnu-unique");
     }
   }
-  Result<void*> library = code.load(RTLD_NOW | RTLD_LOCAL);
+  const bool apart = kApart != 0 && needs_apart(file, program);
+  const std::set<std::string> before = mapped_libraries();
+  Result<void*> library = code.load(RTLD_NOW | RTLD_LOCAL | (apart ? kApart : 0));
   if (!library) return library;
   if (*library == former) {
     dlclose(*library);
     return fail("was overwritten in place while its former code is in this process",
                 "end the run; copy a library beside it and rename that, as linkers do");
   }
+  if (const Status good = check_needs(*library, apart, before, program); !good)
+    return std::unexpected(good.error());
   known->second = now;
   return library;
 }

@@ -12,8 +12,13 @@ namespace tandem {
 /// ever where it has symbols that are one for the whole process (STB_GNU_UNIQUE). Such a library is
 /// opened beside the former one here.
 ///
-/// Errors: TrustedCode::load()'s; it was overwritten in place while its former code is mapped;
-/// a variable of its own is unique, so that the new code would have the former one's.
+/// A library that it names as needed, and of which the program has another version, is loaded for
+/// it alone: each calls its own. (What it allocates by malloc() is then not seen by traps.)
+///
+/// Errors: TrustedCode::load()'s; it was overwritten in place while its former code is mapped; a
+/// variable is unique, so that the new code would have the former one's; a library that it needs
+/// was built anew, and is mapped as it was; one that it brings without naming it would call the
+/// program's version of it.
 [[nodiscard]] Result<void*> load_newest(const TrustedCode& code);
 
 }  // namespace tandem

@@ -74,10 +74,12 @@ ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kern
       owner_(robot_.joints.size(), -1),
       references_(robot_, capabilities_, gains_, period_ns),
       at_rest_(robot_.shape()),
+      discarded_(robot_.shape()),
       guard_(robot_.shape(), capabilities_, gains_) {}
 
 ControllerSource::ControllerSource(LoadedController plugin)
-    : code{.name = {}, .sha256 = plugin.sha256(), .path = plugin.path()} {
+    : code{.name = {}, .sha256 = plugin.sha256(), .path = plugin.path()},
+      lacks_archive(plugin.plugin().lacks_archive) {
   auto owner = std::make_shared<LoadedController>(std::move(plugin));
   controller = std::shared_ptr<Controller>(owner, &**owner);
 }
@@ -94,6 +96,7 @@ Status ControllerHost::add(const std::string& name, ControllerSource source, Tom
   auto made = configure(name, std::move(source), std::move(parameters), limit,
                         active ? std::span<const double>(start_rad_) : std::span<const double>());
   if (!made) return std::unexpected(made.error());
+  (*made)->document = document_;
   table_[slot] = made->get();
   const ControllerSet after = active_ | only(slot);
   if (const auto conflict = active ? find_conflict(table_, after) : std::nullopt) {
@@ -121,6 +124,7 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     const std::lock_guard lock(code_mutex_);
     code_.push_back({name, source.code.sha256, source.code.path});
   }
+  const std::string path = parameters.path();
   const auto shared =
       std::make_shared<ControllerSetup>(robot_, gains_, kernels_, period_ns_, std::move(parameters),
                                         start_rad, estimate_, predictor_);
@@ -142,6 +146,9 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
   auto made = std::make_unique<HostedController>();
   made->name = name;
   made->plugin = source.code.path;
+  made->sha256 = source.code.sha256;
+  made->lacks_archive = source.lacks_archive;
+  made->parameters = path;
   made->controller = std::move(source.controller);
   made->io = setup.io;
   made->claims.assign(setup.claims().begin(), setup.claims().end());
@@ -399,6 +406,7 @@ std::uint64_t ControllerHost::fingerprint() const noexcept {
     if (table_[slot] == nullptr) continue;
     add(slot);
     for (const char letter : table_[slot]->name) add(static_cast<unsigned char>(letter));
+    for (const char letter : table_[slot]->sha256) add(static_cast<unsigned char>(letter));
     for (const auto& claim : table_[slot]->claims) {
       add(claim.joint);
       add(static_cast<std::uint64_t>(claim.mode));

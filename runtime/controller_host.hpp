@@ -27,6 +27,7 @@
 #include "runtime/call_watch.hpp"
 #include "runtime/claim_guard.hpp"
 #include "runtime/controller_times.hpp"
+#include "runtime/controller_succession.hpp"
 #include "runtime/cycle_request.hpp"
 #include "runtime/joint_references.hpp"
 
@@ -49,13 +50,15 @@ struct ControllerSource {
   ControllerSource(LoadedController plugin);  ///< keeps its library open
 
   std::shared_ptr<Controller> controller;
-  ControllerCode code = {};  ///< of a plugin; else empty
+  ControllerCode code = {};    ///< of a plugin; else empty
+  bool lacks_archive = false;  ///< a plugin has members, and no archive()
 };
 
 /// A configured controller.
 struct HostedController {
   std::string name;
   std::string plugin;                      ///< its library's path; empty: it has none
+  std::string sha256;                      ///< of its library; empty: it has none
   std::shared_ptr<Controller> controller;  ///< a plugin's shares its library's life
   std::shared_ptr<ControllerIo> io;        ///< what it declared
   std::vector<ControllerSetup::Claim> claims;
@@ -64,8 +67,13 @@ struct HostedController {
   std::vector<std::uint8_t> strayed;       ///< by joint: something was taken back, and reported
   std::uint32_t id = 0;                    ///< of its name, for the fault log
   std::shared_ptr<ControllerTimes> times;  ///< of its calls in the cycle
+  bool lacks_archive = false;              ///< it has members, and no archive()
   bool of_experiment = true;               ///< not loaded while the run went on
   bool leaves = false;                     ///< the asking side's: the loop was asked to let it go
+  std::optional<TomlDocument> document;    ///< where its parameters are; none: it has no document
+  std::string parameters;                  ///< the path of their table there
+  std::unique_ptr<HostedController> next;  ///< the asking side's: the loop was asked to replace it
+  std::unique_ptr<Succession> succession;  ///< of one that replaces another, until that is done
 };
 
 /// A controller wrote what it had not claimed, and that was taken back.
@@ -105,6 +113,8 @@ class ControllerHost {
   void time_by(rt::Clock& clock) { clock_ = &clock; }
   /// Who is told of each call of the cycle; null: nobody.
   void watch_calls(CallWatch* watch) { watch_ = watch; }
+  /// The document of the parameters of those who are added from now on.
+  void read_from(const TomlDocument& document) { document_ = document; }
   /// Configures a controller and takes its claims.
   /// @param active  false: it is loaded, and waits for its start.
   ///
@@ -163,6 +173,16 @@ class ControllerHost {
   [[nodiscard]] CycleAnswer insert(std::size_t slot,
                                    HostedController& controller) noexcept TANDEM_RT;
   [[nodiscard]] CycleAnswer remove(std::size_t slot) noexcept TANDEM_RT;
+  /// Puts `next`, which has a succession, in the place of what is in `slot`, active as that was.
+  /// When controllers are `running`, an active one goes on with the former's state, or is started,
+  /// and its joints change hands as in switch_over().
+  [[nodiscard]] CycleAnswer replace(std::size_t slot, HostedController& next, bool running,
+                                    const hal::CycleTime& time,
+                                    JointImages images) noexcept TANDEM_RT;
+  /// What is in `slot`, or null.
+  [[nodiscard]] HostedController* at(std::size_t slot) const noexcept TANDEM_RT {
+    return table_[slot];
+  }
   /// Stops and starts controllers, all or none. When they are `running`, every joint that changes
   /// hands does so without a bump (BumplessTransfer): one that moves brakes, what nobody has is
   /// held where it comes to rest, and who starts sees the joint there. Else it is who will start.
@@ -229,6 +249,8 @@ class ControllerHost {
   void settle_ended(JointImages images) noexcept TANDEM_RT;
   [[nodiscard]] const hal::StateImage& at_rest(const hal::StateImage& state,
                                                ControllerSet start) noexcept TANDEM_RT;
+  void go_on_as(HostedController& next, const hal::CycleTime& time,
+                JointImages images) noexcept TANDEM_RT;
   void call_starts(ControllerSet start, const hal::CycleTime& time,
                    JointImages images) noexcept TANDEM_RT;
   [[nodiscard]] bool is_active(std::size_t slot) const noexcept TANDEM_RT {
@@ -247,7 +269,8 @@ class ControllerHost {
   const tandem_kernels* kernels_;
   std::int64_t period_ns_;
   hal::Predictor* predictor_ = nullptr;
-  std::vector<double> start_rad_;  // of start_from()
+  std::vector<double> start_rad_;         // of start_from()
+  std::optional<TomlDocument> document_;  // of read_from()
   mutable std::mutex code_mutex_;
   std::vector<ControllerCode> code_;
   const hal::EstimateImage* estimate_ = nullptr;
@@ -259,7 +282,8 @@ class ControllerHost {
   ControllerSet ended_ = 0;          // of done_: in the last cycle
   std::vector<std::int32_t> owner_;  // by joint: an active one's slot, or -1
   JointReferences references_;
-  hal::StateImage at_rest_;  // what a start sees of joints that brake
+  hal::StateImage at_rest_;      // what a start sees of joints that brake
+  hal::CommandImage discarded_;  // of a start whose references nobody wants
   ClaimGuard guard_;
   std::optional<Stray> stray_;
   std::size_t failed_controller_ = 0;

@@ -38,6 +38,7 @@ struct CycleRequest {
   enum class Kind : std::uint32_t {
     kInsert,   ///< `controller` into `slot`
     kRemove,   ///< what is in `slot`
+    kReplace,  ///< what is in `slot`, by `controller`
     kSwitch,   ///< the controllers of `stop` and `start`
     kGoOn,     ///< the controllers that a reset holds back
     kJoint,    ///< `wish` of `joint`

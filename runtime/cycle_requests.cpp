@@ -66,6 +66,10 @@ void log(CycleNow& now, const CycleRequest& request) noexcept TANDEM_RT {
   switch (request.kind) {
     case RequestKind::kSwitch:
     case RequestKind::kGoOn: return now.event(EventKind::kControllersSwitched);
+    case RequestKind::kReplace: {
+      const auto kept = static_cast<std::uint32_t>(request.controller->succession->kept);
+      return now.event(EventKind::kControllersSwitched, -1, kept);
+    }
     case RequestKind::kJoint: return now.event(EventKind::kJointSet, joint);
     case RequestKind::kHome: return now.event(EventKind::kHomingRequested, joint);
     case RequestKind::kRecover: return now.event(EventKind::kRecoveryRequested, joint);
@@ -84,6 +88,7 @@ CycleAnswer carry_out(CycleRequests& to, const CycleRequest& request) noexcept T
   switch (request.kind) {
     case RequestKind::kInsert: return to.now.controllers.insert(request.slot, *request.controller);
     case RequestKind::kRemove: return remove(to, request.slot);
+    case RequestKind::kReplace: return to.arbiter.replace(request.slot, *request.controller);
     case RequestKind::kGoOn: return to.waiting.go_on();
     case RequestKind::kSwitch: return switch_over(to, request);
     case RequestKind::kJoint: {

@@ -83,6 +83,19 @@ CycleAnswer JointArbiter::switch_over(ControllerSet stop, ControllerSet start) n
   return now_.controllers.switch_over(stop, start, controls_, now_.time, led());
 }
 
+CycleAnswer JointArbiter::replace(std::size_t slot, HostedController& next) noexcept TANDEM_RT {
+  ControllerHost& host = now_.controllers;
+  HostedController* const former = host.at(slot);
+  if (former == nullptr) return host.remove(slot);  // which says so
+  if (controls_ && (host.shown().active & only(slot)) != 0) {
+    (void)host.insert(slot, next);  // as if it were there: what it claims
+    const CycleAnswer no = may_start(only(slot));
+    (void)host.insert(slot, *former);
+    if (no.reason != RejectReason::kNone) return no;
+  }
+  return host.replace(slot, next, controls_, now_.time, led());
+}
+
 CycleAnswer JointArbiter::leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT {
   fill_delay();
   hal::CommandImage& command = delay_.on() ? wanted_ : command_;

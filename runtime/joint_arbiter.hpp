@@ -50,6 +50,8 @@ class JointArbiter {
   /// they carry out. Joints that a stop finds in motion brake.
   void on(RunEvent event, bool holds_back = false) noexcept TANDEM_RT;
   [[nodiscard]] CycleAnswer switch_over(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT;
+  /// Puts `next` in the place of the controller in `slot`.
+  [[nodiscard]] CycleAnswer replace(std::size_t slot, HostedController& next) noexcept TANDEM_RT;
   /// From held joints to controllers, which run from now on: no joint jumps.
   [[nodiscard]] CycleAnswer leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT;
   [[nodiscard]] bool retreat() noexcept TANDEM_RT;

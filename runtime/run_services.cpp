@@ -18,22 +18,6 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::microseconds kLook{200};  // between two looks for an answer
 
-/// The errors of a document in one, as many as somebody reads.
-Status errors_of(const TomlDocument& document) {
-  constexpr std::size_t kMost = 20;
-  const Diagnostics& errors = document.diagnostics();
-  std::string all;
-  for (std::size_t i = 0; i < std::min(kMost, errors.size()); ++i) {
-    Error one = errors[i];
-    if (one.hint.starts_with("add it to the table"))
-      one.hint = "give it with --set or --parameters";
-    all += (all.empty() ? "" : "; ") + one.to_string();
-  }
-  if (errors.size() > kMost) all += "; and " + std::to_string(errors.size() - kMost) + " more";
-  if (all.empty()) return {};
-  return fail(all, "the parameters of each controller are in docs/controllers.md");
-}
-
 /// Why the loop refused, and what to do about it.
 struct Words {
   std::string message;
@@ -138,6 +122,10 @@ void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer&
     host_->owned()[request.slot].reset();
   } else if (request.kind == Kind::kRemove) {
     host_->owned()[request.slot]->leaves = false;
+  } else if (request.kind == Kind::kReplace) {
+    std::unique_ptr<HostedController>& place = host_->owned()[request.slot];
+    std::unique_ptr<HostedController> next = std::move(place->next);
+    if (done) place = std::move(next);
   }
 }
 
@@ -146,6 +134,7 @@ Result<RequestResult> RunServices::ask(Lock& lock, CycleRequest request, Patienc
   if (!inbox_->ask(request)) {
     if (request.kind == CycleRequest::Kind::kInsert) host_->owned()[request.slot].reset();
     if (request.kind == CycleRequest::Kind::kRemove) host_->owned()[request.slot]->leaves = false;
+    if (request.kind == CycleRequest::Kind::kReplace) host_->owned()[request.slot]->next.reset();
     return fail(
         "the loop has not come to the last " + std::to_string(Inbox::kCapacity) + " requests",
         "is it paused? Let it go on");
@@ -234,6 +223,21 @@ ControllerSet RunServices::planned() const {
   return active;
 }
 
+/// The errors of a document in one, as many as somebody reads. `missing`: what to do about a key.
+Status RunServices::errors_of(const TomlDocument& document, const char* missing) {
+  constexpr std::size_t kMost = 20;
+  const Diagnostics& errors = document.diagnostics();
+  std::string all;
+  for (std::size_t i = 0; i < std::min(kMost, errors.size()); ++i) {
+    Error one = errors[i];
+    if (one.hint.starts_with("add it to the table")) one.hint = missing;
+    all += (all.empty() ? "" : "; ") + one.to_string();
+  }
+  if (errors.size() > kMost) all += "; and " + std::to_string(errors.size() - kMost) + " more";
+  if (all.empty()) return {};
+  return fail(all, "the parameters of each controller are in docs/controllers.md");
+}
+
 Status RunServices::check_name(const std::string& name) {
   if (const std::string problem = listed_name_problem(name); !problem.empty()) {
     return fail_at("name", "the controller's name " + problem, "give it another name");
@@ -250,6 +254,7 @@ Result<RequestResult> RunServices::load(const std::string& name, LoadedControlle
   auto made = host_->configure(name, std::move(plugin), parameters.root());
   if (Status read = errors_of(parameters); !read) return std::unexpected(read.error());
   if (!made) return std::unexpected(made.error());
+  (*made)->document = parameters;
   return load(std::move(*made), patience);
 }
 
@@ -259,6 +264,7 @@ Result<RequestResult> RunServices::load(const std::string& name,
   auto made = host_->configure(name, std::move(controller), parameters.root());
   if (Status read = errors_of(parameters); !read) return std::unexpected(read.error());
   if (!made) return std::unexpected(made.error());
+  (*made)->document = parameters;
   return load(std::move(*made), patience);
 }
 
@@ -293,6 +299,9 @@ Result<RequestResult> RunServices::unload(const std::string& name, Patience pati
   if ((planned() & only(*slot)) != 0) {
     return fail_at(name, "the controller is active",
                    "stop it first: tandem controller stop " + name);
+  }
+  if (host_->owned()[*slot]->next != nullptr) {
+    return fail_at(name, "the controller is being reloaded", "ask again when that is done");
   }
   host_->owned()[*slot]->leaves = true;
   return ask(lock, {.kind = CycleRequest::Kind::kRemove, .slot = static_cast<std::uint32_t>(*slot)},

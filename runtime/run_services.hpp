@@ -34,6 +34,13 @@ struct RequestResult {
   hal::RunPhase phase = hal::RunPhase::kRunning;
 };
 
+/// What became of a controller that was to be loaded anew.
+struct Reloaded {
+  RequestResult asked;
+  Kept kept = Kept::kState;  ///< once it is done
+  bool changed = false;      ///< its library is another than before
+};
+
 /// A loaded controller.
 struct ControllerStatus {
   std::string name;
@@ -134,6 +141,18 @@ class RunServices {
   [[nodiscard]] Result<RequestResult> unload(const std::string& name,
                                              Patience patience = kPatience);
 
+  /// Loads the library of a controller as it is now, configures it with the same parameters, and
+  /// puts it in the place of the former one in one cycle and without a bump, active as that was. It
+  /// goes on with the former's state when its claims and the size of that are the same, and starts
+  /// afresh otherwise, or when that is wanted.
+  /// Errors: unknown; without a library; being reloaded already; load_controller()'s; those of
+  /// load(); a joint that another active controller claims. The former one goes on then.
+  [[nodiscard]] Result<Reloaded> reload(const std::string& name, bool fresh = false,
+                                        Patience patience = kPatience);
+  /// The same with the new one as it is given.
+  [[nodiscard]] Result<Reloaded> reload(const std::string& name, ControllerSource source,
+                                        bool fresh = false, Patience patience = kPatience);
+
   /// Stops some controllers and starts others in one cycle, all or none. Before the controllers
   /// have started, and after a stop, it sets who will start; after a reset, in the phase held, it
   /// starts them at once.
@@ -210,6 +229,9 @@ class RunServices {
   [[nodiscard]] Result<RequestResult> load(std::unique_ptr<HostedController> controller,
                                            Patience patience);
   [[nodiscard]] Status check_name(const std::string& name);
+  [[nodiscard]] static Status errors_of(const TomlDocument& document,
+                                        const char* missing = "give it with --set or --parameters");
+  [[nodiscard]] Result<HostedController*> to_reload(const std::string& name) const;
   /// Asks for what needs no more than a joint.
   [[nodiscard]] Result<RequestResult> ask_of_joint(CycleRequest::Kind kind,
                                                    const std::string& joint, Patience patience);

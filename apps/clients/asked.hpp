@@ -41,6 +41,7 @@ Status ask_for_motion(const AskedOptions& options, Json& question);
 // Each prints an answer.
 void print_clock(const Json& answer);
 void print_controllers(const Json& answer);
+void print_reloaded(const Json& answer);
 void print_switched(const Json& answer);
 void print_latched(const Json& answer);
 void print_joint_gains(const Json& joint);

@@ -59,6 +59,7 @@ constexpr Form kForms[]{
     {"clock.step", nullptr, &tell_clock_at_rest},
     {"controller.list", &print_controllers},
     {"controller.load", nullptr, &tell_loaded, &ask_for_load},
+    {"controller.reload", &print_reloaded},
     {"controller.start", &print_switched, nullptr, &ask_for_start},
     {"controller.stop", &print_switched, nullptr, &ask_for_stop},
     {"controller.switch", &print_switched},

@@ -105,6 +105,21 @@ void print_switched(const Json& answer) {
   }
 }
 
+/// "nod: the new build goes on in cycle 1200 with the state of the former one".
+void print_reloaded(const Json& answer) {
+  const std::string name = shown(answer.value("name", ""), 2'000);
+  const char* build = answer.value("changed", true) ? "the new build" : "the same build as before";
+  if (!answer.value("done", false)) {
+    fmt::print("{}: {}\n", name, shown(answer.value("note", ""), 2'000));
+  } else if (answer.value("carried", false)) {
+    fmt::print("{}: {} goes on in cycle {} with the state of the former one\n", name, build,
+               answer.value("cycle", 0));
+  } else {
+    fmt::print("{}: {} starts afresh in cycle {}: {}\n", name, build, answer.value("cycle", 0),
+               shown(answer.value("afresh", ""), 2'000));
+  }
+}
+
 Result<Exit> tell_loaded(Asked& asked) {
   if (asked.has("start")) {
     const std::string name = asked.answer.value("name", "");

@@ -35,12 +35,14 @@ Exit status: 0 each loop has carried it out, or does so first when its paused ti
 user on this machine, or from one that DDS Security has authenticated. `kill -USR1 PID` asks for the
 same without a socket, and gets no answer.)"},
     {"controller", "Controllers of a running run", R"(Examples:
+  tandem controller new mine                         a project of your own; needs no run
   tandem controller list                             loaded controllers, active or not, their joints
   tandem controller load hold --name rest --set 'duration_s = 2.0'
   tandem controller switch --stop squat --start rest in one cycle, or not at all
   tandem controller start                            after `fault reset`: those active before
   tandem controller stop rest                        its joints are held where they are
-  tandem controller unload rest                      then `load` runs a new build of it
+  tandem controller reload mine                      goes on with its new build, in its state
+  tandem controller unload rest                      then it can be loaded once more
 Without --socket or --dds it is the only `tandem run` of this user.)"},
     {"joint", "Joints of a running run", R"(Examples:
   tandem joint list                                  every joint: its controller, mode, measurements

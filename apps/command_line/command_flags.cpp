@@ -59,6 +59,12 @@ const char kNewExamples[] = R"(Examples:
   tandem new my_arm.urdf --density 2700              an arm whose links have no masses, as aluminium
 Every figure that is guessed is marked so in robot.toml. Rules: docs/robots.md.)";
 
+const char kControllerNewExamples[] = R"(Examples:
+  tandem controller new nod                          writes nod/: source, tests, experiment, build
+  cd nod && cmake --workflow --preset run            builds and tests it, and runs it
+  tandem controller new reach --robot panda          on another robot
+  tandem controller new reach --robot my/robot.toml -o controllers/reach)";
+
 const char kModelExamples[] = R"(Examples:
   tandem model build config/coman/robot.toml         generates and compiles the robot's kernels
   tandem model info config/coman/robot.toml          joints, mass, operation counts and sizes)";
@@ -384,6 +390,16 @@ void add_flags(CLI::App& app, NewOptions& o) {
                "Write into an existing folder; files that differ are kept as FILE~");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kNewExamples);
+}
+
+void add_flags(CLI::App& app, ControllerNewOptions& o) {
+  app.add_option("name", o.name, "Of the controller: a class and files are called so")->required();
+  app.add_option("--robot", o.robot, "Robot that it moves: a bundled one, or a robot.toml")
+      ->capture_default_str()
+      ->check(is_given("name a robot"));
+  app.add_option("-o,--output", o.output, "Folder to write (default: the name)")
+      ->check(is_given("name a folder"));
+  app.footer(kControllerNewExamples);
 }
 
 void add_flags(CLI::App& app, EdsOptions& o) {

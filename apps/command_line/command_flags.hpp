@@ -40,6 +40,7 @@ void add_flags(CLI::App& app, CheckOptions& o);
 void add_flags(CLI::App& app, ControllerCheckOptions& o);
 void add_flags(CLI::App& app, ModelOptions& o);
 void add_flags(CLI::App& app, NewOptions& o);
+void add_flags(CLI::App& app, ControllerNewOptions& o);
 void add_flags(CLI::App& app, LogOptions& o);
 void add_flags(CLI::App& app, EdsOptions& o);
 void add_flags(CLI::App& app, ReportOptions& o);

@@ -161,12 +161,12 @@ class Subcommands {
   void add(const char* name, const char* doc) {
     add_to<Options>(app_, name, doc);
   }
-  /// One of a group of commands to a running process, that needs none.
+  /// One more command of the group `group`, which is there.
   template <class Options>
-  void add_to(const char* group, const char* name, const char* doc) {
-    CLI::App* to = app_.get_subcommand(group);
-    to->description(to->get_description() + ", " + name);
-    add_to<Options>(*to, name, doc);
+  void add_to_group(const char* group, const char* name, const char* doc) {
+    CLI::App* first = app_.get_subcommand(group);
+    first->description(first->get_description() + ", " + name);
+    add_to<Options>(*first, name, doc);
   }
   template <class Options>
   void add_to(CLI::App& app, const char* name, const char* doc) {
@@ -213,8 +213,10 @@ void add_all(Subcommands& commands) {
   commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
   commands.add<EdsOptions>("eds", "Data sheets (EDS): write those of a robot's nodes, show one");
   commands.add_asked();
-  commands.add_to<ControllerCheckOptions>("controller", "check",
-                                          "Whether a controller keeps the rules of the cycle");
+  commands.add_to_group<ControllerCheckOptions>("controller", "check",
+                                                "Whether a controller keeps the rules of the cycle");
+  commands.add_to_group<ControllerNewOptions>("controller", "new",
+                                              "The project of a controller of your own");
   commands.add<TopicOptions>("topic", "Topics of ROS 2 and DDS: list, echo, hz");
   commands.add<AskOptions>("ask", "Ask a running process, in JSON");
   commands.add<DoctorOptions>("doctor", "Is this machine fit for real time?");

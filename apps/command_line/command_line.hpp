@@ -114,6 +114,13 @@ struct NewOptions {
   std::string json;
 };
 
+/// tandem controller new NAME
+struct ControllerNewOptions {
+  std::string name;                       ///< of the controller, its class and its files
+  std::string robot = "double_pendulum";  ///< that it moves: a bundled one, or a robot.toml
+  std::string output;                     ///< folder; empty: the name, here
+};
+
 /// tandem log info|csv|diff LOG [LOG_B], tandem log import FILE..., tandem log thresholds LOG...
 struct LogOptions {
   enum class Action : std::uint8_t {
@@ -243,7 +250,7 @@ struct TopicOptions {
 using Command = std::variant<Exit, RunOptions, ServeOptions, AskOptions, AskedOptions, CheckOptions,
                              ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions,
                              IdentifyOptions, ExciteOptions, LatencyOptions, DoctorOptions,
-                             EmulateOptions, TopicOptions, BenchOptions, ControllerCheckOptions>;
+                             EmulateOptions, TopicOptions, BenchOptions, ControllerCheckOptions, ControllerNewOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

@@ -94,6 +94,12 @@ const std::vector<CommandRow> kRows{
            "the file of them, in errors: parameters; the command line reads it: TOML"),
       local(texts("set", "--set", "one parameter, 'key = value', beside the file's; repeatable")),
       local(flag("start", "--start", "start it as well"))}},
+    {"controller.reload", kChanges,
+     "loads a controller's library as it is now, with the same parameters, and puts it in the "
+     "place of the former build in one cycle; it goes on with the former one's state where that "
+     "has the same shape",
+     {need(text("name", "name", kLoaded)),
+      flag("fresh", "--fresh", "start from the measured state in any case")}},
     {"controller.unload", kChanges, "frees an inactive controller",
      {need(text("name", "name", kLoaded))}},
     {"controller.start", kChanges, "starts a controller, or all that a reset holds back",

@@ -111,6 +111,31 @@ Result<Json> load(RunServices& services, const Json& request) {
   return answer;
 }
 
+/// Why it did not take over its former build's state; empty: it did.
+const char* why_afresh(runtime::Kept kept) {
+  switch (kept) {
+    case runtime::Kept::kState: break;
+    case runtime::Kept::kNotWanted: return "that was asked for";
+    case runtime::Kept::kNoArchive: return "it has members, and no archive()";
+    case runtime::Kept::kOtherClaims: return "it claims other joints or modes than before";
+    case runtime::Kept::kOtherState: return "what its archive() names has another size than before";
+  }
+  return "";
+}
+
+Result<Json> reload(RunServices& services, const Json& request) {
+  const auto name = request["name"].get<std::string>();
+  const auto made = services.reload(name, request.value("fresh", false));
+  if (!made) return std::unexpected(made.error());
+  auto answer = tell(services, made->asked);
+  if (!answer) return answer;
+  answer->update({{"name", name}, {"changed", made->changed}});
+  if (!made->asked.done) return answer;
+  (*answer)["carried"] = made->kept == runtime::Kept::kState;
+  (*answer)["afresh"] = why_afresh(made->kept);
+  return answer;
+}
+
 Names names_of(const Json& request, const char* key) {
   return request.contains(key) ? request[key].get<Names>() : Names{};
 }
@@ -129,6 +154,8 @@ void add_controller_commands(ControlRegistry& registry, RunServices& services,
   });
   registry.add("controller.load",
                [&services](const Json& request) { return load(services, request); });
+  registry.add("controller.reload",
+               [&services](const Json& request) { return reload(services, request); });
   registry.add("controller.unload", [&services](const Json& request) {
     return tell(services, services.unload(request["name"].get<std::string>()));
   });

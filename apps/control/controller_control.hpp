@@ -7,8 +7,9 @@
 
 namespace tandem::apps {
 
-/// Adds "controller.list", "controller.load", "controller.unload", "controller.start",
-/// "controller.stop" and "controller.switch". Services and robot outlive the registry.
+/// Adds "controller.list", "controller.load", "controller.reload", "controller.unload",
+/// "controller.start", "controller.stop" and "controller.switch". Services and robot outlive the
+/// registry.
 void add_controller_commands(ControlRegistry& registry, runtime::RunServices& services,
                              const hal::RobotConfig& robot);
 

@@ -43,6 +43,7 @@ Exit perform(const Command& command) {
           [](Exit done) { return done; },
           [](const ModelOptions& options) { return model_command(options); },
           [](const NewOptions& options) { return new_command(options); },
+          [](const ControllerNewOptions& options) { return controller_new_command(options); },
           [](const LogOptions& options) { return log_command(options); },
           [](const EdsOptions& options) { return eds_command(options); },
           [](const ReportOptions& options) { return report_command(options); },

@@ -16,6 +16,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit model_command(const ModelOptions& options);
 /// Writes a robot's folder from its description: robot.toml, hold.toml, move.toml.
 [[nodiscard]] Exit new_command(const NewOptions& options);
+/// Writes the project of a new controller: source, tests, experiment, build.
+[[nodiscard]] Exit controller_new_command(const ControllerNewOptions& options);
 [[nodiscard]] Exit log_command(const LogOptions& options);
 /// A part of log_command().
 [[nodiscard]] Exit log_import_command(const LogOptions& options);

@@ -47,35 +47,11 @@ std::string plain_name(std::string name) {
   return name;
 }
 
-std::vector<std::string> bundled_robots() {
-  std::vector<std::string> names;
-  std::error_code ignored;
-  for (const fs::path& folder : robot_folders()) {
-    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-      if (fs::is_regular_file(entry.path() / "robot.toml", ignored)) {
-        names.push_back(entry.path().filename().string());
-      }
-    }
-  }
-  std::ranges::sort(names);
-  names.erase(std::unique(names.begin(), names.end()), names.end());
-  return names;
-}
-
 /// The robot that --like names: a file, or the folder of a bundled one.
 std::expected<scaffold::Like, Diagnostics> read_like(const std::string& name) {
-  std::error_code ignored;
-  std::string file = name;
-  for (const fs::path& folder : robot_folders()) {
-    if (fs::is_regular_file(file, ignored)) break;
-    file = (folder / name / "robot.toml").string();
-  }
-  if (!fs::is_regular_file(file, ignored)) {
-    return std::unexpected(
-        one("there is no bundled robot '" + name + "'",
-            suggest(name, bundled_robots()) + "; or give the path of its robot.toml", name));
-  }
-  auto robot = robot::read_robot(file);
+  const auto file = named_robot(name);
+  if (!file) return std::unexpected(Diagnostics{file.error()});
+  auto robot = robot::read_robot(file->string());
   if (!robot) return std::unexpected(robot.error());
   return scaffold::Like{std::move(robot->config), std::move(robot->tree)};
 }

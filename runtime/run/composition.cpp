@@ -120,6 +120,7 @@ bool add_kernels(Composition& c, const robot::RobotFiles& robot, bool serves,
   }
   c.controllers = std::make_unique<ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
   c.controllers->start_from(start_of(e));
+  c.controllers->read_from(e.document);
   add_estimator(c, errors);
   if (e.hal.backend == BackendKind::kSim || e.parallel) {
     c.predictor = std::make_unique<internal_model::PredictionService>(e.loop.period_ns);

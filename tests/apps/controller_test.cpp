@@ -49,6 +49,59 @@ TEST_F(Controllers, AreLoadedSwitchedStoppedAndUnloaded) {
   EXPECT_EQ(end(), 0);
 }
 
+TEST_F(Controllers, GoOnWithTheirNewBuildInTheStateOfTheFormerOne) {
+  const auto put = [this](const std::string& build) {
+    const std::filesystem::path plugins = TANDEM_BINARY_DIR "/tests/test_plugins";
+    std::filesystem::copy_file(plugins / ("nodder_" + build + ".so"), folder_ / "new.so");
+    std::filesystem::rename(folder_ / "new.so", folder_ / "nodder.so");
+  };
+  put("1");
+  const std::string hold = read_text(folder_ / "hold.toml");
+  write_text(folder_ / "hold.toml", hold.substr(0, hold.find("[[controller]]")) +
+                                        "[[controller]]\nplugin = \"./nodder.so\"\n"
+                                        "[controller.parameters]\nspeed_rad_s = 0.5\n");
+  begin("");
+  const auto place_rad = [this] {
+    return asked("joint show joint2")["position_rad"].get<double>();
+  };
+  const auto stands = [&](double rad) {
+    return test::eventually([&] { return std::abs(place_rad() - rad) < 1e-3; });
+  };
+  double before_rad = 0.0;
+  EXPECT_TRUE(test::eventually([&] {
+    const double last_rad = before_rad;
+    before_rad = place_rad();
+    return std::abs(before_rad - last_rad) < 1e-5;
+  }));
+  put("2");
+  expect(to_run("controller reload nodder").out, "nodder: the new build goes on in cycle ");
+  EXPECT_TRUE(stands(before_rad + 0.2)) << place_rad() << " of " << before_rad;
+  expect(to_run("controller reload nodder").out, "nodder: the same build as before goes on");
+  put("fails");
+  expect(refused("controller reload nodder"), "this build has a mistake");
+  put("asks");
+  expect(refused("controller reload nodder"), "gain: this key is missing (its parameters are");
+  EXPECT_EQ(asked("controller list")["controllers"][0]["active"], true);
+  put("more");
+  const auto more = asked("controller reload nodder");
+  EXPECT_EQ(more["carried"], false);
+  EXPECT_EQ(more["changed"], true);
+  expect(more["afresh"], "has another size than before");
+  EXPECT_TRUE(stands(before_rad + 0.5)) << "from where it stood";
+  put("all");
+  expect(to_run("controller reload nodder").out, "starts afresh in cycle ");
+  EXPECT_EQ(asked("controller list")["controllers"][0]["claims"].size(), 2U);
+  put("2");
+  EXPECT_EQ(to_run("controller stop nodder").status, 0);
+  expect(to_run("controller reload nodder").out, "claims other joints or modes than before");
+  EXPECT_EQ(asked("controller list")["controllers"][0]["active"], false);
+  EXPECT_EQ(to_run("controller start nodder").status, 0);
+  EXPECT_EQ(asked("controller reload nodder --fresh")["afresh"], "that was asked for");
+  expect(refused("controller reload noder"), "did you mean 'nodder'?");
+  EXPECT_EQ(end(), 0);
+  EXPECT_EQ(json("run.json")["fault_log"].size(), 0U);
+}
+
 TEST_F(Controllers, ThatAreBrokenAreRefusedWhileTheRunGoesOn) {
   begin("");
   const auto broken = [](const std::string& name) {

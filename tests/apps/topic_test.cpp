@@ -118,6 +118,31 @@ TEST_F(Topic, ErrorsNameTheNearestTopicAndField) {
   EXPECT_EQ(end(), 0);
 }
 
+#ifndef TANDEM_NOTHING_APART  // by these sanitizers
+/// A vendor's SDK and the program each have a Cyclone DDS: the calls of one went to the other's.
+TEST_F(Topic, OfARunWhoseControllerBringsALibddscOfItsOwn) {
+  const std::string plugins = TANDEM_BINARY_DIR "/tests/test_plugins/";
+  const std::string hold = read_text(folder_ / "hold.toml");
+  const auto with = [&](const std::string& name) {
+    const std::size_t at = hold.find("[[controller]]");
+    return hold.substr(0, at) + "[[controller]]\nplugin = \"" + plugins + name + ".so\"\n";
+  };
+  write_text(folder_ / "other.toml", with("gets_ddsc"));
+  const Outcome mixed = tandem("check other.toml");
+  EXPECT_EQ(mixed.status, 2);
+  EXPECT_NE(
+      mixed.err.find("libddsc.so.0, whose calls would go to the program's libddsc.so.0debian"),
+      std::string::npos)
+      << mixed.err;
+  write_text(folder_ / "hold.toml", with("brings_ddsc"));
+  begin("--dds" + domain_);
+  const Outcome echo = topic("echo /joint_states --once --wait 30");
+  EXPECT_EQ(echo.status, 0) << echo.err;
+  EXPECT_EQ(end(), 0);
+  EXPECT_EQ(json("run.json")["fault_log"].size(), 0U);
+}
+#endif
+
 TEST_F(Topic, ListSaysWhatToLookAtWhenNobodyIsThere) {
   const Outcome nobody = topic("list --wait 0.2");
   EXPECT_EQ(nobody.status, 0) << nobody.err;

@@ -48,10 +48,14 @@ TEST(PluginLoader, NamesAPathThatDoesNotExist) {
   EXPECT_EQ(loaded.error().file, "no/such.so");
 }
 
-/// A build of tests/controllers/plugins/renewed.cpp, put in the place of `file` as a linker does.
-void put(const std::string& build, const std::string& file) {
-  std::filesystem::copy_file(kBroken[0] + "/renewed_" + build + ".so", file + ".new");
+/// A library in the place of `file`, as a linker puts it there.
+void put_library(const std::string& library, const std::string& file) {
+  std::filesystem::copy_file(kBroken[0] + "/" + library, file + ".new");
   std::filesystem::rename(file + ".new", file);
+}
+/// A build of tests/controllers/plugins/renewed.cpp.
+void put(const std::string& build, const std::string& file) {
+  put_library("renewed_" + build + ".so", file);
 }
 bool stays_mapped(const std::string& file) {
   void* const library = dlopen(file.c_str(), RTLD_NOW | RTLD_NOLOAD);
@@ -111,6 +115,60 @@ TEST(PluginLoader, RefusesTheNewBuildOfALibraryWhoseOwnVariablesStay) {
       << loaded.error().message;
   put("1", file);
   EXPECT_TRUE(load_controller(file, {})) << "has none";
+}
+
+// A name of its own with a type of std in it was taken for one of std, and so was the table by
+// which std::visit() calls the controller's code: the new build ran with the former one's.
+TEST(PluginLoader, RefusesTheNewBuildOfALibraryWhoseVariablesOnlyLookLikeThoseOfStd) {
+  if (!kMakesUniqueSymbols) GTEST_SKIP() << kNoUniqueSymbols;
+  for (const std::string kind : {"named", "table"}) {
+    const test::ScratchFolder folder;
+    const std::string file = folder / "renewed.so";
+    put(kind + "_1", file);
+    EXPECT_STREQ(load_controller(file, {})->plugin().doc, "Build 1.");
+    put(kind + "_2", file);
+    const auto loaded = load_controller(file, {});
+    ASSERT_FALSE(loaded) << kind;
+    const std::string variable = kind == "named" ? "number" : "_S_vtable";
+    EXPECT_NE(loaded.error().message.find(variable), std::string::npos) << loaded.error().message;
+    EXPECT_NE(loaded.error().hint.find("-fno-gnu-unique"), std::string::npos);
+  }
+}
+
+// One that finds another library beside itself was taken for the former one, by its name.
+TEST(PluginLoader, OpensTheNewBuildOfALibraryThatLooksBesideItself) {
+  const test::ScratchFolder folder;
+  const std::string file = folder / "renewed.so";
+  put_library("needed_1/librenewed_needed.so", folder / "librenewed_needed.so");
+  put("needed_1", file);
+  const auto former = load_controller(file, {});
+  ASSERT_TRUE(former) << former.error().to_string();
+  put("needed_2", file);
+  const auto loaded = load_controller(file, {});
+  ASSERT_TRUE(loaded) << loaded.error().to_string();
+  EXPECT_NE(&loaded->plugin(), &former->plugin());
+}
+
+// The linker takes what has the same name and is mapped: the new code called the former library.
+TEST(PluginLoader, RefusesALibraryOneOfWhoseNeedsStaysAsItWas) {
+  const test::ScratchFolder folder;
+  const std::string file = folder / "renewed.so", needed = folder / "librenewed_needed.so";
+  put_library("needed_1/librenewed_needed.so", needed);
+  put("needed_1", file);
+  auto former = load_controller(file, {});
+  ASSERT_TRUE(former) << former.error().to_string();
+  EXPECT_STREQ(former->plugin().doc, "Build 1.");
+  put_library("needed_2/librenewed_needed.so", needed);
+  put("needed_2", file);
+  const auto refused = load_controller(file, {});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message, "needs " + std::filesystem::canonical(needed).string() +
+                                         ", which was built anew while its former code is in this "
+                                         "process");
+  former = fail("it is unloaded");
+  const auto loaded = load_controller(file, {});
+  ASSERT_TRUE(loaded) << loaded.error().to_string();
+  EXPECT_STREQ(loaded->plugin().doc, "Build 2.");
 }
 
 // By tandem_add_controller() nothing is exported but the entry point, and so all of it is freed.

@@ -106,6 +106,31 @@ TEST(SquatSwitch, ChangesNothingInItsCycleAndNoMoreThanASquatInThoseAfterIt) {
   EXPECT_LT(base->final_tilt_rad, 0.05) << "it stands";
 }
 
+// A new build of the squat goes on where the former one was, where the legs move fastest.
+TEST(SquatSwitch, AReloadIsNoMoreThanTheSquatGoingOn) {
+  SwitchedSquat run, other;
+  ASSERT_TRUE(run.cycle->services().reload("squat", false, kNow));
+  const Steps boundary = run.go(1), same = other.go(1);
+  EXPECT_NEAR(boundary.position, same.position, 1e-3) << "of the rate limit";
+  EXPECT_NEAR(boundary.torque, 0.0, 1e-12);
+  const Steps after = run.go(kWatched), alone = other.go(kWatched);
+  EXPECT_NEAR(after.position, alone.position, 1e-3);
+  EXPECT_NEAR(after.torque, alone.torque, 1e-3);
+  double apart_rad = 0.0;
+  for (int i = 0; i < 3000; ++i) {
+    (void)run.go(1);
+    (void)other.go(1);
+    const auto one = run.cycle->command().position_rad();
+    const auto two = other.cycle->command().position_rad();
+    for (std::size_t j = 0; j < one.size(); ++j)
+      apart_rad = std::max(apart_rad, std::abs(one[j] - two[j]));
+  }
+  std::printf("a reload in motion: %.4f of the rate limit, %.4f alone; then %.2g rad apart\n",
+              after.position, alone.position, apart_rad);
+  EXPECT_LT(apart_rad, 1e-4);
+  EXPECT_TRUE(run.cycle->faults().empty());
+}
+
 TEST(SquatSwitch, AtTheSameCycleGivesTheSameBits) {
   SwitchedSquat run;
   const auto before = run.cycle->save();

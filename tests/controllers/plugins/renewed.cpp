@@ -1,6 +1,10 @@
 // A controller of which two builds say that they are. Each has a symbol that is one for the whole
-// process, as a plain g++ makes them: OWN of its own, else of the C++ library.
+// process, as a plain g++ makes them: OWN of its own, NAMED of its own with a type of the C++
+// library in its name, TABLE what the C++ library makes of its code, else a constant of that.
+// NEEDED says it by a library that it is linked to.
 #include <iterator>
+#include <string>
+#include <variant>
 
 #include "controllers/controller.hpp"
 
@@ -26,9 +30,26 @@ class Renewed final : public Controller {
 inline int build_of_this = BUILD;  // default visibility: unique
 #endif
 
+template <class Of>
+struct Build {
+  static inline int number = BUILD;
+};
+
+struct Which {
+  template <class One, class Other>
+  const char* operator()(One, Other) const {
+    return "by a table";
+  }
+};
+
 extern "C" const void* what_is_unique() {
-#ifdef OWN
+#if defined OWN
   return &build_of_this;
+#elif defined NAMED
+  return &Build<std::string>::number;
+#elif defined TABLE
+  static std::variant<int, float, char> one{1}, other{2.0F};
+  return std::visit(Which(), one, other);
 #else
   return &std::ranges::iter_move;
 #endif
@@ -36,4 +57,9 @@ extern "C" const void* what_is_unique() {
 
 #define AS_TEXT(number) #number
 #define TEXT(number) AS_TEXT(number)
+#ifdef NEEDED
+extern "C" const char* build_of_the_needed();
+TANDEM_CONTROLLER(Renewed, "renewed", build_of_the_needed())
+#else
 TANDEM_CONTROLLER(Renewed, "renewed", "Build " TEXT(BUILD) ".")
+#endif

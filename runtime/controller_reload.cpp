@@ -1,0 +1,76 @@
+// A former build of a controller gives its place, and where it can its state, to the new one.
+#include <algorithm>
+
+#include "runtime/controller_host.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+bool same_claims(const HostedController& one, const HostedController& other) noexcept TANDEM_RT {
+  return std::ranges::equal(one.claims, other.claims, [](const auto& a, const auto& b) {
+    return a.joint == b.joint && a.mode == b.mode && a.interaction == b.interaction &&
+           a.with_modes == b.with_modes;
+  });
+}
+
+/// What it declared is the host's, and goes over by itself: also when its own state does not.
+Kept hand_over(HostedController& former, HostedController& next) noexcept TANDEM_RT {
+  Succession& to = *next.succession;
+  (void)to.io.take(*former.io, *next.io);
+  if (!to.wanted) return Kept::kNotWanted;
+  if (former.lacks_archive || next.lacks_archive) return Kept::kNoArchive;
+  if (!same_claims(former, next)) return Kept::kOtherClaims;
+  const bool fits = to.controller.take(*former.controller, *next.controller);
+  return fits ? Kept::kState : Kept::kOtherState;
+}
+
+}  // namespace
+
+CycleAnswer ControllerHost::replace(std::size_t slot, HostedController& next, bool running,
+                                    const hal::CycleTime& time,
+                                    JointImages images) noexcept TANDEM_RT {
+  HostedController* const former = table_[slot];
+  if (former == nullptr) {
+    return {.reason = RejectReason::kGone, .one = static_cast<std::int32_t>(slot)};
+  }
+  table_[slot] = &next;
+  if (const auto conflict = find_conflict(table_, active_)) {
+    table_[slot] = former;
+    return {.reason = RejectReason::kConflict,
+            .joint = static_cast<std::int32_t>(conflict->joint),
+            .one = static_cast<std::int32_t>(conflict->one),
+            .other = static_cast<std::int32_t>(conflict->other)};
+  }
+  next.succession->kept = hand_over(*former, next);
+  done_ &= ~only(slot);
+  ended_ &= ~only(slot);
+  set_active(active_);
+  if (!is_active(slot) || !running) return {};
+  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
+    if (former->claimed[j] == 0 && next.claimed[j] == 0) continue;
+    references_.transfer().begin(j, images.state, images.command);
+  }
+  enter(*former).stop();
+  if (next.succession->kept == Kept::kState) {
+    go_on_as(next, time, images);
+    return {};
+  }
+  for (const auto& claim : former->claims) references_.release(claim.joint, images);
+  call_starts(only(slot), time, images);
+  return {};
+}
+
+/// It is started, for what its archive() leaves out, and then has the state all the same. What it
+/// writes at its start is not commanded.
+void ControllerHost::go_on_as(HostedController& next, const hal::CycleTime& time,
+                              JointImages images) noexcept TANDEM_RT {
+  discarded_.assign(images.command);
+  guard_.remember(discarded_, gains_);
+  enter(next).start(time, images.state, discarded_);
+  take_back(next, discarded_);
+  leave_calls();
+  (void)next.succession->controller.give(*next.controller);
+  (void)next.succession->io.give(*next.io);
+}
+
+}  // namespace tandem::runtime

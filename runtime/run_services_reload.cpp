@@ -1,0 +1,130 @@
+// Asking the loop to put a new build of a controller in the place of the former one.
+#include <charconv>
+#include <utility>
+
+#include "controllers/hosted_call.hpp"
+#include "runtime/run_services.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+/// The table "controller[2].parameters" of a document.
+TomlTable table_at(const TomlDocument& document, const std::string& path) {
+  TomlTable table = document.root();
+  for (std::size_t from = 0; from < path.size();) {
+    const std::size_t end = std::min(path.find('.', from), path.size());
+    const std::string part = path.substr(from, end - from);
+    from = end + 1;
+    const std::size_t bracket = part.find('[');
+    if (bracket == std::string::npos) {
+      table = table.table_or_empty(part);
+      continue;
+    }
+    std::size_t number = 0;
+    std::from_chars(part.data() + bracket + 1, part.data() + part.size(), number);
+    table = table.tables(part.substr(0, bracket), "plugin").at(number);
+  }
+  return table;
+}
+
+/// Room for what `next` takes over: its code is the controller's.
+Result<std::unique_ptr<Succession>> succession_of(const HostedController& next, bool fresh) {
+  const auto written = std::make_shared<Archive>();
+  const Status asked = bounded_call(next.name, ControllerHost::kConfigureTime,
+                                    [written, controller = next.controller]() -> Status {
+                                      controller->archive(*written);
+                                      return {};
+                                    });
+  if (!asked) return std::unexpected(asked.error());
+  Archive io;
+  next.io->archive(io);
+  return std::make_unique<Succession>(CarriedState(*written), CarriedState(io), !fresh);
+}
+
+}  // namespace
+
+/// With the lock. Errors: unknown; it is being reloaded.
+Result<HostedController*> RunServices::to_reload(const std::string& name) const {
+  const Result<std::size_t> slot = slot_of(name);
+  if (!slot) return std::unexpected(slot.error());
+  HostedController* const found = host_->owned()[*slot].get();
+  if (found->next == nullptr) return found;
+  return fail_at(name, "the controller is being reloaded", "ask again when that is done");
+}
+
+Result<Reloaded> RunServices::reload(const std::string& name, bool fresh, Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  const auto former = to_reload(name);
+  if (!former) return std::unexpected(former.error());
+  const std::string library = (*former)->plugin;
+  lock.unlock();
+  if (library.empty()) {
+    return fail_at(name, "the controller has no library of its own",
+                   "it is part of the program, or the owner in another process");
+  }
+  auto loaded = bounded_call(name, ControllerHost::kConfigureTime, [path = library] {
+    const bool is_path = path.find('/') != std::string::npos;
+    return load_controller(is_path ? path : "./" + path, {});
+  });
+  if (!loaded) return std::unexpected(loaded.error());
+  return reload(name, std::move(*loaded), fresh, patience);
+}
+
+Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource source, bool fresh,
+                                     Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  auto former = to_reload(name);
+  if (!former) return std::unexpected(former.error());
+  const std::uint32_t id = (*former)->id;
+  const auto& document = (*former)->document;
+  const auto parameters = document ? TomlDocument::parse(document->text(), document->file())
+                                   : TomlDocument::parse("", "parameters");
+  const std::string table = document ? (*former)->parameters : "";
+  lock.unlock();
+  if (!parameters) return std::unexpected(parameters.error());
+
+  auto next = host_->configure(name, std::move(source), table_at(*parameters, table));
+  if (Status read = errors_of(
+          *parameters,
+          "its parameters are those that it was loaded with: unload it, and load it with others");
+      !read)
+    return std::unexpected(read.error());
+  if (!next) return std::unexpected(next.error());
+  auto succession = succession_of(**next, fresh);
+  if (!succession) return std::unexpected(succession.error());
+  (*next)->succession = std::move(*succession);
+  (*next)->document = *parameters;
+
+  lock.lock();
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  former = to_reload(name);
+  if (!former) return std::unexpected(former.error());
+  if ((*former)->id != id) {
+    return fail_at(name, "the controller was exchanged meanwhile", "ask again");
+  }
+  const std::size_t slot = *slot_of(name);
+  HostedController& made = **next;
+  const std::uint32_t made_id = made.id;
+  made.of_experiment = (*former)->of_experiment;
+  Reloaded result{.asked = {}, .changed = made.sha256 != (*former)->sha256};
+  (*former)->next = std::move(*next);
+  const auto asked = ask(lock,
+                         {.kind = CycleRequest::Kind::kReplace,
+                          .slot = static_cast<std::uint32_t>(slot),
+                          .controller = &made},
+                         patience);
+  if (!asked) return std::unexpected(asked.error());
+  result.asked = *asked;
+  HostedController* const now = host_->owned()[slot].get();
+  if (asked->done && now != nullptr && now->id == made_id) {
+    result.kept = now->succession->kept;
+    now->succession.reset();
+  }
+  return result;
+}
+
+}  // namespace tandem::runtime
