@@ -108,7 +108,7 @@ constexpr Key<ReportConfig> kReport[] = {
   key<&ReportConfig::foot>("foot", "force/torque sensor: vertical force").by_default("chosen by the report"),
 };
 constexpr Key<ParallelOptions> kParallel[] = {
-  key<&ParallelOptions::robot_file>("robot", "its robot.toml: the same joints, sensors, feet, closed loops and passive joints in the same order; all else may differ. `[sim]`, `posture` and `seed` are for both").by_default("the experiment's"),
+  key<&ParallelOptions::robot_file>("robot", "its robot.toml: the same joints, sensors, feet, closed loops and passive joints in the same order; all else may differ. `[sim]`, `posture` and `seed` are for both, but `sim.link`, `sim.joint` and `sim.payload`").by_default("the experiment's"),
   by_hand<ParallelOptions>("link", "–", "table", "`link.NAME`: as [`[model.link.NAME]`](#modellinkname-mass-and-inertia-instead-of-the-urdfs), in place of its robot.toml's"),
 };
 // clang-format on

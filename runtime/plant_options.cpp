@@ -49,11 +49,11 @@ constexpr Key<PayloadTimes> kPayload[] = {
   required(key<&PayloadTimes::name>("name", "for messages").within("unique")),
   by_hand<PayloadTimes>("link", "–", "a link of the URDF", "that carries it: one of `link` and `site`"),
   by_hand<PayloadTimes>("site", "–", "a `[[site]]`", "at which it is carried"),
-  by_hand<PayloadTimes>("mass_kg", "required", "> 0 to 100000", ""),
+  by_hand<PayloadTimes>("mass_kg", "required", "> 0 to 100000", "of the payload"),
   by_hand<PayloadTimes>("com_m", "`[0, 0, 0]`", "3 numbers of ±100", "center of mass, in the frame of the link or site"),
   by_hand<PayloadTimes>("inertia_kg_m2", "a point's", "6 numbers", "`[ixx, ixy, ixz, iyy, iyz, izz]` about the center of mass, along the axes of that frame"),
   key<&PayloadTimes::from_s>("from_s", {0.0, kLongest_s}, "picked up so long after the first SYNC").by_default("from the start"),
-  key<&PayloadTimes::until_s>("until_s", {0.0, kLongest_s, true}, "dropped").by_default("never"),
+  key<&PayloadTimes::until_s>("until_s", {0.0, kLongest_s, true}, "dropped; later than `from_s`").by_default("never"),
 };
 // clang-format on
 

@@ -51,8 +51,9 @@ Result<PlantConfig> plant_config(const hal::RobotConfig& described, const tandem
     const hal::JointConfig& joint = robot.joints[j];
     const double position = posture != nullptr ? posture->position_rad[j] : 0.0;
     const hal::ActuatorConfig& actuator = robot.actuator_of(joint);
-    plant.joints.push_back({joint.name, actuator, position, 0.0, joint.brake,
-                            armature(actuator) - armature(described.actuator_of(joint))});
+    plant.joints.push_back(
+        {joint.name, actuator, position, 0.0, joint.brake,
+         armature(actuator) - armature(described.actuator_of(described.joints[j]))});
   }
   plant.passive = robot.passive;
   plant.loops = robot.loop_specs();

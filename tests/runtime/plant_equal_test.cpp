@@ -107,6 +107,23 @@ TEST_P(PlantEqual, CarriesFromAStepToAStep) {
   EXPECT_GT(difference(between, never), 1e-5);
 }
 
+// Bodies of other engines keep their masses, which only what is there from the start changes.
+TEST_P(PlantEqual, IsRefusedOfAnotherEngineWhereItComesOrGoes) {
+  const std::string link = GetParam().robot == std::string("coman")   ? "Waist"
+                           : GetParam().robot == std::string("panda") ? "panda_hand"
+                                                                      : "coupler";
+  const Experiment e =
+      read("[[sim.payload]]\nname = 'box'\nlink = '" + link + "'\nmass_kg = 1.0\nfrom_s = 1.0\n");
+  sim::SimRobotConfig config = e.sim_robot_config();
+  config.engine = "mujoco";
+  const model::InterpretedKernels kernels(
+      *model::make_mechanism(*e.tree(), sim::model_spec(e.robot)), e.robot.name);
+  const auto made = sim::EmulatedRobot::create(e.robot, kernels.get(), config);
+  ASSERT_FALSE(made);
+  EXPECT_NE(made.error().to_string().find("sim.payload"), std::string::npos)
+      << made.error().to_string();
+}
+
 INSTANTIATE_TEST_SUITE_P(Robots, PlantEqual, testing::ValuesIn(kSubjects),
                          [](const auto& test) { return std::string(test.param.robot); });
 
