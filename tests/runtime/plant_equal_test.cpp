@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "hal/sim/emulated_robot.hpp"
+#include "hal/sim/scenario.hpp"
 #include "hal/sim/setup.hpp"
 #include "model/interpreted_kernels.hpp"
 #include "runtime/experiment.hpp"
@@ -50,6 +51,10 @@ class PlantEqual : public testing::TestWithParam<Subject> {
     if (!e) throw std::runtime_error(e.error().front().to_string());
     return std::move(*e);
   }
+  [[nodiscard]] static std::string carrier() {
+    const std::string robot = GetParam().robot;
+    return robot == "coman" ? "Waist" : robot == "panda" ? "panda_hand" : "coupler";
+  }
   const test::ScratchFolder folder_;
 };
 
@@ -92,8 +97,7 @@ TEST_P(PlantEqual, MovesAsTheRobotThatIsDescribedSo) {
 
 // What comes after 20 ms and goes after 60 ms: as the one that is there between them.
 TEST_P(PlantEqual, CarriesFromAStepToAStep) {
-  if (std::string(GetParam().robot) == "coman") return;  // two of the three are enough
-  const std::string link = std::string(GetParam().robot) == "panda" ? "panda_hand" : "coupler";
+  const std::string link = carrier();
   const std::string box = "[[sim.payload]]\nname = 'box'\nlink = '" + link + "'\nmass_kg = 1.0\n";
   const auto after = [&](const std::string& changes) {
     const Experiment e = read(changes);
@@ -107,13 +111,32 @@ TEST_P(PlantEqual, CarriesFromAStepToAStep) {
   EXPECT_GT(difference(between, never), 1e-5);
 }
 
+// The same by a scenario, to the bit.
+TEST_P(PlantEqual, CarriesWhatAScenarioSays) {
+  const Experiment e = read("[[sim.payload]]\nname = 'box'\nlink = '" + carrier() +
+                            "'\nmass_kg = 1.0\ncom_m = [0.1, 0, 0]\nfrom_s = 0.02\n"
+                            "until_s = 0.06\n");
+  const std::vector<double> wanted = state_after(e.robot, *e.tree(), e.sim_robot_config());
+  sim::SimRobotConfig config = e.sim_robot_config();
+  config.changes = nullptr;
+  const std::string text = "[[fault]]\nkind = 'payload'\nlink = '" + carrier() +
+                           "'\nmass_kg = 1.0\ncom_m = [0.1, 0, 0]\nat_s = 0.02\nfor_s = 0.04\n";
+  const auto faults =
+      sim::parse_scenario(text, "s.toml", e.robot, e.loop.period_ns, e.tree().get());
+  ASSERT_TRUE(faults) << faults.error().front().to_string();
+  config.faults = *faults;
+  EXPECT_EQ(state_after(e.robot, *e.tree(), config), wanted);
+  const auto unknown =
+      sim::parse_scenario("[[fault]]\nkind = 'payload'\nlink = 'nowhere'\nmass_kg = 1.0\n",
+                          "s.toml", e.robot, e.loop.period_ns, e.tree().get());
+  ASSERT_FALSE(unknown);
+  EXPECT_NE(unknown.error().front().to_string().find("s.toml:3"), std::string::npos);
+}
+
 // Bodies of other engines keep their masses, which only what is there from the start changes.
 TEST_P(PlantEqual, IsRefusedOfAnotherEngineWhereItComesOrGoes) {
-  const std::string link = GetParam().robot == std::string("coman")   ? "Waist"
-                           : GetParam().robot == std::string("panda") ? "panda_hand"
-                                                                      : "coupler";
-  const Experiment e =
-      read("[[sim.payload]]\nname = 'box'\nlink = '" + link + "'\nmass_kg = 1.0\nfrom_s = 1.0\n");
+  const Experiment e = read("[[sim.payload]]\nname = 'box'\nlink = '" + carrier() +
+                            "'\nmass_kg = 1.0\nfrom_s = 1.0\n");
   sim::SimRobotConfig config = e.sim_robot_config();
   config.engine = "mujoco";
   const model::InterpretedKernels kernels(
