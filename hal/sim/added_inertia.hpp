@@ -42,7 +42,7 @@ class AddedInertia {
 
   [[nodiscard]] bool any() const noexcept { return any_ != 0; }
   [[nodiscard]] const tandem_kernels& kernels() const noexcept { return *kernels_; }
-  /// Of the whole robot.
+  /// The whole robot's.
   [[nodiscard]] double mass_kg() const noexcept { return kernels_->mass_kg + added_kg_; }
 
   /// As the kernels' of the same names. @param sines  of q

@@ -38,7 +38,7 @@ struct ScenarioFault {
   std::uint64_t seed = 0;           ///< of what is random in it
   std::array<double, 3> force_N{};  ///< in W
   std::array<double, 3> point_m{};  ///< where it acts, in the joint's frame; a payload: the link's
-  /// Of a payload: xx xy xz yy yz zz about its center of mass, along the link's axes.
+  /// A payload's: xx xy xz yy yz zz about its center of mass, along the link's axes.
   std::array<double, 6> inertia_kg_m2{};
   std::int32_t bus = -1;  ///< -1: any
   std::int32_t board = -1;

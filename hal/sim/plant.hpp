@@ -164,7 +164,7 @@ class Plant {
   [[nodiscard]] const double* wrench() const noexcept { return wrench_.data(); }
   /// What force/torque sensor `sensor` (of robot.toml) feels of what the kernels do not know.
   void add_beyond(std::size_t sensor, double* channels) noexcept TANDEM_RT;
-  /// Of the whole robot, in W.
+  /// The whole robot's, in W; as the kernels' of this name.
   void center_of_mass(double* c, double* cdot, double* J) noexcept TANDEM_RT;
   [[nodiscard]] const double* pose() const noexcept { return pose_.data(); }
   [[nodiscard]] const ClosureForces& loops() const noexcept { return loops_; }
