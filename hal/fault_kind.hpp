@@ -34,14 +34,16 @@ enum class FaultKind : std::uint8_t {
   // buses
   kBusDown,  ///< a cut cable, or a switched-off interface
   // the body
-  kPush,  ///< a force on a link, from outside
+  kPush,     ///< a force on a link, from outside
+  kPayload,  ///< a link carries something
 };
-inline constexpr std::array<std::string_view, 20> kFaultNames = {
+inline constexpr std::array<std::string_view, 21> kFaultNames = {
     "none",           "frame_drop",     "frame_delay",     "frame_duplicate",
     "frame_corrupt",  "frame_reorder",  "board_kill",      "board_reset",
     "board_identity", "board_revision", "board_duplicate", "emergency_stop",
     "supply_sag",     "encoder_freeze", "encoder_jump",    "encoder_unplug",
-    "motor_overheat", "spring_break",   "bus_down",        "push"};
+    "motor_overheat", "spring_break",   "bus_down",        "push",
+    "payload"};
 
 /// What a fault strikes.
 enum class FaultTarget : std::uint8_t { kNone = 0, kJoint, kBoard, kSensor, kBus };

@@ -89,4 +89,7 @@ inline constexpr const char* kRepaired =
                                                                const std::string& file,
                                                                const UrdfOptions& options);
 
+/// What is impossible about an inertia, or empty.
+[[nodiscard]] std::string inertia_problem(const Inertia& inertia);
+
 }  // namespace tandem::model

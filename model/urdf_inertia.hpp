@@ -11,9 +11,6 @@
 
 namespace tandem::model {
 
-/// What is impossible about an inertia, or empty.
-[[nodiscard]] std::string inertia_problem(const Inertia& inertia);
-
 /// Whether the inertia is that of a body larger than any robot: it says nothing of the shape.
 [[nodiscard]] bool is_beyond_size(double mass_kg, const Eigen::Matrix3d& about_com_kg_m2);
 

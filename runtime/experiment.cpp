@@ -9,6 +9,7 @@
 #include "robot/posture.hpp"
 #include "runtime/estimation_options.hpp"
 #include "runtime/experiment_tables.hpp"
+#include "runtime/plant_options.hpp"
 #include "runtime/robot_layout.hpp"
 
 namespace tandem::runtime {
@@ -131,6 +132,7 @@ void combine(Experiment& e, TomlTable& root) {
   if (root.has("estimation")) e.estimation = read_estimation(root.table("estimation"), e.robot);
   apply_order(e, e.robot, root.table_or_empty("sim"));
   if (!e.sim.noise) remove_noise(e.robot);
+  e.plant = read_plant_changes(root.table_or_empty("sim"), e.robot, e.description.get(), e.files);
 }
 
 /// The second robot: its files, against the first.
@@ -217,7 +219,8 @@ sim::SimRobotConfig Experiment::sim_robot_config() const {
           .bus_timing = sim.bus_timing,
           .bus_latency_ns = sim.bus_latency_ns,
           .answer_window_ns = std::llround(hal.answer_window * static_cast<double>(loop.period_ns)),
-          .tree = tree()};
+          .tree = tree(),
+          .changes = plant};
 }
 
 std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) {

@@ -132,9 +132,10 @@ struct Experiment {
   std::optional<Teleoperation> teleoperation;  ///< empty: the robot is at hand
   LogConfig log;
   ReportConfig report;
-  estimation::EstimationConfig estimation;  ///< nothing without the table
-  std::optional<ParallelOptions> parallel;  ///< empty: there is no second robot
-  dds::Config dds;                          ///< off without the table
+  estimation::EstimationConfig estimation;         ///< nothing without the table
+  std::shared_ptr<const sim::PlantChanges> plant;  ///< [sim.link] and its like; null: none
+  std::optional<ParallelOptions> parallel;         ///< empty: there is no second robot
+  dds::Config dds;                                 ///< off without the table
   std::vector<ControllerSpec> controllers;
   TomlDocument document;  ///< its diagnostics() grow while controllers read parameters
 

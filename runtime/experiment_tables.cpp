@@ -6,6 +6,7 @@
 
 #include "base/file_name.hpp"
 #include "rt/clock_control.hpp"
+#include "runtime/plant_options.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -107,7 +108,7 @@ constexpr Key<ReportConfig> kReport[] = {
   key<&ReportConfig::foot>("foot", "force/torque sensor: vertical force").by_default("chosen by the report"),
 };
 constexpr Key<ParallelOptions> kParallel[] = {
-  key<&ParallelOptions::robot_file>("robot", "its robot.toml: the same joints, sensors, feet, closed loops and passive joints in the same order; all else may differ. `[sim]`, `posture` and `seed` are for both").by_default("the experiment's"),
+  key<&ParallelOptions::robot_file>("robot", "its robot.toml: the same joints, sensors, feet, closed loops and passive joints in the same order; all else may differ. `[sim]`, `posture` and `seed` are for both, but `sim.link`, `sim.joint` and `sim.payload`").by_default("the experiment's"),
   by_hand<ParallelOptions>("link", "–", "table", "`link.NAME`: as [`[model.link.NAME]`](#modellinkname-mass-and-inertia-instead-of-the-urdfs), in place of its robot.toml's"),
 };
 // clang-format on
@@ -133,6 +134,7 @@ SimOptions read_sim(TomlTable table) {
   if (sim.hoist_lift_m > 0.0 && !sim.hoist)
     hoist.error("lift_m", "without a hoist nothing lifts the base", "leave out enabled = false");
   hoist.finish();
+  leave_plant_changes(table);
   table.finish();
   return sim;
 }
@@ -264,6 +266,7 @@ void describe_experiment(KeyPage& page) {
   page.add("[hal]", kHal);
   page.add("[sim]", kSim);
   page.add("[sim]", kHoist, "hoist.");
+  describe_plant_changes(page);
   page.add("[overrun]", kOverrun);
   page.add("[clock]", kClock);
   page.add("[faults]", kFaults);

@@ -58,7 +58,8 @@ std::expected<Subject, Diagnostics> read_subject(const EmulateOptions& options) 
     return std::unexpected(Diagnostics{done.error()});
   }
   if (!options.scenario.empty()) {
-    auto faults = sim::read_scenario(options.scenario, subject.robot, subject.sim.period_ns);
+    auto faults = sim::read_scenario(options.scenario, subject.robot, subject.sim.period_ns,
+                                     &subject.description.tree);
     if (!faults) return std::unexpected(faults.error());
     subject.sim.faults = std::move(*faults);
   }
@@ -265,7 +266,7 @@ Exit emulate_command(const EmulateOptions& options) {
   ControlRegistry commands;
   commands.add({"status", ControlEffect::kReads, "steps, frames and simulated time so far"},
                [&](const Json&) { return tasks.run([&] { return figures_json(&e); }); });
-  add_inject(commands, e.subject.robot, e.subject.sim.period_ns,
+  add_inject(commands, e.subject.robot, &e.subject.description.tree, e.subject.sim.period_ns,
              [&](const sim::ScenarioFault& fault) {
                const auto done = tasks.run([&]() -> Result<Json> {
                  if (Status added = injected(e.robot->inject(fault)); !added) {

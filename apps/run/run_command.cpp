@@ -223,10 +223,9 @@ class Session {
       add_identity(commands_, dds_->participant());
     }
     if (c_.sim != nullptr) {
-      add_inject(commands_, e.robot, e.loop.period_ns,
+      add_inject(commands_, e.robot, e.tree().get(), e.loop.period_ns,
                  [this](const sim::ScenarioFault& fault) -> Status {
-                   if (fault.kind == hal::FaultKind::kBoardDuplicate)
-                     return injected(Code::kOutOfRange);
+                   if (!c_.sim->robot().can_begin(fault)) return injected(Code::kOutOfRange);
                    return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
                  });
     }

@@ -22,10 +22,12 @@ class Shares {
   std::uint64_t state_ = 0;
 };
 
-PostureInertia posture_at(const tandem_kernels& kernels, std::vector<double> q) {
+PostureInertia posture_at(AddedInertia& dynamics, std::vector<double> q) {
+  const tandem_kernels& kernels = dynamics.kernels();
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   RowMajor M(kernels.nv, kernels.nv);
   kernels.mass_matrix(q.data(), M.data());
+  dynamics.add_to_mass_matrix(q.data(), M.data());
   const Eigen::LLT<Eigen::MatrixXd> factor(M);
   return {std::move(q), M, factor.solve(Eigen::MatrixXd::Identity(kernels.nv, kernels.nv))};
 }
@@ -38,12 +40,12 @@ std::size_t joint_of(const tandem_kernels& kernels, const std::string& name) {
       kernels.joint_names);
 }
 
-std::vector<PostureInertia> postures_within(const tandem_kernels& kernels,
-                                            std::span<const double> start,
+std::vector<PostureInertia> postures_within(AddedInertia dynamics, std::span<const double> start,
                                             std::span<const JointRange> ranges, int more) {
+  const tandem_kernels& kernels = dynamics.kernels();
   const std::size_t first = kernels.nq - kernels.joints;
   std::vector<PostureInertia> postures;
-  postures.push_back(posture_at(kernels, {start.begin(), start.end()}));
+  postures.push_back(posture_at(dynamics, {start.begin(), start.end()}));
   Shares shares;
   for (int n = 0; n < more; ++n) {
     std::vector<double> q(start.begin(), start.end());
@@ -55,7 +57,7 @@ std::vector<PostureInertia> postures_within(const tandem_kernels& kernels,
       if (joint == kernels.joints || !std::isfinite(range.upper_rad - range.lower_rad)) continue;
       q[first + joint] = range.lower_rad + shares.next() * (range.upper_rad - range.lower_rad);
     }
-    postures.push_back(posture_at(kernels, std::move(q)));
+    postures.push_back(posture_at(dynamics, std::move(q)));
   }
   return postures;
 }

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "hal/sim/added_inertia.hpp"
 #include "model/kernels.h"
 
 namespace tandem::sim {
@@ -31,7 +32,8 @@ struct PostureInertia {
 
 /// `start` (nq) and `more`, drawn from a generator with a fixed seed: each joint evenly within
 /// its range, or a turn about its start where it has none.
-[[nodiscard]] std::vector<PostureInertia> postures_within(const tandem_kernels& kernels,
+/// @param dynamics  the robot's; of kernels alone, too
+[[nodiscard]] std::vector<PostureInertia> postures_within(AddedInertia dynamics,
                                                           std::span<const double> start,
                                                           std::span<const JointRange> ranges,
                                                           int more = 16);

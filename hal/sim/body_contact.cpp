@@ -99,9 +99,7 @@ void BodyContact::add_sensors(const hal::RobotConfig& robot, const model::Tree& 
     Beyond& beyond = sensors_[s];
     beyond = {static_cast<std::size_t>(link.body), mat3(link.in_body.R), vec3(link.in_body.p), {}};
     for (const Group& group : groups_) {
-      int at = static_cast<int>(group.link);
-      while (at >= 0 && at != first) at = tree.links[static_cast<std::size_t>(at)].parent;
-      beyond.group.push_back(at == first ? 1 : 0);
+      beyond.group.push_back(is_beyond(tree, static_cast<int>(group.link), first) ? 1 : 0);
     }
   }
 }

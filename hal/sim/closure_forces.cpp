@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hal/sim/cholesky.hpp"
 #include "hal/sim/rotation.hpp"
 
 namespace tandem::sim {
@@ -12,16 +13,6 @@ namespace {
 
 constexpr double kClosed_m = 1e-12;
 constexpr int kMostSteps = 4;  // of one projection; each divides the error by about 1000
-
-// M = L L^T in the lower triangle.
-void cholesky(std::vector<double>& M, std::size_t n) noexcept {
-  for (std::size_t k = 0; k < n; ++k) {
-    for (std::size_t j = 0; j < k; ++j)
-      for (std::size_t i = k; i < n; ++i) M[i * n + k] -= M[i * n + j] * M[k * n + j];
-    const double root = std::sqrt(M[k * n + k]);
-    for (std::size_t i = k; i < n; ++i) M[i * n + k] /= root;
-  }
-}
 
 }  // namespace
 
@@ -39,7 +30,7 @@ ClosureForces::ClosureForces(model::ClosedLoops loops, const tandem_kernels& ker
 }
 
 // What depends on q alone: A, M = L L^T, the rows W of A L^-T, and S = A M^-1 A^T = W W^T.
-void ClosureForces::prepare(const double* q, const double* v) noexcept {
+void ClosureForces::prepare(AddedInertia& added, const double* q, const double* v) noexcept {
   loops_.move(q, v);
   if (fresh_) return;
   fresh_ = true;
@@ -47,6 +38,7 @@ void ClosureForces::prepare(const double* q, const double* v) noexcept {
   const std::size_t rows = loops_.rows();
   loops_.differentiate(q);
   kernels_->mass_matrix_at(loops_.sines(), q, M_.data());
+  added.add_to_mass_matrix(q, M_.data());
   cholesky(M_, n);
   std::copy(loops_.jacobian().begin(), loops_.jacobian().end(), W_.begin());
   for (std::size_t r = 0; r < rows; ++r) {
@@ -78,9 +70,9 @@ void ClosureForces::impulse(const std::vector<double>& change) noexcept {
   }
 }
 
-void ClosureForces::constrain(const double* q, const double* v, double* vdot,
+void ClosureForces::constrain(AddedInertia& added, const double* q, const double* v, double* vdot,
                               double* wrench) noexcept TANDEM_RT {
-  prepare(q, v);
+  prepare(added, q, v);
   const std::size_t n = kernels_->nv;
   for (std::size_t r = 0; r < change_.size(); ++r) {
     change_[r] = -loops_.equations()[r].bias;
@@ -103,7 +95,7 @@ void ClosureForces::step_positions(double* q) const noexcept {
     q[kernels_->nq - kernels_->joints + i] += step_[base + i];
 }
 
-void ClosureForces::project(double* q, double* v) noexcept TANDEM_RT {
+void ClosureForces::project(AddedInertia& added, double* q, double* v) noexcept TANDEM_RT {
   for (int step = 0;; ++step) {
     loops_.move(q, v);
     double open = 0.0;
@@ -120,7 +112,7 @@ void ClosureForces::project(double* q, double* v) noexcept TANDEM_RT {
     worst_position_m_[l] = std::max(worst_position_m_[l], position_error_m_[l]);
   }
   fresh_ = false;
-  prepare(q, v);
+  prepare(added, q, v);
   const std::size_t n = kernels_->nv;
   for (std::size_t r = 0; r < change_.size(); ++r) {
     change_[r] = 0.0;

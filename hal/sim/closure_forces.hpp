@@ -7,11 +7,13 @@
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
+#include "hal/sim/added_inertia.hpp"
 #include "model/closed_loops.hpp"
 
 namespace tandem::sim {
 
-/// Works on the plant's q and v. Nothing here is state: everything follows from q and v.
+/// Works on the plant's q and v, with the mass matrix of the kernels and what is added to it.
+/// Nothing here is state: everything follows from q and v.
 class ClosureForces {
  public:
   ClosureForces() = default;
@@ -29,11 +31,12 @@ class ClosureForces {
 
   /// Corrects the accelerations of the open tree to those with closed loops, and writes the
   /// loops' forces at their sites.
-  void constrain(const double* q, const double* v, double* vdot, double* wrench) noexcept TANDEM_RT;
+  void constrain(AddedInertia& added, const double* q, const double* v, double* vdot,
+                 double* wrench) noexcept TANDEM_RT;
 
   /// Moves q and v onto the closed loops along the least kinetic energy. The directions are those
   /// of the last constrain(), which a sub-step changes little.
-  void project(double* q, double* v) noexcept TANDEM_RT;
+  void project(AddedInertia& added, double* q, double* v) noexcept TANDEM_RT;
 
   /// Errors of the last project().
   [[nodiscard]] double position_error_m(std::size_t loop) const noexcept {
@@ -53,7 +56,7 @@ class ClosureForces {
   }
 
  private:
-  void prepare(const double* q, const double* v) noexcept;
+  void prepare(AddedInertia& added, const double* q, const double* v) noexcept;
   void impulse(const std::vector<double>& change) noexcept;
   void step_positions(double* q) const noexcept;
 

@@ -22,8 +22,11 @@ std::size_t bus_index(const hal::RobotConfig& robot, const std::string& name) {
   return index;
 }
 
-Result<PlantConfig> plant_config(const hal::RobotConfig& robot, const tandem_kernels* kernels,
+/// @param described  as the kernels have it
+Result<PlantConfig> plant_config(const hal::RobotConfig& described, const tandem_kernels* kernels,
                                  const SimRobotConfig& config) {
+  const PlantChanges* changes = config.changes.get();
+  const hal::RobotConfig& robot = changes != nullptr ? changes->robot : described;
   PlantConfig plant;
   plant.kernels = kernels;
   plant.engine = config.engine;
@@ -47,7 +50,10 @@ Result<PlantConfig> plant_config(const hal::RobotConfig& robot, const tandem_ker
   for (std::size_t j = 0; j < robot.joints.size(); ++j) {
     const hal::JointConfig& joint = robot.joints[j];
     const double position = posture != nullptr ? posture->position_rad[j] : 0.0;
-    plant.joints.push_back({joint.name, robot.actuator_of(joint), position, 0.0, joint.brake});
+    const hal::ActuatorConfig& actuator = robot.actuator_of(joint);
+    plant.joints.push_back(
+        {joint.name, actuator, position, 0.0, joint.brake,
+         armature(actuator) - armature(described.actuator_of(described.joints[j]))});
   }
   plant.passive = robot.passive;
   plant.loops = robot.loop_specs();
@@ -55,6 +61,17 @@ Result<PlantConfig> plant_config(const hal::RobotConfig& robot, const tandem_ker
     plant.ranges = mechanical_ranges(robot, *config.tree);
     plant.robot = &robot;
     plant.tree = config.tree.get();
+  }
+  if (changes == nullptr) return plant;
+  plant.actual = &changes->tree;
+  for (const ScenarioFault& payload : changes->carried) {
+    if (config.engine != kOwnEngine) {
+      return fail_at(
+          "sim.payload",
+          "comes or goes, and the bodies of the engine '" + config.engine + "' keep their mass",
+          "leave out from_s and until_s, or set engine = \"tandem\"");
+    }
+    if (payload.start_ns == 0) plant.carried.push_back(load_of(payload));
   }
   return plant;
 }
@@ -131,9 +148,11 @@ Status named(Status status, const std::string& key) {
 
 Status check_engine(const hal::RobotConfig& robot, const SimRobotConfig& config) {
   if (config.engine == kOwnEngine) return {};
-  const auto engine =
-      make_engine(config.engine, robot, *config.tree, static_cast<double>(config.substep_ns) * 1e-9,
-                  config.integrator == Integrator::kRungeKutta4);
+  const PlantChanges* changes = config.changes.get();
+  const auto engine = make_engine(config.engine, changes != nullptr ? changes->robot : robot,
+                                  changes != nullptr ? changes->tree : *config.tree,
+                                  static_cast<double>(config.substep_ns) * 1e-9,
+                                  config.integrator == Integrator::kRungeKutta4);
   if (!engine) return std::unexpected(engine.error());
   return {};
 }
@@ -185,6 +204,7 @@ EmulatedRobot::EmulatedRobot(const hal::RobotConfig& robot, const SimRobotConfig
   for (const hal::JointConfig& joint : robot.joints) {
     supply_V_.push_back(robot.actuator_of(joint).voltage_limit_V);
   }
+  if (config.changes != nullptr) zero_error_rad_ = config.changes->zero_error_rad;
 }
 
 Status EmulatedRobot::add_nodes(const hal::RobotConfig& robot, const SimRobotConfig& config) {
@@ -312,6 +332,10 @@ void EmulatedRobot::sense() noexcept {
               .current_A = joint.current_A,
               .temperature_C = joint.temperature_C,
               .bus_voltage_V = supply_V_[j]};
+      if (!zero_error_rad_.empty()) {
+        pins.link_position_rad += zero_error_rad_[j];
+        pins.motor_position_rad += zero_error_rad_[j];
+      }
       if (faults_.any()) disturb(j, pins);
     }
   }

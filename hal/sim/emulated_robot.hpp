@@ -17,6 +17,7 @@
 #include "hal/ethercat-can/wire_model.hpp"
 #include "hal/sim/fault_injection.hpp"
 #include "hal/sim/plant.hpp"
+#include "hal/sim/plant_changes.hpp"
 #include "hal/sim/sensors.hpp"
 #include "model/tree.hpp"
 
@@ -41,6 +42,8 @@ struct SimRobotConfig {
   std::vector<ScenarioFault> faults = {};   ///< a scenario: read_scenario()
   /// The description: end stops, and links that touch the ground. Null: there are neither.
   std::shared_ptr<const model::Tree> tree = {};
+  /// What is other in the plant than in `tree` and the robot's configuration. Null: nothing.
+  std::shared_ptr<const PlantChanges> changes = {};
 };
 
 /// What the engine refuses of the robot: make_engine()'s errors, which need no kernels.
@@ -108,6 +111,7 @@ class EmulatedRobot {
   [[nodiscard]] hal::can::LoopbackBus& bus(std::size_t index) noexcept { return *buses_[index]; }
   [[nodiscard]] std::size_t buses() const noexcept { return buses_.size(); }
   [[nodiscard]] const Plant& plant() const noexcept { return plant_; }
+  [[nodiscard]] Plant& plant() noexcept { return plant_; }
   /// The time of the last step.
   [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }
   /// True when every axis of every board is in Operation Enabled.
@@ -139,9 +143,14 @@ class EmulatedRobot {
   [[nodiscard]] bool powerless() const noexcept TANDEM_RT;
 
   /// Adds a fault, between two steps. A start that has passed is the next step.
-  /// @return kOk; kQueueFull: there are FaultInjection::kMostFaults; kOutOfRange: a second board
-  ///         with a node id has to be known when the robot is made.
+  /// @return kOk; kQueueFull: there are FaultInjection::kMostFaults; kOutOfRange: not can_begin().
   [[nodiscard]] Code inject(const ScenarioFault& fault) noexcept TANDEM_RT;
+  /// A second board with a node id has to be known when the robot is made; another engine's bodies
+  /// keep their masses.
+  [[nodiscard]] bool can_begin(const ScenarioFault& fault) const noexcept TANDEM_RT {
+    return fault.kind != hal::FaultKind::kBoardDuplicate &&
+           (fault.kind != hal::FaultKind::kPayload || !plant_.has_engine());
+  }
   /// The next injected fault that has begun and was not given yet; null: none.
   [[nodiscard]] const ScenarioFault* next_begun_fault() noexcept TANDEM_RT {
     return faults_.next_begun();
@@ -225,6 +234,7 @@ class EmulatedRobot {
   void begin_faults(std::int64_t time_ns) noexcept;
   void apply(const FaultSlot& slot, std::int64_t time_ns) noexcept;
   void apply_to_board(const FaultSlot& slot) noexcept;
+  void carry() noexcept;
   void apply_to_joint(const FaultSlot& slot, std::int64_t since_ns) noexcept;
   void disturb(std::size_t joint, firmware::AxisSense& pins) const noexcept;
   void release_late_answers() noexcept;
@@ -255,6 +265,7 @@ class EmulatedRobot {
   std::int64_t answer_window_ns_;
   FaultInjection faults_;
   std::vector<Disturbance> disturbances_;  // per joint
+  std::vector<double> zero_error_rad_;     // per joint; empty: there is none
   std::vector<Twin> twins_;
   std::array<canopen::Frame, FaultInjection::kMostFramesOut> passed_{};  // scratch
   std::int64_t period_ns_;

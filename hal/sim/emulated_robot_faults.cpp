@@ -24,10 +24,18 @@ double ramp(double from, double to, std::int64_t since_ns, std::int64_t ramp_ns)
 }  // namespace
 
 Status EmulatedRobot::add_faults(const hal::RobotConfig& robot, const SimRobotConfig& config) {
-  for (const ScenarioFault& fault : config.faults) {
+  std::vector<ScenarioFault> all = config.faults;  // first, for their numbers seed what is random
+  if (config.changes != nullptr) {
+    all.insert(all.end(), config.changes->carried.begin(), config.changes->carried.end());
+  }
+  for (const ScenarioFault& fault : all) {
     if (!faults_.add(fault)) {
-      return fail("a scenario has at most " + std::to_string(FaultInjection::kMostFaults) +
-                  " faults");
+      return fail("there are at most " + std::to_string(FaultInjection::kMostFaults) +
+                  " faults, and payloads that come and go, together");
+    }
+    if (fault.kind == FaultKind::kPayload && config.engine != kOwnEngine) {
+      return fail("the engine '" + config.engine + "' cannot carry a payload that comes or goes",
+                  "set engine = \"tandem\" in [sim]");
     }
     if (fault.kind != FaultKind::kBoardDuplicate) continue;
     const auto index = static_cast<std::size_t>(fault.board);
@@ -46,7 +54,7 @@ Status EmulatedRobot::add_faults(const hal::RobotConfig& robot, const SimRobotCo
 }
 
 Code EmulatedRobot::inject(const ScenarioFault& fault) noexcept TANDEM_RT {
-  if (fault.kind == FaultKind::kBoardDuplicate) return Code::kOutOfRange;
+  if (!can_begin(fault)) return Code::kOutOfRange;
   ScenarioFault added = fault;
   const bool on_enabled = fault.from == FaultFrom::kEnabled;
   const bool counts = started_ != 0 && (!on_enabled || enabled_ns_ >= 0);
@@ -68,9 +76,23 @@ void EmulatedRobot::begin_faults(std::int64_t time_ns) noexcept {
     }
   }
   plant_.pushes().clear();
+  bool loads = false;
   for (const FaultSlot& slot : faults_.slots()) {
     if (slot.active != 0 || slot.ended != 0) apply(slot, time_ns - first_ns_);
+    loads |= slot.fault.kind == FaultKind::kPayload && (slot.began != 0 || slot.ended != 0);
   }
+  if (loads) carry();
+}
+
+/// What is carried has changed: it moves as its link did, and goes as it comes.
+void EmulatedRobot::carry() noexcept {
+  std::array<Load, FaultInjection::kMostFaults> loads;
+  std::size_t count = 0;
+  for (const FaultSlot& slot : faults_.slots()) {
+    if (slot.active == 0 || slot.fault.kind != FaultKind::kPayload) continue;
+    loads[count++] = load_of(slot.fault);
+  }
+  plant_.carry({loads.data(), count});
 }
 
 void EmulatedRobot::apply(const FaultSlot& slot, std::int64_t time_ns) noexcept {

@@ -30,18 +30,20 @@ enum class EncoderSide : std::uint8_t { kLink, kMotor };
 
 /// One fault, its target by index in the robot's configuration. Plain data without padding.
 struct ScenarioFault {
-  std::int64_t start_ns = 0;        ///< after `from`
-  std::int64_t duration_ns = -1;    ///< -1: for good
-  std::int64_t ramp_ns = 0;         ///< in which a sag or a temperature is reached
-  double value = 0.0;               ///< jump [rad, or m of a slide], supply [V], winding [degC]
+  std::int64_t start_ns = 0;      ///< after `from`
+  std::int64_t duration_ns = -1;  ///< -1: for good
+  std::int64_t ramp_ns = 0;       ///< in which a sag or a temperature is reached
+  double value = 0.0;  ///< jump [rad, or m of a slide], supply [V], winding [degC], payload [kg]
   double probability = 1.0;         ///< that a selected frame is struck
   std::uint64_t seed = 0;           ///< of what is random in it
   std::array<double, 3> force_N{};  ///< in W
-  std::array<double, 3> point_m{};  ///< where it acts, in the joint's frame
-  std::int32_t bus = -1;            ///< -1: any
+  std::array<double, 3> point_m{};  ///< where it acts, in the joint's frame; a payload: the link's
+  /// A payload's: xx xy xz yy yz zz about its center of mass, along the link's axes.
+  std::array<double, 6> inertia_kg_m2{};
+  std::int32_t bus = -1;  ///< -1: any
   std::int32_t board = -1;
   std::int32_t sensor = -1;
-  std::int32_t joint = -1;
+  std::int32_t joint = -1;    ///< of a payload: that moves its link; -1: none of the image
   std::uint32_t node_id = 0;  ///< frames whose COB-ID carries it; 0: any
   std::uint32_t cob_id = 0;
   std::uint32_t cob_mask = 0;  ///< bits of the COB-ID that have to agree; 0: any
@@ -54,9 +56,9 @@ struct ScenarioFault {
   FaultFrom from = FaultFrom::kPowerOn;
   FrameDirection direction = FrameDirection::kBoth;
   EncoderSide encoder = EncoderSide::kLink;
-  std::uint32_t reserved = 0;
+  std::int32_t link = -1;  ///< of the description's tree
 };
-static_assert(sizeof(ScenarioFault) == 152);
+static_assert(sizeof(ScenarioFault) == 200);
 
 /// As the loop sees it: what it strikes, the narrowest that it names.
 [[nodiscard]] constexpr hal::InjectedFault injected(const ScenarioFault& fault) noexcept {
@@ -84,7 +86,7 @@ struct FaultSlot {
   std::uint8_t told = 0;   ///< next_begun() gave it
   std::array<std::uint8_t, 7> reserved{};
 };
-static_assert(sizeof(FaultSlot) == 176);
+static_assert(sizeof(FaultSlot) == 224);
 
 /// ```
 /// faults.begin_step(time_ns, enabled_ns);

@@ -27,7 +27,8 @@ double need_kg_m2(const ActuatorModel& m, double link_damping_Nms_rad, double u_
 LightJoints::LightJoints(const tandem_kernels& kernels, const Actuators& actuators,
                          std::span<const double> damping_Nms_rad,
                          std::span<const JointInertia> inertias, double stretch,
-                         std::int64_t substep_ns) {
+                         std::int64_t substep_ns)
+    : joints_(kernels.joints) {
   rest_.assign(kernels.nv, 0.0);
   pushed_.assign(kernels.nv, 0.0);
   for (std::size_t joint = 0; joint < inertias.size(); ++joint) {
@@ -40,17 +41,17 @@ LightJoints::LightJoints(const tandem_kernels& kernels, const Actuators& actuato
   }
 }
 
-void LightJoints::look(const tandem_kernels& kernels, const double* sines, const double* q,
+void LightJoints::look(AddedInertia& dynamics, const double* sines, const double* q,
                        const double* v, double* forces, const double* wrench,
                        std::int64_t time_ns) noexcept TANDEM_RT {
   next_look_ns_ = time_ns + kLook_ns;
-  kernels.forward_dynamics_at(sines, q, v, forces, wrench, rest_.data());
+  dynamics.forward_dynamics(sines, q, v, forces, wrench, rest_.data());
   std::size_t halvings = 0;
   for (const Watched& watched : watched_) {
-    const std::size_t at = kernels.nv - kernels.joints + watched.joint;
+    const std::size_t at = rest_.size() - joints_ + watched.joint;
     const double before = forces[at];
     forces[at] += 1.0;
-    kernels.forward_dynamics_at(sines, q, v, forces, wrench, pushed_.data());
+    dynamics.forward_dynamics(sines, q, v, forces, wrench, pushed_.data());
     forces[at] = before;
     const double per_inertia = pushed_[at] - rest_[at];
     while (halvings < kHalvings && watched.need_kg_m2[halvings] * per_inertia > kTaken) ++halvings;

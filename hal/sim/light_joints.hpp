@@ -11,6 +11,7 @@
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
 #include "hal/sim/actuator.hpp"
+#include "hal/sim/added_inertia.hpp"
 #include "hal/sim/apparent_inertia.hpp"
 #include "model/kernels.h"
 
@@ -41,10 +42,10 @@ class LightJoints {
   }
   /// Finds the inertia that each watched link shows here: 1 over what a unit of torque adds to its
   /// acceleration.
-  /// @param sines   of q, for the kernels
+  /// @param sines   of q
   /// @param forces  (nv) scratch that holds the generalized forces, and does so afterwards
   /// @param wrench  the kernels' wrenches
-  void look(const tandem_kernels& kernels, const double* sines, const double* q, const double* v,
+  void look(AddedInertia& dynamics, const double* sines, const double* q, const double* v,
             double* forces, const double* wrench, std::int64_t time_ns) noexcept TANDEM_RT;
   [[nodiscard]] std::int64_t step_ns(std::int64_t substep_ns) const noexcept TANDEM_RT {
     return substep_ns >> halvings_;
@@ -62,6 +63,7 @@ class LightJoints {
   };
   std::vector<Watched> watched_;
   std::vector<double> rest_, pushed_;  // accelerations, scratch
+  std::size_t joints_ = 0;             // of the kernels
   std::int64_t next_look_ns_ = 0, halvings_ = 0;
 };
 

@@ -67,12 +67,14 @@ Result<Plant> Plant::create(const PlantConfig& config) {
   if (Status status = plant.place_contact(config); !status) return std::unexpected(status.error());
   if (Status status = plant.make_loops(config); !status) return std::unexpected(status.error());
   if (Status status = plant.open_engine(config); !status) return std::unexpected(status.error());
+  plant.add_inertia(config);
   if (Status status = plant.start(config); !status) return std::unexpected(status.error());
   return plant;
 }
 
 Plant::Plant(const PlantConfig& config)
     : kernels_(config.kernels),
+      added_(*config.kernels),
       sines_(*config.kernels),
       integrator_(config.integrator),
       substep_ns_(config.substep_ns),
@@ -147,13 +149,23 @@ Status Plant::open_engine(const PlantConfig& config) {
     return fail("the engine '" + config.engine + "' needs the robot's description",
                 "give PlantConfig its robot and tree");
   }
-  auto engine = make_engine(config.engine, *config.robot, *config.tree,
-                            static_cast<double>(config.substep_ns) * 1e-9,
-                            config.integrator == Integrator::kRungeKutta4);
+  const model::Tree& tree = config.actual != nullptr ? *config.actual : *config.tree;
+  auto engine =
+      make_engine(config.engine, *config.robot, tree, static_cast<double>(config.substep_ns) * 1e-9,
+                  config.integrator == Integrator::kRungeKutta4);
   if (!engine) return std::unexpected(engine.error());
   engine_ = std::move(*engine);
   point_forces_W_.assign(3 * contact_.points(), 0.0);
   return {};
+}
+
+void Plant::add_inertia(const PlantConfig& config) {
+  if (config.tree != nullptr && config.robot != nullptr) {
+    const model::Tree& actual = config.actual != nullptr ? *config.actual : *config.tree;
+    added_ = AddedInertia(*kernels_, *config.robot, *config.tree, actual);
+  }
+  for (std::size_t j = 0; j < config.joints.size(); ++j)
+    added_.add_armature(map_[j], config.joints[j].added_armature_kg_m2);
 }
 
 Status Plant::place_contact(const PlantConfig& config) {
@@ -208,12 +220,13 @@ Status Plant::start(const PlantConfig& config) {
   const std::span<const double> q(at.q(), kernels_->nq), v(at.v(), kernels_->nv);
   fit_passive_friction(config, q);
   set_state(q, v);
-  place_surroundings(config);
+  place_surroundings(config);  // for the lightest that the robot is
+  for (const Load& load : config.carried) added_.carry(load);
 
   // Springs and hoist start with the load that keeps everything at rest.
   touch_ground(x_, true);
   std::vector<double> load(kernels_->nv, 0.0);
-  kernels_->inverse_dynamics(q.data(), v.data(), v.data(), wrench_.data(), load.data());
+  added_.inverse_dynamics(sines(), q.data(), v.data(), v.data(), wrench_.data(), load.data());
   loops_.equations().carry_passive(load.data());
   for (const std::size_t i : map_) {
     const double joint_load = load[base_v_ + i];
@@ -235,8 +248,7 @@ void Plant::fit_passive_friction(const PlantConfig& config, std::span<const doub
   const auto has = [](const hal::PassiveConfig& joint) { return joint.friction_Nm > 0.0; };
   const std::ptrdiff_t count = std::ranges::count_if(config.passive, has);
   if (count == 0) return;
-  const auto inertias =
-      joint_inertias(*kernels_, postures_within(*kernels_, q, config.ranges, 128));
+  const auto inertias = joint_inertias(*kernels_, postures_within(added_, q, config.ranges, 128));
   for (std::size_t j = 0; j < passive_.size(); ++j) {
     if (!has(config.passive[j])) continue;
     actuators_.fit_friction(passive_[j], config.passive[j].friction_Nm,
@@ -255,9 +267,9 @@ void Plant::place_surroundings(const PlantConfig& config) {
     range.lower_rad = std::min(range.lower_rad, x_.joint_q()[joint]);
     range.upper_rad = std::max(range.upper_rad, x_.joint_q()[joint]);
   }
-  const auto postures = postures_within(*kernels_, {q(), kernels_->nq}, ranges);
+  const auto postures = postures_within(added_, {q(), kernels_->nq}, ranges);
   stops_ = EndStops(*kernels_, ranges, joint_inertias(*kernels_, postures), substep_ns_);
-  const auto many = postures_within(*kernels_, {q(), kernels_->nq}, ranges, 128);
+  const auto many = postures_within(added_, {q(), kernels_->nq}, ranges, 128);
   light_ = LightJoints(*kernels_, actuators_, damping_, joint_inertias(*kernels_, many),
                        step_stretch(integrator_), substep_ns_);
   if (!described) return;
@@ -271,12 +283,12 @@ void Plant::hold(const double* q, std::span<const double> load) {
   // Apparent inertia along each base axis: the acceleration that a unit force adds.
   const std::vector<double> v(kernels_->nv, 0.0);
   std::vector<double> rest(kernels_->nv), moved(kernels_->nv);
-  kernels_->forward_dynamics(q, v.data(), load.data(), wrench_.data(), rest.data());
+  added_.forward_dynamics(sines(), q, v.data(), load.data(), wrench_.data(), rest.data());
   double most[2] = {0.0, 0.0};
   for (std::size_t axis = 0; axis < 6; ++axis) {
     std::vector<double> pushed(load.begin(), load.end());
     pushed[axis] += 1.0;
-    kernels_->forward_dynamics(q, v.data(), pushed.data(), wrench_.data(), moved.data());
+    added_.forward_dynamics(sines(), q, v.data(), pushed.data(), wrench_.data(), moved.data());
     most[axis / 3] = std::max(most[axis / 3], moved[axis] - rest[axis]);
   }
   hoist_.hold(1.0 / most[0], 1.0 / most[1], q, load.data());
@@ -308,6 +320,23 @@ void Plant::release() noexcept TANDEM_RT {
   for (const std::size_t i : map_) actuators_.set_brake(i, false, 0.0, 0.0);
 }
 
+void Plant::carry(std::span<const Load> loads) noexcept TANDEM_RT {
+  added_.let_go();
+  for (const Load& load : loads) added_.carry(load);
+  loops_.changed();
+  vdot_fresh_ = 0;
+}
+
+void Plant::add_beyond(std::size_t sensor, double* channels) noexcept TANDEM_RT {
+  bodies_.add_beyond(sensor, channels);
+  added_.add_beyond(sensor, q(), v(), vdot(), channels);
+}
+
+void Plant::center_of_mass(double* c, double* cdot, double* J) noexcept TANDEM_RT {
+  kernels_->center_of_mass_at(sines(), q(), v(), c, cdot, J);
+  added_.add_to_center_of_mass(q(), c);
+}
+
 JointReading Plant::joint(std::size_t joint) const noexcept TANDEM_RT {
   const std::size_t i = map_[joint];
   const MotorStateView motors = x_.motor();
@@ -334,9 +363,9 @@ std::string Plant::diverged_text() const {
 }
 
 void Plant::archive(Archive& ar) {
-  ar(actuators_, contact_, bodies_, hoist_, loops_, light_, x_, tau_, applied_tau_, vdot_, wrench_,
-     pose_, twist_, time_ns_, released_, contact_fresh_, vdot_fresh_, diverged_, diverged_rate_,
-     point_forces_W_, pushes_);
+  ar(actuators_, added_, contact_, bodies_, hoist_, loops_, light_, x_, tau_, applied_tau_, vdot_,
+     wrench_, pose_, twist_, time_ns_, released_, contact_fresh_, vdot_fresh_, diverged_,
+     diverged_rate_, point_forces_W_, pushes_);
   if (ar.reading()) sines_.take(q());
   if (engine_) engine_->archive(ar);
 }

@@ -15,6 +15,7 @@
 #include "base/result.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/sim/actuator.hpp"
+#include "hal/sim/added_inertia.hpp"
 #include "hal/sim/body_contact.hpp"
 #include "hal/sim/closure_forces.hpp"
 #include "hal/sim/contact.hpp"
@@ -46,6 +47,7 @@ struct PlantJoint {
   double position_rad = 0.0;     ///< at the start
   double damping_Nms_rad = 0.0;  ///< of the joint itself, on the link side
   std::optional<hal::BrakeConfig> brake = {};
+  double added_armature_kg_m2 = 0.0;  ///< to the kernels'
 };
 
 struct PlantConfig {
@@ -69,7 +71,10 @@ struct PlantConfig {
   /// What links other than soles touch the ground with; nothing without the description.
   const hal::RobotConfig* robot = nullptr;
   const model::Tree* tree = nullptr;
-  double rate_limit = 1000.0;  ///< any |v| beyond it [rad/s or m/s] counts as diverged
+  /// The same tree with the masses that the plant has, where the kernels' are other ones.
+  const model::Tree* actual = nullptr;
+  std::vector<Load> carried = {};  ///< at the start; another engine carries nothing
+  double rate_limit = 1000.0;      ///< any |v| beyond it [rad/s or m/s] counts as diverged
 };
 
 /// What the encoders and the power stage of one joint see. Link side, about the joint's +axis.
@@ -125,6 +130,12 @@ class Plant {
   /// Who pushes the robot from outside; empty without the description.
   [[nodiscard]] Pushes& pushes() noexcept { return pushes_; }
 
+  /// What the robot carries from now on, whatever it was before. Needs the description.
+  void carry(std::span<const Load> loads) noexcept TANDEM_RT;
+  [[nodiscard]] const AddedInertia& added() const noexcept { return added_; }
+  /// Another engine moves the bodies, which keep their masses.
+  [[nodiscard]] bool has_engine() const noexcept { return engine_ != nullptr; }
+
   /// 1: the hoist holds the base, 0: it is free.
   [[nodiscard]] double hoist_share() const noexcept { return hoist_.share(); }
 
@@ -151,6 +162,10 @@ class Plant {
   [[nodiscard]] const double* vdot() const noexcept { return vdot_.data(); }
   [[nodiscard]] const double* tau() const noexcept { return tau_.data(); }
   [[nodiscard]] const double* wrench() const noexcept { return wrench_.data(); }
+  /// What force/torque sensor `sensor` (of robot.toml) feels of what the kernels do not know.
+  void add_beyond(std::size_t sensor, double* channels) noexcept TANDEM_RT;
+  /// The whole robot's, in W; as the kernels' of this name.
+  void center_of_mass(double* c, double* cdot, double* J) noexcept TANDEM_RT;
   [[nodiscard]] const double* pose() const noexcept { return pose_.data(); }
   [[nodiscard]] const ClosureForces& loops() const noexcept { return loops_; }
   [[nodiscard]] const Contact& contact() const noexcept { return contact_; }
@@ -177,6 +192,7 @@ class Plant {
   Status map_joints(const PlantConfig& config);
   Status place_contact(const PlantConfig& config);
   Status make_loops(const PlantConfig& config);
+  void add_inertia(const PlantConfig& config);
   Status open_engine(const PlantConfig& config);
   Status start(const PlantConfig& config);
   void fit_passive_friction(const PlantConfig& config, std::span<const double> q);
@@ -193,6 +209,7 @@ class Plant {
   [[nodiscard]] bool plausible() noexcept;
 
   const tandem_kernels* kernels_;
+  AddedInertia added_;
   model::Sines sines_;  // of the last touch_ground()'s posture
   Integrator integrator_;
   std::int64_t substep_ns_, release_ns_;

@@ -53,11 +53,11 @@ const std::vector<double>& Plant::with_ends_and_ground(const PlantState& x) noex
 void Plant::accelerate(const double* q, const double* v, const double* forces) noexcept {
   if (engine_) return;  // as its last step left them
   if (loops_.none()) {
-    return kernels_->forward_dynamics_at(sines(), q, v, forces, wrench_.data(), vdot_.data());
+    return added_.forward_dynamics(sines(), q, v, forces, wrench_.data(), vdot_.data());
   }
   loops_.let_go(wrench_.data());
-  kernels_->forward_dynamics_at(sines(), q, v, forces, wrench_.data(), vdot_.data());
-  loops_.constrain(q, v, vdot_.data(), wrench_.data());
+  added_.forward_dynamics(sines(), q, v, forces, wrench_.data(), vdot_.data());
+  loops_.constrain(added_, q, v, vdot_.data(), wrench_.data());
 }
 
 void Plant::evaluate() noexcept TANDEM_RT {
@@ -72,7 +72,7 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
     if (diverged_ >= 0) return Code::kDiverged;
     evaluate();
     if (light_.due(time_ns_)) {
-      light_.look(*kernels_, sines(), q(), v(), applied_tau_.data(), wrench_.data(), time_ns_);
+      light_.look(added_, sines(), q(), v(), applied_tau_.data(), wrench_.data(), time_ns_);
     }
     const std::int64_t step_ns = std::min(duration_ns, light_.step_ns(substep_ns_));
     const double h_s = static_cast<double>(step_ns) * 1e-9;
@@ -84,7 +84,7 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
       x_.step_bodies(h_s, vdot_.data());
       actuators_.step_semi_implicit(h_s, rate_.motor(), x_.motor());
     }
-    if (!loops_.none()) loops_.project(x_.q(), x_.v());
+    if (!loops_.none()) loops_.project(added_, x_.q(), x_.v());
     bodies_.moved(v(), h_s);
     contact_fresh_ = vdot_fresh_ = 0;
     actuators_.finish_step(h_s, x_.joint_q(), x_.joint_v(), x_.motor());

@@ -7,8 +7,8 @@
 #include <limits>
 #include <string_view>
 
-#include "base/nearest.hpp"
 #include "base/toml_reader.hpp"
+#include "hal/sim/payload.hpp"
 
 namespace tandem::sim {
 
@@ -24,22 +24,16 @@ constexpr std::int64_t kAnyU32 = std::numeric_limits<std::uint32_t>::max();
 struct Context {
   const hal::RobotConfig& robot;
   std::int64_t period_ns;
+  const model::Tree* tree;
 };
 
 std::int64_t ns(double seconds) { return std::llround(seconds * 1e9); }
 
 template <class Items>
 std::int32_t index_of(TomlTable& table, const char* key, const Items& items) {
-  const std::string name = table.text(key);
   std::vector<std::string> known;
   for (const auto& item : items) known.push_back(item.name);
-  const auto found = std::ranges::find(known, name);
-  if (found != known.end()) return static_cast<std::int32_t>(found - known.begin());
-  if (!name.empty()) {
-    table.error(key, "the robot has no " + std::string(key) + " '" + name + "'",
-                suggest(name, known));
-  }
-  return -1;
+  return index_in(table, key, known);
 }
 
 void read_times(TomlTable& table, const Context& context, ScenarioFault& fault) {
@@ -182,7 +176,8 @@ void read_push(TomlTable& table, const hal::RobotConfig& robot, ScenarioFault& f
   if (point_m.size() == 3) std::ranges::copy(point_m, fault.point_m.begin());
 }
 
-void read_target(TomlTable& table, const hal::RobotConfig& robot, ScenarioFault& fault) {
+void read_target(TomlTable& table, const Context& context, ScenarioFault& fault) {
+  const hal::RobotConfig& robot = context.robot;
   switch (fault.kind) {
     case FaultKind::kNone: return;
     case FaultKind::kFrameDrop:
@@ -211,6 +206,7 @@ void read_target(TomlTable& table, const hal::RobotConfig& robot, ScenarioFault&
     case FaultKind::kSpringBreak: return read_joint(table, robot, fault);
     case FaultKind::kBusDown: return read_cable(table, robot, fault);
     case FaultKind::kPush: return read_push(table, robot, fault);
+    case FaultKind::kPayload: return read_payload(table, robot, context.tree, fault);
   }
 }
 
@@ -228,7 +224,7 @@ ScenarioFault read_fault(TomlTable& table, const Context& context) {
   ScenarioFault fault;
   fault.kind = read_kind(table);
   read_times(table, context, fault);
-  read_target(table, context.robot, fault);
+  read_target(table, context, fault);
   const bool ramps = fault.kind == FaultKind::kSupplySag || fault.kind == FaultKind::kMotorOverheat;
   if (ramps) fault.ramp_ns = ns(table.number_or("ramp_s", 0.0, {0.0, kLongest_s}));
   // Once and for all, so that an end would have no meaning.
@@ -257,10 +253,11 @@ bool is_literal(std::string_view value) {
 
 std::expected<std::vector<ScenarioFault>, Diagnostics> read(Result<TomlDocument> document,
                                                             const hal::RobotConfig& robot,
-                                                            std::int64_t period_ns) {
+                                                            std::int64_t period_ns,
+                                                            const model::Tree* tree) {
   if (!document) return std::unexpected(Diagnostics{document.error()});
   TomlTable root = document->root();
-  const Context context{robot, period_ns};
+  const Context context{robot, period_ns, tree};
   std::vector<ScenarioFault> faults;
   for (TomlTable& table : root.tables("fault")) faults.push_back(read_fault(table, context));
   if (faults.empty()) {
@@ -282,15 +279,17 @@ std::expected<std::vector<ScenarioFault>, Diagnostics> read(Result<TomlDocument>
 
 std::expected<std::vector<ScenarioFault>, Diagnostics> read_scenario(const std::string& file,
                                                                      const hal::RobotConfig& robot,
-                                                                     std::int64_t period_ns) {
-  return read(TomlDocument::load(file), robot, period_ns);
+                                                                     std::int64_t period_ns,
+                                                                     const model::Tree* tree) {
+  return read(TomlDocument::load(file), robot, period_ns, tree);
 }
 
 std::expected<std::vector<ScenarioFault>, Diagnostics> parse_scenario(std::string_view text,
                                                                       const std::string& file,
                                                                       const hal::RobotConfig& robot,
-                                                                      std::int64_t period_ns) {
-  return read(TomlDocument::parse(text, file), robot, period_ns);
+                                                                      std::int64_t period_ns,
+                                                                      const model::Tree* tree) {
+  return read(TomlDocument::parse(text, file), robot, period_ns, tree);
 }
 
 std::string scenario_of_words(std::span<const std::string> words) {

@@ -11,21 +11,24 @@
 #include "base/result.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/sim/fault_injection.hpp"
+#include "model/tree.hpp"
 
 namespace tandem::sim {
 
 /// Reads the [[fault]] tables of a scenario; docs/configuration.md has every key.
 /// @param period_ns  of the loop: `at_cycle` and `for_cycles` count it
+/// @param tree       the robot's: a payload names one of its links; null: there are none
 /// Errors, all of the file at once: as TOML's; a kind, board, sensor, joint or bus that is not
 /// there (with the nearest name); a key that the kind does not have; two beginnings; a broken
 /// spring where there is none; more faults than FaultInjection::kMostFaults.
 [[nodiscard]] std::expected<std::vector<ScenarioFault>, Diagnostics> read_scenario(
-    const std::string& file, const hal::RobotConfig& robot, std::int64_t period_ns);
+    const std::string& file, const hal::RobotConfig& robot, std::int64_t period_ns,
+    const model::Tree* tree = nullptr);
 
 /// The same from memory; `file` names it in errors.
 [[nodiscard]] std::expected<std::vector<ScenarioFault>, Diagnostics> parse_scenario(
     std::string_view text, const std::string& file, const hal::RobotConfig& robot,
-    std::int64_t period_ns);
+    std::int64_t period_ns, const model::Tree* tree = nullptr);
 
 /// The text of a scenario with one fault, from what a command line gives: `key=value` words, whose
 /// values need no quotes, or one word that is TOML already.

@@ -54,7 +54,7 @@ Result<Sensors> Sensors::create(const hal::RobotConfig& robot, const tandem_kern
   return sensors;
 }
 
-void Sensors::sample(const Plant& plant, std::span<double> channels) noexcept TANDEM_RT {
+void Sensors::sample(Plant& plant, std::span<double> channels) noexcept TANDEM_RT {
   const tandem_kernels& kernels = plant.kernels();
   if (any_force_) {
     kernels.sensor_wrenches_at(plant.sines(), plant.q(), plant.v(), plant.vdot(), plant.wrench(),
@@ -69,7 +69,7 @@ void Sensors::sample(const Plant& plant, std::span<double> channels) noexcept TA
     double* out = channels.data() + slot.offset;
     if (slot.type == hal::SensorType::kForceTorque) {
       std::copy_n(wrenches_.data() + 6 * slot.index, 6, out);
-      plant.bodies().add_beyond(s, out);
+      plant.add_beyond(s, out);
     } else {
       sample_imu(kernels, slot.index, out);
     }

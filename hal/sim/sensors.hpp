@@ -33,7 +33,7 @@ class Sensors {
 
   /// Fills every sensor's channels, one sensor after another.
   /// @pre plant.evaluate() since its last advance.
-  void sample(const Plant& plant, std::span<double> channels) noexcept TANDEM_RT;
+  void sample(Plant& plant, std::span<double> channels) noexcept TANDEM_RT;
   [[nodiscard]] std::size_t channels() const noexcept { return channels_; }
 
  private:

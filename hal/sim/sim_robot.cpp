@@ -74,7 +74,7 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
   state.cycle()[0] = time.cycle;
   state.time_ns()[0] = time.time_ns;
   hook_(SimStage::kMasterDecode);
-  if (keep_truth_) truth_filler_.fill(plant(), time, truth_);
+  if (keep_truth_) truth_filler_.fill(robot_->plant(), time, truth_);
   hook_(SimStage::kTruth);
   return code;
 }

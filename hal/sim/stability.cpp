@@ -64,7 +64,8 @@ void add_ground(const PlantConfig& config, const Plant& plant, Linear& to) {
   k.site_motion(plant.q(), plant.v(), plant.vdot(), pose.data(), twist.data(), acceleration.data());
   const hal::ContactConfig& c = config.contact;
   const double gravity = std::hypot(k.gravity_m_s2[0], k.gravity_m_s2[1], k.gravity_m_s2[2]);
-  const double per_point_N = k.mass_kg * gravity / static_cast<double>(plant.contact().points());
+  const double per_point_N =
+      plant.added().mass_kg() * gravity / static_cast<double>(plant.contact().points());
   const Eigen::Vector3d spring(c.tangential_stiffness_N_m, c.tangential_stiffness_N_m,
                                c.stiffness_N_m);
   const Eigen::Vector3d damper(c.tangential_damping_Ns_m, c.tangential_damping_Ns_m,
@@ -112,6 +113,9 @@ StepLimit longest_step(const PlantConfig& config, const Plant& plant) {
   Linear system(k.nv + k.joints);
   RowMajor M(k.nv, k.nv);
   k.mass_matrix(plant.q(), M.data());
+  AddedInertia added = plant.added();
+  added.let_go();  // what is carried makes nothing stiffer
+  added.add_to_mass_matrix(plant.q(), M.data());
   system.M.topLeftCorner(k.nv, k.nv) = M;
   add_joints(config, plant, system);
   add_passive(config, plant, system);

@@ -26,6 +26,12 @@ namespace tandem::sim {
 }
 [[nodiscard]] Mat3 product(const Mat3& A, const Mat3& B) noexcept TANDEM_RT;
 
+/// Whether a link is `first`, or further from the root than it.
+[[nodiscard]] inline bool is_beyond(const model::Tree& tree, int link, int first) {
+  while (link >= 0 && link != first) link = tree.links[static_cast<std::size_t>(link)].parent;
+  return link == first;
+}
+
 /// Body 0 is the base, or what stands still; joint j moves body j + 1, as in model::Tree.
 class TreeMotion {
  public:

@@ -5,7 +5,7 @@
 
 namespace tandem::sim {
 
-void TruthFiller::fill(const Plant& plant, const hal::CycleTime& time,
+void TruthFiller::fill(Plant& plant, const hal::CycleTime& time,
                        hal::TruthImage& truth) noexcept TANDEM_RT {
   truth.cycle()[0] = time.cycle;
   truth.time_ns()[0] = time.time_ns;
@@ -15,9 +15,7 @@ void TruthFiller::fill(const Plant& plant, const hal::CycleTime& time,
     std::copy_n(plant.q() + 3, 4, truth.base_quaternion().data());
     std::copy_n(plant.v(), 6, truth.base_velocity().data());
   }
-  plant.kernels().center_of_mass_at(plant.sines(), plant.q(), plant.v(),
-                                    truth.center_of_mass_m().data(), com_velocity_.data(),
-                                    com_jacobian_.data());
+  plant.center_of_mass(truth.center_of_mass_m().data(), com_velocity_.data(), com_jacobian_.data());
   for (std::size_t j = 0; j < plant.joints(); ++j) {
     const JointReading joint = plant.joint(j);
     truth.position_rad()[j] = joint.position_rad;

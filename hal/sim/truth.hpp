@@ -18,8 +18,7 @@ class TruthFiller {
       : com_velocity_(3, 0.0), com_jacobian_(std::size_t{3} * plant.kernels().nv, 0.0) {}
 
   /// @pre plant.evaluate() since its last advance.
-  void fill(const Plant& plant, const hal::CycleTime& time,
-            hal::TruthImage& truth) noexcept TANDEM_RT;
+  void fill(Plant& plant, const hal::CycleTime& time, hal::TruthImage& truth) noexcept TANDEM_RT;
 
  private:
   std::vector<double> com_velocity_, com_jacobian_;  // what the kernel computes besides

@@ -378,6 +378,7 @@ Diagnostics add_parallel(Composition& c, const KernelSupply& supply) {
   sim::SimRobotConfig sim = e.sim_robot_config();
   sim.tree = std::make_shared<const model::Tree>(robot->tree);
   sim.truth = true;
+  sim.changes = nullptr;  // they are the first one's
   c.simulation = sim;
   auto second = sim::SimRobot::create(e.parallel->robot, c.parallel_kernels.get(), sim);
   if (!second) {
@@ -395,7 +396,7 @@ Diagnostics add_simulation(Composition& c, const Overrides& overrides) {
   const Experiment& e = c.experiment;
   sim::SimRobotConfig sim = e.sim_robot_config();
   if (!scenario.empty()) {
-    auto faults = sim::read_scenario(scenario, e.robot, e.loop.period_ns);
+    auto faults = sim::read_scenario(scenario, e.robot, e.loop.period_ns, e.tree().get());
     if (!faults) return faults.error();
     sim.faults = std::move(*faults);
   }

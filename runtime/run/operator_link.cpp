@@ -64,6 +64,7 @@ std::expected<remote::OperatorEnd::End, Diagnostics> twin_of(const Composition& 
   if (!side) return std::unexpected(side.error());
   sim::SimRobotConfig sim = e.sim_robot_config();
   sim.seed = e.seed + 1;  // noise of its own
+  sim.changes = nullptr;  // it predicts by what is known
   auto made = sim::SimRobot::create(e.robot, c.kernels.get(), sim);
   if (!made) return std::unexpected(Diagnostics{made.error()});
   return remote::OperatorEnd::End{std::move(*made), std::move(*side)};

@@ -36,7 +36,8 @@ std::set<std::string> matches(const std::string& text, const char* pattern) {
 
 /// Keys that the readers of robots and experiments ask for, by rows or by hand.
 std::set<std::string> keys_read() {
-  std::vector<fs::path> files{kRoot / "hal/sim/scenario.cpp", kRoot / "dds/config.cpp"};
+  std::vector<fs::path> files{kRoot / "hal/sim/payload.cpp", kRoot / "hal/sim/scenario.cpp",
+                              kRoot / "dds/config.cpp"};
   for (const char* folder : {"hal/config", "runtime"}) {
     for (const auto& entry : fs::directory_iterator(kRoot / folder)) {
       if (entry.path().extension() != ".txt" && entry.is_regular_file()) files.push_back(entry);

@@ -1,0 +1,22 @@
+// What of a simulated robot is other than its files say: [sim.link], [sim.joint] and
+// [[sim.payload]] of an experiment. Controllers, estimators, boards and reports keep to the files.
+// Layer: hal/sim.  Thread: non-RT to fill; immutable afterwards.
+#pragma once
+
+#include <vector>
+
+#include "hal/config/robot_config.hpp"
+#include "hal/sim/fault_injection.hpp"
+#include "model/tree.hpp"
+
+namespace tandem::sim {
+
+/// The plant's own robot. Its tree has the joints, bodies and links of the described one.
+struct PlantChanges {
+  hal::RobotConfig robot;              ///< with the plant's actuators and passive joints
+  model::Tree tree;                    ///< with the plant's masses, and what it always carries
+  std::vector<double> zero_error_rad;  ///< per joint: what its encoders read too much; or empty
+  std::vector<ScenarioFault> carried;  ///< kPayload: what comes and goes
+};
+
+}  // namespace tandem::sim

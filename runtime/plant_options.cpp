@@ -1,0 +1,186 @@
+#include "runtime/plant_options.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/nearest.hpp"
+#include "hal/sim/payload.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using hal::ActuatorConfig;
+using hal::PassiveConfig;
+
+constexpr const char* kTheActuators = "the actuator's";
+constexpr double kLongest_s = 1e6;
+
+struct EncoderChange {
+  double zero_error_rad = 0.0;
+};
+struct PayloadTimes {
+  std::string name;
+  double from_s = 0.0;
+  std::optional<double> until_s;
+};
+
+// A key a line.
+// clang-format off
+constexpr Key<ActuatorConfig> kActuator[] = {
+  key<&ActuatorConfig::friction_Nm>("friction_Nm", kNotNegative, "dry friction").by_default(kTheActuators),
+  key<&ActuatorConfig::damping_Nms_rad>("damping_Nms_rad", kNotNegative, "D, the back-EMF's share included").by_default(kTheActuators),
+  key<&ActuatorConfig::inertia_kg_m2>("inertia_kg_m2", kPositive, "J, reflected: of a rigid actuator the joint's armature").by_default(kTheActuators),
+  key<&ActuatorConfig::spring_Nm_rad>("spring_Nm_rad", kNotNegative, "Ks").by_default(kTheActuators),
+  key<&ActuatorConfig::spring_damping_Nms_rad>("spring_damping_Nms_rad", kNotNegative, "Ds").by_default(kTheActuators),
+  key<&ActuatorConfig::torque_constant_Nm_A>("torque_constant_Nm_A", kPositive, "K: the drive takes its current for another torque").by_default(kTheActuators),
+  key<&ActuatorConfig::resistance_ohm>("resistance_ohm", kPositive, "R").by_default(kTheActuators),
+};
+constexpr Key<EncoderChange> kEncoder[] = {
+  key<&EncoderChange::zero_error_rad>("zero_error_rad", {-10.0, 10.0}, "what both encoders read too much"),
+};
+constexpr Key<PassiveConfig> kPassive[] = {
+  key<&PassiveConfig::friction_Nm>("friction_Nm", {0.0, 1e6}, {}),
+  key<&PassiveConfig::damping_Nms_rad>("damping_Nms_rad", {0.0, 1e6}, {}),
+};
+constexpr Key<PayloadTimes> kPayload[] = {
+  required(key<&PayloadTimes::name>("name", "for messages").within("unique")),
+  by_hand<PayloadTimes>("link", "–", "a link of the URDF", "that carries it: one of `link` and `site`"),
+  by_hand<PayloadTimes>("site", "–", "a `[[site]]`", "at which it is carried"),
+  by_hand<PayloadTimes>("mass_kg", "required", "> 0 to 100000", "of the payload"),
+  by_hand<PayloadTimes>("com_m", "`[0, 0, 0]`", "3 numbers of ±100", "center of mass, in the frame of the link or site"),
+  by_hand<PayloadTimes>("inertia_kg_m2", "a point's", "6 numbers", "`[ixx, ixy, ixz, iyy, iyz, izz]` about the center of mass, along the axes of that frame"),
+  key<&PayloadTimes::from_s>("from_s", {0.0, kLongest_s}, "picked up so long after the first SYNC").by_default("from the start"),
+  key<&PayloadTimes::until_s>("until_s", {0.0, kLongest_s, true}, "dropped; later than `from_s`").by_default("never"),
+};
+// clang-format on
+
+std::int64_t ns(double seconds) { return std::llround(seconds * 1e9); }
+
+void nothing_given(TomlTable& table) {
+  if (table.keys().empty()) table.error("", "changes nothing", "give a key, or remove it");
+}
+
+/// The description once more, with the links' masses in place of its own.
+void change_links(TomlTable links, const robot::FileTexts& files, sim::PlantChanges& plant) {
+  std::vector<hal::LinkConfig>& all = plant.robot.model.links;
+  for (hal::LinkConfig& link : hal::read_links(links)) {
+    std::erase_if(all, [&](const hal::LinkConfig& one) { return one.name == link.name; });
+    link.key = "sim.link." + link.name;
+    all.push_back(std::move(link));
+  }
+  if (links.has_errors()) return;
+  hal::RobotConfig robot = plant.robot;
+  const auto model = robot::complete_robot(robot, files);
+  if (model) {
+    plant.tree = model->tree;
+    return;
+  }
+  for (const Error& error : model.error()) {
+    const bool own = error.key.starts_with("sim.link.");
+    TomlTable at = own ? links.table(error.key.substr(9)) : links;
+    at.error("", own ? error.message : error.key + ": " + error.message, error.hint);
+  }
+}
+
+void change_joint(TomlTable table, const std::string& name, sim::PlantChanges& plant) {
+  hal::RobotConfig& robot = plant.robot;
+  nothing_given(table);
+  const auto passive = std::ranges::find(robot.passive, name, &PassiveConfig::name);
+  if (passive != robot.passive.end()) {
+    read_keys(table, kPassive, *passive);
+    return table.finish();
+  }
+  const auto joint = std::ranges::find(robot.joints, name, &hal::JointConfig::name);
+  if (joint == robot.joints.end()) {
+    std::vector<std::string> known = robot.passive_names();
+    for (const hal::JointConfig& one : robot.joints) known.push_back(one.name);
+    return table.error("", "the robot has no joint '" + name + "'", suggest(name, known));
+  }
+  ActuatorConfig own = robot.actuator_of(*joint);
+  EncoderChange encoder;
+  read_keys(table, kActuator, own);
+  read_keys(table, kEncoder, encoder);
+  table.finish();
+  own.name = table.path();  // no other actuator's
+  if (const std::string problem = hal::actuator_problem(own); !problem.empty())
+    table.error("", problem,
+                "its actuator in " + robot.file + " is of order " + std::to_string(own.order));
+  plant.zero_error_rad[static_cast<std::size_t>(joint - robot.joints.begin())] =
+      encoder.zero_error_rad;
+  joint->actuator = own.name;
+  robot.actuators.push_back(std::move(own));
+}
+
+void change_joints(TomlTable joints, sim::PlantChanges& plant) {
+  if (!joints.holds_tables()) return;
+  plant.zero_error_rad.assign(plant.robot.joints.size(), 0.0);
+  for (const std::string& name : joints.keys()) change_joint(joints.table(name), name, plant);
+  const bool none = std::ranges::all_of(plant.zero_error_rad, [](double e) { return e == 0.0; });
+  if (none) plant.zero_error_rad.clear();
+}
+
+/// What is there for good is a part of the tree.
+void add_payload(TomlTable& table, const model::Tree& described, std::vector<std::string>& names,
+                 sim::PlantChanges& plant) {
+  PayloadTimes times;
+  sim::ScenarioFault payload;
+  read_keys(table, kPayload, times);
+  sim::read_payload(table, plant.robot, &described, payload);
+  table.finish();
+  if (!times.name.empty() && std::ranges::count(names, times.name) != 0)
+    table.error("name", "two payloads are called '" + times.name + "'", "rename one of them");
+  names.push_back(times.name);
+  if (times.until_s && !(*times.until_s > times.from_s))
+    table.error("until_s", "it is dropped before it is picked up", "give more than from_s");
+  if (payload.link < 0 || table.has_errors()) return;
+  if (times.from_s > 0.0 || times.until_s) {
+    payload.start_ns = ns(times.from_s);
+    if (times.until_s) payload.duration_ns = ns(*times.until_s - times.from_s);
+    plant.carried.push_back(payload);
+    return;
+  }
+  model::Link& link = plant.tree.links[static_cast<std::size_t>(payload.link)];
+  model::Body& body = plant.tree.bodies[static_cast<std::size_t>(link.body)];
+  const model::Inertia more = sim::load_of(payload).in_link;
+  link.inertia = link.inertia + more;
+  body.inertia = body.inertia + link.in_body * more;
+}
+
+}  // namespace
+
+void leave_plant_changes(TomlTable& sim) {
+  (void)sim.table_or_empty("link");
+  (void)sim.table_or_empty("joint");
+  (void)sim.tables("payload");
+}
+
+std::shared_ptr<const sim::PlantChanges> read_plant_changes(TomlTable sim,
+                                                            const hal::RobotConfig& robot,
+                                                            const model::UrdfModel* description,
+                                                            const robot::FileTexts& files) {
+  if (!sim.has("link") && !sim.has("joint") && !sim.has("payload")) return nullptr;
+  if (description == nullptr) {
+    sim.error("", "the plant cannot be changed without the robot's description");
+    return nullptr;
+  }
+  auto plant = std::make_shared<sim::PlantChanges>();
+  plant->robot = robot;
+  plant->tree = description->tree;
+  if (sim.has("link")) change_links(sim.table("link"), files, *plant);
+  if (sim.has("joint")) change_joints(sim.table("joint"), *plant);
+  std::vector<std::string> names;
+  for (TomlTable& table : sim.tables("payload"))
+    add_payload(table, description->tree, names, *plant);
+  return plant;
+}
+
+void describe_plant_changes(KeyPage& page) {
+  page.add("[sim.joint.NAME]", kActuator);
+  page.add("[sim.joint.NAME]", kEncoder);
+  page.add("[[sim.payload]]", kPayload);
+}
+
+}  // namespace tandem::runtime
