@@ -27,7 +27,7 @@ Result<Records> read_records(const log::LogFile& file, const log::LoggedTopic& t
   const Status done = file.for_each(topic.name, [&](std::int64_t time_ns, auto body) {
     if (out.time_s.size() == topic.messages) return;
     std::memcpy(to + out.stride * out.time_s.size(), body.data(), bytes);
-    out.time_s.push_back(static_cast<double>(time_ns) * 1e-9);
+    out.time_s.push_back(static_cast<double>(time_ns) / 1e9);
   });
   if (!done) return std::unexpected(done.error());
   return out;
@@ -48,8 +48,8 @@ class Log {
         fields.append(py::make_tuple(field.name, element_names(field)));
       }
       out.append(py::make_tuple(topic.name, topic.type, topic.messages,
-                                static_cast<double>(topic.first_ns) * 1e-9,
-                                static_cast<double>(topic.last_ns) * 1e-9, fields));
+                                static_cast<double>(topic.first_ns) / 1e9,
+                                static_cast<double>(topic.last_ns) / 1e9, fields));
     }
     return out;
   }
@@ -88,7 +88,7 @@ class Log {
     for (const log::EventText& one : take(file_.events())) {
       const auto joint = static_cast<std::size_t>(one.event.joint);
       const bool named = one.event.joint >= 0 && joint < file_.info().joints.size();
-      out.append(py::make_tuple(static_cast<double>(one.event.time_ns) * 1e-9, one.event.cycle,
+      out.append(py::make_tuple(static_cast<double>(one.event.time_ns) / 1e9, one.event.cycle,
                                 log::to_string(one.event.kind),
                                 named ? file_.info().joints[joint] : std::string(), one.text));
     }

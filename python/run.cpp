@@ -4,8 +4,11 @@
 // interpreter's lock to others.
 #include <algorithm>
 #include <atomic>
+#include <cstring>
+#include <functional>
 #include <map>
 #include <optional>
+#include <string_view>
 
 #include "hal/config/capabilities.hpp"
 #include "hal/sim/scenario.hpp"
@@ -17,6 +20,8 @@ namespace tandem::python {
 namespace {
 
 using runtime::RunPhase;
+
+constexpr std::string_view kMark = "tandem-run";  // of a snapshot
 
 struct ModeName {
   const char* name;
@@ -102,20 +107,35 @@ class Running {
     return step(1);
   }
 
+  /// A mark, whether the cycle has begun, and a hash of all the rest, which is RobotCycle's.
   [[nodiscard]] py::bytes save() {
     const Turn turn(*this);
     const std::vector<std::byte> bytes = take(run().cycle().save());
-    std::string all(1, begun_ ? '\1' : '\0');
-    all.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const std::string_view rest(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const std::size_t hash = std::hash<std::string_view>{}(rest);
+    std::string all(kMark);
+    all.push_back(begun_ ? '1' : '0');
+    all.append(reinterpret_cast<const char*>(&hash), sizeof hash);
+    all.append(rest);
     return py::bytes(all);
   }
   void restore(const py::bytes& snapshot) {
     const Turn turn(*this);
     const std::string_view all(snapshot);
-    if (all.empty() || all[0] < 0 || all[0] > 1) raise_value("snapshot", "is none of Run.save()");
-    const auto* bytes = reinterpret_cast<const std::byte*>(all.data() + 1);
-    take(run().cycle().restore({bytes, all.size() - 1}));
-    begun_ = all[0] == 1;
+    constexpr std::size_t kHead = kMark.size() + 1 + sizeof(std::size_t);
+    std::size_t hash = 0;
+    if (all.size() > kHead) std::memcpy(&hash, all.data() + kMark.size() + 1, sizeof hash);
+    if (all.size() <= kHead || !all.starts_with(kMark) ||
+        std::hash<std::string_view>{}(all.substr(kHead)) != hash) {
+      raise_value("snapshot", "is none of Run.save(), or damaged");
+    }
+    const std::vector<std::byte> before = take(run().cycle().save());
+    const auto* bytes = reinterpret_cast<const std::byte*>(all.data() + kHead);
+    if (const Status done = run().cycle().restore({bytes, all.size() - kHead}); !done) {
+      (void)run().cycle().restore(before);  // another experiment's may have been read in part
+      raise(done.error());
+    }
+    begun_ = all[kMark.size()] == '1';
     fresh_ = begun_;
     led_ = run().cycle().phase() == RunPhase::kRunning;
   }

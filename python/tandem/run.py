@@ -151,7 +151,7 @@ class Run:
     @property
     def time_s(self) -> float:
         """Its nominal time since the start [s]."""
-        return float(self.state.time_ns[0]) * 1e-9
+        return float(self.state.time_ns[0]) / 1e9
 
     @property
     def phase(self) -> str:

@@ -311,14 +311,34 @@ def test_ctrl_c_is_heard_and_the_run_goes_on(config):
     assert run.step() and not run.faults
 
 
-def test_snapshots_of_others_are_refused(config):
+def scenario_with_a_push(folder):
+    file = folder / "push.toml"
+    file.write_text('[[fault]]\nkind = "push"\njoint = "joint2"\nforce_N = [1, 0, 0]\nfor_s = 0.1\n')
+    return file
+
+
+def test_snapshots_of_others_are_refused(config, tmp_path):
     run = tandem.Run(config / HOLD, control="torque")
-    with pytest.raises(ValueError, match="none of Run.save"):
-        run.restore(b"")
+    run.step(20)
+    own = run.save()
+    wanted = bits(run, 20)
+    flipped = bytearray(own)
+    flipped[len(own) // 2] ^= 1
+    run.restore(own)
+    for bad in (b"", b"tandem-run1", own[:-1], own + b"x", own[1:], bytes(flipped)):
+        with pytest.raises(ValueError, match="none of Run.save"):
+            run.restore(bad)
     with pytest.raises(tandem.Error):
         run.restore(tandem.Run(config / "panda/hold.toml", control="torque").save())
     with pytest.raises(tandem.Error, match="other controllers"):
         run.restore(tandem.Run(config / HOLD).save())
+    other = tandem.Run(config / HOLD, control="torque", scenario=scenario_with_a_push(tmp_path))
+    try:  # as far as it fits; else the run is as it was
+        run.restore(other.save())
+        run.restore(own)
+    except tandem.Error:
+        pass
+    assert bits(run, 20) == wanted
 
 
 def test_model_and_run_agree(config):

@@ -4,6 +4,7 @@ import ast
 import inspect
 import pathlib
 import re
+import subprocess
 
 import tandem
 from tandem import _native
@@ -80,6 +81,13 @@ def test_annotated_attributes_are_there(config, log_file):
     for one in (run, model, log, log["state"], log["state"].position, run.state):
         for name in type(one).__annotations__:
             assert hasattr(one, name), f"{type(one).__name__}.{name}"
+
+
+def test_the_module_exports_what_python_calls_alone():
+    """A plugin, and another module, have their own of everything else."""
+    text = subprocess.run(["nm", "-D", "--defined-only", _native.__file__], check=True,
+                          capture_output=True, text=True).stdout  # fmt: skip
+    assert [line.split()[-1] for line in text.splitlines()] == ["PyInit__native"]
 
 
 def test_the_package_says_that_it_is_typed():
