@@ -23,7 +23,7 @@ using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 /// tandem.Error, or FileNotFoundError where the file that is named is not there.
 [[noreturn]] void raise(const Error& error);
-/// Of several errors: each has its line.
+/// The same of several: each has its line.
 [[noreturn]] void raise(const Diagnostics& errors);
 /// ValueError: "WHAT: message".
 [[noreturn]] void raise_value(const std::string& what, const std::string& message);
