@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import operator
 import os
-from typing import Any, Dict, List, Mapping, Optional, Union
+from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,10 +68,13 @@ class Run:
         build: makes kernels that are missing.
         """
         self.experiment = os.fspath(experiment)
-        every, some = (control, {}) if isinstance(control, str) else ("", dict(control or {}))
+        every, some = _control(control)
+        if rate is not None and not (rate == 0.0 or 0.01 <= rate <= 1000.0):
+            raise ValueError(f"rate: {rate}, wanted 0, or 0.01 to 1000")
+        seed, delay = _whole("seed", seed, 2**63), _whole("delay_cycles", delay_cycles, 1000)
         native = _native.Run(
             self.experiment, every, some, seed, duration_s, rate, os.fspath(scenario), hal,
-            on_fault, delay_cycles, kernel_variant, build,
+            on_fault, delay, kernel_variant, build,
         )  # fmt: skip
         self._native, self._next = native, native.next
         self.joints, self.seed, self.period_s = native.joints, native.seed, native.period_s
@@ -175,6 +179,24 @@ class Run:
 
     def __repr__(self) -> str:
         return f"<Run of {self.experiment}: {self.phase}, {self.time_s:.3f} s>"
+
+
+def _control(control: Any) -> Tuple[str, Dict[str, str]]:
+    """The mode of all joints, or those of some."""
+    if control is None:
+        return "", {}
+    if isinstance(control, str) and control:
+        return control, {}
+    if isinstance(control, Mapping) and control:
+        if all(isinstance(word, str) for item in control.items() for word in item):
+            return "", dict(control)
+    raise ValueError(f"control: {control!r}, wanted None, a mode, or a mode by joint")
+
+
+def _whole(name: str, value: Optional[int], most: int) -> Optional[int]:
+    if value is not None and not 0 <= operator.index(value) <= most:
+        raise ValueError(f"{name}: {value}, wanted 0 to {most}")
+    return value
 
 
 def _plain(value: Any) -> Any:

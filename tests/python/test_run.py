@@ -173,7 +173,14 @@ def test_observers_do_not_command(config):
         ({"duration_s": -1.0}, tandem.Error, "duration_s"),
         ({"on_fault": "laugh"}, tandem.Error, "one of end, wait"),
         ({"scenario": "no/such.toml"}, FileNotFoundError, "no/such.toml"),
-        ({"seed": -1}, TypeError, ""),
+        ({"seed": -1}, ValueError, "seed: -1, wanted 0 to"),
+        ({"seed": "1"}, TypeError, "str"),
+        ({"rate": -1.0}, ValueError, "rate: -1.0, wanted 0, or 0.01 to 1000"),
+        ({"rate": float("nan")}, ValueError, "rate: nan"),
+        ({"delay_cycles": 1001}, ValueError, "delay_cycles: 1001, wanted 0 to 1000"),
+        ({"control": ""}, ValueError, "control: '', wanted None, a mode, or a mode by joint"),
+        ({"control": {"joint1": 3}}, ValueError, "control: "),
+        ({"control": 3}, ValueError, "control: 3"),
     ],
 )
 def test_arguments_that_do_not_fit(config, arguments, kind, words):
