@@ -75,7 +75,10 @@ class Running {
 
   [[nodiscard]] runtime::Run& run() const { return *run_; }
   [[nodiscard]] Lead* lead() const { return lead_.get(); }
-  [[nodiscard]] bool over() const { return !begun_; }
+  /// Controllers have ended; the shut-down may be still to come.
+  [[nodiscard]] bool over() const {
+    return !begun_ || run().cycle().phase() == RunPhase::kShutDown;
+  }
   [[nodiscard]] const std::vector<std::string>& joints() const { return joints_; }
 
   /// Gives the command and reads the next state, `cycles` times. False: the run has ended.
@@ -88,7 +91,7 @@ class Running {
     check_command();
     fresh_ = false;
     if (cycles == 1 && run().experiment().loop.rate == 0.0) return advance();
-    while (cycles > 0 && begun_) {
+    while (cycles > 0 && !over()) {
       const std::int64_t some = std::min<std::int64_t>(cycles, per_turn());
       cycles -= some;
       {
@@ -98,7 +101,19 @@ class Running {
       }
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     }
-    return begun_;
+    return !over();
+  }
+  /// Ends the run, if it has not ended, and carries out the shut-down.
+  void finish() {
+    const Turn turn(*this);
+    run().cycle().inbox().end_run();
+    while (begun_) {
+      {
+        const py::gil_scoped_release others;
+        for (std::int64_t i = 0; i < per_turn() && begun_; ++i) (void)advance();
+      }
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    }
   }
   /// For iteration: the state that nobody has looked at yet, or else the next one.
   bool next() {
@@ -136,7 +151,7 @@ class Running {
       raise(done.error());
     }
     begun_ = all[kMark.size()] == '1';
-    fresh_ = begun_;
+    fresh_ = !over();
     led_ = run().cycle().phase() == RunPhase::kRunning;
   }
 
@@ -213,13 +228,11 @@ class Running {
     if (leads && !led_ && lead_ != nullptr) lead_->follow(run().state(), run().command());
     led_ = leads;
   }
-  /// The rest of this cycle, and the next one's begin; at the end all of the shut-down.
+  /// The rest of this cycle, and the next one's begin.
   bool advance() {
-    do {
-      begun_ = run().cycle().finish();
-      if (begun_) begin();
-    } while (begun_ && run().cycle().phase() == RunPhase::kShutDown);
-    return begun_;
+    begun_ = run().cycle().finish();
+    if (begun_) begin();
+    return !over();
   }
   /// Cycles between two looks at what Ctrl-C asks for.
   [[nodiscard]] std::int64_t per_turn() const {
@@ -345,7 +358,7 @@ void add_run(py::module_& module) {
       .def("save", &Running::save)
       .def("restore", &Running::restore, "snapshot"_a)
       .def("inject", &Running::inject, "scenario"_a)
-      .def("end", [](Running& r) { r.run().cycle().inbox().end_run(); })
+      .def("finish", &Running::finish)
       .def(
           "stop",
           [](Running& r, int category) {

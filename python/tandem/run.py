@@ -23,7 +23,8 @@ class Run:
 
     The run stands where a cycle's state has been read and its command is awaited, so a command
     acts in the cycle of the state that it answers, as a plugin's does. It runs to the bits that
-    `tandem run` gives. After its end `state` stays, and step() is an error.
+    `tandem run` gives. At its end `state` is what the last command led to, the drives are still on,
+    and step() is an error; finish() is the shut-down.
 
     Errors: tandem.Error, what `tandem check` would say, a line an error; FileNotFoundError;
     UnknownName (joint, field, mode); ValueError names what is not finite or has another shape,
@@ -137,9 +138,9 @@ class Run:
         """Clears every fault in this cycle, and enables the drives again; needs on_fault="wait"."""
         self._native.reset_faults()
 
-    def end(self) -> None:
-        """The run ends, in order, with the next step."""
-        self._native.end()
+    def finish(self) -> None:
+        """Ends the run, if it has not ended, and simulates its shut-down: the drives are disabled."""
+        self._native.finish()
 
     def joint(self, name: str) -> int:
         """Where a joint is in the arrays."""
@@ -164,7 +165,7 @@ class Run:
 
     @property
     def over(self) -> bool:
-        """The run has ended."""
+        """Controllers have ended: by time, by a fault, or by finish()."""
         return self._native.over
 
     @property

@@ -33,8 +33,11 @@ def test_controllers_run_to_the_bits_of_the_program(config, log_file):
     state = tandem.Log(log_file)["state"]
     run = tandem.Run(config / TRAJECTORY, duration_s=2)
     seen = [(s.cycle[0], s.position.copy(), s.torque.copy()) for s in run]
-    assert run.over and run.phase == "done" and not run.faults
-    assert len(seen) == 2000
+    assert run.over and run.phase == "shut-down" and not run.faults
+    assert len(seen) == 2000 and run.cycle == seen[-1][0] + 1  # of the last command
+    run.finish()
+    assert run.phase == "done" and run.cycle == state.cycle[-1, 0]
+    assert np.array_equal(run.state.position, state.position[-1])
     for cycle, position, torque in seen:
         assert np.array_equal(position, state.position[cycle])
         assert np.array_equal(torque, state.torque[cycle])
@@ -59,7 +62,7 @@ def test_torque_moves_the_joint_its_way(config):
         assert sign * (run.truth.position - before)[0] > 1e-4
 
 
-def test_python_leads_some_joints_and_a_controller_the_others(config):
+def test_python_and_a_controller_cannot_both_have_a_joint(config):
     with pytest.raises(tandem.Error, match="joint1"):  # `hold` has it
         tandem.Run(config / HOLD, control={"joint1": "torque"})
 
@@ -211,14 +214,16 @@ def test_pushes_and_faults(config):
     run.step(5)
     assert run.phase == "faulted" and run.faults and "stop" in run.faults[0]["text"]
     assert sum(1 for _, _ in zip(range(20), run)) == 20  # it goes on, as its rules say
-    run.end()
-    assert sum(1 for _ in run) < 5000 and run.over
+    run.finish()
+    assert run.over and run.phase == "done" and list(run) == []
 
 
 def test_a_fault_ends_the_run_by_default(config):
     run = tandem.Run(config / HOLD, control="torque")
     run.stop(0)
-    assert run.step() is False and run.phase == "done"
+    assert run.step() is False and run.over
+    run.finish()
+    assert run.phase == "done"
     assert run.result["faults"][0]["category"] == 0
 
 
@@ -359,3 +364,33 @@ def test_model_and_run_agree(config):
         q[order] = state.position
         run.command.torque = model.bias(q, np.zeros(model.nv))[order]
     assert np.abs(run.truth.position - begin).max() < 0.02
+
+
+def test_estimate_is_there_where_the_experiment_wants_one(config):
+    assert tandem.Run(config / HOLD).estimate is None
+    run = tandem.Run(config / "coman/hand.toml", build=False)
+    run.step(300)
+    assert run.estimate.units and run.estimate.cycle[0] == run.cycle
+    assert any(array.any() for name, array in run.estimate._arrays.items() if "torque" in name)
+
+
+def test_a_joint_that_no_controller_has_is_led_beside_them(config, tmp_path):
+    experiment = tmp_path / "one.toml"
+    experiment.write_text(f"""
+robot = "{config}/double_pendulum/robot.toml"
+posture = "ready"
+duration_s = 1.0
+[[controller]]
+plugin = "joint_trajectory"
+[controller.parameters]
+joints = ["joint1"]
+[[controller.parameters.waypoint]]
+time_s = 0.5
+position_rad = [-0.3]
+""")
+    run = tandem.Run(experiment, control={"joint2": "position"})
+    begin = run.state.position.copy()
+    for state in run:
+        run.command.position[:] = begin + 0.1 * min(1.0, (run.time_s - 1.2) / 0.5)
+    assert np.allclose(run.sent.position, [-0.3, begin[1] + 0.1], rtol=0, atol=1e-12)
+    assert np.allclose(run.state.position, run.sent.position, rtol=0, atol=0.05)  # springs yield
