@@ -10,6 +10,8 @@
 #include <mutex>
 #include <vector>
 
+#include "base/process.hpp"
+
 namespace tandem {
 namespace {
 
@@ -62,7 +64,7 @@ bool has_access_list(int descriptor) {
 
 bool is_trusted_user(uid_t user) {
   struct stat own {};
-  const bool known = ::stat("/proc/self/exe", &own) == 0;
+  const bool known = ::stat(program_file().c_str(), &own) == 0;
   return user == ::geteuid() || user == 0 || (known && user == own.st_uid);
 }
 

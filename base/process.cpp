@@ -41,9 +41,25 @@ std::vector<char*> arguments_of(const std::vector<std::string>& words) {
 
 }  // namespace
 
-std::string program_beside(const std::string& name) {
+namespace {
+
+std::string& stands_for() {
+  static std::string path;
+  return path;
+}
+
+}  // namespace
+
+std::string program_file() {
+  if (!stands_for().empty()) return stands_for();
   std::error_code ignored;
-  return std::filesystem::read_symlink("/proc/self/exe", ignored).replace_filename(name).string();
+  return std::filesystem::read_symlink("/proc/self/exe", ignored).string();
+}
+
+void stand_for_program(std::string path) { stands_for() = std::move(path); }
+
+std::string program_beside(const std::string& name) {
+  return std::filesystem::path(program_file()).replace_filename(name).string();
 }
 
 Error become(const std::string& program, const std::vector<std::string>& words) {

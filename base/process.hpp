@@ -27,6 +27,13 @@ struct Spawn {
 /// Errors: the program cannot be started.
 [[nodiscard]] Result<pid_t> spawn(const Spawn& what);
 
+/// The file of this program: its parts (controllers, kernels, engines) are found from there, and
+/// its owner is trusted.
+[[nodiscard]] std::string program_file();
+/// For a library in another program, such as Python's module: it is `path` whose parts are used. To
+/// be called before anything else is.
+void stand_for_program(std::string path);
+
 /// The program of this name in the folder of this one.
 [[nodiscard]] std::string program_beside(const std::string& name);
 

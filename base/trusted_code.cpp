@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "base/file_owner.hpp"
+#include "base/process.hpp"
 #include "base/quoting.hpp"
 #include "base/sha256.hpp"
 
@@ -39,8 +40,7 @@ std::unexpected<Error> refuse(const std::string& path, std::string message, std:
 }
 
 bool is_above_program(const std::string& folder) {
-  std::error_code ignored;
-  const std::string program = fs::read_symlink("/proc/self/exe", ignored).string();
+  const std::string program = program_file();
   return program.starts_with(folder == "/" ? "/" : folder + "/");
 }
 

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "base/nearest.hpp"
+#include "base/process.hpp"
 #include "base/quoting.hpp"
 #include "base/sha256.hpp"
 #include "base/trusted_code.hpp"
@@ -45,10 +46,7 @@ std::vector<std::string> split(const std::string& list) {
 }
 
 /// The folder that holds the program's bin and lib.
-fs::path program_prefix() {
-  std::error_code ignored;
-  return fs::read_symlink("/proc/self/exe", ignored).parent_path().parent_path();
-}
+fs::path program_prefix() { return fs::path(program_file()).parent_path().parent_path(); }
 
 /// How to get a bundled controller that has not been built; else what resembles the name.
 std::string missing_hint(const std::string& name, const std::vector<std::string>& folders) {

@@ -1,7 +1,8 @@
 # Installs into WORK, builds the examples 03 and 06 against that, as they are installed, and 03 as a
 # copy in a folder with a blank, and lets the installed program run all on an installed robot.
 # Every link of the installed pages leads somewhere. Nothing sets the build type.
-# -DBUILD=… -DWORK=… -DCOMPILER=… -DPAGES_TEST=…
+# The Python module runs one, too, where it is built.
+# -DBUILD=… -DWORK=… -DCOMPILER=… -DPAGES_TEST=… -DPYTHON=…, empty without the module
 file(REMOVE_RECURSE ${WORK})
 set(prefix ${WORK}/prefix)
 set(strange "${WORK}/a strange folder")
@@ -64,3 +65,11 @@ execute_process(COMMAND ${prefix}/bin/tandem model info
   ${prefix}/share/tandem/config/double_pendulum/robot.toml OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND ${prefix}/bin/tandem check ${prefix}/share/tandem/config/double_pendulum/hold.toml
   COMMAND_ERROR_IS_FATAL ANY)
+
+if(PYTHON)
+  set(ENV{PYTHONPATH} ${prefix}/lib/python3/dist-packages)
+  execute_process(COMMAND ${PYTHON} -B -c "import tandem, sys
+run = tandem.Run(sys.argv[1] + '/double_pendulum/trajectory.toml', duration_s=0.1, build=False)
+assert tandem.__file__.startswith(sys.argv[2]) and sum(1 for _ in run) == 100 and not run.faults"
+    ${prefix}/share/tandem/config ${prefix} WORKING_DIRECTORY ${WORK} COMMAND_ERROR_IS_FATAL ANY)
+endif()

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "base/file_name.hpp"
+#include "base/process.hpp"
 #include "base/quoting.hpp"
 #include "model/generate.hpp"
 #include "model/kernel_build.hpp"
@@ -63,9 +64,8 @@ Result<std::string> user_library(const std::string& robot, const std::string& ha
 
 std::vector<std::string> model_folders() {
   std::vector<std::string> folders;
-  std::error_code problem;
-  const fs::path program = fs::read_symlink("/proc/self/exe", problem);
-  if (!problem) {
+  const fs::path program = program_file();
+  if (!program.empty()) {
     const fs::path root = program.parent_path().parent_path();
     folders.push_back((root / "lib/models").string());
     folders.push_back((root / "lib/tandem/models").string());

@@ -46,7 +46,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       trace_(config.trace_cycles),
       limited_(parts.robot.joints.size(), kNever) {}
 
-bool RobotCycle::step() noexcept {
+bool RobotCycle::begin() noexcept {
   if (now_.run.in(RunPhase::kDone)) return false;
   wait();
   exchange();
@@ -55,6 +55,10 @@ bool RobotCycle::step() noexcept {
     read();
     check();
   }
+  return true;
+}
+
+bool RobotCycle::finish() noexcept {
   owner_.await();
   {
     const AtWork now(heartbeat_);

@@ -25,7 +25,12 @@ class RobotCycle {
   RobotCycle(const CycleParts& parts, const CycleConfig& config);
 
   /// One cycle. False once the run is done.
-  bool step() noexcept;
+  bool step() noexcept { return begin() && finish(); }
+  /// The halves of step(), for who commands joints between them, in the thread of the loop: the
+  /// state is read and checked, and the controllers come next. Both are false once the run is done.
+  bool begin() noexcept;
+  /// @pre begin() was called, and was true
+  bool finish() noexcept;
   /// Steps until the run is done.
   void run() noexcept {
     while (step()) {
@@ -68,7 +73,8 @@ class RobotCycle {
   [[nodiscard]] const CycleTrace& trace() const noexcept { return trace_; }
 
   /// Everything that the next step() depends on: backend, controllers, images, counters.
-  /// Between two steps, with a simulated robot only; the log goes on where it is.
+  /// Between two steps, or the halves of one; with a simulated robot only; the log goes on where it
+  /// is. A snapshot of between the halves is restored between halves.
   /// Errors: a backend that cannot be rewound; bytes of another configuration; other controllers
   /// than those that were loaded then (nothing has changed after that one).
   [[nodiscard]] Result<std::vector<std::byte>> save();

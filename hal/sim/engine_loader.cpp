@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "base/nearest.hpp"
+#include "base/process.hpp"
 #include "base/trusted_code.hpp"
 #include "hal/sim/actuator.hpp"
 #include "model/placements.hpp"
@@ -32,7 +33,7 @@ std::string joined(const std::vector<std::string>& names) {
 /// The engine's library, or empty.
 std::string library_of(const std::string& name) {
   std::error_code ignored;
-  const fs::path prefix = fs::read_symlink("/proc/self/exe", ignored).parent_path().parent_path();
+  const fs::path prefix = fs::path(program_file()).parent_path().parent_path();
   for (const char* folder : {"lib/engines", "lib/tandem/engines"}) {
     const fs::path file = prefix / folder / (name + ".so");
     if (fs::is_regular_file(file, ignored)) return file.string();

@@ -145,7 +145,7 @@ TEST(Architecture, EverySourceOrItsHeaderBeginsWithItsPurpose) {
   int checked = 0;
   for (const char* folder :
        {"apps", "base", "bench", "canopen", "controllers", "dds", "ethercat", "examples",
-        "firmware_emu", "hal", "log", "model", "report", "rt", "runtime", "scaffold"}) {
+        "firmware_emu", "hal", "log", "model", "python", "report", "rt", "runtime", "scaffold"}) {
     for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
       const fs::path& file = entry.path();
       if (file.extension() != ".hpp" && file.extension() != ".cpp") continue;

@@ -31,6 +31,16 @@ class Process : public testing::Test {
   const std::string output_ = folder_ / "output";
 };
 
+TEST_F(Process, OfALibraryIsTheProgramThatItStandsFor) {
+  const std::string own = program_file();
+  EXPECT_NE(own.find("base_test"), std::string::npos);
+  stand_for_program("/opt/tandem/bin/tandem");
+  EXPECT_EQ(program_file(), "/opt/tandem/bin/tandem");
+  EXPECT_EQ(program_beside("tandem-tools"), "/opt/tandem/bin/tandem-tools");
+  stand_for_program({});
+  EXPECT_EQ(program_file(), own);
+}
+
 TEST_F(Process, GetsItsWordsAsTheyAre) {
   EXPECT_EQ(run({"printf", "%s|", "a b", "$HOME", "`id`", ""}), 0);
   EXPECT_EQ(said(), "a b|$HOME|`id`||");

@@ -61,6 +61,23 @@ TEST(SimRun, RepeatsItsBytesAfterARestoreAtAnyPhase) {
   }
 }
 
+TEST(SimRun, RepeatsItsBytesAfterARestoreBetweenTheHalvesOfACycle) {
+  SimRun run;
+  for (const RunPhase phase : {RunPhase::kBringUp, RunPhase::kRunning}) {
+    run.run_to(phase);
+    for (int i = 0; i < 37; ++i) EXPECT_TRUE(run.cycle->step());
+    ASSERT_TRUE(run.cycle->begin());
+    const auto snapshot = run.cycle->save();
+    ASSERT_TRUE(snapshot) << snapshot.error().to_string();
+    EXPECT_TRUE(run.cycle->finish());
+    const auto first = bytes_of(run, 300);
+    ASSERT_TRUE(run.cycle->begin());  // it is restored where it was taken: between halves
+    ASSERT_TRUE(run.cycle->restore(*snapshot));
+    EXPECT_TRUE(run.cycle->finish());
+    EXPECT_TRUE(bytes_of(run, 300) == first) << to_string(phase);
+  }
+}
+
 TEST(SimRun, GoesOnFromASnapshotInAFreshRobot) {
   SimRun one;
   one.run_to(RunPhase::kRunning);

@@ -1,0 +1,16 @@
+"""Tandem in Python: a robot's dynamics, logs as numpy arrays, and runs that Python steps.
+
+    model = tandem.Model("config/panda/robot.toml")
+    log = tandem.Log("runs/coman-squat-001.mcap")
+    run = tandem.Run("config/panda/hold.toml", control="torque")
+
+SI units, W's z axis upwards; docs/python.md is the guide, docs/conventions.md has the frames.
+"""
+
+from ._native import Error, UnknownName
+from .fields import Fields
+from .log import Channel, Column, Event, Log
+from .model import Model
+from .run import Run
+
+__all__ = ["Channel", "Column", "Error", "Event", "Fields", "Log", "Model", "Run", "UnknownName"]

@@ -1,0 +1,205 @@
+"""A run that Python steps."""
+
+from __future__ import annotations
+
+import json
+import operator
+import os
+from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _native
+from .fields import Fields
+
+
+class Run:
+    """A simulated robot with its controllers, stepped in this process.
+
+        run = tandem.Run("config/panda/hold.toml", control="torque")
+        for state in run:
+            run.command.torque[:] = 50.0 * (goal - state.position) - 10.0 * state.velocity
+
+    The run stands where a cycle's state has been read and its command is awaited, so a command
+    acts in the cycle of the state that it answers, as a plugin's does. It runs to the bits that
+    `tandem run` gives. At its end `state` is what the last command led to, the drives are still on,
+    and step() is an error; finish() is the shut-down.
+
+    Errors: tandem.Error, what `tandem check` would say, a line an error; FileNotFoundError;
+    UnknownName (joint, field, mode); ValueError names what is not finite or has another shape,
+    before anything was commanded. One thread at a time.
+    """
+
+    experiment: str  #: its file
+    robot_file: str  #: for Model()
+    joints: List[str]  #: in the order of the images
+    seed: int
+    period_s: float  #: of a cycle
+    warnings: List[str]
+    state: Fields  #: what was measured in this cycle, read only
+    command: Fields  #: what Python commands; read only when controllers lead alone
+    sent: Fields  #: what the drives were given last, behind the limits
+    truth: Fields  #: what the simulation has, beside what is measured
+    estimate: Optional[Fields]  #: with [estimation]
+    limits: Dict[str, NDArray[np.float64]]  #: of each joint: "max_torque_Nm", …
+
+    def __init__(
+        self,
+        experiment: Union[str, "os.PathLike[str]"],
+        *,
+        control: Union[None, str, Mapping[str, str]] = None,
+        seed: Optional[int] = None,
+        duration_s: Optional[float] = None,
+        rate: Optional[float] = None,
+        scenario: Union[str, "os.PathLike[str]"] = "",
+        hal: str = "",
+        on_fault: str = "",
+        delay_cycles: Optional[int] = None,
+        kernel_variant: str = "",
+        build: bool = True,
+    ) -> None:
+        """Reads and checks everything, enables the drives, and stands at the first cycle of control.
+
+        control: None, the experiment's controllers lead. A mode ("position", "velocity", "torque",
+        "current", "open_loop", "compliant"): Python leads every joint in it, and the experiment's
+        controllers are left out. {joint: mode}: Python leads these, the controllers the others.
+        duration_s [s], seed, rate (1: real time, 0: as fast as it goes), scenario (file), hal,
+        on_fault ("end", "wait"), delay_cycles, kernel_variant: instead of the experiment's.
+        build: makes kernels that are missing.
+        """
+        self.experiment = os.fspath(experiment)
+        every, some = _control(control)
+        if rate is not None and not (rate == 0.0 or 0.01 <= rate <= 1000.0):
+            raise ValueError(f"rate: {rate}, wanted 0, or 0.01 to 1000")
+        seed, delay = _whole("seed", seed, 2**63), _whole("delay_cycles", delay_cycles, 1000)
+        native = _native.Run(
+            self.experiment, every, some, seed, duration_s, rate, os.fspath(scenario), hal,
+            on_fault, delay, kernel_variant, build,
+        )  # fmt: skip
+        self._native, self._next = native, native.next
+        self.joints, self.seed, self.period_s = native.joints, native.seed, native.period_s
+        self.robot_file, self.warnings, self.limits = (
+            native.robot_file, native.warnings, native.limits(),
+        )  # fmt: skip
+        self.state = Fields("state", native.state(), self.joints)
+        commands = native.command()
+        for _, array, _ in commands:
+            if array.dtype != np.float64:  # which cycle, which mode: the run's
+                array.flags.writeable = False
+        self.command = Fields("command", commands, self.joints)
+        self.sent = Fields("sent", native.sent(), self.joints)
+        self.truth = Fields("truth", native.truth(), self.joints)
+        estimate = native.estimate()
+        self.estimate = Fields("estimate", estimate, self.joints) if estimate else None
+
+    def __iter__(self) -> "Run":
+        return self
+
+    def __next__(self) -> Fields:
+        """Commands, and the next state; the first time the state that there is."""
+        if self._next():
+            return self.state
+        raise StopIteration
+
+    def step(self, cycles: int = 1) -> bool:
+        """Gives the command in this cycle and the next ones, and reads the state behind them.
+
+        Of several cycles, without Python between them. False: the run has ended. Ctrl-C is heard.
+        """
+        return self._native.step(cycles)
+
+    def save(self) -> bytes:
+        """Everything that the rest of the run depends on, the command as it stands included."""
+        return self._native.save()
+
+    def restore(self, snapshot: bytes) -> None:
+        """Goes back, or on, to where save() was; iteration begins with that state.
+
+        Also for another Run of the same experiment and control. Errors: tandem.Error, the snapshot
+        is of another experiment.
+        """
+        self._native.restore(snapshot)
+
+    def inject(self, kind: str, **keys: Any) -> None:
+        """Injects a fault, with the keys of a scenario's [[fault]] (docs/configuration.md).
+
+            run.inject("push", joint="panda_joint4", force_N=[0, 40, 0], for_s=0.1)
+        """
+        rows = {"kind": kind, **keys}
+        lines = (f"{key} = {json.dumps(_plain(value))}" for key, value in rows.items())
+        self._native.inject("[[fault]]\n" + "\n".join(lines) + "\n")
+
+    def stop(self, category: int = 1) -> None:
+        """An emergency stop in this cycle: category 0, 1 or 2 (docs/safety.md)."""
+        self._native.stop(category)
+
+    def reset_faults(self) -> None:
+        """Clears every fault in this cycle, and enables the drives again; needs on_fault="wait"."""
+        self._native.reset_faults()
+
+    def finish(self) -> None:
+        """Ends the run, if it has not ended, and simulates its shut-down: the drives are disabled."""
+        self._native.finish()
+
+    def joint(self, name: str) -> int:
+        """Where a joint is in the arrays."""
+        if name not in self.joints:
+            _native.unknown("joint", name, self.joints)
+        return self.joints.index(name)
+
+    @property
+    def cycle(self) -> int:
+        """Number of the cycle."""
+        return int(self.state.cycle[0])
+
+    @property
+    def time_s(self) -> float:
+        """Its nominal time since the start [s]."""
+        return float(self.state.time_ns[0]) / 1e9
+
+    @property
+    def phase(self) -> str:
+        """ "running" while controllers lead; "faulted", "held", …, "done" (docs/architecture.md)."""
+        return self._native.phase
+
+    @property
+    def over(self) -> bool:
+        """Controllers have ended: by time, by a fault, or by finish()."""
+        return self._native.over
+
+    @property
+    def faults(self) -> List[Dict[str, Any]]:
+        """Every fault so far: time_s, cycle, joint, board, text, category, latched."""
+        return self._native.faults()
+
+    @property
+    def result(self) -> Dict[str, Any]:
+        """Figures so far, named as in `tandem run --json`: joints' tracking, work, faults, …"""
+        return self._native.result()
+
+    def __repr__(self) -> str:
+        return f"<Run of {self.experiment}: {self.phase}, {self.time_s:.3f} s>"
+
+
+def _control(control: Any) -> Tuple[str, Dict[str, str]]:
+    """The mode of all joints, or those of some."""
+    if control is None:
+        return "", {}
+    if isinstance(control, str) and control:
+        return control, {}
+    if isinstance(control, Mapping) and control:
+        if all(isinstance(word, str) for item in control.items() for word in item):
+            return "", dict(control)
+    raise ValueError(f"control: {control!r}, wanted None, a mode, or a mode by joint")
+
+
+def _whole(name: str, value: Optional[int], most: int) -> Optional[int]:
+    if value is not None and not 0 <= operator.index(value) <= most:
+        raise ValueError(f"{name}: {value}, wanted 0 to {most}")
+    return value
+
+
+def _plain(value: Any) -> Any:
+    """Of numpy's kinds what TOML has a literal for."""
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value

@@ -1,0 +1,396 @@
+"""tandem.Run: the same bits as the program's, snapshots, faults, and what is refused."""
+
+import gc
+import os
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+import tandem
+
+HOLD, TRAJECTORY = "double_pendulum/hold.toml", "double_pendulum/trajectory.toml"
+
+
+def bits(run, cycles):
+    rows = []
+    for _ in range(cycles):
+        rows.append(b"".join(a.tobytes() for f in (run.state, run.sent, run.truth)
+                             for a in f._arrays.values()))  # fmt: skip
+        if not run.step():
+            break
+    return rows
+
+
+def swing(run):
+    """A law whose command depends on all that went before."""
+    run.command.torque[:] = 3.0 * np.sin(40.0 * run.time_s) - 2.0 * run.state.velocity
+
+
+def test_controllers_run_to_the_bits_of_the_program(config, log_file):
+    """log_file is the same experiment, by `tandem run`."""
+    state = tandem.Log(log_file)["state"]
+    run = tandem.Run(config / TRAJECTORY, duration_s=2)
+    seen = [(s.cycle[0], s.position.copy(), s.torque.copy()) for s in run]
+    assert run.over and run.phase == "shut-down" and not run.faults
+    assert len(seen) == 2000 and run.cycle == seen[-1][0] + 1  # of the last command
+    run.finish()
+    assert run.phase == "done" and run.cycle == state.cycle[-1, 0]
+    assert np.array_equal(run.state.position, state.position[-1])
+    for cycle, position, torque in seen:
+        assert np.array_equal(position, state.position[cycle])
+        assert np.array_equal(torque, state.torque[cycle])
+
+
+def test_command_acts_in_the_cycle_of_its_state(config):
+    run = tandem.Run(config / HOLD, control="torque")
+    cycle = run.cycle
+    run.command.torque[:] = 0.01
+    assert run.step() and run.cycle == cycle + 1
+    assert run.sent.cycle[0] == cycle and run.sent.mode[0] == 3
+
+
+def test_torque_moves_the_joint_its_way(config):
+    for sign in (1.0, -1.0):
+        run = tandem.Run(config / HOLD, control="torque")
+        before = run.truth.position.copy()
+        hold = run.command.torque.copy()  # begins with what is measured
+        for _ in range(100):
+            run.command.torque = hold + [0.5 * sign, 0.0]
+            run.step()
+        assert sign * (run.truth.position - before)[0] > 1e-4
+
+
+def test_python_and_a_controller_cannot_both_have_a_joint(config):
+    with pytest.raises(tandem.Error, match="joint1"):  # `hold` has it
+        tandem.Run(config / HOLD, control={"joint1": "torque"})
+
+
+def test_iteration_begins_with_the_state_that_there_is(config):
+    run = tandem.Run(config / HOLD, control="position")
+    first = run.cycle
+    assert [s.cycle[0] for s, _ in zip(run, range(3))] == [first, first + 1, first + 2]
+    run.step(10)
+    assert run.cycle == first + 13  # zip() had taken a fourth
+
+
+def test_saved_and_restored_it_goes_the_same_way(config):
+    run = tandem.Run(config / HOLD, control="torque", seed=3)
+    for _ in range(200):
+        swing(run)
+        run.step()
+    swing(run)
+    snapshot = run.save()
+    once, command = bits(run, 300), run.command.torque.copy()
+    run.restore(snapshot)
+    assert np.array_equal(run.command.torque, command)  # as it stood
+    assert bits(run, 300) == once
+    other = tandem.Run(config / HOLD, control="torque", seed=3)
+    other.restore(snapshot)
+    assert bits(other, 300) == once
+    assert not np.array_equal(np.frombuffer(once[0], np.uint8), np.frombuffer(once[299], np.uint8))
+
+
+def test_rewound_from_its_end_it_runs_again(config):
+    run = tandem.Run(config / TRAJECTORY, duration_s=0.2)
+    begin = run.save()
+    assert sum(1 for _ in run) == 200
+    end = run.state.position.copy()
+    with pytest.raises(tandem.Error, match="the run is over"):
+        run.step()
+    assert list(run) == [] and run.result["running_cycles"] == 200
+    run.restore(begin)
+    assert sum(1 for _ in run) == 200 and np.array_equal(run.state.position, end)
+
+
+def test_seeds_differ_and_repeat(config):
+    def path(seed):
+        run = tandem.Run(config / "panda/hold.toml", seed=seed, duration_s=0.1)
+        return np.array([s.position.copy() for s in run])
+
+    assert np.array_equal(path(1), path(1))
+    assert tandem.Run(config / HOLD, seed=7).seed == 7
+
+
+def test_many_cycles_in_a_step_are_single_ones(config):
+    one, many = (tandem.Run(config / TRAJECTORY) for _ in range(2))
+    for _ in range(250):
+        one.step()
+    many.step(250)
+    assert bits(one, 5) == bits(many, 5)
+
+
+def test_what_is_no_number_is_refused_before_it_is_commanded(config):
+    run = tandem.Run(config / HOLD, control="torque")
+    cycle = run.cycle
+    run.command.torque[1] = np.nan
+    with pytest.raises(ValueError, match="torque_Nm: of joint2 is not finite in cycle"):
+        run.step()
+    with pytest.raises(ValueError, match="joint2"):
+        next(iter(run)), next(iter(run))
+    assert run.cycle == cycle and not run.faults
+    run.command.torque[1] = 0.0
+    assert run.step() and run.cycle == cycle + 1  # it goes on
+
+
+def test_shapes_and_names_are_checked(config):
+    run = tandem.Run(config / HOLD, control="torque")
+    with pytest.raises(ValueError, match=r"command.torque: has the shape \(3,\), wanted \(2,\)"):
+        run.command.torque = [1.0, 2.0, 3.0]
+    with pytest.raises(ValueError, match="command.torque: of joint2 is not finite"):
+        run.command.torque = [1.0, np.inf]
+    with pytest.raises(ValueError):
+        run.command.torque[:] = np.zeros(3)
+    with pytest.raises(AttributeError, match="did you mean 'torque'"):
+        run.command.torqe = 1.0
+    with pytest.raises(tandem.UnknownName, match="did you mean 'velocity_rad_s'"):
+        run.state["velocty_rad_s"]
+    with pytest.raises(tandem.Error, match="cannot be written"):
+        run.state.position = 0.0
+    with pytest.raises(ValueError):
+        run.state.position[0] = 0.0
+    with pytest.raises(ValueError):
+        run.command.mode[0] = 1
+    with pytest.raises(KeyError, match="did you mean 'joint1'"):
+        run.joint("jiont1")
+    with pytest.raises(ValueError, match="cycles: 0"):
+        run.step(0)
+    assert run.state.units["torque"] == "Nm or N" and run.joint("joint2") == 1
+
+
+def test_observers_do_not_command(config):
+    run = tandem.Run(config / HOLD)
+    with pytest.raises(tandem.Error, match="cannot be written"):
+        run.command.torque = 0.0
+
+
+@pytest.mark.parametrize(
+    "arguments, kind, words",
+    [
+        ({"control": "torqe"}, tandem.UnknownName, "did you mean 'torque'"),
+        ({"control": {"jiont1": "torque"}}, KeyError, "did you mean 'joint1'"),
+        ({"hal": "can"}, tandem.Error, "Python steps a robot that is simulated in its own process"),
+        ({"hal": "dds"}, tandem.Error, "simulated in its own process"),
+        ({"hal": "cna"}, tandem.Error, "one of sim, can"),
+        ({"duration_s": -1.0}, tandem.Error, "duration_s"),
+        ({"on_fault": "laugh"}, tandem.Error, "one of end, wait"),
+        ({"scenario": "no/such.toml"}, FileNotFoundError, "no/such.toml"),
+        ({"seed": -1}, ValueError, "seed: -1, wanted 0 to"),
+        ({"seed": "1"}, TypeError, "str"),
+        ({"rate": -1.0}, ValueError, "rate: -1.0, wanted 0, or 0.01 to 1000"),
+        ({"rate": float("nan")}, ValueError, "rate: nan"),
+        ({"delay_cycles": 1001}, ValueError, "delay_cycles: 1001, wanted 0 to 1000"),
+        ({"control": ""}, ValueError, "control: '', wanted None, a mode, or a mode by joint"),
+        ({"control": {"joint1": 3}}, ValueError, "control: "),
+        ({"control": 3}, ValueError, "control: 3"),
+    ],
+)
+def test_arguments_that_do_not_fit(config, arguments, kind, words):
+    with pytest.raises(kind, match=words):
+        tandem.Run(config / HOLD, **arguments)
+
+
+def test_files_that_do_not_fit(tmp_path):
+    with pytest.raises(FileNotFoundError, match="none.toml"):
+        tandem.Run(tmp_path / "none.toml")
+    (tmp_path / "bad.toml").write_text('robot = 3\nduration = "long"\n')
+    with pytest.raises(tandem.Error) as error:
+        tandem.Run(tmp_path / "bad.toml")
+    assert len(str(error.value).splitlines()) > 1  # every error, a line each
+
+
+def test_pushes_and_faults(config):
+    run = tandem.Run(config / HOLD, control="position", on_fault="wait")
+    run.step(50)
+    before = run.truth.position.copy()
+    run.inject("push", joint="joint2", force_N=[5.0, 0, 0], for_s=0.05)
+    run.step(60)
+    assert np.abs(run.truth.position - before).max() > 1e-5
+    with pytest.raises(tandem.Error, match="did you mean 'joint2'"):
+        run.inject("push", joint="jiont2", force_N=[1, 0, 0])
+    run.inject("encoder_freeze", joint="joint1")
+    run.stop(category=1)
+    run.step(5)
+    assert run.phase == "faulted" and run.faults and "stop" in run.faults[0]["text"]
+    assert sum(1 for _, _ in zip(range(20), run)) == 20  # it goes on, as its rules say
+    run.finish()
+    assert run.over and run.phase == "done" and list(run) == []
+
+
+def test_a_fault_ends_the_run_by_default(config):
+    run = tandem.Run(config / HOLD, control="torque")
+    run.stop(0)
+    assert run.step() is False and run.over
+    run.finish()
+    assert run.phase == "done"
+    assert run.result["faults"][0]["category"] == 0
+
+
+def test_arrays_outlive_their_run(config):
+    run = tandem.Run(config / HOLD, control="torque")
+    state, torque = run.state, run.command.torque
+    position = state.position
+    kept = position.copy()
+    del run, state
+    gc.collect()
+    torque[:] = 1.0
+    assert np.array_equal(position, kept)
+
+
+def test_runs_are_freed(config):
+    def resident_kB():
+        with open("/proc/self/status") as status:
+            return int(next(line for line in status if line.startswith("VmRSS")).split()[1])
+
+    def many(count):
+        for _ in range(count):
+            tandem.Run(config / HOLD, control="torque").step(10)
+        gc.collect()
+        return resident_kB()
+
+    begun = many(10)
+    assert many(40) - begun < 40 * 300  # each has some 2 MB
+
+
+def test_two_runs_go_their_own_ways(config):
+    alone = tandem.Run(config / TRAJECTORY)
+    wanted = bits(alone, 100)
+    one, other = tandem.Run(config / TRAJECTORY), tandem.Run(config / "panda/hold.toml", control="torque")
+    seen = []
+    for _ in range(100):
+        seen += bits(one, 1)
+        other.step()
+    assert seen == wanted
+
+
+def test_runs_in_threads(config):
+    """Opened and stepped at once; each as if it were alone."""
+    alone = tandem.Run(config / TRAJECTORY)
+    alone.step(1500)
+    wanted, found = alone.truth.position.copy(), []
+
+    def work():
+        run = tandem.Run(config / TRAJECTORY)
+        run.step(1500)
+        found.append(run.truth.position.copy())
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 4 and all(np.array_equal(one, wanted) for one in found)
+
+
+def test_one_thread_at_a_time(config):
+    run = tandem.Run(config / HOLD, control="position", duration_s=1e5)
+    errors, stop = [], threading.Event()
+
+    def other():
+        while not stop.is_set():
+            try:
+                run.save()
+            except tandem.Error as error:
+                errors.append(str(error))
+                return
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    while thread.is_alive():
+        try:
+            run.step(2000)
+        except tandem.Error as error:
+            errors.append(str(error))
+            stop.set()
+            break
+    thread.join()
+    assert "another thread is in this run" in errors[0]
+    assert run.step()
+
+
+def test_ctrl_c_is_heard_and_the_run_goes_on(config):
+    run = tandem.Run(config / HOLD, control="position", duration_s=1e6)
+    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        run.step(10**9)
+    cycle = run.cycle
+    assert run.step() and run.cycle == cycle + 1
+    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        for _ in run:
+            pass
+    assert run.step() and not run.faults
+
+
+def scenario_with_a_push(folder):
+    file = folder / "push.toml"
+    file.write_text('[[fault]]\nkind = "push"\njoint = "joint2"\nforce_N = [1, 0, 0]\nfor_s = 0.1\n')
+    return file
+
+
+def test_snapshots_of_others_are_refused(config, tmp_path):
+    run = tandem.Run(config / HOLD, control="torque")
+    run.step(20)
+    own = run.save()
+    wanted = bits(run, 20)
+    flipped = bytearray(own)
+    flipped[len(own) // 2] ^= 1
+    run.restore(own)
+    for bad in (b"", b"tandem-run1", own[:-1], own + b"x", own[1:], bytes(flipped)):
+        with pytest.raises(ValueError, match="none of Run.save"):
+            run.restore(bad)
+    with pytest.raises(tandem.Error):
+        run.restore(tandem.Run(config / "panda/hold.toml", control="torque").save())
+    with pytest.raises(tandem.Error, match="other controllers"):
+        run.restore(tandem.Run(config / HOLD).save())
+    other = tandem.Run(config / HOLD, control="torque", scenario=scenario_with_a_push(tmp_path))
+    try:  # as far as it fits; else the run is as it was
+        run.restore(other.save())
+        run.restore(own)
+    except tandem.Error:
+        pass
+    assert bits(run, 20) == wanted
+
+
+def test_model_and_run_agree(config):
+    """Gravity compensation by the model holds the arm: signs, units and order are the same."""
+    run = tandem.Run(config / "panda/hold.toml", control="torque")
+    model = tandem.Model(run.robot_file)
+    order = model.indices(run.joints)
+    begin = run.truth.position.copy()
+    q = np.empty(model.nq)
+    for state, _ in zip(run, range(500)):
+        q[order] = state.position
+        run.command.torque = model.bias(q, np.zeros(model.nv))[order]
+    assert np.abs(run.truth.position - begin).max() < 0.02
+
+
+def test_estimate_is_there_where_the_experiment_wants_one(config):
+    assert tandem.Run(config / HOLD).estimate is None
+    run = tandem.Run(config / "coman/hand.toml", build=False)
+    run.step(300)
+    assert run.estimate.units and run.estimate.cycle[0] == run.cycle
+    assert any(array.any() for name, array in run.estimate._arrays.items() if "torque" in name)
+
+
+def test_a_joint_that_no_controller_has_is_led_beside_them(config, tmp_path):
+    experiment = tmp_path / "one.toml"
+    experiment.write_text(f"""
+robot = "{config}/double_pendulum/robot.toml"
+posture = "ready"
+duration_s = 1.0
+[[controller]]
+plugin = "joint_trajectory"
+[controller.parameters]
+joints = ["joint1"]
+[[controller.parameters.waypoint]]
+time_s = 0.5
+position_rad = [-0.3]
+""")
+    run = tandem.Run(experiment, control={"joint2": "position"})
+    begin = run.state.position.copy()
+    for state in run:
+        run.command.position[:] = begin + 0.1 * min(1.0, (run.time_s - 1.2) / 0.5)
+    assert np.allclose(run.sent.position, [-0.3, begin[1] + 0.1], rtol=0, atol=1e-12)
+    assert np.allclose(run.state.position, run.sent.position, rtol=0, atol=0.05)  # springs yield
