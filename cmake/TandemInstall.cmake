@@ -9,8 +9,13 @@ set(TANDEM_PLUGIN_HEADERS
   base/archive.hpp
   base/realtime.hpp
   base/result.hpp
+  base/seqlock.hpp
   base/toml_reader.hpp
   controllers/controller.hpp
+  controllers/controller_io.hpp
+  controllers/marks.hpp
+  controllers/signals.hpp
+  controllers/text_events.hpp
   hal/command_fields.inc
   hal/cycle_time.hpp
   hal/devices.hpp
@@ -20,11 +25,14 @@ set(TANDEM_PLUGIN_HEADERS
   hal/image.hpp
   hal/joint_capabilities.hpp
   hal/joint_devices.hpp
+  hal/mark_block.hpp
   hal/predictor.hpp
   hal/robot.hpp
   hal/sensor_devices.hpp
   hal/service_devices.hpp
+  hal/signal_block.hpp
   hal/state_fields.inc
+  hal/text_event.hpp
   hal/trapezoid.hpp
   model/kernels.h
   model/kinematic_loop.hpp)
@@ -44,8 +52,8 @@ function(tandem_install)
     FILES_MATCHING PATTERN "*_kernels.so")
   install(DIRECTORY config/ DESTINATION share/tandem/config
     PATTERN CMakeLists.txt EXCLUDE)
-  # The pages, and what they name, at the places where the pages look for it. Of the examples 03 and
-  # 06 are built there; 04 needs one installed header; the others link parts of the sources.
+  # The pages, and what they name, at the places where the pages look for it. Of the examples 03, 06
+  # and 08 are built there; 04 needs one installed header; the others link parts of the sources.
   set(doc ${CMAKE_INSTALL_DOCDIR})
   install(FILES LICENSE README.md CONTRIBUTING.md CHANGELOG.md DESTINATION ${doc})
   install(DIRECTORY docs examples DESTINATION ${doc} USE_SOURCE_PERMISSIONS
