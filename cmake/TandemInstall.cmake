@@ -37,8 +37,8 @@ function(tandem_install)
     FILES_MATCHING PATTERN "*_kernels.so")
   install(DIRECTORY config/ DESTINATION share/tandem/config
     PATTERN CMakeLists.txt EXCLUDE)
-  # The pages, and what they name, at the places where the pages look for it. Of the examples 03 and
-  # 06 are built there; 04 needs one installed header; the others link parts of the sources.
+  # The pages, and what they name, at the places where the pages look for it. Of the examples 03, 06
+  # and 08 are built there; 04 needs one installed header; the others link parts of the sources.
   set(doc ${CMAKE_INSTALL_DOCDIR})
   install(FILES LICENSE README.md CONTRIBUTING.md CHANGELOG.md DESTINATION ${doc})
   install(DIRECTORY docs examples DESTINATION ${doc} USE_SOURCE_PERMISSIONS

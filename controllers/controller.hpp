@@ -98,7 +98,42 @@ class ControllerSetup {
   };
   [[nodiscard]] std::span<const Plan> plans() const { return plans_; }
 
+  // What the controller tells beside its command: docs/controllers.md#signals. What is wrong with
+  // a declaration is an error of the controller's once configure() has returned.
+
+  /// A number of the controller's own: `depth_ = setup.signal("depth", "m", "of the crouch")`.
+  /// @param name  lower-case letters, digits and _; unique in the controller
+  /// @param unit  "rad", "Nm"; empty: it has none
+  [[nodiscard]] Signal signal(std::string name, std::string unit, std::string doc) {
+    return declare_signal(std::move(name), std::move(unit), std::move(doc), 1, false);
+  }
+  /// `count` numbers of one unit.
+  [[nodiscard]] Signal signals(std::string name, std::string unit, std::string doc,
+                               std::size_t count) {
+    return declare_signal(std::move(name), std::move(unit), std::move(doc), count, false);
+  }
+  /// A number for each joint, in the image's order; of a slide [m] and [N].
+  [[nodiscard]] Signal joint_signals(std::string name, std::string unit, std::string doc) {
+    return declare_signal(std::move(name), std::move(unit), std::move(doc), robot.joints.size(),
+                          true);
+  }
+  /// Lines of text from the cycle: `log_("stance changed", foot)`.
+  [[nodiscard]] TextEvents text_events() const { return TextEvents({io, &io->texts}); }
+  /// A shape for viewers. @param name  unique in the controller
+  [[nodiscard]] Mark mark(std::string name, hal::MarkStyle style) {
+    const std::size_t made = io->marks.declare(std::move(name), std::move(style));
+    return {{io, &io->marks}, made};
+  }
+
  private:
+  [[nodiscard]] Signal declare_signal(std::string name, std::string unit, std::string doc,
+                                      std::size_t count, bool by_joint) {
+    double* const at =
+        io->signals.declare(std::move(name), std::move(unit), std::move(doc), count, by_joint);
+    if (at == nullptr) return {};
+    return {{io, at}, count};
+  }
+
   std::vector<Claim> claims_;
   std::vector<Plan> plans_;
 };
@@ -157,13 +192,32 @@ inline constexpr std::uint32_t kControllerInterface = 14;
 /// The version, and below it a hash of the sizes that go with it: a change whose version nobody
 /// raised, or another standard library, is found as well.
 inline constexpr std::uint32_t kControllerAbi =
-    kControllerInterface << 16 |
-    hash_of({sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::Robot),
-             sizeof(hal::DrivenJoint), sizeof(hal::PassiveJoint), sizeof(hal::Follower),
-             sizeof(hal::Sensor), sizeof(hal::Site), sizeof(hal::Foot), sizeof(hal::Posture),
-             sizeof(model::KinematicLoop), sizeof(hal::StateImage), sizeof(hal::EstimateImage),
-             sizeof(hal::CommandImage), sizeof(hal::ParameterImage), sizeof(hal::Prediction),
-             sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels)});
+    kControllerInterface << 16 | hash_of({sizeof(ControllerSetup),
+                                          sizeof(ControllerSetup::Claim),
+                                          sizeof(hal::Robot),
+                                          sizeof(hal::DrivenJoint),
+                                          sizeof(hal::PassiveJoint),
+                                          sizeof(hal::Follower),
+                                          sizeof(hal::Sensor),
+                                          sizeof(hal::Site),
+                                          sizeof(hal::Foot),
+                                          sizeof(hal::Posture),
+                                          sizeof(model::KinematicLoop),
+                                          sizeof(hal::StateImage),
+                                          sizeof(hal::EstimateImage),
+                                          sizeof(hal::CommandImage),
+                                          sizeof(hal::ParameterImage),
+                                          sizeof(hal::Prediction),
+                                          sizeof(hal::CycleTime),
+                                          sizeof(TomlTable),
+                                          sizeof(tandem_kernels),
+                                          sizeof(ControllerIo),
+                                          sizeof(Signal),
+                                          sizeof(TextEvents),
+                                          sizeof(Mark),
+                                          sizeof(hal::SignalBlock),
+                                          sizeof(hal::MarkBlock),
+                                          sizeof(hal::TextEvent)});
 
 /// Whether `Class` has members of its own, but no archive(): what a snapshot may lack.
 template <class Class>

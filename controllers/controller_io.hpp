@@ -4,13 +4,21 @@
 #pragma once
 
 #include "base/archive.hpp"
+#include "controllers/marks.hpp"
+#include "controllers/signals.hpp"
+#include "controllers/text_events.hpp"
+#include "hal/signal_block.hpp"
 
 namespace tandem {
 
 /// One controller's. It outlives the controller, so that a handle into it never dangles.
 struct ControllerIo {
+  hal::SignalBlock signals;
+  hal::MarkBlock marks;
+  TextEventSlots texts;
+
   /// What the next cycles depend on.
-  void archive(Archive&) {}
+  void archive(Archive& ar) { ar(signals, marks, texts); }
 };
 
 }  // namespace tandem

@@ -37,6 +37,7 @@ class GravityCompensation : public Controller {
     if (!map) return std::unexpected(map.error());
     map_ = std::move(*map);
     kernels_ = setup.kernels;
+    weight_ = setup.joint_signals("weight", "Nm", "torque that holds the measured posture");
     ramp_s_ = setup.parameters.number_or("ramp_s", 1.0, kPositive);
     compliant_ =
         setup.parameters.choice_or("mode", "compliant", {"compliant", "torque"}) == "compliant";
@@ -70,6 +71,7 @@ class GravityCompensation : public Controller {
     for (const ClaimedJoint& joint : joints_) {
       const std::size_t j = joint.index;
       const double weight = tau_[map_.v_index(j)];
+      weight_.set(j, weight);
       if (compliant_) command.position_rad()[j] = joint.position_rad;
       command.velocity_rad_s()[j] = 0.0;
       command.stiffness_Nm_rad()[j] = joint.stiffness_Nm_rad;
@@ -189,6 +191,7 @@ class GravityCompensation : public Controller {
   ModelMap map_;
   std::optional<Support> support_;  // of a floating base
   std::optional<Imu> imu_;
+  Signal weight_;
   bool compliant_ = true;
   double ramp_s_ = 1.0;
   std::int64_t start_ns_ = 0;

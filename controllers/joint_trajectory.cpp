@@ -14,6 +14,7 @@
 #include "controllers/motion_plan.hpp"
 #include "controllers/parameters.hpp"
 #include "controllers/segment.hpp"
+#include "controllers/tracking.hpp"
 
 namespace tandem {
 namespace {
@@ -33,6 +34,8 @@ class JointTrajectory : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     TomlTable& parameters = setup.parameters;
+    progress_ = setup.signal("progress", "", "share of the plan's time that is over");
+    worst_error_ = setup.signal("worst_error", "rad", kWorstErrorDoc);
     const std::string interpolation =
         parameters.choice_or("interpolation", "min_jerk", {"min_jerk", "quintic", "fourier"});
     through_ = interpolation == "quintic";
@@ -87,7 +90,20 @@ class JointTrajectory : public Controller {
 
   Code update(const hal::CycleTime& time, const hal::StateImage& state,
               hal::CommandImage& command) noexcept TANDEM_RT override {
-    const double t_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
+    const Code code = lead(static_cast<double>(time.time_ns - start_ns_) * 1e-9, state, command);
+    worst_error_ = worst_error(joints_, state, command);
+    return code;
+  }
+
+  void archive(Archive& ar) override {
+    ar(start_ns_, segment_, points_, series_.start_rad(), here_rad_, turned_rad_, approach_s_);
+  }
+
+ private:
+  Code lead(double t_s, const hal::StateImage& state,
+            hal::CommandImage& command) noexcept TANDEM_RT {
+    const double end_s = series_.used() ? series_.end_s() : approach_s_ + times_s_.back();
+    progress_ = end_s > 0.0 ? std::min(1.0, t_s / end_s) : 1.0;
     if (series_.used()) {
       series_.play(t_s, joints_, command);
       damp_links(state, command);
@@ -112,11 +128,6 @@ class JointTrajectory : public Controller {
     return segment_ == last && stop_at_end_ ? Code::kStopped : Code::kOk;
   }
 
-  void archive(Archive& ar) override {
-    ar(start_ns_, segment_, points_, series_.start_rad(), here_rad_, turned_rad_, approach_s_);
-  }
-
- private:
   /// Where the joints are: the first point of the path, unless that is planned; then the way to it,
   /// no faster than half of each joint's speed. Turned angles go as a whole to where the joint is.
   void begin_at(std::span<const double> position_rad) noexcept TANDEM_RT {
@@ -396,6 +407,7 @@ class JointTrajectory : public Controller {
     return quintic(from, to, duration, t_s);
   }
 
+  Signal progress_, worst_error_;
   FourierSeries series_;
   bool through_ = false;
   bool stop_at_end_ = false;

@@ -8,6 +8,7 @@
 #include "controllers/min_jerk.hpp"
 #include "controllers/motion_plan.hpp"
 #include "controllers/parameters.hpp"
+#include "controllers/tracking.hpp"
 #include "log/joint_motion.hpp"
 
 namespace tandem {
@@ -21,6 +22,8 @@ class RecordedMotion : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     TomlTable& parameters = setup.parameters;
+    progress_ = setup.signal("progress", "", "share of the recording that is played");
+    worst_error_ = setup.signal("worst_error", "rad", kWorstErrorDoc);
     const std::string path = parameters.text("log");
     const std::string sha256 = parameters.text_or("data_sha256", "");
     log::MotionRequest request;
@@ -74,20 +77,9 @@ class RecordedMotion : public Controller {
   Code update(const hal::CycleTime& time, const hal::StateImage& state,
               hal::CommandImage& command) noexcept TANDEM_RT override {
     const std::int64_t since = (time.time_ns - start_ns_) / time.period_ns;
-    if (since < approach_cycles_) {
-      approach(static_cast<double>(since) / static_cast<double>(approach_cycles_), time, command);
-      damp_links(state, command);
-      return Code::kOk;
-    }
-    const std::size_t last = plan_.cycles() - 1;
-    const std::size_t cycle = std::min(static_cast<std::size_t>(since - approach_cycles_), last);
-    for (std::size_t k = 0; k < joints_.size(); ++k) {
-      command.position_rad()[joints_[k]] = plan_.position(k, cycle);
-      command.velocity_rad_s()[joints_[k]] = plan_.velocity(k, cycle);
-      command.torque_Nm()[joints_[k]] = plan_.has_torque() ? plan_.torque(k, cycle) : 0.0;
-    }
-    damp_links(state, command);
-    return cycle == last && stop_at_end_ ? Code::kStopped : Code::kOk;
+    const Code code = play(since, time, state, command);
+    worst_error_ = worst_error(joints_, state, command);
+    return code;
   }
 
   void archive(Archive& ar) override { ar(start_ns_, approach_cycles_, from_); }
@@ -96,6 +88,26 @@ class RecordedMotion : public Controller {
   struct From {
     double position_rad = 0.0, torque_Nm = 0.0;
   };
+
+  Code play(std::int64_t since, const hal::CycleTime& time, const hal::StateImage& state,
+            hal::CommandImage& command) noexcept TANDEM_RT {
+    progress_ = 0.0;
+    if (since < approach_cycles_) {
+      approach(static_cast<double>(since) / static_cast<double>(approach_cycles_), time, command);
+      damp_links(state, command);
+      return Code::kOk;
+    }
+    const std::size_t last = plan_.cycles() - 1;
+    const std::size_t cycle = std::min(static_cast<std::size_t>(since - approach_cycles_), last);
+    progress_ = static_cast<double>(cycle + 1) / static_cast<double>(last + 1);
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+      command.position_rad()[joints_[k]] = plan_.position(k, cycle);
+      command.velocity_rad_s()[joints_[k]] = plan_.velocity(k, cycle);
+      command.torque_Nm()[joints_[k]] = plan_.has_torque() ? plan_.torque(k, cycle) : 0.0;
+    }
+    damp_links(state, command);
+    return cycle == last && stop_at_end_ ? Code::kStopped : Code::kOk;
+  }
 
   /// One number for all joints, or a table with those that are damped.
   void read_damping(ControllerSetup& setup) {
@@ -170,6 +182,7 @@ class RecordedMotion : public Controller {
   std::vector<std::size_t> joints_;
   std::vector<hal::DrivenJoint> limits_;
   std::vector<double> link_damping_Nms_rad_;  // by joint, as `joints_`
+  Signal progress_, worst_error_;
   MotionPlan plan_;
   double approach_s_ = 0.0, speed_ = 1.0;
   bool stop_at_end_ = false;

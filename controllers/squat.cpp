@@ -108,6 +108,9 @@ class Squat : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     read(setup.parameters);
+    depth_ = setup.signal("depth", "m", "how far the base is asked to be below its start");
+    height_ = setup.signal("height", "m", "of the base above the feet, as it is asked for");
+    residual_ = setup.signal("residual", "m", "of feet and centre of mass, before the last step");
     setup.plan(setup.parameters, "cycles", plan_.start_s + plan_.cycles * plan_.period_s);
     const hal::Posture* posture = posture_parameter(setup);
     const std::vector<std::string> feet =
@@ -147,7 +150,11 @@ class Squat : public Controller {
     const double back_s = static_cast<double>(time.time_ns - retreat_ns_) * 1e-9;
     const Plan::Way way = retreats_ != 0 ? retreat_.at(back_s) : plan_.at(t_s);
     stance_->predict(period_s_);
-    if (!stance_->solve(height_m_ - way.down_m, kCycleSolve).converged) return Code::kFault;
+    const Stance::Solution solution = stance_->solve(height_m_ - way.down_m, kCycleSolve);
+    depth_ = way.down_m;
+    height_ = height_m_ - way.down_m;
+    residual_ = solution.residual;
+    if (!solution.converged) return Code::kFault;
     stance_->move(-way.rate_m_s);
     const std::span<const double> v = stance_->v();
     for (std::size_t i = 0; i < v.size(); ++i) {
@@ -266,6 +273,7 @@ class Squat : public Controller {
   }
 
   Plan plan_;
+  Signal depth_, height_, residual_;
   std::optional<Stance> stance_;
   double period_s_ = 0.0;
   std::int64_t start_ns_ = 0;

@@ -1,6 +1,7 @@
 // tool_path: a site of the robot follows a path in space, by damped inverse kinematics.
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -115,6 +116,8 @@ class ToolPath : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     TomlTable& parameters = setup.parameters;
+    target_ = setup.signals("target", "m", "where the site is to be, in the base's frame", 3);
+    miss_ = setup.signal("miss", "m", "by which the references leave the site beside its path");
     joints_ = joints_parameter(setup);
     for (const std::size_t joint : joints_) setup.claim(joint, hal::ControlMode::kPosition);
     const std::string site = parameters.text("site");
@@ -153,7 +156,8 @@ class ToolPath : public Controller {
   Code update(const hal::CycleTime& time, const hal::StateImage& /*state*/,
               hal::CommandImage& command) noexcept TANDEM_RT override {
     const double t_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
-    (void)follow(t_s);
+    miss_ = follow(t_s);
+    target_.set(target_m_);
     for (std::size_t k = 0; k < joints_.size(); ++k) {
       command.position_rad()[joints_[k]] = reference_[joints_[k]];
       command.velocity_rad_s()[joints_[k]] = move_[static_cast<Eigen::Index>(k)] / period_s_;
@@ -220,7 +224,9 @@ class ToolPath : public Controller {
   /// One step of the references towards the path, no joint faster than it may be or out of range.
   /// @return what the site missed it by before [m]
   double follow(double t_s) noexcept TANDEM_RT {
-    const Eigen::Vector3d error = wanted_m(t_s) - site_m();
+    const Eigen::Vector3d wanted = wanted_m(t_s);
+    Eigen::Map<Eigen::Vector3d>(target_m_.data()) = wanted;
+    const Eigen::Vector3d error = wanted - site_m();
     kernels_->site_jacobians_at(sines_.data(), q_.data(), jacobians_.data());
     const std::size_t nv = kernels_->nv;
     const double* J = &jacobians_[6 * nv * site_];
@@ -285,6 +291,8 @@ class ToolPath : public Controller {
   std::vector<Place> places_;
   double scale_ = 1.0, period_s_ = 1e-3;
   bool stop_at_end_ = false;
+  Signal target_, miss_;
+  std::array<double, 3> target_m_{};
   std::vector<double> q_, zero_, pose_, motion_, jacobians_;
   Eigen::Matrix3Xd J_;
   Eigen::VectorXd move_, back_;  // (joints) in a cycle [rad or m]

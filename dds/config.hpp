@@ -41,12 +41,13 @@ enum class Topic : std::uint8_t {
   kCommand,
   kStatistics,
   kParallel,  ///< of the robot beside this one, when there is one
+  kSignals,   ///< of every controller that declares some
 };
 struct TopicPeriod {
   std::string_view key;     ///< of [dds.every]
   std::int64_t default_ns;  ///< between two samples, unless the key says otherwise; 0: none
 };
-inline constexpr std::array<TopicPeriod, 12> kTopicPeriods{{
+inline constexpr std::array<TopicPeriod, 13> kTopicPeriods{{
     {"joint_states", 10'000'000},
     {"dynamic_joint_states", 0},
     {"imu", 10'000'000},
@@ -59,6 +60,7 @@ inline constexpr std::array<TopicPeriod, 12> kTopicPeriods{{
     {"command", 10'000'000},
     {"statistics", 1'000'000'000},
     {"parallel", 10'000'000},
+    {"signals", 10'000'000},
 }};
 
 /// [dds]

@@ -91,7 +91,7 @@ Publisher::Publisher(Participant& participant, const RunDescription& run)
   if (!run.parallel) every_[static_cast<std::size_t>(Topic::kParallel)] = 0;
   if (run.simulated_time) clock_ = maker.periodic<rosgraph_msgs::Clock>(Topic::kClock, "clock");
   for (MakeTopics* topics : {joint_topics, sensor_topics, wrench_topics, frame_topics, image_topics,
-                             diagnostic_topics}) {
+                             diagnostic_topics, controller_topics}) {
     groups_.push_back(topics(maker, run));
   }
   if (run.parallel) groups_.push_back(parallel_topics(maker, run));
@@ -141,8 +141,10 @@ void Publisher::copy_due(const hal::CycleView& view, std::uint64_t number) noexc
   image_ring_.end_push();
 }
 
-void Publisher::start(FaultFeed faults, hal::ParallelSource* parallel) {
+void Publisher::start(FaultFeed faults, hal::ParallelSource* parallel,
+                      const ControllerFeed& controllers) {
   for (const auto& group : groups_) group->show(parallel);
+  for (const auto& group : groups_) group->follow(controllers);
   fault_source_ = std::move(faults);
   wall_offset_ns_ = wall_less_monotonic();
   offset_due_ = SteadyClock::now() + kOffsetGood;
@@ -164,6 +166,7 @@ void Publisher::run() {
     const std::int64_t newest_ns = newest_ns_.load(std::memory_order_acquire);  // and this, too
     const bool some = drain();
     look_at_faults();
+    for (const auto& group : groups_) group->publish_texts(stamp_less_time_ns_);
     if (!some) clock_ns_ = newest_ns;  // whether or not the cycle had a place in the ring
     if (simulated_time_ && SteadyClock::now() >= clock_due_) publish_clock();
     if (last) return;
@@ -227,6 +230,7 @@ void Publisher::publish(std::span<const std::byte> slot) {
                            .estimate = head.estimate ? &*estimate_ : nullptr,
                            .loop = loop_,
                            .faults = faults_};
+  stamp_less_time_ns_ = sample.stamp_ns - head.time.time_ns;
   if (sample.is_due(Topic::kClock)) publish_clock();  // before what is stamped with it
   for (const auto& group : groups_) group->publish(sample);
 }

@@ -38,7 +38,8 @@ class Publisher final : public hal::CycleObserver {
 
   /// Publishes what does not change, and starts the thread.
   /// @param parallel  the second robot of RunDescription::parallel; null: there is none
-  void start(FaultFeed faults, hal::ParallelSource* parallel = nullptr);
+  void start(FaultFeed faults, hal::ParallelSource* parallel = nullptr,
+             const ControllerFeed& controllers = {});
   /// Publishes what is in the ring, and ends the thread. Once, when no cycle comes any more.
   PublishCounts stop();
 
@@ -97,7 +98,8 @@ class Publisher final : public hal::CycleObserver {
   std::int64_t clock_ns_ = 0;               // that `clock` publishes next
   std::atomic<std::int64_t> newest_ns_{0};  // of take()'s last cycle
   std::chrono::steady_clock::time_point clock_due_, offset_due_;
-  std::int64_t wall_offset_ns_ = 0;  // the wall clock less the loop's
+  std::int64_t wall_offset_ns_ = 0;      // the wall clock less the loop's
+  std::int64_t stamp_less_time_ns_ = 0;  // of the last published cycle
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

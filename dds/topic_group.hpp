@@ -15,7 +15,9 @@
 #include "hal/config/robot_config.hpp"
 #include "hal/cycle_observer.hpp"
 #include "hal/parallel_source.hpp"
+#include "hal/signal_block.hpp"
 #include "hal/stop_category.hpp"
+#include "hal/text_event.hpp"
 #include "model/tree.hpp"
 #include "rt/histogram.hpp"
 
@@ -31,6 +33,16 @@ struct FaultEntry {
   hal::StopCategory category = hal::StopCategory::kWarn;
   bool latched = true;
   double cleared_s = 0.0;  ///< when it is not latched
+};
+
+/// Source of what controllers tell; called on the publisher's thread. Empty: they tell nothing.
+struct ControllerFeed {
+  using Signals = std::pair<std::string, std::shared_ptr<const hal::SignalBlock>>;
+
+  std::function<std::uint64_t()> version{};  ///< not 0; another one: controllers came or went
+  std::function<std::vector<Signals>()> signals{};  ///< by controller
+  /// Appends what was said after the first `seen`, and raises it.
+  std::function<void(std::uint64_t& seen, std::vector<hal::TextEvent>&)> texts{};
 };
 
 /// What is the same in every cycle of a run.
@@ -93,6 +105,8 @@ class Output {
   Output() = default;
   Output(Writer<T> writer, PublishCounts& counts) : writer_(std::move(writer)), counts_(&counts) {}
 
+  /// Whether there is a topic.
+  [[nodiscard]] bool exists() const { return writer_.has_value(); }
   /// Whether somebody would get a sample.
   [[nodiscard]] bool wanted() const { return writer_ && writer_->endpoint().matched() > 0; }
   void write(const T& sample) {
@@ -126,12 +140,21 @@ class OutputMaker {
   [[nodiscard]] Output<T> latched(const std::string& ros_name) {
     return make<T>(ros_name, {.reliable = true, .transient_local = true, .depth = 1});
   }
+  /// ROS 2's /rosout, which every node has in common, in no namespace.
+  [[nodiscard]] Output<rcl_interfaces::Log> rosout() {
+    return make_named<rcl_interfaces::Log>(
+        "rt/rosout", {.reliable = true, .transient_local = true, .depth = 100});
+  }
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
 
  private:
   template <class T>
   Output<T> make(const std::string& ros_name, const Qos& qos) {
-    auto writer = Writer<T>::create(participant_, participant_.topic_name(ros_name), qos);
+    return make_named<T>(participant_.topic_name(ros_name), qos);
+  }
+  template <class T>
+  Output<T> make_named(const std::string& topic, const Qos& qos) {
+    auto writer = Writer<T>::create(participant_, topic, qos);
     if (writer) return Output<T>(std::move(*writer), counts_);
     if (!error_) error_ = writer.error();
     return {};
@@ -153,6 +176,10 @@ class TopicGroup {
   virtual void publish(const CycleSample& sample) = 0;
   /// Faults have come or gone.
   virtual void publish_faults(const std::vector<FaultEntry>& /*faults*/, std::uint64_t /*lost*/) {}
+  /// What controllers have said since the last call. @param stamp_less_time_ns  of a cycle
+  virtual void publish_texts(std::int64_t /*stamp_less_time_ns*/) {}
+  /// Where controllers' signals and words come from. Before the first cycle.
+  virtual void follow(const ControllerFeed& /*feed*/) {}
   /// Where a second robot's cycles come from; null: nowhere. Before the first cycle.
   virtual void show(hal::ParallelSource* /*second*/) {}
 };
@@ -160,7 +187,7 @@ class TopicGroup {
 /// Makes the topics of one file, NAME_topics.cpp.
 using MakeTopics = std::unique_ptr<TopicGroup>(OutputMaker& maker, const RunDescription& run);
 MakeTopics joint_topics, sensor_topics, frame_topics, image_topics, diagnostic_topics,
-    parallel_topics;
+    parallel_topics, controller_topics;
 MakeTopics wrench_topics;  ///< @pre run.wrenches are sites of run.robot
 
 /// A name as ROS 2 allows it in a topic: what is no letter, digit or _ becomes _.

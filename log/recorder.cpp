@@ -8,12 +8,14 @@
 #include <limits>
 #include <utility>
 
+#include "log/controller_messages.hpp"
 #include "log/schema.hpp"
 
 namespace tandem::log {
 namespace {
 
 constexpr Recorder::Channel kEventChannel = 0;
+constexpr Recorder::Channel kTextChannel = 0xFFFF;  // in the ring: of a TextEvent
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
 }  // namespace
@@ -76,10 +78,39 @@ Recorder::Channel Recorder::add_channel(const std::string& topic, const std::str
   return channel;
 }
 
+Recorder::Channel Recorder::add_late_channel(const std::string& topic, const std::string& type,
+                                             const std::string& ros2msg, Encode encode) {
+  const std::lock_guard lock(late_mutex_);
+  for (int number = 1;; ++number) {
+    const std::string ending = number == 1 ? "" : "_" + std::to_string(number);
+    const auto taken = std::ranges::find(late_, topic + ending, &LateChannel::topic);
+    if (taken != late_.end() && taken->ros2msg != ros2msg) continue;
+    const auto index = static_cast<std::size_t>(taken - late_.begin());
+    if (taken == late_.end()) {
+      const std::string type_ending = number == 1 ? "" : std::to_string(number);
+      late_.push_back({topic + ending, type + type_ending, ros2msg, std::move(encode)});
+    }
+    return static_cast<Channel>(first_late_ + index);
+  }
+}
+
+/// Before the first message of one of them, and at the end.
+void Recorder::add_new_channels() {
+  const std::lock_guard lock(late_mutex_);
+  for (std::size_t i = encoders_.size(); i < late_.size(); ++i) {
+    const LateChannel& one = late_[i];
+    const std::uint16_t schema = writer_.add_schema(one.type, "ros2msg", one.ros2msg);
+    writer_.add_channel(schema, one.topic, "cdr");
+    encoders_.push_back(one.encode);
+  }
+}
+
 void Recorder::open_side(std::int64_t lag_ns) { side_lag_ns_ = lag_ns; }
 
 void Recorder::start() {
   view_.add_channels(writer_);
+  first_late_ = writer_.channels();
+  largest_ = std::max(largest_, kMostLateBytes);
   const std::size_t slot_bytes = (sizeof(Slot) + largest_ + 7) / 8 * 8;
   ring_ = std::make_unique<SpscRing>(slot_bytes, ring_slots_);
   if (side_lag_ns_ >= 0) side_ = std::make_unique<SpscRing>(slot_bytes, ring_slots_);
@@ -101,6 +132,7 @@ bool Recorder::push(SpscRing& ring, Channel channel, std::int64_t time_ns,
   const std::span<std::byte> slot = ring.begin_push();
   if (slot.empty()) return false;
   const Slot head{time_ns, static_cast<std::uint32_t>(image.size()), channel};
+  if (image.size() > slot.size() - sizeof head) return false;
   std::memcpy(slot.data(), &head, sizeof head);
   std::memcpy(slot.data() + sizeof head, image.data(), image.size());
   ring.end_push();
@@ -109,6 +141,10 @@ bool Recorder::push(SpscRing& ring, Channel channel, std::int64_t time_ns,
 
 bool Recorder::push(const Event& event) noexcept TANDEM_RT {
   return push(kEventChannel, event.time_ns, std::as_bytes(std::span(&event, 1)));
+}
+
+bool Recorder::push(const hal::TextEvent& event) noexcept TANDEM_RT {
+  return push(kTextChannel, event.time_ns, std::as_bytes(std::span(&event, 1)));
 }
 
 void Recorder::wait_for_space(std::size_t messages) const noexcept { wait_for(*ring_, messages); }
@@ -159,9 +195,36 @@ void Recorder::write(std::span<const std::byte> slot) {
     write(head.channel, head.time_ns, event_);
     return;
   }
+  if (head.channel == kTextChannel) {
+    hal::TextEvent event;
+    std::memcpy(&event, body.data(), sizeof event);
+    return write_text(event);
+  }
+  if (head.channel >= first_late_) {
+    const auto late = static_cast<std::size_t>(head.channel - first_late_);
+    if (late >= encoders_.size()) add_new_channels();
+    if (!encoders_[late]) return write(head.channel, head.time_ns, body);
+    encoders_[late](head.time_ns, body, event_);
+    return write(head.channel, head.time_ns, event_);
+  }
   write(head.channel, head.time_ns, body);
   view_.follow(head.channel, head.time_ns, body,
                [&](Channel channel, auto message) { write(channel, head.time_ns, message); });
+}
+
+void Recorder::write_text(const hal::TextEvent& event) {
+  if (rosout_ < 0) {
+    rosout_ = add_late_channel("/rosout", kRosoutType, rosout_definition());
+    add_new_channels();
+  }
+  encode_event({.cycle = event.cycle,
+                .time_ns = event.time_ns,
+                .code = static_cast<std::uint32_t>(event.level),
+                .kind = EventKind::kText},
+               std::string(event.controller()) + ": " + event.words(), event_);
+  write(kEventChannel, event.time_ns, event_);
+  encode_rosout(event, event.time_ns, event_);
+  write(static_cast<Channel>(rosout_), event.time_ns, event_);
 }
 
 void Recorder::write(Channel channel, std::int64_t time_ns, std::span<const std::byte> body) {
@@ -179,6 +242,7 @@ void Recorder::stop_thread() {
 
 RecordingResult Recorder::close(const StringMap& extra) {
   stop_thread();
+  add_new_channels();
   RecordingResult result;
   result.path = path_;
   result.messages = writer_.messages();

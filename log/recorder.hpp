@@ -1,12 +1,14 @@
 // Takes every cycle's images from the RT thread and writes them to an MCAP file on its own
 // thread.
-// Layer: log.  Thread: open/add_channel/start/close non-RT; push RT; wait_for_space the loop's
-// wait stage.
+// Layer: log.  Thread: open/start/close non-RT; add_channel any but the loop's; push RT;
+// wait_for_space the loop's wait stage.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -15,6 +17,7 @@
 #include "base/result.hpp"
 #include "base/spsc_ring.hpp"
 #include "hal/image.hpp"
+#include "hal/text_event.hpp"
 #include "log/data_hash.hpp"
 #include "log/event.hpp"
 #include "log/info.hpp"
@@ -62,6 +65,16 @@ class Recorder {
   /// "tandem/msg/State". The channel /tandem/event exists always.
   [[nodiscard]] Channel add_channel(const std::string& topic, const std::string& type,
                                     const hal::Layout& layout);
+  /// Makes a message's body of what was pushed; called on the recorder's thread.
+  using Encode = std::function<void(std::int64_t time_ns, std::span<const std::byte>, Bytes& out)>;
+  /// A channel that may also come while it records, from any thread but the loop's, before its
+  /// first message is pushed. Where the topic has a channel of the same definition, it is that one;
+  /// where it has one of another, "_2" is added to the topic and "2" to the type, or the next number.
+  /// @param ros2msg  definition of its messages
+  /// @param encode   empty: what is pushed is the body, at most kMostLateBytes
+  [[nodiscard]] Channel add_late_channel(const std::string& topic, const std::string& type,
+                                         const std::string& ros2msg, Encode encode = {});
+  static constexpr std::size_t kMostLateBytes = 4080;
   /// One other thread will push, too. Its messages follow in the file when the loop's are `lag_ns`
   /// further, or at the end: with a loop that is never further ahead than that, the file does not
   /// depend on the threads' pace. Before start().
@@ -79,6 +92,8 @@ class Recorder {
   bool push(Channel channel, std::int64_t time_ns,
             std::span<const std::byte> image) noexcept TANDEM_RT;
   bool push(const Event& event) noexcept TANDEM_RT;
+  /// A controller's words: an event, and a line of /rosout.
+  bool push(const hal::TextEvent& event) noexcept TANDEM_RT;
 
   /// The same from that other thread.
   bool push_side(Channel channel, std::int64_t time_ns, std::span<const std::byte> image) noexcept;
@@ -113,6 +128,8 @@ class Recorder {
   void write_side(std::int64_t up_to_ns);
   void write(std::span<const std::byte> slot);
   void write(Channel channel, std::int64_t time_ns, std::span<const std::byte> body);
+  void write_text(const hal::TextEvent& event);
+  void add_new_channels();
   void stop_thread();
 
   std::string path_;
@@ -131,6 +148,17 @@ class Recorder {
   std::string trouble_;     // the writer's thread, before failed_
   std::uint64_t lost_ = 0;  // the writer's thread, read after its end
   Bytes event_;             // reused
+
+  /// A channel that came by add_late_channel().
+  struct LateChannel {
+    std::string topic, type, ros2msg;
+    Encode encode;
+  };
+  Channel first_late_ = 0;  // from start() on
+  std::mutex late_mutex_;
+  std::vector<LateChannel> late_;  // the asking threads'; in the order of their numbers
+  std::vector<Encode> encoders_;   // the writer's thread: of those that it has added
+  int rosout_ = -1;                // the same: the channel, once there are words
 };
 
 }  // namespace tandem::log

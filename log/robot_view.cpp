@@ -24,8 +24,8 @@ constexpr Definition kDefinitions[] = {
 constexpr char kWorld[] = "odom";  // as over DDS
 
 std::uint16_t add(McapWriter& writer, const char* topic, std::string_view type) {
-  const auto* found = std::ranges::find(kDefinitions, type, &Definition::name);
-  return writer.add_channel(writer.add_schema(found->name, "ros2msg", found->text), topic, "cdr");
+  return writer.add_channel(writer.add_schema(type, "ros2msg", view_definition(type)), topic,
+                            "cdr");
 }
 
 /// std_msgs/Header
@@ -44,6 +44,10 @@ void read_field(const hal::Layout& layout, std::string_view name, std::span<cons
 }
 
 }  // namespace
+
+std::string_view view_definition(std::string_view type) {
+  return std::ranges::find(kDefinitions, type, &Definition::name)->text;
+}
 
 RobotView::RobotView(ViewedRobot robot, std::vector<std::string> joints)
     : robot_(std::move(robot)), joints_(std::move(joints)) {}

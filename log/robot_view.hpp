@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hal/follower.hpp"
@@ -15,6 +16,10 @@
 #include "log/mcap_writer.hpp"
 
 namespace tandem::log {
+
+/// The definition of a type that viewers know, with those that it needs ("ros2msg"). @pre it is one
+/// of log/CMakeLists.txt's
+[[nodiscard]] std::string_view view_definition(std::string_view type);
 
 /// The robot, as viewers want to know it.
 struct ViewedRobot {

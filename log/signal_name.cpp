@@ -52,8 +52,10 @@ std::string signal_name(const hal::Field& field, std::size_t index, const RunInf
       first += sensor.channels;
     }
   }
-  const bool per_joint =
-      count.empty() || count == "joints";  // of another's field its count says it
+  // Of another's field its count says it; a controller's signal says it itself.
+  const bool signal = count.empty() && field.doc.starts_with('[');
+  const bool per_joint = signal ? field.doc.find("] by joint: ") != std::string::npos
+                                : count.empty() || count == "joints";
   if (per_joint && field.count == info.joints.size()) return field.name + "." + info.joints[index];
   return field.name + "." + std::to_string(index);
 }

@@ -274,7 +274,8 @@ std::vector<std::string> close_and_remark(const std::vector<RunData*>& all,
 
 /// All figures of the report, in its order. `parallel`: the other run is the internal model.
 Result<std::vector<Figure>> draw_all(const RunData& run, const OtherRuns& others, bool parallel,
-                                     const tandem_kernels* kernels) {
+                                     const tandem_kernels* kernels,
+                                     std::vector<std::string>& remarks) {
   std::vector<Figure> figures = figures_of(run, others, kernels);
   if (parallel) {
     for (Figure& figure : difference_figures(run, *others.front()))
@@ -282,8 +283,12 @@ Result<std::vector<Figure>> draw_all(const RunData& run, const OtherRuns& others
   }
   auto wrenches = wrench_figures(run);
   if (!wrenches) return std::unexpected(wrenches.error());
-  figures.insert(figures.end() - 1, std::make_move_iterator(wrenches->begin()),
-                 std::make_move_iterator(wrenches->end()));
+  auto signals = signal_figures(run, remarks);
+  if (!signals) return std::unexpected(signals.error());
+  for (auto* more : {&*wrenches, &*signals}) {
+    figures.insert(figures.end() - 1, std::make_move_iterator(more->begin()),
+                   std::make_move_iterator(more->end()));
+  }
   for (Figure& figure : figures)
     if (!figure.equal_axes) break_at_gaps(figure);  // all but the posture are over time
   return figures;
@@ -314,7 +319,7 @@ Result<ReportFiles> make_report(const std::string& log, const std::vector<std::s
   for (RunData& one : *other_runs) all.push_back(&one);
   files.remarks = close_and_remark(all, kernels);
   const OtherRuns others(all.begin() + 1, all.end());
-  const auto drawn = draw_all(*run, others, beside->has_value(), kernels);
+  const auto drawn = draw_all(*run, others, beside->has_value(), kernels, files.remarks);
   if (!drawn) return std::unexpected(drawn.error());
   const std::vector<Figure>& figures = *drawn;
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());

@@ -9,6 +9,18 @@
 namespace tandem::runtime {
 namespace {
 
+/// Nothing more is declared. Errors name the controller, and what of it is wrong.
+Status close_io(const std::string& controller, ControllerIo& io) {
+  const auto of = [&](const char* what, const Error& error) {
+    return fail_at(controller,
+                   "its " + (what + (" '" + error.key.substr(0, 64) + "' ")) + error.message,
+                   error.hint);
+  };
+  if (const Status signals = io.signals.close(); !signals) return of("signal", signals.error());
+  if (const Status marks = io.marks.check(); !marks) return of("mark", marks.error());
+  return {};
+}
+
 CycleAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
   return {.reason = why, .one = static_cast<std::int32_t>(one)};
 }
@@ -142,6 +154,9 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
   setup.parameters.finish();
   if (Status claims = check_claims(name, setup.claims()); !claims) {
     return std::unexpected(claims.error());
+  }
+  if (const Status closed = close_io(name, *setup.io); !closed) {
+    return std::unexpected(closed.error());
   }
   auto made = std::make_unique<HostedController>();
   made->name = name;
@@ -323,6 +338,7 @@ Code ControllerHost::update(const hal::CycleTime& time, JointImages images) noex
     if (!is_active(slot)) continue;
     HostedController& one = *table_[slot];
     if ((done_ & only(slot)) == 0) {
+      updated_ |= only(slot);
       const Code code = call_update(one, time, images);
       if (code == Code::kStopped) {
         done_ |= only(slot);

@@ -59,8 +59,10 @@ struct HostedController {
   std::string name;
   std::string plugin;                      ///< its library's path; empty: it has none
   std::string sha256;                      ///< of its library; empty: it has none
-  std::shared_ptr<Controller> controller;  ///< a plugin's shares its library's life
   std::shared_ptr<ControllerIo> io;        ///< what it declared
+  std::shared_ptr<Controller> controller;  ///< a plugin's shares its library's life
+  std::int32_t signal_channel = -1;        ///< of the log; -1: none
+  std::int32_t mark_channel = -1;          ///< the same
   std::vector<ControllerSetup::Claim> claims;
   std::vector<ControllerSetup::Plan> plans;
   std::vector<std::uint8_t> claimed;       ///< by joint
@@ -219,6 +221,13 @@ class ControllerHost {
     return std::exchange(stray_, std::nullopt);
   }
 
+  /// Whose update() was called since the last take_updated().
+  [[nodiscard]] ControllerSet take_updated() noexcept TANDEM_RT {
+    return std::exchange(updated_, 0);
+  }
+  /// By slot; null: there is none. The loop's.
+  [[nodiscard]] const Table& loaded() const noexcept TANDEM_RT { return table_; }
+
   /// That are loaded.
   [[nodiscard]] std::size_t size() const noexcept;
   /// For name(): the controller whose code update() returned last.
@@ -280,6 +289,7 @@ class ControllerHost {
   Table table_{};
   ControllerSet active_ = 0, done_ = 0;
   ControllerSet ended_ = 0;          // of done_: in the last cycle
+  ControllerSet updated_ = 0;        // of take_updated()
   std::vector<std::int32_t> owner_;  // by joint: an active one's slot, or -1
   JointReferences references_;
   hal::StateImage at_rest_;      // what a start sees of joints that brake

@@ -1,12 +1,29 @@
 // The only place where the loop meets the recorder.
 #include "runtime/cycle_log.hpp"
 
+#include <utility>
+
+#include "base/file_name.hpp"
+#include "log/controller_messages.hpp"
+#include "log/schema.hpp"
+
 namespace tandem::runtime {
 namespace {
 
 /// As Event::controller has it; of what is loaded later than 254 others, nobody's.
 std::uint8_t controller_number(std::int32_t id) noexcept TANDEM_RT {
   return id >= 0 && id < 255 ? static_cast<std::uint8_t>(id + 1) : std::uint8_t{0};
+}
+
+/// "SignalsJointTrajectory": ROS 2 allows a type no _.
+std::string type_of(const std::string& token) {
+  std::string type = "tandem/msg/Signals";
+  bool begins = true;
+  for (const char c : token) {
+    if (c != '_') type += begins && c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+    begins = c == '_';
+  }
+  return type;
 }
 
 }  // namespace
@@ -26,6 +43,42 @@ CycleLog::CycleLog(log::Recorder* recorder, const hal::StateImage& state,
         recorder_->add_channel("/tandem/estimate", "tandem/msg/Estimate", estimate->layout());
   }
   recorder_->start();
+}
+
+void CycleLog::open(HostedController& controller) {
+  if (recorder_ == nullptr) return;
+  const ControllerIo& io = *controller.io;
+  const std::string token = topic_token(controller.name);
+  const std::string topic = "/tandem/controller/" + token;
+  if (io.signals.numbers() > 0) {
+    controller.signal_channel =
+        recorder_->add_late_channel(topic, type_of(token), log::ros2msg_of(io.signals.layout()));
+  }
+  if (io.marks.declared().empty()) return;
+  controller.mark_channel = recorder_->add_late_channel(
+      topic + "/marks", log::kMarksType, log::marks_definition(),
+      [name = controller.name,
+       marks = std::vector(io.marks.declared().begin(), io.marks.declared().end())](
+          std::int64_t time_ns, std::span<const std::byte> state, log::Bytes& out) {
+        log::encode_marks(name, marks, time_ns, state, out);
+      });
+}
+
+void CycleLog::signals(const hal::CycleTime& time,
+                       const HostedController& controller) noexcept TANDEM_RT {
+  if (recorder_ == nullptr || controller.signal_channel < 0) return;
+  recorder_->push(static_cast<log::Recorder::Channel>(controller.signal_channel), time.time_ns,
+                  controller.io->signals.image());
+}
+
+/// 50 a second, as the other topics for viewers.
+void CycleLog::marks(const hal::CycleTime& time,
+                     const HostedController& controller) noexcept TANDEM_RT {
+  if (recorder_ == nullptr || controller.mark_channel < 0) return;
+  constexpr std::int64_t kPeriod_ns = log::RobotView::kPeriod_ns;
+  if (time.time_ns / kPeriod_ns == (time.time_ns - time.period_ns) / kPeriod_ns) return;
+  recorder_->push(static_cast<log::Recorder::Channel>(controller.mark_channel), time.time_ns,
+                  controller.io->marks.bytes());
 }
 
 void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint,

@@ -9,6 +9,7 @@
 #include "hal/image.hpp"
 #include "hal/truth.hpp"
 #include "log/recorder.hpp"
+#include "runtime/controller_host.hpp"
 
 namespace tandem::runtime {
 
@@ -21,6 +22,9 @@ class CycleLog {
   /// @param truth, estimate  null: there is none
   CycleLog(log::Recorder* recorder, const hal::StateImage& state, const hal::CommandImage& command,
            const hal::TruthImage* truth, const hal::EstimateImage* estimate);
+
+  /// Channels of what a controller declared. Any thread but the loop's, before the loop has it.
+  void open(HostedController& controller);
 
   /// For simulated time, which can wait: blocks until so many messages have room.
   void wait_for_space(std::size_t messages) {
@@ -37,6 +41,12 @@ class CycleLog {
   void images(const hal::CycleTime& time, const hal::StateImage& state,
               const hal::CommandImage& command, const hal::TruthImage* truth,
               const hal::EstimateImage* estimate) noexcept TANDEM_RT;
+  /// Of a controller: what it has in this cycle.
+  void signals(const hal::CycleTime& time, const HostedController& controller) noexcept TANDEM_RT;
+  void marks(const hal::CycleTime& time, const HostedController& controller) noexcept TANDEM_RT;
+  void text(const hal::TextEvent& event) noexcept TANDEM_RT {
+    if (recorder_ != nullptr) recorder_->push(event);
+  }
   /// Messages that found no room.
   [[nodiscard]] std::uint64_t dropped() const noexcept TANDEM_RT {
     return recorder_ == nullptr ? 0 : recorder_->dropped();

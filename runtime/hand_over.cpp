@@ -24,10 +24,36 @@ void HandOver::take() noexcept TANDEM_RT {
   }
   if (!ends(now_.run.phase())) statistics_.take_base(now_.truth);
   now_.log.images(now_.time, now_.state, told, now_.truth, now_.estimate());
+  show_controllers();
   show_progress();
   show_joints();
   show_sensors();
   if (now_.observer != nullptr) show(told);
+}
+
+/// What the controllers tell beside their command.
+void HandOver::show_controllers() noexcept TANDEM_RT {
+  const double period_s = 1e-9 * static_cast<double>(now_.time.period_ns);
+  const ControllerSet updated = now_.controllers.take_updated();
+  const ControllerHost::Table& loaded = now_.controllers.loaded();
+  for (std::size_t slot = 0; slot < loaded.size(); ++slot) {
+    if (loaded[slot] == nullptr) continue;
+    ControllerIo& io = *loaded[slot]->io;
+    if ((updated & only(slot)) != 0) {
+      if (io.signals.numbers() > 0) {
+        io.signals.publish(now_.time.cycle, now_.time.time_ns);
+        now_.log.signals(now_.time, *loaded[slot]);
+      }
+      now_.log.marks(now_.time, *loaded[slot]);
+    }
+    for (hal::TextEvent& event : io.texts.take(period_s)) {
+      event.cycle = now_.time.cycle;
+      event.time_ns = now_.time.time_ns;
+      event.set_controller(loaded[slot]->name);
+      now_.log.text(event);
+      services_.show(event);
+    }
+  }
 }
 
 void HandOver::show_progress() noexcept TANDEM_RT {

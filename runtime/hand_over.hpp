@@ -27,6 +27,7 @@ class HandOver {
   }
 
  private:
+  void show_controllers() noexcept TANDEM_RT;
   void show_progress() noexcept TANDEM_RT;
   void show_joints() noexcept TANDEM_RT;
   void show_sensors() noexcept TANDEM_RT;

@@ -86,15 +86,19 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
 }  // namespace
 
 RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
-                         const Progress& progress, const hal::ParameterImage& gains)
+                         const Progress& progress, const hal::ParameterImage& gains, CycleLog& log)
     : robot_(&robot),
       host_(&host),
       inbox_(&inbox),
       progress_(&progress),
+      log_(&log),
       looks_(robot.joints.size()),
       sensor_looks_(robot.sensors.size()),
       gain_looks_(gains.all().size()) {
   show(gains);
+  for (const auto& one : host.owned()) {
+    if (one != nullptr) log.open(*one);
+  }
 }
 
 // Asking the loop.
@@ -120,6 +124,7 @@ void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer&
   const bool done = answer.reason == RejectReason::kNone;
   if ((request.kind == Kind::kInsert && !done) || (request.kind == Kind::kRemove && done)) {
     host_->owned()[request.slot].reset();
+    ++loads_;
   } else if (request.kind == Kind::kRemove) {
     host_->owned()[request.slot]->leaves = false;
   } else if (request.kind == Kind::kReplace) {
@@ -198,6 +203,19 @@ std::vector<ControllerStatus> RunServices::controllers() {
                    .call_ns = one->times->calls.percentiles(),
                    .overruns = one->times->overruns.load(),
                    .claims = one->claims});
+  }
+  return all;
+}
+
+std::vector<ControllerSignals> RunServices::signals() {
+  const Lock lock(mutex_);
+  collect();
+  const ControllerSet active = host_->shown().active;
+  std::vector<ControllerSignals> all;
+  for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
+    const auto& one = host_->owned()[slot];
+    if (one == nullptr || one->leaves || one->io->signals.numbers() == 0) continue;
+    all.push_back({one->name, (active & only(slot)) != 0, {one->io, &one->io->signals}});
   }
   return all;
 }
@@ -283,10 +301,12 @@ Result<RequestResult> RunServices::load(std::unique_ptr<HostedController> contro
         "unload one first");
   }
   controller->of_experiment = false;
+  log_->open(*controller);
   CycleRequest request{.kind = CycleRequest::Kind::kInsert,
                        .slot = static_cast<std::uint32_t>(free - owned.begin()),
                        .controller = controller.get()};
   *free = std::move(controller);
+  ++loads_;
   return ask(lock, request, patience);
 }
 

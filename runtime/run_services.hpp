@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <map>
@@ -21,8 +22,10 @@
 #include "hal/config/robot_config.hpp"
 #include "hal/image.hpp"
 #include "runtime/controller_host.hpp"
+#include "runtime/cycle_log.hpp"
 #include "runtime/inbox.hpp"
 #include "runtime/progress.hpp"
+#include "runtime/text_history.hpp"
 
 namespace tandem::runtime {
 
@@ -103,6 +106,13 @@ struct SensorReport {
   SensorStatus look;
 };
 
+/// The signals of a loaded controller, which stay for as long as this is kept.
+struct ControllerSignals {
+  std::string controller;
+  bool active = false;
+  std::shared_ptr<const hal::SignalBlock> block;
+};
+
 /// Gains to set; what is empty stays.
 struct GainsRequest {
   std::optional<double> kp{}, ki{}, kd{};
@@ -119,9 +129,9 @@ class RunServices {
   using Patience = std::chrono::milliseconds;
   static constexpr Patience kPatience{1000};
 
-  /// All outlive it.
+  /// All outlive it. The loaded controllers get their channels of the log.
   RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
-              const Progress& progress, const hal::ParameterImage& gains);
+              const Progress& progress, const hal::ParameterImage& gains, CycleLog& log);
 
   /// Loaded controllers, in the order in which they run.
   [[nodiscard]] std::vector<ControllerStatus> controllers();
@@ -169,6 +179,12 @@ class RunServices {
   [[nodiscard]] std::vector<JointInfo> joints();
   /// Every sensor, in the image's order.
   [[nodiscard]] std::vector<SensorReport> sensors() const;
+  /// Those of every loaded controller that has some, in the order in which they run.
+  [[nodiscard]] std::vector<ControllerSignals> signals();
+  /// Changes when a controller comes or goes; never 0.
+  [[nodiscard]] std::uint64_t loads() const noexcept { return loads_.load(); }
+  /// What controllers have said.
+  [[nodiscard]] const TextHistory& texts() const noexcept { return texts_; }
   /// Mode and interaction of a joint that no active controller claims, impedance of any. A joint
   /// that has to be homed, or is being homed, is refused, here and by what follows.
   /// Errors: unknown joint; claimed (the controller is named); not while controllers run; a mode
@@ -222,6 +238,7 @@ class RunServices {
     sensor_looks_.write(sensors);
   }
   void show(const hal::ParameterImage& gains) noexcept TANDEM_RT { gain_looks_.write(gains.all()); }
+  void show(const hal::TextEvent& words) noexcept TANDEM_RT { texts_.write(words); }
 
  private:
   using Lock = std::unique_lock<std::mutex>;
@@ -260,9 +277,12 @@ class RunServices {
   ControllerHost* host_;
   Inbox* inbox_;
   const Progress* progress_;
+  CycleLog* log_;
   Seqlock<JointStatus> looks_;
   Seqlock<SensorStatus> sensor_looks_;
   Seqlock<hal::PidGains> gain_looks_;
+  TextHistory texts_;
+  std::atomic<std::uint64_t> loads_{1};
 
   std::mutex mutex_;          // of all below, and of the asking side of inbox and host
   std::uint64_t number_ = 0;  // of the last request

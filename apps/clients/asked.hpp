@@ -60,6 +60,8 @@ Result<Exit> tell_homing(Asked& asked);
 Result<Exit> tell_joint_reset(Asked& asked);
 Result<Exit> tell_prediction(Asked& asked);
 Result<Exit> tell_sensors(Asked& asked);
+Result<Exit> tell_signals(Asked& asked);
+Result<Exit> tell_signal_watch(Asked& asked);
 
 /// tandem estop: it asks all runs at once.
 [[nodiscard]] Exit estop_command(const AskedOptions& options);

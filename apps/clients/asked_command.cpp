@@ -78,6 +78,8 @@ constexpr Form kForms[]{
     {"joint.stop", &print_joint_stop},
     {"predict", nullptr, &tell_prediction},
     {"sensor.list", nullptr, &tell_sensors},
+    {"signal.list", nullptr, &tell_signals},
+    {"signal.watch", nullptr, &tell_signal_watch},
 };
 
 /// The form of a command; of one that has none a plain one.

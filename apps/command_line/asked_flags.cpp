@@ -65,6 +65,11 @@ Without --socket or --dds it is the only `tandem run` of this user.)"},
   tandem sensor list                                 every IMU and force/torque sensor
   tandem sensor list imu --json -                    one of them, for a program
 Without --socket or --dds it is the only `tandem run` of this user.)"},
+    {"signal", "Signals of a running run's controllers", R"(Examples:
+  tandem signal list                                 what the loaded controllers tell of themselves
+  tandem signal watch squat                          all of one, a line every 0.1 s
+  tandem signal watch squat.depth --every 1 --count 10
+Without --socket or --dds it is the only `tandem run` of this user.)"},
     {"clock", "Simulated time of a run", R"(Examples:
   tandem clock show                                  time, paused or not, rate, measured speed
   tandem clock pause

@@ -93,6 +93,31 @@ class FaultNotes {
   std::size_t told_ = 0;
 };
 
+/// Prints what controllers say, up to some lines: the log has them all.
+class TextNotes {
+ public:
+  void look(const runtime::TextHistory& texts) {
+    if (texts.count() == seen_) return;
+    lines_.clear();
+    const std::uint64_t gone = texts.read(seen_, lines_);
+    if (told_ > kMost) return;
+    restart_line(stderr);
+    for (const hal::TextEvent& one : lines_) {
+      if (++told_ > kMost) break;
+      fmt::print(stderr, "{:.3f} s: {}: {}{}\n", 1e-9 * static_cast<double>(one.time_ns),
+                 shown(one.controller()), one.level == hal::TextLevel::kWarn ? "warning: " : "",
+                 one.words());
+    }
+    told_ += gone;
+    if (told_ > kMost) fmt::print(stderr, "what controllers say from now on is in the log alone\n");
+  }
+
+ private:
+  static constexpr std::uint64_t kMost = 200;
+  std::uint64_t seen_ = 0, told_ = 0;
+  std::vector<hal::TextEvent> lines_;
+};
+
 /// Seconds that no cycle of simulated time lasts, at whatever rate: time was paused meanwhile, or
 /// the process suspended. Real time goes on.
 double longest_cycle_s(runtime::RobotCycle& cycle) {
@@ -148,6 +173,7 @@ void watch(runtime::RobotCycle& cycle, const CycleThread& loop, const WiredCompo
   BusWatch buses(c.open_buses(), stderr);
   FaultNotes faults(waits);
   HomingNote homing;
+  TextNotes texts;
   bool logged = recorder != nullptr;
   while (!loop.done() && !guard.gave_up()) {
     if (logged && recorder->failed()) {
@@ -157,6 +183,7 @@ void watch(runtime::RobotCycle& cycle, const CycleThread& loop, const WiredCompo
     if (!quiet) buses.look();
     if (!quiet) homing.look(cycle, e.robot);
     if (!quiet) faults.look(cycle);
+    if (!quiet) texts.look(cycle.services().texts());
     if (!quiet) {
       bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
                  progress_note(cycle));
@@ -164,6 +191,7 @@ void watch(runtime::RobotCycle& cycle, const CycleThread& loop, const WiredCompo
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   if (!quiet) {
+    texts.look(cycle.services().texts());
     bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
                progress_note(cycle));
     bar.finish();

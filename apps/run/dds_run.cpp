@@ -60,7 +60,8 @@ Result<std::unique_ptr<DdsRun>> DdsRun::open(const WiredComposition& c, const st
   return std::unique_ptr<DdsRun>(new DdsRun(std::move(*participant), std::move(*publisher)));
 }
 
-void DdsRun::start(const runtime::RobotCycle& cycle, hal::ParallelSource* parallel) {
+void DdsRun::start(runtime::RobotCycle& cycle, hal::ParallelSource* parallel) {
+  runtime::RunServices& services = cycle.services();
   publisher_->start({.version =
                          [&cycle] {
                            const runtime::FaultLog& log = cycle.fault_log();
@@ -68,7 +69,19 @@ void DdsRun::start(const runtime::RobotCycle& cycle, hal::ParallelSource* parall
                          },
                      .faults = [&cycle] { return entries(cycle.faults()); },
                      .lost = [&cycle] { return cycle.fault_log().lost(); }},
-                    parallel);
+                    parallel,
+                    {.version = [&services] { return services.loads(); },
+                     .signals =
+                         [&services] {
+                           std::vector<dds::ControllerFeed::Signals> all;
+                           for (const runtime::ControllerSignals& one : services.signals())
+                             all.emplace_back(one.controller, one.block);
+                           return all;
+                         },
+                     .texts =
+                         [&services](std::uint64_t& seen, std::vector<hal::TextEvent>& out) {
+                           (void)services.texts().read(seen, out);
+                         }});
 }
 
 DdsResult DdsRun::finish() { return {participant_->config().domain, publisher_->stop()}; }

@@ -39,7 +39,7 @@ class DdsRun {
 
   /// From now on cycles are published. Before the first of them; the cycle stays until finish().
   /// @param parallel  the second robot; null: there is none
-  void start(const runtime::RobotCycle& cycle, hal::ParallelSource* parallel);
+  void start(runtime::RobotCycle& cycle, hal::ParallelSource* parallel);
   /// When there are no more of them.
   DdsResult finish();
 

@@ -69,6 +69,10 @@ double bytes_per_cycle(const WiredComposition& c) {
                               hal::CommandImage(e.robot.shape()).bytes().size();
   if (const hal::TruthImage* truth = runtime::truth_of(c)) cycle_bytes += truth->bytes().size();
   if (c.estimator != nullptr) cycle_bytes += c.estimator->image().bytes().size();
+  for (const auto& one : c.controllers->owned()) {
+    if (one == nullptr || one->io->signals.numbers() == 0) continue;
+    cycle_bytes += one->io->signals.image().size() + kMessageOverhead;
+  }
   if (c.parallel != nullptr) {
     cycle_bytes += hal::StateImage(e.robot.shape()).bytes().size() + 2 * kMessageOverhead;
     if (e.sim.ground_truth) cycle_bytes += c.parallel->truth().bytes().size();

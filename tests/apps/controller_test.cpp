@@ -102,6 +102,29 @@ TEST_F(Controllers, GoOnWithTheirNewBuildInTheStateOfTheFormerOne) {
   EXPECT_EQ(json("run.json")["fault_log"].size(), 0U);
 }
 
+TEST_F(Controllers, TellTheirSignals) {
+  begin("");
+  expect(to_run("signal list").out, "no loaded controller declares a signal");
+  expect(refused("signal watch"), "no loaded controller declares a signal");
+  ASSERT_EQ(to_run("controller load gravity_compensation --name weigh").status, 0);
+  const auto waiting = asked("signal list")["signals"];
+  ASSERT_EQ(waiting.size(), 1U);
+  EXPECT_EQ(waiting[0]["signal"], "weigh.weight");
+  EXPECT_EQ(waiting[0]["unit"], "Nm");
+  EXPECT_EQ(waiting[0]["names"], nlohmann::json({"weight.joint1", "weight.joint2"}));
+  EXPECT_TRUE(waiting[0]["cycle"].is_null()) << "it has not run yet";
+  EXPECT_TRUE(waiting[0]["values"][0].is_null());
+  expect(to_run("signal list").out, "weigh.weight  Nm    -      torque that holds");
+  ASSERT_EQ(to_run("controller switch --stop hold --start weigh").status, 0);
+  ASSERT_TRUE(tandem::test::eventually(
+      [&] { return asked("signal list weigh")["signals"][0]["values"][0].is_number(); }));
+  const std::string lines = to_run("signal watch weigh.weight --every 0.01 --count 3").out;
+  expect(lines, "time_s  weigh.weight.joint1 [Nm]  weigh.weight.joint2 [Nm]\n");
+  EXPECT_EQ(std::ranges::count(lines, '\n'), 4) << lines;
+  expect(refused("signal list weigh.weihgt"), "did you mean 'weigh.weight'?");
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(Controllers, ThatAreBrokenAreRefusedWhileTheRunGoesOn) {
   begin("");
   const auto broken = [](const std::string& name) {

@@ -1,0 +1,107 @@
+// What a controller draws for viewers: a fixed number of shapes in named frames.
+// Layer: hal.  Thread: declared non-RT; the rest the loop's.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "base/result.hpp"
+
+namespace tandem::hal {
+
+enum class MarkShape : std::uint8_t {
+  kPoints,   ///< a ball at each point
+  kArrow,    ///< from the first point to the second
+  kLine,     ///< through the points
+  kPolygon,  ///< the same, and back to the first
+  kText,     ///< at the first point
+};
+
+/// How a mark looks, as it is declared.
+struct MarkStyle {
+  MarkShape shape = MarkShape::kPoints;
+  std::string frame{};     ///< a link's name; "odom": the world of a floating base
+  std::size_t points = 1;  ///< the most; an arrow has 2, a text 1
+  double size_m = 0.02;    ///< diameter of balls and of an arrow's shaft, width of lines, height of
+                           ///< letters
+  std::array<float, 4> rgba{0.9F, 0.4F, 0.1F, 1.0F};  ///< each 0 to 1
+};
+
+/// One mark. Names are unique in a controller.
+struct MarkInfo : MarkStyle {
+  std::string name;
+  std::size_t first = 0;  ///< of its points among the block's
+};
+
+/// The marks of one controller. It stays where it is: handles point into it.
+class MarkBlock {
+ public:
+  static constexpr std::size_t kMostMarks = 16, kMostPoints = 120, kLongestText = 60;
+
+  /// What changes, as plain bytes.
+  struct State {
+    struct One {
+      std::uint32_t points = 0;  ///< that are shown; 0: the mark is not
+      std::array<char, kLongestText> text{};
+    };
+    std::array<std::array<double, 3>, kMostPoints> place_m{};
+    std::array<One, kMostMarks> marks{};
+  };
+
+  MarkBlock() = default;
+  MarkBlock(const MarkBlock&) = delete;
+  MarkBlock& operator=(const MarkBlock&) = delete;
+
+  /// Index of a new mark; kMostMarks: there is no room, and check() says so.
+  [[nodiscard]] std::size_t declare(std::string name, MarkStyle style);
+  /// Errors, with the mark's name as key: a name twice, or one that cannot be shown; no frame, no
+  /// point; a size or colour out of range; more marks or points than there is room for.
+  [[nodiscard]] Status check() const;
+
+  [[nodiscard]] std::span<const MarkInfo> declared() const noexcept { return declared_; }
+  [[nodiscard]] std::span<const std::byte> bytes() const noexcept TANDEM_RT {
+    return std::as_bytes(std::span(&state_, 1));
+  }
+
+  /// Places point `point` of a mark, which shows it and those before it. @rt a store
+  void place(std::size_t mark, std::size_t point,
+             const std::array<double, 3>& at_m) noexcept TANDEM_RT {
+    if (mark >= declared_.size() || point >= declared_[mark].points) return;
+    state_.place_m[declared_[mark].first + point] = at_m;
+    std::uint32_t& shown = state_.marks[mark].points;
+    shown = std::max(shown, static_cast<std::uint32_t>(point + 1));
+  }
+  /// Shows the first `points`; 0 hides the mark. @rt a store
+  void show(std::size_t mark, std::size_t points) noexcept TANDEM_RT {
+    if (mark >= declared_.size()) return;
+    state_.marks[mark].points =
+        static_cast<std::uint32_t>(std::min(points, declared_[mark].points));
+  }
+  /// Of a text mark: what it says; cut after kLongestText bytes. @rt a copy
+  void say(std::size_t mark, std::string_view text) noexcept TANDEM_RT {
+    if (mark >= declared_.size()) return;
+    auto& to = state_.marks[mark].text;
+    to.fill('\0');
+    std::copy_n(text.begin(), std::min(text.size(), to.size()), to.begin());
+  }
+  void archive(Archive& ar) {
+    if (!declared_.empty()) ar.raw(&state_, sizeof state_);
+  }
+
+ private:
+  std::vector<MarkInfo> declared_;
+  std::size_t points_ = 0;
+  std::string refused_;  // the first that found no room
+  State state_;
+};
+
+}  // namespace tandem::hal
