@@ -84,11 +84,11 @@ class Parameter {
     return row_ == nullptr ? kNotGiven : row_->now();
   }
   operator double() const noexcept TANDEM_RT { return value(); }
-  /// Of a boolean.
+  /// Whether it is true, where it is a boolean.
   [[nodiscard]] bool on() const noexcept TANDEM_RT { return value() == 1.0; }
   /// Whether it has a value: it may lack one where its default is kNotGiven.
   [[nodiscard]] bool given() const noexcept TANDEM_RT { return !std::isnan(value()); }
-  /// Of a choice: whether it is that word.
+  /// Whether it is that word, where it is a choice.
   [[nodiscard]] bool is(std::string_view word) const noexcept TANDEM_RT {
     const double index = value();
     return row_ != nullptr && index >= 0.0 &&
