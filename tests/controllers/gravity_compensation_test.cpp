@@ -86,7 +86,8 @@ TEST(GravityCompensation, RefusesAStiffnessThatIsTooMuch) {
   EXPECT_EQ(test::Harness(pendulum_robot(), "gravity_compensation", "stiffness_Nm_rad = 1e6\n",
                           pendulum())
                 .problem(),
-            "experiment.toml:1: stiffness_Nm_rad: 1e+06 is out of range (must be 0 to 100)");
+            "experiment.toml:1: stiffness_Nm_rad: 1e+06 is out of range (must be at least 0 and at "
+            "most 100)");
 }
 
 TEST(GravityCompensation, CarriesARobotThatStandsOnBothFeet) {

@@ -42,14 +42,14 @@ TEST(LiveParameter, HasWhatTheFileGivesOrItsDefault) {
 
 TEST(LiveParameter, NamesFileLineKeyAndRangeOfWhatIsWrong) {
   EXPECT_EQ(Declared("x = 6", {.min = 0, .max = 5, .otherwise = 1}).problem(),
-            "e.toml:2: x: 6 is out of range (must be 0 to 5)");
+            "e.toml:2: x: 6 is out of range (must be at least 0 and at most 5)");
   EXPECT_EQ(Declared("x = 0", {.min = 0, .above_min = true, .otherwise = 1}).problem(),
             "e.toml:2: x: 0 is out of range (must be greater than 0)");
   EXPECT_EQ(Declared("x = nan", {.otherwise = 1}).problem().substr(0, 14), "e.toml:2: x: m");
   EXPECT_EQ(Declared("x = 'a'", {.otherwise = 1}).problem(),
-            "e.toml:2: x: must be a number, not a string");
+            "e.toml:2: x: must be a number, not string");
   EXPECT_EQ(Declared("x = 1.5", {.whole = true, .otherwise = 1}).problem(),
-            "e.toml:2: x: must be an integer, not a floating-point number");
+            "e.toml:2: x: must be an integer, not floating-point");
   EXPECT_NE(Declared("x = 1", {.otherwise = true}).problem(), "");
   EXPECT_NE(Declared("x = 'c'", {.choices = {"a", "b"}, .otherwise = "a"}).problem(), "");
   EXPECT_NE(Declared("", {.min = 0}).problem().find("x: this key is missing"), std::string::npos);
