@@ -46,6 +46,9 @@ struct MoveRequest {
   double acceleration_rad_s2 = kDefault;
 };
 
+/// That a request sets at most: each is an event of its cycle.
+inline constexpr std::size_t kMostParameterChanges = 32;
+
 struct CycleRequest {
   enum class Kind : std::uint32_t {
     kInsert,   ///< `controller` into `slot`

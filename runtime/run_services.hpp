@@ -163,11 +163,11 @@ class RunServices {
   /// Errors: unknown (with the nearest name).
   [[nodiscard]] Result<std::vector<ParameterStatus>> parameters(const std::string& controller);
   /// Sets live parameters of loaded controllers, active or not, between two cycles: all or none.
-  /// Errors: nothing is named; more than kMostChanges; an unknown controller or parameter (with the
-  /// nearest name); one that is not live, of another type, not finite, out of range, named twice.
+  /// Errors: nothing is named; more than kMostParameterChanges; an unknown controller or parameter
+  /// (with the nearest name); one that is not live, of another type, not finite, out of range,
+  /// named twice.
   [[nodiscard]] Result<RequestResult> set_parameters(const std::vector<ParameterWish>& wishes,
                                                      Patience patience = kPatience);
-  static constexpr std::size_t kMostChanges = 64;
 
   /// Every joint, in the image's order.
   [[nodiscard]] std::vector<JointInfo> joints();

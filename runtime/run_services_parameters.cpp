@@ -115,9 +115,9 @@ Result<RequestResult> RunServices::set_parameters(const std::vector<ParameterWis
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
   if (wishes.empty()) return fail("no parameter is named", "name those to set: kp=40");
-  if (wishes.size() > kMostChanges) {
+  if (wishes.size() > kMostParameterChanges) {
     return fail(fmt::format("sets {} parameters at once", wishes.size()),
-                fmt::format("set at most {}", kMostChanges));
+                fmt::format("set at most {}", kMostParameterChanges));
   }
   std::vector<ParameterChange> changes;
   for (const ParameterWish& wish : wishes) {

@@ -115,7 +115,7 @@ TEST_F(ParameterRun, SetsAllOrNone) {
   EXPECT_FALSE(set({{"tuned", "offset_rad", 0.1}, {"tuned", "offset_rad", 0.2}}));
   EXPECT_FALSE(set({{"tuned", "offset_rad", 0.1}, {"other", "kp", 0.2}}));
   EXPECT_FALSE(set({}));
-  EXPECT_FALSE(set(Wishes(65, {"tuned", "share", 0.2})));
+  EXPECT_FALSE(set(Wishes(kMostParameterChanges + 1, {"tuned", "share", 0.2})));
   steps(2);
   EXPECT_EQ(value("offset_rad"), 0.0);
   EXPECT_EQ(tuned->changes, 0);
