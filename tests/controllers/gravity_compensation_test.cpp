@@ -87,7 +87,7 @@ TEST(GravityCompensation, RefusesAStiffnessThatIsTooMuch) {
                           pendulum())
                 .problem(),
             "experiment.toml:1: stiffness_Nm_rad: 1e+06 is out of range (must be at least 0 and at "
-            "most 100)");
+            "most 1000)");
 }
 
 TEST(GravityCompensation, CarriesARobotThatStandsOnBothFeet) {

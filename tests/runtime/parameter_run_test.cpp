@@ -77,7 +77,8 @@ struct ParameterRun : testing::Test, test::SwingLoop {
     return asked ? "" : asked.error().to_string();
   }
   [[nodiscard]] double value(const std::string& name) const {
-    for (const ParameterStatus& one : *services().parameters("tuned"))
+    const auto all = services().parameters("tuned");
+    for (const ParameterStatus& one : *all)
       if (one.name == name) return one.value;
     return kNotGiven;
   }
@@ -147,8 +148,8 @@ TEST_F(ParameterRun, SaysWhyAValueDoesNotFitAndWhatWould) {
   EXPECT_EQ(refusal("count", 2.5),
             "tuned.count: 2.5 is no whole number (give whole numbers, 1 to 9)");
   EXPECT_EQ(refusal("on", 1), "tuned.on: is true or false, not 1 (give true or false)");
-  EXPECT_EQ(refusal("word", "htere"),
-            "tuned.word: 'htere' is none of its words (did you mean 'there'?)");
+  EXPECT_EQ(refusal("word", "thre"),
+            "tuned.word: 'thre' is none of its words (did you mean 'there'?)");
   EXPECT_EQ(refusal("length_m", 0.4),
             "tuned.length_m: is not live: it is read when the controller is loaded (unload the "
             "controller, then load it with --set 'length_m = …')");
