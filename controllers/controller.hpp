@@ -67,6 +67,15 @@ class ControllerSetup {
   /// What the controller declares with the functions below; the host keeps it.
   const std::shared_ptr<ControllerIo> io = std::make_shared<ControllerIo>();
 
+  /// Declares a parameter, and reads it of `parameters`: {.unit = "Nm/rad", .min = 0, .max = 500,
+  /// .otherwise = 40, .live = true, .doc = "…"}. The name is [controller.parameters]', letters,
+  /// digits and _. One without `otherwise` has to be given. One that is `live` is set between two
+  /// cycles by `tandem controller set`, also while the controller runs: read it in each update().
+  /// Errors go to `parameters`; the handle then has the default, or a number of no meaning.
+  [[nodiscard]] Parameter parameter(std::string_view name, ParameterFacts facts) {
+    return io->parameters.declare(parameters, name, std::move(facts));
+  }
+
   /// Claims a joint (index in the image) in a mode. Two controllers that claim one joint are an
   /// error before anything moves; a joint that nobody claims is held by the loop. What a controller
   /// writes to another joint, and modes that it writes, are taken back and reported.
@@ -217,7 +226,9 @@ inline constexpr std::uint32_t kControllerAbi =
                                           sizeof(Mark),
                                           sizeof(hal::SignalBlock),
                                           sizeof(hal::MarkBlock),
-                                          sizeof(hal::TextEvent)});
+                                          sizeof(hal::TextEvent),
+                                          sizeof(ParameterRow),
+                                          sizeof(Parameter)});
 
 /// Whether `Class` has members of its own, but no archive(): what a snapshot may lack.
 template <class Class>

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "base/archive.hpp"
+#include "controllers/live_parameter.hpp"
 #include "controllers/marks.hpp"
 #include "controllers/signals.hpp"
 #include "controllers/text_events.hpp"
@@ -16,9 +17,10 @@ struct ControllerIo {
   hal::SignalBlock signals;
   hal::MarkBlock marks;
   TextEventSlots texts;
+  Parameters parameters;
 
   /// What the next cycles depend on.
-  void archive(Archive& ar) { ar(signals, marks, texts); }
+  void archive(Archive& ar) { ar(signals, marks, texts, parameters); }
 };
 
 }  // namespace tandem

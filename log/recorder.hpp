@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -69,7 +70,8 @@ class Recorder {
   using Encode = std::function<void(std::int64_t time_ns, std::span<const std::byte>, Bytes& out)>;
   /// A channel that may also come while it records, from any thread but the loop's, before its
   /// first message is pushed. Where the topic has a channel of the same definition, it is that one;
-  /// where it has one of another, "_2" is added to the topic and "2" to the type, or the next number.
+  /// where it has one of another, "_2" is added to the topic and "2" to the type, or the next
+  /// number.
   /// @param ros2msg  definition of its messages
   /// @param encode   empty: what is pushed is the body, at most kMostLateBytes
   [[nodiscard]] Channel add_late_channel(const std::string& topic, const std::string& type,
@@ -94,6 +96,8 @@ class Recorder {
   bool push(const Event& event) noexcept TANDEM_RT;
   /// A controller's words: an event, and a line of /rosout.
   bool push(const hal::TextEvent& event) noexcept TANDEM_RT;
+  /// An event about a parameter: its text has both.
+  bool push(const Event& event, std::string_view parameter, double value) noexcept TANDEM_RT;
 
   /// The same from that other thread.
   bool push_side(Channel channel, std::int64_t time_ns, std::span<const std::byte> image) noexcept;
@@ -137,7 +141,7 @@ class Recorder {
   McapWriter writer_;
   RobotView view_;
   DataHash hash_;
-  std::size_t largest_ = sizeof(Event);
+  std::size_t largest_ = sizeof(Event) + sizeof(ParameterSet);
   std::size_t ring_slots_ = 0;
   std::unique_ptr<SpscRing> ring_;
   std::unique_ptr<SpscRing> side_;  // null: nobody else pushes

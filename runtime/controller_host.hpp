@@ -26,8 +26,8 @@
 #include "rt/clock.hpp"
 #include "runtime/call_watch.hpp"
 #include "runtime/claim_guard.hpp"
-#include "runtime/controller_times.hpp"
 #include "runtime/controller_succession.hpp"
+#include "runtime/controller_times.hpp"
 #include "runtime/cycle_request.hpp"
 #include "runtime/joint_references.hpp"
 
@@ -185,6 +185,9 @@ class ControllerHost {
   [[nodiscard]] HostedController* at(std::size_t slot) const noexcept TANDEM_RT {
     return table_[slot];
   }
+  /// All of them; none when a controller of them has gone.
+  [[nodiscard]] CycleAnswer set_parameters(
+      std::span<const ParameterChange> changes) noexcept TANDEM_RT;
   /// Stops and starts controllers, all or none. When they are `running`, every joint that changes
   /// hands does so without a bump (BumplessTransfer): one that moves brakes, what nobody has is
   /// held where it comes to rest, and who starts sees the joint there. Else it is who will start.
@@ -248,7 +251,7 @@ class ControllerHost {
   /// The slot of one of `by` that claims `joint`, or -1.
   [[nodiscard]] std::int32_t claimant(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
   [[nodiscard]] JointReferences& references() noexcept { return references_; }
-  /// A number of what is loaded: slots, names and claims.
+  /// A number of what is loaded: slots, names, claims and how many parameters each has.
   [[nodiscard]] std::uint64_t fingerprint() const noexcept;
   void archive(Archive& ar);
 

@@ -76,8 +76,9 @@ bool RobotCycle::finish() noexcept {
 void RobotCycle::wait() noexcept {
   show_snapshot();
   // Four images, every event that one cycle can bring, and what the controllers tell.
-  const std::size_t most = 4 + 16 + Inbox::kCapacity + 3 * now_.watch.joints() +
-                           now_.watch.sensors() + kMostControllers * (2 + TextEventSlots::kSlots);
+  const std::size_t most = 4 + 16 + Inbox::kCapacity * kMostParameterChanges +
+                           3 * now_.watch.joints() + now_.watch.sensors() +
+                           kMostControllers * (2 + TextEventSlots::kSlots);
   if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
   now_.tick = now_.loop.wait();
   trace_.begin(now_.tick);
