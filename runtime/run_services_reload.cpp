@@ -111,6 +111,7 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   const std::uint32_t made_id = made.id;
   made.of_experiment = (*former)->of_experiment;
   Reloaded result{.asked = {}, .changed = made.sha256 != (*former)->sha256};
+  log_->open(made);
   (*former)->next = std::move(*next);
   const auto asked = ask(lock,
                          {.kind = CycleRequest::Kind::kReplace,
