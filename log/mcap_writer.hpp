@@ -40,6 +40,8 @@ class McapWriter {
   std::uint16_t add_schema(std::string_view name, std::string_view encoding, std::string_view text);
   std::uint16_t add_channel(std::uint16_t schema, std::string_view topic,
                             std::string_view message_encoding, const StringMap& metadata = {});
+  /// How many there are.
+  [[nodiscard]] std::size_t channels() const noexcept { return channels_.size(); }
   /// Outside of every chunk, at the present end of the file.
   void add_metadata(std::string_view name, const StringMap& map);
 

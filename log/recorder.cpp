@@ -76,10 +76,28 @@ Recorder::Channel Recorder::add_channel(const std::string& topic, const std::str
   return channel;
 }
 
+std::optional<Recorder::Channel> Recorder::add_late_channel(const std::string& topic,
+                                                            const std::string& type,
+                                                            const hal::Layout& layout) {
+  if (layout.bytes() > largest_) return std::nullopt;
+  const std::lock_guard lock(late_mutex_);
+  late_.push_back({topic, type, ros2msg_of(layout)});
+  return static_cast<Channel>(first_late_ + late_.size() - 1);
+}
+
+void Recorder::make_late_channels() {
+  const std::lock_guard lock(late_mutex_);
+  for (; channels_ < first_late_ + late_.size(); ++channels_) {
+    const Late& late = late_[channels_ - first_late_];
+    writer_.add_channel(writer_.add_schema(late.type, "ros2msg", late.text), late.topic, "cdr");
+  }
+}
+
 void Recorder::open_side(std::int64_t lag_ns) { side_lag_ns_ = lag_ns; }
 
 void Recorder::start() {
   view_.add_channels(writer_);
+  channels_ = first_late_ = writer_.channels();
   const std::size_t slot_bytes = (sizeof(Slot) + largest_ + 7) / 8 * 8;
   ring_ = std::make_unique<SpscRing>(slot_bytes, ring_slots_);
   if (side_lag_ns_ >= 0) side_ = std::make_unique<SpscRing>(slot_bytes, ring_slots_);
@@ -152,6 +170,7 @@ void Recorder::write(std::span<const std::byte> slot) {
   Slot head{};
   std::memcpy(&head, slot.data(), sizeof head);
   const std::span<const std::byte> body = slot.subspan(sizeof head, head.bytes);
+  if (head.channel >= channels_) make_late_channels();
   if (head.channel == kEventChannel) {
     Event event;
     std::memcpy(&event, body.data(), sizeof event);

@@ -7,6 +7,8 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -62,6 +64,12 @@ class Recorder {
   /// "tandem/msg/State". The channel /tandem/event exists always.
   [[nodiscard]] Channel add_channel(const std::string& topic, const std::string& type,
                                     const hal::Layout& layout);
+  /// The same while it records, from one thread at a time that is not the loop's; the loop may push
+  /// to it from now on. Empty: its layout has more than kLateBytes, and than every other.
+  [[nodiscard]] std::optional<Channel> add_late_channel(const std::string& topic,
+                                                        const std::string& type,
+                                                        const hal::Layout& layout);
+  static constexpr std::size_t kLateBytes = 1024;
   /// One other thread will push, too. Its messages follow in the file when the loop's are `lag_ns`
   /// further, or at the end: with a loop that is never further ahead than that, the file does not
   /// depend on the threads' pace. Before start().
@@ -108,6 +116,7 @@ class Recorder {
   void write_side(std::int64_t up_to_ns);
   void write(std::span<const std::byte> slot);
   void write(Channel channel, std::int64_t time_ns, std::span<const std::byte> body);
+  void make_late_channels();
   void stop_thread();
 
   std::string path_;
@@ -115,7 +124,15 @@ class Recorder {
   McapWriter writer_;
   RobotView view_;
   DataHash hash_;
-  std::size_t largest_ = sizeof(Event);
+  /// A channel that the writer's thread makes before its first message.
+  struct Late {
+    std::string topic, type, text;
+  };
+  std::mutex late_mutex_;
+  std::vector<Late> late_;      // of all below
+  std::size_t channels_ = 0;    // that the writer has; its thread's
+  std::size_t first_late_ = 0;  // the number of late_'s first
+  std::size_t largest_ = kLateBytes;
   std::size_t ring_slots_ = 0;
   std::unique_ptr<SpscRing> ring_;
   std::unique_ptr<SpscRing> side_;  // null: nobody else pushes
