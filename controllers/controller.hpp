@@ -87,6 +87,13 @@ class ControllerSetup {
   };
   [[nodiscard]] std::span<const Claim> claims() const { return claims_; }
 
+  /// Declares something that the controller wants to be told while it runs, from wherever the
+  /// experiment says. A declaration that makes no sense is an error after configure().
+  /// @param name  unique among the controller's: letters, digits, '_'
+  [[nodiscard]] Input input(std::string name, InputKind kind, InputOptions options = {}) {
+    return io->inputs.declare(std::move(name), kind, std::move(options));
+  }
+
   /// Says that what `key` of `table` wants is reached only `time_s` after the controller's start.
   /// `tandem check` and `tandem run` warn of what is later than the end of the experiment.
   void plan(const TomlTable& table, std::string_view key, double time_s) {
@@ -163,7 +170,8 @@ inline constexpr std::uint32_t kControllerAbi =
              sizeof(hal::Sensor), sizeof(hal::Site), sizeof(hal::Foot), sizeof(hal::Posture),
              sizeof(model::KinematicLoop), sizeof(hal::StateImage), sizeof(hal::EstimateImage),
              sizeof(hal::CommandImage), sizeof(hal::ParameterImage), sizeof(hal::Prediction),
-             sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels)});
+             sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels), sizeof(InputOptions),
+             sizeof(InputBlock), sizeof(Input), sizeof(ControllerIo)});
 
 /// Whether `Class` has members of its own, but no archive(): what a snapshot may lack.
 template <class Class>

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "controllers/hosted_call.hpp"
+#include "runtime/cycle_log.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -35,7 +36,7 @@ ControllerSource::ControllerSource(LoadedController plugin)
 }
 
 Status ControllerHost::add(const std::string& name, ControllerSource source, TomlTable parameters,
-                           bool active) {
+                           bool active, std::span<const InputSource> inputs) {
   const std::size_t slot = size();
   if (slot == kMostControllers) {
     return fail_at(name, "is one controller more than there can be",
@@ -43,8 +44,9 @@ Status ControllerHost::add(const std::string& name, ControllerSource source, Tom
   }
   std::optional<std::chrono::milliseconds> limit;
   if (!source.code.path.empty()) limit = kStartTime;
-  auto made = configure(name, std::move(source), std::move(parameters), limit,
-                        active ? std::span<const double>(start_rad_) : std::span<const double>());
+  auto made =
+      configure(name, std::move(source), std::move(parameters), limit,
+                active ? std::span<const double>(start_rad_) : std::span<const double>(), inputs);
   if (!made) return std::unexpected(made.error());
   table_[slot] = made->get();
   const ControllerSet after = active_ | only(slot);
@@ -57,6 +59,7 @@ Status ControllerHost::add(const std::string& name, ControllerSource source, Tom
         "active = false");
   }
   owned_[slot] = std::move(*made);
+  inputs_ += owned_[slot]->inputs.size();
   if (active) set_active(after);
   return {};
 }
@@ -68,7 +71,8 @@ std::vector<ControllerCode> ControllerHost::code() const {
 
 Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     const std::string& name, ControllerSource source, TomlTable parameters,
-    std::optional<std::chrono::milliseconds> limit, std::span<const double> start_rad) {
+    std::optional<std::chrono::milliseconds> limit, std::span<const double> start_rad,
+    std::span<const InputSource> inputs) {
   if (!source.code.path.empty()) {
     const std::lock_guard lock(code_mutex_);
     code_.push_back({name, source.code.sha256, source.code.path});
@@ -92,10 +96,13 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     return std::unexpected(claims.error());
   }
   auto made = std::make_unique<HostedController>();
-  made->name = name;
   made->plugin = source.code.path;
   made->controller = std::move(source.controller);
   made->io = setup.io;
+  made->name = name;
+  auto ports = make_input_ports(made->io, name, robot_, period_ns_, inputs);
+  if (!ports) return std::unexpected(ports.error());
+  made->inputs = std::move(*ports);
   made->claims.assign(setup.claims().begin(), setup.claims().end());
   made->plans.assign(setup.plans().begin(), setup.plans().end());
   made->claimed.assign(robot_.joints.size(), 0);
@@ -198,12 +205,14 @@ std::int32_t ControllerHost::claimant(std::size_t joint,
 CycleAnswer ControllerHost::insert(std::size_t slot,
                                    HostedController& controller) noexcept TANDEM_RT {
   table_[slot] = &controller;
+  inputs_ += controller.inputs.size();
   return {};
 }
 
 CycleAnswer ControllerHost::remove(std::size_t slot) noexcept TANDEM_RT {
   if (table_[slot] == nullptr) return refuse(RejectReason::kGone, slot);
   if (is_active(slot)) return refuse(RejectReason::kActive, slot);
+  inputs_ -= table_[slot]->inputs.size();
   table_[slot] = nullptr;
   return {};
 }
@@ -271,6 +280,16 @@ void ControllerHost::start(const hal::CycleTime& time, JointImages images) noexc
   call_starts(active_, time, images);
 }
 
+void ControllerHost::take_inputs(const hal::CycleTime& time, bool open,
+                                 CycleLog& log) noexcept TANDEM_RT {
+  for (std::size_t slot = 0; inputs_ > 0 && slot < table_.size(); ++slot) {
+    if (!is_active(slot)) continue;
+    for (const auto& port : table_[slot]->inputs) {
+      if (port->take(time, open)) log.input(time, *port);
+    }
+  }
+}
+
 Code ControllerHost::update(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT {
   settle_ended(images);
   references_.before_update(images.command);
@@ -326,6 +345,7 @@ void ControllerHost::call_starts(ControllerSet start, const hal::CycleTime& time
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((start & only(slot)) == 0) continue;
     HostedController& one = *table_[slot];
+    for (const auto& port : one.inputs) port->begin(time);
     guard_.remember(images.command, gains_);
     enter(one).start(time, shown, images.command);
     take_back(one, images.command);
@@ -379,6 +399,7 @@ void ControllerHost::archive(Archive& ar) {
     if (one == nullptr) continue;
     one->controller->archive(ar);
     ar(*one->io, one->strayed);
+    for (const auto& port : one->inputs) ar(*port);
   }
   ar(active_, done_, ended_, failed_controller_, references_, gains_);
   if (ar.reading()) guard_.forget(gains_);

@@ -25,9 +25,12 @@
 #include "hal/robot.hpp"
 #include "runtime/claim_guard.hpp"
 #include "runtime/cycle_request.hpp"
+#include "runtime/input_port.hpp"
 #include "runtime/joint_references.hpp"
 
 namespace tandem::runtime {
+
+class CycleLog;
 
 /// Controllers that may be loaded at a time; the bits of a set of them.
 inline constexpr std::size_t kMostControllers = 32;
@@ -52,9 +55,10 @@ struct ControllerSource {
 /// A configured controller.
 struct HostedController {
   std::string name;
-  std::string plugin;                      ///< its library's path; empty: it has none
-  std::shared_ptr<Controller> controller;  ///< a plugin's shares its library's life
-  std::shared_ptr<ControllerIo> io;        ///< what it declared
+  std::string plugin;                              ///< its library's path; empty: it has none
+  std::shared_ptr<Controller> controller;          ///< a plugin's shares its library's life
+  std::shared_ptr<ControllerIo> io;                ///< what it declared
+  std::vector<std::shared_ptr<InputPort>> inputs;  ///< the ways to its inputs
   std::vector<ControllerSetup::Claim> claims;
   std::vector<ControllerSetup::Plan> plans;
   std::vector<std::uint8_t> claimed;  ///< by joint
@@ -99,6 +103,7 @@ class ControllerHost {
   void predict_by(hal::Predictor* predictor) { predictor_ = predictor; }
   /// Configures a controller and takes its claims.
   /// @param active  false: it is loaded, and waits for its start.
+  /// @param inputs  who feeds its inputs; of those that are not there `tandem input` does
   ///
   /// Errors (nothing has moved then): those of configure(), which a plugin has kStartTime for; a
   /// joint that another active controller claimed (both are named); too many controllers. After a
@@ -106,7 +111,7 @@ class ControllerHost {
   /// the process ends (a_hosted_call_goes_on()).
   /// Errors in `parameters` go to the document's diagnostics: the caller looks there, too.
   [[nodiscard]] Status add(const std::string& name, ControllerSource source, TomlTable parameters,
-                           bool active = true);
+                           bool active = true, std::span<const InputSource> inputs = {});
 
   /// How long the opening of a library, and a configure(), may take before the run: nobody waits
   /// for an answer yet, and a long recording takes a while to read.
@@ -120,11 +125,12 @@ class ControllerHost {
   /// @param limit      empty: the caller waits for its configure(), however long that takes
   /// @param start_rad  as start_from(); empty: not known
   /// Errors: what its configure() says; it throws, calls exit(), does not return within `limit`; a
-  /// joint index or mode that the robot lacks; a joint that it claims twice.
+  /// joint index or mode that the robot lacks; a joint that it claims twice; an input that makes no
+  /// sense, or does not fit its source.
   [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
       const std::string& name, ControllerSource source, TomlTable parameters,
       std::optional<std::chrono::milliseconds> limit = kConfigureTime,
-      std::span<const double> start_rad = {});
+      std::span<const double> start_rad = {}, std::span<const InputSource> inputs = {});
   /// The first joint that two of `active` claim.
   [[nodiscard]] static std::optional<ClaimConflict> find_conflict(
       const Table& table, ControllerSet active) noexcept TANDEM_RT;
@@ -162,6 +168,11 @@ class ControllerHost {
 
   // The cycle.
 
+  /// Inputs of everything that is loaded.
+  [[nodiscard]] std::size_t inputs() const noexcept TANDEM_RT { return inputs_; }
+  /// Before the controllers' calls: the active ones get their newest samples, which go to the log.
+  /// @param open  false: they get none
+  void take_inputs(const hal::CycleTime& time, bool open, CycleLog& log) noexcept TANDEM_RT;
   /// First cycle: holds every joint, sets the claimed modes, lets the active controllers seed
   /// theirs. Joints go over from `command`, which may be in motion when another loop sent it.
   void start(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT;
@@ -236,6 +247,7 @@ class ControllerHost {
 
   // The loop's.
   Table table_{};
+  std::size_t inputs_ = 0;
   ControllerSet active_ = 0, done_ = 0;
   ControllerSet ended_ = 0;          // of done_: in the last cycle
   std::vector<std::int32_t> owner_;  // by joint: an active one's slot, or -1

@@ -12,15 +12,21 @@
 
 namespace tandem::runtime {
 
-/// The channels of state, command, truth and estimate, and the events. Without a recorder it does
-/// nothing.
+class ControllerHost;
+class InputPort;
+struct HostedController;
+
+/// The channels of state, command, truth, estimate and inputs, and the events. Without a recorder
+/// it does nothing.
 class CycleLog {
  public:
   /// Adds its channels and starts the recorder. The layouts are those of the images shown.
   /// @param recorder  null: nothing is logged. Outlives it.
   /// @param truth, estimate  null: there is none
+  /// @param controllers  a channel of each input of those that are loaded
   CycleLog(log::Recorder* recorder, const hal::StateImage& state, const hal::CommandImage& command,
-           const hal::TruthImage* truth, const hal::EstimateImage* estimate);
+           const hal::TruthImage* truth, const hal::EstimateImage* estimate,
+           ControllerHost& controllers);
 
   /// For simulated time, which can wait: blocks until so many messages have room.
   void wait_for_space(std::size_t messages) {
@@ -32,6 +38,11 @@ class CycleLog {
   void event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint = -1,
              std::uint32_t code = 0, float value = 0.0F, bool reported = false) noexcept TANDEM_RT;
   void event(const hal::CycleTime& time, const hal::InjectedFault& fault) noexcept TANDEM_RT;
+  /// Channels of the inputs of a controller that is loaded while the run goes on. From one thread
+  /// at a time, before the loop has it. False: one of them is too large.
+  [[nodiscard]] bool add(const HostedController& controller);
+  /// A sample that has arrived.
+  void input(const hal::CycleTime& time, InputPort& port) noexcept TANDEM_RT;
   void images(const hal::CycleTime& time, const hal::StateImage& state,
               const hal::CommandImage& command, const hal::TruthImage* truth,
               const hal::EstimateImage* estimate) noexcept TANDEM_RT;
@@ -42,6 +53,7 @@ class CycleLog {
 
  private:
   log::Recorder* recorder_;
+  int inputs_ = 0;  // that have channels
   log::Recorder::Channel state_ = 0, command_ = 0, truth_ = 0, estimate_ = 0;
 };
 

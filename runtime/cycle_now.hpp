@@ -53,7 +53,7 @@ struct CycleNow : CycleParts {
         run(how),
         limits(hal::robot_of(robot), how.loop.period_ns),
         watch(robot, backend, how.lost_after_cycles, how.fall),
-        log(recorder, state, hal::CommandImage(robot.shape()), truth, estimate()) {
+        log(recorder, state, hal::CommandImage(robot.shape()), truth, estimate(), controllers) {
     progress.total_cycles = how.running_cycles;
   }
   /// Null where nothing is estimated.

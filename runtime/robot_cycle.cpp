@@ -41,7 +41,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       owner_(now_, arbiter_, response_),
       requests_{now_, resets_, homing_, arbiter_, waiting_, response_},
       services_(parts.robot, parts.controllers, now_.inbox, now_.progress,
-                parts.controllers.gains()),
+                parts.controllers.gains(), now_.log),
       shown_(now_, resets_, homing_, arbiter_, services_),
       trace_(config.trace_cycles),
       joint_limited_(parts.robot.joints.size()) {}
@@ -71,9 +71,9 @@ bool RobotCycle::step() noexcept {
 /// is simulated, for the log, and while it is paused.
 void RobotCycle::wait() noexcept {
   show_snapshot();
-  // Four images, and every event that one cycle can bring.
-  const std::size_t most =
-      4 + 16 + Inbox::kCapacity + 3 * now_.watch.joints() + now_.watch.sensors();
+  // Four images, a sample of each input, and every event that one cycle can bring.
+  const std::size_t most = 4 + 16 + Inbox::kCapacity + 3 * now_.watch.joints() +
+                           now_.watch.sensors() + now_.controllers.inputs();
   if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
   now_.tick = now_.loop.wait();
   trace_.begin(now_.tick);

@@ -9,6 +9,7 @@
 
 #include "base/file_name.hpp"
 #include "base/nearest.hpp"
+#include "runtime/cycle_log.hpp"
 #include "runtime/owner_controller.hpp"
 
 namespace tandem::runtime {
@@ -102,11 +103,12 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
 }  // namespace
 
 RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
-                         const Progress& progress, const hal::ParameterImage& gains)
+                         const Progress& progress, const hal::ParameterImage& gains, CycleLog& log)
     : robot_(&robot),
       host_(&host),
       inbox_(&inbox),
       progress_(&progress),
+      log_(&log),
       looks_(robot.joints.size()),
       sensor_looks_(robot.sensors.size()),
       gain_looks_(gains.all().size()) {
@@ -273,6 +275,10 @@ Result<RequestResult> RunServices::load(std::unique_ptr<HostedController> contro
         controller->name,
         std::to_string(kMostControllers) + " controllers are loaded, the most there can be",
         "unload one first");
+  }
+  if (!log_->add(*controller)) {
+    return fail_at(controller->name, "a sample of one of its inputs is too large for this log",
+                   "fewer `most_points`; or load it with the experiment");
   }
   controller->of_experiment = false;
   CycleRequest request{.kind = CycleRequest::Kind::kInsert,

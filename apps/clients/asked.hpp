@@ -35,6 +35,7 @@ void tell_done(const Json& answer);
 Status ask_for_load(const AskedOptions& options, Json& question);
 Status ask_for_start(const AskedOptions& options, Json& question);
 Status ask_for_stop(const AskedOptions& options, Json& question);
+Status ask_for_input(const AskedOptions& options, Json& question);
 Status ask_for_list(const AskedOptions& options, Json& question);
 Status ask_for_motion(const AskedOptions& options, Json& question);
 
@@ -53,6 +54,8 @@ void print_recovery(const Json& joint);
 Result<Exit> tell_clock_at_rest(Asked& asked);
 Result<Exit> tell_loaded(Asked& asked);
 Result<Exit> tell_fault_reset(Asked& asked);
+Result<Exit> tell_input(Asked& asked);
+Result<Exit> tell_inputs(Asked& asked);
 Result<Exit> tell_joints(Asked& asked);
 Result<Exit> tell_motion(Asked& asked);
 Result<Exit> tell_homing(Asked& asked);
