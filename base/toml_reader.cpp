@@ -430,6 +430,7 @@ std::vector<std::vector<double>> TomlTable::rows(std::string_view key, std::size
   std::vector<std::vector<double>> found;
   for (const toml::node& element : *array) {
     const toml::array* row = element.as_array();
+    if (columns == 0 && row != nullptr) columns = row->size();
     if (row == nullptr || row->size() != columns) {
       error(key, "each row must be a list of " + std::to_string(columns) + " numbers");
       continue;

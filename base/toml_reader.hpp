@@ -74,7 +74,7 @@ class TomlTable {
                                                Range range = kAnyNumber, std::size_t size = 0);
   [[nodiscard]] std::vector<std::string> texts_or(std::string_view key,
                                                   std::vector<std::string> value);
-  /// A list of equal-length rows: [[x, y, z], …].
+  /// A list of equal-length rows: [[x, y, z], …]. No columns: as many as the first one has.
   [[nodiscard]] std::vector<std::vector<double>> rows(std::string_view key, std::size_t columns);
 
   [[nodiscard]] bool has(std::string_view key) const;

@@ -96,6 +96,13 @@ class ControllerSetup {
   };
   [[nodiscard]] std::span<const Claim> claims() const { return claims_; }
 
+  /// Declares something that the controller wants to be told while it runs, from wherever the
+  /// experiment says. A declaration that makes no sense is an error after configure().
+  /// @param name  unique among the controller's: letters, digits, '_'
+  [[nodiscard]] Input input(std::string name, InputKind kind, InputOptions options = {}) {
+    return io->inputs.declare(std::move(name), kind, std::move(options));
+  }
+
   /// Says that what `key` of `table` wants is reached only `time_s` after the controller's start.
   /// `tandem check` and `tandem run` warn of what is later than the end of the experiment.
   void plan(const TomlTable& table, std::string_view key, double time_s) {
@@ -228,7 +235,10 @@ inline constexpr std::uint32_t kControllerAbi =
                                           sizeof(hal::MarkBlock),
                                           sizeof(hal::TextEvent),
                                           sizeof(ParameterRow),
-                                          sizeof(Parameter)});
+                                          sizeof(Parameter),
+                                          sizeof(InputOptions),
+                                          sizeof(InputBlock),
+                                          sizeof(Input)});
 
 /// Whether `Class` has members of its own, but no archive(): what a snapshot may lack.
 template <class Class>

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "base/archive.hpp"
+#include "controllers/inputs.hpp"
 #include "controllers/live_parameter.hpp"
 #include "controllers/marks.hpp"
 #include "controllers/signals.hpp"
@@ -18,9 +19,10 @@ struct ControllerIo {
   hal::MarkBlock marks;
   TextEventSlots texts;
   Parameters parameters;
+  ControllerInputs inputs;
 
   /// What the next cycles depend on.
-  void archive(Archive& ar) { ar(signals, marks, texts, parameters); }
+  void archive(Archive& ar) { ar(signals, marks, texts, parameters, inputs); }
 };
 
 }  // namespace tandem

@@ -76,7 +76,7 @@ class Recorder {
   /// @param encode   empty: what is pushed is the body, at most kMostLateBytes
   [[nodiscard]] Channel add_late_channel(const std::string& topic, const std::string& type,
                                          const std::string& ros2msg, Encode encode = {});
-  static constexpr std::size_t kMostLateBytes = 4080;
+  static constexpr std::size_t kMostLateBytes = 8 * 1024 + 16;
   /// One other thread will push, too. Its messages follow in the file when the loop's are `lag_ns`
   /// further, or at the end: with a loop that is never further ahead than that, the file does not
   /// depend on the threads' pace. Before start().

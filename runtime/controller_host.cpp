@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "controllers/hosted_call.hpp"
+#include "runtime/cycle_log.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -26,38 +27,6 @@ CycleAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
 }
 
 }  // namespace
-
-/// One call of the cycle into a controller: who is at work, and how long it takes.
-class ControllerHost::InCall {
- public:
-  InCall(ControllerHost& host, HostedController& one,
-         ControllerFunction function) noexcept TANDEM_RT : host_(host),
-                                                           one_(one) {
-    host.at_work_.store(static_cast<std::int32_t>(one.id), std::memory_order_relaxed);
-    if (host.clock_ != nullptr) begin_ns_ = host.clock_->now_ns();
-    if (host.watch_ != nullptr) host.watch_->enter(one.id, function);
-  }
-  ~InCall() {
-    if (host_.watch_ != nullptr) host_.watch_->leave();
-    if (host_.clock_ != nullptr) note(host_.clock_->now_ns() - begin_ns_);
-    host_.at_work_.store(-1, std::memory_order_relaxed);
-  }
-  InCall(const InCall&) = delete;
-  InCall& operator=(const InCall&) = delete;
-
-  [[nodiscard]] Controller* operator->() const noexcept TANDEM_RT { return one_.controller.get(); }
-
- private:
-  void note(std::int64_t took_ns) noexcept TANDEM_RT {
-    one_.times->calls.record(took_ns);
-    if (host_.called_ == host_.calls_.size()) return;
-    host_.calls_[host_.called_++] = {one_.id, begin_ns_, took_ns};
-  }
-
-  ControllerHost& host_;
-  HostedController& one_;
-  std::int64_t begin_ns_ = 0;
-};
 
 std::int32_t ControllerHost::begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT {
   std::int64_t all_ns = 0;
@@ -97,7 +66,7 @@ ControllerSource::ControllerSource(LoadedController plugin)
 }
 
 Status ControllerHost::add(const std::string& name, ControllerSource source, TomlTable parameters,
-                           bool active) {
+                           bool active, std::span<const InputSource> inputs) {
   const std::size_t slot = size();
   if (slot == kMostControllers) {
     return fail_at(name, "is one controller more than there can be",
@@ -105,8 +74,9 @@ Status ControllerHost::add(const std::string& name, ControllerSource source, Tom
   }
   std::optional<std::chrono::milliseconds> limit;
   if (!source.code.path.empty()) limit = kStartTime;
-  auto made = configure(name, std::move(source), std::move(parameters), limit,
-                        active ? std::span<const double>(start_rad_) : std::span<const double>());
+  auto made =
+      configure(name, std::move(source), std::move(parameters), limit,
+                active ? std::span<const double>(start_rad_) : std::span<const double>(), inputs);
   if (!made) return std::unexpected(made.error());
   (*made)->document = document_;
   table_[slot] = made->get();
@@ -120,6 +90,7 @@ Status ControllerHost::add(const std::string& name, ControllerSource source, Tom
         "active = false");
   }
   owned_[slot] = std::move(*made);
+  inputs_ += owned_[slot]->inputs.size();
   if (active) set_active(after);
   return {};
 }
@@ -131,7 +102,8 @@ std::vector<ControllerCode> ControllerHost::code() const {
 
 Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     const std::string& name, ControllerSource source, TomlTable parameters,
-    std::optional<std::chrono::milliseconds> limit, std::span<const double> start_rad) {
+    std::optional<std::chrono::milliseconds> limit, std::span<const double> start_rad,
+    std::span<const InputSource> inputs) {
   if (!source.code.path.empty()) {
     const std::lock_guard lock(code_mutex_);
     code_.push_back({name, source.code.sha256, source.code.path});
@@ -159,13 +131,16 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     return std::unexpected(closed.error());
   }
   auto made = std::make_unique<HostedController>();
-  made->name = name;
   made->plugin = source.code.path;
   made->sha256 = source.code.sha256;
   made->lacks_archive = source.lacks_archive;
   made->parameters = path;
   made->controller = std::move(source.controller);
   made->io = setup.io;
+  made->name = name;
+  auto ports = make_input_ports(made->io, name, robot_, period_ns_, inputs);
+  if (!ports) return std::unexpected(ports.error());
+  made->inputs = std::move(*ports);
   made->claims.assign(setup.claims().begin(), setup.claims().end());
   made->plans.assign(setup.plans().begin(), setup.plans().end());
   made->claimed.assign(robot_.joints.size(), 0);
@@ -258,12 +233,14 @@ std::int32_t ControllerHost::claimant(std::size_t joint,
 CycleAnswer ControllerHost::insert(std::size_t slot,
                                    HostedController& controller) noexcept TANDEM_RT {
   table_[slot] = &controller;
+  inputs_ += controller.inputs.size();
   return {};
 }
 
 CycleAnswer ControllerHost::remove(std::size_t slot) noexcept TANDEM_RT {
   if (table_[slot] == nullptr) return refuse(RejectReason::kGone, slot);
   if (is_active(slot)) return refuse(RejectReason::kActive, slot);
+  inputs_ -= table_[slot]->inputs.size();
   table_[slot] = nullptr;
   return {};
 }
@@ -341,6 +318,16 @@ void ControllerHost::start(const hal::CycleTime& time, JointImages images) noexc
   call_starts(active_, time, images);
 }
 
+void ControllerHost::take_inputs(const hal::CycleTime& time, bool open,
+                                 CycleLog& log) noexcept TANDEM_RT {
+  for (std::size_t slot = 0; inputs_ > 0 && slot < table_.size(); ++slot) {
+    if (!is_active(slot)) continue;
+    for (const auto& port : table_[slot]->inputs) {
+      if (port->take(time, open)) log.input(time, *port);
+    }
+  }
+}
+
 Code ControllerHost::update(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT {
   settle_ended(images);
   references_.before_update(images.command);
@@ -395,6 +382,7 @@ void ControllerHost::call_starts(ControllerSet start, const hal::CycleTime& time
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((start & only(slot)) == 0) continue;
     HostedController& one = *table_[slot];
+    for (const auto& port : one.inputs) port->begin(time);
     guard_.remember(images.command, gains_);
     InCall(*this, one, ControllerFunction::kStart)->start(time, shown, images.command);
     take_back(one, images.command);
@@ -450,6 +438,7 @@ void ControllerHost::archive(Archive& ar) {
     if (one == nullptr) continue;
     one->controller->archive(ar);
     ar(*one->io, one->strayed);
+    for (const auto& port : one->inputs) ar(*port);
   }
   ar(active_, done_, ended_, failed_controller_, references_, gains_);
   if (ar.reading()) guard_.forget(gains_);

@@ -29,9 +29,12 @@
 #include "runtime/controller_succession.hpp"
 #include "runtime/controller_times.hpp"
 #include "runtime/cycle_request.hpp"
+#include "runtime/input_port.hpp"
 #include "runtime/joint_references.hpp"
 
 namespace tandem::runtime {
+
+class CycleLog;
 
 /// Controllers that may be loaded at a time; the bits of a set of them.
 inline constexpr std::size_t kMostControllers = 32;
@@ -57,12 +60,13 @@ struct ControllerSource {
 /// A configured controller.
 struct HostedController {
   std::string name;
-  std::string plugin;                      ///< its library's path; empty: it has none
-  std::string sha256;                      ///< of its library; empty: it has none
-  std::shared_ptr<ControllerIo> io;        ///< what it declared
-  std::shared_ptr<Controller> controller;  ///< a plugin's shares its library's life
-  std::int32_t signal_channel = -1;        ///< of the log; -1: none
-  std::int32_t mark_channel = -1;          ///< the same
+  std::string plugin;                              ///< its library's path; empty: it has none
+  std::string sha256;                              ///< of its library; empty: it has none
+  std::shared_ptr<ControllerIo> io;                ///< what it declared
+  std::shared_ptr<Controller> controller;          ///< a plugin's shares its library's life
+  std::int32_t signal_channel = -1;                ///< of the log; -1: none
+  std::int32_t mark_channel = -1;                  ///< the same
+  std::vector<std::shared_ptr<InputPort>> inputs;  ///< the ways to its inputs
   std::vector<ControllerSetup::Claim> claims;
   std::vector<ControllerSetup::Plan> plans;
   std::vector<std::uint8_t> claimed;       ///< by joint
@@ -119,6 +123,7 @@ class ControllerHost {
   void read_from(const TomlDocument& document) { document_ = document; }
   /// Configures a controller and takes its claims.
   /// @param active  false: it is loaded, and waits for its start.
+  /// @param inputs  who feeds its inputs; of those that are not there `tandem input` does
   ///
   /// Errors (nothing has moved then): those of configure(), which a plugin has kStartTime for; a
   /// joint that another active controller claimed (both are named); too many controllers. After a
@@ -126,7 +131,7 @@ class ControllerHost {
   /// the process ends (a_hosted_call_goes_on()).
   /// Errors in `parameters` go to the document's diagnostics: the caller looks there, too.
   [[nodiscard]] Status add(const std::string& name, ControllerSource source, TomlTable parameters,
-                           bool active = true);
+                           bool active = true, std::span<const InputSource> inputs = {});
 
   /// How long the opening of a library, and a configure(), may take before the run: nobody waits
   /// for an answer yet, and a long recording takes a while to read.
@@ -140,11 +145,12 @@ class ControllerHost {
   /// @param limit      empty: the caller waits for its configure(), however long that takes
   /// @param start_rad  as start_from(); empty: not known
   /// Errors: what its configure() says; it throws, calls exit(), does not return within `limit`; a
-  /// joint index or mode that the robot lacks; a joint that it claims twice.
+  /// joint index or mode that the robot lacks; a joint that it claims twice; an input that makes no
+  /// sense, or does not fit its source.
   [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
       const std::string& name, ControllerSource source, TomlTable parameters,
       std::optional<std::chrono::milliseconds> limit = kConfigureTime,
-      std::span<const double> start_rad = {});
+      std::span<const double> start_rad = {}, std::span<const InputSource> inputs = {});
   /// The first joint that two of `active` claim.
   [[nodiscard]] static std::optional<ClaimConflict> find_conflict(
       const Table& table, ControllerSet active) noexcept TANDEM_RT;
@@ -206,6 +212,11 @@ class ControllerHost {
   /// @return for name(): who is the reason, as the controllers took at least half of it: the one
   ///         with the longest call; -1: nobody is
   std::int32_t begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT;
+  /// Inputs of everything that is loaded.
+  [[nodiscard]] std::size_t inputs() const noexcept TANDEM_RT { return inputs_; }
+  /// Before the controllers' calls: the active ones get their newest samples, which go to the log.
+  /// @param open  false: they get none
+  void take_inputs(const hal::CycleTime& time, bool open, CycleLog& log) noexcept TANDEM_RT;
   /// First cycle: holds every joint, sets the claimed modes, lets the active controllers seed
   /// theirs. Joints go over from `command`, which may be in motion when another loop sent it.
   void start(const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT;
@@ -261,7 +272,7 @@ class ControllerHost {
   void settle_ended(JointImages images) noexcept TANDEM_RT;
   [[nodiscard]] const hal::StateImage& at_rest(const hal::StateImage& state,
                                                ControllerSet start) noexcept TANDEM_RT;
-  void go_on_as(HostedController& next, const hal::CycleTime& time,
+  void go_on_as(const HostedController& former, HostedController& next, const hal::CycleTime& time,
                 JointImages images) noexcept TANDEM_RT;
   void call_starts(ControllerSet start, const hal::CycleTime& time,
                    JointImages images) noexcept TANDEM_RT;
@@ -290,6 +301,7 @@ class ControllerHost {
 
   // The loop's.
   Table table_{};
+  std::size_t inputs_ = 0;
   ControllerSet active_ = 0, done_ = 0;
   ControllerSet ended_ = 0;          // of done_: in the last cycle
   ControllerSet updated_ = 0;        // of take_updated()
@@ -310,6 +322,38 @@ class ControllerHost {
   const std::shared_ptr<ControllerNames> names_ = std::make_shared<ControllerNames>();
 
   Owned owned_;
+};
+
+/// One call of the cycle into a controller: who is at work, and how long it takes.
+class ControllerHost::InCall {
+ public:
+  InCall(ControllerHost& host, HostedController& one,
+         ControllerFunction function) noexcept TANDEM_RT : host_(host),
+                                                           one_(one) {
+    host.at_work_.store(static_cast<std::int32_t>(one.id), std::memory_order_relaxed);
+    if (host.clock_ != nullptr) begin_ns_ = host.clock_->now_ns();
+    if (host.watch_ != nullptr) host.watch_->enter(one.id, function);
+  }
+  ~InCall() {
+    if (host_.watch_ != nullptr) host_.watch_->leave();
+    if (host_.clock_ != nullptr) note(host_.clock_->now_ns() - begin_ns_);
+    host_.at_work_.store(-1, std::memory_order_relaxed);
+  }
+  InCall(const InCall&) = delete;
+  InCall& operator=(const InCall&) = delete;
+
+  [[nodiscard]] Controller* operator->() const noexcept TANDEM_RT { return one_.controller.get(); }
+
+ private:
+  void note(std::int64_t took_ns) noexcept TANDEM_RT {
+    one_.times->calls.record(took_ns);
+    if (host_.called_ == host_.calls_.size()) return;
+    host_.calls_[host_.called_++] = {one_.id, begin_ns_, took_ns};
+  }
+
+  ControllerHost& host_;
+  HostedController& one_;
+  std::int64_t begin_ns_ = 0;
 };
 
 }  // namespace tandem::runtime

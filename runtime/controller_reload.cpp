@@ -34,8 +34,10 @@ CycleAnswer ControllerHost::replace(std::size_t slot, HostedController& next, bo
     return {.reason = RejectReason::kGone, .one = static_cast<std::int32_t>(slot)};
   }
   table_[slot] = &next;
+  inputs_ += next.inputs.size() - former->inputs.size();
   if (const auto conflict = find_conflict(table_, active_)) {
     table_[slot] = former;
+    inputs_ += former->inputs.size() - next.inputs.size();
     return {.reason = RejectReason::kConflict,
             .joint = static_cast<std::int32_t>(conflict->joint),
             .one = static_cast<std::int32_t>(conflict->one),
@@ -50,9 +52,9 @@ CycleAnswer ControllerHost::replace(std::size_t slot, HostedController& next, bo
     if (former->claimed[j] == 0 && next.claimed[j] == 0) continue;
     references_.transfer().begin(j, images.state, images.command);
   }
-  enter(*former).stop();
+  InCall(*this, *former, ControllerFunction::kStop)->stop();
   if (next.succession->kept == Kept::kState) {
-    go_on_as(next, time, images);
+    go_on_as(*former, next, time, images);
     return {};
   }
   for (const auto& claim : former->claims) references_.release(claim.joint, images);
@@ -62,13 +64,17 @@ CycleAnswer ControllerHost::replace(std::size_t slot, HostedController& next, bo
 
 /// It is started, for what its archive() leaves out, and then has the state all the same. What it
 /// writes at its start is not commanded.
-void ControllerHost::go_on_as(HostedController& next, const hal::CycleTime& time,
-                              JointImages images) noexcept TANDEM_RT {
+void ControllerHost::go_on_as(const HostedController& former, HostedController& next,
+                              const hal::CycleTime& time, JointImages images) noexcept TANDEM_RT {
   discarded_.assign(images.command);
   guard_.remember(discarded_, gains_);
-  enter(next).start(time, images.state, discarded_);
+  InCall(*this, next, ControllerFunction::kStart)->start(time, images.state, discarded_);
   take_back(next, discarded_);
-  leave_calls();
+  for (const auto& port : next.inputs) {
+    for (const auto& before : former.inputs) {
+      if (port->is_same_as(*before)) port->go_on_as(*before);
+    }
+  }
   (void)next.succession->controller.give(*next.controller);
   (void)next.succession->io.give(*next.io);
 }

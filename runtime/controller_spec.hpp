@@ -3,8 +3,10 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "base/toml_reader.hpp"
+#include "runtime/input_source.hpp"
 
 namespace tandem::runtime {
 
@@ -14,6 +16,7 @@ struct ControllerSpec {
   std::string name;      ///< unique; default: the plugin's
   bool active = true;    ///< false: it waits until it is started while the run goes on
   TomlTable parameters;  ///< for ControllerSetup; its errors go to `document`
+  std::vector<InputSource> inputs = {};  ///< those that the experiment says something of
 };
 
 }  // namespace tandem::runtime

@@ -1,11 +1,14 @@
 // The only place where the loop meets the recorder.
 #include "runtime/cycle_log.hpp"
 
+#include <set>
 #include <utility>
 
 #include "base/file_name.hpp"
+#include "hal/wire_name.hpp"
 #include "log/controller_messages.hpp"
 #include "log/schema.hpp"
+#include "runtime/controller_host.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -25,6 +28,37 @@ std::string type_of(const std::string& token) {
   }
   return type;
 }
+
+/// A component as the field of a message: in lower case, what is no letter or digit becomes '_'.
+std::string field_name(const std::string& component) {
+  std::string name = hal::wire_name(component);
+  for (char& c : name) {
+    if ((c < 'a' || c > 'z') && (c < '0' || c > '9')) c = '_';
+  }
+  return name.front() >= '0' && name.front() <= '9' ? "c" + name : name;
+}
+
+hal::Layout layout_of(const InputBlock& input) {
+  hal::Layout layout;
+  layout.add("cycle", hal::FieldType::kU64, 1, "in which it reached the controller");
+  layout.add("sequence", hal::FieldType::kU64, 1, "samples since the controller's start");
+  if (input.kind == InputKind::kTrajectory) {
+    layout.add("value", hal::FieldType::kF64, input.values(), "as InputBlock::values() says");
+    return layout;
+  }
+  std::set<std::string> taken;
+  for (std::size_t i = 0; i < input.components.size(); ++i) {
+    std::string name = field_name(input.components[i]);
+    while (!taken.insert(name).second) name += "_";
+    layout.add(name, hal::FieldType::kF64, 1,
+               input.components[i] + (input.units[i].empty() ? "" : " [" + input.units[i] + "]"));
+  }
+  return layout;
+}
+
+std::string topic_of(const InputPort& port) { return "/tandem/input/" + port.full_name(); }
+
+std::string type_of(int number) { return "tandem/msg/Input" + std::to_string(number); }
 
 }  // namespace
 
@@ -54,6 +88,10 @@ void CycleLog::open(HostedController& controller) {
     controller.signal_channel =
         recorder_->add_late_channel(topic, type_of(token), log::ros2msg_of(io.signals.layout()));
   }
+  for (const auto& port : controller.inputs) {
+    port->channel = recorder_->add_late_channel(topic_of(*port), type_of(++inputs_),
+                                                log::ros2msg_of(layout_of(port->input())));
+  }
   if (io.marks.declared().empty()) return;
   controller.mark_channel = recorder_->add_late_channel(
       topic + "/marks", log::kMarksType, log::marks_definition(),
@@ -79,6 +117,11 @@ void CycleLog::marks(const hal::CycleTime& time,
   if (time.time_ns / kPeriod_ns == (time.time_ns - time.period_ns) / kPeriod_ns) return;
   recorder_->push(static_cast<log::Recorder::Channel>(controller.mark_channel), time.time_ns,
                   controller.io->marks.bytes());
+}
+
+void CycleLog::input(const hal::CycleTime& time, InputPort& port) noexcept TANDEM_RT {
+  if (recorder_ == nullptr || port.channel < 0) return;
+  recorder_->push(static_cast<log::Recorder::Channel>(port.channel), time.time_ns, port.message());
 }
 
 void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint,

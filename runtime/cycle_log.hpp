@@ -15,8 +15,12 @@
 
 namespace tandem::runtime {
 
-/// The channels of state, command, truth and estimate, and the events. Without a recorder it does
-/// nothing.
+class ControllerHost;
+class InputPort;
+struct HostedController;
+
+/// The channels of state, command, truth, estimate and inputs, and the events. Without a recorder
+/// it does nothing.
 class CycleLog {
  public:
   /// Adds its channels and starts the recorder. The layouts are those of the images shown.
@@ -42,6 +46,8 @@ class CycleLog {
   void event(const hal::CycleTime& time, const hal::InjectedFault& fault) noexcept TANDEM_RT;
   /// A controller's parameter was set. @param name  "squat.link_damping_Nms_rad"
   void event(const hal::CycleTime& time, std::string_view name, double value) noexcept TANDEM_RT;
+  /// A sample that has arrived.
+  void input(const hal::CycleTime& time, InputPort& port) noexcept TANDEM_RT;
   void images(const hal::CycleTime& time, const hal::StateImage& state,
               const hal::CommandImage& command, const hal::TruthImage* truth,
               const hal::EstimateImage* estimate) noexcept TANDEM_RT;
@@ -58,6 +64,7 @@ class CycleLog {
 
  private:
   log::Recorder* recorder_;
+  int inputs_ = 0;  // that have channels
   log::Recorder::Channel state_ = 0, command_ = 0, truth_ = 0, estimate_ = 0;
 };
 

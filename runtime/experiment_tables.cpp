@@ -41,6 +41,7 @@ constexpr Key<ControllerSpec> kController[] = {
   key<&ControllerSpec::name>("name", "unique; 1 to 64 bytes, no control characters, no comma").by_default("the plugin's"),
   key<&ControllerSpec::active>("active", "`false`: it is loaded and checked, and waits for `tandem controller start`. Only active ones may not claim the same joint"),
   by_hand<ControllerSpec>("parameters", "–", "table", "the controller's own: [controllers.md](controllers.md); an unknown key is an error"),
+  by_hand<ControllerSpec>("inputs", "–", "tables", "`inputs.NAME`: who feeds an input of the controller; without one `tandem input` does"),
 };
 constexpr Key<HalOptions> kHal[] = {
   key<&HalOptions::lockstep>("lockstep", "`\"can\"`: wait for an emulated robot's answers without a time limit, at any speed; `\"dds\"`: the same for a server in lockstep"),
@@ -184,6 +185,7 @@ void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers)
     ControllerSpec one{
         .plugin = {}, .name = {}, .active = true, .parameters = table.table_or_empty("parameters")};
     read_keys(table, kController, one);
+    one.inputs = read_input_sources(table);
     if (!table.has("name")) one.name = std::filesystem::path(one.plugin).stem().string();
     const std::string& name = one.name;
     for (const ControllerSpec& other : controllers) {
@@ -263,6 +265,7 @@ void describe_experiment(KeyPage& page) {
   page.add("experiment.toml", kPeriod);
   const TomlTable none = TomlDocument::parse({}, {})->root();
   page.add("[[controller]]", kController, {}, {{}, {}, true, none});
+  describe_inputs(page);
   page.add("[hal]", kHal);
   page.add("[sim]", kSim);
   page.add("[sim]", kHoist, "hoist.");

@@ -232,6 +232,7 @@ void JointArbiter::start_controllers() noexcept TANDEM_RT {
 Code JointArbiter::run_controllers() noexcept TANDEM_RT {
   if (!controls_) start_controllers();
   if (now_.run.in(RunPhase::kRunning)) ++ran_;
+  now_.controllers.take_inputs(now_.time, now_.run.in(RunPhase::kRunning), now_.log);
   unfollowed_.offer(now_.state, led().command);
   const Code code = now_.controllers.update(now_.time, led());
   unfollowed_.take(now_.state, led().command);

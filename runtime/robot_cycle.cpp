@@ -75,9 +75,11 @@ bool RobotCycle::finish() noexcept {
 /// is simulated, for the log, and while it is paused.
 void RobotCycle::wait() noexcept {
   show_snapshot();
-  // Four images, every event that one cycle can bring, and what the controllers tell.
+  // Four images, a sample of each input, every event that one cycle can bring, and what the
+  // controllers tell.
   const std::size_t most = 4 + 16 + Inbox::kCapacity * kMostParameterChanges +
                            3 * now_.watch.joints() + now_.watch.sensors() +
+                           now_.controllers.inputs() +
                            kMostControllers * (2 + TextEventSlots::kSlots);
   if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
   now_.tick = now_.loop.wait();

@@ -9,6 +9,7 @@
 
 #include "base/file_name.hpp"
 #include "base/nearest.hpp"
+#include "runtime/cycle_log.hpp"
 #include "runtime/owner_controller.hpp"
 
 namespace tandem::runtime {

@@ -113,6 +113,25 @@ struct ControllerSignals {
   std::shared_ptr<const hal::SignalBlock> block;
 };
 
+/// An input of a loaded controller.
+struct InputReport {
+  std::shared_ptr<const InputPort> port;  ///< name, kind, components, source
+  bool active = false;                    ///< its controller is
+  InputLook look;
+};
+
+/// A sample for an input, by the components' names; of a trajectory its way-points.
+struct InputRequest {
+  std::vector<std::string> components{};  ///< those that are not named have what holds without one
+  std::vector<double> numbers{};          ///< of each of them
+  struct Point {
+    double after_s = 0.0;
+    std::vector<double> position_rad{};    ///< a number per joint
+    std::vector<double> velocity_rad_s{};  ///< the same, of every way-point or of none
+  };
+  std::vector<Point> points{};
+};
+
 /// Gains to set; what is empty stays.
 struct GainsRequest {
   std::optional<double> kp{}, ki{}, kd{};
@@ -253,6 +272,19 @@ class RunServices {
   [[nodiscard]] Result<RequestResult> set_gains(const std::string& joint, hal::PidLoop loop,
                                                 const GainsRequest& wish,
                                                 Patience patience = kPatience);
+  /// Every input of every loaded controller, in the order in which they run.
+  [[nodiscard]] std::vector<InputReport> inputs();
+  /// Gives an input a sample, in the next cycle. A newer one within that cycle takes its place.
+  /// @param name  the input's, or "CONTROLLER/INPUT" where several have it
+  /// Errors: no such input, or several; another source feeds it; its controller is not active, or
+  /// not while controllers run; a component that it lacks; a value beyond its bounds.
+  [[nodiscard]] Result<RequestResult> set_input(const std::string& name, const InputRequest& wish,
+                                                Patience patience = kPatience);
+  /// The inputs of the controllers that came with the experiment, which `feeder` feeds.
+  [[nodiscard]] std::vector<std::shared_ptr<InputPort>> inputs_of(InputFeeder feeder);
+  /// Whether whoever feeds `port` may do so now: its controller is active, and controllers run.
+  [[nodiscard]] Status check_runs(const InputPort& port);
+
   /// Whether set_gains() would take them now; the same errors.
   [[nodiscard]] Status check_gains(const std::string& joint, hal::PidLoop loop,
                                    const GainsRequest& wish);
@@ -292,6 +324,8 @@ class RunServices {
   [[nodiscard]] Result<std::size_t> joint_of(const std::string& name) const;
   [[nodiscard]] Result<std::size_t> gains_fit(const std::string& joint, hal::PidLoop loop,
                                               const GainsRequest& wish);
+  [[nodiscard]] Result<std::shared_ptr<InputPort>> input_of(const std::string& name) const;
+  [[nodiscard]] Status check_runs_locked(const InputPort& port) const;
   [[nodiscard]] Result<std::size_t> joint_to_change(const std::string& name);
   [[nodiscard]] Status check_mode(std::size_t joint, const JointRequest& wish,
                                   const JointStatus& now) const;

@@ -83,10 +83,15 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   const auto parameters = document ? TomlDocument::parse(document->text(), document->file())
                                    : TomlDocument::parse("", "parameters");
   const std::string table = document ? (*former)->parameters : "";
+  std::vector<InputSource> sources;
+  for (const auto& port : (*former)->inputs) {
+    if (port->source().feeder != InputFeeder::kCommand) sources.push_back(port->source());
+  }
   lock.unlock();
   if (!parameters) return std::unexpected(parameters.error());
 
-  auto next = host_->configure(name, std::move(source), table_at(*parameters, table));
+  auto next = host_->configure(name, std::move(source), table_at(*parameters, table),
+                               ControllerHost::kConfigureTime, {}, sources);
   if (Status read = errors_of(
           *parameters,
           "its parameters are those that it was loaded with: unload it, and load it with others");
@@ -112,6 +117,7 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   made.of_experiment = (*former)->of_experiment;
   Reloaded result{.asked = {}, .changed = made.sha256 != (*former)->sha256};
   log_->open(made);
+  const auto inputs = (*former)->inputs;  // whoever feeds them goes on to do so
   (*former)->next = std::move(*next);
   const auto asked = ask(lock,
                          {.kind = CycleRequest::Kind::kReplace,
@@ -124,6 +130,11 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   if (asked->done && now != nullptr && now->id == made_id) {
     result.kept = now->succession->kept;
     now->succession.reset();
+    for (const auto& before : inputs) {
+      for (const auto& port : now->inputs) {
+        if (port->is_same_as(*before)) before->pass_to(port);
+      }
+    }
   }
   return result;
 }

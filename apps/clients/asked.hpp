@@ -37,6 +37,7 @@ Status ask_for_set(const AskedOptions& options, Json& question);
 Status ask_for_show(const AskedOptions& options, Json& question);
 Status ask_for_start(const AskedOptions& options, Json& question);
 Status ask_for_stop(const AskedOptions& options, Json& question);
+Status ask_for_input(const AskedOptions& options, Json& question);
 Status ask_for_list(const AskedOptions& options, Json& question);
 Status ask_for_motion(const AskedOptions& options, Json& question);
 
@@ -58,6 +59,8 @@ void print_recovery(const Json& joint);
 Result<Exit> tell_clock_at_rest(Asked& asked);
 Result<Exit> tell_loaded(Asked& asked);
 Result<Exit> tell_fault_reset(Asked& asked);
+Result<Exit> tell_input(Asked& asked);
+Result<Exit> tell_inputs(Asked& asked);
 Result<Exit> tell_joints(Asked& asked);
 Result<Exit> tell_motion(Asked& asked);
 Result<Exit> tell_homing(Asked& asked);

@@ -69,6 +69,8 @@ constexpr Form kForms[]{
     {"fault.reset", nullptr, &tell_fault_reset},
     {"fault.show", &print_latched},
     {"inject", &print_injected, nullptr, &ask_for_fault},
+    {"input.list", nullptr, &tell_inputs},
+    {"input.set", nullptr, &tell_input, &ask_for_input},
     {"joint.gains", &print_joint_gains},
     {"joint.home", nullptr, &tell_homing, &ask_for_motion},
     {"joint.list", nullptr, &tell_joints, &ask_for_list},

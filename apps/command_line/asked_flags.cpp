@@ -63,6 +63,16 @@ Without --socket or --dds it is the only `tandem run` of this user.)"},
   tandem joint gains LElbj position --kp 9e4 --anyway
                                                      also when the model finds that it is not
 Without --socket or --dds it is the only `tandem run` of this user.)"},
+    {"input",
+     "Inputs of a running run's controllers: `tandem input NAME x=0.2`, `tandem input list`",
+     R"(Examples:
+  tandem input list                                  every input: who feeds it, what it holds
+  tandem input rate joint2=0.3                       one sample, which counts until its time-out
+  tandem input rate joint2=0.3 --for 2               again and again, for two seconds
+  tandem input jog/rate joint2=0.3                   of the controller `jog`, where several have it
+  tandem input way --point 1.0,0.3,0.2 --point 2,0,0 way-points: after 1 s, and after 2 s
+Without --socket or --dds it is the only `tandem run` of this user. Whose source is another in the
+experiment's [controller.inputs] is refused: docs/controllers.md)"},
     {"sensor", "Sensors of a running run", R"(Examples:
   tandem sensor list                                 every IMU and force/torque sensor
   tandem sensor list imu --json -                    one of them, for a program
@@ -160,14 +170,18 @@ CLI::Option* add_key(CLI::App& app, const ControlKey& key, Json& given) {
 
 void add_row(CLI::App& app, const CommandRow& row, const char* examples, AskedOptions& o) {
   for (const ControlKey& key : row.keys) {
-    if (!key.line.empty()) add_key(app, key, o.given)->required(key.required);
+    if (key.line.empty()) continue;
+    // Beside the group's verbs the words of its own line are optional: the question is looked at.
+    add_key(app, key, o.given)->required(key.required && !row.more.of_group);
   }
   add_target(app, o.target);
   if (row.effect != ControlEffect::kStops) {  // of each run it prints a line
     app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   }
   app.footer(examples);
-  app.callback([&o, &row] { o.row = &row; });
+  app.callback([&app, &o, &row] {
+    if (app.get_subcommands().empty()) o.row = &row;
+  });
 }
 
 }  // namespace
@@ -177,17 +191,19 @@ void add_asked(CLI::App& app, AskedOptions& o) {
     CLI::App* first = app.add_subcommand(group.name, group.doc);
     first->footer(group.examples);
     std::vector<std::string> verbs;
+    bool own_line = false;
     for (const CommandRow& row : command_rows()) {
       const std::size_t dot = std::min(row.name.find('.'), row.name.size());
       if (!row.more.on_line || row.name.substr(0, dot) != group.name) continue;
-      if (dot == row.name.size()) {
+      if (dot == row.name.size() || row.more.of_group) {
+        own_line = own_line || row.more.of_group;
         add_row(*first, row, group.examples, o);
         continue;
       }
       verbs.push_back(row.name.substr(dot + 1));
       add_row(*first->add_subcommand(verbs.back(), sentence(row.doc)), row, group.examples, o);
     }
-    if (verbs.empty()) continue;
+    if (verbs.empty() || own_line) continue;
     first->require_subcommand(1);
     first->description(fmt::format("{}: {}", group.doc, fmt::join(verbs, ", ")));
   }

@@ -166,6 +166,22 @@ const std::vector<CommandRow> kRows{
       number("kd", "--kd", "of the derivative: kp's units times seconds"),
       flag("anyway", "--anyway", "true: also when the model finds the loop unstable")}},
 
+    {"input.list", kReads, "every input of the loaded controllers: who feeds it, what holds",
+     {local(texts("inputs", "inputs", "only these"))}},
+    {"input.set", kChanges, "gives an input of a controller a sample, which counts until its time-out",
+     {need(text("name", "name", "of the input, or CONTROLLER/INPUT where several have it")),
+      {.name = "values", .type = Type::kObject,
+       .doc = "numbers by component: the others have what holds without a sample"},
+      {.name = "trajectory", .type = Type::kObject,
+       .doc = "points: a list of after_s, position_rad and velocity_rad_s, a number per joint"},
+      local(texts("components", "values", "x=0.2 yaw=0.1: of the components; the others have "
+                  "what holds without a sample")),
+      local(texts("point", "--point", "of a trajectory: after_s and each joint's position, with "
+                  "commas; repeatable")),
+      local({.name = "for_s", .type = Type::kNumber, .doc = "sends it again, ten times a second, "
+             "for so long [s]", .line = "--for", .min = 0.0, .max = 3600.0})},
+     {.of_group = true}},
+
     {"sensor.list", kReads, "every sensor: where it is, what it measures, how old that is",
      {local(texts("sensors", "sensors", "only these"))}},
     {"signal.list", kReads, "every signal of the loaded controllers: unit, value, meaning",

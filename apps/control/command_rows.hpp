@@ -67,6 +67,7 @@ struct CommandRow {
     bool takes_long = false;   ///< no other command waits for it, but itself
     bool on_line = true;       ///< false: only by `tandem ask`
     bool any_process = false;  ///< not only a run is asked
+    bool of_group = false;     ///< `tandem input NAME`: its line is the group's, without a verb
     /// What is asked instead: the command line has two forms of one question. Empty: its name.
     std::string asks{};
   } more{};

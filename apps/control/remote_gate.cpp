@@ -36,7 +36,8 @@ ControlRegistry::Gate remote_gate(const runtime::RemoteOptions& remote,
     if (name == "controller.load") {
       if (const Status loads = check_load(load, request); !loads) return loads;
     }
-    const bool of_the_robot = name.starts_with("controller.") || name.starts_with("joint.");
+    const bool of_the_robot =
+        name.starts_with("controller.") || name.starts_with("joint.") || name.starts_with("input.");
     const std::string who = of_the_robot && owner ? owner() : std::string();
     if (who.empty()) return {};
     return fail(fmt::format("{}: '{}' commands the robot", name, who),

@@ -9,6 +9,7 @@
 #include "apps/control/clock_commands.hpp"
 #include "apps/control/controller_control.hpp"
 #include "apps/control/fault_table.hpp"
+#include "apps/control/input_control.hpp"
 #include "apps/control/joint_control.hpp"
 #include "apps/control/sensor_control.hpp"
 #include "apps/control/signal_control.hpp"
@@ -134,6 +135,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
   });
   add_controller_commands(registry, cycle.services(), robot);
   add_joint_commands(registry, cycle, robot, std::move(judge));
+  add_input_commands(registry, cycle.services());
   add_sensor_commands(registry, cycle.services());
   add_signal_commands(registry, cycle.services(), robot);
   add_clock_commands(registry, cycle);

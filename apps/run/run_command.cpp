@@ -18,7 +18,9 @@
 #include "apps/run/dds_run.hpp"
 #include "apps/run/end_guard.hpp"
 #include "apps/run/gate.hpp"
+#include "apps/run/game_pad.hpp"
 #include "apps/run/inject.hpp"
+#include "apps/run/input_topics.hpp"
 #include "apps/run/prediction.hpp"
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_log.hpp"
@@ -126,17 +128,12 @@ void add_identity(ControlRegistry& commands, const dds::Participant& participant
   commands.add("dds.show", [is](const Json&) -> Result<Json> { return is; });
 }
 
-/// Null without DDS.
-Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlRegistry& commands,
-                                                   const runtime::RemoteOptions& remote,
-                                                   const remote::Server* server,
-                                                   const DdsAdmission& admission) {
-  if (run == nullptr) return nullptr;
-  const auto owner = [server] {
+/// What peers may change, while nobody owns the robot.
+ControlRegistry::Gate gate_of(const runtime::RemoteOptions& remote, const remote::Server* server) {
+  return remote_gate(remote, [server] {
     const bool owned = server != nullptr && server->lease().owner() != 0;
     return owned ? server->lease().name() : std::string();
-  };
-  return DdsServices::open(run->participant(), commands, remote_gate(remote, owner), admission);
+  });
 }
 
 /// A run, or a server: the loop and all that talks to it. Taken apart in reverse order.
@@ -241,7 +238,16 @@ class Session {
       return fail("without a control socket no process can be admitted to this robot",
                   "leave out --no-socket; or [remote] trust = \"domain\" admits everybody");
     }
-    auto services = open_services(dds_.get(), commands_, e.remote, server_.get(), admission_);
+    const ControlRegistry::Gate gate = gate_of(e.remote, server_.get());
+    auto topics = InputTopics::open(dds_ == nullptr ? nullptr : &dds_->participant(),
+                                    cycle_->services(), gate, admission_);
+    if (!topics) return std::unexpected(topics.error());
+    topics_ = std::move(*topics);
+    auto pads = GamePads::open(cycle_->services());
+    if (!pads) return std::unexpected(pads.error());
+    pads_ = std::move(*pads);
+    if (dds_ == nullptr) return {};
+    auto services = DdsServices::open(dds_->participant(), commands_, gate, admission_);
     if (!services) return std::unexpected(services.error());
     services_ = std::move(*services);
     return {};
@@ -355,6 +361,8 @@ class Session {
   ControlRegistry commands_;
   std::unique_ptr<ControlSocket> socket_;
   std::unique_ptr<DdsServices> services_;
+  std::unique_ptr<InputTopics> topics_;
+  std::unique_ptr<GamePads> pads_;
 };
 
 /// What is simulated is then not quite what the description says. `tandem check` has the details.

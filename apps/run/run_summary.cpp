@@ -6,6 +6,7 @@
 
 #include <cstring>
 
+#include "base/counted.hpp"
 #include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
@@ -65,6 +66,21 @@ std::vector<std::string> never_injected(const WiredComposition& c,
   return all;
 }
 
+/// Inputs whose samples were refused, with the last reason.
+std::vector<std::string> refused_samples(const WiredComposition& c) {
+  std::vector<std::string> all;
+  for (const auto& one : c.controllers->owned()) {
+    if (one == nullptr) continue;
+    for (const auto& port : one->inputs) {
+      const runtime::InputLook look = port->look();
+      if (look.counts.refused == 0) continue;
+      all.push_back(fmt::format("the input {} refused {}; the last: {}", port->full_name(),
+                                counted(look.counts.refused, "sample"), look.why));
+    }
+  }
+  return all;
+}
+
 }  // namespace
 
 std::vector<std::string> RunSummary::warnings() const {
@@ -79,6 +95,7 @@ std::vector<std::string> RunSummary::warnings() const {
         composition.experiment.estimation.base->rest_s));
   }
   for (std::string& one : never_injected(composition, cycle)) all.push_back(std::move(one));
+  for (std::string& one : refused_samples(composition)) all.push_back(std::move(one));
   if (composition.tele == nullptr) return all;
   const remote::TeleConfig& link = composition.experiment.teleoperation->link;
   const double silent_s = static_cast<double>(composition.tele->figures().silent_cycles) *

@@ -54,8 +54,8 @@ void add_controllers(Composition& c, Collector& errors) {
     const bool retreats = (*loaded)->can_retreat();
     const bool lacks_archive = loaded->plugin().lacks_archive;
     if (c.controllers != nullptr) {  // without kernels: only that it can be loaded
-      const Status added =
-          c.controllers->add(spec.name, std::move(*loaded), spec.parameters, spec.active);
+      const Status added = c.controllers->add(spec.name, std::move(*loaded), spec.parameters,
+                                              spec.active, spec.inputs);
       if (!added) {
         Error error = added.error();
         error.key = key + (error.key.empty() ? "" : ": " + error.key);

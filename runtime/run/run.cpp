@@ -37,7 +37,8 @@ Status add_controllers_again(const Composition& c, RunFork& fork) {
     auto plugin = load_plugin(e, spec);
     if (!plugin) return std::unexpected(plugin.error());
     if (plugin->plugin().lacks_archive) fork.unarchived.push_back(spec.name);
-    const Status added = host.add(spec.name, std::move(*plugin), spec.parameters, spec.active);
+    const Status added =
+        host.add(spec.name, std::move(*plugin), spec.parameters, spec.active, spec.inputs);
     if (!added) return added;
   }
   if (c.owner == nullptr) return {};

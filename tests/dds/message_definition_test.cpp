@@ -115,6 +115,13 @@ constexpr Published kDefinitions[] = {
     {"rosgraph_msgs/msg/Clock", "692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564"},
     {"diagnostic_msgs/msg/DiagnosticArray",
      "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"},
+    // several: twist_stamped__, joint_trajectory__ and joint_trajectory_point__description.c
+    {"geometry_msgs/msg/TwistStamped",
+     "5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64"},
+    {"trajectory_msgs/msg/JointTrajectory",
+     "179b33eba59d676f6d967ac71fe35e7ca2f64b2f3928f4a018cec115e213796e"},
+    {"trajectory_msgs/msg/JointTrajectoryPoint",
+     "de8907036d8bd45aac6f30cc9044a3d4a329c42cbf719aff7d95a584cfa532d7"},
     // rmw_dds_common's participant_entities_info__description.c
     {"rmw_dds_common/msg/ParticipantEntitiesInfo",
      "91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"},

@@ -1,0 +1,242 @@
+#include "apps/run/game_pad.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <sstream>
+
+#include "base/nearest.hpp"
+
+namespace tandem::apps {
+namespace {
+
+constexpr std::chrono::milliseconds kAgain{100};  // between two samples of a pad at rest
+
+struct PadCode {
+  const char* name;
+  std::uint16_t type, code;
+};
+/// linux/input-event-codes.h
+constexpr PadCode kCodes[]{
+    {"ABS_X", EV_ABS, ABS_X},
+    {"ABS_Y", EV_ABS, ABS_Y},
+    {"ABS_Z", EV_ABS, ABS_Z},
+    {"ABS_RX", EV_ABS, ABS_RX},
+    {"ABS_RY", EV_ABS, ABS_RY},
+    {"ABS_RZ", EV_ABS, ABS_RZ},
+    {"ABS_THROTTLE", EV_ABS, ABS_THROTTLE},
+    {"ABS_RUDDER", EV_ABS, ABS_RUDDER},
+    {"ABS_GAS", EV_ABS, ABS_GAS},
+    {"ABS_BRAKE", EV_ABS, ABS_BRAKE},
+    {"ABS_HAT0X", EV_ABS, ABS_HAT0X},
+    {"ABS_HAT0Y", EV_ABS, ABS_HAT0Y},
+    {"BTN_SOUTH", EV_KEY, BTN_SOUTH},
+    {"BTN_EAST", EV_KEY, BTN_EAST},
+    {"BTN_NORTH", EV_KEY, BTN_NORTH},
+    {"BTN_WEST", EV_KEY, BTN_WEST},
+    {"BTN_TL", EV_KEY, BTN_TL},
+    {"BTN_TR", EV_KEY, BTN_TR},
+    {"BTN_TL2", EV_KEY, BTN_TL2},
+    {"BTN_TR2", EV_KEY, BTN_TR2},
+    {"BTN_SELECT", EV_KEY, BTN_SELECT},
+    {"BTN_START", EV_KEY, BTN_START},
+    {"BTN_MODE", EV_KEY, BTN_MODE},
+    {"BTN_THUMBL", EV_KEY, BTN_THUMBL},
+    {"BTN_THUMBR", EV_KEY, BTN_THUMBR},
+    {"BTN_TRIGGER", EV_KEY, BTN_TRIGGER},
+    {"BTN_THUMB", EV_KEY, BTN_THUMB},
+    {"BTN_TOP", EV_KEY, BTN_TOP},
+};
+
+using Bits = std::array<unsigned char, KEY_MAX / 8 + 1>;
+
+bool has(const Bits& bits, std::uint16_t code) { return (bits[code / 8] >> (code % 8) & 1) != 0; }
+
+std::unexpected<Error> at(const runtime::InputPort& port, std::string message, std::string hint) {
+  Error error = port.source().where;
+  error.message = std::move(message);
+  error.hint = std::move(hint);
+  return std::unexpected(std::move(error));
+}
+
+/// What the device says of a part: whether it has it, its range, where it is.
+Status measure(int device, PadPart& part, const std::string& text) {
+  Bits bits{};
+  if (::ioctl(device, EVIOCGBIT(part.type, bits.size()), bits.data()) < 0) {
+    return fail("is no event device", "name one of /dev/input/by-id/*-event-joystick");
+  }
+  if (!has(bits, part.code)) return fail("has no " + text, "`evtest` shows what it has");
+  if (part.type == EV_KEY) return {};
+  input_absinfo info{};
+  if (::ioctl(device, EVIOCGABS(part.code), &info) < 0 || info.maximum <= info.minimum) {
+    return fail("has no range of " + text, "choose another axis");
+  }
+  part.min = info.minimum;
+  part.max = info.maximum;
+  part.raw = info.value;
+  return {};
+}
+
+}  // namespace
+
+double PadPart::value(double deadband) const {
+  if (type == EV_KEY) return raw != 0.0 ? gain : 0.0;
+  const double middle = 2.0 * (raw - min) / (max - min) - 1.0;
+  const double way = std::max(0.0, std::min(std::abs(middle), 1.0) - deadband) / (1.0 - deadband);
+  return gain * std::copysign(way, middle);
+}
+
+Result<PadPart> parse_pad_part(const std::string& text) {
+  std::istringstream in(text);
+  std::string name, number, more;
+  in >> name >> number >> more;
+  PadPart part;
+  if (name.starts_with('-')) {
+    part.gain = -1.0;
+    name.erase(0, 1);
+  }
+  std::vector<std::string> known;
+  const auto* found = std::ranges::find(kCodes, name, &PadCode::name);
+  for (const PadCode& code : kCodes) known.emplace_back(code.name);
+  if (found == std::end(kCodes)) return fail("there is no '" + name + "'", suggest(name, known));
+  part.type = found->type;
+  part.code = found->code;
+  if (number.empty()) return part;
+  char* end = nullptr;
+  const double gain = std::strtod(number.c_str(), &end);
+  if (*end != '\0' || !std::isfinite(gain) || !more.empty()) {
+    return fail("'" + text + "' is not an axis or button, and a number", "write \"-ABS_Y 0.5\"");
+  }
+  part.gain *= gain;
+  return part;
+}
+
+Result<GamePad> GamePad::open(std::shared_ptr<runtime::InputPort> port) {
+  const runtime::InputSource& source = port->source();
+  if (port->input().kind == InputKind::kTrajectory) {
+    return at(*port, "a game pad is no source of a trajectory", "choose another source");
+  }
+  std::vector<PadPart> parts;
+  for (const auto& [component, text] : source.mapping) {
+    const std::vector<std::string>& all = port->input().components;
+    const auto place = std::ranges::find(all, component);
+    if (place == all.end()) {
+      return at(*port, "mapping: the input has no component '" + component + "'",
+                suggest(component, all));
+    }
+    auto part = parse_pad_part(text);
+    if (!part) return at(*port, "mapping: " + part.error().message, part.error().hint);
+    part->component = static_cast<std::size_t>(place - all.begin());
+    std::vector<double> sample(port->without().begin(), port->without().end());
+    for (const double end : {part->gain, part->type == EV_ABS ? -part->gain : 0.0}) {
+      sample[part->component] = end;
+      if (const Status fits = port->check(sample); !fits) {
+        return at(*port, "mapping: " + component + " " + fits.error().message,
+                  "give the value at its end: \"ABS_Y 0.5\"; " + fits.error().hint);
+      }
+    }
+    parts.push_back(*part);
+  }
+  Descriptor device(::open(source.device.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  if (device.get() < 0) {
+    return at(*port, "cannot open the game pad " + source.device + ": " + std::strerror(errno),
+              "is it plugged in, and is this user in the group `input`? ls -l /dev/input/by-id");
+  }
+  auto part = parts.begin();
+  for (const auto& [component, text] : source.mapping) {
+    const Status measured = measure(device.get(), *part++, text);
+    if (!measured) {
+      return at(*port, source.device + " " + measured.error().message, measured.error().hint);
+    }
+  }
+  return GamePad(std::move(device), std::move(port), std::move(parts));
+}
+
+bool GamePad::read() {
+  std::array<input_event, 64> events{};
+  for (;;) {
+    const ssize_t bytes = ::read(device_.get(), events.data(), sizeof events);
+    if (bytes < 0 && errno == EINTR) continue;
+    if (bytes < 0) return errno == EAGAIN;
+    if (bytes == 0) return false;
+    const std::size_t count = static_cast<std::size_t>(bytes) / sizeof(input_event);
+    for (const input_event& event : std::span(events).first(count)) take(event);
+  }
+}
+
+void GamePad::take(const input_event& event) {
+  if (event.type == EV_SYN) {
+    if (event.code == SYN_DROPPED) look();
+    if (event.code == SYN_REPORT) offer();
+    return;
+  }
+  for (PadPart& part : parts_) {
+    if (part.type == event.type && part.code == event.code) part.raw = event.value;
+  }
+}
+
+/// The kernel has lost events: a button may be up that was down.
+void GamePad::look() {
+  Bits keys{};
+  const bool knows = ::ioctl(device_.get(), EVIOCGKEY(keys.size()), keys.data()) >= 0;
+  for (PadPart& part : parts_) {
+    input_absinfo info{};
+    if (part.type == EV_KEY) {
+      if (knows) part.raw = has(keys, part.code) ? 1.0 : 0.0;
+    } else if (::ioctl(device_.get(), EVIOCGABS(part.code), &info) >= 0) {
+      part.raw = info.value;
+    }
+  }
+}
+
+void GamePad::offer_again() {
+  if (std::chrono::steady_clock::now() - offered_ >= kAgain) offer();
+}
+
+void GamePad::offer() {
+  offered_ = std::chrono::steady_clock::now();
+  const std::span<const double> without = port_->without();
+  std::vector<double> sample(without.begin(), without.end());
+  for (const PadPart& part : parts_) sample[part.component] = part.value(port_->source().deadband);
+  (void)port_->offer(runtime::InputFeeder::kGamepad, sample);
+}
+
+Result<std::unique_ptr<GamePads>> GamePads::open(runtime::RunServices& services) {
+  const auto ports = services.inputs_of(runtime::InputFeeder::kGamepad);
+  if (ports.empty()) return nullptr;
+  std::unique_ptr<GamePads> pads(new GamePads);
+  for (const auto& port : ports) {
+    auto pad = GamePad::open(port);
+    if (!pad) return std::unexpected(pad.error());
+    pads->pads_.push_back(std::move(*pad));
+  }
+  pads->thread_ = std::thread([&one = *pads] { one.run(); });
+  return pads;
+}
+
+GamePads::~GamePads() {
+  ending_ = true;
+  if (thread_.joinable()) thread_.join();
+}
+
+/// One that is gone stays so: its input times out.
+void GamePads::run() {
+  std::vector<pollfd> wait;
+  for (const GamePad& pad : pads_) wait.push_back({pad.descriptor(), POLLIN, 0});
+  while (!ending_) {
+    (void)::poll(wait.data(), wait.size(), static_cast<int>(kAgain.count()));
+    for (std::size_t i = 0; i < pads_.size(); ++i) {
+      if (wait[i].fd >= 0 && wait[i].revents != 0 && !pads_[i].read()) wait[i].fd = -1;
+      if (wait[i].fd >= 0) pads_[i].offer_again();
+    }
+  }
+}
+
+}  // namespace tandem::apps

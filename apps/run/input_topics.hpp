@@ -1,0 +1,48 @@
+// Topics of other ROS 2 nodes that feed inputs of a run's controllers.
+// Layer: apps/run.  Thread: opened and closed by main; one of its own takes samples.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "apps/control/control_registry.hpp"
+#include "apps/transport/dds_admission.hpp"
+#include "base/result.hpp"
+#include "dds/entity.hpp"
+#include "dds/participant.hpp"
+#include "runtime/run_services.hpp"
+
+namespace tandem::apps {
+
+/// A sample is a change of the run like "input.set": it passes the same gate, and its writer has to
+/// be admitted. One writer feeds an input at a time: another one's samples are refused until it has
+/// been silent for the input's time-out, and for half a second at least.
+class InputTopics {
+ public:
+  /// Subscribes to the topics of every input whose source is one; null when none is.
+  /// @param participant  null: without DDS, which is an error then
+  /// All outlive it. Errors: what DDS refuses.
+  [[nodiscard]] static Result<std::unique_ptr<InputTopics>> open(dds::Participant* participant,
+                                                                 runtime::RunServices& services,
+                                                                 ControlRegistry::Gate gate,
+                                                                 const DdsAdmission& admission);
+  ~InputTopics();
+  InputTopics(const InputTopics&) = delete;
+  InputTopics& operator=(const InputTopics&) = delete;
+
+  class Feed;  ///< of one input
+
+ private:
+  InputTopics() = default;
+  void take();
+
+  std::vector<std::unique_ptr<Feed>> feeds_;
+  dds::Entity wake_;     // guard condition: the end
+  dds::Entity waitset_;  // after what is attached to it, so that it goes first
+  std::atomic<bool> ending_{false};
+  std::thread thread_;
+};
+
+}  // namespace tandem::apps

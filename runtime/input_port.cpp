@@ -1,0 +1,400 @@
+#include "runtime/input_port.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <set>
+
+#include "base/nearest.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnitNorm = 1e-3;  // that a quaternion's may differ from 1
+
+bool is_name(const std::string& name) {
+  const auto fits = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; };
+  return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, fits) &&
+         std::isdigit(static_cast<unsigned char>(name.front())) == 0;
+}
+
+/// A bound of each component, from none, one, or each.
+std::vector<double> each(const std::vector<double>& given, std::size_t count, double otherwise) {
+  if (given.size() == 1) return std::vector<double>(count, given.front());
+  return given.empty() ? std::vector<double>(count, otherwise) : given;
+}
+
+Status check_value(const std::string& name, double value, double min, double max,
+                   const std::string& unit) {
+  if (!std::isfinite(value)) {
+    return fail_at(name, "is not finite", "give a number of every component");
+  }
+  if (value >= min && value <= max) return {};
+  return fail_at(name, fmt::format("{:g} is beyond its bounds", value),
+                 fmt::format("{:g} to {:g}{}{}", min, max, unit.empty() ? "" : " ", unit));
+}
+
+}  // namespace
+
+InputPort::InputPort(std::shared_ptr<ControllerIo> io, InputBlock& block, std::string controller,
+                     std::int64_t period_ns)
+    : io_(std::move(io)),
+      block_(&block),
+      controller_(std::move(controller)),
+      period_ns_(period_ns),
+      feed_(Sample{0, std::vector<double>(block.value.size())}),
+      shown_(3 + block.value.size()),
+      scratch_(3 + block.value.size()) {}
+
+Result<std::shared_ptr<InputPort>> InputPort::make(std::shared_ptr<ControllerIo> io,
+                                                   InputBlock& block, const std::string& controller,
+                                                   const hal::Robot& robot, std::int64_t period_ns,
+                                                   const InputSource* source) {
+  if (block.values() > InputBlock::kMostValues || block.value.size() != block.values()) {
+    return fail_at(block.name, "the input is too large",
+                   fmt::format("at most {} numbers, fewer `most_points`", InputBlock::kMostValues));
+  }
+  std::shared_ptr<InputPort> port(new InputPort(std::move(io), block, controller, period_ns));
+  if (const Status right = port->check_declaration(robot); !right) {
+    Error error = right.error();
+    error.message = "the input '" + block.name + "': " + error.message;
+    return std::unexpected(std::move(error));
+  }
+  if (source != nullptr) port->source_ = *source;
+  if (const Status brings = port->check_message(); !brings) return std::unexpected(brings.error());
+  const PlannedInput planned{
+      .block = block,
+      .controller = controller,
+      .without = port->without_,
+      .period_ns = period_ns,
+      .check = [&port](std::span<const double> sample) { return port->check(sample); }};
+  auto plan = make_plan(planned, port->source_);
+  if (!plan) return std::unexpected(plan.error());
+  port->plan_ = std::move(*plan);
+  port->hold(port->without_);
+  port->show();
+  return port;
+}
+
+Status InputPort::fill_bounds(const hal::Robot& robot) {
+  const InputOptions& options = block_->options;
+  const std::size_t count = block_->components.size();
+  for (const auto& [given, what] : {std::pair{&options.min, "min"}, {&options.max, "max"}}) {
+    if (given->size() <= 1 || given->size() == count) continue;
+    return fail_at(what, fmt::format("has {} numbers for {} components", given->size(), count),
+                   "one, or one of each");
+  }
+  const bool buttons = block_->kind == InputKind::kButtons;
+  max_ = each(options.max, count, buttons ? 1.0 : kInfinity);
+  min_ = max_;
+  for (double& bound : min_) bound = buttons ? 0.0 : -bound;
+  if (!options.min.empty()) min_ = each(options.min, count, 0.0);
+  if (block_->kind == InputKind::kTrajectory) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const int joint = robot.joint_index(block_->components[i]);
+      if (joint < 0) return std::unexpected(robot.no_joint(block_->components[i]));
+      const hal::DrivenJoint& limit = robot.joints[static_cast<std::size_t>(joint)];
+      min_[i] = std::max(min_[i], limit.min_position_rad);
+      max_[i] = std::min(max_[i], limit.max_position_rad);
+      max_speed_.push_back(limit.max_velocity_rad_s);
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (min_[i] <= max_[i]) continue;
+    return fail_at(block_->components[i], fmt::format("{:g} to {:g} is no range", min_[i], max_[i]),
+                   "let `min` be at most `max`");
+  }
+  return {};
+}
+
+Status InputPort::check_declaration(const hal::Robot& robot) {
+  const InputOptions& options = block_->options;
+  const std::vector<std::string>& names = block_->components;
+  if (!is_name(block_->name)) {
+    return fail_at("name", "its name is not 1 to 64 letters, digits and '_'", "rename it");
+  }
+  if (names.empty()) return fail_at("names", "names no components", "give InputOptions::names");
+  if (std::set<std::string>(names.begin(), names.end()).size() != names.size()) {
+    return fail_at("names", "names a component twice", "name each once");
+  }
+  if (!(options.timeout_s >= 0.0 && options.timeout_s <= 1e6)) {
+    return fail_at("timeout_s", fmt::format("{:g} s is no time-out", options.timeout_s),
+                   "0 to 1e6 s; 0: none");
+  }
+  timeout_cycles_ = static_cast<std::uint64_t>(
+      std::ceil(options.timeout_s * 1e9 / static_cast<double>(period_ns_) - 1e-6));
+  if (const Status bounds = fill_bounds(robot); !bounds) return bounds;
+  zero_.assign(block_->value.size(), 0.0);
+  if (block_->kind == InputKind::kPose) zero_.back() = 1.0;
+  without_ = zero_;
+  if (options.after == AfterTimeout::kZero || options.otherwise.empty()) return {};
+  if (options.otherwise.size() != without_.size()) {
+    return fail_at("otherwise",
+                   fmt::format("has {} numbers, not {}", options.otherwise.size(), without_.size()),
+                   "a number of each component");
+  }
+  without_ = options.otherwise;
+  return check(without_);
+}
+
+/// Whether its topic's messages bring such samples; an empty type becomes the kind's first.
+Status InputPort::check_message() {
+  if (source_.feeder != InputFeeder::kTopic) return {};
+  const InputKindRow& row = row_of(block_->kind);
+  std::vector<std::string> types;
+  for (const std::string_view type : {row.message, row.stamped}) {
+    if (!type.empty()) types.emplace_back(type);
+  }
+  if (source_.type.empty() && !types.empty()) source_.type = types.front();
+  if (std::ranges::find(types, source_.type) != types.end()) return {};
+  Error error = source_.where;
+  error.message = types.empty()
+                      ? "no topic feeds an input of the kind " + std::string(row.name)
+                      : "messages of type '" + source_.type + "' bring no " + std::string(row.name);
+  error.hint = types.empty() ? "choose another source" : suggest(source_.type, types);
+  return std::unexpected(std::move(error));
+}
+
+Status InputPort::check_trajectory(std::span<const double> sample) const {
+  const std::size_t joints = block_->components.size();
+  const double points = sample[0];
+  if (!(points >= 0.0 && points <= static_cast<double>(block_->options.most_points)) ||
+      points != std::floor(points)) {
+    return fail_at("points", fmt::format("{:g} way-points are too many", points),
+                   fmt::format("at most {}", block_->options.most_points));
+  }
+  const bool moves = sample[1] != 0.0;
+  double before_s = 0.0;
+  for (std::size_t p = 0; p < static_cast<std::size_t>(points); ++p) {
+    const auto point = sample.subspan(2 + p * (1 + 2 * joints), 1 + 2 * joints);
+    const bool later = p == 0 ? point[0] >= 0.0 : point[0] > before_s;
+    if (!later || !(point[0] <= 1e6)) {
+      return fail_at("after_s", fmt::format("the time of way-point {} does not grow", p + 1),
+                     "seconds after the sample, each later than the one before");
+    }
+    before_s = point[0];
+    for (std::size_t j = 0; j < joints; ++j) {
+      const std::string& name = block_->components[j];
+      const Status fits = check_value(name, point[1 + j], min_[j], max_[j], "rad (of a slide m)");
+      if (!fits) return fits;
+      const double speed = point[1 + joints + j];
+      const Status slow = check_value(name + "'s velocity", speed, moves ? -max_speed_[j] : 0.0,
+                                      moves ? max_speed_[j] : 0.0, "rad/s (of a slide m/s)");
+      if (!slow) return slow;
+    }
+  }
+  return {};
+}
+
+Status InputPort::check(std::span<const double> sample) const {
+  if (sample.size() != block_->value.size()) {
+    return fail_at(block_->name,
+                   fmt::format("{} numbers are not {}", sample.size(), block_->value.size()),
+                   "give every component");
+  }
+  if (block_->kind == InputKind::kTrajectory) return check_trajectory(sample);
+  for (std::size_t i = 0; i < sample.size(); ++i) {
+    const Status fits =
+        check_value(block_->components[i], sample[i], min_[i], max_[i], block_->units[i]);
+    if (!fits) return fits;
+  }
+  if (block_->kind == InputKind::kPose) {
+    const double norm =
+        std::hypot(std::hypot(sample[3], sample[4]), std::hypot(sample[5], sample[6]));
+    if (!(std::abs(norm - 1.0) < kUnitNorm)) {
+      return fail_at("qx, qy, qz, qw", fmt::format("have a norm of {:g}, not 1", norm),
+                     "give a unit quaternion");
+    }
+  }
+  return {};
+}
+
+void InputPort::pass_to(std::shared_ptr<InputPort> next) {
+  const std::lock_guard lock(mutex_);
+  next_ = std::move(next);
+}
+
+bool InputPort::is_same_as(const InputPort& other) const noexcept TANDEM_RT {
+  return block_->name == other.block_->name && block_->kind == other.block_->kind &&
+         block_->components == other.block_->components &&
+         block_->values() == other.block_->values();
+}
+
+Result<std::uint64_t> InputPort::offer(InputFeeder feeder, std::span<const double> sample) {
+  std::unique_lock lock(mutex_);
+  if (const auto next = next_) {
+    lock.unlock();
+    return next->offer(feeder, sample);
+  }
+  lock.unlock();
+  Status fits = check(sample);
+  if (feeder != source_.feeder) {
+    fits = fail_at(block_->name, fmt::format("is fed by its {}", to_string(source_.feeder)),
+                   "[controller.inputs] of the experiment says by whom; one source at a time");
+  }
+  if (!fits) {
+    refuse(fits.error());
+    return std::unexpected(fits.error());
+  }
+  lock.lock();
+  Sample& back = feed_.back();
+  back.number = ++number_;
+  std::ranges::copy(sample, back.values.begin());
+  feed_.publish();
+  return number_;
+}
+
+void InputPort::refuse(const Error& why) {
+  refused_.fetch_add(1, std::memory_order_relaxed);
+  const std::lock_guard lock(mutex_);
+  why_ = why.to_string();
+}
+
+std::optional<std::uint64_t> InputPort::taken(std::uint64_t number) const noexcept {
+  if (taken_.load(std::memory_order_acquire) < number) return std::nullopt;
+  return taken_cycle_.load(std::memory_order_relaxed);
+}
+
+InputLook InputPort::look() const {
+  std::vector<double> seen(shown_.size());
+  while (!shown_.read(seen)) {
+  }
+  const std::lock_guard lock(mutex_);
+  return {.value = {seen.begin() + 3, seen.end()},
+          .sequence = static_cast<std::uint64_t>(seen[0]),
+          .cycle = static_cast<std::uint64_t>(seen[1]),
+          .fresh = seen[2] != 0.0,
+          .counts = {.arrived = arrived_.load(std::memory_order_relaxed),
+                     .refused = refused_.load(std::memory_order_relaxed),
+                     .superseded = superseded_.load(std::memory_order_relaxed),
+                     .timed_out = timed_out_.load(std::memory_order_relaxed)},
+          .why = why_};
+}
+
+// The loop's.
+
+void InputPort::begin(const hal::CycleTime& time) noexcept TANDEM_RT {
+  if (feed_.refresh()) {
+    const std::uint64_t number = feed_.front().number;
+    superseded_.fetch_add(number - taken_.load(std::memory_order_relaxed),
+                          std::memory_order_relaxed);
+    taken_cycle_.store(time.cycle, std::memory_order_relaxed);
+    taken_.store(number, std::memory_order_release);
+  }
+  base_ = plan_.of_run ? 0 : time.cycle;
+  const auto first = std::ranges::lower_bound(plan_.at, time.cycle - base_);
+  row_ = static_cast<std::uint64_t>(first - plan_.at.begin());
+  block_->sequence = block_->cycle = 0;
+  block_->fresh = block_->arrived = false;
+  hold(without_);
+  show();
+}
+
+/// The sample of this cycle; empty: there is none.
+std::span<const double> InputPort::next(std::uint64_t cycle) noexcept TANDEM_RT {
+  const std::size_t size = block_->value.size();
+  if (!plan_.at.empty()) {
+    const auto from = plan_.at.begin() + static_cast<std::ptrdiff_t>(row_);
+    const auto past = std::upper_bound(from, plan_.at.end(), cycle - base_);
+    const bool again = plan_.repeat_cycles > 0 && block_->sequence > 0 &&
+                       cycle - block_->cycle >= plan_.repeat_cycles;
+    if (past == from && !again) return {};
+    if (past - from > 1) {
+      superseded_.fetch_add(static_cast<std::uint64_t>(past - from) - 1, std::memory_order_relaxed);
+    }
+    row_ = static_cast<std::uint64_t>(past - plan_.at.begin());
+    return plan_.row(row_ - 1, size);
+  }
+  if (!feed_.refresh()) return {};
+  const Sample& sample = feed_.front();
+  const std::uint64_t before = taken_.load(std::memory_order_relaxed);
+  superseded_.fetch_add(sample.number - before - 1, std::memory_order_relaxed);
+  taken_cycle_.store(cycle, std::memory_order_relaxed);
+  taken_.store(sample.number, std::memory_order_release);
+  return sample.values;
+}
+
+bool InputPort::take(const hal::CycleTime& time, bool open) noexcept TANDEM_RT {
+  InputBlock& to = *block_;
+  to.arrived = false;
+  const std::span<const double> sample = open ? next(time.cycle) : std::span<const double>();
+  if (!sample.empty()) {
+    hold(sample);
+    ++to.sequence;
+    to.cycle = time.cycle;
+    to.fresh = to.arrived = true;
+    arrived_.fetch_add(1, std::memory_order_relaxed);
+    show();
+    return true;
+  }
+  const bool silent = timeout_cycles_ > 0 && time.cycle - to.cycle > timeout_cycles_;
+  if (!to.fresh || !silent) return false;
+  to.fresh = false;
+  if (to.options.after != AfterTimeout::kLast) hold(without_);
+  timed_out_.fetch_add(1, std::memory_order_relaxed);
+  show();
+  return false;
+}
+
+void InputPort::hold(std::span<const double> values) noexcept TANDEM_RT {
+  std::ranges::copy(values, block_->value.begin());
+}
+
+void InputPort::show() noexcept TANDEM_RT {
+  scratch_[0] = static_cast<double>(block_->sequence);
+  scratch_[1] = static_cast<double>(block_->cycle);
+  scratch_[2] = block_->fresh ? 1.0 : 0.0;
+  std::ranges::copy(block_->value, scratch_.begin() + 3);
+  shown_.write(scratch_);
+}
+
+std::span<const std::byte> InputPort::message() noexcept TANDEM_RT {
+  std::memcpy(scratch_.data(), &block_->cycle, sizeof(std::uint64_t));
+  std::memcpy(scratch_.data() + 1, &block_->sequence, sizeof(std::uint64_t));
+  std::ranges::copy(block_->value, scratch_.begin() + 2);
+  return std::as_bytes(std::span(scratch_).first(2 + block_->value.size()));
+}
+
+void InputPort::archive(Archive& ar) {
+  ar(base_, row_);
+  if (ar.reading()) show();
+}
+
+Result<std::vector<std::shared_ptr<InputPort>>> make_input_ports(
+    const std::shared_ptr<ControllerIo>& io, const std::string& controller, const hal::Robot& robot,
+    std::int64_t period_ns, std::span<const InputSource> sources) {
+  std::deque<InputBlock>& declared = io->inputs.all;
+  if (declared.size() > InputBlock::kMost) {
+    return fail_at(controller, "declares " + std::to_string(declared.size()) + " inputs",
+                   "at most " + std::to_string(InputBlock::kMost));
+  }
+  std::vector<std::shared_ptr<InputPort>> ports;
+  std::vector<std::string> names;
+  for (InputBlock& block : declared) {
+    if (std::ranges::find(names, block.name) != names.end()) {
+      return fail_at(controller, "declares the input '" + block.name + "' twice",
+                     "give each a name of its own");
+    }
+    names.push_back(block.name);
+    const auto its = std::ranges::find(sources, block.name, &InputSource::name);
+    auto port = InputPort::make(io, block, controller, robot, period_ns,
+                                its == sources.end() ? nullptr : &*its);
+    if (!port) return std::unexpected(port.error());
+    ports.push_back(std::move(*port));
+  }
+  for (const InputSource& source : sources) {
+    if (std::ranges::find(names, source.name) != names.end()) continue;
+    Error error = source.where;
+    error.message = "the controller '" + controller + "' has no input '" + source.name + "'";
+    error.hint = names.empty() ? "it declares none" : suggest(source.name, names);
+    return std::unexpected(std::move(error));
+  }
+  return ports;
+}
+
+}  // namespace tandem::runtime
