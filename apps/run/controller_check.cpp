@@ -244,8 +244,8 @@ bool has_plugin(const runtime::ControllerHost& host, const std::string& plugin) 
 
 void figures(Figures& f, const ControllerCheckResult& result) {
   f("plugin", "its path", result.plugin);
-  f("kept", "every rule that could be watched", result.kept);
-  f("faults", "of the run: none", result.faults);
+  f("kept", "every rule that could be watched, and no fault was latched", result.kept);
+  f("faults", "that are latched; empty when the run ended well", result.faults);
   f("rules", result.rules);
 }
 
