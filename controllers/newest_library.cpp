@@ -4,18 +4,18 @@
 
 #include <dlfcn.h>
 #include <elf.h>
-#include <link.h>
 #include <sys/stat.h>
 
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <mutex>
 #include <set>
 #include <tuple>
 #include <vector>
+
+#include "base/loaded_libraries.hpp"
 
 #ifdef __has_feature
 #define TANDEM_HAS(sanitizer) __has_feature(sanitizer)
@@ -115,20 +115,6 @@ std::string stem(const std::string& path) {
   return name.substr(0, name.find(".so"));
 }
 
-/// The paths of all libraries of this process.
-std::set<std::string> mapped_libraries() {
-  std::set<std::string> paths;
-  ::dl_iterate_phdr(
-      [](dl_phdr_info* info, std::size_t, void* to) {
-        const std::string path = info->dlpi_name;
-        if (path.find(".so") != std::string::npos)
-          static_cast<std::set<std::string>*>(to)->insert(path);
-        return 0;
-      },
-      &paths);
-  return paths;
-}
-
 /// What the program itself is linked to: its functions come before those of a controller's.
 class OfTheProgram {
  public:
@@ -159,49 +145,6 @@ bool needs_apart(const Sections& file, const OfTheProgram& program) {
   return found;
 }
 
-/// Files that are mapped, and that something else stands in the place of.
-std::set<std::string> replaced_files() {
-  const std::string mark = " (deleted)";
-  std::set<std::string> paths;
-  std::ifstream maps("/proc/self/maps");
-  for (std::string line; std::getline(maps, line);) {
-    if (!line.ends_with(mark)) continue;
-    line.resize(line.size() - mark.size());
-    const std::size_t at = line.find('/');
-    std::error_code gone;
-    if (at != std::string::npos && fs::exists(line.substr(at), gone)) paths.insert(line.substr(at));
-  }
-  return paths;
-}
-
-/// A library that this one needs, itself or by another one, and whose former build is mapped: by
-/// its name the linker takes that. Empty: there is none.
-std::string outdated_need(void* library, const OfTheProgram& program,
-                          const std::set<std::string>& replaced, int depth = 0) {
-  link_map* map = nullptr;
-  if (depth > 16 || ::dlinfo(library, RTLD_DI_LINKMAP, &map) != 0) return {};
-  const char* names = nullptr;
-  for (const ElfW(Dyn)* entry = map->l_ld; entry->d_tag != DT_NULL; ++entry)
-    if (entry->d_tag == DT_STRTAB) names = reinterpret_cast<const char*>(entry->d_un.d_ptr);
-  for (const ElfW(Dyn)* entry = map->l_ld; entry->d_tag != DT_NULL; ++entry) {
-    if (entry->d_tag != DT_NEEDED || names == nullptr) continue;
-    const std::string name = names + entry->d_un.d_val;
-    void* const needed =
-        program.has(name) ? nullptr : ::dlopen(name.c_str(), RTLD_LAZY | RTLD_NOLOAD);
-    if (needed == nullptr) continue;
-    link_map* its = nullptr;
-    std::error_code problem;
-    std::string found;
-    if (::dlinfo(needed, RTLD_DI_LINKMAP, &its) == 0) {
-      const std::string real = fs::canonical(its->l_name, problem).string();
-      found = replaced.contains(real) ? real : outdated_need(needed, program, replaced, depth + 1);
-    }
-    ::dlclose(needed);
-    if (!found.empty()) return found;
-  }
-  return {};
-}
-
 /// A library that came with this one, and whose calls would go to the program's version of it.
 std::string mixed_up(const std::set<std::string>& before, const OfTheProgram& program) {
   for (const std::string& path : mapped_libraries())
@@ -219,7 +162,8 @@ Status check_needs(void* library, bool apart, const std::set<std::string>& befor
         "brings " + mixed + ", whose calls would go to the program's " + program.other_of(mixed),
         "link it to the controller itself, too: then both are kept apart");
   }
-  if (const std::string need = outdated_need(library, program, replaced_files()); !need.empty()) {
+  const auto of_program = [&program](const std::string& name) { return program.has(name); };
+  if (const std::string need = outdated_need(library, of_program); !need.empty()) {
     dlclose(library);
     return fail("needs " + need + ", which was built anew while its former code is in this process",
                 "end the run; or link its parts into the controller (STATIC)");

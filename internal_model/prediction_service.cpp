@@ -257,7 +257,8 @@ Status PredictionService::restore(HandOver& from) {
   const Status restored = fork_->cycle->restore(bytes);
   if (restored) return {};
   return fail("the run cannot be predicted: " + restored.error().message,
-              "a prediction plays the controllers that the experiment names: unload others");
+              "a prediction plays the controllers that the experiment names, as they were built at "
+              "its start: unload others, and predict a reloaded one in a new run");
 }
 
 void PredictionService::run_ahead(hal::Prediction& out, std::int64_t horizon_ns,

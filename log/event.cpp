@@ -50,6 +50,8 @@ std::string target(const Event& event, const EventNames&) {
 
 std::string nothing(const Event&, const EventNames&) { return ""; }
 
+std::string afresh(const Event&, const EventNames&) { return ": it starts afresh"; }
+
 std::string hex_code(const Event& event, const EventNames&) {
   char code[16];
   std::snprintf(code, sizeof code, " (0x%04X)", event.code);

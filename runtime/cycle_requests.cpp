@@ -68,7 +68,7 @@ void log(CycleNow& now, const CycleRequest& request) noexcept TANDEM_RT {
     case RequestKind::kGoOn: return now.event(EventKind::kControllersSwitched);
     case RequestKind::kReplace: {
       const auto kept = static_cast<std::uint32_t>(request.controller->succession->kept);
-      return now.event(EventKind::kControllersSwitched, -1, kept);
+      return now.event(EventKind::kControllerReloaded, -1, kept);
     }
     case RequestKind::kJoint: return now.event(EventKind::kJointSet, joint);
     case RequestKind::kHome: return now.event(EventKind::kHomingRequested, joint);

@@ -81,7 +81,7 @@ const char kTest[] =
 #include <cstdio>
 #include <cstring>
 
-#include "@NAME@.cpp"
+@TESTED@
 
 namespace hal = tandem::hal;
 
@@ -254,6 +254,7 @@ std::vector<std::pair<std::string, std::string>> controller_files(
   const std::pair<std::string, std::string> words[]{
       {"@NAME@", project.name},
       {"@CLASS@", class_of(project.name)},
+      {"@TESTED@", "#include \"" + project.name + ".cpp\""},
       {"@ROBOT@", project.robot},
       {"@ROBOT_FILE@", quoted_text(project.robot_file)},
       {"@POSTURE@", posture},

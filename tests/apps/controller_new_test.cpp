@@ -50,6 +50,28 @@ TEST_F(ControllerNew, MovesARobotOfAnInstallation) {
   make_and_spoil(prefix);
 }
 
+/// find_package() sets a build type for its own scope alone.
+TEST_F(ControllerNew, IsBuiltWithOptimisationWhereNothingSaysSo) {
+  write_text(folder_ / "mine.cpp", "");
+  write_text(folder_ / "CMakeLists.txt", R"(cmake_minimum_required(VERSION 3.25)
+project(mine LANGUAGES CXX)
+function(find)
+  find_package(tandem REQUIRED)
+endfunction()
+find()
+tandem_add_controller(mine SOURCES mine.cpp)
+)");
+  const Outcome configured =
+      shell("cmake -S . -B build -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -Dtandem_DIR=" +
+            shell_word(TANDEM_BINARY_DIR "/package"));
+  ASSERT_EQ(configured.status, 0) << configured.out;
+  const std::string commands = read_text(folder_ / "build/compile_commands.json");
+  expect(commands, " -O2 ");
+#ifndef __clang__
+  expect(commands, " -fno-gnu-unique ");
+#endif
+}
+
 TEST_F(ControllerNew, ChoosesAJointThatDoesNotCarryTheRobot) {
   const Outcome made = tandem("controller new wave --robot coman -o a/b");
   ASSERT_EQ(made.status, 0) << made.err;

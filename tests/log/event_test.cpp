@@ -36,6 +36,10 @@ TEST(Event, SaysWhatHappenedInOneLine) {
   EXPECT_EQ(describe(event, kNames), "link lost: no state comes");
   event = {.code = 108, .joint = 1, .kind = EventKind::kHot, .reported = 1};
   EXPECT_EQ(describe(event, kNames), "hot winding of knee, reported");
+  event = {.kind = EventKind::kControllerReloaded};
+  EXPECT_EQ(describe(event, kNames), "controller reloaded");
+  event.code = 3;
+  EXPECT_EQ(describe(event, kNames), "controller reloaded: it starts afresh");
   event = {.code = 1, .joint = 0, .kind = EventKind::kHomingFailed};
   EXPECT_EQ(describe(event, kNames),
             "homing failed of hip: the drive reports a homing error (statusword bit 13)");

@@ -1,0 +1,21 @@
+// The libraries that this process has loaded, and what of them is not the newest any more.
+// Layer: base.  Thread: any, not RT.
+#pragma once
+
+#include <functional>
+#include <set>
+#include <string>
+
+namespace tandem {
+
+/// The paths of all of them.
+[[nodiscard]] std::set<std::string> mapped_libraries();
+
+/// A library that `library` needs, itself or by another one, whose file was replaced since it was
+/// loaded: by its name the linker takes what it has. Empty: there is none.
+/// @param library    a handle of dlopen()
+/// @param leave_out  names of libraries that do not count
+[[nodiscard]] std::string outdated_need(void* library,
+                                        const std::function<bool(const std::string&)>& leave_out);
+
+}  // namespace tandem
