@@ -7,7 +7,12 @@
 SI units, W's z axis upwards; docs/python.md is the guide, docs/conventions.md has the frames.
 """
 
-from ._native import Error, UnknownName
+try:
+    from ._native import Error, UnknownName
+except ImportError as error:
+    raise ImportError(
+        f"{error} (the module belongs to the Python that Tandem was built with: docs/python.md)"
+    ) from error
 from .fields import Fields
 from .log import Channel, Column, Event, Log
 from .model import Model

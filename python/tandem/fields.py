@@ -55,15 +55,16 @@ class Fields:
         own["units"].update({s: own["units"][f] for s, f in short_names(own["units"]).items()})
 
     def __getattr__(self, name: str) -> NDArray[Any]:
-        array = self.__dict__.get("_arrays", {}).get(name.lower())
-        if array is None or name.startswith("__"):
-            if name.startswith("__"):
-                raise AttributeError(name)
-            _native.unknown("field of the " + self._name, name, list(self._arrays))
-        return array
+        if name.startswith("_"):
+            raise AttributeError(name)
+        arrays: Dict[str, NDArray[Any]] = self.__dict__["_arrays"]
+        if name.lower() not in arrays:
+            _native.unknown(f"field of the {self.__dict__['_name']}", name, list(arrays))
+        return arrays[name.lower()]
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        return getattr(self, name)
+        array: NDArray[Any] = getattr(self, name)
+        return array
 
     def __setattr__(self, name: str, value: ArrayLike) -> None:
         array = getattr(self, name)

@@ -41,7 +41,7 @@ class Column:
     def __getitem__(self, key: Any) -> NDArray[Any]:
         """By an element's name, or as numpy does it."""
         if not isinstance(key, str):
-            return self.values[key]
+            return np.asarray(self.values[key])
         if key not in self.names:
             _native.unknown(f"element of {self.name}", key, self.names)
         return self.values[:, self.names.index(key)]
@@ -79,7 +79,9 @@ class Channel:
     torque: Column
 
     def __init__(self, file: Any, row: Tuple[Any, ...]) -> None:
-        self._file, self._columns = file, None  # type: ignore[var-annotated]
+        self._file = file
+        self._columns: Optional[Dict[str, Column]] = None
+        self._time_s: NDArray[np.float64] = np.empty(0)
         self.name, self.type, self.messages, self.first_s, self.last_s, fields = row
         self._elements: Dict[str, List[str]] = dict(fields)
         self.fields = list(self._elements)

@@ -250,7 +250,7 @@ def test_runs_are_freed(config):
         return resident_kB()
 
     begun = many(10)
-    assert many(40) - begun < 40 * 300  # each has some 2 MB
+    assert many(40) - begun < 40 * 150  # each has 350 kB
 
 
 def test_two_runs_go_their_own_ways(config):
