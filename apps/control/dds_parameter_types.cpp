@@ -58,12 +58,12 @@ ParameterQuestion setting(const Sequence& parameters, bool each) {
 }
 
 /// Every parameter of the answer by its full name, in the order of the controllers.
-struct Named {
+struct NamedParameter {
   std::string name;
   const Json* facts;
 };
-std::vector<Named> parameters_of(const Json& answer) {
-  std::vector<Named> all;
+std::vector<NamedParameter> named_parameters(const Json& answer) {
+  std::vector<NamedParameter> all;
   const auto controllers = answer.find("controllers");
   if (controllers == answer.end()) return all;
   for (const Json& one : *controllers) {
@@ -75,8 +75,9 @@ std::vector<Named> parameters_of(const Json& answer) {
 }
 
 /// Null: there is none.
-const Json* find(const std::vector<Named>& all, const Json& name) {
-  const auto found = std::ranges::find(all, name.get_ref<const std::string&>(), &Named::name);
+const Json* find(const std::vector<NamedParameter>& all, const Json& name) {
+  const auto found =
+      std::ranges::find(all, name.get_ref<const std::string&>(), &NamedParameter::name);
   return found == all.end() ? nullptr : found->facts;
 }
 
@@ -90,7 +91,7 @@ RosType type_of(const Json& parameter) {
 
 /// Room for `count` elements in `sequence`, of the sequence's own type.
 template <class Sequence>
-auto room(Sequence& sequence, std::size_t count, ReplyMemory& memory) {
+auto places_in(Sequence& sequence, std::size_t count, ReplyMemory& memory) {
   using Element = std::remove_pointer_t<decltype(sequence._buffer)>;
   sequence._buffer = memory.array<Element>(count);
   sequence._length = sequence._maximum = static_cast<std::uint32_t>(count);
@@ -99,7 +100,7 @@ auto room(Sequence& sequence, std::size_t count, ReplyMemory& memory) {
 
 void fill_texts(const std::vector<std::string>& texts, dds_sequence_string& to,
                 ReplyMemory& memory) {
-  const auto places = room(to, texts.size(), memory);
+  const auto places = places_in(to, texts.size(), memory);
   for (std::size_t i = 0; i < texts.size(); ++i) places[i] = memory.text(texts[i]);
 }
 
@@ -139,10 +140,10 @@ void fill_descriptor(const Json& name, const Json* parameter,
   const double least = min.is_null() ? Limits::lowest() : min.get<double>();
   const double most = max.is_null() ? Limits::max() : max.get<double>();
   if (to.type == kDouble) {
-    room(to.floating_point_range, 1, memory)[0] = {least, most, 0.0};
+    places_in(to.floating_point_range, 1, memory)[0] = {least, most, 0.0};
   } else {  // an integer's limits are within 2^53
-    room(to.integer_range, 1, memory)[0] = {static_cast<std::int64_t>(least),
-                                            static_cast<std::int64_t>(most), 0};
+    places_in(to.integer_range, 1, memory)[0] = {static_cast<std::int64_t>(least),
+                                                 static_cast<std::int64_t>(most), 0};
   }
 }
 
@@ -191,7 +192,7 @@ ParameterQuestion question_of(const ros::SetParametersAtomically_Request& reques
 void fill(const Json& answer, const ParameterQuestion& asked, ros::ListParameters_Response& reply,
           ReplyMemory& memory) {
   std::vector<std::string> names, prefixes;
-  for (const Named& one : parameters_of(answer)) {
+  for (const NamedParameter& one : named_parameters(answer)) {
     if (!is_listed(one.name, asked.names, asked.depth)) continue;
     const std::string prefix = one.name.substr(0, one.name.rfind('.'));
     names.push_back(one.name);
@@ -203,24 +204,24 @@ void fill(const Json& answer, const ParameterQuestion& asked, ros::ListParameter
 
 void fill(const Json& answer, const ParameterQuestion& asked,
           ros::DescribeParameters_Response& reply, ReplyMemory& memory) {
-  const auto all = parameters_of(answer);
-  const auto places = room(reply.descriptors, asked.names.size(), memory);
+  const auto all = named_parameters(answer);
+  const auto places = places_in(reply.descriptors, asked.names.size(), memory);
   for (std::size_t i = 0; i < places.size(); ++i)
     fill_descriptor(asked.names[i], find(all, asked.names[i]), places[i], memory);
 }
 
 void fill(const Json& answer, const ParameterQuestion& asked, ros::GetParameters_Response& reply,
           ReplyMemory& memory) {
-  const auto all = parameters_of(answer);
-  const auto places = room(reply.values, asked.names.size(), memory);
+  const auto all = named_parameters(answer);
+  const auto places = places_in(reply.values, asked.names.size(), memory);
   for (std::size_t i = 0; i < places.size(); ++i)
     fill_value(find(all, asked.names[i]), places[i], memory);
 }
 
 void fill(const Json& answer, const ParameterQuestion& asked,
           ros::GetParameterTypes_Response& reply, ReplyMemory& memory) {
-  const auto all = parameters_of(answer);
-  const auto places = room(reply.types, asked.names.size(), memory);
+  const auto all = named_parameters(answer);
+  const auto places = places_in(reply.types, asked.names.size(), memory);
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Json* parameter = find(all, asked.names[i]);
     places[i] = parameter == nullptr ? kNotSet : type_of(*parameter);
@@ -230,7 +231,7 @@ void fill(const Json& answer, const ParameterQuestion& asked,
 void fill(const Json& answer, const ParameterQuestion& asked, ros::SetParameters_Response& reply,
           ReplyMemory& memory) {
   const bool ok = answer.value("ok", false);
-  const auto places = room(reply.results, asked.names.size(), memory);
+  const auto places = places_in(reply.results, asked.names.size(), memory);
   for (std::size_t i = 0; i < places.size(); ++i) {
     const auto& name = asked.names[i].get_ref<const std::string&>();
     fill_result(ok ? answer["results"].value(name, "") : message_of(answer), places[i], memory);
