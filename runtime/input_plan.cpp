@@ -73,7 +73,8 @@ Result<Rows> read_csv(const std::string& file) {
   out.components = cut(line);
   out.components.erase(out.components.begin());
   for (int number = 2; next(); ++number) {
-    Row row{.line = number};
+    Row row;
+    row.line = number;
     const std::vector<std::string> words = cut(line);
     for (const std::string& word : words) {
       char* end = nullptr;
@@ -179,6 +180,9 @@ Result<InputPlan> plan_of(const PlannedInput& input, const Rows& rows, const Inp
 
 /// The samples of this input that a log has, in their cycles.
 Result<InputPlan> read_log(const PlannedInput& input, const InputSource& source) {
+  if (source.repeat_s > 0.0) {
+    return wrong(source.where, "a log's samples arrive as they did", "leave out repeat_s");
+  }
   const auto file = log::LogFile::open(source.file);
   if (!file) return std::unexpected(file.error());
   const std::string topic = "/tandem/input/" + input.controller + "/" + input.block.name;
