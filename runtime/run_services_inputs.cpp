@@ -10,7 +10,7 @@
 namespace tandem::runtime {
 namespace {
 
-constexpr std::chrono::microseconds kLook{200};  // between two looks for the sample's arrival
+constexpr std::chrono::microseconds kSampleLook{200};  // between two looks for the sample's arrival
 
 /// Way-points as a sample. Errors: too many of them, or a list of another length.
 Result<std::vector<double>> trajectory_of(const InputBlock& input, const InputRequest& wish) {
@@ -140,7 +140,7 @@ Result<RequestResult> RunServices::set_input(const std::string& name, const Inpu
     const bool stands =
         inbox_->clock().state().standing || progress_->phase.load() != RunPhase::kRunning;
     if (stands || std::chrono::steady_clock::now() >= deadline) return RequestResult{};
-    std::this_thread::sleep_for(kLook);
+    std::this_thread::sleep_for(kSampleLook);
   }
 }
 
