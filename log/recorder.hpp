@@ -69,7 +69,8 @@ class Recorder {
   using Encode = std::function<void(std::int64_t time_ns, std::span<const std::byte>, Bytes& out)>;
   /// A channel that may also come while it records, from any thread but the loop's, before its
   /// first message is pushed. Where the topic has a channel of the same definition, it is that one;
-  /// where it has one of another, "_2" is added to the topic and "2" to the type, or the next number.
+  /// where it has one of another, "_2" is added to the topic and "2" to the type, or the next
+  /// number.
   /// @param ros2msg  definition of its messages
   /// @param encode   empty: what is pushed is the body, at most kMostLateBytes
   [[nodiscard]] Channel add_late_channel(const std::string& topic, const std::string& type,
