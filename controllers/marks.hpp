@@ -32,7 +32,7 @@ class Mark {
     if (block_ != nullptr) block_->show(mark_, points);
   }
   void hide() noexcept TANDEM_RT { show(0); }
-  /// Of a text: what it says, 60 bytes at most.
+  /// What a text says, 60 bytes at most.
   void say(std::string_view text) noexcept TANDEM_RT {
     if (block_ != nullptr) block_->say(mark_, text);
   }

@@ -20,7 +20,7 @@ struct SignalTopic {
   std::int64_t shown_ns = -1;
 };
 
-/// Of signals the newest values when a sample is due, once each: their cycle is in it.
+/// Signals have the newest values when a sample is due, once each: their cycle is in it.
 class ControllerTopics final : public TopicGroup {
  public:
   ControllerTopics(OutputMaker& maker, const RunDescription& run)

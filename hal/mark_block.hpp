@@ -86,7 +86,7 @@ class MarkBlock {
     state_.marks[mark].points =
         static_cast<std::uint32_t>(std::min(points, declared_[mark].points));
   }
-  /// Of a text mark: what it says; cut after kLongestText bytes. @rt a copy
+  /// What a text mark says; cut after kLongestText bytes. @rt a copy
   void say(std::size_t mark, std::string_view text) noexcept TANDEM_RT {
     if (mark >= declared_.size()) return;
     auto& to = state_.marks[mark].text;

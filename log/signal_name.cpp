@@ -52,7 +52,7 @@ std::string signal_name(const hal::Field& field, std::size_t index, const RunInf
       first += sensor.channels;
     }
   }
-  // Of another's field its count says it; a controller's signal says it itself.
+  // The count of another's field says it; a controller's signal says it itself.
   const bool signal = count.empty() && field.doc.starts_with('[');
   const bool per_joint = signal ? field.doc.find("] by joint: ") != std::string::npos
                                 : count.empty() || count == "joints";

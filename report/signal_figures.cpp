@@ -35,7 +35,7 @@ double range_of(const std::vector<double>& column) {
   return high >= low ? high - low : -1.0;
 }
 
-/// Of a signal with many numbers those that change most.
+/// A signal with many numbers shows those that change most.
 Figure figure_of(const RunData& run, const std::string& controller, const hal::Field& field,
                  log::TimeSeries& table) {
   const auto [unit, words] = parts_of(field);

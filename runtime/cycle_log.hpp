@@ -51,7 +51,7 @@ class CycleLog {
   void images(const hal::CycleTime& time, const hal::StateImage& state,
               const hal::CommandImage& command, const hal::TruthImage* truth,
               const hal::EstimateImage* estimate) noexcept TANDEM_RT;
-  /// Of a controller: what it has in this cycle.
+  /// What a controller has in this cycle.
   void signals(const hal::CycleTime& time, const HostedController& controller) noexcept TANDEM_RT;
   void marks(const hal::CycleTime& time, const HostedController& controller) noexcept TANDEM_RT;
   void text(const hal::TextEvent& event) noexcept TANDEM_RT {

@@ -330,7 +330,9 @@ TEST(TextEvents, AFloodIsBoundedAndCounted) {
   const log::LogFile file = run.logged();
   std::size_t said = 0;
   std::string last;
-  for (const auto& event : *file.events()) {
+  const auto events = file.events();
+  ASSERT_TRUE(events);
+  for (const auto& event : *events) {
     if (event.event.kind != log::EventKind::kText) continue;
     ++said;
     last = event.text;
