@@ -164,14 +164,29 @@ inline constexpr std::uint32_t kControllerInterface = 14;
 /// The version, and below it a hash of the sizes that go with it: a change whose version nobody
 /// raised, or another standard library, is found as well.
 inline constexpr std::uint32_t kControllerAbi =
-    kControllerInterface << 16 |
-    hash_of({sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::Robot),
-             sizeof(hal::DrivenJoint), sizeof(hal::PassiveJoint), sizeof(hal::Follower),
-             sizeof(hal::Sensor), sizeof(hal::Site), sizeof(hal::Foot), sizeof(hal::Posture),
-             sizeof(model::KinematicLoop), sizeof(hal::StateImage), sizeof(hal::EstimateImage),
-             sizeof(hal::CommandImage), sizeof(hal::ParameterImage), sizeof(hal::Prediction),
-             sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels), sizeof(InputOptions),
-             sizeof(InputBlock), sizeof(Input), sizeof(ControllerIo)});
+    kControllerInterface << 16 | hash_of({sizeof(ControllerSetup),
+                                          sizeof(ControllerSetup::Claim),
+                                          sizeof(hal::Robot),
+                                          sizeof(hal::DrivenJoint),
+                                          sizeof(hal::PassiveJoint),
+                                          sizeof(hal::Follower),
+                                          sizeof(hal::Sensor),
+                                          sizeof(hal::Site),
+                                          sizeof(hal::Foot),
+                                          sizeof(hal::Posture),
+                                          sizeof(model::KinematicLoop),
+                                          sizeof(hal::StateImage),
+                                          sizeof(hal::EstimateImage),
+                                          sizeof(hal::CommandImage),
+                                          sizeof(hal::ParameterImage),
+                                          sizeof(hal::Prediction),
+                                          sizeof(hal::CycleTime),
+                                          sizeof(TomlTable),
+                                          sizeof(tandem_kernels),
+                                          sizeof(InputOptions),
+                                          sizeof(InputBlock),
+                                          sizeof(Input),
+                                          sizeof(ControllerIo)});
 
 /// Whether `Class` has members of its own, but no archive(): what a snapshot may lack.
 template <class Class>
