@@ -17,7 +17,7 @@ namespace {
 /// Like a person's hand on a stick, and well within the usual time-out.
 constexpr std::chrono::milliseconds kAgain{100};
 
-Result<double> number_of(const std::string& text) {
+Result<double> finite_number(const std::string& text) {
   double number = 0.0;
   const char* last = text.data() + text.size();
   const auto [end, error] = std::from_chars(text.data(), last, number);
@@ -30,7 +30,7 @@ Result<Json> point_of(const std::string& text) {
   Json numbers = Json::array();
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
-    const auto number = number_of(text.substr(begin, end - begin));
+    const auto number = finite_number(text.substr(begin, end - begin));
     if (!number) return std::unexpected(number.error());
     numbers.push_back(*number);
     begin = end + 1;
@@ -40,7 +40,7 @@ Result<Json> point_of(const std::string& text) {
   return Json{{"after_s", after_s}, {"position_rad", std::move(numbers)}};
 }
 
-std::string held(const Json& input) {
+std::string shown_values(const Json& input) {
   if (input.contains("points")) return fmt::format("{} way-points", input["points"].size());
   std::string text;
   for (const auto& [name, value] : input["values"].items()) {
@@ -49,7 +49,7 @@ std::string held(const Json& input) {
   return text;
 }
 
-std::string state_of(const Json& input) {
+std::string freshness_of(const Json& input) {
   if (!input.value("active", false)) return "inactive";
   if (input.value("sequence", 0U) == 0) return "no sample yet";
   return input.value("fresh", false) ? "fresh" : "timed out";
@@ -73,7 +73,7 @@ Status ask_for_input(const AskedOptions& options, Json& question) {
     if (sign == std::string::npos || sign == 0) {
       return fail("'" + word + "' is not COMPONENT=NUMBER", "write x=0.2");
     }
-    const auto number = number_of(word.substr(sign + 1));
+    const auto number = finite_number(word.substr(sign + 1));
     if (!number) return std::unexpected(number.error());
     question["values"][word.substr(0, sign)] = *number;
   }
@@ -112,9 +112,9 @@ Result<Exit> tell_inputs(Asked& asked) {
   table.align_left();
   for (const Json& input : *some) {
     table.add({input.value("input", ""), input.value("controller", ""), input.value("kind", ""),
-               input.value("source", ""), state_of(input),
+               input.value("source", ""), freshness_of(input),
                std::to_string(input.value("arrived", 0U)),
-               std::to_string(input.value("refused", 0U)), held(input)});
+               std::to_string(input.value("refused", 0U)), shown_values(input)});
   }
   table.print(stdout);
   return Exit::kDone;

@@ -57,9 +57,12 @@ constexpr PadCode kCodes[]{
 
 using Bits = std::array<unsigned char, KEY_MAX / 8 + 1>;
 
-bool has(const Bits& bits, std::uint16_t code) { return (bits[code / 8] >> (code % 8) & 1) != 0; }
+bool has_bit(const Bits& bits, std::uint16_t code) {
+  return (bits[code / 8] >> (code % 8) & 1) != 0;
+}
 
-std::unexpected<Error> at(const runtime::InputPort& port, std::string message, std::string hint) {
+std::unexpected<Error> wrong_at(const runtime::InputPort& port, std::string message,
+                                std::string hint) {
   Error error = port.source().where;
   error.message = std::move(message);
   error.hint = std::move(hint);
@@ -72,7 +75,7 @@ Status measure(int device, PadPart& part, const std::string& text) {
   if (::ioctl(device, EVIOCGBIT(part.type, bits.size()), bits.data()) < 0) {
     return fail("is no event device", "name one of /dev/input/by-id/*-event-joystick");
   }
-  if (!has(bits, part.code)) return fail("has no " + text, "`evtest` shows what it has");
+  if (!has_bit(bits, part.code)) return fail("has no " + text, "`evtest` shows what it has");
   if (part.type == EV_KEY) return {};
   input_absinfo info{};
   if (::ioctl(device, EVIOCGABS(part.code), &info) < 0 || info.maximum <= info.minimum) {
@@ -121,39 +124,40 @@ Result<PadPart> parse_pad_part(const std::string& text) {
 Result<GamePad> GamePad::open(std::shared_ptr<runtime::InputPort> port) {
   const runtime::InputSource& source = port->source();
   if (port->input().kind == InputKind::kTrajectory) {
-    return at(*port, "a game pad is no source of a trajectory", "choose another source");
+    return wrong_at(*port, "a game pad is no source of a trajectory", "choose another source");
   }
   std::vector<PadPart> parts;
   for (const auto& [component, text] : source.mapping) {
     const std::vector<std::string>& all = port->input().components;
     const auto place = std::ranges::find(all, component);
     if (place == all.end()) {
-      return at(*port, "mapping: the input has no component '" + component + "'",
-                suggest(component, all));
+      return wrong_at(*port, "mapping: the input has no component '" + component + "'",
+                      suggest(component, all));
     }
     auto part = parse_pad_part(text);
-    if (!part) return at(*port, "mapping: " + part.error().message, part.error().hint);
+    if (!part) return wrong_at(*port, "mapping: " + part.error().message, part.error().hint);
     part->component = static_cast<std::size_t>(place - all.begin());
     std::vector<double> sample(port->without().begin(), port->without().end());
     for (const double end : {part->gain, part->type == EV_ABS ? -part->gain : 0.0}) {
       sample[part->component] = end;
       if (const Status fits = port->check(sample); !fits) {
-        return at(*port, "mapping: " + component + " " + fits.error().message,
-                  "give the value at its end: \"ABS_Y 0.5\"; " + fits.error().hint);
+        return wrong_at(*port, "mapping: " + component + " " + fits.error().message,
+                        "give the value at its end: \"ABS_Y 0.5\"; " + fits.error().hint);
       }
     }
     parts.push_back(*part);
   }
   Descriptor device(::open(source.device.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   if (device.get() < 0) {
-    return at(*port, "cannot open the game pad " + source.device + ": " + std::strerror(errno),
-              "is it plugged in, and is this user in the group `input`? ls -l /dev/input/by-id");
+    return wrong_at(
+        *port, "cannot open the game pad " + source.device + ": " + std::strerror(errno),
+        "is it plugged in, and is this user in the group `input`? ls -l /dev/input/by-id");
   }
   auto part = parts.begin();
   for (const auto& [component, text] : source.mapping) {
     const Status measured = measure(device.get(), *part++, text);
     if (!measured) {
-      return at(*port, source.device + " " + measured.error().message, measured.error().hint);
+      return wrong_at(*port, source.device + " " + measured.error().message, measured.error().hint);
     }
   }
   return GamePad(std::move(device), std::move(port), std::move(parts));
@@ -189,7 +193,7 @@ void GamePad::look() {
   for (PadPart& part : parts_) {
     input_absinfo info{};
     if (part.type == EV_KEY) {
-      if (knows) part.raw = has(keys, part.code) ? 1.0 : 0.0;
+      if (knows) part.raw = has_bit(keys, part.code) ? 1.0 : 0.0;
     } else if (::ioctl(device_.get(), EVIOCGABS(part.code), &info) >= 0) {
       part.raw = info.value;
     }

@@ -126,7 +126,7 @@ TEST_F(Pad, WhatCannotBeOpenedSaysSoWithItsPlace) {
   };
   has(why_not_open({{"x", "ABS_Y 0.5"}}), "/dev/null is no event device");
   has(why_not_open({{"forward", "ABS_Y 0.5"}}), "no component 'forward'");
-  has(why_not_open({{"x", "ABS_YY 0.5"}}), "'ABS_Y'");
+  has(why_not_open({{"x", "ABS_YY 0.5"}}), "there is no 'ABS_YY'");
   has(why_not_open({{"x", "ABS_Y fast"}}), "and a number");
   has(why_not_open({{"x", "ABS_Y 0.6"}}), "beyond its bounds");
   const runtime::InputSource nowhere{.name = "twist",
