@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::size_t kMostLines = 16;
 
-/// Of the unwinder alone, which reads nothing by it.
+/// The unwinder alone has it, and reads nothing by it.
 backtrace_state* unwinder = nullptr;
 
 void ignore(void*, const char*, int) {}

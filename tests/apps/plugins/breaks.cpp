@@ -19,7 +19,9 @@ std::mutex guarded;
 
 [[gnu::noinline]] void make_a_list(std::vector<double>& list) { list.assign(100, 1.0); }
 [[gnu::noinline]] void take_a_lock() { const std::lock_guard lock(guarded); }
-[[gnu::noinline]] void ask_the_kernel() { (void)::getppid(); }
+[[gnu::noinline]] void ask_the_kernel() {
+  [[maybe_unused]] const volatile auto parent = ::getppid();  // no tail call: it is in the stack
+}
 [[gnu::noinline]] void touch(char* pages, std::size_t page) {
   static_cast<volatile char*>(pages)[page * 4096] = 1;
 }
@@ -39,6 +41,7 @@ class Breaks final : public Controller {
     pages_ = static_cast<char*>(::mmap(nullptr, kPages * 4096, PROT_READ | PROT_WRITE,
                                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0));
     ::munlock(pages_, kPages * 4096);
+    ::madvise(pages_, kPages * 4096, MADV_NOHUGEPAGE);
     ::madvise(pages_, kPages * 4096, MADV_DONTNEED);
     return {};
   }
