@@ -57,7 +57,7 @@ constexpr Key<PayloadTimes> kPayload[] = {
 };
 // clang-format on
 
-std::int64_t to_ns(double seconds) { return std::llround(seconds * 1e9); }
+std::int64_t whole_ns(double seconds) { return std::llround(seconds * 1e9); }
 
 void nothing_given(TomlTable& table) {
   if (table.keys().empty()) table.error("", "changes nothing", "give a key, or remove it");
@@ -137,8 +137,8 @@ void add_payload(TomlTable& table, const model::Tree& described, std::vector<std
     table.error("until_s", "it is dropped before it is picked up", "give more than from_s");
   if (payload.link < 0 || table.has_errors()) return;
   if (times.from_s > 0.0 || times.until_s) {
-    payload.start_ns = to_ns(times.from_s);
-    if (times.until_s) payload.duration_ns = to_ns(*times.until_s - times.from_s);
+    payload.start_ns = whole_ns(times.from_s);
+    if (times.until_s) payload.duration_ns = whole_ns(*times.until_s - times.from_s);
     plant.carried.push_back(payload);
     return;
   }

@@ -43,8 +43,8 @@ class PlantEqual : public testing::TestWithParam<Subject> {
  protected:
   [[nodiscard]] Experiment read(const std::string& changes) const {
     std::ofstream(folder_ / "x.toml")
-        << "robot = '" TANDEM_SOURCE_DIR "/config/" << GetParam().robot
-        << "/robot.toml'\nduration_s = 1.0\nposture = '" << GetParam().posture
+        << "robot = \"" TANDEM_SOURCE_DIR "/config/" << GetParam().robot
+        << "/robot.toml\"\nduration_s = 1.0\nposture = '" << GetParam().posture
         << "'\n[[controller]]\nplugin = 'hold'\n[sim]\nhoist.enabled = false\n"
         << changes;
     auto e = read_experiment(folder_ / "x.toml");

@@ -18,7 +18,7 @@ class PlantOptions : public testing::Test {
   [[nodiscard]] std::expected<Experiment, Diagnostics> read(const std::string& text,
                                                             const std::string& robot = "panda") {
     std::ofstream(folder_ / "x.toml")
-        << "robot = '" TANDEM_SOURCE_DIR "/config/" << robot << "/robot.toml'\nduration_s = 1.0\n"
+        << "robot = \"" TANDEM_SOURCE_DIR "/config/" << robot << "/robot.toml\"\nduration_s = 1.0\n"
         << (robot == "coman" ? "posture = 'stand'\n" : "") << "[[controller]]\nplugin = 'hold'\n"
         << text;
     return read_experiment(folder_ / "x.toml");
