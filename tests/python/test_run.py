@@ -32,15 +32,15 @@ def test_controllers_run_to_the_bits_of_the_program(config, log_file):
     """log_file is the same experiment, by `tandem run`."""
     state = tandem.Log(log_file)["state"]
     run = tandem.Run(config / TRAJECTORY, duration_s=2)
-    seen = [(s.cycle[0], s.position.copy(), s.torque.copy()) for s in run]
+    seen = [(run.cycle, {f: run.state[f].copy() for f in state.fields}) for _ in run]
     assert run.over and run.phase == "shut-down" and not run.faults
     assert len(seen) == 2000 and run.cycle == seen[-1][0] + 1  # of the last command
     run.finish()
     assert run.phase == "done" and run.cycle == state.cycle[-1, 0]
     assert np.array_equal(run.state.position, state.position[-1])
-    for cycle, position, torque in seen:
-        assert np.array_equal(position, state.position[cycle])
-        assert np.array_equal(torque, state.torque[cycle])
+    for cycle, fields in seen:
+        for name, values in fields.items():
+            assert np.array_equal(values, state[name][cycle], equal_nan=True), (cycle, name)
 
 
 def test_command_acts_in_the_cycle_of_its_state(config):
