@@ -3,10 +3,13 @@
 import gc
 import os
 import signal
+import subprocess
+import sys
 import threading
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 import tandem
 
@@ -394,3 +397,15 @@ position_rad = [-0.3]
         run.command.position[:] = begin + 0.1 * min(1.0, (run.time_s - 1.2) / 0.5)
     assert np.allclose(run.sent.position, [-0.3, begin[1] + 0.1], rtol=0, atol=1e-12)
     assert np.allclose(run.state.position, run.sent.position, rtol=0, atol=0.05)  # springs yield
+
+
+def test_python_ends_while_a_thread_steps():
+    """A thread that wants the interpreter back from one that ends would end the process."""
+    text = f"""
+import tandem, threading, time
+run = tandem.Run({str(ROOT / "config" / HOLD)!r}, control="position", duration_s=1e6)
+threading.Thread(target=lambda: run.step(10**9), daemon=True).start()
+time.sleep(0.2)
+"""
+    ended = subprocess.run([sys.executable, "-B", "-c", text], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
