@@ -41,6 +41,30 @@ T take(std::expected<T, E>&& result) {
 /// Held while a robot's files are read and checked: that may be done by one thread at a time.
 [[nodiscard]] std::mutex& reading();
 
+/// While one lives, its thread is without the interpreter's lock, and the interpreter does not end:
+/// a thread that wanted the lock back from one that ends would end the process.
+/// Error: Python ends.
+class Away {
+ public:
+  Away() = default;
+  Away(const Away&) = delete;
+  Away& operator=(const Away&) = delete;
+  /// What takes long is to stop.
+  [[nodiscard]] static bool is_recalled() noexcept;
+  /// Lets nobody leave any more, and waits for those who are away.
+  static void recall_all();
+
+ private:
+  struct Counted {
+    Counted();
+    ~Counted();
+    Counted(const Counted&) = delete;
+    Counted& operator=(const Counted&) = delete;
+  };
+  Counted counted_;  // first: until the lock is back
+  py::gil_scoped_release free_;
+};
+
 /// Fields of an image, or of each of many in a row, as (name, array, doc): nothing is copied.
 /// @param records  -1: one image, whose arrays have the shape (count); else (records, count)
 /// @param owner    keeps `base` alive

@@ -93,7 +93,7 @@ class States {
 class Kernels {
  public:
   Kernels(const std::string& file, bool derivatives, bool build, const std::string& variant) {
-    const py::gil_scoped_release others;
+    const Away away;
     auto made = made_of(file, derivatives, build, variant);
     const py::gil_scoped_acquire back;
     library_ = python::take(std::move(made));
@@ -108,7 +108,7 @@ class Kernels {
   /// Calls `kernel(state, result)` for each state, without the interpreter's lock.
   template <class Call>
   static void for_each(const States& states, const Call& call) {
-    const py::gil_scoped_release others;
+    const Away away;
     for (py::ssize_t s = 0; s < states.count(); ++s) call(s);
   }
   void check_base(const py::object& q) const {

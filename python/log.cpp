@@ -67,7 +67,7 @@ class Log {
     auto records = std::make_shared<Records>();
     {
       Result<Records> read = [&] {
-        const py::gil_scoped_release others;
+        const Away away;
         return read_records(file_, *topic);
       }();
       *records = take(std::move(read));
@@ -98,7 +98,7 @@ class Log {
  private:
   static log::LogFile opened(const std::string& path) {
     Result<log::LogFile> file = [&] {
-      const py::gil_scoped_release others;
+      const Away away;
       return log::LogFile::open(path);
     }();
     return take(std::move(file));

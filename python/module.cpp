@@ -2,8 +2,11 @@
 // Layer: python.  Thread: any that holds the interpreter's lock.
 #include <dlfcn.h>
 
+#include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <filesystem>
+#include <thread>
 
 #include "base/nearest.hpp"
 #include "base/process.hpp"
@@ -14,6 +17,8 @@ namespace {
 
 PyObject* error_type = nullptr;    // tandem.Error; the module keeps it alive
 PyObject* unknown_type = nullptr;  // tandem.UnknownName
+std::atomic<bool> recalled{false};
+std::atomic<int> threads_away{0};
 
 [[noreturn]] void throw_as(PyObject* type, const std::string& text) {
   PyErr_SetString(type, text.c_str());
@@ -45,6 +50,22 @@ std::string program_of_this_library() {
 }
 
 }  // namespace
+
+Away::Counted::Counted() {
+  if (is_recalled()) throw_as(error_type, "Python ends: nothing is begun any more");
+  ++threads_away;
+}
+Away::Counted::~Counted() { --threads_away; }
+
+bool Away::is_recalled() noexcept { return recalled; }
+
+void Away::recall_all() {
+  recalled = true;
+  while (threads_away > 0) {
+    const py::gil_scoped_release back;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
 
 void raise(const Error& error) {
   std::error_code ignored;
@@ -132,4 +153,6 @@ PYBIND11_MODULE(_native, module) {
   tandem::python::add_kernels(module);
   tandem::python::add_log(module);
   tandem::python::add_run(module);
+  pybind11::module_::import("atexit").attr("register")(
+      pybind11::cpp_function(&tandem::python::Away::recall_all));
 }

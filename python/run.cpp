@@ -59,13 +59,13 @@ class Running {
       if (!all.empty()) e.controllers.clear();
     };
     auto opened = [&] {
-      const py::gil_scoped_release others;
+      const Away away;
       const std::scoped_lock alone(reading());
       return runtime::Run::open(file, overrides, {}, refuse_others);
     }();
     run_ = take(std::move(opened));
     if (!all.empty() || !some.empty()) add_lead(all, some);
-    const py::gil_scoped_release others;
+    const Away away;
     begin();
     while (begun_ && (run().cycle().phase() == RunPhase::kBringUp ||
                       run().cycle().phase() == RunPhase::kSettling)) {
@@ -95,8 +95,8 @@ class Running {
       const std::int64_t some = std::min<std::int64_t>(cycles, per_turn());
       cycles -= some;
       {
-        const py::gil_scoped_release others;
-        for (std::int64_t i = 0; i < some && advance(); ++i) {
+        const Away away;
+        for (std::int64_t i = 0; i < some && !Away::is_recalled() && advance(); ++i) {
         }
       }
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -109,7 +109,7 @@ class Running {
     run().cycle().inbox().end_run();
     while (begun_) {
       {
-        const py::gil_scoped_release others;
+        const Away away;
         for (std::int64_t i = 0; i < per_turn() && begun_; ++i) (void)advance();
       }
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();

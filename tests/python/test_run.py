@@ -3,10 +3,13 @@
 import gc
 import os
 import signal
+import subprocess
+import sys
 import threading
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 import tandem
 
@@ -32,15 +35,15 @@ def test_controllers_run_to_the_bits_of_the_program(config, log_file):
     """log_file is the same experiment, by `tandem run`."""
     state = tandem.Log(log_file)["state"]
     run = tandem.Run(config / TRAJECTORY, duration_s=2)
-    seen = [(s.cycle[0], s.position.copy(), s.torque.copy()) for s in run]
+    seen = [(run.cycle, {f: run.state[f].copy() for f in state.fields}) for _ in run]
     assert run.over and run.phase == "shut-down" and not run.faults
     assert len(seen) == 2000 and run.cycle == seen[-1][0] + 1  # of the last command
     run.finish()
     assert run.phase == "done" and run.cycle == state.cycle[-1, 0]
     assert np.array_equal(run.state.position, state.position[-1])
-    for cycle, position, torque in seen:
-        assert np.array_equal(position, state.position[cycle])
-        assert np.array_equal(torque, state.torque[cycle])
+    for cycle, fields in seen:
+        for name, values in fields.items():
+            assert np.array_equal(values, state[name][cycle], equal_nan=True), (cycle, name)
 
 
 def test_command_acts_in_the_cycle_of_its_state(config):
@@ -394,3 +397,15 @@ position_rad = [-0.3]
         run.command.position[:] = begin + 0.1 * min(1.0, (run.time_s - 1.2) / 0.5)
     assert np.allclose(run.sent.position, [-0.3, begin[1] + 0.1], rtol=0, atol=1e-12)
     assert np.allclose(run.state.position, run.sent.position, rtol=0, atol=0.05)  # springs yield
+
+
+def test_python_ends_while_a_thread_steps():
+    """A thread that wants the interpreter back from one that ends would end the process."""
+    text = f"""
+import tandem, threading, time
+run = tandem.Run({str(ROOT / "config" / HOLD)!r}, control="position", duration_s=1e6)
+threading.Thread(target=lambda: run.step(10**9), daemon=True).start()
+time.sleep(0.2)
+"""
+    ended = subprocess.run([sys.executable, "-B", "-c", text], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
