@@ -115,7 +115,7 @@ Status add_points(const Json& trajectory, InputRequest& wish) {
   return {};
 }
 
-Result<Json> set(runtime::RunServices& services, const Json& request) {
+Result<Json> set_input(runtime::RunServices& services, const Json& request) {
   InputRequest wish;
   if (request.contains("values") == request.contains("trajectory")) {
     return fail("input.set: give the values, or a trajectory", "tandem input list shows which");
@@ -140,7 +140,7 @@ Result<Json> set(runtime::RunServices& services, const Json& request) {
 
 void add_input_commands(ControlRegistry& registry, runtime::RunServices& services) {
   registry.add("input.list", [&services](const Json&) -> Result<Json> { return list(services); });
-  registry.add("input.set", [&services](const Json& request) { return set(services, request); });
+  registry.add("input.set", [&services](const Json& request) { return set_input(services, request); });
 }
 
 }  // namespace tandem::apps

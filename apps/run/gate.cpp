@@ -27,7 +27,7 @@
 namespace tandem::apps {
 namespace {
 
-constexpr char kTell[] = "tandem_gate_tell", kAgain[] = "TANDEM_GATE_LOADED";
+constexpr char kTell[] = "tandem_gate_tell", kLoaded[] = "TANDEM_GATE_LOADED";
 constexpr int kDispatch = 59;  // PR_SET_SYSCALL_USER_DISPATCH, newer than Debian's header
 constexpr std::uint64_t kWarmCalls = 100;  // without locked memory: first touches of code and data
 constexpr std::uint64_t kFaultyCalls = 3;  // the same: with fewer it keeps the rule
@@ -122,10 +122,10 @@ std::string preload_path() {
 
 Status Gate::enter_process() {
   if (::dlsym(RTLD_DEFAULT, kTell) != nullptr) {
-    const char* former = std::getenv(kAgain);
+    const char* former = std::getenv(kLoaded);
     const std::string others = former == nullptr ? "" : former;
     others.empty() ? ::unsetenv("LD_PRELOAD") : ::setenv("LD_PRELOAD", others.c_str(), 1);
-    ::unsetenv(kAgain);  // children have no gate
+    ::unsetenv(kLoaded);  // children have no gate
     return {};
   }
   const std::string traps = preload_path();
@@ -133,14 +133,14 @@ Status Gate::enter_process() {
     return fail("there are no traps for a gate: tandem_gate.so is missing",
                 "use a build without a sanitizer, which has traps of its own");
   }
-  if (std::getenv(kAgain) != nullptr) {
+  if (std::getenv(kLoaded) != nullptr) {
     return fail("the traps of the gate were not loaded: " + traps,
                 "a program with capabilities or set-user-id loads none: use another copy of it");
   }
   const char* given = std::getenv("LD_PRELOAD");
   const std::string others = given == nullptr ? "" : given;
   ::setenv("LD_PRELOAD", (traps + (others.empty() ? "" : ":") + others).c_str(), 1);
-  ::setenv(kAgain, others.c_str(), 1);
+  ::setenv(kLoaded, others.c_str(), 1);
   return std::unexpected(become("/proc/self/exe", own_words()));
 }
 
