@@ -47,6 +47,7 @@ Result<std::unique_ptr<Recorder>> Recorder::open(Descriptor file, const std::str
 
 Recorder::Recorder(const std::string& path, const RunInfo& info, const RecorderOptions& options)
     : path_(path),
+      named_{.joints = info.joints, .sensors = info.sensors},
       names_{.joints = info.joints, .boards = info.boards, .buses = info.buses},
       view_(options.viewed, info.joints),
       ring_slots_(options.ring_slots) {
@@ -70,7 +71,7 @@ Status Recorder::begin(const RunInfo& info) {
 Recorder::Channel Recorder::add_channel(const std::string& topic, const std::string& type,
                                         const hal::Layout& layout) {
   largest_ = std::max(largest_, layout.bytes());
-  const std::uint16_t schema = writer_.add_schema(type, "ros2msg", ros2msg_of(layout));
+  const std::uint16_t schema = writer_.add_schema(type, "ros2msg", ros2msg_of(layout, named_));
   const Channel channel = writer_.add_channel(schema, topic, "cdr");
   view_.take_channel(channel, topic, layout);
   return channel;

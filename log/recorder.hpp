@@ -111,6 +111,7 @@ class Recorder {
   void stop_thread();
 
   std::string path_;
+  RunInfo named_;  // joints and sensors, for schemas
   EventNames names_;
   McapWriter writer_;
   RobotView view_;

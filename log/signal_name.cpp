@@ -40,21 +40,35 @@ bool is_numbered(std::string_view count) {
 
 }  // namespace
 
-std::string signal_name(const hal::Field& field, std::size_t index, const RunInfo& info) {
+std::string_view named_by(const hal::Field& field, const RunInfo& info) {
   const std::string_view count = count_of(field);
-  if (field.count == 1 && !is_numbered(count)) return field.name;
-  if (field.name == "sensor") {
-    std::size_t first = 0;
-    for (const SensorInfo& sensor : info.sensors) {
-      if (index < first + sensor.channels) {
-        return "sensor." + sensor.name + "." + std::to_string(index - first);
-      }
-      first += sensor.channels;
-    }
-  }
+  if (field.count == 1 && !is_numbered(count) && count != "channels") return {};
+  const auto channels = [&] {
+    std::size_t sum = 0;
+    for (const SensorInfo& sensor : info.sensors) sum += sensor.channels;
+    return sum;
+  };
+  if (count == "channels") return field.count == channels() ? count : std::string_view();
+  if (count == "sensors") return field.count == info.sensors.size() ? count : std::string_view();
   const bool per_joint =
       count.empty() || count == "joints";  // of another's field its count says it
-  if (per_joint && field.count == info.joints.size()) return field.name + "." + info.joints[index];
+  return per_joint && field.count == info.joints.size() ? "joints" : std::string_view();
+}
+
+std::string element_name(const hal::Field& field, std::size_t index, const RunInfo& info) {
+  const std::string_view by = named_by(field, info);
+  if (by == "joints") return info.joints[index];
+  if (by == "sensors") return info.sensors[index].name;
+  for (const SensorInfo& sensor : info.sensors) {
+    if (index < sensor.channels) return sensor.name + "." + std::to_string(index);
+    index -= sensor.channels;
+  }
+  return {};
+}
+
+std::string signal_name(const hal::Field& field, std::size_t index, const RunInfo& info) {
+  if (!named_by(field, info).empty()) return field.name + "." + element_name(field, index, info);
+  if (field.count == 1 && !is_numbered(count_of(field))) return field.name;
   return field.name + "." + std::to_string(index);
 }
 
