@@ -68,6 +68,7 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
   }
   facts.add("robot", fmt::format("{}, {}, {}", info.robot, counted(info.joints.size(), "joint"),
                                  counted(info.sensors.size(), "sensor")));
+  if (info.part > 0) facts.add("part", fmt::format("{} of a log in several files", info.part));
   facts.add("backend", info.hal);
   facts.add("seed", std::to_string(info.seed));
   facts.add("period", info.period_ns == 0
