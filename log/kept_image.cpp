@@ -23,6 +23,7 @@ KeptImage::KeptImage(const hal::Layout& whole, const TopicShare& share) : every_
       runs_.push_back({field.offset, bytes});
     }
   }
+  whole_ = layout_.bytes() == whole.bytes();
   cut_.resize(layout_.bytes());
 }
 
@@ -34,7 +35,7 @@ bool KeptImage::takes(std::span<const std::byte> image) const {
 }
 
 std::span<const std::byte> KeptImage::cut(std::span<const std::byte> image) {
-  if (runs_.size() <= 1) return image.first(cut_.size());
+  if (whole_) return image;
   std::byte* to = cut_.data();
   for (const Run& run : runs_) to = std::ranges::copy(image.subspan(run.offset, run.bytes), to).out;
   return cut_;

@@ -42,6 +42,7 @@ class KeptImage {
   };
   hal::Layout layout_;
   std::uint32_t every_;
+  bool whole_;  // nothing is left out
   std::vector<Run> runs_;
   Bytes cut_;  // reused
 };

@@ -200,6 +200,9 @@ void print_comparison(const log::Comparison& comparison, std::FILE* out) {
   for (const std::string& topic : comparison.only_b) {
     fmt::print(out, "only the second log has {}\n", shown(topic));
   }
+  for (const std::string& topic : comparison.made) {
+    fmt::print(out, "not compared: {}, which is made from the others\n", shown(topic));
+  }
   fmt::print(out, "{}\n", comparison.equal() ? "the same, bit for bit" : "they differ");
 }
 

@@ -1,6 +1,7 @@
 // What a recording keeps: decimated topics, fields, several files, and room on the disk.
 #include <sys/statvfs.h>
 
+#include "base/sha256.hpp"
 #include "hal/truth.hpp"
 #include "log/log_file.hpp"
 #include "log/recorder.hpp"
