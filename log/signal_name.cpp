@@ -14,7 +14,7 @@ struct Row {
   std::string_view name, count;
 };
 
-constexpr Row kRows[] = {
+constexpr Row kFieldRows[] = {
 #define TANDEM_FIELD(type, name, count, doc) {#name, #count},
 #include "hal/command_fields.inc"
 #include "hal/estimate_fields.inc"
@@ -26,9 +26,9 @@ constexpr Row kRows[] = {
 /// The count that the tables say: "joints"; empty of a field that is not ours.
 std::string_view count_of(const hal::Field& field) {
   const std::string name = hal::wire_name(field.name);
-  const auto* row =
-      std::ranges::find_if(kRows, [&](const Row& one) { return hal::wire_name(one.name) == name; });
-  return row == std::end(kRows) ? std::string_view() : row->count;
+  const auto* row = std::ranges::find_if(
+      kFieldRows, [&](const Row& one) { return hal::wire_name(one.name) == name; });
+  return row == std::end(kFieldRows) ? std::string_view() : row->count;
 }
 
 /// Whether a robot may have one of them or more, so that one has its name or number, too.

@@ -13,12 +13,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kCycle_ns = 1'000'000;
+constexpr std::int64_t kKeptCycle_ns = 1'000'000;
 
 /// Cycles of a state of many joints, with a command of one and an event now and then.
-RecordingResult record(const std::string& path, std::uint64_t cycles, RecorderOptions options) {
+RecordingResult record_kept(const std::string& path, std::uint64_t cycles,
+                            RecorderOptions options) {
   const std::size_t joints = 40;
-  RunInfo info{.robot = "many", .period_ns = kCycle_ns, .configuration = {{"a.toml", "text"}}};
+  RunInfo info{.robot = "many", .period_ns = kKeptCycle_ns, .configuration = {{"a.toml", "text"}}};
   for (std::size_t j = 0; j < joints; ++j) info.joints.push_back("j" + std::to_string(j));
   auto recorder = Recorder::open(path, info, options);
   EXPECT_TRUE(recorder) << recorder.error().to_string();
@@ -29,7 +30,7 @@ RecordingResult record(const std::string& path, std::uint64_t cycles, RecorderOp
       (*recorder)->add_channel("/tandem/command", "tandem/msg/Command", command.layout());
   (*recorder)->start();
   for (std::uint64_t cycle = 0; cycle < cycles; ++cycle) {
-    const auto time_ns = static_cast<std::int64_t>(cycle) * kCycle_ns;
+    const auto time_ns = static_cast<std::int64_t>(cycle) * kKeptCycle_ns;
     state.cycle()[0] = command.cycle()[0] = cycle;
     state.time_ns()[0] = command.time_ns()[0] = time_ns;
     for (std::size_t j = 0; j < joints; ++j) {
@@ -55,8 +56,8 @@ LogFile opened(const std::string& path) {
 /// What is left out takes nothing away from what stays.
 TEST(Kept, HasEveryNthCycleAndTheFieldsThatAreWanted) {
   const ScratchFolder folder;
-  const auto whole = record(folder / "whole.mcap", 1000, {});
-  const auto less = record(
+  const auto whole = record_kept(folder / "whole.mcap", 1000, {});
+  const auto less = record_kept(
       folder / "less.mcap", 1000,
       {.shares = {{"state", 10, {"velocity_rad_s", "torque_nm", "statusword"}}, {"command", 0}}});
   const LogFile all = opened(whole.path), log = opened(less.path);
@@ -87,8 +88,8 @@ RecorderOptions in_parts() {
 /// Nothing is lost and nothing is twice where one file ends and the next begins.
 TEST(Kept, GoesOnInFilesThatAreWholeLogs) {
   const ScratchFolder folder;
-  const auto whole = record(folder / "whole.mcap", 5000, {});
-  const auto parts = record(folder / "run.mcap", 5000, in_parts());
+  const auto whole = record_kept(folder / "whole.mcap", 5000, {});
+  const auto parts = record_kept(folder / "run.mcap", 5000, in_parts());
   EXPECT_GE(parts.parts, 5U);
   EXPECT_EQ(parts.removed, 0U);
   EXPECT_EQ(parts.path, folder / "run.mcap");
@@ -132,8 +133,8 @@ TEST(Kept, EqualRunsHaveEqualParts) {
   const ScratchFolder folder;
   RecorderOptions slow = in_parts();
   slow.ring_slots = 8;
-  const auto one = record(folder / "one.mcap", 3000, in_parts());
-  const auto two = record(folder / "a_much_longer_name.mcap", 3000, slow);
+  const auto one = record_kept(folder / "one.mcap", 3000, in_parts());
+  const auto two = record_kept(folder / "a_much_longer_name.mcap", 3000, slow);
   EXPECT_EQ(one.parts, two.parts);
   EXPECT_EQ(one.data_sha256, two.data_sha256);
 }
@@ -143,7 +144,7 @@ TEST(Kept, RemovesTheOldestFilesOfTheRunAndNoOthers) {
   std::ofstream(folder / "run.0.mcap") << "another's";
   RecorderOptions options = in_parts();
   options.limits.total_bytes = 12'000'000;
-  const auto result = record(folder / "run.mcap", 10'000, options);
+  const auto result = record_kept(folder / "run.mcap", 10'000, options);
   EXPECT_GT(result.removed, 3U);
   EXPECT_LE(result.bytes, 12'000'000U);
   EXPECT_EQ(result.failed, 0U);
@@ -169,7 +170,7 @@ TEST(Kept, EndsBeforeTheDiskHasLessThanItShall) {
   const ScratchFolder folder;
   RecorderOptions options;
   options.limits.keep_free_bytes = std::uint64_t{1} << 60;
-  const auto result = record(folder / "run.mcap", 5000, options);
+  const auto result = record_kept(folder / "run.mcap", 5000, options);
   EXPECT_GT(result.failed, 5000U);
   EXPECT_EQ(
       result.error,
@@ -184,7 +185,7 @@ TEST(Kept, EndsBeforeTheDiskHasLessThanItShall) {
 TEST(Kept, SaysWhenTheNextFileCannotBeMade) {
   const ScratchFolder folder;
   std::ofstream(folder / "run.2.mcap") << "another's";
-  const auto result = record(folder / "run.mcap", 5000, in_parts());
+  const auto result = record_kept(folder / "run.mcap", 5000, in_parts());
   EXPECT_NE(result.error.find("run.2.mcap: File exists"), std::string::npos) << result.error;
   EXPECT_GT(result.failed, 1000U);
   EXPECT_EQ(opened(folder / "run.mcap").messages() + result.failed,
