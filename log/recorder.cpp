@@ -249,9 +249,9 @@ void Recorder::next_part() {
   if (!status) return give_up(writer_->error());
   writer_ = std::make_unique<McapWriter>();
   hash_ = {};
-  ++part_;
   Result<Descriptor> file = open_new(path, 0644);
   if (!file) return give_up("cannot make " + path + ": " + file.error().message);
+  ++part_;
   status = writer_->open(std::move(*file), path, options_.writer);
   if (status) status = begin();
   if (!status) return give_up(status.error().message);

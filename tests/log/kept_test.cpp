@@ -188,8 +188,9 @@ TEST(Kept, SaysWhenTheNextFileCannotBeMade) {
   const auto result = record_kept(folder / "run.mcap", 5000, in_parts());
   EXPECT_NE(result.error.find("run.2.mcap: File exists"), std::string::npos) << result.error;
   EXPECT_GT(result.failed, 1000U);
-  EXPECT_EQ(opened(folder / "run.mcap").messages() + result.failed,
-            result.messages + result.failed);
+  EXPECT_EQ(opened(folder / "run.mcap").messages(), result.messages);
+  EXPECT_EQ(result.messages + result.failed, 10'005U);
+  EXPECT_EQ(result.parts, 1U);
   EXPECT_EQ(fs::file_size(folder / "run.2.mcap"), 9U);
 }
 
