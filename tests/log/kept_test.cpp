@@ -185,7 +185,7 @@ TEST(Kept, EndsBeforeTheDiskHasLessThanItShall) {
 TEST(Kept, SaysWhenTheNextFileCannotBeMade) {
   const ScratchFolder folder;
   std::ofstream(folder / "run.2.mcap") << "another's";
-  const auto result = record_kept(folder / "run.mcap", 5000, in_parts());
+  const auto result = record_kept(folder / "run.mcap", 5000, {.limits = {.file_bytes = 4'000'000}});
   EXPECT_NE(result.error.find("run.2.mcap: File exists"), std::string::npos) << result.error;
   EXPECT_GT(result.failed, 1000U);
   EXPECT_EQ(opened(folder / "run.mcap").messages(), result.messages);
