@@ -20,7 +20,7 @@ struct TopicShare {
   std::vector<std::string> without{};  ///< fields, by their names in the log
 };
 
-/// Of a topic that no share names everything.
+/// The share of a topic; one that none names is kept as a whole.
 [[nodiscard]] TopicShare share_of(std::span<const TopicShare> shares, std::string_view topic);
 
 /// One topic's images, cut to what is kept.

@@ -52,7 +52,7 @@ class McapWriter {
   [[nodiscard]] Status close();
 
   [[nodiscard]] bool is_open() const noexcept { return file_.get() >= 0; }
-  /// Of the disk that the file is on, to this user. Nothing: it does not say.
+  /// Free space for this user on the disk that the file is on. Nothing: it does not say.
   [[nodiscard]] std::optional<std::uint64_t> free_bytes() const;
   [[nodiscard]] bool failed() const noexcept { return !error_.empty(); }
   /// "No space left on device", or empty.

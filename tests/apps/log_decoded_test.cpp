@@ -57,7 +57,8 @@ TEST_F(DecodedLog, OfAHumanoidHasEveryNumberOfTheTable) {
 }
 
 TEST_F(DecodedLog, OfClosedLoopsHasEveryNumberOfTheTable) {
-  expect_decoded("parallel_ankle/move.toml", {"/joint_states", "/tf", "/tf_static", "/robot_description"});
+  expect_decoded("parallel_ankle/move.toml",
+                 {"/joint_states", "/tf", "/tf_static", "/robot_description"});
 }
 
 }  // namespace
