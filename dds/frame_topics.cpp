@@ -82,7 +82,7 @@ model::Placement placement(const FrameEdge& edge, double position) {
 namespace {
 
 /// A floating base stands in the frame "odom", where the simulation's truth has it; nobody knows
-/// where that of a real robot stands, and a fixed base is the root.
+/// where that of a real robot stands. A fixed base is where "odom" is.
 class FrameTopics final : public TopicGroup {
  public:
   FrameTopics(OutputMaker& maker, const RunDescription& run);
@@ -96,7 +96,7 @@ class FrameTopics final : public TopicGroup {
 
   FrameTree frames_;
   std::string urdf_, odom_, base_;
-  bool base_known_;
+  bool base_known_, base_fixed_;
   std::vector<Stamped> transforms_;
   Output<tf2_msgs::TFMessage> tf_, tf_static_;
   Output<nav_msgs::Odometry> odometry_;
@@ -111,16 +111,20 @@ FrameTopics::FrameTopics(OutputMaker& maker, const RunDescription& run)
       base_known_(
           run.tree.floating_base &&
           (run.truth != nullptr || (run.estimate != nullptr && run.estimate->estimates_base()))),
+      base_fixed_(!run.tree.floating_base),
       tf_(maker.periodic<tf2_msgs::TFMessage>(Topic::kTf, "tf")),
       tf_static_(maker.latched<tf2_msgs::TFMessage>("tf_static")),
       description_(maker.latched<std_msgs::String>("robot_description")) {
   if (base_known_) odometry_ = maker.periodic<nav_msgs::Odometry>(Topic::kOdom, "odom");
-  transforms_.reserve(std::max(frames_.moving.size() + 1, frames_.fixed.size()));
+  transforms_.reserve(std::max(frames_.moving.size(), frames_.fixed.size()) + 1);
 }
 
 void FrameTopics::begin(std::int64_t stamp_ns) {
   description_.write({refer(urdf_)});
   transforms_.clear();
+  if (base_fixed_) {
+    transforms_.push_back({{ros_time(stamp_ns), refer(odom_)}, refer(base_), transform({})});
+  }
   for (const FrameEdge& edge : frames_.fixed) {
     transforms_.push_back(
         {{ros_time(stamp_ns), refer(edge.parent)}, refer(edge.child), transform(edge.at_zero)});

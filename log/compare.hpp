@@ -31,6 +31,9 @@ struct TopicComparison {
 struct Comparison {
   std::vector<TopicComparison> topics;  ///< that both logs have, in the first one's order
   std::vector<std::string> only_a, only_b;
+  /// That both have and that are not compared: /tf of a run's log is made from its other topics,
+  /// the base's place from the truth or, without it, from the estimate.
+  std::vector<std::string> made;
 
   /// Every topic that both have is the same, and there is one.
   [[nodiscard]] bool equal() const;

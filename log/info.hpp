@@ -27,6 +27,7 @@ struct RunInfo {
   std::string hal{};                  ///< "sim", …
   std::vector<std::string> joints{};  ///< the image's order
   std::vector<SensorInfo> sensors{};  ///< the image's order
+  std::uint64_t part = 0;             ///< of a log in several files, from 1; 0: it is in one
   std::uint64_t seed = 0;
   std::int64_t period_ns = 0;
   /// The state is what a tele-operator saw, predicted or late; false: what was measured.

@@ -72,9 +72,7 @@ Status McapWriter::open(Descriptor file, const std::string& path, const WriterOp
   path_ = path;
   options_ = options;
   file_ = std::move(file);
-  struct statvfs disk {};
-  if (::fstatvfs(file_.get(), &disk) == 0 && disk.f_blocks > 0 &&
-      disk.f_bavail * disk.f_frsize < kSpaceNeeded) {
+  if (free_bytes().value_or(kSpaceNeeded) < kSpaceNeeded) {
     return std::unexpected(open_error(path, ENOSPC, std::strerror(ENOSPC)));
   }
   chunk_.reserve(options.chunk_bytes + options.chunk_bytes / 4);
@@ -86,6 +84,12 @@ Status McapWriter::open(Descriptor file, const std::string& path, const WriterOp
   emit_record(Opcode::kHeader, header);
   if (failed()) return std::unexpected(open_error(path, errno, error_));
   return {};
+}
+
+std::optional<std::uint64_t> McapWriter::free_bytes() const {
+  struct statvfs disk {};
+  if (::fstatvfs(file_.get(), &disk) != 0 || disk.f_blocks == 0) return std::nullopt;
+  return static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize;
 }
 
 void McapWriter::look_at_file() {

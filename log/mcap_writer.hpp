@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -54,6 +55,9 @@ class McapWriter {
   /// Closes the open chunk, writes the summary and the footer. Errors: the first failed write.
   [[nodiscard]] Status close();
 
+  [[nodiscard]] bool is_open() const noexcept { return file_.get() >= 0; }
+  /// Free space for this user on the disk that the file is on. Nothing: it does not say.
+  [[nodiscard]] std::optional<std::uint64_t> free_bytes() const;
   [[nodiscard]] bool failed() const noexcept { return !error_.empty(); }
   /// "No space left on device", or empty.
   [[nodiscard]] const std::string& error() const noexcept { return error_; }

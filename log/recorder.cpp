@@ -2,20 +2,23 @@
 // recorder's thread.
 #include "log/recorder.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstring>
-#include <limits>
+#include <filesystem>
 #include <utility>
 
+#include "base/sha256.hpp"
 #include "log/controller_messages.hpp"
 #include "log/schema.hpp"
 
 namespace tandem::log {
 namespace {
 
-constexpr Recorder::Channel kEventChannel = 0;
-constexpr Recorder::Channel kTextChannel = 0xFFFF;  // in the ring: of a TextEvent
+// Numbers of channels as they are pushed; what they are in a file, each file says.
+constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kTextChannel = 0xFFFF;
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
 }  // namespace
@@ -31,8 +34,8 @@ Recorder::~Recorder() { stop_thread(); }
 Result<std::unique_ptr<Recorder>> Recorder::open(const std::string& path, const RunInfo& info,
                                                  const RecorderOptions& options) {
   std::unique_ptr<Recorder> recorder(new Recorder(path, info, options));
-  Status opened = recorder->writer_.open(path, options.writer);
-  if (opened) opened = recorder->begin(info);
+  Status opened = recorder->writer_->open(path, options.writer);
+  if (opened) opened = recorder->begin();
   if (!opened) return std::unexpected(opened.error());
   return recorder;
 }
@@ -41,39 +44,45 @@ Result<std::unique_ptr<Recorder>> Recorder::open(Descriptor file, const std::str
                                                  const RunInfo& info,
                                                  const RecorderOptions& options) {
   std::unique_ptr<Recorder> recorder(new Recorder(path, info, options));
-  Status opened = recorder->writer_.open(std::move(file), path, options.writer);
-  if (opened) opened = recorder->begin(info);
+  Status opened = recorder->writer_->open(std::move(file), path, options.writer);
+  if (opened) opened = recorder->begin();
   if (!opened) return std::unexpected(opened.error());
   return recorder;
 }
 
 Recorder::Recorder(const std::string& path, const RunInfo& info, const RecorderOptions& options)
     : path_(path),
+      info_(info),
+      options_(options),
       names_{.joints = info.joints, .boards = info.boards, .buses = info.buses},
-      view_(options.viewed, info.joints),
-      ring_slots_(options.ring_slots) {
+      writer_(std::make_unique<McapWriter>()),
+      view_(options.viewed, info.joints) {
   for (const SensorInfo& sensor : info.sensors) names_.sensors.push_back(sensor.name);
 }
 
-Status Recorder::begin(const RunInfo& info) {
-  writer_.add_metadata(kInfoRecord, to_map(info));
-  writer_.add_metadata(kConfigurationRecord, info.configuration);
-  if (writer_.failed()) {
-    return std::unexpected(Error{.message = "cannot write the log: " + writer_.error(),
+/// What stands before the messages of every part.
+Status Recorder::begin() {
+  if (options_.limits.file_bytes > 0) info_.part = part_;
+  writer_->add_metadata(kInfoRecord, to_map(info_));
+  writer_->add_metadata(kConfigurationRecord, info_.configuration);
+  if (writer_->failed()) {
+    return std::unexpected(Error{.message = "cannot write the log: " + writer_->error(),
                                  .hint = "free some space or choose another folder",
                                  .file = path_,
                                  .key = {}});
   }
-  const std::uint16_t schema = writer_.add_schema("tandem/msg/Event", "ros2msg", event_schema());
-  writer_.add_channel(schema, "/tandem/event", "cdr");
+  head_bytes_ = looked_at_ = writer_->bytes_written();
+  const std::uint16_t schema = writer_->add_schema("tandem/msg/Event", "ros2msg", event_schema());
+  writer_->add_channel(schema, "/tandem/event", "cdr");
   return {};
 }
 
 Recorder::Channel Recorder::add_channel(const std::string& topic, const std::string& type,
                                         const hal::Layout& layout) {
   largest_ = std::max(largest_, layout.bytes());
-  const std::uint16_t schema = writer_.add_schema(type, "ros2msg", ros2msg_of(layout));
-  const Channel channel = writer_.add_channel(schema, topic, "cdr");
+  declare(topics_.emplace_back(topic, type, KeptImage(layout, share_of(options_.shares, topic)),
+                               std::nullopt));
+  const auto channel = static_cast<Channel>(topics_.size());
   view_.take_channel(channel, topic, layout);
   return channel;
 }
@@ -90,30 +99,41 @@ Recorder::Channel Recorder::add_late_channel(const std::string& topic, const std
       const std::string type_ending = number == 1 ? "" : std::to_string(number);
       late_.push_back({topic + ending, type + type_ending, ros2msg, std::move(encode)});
     }
-    return static_cast<Channel>(first_late_ + index);
+    return static_cast<Channel>(kFirstLate + index);
   }
 }
 
-/// Before the first message of one of them, and at the end.
-void Recorder::add_new_channels() {
+std::string Recorder::ros2msg_of(const hal::Layout& layout) const {
+  return log::ros2msg_of(layout, info_);
+}
+
+/// Before the first message of one of them in a part, and at its end.
+void Recorder::declare_late() {
   const std::lock_guard lock(late_mutex_);
-  for (std::size_t i = encoders_.size(); i < late_.size(); ++i) {
+  for (std::size_t i = late_ids_.size(); i < late_.size(); ++i) {
     const LateChannel& one = late_[i];
-    const std::uint16_t schema = writer_.add_schema(one.type, "ros2msg", one.ros2msg);
-    writer_.add_channel(schema, one.topic, "cdr");
-    encoders_.push_back(one.encode);
+    const std::uint16_t schema = writer_->add_schema(one.type, "ros2msg", one.ros2msg);
+    late_ids_.push_back(writer_->add_channel(schema, one.topic, "cdr"));
+    if (i == encoders_.size()) encoders_.push_back(one.encode);
   }
+}
+
+/// In the present part.
+void Recorder::declare(Topic& topic) {
+  if (topic.kept.every() == 0) return;
+  const std::uint16_t schema =
+      writer_->add_schema(topic.type, "ros2msg", ros2msg_of(topic.kept.layout()));
+  topic.id = writer_->add_channel(schema, topic.name, "cdr");
 }
 
 void Recorder::open_side(std::int64_t lag_ns) { side_lag_ns_ = lag_ns; }
 
 void Recorder::start() {
-  view_.add_channels(writer_);
-  first_late_ = writer_.channels();
+  view_.add_channels(*writer_);
   largest_ = std::max(largest_, kMostLateBytes);
   const std::size_t slot_bytes = (sizeof(Slot) + largest_ + 7) / 8 * 8;
-  ring_ = std::make_unique<SpscRing>(slot_bytes, ring_slots_);
-  if (side_lag_ns_ >= 0) side_ = std::make_unique<SpscRing>(slot_bytes, ring_slots_);
+  ring_ = std::make_unique<SpscRing>(slot_bytes, options_.ring_slots);
+  if (side_lag_ns_ >= 0) side_ = std::make_unique<SpscRing>(slot_bytes, options_.ring_slots);
   thread_ = std::thread([this] { run(); });
 }
 
@@ -132,7 +152,6 @@ bool Recorder::push(SpscRing& ring, Channel channel, std::int64_t time_ns,
   const std::span<std::byte> slot = ring.begin_push();
   if (slot.empty()) return false;
   const Slot head{time_ns, static_cast<std::uint32_t>(image.size()), channel};
-  if (image.size() > slot.size() - sizeof head) return false;
   std::memcpy(slot.data(), &head, sizeof head);
   std::memcpy(slot.data() + sizeof head, image.data(), image.size());
   ring.end_push();
@@ -174,6 +193,8 @@ void Recorder::run() {
     for (auto slot = ring_->front(); !slot.empty(); slot = ring_->front()) {
       Slot head{};
       std::memcpy(&head, slot.data(), sizeof head);
+      if (full_ && head.time_ns > time_ns_) next_part();  // cycles stay whole
+      time_ns_ = head.time_ns;
       write_side(head.time_ns - side_lag_ns_);
       write(slot);
       ring_->pop();
@@ -209,7 +230,7 @@ void Recorder::write(std::span<const std::byte> slot) {
       text += describe(set);
     }
     encode_event(event, text, event_);
-    write(head.channel, head.time_ns, event_);
+    write(kEventChannel, head.time_ns, event_);
     return;
   }
   if (head.channel == kTextChannel) {
@@ -217,23 +238,23 @@ void Recorder::write(std::span<const std::byte> slot) {
     std::memcpy(&event, body.data(), sizeof event);
     return write_text(event);
   }
-  if (head.channel >= first_late_) {
-    const auto late = static_cast<std::size_t>(head.channel - first_late_);
-    if (late >= encoders_.size()) add_new_channels();
-    if (!encoders_[late]) return write(head.channel, head.time_ns, body);
-    encoders_[late](head.time_ns, body, event_);
-    return write(head.channel, head.time_ns, event_);
-  }
-  write(head.channel, head.time_ns, body);
+  if (head.channel >= kFirstLate) return write_late(head.channel, head.time_ns, body);
+  Topic& topic = topics_[head.channel - 1U];
+  if (topic.id && topic.kept.takes(body)) write(*topic.id, head.time_ns, topic.kept.cut(body));
   view_.follow(head.channel, head.time_ns, body,
-               [&](Channel channel, auto message) { write(channel, head.time_ns, message); });
+               [&](Channel id, auto message) { write(id, head.time_ns, message); });
+}
+
+void Recorder::write_late(Channel channel, std::int64_t time_ns, std::span<const std::byte> body) {
+  const auto late = static_cast<std::size_t>(channel - kFirstLate);
+  if (late >= late_ids_.size()) declare_late();
+  if (!encoders_[late]) return write(late_ids_[late], time_ns, body);
+  encoders_[late](time_ns, body, event_);
+  write(late_ids_[late], time_ns, event_);
 }
 
 void Recorder::write_text(const hal::TextEvent& event) {
-  if (rosout_ < 0) {
-    rosout_ = add_late_channel("/rosout", kRosoutType, rosout_definition());
-    add_new_channels();
-  }
+  if (!rosout_) rosout_ = add_late_channel("/rosout", kRosoutType, rosout_definition());
   encode_event({.cycle = event.cycle,
                 .time_ns = event.time_ns,
                 .code = static_cast<std::uint32_t>(event.level),
@@ -241,15 +262,103 @@ void Recorder::write_text(const hal::TextEvent& event) {
                std::string(event.controller()) + ": " + event.words(), event_);
   write(kEventChannel, event.time_ns, event_);
   encode_rosout(event, event.time_ns, event_);
-  write(static_cast<Channel>(rosout_), event.time_ns, event_);
+  write_late(*rosout_, event.time_ns, event_);
 }
 
-void Recorder::write(Channel channel, std::int64_t time_ns, std::span<const std::byte> body) {
-  hash_.add(channel, time_ns, kCdrHeader, body);
-  if (!writer_.write(channel, time_ns, kCdrHeader, body)) {
-    if (lost_++ == 0) trouble_ = writer_.error();
-    failed_.store(true, std::memory_order_release);
+void Recorder::write(Channel id, std::int64_t time_ns, std::span<const std::byte> body) {
+  if (failed_.load(std::memory_order_relaxed)) {
+    ++lost_;
+    return;
   }
+  hash_.add(id, time_ns, kCdrHeader, body);
+  if (!writer_->write(id, time_ns, kCdrHeader, body)) {
+    ++lost_;
+    give_up(writer_->error());
+  } else if (writer_->bytes_written() != looked_at_) {
+    look_at_disk();
+  }
+}
+
+/// From now on nothing is written.
+void Recorder::give_up(std::string why) {
+  trouble_ = std::move(why);
+  failed_.store(true, std::memory_order_release);
+}
+
+/// After each chunk.
+void Recorder::look_at_disk() {
+  const DiskLimits& limits = options_.limits;
+  looked_at_ = writer_->bytes_written();
+  // The file is known to be full before it is: one more chunk is written.
+  full_ = limits.file_bytes > 0 &&
+          looked_at_ - head_bytes_ + options_.writer.chunk_bytes >= limits.file_bytes;
+  const std::uint64_t next = head_bytes_ + 2 * options_.writer.chunk_bytes;
+  while (limits.total_bytes > 0 && ended_bytes_ + looked_at_ + next > limits.total_bytes) {
+    if (!remove_oldest()) break;
+  }
+  while (limits.keep_free_bytes > 0 &&
+         writer_->free_bytes().value_or(limits.keep_free_bytes) < limits.keep_free_bytes) {
+    if (limits.total_bytes > 0 && remove_oldest()) continue;
+    return give_up("the disk has less than [log] keep_free_MB = " +
+                   std::to_string(limits.keep_free_bytes / 1'000'000) + " free");
+  }
+}
+
+/// False: there is none beside the present part.
+bool Recorder::remove_oldest() {
+  if (ended_.empty()) return false;
+  (void)::unlink(ended_.front().path.c_str());  // one that somebody took away is gone, too
+  ended_bytes_ -= ended_.front().bytes;
+  ended_.erase(ended_.begin());
+  ++removed_;
+  return true;
+}
+
+/// "runs/arm-001.mcap", "runs/arm-001.2.mcap"
+std::string Recorder::part_path(std::uint64_t number) const {
+  if (number == 1) return path_;
+  const std::string ending = ".mcap";
+  const std::string stem =
+      path_.ends_with(ending) ? path_.substr(0, path_.size() - ending.size()) : path_;
+  return stem + "." + std::to_string(number) + ending;
+}
+
+void Recorder::next_part() {
+  full_ = false;
+  const std::string path = part_path(part_ + 1);
+  Status status = end_part({{"continued", std::filesystem::path(path).filename().string()}});
+  if (!status) return give_up(writer_->error());
+  writer_ = std::make_unique<McapWriter>();
+  hash_ = {};
+  Result<Descriptor> file = open_new(path, 0644);
+  if (!file) return give_up("cannot make " + path + ": " + file.error().message);
+  ++part_;
+  status = writer_->open(std::move(*file), path, options_.writer);
+  if (status) status = begin();
+  if (!status) return give_up(status.error().message);
+  for (Topic& topic : topics_) declare(topic);
+  view_.add_channels(*writer_);
+  late_ids_.clear();
+  declare_late();
+}
+
+/// Adds the record "result" to the present part, and ends it.
+Status Recorder::end_part(const StringMap& extra) {
+  const std::string hash = hash_.finish();
+  hashes_ += hash + "\n";
+  StringMap map{{"data_sha256", hash},
+                {"messages", std::to_string(writer_->messages())},
+                {"dropped", std::to_string(dropped())},
+                {"failed", std::to_string(lost_)}};
+  if (removed_ > 0) map.emplace_back("removed_parts", std::to_string(removed_));
+  map.insert(map.end(), extra.begin(), extra.end());
+  writer_->add_metadata(kResultRecord, map);
+  Status closed = writer_->close();
+  ended_messages_ += writer_->messages() - writer_->lost();
+  lost_ += writer_->lost();
+  ended_.push_back({part_path(part_), writer_->bytes_written()});
+  ended_bytes_ += ended_.back().bytes;
+  return closed;
 }
 
 void Recorder::stop_thread() {
@@ -259,23 +368,21 @@ void Recorder::stop_thread() {
 
 RecordingResult Recorder::close(const StringMap& extra) {
   stop_thread();
-  add_new_channels();
   RecordingResult result;
-  result.path = path_;
-  result.messages = writer_.messages();
+  if (writer_->is_open()) {
+    declare_late();
+    const Status closed = end_part(extra);
+    if (!closed) result.error = closed.error().message;
+  }
+  if (failed() && result.error.empty()) result.error = "the log is incomplete: " + trouble_;
+  result.path = ended_.empty() ? path_ : ended_.front().path;
+  result.parts = part_;
+  result.removed = removed_;
+  result.messages = ended_messages_;
   result.dropped = dropped();
   result.failed = lost_;
-  result.data_sha256 = hash_.finish();
-  StringMap map{{"data_sha256", result.data_sha256},
-                {"messages", std::to_string(result.messages)},
-                {"dropped", std::to_string(result.dropped)},
-                {"failed", std::to_string(result.failed)}};
-  map.insert(map.end(), extra.begin(), extra.end());
-  writer_.add_metadata(kResultRecord, map);
-  if (const Status closed = writer_.close(); !closed) result.error = closed.error().message;
-  result.messages -= writer_.lost();
-  result.failed += writer_.lost();
-  result.bytes = writer_.bytes_written();
+  result.bytes = ended_bytes_;
+  result.data_sha256 = part_ == 1 ? hashes_.substr(0, hashes_.find('\n')) : sha256(hashes_);
   return result;
 }
 

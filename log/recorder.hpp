@@ -1,14 +1,16 @@
 // Takes every cycle's images from the RT thread and writes them to an MCAP file on its own
 // thread.
-// Layer: log.  Thread: open/start/close non-RT; add_channel any but the loop's; push RT;
-// wait_for_space the loop's wait stage.
+// Layer: log.  Thread: open/add_channel/start/close non-RT; push RT; wait_for_space the loop's
+// wait stage.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -22,13 +24,26 @@
 #include "log/data_hash.hpp"
 #include "log/event.hpp"
 #include "log/info.hpp"
+#include "log/kept_image.hpp"
 #include "log/mcap_writer.hpp"
 #include "log/robot_view.hpp"
 
 namespace tandem::log {
 
+/// What a recording may take of the disk. 0: no limit.
+struct DiskLimits {
+  /// Messages of one file, about; the next ones go to another. NAME.mcap is followed by
+  /// NAME.2.mcap, NAME.3.mcap: each a whole log.
+  std::uint64_t file_bytes = 0;
+  std::uint64_t total_bytes = 0;      ///< of all its files: the oldest are removed
+  std::uint64_t keep_free_bytes = 0;  ///< on the disk: the oldest are removed if total_bytes says
+                                      ///< so, else nothing more is logged
+};
+
 struct RecorderOptions {
   WriterOptions writer{};
+  DiskLimits limits{};
+  std::vector<TopicShare> shares{};  ///< of topics that are not kept as a whole
   /// Messages between the threads. 2048 are half a second of three channels at 1 kHz.
   std::size_t ring_slots = 2048;
   ViewedRobot viewed{};  ///< with a description: what a ROS viewer needs is logged, too
@@ -36,13 +51,16 @@ struct RecorderOptions {
 
 /// What a closed recording amounts to.
 struct RecordingResult {
-  std::string path;
-  std::uint64_t messages = 0;  ///< in the file
+  std::string path;            ///< the first of its files that is still there
+  std::uint64_t parts = 1;     ///< files that it wrote
+  std::uint64_t removed = 0;   ///< of them, to keep to the limits
+  std::uint64_t messages = 0;  ///< written, those of removed files as well
   std::uint64_t dropped = 0;   ///< refused because the ring was full
   std::uint64_t failed = 0;    ///< lost because writing failed (disk full, file deleted or cut)
-  std::uint64_t bytes = 0;     ///< of the file
-  std::string data_sha256;     ///< DataHash of every message, in order
-  std::string error;           ///< why writing failed; empty when it did not
+  std::uint64_t bytes = 0;     ///< of the files that are there
+  /// DataHash of every message, in order. Of several files the SHA-256 over theirs, each on a line.
+  std::string data_sha256;
+  std::string error;  ///< why writing failed; empty when it did not
 };
 
 /// One recording. Message times are the images' own (simulated or nominal) times, so equal runs
@@ -77,6 +95,8 @@ class Recorder {
   [[nodiscard]] Channel add_late_channel(const std::string& topic, const std::string& type,
                                          const std::string& ros2msg, Encode encode = {});
   static constexpr std::size_t kMostLateBytes = 8 * 1024 + 16;
+  /// log::ros2msg_of(), with the names of this recording's joints and sensors.
+  [[nodiscard]] std::string ros2msg_of(const hal::Layout& layout) const;
   /// One other thread will push, too. Its messages follow in the file when the loop's are `lag_ns`
   /// further, or at the end: with a loop that is never further ahead than that, the file does not
   /// depend on the threads' pace. Before start().
@@ -86,7 +106,7 @@ class Recorder {
   void name_controllers(std::function<std::string(std::size_t)> name) {
     names_.controller = std::move(name);
   }
-  /// No more channels: allocates the ring and starts the writer's thread.
+  /// No more channels but late ones: allocates the ring and starts the writer's thread.
   void start();
 
   /// Hands `image` over. False, and counted, when the ring is full.
@@ -118,51 +138,77 @@ class Recorder {
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
 
   /// Writes what is in the ring, adds the metadata record "result" (with `extra` entries), ends
-  /// the file.
+  /// the last file.
   [[nodiscard]] RecordingResult close(const StringMap& extra = {});
 
  private:
-  struct Slot;  // the head of a ring slot
+  struct Slot;    // the head of a ring slot
+  struct Topic {  // of images, made again in each file
+    std::string name, type;
+    KeptImage kept;
+    std::optional<Channel> id;  // in the file
+  };
+  struct LateChannel {  // that came by add_late_channel()
+    std::string topic, type, ros2msg;
+    Encode encode;
+  };
+  struct Part {
+    std::string path;
+    std::uint64_t bytes;
+  };
   Recorder(const std::string& path, const RunInfo& info, const RecorderOptions& options);
-  [[nodiscard]] Status begin(const RunInfo& info);
+  [[nodiscard]] Status begin();
+  void declare(Topic& topic);
+  void declare_late();
   static bool push(SpscRing& ring, Channel channel, std::int64_t time_ns,
                    std::span<const std::byte> image) noexcept TANDEM_RT;
   static void wait_for(const SpscRing& ring, std::size_t messages) noexcept;
   void run();
   void write_side(std::int64_t up_to_ns);
   void write(std::span<const std::byte> slot);
-  void write(Channel channel, std::int64_t time_ns, std::span<const std::byte> body);
+  void write_late(Channel channel, std::int64_t time_ns, std::span<const std::byte> body);
   void write_text(const hal::TextEvent& event);
-  void add_new_channels();
+  void write(Channel id, std::int64_t time_ns, std::span<const std::byte> body);
+  [[nodiscard]] std::string part_path(std::uint64_t number) const;
+  void next_part();
+  [[nodiscard]] Status end_part(const StringMap& extra);
+  void look_at_disk();
+  [[nodiscard]] bool remove_oldest();
+  void give_up(std::string why);
   void stop_thread();
 
   std::string path_;
+  RunInfo info_;
+  RecorderOptions options_;
   EventNames names_;
-  McapWriter writer_;
+  std::unique_ptr<McapWriter> writer_;  // of the present part
   RobotView view_;
   DataHash hash_;
+  std::vector<Topic> topics_;  // that of channel c is at c - 1
   std::size_t largest_ = sizeof(Event) + sizeof(ParameterSet);
-  std::size_t ring_slots_ = 0;
   std::unique_ptr<SpscRing> ring_;
   std::unique_ptr<SpscRing> side_;  // null: nobody else pushes
   std::int64_t side_lag_ns_ = -1;   // -1: the same
   std::thread thread_;
   std::atomic<bool> closing_{false};
-  std::atomic<bool> failed_{false};
-  std::string trouble_;     // the writer's thread, before failed_
-  std::uint64_t lost_ = 0;  // the writer's thread, read after its end
-  Bytes event_;             // reused
-
-  /// A channel that came by add_late_channel().
-  struct LateChannel {
-    std::string topic, type, ros2msg;
-    Encode encode;
-  };
-  Channel first_late_ = 0;  // from start() on
   std::mutex late_mutex_;
   std::vector<LateChannel> late_;  // the asking threads'; in the order of their numbers
-  std::vector<Encode> encoders_;   // the writer's thread: of those that it has added
-  int rosout_ = -1;                // the same: the channel, once there are words
+  std::atomic<bool> failed_{false};
+  std::string trouble_;  // the writer's thread, before failed_
+  // The rest is the writer's thread's, and read after its end.
+  std::vector<Channel> late_ids_;  // in the present part, of those that it has
+  std::vector<Encode> encoders_;   // of those that a part has had
+  std::optional<Channel> rosout_;  // once there are words
+  std::uint64_t part_ = 1;         // the present one
+  std::uint64_t head_bytes_ = 0;   // of it, before its messages
+  std::uint64_t looked_at_ = 0;    // bytes of it when the disk was looked at
+  bool full_ = false;              // the next cycle begins another
+  std::vector<Part> ended_;        // that are there
+  std::uint64_t ended_bytes_ = 0;  // theirs
+  std::uint64_t removed_ = 0, ended_messages_ = 0, lost_ = 0;
+  std::string hashes_;  // of the ended ones, removed or not
+  std::int64_t time_ns_ = std::numeric_limits<std::int64_t>::min();  // of the loop's last message
+  Bytes event_;                                                      // reused
 };
 
 }  // namespace tandem::log

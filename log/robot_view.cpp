@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <utility>
 
 #include "log/cdr_writer.hpp"
@@ -36,6 +37,41 @@ void write_header(CdrWriter& out, std::int64_t time_ns, std::string_view frame) 
   out.text(frame);
 }
 
+struct Place {
+  std::array<double, 3> xyz_m;
+  std::array<double, 4> quaternion;
+};
+
+/// geometry_msgs/TransformStamped
+void write_transform(CdrWriter& out, std::int64_t time_ns, std::string_view parent,
+                     std::string_view link, const Place& place) {
+  write_header(out, time_ns, parent);
+  out.text(link);
+  for (const double value : place.xyz_m) out.number(value);
+  for (const double value : place.quaternion) out.number(value);
+}
+
+/// @param position  of the link's own joint
+Place place_of(const ViewedLink& link, double position) {
+  const auto& [x, y, z, w] = link.quaternion;
+  const auto& [ax, ay, az] = link.axis;
+  if (link.slides) {
+    // The axis in the parent's frame: a + 2 v x (v x a + w a), v the quaternion's vector.
+    const double cx = y * az - z * ay + w * ax, cy = z * ax - x * az + w * ay,
+                 cz = x * ay - y * ax + w * az;
+    const std::array along{ax + 2.0 * (y * cz - z * cy), ay + 2.0 * (z * cx - x * cz),
+                           az + 2.0 * (x * cy - y * cx)};
+    Place place{link.xyz_m, link.quaternion};
+    for (std::size_t i = 0; i < 3; ++i) place.xyz_m[i] += position * along[i];
+    return place;
+  }
+  const double s = std::sin(0.5 * position), c = std::cos(0.5 * position);
+  const double bx = s * ax, by = s * ay, bz = s * az;
+  return {link.xyz_m,
+          {w * bx + x * c + y * bz - z * by, w * by + y * c + z * bx - x * bz,
+           w * bz + z * c + x * by - y * bx, w * c - x * bx - y * by - z * bz}};
+}
+
 void read_field(const hal::Layout& layout, std::string_view name, std::span<const std::byte> body,
                 std::vector<double>& out) {
   const hal::Field& field = *layout.find(name);
@@ -50,7 +86,11 @@ std::string_view view_definition(std::string_view type) {
 }
 
 RobotView::RobotView(ViewedRobot robot, std::vector<std::string> joints)
-    : robot_(std::move(robot)), joints_(std::move(joints)) {}
+    : robot_(std::move(robot)), joints_(std::move(joints)) {
+  moves_ = std::ranges::any_of(robot_.links, [](const ViewedLink& one) { return one.joint >= 0; });
+  stands_ =
+      !robot_.fixed_root.empty() || std::ranges::count(robot_.links, -1, &ViewedLink::joint) > 0;
+}
 
 void RobotView::take_channel(std::uint16_t channel, std::string_view topic,
                              const hal::Layout& layout) {
@@ -70,11 +110,18 @@ void RobotView::take_channel(std::uint16_t channel, std::string_view topic,
 }
 
 void RobotView::add_channels(McapWriter& writer) {
+  described_ = false;
+  constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+  state_.last_period = truth_.last_period = kNever;
   if (state_.channel >= 0) {
     joint_states_ = add(writer, "/joint_states", "sensor_msgs/msg/JointState");
     description_ = add(writer, "/robot_description", "std_msgs/msg/String");
   }
-  if (truth_.channel >= 0) tf_ = add(writer, "/tf", "tf2_msgs/msg/TFMessage");
+  const bool links = state_.channel >= 0;
+  if (truth_.channel >= 0 || (links && moves_)) {
+    tf_ = add(writer, "/tf", "tf2_msgs/msg/TFMessage");
+  }
+  if (links && stands_) tf_static_ = add(writer, "/tf_static", "tf2_msgs/msg/TFMessage");
 }
 
 bool RobotView::Source::due(std::uint16_t of, std::int64_t time_ns) {
@@ -90,8 +137,14 @@ void RobotView::follow(std::uint16_t channel, std::int64_t time_ns,
     if (!std::exchange(described_, true)) {
       CdrWriter(body_).text(robot_.urdf);
       emit(description_, body_);
+      write_fixed_links(time_ns);
+      if (stands_) emit(tf_static_, body_);
     }
-    if (write_joint_states(time_ns, image)) emit(joint_states_, body_);
+    if (write_joint_states(time_ns, image)) {
+      emit(joint_states_, body_);
+      write_links(time_ns, image);
+      if (moves_) emit(tf_, body_);
+    }
   }
   if (truth_.due(channel, time_ns) && write_base(time_ns, image)) emit(tf_, body_);
 }
@@ -122,6 +175,34 @@ bool RobotView::write_joint_states(std::int64_t time_ns, std::span<const std::by
     out.list(values_);
   }
   return true;
+}
+
+/// Where a viewer of ROS expects what robot_state_publisher says.
+void RobotView::write_links(std::int64_t time_ns, std::span<const std::byte> state) {
+  read_field(state_layout_, "position_rad", state, values_);
+  const auto position = [this](const ViewedLink& link) {
+    return link.multiplier * values_.at(static_cast<std::size_t>(link.joint)) + link.offset;
+  };
+  const auto known = [&](const ViewedLink& link) {
+    return link.joint >= 0 && std::isfinite(position(link));
+  };
+  CdrWriter out(body_);
+  out.number(static_cast<std::uint32_t>(std::ranges::count_if(robot_.links, known)));
+  for (const ViewedLink& link : robot_.links | std::views::filter(known)) {
+    write_transform(out, time_ns, link.parent, link.name, place_of(link, position(link)));
+  }
+}
+
+void RobotView::write_fixed_links(std::int64_t time_ns) {
+  const bool rooted = !robot_.fixed_root.empty();
+  const auto fixed = std::ranges::count(robot_.links, -1, &ViewedLink::joint);
+  CdrWriter out(body_);
+  out.number(static_cast<std::uint32_t>(fixed + (rooted ? 1 : 0)));
+  if (rooted) write_transform(out, time_ns, kWorld, robot_.fixed_root, {{}, {0.0, 0.0, 0.0, 1.0}});
+  for (const ViewedLink& link : robot_.links) {
+    if (link.joint >= 0) continue;
+    write_transform(out, time_ns, link.parent, link.name, {link.xyz_m, link.quaternion});
+  }
 }
 
 bool RobotView::write_base(std::int64_t time_ns, std::span<const std::byte> truth) {

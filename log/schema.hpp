@@ -10,6 +10,7 @@
 
 #include "base/result.hpp"
 #include "hal/image.hpp"
+#include "log/info.hpp"
 
 namespace tandem::log {
 
@@ -19,10 +20,14 @@ inline constexpr std::array<std::byte, 4> kCdrHeader{std::byte{0}, std::byte{1},
 
 /// One line per field: "float64[29] position_rad  # link side, …". A field of one element is a
 /// plain member; a field without elements is left out, since ros2msg has no empty arrays.
-[[nodiscard]] std::string ros2msg_of(const hal::Layout& layout);
+/// The elements of a field that signal_name() tells by joint or sensor become members of a part:
+/// "tandem/JointsFloat64 position_rad", whose text follows with a member for each joint. The bytes
+/// are those of an array, and a viewer shows position_rad.LKneeSag instead of position_rad[3].
+[[nodiscard]] std::string ros2msg_of(const hal::Layout& layout, const RunInfo& info);
 
-/// The layout of a message of fixed-size numbers. Errors: a line that is no such member, or
-/// members that are not in falling order of their size (their CDR would have padding).
+/// The layout of a message of fixed-size numbers, and of parts that have numbers of one type alone.
+/// Errors: a line that is no such member, or members that are not in falling order of their size
+/// (their CDR would have padding).
 [[nodiscard]] Result<hal::Layout> layout_of(std::string_view ros2msg);
 
 /// Element `index` of `field` in a message's CDR body, as a double.

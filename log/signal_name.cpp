@@ -14,7 +14,7 @@ struct Row {
   std::string_view name, count;
 };
 
-constexpr Row kRows[] = {
+constexpr Row kFieldRows[] = {
 #define TANDEM_FIELD(type, name, count, doc) {#name, #count},
 #include "hal/command_fields.inc"
 #include "hal/estimate_fields.inc"
@@ -26,9 +26,9 @@ constexpr Row kRows[] = {
 /// The count that the tables say: "joints"; empty of a field that is not ours.
 std::string_view count_of(const hal::Field& field) {
   const std::string name = hal::wire_name(field.name);
-  const auto* row =
-      std::ranges::find_if(kRows, [&](const Row& one) { return hal::wire_name(one.name) == name; });
-  return row == std::end(kRows) ? std::string_view() : row->count;
+  const auto* row = std::ranges::find_if(
+      kFieldRows, [&](const Row& one) { return hal::wire_name(one.name) == name; });
+  return row == std::end(kFieldRows) ? std::string_view() : row->count;
 }
 
 /// Whether a robot may have one of them or more, so that one has its name or number, too.
@@ -40,23 +40,37 @@ bool is_numbered(std::string_view count) {
 
 }  // namespace
 
-std::string signal_name(const hal::Field& field, std::size_t index, const RunInfo& info) {
+std::string_view named_by(const hal::Field& field, const RunInfo& info) {
   const std::string_view count = count_of(field);
-  if (field.count == 1 && !is_numbered(count)) return field.name;
-  if (field.name == "sensor") {
-    std::size_t first = 0;
-    for (const SensorInfo& sensor : info.sensors) {
-      if (index < first + sensor.channels) {
-        return "sensor." + sensor.name + "." + std::to_string(index - first);
-      }
-      first += sensor.channels;
-    }
-  }
+  if (field.count == 1 && !is_numbered(count) && count != "channels") return {};
+  const auto channels = [&] {
+    std::size_t sum = 0;
+    for (const SensorInfo& sensor : info.sensors) sum += sensor.channels;
+    return sum;
+  };
+  if (count == "channels") return field.count == channels() ? count : std::string_view();
+  if (count == "sensors") return field.count == info.sensors.size() ? count : std::string_view();
   // The count of another's field says it; a controller's signal says it itself.
   const bool signal = count.empty() && field.doc.starts_with('[');
   const bool per_joint = signal ? field.doc.find("] by joint: ") != std::string::npos
                                 : count.empty() || count == "joints";
-  if (per_joint && field.count == info.joints.size()) return field.name + "." + info.joints[index];
+  return per_joint && field.count == info.joints.size() ? "joints" : std::string_view();
+}
+
+std::string element_name(const hal::Field& field, std::size_t index, const RunInfo& info) {
+  const std::string_view by = named_by(field, info);
+  if (by == "joints") return info.joints[index];
+  if (by == "sensors") return info.sensors[index].name;
+  for (const SensorInfo& sensor : info.sensors) {
+    if (index < sensor.channels) return sensor.name + "." + std::to_string(index);
+    index -= sensor.channels;
+  }
+  return {};
+}
+
+std::string signal_name(const hal::Field& field, std::size_t index, const RunInfo& info) {
+  if (!named_by(field, info).empty()) return field.name + "." + element_name(field, index, info);
+  if (field.count == 1 && !is_numbered(count_of(field))) return field.name;
   return field.name + "." + std::to_string(index);
 }
 

@@ -205,14 +205,37 @@ Status read_command(const log::LogFile& file, RunData& run) {
   return {};
 }
 
-/// Rows that the run and a table of another topic have alike: the log of a killed run may end
-/// between a state and its truth. 0: they do not fit.
-std::size_t shared_rows(const RunData& run, const log::TimeSeries& table) {
-  const std::size_t rows = std::min(run.rows(), table.time_s.size());
-  const bool same =
-      std::equal(run.time_s.begin(), run.time_s.begin() + static_cast<std::ptrdiff_t>(rows),
-                 table.time_s.begin());
-  return rows >= 2 && same ? rows : 0;
+/// A table of truth or estimate at the times of the run's rows, up to its last one: the log of a
+/// killed run may end between a state and its truth. A log may have every n-th cycle of it alone:
+/// between two samples that are 20 ms apart at most numbers change evenly. Without rows where they
+/// are further apart.
+log::TimeSeries at_rows(const RunData& run, const log::TimeSeries& table) {
+  constexpr double kLongest_s = 0.0201;
+  constexpr std::size_t kQuaternion = 3;
+  log::TimeSeries out;
+  out.columns.resize(table.columns.size());
+  std::size_t next = 0;
+  for (const double t : run.time_s) {
+    while (next < table.time_s.size() && table.time_s[next] < t) ++next;
+    if (next == table.time_s.size()) break;
+    const bool there = table.time_s[next] == t;
+    const double before_s = next == 0 ? -1e300 : table.time_s[next - 1];
+    const double step_s = table.time_s[next] - before_s;
+    if (!there && step_s > kLongest_s) return {};
+    out.time_s.push_back(t);
+    for (std::size_t c = 0; c < table.columns.size(); ++c) {
+      const std::vector<double>& column = table.columns[c];
+      out.columns[c].push_back(
+          there ? column[next]
+                : std::lerp(column[next - 1], column[next], (t - before_s) / step_s));
+    }
+    if (there) continue;
+    double square = 0.0;
+    for (std::size_t i = 0; i < 4; ++i) square += std::pow(out.columns[kQuaternion + i].back(), 2);
+    for (std::size_t i = 0; i < 4; ++i) out.columns[kQuaternion + i].back() /= std::sqrt(square);
+  }
+  if (out.time_s.size() < 2) return {};
+  return out;
 }
 
 void resize_rows(RunData& run, std::size_t rows) {
@@ -225,25 +248,28 @@ void resize_rows(RunData& run, std::size_t rows) {
   }
 }
 
-Status read_truth(const log::LogFile& file, const char* topic, const log::RunWindow& window,
-                  RunData& run) {
+Status read_truth(const log::LogFile& file, const char* topic, RunData& run) {
   if (file.find(topic) == nullptr) return {};
   const std::size_t feet = 3 * run.robot.contact.feet.size();
   const std::size_t loops = run.robot.loops.size();
   const std::size_t passive = run.robot.passive.size();
-  auto table = read_columns(file, topic,
-                            {{"base_position_m", 3},
-                             {"base_quaternion", 4},
-                             {"base_velocity", 6},
-                             {"foot_position_m", feet},
-                             {"foot_force_n", feet},
-                             {"foot_moment_nm", feet},
-                             {"loop_position_error_m", loops},
-                             {"loop_velocity_error_m_s", loops},
-                             {"passive_position_rad", passive}});
+  const std::initializer_list<Wanted> fields{{"base_position_m", 3},
+                                             {"base_quaternion", 4},
+                                             {"base_velocity", 6},
+                                             {"foot_position_m", feet},
+                                             {"foot_force_n", feet},
+                                             {"foot_moment_nm", feet},
+                                             {"loop_position_error_m", loops},
+                                             {"loop_velocity_error_m_s", loops},
+                                             {"passive_position_rad", passive}};
+  const hal::Layout& logged = file.find(topic)->layout;
+  for (const auto& [name, count] : fields) {
+    if (count > 0 && logged.find(name) == nullptr) return {};  // [log] left it out: no truth
+  }
+  auto table = read_columns(file, topic, fields);
   if (!table) return std::unexpected(table.error());
-  crop(*table, window.begin_s, window.end_s);
-  const std::size_t rows = shared_rows(run, *table);
+  *table = at_rows(run, *table);
+  const std::size_t rows = table->time_s.size();
   if (rows == 0) return {};
   run.base = take(*table, 0, 13);
   run.foot_position_m = take(*table, 13, feet);
@@ -256,7 +282,7 @@ Status read_truth(const log::LogFile& file, const char* topic, const log::RunWin
 }
 
 /// The run's own estimate, where nobody simulated it. It has to have started before the first row.
-Status read_estimate(const log::LogFile& file, const log::RunWindow& window, RunData& run) {
+Status read_estimate(const log::LogFile& file, RunData& run) {
   const auto* topic = file.find(kEstimate);
   if (run.motion_known() || topic == nullptr || !run.robot.model.floating_base) return {};
   const std::size_t feet = 3 * run.robot.contact.feet.size();
@@ -268,8 +294,8 @@ Status read_estimate(const log::LogFile& file, const log::RunWindow& window, Run
                              {"foot_moment_nm", feet},
                              {"base_valid", 1}});
   if (!table) return {};  // an observer alone: no base
-  crop(*table, window.begin_s, window.end_s);
-  const std::size_t rows = shared_rows(run, *table);
+  *table = at_rows(run, *table);
+  const std::size_t rows = table->time_s.size();
   if (rows == 0 || table->columns.back().front() != 1.0) return {};
   run.base = take(*table, 0, 13);
   run.foot_force_N = take(*table, 13, feet);
@@ -385,7 +411,7 @@ Result<std::optional<RunData>> read_parallel(const RunData& run) {
   if (!table) return std::unexpected(table.error());
   if (const Status s = read_rows(*table, window, second); !s) return std::unexpected(s.error());
   if (const Status s = read_command(*file, second); !s) return std::unexpected(s.error());
-  if (const Status s = read_truth(*file, kParallelTruth, window, second); !s) {
+  if (const Status s = read_truth(*file, kParallelTruth, second); !s) {
     return std::unexpected(s.error());
   }
   return second;
@@ -408,9 +434,8 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   log::RunWindow window = log::run_window(*events, run.settle_s);
   if (const Status s = read_state(*file, window, run); !s) return std::unexpected(s.error());
   if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());
-  if (const Status s = read_truth(*file, kTruth, window, run); !s)
-    return std::unexpected(s.error());
-  if (const Status s = read_estimate(*file, window, run); !s) return std::unexpected(s.error());
+  if (const Status s = read_truth(*file, kTruth, run); !s) return std::unexpected(s.error());
+  if (const Status s = read_estimate(*file, run); !s) return std::unexpected(s.error());
   run.step_s = std::max(1e-9, usual_step(run.time_s));
   return run;
 }

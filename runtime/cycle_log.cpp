@@ -85,12 +85,12 @@ void CycleLog::open(HostedController& controller) {
   const std::string token = topic_token(controller.name);
   const std::string topic = "/tandem/controller/" + token;
   if (io.signals.numbers() > 0) {
-    controller.signal_channel =
-        recorder_->add_late_channel(topic, type_of(token), log::ros2msg_of(io.signals.layout()));
+    controller.signal_channel = recorder_->add_late_channel(
+        topic, type_of(token), recorder_->ros2msg_of(io.signals.layout()));
   }
   for (const auto& port : controller.inputs) {
     port->channel = recorder_->add_late_channel(topic_of(*port), type_of(++inputs_),
-                                                log::ros2msg_of(layout_of(port->input())));
+                                                recorder_->ros2msg_of(layout_of(port->input())));
   }
   if (io.marks.declared().empty()) return;
   controller.mark_channel = recorder_->add_late_channel(

@@ -89,6 +89,13 @@ enum class LogCompression : std::uint8_t { kNone, kLz4, kZstd };
 struct LogConfig {
   std::string folder = "runs";  ///< relative to the working directory
   LogCompression compression = LogCompression::kNone;
+  /// Cycles whose number is a multiple are logged; 0: none.
+  std::uint32_t state_every = 1, command_every = 1, truth_every = 1, estimate_every = 1;
+  std::vector<std::string> without{};  ///< "state.acceleration_rad_s2"
+  bool viewers = true;                 ///< the topics of ROS viewers
+  double file_MB = 0.0;                ///< messages of one file; 0: no limit
+  double total_MB = 0.0;               ///< of all files of the run; 0: no limit
+  double keep_free_MB = 0.0;           ///< that the disk keeps
 };
 
 /// [report]: what the four plots show. Empty: the report chooses.

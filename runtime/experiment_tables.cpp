@@ -3,8 +3,12 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 
 #include "base/file_name.hpp"
+#include "base/nearest.hpp"
+#include "hal/estimate.hpp"
+#include "hal/truth.hpp"
 #include "rt/clock_control.hpp"
 #include "runtime/plant_options.hpp"
 
@@ -102,6 +106,15 @@ constexpr Key<RemoteOptions> kRemote[] = {
 constexpr Key<LogConfig> kLog[] = {
   key<&LogConfig::folder>("folder", "relative to the folder in which the command was started; `--log` overrides it"),
   choice<&LogConfig::compression>("compression", "none|lz4|zstd", "of the MCAP file's chunks"),
+  key<&LogConfig::state_every>("state_every", {0, 1e6}, "`/tandem/state` has the cycles whose number is a multiple; 0: no such topic ([log.md](log.md#what-is-kept))"),
+  key<&LogConfig::command_every>("command_every", {0, 1e6}, "the same of `/tandem/command`"),
+  key<&LogConfig::truth_every>("truth_every", {0, 1e6}, "the same of `/tandem/truth`"),
+  key<&LogConfig::estimate_every>("estimate_every", {0, 1e6}, "the same of `/tandem/estimate`"),
+  key<&LogConfig::without>("without", "fields that are left out, as topic and field: `[\"state.acceleration_rad_s2\"]`. `tandem log info FILE --topic state` lists them").by_default("none").within("list of texts"),
+  key<&LogConfig::viewers>("viewers", "`false`: nothing for ROS viewers: no `/joint_states`, `/tf`, `/tf_static`, `/robot_description`"),
+  key<&LogConfig::file_MB>("file_MB", {4, 1e6}, "when the messages of a file need about so much, the next file begins ([log.md](log.md#several-files))").by_default("one file"),
+  key<&LogConfig::total_MB>("total_MB", {8, 1e7}, "of all files of the run: the oldest are removed. At least twice `file_MB`").by_default("no limit"),
+  key<&LogConfig::keep_free_MB>("keep_free_MB", {1, 1e9}, "before the disk has less: with `total_MB` the oldest files of the run are removed, else logging ends with a warning").by_default("no limit"),
 };
 constexpr Key<ReportConfig> kReport[] = {
   key<&ReportConfig::position_of>("position_of", "joint: position with reference").by_default("[chosen by the report](log.md#the-report)"),
@@ -180,6 +193,51 @@ void check_remote(Experiment& e, TomlTable remote) {
                "there command the robot");
 }
 
+/// What is wrong with an entry of `without`, and what to do; nothing: it names a field.
+std::optional<std::pair<std::string, std::string>> unknown_field(const std::string& entry) {
+  const hal::StateImage state({});
+  const hal::CommandImage command({});
+  const hal::TruthImage truth(0, 0);
+  const hal::EstimateImage estimate({});
+  const std::map<std::string, const hal::Layout*> topics{{"state", &state.layout()},
+                                                         {"command", &command.layout()},
+                                                         {"truth", &truth.layout()},
+                                                         {"estimate", &estimate.layout()}};
+  const std::size_t dot = std::min(entry.find('.'), entry.size());
+  const std::string topic = entry.substr(0, dot),
+                    name = entry.substr(std::min(dot + 1, entry.size()));
+  const auto found = topics.find(topic);
+  if (found == topics.end()) {
+    return std::pair(
+        "'" + entry + "' begins with no topic of images",
+        suggest(topic, std::vector<std::string>{"state", "command", "truth", "estimate"}));
+  }
+  if (name == "cycle" || name == "time_ns")
+    return std::pair("'" + entry + "' cannot be left out", "it tells a message's cycle");
+  if (found->second->find(name) != nullptr) return std::nullopt;
+  std::vector<std::string> names;
+  for (const hal::Field& field : found->second->fields()) names.push_back(field.name);
+  return std::pair("the topic '" + topic + "' has no field '" + name + "'", suggest(name, names));
+}
+
+LogConfig read_log(TomlTable table) {
+  LogConfig log;
+  read_keys(table, kLog, log);
+  for (const std::string& entry : log.without) {
+    if (const auto wrong = unknown_field(entry))
+      table.error("without", wrong->first, wrong->second);
+  }
+  if (table.has("total_MB") && log.total_MB < 2.0 * log.file_MB) {
+    table.error("total_MB", "is less than two files of file_MB",
+                "the file that is being written and one before it stay");
+  } else if (table.has("total_MB") && !table.has("file_MB")) {
+    table.error("total_MB", "without file_MB there is one file, which cannot be shortened",
+                "set file_MB, at most half of it");
+  }
+  table.finish();
+  return log;
+}
+
 void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers) {
   for (TomlTable& table : root.tables("controller", "plugin")) {
     ControllerSpec one{
@@ -249,7 +307,7 @@ Experiment read_tables(const TomlDocument& document, TomlTable& root) {
   read_whole(root.table_or_empty("faults"), kFaults, e);
   read_whole(root.table_or_empty("remote"), kRemote, e.remote);
   e.teleoperation = read_teleoperation(root);
-  read_whole(root.table_or_empty("log"), kLog, e.log);
+  e.log = read_log(root.table_or_empty("log"));
   read_whole(root.table_or_empty("report"), kReport, e.report);
   if (root.has("parallel")) {
     e.parallel = read_parallel(root.table("parallel"), e.file, document.folder(), e.robot_file);

@@ -4,18 +4,26 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <filesystem>
+#include <set>
 #include <utility>
 
 #include "base/open_file.hpp"
+#include "dds/frame_topics.hpp"
 #include "hal/sim/engine_loader.hpp"
 
 namespace tandem::apps {
+
+/// The commit that this program was built from, as `git describe` says; empty: not known.
+extern const char* const kBuiltFrom;
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -37,6 +45,7 @@ log::RunInfo info_of(const WiredComposition& c) {
   const runtime::Experiment& e = c.experiment;
   log::RunInfo info;
   info.version = TANDEM_VERSION;
+  if (*kBuiltFrom != '\0') info.version += fmt::format(" ({})", kBuiltFrom);
   info.robot = e.robot.name;
   info.hal = hal_name(e);
   for (const hal::JointConfig& joint : e.robot.joints) info.joints.push_back(joint.name);
@@ -61,28 +70,52 @@ log::RunInfo info_of(const WiredComposition& c) {
   return info;
 }
 
+/// What is logged of each topic of images.
+std::vector<log::TopicShare> shares(const runtime::LogConfig& config) {
+  std::vector<log::TopicShare> all{{"state", config.state_every},
+                                   {"command", config.command_every},
+                                   {"truth", config.truth_every},
+                                   {"estimate", config.estimate_every}};
+  for (const std::string& field : config.without) {
+    const std::size_t dot = field.find('.');
+    std::ranges::find(all, field.substr(0, dot), &log::TopicShare::name)
+        ->without.push_back(field.substr(dot + 1));
+  }
+  return all;
+}
+
 /// Bytes that a cycle adds to the log at most: what is compressed takes less.
 double bytes_per_cycle(const WiredComposition& c) {
   const runtime::Experiment& e = c.experiment;
-  constexpr std::uint64_t kMessageOverhead = 64;
-  std::uint64_t cycle_bytes = hal::StateImage(e.robot.shape()).bytes().size() +
-                              hal::CommandImage(e.robot.shape()).bytes().size();
-  if (const hal::TruthImage* truth = runtime::truth_of(c)) cycle_bytes += truth->bytes().size();
-  if (c.estimator != nullptr) cycle_bytes += c.estimator->image().bytes().size();
+  constexpr double kMessageOverhead = 64.0;
+  const std::vector<log::TopicShare> all = shares(e.log);
+  double cycle_bytes = kMessageOverhead;
+  const auto add = [&](const char* topic, const hal::Image& image) {
+    const log::KeptImage kept(image.layout(), log::share_of(all, topic));
+    if (kept.every() == 0) return;
+    cycle_bytes += (static_cast<double>(kept.layout().bytes()) + kMessageOverhead) / kept.every();
+  };
+  const hal::StateImage state(e.robot.shape());
+  const hal::TruthImage* truth = runtime::truth_of(c);
+  add("state", state);
+  add("command", hal::CommandImage(e.robot.shape()));
+  if (truth != nullptr) add("truth", *truth);
+  if (c.estimator != nullptr) add("estimate", c.estimator->image());
   for (const auto& one : c.controllers->owned()) {
     if (one == nullptr || one->io->signals.numbers() == 0) continue;
-    cycle_bytes += one->io->signals.image().size() + kMessageOverhead;
+    cycle_bytes += static_cast<double>(one->io->signals.image().size()) + kMessageOverhead;
   }
   if (c.parallel != nullptr) {
-    cycle_bytes += hal::StateImage(e.robot.shape()).bytes().size() + 2 * kMessageOverhead;
-    if (e.sim.ground_truth) cycle_bytes += c.parallel->truth().bytes().size();
+    add("state", state);
+    if (e.sim.ground_truth) add("truth", c.parallel->truth());
   }
-  // Joint states and the base's frame, for viewers: three numbers and a name of each joint.
-  const std::uint64_t view_bytes = 4 * kMessageOverhead + 64 * e.robot.joints.size();
+  // For viewers: of each joint three numbers and a name, and its link's place with two names.
+  const double view_bytes =
+      e.log.viewers ? 4.0 * kMessageOverhead + 192.0 * static_cast<double>(e.robot.joints.size())
+                    : 0.0;
   const auto cycles_per_view =
       std::max<std::int64_t>(1, log::RobotView::kPeriod_ns / e.loop.period_ns);
-  const double whole = static_cast<double>(cycle_bytes + 3 * kMessageOverhead) +
-                       static_cast<double>(view_bytes) / static_cast<double>(cycles_per_view);
+  const double whole = cycle_bytes + view_bytes / static_cast<double>(cycles_per_view);
   switch (e.log.compression) {
     case runtime::LogCompression::kNone: return whole;
     case runtime::LogCompression::kLz4: return whole / 2;  // a third and more of a robot that moves
@@ -101,7 +134,9 @@ Error folder_error(const std::string& folder, std::string message) {
           .key = {}};
 }
 
-Status check_folder(const std::string& folder, std::uint64_t needed) {
+/// @param needed  bytes of the log
+/// @param keep_free  bytes that it has to leave
+Status check_folder(const std::string& folder, std::uint64_t needed, std::uint64_t keep_free) {
   std::error_code problem;
   fs::create_directories(folder, problem);
   if (problem) {
@@ -115,18 +150,38 @@ Status check_folder(const std::string& folder, std::uint64_t needed) {
   struct statvfs disk {};
   if (statvfs(folder.c_str(), &disk) != 0) return {};
   const std::uint64_t room = static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize;
-  if (room >= needed) return {};
+  if (room >= needed + keep_free) return {};
   return std::unexpected(folder_error(
-      folder, fmt::format("the disk is too full for the log: it has {:.1f} MB, the run may need "
-                          "{:.1f} MB",
-                          static_cast<double>(room) * 1e-6, static_cast<double>(needed) * 1e-6)));
+      folder,
+      fmt::format(
+          "the disk is too full for the log: it has {:.1f} MB, the run may need {:.1f} MB{}",
+          static_cast<double>(room) * 1e-6, static_cast<double>(needed) * 1e-6,
+          keep_free == 0 ? ""
+                         : fmt::format(", and keep_free_MB = {:g} stay free",
+                                       static_cast<double>(keep_free) * 1e-6))));
+}
+
+/// Numbers of logs whose first part has been removed, or is there.
+std::set<int> taken_numbers(const std::string& folder, const std::string& name) {
+  std::set<int> taken;
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string file = entry.path().filename().string();
+    if (!file.starts_with(name + "-") || !file.ends_with(".mcap")) continue;
+    char* end = nullptr;
+    const long number = std::strtol(file.c_str() + name.size() + 1, &end, 10);
+    if (*end == '.') taken.insert(static_cast<int>(number));
+  }
+  return taken;
 }
 
 /// The first free name, taken by an empty file: of two runs that begin at once each has its own.
 /// That file stays open, and is the log.
 Result<std::pair<std::string, Descriptor>> claim_file(const std::string& folder,
                                                       const std::string& name) {
+  const std::set<int> taken = taken_numbers(folder, name);
   for (int number = 1;; ++number) {
+    if (taken.contains(number)) continue;
     std::string path = fmt::format("{}/{}-{:03d}.mcap", folder, name, number);
     Result<Descriptor> file = open_new(path, 0644);
     if (file) return std::pair(std::move(path), std::move(*file));
@@ -135,13 +190,45 @@ Result<std::pair<std::string, Descriptor>> claim_file(const std::string& folder,
   }
 }
 
+std::vector<log::ViewedLink> viewed_links(const dds::FrameTree& frames) {
+  std::vector<log::ViewedLink> links;
+  const auto add = [&links](const dds::FrameEdge& edge, int joint) {
+    const Eigen::Vector3d& p = edge.at_zero.p;
+    const Eigen::Quaterniond q(edge.at_zero.R);
+    links.push_back({.parent = edge.parent,
+                     .name = edge.child,
+                     .xyz_m = {p.x(), p.y(), p.z()},
+                     .quaternion = {q.x(), q.y(), q.z(), q.w()},
+                     .axis = {edge.axis.x(), edge.axis.y(), edge.axis.z()},
+                     .slides = edge.type == model::JointType::kPrismatic,
+                     .joint = joint,
+                     .multiplier = edge.multiplier,
+                     .offset = edge.offset});
+  };
+  for (const dds::FrameEdge& edge : frames.moving) add(edge, static_cast<int>(edge.joint));
+  for (const dds::FrameEdge& edge : frames.fixed) add(edge, -1);
+  return links;
+}
+
+/// What viewers want of the robot; nothing when the experiment says so.
+log::ViewedRobot viewed(const runtime::Experiment& e) {
+  log::ViewedRobot robot;
+  if (!e.log.viewers) return robot;
+  const model::Tree& tree = e.description->tree;
+  robot.urdf = robot::text_in(e.files, e.robot.model.urdf);
+  robot.followers = e.robot.followers;
+  (tree.floating_base ? robot.base_link : robot.fixed_root) = tree.links.front().name;
+  robot.links = viewed_links(dds::frame_tree(tree, e.robot));
+  return robot;
+}
+
 log::RecorderOptions recorder_options(const WiredComposition& c) {
   const runtime::Experiment& e = c.experiment;
-  log::RecorderOptions options;
-  options.viewed.urdf = robot::text_in(e.files, e.robot.model.urdf);
-  options.viewed.followers = e.robot.followers;
-  if (e.description->tree.floating_base)
-    options.viewed.base_link = e.description->tree.links.front().name;
+  const auto bytes = [](double megabytes) { return static_cast<std::uint64_t>(megabytes * 1e6); };
+  log::RecorderOptions options{
+      .limits = {bytes(e.log.file_MB), bytes(e.log.total_MB), bytes(e.log.keep_free_MB)},
+      .shares = shares(e.log),
+      .viewed = viewed(e)};
   switch (e.log.compression) {
     case runtime::LogCompression::kNone:
       options.writer.compression = log::Compression::kNone;
@@ -158,11 +245,17 @@ log::RecorderOptions recorder_options(const WiredComposition& c) {
 
 std::string log_growth(const WiredComposition& c, const std::string& path) {
   const double rate = bytes_per_cycle(c) * 1e9 / static_cast<double>(c.experiment.loop.period_ns);
+  const runtime::LogConfig& config = c.experiment.log;
   struct statvfs disk {};
   std::string room;
   if (statvfs(path.c_str(), &disk) == 0) {
     const double free = static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize);
-    room = fmt::format("; the disk has room for {:.1f} h of it", free / rate / 3600.0);
+    room = fmt::format("; the disk has room for {:.1f} h of it",
+                       std::max(0.0, free - 1e6 * config.keep_free_MB) / rate / 3600.0);
+  }
+  if (config.total_MB > 0.0) {
+    room = fmt::format("; the last {:g} MB, {:.1f} h, are kept", config.total_MB,
+                       1e6 * config.total_MB / rate / 3600.0);
   }
   return fmt::format("at most {:.2f} MB for each second{}", rate * 1e-6, room);
 }
@@ -178,15 +271,19 @@ std::vector<std::string> controller_lines(const runtime::ControllerHost& host) {
 Result<std::unique_ptr<log::Recorder>> open_log(const WiredComposition& c,
                                                 const std::string& folder) {
   const auto cycles = static_cast<double>(c.experiment.cycles());
-  const std::uint64_t needed =
-      static_cast<std::uint64_t>(cycles * bytes_per_cycle(c)) + kFixed_bytes;
-  if (const Status s = check_folder(folder, needed); !s) return std::unexpected(s.error());
+  const log::RecorderOptions options = recorder_options(c);
+  const log::DiskLimits& limits = options.limits;
+  std::uint64_t needed = static_cast<std::uint64_t>(cycles * bytes_per_cycle(c)) + kFixed_bytes;
+  if (limits.total_bytes > 0) needed = std::min(needed, limits.total_bytes);
+  if (const Status s = check_folder(folder, needed, limits.keep_free_bytes); !s) {
+    return std::unexpected(s.error());
+  }
   const std::string name =
       c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
   auto claimed = claim_file(folder, name);
   if (!claimed) return std::unexpected(claimed.error());
   auto& [path, file] = *claimed;
-  return log::Recorder::open(std::move(file), path, info_of(c), recorder_options(c));
+  return log::Recorder::open(std::move(file), path, info_of(c), options);
 }
 
 }  // namespace tandem::apps

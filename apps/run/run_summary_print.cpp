@@ -175,9 +175,11 @@ void add_link_facts(const Json& run, Facts& facts) {
 /// What the run wrote and published.
 void add_output_facts(const RunSummary& summary, const Json& run, Facts& facts) {
   if (summary.log) {
-    add_figures(facts, run, "log",
-                "{log.path} ({log.messages} messages, {log.dropped} dropped, " +
-                    fmt::format("{:.1f} MB)", static_cast<double>(summary.log->bytes) * 1e-6));
+    add_figures(
+        facts, run, "log",
+        "{log.path} ({log.messages} messages, {log.dropped} dropped, " +
+            fmt::format("{:.1f} MB", static_cast<double>(summary.log->bytes) * 1e-6) +
+            (summary.log->parts == 1 ? ")" : ", {log.files} files, {log.files_removed} removed)"));
   }
   add_figures(facts, run, "DDS",
               "domain {dds.domain}: {dds.samples} samples, {dds.refused} refused; {dds.dropped} "

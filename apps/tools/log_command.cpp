@@ -68,6 +68,7 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
   }
   facts.add("robot", fmt::format("{}, {}, {}", info.robot, counted(info.joints.size(), "joint"),
                                  counted(info.sensors.size(), "sensor")));
+  if (info.part > 0) facts.add("part", fmt::format("{} of a log in several files", info.part));
   facts.add("backend", info.hal);
   facts.add("seed", std::to_string(info.seed));
   facts.add("period", info.period_ns == 0
@@ -198,6 +199,9 @@ void print_comparison(const log::Comparison& comparison, std::FILE* out) {
   }
   for (const std::string& topic : comparison.only_b) {
     fmt::print(out, "only the second log has {}\n", shown(topic));
+  }
+  for (const std::string& topic : comparison.made) {
+    fmt::print(out, "not compared: {}, which is made from the others\n", shown(topic));
   }
   fmt::print(out, "{}\n", comparison.equal() ? "the same, bit for bit" : "they differ");
 }

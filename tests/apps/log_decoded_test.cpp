@@ -53,11 +53,12 @@ class DecodedLog : public Program {
 };
 
 TEST_F(DecodedLog, OfAHumanoidHasEveryNumberOfTheTable) {
-  expect_decoded("coman/squat.toml", {"/joint_states", "/tf", "/robot_description"});
+  expect_decoded("coman/squat.toml", {"/joint_states", "/tf", "/tf_static", "/robot_description"});
 }
 
 TEST_F(DecodedLog, OfClosedLoopsHasEveryNumberOfTheTable) {
-  expect_decoded("parallel_ankle/move.toml", {"/joint_states", "/robot_description"});
+  expect_decoded("parallel_ankle/move.toml",
+                 {"/joint_states", "/tf", "/tf_static", "/robot_description"});
 }
 
 }  // namespace

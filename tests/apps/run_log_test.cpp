@@ -31,5 +31,39 @@ TEST_F(RunLog, HasTheFilesThatAreRun) {
   }
 }
 
+// The first of them may be gone, and its number is still taken.
+TEST_F(RunLog, GoesOnInSeveralFilesOfWhichTheOldestGo) {
+  const std::string experiment = read_text(folder_ / "hold.toml");
+  write_text(folder_ / "hold.toml",
+             experiment + "\n[log]\nfile_MB = 4\ntotal_MB = 8\nwithout = [\"truth.torque_nm\"]\n");
+  const std::string command = "run hold.toml --duration 40 --quiet --json ";
+  ASSERT_EQ(tandem(command + "a.json").status, 0);
+  const auto log = json("a.json")["log"];
+  EXPECT_GT(log["files"].get<int>(), log["files_removed"].get<int>());
+  EXPECT_GT(log["files_removed"].get<int>(), 0) << log;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "runs/double_pendulum-hold-001.mcap"));
+  std::uintmax_t bytes = 0;
+  for (const auto& file : std::filesystem::directory_iterator(folder_ / "runs"))
+    bytes += file.file_size();
+  EXPECT_LE(bytes, 8'000'000U);
+  const std::string first = log["path"];
+  EXPECT_NE(first.find("runs/double_pendulum-hold-001."), std::string::npos) << first;
+  const Outcome info = tandem("log info " + first + " --topic truth");
+  ASSERT_EQ(info.status, 0) << info.err;
+  EXPECT_EQ(info.out.find("torque_nm"), std::string::npos) << info.out;
+  ASSERT_EQ(tandem(command + "b.json").status, 0);
+  const std::string second = json("b.json")["log"]["path"];
+  EXPECT_NE(second.find("runs/double_pendulum-hold-002."), std::string::npos) << second;
+  EXPECT_EQ(json("b.json")["log"]["data_sha256"], log["data_sha256"]);
+}
+
+TEST_F(RunLog, DoesNotBeginWhereTheDiskHasTooLittle) {
+  write_text(folder_ / "hold.toml",
+             read_text(folder_ / "hold.toml") + "\n[log]\nkeep_free_MB = 1e9\n");
+  const Outcome run = tandem("run hold.toml --duration 0.1");
+  EXPECT_EQ(run.status, 2);
+  EXPECT_NE(run.err.find("and keep_free_MB = 1e+09 stay free"), std::string::npos) << run.err;
+}
+
 }  // namespace
 }  // namespace tandem::apps

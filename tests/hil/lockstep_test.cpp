@@ -37,15 +37,12 @@ class Lockstep : public test::OwnFolder {
     ASSERT_EQ(alone.wait(), 0) << alone.output();
   }
   /// That all but the plant's truth is the same in both logs, and no frame was lost.
-  /// @param estimated  the base's place in /tf is the estimate's here and the plant's there
-  void expect_same_bits(const std::string& log, std::uint64_t cycles_at_least,
-                        bool estimated = false) {
+  void expect_same_bits(const std::string& log, std::uint64_t cycles_at_least) {
     Process diff(
         tandem({"log", "diff", in_process_ + log, over_can_ + log, "--json", file("diff.json")}),
         file("diff.txt"));
-    EXPECT_EQ(diff.wait(), estimated ? 1 : 0) << diff.output();
-    auto topics = json("diff.json")["topics"];
-    if (estimated) topics.erase("/tf");
+    EXPECT_EQ(diff.wait(), 0) << diff.output();
+    const auto topics = json("diff.json")["topics"];
     for (const auto& topic : topics.items()) {
       EXPECT_TRUE(topic.value()["equal"]) << topic.key() << "\n" << diff.output();
     }
@@ -116,7 +113,7 @@ TEST_F(HilTwin, OfARobotOnCanIsTheSameToTheLastBitAndSoIsTheEstimate) {
   EXPECT_EQ(parallel["unequal"], 0) << "first in cycle " << parallel["first_unequal"];
   EXPECT_GT(parallel["compared"].get<int>(), 3000);
   EXPECT_EQ(parallel["missed"], 0);
-  expect_same_bits("/coman-twin-001.mcap", 3000, true);
+  expect_same_bits("/coman-twin-001.mcap", 3000);
   EXPECT_TRUE(json("diff.json")["topics"].contains("/tandem/estimate"));
 }
 

@@ -1,5 +1,6 @@
 #include "log/compare.hpp"
 
+#include "hal/truth.hpp"
 #include "log/recorder.hpp"
 #include "tests/log/scratch_folder.hpp"
 
@@ -111,6 +112,33 @@ TEST_F(Compare, MessagesOfOtherLengthsAreShownWithTheirBytes) {
   EXPECT_EQ(first->signal, "length");
   EXPECT_EQ(first->a, 16.0);
   EXPECT_EQ(first->b, 24.0);
+}
+
+// Over a wire nobody knows where the base is, and in process the log says it.
+TEST_F(Compare, PassesOverFramesThatAreMadeFromTheRest) {
+  const auto log_of = [this](const char* name, bool floating) {
+    ViewedRobot robot{.urdf = "<robot/>", .links = {{.parent = "a", .name = "b", .joint = 0}}};
+    if (floating) robot.base_link = "a";
+    auto recorder = Recorder::open(folder_ / name, {.joints = {"hip"}}, {.viewed = robot});
+    const hal::StateImage state({.joints = 1, .sensor_channels = {}});
+    const hal::TruthImage truth(1, 0);
+    const auto states =
+        (*recorder)->add_channel("/tandem/state", "tandem/msg/State", state.layout());
+    const auto truths =
+        (*recorder)->add_channel("/tandem/truth", "tandem/msg/Truth", truth.layout());
+    (*recorder)->start();
+    (*recorder)->push(states, 0, state.bytes());
+    (*recorder)->push(truths, 0, truth.bytes());
+    EXPECT_EQ((*recorder)->close().failed, 0U);
+    return LogFile::open(folder_ / name);
+  };
+  const auto a = log_of("a.mcap", true), b = log_of("b.mcap", false);
+  ASSERT_TRUE(a && b);
+  EXPECT_NE(a->find("/tf")->messages, b->find("/tf")->messages);
+  const auto result = compare(*a, *b);
+  ASSERT_TRUE(result);
+  EXPECT_TRUE(result->equal());
+  EXPECT_EQ(result->made, std::vector<std::string>{"/tf"});
 }
 
 // It was "bytes is 0 and 0".

@@ -36,13 +36,17 @@ for (const one of named) {
 function numbers(definition, message) {
   return definition.definitions.flatMap((field) => {
     const value = message[field.name];
+    if (field.isComplex) return Object.values(value).map(Number);
     return field.isArray ? Array.from(value, Number) : [Number(value)];
   });
 }
 
+/// The numbers of a part, which has one of each joint or sensor.
+const each = (part) => Object.values(part ?? {});
+
 /// Whether joints and sensors were never measured: their samples are older than the run.
 const unmeasured = (message) =>
-  [...(message.age_cycles ?? []), ...(message.sensor_age_cycles ?? [])].map((age) => age > message.cycle);
+  [...each(message.age_cycles), ...each(message.sensor_age_cycles)].map((age) => age > message.cycle);
 
 /// What `tandem log csv` writes of an event, without the time and the kind's name.
 const ofEvent = (event) => [Number(event.cycle), event.joint, event.code, event.text];
@@ -69,9 +73,9 @@ const views = {
     return (
       stamp === time && state.time_ns === time &&
       same(message.name, metadata.get("tandem").get("joints").trimEnd().split("\n")) &&
-      same(message.position, state.position_rad) &&
-      same(message.velocity, state.velocity_rad_s) &&
-      same(message.effort, state.torque_nm)
+      same(message.position, each(state.position_rad)) &&
+      same(message.velocity, each(state.velocity_rad_s)) &&
+      same(message.effort, each(state.torque_nm))
     );
   },
   "tf2_msgs/msg/TFMessage": (message, time) => {

@@ -117,11 +117,12 @@ TEST(LogFileOfAStart, LeavesTheCellsOfWhatWasNeverMeasuredEmpty) {
   ASSERT_TRUE(log);
   std::ostringstream out;
   ASSERT_TRUE(write_csv(*log, "/tandem/state", 1, out));
-  EXPECT_EQ(out.str(),
-            "time_s,cycle,position_rad.hip,position_rad.knee,sensor,age_cycles.hip,age_cycles.knee,"
-            "sensor_age_cycles.0\n"
-            "0.001,1,0.5,,,0,2,2\n"
-            "0.002,2,0.5,,0.25,0,3,1\n");
+  EXPECT_EQ(
+      out.str(),
+      "time_s,cycle,position_rad.hip,position_rad.knee,sensor.imu.0,age_cycles.hip,age_cycles.knee,"
+      "sensor_age_cycles.imu\n"
+      "0.001,1,0.5,,,0,2,2\n"
+      "0.002,2,0.5,,0.25,0,3,1\n");
 }
 
 TEST_F(LogFileOfThree, WritesOnlyTheFieldsAskedFor) {

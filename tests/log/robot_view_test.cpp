@@ -127,6 +127,66 @@ TEST(RobotView, LeavesOutWhatNobodyKnows) {
   EXPECT_EQ(View({}).counts(), (Counts{0, 0, 0})) << "no description";
 }
 
+/// One transform of a TFMessage that has it alone.
+struct Transform {
+  std::string parent, link;
+  std::array<double, 7> place;  // x y z, quaternion x y z w
+};
+Transform transform_of(const std::string& body) {
+  std::size_t at = 12;  // count, stamp
+  const auto text = [&] {
+    at = (at + 3) / 4 * 4;
+    std::uint32_t length = 0;
+    std::memcpy(&length, body.data() + at, 4);
+    const std::string found = body.substr(at + 4, length - 1);
+    at += 4 + length;
+    return found;
+  };
+  Transform found{text(), text(), {}};
+  at = (at + 7) / 8 * 8;
+  EXPECT_EQ(body.size(), at + 56);
+  std::memcpy(found.place.data(), body.data() + at, 56);
+  return found;
+}
+
+/// A robot on a fixed base had no frame at all, and a viewer showed every link at its zero.
+TEST(RobotView, SaysWhereEveryLinkStands) {
+  const double half = std::sqrt(0.5);
+  const ViewedLink turns{.parent = "base",
+                         .name = "thigh",
+                         .xyz_m = {1, 2, 3},
+                         .quaternion = {half, 0, 0, half},  // x to x, y to z
+                         .axis = {0, 1, 0},
+                         .joint = 0};
+  ViewedLink slides = turns;
+  slides.slides = true;
+  slides.multiplier = 2.0;
+  slides.offset = 1.0;
+  const View fixed({.urdf = "<robot/>", .fixed_root = "base"});
+  ASSERT_EQ(fixed.of("/tf_static").size(), 1U);
+  const Transform root = transform_of(fixed.of("/tf_static")[0].second);
+  EXPECT_EQ(root.parent, "odom");
+  EXPECT_EQ(root.link, "base");
+  EXPECT_EQ(root.place, (std::array<double, 7>{0, 0, 0, 0, 0, 0, 1}));
+
+  const View view({.urdf = "<robot/>", .links = {turns}});
+  EXPECT_EQ(view.counts(), (Counts{15, 15, 1})) << "of 0.3 s";
+  EXPECT_EQ(view.log.find("/tf_static"), nullptr);
+  const auto [time_ns, body] = view.of("/tf")[1];
+  const Transform thigh = transform_of(body);
+  EXPECT_EQ(time_ns, 21'000'000) << "cycle 7: hip at 7 rad";
+  EXPECT_EQ(thigh.parent, "base");
+  EXPECT_EQ(thigh.link, "thigh");
+  const double s = std::sin(3.5) * half, c = std::cos(3.5) * half;
+  const std::array<double, 7> turned{1, 2, 3, c, s, s, c};  // (x, 1) times (y s, c)
+  for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(thigh.place[i], turned[i], 1e-12) << i;
+
+  const Transform moved =
+      transform_of(View({.urdf = "<robot/>", .links = {slides}}).of("/tf")[1].second);
+  const std::array<double, 7> along{1, 2, 3 + 2.0 * 7.0 + 1.0, half, 0, 0, half};  // its y is z
+  for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(moved.place[i], along[i], 1e-12) << i;
+}
+
 TEST(RobotView, LeavesOutABaseWhosePlaceIsNoNumber) {
   hal::TruthImage truth(2, 0);
   truth.base_quaternion()[3] = std::numeric_limits<double>::quiet_NaN();

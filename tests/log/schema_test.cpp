@@ -17,7 +17,7 @@ hal::Layout layout() {
 }
 
 TEST(Schema, WritesOneMemberPerFieldThatHasElements) {
-  EXPECT_EQ(ros2msg_of(layout()),
+  EXPECT_EQ(ros2msg_of(layout(), {}),
             "int64 time_ns  # when\n"
             "float64[3] position_rad  # link side\n"
             "uint32[2] fault\n"
@@ -25,7 +25,7 @@ TEST(Schema, WritesOneMemberPerFieldThatHasElements) {
 }
 
 TEST(Schema, ReadsBackTheLayoutThatItWrote) {
-  const auto back = layout_of(ros2msg_of(layout()));
+  const auto back = layout_of(ros2msg_of(layout(), {}));
   ASSERT_TRUE(back) << back.error().to_string();
   EXPECT_EQ(back->bytes(), layout().bytes());
   for (const hal::Field& field : back->fields()) {
@@ -37,6 +37,55 @@ TEST(Schema, ReadsBackTheLayoutThatItWrote) {
     EXPECT_EQ(field.offset, same->offset);
     EXPECT_EQ(field.doc, same->doc);
   }
+}
+
+/// A viewer showed position_rad[3], and nobody knew which joint that is.
+TEST(Schema, TellsJointsAndSensorsByTheirNames) {
+  const RunInfo info{.joints = {"left-knee", "left_knee", "9"}, .sensors = {{"foot", 2}}};
+  hal::Layout layout;
+  layout.add("position_rad", hal::FieldType::kF64, 3, "link side");
+  layout.add("velocity_rad_s", hal::FieldType::kF64, 3, "");
+  layout.add("base_position_m", hal::FieldType::kF64, 3, "");
+  layout.add("sensor", hal::FieldType::kF64, 2, "");
+  layout.add("fault", hal::FieldType::kU32, 3, "");
+  layout.add("sensor_age_cycles", hal::FieldType::kU32, 1, "");
+  const std::string text = ros2msg_of(layout, info), line(80, '=');
+  EXPECT_EQ(text,
+            "tandem/JointsFloat64 position_rad  # link side\n"
+            "tandem/JointsFloat64 velocity_rad_s\n"
+            "float64[3] base_position_m\n"
+            "tandem/ChannelsFloat64 sensor\n"
+            "tandem/JointsUint32 fault\n"
+            "tandem/SensorsUint32 sensor_age_cycles\n" +
+                line + "\nMSG: tandem/JointsFloat64\n" +
+                "float64 left_knee\nfloat64 left_knee_1\nfloat64 n9\n" +  //
+                line + "\nMSG: tandem/ChannelsFloat64\nfloat64 foot_0\nfloat64 foot_1\n" + line +
+                "\nMSG: tandem/JointsUint32\n" +
+                "uint32 left_knee\nuint32 left_knee_1\nuint32 n9\n" +  //
+                line + "\nMSG: tandem/SensorsUint32\nuint32 foot\n");
+  const auto back = layout_of(text);
+  ASSERT_TRUE(back) << back.error().to_string();
+  ASSERT_EQ(back->fields().size(), layout.fields().size());
+  for (std::size_t i = 0; i < layout.fields().size(); ++i) {
+    EXPECT_EQ(back->fields()[i].name, layout.fields()[i].name);
+    EXPECT_EQ(back->fields()[i].type, layout.fields()[i].type);
+    EXPECT_EQ(back->fields()[i].count, layout.fields()[i].count);
+    EXPECT_EQ(back->fields()[i].offset, layout.fields()[i].offset);
+  }
+}
+
+TEST(Schema, RefusesPartsThatAreNoNumbersOfOneType) {
+  const std::string begin = "tandem/Part x\n" + std::string(80, '=') + "\nMSG: tandem/Part\n";
+  EXPECT_TRUE(layout_of(begin + "float64 a\nfloat64[2] b\n"));
+  for (const char* bad : {"", "float64 a\nfloat32 b\n", "float64 a\nuint8 b\n", "string text\n",
+                          "tandem/Part again\n", "float64[90000] a\nfloat64[90000] b\n"}) {
+    EXPECT_FALSE(layout_of(begin + bad)) << bad;
+  }
+  EXPECT_FALSE(layout_of("tandem/Absent x\n"));
+  EXPECT_FALSE(
+      layout_of("tandem/Part[2] x\n" + std::string(80, '=') + "\nMSG: tandem/Part\nfloat64 a\n"));
+  const std::string twice = std::string(80, '=') + "\nMSG: tandem/Part\nfloat64 a\n";
+  EXPECT_FALSE(layout_of("tandem/Part x\n" + twice + twice));
 }
 
 TEST(Schema, RefusesWhatIsNoFixedSizeNumber) {

@@ -26,7 +26,7 @@ TEST(SignalName, OfOneJointIsAsThatOfMany) {
   const RunInfo one{.robot = "gripper", .joints = {"finger"}, .sensors = {{"wrist", 6}}};
   EXPECT_EQ(signal_name(field("position_rad", 1), 0, one), "position_rad.finger");
   EXPECT_EQ(signal_name(field("torque_nm", 1), 0, one), "torque_nm.finger");
-  EXPECT_EQ(signal_name(field("sensor_age_cycles", 1), 0, one), "sensor_age_cycles.0");
+  EXPECT_EQ(signal_name(field("sensor_age_cycles", 1), 0, one), "sensor_age_cycles.wrist");
   EXPECT_EQ(signal_name(field("cycle", 1), 0, one), "cycle");
   EXPECT_EQ(signal_name(field("innovation", 1), 0, one), "innovation");
   EXPECT_EQ(signal_name(field("of_another_program", 1), 0, one), "of_another_program");

@@ -157,6 +157,13 @@ command = "local"
 [log]
 folder = "logs"
 compression = "zstd"
+truth_every = 10
+estimate_every = 0
+without = ["state.acceleration_rad_s2", "truth.foot_moment_nm"]
+viewers = false
+file_MB = 100
+total_MB = 1000
+keep_free_MB = 500
 [report]
 position_of = "elbow"
 torque_of = "elbow"
@@ -203,6 +210,14 @@ foot = "wrist_ft")"),
   EXPECT_EQ(e->remote.command, RemoteAccess::kLocal);
   EXPECT_EQ(e->log.folder, "logs");
   EXPECT_EQ(e->log.compression, LogCompression::kZstd);
+  EXPECT_EQ(e->log.state_every, 1u);
+  EXPECT_EQ(e->log.truth_every, 10u);
+  EXPECT_EQ(e->log.estimate_every, 0u);
+  EXPECT_EQ(e->log.without.size(), 2u);
+  EXPECT_FALSE(e->log.viewers);
+  EXPECT_EQ(e->log.file_MB, 100.0);
+  EXPECT_EQ(e->log.total_MB, 1000.0);
+  EXPECT_EQ(e->log.keep_free_MB, 500.0);
   EXPECT_EQ(e->report.foot, "wrist_ft");
 }
 
@@ -259,6 +274,37 @@ TEST(Experiment, RefusesASubstepThatDoesNotDivide) {
   EXPECT_EQ(errors_of(with("[sim]\nsubstep_ns = 300_000")),
             "arm/x.toml:5: sim.substep_ns: 300000 ns does not divide the period of 1000000 ns "
             "(choose a divisor of period_ns)\n");
+}
+
+TEST(Experiment, RefusesALogThatCannotBeKept) {
+  const auto log = [](const std::string& lines) { return errors_of(with("[log]\n" + lines)); };
+  EXPECT_EQ(log("truth_every = -1"),
+            "arm/x.toml:5: log.truth_every: -1 is out of range (must be 0 to 1000000)\n");
+  EXPECT_EQ(log("without = ['state.torque']"),
+            "arm/x.toml:5: log.without: the topic 'state' has no field 'torque' (did you mean "
+            "'torque_nm'?)\n");
+  EXPECT_EQ(log("without = ['stat.torque_nm']"),
+            "arm/x.toml:5: log.without: 'stat.torque_nm' begins with no topic of images (did you "
+            "mean 'state'?)\n");
+  for (const std::string entry : {"", ".", "state", "state.", "truth.foot_force_n.x"}) {
+    EXPECT_NE(log("without = ['" + entry + "']").find("arm/x.toml:5: log.without: "),
+              std::string::npos)
+        << entry;
+  }
+  EXPECT_EQ(log("without = ['command.cycle']"),
+            "arm/x.toml:5: log.without: 'command.cycle' cannot be left out (it tells a message's "
+            "cycle)\n");
+  EXPECT_EQ(log("without = ['truth.foot_force_n', 'estimate.base_valid']"), "");
+  EXPECT_EQ(log("file_MB = 1"),
+            "arm/x.toml:5: log.file_MB: 1 is out of range (must be 4 to 1000000)\n");
+  EXPECT_EQ(log("total_MB = 100"),
+            "arm/x.toml:5: log.total_MB: without file_MB there is one file, which cannot be "
+            "shortened (set file_MB, at most half of it)\n");
+  EXPECT_EQ(log("total_MB = 100\nfile_MB = 60"),
+            "arm/x.toml:5: log.total_MB: is less than two files of file_MB (the file that is being "
+            "written and one before it stay)\n");
+  EXPECT_EQ(log("total_MB = 120\nfile_MB = 60\nkeep_free_MB = 1e4"), "");
+  EXPECT_NE(log("keep_free_MB = nan").find("arm/x.toml:5: log.keep_free_MB: "), std::string::npos);
 }
 
 TEST(Experiment, ReadsTheNetworkProxysKeys) {
