@@ -97,7 +97,7 @@ const std::vector<CommandRow> kRows{
       need(object("parameters", "by name the values: a number, true or false, or a word")),
       flag("each", "", "true: each by itself; `results` has what became of it"),
       need(local(text("controller", "name", kLoaded))),
-      need(local(texts("values", "values", "kp=40, one or more")))}},
+      need(local(texts("values", "values", "one or more of NAME=VALUE: kp=40")))}},
     {"controller.load", kChanges, "loads a controller, inactive",
      {need(text("plugin", "plugin", "its name, or the path of its library")),
       text("name", "--name", "default: the plugin's"),
