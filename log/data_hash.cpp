@@ -8,6 +8,7 @@
 
 #include "log/bytes.hpp"
 #include "log/mcap_format.hpp"
+#include "log/schema.hpp"
 
 namespace tandem::log {
 
