@@ -7,10 +7,13 @@ include(CMakePackageConfigHelpers)
 # plugin of another version of them (kControllerInterface).
 set(TANDEM_PLUGIN_HEADERS
   base/archive.hpp
+  base/file_name.hpp
   base/realtime.hpp
   base/result.hpp
   base/toml_reader.hpp
   controllers/controller.hpp
+  controllers/controller_io.hpp
+  controllers/live_parameter.hpp
   hal/command_fields.inc
   hal/cycle_time.hpp
   hal/devices.hpp

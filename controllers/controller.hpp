@@ -67,6 +67,15 @@ class ControllerSetup {
   /// What the controller declares with the functions below; the host keeps it.
   const std::shared_ptr<ControllerIo> io = std::make_shared<ControllerIo>();
 
+  /// Declares a parameter, and reads it of `parameters`: {.unit = "Nm/rad", .min = 0, .max = 500,
+  /// .otherwise = 40, .live = true, .doc = "…"}. The name is [controller.parameters]', letters,
+  /// digits and _. One without `otherwise` has to be given. One that is `live` is set between two
+  /// cycles by `tandem controller set`, also while the controller runs: read it in each update().
+  /// Errors go to `parameters`; the handle then has the default, or a number of no meaning.
+  [[nodiscard]] Parameter parameter(std::string_view name, ParameterFacts facts) {
+    return io->parameters.declare(parameters, name, std::move(facts));
+  }
+
   /// Claims a joint (index in the image) in a mode. Two controllers that claim one joint are an
   /// error before anything moves; a joint that nobody claims is held by the loop. What a controller
   /// writes to another joint, and modes that it writes, are taken back and reported.
@@ -157,13 +166,28 @@ inline constexpr std::uint32_t kControllerInterface = 14;
 /// The version, and below it a hash of the sizes that go with it: a change whose version nobody
 /// raised, or another standard library, is found as well.
 inline constexpr std::uint32_t kControllerAbi =
-    kControllerInterface << 16 |
-    hash_of({sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::Robot),
-             sizeof(hal::DrivenJoint), sizeof(hal::PassiveJoint), sizeof(hal::Follower),
-             sizeof(hal::Sensor), sizeof(hal::Site), sizeof(hal::Foot), sizeof(hal::Posture),
-             sizeof(model::KinematicLoop), sizeof(hal::StateImage), sizeof(hal::EstimateImage),
-             sizeof(hal::CommandImage), sizeof(hal::ParameterImage), sizeof(hal::Prediction),
-             sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels)});
+    kControllerInterface << 16 | hash_of({sizeof(ControllerSetup),
+                                          sizeof(ControllerSetup::Claim),
+                                          sizeof(hal::Robot),
+                                          sizeof(hal::DrivenJoint),
+                                          sizeof(hal::PassiveJoint),
+                                          sizeof(hal::Follower),
+                                          sizeof(hal::Sensor),
+                                          sizeof(hal::Site),
+                                          sizeof(hal::Foot),
+                                          sizeof(hal::Posture),
+                                          sizeof(model::KinematicLoop),
+                                          sizeof(hal::StateImage),
+                                          sizeof(hal::EstimateImage),
+                                          sizeof(hal::CommandImage),
+                                          sizeof(hal::ParameterImage),
+                                          sizeof(hal::Prediction),
+                                          sizeof(hal::CycleTime),
+                                          sizeof(TomlTable),
+                                          sizeof(tandem_kernels),
+                                          sizeof(ControllerIo),
+                                          sizeof(ParameterRow),
+                                          sizeof(Parameter)});
 
 /// Whether `Class` has members of its own, but no archive(): what a snapshot may lack.
 template <class Class>

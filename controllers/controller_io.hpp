@@ -4,13 +4,16 @@
 #pragma once
 
 #include "base/archive.hpp"
+#include "controllers/live_parameter.hpp"
 
 namespace tandem {
 
 /// One controller's. It outlives the controller, so that a handle into it never dangles.
 struct ControllerIo {
+  Parameters parameters;
+
   /// What the next cycles depend on.
-  void archive(Archive&) {}
+  void archive(Archive& ar) { ar(parameters); }
 };
 
 }  // namespace tandem

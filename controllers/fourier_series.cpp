@@ -20,8 +20,11 @@ constexpr double kRest_rad_s = 1e-4;  // a speed that is none
 void FourierSeries::configure(ControllerSetup& setup, const std::vector<std::size_t>& joints,
                               bool joints_known) {
   TomlTable& parameters = setup.parameters;
-  period_s_ = parameters.number("period_s", kPositive);
-  periods_ = static_cast<double>(parameters.integer_or("periods", 1, 1, 1'000'000));
+  period_s_ = setup.parameter("period_s",
+                              {.unit = "s", .min = 0, .above_min = true, .doc = "of the series"});
+  periods_ = setup.parameter(
+      "periods",
+      {.min = 1, .max = 1e6, .whole = true, .otherwise = 1, .doc = "how often it is played"});
   std::vector<TomlTable> tables = parameters.tables("harmonic");
   if (tables.empty() || tables.size() > kMostHarmonics) {
     parameters.error(

@@ -1,6 +1,8 @@
 // gravity_compensation: carries the robot's weight, so that a hand can move it.
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <string>
 
@@ -37,9 +39,16 @@ class GravityCompensation : public Controller {
     if (!map) return std::unexpected(map.error());
     map_ = std::move(*map);
     kernels_ = setup.kernels;
-    ramp_s_ = setup.parameters.number_or("ramp_s", 1.0, kPositive);
-    compliant_ =
-        setup.parameters.choice_or("mode", "compliant", {"compliant", "torque"}) == "compliant";
+    ramp_s_ = setup.parameter("ramp_s", {.unit = "s",
+                                         .min = 0,
+                                         .above_min = true,
+                                         .otherwise = 1,
+                                         .doc = "from the torque at the start to the weight's"});
+    compliant_ = setup
+                     .parameter("mode", {.choices = {"compliant", "torque"},
+                                         .otherwise = "compliant",
+                                         .doc = "with a virtual spring and damper, or without"})
+                     .is("compliant");
     if (const Status standing = stand(setup); !standing) return standing;
     claim_joints(setup);
     sines_ = model::Sines(*kernels_);
@@ -67,13 +76,15 @@ class GravityCompensation : public Controller {
     weigh(state);
     const double since_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
     const double share = min_jerk(since_s / ramp_s_).s;
+    const double stiffness = stiffness_Nm_rad_, damping = damping_Nms_rad_;
+    const auto given = [](double value) { return !std::isnan(value); };
     for (const ClaimedJoint& joint : joints_) {
       const std::size_t j = joint.index;
       const double weight = tau_[map_.v_index(j)];
       if (compliant_) command.position_rad()[j] = joint.position_rad;
       command.velocity_rad_s()[j] = 0.0;
-      command.stiffness_Nm_rad()[j] = joint.stiffness_Nm_rad;
-      command.damping_Nms_rad()[j] = joint.damping_Nms_rad;
+      command.stiffness_Nm_rad()[j] = given(stiffness) ? stiffness : joint.stiffness_Nm_rad;
+      command.damping_Nms_rad()[j] = given(damping) ? damping : joint.damping_Nms_rad;
       command.torque_Nm()[j] = joint.torque_Nm + (weight - joint.torque_Nm) * share;
     }
     return Code::kOk;
@@ -84,7 +95,7 @@ class GravityCompensation : public Controller {
  private:
   struct ClaimedJoint {
     std::size_t index = 0;
-    double stiffness_Nm_rad = 0.0;
+    double stiffness_Nm_rad = 0.0;  // robot.toml's
     double damping_Nms_rad = 0.0;
     double position_rad = 0.0;  // at the start
     double torque_Nm = 0.0;     // at the start
@@ -109,28 +120,34 @@ class GravityCompensation : public Controller {
 
   void claim_joints(ControllerSetup& setup) {
     const std::vector<hal::DrivenJoint>& limits = setup.robot.joints;
-    // Negative: the key is missing, each joint has its own.
-    const double stiffness = setup.parameters.number_or("stiffness_Nm_rad", -1.0, kNotNegative);
-    const double damping = setup.parameters.number_or("damping_Nms_rad", -1.0, kNotNegative);
+    // What every joint of these can do.
+    double most_stiffness = kAnyNumber.max, most_damping = kAnyNumber.max;
     for (const std::size_t j : joints_parameter(setup)) {
       if (compliant_) {
         setup.claim(j, hal::ControlMode::kPosition, hal::InteractionMode::kCompliant);
       } else {
         setup.claim(j, hal::ControlMode::kTorque);
       }
-      ClaimedJoint joint{
-          .index = j,
-          .stiffness_Nm_rad = stiffness < 0.0 ? limits[j].stiffness_Nm_rad : stiffness,
-          .damping_Nms_rad = damping < 0.0 ? limits[j].damping_Nms_rad : damping};
-      joints_.push_back(joint);
-      if (joint.stiffness_Nm_rad > limits[j].max_stiffness_Nm_rad) {
-        setup.parameters.error("stiffness_Nm_rad", "is too much for joint '" + limits[j].name + "'",
-                               "give at most its position loop's kp");
-      }
-      if (joint.damping_Nms_rad > limits[j].max_damping_Nms_rad) {
-        setup.parameters.error("damping_Nms_rad", "is too much for joint '" + limits[j].name + "'");
-      }
+      joints_.push_back({.index = j,
+                         .stiffness_Nm_rad = limits[j].stiffness_Nm_rad,
+                         .damping_Nms_rad = limits[j].damping_Nms_rad});
+      most_stiffness = std::min(most_stiffness, limits[j].max_stiffness_Nm_rad);
+      most_damping = std::min(most_damping, limits[j].max_damping_Nms_rad);
     }
+    stiffness_Nm_rad_ =
+        setup.parameter("stiffness_Nm_rad", {.unit = "Nm/rad",
+                                             .min = 0,
+                                             .max = most_stiffness,
+                                             .otherwise = kNotGiven,
+                                             .live = true,
+                                             .doc = "of the virtual spring; else robot.toml's"});
+    damping_Nms_rad_ =
+        setup.parameter("damping_Nms_rad", {.unit = "Nms/rad",
+                                            .min = 0,
+                                            .max = most_damping,
+                                            .otherwise = kNotGiven,
+                                            .live = true,
+                                            .doc = "of the virtual damper; else robot.toml's"});
   }
 
   /// The torques that hold the measured posture, in tau_.
@@ -191,6 +208,7 @@ class GravityCompensation : public Controller {
   std::optional<Imu> imu_;
   bool compliant_ = true;
   double ramp_s_ = 1.0;
+  Parameter stiffness_Nm_rad_, damping_Nms_rad_;
   std::int64_t start_ns_ = 0;
   std::vector<ClaimedJoint> joints_;
   std::vector<double> q_, rest_, tau_, pose_, twist_, J_;

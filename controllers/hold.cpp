@@ -11,15 +11,23 @@ namespace {
 class Hold : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
-    const std::string interaction =
-        setup.parameters.choice_or("interaction", "stiff", {"stiff", "compliant"});
-    duration_s_ = setup.parameters.number_or("duration_s", 3.0, kPositive);
-    link_damping_Nms_rad_ = setup.parameters.number_or("link_damping_Nms_rad", 0.0, kNotNegative);
+    const Parameter interaction =
+        setup.parameter("interaction", {.choices = {"stiff", "compliant"},
+                                        .otherwise = "stiff",
+                                        .doc = "compliant: on robot.toml's spring and damper"});
+    const Parameter duration_s =
+        setup.parameter("duration_s", {.unit = "s",
+                                       .min = 0,
+                                       .above_min = true,
+                                       .otherwise = 3,
+                                       .doc = "of the way to the posture"});
+    duration_s_ = duration_s;
+    link_damping_Nms_rad_ = link_damping_parameter(setup);
     posture_ = posture_parameter(setup);
     for (const std::size_t joint : joints_parameter(setup)) {
-      setup.claim(
-          joint, hal::ControlMode::kPosition,
-          interaction == "stiff" ? hal::InteractionMode::kStiff : hal::InteractionMode::kCompliant);
+      setup.claim(joint, hal::ControlMode::kPosition,
+                  interaction.is("stiff") ? hal::InteractionMode::kStiff
+                                          : hal::InteractionMode::kCompliant);
       moves_.push_back({joint, 0.0, 0.0});
       if (posture_ == nullptr) continue;  // start() makes the measured position the target
       const double target = moves_.back().to_rad = posture_->position_rad.at(joint);
@@ -66,7 +74,7 @@ class Hold : public Controller {
   };
   const hal::Posture* posture_ = nullptr;
   double duration_s_ = 0.0;
-  double link_damping_Nms_rad_ = 0.0;
+  Parameter link_damping_Nms_rad_;
   std::int64_t start_ns_ = 0;
   std::vector<Move> moves_;
 };

@@ -33,19 +33,24 @@ class JointTrajectory : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     TomlTable& parameters = setup.parameters;
-    const std::string interpolation =
-        parameters.choice_or("interpolation", "min_jerk", {"min_jerk", "quintic", "fourier"});
-    through_ = interpolation == "quintic";
-    stop_at_end_ = parameters.boolean_or("stop_at_end", false);
-    wraps_ = parameters.boolean_or("angle_wraparound", false);
-    link_damping_Nms_rad_ = parameters.number_or("link_damping_Nms_rad", 0.0, kNotNegative);
+    const Parameter interpolation = setup.parameter(
+        "interpolation", {.choices = {"min_jerk", "quintic", "fourier"},
+                          .otherwise = "min_jerk",
+                          .doc = "rests at way-points, runs through them, or series"});
+    through_ = interpolation.is("quintic");
+    stop_at_end_ = stop_at_end_parameter(setup);
+    wraps_ = setup
+                 .parameter("angle_wraparound",
+                            {.otherwise = false, .doc = "angles by whole turns, the nearest"})
+                 .on();
+    link_damping_Nms_rad_ = link_damping_parameter(setup);
     joints_ = joints_parameter(setup);
     joints_known_ = !setup.parameters.has_errors();
     for (const std::size_t joint : joints_) {
       setup.claim(joint, hal::ControlMode::kPosition);
       limits_.push_back(setup.robot.joints[joint]);
     }
-    if (interpolation == "fourier") {
+    if (interpolation.is("fourier")) {
       series_.configure(setup, joints_, joints_known_);
       setup.plan(parameters, "periods", series_.end_s());
       return {};
@@ -91,7 +96,7 @@ class JointTrajectory : public Controller {
     if (series_.used()) {
       series_.play(t_s, joints_, command);
       damp_links(state, command);
-      return stop_at_end_ && t_s >= series_.end_s() ? Code::kStopped : Code::kOk;
+      return stop_at_end_.on() && t_s >= series_.end_s() ? Code::kStopped : Code::kOk;
     }
     if (t_s < approach_s_) {
       approach(t_s, command);
@@ -109,7 +114,7 @@ class JointTrajectory : public Controller {
       command.velocity_rad_s()[joints_[k]] = now.velocity;
     }
     damp_links(state, command);
-    return segment_ == last && stop_at_end_ ? Code::kStopped : Code::kOk;
+    return segment_ == last && stop_at_end_.on() ? Code::kStopped : Code::kOk;
   }
 
   void archive(Archive& ar) override {
@@ -151,10 +156,11 @@ class JointTrajectory : public Controller {
   /// On a spring the link may swing, which the motor's own loop hardly damps.
   void damp_links(const hal::StateImage& state,
                   hal::CommandImage& command) const noexcept TANDEM_RT {
-    if (link_damping_Nms_rad_ == 0.0) return;
+    const double damping = link_damping_Nms_rad_;
+    if (damping == 0.0 && !link_damping_Nms_rad_.changed()) return;
     for (const std::size_t joint : joints_) {
       const double swing = state.velocity_rad_s()[joint] - command.velocity_rad_s()[joint];
-      command.torque_Nm()[joint] = -link_damping_Nms_rad_ * swing;
+      command.torque_Nm()[joint] = -damping * swing;
     }
   }
 
@@ -398,11 +404,11 @@ class JointTrajectory : public Controller {
 
   FourierSeries series_;
   bool through_ = false;
-  bool stop_at_end_ = false;
+  Parameter stop_at_end_;
   bool wraps_ = false;
   bool planned_start_ = false;                             // the first way-point is at 0
   std::optional<bool> with_velocity_, with_acceleration_;  // the way-points have them
-  double link_damping_Nms_rad_ = 0.0;
+  Parameter link_damping_Nms_rad_;
   bool joints_known_ = false;  // else their number says nothing of the way-points
   bool incomplete_ = false;    // some way-point is
   // Mistakes at way-points; those between them follow from these.

@@ -1,4 +1,4 @@
-// The keys `joints` and `posture`, read alike by every bundled controller.
+// Keys that several bundled controllers read alike.
 #include "controllers/parameters.hpp"
 
 #include <algorithm>
@@ -28,6 +28,21 @@ std::vector<std::size_t> joints_parameter(ControllerSetup& setup) {
     }
   }
   return joints;
+}
+
+Parameter link_damping_parameter(ControllerSetup& setup) {
+  return setup.parameter("link_damping_Nms_rad",
+                         {.unit = "Nms/rad",
+                          .min = 0,
+                          .otherwise = 0,
+                          .live = true,
+                          .doc = "damps the links' swing on their springs"});
+}
+
+Parameter stop_at_end_parameter(ControllerSetup& setup) {
+  return setup.parameter(
+      "stop_at_end",
+      {.otherwise = false, .live = true, .doc = "done at its end; else it stays there"});
 }
 
 const hal::Posture* posture_parameter(ControllerSetup& setup) {

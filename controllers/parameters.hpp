@@ -16,6 +16,12 @@ namespace tandem {
 /// The robot's joint names in the image's order.
 [[nodiscard]] std::vector<std::string> joint_names(const hal::Robot& robot);
 
+/// `link_damping_Nms_rad`: live, 0 where the key is missing.
+[[nodiscard]] Parameter link_damping_parameter(ControllerSetup& setup);
+
+/// `stop_at_end`: live, false where the key is missing.
+[[nodiscard]] Parameter stop_at_end_parameter(ControllerSetup& setup);
+
 /// `posture = "name"`: null when the key is missing or names none (then it is reported).
 [[nodiscard]] const hal::Posture* posture_parameter(ControllerSetup& setup);
 

@@ -29,14 +29,24 @@ class RecordedMotion : public Controller {
     if (source == "state") request.source = log::MotionSource::kState;
     if (parameters.has("from_s")) request.from_s = parameters.number("from_s");
     if (parameters.has("to_s")) request.to_s = parameters.number("to_s");
-    request.torque = parameters.boolean_or("torque", false);
-    speed_ = parameters.number_or("speed", 1.0, {log::kReplaySlowest, log::kReplayFastest});
+    request.torque = setup
+                         .parameter("torque", {.otherwise = false,
+                                               .doc = "the recorded torques as feed-forward"})
+                         .on();
+    speed_ = setup.parameter("speed", {.min = log::kReplaySlowest,
+                                       .max = log::kReplayFastest,
+                                       .otherwise = 1,
+                                       .doc = "times as fast as recorded"});
     if (request.torque && speed_ > 1.0) {
       parameters.error("torque", "the recorded torques are those of a slower motion",
                        "play it without: torque = false; or not faster than recorded: speed = 1");
     }
-    approach_s_ = parameters.number_or("approach_s", log::kReplayApproach_s, kPositive);
-    stop_at_end_ = parameters.boolean_or("stop_at_end", false);
+    approach_s_ = setup.parameter("approach_s", {.unit = "s",
+                                                 .min = 0,
+                                                 .above_min = true,
+                                                 .otherwise = log::kReplayApproach_s,
+                                                 .doc = "to the first place, at least"});
+    stop_at_end_ = stop_at_end_parameter(setup);
     joints_ = joints_parameter(setup);
     for (const std::size_t joint : joints_) {
       setup.claim(joint, hal::ControlMode::kPosition);
@@ -87,7 +97,7 @@ class RecordedMotion : public Controller {
       command.torque_Nm()[joints_[k]] = plan_.has_torque() ? plan_.torque(k, cycle) : 0.0;
     }
     damp_links(state, command);
-    return cycle == last && stop_at_end_ ? Code::kStopped : Code::kOk;
+    return cycle == last && stop_at_end_.on() ? Code::kStopped : Code::kOk;
   }
 
   void archive(Archive& ar) override { ar(start_ns_, approach_cycles_, from_); }
@@ -97,14 +107,13 @@ class RecordedMotion : public Controller {
     double position_rad = 0.0, torque_Nm = 0.0;
   };
 
-  /// One number for all joints, or a table with those that are damped.
+  /// One number for all joints, which is live, or a table with those that are damped.
   void read_damping(ControllerSetup& setup) {
     constexpr const char* kKey = "link_damping_Nms_rad";
     TomlTable& parameters = setup.parameters;
     link_damping_Nms_rad_.assign(joints_.size(), 0.0);
-    if (!parameters.has(kKey)) return;
-    if (parameters.values().contains(kKey)) {
-      std::ranges::fill(link_damping_Nms_rad_, parameters.number_or(kKey, 0.0, kNotNegative));
+    if (!parameters.has(kKey) || parameters.values().contains(kKey)) {
+      one_damping_ = link_damping_parameter(setup);
       return;
     }
     TomlTable table = parameters.table(kKey);
@@ -118,11 +127,13 @@ class RecordedMotion : public Controller {
   /// On a spring the link may swing, which the motor's own loop hardly damps.
   void damp_links(const hal::StateImage& state,
                   hal::CommandImage& command) const noexcept TANDEM_RT {
+    const double one = one_damping_;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
-      if (link_damping_Nms_rad_[k] == 0.0) continue;
+      const double damping = std::isnan(one) ? link_damping_Nms_rad_[k] : one;
+      if (damping == 0.0) continue;
       const std::size_t joint = joints_[k];
       const double swing = state.velocity_rad_s()[joint] - command.velocity_rad_s()[joint];
-      command.torque_Nm()[joint] -= link_damping_Nms_rad_[k] * swing;
+      command.torque_Nm()[joint] -= damping * swing;
     }
   }
 
@@ -169,10 +180,11 @@ class RecordedMotion : public Controller {
 
   std::vector<std::size_t> joints_;
   std::vector<hal::DrivenJoint> limits_;
-  std::vector<double> link_damping_Nms_rad_;  // by joint, as `joints_`
+  Parameter one_damping_;                     // of all joints
+  std::vector<double> link_damping_Nms_rad_;  // else by joint, as `joints_`
   MotionPlan plan_;
   double approach_s_ = 0.0, speed_ = 1.0;
-  bool stop_at_end_ = false;
+  Parameter stop_at_end_;
   std::int64_t start_ns_ = 0, approach_cycles_ = 0;
   std::vector<From> from_;
 };

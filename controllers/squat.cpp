@@ -107,7 +107,7 @@ class Retreat {
 class Squat : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
-    read(setup.parameters);
+    read(setup);
     setup.plan(setup.parameters, "cycles", plan_.start_s + plan_.cycles * plan_.period_s);
     const hal::Posture* posture = posture_parameter(setup);
     const std::vector<std::string> feet =
@@ -120,7 +120,7 @@ class Squat : public Controller {
     period_s_ = static_cast<double>(setup.period_ns) * 1e-9;
     measured_.assign(setup.robot.joints.size(), 0.0);
     for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
-      damping_.push_back(stance->in_leg(j) ? link_damping_Nms_rad_ : 0.0);
+      in_leg_.push_back(stance->in_leg(j) ? 1.0 : 0.0);
     }
     last_v_.assign(setup.kernels->nv, 0.0);
     vdot_.assign(setup.kernels->nv, 0.0);
@@ -178,17 +178,29 @@ class Squat : public Controller {
   }
 
  private:
-  void read(TomlTable& parameters) {
-    plan_.depth_m = parameters.number("depth_m", kPositive);
-    plan_.period_s = parameters.number("period_s", kPositive);
-    plan_.cycles = static_cast<double>(parameters.integer_or("cycles", 1, 1, 1'000'000));
-    plan_.approach_s = parameters.number_or("approach_s", 1.0, kPositive);
-    plan_.start_s = parameters.number_or("start_s", plan_.approach_s, kPositive);
-    if (parameters.has("settle_s")) plan_.settle_s = parameters.number("settle_s", kNotNegative);
-    link_damping_Nms_rad_ = parameters.number_or("link_damping_Nms_rad", 0.0, kNotNegative);
+  void read(ControllerSetup& setup) {
+    plan_.depth_m = setup.parameter(
+        "depth_m", {.unit = "m", .min = 0, .above_min = true, .doc = "of the base, downward"});
+    plan_.period_s = setup.parameter(
+        "period_s", {.unit = "s", .min = 0, .above_min = true, .doc = "down and up once"});
+    plan_.cycles = setup.parameter(
+        "cycles", {.min = 1, .max = 1e6, .whole = true, .otherwise = 1, .doc = "how often"});
+    plan_.approach_s = setup.parameter(
+        "approach_s",
+        {.unit = "s", .min = 0, .above_min = true, .otherwise = 1, .doc = "to the start posture"});
+    plan_.start_s = setup.parameter("start_s", {.unit = "s",
+                                                .min = 0,
+                                                .above_min = true,
+                                                .otherwise = plan_.approach_s,
+                                                .doc = "when it first goes down"});
+    const Parameter settle_s = setup.parameter(
+        "settle_s",
+        {.unit = "s", .min = 0, .otherwise = kNotGiven, .doc = "done so long after the last"});
+    if (settle_s.given()) plan_.settle_s = settle_s;
+    link_damping_Nms_rad_ = link_damping_parameter(setup);
     if (plan_.start_s < plan_.approach_s) {
-      parameters.error("start_s", "the squat would start before the start posture is reached",
-                       "give approach_s or more");
+      setup.parameters.error("start_s", "the squat would start before the start posture is reached",
+                             "give approach_s or more");
     }
   }
 
@@ -196,6 +208,7 @@ class Squat : public Controller {
   void write(const MinJerk& approach, const hal::StateImage& state,
              hal::CommandImage& command) const noexcept TANDEM_RT {
     const ModelMap& map = stance_->map();
+    const double link_damping = link_damping_Nms_rad_;
     for (std::size_t j = 0; j < map.joints(); ++j) {
       const double way = stance_->q()[map.q_index(j)] - measured_[j];
       command.position_rad()[j] = measured_[j] + way * approach.s;
@@ -203,7 +216,8 @@ class Squat : public Controller {
           way * approach.ds / plan_.approach_s + stance_->v()[map.v_index(j)] * approach.s;
       // On a spring the link may swing, which the motor's own loop hardly damps.
       const double swing = state.velocity_rad_s()[j] - command.velocity_rad_s()[j];
-      command.torque_Nm()[j] = stance_->tau()[map.v_index(j)] * approach.s - damping_[j] * swing;
+      command.torque_Nm()[j] =
+          stance_->tau()[map.v_index(j)] * approach.s - link_damping * in_leg_[j] * swing;
     }
   }
 
@@ -271,11 +285,12 @@ class Squat : public Controller {
   std::int64_t start_ns_ = 0;
   std::int64_t retreat_ns_ = 0, retreats_ = 0;  // when it began; whether it has
   Retreat retreat_;
-  double too_fast_ = 0.0;              // a joint's speed over its limit, of beyond_limits()
-  double height_m_ = 0.0;              // of the base above the feet at the start
-  std::int64_t standing_ = 0;          // whether the start posture was found
-  double link_damping_Nms_rad_ = 0.0;  // of the legs' joints
-  std::vector<double> damping_, measured_, last_v_, vdot_;
+  double too_fast_ = 0.0;           // a joint's speed over its limit, of beyond_limits()
+  double height_m_ = 0.0;           // of the base above the feet at the start
+  std::int64_t standing_ = 0;       // whether the start posture was found
+  Parameter link_damping_Nms_rad_;  // of the legs' joints
+  std::vector<double> in_leg_;      // 1 or 0
+  std::vector<double> measured_, last_v_, vdot_;
 };
 
 }  // namespace

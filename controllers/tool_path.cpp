@@ -119,8 +119,9 @@ class ToolPath : public Controller {
     for (const std::size_t joint : joints_) setup.claim(joint, hal::ControlMode::kPosition);
     const std::string site = parameters.text("site");
     const std::string path = parameters.text("path");
-    scale_ = parameters.number_or("scale", 1.0, {1e-3, 1e3});
-    stop_at_end_ = parameters.boolean_or("stop_at_end", false);
+    scale_ = setup.parameter(
+        "scale", {.min = 1e-3, .max = 1e3, .otherwise = 1, .doc = "of the path's coordinates"});
+    stop_at_end_ = stop_at_end_parameter(setup);
     period_s_ = static_cast<double>(setup.period_ns) * 1e-9;
     robot_ = &setup.robot;
     if (parameters.has_errors()) return {};
@@ -158,7 +159,7 @@ class ToolPath : public Controller {
       command.position_rad()[joints_[k]] = reference_[joints_[k]];
       command.velocity_rad_s()[joints_[k]] = move_[static_cast<Eigen::Index>(k)] / period_s_;
     }
-    return stop_at_end_ && t_s >= places_.back().time_s ? Code::kStopped : Code::kOk;
+    return stop_at_end_.on() && t_s >= places_.back().time_s ? Code::kStopped : Code::kOk;
   }
 
   void archive(Archive& ar) override {
@@ -284,7 +285,7 @@ class ToolPath : public Controller {
   std::vector<std::size_t> joints_;
   std::vector<Place> places_;
   double scale_ = 1.0, period_s_ = 1e-3;
-  bool stop_at_end_ = false;
+  Parameter stop_at_end_;
   std::vector<double> q_, zero_, pose_, motion_, jacobians_;
   Eigen::Matrix3Xd J_;
   Eigen::VectorXd move_, back_;  // (joints) in a cycle [rad or m]

@@ -1,6 +1,9 @@
 // Kinds, texts and CDR encoding of /tandem/event.
 #include "log/event.hpp"
 
+#include <algorithm>
+#include <array>
+#include <charconv>
 #include <cstdio>
 #include <iterator>
 #include <numbers>
@@ -160,6 +163,24 @@ bool is_stop(const Event& event) noexcept { return is_fault(event.kind) && event
 
 std::string describe(const Event& event, const EventNames& names) {
   return what_happened(event, names) + (event.reported != 0 ? ", reported" : "");
+}
+
+std::string describe(const ParameterSet& set) {
+  const std::size_t letters = std::min<std::size_t>(set.letters, set.name.size());
+  std::array<char, 32> number{};
+  const auto end = std::to_chars(number.data(), number.data() + number.size(), set.value).ptr;
+  return ": " + std::string(set.name.data(), letters) + " = " + std::string(number.data(), end);
+}
+
+std::optional<ParameterText> parameter_of(const std::string& event_text) {
+  const std::string begin = std::string(to_string(EventKind::kParameterSet)) + ": ";
+  const std::size_t equals = event_text.rfind(" = ");
+  if (!event_text.starts_with(begin) || equals == std::string::npos) return std::nullopt;
+  ParameterText found{.name = event_text.substr(begin.size(), equals - begin.size())};
+  const char *first = event_text.data() + equals + 3, *last = event_text.data() + event_text.size();
+  const auto [end, error] = std::from_chars(first, last, found.value);
+  if (error != std::errc() || end != last) return std::nullopt;
+  return found;
 }
 
 const std::string& event_schema() {

@@ -2,7 +2,9 @@
 // Layer: log.  Thread: made on the RT thread (plain data); encoded off it.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -56,6 +58,23 @@ struct EventNames {
   std::vector<std::string> sensors{};
   std::vector<std::string> buses{};
 };
+
+/// A controller's parameter that was set.
+struct ParameterSet {
+  static constexpr std::size_t kLongestName = 200;
+
+  double value = 0.0;
+  std::uint32_t letters = 0;              ///< of the name, as far as it has room
+  std::array<char, kLongestName> name{};  ///< "squat.link_damping_Nms_rad"
+};
+/// ": squat.link_damping_Nms_rad = 12.5": the shortest number that reads as the same double.
+[[nodiscard]] std::string describe(const ParameterSet& set);
+/// What the text of an event of the kind kParameterSet says, bit for bit; empty: it is none.
+struct ParameterText {
+  std::string name;
+  double value = 0.0;
+};
+[[nodiscard]] std::optional<ParameterText> parameter_of(const std::string& event_text);
 
 /// One line for people: "fault of LHipMot (0x7310)".
 [[nodiscard]] std::string describe(const Event& event, const EventNames& names);

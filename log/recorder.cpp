@@ -111,6 +111,17 @@ bool Recorder::push(const Event& event) noexcept TANDEM_RT {
   return push(kEventChannel, event.time_ns, std::as_bytes(std::span(&event, 1)));
 }
 
+bool Recorder::push(const Event& event, std::string_view parameter,
+                    double value) noexcept TANDEM_RT {
+  struct {
+    Event event;
+    ParameterSet set;
+  } both{event, {.value = value}};
+  both.set.letters =
+      static_cast<std::uint32_t>(parameter.copy(both.set.name.data(), both.set.name.size()));
+  return push(kEventChannel, event.time_ns, std::as_bytes(std::span(&both, 1)));
+}
+
 void Recorder::wait_for_space(std::size_t messages) const noexcept { wait_for(*ring_, messages); }
 
 void Recorder::wait_for(const SpscRing& ring, std::size_t messages) noexcept {
@@ -155,7 +166,13 @@ void Recorder::write(std::span<const std::byte> slot) {
   if (head.channel == kEventChannel) {
     Event event;
     std::memcpy(&event, body.data(), sizeof event);
-    encode_event(event, describe(event, names_), event_);
+    std::string text = describe(event, names_);
+    if (body.size() > sizeof event) {
+      ParameterSet set;
+      std::memcpy(&set, body.data() + sizeof event, sizeof set);
+      text += describe(set);
+    }
+    encode_event(event, text, event_);
     write(head.channel, head.time_ns, event_);
     return;
   }

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -74,6 +75,8 @@ class Recorder {
   bool push(Channel channel, std::int64_t time_ns,
             std::span<const std::byte> image) noexcept TANDEM_RT;
   bool push(const Event& event) noexcept TANDEM_RT;
+  /// An event about a parameter: its text has both.
+  bool push(const Event& event, std::string_view parameter, double value) noexcept TANDEM_RT;
 
   /// The same from that other thread.
   bool push_side(Channel channel, std::int64_t time_ns, std::span<const std::byte> image) noexcept;
@@ -115,7 +118,7 @@ class Recorder {
   McapWriter writer_;
   RobotView view_;
   DataHash hash_;
-  std::size_t largest_ = sizeof(Event);
+  std::size_t largest_ = sizeof(Event) + sizeof(ParameterSet);
   std::size_t ring_slots_ = 0;
   std::unique_ptr<SpscRing> ring_;
   std::unique_ptr<SpscRing> side_;  // null: nobody else pushes

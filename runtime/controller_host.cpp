@@ -208,6 +208,17 @@ CycleAnswer ControllerHost::remove(std::size_t slot) noexcept TANDEM_RT {
   return {};
 }
 
+CycleAnswer ControllerHost::set_parameters(
+    std::span<const ParameterChange> changes) noexcept TANDEM_RT {
+  for (const ParameterChange& change : changes) {
+    if (table_[change.slot] == nullptr) return refuse(RejectReason::kGone, change.slot);
+  }
+  for (const ParameterChange& change : changes) {
+    table_[change.slot]->io->parameters.set(*change.parameter, change.value);
+  }
+  return {};
+}
+
 CycleAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, bool running,
                                         const hal::CycleTime& time,
                                         JointImages images) noexcept TANDEM_RT {
@@ -337,6 +348,7 @@ Code ControllerHost::call_update(HostedController& one, const hal::CycleTime& ti
                                  JointImages images) noexcept TANDEM_RT {
   guard_.remember(images.command, gains_);
   const Code code = enter(one).update(time, images.state, images.command);
+  one.io->parameters.seen();
   take_back(one, images.command);
   return code;
 }
@@ -370,6 +382,7 @@ std::uint64_t ControllerHost::fingerprint() const noexcept {
       add(static_cast<std::uint64_t>(claim.mode));
       add(static_cast<std::uint64_t>(claim.interaction));
     }
+    add(table_[slot]->io->parameters.rows().size());
   }
   return hash;
 }

@@ -153,6 +153,9 @@ class ControllerHost {
   [[nodiscard]] CycleAnswer insert(std::size_t slot,
                                    HostedController& controller) noexcept TANDEM_RT;
   [[nodiscard]] CycleAnswer remove(std::size_t slot) noexcept TANDEM_RT;
+  /// All of them; none when a controller of them has gone.
+  [[nodiscard]] CycleAnswer set_parameters(
+      std::span<const ParameterChange> changes) noexcept TANDEM_RT;
   /// Stops and starts controllers, all or none. When they are `running`, every joint that changes
   /// hands does so without a bump (BumplessTransfer): one that moves brakes, what nobody has is
   /// held where it comes to rest, and who starts sees the joint there. Else it is who will start.
@@ -195,7 +198,7 @@ class ControllerHost {
   /// The slot of one of `by` that claims `joint`, or -1.
   [[nodiscard]] std::int32_t claimant(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
   [[nodiscard]] JointReferences& references() noexcept { return references_; }
-  /// A number of what is loaded: slots, names and claims.
+  /// A number of what is loaded: slots, names, claims and how many parameters each has.
   [[nodiscard]] std::uint64_t fingerprint() const noexcept;
   void archive(Archive& ar);
 

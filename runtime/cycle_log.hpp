@@ -2,6 +2,8 @@
 // Layer: runtime.  Thread: made non-RT; the rest RT.
 #pragma once
 
+#include <string_view>
+
 #include "base/realtime.hpp"
 #include "hal/cycle_time.hpp"
 #include "hal/estimate.hpp"
@@ -32,6 +34,8 @@ class CycleLog {
   void event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint = -1,
              std::uint32_t code = 0, float value = 0.0F, bool reported = false) noexcept TANDEM_RT;
   void event(const hal::CycleTime& time, const hal::InjectedFault& fault) noexcept TANDEM_RT;
+  /// A controller's parameter was set. @param name  "squat.link_damping_Nms_rad"
+  void event(const hal::CycleTime& time, std::string_view name, double value) noexcept TANDEM_RT;
   void images(const hal::CycleTime& time, const hal::StateImage& state,
               const hal::CommandImage& command, const hal::TruthImage* truth,
               const hal::EstimateImage* estimate) noexcept TANDEM_RT;

@@ -2,14 +2,26 @@
 // Layer: runtime.  Thread: plain data.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <string>
+#include <vector>
 
+#include "controllers/live_parameter.hpp"
 #include "hal/image.hpp"
 
 namespace tandem::runtime {
 
 struct HostedController;
+
+/// A parameter of a controller to be set.
+struct ParameterChange {
+  std::size_t slot = 0;
+  ParameterRow* parameter = nullptr;  ///< of what is in the slot
+  double value = 0.0;                 ///< it fits
+  std::string name{};                 ///< "squat.link_damping_Nms_rad", for the log
+};
 
 /// What to set of a joint. What is negative or NaN stays.
 struct JointRequest {
@@ -34,6 +46,9 @@ struct MoveRequest {
   double acceleration_rad_s2 = kDefault;
 };
 
+/// That a request sets at most: each is an event of its cycle.
+inline constexpr std::size_t kMostParameterChanges = 32;
+
 struct CycleRequest {
   enum class Kind : std::uint32_t {
     kInsert,   ///< `controller` into `slot`
@@ -46,6 +61,7 @@ struct CycleRequest {
     kMove,     ///< `joint`, as `move` says
     kReset,    ///< the drive of `joint`
     kHome,     ///< `joint`, as its configuration says
+    kSet,      ///< `changes`
   };
   std::uint64_t number = 0;  ///< its answer's
   Kind kind = Kind::kSwitch;
@@ -57,6 +73,7 @@ struct CycleRequest {
   JointRequest wish{};
   hal::PidGains gains{};  ///< NaN: stays
   MoveRequest move{};
+  const std::vector<ParameterChange>* changes = nullptr;  ///< the asking side's, until the answer
 };
 
 /// Why the loop did not do it: a row each in runtime/refusals.inc. Nothing has changed then.

@@ -70,6 +70,10 @@ void log(CycleNow& now, const CycleRequest& request) noexcept TANDEM_RT {
     case RequestKind::kHome: return now.event(EventKind::kHomingRequested, joint);
     case RequestKind::kRecover: return now.event(EventKind::kRecoveryRequested, joint);
     case RequestKind::kGains: return now.event(EventKind::kGainsSet, joint);
+    case RequestKind::kSet:
+      for (const ParameterChange& change : *request.changes)
+        now.log.event(now.time, change.name, change.value);
+      return;
     case RequestKind::kMove: break;
     default: return;
   }
@@ -96,6 +100,7 @@ CycleAnswer carry_out(CycleRequests& to, const CycleRequest& request) noexcept T
     case RequestKind::kReset: return to.resets.begin(request.joint);
     case RequestKind::kHome: return to.homing.begin(request.joint);
     case RequestKind::kGains: set_gains(to, request); break;
+    case RequestKind::kSet: return to.now.controllers.set_parameters(*request.changes);
   }
   return {};
 }

@@ -72,8 +72,8 @@ bool RobotCycle::step() noexcept {
 void RobotCycle::wait() noexcept {
   show_snapshot();
   // Four images, and every event that one cycle can bring.
-  const std::size_t most =
-      4 + 16 + Inbox::kCapacity + 3 * now_.watch.joints() + now_.watch.sensors();
+  const std::size_t most = 4 + 16 + Inbox::kCapacity * kMostParameterChanges +
+                           3 * now_.watch.joints() + now_.watch.sensors();
   if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
   now_.tick = now_.loop.wait();
   trace_.begin(now_.tick);

@@ -134,6 +134,7 @@ void RunServices::collect() {
 void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer& answer) {
   using Kind = CycleRequest::Kind;
   const bool done = answer.reason == RejectReason::kNone;
+  forget_changes(request);
   if ((request.kind == Kind::kInsert && !done) || (request.kind == Kind::kRemove && done)) {
     host_->owned()[request.slot].reset();
   } else if (request.kind == Kind::kRemove) {
@@ -144,6 +145,7 @@ void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer&
 Result<RequestResult> RunServices::ask(Lock& lock, CycleRequest request, Patience patience) {
   request.number = ++number_;
   if (!inbox_->ask(request)) {
+    forget_changes(request);
     if (request.kind == CycleRequest::Kind::kInsert) host_->owned()[request.slot].reset();
     if (request.kind == CycleRequest::Kind::kRemove) host_->owned()[request.slot]->leaves = false;
     return fail(

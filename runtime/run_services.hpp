@@ -99,6 +99,21 @@ struct GainsRequest {
   std::optional<double> kp{}, ki{}, kd{};
 };
 
+/// A parameter to set, as it is asked for.
+struct ParameterWish {
+  std::string controller, parameter;
+  ParameterValue value;
+};
+
+/// A parameter of a loaded controller.
+struct ParameterStatus {
+  std::string name;
+  ParameterFacts facts;
+  ParameterType type = ParameterType::kNumber;
+  double otherwise = kNotGiven;  ///< its default, as `value`
+  double value = kNotGiven;      ///< of a boolean 0 or 1, of a choice the word's index
+};
+
 /// Each request is judged before it reaches the loop, then done by the loop at a cycle's boundary,
 /// whole or not at all. A call waits up to `patience` for that; zero: it does not wait. A loop
 /// whose time stands, or which is very slow, comes to it with its next cycle, and the answer says
@@ -143,6 +158,16 @@ class RunServices {
   /// Starts, in one cycle and without a bump, the controllers that were active before a reset.
   /// Errors: nothing is held back; all of them were unloaded; a joint that two would claim.
   [[nodiscard]] Result<RequestResult> go_on(Patience patience = kPatience);
+
+  /// Parameters of a loaded controller, in the order in which it declares them.
+  /// Errors: unknown (with the nearest name).
+  [[nodiscard]] Result<std::vector<ParameterStatus>> parameters(const std::string& controller);
+  /// Sets live parameters of loaded controllers, active or not, between two cycles: all or none.
+  /// Errors: nothing is named; more than kMostParameterChanges; an unknown controller or parameter
+  /// (with the nearest name); one that is not live, of another type, not finite, out of range,
+  /// named twice.
+  [[nodiscard]] Result<RequestResult> set_parameters(const std::vector<ParameterWish>& wishes,
+                                                     Patience patience = kPatience);
 
   /// Every joint, in the image's order.
   [[nodiscard]] std::vector<JointInfo> joints();
@@ -214,6 +239,8 @@ class RunServices {
   [[nodiscard]] Result<RequestResult> ask(Lock& lock, CycleRequest request, Patience patience);
   void collect();
   void free_what_left(const CycleRequest& request, const CycleAnswer& answer);
+  void forget_changes(const CycleRequest& request);
+  [[nodiscard]] Result<ParameterChange> change_of(const ParameterWish& wish) const;
   [[nodiscard]] Error refusal(const CycleAnswer& answer) const;
   [[nodiscard]] Status check_phase() const;
   [[nodiscard]] Result<std::size_t> slot_of(const std::string& name) const;
@@ -244,6 +271,7 @@ class RunServices {
   std::uint64_t number_ = 0;  // of the last request
   std::map<std::uint64_t, CycleRequest> asked_;                  // not answered yet
   std::map<std::uint64_t, std::optional<CycleAnswer>> awaited_;  // that somebody waits for
+  std::vector<std::unique_ptr<const std::vector<ParameterChange>>> changes_;  // of asked_
 };
 
 }  // namespace tandem::runtime

@@ -70,12 +70,24 @@ TEST(GravityCompensation, YieldsAboutTheStartPostureWhenCompliant) {
   EXPECT_EQ(run.command.damping_Nms_rad()[0], 20.0) << "the robot's own";
 }
 
+TEST(GravityCompensation, HasTheRobotsImpedanceUntilOneIsSet) {
+  test::Harness run(pendulum_robot(), "gravity_compensation", "", pendulum());
+  ASSERT_EQ(run.problem(), "");
+  run.start();
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_EQ(run.command.damping_Nms_rad()[0], 20.0);
+  run.set("damping_Nms_rad", 5.0);
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_EQ(run.command.damping_Nms_rad()[0], 5.0);
+  EXPECT_EQ(run.command.damping_Nms_rad()[1], 5.0);
+}
+
 TEST(GravityCompensation, RefusesAStiffnessThatIsTooMuch) {
   EXPECT_EQ(test::Harness(pendulum_robot(), "gravity_compensation", "stiffness_Nm_rad = 1e6\n",
                           pendulum())
                 .problem(),
-            "experiment.toml:1: stiffness_Nm_rad: is too much for joint 'lower' (give at most "
-            "its position loop's kp)");
+            "experiment.toml:1: stiffness_Nm_rad: 1e+06 is out of range (must be at least 0 and at "
+            "most 1000)");
 }
 
 TEST(GravityCompensation, CarriesARobotThatStandsOnBothFeet) {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -60,6 +61,7 @@ class Harness {
     {
       const rt::ScopedRealtime in_the_cycle;
       code = controller().update(time, state, command);
+      setup.io->parameters.seen();
     }
     for (const auto& claim : setup.claims()) {
       if (claim.mode != hal::ControlMode::kPosition) continue;
@@ -74,6 +76,14 @@ class Harness {
     const auto cycles = static_cast<int>(seconds * 1e9 / static_cast<double>(time.period_ns) + 0.5);
     for (int i = 0; i < cycles && code == Code::kOk; ++i) code = step();
     return code;
+  }
+
+  /// Sets a live parameter between two cycles.
+  void set(const std::string& name, double value) {
+    auto& rows = setup.io->parameters.rows();
+    const auto row = std::ranges::find(rows, name, &ParameterRow::name);
+    ASSERT_TRUE(row != rows.end() && row->facts.live) << name;
+    setup.io->parameters.set(*row, value);
   }
 
   hal::Robot robot;

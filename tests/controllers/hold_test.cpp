@@ -65,6 +65,18 @@ TEST(Hold, BrakesTheSwingOfALinkOnRequest) {
   EXPECT_EQ(run.command.torque_Nm()[0], 0.0);
 }
 
+TEST(Hold, BrakesTheSwingMoreOrLessAsSoonAsThatIsSet) {
+  test::Harness run(robot(), "hold", "");
+  ASSERT_EQ(run.problem(), "");
+  run.start();
+  run.state.velocity_rad_s()[2] = 0.5;
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_EQ(run.command.torque_Nm()[2], 0.0);
+  run.set("link_damping_Nms_rad", 3.0);
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_EQ(run.command.torque_Nm()[2], -1.5);
+}
+
 TEST(Hold, ClaimsOnlyTheJointsItIsGiven) {
   test::Harness run(robot(), "hold", "joints = ['wrist']\ninteraction = 'compliant'\n");
   ASSERT_EQ(run.problem(), "");

@@ -366,5 +366,28 @@ TEST(JointTrajectory, RefusesASeriesThatStartsInMotionIsTooFastOrLacksNumbers) {
             std::string::npos);
 }
 
+/// The torque of the last cycle would stay.
+TEST(JointTrajectory, LeavesNoTorqueBehindWhenItsDampingIsSetToZero) {
+  test::Harness run(hal::test::fake_robot(), "joint_trajectory",
+                    std::string("link_damping_Nms_rad = 4.0\n") + kTwo);
+  ASSERT_EQ(run.problem(), "");
+  run.start();
+  run.state.velocity_rad_s()[2] = 0.5;
+  ASSERT_EQ(run.run(0.1), Code::kOk);
+  EXPECT_LT(run.command.torque_Nm()[2], -1.0);
+  run.set("link_damping_Nms_rad", 0.0);
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_EQ(run.command.torque_Nm()[2], 0.0);
+}
+
+TEST(JointTrajectory, EndsWhenItIsToldToAfterItsEnd) {
+  test::Harness run(hal::test::fake_robot(), "joint_trajectory", kTwo);
+  ASSERT_EQ(run.problem(), "");
+  run.start();
+  ASSERT_EQ(run.run(3.2), Code::kOk);
+  run.set("stop_at_end", 1.0);
+  EXPECT_EQ(run.step(), Code::kStopped);
+}
+
 }  // namespace
 }  // namespace tandem

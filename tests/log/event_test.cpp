@@ -1,5 +1,7 @@
 #include "log/event.hpp"
 
+#include <bit>
+
 #include "base/realtime.hpp"
 #include "hal/fault_kind.hpp"
 
@@ -90,6 +92,26 @@ TEST(Event, SaysWhatHappenedInOneLine) {
             "fault: collision of knee: an external torque of 1.5 Nm, reported");
   EXPECT_TRUE(is_fault(event.kind));
   EXPECT_FALSE(is_stop(event));
+}
+
+TEST(Event, OfAParameterIsReadBackBitForBit) {
+  const auto text_of = [](std::string_view name, double value) {
+    ParameterSet set{.value = value};
+    set.letters = static_cast<std::uint32_t>(name.copy(set.name.data(), set.name.size()));
+    return describe({.kind = EventKind::kParameterSet}, kNames) + describe(set);
+  };
+  EXPECT_EQ(text_of("squat.kp", 12.5), "parameter set: squat.kp = 12.5");
+  for (const double value : {0.1, 0.1 + 0.2, -0.0, 5e-324, 1.7976931348623157e308, 40.0}) {
+    const auto back = parameter_of(text_of("my = one.kp", value));
+    ASSERT_TRUE(back);
+    EXPECT_EQ(back->name, "my = one.kp");
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(back->value), std::bit_cast<std::uint64_t>(value));
+  }
+  EXPECT_EQ(parameter_of(text_of(std::string(300, 'x'), 1.0))->name, std::string(200, 'x'));
+  for (const char* other : {"", "gains set of hip", "parameter set", "parameter set: x = y",
+                            "parameter set: x = 1 rad"}) {
+    EXPECT_FALSE(parameter_of(other)) << other;
+  }
 }
 
 TEST(Event, IsEncodedAsPlainCdr) {

@@ -1,0 +1,223 @@
+// Numbers of a controller that the experiment sets, and that may be set while it runs: declared by
+// ControllerSetup::parameter().
+// Layer: controllers.  Thread: declared non-RT; read and set by the loop, shown to any.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/archive.hpp"
+#include "base/file_name.hpp"
+#include "base/realtime.hpp"
+#include "base/toml_reader.hpp"
+
+namespace tandem {
+
+/// A value as somebody gives it: a number, true or false, or a word. Nothing: none is given.
+struct ParameterValue {
+  enum class Is : std::uint8_t { kNothing, kNumber, kBoolean, kText };
+
+  ParameterValue() = default;
+  ParameterValue(double value) : number(value), is(Is::kNumber) {}
+  ParameterValue(int value) : ParameterValue(static_cast<double>(value)) {}
+  ParameterValue(bool value) : number(value ? 1.0 : 0.0), is(Is::kBoolean) {}
+  ParameterValue(const char* value) : text(value), is(Is::kText) {}
+  ParameterValue(std::string value) : text(std::move(value)), is(Is::kText) {}
+
+  double number = 0.0;  ///< of a boolean 0 or 1
+  std::string text{};
+  Is is = Is::kNothing;
+};
+
+/// The default of a parameter that has none and need not be given: it is not finite until it is.
+inline constexpr double kNotGiven = std::numeric_limits<double>::quiet_NaN();
+
+/// What a controller says of a parameter.
+struct ParameterFacts {
+  std::string unit{};                  ///< "Nm/rad"; empty: none
+  double min = kAnyNumber.min;         ///< in its unit
+  double max = kAnyNumber.max;         ///< in its unit
+  bool above_min = false;              ///< `min` itself is refused
+  bool whole = false;                  ///< whole numbers only, up to 2^53
+  std::vector<std::string> choices{};  ///< a word of these instead of a number
+  ParameterValue otherwise{};          ///< its default; nothing: it has to be given
+  bool live = false;                   ///< it may be set while the controller runs
+  std::string doc{};                   ///< one line
+};
+
+enum class ParameterType : std::uint8_t { kNumber, kInteger, kBoolean, kChoice };
+[[nodiscard]] constexpr const char* to_string(ParameterType type) noexcept {
+  constexpr const char* kNames[]{"number", "integer", "boolean", "choice"};
+  return kNames[static_cast<std::size_t>(type)];
+}
+
+/// A parameter that was declared.
+struct ParameterRow {
+  std::string name;
+  ParameterFacts facts;
+  ParameterType type = ParameterType::kNumber;
+  double otherwise = kNotGiven;          ///< as `value`
+  std::atomic<double> value{kNotGiven};  ///< of a boolean 0 or 1, of a choice the word's index
+  bool changed = false;                  ///< the loop's
+  static_assert(std::atomic<double>::is_always_lock_free);
+
+  [[nodiscard]] double now() const noexcept TANDEM_RT {
+    return value.load(std::memory_order_relaxed);
+  }
+};
+
+/// A declared parameter: a number to calculate with. Until it is assigned it is not finite.
+class Parameter {
+ public:
+  Parameter() = default;
+  explicit Parameter(const ParameterRow& row) : row_(&row) {}
+
+  [[nodiscard]] double value() const noexcept TANDEM_RT {
+    return row_ == nullptr ? kNotGiven : row_->now();
+  }
+  operator double() const noexcept TANDEM_RT { return value(); }
+  /// Whether it is true, where it is a boolean.
+  [[nodiscard]] bool on() const noexcept TANDEM_RT { return value() == 1.0; }
+  /// Whether it has a value: it may lack one where its default is kNotGiven.
+  [[nodiscard]] bool given() const noexcept TANDEM_RT { return !std::isnan(value()); }
+  /// Whether it is that word, where it is a choice.
+  [[nodiscard]] bool is(std::string_view word) const noexcept TANDEM_RT {
+    const double index = value();
+    return row_ != nullptr && index >= 0.0 &&
+           index < static_cast<double>(row_->facts.choices.size()) &&
+           row_->facts.choices[static_cast<std::size_t>(index)] == word;
+  }
+  /// Whether this is the first update() after it was set.
+  [[nodiscard]] bool changed() const noexcept TANDEM_RT { return row_ != nullptr && row_->changed; }
+
+ private:
+  const ParameterRow* row_ = nullptr;
+};
+
+/// The parameters of one controller.
+class Parameters {
+ public:
+  static constexpr std::size_t kMost = 256;
+
+  /// Reads `name` of `table`. What is wrong with it, or with the declaration, is reported there.
+  [[nodiscard]] Parameter declare(TomlTable& table, std::string_view name, ParameterFacts facts) {
+    const std::string key(name);
+    const auto known = std::ranges::find(rows_, key, &ParameterRow::name);
+    if (known != rows_.end()) {
+      table.error(key, "the controller declares this parameter twice", "declare it once");
+      return Parameter(*known);
+    }
+    if (rows_.size() == kMost) {
+      table.error("", "the controller declares more than 256 parameters", "declare fewer");
+      return {};
+    }
+    ParameterRow& row = rows_.emplace_back();
+    row.name = key;
+    row.facts = std::move(facts);
+    if (const char* wrong = complete(row); *wrong != '\0') {
+      table.error(key, wrong, "correct the controller");
+    } else {
+      row.value.store(read(table, row), std::memory_order_relaxed);
+    }
+    return Parameter(row);
+  }
+
+  [[nodiscard]] std::deque<ParameterRow>& rows() noexcept { return rows_; }
+
+  // The loop's.
+
+  void set(ParameterRow& row, double value) noexcept TANDEM_RT {
+    row.value.store(value, std::memory_order_relaxed);
+    row.changed = any_changed_ = true;
+  }
+  /// After an update() of the controller: what it has seen is no change any more.
+  void seen() noexcept TANDEM_RT {
+    if (!any_changed_) return;
+    for (ParameterRow& row : rows_) row.changed = false;
+    any_changed_ = false;
+  }
+  void archive(Archive& ar) {
+    for (ParameterRow& row : rows_) {
+      double value = row.now();
+      ar(value, row.changed);
+      if (ar.reading()) row.value.store(value, std::memory_order_relaxed);
+    }
+    ar(any_changed_);
+  }
+
+ private:
+  static constexpr double kMostWhole = 9007199254740992.0;  // 2^53
+
+  /// Type and default. @return what is wrong with the declaration; empty: nothing
+  [[nodiscard]] static const char* complete(ParameterRow& row) {
+    ParameterFacts& facts = row.facts;
+    const ParameterValue& given = facts.otherwise;
+    using Is = ParameterValue::Is;
+    if (!topic_name_problem(row.name).empty()) {
+      return "is no name of a parameter: letters, digits and _, no digit first";
+    }
+    if (!facts.choices.empty()) {
+      row.type = ParameterType::kChoice;
+      if (given.is == Is::kNothing) return "";
+      const auto found = std::ranges::find(facts.choices, given.text);
+      if (given.is != Is::kText || found == facts.choices.end()) {
+        return "has a default that is none of its choices";
+      }
+      row.otherwise = static_cast<double>(found - facts.choices.begin());
+      return "";
+    }
+    if (given.is == Is::kText) return "has a word as default, and no choices";
+    if (given.is != Is::kNothing) row.otherwise = given.number;
+    if (given.is == Is::kBoolean) {
+      row.type = ParameterType::kBoolean;
+      return "";
+    }
+    if (facts.whole) {
+      row.type = ParameterType::kInteger;
+      facts.min = std::max(facts.min, -kMostWhole);
+      facts.max = std::min(facts.max, kMostWhole);
+    }
+    if (!(facts.min <= facts.max)) return "has a range without numbers";
+    const double least = facts.min, most = facts.max;
+    if (row.otherwise < least || row.otherwise > most ||
+        (facts.above_min && row.otherwise == least)) {
+      return "has a default outside its range";
+    }
+    return "";
+  }
+
+  [[nodiscard]] static double read(TomlTable& table, const ParameterRow& row) {
+    const ParameterFacts& facts = row.facts;
+    const bool required = facts.otherwise.is == ParameterValue::Is::kNothing;
+    const Range range{facts.min, facts.max, facts.above_min};
+    switch (row.type) {
+      case ParameterType::kNumber:
+        return required ? table.number(row.name, range)
+                        : table.number_or(row.name, row.otherwise, range);
+      case ParameterType::kInteger:
+        if (!required && !table.has(row.name)) return row.otherwise;
+        return static_cast<double>(table.integer(row.name, static_cast<std::int64_t>(facts.min),
+                                                 static_cast<std::int64_t>(facts.max)));
+      case ParameterType::kBoolean: return table.boolean_or(row.name, row.otherwise == 1.0) ? 1 : 0;
+      case ParameterType::kChoice: break;
+    }
+    const std::string word = required
+                                 ? table.choice(row.name, facts.choices)
+                                 : table.choice_or(row.name, facts.otherwise.text, facts.choices);
+    const auto found = std::ranges::find(facts.choices, word);
+    return found == facts.choices.end() ? 0.0 : static_cast<double>(found - facts.choices.begin());
+  }
+
+  std::deque<ParameterRow> rows_;  // they stay where they are
+  bool any_changed_ = false;
+};
+
+}  // namespace tandem

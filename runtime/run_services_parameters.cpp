@@ -1,0 +1,139 @@
+// Asking the loop for parameters of controllers: what they are, and whether a value fits.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/nearest.hpp"
+#include "runtime/run_services.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using Is = ParameterValue::Is;
+
+/// "give 0 to 500 Nm/rad".
+std::string range_hint(const ParameterRow& row) {
+  const ParameterFacts& facts = row.facts;
+  const bool below = facts.min > kAnyNumber.min, above = facts.max < kAnyNumber.max;
+  const std::string unit = facts.unit.empty() ? "" : " " + facts.unit;
+  const std::string what = facts.whole ? "whole numbers, " : "";
+  if (below && above) {
+    return fmt::format("give {}{}{:g} to {:g}{}", what, facts.above_min ? "more than " : "",
+                       facts.min, facts.max, unit);
+  }
+  if (below) {
+    return fmt::format("give {}{:g}{}{}", facts.above_min ? "more than " : "", facts.min, unit,
+                       facts.above_min ? "" : " or more");
+  }
+  if (above) return fmt::format("give {}at most {:g}{}", what, facts.max, unit);
+  return facts.whole ? "give a whole number" : "give a number" + (unit.empty() ? "" : ":" + unit);
+}
+
+std::string text_of(const ParameterValue& value) {
+  switch (value.is) {
+    case Is::kNumber: return fmt::format("{:g}", value.number);
+    case Is::kBoolean: return value.number == 1.0 ? "true" : "false";
+    case Is::kText: return "'" + value.text.substr(0, kMostNamed) + "'";
+    case Is::kNothing: break;
+  }
+  return "nothing";
+}
+
+/// What the parameter holds for `given`.
+/// @param key  of errors: "squat.kp"
+Result<double> fit(const ParameterRow& row, const ParameterValue& given, const std::string& key) {
+  const auto wrong = [&](const std::string& message, const std::string& hint) {
+    return fail_at(key, message, hint);
+  };
+  if (row.type == ParameterType::kChoice) {
+    const auto& choices = row.facts.choices;
+    const auto found = std::ranges::find(choices, given.text);
+    if (given.is == Is::kText && found != choices.end())
+      return static_cast<double>(found - choices.begin());
+    return wrong(text_of(given) + " is none of its words", suggest(given.text, choices));
+  }
+  if (row.type == ParameterType::kBoolean) {
+    if (given.is == Is::kBoolean) return given.number;
+    return wrong("is true or false, not " + text_of(given), "give true or false");
+  }
+  if (given.is != Is::kNumber) return wrong("is a number, not " + text_of(given), range_hint(row));
+  const double value = given.number;
+  if (!std::isfinite(value)) return wrong("has to be finite", range_hint(row));
+  if (row.type == ParameterType::kInteger && value != std::floor(value))
+    return wrong(text_of(given) + " is no whole number", range_hint(row));
+  const ParameterFacts& facts = row.facts;
+  if (value >= facts.min && value <= facts.max && !(facts.above_min && value == facts.min))
+    return value;
+  return wrong(text_of(given) + " is out of range", range_hint(row));
+}
+
+}  // namespace
+
+Result<std::vector<ParameterStatus>> RunServices::parameters(const std::string& controller) {
+  const Lock lock(mutex_);
+  collect();
+  const Result<std::size_t> slot = slot_of(controller);
+  if (!slot) return std::unexpected(slot.error());
+  std::vector<ParameterStatus> all;
+  for (const ParameterRow& row : host_->owned()[*slot]->io->parameters.rows()) {
+    all.push_back({.name = row.name,
+                   .facts = row.facts,
+                   .type = row.type,
+                   .otherwise = row.otherwise,
+                   .value = row.now()});
+  }
+  return all;
+}
+
+Result<ParameterChange> RunServices::change_of(const ParameterWish& wish) const {
+  const Result<std::size_t> slot = slot_of(wish.controller);
+  if (!slot) return std::unexpected(slot.error());
+  auto& rows = host_->owned()[*slot]->io->parameters.rows();
+  const std::string key = wish.controller + "." + wish.parameter;
+  const auto row = std::ranges::find(rows, wish.parameter, &ParameterRow::name);
+  if (row == rows.end()) {
+    std::vector<std::string> names;
+    for (const ParameterRow& one : rows) names.push_back(one.name);
+    return fail_at(key.substr(0, 2 * kMostNamed), "the controller has no such parameter",
+                   names.empty() ? "it has none: setup.parameter() declares them"
+                                 : suggest(wish.parameter, names));
+  }
+  const Result<double> value = fit(*row, wish.value, key);
+  if (!value) return std::unexpected(value.error());
+  if (!row->facts.live) {
+    return fail_at(key, "is not live: it is read when the controller is loaded",
+                   "unload the controller, then load it with --set '" + wish.parameter + " = …'");
+  }
+  return ParameterChange{.slot = *slot, .parameter = &*row, .value = *value, .name = key};
+}
+
+Result<RequestResult> RunServices::set_parameters(const std::vector<ParameterWish>& wishes,
+                                                  Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  if (wishes.empty()) return fail("no parameter is named", "name those to set: kp=40");
+  if (wishes.size() > kMostParameterChanges) {
+    return fail(fmt::format("sets {} parameters at once", wishes.size()),
+                fmt::format("set at most {}", kMostParameterChanges));
+  }
+  std::vector<ParameterChange> changes;
+  for (const ParameterWish& wish : wishes) {
+    Result<ParameterChange> change = change_of(wish);
+    if (!change) return std::unexpected(change.error());
+    const auto same = std::ranges::find(changes, change->parameter, &ParameterChange::parameter);
+    if (same != changes.end()) return fail_at(change->name, "is named twice", "name it once");
+    changes.push_back(std::move(*change));
+  }
+  changes_.push_back(std::make_unique<const std::vector<ParameterChange>>(std::move(changes)));
+  return ask(lock, {.kind = CycleRequest::Kind::kSet, .changes = changes_.back().get()}, patience);
+}
+
+void RunServices::forget_changes(const CycleRequest& request) {
+  if (request.changes == nullptr) return;
+  std::erase_if(changes_, [&](const auto& one) { return one.get() == request.changes; });
+}
+
+}  // namespace tandem::runtime
