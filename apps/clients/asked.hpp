@@ -33,6 +33,8 @@ void tell_done(const Json& answer);
 
 // Each completes a question.
 Status ask_for_load(const AskedOptions& options, Json& question);
+Status ask_for_set(const AskedOptions& options, Json& question);
+Status ask_for_show(const AskedOptions& options, Json& question);
 Status ask_for_start(const AskedOptions& options, Json& question);
 Status ask_for_stop(const AskedOptions& options, Json& question);
 Status ask_for_list(const AskedOptions& options, Json& question);
@@ -41,6 +43,8 @@ Status ask_for_motion(const AskedOptions& options, Json& question);
 // Each prints an answer.
 void print_clock(const Json& answer);
 void print_controllers(const Json& answer);
+void print_controller(const Json& answer);
+void print_set(const Json& answer);
 void print_switched(const Json& answer);
 void print_latched(const Json& answer);
 void print_joint_gains(const Json& joint);

@@ -59,6 +59,8 @@ constexpr Form kForms[]{
     {"clock.step", nullptr, &tell_clock_at_rest},
     {"controller.list", &print_controllers},
     {"controller.load", nullptr, &tell_loaded, &ask_for_load},
+    {"controller.set", &print_set, nullptr, &ask_for_set},
+    {"controller.show", &print_controller, nullptr, &ask_for_show},
     {"controller.start", &print_switched, nullptr, &ask_for_start},
     {"controller.stop", &print_switched, nullptr, &ask_for_stop},
     {"controller.switch", &print_switched},

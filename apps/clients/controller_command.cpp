@@ -3,6 +3,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <filesystem>
 
 #include "apps/clients/asked.hpp"
@@ -29,6 +31,40 @@ std::size_t end_of_top_level(const std::string& text, const std::string& file) {
   return end;
 }
 
+std::string without_blanks(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(' ');
+  return first == std::string::npos ? ""
+                                    : text.substr(first, text.find_last_not_of(' ') - first + 1);
+}
+
+/// A number, true or false, else a word: the run says whether it fits.
+Json value_of(const std::string& text) {
+  if (text == "true" || text == "false") return text == "true";
+  double number = 0.0;
+  const char* last = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), last, number);
+  if (error == std::errc() && end == last && std::isfinite(number)) return number;
+  return text;
+}
+
+std::string shown_value(const Json& value) {
+  if (value.is_null()) return "-";
+  return value.is_string()   ? value.get<std::string>()
+         : value.is_number() ? fmt::format("{:g}", value.get<double>())
+                             : value.dump();
+}
+
+/// "0 to 500", "> 0", "stiff, compliant".
+std::string shown_range(const Json& one) {
+  if (one["choices"].size() > 0)
+    return fmt::format("{}", fmt::join(one["choices"].get<std::vector<std::string>>(), ", "));
+  const Json &min = one["min"], &max = one["max"];
+  const std::string above = one.value("above_min", false) ? "> " : "";
+  if (!min.is_null() && !max.is_null()) return above + shown_value(min) + " to " + shown_value(max);
+  if (!min.is_null()) return (above.empty() ? ">= " : above) + shown_value(min);
+  return max.is_null() ? "" : "<= " + shown_value(max);
+}
+
 }  // namespace
 
 /// The parameters are the file with what --set adds to it, below its own keys: the lines of errors
@@ -50,6 +86,28 @@ Status ask_for_load(const AskedOptions& options, Json& question) {
   if (plugin.find('/') != std::string::npos) {
     question["plugin"] = std::filesystem::absolute(plugin).string();
   }
+  return {};
+}
+
+/// "kp=40", "mode = torque".
+Status ask_for_set(const AskedOptions& options, Json& question) {
+  question["name"] = options.given["controller"];
+  Json& parameters = question["parameters"] = Json::object();
+  for (const Json& one : options.given["values"]) {
+    const auto word = one.get<std::string>();
+    const std::size_t equals = word.find('=');
+    const std::string name = without_blanks(word.substr(0, equals));
+    if (equals == std::string::npos || name.empty()) {
+      return fail("'" + word + "' is not NAME=VALUE", "write kp=40");
+    }
+    if (parameters.contains(name)) return fail_at(name, "is named twice", "name it once");
+    parameters[name] = value_of(without_blanks(word.substr(equals + 1)));
+  }
+  return {};
+}
+
+Status ask_for_show(const AskedOptions& options, Json& question) {
+  question["name"] = options.given["controller"];
   return {};
 }
 
@@ -80,6 +138,34 @@ void print_controllers(const Json& answer) {
                std::filesystem::path(one.value("plugin", "")).filename().string()});
   }
   table.print(stdout);
+}
+
+void print_controller(const Json& answer) {
+  for (const Json& one : answer["controllers"]) {
+    print_controllers({{"controllers", Json::array({one})}});
+    if (one["parameters"].empty()) {
+      fmt::print("it declares no parameters\n");
+      continue;
+    }
+    Table table({"parameter", "value", "unit", "range", "default", "set", ""});
+    table.align_left();
+    for (const Json& parameter : one["parameters"]) {
+      const bool required = parameter.value("required", false);
+      table.add({parameter.value("name", ""), shown_value(parameter["value"]),
+                 parameter.value("unit", ""), shown_range(parameter),
+                 required ? "required" : shown_value(parameter["default"]),
+                 parameter.value("live", false) ? "live" : "at load", parameter.value("doc", "")});
+    }
+    fmt::print("\n");
+    table.print(stdout);
+  }
+}
+
+void print_set(const Json& answer) {
+  tell_done(answer);
+  Facts facts;
+  for (const auto& [name, value] : answer["values"].items()) facts.add(name, shown_value(value));
+  facts.print(stdout);
 }
 
 /// "done in cycle 1200; active: squat"; "selected in cycle 1200: squat; not started yet: …".

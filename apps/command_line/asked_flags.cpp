@@ -38,6 +38,8 @@ same without a socket, and gets no answer.)"},
   tandem controller list                             loaded controllers, active or not, their joints
   tandem controller load hold --name rest --set 'duration_s = 2.0'
   tandem controller switch --stop squat --start rest in one cycle, or not at all
+  tandem controller show squat                       its parameters: unit, range, value, live or not
+  tandem controller set squat link_damping_Nms_rad=2 between two cycles; several: all or none
   tandem controller start                            after `fault reset`: those active before
   tandem controller stop rest                        its joints are held where they are
   tandem controller unload rest                      then `load` runs a new build of it

@@ -61,6 +61,9 @@ ControlKey texts(const char* name, const char* line, const char* doc) {
 ControlKey flag(const char* name, const char* line, const char* doc) {
   return {.name = name, .type = Type::kBoolean, .doc = doc, .line = line};
 }
+ControlKey object(const char* name, const char* doc) {
+  return {.name = name, .type = Type::kObject, .doc = doc};
+}
 /// One of some texts, which it lists.
 ControlKey choice(const char* name, const char* line, std::vector<std::string> of) {
   return {.name = name, .doc = fmt::format("{}", fmt::join(of, ", ")), .line = line, .choices = of};
@@ -85,6 +88,16 @@ const std::vector<CommandRow> kRows{
     {"run.stop", kEnds, "ends the run in order", {}, {.on_line = false}},
 
     {"controller.list", kReads, "every loaded controller and its claims"},
+    {"controller.show", kReads, "claims and parameters of a controller",
+     {text("name", "", "of a loaded controller; else of every one"),
+      need(local(text("controller", "name", kLoaded)))}},
+    {"controller.set", kChanges,
+     "sets live parameters of a controller between two cycles, all or none",
+     {text("name", "", "of a loaded controller; else the parameters are named NAME.PARAMETER"),
+      need(object("parameters", "by name the values: a number, true or false, or a word")),
+      flag("each", "", "true: each by itself; `results` has what became of it"),
+      need(local(text("controller", "name", kLoaded))),
+      need(local(texts("values", "values", "one or more of NAME=VALUE: kp=40")))}},
     {"controller.load", kChanges, "loads a controller, inactive",
      {need(text("plugin", "plugin", "its name, or the path of its library")),
       text("name", "--name", "default: the plugin's"),

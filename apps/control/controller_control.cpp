@@ -1,9 +1,11 @@
 #include "apps/control/controller_control.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "apps/text/toml_text.hpp"
+#include "base/nearest.hpp"
 #include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "runtime/controller_host.hpp"
@@ -15,9 +17,44 @@ namespace {
 using runtime::RunServices;
 using Names = std::vector<std::string>;
 
-Json list(RunServices& services, const hal::RobotConfig& robot) {
+Json value_json(const runtime::ParameterStatus& one, double value) {
+  if (std::isnan(value)) return nullptr;
+  if (one.type == ParameterType::kBoolean) return value == 1.0;
+  if (one.type == ParameterType::kInteger) return static_cast<std::int64_t>(value);
+  if (one.type == ParameterType::kNumber) return value;
+  const auto index = static_cast<std::size_t>(value);
+  return index < one.facts.choices.size() ? Json(one.facts.choices[index]) : Json(nullptr);
+}
+
+Json parameters_json(const std::vector<runtime::ParameterStatus>& parameters) {
+  Json all = Json::array();
+  for (const runtime::ParameterStatus& one : parameters) {
+    const ParameterFacts& facts = one.facts;
+    const bool ranged = one.type <= ParameterType::kInteger;
+    const auto limit = [ranged](double value, double none) {
+      return ranged && value != none ? Json(value) : Json(nullptr);
+    };
+    all.push_back({{"name", one.name},
+                   {"type", to_string(one.type)},
+                   {"unit", facts.unit},
+                   {"min", limit(facts.min, kAnyNumber.min)},
+                   {"above_min", facts.above_min},
+                   {"max", limit(facts.max, kAnyNumber.max)},
+                   {"choices", facts.choices},
+                   {"required", facts.otherwise.is == ParameterValue::Is::kNothing},
+                   {"default", value_json(one, one.otherwise)},
+                   {"value", value_json(one, one.value)},
+                   {"live", facts.live},
+                   {"doc", facts.doc}});
+  }
+  return all;
+}
+
+/// @param name  of the only one; empty: all
+Json list(RunServices& services, const hal::RobotConfig& robot, const std::string& name = "") {
   Json all = Json::array();
   for (const runtime::ControllerStatus& one : services.controllers()) {
+    if (!name.empty() && one.name != name) continue;
     Json claims = Json::array();
     for (const auto& claim : one.claims) {
       claims.push_back({{"joint", robot.joints[claim.joint].name},
@@ -109,6 +146,80 @@ Result<Json> load(RunServices& services, const Json& request) {
   return answer;
 }
 
+Result<Json> show(RunServices& services, const hal::RobotConfig& robot, const Json& request) {
+  const std::string name = request.value("name", std::string());
+  if (request.contains("name")) {
+    if (const auto known = services.parameters(name); !known) return std::unexpected(known.error());
+  }
+  Json shown = Json::array();
+  for (Json& one : list(services, robot, name)) {
+    const auto parameters = services.parameters(one["name"].get<std::string>());
+    if (!parameters) continue;  // unloaded just now
+    one["parameters"] = parameters_json(*parameters);
+    shown.push_back(std::move(one));
+  }
+  return Json{{"controllers", std::move(shown)}};
+}
+
+/// @param name  of the controller; empty: `parameter` begins with it
+Result<runtime::ParameterWish> wish_of(const std::string& name, const std::string& parameter,
+                                       const Json& value) {
+  runtime::ParameterWish wish{.controller = name, .parameter = parameter, .value = {}};
+  if (name.empty()) {
+    const std::size_t dot = parameter.rfind('.');
+    if (dot == std::string::npos) {
+      return fail_at(parameter.substr(0, kMostNamed), "names no controller",
+                     "write NAME.PARAMETER, or give the controller's \"name\"");
+    }
+    wish.controller = parameter.substr(0, dot);
+    wish.parameter = parameter.substr(dot + 1);
+  }
+  if (value.is_boolean()) {
+    wish.value = value.get<bool>();
+  } else if (value.is_number()) {
+    wish.value = value.get<double>();
+  } else if (value.is_string()) {
+    wish.value = value.get<std::string>();
+  }
+  return wish;
+}
+
+/// What became of it, and the values that are in force after it.
+Result<Json> set_these(RunServices& services, const std::vector<runtime::ParameterWish>& wishes) {
+  const auto asked = services.set_parameters(wishes);
+  if (!asked) return std::unexpected(asked.error());
+  Json answer = asked_json(*asked);
+  Json& values = answer["values"] = Json::object();
+  for (const runtime::ParameterWish& wish : wishes) {
+    const auto now = services.parameters(wish.controller);
+    if (!now) continue;
+    const auto one = std::ranges::find(*now, wish.parameter, &runtime::ParameterStatus::name);
+    if (one != now->end())
+      values[wish.controller + "." + wish.parameter] = value_json(*one, one->value);
+  }
+  return answer;
+}
+
+Result<Json> set(RunServices& services, const Json& request) {
+  const std::string name = request.value("name", std::string());
+  const bool each = request.value("each", false);
+  std::vector<runtime::ParameterWish> wishes;
+  Json results = Json::object();
+  for (const auto& [parameter, value] : request["parameters"].items()) {
+    auto wish = wish_of(name, parameter, value);
+    if (!each) {
+      if (!wish) return std::unexpected(wish.error());
+      wishes.push_back(std::move(*wish));
+      continue;
+    }
+    const Result<Json> asked =
+        wish ? set_these(services, {*wish}) : Result<Json>(std::unexpected(wish.error()));
+    results[parameter] = asked ? "" : asked.error().to_string();
+  }
+  if (each) return Json{{"results", std::move(results)}};
+  return set_these(services, wishes);
+}
+
 Names names_of(const Json& request, const char* key) {
   return request.contains(key) ? request[key].get<Names>() : Names{};
 }
@@ -125,6 +236,10 @@ void add_controller_commands(ControlRegistry& registry, RunServices& services,
   registry.add("controller.list", [&services, &robot](const Json&) -> Result<Json> {
     return Json{{"controllers", list(services, robot)}};
   });
+  registry.add("controller.show",
+               [&services, &robot](const Json& request) { return show(services, robot, request); });
+  registry.add("controller.set",
+               [&services](const Json& request) { return set(services, request); });
   registry.add("controller.load",
                [&services](const Json& request) { return load(services, request); });
   registry.add("controller.unload", [&services](const Json& request) {

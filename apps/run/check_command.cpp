@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "apps/can/bus_table.hpp"
 #include "apps/control/fault_table.hpp"
@@ -19,6 +20,15 @@
 
 namespace tandem::apps {
 namespace {
+
+std::string shown_value(const ParameterRow& row) {
+  const double value = row.now();
+  if (std::isnan(value)) return "-";
+  if (row.type == ParameterType::kBoolean) return value == 1.0 ? "true" : "false";
+  if (row.type == ParameterType::kChoice)
+    return row.facts.choices.at(static_cast<std::size_t>(value));
+  return fmt::format("{:g}", value);
+}
 
 const char* backend_text(runtime::BackendKind backend) {
   switch (backend) {
@@ -102,6 +112,19 @@ void add_estimation_facts(const runtime::Experiment& e, Facts& facts) {
   }
 }
 
+/// "link_damping_Nms_rad = 0 Nms/rad, live: damps …" of each.
+void add_parameter_facts(runtime::ControllerHost& host, const std::string& controller,
+                         Facts& facts) {
+  for (const auto& one : host.owned()) {
+    if (one == nullptr || one->name != controller) continue;
+    for (const ParameterRow& row : one->io->parameters.rows()) {
+      facts.add("", fmt::format("{} = {}{}{}: {}", row.name, shown_value(row),
+                                row.facts.unit.empty() ? "" : " " + row.facts.unit,
+                                row.facts.live ? ", live" : "", row.facts.doc));
+    }
+  }
+}
+
 /// What a run would do.
 void print_plan(const WiredComposition& c, std::FILE* out) {
   const runtime::Experiment& e = c.experiment;
@@ -114,6 +137,7 @@ void print_plan(const WiredComposition& c, std::FILE* out) {
   facts.add("start", e.posture.empty() ? "every joint at 0" : "posture " + e.posture);
   for (const ControllerNote& note : c.notes) {
     facts.add("controller " + note.name, note.doc + (note.active ? "" : " Inactive at first."));
+    if (c.controllers != nullptr) add_parameter_facts(*c.controllers, note.name, facts);
   }
   if (c.controllers == nullptr) {
     facts.add("", "their parameters and claims are checked when there are kernels");

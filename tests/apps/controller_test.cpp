@@ -257,6 +257,56 @@ TEST_F(Controllers, GainsAreKeptAndShown) {
   EXPECT_EQ(end(), 0);
 }
 
+TEST_F(Controllers, ParametersAreShownAndSetByAnotherProcess) {
+  begin("");
+  EXPECT_EQ(asked("controller load hold --name rest --set 'link_damping_Nms_rad = 0.5' --set "
+                  "'joints = [\"joint2\"]'")["done"],
+            true);
+  const auto shown = asked("controller show rest")["controllers"];
+  ASSERT_EQ(shown.size(), 1U);
+  EXPECT_EQ(shown[0]["claims"][0]["joint"], "joint2");
+  nlohmann::json damping;
+  for (const auto& one : shown[0]["parameters"])
+    if (one["name"] == "link_damping_Nms_rad") damping = one;
+  EXPECT_EQ(damping["value"], 0.5);
+  EXPECT_EQ(damping["default"], 0.0);
+  EXPECT_EQ(damping["min"], 0.0);
+  EXPECT_EQ(damping["max"], nullptr);
+  EXPECT_EQ(damping["unit"], "Nms/rad");
+  EXPECT_EQ(damping["live"], true);
+  expect(to_run("controller show rest").out, "duration_s");
+
+  const auto set = asked("controller set rest link_damping_Nms_rad=1.25");
+  EXPECT_EQ(set["done"], true);
+  EXPECT_GT(set["cycle"].get<int>(), 0);
+  EXPECT_EQ(set["values"]["rest.link_damping_Nms_rad"], 1.25);
+  expect(to_run("controller set rest 'link_damping_Nms_rad = 1.5'").out,
+         "rest.link_damping_Nms_rad  1.5");
+  expect(refused("controller set rest link_damping_Nms_rad=-1"),
+         "rest.link_damping_Nms_rad: -1 is out of range (give 0 Nms/rad or more)");
+  expect(refused("controller set rest link_damping_Nms_rad=inf"), "is a number, not 'inf'");
+  expect(refused("controller set rest link_damping=2"), "did you mean 'link_damping_Nms_rad'?");
+  expect(refused("controller set rest duration_s=2"), "rest.duration_s: is not live");
+  expect(refused("controller set rset duration_s=2"), "did you mean 'rest'?");
+  expect(refused("controller show rset"), "did you mean 'rest'?");
+  expect(refused("controller set rest link_damping_Nms_rad=2 duration_s=2"), "is not live");
+  expect(refused("controller set rest link_damping_Nms_rad"), "is not NAME=VALUE");
+  expect(refused("controller set rest link_damping_Nms_rad=1 link_damping_Nms_rad=2"),
+         "is named twice");
+  const auto each = nlohmann::json::parse(
+      to_run("ask '{\"do\": \"controller.set\", \"each\": true, \"parameters\": "
+             "{\"rest.link_damping_Nms_rad\": 3, \"hold.nothing\": 1, \"nobody\": 1}}'")
+          .out,
+      nullptr, false)["results"];
+  EXPECT_EQ(each["rest.link_damping_Nms_rad"], "");
+  EXPECT_NE(each["hold.nothing"].dump().find("has no such parameter"), std::string::npos);
+  EXPECT_NE(each["nobody"].dump().find("names no controller"), std::string::npos);
+  for (const auto& one : asked("controller show rest")["controllers"][0]["parameters"]) {
+    if (one["name"] == "link_damping_Nms_rad") EXPECT_EQ(one["value"], 3.0);
+  }
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(Controllers, OfARunWhoseTimeStandsChangeWithItsNextCycle) {
   begin("");
   EXPECT_EQ(to_run("controller load hold --name rest").status, 0);
