@@ -154,7 +154,10 @@ Result<Value> decode(const MessageDefinition& definition, std::span<const std::b
   };
   if (bytes.size() < kHeader) return refuse("it ends too early");
   if (bytes[0] != std::byte{0} || bytes[1] > std::byte{1}) return refuse("it is not plain CDR");
-  Cursor cursor(bytes.subspan(kHeader), bytes[1] == std::byte{0});
+  // How many bytes at the end are padding, which no value may reach into.
+  const auto padding = std::to_integer<std::size_t>(bytes[3] & std::byte{kMostPadding});
+  if (bytes.size() < kHeader + padding) return refuse("it ends too early");
+  Cursor cursor(bytes.subspan(kHeader, bytes.size() - kHeader - padding), bytes[1] == std::byte{0});
   Value value{message(cursor, definition)};
   if (cursor.failed()) {
     return refuse(fmt::format("{} (byte {})", cursor.reason(), cursor.at() + kHeader));

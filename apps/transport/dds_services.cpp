@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "apps/control/dds_parameter_types.hpp"
 #include "apps/control/dds_service_types.hpp"
 
 namespace tandem::apps {
@@ -25,6 +26,7 @@ Result<std::unique_ptr<DdsServices>> DdsServices::open(dds::Participant& partici
     if (!server) return std::unexpected(server.error());
     *one = std::move(*server);
   }
+  services->node_ = participant.node();
   if (Status added = services->add_stops(); !added) return std::unexpected(added.error());
   if (Status added = services->add_all(); !added) return std::unexpected(added.error());
   if (Status started = services->stops_->start(true); !started) {
@@ -79,7 +81,41 @@ Status DdsServices::add_all() {
   for (const Status& one : added) {
     if (!one) return one;
   }
+  return add_parameters();
+}
+
+/// Those that ROS 2 expects of every node, beneath the node's name.
+Status DdsServices::add_parameters() {
+  using namespace dds::rcl_interfaces;
+  const Status added[]{
+      add_parameters<ListParameters_Request, ListParameters_Response>("list_parameters"),
+      add_parameters<DescribeParameters_Request, DescribeParameters_Response>(
+          "describe_parameters"),
+      add_parameters<GetParameters_Request, GetParameters_Response>("get_parameters"),
+      add_parameters<GetParameterTypes_Request, GetParameterTypes_Response>("get_parameter_types"),
+      add_parameters<SetParameters_Request, SetParameters_Response>("set_parameters"),
+      add_parameters<SetParametersAtomically_Request, SetParametersAtomically_Response>(
+          "set_parameters_atomically"),
+  };
+  for (const Status& one : added) {
+    if (!one) return one;
+  }
   return {};
+}
+
+template <class Request, class Response>
+Status DdsServices::add_parameters(const char* name) {
+  if (!registry_->effect("controller.set")) return {};
+  return server_->add<Request, Response>(
+      node_ + "/" + name, [this](const Request& request, const dds::Asker& asker) {
+        ParameterQuestion asked = question_of(request);
+        const std::string text = json_text(asked.question);
+        return dds::ServiceWork<Response>{.answer = [this, text, asked = std::move(asked), asker,
+                                                     after_stop = registry_->last_stop()](
+                                                        Response& reply, dds::ReplyMemory& memory) {
+          fill(ask(text, asker, after_stop), asked, reply, memory);
+        }};
+      });
 }
 
 Json DdsServices::ask(const std::string& question, const dds::Asker& asker,

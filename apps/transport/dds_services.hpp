@@ -12,8 +12,9 @@
 namespace tandem::apps {
 
 /// Serves a registry as "tandem/ask", and those of its commands that have a type of their own:
-/// "tandem/list_controllers" and so on. Every typed request becomes a question to the registry.
-/// Stops have services, readers and a thread of their own, "tandem/stop" and
+/// "tandem/list_controllers" and so on; and "tandem_run/set_parameters" and the other five by which
+/// ROS 2 reads and sets a node's parameters. Every typed request becomes a question to the
+/// registry. Stops have services, readers and a thread of their own, "tandem/stop" and
 /// "tandem/emergency_stop": what others ask for, and how much of it, does not delay them. Of who is
 /// not admitted kMaxStrangersQuestion bytes are read.
 class DdsServices {
@@ -40,6 +41,9 @@ class DdsServices {
   Status add(dds::ServiceServer& server, const char* name, const char* needs,
              Json (*question)(const Request&),
              void (*fill)(const Json& answer, Response& reply, dds::ReplyMemory& memory));
+  Status add_parameters();
+  template <class Request, class Response>
+  Status add_parameters(const char* name);
   /// @param after_stop  ControlRegistry::last_stop() when the question came
   [[nodiscard]] Json ask(const std::string& question, const dds::Asker& asker,
                          std::uint64_t after_stop) const;
@@ -47,6 +51,7 @@ class DdsServices {
   const ControlRegistry* registry_;
   ControlRegistry::Gate gate_;
   const DdsAdmission* admission_;
+  std::string node_;
   std::unique_ptr<dds::ServiceServer> stops_, server_;  // last: their threads use the others
 };
 

@@ -256,6 +256,153 @@ TEST_F(RunOverDds, SetJointsAndTheirGains) {
   EXPECT_EQ(end(), 0);
 }
 
+/// A parameter's name and value, as ROS 2's tools send it.
+struct RosParameter {
+  RosParameter(std::string its_name, double number) : name(std::move(its_name)) {
+    sample.name = name.data();
+    sample.value.type = 3;  // PARAMETER_DOUBLE
+    sample.value.double_value = number;
+    sample.value.string_value = none.data();
+  }
+  std::string name, none;
+  ::rcl_interfaces_msg_dds__Parameter_ sample{};
+};
+
+TEST_F(RunOverDds, ReadAndSetParametersAsThoseOfARosNode) {
+  using namespace dds::rcl_interfaces;
+  begin_with("local");
+  const auto call_node = [&]<class Response, class Request>(
+                             const char* name, const Request& request,
+                             const std::function<void(const Response&)>& use) {
+    auto client = dds::ServiceClient<Request, Response>::create(*participant_,
+                                                                std::string("tandem_run/") + name);
+    ASSERT_TRUE(client) << client.error().to_string();
+    const Status done = client->call(request, std::chrono::seconds(30), use);
+    EXPECT_TRUE(done) << done.error().to_string();
+  };
+  Texts names;
+  const auto list = [&](Texts prefixes, std::uint64_t depth) {
+    std::vector<char*> pointers;
+    for (std::string& one : prefixes) pointers.push_back(one.data());
+    const auto count = static_cast<std::uint32_t>(pointers.size());
+    names.clear();
+    call_node.operator()<ListParameters_Response>(
+        "list_parameters",
+        ListParameters_Request{0, 0, {count, count, pointers.data(), false}, depth},
+        [&](const ListParameters_Response& reply) {
+          for (std::uint32_t i = 0; i < reply.result.names._length; ++i)
+            names.emplace_back(reply.result.names._buffer[i]);
+          if (count == 0 && depth == 0) {
+            ASSERT_EQ(reply.result.prefixes._length, 1U);
+            EXPECT_STREQ(reply.result.prefixes._buffer[0], "hold");
+          }
+        });
+    return names;
+  };
+  const Texts all{"hold.interaction", "hold.duration_s", "hold.link_damping_Nms_rad"};
+  EXPECT_EQ(list({}, 0), all);
+  EXPECT_EQ(list({"hold"}, 0), all);
+  EXPECT_EQ(list({"hold"}, 1), all);
+  EXPECT_EQ(list({}, 1), Texts{}) << "each has a dot";
+  EXPECT_EQ(list({"hold.duration_s"}, 0), Texts{"hold.duration_s"});
+  EXPECT_EQ(list({"hol"}, 0), Texts{});
+
+  std::string damping = "hold.link_damping_Nms_rad", nobody = "hold.nobody";
+  std::string interaction = "hold.interaction";
+  char* asked[]{damping.data(), nobody.data(), interaction.data()};
+  const dds_sequence_string three{3, 3, asked, false};
+  double value = -1.0;
+  const auto get = [&] {
+    call_node.operator()<GetParameters_Response>(
+        "get_parameters", GetParameters_Request{0, 0, three},
+        [&](const GetParameters_Response& reply) {
+          ASSERT_EQ(reply.values._length, 3U);
+          EXPECT_EQ(reply.values._buffer[0].type, 3);
+          EXPECT_EQ(reply.values._buffer[1].type, 0) << "not set";
+          EXPECT_EQ(reply.values._buffer[2].type, 4);
+          EXPECT_STREQ(reply.values._buffer[2].string_value, "stiff");
+          value = reply.values._buffer[0].double_value;
+        });
+    return value;
+  };
+  EXPECT_EQ(get(), 0.0);
+  call_node.operator()<GetParameterTypes_Response>("get_parameter_types",
+                                                   GetParameterTypes_Request{0, 0, three},
+                                                   [&](const GetParameterTypes_Response& reply) {
+                                                     ASSERT_EQ(reply.types._length, 3U);
+                                                     EXPECT_EQ(reply.types._buffer[0], 3);
+                                                     EXPECT_EQ(reply.types._buffer[1], 0);
+                                                     EXPECT_EQ(reply.types._buffer[2], 4);
+                                                   });
+  call_node.operator()<DescribeParameters_Response>(
+      "describe_parameters", DescribeParameters_Request{0, 0, three},
+      [&](const DescribeParameters_Response& reply) {
+        ASSERT_EQ(reply.descriptors._length, 3U);
+        const auto& first = reply.descriptors._buffer[0];
+        EXPECT_STREQ(first.name, damping.c_str());
+        EXPECT_FALSE(first.read_only);
+        EXPECT_NE(std::string(first.additional_constraints).find("Nms/rad"), std::string::npos);
+        ASSERT_EQ(first.floating_point_range._length, 1U);
+        EXPECT_EQ(first.floating_point_range._buffer[0].from_value, 0.0);
+        EXPECT_TRUE(reply.descriptors._buffer[2].read_only);
+        EXPECT_STREQ(reply.descriptors._buffer[2].additional_constraints, "stiff, compliant");
+      });
+
+  RosParameter right(damping, 0.75), wrong(damping, -1.0), unknown(nobody, 1.0);
+  Texts reasons;
+  const auto set = [&](std::vector<::rcl_interfaces_msg_dds__Parameter_> samples) {
+    const auto count = static_cast<std::uint32_t>(samples.size());
+    reasons.clear();
+    call_node.operator()<SetParameters_Response>(
+        "set_parameters", SetParameters_Request{0, 0, {count, count, samples.data(), false}},
+        [&](const SetParameters_Response& reply) {
+          for (std::uint32_t i = 0; i < reply.results._length; ++i) {
+            reasons.emplace_back(reply.results._buffer[i].reason);
+            EXPECT_EQ(reply.results._buffer[i].successful, reasons.back().empty());
+          }
+        });
+  };
+  set({unknown.sample, right.sample});
+  ASSERT_EQ(reasons.size(), 2U);
+  EXPECT_NE(reasons[0].find("has no such parameter"), std::string::npos) << reasons[0];
+  EXPECT_EQ(reasons[1], "") << "each by itself";
+  EXPECT_EQ(get(), 0.75);
+  const auto set_all = [&](std::vector<::rcl_interfaces_msg_dds__Parameter_> samples) {
+    const auto count = static_cast<std::uint32_t>(samples.size());
+    std::string reason = "no reply";
+    call_node.operator()<SetParametersAtomically_Response>(
+        "set_parameters_atomically",
+        SetParametersAtomically_Request{0, 0, {count, count, samples.data(), false}},
+        [&](const SetParametersAtomically_Response& reply) { reason = reply.result.reason; });
+    return reason;
+  };
+  right.sample.value.double_value = 2.0;
+  EXPECT_NE(set_all({right.sample, unknown.sample}), "");
+  EXPECT_EQ(get(), 0.75) << "all or none";
+  EXPECT_NE(set_all({wrong.sample}).find("is out of range"), std::string::npos);
+  EXPECT_EQ(set_all({right.sample}), "");
+  EXPECT_EQ(get(), 2.0);
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(RunOverDds, SetNoParametersUnlessTheExperimentAllowsIt) {
+  using namespace dds::rcl_interfaces;
+  begin_with("");
+  RosParameter damping("hold.link_damping_Nms_rad", 0.75);
+  auto client = dds::ServiceClient<SetParameters_Request, SetParameters_Response>::create(
+      *participant_, "tandem_run/set_parameters");
+  ASSERT_TRUE(client);
+  std::string reason;
+  ASSERT_TRUE(client->call(SetParameters_Request{0, 0, {1, 1, &damping.sample, false}},
+                           std::chrono::seconds(30), [&](const SetParameters_Response& reply) {
+                             ASSERT_EQ(reply.results._length, 1U);
+                             EXPECT_FALSE(reply.results._buffer[0].successful);
+                             reason = reply.results._buffer[0].reason;
+                           }));
+  EXPECT_NE(reason.find("takes no commands over DDS"), std::string::npos) << reason;
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(RunOverDds, PauseStepAndScaleTime) {
   begin_with("local");
   Clock_Response last{};
