@@ -179,6 +179,18 @@ TEST_F(ParameterRun, IsWithdrawnWithAStopOfTheSameCycle) {
   EXPECT_EQ(value("share"), 1.0);
 }
 
+TEST_F(ParameterRun, IsRefusedWhenTooManyWaitAndThoseAreSetInTheirOrder) {
+  for (std::size_t i = 1; i <= Inbox::kCapacity; ++i)
+    ASSERT_TRUE(set({{"tuned", "share", 1.0 / static_cast<double>(i)}})) << i;
+  const auto asked = set({{"tuned", "share", 0.9}});
+  ASSERT_FALSE(asked);
+  EXPECT_EQ(asked.error().message, "the loop has not come to the last 16 requests");
+  steps(1);
+  EXPECT_EQ(value("share"), 1.0 / static_cast<double>(Inbox::kCapacity));
+  EXPECT_EQ(tuned->changes, 1) << "one cycle";
+  EXPECT_TRUE(set({{"tuned", "share", 0.9}}));
+}
+
 TEST_F(ParameterRun, GoesWithItsControllerWhenThatIsUnloaded) {
   ASSERT_TRUE(services().switch_controllers({"tuned"}, {}, kNow));
   steps(1);
