@@ -32,10 +32,10 @@ struct DriveParameters {
   double torque_slope_Nm_s = std::numeric_limits<double>::infinity();
   double min_position_rad = -std::numeric_limits<double>::infinity();  ///< of references
   double max_position_rad = std::numeric_limits<double>::infinity();
-  LoopGains position;                    ///< [Nm/rad, Nm/(rad s), Nms/rad, Nm]
-  LoopGains velocity;                    ///< [Nms/rad, Nm/rad, Nms^2/rad, Nm]
-  LoopGains torque;                      ///< [V/Nm, V/(Nm s), Vs/Nm, V]
-  LoopGains current;                     ///< [V/A, V/(A s), Vs/A, V]
+  LoopGains position{};                  ///< [Nm/rad, Nm/(rad s), Nms/rad, Nm]
+  LoopGains velocity{};                  ///< [Nms/rad, Nm/rad, Nms^2/rad, Nm]
+  LoopGains torque{};                    ///< [V/Nm, V/(Nm s), Vs/Nm, V]
+  LoopGains current{};                   ///< [V/A, V/(A s), Vs/A, V]
   double torque_to_voltage_V_Nm = 0.0;   ///< feed-forward, times the torque reference
   double emf_compensation_Vs_rad = 0.0;  ///< times the motor velocity
   /// Which encoder the stiff position loop's proportional and derivative terms act on. 0, the

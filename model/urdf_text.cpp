@@ -162,7 +162,8 @@ std::optional<Error> find_wrong_reference(std::string_view text, const std::stri
                             "' stands for no character",
                  .hint = "write the character itself, in UTF-8",
                  .file = file,
-                 .line = 1 + static_cast<int>(lines)};
+                 .line = 1 + static_cast<int>(lines),
+                 .key = {}};
   }
   return std::nullopt;
 }

@@ -220,14 +220,12 @@ std::vector<Nodes> spread(const BusConfig& bus, const Nodes& nodes, std::int64_t
 }
 
 std::string spread_text(const std::vector<Nodes>& buses) {
-  std::string text = fmt::format("{} buses, with", buses.size());
-  for (std::size_t b = 1; b < buses.size(); ++b) {
-    text += b > 1 ? "; on another" : "";
-    for (const NodePlan* node : buses[b]) {
-      text += (node == buses[b].front() ? " " : ", ") + node->name;
-    }
+  std::string text = fmt::format("{} buses:", buses.size());
+  for (const Nodes& bus : buses) {
+    for (const NodePlan* node : bus) text += (node == bus.front() ? " (" : ", ") + node->name;
+    text += ")";
   }
-  return text + " moved";
+  return text;
 }
 
 std::string remedy_of(const RobotConfig& robot, std::size_t index, const Nodes& nodes,

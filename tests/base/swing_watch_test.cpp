@@ -16,7 +16,7 @@ struct Swing {
   double kp = 0.0, ki = 0.0, kd = 0.0, friction = 0.0;
   double most_Nm = 1e9;  ///< of the loop's torque
   double q = 0.0, v = 0.0, integral = 0.0, t = 0.0;
-  SwingWatch watch;
+  SwingWatch watch{};
 
   /// @return s until it is found, or -1 after `seconds`
   template <class Push>

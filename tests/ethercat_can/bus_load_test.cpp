@@ -92,7 +92,7 @@ TEST(BusLoad, RefusesWhatACycleCannotCarryWithTheArithmetic) {
             "+ feedback 540.0 = 1095.0 us of 1000 us");
   EXPECT_EQ(errors[0].hint,
             "any of these fits: period_ns = 2000000 or a longer multiple of 1000000; fd = true; "
-            "2 buses, with b1 moved")
+            "2 buses: (b0) (b1)")
       << "a loop's period goes with the boards' control periods";
 }
 
@@ -116,7 +116,7 @@ TEST(BusLoad, EveryRemedyFits) {
   EXPECT_FALSE((*loads)[0].fits());
   EXPECT_EQ((*loads)[0].remedy,
             "any of these fits: period_ns = 1700000 or a longer multiple of 100000; "
-            "data_bitrate = 5000000; 3 buses, with board_1; on another board_2 moved");
+            "data_bitrate = 5000000; 3 buses: (board_0) (board_1) (board_2)");
   robot.buses[0].data_bitrate = 5'000'000;
   EXPECT_TRUE(check_bus_load(robot, kMs).empty());
   robot.buses[0].data_bitrate = 2'000'000;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
 #include "hal/ethercat-can/loopback.hpp"
 #include "hal/sim/emulator.hpp"
