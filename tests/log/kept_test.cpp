@@ -114,7 +114,9 @@ TEST(Kept, GoesOnInFilesThatAreWholeLogs) {
     ASSERT_TRUE(states && commands);
     EXPECT_EQ(states->time_s, commands->time_s) << "a cycle is in one file";
     cycles.insert(cycles.end(), states->columns[0].begin(), states->columns[0].end());
-    for (const EventText& event : log.events().value()) {
+    const auto texts = log.events();
+    ASSERT_TRUE(texts);
+    for (const EventText& event : *texts) {
       events.push_back(static_cast<double>(event.event.cycle));
     }
     messages += log.messages();
