@@ -119,7 +119,9 @@ void RobotCycle::read() noexcept TANDEM_RT {
 void RobotCycle::check() noexcept TANDEM_RT {
   const RunMachine& run = now_.run;
   const rt::Tick& tick = now_.tick;
-  const std::int32_t slow = now_.controllers.begin_cycle(tick.late ? took_ns_ : 0);
+  // What came between two cycles, such as another program, is no controller's doing.
+  const bool took_too_long = tick.late && took_ns_ >= now_.time.period_ns;
+  const std::int32_t slow = now_.controllers.begin_cycle(took_too_long ? took_ns_ : 0);
   if (tick.skipped > 0) {
     now_.event(EventKind::kOverrun, -1, static_cast<std::uint32_t>(tick.skipped), slow);
   }

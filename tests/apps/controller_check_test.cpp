@@ -24,10 +24,11 @@ class ControllerCheck : public Program {
     said_ = outcome.out;
     EXPECT_EQ(outcome.err, "") << rule;
     std::map<std::string, nlohmann::json> found;
-    for (const auto& one : json("check.json")["rules"])
+    const auto checked = json("check.json");
+    for (const auto& one : checked["rules"])
       if (one["kept"] != true) found[one["rule"]] = one;
     EXPECT_EQ(outcome.status, found.empty() ? 0 : 1) << rule;
-    EXPECT_EQ(json("check.json")["kept"], found.empty());
+    EXPECT_EQ(checked["kept"], found.empty());
     return found;
   }
   std::string said_;

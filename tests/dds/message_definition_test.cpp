@@ -87,6 +87,7 @@ constexpr Published kDefinitions[] = {
      "db0bd950ed5ed867a0e90b225e44dea382d762c0762ff3e0ee842190042a59e5"},
     {"rcl_interfaces/srv/SetParametersAtomically_Response",
      "31b1a38c5b0b9d893ee24da45f69638f4561c78461d82d52750f429b534502b8"},
+    {"rcl_interfaces/msg/Log", "e28ce254ca8abc06abf92773b74602cdbf116ed34fbaf294fb9f81da9f318eac"},
     {"rcl_interfaces/msg/Parameter",
      "ddfe6442cffc462317adb5c92536a7b6dd55858c5c3e1e328165a6b73c2831af"},
     {"rcl_interfaces/msg/ParameterValue",

@@ -295,8 +295,9 @@ TEST(Experiment, RefusesALogThatCannotBeKept) {
             "arm/x.toml:5: log.without: 'command.cycle' cannot be left out (it tells a message's "
             "cycle)\n");
   EXPECT_EQ(log("without = ['truth.foot_force_n', 'estimate.base_valid']"), "");
-  EXPECT_EQ(log("file_MB = 1"),
-            "arm/x.toml:5: log.file_MB: 1 is out of range (must be 4 to 1000000)\n");
+  EXPECT_EQ(
+      log("file_MB = 1"),
+      "arm/x.toml:5: log.file_MB: 1 is out of range (must be at least 4 and at most 1e+06)\n");
   EXPECT_EQ(log("total_MB = 100"),
             "arm/x.toml:5: log.total_MB: without file_MB there is one file, which cannot be "
             "shortened (set file_MB, at most half of it)\n");

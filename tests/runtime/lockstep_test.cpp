@@ -81,7 +81,7 @@ void expect_same_squat(const std::string& name, std::uint64_t cycles, bool bus_t
   const log::LogFile b = over_wire.run();
   const auto compared = log::compare(a, b);
   ASSERT_TRUE(compared) << compared.error().to_string();
-  ASSERT_EQ(compared->topics.size(), 3U);
+  ASSERT_EQ(compared->topics.size(), 4U) << "state, command, events, the squat's signals";
   for (const log::TopicComparison& topic : compared->topics) {
     // Injected faults are known in process only.
     if (!faults.empty() && topic.topic == "/tandem/event") continue;

@@ -152,6 +152,10 @@ const std::map<std::string, Make>& types() {
   static const std::map<std::string, Make> table{
       TYPE(std_msgs, String),
       TYPE(rosgraph_msgs, Clock),
+      TYPE(rcl_interfaces, Log),
+      TYPE(geometry_msgs, Twist),
+      TYPE(geometry_msgs, TwistStamped),
+      TYPE(trajectory_msgs, JointTrajectory),
       TYPE(geometry_msgs, WrenchStamped),
       TYPE(sensor_msgs, JointState),
       TYPE(sensor_msgs, Imu),

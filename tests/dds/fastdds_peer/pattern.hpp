@@ -26,14 +26,18 @@ template <class T, class Leaf>
 void visit(T& value, Leaf& leaf);
 
 MEMBERS(builtin_interfaces::msg::dds_::Time_, m.sec(), m.nanosec())
+MEMBERS(builtin_interfaces::msg::dds_::Duration_, m.sec(), m.nanosec())
 MEMBERS(std_msgs::msg::dds_::Header_, m.stamp(), m.frame_id())
 MEMBERS(std_msgs::msg::dds_::String_, m.data())
+MEMBERS(rcl_interfaces::msg::dds_::Log_, m.stamp(), m.level(), m.name(), m.msg(), m.file(),
+        m.function(), m.line())
 MEMBERS(rosgraph_msgs::msg::dds_::Clock_, m.clock())
 MEMBERS(geometry_msgs::msg::dds_::Vector3_, m.x(), m.y(), m.z())
 MEMBERS(geometry_msgs::msg::dds_::Point_, m.x(), m.y(), m.z())
 MEMBERS(geometry_msgs::msg::dds_::Quaternion_, m.x(), m.y(), m.z(), m.w())
 MEMBERS(geometry_msgs::msg::dds_::Pose_, m.position(), m.orientation())
 MEMBERS(geometry_msgs::msg::dds_::Twist_, m.linear(), m.angular())
+MEMBERS(geometry_msgs::msg::dds_::TwistStamped_, m.header(), m.twist())
 MEMBERS(geometry_msgs::msg::dds_::Wrench_, m.force(), m.torque())
 MEMBERS(geometry_msgs::msg::dds_::WrenchStamped_, m.header(), m.wrench())
 MEMBERS(geometry_msgs::msg::dds_::Transform_, m.translation(), m.rotation())
@@ -45,6 +49,9 @@ MEMBERS(sensor_msgs::msg::dds_::JointState_, m.header(), m.name(), m.position(),
 MEMBERS(sensor_msgs::msg::dds_::Imu_, m.header(), m.orientation(), m.orientation_covariance(),
         m.angular_velocity(), m.angular_velocity_covariance(), m.linear_acceleration(),
         m.linear_acceleration_covariance())
+MEMBERS(trajectory_msgs::msg::dds_::JointTrajectoryPoint_, m.positions(), m.velocities(),
+        m.accelerations(), m.effort(), m.time_from_start())
+MEMBERS(trajectory_msgs::msg::dds_::JointTrajectory_, m.header(), m.joint_names(), m.points())
 MEMBERS(tf2_msgs::msg::dds_::TFMessage_, m.transforms())
 MEMBERS(nav_msgs::msg::dds_::Odometry_, m.header(), m.child_frame_id(), m.pose(), m.twist())
 MEMBERS(diagnostic_msgs::msg::dds_::KeyValue_, m.key(), m.value())
