@@ -213,8 +213,8 @@ void add_all(Subcommands& commands) {
   commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
   commands.add<EdsOptions>("eds", "Data sheets (EDS): write those of a robot's nodes, show one");
   commands.add_asked();
-  commands.add_to_group<ControllerCheckOptions>("controller", "check",
-                                                "Whether a controller keeps the rules of the cycle");
+  commands.add_to_group<ControllerCheckOptions>(
+      "controller", "check", "Whether a controller keeps the rules of the cycle");
   commands.add_to_group<ControllerNewOptions>("controller", "new",
                                               "The project of a controller of your own");
   commands.add<TopicOptions>("topic", "Topics of ROS 2 and DDS: list, echo, hz");

@@ -140,7 +140,8 @@ Result<Json> set_input(runtime::RunServices& services, const Json& request) {
 
 void add_input_commands(ControlRegistry& registry, runtime::RunServices& services) {
   registry.add("input.list", [&services](const Json&) -> Result<Json> { return list(services); });
-  registry.add("input.set", [&services](const Json& request) { return set_input(services, request); });
+  registry.add("input.set",
+               [&services](const Json& request) { return set_input(services, request); });
 }
 
 }  // namespace tandem::apps
