@@ -22,7 +22,12 @@ struct ControllerIo {
   ControllerInputs inputs;
 
   /// What the next cycles depend on.
-  void archive(Archive& ar) { ar(signals, marks, texts, parameters, inputs); }
+  void archive(Archive& ar) {
+    archive_shown(ar);
+    ar(parameters);
+  }
+  /// All but the parameters.
+  void archive_shown(Archive& ar) { ar(signals, marks, texts, inputs); }
 };
 
 }  // namespace tandem

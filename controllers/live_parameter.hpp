@@ -66,7 +66,8 @@ struct ParameterRow {
   ParameterType type = ParameterType::kNumber;
   double otherwise = kNotGiven;          ///< as `value`
   std::atomic<double> value{kNotGiven};  ///< of a boolean 0 or 1, of a choice the word's index
-  bool changed = false;                  ///< the loop's
+  bool changed = false;                  ///< the loop's: before the next update()
+  bool was_set = false;                  ///< the loop's: since the controller was loaded
   static_assert(std::atomic<double>::is_always_lock_free);
 
   [[nodiscard]] double now() const noexcept TANDEM_RT {
@@ -132,11 +133,27 @@ class Parameters {
 
   [[nodiscard]] std::deque<ParameterRow>& rows() noexcept { return rows_; }
 
+  /// Whether a value of `former`, the one of a build before, means the same in `row`.
+  [[nodiscard]] static bool is_same(const ParameterRow& former, const ParameterRow& row) {
+    return former.name == row.name && former.type == row.type &&
+           former.facts.choices == row.facts.choices && former.facts.unit == row.facts.unit &&
+           former.facts.live && row.facts.live;
+  }
+
   // The loop's.
 
+  /// Sets `row` to what `former` was set to, if it was, and that is in its range.
+  void take_over(const ParameterRow& former, ParameterRow& row) noexcept TANDEM_RT {
+    const double value = former.now();
+    const ParameterFacts& facts = row.facts;
+    const bool above = facts.above_min ? value > facts.min : value >= facts.min;
+    const bool is_number =
+        row.type == ParameterType::kNumber || row.type == ParameterType::kInteger;
+    if (former.was_set && (!is_number || (above && value <= facts.max))) set(row, value);
+  }
   void set(ParameterRow& row, double value) noexcept TANDEM_RT {
     row.value.store(value, std::memory_order_relaxed);
-    row.changed = any_changed_ = true;
+    row.changed = row.was_set = any_changed_ = true;
   }
   /// After an update() of the controller: what it has seen is no change any more.
   void seen() noexcept TANDEM_RT {
@@ -147,7 +164,7 @@ class Parameters {
   void archive(Archive& ar) {
     for (ParameterRow& row : rows_) {
       double value = row.now();
-      ar(value, row.changed);
+      ar(value, row.changed, row.was_set);
       if (ar.reading()) row.value.store(value, std::memory_order_relaxed);
     }
     ar(any_changed_);

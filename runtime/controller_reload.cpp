@@ -16,7 +16,9 @@ bool same_claims(const HostedController& one, const HostedController& other) noe
 /// What it declared is the host's, and goes over by itself: also when its own state does not.
 Kept hand_over(HostedController& former, HostedController& next) noexcept TANDEM_RT {
   Succession& to = *next.succession;
-  (void)to.io.take(*former.io, *next.io);
+  ShownIo before{*former.io}, after{*next.io};
+  to.same_shown = to.same_shown && to.shown.take(before, after);
+  for (const auto& [was, is] : to.parameters) next.io->parameters.take_over(*was, *is);
   if (!to.wanted) return Kept::kNotWanted;
   if (former.lacks_archive || next.lacks_archive) return Kept::kNoArchive;
   if (!same_claims(former, next)) return Kept::kOtherClaims;
@@ -76,7 +78,8 @@ void ControllerHost::go_on_as(const HostedController& former, HostedController& 
     }
   }
   (void)next.succession->controller.give(*next.controller);
-  (void)next.succession->io.give(*next.io);
+  ShownIo shown{*next.io};
+  if (next.succession->same_shown) (void)next.succession->shown.give(shown);
 }
 
 }  // namespace tandem::runtime

@@ -5,9 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <utility>
+#include <vector>
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
+#include "controllers/controller_io.hpp"
 
 namespace tandem::runtime {
 
@@ -56,9 +59,18 @@ class CarriedState {
   Archive taken_;          // bounded
 };
 
+/// What a controller declared, but its parameters, for CarriedState.
+struct ShownIo {
+  ControllerIo& io;
+  void archive(Archive& ar) { io.archive_shown(ar); }
+};
+
 /// What a controller that was loaded anew takes over.
 struct Succession {
-  CarriedState controller, io;
+  CarriedState controller, shown;
+  bool same_shown = false;  ///< signals and inputs have the names that they had
+  /// Of the former one and its own: those that mean the same.
+  std::vector<std::pair<const ParameterRow*, ParameterRow*>> parameters{};
   bool wanted = true;  ///< false: nothing of the controller's own
   Kept kept = Kept::kState;
 };

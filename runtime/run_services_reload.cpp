@@ -27,8 +27,18 @@ TomlTable table_at(const TomlDocument& document, const std::string& path) {
   return table;
 }
 
+/// Whether both declare signals and inputs of the same names, in one order.
+bool same_names(const ControllerIo& one, const ControllerIo& other) {
+  const hal::Layout a = one.signals.layout(), b = other.signals.layout();
+  return std::ranges::equal(a.fields(), b.fields(), {}, &hal::Field::name, &hal::Field::name) &&
+         std::ranges::equal(one.inputs.all, other.inputs.all, [](const auto& x, const auto& y) {
+           return x.name == y.name && x.kind == y.kind && x.components == y.components;
+         });
+}
+
 /// Room for what `next` takes over: its code is the controller's.
-Result<std::unique_ptr<Succession>> succession_of(const HostedController& next, bool fresh) {
+Result<std::unique_ptr<Succession>> succession_of(ControllerIo& former,
+                                                  const HostedController& next, bool fresh) {
   const auto written = std::make_shared<Archive>();
   const Status asked = bounded_call(next.name, ControllerHost::kConfigureTime,
                                     [written, controller = next.controller]() -> Status {
@@ -36,9 +46,17 @@ Result<std::unique_ptr<Succession>> succession_of(const HostedController& next, 
                                       return {};
                                     });
   if (!asked) return std::unexpected(asked.error());
-  Archive io;
-  next.io->archive(io);
-  return std::make_unique<Succession>(CarriedState(*written), CarriedState(io), !fresh);
+  Archive shown;
+  next.io->archive_shown(shown);
+  auto made = std::make_unique<Succession>(CarriedState(*written), CarriedState(shown),
+                                           same_names(former, *next.io));
+  made->wanted = !fresh;
+  for (ParameterRow& row : next.io->parameters.rows()) {
+    for (const ParameterRow& was : former.parameters.rows()) {
+      if (Parameters::is_same(was, row)) made->parameters.emplace_back(&was, &row);
+    }
+  }
+  return made;
 }
 
 }  // namespace
@@ -87,6 +105,7 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   for (const auto& port : (*former)->inputs) {
     if (port->source().feeder != InputFeeder::kCommand) sources.push_back(port->source());
   }
+  const std::shared_ptr<ControllerIo> former_io = (*former)->io;
   lock.unlock();
   if (!parameters) return std::unexpected(parameters.error());
 
@@ -98,7 +117,7 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
       !read)
     return std::unexpected(read.error());
   if (!next) return std::unexpected(next.error());
-  auto succession = succession_of(**next, fresh);
+  auto succession = succession_of(*former_io, **next, fresh);
   if (!succession) return std::unexpected(succession.error());
   (*next)->succession = std::move(*succession);
   (*next)->document = *parameters;

@@ -15,9 +15,11 @@ using test::SwitchRun;
 struct Build : Controller {
   double amplitude_rad = 0.2;  ///< compiled in
   std::vector<std::size_t> joints{0, 1};
-  std::size_t more = 0;   ///< numbers of state beside those of its joints
-  std::size_t moved = 0;  ///< of these, that stand in another list
-  std::string needs;      ///< a parameter
+  std::size_t more = 0;             ///< numbers of state beside those of its joints
+  std::size_t moved = 0;            ///< of these, that stand in another list
+  std::string needs;                ///< a parameter
+  std::vector<std::string> live{};  ///< parameters, in this order
+  double otherwise = 1.0, most = 10.0;
   bool refuses = false;
 
   int starts = 0, updates = 0, stops = 0;
@@ -27,6 +29,9 @@ struct Build : Controller {
   Status configure(ControllerSetup& setup) override {
     for (const std::size_t joint : joints) setup.claim(joint, hal::ControlMode::kPosition);
     if (!needs.empty()) (void)setup.parameters.number(needs);
+    for (const std::string& name : live) {
+      (void)setup.parameter(name, {.max = most, .otherwise = otherwise, .live = true});
+    }
     middle_rad.assign(joints.size() + moved, 7.0);
     others.assign(more - moved, 0.0);
     if (refuses) return fail("this build has a mistake", "mend it");
@@ -285,6 +290,37 @@ TEST(ControllerReload, MakesSnapshotsOfTheFormerBuildOthers) {
   const Status restored = run.cycle->restore(*snapshot);
   ASSERT_FALSE(restored);
   EXPECT_NE(restored.error().message.find("other controllers"), std::string::npos);
+}
+
+// What was set by hand goes over by its name: the bytes of kp and kd in another order fit as well.
+// What nobody has set is the new build's.
+TEST(ControllerReload, KeepsWhatWasSetByName) {
+  ReloadRun run;
+  const auto next = [](std::vector<std::string> live, double otherwise, double most = 10.0) {
+    auto build = std::make_shared<Build>();
+    build->live = std::move(live);
+    build->otherwise = otherwise;
+    build->most = most;
+    return build;
+  };
+  const auto value = [&](const std::string& name) {
+    const auto all = run.services().parameters("arm");
+    for (const ParameterStatus& one : *all)
+      if (one.name == name) return one.value;
+    return kNotGiven;
+  };
+  (void)run.reload(next({"kp", "kd"}, 1.0));
+  const auto set = run.while_cycling([&] {
+    return run.services().set_parameters({{.controller = "arm", .parameter = "kp", .value = 4.0}});
+  });
+  ASSERT_TRUE(set) << set.error().to_string();
+  (void)run.reload(next({"kd", "kp"}, 2.0));
+  EXPECT_EQ(value("kp"), 4.0);
+  EXPECT_EQ(value("kd"), 2.0) << "the new build's default";
+  (void)run.reload(next({"kp", "other"}, 2.0));
+  EXPECT_EQ(value("kp"), 4.0) << "also when there are others beside it";
+  (void)run.reload(next({"kp"}, 2.0, 3.0));
+  EXPECT_EQ(value("kp"), 2.0) << "4 is beyond the new range";
 }
 
 }  // namespace
