@@ -69,7 +69,7 @@ struct ShownIo {
 struct Succession {
   CarriedState controller, shown;
   bool same_shown = false;  ///< signals and inputs have the names that they had
-  /// Of the former one and its own: those that mean the same.
+  /// Live ones that mean the same: the former build's, its own.
   std::vector<std::pair<const ParameterRow*, ParameterRow*>> parameters{};
   bool wanted = true;  ///< false: nothing of the controller's own
   Kept kept = Kept::kState;
