@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/bounds.hpp"
+#include "hal/wire_name.hpp"
 #include "log/signal_name.hpp"
 
 namespace tandem::log {
@@ -149,16 +150,20 @@ Result<Part> part_of(std::string_view text) {
   return *part;
 }
 
-/// As ros2msg wants it: a letter, then letters, digits and '_'.
+/// As ROS 2 wants it: small letters and digits, a letter first, single '_' between them.
 std::string identifier(const std::string& name) {
   std::string text;
-  for (const char c : name) {
-    text += std::isalnum(static_cast<unsigned char>(c)) != 0 && static_cast<signed char>(c) > 0
-                ? c
-                : '_';
+  for (const char c : hal::wire_name(name)) {
+    const bool is_letter = c >= 'a' && c <= 'z', is_digit = c >= '0' && c <= '9';
+    if (text.empty() && !is_letter) text = "n";
+    if (is_letter || is_digit) {
+      text += c;
+    } else if (text.back() != '_') {
+      text += '_';
+    }
   }
-  if (text.empty() || std::isalpha(static_cast<unsigned char>(text[0])) == 0) text = "n" + text;
-  return text;
+  while (text.ends_with('_')) text.pop_back();
+  return text.empty() ? "n" : text;
 }
 
 /// The members of a part: a line for each element. Two that would have one name have their number.

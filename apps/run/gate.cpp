@@ -137,9 +137,13 @@ Status Gate::enter_process() {
     return fail("the traps of the gate were not loaded: " + traps,
                 "a program with capabilities or set-user-id loads none: use another copy of it");
   }
+  // By a descriptor that stays open: the loader takes blanks and colons of a path for its ends.
+  const int file = ::open(traps.c_str(), O_RDONLY);
+  if (file < 0) return fail("cannot open " + traps, "make it readable");
+  const std::string preloaded = "/proc/self/fd/" + std::to_string(file);
   const char* given = std::getenv("LD_PRELOAD");
   const std::string others = given == nullptr ? "" : given;
-  ::setenv("LD_PRELOAD", (traps + (others.empty() ? "" : ":") + others).c_str(), 1);
+  ::setenv("LD_PRELOAD", (preloaded + (others.empty() ? "" : ":") + others).c_str(), 1);
   ::setenv(kLoaded, others.c_str(), 1);
   return std::unexpected(become("/proc/self/exe", own_words()));
 }

@@ -38,13 +38,17 @@ std::string content(const std::string& path) {
 /// What @foxglove/rosmsg-msgs-common has of ours.
 const std::set<std::string> kPublished{
     "diagnostic_msgs/msg/DiagnosticArray",
+    "geometry_msgs/msg/Twist",
+    "geometry_msgs/msg/TwistStamped",
     "geometry_msgs/msg/WrenchStamped",
     "nav_msgs/msg/Odometry",
+    "rcl_interfaces/msg/Log",
     "rosgraph_msgs/msg/Clock",
     "sensor_msgs/msg/Imu",
     "sensor_msgs/msg/JointState",
     "std_msgs/msg/String",
     "tf2_msgs/msg/TFMessage",
+    "trajectory_msgs/msg/JointTrajectory",
 };
 
 TEST(Messages, AreDecodedByAnotherProjectWithThePublishedDefinitions) {

@@ -78,16 +78,19 @@ const views = {
       same(message.effort, each(state.torque_nm))
     );
   },
-  "tf2_msgs/msg/TFMessage": (message, time) => {
+  // Links in the ones before them; a floating base in odom, in a message of its own.
+  "tf2_msgs/msg/TFMessage": (message, time, topic) => {
     const truth = last.get("/tandem/truth");
-    const [base, ...more] = message.transforms;
-    const { translation: p, rotation: q } = base.transform;
-    return (
-      more.length === 0 && truth.time_ns === time &&
-      base.header.frame_id === "odom" && base.child_frame_id !== "" &&
-      same([p.x, p.y, p.z], Array.from(truth.base_position_m)) &&
-      same([q.x, q.y, q.z, q.w], Array.from(truth.base_quaternion))
-    );
+    return message.transforms.length > 0 && message.transforms.every((one) => {
+      const { translation: p, rotation: q } = one.transform;
+      if (one.child_frame_id === "" || Math.abs(Math.hypot(q.x, q.y, q.z, q.w) - 1) > 1e-9) return false;
+      if (topic === "/tf_static" || one.header.frame_id !== "odom") return true;
+      return (
+        message.transforms.length === 1 && truth.time_ns === time &&
+        same([p.x, p.y, p.z], Array.from(truth.base_position_m)) &&
+        same([q.x, q.y, q.z, q.w], Array.from(truth.base_quaternion))
+      );
+    });
   },
   "std_msgs/msg/String": (message) => {
     const files = [...metadata.get("configuration")];
@@ -128,7 +131,7 @@ class Channel {
     last.set(this.topic, message);
     const index = this.messages++;
     if (this.view) {
-      if (!this.view(message, record.logTime)) fail(`${this.topic}, message ${index}: is not what its image says`);
+      if (!this.view(message, record.logTime, this.topic)) fail(`${this.topic}, message ${index}: is not what its image says`);
       ++this.compared;
       return;
     }

@@ -41,7 +41,7 @@ TEST(Schema, ReadsBackTheLayoutThatItWrote) {
 
 /// A viewer showed position_rad[3], and nobody knew which joint that is.
 TEST(Schema, TellsJointsAndSensorsByTheirNames) {
-  const RunInfo info{.joints = {"left-knee", "left_knee", "9"}, .sensors = {{"foot", 2}}};
+  const RunInfo info{.joints = {"Left-Knee", "left__knee", "9"}, .sensors = {{"foot", 2}}};
   hal::Layout layout;
   layout.add("position_rad", hal::FieldType::kF64, 3, "link side");
   layout.add("velocity_rad_s", hal::FieldType::kF64, 3, "");

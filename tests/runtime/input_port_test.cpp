@@ -169,7 +169,7 @@ TEST_F(InputRun, SamplesOfAnotherThreadArriveWhole) {
     }
   });
   double before = 0.0;
-  for (int i = 0; i < 2000; ++i) {
+  for (int i = 0; i < 2000 || input().sequence() == 0; ++i) {  // until the thread has begun
     steps(1);
     EXPECT_EQ(input()[0], input()[1]);
     if (!input().arrived()) continue;
