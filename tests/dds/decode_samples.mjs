@@ -36,7 +36,7 @@ function check(type, definitions, cdr) {
   };
   const leaf = (where, field, value) => {
     ++n;
-    if (field.type === "time") {
+    if (field.type === "time" || field.type === "duration") {
       agree(`${where}.sec`, value.sec, n);
       agree(`${where}.nanosec`, value.nsec ?? value.nanosec, ++n);
     } else if (field.type === "bool") agree(where, value, n % 2 === 1);

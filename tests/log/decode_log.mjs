@@ -73,9 +73,9 @@ const views = {
     return (
       stamp === time && state.time_ns === time &&
       same(message.name, metadata.get("tandem").get("joints").trimEnd().split("\n")) &&
-      same(message.position, each(state.position_rad)) &&
-      same(message.velocity, each(state.velocity_rad_s)) &&
-      same(message.effort, each(state.torque_nm))
+      same(Array.from(message.position), each(state.position_rad)) &&
+      same(Array.from(message.velocity), each(state.velocity_rad_s)) &&
+      same(Array.from(message.effort), each(state.torque_nm))
     );
   },
   // Links in the ones before them; a floating base in odom, in a message of its own.
