@@ -28,8 +28,16 @@ class ComputedTorque : public Controller {
     kernels_ = setup.kernels;
     way_rad_ = setup.parameters.numbers("way_rad", setup.robot.joints.size());
     way_rad_.resize(map_.joints());
-    rate_rad_s_ = 2.0 * std::numbers::pi / setup.parameters.number_or("period_s", 4.0, kPositive);
-    bandwidth_rad_s_ = setup.parameters.number_or("bandwidth_rad_s", 10.0, kPositive);
+    rate_rad_s_ =
+        2.0 * std::numbers::pi /
+        setup.parameter(
+            "period_s",
+            {.unit = "s", .min = 0, .above_min = true, .otherwise = 4, .doc = "of one to and fro"});
+    bandwidth_rad_s_ = setup.parameter("bandwidth_rad_s", {.unit = "rad/s",
+                                                           .min = 0,
+                                                           .above_min = true,
+                                                           .otherwise = 10,
+                                                           .doc = "at which errors decay"});
     for (std::size_t j = 0; j < map_.joints(); ++j)
       setup.claim(j, hal::ControlMode::kPosition, hal::InteractionMode::kCompliant);
     start_rad_.assign(map_.joints(), 0.0);

@@ -15,10 +15,17 @@ constexpr double kUp_s = 0.25;  // to the largest velocity
 class Jog : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
-    const double share = setup.parameters.number_or("share", 0.25, {0.0, 1.0, true});
+    const double share = setup.parameter("share", {.min = 0,
+                                                   .max = 1,
+                                                   .above_min = true,
+                                                   .otherwise = 0.25,
+                                                   .doc = "of each joint's velocity limit"});
+    const double timeout_s = setup.parameter(
+        "timeout_s",
+        {.unit = "s", .min = 0.01, .max = 60, .otherwise = 0.5, .doc = "that a sample counts"});
     InputOptions options{.doc = "velocities of the joints",
                          .unit = "rad/s",
-                         .timeout_s = setup.parameters.number_or("timeout_s", 0.5, {0.01, 60.0}),
+                         .timeout_s = timeout_s,
                          .after = AfterTimeout::kZero};
     for (const std::size_t joint : joints_parameter(setup)) {
       const hal::DrivenJoint& limit = setup.robot.joints[joint];

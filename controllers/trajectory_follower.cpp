@@ -11,10 +11,14 @@ namespace {
 class TrajectoryFollower : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
+    const double most_points = setup.parameter("most_points", {.min = 1,
+                                                               .max = InputBlock::kMostValues,
+                                                               .whole = true,
+                                                               .otherwise = 16,
+                                                               .doc = "way-points at a time"});
     InputOptions options{.doc = "way-points of the joints",
                          .timeout_s = 0.0,
-                         .most_points = static_cast<std::size_t>(setup.parameters.integer_or(
-                             "most_points", 16, 1, InputBlock::kMostValues))};
+                         .most_points = static_cast<std::size_t>(most_points)};
     for (const std::size_t joint : joints_parameter(setup)) {
       setup.claim(joint, hal::ControlMode::kPosition);
       options.names.push_back(setup.robot.joints[joint].name);
