@@ -90,7 +90,6 @@ Status ControllerHost::add(const std::string& name, ControllerSource source, Tom
         "active = false");
   }
   owned_[slot] = std::move(*made);
-  inputs_ += owned_[slot]->inputs.size();
   if (active) set_active(after);
   return {};
 }
@@ -233,14 +232,12 @@ std::int32_t ControllerHost::claimant(std::size_t joint,
 CycleAnswer ControllerHost::insert(std::size_t slot,
                                    HostedController& controller) noexcept TANDEM_RT {
   table_[slot] = &controller;
-  inputs_ += controller.inputs.size();
   return {};
 }
 
 CycleAnswer ControllerHost::remove(std::size_t slot) noexcept TANDEM_RT {
   if (table_[slot] == nullptr) return refuse(RejectReason::kGone, slot);
   if (is_active(slot)) return refuse(RejectReason::kActive, slot);
-  inputs_ -= table_[slot]->inputs.size();
   table_[slot] = nullptr;
   return {};
 }
@@ -318,9 +315,15 @@ void ControllerHost::start(const hal::CycleTime& time, JointImages images) noexc
   call_starts(active_, time, images);
 }
 
+std::size_t ControllerHost::inputs() const noexcept TANDEM_RT {
+  std::size_t all = 0;
+  for (const HostedController* one : table_) all += one == nullptr ? 0 : one->inputs.size();
+  return all;
+}
+
 void ControllerHost::take_inputs(const hal::CycleTime& time, bool open,
                                  CycleLog& log) noexcept TANDEM_RT {
-  for (std::size_t slot = 0; inputs_ > 0 && slot < table_.size(); ++slot) {
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (!is_active(slot)) continue;
     for (const auto& port : table_[slot]->inputs) {
       if (port->take(time, open)) log.input(time, *port);

@@ -213,7 +213,7 @@ class ControllerHost {
   ///         with the longest call; -1: nobody is
   std::int32_t begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT;
   /// Inputs of everything that is loaded.
-  [[nodiscard]] std::size_t inputs() const noexcept TANDEM_RT { return inputs_; }
+  [[nodiscard]] std::size_t inputs() const noexcept TANDEM_RT;
   /// Before the controllers' calls: the active ones get their newest samples, which go to the log.
   /// @param open  false: they get none
   void take_inputs(const hal::CycleTime& time, bool open, CycleLog& log) noexcept TANDEM_RT;
@@ -301,7 +301,6 @@ class ControllerHost {
 
   // The loop's.
   Table table_{};
-  std::size_t inputs_ = 0;
   ControllerSet active_ = 0, done_ = 0;
   ControllerSet ended_ = 0;          // of done_: in the last cycle
   ControllerSet updated_ = 0;        // of take_updated()

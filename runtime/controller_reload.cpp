@@ -36,10 +36,8 @@ CycleAnswer ControllerHost::replace(std::size_t slot, HostedController& next, bo
     return {.reason = RejectReason::kGone, .one = static_cast<std::int32_t>(slot)};
   }
   table_[slot] = &next;
-  inputs_ += next.inputs.size() - former->inputs.size();
   if (const auto conflict = find_conflict(table_, active_)) {
     table_[slot] = former;
-    inputs_ += former->inputs.size() - next.inputs.size();
     return {.reason = RejectReason::kConflict,
             .joint = static_cast<std::int32_t>(conflict->joint),
             .one = static_cast<std::int32_t>(conflict->one),

@@ -20,6 +20,7 @@ struct Build : Controller {
   std::string needs;                ///< a parameter
   std::vector<std::string> live{};  ///< parameters, in this order
   double otherwise = 1.0, most = 10.0;
+  bool told = false;  ///< it has an input
   bool refuses = false;
 
   int starts = 0, updates = 0, stops = 0;
@@ -29,6 +30,7 @@ struct Build : Controller {
   Status configure(ControllerSetup& setup) override {
     for (const std::size_t joint : joints) setup.claim(joint, hal::ControlMode::kPosition);
     if (!needs.empty()) (void)setup.parameters.number(needs);
+    if (told) (void)setup.input("rate", InputKind::kNumbers, {.names = {"a"}, .max = {1.0}});
     for (const std::string& name : live) {
       (void)setup.parameter(name, {.max = most, .otherwise = otherwise, .live = true});
     }
@@ -321,6 +323,17 @@ TEST(ControllerReload, KeepsWhatWasSetByName) {
   EXPECT_EQ(value("kp"), 4.0) << "also when there are others beside it";
   (void)run.reload(next({"kp"}, 2.0, 3.0));
   EXPECT_EQ(value("kp"), 2.0) << "4 is beyond the new range";
+}
+
+// An active one that was reloaded was counted three times.
+TEST(ControllerReload, LeavesAsManyInputsAsThereAre) {
+  ReloadRun run;
+  for (int i = 0; i < 3; ++i) {
+    const auto next = std::make_shared<Build>();
+    next->told = true;
+    (void)run.reload(next);
+    EXPECT_EQ(run.host->inputs(), 1U);
+  }
 }
 
 }  // namespace
