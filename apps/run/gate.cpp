@@ -318,7 +318,17 @@ std::vector<GateResult> Gate::results(const runtime::ControllerNames& names) con
       continue;
     GateResult& result = all[static_cast<std::size_t>(notes_[i].rule)];
     result.kept = false;
-    result.breaches.push_back(breach_of(notes_[i], names));
+    GateBreach breach = breach_of(notes_[i], names);
+    // One place, by whatever way of the program's own it was reached.
+    const auto same = std::ranges::find_if(result.breaches, [&](const GateBreach& one) {
+      return one.controller == breach.controller && one.function == breach.function &&
+             one.call == breach.call && one.stack == breach.stack;
+    });
+    if (same == result.breaches.end()) {
+      result.breaches.push_back(std::move(breach));
+    } else {
+      same->count += breach.count;
+    }
   }
   return all;
 }

@@ -1,6 +1,7 @@
 // `tandem controller check` and `tandem run --gate` with a controller that breaks each rule, and
 // who is named where something is slow or wrong.
 #include <map>
+#include <set>
 
 #include "tests/apps/program.hpp"
 
@@ -62,6 +63,14 @@ TEST_F(ControllerCheck, NamesThePlaceOfEachBrokenRule) {
     const auto found = broken(one.rule);
     ASSERT_TRUE(found.contains(one.name)) << one.rule << "\n" << said_;
     const auto& breach = found.at(one.name)["breaches"][0];
+    std::set<std::string> places;
+    for (const auto& each : found.at(one.name)["breaches"]) {
+      EXPECT_TRUE(
+          places.insert(each["call"].dump() + each["function"].dump() + each["stack"].dump())
+              .second)
+          << "told twice:\n"
+          << each.dump(1);
+    }
     EXPECT_EQ(breach["controller"], "breaks");
     if (*one.call != '\0') {
       EXPECT_EQ(breach["call"], one.call);
