@@ -10,10 +10,11 @@
 namespace tandem::apps {
 
 /// What a request asks of the registry, and what only the reply needs: the names in their order, or
-/// prefixes and a depth.
+/// prefixes and a depth; how many parameters it would set.
 struct ParameterQuestion {
   Json question;
   Json names = Json::array();
+  std::size_t count = 0;
   std::uint64_t depth = 0;
 };
 
