@@ -228,6 +228,10 @@ class RunServices {
   [[nodiscard]] std::vector<ControllerSignals> signals();
   /// Changes when a controller comes or goes; never 0.
   [[nodiscard]] std::uint64_t loads() const noexcept { return loads_.load(); }
+  /// Changes when a controller comes or goes, and when a parameter may have another value.
+  [[nodiscard]] std::uint64_t parameter_version() const noexcept {
+    return loads_.load() + host_->parameter_changes();
+  }
   /// What controllers have said.
   [[nodiscard]] const TextHistory& texts() const noexcept { return texts_; }
   /// Mode and interaction of a joint that no active controller claims, impedance of any. A joint
@@ -304,6 +308,8 @@ class RunServices {
   [[nodiscard]] Result<RequestResult> load(std::unique_ptr<HostedController> controller,
                                            Patience patience);
   [[nodiscard]] Status check_name(const std::string& name);
+  /// For the log, with the next cycles.
+  static void tell_loaded(HostedController& controller);
   [[nodiscard]] static Status errors_of(const TomlDocument& document,
                                         const char* missing = "give it with --set or --parameters");
   [[nodiscard]] Result<HostedController*> to_reload(const std::string& name) const;

@@ -21,15 +21,6 @@
 namespace tandem::apps {
 namespace {
 
-std::string shown_value(const ParameterRow& row) {
-  const double value = row.now();
-  if (std::isnan(value)) return "-";
-  if (row.type == ParameterType::kBoolean) return value == 1.0 ? "true" : "false";
-  if (row.type == ParameterType::kChoice)
-    return row.facts.choices.at(static_cast<std::size_t>(value));
-  return fmt::format("{:g}", value);
-}
-
 const char* backend_text(runtime::BackendKind backend) {
   switch (backend) {
     case runtime::BackendKind::kSim: break;
@@ -118,7 +109,8 @@ void add_parameter_facts(runtime::ControllerHost& host, const std::string& contr
   for (const auto& one : host.owned()) {
     if (one == nullptr || one->name != controller) continue;
     for (const ParameterRow& row : one->io->parameters.rows()) {
-      facts.add("", fmt::format("{} = {}{}{}: {}", row.name, shown_value(row),
+      const std::string value = row.text();
+      facts.add("", fmt::format("{} = {}{}{}: {}", row.name, value.empty() ? "-" : value,
                                 row.facts.unit.empty() ? "" : " " + row.facts.unit,
                                 row.facts.live ? ", live" : "", row.facts.doc));
     }
