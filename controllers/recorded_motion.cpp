@@ -30,8 +30,16 @@ class RecordedMotion : public Controller {
     const std::string source = parameters.choice_or("source", "", {"command", "state"});
     if (source == "command") request.source = log::MotionSource::kCommand;
     if (source == "state") request.source = log::MotionSource::kState;
-    if (parameters.has("from_s")) request.from_s = parameters.number("from_s");
-    if (parameters.has("to_s")) request.to_s = parameters.number("to_s");
+    const Parameter from_s = setup.parameter("from_s", {.unit = "s",
+                                                        .otherwise = kNotGiven,
+                                                        .doc = "of the log's time; else where its "
+                                                               "controllers began"});
+    const Parameter to_s = setup.parameter("to_s", {.unit = "s",
+                                                    .otherwise = kNotGiven,
+                                                    .doc = "of the log's time; else where they "
+                                                           "ended"});
+    if (from_s.given()) request.from_s = from_s;
+    if (to_s.given()) request.to_s = to_s;
     request.torque = setup
                          .parameter("torque", {.otherwise = false,
                                                .doc = "the recorded torques as feed-forward"})
