@@ -271,9 +271,10 @@ Result<Json> set(RunServices& services, const Json& request) {
   const bool each = request.value("each", false);
   std::vector<runtime::ParameterWish> wishes;
   Json results = Json::object();
-  if (each && request["parameters"].size() > runtime::kMostParameterChanges) {
-    return fail(fmt::format("sets {} parameters, each by itself", request["parameters"].size()),
-                fmt::format("set at most {} at once", runtime::kMostParameterChanges));
+  if (const std::size_t count = request["parameters"].size();
+      count > runtime::kMostParameterChanges) {
+    return fail(fmt::format("sets {} parameters at once", count),
+                fmt::format("set at most {}", runtime::kMostParameterChanges));
   }
   for (const auto& [parameter, value] : request["parameters"].items()) {
     auto wish = wish_of(services, name, parameter, value);

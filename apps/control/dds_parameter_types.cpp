@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/control/dds_service_types.hpp"
+#include "runtime/cycle_request.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -68,8 +69,14 @@ ParameterQuestion setting(const Sequence& parameters, bool each) {
   ParameterQuestion asked{.question = {{"do", "controller.set"}, {"each", each}}};
   Json& values = asked.question["parameters"] = Json::object();
   asked.count = parameters._length;
-  const std::size_t count = std::min<std::size_t>(parameters._length, kMostNames);
-  for (const auto& one : std::span(parameters._buffer, count)) {
+  if (asked.count > runtime::kMostParameterChanges) {
+    const std::string counts = std::to_string(asked.count) + " parameters at once";
+    asked.refusal = {{"ok", false},
+                     {"error", "sets " + counts},
+                     {"hint", "set at most " + std::to_string(runtime::kMostParameterChanges)}};
+    return asked;
+  }
+  for (const auto& one : std::span(parameters._buffer, asked.count)) {
     const std::string name = name_of(one.name);
     values[name] = json_of(one.value);
     asked.names.push_back(name);

@@ -13,6 +13,7 @@ namespace tandem::apps {
 /// prefixes and a depth; how many parameters it would set.
 struct ParameterQuestion {
   Json question;
+  Json refusal{};  ///< an answer: the registry is not asked; null: it is
   Json names = Json::array();
   std::size_t count = 0;
   std::uint64_t depth = 0;

@@ -103,14 +103,23 @@ void add_estimation_facts(const runtime::Experiment& e, Facts& facts) {
   }
 }
 
-/// "link_damping_Nms_rad = 0 Nms/rad, live: damps …" of each.
+/// "link_damping_Nms_rad = 0 Nms/rad, live: damps …" of each; a list is one line where its elements
+/// are alike.
 void add_parameter_facts(runtime::ControllerHost& host, const std::string& controller,
                          Facts& facts) {
   for (const auto& one : host.owned()) {
     if (one == nullptr || one->name != controller) continue;
-    for (const ParameterRow& row : one->io->parameters.rows()) {
+    const auto& rows = one->io->parameters.rows();
+    std::string told;  // a list that has its line
+    for (const ParameterRow& row : rows) {
+      if (!row.list.empty() && row.list == told) continue;
       const std::string value = row.text();
-      facts.add("", fmt::format("{} = {}{}{}: {}", row.name, value.empty() ? "-" : value,
+      const bool alike = std::ranges::all_of(rows, [&](const ParameterRow& other) {
+        return other.list != row.list || other.text() == value;
+      });
+      if (!row.list.empty() && alike) told = row.list;
+      facts.add("", fmt::format("{} = {}{}{}: {}", row.list.empty() || !alike ? row.name : row.list,
+                                value.empty() ? "-" : value,
                                 row.facts.unit.empty() ? "" : " " + row.facts.unit,
                                 row.facts.live ? ", live" : "", row.facts.doc));
     }
