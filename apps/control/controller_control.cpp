@@ -49,7 +49,7 @@ Json parameter_json(const runtime::ParameterStatus& one) {
           {"doc", facts.doc}};
 }
 
-/// Of a list one entry, with what its elements differ in as lists.
+/// A list is one entry, with what its elements differ in as lists.
 Json parameters_json(const std::vector<runtime::ParameterStatus>& parameters) {
   Json all = Json::array();
   std::string list;
@@ -208,7 +208,7 @@ Result<Json> show(RunServices& services, const hal::RobotConfig& robot, const Js
   return Json{{"controllers", std::move(shown)}};
 }
 
-/// Of "tuned.kp.elbow" the controller, and the parameter: names of both may have dots.
+/// Controller and parameter of "tuned.kp.elbow": names of both may have dots.
 Result<runtime::ParameterWish> split(RunServices& services, const std::string& name) {
   std::size_t longest = 0;
   for (const runtime::ControllerStatus& one : services.controllers()) {

@@ -23,7 +23,7 @@ std::vector<std::pair<std::string, rt::Percentiles>> times_of(
   return all;
 }
 
-/// Of the elements of a list one.
+/// A list is one parameter.
 std::vector<dds::NodeParameter> parameters_of(runtime::RunServices& services) {
   using Type = dds::NodeParameter::Type;
   std::vector<dds::NodeParameter> all;

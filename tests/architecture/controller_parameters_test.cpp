@@ -31,7 +31,7 @@ std::vector<std::pair<std::string, std::string>> sources() {
 }
 
 TEST(ControllerParameters, AreDeclaredWhereverABundledControllerReadsANumber) {
-  // Of [controller.parameters] itself: rows of way-points and harmonics are data, in tables.
+  // Keys of [controller.parameters] itself: way-points and harmonics are data, in tables.
   const std::regex read(R"(parameters\.(number|numbers|integer|boolean|rows)(_or)?\()");
   ASSERT_GT(sources().size(), 10U);
   for (const auto& [name, text] : sources()) EXPECT_FALSE(std::regex_search(text, read)) << name;
