@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <vector>
 
 #include "controllers/controller.hpp"
@@ -10,12 +11,12 @@
 namespace tandem {
 namespace {
 
-/// Parameters: way_rad (one per joint: from where it starts, and back), period_s (4) of one to and
-/// fro, bandwidth_rad_s (10).
+/// Parameters: way_rad (by joint: from where it starts, and back), period_s (4) of one to and fro,
+/// bandwidth_rad_s (10, by joint).
 ///
-/// tau = M(q) (a_ref + 2 w (v_ref - v) + w^2 (q_ref - q)) + h(q, v), with which every joint's error
-/// decays alike, as long as the robot is the described one. The references are in the command, too,
-/// for logs and reports; the drives add nothing to the torque.
+/// tau = M(q) (a_ref + 2 w (v_ref - v) + w^2 (q_ref - q)) + h(q, v), with which a joint's error
+/// decays with its w, whatever the others do, as long as the robot is the described one. The
+/// references are in the command, too, for logs and reports; the drives add nothing to the torque.
 class ComputedTorque : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
@@ -26,19 +27,23 @@ class ComputedTorque : public Controller {
     }
     map_ = std::move(*map);
     kernels_ = setup.kernels;
-    way_rad_ = setup.parameters.numbers("way_rad", setup.robot.joints.size());
-    way_rad_.resize(map_.joints());
+    std::vector<std::size_t> joints(map_.joints());
+    std::iota(joints.begin(), joints.end(), std::size_t{0});
+    way_rad_ = setup.joint_parameters("way_rad", joints,
+                                      {{.unit = "rad", .doc = "from where it starts, and back"}});
     rate_rad_s_ =
         2.0 * std::numbers::pi /
         setup.parameter(
             "period_s",
             {.unit = "s", .min = 0, .above_min = true, .otherwise = 4, .doc = "of one to and fro"});
-    bandwidth_rad_s_ = setup.parameter("bandwidth_rad_s", {.unit = "rad/s",
-                                                           .min = 0,
-                                                           .above_min = true,
-                                                           .otherwise = 10,
-                                                           .doc = "at which errors decay"});
-    for (std::size_t j = 0; j < map_.joints(); ++j)
+    bandwidth_rad_s_ = setup.joint_parameters("bandwidth_rad_s", joints,
+                                              {{.unit = "rad/s",
+                                                .min = 0,
+                                                .above_min = true,
+                                                .otherwise = 10,
+                                                .live = true,
+                                                .doc = "at which errors decay"}});
+    for (const std::size_t j : joints)
       setup.claim(j, hal::ControlMode::kPosition, hal::InteractionMode::kCompliant);
     start_rad_.assign(map_.joints(), 0.0);
     q_.assign(kernels_->nq, 0.0);
@@ -56,10 +61,9 @@ class ComputedTorque : public Controller {
   Code update(const hal::CycleTime& time, const hal::StateImage& state,
               hal::CommandImage& command) noexcept TANDEM_RT override {
     const double phase = rate_rad_s_ * static_cast<double>(time.time_ns - start_ns_) * 1e-9;
-    const double w = bandwidth_rad_s_;
     map_.positions_to_q(state.position_rad(), q_);
     for (std::size_t j = 0; j < map_.joints(); ++j) {
-      const double half = 0.5 * way_rad_[j];
+      const double half = 0.5 * way_rad_[j], w = bandwidth_rad_s_[j];
       const double position = start_rad_[j] + half * (1.0 - std::cos(phase));
       const double velocity = half * rate_rad_s_ * std::sin(phase);
       const double acceleration = half * rate_rad_s_ * rate_rad_s_ * std::cos(phase);
@@ -83,8 +87,9 @@ class ComputedTorque : public Controller {
  private:
   const tandem_kernels* kernels_ = nullptr;
   ModelMap map_;
-  double rate_rad_s_ = 0.0, bandwidth_rad_s_ = 0.0;
-  std::vector<double> way_rad_, start_rad_;
+  double rate_rad_s_ = 0.0;
+  std::vector<Parameter> way_rad_, bandwidth_rad_s_;  // by joint
+  std::vector<double> start_rad_;
   std::int64_t start_ns_ = 0;
   std::vector<double> q_, v_, vdot_, tau_, wrench_;
 };

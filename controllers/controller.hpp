@@ -75,6 +75,24 @@ class ControllerSetup {
   [[nodiscard]] Parameter parameter(std::string_view name, ParameterFacts facts) {
     return io->parameters.declare(parameters, name, std::move(facts));
   }
+  /// Declares a number for each of some joints, as those that it claims: `kp_Nm_rad = 40` for all,
+  /// `= [40, 40, 20]` in their order, or `= { elbow = 20 }`. Each is set by itself, too:
+  /// "kp_Nm_rad.elbow". `kp_[i]` is that of the i-th of `joints`.
+  /// @param joints  indices in the image
+  /// @param facts   of all of them, or one for each, where range or default differ
+  [[nodiscard]] std::vector<Parameter> joint_parameters(std::string_view name,
+                                                        std::span<const std::size_t> joints,
+                                                        const std::vector<ParameterFacts>& facts) {
+    std::vector<std::string> names;
+    for (const std::size_t joint : joints) names.push_back(robot.joints.at(joint).name);
+    return io->parameters.declare_list(parameters, name, names, facts);
+  }
+  /// The same of anything that has names: {"x", "y", "z"}.
+  [[nodiscard]] std::vector<Parameter> list_parameters(std::string_view name,
+                                                       const std::vector<std::string>& elements,
+                                                       const std::vector<ParameterFacts>& facts) {
+    return io->parameters.declare_list(parameters, name, elements, facts);
+  }
 
   /// Claims a joint (index in the image) in a mode. Two controllers that claim one joint are an
   /// error before anything moves; a joint that nobody claims is held by the loop. What a controller

@@ -27,7 +27,7 @@ std::string imu_site(const hal::Robot& robot, const hal::Sensor& sensor) {
 }
 
 /// Parameters: mode ("compliant": a virtual spring and damper about the start posture, "torque":
-/// none), joints (all), stiffness_Nm_rad and damping_Nms_rad (the robot's), ramp_s (1),
+/// none), joints (all), stiffness_Nm_rad and damping_Nms_rad (by joint, the robot's), ramp_s (1),
 /// feet (all; floating base only).
 ///
 /// tau = h(q, 0) for a fixed base. A floating base is taken to stand on its feet, turned as its
@@ -77,16 +77,15 @@ class GravityCompensation : public Controller {
     weigh(state);
     const double since_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
     const double share = min_jerk(since_s / ramp_s_).s;
-    const double stiffness = stiffness_Nm_rad_, damping = damping_Nms_rad_;
-    const auto given = [](double value) { return !std::isnan(value); };
-    for (const ClaimedJoint& joint : joints_) {
+    for (std::size_t i = 0; i < joints_.size(); ++i) {
+      const ClaimedJoint& joint = joints_[i];
       const std::size_t j = joint.index;
       const double weight = tau_[map_.v_index(j)];
       weight_.set(j, weight);
       if (compliant_) command.position_rad()[j] = joint.position_rad;
       command.velocity_rad_s()[j] = 0.0;
-      command.stiffness_Nm_rad()[j] = given(stiffness) ? stiffness : joint.stiffness_Nm_rad;
-      command.damping_Nms_rad()[j] = given(damping) ? damping : joint.damping_Nms_rad;
+      command.stiffness_Nm_rad()[j] = stiffness_Nm_rad_[i];
+      command.damping_Nms_rad()[j] = damping_Nms_rad_[i];
       command.torque_Nm()[j] = joint.torque_Nm + (weight - joint.torque_Nm) * share;
     }
     return Code::kOk;
@@ -97,8 +96,6 @@ class GravityCompensation : public Controller {
  private:
   struct ClaimedJoint {
     std::size_t index = 0;
-    double stiffness_Nm_rad = 0.0;  // robot.toml's
-    double damping_Nms_rad = 0.0;
     double position_rad = 0.0;  // at the start
     double torque_Nm = 0.0;     // at the start
   };
@@ -121,35 +118,31 @@ class GravityCompensation : public Controller {
   }
 
   void claim_joints(ControllerSetup& setup) {
-    const std::vector<hal::DrivenJoint>& limits = setup.robot.joints;
-    // What every joint of these can do.
-    double most_stiffness = kAnyNumber.max, most_damping = kAnyNumber.max;
-    for (const std::size_t j : joints_parameter(setup)) {
+    const std::vector<std::size_t> joints = joints_parameter(setup);
+    std::vector<ParameterFacts> stiffness, damping;
+    for (const std::size_t j : joints) {
       if (compliant_) {
         setup.claim(j, hal::ControlMode::kPosition, hal::InteractionMode::kCompliant);
       } else {
         setup.claim(j, hal::ControlMode::kTorque);
       }
-      joints_.push_back({.index = j,
-                         .stiffness_Nm_rad = limits[j].stiffness_Nm_rad,
-                         .damping_Nms_rad = limits[j].damping_Nms_rad});
-      most_stiffness = std::min(most_stiffness, limits[j].max_stiffness_Nm_rad);
-      most_damping = std::min(most_damping, limits[j].max_damping_Nms_rad);
+      joints_.push_back({.index = j});
+      const hal::DrivenJoint& limit = setup.robot.joints[j];
+      stiffness.push_back({.unit = "Nm/rad",
+                           .min = 0,
+                           .max = limit.max_stiffness_Nm_rad,
+                           .otherwise = limit.stiffness_Nm_rad,
+                           .live = true,
+                           .doc = "of the virtual spring; else robot.toml's"});
+      damping.push_back({.unit = "Nms/rad",
+                         .min = 0,
+                         .max = limit.max_damping_Nms_rad,
+                         .otherwise = limit.damping_Nms_rad,
+                         .live = true,
+                         .doc = "of the virtual damper; else robot.toml's"});
     }
-    stiffness_Nm_rad_ =
-        setup.parameter("stiffness_Nm_rad", {.unit = "Nm/rad",
-                                             .min = 0,
-                                             .max = most_stiffness,
-                                             .otherwise = kNotGiven,
-                                             .live = true,
-                                             .doc = "of the virtual spring; else robot.toml's"});
-    damping_Nms_rad_ =
-        setup.parameter("damping_Nms_rad", {.unit = "Nms/rad",
-                                            .min = 0,
-                                            .max = most_damping,
-                                            .otherwise = kNotGiven,
-                                            .live = true,
-                                            .doc = "of the virtual damper; else robot.toml's"});
+    stiffness_Nm_rad_ = setup.joint_parameters("stiffness_Nm_rad", joints, stiffness);
+    damping_Nms_rad_ = setup.joint_parameters("damping_Nms_rad", joints, damping);
   }
 
   /// The torques that hold the measured posture, in tau_.
@@ -211,9 +204,9 @@ class GravityCompensation : public Controller {
   Signal weight_;
   bool compliant_ = true;
   double ramp_s_ = 1.0;
-  Parameter stiffness_Nm_rad_, damping_Nms_rad_;
   std::int64_t start_ns_ = 0;
   std::vector<ClaimedJoint> joints_;
+  std::vector<Parameter> stiffness_Nm_rad_, damping_Nms_rad_;  // of these
   std::vector<double> q_, rest_, tau_, pose_, twist_, J_;
 };
 

@@ -4,9 +4,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <deque>
 #include <limits>
 #include <string>
@@ -21,9 +24,10 @@
 
 namespace tandem {
 
-/// A value as somebody gives it: a number, true or false, or a word. Nothing: none is given.
+/// A value as somebody gives it: a number, true or false, a word, or a list's numbers. Nothing:
+/// none is given.
 struct ParameterValue {
-  enum class Is : std::uint8_t { kNothing, kNumber, kBoolean, kText };
+  enum class Is : std::uint8_t { kNothing, kNumber, kBoolean, kText, kNumbers };
 
   ParameterValue() = default;
   ParameterValue(double value) : number(value), is(Is::kNumber) {}
@@ -31,9 +35,11 @@ struct ParameterValue {
   ParameterValue(bool value) : number(value ? 1.0 : 0.0), is(Is::kBoolean) {}
   ParameterValue(const char* value) : text(value), is(Is::kText) {}
   ParameterValue(std::string value) : text(std::move(value)), is(Is::kText) {}
+  ParameterValue(std::vector<double> values) : numbers(std::move(values)), is(Is::kNumbers) {}
 
   double number = 0.0;  ///< of a boolean 0 or 1
   std::string text{};
+  std::vector<double> numbers{};
   Is is = Is::kNothing;
 };
 
@@ -59,19 +65,40 @@ enum class ParameterType : std::uint8_t { kNumber, kInteger, kBoolean, kChoice }
   return kNames[static_cast<std::size_t>(type)];
 }
 
-/// A parameter that was declared.
+/// A parameter that was declared, or an element of a list of them.
 struct ParameterRow {
-  std::string name;
+  std::string name;  ///< of an element the list's and its own: "kp_Nm_rad.elbow"
   ParameterFacts facts;
   ParameterType type = ParameterType::kNumber;
   double otherwise = kNotGiven;          ///< as `value`
   std::atomic<double> value{kNotGiven};  ///< of a boolean 0 or 1, of a choice the word's index
   bool changed = false;                  ///< the loop's: before the next update()
   bool was_set = false;                  ///< the loop's: since the controller was loaded
+  std::string list{};                    ///< that it is an element of; empty: it stands alone
   static_assert(std::atomic<double>::is_always_lock_free);
 
   [[nodiscard]] double now() const noexcept TANDEM_RT {
     return value.load(std::memory_order_relaxed);
+  }
+  /// Whether it may be `number`: finite, in its range, whole where it has to be.
+  [[nodiscard]] bool fits(double number) const noexcept TANDEM_RT {
+    if (!std::isfinite(number)) return false;
+    if (type == ParameterType::kBoolean || type == ParameterType::kChoice) return true;
+    if (facts.above_min ? number <= facts.min : number < facts.min) return false;
+    return number <= facts.max && (type != ParameterType::kInteger || number == std::floor(number));
+  }
+  /// As a file gives it, and exactly: "0.1", "true", "compliant"; empty: it has none.
+  [[nodiscard]] std::string text() const {
+    const double number = now();
+    if (std::isnan(number)) return {};
+    if (type == ParameterType::kBoolean) return number == 1.0 ? "true" : "false";
+    if (type == ParameterType::kChoice) return facts.choices.at(static_cast<std::size_t>(number));
+    std::array<char, 32> digits{};
+    return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr};
+  }
+  /// An element's name in its list: "elbow".
+  [[nodiscard]] std::string element() const {
+    return list.empty() ? "" : name.substr(list.size() + 1);
   }
 };
 
@@ -106,29 +133,60 @@ class Parameter {
 /// The parameters of one controller.
 class Parameters {
  public:
-  static constexpr std::size_t kMost = 256;
+  static constexpr std::size_t kMost = 1024;  ///< each element of a list counts
 
   /// Reads `name` of `table`. What is wrong with it, or with the declaration, is reported there.
   [[nodiscard]] Parameter declare(TomlTable& table, std::string_view name, ParameterFacts facts) {
     const std::string key(name);
-    const auto known = std::ranges::find(rows_, key, &ParameterRow::name);
-    if (known != rows_.end()) {
-      table.error(key, "the controller declares this parameter twice", "declare it once");
-      return Parameter(*known);
-    }
-    if (rows_.size() == kMost) {
-      table.error("", "the controller declares more than 256 parameters", "declare fewer");
-      return {};
+    if (!is_new(table, key, 1)) {
+      const auto known = std::ranges::find(rows_, key, &ParameterRow::name);
+      return known == rows_.end() ? Parameter() : Parameter(*known);
     }
     ParameterRow& row = rows_.emplace_back();
     row.name = key;
     row.facts = std::move(facts);
-    if (const char* wrong = complete(row); *wrong != '\0') {
+    if (const char* wrong = complete(row, key); *wrong != '\0') {
       table.error(key, wrong, "correct the controller");
     } else {
       row.value.store(read(table, row), std::memory_order_relaxed);
     }
     return Parameter(row);
+  }
+
+  /// The same of a list: a number for each of `elements`. The file gives one for all of them, a
+  /// list, or a table by their names; of those that the table lacks the default counts.
+  /// @param facts  of all of them, or one for each
+  /// @return one for each
+  [[nodiscard]] std::vector<Parameter> declare_list(TomlTable& table, std::string_view name,
+                                                    const std::vector<std::string>& elements,
+                                                    const std::vector<ParameterFacts>& facts) {
+    const std::string key(name);
+    std::vector<Parameter> handles(elements.size());
+    if (!is_new(table, key, elements.size())) return handles;
+    const char* wrong = facts.size() == 1 || facts.size() == elements.size()
+                            ? ""
+                            : "has facts for another number of elements than it has";
+    const std::size_t first = rows_.size();
+    for (std::size_t i = 0; i < elements.size() && *wrong == '\0'; ++i) {
+      const std::string full = key + "." + elements[i];
+      if (!shown_name_problem(elements[i]).empty()) wrong = "has an element without a good name";
+      if (std::ranges::find(rows_, full, &ParameterRow::name) != rows_.end())
+        wrong = "has two elements of one name";
+      ParameterRow& row = rows_.emplace_back();
+      row.name = full;
+      row.list = key;
+      row.facts = facts[facts.size() == 1 ? 0 : i];
+      handles[i] = Parameter(row);
+      if (*wrong == '\0') wrong = complete(row, key);
+      if (*wrong == '\0' && row.type > ParameterType::kInteger)
+        wrong = "is a list, and a list is of numbers";
+    }
+    if (*wrong != '\0') {
+      table.error(key, wrong, "correct the controller");
+    } else {
+      read_list(table, key, first);
+    }
+    return handles;
   }
 
   [[nodiscard]] std::deque<ParameterRow>& rows() noexcept { return rows_; }
@@ -145,11 +203,7 @@ class Parameters {
   /// Sets `row` to what `former` was set to, if it was, and that is in its range.
   void take_over(const ParameterRow& former, ParameterRow& row) noexcept TANDEM_RT {
     const double value = former.now();
-    const ParameterFacts& facts = row.facts;
-    const bool above = facts.above_min ? value > facts.min : value >= facts.min;
-    const bool is_number =
-        row.type == ParameterType::kNumber || row.type == ParameterType::kInteger;
-    if (former.was_set && (!is_number || (above && value <= facts.max))) set(row, value);
+    if (former.was_set && row.fits(value)) set(row, value);
   }
   void set(ParameterRow& row, double value) noexcept TANDEM_RT {
     row.value.store(value, std::memory_order_relaxed);
@@ -173,12 +227,25 @@ class Parameters {
  private:
   static constexpr double kMostWhole = 9007199254740992.0;  // 2^53
 
+  /// Whether `key` may be declared, with so many numbers; else it is reported.
+  [[nodiscard]] bool is_new(TomlTable& table, const std::string& key, std::size_t numbers) const {
+    const bool known = std::ranges::any_of(
+        rows_, [&](const ParameterRow& row) { return row.name == key || row.list == key; });
+    if (known) {
+      table.error(key, "the controller declares this parameter twice", "declare it once");
+    } else if (rows_.size() + numbers > kMost) {
+      table.error("", "the controller declares more than 1024 parameters", "declare fewer");
+      return false;
+    }
+    return !known;
+  }
+
   /// Type and default. @return what is wrong with the declaration; empty: nothing
-  [[nodiscard]] static const char* complete(ParameterRow& row) {
+  [[nodiscard]] static const char* complete(ParameterRow& row, const std::string& key) {
     ParameterFacts& facts = row.facts;
     const ParameterValue& given = facts.otherwise;
     using Is = ParameterValue::Is;
-    if (!topic_name_problem(row.name).empty()) {
+    if (!topic_name_problem(key).empty()) {
       return "is no name of a parameter: letters, digits and _, no digit first";
     }
     if (!facts.choices.empty()) {
@@ -231,6 +298,63 @@ class Parameters {
                                  : table.choice_or(row.name, facts.otherwise.text, facts.choices);
     const auto found = std::ranges::find(facts.choices, word);
     return found == facts.choices.end() ? 0.0 : static_cast<double>(found - facts.choices.begin());
+  }
+
+  /// The elements from `first` on.
+  void read_list(TomlTable& table, const std::string& key, std::size_t first) {
+    const std::size_t count = rows_.size() - first;
+    const auto element = [&](std::size_t i) -> ParameterRow& { return rows_[first + i]; };
+    const auto required = [&](std::size_t i) {
+      return element(i).facts.otherwise.is == ParameterValue::Is::kNothing;
+    };
+    std::vector<double> values;
+    for (std::size_t i = 0; i < count; ++i) values.push_back(element(i).otherwise);
+    const auto given = table.values();
+    const auto found = given.find(key);
+    const bool is_list = found != given.end() && found->second.starts_with('[');
+    const bool is_missing = !table.has(key) && count > 0 && required(0);
+    if (is_missing || (found != given.end() && !is_list)) {
+      std::ranges::fill(values, table.number(key));
+    } else if (given.lower_bound(key + ".") != given.lower_bound(key + "/")) {  // '.' + 1 is '/'
+      TomlTable by_name = table.table(key);
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::string name = element(i).element();
+        values[i] = required(i) ? by_name.number(name) : by_name.number_or(name, values[i]);
+      }
+      if (count > 0) by_name.finish();
+      if (by_name.has_errors()) return;
+    } else if (table.has(key)) {
+      std::vector<double> list = table.numbers(key, 0);
+      const bool counts = !table.has_errors(key) && !table.has_errors("joints");
+      if (counts && count > 0 && list.size() != count)
+        table.error(key, "has " + std::to_string(list.size()) + " numbers",
+                    "give one for all, or one for each of " + names_of(first));
+      if (list.size() == count) values = std::move(list);
+    }
+    if (table.has_errors(key)) return;
+    for (std::size_t i = 0; i < count; ++i) {
+      const bool is_default = std::isnan(values[i]) && std::isnan(element(i).otherwise);
+      if (!is_default && !element(i).fits(values[i]))
+        return refuse(table, key, element(i), values[i]);
+      element(i).value.store(values[i], std::memory_order_relaxed);
+    }
+  }
+  [[nodiscard]] std::string names_of(std::size_t first) const {
+    std::string names;
+    for (std::size_t i = first; i < rows_.size(); ++i)
+      names += (names.empty() ? "" : ", ") + rows_[i].element();
+    return names;
+  }
+  static void refuse(TomlTable& table, const std::string& key, const ParameterRow& row,
+                     double value) {
+    char words[160];
+    std::snprintf(words, sizeof words, "%g is out of range", value);
+    const std::string what = row.element() + ": " + words;
+    const ParameterFacts& facts = row.facts;
+    std::snprintf(words, sizeof words, "must be %s%g and at most %g%s",
+                  facts.above_min ? "greater than " : "at least ", facts.min, facts.max,
+                  facts.whole ? ", and whole" : "");
+    table.error(key, what, words);
   }
 
   std::deque<ParameterRow> rows_;  // they stay where they are

@@ -17,7 +17,7 @@ namespace {
 /// Parameters: log (relative to the experiment), data_sha256 (any), joints (all), source (the
 /// commands where the log has them), from_s, to_s (while its controllers ran), speed (1), torque
 /// (false), approach_s (3, and longer where the way is), stop_at_end (false),
-/// link_damping_Nms_rad (0; or a table, of joints).
+/// link_damping_Nms_rad (0, by joint).
 class RecordedMotion : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
@@ -30,8 +30,16 @@ class RecordedMotion : public Controller {
     const std::string source = parameters.choice_or("source", "", {"command", "state"});
     if (source == "command") request.source = log::MotionSource::kCommand;
     if (source == "state") request.source = log::MotionSource::kState;
-    if (parameters.has("from_s")) request.from_s = parameters.number("from_s");
-    if (parameters.has("to_s")) request.to_s = parameters.number("to_s");
+    const Parameter from_s = setup.parameter("from_s", {.unit = "s",
+                                                        .otherwise = kNotGiven,
+                                                        .doc = "of the log's time; else where its "
+                                                               "controllers began"});
+    const Parameter to_s = setup.parameter("to_s", {.unit = "s",
+                                                    .otherwise = kNotGiven,
+                                                    .doc = "of the log's time; else where they "
+                                                           "ended"});
+    if (from_s.given()) request.from_s = from_s;
+    if (to_s.given()) request.to_s = to_s;
     request.torque = setup
                          .parameter("torque", {.otherwise = false,
                                                .doc = "the recorded torques as feed-forward"})
@@ -57,7 +65,13 @@ class RecordedMotion : public Controller {
       limits_.push_back(setup.robot.joints[joint]);
     }
     from_.assign(joints_.size(), {});
-    read_damping(setup);
+    link_damping_Nms_rad_ =
+        setup.joint_parameters("link_damping_Nms_rad", joints_,
+                               {{.unit = "Nms/rad",
+                                 .min = 0,
+                                 .otherwise = 0,
+                                 .live = true,
+                                 .doc = "damps the links' swing on their springs"}});
     if (parameters.has_errors() || joints_.empty()) return {};
     if (const Status read = read_log(setup, path, sha256, request); !read) {
       const Error& error = read.error();
@@ -119,29 +133,11 @@ class RecordedMotion : public Controller {
     return cycle == last && stop_at_end_.on() ? Code::kStopped : Code::kOk;
   }
 
-  /// One number for all joints, which is live, or a table with those that are damped.
-  void read_damping(ControllerSetup& setup) {
-    constexpr const char* kKey = "link_damping_Nms_rad";
-    TomlTable& parameters = setup.parameters;
-    link_damping_Nms_rad_.assign(joints_.size(), 0.0);
-    if (!parameters.has(kKey) || parameters.values().contains(kKey)) {
-      one_damping_ = link_damping_parameter(setup);
-      return;
-    }
-    TomlTable table = parameters.table(kKey);
-    for (std::size_t k = 0; k < joints_.size(); ++k) {
-      const std::string& name = setup.robot.joints[joints_[k]].name;
-      link_damping_Nms_rad_[k] = table.number_or(name, 0.0, kNotNegative);
-    }
-    table.finish();
-  }
-
   /// On a spring the link may swing, which the motor's own loop hardly damps.
   void damp_links(const hal::StateImage& state,
                   hal::CommandImage& command) const noexcept TANDEM_RT {
-    const double one = one_damping_;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
-      const double damping = std::isnan(one) ? link_damping_Nms_rad_[k] : one;
+      const double damping = link_damping_Nms_rad_[k];
       if (damping == 0.0) continue;
       const std::size_t joint = joints_[k];
       const double swing = state.velocity_rad_s()[joint] - command.velocity_rad_s()[joint];
@@ -192,8 +188,7 @@ class RecordedMotion : public Controller {
 
   std::vector<std::size_t> joints_;
   std::vector<hal::DrivenJoint> limits_;
-  Parameter one_damping_;                     // of all joints
-  std::vector<double> link_damping_Nms_rad_;  // else by joint, as `joints_`
+  std::vector<Parameter> link_damping_Nms_rad_;  // as `joints_`
   Signal progress_, worst_error_;
   MotionPlan plan_;
   double approach_s_ = 0.0, speed_ = 1.0;

@@ -29,7 +29,7 @@ class ControllerTopics final : public TopicGroup {
   }
   void follow(const ControllerFeed& feed) override { feed_ = feed; }
   void publish(const CycleSample& sample) override;
-  void publish_texts(std::int64_t stamp_less_time_ns) override;
+  void publish_news(const News& news) override;
 
  private:
   void renew();
@@ -98,7 +98,7 @@ void ControllerTopics::publish(SignalTopic& topic) {
   topic.output.write(message);
 }
 
-void ControllerTopics::publish_texts(std::int64_t stamp_less_time_ns) {
+void ControllerTopics::publish_news(const News& news) {
   if (!feed_.texts) return;
   texts_.clear();
   feed_.texts(texts_seen_, texts_);
@@ -106,7 +106,7 @@ void ControllerTopics::publish_texts(std::int64_t stamp_less_time_ns) {
     const std::string name(event.controller()), words = event.words();
     const std::string function = "cycle " + std::to_string(event.cycle), none;
     rcl_interfaces::Log message{};
-    message.stamp = ros_time(event.time_ns + stamp_less_time_ns);
+    message.stamp = ros_time(event.time_ns + news.stamp_less_time_ns);
     message.level = static_cast<std::uint8_t>(event.level);
     message.name = refer(name);
     message.msg = refer(words);

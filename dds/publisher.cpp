@@ -91,7 +91,7 @@ Publisher::Publisher(Participant& participant, const RunDescription& run)
   if (!run.parallel) every_[static_cast<std::size_t>(Topic::kParallel)] = 0;
   if (run.simulated_time) clock_ = maker.periodic<rosgraph_msgs::Clock>(Topic::kClock, "clock");
   for (MakeTopics* topics : {joint_topics, sensor_topics, wrench_topics, frame_topics, image_topics,
-                             diagnostic_topics, controller_topics}) {
+                             diagnostic_topics, controller_topics, parameter_topics}) {
     groups_.push_back(topics(maker, run));
   }
   if (run.parallel) groups_.push_back(parallel_topics(maker, run));
@@ -166,7 +166,8 @@ void Publisher::run() {
     const std::int64_t newest_ns = newest_ns_.load(std::memory_order_acquire);  // and this, too
     const bool some = drain();
     look_at_faults();
-    for (const auto& group : groups_) group->publish_texts(stamp_less_time_ns_);
+    const News news{simulated_time_ ? clock_ns_ : clock_ns(CLOCK_REALTIME), stamp_less_time_ns_};
+    for (const auto& group : groups_) group->publish_news(news);
     if (!some) clock_ns_ = newest_ns;  // whether or not the cycle had a place in the ring
     if (simulated_time_ && SteadyClock::now() >= clock_due_) publish_clock();
     if (last) return;

@@ -35,6 +35,23 @@ struct FaultEntry {
   double cleared_s = 0.0;  ///< when it is not latched
 };
 
+/// A parameter of a controller, as ROS 2's parameter of the node.
+struct NodeParameter {
+  enum class Type : std::uint8_t {  ///< rcl_interfaces/msg/ParameterType
+    kNotSet = 0,
+    kBool = 1,
+    kInteger = 2,
+    kDouble = 3,
+    kText = 4,
+    kDoubles = 8,
+  };
+  std::string name;  ///< "squat.depth_m"
+  Type type = Type::kNotSet;
+  double number = 0.0;  ///< of a bool 0 or 1
+  std::string text{};
+  std::vector<double> numbers{};
+};
+
 /// Source of what controllers tell; called on the publisher's thread. Empty: they tell nothing.
 struct ControllerFeed {
   using Signals = std::pair<std::string, std::shared_ptr<const hal::SignalBlock>>;
@@ -43,6 +60,8 @@ struct ControllerFeed {
   std::function<std::vector<Signals>()> signals{};  ///< by controller
   /// Appends what was said after the first `seen`, and raises it.
   std::function<void(std::uint64_t& seen, std::vector<hal::TextEvent>&)> texts{};
+  std::function<std::uint64_t()> parameter_version{};        ///< another one: some may be different
+  std::function<std::vector<NodeParameter>()> parameters{};  ///< of every controller
 };
 
 /// What is the same in every cycle of a run.
@@ -145,6 +164,15 @@ class OutputMaker {
     return make_named<rcl_interfaces::Log>(
         "rt/rosout", {.reliable = true, .transient_local = true, .depth = 100});
   }
+  /// ROS 2's /parameter_events, which every node has in common, in no namespace.
+  [[nodiscard]] Output<rcl_interfaces::ParameterEvent> parameter_events() {
+    return make_named<rcl_interfaces::ParameterEvent>(
+        "rt/parameter_events", {.reliable = true, .transient_local = false, .depth = 1000});
+  }
+  /// "/tandem_run", "/left/tandem_run".
+  [[nodiscard]] std::string full_node_name() const {
+    return participant_.topic_name(participant_.node()).substr(2);
+  }
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
 
  private:
@@ -166,6 +194,12 @@ class OutputMaker {
   std::optional<Error> error_;
 };
 
+/// When what comes at any time is published.
+struct News {
+  std::int64_t now_ns = 0;              ///< on the clock that the stamps have
+  std::int64_t stamp_less_time_ns = 0;  ///< of a cycle
+};
+
 /// Some topics that belong together.
 class TopicGroup {
  public:
@@ -176,9 +210,9 @@ class TopicGroup {
   virtual void publish(const CycleSample& sample) = 0;
   /// Faults have come or gone.
   virtual void publish_faults(const std::vector<FaultEntry>& /*faults*/, std::uint64_t /*lost*/) {}
-  /// What controllers have said since the last call. @param stamp_less_time_ns  of a cycle
-  virtual void publish_texts(std::int64_t /*stamp_less_time_ns*/) {}
-  /// Where controllers' signals and words come from. Before the first cycle.
+  /// What has come since the last call and belongs to no sample: words, parameters.
+  virtual void publish_news(const News& /*news*/) {}
+  /// Where controllers' signals, words and parameters come from. Before the first cycle.
   virtual void follow(const ControllerFeed& /*feed*/) {}
   /// Where a second robot's cycles come from; null: nowhere. Before the first cycle.
   virtual void show(hal::ParallelSource* /*second*/) {}
@@ -187,7 +221,7 @@ class TopicGroup {
 /// Makes the topics of one file, NAME_topics.cpp.
 using MakeTopics = std::unique_ptr<TopicGroup>(OutputMaker& maker, const RunDescription& run);
 MakeTopics joint_topics, sensor_topics, frame_topics, image_topics, diagnostic_topics,
-    parallel_topics, controller_topics;
+    parallel_topics, controller_topics, parameter_topics;
 MakeTopics wrench_topics;  ///< @pre run.wrenches are sites of run.robot
 
 /// A name as ROS 2 allows it in a topic: what is no letter, digit or _ becomes _.

@@ -178,10 +178,12 @@ std::string describe(const ParameterSet& set) {
 }
 
 std::optional<ParameterText> parameter_of(const std::string& event_text) {
-  const std::string begin = std::string(to_string(EventKind::kParameterSet)) + ": ";
-  const std::size_t equals = event_text.rfind(" = ");
-  if (!event_text.starts_with(begin) || equals == std::string::npos) return std::nullopt;
-  ParameterText found{.name = event_text.substr(begin.size(), equals - begin.size())};
+  const std::size_t begin = event_text.find(": ") + 2, equals = event_text.rfind(" = ");
+  const bool is_one = std::ranges::any_of(
+      std::array{EventKind::kParameterSet, EventKind::kParameterLoaded},
+      [&](EventKind kind) { return event_text.starts_with(std::string(to_string(kind)) + ": "); });
+  if (!is_one || equals == std::string::npos || equals < begin) return std::nullopt;
+  ParameterText found{.name = event_text.substr(begin, equals - begin)};
   const char *first = event_text.data() + equals + 3, *last = event_text.data() + event_text.size();
   const auto [end, error] = std::from_chars(first, last, found.value);
   if (error != std::errc() || end != last) return std::nullopt;

@@ -61,7 +61,7 @@ struct EventNames {
   std::function<std::string(std::size_t)> controller{};  ///< by number; any thread's
 };
 
-/// A controller's parameter that was set.
+/// A controller's parameter that was set, or came with it.
 struct ParameterSet {
   static constexpr std::size_t kLongestName = 200;
 
@@ -71,7 +71,8 @@ struct ParameterSet {
 };
 /// ": squat.link_damping_Nms_rad = 12.5": the shortest number that reads as the same double.
 [[nodiscard]] std::string describe(const ParameterSet& set);
-/// What the text of an event of the kind kParameterSet says, bit for bit; empty: it is none.
+/// What the text of an event of the kinds kParameterSet and kParameterLoaded says, bit for bit;
+/// empty: it is none.
 struct ParameterText {
   std::string name;
   double value = 0.0;

@@ -45,11 +45,14 @@ StringMap to_map(const RunInfo& info) {
                 {"description_hash", info.description_hash}};
   std::string controllers;
   for (const std::string& one : info.controllers) controllers += one + "\n";
+  std::string parameters;
+  for (const std::string& one : info.parameters) parameters += one + "\n";
   for (const auto& [key, value] : {std::pair{"host", &info.host},
                                    {"started", &info.started},
                                    {"time_zone", &info.time_zone},
                                    {"kernel_sha256", &info.kernel_sha256},
-                                   {"controllers", &std::as_const(controllers)}}) {
+                                   {"controllers", &std::as_const(controllers)},
+                                   {"parameters", &std::as_const(parameters)}}) {
     if (!value->empty()) map.emplace_back(key, *value);
   }
   if (info.part > 0) map.emplace_back("part", std::to_string(info.part));
@@ -84,6 +87,7 @@ RunInfo info_from(const StringMap& map) {
   info.time_zone = value_of(map, "time_zone");
   info.kernel_sha256 = value_of(map, "kernel_sha256");
   info.controllers = lines_of(value_of(map, "controllers"));
+  info.parameters = lines_of(value_of(map, "parameters"));
   return info;
 }
 

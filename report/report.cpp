@@ -106,6 +106,18 @@ PageTable loops_table(const RunData& run, const std::string& side) {
   return table;
 }
 
+/// Table of every parameter; without rows when the log has none.
+PageTable parameter_table(const RunData& run, const std::string& side) {
+  PageTable table{"Parameters" + side,
+                  "Of the controllers, at the run's start, and what was set last. Of a word that "
+                  "was set its number among the choices is shown.",
+                  {"parameter", "at the start", "set last", "times set"},
+                  {}};
+  for (const RunParameter& one : run.parameters)
+    table.rows.push_back({one.name, one.start, one.then, std::to_string(one.changes)});
+  return table;
+}
+
 /// Table of every foot, by the simulation's truth; without rows when the log has none.
 PageTable feet_table(const RunData& run, const std::string& side) {
   PageTable table{"Feet" + side,
@@ -122,12 +134,10 @@ PageTable feet_table(const RunData& run, const std::string& side) {
 }
 
 void add_tables(const RunData& run, const std::string& side, Page& page) {
-  PageTable tracking = tracking_table(run, side);
-  if (!tracking.rows.empty()) page.tables.push_back(std::move(tracking));
-  PageTable feet = feet_table(run, side);
-  if (!feet.rows.empty()) page.tables.push_back(std::move(feet));
-  PageTable loops = loops_table(run, side);
-  if (!loops.rows.empty()) page.tables.push_back(std::move(loops));
+  for (auto* make : {tracking_table, feet_table, loops_table, parameter_table}) {
+    PageTable table = make(run, side);
+    if (!table.rows.empty()) page.tables.push_back(std::move(table));
+  }
 }
 
 Status create(const std::string& folder) {

@@ -1,6 +1,8 @@
 // Rebuilds robot and experiment from the texts inside the log, so that a log needs no other file.
 #include "report/run_data.hpp"
 
+#include <fmt/core.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -140,6 +142,32 @@ std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
     faults.push_back(std::move(fault));
   }
   return faults;
+}
+
+/// By the run's own record and its events.
+std::vector<RunParameter> parameters_of(const std::vector<log::EventText>& events,
+                                        const std::vector<std::string>& at_start) {
+  std::vector<RunParameter> all;
+  for (const std::string& line : at_start) {
+    const std::size_t equals = std::min(line.rfind(" = "), line.size());
+    all.push_back({line.substr(0, equals), line.substr(std::min(equals + 3, line.size()))});
+  }
+  for (const auto& [event, text] : events) {
+    const auto it = log::parameter_of(text);
+    if (!it) continue;
+    const auto known = std::ranges::find(all, it->name, &RunParameter::name);
+    RunParameter& one = known == all.end() ? all.emplace_back() : *known;
+    one.name = it->name;
+    const double time_s = static_cast<double>(event.time_ns) * 1e-9;
+    std::string value = fmt::format("{:g} at {:.3f} s", it->value, time_s);
+    if (event.kind == log::EventKind::kParameterLoaded) {
+      one = {one.name, std::move(value)};
+    } else {
+      one.then = std::move(value);
+      ++one.changes;
+    }
+  }
+  return all;
 }
 
 Result<log::TimeSeries> state_columns(const log::LogFile& file, const char* topic,
@@ -431,6 +459,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   const auto events = file->events();
   if (!events) return std::unexpected(events.error());
   run.faults = faults_of(*events, run.info.joints, error_text);
+  run.parameters = parameters_of(*events, run.info.parameters);
   log::RunWindow window = log::run_window(*events, run.settle_s);
   if (const Status s = read_state(*file, window, run); !s) return std::unexpected(s.error());
   if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());

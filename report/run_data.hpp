@@ -44,6 +44,14 @@ struct RunFault {
   bool stops = true;    ///< false: it was reported, and the run went on
 };
 
+/// A controller's parameter in a run: what it was at the start, and what became of it.
+struct RunParameter {
+  std::string name;         ///< "squat.depth_m"
+  std::string start;        ///< of a controller that came later: then
+  std::string then{};       ///< what it was set to last, and when; empty: nothing was set
+  std::size_t changes = 0;  ///< how often it was set
+};
+
 /// Faults of a run that are shown in the page, and as lines in its figures.
 inline constexpr std::size_t kFaultsShown = 5;
 
@@ -73,6 +81,7 @@ struct RunData {
   double drawn_from_s = -std::numeric_limits<double>::infinity();  ///< of the figures' times: only
   double drawn_to_s = std::numeric_limits<double>::infinity();     ///< rows in these are drawn
   std::vector<RunFault> faults;                                    ///< in the order of their times
+  std::vector<RunParameter> parameters;                            ///< of its controllers
   Columns position_rad, velocity_rad_s, torque_Nm;                 ///< [joint][row], measured
   Columns reference_rad;    ///< [joint][row]; NaN when not under position control
   Columns sensor;           ///< [channel][row], all sensors one after another

@@ -250,7 +250,19 @@ CycleAnswer ControllerHost::set_parameters(
   for (const ParameterChange& change : changes) {
     table_[change.slot]->io->parameters.set(*change.parameter, change.value);
   }
+  parameter_changes_.fetch_add(1, std::memory_order_release);
   return {};
+}
+
+void ControllerHost::tell_parameters(const hal::CycleTime& time, CycleLog& log) noexcept TANDEM_RT {
+  std::size_t most = kToldParameters;
+  for (HostedController* one : table_) {
+    for (; one != nullptr && most > 0 && one->told < one->loaded.size(); --most) {
+      const ParameterChange& its = one->loaded[one->told++];
+      if (its.parameter->was_set) continue;
+      log.event(time, log::EventKind::kParameterLoaded, its.name, its.value);
+    }
+  }
 }
 
 CycleAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, bool running,
@@ -444,7 +456,10 @@ void ControllerHost::archive(Archive& ar) {
     for (const auto& port : one->inputs) ar(*port);
   }
   ar(active_, done_, ended_, failed_controller_, references_, gains_);
-  if (ar.reading()) guard_.forget(gains_);
+  if (ar.reading()) {
+    guard_.forget(gains_);
+    parameter_changes_.fetch_add(1, std::memory_order_release);
+  }
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (table_[slot] == nullptr) active_ &= ~only(slot);  // bytes of something else
   }

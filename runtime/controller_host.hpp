@@ -79,6 +79,8 @@ struct HostedController {
   std::optional<TomlDocument> document;    ///< where its parameters are; none: it has no document
   std::string parameters;                  ///< the path of their table there
   std::unique_ptr<HostedController> next;  ///< the asking side's: the loop was asked to replace it
+  std::vector<ParameterChange> loaded;     ///< for the log: what it came with during a run
+  std::size_t told = 0;                    ///< the loop's: of these
   std::unique_ptr<Succession> succession;  ///< of one that replaces another, until that is done
 };
 
@@ -194,6 +196,14 @@ class ControllerHost {
   /// All of them; none when a controller of them has gone.
   [[nodiscard]] CycleAnswer set_parameters(
       std::span<const ParameterChange> changes) noexcept TANDEM_RT;
+  /// Changes when a parameter may have another value. Any thread.
+  [[nodiscard]] std::uint64_t parameter_changes() const noexcept {
+    return parameter_changes_.load(std::memory_order_acquire);
+  }
+  static constexpr std::size_t kToldParameters = 16;
+  /// The log gets what controllers that came during the run have as parameters, at most
+  /// kToldParameters a cycle. Of one that has been set it has that.
+  void tell_parameters(const hal::CycleTime& time, CycleLog& log) noexcept TANDEM_RT;
   /// Stops and starts controllers, all or none. When they are `running`, every joint that changes
   /// hands does so without a bump (BumplessTransfer): one that moves brakes, what nobody has is
   /// held where it comes to rest, and who starts sees the joint there. Else it is who will start.
@@ -313,6 +323,7 @@ class ControllerHost {
   std::size_t failed_controller_ = 0;
   std::atomic<std::uint64_t> shown_{0};  // active, and done in the upper half
   std::atomic<std::int32_t> at_work_{-1};
+  std::atomic<std::uint64_t> parameter_changes_{0};
   rt::Clock* clock_ = nullptr;
   CallWatch* watch_ = nullptr;
   std::array<ControllerCall, kMostControllers> calls_{};  // of this cycle; more are not kept

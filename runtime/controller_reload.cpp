@@ -44,6 +44,7 @@ CycleAnswer ControllerHost::replace(std::size_t slot, HostedController& next, bo
             .other = static_cast<std::int32_t>(conflict->other)};
   }
   next.succession->kept = hand_over(*former, next);
+  parameter_changes_.fetch_add(1, std::memory_order_release);
   done_ &= ~only(slot);
   ended_ &= ~only(slot);
   set_active(active_);

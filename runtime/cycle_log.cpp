@@ -151,13 +151,11 @@ void CycleLog::event(const hal::CycleTime& time,
                              .value = static_cast<float>(fault.index)});
 }
 
-void CycleLog::event(const hal::CycleTime& time, std::string_view name,
+void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::string_view name,
                      double value) noexcept TANDEM_RT {
   if (recorder_ == nullptr) return;
-  recorder_->push(
-      log::Event{
-          .cycle = time.cycle, .time_ns = time.time_ns, .kind = log::EventKind::kParameterSet},
-      name, value);
+  recorder_->push(log::Event{.cycle = time.cycle, .time_ns = time.time_ns, .kind = kind}, name,
+                  value);
 }
 
 void CycleLog::images(const hal::CycleTime& time, const hal::StateImage& state,

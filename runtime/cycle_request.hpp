@@ -46,8 +46,8 @@ struct MoveRequest {
   double acceleration_rad_s2 = kDefault;
 };
 
-/// That a request sets at most: each is an event of its cycle.
-inline constexpr std::size_t kMostParameterChanges = 32;
+/// That a request sets at most, each element of a list counted: each is an event of its cycle.
+inline constexpr std::size_t kMostParameterChanges = 64;
 
 struct CycleRequest {
   enum class Kind : std::uint32_t {

@@ -78,8 +78,8 @@ void RobotCycle::wait() noexcept {
   // Four images, a sample of each input, every event that one cycle can bring, and what the
   // controllers tell.
   const std::size_t most = 4 + 16 + Inbox::kCapacity * kMostParameterChanges +
-                           3 * now_.watch.joints() + now_.watch.sensors() +
-                           now_.controllers.inputs() +
+                           ControllerHost::kToldParameters + 3 * now_.watch.joints() +
+                           now_.watch.sensors() + now_.controllers.inputs() +
                            kMostControllers * (2 + TextEventSlots::kSlots);
   if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
   now_.tick = now_.loop.wait();
@@ -217,6 +217,7 @@ void RobotCycle::take_inbox() noexcept TANDEM_RT {
     arbiter_.on(RunEvent::kEnd);
   }
   requests_.carry_out();
+  now_.controllers.tell_parameters(now_.time, now_.log);
   trace_.mark(CycleStage::kCheck, now_.clock);
 }
 

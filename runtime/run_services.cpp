@@ -132,7 +132,9 @@ void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer&
   } else if (request.kind == Kind::kReplace) {
     std::unique_ptr<HostedController>& place = host_->owned()[request.slot];
     std::unique_ptr<HostedController> next = std::move(place->next);
-    if (done) place = std::move(next);
+    if (!done) return;
+    place = std::move(next);
+    ++loads_;
   }
 }
 
@@ -289,6 +291,14 @@ Result<RequestResult> RunServices::load(const std::string& name,
   return load(std::move(*made), patience);
 }
 
+void RunServices::tell_loaded(HostedController& controller) {
+  for (ParameterRow& row : controller.io->parameters.rows()) {
+    if (std::isnan(row.now())) continue;
+    controller.loaded.push_back(
+        {.parameter = &row, .value = row.now(), .name = controller.name + "." + row.name});
+  }
+}
+
 Result<RequestResult> RunServices::load(std::unique_ptr<HostedController> controller,
                                         Patience patience) {
   Lock lock(mutex_);
@@ -305,6 +315,7 @@ Result<RequestResult> RunServices::load(std::unique_ptr<HostedController> contro
   }
   controller->of_experiment = false;
   log_->open(*controller);
+  tell_loaded(*controller);
   CycleRequest request{.kind = CycleRequest::Kind::kInsert,
                        .slot = static_cast<std::uint32_t>(free - owned.begin()),
                        .controller = controller.get()};

@@ -137,7 +137,7 @@ struct GainsRequest {
   std::optional<double> kp{}, ki{}, kd{};
 };
 
-/// A parameter to set, as it is asked for.
+/// A parameter to set, as it is asked for: of a list all elements, or one, "kp_Nm_rad.elbow".
 struct ParameterWish {
   std::string controller, parameter;
   ParameterValue value;
@@ -146,6 +146,7 @@ struct ParameterWish {
 /// A parameter of a loaded controller.
 struct ParameterStatus {
   std::string name;
+  std::string list{};  ///< that it is an element of; empty: it stands alone
   ParameterFacts facts;
   ParameterType type = ParameterType::kNumber;
   double otherwise = kNotGiven;  ///< its default, as `value`
@@ -214,8 +215,8 @@ class RunServices {
   [[nodiscard]] Result<std::vector<ParameterStatus>> parameters(const std::string& controller);
   /// Sets live parameters of loaded controllers, active or not, between two cycles: all or none.
   /// Errors: nothing is named; more than kMostParameterChanges; an unknown controller or parameter
-  /// (with the nearest name); one that is not live, of another type, not finite, out of range,
-  /// named twice.
+  /// (with the nearest name); one that is not live, of another type or length, not finite, out of
+  /// range, named twice.
   [[nodiscard]] Result<RequestResult> set_parameters(const std::vector<ParameterWish>& wishes,
                                                      Patience patience = kPatience);
 
@@ -227,6 +228,10 @@ class RunServices {
   [[nodiscard]] std::vector<ControllerSignals> signals();
   /// Changes when a controller comes or goes; never 0.
   [[nodiscard]] std::uint64_t loads() const noexcept { return loads_.load(); }
+  /// Changes when a controller comes or goes, and when a parameter may have another value.
+  [[nodiscard]] std::uint64_t parameter_version() const noexcept {
+    return loads_.load() + host_->parameter_changes();
+  }
   /// What controllers have said.
   [[nodiscard]] const TextHistory& texts() const noexcept { return texts_; }
   /// Mode and interaction of a joint that no active controller claims, impedance of any. A joint
@@ -303,6 +308,8 @@ class RunServices {
   [[nodiscard]] Result<RequestResult> load(std::unique_ptr<HostedController> controller,
                                            Patience patience);
   [[nodiscard]] Status check_name(const std::string& name);
+  /// For the log, with the next cycles.
+  static void tell_loaded(HostedController& controller);
   [[nodiscard]] static Status errors_of(const TomlDocument& document,
                                         const char* missing = "give it with --set or --parameters");
   [[nodiscard]] Result<HostedController*> to_reload(const std::string& name) const;
@@ -313,7 +320,8 @@ class RunServices {
   void collect();
   void free_what_left(const CycleRequest& request, const CycleAnswer& answer);
   void forget_changes(const CycleRequest& request);
-  [[nodiscard]] Result<ParameterChange> change_of(const ParameterWish& wish) const;
+  [[nodiscard]] Status add_changes(const ParameterWish& wish,
+                                   std::vector<ParameterChange>& changes) const;
   [[nodiscard]] Error refusal(const CycleAnswer& answer) const;
   [[nodiscard]] Status check_phase() const;
   [[nodiscard]] Result<std::size_t> slot_of(const std::string& name) const;

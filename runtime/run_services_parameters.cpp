@@ -1,5 +1,6 @@
 // Asking the loop for parameters of controllers: what they are, and whether a value fits.
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -36,6 +37,7 @@ std::string text_of(const ParameterValue& value) {
     case Is::kNumber: return fmt::format("{:g}", value.number);
     case Is::kBoolean: return value.number == 1.0 ? "true" : "false";
     case Is::kText: return "'" + value.text.substr(0, kMostNamed) + "'";
+    case Is::kNumbers: return "a list";
     case Is::kNothing: break;
   }
   return "nothing";
@@ -63,10 +65,29 @@ Result<double> fit(const ParameterRow& row, const ParameterValue& given, const s
   if (!std::isfinite(value)) return wrong("has to be finite", range_hint(row));
   if (row.type == ParameterType::kInteger && value != std::floor(value))
     return wrong(text_of(given) + " is no whole number", range_hint(row));
-  const ParameterFacts& facts = row.facts;
-  if (value >= facts.min && value <= facts.max && !(facts.above_min && value == facts.min))
-    return value;
+  if (row.fits(value)) return value;
   return wrong(text_of(given) + " is out of range", range_hint(row));
+}
+
+/// What to do about a name that no parameter has.
+std::string nearest(const std::string& name, const std::deque<ParameterRow>& rows) {
+  std::vector<std::string> names;
+  for (const ParameterRow& row : rows) {
+    names.push_back(row.name);
+    if (!row.list.empty()) names.push_back(row.list);
+  }
+  return names.empty() ? "it has none: setup.parameter() declares them" : suggest(name, names);
+}
+
+std::string elements_of(const std::vector<ParameterRow*>& list) {
+  std::vector<std::string> names;
+  for (const ParameterRow* one : list) names.push_back(one->element());
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+std::unexpected<Error> too_many(std::size_t parameters) {
+  return fail(fmt::format("sets {} parameters at once", parameters),
+              fmt::format("set at most {}; each element of a list is one", kMostParameterChanges));
 }
 
 }  // namespace
@@ -79,6 +100,7 @@ Result<std::vector<ParameterStatus>> RunServices::parameters(const std::string& 
   std::vector<ParameterStatus> all;
   for (const ParameterRow& row : host_->owned()[*slot]->io->parameters.rows()) {
     all.push_back({.name = row.name,
+                   .list = row.list,
                    .facts = row.facts,
                    .type = row.type,
                    .otherwise = row.otherwise,
@@ -87,26 +109,41 @@ Result<std::vector<ParameterStatus>> RunServices::parameters(const std::string& 
   return all;
 }
 
-Result<ParameterChange> RunServices::change_of(const ParameterWish& wish) const {
+/// Adds what `wish` sets: a parameter, an element of a list, or every element of it.
+Status RunServices::add_changes(const ParameterWish& wish,
+                                std::vector<ParameterChange>& changes) const {
   const Result<std::size_t> slot = slot_of(wish.controller);
   if (!slot) return std::unexpected(slot.error());
   auto& rows = host_->owned()[*slot]->io->parameters.rows();
-  const std::string key = wish.controller + "." + wish.parameter;
-  const auto row = std::ranges::find(rows, wish.parameter, &ParameterRow::name);
-  if (row == rows.end()) {
-    std::vector<std::string> names;
-    for (const ParameterRow& one : rows) names.push_back(one.name);
-    return fail_at(key.substr(0, 2 * kMostNamed), "the controller has no such parameter",
-                   names.empty() ? "it has none: setup.parameter() declares them"
-                                 : suggest(wish.parameter, names));
+  const std::string key = (wish.controller + "." + wish.parameter).substr(0, 3 * kMostNamed);
+  std::vector<ParameterRow*> named;
+  for (ParameterRow& row : rows) {
+    if (row.name == wish.parameter || row.list == wish.parameter) named.push_back(&row);
   }
-  const Result<double> value = fit(*row, wish.value, key);
-  if (!value) return std::unexpected(value.error());
-  if (!row->facts.live) {
-    return fail_at(key, "is not live: it is read when the controller is loaded",
-                   "unload the controller, then load it with --set '" + wish.parameter + " = …'");
+  if (named.empty()) {
+    return fail_at(key, "the controller has no such parameter", nearest(wish.parameter, rows));
   }
-  return ParameterChange{.slot = *slot, .parameter = &*row, .value = *value, .name = key};
+  const std::vector<double>& numbers = wish.value.numbers;
+  const bool is_list = !named.front()->list.empty() && named.front()->name != wish.parameter;
+  const bool each = is_list && wish.value.is == Is::kNumbers;
+  if (each && numbers.size() != named.size()) {
+    return fail_at(key, fmt::format("has {} elements, not {}", named.size(), numbers.size()),
+                   "give one number for all, or one for each of " + elements_of(named));
+  }
+  for (std::size_t i = 0; i < named.size(); ++i) {
+    const std::string full = wish.controller + "." + named[i]->name;
+    const ParameterValue given = each ? ParameterValue(numbers[i]) : wish.value;
+    const Result<double> value = fit(*named[i], given, full);
+    if (!value) return std::unexpected(value.error());
+    if (!named[i]->facts.live) {
+      return fail_at(key, "is not live: it is read when the controller is loaded",
+                     "unload the controller, then load it with --set '" + wish.parameter + " = …'");
+    }
+    if (std::ranges::find(changes, named[i], &ParameterChange::parameter) != changes.end())
+      return fail_at(full, "is named twice", "name it once");
+    changes.push_back({.slot = *slot, .parameter = named[i], .value = *value, .name = full});
+  }
+  return {};
 }
 
 Result<RequestResult> RunServices::set_parameters(const std::vector<ParameterWish>& wishes,
@@ -115,18 +152,12 @@ Result<RequestResult> RunServices::set_parameters(const std::vector<ParameterWis
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
   if (wishes.empty()) return fail("no parameter is named", "name those to set: kp=40");
-  if (wishes.size() > kMostParameterChanges) {
-    return fail(fmt::format("sets {} parameters at once", wishes.size()),
-                fmt::format("set at most {}", kMostParameterChanges));
-  }
+  if (wishes.size() > kMostParameterChanges) return too_many(wishes.size());
   std::vector<ParameterChange> changes;
   for (const ParameterWish& wish : wishes) {
-    Result<ParameterChange> change = change_of(wish);
-    if (!change) return std::unexpected(change.error());
-    const auto same = std::ranges::find(changes, change->parameter, &ParameterChange::parameter);
-    if (same != changes.end()) return fail_at(change->name, "is named twice", "name it once");
-    changes.push_back(std::move(*change));
+    if (Status fits = add_changes(wish, changes); !fits) return std::unexpected(fits.error());
   }
+  if (changes.size() > kMostParameterChanges) return too_many(changes.size());
   changes_.push_back(std::make_unique<const std::vector<ParameterChange>>(std::move(changes)));
   return ask(lock, {.kind = CycleRequest::Kind::kSet, .changes = changes_.back().get()}, patience);
 }

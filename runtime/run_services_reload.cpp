@@ -136,6 +136,7 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   made.of_experiment = (*former)->of_experiment;
   Reloaded result{.asked = {}, .changed = made.sha256 != (*former)->sha256};
   log_->open(made);
+  tell_loaded(made);
   const auto inputs = (*former)->inputs;  // whoever feeds them goes on to do so
   (*former)->next = std::move(*next);
   const auto asked = ask(lock,

@@ -37,8 +37,12 @@ std::string without_blanks(const std::string& text) {
                                     : text.substr(first, text.find_last_not_of(' ') - first + 1);
 }
 
-/// A number, true or false, else a word: the run says whether it fits.
+/// A number, true or false, a list, else a word: the run says whether it fits.
 Json value_of(const std::string& text) {
+  if (text.starts_with('[')) {
+    Json list = Json::parse(text, nullptr, false);
+    return list.is_array() ? list : Json(text);
+  }
   if (text == "true" || text == "false") return text == "true";
   double number = 0.0;
   const char* last = text.data() + text.size();
@@ -49,6 +53,11 @@ Json value_of(const std::string& text) {
 
 std::string shown_value(const Json& value) {
   if (value.is_null()) return "-";
+  if (value.is_array()) {
+    std::string all;
+    for (const Json& one : value) all += (all.empty() ? "" : ", ") + shown_value(one);
+    return all;
+  }
   return value.is_string()   ? value.get<std::string>()
          : value.is_number() ? fmt::format("{:g}", value.get<double>())
                              : value.dump();
@@ -63,6 +72,27 @@ std::string shown_range(const Json& one) {
   if (!min.is_null() && !max.is_null()) return above + shown_value(min) + " to " + shown_value(max);
   if (!min.is_null()) return (above.empty() ? ">= " : above) + shown_value(min);
   return max.is_null() ? "" : "<= " + shown_value(max);
+}
+
+/// A list as one parameter where its elements are alike, else each of them.
+std::vector<Json> rows_of(const Json& parameter) {
+  const Json& elements = parameter["elements"];
+  std::vector<Json> rows;
+  bool alike = true;
+  for (std::size_t i = 0; i < elements.size(); ++i) {
+    Json& row = rows.emplace_back(parameter);
+    row["name"] = parameter.value("name", "") + "." + elements[i].get<std::string>();
+    for (const char* key : {"min", "max", "default", "value"}) {
+      row[key] = parameter[key][i];
+      alike = alike && parameter[key][i] == parameter[key][0];
+    }
+  }
+  if (rows.empty()) return {parameter};
+  if (!alike) return rows;
+  rows.resize(1);
+  rows[0]["name"] = parameter["name"];
+  rows[0]["doc"] = fmt::format("{} ({} elements)", parameter.value("doc", ""), elements.size());
+  return rows;
 }
 
 }  // namespace
@@ -157,11 +187,12 @@ void print_controller(const Json& answer) {
     Table table({"parameter", "value", "unit", "range", "default", "set", ""});
     table.align_left();
     for (const Json& parameter : one["parameters"]) {
-      const bool required = parameter.value("required", false);
-      table.add({parameter.value("name", ""), shown_value(parameter["value"]),
-                 parameter.value("unit", ""), shown_range(parameter),
-                 required ? "required" : shown_value(parameter["default"]),
-                 parameter.value("live", false) ? "live" : "at load", parameter.value("doc", "")});
+      for (const Json& row : rows_of(parameter)) {
+        const bool required = row.value("required", false);
+        table.add({row.value("name", ""), shown_value(row["value"]), row.value("unit", ""),
+                   shown_range(row), required ? "required" : shown_value(row["default"]),
+                   row.value("live", false) ? "live" : "at load", row.value("doc", "")});
+      }
     }
     fmt::print("\n");
     table.print(stdout);

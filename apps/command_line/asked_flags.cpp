@@ -41,6 +41,7 @@ same without a socket, and gets no answer.)"},
   tandem controller switch --stop squat --start rest in one cycle, or not at all
   tandem controller show squat                       its parameters: unit, range, value, live or not
   tandem controller set squat link_damping_Nms_rad=2 between two cycles; several: all or none
+  tandem controller set arm kp_Nm_rad.elbow=20       of a parameter by joint one; kp_Nm_rad=20: all
   tandem controller start                            after `fault reset`: those active before
   tandem controller stop rest                        its joints are held where they are
   tandem controller reload mine                      goes on with its new build, in its state

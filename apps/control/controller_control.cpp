@@ -1,5 +1,7 @@
 #include "apps/control/controller_control.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -26,26 +28,44 @@ Json value_json(const runtime::ParameterStatus& one, double value) {
   return index < one.facts.choices.size() ? Json(one.facts.choices[index]) : Json(nullptr);
 }
 
+Json parameter_json(const runtime::ParameterStatus& one) {
+  const ParameterFacts& facts = one.facts;
+  const bool ranged = one.type <= ParameterType::kInteger;
+  const auto limit = [ranged](double value, double none) {
+    return ranged && value != none ? Json(value) : Json(nullptr);
+  };
+  return {{"name", one.name},
+          {"type", to_string(one.type)},
+          {"elements", Json::array()},
+          {"unit", facts.unit},
+          {"min", limit(facts.min, kAnyNumber.min)},
+          {"above_min", facts.above_min},
+          {"max", limit(facts.max, kAnyNumber.max)},
+          {"choices", facts.choices},
+          {"required", facts.otherwise.is == ParameterValue::Is::kNothing},
+          {"default", value_json(one, one.otherwise)},
+          {"value", value_json(one, one.value)},
+          {"live", facts.live},
+          {"doc", facts.doc}};
+}
+
+/// A list is one entry, with what its elements differ in as lists.
 Json parameters_json(const std::vector<runtime::ParameterStatus>& parameters) {
   Json all = Json::array();
+  std::string list;
   for (const runtime::ParameterStatus& one : parameters) {
-    const ParameterFacts& facts = one.facts;
-    const bool ranged = one.type <= ParameterType::kInteger;
-    const auto limit = [ranged](double value, double none) {
-      return ranged && value != none ? Json(value) : Json(nullptr);
-    };
-    all.push_back({{"name", one.name},
-                   {"type", to_string(one.type)},
-                   {"unit", facts.unit},
-                   {"min", limit(facts.min, kAnyNumber.min)},
-                   {"above_min", facts.above_min},
-                   {"max", limit(facts.max, kAnyNumber.max)},
-                   {"choices", facts.choices},
-                   {"required", facts.otherwise.is == ParameterValue::Is::kNothing},
-                   {"default", value_json(one, one.otherwise)},
-                   {"value", value_json(one, one.value)},
-                   {"live", facts.live},
-                   {"doc", facts.doc}});
+    Json json = parameter_json(one);
+    if (one.list.empty() || one.list != list) all.push_back(json);
+    list = one.list;
+    if (list.empty()) continue;
+    Json& of = all.back();
+    for (const char* key : {"min", "max", "default", "value"}) {
+      if (of["name"] == one.name) of[key] = Json::array();
+      of[key].push_back(json[key]);
+    }
+    if (of["name"] == one.name) of["name"] = list;
+    of["type"] = "numbers";
+    of["elements"].push_back(one.name.substr(list.size() + 1));
   }
   return all;
 }
@@ -188,18 +208,27 @@ Result<Json> show(RunServices& services, const hal::RobotConfig& robot, const Js
   return Json{{"controllers", std::move(shown)}};
 }
 
+/// Controller and parameter of "tuned.kp.elbow": names of both may have dots.
+Result<runtime::ParameterWish> split(RunServices& services, const std::string& name) {
+  std::size_t longest = 0;
+  for (const runtime::ControllerStatus& one : services.controllers()) {
+    if (name.starts_with(one.name + ".")) longest = std::max(longest, one.name.size());
+  }
+  const std::size_t dot = longest > 0 ? longest : name.rfind('.');
+  if (dot != std::string::npos)
+    return runtime::ParameterWish{name.substr(0, dot), name.substr(dot + 1), {}};
+  return fail_at(name.substr(0, kMostNamed), "names no controller",
+                 "write NAME.PARAMETER, or give the controller's \"name\"");
+}
+
 /// @param name  of the controller; empty: `parameter` begins with it
-Result<runtime::ParameterWish> wish_of(const std::string& name, const std::string& parameter,
-                                       const Json& value) {
+Result<runtime::ParameterWish> wish_of(RunServices& services, const std::string& name,
+                                       const std::string& parameter, const Json& value) {
   runtime::ParameterWish wish{.controller = name, .parameter = parameter, .value = {}};
   if (name.empty()) {
-    const std::size_t dot = parameter.rfind('.');
-    if (dot == std::string::npos) {
-      return fail_at(parameter.substr(0, kMostNamed), "names no controller",
-                     "write NAME.PARAMETER, or give the controller's \"name\"");
-    }
-    wish.controller = parameter.substr(0, dot);
-    wish.parameter = parameter.substr(dot + 1);
+    auto both = split(services, parameter);
+    if (!both) return both;
+    wish = std::move(*both);
   }
   if (value.is_boolean()) {
     wish.value = value.get<bool>();
@@ -207,6 +236,14 @@ Result<runtime::ParameterWish> wish_of(const std::string& name, const std::strin
     wish.value = value.get<double>();
   } else if (value.is_string()) {
     wish.value = value.get<std::string>();
+  } else if (value.is_array()) {
+    const bool numbers =
+        std::ranges::all_of(value, [](const Json& one) { return one.is_number(); });
+    if (!numbers) {
+      return fail_at(parameter.substr(0, kMostNamed), "is a list with other things than numbers",
+                     "give numbers: [40, 40, 20]");
+    }
+    wish.value = value.get<std::vector<double>>();
   }
   return wish;
 }
@@ -220,9 +257,11 @@ Result<Json> set_these(RunServices& services, const std::vector<runtime::Paramet
   for (const runtime::ParameterWish& wish : wishes) {
     const auto now = services.parameters(wish.controller);
     if (!now) continue;
-    const auto one = std::ranges::find(*now, wish.parameter, &runtime::ParameterStatus::name);
-    if (one != now->end())
-      values[wish.controller + "." + wish.parameter] = value_json(*one, one->value);
+    Json& value = values[wish.controller + "." + wish.parameter];
+    for (const runtime::ParameterStatus& one : *now) {
+      if (one.name == wish.parameter) value = value_json(one, one.value);
+      if (one.list == wish.parameter) value.push_back(value_json(one, one.value));
+    }
   }
   return answer;
 }
@@ -232,8 +271,13 @@ Result<Json> set(RunServices& services, const Json& request) {
   const bool each = request.value("each", false);
   std::vector<runtime::ParameterWish> wishes;
   Json results = Json::object();
+  if (const std::size_t count = request["parameters"].size();
+      count > runtime::kMostParameterChanges) {
+    return fail(fmt::format("sets {} parameters at once", count),
+                fmt::format("set at most {}", runtime::kMostParameterChanges));
+  }
   for (const auto& [parameter, value] : request["parameters"].items()) {
-    auto wish = wish_of(name, parameter, value);
+    auto wish = wish_of(services, name, parameter, value);
     if (!each) {
       if (!wish) return std::unexpected(wish.error());
       wishes.push_back(std::move(*wish));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/control/dds_service_types.hpp"
+#include "runtime/cycle_request.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -16,9 +17,18 @@ using dds::ReplyMemory;
 using Value = ::rcl_interfaces_msg_dds__ParameterValue_;
 
 /// rcl_interfaces/msg/ParameterType.
-enum RosType : std::uint8_t { kNotSet = 0, kBool = 1, kInteger = 2, kDouble = 3, kString = 4 };
+enum RosType : std::uint8_t {
+  kNotSet = 0,
+  kBool = 1,
+  kInteger = 2,
+  kDouble = 3,
+  kString = 4,
+  kIntegerArray = 7,
+  kDoubleArray = 8,
+};
 
 constexpr std::size_t kMostNames = 1024, kLongestName = 512;  // of a request
+constexpr std::size_t kMostElements = 1024;                   // of an array
 
 std::string name_of(const char* name) { return {name, ::strnlen(name, kLongestName)}; }
 
@@ -33,6 +43,14 @@ ParameterQuestion about(const dds_sequence_string& names) {
   return {.question = {{"do", "controller.show"}}, .names = names_of(names)};
 }
 
+template <class Sequence>
+Json list_of(const Sequence& sequence) {
+  Json list = Json::array();
+  const std::size_t count = std::min<std::size_t>(sequence._length, kMostElements);
+  for (const auto& one : std::span(sequence._buffer, count)) list.push_back(one);
+  return list;
+}
+
 /// Null: of a type that no parameter has.
 Json json_of(const Value& value) {
   switch (value.type) {
@@ -40,6 +58,8 @@ Json json_of(const Value& value) {
     case kInteger: return value.integer_value;
     case kDouble: return value.double_value;
     case kString: return name_of(value.string_value);
+    case kIntegerArray: return list_of(value.integer_array_value);
+    case kDoubleArray: return list_of(value.double_array_value);
     default: return nullptr;
   }
 }
@@ -48,8 +68,15 @@ template <class Sequence>
 ParameterQuestion setting(const Sequence& parameters, bool each) {
   ParameterQuestion asked{.question = {{"do", "controller.set"}, {"each", each}}};
   Json& values = asked.question["parameters"] = Json::object();
-  const std::size_t count = std::min<std::size_t>(parameters._length, kMostNames);
-  for (const auto& one : std::span(parameters._buffer, count)) {
+  asked.count = parameters._length;
+  if (asked.count > runtime::kMostParameterChanges) {
+    const std::string counts = std::to_string(asked.count) + " parameters at once";
+    asked.refusal = {{"ok", false},
+                     {"error", "sets " + counts},
+                     {"hint", "set at most " + std::to_string(runtime::kMostParameterChanges)}};
+    return asked;
+  }
+  for (const auto& one : std::span(parameters._buffer, asked.count)) {
     const std::string name = name_of(one.name);
     values[name] = json_of(one.value);
     asked.names.push_back(name);
@@ -86,6 +113,7 @@ RosType type_of(const Json& parameter) {
   return type == "boolean"   ? kBool
          : type == "integer" ? kInteger
          : type == "choice"  ? kString
+         : type == "numbers" ? kDoubleArray
                              : kDouble;
 }
 
@@ -104,6 +132,11 @@ void fill_texts(const std::vector<std::string>& texts, dds_sequence_string& to,
   for (std::size_t i = 0; i < texts.size(); ++i) places[i] = memory.text(texts[i]);
 }
 
+/// One that is not given is no number.
+double number_of(const Json& value) {
+  return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
+}
+
 /// @param parameter  null: there is none
 void fill_value(const Json* parameter, Value& to, ReplyMemory& memory) {
   to.string_value = memory.text("");
@@ -114,6 +147,9 @@ void fill_value(const Json* parameter, Value& to, ReplyMemory& memory) {
   if (to.type == kInteger) to.integer_value = value.get<std::int64_t>();
   if (to.type == kDouble) to.double_value = value.get<double>();
   if (to.type == kString) to.string_value = memory.text(value.get<std::string>());
+  if (to.type != kDoubleArray) return;
+  const auto places = places_in(to.double_array_value, value.size(), memory);
+  for (std::size_t i = 0; i < places.size(); ++i) places[i] = number_of(value[i]);
 }
 
 /// What its range and type do not say.
@@ -121,9 +157,20 @@ std::string constraints(const Json& parameter) {
   std::string text = parameter.value("unit", "");
   if (parameter.value("above_min", false))
     text += text.empty() ? "above its minimum" : ", above its minimum";
-  for (const Json& word : parameter["choices"])
-    text += (text.empty() ? "" : ", ") + word.get<std::string>();
+  for (const char* words : {"choices", "elements"}) {
+    for (const Json& word : parameter[words])
+      text += (text.empty() ? "" : ", ") + word.get<std::string>();
+  }
   return text;
+}
+
+/// The end of a range, of a list the one of all its elements: null where there is none.
+Json limit_of(const Json& parameter, const char* key, bool most) {
+  const Json& limit = parameter[key];
+  if (!limit.is_array()) return limit;
+  const auto less = [](const Json& a, const Json& b) { return number_of(a) < number_of(b); };
+  if (limit.empty() || std::ranges::any_of(limit, &Json::is_null)) return nullptr;
+  return most ? *std::ranges::max_element(limit, less) : *std::ranges::min_element(limit, less);
 }
 
 void fill_descriptor(const Json& name, const Json* parameter,
@@ -134,12 +181,12 @@ void fill_descriptor(const Json& name, const Json* parameter,
   if (parameter == nullptr) return;
   to.type = type_of(*parameter);
   to.read_only = !parameter->value("live", false);
-  const Json &min = (*parameter)["min"], &max = (*parameter)["max"];
+  const Json min = limit_of(*parameter, "min", false), max = limit_of(*parameter, "max", true);
   if (min.is_null() && max.is_null()) return;
   using Limits = std::numeric_limits<double>;
   const double least = min.is_null() ? Limits::lowest() : min.get<double>();
   const double most = max.is_null() ? Limits::max() : max.get<double>();
-  if (to.type == kDouble) {
+  if (to.type != kInteger) {
     places_in(to.floating_point_range, 1, memory)[0] = {least, most, 0.0};
   } else {  // an integer's limits are within 2^53
     places_in(to.integer_range, 1, memory)[0] = {static_cast<std::int64_t>(least),
@@ -230,11 +277,16 @@ void fill(const Json& answer, const ParameterQuestion& asked,
 
 void fill(const Json& answer, const ParameterQuestion& asked, ros::SetParameters_Response& reply,
           ReplyMemory& memory) {
-  const bool ok = answer.value("ok", false);
+  if (!answer.value("ok", false)) {  // the same of all, of however many
+    ::rcl_interfaces_msg_dds__SetParametersResult_ refused{};
+    fill_result(message_of(answer), refused, memory);
+    std::ranges::fill(places_in(reply.results, asked.count, memory), refused);
+    return;
+  }
   const auto places = places_in(reply.results, asked.names.size(), memory);
   for (std::size_t i = 0; i < places.size(); ++i) {
     const auto& name = asked.names[i].get_ref<const std::string&>();
-    fill_result(ok ? answer["results"].value(name, "") : message_of(answer), places[i], memory);
+    fill_result(answer["results"].value(name, ""), places[i], memory);
   }
 }
 

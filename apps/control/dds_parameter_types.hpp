@@ -10,10 +10,12 @@
 namespace tandem::apps {
 
 /// What a request asks of the registry, and what only the reply needs: the names in their order, or
-/// prefixes and a depth.
+/// prefixes and a depth; how many parameters it would set.
 struct ParameterQuestion {
   Json question;
+  Json refusal{};  ///< an answer: the registry is not asked; null: it is
   Json names = Json::array();
+  std::size_t count = 0;
   std::uint64_t depth = 0;
 };
 

@@ -21,15 +21,6 @@
 namespace tandem::apps {
 namespace {
 
-std::string shown_value(const ParameterRow& row) {
-  const double value = row.now();
-  if (std::isnan(value)) return "-";
-  if (row.type == ParameterType::kBoolean) return value == 1.0 ? "true" : "false";
-  if (row.type == ParameterType::kChoice)
-    return row.facts.choices.at(static_cast<std::size_t>(value));
-  return fmt::format("{:g}", value);
-}
-
 const char* backend_text(runtime::BackendKind backend) {
   switch (backend) {
     case runtime::BackendKind::kSim: break;
@@ -112,13 +103,23 @@ void add_estimation_facts(const runtime::Experiment& e, Facts& facts) {
   }
 }
 
-/// "link_damping_Nms_rad = 0 Nms/rad, live: damps …" of each.
+/// "link_damping_Nms_rad = 0 Nms/rad, live: damps …" of each; a list is one line where its elements
+/// are alike.
 void add_parameter_facts(runtime::ControllerHost& host, const std::string& controller,
                          Facts& facts) {
   for (const auto& one : host.owned()) {
     if (one == nullptr || one->name != controller) continue;
-    for (const ParameterRow& row : one->io->parameters.rows()) {
-      facts.add("", fmt::format("{} = {}{}{}: {}", row.name, shown_value(row),
+    const auto& rows = one->io->parameters.rows();
+    std::string told;  // a list that has its line
+    for (const ParameterRow& row : rows) {
+      if (!row.list.empty() && row.list == told) continue;
+      const std::string value = row.text();
+      const bool alike = std::ranges::all_of(rows, [&](const ParameterRow& other) {
+        return other.list != row.list || other.text() == value;
+      });
+      if (!row.list.empty() && alike) told = row.list;
+      facts.add("", fmt::format("{} = {}{}{}: {}", row.list.empty() || !alike ? row.name : row.list,
+                                value.empty() ? "-" : value,
                                 row.facts.unit.empty() ? "" : " " + row.facts.unit,
                                 row.facts.live ? ", live" : "", row.facts.doc));
     }

@@ -1,5 +1,6 @@
 #include "apps/run/dds_run.hpp"
 
+#include <cmath>
 #include <random>
 
 #include "robot/robot_files.hpp"
@@ -18,6 +19,37 @@ std::vector<std::pair<std::string, rt::Percentiles>> times_of(
   for (const auto& one : names.all()) {
     const rt::Percentiles times = one->calls.percentiles();
     if (times.max > 0) all.emplace_back(one->name, times);
+  }
+  return all;
+}
+
+/// A list is one parameter.
+std::vector<dds::NodeParameter> parameters_of(runtime::RunServices& services) {
+  using Type = dds::NodeParameter::Type;
+  std::vector<dds::NodeParameter> all;
+  for (const runtime::ControllerStatus& controller : services.controllers()) {
+    const auto its = services.parameters(controller.name);
+    for (const runtime::ParameterStatus& one :
+         its.value_or(std::vector<runtime::ParameterStatus>{})) {
+      const std::string name = controller.name + "." + (one.list.empty() ? one.name : one.list);
+      if (!one.list.empty()) {
+        if (all.empty() || all.back().name != name) all.push_back({name, Type::kDoubles});
+        all.back().numbers.push_back(one.value);
+        continue;
+      }
+      dds::NodeParameter& made = all.emplace_back();
+      made.name = name;
+      if (std::isnan(one.value)) continue;
+      made.number = one.value;
+      switch (one.type) {
+        case ParameterType::kNumber: made.type = Type::kDouble; break;
+        case ParameterType::kInteger: made.type = Type::kInteger; break;
+        case ParameterType::kBoolean: made.type = Type::kBool; break;
+        case ParameterType::kChoice:
+          made.type = Type::kText;
+          made.text = one.facts.choices.at(static_cast<std::size_t>(one.value));
+      }
+    }
   }
   return all;
 }
@@ -81,7 +113,9 @@ void DdsRun::start(runtime::RobotCycle& cycle, hal::ParallelSource* parallel) {
                      .texts =
                          [&services](std::uint64_t& seen, std::vector<hal::TextEvent>& out) {
                            (void)services.texts().read(seen, out);
-                         }});
+                         },
+                     .parameter_version = [&services] { return services.parameter_version(); },
+                     .parameters = [&services] { return parameters_of(services); }});
 }
 
 DdsResult DdsRun::finish() { return {participant_->config().domain, publisher_->stop()}; }

@@ -62,6 +62,13 @@ log::RunInfo info_of(const WiredComposition& c) {
   info.description_hash = c.kernels->description_hash;
   info.kernel_sha256 = c.kernels.sha256();
   info.controllers = controller_lines(*c.controllers);
+  for (const auto& one : c.controllers->owned()) {
+    if (one == nullptr) continue;
+    for (const ParameterRow& row : one->io->parameters.rows()) {
+      const std::string value = row.text();
+      if (!value.empty()) info.parameters.push_back(one->name + "." + row.name + " = " + value);
+    }
+  }
   add_place_and_time(info);
   for (const auto& file : e.files) {  // each once
     const auto same = [&](const auto& one) { return one.first == file.first; };

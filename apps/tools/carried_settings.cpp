@@ -63,10 +63,15 @@ void carry_damping(TomlTable& controller, const robot::RobotFiles& robot,
     return;
   }
   const auto values = parameters.values();
-  for (const std::string& joint : joints) {
+  std::vector<double> each;
+  const auto given = values.find(key);
+  const bool is_list = given != values.end() && given->second.starts_with('[');
+  if (is_list) each = parameters.numbers_or(key, {}, kNotNegative);
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    const std::string& joint = joints[i];
     if (std::ranges::find(all, joint) == all.end()) continue;
-    double damping = 0.0;
-    if (values.contains(key)) damping = parameters.number_or(key, 0.0, kNotNegative);
+    double damping = i < each.size() ? each[i] : 0.0;
+    if (given != values.end() && !is_list) damping = parameters.number_or(key, 0.0, kNotNegative);
     if (values.contains(key + "." + joint))
       damping = parameters.table(key).number_or(joint, 0.0, kNotNegative);
     if (damping > 0.0) carried.damping_Nms_rad[joint] = damping;

@@ -113,7 +113,8 @@ Status DdsServices::add_parameters(const char* name) {
         return dds::ServiceWork<Response>{.answer = [this, text, asked = std::move(asked), asker,
                                                      after_stop = registry_->last_stop()](
                                                         Response& reply, dds::ReplyMemory& memory) {
-          fill(ask(text, asker, after_stop), asked, reply, memory);
+          const bool asks = asked.refusal.is_null();
+          fill(asks ? ask(text, asker, after_stop) : asked.refusal, asked, reply, memory);
         }};
       });
 }

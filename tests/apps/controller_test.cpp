@@ -383,6 +383,91 @@ TEST_F(Controllers, ParametersAreShownAndSetByAnotherProcess) {
   EXPECT_EQ(end(), 0);
 }
 
+TEST_F(Controllers, HaveListsOfParametersByJoint) {
+  begin("");
+  EXPECT_EQ(asked("controller load gravity_compensation --name weigh --set "
+                  "'damping_Nms_rad = [0.2, 0.15]'")["done"],
+            true);
+  nlohmann::json damping;
+  for (const auto& one : asked("controller show weigh")["controllers"][0]["parameters"])
+    if (one["name"] == "damping_Nms_rad") damping = one;
+  EXPECT_EQ(damping["type"], "numbers");
+  EXPECT_EQ(damping["elements"], nlohmann::json({"joint1", "joint2"}));
+  EXPECT_EQ(damping["value"], nlohmann::json({0.2, 0.15}));
+  EXPECT_EQ(damping["default"], nlohmann::json({0.1, 0.1}));
+  EXPECT_EQ(damping["min"], nlohmann::json({0.0, 0.0}));
+  const std::string shown = to_run("controller show weigh").out;
+  expect(shown, "damping_Nms_rad.joint2  0.15");
+  expect(shown, "stiffness_Nm_rad        1.2");
+  expect(shown, "(2 elements)");
+
+  EXPECT_EQ(asked("controller set weigh damping_Nms_rad=0.05")["values"]["weigh.damping_Nms_rad"],
+            nlohmann::json({0.05, 0.05}));
+  EXPECT_EQ(asked("controller set weigh damping_Nms_rad.joint2=0.125")["values"],
+            nlohmann::json({{"weigh.damping_Nms_rad.joint2", 0.125}}));
+  expect(to_run("controller set weigh 'damping_Nms_rad=[0.125, 0]'").out,
+         "weigh.damping_Nms_rad  0.125, 0");
+  expect(
+      refused("controller set weigh 'damping_Nms_rad=[0.1, 0, 0]'"),
+      "weigh.damping_Nms_rad: has 2 elements, not 3 (give one number for all, or one for each of "
+      "joint1, joint2)");
+  expect(refused("controller set weigh 'damping_Nms_rad=[0.1, -1]'"),
+         "weigh.damping_Nms_rad.joint2: -1 is out of range");
+  expect(refused("controller set weigh 'damping_Nms_rad=[0.1, true]'"),
+         "other things than numbers");
+  expect(refused("controller set weigh 'damping_Nms_rad=[0.1, 0'"), "is a number, not '[0.1, 0'");
+  expect(refused("controller set weigh damping_Nms_rad.joint3=0"), "has no such parameter");
+  expect(refused("controller set weigh damping_Nms_rad=0 damping_Nms_rad.joint1=0.1"),
+         "weigh.damping_Nms_rad.joint1: is named twice");
+  expect(refused("controller load gravity_compensation --name x --set 'damping_Nms_rad = [1]'"),
+         "damping_Nms_rad: has 1 numbers");
+  expect(to_run("ask '{\"do\": \"controller.set\", \"parameters\": "
+                "{\"weigh.damping_Nms_rad.joint1\": 0.0625}}'")
+             .out,
+         "0.0625");
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Controllers, HaveTheirParametersInTheLogAndInItsReport) {
+  log_flags_ = "--log runs";
+  begin("");
+  ASSERT_EQ(to_run("controller load gravity_compensation --name weigh --set ramp_s=2").status, 0);
+  ASSERT_EQ(asked("controller set hold link_damping_Nms_rad=0.5")["done"], true);
+  ASSERT_EQ(asked("controller set hold link_damping_Nms_rad=0.25")["done"], true);
+  EXPECT_EQ(end(), 0);
+  const std::string log = "runs/double_pendulum-hold-001.mcap";
+  const std::string info = tandem("log info " + log).out;
+  expect(info, "hold.link_damping_Nms_rad = 0\n");
+  expect(info, "hold.interaction = stiff\n");
+  const std::string events = tandem("log csv " + log + " --topic event").out;
+  expect(events, "parameter loaded: weigh.ramp_s = 2\"");
+  expect(events, "parameter loaded: weigh.damping_Nms_rad.joint2 = 0.1\"");
+  expect(events, "parameter set: hold.link_damping_Nms_rad = 0.25\"");
+  ASSERT_EQ(tandem("report " + log + " -o page").status, 0);
+  const std::string page = read_text(folder_ / "page/report.html");
+  expect(page, "Parameters");
+  const std::size_t row = page.find("hold.link_damping_Nms_rad");
+  ASSERT_NE(row, std::string::npos);
+  expect(page.substr(row, 200), "0.25 at ");
+  expect(page.substr(row, 200), ">2<");
+  expect(page, "weigh.ramp_s");
+}
+
+TEST_F(Controllers, ManyParametersInOneRequestAreRefusedAndTheRunGoesOn) {
+  begin("");
+  nlohmann::json question{{"do", "controller.set"}, {"name", "hold"}};  // 128 kB fit in a word
+  for (int i = 0; i < 10'000; ++i) question["parameters"][std::to_string(i)] = 1;
+  for (const bool each : {false, true}) {
+    question["each"] = each;
+    write_text(folder_ / "many.json", question.dump());
+    const Outcome said = to_run("ask \"$(cat many.json)\"");
+    EXPECT_NE(said.status, 0);
+    expect(said.out + said.err, "sets 10000 parameters at once");
+  }
+  EXPECT_EQ(asked("controller set hold link_damping_Nms_rad=1")["done"], true);
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(Controllers, OfARunWhoseTimeStandsChangeWithItsNextCycle) {
   begin("");
   EXPECT_EQ(to_run("controller load hold --name rest").status, 0);

@@ -386,6 +386,125 @@ TEST_F(RunOverDds, ReadAndSetParametersAsThoseOfARosNode) {
   EXPECT_EQ(end(), 0);
 }
 
+/// A list's name and numbers.
+struct RosList : RosParameter {
+  RosList(std::string its_name, std::vector<double> its_numbers)
+      : RosParameter(std::move(its_name), 0.0), numbers(std::move(its_numbers)) {
+    sample.value.type = 8;  // PARAMETER_DOUBLE_ARRAY
+    const auto count = static_cast<std::uint32_t>(numbers.size());
+    sample.value.double_array_value = {count, count, numbers.data(), false};
+  }
+  std::vector<double> numbers;
+};
+
+TEST_F(RunOverDds, HaveParametersByJointAsDoubleArraysAndTellOfTheirChanges) {
+  using namespace dds::rcl_interfaces;
+  using Values = std::vector<double>;
+  begin_with("local");
+  auto events = dds::Reader<ParameterEvent>::create(
+      *participant_, "rt/parameter_events",
+      {.reliable = true, .transient_local = false, .depth = 1000, .user_data = {}});
+  ASSERT_TRUE(events);
+  ASSERT_TRUE(eventually([&] { return events->endpoint().matched() == 1; }));
+  std::string told;  // of "weigh"
+  const auto tells = [&](const std::string& what) {
+    return eventually([&] {
+      events->take([&](const ParameterEvent& event, const auto&) {
+        EXPECT_STREQ(event.node, "/tandem_run");
+        const auto add = [&](const char* sign, const auto& all) {
+          for (std::uint32_t i = 0; i < all._length; ++i)
+            told += sign + std::string(all._buffer[i].name) + " ";
+        };
+        add("+", event.new_parameters);
+        add("~", event.changed_parameters);
+        add("-", event.deleted_parameters);
+      });
+      return told.find(what) != std::string::npos;
+    });
+  };
+  ASSERT_EQ(to_run("controller load gravity_compensation --name weigh").status, 0);
+  EXPECT_TRUE(tells("+weigh.damping_Nms_rad ")) << told;
+
+  std::string damping = "weigh.damping_Nms_rad";
+  char* asked[]{damping.data()};
+  const dds_sequence_string one{1, 1, asked, false};
+  const auto call_node = [&]<class Response, class Request>(
+                             const char* name, const Request& request,
+                             const std::function<void(const Response&)>& use) {
+    auto client = dds::ServiceClient<Request, Response>::create(*participant_,
+                                                                std::string("tandem_run/") + name);
+    ASSERT_TRUE(client);
+    const Status done = client->call(request, std::chrono::seconds(30), use);
+    EXPECT_TRUE(done) << done.error().to_string();
+  };
+  const auto get = [&] {
+    Values values;
+    call_node.operator()<GetParameters_Response>(
+        "get_parameters", GetParameters_Request{0, 0, one},
+        [&](const GetParameters_Response& reply) {
+          ASSERT_EQ(reply.values._length, 1U);
+          EXPECT_EQ(reply.values._buffer[0].type, 8);
+          const auto& list = reply.values._buffer[0].double_array_value;
+          values.assign(list._buffer, list._buffer + list._length);
+        });
+    return values;
+  };
+  EXPECT_EQ(get(), Values({0.1, 0.1}));
+  call_node.operator()<GetParameterTypes_Response>(
+      "get_parameter_types", GetParameterTypes_Request{0, 0, one},
+      [&](const GetParameterTypes_Response& reply) { EXPECT_EQ(reply.types._buffer[0], 8); });
+  call_node.operator()<DescribeParameters_Response>(
+      "describe_parameters", DescribeParameters_Request{0, 0, one},
+      [&](const DescribeParameters_Response& reply) {
+        ASSERT_EQ(reply.descriptors._length, 1U);
+        const auto& it = reply.descriptors._buffer[0];
+        EXPECT_EQ(it.type, 8);
+        EXPECT_FALSE(it.read_only);
+        EXPECT_STREQ(it.additional_constraints, "Nms/rad, joint1, joint2");
+        ASSERT_EQ(it.floating_point_range._length, 1U);
+        EXPECT_EQ(it.floating_point_range._buffer[0].from_value, 0.0);
+      });
+
+  const auto set = [&](std::vector<::rcl_interfaces_msg_dds__Parameter_> samples) {
+    const auto count = static_cast<std::uint32_t>(samples.size());
+    Texts reasons;
+    call_node.operator()<SetParameters_Response>(
+        "set_parameters", SetParameters_Request{0, 0, {count, count, samples.data(), false}},
+        [&](const SetParameters_Response& reply) {
+          for (std::uint32_t i = 0; i < reply.results._length; ++i) {
+            reasons.emplace_back(reply.results._buffer[i].reason);
+            EXPECT_EQ(reply.results._buffer[i].successful, reasons.back().empty());
+          }
+        });
+    return reasons;
+  };
+  RosList both(damping, {0.2, 0.15}), short_one(damping, {0.2}), wrong(damping, {0.2, -1.0});
+  EXPECT_EQ(set({both.sample}), Texts{""});
+  EXPECT_EQ(get(), Values({0.2, 0.15}));
+  EXPECT_TRUE(tells("~weigh.damping_Nms_rad ")) << told;
+  EXPECT_NE(set({short_one.sample}).at(0).find("has 2 elements, not 1"), std::string::npos);
+  EXPECT_NE(set({wrong.sample}).at(0).find("weigh.damping_Nms_rad.joint2: -1 is out of range"),
+            std::string::npos);
+  std::vector<std::int64_t> whole{0, 0};
+  RosList integers(damping, {});
+  integers.sample.value.type = 7;  // PARAMETER_INTEGER_ARRAY, as of `ros2 param set … "[0, 0]"`
+  integers.sample.value.integer_array_value = {2, 2, whole.data(), false};
+  EXPECT_EQ(set({integers.sample}), Texts{""});
+  EXPECT_EQ(get(), Values({0, 0}));
+  RosParameter element(damping + ".joint2", 0.125), all(damping, 0.25);
+  EXPECT_EQ(set({all.sample, element.sample}), Texts({"", ""}));
+  EXPECT_EQ(get(), Values({0.25, 0.125}));
+
+  const Texts many = set(std::vector(10'000, all.sample));
+  ASSERT_EQ(many.size(), 10'000U) << "an answer for each, as a client expects it";
+  EXPECT_NE(many.front().find("sets "), std::string::npos) << many.front();
+  EXPECT_EQ(many.back(), many.front());
+  EXPECT_EQ(get(), Values({0.25, 0.125}));
+  ASSERT_EQ(to_run("controller unload weigh").status, 0);
+  EXPECT_TRUE(tells("-weigh.damping_Nms_rad ")) << told;
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(RunOverDds, SetNoParametersUnlessTheExperimentAllowsIt) {
   using namespace dds::rcl_interfaces;
   begin_with("");

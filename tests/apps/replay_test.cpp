@@ -251,6 +251,16 @@ TEST_F(LogReplay, IsSimulatedAsTheRecordingWas) {
   EXPECT_NE(read_text(folder_ / "two.toml").find("[hal]\ndelay_cycles = 2\n"), std::string::npos);
   EXPECT_NE(read_text(folder_ / "two.toml").find("\nlink_damping_Nms_rad = 0.05\n"),
             std::string::npos);
+  // By joint.
+  edit("replay.toml", "link_damping_Nms_rad = 0.05", "link_damping_Nms_rad = [0.05, 0.025]");
+  ASSERT_EQ(tandem("run replay.toml -q --log by_joint").status, 0);
+  ASSERT_EQ(tandem("log replay by_joint/double_pendulum-replay-001.mcap --robot robot.toml --out "
+                   "three.toml")
+                .status,
+            0);
+  EXPECT_NE(read_text(folder_ / "three.toml")
+                .find("\nlink_damping_Nms_rad = { \"joint1\" = 0.05, \"joint2\" = 0.025 }\n"),
+            std::string::npos);
 }
 
 TEST_F(LogReplay, RefusesWithStatus2AndWritesNothing) {

@@ -23,12 +23,10 @@ class Running : public Program {
   /// The same with no flags but these, and without waiting.
   void start(const std::string& flags) {
     run_ = std::thread([this, flags] {
-      const std::string command = "cd " + shell_word(folder_.string()) +
-                                  " && echo $$ >pid && exec " +
-                                  shell_word(TANDEM_BINARY_DIR "/bin/tandem") +
-                                  " run hold.toml --no-log -q --json run.json "
-                                  "--socket " +
-                                  socket_ + " " + flags + " 2>run.txt";
+      const std::string command =
+          "cd " + shell_word(folder_.string()) + " && echo $$ >pid && exec " +
+          shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " run hold.toml " + log_flags_ +
+          " -q --json run.json --socket " + socket_ + " " + flags + " 2>run.txt";
       const int raw = std::system(command.c_str());
       status_ = WIFEXITED(raw) ? WEXITSTATUS(raw) : -1;
     });
@@ -59,6 +57,7 @@ class Running : public Program {
     return join();
   }
 
+  std::string log_flags_ = "--no-log";  // of begin() and start()
   std::string socket_;
   std::thread run_;
   int status_ = -1;

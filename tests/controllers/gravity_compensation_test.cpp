@@ -82,12 +82,27 @@ TEST(GravityCompensation, HasTheRobotsImpedanceUntilOneIsSet) {
   EXPECT_EQ(run.command.damping_Nms_rad()[1], 5.0);
 }
 
+TEST(GravityCompensation, HasAnImpedanceOfItsOwnForEachJoint) {
+  test::Harness run(pendulum_robot(), "gravity_compensation", "damping_Nms_rad = [4.0, 2.0]\n",
+                    pendulum());
+  ASSERT_EQ(run.problem(), "");
+  run.start();
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_EQ(run.command.damping_Nms_rad()[0], 4.0);
+  EXPECT_EQ(run.command.damping_Nms_rad()[1], 2.0);
+  run.set("damping_Nms_rad." + run.robot.joints[1].name, 3.0);
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_EQ(run.command.damping_Nms_rad()[0], 4.0);
+  EXPECT_EQ(run.command.damping_Nms_rad()[1], 3.0);
+}
+
 TEST(GravityCompensation, RefusesAStiffnessThatIsTooMuch) {
   EXPECT_EQ(test::Harness(pendulum_robot(), "gravity_compensation", "stiffness_Nm_rad = 1e6\n",
                           pendulum())
                 .problem(),
-            "experiment.toml:1: stiffness_Nm_rad: 1e+06 is out of range (must be at least 0 and at "
-            "most 1000)");
+            "experiment.toml:1: stiffness_Nm_rad: " + pendulum_robot().joints[0].name +
+                ": 1e+06 is out of range (must be at least 0 and at "
+                "most 1000)");
 }
 
 TEST(GravityCompensation, CarriesARobotThatStandsOnBothFeet) {

@@ -78,12 +78,16 @@ class Harness {
     return code;
   }
 
-  /// Sets a live parameter between two cycles.
+  /// Sets a live parameter between two cycles; of a list every element, or one.
   void set(const std::string& name, double value) {
-    auto& rows = setup.io->parameters.rows();
-    const auto row = std::ranges::find(rows, name, &ParameterRow::name);
-    ASSERT_TRUE(row != rows.end() && row->facts.live) << name;
-    setup.io->parameters.set(*row, value);
+    bool found = false;
+    for (ParameterRow& row : setup.io->parameters.rows()) {
+      if (row.name != name && row.list != name) continue;
+      ASSERT_TRUE(row.facts.live) << name;
+      setup.io->parameters.set(row, value);
+      found = true;
+    }
+    ASSERT_TRUE(found) << name;
   }
 
   hal::Robot robot;

@@ -85,7 +85,106 @@ TEST(LiveParameter, IsDeclaredOnceAndNotTooOften) {
     (void)many.parameters.declare(its, "p" + std::to_string(i), {.otherwise = 1});
   EXPECT_EQ(many.problem(), "");
   (void)many.parameters.declare(its, "more", {.otherwise = 1});
-  EXPECT_NE(many.problem().find("more than 256"), std::string::npos);
+  EXPECT_NE(many.problem().find("more than 1024"), std::string::npos);
+}
+
+/// Declares a list "kp" of the joints a, b.c and d that the file gives as `line`.
+struct DeclaredList {
+  using Names = std::vector<std::string>;
+
+  DeclaredList(const std::string& line, const std::vector<ParameterFacts>& facts,
+               const Names& names = {"a", "b.c", "d"}, const std::string& name = "kp")
+      : document(*TomlDocument::parse("\n" + line + "\n", "e.toml")) {
+    TomlTable table = document.root();
+    kp = parameters.declare_list(table, name, names, facts);
+    table.finish();
+  }
+  [[nodiscard]] std::vector<double> values() const { return {kp.begin(), kp.end()}; }
+  [[nodiscard]] std::string problem() const {
+    return document.diagnostics().empty() ? "" : document.diagnostics().front().to_string();
+  }
+
+  TomlDocument document;
+  Parameters parameters;
+  std::vector<Parameter> kp;
+};
+
+TEST(ParameterList, HasOneNumberForAllOneForEachOrThoseThatAreNamed) {
+  using Values = std::vector<double>;
+  const std::vector<ParameterFacts> facts{{.min = 0, .max = 500, .otherwise = 10, .live = true}};
+  const auto values = [&](const std::string& line) {
+    const DeclaredList list(line, facts);
+    EXPECT_EQ(list.problem(), "") << line;
+    return list.values();
+  };
+  EXPECT_EQ(values(""), Values({10, 10, 10}));
+  EXPECT_EQ(values("kp = 40"), Values({40, 40, 40}));
+  EXPECT_EQ(values("kp = [40, 40.5, 20]"), Values({40, 40.5, 20}));
+  EXPECT_EQ(values("kp = { 'b.c' = 30 }"), Values({10, 30, 10}));
+  EXPECT_EQ(values("[kp]\na = 1\nd = 2"), Values({1, 10, 2}));
+
+  const DeclaredList own("", {{.max = 1, .otherwise = 0.5}, {.otherwise = 2}, {.otherwise = 3}});
+  EXPECT_EQ(own.problem(), "");
+  EXPECT_EQ(own.values(), Values({0.5, 2, 3}));
+  DeclaredList list("kp = 40", facts);
+  auto& rows = list.parameters.rows();
+  ASSERT_EQ(rows.size(), 3U);
+  EXPECT_EQ(rows[1].name, "kp.b.c");
+  EXPECT_EQ(rows[1].element(), "b.c");
+  EXPECT_EQ(rows[1].list, "kp");
+  list.parameters.set(rows[1], 7);
+  EXPECT_EQ(list.values(), Values({40, 7, 40}));
+  EXPECT_TRUE(list.kp[1].changed());
+  EXPECT_FALSE(list.kp[0].changed());
+  EXPECT_FALSE(DeclaredList("", {{.otherwise = kNotGiven}}).kp[0].given());
+}
+
+TEST(ParameterList, NamesFileLineKeyAndElementOfWhatIsWrong) {
+  const std::vector<ParameterFacts> facts{{.min = 0, .max = 500, .otherwise = 10}};
+  const auto wrong = [&](const std::string& line) { return DeclaredList(line, facts).problem(); };
+  EXPECT_EQ(wrong("kp = [40, 40]"),
+            "e.toml:2: kp: has 2 numbers (give one for all, or one for each of a, b.c, d)");
+  EXPECT_NE(wrong("kp = []"), "");
+  EXPECT_NE(wrong("kp = [40, 40, 40, 40]"), "");
+  EXPECT_EQ(wrong("kp = [40, 501, 40]"),
+            "e.toml:2: kp: b.c: 501 is out of range (must be at least 0 and at most 500)");
+  EXPECT_NE(wrong("kp = -1"), "");
+  EXPECT_NE(wrong("kp = nan"), "");
+  EXPECT_NE(wrong("kp = [40, inf, 40]"), "");
+  EXPECT_NE(wrong("kp = [40, 'much', 40]"), "");
+  EXPECT_NE(wrong("kp = 'much'"), "");
+  EXPECT_NE(wrong("kp = true"), "");
+  EXPECT_NE(wrong("kp = { a = 501 }").find("e.toml:2: kp: a: 501"), std::string::npos);
+  EXPECT_NE(wrong("kp = { aa = 1 }").find("kp.aa: unknown key"), std::string::npos);
+  EXPECT_NE(DeclaredList("", {{.min = 0}}).problem().find("kp: this key is missing"),
+            std::string::npos);
+  EXPECT_NE(DeclaredList("kp = { a = 1 }", {{.min = 0}}).problem(), "") << "b.c and d are required";
+  EXPECT_NE(DeclaredList("kp = [1, 2.5, 3]", {{.whole = true, .otherwise = 1}}).problem(), "");
+}
+
+TEST(ParameterList, ThatIsDeclaredWronglyIsAnErrorOfTheController) {
+  const auto wrong = [](const std::vector<ParameterFacts>& facts, const char* name = "kp") {
+    return DeclaredList("", facts, {"a", "b.c", "d"}, name).problem();
+  };
+  EXPECT_EQ(wrong({{.min = 0, .max = 5, .otherwise = 6}}),
+            "e.toml:1: kp: has a default outside its range (correct the controller)");
+  EXPECT_NE(wrong({{.otherwise = 1}, {.otherwise = 1}}), "");
+  EXPECT_NE(wrong({}), "");
+  EXPECT_NE(wrong({{.otherwise = true}}), "");
+  EXPECT_NE(wrong({{.choices = {"x"}, .otherwise = "x"}}), "");
+  EXPECT_NE(wrong({{.otherwise = 1}}, "k p"), "");
+  const std::vector<ParameterFacts> one{{.otherwise = 1}};
+  EXPECT_NE(DeclaredList("", one, {"a", "a"}).problem(), "");
+  EXPECT_NE(DeclaredList("", one, {"a", ""}).problem(), "");
+  EXPECT_EQ(DeclaredList("kp = 1", one, {}).problem(), "") << "of no joints";
+  DeclaredList twice("", one);
+  TomlTable table = twice.document.root();
+  EXPECT_EQ(twice.parameters.declare_list(table, "kp", {"e"}, one).size(), 1U);
+  EXPECT_NE(twice.problem().find("declares this parameter twice"), std::string::npos);
+  DeclaredList many("", one, DeclaredList::Names(Parameters::kMost + 1, "x"));
+  EXPECT_NE(many.problem().find("more than 1024"), std::string::npos);
+  EXPECT_EQ(many.kp.size(), Parameters::kMost + 1) << "handles that are no numbers, and harmless";
+  EXPECT_TRUE(std::isnan(many.kp.back()));
 }
 
 TEST(LiveParameter, IsArchivedWithWhetherItsChangeWasSeen) {

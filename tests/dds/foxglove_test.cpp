@@ -43,6 +43,7 @@ const std::set<std::string> kPublished{
     "geometry_msgs/msg/WrenchStamped",
     "nav_msgs/msg/Odometry",
     "rcl_interfaces/msg/Log",
+    "rcl_interfaces/msg/ParameterEvent",
     "rosgraph_msgs/msg/Clock",
     "sensor_msgs/msg/Imu",
     "sensor_msgs/msg/JointState",

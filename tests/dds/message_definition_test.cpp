@@ -88,6 +88,9 @@ constexpr Published kDefinitions[] = {
     {"rcl_interfaces/srv/SetParametersAtomically_Response",
      "31b1a38c5b0b9d893ee24da45f69638f4561c78461d82d52750f429b534502b8"},
     {"rcl_interfaces/msg/Log", "e28ce254ca8abc06abf92773b74602cdbf116ed34fbaf294fb9f81da9f318eac"},
+    // several: rosbag2's and zenoh's tests, of topics of a Jazzy graph
+    {"rcl_interfaces/msg/ParameterEvent",
+     "043e627780fcad87a22d225bc2a037361dba713fca6a6b9f4b869a5aa0393204"},
     {"rcl_interfaces/msg/Parameter",
      "ddfe6442cffc462317adb5c92536a7b6dd55858c5c3e1e328165a6b73c2831af"},
     {"rcl_interfaces/msg/ParameterValue",

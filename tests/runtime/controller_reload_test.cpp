@@ -19,6 +19,7 @@ struct Build : Controller {
   std::size_t moved = 0;            ///< of these, that stand in another list
   std::string needs;                ///< a parameter
   std::vector<std::string> live{};  ///< parameters, in this order
+  std::vector<std::string> list{};  ///< elements of a live list "gains"
   double otherwise = 1.0, most = 10.0;
   bool told = false;  ///< it has an input
   bool refuses = false;
@@ -34,6 +35,9 @@ struct Build : Controller {
     for (const std::string& name : live) {
       (void)setup.parameter(name, {.max = most, .otherwise = otherwise, .live = true});
     }
+    if (!list.empty())
+      (void)setup.list_parameters("gains", list,
+                                  {{.max = most, .otherwise = otherwise, .live = true}});
     middle_rad.assign(joints.size() + moved, 7.0);
     others.assign(more - moved, 0.0);
     if (refuses) return fail("this build has a mistake", "mend it");
@@ -323,6 +327,28 @@ TEST(ControllerReload, KeepsWhatWasSetByName) {
   EXPECT_EQ(value("kp"), 4.0) << "also when there are others beside it";
   (void)run.reload(next({"kp"}, 2.0, 3.0));
   EXPECT_EQ(value("kp"), 2.0) << "4 is beyond the new range";
+}
+
+TEST(ControllerReload, KeepsWhatWasSetOfAListByTheElementsName) {
+  ReloadRun run;
+  const auto next = [](std::vector<std::string> list) {
+    auto build = std::make_shared<Build>();
+    build->list = std::move(list);
+    return build;
+  };
+  (void)run.reload(next({"elbow", "wrist"}));
+  const auto set = run.while_cycling([&] {
+    return run.services().set_parameters(
+        {{.controller = "arm", .parameter = "gains", .value = std::vector<double>{4.0, 5.0}}});
+  });
+  ASSERT_TRUE(set) << set.error().to_string();
+  const std::uint64_t loads = run.services().loads();
+  (void)run.reload(next({"wrist", "hand", "elbow"}));
+  std::string values;
+  for (const ParameterStatus& one : *run.services().parameters("arm"))
+    values += one.name + " " + std::to_string(static_cast<int>(one.value)) + " ";
+  EXPECT_EQ(values, "gains.wrist 5 gains.hand 1 gains.elbow 4 ");
+  EXPECT_NE(run.services().loads(), loads) << "what is shown of it is the new build's from now on";
 }
 
 // An active one that was reloaded was counted three times.

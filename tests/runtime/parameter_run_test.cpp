@@ -2,6 +2,9 @@
 // and again after a restore.
 #include <bit>
 #include <cmath>
+#include <map>
+#include <string>
+#include <vector>
 
 #include "log/log_file.hpp"
 #include "tests/log/scratch_folder.hpp"
@@ -34,6 +37,8 @@ class Tuned : public Controller {
         {.min = 1, .max = 9, .whole = true, .otherwise = 3, .live = true, .doc = "of nothing"});
     on_ = setup.parameter("on", {.otherwise = true, .live = true, .doc = "false: no offset"});
     length_m_ = setup.parameter("length_m", {.otherwise = 0.5, .doc = "fixed"});
+    gains_ = setup.list_parameters("gains", {"x", "y", "z.0"},
+                                   {{.min = 0, .max = 9, .otherwise = 1, .live = true}});
     setup.claim(0, hal::ControlMode::kPosition);
     return {};
   }
@@ -58,6 +63,7 @@ class Tuned : public Controller {
 
  private:
   Parameter offset_rad_, share_, word_, count_, on_, length_m_;
+  std::vector<Parameter> gains_;
   double here_rad_ = 0.0;
 };
 
@@ -129,6 +135,101 @@ TEST_F(ParameterRun, SetsAllOrNone) {
   EXPECT_EQ(value("word"), 1.0);
   EXPECT_EQ(value("count"), 4.0);
   EXPECT_EQ(value("on"), 0.0);
+  EXPECT_TRUE(cycle->faults().empty());
+}
+
+TEST_F(ParameterRun, SetsAListAllElementsAtOnceOrEachByItself) {
+  const auto gains = [&] {
+    return std::vector<double>{value("gains.x"), value("gains.y"), value("gains.z.0")};
+  };
+  using Values = std::vector<double>;
+  ASSERT_TRUE(set({{"tuned", "gains", 4}}));
+  steps(1);
+  EXPECT_EQ(gains(), Values({4, 4, 4}));
+  ASSERT_TRUE(set({{"tuned", "gains", Values{1, 2, 3}}}));
+  steps(1);
+  EXPECT_EQ(gains(), Values({1, 2, 3}));
+  const auto snapshot = cycle->save();
+  ASSERT_TRUE(snapshot);
+  ASSERT_TRUE(set({{"tuned", "gains.z.0", 5}, {"tuned", "share", 0.5}}));
+  steps(1);
+  EXPECT_EQ(gains(), Values({1, 2, 5}));
+  ASSERT_TRUE(cycle->restore(*snapshot));
+  EXPECT_EQ(gains(), Values({1, 2, 3}));
+
+  EXPECT_EQ(refusal("gains", Values{1, 2}),
+            "tuned.gains: has 3 elements, not 2 (give one number for all, or one for each of x, y, "
+            "z.0)");
+  EXPECT_NE(refusal("gains", Values{}), "");
+  EXPECT_NE(refusal("gains", Values(10'000, 1.0)), "");
+  EXPECT_EQ(refusal("gains", Values{1, 10, 2}), "tuned.gains.y: 10 is out of range (give 0 to 9)");
+  EXPECT_EQ(refusal("gains", Values{1, std::nan(""), 2}),
+            "tuned.gains.y: has to be finite (give 0 to 9)");
+  EXPECT_EQ(refusal("gains", 10), "tuned.gains.x: 10 is out of range (give 0 to 9)");
+  EXPECT_EQ(refusal("gains", true), "tuned.gains.x: is a number, not true (give 0 to 9)");
+  EXPECT_EQ(refusal("gains.y", Values{1, 2, 3}),
+            "tuned.gains.y: is a number, not a list (give 0 to 9)");
+  EXPECT_EQ(refusal("share", Values{1}), "tuned.share: is a number, not a list (give 0 to 1)");
+  EXPECT_EQ(refusal("gians", 1),
+            "tuned.gians: the controller has no such parameter (did you mean 'gains'?)");
+  EXPECT_FALSE(set({{"tuned", "gains", 2}, {"tuned", "gains.y", 3}})) << "y is named twice";
+  EXPECT_FALSE(set(Wishes(kMostParameterChanges / 3 + 1, {"tuned", "gains", 2})));
+  EXPECT_FALSE(set(Wishes(10'000, {"tuned", "share", 0.2})));
+  steps(2);
+  EXPECT_EQ(gains(), Values({1, 2, 3})) << "all or none";
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+}
+
+TEST_F(ParameterRun, GoesOnWhenAControllerThatDeclaresThemWronglyIsLoaded) {
+  /// Declares "kp" as `declare` does.
+  struct Wrong : Controller {
+    explicit Wrong(void (*it)(ControllerSetup&)) : declare(it) {}
+    Status configure(ControllerSetup& setup) override {
+      declare(setup);
+      return {};
+    }
+    void start(const hal::CycleTime&, const hal::StateImage&,
+               hal::CommandImage&) noexcept override {}
+    Code update(const hal::CycleTime&, const hal::StateImage&,
+                hal::CommandImage&) noexcept override {
+      return Code::kOk;
+    }
+    void (*declare)(ControllerSetup&);
+  };
+  const auto refused = [&](void (*declare)(ControllerSetup&), const std::string& text = "") {
+    const auto parameters = TomlDocument::parse(text, "p.toml");
+    const auto asked =
+        services().load("wrong", std::make_shared<Wrong>(declare), *parameters, kNow);
+    EXPECT_FALSE(asked);
+    EXPECT_FALSE(services().parameters("wrong"));
+    return asked ? "" : asked.error().message;
+  };
+  EXPECT_NE(refused([](ControllerSetup& setup) {
+              for (int i = 0; i < 2; ++i) (void)setup.parameter("kp", {.otherwise = 1});
+            }).find("kp: the controller declares this parameter twice"),
+            std::string::npos);
+  EXPECT_NE(refused([](ControllerSetup& setup) {
+              (void)setup.parameter("kp", {.min = 0, .max = 5, .otherwise = 6});
+            }).find("kp: has a default outside its range"),
+            std::string::npos);
+  EXPECT_NE(
+      refused([](ControllerSetup& setup) {
+        (void)setup.joint_parameters("kp", std::vector<std::size_t>{0, 0}, {{.otherwise = 1}});
+      }).find("kp: has two elements of one name"),
+      std::string::npos);
+  EXPECT_NE(refused([](ControllerSetup& setup) {
+              for (int i = 0; i < 10'000; ++i)
+                (void)setup.parameter("p" + std::to_string(i), {.otherwise = 1});
+            }).find("more than 1024 parameters"),
+            std::string::npos);
+  const auto one = [](ControllerSetup& setup) {
+    (void)setup.list_parameters("kp", {"x", "y"}, {{.min = 0, .otherwise = 1}});
+  };
+  for (const char* text :
+       {"kp = [1, 2, 3]", "kp = nan", "kp = [1, 'x']", "kp = -1", "kp = {z = 1}"})
+    EXPECT_NE(refused(one, text).find("p.toml:1: kp"), std::string::npos) << text;
+  steps(3);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
   EXPECT_TRUE(cycle->faults().empty());
 }
 
@@ -260,6 +361,86 @@ TEST(ParameterLog, HasTheNameTheCycleAndEveryBitOfTheValue) {
     ++found;
   }
   EXPECT_EQ(found, 2 * std::size(values));
+}
+
+/// Joined by blanks what the log says of parameters that came, and those that were set.
+std::string told(const std::string& path) {
+  const auto log = log::LogFile::open(path);
+  const auto events = log->events();
+  std::string all;
+  for (const log::EventText& event : *events) {
+    const bool loaded = event.event.kind == log::EventKind::kParameterLoaded;
+    if (!loaded && event.event.kind != log::EventKind::kParameterSet) continue;
+    const auto it = log::parameter_of(event.text);
+    EXPECT_TRUE(it) << event.text;
+    if (!it) continue;
+    all += (all.empty() ? "" : " ") +
+           ((loaded ? "+" : "~") + it->name + "=" + std::to_string(it->value).substr(0, 4));
+  }
+  return all;
+}
+
+TEST(ParameterLog, HasWhatAControllerThatComesLaterStartsWith) {
+  const log::ScratchFolder folder;
+  const std::string path = folder / "load.mcap";
+  auto file = log::Recorder::open(path, {.joints = {"swing"}}, {});
+  ASSERT_TRUE(file);
+  test::SwingLoop run;
+  run.recorder = file->get();
+  run.add("tuned", std::make_shared<Tuned>());
+  run.begin({.settle_cycles = 200});
+  run.run_to(RunPhase::kRunning);
+  const auto parameters = TomlDocument::parse("share = 0.5\ngains = [1, 2, 3]", "p.toml");
+  ASSERT_TRUE(run.services().load("later", std::make_shared<Tuned>(), *parameters, kNow));
+  run.steps(3);
+  ASSERT_TRUE(run.services().set_parameters({{"later", "gains.y", 4}}, kNow));
+  run.steps(3);
+  EXPECT_EQ((*file)->close().dropped, 0U);
+  EXPECT_EQ(told(path),
+            "+later.offset_rad=0.00 +later.share=0.50 +later.word=0.00 +later.count=3.00 "
+            "+later.on=1.00 +later.length_m=0.50 +later.gains.x=1.00 +later.gains.y=2.00 "
+            "+later.gains.z.0=3.00 ~later.gains.y=4.00");
+}
+
+/// Declares two lists of 20 numbers.
+struct Many : Tuned {
+  Status configure(ControllerSetup& setup) override {
+    std::vector<std::string> names;
+    for (int i = 0; i < 20; ++i) names.push_back(std::to_string(i));
+    for (const char* name : {"a", "b"})
+      (void)setup.list_parameters(name, names, {{.otherwise = 1, .live = true}});
+    return {};
+  }
+};
+
+TEST(ParameterLog, HasNotMoreOfThemInACycleThanItsRingHasRoomFor) {
+  const log::ScratchFolder folder;
+  const std::string path = folder / "many.mcap";
+  auto file = log::Recorder::open(path, {.joints = {"swing"}}, {});
+  ASSERT_TRUE(file);
+  test::SwingLoop run;
+  run.recorder = file->get();
+  run.add("tuned", std::make_shared<Tuned>());
+  run.begin({.settle_cycles = 200});
+  run.run_to(RunPhase::kRunning);
+  const auto parameters = TomlDocument::parse("", "p.toml");
+  ASSERT_TRUE(run.services().load("many", std::make_shared<Many>(), *parameters, kNow));
+  run.steps(1);
+  // What is set before it is told has that event alone: the last one says what is in force.
+  ASSERT_TRUE(run.services().set_parameters({{"many", "b.19", 2}}, kNow));
+  run.steps(5);
+  EXPECT_EQ((*file)->close().dropped, 0U);
+  std::map<std::uint64_t, std::size_t> by_cycle;
+  const auto log = log::LogFile::open(path);
+  const auto events = log->events();
+  for (const log::EventText& event : *events) {
+    if (event.event.kind == log::EventKind::kParameterLoaded) ++by_cycle[event.event.cycle];
+  }
+  std::vector<std::size_t> counts;
+  for (const auto& [cycle, count] : by_cycle) counts.push_back(count);
+  EXPECT_EQ(counts, (std::vector<std::size_t>{16, 16, 7}));
+  EXPECT_NE(told(path).find("~many.b.19=2"), std::string::npos);
+  EXPECT_EQ(told(path).find("+many.b.19="), std::string::npos);
 }
 
 }  // namespace

@@ -153,6 +153,7 @@ const std::map<std::string, Make>& types() {
       TYPE(std_msgs, String),
       TYPE(rosgraph_msgs, Clock),
       TYPE(rcl_interfaces, Log),
+      TYPE(rcl_interfaces, ParameterEvent),
       TYPE(geometry_msgs, Twist),
       TYPE(geometry_msgs, TwistStamped),
       TYPE(trajectory_msgs, JointTrajectory),

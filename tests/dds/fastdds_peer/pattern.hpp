@@ -65,6 +65,12 @@ MEMBERS(rmw_dds_common::msg::dds_::Gid_, m.data())
 MEMBERS(rmw_dds_common::msg::dds_::NodeEntitiesInfo_, m.node_namespace(), m.node_name(),
         m.reader_gid_seq(), m.writer_gid_seq())
 MEMBERS(rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_, m.gid(), m.node_entities_info_seq())
+MEMBERS(rcl_interfaces::msg::dds_::ParameterValue_, m.type(), m.bool_value(), m.integer_value(),
+        m.double_value(), m.string_value(), m.byte_array_value(), m.bool_array_value(),
+        m.integer_array_value(), m.double_array_value(), m.string_array_value())
+MEMBERS(rcl_interfaces::msg::dds_::Parameter_, m.name(), m.value())
+MEMBERS(rcl_interfaces::msg::dds_::ParameterEvent_, m.stamp(), m.node(), m.new_parameters(),
+        m.changed_parameters(), m.deleted_parameters())
 MEMBERS(std_srvs::srv::dds_::Trigger_Request_, m.request_guid(), m.request_sequence(),
         m.structure_needs_at_least_one_member())
 MEMBERS(std_srvs::srv::dds_::Trigger_Response_, m.request_guid(), m.request_sequence(), m.success(),
@@ -87,7 +93,15 @@ void visit(T& value, Leaf& leaf) {
     leaf(value);
   } else if constexpr (IsList<T>::value) {
     leaf.list(value);
-    for (auto& element : value) visit(element, leaf);
+    for (auto&& element : value) {
+      if constexpr (std::is_same_v<T, std::vector<bool>>) {  // its elements are no objects
+        bool one = element;
+        leaf(one);
+        element = one;
+      } else {
+        visit(element, leaf);
+      }
+    }
   } else {
     members(value, leaf);
   }
@@ -98,6 +112,8 @@ template <class T>
 auto nth(std::uint64_t n) {
   if constexpr (kIsText<T>) {
     return T("s" + std::to_string(n));
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return n % 2 == 1;
   } else if constexpr (std::is_floating_point_v<T>) {
     return static_cast<T>(n) / 4;
   } else {
