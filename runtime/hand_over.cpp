@@ -51,7 +51,9 @@ void HandOver::show_controllers() noexcept TANDEM_RT {
     }
     if (views && io.marks.show_to_viewers(now_.time.time_ns, (active & only(slot)) != 0))
       now_.log.marks(now_.time, *loaded[slot]);
-    for (hal::TextEvent& event : io.texts.take(period_s)) {
+    const auto said = io.texts.take(period_s);
+    statistics_.take_texts({.said = said.size(), .left_out = io.texts.take_left_out()});
+    for (hal::TextEvent& event : said) {
       event.cycle = now_.time.cycle;
       event.time_ns = now_.time.time_ns;
       event.set_controller(loaded[slot]->name);

@@ -347,8 +347,41 @@ TEST(TextEvents, AFloodIsBoundedAndCounted) {
   EXPECT_NEAR(static_cast<double>(said), 50.0 + 40.0 + 1.0, 2.0)
       << "at once, 20 a second, and the last one";
   EXPECT_EQ(run.services().texts().count(), said);
+  EXPECT_EQ(run.cycle->statistics().texts().said, said);
+  EXPECT_EQ(run.cycle->statistics().texts().left_out, 200'001 - said);
   EXPECT_NE(last.find(" before it were too many"), std::string::npos) << last;
   EXPECT_EQ(run.host->owned()[0]->io->texts.left_out(), 200'000 - (said - 1));
+}
+
+// Those of a controller that was unloaded, and those left out after the last line, count as well.
+TEST(TextEvents, AreCountedForTheWholeRun) {
+  LoggedRun run;
+  run.add_teller("other")->lines = 0;
+  run.begin({.running_cycles = 10'000});
+  run.until(RunPhase::kRunning);
+  EXPECT_EQ(run.cycle->statistics().texts().said, 0U);
+  auto teller = std::make_shared<Teller>(1);
+  teller->lines = 20;
+  const TomlDocument nothing = TomlDocument::parse("", "test.toml").value();
+  ASSERT_TRUE(run.services().load("late", teller, nothing, kNow));
+  run.steps(2);
+  ASSERT_TRUE(run.services().switch_controllers({}, {"late"}, kNow));
+  run.steps(1);
+  const auto snapshot = run.cycle->save();
+  const TextFigures once = run.cycle->statistics().texts();
+  EXPECT_EQ(once.said, 8U) << "of one cycle at most";
+  EXPECT_EQ(once.left_out, 12U);
+  run.steps(3);
+  ASSERT_TRUE(run.cycle->restore(*snapshot));
+  EXPECT_EQ(run.cycle->statistics().texts().said, once.said) << "of the run that is, once";
+  run.steps(1);
+  ASSERT_TRUE(run.services().switch_controllers({"late"}, {}, kNow));
+  run.steps(2);
+  ASSERT_TRUE(run.services().unload("late", kNow));
+  run.steps(2);
+  const TextFigures all = run.cycle->statistics().texts();
+  EXPECT_GE(all.said, 16U);
+  EXPECT_EQ((all.said + all.left_out) % 20, 0U) << "each update said 20";
 }
 
 TEST(TextEvents, ThatAreTooLongAreCutBetweenCharacters) {
