@@ -35,7 +35,7 @@ std::span<const Place> shown_places(const MarkInfo& mark, const MarkBlock::State
   return finite && points >= (mark.shape == MarkShape::kArrow ? 2U : 1U) ? places : places.first(0);
 }
 
-/// Of the rotations about the fixed axes x, y, z, in this order.
+/// Turns about the fixed axes x, y, z, in this order: x, y, z, w.
 std::array<double, 4> quaternion_of(const std::array<double, 3>& rpy_rad) {
   const auto [r, p, y] = rpy_rad;
   const double cr = std::cos(r / 2), sr = std::sin(r / 2), cp = std::cos(p / 2),
