@@ -251,6 +251,7 @@ inline constexpr std::uint32_t kControllerAbi =
                                           sizeof(Mark),
                                           sizeof(hal::SignalBlock),
                                           sizeof(hal::MarkBlock),
+                                          sizeof(hal::MarkInfo),
                                           sizeof(hal::TextEvent),
                                           sizeof(ParameterRow),
                                           sizeof(Parameter),

@@ -47,13 +47,17 @@ class TextEventSlots {
   }
   /// That were too many, so far.
   [[nodiscard]] std::uint64_t left_out() const noexcept { return all_left_out_; }
-  void archive(Archive& ar) { ar(credit_, left_out_, all_left_out_); }
+  /// The same since the last call.
+  [[nodiscard]] std::uint64_t take_left_out() noexcept TANDEM_RT {
+    return all_left_out_ - std::exchange(taken_left_out_, all_left_out_);
+  }
+  void archive(Archive& ar) { ar(credit_, left_out_, all_left_out_, taken_left_out_); }
 
  private:
   std::array<hal::TextEvent, kSlots> slots_{};
   std::size_t waiting_ = 0;
   double credit_ = kBurst;
-  std::uint64_t left_out_ = 0, all_left_out_ = 0;
+  std::uint64_t left_out_ = 0, all_left_out_ = 0, taken_left_out_ = 0;
 };
 
 /// What ControllerSetup::text_events() gives: `log_("stance changed", foot)` is the line

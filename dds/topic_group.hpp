@@ -14,6 +14,7 @@
 #include "dds/endpoint.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/cycle_observer.hpp"
+#include "hal/mark_block.hpp"
 #include "hal/parallel_source.hpp"
 #include "hal/signal_block.hpp"
 #include "hal/stop_category.hpp"
@@ -55,9 +56,11 @@ struct NodeParameter {
 /// Source of what controllers tell; called on the publisher's thread. Empty: they tell nothing.
 struct ControllerFeed {
   using Signals = std::pair<std::string, std::shared_ptr<const hal::SignalBlock>>;
+  using Marks = std::pair<std::string, std::shared_ptr<const hal::MarkBlock>>;
 
   std::function<std::uint64_t()> version{};  ///< not 0; another one: controllers came or went
   std::function<std::vector<Signals>()> signals{};  ///< by controller
+  std::function<std::vector<Marks>()> marks{};      ///< the same
   /// Appends what was said after the first `seen`, and raises it.
   std::function<void(std::uint64_t& seen, std::vector<hal::TextEvent>&)> texts{};
   std::function<std::uint64_t()> parameter_version{};        ///< another one: some may be different
@@ -221,7 +224,7 @@ class TopicGroup {
 /// Makes the topics of one file, NAME_topics.cpp.
 using MakeTopics = std::unique_ptr<TopicGroup>(OutputMaker& maker, const RunDescription& run);
 MakeTopics joint_topics, sensor_topics, frame_topics, image_topics, diagnostic_topics,
-    parallel_topics, controller_topics, parameter_topics;
+    parallel_topics, controller_topics, parameter_topics, mark_topics;
 MakeTopics wrench_topics;  ///< @pre run.wrenches are sites of run.robot
 
 /// A name as ROS 2 allows it in a topic: what is no letter, digit or _ becomes _.

@@ -1,5 +1,5 @@
-# Installs into WORK, builds the examples 03 and 06 against that, as they are installed, and 03 as a
-# copy in a folder with a blank, and lets the installed program run all on an installed robot.
+# Installs into WORK, builds the examples 03, 06 and 08 against that, as they are installed, and 03 as
+# a copy in a folder with a blank, and lets the installed program run all on an installed robot.
 # Every link of the installed pages leads somewhere. Nothing sets the build type.
 # The Python module runs one, too, where it is built.
 # -DBUILD=… -DWORK=… -DCOMPILER=… -DPAGES_TEST=… -DPYTHON=…, empty without the module
@@ -49,6 +49,12 @@ set(devices ${prefix}/share/doc/tandem/examples/06_devices)
 build(${devices} ${WORK}/devices)
 set(ENV{TANDEM_CONTROLLERS} ${WORK}/devices/lib/controllers)
 execute_process(COMMAND ${prefix}/bin/tandem run --no-log --duration 2 --quiet ${devices}/reach.toml
+  COMMAND_ERROR_IS_FATAL ANY)
+
+set(declarations ${prefix}/share/doc/tandem/examples/08_declarations)
+build(${declarations} ${WORK}/declarations)
+set(ENV{TANDEM_CONTROLLERS} ${WORK}/declarations/lib/controllers)
+execute_process(COMMAND ${prefix}/bin/tandem run --no-log --duration 2 --quiet ${declarations}/nod.toml
   COMMAND_ERROR_IS_FATAL ANY)
 
 file(COPY ${example}/ DESTINATION ${strange})

@@ -1,11 +1,12 @@
 // What a controller draws for viewers: a fixed number of shapes in named frames.
-// Layer: hal.  Thread: declared non-RT; the rest the loop's.
+// Layer: hal.  Thread: declared non-RT; the rest the loop's; look() any.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,6 +16,8 @@
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
 #include "base/result.hpp"
+#include "base/seqlock.hpp"
+#include "hal/robot.hpp"
 
 namespace tandem::hal {
 
@@ -29,7 +32,7 @@ enum class MarkShape : std::uint8_t {
 /// How a mark looks, as it is declared.
 struct MarkStyle {
   MarkShape shape = MarkShape::kPoints;
-  std::string frame{};     ///< a link's name; "odom": the world of a floating base
+  std::string frame{};     ///< a link, or a site; "odom": the world, where a fixed base stands
   std::size_t points = 1;  ///< the most; an arrow has 2, a text 1
   double size_m = 0.02;    ///< diameter of balls and of an arrow's shaft, width of lines, height of
                            ///< letters
@@ -40,6 +43,10 @@ struct MarkStyle {
 struct MarkInfo : MarkStyle {
   std::string name;
   std::size_t first = 0;  ///< of its points among the block's
+  // Once the block is closed: what viewers know of the frame, which has no sites.
+  std::string link{};               ///< or "odom"
+  std::array<double, 3> xyz_m{};    ///< of the frame in that
+  std::array<double, 3> rpy_rad{};  ///< the same, as of a Site
 };
 
 /// The marks of one controller. It stays where it is: handles point into it.
@@ -53,6 +60,8 @@ class MarkBlock {
       std::uint32_t points = 0;  ///< that are shown; 0: the mark is not
       std::array<char, kLongestText> text{};
     };
+    std::int64_t time_ns = -1;  ///< of the last show_to_viewers(); -1: there was none
+    std::uint64_t drawn = 0;    ///< 0: nothing is shown, whatever the marks say
     std::array<std::array<double, 3>, kMostPoints> place_m{};
     std::array<One, kMostMarks> marks{};
   };
@@ -63,14 +72,28 @@ class MarkBlock {
 
   /// Index of a new mark; kMostMarks: there is no room, and check() says so.
   [[nodiscard]] std::size_t declare(std::string name, MarkStyle style);
-  /// Errors, with the mark's name as key: a name twice, or one that cannot be shown; no frame, no
-  /// point; a size or colour out of range; more marks or points than there is room for.
-  [[nodiscard]] Status check() const;
+  /// No more of them.
+  /// @param links  the robot's; empty: not known, and any frame is one
+  /// Errors, with the mark's name as key: a name twice, or one that cannot be shown; a frame that
+  /// the robot lacks (with the nearest); no point; a size or colour out of range; more marks or
+  /// points than there is room for.
+  [[nodiscard]] Status close(std::span<const std::string> links, std::span<const Site> sites);
 
-  [[nodiscard]] std::span<const MarkInfo> declared() const noexcept { return declared_; }
+  [[nodiscard]] std::span<const MarkInfo> declared() const noexcept TANDEM_RT { return declared_; }
   [[nodiscard]] std::span<const std::byte> bytes() const noexcept TANDEM_RT {
     return std::as_bytes(std::span(&state_, 1));
   }
+  /// Shows the marks to look() and in bytes(). @param drawn  false: from now on there are none
+  /// @return false: there were none before either @rt a store for each word
+  bool show_to_viewers(std::int64_t time_ns, bool drawn) noexcept TANDEM_RT {
+    if (shown_ == nullptr || (!drawn && state_.drawn == 0)) return false;
+    state_.time_ns = time_ns;
+    state_.drawn = drawn ? 1 : 0;
+    shown_->write(std::span(&state_, 1));
+    return true;
+  }
+  /// What was shown last. Any thread, once it is closed.
+  [[nodiscard]] State look() const;
 
   /// Places point `point` of a mark, which shows it and those before it. @rt a store
   void place(std::size_t mark, std::size_t point,
@@ -102,6 +125,7 @@ class MarkBlock {
   std::size_t points_ = 0;
   std::string refused_;  // the first that found no room
   State state_;
+  std::unique_ptr<Seqlock<State>> shown_;  // null: nothing is declared, or it is not closed
 };
 
 }  // namespace tandem::hal

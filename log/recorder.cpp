@@ -88,16 +88,17 @@ Recorder::Channel Recorder::add_channel(const std::string& topic, const std::str
 }
 
 Recorder::Channel Recorder::add_late_channel(const std::string& topic, const std::string& type,
-                                             const std::string& ros2msg, Encode encode) {
+                                             const std::string& ros2msg, Encode encode,
+                                             const std::string& meaning) {
   const std::lock_guard lock(late_mutex_);
   for (int number = 1;; ++number) {
     const std::string ending = number == 1 ? "" : "_" + std::to_string(number);
     const auto taken = std::ranges::find(late_, topic + ending, &LateChannel::topic);
-    if (taken != late_.end() && taken->ros2msg != ros2msg) continue;
+    if (taken != late_.end() && (taken->ros2msg != ros2msg || taken->meaning != meaning)) continue;
     const auto index = static_cast<std::size_t>(taken - late_.begin());
     if (taken == late_.end()) {
-      const std::string type_ending = number == 1 ? "" : std::to_string(number);
-      late_.push_back({topic + ending, type + type_ending, ros2msg, std::move(encode)});
+      const std::string type_ending = number == 1 || encode ? "" : std::to_string(number);
+      late_.push_back({topic + ending, type + type_ending, ros2msg, meaning, std::move(encode)});
     }
     return static_cast<Channel>(kFirstLate + index);
   }

@@ -91,9 +91,12 @@ class Recorder {
   /// where it has one of another, "_2" is added to the topic and "2" to the type, or the next
   /// number.
   /// @param ros2msg  definition of its messages
-  /// @param encode   empty: what is pushed is the body, at most kMostLateBytes
+  /// @param encode   empty: what is pushed is the body, at most kMostLateBytes. Else the type keeps
+  ///                 its name
+  /// @param meaning  of the bytes that `encode` gets: another one is another channel
   [[nodiscard]] Channel add_late_channel(const std::string& topic, const std::string& type,
-                                         const std::string& ros2msg, Encode encode = {});
+                                         const std::string& ros2msg, Encode encode = {},
+                                         const std::string& meaning = {});
   static constexpr std::size_t kMostLateBytes = 8 * 1024 + 16;
   /// log::ros2msg_of(), with the names of this recording's joints and sensors.
   [[nodiscard]] std::string ros2msg_of(const hal::Layout& layout) const;
@@ -149,7 +152,7 @@ class Recorder {
     std::optional<Channel> id;  // in the file
   };
   struct LateChannel {  // that came by add_late_channel()
-    std::string topic, type, ros2msg;
+    std::string topic, type, ros2msg, meaning;
     Encode encode;
   };
   struct Part {

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "base/realtime.hpp"
+#include "hal/cycle_time.hpp"
 #include "hal/follower.hpp"
 #include "hal/image.hpp"
 #include "log/bytes.hpp"
@@ -49,6 +51,10 @@ class RobotView {
   /// Simulated time from one message of a topic to the next: 50 Hz. A cycle that takes longer has
   /// one each.
   static constexpr std::int64_t kPeriod_ns = 20'000'000;
+  /// Whether that is due in a cycle, by its nominal time.
+  [[nodiscard]] static bool begins_period(const hal::CycleTime& time) noexcept TANDEM_RT {
+    return time.time_ns / kPeriod_ns != (time.time_ns - time.period_ns) / kPeriod_ns;
+  }
 
   RobotView() = default;  ///< of no robot: no topics
   /// @param joints  names in the images' order

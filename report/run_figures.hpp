@@ -60,7 +60,7 @@ inline constexpr std::size_t kMostOthers = 2;
 
 // signal_figures.cpp: what a run's controllers told of themselves.
 
-/// A figure of each signal, "signal_CONTROLLER_SIGNAL", in every cycle of its controller; of a
+/// A figure of each signal, "signal_CONTROLLER-SIGNAL", in every cycle of its controller; of a
 /// signal with many numbers those that change most. What is not drawn is a remark.
 /// Errors: as log::LogFile::open() and read(), of a log that changed since the run was read.
 [[nodiscard]] Result<std::vector<Figure>> signal_figures(const RunData& run,

@@ -40,7 +40,7 @@ Figure figure_of(const RunData& run, const std::string& controller, const hal::F
                  log::TimeSeries& table) {
   const auto [unit, words] = parts_of(field);
   Figure figure;
-  figure.name = "signal_" + controller + "_" + field.name;
+  figure.name = "signal_" + controller + "-" + field.name;
   figure.title = controller + "." + field.name + ":" + words;
   figure.x_label = time_label(run);
   figure.y_label = field.name + (unit == "[]" ? "" : " " + unit);

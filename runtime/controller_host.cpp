@@ -11,14 +11,15 @@ namespace tandem::runtime {
 namespace {
 
 /// Nothing more is declared. Errors name the controller, and what of it is wrong.
-Status close_io(const std::string& controller, ControllerIo& io) {
+Status close_io(const std::string& controller, ControllerIo& io, std::span<const std::string> links,
+                std::span<const hal::Site> sites) {
   const auto of = [&](const char* what, const Error& error) {
     return fail_at(controller,
                    "its " + (what + (" '" + error.key.substr(0, 64) + "' ")) + error.message,
                    error.hint);
   };
   if (const Status signals = io.signals.close(); !signals) return of("signal", signals.error());
-  if (const Status marks = io.marks.check(); !marks) return of("mark", marks.error());
+  if (const Status marks = io.marks.close(links, sites); !marks) return of("mark", marks.error());
   return {};
 }
 
@@ -126,7 +127,7 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
   if (Status claims = check_claims(name, setup.claims()); !claims) {
     return std::unexpected(claims.error());
   }
-  if (const Status closed = close_io(name, *setup.io); !closed) {
+  if (const Status closed = close_io(name, *setup.io, links_, robot_.sites); !closed) {
     return std::unexpected(closed.error());
   }
   auto made = std::make_unique<HostedController>();
@@ -198,7 +199,7 @@ std::size_t ControllerHost::size() const noexcept {
       std::ranges::count_if(owned_, [](const auto& one) { return one != nullptr; }));
 }
 
-ControllerHost::Shown ControllerHost::shown() const noexcept {
+ControllerHost::Shown ControllerHost::shown() const noexcept TANDEM_RT {
   const std::uint64_t both = shown_.load(std::memory_order_acquire);
   return {static_cast<ControllerSet>(both), static_cast<ControllerSet>(both >> 32)};
 }

@@ -115,6 +115,8 @@ class ControllerHost {
   void start_from(std::vector<double> position_rad) { start_rad_ = std::move(position_rad); }
   /// What is estimated, for those who are configured from now on; null: nothing.
   void show_estimate(const hal::EstimateImage* estimate) { estimate_ = estimate; }
+  /// The robot's links, for the frames of marks; none: any name is a link.
+  void draw_in(std::vector<std::string> links) { links_ = std::move(links); }
   /// What those who are added from now on may ask for what will happen; null: nobody.
   void predict_by(hal::Predictor* predictor) { predictor_ = predictor; }
   /// Each call of the cycle is timed by it from now on; without a clock none is.
@@ -148,7 +150,7 @@ class ControllerHost {
   /// @param start_rad  as start_from(); empty: not known
   /// Errors: what its configure() says; it throws, calls exit(), does not return within `limit`; a
   /// joint index or mode that the robot lacks; a joint that it claims twice; an input that makes no
-  /// sense, or does not fit its source.
+  /// sense, or does not fit its source; a signal or a mark that cannot be.
   [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
       const std::string& name, ControllerSource source, TomlTable parameters,
       std::optional<std::chrono::milliseconds> limit = kConfigureTime,
@@ -164,7 +166,7 @@ class ControllerHost {
   struct Shown {
     ControllerSet active = 0, done = 0;
   };
-  [[nodiscard]] Shown shown() const noexcept;
+  [[nodiscard]] Shown shown() const noexcept TANDEM_RT;
   [[nodiscard]] const std::vector<hal::JointCapabilities>& capabilities() const noexcept {
     return capabilities_;
   }
@@ -303,6 +305,7 @@ class ControllerHost {
   std::int64_t period_ns_;
   hal::Predictor* predictor_ = nullptr;
   std::vector<double> start_rad_;         // of start_from()
+  std::vector<std::string> links_;        // of draw_in()
   std::optional<TomlDocument> document_;  // of read_from()
   mutable std::mutex code_mutex_;
   std::vector<ControllerCode> code_;

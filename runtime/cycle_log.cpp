@@ -56,6 +56,18 @@ hal::Layout layout_of(const InputBlock& input) {
   return layout;
 }
 
+/// What the bytes of marks mean: the same of a controller that is loaded again with the same ones.
+std::string fingerprint_of(std::span<const hal::MarkInfo> marks) {
+  std::string text;
+  for (const hal::MarkInfo& mark : marks) {
+    text += mark.name + "\n" + mark.frame + "\n" + std::to_string(static_cast<int>(mark.shape)) +
+            " " + std::to_string(mark.points) + " " + std::to_string(mark.size_m);
+    for (const float part : mark.rgba) text += " " + std::to_string(part);
+    text += "\n";
+  }
+  return text;
+}
+
 std::string topic_of(const InputPort& port) { return "/tandem/input/" + port.full_name(); }
 
 std::string type_of(int number) { return "tandem/msg/Input" + std::to_string(number); }
@@ -93,13 +105,15 @@ void CycleLog::open(HostedController& controller) {
                                                 recorder_->ros2msg_of(layout_of(port->input())));
   }
   if (io.marks.declared().empty()) return;
+  std::vector marks(io.marks.declared().begin(), io.marks.declared().end());
+  const std::string meaning = controller.name + "\n" + fingerprint_of(marks);
   controller.mark_channel = recorder_->add_late_channel(
       topic + "/marks", log::kMarksType, log::marks_definition(),
-      [name = controller.name,
-       marks = std::vector(io.marks.declared().begin(), io.marks.declared().end())](
+      [name = controller.name, marks = std::move(marks)](
           std::int64_t time_ns, std::span<const std::byte> state, log::Bytes& out) {
         log::encode_marks(name, marks, time_ns, state, out);
-      });
+      },
+      meaning);
 }
 
 void CycleLog::signals(const hal::CycleTime& time,
@@ -109,12 +123,9 @@ void CycleLog::signals(const hal::CycleTime& time,
                   controller.io->signals.image());
 }
 
-/// 50 a second, as the other topics for viewers.
 void CycleLog::marks(const hal::CycleTime& time,
                      const HostedController& controller) noexcept TANDEM_RT {
   if (recorder_ == nullptr || controller.mark_channel < 0) return;
-  constexpr std::int64_t kPeriod_ns = log::RobotView::kPeriod_ns;
-  if (time.time_ns / kPeriod_ns == (time.time_ns - time.period_ns) / kPeriod_ns) return;
   recorder_->push(static_cast<log::Recorder::Channel>(controller.mark_channel), time.time_ns,
                   controller.io->marks.bytes());
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "log/robot_view.hpp"
+
 namespace tandem::runtime {
 
 HandOver::HandOver(CycleNow& now, const DriveResets& resets, const JointHoming& homing,
@@ -35,6 +37,8 @@ void HandOver::take() noexcept TANDEM_RT {
 void HandOver::show_controllers() noexcept TANDEM_RT {
   const double period_s = 1e-9 * static_cast<double>(now_.time.period_ns);
   const ControllerSet updated = now_.controllers.take_updated();
+  const ControllerSet active = now_.controllers.shown().active;
+  const bool views = log::RobotView::begins_period(now_.time);
   const ControllerHost::Table& loaded = now_.controllers.loaded();
   for (std::size_t slot = 0; slot < loaded.size(); ++slot) {
     if (loaded[slot] == nullptr) continue;
@@ -44,9 +48,12 @@ void HandOver::show_controllers() noexcept TANDEM_RT {
         io.signals.publish(now_.time.cycle, now_.time.time_ns);
         now_.log.signals(now_.time, *loaded[slot]);
       }
-      now_.log.marks(now_.time, *loaded[slot]);
     }
-    for (hal::TextEvent& event : io.texts.take(period_s)) {
+    if (views && io.marks.show_to_viewers(now_.time.time_ns, (active & only(slot)) != 0))
+      now_.log.marks(now_.time, *loaded[slot]);
+    const auto said = io.texts.take(period_s);
+    statistics_.take_texts({.said = said.size(), .left_out = io.texts.take_left_out()});
+    for (hal::TextEvent& event : said) {
       event.cycle = now_.time.cycle;
       event.time_ns = now_.time.time_ns;
       event.set_controller(loaded[slot]->name);

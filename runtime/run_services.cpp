@@ -225,6 +225,17 @@ std::vector<ControllerSignals> RunServices::signals() {
   return all;
 }
 
+std::vector<ControllerMarks> RunServices::marks() {
+  const Lock lock(mutex_);
+  collect();
+  std::vector<ControllerMarks> all;
+  for (const auto& one : host_->owned()) {
+    if (one == nullptr || one->leaves || one->io->marks.declared().empty()) continue;
+    all.push_back({one->name, {one->io, &one->io->marks}});
+  }
+  return all;
+}
+
 Result<std::size_t> RunServices::slot_of(const std::string& name) const {
   std::vector<std::string> names;
   for (std::size_t slot = 0; slot < kMostControllers; ++slot) {

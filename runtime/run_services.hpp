@@ -113,6 +113,12 @@ struct ControllerSignals {
   std::shared_ptr<const hal::SignalBlock> block;
 };
 
+/// The marks of a loaded controller that has some.
+struct ControllerMarks {
+  std::string controller;
+  std::shared_ptr<const hal::MarkBlock> block;
+};
+
 /// An input of a loaded controller.
 struct InputReport {
   std::shared_ptr<const InputPort> port;  ///< name, kind, components, source
@@ -226,6 +232,7 @@ class RunServices {
   [[nodiscard]] std::vector<SensorReport> sensors() const;
   /// Those of every loaded controller that has some, in the order in which they run.
   [[nodiscard]] std::vector<ControllerSignals> signals();
+  [[nodiscard]] std::vector<ControllerMarks> marks();
   /// Changes when a controller comes or goes; never 0.
   [[nodiscard]] std::uint64_t loads() const noexcept { return loads_.load(); }
   /// Changes when a controller comes or goes, and when a parameter may have another value.

@@ -83,6 +83,11 @@ struct ClosureFigures {
   double max_velocity_error_m_s = 0.0;
 };
 
+/// Lines that controllers said in the whole run, and those that were too many (TextEventSlots).
+struct TextFigures {
+  std::uint64_t said = 0, left_out = 0;
+};
+
 class RunStatistics {
  public:
   /// @param feet, loops  of the truth image; 0 without one.
@@ -98,6 +103,13 @@ class RunStatistics {
   /// A cycle before the shut-down, with controllers or without. `truth` may be null.
   void take_base(const hal::TruthImage* truth) noexcept TANDEM_RT;
 
+  /// What a controller said in a cycle.
+  void take_texts(const TextFigures& more) noexcept TANDEM_RT {
+    texts_.said += more.said;
+    texts_.left_out += more.left_out;
+  }
+
+  [[nodiscard]] const TextFigures& texts() const noexcept { return texts_; }
   [[nodiscard]] std::vector<TrackingError> tracking() const;
   /// Per joint: cycles in which a controller's command was not what the joint was given.
   [[nodiscard]] std::vector<std::uint64_t> limited_cycles() const;
@@ -150,6 +162,7 @@ class RunStatistics {
   double force_sum_N_ = 0.0, slip_m_ = 0.0;
   BaseFigures base_;
   std::uint64_t base_free_ = 0;  // it was, once
+  TextFigures texts_;
 };
 
 }  // namespace tandem::runtime

@@ -110,6 +110,13 @@ void DdsRun::start(runtime::RobotCycle& cycle, hal::ParallelSource* parallel) {
                              all.emplace_back(one.controller, one.block);
                            return all;
                          },
+                     .marks =
+                         [&services] {
+                           std::vector<dds::ControllerFeed::Marks> all;
+                           for (const runtime::ControllerMarks& one : services.marks())
+                             all.emplace_back(one.controller, one.block);
+                           return all;
+                         },
                      .texts =
                          [&services](std::uint64_t& seen, std::vector<hal::TextEvent>& out) {
                            (void)services.texts().read(seen, out);

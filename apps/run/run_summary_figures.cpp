@@ -159,6 +159,12 @@ static void figures(Figures& f, const ControllerFigures& one) {
   f("overruns", "of which it is the reason: [realtime.md](realtime.md#who-was-slow)", one.overruns);
 }
 
+static void figures(Figures& f, const runtime::TextFigures& texts) {
+  f("said", "that are in the log, on `/rosout` and in the output", texts.said);
+  f("left_out", "beside them, as too many: [controllers.md](controllers.md#signals)",
+    texts.left_out);
+}
+
 static void figures(Figures& f, const runtime::WorkFigures& work) {
   f("done_J", "of the joints that drove", work.done_J);
   f("taken_J", "of those that braked", work.taken_J);
@@ -253,6 +259,10 @@ void figures(Figures& f, const RunSummary* s) {
     [&] { return known(s->composition.backend->waits_for_bus(), loop().bus); });
   f("cycle_ns", "of a cycle's own work; null: no cycle was made", [&] { return loop().work; });
   f("controllers", "by name; null: it was never called", [&] { return controllers_of(*s); });
+  f("texts", "lines of text that controllers said; null: none", [&] {
+    const runtime::TextFigures& texts = s->cycle.statistics().texts();
+    return known(texts.said + texts.left_out > 0, texts);
+  });
   f("log", "null: nothing was logged", [&] { return s->log; });
   f("frames", "of `--record-frames`", [&] { return s->frames; });
   f("dds", "with `[dds]`", [&] { return s->dds; });

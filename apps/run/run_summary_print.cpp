@@ -174,6 +174,9 @@ void add_link_facts(const Json& run, Facts& facts) {
 
 /// What the run wrote and published.
 void add_output_facts(const RunSummary& summary, const Json& run, Facts& facts) {
+  const bool too_many = summary.cycle.statistics().texts().left_out > 0;
+  add_figures(facts, run, "controllers said",
+              too_many ? "{texts.said|line}, {texts.left_out} more left out" : "{texts.said|line}");
   if (summary.log) {
     add_figures(
         facts, run, "log",

@@ -92,6 +92,14 @@ void add_estimator(Composition& c, Collector& errors) {
 
 /// The robot's kernels, and the host of controllers. They are built after all that can be checked
 /// without them, for it takes a while.
+std::vector<std::string> links_of(const Experiment& e) {
+  std::vector<std::string> names;
+  if (const auto tree = e.tree()) {
+    for (const model::Link& link : tree->links) names.push_back(link.name);
+  }
+  return names;
+}
+
 /// @return false: there are errors, and no more to find
 bool add_kernels(Composition& c, const robot::RobotFiles& robot, bool serves,
                  const KernelSupply& supply, Collector& errors) {
@@ -120,6 +128,7 @@ bool add_kernels(Composition& c, const robot::RobotFiles& robot, bool serves,
   }
   c.controllers = std::make_unique<ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
   c.controllers->start_from(start_of(e));
+  c.controllers->draw_in(links_of(e));
   c.controllers->read_from(e.document);
   add_estimator(c, errors);
   if (e.hal.backend == BackendKind::kSim || e.parallel) {

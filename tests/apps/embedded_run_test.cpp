@@ -114,6 +114,36 @@ TEST_F(EmbeddedRun, RunsWhatItsProgramChangesAndAdds) {
   EXPECT_EQ(own->updates, 200);
 }
 
+/// Draws something in a frame.
+struct Drawing final : Controller {
+  explicit Drawing(std::string where) : frame(std::move(where)) {}
+  Status configure(ControllerSetup& setup) override {
+    (void)setup.mark("push", {.frame = frame});
+    return {};
+  }
+  void start(const hal::CycleTime&, const hal::StateImage&, hal::CommandImage&) noexcept override {}
+  Code update(const hal::CycleTime&, const hal::StateImage&, hal::CommandImage&) noexcept override {
+    return Code::kOk;
+  }
+  std::string frame;
+};
+
+TEST_F(EmbeddedRun, KnowsTheFramesThatMarksMayBeIn) {
+  const auto run = runtime::Run::open(path("hold.toml"));
+  ASSERT_TRUE(run) << run.error().front().to_string();
+  int number = 0;
+  const auto add = [&](const char* frame) {
+    const Status added = (*run)->controllers().add("draws" + std::to_string(++number),
+                                                   std::make_shared<Drawing>(frame),
+                                                   TomlDocument::parse("", "own")->root());
+    return added ? "" : added.error().to_string();
+  };
+  for (const char* frame : {"base_link", "link2", "tip", "odom"}) EXPECT_EQ(add(frame), "");
+  const std::string said = add("lnik2");
+  EXPECT_NE(said.find("its mark 'push' is in the frame 'lnik2'"), std::string::npos) << said;
+  EXPECT_NE(said.find("did you mean 'link2'"), std::string::npos) << said;
+}
+
 TEST_F(EmbeddedRun, RunsTheRobotThatItsProgramConnects) {
   const auto run =
       runtime::Run::open(path("hold.toml"), {.duration_s = 0.1, .hal = "can", .lockstep = true}, {},

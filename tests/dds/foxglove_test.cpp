@@ -50,6 +50,7 @@ const std::set<std::string> kPublished{
     "std_msgs/msg/String",
     "tf2_msgs/msg/TFMessage",
     "trajectory_msgs/msg/JointTrajectory",
+    "visualization_msgs/msg/MarkerArray",
 };
 
 TEST(Messages, AreDecodedByAnotherProjectWithThePublishedDefinitions) {

@@ -126,6 +126,18 @@ constexpr Published kDefinitions[] = {
      "179b33eba59d676f6d967ac71fe35e7ca2f64b2f3928f4a018cec115e213796e"},
     {"trajectory_msgs/msg/JointTrajectoryPoint",
      "de8907036d8bd45aac6f30cc9044a3d4a329c42cbf719aff7d95a584cfa532d7"},
+    // visualization_msgs' marker_array__description.c
+    {"visualization_msgs/msg/MarkerArray",
+     "86cb8800b6fb05b5eff1abd7a56f62a5641d3ae9a1c29e78e67e704f1d067dcf"},
+    {"visualization_msgs/msg/Marker",
+     "45b13ccf791f225962bf74e746f9644518855d783a6f42ba0cc14fde2b4f3ce0"},
+    {"visualization_msgs/msg/MeshFile",
+     "7710ece15a148fb7c9b546364cfb215bb06098087bd6394fe5b73a493508f8c4"},
+    {"visualization_msgs/msg/UVCoordinate",
+     "f27f7ed21fe360c6066944f856b801a0c0d1e94e815b6886444b42d90b196a26"},
+    {"sensor_msgs/msg/CompressedImage",
+     "15640771531571185e2efc8a100baf923961a4d15d5569652e6cb6691e8e371a"},
+    {"std_msgs/msg/ColorRGBA", "77a7a5b9ae477306097665106e0413ba74440245b1f3d0c6d6405fe5c7813fe8"},
     // rmw_dds_common's participant_entities_info__description.c
     {"rmw_dds_common/msg/ParticipantEntitiesInfo",
      "91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"},

@@ -2,6 +2,7 @@
 // log.
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "dds/cdr.hpp"
 #include "dds/message_definition.hpp"
@@ -81,8 +82,14 @@ struct Declares : Controller {
 };
 
 /// What add() says of it.
-std::string problem(std::function<void(ControllerSetup&)> declare) {
-  JointRun run;
+std::string problem(std::function<void(ControllerSetup&)> declare,
+                    std::vector<std::string> links = {}) {
+  hal::RobotConfig config = hal::test::fake_robot();
+  hal::SiteConfig& palm = config.model.sites.emplace_back();
+  palm.name = "palm";
+  palm.link = "hand";
+  JointRun run(std::move(config));
+  run.host->draw_in(std::move(links));
   const TomlDocument nothing = TomlDocument::parse("", "test.toml").value();
   const Status added =
       run.host->add("gait", std::make_shared<Declares>(std::move(declare)), nothing.root());
@@ -340,8 +347,41 @@ TEST(TextEvents, AFloodIsBoundedAndCounted) {
   EXPECT_NEAR(static_cast<double>(said), 50.0 + 40.0 + 1.0, 2.0)
       << "at once, 20 a second, and the last one";
   EXPECT_EQ(run.services().texts().count(), said);
+  EXPECT_EQ(run.cycle->statistics().texts().said, said);
+  EXPECT_EQ(run.cycle->statistics().texts().left_out, 200'001 - said);
   EXPECT_NE(last.find(" before it were too many"), std::string::npos) << last;
   EXPECT_EQ(run.host->owned()[0]->io->texts.left_out(), 200'000 - (said - 1));
+}
+
+// Those of a controller that was unloaded, and those left out after the last line, count as well.
+TEST(TextEvents, AreCountedForTheWholeRun) {
+  LoggedRun run;
+  run.add_teller("other")->lines = 0;
+  run.begin({.running_cycles = 10'000});
+  run.until(RunPhase::kRunning);
+  EXPECT_EQ(run.cycle->statistics().texts().said, 0U);
+  auto teller = std::make_shared<Teller>(1);
+  teller->lines = 20;
+  const TomlDocument nothing = TomlDocument::parse("", "test.toml").value();
+  ASSERT_TRUE(run.services().load("late", teller, nothing, kNow));
+  run.steps(2);
+  ASSERT_TRUE(run.services().switch_controllers({}, {"late"}, kNow));
+  run.steps(1);
+  const auto snapshot = run.cycle->save();
+  const TextFigures once = run.cycle->statistics().texts();
+  EXPECT_EQ(once.said, 8U) << "of one cycle at most";
+  EXPECT_EQ(once.left_out, 12U);
+  run.steps(3);
+  ASSERT_TRUE(run.cycle->restore(*snapshot));
+  EXPECT_EQ(run.cycle->statistics().texts().said, once.said) << "of the run that is, once";
+  run.steps(1);
+  ASSERT_TRUE(run.services().switch_controllers({"late"}, {}, kNow));
+  run.steps(2);
+  ASSERT_TRUE(run.services().unload("late", kNow));
+  run.steps(2);
+  const TextFigures all = run.cycle->statistics().texts();
+  EXPECT_GE(all.said, 16U);
+  EXPECT_EQ((all.said + all.left_out) % 20, 0U) << "each update said 20";
 }
 
 TEST(TextEvents, ThatAreTooLongAreCutBetweenCharacters) {
@@ -396,6 +436,95 @@ TEST(Marks, ThatCannotBeAreErrorsWithControllerAndMark) {
         of({.frame = "hand", .rgba = {2.0F, 0.0F, 0.0F, 1.0F}})}) {
     EXPECT_NE(said.find("gait: its mark 'm' "), std::string::npos) << said;
   }
+}
+
+TEST(Marks, AreInALinkASiteOrTheWorld) {
+  const auto in = [](const char* frame) {
+    return problem([&](ControllerSetup& setup) { (void)setup.mark("push", {.frame = frame}); },
+                   {"base", "hand"});
+  };
+  for (const char* frame : {"hand", "base", "palm", "odom"}) EXPECT_EQ(in(frame), "") << frame;
+  const auto of = [&](const char* frame, const std::string& hint) {
+    const std::string said = in(frame);
+    EXPECT_NE(said.find("gait: its mark 'push' is in the frame '" + std::string(frame) + "'"),
+              std::string::npos)
+        << said;
+    EXPECT_NE(said.find(hint), std::string::npos) << said;
+  };
+  of("hnad", "'hand'");
+  of("plam", "'palm'");
+  of("world", "\"odom\"");
+  of("something else", "known: odom, palm, base, hand");
+}
+
+/// What a viewer of the log has after all messages: namespaces of the marks.
+std::set<std::string> seen_in(const log::LogFile& file, const std::string& topic) {
+  std::set<std::string> seen;
+  for (const auto& message : decoded(file, topic, "visualization_msgs/msg/MarkerArray")) {
+    for (const auto& marker : get<dds::Value::List>(message, "markers")) {
+      const auto space = get<std::string>(marker, "ns");
+      get<std::int64_t>(marker, "action") == 2 ? (void)seen.erase(space) : (void)seen.insert(space);
+    }
+  }
+  return seen;
+}
+
+TEST(Marks, OfAStoppedControllerAreDeleted) {
+  const auto after = [](bool stops, bool starts) {
+    LoggedRun run;
+    run.add_teller();
+    run.begin({.running_cycles = 1000});
+    run.until(RunPhase::kRunning);
+    run.steps(100);
+    if (stops) {
+      EXPECT_TRUE(run.services().switch_controllers({"gait"}, {}, kNow));
+    }
+    run.steps(100);
+    if (starts) {
+      EXPECT_TRUE(run.services().switch_controllers({}, {"gait"}, kNow));
+    }
+    run.steps(100);
+    return seen_in(run.logged(), "/tandem/controller/gait/marks");
+  };
+  const std::set<std::string> both{"gait/push", "gait/words"};
+  EXPECT_EQ(after(false, false), both);
+  EXPECT_EQ(after(true, false), std::set<std::string>());
+  EXPECT_EQ(after(true, true), both) << "they are what they were";
+}
+
+/// One of that name and other marks: the log does not take its points for the former's.
+TEST(Marks, OfANewBuildHaveTheirOwnChannel) {
+  struct Draws : Declares {
+    explicit Draws(const char* mark)
+        : Declares([=, this](ControllerSetup& setup) { made = setup.mark(mark, {.frame = "a"}); }) {
+    }
+    Code update(const hal::CycleTime&, const hal::StateImage&,
+                hal::CommandImage&) noexcept override {
+      made.set(0, {1.0, 2.0, 3.0});
+      return Code::kOk;
+    }
+    Mark made;
+  };
+  LoggedRun run;
+  run.add_teller("other");
+  run.begin({.running_cycles = 10'000});
+  run.until(RunPhase::kRunning);
+  const TomlDocument nothing = TomlDocument::parse("", "test.toml").value();
+  for (const char* mark : {"one", "one", "two"}) {
+    ASSERT_TRUE(run.services().load("late", std::make_shared<Draws>(mark), nothing, kNow));
+    run.steps(2);
+    ASSERT_TRUE(run.services().switch_controllers({}, {"late"}, kNow));
+    run.steps(30);
+    if (std::string_view(mark) == "two") break;
+    ASSERT_TRUE(run.services().switch_controllers({"late"}, {}, kNow));
+    run.steps(30);
+    ASSERT_TRUE(run.services().unload("late", kNow));
+    run.steps(2);
+  }
+  const log::LogFile file = run.logged();
+  EXPECT_EQ(seen_in(file, "/tandem/controller/late/marks"), std::set<std::string>());
+  EXPECT_EQ(seen_in(file, "/tandem/controller/late/marks_2"), std::set<std::string>{"late/two"});
+  EXPECT_EQ(file.find("/tandem/controller/late/marks_3"), nullptr);
 }
 
 }  // namespace

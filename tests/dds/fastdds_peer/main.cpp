@@ -161,6 +161,7 @@ const std::map<std::string, Make>& types() {
       TYPE(sensor_msgs, JointState),
       TYPE(sensor_msgs, Imu),
       TYPE(tf2_msgs, TFMessage),
+      TYPE(visualization_msgs, MarkerArray),
       TYPE(nav_msgs, Odometry),
       TYPE(diagnostic_msgs, DiagnosticArray),
       TYPE(control_msgs, DynamicJointState),

@@ -52,6 +52,15 @@ MEMBERS(sensor_msgs::msg::dds_::Imu_, m.header(), m.orientation(), m.orientation
 MEMBERS(trajectory_msgs::msg::dds_::JointTrajectoryPoint_, m.positions(), m.velocities(),
         m.accelerations(), m.effort(), m.time_from_start())
 MEMBERS(trajectory_msgs::msg::dds_::JointTrajectory_, m.header(), m.joint_names(), m.points())
+MEMBERS(std_msgs::msg::dds_::ColorRGBA_, m.r(), m.g(), m.b(), m.a())
+MEMBERS(sensor_msgs::msg::dds_::CompressedImage_, m.header(), m.format(), m.data())
+MEMBERS(visualization_msgs::msg::dds_::UVCoordinate_, m.u(), m.v())
+MEMBERS(visualization_msgs::msg::dds_::MeshFile_, m.filename(), m.data())
+MEMBERS(visualization_msgs::msg::dds_::Marker_, m.header(), m.ns(), m.id(), m.type(), m.action(),
+        m.pose(), m.scale(), m.color(), m.lifetime(), m.frame_locked(), m.points(), m.colors(),
+        m.texture_resource(), m.texture(), m.uv_coordinates(), m.text(), m.mesh_resource(),
+        m.mesh_file(), m.mesh_use_embedded_materials())
+MEMBERS(visualization_msgs::msg::dds_::MarkerArray_, m.markers())
 MEMBERS(tf2_msgs::msg::dds_::TFMessage_, m.transforms())
 MEMBERS(nav_msgs::msg::dds_::Odometry_, m.header(), m.child_frame_id(), m.pose(), m.twist())
 MEMBERS(diagnostic_msgs::msg::dds_::KeyValue_, m.key(), m.value())
@@ -116,6 +125,8 @@ auto nth(std::uint64_t n) {
     return n % 2 == 1;
   } else if constexpr (std::is_floating_point_v<T>) {
     return static_cast<T>(n) / 4;
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return n % 2 == 1;
   } else {
     return static_cast<T>(n);
   }
