@@ -55,8 +55,17 @@ class InputTopics::Feed {
     std::array<void*, kKept> samples{};  // null: they are lent
     std::array<dds_sample_info_t, kKept> infos{};
     const dds_return_t taken = dds_take(reader_.get(), samples.data(), infos.data(), kKept, kKept);
+    Status may;
+    dds_instance_handle_t asked = 0;  // whether this writer may: once for the samples at hand
     for (std::size_t i = 0; taken > 0 && i < static_cast<std::size_t>(taken); ++i) {
-      if (infos[i].valid_data) offer(samples[i], infos[i].publication_handle);
+      if (!infos[i].valid_data) continue;
+      const dds_instance_handle_t writer = infos[i].publication_handle;
+      if (writer != std::exchange(asked, writer)) may = check_writer(writer);
+      if (!may) {
+        port_->refuse(may.error());
+      } else {
+        offer(samples[i]);
+      }
     }
     if (taken > 0) {
       dds_return_loan(reader_.get(), samples.data(), taken);
@@ -79,8 +88,7 @@ class InputTopics::Feed {
     rung_->notify_one();
   }
 
-  void offer(const void* message, dds_instance_handle_t writer) {
-    if (const Status may = check_writer(writer); !may) return port_->refuse(may.error());
+  void offer(const void* message) {
     const auto sample = port_->messages().sample(message, port_->input(), port_->source());
     if (!sample) return port_->refuse(sample.error());
     (void)port_->offer(runtime::InputFeeder::kTopic, *sample);
