@@ -25,18 +25,15 @@ struct InputKindRow {
   std::string_view name;
   std::string_view components;  ///< divided by blanks; empty: the controller names them
   std::string_view units;       ///< of each; "-": none
-  std::string_view message;     ///< the ROS 2 message that brings one; empty: none does
-  std::string_view stamped;     ///< another that brings the same; empty: none does
 };
 /// Every kind, in InputKind's order. Positions, velocities, forces along x, y, z, then about them.
 inline constexpr InputKindRow kInputKinds[] = {
-    {"twist", "x y z roll pitch yaw", "m/s m/s m/s rad/s rad/s rad/s", "geometry_msgs/msg/Twist",
-     "geometry_msgs/msg/TwistStamped"},
-    {"wrench", "fx fy fz tx ty tz", "N N N Nm Nm Nm", "", "geometry_msgs/msg/WrenchStamped"},
-    {"pose", "x y z qx qy qz qw", "m m m - - - -", "", ""},
-    {"numbers", "", "", "", ""},
-    {"buttons", "", "", "", ""},
-    {"trajectory", "", "", "trajectory_msgs/msg/JointTrajectory", ""},
+    {"twist", "x y z roll pitch yaw", "m/s m/s m/s rad/s rad/s rad/s"},
+    {"wrench", "fx fy fz tx ty tz", "N N N Nm Nm Nm"},
+    {"pose", "x y z qx qy qz qw", "m m m - - - -"},
+    {"numbers", "", ""},
+    {"buttons", "", ""},
+    {"trajectory", "", ""},
 };
 [[nodiscard]] constexpr const InputKindRow& row_of(InputKind kind) noexcept {
   return kInputKinds[static_cast<std::size_t>(kind)];

@@ -66,7 +66,11 @@ Result<std::shared_ptr<InputPort>> InputPort::make(std::shared_ptr<ControllerIo>
     return std::unexpected(std::move(error));
   }
   if (source != nullptr) port->source_ = *source;
-  if (const Status brings = port->check_message(); !brings) return std::unexpected(brings.error());
+  if (port->source_.feeder == InputFeeder::kTopic) {
+    const auto message = message_of(block.kind, port->source_);
+    if (!message) return std::unexpected(message.error());
+    port->message_ = *message;
+  }
   const PlannedInput planned{
       .block = block,
       .controller = controller,
@@ -142,24 +146,6 @@ Status InputPort::check_declaration(const hal::Robot& robot) {
   return check(without_);
 }
 
-/// Whether its topic's messages bring such samples; an empty type becomes the kind's first.
-Status InputPort::check_message() {
-  if (source_.feeder != InputFeeder::kTopic) return {};
-  const InputKindRow& row = row_of(block_->kind);
-  std::vector<std::string> types;
-  for (const std::string_view type : {row.message, row.stamped}) {
-    if (!type.empty()) types.emplace_back(type);
-  }
-  if (source_.type.empty() && !types.empty()) source_.type = types.front();
-  if (std::ranges::find(types, source_.type) != types.end()) return {};
-  Error error = source_.where;
-  error.message = types.empty()
-                      ? "no topic feeds an input of the kind " + std::string(row.name)
-                      : "messages of type '" + source_.type + "' bring no " + std::string(row.name);
-  error.hint = types.empty() ? "choose another source" : suggest(source_.type, types);
-  return std::unexpected(std::move(error));
-}
-
 Status InputPort::check_trajectory(std::span<const double> sample) const {
   const std::size_t joints = block_->components.size();
   const double points = sample[0];
@@ -219,6 +205,16 @@ void InputPort::pass_to(std::shared_ptr<InputPort> next) {
   next_ = std::move(next);
 }
 
+std::shared_ptr<InputPort> InputPort::heir() const {
+  std::shared_ptr<InputPort> next;
+  {
+    const std::lock_guard lock(mutex_);
+    next = next_;
+  }
+  const auto later = next == nullptr ? nullptr : next->heir();
+  return later == nullptr ? next : later;
+}
+
 bool InputPort::is_same_as(const InputPort& other) const noexcept TANDEM_RT {
   return block_->name == other.block_->name && block_->kind == other.block_->kind &&
          block_->components == other.block_->components &&
@@ -247,6 +243,10 @@ Result<std::uint64_t> InputPort::offer(InputFeeder feeder, std::span<const doubl
   std::ranges::copy(sample, back.values.begin());
   feed_.publish();
   return number_;
+}
+
+void InputPort::pass_over(std::uint64_t samples) noexcept {
+  superseded_.fetch_add(samples, std::memory_order_relaxed);
 }
 
 void InputPort::refuse(const Error& why) {

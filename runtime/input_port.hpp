@@ -20,6 +20,7 @@
 #include "controllers/controller_io.hpp"
 #include "hal/cycle_time.hpp"
 #include "hal/robot.hpp"
+#include "runtime/input_messages.hpp"
 #include "runtime/input_plan.hpp"
 #include "runtime/input_source.hpp"
 
@@ -29,7 +30,7 @@ namespace tandem::runtime {
 struct InputCounts {
   std::uint64_t arrived = 0;     ///< reached the controller
   std::uint64_t refused = 0;     ///< beyond a bound, not finite, or of who may not
-  std::uint64_t superseded = 0;  ///< a newer one came within the cycle, or no controller ran
+  std::uint64_t superseded = 0;  ///< a newer one came within the cycle, or before anybody looked
   std::uint64_t timed_out = 0;   ///< how often it went silent for its time-out
 };
 
@@ -55,6 +56,8 @@ class InputPort {
   [[nodiscard]] const InputBlock& input() const noexcept { return *block_; }
   [[nodiscard]] const std::string& controller() const noexcept { return controller_; }
   [[nodiscard]] const InputSource& source() const noexcept { return source_; }
+  /// What its topic's messages are. @pre source().feeder is InputFeeder::kTopic
+  [[nodiscard]] const InputMessage& messages() const noexcept { return *message_; }
   /// "CONTROLLER/INPUT"
   [[nodiscard]] std::string full_name() const { return controller_ + "/" + block_->name; }
 
@@ -67,8 +70,12 @@ class InputPort {
   [[nodiscard]] Result<std::uint64_t> offer(InputFeeder feeder, std::span<const double> sample);
   /// From now on what is offered here is offered to `next`: the same input of a later build.
   void pass_to(std::shared_ptr<InputPort> next);
+  /// The one that pass_to() named, of the latest build; null: this one is it.
+  [[nodiscard]] std::shared_ptr<InputPort> heir() const;
   /// Whether both have one name, kind and components.
   [[nodiscard]] bool is_same_as(const InputPort& other) const noexcept TANDEM_RT;
+  /// So many came that nobody looked at before newer ones took their place.
+  void pass_over(std::uint64_t samples) noexcept;
   /// One came that is no sample of this input, or of who may not.
   void refuse(const Error& why);
   /// The cycle in which a sample, or a newer one, arrived; empty: not yet.
@@ -104,7 +111,6 @@ class InputPort {
   InputPort(std::shared_ptr<ControllerIo> io, InputBlock& block, std::string controller,
             std::int64_t period_ns);
   [[nodiscard]] Status check_declaration(const hal::Robot& robot);
-  [[nodiscard]] Status check_message();
   [[nodiscard]] Status fill_bounds(const hal::Robot& robot);
   [[nodiscard]] Status check_trajectory(std::span<const double> sample) const;
   [[nodiscard]] std::span<const double> next(std::uint64_t cycle) noexcept TANDEM_RT;
@@ -115,6 +121,7 @@ class InputPort {
   InputBlock* block_;
   std::string controller_;
   InputSource source_;
+  const InputMessage* message_ = nullptr;
   std::int64_t period_ns_;
   std::uint64_t timeout_cycles_ = 0;
   std::vector<double> min_, max_;  // by component; of a trajectory by joint

@@ -20,6 +20,14 @@ Status LocalControllers::add(const std::string& name, LoadedController plugin,
                              TomlTable parameters) {
   auto made = host_.configure(name, std::move(plugin), std::move(parameters));
   if (!made) return std::unexpected(made.error());
+  if (!(*made)->inputs.empty()) {
+    return fail_at(
+        name,
+        "has the input '" + (*made)->inputs.front()->input().name +
+            "', and nobody feeds inputs of controllers at the robot's end of a link",
+        "let the operator's [[controller]] have its joints; or run it at the robot, with "
+        "`tandem run` and its input from a topic");
+  }
   for (const auto& other : controllers_) {
     for (const ControllerSetup::Claim& claim : (*made)->claims) {
       if (!claims(*other, claim.joint)) continue;
@@ -29,6 +37,13 @@ Status LocalControllers::add(const std::string& name, LoadedController plugin,
   }
   controllers_.push_back(std::move(*made));
   return {};
+}
+
+std::string LocalControllers::unseen() const {
+  const ControllerIo& io = *controllers_.back()->io;
+  std::string what = io.signals.numbers() > 0 ? "signals" : "";
+  if (!io.marks.declared().empty()) what += what.empty() ? "marks" : " and marks";
+  return what;
 }
 
 std::optional<std::size_t> LocalControllers::shared_joint(ControllerHost& host) const {

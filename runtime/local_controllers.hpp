@@ -18,8 +18,11 @@ class LocalControllers final : public remote::RobotSide {
   LocalControllers(const hal::RobotConfig& robot, const tandem_kernels* kernels,
                    std::int64_t period_ns);
 
-  /// Errors: those of ControllerHost::configure(); a joint that another one claims.
+  /// Errors: those of ControllerHost::configure(); a joint that another one claims; an input, which
+  /// nobody could feed there.
   [[nodiscard]] Status add(const std::string& name, LoadedController plugin, TomlTable parameters);
+  /// What the last one declared that nobody will see: "signals", "marks"; empty: nothing.
+  [[nodiscard]] std::string unseen() const;
   /// The first joint that one of these and one of the operator's `host` claim.
   [[nodiscard]] std::optional<std::size_t> shared_joint(ControllerHost& host) const;
 

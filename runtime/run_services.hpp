@@ -7,6 +7,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -294,8 +295,12 @@ class RunServices {
                                                 Patience patience = kPatience);
   /// The inputs of the controllers that came with the experiment, which `feeder` feeds.
   [[nodiscard]] std::vector<std::shared_ptr<InputPort>> inputs_of(InputFeeder feeder);
-  /// Whether whoever feeds `port` may do so now: its controller is active, and controllers run.
+  /// Whether whoever feeds `port` may do so now: its controller is active, controllers run, and
+  /// nobody commands the robot from afar.
   [[nodiscard]] Status check_runs(const InputPort& port);
+
+  /// Who commands the robot from afar; empty text: nobody. Called on any thread.
+  void name_owner(std::function<std::string()> owner);
 
   /// Whether set_gains() would take them now; the same errors.
   [[nodiscard]] Status check_gains(const std::string& joint, hal::PidLoop loop,
@@ -360,8 +365,9 @@ class RunServices {
   TextHistory texts_;
   std::atomic<std::uint64_t> loads_{1};
 
-  std::mutex mutex_;          // of all below, and of the asking side of inbox and host
-  std::uint64_t number_ = 0;  // of the last request
+  std::mutex mutex_;  // of all below, and of the asking side of inbox and host
+  std::function<std::string()> owner_;
+  std::uint64_t number_ = 0;                                     // of the last request
   std::map<std::uint64_t, CycleRequest> asked_;                  // not answered yet
   std::map<std::uint64_t, std::optional<CycleAnswer>> awaited_;  // that somebody waits for
   std::vector<std::unique_ptr<const std::vector<ParameterChange>>> changes_;  // of asked_

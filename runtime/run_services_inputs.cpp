@@ -40,6 +40,18 @@ Result<std::vector<double>> trajectory_of(const InputBlock& input, const InputRe
   return sample;
 }
 
+Result<std::vector<double>> sample_of_wish(const InputPort& port, const InputRequest& wish) {
+  const InputBlock& input = port.input();
+  const bool way = input.kind == InputKind::kTrajectory;
+  if (way ? !wish.components.empty() : !wish.points.empty()) {
+    return fail_at(port.full_name(),
+                   way ? "is fed with way-points" : "is fed with values, not with way-points",
+                   way ? "--point 1.0,0.3,0.2" : "x=0.2 yaw=0.1");
+  }
+  if (way) return trajectory_of(input, wish);
+  return sample_of(input, port.without(), wish.components, wish.numbers);
+}
+
 }  // namespace
 
 std::vector<InputReport> RunServices::inputs() {
@@ -50,8 +62,12 @@ std::vector<InputReport> RunServices::inputs() {
   for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
     const auto& one = host_->owned()[slot];
     if (one == nullptr || one->leaves) continue;
-    for (const auto& port : one->inputs)
-      all.push_back({port, (active & only(slot)) != 0, port->look()});
+    for (const auto& port : one->inputs) {
+      InputReport& report = all.emplace_back(port, (active & only(slot)) != 0, port->look());
+      if (report.active) continue;
+      report.look.fresh = false;  // nobody takes samples: its start begins anew
+      report.look.value.assign(port->without().begin(), port->without().end());
+    }
   }
   return all;
 }
@@ -89,7 +105,16 @@ Result<std::shared_ptr<InputPort>> RunServices::input_of(const std::string& name
                  known.empty() ? "none of them has any" : suggest(name, known));
 }
 
+void RunServices::name_owner(std::function<std::string()> owner) {
+  const Lock lock(mutex_);
+  owner_ = std::move(owner);
+}
+
 Status RunServices::check_runs_locked(const InputPort& port) const {
+  if (const std::string who = owner_ ? owner_() : std::string(); !who.empty()) {
+    return fail_at(port.full_name(), "'" + who + "' commands the robot",
+                   "wait until it releases the robot");
+  }
   const RunPhase phase = progress_->phase.load();
   if (phase != RunPhase::kRunning) {
     return fail_at(port.full_name(),
@@ -118,17 +143,12 @@ Result<RequestResult> RunServices::set_input(const std::string& name, const Inpu
   collect();
   const auto port = input_of(name);
   if (!port) return std::unexpected(port.error());
-  if (Status runs = check_runs_locked(**port); !runs) return std::unexpected(runs.error());
-  const InputBlock& input = (*port)->input();
-  const bool way = input.kind == InputKind::kTrajectory;
-  if (way ? !wish.components.empty() : !wish.points.empty()) {
-    return fail_at((*port)->full_name(),
-                   way ? "is fed with way-points" : "is fed with values, not with way-points",
-                   way ? "--point 1.0,0.3,0.2" : "x=0.2 yaw=0.1");
+  const Status runs = check_runs_locked(**port);
+  const auto sample = runs ? sample_of_wish(**port, wish) : std::unexpected(runs.error());
+  if (!sample) {
+    (*port)->refuse(sample.error());
+    return std::unexpected(sample.error());
   }
-  const auto sample = way ? trajectory_of(input, wish)
-                          : sample_of(input, (*port)->without(), wish.components, wish.numbers);
-  if (!sample) return std::unexpected(sample.error());
   const auto number = (*port)->offer(InputFeeder::kCommand, *sample);
   if (!number) return std::unexpected(number.error());
   lock.unlock();  // the port stays, and a flood of samples holds up nobody else

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <sstream>
+#include <utility>
 
 #include "base/nearest.hpp"
 
@@ -18,6 +19,7 @@ namespace tandem::apps {
 namespace {
 
 constexpr std::chrono::milliseconds kAgain{100};  // between two samples of a pad at rest
+constexpr std::chrono::milliseconds kLook{500};   // between two looks for one that is gone
 
 struct PadCode {
   const char* name;
@@ -160,10 +162,20 @@ Result<GamePad> GamePad::open(std::shared_ptr<runtime::InputPort> port) {
       return wrong_at(*port, source.device + " " + measured.error().message, measured.error().hint);
     }
   }
-  return GamePad(std::move(device), std::move(port), std::move(parts));
+  GamePad pad(std::move(device), std::move(port), std::move(parts));
+  if (!pad.look()) return wrong_at(*pad.port_, source.device + " does not say how it stands", {});
+  return pad;
 }
 
 bool GamePad::read() {
+  if (read_events()) return true;
+  device_ = Descriptor();
+  port_->refuse(
+      fail_at(port_->source().device, "the game pad is gone", "plug it in again").error());
+  return false;
+}
+
+bool GamePad::read_events() {
   std::array<input_event, 64> events{};
   for (;;) {
     const ssize_t bytes = ::read(device_.get(), events.data(), sizeof events);
@@ -171,33 +183,53 @@ bool GamePad::read() {
     if (bytes < 0) return errno == EAGAIN;
     if (bytes == 0) return false;
     const std::size_t count = static_cast<std::size_t>(bytes) / sizeof(input_event);
-    for (const input_event& event : std::span(events).first(count)) take(event);
-  }
-}
-
-void GamePad::take(const input_event& event) {
-  if (event.type == EV_SYN) {
-    if (event.code == SYN_DROPPED) look();
-    if (event.code == SYN_REPORT) offer();
-    return;
-  }
-  for (PadPart& part : parts_) {
-    if (part.type == event.type && part.code == event.code) part.raw = event.value;
-  }
-}
-
-/// The kernel has lost events: a button may be up that was down.
-void GamePad::look() {
-  Bits keys{};
-  const bool knows = ::ioctl(device_.get(), EVIOCGKEY(keys.size()), keys.data()) >= 0;
-  for (PadPart& part : parts_) {
-    input_absinfo info{};
-    if (part.type == EV_KEY) {
-      if (knows) part.raw = has_bit(keys, part.code) ? 1.0 : 0.0;
-    } else if (::ioctl(device_.get(), EVIOCGABS(part.code), &info) >= 0) {
-      part.raw = info.value;
+    for (const input_event& event : std::span(events).first(count)) {
+      if (!take(event)) return false;
     }
   }
+}
+
+/// After SYN_DROPPED what follows until the next report's end is older than what the device says.
+bool GamePad::take(const input_event& event) {
+  if (event.type == EV_SYN) {
+    if (event.code == SYN_DROPPED) dropped_ = true;
+    if (event.code != SYN_REPORT) return true;
+    if (std::exchange(dropped_, false) && !look()) return false;
+    offer();
+    return true;
+  }
+  for (PadPart& part : parts_) {
+    if (!dropped_ && part.type == event.type && part.code == event.code) part.raw = event.value;
+  }
+  return true;
+}
+
+/// How each part stands. False: the device does not say.
+bool GamePad::look() {
+  Bits keys{};
+  if (::ioctl(device_.get(), EVIOCGKEY(keys.size()), keys.data()) < 0) return false;
+  for (PadPart& part : parts_) {
+    input_absinfo info{};
+    if (part.type == EV_ABS && ::ioctl(device_.get(), EVIOCGABS(part.code), &info) < 0) {
+      return false;
+    }
+    part.raw = part.type == EV_ABS ? info.value : has_bit(keys, part.code) ? 1.0 : 0.0;
+  }
+  return true;
+}
+
+void GamePad::look_for() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now - looked_for_ < kLook) return;
+  looked_for_ = now;
+  auto again = open(port_);
+  if (again) {
+    *this = std::move(*again);
+    return;
+  }
+  if (missed_ == again.error().message) return;  // once
+  missed_ = again.error().message;
+  port_->refuse(again.error());
 }
 
 void GamePad::offer_again() {
@@ -205,6 +237,7 @@ void GamePad::offer_again() {
 }
 
 void GamePad::offer() {
+  if (auto heir = port_->heir()) port_ = std::move(heir);  // its controller was reloaded
   offered_ = std::chrono::steady_clock::now();
   const std::span<const double> without = port_->without();
   std::vector<double> sample(without.begin(), without.end());
@@ -230,15 +263,18 @@ GamePads::~GamePads() {
   if (thread_.joinable()) thread_.join();
 }
 
-/// One that is gone stays so: its input times out.
 void GamePads::run() {
-  std::vector<pollfd> wait;
-  for (const GamePad& pad : pads_) wait.push_back({pad.descriptor(), POLLIN, 0});
+  std::vector<pollfd> wait(pads_.size());
   while (!ending_) {
+    for (std::size_t i = 0; i < pads_.size(); ++i) wait[i] = {pads_[i].descriptor(), POLLIN, 0};
     (void)::poll(wait.data(), wait.size(), static_cast<int>(kAgain.count()));
     for (std::size_t i = 0; i < pads_.size(); ++i) {
-      if (wait[i].fd >= 0 && wait[i].revents != 0 && !pads_[i].read()) wait[i].fd = -1;
-      if (wait[i].fd >= 0) pads_[i].offer_again();
+      GamePad& pad = pads_[i];
+      if (pad.descriptor() < 0) {
+        pad.look_for();
+      } else if (wait[i].revents == 0 || pad.read()) {
+        pad.offer_again();
+      }
     }
   }
 }

@@ -42,29 +42,37 @@ class GamePad {
   GamePad(Descriptor device, std::shared_ptr<runtime::InputPort> port, std::vector<PadPart> parts)
       : device_(std::move(device)), port_(std::move(port)), parts_(std::move(parts)) {}
 
-  /// Opens the device that an input names. Errors: there is none, or it may not be read; it is no
-  /// event device; it lacks an axis or button; the input has no such component, or it would be
-  /// beyond its bounds.
+  /// Opens the device that an input names, as it stands: a button may be down. Errors: there is
+  /// none, or it may not be read; it is no event device; it lacks an axis or button; the input has
+  /// no such component, or it would be beyond its bounds.
   [[nodiscard]] static Result<GamePad> open(std::shared_ptr<runtime::InputPort> port);
 
+  /// -1: the pad is gone.
   [[nodiscard]] int descriptor() const noexcept { return device_.get(); }
-  /// Reads what waits, and offers a sample at the end of each report. False: the pad is gone.
+  /// Reads what waits, and offers a sample at the end of each report. False: the pad is gone, which
+  /// its input says.
   bool read();
+  /// Opens it again, where it is there again. What else is wrong with it then its input says.
+  void look_for();
   /// Offers the state as it is, when it is a while since the last time: a stick that does not move
   /// sends nothing.
   void offer_again();
 
  private:
   void offer();
-  void take(const input_event& event);
-  void look();
+  bool read_events();
+  bool take(const input_event& event);
+  bool look();
 
   Descriptor device_;
   std::shared_ptr<runtime::InputPort> port_;
   std::vector<PadPart> parts_;
-  std::chrono::steady_clock::time_point offered_;
+  bool dropped_ = false;  // the kernel lost events: until the report's end they mean nothing
+  std::string missed_;    // what was told of a pad that is gone
+  std::chrono::steady_clock::time_point offered_, looked_for_;
 };
 
+/// One that is pulled out falls silent, so that its input times out; plugged in again it goes on.
 class GamePads {
  public:
   /// The pads of every input whose source is one; null when none is. Errors: GamePad::open()'s,

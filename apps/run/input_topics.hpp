@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -10,7 +11,6 @@
 #include "apps/control/control_registry.hpp"
 #include "apps/transport/dds_admission.hpp"
 #include "base/result.hpp"
-#include "dds/entity.hpp"
 #include "dds/participant.hpp"
 #include "runtime/run_services.hpp"
 
@@ -18,7 +18,8 @@ namespace tandem::apps {
 
 /// A sample is a change of the run like "input.set": it passes the same gate, and its writer has to
 /// be admitted. One writer feeds an input at a time: another one's samples are refused until it has
-/// been silent for the input's time-out, and for half a second at least.
+/// been silent for the input's time-out, and for half a second at least. Of a flood the newest
+/// samples that a reader keeps are looked at; the others count as superseded.
 class InputTopics {
  public:
   /// Subscribes to the topics of every input whose source is one; null when none is.
@@ -33,15 +34,20 @@ class InputTopics {
   InputTopics& operator=(const InputTopics&) = delete;
 
   class Feed;  ///< of one input
+  struct Parts {
+    dds::Participant& participant;
+    runtime::RunServices& services;
+    ControlRegistry::Gate gate;
+    const DdsAdmission& admission;
+  };
 
  private:
   InputTopics() = default;
   void take();
 
-  std::vector<std::unique_ptr<Feed>> feeds_;
-  dds::Entity wake_;     // guard condition: the end
-  dds::Entity waitset_;  // after what is attached to it, so that it goes first
+  std::atomic<std::uint64_t> rung_{0};  // a sample came, or the end
   std::atomic<bool> ending_{false};
+  std::vector<std::unique_ptr<Feed>> feeds_;  // after what their listeners ring
   std::thread thread_;
 };
 

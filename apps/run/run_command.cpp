@@ -128,12 +128,15 @@ void add_identity(ControlRegistry& commands, const dds::Participant& participant
   commands.add("dds.show", [is](const Json&) -> Result<Json> { return is; });
 }
 
+/// Who commands the robot from afar; empty: nobody.
+std::string owner_of(const remote::Server* server) {
+  const bool owned = server != nullptr && server->lease().owner() != 0;
+  return owned ? server->lease().name() : std::string();
+}
+
 /// What peers may change, while nobody owns the robot.
 ControlRegistry::Gate gate_of(const runtime::RemoteOptions& remote, const remote::Server* server) {
-  return remote_gate(remote, [server] {
-    const bool owned = server != nullptr && server->lease().owner() != 0;
-    return owned ? server->lease().name() : std::string();
-  });
+  return remote_gate(remote, [server] { return owner_of(server); });
 }
 
 /// A run, or a server: the loop and all that talks to it. Taken apart in reverse order.
@@ -189,7 +192,9 @@ class Session {
                                    .observer = dds_ == nullptr ? nullptr : &dds_->tap(),
                                    .owner = server_.get()});
     cycle_ = &run_->cycle();
-    if (server_ != nullptr) tell_faults(*server_, *cycle_);
+    if (server_ == nullptr) return;
+    tell_faults(*server_, *cycle_);
+    cycle_->services().name_owner([server = server_.get()] { return owner_of(server); });
   }
 
   void announce() const {

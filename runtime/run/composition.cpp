@@ -170,7 +170,7 @@ void serve_only(Experiment& e, bool lockstep) {
 
 /// What stays at this end of a link, while its owner is at the other.
 void add_robot_side(Composition& c, OwnerController& owner, Collector& errors) {
-  auto side = robot_side_of(c);
+  auto side = robot_side_of(c, &c.warnings);
   if (!side) return errors.add(side.error());
   c.robot_side = std::move(*side);
   owner.beside(c.robot_side.get());

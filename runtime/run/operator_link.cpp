@@ -21,7 +21,8 @@ std::string plugin_path(const Experiment& e, const std::string& plugin) {
   return (folder / plugin).lexically_normal().string();
 }
 
-std::expected<std::unique_ptr<LocalControllers>, Diagnostics> robot_side_of(const Composition& c) {
+std::expected<std::unique_ptr<LocalControllers>, Diagnostics> robot_side_of(const Composition& c,
+                                                                            Diagnostics* warnings) {
   const Experiment& e = c.experiment;
   if (e.teleoperation->robot_controllers.empty()) return nullptr;
   Diagnostics errors;
@@ -30,12 +31,15 @@ std::expected<std::unique_ptr<LocalControllers>, Diagnostics> robot_side_of(cons
     auto loaded = load_controller(plugin_path(e, spec.plugin), controller_folders());
     Status added = loaded ? side->add(spec.name, std::move(*loaded), spec.parameters)
                           : Status(std::unexpected(loaded.error()));
-    if (added) continue;
-    Error error = added.error();
-    error.file = e.file;
-    error.line = spec.parameters.line();
-    error.key = "teleoperation.robot_controller." + spec.name;
-    errors.push_back(std::move(error));
+    const std::string unseen = added ? side->unseen() : "";
+    if (added && (warnings == nullptr || unseen.empty())) continue;
+    Error told = added ? Error{.message = "its " + unseen + " are in no log, report or topic",
+                               .hint = "run the controller at one end, without a link, to see them"}
+                       : added.error();
+    told.file = e.file;
+    told.line = spec.parameters.line();
+    told.key = "teleoperation.robot_controller." + spec.name;
+    (added ? *warnings : errors).push_back(std::move(told));
   }
   for (const Error& error : e.document.diagnostics()) errors.push_back(error);
   if (!errors.empty()) return std::unexpected(std::move(errors));
@@ -58,9 +62,10 @@ Diagnostics shared_joint(const Composition& c, const LocalControllers* side) {
 }
 
 /// A simulated robot that follows each command at once, with its own controllers.
-std::expected<remote::OperatorEnd::End, Diagnostics> twin_of(const Composition& c) {
+std::expected<remote::OperatorEnd::End, Diagnostics> twin_of(const Composition& c,
+                                                             Diagnostics* warnings) {
   const Experiment& e = c.experiment;
-  auto side = robot_side_of(c);
+  auto side = robot_side_of(c, warnings);
   if (!side) return std::unexpected(side.error());
   sim::SimRobotConfig sim = e.sim_robot_config();
   sim.seed = e.seed + 1;  // noise of its own
@@ -73,16 +78,16 @@ std::expected<remote::OperatorEnd::End, Diagnostics> twin_of(const Composition& 
 }  // namespace
 
 std::expected<std::unique_ptr<remote::OperatorEnd>, Diagnostics> link_to(
-    const Composition& c, std::unique_ptr<hal::Backend> robot) {
+    const Composition& c, std::unique_ptr<hal::Backend> robot, Diagnostics* warnings) {
   const Experiment& e = c.experiment;
   remote::TeleConfig config = e.teleoperation->link;
   config.seed = e.seed;
-  auto side = robot_side_of(c);
+  auto side = robot_side_of(c, warnings);
   if (!side) return std::unexpected(side.error());
   if (auto shared = shared_joint(c, side->get()); !shared.empty()) return std::unexpected(shared);
   remote::OperatorEnd::End twin;
   if (config.predict) {
-    auto made = twin_of(c);
+    auto made = twin_of(c, nullptr);
     if (!made) return std::unexpected(made.error());
     twin = std::move(*made);
   }
@@ -93,7 +98,7 @@ std::expected<std::unique_ptr<remote::OperatorEnd>, Diagnostics> link_to(
 
 Diagnostics put_link_between(Composition& c) {
   if (!c.experiment.teleoperation) return {};
-  auto link = link_to(c, std::move(c.backend));
+  auto link = link_to(c, std::move(c.backend), &c.warnings);
   if (!link) return link.error();
   c.tele = link->get();
   c.backend = std::move(*link);
@@ -141,7 +146,7 @@ Diagnostics operate_live(Composition& c, std::unique_ptr<remote::RemoteBackend> 
   if (e.teleoperation->real) config.up = config.down = {};
   remote::OperatorEnd::End twin;
   if (config.predict) {
-    auto made = twin_of(c);
+    auto made = twin_of(c, nullptr);  // the server warns
     if (!made) return made.error();
     if (auto shared = shared_joint(c, static_cast<const LocalControllers*>(made->side.get()));
         !shared.empty()) {

@@ -22,13 +22,15 @@ namespace tandem::runtime {
 
 /// A TeleBackend before `robot`, with a twin and the robot's own controllers. Errors as
 /// put_link_between()'s. @pre the experiment has [teleoperation]
+/// @param warnings  null: told before
 [[nodiscard]] std::expected<std::unique_ptr<remote::OperatorEnd>, Diagnostics> link_to(
-    const Composition& c, std::unique_ptr<hal::Backend> robot);
+    const Composition& c, std::unique_ptr<hal::Backend> robot, Diagnostics* warnings = nullptr);
 
 /// [[teleoperation.robot_controller]], for the robot's end; null: there are none.
-/// Errors: plugins and parameters.
+/// Errors: plugins and parameters; a controller with an input.
+/// @param warnings  gets what of theirs is told nowhere; null: told before
 [[nodiscard]] std::expected<std::unique_ptr<LocalControllers>, Diagnostics> robot_side_of(
-    const Composition& c);
+    const Composition& c, Diagnostics* warnings);
 
 /// In real time: the backend becomes a LiveLink to `robot`, with a twin. A robot that stands
 /// elsewhere than where the experiment begins is one of the composition's warnings. Errors as

@@ -1,7 +1,14 @@
 // Inputs of a running run: by the command line, by topics of other nodes, and who may.
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <thread>
 
+#include "apps/transport/control_path.hpp"
 #include "dds/endpoint.hpp"
 #include "dds/participant.hpp"
 #include "dds/service.hpp"
@@ -88,6 +95,43 @@ TEST_F(InputOfARun, IsFedByTheCommandLine) {
   EXPECT_EQ(end(), 0);
 }
 
+/// Questions as fast as a socket takes them: who asks waits for a cycle each time, others do not.
+TEST_F(InputOfARun, AFloodOverTheSocketIsASampleACycleAndHoldsUpNobody) {
+  with_jog("timeout_s = 60.0\n");
+  begin_in_time("");
+  const int flood = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const auto address = control_address(socket_);
+  ASSERT_EQ(::connect(flood, reinterpret_cast<const sockaddr*>(&*address), sizeof *address), 0);
+  constexpr int kFlood = 1000;
+  std::thread sender([&] {
+    std::string all;
+    for (int i = 1; i <= kFlood; ++i) {
+      all += R"({"do": "input.set", "name": "rate", "values": {"joint2": )" +
+             std::to_string(i * 1e-4) + "}}\n";
+    }
+    EXPECT_EQ(::send(flood, all.data(), all.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(all.size()));
+  });
+  std::atomic<int> answered{0};
+  std::thread reader([&] {
+    std::array<char, 4096> bytes{};
+    for (ssize_t count = 0;
+         answered < kFlood && (count = ::recv(flood, bytes.data(), 4096, 0)) > 0;)
+      answered += static_cast<int>(std::count(bytes.begin(), bytes.begin() + count, '\n'));
+  });
+  int asked_between = 0;
+  for (; answered < kFlood / 2; ++asked_between) EXPECT_EQ(to_run("input list").status, 0);
+  sender.join();
+  reader.join();
+  ::close(flood);
+  EXPECT_GT(asked_between, 0);
+  EXPECT_EQ(answered, kFlood);
+  EXPECT_NEAR(input()["values"]["joint2"].get<double>(), kFlood * 1e-4, 1e-9) << "the newest";
+  EXPECT_EQ(input()["arrived"].get<int>() + input()["superseded"].get<int>(), kFlood);
+  EXPECT_EQ(input()["refused"], 0);
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(InputOfARun, WhatIsWrongIsRefusedByNameAndTheRunGoesOn) {
   with_jog();
   begin_in_time("");
@@ -109,13 +153,14 @@ TEST_F(InputOfARun, WhatIsWrongIsRefusedByNameAndTheRunGoesOn) {
     EXPECT_EQ(to_run("ask " + shell_word(question)).status, 2) << question;
   }
   EXPECT_EQ(input()["sequence"], 0);
-  EXPECT_NE(input()["why"].get<std::string>().find("joint2"), std::string::npos);
+  EXPECT_NE(input()["why"].get<std::string>().find("fed with values"), std::string::npos);
+  EXPECT_EQ(input()["refused"], 3);
   EXPECT_EQ(to_run("controller stop jog").status, 0);
   const Outcome stopped = to_run("input rate joint2=0.1");
   EXPECT_NE(stopped.err.find("its controller is not active"), std::string::npos) << stopped.err;
   EXPECT_EQ(end(), 0);
   const std::string warned = read_text(folder_ / "run.txt");
-  EXPECT_NE(warned.find("the input jog/rate refused 1 sample; the last: joint2: 99"),
+  EXPECT_NE(warned.find("the input jog/rate refused 4 samples; the last: jog/rate: its"),
             std::string::npos)
       << warned;
 }
@@ -169,6 +214,54 @@ TEST_F(InputOfARun, AStrangersTwistWaitsUntilHeIsAdmitted) {
   EXPECT_EQ(end(), 0);
 }
 
+/// The lease goes to one process. Its end, by a silence here, gives the inputs back.
+TEST_F(InputOfARun, WhileAnotherProcessHasTheLeaseIsRefusedByItsName) {
+  with_jog("[remote]\ncommand = \"local\"\ntrust = \"domain\"\nlease_timeout_s = 1.0\n");
+  begin_in_time(in_domain());
+  EXPECT_EQ(to_run("input rate joint2=0.1").status, 0);
+  EXPECT_EQ(input()["values"]["joint2"], 0.1);
+  std::thread owner([this] {
+    const std::string command =
+        "cd " + shell_word(folder_.string()) + " && echo $$ >owner.pid && exec " +
+        shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " run trajectory.toml --hal dds --domain " +
+        std::to_string(dds::test::own_domain()) +
+        " --duration 1000 --no-log --no-socket -q >owner.txt 2>&1 </dev/null";
+    (void)std::system(command.c_str());
+  });
+  Outcome told;
+  const auto ask_again = [&] { told = to_run("input rate joint2=0.1"); };
+  EXPECT_TRUE(until_true([&] { return told.err.contains("' commands the robot"); }, ask_again))
+      << told.err << read_text(folder_ / "owner.txt");
+  EXPECT_NE(told.err.find("jog/rate"), std::string::npos) << told.err;
+  EXPECT_GT(input()["refused"], 0);
+  EXPECT_EQ(input()["fresh"], false);
+  EXPECT_EQ(input()["values"]["joint2"], 0.0) << "what the input holds without a sample";
+  (void)std::system(
+      ("kill -KILL $(cat " + shell_word((folder_ / "owner.pid").string()) + ")").c_str());
+  owner.join();
+  EXPECT_TRUE(until_true([&] { return told.err.contains("not active"); }, ask_again)) << told.err;
+  EXPECT_EQ(to_run("controller start jog").status, 0);
+  EXPECT_EQ(to_run("input rate joint2=0.1").status, 0);
+  EXPECT_EQ(end(), 1) << "the owner's loss is a fault";
+}
+
+/// Its samples went to the build that had gone, and were refused.
+TEST_F(InputOfARun, ATopicGoesOnToFeedAControllerThatWasReloaded) {
+  with_jog(std::string(kTwist) + "[remote]\ncommand = \"local\"\ntrust = \"domain\"\n");
+  join_domain();
+  begin_in_time(in_domain());
+  auto cmd_vel = writer<Twist>("cmd_vel");
+  const Twist twist{.linear = {}, .angular = {0.0, 0.0, 0.1}};
+  const auto write = [&] { EXPECT_TRUE(cmd_vel.write(twist)); };
+  EXPECT_TRUE(until_true([&] { return input()["fresh"] == true; }, write));
+  const Outcome reloaded = to_run("controller reload jog");
+  EXPECT_EQ(reloaded.status, 0) << reloaded.err;
+  const auto refused = input()["refused"], arrived = input()["arrived"];
+  EXPECT_TRUE(until_true([&] { return input()["arrived"] > arrived; }, write)) << input()["why"];
+  EXPECT_EQ(input()["refused"], refused) << input()["why"];
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(InputOfARun, ATopicThatNobodyMayUseIsAnErrorAtTheStart) {
   const auto why = [this](const std::string& flags) {
     return tandem("run hold.toml --no-log --no-socket -q --duration 0.1 " + flags).err;
@@ -179,8 +272,10 @@ TEST_F(InputOfARun, ATopicThatNobodyMayUseIsAnErrorAtTheStart) {
   EXPECT_NE(why(in_domain()).find("takes no commands over DDS"), std::string::npos);
   with_jog(std::string(kTwist) + "type = \"sensor_msgs/msg/Imu\"\n");
   EXPECT_NE(why("").find("bring no twist"), std::string::npos) << why("");
-  with_jog("[controller.inputs.rate]\nsource = \"topic\"\ntopic = \"rates\"\n");
-  EXPECT_NE(why("").find("no topic feeds an input of the kind numbers"), std::string::npos);
+  with_jog("[controller.inputs.rate]\nsource = \"topic\"\ntopic = \"rates\"\nframe = \"hand\"\n");
+  EXPECT_NE(why("").find("'std_msgs/msg/Float64MultiArray' name no frame"), std::string::npos);
+  with_jog("[controller.inputs.rate]\nsource = \"command\"\nframe = \"hand\"\n");
+  EXPECT_NE(why("").find("its source is \"command\""), std::string::npos) << why("");
   with_jog(
       "[controller.inputs.rate]\nsource = \"gamepad\"\ndevice = \"/dev/input/none\"\n"
       "mapping = { joint2 = \"ABS_X 0.5\" }\n");

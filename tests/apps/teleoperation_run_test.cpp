@@ -182,6 +182,30 @@ TEST_F(TeleoperationRun, OtherControllersAtTheRobotsEndAreRefused) {
   EXPECT_EQ(status("same"), "0\n") << told("same") << told("serve");
 }
 
+/// Nobody could have fed it: it never moved, and nothing said so.
+TEST_F(TeleoperationRun, AControllerWithAnInputIsRefusedAtTheRobotsEnd) {
+  const auto experiment = [](const std::string& plugin) {
+    return "robot = \"robot.toml\"\nposture = \"ready\"\nduration_s = 0.1\n[teleoperation.up]\n"
+           "delay_s = 0.01\n[[teleoperation.robot_controller]]\nplugin = \"" +
+           plugin +
+           "\"\n[teleoperation.robot_controller.parameters]\njoints = [\"joint2\"]\n"
+           "[[controller]]\nplugin = \"hold\"\n[controller.parameters]\njoints = [\"joint1\"]\n";
+  };
+  write_text(folder_ / "jog.toml", experiment("jog"));
+  for (const char* command : {"run jog.toml --no-log --no-socket -q", "check jog.toml"}) {
+    const Outcome refused = tandem(command);
+    EXPECT_EQ(refused.status, 2) << command;
+    EXPECT_NE((refused.err + refused.out).find("has the input 'rate', and nobody feeds inputs"),
+              std::string::npos)
+        << command << refused.err << refused.out;
+  }
+  write_text(folder_ / "weight.toml", experiment("gravity_compensation"));
+  const Outcome warned = tandem("run weight.toml --no-log --no-socket");
+  EXPECT_EQ(warned.status, 0) << warned.err;
+  EXPECT_NE(warned.err.find("its signals are in no log, report or topic"), std::string::npos)
+      << warned.err;
+}
+
 // It was taken for measurements, of a robot that never moved.
 TEST_F(TeleoperationRun, IsNoRecordingToIdentifyFrom) {
   const std::string plain = read_text(folder_ / "trajectory.toml");

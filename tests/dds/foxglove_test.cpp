@@ -38,6 +38,7 @@ std::string content(const std::string& path) {
 /// What @foxglove/rosmsg-msgs-common has of ours.
 const std::set<std::string> kPublished{
     "diagnostic_msgs/msg/DiagnosticArray",
+    "geometry_msgs/msg/PoseStamped",
     "geometry_msgs/msg/Twist",
     "geometry_msgs/msg/TwistStamped",
     "geometry_msgs/msg/WrenchStamped",
@@ -47,6 +48,8 @@ const std::set<std::string> kPublished{
     "rosgraph_msgs/msg/Clock",
     "sensor_msgs/msg/Imu",
     "sensor_msgs/msg/JointState",
+    "sensor_msgs/msg/Joy",
+    "std_msgs/msg/Float64MultiArray",
     "std_msgs/msg/String",
     "tf2_msgs/msg/TFMessage",
     "trajectory_msgs/msg/JointTrajectory",

@@ -138,6 +138,18 @@ constexpr Published kDefinitions[] = {
     {"sensor_msgs/msg/CompressedImage",
      "15640771531571185e2efc8a100baf923961a4d15d5569652e6cb6691e8e371a"},
     {"std_msgs/msg/ColorRGBA", "77a7a5b9ae477306097665106e0413ba74440245b1f3d0c6d6405fe5c7813fe8"},
+    // EXPECTED_HASH of those that use them: joy_state__ and
+    // float64_multi_array_stamped__description.c,
+    // and ten others of PoseStamped
+    {"geometry_msgs/msg/PoseStamped",
+     "10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8"},
+    {"sensor_msgs/msg/Joy", "0d356c79cad3401e35ffeb75a96a96e08be3ef896b8b83841d73e890989372c5"},
+    {"std_msgs/msg/Float64MultiArray",
+     "1025ddc6b9552d191f89ef1a8d2f60f3d373e28b283d8891ddcc974e8c55397f"},
+    {"std_msgs/msg/MultiArrayDimension",
+     "5e773a60a4c7fc8a54985f307c7837aa2994252a126c301957a24e31282c9cbe"},
+    {"std_msgs/msg/MultiArrayLayout",
+     "4c66e6f78e740ac103a94cf63259f968e48c617e7699e829b63c21a5cb50dac6"},
     // rmw_dds_common's participant_entities_info__description.c
     {"rmw_dds_common/msg/ParticipantEntitiesInfo",
      "91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"},

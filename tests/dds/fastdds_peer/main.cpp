@@ -151,15 +151,18 @@ std::unique_ptr<Part> make(fdds::DomainParticipant& participant, const std::stri
 const std::map<std::string, Make>& types() {
   static const std::map<std::string, Make> table{
       TYPE(std_msgs, String),
+      TYPE(std_msgs, Float64MultiArray),
       TYPE(rosgraph_msgs, Clock),
       TYPE(rcl_interfaces, Log),
       TYPE(rcl_interfaces, ParameterEvent),
+      TYPE(geometry_msgs, PoseStamped),
       TYPE(geometry_msgs, Twist),
       TYPE(geometry_msgs, TwistStamped),
       TYPE(trajectory_msgs, JointTrajectory),
       TYPE(geometry_msgs, WrenchStamped),
       TYPE(sensor_msgs, JointState),
       TYPE(sensor_msgs, Imu),
+      TYPE(sensor_msgs, Joy),
       TYPE(tf2_msgs, TFMessage),
       TYPE(visualization_msgs, MarkerArray),
       TYPE(nav_msgs, Odometry),

@@ -29,6 +29,9 @@ MEMBERS(builtin_interfaces::msg::dds_::Time_, m.sec(), m.nanosec())
 MEMBERS(builtin_interfaces::msg::dds_::Duration_, m.sec(), m.nanosec())
 MEMBERS(std_msgs::msg::dds_::Header_, m.stamp(), m.frame_id())
 MEMBERS(std_msgs::msg::dds_::String_, m.data())
+MEMBERS(std_msgs::msg::dds_::MultiArrayDimension_, m.label(), m.size(), m.stride())
+MEMBERS(std_msgs::msg::dds_::MultiArrayLayout_, m.dim(), m.data_offset())
+MEMBERS(std_msgs::msg::dds_::Float64MultiArray_, m.layout(), m.data())
 MEMBERS(rcl_interfaces::msg::dds_::Log_, m.stamp(), m.level(), m.name(), m.msg(), m.file(),
         m.function(), m.line())
 MEMBERS(rosgraph_msgs::msg::dds_::Clock_, m.clock())
@@ -36,6 +39,7 @@ MEMBERS(geometry_msgs::msg::dds_::Vector3_, m.x(), m.y(), m.z())
 MEMBERS(geometry_msgs::msg::dds_::Point_, m.x(), m.y(), m.z())
 MEMBERS(geometry_msgs::msg::dds_::Quaternion_, m.x(), m.y(), m.z(), m.w())
 MEMBERS(geometry_msgs::msg::dds_::Pose_, m.position(), m.orientation())
+MEMBERS(geometry_msgs::msg::dds_::PoseStamped_, m.header(), m.pose())
 MEMBERS(geometry_msgs::msg::dds_::Twist_, m.linear(), m.angular())
 MEMBERS(geometry_msgs::msg::dds_::TwistStamped_, m.header(), m.twist())
 MEMBERS(geometry_msgs::msg::dds_::Wrench_, m.force(), m.torque())
@@ -49,6 +53,7 @@ MEMBERS(sensor_msgs::msg::dds_::JointState_, m.header(), m.name(), m.position(),
 MEMBERS(sensor_msgs::msg::dds_::Imu_, m.header(), m.orientation(), m.orientation_covariance(),
         m.angular_velocity(), m.angular_velocity_covariance(), m.linear_acceleration(),
         m.linear_acceleration_covariance())
+MEMBERS(sensor_msgs::msg::dds_::Joy_, m.header(), m.axes(), m.buttons())
 MEMBERS(trajectory_msgs::msg::dds_::JointTrajectoryPoint_, m.positions(), m.velocities(),
         m.accelerations(), m.effort(), m.time_from_start())
 MEMBERS(trajectory_msgs::msg::dds_::JointTrajectory_, m.header(), m.joint_names(), m.points())
