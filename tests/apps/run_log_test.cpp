@@ -1,5 +1,5 @@
 // What the log of a run says about itself.
-#include "apps/run/run_log.hpp"
+#include "runtime/run/run_log.hpp"
 
 #include "log/log_file.hpp"
 #include "tests/apps/program.hpp"
@@ -14,10 +14,10 @@ TEST_F(RunLog, HasTheFilesThatAreRun) {
   const std::vector<std::string> names{"hold.toml", "robot.toml", "double_pendulum.urdf"};
   std::vector<std::string> texts;
   for (const std::string& name : names) texts.push_back(read_text(folder_ / name));
-  auto composition = runtime::composed<WiredComposition>((folder_ / "hold.toml").string(), {});
+  auto composition = runtime::composed((folder_ / "hold.toml").string(), {});
   ASSERT_TRUE(composition) << composition.error().front().to_string();
   for (const std::string& name : names) write_text(folder_ / name, "another by now\n");
-  auto recorder = open_log(**composition, (folder_ / "runs").string());
+  auto recorder = runtime::open_log(**composition, (folder_ / "runs").string());
   ASSERT_TRUE(recorder) << recorder.error().to_string();
   (*recorder)->start();
   const log::RecordingResult result = (*recorder)->close();
