@@ -57,6 +57,20 @@ TEST_F(RunLog, GoesOnInSeveralFilesOfWhichTheOldestGo) {
   EXPECT_EQ(json("b.json")["log"]["data_sha256"], log["data_sha256"]);
 }
 
+TEST_F(RunLog, IsTheFileThatIsNamedUnlessThatIsThere) {
+  const std::string run = "run hold.toml --duration 0.1 --quiet --log ";
+  ASSERT_EQ(tandem(run + "new/a.mcap").status, 0);
+  const std::string first = read_text(folder_ / "new/a.mcap");
+  EXPECT_EQ(tandem("log info new/a.mcap").status, 0);
+  const Outcome again = tandem(run + "new/a.mcap");
+  EXPECT_EQ(again.status, 2);
+  EXPECT_NE(again.err.find("a.mcap: cannot make the log: "), std::string::npos) << again.err;
+  EXPECT_EQ(read_text(folder_ / "new/a.mcap"), first);
+  std::filesystem::create_directory(folder_ / "odd.mcap");  // a folder stays one
+  ASSERT_EQ(tandem(run + "odd.mcap").status, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "odd.mcap/double_pendulum-hold-001.mcap"));
+}
+
 TEST_F(RunLog, DoesNotBeginWhereTheDiskHasTooLittle) {
   write_text(folder_ / "hold.toml",
              read_text(folder_ / "hold.toml") + "\n[log]\nkeep_free_MB = 1e9\n");
