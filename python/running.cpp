@@ -1,13 +1,22 @@
 #include "python/running.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstring>
 #include <functional>
 #include <string_view>
 #include <utility>
 
+#include "apps/control/controller_control.hpp"
+#include "apps/control/input_control.hpp"
+#include "apps/control/joint_control.hpp"
+#include "apps/control/sensor_control.hpp"
+#include "apps/control/signal_control.hpp"
+#include "base/counted.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/sim/scenario.hpp"
+#include "runtime/run/run_log.hpp"
 
 namespace tandem::python {
 namespace {
@@ -39,13 +48,13 @@ const ModeName& mode_of(const std::string& name) {
   raise_unknown("mode", name, known);
 }
 
-Diagnostics refuse_others(runtime::Composition& c) {
-  if (c.experiment.hal.backend == runtime::BackendKind::kSim) return {};
-  return {{.message = "Python steps a robot that is simulated in its own process; a robot on a "
-                      "wire, or of another process, does not wait for it",
-           .hint = "pass hal=\"sim\", or write the controller in C++ and use `tandem run`",
-           .file = c.experiment.file,
-           .key = "hal.backend"}};
+void check_place(const runtime::Experiment& e) {
+  if (e.hal.backend == runtime::BackendKind::kSim) return;
+  raise(Error{.message = "Python steps a robot that is simulated in its own process; a robot on a "
+                         "wire, or of another process, does not wait for it",
+              .hint = "pass hal=\"sim\", or write the controller in C++ and use `tandem run`",
+              .file = e.file,
+              .key = "hal.backend"});
 }
 
 }  // namespace
@@ -57,19 +66,31 @@ Running::Turn::Turn(Running& of) : of_(&of) {
 }
 
 Running::Running(const std::string& file, runtime::Overrides overrides, const std::string& all,
-                 const Control& some) {
+                 const Control& some, const std::string& log) {
   overrides.change = [&all](runtime::Experiment& e) {
     e.loop.start_paused = false;  // there is nobody to let it go on
     if (!all.empty()) e.controllers.clear();
   };
-  auto opened = [&] {
+  auto composed = [&] {
     const Away away;
     const std::scoped_lock alone(reading());
-    return runtime::Run::open(file, overrides, {}, refuse_others);
+    return runtime::composed(file, overrides);
   }();
-  run_ = take(std::move(opened));
+  c_ = take(std::move(composed));
+  check_place(c_->experiment);
   if (!all.empty() || !some.empty()) add_lead(all, some);
+  if (!log.empty()) {
+    recorder_ = take(runtime::open_log(*c_, log));
+    log_path_ = recorder_->path();
+    plugins_at_start_ = c_->controllers->code().size();
+    process_ = ::getpid();
+  }
   const Away away;
+  run_ = std::make_unique<runtime::Run>(*c_, overrides,
+                                        runtime::RunParts{.recorder = recorder_.get()});
+  run().cycle().services().attended_by([this] {
+    if (begun_) run().cycle().attend();
+  });
   begin();
   while (begun_ && (run().cycle().phase() == RunPhase::kBringUp ||
                     run().cycle().phase() == RunPhase::kSettling)) {
@@ -77,8 +98,45 @@ Running::Running(const std::string& file, runtime::Overrides overrides, const st
   }
 }
 
+Running::~Running() {
+  if (recorder_ != nullptr && ::getpid() != process_) {
+    (void)recorder_.release();  // its thread, and its file, are the parent's
+    return;
+  }
+  try {
+    end_log();
+  } catch (py::error_already_set& lost) {
+    lost.discard_as_unraisable("tandem.Run");
+  }
+}
+
+void Running::end_log() {
+  if (recorder_ == nullptr || std::exchange(closed_, true)) return;
+  const log::RecordingResult done = [this] {
+    const py::gil_scoped_release free;
+    if (run_ != nullptr && run_->parallel() != nullptr) (void)run_->parallel()->finish();
+    return recorder_->close(runtime::loaded_later(*c_->controllers, plugins_at_start_));
+  }();
+  log_path_ = done.path;
+  if (done.error.empty()) return;
+  raise(Error{.message = "the log lost " + counted(done.failed, "message") + ": " + done.error,
+              .hint = {},
+              .file = done.path,
+              .key = {}});
+}
+
+void Running::check_open() const {
+  if (recorder_ != nullptr && ::getpid() != process_) {
+    raise(fail("this run and its log are those of another process",
+               "open the run in the process that steps it")
+              .error());
+  }
+  if (closed_) raise(fail("the run is closed", "open another one").error());
+}
+
 bool Running::step(std::int64_t cycles) {
   const Turn turn(*this);
+  check_open();
   if (cycles < 1) raise_value("step", "cycles: " + std::to_string(cycles) + ", wanted 1 or more");
   if (over()) {
     raise(fail("the run is over", "open another one, or restore() a snapshot of it").error());
@@ -101,6 +159,8 @@ bool Running::step(std::int64_t cycles) {
 
 void Running::finish() {
   const Turn turn(*this);
+  if (closed_) return;
+  check_open();
   run().cycle().inbox().end_run();
   while (begun_) {
     {
@@ -109,6 +169,14 @@ void Running::finish() {
     }
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   }
+  end_log();
+}
+
+void Running::close() {
+  const Turn turn(*this);
+  if (!closed_) check_open();
+  end_log();
+  closed_ = true;
 }
 
 bool Running::next() {
@@ -131,6 +199,12 @@ py::bytes Running::save() {
 
 void Running::restore(const py::bytes& snapshot) {
   const Turn turn(*this);
+  check_open();
+  if (recorder_ != nullptr) {
+    raise(fail("a run with a log goes forward only: the log would tell of one run and show two",
+               "restore the snapshot in a run that is opened without `log`")
+              .error());
+  }
   const std::string_view all(snapshot);
   constexpr std::size_t kHead = kMark.size() + 1 + sizeof(std::size_t);
   std::size_t hash = 0;
@@ -148,10 +222,12 @@ void Running::restore(const py::bytes& snapshot) {
   begun_ = all[kMark.size()] == '1';
   fresh_ = !over();
   led_ = run().cycle().phase() == RunPhase::kRunning;
+  texts_before_ = run().cycle().services().texts().count();
 }
 
 std::size_t Running::inject(const std::string& scenario) {
   const Turn turn(*this);
+  check_open();
   const runtime::Experiment& e = run().experiment();
   auto faults = sim::parse_scenario(scenario, "inject", e.robot, e.loop.period_ns);
   if (!faults) {
@@ -171,7 +247,7 @@ std::size_t Running::inject(const std::string& scenario) {
 }
 
 void Running::add_lead(const std::string& all, const Control& some) {
-  const hal::Robot robot = hal::robot_of(run().experiment().robot);
+  const hal::Robot robot = hal::robot_of(c_->experiment.robot);
   std::vector<ControllerSetup::Claim> claims;
   for (const hal::DrivenJoint& joint : robot.joints) joints_.push_back(joint.name);
   for (const auto& [name, mode] : some) {
@@ -184,8 +260,8 @@ void Running::add_lead(const std::string& all, const Control& some) {
     claims.push_back({j, mode.mode, mode.interaction, false});
   }
   lead_ = std::make_shared<Lead>(std::move(claims), robot.shape());
-  const auto nothing = TomlDocument::parse("", run().experiment().file);
-  take(run().controllers().add("python", lead_, nothing->root(), true));
+  const auto nothing = TomlDocument::parse("", c_->experiment.file);
+  take(c_->controllers->add("python", lead_, nothing->root(), true));
 }
 
 void Running::begin() {
@@ -212,6 +288,49 @@ void Running::check_command() const {
   raise_value("command." + std::string(bad->field),
               "of " + joints_[bad->joint] + " is not finite in cycle " +
                   std::to_string(run().state().cycle()[0]) + ": nothing was commanded");
+}
+
+std::string Running::ask(const std::string& question) {
+  const Turn turn(*this);
+  check_open();
+  runtime::RobotCycle& cycle = run().cycle();
+  if (commands_ == nullptr) {  // not those of stops and time, which are the run's own
+    commands_ = std::make_unique<apps::ControlRegistry>();
+    apps::add_controller_commands(*commands_, cycle.services(), c_->experiment.robot);
+    apps::add_joint_commands(*commands_, cycle, c_->experiment.robot);
+    apps::add_input_commands(*commands_, cycle.services());
+    apps::add_sensor_commands(*commands_, cycle.services());
+    apps::add_signal_commands(*commands_, cycle.services(), c_->experiment.robot);
+  }
+  if (begun_) cycle.attend();  // what is asked for is judged by the state that was read
+  const apps::Json answer = commands_->answer(question);
+  if (!answer.value("ok", false)) {
+    raise(fail(answer.value("error", "no answer"), answer.value("hint", "")).error());
+  }
+  return answer.dump(-1, ' ', false, apps::Json::error_handler_t::replace);
+}
+
+py::list Running::signals() {
+  py::list all;
+  for (const runtime::ControllerSignals& one : run().cycle().services().signals()) {
+    const hal::SignalBlock& block = *one.block;
+    all.append(py::make_tuple(one.controller, views(block.layout(), block.image().data(), -1, 0,
+                                                    keeper(one.block), false)));
+  }
+  return all;
+}
+
+py::list Running::texts() {
+  std::vector<hal::TextEvent> events;
+  std::uint64_t seen = texts_before_;
+  run().cycle().services().texts().read(seen, events);
+  py::list all;
+  for (const hal::TextEvent& one : events) {
+    all.append(py::make_tuple(static_cast<double>(one.time_ns) * 1e-9, one.cycle,
+                              std::string(one.controller()),
+                              one.level == hal::TextLevel::kWarn ? "warn" : "info", one.words()));
+  }
+  return all;
 }
 
 py::list faults_of(const Running& running) {
