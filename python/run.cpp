@@ -77,7 +77,7 @@ void add_run(py::module_& module) {
           "category"_a)
       .def("reset_faults", [](Running& r) { r.run().cycle().inbox().reset_faults(); })
       .def("faults", &faults_of)
-      .def("result", &result_of)
+      .def("result", &Running::result)
       .def("limits", [](const Running& r) { return limits_of(r.run()); })
       .def("state", [](const Shared& r) { return views_of(r, r->run().state(), false); })
       .def("command",

@@ -349,9 +349,10 @@ py::list faults_of(const Running& running) {
   return out;
 }
 
-py::dict result_of(const Running& running) {
-  const runtime::RunStatistics& figures = running.run().cycle().statistics();
-  const double period_s = static_cast<double>(running.run().experiment().loop.period_ns) * 1e-9;
+py::dict Running::result() {
+  const Turn turn(*this);
+  const runtime::RunStatistics& figures = run().cycle().statistics();
+  const double period_s = static_cast<double>(run().experiment().loop.period_ns) * 1e-9;
   py::dict joints, out;
   const auto tracking = figures.tracking();
   const auto limited = figures.limited_cycles();
@@ -361,13 +362,13 @@ py::dict result_of(const Running& running) {
     joint["rms_tracking_error_rad"] = any ? py::cast(tracking[j].rms_rad) : py::none();
     joint["max_tracking_error_rad"] = any ? py::cast(tracking[j].max_rad) : py::none();
     joint["limited_cycles"] = limited[j];
-    joints[running.run().experiment().robot.joints[j].name.c_str()] = std::move(joint);
+    joints[run().experiment().robot.joints[j].name.c_str()] = std::move(joint);
   }
-  out["cycles"] = running.run().cycle().loop().cycles;
-  out["running_cycles"] = running.run().cycle().running_cycles();
-  out["simulated_s"] = static_cast<double>(running.run().cycle().running_cycles()) * period_s;
-  out["phase"] = hal::to_string(running.run().cycle().phase());
-  out["faults"] = faults_of(running);
+  out["cycles"] = run().cycle().loop().cycles;
+  out["running_cycles"] = run().cycle().running_cycles();
+  out["simulated_s"] = static_cast<double>(run().cycle().running_cycles()) * period_s;
+  out["phase"] = hal::to_string(run().cycle().phase());
+  out["faults"] = faults_of(*this);
   out["joints"] = std::move(joints);
   if (const auto work = figures.work(period_s)) {
     out["work"] = py::dict(py::arg("done_J") = work->done_J, py::arg("taken_J") = work->taken_J,

@@ -50,7 +50,7 @@ class Running {
   void finish();
   /// Ends the log where the run stands, which goes no further. Error: messages were lost.
   void close();
-  /// Of the log; empty: there is none.
+  /// The log's; empty: there is none.
   [[nodiscard]] const std::string& log_path() const { return log_path_; }
   /// For iteration: the state that nobody has looked at yet, or else the next one.
   bool next();
@@ -67,6 +67,9 @@ class Running {
   /// What controllers have said since the run was opened, or restored last: the last 256 as
   /// (time_s, cycle, controller, level, text).
   [[nodiscard]] py::list texts();
+
+  /// Figures so far, by the names of `tandem run --json`.
+  [[nodiscard]] py::dict result();
 
   /// The faults of a scenario's text. @return how many
   std::size_t inject(const std::string& scenario);
@@ -111,7 +114,5 @@ class Running {
 
 /// Every fault so far, as tandem.Run.faults has it.
 [[nodiscard]] py::list faults_of(const Running& running);
-/// Figures so far, by the names of `tandem run --json`.
-[[nodiscard]] py::dict result_of(const Running& running);
 
 }  // namespace tandem::python
