@@ -71,7 +71,13 @@ class Fields:
         what = f"{self._name}.{name}"
         if not array.flags.writeable:
             raise _native.Error(f"{what}: cannot be written (only what a command refers to can)")
-        values = np.asarray(value, dtype=float)
+        try:
+            values = np.asarray(value)
+            if values.dtype.kind not in "fiub":
+                raise ValueError(f"are {values.dtype}, wanted numbers")
+            values = values.astype(float, copy=False)
+        except ValueError as error:  # rows of different lengths, too
+            raise ValueError(f"{what}: {error}") from None
         if values.shape not in ((), array.shape):
             raise ValueError(f"{what}: has the shape {values.shape}, wanted {array.shape}")
         if not np.isfinite(values).all():

@@ -1,0 +1,118 @@
+// A run that Python steps: it stands between the halves of a cycle, where the state has been read
+// and the command is awaited.
+// Layer: python.  Thread: one at a time per run, else an error; long steps leave the
+// interpreter's lock to others.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/control/control_registry.hpp"
+#include "python/arrays.hpp"
+#include "python/lead.hpp"
+#include "runtime/run/run.hpp"
+
+namespace tandem::python {
+
+/// Which joints Python leads, in which mode.
+using Control = std::map<std::string, std::string>;
+
+/// The run, the controller that Python is, and where in a cycle they stand. Arrays keep it alive.
+class Running {
+ public:
+  /// Opens the run and steps it to its first cycle of control.
+  /// @param all   the mode of every joint, without the experiment's controllers; empty: see `some`
+  /// @param some  the modes of those that Python leads beside them
+  /// @param log   open_log()'s place; empty: nothing is logged
+  /// Errors: compose()'s; a robot that is not simulated in this process; an unknown joint or mode;
+  /// open_log()'s.
+  Running(const std::string& file, runtime::Overrides overrides, const std::string& all,
+          const Control& some, const std::string& log);
+  ~Running();
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+
+  [[nodiscard]] runtime::Run& run() const { return *run_; }
+  [[nodiscard]] Lead* lead() const { return lead_.get(); }
+  /// Controllers have ended, or close() was called; the shut-down may be still to come.
+  [[nodiscard]] bool over() const {
+    return closed_ || !begun_ || run().cycle().phase() == runtime::RunPhase::kShutDown;
+  }
+
+  /// Gives the command and reads the next state, `cycles` times. False: the run has ended.
+  bool step(std::int64_t cycles);
+  /// Ends the run, if it has not ended, and carries out the shut-down; then close().
+  void finish();
+  /// Ends the log where the run stands, which goes no further. Error: messages were lost.
+  void close();
+  /// The log's; empty: there is none.
+  [[nodiscard]] const std::string& log_path() const { return log_path_; }
+  /// For iteration: the state that nobody has looked at yet, or else the next one.
+  bool next();
+
+  /// A mark, whether the cycle has begun, and a hash of all the rest, which is RobotCycle's.
+  [[nodiscard]] py::bytes save();
+  /// Errors: another run's; a run with a log, which goes forward only.
+  void restore(const py::bytes& snapshot);
+  /// A command of the control socket that concerns controllers, inputs, joints, sensors or signals,
+  /// carried out in this cycle. @return the answer's JSON. Errors: the command's.
+  [[nodiscard]] std::string ask(const std::string& question);
+  /// (controller, fields of its signals).
+  [[nodiscard]] py::list signals();
+  /// What controllers have said since the run was opened, or restored last: the last 256 as
+  /// (time_s, cycle, controller, level, text).
+  [[nodiscard]] py::list texts();
+
+  /// Figures so far, by the names of `tandem run --json`.
+  [[nodiscard]] py::dict result();
+
+  /// The faults of a scenario's text. @return how many
+  std::size_t inject(const std::string& scenario);
+
+ private:
+  /// Marks that a thread is in the run.
+  class Turn {
+   public:
+    explicit Turn(Running& of);
+    ~Turn() { of_->busy_ = false; }
+    Turn(const Turn&) = delete;
+    Turn& operator=(const Turn&) = delete;
+
+   private:
+    Running* of_;
+  };
+
+  void add_lead(const std::string& all, const Control& some);
+  void end_log();
+  void check_open() const;
+  void begin();
+  bool advance();
+  [[nodiscard]] std::int64_t per_turn() const;
+  void check_command() const;
+
+  std::unique_ptr<runtime::Composition> c_;
+  std::unique_ptr<log::Recorder> recorder_;  // null: nothing is logged
+  std::unique_ptr<runtime::Run> run_;
+  std::string log_path_;
+  std::size_t plugins_at_start_ = 0;
+  int process_ = 0;                                  // that opened the log
+  bool closed_ = false;                              // nothing is stepped any more
+  std::unique_ptr<apps::ControlRegistry> commands_;  // once something was asked
+  std::uint64_t texts_before_ = 0;                   // the last restore()
+  std::shared_ptr<Lead> lead_;
+  std::vector<std::string> joints_;
+  std::atomic<bool> busy_{false};
+  bool begun_ = false;  // the cycle's first half is done
+  bool fresh_ = true;   // nobody has looked at its state
+  bool led_ = false;    // controllers ran in the cycle before
+};
+
+/// Every fault so far, as tandem.Run.faults has it.
+[[nodiscard]] py::list faults_of(const Running& running);
+
+}  // namespace tandem::python
