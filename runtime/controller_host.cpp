@@ -388,8 +388,9 @@ const hal::StateImage& ControllerHost::at_rest(const hal::StateImage& state,
 }
 
 /// Each in the modes of its claims.
+/// @param inputs_wait  false: samples that wait arrive all the same, in this cycle
 void ControllerHost::call_starts(ControllerSet start, const hal::CycleTime& time,
-                                 JointImages images) noexcept TANDEM_RT {
+                                 JointImages images, bool inputs_wait) noexcept TANDEM_RT {
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((start & only(slot)) == 0) continue;
     for (const auto& claim : table_[slot]->claims) references_.take_up(claim, images.command);
@@ -398,7 +399,7 @@ void ControllerHost::call_starts(ControllerSet start, const hal::CycleTime& time
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((start & only(slot)) == 0) continue;
     HostedController& one = *table_[slot];
-    for (const auto& port : one.inputs) port->begin(time);
+    for (const auto& port : one.inputs) port->begin(time, inputs_wait);
     guard_.remember(images.command, gains_);
     InCall(*this, one, ControllerFunction::kStart)->start(time, shown, images.command);
     take_back(one, images.command);

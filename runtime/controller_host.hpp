@@ -286,8 +286,8 @@ class ControllerHost {
                                                ControllerSet start) noexcept TANDEM_RT;
   void go_on_as(const HostedController& former, HostedController& next, const hal::CycleTime& time,
                 JointImages images) noexcept TANDEM_RT;
-  void call_starts(ControllerSet start, const hal::CycleTime& time,
-                   JointImages images) noexcept TANDEM_RT;
+  void call_starts(ControllerSet start, const hal::CycleTime& time, JointImages images,
+                   bool inputs_wait = true) noexcept TANDEM_RT;
   [[nodiscard]] bool is_active(std::size_t slot) const noexcept TANDEM_RT {
     return (active_ & only(slot)) != 0;
   }

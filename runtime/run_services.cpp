@@ -133,6 +133,11 @@ void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer&
     std::unique_ptr<HostedController>& place = host_->owned()[request.slot];
     std::unique_ptr<HostedController> next = std::move(place->next);
     if (!done) return;
+    for (const auto& port : next->inputs) {
+      for (const auto& before : place->inputs) {  // whoever feeds it feeds this one
+        if (port->is_same_as(*before)) before->pass_to(port);
+      }
+    }
     place = std::move(next);
     ++loads_;
   }

@@ -43,6 +43,8 @@ struct Reloaded {
   RequestResult asked;
   Kept kept = Kept::kState;  ///< once it is done
   bool changed = false;      ///< its library is another than before
+  /// Once it is done: what was set, or held, and did not go over, a line each with its name.
+  std::vector<std::string> left{};
 };
 
 /// A loaded controller.

@@ -190,6 +190,7 @@ Result<Json> reload(RunServices& services, const Json& request) {
   if (!made->asked.done) return answer;
   (*answer)["carried"] = made->kept == runtime::Kept::kState;
   (*answer)["afresh"] = why_afresh(made->kept);
+  (*answer)["left"] = made->left;
   return answer;
 }
 
