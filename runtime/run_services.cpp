@@ -124,6 +124,7 @@ void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer&
   using Kind = CycleRequest::Kind;
   const bool done = answer.reason == RejectReason::kNone;
   forget_changes(request);
+  if (request.kind == Kind::kInsert && done) host_->note_code(*host_->owned()[request.slot]);
   if ((request.kind == Kind::kInsert && !done) || (request.kind == Kind::kRemove && done)) {
     host_->owned()[request.slot].reset();
     ++loads_;
@@ -139,6 +140,7 @@ void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer&
       }
     }
     place = std::move(next);
+    host_->note_code(*place);
     ++loads_;
   }
 }
@@ -335,6 +337,7 @@ Result<RequestResult> RunServices::load(std::unique_ptr<HostedController> contro
         "unload one first");
   }
   controller->of_experiment = false;
+  host_->enter(*controller);
   log_->open(*controller);
   tell_loaded(*controller);
   CycleRequest request{.kind = CycleRequest::Kind::kInsert,

@@ -176,7 +176,6 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
   auto former = to_reload(name);
   if (!former) return std::unexpected(former.error());
-  const std::uint32_t id = (*former)->id;
   const auto& document = (*former)->document;
   const auto parameters = document ? TomlDocument::parse(document->text(), document->file())
                                    : TomlDocument::parse("", "parameters");
@@ -208,12 +207,13 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
   former = to_reload(name);
   if (!former) return std::unexpected(former.error());
-  if ((*former)->id != id) {
+  if ((*former)->io != former_io) {
     return fail_at(name, "the controller was exchanged meanwhile", "ask again");
   }
   const std::size_t slot = *slot_of(name);
   HostedController& made = **next;
-  const std::uint32_t made_id = made.id;
+  const std::shared_ptr<ControllerIo> made_io = made.io;
+  host_->enter(made);
   made.of_experiment = (*former)->of_experiment;
   Reloaded result{.asked = {}, .changed = made.sha256 != (*former)->sha256};
   log_->open(made);
@@ -227,7 +227,7 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   if (!asked) return std::unexpected(asked.error());
   result.asked = *asked;
   HostedController* const now = host_->owned()[slot].get();
-  if (asked->done && now != nullptr && now->id == made_id) {
+  if (asked->done && now != nullptr && now->io == made_io) {
     result.kept = now->succession->kept;
     const bool active = (host_->shown().active & only(slot)) != 0;
     result.left = left_behind(*former_io, active ? inputs : Inputs(), *now);

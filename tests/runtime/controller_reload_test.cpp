@@ -351,6 +351,48 @@ TEST(ControllerReload, KeepsWhatWasSetOfAListByTheElementsName) {
   EXPECT_NE(run.services().loads(), loads) << "what is shown of it is the new build's from now on";
 }
 
+// A row for each build had only the last one's calls; a refused one took its name's row.
+TEST(ControllerReload, CountsOnOverBuildsAndWhatIsRefusedLeavesNoTrace) {
+  ReloadRun run;
+  std::vector<std::shared_ptr<Build>> builds{run.first};
+  const auto expect_counted = [&] {
+    std::uint64_t calls = 0;
+    for (const auto& one : builds)
+      calls += static_cast<std::uint64_t>(one->starts + one->updates + one->stops);
+    const auto rows = run.host->names()->all();
+    ASSERT_EQ(rows.size(), 2U);
+    EXPECT_EQ(rows[0]->name, "arm");
+    EXPECT_EQ(rows[0]->calls.count(), calls);
+    EXPECT_EQ(rows[1]->name, "wrist");
+  };
+  run.steps(100);
+  ASSERT_FALSE(run.services().load("arm", build(), test::document_of(), kNow));
+  const auto mistake = build();
+  mistake->refuses = true;
+  ControllerSource refused(mistake);
+  refused.code = {.name = "arm", .sha256 = "1", .path = "refused.so"};
+  ASSERT_FALSE(run.services().reload("arm", refused, false, kNow));
+  expect_counted();
+  builds.push_back(build());
+  ControllerSource next(builds.back());
+  next.code = {.name = "arm", .sha256 = "2", .path = "next.so"};
+  ASSERT_TRUE(run.services().reload("arm", next, false, kNow));
+  run.steps(100);
+  expect_counted();
+  ASSERT_TRUE(run.services().switch_controllers({"arm"}, {}, kNow));
+  run.steps(1);
+  ASSERT_TRUE(run.services().unload("arm", kNow));
+  run.steps(1);
+  builds.push_back(build());
+  ASSERT_TRUE(run.services().load("arm", builds.back(), test::document_of(), kNow));
+  run.steps(1);
+  ASSERT_TRUE(run.services().switch_controllers({}, {"arm"}, kNow));
+  run.steps(100);
+  expect_counted();
+  ASSERT_EQ(run.host->code().size(), 1U);
+  EXPECT_EQ(run.host->code()[0].path, "next.so");
+}
+
 // An active one that was reloaded was counted three times.
 TEST(ControllerReload, LeavesAsManyInputsAsThereAre) {
   ReloadRun run;
