@@ -48,10 +48,11 @@ CycleAnswer ControllerHost::replace(std::size_t slot, HostedController& next, bo
   table_[slot] = &next;
   if (const auto conflict = find_conflict(table_, active_)) {
     table_[slot] = former;
-    return {.reason = RejectReason::kConflict,
+    const std::size_t other = conflict->one == slot ? conflict->other : conflict->one;
+    return {.reason = RejectReason::kTaken,
             .joint = static_cast<std::int32_t>(conflict->joint),
-            .one = static_cast<std::int32_t>(conflict->one),
-            .other = static_cast<std::int32_t>(conflict->other)};
+            .one = static_cast<std::int32_t>(slot),
+            .other = static_cast<std::int32_t>(other)};
   }
   next.succession->kept = hand_over(*former, next);
   parameter_changes_.fetch_add(1, std::memory_order_release);

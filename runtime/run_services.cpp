@@ -269,14 +269,18 @@ ControllerSet RunServices::planned() const {
   return active;
 }
 
-/// The errors of a document in one, as many as somebody reads. `missing`: what to do about a key.
-Status RunServices::errors_of(const TomlDocument& document, const char* missing) {
+/// The errors of a document in one, as many as somebody reads.
+/// @param missing, unknown  what to do about a key
+Status RunServices::errors_of(const TomlDocument& document, const char* missing,
+                              const char* unknown) {
   constexpr std::size_t kMost = 20;
   const Diagnostics& errors = document.diagnostics();
   std::string all;
   for (std::size_t i = 0; i < std::min(kMost, errors.size()); ++i) {
     Error one = errors[i];
     if (one.hint.starts_with("add it to the table")) one.hint = missing;
+    if (one.message == "unknown key" && *unknown != '\0')
+      one.hint += (one.hint.empty() ? "" : " ") + std::string(unknown);
     all += (all.empty() ? "" : "; ") + one.to_string();
   }
   if (errors.size() > kMost) all += "; and " + std::to_string(errors.size() - kMost) + " more";

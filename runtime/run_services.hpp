@@ -329,7 +329,8 @@ class RunServices {
   /// For the log, with the next cycles.
   static void tell_loaded(HostedController& controller);
   [[nodiscard]] static Status errors_of(const TomlDocument& document,
-                                        const char* missing = "give it with --set or --parameters");
+                                        const char* missing = "give it with --set or --parameters",
+                                        const char* unknown = "");
   [[nodiscard]] Result<HostedController*> to_reload(const std::string& name) const;
   /// Asks for what needs no more than a joint.
   [[nodiscard]] Result<RequestResult> ask_of_joint(CycleRequest::Kind kind,

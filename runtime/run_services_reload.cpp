@@ -191,10 +191,12 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
 
   auto next = host_->configure(name, std::move(source), table_at(*parameters, table),
                                ControllerHost::kConfigureTime, {}, sources);
-  if (Status read = errors_of(
-          *parameters,
-          "its parameters are those that it was loaded with: unload it, and load it with others");
-      !read)
+  constexpr const char* kFixed =
+      "its parameters are those that it was loaded with: unload it, and load it with others";
+  constexpr const char* kRenamed =
+      "This build has none of the name, and its parameters are those that it was loaded with: "
+      "unload it, and load it with others";
+  if (Status read = errors_of(*parameters, kFixed, kRenamed); !read)
     return std::unexpected(read.error());
   if (!next) return std::unexpected(next.error());
   auto succession = succession_of(*former_io, inputs, **next, fresh);

@@ -198,6 +198,7 @@ TEST(ControllerReload, IsRefusedWhereAnotherHasAJointThatItClaimsAndTheFormerGoe
   ASSERT_FALSE(asked);
   EXPECT_EQ(asked.error().key, "wrist");
   EXPECT_EQ(asked.error().message, "is claimed by the controllers 'arm' and 'wrist'");
+  EXPECT_EQ(asked.error().hint, "stop the other one first: tandem controller stop wrist");
   const int before = run.first->updates;
   run.steps(10);
   EXPECT_EQ(run.first->updates, before + 10);
@@ -223,6 +224,27 @@ TEST(ControllerReload, ThatCannotBeConfiguredLeavesTheFormerAtWork) {
   run.steps(10);
   EXPECT_EQ(run.first->updates, before + 10);
   EXPECT_EQ(run.reload(good), Kept::kState) << "and no error of a former try stays";
+}
+
+TEST(ControllerReload, OfARenamedParameterNamesBothAndWhatToDo) {
+  test::JointRun run;
+  const auto needs = [](const std::string& parameter) {
+    auto made = build();
+    made->needs = parameter;
+    return made;
+  };
+  run.host->read_from(test::document_of("gain = 2.0"));
+  run.add("arm", needs("gain"), true, "gain = 2.0");
+  run.begin({.running_cycles = 1000});
+  run.steps(100);
+  for (const char* name : {"gains", "stiffness"}) {
+    const auto asked = run.services().reload("arm", ControllerSource(needs(name)), false, kNow);
+    ASSERT_FALSE(asked);
+    const std::string& message = asked.error().message;
+    EXPECT_NE(message.find("gain: unknown key"), std::string::npos) << message;
+    EXPECT_NE(message.find(name), std::string::npos) << message;
+    EXPECT_NE(message.find("unload it, and load it with others"), std::string::npos) << message;
+  }
 }
 
 TEST(ControllerReload, OfAnInactiveOneTakesItsPlaceAndStartsNothing) {
