@@ -42,7 +42,7 @@ class HostedCode {
 
 /// Whether a bounded_call() was given up, and goes on all the same.
 using GivenUp = std::shared_ptr<const std::atomic<bool>>;
-/// Of the call that this thread is in; null: it is in none.
+/// That of the call that this thread is in; null: it is in none.
 [[nodiscard]] const GivenUp& hosted_call_given_up() noexcept;
 /// The thread is that call's.
 void this_thread_is_of(GivenUp call) noexcept;

@@ -52,7 +52,7 @@ bool InputPort::holds_sample() const noexcept TANDEM_RT {
   return block_->sequence > 0 && (block_->fresh || block_->options.after == AfterTimeout::kLast);
 }
 
-/// Of way-points only the bounds are compared: theirs are the joints' own as well.
+/// For way-points only the bounds are compared: theirs are the joints' own as well.
 bool InputPort::admits(std::span<const double> sample) const noexcept TANDEM_RT {
   if (same_bounds_) return true;
   if (block_->kind == InputKind::kTrajectory) return false;
