@@ -44,8 +44,8 @@ class HostedCode {
 using GivenUp = std::shared_ptr<const std::atomic<bool>>;
 /// That of the call that this thread is in; null: it is in none.
 [[nodiscard]] const GivenUp& hosted_call_given_up() noexcept;
-/// The thread is that call's.
-void this_thread_is_of(GivenUp call) noexcept;
+/// The thread is that call's, which outlives it.
+void this_thread_is_of(const GivenUp& call) noexcept;
 
 /// Whether a call was given up that may still go on: then the process ends by _exit(), and what the
 /// call uses stays.
@@ -96,7 +96,8 @@ template <class Call>
       job->exited = true;
       job->over.notify_all();
     };
-    this_thread_is_of(GivenUp(job, &job->given_up));
+    const GivenUp given_up(job, &job->given_up);
+    this_thread_is_of(given_up);
     const HostedCode inside(job->controller, exits);
     Answer answer = hosted_call(job->controller, *job->call);
     job->call.reset();  // nothing that it owns outlives the answer's reader here
