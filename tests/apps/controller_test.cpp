@@ -418,7 +418,8 @@ TEST_F(Controllers, ParametersAreShownAndSetByAnotherProcess) {
   EXPECT_EQ(each["rest.link_damping_Nms_rad"], "");
   EXPECT_NE(each["hold.nothing"].dump().find("has no such parameter"), std::string::npos);
   EXPECT_NE(each["nobody"].dump().find("names no controller"), std::string::npos);
-  for (const auto& one : asked("controller show rest")["controllers"][0]["parameters"]) {
+  const auto shown = asked("controller show rest");  // a loop over a temporary's part dangles
+  for (const auto& one : shown["controllers"][0]["parameters"]) {
     if (one["name"] == "link_damping_Nms_rad") EXPECT_EQ(one["value"], 3.0);
   }
   EXPECT_EQ(end(), 0);
@@ -430,7 +431,8 @@ TEST_F(Controllers, HaveListsOfParametersByJoint) {
                   "'damping_Nms_rad = [0.2, 0.15]'")["done"],
             true);
   nlohmann::json damping;
-  for (const auto& one : asked("controller show weigh")["controllers"][0]["parameters"])
+  const auto weigh = asked("controller show weigh");
+  for (const auto& one : weigh["controllers"][0]["parameters"])
     if (one["name"] == "damping_Nms_rad") damping = one;
   EXPECT_EQ(damping["type"], "numbers");
   EXPECT_EQ(damping["elements"], nlohmann::json({"joint1", "joint2"}));
