@@ -418,8 +418,8 @@ TEST_F(Controllers, ParametersAreShownAndSetByAnotherProcess) {
   EXPECT_EQ(each["rest.link_damping_Nms_rad"], "");
   EXPECT_NE(each["hold.nothing"].dump().find("has no such parameter"), std::string::npos);
   EXPECT_NE(each["nobody"].dump().find("names no controller"), std::string::npos);
-  const auto shown = asked("controller show rest");  // a loop over a temporary's part dangles
-  for (const auto& one : shown["controllers"][0]["parameters"]) {
+  const auto rest = asked("controller show rest");  // a loop over a temporary's part dangles
+  for (const auto& one : rest["controllers"][0]["parameters"]) {
     if (one["name"] == "link_damping_Nms_rad") EXPECT_EQ(one["value"], 3.0);
   }
   EXPECT_EQ(end(), 0);
