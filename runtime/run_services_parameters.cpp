@@ -73,8 +73,9 @@ Result<double> fit(const ParameterRow& row, const ParameterValue& given, const s
 std::string nearest(const std::string& name, const std::deque<ParameterRow>& rows) {
   std::vector<std::string> names;
   for (const ParameterRow& row : rows) {
+    if (!row.list.empty() && std::ranges::find(names, row.list) == names.end())
+      names.push_back(row.list);
     names.push_back(row.name);
-    if (!row.list.empty()) names.push_back(row.list);
   }
   return names.empty() ? "it has none: setup.parameter() declares them" : suggest(name, names);
 }
