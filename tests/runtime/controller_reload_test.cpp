@@ -345,7 +345,8 @@ TEST(ControllerReload, KeepsWhatWasSetOfAListByTheElementsName) {
   const std::uint64_t loads = run.services().loads();
   (void)run.reload(next({"wrist", "hand", "elbow"}));
   std::string values;
-  for (const ParameterStatus& one : *run.services().parameters("arm"))
+  const auto all = run.services().parameters("arm");
+  for (const ParameterStatus& one : *all)
     values += one.name + " " + std::to_string(static_cast<int>(one.value)) + " ";
   EXPECT_EQ(values, "gains.wrist 5 gains.hand 1 gains.elbow 4 ");
   EXPECT_NE(run.services().loads(), loads) << "what is shown of it is the new build's from now on";
