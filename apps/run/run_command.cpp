@@ -32,6 +32,7 @@
 #include "apps/transport/dds_admission.hpp"
 #include "apps/transport/dds_services.hpp"
 #include "base/counted.hpp"
+#include "base/process.hpp"
 #include "base/quoting.hpp"
 #include "rt/cpu_latency.hpp"
 #include "rt/stop_signal.hpp"
@@ -67,7 +68,8 @@ std::string pace_text(const WiredComposition& c) {
   const std::string how = hal.lockstep && !where.empty() ? "in lockstep, " : "";
   const rt::CyclicLoopConfig& loop = c.experiment.loop;
   return where + how + (loop.rate > 0.0 ? fmt::format("rate {:g}", loop.rate) : "free running") +
-         (loop.start_paused ? ", paused: tandem clock resume" : "");
+         (loop.start_paused ? ", paused: tandem clock resume" : "") +
+         (time_limits_are_waived() ? ", without limits of time" : "");
 }
 
 std::string served_text(const runtime::Experiment& e) {
