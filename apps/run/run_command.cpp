@@ -13,6 +13,7 @@
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/connection.hpp"
+#include "apps/run/controller_trial.hpp"
 #include "apps/run/cycle_guard.hpp"
 #include "apps/run/cycle_thread.hpp"
 #include "apps/run/dds_run.hpp"
@@ -215,7 +216,8 @@ class Session {
         [judge](std::size_t joint, hal::PidLoop loop, const robot::GainsJudge::Gains& gains,
                 const std::vector<double>& position_rad) {
           return opinion(*judge, joint, loop, gains, position_rad);
-        });
+        },
+        try_in_other_process(options_));
     add_predict(commands_, c_.predictor.get(), e.robot);
     if (dds_ != nullptr) {
       admission_.add_to(commands_);
