@@ -191,6 +191,17 @@ Result<LogFile> LogFile::open(const std::string& path) {
   return log;
 }
 
+Status LogFile::check(const std::string& path) {
+  const auto file = begin(path);
+  if (file) return {};
+  const auto part = part_of(path);
+  if (part && part->number == 1 && begin(part->all)) return {};
+  for (const auto& [number, sibling] : parts_of(path)) {
+    if (begin(sibling)) return {};
+  }
+  return std::unexpected(file.error());
+}
+
 bool LogFile::truncated() const { return std::ranges::any_of(parts_, &LogPart::truncated); }
 
 std::uint64_t LogFile::bytes() const {

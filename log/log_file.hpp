@@ -51,6 +51,8 @@ class LogFile {
   /// and what does not move, is in the whole once.
   /// Errors: as McapReader; a file that is cut before anything of a run.
   [[nodiscard]] static Result<LogFile> open(const std::string& path);
+  /// Whether open() would find a log, without reading it.
+  [[nodiscard]] static Status check(const std::string& path);
 
   /// As it was opened.
   [[nodiscard]] const std::string& path() const { return path_; }
