@@ -253,8 +253,8 @@ void RobotCycle::limit() noexcept TANDEM_RT {
   trace_.mark(CycleStage::kLimit, now_.clock);
 }
 
-/// Of each joint the first time that a limit changed its command, whichever limit, and the first
-/// time that the command was a controller's.
+/// Each joint's first command that a limit changed, whichever limit, and its first one that was a
+/// controller's.
 void RobotCycle::note_limits() noexcept TANDEM_RT {
   const auto counters = now_.limits.counters();
   for (std::size_t j = 0; j < counters.size(); ++j) {

@@ -118,9 +118,7 @@ static void figures(Figures& f, const log::RecordingResult& log) {
   f("files_removed", "of them, to keep to `[log] total_MB` or `keep_free_MB`", log.removed);
   f("messages", "written", log.messages);
   f("dropped", "the ring was full", log.dropped);
-  f("data_sha256",
-    "of the messages' data, in order, in however many files",
-    log.data_sha256);
+  f("data_sha256", "of the messages' data, in order, in however many files", log.data_sha256);
 }
 
 static void figures(Figures& f, const hal::can::FrameRecord::Result& frames) {
