@@ -87,7 +87,8 @@ Result<pid_t> spawn(const Spawn& what) {
   }
   posix_spawn_file_actions_adddup2(&actions, output->get(), 1);
   posix_spawn_file_actions_adddup2(&actions, 1, 2);
-  posix_spawn_file_actions_addchdir_np(&actions, what.directory.c_str());
+  if (what.directory != ".")  // what confines a run does not let it change its folder
+    posix_spawn_file_actions_addchdir_np(&actions, what.directory.c_str());
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   if (what.own_group) posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);

@@ -82,7 +82,7 @@ std::optional<int> wait_for_trial(pid_t child, milliseconds limit) {
     std::this_thread::sleep_for(kTick);
     if (!time_limits_are_waived()) left -= kTick;
   }
-  ::kill(-child, SIGKILL);  // and what it started
+  ::kill(child, SIGKILL);
   (void)wait_for(child);
   return std::nullopt;
 }
@@ -156,9 +156,8 @@ Status tried(const RunOptions& options, const ControllerTrial& trial) {
     if (write_all(*request, json_text(request_of(options, trial))) != 0)
       return untried("the disk is full");
   }
-  const auto child = spawn({.command = {program_file(), kTryController, folder.request()},
-                            .output = folder.output(),
-                            .own_group = true});
+  const auto child = spawn(
+      {.command = {program_file(), kTryController, folder.request()}, .output = folder.output()});
   if (!child) return untried(child.error().message);
   const milliseconds limit = runtime::ControllerHost::kConfigureTime;
   const std::optional<int> status = wait_for_trial(*child, limit);
