@@ -78,8 +78,11 @@ std::string cause(const Event& event, const EventNames&) {
 }
 
 std::string limited(const Event& event, const EventNames&) {
-  return event.code == static_cast<std::uint32_t>(Code::kNotFinite) ? ": it was not finite"
-                                                                    : ": it was out of range";
+  switch (static_cast<Code>(event.code)) {
+    case Code::kOk: return ": it is followed as fast as the joint's limits allow";
+    case Code::kNotFinite: return ": it was not finite";
+    default: return ": it was out of range";
+  }
 }
 
 bool has_joint(const Event& event, const EventNames& names) {
@@ -126,7 +129,8 @@ std::string what_happened(const Event& event, const EventNames& names) {
   text += whose(event, names);
   const EventRow* row = row_of(event.kind);
   if (row == nullptr) return text;
-  const bool tells = event.code != 0 || row->detail == target;  // a motion's 0 is a unit
+  // A motion's 0 is a unit, and that of a limit its speed.
+  const bool tells = event.code != 0 || row->detail == target || row->detail == limited;
   return tells ? text + row->detail(event, names) : text;
 }
 

@@ -130,6 +130,13 @@ void add_log(py::module_& module) {
                              [](const Log& log) { return log.file().info().configuration; })
       .def_property_readonly("result", [](const Log& log) { return log.file().result(); })
       .def_property_readonly("truncated", [](const Log& log) { return log.file().truncated(); })
+      .def_property_readonly("parts",
+                             [](const Log& log) {
+                               std::vector<std::string> paths;
+                               for (const auto& one : log.file().parts()) paths.push_back(one.path);
+                               return paths;
+                             })
+      .def_property_readonly("remarks", [](const Log& log) { return log.file().remarks(); })
       .def_property_readonly("data_sha256", [](const Log& log) { return log.file().data_sha256(); })
       .def("channels", &Log::channels)
       .def("read", &Log::read, "channel"_a)

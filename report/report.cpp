@@ -40,6 +40,7 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   facts.emplace_back(
       "log" + side,
       run.path + (run.truncated ? " (cut: its run was killed, or the copy is not whole)" : ""));
+  for (const std::string& one : run.remarks) facts.emplace_back("log" + side, one);
   add_faults(run, side, facts);
   const std::size_t passive = run.robot.passive.size();
   facts.emplace_back(
@@ -53,7 +54,7 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   const double start_s = run.time_s.front();
   const double ran_s = run.controllers_ran ? run.time_s[run.rows_before_stop() - 1] - start_s : 0.0;
   const bool imported = run.info.hal == "import";
-  if (run.controllers_ran && !imported) {
+  if (run.controllers_ran && !imported && run.remarks.empty()) {
     facts.emplace_back("controllers started" + side, fmt::format("{:.3f} s", start_s));
   }
   facts.emplace_back((imported ? "recorded" : "controllers ran") + side,

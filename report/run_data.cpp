@@ -453,6 +453,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   run.info = file->info();
   run.result = file->result();
   run.truncated = file->truncated();
+  run.remarks = file->remarks();
   run.data_sha256 = file->data_sha256();
   if (const Status s = read_configuration(run); !s) return std::unexpected(s.error());
   if (const Status s = read_description(run); !s) return std::unexpected(s.error());

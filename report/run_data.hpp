@@ -64,6 +64,7 @@ struct RunData {
   log::RunInfo info;
   log::StringMap result;  ///< empty when the run was killed
   bool truncated = false;
+  std::vector<std::string> remarks;  ///< log::LogFile::remarks()
   std::string data_sha256;
 
   hal::RobotConfig robot;  ///< as it was logged

@@ -36,14 +36,11 @@ void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& 
     limited_[j].count = count;
   }
   ++cycles_;
-  const auto mode = command.mode();
   const auto wanted = command.position_rad();
   const auto measured = state.position_rad();
   for (std::size_t j = 0; j < errors_.size(); ++j) {
     const double error = wanted[j] - measured[j];
-    // Outside position control what nobody writes is what is measured.
-    const bool follows = mode[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition);
-    if ((!follows && error == 0.0) || std::isnan(error)) continue;
+    if (std::isnan(error)) continue;  // nobody wants it anywhere, or knows where it is
     errors_[j].square_sum += error * error;
     errors_[j].max = std::max(errors_[j].max, std::abs(error));
     ++errors_[j].count;

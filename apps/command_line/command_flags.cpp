@@ -268,6 +268,9 @@ void add_flags(CLI::App& app, RunOptions& o) {
   app.add_flag("--gate", o.gate,
                "Watch what controllers do in a cycle, as `tandem controller check` (status 1: a "
                "rule is broken)");
+  app.add_flag("--debug", o.debug,
+               "For work in a debugger, in simulation only: no limit of time ends a configure(), "
+               "a cycle or the run (one that gdb holds is noticed without)");
   app.add_flag("--report", o.report, "Draw the report after the run, from its log")
       ->excludes("--no-log");
   app.add_option("--on-fault", o.on_fault,

@@ -112,14 +112,13 @@ std::vector<std::string> wire_of(const hal::can::DriveMaster* master) {
 }  // namespace
 
 static void figures(Figures& f, const log::RecordingResult& log) {
-  f("path", "of several files the first that is there", log.path);
+  f("path", "of several files that of the first: it opens all of them, also when that one is gone",
+    log.path);
   f("files", "that were written", log.parts);
   f("files_removed", "of them, to keep to `[log] total_MB` or `keep_free_MB`", log.removed);
   f("messages", "written", log.messages);
   f("dropped", "the ring was full", log.dropped);
-  f("data_sha256",
-    "of the messages' data, in order; of several files [theirs](log.md#several-files)",
-    log.data_sha256);
+  f("data_sha256", "of the messages' data, in order, in however many files", log.data_sha256);
 }
 
 static void figures(Figures& f, const hal::can::FrameRecord::Result& frames) {

@@ -131,6 +131,7 @@ class Channel:
 class Log:
     """A log of `tandem run`, opened: `log["state"].position["LKneeSag"]`, `log.events`.
 
+    Of a log in several files the first one's name opens all, "arm-001.3.mcap" that part alone.
     Opening counts the messages; numbers are read channel by channel when they are asked for.
     Errors: FileNotFoundError; tandem.Error, a file that is no log or is damaged; UnknownName.
     """
@@ -142,6 +143,8 @@ class Log:
     info: Dict[str, str]  #: who, where, when, seed, period, kernels, controllers
     result: Dict[str, str]  #: empty when the run was killed
     configuration: Dict[str, str]  #: text of every file that was read, by path
+    parts: List[str]  #: its files: of a log in several, all that are there
+    remarks: List[str]  #: which parts are not, and what time is here; [] when none is missing
     truncated: bool  #: the run was killed, or goes on: the data end where its last chunk ended
     data_sha256: str  #: over every message
 
@@ -151,6 +154,7 @@ class Log:
         self.path, self.robot, self.joints = file.path, file.robot, file.joints
         self.info, self.result = dict(file.info), dict(file.result)
         self.configuration = dict(file.configuration)
+        self.parts, self.remarks = file.parts, file.remarks
         self.truncated, self.data_sha256 = file.truncated, file.data_sha256
         self._channels = {row[0]: Channel(file, row) for row in file.channels()}
         self.channels = list(self._channels)

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "base/process.hpp"
 #include "base/quoting.hpp"
 #include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
@@ -317,6 +318,15 @@ Diagnostics unfit(const Experiment& e, const Overrides& overrides) {
              .file = e.file,
              .key = "hal.backend"}};
   }
+  if (overrides.debug && (e.hal.backend != BackendKind::kSim || overrides.serves)) {
+    return {{.message = "--debug waives the limits of time that keep a robot safe: it is for a "
+                        "simulation in this process, and " +
+                        std::string(is_remote ? "this robot is another process'"
+                                              : "this robot is on a bus"),
+             .hint = "add --hal sim, or leave --debug out",
+             .file = e.file,
+             .key = "hal.backend"}};
+  }
   if (overrides.domain && !is_remote && !overrides.serves && !e.dds.enabled) {
     return {{.message = "--domain: nothing of this run is in a DDS domain",
              .hint = "add --dds, or leave it out",
@@ -432,6 +442,7 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   e = std::move(*experiment);
   if (auto unknown = override_experiment(e, overrides); !unknown.empty()) return unknown;
   if (auto reasons = unfit(e, overrides); !reasons.empty()) return reasons;
+  if (overrides.debug) waive_time_limits();
   keep_to_own_end(e, overrides);
   if (Status done = hal::replace_interfaces(e.robot, overrides.interfaces); !done) {
     return {done.error()};

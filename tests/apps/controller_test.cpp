@@ -125,6 +125,75 @@ TEST_F(Controllers, TellTheirSignals) {
   EXPECT_EQ(end(), 0);
 }
 
+constexpr char kTestPlugins[] = TANDEM_BINARY_DIR "/tests/test_plugins/";
+
+// The run had ended with the signal, and the robot with it.
+TEST_F(Controllers, ThatCrashBeforeTheirFirstCycleAreRefusedAndTheRunGoesOn) {
+  if (TANDEM_SANITIZED != 0) GTEST_SKIP() << "a sanitizer handles signals itself";
+  begin("");
+  const auto lazy = [](const std::string& crash) {
+    return "controller load " + shell_word(std::string(kTestPlugins) + "hangs.so") +
+           " --name lazy --set at_once=true --set 'crash = \"" + crash + "\"'";
+  };
+  const std::string crashed = "lazy: the controller crashed before its first cycle: ";
+  const std::string null = refused(lazy("null"));
+  expect(null, crashed + "SIGSEGV in ");
+  expect(null, "Hangs::");
+  expect(null, "the run goes on");
+  expect(read_text(folder_ / "run.txt"), "from the trial of the controller 'lazy'");
+  expect(refused(lazy("stack")), crashed + "SIGSEGV");
+  expect(refused(lazy("abort")), crashed + "SIGABRT");
+  expect(refused(lazy("divide")), crashed + "SIGFPE");
+  expect(refused(lazy("exit")), "lazy: the controller called exit()");
+  expect(refused("controller load " +
+                 shell_word(std::string(kTestPlugins) + "crashes_when_opened.so")),
+         "crashes_when_opened: the controller crashed before its first cycle: SIGSEGV");
+  EXPECT_EQ(to_run("controller load " + shell_word(std::string(kTestPlugins) + "hangs.so") +
+                   " --name lazy")
+                .status,
+            0)
+      << "it is the parameters that let it crash";
+  EXPECT_EQ(asked("controller list")["controllers"].size(), 2U);
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Controllers, KeepTheirFormerBuildWhenTheNewOneCrashes) {
+  if (TANDEM_SANITIZED != 0) GTEST_SKIP() << "a sanitizer handles signals itself";
+  const auto put = [this](const std::string& build) {
+    std::filesystem::copy_file(std::string(kTestPlugins) + build + ".so", folder_ / "new.so");
+    std::filesystem::rename(folder_ / "new.so", folder_ / "nodder.so");
+  };
+  put("nodder_1");
+  const std::string hold = read_text(folder_ / "hold.toml");
+  write_text(folder_ / "hold.toml", hold.substr(0, hold.find("[[controller]]")) +
+                                        "[[controller]]\nplugin = \"./nodder.so\"\n"
+                                        "[controller.parameters]\nspeed_rad_s = 0.5\n");
+  begin("");
+  put("crashes_when_opened");
+  expect(refused("controller reload nodder"),
+         "nodder: the controller crashed before its first cycle: SIGSEGV");
+  EXPECT_EQ(asked("controller list")["controllers"][0]["active"], true);
+  // What it cannot be tried with is not opened, either.
+  put("nodder_2");
+  const std::string robot = read_text(folder_ / "robot.toml");
+  write_text(folder_ / "robot.toml", "not a robot");
+  expect(refused("controller reload nodder"), "nodder: it could not be tried: ");
+  EXPECT_EQ(asked("controller reload nodder --untried")["done"], true);
+  write_text(folder_ / "robot.toml", robot);
+  EXPECT_EQ(asked("controller reload nodder")["done"], true);
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Controllers, ThatCrashUntriedEndTheRun) {
+  if (TANDEM_SANITIZED != 0) GTEST_SKIP() << "a sanitizer handles signals itself";
+  begin("");
+  EXPECT_NE(to_run("controller load --untried " +
+                   shell_word(std::string(kTestPlugins) + "crashes_when_opened.so"))
+                .status,
+            0);
+  EXPECT_NE(join(), 0);
+}
+
 TEST_F(Controllers, ThatAreBrokenAreRefusedWhileTheRunGoesOn) {
   begin("");
   const auto broken = [](const std::string& name) {

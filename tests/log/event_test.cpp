@@ -47,6 +47,9 @@ TEST(Event, SaysWhatHappenedInOneLine) {
            .joint = 1,
            .kind = EventKind::kLimited};
   EXPECT_EQ(describe(event, kNames), "command limited of knee: it was out of range");
+  event.code = static_cast<std::uint32_t>(Code::kOk);
+  EXPECT_EQ(describe(event, kNames),
+            "command limited of knee: it is followed as fast as the joint's limits allow");
   event = {.code = 3, .kind = EventKind::kOverrun};
   EXPECT_EQ(describe(event, kNames), "overrun: 3 cycles skipped");
   EventNames names = kNames;

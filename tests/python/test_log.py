@@ -3,6 +3,7 @@
 import csv
 import gc
 import io
+import os
 import subprocess
 
 import numpy as np
@@ -92,3 +93,28 @@ def test_files_that_are_no_logs(tmp_path, log_file):
     (tmp_path / "damaged.mcap").write_bytes(damaged)
     with pytest.raises(tandem.Error):
         tandem.Log(tmp_path / "damaged.mcap")
+
+
+def test_a_log_in_several_files_is_one(tmp_path, config):
+    experiment = tmp_path / "parts.toml"
+    experiment.write_text(
+        f'robot = "{config}/double_pendulum/robot.toml"\nduration_s = 20\n'
+        '[log]\nfile_MB = 4\n[[controller]]\nplugin = "hold"\n'
+    )
+    subprocess.run(
+        [BUILD / "bin/tandem", "run", experiment, "--no-socket", "--no-dds", "--quiet", "--log", tmp_path],
+        check=True,
+    )
+    first = next(tmp_path.glob("*-001.mcap"))
+    whole = tandem.Log(first)
+    assert len(whole.parts) > 2 and whole.remarks == []
+    cycles = whole["state"].cycle.values[:, 0]
+    assert np.array_equal(cycles, np.arange(len(whole["state"])))
+    alone = tandem.Log(whole.parts[1])
+    assert alone.parts == [whole.parts[1]]
+    assert "opens all of them" in alone.remarks[0]
+    os.remove(whole.parts[0])
+    rest = tandem.Log(first)
+    assert rest.parts == whole.parts[1:]
+    assert rest.remarks[0].startswith("the log lacks part 1; what is here is from ")
+    assert len(rest["state"]) < len(whole["state"])
