@@ -33,7 +33,7 @@ void HandOver::take() noexcept TANDEM_RT {
 
 void HandOver::show() noexcept TANDEM_RT {
   show_progress();
-  show_joints(told);
+  show_joints(arbiter_.told());
   show_sensors();
 }
 
