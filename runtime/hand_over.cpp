@@ -27,7 +27,9 @@ void HandOver::take() noexcept TANDEM_RT {
   if (!ends(now_.run.phase())) statistics_.take_base(now_.truth);
   now_.log.images(now_.time, now_.state, told, now_.truth, now_.estimate());
   show_controllers();
-  show();
+  show_progress();
+  show_joints(told);
+  show_sensors();
   if (now_.observer != nullptr) show(told);
 }
 
