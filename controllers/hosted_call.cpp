@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 namespace tandem {
 namespace {
@@ -15,6 +16,8 @@ constexpr int kStatus = 2;  // what a controller that cannot be used ends a comm
 
 thread_local const std::string* inside = nullptr;             // the controller whose code runs
 thread_local const std::function<void()>* on_exit = nullptr;  // of a bounded_call()
+
+thread_local GivenUp given_up;
 
 std::atomic<bool> one_goes_on{false};
 
@@ -53,6 +56,9 @@ HostedCode::~HostedCode() {
 
 bool a_hosted_call_goes_on() noexcept { return one_goes_on.load(std::memory_order_relaxed); }
 void note_hosted_call_goes_on() noexcept { one_goes_on.store(true, std::memory_order_relaxed); }
+
+const GivenUp& hosted_call_given_up() noexcept { return given_up; }
+void this_thread_is_of(GivenUp call) noexcept { given_up = std::move(call); }
 
 const char* hosted_controller() noexcept { return inside == nullptr ? nullptr : inside->c_str(); }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
@@ -38,6 +39,13 @@ class HostedCode {
 
 /// The controller whose code this thread is in, null: in none's. For a signal handler.
 [[nodiscard]] const char* hosted_controller() noexcept;
+
+/// Whether a bounded_call() was given up, and goes on all the same.
+using GivenUp = std::shared_ptr<const std::atomic<bool>>;
+/// That of the call that this thread is in; null: it is in none.
+[[nodiscard]] const GivenUp& hosted_call_given_up() noexcept;
+/// The thread is that call's.
+void this_thread_is_of(GivenUp call) noexcept;
 
 /// Whether a call was given up that may still go on: then the process ends by _exit(), and what the
 /// call uses stays.
@@ -79,6 +87,7 @@ template <class Call>
     std::condition_variable over{};
     std::optional<Answer> answer{};
     bool exited = false;
+    std::atomic<bool> given_up{false};
   };
   const auto job = std::make_shared<Job>(controller, std::optional<Call>(std::move(call)));
   std::thread([job] {
@@ -87,6 +96,7 @@ template <class Call>
       job->exited = true;
       job->over.notify_all();
     };
+    this_thread_is_of(GivenUp(job, &job->given_up));
     const HostedCode inside(job->controller, exits);
     Answer answer = hosted_call(job->controller, *job->call);
     job->call.reset();  // nothing that it owns outlives the answer's reader here
@@ -103,6 +113,7 @@ template <class Call>
     if (!time_limits_are_waived()) left -= tick;
   }
   if (job->answer) return std::move(*job->answer);
+  job->given_up = true;
   note_hosted_call_goes_on();
   const bool exited = job->exited;
   return std::unexpected(Error{

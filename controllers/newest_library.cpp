@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <map>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "base/loaded_libraries.hpp"
+#include "controllers/hosted_call.hpp"
 
 #ifdef __has_feature
 #define TANDEM_HAS(sanitizer) __has_feature(sanitizer)
@@ -171,12 +173,69 @@ Status check_needs(void* library, bool apart, const std::set<std::string>& befor
   return {};
 }
 
+/// One thread at a time is in the linker, which keeps a lock while a library's own initialisers or
+/// clean-up run: one that does not return has it for ever.
+struct Linker {
+  std::timed_mutex turn;
+  std::mutex mutex;  // of what follows: who has the turn
+  std::string path;
+  GivenUp given_up;
+};
+Linker& linker() {
+  static Linker& one = *new Linker;  // also while the process ends
+  return one;
+}
+
+/// The turn for a library, as long as it lives.
+class LinkerTurn {
+ public:
+  /// Waits. Errors, by no wait: who has the turn was given up; the one who waits was.
+  explicit LinkerTurn(const std::string& path) : turn_(linker().turn, std::defer_lock) {
+    constexpr std::chrono::milliseconds kLook{20};
+    Linker& its = linker();
+    const GivenUp& own = hosted_call_given_up();
+    while (!turn_.try_lock_for(kLook)) {
+      const std::lock_guard lock(its.mutex);
+      if ((own == nullptr || !*own) && (its.given_up == nullptr || !*its.given_up)) continue;
+      state_ = fail("cannot be loaded: the process is still in " + its.path +
+                        ", which does not return from its static initialisers or its clean-up",
+                    "correct that one, and end the run: it loads and frees no library before");
+      return;
+    }
+    const std::lock_guard lock(its.mutex);
+    its.path = path;
+    its.given_up = own;
+  }
+  ~LinkerTurn() {
+    if (!turn_) return;
+    const std::lock_guard lock(linker().mutex);
+    linker().given_up.reset();
+  }
+  LinkerTurn(const LinkerTurn&) = delete;
+  LinkerTurn& operator=(const LinkerTurn&) = delete;
+
+  [[nodiscard]] const Status& state() const noexcept { return state_; }
+
+ private:
+  std::unique_lock<std::timed_mutex> turn_;
+  Status state_;
+};
+
 }  // namespace
 
+void close_library(void* library, const std::string& path) noexcept {
+  constexpr std::chrono::milliseconds kLimit{4000};
+  (void)bounded_call(path, kLimit, [library, path]() -> Status {
+    const LinkerTurn turn(path);
+    if (turn.state()) dlclose(library);
+    return turn.state();
+  });
+}
+
 Result<void*> load_newest(const TrustedCode& code) {
-  static std::mutex mutex;
   static std::map<std::string, Identity> loaded;  // when it was loaded last, by its real path
-  const std::lock_guard lock(mutex);
+  const LinkerTurn turn(code.real_path());
+  if (!turn.state()) return std::unexpected(turn.state().error());
   static const OfTheProgram program;
   const Identity now = identity_of(code.file());
   const auto [known, first] = loaded.try_emplace(code.real_path(), now);

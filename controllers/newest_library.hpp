@@ -2,6 +2,8 @@
 // Layer: controllers.  Thread: any, non-RT.
 #pragma once
 
+#include <string>
+
 #include "base/result.hpp"
 #include "base/trusted_code.hpp"
 
@@ -18,7 +20,12 @@ namespace tandem {
 /// Errors: TrustedCode::load()'s; it was overwritten in place while its former code is mapped; a
 /// variable is unique, so that the new code would have the former one's; a library that it needs
 /// was built anew, and is mapped as it was; one that it brings without naming it would call the
-/// program's version of it.
+/// program's version of it; another library, which is named, has not returned from its static
+/// initialisers or its clean-up, and its call was given up.
 [[nodiscard]] Result<void*> load_newest(const TrustedCode& code);
+
+/// dlclose(), for at most 4 s. What does not return by then, and what is closed while another
+/// library does not, stays mapped.
+void close_library(void* library, const std::string& path) noexcept;
 
 }  // namespace tandem

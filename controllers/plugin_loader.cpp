@@ -118,7 +118,9 @@ Status check(const ControllerPlugin& plugin, const std::string& name, const std:
 
 }  // namespace
 
-void LoadedController::Close::operator()(void* library) const noexcept { dlclose(library); }
+void LoadedController::Close::operator()(void* library) const noexcept {
+  close_library(library, path);
+}
 
 std::vector<std::string> controller_folders() {
   std::vector<std::string> folders;
@@ -162,7 +164,7 @@ Status LoadedController::open(const TrustedCode& code, const std::string& name) 
   sha256_ = sha256_of(code.file().get());
   const Result<void*> library = load_newest(code);
   if (!library) return refuse(name, path_, library.error().message, library.error().hint);
-  library_.reset(*library);
+  library_ = {*library, Close{code.real_path()}};
   using Entry = const ControllerPlugin* (*)();
   const auto entry = reinterpret_cast<Entry>(dlsym(library_.get(), kEntry));
   if (entry == nullptr) {

@@ -28,6 +28,7 @@ class LoadedController {
                                                   const std::vector<std::string>&);
   [[nodiscard]] Status open(const TrustedCode& code, const std::string& name);
   struct Close {
+    std::string path;
     void operator()(void* library) const noexcept;
   };
   std::unique_ptr<void, Close> library_;  // outlives controller_

@@ -80,6 +80,8 @@ Status ControllerHost::add(const std::string& name, ControllerSource source, Tom
                 active ? std::span<const double>(start_rad_) : std::span<const double>(), inputs);
   if (!made) return std::unexpected(made.error());
   (*made)->document = document_;
+  enter(**made);
+  note_code(**made);
   table_[slot] = made->get();
   const ControllerSet after = active_ | only(slot);
   if (const auto conflict = active ? find_conflict(table_, after) : std::nullopt) {
@@ -104,10 +106,6 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     const std::string& name, ControllerSource source, TomlTable parameters,
     std::optional<std::chrono::milliseconds> limit, std::span<const double> start_rad,
     std::span<const InputSource> inputs) {
-  if (!source.code.path.empty()) {
-    const std::lock_guard lock(code_mutex_);
-    code_.push_back({name, source.code.sha256, source.code.path});
-  }
   const std::string path = parameters.path();
   const auto shared =
       std::make_shared<ControllerSetup>(robot_, gains_, kernels_, period_ns_, std::move(parameters),
@@ -146,9 +144,18 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
   made->claimed.assign(robot_.joints.size(), 0);
   made->strayed.assign(robot_.joints.size(), 0);
   for (const auto& claim : made->claims) made->claimed[claim.joint] = 1;
-  made->id = names_->add(name);
-  made->times = names_->all()[made->id];
   return made;
+}
+
+void ControllerHost::enter(HostedController& one) {
+  one.id = names_->add(one.name);
+  one.times = names_->all()[one.id];
+}
+
+void ControllerHost::note_code(const HostedController& one) {
+  if (one.plugin.empty()) return;
+  const std::lock_guard lock(code_mutex_);
+  code_.push_back({one.name, one.sha256, one.plugin});
 }
 
 Status ControllerHost::check_claims(const std::string& name,
@@ -388,8 +395,9 @@ const hal::StateImage& ControllerHost::at_rest(const hal::StateImage& state,
 }
 
 /// Each in the modes of its claims.
+/// @param inputs_wait  false: samples that wait arrive all the same, in this cycle
 void ControllerHost::call_starts(ControllerSet start, const hal::CycleTime& time,
-                                 JointImages images) noexcept TANDEM_RT {
+                                 JointImages images, bool inputs_wait) noexcept TANDEM_RT {
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((start & only(slot)) == 0) continue;
     for (const auto& claim : table_[slot]->claims) references_.take_up(claim, images.command);
@@ -398,7 +406,7 @@ void ControllerHost::call_starts(ControllerSet start, const hal::CycleTime& time
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((start & only(slot)) == 0) continue;
     HostedController& one = *table_[slot];
-    for (const auto& port : one.inputs) port->begin(time);
+    for (const auto& port : one.inputs) port->begin(time, inputs_wait);
     guard_.remember(images.command, gains_);
     InCall(*this, one, ControllerFunction::kStart)->start(time, shown, images.command);
     take_back(one, images.command);

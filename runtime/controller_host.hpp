@@ -71,7 +71,7 @@ struct HostedController {
   std::vector<ControllerSetup::Plan> plans;
   std::vector<std::uint8_t> claimed;       ///< by joint
   std::vector<std::uint8_t> strayed;       ///< by joint: something was taken back, and reported
-  std::uint32_t id = 0;                    ///< of its name, for the fault log
+  std::uint32_t id = 0;                    ///< of its name, for the fault log: enter()
   std::shared_ptr<ControllerTimes> times;  ///< of its calls in the cycle
   bool lacks_archive = false;              ///< it has members, and no archive()
   bool of_experiment = true;               ///< not loaded while the run went on
@@ -155,6 +155,10 @@ class ControllerHost {
       const std::string& name, ControllerSource source, TomlTable parameters,
       std::optional<std::chrono::milliseconds> limit = kConfigureTime,
       std::span<const double> start_rad = {}, std::span<const InputSource> inputs = {});
+  /// It will be loaded: gives it the number and the times of its name.
+  void enter(HostedController& one);
+  /// It is loaded: its library is among code() from now on.
+  void note_code(const HostedController& one);
   /// The first joint that two of `active` claim.
   [[nodiscard]] static std::optional<ClaimConflict> find_conflict(
       const Table& table, ControllerSet active) noexcept TANDEM_RT;
@@ -171,7 +175,7 @@ class ControllerHost {
     return capabilities_;
   }
 
-  /// Every plugin that was given to add() and configure(), in order, also of those that are gone.
+  /// Every plugin that was loaded, in order, also of those that are gone.
   [[nodiscard]] std::vector<ControllerCode> code() const;
 
   using Owned = std::array<std::unique_ptr<HostedController>, kMostControllers>;
@@ -286,8 +290,8 @@ class ControllerHost {
                                                ControllerSet start) noexcept TANDEM_RT;
   void go_on_as(const HostedController& former, HostedController& next, const hal::CycleTime& time,
                 JointImages images) noexcept TANDEM_RT;
-  void call_starts(ControllerSet start, const hal::CycleTime& time,
-                   JointImages images) noexcept TANDEM_RT;
+  void call_starts(ControllerSet start, const hal::CycleTime& time, JointImages images,
+                   bool inputs_wait = true) noexcept TANDEM_RT;
   [[nodiscard]] bool is_active(std::size_t slot) const noexcept TANDEM_RT {
     return (active_ & only(slot)) != 0;
   }

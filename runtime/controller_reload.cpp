@@ -13,17 +13,27 @@ bool same_claims(const HostedController& one, const HostedController& other) noe
   });
 }
 
+/// Signals and marks, which stay until they are written.
+void carry_shown(const HostedController& former, HostedController& next) noexcept TANDEM_RT {
+  Succession& to = *next.succession;
+  const ControllerIo& was = *former.io;
+  ControllerIo& is = *next.io;
+  to.signals.carry(was.signals.image(), is.signals.image(), is.signals);
+  to.marks.carry(was.marks.bytes(), is.marks.bytes(), is.marks);
+}
+
 /// What it declared is the host's, and goes over by itself: also when its own state does not.
 Kept hand_over(HostedController& former, HostedController& next) noexcept TANDEM_RT {
   Succession& to = *next.succession;
-  ShownIo before{*former.io}, after{*next.io};
-  to.same_shown = to.same_shown && to.shown.take(before, after);
+  carry_shown(former, next);
+  next.io->texts = former.io->texts;
   for (const auto& [was, is] : to.parameters) next.io->parameters.take_over(*was, *is);
   if (!to.wanted) return Kept::kNotWanted;
   if (former.lacks_archive || next.lacks_archive) return Kept::kNoArchive;
   if (!same_claims(former, next)) return Kept::kOtherClaims;
-  const bool fits = to.controller.take(*former.controller, *next.controller);
-  return fits ? Kept::kState : Kept::kOtherState;
+  if (!to.controller.take(*former.controller, *next.controller)) return Kept::kOtherState;
+  for (const auto& [was, is] : to.inputs) is->go_on_as(*was);
+  return Kept::kState;
 }
 
 }  // namespace
@@ -38,10 +48,11 @@ CycleAnswer ControllerHost::replace(std::size_t slot, HostedController& next, bo
   table_[slot] = &next;
   if (const auto conflict = find_conflict(table_, active_)) {
     table_[slot] = former;
-    return {.reason = RejectReason::kConflict,
+    const std::size_t other = conflict->one == slot ? conflict->other : conflict->one;
+    return {.reason = RejectReason::kTaken,
             .joint = static_cast<std::int32_t>(conflict->joint),
-            .one = static_cast<std::int32_t>(conflict->one),
-            .other = static_cast<std::int32_t>(conflict->other)};
+            .one = static_cast<std::int32_t>(slot),
+            .other = static_cast<std::int32_t>(other)};
   }
   next.succession->kept = hand_over(*former, next);
   parameter_changes_.fetch_add(1, std::memory_order_release);
@@ -59,7 +70,7 @@ CycleAnswer ControllerHost::replace(std::size_t slot, HostedController& next, bo
     return {};
   }
   for (const auto& claim : former->claims) references_.release(claim.joint, images);
-  call_starts(only(slot), time, images);
+  call_starts(only(slot), time, images, false);
   return {};
 }
 
@@ -71,14 +82,8 @@ void ControllerHost::go_on_as(const HostedController& former, HostedController& 
   guard_.remember(discarded_, gains_);
   InCall(*this, next, ControllerFunction::kStart)->start(time, images.state, discarded_);
   take_back(next, discarded_);
-  for (const auto& port : next.inputs) {
-    for (const auto& before : former.inputs) {
-      if (port->is_same_as(*before)) port->go_on_as(*before);
-    }
-  }
   (void)next.succession->controller.give(*next.controller);
-  ShownIo shown{*next.io};
-  if (next.succession->same_shown) (void)next.succession->shown.give(shown);
+  carry_shown(former, next);
 }
 
 }  // namespace tandem::runtime

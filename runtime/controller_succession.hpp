@@ -5,12 +5,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
 #include "controllers/controller_io.hpp"
+#include "runtime/input_port.hpp"
 
 namespace tandem::runtime {
 
@@ -59,16 +61,42 @@ class CarriedState {
   Archive taken_;          // bounded
 };
 
-/// What a controller declared, but its parameters, for CarriedState.
-struct ShownIo {
-  ControllerIo& io;
-  void archive(Archive& ar) { io.archive_shown(ar); }
+/// A block of plain words, of which the successor's gets the parts that both have.
+class CarriedWords {
+ public:
+  /// Bytes of the former block, and where they go.
+  struct Part {
+    std::size_t from = 0, to = 0, size = 0;
+  };
+  /// @param as_configured  what the successor's block has written
+  CarriedWords(const Archive& as_configured, std::vector<Part> parts)
+      : fresh_(as_configured.bytes()), given_(fresh_), parts_(std::move(parts)) {}
+
+  /// @param now  what the successor's block holds: the rest of it stays
+  template <class Block>
+  void carry(std::span<const std::byte> former, std::span<const std::byte> now,
+             Block& next) noexcept TANDEM_RT {
+    if (parts_.empty()) return;
+    given_ = fresh_;
+    // Its own bytes, which are no constants: an Archive is filled in place.
+    auto* const to = const_cast<std::byte*>(given_.bytes().data());
+    std::memcpy(to, now.data(), now.size());
+    for (const Part& part : parts_) std::memcpy(to + part.to, former.data() + part.from, part.size);
+    next.archive(given_);
+  }
+
+ private:
+  Archive fresh_, given_;  // to read: as configured; what is read now
+  std::vector<Part> parts_;
 };
 
-/// What a controller that was loaded anew takes over.
+/// What a controller that was loaded anew takes over. What it declared goes over by name, whatever
+/// else it declares.
 struct Succession {
-  CarriedState controller, shown;
-  bool same_shown = false;  ///< signals and inputs have the names that they had
+  CarriedState controller;
+  CarriedWords signals, marks;
+  /// That are the same in both: the former build's, its own.
+  std::vector<std::pair<const InputPort*, InputPort*>> inputs{};
   /// Live ones that mean the same: the former build's, its own.
   std::vector<std::pair<const ParameterRow*, ParameterRow*>> parameters{};
   bool wanted = true;  ///< false: nothing of the controller's own

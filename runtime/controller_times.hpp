@@ -13,7 +13,7 @@
 
 namespace tandem::runtime {
 
-/// One controller's. Percentiles and `overruns` may be read while the loop counts.
+/// One name's. Percentiles and `overruns` may be read while the loop counts.
 struct ControllerTimes {
   std::string name;
   rt::Histogram calls;  ///< of each call in the cycle: start, update, retreat, stop
@@ -26,12 +26,14 @@ struct ControllerCall {
   std::int64_t begin_ns = 0, took_ns = 0;
 };
 
-/// Everyone that was ever loaded, by number, also when it is gone. Shared by those who tell of it
-/// later.
+/// Every name that a controller ever was loaded by, by number, also when it is gone. Later ones of
+/// the name, and later builds, are counted on with it. Shared by those who tell of it later.
 class ControllerNames {
  public:
   [[nodiscard]] std::uint32_t add(const std::string& name) {
     const std::lock_guard lock(mutex_);
+    for (std::size_t id = 0; id < all_.size(); ++id)
+      if (all_[id]->name == name) return static_cast<std::uint32_t>(id);
     all_.push_back(std::make_shared<ControllerTimes>());
     all_.back()->name = name;
     return static_cast<std::uint32_t>(all_.size() - 1);

@@ -47,7 +47,7 @@ InputPort::InputPort(std::shared_ptr<ControllerIo> io, InputBlock& block, std::s
       block_(&block),
       controller_(std::move(controller)),
       period_ns_(period_ns),
-      feed_(Sample{0, std::vector<double>(block.value.size())}),
+      mail_(std::make_shared<Mail>(block.value.size())),
       shown_(3 + block.value.size()),
       scratch_(3 + block.value.size()) {}
 
@@ -200,34 +200,14 @@ Status InputPort::check(std::span<const double> sample) const {
   return {};
 }
 
-void InputPort::pass_to(std::shared_ptr<InputPort> next) {
-  const std::lock_guard lock(mutex_);
-  next_ = std::move(next);
-}
-
-std::shared_ptr<InputPort> InputPort::heir() const {
-  std::shared_ptr<InputPort> next;
-  {
-    const std::lock_guard lock(mutex_);
-    next = next_;
-  }
-  const auto later = next == nullptr ? nullptr : next->heir();
-  return later == nullptr ? next : later;
-}
-
-bool InputPort::is_same_as(const InputPort& other) const noexcept TANDEM_RT {
-  return block_->name == other.block_->name && block_->kind == other.block_->kind &&
-         block_->components == other.block_->components &&
-         block_->values() == other.block_->values();
-}
-
 Result<std::uint64_t> InputPort::offer(InputFeeder feeder, std::span<const double> sample) {
-  std::unique_lock lock(mutex_);
-  if (const auto next = next_) {
-    lock.unlock();
-    return next->offer(feeder, sample);
+  {
+    std::unique_lock lock(mutex_);
+    if (const auto next = next_) {
+      lock.unlock();
+      return next->offer(feeder, sample);
+    }
   }
-  lock.unlock();
   Status fits = check(sample);
   if (feeder != source_.feeder) {
     fits = fail_at(block_->name, fmt::format("is fed by its {}", to_string(source_.feeder)),
@@ -237,54 +217,54 @@ Result<std::uint64_t> InputPort::offer(InputFeeder feeder, std::span<const doubl
     refuse(fits.error());
     return std::unexpected(fits.error());
   }
-  lock.lock();
-  Sample& back = feed_.back();
-  back.number = ++number_;
+  const std::lock_guard lock(mail_->mutex);
+  Sample& back = mail_->feed.back();
+  back.number = ++mail_->number;
+  back.build = build_;
   std::ranges::copy(sample, back.values.begin());
-  feed_.publish();
-  return number_;
+  mail_->feed.publish();
+  return mail_->number;
 }
 
 void InputPort::pass_over(std::uint64_t samples) noexcept {
-  superseded_.fetch_add(samples, std::memory_order_relaxed);
+  mail_->superseded.fetch_add(samples, std::memory_order_relaxed);
 }
 
 void InputPort::refuse(const Error& why) {
-  refused_.fetch_add(1, std::memory_order_relaxed);
-  const std::lock_guard lock(mutex_);
-  why_ = why.to_string();
+  mail_->refused.fetch_add(1, std::memory_order_relaxed);
+  const std::lock_guard lock(mail_->mutex);
+  mail_->why = why.to_string();
 }
 
 std::optional<std::uint64_t> InputPort::taken(std::uint64_t number) const noexcept {
-  if (taken_.load(std::memory_order_acquire) < number) return std::nullopt;
-  return taken_cycle_.load(std::memory_order_relaxed);
+  if (mail_->taken.load(std::memory_order_acquire) < number) return std::nullopt;
+  return mail_->taken_cycle.load(std::memory_order_relaxed);
 }
 
 InputLook InputPort::look() const {
   std::vector<double> seen(shown_.size());
   while (!shown_.read(seen)) {
   }
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(mail_->mutex);
   return {.value = {seen.begin() + 3, seen.end()},
           .sequence = static_cast<std::uint64_t>(seen[0]),
           .cycle = static_cast<std::uint64_t>(seen[1]),
           .fresh = seen[2] != 0.0,
-          .counts = {.arrived = arrived_.load(std::memory_order_relaxed),
-                     .refused = refused_.load(std::memory_order_relaxed),
-                     .superseded = superseded_.load(std::memory_order_relaxed),
-                     .timed_out = timed_out_.load(std::memory_order_relaxed)},
-          .why = why_};
+          .counts = {.arrived = mail_->arrived.load(std::memory_order_relaxed),
+                     .refused = mail_->refused.load(std::memory_order_relaxed),
+                     .superseded = mail_->superseded.load(std::memory_order_relaxed),
+                     .timed_out = mail_->timed_out.load(std::memory_order_relaxed)},
+          .why = mail_->why};
 }
 
 // The loop's.
 
-void InputPort::begin(const hal::CycleTime& time) noexcept TANDEM_RT {
-  if (feed_.refresh()) {
-    const std::uint64_t number = feed_.front().number;
-    superseded_.fetch_add(number - taken_.load(std::memory_order_relaxed),
-                          std::memory_order_relaxed);
-    taken_cycle_.store(time.cycle, std::memory_order_relaxed);
-    taken_.store(number, std::memory_order_release);
+void InputPort::begin(const hal::CycleTime& time, bool waits) noexcept TANDEM_RT {
+  if (waits && mail_->feed.refresh()) {
+    const std::uint64_t number = mail_->feed.front().number;
+    mail_->superseded.fetch_add(number - mail_->taken.load(std::memory_order_relaxed),
+                                std::memory_order_relaxed);
+    note_taken(number, time.cycle);
   }
   base_ = plan_.of_run ? 0 : time.cycle;
   const auto first = std::ranges::lower_bound(plan_.at, time.cycle - base_);
@@ -293,6 +273,11 @@ void InputPort::begin(const hal::CycleTime& time) noexcept TANDEM_RT {
   block_->fresh = block_->arrived = false;
   hold(without_);
   show();
+}
+
+void InputPort::note_taken(std::uint64_t number, std::uint64_t cycle) noexcept TANDEM_RT {
+  mail_->taken_cycle.store(cycle, std::memory_order_relaxed);
+  mail_->taken.store(number, std::memory_order_release);
 }
 
 /// The sample of this cycle; empty: there is none.
@@ -305,18 +290,20 @@ std::span<const double> InputPort::next(std::uint64_t cycle) noexcept TANDEM_RT 
                        cycle - block_->cycle >= plan_.repeat_cycles;
     if (past == from && !again) return {};
     if (past - from > 1) {
-      superseded_.fetch_add(static_cast<std::uint64_t>(past - from) - 1, std::memory_order_relaxed);
+      mail_->superseded.fetch_add(static_cast<std::uint64_t>(past - from) - 1,
+                                  std::memory_order_relaxed);
     }
     row_ = static_cast<std::uint64_t>(past - plan_.at.begin());
     return plan_.row(row_ - 1, size);
   }
-  if (!feed_.refresh()) return {};
-  const Sample& sample = feed_.front();
-  const std::uint64_t before = taken_.load(std::memory_order_relaxed);
-  superseded_.fetch_add(sample.number - before - 1, std::memory_order_relaxed);
-  taken_cycle_.store(cycle, std::memory_order_relaxed);
-  taken_.store(sample.number, std::memory_order_release);
-  return sample.values;
+  if (!mail_->feed.refresh()) return {};
+  const Sample& sample = mail_->feed.front();
+  const std::uint64_t before = mail_->taken.load(std::memory_order_relaxed);
+  mail_->superseded.fetch_add(sample.number - before - 1, std::memory_order_relaxed);
+  note_taken(sample.number, cycle);
+  if (sample.build == build_ || admits(sample.values)) return sample.values;
+  mail_->refused.fetch_add(1, std::memory_order_relaxed);  // it was offered to the former build
+  return {};
 }
 
 bool InputPort::take(const hal::CycleTime& time, bool open) noexcept TANDEM_RT {
@@ -328,7 +315,7 @@ bool InputPort::take(const hal::CycleTime& time, bool open) noexcept TANDEM_RT {
     ++to.sequence;
     to.cycle = time.cycle;
     to.fresh = to.arrived = true;
-    arrived_.fetch_add(1, std::memory_order_relaxed);
+    mail_->arrived.fetch_add(1, std::memory_order_relaxed);
     show();
     return true;
   }
@@ -336,7 +323,7 @@ bool InputPort::take(const hal::CycleTime& time, bool open) noexcept TANDEM_RT {
   if (!to.fresh || !silent) return false;
   to.fresh = false;
   if (to.options.after != AfterTimeout::kLast) hold(without_);
-  timed_out_.fetch_add(1, std::memory_order_relaxed);
+  mail_->timed_out.fetch_add(1, std::memory_order_relaxed);
   show();
   return false;
 }

@@ -72,8 +72,11 @@ class InputPort {
   void pass_to(std::shared_ptr<InputPort> next);
   /// The one that pass_to() named, of the latest build; null: this one is it.
   [[nodiscard]] std::shared_ptr<InputPort> heir() const;
-  /// Whether both have one name, kind and components.
-  [[nodiscard]] bool is_same_as(const InputPort& other) const noexcept TANDEM_RT;
+  /// Whether both have one name, kind, components and units.
+  [[nodiscard]] bool is_same_as(const InputPort& other) const noexcept;
+  /// Before the loop has it: what is, or will be, offered to `former` arrives here once this one
+  /// has its place, and is counted with it. @pre is_same_as(former)
+  void follow(const InputPort& former);
   /// So many came that nobody looked at before newer ones took their place.
   void pass_over(std::uint64_t samples) noexcept;
   /// One came that is no sample of this input, or of who may not.
@@ -87,12 +90,16 @@ class InputPort {
   // The loop's.
 
   /// The controller starts: what came before counts no more.
-  void begin(const hal::CycleTime& time) noexcept TANDEM_RT;
-  /// Its plan goes on where that of `former` is.
-  void go_on_as(const InputPort& former) noexcept TANDEM_RT {
-    base_ = former.base_;
-    row_ = former.row_;
-  }
+  /// @param waits  false: but a sample that waits does, which arrives in this cycle
+  void begin(const hal::CycleTime& time, bool waits = true) noexcept TANDEM_RT;
+  /// Holds what `former`, which it follows, does, as old as it is there; its plan goes on where
+  /// that one is. What is beyond the bounds here is as if it had never come. @rt a copy of a
+  /// sample.
+  void go_on_as(const InputPort& former) noexcept TANDEM_RT;
+  /// Whether it holds a sample that counts: a fresh one, or the last where that stays.
+  [[nodiscard]] bool holds_sample() const noexcept TANDEM_RT;
+  /// Whether a sample of the build before is within the bounds here.
+  [[nodiscard]] bool admits(std::span<const double> sample) const noexcept TANDEM_RT;
   /// Each cycle in which the controller is active. @param open  false: nothing is taken
   /// @return whether a sample arrived
   /// @rt one copy of a sample at most; no search longer than a binary one.
@@ -106,7 +113,18 @@ class InputPort {
  private:
   struct Sample {
     std::uint64_t number = 0;
+    std::uint64_t build = 0;  // whose bounds it was checked against
     std::vector<double> values;
+  };
+  /// What those who offer and the loop share: one for all builds that follow each other.
+  struct Mail {
+    explicit Mail(std::size_t values) : feed(Sample{0, 0, std::vector<double>(values)}) {}
+    std::mutex mutex;  // of those who offer: number, feed's back, why
+    std::string why;
+    std::uint64_t number = 0;
+    TripleBuffer<Sample> feed;
+    std::atomic<std::uint64_t> refused{0}, superseded{0}, arrived{0}, timed_out{0};
+    std::atomic<std::uint64_t> taken{0}, taken_cycle{0};
   };
   InputPort(std::shared_ptr<ControllerIo> io, InputBlock& block, std::string controller,
             std::int64_t period_ns);
@@ -114,6 +132,7 @@ class InputPort {
   [[nodiscard]] Status fill_bounds(const hal::Robot& robot);
   [[nodiscard]] Status check_trajectory(std::span<const double> sample) const;
   [[nodiscard]] std::span<const double> next(std::uint64_t cycle) noexcept TANDEM_RT;
+  void note_taken(std::uint64_t number, std::uint64_t cycle) noexcept TANDEM_RT;
   void hold(std::span<const double> values) noexcept TANDEM_RT;
   void show() noexcept TANDEM_RT;
 
@@ -128,13 +147,11 @@ class InputPort {
   std::vector<double> max_speed_;  // of a trajectory, by joint
   std::vector<double> zero_, without_;
 
-  mutable std::mutex mutex_;  // of those who offer
-  std::string why_;
+  std::shared_ptr<Mail> mail_;
+  mutable std::mutex mutex_;
   std::shared_ptr<InputPort> next_;  // of pass_to()
-  std::uint64_t number_ = 0;
-  TripleBuffer<Sample> feed_;
-  std::atomic<std::uint64_t> refused_{0}, superseded_{0}, arrived_{0}, timed_out_{0};
-  std::atomic<std::uint64_t> taken_{0}, taken_cycle_{0};
+  std::uint64_t build_ = 0;          // how many it follows
+  bool same_bounds_ = false;         // as the one that it follows
   Seqlock<double> shown_;
 
   // The loop's.

@@ -35,6 +35,8 @@ Status LocalControllers::add(const std::string& name, LoadedController plugin,
                      "let one controller have the joint");
     }
   }
+  host_.enter(**made);
+  host_.note_code(**made);
   controllers_.push_back(std::move(*made));
   return {};
 }

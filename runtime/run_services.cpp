@@ -124,6 +124,7 @@ void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer&
   using Kind = CycleRequest::Kind;
   const bool done = answer.reason == RejectReason::kNone;
   forget_changes(request);
+  if (request.kind == Kind::kInsert && done) host_->note_code(*host_->owned()[request.slot]);
   if ((request.kind == Kind::kInsert && !done) || (request.kind == Kind::kRemove && done)) {
     host_->owned()[request.slot].reset();
     ++loads_;
@@ -133,7 +134,13 @@ void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer&
     std::unique_ptr<HostedController>& place = host_->owned()[request.slot];
     std::unique_ptr<HostedController> next = std::move(place->next);
     if (!done) return;
+    for (const auto& port : next->inputs) {
+      for (const auto& before : place->inputs) {  // whoever feeds it feeds this one
+        if (port->is_same_as(*before)) before->pass_to(port);
+      }
+    }
     place = std::move(next);
+    host_->note_code(*place);
     ++loads_;
   }
 }
@@ -262,14 +269,18 @@ ControllerSet RunServices::planned() const {
   return active;
 }
 
-/// The errors of a document in one, as many as somebody reads. `missing`: what to do about a key.
-Status RunServices::errors_of(const TomlDocument& document, const char* missing) {
+/// The errors of a document in one, as many as somebody reads.
+/// @param missing, unknown  what to do about a key
+Status RunServices::errors_of(const TomlDocument& document, const char* missing,
+                              const char* unknown) {
   constexpr std::size_t kMost = 20;
   const Diagnostics& errors = document.diagnostics();
   std::string all;
   for (std::size_t i = 0; i < std::min(kMost, errors.size()); ++i) {
     Error one = errors[i];
     if (one.hint.starts_with("add it to the table")) one.hint = missing;
+    if (one.message == "unknown key" && *unknown != '\0')
+      one.hint += (one.hint.empty() ? "" : " ") + std::string(unknown);
     all += (all.empty() ? "" : "; ") + one.to_string();
   }
   if (errors.size() > kMost) all += "; and " + std::to_string(errors.size() - kMost) + " more";
@@ -330,6 +341,7 @@ Result<RequestResult> RunServices::load(std::unique_ptr<HostedController> contro
         "unload one first");
   }
   controller->of_experiment = false;
+  host_->enter(*controller);
   log_->open(*controller);
   tell_loaded(*controller);
   CycleRequest request{.kind = CycleRequest::Kind::kInsert,

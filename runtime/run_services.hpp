@@ -43,6 +43,8 @@ struct Reloaded {
   RequestResult asked;
   Kept kept = Kept::kState;  ///< once it is done
   bool changed = false;      ///< its library is another than before
+  /// Once it is done: what was set, or held, and did not go over, a line each with its name.
+  std::vector<std::string> left{};
 };
 
 /// By what a controller was loaded, and would be loaded again.
@@ -340,7 +342,8 @@ class RunServices {
   /// For the log, with the next cycles.
   static void tell_loaded(HostedController& controller);
   [[nodiscard]] static Status errors_of(const TomlDocument& document,
-                                        const char* missing = "give it with --set or --parameters");
+                                        const char* missing = "give it with --set or --parameters",
+                                        const char* unknown = "");
   [[nodiscard]] Result<HostedController*> to_reload(const std::string& name) const;
   /// Asks for what needs no more than a joint.
   [[nodiscard]] Result<RequestResult> ask_of_joint(CycleRequest::Kind kind,

@@ -235,6 +235,8 @@ void print_reloaded(const Json& answer) {
     fmt::print("{}: {} starts afresh in cycle {}: {}\n", name, build, answer.value("cycle", 0),
                shown(answer.value("afresh", ""), 2'000));
   }
+  for (const Json& one : answer.value("left", Json::array()))
+    fmt::print("  {}\n", shown(one.get<std::string>(), 2'000));
 }
 
 Result<Exit> tell_loaded(Asked& asked) {

@@ -209,6 +209,7 @@ Result<Json> reload(RunServices& services, const TryController& trial, const Jso
   if (!made->asked.done) return answer;
   (*answer)["carried"] = made->kept == runtime::Kept::kState;
   (*answer)["afresh"] = why_afresh(made->kept);
+  (*answer)["left"] = made->left;
   return answer;
 }
 

@@ -34,6 +34,7 @@
 #include "base/counted.hpp"
 #include "base/process.hpp"
 #include "base/quoting.hpp"
+#include "controllers/hosted_call.hpp"
 #include "rt/cpu_latency.hpp"
 #include "rt/stop_signal.hpp"
 #include "runtime/run/run.hpp"
@@ -400,8 +401,8 @@ Exit run_command(const RunOptions& given, ReportOfRun& report) {
                          ? wrong_kind(options.experiment, Takes::kEither, "tandem serve")
                          : wrong_kind(options.experiment, Takes::kExperiment, "tandem run");
   if (wrong) return refuse(*wrong);
-  const auto composition = runtime::composed<WiredComposition>(options.experiment, options,
-                                                               {.build = builder(options.quiet)});
+  auto composition = runtime::composed<WiredComposition>(options.experiment, options,
+                                                         {.build = builder(options.quiet)});
   if (!composition) return refuse(composition.error());
   warn_of_inertias((*composition)->experiment);
   print_warnings(std::exchange((*composition)->warnings, {}));
@@ -419,6 +420,8 @@ Exit run_command(const RunOptions& given, ReportOfRun& report) {
   }
   const EndGuard in_time;
   session.reset();
+  // A library that hangs where it is loaded or freed keeps all others from being freed.
+  if (a_hosted_call_goes_on()) (void)composition->release();
   return exit;
 }
 

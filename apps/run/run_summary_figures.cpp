@@ -31,7 +31,7 @@ struct ControllerFigures {
   std::uint64_t calls = 0, overruns = 0;
 };
 
-/// Also of those that are unloaded; by the name's last one.
+/// Also of those that are unloaded; of all builds that had the name.
 Named<std::optional<ControllerFigures>> controllers_of(const RunSummary& s) {
   Named<std::optional<ControllerFigures>> all;
   for (const auto& one : s.composition.controllers->names()->all()) {
@@ -257,7 +257,8 @@ void figures(Figures& f, const RunSummary* s) {
   f("bus_ns", "waiting for the answers on the bus; null without one",
     [&] { return known(s->composition.backend->waits_for_bus(), loop().bus); });
   f("cycle_ns", "of a cycle's own work; null: no cycle was made", [&] { return loop().work; });
-  f("controllers", "by name; null: it was never called", [&] { return controllers_of(*s); });
+  f("controllers", "by name, over all builds that had it; null: it was never called",
+    [&] { return controllers_of(*s); });
   f("texts", "lines of text that controllers said; null: none", [&] {
     const runtime::TextFigures& texts = s->cycle.statistics().texts();
     return known(texts.said + texts.left_out > 0, texts);

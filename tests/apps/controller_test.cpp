@@ -49,18 +49,33 @@ TEST_F(Controllers, AreLoadedSwitchedStoppedAndUnloaded) {
   EXPECT_EQ(end(), 0);
 }
 
-TEST_F(Controllers, GoOnWithTheirNewBuildInTheStateOfTheFormerOne) {
-  const auto put = [this](const std::string& build) {
+class Builds : public Controllers {
+ protected:
+  /// nodder.so is that build now, as a linker leaves it.
+  void put(const std::string& build) const {
     const std::filesystem::path plugins = TANDEM_BINARY_DIR "/tests/test_plugins";
     std::filesystem::copy_file(plugins / ("nodder_" + build + ".so"), folder_ / "new.so");
     std::filesystem::rename(folder_ / "new.so", folder_ / "nodder.so");
-  };
-  put("1");
-  const std::string hold = read_text(folder_ / "hold.toml");
-  write_text(folder_ / "hold.toml", hold.substr(0, hold.find("[[controller]]")) +
-                                        "[[controller]]\nplugin = \"./nodder.so\"\n"
-                                        "[controller.parameters]\nspeed_rad_s = 0.5\n");
-  begin("");
+  }
+  void begin_with_nodder() {
+    put("1");
+    const std::string hold = read_text(folder_ / "hold.toml");
+    write_text(folder_ / "hold.toml", hold.substr(0, hold.find("[[controller]]")) +
+                                          "[[controller]]\nplugin = \"./nodder.so\"\n"
+                                          "[controller.parameters]\nspeed_rad_s = 0.5\n");
+    begin("");
+  }
+  /// The run ends by itself, with all that it tells.
+  void expect_whole_end() {
+    EXPECT_EQ(end(), 0);
+    const auto summary = json("run.json");
+    EXPECT_GT(summary["controllers"]["nodder"]["calls"], 0);
+    EXPECT_EQ(summary["fault_log"].size(), 0U);
+  }
+};
+
+TEST_F(Builds, GoOnInTheStateOfTheFormerOne) {
+  begin_with_nodder();
   const auto place_rad = [this] {
     return asked("joint show joint2")["position_rad"].get<double>();
   };
@@ -100,6 +115,32 @@ TEST_F(Controllers, GoOnWithTheirNewBuildInTheStateOfTheFormerOne) {
   expect(refused("controller reload noder"), "did you mean 'nodder'?");
   EXPECT_EQ(end(), 0);
   EXPECT_EQ(json("run.json")["fault_log"].size(), 0U);
+}
+
+// The linker keeps a lock while a library's own code runs in it: the next build, which was right,
+// was blamed for not returning, and the process never ended.
+TEST_F(Builds, OfWhichOneHangsWhereItIsLoadedDoNotTakeTheBlameForIt) {
+  begin_with_nodder();
+  put("stuck");
+  expect(refused("controller reload nodder"), "nodder: the controller did not return within");
+  put("2");
+  for (int i = 0; i < 2; ++i)
+    expect(refused("controller reload nodder"), "nodder.so, which does not return from its static");
+  EXPECT_EQ(asked("controller list")["controllers"][0]["active"], true);
+  EXPECT_EQ(to_run("controller stop nodder").status, 0);
+  EXPECT_EQ(to_run("controller unload nodder").status, 0);
+  expect_whole_end();
+}
+
+TEST_F(Builds, OfWhichOneHangsWhereItIsFreedHoldNothingUp) {
+  begin_with_nodder();
+  put("clings");
+  ASSERT_EQ(to_run("controller load ./nodder.so --name other --set speed_rad_s=0.5").status, 0);
+  EXPECT_EQ(to_run("controller unload other").status, 0);
+  EXPECT_EQ(asked("controller list")["controllers"].size(), 1U);
+  put("2");
+  expect(refused("controller reload nodder"), "nodder.so, which does not return from its static");
+  expect_whole_end();
 }
 
 TEST_F(Controllers, TellTheirSignals) {

@@ -198,6 +198,7 @@ TEST(ControllerReload, IsRefusedWhereAnotherHasAJointThatItClaimsAndTheFormerGoe
   ASSERT_FALSE(asked);
   EXPECT_EQ(asked.error().key, "wrist");
   EXPECT_EQ(asked.error().message, "is claimed by the controllers 'arm' and 'wrist'");
+  EXPECT_EQ(asked.error().hint, "stop the other one first: tandem controller stop wrist");
   const int before = run.first->updates;
   run.steps(10);
   EXPECT_EQ(run.first->updates, before + 10);
@@ -223,6 +224,27 @@ TEST(ControllerReload, ThatCannotBeConfiguredLeavesTheFormerAtWork) {
   run.steps(10);
   EXPECT_EQ(run.first->updates, before + 10);
   EXPECT_EQ(run.reload(good), Kept::kState) << "and no error of a former try stays";
+}
+
+TEST(ControllerReload, OfARenamedParameterNamesBothAndWhatToDo) {
+  test::JointRun run;
+  const auto needs = [](const std::string& parameter) {
+    auto made = build();
+    made->needs = parameter;
+    return made;
+  };
+  run.host->read_from(test::document_of("gain = 2.0"));
+  run.add("arm", needs("gain"), true, "gain = 2.0");
+  run.begin({.running_cycles = 1000});
+  run.steps(100);
+  for (const char* name : {"gains", "stiffness"}) {
+    const auto asked = run.services().reload("arm", ControllerSource(needs(name)), false, kNow);
+    ASSERT_FALSE(asked);
+    const std::string& message = asked.error().message;
+    EXPECT_NE(message.find("gain: unknown key"), std::string::npos) << message;
+    EXPECT_NE(message.find(name), std::string::npos) << message;
+    EXPECT_NE(message.find("unload it, and load it with others"), std::string::npos) << message;
+  }
 }
 
 TEST(ControllerReload, OfAnInactiveOneTakesItsPlaceAndStartsNothing) {
@@ -345,11 +367,53 @@ TEST(ControllerReload, KeepsWhatWasSetOfAListByTheElementsName) {
   const std::uint64_t loads = run.services().loads();
   (void)run.reload(next({"wrist", "hand", "elbow"}));
   std::string values;
-  const auto all = run.services().parameters("arm");
+  const auto all = run.services().parameters("arm");  // a loop over a temporary's part dangles
   for (const ParameterStatus& one : *all)
     values += one.name + " " + std::to_string(static_cast<int>(one.value)) + " ";
   EXPECT_EQ(values, "gains.wrist 5 gains.hand 1 gains.elbow 4 ");
   EXPECT_NE(run.services().loads(), loads) << "what is shown of it is the new build's from now on";
+}
+
+// A row for each build had only the last one's calls; a refused one took its name's row.
+TEST(ControllerReload, CountsOnOverBuildsAndWhatIsRefusedLeavesNoTrace) {
+  ReloadRun run;
+  std::vector<std::shared_ptr<Build>> builds{run.first};
+  const auto expect_counted = [&] {
+    std::uint64_t calls = 0;
+    for (const auto& one : builds)
+      calls += static_cast<std::uint64_t>(one->starts + one->updates + one->stops);
+    const auto rows = run.host->names()->all();
+    ASSERT_EQ(rows.size(), 2U);
+    EXPECT_EQ(rows[0]->name, "arm");
+    EXPECT_EQ(rows[0]->calls.count(), calls);
+    EXPECT_EQ(rows[1]->name, "wrist");
+  };
+  run.steps(100);
+  ASSERT_FALSE(run.services().load("arm", build(), test::document_of(), kNow));
+  const auto mistake = build();
+  mistake->refuses = true;
+  ControllerSource refused(mistake);
+  refused.code = {.name = "arm", .sha256 = "1", .path = "refused.so"};
+  ASSERT_FALSE(run.services().reload("arm", refused, false, kNow));
+  expect_counted();
+  builds.push_back(build());
+  ControllerSource next(builds.back());
+  next.code = {.name = "arm", .sha256 = "2", .path = "next.so"};
+  ASSERT_TRUE(run.services().reload("arm", next, false, kNow));
+  run.steps(100);
+  expect_counted();
+  ASSERT_TRUE(run.services().switch_controllers({"arm"}, {}, kNow));
+  run.steps(1);
+  ASSERT_TRUE(run.services().unload("arm", kNow));
+  run.steps(1);
+  builds.push_back(build());
+  ASSERT_TRUE(run.services().load("arm", builds.back(), test::document_of(), kNow));
+  run.steps(1);
+  ASSERT_TRUE(run.services().switch_controllers({}, {"arm"}, kNow));
+  run.steps(100);
+  expect_counted();
+  ASSERT_EQ(run.host->code().size(), 1U);
+  EXPECT_EQ(run.host->code()[0].path, "next.so");
 }
 
 // An active one that was reloaded was counted three times.

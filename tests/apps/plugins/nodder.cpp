@@ -1,5 +1,8 @@
 // A controller whose builds differ, as its author changes it while a run goes on: ABOVE_RAD is a
-// constant; MORE more state; ALL claims every joint; ASKS wants a parameter; FAILS has a mistake.
+// constant; MORE more state; ALL claims every joint; ASKS wants a parameter; FAILS has a mistake;
+// STUCK never returns from its static initialisers, CLINGS from its clean-up.
+#include <unistd.h>
+
 #include <algorithm>
 
 #include "controllers/controller.hpp"
@@ -7,6 +10,18 @@
 namespace {
 
 using namespace tandem;
+
+[[maybe_unused]] int wait_for_ever() {
+  for (;;) ::pause();
+}
+#ifdef STUCK
+[[maybe_unused]] const int stuck = wait_for_ever();
+#endif
+#ifdef CLINGS
+struct Clings {
+  ~Clings() { wait_for_ever(); }
+} clings;
+#endif
 
 class Nodder final : public Controller {
  public:
