@@ -42,12 +42,19 @@ class Running {
   bool step(std::int64_t cycles);
   /// Ends the run, if it has not ended, and carries out the shut-down.
   void finish();
-  /// For iteration: the state that nobody has looked at yet, or else the next one.
+  /// For iteration: the state that nobody has looked at yet, or else the next one. False, too, once
+  /// the planned cycles have passed in fault or held, where none of them counts.
   bool next();
 
   /// A mark, whether the cycle has begun, and a hash of all the rest, which is RobotCycle's.
   [[nodiscard]] py::bytes save();
   void restore(const py::bytes& snapshot);
+  /// Acts in this cycle, as the next ones. Errors: a run that is over.
+  void stop(int category);
+  void reset_faults();
+  /// The controllers that a reset holds back, and Python, lead again: its command begins where the
+  /// robot is. Error: another phase than kHeld.
+  void start();
   /// The faults of a scenario's text. @return how many
   std::size_t inject(const std::string& scenario);
 
@@ -69,19 +76,22 @@ class Running {
   bool advance();
   [[nodiscard]] std::int64_t per_turn() const;
   void check_command() const;
+  void check_going(const char* what) const;
+  [[nodiscard]] bool waits_too_long() const;
 
   std::unique_ptr<runtime::Run> run_;
   std::shared_ptr<Lead> lead_;
   std::vector<std::string> joints_;
   std::atomic<bool> busy_{false};
-  bool begun_ = false;  // the cycle's first half is done
-  bool fresh_ = true;   // nobody has looked at its state
-  bool led_ = false;    // controllers ran in the cycle before
+  bool begun_ = false;       // the cycle's first half is done
+  bool fresh_ = true;        // nobody has looked at its state
+  bool led_ = false;         // controllers ran in the cycle before
+  std::uint64_t first_ = 0;  // cycle of control
 };
 
 /// Every fault so far, as tandem.Run.faults has it.
 [[nodiscard]] py::list faults_of(const Running& running);
-/// Figures so far, by the names of `tandem run --json`.
+/// Figures so far, those of `tandem run --json` that are of the simulation and not of the program.
 [[nodiscard]] py::dict result_of(const Running& running);
 
 }  // namespace tandem::python

@@ -8,7 +8,7 @@ SI units, W's z axis upwards; docs/python.md is the guide, docs/conventions.md h
 """
 
 try:
-    from ._native import Error, UnknownName
+    from ._native import Error, UnknownName, __version__
 except ImportError as error:
     raise ImportError(
         f"{error} (the module belongs to the Python that Tandem was built with: docs/python.md)"
@@ -18,4 +18,7 @@ from .log import Channel, Column, Event, Log
 from .model import Model
 from .run import Run
 
-__all__ = ["Channel", "Column", "Error", "Event", "Fields", "Log", "Model", "Run", "UnknownName"]
+__all__ = [
+    "Channel", "Column", "Error", "Event", "Fields", "Log", "Model", "Run", "UnknownName",
+    "__version__",
+]  # fmt: skip
