@@ -11,8 +11,8 @@ if(failed EQUAL 0 AND up STREQUAL "") # else SOURCE lies in a checkout of someth
 endif()
 file(CONFIGURE OUTPUT ${OUT} CONTENT
 "// Written by cmake/BuiltFrom.cmake.
-namespace tandem::apps {
+namespace tandem::runtime {
 extern const char* const kBuiltFrom;
 const char* const kBuiltFrom = \"${commit}\";
-}  // namespace tandem::apps
+}  // namespace tandem::runtime
 ")

@@ -36,7 +36,7 @@ struct RunInfo {
   std::string kernel_variant{};    ///< "x86-64-v3"; may change a result's last bits
   std::string description_hash{};  ///< of what the kernels were made from
   std::string kernel_sha256{};     ///< of the kernels' library
-  std::vector<std::string> controllers{};  ///< "NAME SHA256 PATH" of each plugin at the start
+  std::vector<std::string> controllers{};  ///< "NAME SHA256 PATH" at the start; without a library "NAME - -"
   StringMap configuration{};               ///< path -> text of every file that was read
   std::vector<std::string> boards{};       ///< for events' texts: in no record
   std::vector<std::string> buses{};        ///< the same

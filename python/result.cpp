@@ -101,14 +101,15 @@ py::list faults_of(const Running& running) {
   return out;
 }
 
-py::dict result_of(const Running& running) {
+py::dict Running::result() {
   using namespace py::literals;
-  const runtime::Run& run = running.run();
+  const Turn turn(*this);
+  const runtime::Run& run = *run_;
   const runtime::RobotCycle& cycle = run.cycle();
   const runtime::Experiment& e = run.experiment();
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
   const auto cycles = static_cast<std::int64_t>(cycle.running_cycles());
-  py::dict out("robot"_a = e.robot.name, "seed"_a = e.seed, "ended"_a = ended_of(running),
+  py::dict out("robot"_a = e.robot.name, "seed"_a = e.seed, "ended"_a = ended_of(*this),
                "planned_cycles"_a = e.endless() ? py::none() : py::cast(e.cycles()),
                "cycles"_a = cycles, "period_ns"_a = e.loop.period_ns,
                "sim_seconds"_a = static_cast<double>(cycles * e.loop.period_ns) / 1e9,

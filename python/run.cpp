@@ -41,7 +41,7 @@ void add_run(py::module_& module) {
                        std::optional<double> duration_s, std::optional<double> rate,
                        const std::string& scenario, const std::string& hal,
                        const std::string& on_fault, std::optional<std::uint32_t> delay_cycles,
-                       const std::string& kernel_variant, bool build) {
+                       const std::string& kernel_variant, bool build, const std::string& log) {
              runtime::Overrides o;
              o.seed = seed;
              o.duration_s = duration_s;
@@ -52,22 +52,27 @@ void add_run(py::module_& module) {
              o.delay_cycles = delay_cycles;
              o.kernel_variant = kernel_variant;
              o.no_build = !build;
-             return std::make_shared<Running>(file, std::move(o), control_all, control_some);
+             return std::make_shared<Running>(file, std::move(o), control_all, control_some, log);
            }),
            "experiment"_a, "control_all"_a, "control_some"_a, "seed"_a, "duration_s"_a, "rate"_a,
-           "scenario"_a, "hal"_a, "on_fault"_a, "delay_cycles"_a, "kernel_variant"_a, "build"_a)
+           "scenario"_a, "hal"_a, "on_fault"_a, "delay_cycles"_a, "kernel_variant"_a, "build"_a,
+           "log"_a)
       .def_static("__new__", &made_whole)
       .def("step", &Running::step, "cycles"_a)
       .def("next", &Running::next)
       .def("save", &Running::save)
       .def("restore", &Running::restore, "snapshot"_a)
       .def("inject", &Running::inject, "scenario"_a)
+      .def("ask", &Running::ask, "question"_a)
+      .def("signals", &Running::signals)
+      .def("texts", &Running::texts)
       .def("finish", &Running::finish)
+      .def("close", &Running::close)
       .def("stop", &Running::stop, "category"_a)
       .def("reset_faults", &Running::reset_faults)
       .def("start", &Running::start)
       .def("faults", &faults_of)
-      .def("result", &result_of)
+      .def("result", &Running::result)
       .def("limits", [](const Running& r) { return limits_of(r.run()); })
       .def("state", [](const Shared& r) { return views_of(r, r->run().state(), false); })
       .def("command",
@@ -83,6 +88,7 @@ void add_run(py::module_& module) {
              return any ? views_of(r, r->run().estimate(), false) : py::list();
            })
       .def_property_readonly("over", &Running::over)
+      .def_property_readonly("log", &Running::log_path)
       .def_property_readonly(
           "phase", [](const Running& r) { return hal::to_string(r.run().cycle().phase()); })
       .def_property_readonly("warnings",

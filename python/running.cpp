@@ -1,13 +1,22 @@
 #include "python/running.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstring>
 #include <functional>
 #include <string_view>
 #include <utility>
 
+#include "apps/control/controller_control.hpp"
+#include "apps/control/input_control.hpp"
+#include "apps/control/joint_control.hpp"
+#include "apps/control/sensor_control.hpp"
+#include "apps/control/signal_control.hpp"
+#include "base/counted.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/sim/scenario.hpp"
+#include "runtime/run/run_log.hpp"
 
 namespace tandem::python {
 namespace {
@@ -41,18 +50,12 @@ const ModeName& mode_of(const std::string& name) {
 
 bool is_backend(std::string_view hal) { return hal == "can" || hal == "ethercat" || hal == "dds"; }
 
-Error of_elsewhere(const std::string& file) {
-  return {.message =
-              "Python steps a robot that is simulated in its own process; a robot on a "
-              "wire, or of another process, does not wait for it",
-          .hint = "pass hal=\"sim\", or write the controller in C++ and use `tandem run`",
-          .file = file,
-          .key = "hal.backend"};
-}
-
-Diagnostics refuse_others(runtime::Composition& c) {
-  if (c.experiment.hal.backend == runtime::BackendKind::kSim) return {};
-  return {of_elsewhere(c.experiment.file)};
+[[noreturn]] void refuse_place(const std::string& file) {
+  raise(Error{.message = "Python steps a robot that is simulated in its own process; a robot on a "
+                         "wire, or of another process, does not wait for it",
+              .hint = "pass hal=\"sim\", or write the controller in C++ and use `tandem run`",
+              .file = file,
+              .key = "hal.backend"});
 }
 
 }  // namespace
@@ -64,6 +67,7 @@ Running::Turn::Turn(Running& of) : of_(&of) {
 }
 
 void Running::check_going(const char* what) const {
+  check_open();
   if (!over()) return;
   raise(fail(std::string(what) + ": the run is over",
              "open another one, or restore() a snapshot of it")
@@ -71,28 +75,74 @@ void Running::check_going(const char* what) const {
 }
 
 Running::Running(const std::string& file, runtime::Overrides overrides, const std::string& all,
-                 const Control& some) {
-  if (!overrides.hal.empty() && overrides.hal != "sim" && is_backend(overrides.hal)) {
-    raise(of_elsewhere({}));
-  }
+                 const Control& some, const std::string& log) {
+  if (is_backend(overrides.hal)) refuse_place({});
   overrides.change = [&all](runtime::Experiment& e) {
     e.loop.start_paused = false;  // there is nobody to let it go on
     if (!all.empty()) e.controllers.clear();
   };
-  auto opened = [&] {
+  auto composed = [&] {
     const Away away;
     const std::scoped_lock alone(reading());
-    return runtime::Run::open(file, overrides, {}, refuse_others);
+    return runtime::composed(file, overrides);
   }();
-  run_ = take(std::move(opened));
+  c_ = take(std::move(composed));
+  if (c_->experiment.hal.backend != runtime::BackendKind::kSim) refuse_place(c_->experiment.file);
   if (!all.empty() || !some.empty()) add_lead(all, some);
+  if (!log.empty()) {
+    recorder_ = take(runtime::open_log(*c_, log));
+    log_path_ = recorder_->path();
+    plugins_at_start_ = c_->controllers->code().size();
+    process_ = ::getpid();
+  }
   const Away away;
+  run_ = std::make_unique<runtime::Run>(*c_, overrides,
+                                        runtime::RunParts{.recorder = recorder_.get()});
+  run().cycle().services().attended_by([this] {
+    if (begun_) run().cycle().attend();
+  });
   begin();
   while (begun_ && (run().cycle().phase() == RunPhase::kBringUp ||
                     run().cycle().phase() == RunPhase::kSettling)) {
     advance();
   }
   first_ = run().state().cycle()[0];
+}
+
+Running::~Running() {
+  if (recorder_ != nullptr && ::getpid() != process_) {
+    (void)recorder_.release();  // its thread, and its file, are the parent's
+    return;
+  }
+  try {
+    end_log();
+  } catch (py::error_already_set& lost) {
+    lost.discard_as_unraisable("tandem.Run");
+  }
+}
+
+void Running::end_log() {
+  if (recorder_ == nullptr || std::exchange(closed_, true)) return;
+  const log::RecordingResult done = [this] {
+    const py::gil_scoped_release free;
+    if (run_ != nullptr && run_->parallel() != nullptr) (void)run_->parallel()->finish();
+    return recorder_->close(runtime::loaded_later(*c_->controllers, plugins_at_start_));
+  }();
+  log_path_ = done.path;
+  if (done.error.empty()) return;
+  raise(Error{.message = "the log lost " + counted(done.failed, "message") + ": " + done.error,
+              .hint = {},
+              .file = done.path,
+              .key = {}});
+}
+
+void Running::check_open() const {
+  if (recorder_ != nullptr && ::getpid() != process_) {
+    raise(fail("this run and its log are those of another process",
+               "open the run in the process that steps it")
+              .error());
+  }
+  if (closed_) raise(fail("the run is closed", "open another one").error());
 }
 
 bool Running::step(std::int64_t cycles) {
@@ -117,6 +167,8 @@ bool Running::step(std::int64_t cycles) {
 
 void Running::finish() {
   const Turn turn(*this);
+  if (closed_) return;
+  check_open();
   run().cycle().inbox().end_run();
   while (begun_) {
     {
@@ -125,6 +177,14 @@ void Running::finish() {
     }
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   }
+  end_log();
+}
+
+void Running::close() {
+  const Turn turn(*this);
+  if (!closed_) check_open();
+  end_log();
+  closed_ = true;
 }
 
 bool Running::next() {
@@ -147,6 +207,12 @@ py::bytes Running::save() {
 
 void Running::restore(const py::bytes& snapshot) {
   const Turn turn(*this);
+  check_open();
+  if (recorder_ != nullptr) {
+    raise(fail("a run with a log goes forward only: the log would tell of one run and show two",
+               "restore the snapshot in a run that is opened without `log`")
+              .error());
+  }
   const std::string_view all(snapshot);
   constexpr std::size_t kHead = kMark.size() + 1 + sizeof(std::size_t);
   std::size_t hash = 0;
@@ -164,6 +230,7 @@ void Running::restore(const py::bytes& snapshot) {
   begun_ = all[kMark.size()] == '1';
   fresh_ = !over();
   led_ = run().cycle().phase() == RunPhase::kRunning;
+  texts_before_ = run().cycle().services().texts().count();
   if (!led_ && lead_ != nullptr) lead_->disobeyed();
 }
 
@@ -191,9 +258,9 @@ void Running::start() {
                    : "reset_faults(), then step() until the phase is 'held'")
               .error());
   }
-  (void)run().cycle().inbox().ask({.kind = runtime::CycleRequest::Kind::kGoOn});
-  if (lead_ != nullptr) lead_->follow(run().state(), run().command());
-  led_ = true;
+  run().cycle().attend();  // it is judged by the state that was read
+  take(run().cycle().services().go_on());
+  take_lead();
 }
 
 std::size_t Running::inject(const std::string& scenario) {
@@ -218,7 +285,7 @@ std::size_t Running::inject(const std::string& scenario) {
 }
 
 void Running::add_lead(const std::string& all, const Control& some) {
-  const hal::Robot robot = hal::robot_of(run().experiment().robot);
+  const hal::Robot robot = hal::robot_of(c_->experiment.robot);
   std::vector<ControllerSetup::Claim> claims;
   for (const hal::DrivenJoint& joint : robot.joints) joints_.push_back(joint.name);
   for (const auto& [name, mode] : some) {
@@ -231,8 +298,8 @@ void Running::add_lead(const std::string& all, const Control& some) {
     claims.push_back({j, mode.mode, mode.interaction, false});
   }
   lead_ = std::make_shared<Lead>(std::move(claims), robot.shape());
-  const auto nothing = TomlDocument::parse("", run().experiment().file);
-  Status added = run().controllers().add("python", lead_, nothing->root(), true);
+  const auto nothing = TomlDocument::parse("", c_->experiment.file);
+  Status added = c_->controllers->add("python", lead_, nothing->root(), true);
   if (added) return;
   if (!added.error().hint.empty()) {  // it is the experiment's controller that is in the way
     added.error().hint =
@@ -244,6 +311,11 @@ void Running::add_lead(const std::string& all, const Control& some) {
 
 void Running::begin() {
   begun_ = run().cycle().begin();
+  take_lead();
+}
+
+/// Where Python begins to lead, its command does; where it does not lead any more, nobody obeys it.
+void Running::take_lead() {
   const bool leads = begun_ && run().cycle().phase() == RunPhase::kRunning;
   if (leads != led_ && lead_ != nullptr) {
     leads ? lead_->follow(run().state(), run().command()) : lead_->disobeyed();
@@ -282,6 +354,50 @@ void Running::check_command() const {
   raise_value("command." + std::string(bad->field),
               "of " + joints_[bad->joint] + " is not finite in cycle " +
                   std::to_string(run().state().cycle()[0]) + ": nothing was commanded");
+}
+
+std::string Running::ask(const std::string& question) {
+  const Turn turn(*this);
+  check_open();
+  runtime::RobotCycle& cycle = run().cycle();
+  if (commands_ == nullptr) {  // not those of stops and time, which are the run's own
+    commands_ = std::make_unique<apps::ControlRegistry>();
+    apps::add_controller_commands(*commands_, cycle.services(), c_->experiment.robot);
+    apps::add_joint_commands(*commands_, cycle, c_->experiment.robot);
+    apps::add_input_commands(*commands_, cycle.services());
+    apps::add_sensor_commands(*commands_, cycle.services());
+    apps::add_signal_commands(*commands_, cycle.services(), c_->experiment.robot);
+  }
+  if (begun_) cycle.attend();  // what is asked for is judged by the state that was read
+  const apps::Json answer = commands_->answer(question);
+  take_lead();
+  if (!answer.value("ok", false)) {
+    raise(fail(answer.value("error", "no answer"), answer.value("hint", "")).error());
+  }
+  return answer.dump(-1, ' ', false, apps::Json::error_handler_t::replace);
+}
+
+py::list Running::signals() {
+  py::list all;
+  for (const runtime::ControllerSignals& one : run().cycle().services().signals()) {
+    const hal::SignalBlock& block = *one.block;
+    all.append(py::make_tuple(one.controller, views(block.layout(), block.image().data(), -1, 0,
+                                                    keeper(one.block), false)));
+  }
+  return all;
+}
+
+py::list Running::texts() {
+  std::vector<hal::TextEvent> events;
+  std::uint64_t seen = texts_before_;
+  run().cycle().services().texts().read(seen, events);
+  py::list all;
+  for (const hal::TextEvent& one : events) {
+    all.append(py::make_tuple(static_cast<double>(one.time_ns) * 1e-9, one.cycle,
+                              std::string(one.controller()),
+                              one.level == hal::TextLevel::kWarn ? "warn" : "info", one.words()));
+  }
+  return all;
 }
 
 }  // namespace tandem::python

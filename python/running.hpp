@@ -8,9 +8,11 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/control/control_registry.hpp"
 #include "python/arrays.hpp"
 #include "python/lead.hpp"
 #include "runtime/run/run.hpp"
@@ -26,28 +28,37 @@ class Running {
   /// Opens the run and steps it to its first cycle of control.
   /// @param all   the mode of every joint, without the experiment's controllers; empty: see `some`
   /// @param some  the modes of those that Python leads beside them
-  /// Errors: Run::open()'s; a robot that is not simulated in this process; an unknown joint or
-  /// mode.
+  /// @param log   open_log()'s place; empty: nothing is logged
+  /// Errors: compose()'s; a robot that is not simulated in this process; an unknown joint or mode;
+  /// open_log()'s.
   Running(const std::string& file, runtime::Overrides overrides, const std::string& all,
-          const Control& some);
+          const Control& some, const std::string& log);
+  ~Running();
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
 
   [[nodiscard]] runtime::Run& run() const { return *run_; }
   [[nodiscard]] Lead* lead() const { return lead_.get(); }
-  /// Controllers have ended; the shut-down may be still to come.
+  /// Controllers have ended, or close() was called; the shut-down may be still to come.
   [[nodiscard]] bool over() const {
-    return !begun_ || run().cycle().phase() == runtime::RunPhase::kShutDown;
+    return closed_ || !begun_ || run().cycle().phase() == runtime::RunPhase::kShutDown;
   }
 
   /// Gives the command and reads the next state, `cycles` times. False: the run has ended.
   bool step(std::int64_t cycles);
-  /// Ends the run, if it has not ended, and carries out the shut-down.
+  /// Ends the run, if it has not ended, and carries out the shut-down; then close().
   void finish();
+  /// Ends the log where the run stands, which goes no further. Error: messages were lost.
+  void close();
+  /// The log's; empty: there is none.
+  [[nodiscard]] const std::string& log_path() const { return log_path_; }
   /// For iteration: the state that nobody has looked at yet, or else the next one. False, too, once
   /// the planned cycles have passed in fault or held, where none of them counts.
   bool next();
 
   /// A mark, whether the cycle has begun, and a hash of all the rest, which is RobotCycle's.
   [[nodiscard]] py::bytes save();
+  /// Errors: another run's; a run with a log, which goes forward only.
   void restore(const py::bytes& snapshot);
   /// Acts in this cycle, as the next ones. Errors: a run that is over.
   void stop(int category);
@@ -55,6 +66,19 @@ class Running {
   /// The controllers that a reset holds back, and Python, lead again: its command begins where the
   /// robot is. Error: another phase than kHeld.
   void start();
+  /// A command of the control socket that concerns controllers, inputs, joints, sensors or signals,
+  /// carried out in this cycle. @return the answer's JSON. Errors: the command's.
+  [[nodiscard]] std::string ask(const std::string& question);
+  /// (controller, fields of its signals).
+  [[nodiscard]] py::list signals();
+  /// What controllers have said since the run was opened, or restored last: the last 256 as
+  /// (time_s, cycle, controller, level, text).
+  [[nodiscard]] py::list texts();
+
+  /// Figures so far, those of `tandem run --json` that are of the simulation and not of the
+  /// program.
+  [[nodiscard]] py::dict result();
+
   /// The faults of a scenario's text. @return how many
   std::size_t inject(const std::string& scenario);
 
@@ -72,14 +96,25 @@ class Running {
   };
 
   void add_lead(const std::string& all, const Control& some);
+  void end_log();
+  void check_open() const;
   void begin();
+  void take_lead();
   bool advance();
   [[nodiscard]] std::int64_t per_turn() const;
   void check_command() const;
   void check_going(const char* what) const;
   [[nodiscard]] bool waits_too_long() const;
 
+  std::unique_ptr<runtime::Composition> c_;
+  std::unique_ptr<log::Recorder> recorder_;  // null: nothing is logged
   std::unique_ptr<runtime::Run> run_;
+  std::string log_path_;
+  std::size_t plugins_at_start_ = 0;
+  int process_ = 0;                                  // that opened the log
+  bool closed_ = false;                              // nothing is stepped any more
+  std::unique_ptr<apps::ControlRegistry> commands_;  // once something was asked
+  std::uint64_t texts_before_ = 0;                   // the last restore()
   std::shared_ptr<Lead> lead_;
   std::vector<std::string> joints_;
   std::atomic<bool> busy_{false};
@@ -91,7 +126,5 @@ class Running {
 
 /// Every fault so far, as tandem.Run.faults has it.
 [[nodiscard]] py::list faults_of(const Running& running);
-/// Figures so far, those of `tandem run --json` that are of the simulation and not of the program.
-[[nodiscard]] py::dict result_of(const Running& running);
 
 }  // namespace tandem::python

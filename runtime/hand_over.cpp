@@ -25,10 +25,14 @@ void HandOver::take() noexcept TANDEM_RT {
   if (!ends(now_.run.phase())) statistics_.take_base(now_.truth);
   now_.log.images(now_.time, now_.state, told, now_.truth, now_.estimate());
   show_controllers();
+  show();
+  if (now_.observer != nullptr) show(told);
+}
+
+void HandOver::show() noexcept TANDEM_RT {
   show_progress();
   show_joints();
   show_sensors();
-  if (now_.observer != nullptr) show(told);
 }
 
 /// What the controllers tell beside their command.

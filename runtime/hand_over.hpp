@@ -17,6 +17,8 @@ class HandOver {
   HandOver(CycleNow& now, const DriveResets& resets, const JointHoming& homing,
            JointArbiter& arbiter, RunServices& services);
 
+  /// To RunServices, how things are.
+  void show() noexcept TANDEM_RT;
   /// Each cycle, when its command is out.
   void take() noexcept TANDEM_RT;
   [[nodiscard]] const RunStatistics& statistics() const noexcept { return statistics_; }

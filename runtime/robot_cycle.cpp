@@ -71,6 +71,16 @@ bool RobotCycle::finish() noexcept {
   return !now_.run.in(RunPhase::kDone);
 }
 
+void RobotCycle::attend() noexcept {
+  const AtWork now(heartbeat_);
+  const RunPhase before = now_.progress.phase.load();
+  requests_.carry_out();
+  shown_.show();
+  // The controllers start in this cycle, and forget what came before.
+  const bool starting = now_.run.in(RunPhase::kRunning) && !arbiter_.controls();
+  if (starting) now_.progress.phase.store(before);
+}
+
 /// May block, as the backend's exchange() may and nothing else: for the cycle's time and, when time
 /// is simulated, for the log, and while it is paused.
 void RobotCycle::wait() noexcept {

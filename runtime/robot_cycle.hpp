@@ -31,6 +31,9 @@ class RobotCycle {
   bool begin() noexcept;
   /// @pre begin() was called, and was true
   bool finish() noexcept;
+  /// Between the halves, in the thread of the loop: carries out what services() were asked for, as
+  /// finish() would now, and shows them the state that was read. @pre as finish()'s
+  void attend() noexcept;
   /// Steps until the run is done.
   void run() noexcept {
     while (step()) {

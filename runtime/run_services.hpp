@@ -7,6 +7,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -166,6 +167,10 @@ class RunServices {
   /// All outlive it. The loaded controllers get their channels of the log.
   RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
               const Progress& progress, const hal::ParameterImage& gains, CycleLog& log);
+
+  /// The thread of the loop asks by itself, between the halves of a cycle: where another thread
+  /// would wait for the loop's answer, `attend` is called instead.
+  void attended_by(std::function<void()> attend) { attend_ = std::move(attend); }
 
   /// Loaded controllers, in the order in which they run.
   [[nodiscard]] std::vector<ControllerStatus> controllers();
@@ -344,6 +349,7 @@ class RunServices {
   Seqlock<hal::PidGains> gain_looks_;
   TextHistory texts_;
   std::atomic<std::uint64_t> loads_{1};
+  std::function<void()> attend_;  // empty: the loop has a thread of its own
 
   std::mutex mutex_;          // of all below, and of the asking side of inbox and host
   std::uint64_t number_ = 0;  // of the last request

@@ -15,22 +15,6 @@
 
 namespace tandem::apps {
 
-std::string wire_name(const hal::RobotConfig& robot) {
-  const bool line =
-      !robot.buses.empty() && std::ranges::all_of(robot.buses, [](const hal::BusConfig& bus) {
-        return bus.kind == hal::BusKind::kEthercat;
-      });
-  return line ? "EtherCAT" : "CAN";
-}
-
-std::string hal_name(const runtime::Experiment& e) {
-  const runtime::HalOptions& hal = e.hal;
-  if (hal.backend == runtime::BackendKind::kSim) return "sim";
-  const std::string wire = wire_name(e.robot) == "CAN" ? "can" : "ethercat";
-  const std::string name = hal.backend == runtime::BackendKind::kWire ? wire : "dds";
-  return hal.lockstep ? name + " lockstep" : name;
-}
-
 std::string length_text(const runtime::Experiment& e) {
   if (e.endless()) return "until it is stopped";
   return fmt::format("{:.3f} s", static_cast<double>(e.cycles() * e.loop.period_ns) * 1e-9);

@@ -12,10 +12,13 @@
 #include "dds/participant.hpp"
 #include "hal/ethercat-can/frame_record.hpp"
 #include "runtime/run/composition.hpp"
+#include "runtime/run/run_log.hpp"
 
 namespace tandem::apps {
 
 using runtime::ControllerNote;
+using runtime::hal_name;
+using runtime::wire_name;
 
 /// What a backend speaks over.
 struct Wires {
@@ -32,12 +35,6 @@ struct Wires {
 
 /// The wires come first, for they outlive the backend: it says goodbye over them.
 struct WiredComposition : Wires, runtime::Composition {};
-
-/// "EtherCAT" when the robot has no other bus, else "CAN".
-[[nodiscard]] std::string wire_name(const hal::RobotConfig& robot);
-
-/// "sim", "can", "can lockstep", "ethercat", "dds", "dds lockstep", for logs and summaries.
-[[nodiscard]] std::string hal_name(const runtime::Experiment& e);
 
 /// How long it runs: "5.000 s", "until it is stopped".
 [[nodiscard]] std::string length_text(const runtime::Experiment& e);

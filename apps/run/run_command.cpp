@@ -23,7 +23,6 @@
 #include "apps/run/input_topics.hpp"
 #include "apps/run/prediction.hpp"
 #include "apps/run/remote_link.hpp"
-#include "apps/run/run_log.hpp"
 #include "apps/run/run_summary.hpp"
 #include "apps/run/tools_program.hpp"
 #include "apps/text/console.hpp"
@@ -171,7 +170,7 @@ class Session {
     dds_ = std::move(*dds);
     if (!options_.no_log) {
       const std::string& asked = options_.log_folder;
-      auto recorder = open_log(c_, asked.empty() ? experiment().log.folder : asked);
+      auto recorder = runtime::open_log(c_, asked.empty() ? experiment().log.folder : asked);
       if (!recorder) return std::unexpected(recorder.error());
       recorder_ = std::move(*recorder);
       plugins_at_start_ = c_.controllers->code().size();
@@ -201,7 +200,7 @@ class Session {
                pace_text(c_));
     if (recorder_ == nullptr) return;
     fmt::print(out_, "log: {}\n", recorder_->path());
-    if (e.endless()) fmt::print(out_, "     {}\n", log_growth(c_, recorder_->path()));
+    if (e.endless()) fmt::print(out_, "     {}\n", runtime::log_growth(c_, recorder_->path()));
   }
 
   /// What may be asked of the run, and the ways in: the control socket and the services over DDS.
@@ -314,10 +313,8 @@ class Session {
     if (services_ != nullptr) summary.dds->services = services_->counts();
     if (recorder_ != nullptr) {
       log::StringMap result = result_of(c_.master);
-      std::string later;  // plugins that came during the run
-      const std::vector<std::string> code = controller_lines(*c_.controllers);
-      for (std::size_t i = plugins_at_start_; i < code.size(); ++i) later += code[i] + "\n";
-      if (!later.empty()) result.emplace_back("loaded_controllers", later);
+      for (auto& later : runtime::loaded_later(*c_.controllers, plugins_at_start_))
+        result.push_back(std::move(later));
       summary.log = recorder_->close(result);
       log_ = summary.log->path;
       log_is_whole_ = summary.log->error.empty();

@@ -16,8 +16,32 @@ CONFIG = pathlib.Path(__file__).resolve().parents[2] / "config"
 GOAL = np.array([0.4, -0.5, 0.0, -2.0, 0.0, 1.8, 0.5])  # rad
 
 
-class PandaEnv:
+try:
+    from gymnasium import Env
+    from gymnasium.spaces import Box
+except ImportError:  # what of it an environment needs
+
+    class Env:
+        def reset(self, *, seed=None, options=None):
+            if seed is not None:
+                self.np_random = np.random.default_rng(seed)
+
+    class Box:
+        def __init__(self, low, high, shape, dtype):
+            self.low, self.high, self.shape, self.dtype = low, high, shape, np.dtype(dtype)
+
+        def contains(self, x):
+            fits = x.shape == self.shape and x.dtype == self.dtype
+            return bool(fits and np.all(x >= self.low) and np.all(x <= self.high))
+
+
+class PandaEnv(Env):
     """Action (7): share of each joint's torque, -1 to 1. Observation (14): position, velocity."""
+
+    metadata = {"render_modes": []}
+    render_mode = None
+    action_space = Box(-1.0, 1.0, (7,), np.float32)
+    observation_space = Box(-np.inf, np.inf, (14,), np.float64)
 
     def __init__(self, duration_s=1.0):
         self.duration_s = duration_s
@@ -29,7 +53,8 @@ class PandaEnv:
         self.begin = self.run.save()
         self.max_torque = self.run.limits["max_torque_Nm"]
 
-    def reset(self, seed=None):
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
         if seed is not None and seed != self.run.seed:
             self.open(seed)
         self.run.restore(self.begin)
@@ -40,6 +65,8 @@ class PandaEnv:
         return np.concatenate((state.position, state.velocity))
 
     def step(self, action):
+        if np.shape(action) != (7,):
+            raise ValueError(f"action: has the shape {np.shape(action)}, wanted (7,)")
         np.multiply(action, self.max_torque, out=self.run.command.torque)
         goes_on = self.run.step()
         error = self.run.state.position - GOAL

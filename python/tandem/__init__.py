@@ -13,12 +13,13 @@ except ImportError as error:
     raise ImportError(
         f"{error} (the module belongs to the Python that Tandem was built with: docs/python.md)"
     ) from error
+from .control import Controllers, Parameters, Signals, Text
 from .fields import Fields
 from .log import Channel, Column, Event, Log
 from .model import Model
 from .run import Run
 
 __all__ = [
-    "Channel", "Column", "Error", "Event", "Fields", "Log", "Model", "Run", "UnknownName",
-    "__version__",
+    "Channel", "Column", "Controllers", "Error", "Event", "Fields", "Log", "Model", "Parameters",
+    "Run", "Signals", "Text", "UnknownName", "__version__",
 ]  # fmt: skip

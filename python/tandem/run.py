@@ -7,12 +7,14 @@ import math
 import operator
 import os
 import re
+import weakref
 from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from .control import Controllers, Sample, Signals, Text, ask, give_input, plain
 from .fields import Fields, Sealed
 
 
@@ -65,15 +67,19 @@ class Run(Sealed):
         delay_cycles: Optional[int] = None,
         kernel_variant: str = "",
         build: bool = True,
+        log: Union[None, str, "os.PathLike[str]"] = None,
     ) -> None:
         """Reads and checks everything, enables the drives, and stands at the first cycle of control.
 
         control: None, the experiment's controllers lead. A mode ("position", "velocity", "torque",
         "current", "open_loop", "compliant"): Python leads every joint in it, and the experiment's
         controllers are left out. {joint: mode}: Python leads these, the controllers the others.
-        duration_s [s] or "endless", seed, rate (1: real time, 0: as fast as it goes), scenario (file), hal,
-        on_fault ("end", "wait"), delay_cycles, kernel_variant: instead of the experiment's.
+        duration_s [s] or "endless", seed, rate (1: real time, 0: as fast as it goes), scenario (file),
+        hal, on_fault ("end", "wait"), delay_cycles, kernel_variant: instead of the experiment's.
         build: makes kernels that are missing.
+        log: a folder, which gets ROBOT-EXPERIMENT-001.mcap or the next free number, or a new
+        NAME.mcap. It is the log that `tandem run` writes. Such a run goes forward only: restore()
+        is an error. finish() or close() ends the log, or else the end of the Run.
         """
         self.experiment = os.fspath(experiment)
         every, some = _control(control)
@@ -88,8 +94,10 @@ class Run(Sealed):
                 raise ValueError(f"{key}: {text!r} is no text")
         native = _native.Run(
             self.experiment, every, some, seed, duration_s, rate, os.fspath(scenario), hal,
-            on_fault, delay, kernel_variant, build,
+            on_fault, delay, kernel_variant, build, _place(log),
         )  # fmt: skip
+        if log is not None:
+            weakref.finalize(self, native.close)  # at the interpreter's end, too
         self._native, self._next = native, native.next
         self.joints, self.seed, self.period_s = native.joints, native.seed, native.period_s
         self.robot_file, self.warnings, self.limits = (
@@ -139,13 +147,15 @@ class Run(Sealed):
         """Goes back, or on, to where save() was; iteration begins with that state.
 
         Also for another Run of the same robot, experiment, options, seed and control; duration_s
-        may differ, and is then this run's. Errors: tandem.Error names what is not the same.
+        may differ, and is then this run's. Errors: tandem.Error names what is not the same, or this
+        run writes a log. The run is as it was then.
         """
         try:
             snapshot = bytes(memoryview(snapshot))
         except TypeError:
             kind = type(snapshot).__name__
-            raise ValueError(f"snapshot: is of the type {kind}, wanted the bytes of save()") from None
+            text = f"snapshot: is of the type {kind}, wanted the bytes of save()"
+            raise ValueError(text) from None
         self._native.restore(snapshot)
 
     def inject(self, kind: str, **keys: Any) -> None:
@@ -153,8 +163,50 @@ class Run(Sealed):
 
             run.inject("push", joint="panda_joint4", force_N=[0, 40, 0], for_s=0.1)
         """
-        lines = (_toml(key, _plain(value)) for key, value in {"kind": kind, **keys}.items())
+        lines = (_toml(key, _listed(value)) for key, value in {"kind": kind, **keys}.items())
         self._native.inject("[[fault]]\n" + "\n".join(lines) + "\n")
+
+    @property
+    def controllers(self) -> Controllers:
+        """Live parameters: `run.controllers["squat"]["kp"] = 40` takes effect in this cycle.
+
+        It is an event of the log, and part of snapshots.
+        """
+        return Controllers(self._native)
+
+    @property
+    def signals(self) -> Signals:
+        """What controllers tell: `run.signals["squat"].depth`, an array that changes each cycle."""
+        return Signals(self._native, self.joints)
+
+    def input(self, name: str, sample: Sample) -> None:
+        """Gives an input of a controller a sample, which this cycle's update takes.
+
+        Not in the first cycle of control, in which the controllers start.
+
+            run.input("rate", {"scale": 0.5})
+            run.input("path", [{"after_s": 1.0, "position_rad": [0.3, 0.2]}])
+
+        Errors: tandem.Error with the name: no such input or component, out of bounds, another
+        source feeds it, the controller does not run.
+        """
+        give_input(self._native, name, sample)
+
+    @property
+    def texts(self) -> List[Text]:
+        """What controllers said since the run was opened or restored: the last 256."""
+        return [Text(*row) for row in self._native.texts()]
+
+    def ask(self, command: str, **keys: Any) -> Dict[str, Any]:
+        """A command of the control socket, with its keys and its answer (docs/json.md).
+
+            run.ask("joint.home", joint="slide")
+            run.ask("controller.switch", stop=["hold"], start=["squat"])
+
+        Those of controllers, inputs, joints, sensors and signals, carried out in this cycle.
+        Errors: tandem.Error, the command's.
+        """
+        return ask(self._native, command, keys)
 
     def stop(self, category: int = 1) -> None:
         """An emergency stop in this cycle: category 0, 1 or 2 (docs/safety.md)."""
@@ -176,8 +228,29 @@ class Run(Sealed):
         self._native.start()
 
     def finish(self) -> None:
-        """Ends the run, if it has not ended, and simulates its shut-down: the drives are disabled."""
+        """Ends the run, if it has not ended, and simulates its shut-down: the drives are disabled.
+
+        A log is closed then.
+        """
         self._native.finish()
+
+    def close(self) -> None:
+        """Ends the log where the run stands: step() is an error from then on.
+
+        Error: tandem.Error, the log lost messages (disk full, file gone), as finish() says it.
+        """
+        self._native.close()
+
+    def __enter__(self) -> "Run":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def log(self) -> Optional[str]:
+        """The log's path; None: nothing is logged."""
+        return self._native.log or None
 
     def joint(self, name: str) -> int:
         """Where a joint is in the arrays."""
@@ -259,8 +332,15 @@ def _whole(name: str, value: Optional[int], most: int) -> Optional[int]:
     return value
 
 
-def _plain(value: Any) -> Any:
-    """Of numpy's kinds what TOML has a literal for."""
-    if isinstance(value, (np.ndarray, np.generic)):
-        return value.tolist()
-    return [_plain(one) for one in value] if isinstance(value, (list, tuple)) else value
+def _listed(value: Any) -> Any:
+    """Of numpy's kinds, and of tuples, what TOML has a literal for."""
+    value = plain(value)
+    return [_listed(one) for one in value] if isinstance(value, (list, tuple)) else value
+
+
+def _place(log: Union[None, str, "os.PathLike[str]"]) -> str:
+    """Of the log; "": nowhere."""
+    place = "" if log is None else os.fspath(log)
+    if log is not None and (not place or "\0" in place):
+        raise ValueError(f"log: {log!r} is no name of a folder or file")
+    return place

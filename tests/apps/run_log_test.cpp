@@ -1,5 +1,5 @@
 // What the log of a run says about itself.
-#include "apps/run/run_log.hpp"
+#include "runtime/run/run_log.hpp"
 
 #include "log/log_file.hpp"
 #include "tests/apps/program.hpp"
@@ -14,10 +14,10 @@ TEST_F(RunLog, HasTheFilesThatAreRun) {
   const std::vector<std::string> names{"hold.toml", "robot.toml", "double_pendulum.urdf"};
   std::vector<std::string> texts;
   for (const std::string& name : names) texts.push_back(read_text(folder_ / name));
-  auto composition = runtime::composed<WiredComposition>((folder_ / "hold.toml").string(), {});
+  auto composition = runtime::composed((folder_ / "hold.toml").string(), {});
   ASSERT_TRUE(composition) << composition.error().front().to_string();
   for (const std::string& name : names) write_text(folder_ / name, "another by now\n");
-  auto recorder = open_log(**composition, (folder_ / "runs").string());
+  auto recorder = runtime::open_log(**composition, (folder_ / "runs").string());
   ASSERT_TRUE(recorder) << recorder.error().to_string();
   (*recorder)->start();
   const log::RecordingResult result = (*recorder)->close();
@@ -55,6 +55,20 @@ TEST_F(RunLog, GoesOnInSeveralFilesOfWhichTheOldestGo) {
   const std::string second = json("b.json")["log"]["path"];
   EXPECT_NE(second.find("runs/double_pendulum-hold-002."), std::string::npos) << second;
   EXPECT_EQ(json("b.json")["log"]["data_sha256"], log["data_sha256"]);
+}
+
+TEST_F(RunLog, IsTheFileThatIsNamedUnlessThatIsThere) {
+  const std::string run = "run hold.toml --duration 0.1 --quiet --log ";
+  ASSERT_EQ(tandem(run + "new/a.mcap").status, 0);
+  const std::string first = read_text(folder_ / "new/a.mcap");
+  EXPECT_EQ(tandem("log info new/a.mcap").status, 0);
+  const Outcome again = tandem(run + "new/a.mcap");
+  EXPECT_EQ(again.status, 2);
+  EXPECT_NE(again.err.find("a.mcap: cannot make the log: "), std::string::npos) << again.err;
+  EXPECT_EQ(read_text(folder_ / "new/a.mcap"), first);
+  std::filesystem::create_directory(folder_ / "odd.mcap");  // a folder stays one
+  ASSERT_EQ(tandem(run + "odd.mcap").status, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "odd.mcap/double_pendulum-hold-001.mcap"));
 }
 
 TEST_F(RunLog, DoesNotBeginWhereTheDiskHasTooLittle) {

@@ -2,7 +2,8 @@
 // which is one line of JSON that says why where it is no; the run goes on, with finite commands.
 //
 // The input: a byte that says who asks and how (Way), then questions, one a line; or the fields of
-// a typed service's request, one a line.
+// a typed service's request, one a line; or requests of ROS 2's parameter services, name, type and
+// value by turns.
 #include <time.h>
 
 #include <algorithm>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "apps/control/control_registry.hpp"
+#include "apps/control/dds_parameter_types.hpp"
 #include "apps/control/dds_service_types.hpp"
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
@@ -92,7 +94,7 @@ ControlRegistry::Gate gate(unsigned who) {
   return remote_gate(remote, [who] { return std::string(who == 3 ? "somebody" : ""); });
 }
 
-void ask(Run& run, const std::string& question, const ControlRegistry::Gate& gate) {
+Json ask(Run& run, const std::string& question, const ControlRegistry::Gate& gate) {
   (void)run.registry.turn_of(question);
   const Json answer = run.registry.answer(question, gate);
   const std::string text = json_text(answer);
@@ -101,6 +103,7 @@ void ask(Run& run, const std::string& question, const ControlRegistry::Gate& gat
   require(read && (*read)["ok"].is_boolean());
   if (!answer["ok"].get<bool>()) require(!(*read)["error"].get<std::string>().empty());
   for (int i = 0; i < 2; ++i) run.advance();
+  return answer;
 }
 
 /// The question that a typed service makes of a request with these fields.
@@ -152,6 +155,78 @@ std::string typed_question(unsigned service, std::vector<std::string>& fields) {
   }
 }
 
+/// Asks as a parameter service does. @return the reply, which is for `memory` to keep
+template <class Response, class Request>
+Response ask_of_parameters(Run& run, const Request& request, const ControlRegistry::Gate& gate,
+                           dds::ReplyMemory& memory) {
+  const ParameterQuestion asked = question_of(request);
+  Response reply{};
+  fill(ask(run, json_text(asked.question), gate), asked, reply, memory);
+  return reply;
+}
+
+void require_texts(const dds_sequence_string& texts) {
+  for (std::uint32_t i = 0; i < texts._length; ++i) require(texts._buffer[i] != nullptr);
+}
+
+/// Every parameter service with these names: listed and read, or set to these values.
+void ask_parameters(Run& run, bool sets, std::vector<std::string>& fields,
+                    const ControlRegistry::Gate& gate) {
+  fields.resize((fields.size() + 2) / 3 * 3);
+  std::vector<char*> names;
+  std::vector<::rcl_interfaces_msg_dds__Parameter_> values;
+  for (std::size_t i = 0; i < fields.size(); i += 3) {
+    names.push_back(fields[i].data());
+    auto& one = values.emplace_back();
+    one.name = fields[i].data();
+    one.value.string_value = fields[i + 2].data();
+    one.value.type = static_cast<std::uint8_t>(std::strtoul(fields[i + 1].c_str(), nullptr, 10));
+    one.value.bool_value = !fields[i + 2].empty();
+    one.value.integer_value = std::strtoll(fields[i + 2].c_str(), nullptr, 10);
+    one.value.double_value = std::strtod(fields[i + 2].c_str(), nullptr);
+  }
+  const auto count = static_cast<std::uint32_t>(names.size());
+  dds::ReplyMemory memory;
+  const auto ask_for = [&]<class Request, class Response>(Request request) {
+    return ask_of_parameters<Response>(run, request, gate, memory);
+  };
+  if (sets) {
+    ros::SetParameters_Request each{};
+    each.parameters = {count, count, values.data(), false};
+    const auto set =
+        ask_for.operator()<ros::SetParameters_Request, ros::SetParameters_Response>(each);
+    require(set.results._length == count);
+    ros::SetParametersAtomically_Request all{};
+    all.parameters = {count, count, values.data(), false};
+    const auto reply = ask_for.operator()<ros::SetParametersAtomically_Request,
+                                          ros::SetParametersAtomically_Response>(all);
+    require(reply.result.successful == (reply.result.reason[0] == '\0'));
+    return;
+  }
+  const dds_sequence_string asked{count, count, names.data(), false};
+  ros::ListParameters_Request list{};
+  list.prefixes = asked;
+  list.depth = fields.empty() ? 0 : fields[1].size();
+  const auto listed =
+      ask_for.operator()<ros::ListParameters_Request, ros::ListParameters_Response>(list);
+  require_texts(listed.result.names);
+  ros::DescribeParameters_Request describe{};
+  describe.names = asked;
+  require(
+      ask_for
+          .
+          operator()<ros::DescribeParameters_Request, ros::DescribeParameters_Response>(describe)
+          .descriptors._length == count);
+  ros::GetParameters_Request get{};
+  get.names = asked;
+  require(ask_for.operator()<ros::GetParameters_Request, ros::GetParameters_Response>(get)
+              .values._length == count);
+  ros::GetParameterTypes_Request types{};
+  types.names = asked;
+  require(ask_for.operator()<ros::GetParameterTypes_Request, ros::GetParameterTypes_Response>(types)
+              .types._length == count);
+}
+
 std::vector<std::string> lines_of(std::string_view text) {
   std::vector<std::string> lines;
   while (!text.empty() && lines.size() < kMostQuestions) {
@@ -175,16 +250,27 @@ extern "C" int nanosleep(const timespec* duration, timespec* left) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
-  static const auto kOpen = load_controller("hold", controller_folders());  // stays open
-  require(kOpen.has_value());
+  static const bool kOpen = [] {  // they stay open
+    static std::vector<LoadedController> open;
+    for (const char* name : {"hold", "jog", "trajectory_follower"}) {
+      auto loaded = load_controller(name, controller_folders());
+      require(loaded.has_value());
+      open.push_back(std::move(*loaded));
+    }
+    return true;
+  }();
+  require(kOpen);
   const unsigned way = data[0];
   std::vector<std::string> lines = lines_of({reinterpret_cast<const char*>(data) + 1, size - 1});
   Run run;
   waited_for = &run;
   if ((way & 4) == 0) {
     for (const std::string& line : lines) ask(run, line, gate(way & 3));
-  } else {
+  } else if ((way & 32) == 0) {
     ask(run, typed_question((way >> 3) & 3, lines), gate(way & 3));
+  } else {
+    ask(run, R"({"do": "controller.load", "plugin": "hold"})", {});
+    ask_parameters(run, (way & 8) != 0, lines, gate(way & 3));
   }
   waited_for = nullptr;
   return 0;

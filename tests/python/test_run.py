@@ -164,6 +164,27 @@ def test_shapes_and_names_are_checked(config):
     assert run.state.units["torque"] == "Nm or N" and run.joint("joint2") == 1
 
 
+def test_values_of_any_layout_and_number_are_taken_and_others_named(config):
+    run = tandem.Run(config / HOLD, control="torque")
+    wide = np.arange(8.0).reshape(4, 2) / 100.0
+    for values in (wide[::-1][0], wide.T[:, 3], wide[3].astype(np.float32).astype(float), [0.06, 0.07]):
+        run.command.torque = values
+        assert np.allclose(run.command.torque, [0.06, 0.07], rtol=0, atol=1e-8)
+    for values in (np.array([1, 0], np.int8), np.array([True, False]), (1, 0)):
+        run.command.torque = values
+        assert run.command.torque.dtype == np.float64 and list(run.command.torque) == [1.0, 0.0]
+    cycle = run.cycle
+    for bad in ("much", ["a", "b"], [1j, 0], [[1.0], [1.0, 2.0]], {"joint1": 1.0}, None, object(),
+                np.array(["2026-01-01", "2026-01-02"], "M8[D]")):  # fmt: skip
+        with pytest.raises(ValueError, match="command.torque: "):
+            run.command.torque = bad
+    for bad in (np.zeros((2, 1)), np.zeros((1, 2)), np.zeros(0), np.zeros(1)):
+        with pytest.raises(ValueError, match="command.torque: has the shape"):
+            run.command.torque = bad
+    assert list(run.command.torque) == [1.0, 0.0]
+    assert run.step() and run.cycle == cycle + 1 and not run.faults
+
+
 def test_observers_do_not_command(config):
     run = tandem.Run(config / HOLD)
     with pytest.raises(tandem.Error, match="cannot be written"):
@@ -293,14 +314,18 @@ def test_runs_in_threads(config):
     assert len(found) == 4 and all(np.array_equal(one, wanted) for one in found)
 
 
-def test_one_thread_at_a_time(config):
+@pytest.mark.parametrize(
+    "call",
+    [tandem.Run.save, lambda run: run.result, lambda run: run.ask("controller.list")],
+)
+def test_one_thread_at_a_time(config, call):
     run = tandem.Run(config / HOLD, control="position", duration_s=1e5)
     errors, stop = [], threading.Event()
 
     def other():
         while not stop.is_set():
             try:
-                run.save()
+                call(run)
             except tandem.Error as error:
                 errors.append(str(error))
                 return

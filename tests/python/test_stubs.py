@@ -68,6 +68,8 @@ def test_public_members_have_docstrings_and_annotations():
         for member, function in inspect.getmembers(one, inspect.isfunction):
             if member.startswith("_") and member != "__init__":
                 continue
+            if not function.__module__.startswith("tandem"):  # what a Mapping has besides
+                continue
             assert function.__doc__ or member == "__init__", f"{name}.{member}"
             parameters = list(inspect.signature(function).parameters.values())[1:]
             assert all(p.annotation is not p.empty for p in parameters), f"{name}.{member}"

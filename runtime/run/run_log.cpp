@@ -1,4 +1,4 @@
-#include "apps/run/run_log.hpp"
+#include "runtime/run/run_log.hpp"
 
 #include <fmt/core.h>
 #include <sys/statvfs.h>
@@ -19,7 +19,7 @@
 #include "dds/frame_topics.hpp"
 #include "hal/sim/engine_loader.hpp"
 
-namespace tandem::apps {
+namespace tandem::runtime {
 
 /// The commit that this program was built from, as `git describe` says; empty: not known.
 extern const char* const kBuiltFrom;
@@ -41,8 +41,17 @@ void add_place_and_time(log::RunInfo& info) {
   if (std::strftime(text.data(), text.size(), "%z %Z", &local) > 0) info.time_zone = text.data();
 }
 
-log::RunInfo info_of(const WiredComposition& c) {
-  const runtime::Experiment& e = c.experiment;
+/// "NAME SHA256 PATH" of every plugin that a host was given.
+std::vector<std::string> controller_lines(const ControllerHost& host) {
+  std::vector<std::string> lines;
+  for (const ControllerCode& one : host.code()) {
+    lines.push_back(fmt::format("{} {} {}", one.name, one.sha256, one.path));
+  }
+  return lines;
+}
+
+log::RunInfo info_of(const Composition& c) {
+  const Experiment& e = c.experiment;
   log::RunInfo info;
   info.version = TANDEM_VERSION;
   if (*kBuiltFrom != '\0') info.version += fmt::format(" ({})", kBuiltFrom);
@@ -62,6 +71,9 @@ log::RunInfo info_of(const WiredComposition& c) {
   info.description_hash = c.kernels->description_hash;
   info.kernel_sha256 = c.kernels.sha256();
   info.controllers = controller_lines(*c.controllers);
+  for (const auto& one : c.controllers->owned()) {  // part of the program: Python, a robot's owner
+    if (one != nullptr && one->plugin.empty()) info.controllers.push_back(one->name + " - -");
+  }
   add_place_and_time(info);
   for (const auto& file : e.files) {  // each once
     const auto same = [&](const auto& one) { return one.first == file.first; };
@@ -71,7 +83,7 @@ log::RunInfo info_of(const WiredComposition& c) {
 }
 
 /// What is logged of each topic of images.
-std::vector<log::TopicShare> shares(const runtime::LogConfig& config) {
+std::vector<log::TopicShare> shares(const LogConfig& config) {
   std::vector<log::TopicShare> all{{"state", config.state_every},
                                    {"command", config.command_every},
                                    {"truth", config.truth_every},
@@ -85,8 +97,8 @@ std::vector<log::TopicShare> shares(const runtime::LogConfig& config) {
 }
 
 /// Bytes that a cycle adds to the log at most: what is compressed takes less.
-double bytes_per_cycle(const WiredComposition& c) {
-  const runtime::Experiment& e = c.experiment;
+double bytes_per_cycle(const Composition& c) {
+  const Experiment& e = c.experiment;
   constexpr double kMessageOverhead = 64.0;
   const std::vector<log::TopicShare> all = shares(e.log);
   double cycle_bytes = kMessageOverhead;
@@ -96,7 +108,7 @@ double bytes_per_cycle(const WiredComposition& c) {
     cycle_bytes += (static_cast<double>(kept.layout().bytes()) + kMessageOverhead) / kept.every();
   };
   const hal::StateImage state(e.robot.shape());
-  const hal::TruthImage* truth = runtime::truth_of(c);
+  const hal::TruthImage* truth = truth_of(c);
   add("state", state);
   add("command", hal::CommandImage(e.robot.shape()));
   if (truth != nullptr) add("truth", *truth);
@@ -117,9 +129,9 @@ double bytes_per_cycle(const WiredComposition& c) {
       std::max<std::int64_t>(1, log::RobotView::kPeriod_ns / e.loop.period_ns);
   const double whole = cycle_bytes + view_bytes / static_cast<double>(cycles_per_view);
   switch (e.log.compression) {
-    case runtime::LogCompression::kNone: return whole;
-    case runtime::LogCompression::kLz4: return whole / 2;  // a third and more of a robot that moves
-    case runtime::LogCompression::kZstd: return whole / 3;
+    case LogCompression::kNone: return whole;
+    case LogCompression::kLz4: return whole / 2;  // a third and more of a robot that moves
+    case LogCompression::kZstd: return whole / 3;
   }
   return whole;
 }
@@ -129,7 +141,7 @@ constexpr std::uint64_t kFixed_bytes = 1'000'000;
 
 Error folder_error(const std::string& folder, std::string message) {
   return {.message = std::move(message),
-          .hint = "choose another folder with --log, or run with --no-log",
+          .hint = "choose another place for the log, or run without one: --log, --no-log",
           .file = folder,
           .key = {}};
 }
@@ -190,6 +202,13 @@ Result<std::pair<std::string, Descriptor>> claim_file(const std::string& folder,
   }
 }
 
+/// The same of the name that was asked for: what is there is nobody's to overwrite.
+Result<std::pair<std::string, Descriptor>> claim_named(const std::string& path) {
+  Result<Descriptor> file = open_new(path, 0644);
+  if (file) return std::pair(path, std::move(*file));
+  return std::unexpected(folder_error(path, "cannot make the log: " + file.error().message));
+}
+
 std::vector<log::ViewedLink> viewed_links(const dds::FrameTree& frames) {
   std::vector<log::ViewedLink> links;
   const auto add = [&links](const dds::FrameEdge& edge, int joint) {
@@ -211,7 +230,7 @@ std::vector<log::ViewedLink> viewed_links(const dds::FrameTree& frames) {
 }
 
 /// What viewers want of the robot; nothing when the experiment says so.
-log::ViewedRobot viewed(const runtime::Experiment& e) {
+log::ViewedRobot viewed(const Experiment& e) {
   log::ViewedRobot robot;
   if (!e.log.viewers) return robot;
   const model::Tree& tree = e.description->tree;
@@ -222,30 +241,26 @@ log::ViewedRobot viewed(const runtime::Experiment& e) {
   return robot;
 }
 
-log::RecorderOptions recorder_options(const WiredComposition& c) {
-  const runtime::Experiment& e = c.experiment;
+log::RecorderOptions recorder_options(const Composition& c) {
+  const Experiment& e = c.experiment;
   const auto bytes = [](double megabytes) { return static_cast<std::uint64_t>(megabytes * 1e6); };
   log::RecorderOptions options{
       .limits = {bytes(e.log.file_MB), bytes(e.log.total_MB), bytes(e.log.keep_free_MB)},
       .shares = shares(e.log),
       .viewed = viewed(e)};
   switch (e.log.compression) {
-    case runtime::LogCompression::kNone:
-      options.writer.compression = log::Compression::kNone;
-      break;
-    case runtime::LogCompression::kLz4: options.writer.compression = log::Compression::kLz4; break;
-    case runtime::LogCompression::kZstd:
-      options.writer.compression = log::Compression::kZstd;
-      break;
+    case LogCompression::kNone: options.writer.compression = log::Compression::kNone; break;
+    case LogCompression::kLz4: options.writer.compression = log::Compression::kLz4; break;
+    case LogCompression::kZstd: options.writer.compression = log::Compression::kZstd; break;
   }
   return options;
 }
 
 }  // namespace
 
-std::string log_growth(const WiredComposition& c, const std::string& path) {
+std::string log_growth(const Composition& c, const std::string& path) {
   const double rate = bytes_per_cycle(c) * 1e9 / static_cast<double>(c.experiment.loop.period_ns);
-  const runtime::LogConfig& config = c.experiment.log;
+  const LogConfig& config = c.experiment.log;
   struct statvfs disk {};
   std::string room;
   if (statvfs(path.c_str(), &disk) == 0) {
@@ -260,30 +275,49 @@ std::string log_growth(const WiredComposition& c, const std::string& path) {
   return fmt::format("at most {:.2f} MB for each second{}", rate * 1e-6, room);
 }
 
-std::vector<std::string> controller_lines(const runtime::ControllerHost& host) {
-  std::vector<std::string> lines;
-  for (const runtime::ControllerCode& one : host.code()) {
-    lines.push_back(fmt::format("{} {} {}", one.name, one.sha256, one.path));
-  }
-  return lines;
+std::string wire_name(const hal::RobotConfig& robot) {
+  const bool line =
+      !robot.buses.empty() && std::ranges::all_of(robot.buses, [](const hal::BusConfig& bus) {
+        return bus.kind == hal::BusKind::kEthercat;
+      });
+  return line ? "EtherCAT" : "CAN";
 }
 
-Result<std::unique_ptr<log::Recorder>> open_log(const WiredComposition& c,
-                                                const std::string& folder) {
+std::string hal_name(const Experiment& e) {
+  const HalOptions& hal = e.hal;
+  if (hal.backend == BackendKind::kSim) return "sim";
+  const std::string wire = wire_name(e.robot) == "CAN" ? "can" : "ethercat";
+  const std::string name = hal.backend == BackendKind::kWire ? wire : "dds";
+  return hal.lockstep ? name + " lockstep" : name;
+}
+
+log::StringMap loaded_later(const ControllerHost& host, std::size_t known) {
+  std::string later;
+  const std::vector<std::string> code = controller_lines(host);
+  for (std::size_t i = known; i < code.size(); ++i) later += code[i] + "\n";
+  if (later.empty()) return {};
+  return {{"loaded_controllers", later}};
+}
+
+Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& place) {
   const auto cycles = static_cast<double>(c.experiment.cycles());
   const log::RecorderOptions options = recorder_options(c);
   const log::DiskLimits& limits = options.limits;
   std::uint64_t needed = static_cast<std::uint64_t>(cycles * bytes_per_cycle(c)) + kFixed_bytes;
   if (limits.total_bytes > 0) needed = std::min(needed, limits.total_bytes);
+  std::error_code ignored;
+  const bool file_named = place.ends_with(".mcap") && !fs::is_directory(place, ignored);
+  const std::string parent = fs::path(place).parent_path().string();
+  const std::string folder = !file_named ? place : parent.empty() ? "." : parent;
   if (const Status s = check_folder(folder, needed, limits.keep_free_bytes); !s) {
     return std::unexpected(s.error());
   }
   const std::string name =
       c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
-  auto claimed = claim_file(folder, name);
+  auto claimed = file_named ? claim_named(place) : claim_file(folder, name);
   if (!claimed) return std::unexpected(claimed.error());
   auto& [path, file] = *claimed;
   return log::Recorder::open(std::move(file), path, info_of(c), options);
 }
 
-}  // namespace tandem::apps
+}  // namespace tandem::runtime

@@ -1,0 +1,38 @@
+// The log of a run: where it goes, and what it says about itself.
+// Layer: runtime/run.  Thread: main.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+#include "log/recorder.hpp"
+#include "runtime/run/composition.hpp"
+
+namespace tandem::runtime {
+
+/// "EtherCAT" when the robot has no other bus, else "CAN".
+[[nodiscard]] std::string wire_name(const hal::RobotConfig& robot);
+
+/// "sim", "can", "can lockstep", "ethercat", "dds", "dds lockstep", for logs and summaries.
+[[nodiscard]] std::string hal_name(const Experiment& e);
+
+/// Opens FOLDER/ROBOT-EXPERIMENT-NNN.mcap, the next free number, or the file that is named.
+///
+/// @param place  a folder or, when it ends in ".mcap" and is none, a file; folders are created
+/// where they are missing.
+/// Errors, before anything has moved: the folder cannot be made or written; the disk has less
+/// room than the run will write; the file is there already.
+[[nodiscard]] Result<std::unique_ptr<log::Recorder>> open_log(const Composition& composition,
+                                                              const std::string& place);
+
+/// How fast the log at `path` grows, and for how long there is room: "at most 0.84 MB for each
+/// second; the disk has room for 6.1 h of it".
+[[nodiscard]] std::string log_growth(const Composition& composition, const std::string& path);
+
+/// For the log's result: `loaded_controllers`, "NAME SHA256 PATH" of every plugin that a host was
+/// given after the first `known`; nothing without one.
+[[nodiscard]] log::StringMap loaded_later(const ControllerHost& host, std::size_t known);
+
+}  // namespace tandem::runtime
