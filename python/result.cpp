@@ -63,7 +63,8 @@ double weight_N(const tandem_kernels& k) {
 void add_truth(const runtime::Run& run, py::dict& out) {
   using namespace py::literals;
   const runtime::RunStatistics& figures = run.cycle().statistics();
-  out["ground"] = out["base"] = py::none();
+  out["ground"] = py::none();
+  out["base"] = py::none();
   if (const auto ground = figures.ground(weight_N(run.kernels()))) {
     out["ground"] = py::dict("weight_N"_a = ground->weight_N,
                              "mean_vertical_force_N"_a = ground->mean_vertical_force_N,
