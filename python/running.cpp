@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <functional>
 #include <string_view>
 #include <utility>
@@ -58,6 +59,17 @@ bool is_backend(std::string_view hal) { return hal == "can" || hal == "ethercat"
               .key = "hal.backend"});
 }
 
+/// In a folder, or as the file that the name's end says.
+Result<std::unique_ptr<log::Recorder>> open_log_at(const runtime::Composition& c,
+                                                   const std::filesystem::path& place) {
+  std::error_code ignored;
+  if (place.extension() != ".mcap" || std::filesystem::is_directory(place, ignored)) {
+    return runtime::open_log(c, place);
+  }
+  const std::filesystem::path folder = place.parent_path();
+  return runtime::open_log(c, folder.empty() ? "." : folder, place.filename());
+}
+
 }  // namespace
 
 Running::Turn::Turn(Running& of) : of_(&of) {
@@ -90,7 +102,7 @@ Running::Running(const std::string& file, runtime::Overrides overrides, const st
   if (c_->experiment.hal.backend != runtime::BackendKind::kSim) refuse_place(c_->experiment.file);
   if (!all.empty() || !some.empty()) add_lead(all, some);
   if (!log.empty()) {
-    recorder_ = take(runtime::open_log(*c_, log));
+    recorder_ = take(open_log_at(*c_, log));
     log_path_ = recorder_->path();
     plugins_at_start_ = c_->controllers->code().size();
     process_ = ::getpid();

@@ -28,7 +28,7 @@ class Running {
   /// Opens the run and steps it to its first cycle of control.
   /// @param all   the mode of every joint, without the experiment's controllers; empty: see `some`
   /// @param some  the modes of those that Python leads beside them
-  /// @param log   open_log()'s place; empty: nothing is logged
+  /// @param log   its folder, or a new NAME.mcap; empty: nothing is logged
   /// Errors: compose()'s; a robot that is not simulated in this process; an unknown joint or mode;
   /// open_log()'s.
   Running(const std::string& file, runtime::Overrides overrides, const std::string& all,

@@ -299,22 +299,20 @@ log::StringMap loaded_later(const ControllerHost& host, std::size_t known) {
   return {{"loaded_controllers", later}};
 }
 
-Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& place) {
+Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& folder,
+                                                const std::string& file_name) {
   const auto cycles = static_cast<double>(c.experiment.cycles());
   const log::RecorderOptions options = recorder_options(c);
   const log::DiskLimits& limits = options.limits;
   std::uint64_t needed = static_cast<std::uint64_t>(cycles * bytes_per_cycle(c)) + kFixed_bytes;
   if (limits.total_bytes > 0) needed = std::min(needed, limits.total_bytes);
-  std::error_code ignored;
-  const bool file_named = place.ends_with(".mcap") && !fs::is_directory(place, ignored);
-  const std::string parent = fs::path(place).parent_path().string();
-  const std::string folder = !file_named ? place : parent.empty() ? "." : parent;
   if (const Status s = check_folder(folder, needed, limits.keep_free_bytes); !s) {
     return std::unexpected(s.error());
   }
   const std::string name =
       c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
-  auto claimed = file_named ? claim_named(place) : claim_file(folder, name);
+  auto claimed =
+      file_name.empty() ? claim_file(folder, name) : claim_named(fs::path(folder) / file_name);
   if (!claimed) return std::unexpected(claimed.error());
   auto& [path, file] = *claimed;
   return log::Recorder::open(std::move(file), path, info_of(c), options);

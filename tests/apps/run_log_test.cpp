@@ -58,17 +58,20 @@ TEST_F(RunLog, GoesOnInSeveralFilesOfWhichTheOldestGo) {
 }
 
 TEST_F(RunLog, IsTheFileThatIsNamedUnlessThatIsThere) {
-  const std::string run = "run hold.toml --duration 0.1 --quiet --log ";
-  ASSERT_EQ(tandem(run + "new/a.mcap").status, 0);
-  const std::string first = read_text(folder_ / "new/a.mcap");
-  EXPECT_EQ(tandem("log info new/a.mcap").status, 0);
-  const Outcome again = tandem(run + "new/a.mcap");
-  EXPECT_EQ(again.status, 2);
-  EXPECT_NE(again.err.find("a.mcap: cannot make the log: "), std::string::npos) << again.err;
-  EXPECT_EQ(read_text(folder_ / "new/a.mcap"), first);
-  std::filesystem::create_directory(folder_ / "odd.mcap");  // a folder stays one
-  ASSERT_EQ(tandem(run + "odd.mcap").status, 0);
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "odd.mcap/double_pendulum-hold-001.mcap"));
+  auto composition = runtime::composed((folder_ / "hold.toml").string(), {});
+  ASSERT_TRUE(composition);
+  const std::string folder = (folder_ / "new").string();
+  {
+    const auto recorder = runtime::open_log(**composition, folder, "a.mcap");
+    ASSERT_TRUE(recorder) << recorder.error().to_string();
+    EXPECT_EQ((*recorder)->path(), folder + "/a.mcap");
+  }
+  const std::string before = read_text(folder_ / "new/a.mcap");
+  const auto again = runtime::open_log(**composition, folder, "a.mcap");
+  ASSERT_FALSE(again);
+  EXPECT_NE(again.error().to_string().find("a.mcap: cannot make the log: "), std::string::npos)
+      << again.error().to_string();
+  EXPECT_EQ(read_text(folder_ / "new/a.mcap"), before);
 }
 
 TEST_F(RunLog, DoesNotBeginWhereTheDiskHasTooLittle) {
