@@ -1,5 +1,7 @@
 // Figures and faults of a run, by the names of `tandem run --json` (docs/json.md).
 // Layer: python.  Thread: as python/running.hpp.
+#include <fmt/core.h>
+
 #include <cmath>
 
 #include "python/running.hpp"
@@ -122,7 +124,9 @@ py::dict Running::result() {
   add_truth(run, out);
   py::list latched;
   for (const runtime::FaultReport& one : cycle.faults()) {
-    if (one.latched) latched.append(one.text);
+    if (!one.latched) continue;
+    const std::string where = one.joint.empty() ? "" : one.joint + ": ";
+    latched.append(fmt::format("{:.3f} s: {}{}", one.time_s, where, one.text));
   }
   out["faults"] = std::move(latched);
   out["fault_log"] = fault_log_of(cycle);

@@ -20,7 +20,8 @@ HandOver::HandOver(CycleNow& now, const DriveResets& resets, const JointHoming& 
 void HandOver::take() noexcept TANDEM_RT {
   const hal::CommandImage& told = arbiter_.told();
   if (now_.run.in(RunPhase::kRunning)) {
-    statistics_.take(now_.state, told, now_.truth, now_.limits.counters(), now_.estimate());
+    statistics_.take(now_.state, told, arbiter_.unfollowed(), now_.truth, now_.limits.counters(),
+                     now_.estimate());
   }
   if (!ends(now_.run.phase())) statistics_.take_base(now_.truth);
   now_.log.images(now_.time, now_.state, told, now_.truth, now_.estimate());

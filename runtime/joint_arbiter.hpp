@@ -32,6 +32,10 @@ class JointArbiter {
   [[nodiscard]] const hal::CommandImage& told() noexcept TANDEM_RT {
     return unfollowed_.in(command_);
   }
+  /// By joint: whether told() has a position reference of it that no drive follows.
+  [[nodiscard]] std::span<const std::uint8_t> unfollowed() const noexcept TANDEM_RT {
+    return unfollowed_.written();
+  }
   /// Controllers are started.
   [[nodiscard]] bool controls() const noexcept TANDEM_RT { return controls_; }
   /// Cycles of kRunning in which they ran.

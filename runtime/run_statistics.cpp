@@ -27,7 +27,8 @@ RunStatistics::RunStatistics(std::size_t joints, std::size_t feet, std::size_t l
       wrenches_(wrenches) {}
 
 void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& command,
-                         const hal::TruthImage* truth, std::span<const hal::LimitCounters> limits,
+                         std::span<const std::uint8_t> unfollowed, const hal::TruthImage* truth,
+                         std::span<const hal::LimitCounters> limits,
                          const hal::EstimateImage* estimate) noexcept TANDEM_RT {
   for (std::size_t j = 0; j < limits.size(); ++j) {
     const hal::LimitCounters& now = limits[j];
@@ -41,9 +42,8 @@ void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& 
   const auto measured = state.position_rad();
   for (std::size_t j = 0; j < errors_.size(); ++j) {
     const double error = wanted[j] - measured[j];
-    // Outside position control what nobody writes is what is measured.
     const bool follows = mode[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition);
-    if ((!follows && error == 0.0) || std::isnan(error)) continue;
+    if ((!follows && unfollowed[j] == 0) || std::isnan(error)) continue;
     errors_[j].square_sum += error * error;
     errors_[j].max = std::max(errors_[j].max, std::abs(error));
     ++errors_[j].count;

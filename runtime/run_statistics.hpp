@@ -90,10 +90,12 @@ class RunStatistics {
   RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops = 0,
                 std::size_t wrenches = 0);
 
-  /// A cycle in which the controllers ran. `truth` and `estimate` may be null; `limits` are
+  /// A cycle in which the controllers ran. `unfollowed` says by joint whether it has a position
+  /// reference outside position control. `truth` and `estimate` may be null; `limits` are
   /// CommandLimits' own.
   void take(const hal::StateImage& state, const hal::CommandImage& command,
-            const hal::TruthImage* truth, std::span<const hal::LimitCounters> limits,
+            std::span<const std::uint8_t> unfollowed, const hal::TruthImage* truth,
+            std::span<const hal::LimitCounters> limits,
             const hal::EstimateImage* estimate = nullptr) noexcept TANDEM_RT;
   /// A cycle before the shut-down, with controllers or without. `truth` may be null.
   void take_base(const hal::TruthImage* truth) noexcept TANDEM_RT;

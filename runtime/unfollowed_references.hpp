@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -44,6 +45,10 @@ class UnfollowedReferences {
       if (!std::isfinite(reference[j]) || is_followed(command, j)) written_[j] = 0;
       written_rad_[j] = reference[j];
     }
+  }
+  /// By joint: whether there is one in this cycle.
+  [[nodiscard]] std::span<const std::uint8_t> written() const noexcept TANDEM_RT {
+    return written_;
   }
   /// `command`, which has passed the limits, with these references.
   [[nodiscard]] const hal::CommandImage& in(const hal::CommandImage& command) noexcept TANDEM_RT {

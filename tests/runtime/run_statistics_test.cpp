@@ -13,7 +13,7 @@ class RunStatisticsOfTwo : public testing::Test {
     command_.mode()[0] = kPosition;
     command_.position_rad()[0] = wanted;
     state_.position_rad()[0] = measured;
-    statistics_.take(state_, command_, &truth_, limits_);
+    statistics_.take(state_, command_, unfollowed_, &truth_, limits_);
     statistics_.take_base(&truth_);
   }
   void foot(std::size_t index, double x, double force_N) {
@@ -23,6 +23,7 @@ class RunStatisticsOfTwo : public testing::Test {
 
   hal::StateImage state_{{.joints = 2, .sensor_channels = {}}};
   hal::CommandImage command_{{.joints = 2, .sensor_channels = {}}};
+  std::vector<std::uint8_t> unfollowed_{0, 0};
   hal::TruthImage truth_{2, 2};
   std::vector<hal::LimitCounters> limits_{2};
   RunStatistics statistics_{2, 2};
@@ -50,6 +51,17 @@ TEST_F(RunStatisticsOfTwo, GivesRmsAndMaximumOfTheTrackingError) {
   EXPECT_DOUBLE_EQ(tracking[0].rms_rad, std::sqrt((0.09 + 0.16) / 2.0));
   EXPECT_DOUBLE_EQ(tracking[0].max_rad, 0.4);
   EXPECT_EQ(tracking[1].rms_rad, 0.0);  // never in position control
+}
+
+TEST_F(RunStatisticsOfTwo, GiveNoTrackingErrorWhereNobodyWroteAReference) {
+  command_.mode()[1] = static_cast<std::int8_t>(hal::ControlMode::kTorque);
+  command_.position_rad()[1] = 0.5;  // left over from who held the joint
+  take(0.0, 0.0);
+  EXPECT_EQ(statistics_.tracking()[1].cycles, 0U);
+  unfollowed_[1] = 1;
+  take(0.0, 0.0);
+  EXPECT_EQ(statistics_.tracking()[1].cycles, 1U);
+  EXPECT_DOUBLE_EQ(statistics_.tracking()[1].max_rad, 0.5);
 }
 
 TEST_F(RunStatisticsOfTwo, SumTheWorkOfJointsThatDriveAndOfThoseThatBrake) {
@@ -81,7 +93,7 @@ TEST_F(RunStatisticsOfTwo, KeepTheLargestWrenchOfEachPlaceAndItsTime) {
     estimate.external_force_N()[3] = force_x_N;
     estimate.external_moment_Nm()[5] = moment_z_Nm;
     estimate.unexplained_torque_Nm()[0] = rest_Nm;
-    statistics.take(state_, command_, nullptr, limits_, &estimate);
+    statistics.take(state_, command_, unfollowed_, nullptr, limits_, &estimate);
   };
   estimate.external_force_N()[4] = 4.0;
   at(1, 0.0, 0.5, 0.1);
@@ -122,7 +134,7 @@ TEST_F(RunStatisticsOfTwo, KeepsTheWorstErrorOfEachLoop) {
   for (const double error : {1e-9, 3e-9, 2e-9}) {
     truth.loop_position_error_m()[1] = error;
     truth.loop_velocity_error_m_s()[0] = 2.0 * error;
-    statistics.take(state_, command_, &truth, {});
+    statistics.take(state_, command_, unfollowed_, &truth, {});
   }
   EXPECT_EQ(statistics.loops()[0].max_position_error_m, 0.0);
   EXPECT_EQ(statistics.loops()[0].max_velocity_error_m_s, 6e-9);
@@ -189,7 +201,7 @@ TEST_F(RunStatisticsOfTwo, GivesTheEstimatesWorstErrorsOfTiltAndHeight) {
     q[2] = std::sin(yaw / 2) * std::cos(tilt / 2);
     q[3] = std::cos(yaw / 2) * std::cos(tilt / 2);
     estimate.base_position_m()[2] = height_m;
-    statistics_.take(state_, command_, &truth_, limits_, &estimate);
+    statistics_.take(state_, command_, unfollowed_, &truth_, limits_, &estimate);
   };
   estimate.external_torque_Nm()[1] = -3.0;
   take_both(0.0, 1.0, 9.0);
