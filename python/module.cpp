@@ -101,7 +101,7 @@ Doubles numbers_of(const std::string& name, const py::object& value) {
   py::array array;
   if (!value.is_none()) array = py::array::ensure(value);
   const char kind = array ? array.dtype().kind() : '?';
-  if (std::string_view("biufO").find(kind) == std::string_view::npos) {
+  if (std::string_view("biuf").find(kind) == std::string_view::npos) {
     raise_value(name, "is no array of numbers");
   }
   Doubles numbers = Doubles::ensure(array);

@@ -32,7 +32,7 @@ def numbers(what: str, value: ArrayLike) -> NDArray[np.float64]:
     """As floating point; ValueError names what is text, complex, or no number at all."""
     try:
         array = np.asarray(value)
-        if array.dtype.kind not in "biufO":
+        if array.dtype.kind not in "biuf":
             raise TypeError
         return np.asarray(array, dtype=float)
     except (TypeError, ValueError):
