@@ -8,7 +8,8 @@ SI units, W's z axis upwards; docs/python.md is the guide, docs/conventions.md h
 """
 
 try:
-    from ._native import Error, UnknownName, __version__
+    from ._native import Error, UnknownName
+    from ._native import __version__ as __version__
 except ImportError as error:
     raise ImportError(
         f"{error} (the module belongs to the Python that Tandem was built with: docs/python.md)"
@@ -21,5 +22,5 @@ from .run import Run
 
 __all__ = [
     "Channel", "Column", "Controllers", "Error", "Event", "Fields", "Log", "Model", "Parameters",
-    "Run", "Signals", "Text", "UnknownName", "__version__",
+    "Run", "Signals", "Text", "UnknownName",
 ]  # fmt: skip

@@ -534,6 +534,8 @@ def test_whole_objects_cannot_be_assigned(config, log_file):
         run.command = np.zeros(2)
     with pytest.raises(tandem.Error, match="Run.sede: cannot be set"):
         run.sede = 3
+    with pytest.raises(tandem.Error, match="Parameters.kp: cannot be set"):
+        tandem.Run(config / HOLD).controllers["hold"].kp = 3
     model = tandem.Model(run.robot_file)
     with pytest.raises(tandem.Error, match="Model.mass_kg: cannot be set"):
         model.mass_kg = 3
