@@ -98,9 +98,8 @@ void raise_unknown(const std::string& kind, const std::string& name,
 }
 
 Doubles numbers_of(const std::string& name, const py::object& value) {
-  py::array array;
-  if (!value.is_none()) array = py::array::ensure(value);
-  const char kind = array ? array.dtype().kind() : '?';
+  const py::array array = py::array::ensure(value);
+  const char kind = array ? array.dtype().kind() : '?';  // of None it is 'O'
   if (std::string_view("biuf").find(kind) == std::string_view::npos) {
     raise_value(name, "is no array of numbers");
   }
