@@ -77,7 +77,8 @@ class Log {
     const auto* base = reinterpret_cast<const std::byte*>(records->block.data());
     py::list fields =
         views(topic->layout, base, count, static_cast<py::ssize_t>(records->stride), owner, false);
-    const py::array_t<double> time_s(count, records->time_s.data(), owner);
+    py::array_t<double> time_s(count, records->time_s.data(), owner);
+    time_s.attr("flags").attr("writeable") = false;
     return py::make_tuple(time_s, fields);
   }
 
@@ -122,6 +123,7 @@ void add_log(py::module_& module) {
   using namespace py::literals;
   py::class_<Log>(module, "LogFile", "A log, counted, with none of its numbers read.")
       .def(py::init<const std::string&>(), "path"_a)
+      .def_static("__new__", &made_whole)
       .def_property_readonly("path", [](const Log& log) { return log.file().path(); })
       .def_property_readonly("robot", [](const Log& log) { return log.file().info().robot; })
       .def_property_readonly("joints", [](const Log& log) { return log.file().info().joints; })

@@ -311,7 +311,7 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
 
 void RobotCycle::archive(Archive& ar) {
   std::uint64_t controllers = now_.controllers.fingerprint();
-  ar(controllers);  // first: restore() looks at it before anything changes
+  ar(now_.identity, controllers);  // first: restore() looks at them before anything changes
   ar(now_, resets_, homing_, arbiter_, waiting_, response_);
   ar(now_.controllers, shown_, started_, limited_, limits_met_);
 }
@@ -345,9 +345,15 @@ Result<std::vector<std::byte>> RobotCycle::save() {
 
 Status RobotCycle::restore(std::span<const std::byte> snapshot) {
   Archive ar(snapshot);
+  RunIdentity identity;
   std::uint64_t controllers = 0;
   Archive first(snapshot);
-  first(controllers);
+  first(identity, controllers);
+  if (const std::string other = now_.identity.difference(identity); !other.empty()) {
+    return fail("the snapshot is of another run: '" + other + "' is not the same",
+                "restore it where robot, experiment, kernels, options and seed are those that it "
+                "was saved with");
+  }
   if (controllers != now_.controllers.fingerprint()) {
     return fail("the snapshot was taken with other controllers than are loaded now",
                 "load and unload, in the same order, what was loaded then");

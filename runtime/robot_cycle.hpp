@@ -78,8 +78,8 @@ class RobotCycle {
   /// Everything that the next step() depends on: backend, controllers, images, counters.
   /// Between two steps, or the halves of one; with a simulated robot only; the log goes on where it
   /// is. A snapshot of between the halves is restored between halves.
-  /// Errors: a backend that cannot be rewound; bytes of another configuration; other controllers
-  /// than those that were loaded then (nothing has changed after that one).
+  /// Errors: a backend that cannot be rewound; bytes of another configuration; another identity, or
+  /// other controllers than those that were loaded then (nothing has changed after those).
   [[nodiscard]] Result<std::vector<std::byte>> save();
   [[nodiscard]] Status restore(std::span<const std::byte> snapshot);
   /// What save() answers, into `ar`, which may be bounded; without `backend` all but its part,

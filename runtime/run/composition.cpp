@@ -230,7 +230,7 @@ Diagnostics override_experiment(Experiment& e, const Overrides& overrides) {
   const double duration_s = overrides.duration_s.value_or(kEndless_s);
   if (!(duration_s > 0.0 && (duration_s <= 1e6 || duration_s == kEndless_s))) {
     return {
-        fail(fmt::format("duration_s: {}", duration_s), "above 0, to 1e6, or kEndless_s").error()};
+        fail(fmt::format("duration_s: {}", duration_s), "above 0, to 1e6, or infinity: no end").error()};
   }
   e.seed = overrides.seed.value_or(e.seed);
   e.duration_s = overrides.duration_s.value_or(e.duration_s);

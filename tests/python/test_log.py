@@ -79,6 +79,20 @@ def test_what_is_not_there_is_named(log_file):
         log["event"]["text"]
 
 
+def test_columns_are_numbers_to_numpy(log_file):
+    log = tandem.Log(log_file)
+    position = log["state"].position
+    values = position.values
+    assert np.array_equal(position - 1, values - 1.0, equal_nan=True)
+    assert np.array_equal(2 * position + position, 3 * values, equal_nan=True)
+    assert np.array_equal(np.abs(position), abs(values), equal_nan=True)
+    assert ((position > 0) == (values > 0)).all()
+    with pytest.raises(TypeError):
+        np.add(values, 1, out=position)
+    for channel in log:
+        assert isinstance(channel.units, dict)
+
+
 def test_files_that_are_no_logs(tmp_path, log_file):
     with pytest.raises(FileNotFoundError, match="none.mcap"):
         tandem.Log(tmp_path / "none.mcap")
