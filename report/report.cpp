@@ -36,11 +36,19 @@ void add_faults(const RunData& run, const std::string& side, Facts& facts) {
   if (more > 0) facts.emplace_back("fault" + side, fmt::format("{} more", more));
 }
 
+void add_payloads(const RunData& run, const std::string& side, Facts& facts) {
+  for (const PayloadMark& one : run.payloads) {
+    const std::string what = one.text.substr(one.text.find(' ') + 1);  // without "payload "
+    facts.emplace_back("payload" + side, fmt::format("{}, at {:.3f} s", what, one.time_s));
+  }
+}
+
 void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   facts.emplace_back(
       "log" + side,
       run.path + (run.truncated ? " (cut: its run was killed, or the copy is not whole)" : ""));
   add_faults(run, side, facts);
+  add_payloads(run, side, facts);
   const std::size_t passive = run.robot.passive.size();
   facts.emplace_back(
       "robot" + side,

@@ -142,6 +142,16 @@ std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
   return faults;
 }
 
+std::vector<PayloadMark> payloads_of(const std::vector<log::EventText>& events) {
+  std::vector<PayloadMark> marks;
+  for (const auto& [event, text] : events) {
+    const bool dropped = event.kind == log::EventKind::kDropped;
+    if (!dropped && event.kind != log::EventKind::kPickedUp) continue;
+    marks.push_back({static_cast<double>(event.time_ns) * 1e-9, dropped, text});
+  }
+  return marks;
+}
+
 Result<log::TimeSeries> state_columns(const log::LogFile& file, const char* topic,
                                       const RunData& run) {
   const std::size_t n = run.robot.joints.size();
@@ -393,6 +403,7 @@ Result<std::optional<RunData>> read_parallel(const RunData& run) {
   if (file->find(kParallelState) == nullptr) return std::nullopt;
   RunData second = run;
   second.faults.clear();
+  second.payloads.clear();  // they are the first one's
   for (Columns* truth : {&second.base, &second.foot_position_m, &second.foot_force_N,
                          &second.foot_moment_Nm, &second.loop_error, &second.passive_rad}) {
     truth->clear();
@@ -431,6 +442,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   const auto events = file->events();
   if (!events) return std::unexpected(events.error());
   run.faults = faults_of(*events, run.info.joints, error_text);
+  run.payloads = payloads_of(*events);
   log::RunWindow window = log::run_window(*events, run.settle_s);
   if (const Status s = read_state(*file, window, run); !s) return std::unexpected(s.error());
   if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());

@@ -44,6 +44,13 @@ struct RunFault {
   bool stops = true;    ///< false: it was reported, and the run went on
 };
 
+/// What the simulated robot picked up or dropped.
+struct PayloadMark {
+  double time_s = 0.0;  ///< since the first SYNC
+  bool dropped = false;
+  std::string text;  ///< "payload picked up: box, 1.6 kg on panda_hand"
+};
+
 /// Faults of a run that are shown in the page, and as lines in its figures.
 inline constexpr std::size_t kFaultsShown = 5;
 
@@ -73,6 +80,7 @@ struct RunData {
   double drawn_from_s = -std::numeric_limits<double>::infinity();  ///< of the figures' times: only
   double drawn_to_s = std::numeric_limits<double>::infinity();     ///< rows in these are drawn
   std::vector<RunFault> faults;                                    ///< in the order of their times
+  std::vector<PayloadMark> payloads;                               ///< the same
   Columns position_rad, velocity_rad_s, torque_Nm;                 ///< [joint][row], measured
   Columns reference_rad;    ///< [joint][row]; NaN when not under position control
   Columns sensor;           ///< [channel][row], all sensors one after another

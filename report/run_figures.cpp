@@ -89,6 +89,17 @@ std::string side_of(std::size_t index, const OtherRuns& others) {
 constexpr CurveStyle kOthers[] = {CurveStyle::kSecond, CurveStyle::kFourth};
 static_assert(std::size(kOthers) == kMostOthers);
 
+/// What the robot picked up and dropped while it is drawn.
+void add_payloads(const RunData& run, const std::string& side, Figure& figure) {
+  std::string labels[] = {"payload picked up" + side, "payload dropped" + side};
+  for (const PayloadMark& one : run.payloads) {
+    const bool seen = one.time_s >= run.time_s.front() && one.time_s <= run.time_s.back();
+    if (!seen || !run.is_drawn(one.time_s)) continue;
+    figure.marks.push_back(
+        {std::exchange(labels[one.dropped ? 1 : 0], ""), run.drawn(one.time_s), false});
+  }
+}
+
 /// What every figure over time has: its axis, and where runs had faults. The spike of one that
 /// stopped a run may be there before the loop knows of the fault: it does not widen the plots.
 void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
@@ -97,6 +108,7 @@ void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
   for (std::size_t i = 0; i <= others.size(); ++i) {
     const RunData& one = i == 0 ? run : *others[i - 1];
     const RunFault* const stop = one.stop();
+    add_payloads(one, side_of(i, others), figure);
     std::string reported = "fault, reported" + side_of(i, others);
     for (std::size_t f = 0; f < std::min(kFaultsShown, one.faults.size()); ++f) {
       const RunFault& fault = one.faults[f];
@@ -142,7 +154,7 @@ double gravity_m_s2(const RunData& run) {
   return std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
 }
 
-/// Weight of everything that moves [N].
+/// Weight of everything that moves [N]: as the run says it where its plant was another one.
 double weight_N(const RunData& run) {
   double mass_kg = 0.0;
   for (const model::Body& body : run.tree.bodies) mass_kg += body.inertia.mass_kg;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <string>
 #include <vector>
@@ -122,6 +123,25 @@ void change_joints(TomlTable joints, sim::PlantChanges& plant) {
   if (none) plant.zero_error_rad.clear();
 }
 
+/// ", from 5 s to 9 s"; nothing of what is there for good.
+std::string times_text(const PayloadTimes& times) {
+  const auto seconds = [](const char* before, double value) {
+    char text[40];
+    std::snprintf(text, sizeof text, "%s%.6g s", before, value);
+    return std::string(text);
+  };
+  return ", " + (times.from_s > 0.0 ? seconds("from ", times.from_s) : "from the start") +
+         (times.until_s ? seconds(" to ", *times.until_s) : "");
+}
+
+/// "link panda_link4: mass_kg = 3", as the table says it.
+void note(const std::string& what, const TomlTable& table, sim::PlantChanges& plant) {
+  std::string keys;
+  for (const auto& [key, value] : table.values())
+    keys += (keys.empty() ? "" : ", ") + key + " = " + value;
+  plant.differences.push_back(what + ": " + keys);
+}
+
 /// What is there for good is a part of the tree.
 void add_payload(TomlTable& table, const model::Tree& described, std::vector<std::string>& names,
                  sim::PlantChanges& plant) {
@@ -136,12 +156,17 @@ void add_payload(TomlTable& table, const model::Tree& described, std::vector<std
   if (times.until_s && !(*times.until_s > times.from_s))
     table.error("until_s", "it is dropped before it is picked up", "give more than from_s");
   if (payload.link < 0 || table.has_errors()) return;
+  payload.number = static_cast<std::uint32_t>(names.size());
+  plant.payloads.resize(names.size());
+  plant.payloads.back() = times.name + ", " + sim::words_of(payload, described);
+  plant.differences.push_back("payload " + plant.payloads.back() + times_text(times));
   if (times.from_s > 0.0 || times.until_s) {
     payload.start_ns = whole_ns(times.from_s);
     if (times.until_s) payload.duration_ns = whole_ns(*times.until_s - times.from_s);
     plant.carried.push_back(payload);
     return;
   }
+  plant.kept.push_back(payload);
   model::Link& link = plant.tree.links[static_cast<std::size_t>(payload.link)];
   model::Body& body = plant.tree.bodies[static_cast<std::size_t>(link.body)];
   const model::Inertia more = sim::load_of(payload).in_link;
@@ -171,6 +196,10 @@ std::shared_ptr<const sim::PlantChanges> read_plant_changes(TomlTable sim,
   plant->tree = description->tree;
   if (sim.has("link")) change_links(sim.table("link"), files, *plant);
   if (sim.has("joint")) change_joints(sim.table("joint"), *plant);
+  for (const char* const what : {"link", "joint"}) {
+    TomlTable all = sim.table_or_empty(what);
+    for (const std::string& name : all.keys()) note(what + (" " + name), all.table(name), *plant);
+  }
   std::vector<std::string> names;
   for (TomlTable& table : sim.tables("payload"))
     add_payload(table, description->tree, names, *plant);

@@ -283,7 +283,12 @@ Result<std::unique_ptr<log::Recorder>> open_log(const WiredComposition& c,
   auto claimed = claim_file(folder, name);
   if (!claimed) return std::unexpected(claimed.error());
   auto& [path, file] = *claimed;
-  return log::Recorder::open(std::move(file), path, info_of(c), options);
+  auto recorder = log::Recorder::open(std::move(file), path, info_of(c), options);
+  if (recorder && c.sim != nullptr) {
+    (*recorder)->name_payloads(
+        [sim = c.sim](std::uint32_t number) { return sim->robot().payload_text(number); });
+  }
+  return recorder;
 }
 
 }  // namespace tandem::apps
