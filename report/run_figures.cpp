@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <numeric>
 #include <utility>
@@ -156,6 +157,8 @@ double gravity_m_s2(const RunData& run) {
 
 /// Weight of everything that moves [N]: as the run says it where its plant was another one.
 double weight_N(const RunData& run) {
+  const std::string said = log::value_of(run.result, "weight_N");
+  if (!said.empty()) return std::strtod(said.c_str(), nullptr);
   double mass_kg = 0.0;
   for (const model::Body& body : run.tree.bodies) mass_kg += body.inertia.mass_kg;
   return mass_kg * gravity_m_s2(run);

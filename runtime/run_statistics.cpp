@@ -121,7 +121,8 @@ void RunStatistics::take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT
     if (foot.touching == 0) continue;
     slip_m_ = std::max(slip_m_, std::hypot(at[0] - foot.anchor_x, at[1] - foot.anchor_y));
   }
-  ++free_cycles_;
+  free_to_ns_ = truth.time_ns()[0];
+  if (free_cycles_++ == 0) free_from_ns_ = free_to_ns_;
 }
 
 void RunStatistics::take_base(const hal::TruthImage* truth) noexcept TANDEM_RT {
@@ -157,7 +158,8 @@ std::optional<WorkFigures> RunStatistics::work(double period_s) const {
 
 std::optional<GroundFigures> RunStatistics::ground(double weight_N) const {
   if (free_cycles_ == 0 || feet_.empty()) return std::nullopt;
-  return GroundFigures{weight_N, force_sum_N_ / static_cast<double>(free_cycles_), slip_m_};
+  return GroundFigures{weight_N, force_sum_N_ / static_cast<double>(free_cycles_), slip_m_,
+                       free_from_ns_, free_to_ns_};
 }
 
 std::optional<BaseFigures> RunStatistics::base() const {

@@ -279,7 +279,7 @@ class Session {
   }
 
   void close_log() {
-    if (recorder_ != nullptr) (void)recorder_->close(result_of(c_.master));
+    if (recorder_ != nullptr) (void)recorder_->close(result_of(c_, *cycle_));
   }
 
   /// The loop was given up. Its thread is still there, and may go on at any time: what it uses
@@ -313,7 +313,7 @@ class Session {
     }
     if (services_ != nullptr) summary.dds->services = services_->counts();
     if (recorder_ != nullptr) {
-      log::StringMap result = result_of(c_.master);
+      log::StringMap result = result_of(c_, *cycle_);
       std::string later;  // plugins that came during the run
       const std::vector<std::string> code = controller_lines(*c_.controllers);
       for (std::size_t i = plugins_at_start_; i < code.size(); ++i) later += code[i] + "\n";
