@@ -68,6 +68,9 @@ bool has_numbers(const std::vector<double>& values) {
   return std::ranges::any_of(values, [](double value) { return std::isfinite(value); });
 }
 
+/// Whether nobody knows where the base was.
+bool unplaced(const RunData& run) { return run.robot.model.floating_base && !run.motion_known(); }
+
 bool legged(const RunData& run) { return !run.robot.contact.feet.empty(); }
 
 Curve curve_of(const RunData& run, std::string label, CurveStyle style,
@@ -231,6 +234,7 @@ Figure force_figure(const RunData& run, const OtherRuns& others, const std::vect
   figure.title = sensors.empty() ? "Vertical force of the ground on the feet (simulated)"
                                  : fmt::format("Vertical force in the {}six-axis sensors",
                                                legged(run) ? "legs' " : "");
+  if (!sensors.empty() && unplaced(run)) figure.title += ", the base taken as upright";
   add_time(run, others, figure);
   figure.y_label = "force [N]";
   const std::size_t shown =
@@ -296,12 +300,25 @@ std::size_t nearest_row(const std::vector<double>& values, double wanted, std::s
   return best;
 }
 
+/// How high the base was at every row; where nobody knows, above its feet. Empty: it has none.
+std::vector<double> base_height(const RunData& run) {
+  if (!run.robot.model.floating_base) return {};
+  if (!unplaced(run)) return run.base[2];
+  std::vector<double> height_m;
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    const PostureSample sample{"", run.time_s[row], {}, run.positions(row)};
+    const std::optional<double> foot_m = lowest_foot_m(run.tree, run.robot, sample);
+    if (!foot_m) return {};
+    height_m.push_back(-*foot_m);
+  }
+  return height_m;
+}
+
 /// Whether the base goes down, and not only gives way: by more than a fiftieth of its height.
-bool squats(const RunData& run) {
-  if (!run.truth() || !run.robot.model.floating_base) return false;
-  const auto first = run.base[2].begin();
-  const auto [low, high] =
-      std::minmax_element(first, first + static_cast<std::ptrdiff_t>(run.rows_before_stop()));
+bool squats(const std::vector<double>& height_m, std::size_t rows) {
+  if (height_m.empty()) return false;
+  const auto first = height_m.begin();
+  const auto [low, high] = std::minmax_element(first, first + static_cast<std::ptrdiff_t>(rows));
   return *high - *low > 0.02 * std::abs(*first);
 }
 
@@ -309,8 +326,9 @@ bool squats(const RunData& run) {
 /// `joint`'s position.
 /// @param suffix  behind each label, when two runs stand beside each other: then fewer moments.
 std::vector<PostureSample> moments(const RunData& run, int joint, const std::string& suffix) {
-  const bool base = squats(run);
-  const std::vector<double>& whole = base ? run.base[2] : run.position_rad[at(joint)];
+  const std::vector<double> height_m = base_height(run);
+  const bool base = squats(height_m, run.rows_before_stop());
+  const std::vector<double>& whole = base ? height_m : run.position_rad[at(joint)];
   std::vector<std::size_t> rows;  // that are drawn
   std::vector<double> depth;
   for (std::size_t row = 0; row < run.rows_before_stop(); ++row) {
@@ -322,8 +340,8 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   if (rows.empty()) return samples;
   const auto add = [&](const char* what, std::size_t shown) {
     const std::size_t row = rows[shown];
-    samples.push_back(
-        {what + suffix, run.drawn(run.time_s[row]), run.base_placement(row), run.positions(row)});
+    samples.push_back({what + suffix, run.drawn(run.time_s[row]), run.base_placement(row),
+                       run.positions(row), !unplaced(run)});
   };
   const std::size_t last = depth.size() - 1;
   const double start = depth.front();
