@@ -93,13 +93,17 @@ TEST(LogFileOfAStart, LeavesTheCellsOfWhatWasNeverMeasuredEmpty) {
       .robot = "two", .joints = {"hip", "knee"}, .sensors = {{"imu", 1}}, .period_ns = 1000};
   auto recorder = Recorder::open(folder / "run.mcap", info, {});
   ASSERT_TRUE(recorder);
-  hal::Layout layout;
+  hal::Layout layout, commanded;
   layout.add("cycle", hal::FieldType::kU64, 1, "");
   layout.add("position_rad", hal::FieldType::kF64, 2, "");
   layout.add("sensor", hal::FieldType::kF64, 1, "");
   layout.add("age_cycles", hal::FieldType::kU32, 2, "");
   layout.add("sensor_age_cycles", hal::FieldType::kU32, 1, "");
+  commanded.add("cycle", hal::FieldType::kU64, 1, "");
+  commanded.add("position_rad", hal::FieldType::kF64, 2, "");
+  commanded.add("torque_nm", hal::FieldType::kF64, 2, "");
   const auto channel = (*recorder)->add_channel("/tandem/state", "tandem/msg/State", layout);
+  const auto command = (*recorder)->add_channel("/tandem/command", "tandem/msg/Command", commanded);
   (*recorder)->start();
   for (std::uint32_t cycle = 0; cycle < 3; ++cycle) {
     struct {
@@ -111,6 +115,11 @@ TEST(LogFileOfAStart, LeavesTheCellsOfWhatWasNeverMeasuredEmpty) {
               {cycle < 1 ? cycle + 1 : 0, cycle + 1, cycle < 2 ? cycle + 1 : 1, 0}};
     (*recorder)->push(channel, cycle * 1'000'000,
                       std::as_bytes(std::span(&message, 1)).first(layout.bytes()));
+    const struct {
+      std::uint64_t cycle;
+      double numbers[4];
+    } sent{cycle, {cycle < 1 ? 0.0 : 0.5, 0.0, 0.0, 1.0}};
+    (*recorder)->push(command, cycle * 1'000'000, std::as_bytes(std::span(&sent, 1)));
   }
   const std::string path = (*recorder)->close().path;
   const auto log = LogFile::open(path);
@@ -123,6 +132,13 @@ TEST(LogFileOfAStart, LeavesTheCellsOfWhatWasNeverMeasuredEmpty) {
       "sensor_age_cycles.imu\n"
       "0.001,1,0.5,,,0,2,2\n"
       "0.002,2,0.5,,0.25,0,3,1\n");
+  // A command repeats what is measured: its zeros stood for it before anything was.
+  out.str("");
+  ASSERT_TRUE(write_csv(*log, "/tandem/command", 1, out));
+  EXPECT_EQ(out.str(),
+            "time_s,cycle,position_rad.hip,position_rad.knee,torque_nm.hip,torque_nm.knee\n"
+            "0.001,1,0.5,,0,1\n"
+            "0.002,2,0.5,,0,1\n");
 }
 
 TEST_F(LogFileOfThree, WritesOnlyTheFieldsAskedFor) {
