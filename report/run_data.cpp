@@ -156,9 +156,14 @@ Result<log::TimeSeries> state_columns(const log::LogFile& file, const char* topi
                                       const RunData& run) {
   const std::size_t n = run.robot.joints.size();
   const std::size_t channels = run.first_channel(run.robot.sensors.size());
-  return read_columns(
-      file, topic,
-      {{"position_rad", n}, {"velocity_rad_s", n}, {"torque_nm", n}, {"sensor", channels}});
+  const log::LoggedTopic* const state = file.find(topic);  // a recording of others has no faults
+  const bool faults = state != nullptr && state->layout.find("fault") != nullptr;
+  return read_columns(file, topic,
+                      {{"position_rad", n},
+                       {"velocity_rad_s", n},
+                       {"torque_nm", n},
+                       {"sensor", channels},
+                       {"fault", faults ? n : 0}});
 }
 
 /// What was measured in the window.
@@ -174,6 +179,7 @@ Status read_rows(log::TimeSeries& table, const log::RunWindow& window, RunData& 
   run.velocity_rad_s = take(table, n, n);
   run.torque_Nm = take(table, 2 * n, n);
   run.sensor = take(table, 3 * n, channels);
+  run.drive_fault = take(table, 3 * n + channels, table.columns.size() - 3 * n - channels);
   return {};
 }
 
@@ -252,8 +258,8 @@ void resize_rows(RunData& run, std::size_t rows) {
   run.time_s.resize(rows);
   for (Columns* columns :
        {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm, &run.reference_rad, &run.sensor,
-        &run.base, &run.foot_position_m, &run.foot_force_N, &run.foot_moment_Nm, &run.loop_error,
-        &run.passive_rad}) {
+        &run.drive_fault, &run.base, &run.foot_position_m, &run.foot_force_N, &run.foot_moment_Nm,
+        &run.loop_error, &run.passive_rad}) {
     for (std::vector<double>& column : *columns) column.resize(rows);
   }
 }
@@ -346,6 +352,16 @@ std::vector<double> RunData::positions(std::size_t row) const {
   for (const std::vector<double>& joint : position_rad) q.push_back(joint[row]);
   for (const std::vector<double>& joint : passive_rad) q.push_back(joint[row]);
   return q;
+}
+
+std::vector<double> RunData::measured(const Columns& columns, std::size_t joint) const {
+  constexpr double kNoNumber = 0x7300;  // CiA 402: a sensor
+  std::vector<double> values = columns[joint];
+  for (std::size_t row = 0; !drive_fault.empty() && row < values.size(); ++row) {
+    if (drive_fault[joint][row] == kNoNumber)
+      values[row] = std::numeric_limits<double>::quiet_NaN();
+  }
+  return values;
 }
 
 bool RunData::slides(std::size_t joint) const {

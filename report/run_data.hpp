@@ -84,6 +84,7 @@ struct RunData {
   Columns position_rad, velocity_rad_s, torque_Nm;                 ///< [joint][row], measured
   Columns reference_rad;    ///< [joint][row]; NaN when not under position control
   Columns sensor;           ///< [channel][row], all sensors one after another
+  Columns drive_fault;      ///< [joint][row]: error codes; empty: the log has none
   Columns base;             ///< [13][row]: position, quaternion xyzw, velocity of the base
                             ///< in its frame; by the truth or, without it, by the run's
                             ///< estimate; empty without either
@@ -111,6 +112,9 @@ struct RunData {
   [[nodiscard]] model::Placement base_placement(std::size_t row) const;
   /// Every joint's position at a row, in the image's order, then the passive ones'.
   [[nodiscard]] std::vector<double> positions(std::size_t row) const;
+  /// A joint's column without what its board repeats while one of its sensors gives no number
+  /// (NaN).
+  [[nodiscard]] std::vector<double> measured(const Columns& columns, std::size_t joint) const;
   /// Whether a joint (image) is prismatic: its columns are m, m/s and N then.
   [[nodiscard]] bool slides(std::size_t joint) const;
   bool estimated = false;  ///< base, foot forces and moments are the run's estimate

@@ -143,10 +143,12 @@ Figure position_figure(const RunData& run, const OtherRuns& others, const Subjec
   const double factor = slides ? kMillimetres : kDegrees;
   figure.y_label = slides ? "position [mm]" : "position [deg]";
   figure.curves.push_back(curve_of(run, name_of_state(run) + side_of(0, others),
-                                   CurveStyle::kMeasured, run.position_rad[joint], factor));
+                                   CurveStyle::kMeasured, run.measured(run.position_rad, joint),
+                                   factor));
   for (std::size_t i = 0; i < others.size(); ++i) {
     figure.curves.push_back(curve_of(*others[i], name_of_state(*others[i]) + side_of(i + 1, others),
-                                     kOthers[i], others[i]->position_rad[joint], factor));
+                                     kOthers[i],
+                                     others[i]->measured(others[i]->position_rad, joint), factor));
   }
   figure.curves.push_back(curve_of(run, "reference" + side_of(0, others), CurveStyle::kReference,
                                    run.reference_rad[joint], factor));
@@ -274,10 +276,11 @@ Figure torque_figure(const RunData& run, const OtherRuns& others, const Subjects
   add_time(run, others, figure);
   figure.y_label = slides ? "force [N]" : "torque [Nm]";
   figure.curves.push_back(curve_of(run, name_of_state(run) + side_of(0, others),
-                                   CurveStyle::kMeasured, run.torque_Nm[joint], 1.0));
+                                   CurveStyle::kMeasured, run.measured(run.torque_Nm, joint), 1.0));
   for (std::size_t i = 0; i < others.size(); ++i) {
     figure.curves.push_back(curve_of(*others[i], name_of_state(*others[i]) + side_of(i + 1, others),
-                                     kOthers[i], others[i]->torque_Nm[joint], 1.0));
+                                     kOthers[i], others[i]->measured(others[i]->torque_Nm, joint),
+                                     1.0));
   }
   if (kernels == nullptr) return figure;
   Result<Curve> computed = inverse_dynamics_curve(run, subjects.torque_of, *kernels);
