@@ -64,6 +64,28 @@ void nothing_given(TomlTable& table) {
   if (table.keys().empty()) table.error("", "changes nothing", "give a key, or remove it");
 }
 
+/// An error of the changed description, at the link's table or key that says so.
+void place(const Error& error, TomlTable& links) {
+  constexpr std::string_view kOwn = "sim.link.", kLink = "link ";
+  const bool own = error.key.starts_with(kOwn);
+  const std::string name = own                            ? error.key.substr(kOwn.size())
+                           : error.key.starts_with(kLink) ? error.key.substr(kLink.size())
+                                                          : "";
+  // A robot.toml's inertias can be repaired. These are what somebody has just written.
+  const std::string hint = error.hint.substr(0, error.hint.find("; inertia = \"repair\""));
+  if (name.empty() || !links.has(name))
+    return links.error("", error.key + ": " + error.message, hint);
+  TomlTable at = links.table(name);
+  const auto about = [&](std::string_view key, std::string_view word) {
+    return at.has(key) && error.message.find(word) != std::string::npos;
+  };
+  const char* const key = about("inertia_kg_m2", "inertia")  ? "inertia_kg_m2"
+                          : about("com_m", "centre of mass") ? "com_m"
+                          : about("mass_kg", "mass")         ? "mass_kg"
+                                                             : "";
+  at.error(key, error.message, hint);
+}
+
 /// The description once more, with the links' masses in place of its own.
 void change_links(TomlTable links, const robot::FileTexts& files, sim::PlantChanges& plant) {
   std::vector<hal::LinkConfig>& all = plant.robot.model.links;
@@ -79,11 +101,7 @@ void change_links(TomlTable links, const robot::FileTexts& files, sim::PlantChan
     plant.tree = model->tree;
     return;
   }
-  for (const Error& error : model.error()) {
-    const bool own = error.key.starts_with("sim.link.");
-    TomlTable at = own ? links.table(error.key.substr(9)) : links;
-    at.error("", own ? error.message : error.key + ": " + error.message, error.hint);
-  }
+  for (const Error& error : model.error()) place(error, links);
 }
 
 void change_joint(TomlTable table, const std::string& name, sim::PlantChanges& plant) {
@@ -103,6 +121,13 @@ void change_joint(TomlTable table, const std::string& name, sim::PlantChanges& p
   ActuatorConfig own = robot.actuator_of(*joint);
   EncoderChange encoder;
   read_keys(table, kActuator, own);
+  for (const char* const key : {"spring_Nm_rad", "spring_damping_Nms_rad"}) {
+    if (own.order >= 2 || !table.has(key)) continue;
+    table.error(key,
+                "changes nothing: " + joint->actuator + " of " + robot.file + " is rigid (order " +
+                    std::to_string(own.order) + ")",
+                "leave it out; actuators of order 2 and 3 have a spring");
+  }
   read_keys(table, kEncoder, encoder);
   table.finish();
   own.name = table.path();  // no other actuator's

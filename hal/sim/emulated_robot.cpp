@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "base/archive.hpp"
 #include "base/nearest.hpp"
@@ -138,6 +139,24 @@ Error placed(Error error, const hal::RobotConfig& robot) {
   return error;
 }
 
+// A sub-step that is short enough for the described robot is not what is wrong.
+Error blamed(Error error, const hal::RobotConfig& robot, const tandem_kernels* kernels,
+             const PlantConfig& plant, const Plant& body, SimRobotConfig config) {
+  const std::shared_ptr<const PlantChanges> changes = std::exchange(config.changes, nullptr);
+  if (changes == nullptr || changes->differences.empty()) return error;
+  const Result<PlantConfig> described = plant_config(robot, kernels, config);
+  const Result<Plant> as_described =
+      described ? Plant::create(*described) : std::unexpected(described.error());
+  if (!as_described || !check_step(robot, *described, *as_described)) return error;
+  const std::string step = std::to_string(config.substep_ns) + " ns";
+  const std::string& first = changes->differences.front();
+  return {.message = "makes a sub-step of " + step + " unstable at " +
+                     longest_step(plant, body).place + ": the plant is other in " + first,
+          .hint = "check its numbers; as the robot's files have it, " + step + " is short enough",
+          .file = {},
+          .key = "sim." + first.substr(0, first.find(' '))};
+}
+
 Status named(Status status, const std::string& key) {
   if (!status)
     status.error().key = key + (status.error().key.empty() ? "" : ".") + status.error().key;
@@ -172,7 +191,7 @@ Result<std::unique_ptr<EmulatedRobot>> EmulatedRobot::create(const hal::RobotCon
   Result<Plant> body = Plant::create(*plant);
   if (!body) return std::unexpected(placed(body.error(), robot));
   if (Status status = check_step(robot, *plant, *body); !status)
-    return std::unexpected(status.error());
+    return std::unexpected(blamed(status.error(), robot, kernels, *plant, *body, config));
   Result<Sensors> sensors = Sensors::create(robot, *kernels);
   if (!sensors) return std::unexpected(sensors.error());
 
