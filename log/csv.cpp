@@ -47,7 +47,7 @@ Status write_events(const LogFile& log, std::ostream& out) {
 }
 
 /// The topic's fields that `names` asks for; all when it asks for none.
-Result<std::vector<const hal::Field*>> choose(const LoggedTopic* topic,
+Result<std::vector<const hal::Field*>> choose(const LogFile& log, const LoggedTopic* topic,
                                               std::span<const std::string> names) {
   std::vector<const hal::Field*> chosen;
   if (topic == nullptr) return chosen;  // for_each() says so
@@ -60,8 +60,10 @@ Result<std::vector<const hal::Field*>> choose(const LoggedTopic* topic,
   }
   for (const std::string& name : names) {
     if (std::ranges::find(known, name) != known.end()) continue;
-    return fail("the topic '" + topic->name + "' has no field '" + name + "'",
-                suggest(name, known));
+    const std::string why = log.left_out(topic->name, name);
+    return fail("the topic '" + topic->name + "' has no field '" + name + "'" +
+                    (why.empty() ? "" : ": " + why),
+                why.empty() ? suggest(name, known) : "");
   }
   return chosen;
 }
@@ -85,7 +87,7 @@ Status write_csv(const LogFile& log, const std::string& topic, std::size_t every
     return fail("the messages of '" + topic + "' are no numbers of a fixed count",
                 "take another topic, /tandem/state for one, or a ROS viewer");
   }
-  const auto chosen = choose(found, fields);
+  const auto chosen = choose(log, found, fields);
   if (!chosen) return std::unexpected(chosen.error());
   if (found != nullptr) out << header(*chosen, log.info()) << "\n";
   Result<Unmeasured> unknown = found == nullptr ? Unmeasured() : Unmeasured::of(log, *found);

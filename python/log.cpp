@@ -159,6 +159,14 @@ void add_log(py::module_& module) {
       .def_property_readonly("truncated", [](const Log& log) { return log.file().truncated(); })
       .def_property_readonly("data_sha256", [](const Log& log) { return log.file().data_sha256(); })
       .def("channels", &Log::channels)
+      .def("full_name",
+           [](const Log& log, const std::string& name) { return log.file().full_name(name); })
+      .def(
+          "left_out",
+          [](const Log& log, const std::string& topic, const std::string& field) {
+            return log.file().left_out(topic, field);
+          },
+          "topic"_a, "field"_a = "")
       .def("read", &Log::read, "channel"_a)
       .def("events", &Log::events);
 }

@@ -67,6 +67,30 @@ TEST_F(LogFileOfThree, SuggestsTheNearestNameOfATopicOrField) {
   EXPECT_FALSE(log.read("/tandem/state", {{"position_rad", 2}}));
 }
 
+// "squat" was as near to "/tandem/state" as to anything.
+TEST(LogFileOfController, FindsItsTopicsByTheirLastParts) {
+  const ScratchFolder folder;
+  auto recorder = Recorder::open(folder / "run.mcap", {.robot = "two"}, {});
+  ASSERT_TRUE(recorder);
+  hal::Layout layout;
+  layout.add("cycle", hal::FieldType::kU64, 1, "");
+  for (const char* topic : {"/tandem/state", "/tandem/controller/squat", "/tf", "/a/one", "/b/one"})
+    (void)(*recorder)->add_channel(topic, "tandem/msg/X", layout);
+  (*recorder)->start();
+  const auto log = LogFile::open((*recorder)->close().path);
+  ASSERT_TRUE(log);
+  EXPECT_EQ(log->full_name("state"), "/tandem/state");
+  EXPECT_EQ(log->full_name("squat"), "/tandem/controller/squat");
+  EXPECT_EQ(log->full_name("controller/squat"), "/tandem/controller/squat");
+  EXPECT_EQ(log->full_name("tf"), "/tf");
+  EXPECT_EQ(log->full_name("one"), "/tandem/one") << "there are two";
+  const auto hint = [&](const char* name) { return log->read(name, {}).error().hint; };
+  EXPECT_EQ(hint("/tandem/squat"), "did you mean '/tandem/controller/squat'?");
+  EXPECT_EQ(hint("/tandem/squta"), "did you mean '/tandem/controller/squat'?");
+  EXPECT_EQ(hint("/tandem/tf"), "did you mean '/tf'?");
+  EXPECT_EQ(hint("/tandem/stat"), "did you mean '/tandem/state'?");
+}
+
 TEST_F(LogFileOfThree, ReadsEverySecondMessage) {
   const auto table = open().read("/tandem/state", {{"sensor", 1}}, 2);
   ASSERT_TRUE(table);

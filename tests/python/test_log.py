@@ -79,6 +79,7 @@ def test_what_is_not_there_is_named(log_file):
     log = tandem.Log(log_file)
     with pytest.raises(KeyError, match="no such channel of .* 'stat'.*did you mean"):
         log["stat"]
+    assert log["tf"] is log["/tf"]
     with pytest.raises(tandem.UnknownName, match="did you mean 'position_rad'"):
         log["state"]["positon_rad"]
     with pytest.raises(AttributeError, match="no such field"):
