@@ -280,6 +280,20 @@ std::vector<std::string> close_and_remark(const std::vector<RunData*>& all,
   return remarks;
 }
 
+/// "A: coman-squat-001, B: coman-squat-002": what the letters in a picture mean.
+std::string letters_of(const RunData& run, const OtherRuns& others, bool parallel) {
+  if (parallel) return "A: the robot, B: the one beside it";
+  const auto stem = [](const RunData& one) {
+    return std::filesystem::path(one.path).stem().string();
+  };
+  bool distinct = true;
+  for (const RunData* one : others) distinct = distinct && stem(*one) != stem(run);
+  std::string text = "A: " + (distinct ? stem(run) : run.path);
+  for (std::size_t i = 0; i < others.size(); ++i)
+    text += fmt::format(",{}: {}", kSides[i + 1], distinct ? stem(*others[i]) : others[i]->path);
+  return text;
+}
+
 /// All figures of the report, in its order. `parallel`: the other run is the internal model.
 Result<std::vector<Figure>> draw_all(const RunData& run, const OtherRuns& others, bool parallel,
                                      const tandem_kernels* kernels,
@@ -296,6 +310,10 @@ Result<std::vector<Figure>> draw_all(const RunData& run, const OtherRuns& others
   for (auto* more : {&*wrenches, &*signals}) {
     figures.insert(figures.end() - 1, std::make_move_iterator(more->begin()),
                    std::make_move_iterator(more->end()));
+  }
+  if (!others.empty()) {
+    const std::string letters = letters_of(run, others, parallel);
+    for (Figure& figure : figures) figure.x_label += (figure.x_label.empty() ? "" : "; ") + letters;
   }
   for (Figure& figure : figures)
     if (!figure.equal_axes) break_at_gaps(figure);  // all but the posture are over time
