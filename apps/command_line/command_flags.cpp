@@ -233,7 +233,7 @@ CLI::Validator is_given(const std::string& hint) {
 }
 
 void add_target(CLI::App& app, ControlTarget& target) {
-  CLI::Option* socket = app.add_option("--socket", target.socket, kSocketHelp);
+  CLI::Option* socket = app.add_option("--socket", target.socket, kAskedSocketHelp);
   CLI::Option* dds =
       app.add_flag("--dds", target.dds, "Ask over DDS instead: the service tandem/ask")
           ->excludes(socket);

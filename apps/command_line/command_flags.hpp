@@ -13,6 +13,8 @@ inline constexpr char kJsonHelp[] =
     "Write the result as JSON (docs/json.md); '-' is standard output";
 inline constexpr char kSocketHelp[] =
     "Control socket (default: in $XDG_RUNTIME_DIR/tandem or /tmp/tandem-<uid>)";
+inline constexpr char kAskedSocketHelp[] =
+    "Control socket of the run to ask (default: the only one of this user, wherever it is)";
 
 inline constexpr char kNameAFile[] = "name a file, or leave it out";
 
