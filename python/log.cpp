@@ -89,7 +89,7 @@ class Log {
     }
     auto records = std::make_shared<Records>();
     {
-      Result<Records> read = [&] {
+      Result<Records> read = [&]() -> Result<Records> {
         const Away away;
         Result<Records> all = read_records(file_, *topic);
         if (!all) return all;

@@ -19,7 +19,7 @@ double mass_kg(const model::Tree& tree) {
   return sum;
 }
 
-/// Of the plant as it is: on the average, where that changes.
+/// The plant's as it is: on the average, where that changes.
 double weight_N(const WiredComposition& c, const runtime::GroundFigures& over) {
   double mass = c.kernels->mass_kg;
   if (c.sim != nullptr) {
