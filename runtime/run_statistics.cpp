@@ -175,7 +175,8 @@ EstimateFigures RunStatistics::estimate() const {
 void RunStatistics::archive(Archive& ar) {
   ar(errors_, limited_, cycles_, driving_W_, braking_W_, max_power_W_, powered_, feet_, loops_,
      base_cycles_, compared_, tilt_error_rad_, height_error_m_, external_Nm_, base_wrench_,
-     wrenches_, unexplained_Nm_, free_cycles_, force_sum_N_, slip_m_, base_, base_free_);
+     wrenches_, unexplained_Nm_, free_cycles_, force_sum_N_, slip_m_, free_from_ns_, free_to_ns_,
+     base_, base_free_);
 }
 
 }  // namespace tandem::runtime
