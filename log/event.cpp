@@ -29,8 +29,10 @@ std::string whose(const Event& event, const EventNames& names) {
     case hal::FaultTarget::kBoard: return named(" of board ", names.boards, event.value);
     case hal::FaultTarget::kSensor: return named(" of sensor ", names.sensors, event.value);
     case hal::FaultTarget::kBus: return named(" of bus ", names.buses, event.value);
-    default: return named(" of ", names.joints, event.joint);
+    default: break;
   }
+  const bool carries = event.kind == EventKind::kPickedUp || event.kind == EventKind::kDropped;
+  return carries ? "" : named(" of ", names.joints, event.joint);
 }
 
 // What a text says of an event's code and value: the column `detail` of the table.
@@ -83,6 +85,12 @@ std::string limited(const Event& event, const EventNames&) {
     case Code::kNotFinite: return ": it was not finite";
     default: return ": it was out of range";
   }
+}
+
+std::string payload(const Event& event, const EventNames& names) {
+  const std::string what = names.payload ? names.payload(event.code) : "";
+  if (event.kind == EventKind::kPickedUp || what.empty()) return what.empty() ? "" : ": " + what;
+  return ": " + what.substr(0, what.rfind(", "));  // its name, which says enough then
 }
 
 bool has_joint(const Event& event, const EventNames& names) {

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <iterator>
 #include <utility>
 
 #include "base/bounds.hpp"
 #include "base/nearest.hpp"
+#include "base/toml_reader.hpp"
 #include "log/mcap_reader.hpp"
 #include "log/schema.hpp"
 
@@ -42,6 +44,45 @@ bool fits(const LoggedTopic& topic, std::int64_t period_ns) {
   const double cycles = apart_ns / static_cast<double>(period_ns);
   return topic.messages < 2 || cycles / static_cast<double>(topic.messages) <=
                                    static_cast<double>(bounds::kReplayCycles.most);
+}
+
+/// What [log] of the experiment leaves out, in its own words; empty: not this.
+std::string left_out_by(TomlTable log, std::string_view topic, std::string_view field) {
+  constexpr std::string_view kViewers[] = {"joint_states", "tf", "tf_static", "robot_description"};
+  if (!field.empty()) {
+    const std::string whole = std::string(topic) + "." + std::string(field);
+    const auto without = log.texts_or("without", {});
+    return std::ranges::find(without, whole) != without.end() ? "without = [\"" + whole + "\"]"
+                                                              : "";
+  }
+  if (std::ranges::find(kViewers, topic) != std::end(kViewers))
+    return log.boolean_or("viewers", true) ? "" : "viewers = false";
+  const std::string key = std::string(topic) + "_every";
+  return log.has(key) && log.integer_or(key, 1, 0, 1'000'000) == 0 ? key + " = 0" : "";
+}
+
+/// The names of topics that end in "/`end`".
+std::vector<std::string> ending_in(const std::vector<LoggedTopic>& topics, std::string_view end) {
+  std::vector<std::string> names;
+  for (const LoggedTopic& topic : topics)
+    if (topic.name.ends_with("/" + std::string(end))) names.push_back(topic.name);
+  return names;
+}
+
+/// The topics that `name` may have meant.
+std::string suggest_topic(const std::string& name, const std::vector<LoggedTopic>& topics) {
+  std::string_view end = name;
+  for (const std::string_view lead : {"/tandem/", "/"})
+    if (end.starts_with(lead)) end.remove_prefix(lead.size());
+  std::vector<std::string> names = ending_in(topics, end), ends, all;
+  for (const LoggedTopic& topic : topics) {
+    all.push_back(topic.name);
+    for (auto at = topic.name.find('/'); at != std::string::npos; at = topic.name.find('/', at + 1))
+      ends.push_back(topic.name.substr(at + 1));
+  }
+  if (names.empty()) names = ending_in(topics, nearest(end, ends));
+  if (names.size() == 1) return "did you mean '" + names.front() + "'?";
+  return suggest(name, names.empty() ? all : names);
 }
 
 constexpr char kCutHint[] = "its run was killed, or the copy is not whole: copy it again";
@@ -255,9 +296,29 @@ Result<const LoggedTopic*> LogFile::require(const std::string& name) const {
                                   " bytes, before a message of '" + name + "'",
                               kCutHint));
   }
-  std::vector<std::string> names;
-  for (const LoggedTopic& topic : topics_) names.push_back(topic.name);
-  return std::unexpected(at(path_, "has no topic '" + name + "'", suggest(name, names)));
+  const std::string why = left_out(name);
+  return std::unexpected(at(path_, "has no topic '" + name + "'" + (why.empty() ? "" : ": " + why),
+                            why.empty() ? suggest_topic(name, topics_) : ""));
+}
+
+std::string LogFile::full_name(const std::string& name) const {
+  if (find(name) != nullptr || name.starts_with('/')) return name;
+  for (const std::string lead : {"/tandem/", "/"})
+    if (find(lead + name) != nullptr) return lead + name;
+  const std::vector<std::string> names = ending_in(topics_, name);
+  return names.size() == 1 ? names.front() : "/tandem/" + name;
+}
+
+std::string LogFile::left_out(std::string_view topic, std::string_view field) const {
+  for (const auto& [file, text] : info_.configuration) {
+    if (!file.ends_with(".toml")) continue;
+    const Result<TomlDocument> document = TomlDocument::parse(text, file);
+    if (!document || !document->root().has("robot")) continue;
+    const std::string_view last = topic.substr(topic.rfind('/') + 1);
+    const std::string key = left_out_by(document->root().table_or_empty("log"), last, field);
+    return key.empty() ? "" : "this log leaves it out ([log] " + key + ")";
+  }
+  return {};
 }
 
 Status LogFile::for_each(
@@ -296,8 +357,10 @@ Result<TimeSeries> LogFile::read(const std::string& name, const std::vector<Colu
     if (field == nullptr) {
       std::vector<std::string> names;
       for (const hal::Field& one : (*topic)->layout.fields()) names.push_back(one.name);
+      const std::string why = left_out(name, column.field);
       return std::unexpected(
-          at(path_, name + " has no field '" + column.field + "'", suggest(column.field, names)));
+          at(path_, name + " has no field '" + column.field + "'" + (why.empty() ? "" : ": " + why),
+             why.empty() ? suggest(column.field, names) : ""));
     }
     if (column.index >= field->count) {
       return std::unexpected(at(path_, column.field + " of " + name + " has only " +

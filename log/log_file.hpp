@@ -69,9 +69,14 @@ class LogFile {
   [[nodiscard]] const StringMap& result() const { return result_; }
   [[nodiscard]] const std::vector<LoggedTopic>& topics() const { return topics_; }
   [[nodiscard]] const LoggedTopic* find(std::string_view topic) const;
-  /// The same. Error: the log has no such topic, or is cut before
-  /// its first message.
+  /// The same. Error: the log has no such topic, leaves it out, or is cut before its first message.
   [[nodiscard]] Result<const LoggedTopic*> require(const std::string& topic) const;
+  /// The topic that `name` names: leading parts may be left out, of "/tandem/" first, where what is
+  /// left names one alone. One that the log does not have: as below /tandem.
+  [[nodiscard]] std::string full_name(const std::string& name) const;
+  /// "this log leaves it out ([log] state_every = 0)"; empty: its experiment does not say so.
+  /// @param field  of the topic; empty: the topic as a whole
+  [[nodiscard]] std::string left_out(std::string_view topic, std::string_view field = {}) const;
   /// True when the run was killed: the data, or those of a part, end where its last chunk ended.
   [[nodiscard]] bool truncated() const;
   /// The files' size.

@@ -110,6 +110,10 @@ class Recorder {
   void name_controllers(std::function<std::string(std::size_t)> name) {
     names_.controller = std::move(name);
   }
+  /// Who knows what the robot carries, the same way.
+  void name_payloads(std::function<std::string(std::uint32_t)> name) {
+    names_.payload = std::move(name);
+  }
   /// No more channels but late ones: allocates the ring and starts the writer's thread.
   void start();
 

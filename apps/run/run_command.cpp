@@ -288,7 +288,7 @@ class Session {
   }
 
   void close_log() {
-    if (recorder_ != nullptr) (void)recorder_->close(result_of(c_.master));
+    if (recorder_ != nullptr) (void)recorder_->close(result_of(c_, *cycle_));
   }
 
   /// The loop was given up. Its thread is still there, and may go on at any time: what it uses
@@ -322,7 +322,7 @@ class Session {
     }
     if (services_ != nullptr) summary.dds->services = services_->counts();
     if (recorder_ != nullptr) {
-      log::StringMap result = result_of(c_.master);
+      log::StringMap result = result_of(c_, *cycle_);
       for (auto& later : runtime::loaded_later(*c_.controllers, plugins_at_start_))
         result.push_back(std::move(later));
       summary.log = recorder_->close(result);

@@ -151,14 +151,8 @@ Status print_fields(const log::LogFile& file, const std::string& name, std::FILE
   return {};
 }
 
-/// "state" and "/tandem/state" name the same topic.
-std::string full_topic(const std::string& name) {
-  if (name.empty()) return "/tandem/state";
-  return name.starts_with('/') ? name : "/tandem/" + name;
-}
-
 Status write_csv(const log::LogFile& file, const LogOptions& options) {
-  const std::string topic = full_topic(options.topic);
+  const std::string topic = file.full_name(options.topic.empty() ? "state" : options.topic);
   if (options.output.empty()) {
     errno = 0;
     Status written = log::write_csv(file, topic, options.every, std::cout, options.fields);
@@ -277,7 +271,7 @@ Exit log_command(const LogOptions& options) {
     if (compared) exit = *compared;
     if (!compared) done = std::unexpected(compared.error());
   } else if (!options.topic.empty()) {
-    done = print_fields(*file, full_topic(options.topic), human_output(options.json));
+    done = print_fields(*file, file->full_name(options.topic), human_output(options.json));
     if (done) done = write_json(options.json, figures_json(&*file));
   } else {
     const Json json = figures_json(&*file);

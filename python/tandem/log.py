@@ -124,6 +124,9 @@ class Channel(Sealed):
     def __getitem__(self, name: str) -> Column:
         full = self._short.get(name, name.lower())
         if self.fields and full not in self._elements:
+            why = self._file.left_out(self.name, full)
+            if why:
+                raise _native.UnknownName(f"no such field of {self.name} '{name}': {why}")
             _native.unknown(f"field of {self.name}", name, self.fields)
         return self._read()[full]
 
@@ -140,6 +143,11 @@ class Channel(Sealed):
 
     def __repr__(self) -> str:
         return f"<{self.name}: {self.messages} messages, {', '.join(self.fields)}>"
+
+
+def _short_name(channel: str) -> str:
+    """Without the leading parts that a name may leave out in any log."""
+    return channel[len("/tandem/") :] if channel.startswith("/tandem/") else channel[1:]
 
 
 class Log(Sealed):
@@ -183,11 +191,14 @@ class Log(Sealed):
         return self._events
 
     def __getitem__(self, name: str) -> Channel:
-        """A channel by its full name, or by the last part of it: "state"."""
-        for known in (name, "/tandem/" + name, "/" + name):
-            if known in self._channels:
-                return self._channels[known]
-        _native.unknown("channel of " + self.path, name, [c.rpartition("/")[2] for c in self.channels])
+        """A channel by its full name, or by the last parts of it: "state", "squat"."""
+        full = self._file.full_name(name)
+        if full in self._channels:
+            return self._channels[full]
+        why = self._file.left_out(full)
+        if why:
+            raise _native.UnknownName(f"no such channel of {self.path} '{name}': {why}")
+        _native.unknown("channel of " + self.path, name, [_short_name(c) for c in self.channels])
         raise AssertionError
 
     def __iter__(self) -> Iterator[Channel]:

@@ -37,9 +37,21 @@ def test_names_units_and_shapes(log_file):
     assert position.shape == np.asarray(position).shape == (log["state"].messages, 2)
     assert log["state"].units["temperature_c"] == "degC"
     assert np.allclose(np.diff(log["state"].time_s), 1e-3)
-    assert log["state"].cycle[5, 0] == 5 and position[10, 1] == position["joint2"][10]
+    assert log["state"].cycle[5, 0] == 5 and position[1000, 1] == position["joint2"][1000]
     assert log.info["seed"] == "1" and any("robot.toml" in path for path in log.configuration)
     assert not log.truncated and len(log.data_sha256) == 64
+
+
+def test_what_was_not_measured_yet_is_no_number(log_file):
+    log = tandem.Log(log_file)
+    state, command = log["state"], log["command"]
+    never = state.age_cycles.values > state.cycle.values
+    assert never.any() and not never.all()
+    for column in (state.position, state.torque, state.velocity):
+        assert np.array_equal(np.isnan(column.values), never)
+    assert np.array_equal(np.isnan(command.position.values), never)
+    assert not np.isnan(command.torque.values).any()
+    assert not np.isnan(log["truth"].position.values).any()
 
 
 def test_events_are_a_list(log_file):
@@ -68,6 +80,7 @@ def test_what_is_not_there_is_named(log_file):
     log = tandem.Log(log_file)
     with pytest.raises(KeyError, match="no such channel of .* 'stat'.*did you mean"):
         log["stat"]
+    assert log["tf"] is log["/tf"]
     with pytest.raises(tandem.UnknownName, match="did you mean 'position_rad'"):
         log["state"]["positon_rad"]
     with pytest.raises(AttributeError, match="no such field"):
