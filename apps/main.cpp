@@ -1,14 +1,18 @@
 // The program `tandem`: reads its command line and calls the command. Those that need no loop are
 // in `tandem-tools`, which it becomes.
+#include <string_view>
+
 #include "apps/clients/commands.hpp"
 #include "apps/command_line/program.hpp"
 #include "apps/run/commands.hpp"
+#include "apps/run/controller_trial.hpp"
 #include "apps/run/loop_crash.hpp"
 #include "apps/run/tools_program.hpp"
 
 int main(int argc, char** argv) {
   using namespace tandem::apps;
   name_crashing_controllers();
+  if (argc == 3 && std::string_view(argv[1]) == kTryController) return try_controller(argv[2]);
   ReportOfRun report;
   const Overloaded perform{
       [](Exit done) { return done; },

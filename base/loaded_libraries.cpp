@@ -29,23 +29,26 @@ std::set<std::string> replaced_files() {
   return paths;
 }
 
-/// The names of what a library needs.
-std::vector<std::string> needs_of(const link_map& library) {
+/// The texts of a library's entries with a tag.
+std::vector<std::string> texts_of(const link_map& library, ElfW(Sxword) tag) {
   const char* names = nullptr;
-  std::vector<std::string> needs;
+  std::vector<std::string> texts;
   for (const ElfW(Dyn)* entry = library.l_ld; entry->d_tag != DT_NULL; ++entry)
-    if (entry->d_tag == DT_STRTAB) names = reinterpret_cast<const char*>(entry->d_un.d_ptr);
+    if (entry->d_tag ==
+        DT_STRTAB) {  // from the library's start where the loader cannot write: vDSO
+      const ElfW(Addr) at = entry->d_un.d_ptr;
+      names = reinterpret_cast<const char*>(at < library.l_addr ? library.l_addr + at : at);
+    }
   for (const ElfW(Dyn)* entry = library.l_ld; entry->d_tag != DT_NULL; ++entry)
-    if (entry->d_tag == DT_NEEDED && names != nullptr)
-      needs.emplace_back(names + entry->d_un.d_val);
-  return needs;
+    if (entry->d_tag == tag && names != nullptr) texts.emplace_back(names + entry->d_un.d_val);
+  return texts;
 }
 
 std::string find_outdated(void* library, const std::function<bool(const std::string&)>& leave_out,
                           const std::set<std::string>& replaced, int depth) {
   link_map* map = nullptr;
   if (depth > kDeepest || ::dlinfo(library, RTLD_DI_LINKMAP, &map) != 0) return {};
-  for (const std::string& name : needs_of(*map)) {
+  for (const std::string& name : texts_of(*map, DT_NEEDED)) {
     void* const needed =
         leave_out(name) ? nullptr : ::dlopen(name.c_str(), RTLD_LAZY | RTLD_NOLOAD);
     link_map* its = nullptr;
@@ -72,6 +75,19 @@ std::set<std::string> mapped_libraries() {
       },
       &paths);
   return paths;
+}
+
+std::string needed_as(const std::string& path) {
+  std::string name = fs::path(path).filename().string();
+  void* const library = ::dlopen(path.c_str(), RTLD_LAZY | RTLD_NOLOAD);
+  if (library == nullptr) return name;
+  link_map* map = nullptr;
+  if (::dlinfo(library, RTLD_DI_LINKMAP, &map) == 0) {
+    const std::vector<std::string> own = texts_of(*map, DT_SONAME);
+    if (!own.empty()) name = own.front();
+  }
+  ::dlclose(library);
+  return name;
 }
 
 std::string outdated_need(void* library, const std::function<bool(const std::string&)>& leave_out) {

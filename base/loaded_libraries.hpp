@@ -11,6 +11,10 @@ namespace tandem {
 /// The paths of all of them.
 [[nodiscard]] std::set<std::string> mapped_libraries();
 
+/// The name that others need a loaded library by, its DT_SONAME: "libasan.so.8" of a path that ends
+/// with "libasan.so". Without one, and of what is not loaded, the path's last part.
+[[nodiscard]] std::string needed_as(const std::string& path);
+
 /// A library that `library` needs, itself or by another one, whose file was replaced since it was
 /// loaded: by its name the linker takes what it has. Empty: there is none.
 /// @param library    a handle of dlopen()

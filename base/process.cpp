@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -86,7 +87,8 @@ Result<pid_t> spawn(const Spawn& what) {
   }
   posix_spawn_file_actions_adddup2(&actions, output->get(), 1);
   posix_spawn_file_actions_adddup2(&actions, 1, 2);
-  posix_spawn_file_actions_addchdir_np(&actions, what.directory.c_str());
+  if (what.directory != ".")  // what confines a run does not let it change its folder
+    posix_spawn_file_actions_addchdir_np(&actions, what.directory.c_str());
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   if (what.own_group) posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
@@ -113,6 +115,14 @@ int wait_for(pid_t child) {
   }
   return exit_status(raw);
 }
+
+namespace {
+std::atomic<bool> waived{false};
+}  // namespace
+
+void waive_time_limits() noexcept { waived.store(true); }
+
+bool time_limits_are_waived() { return waived.load() || is_debugged(); }
 
 bool is_debugged() {
   std::ifstream status("/proc/self/status");

@@ -48,7 +48,12 @@ void stand_for_program(std::string path);
 /// The same of what waitpid() answered.
 [[nodiscard]] int exit_status(int raw) noexcept;
 
-/// Whether a debugger has this process: what takes long then says nothing.
+/// Whether a debugger has this process, now.
 [[nodiscard]] bool is_debugged();
+/// From now on what takes long says nothing in this process, with a debugger or without: `--debug`.
+void waive_time_limits() noexcept;
+/// Whether it says nothing: is_debugged(), or waive_time_limits() was called. Every limit of time
+/// on the wall clock that is there for what hangs asks this before it ends anything.
+[[nodiscard]] bool time_limits_are_waived();
 
 }  // namespace tandem

@@ -134,7 +134,7 @@ std::string another_spelling() {
   return way;
 }
 
-/// A name of the descriptor's file, by which a debugger finds it, too. Empty: there is no /proc.
+/// A name of the descriptor's file. Empty: there is no /proc.
 std::string name_of(const Descriptor& file) {
   std::error_code missing;
   const std::string process = fs::read_symlink("/proc/self", missing).string();
@@ -218,7 +218,9 @@ Status TrustedCode::check_seal() const {
 }
 
 Result<void*> TrustedCode::load(int flags) const {
-  const std::string name = looks_beside_itself(file_) ? another_spelling() + real_ : name_of(file_);
+  // A debugger opens it by its name, too, when the descriptor may be another file's already.
+  const bool by_path = looks_beside_itself(file_) || is_debugged();
+  const std::string name = by_path ? another_spelling() + real_ : name_of(file_);
   if (name.empty()) {
     return refuse(path_, "cannot be loaded without /proc", "mount it: mount -t proc proc /proc");
   }

@@ -37,7 +37,7 @@ class TrustedCode {
 
   /// dlopen(). The loader, debuggers and dladdr() know the library by its real path. Of the file
   /// itself; by its real path, of which every folder was judged, if it looks for other libraries
-  /// beside itself ($ORIGIN).
+  /// beside itself ($ORIGIN), or a debugger has this process.
   /// Errors: the loader's words, without the path; /proc is missing.
   [[nodiscard]] Result<void*> load(int flags) const;
   /// What this process has loaded by its real path, such as a former build: a handle to compare

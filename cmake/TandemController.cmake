@@ -12,8 +12,13 @@ function(tandem_add_controller name)
     target_precompile_headers(controller_${name} REUSE_FROM tandem_pch)  # with its flags
   else()
     # Nothing that is one for the whole process, which would keep a former build at work; and never
-    # without optimisation by oversight: that takes many times as long in every cycle.
-    target_compile_options(controller_${name} PRIVATE -g1  # lines, for the stack of a crash
+    # without optimisation by oversight: that takes many times as long in every cycle. Lines, for the
+    # stack of a crash, where the build asks for no debug information: the last -g counts.
+    set(lines $<$<NOT:$<CONFIG:Debug,RelWithDebInfo>>:-g1>)
+    if(CMAKE_CXX_FLAGS MATCHES "(^| )-g")
+      set(lines)
+    endif()
+    target_compile_options(controller_${name} PRIVATE ${lines}
       $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique> $<$<STREQUAL:$<CONFIG>,>:-O2>)
   endif()
   # Nothing undefined that the loader would find missing, nothing exported but the entry point: a

@@ -74,8 +74,8 @@ template <class Call>
 }
 
 /// As hosted_call(), for at most `limit`, on a thread of its own: the process goes on when `call`
-/// does not return, or calls exit(). Then the thread stays behind, with what `call` owns. While a
-/// debugger has the process the limit waits.
+/// does not return, or calls exit(). Then the thread stays behind, with what `call` owns. While
+/// time limits are waived, as in a debugger, it waits.
 template <class Call>
 [[nodiscard]] auto bounded_call(const std::string& controller, std::chrono::milliseconds limit,
                                 Call call) -> decltype(call()) {
@@ -106,12 +106,12 @@ template <class Call>
     job->over.notify_all();
   }).detach();
   std::unique_lock lock(job->mutex);
-  // In short waits, which do not count while a debugger has the process.
+  // In short waits, which do not count while limits are waived.
   const auto is_over = [&] { return job->answer || job->exited; };
   for (auto left = limit; left.count() > 0;) {
     const auto tick = std::min(left, std::chrono::milliseconds(20));
     if (job->over.wait_for(lock, tick, is_over)) break;
-    if (!is_debugged()) left -= tick;
+    if (!time_limits_are_waived()) left -= tick;
   }
   if (job->answer) return std::move(*job->answer);
   job->given_up = true;

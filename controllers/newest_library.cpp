@@ -121,7 +121,7 @@ std::string stem(const std::string& path) {
 class OfTheProgram {
  public:
   OfTheProgram() {
-    for (const std::string& path : mapped_libraries()) names_[stem(path)] = file_name(path);
+    for (const std::string& path : mapped_libraries()) names_[stem(path)] = needed_as(path);
   }
   [[nodiscard]] bool has(const std::string& path) const {
     const auto found = names_.find(stem(path));

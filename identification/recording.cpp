@@ -419,6 +419,7 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
   recording.period_s = grid->period_s;
   recording.time_s = grid->time_s;
   note_simulation(info, robot, recording);
+  for (std::string& one : file->remarks()) recording.remarks.push_back(std::move(one));
   if (file->truncated()) {
     recording.remarks.push_back(
         fmt::format("the log is cut after {} bytes: its run was killed, or the copy is not whole; "

@@ -9,6 +9,7 @@
 #include "base/quoting.hpp"
 #include "log/schema.hpp"
 #include "log/signal_name.hpp"
+#include "log/unmeasured.hpp"
 
 namespace tandem::log {
 namespace {
@@ -46,7 +47,7 @@ Status write_events(const LogFile& log, std::ostream& out) {
 }
 
 /// The topic's fields that `names` asks for; all when it asks for none.
-Result<std::vector<const hal::Field*>> choose(const LoggedTopic* topic,
+Result<std::vector<const hal::Field*>> choose(const LogFile& log, const LoggedTopic* topic,
                                               std::span<const std::string> names) {
   std::vector<const hal::Field*> chosen;
   if (topic == nullptr) return chosen;  // for_each() says so
@@ -59,8 +60,10 @@ Result<std::vector<const hal::Field*>> choose(const LoggedTopic* topic,
   }
   for (const std::string& name : names) {
     if (std::ranges::find(known, name) != known.end()) continue;
-    return fail("the topic '" + topic->name + "' has no field '" + name + "'",
-                suggest(name, known));
+    const std::string why = log.left_out(topic->name, name);
+    return fail("the topic '" + topic->name + "' has no field '" + name + "'" +
+                    (why.empty() ? "" : ": " + why),
+                why.empty() ? suggest(name, known) : "");
   }
   return chosen;
 }
@@ -74,25 +77,6 @@ std::string header(const std::vector<const hal::Field*>& fields, const RunInfo& 
   return line;
 }
 
-/// What tells the age of a field's elements: one that is older than the run was never measured.
-struct Ages {
-  const hal::Field* field = nullptr;  ///< null: the field is no measurement
-  std::vector<std::size_t> of;        ///< by element of the field
-};
-Ages ages_of(const hal::Layout& layout, const hal::Field& field, const RunInfo& info) {
-  Ages ages;
-  if (field.type != hal::FieldType::kF64) return ages;
-  const bool sensor = field.name == "sensor";
-  ages.field = layout.find(sensor ? "sensor_age_cycles" : "age_cycles");
-  for (std::size_t i = 0; !sensor && i < field.count; ++i) ages.of.push_back(i);
-  for (std::size_t s = 0; sensor && s < info.sensors.size(); ++s)
-    ages.of.insert(ages.of.end(), info.sensors[s].channels, s);
-  const bool fits = ages.field != nullptr && ages.of.size() == field.count &&
-                    (field.count == 0 || ages.of.back() < ages.field->count);
-  if (!fits) ages.field = nullptr;
-  return ages;
-}
-
 }  // namespace
 
 Status write_csv(const LogFile& log, const std::string& topic, std::size_t every, std::ostream& out,
@@ -103,13 +87,11 @@ Status write_csv(const LogFile& log, const std::string& topic, std::size_t every
     return fail("the messages of '" + topic + "' are no numbers of a fixed count",
                 "take another topic, /tandem/state for one, or a ROS viewer");
   }
-  const auto chosen = choose(found, fields);
+  const auto chosen = choose(log, found, fields);
   if (!chosen) return std::unexpected(chosen.error());
   if (found != nullptr) out << header(*chosen, log.info()) << "\n";
-  std::vector<Ages> ages;
-  for (const hal::Field* field : *chosen)
-    ages.push_back(ages_of(found->layout, *field, log.info()));
-  const hal::Field* cycle = found == nullptr ? nullptr : found->layout.find("cycle");
+  Result<Unmeasured> unknown = found == nullptr ? Unmeasured() : Unmeasured::of(log, *found);
+  if (!unknown) return std::unexpected(unknown.error());
   std::string line;
   std::size_t count = 0;
   bool begun = false;  // rows before the first measurement are left out
@@ -118,17 +100,15 @@ Status write_csv(const LogFile& log, const std::string& topic, std::size_t every
     line.clear();
     append_number(line, static_cast<double>(time_ns) * 1e-9);
     bool measures = false, measured = false;
-    for (std::size_t f = 0; f < chosen->size(); ++f) {
-      const hal::Field& field = *(*chosen)[f];
-      const Ages& age = ages[f];
-      for (std::size_t i = 0; i < field.count; ++i) {
+    for (const hal::Field* field : *chosen) {
+      const auto number = static_cast<std::size_t>(field - found->layout.fields().data());
+      const bool tells = unknown->tells(number);
+      for (std::size_t i = 0; i < field->count; ++i) {
         line += ',';
-        const bool has_age = age.field != nullptr && cycle != nullptr;
-        const bool unmeasured =
-            has_age && element(*age.field, body, age.of[i]) > element(*cycle, body, 0);
-        if (!unmeasured) append_number(line, element(field, body, i));
-        measures |= has_age;
-        measured |= has_age && !unmeasured;
+        const bool unmeasured = tells && unknown->is(number, i, body);
+        if (!unmeasured) append_number(line, element(*field, body, i));
+        measures |= tells;
+        measured |= tells && !unmeasured;
       }
     }
     begun |= measured || !measures;

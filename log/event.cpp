@@ -29,8 +29,10 @@ std::string whose(const Event& event, const EventNames& names) {
     case hal::FaultTarget::kBoard: return named(" of board ", names.boards, event.value);
     case hal::FaultTarget::kSensor: return named(" of sensor ", names.sensors, event.value);
     case hal::FaultTarget::kBus: return named(" of bus ", names.buses, event.value);
-    default: return named(" of ", names.joints, event.joint);
+    default: break;
   }
+  const bool carries = event.kind == EventKind::kPickedUp || event.kind == EventKind::kDropped;
+  return carries ? "" : named(" of ", names.joints, event.joint);
 }
 
 // What a text says of an event's code and value: the column `detail` of the table.
@@ -78,8 +80,17 @@ std::string cause(const Event& event, const EventNames&) {
 }
 
 std::string limited(const Event& event, const EventNames&) {
-  return event.code == static_cast<std::uint32_t>(Code::kNotFinite) ? ": it was not finite"
-                                                                    : ": it was out of range";
+  switch (static_cast<Code>(event.code)) {
+    case Code::kOk: return ": it is followed as fast as the joint's limits allow";
+    case Code::kNotFinite: return ": it was not finite";
+    default: return ": it was out of range";
+  }
+}
+
+std::string payload(const Event& event, const EventNames& names) {
+  const std::string what = names.payload ? names.payload(event.code) : "";
+  if (event.kind == EventKind::kPickedUp || what.empty()) return what.empty() ? "" : ": " + what;
+  return ": " + what.substr(0, what.rfind(", "));  // its name, which says enough then
 }
 
 bool has_joint(const Event& event, const EventNames& names) {
@@ -126,7 +137,8 @@ std::string what_happened(const Event& event, const EventNames& names) {
   text += whose(event, names);
   const EventRow* row = row_of(event.kind);
   if (row == nullptr) return text;
-  const bool tells = event.code != 0 || row->detail == target;  // a motion's 0 is a unit
+  // A motion's 0 is a unit, and that of a limit its speed.
+  const bool tells = event.code != 0 || row->detail == target || row->detail == limited;
   return tells ? text + row->detail(event, names) : text;
 }
 

@@ -59,6 +59,8 @@ struct EventNames {
   std::vector<std::string> sensors{};
   std::vector<std::string> buses{};
   std::function<std::string(std::size_t)> controller{};  ///< by number; any thread's
+  /// "box, 1.6 kg on panda_hand" by the event's code; any thread's.
+  std::function<std::string(std::uint32_t)> payload{};
 };
 
 /// A controller's parameter that was set, or came with it.

@@ -1,12 +1,16 @@
-// open() reads the whole file once, for its topics and the data hash; read() streams it again for
-// the columns that are asked for.
+// open() reads every file once, for its topics and the data hash; read() streams them again for the
+// columns that are asked for.
 #include "log/log_file.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <iterator>
 #include <utility>
 
 #include "base/bounds.hpp"
 #include "base/nearest.hpp"
-#include "log/data_hash.hpp"
+#include "base/toml_reader.hpp"
 #include "log/mcap_reader.hpp"
 #include "log/schema.hpp"
 
@@ -42,53 +46,233 @@ bool fits(const LoggedTopic& topic, std::int64_t period_ns) {
                                    static_cast<double>(bounds::kReplayCycles.most);
 }
 
+/// What [log] of the experiment leaves out, in its own words; empty: not this.
+std::string left_out_by(TomlTable log, std::string_view topic, std::string_view field) {
+  constexpr std::string_view kViewers[] = {"joint_states", "tf", "tf_static", "robot_description"};
+  if (!field.empty()) {
+    const std::string whole = std::string(topic) + "." + std::string(field);
+    const auto without = log.texts_or("without", {});
+    return std::ranges::find(without, whole) != without.end() ? "without = [\"" + whole + "\"]"
+                                                              : "";
+  }
+  if (std::ranges::find(kViewers, topic) != std::end(kViewers))
+    return log.boolean_or("viewers", true) ? "" : "viewers = false";
+  const std::string key = std::string(topic) + "_every";
+  return log.has(key) && log.integer_or(key, 1, 0, 1'000'000) == 0 ? key + " = 0" : "";
+}
+
+/// The names of topics that end in "/`end`".
+std::vector<std::string> ending_in(const std::vector<LoggedTopic>& topics, std::string_view end) {
+  std::vector<std::string> names;
+  for (const LoggedTopic& topic : topics)
+    if (topic.name.ends_with("/" + std::string(end))) names.push_back(topic.name);
+  return names;
+}
+
+/// The topics that `name` may have meant.
+std::string suggest_topic(const std::string& name, const std::vector<LoggedTopic>& topics) {
+  std::string_view end = name;
+  for (const std::string_view lead : {"/tandem/", "/"})
+    if (end.starts_with(lead)) end.remove_prefix(lead.size());
+  std::vector<std::string> names = ending_in(topics, end), ends, all;
+  for (const LoggedTopic& topic : topics) {
+    all.push_back(topic.name);
+    for (auto at = topic.name.find('/'); at != std::string::npos; at = topic.name.find('/', at + 1))
+      ends.push_back(topic.name.substr(at + 1));
+  }
+  if (names.empty()) names = ending_in(topics, nearest(end, ends));
+  if (names.size() == 1) return "did you mean '" + names.front() + "'?";
+  return suggest(name, names.empty() ? all : names);
+}
+
 constexpr char kCutHint[] = "its run was killed, or the copy is not whole: copy it again";
+
+/// Topics that each file has once for viewers: the whole log has them once, too.
+bool is_repeated(const std::string& topic) {
+  return topic == "/robot_description" || topic == "/tf_static";
+}
+
+/// Whether both files say the same of their run.
+bool is_same_run(RunInfo a, const RunInfo& b) {
+  a.part = b.part;
+  return to_map(a) == to_map(b);
+}
+
+StringMap without(StringMap map, std::string_view key) {
+  std::erase_if(map, [key](const auto& one) { return one.first == key; });
+  return map;
+}
 
 }  // namespace
 
-Result<LogFile> LogFile::open(const std::string& path) {
+struct LogFile::Beginning {
+  std::string path;
+  std::shared_ptr<const Descriptor> file;
+  McapReader reader;
+  std::optional<MessageView> first;  // valid until the reader's next
+  RunInfo info;
+};
+
+Result<LogFile::Beginning> LogFile::begin(const std::string& path) {
   Result<Descriptor> file = open_to_read(path, "name a log of `tandem run`");
   if (!file) return std::unexpected(file.error());
-  LogFile log;
-  log.path_ = path;
-  log.file_ = std::make_shared<const Descriptor>(std::move(*file));
-  auto reader = McapReader::open(log.file_, path);
+  auto shared = std::make_shared<const Descriptor>(std::move(*file));
+  auto reader = McapReader::open(shared, path);
   if (!reader) return std::unexpected(reader.error());
+  Beginning begun{path, std::move(shared), std::move(*reader), {}, {}};
+  auto first = begun.reader.next();
+  if (!first) return std::unexpected(first.error());
+  begun.first = *first;
+  begun.info = info_from(metadata_of(begun.reader, kInfoRecord));
+  return begun;
+}
+
+/// Counts one more file, to its end.
+Status LogFile::add(Beginning file, DataHash& hash) {
+  McapReader& reader = file.reader;
+  LogPart part{.number = file.info.part, .path = file.path, .bytes = reader.bytes()};
   std::map<std::uint16_t, LoggedTopic> by_channel;
-  DataHash hash;
-  for (;;) {
-    auto message = reader->next();
-    if (!message) return std::unexpected(message.error());
-    if (!message->has_value()) break;
+  for (Result<std::optional<MessageView>> message = file.first; message->has_value();) {
     const MessageView& view = **message;
     auto [topic, added] = by_channel.try_emplace(view.channel);
     if (added) {
-      topic->second = topic_of(*reader, reader->channels().at(view.channel));
+      topic->second = topic_of(reader, reader.channels().at(view.channel));
       topic->second.first_ns = view.time_ns;
     }
     topic->second.last_ns = view.time_ns;
-    ++topic->second.messages;
-    hash.add(view.channel, view.time_ns, view.data);
+    if (part.messages++ == 0) part.first_ns = view.time_ns;
+    part.last_ns = std::max(part.last_ns, view.time_ns);
+    if (parts_.empty() || !is_repeated(topic->second.name)) {
+      ++topic->second.messages;
+      hash.add(view.channel, view.time_ns, view.data);
+    }
+    message = reader.next();
+    if (!message) return std::unexpected(message.error());
   }
-  for (const auto& [id, channel] : reader->channels()) {
-    if (!by_channel.contains(id)) by_channel[id] = topic_of(*reader, channel);
+  for (const auto& [id, channel] : reader.channels()) {
+    if (!by_channel.contains(id)) by_channel[id] = topic_of(reader, channel);
   }
-  for (auto& [id, topic] : by_channel) log.topics_.push_back(std::move(topic));
-  log.info_ = info_from(metadata_of(*reader, kInfoRecord));
-  for (const LoggedTopic& topic : log.topics_)
-    if (topic.name == "/tandem/state" && !fits(topic, log.info_.period_ns)) log.info_.period_ns = 0;
-  log.info_.configuration = metadata_of(*reader, kConfigurationRecord);
-  log.result_ = metadata_of(*reader, kResultRecord);
-  log.truncated_ = reader->truncated();
-  log.bytes_ = reader->bytes();
-  if (log.truncated_ && log.topics_.empty() && reader->metadata().empty()) {
+  for (auto& [id, topic] : by_channel) {
+    const auto known = std::ranges::find(topics_, topic.name, &LoggedTopic::name);
+    if (parts_.empty() || known == topics_.end()) {
+      topics_.push_back(std::move(topic));
+    } else if (topic.messages > 0) {
+      if (known->messages == 0) known->first_ns = topic.first_ns;
+      known->last_ns = topic.last_ns;
+      known->messages += topic.messages;
+    }
+  }
+  if (parts_.empty()) {
+    info_ = info_from(metadata_of(reader, kInfoRecord));
+    info_.configuration = metadata_of(reader, kConfigurationRecord);
+  }
+  result_ = metadata_of(reader, kResultRecord);
+  part.truncated = reader.truncated();
+  if (part.truncated && by_channel.empty() && reader.metadata().empty()) {
     return std::unexpected(at(
-        path,
-        "the log is cut after " + std::to_string(log.bytes_) + " bytes, before anything of its run",
+        file.path,
+        "the log is cut after " + std::to_string(part.bytes) + " bytes, before anything of its run",
         kCutHint));
   }
-  log.data_sha256_ = hash.finish();
+  parts_.push_back(std::move(part));
+  files_.push_back(std::move(file.file));
+  return {};
+}
+
+/// All files of the run that have the name of all; but those that are here already. One that was
+/// removed meanwhile, cannot be read, or is of another run, is none.
+Status LogFile::add_siblings(const std::string& name, DataHash& hash) {
+  for (const auto& [number, path] : parts_of(name)) {
+    if (!parts_.empty() && number <= parts_.back().number) continue;
+    auto file = begin(path);
+    if (!file || file->info.part != number) continue;  // missing_of() says so
+    if (!parts_.empty() && !is_same_run(info_, file->info)) continue;
+    if (parts_.size() == bounds::kLogParts.most)
+      return std::unexpected(beyond(bounds::kLogParts, name));
+    if (Status added = add(std::move(*file), hash); !added) return added;
+  }
+  return {};
+}
+
+/// What is said of all files together.
+void LogFile::finish(DataHash& hash) {
+  for (const LoggedTopic& topic : topics_)
+    if (topic.name == "/tandem/state" && !fits(topic, info_.period_ns)) info_.period_ns = 0;
+  if (parts_.size() > 1 && !result_.empty()) {
+    result_ = without(without(result_, "data_sha256"), "messages");
+    result_.emplace_back("messages", std::to_string(messages()));
+  }
+  data_sha256_ = hash.finish();
+}
+
+Result<LogFile> LogFile::open(const std::string& path) {
+  LogFile log;
+  log.path_ = path;
+  DataHash hash;
+  auto file = begin(path);
+  const auto part = part_of(path);
+  bool all = true;
+  if (!file && part && part->number == 1) {  // the first file alone
+    auto first = begin(part->all);
+    if (first && first->info.part == 1) file = std::move(first), all = false;
+  }
+  if (file) {
+    all = all && file->info.part == 1;
+    if (Status added = log.add(std::move(*file), hash); !added)
+      return std::unexpected(added.error());
+  }
+  if (!file || all) {
+    if (Status added = log.add_siblings(path, hash); !added) return std::unexpected(added.error());
+    if (log.parts_.empty()) return std::unexpected(file.error());
+    log.info_.part = 0;
+    const bool goes_on = !value_of(log.result_, "continued").empty();
+    log.missing_ = missing_of(log.parts_, goes_on);
+  }
+  log.finish(hash);
   return log;
+}
+
+Status LogFile::check(const std::string& path) {
+  const auto file = begin(path);
+  if (file) return {};
+  const auto part = part_of(path);
+  if (part && part->number == 1 && begin(part->all)) return {};
+  for (const auto& [number, sibling] : parts_of(path)) {
+    if (begin(sibling)) return {};
+  }
+  return std::unexpected(file.error());
+}
+
+bool LogFile::truncated() const { return std::ranges::any_of(parts_, &LogPart::truncated); }
+
+std::uint64_t LogFile::bytes() const {
+  std::uint64_t bytes = 0;
+  for (const LogPart& part : parts_) bytes += part.bytes;
+  return bytes;
+}
+
+std::vector<std::string> LogFile::remarks() const {
+  if (info_.part > 0) {
+    const auto name = part_of(path_);
+    return {"this is part " + std::to_string(info_.part) + " of a log in several files" +
+            (name ? ": " + name->all + " opens all of them" : "")};
+  }
+  if (missing_.empty()) return {};
+  std::string text;
+  for (const MissingParts& one : missing_) text += (text.empty() ? "" : ", ") + to_string(one);
+  const auto seconds = [](std::int64_t time_ns) {
+    std::array<char, 32> number{};
+    std::snprintf(number.data(), number.size(), "%.3f", static_cast<double>(time_ns) * 1e-9);
+    return std::string(number.data());
+  };
+  text = "the log lacks " + text + "; what is here is from ";
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const bool follows = i > 0 && parts_[i - 1].number + 1 == parts_[i].number;
+    if (!follows) text += (i == 0 ? "" : " and from ") + seconds(parts_[i].first_ns) + " s to ";
+    const bool ends = i + 1 == parts_.size() || parts_[i].number + 1 != parts_[i + 1].number;
+    if (ends) text += seconds(parts_[i].last_ns) + " s";
+  }
+  return {text};
 }
 
 const LoggedTopic* LogFile::find(std::string_view name) const {
@@ -106,15 +290,35 @@ std::uint64_t LogFile::messages() const {
 
 Result<const LoggedTopic*> LogFile::require(const std::string& name) const {
   if (const LoggedTopic* topic = find(name)) return topic;
-  if (truncated_) {
+  if (truncated()) {
     return std::unexpected(at(path_,
-                              "the log is cut after " + std::to_string(bytes_) +
+                              "the log is cut after " + std::to_string(bytes()) +
                                   " bytes, before a message of '" + name + "'",
                               kCutHint));
   }
-  std::vector<std::string> names;
-  for (const LoggedTopic& topic : topics_) names.push_back(topic.name);
-  return std::unexpected(at(path_, "has no topic '" + name + "'", suggest(name, names)));
+  const std::string why = left_out(name);
+  return std::unexpected(at(path_, "has no topic '" + name + "'" + (why.empty() ? "" : ": " + why),
+                            why.empty() ? suggest_topic(name, topics_) : ""));
+}
+
+std::string LogFile::full_name(const std::string& name) const {
+  if (find(name) != nullptr || name.starts_with('/')) return name;
+  for (const std::string lead : {"/tandem/", "/"})
+    if (find(lead + name) != nullptr) return lead + name;
+  const std::vector<std::string> names = ending_in(topics_, name);
+  return names.size() == 1 ? names.front() : "/tandem/" + name;
+}
+
+std::string LogFile::left_out(std::string_view topic, std::string_view field) const {
+  for (const auto& [file, text] : info_.configuration) {
+    if (!file.ends_with(".toml")) continue;
+    const Result<TomlDocument> document = TomlDocument::parse(text, file);
+    if (!document || !document->root().has("robot")) continue;
+    const std::string_view last = topic.substr(topic.rfind('/') + 1);
+    const std::string key = left_out_by(document->root().table_or_empty("log"), last, field);
+    return key.empty() ? "" : "this log leaves it out ([log] " + key + ")";
+  }
+  return {};
 }
 
 Status LogFile::for_each(
@@ -122,20 +326,25 @@ Status LogFile::for_each(
     const std::function<void(std::int64_t, std::span<const std::byte>)>& visit) const {
   const auto topic = require(name);
   if (!topic) return std::unexpected(topic.error());
-  auto reader = McapReader::open(file_, path_);
-  if (!reader) return std::unexpected(reader.error());
-  for (;;) {
-    auto message = reader->next();
-    if (!message) return std::unexpected(message.error());
-    if (!message->has_value()) return {};
-    const MessageView& view = **message;
-    if (reader->channels().at(view.channel).topic != name) continue;
-    const std::size_t expected = (*topic)->layout.bytes();
-    if (view.data.size() < kCdrHeader.size() + expected) {
-      return std::unexpected(at(path_, "a message of " + name + " is shorter than its type"));
+  for (std::size_t i = 0; i < files_.size(); ++i) {
+    auto reader = McapReader::open(files_[i], parts_[i].path);
+    if (!reader) return std::unexpected(reader.error());
+    if (i > 0 && is_repeated(name)) return {};
+    for (;;) {
+      auto message = reader->next();
+      if (!message) return std::unexpected(message.error());
+      if (!message->has_value()) break;
+      const MessageView& view = **message;
+      if (reader->channels().at(view.channel).topic != name) continue;
+      const std::size_t expected = (*topic)->layout.bytes();
+      if (view.data.size() < kCdrHeader.size() + expected) {
+        return std::unexpected(
+            at(parts_[i].path, "a message of " + name + " is shorter than its type"));
+      }
+      visit(view.time_ns, view.data.subspan(kCdrHeader.size()));
     }
-    visit(view.time_ns, view.data.subspan(kCdrHeader.size()));
   }
+  return {};
 }
 
 Result<TimeSeries> LogFile::read(const std::string& name, const std::vector<Column>& columns,
@@ -148,8 +357,10 @@ Result<TimeSeries> LogFile::read(const std::string& name, const std::vector<Colu
     if (field == nullptr) {
       std::vector<std::string> names;
       for (const hal::Field& one : (*topic)->layout.fields()) names.push_back(one.name);
+      const std::string why = left_out(name, column.field);
       return std::unexpected(
-          at(path_, name + " has no field '" + column.field + "'", suggest(column.field, names)));
+          at(path_, name + " has no field '" + column.field + "'" + (why.empty() ? "" : ": " + why),
+             why.empty() ? suggest(column.field, names) : ""));
     }
     if (column.index >= field->count) {
       return std::unexpected(at(path_, column.field + " of " + name + " has only " +

@@ -12,8 +12,10 @@
 #include "base/open_file.hpp"
 #include "base/result.hpp"
 #include "hal/image.hpp"
+#include "log/data_hash.hpp"
 #include "log/event.hpp"
 #include "log/info.hpp"
+#include "log/log_parts.hpp"
 
 namespace tandem::log {
 
@@ -40,27 +42,48 @@ struct TimeSeries {
   std::vector<std::vector<double>> columns;  ///< as asked for
 };
 
+/// A log in one file, or all files of one that `[log] file_MB` has split.
 class LogFile {
  public:
-  /// Reads the whole file once to count. Errors: as McapReader; a file that is cut before anything
-  /// of a run.
+  /// Reads it once to count. Of a log in several files the first one's name, "arm-001.mcap", opens
+  /// all that are there, also where the first one is gone; "arm-001.3.mcap" is that part alone, and
+  /// "arm-001.1.mcap" the first one alone. What is in each file once for viewers, the description
+  /// and what does not move, is in the whole once.
+  /// Errors: as McapReader; a file that is cut before anything of a run.
   [[nodiscard]] static Result<LogFile> open(const std::string& path);
+  /// Whether open() would find a log, without reading it.
+  [[nodiscard]] static Status check(const std::string& path);
 
+  /// As it was opened.
   [[nodiscard]] const std::string& path() const { return path_; }
+  /// Its files, in the order of the run; one at least.
+  [[nodiscard]] const std::vector<LogPart>& parts() const { return parts_; }
+  /// What of the run is in files that are not here.
+  [[nodiscard]] const std::vector<MissingParts>& missing() const { return missing_; }
+  /// The same in words, with the time of what is here: for whoever computes with it. Empty: the log
+  /// is whole, or was cut.
+  [[nodiscard]] std::vector<std::string> remarks() const;
   [[nodiscard]] const RunInfo& info() const { return info_; }
-  /// The metadata record "result"; empty when the run was killed.
+  /// The metadata record "result"; empty when the run was killed. Of several files the last one's,
+  /// with the messages of all.
   [[nodiscard]] const StringMap& result() const { return result_; }
   [[nodiscard]] const std::vector<LoggedTopic>& topics() const { return topics_; }
   [[nodiscard]] const LoggedTopic* find(std::string_view topic) const;
-  /// The same. Error: the log has no such topic, or is cut before
-  /// its first message.
+  /// The same. Error: the log has no such topic, leaves it out, or is cut before its first message.
   [[nodiscard]] Result<const LoggedTopic*> require(const std::string& topic) const;
-  /// True when the run was killed: the data end where its last chunk ended.
-  [[nodiscard]] bool truncated() const { return truncated_; }
-  /// The file's size.
-  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  /// The topic that `name` names: leading parts may be left out, of "/tandem/" first, where what is
+  /// left names one alone. One that the log does not have: as below /tandem.
+  [[nodiscard]] std::string full_name(const std::string& name) const;
+  /// "this log leaves it out ([log] state_every = 0)"; empty: its experiment does not say so.
+  /// @param field  of the topic; empty: the topic as a whole
+  [[nodiscard]] std::string left_out(std::string_view topic, std::string_view field = {}) const;
+  /// True when the run was killed: the data, or those of a part, end where its last chunk ended.
+  [[nodiscard]] bool truncated() const;
+  /// The files' size.
+  [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] std::uint64_t messages() const;
-  /// SHA-256 over the messages as they stand in the file, as RecordingResult defines it.
+  /// SHA-256 over the messages in their order, as RecordingResult defines it: of several files the
+  /// same as of one.
   [[nodiscard]] const std::string& data_sha256() const { return data_sha256_; }
 
   /// The columns of every message of `topic`, or of every `every`-th.
@@ -76,13 +99,20 @@ class LogFile {
       const std::function<void(std::int64_t, std::span<const std::byte>)>& visit) const;
 
  private:
+  /// How a file begins: of which part, of which run.
+  struct Beginning;
+  [[nodiscard]] static Result<Beginning> begin(const std::string& path);
+  [[nodiscard]] Status add(Beginning file, DataHash& hash);
+  [[nodiscard]] Status add_siblings(const std::string& name, DataHash& hash);
+  void finish(DataHash& hash);
+
   std::string path_;
-  std::shared_ptr<const Descriptor> file_;  // read again and again: always the same
+  std::vector<std::shared_ptr<const Descriptor>> files_;  // read again and again: always the same
+  std::vector<LogPart> parts_;                            // of those
+  std::vector<MissingParts> missing_;
   RunInfo info_;
   StringMap result_;
   std::vector<LoggedTopic> topics_;
-  bool truncated_ = false;
-  std::uint64_t bytes_ = 0;
   std::string data_sha256_;
 };
 

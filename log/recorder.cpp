@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <utility>
 
-#include "base/sha256.hpp"
 #include "log/controller_messages.hpp"
+#include "log/log_parts.hpp"
 #include "log/schema.hpp"
 
 namespace tandem::log {
@@ -272,6 +272,9 @@ void Recorder::write(Channel id, std::int64_t time_ns, std::span<const std::byte
     return;
   }
   hash_.add(id, time_ns, kCdrHeader, body);
+  if (info_.part > 0 && (part_ == 1 || !view_.repeats(id))) {
+    whole_hash_.add(id, time_ns, kCdrHeader, body);
+  }
   if (!writer_->write(id, time_ns, kCdrHeader, body)) {
     ++lost_;
     give_up(writer_->error());
@@ -315,18 +318,9 @@ bool Recorder::remove_oldest() {
   return true;
 }
 
-/// "runs/arm-001.mcap", "runs/arm-001.2.mcap"
-std::string Recorder::part_path(std::uint64_t number) const {
-  if (number == 1) return path_;
-  const std::string ending = ".mcap";
-  const std::string stem =
-      path_.ends_with(ending) ? path_.substr(0, path_.size() - ending.size()) : path_;
-  return stem + "." + std::to_string(number) + ending;
-}
-
 void Recorder::next_part() {
   full_ = false;
-  const std::string path = part_path(part_ + 1);
+  const std::string path = part_path(path_, part_ + 1);
   Status status = end_part({{"continued", std::filesystem::path(path).filename().string()}});
   if (!status) return give_up(writer_->error());
   writer_ = std::make_unique<McapWriter>();
@@ -345,9 +339,8 @@ void Recorder::next_part() {
 
 /// Adds the record "result" to the present part, and ends it.
 Status Recorder::end_part(const StringMap& extra) {
-  const std::string hash = hash_.finish();
-  hashes_ += hash + "\n";
-  StringMap map{{"data_sha256", hash},
+  last_hash_ = hash_.finish();
+  StringMap map{{"data_sha256", last_hash_},
                 {"messages", std::to_string(writer_->messages())},
                 {"dropped", std::to_string(dropped())},
                 {"failed", std::to_string(lost_)}};
@@ -357,7 +350,7 @@ Status Recorder::end_part(const StringMap& extra) {
   Status closed = writer_->close();
   ended_messages_ += writer_->messages() - writer_->lost();
   lost_ += writer_->lost();
-  ended_.push_back({part_path(part_), writer_->bytes_written()});
+  ended_.push_back({part_path(path_, part_), writer_->bytes_written()});
   ended_bytes_ += ended_.back().bytes;
   return closed;
 }
@@ -376,14 +369,14 @@ RecordingResult Recorder::close(const StringMap& extra) {
     if (!closed) result.error = closed.error().message;
   }
   if (failed() && result.error.empty()) result.error = "the log is incomplete: " + trouble_;
-  result.path = ended_.empty() ? path_ : ended_.front().path;
+  result.path = path_;
   result.parts = part_;
   result.removed = removed_;
   result.messages = ended_messages_;
   result.dropped = dropped();
   result.failed = lost_;
   result.bytes = ended_bytes_;
-  result.data_sha256 = part_ == 1 ? hashes_.substr(0, hashes_.find('\n')) : sha256(hashes_);
+  result.data_sha256 = part_ == 1 ? last_hash_ : whole_hash_.finish();
   return result;
 }
 

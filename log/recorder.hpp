@@ -51,14 +51,15 @@ struct RecorderOptions {
 
 /// What a closed recording amounts to.
 struct RecordingResult {
-  std::string path;            ///< the first of its files that is still there
+  std::string path;            ///< LogFile::open() reads all of its files by it
   std::uint64_t parts = 1;     ///< files that it wrote
   std::uint64_t removed = 0;   ///< of them, to keep to the limits
   std::uint64_t messages = 0;  ///< written, those of removed files as well
   std::uint64_t dropped = 0;   ///< refused because the ring was full
   std::uint64_t failed = 0;    ///< lost because writing failed (disk full, file deleted or cut)
   std::uint64_t bytes = 0;     ///< of the files that are there
-  /// DataHash of every message, in order. Of several files the SHA-256 over theirs, each on a line.
+  /// DataHash of every message, in order. Several files have that of the same messages in one:
+  /// what is in each file once for viewers counts once.
   std::string data_sha256;
   std::string error;  ///< why writing failed; empty when it did not
 };
@@ -108,6 +109,10 @@ class Recorder {
   /// start().
   void name_controllers(std::function<std::string(std::size_t)> name) {
     names_.controller = std::move(name);
+  }
+  /// Who knows what the robot carries, the same way.
+  void name_payloads(std::function<std::string(std::uint32_t)> name) {
+    names_.payload = std::move(name);
   }
   /// No more channels but late ones: allocates the ring and starts the writer's thread.
   void start();
@@ -172,7 +177,6 @@ class Recorder {
   void write_late(Channel channel, std::int64_t time_ns, std::span<const std::byte> body);
   void write_text(const hal::TextEvent& event);
   void write(Channel id, std::int64_t time_ns, std::span<const std::byte> body);
-  [[nodiscard]] std::string part_path(std::uint64_t number) const;
   void next_part();
   [[nodiscard]] Status end_part(const StringMap& extra);
   void look_at_disk();
@@ -209,7 +213,8 @@ class Recorder {
   std::vector<Part> ended_;        // that are there
   std::uint64_t ended_bytes_ = 0;  // theirs
   std::uint64_t removed_ = 0, ended_messages_ = 0, lost_ = 0;
-  std::string hashes_;  // of the ended ones, removed or not
+  DataHash whole_hash_;    // of a log in several files, as if it were in one
+  std::string last_hash_;  // of the part that ended last
   std::int64_t time_ns_ = std::numeric_limits<std::int64_t>::min();  // of the loop's last message
   Bytes event_;                                                      // reused
 };

@@ -111,8 +111,6 @@ void RobotView::take_channel(std::uint16_t channel, std::string_view topic,
 
 void RobotView::add_channels(McapWriter& writer) {
   described_ = false;
-  constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
-  state_.last_period = truth_.last_period = kNever;
   if (state_.channel >= 0) {
     joint_states_ = add(writer, "/joint_states", "sensor_msgs/msg/JointState");
     description_ = add(writer, "/robot_description", "std_msgs/msg/String");

@@ -66,6 +66,11 @@ class RobotView {
   /// Once all channels are known, and for each file again: makes those that it can fill.
   void add_channels(McapWriter& writer);
 
+  /// Whether a channel's messages are in each file again.
+  [[nodiscard]] bool repeats(std::uint16_t channel) const noexcept {
+    return state_.channel >= 0 && (channel == description_ || (stands_ && channel == tf_static_));
+  }
+
   /// Calls `emit` for each message that comes with an image: the first one of every 20 ms has
   /// some. The description and what does not move come with a file's first state.
   void follow(std::uint16_t channel, std::int64_t time_ns, std::span<const std::byte> image,

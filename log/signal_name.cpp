@@ -1,9 +1,10 @@
-// "position_rad.elbow", "sensor.left_foot.2": the element's joint or sensor, where it has one.
+// "position_rad.elbow", "sensor.left_foot.fz_N": the element's joint or sensor, where it has one.
 #include "log/signal_name.hpp"
 
 #include <algorithm>
 #include <string_view>
 
+#include "hal/robot.hpp"
 #include "hal/wire_name.hpp"
 
 namespace tandem::log {
@@ -29,6 +30,20 @@ std::string_view count_of(const hal::Field& field) {
   const auto* row = std::ranges::find_if(
       kFieldRows, [&](const Row& one) { return hal::wire_name(one.name) == name; });
   return row == std::end(kFieldRows) ? std::string_view() : row->count;
+}
+
+/// What a sensor's channels measure, by how many it has: of hal::SensorType.
+constexpr std::string_view kForceTorque[] = {"fx_N", "fy_N", "fz_N", "tx_Nm", "ty_Nm", "tz_Nm"};
+constexpr std::string_view kImu[] = {"qx",       "qy",       "qz",      "qw",      "wx_rad_s",
+                                     "wy_rad_s", "wz_rad_s", "ax_m_s2", "ay_m_s2", "az_m_s2"};
+static_assert(std::size(kForceTorque) == hal::channels_of(hal::SensorType::kForceTorque));
+static_assert(std::size(kImu) == hal::channels_of(hal::SensorType::kImu));
+
+/// "fx_N"; of a sensor that is none of ours its number.
+std::string channel_name(std::size_t channels, std::size_t index) {
+  if (channels == std::size(kForceTorque)) return std::string(kForceTorque[index]);
+  if (channels == std::size(kImu)) return std::string(kImu[index]);
+  return std::to_string(index);
 }
 
 /// Whether a robot may have one of them or more, so that one has its name or number, too.
@@ -62,7 +77,7 @@ std::string element_name(const hal::Field& field, std::size_t index, const RunIn
   if (by == "joints") return info.joints[index];
   if (by == "sensors") return info.sensors[index].name;
   for (const SensorInfo& sensor : info.sensors) {
-    if (index < sensor.channels) return sensor.name + "." + std::to_string(index);
+    if (index < sensor.channels) return sensor.name + "." + channel_name(sensor.channels, index);
     index -= sensor.channels;
   }
   return {};

@@ -31,6 +31,14 @@ using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 [[noreturn]] void raise_unknown(const std::string& kind, const std::string& name,
                                 const std::vector<std::string>& known);
 
+/// `value` as floating point. Error: text, complex numbers, None, and what is no array.
+[[nodiscard]] Doubles numbers_of(const std::string& name, const py::object& value);
+
+/// A class's __new__: __init__ is called at once, so that there is no object without its C++ half.
+/// The second call, which Python makes, does nothing.
+[[nodiscard]] py::object made_whole(const py::handle& type, const py::args& arguments,
+                                    const py::kwargs& named);
+
 /// The value, or an exception.
 template <class T, class E>
 T take(std::expected<T, E>&& result) {

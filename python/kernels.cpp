@@ -55,9 +55,7 @@ class States {
       arguments_.push_back(std::move(one));
       return;
     }
-    if (!argument.value.is_none()) one.array = Doubles::ensure(argument.value);
-    if (argument.value.is_none() || !one.array)
-      raise_value(argument.name, "is no array of numbers");
+    one.array = numbers_of(argument.name, argument.value);
     const auto width = static_cast<py::ssize_t>(argument.width);
     const py::ssize_t dimensions = one.array.ndim();
     one.many = dimensions == 2;
@@ -105,11 +103,17 @@ class Kernels {
     return {names, names + count};
   }
 
-  /// Calls `kernel(state, result)` for each state, without the interpreter's lock.
+  /// Calls `kernel(state, result)` for each state, without the interpreter's lock, and looks for
+  /// Ctrl-C now and then.
   template <class Call>
   static void for_each(const States& states, const Call& call) {
-    const Away away;
-    for (py::ssize_t s = 0; s < states.count(); ++s) call(s);
+    constexpr py::ssize_t kPerTurn = 8192;
+    for (py::ssize_t begin = 0; begin < states.count(); begin += kPerTurn) {
+      if (begin > 0 && PyErr_CheckSignals() != 0) throw py::error_already_set();
+      const Away away;
+      const py::ssize_t end = std::min(begin + kPerTurn, states.count());
+      for (py::ssize_t s = begin; s < end; ++s) call(s);
+    }
   }
   void check_base(const py::object& q) const {
     if (table().floating_base == 0) return;
@@ -246,10 +250,19 @@ class Kernels {
     const std::scoped_lock alone(reading());
     auto robot = robot::read_robot(file);
     if (!robot) return std::unexpected(robot.error());
-    robot->spec.derivatives = robot->spec.derivatives || derivatives;
+    const bool declared =
+        std::exchange(robot->spec.derivatives, robot->spec.derivatives || derivatives);
     using robot::MissingKernels;
     auto library = robot::supply_kernels(*robot, variant,
                                          build ? MissingKernels::kBuild : MissingKernels::kRefuse);
+    if (!library && derivatives && !declared && !build) {  // the program builds what is declared
+      return std::unexpected(Diagnostics{
+          {.message = "there are no kernels of '" + robot->config.name + "' with derivatives",
+           .hint = "let Model build them once (build=True), or write `derivatives = true` into "
+                   "[model] of robot.toml, then: tandem model build",
+           .file = file,
+           .key = {}}});
+    }
     if (!library) return std::unexpected(Diagnostics{library.error()});
     return std::move(*library);
   }
@@ -265,6 +278,7 @@ void add_kernels(py::module_& module) {
   py::class_<Kernels>(module, "Kernels", "A robot's generated kernels.")
       .def(py::init<const std::string&, bool, bool, const std::string&>(), "file"_a,
            "derivatives"_a = false, "build"_a = true, "variant"_a = "")
+      .def_static("__new__", &made_whole)
       .def_property_readonly("robot", [](const Kernels& k) { return k.table().robot; })
       .def_property_readonly("variant", [](const Kernels& k) { return k.table().variant; })
       .def_property_readonly("nq", [](const Kernels& k) { return k.table().nq; })

@@ -3,8 +3,10 @@
 #include "log/log_file.hpp"
 
 #include <cstring>
+#include <limits>
 
 #include "log/signal_name.hpp"
+#include "log/unmeasured.hpp"
 #include "python/arrays.hpp"
 
 namespace tandem::python {
@@ -31,6 +33,27 @@ Result<Records> read_records(const log::LogFile& file, const log::LoggedTopic& t
   });
   if (!done) return std::unexpected(done.error());
   return out;
+}
+
+/// What nobody had measured yet is no number: until the first message that has all of it.
+Status forget_unmeasured(const log::LogFile& file, const log::LoggedTopic& topic, Records& out) {
+  const auto unknown = log::Unmeasured::of(file, topic);
+  if (!unknown) return std::unexpected(unknown.error());
+  const auto fields = topic.layout.fields();
+  auto* at = reinterpret_cast<std::byte*>(out.block.data());
+  for (std::size_t row = 0; row < out.time_s.size(); ++row, at += out.stride) {
+    bool all = true;
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+      for (std::size_t i = 0; unknown->tells(f) && i < fields[f].count; ++i) {
+        if (!unknown->is(f, i, {at, topic.layout.bytes()})) continue;
+        all = false;
+        const double none = std::numeric_limits<double>::quiet_NaN();
+        std::memcpy(at + fields[f].offset + i * sizeof none, &none, sizeof none);
+      }
+    }
+    if (all) break;
+  }
+  return {};
 }
 
 class Log {
@@ -66,9 +89,13 @@ class Log {
     }
     auto records = std::make_shared<Records>();
     {
-      Result<Records> read = [&] {
+      Result<Records> read = [&]() -> Result<Records> {
         const Away away;
-        return read_records(file_, *topic);
+        Result<Records> all = read_records(file_, *topic);
+        if (!all) return all;
+        const Status known = forget_unmeasured(file_, *topic, *all);
+        if (!known) return std::unexpected(known.error());
+        return all;
       }();
       *records = take(std::move(read));
     }
@@ -77,7 +104,8 @@ class Log {
     const auto* base = reinterpret_cast<const std::byte*>(records->block.data());
     py::list fields =
         views(topic->layout, base, count, static_cast<py::ssize_t>(records->stride), owner, false);
-    const py::array_t<double> time_s(count, records->time_s.data(), owner);
+    py::array_t<double> time_s(count, records->time_s.data(), owner);
+    time_s.attr("flags").attr("writeable") = false;
     return py::make_tuple(time_s, fields);
   }
 
@@ -122,6 +150,7 @@ void add_log(py::module_& module) {
   using namespace py::literals;
   py::class_<Log>(module, "LogFile", "A log, counted, with none of its numbers read.")
       .def(py::init<const std::string&>(), "path"_a)
+      .def_static("__new__", &made_whole)
       .def_property_readonly("path", [](const Log& log) { return log.file().path(); })
       .def_property_readonly("robot", [](const Log& log) { return log.file().info().robot; })
       .def_property_readonly("joints", [](const Log& log) { return log.file().info().joints; })
@@ -130,8 +159,23 @@ void add_log(py::module_& module) {
                              [](const Log& log) { return log.file().info().configuration; })
       .def_property_readonly("result", [](const Log& log) { return log.file().result(); })
       .def_property_readonly("truncated", [](const Log& log) { return log.file().truncated(); })
+      .def_property_readonly("parts",
+                             [](const Log& log) {
+                               std::vector<std::string> paths;
+                               for (const auto& one : log.file().parts()) paths.push_back(one.path);
+                               return paths;
+                             })
+      .def_property_readonly("remarks", [](const Log& log) { return log.file().remarks(); })
       .def_property_readonly("data_sha256", [](const Log& log) { return log.file().data_sha256(); })
       .def("channels", &Log::channels)
+      .def("full_name",
+           [](const Log& log, const std::string& name) { return log.file().full_name(name); })
+      .def(
+          "left_out",
+          [](const Log& log, const std::string& topic, const std::string& field) {
+            return log.file().left_out(topic, field);
+          },
+          "topic"_a, "field"_a = "")
       .def("read", &Log::read, "channel"_a)
       .def("events", &Log::events);
 }

@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <chrono>
 #include <filesystem>
+#include <string_view>
 #include <thread>
 
 #include "base/nearest.hpp"
@@ -96,6 +97,24 @@ void raise_unknown(const std::string& kind, const std::string& name,
            "no such " + kind + " '" + name + "'" + (hint.empty() ? "" : " (" + hint + ")"));
 }
 
+Doubles numbers_of(const std::string& name, const py::object& value) {
+  const py::array array = py::array::ensure(value);
+  const char kind = array ? array.dtype().kind() : '?';  // of None it is 'O'
+  if (std::string_view("biuf").find(kind) == std::string_view::npos) {
+    raise_value(name, "is no array of numbers");
+  }
+  Doubles numbers = Doubles::ensure(array);
+  if (!numbers) raise_value(name, "is no array of numbers");
+  return numbers;
+}
+
+py::object made_whole(const py::handle& type, const py::args& arguments, const py::kwargs& named) {
+  auto* of = reinterpret_cast<PyTypeObject*>(type.ptr());
+  auto made = py::reinterpret_steal<py::object>(py::detail::make_new_instance(of));
+  made.attr("__init__")(*arguments, **named);
+  return made;
+}
+
 std::mutex& reading() {
   static std::mutex mutex;
   return mutex;
@@ -148,6 +167,7 @@ void add_errors(py::module_& module) {
 
 PYBIND11_MODULE(_native, module) {
   module.doc() = "The C++ half of `tandem`; import tandem, not this.";
+  module.attr("__version__") = TANDEM_VERSION;
   tandem::stand_for_program(tandem::python::program_of_this_library());
   tandem::python::add_errors(module);
   tandem::python::add_kernels(module);

@@ -57,6 +57,7 @@ void add_run(py::module_& module) {
            "experiment"_a, "control_all"_a, "control_some"_a, "seed"_a, "duration_s"_a, "rate"_a,
            "scenario"_a, "hal"_a, "on_fault"_a, "delay_cycles"_a, "kernel_variant"_a, "build"_a,
            "log"_a)
+      .def_static("__new__", &made_whole)
       .def("step", &Running::step, "cycles"_a)
       .def("next", &Running::next)
       .def("save", &Running::save)
@@ -67,15 +68,9 @@ void add_run(py::module_& module) {
       .def("texts", &Running::texts)
       .def("finish", &Running::finish)
       .def("close", &Running::close)
-      .def(
-          "stop",
-          [](Running& r, int category) {
-            if (category < 0 || category > 2)
-              raise_value("stop", "category: " + std::to_string(category) + ", wanted 0, 1 or 2");
-            r.run().cycle().inbox().emergency_stop(static_cast<hal::StopCategory>(category));
-          },
-          "category"_a)
-      .def("reset_faults", [](Running& r) { r.run().cycle().inbox().reset_faults(); })
+      .def("stop", &Running::stop, "category"_a)
+      .def("reset_faults", &Running::reset_faults)
+      .def("start", &Running::start)
       .def("faults", &faults_of)
       .def("result", &Running::result)
       .def("limits", [](const Running& r) { return limits_of(r.run()); })

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <functional>
 #include <string_view>
 #include <utility>
@@ -48,13 +49,25 @@ const ModeName& mode_of(const std::string& name) {
   raise_unknown("mode", name, known);
 }
 
-void check_place(const runtime::Experiment& e) {
-  if (e.hal.backend == runtime::BackendKind::kSim) return;
+bool is_backend(std::string_view hal) { return hal == "can" || hal == "ethercat" || hal == "dds"; }
+
+[[noreturn]] void refuse_place(const std::string& file) {
   raise(Error{.message = "Python steps a robot that is simulated in its own process; a robot on a "
                          "wire, or of another process, does not wait for it",
               .hint = "pass hal=\"sim\", or write the controller in C++ and use `tandem run`",
-              .file = e.file,
+              .file = file,
               .key = "hal.backend"});
+}
+
+/// In a folder, or as the file that the name's end says.
+Result<std::unique_ptr<log::Recorder>> open_log_at(const runtime::Composition& c,
+                                                   const std::filesystem::path& place) {
+  std::error_code ignored;
+  if (place.extension() != ".mcap" || std::filesystem::is_directory(place, ignored)) {
+    return runtime::open_log(c, place);
+  }
+  const std::filesystem::path folder = place.parent_path();
+  return runtime::open_log(c, folder.empty() ? "." : folder, place.filename());
 }
 
 }  // namespace
@@ -65,8 +78,17 @@ Running::Turn::Turn(Running& of) : of_(&of) {
   }
 }
 
+void Running::check_going(const char* what) const {
+  check_open();
+  if (!over()) return;
+  raise(fail(std::string(what) + ": the run is over",
+             "open another one, or restore() a snapshot of it")
+            .error());
+}
+
 Running::Running(const std::string& file, runtime::Overrides overrides, const std::string& all,
                  const Control& some, const std::string& log) {
+  if (is_backend(overrides.hal)) refuse_place({});
   overrides.change = [&all](runtime::Experiment& e) {
     e.loop.start_paused = false;  // there is nobody to let it go on
     if (!all.empty()) e.controllers.clear();
@@ -77,10 +99,10 @@ Running::Running(const std::string& file, runtime::Overrides overrides, const st
     return runtime::composed(file, overrides);
   }();
   c_ = take(std::move(composed));
-  check_place(c_->experiment);
+  if (c_->experiment.hal.backend != runtime::BackendKind::kSim) refuse_place(c_->experiment.file);
   if (!all.empty() || !some.empty()) add_lead(all, some);
   if (!log.empty()) {
-    recorder_ = take(runtime::open_log(*c_, log));
+    recorder_ = take(open_log_at(*c_, log));
     log_path_ = recorder_->path();
     plugins_at_start_ = c_->controllers->code().size();
     process_ = ::getpid();
@@ -96,6 +118,7 @@ Running::Running(const std::string& file, runtime::Overrides overrides, const st
                     run().cycle().phase() == RunPhase::kSettling)) {
     advance();
   }
+  first_ = run().state().cycle()[0];
 }
 
 Running::~Running() {
@@ -136,11 +159,8 @@ void Running::check_open() const {
 
 bool Running::step(std::int64_t cycles) {
   const Turn turn(*this);
-  check_open();
   if (cycles < 1) raise_value("step", "cycles: " + std::to_string(cycles) + ", wanted 1 or more");
-  if (over()) {
-    raise(fail("the run is over", "open another one, or restore() a snapshot of it").error());
-  }
+  check_going("step");
   check_command();
   fresh_ = false;
   if (cycles == 1 && run().experiment().loop.rate == 0.0) return advance();
@@ -180,7 +200,7 @@ void Running::close() {
 }
 
 bool Running::next() {
-  if (over()) return false;
+  if (over() || waits_too_long()) return false;
   if (std::exchange(fresh_, false)) return true;
   return step(1);
 }
@@ -223,13 +243,43 @@ void Running::restore(const py::bytes& snapshot) {
   fresh_ = !over();
   led_ = run().cycle().phase() == RunPhase::kRunning;
   texts_before_ = run().cycle().services().texts().count();
+  if (!led_ && lead_ != nullptr) lead_->disobeyed();
+}
+
+void Running::stop(int category) {
+  if (!busy_) check_going("stop");  // also from another thread than the one that steps it
+  if (category < 0 || category > 2)
+    raise_value("stop", "category: " + std::to_string(category) + ", wanted 0, 1 or 2");
+  run().cycle().inbox().emergency_stop(static_cast<hal::StopCategory>(category));
+}
+
+void Running::reset_faults() {
+  if (!busy_) check_going("reset_faults");
+  run().cycle().inbox().reset_faults();
+}
+
+void Running::start() {
+  const Turn turn(*this);
+  check_going("start");
+  const RunPhase phase = run().cycle().phase();
+  if (phase != RunPhase::kHeld) {
+    raise(fail(std::string("start: the run is in the phase '") + hal::to_string(phase) +
+                   "', wanted 'held'",
+               phase == RunPhase::kRunning
+                   ? "its controllers lead already"
+                   : "reset_faults(), then step() until the phase is 'held'")
+              .error());
+  }
+  run().cycle().attend();  // it is judged by the state that was read
+  take(run().cycle().services().go_on());
+  take_lead();
 }
 
 std::size_t Running::inject(const std::string& scenario) {
   const Turn turn(*this);
-  check_open();
+  check_going("inject");
   const runtime::Experiment& e = run().experiment();
-  auto faults = sim::parse_scenario(scenario, "inject", e.robot, e.loop.period_ns);
+  auto faults = sim::parse_scenario(scenario, "inject", e.robot, e.loop.period_ns, e.tree().get());
   if (!faults) {
     for (Error& error : faults.error()) error.file.clear();  // there is none
     raise(faults.error());
@@ -261,13 +311,27 @@ void Running::add_lead(const std::string& all, const Control& some) {
   }
   lead_ = std::make_shared<Lead>(std::move(claims), robot.shape());
   const auto nothing = TomlDocument::parse("", c_->experiment.file);
-  take(c_->controllers->add("python", lead_, nothing->root(), true));
+  Status added = c_->controllers->add("python", lead_, nothing->root(), true);
+  if (added) return;
+  if (!added.error().hint.empty()) {  // it is the experiment's controller that is in the way
+    added.error().hint =
+        "leave these joints out of its parameters (`joints = [...]`), or out of `control`; "
+        "control=\"MODE\" leads every joint, without the experiment's controllers";
+  }
+  raise(added.error());
 }
 
 void Running::begin() {
   begun_ = run().cycle().begin();
+  take_lead();
+}
+
+/// Where Python begins to lead, its command does; where it does not lead any more, nobody obeys it.
+void Running::take_lead() {
   const bool leads = begun_ && run().cycle().phase() == RunPhase::kRunning;
-  if (leads && !led_ && lead_ != nullptr) lead_->follow(run().state(), run().command());
+  if (leads != led_ && lead_ != nullptr) {
+    leads ? lead_->follow(run().state(), run().command()) : lead_->disobeyed();
+  }
   led_ = leads;
 }
 
@@ -281,8 +345,22 @@ bool Running::advance() {
 /// Cycles between two looks at what Ctrl-C asks for.
 std::int64_t Running::per_turn() const { return run().experiment().loop.rate > 0.0 ? 1 : 100; }
 
+/// In fault, or held, no time runs out where the run waits for an operator: a loop over it ends.
+bool Running::waits_too_long() const {
+  const RunPhase phase = run().cycle().phase();
+  if (phase == RunPhase::kRunning || run().experiment().endless()) return false;
+  return run().state().cycle()[0] >= first_ + run().experiment().cycles();
+}
+
 void Running::check_command() const {
   if (lead_ == nullptr) return;
+  if (!led_ && lead_->take_unheard()) {
+    const std::string text = std::string("the run is in the phase '") +
+                             hal::to_string(run().cycle().phase()) +
+                             "': its command is not obeyed (reset_faults(), and start() once it is "
+                             "'held', give it back)";
+    if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  }
   const auto bad = lead_->find_bad();
   if (!bad) return;
   raise_value("command." + std::string(bad->field),
@@ -304,6 +382,7 @@ std::string Running::ask(const std::string& question) {
   }
   if (begun_) cycle.attend();  // what is asked for is judged by the state that was read
   const apps::Json answer = commands_->answer(question);
+  take_lead();
   if (!answer.value("ok", false)) {
     raise(fail(answer.value("error", "no answer"), answer.value("hint", "")).error());
   }
@@ -331,55 +410,6 @@ py::list Running::texts() {
                               one.level == hal::TextLevel::kWarn ? "warn" : "info", one.words()));
   }
   return all;
-}
-
-py::list faults_of(const Running& running) {
-  py::list out;
-  for (const runtime::FaultReport& one : running.run().cycle().faults()) {
-    py::dict fault;
-    fault["time_s"] = one.time_s;
-    fault["cycle"] = one.cycle;
-    fault["joint"] = one.joint;
-    fault["board"] = one.board;
-    fault["text"] = one.text;
-    fault["category"] = static_cast<int>(one.category);
-    fault["latched"] = one.latched;
-    out.append(std::move(fault));
-  }
-  return out;
-}
-
-py::dict Running::result() {
-  const Turn turn(*this);
-  const runtime::RunStatistics& figures = run().cycle().statistics();
-  const double period_s = static_cast<double>(run().experiment().loop.period_ns) * 1e-9;
-  py::dict joints, out;
-  const auto tracking = figures.tracking();
-  const auto limited = figures.limited_cycles();
-  for (std::size_t j = 0; j < tracking.size(); ++j) {
-    py::dict joint;
-    const bool any = tracking[j].cycles > 0;
-    joint["rms_tracking_error_rad"] = any ? py::cast(tracking[j].rms_rad) : py::none();
-    joint["max_tracking_error_rad"] = any ? py::cast(tracking[j].max_rad) : py::none();
-    joint["limited_cycles"] = limited[j];
-    joints[run().experiment().robot.joints[j].name.c_str()] = std::move(joint);
-  }
-  out["cycles"] = run().cycle().loop().cycles;
-  out["running_cycles"] = run().cycle().running_cycles();
-  out["simulated_s"] = static_cast<double>(run().cycle().running_cycles()) * period_s;
-  out["phase"] = hal::to_string(run().cycle().phase());
-  out["faults"] = faults_of(*this);
-  out["joints"] = std::move(joints);
-  if (const auto work = figures.work(period_s)) {
-    out["work"] = py::dict(py::arg("done_J") = work->done_J, py::arg("taken_J") = work->taken_J,
-                           py::arg("max_power_W") = work->max_power_W);
-  }
-  if (const auto base = figures.base()) {
-    out["base"] = py::dict(py::arg("min_height_m") = base->min_height_m,
-                           py::arg("max_height_m") = base->max_height_m,
-                           py::arg("max_tilt_rad") = base->max_tilt_rad);
-  }
-  return out;
 }
 
 }  // namespace tandem::python

@@ -28,7 +28,7 @@ class Running {
   /// Opens the run and steps it to its first cycle of control.
   /// @param all   the mode of every joint, without the experiment's controllers; empty: see `some`
   /// @param some  the modes of those that Python leads beside them
-  /// @param log   open_log()'s place; empty: nothing is logged
+  /// @param log   its folder, or a new NAME.mcap; empty: nothing is logged
   /// Errors: compose()'s; a robot that is not simulated in this process; an unknown joint or mode;
   /// open_log()'s.
   Running(const std::string& file, runtime::Overrides overrides, const std::string& all,
@@ -52,13 +52,20 @@ class Running {
   void close();
   /// The log's; empty: there is none.
   [[nodiscard]] const std::string& log_path() const { return log_path_; }
-  /// For iteration: the state that nobody has looked at yet, or else the next one.
+  /// For iteration: the state that nobody has looked at yet, or else the next one. False, too, once
+  /// the planned cycles have passed in fault or held, where none of them counts.
   bool next();
 
   /// A mark, whether the cycle has begun, and a hash of all the rest, which is RobotCycle's.
   [[nodiscard]] py::bytes save();
   /// Errors: another run's; a run with a log, which goes forward only.
   void restore(const py::bytes& snapshot);
+  /// Acts in this cycle, as the next ones. Errors: a run that is over.
+  void stop(int category);
+  void reset_faults();
+  /// The controllers that a reset holds back, and Python, lead again: its command begins where the
+  /// robot is. Error: another phase than kHeld.
+  void start();
   /// A command of the control socket that concerns controllers, inputs, joints, sensors or signals,
   /// carried out in this cycle. @return the answer's JSON. Errors: the command's.
   [[nodiscard]] std::string ask(const std::string& question);
@@ -68,7 +75,8 @@ class Running {
   /// (time_s, cycle, controller, level, text).
   [[nodiscard]] py::list texts();
 
-  /// Figures so far, by the names of `tandem run --json`.
+  /// Figures so far, those of `tandem run --json` that are of the simulation and not of the
+  /// program.
   [[nodiscard]] py::dict result();
 
   /// The faults of a scenario's text. @return how many
@@ -91,9 +99,12 @@ class Running {
   void end_log();
   void check_open() const;
   void begin();
+  void take_lead();
   bool advance();
   [[nodiscard]] std::int64_t per_turn() const;
   void check_command() const;
+  void check_going(const char* what) const;
+  [[nodiscard]] bool waits_too_long() const;
 
   std::unique_ptr<runtime::Composition> c_;
   std::unique_ptr<log::Recorder> recorder_;  // null: nothing is logged
@@ -107,9 +118,10 @@ class Running {
   std::shared_ptr<Lead> lead_;
   std::vector<std::string> joints_;
   std::atomic<bool> busy_{false};
-  bool begun_ = false;  // the cycle's first half is done
-  bool fresh_ = true;   // nobody has looked at its state
-  bool led_ = false;    // controllers ran in the cycle before
+  bool begun_ = false;       // the cycle's first half is done
+  bool fresh_ = true;        // nobody has looked at its state
+  bool led_ = false;         // controllers ran in the cycle before
+  std::uint64_t first_ = 0;  // cycle of control
 };
 
 /// Every fault so far, as tandem.Run.faults has it.

@@ -53,6 +53,7 @@ struct Level {
 struct Mark {
   std::string label;  ///< empty: none
   double x = 0.0;
+  bool fault = true;  ///< false: what happened is none
 };
 
 struct Figure {

@@ -81,6 +81,10 @@ std::string data_block(const std::string& name, const Curve& curve) {
   return out + "EOD\n";
 }
 
+std::string mark_style(const Mark& mark, const char* before = "") {
+  return fmt::format("{}ls {}", before, mark.fault ? 14 : 13);
+}
+
 std::string plot_command(const Figure& figure, std::size_t index) {
   std::string out;
   const auto add = [&out](const std::string& what, const std::string& label) {
@@ -99,7 +103,7 @@ std::string plot_command(const Figure& figure, std::size_t index) {
     add(fmt::format("{:.9g} with lines ls 13", level.y), level.label);
   }
   for (const Mark& mark : figure.marks) {  // the line itself is an arrow; this is its key
-    if (!mark.label.empty()) add("NaN with lines ls 14", mark.label);
+    if (!mark.label.empty()) add(mark_style(mark, "NaN with lines "), mark.label);
   }
   return out + "\n";
 }
@@ -161,8 +165,8 @@ std::string body(const Figure& figure, std::size_t index, const Cell& cell) {
                        quoted(note.text), note.x, note.y);
   }
   for (const Mark& mark : figure.marks) {
-    out += fmt::format("set arrow from {0:.9g}, graph 0 to {0:.9g}, graph 1 nohead ls 14 front\n",
-                       mark.x);
+    out += fmt::format("set arrow from {0:.9g}, graph 0 to {0:.9g}, graph 1 nohead {1} front\n",
+                       mark.x, mark_style(mark));
   }
   out += fmt::format("set xlabel {} noenhanced\n", quoted(figure.x_label));
   return out + plot_command(figure, index);

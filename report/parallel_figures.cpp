@@ -64,6 +64,12 @@ Curve curve_between(std::string label, CurveStyle style, const Apart& one, doubl
   return curve;
 }
 
+/// "deg", "mm", or both of what is drawn.
+std::string unit_of(bool slide, bool turn, const char* turning, const char* sliding) {
+  if (slide && turn) return fmt::format("{}, {}", turning, sliding);
+  return slide ? sliding : turning;
+}
+
 /// @param angles  positions: in degrees, of a prismatic joint in mm
 Figure joints_figure(const RunData& run, const std::vector<Apart>& joints, bool angles) {
   Figure figure;
@@ -71,14 +77,17 @@ Figure joints_figure(const RunData& run, const std::vector<Apart>& joints, bool 
   figure.title = fmt::format("{} of A minus that of B: the joints that differ most",
                              angles ? "Position" : "Torque");
   figure.x_label = "time since the first SYNC [s]";
-  figure.y_label = angles ? "difference [deg, mm]" : "difference [Nm, N]";
+  bool slide = false, turn = false;
   const std::vector<std::size_t> order = largest(joints);
   for (std::size_t i = 0; i < std::min(kJointsDrawn, order.size()); ++i) {
     const std::size_t j = order[i];
     const double factor = !angles ? 1.0 : (run.slides(j) ? 1e3 : kDegrees);
+    (run.slides(j) ? slide : turn) = true;
     figure.curves.push_back(
         curve_between(run.robot.joints[j].name, kDrawnAs[i], joints[j], factor));
   }
+  figure.y_label = fmt::format("difference [{}]", angles ? unit_of(slide, turn, "deg", "mm")
+                                                         : unit_of(slide, turn, "Nm", "N"));
   return figure;
 }
 

@@ -263,27 +263,25 @@ void add_figure(Sticks& sticks, std::span<const Limb> limbs, const model::Tree& 
   add_feet(sticks.legs, feet_of(tree, robot, bodies), bodies);
 }
 
-/// Whether there is more to see from the front than from the side: by how far the bodies' centres
-/// of mass move, or, when nothing moves, by how far it reaches.
+/// Whether there is more to see from the front than from the side: by how far each figure reaches
+/// across, and how far the bodies' centres of mass move.
 bool shows_more_from_front(const model::Tree& tree, const hal::RobotConfig& robot,
                            std::span<const PostureSample> samples) {
-  constexpr double kStill_m = 0.01;
+  Eigen::Vector2d reach = Eigen::Vector2d::Zero();
   const auto first = body_placements(tree, robot, samples.front());
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
   for (const PostureSample& sample : samples) {
     const auto bodies = body_placements(tree, robot, sample);
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& point : drawn_points(tree, robot, bodies)) box.extend(point);
+    reach += box.sizes().head<2>();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const Eigen::Vector3d com = tree.bodies[i].inertia.com_m;
       const Eigen::Vector3d moved = bodies[i].R * com + bodies[i].p - first[i].R * com - first[i].p;
       way = way.cwiseMax(moved.cwiseAbs());
     }
   }
-  if (way.head<2>().maxCoeff() < kStill_m) {
-    Eigen::AlignedBox3d box;
-    for (const Eigen::Vector3d& point : drawn_points(tree, robot, first)) box.extend(point);
-    way = box.sizes();
-  }
-  return way.y() > way.x();
+  return reach.y() + way.y() > reach.x() + way.x();
 }
 
 double position_of(const hal::RobotConfig& robot, const std::string& joint,
@@ -347,16 +345,22 @@ std::vector<PostureSample> turned(const model::Tree& tree, const hal::RobotConfi
   const Eigen::AngleAxisd view(-std::atan2(right.y(), right.x()), Eigen::Vector3d::UnitZ());
   const model::Placement turn{view.toRotationMatrix(), Eigen::Vector3d::Zero()};
   std::vector<PostureSample> samples(moments.begin(), moments.end());
-  for (PostureSample& sample : samples) sample.base = turn * sample.base;
+  for (PostureSample& sample : samples) {
+    sample.base = turn * sample.base;
+    if (sample.placed) continue;
+    const std::optional<double> lowest_m = lowest_foot_m(tree, robot, sample);
+    if (lowest_m) sample.base.p.z() += robot.contact.height_m - *lowest_m;
+  }
   return samples;
 }
 
-Figure empty_figure(bool from_front, bool leaves_out) {
+Figure empty_figure(bool from_front, bool leaves_out, bool unplaced, bool legged) {
   Figure figure;
   figure.name = "posture";
   figure.title =
       from_front ? "Posture, seen from the front" : "Posture, seen from the robot's right";
   if (leaves_out) figure.title += ", without what passive joints move";
+  if (unplaced) figure.title += legged ? "; base unknown: upright on its feet" : "; base unknown";
   figure.y_label = "z [m]";
   figure.equal_axes = true;
   return figure;
@@ -373,6 +377,16 @@ std::vector<model::Placement> body_placements(const model::Tree& tree,
   return model::place_bodies(tree, position, sample.base);
 }
 
+std::optional<double> lowest_foot_m(const model::Tree& tree, const hal::RobotConfig& robot,
+                                    const PostureSample& sample) {
+  std::optional<double> lowest_m;
+  for (const FootPoints& foot : feet_of(tree, robot, body_placements(tree, robot, sample))) {
+    for (const Eigen::Vector3d& point : foot.points_m)
+      lowest_m = std::min(lowest_m.value_or(point.z()), point.z());
+  }
+  return lowest_m;
+}
+
 Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configured,
                       std::span<const PostureSample> moments) {
   const std::vector<bool> unknown = unknown_bodies(tree, configured, moments);
@@ -382,7 +396,8 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configure
   const bool legged = !robot.contact.feet.empty();
   const bool from_front = !legged && shows_more_from_front(tree, robot, moments);
   const std::vector<PostureSample> samples = turned(tree, robot, moments, from_front);
-  Figure figure = empty_figure(from_front, leaves_out);
+  const bool unplaced = !std::ranges::all_of(samples, &PostureSample::placed);
+  Figure figure = empty_figure(from_front, leaves_out, unplaced, legged);
   Sticks sticks(legged ? "trunk" : robot.name);
   const std::vector<Limb> limbs = known_limbs(tree, robot, unknown);
   std::vector<Sticks> drawn;

@@ -36,11 +36,20 @@ void add_faults(const RunData& run, const std::string& side, Facts& facts) {
   if (more > 0) facts.emplace_back("fault" + side, fmt::format("{} more", more));
 }
 
+void add_payloads(const RunData& run, const std::string& side, Facts& facts) {
+  for (const PayloadMark& one : run.payloads) {
+    const std::string what = one.text.substr(one.text.find(' ') + 1);  // without "payload "
+    facts.emplace_back("payload" + side, fmt::format("{}, at {:.3f} s", what, one.time_s));
+  }
+}
+
 void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   facts.emplace_back(
       "log" + side,
       run.path + (run.truncated ? " (cut: its run was killed, or the copy is not whole)" : ""));
+  for (const std::string& one : run.remarks) facts.emplace_back("log" + side, one);
   add_faults(run, side, facts);
+  add_payloads(run, side, facts);
   const std::size_t passive = run.robot.passive.size();
   facts.emplace_back(
       "robot" + side,
@@ -53,7 +62,7 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   const double start_s = run.time_s.front();
   const double ran_s = run.controllers_ran ? run.time_s[run.rows_before_stop() - 1] - start_s : 0.0;
   const bool imported = run.info.hal == "import";
-  if (run.controllers_ran && !imported) {
+  if (run.controllers_ran && !imported && run.remarks.empty()) {
     facts.emplace_back("controllers started" + side, fmt::format("{:.3f} s", start_s));
   }
   facts.emplace_back((imported ? "recorded" : "controllers ran") + side,
@@ -282,6 +291,20 @@ std::vector<std::string> close_and_remark(const std::vector<RunData*>& all,
   return remarks;
 }
 
+/// "A: coman-squat-001, B: coman-squat-002": what the letters in a picture mean.
+std::string letters_of(const RunData& run, const OtherRuns& others, bool parallel) {
+  if (parallel) return "A: the robot, B: the one beside it";
+  const auto stem = [](const RunData& one) {
+    return std::filesystem::path(one.path).stem().string();
+  };
+  bool distinct = true;
+  for (const RunData* one : others) distinct = distinct && stem(*one) != stem(run);
+  std::string text = "A: " + (distinct ? stem(run) : run.path);
+  for (std::size_t i = 0; i < others.size(); ++i)
+    text += fmt::format(",{}: {}", kSides[i + 1], distinct ? stem(*others[i]) : others[i]->path);
+  return text;
+}
+
 /// All figures of the report, in its order. `parallel`: the other run is the internal model.
 Result<std::vector<Figure>> draw_all(const RunData& run, const OtherRuns& others, bool parallel,
                                      const tandem_kernels* kernels,
@@ -298,6 +321,10 @@ Result<std::vector<Figure>> draw_all(const RunData& run, const OtherRuns& others
   for (auto* more : {&*wrenches, &*signals}) {
     figures.insert(figures.end() - 1, std::make_move_iterator(more->begin()),
                    std::make_move_iterator(more->end()));
+  }
+  if (!others.empty()) {
+    const std::string letters = letters_of(run, others, parallel);
+    for (Figure& figure : figures) figure.x_label += (figure.x_label.empty() ? "" : "; ") + letters;
   }
   for (Figure& figure : figures)
     if (!figure.equal_axes) break_at_gaps(figure);  // all but the posture are over time

@@ -170,13 +170,28 @@ std::vector<RunParameter> parameters_of(const std::vector<log::EventText>& event
   return all;
 }
 
+std::vector<PayloadMark> payloads_of(const std::vector<log::EventText>& events) {
+  std::vector<PayloadMark> marks;
+  for (const auto& [event, text] : events) {
+    const bool dropped = event.kind == log::EventKind::kDropped;
+    if (!dropped && event.kind != log::EventKind::kPickedUp) continue;
+    marks.push_back({static_cast<double>(event.time_ns) * 1e-9, dropped, text});
+  }
+  return marks;
+}
+
 Result<log::TimeSeries> state_columns(const log::LogFile& file, const char* topic,
                                       const RunData& run) {
   const std::size_t n = run.robot.joints.size();
   const std::size_t channels = run.first_channel(run.robot.sensors.size());
-  return read_columns(
-      file, topic,
-      {{"position_rad", n}, {"velocity_rad_s", n}, {"torque_nm", n}, {"sensor", channels}});
+  const log::LoggedTopic* const state = file.find(topic);  // a recording of others has no faults
+  const bool faults = state != nullptr && state->layout.find("fault") != nullptr;
+  return read_columns(file, topic,
+                      {{"position_rad", n},
+                       {"velocity_rad_s", n},
+                       {"torque_nm", n},
+                       {"sensor", channels},
+                       {"fault", faults ? n : 0}});
 }
 
 /// What was measured in the window.
@@ -192,6 +207,7 @@ Status read_rows(log::TimeSeries& table, const log::RunWindow& window, RunData& 
   run.velocity_rad_s = take(table, n, n);
   run.torque_Nm = take(table, 2 * n, n);
   run.sensor = take(table, 3 * n, channels);
+  run.drive_fault = take(table, 3 * n + channels, table.columns.size() - 3 * n - channels);
   return {};
 }
 
@@ -270,8 +286,8 @@ void resize_rows(RunData& run, std::size_t rows) {
   run.time_s.resize(rows);
   for (Columns* columns :
        {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm, &run.reference_rad, &run.sensor,
-        &run.base, &run.foot_position_m, &run.foot_force_N, &run.foot_moment_Nm, &run.loop_error,
-        &run.passive_rad}) {
+        &run.drive_fault, &run.base, &run.foot_position_m, &run.foot_force_N, &run.foot_moment_Nm,
+        &run.loop_error, &run.passive_rad}) {
     for (std::vector<double>& column : *columns) column.resize(rows);
   }
 }
@@ -366,6 +382,16 @@ std::vector<double> RunData::positions(std::size_t row) const {
   return q;
 }
 
+std::vector<double> RunData::measured(const Columns& columns, std::size_t joint) const {
+  constexpr double kNoNumber = 0x7300;  // CiA 402: a sensor
+  std::vector<double> values = columns[joint];
+  for (std::size_t row = 0; !drive_fault.empty() && row < values.size(); ++row) {
+    if (drive_fault[joint][row] == kNoNumber)
+      values[row] = std::numeric_limits<double>::quiet_NaN();
+  }
+  return values;
+}
+
 bool RunData::slides(std::size_t joint) const {
   const int index = tree.joint_index(robot.joints[joint].name);
   return index >= 0 &&
@@ -421,6 +447,7 @@ Result<std::optional<RunData>> read_parallel(const RunData& run) {
   if (file->find(kParallelState) == nullptr) return std::nullopt;
   RunData second = run;
   second.faults.clear();
+  second.payloads.clear();  // they are the first one's
   for (Columns* truth : {&second.base, &second.foot_position_m, &second.foot_force_N,
                          &second.foot_moment_Nm, &second.loop_error, &second.passive_rad}) {
     truth->clear();
@@ -453,6 +480,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   run.info = file->info();
   run.result = file->result();
   run.truncated = file->truncated();
+  run.remarks = file->remarks();
   run.data_sha256 = file->data_sha256();
   if (const Status s = read_configuration(run); !s) return std::unexpected(s.error());
   if (const Status s = read_description(run); !s) return std::unexpected(s.error());
@@ -460,6 +488,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   if (!events) return std::unexpected(events.error());
   run.faults = faults_of(*events, run.info.joints, error_text);
   run.parameters = parameters_of(*events, run.info.parameters);
+  run.payloads = payloads_of(*events);
   log::RunWindow window = log::run_window(*events, run.settle_s);
   if (const Status s = read_state(*file, window, run); !s) return std::unexpected(s.error());
   if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());

@@ -52,6 +52,13 @@ struct RunParameter {
   std::size_t changes = 0;  ///< how often it was set
 };
 
+/// What the simulated robot picked up or dropped.
+struct PayloadMark {
+  double time_s = 0.0;  ///< since the first SYNC
+  bool dropped = false;
+  std::string text;  ///< "payload picked up: box, 1.6 kg on panda_hand"
+};
+
 /// Faults of a run that are shown in the page, and as lines in its figures.
 inline constexpr std::size_t kFaultsShown = 5;
 
@@ -64,6 +71,7 @@ struct RunData {
   log::RunInfo info;
   log::StringMap result;  ///< empty when the run was killed
   bool truncated = false;
+  std::vector<std::string> remarks;  ///< log::LogFile::remarks()
   std::string data_sha256;
 
   hal::RobotConfig robot;  ///< as it was logged
@@ -82,9 +90,11 @@ struct RunData {
   double drawn_to_s = std::numeric_limits<double>::infinity();     ///< rows in these are drawn
   std::vector<RunFault> faults;                                    ///< in the order of their times
   std::vector<RunParameter> parameters;                            ///< of its controllers
+  std::vector<PayloadMark> payloads;                               ///< the same
   Columns position_rad, velocity_rad_s, torque_Nm;                 ///< [joint][row], measured
   Columns reference_rad;    ///< [joint][row]; NaN when not under position control
   Columns sensor;           ///< [channel][row], all sensors one after another
+  Columns drive_fault;      ///< [joint][row]: error codes; empty: the log has none
   Columns base;             ///< [13][row]: position, quaternion xyzw, velocity of the base
                             ///< in its frame; by the truth or, without it, by the run's
                             ///< estimate; empty without either
@@ -112,6 +122,9 @@ struct RunData {
   [[nodiscard]] model::Placement base_placement(std::size_t row) const;
   /// Every joint's position at a row, in the image's order, then the passive ones'.
   [[nodiscard]] std::vector<double> positions(std::size_t row) const;
+  /// A joint's column without what its board repeats while one of its sensors gives no number
+  /// (NaN).
+  [[nodiscard]] std::vector<double> measured(const Columns& columns, std::size_t joint) const;
   /// Whether a joint (image) is prismatic: its columns are m, m/s and N then.
   [[nodiscard]] bool slides(std::size_t joint) const;
   bool estimated = false;  ///< base, foot forces and moments are the run's estimate

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <numeric>
 #include <utility>
@@ -67,6 +68,9 @@ bool has_numbers(const std::vector<double>& values) {
   return std::ranges::any_of(values, [](double value) { return std::isfinite(value); });
 }
 
+/// Whether nobody knows where the base was.
+bool unplaced(const RunData& run) { return run.robot.model.floating_base && !run.motion_known(); }
+
 bool legged(const RunData& run) { return !run.robot.contact.feet.empty(); }
 
 Curve curve_of(const RunData& run, std::string label, CurveStyle style,
@@ -89,6 +93,17 @@ std::string side_of(std::size_t index, const OtherRuns& others) {
 constexpr CurveStyle kOthers[] = {CurveStyle::kSecond, CurveStyle::kFourth};
 static_assert(std::size(kOthers) == kMostOthers);
 
+/// What the robot picked up and dropped while it is drawn.
+void add_payloads(const RunData& run, const std::string& side, Figure& figure) {
+  std::string labels[] = {"payload picked up" + side, "payload dropped" + side};
+  for (const PayloadMark& one : run.payloads) {
+    const bool seen = one.time_s >= run.time_s.front() && one.time_s <= run.time_s.back();
+    if (!seen || !run.is_drawn(one.time_s)) continue;
+    figure.marks.push_back(
+        {std::exchange(labels[one.dropped ? 1 : 0], ""), run.drawn(one.time_s), false});
+  }
+}
+
 /// What every figure over time has: its axis, and where runs had faults. The spike of one that
 /// stopped a run may be there before the loop knows of the fault: it does not widen the plots.
 void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
@@ -97,6 +112,7 @@ void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
   for (std::size_t i = 0; i <= others.size(); ++i) {
     const RunData& one = i == 0 ? run : *others[i - 1];
     const RunFault* const stop = one.stop();
+    add_payloads(one, side_of(i, others), figure);
     std::string reported = "fault, reported" + side_of(i, others);
     for (std::size_t f = 0; f < std::min(kFaultsShown, one.faults.size()); ++f) {
       const RunFault& fault = one.faults[f];
@@ -127,10 +143,12 @@ Figure position_figure(const RunData& run, const OtherRuns& others, const Subjec
   const double factor = slides ? kMillimetres : kDegrees;
   figure.y_label = slides ? "position [mm]" : "position [deg]";
   figure.curves.push_back(curve_of(run, name_of_state(run) + side_of(0, others),
-                                   CurveStyle::kMeasured, run.position_rad[joint], factor));
+                                   CurveStyle::kMeasured, run.measured(run.position_rad, joint),
+                                   factor));
   for (std::size_t i = 0; i < others.size(); ++i) {
     figure.curves.push_back(curve_of(*others[i], name_of_state(*others[i]) + side_of(i + 1, others),
-                                     kOthers[i], others[i]->position_rad[joint], factor));
+                                     kOthers[i],
+                                     others[i]->measured(others[i]->position_rad, joint), factor));
   }
   figure.curves.push_back(curve_of(run, "reference" + side_of(0, others), CurveStyle::kReference,
                                    run.reference_rad[joint], factor));
@@ -142,8 +160,10 @@ double gravity_m_s2(const RunData& run) {
   return std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
 }
 
-/// Weight of everything that moves [N].
+/// Weight of everything that moves [N]: as the run says it where its plant was another one.
 double weight_N(const RunData& run) {
+  const std::string said = log::value_of(run.result, "weight_N");
+  if (!said.empty()) return std::strtod(said.c_str(), nullptr);
   double mass_kg = 0.0;
   for (const model::Body& body : run.tree.bodies) mass_kg += body.inertia.mass_kg;
   return mass_kg * gravity_m_s2(run);
@@ -216,6 +236,7 @@ Figure force_figure(const RunData& run, const OtherRuns& others, const std::vect
   figure.title = sensors.empty() ? "Vertical force of the ground on the feet (simulated)"
                                  : fmt::format("Vertical force in the {}six-axis sensors",
                                                legged(run) ? "legs' " : "");
+  if (!sensors.empty() && unplaced(run)) figure.title += ", the base taken as upright";
   add_time(run, others, figure);
   figure.y_label = "force [N]";
   const std::size_t shown =
@@ -255,10 +276,11 @@ Figure torque_figure(const RunData& run, const OtherRuns& others, const Subjects
   add_time(run, others, figure);
   figure.y_label = slides ? "force [N]" : "torque [Nm]";
   figure.curves.push_back(curve_of(run, name_of_state(run) + side_of(0, others),
-                                   CurveStyle::kMeasured, run.torque_Nm[joint], 1.0));
+                                   CurveStyle::kMeasured, run.measured(run.torque_Nm, joint), 1.0));
   for (std::size_t i = 0; i < others.size(); ++i) {
     figure.curves.push_back(curve_of(*others[i], name_of_state(*others[i]) + side_of(i + 1, others),
-                                     kOthers[i], others[i]->torque_Nm[joint], 1.0));
+                                     kOthers[i], others[i]->measured(others[i]->torque_Nm, joint),
+                                     1.0));
   }
   if (kernels == nullptr) return figure;
   Result<Curve> computed = inverse_dynamics_curve(run, subjects.torque_of, *kernels);
@@ -281,12 +303,25 @@ std::size_t nearest_row(const std::vector<double>& values, double wanted, std::s
   return best;
 }
 
+/// How high the base was at every row; where nobody knows, above its feet. Empty: it has none.
+std::vector<double> base_height(const RunData& run) {
+  if (!run.robot.model.floating_base) return {};
+  if (!unplaced(run)) return run.base[2];
+  std::vector<double> height_m;
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    const PostureSample sample{"", run.time_s[row], {}, run.positions(row)};
+    const std::optional<double> foot_m = lowest_foot_m(run.tree, run.robot, sample);
+    if (!foot_m) return {};
+    height_m.push_back(-*foot_m);
+  }
+  return height_m;
+}
+
 /// Whether the base goes down, and not only gives way: by more than a fiftieth of its height.
-bool squats(const RunData& run) {
-  if (!run.truth() || !run.robot.model.floating_base) return false;
-  const auto first = run.base[2].begin();
-  const auto [low, high] =
-      std::minmax_element(first, first + static_cast<std::ptrdiff_t>(run.rows_before_stop()));
+bool squats(const std::vector<double>& height_m, std::size_t rows) {
+  if (height_m.empty()) return false;
+  const auto first = height_m.begin();
+  const auto [low, high] = std::minmax_element(first, first + static_cast<std::ptrdiff_t>(rows));
   return *high - *low > 0.02 * std::abs(*first);
 }
 
@@ -294,8 +329,9 @@ bool squats(const RunData& run) {
 /// `joint`'s position.
 /// @param suffix  behind each label, when two runs stand beside each other: then fewer moments.
 std::vector<PostureSample> moments(const RunData& run, int joint, const std::string& suffix) {
-  const bool base = squats(run);
-  const std::vector<double>& whole = base ? run.base[2] : run.position_rad[at(joint)];
+  const std::vector<double> height_m = base_height(run);
+  const bool base = squats(height_m, run.rows_before_stop());
+  const std::vector<double>& whole = base ? height_m : run.position_rad[at(joint)];
   std::vector<std::size_t> rows;  // that are drawn
   std::vector<double> depth;
   for (std::size_t row = 0; row < run.rows_before_stop(); ++row) {
@@ -307,8 +343,8 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   if (rows.empty()) return samples;
   const auto add = [&](const char* what, std::size_t shown) {
     const std::size_t row = rows[shown];
-    samples.push_back(
-        {what + suffix, run.drawn(run.time_s[row]), run.base_placement(row), run.positions(row)});
+    samples.push_back({what + suffix, run.drawn(run.time_s[row]), run.base_placement(row),
+                       run.positions(row), !unplaced(run)});
   };
   const std::size_t last = depth.size() - 1;
   const double start = depth.front();

@@ -1,6 +1,7 @@
 // The only place where the loop meets the recorder.
 #include "runtime/cycle_log.hpp"
 
+#include <cstdlib>
 #include <set>
 #include <utility>
 
@@ -153,13 +154,18 @@ void CycleLog::event(const hal::CycleTime& time,
                      const hal::InjectedFault& fault) noexcept TANDEM_RT {
   if (recorder_ == nullptr) return;
   const bool of_joint = fault.target == hal::FaultTarget::kJoint;
-  recorder_->push(log::Event{.cycle = time.cycle,
-                             .time_ns = time.time_ns,
-                             .code = static_cast<std::uint32_t>(fault.kind),
-                             .joint = of_joint ? fault.index : -1,
-                             .kind = log::EventKind::kInjected,
-                             .target = fault.target,
-                             .value = static_cast<float>(fault.index)});
+  log::Event event{.cycle = time.cycle,
+                   .time_ns = time.time_ns,
+                   .code = static_cast<std::uint32_t>(fault.kind),
+                   .joint = of_joint ? fault.index : -1,
+                   .kind = log::EventKind::kInjected,
+                   .target = fault.target,
+                   .value = static_cast<float>(fault.index)};
+  if (fault.kind == hal::FaultKind::kPayload) {
+    event.kind = fault.index < 0 ? log::EventKind::kDropped : log::EventKind::kPickedUp;
+    event.code = static_cast<std::uint32_t>(std::abs(fault.index));
+  }
+  recorder_->push(event);
 }
 
 void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::string_view name,

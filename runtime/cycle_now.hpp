@@ -21,6 +21,7 @@
 #include "runtime/inbox.hpp"
 #include "runtime/owner_controller.hpp"
 #include "runtime/progress.hpp"
+#include "runtime/run_identity.hpp"
 #include "runtime/run_machine.hpp"
 #include "runtime/snapshot_port.hpp"
 
@@ -38,6 +39,7 @@ struct CycleParts {
   RemoteCommandParts owner = {};               ///< for one in another process
   estimation::Estimator* estimator = nullptr;  ///< null: nothing is estimated
   SnapshotPort* snapshots = nullptr;           ///< null: nobody wants any while it runs
+  RunIdentity identity = {};                   ///< a snapshot of another one is refused
 };
 
 /// What the parts of RobotCycle know of this cycle. RobotCycle fills it; they read it, note faults

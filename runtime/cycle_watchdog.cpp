@@ -64,7 +64,9 @@ void CycleWatchdog::run() {
     if (beats == 0 || (limit == nanoseconds{} && !crashed)) continue;
     if (crashed) limit = {};  // there is nothing to wait for
     silent += awake;
-    if (silent > limit && !crashed && config_.waits_for_debugger && is_debugged()) silent = {};
+    if (silent > limit && !crashed && config_.waits_for_debugger && time_limits_are_waived()) {
+      silent = {};
+    }
     if (!hung && silent > limit) {
       hung = true;
       hooks_.on_hang(at_work);

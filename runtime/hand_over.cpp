@@ -27,13 +27,15 @@ void HandOver::take() noexcept TANDEM_RT {
   if (!ends(now_.run.phase())) statistics_.take_base(now_.truth);
   now_.log.images(now_.time, now_.state, told, now_.truth, now_.estimate());
   show_controllers();
-  show();
+  show_progress();
+  show_joints(told);
+  show_sensors();
   if (now_.observer != nullptr) show(told);
 }
 
 void HandOver::show() noexcept TANDEM_RT {
   show_progress();
-  show_joints();
+  show_joints(arbiter_.told());
   show_sensors();
 }
 
@@ -95,7 +97,7 @@ void HandOver::show(const hal::CommandImage& told) noexcept TANDEM_RT {
 }
 
 /// What is asked of a joint is what its owner wants, before a delay and a transfer.
-void HandOver::show_joints() noexcept TANDEM_RT {
+void HandOver::show_joints(const hal::CommandImage& told) noexcept TANDEM_RT {
   const hal::CommandImage& wanted = arbiter_.wanted();
   const hal::StateImage& state = now_.state;
   JointReferences& references = now_.controllers.references();
@@ -112,7 +114,7 @@ void HandOver::show_joints() noexcept TANDEM_RT {
     joint.current_A = state.current_A()[j];
     joint.voltage_V = state.voltage_V()[j];
     joint.temperature_C = state.temperature_C()[j];
-    joint.commanded_rad = arbiter_.command().position_rad()[j];
+    joint.commanded_rad = told.position_rad()[j];
     joint.stiffness_Nm_rad = impedance.stiffness_Nm_rad;
     joint.damping_Nms_rad = impedance.damping_Nms_rad;
     joint.fault = state.fault()[j];

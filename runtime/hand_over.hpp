@@ -31,7 +31,7 @@ class HandOver {
  private:
   void show_controllers() noexcept TANDEM_RT;
   void show_progress() noexcept TANDEM_RT;
-  void show_joints() noexcept TANDEM_RT;
+  void show_joints(const hal::CommandImage& told) noexcept TANDEM_RT;
   void show_sensors() noexcept TANDEM_RT;
   void show_gains() noexcept TANDEM_RT;
   void show(const hal::CommandImage& told) noexcept TANDEM_RT;

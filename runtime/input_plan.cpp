@@ -128,8 +128,11 @@ Result<InputPlan> plan_of(const PlannedInput& input, const Rows& rows, const Inp
   double before_s = 0.0;
   const auto at = [&](std::size_t r) {
     if (rows.file.empty()) return source.where;
-    return Error{
-        .message = {}, .hint = {}, .file = rows.file, .line = rows.rows[r].line, .key = {}};
+    return Error{.message = {},
+                 .hint = {},
+                 .file = rows.file,
+                 .line = r < rows.rows.size() ? rows.rows[r].line : 1,
+                 .key = {}};
   };
   const auto place = [&](std::size_t r) {
     return rows.file.empty() ? fmt::format("row {} of its timeline ", r + 1) : std::string();
@@ -140,14 +143,16 @@ Result<InputPlan> plan_of(const PlannedInput& input, const Rows& rows, const Inp
                      fmt::format("after_s and its {} joints", input.block.components.size()),
                  "leave `components` out, and name the joints in their order in a file");
   }
+  for (std::size_t r = 0; r < rows.rows.size(); ++r) {
+    const std::size_t numbers = rows.rows[r].numbers.size();
+    if (numbers == rows.components.size()) continue;
+    return wrong(at(r),
+                 place(r) + fmt::format("has {} numbers after its time, not {}", numbers,
+                                        rows.components.size()),
+                 "a row is the time [s], then each of `components`, or of the input's");
+  }
   for (std::size_t r = 0; r < rows.rows.size();) {
     const Row& row = rows.rows[r];
-    if (row.numbers.size() != rows.components.size()) {
-      return wrong(at(r),
-                   place(r) + fmt::format("has {} numbers after its time, not {}",
-                                          row.numbers.size(), rows.components.size()),
-                   "a row is the time [s], then each of `components`, or of the input's");
-    }
     if (!(row.time_s >= before_s) || row.time_s > 1e6) {
       return wrong(at(r), place(r) + "is not later than the one before, or beyond 1e6 s",
                    "times are seconds after the controller's start, and grow");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <string>
 #include <vector>
@@ -63,6 +64,28 @@ void nothing_given(TomlTable& table) {
   if (table.keys().empty()) table.error("", "changes nothing", "give a key, or remove it");
 }
 
+/// An error of the changed description, at the link's table or key that says so.
+void place(const Error& error, TomlTable& links) {
+  constexpr std::string_view kOwn = "sim.link.", kLink = "link ";
+  const bool own = error.key.starts_with(kOwn);
+  const std::string name = own                            ? error.key.substr(kOwn.size())
+                           : error.key.starts_with(kLink) ? error.key.substr(kLink.size())
+                                                          : "";
+  // A robot.toml's inertias can be repaired. These are what somebody has just written.
+  const std::string hint = error.hint.substr(0, error.hint.find("; inertia = \"repair\""));
+  if (name.empty() || !links.has(name))
+    return links.error("", error.key + ": " + error.message, hint);
+  TomlTable at = links.table(name);
+  const auto about = [&](std::string_view key, std::string_view word) {
+    return at.has(key) && error.message.find(word) != std::string::npos;
+  };
+  const char* const key = about("inertia_kg_m2", "inertia")  ? "inertia_kg_m2"
+                          : about("com_m", "centre of mass") ? "com_m"
+                          : about("mass_kg", "mass")         ? "mass_kg"
+                                                             : "";
+  at.error(key, error.message, hint);
+}
+
 /// The description once more, with the links' masses in place of its own.
 void change_links(TomlTable links, const robot::FileTexts& files, sim::PlantChanges& plant) {
   std::vector<hal::LinkConfig>& all = plant.robot.model.links;
@@ -78,11 +101,7 @@ void change_links(TomlTable links, const robot::FileTexts& files, sim::PlantChan
     plant.tree = model->tree;
     return;
   }
-  for (const Error& error : model.error()) {
-    const bool own = error.key.starts_with("sim.link.");
-    TomlTable at = own ? links.table(error.key.substr(9)) : links;
-    at.error("", own ? error.message : error.key + ": " + error.message, error.hint);
-  }
+  for (const Error& error : model.error()) place(error, links);
 }
 
 void change_joint(TomlTable table, const std::string& name, sim::PlantChanges& plant) {
@@ -102,6 +121,13 @@ void change_joint(TomlTable table, const std::string& name, sim::PlantChanges& p
   ActuatorConfig own = robot.actuator_of(*joint);
   EncoderChange encoder;
   read_keys(table, kActuator, own);
+  for (const char* const key : {"spring_Nm_rad", "spring_damping_Nms_rad"}) {
+    if (own.order >= 2 || !table.has(key)) continue;
+    table.error(key,
+                "changes nothing: " + joint->actuator + " of " + robot.file + " is rigid (order " +
+                    std::to_string(own.order) + ")",
+                "leave it out; actuators of order 2 and 3 have a spring");
+  }
   read_keys(table, kEncoder, encoder);
   table.finish();
   own.name = table.path();  // no other actuator's
@@ -122,6 +148,25 @@ void change_joints(TomlTable joints, sim::PlantChanges& plant) {
   if (none) plant.zero_error_rad.clear();
 }
 
+/// ", from 5 s to 9 s"; nothing of what is there for good.
+std::string times_text(const PayloadTimes& times) {
+  const auto seconds = [](const char* before, double value) {
+    char text[40];
+    std::snprintf(text, sizeof text, "%s%.6g s", before, value);
+    return std::string(text);
+  };
+  return ", " + (times.from_s > 0.0 ? seconds("from ", times.from_s) : "from the start") +
+         (times.until_s ? seconds(" to ", *times.until_s) : "");
+}
+
+/// "link panda_link4: mass_kg = 3", as the table says it.
+void note(const std::string& what, const TomlTable& table, sim::PlantChanges& plant) {
+  std::string keys;
+  for (const auto& [key, value] : table.values())
+    keys += (keys.empty() ? "" : ", ") + key + " = " + value;
+  plant.differences.push_back(what + ": " + keys);
+}
+
 /// What is there for good is a part of the tree.
 void add_payload(TomlTable& table, const model::Tree& described, std::vector<std::string>& names,
                  sim::PlantChanges& plant) {
@@ -136,12 +181,17 @@ void add_payload(TomlTable& table, const model::Tree& described, std::vector<std
   if (times.until_s && !(*times.until_s > times.from_s))
     table.error("until_s", "it is dropped before it is picked up", "give more than from_s");
   if (payload.link < 0 || table.has_errors()) return;
+  payload.number = static_cast<std::uint32_t>(names.size());
+  plant.payloads.resize(names.size());
+  plant.payloads.back() = times.name + ", " + sim::words_of(payload, described);
+  plant.differences.push_back("payload " + plant.payloads.back() + times_text(times));
   if (times.from_s > 0.0 || times.until_s) {
     payload.start_ns = whole_ns(times.from_s);
     if (times.until_s) payload.duration_ns = whole_ns(*times.until_s - times.from_s);
     plant.carried.push_back(payload);
     return;
   }
+  plant.kept.push_back(payload);
   model::Link& link = plant.tree.links[static_cast<std::size_t>(payload.link)];
   model::Body& body = plant.tree.bodies[static_cast<std::size_t>(link.body)];
   const model::Inertia more = sim::load_of(payload).in_link;
@@ -171,6 +221,10 @@ std::shared_ptr<const sim::PlantChanges> read_plant_changes(TomlTable sim,
   plant->tree = description->tree;
   if (sim.has("link")) change_links(sim.table("link"), files, *plant);
   if (sim.has("joint")) change_joints(sim.table("joint"), *plant);
+  for (const char* const what : {"link", "joint"}) {
+    TomlTable all = sim.table_or_empty(what);
+    for (const std::string& name : all.keys()) note(what + (" " + name), all.table(name), *plant);
+  }
   std::vector<std::string> names;
   for (TomlTable& table : sim.tables("payload"))
     add_payload(table, description->tree, names, *plant);

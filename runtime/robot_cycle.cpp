@@ -44,7 +44,8 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
                 parts.controllers.gains(), now_.log),
       shown_(now_, resets_, homing_, arbiter_, services_),
       trace_(config.trace_cycles),
-      limited_(parts.robot.joints.size(), kNever) {}
+      limited_(parts.robot.joints.size(), kNever),
+      limits_met_(parts.robot.joints.size()) {}
 
 bool RobotCycle::begin() noexcept {
   if (now_.run.in(RunPhase::kDone)) return false;
@@ -248,23 +249,35 @@ void RobotCycle::update() noexcept TANDEM_RT {
 
 void RobotCycle::limit() noexcept TANDEM_RT {
   const Code limited = now_.limits.apply(now_.state, arbiter_.to_limit());
+  note_limits();
   const auto codes = now_.limits.codes();
   for (std::size_t j = 0; limited != Code::kOk && j < codes.size(); ++j) {
     if (codes[j] == Code::kOk) continue;
     const auto joint = static_cast<std::int32_t>(j);
-    const std::int32_t owner = now_.controllers.owner_id(j);
-    if (limited_[j] == kNever) {
-      now_.event(EventKind::kLimited, joint, static_cast<std::uint32_t>(codes[j]), owner);
-      limited_[j] = owner;
-    }
     if (codes[j] == Code::kNotFinite && now_.run.controllers_run()) {
       response_.raise({.index = joint,
                        .code = static_cast<std::uint32_t>(codes[j]),
                        .cause = FaultCause::kCommand,
-                       .controller = owner});
+                       .controller = now_.controllers.owner_id(j)});
     }
   }
   trace_.mark(CycleStage::kLimit, now_.clock);
+}
+
+/// Each joint's first command that a limit changed, whichever limit, and its first one that was a
+/// controller's.
+void RobotCycle::note_limits() noexcept TANDEM_RT {
+  const auto counters = now_.limits.counters();
+  for (std::size_t j = 0; j < counters.size(); ++j) {
+    const hal::LimitCounters& now = counters[j];
+    const std::uint64_t met = std::uint64_t{now.not_finite} + now.out_of_range + now.too_fast;
+    if (std::exchange(limits_met_[j], met) == met) continue;
+    const std::int32_t owner = now_.controllers.owner_id(j);
+    if (limited_[j] >= 0 || (limited_[j] != kNever && owner < 0)) continue;
+    now_.event(EventKind::kLimited, static_cast<std::int32_t>(j),
+               static_cast<std::uint32_t>(now_.limits.codes()[j]), owner);
+    limited_[j] = owner;
+  }
 }
 
 void RobotCycle::write() noexcept TANDEM_RT {
@@ -298,9 +311,9 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
 
 void RobotCycle::archive(Archive& ar) {
   std::uint64_t controllers = now_.controllers.fingerprint();
-  ar(controllers);  // first: restore() looks at it before anything changes
+  ar(now_.identity, controllers);  // first: restore() looks at them before anything changes
   ar(now_, resets_, homing_, arbiter_, waiting_, response_);
-  ar(now_.controllers, shown_, started_, limited_);
+  ar(now_.controllers, shown_, started_, limited_, limits_met_);
 }
 
 bool RobotCycle::write_down(Archive& ar, bool backend) {
@@ -332,9 +345,15 @@ Result<std::vector<std::byte>> RobotCycle::save() {
 
 Status RobotCycle::restore(std::span<const std::byte> snapshot) {
   Archive ar(snapshot);
+  RunIdentity identity;
   std::uint64_t controllers = 0;
   Archive first(snapshot);
-  first(controllers);
+  first(identity, controllers);
+  if (const std::string other = now_.identity.difference(identity); !other.empty()) {
+    return fail("the snapshot is of another run: '" + other + "' is not the same",
+                "restore it where robot, experiment, kernels, options and seed are those that it "
+                "was saved with");
+  }
   if (controllers != now_.controllers.fingerprint()) {
     return fail("the snapshot was taken with other controllers than are loaded now",
                 "load and unload, in the same order, what was loaded then");

@@ -78,8 +78,8 @@ class RobotCycle {
   /// Everything that the next step() depends on: backend, controllers, images, counters.
   /// Between two steps, or the halves of one; with a simulated robot only; the log goes on where it
   /// is. A snapshot of between the halves is restored between halves.
-  /// Errors: a backend that cannot be rewound; bytes of another configuration; other controllers
-  /// than those that were loaded then (nothing has changed after that one).
+  /// Errors: a backend that cannot be rewound; bytes of another configuration; another identity, or
+  /// other controllers than those that were loaded then (nothing has changed after those).
   [[nodiscard]] Result<std::vector<std::byte>> save();
   [[nodiscard]] Status restore(std::span<const std::byte> snapshot);
   /// What save() answers, into `ar`, which may be bounded; without `backend` all but its part,
@@ -97,6 +97,7 @@ class RobotCycle {
   void take_inbox() noexcept TANDEM_RT;
   void update() noexcept TANDEM_RT;
   void limit() noexcept TANDEM_RT;
+  void note_limits() noexcept TANDEM_RT;
   void write() noexcept TANDEM_RT;
   void hand_over() noexcept TANDEM_RT;
 
@@ -118,8 +119,9 @@ class RobotCycle {
   bool started_ = false;            // the first cycle was
   bool ends_with_command_ = false;  // controllers wrote in this cycle
   static constexpr std::int32_t kNever = -2;
-  std::vector<std::int32_t> limited_;  // by joint: noted once each, with whose command it was
-  std::int64_t took_ns_ = 0;           // of the last cycle, from its grid point
+  std::vector<std::int32_t> limited_;      // by joint: noted once each, with whose command it was
+  std::vector<std::uint64_t> limits_met_;  // by joint: how often so far
+  std::int64_t took_ns_ = 0;               // of the last cycle, from its grid point
 };
 
 }  // namespace tandem::runtime

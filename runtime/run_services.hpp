@@ -47,6 +47,17 @@ struct Reloaded {
   std::vector<std::string> left{};
 };
 
+/// By what a controller was loaded, and would be loaded again.
+struct LoadedAs {
+  std::string library{};     ///< its path; empty: it is part of the program
+  std::string parameters{};  ///< TOML
+  std::string file{};        ///< where that is from
+  std::string table{};       ///< the path of its parameters there
+};
+
+/// The table "controller[2].parameters" of a document; "" is all of it.
+[[nodiscard]] TomlTable table_at(const TomlDocument& document, const std::string& path);
+
 /// A loaded controller.
 struct ControllerStatus {
   std::string name;
@@ -66,7 +77,7 @@ struct JointStatus {
   double acceleration_rad_s2 = 0.0;
   double motor_position_rad = 0.0, motor_velocity_rad_s = 0.0;   ///< on the link side
   double current_A = 0.0, voltage_V = 0.0, temperature_C = 0.0;  ///< of the motor
-  double commanded_rad = 0.0;
+  double commanded_rad = 0.0;  ///< NaN: outside position control nobody wrote a reference
   double stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;  ///< asked for: the command goes over to it
   std::uint32_t fault = 0;                               ///< 0, or the drive's CiA 402 error code
   std::uint32_t age_cycles = 0;                          ///< of the sample
@@ -199,6 +210,8 @@ class RunServices {
   [[nodiscard]] Result<RequestResult> unload(const std::string& name,
                                              Patience patience = kPatience);
 
+  /// Errors: unknown; being reloaded.
+  [[nodiscard]] Result<LoadedAs> loaded_as(const std::string& name);
   /// Loads the library of a controller as it is now, configures it with the same parameters, and
   /// puts it in the place of the former one in one cycle and without a bump, active as that was. It
   /// goes on with the former's state when its claims and the size of that are the same, and starts

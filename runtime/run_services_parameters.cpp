@@ -69,14 +69,16 @@ Result<double> fit(const ParameterRow& row, const ParameterValue& given, const s
   return wrong(text_of(given) + " is out of range", range_hint(row));
 }
 
-/// What to do about a name that no parameter has.
+/// What to do about a name that no parameter has: elements are suggested in the list's name only.
 std::string nearest(const std::string& name, const std::deque<ParameterRow>& rows) {
-  std::vector<std::string> names;
+  std::vector<std::string> names, elements;
   for (const ParameterRow& row : rows) {
-    names.push_back(row.name);
-    if (!row.list.empty()) names.push_back(row.list);
+    const std::string& one = row.list.empty() ? row.name : row.list;
+    if (names.empty() || names.back() != one) names.push_back(one);
+    if (!row.list.empty() && name.starts_with(row.list + ".")) elements.push_back(row.name);
   }
-  return names.empty() ? "it has none: setup.parameter() declares them" : suggest(name, names);
+  if (names.empty()) return "it has none: setup.parameter() declares them";
+  return suggest(name, elements.empty() ? names : elements);
 }
 
 std::string elements_of(const std::vector<ParameterRow*>& list) {

@@ -8,9 +8,7 @@
 #include "runtime/run_services.hpp"
 
 namespace tandem::runtime {
-namespace {
 
-/// The table "controller[2].parameters" of a document.
 TomlTable table_at(const TomlDocument& document, const std::string& path) {
   TomlTable table = document.root();
   for (std::size_t from = 0; from < path.size();) {
@@ -28,6 +26,8 @@ TomlTable table_at(const TomlDocument& document, const std::string& path) {
   }
   return table;
 }
+
+namespace {
 
 using Part = CarriedWords::Part;
 using Inputs = std::vector<std::shared_ptr<InputPort>>;
@@ -148,6 +148,17 @@ Result<HostedController*> RunServices::to_reload(const std::string& name) const 
   HostedController* const found = host_->owned()[*slot].get();
   if (found->next == nullptr) return found;
   return fail_at(name, "the controller is being reloaded", "ask again when that is done");
+}
+
+Result<LoadedAs> RunServices::loaded_as(const std::string& name) {
+  const Lock lock(mutex_);
+  collect();
+  const auto found = to_reload(name);
+  if (!found) return std::unexpected(found.error());
+  const HostedController& one = **found;
+  LoadedAs as{.library = one.plugin, .table = one.parameters};
+  if (one.document) as.parameters = one.document->text(), as.file = one.document->file();
+  return as;
 }
 
 Result<Reloaded> RunServices::reload(const std::string& name, bool fresh, Patience patience) {

@@ -36,14 +36,11 @@ void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& 
     limited_[j].count = count;
   }
   ++cycles_;
-  const auto mode = command.mode();
   const auto wanted = command.position_rad();
   const auto measured = state.position_rad();
   for (std::size_t j = 0; j < errors_.size(); ++j) {
     const double error = wanted[j] - measured[j];
-    // Outside position control what nobody writes is what is measured.
-    const bool follows = mode[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition);
-    if ((!follows && error == 0.0) || std::isnan(error)) continue;
+    if (std::isnan(error)) continue;  // nobody wants it anywhere, or knows where it is
     errors_[j].square_sum += error * error;
     errors_[j].max = std::max(errors_[j].max, std::abs(error));
     ++errors_[j].count;
@@ -121,7 +118,8 @@ void RunStatistics::take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT
     if (foot.touching == 0) continue;
     slip_m_ = std::max(slip_m_, std::hypot(at[0] - foot.anchor_x, at[1] - foot.anchor_y));
   }
-  ++free_cycles_;
+  free_to_ns_ = truth.time_ns()[0];
+  if (free_cycles_++ == 0) free_from_ns_ = free_to_ns_;
 }
 
 void RunStatistics::take_base(const hal::TruthImage* truth) noexcept TANDEM_RT {
@@ -157,7 +155,8 @@ std::optional<WorkFigures> RunStatistics::work(double period_s) const {
 
 std::optional<GroundFigures> RunStatistics::ground(double weight_N) const {
   if (free_cycles_ == 0 || feet_.empty()) return std::nullopt;
-  return GroundFigures{weight_N, force_sum_N_ / static_cast<double>(free_cycles_), slip_m_};
+  return GroundFigures{weight_N, force_sum_N_ / static_cast<double>(free_cycles_), slip_m_,
+                       free_from_ns_, free_to_ns_};
 }
 
 std::optional<BaseFigures> RunStatistics::base() const {
@@ -173,8 +172,8 @@ EstimateFigures RunStatistics::estimate() const {
 void RunStatistics::archive(Archive& ar) {
   ar(errors_, limited_, cycles_, driving_W_, braking_W_, max_power_W_, powered_, feet_, loops_,
      base_cycles_, compared_, tilt_error_rad_, height_error_m_, external_Nm_, base_wrench_,
-     wrenches_, unexplained_Nm_, free_cycles_, force_sum_N_, slip_m_, base_, base_free_,
-     texts_.said, texts_.left_out);
+     wrenches_, unexplained_Nm_, free_cycles_, force_sum_N_, slip_m_, free_from_ns_, free_to_ns_,
+     base_, base_free_, texts_.said, texts_.left_out);
 }
 
 }  // namespace tandem::runtime

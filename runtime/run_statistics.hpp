@@ -35,9 +35,10 @@ struct WorkFigures {
 
 /// From the plant's truth, over the cycles in which controllers ran and the base was free.
 struct GroundFigures {
-  double weight_N = 0.0;               ///< mass times gravity, from the model
-  double mean_vertical_force_N = 0.0;  ///< of all feet together
-  double max_foot_slip_m = 0.0;        ///< horizontal way of a foot since it touched down
+  double weight_N = 0.0;                ///< mass times gravity, as ground() was told
+  double mean_vertical_force_N = 0.0;   ///< of all feet together
+  double max_foot_slip_m = 0.0;         ///< horizontal way of a foot since it touched down
+  std::int64_t from_ns = 0, to_ns = 0;  ///< the first and the last of those cycles
 };
 /// From the plant's truth, from the first cycle with controllers and a free base until the drives
 /// are disabled at the end: a fall after a fault counts, too.
@@ -160,6 +161,7 @@ class RunStatistics {
   Peak unexplained_Nm_;
   std::uint64_t free_cycles_ = 0;
   double force_sum_N_ = 0.0, slip_m_ = 0.0;
+  std::int64_t free_from_ns_ = 0, free_to_ns_ = 0;
   BaseFigures base_;
   std::uint64_t base_free_ = 0;  // it was, once
   TextFigures texts_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -13,9 +14,10 @@
 
 namespace tandem::runtime {
 
-/// The position reference of a joint outside position control is where it is, unless a controller
-/// writes another one in this cycle: what it wants the joint to follow by other means. Before the
-/// limits, which know none there: offer(), the controllers, take(), keep().
+/// The position reference of a joint outside position control is NaN, not known, unless a
+/// controller writes one in this cycle: what it wants the joint to follow by other means. What the
+/// limits and the drive get there is where the joint is. Before the limits, which know no other:
+/// offer(), the controllers, take(), keep().
 class UnfollowedReferences {
  public:
   explicit UnfollowedReferences(const hal::ImageShape& shape)
@@ -45,14 +47,17 @@ class UnfollowedReferences {
       written_rad_[j] = reference[j];
     }
   }
-  /// `command`, which has passed the limits, with these references.
+  /// `command`, which has passed the limits, with what is known of these references.
   [[nodiscard]] const hal::CommandImage& in(const hal::CommandImage& command) noexcept TANDEM_RT {
-    if (std::ranges::none_of(written_, [](std::uint8_t one) { return one != 0; })) return command;
-    told_.assign(command);
+    bool differs = false;
     for (std::size_t j = 0; j < written_.size(); ++j) {
-      if (written_[j] != 0) told_.position_rad()[j] = written_rad_[j];
+      if (is_followed(command, j)) continue;
+      if (!differs) told_.assign(command);
+      differs = true;
+      told_.position_rad()[j] =
+          written_[j] != 0 ? written_rad_[j] : std::numeric_limits<double>::quiet_NaN();
     }
-    return told_;
+    return differs ? told_ : command;
   }
 
  private:

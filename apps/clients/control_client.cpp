@@ -146,7 +146,9 @@ class SocketClient : public ControlClient {
 
 std::chrono::milliseconds answer_time(const Json& question) {
   const std::string name = question.value("do", "");  // dds.show: an emergency stop waits for it
-  return name == "estop" || name == "dds.show" ? kStopAnswer : 5000ms;
+  if (name == "estop" || name == "dds.show") return kStopAnswer;
+  // A library is tried, opened, and configured: each may take 4 s.
+  return name == "controller.load" || name == "controller.reload" ? 15000ms : 5000ms;
 }
 
 Result<Json> ask(const std::string& path, const Json& question) {

@@ -108,12 +108,14 @@ Result<Exit> tell_inputs(Asked& asked) {
     fmt::print("no loaded controller has an input\n");
     return Exit::kDone;
   }
-  Table table({"input", "controller", "kind", "source", "state", "samples", "refused", "holds"});
+  Table table({"input", "controller", "kind", "source", "state", "samples", "superseded", "refused",
+               "holds"});
   table.align_left();
   for (const Json& input : *some) {
     table.add({input.value("input", ""), input.value("controller", ""), input.value("kind", ""),
                input.value("source", ""), freshness_of(input),
                std::to_string(input.value("arrived", 0U)),
+               std::to_string(input.value("superseded", 0U)),
                std::to_string(input.value("refused", 0U)), shown_values(input)});
   }
   table.print(stdout);

@@ -91,7 +91,7 @@ Result<Json> wait_for_homing(ControlClient& run, const std::string& name) {
 
 /// The reference has arrived: what is measured may lag, or rest against something.
 void warn_if_far(const Asked& asked, const Json& joint) {
-  if (!joint["position_rad"].is_number()) return;
+  if (!joint["position_rad"].is_number() || !joint["commanded_position_rad"].is_number()) return;
   const double off =
       std::abs(joint["position_rad"].get<double>() - joint["commanded_position_rad"].get<double>());
   if (off <= (slides(joint) ? kFar_m : kFar_rad)) return;

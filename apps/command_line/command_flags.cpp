@@ -167,11 +167,10 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
   app.add_option("--record-frames", o.record_frames,
                  "CAN: write every frame to this file, as candump -L does");
   app.add_option("--scenario", o.scenario, kScenarioHelp);
-  CLI::Option* log = app.add_option("--log", o.log_folder,
-                                    "Folder of the log, instead of the experiment's (else runs, "
-                                    "below the current folder); or its "
-                                    "own name, a new NAME.mcap");
-  log->check(is_given("name a folder or a file, or leave it out"));
+  CLI::Option* log = app.add_option(
+      "--log", o.log_folder,
+      "Folder of the log, instead of the experiment's (else runs, below the current folder)");
+  log->check(is_given("name a folder, or leave it out"));
   app.add_flag("--no-log", o.no_log, "Write no log")->excludes(log);
   app.add_option("--kernel-variant", o.kernel_variant,
                  "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
@@ -269,6 +268,9 @@ void add_flags(CLI::App& app, RunOptions& o) {
   app.add_flag("--gate", o.gate,
                "Watch what controllers do in a cycle, as `tandem controller check` (status 1: a "
                "rule is broken)");
+  app.add_flag("--debug", o.debug,
+               "For work in a debugger, in simulation only: no limit of time ends a configure(), "
+               "a cycle or the run (one that gdb holds is noticed without)");
   app.add_flag("--report", o.report, "Draw the report after the run, from its log")
       ->excludes("--no-log");
   app.add_option("--on-fault", o.on_fault,

@@ -109,13 +109,15 @@ const std::vector<CommandRow> kRows{
       text("parameters_file", "--parameters",
            "the file of them, in errors: parameters; the command line reads it: TOML"),
       local(texts("set", "--set", "one parameter, 'key = value', beside the file's; repeatable")),
+      flag("untried", "--untried", "open it without the trial in a process of its own: a crash ends the run"),
       local(flag("start", "--start", "start it as well"))}},
     {"controller.reload", kChanges,
      "loads a controller's library as it is now, with the same parameters, and puts it in the "
      "place of the former build in one cycle; it goes on with the former one's state where that "
      "has the same shape",
      {need(text("name", "name", kLoaded)),
-      flag("fresh", "--fresh", "start from the measured state in any case")}},
+      flag("fresh", "--fresh", "start from the measured state in any case"),
+      flag("untried", "--untried", "open it without the trial in a process of its own: a crash ends the run")}},
     {"controller.unload", kChanges, "frees an inactive controller",
      {need(text("name", "name", kLoaded))}},
     {"controller.start", kChanges, "starts a controller, or all that a reset holds back",

@@ -154,11 +154,19 @@ Result<TomlDocument> parameters_of(const Json& request) {
   return fail(file + ":" + std::to_string(error.line) + ": " + error.message, error.hint);
 }
 
-Result<Json> load(RunServices& services, const Json& request) {
+Result<Json> load(RunServices& services, const TryController& trial, const Json& request) {
   const auto plugin = request["plugin"].get<std::string>();
   const std::string name = request.value("name", std::filesystem::path(plugin).stem().string());
   const auto parameters = parameters_of(request);
   if (!parameters) return std::unexpected(parameters.error());
+  if (trial && !request.value("untried", false)) {
+    const Status tried = trial({.name = name,
+                                .plugin = plugin,
+                                .parameters = parameters->text(),
+                                .file = parameters->file(),
+                                .table = {}});
+    if (!tried) return std::unexpected(tried.error());
+  }
   auto loaded = bounded_call(name, runtime::ControllerHost::kConfigureTime,
                              [plugin] { return load_controller(plugin, controller_folders()); });
   if (!loaded) return std::unexpected(loaded.error());
@@ -180,8 +188,19 @@ const char* why_afresh(runtime::Kept kept) {
   return "";
 }
 
-Result<Json> reload(RunServices& services, const Json& request) {
+Result<Json> reload(RunServices& services, const TryController& trial, const Json& request) {
   const auto name = request["name"].get<std::string>();
+  const auto as = services.loaded_as(name);
+  if (!as) return std::unexpected(as.error());
+  if (trial && !as->library.empty() && !request.value("untried", false)) {
+    const bool is_path = as->library.find('/') != std::string::npos;
+    const Status tried = trial({.name = name,
+                                .plugin = is_path ? as->library : "./" + as->library,
+                                .parameters = as->parameters,
+                                .file = as->file,
+                                .table = as->table});
+    if (!tried) return std::unexpected(tried.error());
+  }
   const auto made = services.reload(name, request.value("fresh", false));
   if (!made) return std::unexpected(made.error());
   auto answer = tell(services, made->asked);
@@ -304,7 +323,7 @@ Json asked_json(const runtime::RequestResult& asked) {
 }
 
 void add_controller_commands(ControlRegistry& registry, RunServices& services,
-                             const hal::RobotConfig& robot) {
+                             const hal::RobotConfig& robot, TryController trial) {
   registry.add("controller.list", [&services, &robot](const Json&) -> Result<Json> {
     return Json{{"controllers", list(services, robot)}};
   });
@@ -313,9 +332,10 @@ void add_controller_commands(ControlRegistry& registry, RunServices& services,
   registry.add("controller.set",
                [&services](const Json& request) { return set(services, request); });
   registry.add("controller.load",
-               [&services](const Json& request) { return load(services, request); });
-  registry.add("controller.reload",
-               [&services](const Json& request) { return reload(services, request); });
+               [&services, trial](const Json& request) { return load(services, trial, request); });
+  registry.add("controller.reload", [&services, trial = std::move(trial)](const Json& request) {
+    return reload(services, trial, request);
+  });
   registry.add("controller.unload", [&services](const Json& request) {
     return tell(services, services.unload(request["name"].get<std::string>()));
   });

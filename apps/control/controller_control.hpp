@@ -2,16 +2,31 @@
 // Layer: apps/control.  Thread: main; the handlers run on the serving thread.
 #pragma once
 
+#include <functional>
+#include <string>
+
 #include "apps/control/control_registry.hpp"
 #include "runtime/run_services.hpp"
 
 namespace tandem::apps {
 
+/// A controller that is about to be loaded.
+struct ControllerTrial {
+  std::string name;
+  std::string plugin;      ///< as load_controller() takes it
+  std::string parameters;  ///< TOML
+  std::string file;        ///< where that is from
+  std::string table;       ///< the path of its parameters there; empty: all of it
+};
+/// Tries it where a crash does no harm. Errors: it must not be loaded.
+using TryController = std::function<Status(const ControllerTrial&)>;
+
 /// Adds "controller.list", "controller.load", "controller.reload", "controller.unload",
 /// "controller.start", "controller.stop" and "controller.switch". Services and robot outlive the
 /// registry.
+/// @param trial  before a library is opened, unless the question says "untried"; empty: none is
 void add_controller_commands(ControlRegistry& registry, runtime::RunServices& services,
-                             const hal::RobotConfig& robot);
+                             const hal::RobotConfig& robot, TryController trial = {});
 
 /// {"done": …, "cycle": …}: what became of a request.
 [[nodiscard]] Json asked_json(const runtime::RequestResult& asked);

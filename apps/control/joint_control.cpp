@@ -82,7 +82,8 @@ Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t ind
           {"mode", hal::to_string(static_cast<ControlMode>(look.mode))},
           {"interaction", hal::to_string(static_cast<InteractionMode>(look.interaction))},
           {"mode_in_force", hal::to_string(static_cast<ControlMode>(look.drive_mode))},
-          {"commanded_position_rad", look.commanded_rad},
+          {"commanded_position_rad",
+           std::isfinite(look.commanded_rad) ? Json(look.commanded_rad) : Json(nullptr)},
           {"moving", look.moving != 0},
           {"position_rad", measured(true, look.position_rad)},
           {"velocity_rad_s", measured(true, look.velocity_rad_s)},
@@ -190,7 +191,10 @@ double shortest(const Run& run, const std::string& name, double target_rad) {
   const auto joint = std::ranges::find(joints, name, &runtime::JointInfo::name);
   const hal::JointCapabilities* limit = run.limits_of(name);
   if (joint == joints.end() || limit == nullptr) return target_rad;
-  const double turns = std::round((joint->look.commanded_rad - target_rad) / kTurn_rad);
+  const runtime::JointStatus& look = joint->look;
+  const double from_rad =
+      std::isfinite(look.commanded_rad) ? look.commanded_rad : look.position_rad;
+  const double turns = std::round((from_rad - target_rad) / kTurn_rad);
   const double nearest = target_rad + turns * kTurn_rad;
   return hal::reaches(*limit, nearest) ? nearest : target_rad;
 }

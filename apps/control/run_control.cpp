@@ -114,7 +114,7 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
 }  // namespace
 
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
-                      const hal::RobotConfig& robot, JudgeGains judge) {
+                      const hal::RobotConfig& robot, JudgeGains judge, TryController trial) {
   registry.stops_by([&cycle] { return cycle.progress().stopped_before.load(); });
   registry.add("status", [&cycle](const Json&) -> Result<Json> { return status(cycle); });
   registry.add("fault.show", [&cycle](const Json&) -> Result<Json> {
@@ -133,7 +133,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
     cycle.inbox().end_run();
     return Json::object();
   });
-  add_controller_commands(registry, cycle.services(), robot);
+  add_controller_commands(registry, cycle.services(), robot, std::move(trial));
   add_joint_commands(registry, cycle, robot, std::move(judge));
   add_input_commands(registry, cycle.services());
   add_sensor_commands(registry, cycle.services());

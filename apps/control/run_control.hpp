@@ -2,6 +2,7 @@
 // Layer: apps/control.  Thread: main; the handlers run on the serving thread.
 #pragma once
 
+#include "apps/control/controller_control.hpp"
 #include "apps/control/joint_control.hpp"
 #include "runtime/robot_cycle.hpp"
 
@@ -10,7 +11,9 @@ namespace tandem::apps {
 /// Adds "status", "fault.show", "fault.reset", "estop" and "run.stop", and the commands of
 /// controllers, joints, sensors and clock. Cycle and robot outlive the registry.
 /// @param judge  add_joint_commands()'s
+/// @param trial  add_controller_commands()'s
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
-                      const hal::RobotConfig& robot, JudgeGains judge = {});
+                      const hal::RobotConfig& robot, JudgeGains judge = {},
+                      TryController trial = {});
 
 }  // namespace tandem::apps

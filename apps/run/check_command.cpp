@@ -148,6 +148,8 @@ void print_plan(const WiredComposition& c, std::FILE* out) {
                   : counted(e.cycles(), "cycle") + ", " + length_text(e) + " after bring-up";
   facts.add("loop", fmt::format("{:.3g} kHz, {}", 1e-3 / period_s, length));
   add_simulation_facts(e, facts);
+  if (e.hal.backend == runtime::BackendKind::kSim && e.plant != nullptr)
+    for (const std::string& one : e.plant->differences) facts.add("plant is other in", one);
   facts.add("seed", std::to_string(e.seed));
   add_estimation_facts(e, facts);
   if (e.teleoperation) {
@@ -221,6 +223,28 @@ void warn_of_archives(const WiredComposition& c, Diagnostics& warnings) {
   }
 }
 
+/// Payloads that nobody will see, or see dropped. A run ends its length after the drives' bring-up,
+/// which takes a part of a second.
+void warn_of_payloads(const runtime::Experiment& e, Diagnostics& warnings) {
+  constexpr double kBringUp_s = 0.5;
+  if (e.hal.backend != runtime::BackendKind::kSim || e.plant == nullptr || e.endless()) return;
+  const double end_s = kBringUp_s + e.hal.settle_s + e.duration_s;
+  for (const sim::ScenarioFault& one : e.plant->carried) {
+    const double from_s = static_cast<double>(one.start_ns) * 1e-9;
+    const double until_s = from_s + static_cast<double>(one.duration_ns) * 1e-9;
+    const bool never = from_s >= end_s;
+    if (!never && (one.duration_ns < 0 || until_s < end_s)) continue;
+    warnings.push_back(
+        {.message = fmt::format("{} is never {}: that is due {:.6g} s after the first SYNC, and "
+                                "the run ends about {:.1f} s after it",
+                                e.plant->payloads[one.number - 1], never ? "picked up" : "dropped",
+                                never ? from_s : until_s, end_s),
+         .hint = never ? "give an earlier from_s, or a longer duration_s" : "",
+         .file = e.file,
+         .key = "sim.payload"});
+  }
+}
+
 Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                              Json& json) {
   const auto composition = runtime::composed<WiredComposition>(
@@ -229,6 +253,7 @@ Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagno
   warnings = (*composition)->experiment.description->warnings;
   warnings.insert(warnings.end(), (*composition)->warnings.begin(), (*composition)->warnings.end());
   warn_of_archives(**composition, warnings);
+  warn_of_payloads((*composition)->experiment, warnings);
   print_warnings(warnings);
   const runtime::Experiment& e = (*composition)->experiment;
   add_loop_json(e.robot, (*composition)->loops, json);

@@ -28,6 +28,13 @@ void figures(Figures& f, const runtime::Experiment* e) {
     const std::string version = here() ? sim::engine_version(e->sim.engine) : "";
     return known(!version.empty(), version);
   });
+  f("plant",
+    "[what of the simulated robot](simulation.md#the-plant-is-not-the-model) is other than its "
+    "files say, a text each; null: nothing",
+    [&] {
+      const bool other = here() && e->plant != nullptr;
+      return known(other, other ? e->plant->differences : std::vector<std::string>());
+    });
 }
 
 namespace {

@@ -1,6 +1,7 @@
 // `tandem emulate`: the simulated robot with emulated boards on CAN interfaces.
 #include <fmt/core.h>
 
+#include <cstdlib>
 #include "apps/can/bus_watch.hpp"
 #include "apps/can/can_sockets.hpp"
 #include "apps/robot/kernel_build.hpp"
@@ -156,8 +157,7 @@ void print_summary(const Emulation& e, const Json& json, std::FILE* out) {
 }
 
 /// " of joint1", " of board leg_1"; empty of what strikes every frame.
-std::string whose(const sim::ScenarioFault& fault, const hal::RobotConfig& robot) {
-  const hal::InjectedFault injected = sim::injected(fault);
+std::string whose(const hal::InjectedFault& injected, const hal::RobotConfig& robot) {
   const auto index = static_cast<std::size_t>(injected.index);
   switch (injected.target) {
     case hal::FaultTarget::kNone: return "";
@@ -169,13 +169,21 @@ std::string whose(const sim::ScenarioFault& fault, const hal::RobotConfig& robot
   return "";
 }
 
-/// Faults that have begun since.
+/// Faults that have begun since, and payloads that have come or gone.
 void tell_injected(Emulation& e, std::FILE* out, bool quiet) {
-  while (const sim::ScenarioFault* fault = e.robot->next_begun_fault()) {
-    ++e.injected;
+  for (;;) {
+    const hal::InjectedFault fault = e.robot->next_injected();
+    if (fault.kind == hal::FaultKind::kNone) return;
+    const bool carried = fault.kind == hal::FaultKind::kPayload;
+    const bool dropped = carried && fault.index < 0;
+    if (!dropped) ++e.injected;
     if (quiet) continue;
-    fmt::print(out, "{:.3f} s: injected {}{}\n", static_cast<double>(e.emulator->time_ns()) * 1e-9,
-               to_string(fault->kind), whose(*fault, e.subject.robot));
+    fmt::print(
+        out, "{:.3f} s: {}\n", static_cast<double>(e.emulator->time_ns()) * 1e-9,
+        carried
+            ? fmt::format("payload {}: {}", dropped ? "dropped" : "picked up",
+                          e.robot->payload_text(static_cast<std::uint32_t>(std::abs(fault.index))))
+            : fmt::format("injected {}{}", to_string(fault.kind), whose(fault, e.subject.robot)));
     std::fflush(out);
   }
 }

@@ -15,13 +15,14 @@
 #include <utility>
 
 #include "apps/text/console.hpp"
+#include "base/process.hpp"
 
 namespace tandem::apps {
 
 /// While one exists, `limit` is the time for what its scope does: closing what threads wait for.
 /// They may never come back, for instance where a controller has closed every descriptor of the
 /// process. The robot has been stopped by then. What a client has asked for last may take its time,
-/// as a controller's configure() may: no more than this.
+/// as a controller's configure() may: no more than this, but in a debugger.
 class EndGuard {
  public:
   static constexpr std::chrono::seconds kLimit{20};
@@ -47,7 +48,9 @@ class EndGuard {
  private:
   void wait() {
     std::unique_lock lock(mutex_);
-    if (news_.wait_for(lock, kLimit, [this] { return done_; })) return;
+    do {
+      if (news_.wait_for(lock, kLimit, [this] { return done_; })) return;
+    } while (time_limits_are_waived());
     if (last_words_) last_words_();
     fmt::print(stderr,
                "fault: the run is over, and a thread of it does not end: the process ends without "

@@ -13,6 +13,7 @@
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/connection.hpp"
+#include "apps/run/controller_trial.hpp"
 #include "apps/run/cycle_guard.hpp"
 #include "apps/run/cycle_thread.hpp"
 #include "apps/run/dds_run.hpp"
@@ -31,6 +32,7 @@
 #include "apps/transport/dds_admission.hpp"
 #include "apps/transport/dds_services.hpp"
 #include "base/counted.hpp"
+#include "base/process.hpp"
 #include "base/quoting.hpp"
 #include "controllers/hosted_call.hpp"
 #include "rt/cpu_latency.hpp"
@@ -67,7 +69,8 @@ std::string pace_text(const WiredComposition& c) {
   const std::string how = hal.lockstep && !where.empty() ? "in lockstep, " : "";
   const rt::CyclicLoopConfig& loop = c.experiment.loop;
   return where + how + (loop.rate > 0.0 ? fmt::format("rate {:g}", loop.rate) : "free running") +
-         (loop.start_paused ? ", paused: tandem clock resume" : "");
+         (loop.start_paused ? ", paused: tandem clock resume" : "") +
+         (time_limits_are_waived() ? ", without limits of time" : "");
 }
 
 std::string served_text(const runtime::Experiment& e) {
@@ -218,7 +221,8 @@ class Session {
         [judge](std::size_t joint, hal::PidLoop loop, const robot::GainsJudge::Gains& gains,
                 const std::vector<double>& position_rad) {
           return opinion(*judge, joint, loop, gains, position_rad);
-        });
+        },
+        try_in_other_process(options_));
     add_predict(commands_, c_.predictor.get(), e.robot);
     if (dds_ != nullptr) {
       admission_.add_to(commands_);
@@ -284,7 +288,7 @@ class Session {
   }
 
   void close_log() {
-    if (recorder_ != nullptr) (void)recorder_->close(result_of(c_.master));
+    if (recorder_ != nullptr) (void)recorder_->close(result_of(c_, *cycle_));
   }
 
   /// The loop was given up. Its thread is still there, and may go on at any time: what it uses
@@ -318,7 +322,7 @@ class Session {
     }
     if (services_ != nullptr) summary.dds->services = services_->counts();
     if (recorder_ != nullptr) {
-      log::StringMap result = result_of(c_.master);
+      log::StringMap result = result_of(c_, *cycle_);
       for (auto& later : runtime::loaded_later(*c_.controllers, plugins_at_start_))
         result.push_back(std::move(later));
       summary.log = recorder_->close(result);

@@ -57,10 +57,13 @@ std::vector<std::string> never_injected(const WiredComposition& c,
   for (const sim::FaultSlot& slot : c.sim->robot().faults()) {
     if (slot.acted != 0) continue;
     const bool enabled = slot.fault.from == sim::FaultFrom::kEnabled;
+    const bool carried = slot.fault.kind == hal::FaultKind::kPayload;
     all.push_back(fmt::format(
-        "the fault '{}' was never injected: it is due {:.3f} s after {}, and the run ended {:.3f} "
+        "{} was never {}: it is due {:.3f} s after {}, and the run ended {:.3f} "
         "s after its first SYNC",
-        hal::to_string(slot.fault.kind), static_cast<double>(slot.fault.start_ns) * 1e-9,
+        carried ? "the payload " + c.sim->robot().payload_text(c.sim->robot().payload_number(slot))
+                : fmt::format("the fault '{}'", hal::to_string(slot.fault.kind)),
+        carried ? "picked up" : "injected", static_cast<double>(slot.fault.start_ns) * 1e-9,
         enabled ? "the drives are enabled" : "the first SYNC", ended_s));
   }
   return all;

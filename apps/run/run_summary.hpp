@@ -23,8 +23,12 @@ namespace tandem::apps {
 /// "29 axes enabled after 0.211 s, …"; empty without a master, or before that.
 [[nodiscard]] std::string start_text(const hal::can::DriveMaster* master);
 
-/// What the log's record "result" tells of the master.
-[[nodiscard]] log::StringMap result_of(const hal::can::DriveMaster* master);
+/// What the ground did, against the weight of the robot that was simulated.
+[[nodiscard]] std::optional<runtime::GroundFigures> ground_of(const WiredComposition& c,
+                                                              const runtime::RobotCycle& cycle);
+
+/// What the log's record "result" tells of the master, and of a plant that is not the model.
+[[nodiscard]] log::StringMap result_of(const WiredComposition& c, const runtime::RobotCycle& cycle);
 
 struct RunSummary {
   const WiredComposition& composition;

@@ -1,4 +1,7 @@
 // The figures of a run, each declared once: docs/json.md, `tandem run`.
+#include <fmt/core.h>
+
+#include <algorithm>
 #include <cmath>
 
 #include "apps/can/bus_watch.hpp"
@@ -10,9 +13,22 @@
 namespace tandem::apps {
 namespace {
 
-double weight_N(const tandem_kernels& k) {
-  const double* g = k.gravity_m_s2;
-  return k.mass_kg * std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+double mass_kg(const model::Tree& tree) {
+  double sum = 0.0;
+  for (const model::Body& body : tree.bodies) sum += body.inertia.mass_kg;
+  return sum;
+}
+
+/// The plant's as it is: on the average, where that changes.
+double weight_N(const WiredComposition& c, const runtime::GroundFigures& over) {
+  double mass = c.kernels->mass_kg;
+  if (c.sim != nullptr) {
+    const auto& plant = c.experiment.plant;
+    if (plant != nullptr) mass += mass_kg(plant->tree) - mass_kg(*c.experiment.tree());
+    mass += c.sim->robot().carried_kg(over.from_ns, over.to_ns + c.experiment.loop.period_ns);
+  }
+  const double* g = c.kernels->gravity_m_s2;
+  return mass * std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
 }
 
 /// Whether what touches the base was estimated: on a floating base, once its estimate had started.
@@ -112,14 +128,13 @@ std::vector<std::string> wire_of(const hal::can::DriveMaster* master) {
 }  // namespace
 
 static void figures(Figures& f, const log::RecordingResult& log) {
-  f("path", "of several files the first that is there", log.path);
+  f("path", "of several files that of the first: it opens all of them, also when that one is gone",
+    log.path);
   f("files", "that were written", log.parts);
   f("files_removed", "of them, to keep to `[log] total_MB` or `keep_free_MB`", log.removed);
   f("messages", "written", log.messages);
   f("dropped", "the ring was full", log.dropped);
-  f("data_sha256",
-    "of the messages' data, in order; of several files [theirs](log.md#several-files)",
-    log.data_sha256);
+  f("data_sha256", "of the messages' data, in order, in however many files", log.data_sha256);
 }
 
 static void figures(Figures& f, const hal::can::FrameRecord::Result& frames) {
@@ -172,7 +187,9 @@ static void figures(Figures& f, const runtime::WorkFigures& work) {
 }
 
 static void figures(Figures& f, const runtime::GroundFigures& ground) {
-  f("weight_N", "mass times gravity", ground.weight_N);
+  f("weight_N",
+    "mass times gravity, of the plant as it is, payloads included; the average where that changes",
+    ground.weight_N);
   f("mean_vertical_force_N", "of all feet together", ground.mean_vertical_force_N);
   f("max_foot_slip_m", "way of a foot since it touched down", ground.max_foot_slip_m);
 }
@@ -272,7 +289,7 @@ void figures(Figures& f, const RunSummary* s) {
   f("work", "torque times velocity, as measured; null: no drive tells them",
     [&] { return s->cycle.statistics().work(static_cast<double>(e().loop.period_ns) * 1e-9); });
   f("ground", "by the plant's truth, of a floating base with feet",
-    [&] { return s->cycle.statistics().ground(weight_N(*s->composition.kernels)); });
+    [&] { return ground_of(s->composition, s->cycle); });
   f("loops", "of a robot with closed loops in simulation", [&] { return loops_of(*s); });
   f("parallel", "of `[parallel]`", [&] { return s->parallel_summary(); });
   f("base",
@@ -310,8 +327,23 @@ void figures(Figures& f, const RunSummary* s) {
 
 Json RunSummary::json() const { return figures_json(this); }
 
-log::StringMap result_of(const hal::can::DriveMaster* master) {
+std::optional<runtime::GroundFigures> ground_of(const WiredComposition& c,
+                                                const runtime::RobotCycle& cycle) {
+  std::optional<runtime::GroundFigures> ground = cycle.statistics().ground(0.0);
+  if (ground) ground->weight_N = weight_N(c, *ground);
+  return ground;
+}
+
+log::StringMap result_of(const WiredComposition& c, const runtime::RobotCycle& cycle) {
+  const hal::can::DriveMaster* const master = c.master;
   log::StringMap result;
+  if (const auto ground = ground_of(c, cycle); ground && c.sim != nullptr) {
+    const bool carries = std::ranges::any_of(c.sim->robot().faults(), [](const auto& slot) {
+      return slot.fault.kind == hal::FaultKind::kPayload && slot.acted != 0;
+    });
+    if (carries || c.experiment.plant != nullptr)
+      result.emplace_back("weight_N", fmt::format("{:.6g}", ground->weight_N));
+  }
   const std::string start = start_text(master);
   if (!start.empty()) result.emplace_back("start", start);
   for (const std::string& text : wire_of(master)) result.emplace_back("wire", text);

@@ -230,6 +230,11 @@ void RunSummary::print(std::FILE* out) const {
   add_figures(facts, run, "kernels", "{kernel_variant}");
   const std::string engine = sim::engine_text(composition.experiment.sim.engine);
   if (composition.sim != nullptr && !engine.empty()) facts.add("engine", engine);
+  if (run["plant"].is_array()) {
+    std::string all;
+    for (const Json& one : run["plant"]) all += (all.empty() ? "" : "; ") + one.get<std::string>();
+    facts.add("plant is other in", all);
+  }
   add_output_facts(*this, run, facts);
   add_bus_facts(composition.open_buses(), facts);
   add_figures(facts, run, "frames",

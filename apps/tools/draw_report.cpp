@@ -4,8 +4,8 @@
 
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
-#include "base/open_file.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
+#include "log/log_file.hpp"
 #include "report/page.hpp"
 #include "robot/kernel_store.hpp"
 
@@ -39,8 +39,8 @@ Result<report::ReportFiles> draw_report(const std::string& log,
   std::vector<std::string> logs{log};
   logs.insert(logs.end(), others.begin(), others.end());
   for (const std::string& one : logs) {  // before a folder is made beside it
-    if (const auto file = open_to_read(one, "name a log of `tandem run`"); !file)
-      return std::unexpected(file.error());
+    if (const Status there = log::LogFile::check(one); !there)
+      return std::unexpected(there.error());
   }
   const std::string folder = output.empty() ? default_folder(log, others) : output;
   if (const Status lost = check_overwrites(

@@ -10,12 +10,32 @@
 #include "apps/text/figures.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/log_thresholds.hpp"
+#include "apps/tools/opened_log.hpp"
 #include "base/counted.hpp"
 #include "base/open_file.hpp"
 #include "base/quoting.hpp"
 #include "log/compare.hpp"
 #include "log/csv.hpp"
 #include "log/log_file.hpp"
+
+namespace tandem::log {
+
+static void figures(apps::Figures& f, const LogPart& part) {
+  f("part", "its number, from 1; 0: the log is in one file", part.number);
+  f("path", part.path);
+  f("start_ns", "nominal time of its first message", part.first_ns);
+  f("end_ns", "of its last", part.last_ns);
+  f("messages", part.messages);
+  f("bytes", part.bytes);
+  f("complete", "false: its run was killed while it wrote it", !part.truncated);
+}
+
+static void figures(apps::Figures& f, const MissingParts& missing) {
+  f("first", "its number", missing.first);
+  f("last", "null: nobody knows how many follow", apps::known(missing.last > 0, missing.last));
+}
+
+}  // namespace tandem::log
 
 namespace tandem::apps {
 static void figures(Figures& f, const log::LoggedTopic& topic) {
@@ -46,6 +66,9 @@ static void figures(Figures& f, const log::LogFile* file) {
     return all;
   });
   f("topics", [&] { return by_name(file->topics()); });
+  f("parts", "its files, in the order of the run", [&] { return file->parts(); });
+  f("missing", "parts of a [log in several files](log.md#several-files) that are not here",
+    [&] { return file->missing(); });
 }
 
 std::vector<Figures::Row> log_figures() { return Figures::rows_of<const log::LogFile*>(); }
@@ -68,7 +91,13 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
   }
   facts.add("robot", fmt::format("{}, {}, {}", info.robot, counted(info.joints.size(), "joint"),
                                  counted(info.sensors.size(), "sensor")));
-  if (info.part > 0) facts.add("part", fmt::format("{} of a log in several files", info.part));
+  if (const auto& parts = file.parts(); parts.size() > 1) {
+    facts.add("files", fmt::format("{}, parts {} to {}", parts.size(), parts.front().number,
+                                   parts.back().number));
+  }
+  for (const std::string& remark : file.remarks()) {
+    facts.add(info.part > 0 ? "part" : "missing", shown(remark, 4'096));
+  }
   facts.add("backend", info.hal);
   facts.add("seed", std::to_string(info.seed));
   facts.add("period", info.period_ns == 0
@@ -122,14 +151,8 @@ Status print_fields(const log::LogFile& file, const std::string& name, std::FILE
   return {};
 }
 
-/// "state" and "/tandem/state" name the same topic.
-std::string full_topic(const std::string& name) {
-  if (name.empty()) return "/tandem/state";
-  return name.starts_with('/') ? name : "/tandem/" + name;
-}
-
 Status write_csv(const log::LogFile& file, const LogOptions& options) {
-  const std::string topic = full_topic(options.topic);
+  const std::string topic = file.full_name(options.topic.empty() ? "state" : options.topic);
   if (options.output.empty()) {
     errno = 0;
     Status written = log::write_csv(file, topic, options.every, std::cout, options.fields);
@@ -215,7 +238,7 @@ void print_robots(const log::RunInfo& a, const log::RunInfo& b, std::FILE* out) 
 }
 
 Result<Exit> diff(const log::LogFile& file, const LogOptions& options) {
-  const Result<log::LogFile> other = log::LogFile::open(options.other);
+  const Result<log::LogFile> other = opened_log(options.other);
   if (!other) return std::unexpected(other.error());
   const Result<log::Comparison> comparison = log::compare(file, *other);
   if (!comparison) return std::unexpected(comparison.error());
@@ -235,7 +258,8 @@ Exit log_command(const LogOptions& options) {
     const Status printed = print_thresholds(options);
     return printed ? Exit::kDone : refuse(printed.error());
   }
-  const Result<log::LogFile> file = log::LogFile::open(options.log);
+  const bool told = options.action == LogOptions::Action::kInfo && options.topic.empty();
+  const auto file = told ? log::LogFile::open(options.log) : opened_log(options.log);
   Status done;
   Exit exit = Exit::kDone;
   if (!file) {
@@ -247,7 +271,7 @@ Exit log_command(const LogOptions& options) {
     if (compared) exit = *compared;
     if (!compared) done = std::unexpected(compared.error());
   } else if (!options.topic.empty()) {
-    done = print_fields(*file, full_topic(options.topic), human_output(options.json));
+    done = print_fields(*file, file->full_name(options.topic), human_output(options.json));
     if (done) done = write_json(options.json, figures_json(&*file));
   } else {
     const Json json = figures_json(&*file);

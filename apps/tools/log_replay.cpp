@@ -10,6 +10,7 @@
 #include "apps/tools/carried_settings.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/listed_names.hpp"
+#include "apps/tools/opened_log.hpp"
 #include "apps/tools/relative_path.hpp"
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
@@ -118,7 +119,7 @@ Error with_options(Error error) {
 Result<Replay> plan(const LogOptions& options) {
   const auto files = robot::read_robot(options.robot);
   if (!files) return std::unexpected(files.error().front());
-  const auto file = log::LogFile::open(options.log);
+  const auto file = opened_log(options.log);
   if (!file) return std::unexpected(file.error());
   Replay replay;
   replay.options = options;

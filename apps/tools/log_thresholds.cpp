@@ -11,6 +11,7 @@
 #include "apps/tools/carried_settings.hpp"
 #include "apps/tools/log_alarms.hpp"
 #include "apps/tools/log_torques.hpp"
+#include "apps/tools/opened_log.hpp"
 #include "base/counted.hpp"
 #include "base/quoting.hpp"
 #include "estimation/collision.hpp"
@@ -106,7 +107,7 @@ Result<std::vector<NamedTorques>> read_all(const std::vector<std::string>& paths
   std::vector<NamedTorques> all;
   std::map<std::string, std::string> seen;  // data's digest -> path
   for (const std::string& path : paths) {
-    const Result<log::LogFile> file = log::LogFile::open(path);
+    const Result<log::LogFile> file = opened_log(path);
     if (!file) return std::unexpected(file.error());
     const auto [twin, is_new] = seen.emplace(file->data_sha256(), path);
     if (!is_new) return std::unexpected(log::same_data(path, twin->second));

@@ -36,7 +36,11 @@ except ImportError:  # what of it an environment needs
 
 
 class PandaEnv(Env):
-    """Action (7): share of each joint's torque, -1 to 1. Observation (14): position, velocity."""
+    """Action (7): share of each joint's torque, -1 to 1. Observation (14): position, velocity.
+
+    An episode begins as a controller does: in its first 0.1 s the torque goes over from what held
+    the joints to the action. `run.sent.torque` is what the drives were given.
+    """
 
     metadata = {"render_modes": []}
     render_mode = None

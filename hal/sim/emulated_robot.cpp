@@ -79,6 +79,8 @@ EmulatedRobot::EmulatedRobot(const hal::RobotConfig& robot, const SimRobotConfig
       answer_window_ns_(config.answer_window_ns),
       faults_(config.seed),
       disturbances_(robot.joints.size()),
+      changes_(config.changes),
+      tree_(config.tree),
       period_ns_(config.period_ns),
       tick_ns_(common_tick(robot, config.period_ns)) {
   for (std::size_t b = 0; b < robot.buses.size(); ++b) {
@@ -328,7 +330,7 @@ void EmulatedRobot::archive(Archive& ar) {
   for (const Twin& twin : twins_) ar(*twin.board);
   for (firmware::AxisDrive& drive : drive_) ar(drive.voltage_V, drive.enabled, drive.brake_open);
   for (Wire& wire : wires_) ar(wire.model, wire.answers_ns, wire.sync_waits);
-  ar(faults_, disturbances_, now_ns_, first_ns_, enabled_ns_, started_, let_down_);
+  ar(faults_, disturbances_, now_ns_, first_ns_, enabled_ns_, started_, let_down_, told_kept_);
 }
 
 }  // namespace tandem::sim

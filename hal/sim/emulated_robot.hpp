@@ -151,10 +151,15 @@ class EmulatedRobot {
     return fault.kind != hal::FaultKind::kBoardDuplicate &&
            (fault.kind != hal::FaultKind::kPayload || !plant_.has_engine());
   }
-  /// The next injected fault that has begun and was not given yet; null: none.
-  [[nodiscard]] const ScenarioFault* next_begun_fault() noexcept TANDEM_RT {
-    return faults_.next_begun();
-  }
+  /// What hal::Backend::next_injected() gives; also what a payload is that comes or goes.
+  [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT;
+  /// The number of one of faults() that is a payload: InjectedFault::index.
+  [[nodiscard]] std::uint32_t payload_number(const FaultSlot& slot) const noexcept TANDEM_RT;
+  /// "box, 1.6 kg on panda_hand"; without a name "1.6 kg on panda_hand". On any thread.
+  /// @param number  payload_number()
+  [[nodiscard]] std::string payload_text(std::uint32_t number) const;
+  /// What comes and goes, on the average of [from_ns, to_ns): times of step().
+  [[nodiscard]] double carried_kg(std::int64_t from_ns, std::int64_t to_ns) const noexcept;
   /// Every fault injected so far, and what it has done.
   [[nodiscard]] std::span<const FaultSlot> faults() const noexcept { return faults_.slots(); }
   /// For who emulates another wire: whose frames are struck there.
@@ -264,8 +269,10 @@ class EmulatedRobot {
   std::vector<Wire> wires_;  // by bus; empty without bus_timing
   std::int64_t answer_window_ns_;
   FaultInjection faults_;
-  std::vector<Disturbance> disturbances_;  // per joint
-  std::vector<double> zero_error_rad_;     // per joint; empty: there is none
+  std::vector<Disturbance> disturbances_;        // per joint
+  std::shared_ptr<const PlantChanges> changes_;  // null: there are none
+  std::shared_ptr<const model::Tree> tree_;      // the description; null: not known
+  std::vector<double> zero_error_rad_;           // per joint; empty: there is none
   std::vector<Twin> twins_;
   std::array<canopen::Frame, FaultInjection::kMostFramesOut> passed_{};  // scratch
   std::int64_t period_ns_;
@@ -274,6 +281,7 @@ class EmulatedRobot {
   std::int64_t first_ns_ = 0;     // time of the first step
   std::int64_t enabled_ns_ = -1;  // after it, when all axes were enabled first
   std::uint8_t started_ = 0, let_down_ = 0;
+  std::uint64_t told_kept_ = 0;  // of what is carried for good: next_injected() gave it
   StageHook hook_;
 };
 

@@ -95,6 +95,50 @@ void EmulatedRobot::carry() noexcept {
   plant_.carry({loads.data(), count});
 }
 
+hal::InjectedFault EmulatedRobot::next_injected() noexcept TANDEM_RT {
+  const auto payload = [](std::int64_t number) {
+    return hal::InjectedFault{.kind = FaultKind::kPayload,
+                              .index = static_cast<std::int32_t>(number)};
+  };
+  if (changes_ != nullptr && started_ != 0 && told_kept_ < changes_->kept.size())
+    return payload(changes_->kept[told_kept_++].number);
+  if (const FaultSlot* slot = faults_.next_begun(); slot != nullptr) {
+    if (slot->fault.kind != FaultKind::kPayload) return injected(slot->fault);
+    return payload(payload_number(*slot));
+  }
+  const FaultSlot* dropped = faults_.next_dropped();
+  return dropped == nullptr ? hal::InjectedFault{}
+                            : payload(-std::int64_t{payload_number(*dropped)});
+}
+
+std::uint32_t EmulatedRobot::payload_number(const FaultSlot& slot) const noexcept TANDEM_RT {
+  if (slot.fault.number != 0) return slot.fault.number;
+  const std::size_t named = changes_ != nullptr ? changes_->payloads.size() : 0;
+  return static_cast<std::uint32_t>(1 + named) +
+         static_cast<std::uint32_t>(&slot - faults_.slots().data());
+}
+
+std::string EmulatedRobot::payload_text(std::uint32_t number) const {
+  const std::size_t named = changes_ != nullptr ? changes_->payloads.size() : 0;
+  if (number == 0) return {};
+  if (number <= named) return changes_->payloads[number - 1];
+  return tree_ == nullptr ? std::string() : words_of(faults_.fault(number - 1 - named), *tree_);
+}
+
+double EmulatedRobot::carried_kg(std::int64_t from_ns, std::int64_t to_ns) const noexcept {
+  double sum = 0.0;
+  for (const FaultSlot& slot : faults_.slots()) {
+    if (slot.fault.kind != FaultKind::kPayload || slot.acted == 0) continue;
+    const std::int64_t after_ns = slot.fault.from == FaultFrom::kEnabled ? enabled_ns_ : 0;
+    const std::int64_t begin_ns = first_ns_ + after_ns + slot.fault.start_ns;
+    const std::int64_t length_ns = slot.fault.duration_ns;
+    const std::int64_t end_ns = length_ns < 0 ? to_ns : std::min(to_ns, begin_ns + length_ns);
+    const std::int64_t held_ns = std::max<std::int64_t>(0, end_ns - std::max(from_ns, begin_ns));
+    sum += slot.fault.value * static_cast<double>(held_ns);
+  }
+  return to_ns > from_ns ? sum / static_cast<double>(to_ns - from_ns) : 0.0;
+}
+
 void EmulatedRobot::apply(const FaultSlot& slot, std::int64_t time_ns) noexcept {
   const ScenarioFault& fault = slot.fault;
   const std::int64_t from_ns = fault.from == FaultFrom::kEnabled ? enabled_ns_ : 0;

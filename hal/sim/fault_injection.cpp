@@ -175,11 +175,20 @@ std::size_t FaultInjection::held_by(std::size_t slot, FrameDirection direction,
   return i;
 }
 
-const ScenarioFault* FaultInjection::next_begun() noexcept TANDEM_RT {
+const FaultSlot* FaultInjection::next_begun() noexcept TANDEM_RT {
   for (FaultSlot& slot : std::span(slots_).first(count_)) {
     if (slot.acted == 0 || slot.told != 0) continue;
     slot.told = 1;
-    return &slot.fault;
+    return &slot;
+  }
+  return nullptr;
+}
+
+const FaultSlot* FaultInjection::next_dropped() noexcept TANDEM_RT {
+  for (FaultSlot& slot : std::span(slots_).first(count_)) {
+    if (slot.fault.kind != FaultKind::kPayload || slot.told != 1 || slot.active != 0) continue;
+    slot.told = 2;
+    return &slot;
   }
   return nullptr;
 }

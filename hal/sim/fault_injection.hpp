@@ -2,6 +2,7 @@
 // Layer: hal/sim.  Thread: add() between cycles; the rest the emulated robot's.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -51,7 +52,8 @@ struct ScenarioFault {
   std::uint32_t steps = 1;     ///< that a frame is delayed
   std::uint32_t bits = 1;      ///< that are flipped in a frame
   std::int32_t length = -1;    ///< that a frame gets; -1: its own
-  std::uint32_t number = 0;    ///< product code, revision
+  std::uint32_t number = 0;    ///< product code, revision; a payload's: which [[sim.payload]],
+                               ///< from 1, 0: none of them
   hal::FaultKind kind = hal::FaultKind::kNone;
   FaultFrom from = FaultFrom::kPowerOn;
   FrameDirection direction = FrameDirection::kBoth;
@@ -83,7 +85,7 @@ struct FaultSlot {
   std::uint8_t began = 0;  ///< in this step
   std::uint8_t ended = 0;  ///< in this step
   std::uint8_t acted = 0;  ///< ever
-  std::uint8_t told = 0;   ///< next_begun() gave it
+  std::uint8_t told = 0;   ///< 1: next_begun() gave it; 2: next_dropped(), too
   std::array<std::uint8_t, 7> reserved{};
 };
 static_assert(sizeof(FaultSlot) == 224);
@@ -129,7 +131,13 @@ class FaultInjection {
                               canopen::Frame& frame) noexcept TANDEM_RT;
 
   /// The next fault that has begun and was not given yet; null: none.
-  [[nodiscard]] const ScenarioFault* next_begun() noexcept TANDEM_RT;
+  [[nodiscard]] const FaultSlot* next_begun() noexcept TANDEM_RT;
+  /// The next payload that is gone after next_begun() gave it; null: none.
+  [[nodiscard]] const FaultSlot* next_dropped() noexcept TANDEM_RT;
+  /// The fault of a slot that one of these gave: on any thread that knows of it.
+  [[nodiscard]] const ScenarioFault& fault(std::size_t slot) const noexcept {
+    return slots_[std::min(slot, kMostFaults - 1)].fault;
+  }
 
   void archive(Archive& ar);
 

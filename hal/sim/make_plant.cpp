@@ -1,5 +1,8 @@
 #include "hal/sim/make_plant.hpp"
 
+#include <memory>
+#include <utility>
+
 #include "base/nearest.hpp"
 #include "hal/sim/setup.hpp"
 #include "hal/sim/stability.hpp"
@@ -115,6 +118,24 @@ Error placed(Error error, const hal::RobotConfig& robot) {
   return error;
 }
 
+// A sub-step that is short enough for the described robot is not what is wrong.
+Error blamed(Error error, const hal::RobotConfig& robot, const tandem_kernels* kernels,
+             const PlantConfig& plant, const Plant& body, SimRobotConfig config) {
+  const std::shared_ptr<const PlantChanges> changes = std::exchange(config.changes, nullptr);
+  if (changes == nullptr || changes->differences.empty()) return error;
+  const Result<PlantConfig> described = plant_config(robot, kernels, config);
+  const Result<Plant> as_described =
+      described ? Plant::create(*described) : std::unexpected(described.error());
+  if (!as_described || !check_step(robot, *described, *as_described)) return error;
+  const std::string step = std::to_string(config.substep_ns) + " ns";
+  const std::string& first = changes->differences.front();
+  return {.message = "makes a sub-step of " + step + " unstable at " +
+                     longest_step(plant, body).place + ": the plant is other in " + first,
+          .hint = "check its numbers; as the robot's files have it, " + step + " is short enough",
+          .file = {},
+          .key = "sim." + first.substr(0, first.find(' '))};
+}
+
 }  // namespace
 
 Result<Plant> make_plant(const hal::RobotConfig& robot, const tandem_kernels* kernels,
@@ -124,7 +145,7 @@ Result<Plant> make_plant(const hal::RobotConfig& robot, const tandem_kernels* ke
   Result<Plant> body = Plant::create(*plant);
   if (!body) return std::unexpected(placed(body.error(), robot));
   if (const Status status = check_step(robot, *plant, *body); !status) {
-    return std::unexpected(status.error());
+    return std::unexpected(blamed(status.error(), robot, kernels, *plant, *body, config));
   }
   return body;
 }

@@ -2,6 +2,7 @@
 #include "hal/sim/payload.hpp"
 
 #include <algorithm>
+#include <cstdio>
 #include <optional>
 
 #include "base/nearest.hpp"
@@ -48,6 +49,13 @@ std::optional<model::Placement> read_carrier(TomlTable& table, const hal::RobotC
 }
 
 }  // namespace
+
+std::string words_of(const ScenarioFault& payload, const model::Tree& tree) {
+  char mass[32];
+  std::snprintf(mass, sizeof mass, "%.6g kg", payload.value);
+  const auto link = static_cast<std::size_t>(payload.link);
+  return mass + (link < tree.links.size() ? " on " + tree.links[link].name : "");
+}
 
 Load load_of(const ScenarioFault& payload) noexcept TANDEM_RT {
   const auto& [xx, xy, xz, yy, yz, zz] = payload.inertia_kg_m2;

@@ -20,6 +20,9 @@ struct Load {
   model::Inertia in_link;  ///< in the link's frame
 };
 
+/// "1.6 kg on panda_hand"
+[[nodiscard]] std::string words_of(const ScenarioFault& payload, const model::Tree& tree);
+
 /// What a fault of kind kPayload attaches.
 [[nodiscard]] Load load_of(const ScenarioFault& payload) noexcept TANDEM_RT;
 

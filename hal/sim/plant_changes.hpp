@@ -3,6 +3,7 @@
 // Layer: hal/sim.  Thread: non-RT to fill; immutable afterwards.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "hal/config/robot_config.hpp"
@@ -17,6 +18,12 @@ struct PlantChanges {
   model::Tree tree;                    ///< with the plant's masses, and what it always carries
   std::vector<double> zero_error_rad;  ///< per joint: what its encoders read too much; or empty
   std::vector<ScenarioFault> carried;  ///< kPayload: what comes and goes
+  std::vector<ScenarioFault> kept;     ///< kPayload: what is carried for good; `tree` has it, too
+  /// "box, 1.6 kg on panda_hand": by the `number` of those, from 1.
+  std::vector<std::string> payloads;
+  /// Everything, for people: "link panda_link4: mass_kg = 3", "payload box, 1.6 kg on panda_hand,
+  /// from 5 s to 9 s".
+  std::vector<std::string> differences;
 };
 
 }  // namespace tandem::sim

@@ -87,10 +87,7 @@ bool SimRobot::post(const ScenarioFault& fault) {
   return true;
 }
 
-hal::InjectedFault SimRobot::next_injected() noexcept TANDEM_RT {
-  const ScenarioFault* fault = robot_->next_begun_fault();
-  return fault == nullptr ? hal::InjectedFault{} : injected(*fault);
-}
+hal::InjectedFault SimRobot::next_injected() noexcept TANDEM_RT { return robot_->next_injected(); }
 
 bool SimRobot::archive(Archive& ar) {
   ar(*robot_, truth_, *master_);

@@ -9,6 +9,7 @@ SI units, W's z axis upwards; docs/python.md is the guide, docs/conventions.md h
 
 try:
     from ._native import Error, UnknownName
+    from ._native import __version__ as __version__
 except ImportError as error:
     raise ImportError(
         f"{error} (the module belongs to the Python that Tandem was built with: docs/python.md)"

@@ -9,7 +9,7 @@ from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Sequence, Uni
 import numpy as np
 
 from . import _native
-from .fields import Fields
+from .fields import Fields, Sealed
 
 
 class Text(NamedTuple):
@@ -55,7 +55,7 @@ def _refuse_not_finite(key: str, value: Any) -> None:
         raise ValueError(f"{key}: {value} is not finite")
 
 
-class Parameters(Mapping[str, Any]):
+class Parameters(Sealed, Mapping[str, Any]):
     """Parameters of a controller by name. Those that are live can be set, in this cycle.
 
     Errors: tandem.Error with the name: not live, out of range, another type; nothing is set then.
@@ -63,6 +63,7 @@ class Parameters(Mapping[str, Any]):
 
     def __init__(self, native: Any, controller: str) -> None:
         self._native, self.controller = native, controller
+        self._seal()
 
     @property
     def facts(self) -> Dict[str, Dict[str, Any]]:
@@ -93,11 +94,12 @@ class Parameters(Mapping[str, Any]):
         return f"<parameters of {self.controller}: {dict(self)}>"
 
 
-class Controllers(Mapping[str, Parameters]):
+class Controllers(Sealed, Mapping[str, Parameters]):
     """The parameters of each loaded controller: `run.controllers["squat"]["kp"] = 40`."""
 
     def __init__(self, native: Any) -> None:
         self._native = native
+        self._seal()
 
     def __getitem__(self, name: str) -> Parameters:
         if name not in list(self):
@@ -115,7 +117,7 @@ class Controllers(Mapping[str, Parameters]):
         return f"<controllers: {', '.join(self)}>"
 
 
-class Signals(Mapping[str, Any]):
+class Signals(Sealed, Mapping[str, Any]):
     """Signals by controller: `run.signals["squat"].depth`, or in one, `run.signals["squat.depth"]`.
 
     Arrays look into the controller as those of `run.state` into the run.
@@ -123,6 +125,7 @@ class Signals(Mapping[str, Any]):
 
     def __init__(self, native: Any, joints: List[str]) -> None:
         self._fields = {name: Fields(name, rows, joints) for name, rows in native.signals()}
+        self._seal()
 
     def __getitem__(self, name: str) -> Any:
         controller, _, signal = name.rpartition(".")

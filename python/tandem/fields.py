@@ -28,6 +28,36 @@ def short_names(names: Iterable[str]) -> Dict[str, str]:
     return {s: full[0] for s, full in found.items() if len(full) == 1 and s not in known}
 
 
+def numbers(what: str, value: ArrayLike) -> NDArray[np.float64]:
+    """As floating point; ValueError names what is text, complex, or no number at all."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "biuf":
+            raise TypeError
+        return np.asarray(array, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what}: is no array of numbers") from None
+
+
+class Sealed:
+    """Attributes are what the class made them: setting one would look as if it did something."""
+
+    _advice: Dict[str, str] = {}  # by attribute: what to do instead
+
+    def _seal(self) -> None:
+        self.__dict__["_sealed"] = True
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if "_sealed" in self.__dict__ and not name.startswith("_"):
+            advice = self._advice.get(name, "")
+            kind = type(self).__name__
+            raise _native.Error(f"{kind}.{name}: cannot be set{advice and f' ({advice})'}")
+        object.__setattr__(self, name, value)
+
+    def __delattr__(self, name: str) -> None:
+        raise _native.Error(f"{type(self).__name__}.{name}: cannot be deleted")
+
+
 class Fields:
     """Arrays by name, as attributes and as items: `fields.torque`, `fields["torque_nm"]`.
 
@@ -71,13 +101,7 @@ class Fields:
         what = f"{self._name}.{name}"
         if not array.flags.writeable:
             raise _native.Error(f"{what}: cannot be written (only what a command refers to can)")
-        try:
-            values = np.asarray(value)
-            if values.dtype.kind not in "fiub":
-                raise ValueError(f"are {values.dtype}, wanted numbers")
-            values = values.astype(float, copy=False)
-        except ValueError as error:  # rows of different lengths, too
-            raise ValueError(f"{what}: {error}") from None
+        values = numbers(what, value)
         if values.shape not in ((), array.shape):
             raise ValueError(f"{what}: has the shape {values.shape}, wanted {array.shape}")
         if not np.isfinite(values).all():

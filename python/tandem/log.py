@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
-from .fields import short_names, unit_of
+from .fields import Sealed, short_names, unit_of
 
 
 class Event(NamedTuple):
@@ -22,8 +22,11 @@ class Event(NamedTuple):
     text: str  #: one line
 
 
-class Column:
-    """One field over time: `column["LKneeSag"]` is a joint's (N,), `column.values` all of them."""
+class Column(Sealed, np.lib.mixins.NDArrayOperatorsMixin):
+    """One field over time: `column["LKneeSag"]` is a joint's (N,), `column.values` all of them.
+
+    numpy takes it as `values`: `column - 1.0`, `np.abs(column)`.
+    """
 
     name: str
     unit: str  #: "rad or m"
@@ -37,6 +40,7 @@ class Column:
     ) -> None:
         self.name, self.doc, self.unit, self.names = name, doc, unit_of(doc), names
         self.values, self.time_s = values, time_s
+        self._seal()
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
         """By an element's name, or as numpy does it."""
@@ -46,8 +50,15 @@ class Column:
             _native.unknown(f"element of {self.name}", key, self.names)
         return self.values[:, self.names.index(key)]
 
-    def __array__(self, dtype: Any = None) -> NDArray[Any]:
-        return np.asarray(self.values, dtype=dtype)
+    def __array__(self, dtype: Any = None, copy: Optional[bool] = None) -> NDArray[Any]:
+        return np.array(self.values, dtype=dtype) if copy else np.asarray(self.values, dtype=dtype)
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **keys: Any) -> Any:
+        """Arithmetic is of the values; nothing is written into them."""
+        if any(isinstance(one, Column) for one in keys.get("out", ())):
+            return NotImplemented
+        plain = (one.values if isinstance(one, Column) else one for one in inputs)
+        return getattr(ufunc, method)(*plain, **keys)
 
     def __len__(self) -> int:
         return len(self.values)
@@ -60,7 +71,7 @@ class Column:
         return f"<{self.name} [{self.unit}] {self.values.shape}>"
 
 
-class Channel:
+class Channel(Sealed):
     """A channel of a log. Its numbers are read, all of them, when the first is asked for.
 
     Fields are attributes and items: `channel.position`, `channel["position_rad"]`; a name may leave
@@ -86,6 +97,7 @@ class Channel:
         self._elements: Dict[str, List[str]] = dict(fields)
         self.fields = list(self._elements)
         self._short = short_names(self.fields)
+        self._seal()
 
     def _read(self) -> Dict[str, Column]:
         if self._columns is None:
@@ -105,11 +117,16 @@ class Channel:
     @property
     def units(self) -> Dict[str, str]:
         """Unit of each field; "" of those that have none."""
+        if not self.fields:
+            return {}
         return {name: column.unit for name, column in self._read().items()}
 
     def __getitem__(self, name: str) -> Column:
         full = self._short.get(name, name.lower())
         if self.fields and full not in self._elements:
+            why = self._file.left_out(self.name, full)
+            if why:
+                raise _native.UnknownName(f"no such field of {self.name} '{name}': {why}")
             _native.unknown(f"field of {self.name}", name, self.fields)
         return self._read()[full]
 
@@ -128,9 +145,15 @@ class Channel:
         return f"<{self.name}: {self.messages} messages, {', '.join(self.fields)}>"
 
 
-class Log:
+def _short_name(channel: str) -> str:
+    """Without the leading parts that a name may leave out in any log."""
+    return channel[len("/tandem/") :] if channel.startswith("/tandem/") else channel[1:]
+
+
+class Log(Sealed):
     """A log of `tandem run`, opened: `log["state"].position["LKneeSag"]`, `log.events`.
 
+    Of a log in several files the first one's name opens all, "arm-001.3.mcap" that part alone.
     Opening counts the messages; numbers are read channel by channel when they are asked for.
     Errors: FileNotFoundError; tandem.Error, a file that is no log or is damaged; UnknownName.
     """
@@ -142,6 +165,8 @@ class Log:
     info: Dict[str, str]  #: who, where, when, seed, period, kernels, controllers
     result: Dict[str, str]  #: empty when the run was killed
     configuration: Dict[str, str]  #: text of every file that was read, by path
+    parts: List[str]  #: its files: of a log in several, all that are there
+    remarks: List[str]  #: which parts are not, and what time is here; [] when none is missing
     truncated: bool  #: the run was killed, or goes on: the data end where its last chunk ended
     data_sha256: str  #: over every message
 
@@ -151,10 +176,12 @@ class Log:
         self.path, self.robot, self.joints = file.path, file.robot, file.joints
         self.info, self.result = dict(file.info), dict(file.result)
         self.configuration = dict(file.configuration)
+        self.parts, self.remarks = file.parts, file.remarks
         self.truncated, self.data_sha256 = file.truncated, file.data_sha256
         self._channels = {row[0]: Channel(file, row) for row in file.channels()}
         self.channels = list(self._channels)
         self._events: Optional[List[Event]] = None
+        self._seal()
 
     @property
     def events(self) -> List[Event]:
@@ -164,11 +191,14 @@ class Log:
         return self._events
 
     def __getitem__(self, name: str) -> Channel:
-        """A channel by its full name, or by the last part of it: "state"."""
-        for known in (name, "/tandem/" + name, "/" + name):
-            if known in self._channels:
-                return self._channels[known]
-        _native.unknown("channel of " + self.path, name, [c.rpartition("/")[2] for c in self.channels])
+        """A channel by its full name, or by the last parts of it: "state", "squat"."""
+        full = self._file.full_name(name)
+        if full in self._channels:
+            return self._channels[full]
+        why = self._file.left_out(full)
+        if why:
+            raise _native.UnknownName(f"no such channel of {self.path} '{name}': {why}")
+        _native.unknown("channel of " + self.path, name, [_short_name(c) for c in self.channels])
         raise AssertionError
 
     def __iter__(self) -> Iterator[Channel]:

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
+from .fields import Sealed
 
 Array = NDArray[np.float64]
 
 
-class Model:
+class Model(Sealed):
     """The dynamics of the robot of a robot.toml. Immutable; any thread.
 
     Each argument is a vector of one state, or a 2-D array with a state in each row: (N, nq) for q,
@@ -56,6 +57,7 @@ class Model:
         self.wrenches, self.nq, self.nv = kernels.wrenches, kernels.nq, kernels.nv
         self.floating_base, self.mass_kg = kernels.floating_base, kernels.mass_kg
         self.variant = kernels.variant
+        self._seal()
 
     def forward_dynamics(
         self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, wrench: Optional[ArrayLike] = None
@@ -126,12 +128,12 @@ class Model:
         base = 6 if self.floating_base else 0
         for name in joints:
             if name not in self.joints:
-                _native.unknown("joint", name, self.joints)
+                _native.unknown("joint", str(name), self.joints)
         return np.array([base + self.joints.index(name) for name in joints], dtype=np.intp)
 
     def _site(self, name: str) -> int:
         if name not in self.sites:
-            _native.unknown("site", name, self.sites)
+            _native.unknown("site", str(name), self.sites)
         return self.sites.index(name)
 
     def __repr__(self) -> str:

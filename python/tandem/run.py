@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import json
+import math
 import operator
 import os
+import re
 import weakref
-from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
 from .control import Controllers, Sample, Signals, Text, ask, give_input, plain
-from .fields import Fields
+from .fields import Fields, Sealed
 
 
-class Run:
+class Run(Sealed):
     """A simulated robot with its controllers, stepped in this process.
 
         run = tandem.Run("config/panda/hold.toml", control="torque")
@@ -46,13 +48,18 @@ class Run:
     estimate: Optional[Fields]  #: with [estimation]
     limits: Dict[str, NDArray[np.float64]]  #: of each joint: "max_torque_Nm", …
 
+    _advice = {
+        "command": "write into it: run.command.torque[:] = values",
+        "state": "it is what was measured",
+    }
+
     def __init__(
         self,
         experiment: Union[str, "os.PathLike[str]"],
         *,
         control: Union[None, str, Mapping[str, str]] = None,
         seed: Optional[int] = None,
-        duration_s: Optional[float] = None,
+        duration_s: Union[None, float, str] = None,
         rate: Optional[float] = None,
         scenario: Union[str, "os.PathLike[str]"] = "",
         hal: str = "",
@@ -67,8 +74,8 @@ class Run:
         control: None, the experiment's controllers lead. A mode ("position", "velocity", "torque",
         "current", "open_loop", "compliant"): Python leads every joint in it, and the experiment's
         controllers are left out. {joint: mode}: Python leads these, the controllers the others.
-        duration_s [s], seed, rate (1: real time, 0: as fast as it goes), scenario (file), hal,
-        on_fault ("end", "wait"), delay_cycles, kernel_variant: instead of the experiment's.
+        duration_s [s] or "endless", seed, rate (1: real time, 0: as fast as it goes), scenario (file),
+        hal, on_fault ("end", "wait"), delay_cycles, kernel_variant: instead of the experiment's.
         build: makes kernels that are missing.
         log: a folder, which gets ROBOT-EXPERIMENT-001.mcap or the next free number, or a new
         NAME.mcap. It is the log that `tandem run` writes. Such a run goes forward only: restore()
@@ -76,9 +83,15 @@ class Run:
         """
         self.experiment = os.fspath(experiment)
         every, some = _control(control)
-        if rate is not None and not (rate == 0.0 or 0.01 <= rate <= 1000.0):
-            raise ValueError(f"rate: {rate}, wanted 0, or 0.01 to 1000")
-        seed, delay = _whole("seed", seed, 2**63), _whole("delay_cycles", delay_cycles, 1000)
+        _number("rate", rate, lambda x: x == 0.0 or 0.01 <= x <= 1000.0, "0, or 0.01 to 1000")
+        if duration_s == "endless":
+            duration_s = math.inf
+        _number("duration_s", duration_s, lambda x: 0.0 < x <= 1e6 or x == math.inf,
+                'above 0 to 1e6, or "endless"')  # fmt: skip
+        seed, delay = _whole("seed", seed, 2**63 - 1), _whole("delay_cycles", delay_cycles, 1000)
+        for key, text in dict(hal=hal, on_fault=on_fault, kernel_variant=kernel_variant).items():
+            if not isinstance(text, str):
+                raise ValueError(f"{key}: {text!r} is no text")
         native = _native.Run(
             self.experiment, every, some, seed, duration_s, rate, os.fspath(scenario), hal,
             on_fault, delay, kernel_variant, build, _place(log),
@@ -100,12 +113,18 @@ class Run:
         self.truth = Fields("truth", native.truth(), self.joints)
         estimate = native.estimate()
         self.estimate = Fields("estimate", estimate, self.joints) if estimate else None
+        for array in self.limits.values():
+            array.flags.writeable = False
+        self._seal()
 
     def __iter__(self) -> "Run":
         return self
 
     def __next__(self) -> Fields:
-        """Commands, and the next state; the first time the state that there is."""
+        """Commands, and the next state; the first time the state that there is.
+
+        With on_fault="wait" it ends, too, when duration_s has passed in fault or held.
+        """
         if self._next():
             return self.state
         raise StopIteration
@@ -115,7 +134,10 @@ class Run:
 
         Of several cycles, without Python between them. False: the run has ended. Ctrl-C is heard.
         """
-        return self._native.step(cycles)
+        try:
+            return self._native.step(cycles)
+        except TypeError:
+            raise ValueError(f"step: cycles: {cycles!r}, wanted a whole number from 1") from None
 
     def save(self) -> bytes:
         """Everything that the rest of the run depends on, the command as it stands included."""
@@ -124,9 +146,16 @@ class Run:
     def restore(self, snapshot: bytes) -> None:
         """Goes back, or on, to where save() was; iteration begins with that state.
 
-        Also for another Run of the same experiment and control. Errors: tandem.Error, the snapshot
-        is of another experiment, or this run writes a log. The run is as it was then.
+        Also for another Run of the same robot, experiment, options, seed and control; duration_s
+        may differ, and is then this run's. Errors: tandem.Error names what is not the same, or this
+        run writes a log. The run is as it was then.
         """
+        try:
+            snapshot = bytes(memoryview(snapshot))
+        except TypeError:
+            kind = type(snapshot).__name__
+            text = f"snapshot: is of the type {kind}, wanted the bytes of save()"
+            raise ValueError(text) from None
         self._native.restore(snapshot)
 
     def inject(self, kind: str, **keys: Any) -> None:
@@ -134,8 +163,7 @@ class Run:
 
             run.inject("push", joint="panda_joint4", force_N=[0, 40, 0], for_s=0.1)
         """
-        rows = {"kind": kind, **keys}
-        lines = (f"{key} = {json.dumps(plain(value))}" for key, value in rows.items())
+        lines = (_toml(key, _listed(value)) for key, value in {"kind": kind, **keys}.items())
         self._native.inject("[[fault]]\n" + "\n".join(lines) + "\n")
 
     @property
@@ -185,8 +213,19 @@ class Run:
         self._native.stop(category)
 
     def reset_faults(self) -> None:
-        """Clears every fault in this cycle, and enables the drives again; needs on_fault="wait"."""
+        """Clears every fault in this cycle, and enables the drives again; needs on_fault="wait".
+
+        That takes some cycles. Then the phase is "held", until start(); with the experiment's
+        after_reset = "continue", "running".
+        """
         self._native.reset_faults()
+
+    def start(self) -> None:
+        """After a reset, in the phase "held": controllers and Python lead again, in this cycle.
+
+        `command` begins with what is measured. Error: tandem.Error, another phase.
+        """
+        self._native.start()
 
     def finish(self) -> None:
         """Ends the run, if it has not ended, and simulates its shut-down: the drives are disabled.
@@ -216,7 +255,7 @@ class Run:
     def joint(self, name: str) -> int:
         """Where a joint is in the arrays."""
         if name not in self.joints:
-            _native.unknown("joint", name, self.joints)
+            _native.unknown("joint", str(name), self.joints)
         return self.joints.index(name)
 
     @property
@@ -246,7 +285,10 @@ class Run:
 
     @property
     def result(self) -> Dict[str, Any]:
-        """Figures so far, named as in `tandem run --json`: joints' tracking, work, faults, …"""
+        """Figures so far, as in `tandem run --json`: those of the simulation, not of the program.
+
+        `ended` is None while the run goes on.
+        """
         return self._native.result()
 
     def __repr__(self) -> str:
@@ -265,10 +307,35 @@ def _control(control: Any) -> Tuple[str, Dict[str, str]]:
     raise ValueError(f"control: {control!r}, wanted None, a mode, or a mode by joint")
 
 
+def _number(name: str, value: Any, fits: Callable[[float], bool], wanted: str) -> None:
+    if value is None:
+        return
+    if not isinstance(value, (int, float, np.integer, np.floating)) or not fits(value):
+        raise ValueError(f"{name}: {value!r}, wanted {wanted}")
+
+
+def _toml(key: str, value: Any) -> str:
+    """A line `key = value`."""
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", key):
+        raise ValueError(f"inject: {key!r} is no key")
+    for one in value if isinstance(value, list) else [value]:
+        if not isinstance(one, (bool, int, float, str, list)):
+            raise ValueError(f"inject: {key}: {value!r} is no number, text, or list of them")
+        if isinstance(one, float) and not math.isfinite(one):
+            raise ValueError(f"inject: {key}: {value!r} is not finite")
+    return f"{key} = {json.dumps(value, ensure_ascii=False)}"
+
+
 def _whole(name: str, value: Optional[int], most: int) -> Optional[int]:
     if value is not None and not 0 <= operator.index(value) <= most:
         raise ValueError(f"{name}: {value}, wanted 0 to {most}")
     return value
+
+
+def _listed(value: Any) -> Any:
+    """Of numpy's kinds, and of tuples, what TOML has a literal for."""
+    value = plain(value)
+    return [_listed(one) for one in value] if isinstance(value, (list, tuple)) else value
 
 
 def _place(log: Union[None, str, "os.PathLike[str]"]) -> str:

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "base/process.hpp"
 #include "base/quoting.hpp"
 #include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
@@ -229,7 +230,7 @@ Diagnostics override_experiment(Experiment& e, const Overrides& overrides) {
   const double duration_s = overrides.duration_s.value_or(kEndless_s);
   if (!(duration_s > 0.0 && (duration_s <= 1e6 || duration_s == kEndless_s))) {
     return {
-        fail(fmt::format("duration_s: {}", duration_s), "above 0, to 1e6, or kEndless_s").error()};
+        fail(fmt::format("duration_s: {}", duration_s), "above 0, to 1e6, or infinity: no end").error()};
   }
   e.seed = overrides.seed.value_or(e.seed);
   e.duration_s = overrides.duration_s.value_or(e.duration_s);
@@ -314,6 +315,15 @@ Diagnostics unfit(const Experiment& e, const Overrides& overrides) {
   if (overrides.serves && is_remote) {
     return {{.message = "a robot of another process cannot be served once more",
              .hint = "add --hal sim or --hal can",
+             .file = e.file,
+             .key = "hal.backend"}};
+  }
+  if (overrides.debug && (e.hal.backend != BackendKind::kSim || overrides.serves)) {
+    return {{.message = "--debug waives the limits of time that keep a robot safe: it is for a "
+                        "simulation in this process, and " +
+                        std::string(is_remote ? "this robot is another process'"
+                                              : "this robot is on a bus"),
+             .hint = "add --hal sim, or leave --debug out",
              .file = e.file,
              .key = "hal.backend"}};
   }
@@ -432,6 +442,7 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   e = std::move(*experiment);
   if (auto unknown = override_experiment(e, overrides); !unknown.empty()) return unknown;
   if (auto reasons = unfit(e, overrides); !reasons.empty()) return reasons;
+  if (overrides.debug) waive_time_limits();
   keep_to_own_end(e, overrides);
   if (Status done = hal::replace_interfaces(e.robot, overrides.interfaces); !done) {
     return {done.error()};

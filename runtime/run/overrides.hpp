@@ -29,7 +29,9 @@ struct Overrides {
   std::optional<bool> dds = std::nullopt;
   std::optional<int> domain = std::nullopt;  ///< of DDS
   std::string on_fault = {};                 ///< "end", "wait"
-  std::size_t trace_cycles = 0;              ///< the last whose stages' times are kept
+  /// No limit of the wall clock ends anything: for work in a debugger. Simulation only.
+  bool debug = false;
+  std::size_t trace_cycles = 0;  ///< the last whose stages' times are kept
   /// Any other change of what was read, before it is checked. Robot and period stay valid.
   std::function<void(Experiment&)> change = {};
 };

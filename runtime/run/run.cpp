@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "hal/config/capabilities.hpp"
+#include "runtime/run/identity.hpp"
 #include "runtime/run/operator_link.hpp"
 
 namespace tandem::runtime {
@@ -91,7 +92,8 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
                  .controllers = *fork->controllers,
                  .clock = fork->clock,
                  .truth = truth_of(c) != nullptr ? fork->truth : nullptr,
-                 .estimator = fork->estimator.get()},
+                 .estimator = fork->estimator.get(),
+                 .identity = identity_of(c, config)},
       ahead);
   fork->cycle = fork->own.get();
   return fork;
@@ -135,7 +137,8 @@ Run::Run(Composition& c, const Overrides& overrides, const RunParts& parts) : c_
                             .observer = parts.observer,
                             .owner = {parts.owner, c.owner.get(), c.owner_slot},
                             .estimator = c.estimator.get(),
-                            .snapshots = c.predictor.get()},
+                            .snapshots = c.predictor.get(),
+                            .identity = identity_of(c, config)},
                  config);
   if (c.predictor != nullptr) {
     c.predictor->attach(*cycle_, parallel(), [&c, config] { return make_fork(c, config); });

@@ -262,6 +262,14 @@ log::RecorderOptions recorder_options(const Composition& c) {
   return options;
 }
 
+/// "2.5 h", "12 min", "40 s": as long as that is.
+std::string time_text(double seconds) {
+  constexpr double kMinute_s = 60.0, kHour_s = 3600.0;
+  if (seconds >= kHour_s) return fmt::format("{:.1f} h", seconds / kHour_s);
+  if (seconds >= kMinute_s) return fmt::format("{:.0f} min", seconds / kMinute_s);
+  return fmt::format("{:.0f} s", seconds);
+}
+
 }  // namespace
 
 std::string log_growth(const Composition& c, const std::string& path) {
@@ -271,12 +279,12 @@ std::string log_growth(const Composition& c, const std::string& path) {
   std::string room;
   if (statvfs(path.c_str(), &disk) == 0) {
     const double free = static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize);
-    room = fmt::format("; the disk has room for {:.1f} h of it",
-                       std::max(0.0, free - 1e6 * config.keep_free_MB) / rate / 3600.0);
+    room = fmt::format("; the disk has room for {} of it",
+                       time_text(std::max(0.0, free - 1e6 * config.keep_free_MB) / rate));
   }
   if (config.total_MB > 0.0) {
-    room = fmt::format("; the last {:g} MB, {:.1f} h, are kept", config.total_MB,
-                       1e6 * config.total_MB / rate / 3600.0);
+    room = fmt::format("; the last {:g} MB, {}, are kept", config.total_MB,
+                       time_text(1e6 * config.total_MB / rate));
   }
   return fmt::format("at most {:.2f} MB for each second{}", rate * 1e-6, room);
 }
@@ -305,25 +313,30 @@ log::StringMap loaded_later(const ControllerHost& host, std::size_t known) {
   return {{"loaded_controllers", later}};
 }
 
-Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& place) {
+Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& folder,
+                                                const std::string& file_name) {
   const auto cycles = static_cast<double>(c.experiment.cycles());
   const log::RecorderOptions options = recorder_options(c);
   const log::DiskLimits& limits = options.limits;
   std::uint64_t needed = static_cast<std::uint64_t>(cycles * bytes_per_cycle(c)) + kFixed_bytes;
-  if (limits.total_bytes > 0) needed = std::min(needed, limits.total_bytes);
-  std::error_code ignored;
-  const bool file_named = place.ends_with(".mcap") && !fs::is_directory(place, ignored);
-  const std::string parent = fs::path(place).parent_path().string();
-  const std::string folder = !file_named ? place : parent.empty() ? "." : parent;
+  if (limits.total_bytes > 0) {  // its oldest files go, before the disk has less, too
+    needed = std::min(needed, limits.keep_free_bytes > 0 ? limits.file_bytes : limits.total_bytes);
+  }
   if (const Status s = check_folder(folder, needed, limits.keep_free_bytes); !s) {
     return std::unexpected(s.error());
   }
   const std::string name =
       c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
-  auto claimed = file_named ? claim_named(place) : claim_file(folder, name);
+  auto claimed =
+      file_name.empty() ? claim_file(folder, name) : claim_named(fs::path(folder) / file_name);
   if (!claimed) return std::unexpected(claimed.error());
   auto& [path, file] = *claimed;
-  return log::Recorder::open(std::move(file), path, info_of(c), options);
+  auto recorder = log::Recorder::open(std::move(file), path, info_of(c), options);
+  if (recorder && c.sim != nullptr) {
+    (*recorder)->name_payloads(
+        [sim = c.sim](std::uint32_t number) { return sim->robot().payload_text(number); });
+  }
+  return recorder;
 }
 
 }  // namespace tandem::runtime

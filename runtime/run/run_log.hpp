@@ -18,14 +18,15 @@ namespace tandem::runtime {
 /// "sim", "can", "can lockstep", "ethercat", "dds", "dds lockstep", for logs and summaries.
 [[nodiscard]] std::string hal_name(const Experiment& e);
 
-/// Opens FOLDER/ROBOT-EXPERIMENT-NNN.mcap, the next free number, or the file that is named.
+/// Opens FOLDER/ROBOT-EXPERIMENT-NNN.mcap, the next free number, or FOLDER/FILE.
 ///
-/// @param place  a folder or, when it ends in ".mcap" and is none, a file; folders are created
-/// where they are missing.
+/// @param folder  created when it is missing.
+/// @param file    empty: as above
 /// Errors, before anything has moved: the folder cannot be made or written; the disk has less
 /// room than the run will write; the file is there already.
 [[nodiscard]] Result<std::unique_ptr<log::Recorder>> open_log(const Composition& composition,
-                                                              const std::string& place);
+                                                              const std::string& folder,
+                                                              const std::string& file = {});
 
 /// How fast the log at `path` grows, and for how long there is room: "at most 0.84 MB for each
 /// second; the disk has room for 6.1 h of it".

@@ -62,5 +62,17 @@ TEST_F(BadDisk, AFullDiskIsRefused) {
   expect_refused({"disk", "too full"}, "run hold.toml --log disk");
 }
 
+// "the run may need 49.6 MB", of which the oldest go while it runs.
+TEST_F(BadDisk, ARunWhoseOldFilesGoBeginsOnADiskThatCannotHaveThemAll) {
+  const Mount disk(folder_ / "disk", "size=9m");
+  if (!disk.mounted()) GTEST_SKIP() << test::needs_root("to mount a small disk");
+  write_text(folder_ / "long.toml",
+             read_text(folder_ / "hold.toml") +
+                 "\n[log]\nfile_MB = 4\ntotal_MB = 8\nkeep_free_MB = 2\ncompression = 'none'\n");
+  const Outcome run = tandem("run long.toml --duration 40 -q --log disk --json j.json");
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_GT(json("j.json")["log"]["files_removed"].get<int>(), 0);
+}
+
 }  // namespace
 }  // namespace tandem::apps

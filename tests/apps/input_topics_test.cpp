@@ -4,11 +4,16 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <random>
 #include <thread>
 
+#include "controllers/controller_io.hpp"
 #include "dds/endpoint.hpp"
 #include "dds/service.hpp"
+#include "hal/config/capabilities.hpp"
+#include "tests/dds/cdr_sample.hpp"
 #include "tests/dds/fastdds.hpp"
+#include "tests/dds/raw_topic.hpp"
 #include "tests/runtime/loop_run.hpp"
 #include "tests/support/dds_domain.hpp"
 
@@ -354,6 +359,37 @@ TEST(InputMessages, BringEveryKind) {
   EXPECT_EQ(why(InputKind::kTwist,
                 {.name = {}, .type = "geometry_msgs/msg/TwistStamped", .frame = "base"}),
             "");
+}
+
+/// Lengths, texts and numbers at random, decoded by Cyclone DDS: taken whole and within the bounds,
+/// or refused.
+TEST_F(InputTopic, AnyMessageOfEveryTypeIsTakenWholeOrRefused) {
+  std::mt19937_64 random(11);
+  const dds::test::Filling any{
+      .next = [&] { return random() % 4 == 0 ? random() : random() % 9; },
+      .elements = [&] { return static_cast<std::uint32_t>(random() % 4); }};
+  std::size_t taken = 0, refused = 0;
+  for (const runtime::InputMessage& row : runtime::input_messages()) {
+    const dds::Type& type = row.type();
+    InputOptions options{.names = {"shoulder", "elbow"}, .max = {2.0}, .most_points = 2};
+    auto io = std::make_shared<ControllerIo>();
+    io->inputs.declare("wish", row.kind, options);
+    const runtime::InputSource source{
+        .name = "wish", .feeder = InputFeeder::kTopic, .topic = "t", .type = type.ros_name};
+    const auto port = runtime::InputPort::make(io, io->inputs.all.front(), "one",
+                                               hal::robot_of(robot), 1'000'000, &source);
+    ASSERT_TRUE(port) << type.ros_name << port.error().to_string();
+    const dds::test::Codec codec(*own, type);
+    for (int i = 0; i < 2000; ++i) {
+      const auto message = codec.sample(dds::test::CdrWriter(any).sample(*type.tree));
+      ASSERT_TRUE(message) << type.ros_name;
+      const auto sample = row.sample(message->get(), (*port)->input(), source);
+      ASSERT_TRUE(!sample || sample->size() == (*port)->input().values()) << type.ros_name;
+      ++(sample && (*port)->check(*sample) ? taken : refused);
+    }
+  }
+  EXPECT_GT(taken, 1000U);
+  EXPECT_GT(refused, 1000U);
 }
 
 }  // namespace

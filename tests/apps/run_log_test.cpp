@@ -1,6 +1,8 @@
 // What the log of a run says about itself.
 #include "runtime/run/run_log.hpp"
 
+#include <cmath>
+
 #include "log/log_file.hpp"
 #include "tests/apps/program.hpp"
 
@@ -47,10 +49,31 @@ TEST_F(RunLog, GoesOnInSeveralFilesOfWhichTheOldestGo) {
     bytes += file.file_size();
   EXPECT_LE(bytes, 8'000'000U);
   const std::string first = log["path"];
-  EXPECT_NE(first.find("runs/double_pendulum-hold-001."), std::string::npos) << first;
-  const Outcome info = tandem("log info " + first + " --topic truth");
-  ASSERT_EQ(info.status, 0) << info.err;
-  EXPECT_EQ(info.out.find("torque_nm"), std::string::npos) << info.out;
+  EXPECT_EQ(first, "runs/double_pendulum-hold-001.mcap");
+  const Outcome fields = tandem("log info " + first + " --topic truth");
+  ASSERT_EQ(fields.status, 0) << fields.err;
+  EXPECT_EQ(fields.out.find("torque_nm"), std::string::npos) << fields.out;
+  // It opens all files that are left, and every reader says what is missing.
+  const std::string missing =
+      "the log lacks " +
+      (log["files_removed"] == 1 ? "part 1" : "parts 1 to " + log["files_removed"].dump());
+  EXPECT_NE(fields.err.find(missing), std::string::npos) << fields.err;
+  const Outcome info = tandem("log info " + first + " --json info.json");
+  EXPECT_NE(info.out.find(missing + "; what is here is from "), std::string::npos) << info.out;
+  const auto parts = json("info.json")["parts"];
+  EXPECT_EQ(parts.size(),
+            log["files"].get<std::size_t>() - log["files_removed"].get<std::size_t>());
+  EXPECT_EQ(parts[0]["start_ns"], json("info.json")["start_ns"]);
+  EXPECT_EQ(json("info.json")["missing"][0]["last"], log["files_removed"]);
+  EXPECT_NE(tandem("log csv " + first + " --every 1000").err.find(missing), std::string::npos);
+  EXPECT_NE(tandem("log diff " + first + " " + first).err.find(missing), std::string::npos);
+  ASSERT_EQ(tandem("report " + first + " -o page").status, 0);
+  EXPECT_NE(read_text(folder_ / "page/report.html").find(missing), std::string::npos);
+  const std::string last = parts.back()["path"];
+  const Outcome alone = tandem("log info " + last);
+  EXPECT_NE(alone.out.find("of a log in several files: " + first + " opens all of them"),
+            std::string::npos)
+      << alone.out;
   ASSERT_EQ(tandem(command + "b.json").status, 0);
   const std::string second = json("b.json")["log"]["path"];
   EXPECT_NE(second.find("runs/double_pendulum-hold-002."), std::string::npos) << second;
@@ -58,17 +81,45 @@ TEST_F(RunLog, GoesOnInSeveralFilesOfWhichTheOldestGo) {
 }
 
 TEST_F(RunLog, IsTheFileThatIsNamedUnlessThatIsThere) {
-  const std::string run = "run hold.toml --duration 0.1 --quiet --log ";
-  ASSERT_EQ(tandem(run + "new/a.mcap").status, 0);
-  const std::string first = read_text(folder_ / "new/a.mcap");
-  EXPECT_EQ(tandem("log info new/a.mcap").status, 0);
-  const Outcome again = tandem(run + "new/a.mcap");
-  EXPECT_EQ(again.status, 2);
-  EXPECT_NE(again.err.find("a.mcap: cannot make the log: "), std::string::npos) << again.err;
-  EXPECT_EQ(read_text(folder_ / "new/a.mcap"), first);
-  std::filesystem::create_directory(folder_ / "odd.mcap");  // a folder stays one
-  ASSERT_EQ(tandem(run + "odd.mcap").status, 0);
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "odd.mcap/double_pendulum-hold-001.mcap"));
+  auto composition = runtime::composed((folder_ / "hold.toml").string(), {});
+  ASSERT_TRUE(composition);
+  const std::string folder = (folder_ / "new").string();
+  {
+    const auto recorder = runtime::open_log(**composition, folder, "a.mcap");
+    ASSERT_TRUE(recorder) << recorder.error().to_string();
+    EXPECT_EQ((*recorder)->path(), folder + "/a.mcap");
+  }
+  const std::string before = read_text(folder_ / "new/a.mcap");
+  const auto again = runtime::open_log(**composition, folder, "a.mcap");
+  ASSERT_FALSE(again);
+  EXPECT_NE(again.error().to_string().find("a.mcap: cannot make the log: "), std::string::npos)
+      << again.error().to_string();
+  EXPECT_EQ(read_text(folder_ / "new/a.mcap"), before);
+}
+
+// The log had the measured position as a reference in torque mode: an error of 0, and CI passed.
+TEST_F(RunLog, HasNoReferenceThatNobodyWrote) {
+  const std::string hold = read_text(folder_ / "hold.toml");
+  const std::string head = hold.substr(0, hold.find("[[controller]]"));
+  write_text(folder_ / "hold.toml", head +
+                                        "[[controller]]\nplugin = \"gravity_compensation\"\n"
+                                        "[controller.parameters]\nmode = \"torque\"\n");
+  ASSERT_EQ(tandem("run hold.toml -q --duration 0.5 --json run.json").status, 0);
+  const auto joint = json("run.json")["joints"]["joint1"];
+  EXPECT_TRUE(joint["max_tracking_error_rad"].is_null()) << joint;
+  EXPECT_TRUE(joint["rms_tracking_error_rad"].is_null()) << joint;
+  const std::string path = json("run.json")["log"]["path"];
+  const auto file = log::LogFile::open((folder_ / path).string());
+  ASSERT_TRUE(file) << file.error().to_string();
+  const auto table = file->read("/tandem/command", {{"mode", 0}, {"position_rad", 0}});
+  ASSERT_TRUE(table);
+  std::size_t in_torque = 0;
+  for (std::size_t i = 0; i < table->time_s.size(); ++i) {
+    const bool torque = table->columns[0][i] == static_cast<double>(hal::ControlMode::kTorque);
+    EXPECT_EQ(std::isnan(table->columns[1][i]), torque) << table->time_s[i];
+    in_torque += torque ? 1 : 0;
+  }
+  EXPECT_GE(in_torque, 500U);
 }
 
 TEST_F(RunLog, DoesNotBeginWhereTheDiskHasTooLittle) {

@@ -51,6 +51,21 @@ TEST_F(Stops, AreNotConfirmedByALoopThatHangsWhichTheWatchdogEnds) {
   EXPECT_FALSE(std::filesystem::exists(socket_)) << "the next run finds its way clear";
 }
 
+TEST_F(Stops, DoNotComeFromTimeThatIsWaived) {
+  hang("1.0", "[faults]\nwatchdog_s = 0.2\n");
+  const Outcome run = tandem("run hold.toml --no-socket --no-log --debug --duration 0.3");
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.out.find("free running, without limits of time"), std::string::npos) << run.out;
+  EXPECT_EQ(tandem("run hold.toml --no-socket --no-log -q --duration 0.3").status, 1);
+  for (const char* elsewhere : {"--hal can", "--hal dds", "--hal can --lockstep"}) {
+    const Outcome robot = tandem(std::string("run hold.toml --no-log -q --debug ") + elsewhere);
+    EXPECT_EQ(robot.status, 2);
+    EXPECT_NE(robot.err.find("--debug waives the limits of time that keep a robot safe"),
+              std::string::npos)
+        << robot.err;
+  }
+}
+
 TEST_F(Stops, OfALoopThatHangsLeaveALogThatCanBeRead) {
   hang("0.0", "[faults]\nwatchdog_s = 0.2\n");
   EXPECT_EQ(tandem("run hold.toml --no-socket -q").status, 1);

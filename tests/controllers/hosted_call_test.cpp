@@ -38,5 +38,17 @@ TEST(BoundedCall, WaitsAsLongAsADebuggerHasTheProcess) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
+TEST(BoundedCall, WaitsWhileLimitsOfTimeAreWaived) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    waive_time_limits();
+    ::_exit(slow_call_is_in_time() ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
 }  // namespace
 }  // namespace tandem

@@ -47,6 +47,9 @@ TEST(Event, SaysWhatHappenedInOneLine) {
            .joint = 1,
            .kind = EventKind::kLimited};
   EXPECT_EQ(describe(event, kNames), "command limited of knee: it was out of range");
+  event.code = static_cast<std::uint32_t>(Code::kOk);
+  EXPECT_EQ(describe(event, kNames),
+            "command limited of knee: it is followed as fast as the joint's limits allow");
   event = {.code = 3, .kind = EventKind::kOverrun};
   EXPECT_EQ(describe(event, kNames), "overrun: 3 cycles skipped");
   EventNames names = kNames;
@@ -81,6 +84,17 @@ TEST(Event, SaysWhatHappenedInOneLine) {
   // It had been "sensor lost (0x000B)", whichever it was.
   event = {.code = 11, .kind = EventKind::kSensorLost, .value = 1.0F};
   EXPECT_EQ(describe(event, kNames), "sensor lost: imu for 11 cycles");
+  // A payload was "injected payload of knee", and its drop nothing.
+  event = {.code = 2, .joint = 1, .kind = EventKind::kPickedUp};
+  EXPECT_EQ(describe(event, kNames), "payload picked up") << "nobody knows what it is";
+  names.payload = [](std::uint32_t n) {
+    return n == 2 ? std::string("a, box, 1.6 kg on foot") : std::string("2 kg on foot");
+  };
+  EXPECT_EQ(describe(event, names), "payload picked up: a, box, 1.6 kg on foot");
+  event.kind = EventKind::kDropped;
+  EXPECT_EQ(describe(event, names), "payload dropped: a, box");
+  event.code = 3;
+  EXPECT_EQ(describe(event, names), "payload dropped: 2 kg on foot");
   event = {.joint = 1, .kind = EventKind::kMotionRequested, .value = -0.5F};
   EXPECT_EQ(describe(event, kNames), "motion requested of knee: to -0.5 rad (-28.65 deg)");
   event.code = 1;  // it slides

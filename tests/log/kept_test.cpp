@@ -1,8 +1,8 @@
 // What a recording keeps: decimated topics, fields, several files, and room on the disk.
 #include <sys/statvfs.h>
 
-#include "base/sha256.hpp"
 #include "hal/truth.hpp"
+#include "log/compare.hpp"
 #include "log/log_file.hpp"
 #include "log/recorder.hpp"
 #include "log/schema.hpp"
@@ -16,10 +16,13 @@ namespace fs = std::filesystem;
 constexpr std::int64_t kKeptCycle_ns = 1'000'000;
 
 /// Cycles of a state of many joints, with a command of one and an event now and then.
-RecordingResult record_kept(const std::string& path, std::uint64_t cycles,
-                            RecorderOptions options) {
+RecordingResult record_kept(const std::string& path, std::uint64_t cycles, RecorderOptions options,
+                            std::uint64_t seed = 1) {
   const std::size_t joints = 40;
-  RunInfo info{.robot = "many", .period_ns = kKeptCycle_ns, .configuration = {{"a.toml", "text"}}};
+  RunInfo info{.robot = "many",
+               .seed = seed,
+               .period_ns = kKeptCycle_ns,
+               .configuration = {{"a.toml", "text"}}};
   for (std::size_t j = 0; j < joints; ++j) info.joints.push_back("j" + std::to_string(j));
   auto recorder = Recorder::open(path, info, options);
   EXPECT_TRUE(recorder) << recorder.error().to_string();
@@ -95,12 +98,14 @@ TEST(Kept, GoesOnInFilesThatAreWholeLogs) {
   EXPECT_EQ(parts.path, folder / "run.mcap");
   std::vector<double> cycles, events;
   std::uint64_t messages = 0, bytes = 0;
-  std::string hashes;
   for (std::uint64_t part = 1; part <= parts.parts; ++part) {
     const std::string name = part == 1 ? "run.mcap" : "run." + std::to_string(part) + ".mcap";
-    const LogFile log = opened(folder / name);
+    const LogFile log = opened(folder / (part == 1 ? "run.1.mcap" : name));
     EXPECT_FALSE(log.truncated());
     EXPECT_EQ(log.info().part, part);
+    EXPECT_EQ(log.remarks(), std::vector{"this is part " + std::to_string(part) +
+                                         " of a log in several files: " + (folder / "run.mcap") +
+                                         " opens all of them"});
     EXPECT_EQ(log.info().joints.size(), 40U);
     EXPECT_EQ(log.info().configuration.size(), 1U);
     for (const char* topic : {"/robot_description", "/tf_static"})
@@ -121,13 +126,111 @@ TEST(Kept, GoesOnInFilesThatAreWholeLogs) {
     }
     messages += log.messages();
     bytes += log.bytes();
-    hashes += log.data_sha256() + "\n";
   }
   EXPECT_EQ(cycles, opened(whole.path).read("/tandem/state", {{"cycle", 0}})->columns[0]);
   EXPECT_EQ(events, (std::vector<double>{0, 1000, 2000, 3000, 4000}));
   EXPECT_EQ(messages, parts.messages);
   EXPECT_EQ(bytes, parts.bytes);
-  EXPECT_EQ(parts.data_sha256, sha256(hashes));
+}
+
+/// Whoever reads a log need not know whether it is in one file.
+TEST(Kept, OpensAllFilesAsOneLogThatIsTheSameBitForBit) {
+  const ScratchFolder folder;
+  RecorderOptions one_file = in_parts();
+  one_file.limits = {};
+  const auto whole = record_kept(folder / "whole.mcap", 5000, one_file);
+  const auto parts = record_kept(folder / "run.mcap", 5000, in_parts());
+  std::ofstream(folder / "run.77.mcap") << "another's";
+  ASSERT_GE(parts.parts, 5U);
+  const LogFile expected = opened(whole.path), log = opened(parts.path);
+  EXPECT_EQ(log.parts().size(), parts.parts);
+  EXPECT_TRUE(log.missing().empty());
+  EXPECT_TRUE(log.remarks().empty());
+  EXPECT_FALSE(log.truncated());
+  EXPECT_EQ(log.bytes(), parts.bytes);
+  EXPECT_EQ(log.info().part, 0U);
+  EXPECT_EQ(log.messages(), expected.messages());
+  EXPECT_EQ(value_of(log.result(), "messages"), std::to_string(log.messages()));
+  EXPECT_EQ(log.data_sha256(), expected.data_sha256());
+  EXPECT_EQ(log.data_sha256(), parts.data_sha256);
+  const auto compared = compare(expected, log);
+  ASSERT_TRUE(compared) << compared.error().to_string();
+  EXPECT_TRUE(compared->equal());
+  EXPECT_EQ(compared->topics.size(), expected.topics().size());
+  ASSERT_EQ(log.topics().size(), expected.topics().size());
+  for (std::size_t i = 0; i < log.topics().size(); ++i) {
+    const LoggedTopic &a = log.topics()[i], &b = expected.topics()[i];
+    EXPECT_EQ(a.name, b.name);
+    EXPECT_EQ(a.messages, b.messages) << a.name;
+    EXPECT_EQ(a.first_ns, b.first_ns) << a.name;
+    EXPECT_EQ(a.last_ns, b.last_ns) << a.name;
+  }
+}
+
+/// What is gone is said, with the time of what is there.
+TEST(Kept, SaysWhichPartsAreMissing) {
+  const ScratchFolder folder;
+  const auto parts = record_kept(folder / "run.mcap", 5000, in_parts());
+  ASSERT_GE(parts.parts, 5U);
+  const auto part = [&](std::uint64_t number) { return part_path(folder / "run.mcap", number); };
+  const std::int64_t third_ns = opened(part(3)).parts().front().first_ns;
+  fs::remove(part(1));
+  fs::remove(part(2));
+  LogFile log = opened(folder / "run.mcap");
+  EXPECT_EQ(log.parts().front().number, 3U);
+  ASSERT_EQ(log.missing().size(), 1U);
+  EXPECT_EQ(to_string(log.missing()[0]), "parts 1 to 2");
+  ASSERT_EQ(log.remarks().size(), 1U);
+  EXPECT_EQ(log.remarks()[0].find("the log lacks parts 1 to 2; what is here is from " +
+                                  std::to_string(third_ns / 1'000'000'000) + "."),
+            0U)
+      << log.remarks()[0];
+  const auto rows = log.read("/tandem/state", {{"cycle", 0}});
+  ASSERT_TRUE(rows);
+  EXPECT_EQ(rows->columns[0].back(), 4999.0);
+  EXPECT_EQ(rows->columns[0].size(), 5000.0 - rows->columns[0].front());
+
+  fs::remove(part(parts.parts));
+  fs::remove(part(4));
+  log = opened(folder / "run.mcap");
+  ASSERT_EQ(log.missing().size(), 3U);
+  EXPECT_EQ(to_string(log.missing()[1]), "part 4");
+  EXPECT_EQ(to_string(log.missing()[2]),
+            "part " + std::to_string(parts.parts) + " and what follows");
+  EXPECT_NE(log.remarks()[0].find(" s and from "), std::string::npos) << log.remarks()[0];
+  for (std::uint64_t i = 3; i < parts.parts; ++i) fs::remove(part(i));
+  EXPECT_FALSE(LogFile::open(folder / "run.mcap"));
+}
+
+/// The last part of a run that was killed ends where it was cut; a file of another run that has the
+/// name of a part is none.
+TEST(Kept, ReadsACutLastPartAndNoOtherRuns) {
+  const ScratchFolder folder;
+  const auto parts = record_kept(folder / "run.mcap", 5000, in_parts());
+  const std::string last = part_path(folder / "run.mcap", parts.parts);
+  fs::resize_file(last, fs::file_size(last) / 2);
+  LogFile log = opened(folder / "run.mcap");
+  EXPECT_TRUE(log.truncated());
+  EXPECT_EQ(log.parts().size(), parts.parts);
+  EXPECT_TRUE(log.remarks().empty());
+  fs::resize_file(last, 0);  // killed before a byte of it
+  EXPECT_EQ(to_string(opened(folder / "run.mcap").missing().at(0)),
+            "part " + std::to_string(parts.parts) + " and what follows");
+  const ScratchFolder other;
+  (void)record_kept(other / "run.mcap", 5000, in_parts(), 2);
+  fs::copy_file(part_path(other / "run.mcap", 2), part_path(folder / "run.mcap", 2),
+                fs::copy_options::overwrite_existing);
+  log = opened(folder / "run.mcap");
+  EXPECT_EQ(to_string(log.missing().at(0)), "part 2");
+  EXPECT_EQ(log.parts().size(), parts.parts - 2);
+}
+
+TEST(Kept, KnowsThePartThatAPathNames) {
+  EXPECT_EQ(part_of("runs/a-001.12.mcap")->all, "runs/a-001.mcap");
+  EXPECT_EQ(part_of("runs/a-001.12.mcap")->number, 12U);
+  for (const char* none : {"a.mcap", "a.2", "a.0.mcap", "a.02.mcap", "a.x.mcap", "a..mcap",
+                           "a.2x.mcap", ".2.mcap", "a.99999999999999999999.mcap", "a.-1.mcap"})
+    EXPECT_FALSE(part_of(none)) << none;
 }
 
 /// Where files end does not depend on the machine, nor on what it says of itself.
@@ -160,8 +263,9 @@ TEST(Kept, RemovesTheOldestFilesOfTheRunAndNoOthers) {
   EXPECT_EQ(bytes, result.bytes);
   EXPECT_TRUE(fs::exists(folder / "run.0.mcap"));
   EXPECT_FALSE(fs::exists(folder / "run.mcap"));
-  const LogFile first = opened(result.path);
-  EXPECT_EQ(first.info().part, result.removed + 1);
+  const LogFile all = opened(result.path);
+  EXPECT_EQ(all.parts().front().number, result.removed + 1);
+  EXPECT_EQ(all.parts().size(), files);
   const LogFile last = opened(folder / ("run." + std::to_string(result.parts) + ".mcap"));
   EXPECT_EQ(value_of(last.result(), "removed_parts"), std::to_string(result.removed));
   EXPECT_EQ(last.read("/tandem/state", {{"cycle", 0}})->columns[0].back(), 9999.0);

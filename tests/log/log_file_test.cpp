@@ -67,6 +67,30 @@ TEST_F(LogFileOfThree, SuggestsTheNearestNameOfATopicOrField) {
   EXPECT_FALSE(log.read("/tandem/state", {{"position_rad", 2}}));
 }
 
+// "squat" was as near to "/tandem/state" as to anything.
+TEST(LogFileOfController, FindsItsTopicsByTheirLastParts) {
+  const ScratchFolder folder;
+  auto recorder = Recorder::open(folder / "run.mcap", {.robot = "two"}, {});
+  ASSERT_TRUE(recorder);
+  hal::Layout layout;
+  layout.add("cycle", hal::FieldType::kU64, 1, "");
+  for (const char* topic : {"/tandem/state", "/tandem/controller/squat", "/tf", "/a/one", "/b/one"})
+    (void)(*recorder)->add_channel(topic, "tandem/msg/X", layout);
+  (*recorder)->start();
+  const auto log = LogFile::open((*recorder)->close().path);
+  ASSERT_TRUE(log);
+  EXPECT_EQ(log->full_name("state"), "/tandem/state");
+  EXPECT_EQ(log->full_name("squat"), "/tandem/controller/squat");
+  EXPECT_EQ(log->full_name("controller/squat"), "/tandem/controller/squat");
+  EXPECT_EQ(log->full_name("tf"), "/tf");
+  EXPECT_EQ(log->full_name("one"), "/tandem/one") << "there are two";
+  const auto hint = [&](const char* name) { return log->read(name, {}).error().hint; };
+  EXPECT_EQ(hint("/tandem/squat"), "did you mean '/tandem/controller/squat'?");
+  EXPECT_EQ(hint("/tandem/squta"), "did you mean '/tandem/controller/squat'?");
+  EXPECT_EQ(hint("/tandem/tf"), "did you mean '/tf'?");
+  EXPECT_EQ(hint("/tandem/stat"), "did you mean '/tandem/state'?");
+}
+
 TEST_F(LogFileOfThree, ReadsEverySecondMessage) {
   const auto table = open().read("/tandem/state", {{"sensor", 1}}, 2);
   ASSERT_TRUE(table);
@@ -93,13 +117,17 @@ TEST(LogFileOfAStart, LeavesTheCellsOfWhatWasNeverMeasuredEmpty) {
       .robot = "two", .joints = {"hip", "knee"}, .sensors = {{"imu", 1}}, .period_ns = 1000};
   auto recorder = Recorder::open(folder / "run.mcap", info, {});
   ASSERT_TRUE(recorder);
-  hal::Layout layout;
+  hal::Layout layout, commanded;
   layout.add("cycle", hal::FieldType::kU64, 1, "");
   layout.add("position_rad", hal::FieldType::kF64, 2, "");
   layout.add("sensor", hal::FieldType::kF64, 1, "");
   layout.add("age_cycles", hal::FieldType::kU32, 2, "");
   layout.add("sensor_age_cycles", hal::FieldType::kU32, 1, "");
+  commanded.add("cycle", hal::FieldType::kU64, 1, "");
+  commanded.add("position_rad", hal::FieldType::kF64, 2, "");
+  commanded.add("torque_nm", hal::FieldType::kF64, 2, "");
   const auto channel = (*recorder)->add_channel("/tandem/state", "tandem/msg/State", layout);
+  const auto command = (*recorder)->add_channel("/tandem/command", "tandem/msg/Command", commanded);
   (*recorder)->start();
   for (std::uint32_t cycle = 0; cycle < 3; ++cycle) {
     struct {
@@ -111,6 +139,11 @@ TEST(LogFileOfAStart, LeavesTheCellsOfWhatWasNeverMeasuredEmpty) {
               {cycle < 1 ? cycle + 1 : 0, cycle + 1, cycle < 2 ? cycle + 1 : 1, 0}};
     (*recorder)->push(channel, cycle * 1'000'000,
                       std::as_bytes(std::span(&message, 1)).first(layout.bytes()));
+    const struct {
+      std::uint64_t cycle;
+      double numbers[4];
+    } sent{cycle, {cycle < 1 ? 0.0 : 0.5, 0.0, 0.0, 1.0}};
+    (*recorder)->push(command, cycle * 1'000'000, std::as_bytes(std::span(&sent, 1)));
   }
   const std::string path = (*recorder)->close().path;
   const auto log = LogFile::open(path);
@@ -123,6 +156,13 @@ TEST(LogFileOfAStart, LeavesTheCellsOfWhatWasNeverMeasuredEmpty) {
       "sensor_age_cycles.imu\n"
       "0.001,1,0.5,,,0,2,2\n"
       "0.002,2,0.5,,0.25,0,3,1\n");
+  // A command repeats what is measured: its zeros stood for it before anything was.
+  out.str("");
+  ASSERT_TRUE(write_csv(*log, "/tandem/command", 1, out));
+  EXPECT_EQ(out.str(),
+            "time_s,cycle,position_rad.hip,position_rad.knee,torque_nm.hip,torque_nm.knee\n"
+            "0.001,1,0.5,,0,1\n"
+            "0.002,2,0.5,,0,1\n");
 }
 
 TEST_F(LogFileOfThree, WritesOnlyTheFieldsAskedFor) {

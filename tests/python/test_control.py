@@ -288,4 +288,4 @@ def test_words_of_a_controller(config, tmp_path, nodding):
 def nodding(config, monkeypatch):
     """Example 08, by whose folder it is found."""
     monkeypatch.setenv("TANDEM_CONTROLLERS", str(BUILD / "lib/examples"))
-    return config.parent / "examples/08_signals/nod.toml"
+    return config.parent / "examples/08_declarations/nod.toml"

@@ -3,6 +3,7 @@
 import csv
 import gc
 import io
+import os
 import subprocess
 
 import numpy as np
@@ -36,9 +37,21 @@ def test_names_units_and_shapes(log_file):
     assert position.shape == np.asarray(position).shape == (log["state"].messages, 2)
     assert log["state"].units["temperature_c"] == "degC"
     assert np.allclose(np.diff(log["state"].time_s), 1e-3)
-    assert log["state"].cycle[5, 0] == 5 and position[10, 1] == position["joint2"][10]
+    assert log["state"].cycle[5, 0] == 5 and position[1000, 1] == position["joint2"][1000]
     assert log.info["seed"] == "1" and any("robot.toml" in path for path in log.configuration)
     assert not log.truncated and len(log.data_sha256) == 64
+
+
+def test_what_was_not_measured_yet_is_no_number(log_file):
+    log = tandem.Log(log_file)
+    state, command = log["state"], log["command"]
+    never = state.age_cycles.values > state.cycle.values
+    assert never.any() and not never.all()
+    for column in (state.position, state.torque, state.velocity):
+        assert np.array_equal(np.isnan(column.values), never)
+    assert np.array_equal(np.isnan(command.position.values), never)
+    assert not np.isnan(command.torque.values).any()
+    assert not np.isnan(log["truth"].position.values).any()
 
 
 def test_events_are_a_list(log_file):
@@ -67,6 +80,7 @@ def test_what_is_not_there_is_named(log_file):
     log = tandem.Log(log_file)
     with pytest.raises(KeyError, match="no such channel of .* 'stat'.*did you mean"):
         log["stat"]
+    assert log["tf"] is log["/tf"]
     with pytest.raises(tandem.UnknownName, match="did you mean 'position_rad'"):
         log["state"]["positon_rad"]
     with pytest.raises(AttributeError, match="no such field"):
@@ -76,6 +90,20 @@ def test_what_is_not_there_is_named(log_file):
         log["state"].position["jiont1"]
     with pytest.raises(tandem.Error, match="not all numbers"):
         log["event"]["text"]
+
+
+def test_columns_are_numbers_to_numpy(log_file):
+    log = tandem.Log(log_file)
+    position = log["state"].position
+    values = position.values
+    assert np.array_equal(position - 1, values - 1.0, equal_nan=True)
+    assert np.array_equal(2 * position + position, 3 * values, equal_nan=True)
+    assert np.array_equal(np.abs(position), abs(values), equal_nan=True)
+    assert ((position > 0) == (values > 0)).all()
+    with pytest.raises(TypeError):
+        np.add(values, 1, out=position)
+    for channel in log:
+        assert isinstance(channel.units, dict)
 
 
 def test_files_that_are_no_logs(tmp_path, log_file):
@@ -92,3 +120,28 @@ def test_files_that_are_no_logs(tmp_path, log_file):
     (tmp_path / "damaged.mcap").write_bytes(damaged)
     with pytest.raises(tandem.Error):
         tandem.Log(tmp_path / "damaged.mcap")
+
+
+def test_a_log_in_several_files_is_one(tmp_path, config):
+    experiment = tmp_path / "parts.toml"
+    experiment.write_text(
+        f'robot = "{config}/double_pendulum/robot.toml"\nduration_s = 20\n'
+        '[log]\nfile_MB = 4\n[[controller]]\nplugin = "hold"\n'
+    )
+    subprocess.run(
+        [BUILD / "bin/tandem", "run", experiment, "--no-socket", "--no-dds", "--quiet", "--log", tmp_path],
+        check=True,
+    )
+    first = next(tmp_path.glob("*-001.mcap"))
+    whole = tandem.Log(first)
+    assert len(whole.parts) > 2 and whole.remarks == []
+    cycles = whole["state"].cycle.values[:, 0]
+    assert np.array_equal(cycles, np.arange(len(whole["state"])))
+    alone = tandem.Log(whole.parts[1])
+    assert alone.parts == [whole.parts[1]]
+    assert "opens all of them" in alone.remarks[0]
+    os.remove(whole.parts[0])
+    rest = tandem.Log(first)
+    assert rest.parts == whole.parts[1:]
+    assert rest.remarks[0].startswith("the log lacks part 1; what is here is from ")
+    assert len(rest["state"]) < len(whole["state"])

@@ -1,5 +1,7 @@
 """tandem.Model: kernels against each other, batches against rows, and what is refused."""
 
+import signal
+
 import numpy as np
 import pytest
 
@@ -120,3 +122,22 @@ def test_missing_robot_and_missing_derivatives(panda, tmp_path):
         tandem.Model(broken)
     with pytest.raises(tandem.Error, match="derivatives=True"):
         panda.forward_dynamics_derivatives(np.zeros(7), np.zeros(7), np.zeros(7))
+
+
+@pytest.mark.parametrize("bad", [["1"] * 7, [1j] * 7, "abc", None, [None] * 7])
+def test_what_is_no_number_is_refused(panda, bad):
+    with pytest.raises(ValueError, match="q: is no array of numbers"):
+        panda.mass_matrix(bad)
+
+
+def test_signals_are_heard_in_a_batch(panda):
+    """Ctrl-C is one; those that come meanwhile would else be one at its end."""
+    q, heard = np.zeros((1_000_000, 7)), []
+    before = signal.signal(signal.SIGALRM, lambda *_: heard.append(1))
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.002, 0.002)
+        panda.bias(q, np.zeros(7))
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert len(heard) > 5

@@ -1,6 +1,7 @@
 """tandem.Run: the same bits as the program's, snapshots, faults, and what is refused."""
 
 import gc
+import json
 import os
 import signal
 import subprocess
@@ -9,9 +10,10 @@ import threading
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import BUILD, ROOT
 
 import tandem
+from tandem import _native
 
 HOLD, TRAJECTORY = "double_pendulum/hold.toml", "double_pendulum/trajectory.toml"
 
@@ -102,7 +104,7 @@ def test_rewound_from_its_end_it_runs_again(config):
     end = run.state.position.copy()
     with pytest.raises(tandem.Error, match="the run is over"):
         run.step()
-    assert list(run) == [] and run.result["running_cycles"] == 200
+    assert list(run) == [] and run.result["cycles"] == 200
     run.restore(begin)
     assert sum(1 for _ in run) == 200 and np.array_equal(run.state.position, end)
 
@@ -197,7 +199,11 @@ def test_observers_do_not_command(config):
         ({"hal": "can"}, tandem.Error, "Python steps a robot that is simulated in its own process"),
         ({"hal": "dds"}, tandem.Error, "simulated in its own process"),
         ({"hal": "cna"}, tandem.Error, "one of sim, can"),
-        ({"duration_s": -1.0}, tandem.Error, "duration_s"),
+        ({"duration_s": -1.0}, ValueError, "duration_s: -1.0, wanted above 0 to 1e6"),
+        ({"duration_s": 0}, ValueError, 'or "endless"'),
+        ({"duration_s": "long"}, ValueError, "duration_s: 'long', wanted above 0"),
+        ({"hal": "ethercat"}, tandem.Error, "simulated in its own process"),
+        ({"seed": 2**63}, ValueError, "seed: 9223372036854775808, wanted 0 to"),
         ({"on_fault": "laugh"}, tandem.Error, "one of end, wait"),
         ({"scenario": "no/such.toml"}, FileNotFoundError, "no/such.toml"),
         ({"seed": -1}, ValueError, "seed: -1, wanted 0 to"),
@@ -248,7 +254,8 @@ def test_a_fault_ends_the_run_by_default(config):
     assert run.step() is False and run.over
     run.finish()
     assert run.phase == "done"
-    assert run.result["faults"][0]["category"] == 0
+    assert run.result["fault_log"][0]["category"] == "category0"
+    assert run.result["ended"] == "by a fault" and len(run.result["faults"]) == 1
 
 
 def test_arrays_outlive_their_run(config):
@@ -370,8 +377,14 @@ def test_snapshots_of_others_are_refused(config, tmp_path):
             run.restore(bad)
     with pytest.raises(tandem.Error):
         run.restore(tandem.Run(config / "panda/hold.toml", control="torque").save())
-    with pytest.raises(tandem.Error, match="other controllers"):
+    with pytest.raises(tandem.Error, match="'controller"):
         run.restore(tandem.Run(config / HOLD).save())
+    with pytest.raises(tandem.Error, match="other controllers"):
+        run.restore(tandem.Run(config / HOLD, control="position").save())
+    for no_bytes in ("abc", 3, None):
+        with pytest.raises(ValueError, match="snapshot: is of the type"):
+            run.restore(no_bytes)
+    run.restore(bytearray(own))
     other = tandem.Run(config / HOLD, control="torque", scenario=scenario_with_a_push(tmp_path))
     try:  # as far as it fits; else the run is as it was
         run.restore(other.save())
@@ -379,6 +392,239 @@ def test_snapshots_of_others_are_refused(config, tmp_path):
     except tandem.Error:
         pass
     assert bits(run, 20) == wanted
+
+
+def changed(config, tmp_path, text="", robot=None):
+    """hold.toml with more text, and another robot.toml beside it."""
+    folder = config / "double_pendulum"
+    hold = (folder / "hold.toml").read_text().replace("robot.toml", str(folder / "robot.toml"))
+    if robot is not None:
+        other = tmp_path / "robot.toml"
+        lines = (folder / "robot.toml").read_text().replace('urdf = "', f'urdf = "{folder}/')
+        other.write_text(lines.replace(*robot))
+        assert robot[0] in lines
+        hold = hold.replace(str(folder / "robot.toml"), str(other))
+    file = tmp_path / "changed.toml"
+    file.write_text(text.format(hold=hold) if "{hold}" in text else hold + text)
+    return file
+
+
+@pytest.mark.parametrize(
+    "text, options, what",
+    [
+        ("\n[sim.link.link2]\nmass_kg = 3.0\n", {}, "sim.link"),
+        ("\n[sim.joint.joint1]\nfriction_Nm = 1.0\n", {}, "sim.joint"),
+        ('\n[sim]\nintegrator = "rk4"\n', {}, "sim.integrator"),
+        ("period_ns = 2000000\n{hold}", {}, "period_ns"),
+        ("", {"seed": 9}, "seed"),
+        ("", {"on_fault": "wait"}, "on_fault"),
+        ("", {"delay_cycles": 2}, "delay_cycles"),
+        ("", {"kernel_variant": "baseline"}, "kernels"),
+    ],
+)
+def test_a_snapshot_names_what_is_not_the_same(config, tmp_path, text, options, what):
+    snapshot = tandem.Run(config / HOLD, control="torque").save()
+    other = tandem.Run(changed(config, tmp_path, text), control="torque", **options)
+    before = other.save()
+    with pytest.raises(tandem.Error, match=f"is of another run: '{what}' is not the same"):
+        other.restore(snapshot)
+    assert other.save() == before
+    with pytest.raises(tandem.Error, match=f"'{what}'"):
+        tandem.Run(config / HOLD, control="torque").restore(before)
+
+
+def test_a_snapshot_of_another_robot_file_is_refused(config, tmp_path):
+    snapshot = tandem.Run(config / HOLD, control="torque").save()
+    robot = ("[model]", "# another\n[model]")
+    other = tandem.Run(changed(config, tmp_path, robot=robot), control="torque")
+    with pytest.raises(tandem.Error, match="another run: 'robot'"):
+        other.restore(snapshot)
+
+
+def test_a_snapshot_fits_where_nothing_that_matters_differs(config, tmp_path):
+    run = tandem.Run(config / HOLD, control="torque", duration_s=1)
+    run.step(900)
+    snapshot = run.save()
+    wanted = bits(run, 99)
+    quiet = changed(config, tmp_path, "\n# a remark\n[report]\n[log]\nfolder = \"elsewhere\"\n")
+    other = tandem.Run(quiet, control="torque", duration_s=2)
+    other.restore(snapshot)
+    assert bits(other, 99) == wanted
+    assert 1 + sum(1 for _ in other) == 1001  # the duration is its own
+
+
+def test_tracking_error_is_none_where_no_position_was_wanted(config):
+    run = tandem.Run(config / "panda/hold.toml", control="torque")
+    model = tandem.Model(run.robot_file)
+    for state, _ in zip(run, range(300)):
+        run.command.torque[:] = model.bias(state.position, np.zeros(7)) - 2.0 * state.velocity
+    rows = run.result["joints"]
+    assert all(row["rms_tracking_error_rad"] is None for row in rows.values()), rows
+    assert all(row["max_tracking_error_rad"] is None for row in rows.values())
+    run.command.position[3] = run.state.position[3] + 0.1  # what it wants by other means
+    run.step(10)
+    rows = run.result["joints"]
+    assert rows.pop("panda_joint4")["max_tracking_error_rad"] > 0.05
+    assert all(row["rms_tracking_error_rad"] is None for row in rows.values())
+
+
+def stopped(config, **options):
+    run = tandem.Run(config / HOLD, control="torque", on_fault="wait", **options)
+    run.step(50)
+    run.stop(1)
+    run.step(20)
+    assert run.phase == "faulted"
+    return run
+
+
+def test_after_a_reset_start_gives_the_robot_back(config):
+    run = stopped(config, duration_s=1)
+    with pytest.raises(tandem.Error, match="phase 'faulted', wanted 'held'"):
+        run.start()
+    run.reset_faults()
+    while run.phase != "held":
+        run.step()
+    run.start()
+    assert np.array_equal(run.command.torque, run.state.torque)
+    run.command.torque[:] = hold = run.command.torque.copy()
+    assert run.step() and run.phase == "running"
+    with pytest.raises(tandem.Error, match="lead already"):
+        run.start()
+    run.step(150)
+    assert np.allclose(run.sent.torque, hold)
+    assert 0 < sum(1 for _ in run) < 1000 and run.over  # and ends as planned
+    assert run.result["cycles"] == 1000 and run.result["ended"] == "as planned"
+
+
+def test_a_loop_ends_though_the_run_waits(config):
+    run = stopped(config, duration_s=0.5)
+    assert sum(1 for _ in run) < 500 and not run.over
+    run.reset_faults()
+    run.step(2000)
+    assert run.phase == "held" and list(run) == []
+
+
+def test_a_command_that_nobody_obeys_is_told(config, recwarn):
+    run = stopped(config)
+    run.step(5)
+    assert not recwarn.list
+    run.command.torque[0] = 0.5
+    with pytest.warns(RuntimeWarning, match="phase 'faulted': its command is not obeyed"):
+        run.step()
+
+
+def test_what_is_for_other_joints_is_told_as_a_plugins(config, tmp_path):
+    text = "\n[controller.parameters]\njoints = [\"joint2\"]\n"
+    run = tandem.Run(changed(config, tmp_path, text), control={"joint1": "torque"})
+    run.step(5)
+    run.command.torque[0] = 0.1
+    run.step(5)
+    assert not run.faults
+    run.command.position[1] = np.nan
+    sent = run.sent.position[1]
+    run.step(5)
+    assert [f["joint"] for f in run.faults] == ["joint2"] and run.sent.position[1] == sent
+    assert "python" in str(run.result["fault_log"][0])
+    assert run.phase == "running"
+
+
+def test_whole_objects_cannot_be_assigned(config, log_file):
+    run = tandem.Run(config / HOLD, control="torque")
+    with pytest.raises(tandem.Error, match=r"Run.command: cannot be set \(write into it: run.command"):
+        run.command = np.zeros(2)
+    with pytest.raises(tandem.Error, match="Run.sede: cannot be set"):
+        run.sede = 3
+    with pytest.raises(tandem.Error, match="Parameters.kp: cannot be set"):
+        tandem.Run(config / HOLD).controllers["hold"].kp = 3
+    model = tandem.Model(run.robot_file)
+    with pytest.raises(tandem.Error, match="Model.mass_kg: cannot be set"):
+        model.mass_kg = 3
+    with pytest.raises(tandem.Error, match="cannot be deleted"):
+        del model.nq
+    log = tandem.Log(log_file)
+    for target in (log, log["state"], log["state"].position):
+        with pytest.raises(tandem.Error, match="cannot be set"):
+            target.joints = []
+    for array in (log["state"].time_s, log["state"].position.values, run.limits["max_torque_Nm"]):
+        with pytest.raises(ValueError):
+            array[0] = 99
+
+
+def test_a_payload_is_injected(config):
+    runs = [tandem.Run(config / "panda/hold.toml") for _ in range(2)]
+    runs[1].inject("payload", site="hand", mass_kg=2.0)
+    for run in runs:
+        run.step(1000)
+    assert abs(runs[1].state.torque - runs[0].state.torque).max() > 5.0
+    with pytest.raises(tandem.Error, match="hand"):
+        runs[0].inject("payload", site="hadn", mass_kg=2.0)
+
+
+def test_figures_are_those_of_the_program(config, tmp_path):
+    run = tandem.Run(config / "coman/squat.toml", duration_s=1)
+    assert run.result["ended"] is None
+    assert sum(1 for _ in run) == 1000
+    run.finish()
+    text = subprocess.run(
+        [BUILD / "bin/tandem", "run", config / "coman/squat.toml", "--duration", "1", "--json", "-",
+         "--no-socket", "--no-dds", "--quiet", "--log", tmp_path],
+        check=True, capture_output=True, text=True,
+    ).stdout  # fmt: skip
+    theirs, ours = json.loads(text), run.result
+    assert len(ours) >= 15 and ours["ground"] and ours["base"] and ours["work"]
+    for name, value in ours.items():
+        if name == "joints":  # whose command was limited is the program's to say
+            theirs[name] = {j: {k: row[k] for k in value[j]} for j, row in theirs[name].items()}
+        assert same(value, theirs[name]), (name, value, theirs[name])
+
+
+def same(one, other):
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(same(one[k], other[k]) for k in one)
+    return one == other or (isinstance(one, float) and np.isclose(one, other, rtol=1e-5, atol=1e-12))
+
+
+def test_after_the_end_nothing_is_asked(config):
+    run = tandem.Run(config / HOLD, control="torque", duration_s=0.05)
+    assert sum(1 for _ in run) == 50
+    for ask in (run.reset_faults, run.stop, run.start, run.step,
+                lambda: run.inject("encoder_freeze", joint="joint1")):  # fmt: skip
+        with pytest.raises(tandem.Error, match="the run is over"):
+            ask()
+    assert run.result["ended"] == "as planned"
+
+
+@pytest.mark.parametrize(
+    "call, words",
+    [
+        (lambda run: run.step(1.5), "cycles: 1.5, wanted a whole number from 1"),
+        (lambda run: run.step(2**70), "wanted a whole number"),
+        (lambda run: run.joint(3), "no such joint '3'"),
+        (lambda run: run.inject("push", joint="joint1", force_N=[0, float("nan"), 0]), "force_N: .* is not finite"),
+        (lambda run: run.inject("push", joint=None), "joint: None is no number"),
+        (lambda run: run.inject("push", **{"a b": 1}), "'a b' is no key"),
+        (lambda run: setattr(run.command, "torque", ["1", "2"]), "command.torque: is no array of numbers"),
+        (lambda run: setattr(run.command, "torque", [1j, 0]), "command.torque: is no array of numbers"),
+    ],
+)  # fmt: skip
+def test_messages_speak_of_what_was_given(config, call, words):
+    run = tandem.Run(config / HOLD, control="torque")
+    with pytest.raises((ValueError, KeyError), match=words) as error:
+        call(run)
+    assert "_native" not in str(error.value)
+
+
+def test_a_conflict_advises_what_helps(config):
+    with pytest.raises(tandem.Error, match=r"joints = \[...\]") as error:
+        tandem.Run(config / HOLD, control={"joint1": "torque"})
+    assert "active = false" not in str(error.value)
+
+
+def test_no_object_is_without_its_run(log_file):
+    for kind in (_native.Kernels, _native.Run, _native.LogFile):
+        with pytest.raises(TypeError):
+            kind.__new__(kind)
+    assert tandem.__version__
 
 
 def test_model_and_run_agree(config):
@@ -419,7 +665,7 @@ position_rad = [-0.3]
     run = tandem.Run(experiment, control={"joint2": "position"})
     begin = run.state.position.copy()
     for state in run:
-        run.command.position[:] = begin + 0.1 * min(1.0, (run.time_s - 1.2) / 0.5)
+        run.command.position[1] = begin[1] + 0.1 * min(1.0, (run.time_s - 1.2) / 0.5)
     assert np.allclose(run.sent.position, [-0.3, begin[1] + 0.1], rtol=0, atol=1e-12)
     assert np.allclose(run.state.position, run.sent.position, rtol=0, atol=0.05)  # springs yield
 

@@ -64,6 +64,9 @@ def test_a_folder_gets_the_next_free_number(config, tmp_path):
             names.append(run.log)
     assert names == [str(tmp_path / f"logs/double_pendulum-hold-00{n}.mcap") for n in (1, 2)]
     assert all(len(tandem.Log(name)["state"]) > 10 for name in names)
+    (tmp_path / "odd.mcap").mkdir()  # a folder stays one
+    with tandem.Run(config / HOLD, log=tmp_path / "odd.mcap") as run:
+        assert run.log == str(tmp_path / "odd.mcap/double_pendulum-hold-001.mcap")
     assert tandem.Run(config / HOLD).log is None
 
 

@@ -99,6 +99,8 @@ TEST_P(AnyFeet, EveryFootsForceIsDrawnBesideItsShareOfTheWeight) {
   EXPECT_EQ(force.curves.size(), static_cast<std::size_t>(GetParam()));
   ASSERT_EQ(force.levels.size(), 1U);
   EXPECT_NEAR(force.levels[0].y * GetParam(), one.kernels.get()->mass_kg * 9.81, 1e-9);
+  run.result = {{"weight_N", "400"}};  // of a plant that is not the model
+  EXPECT_NEAR(figure("foot_force").levels[0].y * GetParam(), 400.0, 1e-9);
   const std::vector<FootFigures> feet = run.feet();
   ASSERT_EQ(feet.size(), static_cast<std::size_t>(GetParam()));
   double sum_N = 0.0;

@@ -269,6 +269,50 @@ TEST_F(Gripper, OfAFaultedRunShowsTheFaultAndWhatFollowedButCountsIt) {
   EXPECT_EQ(figures[2].notes.back().text, "1.30 s");
 }
 
+// A payload that came and went left no trace in a figure.
+TEST_F(Gripper, OfARunThatPicksSomethingUpMarksWhen) {
+  run.time_s = {1.0, 2.0};
+  run.payloads = {{0.0, false, "payload picked up: tool"},
+                  {1.2, false, "payload picked up: box"},
+                  {1.3, false, "payload picked up: can"},
+                  {1.7, true, "payload dropped: box"}};
+  const Figure figure = figures_of(run, {}, nullptr).front();
+  ASSERT_EQ(figure.marks.size(), 3U) << "what is there before the first row is no mark";
+  EXPECT_EQ(figure.marks[0].label, "payload picked up");
+  EXPECT_EQ(figure.marks[1].label, "");
+  EXPECT_EQ(figure.marks[2].label, "payload dropped");
+  EXPECT_EQ(figure.marks[2].x, 1.7);
+  EXPECT_FALSE(figure.marks[2].fault);
+}
+
+// A board whose encoder is unplugged repeats what it measured last, and age_cycles stays 0.
+TEST_F(Gripper, WhatABoardRepeatsWithoutASensorIsNotDrawnAsMeasured) {
+  run.drive_fault.assign(8, {0.0, 0.0});
+  EXPECT_EQ(figures_of(run, {}, nullptr)[0].curves[0].y.size(), 2U);
+  EXPECT_TRUE(std::isfinite(figures_of(run, {}, nullptr)[0].curves[0].y[1]));
+  run.drive_fault.back() = {0.0, 0x7300};
+  const std::vector<Figure> figures = figures_of(run, {}, nullptr);
+  for (const std::size_t figure : {0U, 1U}) {
+    EXPECT_TRUE(std::isfinite(figures[figure].curves[0].y[0]));
+    EXPECT_TRUE(std::isnan(figures[figure].curves[0].y[1])) << figures[figure].name;
+  }
+}
+
+// It was "[deg, mm]" of any robot.
+TEST_F(Gripper, DifferencesHaveTheUnitsOfWhatIsDrawn) {
+  RunData second = run;
+  for (auto& column : second.position_rad) column[1] += 0.001;
+  second.torque_Nm = second.position_rad;
+  second.position_rad.back()[1] += 1.0;
+  const std::vector<Figure> figures = difference_figures(run, second);
+  EXPECT_EQ(figures[0].y_label, "difference [deg, mm]");
+  second.position_rad.back() = run.position_rad.back();
+  second.torque_Nm.back() = run.torque_Nm.back();
+  const std::vector<Figure> turning = difference_figures(run, second);
+  EXPECT_EQ(turning[0].y_label, "difference [deg]");
+  EXPECT_EQ(turning[1].y_label, "difference [Nm]");
+}
+
 // An empty frame had been drawn, and "against its reference" stood above none.
 TEST_F(Gripper, OfARecordingOnlyWhatItHasIsDrawnAndNamed) {
   run.info.hal = "import";

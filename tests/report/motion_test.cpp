@@ -103,6 +103,47 @@ TEST(Posture, LooksToTheRightWhereverTheDescriptionsXPoints) {
   }
 }
 
+/// Without a truth the base stood at 0, the feet half a metre below, and "ground" between.
+TEST(Posture, OfABaseThatNobodyKnowsStandsOnItsFeetAndSaysSo) {
+  const std::string folder = TANDEM_SOURCE_DIR "/config/coman/";
+  const auto robot = hal::read_robot_config(folder + "robot.toml");
+  ASSERT_TRUE(robot.has_value());
+  const auto description = model::read_urdf(robot->model.urdf, {.floating_base = true});
+  ASSERT_TRUE(description.has_value());
+  PostureSample zero{"", 0.0, {}, std::vector<double>(robot->joints.size(), 0.0), false};
+  const auto lowest = [&](const Figure& figure) {
+    double low = 1e300;
+    for (const Curve& curve : figure.curves)
+      for (const double z : curve.y) low = std::isfinite(z) ? std::min(low, z) : low;
+    return low;
+  };
+  const Figure unknown = posture_figure(description->tree, *robot, {&zero, 1});
+  EXPECT_NEAR(lowest(unknown), robot->contact.height_m, 1e-9);
+  EXPECT_TRUE(unknown.title.ends_with("; base unknown: upright on its feet")) << unknown.title;
+  zero.placed = true;
+  const Figure known = posture_figure(description->tree, *robot, {&zero, 1});
+  EXPECT_LT(lowest(known), -0.3);
+  EXPECT_EQ(known.title, "Posture, seen from the robot's right");
+}
+
+/// An arm that reaches ahead and turns a little was a line, seen from the front.
+TEST(Posture, OfAnArmIsSeenFromWhereItShowsMost) {
+  const std::string folder = TANDEM_SOURCE_DIR "/config/panda/";
+  const auto robot = hal::read_robot_config(folder + "robot.toml");
+  ASSERT_TRUE(robot.has_value());
+  const auto description = model::read_urdf(robot->model.urdf, {.lock = robot->model.lock});
+  ASSERT_TRUE(description.has_value());
+  std::vector<double> q = robot->posture("ready")->position_rad;
+  std::vector<PostureSample> samples{{"start", 0.0, {}, q}};
+  q[0] += 0.4;
+  samples.push_back({"farthest", 1.0, {}, q});
+  EXPECT_EQ(posture_figure(description->tree, *robot, samples).title,
+            "Posture, seen from the robot's right");
+  for (PostureSample& sample : samples) sample.position_rad[0] += 1.5;
+  EXPECT_EQ(posture_figure(description->tree, *robot, samples).title,
+            "Posture, seen from the front");
+}
+
 TEST(Posture, PlacesEveryBodyOfThePendulum) {
   const std::string folder = TANDEM_SOURCE_DIR "/config/double_pendulum/";
   const auto robot = hal::read_robot_config(folder + "robot.toml");

@@ -96,8 +96,7 @@ class FaultRobot final : public hal::Backend {
     return master->fault_cause(joint);
   }
   [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override {
-    const sim::ScenarioFault* fault = emulated->next_begun_fault();
-    return fault == nullptr ? hal::InjectedFault{} : sim::injected(*fault);
+    return emulated->next_injected();
   }
 
   /// A period passes without the master.

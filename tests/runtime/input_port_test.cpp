@@ -495,6 +495,27 @@ TEST_F(InputRun, AFileOfRowsIsATimeline) {
   EXPECT_EQ(input()[1], -1.5);
 }
 
+// The first read beyond the rows, the second wrote beyond the sample.
+TEST_F(InputRun, AFileWithoutRowsAndALongWayPointAreErrors) {
+  const tandem::test::ScratchFolder folder;
+  const std::string path = folder / "rows.csv";
+  std::ofstream(path) << "time_s,after_,shoulder,elbow\n";
+  const auto why = [&](InputSource source) {
+    source.name = "way";
+    of(hal::test::fake_robot());
+    const Status added =
+        add({{"way", InputKind::kTrajectory, {.names = {"shoulder", "elbow"}}}}, {source});
+    return added ? std::string() : added.error().to_string();
+  };
+  const std::string file = why({.feeder = InputFeeder::kFile, .file = path});
+  EXPECT_NE(file.find("rows.csv:1: a way-point is not"), std::string::npos) << file;
+  std::vector<double> longer(100, 0.1);
+  longer[0] = 0.5;
+  const std::string row =
+      why({.feeder = InputFeeder::kTimeline, .timeline = {{0.5, 1.0, 0.1, 0.2}, longer}});
+  EXPECT_NE(row.find("row 2 of its timeline has 99 numbers"), std::string::npos) << row;
+}
+
 /// JointRun's loop runs under the traps; this one says that a flood, a repeat and an expiry do too.
 TEST_F(InputRun, TakesNoHeapInTheCycle) {
   run({timeline({{0.001, 0.1, 0.0}}, 0.002)});

@@ -170,8 +170,11 @@ TEST_F(ParameterRun, SetsAListAllElementsAtOnceOrEachByItself) {
   EXPECT_EQ(refusal("gains.y", Values{1, 2, 3}),
             "tuned.gains.y: is a number, not a list (give 0 to 9)");
   EXPECT_EQ(refusal("share", Values{1}), "tuned.share: is a number, not a list (give 0 to 1)");
-  EXPECT_EQ(refusal("gians", 1),
-            "tuned.gians: the controller has no such parameter (did you mean 'gains'?)");
+  EXPECT_EQ(refusal("gain", 1),
+            "tuned.gain: the controller has no such parameter (did you mean 'gains'?)");
+  EXPECT_EQ(refusal("gains.w", 1),
+            "tuned.gains.w: the controller has no such parameter (known: gains.x, gains.y, "
+            "gains.z.0)");
   EXPECT_FALSE(set({{"tuned", "gains", 2}, {"tuned", "gains.y", 3}})) << "y is named twice";
   EXPECT_FALSE(set(Wishes(kMostParameterChanges / 3 + 1, {"tuned", "gains", 2})));
   EXPECT_FALSE(set(Wishes(10'000, {"tuned", "share", 0.2})));

@@ -73,6 +73,39 @@ TEST_F(PlantOptions, ChangeThePlantAndLeaveTheRobot) {
   EXPECT_EQ(e->robot.joints[static_cast<std::size_t>(plant.carried[0].joint)].name, "panda_joint7");
 }
 
+TEST_F(PlantOptions, NameWhatTheyChange) {
+  const auto e = read(
+      "[sim.link.panda_link7]\nmass_kg = 2.0\n[sim.joint.panda_joint2]\nfriction_Nm = 3.0\n"
+      "[[sim.payload]]\nname = 'tool'\nlink = 'panda_hand'\nmass_kg = 0.5\n"
+      "[[sim.payload]]\nname = 'box'\nsite = 'hand'\nmass_kg = 1.6\nuntil_s = 0.5\n");
+  ASSERT_TRUE(e) << to_string(e.error());
+  EXPECT_EQ(e->plant->differences,
+            (std::vector<std::string>{
+                "link panda_link7: mass_kg = 2", "joint panda_joint2: friction_Nm = 3",
+                "payload tool, 0.5 kg on panda_hand, from the start",
+                "payload box, 1.6 kg on panda_hand, from the start to 0.5 s"}));
+  ASSERT_EQ(e->plant->kept.size(), 1u);
+  EXPECT_EQ(e->plant->payloads[e->plant->kept[0].number - 1], "tool, 0.5 kg on panda_hand");
+  EXPECT_EQ(e->plant->payloads[e->plant->carried[0].number - 1], "box, 1.6 kg on panda_hand");
+}
+
+// They were to be "repaired", by a command that refuses an experiment; or had no key; or did
+// nothing.
+TEST_F(PlantOptions, AreRefusedByTheirKeysWithHintsThatHelp) {
+  const std::string inertia =
+      errors_of("[sim.link.panda_link4]\ninertia_kg_m2 = [1, 0, 0, 0.1, 0, 0.1]\n");
+  EXPECT_NE(inertia.find("sim.link.panda_link4.inertia_kg_m2: "), std::string::npos) << inertia;
+  EXPECT_EQ(inertia.find("repair"), std::string::npos) << inertia;
+  const std::string far = errors_of("[sim.link.panda_link4]\ncom_m = [100, 0, 0]\n");
+  EXPECT_NE(far.find("sim.link.panda_link4.com_m: "), std::string::npos) << far;
+  for (const std::string key : {"spring_Nm_rad", "spring_damping_Nms_rad"}) {
+    const std::string rigid = errors_of("[sim.joint.panda_joint4]\n" + key + " = 10\n");
+    EXPECT_NE(rigid.find("sim.joint.panda_joint4." + key + ": changes nothing"), std::string::npos)
+        << rigid;
+    EXPECT_EQ(errors_of("[sim.joint.LKneeSag]\n" + key + " = 10\n", "coman"), "");
+  }
+}
+
 // What stands at a turned site is the same as what stands at its link, turned.
 TEST_F(PlantOptions, TakeASitesNumbersInItsOwnFrame) {
   const auto e = read(

@@ -182,7 +182,9 @@ TEST(RobotCycle, KeepsThePositionThatAControllerWantsInTorqueMode) {
       void take(const hal::CycleView& view) noexcept override {
         if (view.phase != RunPhase::kRunning) return;
         shown_rad = std::max(shown_rad, view.command.position_rad()[0] - 0.1);
-        silent = silent && view.command.position_rad()[1] == view.state.position_rad()[1];
+        const bool torque =
+            view.command.mode()[1] == static_cast<std::int8_t>(hal::ControlMode::kTorque);
+        silent = silent && std::isnan(view.command.position_rad()[1]) == torque;
       }
       double shown_rad = 0.0;
       bool silent = true;

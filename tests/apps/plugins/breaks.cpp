@@ -32,11 +32,11 @@ class Breaks final : public Controller {
     rule_ = setup.parameters.choice_or(
         "rule", "none",
         {"none", "allocation", "lock", "system_call", "thread", "thread_in_configure", "page_fault",
-         "archive_reads_more", "archive_forgets", "archive_allocates", "slow", "nan"});
+         "archive_reads_more", "archive_forgets", "archive_allocates", "slow", "nan", "too_fast",
+         "stray"});
     if (rule_ == "thread_in_configure") std::thread([] {}).join();
-    for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
-      setup.claim(j, hal::ControlMode::kPosition);
-    }
+    const std::size_t joints = rule_ == "stray" ? 1 : setup.robot.joints.size();
+    for (std::size_t j = 0; j < joints; ++j) setup.claim(j, hal::ControlMode::kPosition);
     // No memory that is locked, whatever the process asks for.
     pages_ = static_cast<char*>(::mmap(nullptr, kPages * 4096, PROT_READ | PROT_WRITE,
                                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0));
@@ -75,6 +75,8 @@ class Breaks final : public Controller {
     if (rule_ == "thread") std::thread([] {}).join();
     if (rule_ == "page_fault") touch(pages_, cycle_ / 100 % kPages);
     if (rule_ == "slow") ::usleep(5'000);
+    if (rule_ == "too_fast") command.position_rad()[1] += 0.2;
+    if (rule_ == "stray") command.position_rad()[1] = 1.0;
     if (rule_ == "nan") command.position_rad()[1] = 0.0 / (0.0 * middle_rad_);
   }
 

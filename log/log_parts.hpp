@@ -1,0 +1,51 @@
+// The files of a log in several: their names, and what of them is there.
+// Layer: log.  Thread: any, non-RT.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tandem::log {
+
+/// A log of `[log] file_MB`: "runs/arm-001.mcap" is the first file and the name of all of them;
+/// "runs/arm-001.2.mcap" is the second.
+/// @param name  of all of them
+[[nodiscard]] std::string part_path(const std::string& name, std::uint64_t number);
+
+/// The part that a path names, and all of them: "a.2.mcap" is part 2 of "a.mcap". Part 1 alone is
+/// "a.1.mcap", a name that no file has. Empty: the path has no number.
+struct PartName {
+  std::string all;
+  std::uint64_t number = 0;
+};
+[[nodiscard]] std::optional<PartName> part_of(const std::string& path);
+
+/// Paths beside `name` that can be its parts, by their numbers; whether they are, their content
+/// says.
+[[nodiscard]] std::map<std::uint64_t, std::string> parts_of(const std::string& name);
+
+/// One file of a log, and what of the run is in it.
+struct LogPart {
+  std::uint64_t number = 0;  ///< from 1; 0: the log is in one file
+  std::string path{};
+  std::uint64_t bytes = 0;
+  std::uint64_t messages = 0;
+  std::int64_t first_ns = 0;  ///< time of the first message; without messages 0
+  std::int64_t last_ns = 0;
+  bool truncated = false;
+};
+
+/// Parts that are not there. `last` 0: nobody knows how many follow.
+struct MissingParts {
+  std::uint64_t first = 0, last = 0;
+};
+/// @param parts      by their numbers, one at least
+/// @param goes_on    the last one says that another follows
+[[nodiscard]] std::vector<MissingParts> missing_of(const std::vector<LogPart>& parts, bool goes_on);
+/// "part 3", "parts 1 to 4", "part 5 and what follows"
+[[nodiscard]] std::string to_string(const MissingParts& missing);
+
+}  // namespace tandem::log
