@@ -51,12 +51,6 @@ std::string shown_name_problem(std::string_view name) {
   return {};
 }
 
-std::string listed_name_problem(std::string_view name) {
-  const std::string problem = shown_name_problem(name);
-  if (problem.empty() && name.find(',') != std::string_view::npos) return "has a comma";
-  return problem;
-}
-
 std::string interface_name_problem(std::string_view name) {
   constexpr std::size_t kLongest = 15;  // IFNAMSIZ less the closing zero
   if (name.empty()) return "is empty";
@@ -71,11 +65,16 @@ std::string interface_name_problem(std::string_view name) {
 }
 
 std::string topic_token(std::string_view name) {
-  std::string token(name.substr(0, kLongestFileName));
+  std::string token(name);
   std::ranges::replace_if(
       token, [](char c) { return !is_word(c); }, '_');
-  if (!token.empty() && is_digit(token.front())) token.front() = '_';
-  return token;
+  if (!token.empty() && is_digit(token.front())) token.insert(0, 1, '_');
+  return token.substr(0, kLongestFileName);
+}
+
+std::string topic_name_hint(std::string_view name) {
+  const std::string use = "use letters, digits and _, no digit first";
+  return name.empty() ? use : use + ": name = \"" + topic_token(name) + "\"";
 }
 
 }  // namespace tandem

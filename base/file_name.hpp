@@ -23,14 +23,16 @@ inline constexpr std::size_t kLongestFileName = 64;
 /// without control characters, which a terminal obeys.
 [[nodiscard]] std::string shown_name_problem(std::string_view name);
 
-/// The same of a name that also stands in lists: it has no comma, which parts them.
-[[nodiscard]] std::string listed_name_problem(std::string_view name);
-
 /// Why no network interface of Linux can have the name, or empty when one can: 1 to 15 characters,
 /// none of them a blank, `/` or `:`, and neither `.` nor `..`.
 [[nodiscard]] std::string interface_name_problem(std::string_view name);
 
-/// The nearest name that can: what is neither letter nor digit becomes `_`.
+/// The nearest name that can: what is neither letter nor digit becomes `_`, and a digit at the
+/// front has one before it. Names that differ may have the same one: who makes topics of them has
+/// to ask.
 [[nodiscard]] std::string topic_token(std::string_view name);
+
+/// What to write in place of a name that topic_name_problem() refuses.
+[[nodiscard]] std::string topic_name_hint(std::string_view name);
 
 }  // namespace tandem

@@ -30,8 +30,9 @@ double cost_ns(std::size_t numbers, const std::string& folder) {
   auto recorder = log::Recorder::open(folder + "/signals_bench.mcap", {}, {});
   if (!recorder) return -1.0;
   (*recorder)->start();
-  const auto channel = (*recorder)->add_late_channel(
-      "/tandem/controller/bench", "tandem/msg/SignalsBench", log::ros2msg_of(io->signals.layout(), {}));
+  const auto channel =
+      (*recorder)->add_late_channel("/tandem/controller/bench", "tandem/msg/SignalsBench",
+                                    log::ros2msg_of(io->signals.layout(), {}));
   Clock::duration spent{};
   for (int cycle = 0; cycle < kCycles;) {
     (*recorder)->wait_for_space(kBatch);

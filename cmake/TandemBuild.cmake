@@ -142,5 +142,6 @@ function(tandem_test name)
   endif()
   tandem_test_program(${name} SOURCES ${TEST_SOURCES} LINKS ${TEST_LINKS})
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
-    PROPERTIES LABELS ${TEST_LABEL} TIMEOUT 300 ${cost})
+    PROPERTIES LABELS ${TEST_LABEL} TIMEOUT 300 ${cost}
+      ENVIRONMENT_MODIFICATION ROS_DOMAIN_ID=unset:)
 endfunction()

@@ -4,6 +4,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cstdlib>
 #include <filesystem>
 
 #include "base/quoting.hpp"
@@ -16,7 +18,7 @@ namespace {
 // clang-format off
 constexpr Key<Config> kKeys[] = {
   key<&Config::enabled>("enabled", "`--dds` and `--no-dds` override it").by_default("`true`"),
-  key<&Config::domain>("domain", {0, 232}, "DDS domain, ROS 2's `ROS_DOMAIN_ID`. `--domain` overrides it"),
+  key<&Config::domain>("domain", {0, kLastDomain}, "DDS domain. `--domain` overrides it").by_default("`ROS_DOMAIN_ID`, else 0"),
   key<&Config::name_space>("namespace", "before the names of topics and services").by_default("none").within("`\"left\"`, `\"robots/left\"`"),
   key<&Config::interfaces>("interfaces", "network interfaces; with `lo` alone nothing leaves this machine").by_default("`[\"lo\"]`").within("names or addresses"),
   key<&Config::peers>("peers", "where to look for others, beside multicast").by_default("`[]`").within("addresses"),
@@ -133,6 +135,7 @@ std::string security_xml(const SecurityConfig& s) {
 Config read_config(TomlTable table, const std::string& folder) {
   Config config;
   config.enabled = true;
+  config.domain_given = table.has("domain");
   read_keys(table, kKeys, config);
   if (!config.name_space.empty()) {
     check_all(table, "namespace", {config.name_space}, &is_name_space,
@@ -147,6 +150,19 @@ Config read_config(TomlTable table, const std::string& folder) {
   read_every(table.table_or_empty("every"), config);
   table.finish();
   return config;
+}
+
+Result<int> environment_domain() {
+  const char* given = std::getenv("ROS_DOMAIN_ID");
+  if (given == nullptr || *given == 0) return 0;
+  const std::string_view text = given;
+  int domain = -1;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), domain);
+  if (error == std::errc() && end == text.data() + text.size() && domain >= 0 &&
+      domain <= kLastDomain)
+    return domain;
+  return fail(fmt::format("ROS_DOMAIN_ID='{}' is no DDS domain", shown(text)),
+              fmt::format("0 to {}; or name the domain with --domain", kLastDomain));
 }
 
 void describe_keys(KeyPage& page) { page.add("[dds]", kKeys); }

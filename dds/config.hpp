@@ -68,7 +68,8 @@ inline constexpr std::array<TopicPeriod, 14> kTopicPeriods{{
 /// [dds]
 struct Config {
   bool enabled = false;                       ///< the table is there, or --dds was given
-  int domain = 0;                             ///< 0 to 232, ROS_DOMAIN_ID
+  int domain = 0;                             ///< 0 to 232
+  bool domain_given = false;                  ///< else it is environment_domain()
   std::string name_space;                     ///< "left": /left/joint_states; empty: none
   std::vector<std::string> interfaces{"lo"};  ///< names or addresses of network interfaces
   std::vector<std::string> peers;             ///< addresses to look for others at, beside multicast
@@ -84,6 +85,12 @@ struct Config {
     return interfaces.size() == 1 && interfaces.front() == "lo";
   }
 };
+
+/// The greatest domain: the ports of a greater one would be beyond 65535.
+inline constexpr int kLastDomain = 232;
+
+/// ROS_DOMAIN_ID of this process' environment, 0 without it. Error: it is no domain.
+[[nodiscard]] Result<int> environment_domain();
 
 /// Reads the table; errors go to its document. An absent table gives the default.
 /// @param folder  of the TOML: the security files' paths are relative to it

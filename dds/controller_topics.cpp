@@ -79,8 +79,8 @@ void ControllerTopics::renew() {
   before.clear();  // a topic of the same name as a new one ends first
   for (SignalTopic& one : topics_) {
     if (one.output.exists()) continue;
-    one.output = maker_.periodic<tandem_msgs::Signals>(
-        Topic::kSignals, "tandem/controller/" + ros_token(one.controller));
+    one.output = maker_.periodic<tandem_msgs::Signals>(Topic::kSignals,
+                                                       "tandem/controller/" + one.controller);
   }
 }
 

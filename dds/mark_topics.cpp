@@ -126,7 +126,7 @@ void MarkTopics::renew() {
   for (const auto& one : topics_) {
     if (one->output.exists()) continue;
     one->output = maker_.periodic<visualization_msgs::MarkerArray>(
-        Topic::kMarks, "tandem/controller/" + ros_token(one->controller) + "/marks");
+        Topic::kMarks, "tandem/controller/" + one->controller + "/marks");
   }
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/clock_ns.hpp"
+#include "base/file_name.hpp"
 #include "dds/message_parts.hpp"
 
 namespace tandem::dds {
@@ -48,13 +49,14 @@ std::int64_t wall_less_monotonic() {
 Status check_names(const hal::RobotConfig& robot, const std::vector<std::string>& wrenches) {
   std::set<std::string> names, sites;
   for (const std::string& site : wrenches) {
-    if (sites.insert(ros_token(site)).second) continue;
-    return fail("two sites of [[estimation.wrench]] are called '" + ros_token(site) + "' in ROS 2",
-                "rename '" + site + "': only letters, digits and _ make a difference");
+    if (sites.insert(topic_token(site)).second) continue;
+    return fail(
+        "two sites of [[estimation.wrench]] are called '" + topic_token(site) + "' in ROS 2",
+        "rename '" + site + "': only letters, digits and _ make a difference");
   }
   for (const hal::SensorConfig& sensor : robot.sensors) {
-    if (names.insert(ros_token(sensor.name)).second) continue;
-    return fail("two sensors are called '" + ros_token(sensor.name) + "' in ROS 2",
+    if (names.insert(topic_token(sensor.name)).second) continue;
+    return fail("two sensors are called '" + topic_token(sensor.name) + "' in ROS 2",
                 "rename '" + sensor.name + "': only letters, digits and _ make a difference");
   }
   return {};

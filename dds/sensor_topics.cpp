@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/file_name.hpp"
 #include "dds/message_parts.hpp"
 #include "dds/topic_group.hpp"
 
@@ -40,7 +41,7 @@ SensorTopics::SensorTopics(OutputMaker& maker, const RunDescription& run)
     : imu_every_(maker.every(Topic::kImu)), wrench_every_(maker.every(Topic::kWrench)) {
   for (std::size_t s = 0; s < run.robot.sensors.size(); ++s) {
     const hal::SensorConfig& sensor = run.robot.sensors[s];
-    const std::string name = ros_token(sensor.name);
+    const std::string name = topic_token(sensor.name);
     if (sensor.type == hal::SensorType::kImu) {
       imus_.push_back(
           {s, sensor.link, maker.periodic<sensor_msgs::Imu>(Topic::kImu, "imu/" + name)});

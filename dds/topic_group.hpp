@@ -227,14 +227,4 @@ MakeTopics joint_topics, sensor_topics, frame_topics, image_topics, diagnostic_t
     parallel_topics, controller_topics, parameter_topics, mark_topics;
 MakeTopics wrench_topics;  ///< @pre run.wrenches are sites of run.robot
 
-/// A name as ROS 2 allows it in a topic: what is no letter, digit or _ becomes _.
-[[nodiscard]] inline std::string ros_token(std::string name) {
-  for (char& c : name) {
-    const bool good = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-    if (!good) c = '_';
-  }
-  const bool digit = !name.empty() && name.front() >= '0' && name.front() <= '9';
-  return digit ? "_" + name : name;
-}
-
 }  // namespace tandem::dds

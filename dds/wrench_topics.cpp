@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/file_name.hpp"
 #include "dds/frame_topics.hpp"
 #include "dds/message_parts.hpp"
 #include "dds/topic_group.hpp"
@@ -68,7 +69,7 @@ WrenchTopics::WrenchTopics(OutputMaker& maker, const RunDescription& run) {
     places_.push_back({places_.size(), site->link, Eigen::Vector3d(site->xyz_m.data()),
                        edges_from(frames, site->link),
                        maker.periodic<geometry_msgs::WrenchStamped>(
-                           Topic::kWrench, "external_wrench/" + ros_token(name))});
+                           Topic::kWrench, "external_wrench/" + topic_token(name))});
   }
 }
 

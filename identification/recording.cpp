@@ -422,9 +422,8 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
   for (std::string& one : file->remarks()) recording.remarks.push_back(std::move(one));
   if (file->truncated()) {
     recording.remarks.push_back(
-        fmt::format("the log is cut after {} bytes: its run was killed, or the copy is not whole; "
-                    "what can be read ends at {:.3f} s",
-                    file->bytes(), recording.time_s.back()));
+        fmt::format("the log is cut after {} bytes: {}; what can be read ends at {:.3f} s",
+                    file->bytes(), file->cut_reason(), recording.time_s.back()));
   }
   if (window.fault_s < 1e299) {
     recording.remarks.push_back(

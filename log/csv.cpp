@@ -1,6 +1,8 @@
 // Streams a log once; numbers are written with the fewest digits that read back the same.
 #include "log/csv.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <charconv>
 #include <ostream>
@@ -33,13 +35,24 @@ std::string name_cell(const std::string& name) {
   return plain ? name : cell(name);
 }
 
+/// Seconds, all of their nanoseconds and no more: 0.217.
+void append_time(std::string& line, std::int64_t time_ns) {
+  constexpr std::uint64_t kSecond_ns = 1'000'000'000;
+  const auto size =
+      time_ns < 0 ? 0 - static_cast<std::uint64_t>(time_ns) : static_cast<std::uint64_t>(time_ns);
+  std::string part = fmt::format(".{:09}", size % kSecond_ns);
+  while (part.back() == '0') part.pop_back();
+  if (part == ".") part.clear();
+  line += fmt::format("{}{}{}", time_ns < 0 ? "-" : "", size / kSecond_ns, part);
+}
+
 Status write_events(const LogFile& log, std::ostream& out) {
   const auto events = log.events();
   if (!events) return std::unexpected(events.error());
   out << "time_s,cycle,kind,joint,code,text\n";
   for (const auto& [event, text] : *events) {
     std::string time;
-    append_number(time, static_cast<double>(event.time_ns) * 1e-9);
+    append_time(time, event.time_ns);
     out << time << ',' << event.cycle << ',' << to_string(event.kind) << ',' << event.joint << ','
         << event.code << ',' << cell(text) << "\n";
   }
@@ -98,7 +111,7 @@ Status write_csv(const LogFile& log, const std::string& topic, std::size_t every
   Status done = log.for_each(topic, [&](std::int64_t time_ns, std::span<const std::byte> body) {
     if (count++ % every != 0) return;
     line.clear();
-    append_number(line, static_cast<double>(time_ns) * 1e-9);
+    append_time(line, time_ns);
     bool measures = false, measured = false;
     for (const hal::Field* field : *chosen) {
       const auto number = static_cast<std::size_t>(field - found->layout.fields().data());

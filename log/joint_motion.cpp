@@ -84,8 +84,7 @@ Result<Stretch> stretch_of(const LogFile& file, const LoggedTopic& topic,
   }
   if (file.truncated() && !request.to_s) {
     return refuse(file,
-                  "the log is cut: its run was killed, or the copy is not whole; what can be read "
-                  "ends at " +
+                  "the log is cut: " + file.cut_reason() + "; what can be read ends at " +
                       seconds(topic.last_ns),
                   "copy it again; or play what there is: to_s");
   }

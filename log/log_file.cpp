@@ -2,8 +2,11 @@
 // columns that are asked for.
 #include "log/log_file.hpp"
 
+#include <sys/file.h>
+
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdio>
 #include <iterator>
 #include <utility>
@@ -85,7 +88,21 @@ std::string suggest_topic(const std::string& name, const std::vector<LoggedTopic
   return suggest(name, names.empty() ? all : names);
 }
 
-constexpr char kCutHint[] = "its run was killed, or the copy is not whole: copy it again";
+/// What writes it has a lock on it (McapWriter::open).
+bool is_being_written(const Descriptor& file) {
+  if (::flock(file.get(), LOCK_SH | LOCK_NB) != 0) return errno == EWOULDBLOCK;
+  ::flock(file.get(), LOCK_UN);
+  return false;
+}
+
+std::string reason_of_cut(bool being_written) {
+  return being_written ? "its run is still writing it"
+                       : "its run was killed, or the copy is not whole";
+}
+
+std::string hint_of_cut(bool being_written) {
+  return reason_of_cut(being_written) + (being_written ? ": wait for its end" : ": copy it again");
+}
 
 /// Topics that each file has once for viewers: the whole log has them once, too.
 bool is_repeated(const std::string& topic) {
@@ -168,11 +185,12 @@ Status LogFile::add(Beginning file, DataHash& hash) {
   }
   result_ = metadata_of(reader, kResultRecord);
   part.truncated = reader.truncated();
+  part.being_written = part.truncated && is_being_written(*file.file);
   if (part.truncated && by_channel.empty() && reader.metadata().empty()) {
     return std::unexpected(at(
         file.path,
         "the log is cut after " + std::to_string(part.bytes) + " bytes, before anything of its run",
-        kCutHint));
+        hint_of_cut(part.being_written)));
   }
   parts_.push_back(std::move(part));
   files_.push_back(std::move(file.file));
@@ -245,6 +263,10 @@ Status LogFile::check(const std::string& path) {
 
 bool LogFile::truncated() const { return std::ranges::any_of(parts_, &LogPart::truncated); }
 
+std::string LogFile::cut_reason() const {
+  return reason_of_cut(std::ranges::any_of(parts_, &LogPart::being_written));
+}
+
 std::uint64_t LogFile::bytes() const {
   std::uint64_t bytes = 0;
   for (const LogPart& part : parts_) bytes += part.bytes;
@@ -294,7 +316,7 @@ Result<const LoggedTopic*> LogFile::require(const std::string& name) const {
     return std::unexpected(at(path_,
                               "the log is cut after " + std::to_string(bytes()) +
                                   " bytes, before a message of '" + name + "'",
-                              kCutHint));
+                              hint_of_cut(std::ranges::any_of(parts_, &LogPart::being_written))));
   }
   const std::string why = left_out(name);
   return std::unexpected(at(path_, "has no topic '" + name + "'" + (why.empty() ? "" : ": " + why),

@@ -79,6 +79,8 @@ class LogFile {
   [[nodiscard]] std::string left_out(std::string_view topic, std::string_view field = {}) const;
   /// True when the run was killed: the data, or those of a part, end where its last chunk ended.
   [[nodiscard]] bool truncated() const;
+  /// Why it is truncated: "its run is still writing it", or "its run was killed, or …".
+  [[nodiscard]] std::string cut_reason() const;
   /// The files' size.
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] std::uint64_t messages() const;

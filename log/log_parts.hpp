@@ -36,6 +36,7 @@ struct LogPart {
   std::int64_t first_ns = 0;  ///< time of the first message; without messages 0
   std::int64_t last_ns = 0;
   bool truncated = false;
+  bool being_written = false;  ///< truncated, as a run of this machine still writes it
 };
 
 /// Parts that are not there. `last` 0: nobody knows how many follow.

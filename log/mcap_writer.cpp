@@ -3,6 +3,7 @@
 #include "log/mcap_writer.hpp"
 
 #include <libdeflate.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -72,6 +73,7 @@ Status McapWriter::open(Descriptor file, const std::string& path, const WriterOp
   path_ = path;
   options_ = options;
   file_ = std::move(file);
+  (void)::flock(file_.get(), LOCK_EX | LOCK_NB);  // readers see by it that it is being written
   if (free_bytes().value_or(kSpaceNeeded) < kSpaceNeeded) {
     return std::unexpected(open_error(path, ENOSPC, std::strerror(ENOSPC)));
   }

@@ -44,9 +44,8 @@ void add_payloads(const RunData& run, const std::string& side, Facts& facts) {
 }
 
 void add_facts(const RunData& run, const std::string& side, Facts& facts) {
-  facts.emplace_back(
-      "log" + side,
-      run.path + (run.truncated ? " (cut: its run was killed, or the copy is not whole)" : ""));
+  facts.emplace_back("log" + side,
+                     run.path + (run.cut_reason.empty() ? "" : " (cut: " + run.cut_reason + ")"));
   for (const std::string& one : run.remarks) facts.emplace_back("log" + side, one);
   add_faults(run, side, facts);
   add_payloads(run, side, facts);

@@ -479,7 +479,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   run.path = path;
   run.info = file->info();
   run.result = file->result();
-  run.truncated = file->truncated();
+  if (file->truncated()) run.cut_reason = file->cut_reason();
   run.remarks = file->remarks();
   run.data_sha256 = file->data_sha256();
   if (const Status s = read_configuration(run); !s) return std::unexpected(s.error());

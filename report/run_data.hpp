@@ -69,8 +69,8 @@ using ErrorText = std::function<std::string(std::uint32_t code)>;
 struct RunData {
   std::string path;
   log::RunInfo info;
-  log::StringMap result;  ///< empty when the run was killed
-  bool truncated = false;
+  log::StringMap result;             ///< empty when the run was killed
+  std::string cut_reason;            ///< log::LogFile::cut_reason(); empty: it is whole
   std::vector<std::string> remarks;  ///< log::LogFile::remarks()
   std::string data_sha256;
 

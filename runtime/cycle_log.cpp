@@ -95,11 +95,10 @@ CycleLog::CycleLog(log::Recorder* recorder, const hal::StateImage& state,
 void CycleLog::open(HostedController& controller) {
   if (recorder_ == nullptr) return;
   const ControllerIo& io = *controller.io;
-  const std::string token = topic_token(controller.name);
-  const std::string topic = "/tandem/controller/" + token;
+  const std::string topic = "/tandem/controller/" + controller.name;
   if (io.signals.numbers() > 0) {
     controller.signal_channel = recorder_->add_late_channel(
-        topic, type_of(token), recorder_->ros2msg_of(io.signals.layout()));
+        topic, type_of(controller.name), recorder_->ros2msg_of(io.signals.layout()));
   }
   for (const auto& port : controller.inputs) {
     port->channel = recorder_->add_late_channel(topic_of(*port), type_of(++inputs_),

@@ -7,6 +7,7 @@
 
 #include "base/file_name.hpp"
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 #include "hal/estimate.hpp"
 #include "hal/truth.hpp"
 #include "rt/clock_control.hpp"
@@ -42,7 +43,7 @@ constexpr Key<rt::CyclicLoopConfig> kPeriod[] = {
 };
 constexpr Key<ControllerSpec> kController[] = {
   required(key<&ControllerSpec::plugin>("plugin", "a bundled controller (`\"hold\"`, `\"squat\"`, …), or the path of a shared library, with a `/`: `\"./my.so\"` is beside this file")),
-  key<&ControllerSpec::name>("name", "unique; 1 to 64 bytes, no control characters, no comma").by_default("the plugin's"),
+  key<&ControllerSpec::name>("name", "unique; 1 to 64 letters, digits and `_`, no digit first: it names topics").by_default("the plugin's"),
   key<&ControllerSpec::active>("active", "`false`: it is loaded and checked, and waits for `tandem controller start`. Only active ones may not claim the same joint"),
   by_hand<ControllerSpec>("parameters", "–", "table", "the controller's own: [controllers.md](controllers.md); an unknown key is an error"),
   by_hand<ControllerSpec>("inputs", "–", "tables", "`inputs.NAME`: who feeds an input of the controller; without one `tandem input` does"),
@@ -250,9 +251,10 @@ void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers)
       if (name.empty() || other.name != name) continue;
       table.error("name", "two controllers are called '" + name + "'", "rename one of them");
     }
-    if (const std::string problem = listed_name_problem(name);
+    if (const std::string problem = topic_name_problem(name);
         !one.plugin.empty() && !problem.empty()) {
-      table.error("name", "the controller's name " + problem, "give it another name");
+      table.error("name", "the controller's name '" + shown(name) + "' " + problem,
+                  topic_name_hint(name));
     }
     table.finish();
     controllers.push_back(std::move(one));

@@ -36,7 +36,7 @@ Status check_value(const std::string& name, double value, double min, double max
   }
   if (value >= min && value <= max) return {};
   return fail_at(name, fmt::format("{:g} is beyond its bounds", value),
-                 fmt::format("{:g} to {:g}{}{}", min, max, unit.empty() ? "" : " ", unit));
+                 fmt::format("{:g} to {:g}{}{}", min + 0.0, max + 0.0,  // no -0 unit.empty() ? "" : " ", unit));
 }
 
 }  // namespace

@@ -243,6 +243,11 @@ void RobotCycle::update() noexcept TANDEM_RT {
                      .cause = FaultCause::kStray,
                      .category = now_.config.on_stray,
                      .controller = static_cast<std::int32_t>(stray->controller)});
+    if (now_.config.on_stray == hal::StopCategory::kWarn) {  // it is taken back: nothing stays
+      now_.faults.clear_latched(now_.time.time_ns, [](const FaultRecord& record) {
+        return record.cause == FaultCause::kStray;
+      });
+    }
   }
   trace_.mark(CycleStage::kUpdate, now_.clock);
 }

@@ -9,6 +9,7 @@
 
 #include "base/file_name.hpp"
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 #include "runtime/cycle_log.hpp"
 #include "runtime/owner_controller.hpp"
 
@@ -289,8 +290,9 @@ Status RunServices::errors_of(const TomlDocument& document, const char* missing,
 }
 
 Status RunServices::check_name(const std::string& name) {
-  if (const std::string problem = listed_name_problem(name); !problem.empty()) {
-    return fail_at("name", "the controller's name " + problem, "give it another name");
+  if (const std::string problem = topic_name_problem(name); !problem.empty()) {
+    return fail_at("name", "the controller's name '" + shown(name) + "' " + problem,
+                   topic_name_hint(name));
   }
   if (slot_of(name)) {
     return fail_at(name, "a controller of this name is loaded already",

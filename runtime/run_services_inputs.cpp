@@ -86,17 +86,19 @@ std::vector<std::shared_ptr<InputPort>> RunServices::inputs_of(InputFeeder feede
 
 Result<std::shared_ptr<InputPort>> RunServices::input_of(const std::string& name) const {
   std::vector<std::string> known;
+  const bool full = name.find('/') != std::string::npos;
   std::vector<std::shared_ptr<InputPort>> found;
   for (const auto& one : host_->owned()) {
     if (one == nullptr || one->leaves) continue;
     for (const auto& port : one->inputs) {
-      known.push_back(port->input().name);
-      known.push_back(port->full_name());
+      known.push_back(full ? port->full_name() : port->input().name);
       if (name == port->full_name()) return port;
       if (name == port->input().name) found.push_back(port);
     }
   }
   if (found.size() == 1) return found.front();
+  std::ranges::sort(known);
+  known.erase(std::ranges::unique(known).begin(), known.end());
   if (!found.empty()) {
     return fail_at(name, std::to_string(found.size()) + " controllers have an input of this name",
                    "name it as " + found.front()->full_name());

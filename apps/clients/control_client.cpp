@@ -16,6 +16,7 @@
 #include "apps/control/control_registry.hpp"
 #include "apps/text/json_reader.hpp"
 #include "apps/transport/control_path.hpp"
+#include "apps/transport/control_socket.hpp"
 #include "base/open_file.hpp"
 
 namespace tandem::apps {
@@ -81,6 +82,10 @@ Result<std::string> exchange(int fd, std::string out, std::chrono::milliseconds 
                               ? ::recv(fd, bytes, sizeof bytes, MSG_DONTWAIT)
                               : ::send(fd, out.data(), out.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     if (count < 0 && (errno == EAGAIN || errno == EINTR)) continue;
+    if (count <= 0 && !out.empty()) {  // it takes no more, and may have said why
+      out.clear();
+      continue;
+    }
     if (count <= 0) return fail(kClosed, "look at what it printed");
     if (out.empty()) {
       in.append(bytes, static_cast<std::size_t>(count));
@@ -155,7 +160,9 @@ Result<Json> ask(const std::string& path, const Json& question) {
   const int tries = question.value("do", "") == "estop" ? kStopTries : 1;
   for (int left = tries;; --left) {
     Result<Json> answer = ask_once(path, question);
-    if (answer || answer.error().message != kClosed || left == 1) return answer;
+    if (answer || left == 1) return answer;
+    const std::string& why = answer.error().message;
+    if (why != kClosed && why != kTooManyClients) return answer;
   }
 }
 

@@ -5,7 +5,8 @@ namespace tandem::apps {
 Result<dds::Config> dds_config(const DdsPlace& place) {
   dds::Config config;
   if (place.from.empty()) {
-    config.domain = place.domain;
+    config.domain_given = place.domain.has_value();
+    config.domain = place.domain.value_or(0);
     config.interfaces = place.interfaces;
   } else {
     const Result<TomlDocument> document = TomlDocument::load(place.from);
@@ -22,6 +23,10 @@ Result<dds::Config> dds_config(const DdsPlace& place) {
     if (!document->diagnostics().empty()) return std::unexpected(document->diagnostics().front());
   }
   config.enabled = true;
+  if (config.domain_given) return config;
+  const Result<int> domain = dds::environment_domain();
+  if (!domain) return std::unexpected(domain.error());
+  config.domain = *domain;
   return config;
 }
 

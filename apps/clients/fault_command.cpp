@@ -166,9 +166,10 @@ Exit tell_missing(const OwnRuns& own, const DdsAnswers& answers, const ControlTa
                who);
   }
   if (!target.place.from.empty()) return Exit::kDone;  // which domain and namespace, it says
+  const auto place = dds_config(target.place);         // it has been asked there: this is right
   Exit exit = Exit::kDone;
   for (const OwnRun& run : own.runs) {
-    const bool meant = run.domain == target.place.domain &&
+    const bool meant = place && run.domain == place->domain &&
                        (!target.name_space || *target.name_space == run.name_space);
     const auto heard =
         std::ranges::find(answers.all, std::optional(run.participant), &DdsAnswer::participant);

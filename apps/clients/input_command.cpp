@@ -10,6 +10,7 @@
 #include "apps/clients/asked.hpp"
 #include "apps/clients/named.hpp"
 #include "apps/text/console.hpp"
+#include "base/counted.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -41,7 +42,7 @@ Result<Json> point_of(const std::string& text) {
 }
 
 std::string shown_values(const Json& input) {
-  if (input.contains("points")) return fmt::format("{} way-points", input["points"].size());
+  if (input.contains("points")) return counted(input["points"].size(), "way-point");
   std::string text;
   for (const auto& [name, value] : input["values"].items()) {
     text += fmt::format("{}{}={:.4g}", text.empty() ? "" : " ", name, value.get<double>());
@@ -73,9 +74,16 @@ Status ask_for_input(const AskedOptions& options, Json& question) {
     if (sign == std::string::npos || sign == 0) {
       return fail("'" + word + "' is not COMPONENT=NUMBER", "write x=0.2");
     }
-    const auto number = finite_number(word.substr(sign + 1));
-    if (!number) return std::unexpected(number.error());
-    question["values"][word.substr(0, sign)] = *number;
+    const std::string component = word.substr(0, sign), text = word.substr(sign + 1);
+    if (question.contains("values") && question["values"].contains(component)) {
+      return fail("'" + component + "' is given twice", "give each component once");
+    }
+    // What is no number goes as it is: the run knows the component's unit, and says it.
+    if (const auto number = finite_number(text)) {
+      question["values"][component] = *number;
+    } else {
+      question["values"][component] = text;
+    }
   }
   for (const std::string& text : given("point")) {
     auto point = point_of(text);
@@ -109,14 +117,14 @@ Result<Exit> tell_inputs(Asked& asked) {
     return Exit::kDone;
   }
   Table table({"input", "controller", "kind", "source", "state", "samples", "superseded", "refused",
-               "holds"});
+               "holds", "last refused"});
   table.align_left();
   for (const Json& input : *some) {
-    table.add({input.value("input", ""), input.value("controller", ""), input.value("kind", ""),
-               input.value("source", ""), freshness_of(input),
-               std::to_string(input.value("arrived", 0U)),
-               std::to_string(input.value("superseded", 0U)),
-               std::to_string(input.value("refused", 0U)), shown_values(input)});
+    table.add(
+        {input.value("input", ""), input.value("controller", ""), input.value("kind", ""),
+         input.value("source", ""), freshness_of(input), std::to_string(input.value("arrived", 0U)),
+         std::to_string(input.value("superseded", 0U)), std::to_string(input.value("refused", 0U)),
+         shown_values(input), input.value("why", "")});
   }
   table.print(stdout);
   return Exit::kDone;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace tandem::apps {
 void TopicRate::arrived(std::int64_t time_ns, std::optional<std::uint64_t> cycle) {
@@ -20,13 +21,14 @@ void TopicRate::arrived(std::int64_t time_ns, std::optional<std::uint64_t> cycle
   } else {
     const std::uint64_t step = *cycle - *last_cycle_;
     step_ = step_ == 0 ? step : std::min(step_, step);
+    common_ = std::gcd(common_, step);
   }
   last_cycle_ = cycle;
   ++told_;
 }
 
 std::optional<std::uint64_t> TopicRate::lost() const {
-  if (!first_cycle_) return std::nullopt;
+  if (!first_cycle_ || common_ != step_) return std::nullopt;
   if (step_ == 0) return 0;
   const std::uint64_t sent = (*last_cycle_ - *first_cycle_) / step_ + 1;
   return sent > told_ ? sent - told_ : 0;
@@ -59,7 +61,8 @@ void figures(Figures& f, const RateFigures& rate) {
   f("max_s", rate.max_s);
   f("deviation_s", "standard deviation", rate.deviation_s);
   f("interval_ns", "of all intervals", rate.interval);
-  f("lost", "by the cycles' numbers; null: the type has none", rate.lost);
+  f("lost", "by the cycles' numbers; null: the type has none, or they are not evenly apart",
+    rate.lost);
 }
 
 Json TopicRate::json() const { return figures_json(figures()); }
@@ -82,7 +85,8 @@ void TopicRate::add_to(Facts& facts) const {
   const auto missing = lost();
   facts.add("lost",
             missing ? fmt::format("{} of {}, by the cycles' numbers", *missing, told_ + *missing)
-                    : "unknown: the type has no cycle numbers");
+            : first_cycle_ ? "unknown: the topic has some cycles only, not evenly apart"
+                           : "unknown: the type has no cycle numbers");
 }
 
 }  // namespace tandem::apps

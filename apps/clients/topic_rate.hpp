@@ -19,7 +19,7 @@ struct RateFigures {
   std::size_t window = 0;                                             ///< newest intervals
   double rate_Hz = NAN, min_s = NAN, max_s = NAN, deviation_s = NAN;  ///< of these
   rt::Histogram interval;                                             ///< of all
-  std::optional<std::uint64_t> lost;  ///< nothing: there are no cycle numbers
+  std::optional<std::uint64_t> lost;  ///< nothing: no cycle numbers, or uneven ones
 };
 void figures(Figures& f, const RateFigures& rate);
 
@@ -34,7 +34,7 @@ class TopicRate {
 
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
   /// Samples that were sent but did not come, by the cycles' numbers; empty where there are
-  /// none. Correct when the topic's rate is constant.
+  /// none, and where their distances have no common step: then nobody can tell what was sent.
   [[nodiscard]] std::optional<std::uint64_t> lost() const;
 
   /// "99.98 Hz, min 9.1 ms, …"
@@ -52,8 +52,9 @@ class TopicRate {
   std::deque<std::int64_t> intervals_ns_;
   rt::Histogram all_;  // intervals
   std::optional<std::uint64_t> first_cycle_, last_cycle_;
-  std::uint64_t step_ = 0;  // the smallest between two cycles
-  std::uint64_t told_ = 0;  // samples with a cycle, since the numbers began anew
+  std::uint64_t step_ = 0;    // the smallest between two cycles
+  std::uint64_t common_ = 0;  // of which every step between two cycles is a multiple
+  std::uint64_t told_ = 0;    // samples with a cycle, since the numbers began anew
 };
 
 }  // namespace tandem::apps

@@ -184,7 +184,8 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
   app.add_flag("--no-socket", o.no_socket, "Open no control socket")->excludes(socket);
-  app.add_option("--domain", o.domain, "DDS domain, instead of the experiment's")
+  app.add_option("--domain", o.domain,
+                 "DDS domain, instead of the experiment's (else: ROS_DOMAIN_ID, else 0)")
       ->check(CLI::Range(0, 232));
 }
 
@@ -192,7 +193,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
 
 CLI::Option* add_place(CLI::App& app, DdsPlace& place, CLI::Option* dds) {
   CLI::Option* domain =
-      app.add_option("--domain", place.domain, "DDS domain, ROS_DOMAIN_ID (default: 0)")
+      app.add_option("--domain", place.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)")
           ->check(CLI::Range(0, 232));
   CLI::Option* interface = app.add_option("--interface", place.interfaces,
                                           "Network interface of DDS (default: lo); may be repeated")

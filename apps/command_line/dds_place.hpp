@@ -2,13 +2,14 @@
 // Layer: apps/command_line.  Thread: main.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace tandem::apps {
 
 struct DdsPlace {
-  int domain = 0;
+  std::optional<int> domain{};                ///< nothing: ROS_DOMAIN_ID
   std::vector<std::string> interfaces{"lo"};  ///< network interfaces
   std::string from{};  ///< TOML whose [dds] says all of it, with DDS Security; empty: none
 };

@@ -5,7 +5,7 @@ namespace tandem::apps {
 namespace {
 
 const char kListExamples[] = R"(Examples:
-  tandem topic list                                  in domain 0, on this machine
+  tandem topic list                                  in domain ROS_DOMAIN_ID, else 0, here
   tandem topic list --dds-from squat.toml            where DDS Security is on: with its keys
   tandem topic list --domain 7 --interface eth0      as ROS_DOMAIN_ID=7, over the network
   tandem topic list --all --json - | jq .            services and the graph's topics, too)";

@@ -1,10 +1,12 @@
 #include "apps/control/input_control.hpp"
 
+#include <algorithm>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "apps/control/controller_control.hpp"
+#include "base/quoting.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -115,6 +117,22 @@ Status add_points(const Json& trajectory, InputRequest& wish) {
   return {};
 }
 
+/// "x is in m/s: write x=0.2"
+std::string number_hint(runtime::RunServices& services, const std::string& name,
+                        const std::string& component) {
+  for (const InputReport& report : services.inputs()) {
+    const InputBlock& input = report.port->input();
+    const auto found = std::ranges::find(input.components, component);
+    if (found == input.components.end()) continue;
+    if (name != input.name && name != report.port->full_name()) continue;
+    const auto index = static_cast<std::size_t>(found - input.components.begin());
+    const std::string unit = index < input.units.size() ? input.units[index] : "";
+    return (unit.empty() ? "" : component + " is in " + unit + ": ") + "write " + component +
+           "=0.2";
+  }
+  return "values: numbers by name";
+}
+
 Result<Json> set_input(runtime::RunServices& services, const Json& request) {
   InputRequest wish;
   if (request.contains("values") == request.contains("trajectory")) {
@@ -127,7 +145,11 @@ Result<Json> set_input(runtime::RunServices& services, const Json& request) {
   const Json none = Json::object();
   const Json& values = request.contains("values") ? request["values"] : none;
   for (const auto& [component, value] : values.items()) {
-    if (!value.is_number()) return fail_at(component, "is no number", "values: numbers by name");
+    if (!value.is_number()) {
+      const std::string text = value.is_string() ? value.get<std::string>() : json_text(value);
+      return fail_at(component, "'" + shown(text) + "' is no finite number",
+                     number_hint(services, request["name"].get<std::string>(), component));
+    }
     wish.components.push_back(component);
     wish.numbers.push_back(value.get<double>());
   }

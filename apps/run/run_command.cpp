@@ -103,6 +103,17 @@ Status check_pace(const WiredComposition& c, const RunOptions& options) {
               "leave --rate out, or add --lockstep for emulated boards");
 }
 
+/// A simulated run is the same to the last bit however late its cycles are: no policy holds.
+void note_overrun_policy(const WiredComposition& c, const RunOptions& options) {
+  const rt::CyclicLoopConfig& loop = c.experiment.loop;
+  const bool paced = options.rate.value_or(loop.rate) > 0.0;
+  if (c.backend->pace() != hal::Pace::kSimulatedClock || !paced) return;
+  if (loop.on_overrun == rt::OverrunPolicy::kSkip) return;
+  fmt::print(stderr,
+             "note: [overrun] holds for the wall clock; this run's time is simulated: a late cycle "
+             "is counted, and neither skips one nor stops the run (docs/realtime.md)\n");
+}
+
 /// Writes what --trace asks for, and says how much of the run it is.
 Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE* out) {
   if (options.trace.empty()) return {};
@@ -412,6 +423,7 @@ Exit run_command(const RunOptions& given, ReportOfRun& report) {
     return refuse(errors);
   print_warnings((*composition)->warnings);
   if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
+  note_overrun_policy(**composition, options);
   auto session = std::make_unique<Session>(**composition, options, gate.get());
   const Exit exit = session->run();
   if (options.report) {

@@ -27,7 +27,7 @@ static void figures(apps::Figures& f, const LogPart& part) {
   f("end_ns", "of its last", part.last_ns);
   f("messages", part.messages);
   f("bytes", part.bytes);
-  f("complete", "false: its run was killed while it wrote it", !part.truncated);
+  f("complete", "false: its run writes it, or was killed while it did", !part.truncated);
 }
 
 static void figures(apps::Figures& f, const MissingParts& missing) {
@@ -55,7 +55,7 @@ static void figures(Figures& f, const log::LogFile* file) {
     end_ns = std::max(end_ns.value_or(topic.last_ns), topic.last_ns);
   }
   f("path", [&] { return file->path(); });
-  f("complete", "false after a killed run", [&] { return !file->truncated(); });
+  f("complete", "false after a killed run, and while it runs", [&] { return !file->truncated(); });
   f("start_ns", "nominal time of the first message", start_ns);
   f("end_ns", "of the last", end_ns);
   f("messages", [&] { return file->messages(); });
@@ -76,8 +76,7 @@ std::vector<Figures::Row> log_figures() { return Figures::rows_of<const log::Log
 namespace {
 
 std::string cut_text(const log::LogFile& file) {
-  return fmt::format("cut after {} bytes: its run was killed, or the copy is not whole",
-                     file.bytes());
+  return fmt::format("cut after {} bytes: {}", file.bytes(), file.cut_reason());
 }
 
 void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {

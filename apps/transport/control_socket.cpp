@@ -177,6 +177,13 @@ void ControlSocket::serve() {
   }
 }
 
+/// Says why, unless an answer is half sent: the rest of its line would be this one.
+void ControlSocket::send_away(Client& client) {
+  if (!client.out.empty()) return;
+  const std::string words = refused(kTooManyClients, "close one of them, or ask again") + "\n";
+  (void)!::send(client.fd, words.data(), words.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
 void ControlSocket::accept() {
   const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
   if (fd < 0) return;
@@ -186,9 +193,11 @@ void ControlSocket::accept() {
     return;
   }
   if (clients_.size() == kMaxControlClients) {
-    clients_.erase(std::ranges::min_element(clients_, {}, [](const auto& client) {
+    const auto quietest = std::ranges::min_element(clients_, {}, [](const auto& client) {
       return std::pair(client->urgent, client->last_turn);
-    }));
+    });
+    send_away(**quietest);
+    clients_.erase(quietest);
   }
   clients_.push_back(std::make_unique<Client>(fd, ++newest_));
   clients_.back()->last_turn = ++turn_;

@@ -27,6 +27,9 @@ inline constexpr std::size_t kMaxControlLine = kMaxQuestion + 1;
 /// Clients at once. A further one takes the place of the one that has been quiet the longest, so
 /// that an emergency stop always finds its way in.
 inline constexpr std::size_t kMaxControlClients = 16;
+/// The answer to the one that goes; it was not asked for anything.
+inline constexpr char kTooManyClients[] = "16 clients are there already";
+static_assert(kMaxControlClients == 16);
 
 /// Serves a registry until it is destroyed; the file is removed then. Nothing that a client does
 /// or leaves undone reaches the process: a client that sends a line that is too long, that does
@@ -67,6 +70,7 @@ class ControlSocket {
   Status listen();
   void serve();
   void accept();
+  static void send_away(Client& client);
   void take(Client& client);
   void answer_lines(Client& client);
   static void flush(Client& client);

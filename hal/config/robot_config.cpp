@@ -17,6 +17,11 @@ void read_site(TomlTable table, ModelConfig& model) {
   read_whole(table, keys::kSite, site);
   check_own_name(table, site.name);
   check_unique(table, model.sites, site.name, "site");
+  for (const SiteConfig& other : model.sites) {
+    if (other.name == site.name || topic_token(other.name) != topic_token(site.name)) continue;
+    table.error("name", "'" + site.name + "' and the site '" + other.name + "' are one topic",
+                "rename one: only letters, digits and _ make a difference there");
+  }
   model.sites.push_back(site);
 }
 

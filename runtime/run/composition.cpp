@@ -237,7 +237,14 @@ Diagnostics override_experiment(Experiment& e, const Overrides& overrides) {
   if (!overrides.kernel_variant.empty()) e.kernel_variant = overrides.kernel_variant;
   e.hal.lockstep = e.hal.lockstep || overrides.lockstep;
   e.dds.enabled = overrides.dds.value_or(e.dds.enabled);
-  e.dds.domain = overrides.domain.value_or(e.dds.domain);
+  const bool in_domain = e.dds.enabled || e.hal.backend == BackendKind::kDds || overrides.serves;
+  if (overrides.domain) {
+    e.dds.domain = *overrides.domain;
+  } else if (in_domain && !e.dds.domain_given) {
+    const Result<int> domain = dds::environment_domain();
+    if (!domain) return {domain.error()};
+    e.dds.domain = *domain;
+  }
   e.hal.delay_cycles = overrides.delay_cycles.value_or(e.hal.delay_cycles);
   if (overrides.change) overrides.change(e);
   return {};

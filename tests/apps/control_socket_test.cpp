@@ -80,6 +80,7 @@ TEST_F(Socket, GivesTheQuietestClientsPlaceToANewOne) {
   send(clients.front(), "{\"do\": \"help\"}\n");
   EXPECT_NE(line(clients.front()), "");
   EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
+  EXPECT_NE(line(clients[1]).find("16 clients are there already"), std::string::npos);
   EXPECT_TRUE(closed(clients[1]));
   send(clients.front(), "{\"do\": \"help\"}\n");
   EXPECT_NE(line(clients.front()), "");

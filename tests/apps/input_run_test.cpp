@@ -137,6 +137,9 @@ TEST_F(InputOfARun, WhatIsWrongIsRefusedByNameAndTheRunGoesOn) {
   begin_in_time("");
   for (const auto& [words, why] : {std::pair{"rate joint2=99", "joint2: 99 is beyond its bounds"},
                                    {"rate joint2=nan", "no finite number"},
+                                   {"rate joint2=0.1rad/s", "'0.1rad/s' is no finite number"},
+                                   {"rate joint2=0.1rad/s", "joint2 is in rad/s: write joint2=0.2"},
+                                   {"rate joint2=0.1 joint2=0.2", "'joint2' is given twice"},
                                    {"rate joint3=0.1", "no component 'joint3'"},
                                    {"rote joint2=0.1", "no loaded controller has an input 'rote'"},
                                    {"rate", "give values"},
@@ -155,6 +158,7 @@ TEST_F(InputOfARun, WhatIsWrongIsRefusedByNameAndTheRunGoesOn) {
   EXPECT_EQ(input()["sequence"], 0);
   EXPECT_NE(input()["why"].get<std::string>().find("fed with values"), std::string::npos);
   EXPECT_EQ(input()["refused"], 3);
+  EXPECT_NE(to_run("input list").out.find("fed with values"), std::string::npos) << "the reason";
   EXPECT_EQ(to_run("controller stop jog").status, 0);
   const Outcome stopped = to_run("input rate joint2=0.1");
   EXPECT_NE(stopped.err.find("its controller is not active"), std::string::npos) << stopped.err;

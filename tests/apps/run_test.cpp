@@ -33,6 +33,16 @@ TEST_F(Run, WarnsOfAFaultOfTheScenarioThatIsDueAfterItsEnd) {
       << warning;
 }
 
+// `[overrun]` was passed over without a word where the simulation keeps real time.
+TEST_F(Run, SaysThatOverrunsHaveNoPolicyInSimulatedTime) {
+  std::ofstream(folder_ / "hold.toml", std::ios::app) << "\n[overrun]\npolicy = \"stop\"\n";
+  const auto said = [&](const std::string& flags) {
+    return tandem("run hold.toml --no-log --duration 0.1 " + flags).err;
+  };
+  EXPECT_NE(said("--realtime").find("note: [overrun] holds for the wall clock"), std::string::npos);
+  EXPECT_EQ(said("").find("[overrun]"), std::string::npos) << "no cycle of it can be late";
+}
+
 TEST_F(Run, WritesTheDocumentedKeys) {
   const auto json = run("hold.toml --duration 0.5 --seed 7");
   for (const std::string key :

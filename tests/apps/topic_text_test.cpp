@@ -131,6 +131,16 @@ TEST(TopicRate, KnowsRateSpreadAndWhatIsMissing) {
   EXPECT_EQ(rate.lost(), 0U);
 }
 
+// The newest values each 10 ms: their cycles are 9, 10 or 11 apart, and none of them was lost.
+TEST(TopicRate, DoesNotGuessWhatIsMissingWhereCyclesAreNotEvenlyApart) {
+  TopicRate rate(100);
+  std::int64_t time_ns = 0;
+  for (const std::uint64_t cycle : {100, 110, 119, 130, 140, 150})
+    rate.arrived(time_ns += 10'000'000, cycle);
+  EXPECT_FALSE(rate.lost()) << *rate.lost();
+  EXPECT_TRUE(rate.json()["lost"].is_null());
+}
+
 TEST(TopicRate, DoesNotGuessWhatIsMissingWithoutCycleNumbers) {
   TopicRate rate(2);
   for (const std::int64_t time_ns : {0, 1'000'000, 3'000'000, 4'000'000}) {

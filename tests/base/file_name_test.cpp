@@ -49,6 +49,8 @@ TEST(TopicName, LettersDigitsAndUnderscoresAreAllowed) {
   }
   EXPECT_NE(topic_name_problem(std::string(kLongestFileName + 1, 'a')), "");
   EXPECT_EQ(topic_token("a/1"), "a_1");
+  EXPECT_EQ(topic_token("2nd"), "_2nd");  // not that of "3nd"
+  EXPECT_EQ(topic_name_hint("a.b"), "use letters, digits and _, no digit first: name = \"a_b\"");
 }
 
 }  // namespace

@@ -46,6 +46,25 @@ TEST(DdsConfig, RefusesAnUnknownTopicAndANegativeRate) {
 }
 
 // Lines of a kernel's /proc/net/udp.
+TEST(DdsConfig, TakesTheDomainOfTheEnvironmentWhereNothingSaysAnother) {
+  EXPECT_FALSE(read("[dds]\n").domain_given);
+  EXPECT_TRUE(read("[dds]\ndomain = 0\n").domain_given);
+  const char* former = std::getenv("ROS_DOMAIN_ID");
+  const std::string before = former == nullptr ? "" : former;
+  for (const auto& [text, domain] : {std::pair{"", 0}, {"0", 0}, {"217", 217}, {"232", 232}}) {
+    ::setenv("ROS_DOMAIN_ID", text, 1);
+    EXPECT_EQ(environment_domain(), domain) << text;
+  }
+  for (const char* text : {"233", "-1", "7x", " 7", "0x7", "seven", "99999999999"}) {
+    ::setenv("ROS_DOMAIN_ID", text, 1);
+    ASSERT_FALSE(environment_domain()) << text;
+    EXPECT_NE(environment_domain().error().to_string().find("is no DDS domain"), std::string::npos);
+  }
+  ::unsetenv("ROS_DOMAIN_ID");
+  EXPECT_EQ(environment_domain(), 0);
+  if (former != nullptr) ::setenv("ROS_DOMAIN_ID", before.c_str(), 1);
+}
+
 TEST(DdsPorts, AreCountedByWhoHasThem) {
   const std::string table =
       "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout "

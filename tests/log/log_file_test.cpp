@@ -1,10 +1,12 @@
 #include "log/log_file.hpp"
 
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <sstream>
 
 #include "log/csv.hpp"
+#include "log/mcap_writer.hpp"
 #include "log/recorder.hpp"
 #include "tests/log/scratch_folder.hpp"
 
@@ -201,6 +203,21 @@ TEST_F(LogFileOfThree, IsRefusedWhenItIsCutBeforeAnythingOfItsRun) {
   ASSERT_FALSE(log);
   EXPECT_EQ(log.error().message, "the log is cut after 20 bytes, before anything of its run");
   EXPECT_NE(log.error().hint.find("the copy is not whole"), std::string::npos);
+}
+
+// "its run was killed": of a run that goes on. Whoever writes a log has a lock on it.
+TEST_F(LogFileOfThree, SaysThatItsRunIsStillWritingIt) {
+  const std::string file = cut(path_, folder_ / "now.mcap", read_bytes(path_).size() / 2);
+  EXPECT_NE(LogFile::open(file)->cut_reason().find("was killed"), std::string::npos);
+  const std::string written = folder_ / "other.mcap";
+  McapWriter writer;
+  ASSERT_TRUE(writer.open(written, {}));
+  std::filesystem::resize_file(written, 0);
+  std::ofstream(written, std::ios::binary | std::ios::app) << read_bytes(file);
+  const auto log = LogFile::open(written);
+  ASSERT_TRUE(log) << log.error().to_string();
+  EXPECT_TRUE(log->truncated());
+  EXPECT_EQ(log->cut_reason(), "its run is still writing it");
 }
 
 // "has no topic '/tandem/state'": whoever reads that looks for another topic.

@@ -86,10 +86,11 @@ struct ComanRig : BundledRun {
 /// COMAN with a controller of the test instead of its squat.
 struct OtherRig : ComanRig {
   OtherRig(const char* name, std::shared_ptr<Controller> controller,
-           const std::string& its_parameters = "")
-      : ComanRig([](Experiment& e) {
+           const std::string& its_parameters = "",
+           hal::StopCategory on_stray = hal::StopCategory::kCategory1)
+      : ComanRig([on_stray](Experiment& e) {
           e.controllers.clear();
-          e.on_stray = hal::StopCategory::kCategory1;
+          e.on_stray = on_stray;
         }) {
     EXPECT_TRUE(run->controllers().add(name, std::move(controller), parameters(its_parameters)));
   }
@@ -186,6 +187,18 @@ TEST(FaultRow, ControllerOfComanWritesWithoutAClaim) {
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("the controller 'stray' wrote to this joint"), std::string::npos)
       << rig.causes();
+}
+
+// It was said twice, as a warning and as a fault, and the run ended with status 1.
+TEST(StrayOfComan, ThatOnlyWarnsIsToldAndIsNoFaultThatStays) {
+  auto stray = std::make_shared<test::Stray>(0, false);
+  OtherRig rig("stray", stray, "", hal::StopCategory::kWarn);
+  rig.run_to(RunPhase::kRunning);
+  rig.steps(100);
+  EXPECT_EQ(rig.cycle->phase(), RunPhase::kRunning) << rig.causes();
+  const auto faults = rig.cycle->faults();
+  ASSERT_FALSE(faults.empty());
+  for (const runtime::FaultReport& fault : faults) EXPECT_FALSE(fault.latched) << fault.text;
 }
 
 TEST(FaultRow, JointOfComanRings) {
