@@ -92,6 +92,26 @@ TEST_F(Stops, OfAControllerThatThrowsAreThoseOfOneThatHangs) {
   EXPECT_EQ(info.out.find("no index"), std::string::npos) << info.out;
 }
 
+// The file had still said "as planned" of the former run.
+TEST_F(Stops, ByAKillLeaveNoResultOfAFormerRun) {
+  const std::filesystem::path result = folder_ / "run.json";
+  for (const bool linked : {false, true}) {
+    std::filesystem::remove(result);
+    write_text(folder_ / "former.json", R"({"ended": "as planned"})");
+    if (linked) {
+      std::filesystem::create_symlink("former.json", result);
+    } else {
+      std::filesystem::copy_file(folder_ / "former.json", result);
+    }
+    begin("");
+    EXPECT_EQ(std::filesystem::exists(result), linked);
+    if (linked) EXPECT_EQ(read_text(result), "") << "the link is its owner's";
+    signal("KILL");
+    EXPECT_EQ(join(), -1);
+    EXPECT_EQ(read_text(result), "");
+  }
+}
+
 TEST_F(Stops, AreNotTheEndOfACommandThatDoesNotSayWhoseCrashItWas) {
   if (TANDEM_SANITIZED != 0) GTEST_SKIP() << "a sanitizer handles signals itself";
   hang("0.0", "crash = \"null\"\nat_once = true\n");
