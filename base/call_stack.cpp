@@ -38,12 +38,18 @@ const char* base_name(const char* path) {
   return slash == nullptr ? path : slash + 1;
 }
 
+struct CallPlaceView {
+  std::uintptr_t call;
+  const char *function, *file;  // null: unknown
+  int line;
+};
+
 /// Prints calls line by line without the heap, but for demangling.
 struct Printer {
   backtrace_state* state;
   bool demangles;
   std::size_t most;
-  void (*put)(void* to, const char* line);
+  void (*put)(void* to, const char* line, const CallPlaceView& place);
   void* to;
   std::uintptr_t pc = 0;
   std::size_t lines = 0;
@@ -78,15 +84,15 @@ struct Printer {
           library, sizeof library, " (%s+0x%zx)", base_name(where.dli_fname),
           static_cast<std::size_t>(pc - reinterpret_cast<std::uintptr_t>(where.dli_fbase)));
     }
-    std::snprintf(text, sizeof text, "%.2000s%s%s",
-                  clear != nullptr ? clear : (name != nullptr ? name : "?"), place, library);
+    if (clear != nullptr) name = clear;
+    std::snprintf(text, sizeof text, "%.2000s%s%s", name != nullptr ? name : "?", place, library);
+    put(to, text, {pc, name, file, number});
     std::free(clear);
-    put(to, text);
   }
 };
 
 void print(const CallStack& stack, bool demangles, std::size_t most,
-           void (*put)(void*, const char*), void* to) {
+           void (*put)(void*, const char*, const CallPlaceView&), void* to) {
   // A new one each time: it knows the libraries that are loaded when it is first asked.
   Printer printer{::backtrace_create_state(nullptr, 1, &ignore, nullptr), demangles, most, put, to};
   for (const std::uintptr_t pc : stack.view()) {
@@ -100,7 +106,7 @@ struct Output {
   const char* title;  // null: it is written
 
   void say(const char* text) const { (void)!::write(fd, text, std::strlen(text)); }
-  static void put(void* self, const char* line) {
+  static void put(void* self, const char* line, const CallPlaceView&) {
     auto& out = *static_cast<Output*>(self);
     if (out.title != nullptr) {
       out.say(out.title);
@@ -181,25 +187,48 @@ std::vector<std::string> describe(const CallStack& stack, std::size_t most) {
   std::vector<std::string> lines;
   print(
       stack, true, most,
-      [](void* to, const char* line) {
+      [](void* to, const char* line, const CallPlaceView&) {
         static_cast<std::vector<std::string>*>(to)->emplace_back(line);
       },
       &lines);
   return lines;
 }
 
+std::vector<CallPlace> places_of(const CallStack& stack) {
+  std::vector<CallPlace> places;
+  print(
+      stack, true, stack.calls.size(),
+      [](void* to, const char*, const CallPlaceView& at) {
+        static_cast<std::vector<CallPlace>*>(to)->push_back(
+            {at.call, at.function == nullptr ? "" : at.function, at.file == nullptr ? "" : at.file,
+             at.line});
+      },
+      &places);
+  return places;
+}
+
+bool run_in_child(void (*work)(void*), void* with) noexcept {
+  const pid_t child = ::_Fork();
+  if (child != 0) return child > 0 && ended_well(child);
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM}) {
+    std::signal(signal, SIG_DFL);
+  }
+  ::alarm(2);
+  work(with);
+  ::_exit(0);
+}
+
 void write_call_stack(int fd, const char* title, const CallStack& stack) noexcept {
   Output out{fd, title};
-  const pid_t child = ::_Fork();
-  if (child == 0) {
-    for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM}) {
-      std::signal(signal, SIG_DFL);
-    }
-    ::alarm(2);
-    print(stack, true, kMostLines, &Output::put, &out);
-    ::_exit(0);
-  }
-  if (child > 0 && ended_well(child)) return;
+  struct Job {
+    const CallStack& stack;
+    Output& out;
+  } job{stack, out};
+  const auto named = [](void* with) {
+    auto& of = *static_cast<Job*>(with);
+    print(of.stack, true, kMostLines, &Output::put, &of.out);
+  };
+  if (run_in_child(named, &job)) return;
   print(stack, false, kMostLines, &Output::put, &out);
 }
 

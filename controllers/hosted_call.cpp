@@ -17,6 +17,7 @@ thread_local const std::string* inside = nullptr;             // the controller 
 thread_local const std::function<void()>* on_exit = nullptr;  // of a bounded_call()
 
 std::atomic<bool> one_goes_on{false};
+std::atomic<void (*)(const std::string&, const char*)> exit_told{nullptr};
 
 void refuse_the_end() {
   if (inside == nullptr) return;
@@ -24,10 +25,10 @@ void refuse_the_end() {
     (*on_exit)();
     for (;;) ::pause();
   }
-  std::fprintf(stderr,
-               "error: %s: the controller ended the process with exit() (a controller returns its "
-               "errors; correct it)\n",
-               inside->c_str());
+  constexpr char kMessage[] = "the controller ended the process with exit()";
+  std::fprintf(stderr, "error: %s: %s (a controller returns its errors; correct it)\n",
+               inside->c_str(), kMessage);
+  if (const auto told = exit_told.load()) told(*inside, kMessage);
   ::_exit(kStatus);
 }
 
@@ -53,6 +54,10 @@ HostedCode::~HostedCode() {
 
 bool a_hosted_call_goes_on() noexcept { return one_goes_on.load(std::memory_order_relaxed); }
 void note_hosted_call_goes_on() noexcept { one_goes_on.store(true, std::memory_order_relaxed); }
+
+void tell_hosted_exit(void (*told)(const std::string&, const char*)) noexcept {
+  exit_told.store(told);
+}
 
 const char* hosted_controller() noexcept { return inside == nullptr ? nullptr : inside->c_str(); }
 

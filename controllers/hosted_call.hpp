@@ -39,6 +39,9 @@ class HostedCode {
 /// The controller whose code this thread is in, null: in none's. For a signal handler.
 [[nodiscard]] const char* hosted_controller() noexcept;
 
+/// From now on called with the controller that ends the process by exit(), before it ends.
+void tell_hosted_exit(void (*told)(const std::string& controller, const char* message)) noexcept;
+
 /// Whether a call was given up that may still go on: then the process ends by _exit(), and what the
 /// call uses stays.
 [[nodiscard]] bool a_hosted_call_goes_on() noexcept;

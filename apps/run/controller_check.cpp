@@ -295,7 +295,7 @@ Exit controller_check_command(const ControllerCheckOptions& given) {
   auto proof = prove_on_thread(**c, run, *gate, options.seconds);
   if (!proof) return refuse(proof.error());
   if (!proof->crashed.empty()) {
-    remember_error({.message = proof->crashed, .hint = {}, .file = {}, .key = {}});
+    remember_error(loop_error(proof->crashed));
     write_failure(options.json);
     fmt::print(stderr, "fault: {}\n", proof->crashed);
     std::fflush(nullptr);
