@@ -121,10 +121,11 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   lock.unlock();
   if (!parameters) return std::unexpected(parameters.error());
 
+  const std::string library = source.code.path;
   auto next = host_->configure(name, std::move(source), table_at(*parameters, table),
                                ControllerHost::kConfigureTime, {}, sources);
   if (Status read = errors_of(
-          *parameters,
+          *parameters, library,
           "its parameters are those that it was loaded with: unload it, and load it with others");
       !read)
     return std::unexpected(read.error());
