@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -43,6 +44,33 @@ struct CallPlaceView {
   const char *function, *file;  // null: unknown
   int line;
 };
+
+/// Leaves "<…>" of what a template is made with, where the whole name is long; in place, and a name
+/// of which no bracket is left open. What is longer still is cut off.
+void shorten(char* name) {
+  constexpr std::size_t kLong = 120, kMost = 240;
+  constexpr char kLeftOut[] = "<…>";
+  if (std::strlen(name) <= kLong) return;
+  char* to = name;
+  for (const char* from = name; *from != '\0'; ++from) {
+    const bool opens =
+        *from == '<' && std::isalnum(static_cast<unsigned char>(to > name ? to[-1] : ' ')) != 0;
+    const bool is_operator = to - name >= 8 && std::strncmp(to - 8, "operator", 8) == 0;
+    const char* end = from;
+    for (int depth = 0; opens && !is_operator && *end != '\0'; ++end) {
+      if (*end == '<') ++depth;
+      if (*end == '>' && end[-1] != '-' && --depth == 0) break;
+    }
+    if (end - from < static_cast<std::ptrdiff_t>(sizeof kLeftOut) || *end == '\0') {
+      *to++ = *from;
+      continue;
+    }
+    to = static_cast<char*>(std::memcpy(to, kLeftOut, sizeof kLeftOut - 1)) + sizeof kLeftOut - 1;
+    from = end;
+  }
+  *to = '\0';
+  if (to - name > static_cast<std::ptrdiff_t>(kMost)) std::strcpy(name + kMost, "...");
+}
 
 /// Prints calls line by line without the heap, but for demangling.
 struct Printer {
@@ -84,7 +112,10 @@ struct Printer {
           library, sizeof library, " (%s+0x%zx)", base_name(where.dli_fname),
           static_cast<std::size_t>(pc - reinterpret_cast<std::uintptr_t>(where.dli_fbase)));
     }
-    if (clear != nullptr) name = clear;
+    if (clear != nullptr) {
+      shorten(clear);
+      name = clear;
+    }
     std::snprintf(text, sizeof text, "%.2000s%s%s", name != nullptr ? name : "?", place, library);
     put(to, text, {pc, name, file, number});
     std::free(clear);
