@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -38,12 +39,45 @@ const char* base_name(const char* path) {
   return slash == nullptr ? path : slash + 1;
 }
 
+struct CallPlaceView {
+  std::uintptr_t call;
+  const char *function, *file;  // null: unknown
+  int line;
+};
+
+/// Leaves "<…>" of what a template is made with, where the whole name is long; in place, and a name
+/// of which no bracket is left open. What is longer still is cut off.
+void shorten(char* name) {
+  constexpr std::size_t kLong = 120, kMost = 240;
+  constexpr char kLeftOut[] = "<…>";
+  if (std::strlen(name) <= kLong) return;
+  char* to = name;
+  for (const char* from = name; *from != '\0'; ++from) {
+    const bool opens =
+        *from == '<' && std::isalnum(static_cast<unsigned char>(to > name ? to[-1] : ' ')) != 0;
+    const bool is_operator = to - name >= 8 && std::strncmp(to - 8, "operator", 8) == 0;
+    const char* end = from;
+    for (int depth = 0; opens && !is_operator && *end != '\0'; ++end) {
+      if (*end == '<') ++depth;
+      if (*end == '>' && end[-1] != '-' && --depth == 0) break;
+    }
+    if (end - from < static_cast<std::ptrdiff_t>(sizeof kLeftOut) || *end == '\0') {
+      *to++ = *from;
+      continue;
+    }
+    to = static_cast<char*>(std::memcpy(to, kLeftOut, sizeof kLeftOut - 1)) + sizeof kLeftOut - 1;
+    from = end;
+  }
+  *to = '\0';
+  if (to - name > static_cast<std::ptrdiff_t>(kMost)) std::strcpy(name + kMost, "...");
+}
+
 /// Prints calls line by line without the heap, but for demangling.
 struct Printer {
   backtrace_state* state;
   bool demangles;
   std::size_t most;
-  void (*put)(void* to, const char* line);
+  void (*put)(void* to, const char* line, const CallPlaceView& place);
   void* to;
   std::uintptr_t pc = 0;
   std::size_t lines = 0;
@@ -78,15 +112,18 @@ struct Printer {
           library, sizeof library, " (%s+0x%zx)", base_name(where.dli_fname),
           static_cast<std::size_t>(pc - reinterpret_cast<std::uintptr_t>(where.dli_fbase)));
     }
-    std::snprintf(text, sizeof text, "%.2000s%s%s",
-                  clear != nullptr ? clear : (name != nullptr ? name : "?"), place, library);
+    if (clear != nullptr) {
+      shorten(clear);
+      name = clear;
+    }
+    std::snprintf(text, sizeof text, "%.2000s%s%s", name != nullptr ? name : "?", place, library);
+    put(to, text, {pc, name, file, number});
     std::free(clear);
-    put(to, text);
   }
 };
 
 void print(const CallStack& stack, bool demangles, std::size_t most,
-           void (*put)(void*, const char*), void* to) {
+           void (*put)(void*, const char*, const CallPlaceView&), void* to) {
   // A new one each time: it knows the libraries that are loaded when it is first asked.
   Printer printer{::backtrace_create_state(nullptr, 1, &ignore, nullptr), demangles, most, put, to};
   for (const std::uintptr_t pc : stack.view()) {
@@ -100,7 +137,7 @@ struct Output {
   const char* title;  // null: it is written
 
   void say(const char* text) const { (void)!::write(fd, text, std::strlen(text)); }
-  static void put(void* self, const char* line) {
+  static void put(void* self, const char* line, const CallPlaceView&) {
     auto& out = *static_cast<Output*>(self);
     if (out.title != nullptr) {
       out.say(out.title);
@@ -181,25 +218,48 @@ std::vector<std::string> describe(const CallStack& stack, std::size_t most) {
   std::vector<std::string> lines;
   print(
       stack, true, most,
-      [](void* to, const char* line) {
+      [](void* to, const char* line, const CallPlaceView&) {
         static_cast<std::vector<std::string>*>(to)->emplace_back(line);
       },
       &lines);
   return lines;
 }
 
+std::vector<CallPlace> places_of(const CallStack& stack) {
+  std::vector<CallPlace> places;
+  print(
+      stack, true, stack.calls.size(),
+      [](void* to, const char*, const CallPlaceView& at) {
+        static_cast<std::vector<CallPlace>*>(to)->push_back(
+            {at.call, at.function == nullptr ? "" : at.function, at.file == nullptr ? "" : at.file,
+             at.line});
+      },
+      &places);
+  return places;
+}
+
+bool run_in_child(void (*work)(void*), void* with) noexcept {
+  const pid_t child = ::_Fork();
+  if (child != 0) return child > 0 && ended_well(child);
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM}) {
+    std::signal(signal, SIG_DFL);
+  }
+  ::alarm(2);
+  work(with);
+  ::_exit(0);
+}
+
 void write_call_stack(int fd, const char* title, const CallStack& stack) noexcept {
   Output out{fd, title};
-  const pid_t child = ::_Fork();
-  if (child == 0) {
-    for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM}) {
-      std::signal(signal, SIG_DFL);
-    }
-    ::alarm(2);
-    print(stack, true, kMostLines, &Output::put, &out);
-    ::_exit(0);
-  }
-  if (child > 0 && ended_well(child)) return;
+  struct Job {
+    const CallStack& stack;
+    Output& out;
+  } job{stack, out};
+  const auto named = [](void* with) {
+    auto& of = *static_cast<Job*>(with);
+    print(of.stack, true, kMostLines, &Output::put, &of.out);
+  };
+  if (run_in_child(named, &job)) return;
   print(stack, false, kMostLines, &Output::put, &out);
 }
 

@@ -40,8 +40,24 @@ CallStack interrupted_call_stack(const void* context) noexcept;
 /// @param most  lines
 [[nodiscard]] std::vector<std::string> describe(const CallStack& stack, std::size_t most = 16);
 
-/// Writes the same to a descriptor, indented, below a line `title`. Safe in a signal handler: names
-/// are read in a child of this process, and after 2 s without.
+/// A call as its debug information has it; without that no file and no line.
+struct CallPlace {
+  std::uintptr_t call = 0;
+  std::string function;  ///< "Nod::update(…)"; may be empty
+  std::string file;
+  int line = 0;  ///< 0: unknown
+};
+
+/// Of each call, inlined ones too, innermost first.
+[[nodiscard]] std::vector<CallPlace> places_of(const CallStack& stack);
+
+/// work(with) in a child of this process, which writes what it finds out. Safe in a signal handler,
+/// whatever `work` is: a child that crashes, or takes more than 2 s, is no more.
+/// @return whether it came to its end
+bool run_in_child(void (*work)(void* with), void* with) noexcept;
+
+/// Writes the same as describe() to a descriptor, indented, below a line `title`. Safe in a signal
+/// handler: names are read in a child of this process, and after 2 s without.
 void write_call_stack(int fd, const char* title, const CallStack& stack) noexcept;
 
 }  // namespace tandem

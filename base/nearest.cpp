@@ -15,7 +15,8 @@ constexpr std::size_t kMostRow = kMostNamed + kMostNamed / 2 + 2;
 
 char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
 
-std::size_t too_far(std::string_view name) { return std::max<std::size_t>(2, name.size() / 2) + 1; }
+/// With three letters one edit is a slip, and two are another word: "foo" and "on".
+std::size_t too_far(std::string_view name) { return std::max<std::size_t>(1, name.size() / 2) + 1; }
 
 /// Optimal string alignment distance. @pre both are shorter than kMostRow
 std::size_t distance(std::string_view a, std::string_view b) {
@@ -44,8 +45,8 @@ std::size_t nearness(std::string_view name, std::string_view candidate) {
                           candidate[name.size()] == '_' && candidate.starts_with(name);
   const std::size_t least = candidate.size() > name.size() ? candidate.size() - name.size()
                                                            : name.size() - candidate.size();
-  if (least >= far) return lacks_unit ? std::min<std::size_t>(2, far) : far;
-  return std::min(distance(name, candidate), lacks_unit ? 2 : far);
+  const std::size_t unit = lacks_unit ? std::min<std::size_t>(2, far - 1) : far;
+  return least >= far ? unit : std::min(distance(name, candidate), unit);
 }
 
 struct Best {

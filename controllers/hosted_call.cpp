@@ -21,6 +21,7 @@ const GivenUp none;
 thread_local const GivenUp* given_up = &none;
 
 std::atomic<bool> one_goes_on{false};
+std::atomic<void (*)(const std::string&, const char*)> exit_told{nullptr};
 
 void refuse_the_end() {
   if (inside == nullptr) return;
@@ -28,10 +29,10 @@ void refuse_the_end() {
     (*on_exit)();
     for (;;) ::pause();
   }
-  std::fprintf(stderr,
-               "error: %s: the controller ended the process with exit() (a controller returns its "
-               "errors; correct it)\n",
-               inside->c_str());
+  constexpr char kMessage[] = "the controller ended the process with exit()";
+  std::fprintf(stderr, "error: %s: %s (a controller returns its errors; correct it)\n",
+               inside->c_str(), kMessage);
+  if (const auto told = exit_told.load()) told(*inside, kMessage);
   ::_exit(kStatus);
 }
 
@@ -60,6 +61,9 @@ void note_hosted_call_goes_on() noexcept { one_goes_on.store(true, std::memory_o
 
 const GivenUp& hosted_call_given_up() noexcept { return *given_up; }
 void this_thread_is_of(const GivenUp& call) noexcept { given_up = &call; }
+void tell_hosted_exit(void (*told)(const std::string&, const char*)) noexcept {
+  exit_told.store(told);
+}
 
 const char* hosted_controller() noexcept { return inside == nullptr ? nullptr : inside->c_str(); }
 

@@ -47,6 +47,9 @@ using GivenUp = std::shared_ptr<const std::atomic<bool>>;
 /// The thread is that call's, which outlives it.
 void this_thread_is_of(const GivenUp& call) noexcept;
 
+/// From now on called with the controller that ends the process by exit(), before it ends.
+void tell_hosted_exit(void (*told)(const std::string& controller, const char* message)) noexcept;
+
 /// Whether a call was given up that may still go on: then the process ends by _exit(), and what the
 /// call uses stays.
 [[nodiscard]] bool a_hosted_call_goes_on() noexcept;

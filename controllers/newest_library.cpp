@@ -2,15 +2,18 @@
 // What the linker would give it of the program, or of its own former parts, is looked for.
 #include "controllers/newest_library.hpp"
 
+#include <cxxabi.h>
 #include <dlfcn.h>
 #include <elf.h>
 #include <sys/stat.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <set>
 #include <tuple>
@@ -108,6 +111,13 @@ std::string unique_variable(const Sections& file) {
     if (found.empty() && !(is_of_std(name) && !file.is_written(symbol))) found = name;
   });
   return found;
+}
+
+/// "tandem::kPositive" of "_ZN6tandem9kPositiveE".
+std::string clear_name(const std::string& symbol) {
+  const std::unique_ptr<char, decltype(&std::free)> clear(
+      abi::__cxa_demangle(symbol.c_str(), nullptr, nullptr, nullptr), std::free);
+  return clear == nullptr ? symbol : clear.get();
 }
 
 std::string file_name(const std::string& path) { return fs::path(path).filename().string(); }
@@ -246,7 +256,7 @@ Result<void*> load_newest(const TrustedCode& code) {
       return fail(
           "was built anew, but its former code stays in this process, and the new one would "
           "use its variable " +
-              name,
+              clear_name(name),
           "end the run; build it by tandem_add_controller(), or with -fno-gnu-unique");
     }
   }

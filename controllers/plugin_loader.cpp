@@ -130,6 +130,16 @@ std::vector<std::string> controller_folders() {
   return folders;
 }
 
+bool is_bundled_controller(const std::string& library) {
+  const std::vector<std::string> bundled = split(TANDEM_BUNDLED_CONTROLLERS);
+  const fs::path path = library;
+  if (std::ranges::find(bundled, path.stem().string()) == bundled.end()) return false;
+  std::error_code ignored;
+  const fs::path folder = path.parent_path();
+  return fs::equivalent(folder, program_prefix() / "lib/controllers", ignored) ||
+         fs::equivalent(folder, program_prefix() / "lib/tandem/controllers", ignored);
+}
+
 std::vector<std::string> available_controllers(const std::vector<std::string>& folders) {
   std::vector<std::string> names;
   for (const std::string& folder : folders) {

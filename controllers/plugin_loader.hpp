@@ -43,6 +43,9 @@ class LoadedController {
 /// the folder of the running program.
 [[nodiscard]] std::vector<std::string> controller_folders();
 
+/// Whether a library is one of those that come with this program.
+[[nodiscard]] bool is_bundled_controller(const std::string& library);
+
 /// The names of the controllers (NAME.so) in `folders`, sorted, each once. Opens none.
 [[nodiscard]] std::vector<std::string> available_controllers(
     const std::vector<std::string>& folders);

@@ -168,8 +168,10 @@ void add_log(py::module_& module) {
       .def_property_readonly("remarks", [](const Log& log) { return log.file().remarks(); })
       .def_property_readonly("data_sha256", [](const Log& log) { return log.file().data_sha256(); })
       .def("channels", &Log::channels)
-      .def("full_name",
-           [](const Log& log, const std::string& name) { return log.file().full_name(name); })
+      .def(
+          "full_name",
+          [](const Log& log, const std::string& name) { return log.file().full_name(name); },
+          "name"_a)
       .def(
           "left_out",
           [](const Log& log, const std::string& topic, const std::string& field) {

@@ -270,10 +270,10 @@ ControllerSet RunServices::planned() const {
   return active;
 }
 
-/// The errors of a document in one, as many as somebody reads.
-/// @param missing, unknown  what to do about a key
-Status RunServices::errors_of(const TomlDocument& document, const char* missing,
-                              const char* unknown) {
+/// The errors of a document in one, as many as somebody reads. `library`: the controller's;
+/// `missing`, `unknown`: what to do about a key.
+Status RunServices::errors_of(const TomlDocument& document, const std::string& library,
+                              const char* missing, const char* unknown) {
   constexpr std::size_t kMost = 20;
   const Diagnostics& errors = document.diagnostics();
   std::string all;
@@ -286,7 +286,9 @@ Status RunServices::errors_of(const TomlDocument& document, const char* missing,
   }
   if (errors.size() > kMost) all += "; and " + std::to_string(errors.size() - kMost) + " more";
   if (all.empty()) return {};
-  return fail(all, "the parameters of each controller are in docs/controllers.md");
+  return fail(all, is_bundled_controller(library)
+                       ? "the parameters of each controller are in docs/controllers.md"
+                       : "");
 }
 
 Status RunServices::check_name(const std::string& name) {
@@ -303,8 +305,9 @@ Status RunServices::check_name(const std::string& name) {
 
 Result<RequestResult> RunServices::load(const std::string& name, LoadedController plugin,
                                         const TomlDocument& parameters, Patience patience) {
+  const std::string library = plugin.path();
   auto made = host_->configure(name, std::move(plugin), parameters.root());
-  if (Status read = errors_of(parameters); !read) return std::unexpected(read.error());
+  if (Status read = errors_of(parameters, library); !read) return std::unexpected(read.error());
   if (!made) return std::unexpected(made.error());
   (*made)->document = parameters;
   return load(std::move(*made), patience);
@@ -314,7 +317,7 @@ Result<RequestResult> RunServices::load(const std::string& name,
                                         std::shared_ptr<Controller> controller,
                                         const TomlDocument& parameters, Patience patience) {
   auto made = host_->configure(name, std::move(controller), parameters.root());
-  if (Status read = errors_of(parameters); !read) return std::unexpected(read.error());
+  if (Status read = errors_of(parameters, ""); !read) return std::unexpected(read.error());
   if (!made) return std::unexpected(made.error());
   (*made)->document = parameters;
   return load(std::move(*made), patience);

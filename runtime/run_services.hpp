@@ -341,7 +341,7 @@ class RunServices {
   [[nodiscard]] Status check_name(const std::string& name);
   /// For the log, with the next cycles.
   static void tell_loaded(HostedController& controller);
-  [[nodiscard]] static Status errors_of(const TomlDocument& document,
+  [[nodiscard]] static Status errors_of(const TomlDocument& document, const std::string& library,
                                         const char* missing = "give it with --set or --parameters",
                                         const char* unknown = "");
   [[nodiscard]] Result<HostedController*> to_reload(const std::string& name) const;

@@ -200,6 +200,7 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   lock.unlock();
   if (!parameters) return std::unexpected(parameters.error());
 
+  const std::string library = source.code.path;
   auto next = host_->configure(name, std::move(source), table_at(*parameters, table),
                                ControllerHost::kConfigureTime, {}, sources);
   constexpr const char* kFixed =
@@ -207,7 +208,7 @@ Result<Reloaded> RunServices::reload(const std::string& name, ControllerSource s
   constexpr const char* kRenamed =
       "This build has none of the name, and its parameters are those that it was loaded with: "
       "unload it, and load it with others";
-  if (Status read = errors_of(*parameters, kFixed, kRenamed); !read)
+  if (Status read = errors_of(*parameters, library, kFixed, kRenamed); !read)
     return std::unexpected(read.error());
   if (!next) return std::unexpected(next.error());
   auto succession = succession_of(*former_io, inputs, **next, fresh);

@@ -63,15 +63,22 @@ std::string shown_value(const Json& value) {
                              : value.dump();
 }
 
-/// "0 to 500", "> 0", "stiff, compliant".
-std::string shown_range(const Json& one) {
-  if (one["choices"].size() > 0)
-    return fmt::format("{}", fmt::join(one["choices"].get<std::vector<std::string>>(), ", "));
+/// "0 to 500", "> 0".
+std::string shown_limits(const Json& one) {
   const Json &min = one["min"], &max = one["max"];
   const std::string above = one.value("above_min", false) ? "> " : "";
   if (!min.is_null() && !max.is_null()) return above + shown_value(min) + " to " + shown_value(max);
   if (!min.is_null()) return (above.empty() ? ">= " : above) + shown_value(min);
   return max.is_null() ? "" : "<= " + shown_value(max);
+}
+
+/// "0 to 500, whole", "stiff, compliant".
+std::string shown_range(const Json& one) {
+  if (one["choices"].size() > 0)
+    return fmt::format("{}", fmt::join(one["choices"].get<std::vector<std::string>>(), ", "));
+  const std::string limits = shown_limits(one);
+  if (one.value("type", "") != "integer") return limits;
+  return limits.empty() ? "whole" : limits + ", whole";
 }
 
 /// A list as one parameter where its elements are alike, else each of them.

@@ -339,8 +339,8 @@ void add_flags(CLI::App& app, ControllerCheckOptions& o) {
   CLI::Option* experiment =
       app.add_option("--experiment", o.experiment, "Experiment that has it among its controllers")
           ->check(is_given("name an experiment, or leave it out"));
-  app.add_option("--robot", o.robot, "Robot TOML (default: the bundled double_pendulum)")
-      ->check(is_given("name a robot.toml, or leave it out"))
+  app.add_option("--robot", o.robot, "A bundled robot, or a robot.toml (default: double_pendulum)")
+      ->check(is_given("name a robot, or leave it out"))
       ->excludes(experiment);
   app.add_option("--set", o.set, "One of its parameters, KEY = VALUE as in TOML")
       ->allow_extra_args(false)

@@ -62,6 +62,7 @@ int run_program(int argc, const char* const* argv,
       print_errors({kept.error()});
       return static_cast<int>(Exit::kUsage);
     }
+    begin_json(json_argument(argc, argv));
   }
   const std::expected<Exit, int> done = performed(command, perform);
   Exit exit = done.value_or(Exit::kUsage);

@@ -6,11 +6,13 @@
 
 #include "apps/can/bus_table.hpp"
 #include "apps/control/fault_table.hpp"
+#include "apps/control/remote_gate.hpp"
 #include "apps/robot/loop_facts.hpp"
 #include "apps/robot/scale_facts.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/connection.hpp"
+#include "apps/run/input_topics.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
 #include "base/quoting.hpp"
@@ -245,6 +247,20 @@ void warn_of_payloads(const runtime::Experiment& e, Diagnostics& warnings) {
   }
 }
 
+/// Inputs whose topics a run would refuse to read.
+Status check_topics(const WiredComposition& c) {
+  if (c.controllers == nullptr) return {};
+  std::vector<std::shared_ptr<runtime::InputPort>> fed;
+  for (const auto& one : c.controllers->owned()) {
+    if (one == nullptr) continue;
+    for (const auto& port : one->inputs) {
+      if (port->source().feeder == runtime::InputFeeder::kTopic) fed.push_back(port);
+    }
+  }
+  const auto nobody = [] { return std::string(); };
+  return topics_may_feed(fed, c.experiment.dds.enabled, remote_gate(c.experiment.remote, nobody));
+}
+
 Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                              Json& json) {
   const auto composition = runtime::composed<WiredComposition>(
@@ -255,6 +271,7 @@ Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagno
   warn_of_archives(**composition, warnings);
   warn_of_payloads((*composition)->experiment, warnings);
   print_warnings(warnings);
+  if (const Status fed = check_topics(**composition); !fed) return {fed.error()};
   const runtime::Experiment& e = (*composition)->experiment;
   add_loop_json(e.robot, (*composition)->loops, json);
   add_scale_json(e.robot, json);

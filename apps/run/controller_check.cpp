@@ -36,36 +36,54 @@ constexpr double kBeforeSave_s = 0.2;  // under the controllers
 class MadeExperiment {
  public:
   static Result<MadeExperiment> make(const ControllerCheckOptions& o) {
-    const fs::path robot = o.robot.empty() ? bundled_robot(kDefaultRobot) : fs::path(o.robot);
-    if (robot.empty()) {
-      return fail("there is no bundled robot to check it on", "give --robot or --experiment");
-    }
+    const auto robot = named_robot(o.robot.empty() ? kDefaultRobot : o.robot);
+    if (!robot) return std::unexpected(robot.error());
     std::string text = fmt::format(
         "robot = {}\nduration_s = 1.0\n[[controller]]\nplugin = {}\n[controller.parameters]\n",
-        quoted_text(fs::absolute(robot).string()), quoted_text(o.plugin));
+        quoted_text(fs::absolute(*robot).string()), quoted_text(o.plugin));
     for (const std::string& line : o.set) text += line + "\n";
     std::string folder = (fs::temp_directory_path() / "tandem-check-XXXXXX").string();
     if (::mkdtemp(folder.data()) == nullptr) {
       return fail("cannot make a folder in " + fs::temp_directory_path().string(),
                   "let TMPDIR name one that can be written");
     }
-    MadeExperiment made(folder);
+    MadeExperiment made(folder, o.set);
     auto file = open_output(made.path(), 0600);
     if (!file) return std::unexpected(file.error());
     if (::write(file->get(), text.data(), text.size()) != static_cast<ssize_t>(text.size()))
       return fail("cannot write " + made.path(), "is the disk full?");
     return made;
   }
-  MadeExperiment(MadeExperiment&& other) noexcept : folder_(std::exchange(other.folder_, {})) {}
+  MadeExperiment(MadeExperiment&& other) noexcept
+      : folder_(std::exchange(other.folder_, {})), set_(std::move(other.set_)) {}
   ~MadeExperiment() {
     std::error_code ignored;
     if (!folder_.empty()) fs::remove_all(folder_, ignored);
   }
   [[nodiscard]] std::string path() const { return folder_ + "/check.toml"; }
 
+  /// Errors of this file, which nobody has seen, as those of the command line that it was made of.
+  [[nodiscard]] Diagnostics as_given(Diagnostics errors) const {
+    constexpr std::string_view kTable = "controller[0].parameters.";
+    for (Error& error : errors) {
+      if (error.file != path()) continue;
+      const auto line = static_cast<std::size_t>(error.line);
+      const bool is_set = line >= kFirstSet && line < kFirstSet + set_.size();
+      error.file = is_set ? "--set " + shell_word(set_[line - kFirstSet]) : "";
+      error.line = 0;
+      if (error.key.starts_with(kTable)) error.key.erase(0, kTable.size());
+      if (error.hint.starts_with("add it to the table"))
+        error.hint = "give it: --set '" + error.key + " = …'";
+    }
+    return errors;
+  }
+
  private:
-  explicit MadeExperiment(std::string folder) : folder_(std::move(folder)) {}
+  static constexpr std::size_t kFirstSet = 6;  // line
+  MadeExperiment(std::string folder, std::vector<std::string> set)
+      : folder_(std::move(folder)), set_(std::move(set)) {}
   std::string folder_;
+  std::vector<std::string> set_;
 };
 
 /// What the loop's thread finds out.
@@ -281,7 +299,7 @@ Exit controller_check_command(const ControllerCheckOptions& given) {
   overrides.on_fault = "end";
   auto c =
       runtime::composed<WiredComposition>(experiment, overrides, {.build = builder(options.quiet)});
-  if (!c) return refuse(c.error());
+  if (!c) return refuse(made ? made->as_given(c.error()) : c.error());
   if (!has_plugin(*(*c)->controllers, options.plugin)) {
     return refuse({.message = "none of its controllers is " + options.plugin,
                    .hint = "let a [[controller]] name it, or its file's name without .so",
@@ -295,7 +313,7 @@ Exit controller_check_command(const ControllerCheckOptions& given) {
   auto proof = prove_on_thread(**c, run, *gate, options.seconds);
   if (!proof) return refuse(proof.error());
   if (!proof->crashed.empty()) {
-    remember_error({.message = proof->crashed, .hint = {}, .file = {}, .key = {}});
+    remember_error(loop_error(proof->crashed));
     write_failure(options.json);
     fmt::print(stderr, "fault: {}\n", proof->crashed);
     std::fflush(nullptr);

@@ -126,24 +126,30 @@ class InputTopics::Feed {
   dds::Endpoint reader_;
 };
 
+Status topics_may_feed(std::span<const std::shared_ptr<runtime::InputPort>> inputs, bool on_dds,
+                       const ControlRegistry::Gate& gate) {
+  if (inputs.empty()) return {};
+  Error error = inputs.front()->source().where;
+  if (!on_dds) {
+    error.message = "a topic feeds it, and the run is not on DDS";
+    error.hint = "add [dds], or --dds";
+    return std::unexpected(std::move(error));
+  }
+  const Status open = gate("input.set", ControlEffect::kChanges, Json::object());
+  if (open) return {};
+  error.message = "a topic feeds it, and " + open.error().message;
+  error.hint = "[remote] command = \"local\", or \"network\"";
+  return std::unexpected(std::move(error));
+}
+
 Result<std::unique_ptr<InputTopics>> InputTopics::open(dds::Participant* participant,
                                                        runtime::RunServices& services,
                                                        ControlRegistry::Gate gate,
                                                        const DdsAdmission& admission) {
   const auto ports = services.inputs_of(runtime::InputFeeder::kTopic);
   if (ports.empty()) return nullptr;
-  if (participant == nullptr) {
-    Error error = ports.front()->source().where;
-    error.message = "a topic feeds it, and the run is not on DDS";
-    error.hint = "add [dds], or --dds";
-    return std::unexpected(std::move(error));
-  }
-  if (const Status open = gate("input.set", ControlEffect::kChanges, Json::object()); !open) {
-    Error error = ports.front()->source().where;
-    error.message = "a topic feeds it, and " + open.error().message;
-    error.hint = "[remote] command = \"local\", or \"network\"";
-    return std::unexpected(std::move(error));
-  }
+  if (const Status may = topics_may_feed(ports, participant != nullptr, gate); !may)
+    return std::unexpected(may.error());
   std::unique_ptr<InputTopics> topics(new InputTopics);
   const Parts parts{*participant, services, std::move(gate), admission};
   for (const auto& port : ports) {

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <thread>
 #include <vector>
 
@@ -15,6 +16,11 @@
 #include "runtime/run_services.hpp"
 
 namespace tandem::apps {
+
+/// Why topics cannot feed the inputs that they are the source of: no DDS, or what changes the run
+/// is not let in. With the place in the experiment.
+[[nodiscard]] Status topics_may_feed(std::span<const std::shared_ptr<runtime::InputPort>> inputs,
+                                     bool on_dds, const ControlRegistry::Gate& gate);
 
 /// A sample is a change of the run like "input.set": it passes the same gate, and its writer has to
 /// be admitted. One writer feeds an input at a time: another one's samples are refused until it has

@@ -1,7 +1,9 @@
 // Handlers of std::terminate, of signals and of exit(), which stop the loop's thread in a cycle.
 #include "apps/run/loop_crash.hpp"
 
+#include <dlfcn.h>
 #include <fmt/core.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <array>
@@ -14,6 +16,7 @@
 #include <exception>
 #include <string>
 
+#include "apps/text/console.hpp"
 #include "base/call_stack.hpp"
 #include "controllers/hosted_call.hpp"
 
@@ -25,10 +28,88 @@ std::terminate_handler usual_end = nullptr;
 /// For a signal handler when the loop's own stack is full.
 alignas(std::max_align_t) std::array<std::byte, 262144> signal_stack;
 std::atomic<const char*> reason{nullptr};
+/// In memory that a child shares, which finds it out: CrashPlace.
+struct SharedPlace {
+  std::array<char, 512> function{}, file{};
+  int line = 0;
+  std::atomic<bool> known{false};
+};
+SharedPlace* shared_place = nullptr;  // null: there is no memory for it
 constexpr char kTitle[] = "called from (innermost first):";
 
 bool in_cycle() noexcept {
   return loop_heartbeat != nullptr && runtime::Heartbeat::at_work(loop_heartbeat->beats());
+}
+
+/// Whether the library that a call is in is a controller's: it has the entry point.
+bool is_in_controller(std::uintptr_t call) {
+  Dl_info where{}, entry{};
+  if (::dladdr(reinterpret_cast<void*>(call), &where) == 0) return false;
+  void* library = ::dlopen(where.dli_fname, RTLD_LAZY | RTLD_NOLOAD);
+  const void* found = library == nullptr ? nullptr : ::dlsym(library, "tandem_controller_plugin");
+  return found != nullptr && ::dladdr(found, &entry) != 0 && entry.dli_fbase == where.dli_fbase;
+}
+
+/// The innermost call of a controller's library, and of its own files if one is: a template of
+/// /usr/include is not what its author wrote. Without any the innermost call of all.
+CrashPlace author_place(const CallStack& stack) {
+  const std::vector<CallPlace> places = places_of(stack);
+  const CallPlace* chosen = nullptr;
+  for (const CallPlace& place : places) {
+    if (!is_in_controller(place.call)) continue;
+    if (chosen == nullptr) chosen = &place;
+    if (place.file.empty() || place.file.starts_with("/usr/")) continue;
+    chosen = &place;
+    break;
+  }
+  if (chosen == nullptr && !places.empty()) chosen = &places.front();
+  if (chosen == nullptr) return {};
+  return {chosen->function, chosen->file, chosen->line};
+}
+
+/// For the thread that ends the process. In a child.
+void share_place(void* stack) {
+  const CrashPlace place = author_place(*static_cast<const CallStack*>(stack));
+  const auto copy = [](const std::string& from, std::array<char, 512>& to) {
+    to[from.copy(to.data(), to.size() - 1)] = '\0';
+  };
+  copy(place.function, shared_place->function);
+  copy(place.file, shared_place->file);
+  shared_place->line = place.line;
+  shared_place->known.store(true);
+}
+
+/// A crash outside of the cycle, in a controller's code.
+struct EarlyCrash {
+  const char* controller;
+  const char* why;
+  const CallStack* stack;  // null: without a place
+
+  static void write(void* self) {
+    const auto& crash = *static_cast<const EarlyCrash*>(self);
+    const CrashPlace place = crash.stack == nullptr ? CrashPlace{} : author_place(*crash.stack);
+    fail_begun_json({.message = std::string("the controller crashed before its first cycle: ") +
+                                crash.why + place.in_function(),
+                     .hint = "correct it; the standard error has the calls",
+                     .file = place.file,
+                     .line = place.line,
+                     .key = crash.controller});
+  }
+};
+
+/// The JSON of a process that ends now.
+void write_early_crash(const char* controller, const char* why, const CallStack& stack) {
+  EarlyCrash crash{controller, why, &stack};
+  if (run_in_child(&EarlyCrash::write, &crash)) return;
+  crash.stack = nullptr;
+  (void)run_in_child(&EarlyCrash::write, &crash);
+}
+
+void write_early_exit(const std::string& controller, const char* message) {
+  fail_begun_json({.message = message,
+                   .hint = "a controller returns its errors; correct it",
+                   .file = {},
+                   .key = controller});
 }
 
 /// What stops the robot does not wait for the words.
@@ -36,6 +117,8 @@ bool in_cycle() noexcept {
   reason.store(why);
   loop_heartbeat->stand_still();
   write_call_stack(STDERR_FILENO, kTitle, stack);
+  CallStack copy = stack;
+  if (shared_place != nullptr) (void)run_in_child(&share_place, &copy);
   while (true) ::pause();
 }
 
@@ -82,7 +165,9 @@ void on_signal(int signal, siginfo_t*, void* context) {
       for (const char* part :
            {": the controller crashed before its first cycle: ", name_of(signal), "\n"})
         write_text(part);
-      write_call_stack(STDERR_FILENO, kTitle, interrupted_call_stack(context));
+      const CallStack stack = interrupted_call_stack(context);
+      write_call_stack(STDERR_FILENO, kTitle, stack);
+      write_early_crash(controller, name_of(signal), stack);
     }
     std::signal(signal, SIG_DFL);
     std::raise(signal);
@@ -121,7 +206,26 @@ const char* crash_reason() noexcept {
   return why == nullptr ? "" : why;
 }
 
-void name_crashing_controllers() { handle_all(); }
+std::string CrashPlace::in_function() const { return function.empty() ? "" : " in " + function; }
+
+CrashPlace crash_place() {
+  if (shared_place == nullptr || !shared_place->known.load()) return {};
+  return {shared_place->function.data(), shared_place->file.data(), shared_place->line};
+}
+
+Error loop_error(const std::string& fault) {
+  const CrashPlace place = crash_place();
+  return {.message = fault + place.in_function(),
+          .hint = {},
+          .file = place.file,
+          .line = place.line,
+          .key = {}};
+}
+
+void name_crashing_controllers() {
+  handle_all();
+  tell_hosted_exit(&write_early_exit);
+}
 
 int end_beside_controllers(int status) {
   if (!a_hosted_call_goes_on()) return status;
@@ -138,6 +242,11 @@ void stand_still_on_crash(runtime::Heartbeat& heartbeat) {
   if ((stack.ss_flags & SS_DISABLE) != 0) {  // a sanitizer's is its own to free
     stack = {.ss_sp = signal_stack.data(), .ss_flags = 0, .ss_size = signal_stack.size()};
     ::sigaltstack(&stack, nullptr);
+  }
+  if (shared_place == nullptr) {
+    void* memory = ::mmap(nullptr, sizeof(SharedPlace), PROT_READ | PROT_WRITE,
+                          MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (memory != MAP_FAILED) shared_place = new (memory) SharedPlace;
   }
   handle_all();
   std::atexit(on_exit);

@@ -3,6 +3,9 @@
 // Layer: apps/run.  Thread: the loop's, or any where it is said.
 #pragma once
 
+#include <string>
+
+#include "base/result.hpp"
 #include "runtime/heartbeat.hpp"
 
 namespace tandem::apps {
@@ -19,8 +22,25 @@ void stand_still_on_crash(runtime::Heartbeat& heartbeat);
 /// Why it stands still: "segmentation fault (SIGSEGV)", "an exception"; empty: it does not.
 [[nodiscard]] const char* crash_reason() noexcept;
 
+/// Where in its author's code a controller crashed. Without debug information function and file may
+/// be empty, and the line 0.
+struct CrashPlace {
+  std::string function, file;
+  int line = 0;
+  /// " in FUNCTION", or empty.
+  [[nodiscard]] std::string in_function() const;
+};
+
+/// Of the crash that the loop stands still by; empty as long as it is not found out.
+[[nodiscard]] CrashPlace crash_place();
+
+/// The error of a loop that was given up.
+/// @param fault  what CycleGuard says of it
+[[nodiscard]] Error loop_error(const std::string& fault);
+
 /// The process ends by SIGSEGV and the like as it did, but names the controller in whose code that
-/// happens outside of the cycle, as in configure(). Any thread's.
+/// happens outside of the cycle, as in configure(), and writes the command's JSON, with the place.
+/// Any thread's.
 void name_crashing_controllers();
 
 /// As a return from main(), but at once where a controller was given up that did not return, or

@@ -22,6 +22,7 @@
 #include "apps/run/gate.hpp"
 #include "apps/run/inject.hpp"
 #include "apps/run/input_topics.hpp"
+#include "apps/run/loop_crash.hpp"
 #include "apps/run/prediction.hpp"
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_summary.hpp"
@@ -305,14 +306,15 @@ class Session {
   /// The loop was given up. Its thread is still there, and may go on at any time: what it uses
   /// stays.
   [[noreturn]] void end_without_loop(const CycleGuard& guard) {
-    const std::string& fault = guard.fault();
+    const Error error = loop_error(guard.fault());
     std::string log;
-    if (recorder_ != nullptr) log = recorder_->close({{"ended", fault}}).path;
+    if (recorder_ != nullptr) log = recorder_->close({{"ended", error.to_string()}}).path;
     if (c_.frames != nullptr) (void)c_.frames->close();
-    remember_error({.message = fault, .hint = {}, .file = {}, .key = {}});
+    remember_error(error);
     write_failure(options_.json);
     socket_.reset();
-    fmt::print(stderr, "fault: {}{}\n", fault, log.empty() ? "" : "; the log up to then is " + log);
+    fmt::print(stderr, "fault: {}{}\n", guard.fault(),
+               log.empty() ? "" : "; the log up to then is " + log);
     std::fflush(nullptr);
     ::_exit(static_cast<int>(Exit::kFault));
   }

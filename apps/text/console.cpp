@@ -30,6 +30,7 @@ constexpr std::size_t kLongestCell = 2'000;  // characters
 
 Diagnostics reported;      // by print_errors(), for write_failure()
 bool has_written = false;  // by write_json()
+std::string begun_json;    // by begin_json()
 std::atomic<int> lost{0};  // errno with which the standard output was last thrown away
 
 /// Columns that a UTF-8 text takes: bytes that do not continue a character.
@@ -295,6 +296,20 @@ Json errors_json(const Diagnostics& errors) {
 }
 
 void remember_error(Error error) { reported.push_back(std::move(error)); }
+
+// One behind a link, or in a folder where nothing can be removed, is emptied.
+void begin_json(const std::string& file) {
+  begun_json = file;
+  std::error_code problem;
+  if (file.empty() || file == "-" || !std::filesystem::is_regular_file(file, problem)) return;
+  if (std::filesystem::is_symlink(file, problem) || !std::filesystem::remove(file, problem))
+    std::filesystem::resize_file(file, 0, problem);
+}
+
+void fail_begun_json(Error error) {
+  remember_error(std::move(error));
+  write_failure(begun_json);
+}
 
 void write_failure(const std::string& file) {
   if (has_written) return;

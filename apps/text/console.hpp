@@ -102,6 +102,13 @@ void remember_error(Error error);
 /// A list of objects: file, line, key, message, hint.
 [[nodiscard]] Json errors_json(const Diagnostics& errors);
 
+/// A command with `--json file` begins: what a former one left there goes, so that a command which
+/// comes to no end leaves no result. Once, before it does anything.
+void begin_json(const std::string& file);
+
+/// write_failure() with this error, to the file of begin_json(): the process ends at once.
+void fail_begun_json(Error error);
+
 /// For a command that failed: {"ok": false, "errors": [...]} with all that print_errors() said,
 /// unless write_json() has written something already. `file` as there.
 void write_failure(const std::string& file);

@@ -58,6 +58,8 @@ void add_controllers(Composition& c, Collector& errors) {
       const Status added = c.controllers->add(spec.name, std::move(*loaded), spec.parameters,
                                               spec.active, spec.inputs);
       if (!added) {
+        TomlTable parameters = spec.parameters;
+        if (parameters.has_errors()) continue;  // what it makes of what is not there follows on
         Error error = added.error();
         error.key = key + (error.key.empty() ? "" : ": " + error.key);
         errors.add(std::move(error), c.experiment.file, line);

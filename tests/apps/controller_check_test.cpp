@@ -112,6 +112,27 @@ TEST_F(ControllerCheck, RefusesWhatItCannotCheck) {
   }
 }
 
+// It had named a temporary file that nobody sees, and what followed on from the missing key first.
+TEST_F(ControllerCheck, SaysWhatToGiveItOnTheCommandLine) {
+  const auto said = [&](const std::string& more) {
+    return tandem("controller check " + shell_word(kPlugins + "nodder_asks.so") + more).err;
+  };
+  EXPECT_EQ(said(" --set 'speed_rad_s = 1.0'"),
+            "error: gain: this key is missing (give it: --set 'gain = …')\n");
+  const std::string wrong = said(" --set 'gain = 1.0' --set 'speed_rad_s = \"fast\"'");
+  EXPECT_TRUE(wrong.starts_with("error: --set 'speed_rad_s = \"fast\"': speed_rad_s: ")) << wrong;
+  const std::string syntax = said(" --set 'gain = '");
+  EXPECT_TRUE(syntax.starts_with("error: --set 'gain = ': not valid TOML")) << syntax;
+  EXPECT_EQ(said(" --set 'gain = 0.0' --set 'speed_rad_s = 1.0'"),
+            "error: controller.nodder_asks: a gain of 0 does nothing (raise it)\n");
+}
+
+TEST_F(ControllerCheck, TakesABundledRobotByItsName) {
+  const Outcome outcome =
+      tandem("controller check " + shell_word(kPlugin) + " --robot double_pendulum --duration 0.3");
+  EXPECT_EQ(outcome.status, 0) << outcome.err << outcome.out;
+}
+
 TEST_F(ControllerCheck, TakesAnExperimentThatNamesThePlugin) {
   edit("hold.toml", "plugin = \"hold\"", "plugin = \"breaks\"\nname = \"mine\"");
   const Outcome outcome =

@@ -95,7 +95,9 @@ TEST_F(Builds, GoOnInTheStateOfTheFormerOne) {
   put("fails");
   expect(refused("controller reload nodder"), "this build has a mistake");
   put("asks");
-  expect(refused("controller reload nodder"), "gain: this key is missing (its parameters are");
+  const std::string asks = refused("controller reload nodder");
+  expect(asks, "gain: this key is missing (its parameters are");
+  EXPECT_EQ(asks.find("docs/controllers.md"), std::string::npos) << "it is its author's own";
   EXPECT_EQ(asked("controller list")["controllers"][0]["active"], true);
   put("more");
   const auto more = asked("controller reload nodder");

@@ -273,6 +273,9 @@ TEST_F(InputOfARun, ATopicThatNobodyMayUseIsAnErrorAtTheStart) {
   with_jog(kTwist);
   EXPECT_NE(why("").find("hold.toml:"), std::string::npos) << why("");
   EXPECT_NE(why("").find("the run is not on DDS"), std::string::npos) << why("");
+  const Outcome check = tandem("check hold.toml");
+  EXPECT_EQ(check.status, 2) << "it had called it right";
+  EXPECT_NE(check.err.find("the run is not on DDS"), std::string::npos) << check.err;
   EXPECT_NE(why(in_domain()).find("takes no commands over DDS"), std::string::npos);
   with_jog(std::string(kTwist) + "type = \"sensor_msgs/msg/Imu\"\n");
   EXPECT_NE(why("").find("bring no twist"), std::string::npos) << why("");

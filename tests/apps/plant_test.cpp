@@ -23,7 +23,7 @@ class ChangedPlant : public Program {
 // It was one event, "injected payload of joint2": no name, no drop, and nothing of what is there
 // for good.
 TEST_F(ChangedPlant, IsInEventsTableJsonAndReport) {
-  const Outcome run = tandem("run p.toml --duration 1 --log l --report r --json j.json");
+  const Outcome run = tandem("run p.toml --duration 1 --log l --report --json j.json");
   ASSERT_EQ(run.status, 0) << run.err;
   expect_in(run.out, {"payload lead, 0.05 kg on link1, from the start; payload box, 0.1 kg on "
                       "link2, from 0.6 s to 0.9 s"});
@@ -33,7 +33,7 @@ TEST_F(ChangedPlant, IsInEventsTableJsonAndReport) {
                      "payload picked up,-1,2,\"payload picked up: box, 0.1 kg on link2\"",
                      "payload dropped,-1,2,\"payload dropped: box\""});
   EXPECT_EQ(events.find("injected"), std::string::npos) << events;
-  expect_in(read_text(folder_ / "r/report.html"),
+  expect_in(read_text(folder_ / "l/double_pendulum-p-001/report.html"),
             {"picked up: box, 0.1 kg on link2, at 0.600 s", "dropped: box, at 0.900 s"});
 }
 
@@ -97,8 +97,8 @@ TEST_F(ChangedPlant, HasTheWeightThatTheGroundCarries) {
 
 // The ground's damping was blamed.
 TEST_F(ChangedPlant, IsBlamedForASubStepThatTheDescribedRobotCanTake) {
-  write_text(folder_ / "c.toml", "robot = '" TANDEM_SOURCE_DIR
-                                 "/config/coman/robot.toml'\nposture = 'stand'\nduration_s = 1.0\n"
+  write_text(folder_ / "c.toml", "robot = \"" TANDEM_SOURCE_DIR
+                                 "/config/coman/robot.toml\"\nposture = 'stand'\nduration_s = 1.0\n"
                                  "[[controller]]\nplugin = 'hold'\n[sim.link.DWYTorso]\n"
                                  "mass_kg = 1e6\n");
   const Outcome check = tandem("check c.toml");

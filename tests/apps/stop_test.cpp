@@ -1,4 +1,6 @@
 // Stops of a run whose loop hangs: what `tandem estop` answers.
+#include <csignal>
+
 #include "tests/apps/running.hpp"
 
 namespace tandem::apps {
@@ -12,6 +14,17 @@ class Stops : public Running {
          "name = \"lazy\"\nplugin = \"" TANDEM_BINARY_DIR
          "/tests/test_plugins/hangs.so\"\n[controller.parameters]\nfor_s = " +
              for_s + "\n" + more);
+  }
+  /// run.json has one error, with function, file and line of the controller's own code.
+  void expect_crash(const std::string& message) const {
+    const nlohmann::json is = json("run.json");
+    EXPECT_EQ(is["ok"], false);
+    const nlohmann::json error = is["errors"][0];
+    const std::string said = error["message"];
+    EXPECT_TRUE(said.starts_with(message)) << error;
+    EXPECT_NE(said.find("Hangs::"), std::string::npos) << error;
+    EXPECT_TRUE(std::string(error["file"]).ends_with("hangs.cpp")) << error;
+    EXPECT_GT(error["line"], 0) << error;
   }
 };
 
@@ -92,17 +105,44 @@ TEST_F(Stops, OfAControllerThatThrowsAreThoseOfOneThatHangs) {
   EXPECT_EQ(info.out.find("no index"), std::string::npos) << info.out;
 }
 
+// The file had still said "as planned" of the former run.
+TEST_F(Stops, ByAKillLeaveNoResultOfAFormerRun) {
+  const std::filesystem::path result = folder_ / "run.json";
+  for (const bool linked : {false, true}) {
+    std::filesystem::remove(result);
+    write_text(folder_ / "former.json", R"({"ended": "as planned"})");
+    if (linked) {
+      std::filesystem::create_symlink("former.json", result);
+    } else {
+      std::filesystem::copy_file(folder_ / "former.json", result);
+    }
+    begin("");
+    EXPECT_EQ(std::filesystem::exists(result), linked);
+    if (linked) EXPECT_EQ(read_text(result), "") << "the link is its owner's";
+    signal("KILL");
+    EXPECT_EQ(join(), -1);
+    EXPECT_EQ(read_text(result), "");
+  }
+}
+
 TEST_F(Stops, AreNotTheEndOfACommandThatDoesNotSayWhoseCrashItWas) {
   if (TANDEM_SANITIZED != 0) GTEST_SKIP() << "a sanitizer handles signals itself";
   hang("0.0", "crash = \"null\"\nat_once = true\n");
   for (const char* command : {"check hold.toml", "run hold.toml -q --no-log --duration 1"}) {
-    const Outcome outcome = tandem(command);
+    write_text(folder_ / "run.json", R"({"ok": true, "ended": "as planned"})");
+    const Outcome outcome = tandem(std::string(command) + " --json run.json");
     EXPECT_NE(outcome.err.find("error: lazy: the controller crashed before its first cycle: "
                                "segmentation fault (SIGSEGV)"),
               std::string::npos)
         << outcome.err;
-    EXPECT_NE(outcome.status, 0);
+    EXPECT_EQ(outcome.status, 128 + SIGSEGV);
+    expect_crash("the controller crashed before its first cycle: segmentation fault (SIGSEGV) in ");
+    EXPECT_EQ(json("run.json")["errors"][0]["key"], "lazy");
   }
+  edit("hold.toml", "\"null\"", "\"exit\"");
+  EXPECT_EQ(tandem("check hold.toml --json run.json").status, 2);
+  EXPECT_EQ(json("run.json")["errors"][0]["message"],
+            "the controller ended the process with exit()");
 }
 
 // The process had ended by the signal, or with status 0: no controller's name, no NMT stop.
@@ -132,7 +172,12 @@ TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
     const char* const place = crash == std::string("stack") ? "Hangs::fill(" : "Hangs::update(";
     EXPECT_NE(run.err.find(place), std::string::npos) << crash << "\n" << run.err;
     EXPECT_NE(run.err.find("(hangs.so+0x"), std::string::npos) << crash << "\n" << run.err;
-    EXPECT_EQ(json("run.json")["ok"], false);
+    expect_crash("the loop crashed in the controller 'lazy': ");
+    if (crash == std::string("null")) {
+      const std::string log = tandem("log info runs/*.mcap").out;
+      EXPECT_NE(log.find("hangs.cpp:"), std::string::npos) << log;
+    }
+    std::filesystem::remove_all(folder_ / "runs");
   }
 }
 

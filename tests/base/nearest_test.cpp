@@ -22,7 +22,15 @@ TEST(Nearest, FindsANameThatLacksItsUnit) {
       << "a slip is nearer";
 }
 
-TEST(Nearest, IsEmptyWhenNothingIsNear) { EXPECT_EQ(nearest("zzzzzzzz", kNames), ""); }
+TEST(Nearest, IsEmptyWhenNothingIsNear) {
+  EXPECT_EQ(nearest("zzzzzzzz", kNames), "");
+  const std::vector<std::string> words{"off", "on", "jog", "hold", "squat"};
+  for (const char* other : {"foo", "wob", "nod", "xy"})
+    EXPECT_EQ(nearest(other, words), "") << other;
+  EXPECT_EQ(nearest("jgo", words), "jog");
+  EXPECT_EQ(nearest("of", words), "off");
+  EXPECT_EQ(nearest("com", std::vector<std::string>{"com_m", "mass_kg"}), "com_m");
+}
 
 // An unknown word of 100 kB had cost 1.35 s, whoever sent it.
 TEST(Nearest, LooksAtNoLongNameAndAtSoManyCandidatesOnly) {

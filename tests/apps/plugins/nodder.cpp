@@ -30,7 +30,7 @@ class Nodder final : public Controller {
     return fail("this build has a mistake", "mend it");
 #endif
 #ifdef ASKS
-    (void)setup.parameters.number("gain");
+    if (setup.parameters.number("gain") == 0.0) return fail("a gain of 0 does nothing", "raise it");
 #endif
 #ifdef ALL
     setup.claim(0, hal::ControlMode::kPosition);
