@@ -1,8 +1,6 @@
 // Streams a log once; numbers are written with the fewest digits that read back the same.
 #include "log/csv.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <charconv>
 #include <ostream>
@@ -40,10 +38,11 @@ void append_time(std::string& line, std::int64_t time_ns) {
   constexpr std::uint64_t kSecond_ns = 1'000'000'000;
   const auto size =
       time_ns < 0 ? 0 - static_cast<std::uint64_t>(time_ns) : static_cast<std::uint64_t>(time_ns);
-  std::string part = fmt::format(".{:09}", size % kSecond_ns);
+  std::string part = std::to_string(kSecond_ns + size % kSecond_ns);  // a 1, and nine digits
+  part.front() = '.';
   while (part.back() == '0') part.pop_back();
   if (part == ".") part.clear();
-  line += fmt::format("{}{}{}", time_ns < 0 ? "-" : "", size / kSecond_ns, part);
+  line += (time_ns < 0 ? "-" : "") + std::to_string(size / kSecond_ns) + part;
 }
 
 Status write_events(const LogFile& log, std::ostream& out) {

@@ -35,8 +35,10 @@ Status check_value(const std::string& name, double value, double min, double max
     return fail_at(name, "is not finite", "give a number of every component");
   }
   if (value >= min && value <= max) return {};
-  return fail_at(name, fmt::format("{:g} is beyond its bounds", value),
-                 fmt::format("{:g} to {:g}{}{}", min + 0.0, max + 0.0,  // no -0 unit.empty() ? "" : " ", unit));
+  // + 0.0: no -0.
+  return fail_at(
+      name, fmt::format("{:g} is beyond its bounds", value),
+      fmt::format("{:g} to {:g}{}{}", min + 0.0, max + 0.0, unit.empty() ? "" : " ", unit));
 }
 
 }  // namespace
