@@ -96,7 +96,7 @@ TEST_F(Stops, OfAControllerThatThrowsAreThoseOfOneThatHangs) {
   for (const char* text :
        {"fault: an exception left the loop, which stands still: no such thing",
         "fault: the loop crashed in the controller 'lazy': an exception; the log", "(hangs.so+0x",
-        "update"}) {
+        "\n  update at "}) {
     EXPECT_NE(run.err.find(text), std::string::npos) << run.err;
   }
   EXPECT_EQ(json("run.json")["ok"], false);
@@ -168,7 +168,7 @@ TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
       EXPECT_NE(run.err.find(said), std::string::npos) << run.err;
     }
     EXPECT_EQ(run.err.find("hung"), std::string::npos) << run.err;
-    const char* const place = crash == std::string("stack") ? "fill" : "update";
+    const char* const place = crash == std::string("stack") ? "fill at " : "\n  update at ";
     EXPECT_NE(run.err.find(place), std::string::npos) << crash << "\n" << run.err;
     EXPECT_NE(run.err.find("(hangs.so+0x"), std::string::npos) << crash << "\n" << run.err;
     expect_crash("the loop crashed in the controller 'lazy': ");
