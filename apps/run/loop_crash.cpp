@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <exception>
 #include <string>
 
@@ -209,7 +210,10 @@ const char* crash_reason() noexcept {
 std::string CrashPlace::in_function() const { return function.empty() ? "" : " in " + function; }
 
 CrashPlace crash_place() {
-  if (shared_place == nullptr || !shared_place->known.load()) return {};
+  if (shared_place == nullptr || reason.load() == nullptr) return {};
+  constexpr timespec kLook{.tv_sec = 0, .tv_nsec = 10'000'000};
+  for (int i = 0; i < 150 && !shared_place->known.load(); ++i) ::nanosleep(&kLook, nullptr);
+  if (!shared_place->known.load()) return {};
   return {shared_place->function.data(), shared_place->file.data(), shared_place->line};
 }
 

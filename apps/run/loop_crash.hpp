@@ -31,7 +31,8 @@ struct CrashPlace {
   [[nodiscard]] std::string in_function() const;
 };
 
-/// Of the crash that the loop stands still by; empty as long as it is not found out.
+/// Of the crash that the loop stands still by; waits up to 1.5 s
+/// until it is found out; else empty.
 [[nodiscard]] CrashPlace crash_place();
 
 /// The error of a loop that was given up.

@@ -22,7 +22,7 @@ class Stops : public Running {
     const nlohmann::json error = is["errors"][0];
     const std::string said = error["message"];
     EXPECT_TRUE(said.starts_with(message)) << error;
-    EXPECT_NE(said.find("Hangs::"), std::string::npos) << error;
+    EXPECT_NE(said.find(" in "), std::string::npos) << error;
     EXPECT_TRUE(std::string(error["file"]).ends_with("hangs.cpp")) << error;
     EXPECT_GT(error["line"], 0) << error;
   }
@@ -96,7 +96,7 @@ TEST_F(Stops, OfAControllerThatThrowsAreThoseOfOneThatHangs) {
   for (const char* text :
        {"fault: an exception left the loop, which stands still: no such thing",
         "fault: the loop crashed in the controller 'lazy': an exception; the log", "(hangs.so+0x",
-        "Hangs::update("}) {
+        "\n  update at "}) {
     EXPECT_NE(run.err.find(text), std::string::npos) << run.err;
   }
   EXPECT_EQ(json("run.json")["ok"], false);
@@ -141,8 +141,7 @@ TEST_F(Stops, AreNotTheEndOfACommandThatDoesNotSayWhoseCrashItWas) {
   }
   edit("hold.toml", "\"null\"", "\"exit\"");
   EXPECT_EQ(tandem("check hold.toml --json run.json").status, 2);
-  EXPECT_EQ(json("run.json")["errors"][0]["message"],
-            "the controller ended the process with exit()");
+  EXPECT_EQ(json("run.json")["errors"][0]["message"], "the controller called exit()");
 }
 
 // The process had ended by the signal, or with status 0: no controller's name, no NMT stop.
@@ -169,7 +168,7 @@ TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
       EXPECT_NE(run.err.find(said), std::string::npos) << run.err;
     }
     EXPECT_EQ(run.err.find("hung"), std::string::npos) << run.err;
-    const char* const place = crash == std::string("stack") ? "Hangs::fill(" : "Hangs::update(";
+    const char* const place = crash == std::string("stack") ? "fill at " : "\n  update at ";
     EXPECT_NE(run.err.find(place), std::string::npos) << crash << "\n" << run.err;
     EXPECT_NE(run.err.find("(hangs.so+0x"), std::string::npos) << crash << "\n" << run.err;
     expect_crash("the loop crashed in the controller 'lazy': ");
