@@ -90,6 +90,16 @@ std::string needed_as(const std::string& path) {
   return name;
 }
 
+bool is_defined_beside(std::uintptr_t call, const char* symbol) {
+  Dl_info where{}, entry{};
+  if (::dladdr(reinterpret_cast<void*>(call), &where) == 0) return false;
+  void* const library = ::dlopen(where.dli_fname, RTLD_LAZY | RTLD_NOLOAD);
+  if (library == nullptr) return false;
+  const void* const found = ::dlsym(library, symbol);
+  ::dlclose(library);
+  return found != nullptr && ::dladdr(found, &entry) != 0 && entry.dli_fbase == where.dli_fbase;
+}
+
 std::string outdated_need(void* library, const std::function<bool(const std::string&)>& leave_out) {
   return find_outdated(library, leave_out, replaced_files(), 0);
 }

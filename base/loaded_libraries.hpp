@@ -2,6 +2,7 @@
 // Layer: base.  Thread: any, not RT.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <set>
 #include <string>
@@ -14,6 +15,9 @@ namespace tandem {
 /// The name that others need a loaded library by, its DT_SONAME: "libasan.so.8" of a path that ends
 /// with "libasan.so". Without one, and of what is not loaded, the path's last part.
 [[nodiscard]] std::string needed_as(const std::string& path);
+
+/// Whether the library that a call is in defines `symbol` itself.
+[[nodiscard]] bool is_defined_beside(std::uintptr_t call, const char* symbol);
 
 /// A library that `library` needs, itself or by another one, whose file was replaced since it was
 /// loaded: by its name the linker takes what it has. Empty: there is none.

@@ -16,6 +16,7 @@
 #include <memory>
 #include <mutex>
 #include <set>
+#include <system_error>
 #include <tuple>
 #include <vector>
 
@@ -235,11 +236,16 @@ class LinkerTurn {
 
 void close_library(void* library, const std::string& path) noexcept {
   constexpr std::chrono::milliseconds kLimit{4000};
-  (void)bounded_call(path, kLimit, [library, path]() -> Status {
+  const auto close = [library, path]() -> Status {
     const LinkerTurn turn(path);
     if (turn.state()) dlclose(library);
     return turn.state();
-  });
+  };
+  try {
+    (void)bounded_call(path, kLimit, close);
+  } catch (const std::system_error&) {  // there are no more threads
+    (void)close();
+  }
 }
 
 Result<void*> load_newest(const TrustedCode& code) {

@@ -1,7 +1,6 @@
 // Handlers of std::terminate, of signals and of exit(), which stop the loop's thread in a cycle.
 #include "apps/run/loop_crash.hpp"
 
-#include <dlfcn.h>
 #include <fmt/core.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -19,6 +18,7 @@
 
 #include "apps/text/console.hpp"
 #include "base/call_stack.hpp"
+#include "base/loaded_libraries.hpp"
 #include "controllers/hosted_call.hpp"
 
 namespace tandem::apps {
@@ -42,22 +42,13 @@ bool in_cycle() noexcept {
   return loop_heartbeat != nullptr && runtime::Heartbeat::at_work(loop_heartbeat->beats());
 }
 
-/// Whether the library that a call is in is a controller's: it has the entry point.
-bool is_in_controller(std::uintptr_t call) {
-  Dl_info where{}, entry{};
-  if (::dladdr(reinterpret_cast<void*>(call), &where) == 0) return false;
-  void* library = ::dlopen(where.dli_fname, RTLD_LAZY | RTLD_NOLOAD);
-  const void* found = library == nullptr ? nullptr : ::dlsym(library, "tandem_controller_plugin");
-  return found != nullptr && ::dladdr(found, &entry) != 0 && entry.dli_fbase == where.dli_fbase;
-}
-
 /// The innermost call of a controller's library, and of its own files if one is: a template of
 /// /usr/include is not what its author wrote. Without any the innermost call of all.
 CrashPlace author_place(const CallStack& stack) {
   const std::vector<CallPlace> places = places_of(stack);
   const CallPlace* chosen = nullptr;
   for (const CallPlace& place : places) {
-    if (!is_in_controller(place.call)) continue;
+    if (!is_defined_beside(place.call, "tandem_controller_plugin")) continue;  // no controller's
     if (chosen == nullptr) chosen = &place;
     if (place.file.empty() || place.file.starts_with("/usr/")) continue;
     chosen = &place;

@@ -158,7 +158,8 @@ TEST_F(InputOfARun, WhatIsWrongIsRefusedByNameAndTheRunGoesOn) {
   EXPECT_EQ(input()["sequence"], 0);
   EXPECT_NE(input()["why"].get<std::string>().find("fed with values"), std::string::npos);
   EXPECT_EQ(input()["refused"], 3);
-  EXPECT_NE(to_run("input list").out.find("fed with values"), std::string::npos) << "the reason";
+  const std::string table = to_run("input list").out;  // its last column is broken into lines
+  EXPECT_NE(table.find("fed with"), std::string::npos) << table;
   EXPECT_EQ(to_run("controller stop jog").status, 0);
   const Outcome stopped = to_run("input rate joint2=0.1");
   EXPECT_NE(stopped.err.find("its controller is not active"), std::string::npos) << stopped.err;
