@@ -231,8 +231,8 @@ Diagnostics override_experiment(Experiment& e, const Overrides& overrides) {
   if (on_fault == "wait") e.after_stop = AfterStop::kWait;
   const double duration_s = overrides.duration_s.value_or(kEndless_s);
   if (!(duration_s > 0.0 && (duration_s <= 1e6 || duration_s == kEndless_s))) {
-    return {
-        fail(fmt::format("duration_s: {}", duration_s), "above 0, to 1e6, or infinity: no end").error()};
+    return {fail(fmt::format("duration_s: {}", duration_s), "above 0, to 1e6, or infinity: no end")
+                .error()};
   }
   e.seed = overrides.seed.value_or(e.seed);
   e.duration_s = overrides.duration_s.value_or(e.duration_s);
