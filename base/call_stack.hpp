@@ -48,7 +48,7 @@ struct CallPlace {
   int line = 0;  ///< 0: unknown
 };
 
-/// Of each call, inlined ones too, innermost first.
+/// The place of each call, inlined ones too, innermost first.
 [[nodiscard]] std::vector<CallPlace> places_of(const CallStack& stack);
 
 /// work(with) in a child of this process, which writes what it finds out. Safe in a signal handler,

@@ -31,7 +31,7 @@ struct CrashPlace {
   [[nodiscard]] std::string in_function() const;
 };
 
-/// Of the crash that the loop stands still by; waits up to 1.5 s
+/// The place of the crash that the loop stands still by; waits up to 1.5 s
 /// until it is found out; else empty.
 [[nodiscard]] CrashPlace crash_place();
 
