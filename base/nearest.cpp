@@ -38,15 +38,16 @@ std::size_t distance(std::string_view a, std::string_view b) {
   return last[b.size()];
 }
 
-/// The distance, or what a lacking unit counts; too_far() when it is not worth looking.
+/// The distance, or what a lacking unit counts, in half edits; twice too_far() when it is not worth
+/// looking.
 std::size_t nearness(std::string_view name, std::string_view candidate) {
   const std::size_t far = too_far(name);
   const bool lacks_unit = !name.empty() && candidate.size() > name.size() &&
                           candidate[name.size()] == '_' && candidate.starts_with(name);
   const std::size_t least = candidate.size() > name.size() ? candidate.size() - name.size()
                                                            : name.size() - candidate.size();
-  const std::size_t unit = lacks_unit ? std::min<std::size_t>(2, far - 1) : far;
-  return least >= far ? unit : std::min(distance(name, candidate), unit);
+  const std::size_t unit = lacks_unit ? std::min<std::size_t>(4, 2 * far - 1) : 2 * far;
+  return least >= far ? unit : std::min(2 * distance(name, candidate), unit);
 }
 
 struct Best {
@@ -57,7 +58,7 @@ struct Best {
 Best best_of(std::string_view name, std::span<const std::string> candidates) {
   Best best;
   if (name.size() > kMostNamed) return best;
-  std::size_t least = too_far(name);
+  std::size_t least = 2 * too_far(name);
   for (const std::string& candidate : candidates.first(std::min(candidates.size(), kMostLooked))) {
     const std::size_t d = nearness(name, candidate);
     if (d == least && best.count > 0) ++best.count;

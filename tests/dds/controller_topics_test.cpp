@@ -58,7 +58,7 @@ void start(PublisherRig& rig, Told& told) {
 TEST(ControllerTopics, HaveTheSignalsOfEachController) {
   Told told;
   PublisherRig rig;
-  const auto block = told.add("my-gait", 1);
+  const auto block = told.add("my_gait", 1);
   start(rig, told);
   rig.show(0);
   auto reader = rig.reader<tandem_msgs::Signals>("tandem/controller/my_gait");
@@ -71,7 +71,7 @@ TEST(ControllerTopics, HaveTheSignalsOfEachController) {
       EXPECT_EQ(message.run, 77U);
       EXPECT_EQ(message.cycle, 97U);
       EXPECT_EQ(message.time_ns, 97'000'000);
-      EXPECT_EQ(std::string(message.controller), "my-gait");
+      EXPECT_EQ(std::string(message.controller), "my_gait");
       EXPECT_EQ(texts(message.names),
                 (std::vector<std::string>{"depth", "error.joint1", "error.joint2", "com"}));
       EXPECT_EQ(texts(message.units), (std::vector<std::string>{"m", "rad", "rad", "m"}));

@@ -36,7 +36,7 @@ struct Drawn {
             .marks =
                 [this] {
                   std::vector<ControllerFeed::Marks> all;
-                  if (version.load() == 1) all.emplace_back("my-gait", block);
+                  if (version.load() == 1) all.emplace_back("my_gait", block);
                   return all;
                 }};
   }
@@ -91,7 +91,7 @@ TEST(MarkTopics, AreWhatRosViewersExpect) {
       const auto& arrow = markers[0];
       EXPECT_EQ(ns(arrow.header.stamp), 20'000'000);
       EXPECT_EQ(std::string(arrow.header.frame_id), "link1");
-      EXPECT_EQ(std::string(arrow.ns), "my-gait/push");
+      EXPECT_EQ(std::string(arrow.ns), "my_gait/push");
       EXPECT_EQ(arrow.id, 0);
       EXPECT_EQ(arrow.type, 0);
       EXPECT_EQ(arrow.action, 0);
@@ -135,7 +135,7 @@ TEST(MarkTopics, ThatAreHiddenAreDeleted) {
   drawn.block->show(drawn.arrow, 0);
   EXPECT_TRUE(drawn.block->show_to_viewers(2, true));
   ASSERT_TRUE(sees(1));
-  EXPECT_EQ(viewer.seen.begin()->first, "my-gait/said");
+  EXPECT_EQ(viewer.seen.begin()->first, "my_gait/said");
   EXPECT_TRUE(drawn.block->show_to_viewers(3, false)) << "its controller is stopped";
   ASSERT_TRUE(sees(0));
   EXPECT_FALSE(drawn.block->show_to_viewers(4, false)) << "there is nothing to say any more";

@@ -45,9 +45,8 @@ TEST(ControllerLoad, RefusesWhatIsWrongWhileTheRunGoesOn) {
   };
   EXPECT_EQ(load("left", {0}).error().key, "left");
   EXPECT_FALSE(load("", {0}));
-  EXPECT_NE(load("a\033[2Jb", {0}).error().message.find("has control characters"),
-            std::string::npos);
-  EXPECT_NE(load("a,b", {0}).error().message.find("has a comma"), std::string::npos);
+  EXPECT_NE(load("a\033[2Jb", {0}).error().message.find("has other characters"), std::string::npos);
+  EXPECT_NE(load("a,b", {0}).error().message.find("has other characters"), std::string::npos);
   EXPECT_NE(load(std::string(65, 'a'), {0}).error().message.find("longer than 64"),
             std::string::npos);
   const auto none = run.services().load(
@@ -101,14 +100,14 @@ TEST(ControllerLoad, HasRoomForSoManyAndSaysSo) {
   SwitchRun run;
   run.run();
   for (std::size_t i = 3; i < kMostControllers; ++i) {
-    ASSERT_TRUE(run.services().load(std::to_string(i),
+    ASSERT_TRUE(run.services().load("c" + std::to_string(i),
                                     std::make_shared<Sine>(std::vector<std::size_t>{0}),
                                     document_of(), kNow));
     run.steps(1);
   }
   EXPECT_FALSE(run.services().load("more", std::make_shared<Sine>(std::vector<std::size_t>{0}),
                                    document_of(), kNow));
-  ASSERT_TRUE(run.services().unload("5", kNow));
+  ASSERT_TRUE(run.services().unload("c5", kNow));
   run.steps(1);
   EXPECT_TRUE(run.services().load("more", std::make_shared<Sine>(std::vector<std::size_t>{0}),
                                   document_of(), kNow));
@@ -227,7 +226,7 @@ TEST(ControllerSwitch, KeepsClaimsExclusiveInAThousandRandomSequences) {
 /// Loads, starts, stops and unloads a controller of its own, a hundred times.
 void play(RunServices& services, std::size_t joint, unsigned seed, std::atomic<int>& done) {
   std::mt19937 random(seed);
-  const std::string name = "of joint " + std::to_string(joint);
+  const std::string name = "of_joint_" + std::to_string(joint);
   for (int i = 0; i < 100; ++i) {
     const RunServices::Patience patience{random() % 2 == 0 ? 0 : 1000};
     auto made = std::make_shared<Sine>(std::vector<std::size_t>{joint});
@@ -236,7 +235,7 @@ void play(RunServices& services, std::size_t joint, unsigned seed, std::atomic<i
     if (services.switch_controllers({name}, {}, patience)) ++done;
     if (services.unload(name)) ++done;  // waits, so that the mailbox cannot be full
     for (const JointInfo& one : services.joints()) {
-      EXPECT_TRUE(one.owner.empty() || one.owner.starts_with("of joint ")) << one.owner;
+      EXPECT_TRUE(one.owner.empty() || one.owner.starts_with("of_joint_")) << one.owner;
     }
   }
 }

@@ -98,7 +98,7 @@ TEST(NewRobot, GivesSensorsNamesThatATopicMayHave) {
   }
   std::vector<std::string> names;
   for (const FoundSensor& sensor : find_sensors(tree, {})) names.push_back(sensor.config.name);
-  EXPECT_EQ(names, (std::vector<std::string>{"imu_1", "imu_1_2", "__imu"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"imu_1", "imu_1_2", "_1_imu"}));
 }
 
 TEST(NewRobot, FindsOneSensorForEachWrenchAndEachImu) {
