@@ -34,11 +34,7 @@ std::vector<std::string> texts_of(const link_map& library, ElfW(Sxword) tag) {
   const char* names = nullptr;
   std::vector<std::string> texts;
   for (const ElfW(Dyn)* entry = library.l_ld; entry->d_tag != DT_NULL; ++entry)
-    if (entry->d_tag ==
-        DT_STRTAB) {  // from the library's start where the loader cannot write: vDSO
-      const ElfW(Addr) at = entry->d_un.d_ptr;
-      names = reinterpret_cast<const char*>(at < library.l_addr ? library.l_addr + at : at);
-    }
+    if (entry->d_tag == DT_STRTAB) names = reinterpret_cast<const char*>(entry->d_un.d_ptr);
   for (const ElfW(Dyn)* entry = library.l_ld; entry->d_tag != DT_NULL; ++entry)
     if (entry->d_tag == tag && names != nullptr) texts.emplace_back(names + entry->d_un.d_val);
   return texts;
@@ -79,6 +75,7 @@ std::set<std::string> mapped_libraries() {
 
 std::string needed_as(const std::string& path) {
   std::string name = fs::path(path).filename().string();
+  if (!path.starts_with('/')) return name;  // no file: the vDSO, whose names nobody relocates
   void* const library = ::dlopen(path.c_str(), RTLD_LAZY | RTLD_NOLOAD);
   if (library == nullptr) return name;
   link_map* map = nullptr;
