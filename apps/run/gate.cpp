@@ -21,6 +21,7 @@
 #include <filesystem>
 
 #include "base/counted.hpp"
+#include "base/loaded_libraries.hpp"
 #include "base/process.hpp"
 #include "controllers/hosted_call.hpp"
 
@@ -253,28 +254,52 @@ void Gate::note(const Note& what) noexcept {
   noting_.clear(std::memory_order_release);
 }
 
-bool Gate::is_through_trap(const Note& note) const {
-  const void* const traps =
-      library_of(reinterpret_cast<std::uintptr_t>(::dlsym(RTLD_DEFAULT, kTell)));
-  return note.system_call >= 0 && std::ranges::any_of(note.stack.view(), [&](std::uintptr_t call) {
-           return library_of(call) == traps;
-         });
+namespace {
+
+/// Where a stack comes to the controller that was called; its size: it does not.
+std::size_t controller_at(std::span<const std::uintptr_t> calls) {
+  const auto found = std::ranges::find_if(calls, [](std::uintptr_t call) {
+    return is_defined_beside(call, "tandem_controller_plugin");
+  });
+  return static_cast<std::size_t>(found - calls.begin());
 }
 
-/// Without the traps' own frames at its top, and the loop's at its end.
+const void* own_library() { return library_of(reinterpret_cast<std::uintptr_t>(&rule_of)); }
+const void* trap_library() {
+  return library_of(reinterpret_cast<std::uintptr_t>(::dlsym(RTLD_DEFAULT, kTell)));
+}
+
+}  // namespace
+
+/// Whether another note tells of it: what an interposed function, or the program itself for the
+/// controller, as of standard error, asks the kernel for.
+bool Gate::is_through_trap(const Note& note) const {
+  if (note.system_call < 0) return false;
+  const void* const traps = trap_library();
+  const void* const own = own_library();
+  const auto calls = note.stack.view();
+  const std::size_t at = controller_at(calls);
+  return std::ranges::any_of(calls,
+                             [&](std::uintptr_t call) { return library_of(call) == traps; }) ||
+         (at < calls.size() && std::ranges::any_of(calls.first(at), [&](std::uintptr_t call) {
+            return library_of(call) == own;
+          }));
+}
+
+/// Without the traps' own frames at its top, the loop's at its end, and the program's between.
 GateBreach Gate::breach_of(const Note& note, const runtime::ControllerNames& names) const {
-  const void* const traps =
-      library_of(reinterpret_cast<std::uintptr_t>(::dlsym(RTLD_DEFAULT, kTell)));
-  const void* const own = library_of(reinterpret_cast<std::uintptr_t>(&rule_of));
+  const void* const traps = trap_library();
+  const void* const own = own_library();
   const auto calls = note.stack.view();
   std::size_t begin = 0;
   for (std::size_t i = 0; i < calls.size(); ++i)
     if (library_of(calls[i]) == traps) begin = i + 1;
-  std::size_t end = begin;
+  const std::size_t at = controller_at(calls);
+  std::size_t end = at < calls.size() ? std::max(at, begin) : begin;
   while (end < calls.size() && library_of(calls[end]) != own) ++end;
   CallStack stack;
-  stack.count = end - begin;
-  std::ranges::copy(calls.subspan(begin, stack.count), stack.calls.begin());
+  for (std::size_t i = begin; i < end; ++i)
+    if (library_of(calls[i]) != own) stack.calls[stack.count++] = calls[i];
   std::vector<std::string> lines = describe(stack, 100);
   std::erase_if(lines, [](const std::string& line) { return line.contains(" at /usr/include/"); });
   lines.resize(std::min(lines.size(), kStackLines));

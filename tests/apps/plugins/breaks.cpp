@@ -4,6 +4,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -22,6 +23,10 @@ std::mutex guarded;
 [[gnu::noinline]] void ask_the_kernel() {
   [[maybe_unused]] const volatile auto parent = ::getppid();  // no tail call: it is in the stack
 }
+[[gnu::noinline]] void print_a_line() {
+  std::fprintf(stderr, "a line\n");
+  asm volatile("");  // no tail call
+}
 [[gnu::noinline]] void touch(char* pages, std::size_t page) {
   static_cast<volatile char*>(pages)[page * 4096] = 1;
 }
@@ -31,9 +36,9 @@ class Breaks final : public Controller {
   Status configure(ControllerSetup& setup) override {
     rule_ = setup.parameters.choice_or(
         "rule", "none",
-        {"none", "allocation", "lock", "system_call", "thread", "thread_in_configure", "page_fault",
-         "archive_reads_more", "archive_forgets", "archive_allocates", "slow", "nan", "too_fast",
-         "stray"});
+        {"none", "allocation", "lock", "system_call", "print", "thread", "thread_in_configure",
+         "page_fault", "archive_reads_more", "archive_forgets", "archive_allocates", "slow", "nan",
+         "too_fast", "stray"});
     if (rule_ == "thread_in_configure") std::thread([] {}).join();
     const std::size_t joints = rule_ == "stray" ? 1 : setup.robot.joints.size();
     for (std::size_t j = 0; j < joints; ++j) setup.claim(j, hal::ControlMode::kPosition);
@@ -72,6 +77,7 @@ class Breaks final : public Controller {
     if (rule_ == "allocation") std::vector<double>().swap(list_);
     if (rule_ == "lock") take_a_lock();
     if (rule_ == "system_call") ask_the_kernel();
+    if (rule_ == "print") print_a_line();
     if (rule_ == "thread") std::thread([] {}).join();
     if (rule_ == "page_fault") touch(pages_, cycle_ / 100 % kPages);
     if (rule_ == "slow") ::usleep(5'000);
