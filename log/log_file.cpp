@@ -279,22 +279,30 @@ std::vector<std::string> LogFile::remarks() const {
     return {"this is part " + std::to_string(info_.part) + " of a log in several files" +
             (name ? ": " + name->all + " opens all of them" : "")};
   }
-  if (missing_.empty()) return {};
-  std::string text;
-  for (const MissingParts& one : missing_) text += (text.empty() ? "" : ", ") + to_string(one);
   const auto seconds = [](std::int64_t time_ns) {
     std::array<char, 32> number{};
     std::snprintf(number.data(), number.size(), "%.3f", static_cast<double>(time_ns) * 1e-9);
     return std::string(number.data());
   };
-  text = "the log lacks " + text + "; what is here is from ";
-  for (std::size_t i = 0; i < parts_.size(); ++i) {
-    const bool follows = i > 0 && parts_[i - 1].number + 1 == parts_[i].number;
-    if (!follows) text += (i == 0 ? "" : " and from ") + seconds(parts_[i].first_ns) + " s to ";
-    const bool ends = i + 1 == parts_.size() || parts_[i].number + 1 != parts_[i + 1].number;
-    if (ends) text += seconds(parts_[i].last_ns) + " s";
+  std::vector<std::string> all;
+  if (!missing_.empty()) {
+    std::string text;
+    for (const MissingParts& one : missing_) text += (text.empty() ? "" : ", ") + to_string(one);
+    text = "the log lacks " + text + "; what is here is from ";
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      const bool follows = i > 0 && parts_[i - 1].number + 1 == parts_[i].number;
+      if (!follows) text += (i == 0 ? "" : " and from ") + seconds(parts_[i].first_ns) + " s to ";
+      const bool ends = i + 1 == parts_.size() || parts_[i].number + 1 != parts_[i + 1].number;
+      if (ends) text += seconds(parts_[i].last_ns) + " s";
+    }
+    all.push_back(std::move(text));
   }
-  return {text};
+  for (std::size_t i = 0; i + 1 < parts_.size(); ++i) {  // the last one's end is truncated()
+    if (!parts_[i].truncated) continue;
+    all.push_back(parts_[i].path + " is cut: nothing is here from " + seconds(parts_[i].last_ns) +
+                  " s to " + seconds(parts_[i + 1].first_ns) + " s");
+  }
+  return all;
 }
 
 const LoggedTopic* LogFile::find(std::string_view name) const {

@@ -308,7 +308,7 @@ std::string hal_name(const Experiment& e) {
 log::StringMap loaded_later(const ControllerHost& host, std::size_t known) {
   std::string later;
   const std::vector<std::string> code = controller_lines(host);
-  for (std::size_t i = known; i < code.size(); ++i) later += code[i] + "\n";
+  for (std::size_t i = known; i < code.size(); ++i) later += (later.empty() ? "" : "\n") + code[i];
   if (later.empty()) return {};
   return {{"loaded_controllers", later}};
 }

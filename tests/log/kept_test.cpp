@@ -213,6 +213,15 @@ TEST(Kept, ReadsACutLastPartAndNoOtherRuns) {
   EXPECT_TRUE(log.truncated());
   EXPECT_EQ(log.parts().size(), parts.parts);
   EXPECT_TRUE(log.remarks().empty());
+  // One that is cut in the middle of the run was not told: whoever computed with it saw no gap.
+  const ScratchFolder copy;
+  for (std::uint64_t i = 1; i <= parts.parts; ++i)
+    fs::copy_file(part_path(folder / "run.mcap", i), part_path(copy / "run.mcap", i));
+  const std::string second = part_path(copy / "run.mcap", 2);
+  fs::resize_file(second, fs::file_size(second) / 2);
+  const std::vector<std::string> told = opened(copy / "run.mcap").remarks();
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_TRUE(told[0].starts_with(second + " is cut: nothing is here from ")) << told[0];
   fs::resize_file(last, 0);  // killed before a byte of it
   EXPECT_EQ(to_string(opened(folder / "run.mcap").missing().at(0)),
             "part " + std::to_string(parts.parts) + " and what follows");
