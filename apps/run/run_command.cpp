@@ -308,7 +308,11 @@ class Session {
   [[noreturn]] void end_without_loop(const CycleGuard& guard) {
     const Error error = loop_error(guard.fault());
     std::string log;
-    if (recorder_ != nullptr) log = recorder_->close({{"ended", error.to_string()}}).path;
+    if (recorder_ != nullptr) {
+      log::StringMap result = runtime::loaded_later(*c_.controllers, plugins_at_start_);
+      result.emplace_back("ended", error.to_string());
+      log = recorder_->close(result).path;
+    }
     if (c_.frames != nullptr) (void)c_.frames->close();
     remember_error(error);
     write_failure(options_.json);

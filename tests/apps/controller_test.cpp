@@ -239,6 +239,23 @@ TEST_F(Controllers, ThatCrashUntriedEndTheRun) {
   EXPECT_NE(join(), 0);
 }
 
+// The log of a crash named only the libraries of the start.
+TEST_F(Controllers, ThatCameAndCrashedAreInTheLog) {
+  if (TANDEM_SANITIZED != 0) GTEST_SKIP() << "a sanitizer handles signals itself";
+  log_flags_ = "--log l";
+  begin("");
+  ASSERT_EQ(to_run("controller load " + shell_word(std::string(kTestPlugins) + "hangs.so") +
+                   " --name late --set 'crash = \"null\"'")
+                .status,
+            0);
+  (void)to_run("controller switch --stop hold --start late");
+  EXPECT_NE(join(), 0);
+  const std::string info = tandem("log info l/double_pendulum-hold-001.mcap").out;
+  expect(info, "loaded_controllers");
+  expect(info, "late ");
+  expect(info, "the controller 'late'");
+}
+
 TEST_F(Controllers, ThatAreBrokenAreRefusedWhileTheRunGoesOn) {
   begin("");
   const auto broken = [](const std::string& name) {
