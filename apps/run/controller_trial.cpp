@@ -70,17 +70,23 @@ Json request_of(const RunOptions& options, const ControllerTrial& trial) {
           {"table", trial.table}};
 }
 
-/// Waits for the child. While a debugger has this process, or --debug, for ever.
+/// Waits for the child. While a debugger has this process, or --debug, for ever. One that has said
+/// something may have crashed: it gets the time again, to find out where.
 /// @return its exit status, 128 + signal; empty: it was too slow, and is no more
-std::optional<int> wait_for_trial(pid_t child, milliseconds limit) {
+std::optional<int> wait_for_trial(pid_t child, milliseconds limit, const std::string& output) {
   constexpr milliseconds kTick{2};
   int raw = 0;
+  bool extended = false;
   for (auto left = limit; left.count() > 0;) {
     const pid_t ended = ::waitpid(child, &raw, WNOHANG);
     if (ended == child) return exit_status(raw);
     if (ended < 0 && errno != EINTR) return -1;
     std::this_thread::sleep_for(kTick);
     if (!time_limits_are_waived()) left -= kTick;
+    std::error_code none;
+    if (left.count() > 0 || extended || fs::file_size(output, none) == 0 || none) continue;
+    extended = true;
+    left = limit;
   }
   ::kill(child, SIGKILL);
   (void)wait_for(child);
@@ -160,7 +166,7 @@ Status tried(const RunOptions& options, const ControllerTrial& trial) {
       {.command = {program_file(), kTryController, folder.request()}, .output = folder.output()});
   if (!child) return untried(child.error().message);
   const milliseconds limit = runtime::ControllerHost::kConfigureTime;
-  const std::optional<int> status = wait_for_trial(*child, limit);
+  const std::optional<int> status = wait_for_trial(*child, limit, folder.output());
   const auto output = read_file(folder.output(), "", kMostTrialBytes);
   return judged(trial, status, limit, output ? *output : "");
 }
