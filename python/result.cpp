@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "hal/sim/plant_changes.hpp"
 #include "python/running.hpp"
 
 namespace tandem::python {
@@ -122,6 +123,7 @@ py::dict Running::result() {
                            "max_power_W"_a = work->max_power_W);
   }
   add_truth(run, out);
+  out["plant"] = e.plant != nullptr ? py::cast(e.plant->differences) : py::none();
   py::list latched;
   for (const runtime::FaultReport& one : cycle.faults()) {
     if (!one.latched) continue;

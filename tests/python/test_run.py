@@ -550,6 +550,12 @@ def test_whole_objects_cannot_be_assigned(config, log_file):
             array[0] = 99
 
 
+def test_the_result_says_what_of_the_plant_is_other(config):
+    plant = tandem.Run(config / "panda/payload.toml").result["plant"]
+    assert plant == ["payload box, 1.6 kg on panda_hand, from 5 s to 9 s"]
+    assert tandem.Run(config / "panda/hold.toml").result["plant"] is None
+
+
 def test_a_payload_is_injected(config):
     runs = [tandem.Run(config / "panda/hold.toml") for _ in range(2)]
     runs[1].inject("payload", site="hand", mass_kg=2.0)
