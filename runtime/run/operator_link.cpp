@@ -34,7 +34,9 @@ std::expected<std::unique_ptr<LocalControllers>, Diagnostics> robot_side_of(cons
     const std::string unseen = added ? side->unseen() : "";
     if (added && (warnings == nullptr || unseen.empty())) continue;
     Error told = added ? Error{.message = "its " + unseen + " are in no log, report or topic",
-                               .hint = "run the controller at one end, without a link, to see them"}
+                               .hint = "run the controller at one end, without a link, to see them",
+                               .file = {},
+                               .key = {}}
                        : added.error();
     told.file = e.file;
     told.line = spec.parameters.line();
