@@ -1,64 +1,18 @@
 // tandem/controller/NAME/marks: what controllers draw, at its readers.
-#include <atomic>
 #include <set>
 
 #include "hal/marker.hpp"
-#include "tests/dds/fastdds.hpp"
-#include "tests/dds/publisher_rig.hpp"
+#include "tests/dds/drawn_marks.hpp"
 
 namespace tandem::dds {
 namespace {
 
 using namespace test;
 
-constexpr const char* kTopic = "tandem/controller/my_gait/marks";
-
-/// A controller that draws: an arrow, and a word in the site of a link.
-struct Drawn {
-  Drawn() {
-    arrow = block->declare("push", {.shape = hal::MarkShape::kArrow, .frame = "link1"});
-    word = block->declare("said", {.shape = hal::MarkShape::kText, .frame = "tip", .size_m = 0.5});
-    const std::vector<std::string> links{"link1", "link2"};
-    hal::Site tip{.name = "tip", .link = "link2", .xyz_m = {1.0, 2.0, 3.0}};
-    tip.rpy_rad[2] = M_PI / 2;
-    EXPECT_TRUE(block->close(links, std::vector{tip}));
-  }
-  /// Both of them, from now on.
-  void draw(std::int64_t time_ns) {
-    block->place(arrow, 0, {0.0, 0.0, 0.0});
-    block->place(arrow, 1, {0.0, 0.25, 1.0});
-    block->place(word, 0, {1.0, 0.0, 0.0});
-    block->say(word, "ouch");
-    EXPECT_TRUE(block->show_to_viewers(time_ns, true));
-  }
-  ControllerFeed feed() {
-    return {.version = [this] { return version.load(); },
-            .marks =
-                [this] {
-                  std::vector<ControllerFeed::Marks> all;
-                  if (version.load() == 1) all.emplace_back("my_gait", block);
-                  return all;
-                }};
-  }
-  void unload() { version = 2; }
-
-  std::shared_ptr<hal::MarkBlock> block = std::make_shared<hal::MarkBlock>();
-  std::size_t arrow = 0, word = 0;
-  std::atomic<std::uint64_t> version{1};
-};
-
-void start(PublisherRig& rig, Drawn& drawn) {
-  rig.publisher->start({.version = [] { return std::uint64_t{0}; },
-                        .faults = [] { return std::vector<FaultEntry>(); },
-                        .lost = [] { return std::uint64_t{0}; }},
-                       nullptr, drawn.feed());
-  rig.show(0);
-}
-
 /// What a viewer keeps: one mark by each namespace and id, until it is deleted.
 struct Viewer {
   explicit Viewer(PublisherRig& rig)
-      : reader(rig.reader<visualization_msgs::MarkerArray>(kTopic)) {}
+      : reader(rig.reader<visualization_msgs::MarkerArray>(kMarksTopic)) {}
   std::size_t look() {
     reader.take([&](const visualization_msgs::MarkerArray& message, const auto&) {
       ++samples;
@@ -79,7 +33,7 @@ TEST(MarkTopics, AreWhatRosViewersExpect) {
   Drawn drawn;
   PublisherRig rig;
   start(rig, drawn);
-  auto reader = rig.reader<visualization_msgs::MarkerArray>(kTopic);
+  auto reader = rig.reader<visualization_msgs::MarkerArray>(kMarksTopic);
   drawn.draw(20'000'000);
   std::size_t samples = 0;
   ASSERT_TRUE(eventually([&] {
@@ -174,28 +128,6 @@ TEST(MarkTopics, AreDeletedAtTheEndOfTheRun) {
   rig.publisher.reset();
   rig.participant.reset();
   EXPECT_TRUE(eventually([&] { return viewer.look() == 0; }));
-}
-
-/// An array of two markers has 72 values with an arrow's two points, 66 without.
-TEST(MarkTopics, AreReadByFastDds) {
-  if (!have_fastdds()) GTEST_SKIP() << kNoFastDds;
-  Drawn drawn;
-  PublisherRig rig;
-  start(rig, drawn);
-  FastDdsPeer peer(
-      {"hear", "reliable", "visualization_msgs/msg/MarkerArray", std::string("rt/") + kTopic});
-  std::int64_t time_ns = 0;
-  const auto hears = [&](const std::string& values, bool shown) {
-    return eventually([&] {
-      shown ? drawn.draw(++time_ns) : (void)drawn.block->show_to_viewers(++time_ns, shown);
-      rig.show(20);
-      for (const std::string& line : peer.lines())
-        if (line == "rt/" + std::string(kTopic) + " other " + values) return true;
-      return false;
-    });
-  };
-  EXPECT_TRUE(hears("72", true));
-  EXPECT_TRUE(hears("66", false));
 }
 
 }  // namespace
