@@ -5,22 +5,25 @@
 #include <backtrace.h>
 #include <cxxabi.h>
 #include <dlfcn.h>
-#include <sys/wait.h>
+#include <link.h>
 #include <ucontext.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
-#include <csignal>
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
+#include <string_view>
+
+#include "base/utf8.hpp"
+
+/// What libbacktrace is given for dl_iterate_phdr() (base/CMakeLists.txt).
+extern "C" int tandem_iterate_libraries(int (*visit)(dl_phdr_info*, std::size_t, void*),
+                                        void* data);
 
 namespace tandem {
 namespace {
-
-constexpr std::size_t kMostLines = 16;
 
 /// The unwinder alone has it, and reads nothing by it.
 backtrace_state* unwinder = nullptr;
@@ -38,12 +41,6 @@ const char* base_name(const char* path) {
   const char* slash = std::strrchr(path, '/');
   return slash == nullptr ? path : slash + 1;
 }
-
-struct CallPlaceView {
-  std::uintptr_t call;
-  const char *function, *file;  // null: unknown
-  int line;
-};
 
 /// Leaves "<…>" of what a template is made with, where the whole name is long; in place, and a name
 /// of which no bracket is left open. What is longer still is cut off.
@@ -69,99 +66,29 @@ void shorten(char* name) {
     from = end;
   }
   *to = '\0';
-  if (to - name > static_cast<std::ptrdiff_t>(kMost)) std::strcpy(name + kMost, "...");
+  if (to - name > static_cast<std::ptrdiff_t>(kMost))
+    std::strcpy(name + whole_characters(name, kMost).size(), "...");
 }
 
-/// Prints calls line by line without the heap, but for demangling.
-struct Printer {
-  backtrace_state* state;
-  bool demangles;
-  std::size_t most;
-  void (*put)(void* to, const char* line, const CallPlaceView& place);
-  void* to;
-  std::uintptr_t pc = 0;
-  std::size_t lines = 0;
-
-  void call(std::uintptr_t at) {
-    pc = at;
-    const std::size_t before = lines;
-    ::backtrace_pcinfo(state, pc, &on_line, &ignore, this);
-    if (lines == before) ::backtrace_syminfo(state, pc, &on_symbol, &ignore, this);
-    if (lines == before) line(nullptr, 0, nullptr);
-  }
-  static int on_line(void* self, std::uintptr_t, const char* file, int number, const char* name) {
-    if (file == nullptr && name == nullptr) return 0;
-    static_cast<Printer*>(self)->line(file, number, name);
-    return 0;
-  }
-  static void on_symbol(void* self, std::uintptr_t, const char* name, std::uintptr_t,
-                        std::uintptr_t) {
-    static_cast<Printer*>(self)->line(nullptr, 0, name);
-  }
-  void line(const char* file, int number, const char* name) {
-    if (lines++ >= most) return;
-    Dl_info where{};
-    const bool placed = ::dladdr(reinterpret_cast<void*>(pc), &where) != 0;
-    if (name == nullptr && placed) name = where.dli_sname;
-    char* clear = nullptr;
-    if (demangles && name != nullptr) clear = abi::__cxa_demangle(name, nullptr, nullptr, nullptr);
-    char place[1024] = "", library[512] = "", text[4096];
-    if (file != nullptr) std::snprintf(place, sizeof place, " at %s:%d", file, number);
-    if (placed && where.dli_fname != nullptr) {
-      std::snprintf(
-          library, sizeof library, " (%s+0x%zx)", base_name(where.dli_fname),
-          static_cast<std::size_t>(pc - reinterpret_cast<std::uintptr_t>(where.dli_fbase)));
-    }
-    if (clear != nullptr) {
-      shorten(clear);
-      name = clear;
-    }
-    std::snprintf(text, sizeof text, "%.2000s%s%s", name != nullptr ? name : "?", place, library);
-    put(to, text, {pc, name, file, number});
-    std::free(clear);
-  }
+/// What the reader of debug information is shown.
+struct Shown {
+  std::uintptr_t address = 0;  // of a call in the library; 0: all libraries
+  bool program = false;        // that, too
 };
+thread_local Shown shown_library;
 
-void print(const CallStack& stack, bool demangles, std::size_t most,
-           void (*put)(void*, const char*, const CallPlaceView&), void* to) {
-  // A new one each time: it knows the libraries that are loaded when it is first asked.
-  Printer printer{::backtrace_create_state(nullptr, 1, &ignore, nullptr), demangles, most, put, to};
-  for (const std::uintptr_t pc : stack.view()) {
-    if (printer.lines >= most) break;
-    printer.call(pc);
-  }
+bool is_in(const dl_phdr_info& library, std::uintptr_t address) noexcept {
+  const std::span parts(library.dlpi_phdr, library.dlpi_phnum);
+  return std::ranges::any_of(parts, [&](const auto& part) {
+    return part.p_type == PT_LOAD && address - (library.dlpi_addr + part.p_vaddr) < part.p_memsz;
+  });
 }
 
-struct Output {
-  int fd;
-  const char* title;  // null: it is written
-
-  void say(const char* text) const { (void)!::write(fd, text, std::strlen(text)); }
-  static void put(void* self, const char* line, const CallPlaceView&) {
-    auto& out = *static_cast<Output*>(self);
-    if (out.title != nullptr) {
-      out.say(out.title);
-      out.say("\n");
-      out.title = nullptr;
-    }
-    out.say("  ");
-    out.say(line);
-    out.say("\n");
-  }
-};
-
-/// Whether the child ended well within some 2 s.
-bool ended_well(pid_t child) {
-  for (int i = 0; i < 250; ++i) {
-    int status = 0;
-    const pid_t ended = ::waitpid(child, &status, WNOHANG);
-    if (ended != 0) return ended == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
-    constexpr timespec kLook{.tv_sec = 0, .tv_nsec = 10'000'000};
-    ::nanosleep(&kLook, nullptr);
-  }
-  ::kill(child, SIGKILL);
-  ::waitpid(child, nullptr, 0);
-  return false;
+void append(std::span<char>& room, std::string_view text) noexcept {
+  const std::string_view fits = whole_characters(text, room.size() - 1);
+  std::ranges::copy(fits, room.begin());
+  room[fits.size()] = '\0';
+  room = room.subspan(fits.size());
 }
 
 struct Registers {
@@ -184,6 +111,27 @@ Registers registers_of(const void* context) noexcept {
 }
 
 }  // namespace
+}  // namespace tandem
+
+extern "C" int tandem_iterate_libraries(int (*visit)(dl_phdr_info*, std::size_t, void*),
+                                        void* data) {
+  struct Job {
+    int (*visit)(dl_phdr_info*, std::size_t, void*);
+    void* data;
+  } job{visit, data};
+  return ::dl_iterate_phdr(
+      [](dl_phdr_info* library, std::size_t size, void* self) {
+        const auto& of = *static_cast<const Job*>(self);
+        const tandem::Shown& shown = tandem::shown_library;
+        const bool is_program = library->dlpi_name == nullptr || *library->dlpi_name == '\0';
+        const bool is_shown = shown.address == 0 || (is_program && shown.program) ||
+                              tandem::is_in(*library, shown.address);
+        return is_shown ? of.visit(library, size, of.data) : 0;
+      },
+      &job);
+}
+
+namespace tandem {
 
 void prepare_call_stacks() {
   if (unwinder == nullptr) unwinder = ::backtrace_create_state(nullptr, 1, &ignore, nullptr);
@@ -209,58 +157,116 @@ CallStack interrupted_call_stack(const void* context) noexcept {
   return stack;
 }
 
+// The linker's lock may be held for ever, where a library does not return from its initialisers.
 const void* library_of(std::uintptr_t call) noexcept {
+  dl_find_object where{};
+  return ::_dl_find_object(reinterpret_cast<void*>(call), &where) == 0 ? where.dlfo_map_start
+                                                                       : nullptr;
+}
+
+CallPlaceView symbol_of(std::uintptr_t call) noexcept {
   Dl_info where{};
-  return ::dladdr(reinterpret_cast<void*>(call), &where) != 0 ? where.dli_fbase : nullptr;
+  const bool placed = ::dladdr(reinterpret_cast<void*>(call), &where) != 0;
+  return {.call = call, .function = placed ? where.dli_sname : nullptr};
+}
+
+void PlaceReader::read(std::uintptr_t call, Visit visit, void* to) noexcept {
+  const void* const base = library_of(call);
+  const std::span<Library> known(libraries_.data(), count_);
+  auto at = std::ranges::find(known, base, &Library::base);
+  if (at == known.end()) {
+    if (count_ < libraries_.size()) ++count_;
+    libraries_[count_ - 1] = {base, ::backtrace_create_state(nullptr, 1, &ignore, nullptr)};
+    at = known.begin() + static_cast<std::ptrdiff_t>(count_ - 1);
+  }
+  struct Job {
+    std::uintptr_t call;
+    Visit visit;
+    void* to;
+    bool any = false;
+  } job{call, visit, to};
+  shown_library = {call, !leaves_files_open_};
+  ::backtrace_pcinfo(
+      at->state, call,
+      [](void* self, std::uintptr_t, const char* file, int line, const char* name) {
+        auto& of = *static_cast<Job*>(self);
+        if (file == nullptr && name == nullptr) return 0;
+        of.any = true;
+        of.visit(of.to, {of.call, name, file, line});
+        return 0;
+      },
+      &ignore, &job);
+  if (!job.any) {
+    ::backtrace_syminfo(
+        at->state, call,
+        [](void* self, std::uintptr_t, const char* name, std::uintptr_t, std::uintptr_t) {
+          auto& of = *static_cast<Job*>(self);
+          of.any = name != nullptr;
+          if (of.any) of.visit(of.to, {.call = of.call, .function = name});
+        },
+        &ignore, &job);
+  }
+  shown_library = {};
+  if (!job.any) visit(to, symbol_of(call));
+}
+
+void write_clear_name(const char* name, std::span<char> to) {
+  char* clear = abi::__cxa_demangle(name, nullptr, nullptr, nullptr);
+  to.front() = '\0';
+  if (clear == nullptr) return;
+  shorten(clear);
+  append(to, clear);
+  std::free(clear);
+}
+
+void write_offset(std::uintptr_t call, std::span<char> to) noexcept {
+  dl_find_object where{};
+  to.front() = '\0';
+  if (::_dl_find_object(reinterpret_cast<void*>(call), &where) != 0) return;
+  const char* const path = where.dlfo_link_map->l_name;
+  char offset[24];
+  std::snprintf(
+      offset, sizeof offset, "+0x%zx",
+      static_cast<std::size_t>(call - reinterpret_cast<std::uintptr_t>(where.dlfo_map_start)));
+  append(to, *path == '\0' ? program_invocation_short_name : base_name(path));
+  append(to, offset);
+}
+
+void write_place(const CallPlaceView& place, std::span<char> to) noexcept {
+  char offset[512], line[16];
+  write_offset(place.call, offset);
+  std::snprintf(line, sizeof line, ":%d", place.line);
+  append(to, whole_characters(place.function == nullptr ? "?" : place.function, 2000));
+  if (place.file != nullptr) {
+    append(to, " at ");
+    append(to, whole_characters(place.file, 1000));
+    append(to, line);
+  }
+  if (*offset == '\0') return;
+  append(to, " (");
+  append(to, offset);
+  append(to, ")");
 }
 
 std::vector<std::string> describe(const CallStack& stack, std::size_t most) {
   std::vector<std::string> lines;
-  print(
-      stack, true, most,
-      [](void* to, const char* line, const CallPlaceView&) {
-        static_cast<std::vector<std::string>*>(to)->emplace_back(line);
-      },
-      &lines);
-  return lines;
-}
-
-std::vector<CallPlace> places_of(const CallStack& stack) {
-  std::vector<CallPlace> places;
-  print(
-      stack, true, stack.calls.size(),
-      [](void* to, const char*, const CallPlaceView& at) {
-        static_cast<std::vector<CallPlace>*>(to)->push_back(
-            {at.call, at.function == nullptr ? "" : at.function, at.file == nullptr ? "" : at.file,
-             at.line});
-      },
-      &places);
-  return places;
-}
-
-bool run_in_child(void (*work)(void*), void* with) noexcept {
-  const pid_t child = ::_Fork();
-  if (child != 0) return child > 0 && ended_well(child);
-  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM}) {
-    std::signal(signal, SIG_DFL);
+  PlaceReader reader(false);
+  for (const std::uintptr_t call : stack.view()) {
+    reader.read(
+        call,
+        [](void* to, const CallPlaceView& at) {
+          CallPlaceView place = at;
+          char clear[kLongestClearName + 1] = "", line[4096];
+          if (place.function != nullptr) write_clear_name(place.function, clear);
+          if (*clear != '\0') place.function = clear;
+          write_place(place, line);
+          static_cast<std::vector<std::string>*>(to)->emplace_back(line);
+        },
+        &lines);
+    if (lines.size() >= most) break;
   }
-  ::alarm(2);
-  work(with);
-  ::_exit(0);
-}
-
-void write_call_stack(int fd, const char* title, const CallStack& stack) noexcept {
-  Output out{fd, title};
-  struct Job {
-    const CallStack& stack;
-    Output& out;
-  } job{stack, out};
-  const auto named = [](void* with) {
-    auto& of = *static_cast<Job*>(with);
-    print(of.stack, true, kMostLines, &Output::put, &of.out);
-  };
-  if (run_in_child(named, &job)) return;
-  print(stack, false, kMostLines, &Output::put, &out);
+  lines.resize(std::min(lines.size(), most));
+  return lines;
 }
 
 }  // namespace tandem

@@ -1,4 +1,4 @@
-// Where a thread is: its calls with function, file and line, also from a signal handler.
+// Where a thread is: its calls, also from a signal handler; their functions, files and lines.
 // Layer: base.  Thread: any.
 #pragma once
 
@@ -8,6 +8,8 @@
 #include <span>
 #include <string>
 #include <vector>
+
+struct backtrace_state;
 
 namespace tandem {
 
@@ -32,7 +34,7 @@ void prepare_call_stacks();
 /// @param context  the handler's third argument
 CallStack interrupted_call_stack(const void* context) noexcept;
 
-/// Where the library (or the program) begins that a call is in; null: nowhere.
+/// Where the library (or the program) begins that a call is in; null: nowhere. No lock.
 [[nodiscard]] const void* library_of(std::uintptr_t call) noexcept;
 
 /// A line for each call, "update() at nod.cpp:31 (nod.so+0x12a0)"; inlined ones have their own.
@@ -40,24 +42,48 @@ CallStack interrupted_call_stack(const void* context) noexcept;
 /// @param most  lines
 [[nodiscard]] std::vector<std::string> describe(const CallStack& stack, std::size_t most = 16);
 
-/// A call as its debug information has it; without that no file and no line.
-struct CallPlace {
+/// A call, or one that was inlined into it, as the debug information has it. Texts live as long as
+/// the PlaceReader.
+struct CallPlaceView {
   std::uintptr_t call = 0;
-  std::string function;  ///< "Nod::update(…)"; may be empty
-  std::string file;
-  int line = 0;  ///< 0: unknown
+  const char* function = nullptr;  ///< as the linker has it; null: unknown
+  const char* file = nullptr;      ///< null: unknown
+  int line = 0;
 };
 
-/// The place of each call, inlined ones too, innermost first.
-[[nodiscard]] std::vector<CallPlace> places_of(const CallStack& stack);
+/// Reads debug information and symbols of the libraries that calls are in, of each once, and of no
+/// others: those of the C library alone, where they are installed, cost 60 ms of a processor.
+/// Takes no heap, but is no work for a signal handler: for a child of it.
+class PlaceReader {
+ public:
+  /// @param leaves_files_open  one for each library: for a child that ends soon. Else the program
+  ///                           is read together with each library, as that closes its file
+  explicit PlaceReader(bool leaves_files_open) : leaves_files_open_(leaves_files_open) {}
+  using Visit = void (*)(void* to, const CallPlaceView& place);
+  /// Inlined ones innermost first. At least one, if with the address alone.
+  void read(std::uintptr_t call, Visit visit, void* to) noexcept;
 
-/// work(with) in a child of this process, which writes what it finds out. Safe in a signal handler,
-/// whatever `work` is: a child that crashes, or takes more than 2 s, is no more.
-/// @return whether it came to its end
-bool run_in_child(void (*work)(void* with), void* with) noexcept;
+ private:
+  struct Library {
+    const void* base;
+    backtrace_state* state;
+  };
+  bool leaves_files_open_;
+  std::array<Library, 32> libraries_{};
+  std::size_t count_ = 0;
+};
+/// The same by the dynamic symbols alone, which cost nothing; takes the dynamic linker's lock.
+[[nodiscard]] CallPlaceView symbol_of(std::uintptr_t call) noexcept;
 
-/// Writes the same as describe() to a descriptor, indented, below a line `title`. Safe in a signal
-/// handler: names are read in a child of this process, and after 2 s without.
-void write_call_stack(int fd, const char* title, const CallStack& stack) noexcept;
+/// "Nod::update(…)" of the linker's name, cut where it is long; on the heap. Empty: it is none.
+/// @param to  a byte more than kLongestClearName at least
+inline constexpr std::size_t kLongestClearName = 255;
+void write_clear_name(const char* name, std::span<char> to);
+
+/// "FUNCTION at FILE:LINE (LIBRARY+0x12a0)", what is unknown left out; without the heap.
+/// @param place  its function as it is to be shown
+void write_place(const CallPlaceView& place, std::span<char> to) noexcept;
+/// "LIBRARY+0x12a0"; empty: it is nowhere. No heap, no lock.
+void write_offset(std::uintptr_t call, std::span<char> to) noexcept;
 
 }  // namespace tandem

@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <link.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <vector>
@@ -38,6 +39,39 @@ std::vector<std::string> texts_of(const link_map& library, ElfW(Sxword) tag) {
   for (const ElfW(Dyn)* entry = library.l_ld; entry->d_tag != DT_NULL; ++entry)
     if (entry->d_tag == tag && names != nullptr) texts.emplace_back(names + entry->d_un.d_val);
   return texts;
+}
+
+/// The entry's address, as glibc has put it for its own use.
+template <class Word>
+const Word* part_of(const link_map& library, ElfW(Sxword) tag) {
+  for (const ElfW(Dyn)* entry = library.l_ld; entry->d_tag != DT_NULL; ++entry)
+    if (entry->d_tag == tag) return reinterpret_cast<const Word*>(entry->d_un.d_ptr);
+  return nullptr;
+}
+
+/// By the library's own hash table, without a lock or the heap.
+bool has_symbol(const link_map& library, const char* name) {
+  const auto* const table = part_of<std::uint32_t>(library, DT_GNU_HASH);
+  const auto* const symbols = part_of<ElfW(Sym)>(library, DT_SYMTAB);
+  const auto* const names = part_of<char>(library, DT_STRTAB);
+  // The kernel's own library has addresses that nobody relocates.
+  if (table == nullptr || symbols == nullptr || names == nullptr ||
+      reinterpret_cast<std::uintptr_t>(table) < library.l_addr) {
+    return false;
+  }
+  std::uint32_t wanted = 5381;
+  for (const char* c = name; *c != '\0'; ++c) wanted = wanted * 33 + static_cast<unsigned char>(*c);
+  const std::uint32_t buckets = table[0], first = table[1], filter_words = table[2];
+  const std::uint32_t* const bucket = table + 4 + filter_words * (sizeof(ElfW(Addr)) / 4);
+  const std::uint32_t* const chain = bucket + buckets;
+  for (std::uint32_t at = buckets == 0 ? 0 : bucket[wanted % buckets]; at >= first && at != 0;
+       ++at) {
+    const std::uint32_t hash = chain[at - first];
+    if ((hash | 1U) == (wanted | 1U) && std::strcmp(names + symbols[at].st_name, name) == 0)
+      return symbols[at].st_shndx != SHN_UNDEF;
+    if ((hash & 1U) != 0) break;
+  }
+  return false;
 }
 
 std::string find_outdated(void* library, const std::function<bool(const std::string&)>& leave_out,
@@ -87,14 +121,10 @@ std::string needed_as(const std::string& path) {
   return name;
 }
 
-bool is_defined_beside(std::uintptr_t call, const char* symbol) {
-  Dl_info where{}, entry{};
-  if (::dladdr(reinterpret_cast<void*>(call), &where) == 0) return false;
-  void* const library = ::dlopen(where.dli_fname, RTLD_LAZY | RTLD_NOLOAD);
-  if (library == nullptr) return false;
-  const void* const found = ::dlsym(library, symbol);
-  ::dlclose(library);
-  return found != nullptr && ::dladdr(found, &entry) != 0 && entry.dli_fbase == where.dli_fbase;
+bool is_defined_beside(std::uintptr_t call, const char* symbol) noexcept {
+  dl_find_object where{};
+  return ::_dl_find_object(reinterpret_cast<void*>(call), &where) == 0 &&
+         has_symbol(*where.dlfo_link_map, symbol);
 }
 
 std::string outdated_need(void* library, const std::function<bool(const std::string&)>& leave_out) {

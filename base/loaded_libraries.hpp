@@ -16,8 +16,9 @@ namespace tandem {
 /// with "libasan.so". Without one, and of what is not loaded, the path's last part.
 [[nodiscard]] std::string needed_as(const std::string& path);
 
-/// Whether the library that a call is in defines `symbol` itself.
-[[nodiscard]] bool is_defined_beside(std::uintptr_t call, const char* symbol);
+/// Whether the library that a call is in defines `symbol` itself, for others to find. No heap,
+/// no lock.
+[[nodiscard]] bool is_defined_beside(std::uintptr_t call, const char* symbol) noexcept;
 
 /// A library that `library` needs, itself or by another one, whose file was replaced since it was
 /// loaded: by its name the linker takes what it has. Empty: there is none.

@@ -1,5 +1,5 @@
-// Whether bytes are UTF-8: names of files come from anywhere, TOML and JSON take nothing else.
-// Layer: base.  Thread: any.
+// Whether bytes are UTF-8, and where it may be cut: names of files come from anywhere, TOML and
+// JSON take nothing else. Layer: base.  Thread: any.
 #pragma once
 
 #include <cstddef>
@@ -31,6 +31,17 @@ namespace tandem {
     }
   }
   return true;
+}
+
+/// The longest beginning of `text` that has `most` bytes at most, and no half of a character at its
+/// end. What is no UTF-8 there is cut anywhere.
+[[nodiscard]] constexpr std::string_view whole_characters(std::string_view text,
+                                                          std::size_t most) noexcept {
+  if (text.size() <= most) return text;
+  std::size_t end = most;
+  const auto inside = [&] { return (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U; };
+  while (inside() && end > 0 && most - end < 3) --end;
+  return text.substr(0, inside() ? most : end);
 }
 
 }  // namespace tandem

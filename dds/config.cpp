@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "base/quoting.hpp"
+#include "base/utf8.hpp"
 #include "dds/ports.hpp"
 
 namespace tandem::dds {
@@ -54,7 +55,8 @@ bool is_name_space(std::string_view text) {
 void check_all(TomlTable& table, const std::string& key, const std::vector<std::string>& texts,
                bool (*is_one)(std::string_view), const std::string& hint) {
   for (const std::string& text : texts) {
-    if (!is_one(text)) table.error(key, "'" + text.substr(0, kLongestWord) + "' is none", hint);
+    if (!is_one(text))
+      table.error(key, "'" + std::string(whole_characters(text, kLongestWord)) + "' is none", hint);
   }
 }
 

@@ -152,8 +152,9 @@ class SocketClient : public ControlClient {
 std::chrono::milliseconds answer_time(const Json& question) {
   const std::string name = question.value("do", "");  // dds.show: an emergency stop waits for it
   if (name == "estop" || name == "dds.show") return kStopAnswer;
-  // A library is tried, opened, and configured: each may take 4 s.
-  return name == "controller.load" || name == "controller.reload" ? 15000ms : 5000ms;
+  // A library is tried, opened, and configured: each may take 4 s. Where one crashes, which is
+  // tried, is looked for 25 s long.
+  return name == "controller.load" || name == "controller.reload" ? 40000ms : 5000ms;
 }
 
 Result<Json> ask(const std::string& path, const Json& question) {

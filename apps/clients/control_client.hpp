@@ -18,7 +18,7 @@ namespace tandem::apps {
 /// How the error begins of who does not answer in time.
 inline constexpr char kNoAnswer[] = "no answer within";
 
-/// How long ask() waits for the answer to `question`: kStopAnswer, 15 s of a controller
+/// How long ask() waits for the answer to `question`: kStopAnswer, 40 s of a controller
 /// that is loaded, or 5 s.
 [[nodiscard]] std::chrono::milliseconds answer_time(const Json& question);
 

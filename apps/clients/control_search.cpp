@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "apps/transport/control_path.hpp"
+#include "base/utf8.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -52,7 +53,7 @@ std::string command_line_of(pid_t pid) {
   for (char& c : words) {
     if (c == '\0' || c == '\n') c = ' ';
   }
-  if (words.size() > kMost) words = words.substr(0, kMost) + "...";
+  if (words.size() > kMost) words = std::string(whole_characters(words, kMost)) + "...";
   return words;
 }
 

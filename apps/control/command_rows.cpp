@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/nearest.hpp"
+#include "base/utf8.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -251,7 +252,7 @@ Status check_value(const ControlKey& key, const Json& value) {
   if (value.is_string() && !key.choices.empty()) {
     const auto wanted = value.get<std::string>();
     if (std::ranges::find(key.choices, wanted) == key.choices.end()) {
-      return fail(fmt::format("cannot be '{}'", wanted.substr(0, kMostNamed)),
+      return fail(fmt::format("cannot be '{}'", whole_characters(wanted, kMostNamed)),
                   suggest(wanted, key.choices));
     }
   }

@@ -8,6 +8,7 @@
 
 #include "apps/text/json_reader.hpp"
 #include "base/nearest.hpp"
+#include "base/utf8.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -26,7 +27,7 @@ Result<Json> parse(std::string_view text, bool known) {
 
 /// What somebody wrote, as far as it can be a word.
 std::string shown(const std::string& word) {
-  return word.size() <= kMostNamed ? word : word.substr(0, kMostNamed) + "…";
+  return word.size() <= kMostNamed ? word : std::string(whole_characters(word, kMostNamed)) + "…";
 }
 
 /// @param known_asker  for nobody else it is looked what may be meant

@@ -8,6 +8,7 @@
 
 #include "apps/text/toml_text.hpp"
 #include "base/nearest.hpp"
+#include "base/utf8.hpp"
 #include "controllers/hosted_call.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "runtime/controller_host.hpp"
@@ -237,7 +238,7 @@ Result<runtime::ParameterWish> split(RunServices& services, const std::string& n
   const std::size_t dot = longest > 0 ? longest : name.rfind('.');
   if (dot != std::string::npos)
     return runtime::ParameterWish{name.substr(0, dot), name.substr(dot + 1), {}};
-  return fail_at(name.substr(0, kMostNamed), "names no controller",
+  return fail_at(std::string(whole_characters(name, kMostNamed)), "names no controller",
                  "write NAME.PARAMETER, or give the controller's \"name\"");
 }
 
@@ -260,8 +261,8 @@ Result<runtime::ParameterWish> wish_of(RunServices& services, const std::string&
     const bool numbers =
         std::ranges::all_of(value, [](const Json& one) { return one.is_number(); });
     if (!numbers) {
-      return fail_at(parameter.substr(0, kMostNamed), "is a list with other things than numbers",
-                     "give numbers: [40, 40, 20]");
+      return fail_at(std::string(whole_characters(parameter, kMostNamed)),
+                     "is a list with other things than numbers", "give numbers: [40, 40, 20]");
     }
     wish.value = value.get<std::vector<double>>();
   }

@@ -10,6 +10,7 @@
 
 #include "apps/machine/child_process.hpp"
 #include "base/open_file.hpp"
+#include "base/utf8.hpp"
 #include "rt/cyclic_loop.hpp"
 #include "rt/stop_signal.hpp"
 
@@ -133,7 +134,7 @@ class Measurement {
     }
     if (*process.poll() != 0) {
       return fail(fmt::format("cyclictest ended with status {}", *process.poll()),
-                  written_to(output_file()).substr(0, 300));
+                  std::string(whole_characters(written_to(output_file()), 300)));
     }
     const auto result = read_cyclictest(written_to(json_file()));
     if (!result) return std::unexpected(result.error());

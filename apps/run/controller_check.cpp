@@ -228,7 +228,8 @@ Result<Proof> prove_on_thread(const WiredComposition& c, runtime::Run& run, Gate
   }
   thread.detach();
   const std::string fault = (*guard)->fault();
-  (void)guard->release();  // it still watches, and so what follows cannot last for ever
+  (*guard)->log_is_closed();  // there is none
+  (void)guard->release();     // it still watches, and so what follows cannot last for ever
   return Proof{.crashed = fault};
 }
 
@@ -313,6 +314,7 @@ Exit controller_check_command(const ControllerCheckOptions& given) {
   auto proof = prove_on_thread(**c, run, *gate, options.seconds);
   if (!proof) return refuse(proof.error());
   if (!proof->crashed.empty()) {
+    await_crash_place();
     remember_error(loop_error(proof->crashed));
     write_failure(options.json);
     fmt::print(stderr, "fault: {}\n", proof->crashed);

@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "apps/run/connection.hpp"
+#include "apps/run/loop_crash.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/json_reader.hpp"
 #include "base/archive.hpp"
@@ -71,7 +72,7 @@ Json request_of(const RunOptions& options, const ControllerTrial& trial) {
 }
 
 /// Waits for the child. While a debugger has this process, or --debug, for ever. One that has said
-/// something may have crashed: it gets the time again, to find out where.
+/// that it crashed gets the time to find out where.
 /// @return its exit status, 128 + signal; empty: it was too slow, and is no more
 std::optional<int> wait_for_trial(pid_t child, milliseconds limit, const std::string& output) {
   constexpr milliseconds kTick{2};
@@ -83,10 +84,11 @@ std::optional<int> wait_for_trial(pid_t child, milliseconds limit, const std::st
     if (ended < 0 && errno != EINTR) return -1;
     std::this_thread::sleep_for(kTick);
     if (!time_limits_are_waived()) left -= kTick;
-    std::error_code none;
-    if (left.count() > 0 || extended || fs::file_size(output, none) == 0 || none) continue;
+    if (left.count() > 0 || extended) continue;
+    const auto said = read_file(output, "", kMostTrialBytes);
+    if (!said || !said->contains(kEarlyCrash)) continue;
     extended = true;
-    left = limit;
+    left = kPlaceTime;
   }
   ::kill(child, SIGKILL);
   (void)wait_for(child);

@@ -90,6 +90,7 @@ void CycleGuard::on_hang(bool at_work) {
                   "in {} s{}",
                   crashed ? "stands still" : fmt::format("hangs: no cycle for {:g} s", limit_s_),
                   where, nodes, kGrace.count(), crashed ? "" : " if the loop does not come back"));
+  if (crashed) robot_is_stopped();
 }
 
 std::string CycleGuard::stop_nodes() {
@@ -111,6 +112,7 @@ std::string CycleGuard::stop_nodes() {
 void CycleGuard::on_given_up() {
   gave_up_.store(true, std::memory_order_release);
   std::this_thread::sleep_for(kLastWords);
+  if (log_closed_.load(std::memory_order_acquire)) std::this_thread::sleep_for(kPlaceTime);
   say("fault: the process could not end in order");
   ::_exit(static_cast<int>(Exit::kFault));
 }

@@ -21,7 +21,8 @@ namespace tandem::apps {
 /// 2. every node of a CAN robot gets NMT stop, by sockets that the loop does not use;
 /// 3. standard error says in which controller the loop is.
 /// A loop that is not back after kGrace is given up: gave_up(). Whoever owns the run then has
-/// kLastWords for the log, and ends the process; after that the guard does so, with status 1.
+/// kLastWords for the log, and ends the process; after that the guard does so, with status 1. Once
+/// the log is closed there is kPlaceTime more for what is still to be said.
 class CycleGuard {
  public:
   static constexpr std::chrono::seconds kGrace{2};
@@ -32,6 +33,8 @@ class CycleGuard {
                                                                 runtime::RobotCycle& cycle);
 
   [[nodiscard]] bool gave_up() const noexcept { return gave_up_.load(std::memory_order_acquire); }
+  /// The log is closed: nothing is lost any more by a process that ends. When it gave up.
+  void log_is_closed() noexcept { log_closed_.store(true, std::memory_order_release); }
   /// What the loop did: "the loop crashed in the controller 'squat'". For when it gave up.
   [[nodiscard]] const std::string& fault() const noexcept { return fault_; }
 
@@ -48,7 +51,7 @@ class CycleGuard {
   std::vector<std::unique_ptr<hal::can::SocketCanBus>> buses_;
   double limit_s_ = 0.0;
   std::string fault_;
-  std::atomic<bool> gave_up_{false};
+  std::atomic<bool> gave_up_{false}, log_closed_{false};
   std::unique_ptr<runtime::CycleWatchdog> watchdog_;  // last: its thread uses the others
 };
 

@@ -1,25 +1,27 @@
 // Handlers of std::terminate, of signals and of exit(), which stop the loop's thread in a cycle.
 #include "apps/run/loop_crash.hpp"
 
-#include <fmt/core.h>
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <ctime>
 #include <exception>
+#include <initializer_list>
 #include <string>
+#include <thread>
 
 #include "apps/text/console.hpp"
 #include "base/call_stack.hpp"
 #include "base/loaded_libraries.hpp"
+#include "base/place_search.hpp"
 #include "controllers/hosted_call.hpp"
+#include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -29,57 +31,47 @@ std::terminate_handler usual_end = nullptr;
 /// For a signal handler when the loop's own stack is full.
 alignas(std::max_align_t) std::array<std::byte, 262144> signal_stack;
 std::atomic<const char*> reason{nullptr};
-/// In memory that a child shares, which finds it out: CrashPlace.
-struct SharedPlace {
-  std::array<char, 512> function{}, file{};
-  int line = 0;
-  std::atomic<bool> known{false};
-};
-SharedPlace* shared_place = nullptr;  // null: there is no memory for it
+/// Of the loop's crash, and of one before the first cycle: null before the first run.
+PlaceSearch *loop_search = nullptr, *early_search = nullptr;
+std::atomic<bool> robot_stopped{false};
 constexpr char kTitle[] = "called from (innermost first):";
+constexpr char kNotice[] = "note: file and line of the crash are looked for, at most 20 s long\n";
+
+/// In one piece, as another thread writes, too. Safe in a signal handler. What is no sign of ASCII
+/// is a question mark.
+void write_line(std::initializer_list<const char*> parts) noexcept {
+  std::array<char, 1024> line;
+  std::size_t size = 0;
+  for (const char* part : parts) {
+    for (; *part != '\0' && size + 1 < line.size(); ++part)
+      line[size++] = *part >= 0x20 && *part < 0x7F ? *part : '?';
+  }
+  line[size++] = '\n';
+  (void)!::write(STDERR_FILENO, line.data(), size);
+}
 
 bool in_cycle() noexcept {
   return loop_heartbeat != nullptr && runtime::Heartbeat::at_work(loop_heartbeat->beats());
 }
 
-/// The innermost call of a controller's library, and of its own files if one is: a template of
-/// /usr/include is not what its author wrote. Without any the innermost call of all.
-CrashPlace author_place(const CallStack& stack) {
-  const std::vector<CallPlace> places = places_of(stack);
-  const CallPlace* chosen = nullptr;
-  for (const CallPlace& place : places) {
-    if (!is_defined_beside(place.call, "tandem_controller_plugin")) continue;  // no controller's
-    if (chosen == nullptr) chosen = &place;
-    if (place.file.empty() || place.file.starts_with("/usr/")) continue;
-    chosen = &place;
-    break;
-  }
-  if (chosen == nullptr && !places.empty()) chosen = &places.front();
-  if (chosen == nullptr) return {};
-  return {chosen->function, chosen->file, chosen->line};
+bool is_controllers(std::uintptr_t call) noexcept {
+  return is_defined_beside(call, "tandem_controller_plugin");
 }
 
-/// For the thread that ends the process. In a child.
-void share_place(void* stack) {
-  const CrashPlace place = author_place(*static_cast<const CallStack*>(stack));
-  const auto copy = [](const std::string& from, std::array<char, 512>& to) {
-    to[from.copy(to.data(), to.size() - 1)] = '\0';
-  };
-  copy(place.function, shared_place->function);
-  copy(place.file, shared_place->file);
-  shared_place->line = place.line;
-  shared_place->known.store(true);
+/// A robot moves as long as the process lives that crashes outside of its loop.
+ChildTime early_time() {
+  if (loop_search == nullptr) return {.notice = kNotice};
+  return {.longest = std::chrono::seconds(2)};
 }
 
 /// A crash outside of the cycle, in a controller's code.
 struct EarlyCrash {
   const char* controller;
   const char* why;
-  const CallStack* stack;  // null: without a place
 
   static void write(void* self) {
     const auto& crash = *static_cast<const EarlyCrash*>(self);
-    const CrashPlace place = crash.stack == nullptr ? CrashPlace{} : author_place(*crash.stack);
+    const CrashPlace place = early_search == nullptr ? CrashPlace{} : early_search->place();
     fail_begun_json({.message = std::string("the controller crashed before its first cycle: ") +
                                 crash.why + place.in_function(),
                      .hint = "correct it; the standard error has the calls",
@@ -89,14 +81,6 @@ struct EarlyCrash {
   }
 };
 
-/// The JSON of a process that ends now.
-void write_early_crash(const char* controller, const char* why, const CallStack& stack) {
-  EarlyCrash crash{controller, why, &stack};
-  if (run_in_child(&EarlyCrash::write, &crash)) return;
-  crash.stack = nullptr;
-  (void)run_in_child(&EarlyCrash::write, &crash);
-}
-
 void write_early_exit(const std::string& controller, const char* message) {
   fail_begun_json({.message = message,
                    .hint = "a controller returns its errors; correct it",
@@ -104,19 +88,29 @@ void write_early_exit(const std::string& controller, const char* message) {
                    .key = controller});
 }
 
-/// What stops the robot does not wait for the words.
-[[noreturn]] void stand_still(const char* why, const CallStack& stack) {
+/// First what lets the watchdog stop the robot, which waits for nothing that follows here.
+void begin_to_stand_still(const char* why) noexcept {
   reason.store(why);
   loop_heartbeat->stand_still();
-  write_call_stack(STDERR_FILENO, kTitle, stack);
-  CallStack copy = stack;
-  if (shared_place != nullptr) (void)run_in_child(&share_place, &copy);
+}
+
+[[noreturn]] void stand_still(const char* what, const char* more, const CallStack& stack) noexcept {
+  const bool looks = loop_search != nullptr && loop_search->note(stack, &is_controllers);
+  write_line({"fault: ", what, more, looks ? loop_search->noted() : ""});
+  if (looks) {
+    constexpr timespec kLook{.tv_sec = 0, .tv_nsec = 1'000'000};
+    for (int i = 0; i < 5'000 && !robot_stopped.load(); ++i) ::nanosleep(&kLook, nullptr);
+    loop_search->look({.notice = kNotice});
+    loop_search->write(STDERR_FILENO, kTitle);
+    loop_search->end();
+  }
   while (true) ::pause();
 }
 
 /// What is thrown in a controller ends here, as its functions are noexcept.
 [[noreturn]] void on_exception() {
   if (!in_cycle()) usual_end();
+  begin_to_stand_still("an exception");
   std::string what = "of an unknown type";
   try {
     if (const auto thrown = std::current_exception()) std::rethrow_exception(thrown);
@@ -124,8 +118,7 @@ void write_early_exit(const std::string& controller, const char* message) {
     what = exception.what();
   } catch (...) {  // NOLINT(bugprone-empty-catch): `what` says so already
   }
-  fmt::print(stderr, "fault: an exception left the loop, which stands still: {}\n", what);
-  stand_still("an exception", take_call_stack());
+  stand_still("an exception left the loop, which stands still: ", what.c_str(), take_call_stack());
 }
 
 const char* name_of(int signal) {
@@ -138,43 +131,34 @@ const char* name_of(int signal) {
   }
 }
 
-/// Calls only what is safe in a signal handler.
-void write_text(const char* text) { (void)!::write(STDERR_FILENO, text, std::strlen(text)); }
-
-/// The same of a name: what is no sign of ASCII is a question mark.
-void write_name(const char* name) {
-  for (; *name != '\0'; ++name) {
-    const char sign[2] = {*name >= 0x20 && *name < 0x7F ? *name : '?', '\0'};
-    write_text(sign);
-  }
+/// Of a process that ends now.
+void tell_early_crash(const char* controller, const char* why, const CallStack& stack) noexcept {
+  const bool looks = early_search != nullptr && early_search->note(stack, &is_controllers);
+  write_line({"error: ", controller, kEarlyCrash, why, looks ? early_search->noted() : ""});
+  if (!looks) return;
+  early_search->look(early_time());
+  early_search->write(STDERR_FILENO, kTitle);
+  EarlyCrash crash{controller, why};
+  (void)run_in_child(&EarlyCrash::write, &crash, early_time());
 }
 
 void on_signal(int signal, siginfo_t*, void* context) {
   if (!in_cycle()) {
-    if (const char* controller = hosted_controller()) {
-      write_text("error: ");
-      write_name(controller);
-      for (const char* part :
-           {": the controller crashed before its first cycle: ", name_of(signal), "\n"})
-        write_text(part);
-      const CallStack stack = interrupted_call_stack(context);
-      write_call_stack(STDERR_FILENO, kTitle, stack);
-      write_early_crash(controller, name_of(signal), stack);
-    }
+    if (const char* controller = hosted_controller())
+      tell_early_crash(controller, name_of(signal), interrupted_call_stack(context));
     std::signal(signal, SIG_DFL);
     std::raise(signal);
     return;
   }
-  write_text("fault: the loop crashed, and stands still: ");
-  write_text(name_of(signal));
-  write_text("\n");
-  stand_still(name_of(signal), interrupted_call_stack(context));
+  begin_to_stand_still(name_of(signal));
+  stand_still("the loop crashed, and stands still: ", name_of(signal),
+              interrupted_call_stack(context));
 }
 
 void on_exit() {
   if (!in_cycle()) return;
-  write_text("fault: exit() was called in the loop, which stands still\n");
-  stand_still("exit()", take_call_stack());
+  begin_to_stand_still("exit()");
+  stand_still("exit() was called in the loop, which stands still", "", take_call_stack());
 }
 
 void handle(int signal) {
@@ -198,18 +182,21 @@ const char* crash_reason() noexcept {
   return why == nullptr ? "" : why;
 }
 
-std::string CrashPlace::in_function() const { return function.empty() ? "" : " in " + function; }
+void robot_is_stopped() noexcept { robot_stopped.store(true); }
 
-CrashPlace crash_place() {
-  if (shared_place == nullptr || reason.load() == nullptr) return {};
-  constexpr timespec kLook{.tv_sec = 0, .tv_nsec = 10'000'000};
-  for (int i = 0; i < 150 && !shared_place->known.load(); ++i) ::nanosleep(&kLook, nullptr);
-  if (!shared_place->known.load()) return {};
-  return {shared_place->function.data(), shared_place->file.data(), shared_place->line};
+void await_crash_place() {
+  if (loop_search == nullptr || reason.load() == nullptr) return;
+  constexpr std::chrono::milliseconds kLook(10);
+  rt::clear_stop();
+  for (auto left = kPlaceTime; left > kLook && !loop_search->is_over(); left -= kLook) {
+    if (rt::stop_requested()) return;
+    std::this_thread::sleep_for(kLook);
+  }
 }
 
 Error loop_error(const std::string& fault) {
-  const CrashPlace place = crash_place();
+  const bool noted = loop_search != nullptr && loop_search->is_noted();
+  const CrashPlace place = noted ? loop_search->place() : CrashPlace{};
   return {.message = fault + place.in_function(),
           .hint = {},
           .file = place.file,
@@ -218,6 +205,8 @@ Error loop_error(const std::string& fault) {
 }
 
 void name_crashing_controllers() {
+  static PlaceSearch search;
+  early_search = &search;
   handle_all();
   tell_hosted_exit(&write_early_exit);
 }
@@ -238,11 +227,7 @@ void stand_still_on_crash(runtime::Heartbeat& heartbeat) {
     stack = {.ss_sp = signal_stack.data(), .ss_flags = 0, .ss_size = signal_stack.size()};
     ::sigaltstack(&stack, nullptr);
   }
-  if (shared_place == nullptr) {
-    void* memory = ::mmap(nullptr, sizeof(SharedPlace), PROT_READ | PROT_WRITE,
-                          MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    if (memory != MAP_FAILED) shared_place = new (memory) SharedPlace;
-  }
+  if (loop_search == nullptr) loop_search = new PlaceSearch;  // a crash may come at the very end
   handle_all();
   std::atexit(on_exit);
 }

@@ -3,6 +3,7 @@
 // Layer: apps/run.  Thread: the loop's, or any where it is said.
 #pragma once
 
+#include <chrono>
 #include <string>
 
 #include "base/result.hpp"
@@ -10,9 +11,14 @@
 
 namespace tandem::apps {
 
+/// What the standard error of a process says whose controller crashes outside of the cycle, between
+/// the controller's name and the reason.
+inline constexpr char kEarlyCrash[] = ": the controller crashed before its first cycle: ";
+
 /// Keeps the process alive when the loop crashes. Call it on the loop's thread, before its first
 /// cycle. An exception, a signal such as SIGSEGV or exit() in the working part of a cycle then
-/// stops this thread only, which says why, and where with function, file and line. The watchdog
+/// stops this thread only, which says why and where, and once the robot is stopped looks for
+/// function, file and line, in a child. The watchdog
 /// acts at once, as for a loop that hangs: it stops robot and nodes, names the controller and
 /// closes the log. The process still ends between two cycles, by _exit(), and by a signal that has
 /// another handler already, such as a sanitizer's.
@@ -22,20 +28,18 @@ void stand_still_on_crash(runtime::Heartbeat& heartbeat);
 /// Why it stands still: "segmentation fault (SIGSEGV)", "an exception"; empty: it does not.
 [[nodiscard]] const char* crash_reason() noexcept;
 
-/// Where in its author's code a controller crashed. Without debug information function and file may
-/// be empty, and the line 0.
-struct CrashPlace {
-  std::string function, file;
-  int line = 0;
-  /// " in FUNCTION", or empty.
-  [[nodiscard]] std::string in_function() const;
-};
+/// The watchdog's: what stops the robot has been done. Files and lines are looked for after that.
+void robot_is_stopped() noexcept;
 
-/// The place of the crash that the loop stands still by; waits up to 1.5 s
-/// until it is found out; else empty.
-[[nodiscard]] CrashPlace crash_place();
+/// As long as the place of a crash may take, with what is said of it.
+inline constexpr std::chrono::milliseconds kPlaceTime{25'000};
+/// Waits until the place of the crash that the loop stands still by is known and said, or known not
+/// to be found; for kPlaceTime at most, and until a signal wants the process to stop. On an idle
+/// machine it is known long before the loop is given up.
+void await_crash_place();
 
-/// The error of a loop that was given up.
+/// The error of a loop that was given up, with what is known of the place by now: at least the
+/// library and the offset.
 /// @param fault  what CycleGuard says of it
 [[nodiscard]] Error loop_error(const std::string& fault);
 

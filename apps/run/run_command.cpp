@@ -304,19 +304,20 @@ class Session {
   }
 
   /// The loop was given up. Its thread is still there, and may go on at any time: what it uses
-  /// stays.
-  [[noreturn]] void end_without_loop(const CycleGuard& guard) {
-    const Error error = loop_error(guard.fault());
+  /// stays. The log does not wait for the place of a crash.
+  [[noreturn]] void end_without_loop(CycleGuard& guard) {
     std::string log;
     if (recorder_ != nullptr) {
       log::StringMap result = runtime::loaded_later(*c_.controllers, plugins_at_start_);
-      result.emplace_back("ended", error.to_string());
+      result.emplace_back("ended", loop_error(guard.fault()).to_string());
       log = recorder_->close(result).path;
     }
     if (c_.frames != nullptr) (void)c_.frames->close();
-    remember_error(error);
-    write_failure(options_.json);
+    guard.log_is_closed();
     socket_.reset();
+    await_crash_place();
+    remember_error(loop_error(guard.fault()));
+    write_failure(options_.json);
     fmt::print(stderr, "fault: {}{}\n", guard.fault(),
                log.empty() ? "" : "; the log up to then is " + log);
     std::fflush(nullptr);

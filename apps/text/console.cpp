@@ -21,6 +21,7 @@
 #include "apps/text/draft.hpp"
 #include "base/open_file.hpp"
 #include "base/quoting.hpp"
+#include "base/utf8.hpp"
 #include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
@@ -336,7 +337,7 @@ namespace {
 std::string indented(const std::string& text) {
   constexpr std::size_t kMost = 20'000;
   std::string out;
-  for (const char c : text.substr(0, kMost))
+  for (const char c : whole_characters(text, kMost))
     out += c == '\n' ? std::string("\n    ") : std::string(1, c);
   return harmless(out + (text.size() > kMost ? "…" : "")) + "\n";
 }

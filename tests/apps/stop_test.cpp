@@ -1,4 +1,6 @@
 // Stops of a run whose loop hangs: what `tandem estop` answers.
+#include <sys/stat.h>
+
 #include <csignal>
 
 #include "tests/apps/running.hpp"
@@ -147,11 +149,11 @@ TEST_F(Stops, AreNotTheEndOfACommandThatDoesNotSayWhoseCrashItWas) {
 // The process had ended by the signal, or with status 0: no controller's name, no NMT stop.
 TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
   const std::pair<const char*, const char*> crashes[] = {
-      {"null", "fault: the loop crashed, and stands still: segmentation fault (SIGSEGV)"},
-      {"stack", "fault: the loop crashed, and stands still: segmentation fault (SIGSEGV)"},
-      {"abort", "fault: the loop crashed, and stands still: abort() (SIGABRT)"},
-      {"divide", "fault: the loop crashed, and stands still: arithmetic error (SIGFPE)"},
-      {"exit", "fault: exit() was called in the loop, which stands still"}};
+      {"null", "the loop crashed, and stands still: segmentation fault (SIGSEGV) at hangs.so+0x"},
+      {"stack", "the loop crashed, and stands still: segmentation fault (SIGSEGV) at hangs.so+0x"},
+      {"abort", "fault: the loop crashed, and stands still: abort() (SIGABRT) at hangs.so+0x"},
+      {"divide", "the loop crashed, and stands still: arithmetic error (SIGFPE) at hangs.so+0x"},
+      {"exit", "fault: exit() was called in the loop, which stands still at hangs.so+0x"}};
   // A crash is no hang: nothing waits for the watchdog's time.
   hang("0.0", "crash = \"none\"\n[faults]\nwatchdog_s = 3600\n");
   std::string before = "none";
@@ -178,6 +180,34 @@ TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
     }
     std::filesystem::remove_all(folder_ / "runs");
   }
+}
+
+// Nothing had been said of the place, and the thread had read on for ever: here the library's file
+// is a pipe by then, whose end never comes.
+TEST_F(Stops, OfACrashHaveItsOffsetWhereNoDebugInformationCanBeRead) {
+  if (TANDEM_SANITIZED != 0) GTEST_SKIP() << "a sanitizer handles signals itself";
+  const std::filesystem::path library = folder_ / "gone.so";
+  std::filesystem::copy_file(TANDEM_BINARY_DIR "/tests/test_plugins/hangs.so", library);
+  edit("hold.toml", "plugin = \"hold\"",
+       "name = \"lazy\"\nplugin = \"./gone.so\"\n[controller.parameters]\ncrash = \"null\"\n");
+  log_flags_ = "--log l";
+  start("--start-paused");
+  until(R"("paused": true)");
+  std::filesystem::remove(library);
+  ASSERT_EQ(::mkfifo(library.c_str(), 0600), 0);
+  (void)to_run("clock resume");
+  EXPECT_EQ(join(), 1);
+  const std::string said = read_text(folder_ / "run.txt");
+  EXPECT_NE(said.find("segmentation fault (SIGSEGV) at gone.so+0x"), std::string::npos) << said;
+  EXPECT_NE(said.find("called from (innermost first):\n  "), std::string::npos) << said;
+  EXPECT_NE(said.find(" (gone.so+0x"), std::string::npos) << said;
+  const std::string message = json("run.json")["errors"][0]["message"];
+  EXPECT_TRUE(message.starts_with("the loop crashed in the controller 'lazy': segmentation"))
+      << message;
+  EXPECT_NE(message.find("gone.so+0x"), std::string::npos) << message;
+  const Outcome info = tandem("log info l/*.mcap");
+  EXPECT_NE(info.out.find("gone.so+0x"), std::string::npos) << info.out;
+  EXPECT_EQ(info.out.find("no index"), std::string::npos) << info.out;
 }
 
 TEST_F(Stops, OfALoopThatComesBackEndTheRunInOrder) {

@@ -25,5 +25,15 @@ TEST(Utf8, IsNothingElse) {
   }
 }
 
+TEST(Utf8, IsCutBetweenTwoCharacters) {
+  EXPECT_EQ(whole_characters("a<…>b", 20), "a<…>b");
+  EXPECT_EQ(whole_characters("a<…>b", 6), "a<…>");
+  EXPECT_EQ(whole_characters("a<…>b", 5), "a<…");
+  for (const std::size_t inside : {2U, 3U, 4U}) EXPECT_EQ(whole_characters("a<…>b", inside), "a<");
+  EXPECT_EQ(whole_characters("\xF0\x90\x80\x80", 3), "");
+  EXPECT_EQ(whole_characters("\x80\x80\x80\x80\x80\x80", 4).size(), 4U) << "it has no characters";
+  EXPECT_EQ(whole_characters("ü", 0), "");
+}
+
 }  // namespace
 }  // namespace tandem
