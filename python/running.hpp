@@ -75,9 +75,8 @@ class Running {
   /// (time_s, cycle, controller, level, text).
   [[nodiscard]] py::list texts();
 
-  /// Figures so far, those of `tandem run --json` that are of the simulation and not of the
-  /// program.
-  [[nodiscard]] py::dict result();
+  /// Figures so far as JSON, those of `tandem run --json` that are no program's.
+  [[nodiscard]] std::string result();
 
   /// The faults of a scenario's text. @return how many
   std::size_t inject(const std::string& scenario);
