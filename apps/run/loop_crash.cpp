@@ -11,13 +11,13 @@
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <ctime>
 #include <exception>
 #include <string>
 
 #include "apps/text/console.hpp"
 #include "base/call_stack.hpp"
+#include "base/crash_signals.hpp"
 #include "base/loaded_libraries.hpp"
 #include "controllers/hosted_call.hpp"
 
@@ -128,20 +128,7 @@ void write_early_exit(const std::string& controller, const char* message) {
   stand_still("an exception", take_call_stack());
 }
 
-const char* name_of(int signal) {
-  switch (signal) {
-    case SIGSEGV: return "segmentation fault (SIGSEGV)";
-    case SIGBUS: return "bus error (SIGBUS)";
-    case SIGFPE: return "arithmetic error (SIGFPE)";
-    case SIGILL: return "illegal instruction (SIGILL)";
-    default: return "abort() (SIGABRT)";
-  }
-}
-
-/// Calls only what is safe in a signal handler.
-void write_text(const char* text) { (void)!::write(STDERR_FILENO, text, std::strlen(text)); }
-
-/// The same of a name: what is no sign of ASCII is a question mark.
+/// To standard error; what is no sign of ASCII is a question mark.
 void write_name(const char* name) {
   for (; *name != '\0'; ++name) {
     const char sign[2] = {*name >= 0x20 && *name < 0x7F ? *name : '?', '\0'};
@@ -155,20 +142,20 @@ void on_signal(int signal, siginfo_t*, void* context) {
       write_text("error: ");
       write_name(controller);
       for (const char* part :
-           {": the controller crashed before its first cycle: ", name_of(signal), "\n"})
+           {": the controller crashed before its first cycle: ", crash_text(signal), "\n"})
         write_text(part);
       const CallStack stack = interrupted_call_stack(context);
       write_call_stack(STDERR_FILENO, kTitle, stack);
-      write_early_crash(controller, name_of(signal), stack);
+      write_early_crash(controller, crash_text(signal), stack);
     }
     std::signal(signal, SIG_DFL);
     std::raise(signal);
     return;
   }
   write_text("fault: the loop crashed, and stands still: ");
-  write_text(name_of(signal));
+  write_text(crash_text(signal));
   write_text("\n");
-  stand_still(name_of(signal), interrupted_call_stack(context));
+  stand_still(crash_text(signal), interrupted_call_stack(context));
 }
 
 void on_exit() {
@@ -188,7 +175,7 @@ void handle(int signal) {
 
 void handle_all() {
   prepare_call_stacks();
-  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) handle(signal);
+  for (const int signal : kCrashSignals) handle(signal);
 }
 
 }  // namespace
