@@ -9,14 +9,9 @@
 #include <string_view>
 #include <utility>
 
-#include "apps/control/controller_control.hpp"
-#include "apps/control/input_control.hpp"
-#include "apps/control/joint_control.hpp"
-#include "apps/control/sensor_control.hpp"
-#include "apps/control/signal_control.hpp"
 #include "base/counted.hpp"
+#include "base/crash_signals.hpp"
 #include "hal/config/capabilities.hpp"
-#include "hal/sim/scenario.hpp"
 #include "runtime/run/run_log.hpp"
 
 namespace tandem::python {
@@ -72,10 +67,11 @@ Result<std::unique_ptr<log::Recorder>> open_log_at(const runtime::Composition& c
 
 }  // namespace
 
-Running::Turn::Turn(Running& of) : of_(&of) {
+Running::Turn::Turn(Running& of, bool hosts) : of_(&of) {
   if (of.busy_.exchange(true)) {
     raise(fail("another thread is in this run", "let one thread at a time step it").error());
   }
+  if (hosts || of.has_plugins_) guard_.emplace(*of.scene_, hosts);
 }
 
 void Running::check_going(const char* what) const {
@@ -89,6 +85,10 @@ void Running::check_going(const char* what) const {
 Running::Running(const std::string& file, runtime::Overrides overrides, const std::string& all,
                  const Control& some, const std::string& log) {
   if (is_backend(overrides.hal)) refuse_place({});
+  using Last = std::function<void(const char*)>;
+  scene_ = std::make_unique<runtime::CrashScene>(
+      log.empty() ? Last() : [this](const char* what) { end_log_by(what); });
+  const runtime::CrashGuard guard(*scene_, true);
   overrides.change = [&all](runtime::Experiment& e) {
     e.loop.start_paused = false;  // there is nobody to let it go on
     if (!all.empty()) e.controllers.clear();
@@ -110,6 +110,8 @@ Running::Running(const std::string& file, runtime::Overrides overrides, const st
   const Away away;
   run_ = std::make_unique<runtime::Run>(*c_, overrides,
                                         runtime::RunParts{.recorder = recorder_.get()});
+  scene_->look_at(run());
+  look_for_plugins();
   run().cycle().services().attended_by([this] {
     if (begun_) run().cycle().attend();
   });
@@ -124,6 +126,7 @@ Running::Running(const std::string& file, runtime::Overrides overrides, const st
 Running::~Running() {
   if (recorder_ != nullptr && ::getpid() != process_) {
     (void)recorder_.release();  // its thread, and its file, are the parent's
+    (void)scene_.release();     // so is this one's
     return;
   }
   try {
@@ -147,6 +150,17 @@ void Running::end_log() {
               .file = done.path,
               .key = {}});
 }
+
+/// Before the process ends by a crash: another thread than the one that crashed, without Python.
+void Running::end_log_by(const char* crash) {
+  if (recorder_ == nullptr || std::exchange(closed_, true)) return;
+  log::StringMap result = runtime::loaded_later(*c_->controllers, plugins_at_start_);
+  result.emplace_back("ended", crash);
+  const log::RecordingResult done = recorder_->close(result);
+  for (const char* part : {"the log up to then is ", done.path.c_str(), "\n"}) write_text(part);
+}
+
+void Running::look_for_plugins() { has_plugins_ = !c_->controllers->code().empty(); }
 
 void Running::check_open() const {
   if (recorder_ != nullptr && ::getpid() != process_) {
@@ -275,27 +289,6 @@ void Running::start() {
   take_lead();
 }
 
-std::size_t Running::inject(const std::string& scenario) {
-  const Turn turn(*this);
-  check_going("inject");
-  const runtime::Experiment& e = run().experiment();
-  auto faults = sim::parse_scenario(scenario, "inject", e.robot, e.loop.period_ns, e.tree().get());
-  if (!faults) {
-    for (Error& error : faults.error()) error.file.clear();  // there is none
-    raise(faults.error());
-  }
-  for (const sim::ScenarioFault& fault : *faults) {
-    const Code code = run().robot().robot().inject(fault);
-    if (code == Code::kOk) continue;
-    raise(fail(code == Code::kOutOfRange
-                   ? "board_duplicate has to be known when the robot is made"
-                   : "the most faults that there can be were injected already",
-               code == Code::kOutOfRange ? "pass it as `scenario`" : "open the run again")
-              .error());
-  }
-  return faults->size();
-}
-
 void Running::add_lead(const std::string& all, const Control& some) {
   const hal::Robot robot = hal::robot_of(c_->experiment.robot);
   std::vector<ControllerSetup::Claim> claims;
@@ -366,50 +359,6 @@ void Running::check_command() const {
   raise_value("command." + std::string(bad->field),
               "of " + joints_[bad->joint] + " is not finite in cycle " +
                   std::to_string(run().state().cycle()[0]) + ": nothing was commanded");
-}
-
-std::string Running::ask(const std::string& question) {
-  const Turn turn(*this);
-  check_open();
-  runtime::RobotCycle& cycle = run().cycle();
-  if (commands_ == nullptr) {  // not those of stops and time, which are the run's own
-    commands_ = std::make_unique<apps::ControlRegistry>();
-    apps::add_controller_commands(*commands_, cycle.services(), c_->experiment.robot);
-    apps::add_joint_commands(*commands_, cycle, c_->experiment.robot);
-    apps::add_input_commands(*commands_, cycle.services());
-    apps::add_sensor_commands(*commands_, cycle.services());
-    apps::add_signal_commands(*commands_, cycle.services(), c_->experiment.robot);
-  }
-  if (begun_) cycle.attend();  // what is asked for is judged by the state that was read
-  const apps::Json answer = commands_->answer(question);
-  take_lead();
-  if (!answer.value("ok", false)) {
-    raise(fail(answer.value("error", "no answer"), answer.value("hint", "")).error());
-  }
-  return answer.dump(-1, ' ', false, apps::Json::error_handler_t::replace);
-}
-
-py::list Running::signals() {
-  py::list all;
-  for (const runtime::ControllerSignals& one : run().cycle().services().signals()) {
-    const hal::SignalBlock& block = *one.block;
-    all.append(py::make_tuple(one.controller, views(block.layout(), block.image().data(), -1, 0,
-                                                    keeper(one.block), false)));
-  }
-  return all;
-}
-
-py::list Running::texts() {
-  std::vector<hal::TextEvent> events;
-  std::uint64_t seen = texts_before_;
-  run().cycle().services().texts().read(seen, events);
-  py::list all;
-  for (const hal::TextEvent& one : events) {
-    all.append(py::make_tuple(static_cast<double>(one.time_ns) * 1e-9, one.cycle,
-                              std::string(one.controller()),
-                              one.level == hal::TextLevel::kWarn ? "warn" : "info", one.words()));
-  }
-  return all;
 }
 
 }  // namespace tandem::python

@@ -15,6 +15,7 @@
 #include "apps/control/control_registry.hpp"
 #include "python/arrays.hpp"
 #include "python/lead.hpp"
+#include "runtime/run/crash_guard.hpp"
 #include "runtime/run/run.hpp"
 
 namespace tandem::python {
@@ -75,28 +76,31 @@ class Running {
   /// (time_s, cycle, controller, level, text).
   [[nodiscard]] py::list texts();
 
-  /// Figures so far, those of `tandem run --json` that are of the simulation and not of the
-  /// program.
-  [[nodiscard]] py::dict result();
+  /// Figures so far as JSON, those of `tandem run --json` that are no program's.
+  [[nodiscard]] std::string result();
 
   /// The faults of a scenario's text. @return how many
   std::size_t inject(const std::string& scenario);
 
  private:
-  /// Marks that a thread is in the run.
+  /// Marks that a thread is in the run, and says whose crash it is if one crashes there.
   class Turn {
    public:
-    explicit Turn(Running& of);
+    /// @param hosts  controllers may be loaded
+    explicit Turn(Running& of, bool hosts = false);
     ~Turn() { of_->busy_ = false; }
     Turn(const Turn&) = delete;
     Turn& operator=(const Turn&) = delete;
 
    private:
     Running* of_;
+    std::optional<runtime::CrashGuard> guard_;  // where there is a plugin that may crash
   };
 
   void add_lead(const std::string& all, const Control& some);
   void end_log();
+  void end_log_by(const char* crash);
+  void look_for_plugins();
   void check_open() const;
   void begin();
   void take_lead();
@@ -106,11 +110,13 @@ class Running {
   void check_going(const char* what) const;
   [[nodiscard]] bool waits_too_long() const;
 
+  std::unique_ptr<runtime::CrashScene> scene_;  // first: controllers tell it of their calls
   std::unique_ptr<runtime::Composition> c_;
   std::unique_ptr<log::Recorder> recorder_;  // null: nothing is logged
   std::unique_ptr<runtime::Run> run_;
   std::string log_path_;
   std::size_t plugins_at_start_ = 0;
+  bool has_plugins_ = false;
   int process_ = 0;                                  // that opened the log
   bool closed_ = false;                              // nothing is stepped any more
   std::unique_ptr<apps::ControlRegistry> commands_;  // once something was asked

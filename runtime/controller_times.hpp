@@ -43,6 +43,11 @@ class ControllerNames {
     const std::lock_guard lock(mutex_);
     return id < all_.size() ? all_[id]->name : std::string();
   }
+  /// The same without the heap, as a signal handler needs it; stays. Null: there was none.
+  [[nodiscard]] const char* text(std::size_t id) const noexcept {
+    const std::lock_guard lock(mutex_);
+    return id < all_.size() ? all_[id]->name.c_str() : nullptr;
+  }
   [[nodiscard]] std::vector<std::shared_ptr<ControllerTimes>> all() const {
     const std::lock_guard lock(mutex_);
     return all_;

@@ -312,6 +312,9 @@ class RunServices {
   /// not while controllers run; a component that it lacks; a value beyond its bounds.
   [[nodiscard]] Result<RequestResult> set_input(const std::string& name, const InputRequest& wish,
                                                 Patience patience = kPatience);
+  /// Counts a sample that is none, as set_input() does what it refuses. Nothing without such an
+  /// input.
+  void refuse_input(const std::string& name, const Error& why);
   /// The inputs of the controllers that came with the experiment, which `feeder` feeds.
   [[nodiscard]] std::vector<std::shared_ptr<InputPort>> inputs_of(InputFeeder feeder);
   /// Whether whoever feeds `port` may do so now: its controller is active, controllers run, and

@@ -166,4 +166,9 @@ Result<RequestResult> RunServices::set_input(const std::string& name, const Inpu
   }
 }
 
+void RunServices::refuse_input(const std::string& name, const Error& why) {
+  const Lock lock(mutex_);
+  if (const auto port = input_of(name)) (*port)->refuse(why);
+}
+
 }  // namespace tandem::runtime

@@ -35,6 +35,16 @@ void figures(Figures& f, const runtime::FaultReport& fault) {
   f("cleared_s", "null while it is latched", known(!fault.latched, fault.cleared_s));
 }
 
+std::vector<std::string> latched_texts(const std::vector<runtime::FaultReport>& faults) {
+  std::vector<std::string> texts;
+  for (const runtime::FaultReport& fault : faults) {
+    if (!fault.latched) continue;
+    texts.push_back(fmt::format("{:.3f} s: {}{}{}", fault.time_s, fault.joint,
+                                fault.joint.empty() ? "" : ": ", fault.text));
+  }
+  return texts;
+}
+
 void print_faults(const Json& faults, std::FILE* out) {
   if (faults.empty()) return;
   // Within 100 columns: the category is that of the reaction, and in the JSON.

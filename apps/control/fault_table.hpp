@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "apps/text/figures.hpp"
 #include "runtime/fault.hpp"
@@ -18,6 +19,10 @@ namespace tandem::apps {
 
 /// docs/json.md, `fault_log`
 void figures(Figures& f, const runtime::FaultReport& fault);
+
+/// "1.204 s: joint2: it is too hot", of each that is latched.
+[[nodiscard]] std::vector<std::string> latched_texts(
+    const std::vector<runtime::FaultReport>& faults);
 
 /// The table of a JSON list of faults; nothing when it is empty.
 void print_faults(const Json& faults, std::FILE* out);

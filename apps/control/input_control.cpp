@@ -86,6 +86,10 @@ Result<std::vector<double>> numbers_of(const Json& object, const char* key, bool
   std::vector<double> numbers;
   const bool list = found != object.end() && found->is_array();
   for (const Json& one : list ? *found : Json::array()) {
+    if (one.is_string()) {
+      return fail_at(key, "'" + shown(one.get<std::string>()) + "' is no finite number",
+                     "a number per joint");
+    }
     if (!one.is_number()) return fail_at(key, "is no list of numbers", "a number per joint");
     numbers.push_back(one.get<double>());
   }
@@ -133,11 +137,8 @@ std::string number_hint(runtime::RunServices& services, const std::string& name,
   return "values: numbers by name";
 }
 
-Result<Json> set_input(runtime::RunServices& services, const Json& request) {
+Result<InputRequest> wish_of(runtime::RunServices& services, const Json& request) {
   InputRequest wish;
-  if (request.contains("values") == request.contains("trajectory")) {
-    return fail("input.set: give the values, or a trajectory", "tandem input list shows which");
-  }
   if (request.contains("trajectory")) {
     const Status added = add_points(request["trajectory"], wish);
     if (!added) return std::unexpected(added.error());
@@ -153,7 +154,20 @@ Result<Json> set_input(runtime::RunServices& services, const Json& request) {
     wish.components.push_back(component);
     wish.numbers.push_back(value.get<double>());
   }
-  const auto asked = services.set_input(request["name"].get<std::string>(), wish);
+  return wish;
+}
+
+Result<Json> set_input(runtime::RunServices& services, const Json& request) {
+  if (request.contains("values") == request.contains("trajectory")) {
+    return fail("input.set: give the values, or a trajectory", "tandem input list shows which");
+  }
+  const std::string name = request["name"].get<std::string>();
+  const auto wish = wish_of(services, request);
+  if (!wish) {
+    services.refuse_input(name, wish.error());
+    return std::unexpected(wish.error());
+  }
+  const auto asked = services.set_input(name, *wish);
   if (!asked) return std::unexpected(asked.error());
   return asked_json(*asked);
 }

@@ -18,6 +18,7 @@
 
 #include "apps/text/console.hpp"
 #include "base/call_stack.hpp"
+#include "base/crash_signals.hpp"
 #include "base/loaded_libraries.hpp"
 #include "base/place_search.hpp"
 #include "controllers/hosted_call.hpp"
@@ -121,16 +122,6 @@ void begin_to_stand_still(const char* why) noexcept {
   stand_still("an exception left the loop, which stands still: ", what.c_str(), take_call_stack());
 }
 
-const char* name_of(int signal) {
-  switch (signal) {
-    case SIGSEGV: return "segmentation fault (SIGSEGV)";
-    case SIGBUS: return "bus error (SIGBUS)";
-    case SIGFPE: return "arithmetic error (SIGFPE)";
-    case SIGILL: return "illegal instruction (SIGILL)";
-    default: return "abort() (SIGABRT)";
-  }
-}
-
 /// Of a process that ends now.
 void tell_early_crash(const char* controller, const char* why, const CallStack& stack) noexcept {
   const bool looks = early_search != nullptr && early_search->note(stack, &is_controllers);
@@ -145,13 +136,13 @@ void tell_early_crash(const char* controller, const char* why, const CallStack& 
 void on_signal(int signal, siginfo_t*, void* context) {
   if (!in_cycle()) {
     if (const char* controller = hosted_controller())
-      tell_early_crash(controller, name_of(signal), interrupted_call_stack(context));
+      tell_early_crash(controller, crash_text(signal), interrupted_call_stack(context));
     std::signal(signal, SIG_DFL);
     std::raise(signal);
     return;
   }
-  begin_to_stand_still(name_of(signal));
-  stand_still("the loop crashed, and stands still: ", name_of(signal),
+  begin_to_stand_still(crash_text(signal));
+  stand_still("the loop crashed, and stands still: ", crash_text(signal),
               interrupted_call_stack(context));
 }
 
@@ -172,7 +163,7 @@ void handle(int signal) {
 
 void handle_all() {
   prepare_call_stacks();
-  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) handle(signal);
+  for (const int signal : kCrashSignals) handle(signal);
 }
 
 }  // namespace

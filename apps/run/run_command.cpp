@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <optional>
 
+#include "apps/control/fault_table.hpp"
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
 #include "apps/robot/gains_opinion.hpp"
@@ -46,12 +47,7 @@ namespace {
 
 std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
                                      const std::optional<log::RecordingResult>& log) {
-  std::vector<std::string> texts;
-  for (const runtime::FaultReport& fault : cycle.faults()) {
-    if (!fault.latched) continue;
-    texts.push_back(fmt::format("{:.3f} s: {}{}{}", fault.time_s, fault.joint,
-                                fault.joint.empty() ? "" : ": ", fault.text));
-  }
+  std::vector<std::string> texts = latched_texts(cycle.faults());
   if (log && !log->error.empty()) {
     texts.push_back(
         fmt::format("the log lost {}: {}", counted(log->failed, "message"), log->error));

@@ -8,6 +8,7 @@
 
 #include "base/counted.hpp"
 #include "rt/stop_signal.hpp"
+#include "runtime/run/plant_weight.hpp"
 
 namespace tandem::apps {
 
@@ -32,9 +33,13 @@ std::string RunSummary::ended() const {
   return asked ? "on request" : "its controllers were done";
 }
 
-double RunSummary::sim_s() const {
-  const auto cycles = static_cast<std::int64_t>(cycle.running_cycles());
-  return static_cast<double>(cycles * composition.experiment.loop.period_ns) / 1e9;
+RunFigures RunSummary::run() const {
+  const runtime::Composition& c = composition;
+  return {.experiment = &c.experiment,
+          .cycle = &cycle,
+          .controllers = c.controllers.get(),
+          .ground = runtime::ground_of(c, cycle),
+          .kernel_variant = c.kernels->variant};
 }
 
 std::optional<ParallelSummary> RunSummary::parallel_summary() const {
@@ -43,7 +48,7 @@ std::optional<ParallelSummary> RunSummary::parallel_summary() const {
 }
 
 double RunSummary::realtime_factor() const {
-  return times.running_s > 0.0 ? sim_s() / times.running_s : 0.0;
+  return times.running_s > 0.0 ? run().sim_s() / times.running_s : 0.0;
 }
 
 namespace {

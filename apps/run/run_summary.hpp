@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/control/run_figures.hpp"
 #include "apps/run/connection.hpp"
 #include "apps/run/cycle_thread.hpp"
 #include "apps/run/dds_run.hpp"
@@ -22,10 +23,6 @@ namespace tandem::apps {
 
 /// "29 axes enabled after 0.211 s, …"; empty without a master, or before that.
 [[nodiscard]] std::string start_text(const hal::can::DriveMaster* master);
-
-/// What the ground did, against the weight of the robot that was simulated.
-[[nodiscard]] std::optional<runtime::GroundFigures> ground_of(const WiredComposition& c,
-                                                              const runtime::RobotCycle& cycle);
 
 /// What the log's record "result" tells of the master, and of a plant that is not the model.
 [[nodiscard]] log::StringMap result_of(const WiredComposition& c, const runtime::RobotCycle& cycle);
@@ -52,7 +49,8 @@ struct RunSummary {
   /// How it ended: "as planned", "interrupted by SIGINT", "on request", …; "by a fault" when one is
   /// latched and nobody interrupted it.
   [[nodiscard]] std::string ended() const;
-  [[nodiscard]] double sim_s() const;
+  /// Those of its figures that are no program's.
+  [[nodiscard]] RunFigures run() const;
   /// Simulated by wall clock, while controllers ran; 0: they did not.
   [[nodiscard]] double realtime_factor() const;
   [[nodiscard]] std::optional<ParallelSummary> parallel_summary() const;

@@ -2,45 +2,21 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "apps/can/bus_watch.hpp"
 #include "apps/can/round_trips.hpp"
 #include "apps/control/fault_table.hpp"
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_summary.hpp"
+#include "runtime/run/plant_weight.hpp"
 
 namespace tandem::apps {
 namespace {
-
-double mass_kg(const model::Tree& tree) {
-  double sum = 0.0;
-  for (const model::Body& body : tree.bodies) sum += body.inertia.mass_kg;
-  return sum;
-}
-
-/// The plant's as it is: on the average, where that changes.
-double weight_N(const WiredComposition& c, const runtime::GroundFigures& over) {
-  double mass = c.kernels->mass_kg;
-  if (c.sim != nullptr) {
-    const auto& plant = c.experiment.plant;
-    if (plant != nullptr) mass += mass_kg(plant->tree) - mass_kg(*c.experiment.tree());
-    mass += c.sim->robot().carried_kg(over.from_ns, over.to_ns + c.experiment.loop.period_ns);
-  }
-  const double* g = c.kernels->gravity_m_s2;
-  return mass * std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-}
 
 /// Whether what touches the base was estimated: on a floating base, once its estimate had started.
 bool has_base_wrench(const hal::EstimateImage& image, const runtime::EstimateFigures& figures) {
   return !image.external_base_wrench().empty() && figures.base_cycles > 0;
 }
-
-struct JointFigures {
-  runtime::TrackingError error;
-  std::uint64_t limited_cycles = 0;
-  std::optional<std::string> limited_controller{};
-};
 
 struct ControllerFigures {
   rt::Percentiles call_ns{};
@@ -56,29 +32,6 @@ Named<std::optional<ControllerFigures>> controllers_of(const RunSummary& s) {
                                                         one->calls.count(), one->overruns.load()}));
   }
   return all;
-}
-
-Named<JointFigures> joints_of(const RunSummary& s) {
-  Named<JointFigures> joints;
-  const auto tracking = s.cycle.statistics().tracking();
-  const auto limited = s.cycle.statistics().limited_cycles();
-  for (std::size_t j = 0; j < tracking.size(); ++j) {
-    const std::int32_t who = s.cycle.limited(j);
-    joints.emplace_back(
-        s.composition.experiment.robot.joints[j].name,
-        JointFigures{tracking[j], limited[j],
-                     known(who >= 0, who < 0 ? std::string()
-                                             : s.composition.controllers->name(
-                                                   static_cast<std::size_t>(who)))});
-  }
-  return joints;
-}
-
-Named<runtime::ClosureFigures> loops_of(const RunSummary& s) {
-  Named<runtime::ClosureFigures> loops;
-  for (const runtime::ClosureFigures& one : s.cycle.statistics().loops())
-    loops.emplace_back(s.composition.experiment.robot.loops[loops.size()].name, one);
-  return loops;
 }
 
 /// What was estimated.
@@ -154,20 +107,6 @@ static void figures(Figures& f, const DdsResult& dds) {
   f("replies_unclaimed", "the client was gone", dds.services.unclaimed);
 }
 
-static void figures(Figures& f, const JointFigures& joint) {
-  const bool tracked = joint.error.cycles > 0;
-  f("rms_tracking_error_rad",
-    "against the position reference, also one that a controller writes in another mode than "
-    "position control; null: there was none",
-    known(tracked, joint.error.rms_rad));
-  f("max_tracking_error_rad", "of the absolute value", known(tracked, joint.error.max_rad));
-  f("limited_cycles",
-    "in which a limit changed the controller's command: [controllers.md](controllers.md#limits)",
-    joint.limited_cycles);
-  f("limited_controller", "whose command was the first that a limit changed; null: none was",
-    joint.limited_controller);
-}
-
 static void figures(Figures& f, const ControllerFigures& one) {
   f("call_ns", "of its calls in the cycle: `start`, `update`, `retreat`, `stop`", one.call_ns);
   f("calls", one.calls);
@@ -178,32 +117,6 @@ static void figures(Figures& f, const runtime::TextFigures& texts) {
   f("said", "that are in the log, on `/rosout` and in the output", texts.said);
   f("left_out", "beside them, as too many: [controllers.md](controllers.md#signals)",
     texts.left_out);
-}
-
-static void figures(Figures& f, const runtime::WorkFigures& work) {
-  f("done_J", "of the joints that drove", work.done_J);
-  f("taken_J", "of those that braked", work.taken_J);
-  f("max_power_W", "of all together; braking ones count negative", work.max_power_W);
-}
-
-static void figures(Figures& f, const runtime::GroundFigures& ground) {
-  f("weight_N",
-    "mass times gravity, of the plant as it is, payloads included; the average where that changes",
-    ground.weight_N);
-  f("mean_vertical_force_N", "of all feet together", ground.mean_vertical_force_N);
-  f("max_foot_slip_m", "way of a foot since it touched down", ground.max_foot_slip_m);
-}
-
-static void figures(Figures& f, const runtime::ClosureFigures& loop) {
-  f("max_position_error_m", "over all cycles", loop.max_position_error_m);
-  f("max_velocity_error_m_s", loop.max_velocity_error_m_s);
-}
-
-static void figures(Figures& f, const runtime::BaseFigures& base) {
-  f("min_height_m", base.min_height_m);
-  f("max_height_m", base.max_height_m);
-  f("final_tilt_rad", "between the base's z axis and the world's", base.final_tilt_rad);
-  f("max_tilt_rad", base.max_tilt_rad);
 }
 
 static void figures(Figures& f, const runtime::WrenchFigures& one) {
@@ -246,19 +159,14 @@ void figures(Figures& f, const RunSummary* s) {
   const auto e = [s]() -> const runtime::Experiment& { return s->composition.experiment; };
   const auto loop = [s]() -> const rt::CycleStatistics& { return s->cycle.loop(); };
   const auto master = [s] { return s->composition.master; };
-  f("robot", "`name` of the robot.toml", [&] { return e().robot.name; });
+  const RunFigures run = s == nullptr ? RunFigures() : s->run();
+  figures(f, s == nullptr ? nullptr : &run);
   f("hal", "backend: `sim`, `can`, `ethercat`, `dds`, …", [&] { return hal_name(e()); });
-  f("seed", "of every random generator", [&] { return e().seed; });
   f("ended",
     "`as planned`; `interrupted by SIGINT` (or another signal), in a run without an end `stopped "
     "by SIGINT`; `on request` (`run.stop`); `its controllers were done` before the planned end; "
     "`by a fault`; `nobody reads its output any more`",
     [&] { return s->ended(); });
-  f("planned_cycles", "of the whole run; null: it has no planned end",
-    [&] { return known(s->planned_cycles() > 0, s->planned_cycles()); });
-  f("cycles", "of the loop while controllers ran", [&] { return s->cycle.running_cycles(); });
-  f("period_ns", "nominal", [&] { return e().loop.period_ns; });
-  f("sim_seconds", "`cycles * period_ns`", [&] { return s->sim_s(); });
   f("wall_seconds", "of those cycles on the wall clock", [&] { return s->times.running_s; });
   f("stopped_seconds", "on the wall clock: in fault, in a reset, or held after it",
     [&] { return s->times.stopped_s; });
@@ -285,17 +193,7 @@ void figures(Figures& f, const RunSummary* s) {
   f("frames", "of `--record-frames`", [&] { return s->frames; });
   f("dds", "with `[dds]`", [&] { return s->dds; });
   f("buses", "of a CAN backend", [&] { return s->composition.open_buses(); });
-  f("joints", [&] { return joints_of(*s); });
-  f("work", "torque times velocity, as measured; null: no drive tells them",
-    [&] { return s->cycle.statistics().work(static_cast<double>(e().loop.period_ns) * 1e-9); });
-  f("ground", "by the plant's truth, of a floating base with feet",
-    [&] { return ground_of(s->composition, s->cycle); });
-  f("loops", "of a robot with closed loops in simulation", [&] { return loops_of(*s); });
   f("parallel", "of `[parallel]`", [&] { return s->parallel_summary(); });
-  f("base",
-    "until the drives are disabled at the end, so a fall after a fault counts; floating base with "
-    "known truth",
-    [&] { return s->cycle.statistics().base(); });
   f("estimate", "with `[estimation]`, while controllers ran", [&] { return estimate_of(*s); });
   f("round_trips", "per board", [&] {
     return master() == nullptr ? std::vector<hal::can::RoundTrip>() : master()->round_trips();
@@ -319,25 +217,15 @@ void figures(Figures& f, const RunSummary* s) {
     "refused value",
     [&] { return s->warnings(); });
   f("gate", "with `--gate`: as `rules` of `tandem controller check`", [&] { return s->gate; });
-  f("fault_log", "every fault", [&] { return s->cycle.faults(); });
-  f("kernel_variant", "of the generated kernels that ran",
-    [&] { return std::string(s->composition.kernels->variant); });
   figures(f, s == nullptr ? nullptr : &e());
 }
 
 Json RunSummary::json() const { return figures_json(this); }
 
-std::optional<runtime::GroundFigures> ground_of(const WiredComposition& c,
-                                                const runtime::RobotCycle& cycle) {
-  std::optional<runtime::GroundFigures> ground = cycle.statistics().ground(0.0);
-  if (ground) ground->weight_N = weight_N(c, *ground);
-  return ground;
-}
-
 log::StringMap result_of(const WiredComposition& c, const runtime::RobotCycle& cycle) {
   const hal::can::DriveMaster* const master = c.master;
   log::StringMap result;
-  if (const auto ground = ground_of(c, cycle); ground && c.sim != nullptr) {
+  if (const auto ground = runtime::ground_of(c, cycle); ground && c.sim != nullptr) {
     const bool carries = std::ranges::any_of(c.sim->robot().faults(), [](const auto& slot) {
       return slot.fault.kind == hal::FaultKind::kPayload && slot.acted != 0;
     });

@@ -27,8 +27,12 @@ def plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
+class NotFinite(ValueError):
+    """A number that JSON has no literal for, with the key that has it."""
+
+
 def ask(native: Any, command: str, keys: Mapping[str, Any]) -> Dict[str, Any]:
-    """A command's answer. ValueError: a number that is not finite, with the key that has it."""
+    """A command's answer. Error: NotFinite."""
     for key, value in keys.items():
         _refuse_not_finite(key, value)
     question = json.dumps({"do": command, **keys}, default=_of_numpy)
@@ -52,7 +56,17 @@ def _refuse_not_finite(key: str, value: Any) -> None:
         for one in value:
             _refuse_not_finite(key, one)
     elif isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"{key}: {value} is not finite")
+        raise NotFinite(f"{key}: {value} is not finite")
+
+
+def _finite_or_text(value: Any) -> Any:
+    """Numbers that are not finite as text."""
+    value = plain(value)
+    if isinstance(value, Mapping):
+        return {name: _finite_or_text(one) for name, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite_or_text(one) for one in value]
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 class Parameters(Sealed, Mapping[str, Any]):
@@ -154,4 +168,11 @@ def give_input(native: Any, name: str, sample: Sample) -> None:
         keys = {"trajectory": {"points": [dict(point) for point in sample]}}
     else:
         raise ValueError(f"{name}: wanted numbers by component, or a list of points")
-    ask(native, "input.set", {"name": name, **keys})
+    try:
+        ask(native, "input.set", {"name": name, **keys})
+    except NotFinite:
+        try:  # it is refused there, too, which counts it
+            ask(native, "input.set", {"name": name, **_finite_or_text(keys)})
+        except _native.Error:
+            pass
+        raise

@@ -289,7 +289,8 @@ class Run(Sealed):
 
         `ended` is None while the run goes on.
         """
-        return self._native.result()
+        figures: Dict[str, Any] = json.loads(self._native.result())
+        return figures
 
     def __repr__(self) -> str:
         return f"<Run of {self.experiment}: {self.phase}, {self.time_s:.3f} s>"

@@ -211,6 +211,24 @@ def test_inputs_that_do_not_fit_are_named_and_the_run_goes_on(config, jog):
         tandem.Run(config / JOG).input("rate", {"joint2": 0.1})
 
 
+def test_an_input_that_is_not_finite_counts_as_refused(jog, config, tmp_path):
+    run = tandem.Run(jog)
+    run.step()
+    for value in (math.nan, np.float64("inf"), np.array(-np.inf)):
+        with pytest.raises(ValueError, match="joint2: -?(nan|inf) is not finite"):
+            run.input("rate", {"joint2": value})
+    shown = run.ask("input.list")["inputs"][0]
+    assert shown["refused"] == 3 and shown["sequence"] == 0
+    assert "joint2: '-inf' is no finite number" in shown["why"]
+    run = tandem.Run(experiment(tmp_path, config, '[[controller]]\nplugin = "trajectory_follower"\n'))
+    run.step()
+    for point in ({"after_s": 0.5, "position_rad": [0.7, math.nan]},
+                  {"after_s": math.nan, "position_rad": np.array([0.7, -0.3])}):  # fmt: skip
+        with pytest.raises(ValueError, match="nan is not finite"):
+            run.input("trajectory", [point])
+    assert run.ask("input.list")["inputs"][0]["refused"] == 2
+
+
 def test_commands_that_are_none(jog):
     run = tandem.Run(jog)
     for command in ("controller.lits", "controler.list"):
