@@ -70,15 +70,20 @@ struct ParameterRow {
   std::string name;  ///< of an element the list's and its own: "kp_Nm_rad.elbow"
   ParameterFacts facts;
   ParameterType type = ParameterType::kNumber;
-  double otherwise = kNotGiven;          ///< as `value`
-  std::atomic<double> value{kNotGiven};  ///< of a boolean 0 or 1, of a choice the word's index
-  bool changed = false;                  ///< the loop's: before the next update()
-  bool was_set = false;                  ///< the loop's: since the controller was loaded
-  std::string list{};                    ///< that it is an element of; empty: it stands alone
-  static_assert(std::atomic<double>::is_always_lock_free);
+  double otherwise = kNotGiven;  ///< as `value`
+  /// A boolean's is 0 or 1, a choice's the word's index. A plain number, which a debugger shows:
+  /// now() and put() read and write it for other threads.
+  double value = kNotGiven;
+  bool changed = false;  ///< the loop's: before the next update()
+  bool was_set = false;  ///< the loop's: since the controller was loaded
+  std::string list{};    ///< that it is an element of; empty: it stands alone
+  static_assert(std::atomic_ref<double>::is_always_lock_free);
 
-  [[nodiscard]] double now() const noexcept TANDEM_RT {
-    return value.load(std::memory_order_relaxed);
+  [[nodiscard]] double now() const noexcept TANDEM_RT {  // C++23 has no atomic_ref to const
+    return std::atomic_ref(const_cast<double&>(value)).load(std::memory_order_relaxed);
+  }
+  void put(double number) noexcept TANDEM_RT {
+    std::atomic_ref(value).store(number, std::memory_order_relaxed);
   }
   /// Whether it may be `number`: finite, in its range, whole where it has to be.
   [[nodiscard]] bool fits(double number) const noexcept TANDEM_RT {
@@ -87,12 +92,18 @@ struct ParameterRow {
     if (facts.above_min ? number <= facts.min : number < facts.min) return false;
     return number <= facts.max && (type != ParameterType::kInteger || number == std::floor(number));
   }
+  /// The word for `number`, of a boolean or a choice; empty: it is a number.
+  [[nodiscard]] std::string_view word_of(double number) const noexcept TANDEM_RT {
+    if (type == ParameterType::kBoolean) return number == 1.0 ? "true" : "false";
+    const bool has = type == ParameterType::kChoice && number >= 0.0 &&
+                     number < static_cast<double>(facts.choices.size());
+    return has ? std::string_view(facts.choices[static_cast<std::size_t>(number)]) : "";
+  }
   /// As a file gives it, and exactly: "0.1", "true", "compliant"; empty: it has none.
   [[nodiscard]] std::string text() const {
     const double number = now();
     if (std::isnan(number)) return {};
-    if (type == ParameterType::kBoolean) return number == 1.0 ? "true" : "false";
-    if (type == ParameterType::kChoice) return facts.choices.at(static_cast<std::size_t>(number));
+    if (type > ParameterType::kInteger) return std::string(word_of(number));
     std::array<char, 32> digits{};
     return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr};
   }
@@ -102,7 +113,8 @@ struct ParameterRow {
   }
 };
 
-/// A declared parameter: a number to calculate with. Until it is assigned it is not finite.
+/// A declared parameter: a number to calculate with. Until it is assigned it is not finite. It
+/// counts as long as the ControllerIo that it was declared in. In gdb: `print kp_.row_->value`.
 class Parameter {
  public:
   Parameter() = default;
@@ -118,10 +130,8 @@ class Parameter {
   [[nodiscard]] bool given() const noexcept TANDEM_RT { return !std::isnan(value()); }
   /// Whether it is that word, where it is a choice.
   [[nodiscard]] bool is(std::string_view word) const noexcept TANDEM_RT {
-    const double index = value();
-    return row_ != nullptr && index >= 0.0 &&
-           index < static_cast<double>(row_->facts.choices.size()) &&
-           row_->facts.choices[static_cast<std::size_t>(index)] == word;
+    return row_ != nullptr && row_->type == ParameterType::kChoice &&
+           row_->word_of(row_->now()) == word;
   }
   /// Whether this is the first update() after it was set.
   [[nodiscard]] bool changed() const noexcept TANDEM_RT { return row_ != nullptr && row_->changed; }
@@ -148,7 +158,7 @@ class Parameters {
     if (const char* wrong = complete(row, key); *wrong != '\0') {
       table.error(key, wrong, "correct the controller");
     } else {
-      row.value.store(read(table, row), std::memory_order_relaxed);
+      row.put(read(table, row));
     }
     return Parameter(row);
   }
@@ -206,7 +216,7 @@ class Parameters {
     if (former.was_set && row.fits(value)) set(row, value);
   }
   void set(ParameterRow& row, double value) noexcept TANDEM_RT {
-    row.value.store(value, std::memory_order_relaxed);
+    row.put(value);
     row.changed = row.was_set = any_changed_ = true;
   }
   /// After an update() of the controller: what it has seen is no change any more.
@@ -219,7 +229,7 @@ class Parameters {
     for (ParameterRow& row : rows_) {
       double value = row.now();
       ar(value, row.changed, row.was_set);
-      if (ar.reading()) row.value.store(value, std::memory_order_relaxed);
+      if (ar.reading()) row.put(value);
     }
     ar(any_changed_);
   }
@@ -336,7 +346,7 @@ class Parameters {
       const bool is_default = std::isnan(values[i]) && std::isnan(element(i).otherwise);
       if (!is_default && !element(i).fits(values[i]))
         return refuse(table, key, element(i), values[i]);
-      element(i).value.store(values[i], std::memory_order_relaxed);
+      element(i).put(values[i]);
     }
   }
   [[nodiscard]] std::string names_of(std::size_t first) const {

@@ -10,7 +10,7 @@ namespace {
 struct JointFigures {
   runtime::TrackingError error;
   std::uint64_t limited_cycles = 0;
-  std::optional<std::string> limited_controller{};
+  std::optional<std::string> limited_controller{}, limited_command{};
 };
 
 Named<JointFigures> joints_of(const RunFigures& s) {
@@ -19,12 +19,13 @@ Named<JointFigures> joints_of(const RunFigures& s) {
   const auto limited = s.cycle->statistics().limited_cycles();
   for (std::size_t j = 0; j < tracking.size(); ++j) {
     const std::int32_t who = s.cycle->limited(j);
+    const hal::LimitMet& met = s.cycle->first_limited(j);
     joints.emplace_back(
         s.experiment->robot.joints[j].name,
-        JointFigures{
-            tracking[j], limited[j],
-            known(who >= 0,
-                  who < 0 ? std::string() : s.controllers->name(static_cast<std::size_t>(who)))});
+        JointFigures{tracking[j], limited[j],
+                     known(who >= 0, who < 0 ? std::string()
+                                             : s.controllers->name(static_cast<std::size_t>(who))),
+                     known(met.kind != hal::LimitKind::kNone, hal::in_words(met))});
   }
   return joints;
 }
@@ -50,6 +51,8 @@ static void figures(Figures& f, const JointFigures& joint) {
     joint.limited_cycles);
   f("limited_controller", "whose command was the first that a limit changed; null: none was",
     joint.limited_controller);
+  f("limited_command", "that command's field, its value and the limit, in words; null: none",
+    joint.limited_command);
 }
 
 static void figures(Figures& f, const runtime::WorkFigures& work) {

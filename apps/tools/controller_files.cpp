@@ -14,7 +14,8 @@ const char kSource[] =
     R"(// @NAME@: leads one joint to and fro between two places. A PD law pulls the joint's reference to the
 // place, so the joint moves smoothly although the place jumps.
 //   cmake --workflow --preset run         configures, builds, tests, and runs @NAME@.toml
-//   tandem controller reload @NAME@       while a run goes on: after a change and `cmake --build build`
+//   tandem controller set @NAME@ kp_1_s2=40      while a run goes on
+//   tandem controller reload @NAME@       the same: after a change and `cmake --build build`
 #include <cmath>
 #include <string>
 
@@ -28,9 +29,25 @@ class @CLASS@ : public tandem::Controller {
     const int joint = setup.robot.joint_index(name);
     if (joint < 0) return std::unexpected(setup.robot.no_joint(name));
     joint_ = static_cast<std::size_t>(joint);
-    amplitude_rad_ = setup.parameters.number("amplitude_rad", tandem::kPositive);
-    half_s_ = setup.parameters.number_or("period_s", 4.0, {0.1, 1e3}) / 2.0;
-    kp_1_s2_ = setup.parameters.number_or("kp_1_s2", 16.0, {0.01, 1e3});
+    // One without `otherwise` has to be given. A live one may be set while it runs: so update()
+    // reads it anew, and no value of its range may let the reference jump.
+    amplitude_rad_ = setup.parameter("amplitude_rad", {.unit = "rad",
+                                                       .min = 0.0,
+                                                       .max = 10.0,
+                                                       .live = true,
+                                                       .doc = "from the middle to a place"});
+    period_s_ = setup.parameter("period_s", {.unit = "s",
+                                             .min = 0.1,
+                                             .max = 1e3,
+                                             .otherwise = 4.0,
+                                             .live = true,
+                                             .doc = "of a way to and fro"});
+    kp_1_s2_ = setup.parameter("kp_1_s2", {.unit = "1/s2",
+                                           .min = 0.01,
+                                           .max = 1e3,
+                                           .otherwise = 16.0,
+                                           .live = true,
+                                           .doc = "pull to the place"});
     cycle_s_ = 1e-9 * static_cast<double>(setup.period_ns);
     setup.claim(joint_, tandem::hal::ControlMode::kPosition);
     return {};
@@ -48,7 +65,7 @@ class @CLASS@ : public tandem::Controller {
   tandem::Code update(const tandem::hal::CycleTime& time, const tandem::hal::StateImage&,
                       tandem::hal::CommandImage& command) noexcept TANDEM_RT override {
     const double t_s = 1e-9 * static_cast<double>(time.time_ns - start_ns_);
-    const bool above = static_cast<long>(t_s / half_s_) % 2 == 0;
+    const bool above = std::fmod(t_s, period_s_) < period_s_ / 2.0;
     const double target_rad = middle_rad_ + (above ? amplitude_rad_ : -amplitude_rad_);
     const double kd_1_s = 2.0 * std::sqrt(kp_1_s2_);  // critical damping: it does not overshoot
     const double acceleration_rad_s2 =
@@ -67,7 +84,8 @@ class @CLASS@ : public tandem::Controller {
 
  private:
   std::size_t joint_ = 0;
-  double amplitude_rad_ = 0.0, half_s_ = 0.0, kp_1_s2_ = 0.0, cycle_s_ = 0.0;
+  tandem::Parameter amplitude_rad_, period_s_, kp_1_s2_;
+  double cycle_s_ = 0.0;
   std::int64_t start_ns_ = 0;
   double middle_rad_ = 0.0, reference_rad_ = 0.0, velocity_rad_s_ = 0.0;
 };
@@ -95,7 +113,6 @@ struct Bench {
   }
   // Configured and started with the joint at `position_rad`; then `seconds` of cycles.
   bool run(double position_rad, double seconds) {
-    tandem::ControllerSetup setup(robot, gains, nullptr, time.period_ns, parameters->root());
     if (!controller.configure(setup)) return false;
     state.position_rad()[0] = position_rad;
     controller.start(time, state, command);
@@ -113,6 +130,8 @@ struct Bench {
   tandem::Result<tandem::TomlDocument> parameters = tandem::TomlDocument::parse(
       "joint = 'joint'\namplitude_rad = 0.2\nperiod_s = 8.0", "parameters");
   hal::CycleTime time;
+  // It stays: what the controller declared points into it.
+  tandem::ControllerSetup setup{robot, gains, nullptr, time.period_ns, parameters->root()};
   hal::StateImage state{hal::ImageShape{1, {}}};
   hal::CommandImage command{hal::ImageShape{1, {}}};
   @CLASS@ controller;

@@ -117,8 +117,8 @@ bool tell_crash(int signal, const siginfo_t& info, const void* context) {
   if (controller == nullptr) return false;
   if (!become_teller()) return true;
   const char* const where = note(interrupted_call_stack(context));
-  for (const char* part : {"fault: controller ", controller, " crashed before its first cycle: ",
-                           crash_text(signal), where, "\n"}) {
+  for (const char* part : {"fault: controller ", controller,
+                           " crashed before its first cycle: ", crash_text(signal), where, "\n"}) {
     write_text(part);
   }
   write_calls();

@@ -19,6 +19,18 @@ class ControllerNew : public Program {
     const int raw = std::system(whole.c_str());
     return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -1, read_text(folder_ / "out.txt"), ""};
   }
+  /// While the made controller runs. Its numbers were read once: `set` found no parameter.
+  void set_its_gain(const std::string& tandem) const {
+    const std::string to = " --socket /tmp/tandem-test-" + std::to_string(::getpid()) + ".sock";
+    const Outcome set =
+        shell("cd nod && { " + tandem + " run nod.toml --rate 20 --duration 2000 --no-log -q" + to +
+              " & } && for i in $(seq 600); do " + tandem + " controller set nod kp_1_s2=40" + to +
+              " && break; sleep 0.05; done; " + tandem + " controller show nod" + to +
+              "; kill -INT $!; wait $!");
+    EXPECT_EQ(set.status, 130) << set.out;
+    for (const char* part : {"nod.kp_1_s2  40", "amplitude_rad", "period_s", "0.01 to 1000"})
+      expect(set.out, part);
+  }
   /// The two commands, with the program of `prefix`; then the same with a wrong sign.
   void make_and_spoil(const std::string& prefix) const {
     const Outcome made = shell(shell_word(prefix + "/bin/tandem") + " controller new nod");
@@ -30,6 +42,7 @@ class ControllerNew : public Program {
     expect(run.out, "joint2");
     const fs::path log = folder_ / "nod/runs/double_pendulum-nod-001.mcap";
     EXPECT_TRUE(fs::is_regular_file(log)) << run.out;
+    set_its_gain(shell_word(prefix + "/bin/tandem"));
     edit("nod/nod.cpp", "(target_rad - reference_rad_)", "(reference_rad_ - target_rad)");
     const Outcome wrong = shell("cd nod && cmake --workflow --preset run");
     EXPECT_NE(wrong.status, 0);
