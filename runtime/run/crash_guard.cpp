@@ -213,7 +213,8 @@ void CrashScene::tell(const char* how, const char* why, const CallStack& stack) 
                   name == nullptr ? "?" : name, how, to_string(function_), colon, why);
   }
   const char* const where = note(stack);
-  for (const char* part : {"fault: ", what_.data(), where, "\n"}) write_text(part);
+  for (const char* part : {"fault: ", static_cast<const char*>(what_.data()), where, "\n"})
+    write_text(part);
   ::sem_post(&wake_);
   write_calls();
   constexpr timespec kLook{.tv_sec = 0, .tv_nsec = 10'000'000};
