@@ -405,8 +405,8 @@ TEST(ParameterLog, HasWhatAControllerThatComesLaterStartsWith) {
   run.steps(3);
   EXPECT_EQ((*file)->close().dropped, 0U);
   EXPECT_EQ(told(path),
-            "+later.offset_rad=0.00 +later.share=0.50 +later.word=0.00 +later.count=3.00 "
-            "+later.on=1.00 +later.length_m=0.50 +later.gains.x=1.00 +later.gains.y=2.00 "
+            "+later.offset_rad=0.00 +later.share=0.50 +later.word=here +later.count=3.00 "
+            "+later.on=true +later.length_m=0.50 +later.gains.x=1.00 +later.gains.y=2.00 "
             "+later.gains.z.0=3.00 ~later.gains.y=4.00");
 }
 
