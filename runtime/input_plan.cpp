@@ -174,6 +174,7 @@ Result<InputPlan> plan_of(const PlannedInput& input, const Rows& rows, const Inp
                    "leave one of them out");
     }
     plan.at.push_back(cycle);
+    plan.number.push_back(rows.file.empty() ? r + 1 : static_cast<std::size_t>(row.line));
     plan.values.insert(plan.values.end(), sample->begin(), sample->end());
     before_s = row.time_s;
     r = end;
@@ -192,7 +193,7 @@ Result<InputPlan> read_log(const PlannedInput& input, const InputSource& source)
   if (!file) return std::unexpected(file.error());
   const std::string topic = "/tandem/input/" + input.controller + "/" + input.block.name;
   if (const auto found = file->require(topic); !found) return std::unexpected(found.error());
-  InputPlan plan{.at = {}, .values = {}, .of_run = true};
+  InputPlan plan{.at = {}, .values = {}, .number = {}, .of_run = true};
   const std::size_t size = input.block.values();
   bool right = true;
   const Status read = file->for_each(topic, [&](std::int64_t, std::span<const std::byte> body) {

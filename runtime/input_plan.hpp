@@ -18,6 +18,8 @@ namespace tandem::runtime {
 struct InputPlan {
   std::vector<std::uint64_t> at;    ///< cycles, growing
   std::vector<double> values;       ///< InputBlock::values() of each
+  std::vector<std::size_t> number;  ///< of each: its row in the timeline, its line in the file;
+                                    ///< empty of a log
   bool of_run = false;              ///< counted from the run's first cycle, not the controller's
   std::uint64_t repeat_cycles = 0;  ///< 0: each once
 

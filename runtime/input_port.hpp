@@ -58,6 +58,8 @@ class InputPort {
   [[nodiscard]] const InputSource& source() const noexcept { return source_; }
   /// What its topic's messages are. @pre source().feeder is InputFeeder::kTopic
   [[nodiscard]] const InputMessage& messages() const noexcept { return *message_; }
+  /// What is known of it before the run; of other sources than timelines and files empty.
+  [[nodiscard]] const InputPlan& plan() const noexcept { return plan_; }
   /// "CONTROLLER/INPUT"
   [[nodiscard]] std::string full_name() const { return controller_ + "/" + block_->name; }
 

@@ -181,6 +181,10 @@ void add_payload(TomlTable& table, const model::Tree& described, std::vector<std
   if (times.until_s && !(*times.until_s > times.from_s))
     table.error("until_s", "it is dropped before it is picked up", "give more than from_s");
   if (payload.link < 0 || table.has_errors()) return;
+  if (const std::string heavy = sim::too_heavy(payload, described); !heavy.empty()) {
+    plant.warnings.push_back(table.error_at("mass_kg", heavy));
+    plant.warnings.back().hint = "give its mass in kg";
+  }
   payload.number = static_cast<std::uint32_t>(names.size());
   plant.payloads.resize(names.size());
   plant.payloads.back() = times.name + ", " + sim::words_of(payload, described);

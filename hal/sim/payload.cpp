@@ -57,6 +57,15 @@ std::string words_of(const ScenarioFault& payload, const model::Tree& tree) {
   return mass + (link < tree.links.size() ? " on " + tree.links[link].name : "");
 }
 
+std::string too_heavy(const ScenarioFault& payload, const model::Tree& tree) {
+  double robot_kg = 0.0;
+  for (const model::Link& link : tree.links) robot_kg += link.inertia.mass_kg;
+  if (payload.value <= robot_kg) return {};
+  char mass[32];
+  std::snprintf(mass, sizeof mass, "%.4g kg", robot_kg);
+  return words_of(payload, tree) + " is heavier than the whole robot, " + mass;
+}
+
 Load load_of(const ScenarioFault& payload) noexcept TANDEM_RT {
   const auto& [xx, xy, xz, yy, yz, zz] = payload.inertia_kg_m2;
   Load load{static_cast<std::size_t>(payload.link), {}};

@@ -23,6 +23,9 @@ struct Load {
 /// "1.6 kg on panda_hand"
 [[nodiscard]] std::string words_of(const ScenarioFault& payload, const model::Tree& tree);
 
+/// "1600 kg on link2 is heavier than the whole robot, 3.2 kg"; empty: it is not.
+[[nodiscard]] std::string too_heavy(const ScenarioFault& payload, const model::Tree& tree);
+
 /// What a fault of kind kPayload attaches.
 [[nodiscard]] Load load_of(const ScenarioFault& payload) noexcept TANDEM_RT;
 

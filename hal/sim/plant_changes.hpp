@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/result.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/sim/fault_injection.hpp"
 #include "model/tree.hpp"
@@ -24,6 +25,7 @@ struct PlantChanges {
   /// Everything, for people: "link panda_link4: mass_kg = 3", "payload box, 1.6 kg on panda_hand,
   /// from 5 s to 9 s".
   std::vector<std::string> differences;
+  Diagnostics warnings;  ///< of what is allowed, and hardly meant
 };
 
 }  // namespace tandem::sim

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "base/process.hpp"
 #include "base/quoting.hpp"
@@ -10,6 +11,7 @@
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/sim/engine_loader.hpp"
+#include "hal/sim/payload.hpp"
 #include "hal/sim/scenario.hpp"
 #include "runtime/run/late_plans.hpp"
 #include "runtime/run/operator_link.hpp"
@@ -427,6 +429,11 @@ Diagnostics add_simulation(Composition& c, const Overrides& overrides) {
     auto faults = sim::read_scenario(scenario, e.robot, e.loop.period_ns, e.tree().get());
     if (!faults) return faults.error();
     sim.faults = std::move(*faults);
+    for (const sim::ScenarioFault& fault : sim.faults) {
+      if (fault.kind != hal::FaultKind::kPayload || e.tree() == nullptr) continue;
+      if (std::string heavy = sim::too_heavy(fault, *e.tree()); !heavy.empty())
+        c.warnings.push_back({heavy, "give its mass in kg", scenario, 0, "fault"});
+    }
   }
   auto backend = sim::SimRobot::create(e.robot, c.kernels.get(), sim);
   if (!backend) return {in_its_file(backend.error(), e)};
@@ -467,7 +474,9 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   if (!errors.empty()) {
     return errors.give().error();
   }
+  if (e.plant != nullptr) std::ranges::copy(e.plant->warnings, std::back_inserter(c.warnings));
   for (Error& warning : missing_retreats(c)) c.warnings.push_back(std::move(warning));
+  std::ranges::move(empty_timelines(c), std::back_inserter(c.warnings));
   if (c.controllers != nullptr && !overrides.duration_s && !overrides.serves) {
     std::ranges::move(late_plans(c), std::back_inserter(c.warnings));
   }

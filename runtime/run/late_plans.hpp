@@ -1,4 +1,4 @@
-// What the controllers of an experiment plan for a time after its end.
+// What the controllers of an experiment plan, or are to be told, for a time after its end.
 // Layer: apps/run.  Thread: main.
 #pragma once
 
@@ -8,7 +8,11 @@
 namespace tandem::runtime {
 
 /// A warning of each active controller that plans something for later than the run's end, with the
-/// key, both times and how much else is late.
+/// key, both times and how much else is late; and of each of its inputs whose timeline or file goes
+/// on after it, with the first such row.
 [[nodiscard]] Diagnostics late_plans(const Composition& composition);
+
+/// A warning of each input whose timeline has no row.
+[[nodiscard]] Diagnostics empty_timelines(const Composition& composition);
 
 }  // namespace tandem::runtime

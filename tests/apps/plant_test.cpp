@@ -65,6 +65,25 @@ TEST_F(ChangedPlant, IsListedByCheckWhichWarnsOfTimesAfterTheEnd) {
   expect_in(run.err + run.out, {"the payload late, 1 kg on link2 was never picked up"});
 }
 
+// 1600 kg in the place of 1.6 passed without a word.
+TEST_F(ChangedPlant, IsWarnedOfWhereItIsHeavierThanTheRobot) {
+  write_text(folder_ / "heavy.toml",
+             read_text(folder_ / "trajectory.toml") +
+                 "[[sim.payload]]\nname = 'box'\nlink = 'link2'\nmass_kg = 1600\nfrom_s = 100\n");
+  const std::string says = "1600 kg on link2 is heavier than the whole robot, 0.701 kg";
+  for (const std::string command : {"check heavy.toml", "run heavy.toml --duration 0.2 --no-log"}) {
+    const Outcome outcome = tandem(command);
+    expect_in(outcome.err, {"heavy.toml:", "mass_kg: " + says});
+  }
+  write_text(folder_ / "s.toml",
+             "[[fault]]\nkind = 'payload'\nlink = 'link2'\nmass_kg = 1600\nat_s = 100\n");
+  expect_in(tandem("run hold.toml --duration 0.2 --no-log --scenario s.toml").err,
+            {"s.toml: ", says});
+  const Outcome light = tandem("check p.toml");
+  EXPECT_EQ(light.status, 0) << light.err;
+  EXPECT_EQ(light.err.find("heavier"), std::string::npos) << light.err;
+}
+
 // 3 kg on the trunk of COMAN were "+9.5 %" of the weight.
 TEST_F(ChangedPlant, HasTheWeightThatTheGroundCarries) {
   const std::string coman = TANDEM_SOURCE_DIR "/config/coman/";

@@ -127,6 +127,46 @@ TEST_F(JogRun, ATrajectoryReplacesAnotherFromTheReference) {
   EXPECT_EQ(follow.cycle->faults().size(), 0U);
 }
 
+/// The warnings of a run with this timeline.
+std::string warned(const Overrides& overrides) {
+  Composition c;
+  EXPECT_TRUE(compose(c, TANDEM_SOURCE_DIR "/config/double_pendulum/jog.toml", overrides).empty());
+  std::string all;
+  for (const Error& warning : c.warnings) all += warning.to_string() + "\n";
+  return all;
+}
+
+// Nothing was said of either.
+TEST_F(JogRun, ATimelineWithoutRowsOrWithRowsAfterTheEndIsWarnedOf) {
+  EXPECT_EQ(warned(with({{0.5, 0.4}, {5.0, 0.0}})), "");
+  const std::string empty = warned(with({}));
+  for (const char* part : {"jog.toml:", "the timeline of the input 'rate' has no row"})
+    EXPECT_NE(empty.find(part), std::string::npos) << empty;
+  const std::string late = warned(with({{0.5, 0.4}, {6.0, 0.0}, {8.5, 0.1}}));
+  for (const char* part :
+       {"jog.toml:", "row 2 of the timeline of the input 'rate' arrives 6 s after", "and 1 more",
+        "the run ends after 5 s", "duration_s = 8.5"})
+    EXPECT_NE(late.find(part), std::string::npos) << late;
+  Overrides asked = with({{0.5, 0.4}, {6.0, 0.0}});
+  asked.duration_s = 2.0;
+  EXPECT_EQ(warned(asked), "") << "who says how long knows it";
+}
+
+TEST_F(JogRun, ARowOfAFileAfterTheEndIsWarnedOfAtItsLine) {
+  const test::ScratchFolder folder;
+  const std::string file = folder / "rates.csv";
+  std::ofstream(file) << "time_s,joint2\n0.5,0.4\n60,0\n";
+  const std::string late = warned({.change = [&](Experiment& e) {
+    InputSource& source = e.controllers.front().inputs.front();
+    source.feeder = InputFeeder::kFile;
+    source.file = file;
+    source.timeline.clear();
+  }});
+  EXPECT_NE(late.find("rates.csv:3: this row of the input 'rate' arrives 60 s after"),
+            std::string::npos)
+      << late;
+}
+
 TEST_F(JogRun, ATimelineBeyondItsBoundsIsAnErrorWithItsPlace) {
   Composition c;
   const Diagnostics errors =
