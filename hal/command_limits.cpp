@@ -44,12 +44,14 @@ CommandLimits::CommandLimits(const Robot& robot, std::int64_t period_ns)
       position_(limits_.size()),
       velocity_(limits_.size()),
       counters_(limits_.size()),
-      codes_(limits_.size(), Code::kOk) {}
+      codes_(limits_.size(), Code::kOk),
+      met_(limits_.size()) {}
 
 Code CommandLimits::apply(const StateImage& state, CommandImage& command) noexcept TANDEM_RT {
   Code worst = Code::kOk;
   for (std::size_t j = 0; j < limits_.size(); ++j) {
     codes_[j] = Code::kOk;
+    met_[j] = {};
     Last& last = last_[j];
     const Last was = last;
     modes(j, command);
@@ -94,11 +96,42 @@ void CommandLimits::modes(std::size_t joint, CommandImage& command) noexcept TAN
   const bool known = mode >= static_cast<std::int8_t>(ControlMode::kIdle) &&
                      mode <= static_cast<std::int8_t>(ControlMode::kCurrent) && interaction <= 1;
   if (!known) {
+    const bool is_mode = interaction <= 1;
+    note(joint, {is_mode ? CommandField::kMode : CommandField::kInteraction, LimitKind::kNotFinite,
+                 is_mode ? static_cast<double>(mode) : static_cast<double>(interaction)});
     mode = static_cast<std::int8_t>(last.mode);
     interaction = static_cast<std::uint8_t>(last.interaction);
     ++counters_[joint].not_finite;
     codes_[joint] = Code::kNotFinite;
   }
+}
+
+void CommandLimits::note(std::size_t joint, const Met& met) noexcept TANDEM_RT {
+  const auto rank = [](LimitKind kind) {  // the two of speed are alike
+    return kind == LimitKind::kAtEnd ? LimitKind::kTooFast : kind;
+  };
+  if (rank(met.kind) <= rank(met_[joint].kind)) return;
+  met_[joint] = {.value = met.value,
+                 .limit = met.limit,
+                 .field = met.field,
+                 .kind = met.kind,
+                 .derivative = met.derivative,
+                 .slides = static_cast<std::uint8_t>(limits_[joint].slides ? 1 : 0)};
+}
+
+/// What is too much of a position reference that moves too fast: velocity, acceleration or jerk.
+void CommandLimits::note_speed(std::size_t joint, double reference, double asked_rad_s,
+                               double before_rad_s, double most_rad_s) noexcept TANDEM_RT {
+  const JointCapabilities& limit = limits_[joint];
+  Met met{CommandField::kPosition, LimitKind::kTooFast, reference, most_rad_s, 1};
+  if (std::abs(asked_rad_s) <= most_rad_s * (1.0 + 1e-9)) {
+    const double asked_rad_s2 = std::abs(asked_rad_s - before_rad_s) / period_s_;
+    const bool jerks =
+        std::isfinite(limit.max_jerk_rad_s3) && asked_rad_s2 <= limit.max_acceleration_rad_s2;
+    met.limit = jerks ? limit.max_jerk_rad_s3 : limit.max_acceleration_rad_s2;
+    met.derivative = jerks ? 3 : 2;
+  }
+  note(joint, met);
 }
 
 void CommandLimits::position(std::size_t joint, const StateImage& state,
@@ -126,7 +159,7 @@ void CommandLimits::position(std::size_t joint, const StateImage& state,
   const double max = std::max(limit.max_position_rad, from);
   const bool outside = from < limit.min_position_rad || from > limit.max_position_rad;
   const double speed = limit.max_velocity_rad_s * (outside ? kRecoveryShare : 1.0);
-  bounded(joint, reference, last.position_rad, min, max);
+  bounded(joint, CommandField::kPosition, reference, last.position_rad, min, max);
   double limited = 0.0;
   if (std::isfinite(limit.max_acceleration_rad_s2)) {
     if (!closed) {
@@ -147,8 +180,12 @@ void CommandLimits::position(std::size_t joint, const StateImage& state,
     // A reference that runs at exactly the maximum velocity is not changed for its rounding.
     if (std::abs(limited - reference) <= 1e-9 * step) limited = reference;
   }
+  if (limited != reference) {
+    note_speed(joint, reference, (reference - from) / period_s_, closed ? last.speed_rad_s : 0.0,
+               speed);
+    ++counters_[joint].too_fast;
+  }
   last.speed_rad_s = (limited - from) / period_s_;
-  if (limited != reference) ++counters_[joint].too_fast;
   reference = limited;
   last.position_rad = reference;
 }
@@ -167,7 +204,10 @@ void CommandLimits::brake_before_ends(std::size_t joint, double position_rad,
   double slower = reference;
   if (up >= 0.0) slower = std::min(slower, fastest(up));
   if (down >= 0.0) slower = std::max(slower, -fastest(down));
-  if (slower != reference) ++counters_[joint].too_fast;
+  if (slower != reference) {
+    note(joint, {CommandField::kVelocity, LimitKind::kAtEnd, reference, slower});
+    ++counters_[joint].too_fast;
+  }
   reference = slower;
 }
 
@@ -188,7 +228,7 @@ void CommandLimits::velocity(std::size_t joint, const Last& was, const StateImag
     if (position < limit.min_position_rad) max = slow;
   }
   go_on(reference, was.velocity_rad_s, was.velocity_wish_rad_s);
-  bounded(joint, reference, last.velocity_rad_s, min, max);
+  bounded(joint, CommandField::kVelocity, reference, last.velocity_rad_s, min, max);
   last.velocity_wish_rad_s = reference;
   if (last.held_back != 0) reference = last.velocity_rad_s = std::clamp(last.speed_rad_s, min, max);
   if (!follows || !in_operation(state, joint)) return;
@@ -198,7 +238,8 @@ void CommandLimits::velocity(std::size_t joint, const Last& was, const StateImag
   const double measured = state.velocity_rad_s()[joint];
   const double from = closed || !std::isfinite(measured) ? was.velocity_rad_s : measured;
   if (!std::isfinite(limit.max_jerk_rad_s3)) {
-    rated(joint, reference, last.velocity_rad_s, from, acceleration_of(limit) * period_s_);
+    rated(joint, CommandField::kVelocity, reference, last.velocity_rad_s, from,
+          acceleration_of(limit) * period_s_);
   } else {
     if (!closed) velocity_[joint].begin(from);
     const double limited = velocity_[joint].step(reference,
@@ -207,7 +248,13 @@ void CommandLimits::velocity(std::size_t joint, const Last& was, const StateImag
                                                   .velocity = limit.max_acceleration_rad_s2,
                                                   .acceleration = limit.max_jerk_rad_s3},
                                                  period_s_);
-    if (limited != reference) ++counters_[joint].too_fast;
+    if (limited != reference) {
+      const bool jerks = std::abs(reference - from) <= limit.max_acceleration_rad_s2 * period_s_;
+      note(joint, {CommandField::kVelocity, LimitKind::kTooFast, reference,
+                   jerks ? limit.max_jerk_rad_s3 : limit.max_acceleration_rad_s2,
+                   static_cast<std::uint8_t>(jerks ? 2 : 1)});
+      ++counters_[joint].too_fast;
+    }
     reference = last.velocity_rad_s = limited;
   }
   if (reference >= min && reference <= max) return;
@@ -221,7 +268,7 @@ void CommandLimits::torque(std::size_t joint, const Last& was, const StateImage&
   double& reference = command.torque_Nm()[joint];
   const double most = limits_[joint].max_torque_Nm;
   go_on(reference, was.torque_Nm, was.torque_wish_Nm);
-  bounded(joint, reference, last.torque_Nm, -most, most);
+  bounded(joint, CommandField::kTorque, reference, last.torque_Nm, -most, most);
   last.torque_wish_Nm = reference;
   if (!in_operation(state, joint)) return;
   const auto by_torque = [](const Last& sent) {  // not a torque beside a stiff loop's
@@ -232,7 +279,7 @@ void CommandLimits::torque(std::size_t joint, const Last& was, const StateImage&
   };
   const bool starts = by_torque(last) && !(by_torque(was) && was.operates != 0);
   const double measured = state.torque_Nm()[joint];
-  rated(joint, reference, last.torque_Nm,
+  rated(joint, CommandField::kTorque, reference, last.torque_Nm,
         starts && std::isfinite(measured) ? measured : was.torque_Nm,
         limits_[joint].max_torque_rate_Nm_s * period_s_);
 }
@@ -244,13 +291,15 @@ void CommandLimits::direct(std::size_t joint, const Last& was, const StateImage&
   const bool operates = in_operation(state, joint);
   const auto one = [&](ControlMode mode, double& value, double& sent, double& wish, double before,
                        double measured, double most, double rate) noexcept {
+    const CommandField field =
+        mode == ControlMode::kCurrent ? CommandField::kCurrent : CommandField::kVoltage;
     go_on(value, before, wish);
-    bounded(joint, value, sent, -most, most);
+    bounded(joint, field, value, sent, -most, most);
     wish = value;
     if (!operates || !is(mode, last.mode)) return;
     const bool closed = is(mode, was.mode) && was.operates != 0;
     const double from = closed || !std::isfinite(measured) ? before : measured;
-    rated(joint, value, sent, std::clamp(from, -most, most), rate * period_s_);
+    rated(joint, field, value, sent, std::clamp(from, -most, most), rate * period_s_);
   };
   one(ControlMode::kOpenLoop, command.voltage_V()[joint], last.voltage_V, last.voltage_wish_V,
       was.voltage_V, state.voltage_V()[joint], limit.max_voltage_V, limit.max_voltage_rate_V_s);
@@ -266,8 +315,10 @@ void CommandLimits::impedance(std::size_t joint, const Last& was, const StateIma
   double& damping = command.damping_Nms_rad()[joint];
   go_on(stiffness, was.stiffness_Nm_rad, was.stiffness_wish_Nm_rad);
   go_on(damping, was.damping_Nms_rad, was.damping_wish_Nms_rad);
-  bounded(joint, stiffness, last.stiffness_Nm_rad, 0.0, limit.max_stiffness_Nm_rad);
-  bounded(joint, damping, last.damping_Nms_rad, 0.0, limit.max_damping_Nms_rad);
+  bounded(joint, CommandField::kStiffness, stiffness, last.stiffness_Nm_rad, 0.0,
+          limit.max_stiffness_Nm_rad);
+  bounded(joint, CommandField::kDamping, damping, last.damping_Nms_rad, 0.0,
+          limit.max_damping_Nms_rad);
   last.stiffness_wish_Nm_rad = stiffness;
   last.damping_wish_Nms_rad = damping;
   const auto compliant = static_cast<std::int64_t>(InteractionMode::kCompliant);
@@ -276,34 +327,39 @@ void CommandLimits::impedance(std::size_t joint, const Last& was, const StateIma
     return;
   }
   const double share = period_s_ / kFullScale_s;
-  rated(joint, stiffness, last.stiffness_Nm_rad, was.stiffness_Nm_rad,
+  rated(joint, CommandField::kStiffness, stiffness, last.stiffness_Nm_rad, was.stiffness_Nm_rad,
         limit.max_stiffness_Nm_rad * share);
-  rated(joint, damping, last.damping_Nms_rad, was.damping_Nms_rad,
+  rated(joint, CommandField::kDamping, damping, last.damping_Nms_rad, was.damping_Nms_rad,
         limit.max_damping_Nms_rad * share);
 }
 
-void CommandLimits::rated(std::size_t joint, double& value, double& last, double from,
-                          double step) noexcept TANDEM_RT {
+void CommandLimits::rated(std::size_t joint, CommandField field, double& value, double& last,
+                          double from, double step) noexcept TANDEM_RT {
   const double limited = std::clamp(value, from - step, from + step);
   if (std::abs(limited - value) <= 1e-9 * step) return;
+  note(joint, {field, LimitKind::kTooFast, value, step / period_s_, 1});
   value = last = limited;
   ++counters_[joint].too_fast;
 }
 
-void CommandLimits::correct(std::size_t joint, double& value, double last, double min,
-                            double max) noexcept TANDEM_RT {
+void CommandLimits::correct(std::size_t joint, CommandField field, double& value, double last,
+                            double min, double max) noexcept TANDEM_RT {
   if (!std::isfinite(value)) {
+    note(joint, {field, LimitKind::kNotFinite, value});
     value = last;
     ++counters_[joint].not_finite;
     codes_[joint] = Code::kNotFinite;
   }
   if (value < min || value > max) {
+    note(joint, {field, LimitKind::kRange, value, value < min ? min : max});
     value = std::clamp(value, min, max);
     ++counters_[joint].out_of_range;
     if (codes_[joint] == Code::kOk) codes_[joint] = Code::kOutOfRange;
   }
 }
 
-void CommandLimits::archive(Archive& ar) { ar(last_, position_, velocity_, counters_, codes_); }
+void CommandLimits::archive(Archive& ar) {
+  ar(last_, position_, velocity_, counters_, codes_, met_);
+}
 
 }  // namespace tandem::hal

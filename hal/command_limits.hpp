@@ -10,6 +10,7 @@
 #include "base/realtime.hpp"
 #include "hal/image.hpp"
 #include "hal/joint_capabilities.hpp"
+#include "hal/limit_met.hpp"
 #include "hal/reference_motion.hpp"
 #include "hal/robot.hpp"
 
@@ -67,6 +68,8 @@ class CommandLimits {
   /// What apply() answered for each joint in the last cycle.
   [[nodiscard]] std::span<const Code> codes() const noexcept { return codes_; }
   [[nodiscard]] std::span<const LimitCounters> counters() const noexcept { return counters_; }
+  /// What was changed of each joint in the last cycle: the worst, and of those the first.
+  [[nodiscard]] std::span<const LimitMet> met() const noexcept { return met_; }
   [[nodiscard]] std::span<const JointCapabilities> limits() const noexcept { return limits_; }
 
   void archive(Archive& ar);
@@ -94,6 +97,16 @@ class CommandLimits {
     double speed_rad_s = 0.0;    // of the position reference
     std::int64_t held_back = 0;  // the position reference was
   };
+  /// A value that a limit is about to change.
+  struct Met {
+    CommandField field;
+    LimitKind kind;
+    double value, limit = 0.0;
+    std::uint8_t derivative = 0;  // that the limit is of
+  };
+  void note(std::size_t joint, const Met& met) noexcept TANDEM_RT;
+  void note_speed(std::size_t joint, double reference, double asked_rad_s, double before_rad_s,
+                  double most_rad_s) noexcept TANDEM_RT;
   void modes(std::size_t joint, CommandImage& command) noexcept TANDEM_RT;
   void position(std::size_t joint, const StateImage& state,
                 CommandImage& command) noexcept TANDEM_RT;
@@ -109,15 +122,15 @@ class CommandLimits {
   void impedance(std::size_t joint, const Last& was, const StateImage& state,
                  CommandImage& command) noexcept TANDEM_RT;
   /// Holds `value` near `from`, and counts it.
-  void rated(std::size_t joint, double& value, double& last, double from,
+  void rated(std::size_t joint, CommandField field, double& value, double& last, double from,
              double step) noexcept TANDEM_RT;
-  void bounded(std::size_t joint, double& value, double& last, double min,
+  void bounded(std::size_t joint, CommandField field, double& value, double& last, double min,
                double max) noexcept TANDEM_RT {
     if (!(std::isfinite(value) && value >= min && value <= max)) [[unlikely]]
-      correct(joint, value, last, min, max);
+      correct(joint, field, value, last, min, max);
     last = value;
   }
-  void correct(std::size_t joint, double& value, double last, double min,
+  void correct(std::size_t joint, CommandField field, double& value, double last, double min,
                double max) noexcept TANDEM_RT;
 
   double period_s_;
@@ -126,6 +139,7 @@ class CommandLimits {
   std::vector<ReferenceMotion> position_, velocity_;  // of joints with a declared acceleration
   std::vector<LimitCounters> counters_;
   std::vector<Code> codes_;
+  std::vector<LimitMet> met_;
 };
 
 }  // namespace tandem::hal

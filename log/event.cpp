@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cstdio>
 #include <iterator>
+#include <limits>
 #include <numbers>
 #include <string>
 
@@ -129,12 +130,13 @@ const EventRow* row_of(EventKind kind) {
   return index < std::size(kRows) ? &kRows[index] : nullptr;
 }
 
-std::string what_happened(const Event& event, const EventNames& names) {
+std::string what_happened(const Event& event, const EventNames& names, const hal::LimitMet& met) {
   std::string text = to_string(event.kind);
   if (event.kind == EventKind::kInjected) {
     text += " " + std::string(hal::to_string(static_cast<hal::FaultKind>(event.code)));
   }
   text += whose(event, names);
+  if (met.kind != hal::LimitKind::kNone) return text + ": " + hal::in_words(met);
   const EventRow* row = row_of(event.kind);
   if (row == nullptr) return text;
   // A motion's 0 is a unit, and that of a limit its speed.
@@ -175,18 +177,21 @@ bool is_fault(EventKind kind) noexcept {
 
 bool is_stop(const Event& event) noexcept { return is_fault(event.kind) && event.reported == 0; }
 
-std::string describe(const Event& event, const EventNames& names) {
+std::string describe(const Event& event, const EventNames& names, const hal::LimitMet& met) {
   std::string who;
   if (event.controller != 0 && names.controller)
     who = ", controller '" + names.controller(event.controller - 1U) + "'";
-  return what_happened(event, names) + who + (event.reported != 0 ? ", reported" : "");
+  return what_happened(event, names, met) + who + (event.reported != 0 ? ", reported" : "");
 }
 
 std::string describe(const ParameterSet& set) {
   const std::size_t letters = std::min<std::size_t>(set.letters, set.name.size());
+  const std::string named = ": " + std::string(set.name.data(), letters) + " = ";
+  const std::size_t word = std::min<std::size_t>(set.word_letters, set.word.size());
+  if (word > 0) return named + std::string(set.word.data(), word);
   std::array<char, 32> number{};
   const auto end = std::to_chars(number.data(), number.data() + number.size(), set.value).ptr;
-  return ": " + std::string(set.name.data(), letters) + " = " + std::string(number.data(), end);
+  return named + std::string(number.data(), end);
 }
 
 std::optional<ParameterText> parameter_of(const std::string& event_text) {
@@ -198,8 +203,10 @@ std::optional<ParameterText> parameter_of(const std::string& event_text) {
   ParameterText found{.name = event_text.substr(begin, equals - begin)};
   const char *first = event_text.data() + equals + 3, *last = event_text.data() + event_text.size();
   const auto [end, error] = std::from_chars(first, last, found.value);
-  if (error != std::errc() || end != last) return std::nullopt;
-  return found;
+  if (error == std::errc() && end == last) return found;
+  found.value = std::numeric_limits<double>::quiet_NaN();
+  found.word = event_text.substr(equals + 3);
+  return found.word.empty() ? std::nullopt : std::optional(found);
 }
 
 const std::string& event_schema() {

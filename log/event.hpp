@@ -14,6 +14,7 @@
 #include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "hal/fault_kind.hpp"
+#include "hal/limit_met.hpp"
 #include "hal/stop_category.hpp"
 #include "log/bytes.hpp"
 
@@ -65,24 +66,30 @@ struct EventNames {
 
 /// A controller's parameter that was set, or came with it.
 struct ParameterSet {
-  static constexpr std::size_t kLongestName = 200;
+  static constexpr std::size_t kLongestName = 200, kLongestWord = 96;
 
   double value = 0.0;
   std::uint32_t letters = 0;              ///< of the name, as far as it has room
+  std::uint32_t word_letters = 0;         ///< of the word; 0: the value is a number
   std::array<char, kLongestName> name{};  ///< "squat.link_damping_Nms_rad"
+  std::array<char, kLongestWord> word{};  ///< of a choice or a boolean
 };
-/// ": squat.link_damping_Nms_rad = 12.5": the shortest number that reads as the same double.
+/// ": squat.link_damping_Nms_rad = 12.5": the shortest number that reads as the same double; of a
+/// choice its word, of a boolean true or false.
 [[nodiscard]] std::string describe(const ParameterSet& set);
 /// What the text of an event of the kinds kParameterSet and kParameterLoaded says, bit for bit;
 /// empty: it is none.
 struct ParameterText {
   std::string name;
-  double value = 0.0;
+  double value = 0.0;  ///< NaN: it is a word
+  std::string word{};
 };
 [[nodiscard]] std::optional<ParameterText> parameter_of(const std::string& event_text);
 
 /// One line for people: "fault of LHipMot (0x7310)".
-[[nodiscard]] std::string describe(const Event& event, const EventNames& names);
+/// @param met  the command that it is about, of kLimited and of a fault by a command
+[[nodiscard]] std::string describe(const Event& event, const EventNames& names,
+                                   const hal::LimitMet& met = {});
 
 /// The channel's ros2msg definition.
 [[nodiscard]] const std::string& event_schema();

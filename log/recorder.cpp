@@ -21,6 +21,19 @@ namespace {
 constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kTextChannel = 0xFFFF;
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
+/// @param more  what was pushed behind the event
+std::string whole_text(const Event& event, std::span<const std::byte> more,
+                       const EventNames& names) {
+  hal::LimitMet met;
+  ParameterSet set;
+  static_assert(sizeof met != sizeof set);
+  if (more.size() == sizeof met) std::memcpy(&met, more.data(), sizeof met);
+  std::string text = describe(event, names, met);
+  if (more.size() != sizeof set) return text;
+  std::memcpy(&set, more.data(), sizeof set);
+  return text + describe(set);
+}
+
 }  // namespace
 
 struct Recorder::Slot {
@@ -167,14 +180,24 @@ bool Recorder::push(const hal::TextEvent& event) noexcept TANDEM_RT {
   return push(kTextChannel, event.time_ns, std::as_bytes(std::span(&event, 1)));
 }
 
-bool Recorder::push(const Event& event, std::string_view parameter,
-                    double value) noexcept TANDEM_RT {
+bool Recorder::push(const Event& event, std::string_view parameter, double value,
+                    std::string_view word) noexcept TANDEM_RT {
   struct {
     Event event;
     ParameterSet set;
   } both{event, {.value = value}};
   both.set.letters =
       static_cast<std::uint32_t>(parameter.copy(both.set.name.data(), both.set.name.size()));
+  both.set.word_letters =
+      static_cast<std::uint32_t>(word.copy(both.set.word.data(), both.set.word.size()));
+  return push(kEventChannel, event.time_ns, std::as_bytes(std::span(&both, 1)));
+}
+
+bool Recorder::push(const Event& event, const hal::LimitMet& met) noexcept TANDEM_RT {
+  struct {
+    Event event;
+    hal::LimitMet met;
+  } const both{event, met};
   return push(kEventChannel, event.time_ns, std::as_bytes(std::span(&both, 1)));
 }
 
@@ -224,13 +247,7 @@ void Recorder::write(std::span<const std::byte> slot) {
   if (head.channel == kEventChannel) {
     Event event;
     std::memcpy(&event, body.data(), sizeof event);
-    std::string text = describe(event, names_);
-    if (body.size() > sizeof event) {
-      ParameterSet set;
-      std::memcpy(&set, body.data() + sizeof event, sizeof set);
-      text += describe(set);
-    }
-    encode_event(event, text, event_);
+    encode_event(event, whole_text(event, body.subspan(sizeof event), names_), event_);
     write(kEventChannel, head.time_ns, event_);
     return;
   }

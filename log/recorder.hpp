@@ -124,8 +124,11 @@ class Recorder {
   bool push(const Event& event) noexcept TANDEM_RT;
   /// A controller's words: an event, and a line of /rosout.
   bool push(const hal::TextEvent& event) noexcept TANDEM_RT;
-  /// An event about a parameter: its text has both.
-  bool push(const Event& event, std::string_view parameter, double value) noexcept TANDEM_RT;
+  /// An event about a parameter: its text has both. @param word  for the value; empty: none
+  bool push(const Event& event, std::string_view parameter, double value,
+            std::string_view word) noexcept TANDEM_RT;
+  /// An event about a command: its text has field, value and limit.
+  bool push(const Event& event, const hal::LimitMet& met) noexcept TANDEM_RT;
 
   /// The same from that other thread.
   bool push_side(Channel channel, std::int64_t time_ns, std::span<const std::byte> image) noexcept;

@@ -159,7 +159,8 @@ std::vector<RunParameter> parameters_of(const std::vector<log::EventText>& event
     RunParameter& one = known == all.end() ? all.emplace_back() : *known;
     one.name = it->name;
     const double time_s = static_cast<double>(event.time_ns) * 1e-9;
-    std::string value = fmt::format("{:g} at {:.3f} s", it->value, time_s);
+    const std::string given = it->word.empty() ? fmt::format("{:g}", it->value) : it->word;
+    std::string value = fmt::format("{} at {:.3f} s", given, time_s);
     if (event.kind == log::EventKind::kParameterLoaded) {
       one = {one.name, std::move(value)};
     } else {

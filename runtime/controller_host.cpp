@@ -268,7 +268,7 @@ void ControllerHost::tell_parameters(const hal::CycleTime& time, CycleLog& log) 
     for (; one != nullptr && most > 0 && one->told < one->loaded.size(); --most) {
       const ParameterChange& its = one->loaded[one->told++];
       if (its.parameter->was_set) continue;
-      log.event(time, log::EventKind::kParameterLoaded, its.name, its.value);
+      log.event(time, log::EventKind::kParameterLoaded, its);
     }
   }
 }

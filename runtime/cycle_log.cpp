@@ -136,17 +136,22 @@ void CycleLog::input(const hal::CycleTime& time, InputPort& port) noexcept TANDE
 }
 
 void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint,
-                     std::uint32_t code, float value, bool reported,
-                     std::int32_t controller) noexcept TANDEM_RT {
+                     std::uint32_t code, float value, bool reported, std::int32_t controller,
+                     const hal::LimitMet& met) noexcept TANDEM_RT {
   if (recorder_ == nullptr) return;
-  recorder_->push(log::Event{.cycle = time.cycle,
-                             .time_ns = time.time_ns,
-                             .code = code,
-                             .joint = joint,
-                             .kind = kind,
-                             .reported = static_cast<std::uint8_t>(reported ? 1 : 0),
-                             .controller = controller_number(controller),
-                             .value = value});
+  const log::Event event{.cycle = time.cycle,
+                         .time_ns = time.time_ns,
+                         .code = code,
+                         .joint = joint,
+                         .kind = kind,
+                         .reported = static_cast<std::uint8_t>(reported ? 1 : 0),
+                         .controller = controller_number(controller),
+                         .value = value};
+  if (met.kind == hal::LimitKind::kNone) {
+    recorder_->push(event);
+  } else {
+    recorder_->push(event, met);
+  }
 }
 
 void CycleLog::event(const hal::CycleTime& time,
@@ -167,11 +172,11 @@ void CycleLog::event(const hal::CycleTime& time,
   recorder_->push(event);
 }
 
-void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::string_view name,
-                     double value) noexcept TANDEM_RT {
+void CycleLog::event(const hal::CycleTime& time, log::EventKind kind,
+                     const ParameterChange& change) noexcept TANDEM_RT {
   if (recorder_ == nullptr) return;
-  recorder_->push(log::Event{.cycle = time.cycle, .time_ns = time.time_ns, .kind = kind}, name,
-                  value);
+  recorder_->push(log::Event{.cycle = time.cycle, .time_ns = time.time_ns, .kind = kind},
+                  change.name, change.value, change.parameter->word_of(change.value));
 }
 
 void CycleLog::images(const hal::CycleTime& time, const hal::StateImage& state,

@@ -40,13 +40,14 @@ class CycleLog {
   /// @param value  of the kinds that have one
   /// @param reported  a fault that stops nothing
   /// @param controller  whose doing it is; -1: nobody's
+  /// @param met  the command that it is about
   void event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint = -1,
              std::uint32_t code = 0, float value = 0.0F, bool reported = false,
-             std::int32_t controller = -1) noexcept TANDEM_RT;
+             std::int32_t controller = -1, const hal::LimitMet& met = {}) noexcept TANDEM_RT;
   void event(const hal::CycleTime& time, const hal::InjectedFault& fault) noexcept TANDEM_RT;
-  /// A controller's parameter was set, or came with it. @param name  "squat.link_damping_Nms_rad"
-  void event(const hal::CycleTime& time, log::EventKind kind, std::string_view name,
-             double value) noexcept TANDEM_RT;
+  /// A controller's parameter was set, or came with it.
+  void event(const hal::CycleTime& time, log::EventKind kind,
+             const ParameterChange& change) noexcept TANDEM_RT;
   /// A sample that has arrived.
   void input(const hal::CycleTime& time, InputPort& port) noexcept TANDEM_RT;
   void images(const hal::CycleTime& time, const hal::StateImage& state,

@@ -64,8 +64,8 @@ struct CycleNow : CycleParts {
     return estimator == nullptr ? nullptr : &estimator->image();
   }
   void event(log::EventKind kind, std::int32_t joint = -1, std::uint32_t code = 0,
-             std::int32_t controller = -1) noexcept TANDEM_RT {
-    log.event(time, kind, joint, code, 0.0F, false, controller);
+             std::int32_t controller = -1, const hal::LimitMet& met = {}) noexcept TANDEM_RT {
+    log.event(time, kind, joint, code, 0.0F, false, controller, met);
   }
   void archive(Archive& ar) {
     ar(loop, time, read_code, run, limits, state, watch, faults);

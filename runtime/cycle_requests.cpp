@@ -76,7 +76,7 @@ void log(CycleNow& now, const CycleRequest& request) noexcept TANDEM_RT {
     case RequestKind::kGains: return now.event(EventKind::kGainsSet, joint);
     case RequestKind::kSet:
       for (const ParameterChange& change : *request.changes)
-        now.log.event(now.time, EventKind::kParameterSet, change.name, change.value);
+        now.log.event(now.time, EventKind::kParameterSet, change);
       return;
     case RequestKind::kMove: break;
     default: return;

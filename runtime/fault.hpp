@@ -10,6 +10,7 @@
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
+#include "hal/limit_met.hpp"
 #include "hal/stop_category.hpp"
 
 namespace tandem::runtime {
@@ -25,6 +26,7 @@ struct FaultRecord {
   hal::StopCategory category = hal::row_of(cause).category;
   std::uint8_t padding[2] = {};
   std::int32_t controller = -1;  ///< whose doing it is, for ControllerHost::name(); -1: nobody's
+  hal::LimitMet met{};           ///< of kCommand: what was commanded
 };
 
 /// Whether it is of the link to a robot far away.

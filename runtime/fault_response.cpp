@@ -18,7 +18,7 @@ void FaultResponse::raise(FaultRecord record) noexcept TANDEM_RT {
   now_.log.event(now_.time, log::event_of(record.cause), of_joint && !of_base ? record.index : -1,
                  row.number != 0 ? row.number : record.code,
                  by_value ? static_cast<float>(record.index) : 0.0F,
-                 record.category == StopCategory::kWarn, record.controller);
+                 record.category == StopCategory::kWarn, record.controller, record.met);
   if (record.category == StopCategory::kCategory2 && !now_.run.in(RunPhase::kRetreating) &&
       !retreat()) {
     record.category = StopCategory::kCategory1;  // nobody can

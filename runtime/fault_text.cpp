@@ -73,8 +73,13 @@ std::string text_of(const FaultRecord& record, const FaultContext& about) {
   if (hal::is_of_drive(record.cause) && record.cause != FaultCause::kJointLost) {
     return about.backend.fault_text(record.cause, record.code);
   }
-  if (record.cause == FaultCause::kCommand && record.controller >= 0) {
-    return "the command of the controller '" + name_of(record, about) + "' was not a finite number";
+  if (record.cause == FaultCause::kCommand && record.met.kind != hal::LimitKind::kNone) {
+    const std::string whose =
+        record.controller < 0 ? "a controller" : "the controller '" + name_of(record, about) + "'";
+    const bool is_mode = record.met.field >= hal::CommandField::kMode;
+    return "the command of " + whose +
+           (is_mode ? " has what does not exist: " : " was not a finite number: ") +
+           hal::value_in_words(record.met);
   }
   if (log::event_of(record.cause) == log::EventKind::kFell) {
     return fall_text({record.cause, record.index}, about.config.fall);

@@ -44,7 +44,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
                 parts.controllers.gains(), now_.log),
       shown_(now_, resets_, homing_, arbiter_, services_),
       trace_(config.trace_cycles),
-      limited_(parts.robot.joints.size(), kNever),
+      limited_(parts.robot.joints.size()),
       limits_met_(parts.robot.joints.size()) {}
 
 bool RobotCycle::begin() noexcept {
@@ -257,13 +257,12 @@ void RobotCycle::limit() noexcept TANDEM_RT {
   note_limits();
   const auto codes = now_.limits.codes();
   for (std::size_t j = 0; limited != Code::kOk && j < codes.size(); ++j) {
-    if (codes[j] == Code::kOk) continue;
-    const auto joint = static_cast<std::int32_t>(j);
     if (codes[j] == Code::kNotFinite && now_.run.controllers_run()) {
-      response_.raise({.index = joint,
+      response_.raise({.index = static_cast<std::int32_t>(j),
                        .code = static_cast<std::uint32_t>(codes[j]),
                        .cause = FaultCause::kCommand,
-                       .controller = now_.controllers.owner_id(j)});
+                       .controller = now_.controllers.owner_id(j),
+                       .met = now_.limits.met()[j]});
     }
   }
   trace_.mark(CycleStage::kLimit, now_.clock);
@@ -278,10 +277,11 @@ void RobotCycle::note_limits() noexcept TANDEM_RT {
     const std::uint64_t met = std::uint64_t{now.not_finite} + now.out_of_range + now.too_fast;
     if (std::exchange(limits_met_[j], met) == met) continue;
     const std::int32_t owner = now_.controllers.owner_id(j);
-    if (limited_[j] >= 0 || (limited_[j] != kNever && owner < 0)) continue;
+    const std::int32_t before = limited_[j].controller;
+    if (before >= 0 || (before != kNever && owner < 0)) continue;
+    limited_[j] = {.met = now_.limits.met()[j], .controller = owner};
     now_.event(EventKind::kLimited, static_cast<std::int32_t>(j),
-               static_cast<std::uint32_t>(now_.limits.codes()[j]), owner);
-    limited_[j] = owner;
+               static_cast<std::uint32_t>(now_.limits.codes()[j]), owner, limited_[j].met);
   }
 }
 

@@ -58,7 +58,11 @@ class RobotCycle {
   /// For ControllerHost::name(): whose command was the first of `joint` that a limit changed; -1:
   /// no controller's. Between two steps.
   [[nodiscard]] std::int32_t limited(std::size_t joint) const noexcept {
-    return std::max(limited_[joint], -1);
+    return std::max(limited_[joint].controller, -1);
+  }
+  /// What that was; of kind kNone where there was none.
+  [[nodiscard]] const hal::LimitMet& first_limited(std::size_t joint) const noexcept {
+    return limited_[joint].met;
   }
 
   /// Every fault so far, in the order of their times. Any thread.
@@ -119,7 +123,12 @@ class RobotCycle {
   bool started_ = false;            // the first cycle was
   bool ends_with_command_ = false;  // controllers wrote in this cycle
   static constexpr std::int32_t kNever = -2;
-  std::vector<std::int32_t> limited_;      // by joint: noted once each, with whose command it was
+  struct Limited {
+    hal::LimitMet met{};
+    std::int32_t controller = kNever;  // whose command it was
+    std::int32_t padding = 0;
+  };
+  std::vector<Limited> limited_;           // by joint: noted once each
   std::vector<std::uint64_t> limits_met_;  // by joint: how often so far
   std::int64_t took_ns_ = 0;               // of the last cycle, from its grid point
 };

@@ -39,7 +39,7 @@ bool has_base_wrench(const hal::EstimateImage& image, const runtime::EstimateFig
 struct JointFigures {
   runtime::TrackingError error;
   std::uint64_t limited_cycles = 0;
-  std::optional<std::string> limited_controller{};
+  std::optional<std::string> limited_controller{}, limited_command{};
 };
 
 struct ControllerFigures {
@@ -64,12 +64,13 @@ Named<JointFigures> joints_of(const RunSummary& s) {
   const auto limited = s.cycle.statistics().limited_cycles();
   for (std::size_t j = 0; j < tracking.size(); ++j) {
     const std::int32_t who = s.cycle.limited(j);
-    joints.emplace_back(
-        s.composition.experiment.robot.joints[j].name,
-        JointFigures{tracking[j], limited[j],
-                     known(who >= 0, who < 0 ? std::string()
-                                             : s.composition.controllers->name(
-                                                   static_cast<std::size_t>(who)))});
+    const hal::LimitMet& met = s.cycle.first_limited(j);
+    joints.emplace_back(s.composition.experiment.robot.joints[j].name,
+                        JointFigures{tracking[j], limited[j],
+                                     known(who >= 0, who < 0 ? std::string()
+                                                             : s.composition.controllers->name(
+                                                                   static_cast<std::size_t>(who))),
+                                     known(met.kind != hal::LimitKind::kNone, hal::in_words(met))});
   }
   return joints;
 }
@@ -166,6 +167,8 @@ static void figures(Figures& f, const JointFigures& joint) {
     joint.limited_cycles);
   f("limited_controller", "whose command was the first that a limit changed; null: none was",
     joint.limited_controller);
+  f("limited_command", "that command's field, its value and the limit, in words; null: none",
+    joint.limited_command);
 }
 
 static void figures(Figures& f, const ControllerFigures& one) {

@@ -56,17 +56,17 @@ void add_limited(const RunSummary& s, Facts& facts) {
   const auto most = std::ranges::max_element(limited);
   if (most == limited.end() || *most == 0) return;
   const auto joints = limited.size() - static_cast<std::size_t>(std::ranges::count(limited, 0U));
-  const std::int32_t who = s.cycle.limited(static_cast<std::size_t>(most - limited.begin()));
+  const auto joint = static_cast<std::size_t>(most - limited.begin());
+  const std::int32_t who = s.cycle.limited(joint);
   const std::string whose =
       who < 0 ? ""
               : ", by '" + s.composition.controllers->name(static_cast<std::size_t>(who)) + "'";
-  facts.add("commands limited",
-            fmt::format("{} in {} of {}{}{}",
-                        s.composition.experiment.robot
-                            .joints[static_cast<std::size_t>(most - limited.begin())]
-                            .name,
-                        *most, counted(s.cycle.running_cycles(), "cycle"), whose,
-                        joints > 1 ? ", " + counted(joints - 1, "more joint") : ""));
+  facts.add(
+      "commands limited",
+      fmt::format("{} in {} of {}{}{}; first {}", s.composition.experiment.robot.joints[joint].name,
+                  *most, counted(s.cycle.running_cycles(), "cycle"), whose,
+                  joints > 1 ? ", " + counted(joints - 1, "more joint") : "",
+                  hal::in_words(s.cycle.first_limited(joint))));
 }
 
 /// What the robot did on the ground, and its floating base.

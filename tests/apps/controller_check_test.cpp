@@ -171,10 +171,17 @@ TEST_F(ControllerCheck, IsNotNeededToNameWhoWasSlowOrWrong) {
   outcome = tandem("run hold.toml --no-socket --json run.json --log log");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_EQ(json("run.json")["fault_log"][0]["controller"], "hold");
-  EXPECT_NE(
-      outcome.err.find("joint2: the command of the controller 'hold' was not a finite number"),
-      std::string::npos)
+  EXPECT_NE(outcome.err.find("joint2: the command of the controller 'hold' was not a finite "
+                             "number: position reference nan"),
+            std::string::npos)
       << outcome.err;
+  const std::string events = tandem("log csv log/*.mcap --topic event").out;
+  for (const char* event : {"\"fault", "\"command limited"}) {
+    const std::string says = event + std::string(
+                                         " of joint2: the position reference nan is not "
+                                         "finite, controller 'hold'");
+    EXPECT_NE(events.find(says), std::string::npos) << events;
+  }
   EXPECT_EQ(json("run.json")["joints"]["joint2"]["limited_controller"], "hold");
 }
 
@@ -190,9 +197,9 @@ TEST_F(ControllerCheck, IsNotNeededToNameWhoMetALimit) {
   EXPECT_EQ(joint["limited_controller"], "hold");
   EXPECT_TRUE(json("run.json")["joints"]["joint1"]["limited_controller"].is_null());
   const std::string events = tandem("log csv log/*.mcap --topic event").out;
-  const std::string met =
-      "command limited of joint2: it is followed as fast as the joint's limits allow, controller "
-      "'hold'";
+  const std::string what = joint["limited_command"];
+  EXPECT_NE(outcome.out.find("; first " + what.substr(0, 24)), std::string::npos) << outcome.out;
+  const std::string met = "command limited of joint2: " + what + ", controller 'hold'";
   EXPECT_NE(events.find(met), std::string::npos) << events;
   EXPECT_EQ(events.find(met), events.rfind(met)) << "once";
 }

@@ -566,6 +566,8 @@ TEST_F(Controllers, HaveTheirParametersInTheLogAndInItsReport) {
   log_flags_ = "--log runs";
   begin("");
   ASSERT_EQ(to_run("controller load gravity_compensation --name weigh --set ramp_s=2").status, 0);
+  ASSERT_EQ(to_run("controller load hold --name soft --set 'interaction = \"compliant\"'").status,
+            0);
   ASSERT_EQ(asked("controller set hold link_damping_Nms_rad=0.5")["done"], true);
   ASSERT_EQ(asked("controller set hold link_damping_Nms_rad=0.25")["done"], true);
   EXPECT_EQ(end(), 0);
@@ -576,6 +578,7 @@ TEST_F(Controllers, HaveTheirParametersInTheLogAndInItsReport) {
   const std::string events = tandem("log csv " + log + " --topic event").out;
   expect(events, "parameter loaded: weigh.ramp_s = 2\"");
   expect(events, "parameter loaded: weigh.damping_Nms_rad.joint2 = 0.1\"");
+  expect(events, "parameter loaded: soft.interaction = compliant\"");
   expect(events, "parameter set: hold.link_damping_Nms_rad = 0.25\"");
   ASSERT_EQ(tandem("report " + log + " -o page").status, 0);
   const std::string page = read_text(folder_ / "page/report.html");

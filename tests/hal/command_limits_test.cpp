@@ -32,6 +32,48 @@ class Limits : public testing::Test {
   CommandLimits limits{robot_of(robot), 1'000'000};
 };
 
+// A code and a count said neither which of the fields nor by how much.
+TEST_F(Limits, SayFieldValueAndLimitOfWhatTheyChange) {
+  const auto words = [&] {
+    (void)limits.apply(state, command);
+    return in_words(limits.met()[0]);
+  };
+  const std::string followed = ": it is followed as fast as the joint's limits allow";
+  EXPECT_EQ(words(), "");
+  command.position_rad()[0] = 0.2;
+  EXPECT_EQ(words(), "the position reference 0.2 rad asks for more than 2 rad/s" + followed);
+  command.position_rad()[0] = 9.0;
+  EXPECT_EQ(words(), "the position reference 9 rad is beyond the limit 1.5 rad") << "goes first";
+  command.damping_Nms_rad()[0] = kInf;
+  EXPECT_EQ(words(), "the damping inf is not finite") << "goes first of all";
+  command.torque_Nm()[0] = 15.0;  // the position stays where it was limited to
+  EXPECT_EQ(words(), "the torque 15 Nm asks for more than 2000 Nm/s" + followed);
+  command.torque_Nm()[0] = -21.0;
+  EXPECT_EQ(words(), "the torque -21 Nm is beyond the limit -20 Nm");
+  command.mode()[0] = 17;
+  EXPECT_EQ(words(), "the mode 17 does not exist");
+  mode(ControlMode::kVelocity);
+  command.torque_Nm()[0] = 0.0;
+  state.position_rad()[0] = 1.5 - 1e-4;
+  command.velocity_rad_s()[0] = 1.0;
+  EXPECT_EQ(words(),
+            "the velocity reference 1 rad/s is more than 0.04472 rad/s, with which the "
+            "joint stops within its range");
+  EXPECT_EQ(in_words(limits.met()[1]), "");
+}
+
+TEST_F(Limits, NameTheAccelerationOrTheJerkThatIsTooMuch) {
+  robot.joints[0].max_acceleration_rad_s2 = 10.0;
+  robot.joints[1].max_acceleration_rad_s2 = 1e5;
+  robot.joints[1].max_jerk_rad_s3 = 300.0;
+  limits = CommandLimits(robot_of(robot), 1'000'000);
+  ASSERT_EQ(limits.apply(state, command), Code::kOk);
+  command.position_rad()[0] = command.position_rad()[1] = 0.101;  // 1 rad/s, 1000 rad/s2
+  ASSERT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_NE(in_words(limits.met()[0]).find("more than 10 rad/s2"), std::string::npos);
+  EXPECT_NE(in_words(limits.met()[1]).find("more than 300 rad/s3"), std::string::npos);
+}
+
 TEST_F(Limits, LetGoodCommandsPassUnchanged) {
   command.position_rad()[0] = 0.1015;
   command.velocity_rad_s()[0] = 1.5;

@@ -358,8 +358,12 @@ TEST(ParameterLog, HasTheNameTheCycleAndEveryBitOfTheValue) {
     const bool first = found % 2 == 0;
     EXPECT_EQ(set->name, first ? "tu.ned.offset_rad" : "tu.ned.word");
     ASSERT_LT(found / 2, std::size(values));
-    EXPECT_EQ(std::bit_cast<std::uint64_t>(set->value),
-              std::bit_cast<std::uint64_t>(first ? values[found / 2] : 1.0));
+    if (first) {
+      EXPECT_EQ(std::bit_cast<std::uint64_t>(set->value),
+                std::bit_cast<std::uint64_t>(values[found / 2]));
+    } else {
+      EXPECT_EQ(set->word, "there") << "it was its index, 1";
+    }
     EXPECT_EQ(event.event.cycle, cycles[found / 2]);
     ++found;
   }
@@ -378,7 +382,8 @@ std::string told(const std::string& path) {
     EXPECT_TRUE(it) << event.text;
     if (!it) continue;
     all += (all.empty() ? "" : " ") +
-           ((loaded ? "+" : "~") + it->name + "=" + std::to_string(it->value).substr(0, 4));
+           ((loaded ? "+" : "~") + it->name + "=" +
+            (it->word.empty() ? std::to_string(it->value).substr(0, 4) : it->word));
   }
   return all;
 }
@@ -400,8 +405,8 @@ TEST(ParameterLog, HasWhatAControllerThatComesLaterStartsWith) {
   run.steps(3);
   EXPECT_EQ((*file)->close().dropped, 0U);
   EXPECT_EQ(told(path),
-            "+later.offset_rad=0.00 +later.share=0.50 +later.word=0.00 +later.count=3.00 "
-            "+later.on=1.00 +later.length_m=0.50 +later.gains.x=1.00 +later.gains.y=2.00 "
+            "+later.offset_rad=0.00 +later.share=0.50 +later.word=here +later.count=3.00 "
+            "+later.on=true +later.length_m=0.50 +later.gains.x=1.00 +later.gains.y=2.00 "
             "+later.gains.z.0=3.00 ~later.gains.y=4.00");
 }
 
