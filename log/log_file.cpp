@@ -184,6 +184,7 @@ Status LogFile::add(Beginning file, DataHash& hash) {
     info_.configuration = metadata_of(reader, kConfigurationRecord);
   }
   result_ = metadata_of(reader, kResultRecord);
+  part.damage = reader.damage();
   part.truncated = reader.truncated();
   part.being_written = part.truncated && is_being_written(*file.file);
   if (part.truncated && by_channel.empty() && reader.metadata().empty()) {
@@ -273,7 +274,33 @@ std::uint64_t LogFile::bytes() const {
   return bytes;
 }
 
+std::vector<std::string> LogFile::damage() const {
+  constexpr std::size_t kSaid = 5;
+  std::vector<std::string> all;
+  std::size_t more = 0;
+  for (const LogPart& part : parts_) {
+    for (const Damage& one : part.damage) {
+      if (all.size() == kSaid && ++more > 0) continue;
+      all.push_back((parts_.size() > 1 ? part.path + ": " : "") + to_string(one));
+    }
+  }
+  if (more > 0) all.push_back(std::to_string(more) + " more damaged places");
+  return all;
+}
+
+bool LogFile::damage_loses_messages() const {
+  return std::ranges::any_of(parts_, [](const LogPart& part) {
+    return std::ranges::any_of(part.damage, &Damage::loses_messages);
+  });
+}
+
 std::vector<std::string> LogFile::remarks() const {
+  std::vector<std::string> all = gaps();
+  for (std::string& one : damage()) all.push_back(std::move(one));
+  return all;
+}
+
+std::vector<std::string> LogFile::gaps() const {
   if (info_.part > 0) {
     const auto name = part_of(path_);
     return {"this is part " + std::to_string(info_.part) + " of a log in several files" +

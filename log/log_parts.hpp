@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "log/damage.hpp"
+
 namespace tandem::log {
 
 /// A log of `[log] file_MB`: "runs/arm-001.mcap" is the first file and the name of all of them;
@@ -37,6 +39,7 @@ struct LogPart {
   std::int64_t last_ns = 0;
   bool truncated = false;
   bool being_written = false;  ///< truncated, as a run of this machine still writes it
+  std::vector<Damage> damage{};  ///< what of it was left out
 };
 
 /// Parts that are not there. `last` 0: nobody knows how many follow.
