@@ -10,7 +10,7 @@ namespace tandem::log {
 namespace {
 
 constexpr std::uint64_t kFooterBytes = kRecordHeaderBytes + 20;
-/// Of a summary that is read: that of a day in chunks of 200 ms.
+/// The largest summary that is read: that of a day in chunks of 200 ms.
 constexpr std::uint64_t kMostSummary = std::uint64_t{128} << 20;
 
 bool read_at(const Descriptor& file, std::uint64_t at, std::span<std::byte> into) {
