@@ -40,7 +40,7 @@ struct Comparison {
 };
 
 /// Compares every message of every topic that both logs hold: time stamps and bytes. Events are
-/// compared like the rest. Errors: damaged data.
+/// compared like the rest. Errors: a log that lost messages, since nobody knows what they were.
 [[nodiscard]] Result<Comparison> compare(const LogFile& a, const LogFile& b);
 
 }  // namespace tandem::log

@@ -85,7 +85,7 @@ Status decompress(Compression compression, std::span<const std::byte> data, std:
                   Bytes& out) {
   if (size >
       std::min(std::uint64_t{bounds::kLogRecord.most}, most_content(compression, data.size()))) {
-    return fail("a chunk claims " + std::to_string(size) + " bytes");
+    return fail("it claims " + std::to_string(size) + " bytes");
   }
   bool good = false;
   if (compression == Compression::kNone) {
@@ -97,7 +97,7 @@ Status decompress(Compression compression, std::span<const std::byte> data, std:
                ? lz4_decompress(data, out)
                : ZSTD_decompress(out.data(), out.size(), data.data(), data.size()) == size;
   }
-  if (!good) return fail("a chunk's compressed data are damaged");
+  if (!good) return fail("its compressed data are damaged");
   return {};
 }
 

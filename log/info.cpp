@@ -47,12 +47,15 @@ StringMap to_map(const RunInfo& info) {
   for (const std::string& one : info.controllers) controllers += one + "\n";
   std::string parameters;
   for (const std::string& one : info.parameters) parameters += one + "\n";
+  std::string plant;
+  for (const std::string& one : info.plant) plant += one + "\n";
   for (const auto& [key, value] : {std::pair{"host", &info.host},
                                    {"started", &info.started},
                                    {"time_zone", &info.time_zone},
                                    {"kernel_sha256", &info.kernel_sha256},
                                    {"controllers", &std::as_const(controllers)},
-                                   {"parameters", &std::as_const(parameters)}}) {
+                                   {"parameters", &std::as_const(parameters)},
+                                   {"plant", &std::as_const(plant)}}) {
     if (!value->empty()) map.emplace_back(key, *value);
   }
   if (info.part > 0) map.emplace_back("part", std::to_string(info.part));
@@ -88,6 +91,7 @@ RunInfo info_from(const StringMap& map) {
   info.kernel_sha256 = value_of(map, "kernel_sha256");
   info.controllers = lines_of(value_of(map, "controllers"));
   info.parameters = lines_of(value_of(map, "parameters"));
+  info.plant = lines_of(value_of(map, "plant"));
   return info;
 }
 

@@ -39,6 +39,7 @@ struct RunInfo {
   std::vector<std::string>
       controllers{};  ///< "NAME SHA256 PATH" at the start; without a library "NAME - -"
   std::vector<std::string> parameters{};  ///< "NAME.PARAMETER = VALUE" at the start
+  std::vector<std::string> plant{};       ///< what of the simulated robot is not as its files say
   StringMap configuration{};              ///< path -> text of every file that was read
   std::vector<std::string> boards{};      ///< for events' texts: in no record
   std::vector<std::string> buses{};       ///< the same

@@ -88,6 +88,10 @@ Result<Stretch> stretch_of(const LogFile& file, const LoggedTopic& topic,
                       seconds(topic.last_ns),
                   "copy it again; or play what there is: to_s");
   }
+  if (file.damage_loses_messages() && !request.to_s) {
+    return refuse(file, "the log is damaged: " + file.damage().front(),
+                  "copy it again; or play what is whole: from_s and to_s");
+  }
   if (faultless_s < to_s) {
     return refuse(file, "its run met a fault at " + seconds(ns_of(faultless_s)),
                   "play what was before: to_s");

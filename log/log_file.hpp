@@ -49,6 +49,7 @@ class LogFile {
   /// all that are there, also where the first one is gone; "arm-001.3.mcap" is that part alone, and
   /// "arm-001.1.mcap" the first one alone. What is in each file once for viewers, the description
   /// and what does not move, is in the whole once.
+  /// A chunk that is damaged is left out: damage().
   /// Errors: as McapReader; a file that is cut before anything of a run.
   [[nodiscard]] static Result<LogFile> open(const std::string& path);
   /// Whether open() would find a log, without reading it.
@@ -60,8 +61,13 @@ class LogFile {
   [[nodiscard]] const std::vector<LogPart>& parts() const { return parts_; }
   /// What of the run is in files that are not here.
   [[nodiscard]] const std::vector<MissingParts>& missing() const { return missing_; }
-  /// The same in words, with the time of what is here: for whoever computes with it. Empty: the log
-  /// is whole, or was cut.
+  /// The same in words, with the time of what is here. Empty: the log is whole, or was cut.
+  [[nodiscard]] std::vector<std::string> gaps() const;
+  /// What was left out of its files because it is damaged, in words, the first few one by one.
+  [[nodiscard]] std::vector<std::string> damage() const;
+  /// Whether messages of the log may be lost by that. What needs all of them refuses then.
+  [[nodiscard]] bool damage_loses_messages() const;
+  /// gaps(), then damage(): for whoever computes with it.
   [[nodiscard]] std::vector<std::string> remarks() const;
   [[nodiscard]] const RunInfo& info() const { return info_; }
   /// The metadata record "result"; empty when the run was killed. Of several files the last one's,
@@ -89,7 +95,7 @@ class LogFile {
   [[nodiscard]] const std::string& data_sha256() const { return data_sha256_; }
 
   /// The columns of every message of `topic`, or of every `every`-th.
-  /// Errors: no such topic, field (the nearest is suggested) or index; damaged data.
+  /// Errors: no such topic, field (the nearest is suggested) or index; a message that is too short.
   [[nodiscard]] Result<TimeSeries> read(const std::string& topic,
                                         const std::vector<Column>& columns,
                                         std::size_t every = 1) const;

@@ -50,6 +50,15 @@ std::map<std::uint64_t, std::string> parts_of(const std::string& name) {
   return parts;
 }
 
+std::string reason_of_cut(bool being_written) {
+  return being_written ? "its run is still writing it"
+                       : "its run was killed, or the copy is not whole";
+}
+
+std::string hint_of_cut(bool being_written) {
+  return reason_of_cut(being_written) + (being_written ? ": wait for its end" : ": copy it again");
+}
+
 std::vector<MissingParts> missing_of(const std::vector<LogPart>& parts, bool goes_on) {
   std::vector<MissingParts> missing;
   std::uint64_t next = 1;

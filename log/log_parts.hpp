@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "log/damage.hpp"
+
 namespace tandem::log {
 
 /// A log of `[log] file_MB`: "runs/arm-001.mcap" is the first file and the name of all of them;
@@ -36,8 +38,14 @@ struct LogPart {
   std::int64_t first_ns = 0;  ///< time of the first message; without messages 0
   std::int64_t last_ns = 0;
   bool truncated = false;
-  bool being_written = false;  ///< truncated, as a run of this machine still writes it
+  bool being_written = false;    ///< truncated, as a run of this machine still writes it
+  std::vector<Damage> damage{};  ///< what of it was left out
 };
+
+/// Why a file is cut: "its run is still writing it", or "its run was killed, or …".
+[[nodiscard]] std::string reason_of_cut(bool being_written);
+/// The same with what to do about it.
+[[nodiscard]] std::string hint_of_cut(bool being_written);
 
 /// Parts that are not there. `last` 0: nobody knows how many follow.
 struct MissingParts {

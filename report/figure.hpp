@@ -24,6 +24,8 @@ enum class CurveStyle : std::uint8_t {
   kFifth,         ///< solid, brown
   kSixth,         ///< solid, light blue
   kSecondDashed,  ///< dashed, purple
+  kSeventh,       ///< solid, dark orange
+  kStill,         ///< solid, thin, light grey: what does not change
   kStick,         ///< solid with round joints, blue
   kStickSecond,   ///< the same, dark grey
   kStickThird,    ///< the same, light grey

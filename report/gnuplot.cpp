@@ -38,11 +38,13 @@ set style line 6 lw 2.0 lc rgb '#3d8b57' dt solid
 set style line 7 lw 2.0 lc rgb '#a0612b' dt solid
 set style line 8 lw 2.0 lc rgb '#5cb3d6' dt solid
 set style line 9 lw 1.7 lc rgb '#8e4aa8' dt (8,6)
-set style line 10 lw 3.0 lc rgb '#1f5fa8' dt solid pt 7 ps 0.7
-set style line 11 lw 3.0 lc rgb '#3a424c' dt solid pt 7 ps 0.7
-set style line 12 lw 3.0 lc rgb '#b4bcc6' dt solid pt 7 ps 0.7
-set style line 13 lw 1.8 lc rgb "#3a424c" dt (3,4)
-set style line 14 lw 1.8 lc rgb "#c0392b" dt solid
+set style line 10 lw 2.0 lc rgb '#e07b00' dt solid
+set style line 11 lw 1.0 lc rgb '#b4bcc6' dt solid
+set style line 12 lw 3.0 lc rgb '#1f5fa8' dt solid pt 7 ps 0.7
+set style line 13 lw 3.0 lc rgb '#3a424c' dt solid pt 7 ps 0.7
+set style line 14 lw 3.0 lc rgb '#b4bcc6' dt solid pt 7 ps 0.7
+set style line 15 lw 1.8 lc rgb "#3a424c" dt (3,4)
+set style line 16 lw 1.8 lc rgb "#c0392b" dt solid
 )";
 
 int line_style(CurveStyle style) { return static_cast<int>(style) + 1; }
@@ -82,7 +84,7 @@ std::string data_block(const std::string& name, const Curve& curve) {
 }
 
 std::string mark_style(const Mark& mark, const char* before = "") {
-  return fmt::format("{}ls {}", before, mark.fault ? 14 : 13);
+  return fmt::format("{}ls {}", before, mark.fault ? 16 : 15);
 }
 
 std::string plot_command(const Figure& figure, std::size_t index) {
@@ -100,7 +102,7 @@ std::string plot_command(const Figure& figure, std::size_t index) {
         curve.label);
   }
   for (const Level& level : figure.levels) {
-    add(fmt::format("{:.9g} with lines ls 13", level.y), level.label);
+    add(fmt::format("{:.9g} with lines ls 15", level.y), level.label);
   }
   for (const Mark& mark : figure.marks) {  // the line itself is an arrow; this is its key
     if (!mark.label.empty()) add(mark_style(mark, "NaN with lines "), mark.label);

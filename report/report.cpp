@@ -7,146 +7,17 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 
-#include "base/counted.hpp"
 #include "base/quoting.hpp"
 #include "report/close_passive.hpp"
 #include "report/gnuplot.hpp"
 #include "report/page.hpp"
 #include "report/replay.hpp"
+#include "report/run_facts.hpp"
 #include "report/run_figures.hpp"
 
 namespace tandem::report {
 namespace {
-
-/// What, which joint, when: of the first few, which the others mostly follow from, and of the stop.
-void add_faults(const RunData& run, const std::string& side, Facts& facts) {
-  std::size_t more = 0;
-  for (std::size_t i = 0; i < run.faults.size(); ++i) {
-    const RunFault& fault = run.faults[i];
-    if (i >= kFaultsShown && &fault != run.stop()) {
-      ++more;
-      continue;
-    }
-    facts.emplace_back("fault" + side,
-                       fmt::format("{}{}{}, at {:.3f} s", fault.joint,
-                                   fault.joint.empty() ? "" : ": ", fault.text, fault.time_s));
-  }
-  if (more > 0) facts.emplace_back("fault" + side, fmt::format("{} more", more));
-}
-
-void add_payloads(const RunData& run, const std::string& side, Facts& facts) {
-  for (const PayloadMark& one : run.payloads) {
-    const std::string what = one.text.substr(one.text.find(' ') + 1);  // without "payload "
-    facts.emplace_back("payload" + side, fmt::format("{}, at {:.3f} s", what, one.time_s));
-  }
-}
-
-void add_facts(const RunData& run, const std::string& side, Facts& facts) {
-  facts.emplace_back("log" + side,
-                     run.path + (run.cut_reason.empty() ? "" : " (cut: " + run.cut_reason + ")"));
-  for (const std::string& one : run.remarks) facts.emplace_back("log" + side, one);
-  add_faults(run, side, facts);
-  add_payloads(run, side, facts);
-  const std::size_t passive = run.robot.passive.size();
-  facts.emplace_back(
-      "robot" + side,
-      fmt::format("{}, {}{}", run.info.robot, counted(run.info.joints.size(), "joint"),
-                  passive == 0 ? "" : fmt::format(", {} more passive", passive)));
-  facts.emplace_back("backend" + side, run.info.hal);
-  facts.emplace_back("seed" + side, std::to_string(run.info.seed));
-  facts.emplace_back("period" + side,
-                     fmt::format("{} us", static_cast<double>(run.info.period_ns) * 1e-3));
-  const double start_s = run.time_s.front();
-  const double ran_s = run.controllers_ran ? run.time_s[run.rows_before_stop() - 1] - start_s : 0.0;
-  const bool imported = run.info.hal == "import";
-  if (run.controllers_ran && !imported && run.remarks.empty()) {
-    facts.emplace_back("controllers started" + side, fmt::format("{:.3f} s", start_s));
-  }
-  facts.emplace_back((imported ? "recorded" : "controllers ran") + side,
-                     fmt::format("{:.3f} s", ran_s));
-  if (!run.info.engine.empty()) facts.emplace_back("engine" + side, run.info.engine);
-  facts.emplace_back("kernels" + side, run.info.kernel_variant);
-  facts.emplace_back("tandem" + side, run.info.version);
-  for (const auto& [key, value] : run.result) {
-    if (key != "data_sha256") facts.emplace_back(key + side, value);
-  }
-  facts.emplace_back("data sha256" + side, run.data_sha256);
-}
-
-PageTable tracking_table(const RunData& run, const std::string& side) {
-  PageTable table{"Tracking" + side,
-                  "Reference minus measured link position of the joints under position control, "
-                  "and the largest measured torque. The worst first.",
-                  {"joint", "rms [deg]", "max [deg]", "max torque [Nm]"},
-                  {}};
-  if (run.stop() != nullptr) table.caption += " Until the fault that stopped it.";
-  const std::vector<Tracking> joints = run.tracking();
-  const bool all_slide = !joints.empty() && std::ranges::all_of(joints, &Tracking::slides);
-  const bool mixed = !all_slide && std::ranges::any_of(joints, &Tracking::slides);
-  if (all_slide) table.header = {"joint", "rms [mm]", "max [mm]", "max force [N]"};
-  if (mixed) table.header = {"joint", "rms", "max", "max torque or force"};
-  for (const Tracking& one : joints) {
-    const double factor = one.slides ? 1e3 : kDegrees;
-    const char* unit = !mixed ? "" : (one.slides ? " mm" : " deg");
-    table.rows.push_back(
-        {one.joint, fmt::format("{:.4f}{}", one.rms_rad * factor, unit),
-         fmt::format("{:.4f}{}", one.max_rad * factor, unit),
-         fmt::format("{:.2f}{}", one.max_torque_Nm, !mixed ? "" : (one.slides ? " N" : " Nm"))});
-  }
-  return table;
-}
-
-/// Table of every closed loop, by the simulation's truth; without rows when the log has none.
-PageTable loops_table(const RunData& run, const std::string& side) {
-  PageTable table{"Closed loops" + side,
-                  "How far and how fast a loop was open at most in the simulation, which closes it "
-                  "after every step: what is left is rounding.",
-                  {"loop", "open [m]", "opening [m/s]"},
-                  {}};
-  const std::size_t loops = run.robot.loops.size();
-  for (std::size_t l = 0; l < run.loop_error.size() / 2; ++l) {
-    table.rows.push_back({run.robot.loops[l].name,
-                          fmt::format("{:.1e}", std::ranges::max(run.loop_error[l])),
-                          fmt::format("{:.1e}", std::ranges::max(run.loop_error[loops + l]))});
-  }
-  return table;
-}
-
-/// Table of every parameter; without rows when the log has none.
-PageTable parameter_table(const RunData& run, const std::string& side) {
-  PageTable table{"Parameters" + side,
-                  "Of the controllers, at the run's start, and what was set last. Of a word that "
-                  "was set its number among the choices is shown.",
-                  {"parameter", "at the start", "set last", "times set"},
-                  {}};
-  for (const RunParameter& one : run.parameters)
-    table.rows.push_back({one.name, one.start, one.then, std::to_string(one.changes)});
-  return table;
-}
-
-/// Table of every foot, by the simulation's truth; without rows when the log has none.
-PageTable feet_table(const RunData& run, const std::string& side) {
-  PageTable table{"Feet" + side,
-                  "Vertical force of the ground in the simulation, and the farthest that a foot "
-                  "was from where it last touched down.",
-                  {"foot", "mean [N]", "max [N]", "slip [mm]"},
-                  {}};
-  for (const FootFigures& foot : run.feet()) {
-    table.rows.push_back({foot.name, fmt::format("{:.2f}", foot.mean_force_N),
-                          fmt::format("{:.2f}", foot.max_force_N),
-                          fmt::format("{:.3f}", foot.slip_m * 1e3)});
-  }
-  return table;
-}
-
-void add_tables(const RunData& run, const std::string& side, Page& page) {
-  for (auto* make : {tracking_table, feet_table, loops_table, parameter_table}) {
-    PageTable table = make(run, side);
-    if (!table.rows.empty()) page.tables.push_back(std::move(table));
-  }
-}
 
 Status create(const std::string& folder) {
   std::error_code problem;
@@ -186,10 +57,7 @@ Page page_of(const RunData& run, const OtherRuns& others, const std::vector<Page
   const bool imported = run.info.hal == "import";
   page.lead = imported ? "Times count from the recording's start, as in the log."
                        : "Times count from the run's first SYNC, as in the log.";
-  if (!imported)
-    page.lead += run.controllers_ran
-                     ? fmt::format(" The controllers started at {:.3f} s.", run.time_s.front())
-                     : " The run ended before its controllers started.";
+  if (!imported) page.lead += " " + start_text(run);
   add_facts(run, others.empty() ? "" : " A", page.facts);
   page.tables = replays;
   add_tables(run, others.empty() ? "" : " A", page);
@@ -216,11 +84,12 @@ Page page_of(const RunData& run, const OtherRuns& others, const std::vector<Page
   return page;
 }
 
-/// Draws `other` where its controllers start with those of `run`; or where the replay that one of
-/// them is lies over its recording, the other one. Then a table is added.
+/// Draws `other` where its controllers start with those of `run`, if both logs have that; or where
+/// the replay that one of them is lies over its recording, the other one. Then a table is added.
 Status align(const RunData& run, RunData& other, const std::string& side,
              std::vector<PageTable>& tables) {
-  other.drawn_later_s = run.time_s.front() - other.time_s.front();
+  if (run.start_known && other.start_known)
+    other.drawn_later_s = run.time_s.front() - other.time_s.front();
   for (const bool forth : {true, false}) {
     const RunData& playing = forth ? other : run;
     const RunData& played = forth ? run : other;
@@ -354,6 +223,11 @@ Result<ReportFiles> make_report(const std::string& log, const std::vector<std::s
   std::vector<RunData*> all{&*run};
   for (RunData& one : *other_runs) all.push_back(&one);
   files.remarks = close_and_remark(all, kernels);
+  for (const RunData* one : all) {
+    if (*beside && one != &*run) continue;  // it is of the same log
+    for (const std::string& remark : one->remarks)
+      files.remarks.push_back(one->path + ": " + remark);
+  }
   const OtherRuns others(all.begin() + 1, all.end());
   const auto drawn = draw_all(*run, others, beside->has_value(), kernels, files.remarks);
   if (!drawn) return std::unexpected(drawn.error());

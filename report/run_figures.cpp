@@ -1,4 +1,4 @@
-// Chooses the joints and feet to show, from [report] or by the motion, and makes the four figures.
+// Makes the four figures of the joints and feet that subjects.hpp chooses.
 #include "report/run_figures.hpp"
 
 #include <fmt/core.h>
@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
-#include <numeric>
 #include <utility>
 
 #include "report/logged_torque.hpp"
@@ -21,57 +20,12 @@ constexpr double kMoves = 0.01;  // [rad, m]: less between two postures is none 
 
 std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
-/// The joints of the tree from the root to the link of the first foot's site.
-std::vector<int> first_leg(const RunData& run) {
-  std::vector<int> joints;
-  if (run.robot.contact.feet.empty()) return joints;
-  for (const hal::SiteConfig& site : run.robot.model.sites) {
-    const int link = run.tree.link_index(site.link);
-    if (site.name != run.robot.contact.feet.front().site || link < 0) continue;
-    for (int body = run.tree.links[at(link)].body; body > 0;
-         body = run.tree.joints[at(body) - 1].parent) {
-      joints.insert(joints.begin(), body - 1);
-    }
-  }
-  return joints;
-}
-
-/// Joints (image) of the first leg that turn about the robot's lateral axis.
-std::vector<int> pitch_joints(const RunData& run) {
-  PostureSample zero{"", 0.0, {}, std::vector<double>(run.robot.joints.size(), 0.0)};
-  const auto bodies = body_placements(run.tree, run.robot, zero);
-  std::vector<int> found;
-  for (const int joint : first_leg(run)) {
-    const model::Joint& j = run.tree.joints[at(joint)];
-    const int index = run.robot.joint_index(j.name);
-    if (index >= 0 && std::abs((bodies[at(joint) + 1].R * j.axis).y()) > 0.9) {
-      found.push_back(index);
-    }
-  }
-  return found;
-}
-
-/// Joints by how far they moved, the widest first.
-std::vector<int> widest_joints(const RunData& run) {
-  std::vector<double> range;
-  for (const std::vector<double>& q : run.position_rad) {
-    const auto [low, high] = std::ranges::minmax_element(q);
-    range.push_back(*high - *low);
-  }
-  std::vector<int> order(range.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::ranges::stable_sort(order, std::ranges::greater{}, [&](int j) { return range[at(j)]; });
-  return order;
-}
-
 bool has_numbers(const std::vector<double>& values) {
   return std::ranges::any_of(values, [](double value) { return std::isfinite(value); });
 }
 
 /// Whether nobody knows where the base was.
 bool unplaced(const RunData& run) { return run.robot.model.floating_base && !run.motion_known(); }
-
-bool legged(const RunData& run) { return !run.robot.contact.feet.empty(); }
 
 Curve curve_of(const RunData& run, std::string label, CurveStyle style,
                const std::vector<double>& values, double factor) {
@@ -169,17 +123,6 @@ double weight_N(const RunData& run) {
   return mass_kg * gravity_m_s2(run);
 }
 
-/// Which links lie beyond a joint, away from the root.
-std::vector<bool> links_beyond(const RunData& run, const std::string& joint) {
-  std::vector<bool> beyond(run.tree.links.size(), false);
-  const int first = run.tree.child_link_index(joint);
-  for (std::size_t i = at(std::max(first, 0)); first >= 0 && i < beyond.size(); ++i) {
-    const int parent = run.tree.links[i].parent;
-    beyond[i] = i == at(first) || (parent >= 0 && beyond[at(parent)]);
-  }
-  return beyond;
-}
-
 /// Weight of the links beyond a sensor's joint [N]: what a foot's sensor does not carry.
 double weight_beyond_N(const RunData& run, int sensor) {
   const std::vector<bool> beyond = links_beyond(run, run.robot.sensors[at(sensor)].joint);
@@ -188,19 +131,6 @@ double weight_beyond_N(const RunData& run, int sensor) {
     if (beyond[i]) mass_kg += run.tree.links[i].inertia.mass_kg;
   }
   return mass_kg * gravity_m_s2(run);
-}
-
-/// Whether a sensor measures what a foot carries; on a robot without feet, whether it is six-axis.
-bool on_a_leg(const RunData& run, const hal::SensorConfig& sensor) {
-  if (sensor.type != hal::SensorType::kForceTorque) return false;
-  if (!legged(run)) return true;
-  const std::vector<bool> beyond = links_beyond(run, sensor.joint);
-  return std::ranges::any_of(run.robot.contact.feet, [&](const hal::Foot& foot) {
-    return std::ranges::any_of(run.robot.model.sites, [&](const hal::SiteConfig& site) {
-      const int link = run.tree.link_index(site.link);
-      return site.name == foot.site && link >= 0 && beyond[at(link)];
-    });
-  });
 }
 
 /// The share of the weight that every foot carries when all carry alike.
@@ -365,25 +295,6 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
 }
 
 }  // namespace
-
-Subjects subjects_of(const RunData& run) {
-  Subjects subjects;
-  std::vector<int> joints = pitch_joints(run);
-  if (joints.size() < 2) joints = widest_joints(run);
-  subjects.position_of = run.robot.joint_index(run.position_of);
-  subjects.torque_of = run.robot.joint_index(run.torque_of);
-  if (subjects.position_of < 0) subjects.position_of = joints.front();
-  if (subjects.torque_of < 0)
-    subjects.torque_of = joints[std::min<std::size_t>(1, joints.size() - 1)];
-  for (std::size_t i = 0; i < run.robot.sensors.size(); ++i) {
-    const hal::SensorConfig& sensor = run.robot.sensors[i];
-    const bool first = sensor.name == run.foot;
-    if (!first && !on_a_leg(run, sensor)) continue;
-    subjects.foot_sensors.insert(
-        first ? subjects.foot_sensors.begin() : subjects.foot_sensors.end(), static_cast<int>(i));
-  }
-  return subjects;
-}
 
 std::string time_label(const RunData& run) {
   return run.info.hal == "import" ? "time since the recording's start [s]"

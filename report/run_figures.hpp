@@ -11,20 +11,9 @@
 #include "report/figure.hpp"
 #include "report/page.hpp"
 #include "report/run_data.hpp"
+#include "report/subjects.hpp"
 
 namespace tandem::report {
-
-/// Which joints and sensor the figures show.
-struct Subjects {
-  int position_of = -1;           ///< joint in the image
-  int torque_of = -1;             ///< the same
-  std::vector<int> foot_sensors;  ///< force/torque sensors in the image, the chosen one first
-};
-
-/// What the experiment's [report] says. Where it is silent: the first two pitch joints of the
-/// first foot's leg, and the force/torque sensors of the legs; on a robot without such legs the
-/// two joints that move most.
-[[nodiscard]] Subjects subjects_of(const RunData& run);
 
 /// Runs that are laid over another, of the same robot.
 using OtherRuns = std::vector<const RunData*>;

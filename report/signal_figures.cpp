@@ -13,8 +13,9 @@ namespace {
 
 constexpr std::size_t kMostFigures = 12;
 constexpr CurveStyle kSignalStyles[] = {CurveStyle::kMeasured, CurveStyle::kSecond,
-                                        CurveStyle::kFourth,   CurveStyle::kReference,
+                                        CurveStyle::kFourth,   CurveStyle::kSeventh,
                                         CurveStyle::kFifth,    CurveStyle::kSixth};
+constexpr double kStillShare = 1e-3;  // of the largest change: a thousandth is none to be seen
 
 /// "[m] of the crouch": unit and words. Empty: it is no signal.
 std::pair<std::string, std::string> parts_of(const hal::Field& field) {
@@ -35,7 +36,7 @@ double range_of(const std::vector<double>& column) {
   return high >= low ? high - low : -1.0;
 }
 
-/// A signal with many numbers shows those that change most.
+/// Those of its numbers that change most come first; the ones that stand still are thin and grey.
 Figure figure_of(const RunData& run, const std::string& controller, const hal::Field& field,
                  log::TimeSeries& table) {
   const auto [unit, words] = parts_of(field);
@@ -50,11 +51,14 @@ Figure figure_of(const RunData& run, const std::string& controller, const hal::F
                            [&](std::size_t i) { return range_of(table.columns[i]); });
   order.resize(std::min(order.size(), std::size(kSignalStyles)));
   if (order.size() < table.columns.size()) figure.title += " (the largest changes)";
-  std::ranges::sort(order);
+  const double largest = range_of(table.columns[order.front()]);
   for (std::size_t k = 0; k < order.size(); ++k) {
+    std::vector<double>& column = table.columns[order[k]];
+    const bool still = largest > 0.0 && range_of(column) <= kStillShare * largest;
     const std::string name = log::signal_name(field, order[k], run.info);
-    figure.curves.push_back({field.count == 1 ? std::string() : name, kSignalStyles[k],
-                             table.time_s, std::move(table.columns[order[k]])});
+    figure.curves.push_back({field.count == 1 ? std::string() : name,
+                             still ? CurveStyle::kStill : kSignalStyles[k], table.time_s,
+                             std::move(column)});
   }
   drop_empty_curves(figure);
   return figure;

@@ -191,6 +191,11 @@ Result<InputPlan> read_log(const PlannedInput& input, const InputSource& source)
   }
   const auto file = log::LogFile::open(source.file);
   if (!file) return std::unexpected(file.error());
+  if (file->damage_loses_messages()) {
+    const Error damaged{.message = {}, .hint = {}, .file = source.file, .line = 0, .key = {}};
+    return wrong(damaged, "is damaged, so its inputs cannot be replayed: " + file->damage().front(),
+                 "copy the file again");
+  }
   const std::string topic = "/tandem/input/" + input.controller + "/" + input.block.name;
   if (const auto found = file->require(topic); !found) return std::unexpected(found.error());
   InputPlan plan{.at = {}, .values = {}, .number = {}, .of_run = true};

@@ -1,8 +1,6 @@
 // Asking the loop for controllers.
 #include "runtime/run_services.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <thread>
 #include <utility>
@@ -11,7 +9,7 @@
 #include "base/nearest.hpp"
 #include "base/quoting.hpp"
 #include "runtime/cycle_log.hpp"
-#include "runtime/owner_controller.hpp"
+#include "runtime/refusal_text.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -19,71 +17,6 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::microseconds kLook{200};  // between two looks for an answer
-
-/// Why the loop refused, and what to do about it.
-struct Words {
-  std::string message;
-  std::string hint;
-};
-
-/// @param what  "moved", "set"
-Words while_latched(const std::string& what) {
-  return {"nothing is " + what + " while a fault is latched", "tandem fault reset, then ask again"};
-}
-
-/// Why no joint may move in the phase. Empty in one with another answer.
-Words not_yet(RunPhase phase) {
-  switch (phase) {
-    case RunPhase::kBringUp:
-      return {"its drive is not enabled yet", "ask again in the phase running"};
-    case RunPhase::kSettling:
-      return {"the joints are held until the robot has settled at its start",
-              "wait a moment, then ask again"};
-    case RunPhase::kRetreating:
-      return {"the robot is on its way to a safe posture", "ask again after a reset"};
-    case RunPhase::kFaulted: return while_latched("moved");
-    case RunPhase::kResetting: return {"a reset is under way", "wait a moment, then ask again"};
-    case RunPhase::kRunning:
-    case RunPhase::kHeld:
-    case RunPhase::kShutDown:
-    case RunPhase::kDone: break;
-  }
-  return {};
-}
-
-using enum RejectReason;
-constexpr struct {
-  const char *message, *hint;
-} kWords[]{
-    {"", ""},
-#define TANDEM_REFUSAL(name, words, hint) {words, hint},
-#include "runtime/refusals.inc"
-#undef TANDEM_REFUSAL
-};
-
-/// @param one, other  controllers that stand in the way; empty where there is none
-Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
-               const std::string& one, const std::string& other) {
-  if (reason == kNone) return {};
-  if (reason == kNotRunning && phase == RunPhase::kFaulted) return while_latched("set");
-  if (reason == kNotRunning && phase == RunPhase::kHeld) {
-    return {"every joint is held after the reset, until the controllers run",
-            "tandem controller start lets them continue, then ask again"};
-  }
-  if (reason == kClaimed && one == kOwnerController) {
-    return {"is claimed by the owner of the robot in another process",
-            "ask that process, or end it: then the joint is free"};
-  }
-  if (reason == kNotEnabled) {
-    if (Words yet = not_yet(phase); !yet.message.empty()) return yet;
-  }
-  const std::string who = one.empty() ? "this" : "the controller '" + one + "'";
-  const auto& row = kWords[static_cast<std::size_t>(reason)];
-  const auto filled = [&](const char* words) {
-    return fmt::format(fmt::runtime(words), joint, one, other, to_string(phase), who);
-  };
-  return {filled(row.message), filled(row.hint)};
-}
 
 }  // namespace
 
@@ -196,8 +129,8 @@ std::string RunServices::controller_name(std::int32_t slot) const {
 Error RunServices::refusal(const CycleAnswer& answer) const {
   const std::string joint =
       answer.joint < 0 ? "" : robot_->joints[static_cast<std::size_t>(answer.joint)].name;
-  Words words = words_of(answer.reason, progress_->phase.load(), joint, controller_name(answer.one),
-                         controller_name(answer.other));
+  RefusalText words = refusal_text(answer.reason, progress_->phase.load(), joint,
+                                   controller_name(answer.one), controller_name(answer.other));
   return {
       .message = std::move(words.message), .hint = std::move(words.hint), .file = {}, .key = joint};
 }

@@ -20,6 +20,15 @@
 
 namespace tandem::log {
 
+static void figures(apps::Figures& f, const Damage& damage) {
+  f("at", "byte of the file; 0: the file as a whole", damage.at);
+  f("bytes", damage.bytes);
+  f("start_ns", "of a chunk: its messages' first time", apps::known(damage.chunk, damage.first_ns));
+  f("end_ns", "the last", apps::known(damage.chunk, damage.last_ns));
+  f("loses_messages", "false: all messages are here", damage.loses_messages);
+  f("text", "what is wrong", damage.what);
+}
+
 static void figures(apps::Figures& f, const LogPart& part) {
   f("part", "its number, from 1; 0: the log is in one file", part.number);
   f("path", part.path);
@@ -28,6 +37,7 @@ static void figures(apps::Figures& f, const LogPart& part) {
   f("messages", part.messages);
   f("bytes", part.bytes);
   f("complete", "false: its run writes it, or was killed while it did", !part.truncated);
+  f("damage", "what of it could not be read and was left out", part.damage);
 }
 
 static void figures(apps::Figures& f, const MissingParts& missing) {
@@ -55,7 +65,8 @@ static void figures(Figures& f, const log::LogFile* file) {
     end_ns = std::max(end_ns.value_or(topic.last_ns), topic.last_ns);
   }
   f("path", [&] { return file->path(); });
-  f("complete", "false after a killed run, and while it runs", [&] { return !file->truncated(); });
+  f("complete", "false after a killed run, while it runs, and where damage loses messages",
+    [&] { return !file->truncated() && !file->damage_loses_messages(); });
   f("start_ns", "nominal time of the first message", start_ns);
   f("end_ns", "of the last", end_ns);
   f("messages", [&] { return file->messages(); });
@@ -94,7 +105,8 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
     facts.add("files", fmt::format("{}, parts {} to {}", parts.size(), parts.front().number,
                                    parts.back().number));
   }
-  for (const std::string& remark : file.remarks()) {
+  for (const std::string& one : file.damage()) facts.add("damaged", shown(one, 4'096));
+  for (const std::string& remark : file.gaps()) {
     facts.add(info.part > 0 ? "part" : "missing", shown(remark, 4'096));
   }
   facts.add("backend", info.hal);
@@ -104,6 +116,7 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
                           : fmt::format("{} us", static_cast<double>(info.period_ns) / 1e3));
   if (info.operators_view) facts.add("state", "what the tele-operator saw: predicted, or late");
   if (!info.engine.empty()) facts.add("engine", info.engine);
+  for (const std::string& one : info.plant) facts.add("plant is other in", one);
   facts.add("kernels", info.kernel_variant);
   if (!info.kernel_sha256.empty()) facts.add("kernels sha256", info.kernel_sha256);
   for (const std::string& controller : info.controllers) facts.add("controller", controller);

@@ -113,6 +113,8 @@ class BagSource {
           schema == reader->schemas().end() ? "" : ros_name(schema->second.name);
       if (Status taken = take(channel, type, **message); !taken) return taken;
     }
+    if (const auto& damage = reader->damage(); !damage.empty())
+      return refuse(to_string(damage.front()), "copy it again, or mend it: mcap recover");
     if (!reader->truncated()) return {};
     return refuse("the file is cut after " + std::to_string(reader->bytes()) + " bytes",
                   "copy it again, or mend it: mcap recover");

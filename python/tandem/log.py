@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
@@ -155,7 +156,8 @@ class Log(Sealed):
 
     Of a log in several files the first one's name opens all, "arm-001.3.mcap" that part alone.
     Opening counts the messages; numbers are read channel by channel when they are asked for.
-    Errors: FileNotFoundError; tandem.Error, a file that is no log or is damaged; UnknownName.
+    What of a file is damaged is left out: `remarks` say so, and a UserWarning.
+    Errors: FileNotFoundError; tandem.Error, a file that is no log; UnknownName.
     """
 
     path: str
@@ -166,7 +168,7 @@ class Log(Sealed):
     result: Dict[str, str]  #: empty when the run was killed
     configuration: Dict[str, str]  #: text of every file that was read, by path
     parts: List[str]  #: its files: of a log in several, all that are there
-    remarks: List[str]  #: which parts are not, and what time is here; [] when none is missing
+    remarks: List[str]  #: which parts are missing, and what is damaged; [] when neither
     truncated: bool  #: the run was killed, or goes on: the data end where its last chunk ended
     data_sha256: str  #: over every message
 
@@ -178,6 +180,8 @@ class Log(Sealed):
         self.configuration = dict(file.configuration)
         self.parts, self.remarks = file.parts, file.remarks
         self.truncated, self.data_sha256 = file.truncated, file.data_sha256
+        for damage in file.damage:
+            warnings.warn(f"{self.path}: {damage}", stacklevel=2)
         self._channels = {row[0]: Channel(file, row) for row in file.channels()}
         self.channels = list(self._channels)
         self._events: Optional[List[Event]] = None

@@ -201,6 +201,33 @@ TEST_F(LogAndReport, AKilledRunLeavesALogThatIsReadAndDrawn) {
   EXPECT_EQ(report.err, "") << "nothing is left out";
 }
 
+// Nothing of it was read.
+TEST_F(LogAndReport, ALogWithOneWrongBitIsReadAndSaysWhatIsLeftOut) {
+  ASSERT_EQ(tandem("run trajectory.toml --duration 1.5 --quiet").status, 0);
+  const std::string log = "runs/double_pendulum-trajectory-002.mcap";
+  std::string bytes = read_text(folder_ / log);
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 4);
+  write_text(folder_ / "runs/bad.mcap", bytes);
+  const std::string left_out = ": its checksum is wrong; its messages are left out";
+  const Outcome info = tandem("log info runs/bad.mcap --json info.json");
+  ASSERT_EQ(info.status, 0) << info.err;
+  EXPECT_NE(info.out.find(left_out), std::string::npos) << info.out;
+  EXPECT_EQ(json("info.json")["complete"], false);
+  const auto damage = json("info.json")["parts"][0]["damage"][0];
+  EXPECT_EQ(damage["loses_messages"], true);
+  EXPECT_GT(damage["end_ns"].get<double>(), damage["start_ns"].get<double>());
+  for (const char* const command : {"log csv runs/bad.mcap", "report runs/bad.mcap"}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.err.find(left_out), std::string::npos) << command << "\n" << outcome.err;
+  }
+  EXPECT_NE(read_text(folder_ / "runs/bad/report.html").find(left_out), std::string::npos);
+  const Outcome diff = tandem("log diff " + log + " runs/bad.mcap");
+  EXPECT_EQ(diff.status, 2);
+  EXPECT_NE(diff.err.find("it is not comparable bit for bit: chunk of"), std::string::npos)
+      << diff.err;
+}
+
 TEST_F(LogAndReport, ReportLaysTwoLogsOverEachOther) {
   ASSERT_EQ(tandem("run hold.toml --duration 0.5 --quiet").status, 0);
   const Outcome outcome =

@@ -37,6 +37,26 @@ TEST_F(ChangedPlant, IsInEventsTableJsonAndReport) {
             {"picked up: box, 0.1 kg on link2, at 0.600 s", "dropped: box, at 0.900 s"});
 }
 
+// The page had the payloads' events alone.
+TEST_F(ChangedPlant, IsATableOfTheReport) {
+  write_text(folder_ / "c.toml", read_text(folder_ / "p.toml") +
+                                     "[sim.link.link1]\nmass_kg = 1.5\n[sim.joint.joint1]\n"
+                                     "friction_Nm = 0.1\n");
+  const Outcome run = tandem("run c.toml --duration 0.3 --log l --report -q");
+  ASSERT_EQ(run.status, 0) << run.err;
+  expect_in(read_text(folder_ / "l/double_pendulum-c-001/report.html"),
+            {"<h2>The simulated robot is other than the model</h2>",
+             "<tr><td>link link1</td><td>mass_kg = 1.5</td></tr>",
+             "<tr><td>joint joint1</td><td>friction_Nm = 0.1</td></tr>",
+             "<tr><td>payload lead</td><td>0.05 kg on link1, from the start</td></tr>",
+             "<tr><td>payload box</td><td>0.1 kg on link2, from 0.6 s to 0.9 s</td></tr>"});
+  expect_in(tandem("log info l/double_pendulum-c-001.mcap").out,
+            {"plant is other in", "link link1: mass_kg = 1.5"});
+  ASSERT_EQ(tandem("run trajectory.toml --duration 0.3 --log l --report -q").status, 0);
+  EXPECT_EQ(read_text(folder_ / "l/double_pendulum-trajectory-001/report.html").find("is other"),
+            std::string::npos);
+}
+
 // One that a run is given has no name.
 TEST_F(ChangedPlant, OfAScenarioHasItsMassAndLink) {
   write_text(

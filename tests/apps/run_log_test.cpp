@@ -68,7 +68,12 @@ TEST_F(RunLog, GoesOnInSeveralFilesOfWhichTheOldestGo) {
   EXPECT_NE(tandem("log csv " + first + " --every 1000").err.find(missing), std::string::npos);
   EXPECT_NE(tandem("log diff " + first + " " + first).err.find(missing), std::string::npos);
   ASSERT_EQ(tandem("report " + first + " -o page").status, 0);
-  EXPECT_NE(read_text(folder_ / "page/report.html").find(missing), std::string::npos);
+  // The first row that was left was "the controllers' start".
+  const std::string page = read_text(folder_ / "page/report.html");
+  EXPECT_NE(page.find(missing), std::string::npos);
+  EXPECT_NE(page.find(" s, and does not have the controllers' start."), std::string::npos);
+  EXPECT_NE(page.find("<dt>covers</dt>"), std::string::npos);
+  EXPECT_EQ(page.find("controllers started"), std::string::npos);
   const std::string last = parts.back()["path"];
   const Outcome alone = tandem("log info " + last);
   EXPECT_NE(alone.out.find("of a log in several files: " + first + " opens all of them"),

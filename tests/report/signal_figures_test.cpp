@@ -122,7 +122,7 @@ TEST_F(SignalFigures, ShowWhatIsANumber) {
   const std::vector<double>& y = all[0].curves[0].y;
   EXPECT_TRUE(std::isnan(y[9]) && std::isnan(y[20])) << "its line has gaps";
   EXPECT_EQ(y[10], 11.0);
-  EXPECT_EQ(labels(all[1]), (std::vector<std::string>{"some.0", "some.2"}));
+  EXPECT_EQ(labels(all[1]), (std::vector<std::string>{"some.2", "some.0"}));
   const std::string pictures = folder_ / "report";
   std::filesystem::create_directory(pictures);
   const Status drawn = draw(all, pictures);
@@ -154,8 +154,30 @@ TEST_F(SignalFigures, OfManyNumbersShowTheLargestChanges) {
   const auto all = figures();
   ASSERT_EQ(all.size(), 1U);
   EXPECT_EQ(all[0].title, "gait.place: of all (the largest changes)");
-  EXPECT_EQ(labels(all[0]), (std::vector<std::string>{"place.0", "place.1", "place.2", "place.5",
-                                                      "place.7", "place.8"}));
+  EXPECT_EQ(labels(all[0]), (std::vector<std::string>{"place.1", "place.2", "place.5", "place.7",
+                                                      "place.8", "place.0"}));
+  EXPECT_EQ(all[0].curves.back().style, CurveStyle::kStill) << "it changes by a thousandth of them";
+}
+
+// A joint that stood still was bold, and the one that moved a thin dashed line.
+TEST_F(SignalFigures, DrawTheJointThatMovesInAFullLine) {
+  run_.info.joints = {"hip", "knee", "ankle", "toe", "wrist", "neck"};
+  hal::SignalBlock gait;
+  double* const error = gait.declare("error", "rad", "reference less position", 6, true);
+  log_of("gait", gait, [&](int k) {
+    for (int j = 0; j < 6; ++j) error[j] = 0.1 * j;
+    error[3] = std::sin(0.2 * k);
+  });
+  const auto all = figures();
+  ASSERT_EQ(all.size(), 1U);
+  ASSERT_EQ(all[0].curves.size(), 6U);
+  EXPECT_EQ(all[0].curves[0].label, "error.toe");
+  EXPECT_EQ(all[0].curves[0].style, CurveStyle::kMeasured);
+  for (std::size_t k = 1; k < 6; ++k)
+    EXPECT_EQ(all[0].curves[k].style, CurveStyle::kStill) << all[0].curves[k].label;
+  const std::string pictures = folder_ / "report";
+  std::filesystem::create_directory(pictures);
+  ASSERT_TRUE(draw(all, pictures));
 }
 
 TEST_F(SignalFigures, BeyondTwelveAreARemark) {

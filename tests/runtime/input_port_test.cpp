@@ -9,6 +9,7 @@
 
 #include "log/log_file.hpp"
 #include "rt/scoped_realtime.hpp"
+#include "tests/log/scratch_folder.hpp"
 #include "tests/runtime/loop_run.hpp"
 #include "tests/support/scratch_folder.hpp"
 
@@ -333,6 +334,34 @@ TEST_F(InputRun, AReplayFromTheLogIsTheSameToTheLastBit) {
   EXPECT_EQ(live, replayed);
   const auto without = commands(nullptr, {}, false);
   EXPECT_NE(live, without);
+}
+
+// What is left of the samples would have been played as if it were all.
+TEST_F(InputRun, AReplayFromALogThatLostSomethingIsRefused) {
+  const tandem::test::ScratchFolder folder;
+  const std::string path = folder / "live.mcap";
+  auto recording = log::Recorder::open(path, {.joints = {"shoulder", "elbow", "wrist"}}, {});
+  ASSERT_TRUE(recording) << recording.error().to_string();
+  recorder = recording->get();
+  run();
+  EXPECT_EQ(set({.components = {"a"}, .numbers = {0.3125}}), "accepted");
+  steps(5);
+  (void)recorder->close();
+  cycle.reset();
+  std::string bytes = log::content(path);
+  const double sample = 0.3125;
+  const std::size_t at = bytes.find(std::string(reinterpret_cast<const char*>(&sample), 8));
+  ASSERT_NE(at, std::string::npos);
+  bytes[at] = static_cast<char>(bytes[at] ^ 1);
+  log::overwrite(path, bytes);
+  InputLoop loop;
+  const Status added = loop.add({{"rate", InputKind::kNumbers, kRate}},
+                                {{.name = "rate", .feeder = InputFeeder::kFile, .file = path}});
+  ASSERT_FALSE(added);
+  EXPECT_NE(
+      added.error().to_string().find("is damaged, so its inputs cannot be replayed: chunk of"),
+      std::string::npos)
+      << added.error().to_string();
 }
 
 /// An input of each kind, and a sample of it that is no other.

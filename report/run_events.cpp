@@ -1,0 +1,64 @@
+#include "report/run_events.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+namespace tandem::report {
+
+std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
+                                const std::vector<std::string>& joints,
+                                const ErrorText& error_text) {
+  constexpr std::uint32_t kFirstErrorCode = 0x1000;  // CiA 402; below it: other causes' figures
+  std::vector<RunFault> faults;
+  for (const auto& [event, text] : events) {
+    if (!log::is_fault(event.kind)) continue;
+    RunFault fault{static_cast<double>(event.time_ns) * 1e-9, {}, text, log::is_stop(event)};
+    const auto joint = static_cast<std::size_t>(event.joint);
+    const bool of_drive = event.joint >= 0 && joint < joints.size();
+    if (of_drive && event.code >= kFirstErrorCode && error_text) {
+      fault.joint = joints[joint];
+      fault.text = error_text(event.code) + (fault.stops ? "" : ", reported");
+    }
+    faults.push_back(std::move(fault));
+  }
+  return faults;
+}
+
+std::vector<RunParameter> parameters_of(const std::vector<log::EventText>& events,
+                                        const std::vector<std::string>& at_start) {
+  std::vector<RunParameter> all;
+  for (const std::string& line : at_start) {
+    const std::size_t equals = std::min(line.rfind(" = "), line.size());
+    all.push_back({line.substr(0, equals), line.substr(std::min(equals + 3, line.size()))});
+  }
+  for (const auto& [event, text] : events) {
+    const auto it = log::parameter_of(text);
+    if (!it) continue;
+    const auto known = std::ranges::find(all, it->name, &RunParameter::name);
+    RunParameter& one = known == all.end() ? all.emplace_back() : *known;
+    one.name = it->name;
+    const double time_s = static_cast<double>(event.time_ns) * 1e-9;
+    const std::string given = it->word.empty() ? fmt::format("{:g}", it->value) : it->word;
+    std::string value = fmt::format("{} at {:.3f} s", given, time_s);
+    if (event.kind == log::EventKind::kParameterLoaded) {
+      one = {one.name, std::move(value)};
+    } else {
+      one.then = std::move(value);
+      ++one.changes;
+    }
+  }
+  return all;
+}
+
+std::vector<PayloadMark> payloads_of(const std::vector<log::EventText>& events) {
+  std::vector<PayloadMark> marks;
+  for (const auto& [event, text] : events) {
+    const bool dropped = event.kind == log::EventKind::kDropped;
+    if (!dropped && event.kind != log::EventKind::kPickedUp) continue;
+    marks.push_back({static_cast<double>(event.time_ns) * 1e-9, dropped, text});
+  }
+  return marks;
+}
+
+}  // namespace tandem::report
