@@ -133,7 +133,7 @@ void PlaceSearch::look_in_child(void* self) {
   }
 }
 
-/// Of each call those that were found; a call whose place is not known with its symbol.
+/// Places of each call that were found; a call whose place is not known has its symbol.
 /// @param use  (index of the call, its place); false: no more
 template <class Use>
 void PlaceSearch::each_line(const Use& use) const {

@@ -86,11 +86,11 @@ bool Comparison::equal() const {
 Result<Comparison> compare(const LogFile& a, const LogFile& b) {
   for (const LogFile* one : {&a, &b}) {
     if (!one->damage_loses_messages()) continue;
-    return std::unexpected(Error{.message = "is damaged, so it is not comparable bit for bit: " +
-                                            one->damage().front(),
-                                 .hint = "copy the file again",
-                                 .file = one->path(),
-                                 .key = {}});
+    return std::unexpected(Error{
+        .message = "is damaged, so it is not comparable bit for bit: " + one->damage().front(),
+        .hint = "copy the file again",
+        .file = one->path(),
+        .key = {}});
   }
   Comparison result;
   const bool runs = a.find("/tandem/state") != nullptr && b.find("/tandem/state") != nullptr;

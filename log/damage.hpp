@@ -11,7 +11,7 @@ namespace tandem::log {
 struct Damage {
   std::uint64_t at = 0;  ///< in the file; 0: the file as a whole
   std::uint64_t bytes = 0;
-  bool chunk = false;  ///< a chunk of messages; else another record
+  bool chunk = false;                      ///< a chunk of messages; else another record
   std::int64_t first_ns = 0, last_ns = 0;  ///< of a chunk: its messages' times
   bool loses_messages = true;              ///< false: all messages are here
   std::string what{};                      ///< "its checksum is wrong; its messages are left out"

@@ -17,13 +17,13 @@ namespace tandem::log {
 struct RecordPlace {
   Opcode opcode{};
   std::uint64_t at = 0;
-  std::uint64_t bytes = 0;  ///< with its head
-  std::uint64_t end = 0;    ///< behind it, and behind the message indices of a chunk
+  std::uint64_t bytes = 0;                 ///< with its head
+  std::uint64_t end = 0;                   ///< behind it, and behind the message indices of a chunk
   std::int64_t first_ns = 0, last_ns = 0;  ///< of a chunk's messages
 };
 
 struct McapIndex {
-  std::vector<RecordPlace> places{};  ///< in the file's order, none in another
+  std::vector<RecordPlace> places{};              ///< in the file's order, none in another
   std::vector<std::pair<Opcode, Bytes>> texts{};  ///< all schemas, all channels
   std::uint64_t data_end = 0;  ///< the data are before it; 0: there is no summary to rely on
   bool damaged = false;        ///< there is one, and it cannot be relied on

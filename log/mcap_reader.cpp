@@ -199,7 +199,8 @@ Status McapReader::read_record() {
   }
   record_.resize(static_cast<std::size_t>(length));
   if (!read(record_)) return unreadable();
-  if (ours_ && !is_of_tandem(opcode, record_)) return note(std::move(place), "its kind is wrong; it is left out");
+  if (ours_ && !is_of_tandem(opcode, record_))
+    return note(std::move(place), "its kind is wrong; it is left out");
   return take_record(opcode, std::move(place));
 }
 
@@ -230,7 +231,8 @@ Status McapReader::take_record(Opcode opcode, Damage place) {
   if (opcode != Opcode::kMessage) {
     const auto whole = take(opcode, record_);
     if (!whole) return std::unexpected(whole.error());
-    return *whole ? Status() : note(std::move(place), "it is shorter than its content; it is left out");
+    return *whole ? Status()
+                  : note(std::move(place), "it is shorter than its content; it is left out");
   }
   // A file without chunks: next_in_chunk() finds the message as one of its own.
   chunk_.clear();

@@ -32,7 +32,8 @@ std::terminate_handler usual_end = nullptr;
 /// For a signal handler when the loop's own stack is full.
 alignas(std::max_align_t) std::array<std::byte, 262144> signal_stack;
 std::atomic<const char*> reason{nullptr};
-/// Of the loop's crash, and of one before the first cycle: null before the first run.
+/// The search of the loop's crash, and that of one before the first cycle: null before the first
+/// run.
 PlaceSearch *loop_search = nullptr, *early_search = nullptr;
 std::atomic<bool> robot_stopped{false};
 constexpr char kTitle[] = "called from (innermost first):";
@@ -122,7 +123,7 @@ void begin_to_stand_still(const char* why) noexcept {
   stand_still("an exception left the loop, which stands still: ", what.c_str(), take_call_stack());
 }
 
-/// Of a process that ends now.
+/// The words of a process that ends now.
 void tell_early_crash(const char* controller, const char* why, const CallStack& stack) noexcept {
   const bool looks = early_search != nullptr && early_search->note(stack, &is_controllers);
   write_line({"error: ", controller, kEarlyCrash, why, looks ? early_search->noted() : ""});

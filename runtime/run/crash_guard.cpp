@@ -46,7 +46,7 @@ const char* note(const CallStack& stack) noexcept {
   return search->note(stack, &is_controllers) ? search->noted() : "";
 }
 
-/// Of the stack that was noted, whose files and lines take their time.
+/// The stack that was noted; its files and lines take their time.
 void write_calls() noexcept {
   search->look({.notice = "note: file and line of the crash are looked for, at most 20 s long\n"});
   search->write(STDERR_FILENO, "called from (innermost first):");

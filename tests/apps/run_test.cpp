@@ -232,7 +232,8 @@ TEST_F(Run, TablesStandApartAndFaultsBeginAtTheLeft) {
 TEST_F(Run, CountsTheJointsWhoseCommandsWereLimited) {
   edit("robot.toml", "max_torque_Nm = 2.0", "max_torque_Nm = 2.0\nmax_acceleration_rad_s2 = 1.0");
   const Outcome outcome = tandem("run trajectory.toml --no-log --no-socket");
-  EXPECT_NE(outcome.out.find(" cycles, by 'joint_trajectory', 1 more joint; first "), std::string::npos)
+  EXPECT_NE(outcome.out.find(" cycles, by 'joint_trajectory', 1 more joint; first "),
+            std::string::npos)
       << outcome.out;
 }
 

@@ -86,9 +86,10 @@ struct DamagedFile : testing::TestWithParam<Compression> {
     ASSERT_EQ(all.messages.size(), 24U);
     ASSERT_TRUE(all.damage.empty());
   }
-  /// Reads the file with one wrong bit after the other: all of what frames records, else one of each
-  /// byte. @param from  the first of them  @param size  of the file
-  void read_with_wrong_bits(std::size_t from, std::size_t size, const std::function<void(std::size_t, const Found&)>& look) const {
+  /// Reads the file with one wrong bit after the other: all of what frames records, else one of
+  /// each byte. @param from  the first of them  @param size  of the file
+  void read_with_wrong_bits(std::size_t from, std::size_t size,
+                            const std::function<void(std::size_t, const Found&)>& look) const {
     std::vector<bool> frames(size, false);
     for (const RecordPlace& place : index_of(path).places) {
       for (std::size_t i = 0; i < 64; ++i) {
@@ -181,16 +182,19 @@ TEST_P(DamagedFile, IsReadHonestlyWithoutItsEndToo) {
 INSTANTIATE_TEST_SUITE_P(Packed, DamagedFile,
                          testing::Values(Compression::kNone, Compression::kLz4, Compression::kZstd),
                          [](const auto& one) {
-                           return one.param == Compression::kNone ? std::string("Not")
-                                                                  : std::string(mcap_name(one.param));
+                           return one.param == Compression::kNone
+                                      ? std::string("Not")
+                                      : std::string(mcap_name(one.param));
                          });
 
 /// Two joints at 100 Hz for a second, in chunks of 200 ms.
 struct DamagedLog : testing::Test {
   void SetUp() override {
     for (const std::string& one : {path, other}) {
-      auto recorder = Recorder::open(one, {.robot = "two", .hal = "import", .joints = {"hip", "knee"},
-                                           .period_ns = 10'000'000}, {});
+      auto recorder = Recorder::open(
+          one,
+          {.robot = "two", .hal = "import", .joints = {"hip", "knee"}, .period_ns = 10'000'000},
+          {});
       ASSERT_TRUE(recorder);
       hal::Layout layout;
       for (const char* name : {"position_rad", "velocity_rad_s", "torque_nm", "age_cycles"})
@@ -227,10 +231,11 @@ TEST_F(DamagedLog, SaysWhatOfItIsLeftOut) {
   const LogFile log = damaged(chunks[2]);
   EXPECT_FALSE(log.truncated());
   EXPECT_TRUE(log.damage_loses_messages());
-  EXPECT_EQ(log.remarks(), (std::vector<std::string>{
-                               "chunk of " + std::to_string(chunks[2].bytes) + " bytes at byte " +
-                               std::to_string(chunks[2].at) +
-                               ", 0.420 to 0.620 s: its checksum is wrong; its messages are left out"}));
+  EXPECT_EQ(log.remarks(),
+            (std::vector<std::string>{
+                "chunk of " + std::to_string(chunks[2].bytes) + " bytes at byte " +
+                std::to_string(chunks[2].at) +
+                ", 0.420 to 0.620 s: its checksum is wrong; its messages are left out"}));
   const auto table = log.read("/tandem/state", {{"position_rad", 0}});
   ASSERT_TRUE(table);
   EXPECT_EQ(table->time_s.size(), 80U);
