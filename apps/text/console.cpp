@@ -304,7 +304,7 @@ void begin_json(const std::string& file) {
   std::error_code problem;
   if (file.empty() || file == "-" || !std::filesystem::is_regular_file(file, problem)) return;
   if (std::filesystem::is_symlink(file, problem) || !std::filesystem::remove(file, problem))
-    std::filesystem::resize_file(file, 0, problem);
+    (void)open_output(file);  // not through a stranger's link
 }
 
 void fail_begun_json(Error error) {
