@@ -49,45 +49,6 @@ bool fits(const LoggedTopic& topic, std::int64_t period_ns) {
                                    static_cast<double>(bounds::kReplayCycles.most);
 }
 
-/// What [log] of the experiment leaves out, in its own words; empty: not this.
-std::string left_out_by(TomlTable log, std::string_view topic, std::string_view field) {
-  constexpr std::string_view kViewers[] = {"joint_states", "tf", "tf_static", "robot_description"};
-  if (!field.empty()) {
-    const std::string whole = std::string(topic) + "." + std::string(field);
-    const auto without = log.texts_or("without", {});
-    return std::ranges::find(without, whole) != without.end() ? "without = [\"" + whole + "\"]"
-                                                              : "";
-  }
-  if (std::ranges::find(kViewers, topic) != std::end(kViewers))
-    return log.boolean_or("viewers", true) ? "" : "viewers = false";
-  const std::string key = std::string(topic) + "_every";
-  return log.has(key) && log.integer_or(key, 1, 0, 1'000'000) == 0 ? key + " = 0" : "";
-}
-
-/// The names of topics that end in "/`end`".
-std::vector<std::string> ending_in(const std::vector<LoggedTopic>& topics, std::string_view end) {
-  std::vector<std::string> names;
-  for (const LoggedTopic& topic : topics)
-    if (topic.name.ends_with("/" + std::string(end))) names.push_back(topic.name);
-  return names;
-}
-
-/// The topics that `name` may have meant.
-std::string suggest_topic(const std::string& name, const std::vector<LoggedTopic>& topics) {
-  std::string_view end = name;
-  for (const std::string_view lead : {"/tandem/", "/"})
-    if (end.starts_with(lead)) end.remove_prefix(lead.size());
-  std::vector<std::string> names = ending_in(topics, end), ends, all;
-  for (const LoggedTopic& topic : topics) {
-    all.push_back(topic.name);
-    for (auto at = topic.name.find('/'); at != std::string::npos; at = topic.name.find('/', at + 1))
-      ends.push_back(topic.name.substr(at + 1));
-  }
-  if (names.empty()) names = ending_in(topics, nearest(end, ends));
-  if (names.size() == 1) return "did you mean '" + names.front() + "'?";
-  return suggest(name, names.empty() ? all : names);
-}
-
 /// What writes it has a lock on it (McapWriter::open).
 bool is_being_written(const Descriptor& file) {
   if (::flock(file.get(), LOCK_SH | LOCK_NB) != 0) return errno == EWOULDBLOCK;
@@ -285,6 +246,7 @@ std::vector<std::string> LogFile::remarks() const {
     return std::string(number.data());
   };
   std::vector<std::string> all;
+  if (!info_.reduced.empty()) all.push_back("this log is reduced " + info_.reduced);
   if (!missing_.empty()) {
     std::string text;
     for (const MissingParts& one : missing_) text += (text.empty() ? "" : ", ") + to_string(one);
@@ -305,76 +267,44 @@ std::vector<std::string> LogFile::remarks() const {
   return all;
 }
 
-const LoggedTopic* LogFile::find(std::string_view name) const {
-  for (const LoggedTopic& topic : topics_) {
-    if (topic.name == name) return &topic;
-  }
-  return nullptr;
-}
-
 std::uint64_t LogFile::messages() const {
   std::uint64_t count = 0;
   for (const LoggedTopic& topic : topics_) count += topic.messages;
   return count;
 }
 
-Result<const LoggedTopic*> LogFile::require(const std::string& name) const {
-  if (const LoggedTopic* topic = find(name)) return topic;
-  if (truncated()) {
-    return std::unexpected(at(path_,
-                              "the log is cut after " + std::to_string(bytes()) +
-                                  " bytes, before a message of '" + name + "'",
-                              hint_of_cut(std::ranges::any_of(parts_, &LogPart::being_written))));
-  }
-  const std::string why = left_out(name);
-  return std::unexpected(at(path_, "has no topic '" + name + "'" + (why.empty() ? "" : ": " + why),
-                            why.empty() ? suggest_topic(name, topics_) : ""));
-}
-
-std::string LogFile::full_name(const std::string& name) const {
-  if (find(name) != nullptr || name.starts_with('/')) return name;
-  for (const std::string lead : {"/tandem/", "/"})
-    if (find(lead + name) != nullptr) return lead + name;
-  const std::vector<std::string> names = ending_in(topics_, name);
-  return names.size() == 1 ? names.front() : "/tandem/" + name;
-}
-
-std::string LogFile::left_out(std::string_view topic, std::string_view field) const {
-  for (const auto& [file, text] : info_.configuration) {
-    if (!file.ends_with(".toml")) continue;
-    const Result<TomlDocument> document = TomlDocument::parse(text, file);
-    if (!document || !document->root().has("robot")) continue;
-    const std::string_view last = topic.substr(topic.rfind('/') + 1);
-    const std::string key = left_out_by(document->root().table_or_empty("log"), last, field);
-    return key.empty() ? "" : "this log leaves it out ([log] " + key + ")";
+Status LogFile::visit(
+    const std::function<Status(const McapReader&, const MessageView&)>& visit) const {
+  for (std::size_t i = 0; i < files_.size(); ++i) {
+    auto reader = McapReader::open(files_[i], parts_[i].path);
+    if (!reader) return std::unexpected(reader.error());
+    for (;;) {
+      auto message = reader->next();
+      if (!message) return std::unexpected(message.error());
+      if (!message->has_value()) break;
+      if (i > 0 && is_repeated(reader->channels().at((*message)->channel).topic)) continue;
+      if (Status visited = visit(*reader, **message); !visited) {
+        if (visited.error().file.empty()) visited.error().file = parts_[i].path;
+        return visited;
+      }
+    }
   }
   return {};
 }
 
 Status LogFile::for_each(
     const std::string& name,
-    const std::function<void(std::int64_t, std::span<const std::byte>)>& visit) const {
+    const std::function<void(std::int64_t, std::span<const std::byte>)>& each) const {
   const auto topic = require(name);
   if (!topic) return std::unexpected(topic.error());
-  for (std::size_t i = 0; i < files_.size(); ++i) {
-    auto reader = McapReader::open(files_[i], parts_[i].path);
-    if (!reader) return std::unexpected(reader.error());
-    if (i > 0 && is_repeated(name)) return {};
-    for (;;) {
-      auto message = reader->next();
-      if (!message) return std::unexpected(message.error());
-      if (!message->has_value()) break;
-      const MessageView& view = **message;
-      if (reader->channels().at(view.channel).topic != name) continue;
-      const std::size_t expected = (*topic)->layout.bytes();
-      if (view.data.size() < kCdrHeader.size() + expected) {
-        return std::unexpected(
-            at(parts_[i].path, "a message of " + name + " is shorter than its type"));
-      }
-      visit(view.time_ns, view.data.subspan(kCdrHeader.size()));
-    }
-  }
-  return {};
+  const std::size_t expected = kCdrHeader.size() + (*topic)->layout.bytes();
+  return visit([&](const McapReader& reader, const MessageView& view) -> Status {
+    if (reader.channels().at(view.channel).topic != name) return {};
+    if (view.data.size() < expected)
+      return fail("a message of " + name + " is shorter than its type");
+    each(view.time_ns, view.data.subspan(kCdrHeader.size()));
+    return {};
+  });
 }
 
 Result<TimeSeries> LogFile::read(const std::string& name, const std::vector<Column>& columns,
@@ -426,15 +356,6 @@ Result<std::vector<EventText>> LogFile::events() const {
   if (!done) return std::unexpected(done.error());
   if (!decoded) return std::unexpected(decoded.error());
   return events;
-}
-
-Error same_data(const std::string& path, const std::string& other) {
-  return {
-      .message = "has the same data as " + other + ", bit by bit",
-      .hint =
-          "leave one of them out; a simulated robot without noise does the same with every seed",
-      .file = path,
-      .key = {}};
 }
 
 }  // namespace tandem::log

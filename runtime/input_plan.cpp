@@ -190,6 +190,7 @@ Result<InputPlan> read_log(const PlannedInput& input, const InputSource& source)
   }
   const auto file = log::LogFile::open(source.file);
   if (!file) return std::unexpected(file.error());
+  if (const Status whole = file->require_samples(); !whole) return std::unexpected(whole.error());
   const std::string topic = "/tandem/input/" + input.controller + "/" + input.block.name;
   if (const auto found = file->require(topic); !found) return std::unexpected(found.error());
   InputPlan plan{.at = {}, .values = {}, .of_run = true};
