@@ -100,8 +100,8 @@ class LogFile {
                                         std::size_t every = 1) const;
   [[nodiscard]] Result<std::vector<EventText>> events() const;
 
-  /// Calls `visit` for each message of all its files, in order, with the reader of its file; ends at
-  /// the first error that it returns.
+  /// Calls `visit` for each message of all its files, in order, with the reader of its file. The
+  /// first error that it returns ends it.
   [[nodiscard]] Status visit(
       const std::function<Status(const McapReader&, const MessageView&)>& visit) const;
   /// Calls `visit(time_ns, CDR body)` for each message of `topic`, in order.
