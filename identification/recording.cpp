@@ -394,6 +394,7 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
   auto file = log::LogFile::open(path);
   if (!file) return std::unexpected(file.error());
   if (const auto topic = file->require(kState); !topic) return std::unexpected(topic.error());
+  if (const Status whole = file->require_samples(); !whole) return std::unexpected(whole.error());
   const log::RunInfo& info = file->info();
   if (info.operators_view) {
     return bad_log(

@@ -59,6 +59,7 @@ StringMap to_map(const RunInfo& info) {
     if (!value->empty()) map.emplace_back(key, *value);
   }
   if (info.part > 0) map.emplace_back("part", std::to_string(info.part));
+  if (!info.reduced.empty()) map.emplace_back("reduced", info.reduced);
   if (info.operators_view) map.emplace_back("state", kOperatorsView);
   if (!info.engine.empty()) map.emplace_back("engine", info.engine);
   return map;
@@ -78,6 +79,7 @@ RunInfo info_from(const StringMap& map) {
         {line.substr(0, space), std::min<std::uint64_t>(channels, bounds::kLogNames.most)});
   }
   info.part = std::strtoull(value_of(map, "part").c_str(), nullptr, 10);
+  info.reduced = value_of(map, "reduced");
   info.seed = std::strtoull(value_of(map, "seed").c_str(), nullptr, 10);
   info.period_ns = std::strtoll(value_of(map, "period_ns").c_str(), nullptr, 10);
   if (info.period_ns < kShortest_ns || info.period_ns > kLongest_ns) info.period_ns = 0;

@@ -28,6 +28,9 @@ struct RunInfo {
   std::vector<std::string> joints{};  ///< the image's order
   std::vector<SensorInfo> sensors{};  ///< the image's order
   std::uint64_t part = 0;             ///< of a log in several files, from 1; 0: it is in one
+  /// "to 100 Hz, of squat-001.mcap …": a copy for viewers, which lacks most samples
+  /// (log/reduced.hpp); empty: it is none.
+  std::string reduced{};
   std::uint64_t seed = 0;
   std::int64_t period_ns = 0;
   /// The state is what a tele-operator saw, predicted or late; false: what was measured.

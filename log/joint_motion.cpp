@@ -231,6 +231,7 @@ const char* to_string(MotionSource source) noexcept {
 }
 
 Result<JointMotion> read_joint_motion(const LogFile& file, const MotionRequest& request) {
+  if (const Status whole = file.require_samples(); !whole) return std::unexpected(whole.error());
   const auto order = order_of(file, request.joints);
   if (!order) return std::unexpected(order.error());
   JointMotion motion;

@@ -51,10 +51,10 @@ struct JointMotion {
 /// Without from_s and to_s it is all that controllers did: of an import the whole log.
 ///
 /// Errors, each with the log's path and what to do: the log has none of it, or not the topic; it
-/// lacks a joint; it is cut, or its run met a fault, before to_s; times that do not increase, or
-/// are outside of the log; a joint without a sample for more than 20 ms (and three cycles); a
-/// position, or a torque that is asked for, that is not finite; commands that are no references of
-/// stiff position control.
+/// lacks a joint; it is reduced, or cut, or its run met a fault, before to_s; times that do not
+/// increase, or are outside of the log; a joint without a sample for more than 20 ms (and three
+/// cycles); a position, or a torque that is asked for, that is not finite; commands that are no
+/// references of stiff position control.
 [[nodiscard]] Result<JointMotion> read_joint_motion(const LogFile& file,
                                                     const MotionRequest& request);
 

@@ -231,30 +231,38 @@ std::uint64_t LogFile::messages() const {
   return count;
 }
 
-Status LogFile::for_each(
-    const std::string& name,
-    const std::function<void(std::int64_t, std::span<const std::byte>)>& visit) const {
-  const auto topic = require(name);
-  if (!topic) return std::unexpected(topic.error());
+Status LogFile::visit(
+    const std::function<Status(const McapReader&, const MessageView&)>& visit) const {
   for (std::size_t i = 0; i < files_.size(); ++i) {
     auto reader = McapReader::open(files_[i], parts_[i].path);
     if (!reader) return std::unexpected(reader.error());
-    if (i > 0 && is_repeated(name)) return {};
     for (;;) {
       auto message = reader->next();
       if (!message) return std::unexpected(message.error());
       if (!message->has_value()) break;
-      const MessageView& view = **message;
-      if (reader->channels().at(view.channel).topic != name) continue;
-      const std::size_t expected = (*topic)->layout.bytes();
-      if (view.data.size() < kCdrHeader.size() + expected) {
-        return std::unexpected(
-            at(parts_[i].path, "a message of " + name + " is shorter than its type"));
+      if (i > 0 && is_repeated(reader->channels().at((*message)->channel).topic)) continue;
+      if (Status visited = visit(*reader, **message); !visited) {
+        if (visited.error().file.empty()) visited.error().file = parts_[i].path;
+        return visited;
       }
-      visit(view.time_ns, view.data.subspan(kCdrHeader.size()));
     }
   }
   return {};
+}
+
+Status LogFile::for_each(
+    const std::string& name,
+    const std::function<void(std::int64_t, std::span<const std::byte>)>& each) const {
+  const auto topic = require(name);
+  if (!topic) return std::unexpected(topic.error());
+  const std::size_t expected = kCdrHeader.size() + (*topic)->layout.bytes();
+  return visit([&](const McapReader& reader, const MessageView& view) -> Status {
+    if (reader.channels().at(view.channel).topic != name) return {};
+    if (view.data.size() < expected)
+      return fail("a message of " + name + " is shorter than its type");
+    each(view.time_ns, view.data.subspan(kCdrHeader.size()));
+    return {};
+  });
 }
 
 Result<TimeSeries> LogFile::read(const std::string& name, const std::vector<Column>& columns,
@@ -306,15 +314,6 @@ Result<std::vector<EventText>> LogFile::events() const {
   if (!done) return std::unexpected(done.error());
   if (!decoded) return std::unexpected(decoded.error());
   return events;
-}
-
-Error same_data(const std::string& path, const std::string& other) {
-  return {
-      .message = "has the same data as " + other + ", bit by bit",
-      .hint =
-          "leave one of them out; a simulated robot without noise does the same with every seed",
-      .file = path,
-      .key = {}};
 }
 
 }  // namespace tandem::log

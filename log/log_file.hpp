@@ -19,6 +19,9 @@
 
 namespace tandem::log {
 
+class McapReader;
+struct MessageView;
+
 /// A topic of the file.
 struct LoggedTopic {
   std::string name;      ///< "/tandem/state"
@@ -69,6 +72,8 @@ class LogFile {
   [[nodiscard]] bool damage_loses_messages() const;
   /// gaps(), then damage(): for whoever computes with it.
   [[nodiscard]] std::vector<std::string> remarks() const;
+  /// An error of a reduced copy, for who needs every sample of a run.
+  [[nodiscard]] Status require_samples() const;
   [[nodiscard]] const RunInfo& info() const { return info_; }
   /// The metadata record "result"; empty when the run was killed. Of several files the last one's,
   /// with the messages of all.
@@ -101,6 +106,10 @@ class LogFile {
                                         std::size_t every = 1) const;
   [[nodiscard]] Result<std::vector<EventText>> events() const;
 
+  /// Calls `visit` for each message of all its files, in order, with the reader of its file. The
+  /// first error that it returns ends it.
+  [[nodiscard]] Status visit(
+      const std::function<Status(const McapReader&, const MessageView&)>& visit) const;
   /// Calls `visit(time_ns, CDR body)` for each message of `topic`, in order.
   [[nodiscard]] Status for_each(
       const std::string& topic,

@@ -51,7 +51,7 @@ std::string suggest_topic(const std::string& name, const std::vector<LoggedTopic
   return suggest(name, names.empty() ? all : names);
 }
 
-std::unexpected<Error> no_topic(const std::string& file, std::string message, std::string hint) {
+std::unexpected<Error> refusal(const std::string& file, std::string message, std::string hint) {
   return std::unexpected(
       Error{.message = std::move(message), .hint = std::move(hint), .file = file, .key = {}});
 }
@@ -100,6 +100,7 @@ std::vector<std::string> LogFile::gaps() const {
     return std::string(number.data());
   };
   std::vector<std::string> all;
+  if (!info_.reduced.empty()) all.push_back("this log is reduced " + info_.reduced);
   if (!missing_.empty()) {
     std::string text;
     for (const MissingParts& one : missing_) text += (text.empty() ? "" : ", ") + to_string(one);
@@ -120,17 +121,23 @@ std::vector<std::string> LogFile::gaps() const {
   return all;
 }
 
+Status LogFile::require_samples() const {
+  if (info_.reduced.empty()) return {};
+  return refusal(path_, "this log lacks samples: it is reduced " + info_.reduced,
+                 "give the log that it was made of");
+}
+
 Result<const LoggedTopic*> LogFile::require(const std::string& name) const {
   if (const LoggedTopic* topic = find(name)) return topic;
   if (truncated()) {
-    return no_topic(path_,
-                    "the log is cut after " + std::to_string(bytes()) +
-                        " bytes, before a message of '" + name + "'",
-                    hint_of_cut(std::ranges::any_of(parts_, &LogPart::being_written)));
+    return refusal(path_,
+                   "the log is cut after " + std::to_string(bytes()) +
+                       " bytes, before a message of '" + name + "'",
+                   hint_of_cut(std::ranges::any_of(parts_, &LogPart::being_written)));
   }
   const std::string why = left_out(name);
-  return no_topic(path_, "has no topic '" + name + "'" + (why.empty() ? "" : ": " + why),
-                  why.empty() ? suggest_topic(name, topics_) : "");
+  return refusal(path_, "has no topic '" + name + "'" + (why.empty() ? "" : ": " + why),
+                 why.empty() ? suggest_topic(name, topics_) : "");
 }
 
 std::string LogFile::full_name(const std::string& name) const {
@@ -142,6 +149,8 @@ std::string LogFile::full_name(const std::string& name) const {
 }
 
 std::string LogFile::left_out(std::string_view topic, std::string_view field) const {
+  const bool some = info_.reduced.contains("to some topics");
+  if (some && field.empty()) return "this log is reduced " + info_.reduced;
   for (const auto& [file, text] : info_.configuration) {
     if (!file.ends_with(".toml")) continue;
     const Result<TomlDocument> document = TomlDocument::parse(text, file);

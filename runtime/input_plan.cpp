@@ -196,6 +196,7 @@ Result<InputPlan> read_log(const PlannedInput& input, const InputSource& source)
     return wrong(damaged, "is damaged, so its inputs cannot be replayed: " + file->damage().front(),
                  "copy the file again");
   }
+  if (const Status whole = file->require_samples(); !whole) return std::unexpected(whole.error());
   const std::string topic = "/tandem/input/" + input.controller + "/" + input.block.name;
   if (const auto found = file->require(topic); !found) return std::unexpected(found.error());
   InputPlan plan{.at = {}, .values = {}, .number = {}, .of_run = true};

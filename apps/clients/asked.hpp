@@ -69,6 +69,7 @@ Result<Exit> tell_prediction(Asked& asked);
 Result<Exit> tell_sensors(Asked& asked);
 Result<Exit> tell_signals(Asked& asked);
 Result<Exit> tell_signal_watch(Asked& asked);
+Result<Exit> tell_top(Asked& asked);
 
 /// tandem estop: it asks all runs at once.
 [[nodiscard]] Exit estop_command(const AskedOptions& options);

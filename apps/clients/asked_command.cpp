@@ -84,6 +84,7 @@ constexpr Form kForms[]{
     {"sensor.list", nullptr, &tell_sensors},
     {"signal.list", nullptr, &tell_signals},
     {"signal.watch", nullptr, &tell_signal_watch},
+    {"top", nullptr, &tell_top},
 };
 
 /// The form of a command; of one that has none a plain one.

@@ -17,6 +17,13 @@ struct Group {
   const char* examples;
 };
 constexpr Group kGroups[]{
+    {"top", "A live table of a running run: loop, faults, controllers, every joint", R"(Examples:
+  tandem top                                         in the terminal, until `q`; `?` lists the keys
+  tandem top --once > picture.txt                    one table, as without a terminal
+  tandem top --json -                                what the table is made of
+  tandem top --dds --namespace left                  of the run with this [dds] namespace
+It asks five times a second, and only what reads. Without --socket or --dds it is the only
+`tandem run` of this user.)"},
     {"fault", "Faults of a running run", R"(Examples:
   tandem fault show                                  what has been latched, and what was cleared
   tandem fault reset                                 clears and holds; exit status 1: it failed

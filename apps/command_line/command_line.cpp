@@ -19,6 +19,7 @@ const char kExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --realtime      in real time
   tandem emulate config/coman/squat.toml --lockstep  the robot on the other end of CAN
   tandem serve config/coman/squat.toml               a robot for `tandem run X --hal dds`
+  tandem top                                         a live table of the run that goes on
   tandem check config/coman/squat.toml               read every file, move nothing
   tandem report runs/coman-squat-001.mcap            draw the plots of a run
   tandem identify runs/panda-excite-001.mcap --robot config/panda/robot.toml --out identified
@@ -208,7 +209,7 @@ void add_all(Subcommands& commands) {
   commands.add<ReportOptions>("report", "Draw the plots of a log, or of up to three");
   commands.add<ExciteOptions>("excite", "An experiment that excites a robot's dynamics");
   commands.add<IdentifyOptions>("identify", "Masses, inertias and friction from logs");
-  commands.add<LogOptions>("log", "Logs: info, csv, diff, import, replay, thresholds");
+  commands.add<LogOptions>("log", "Logs: info, csv, export, diff, import, replay, thresholds");
   commands.add<ModelOptions>("model", "A robot's generated kernels: build, info");
   commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
   commands.add<EdsOptions>("eds", "Data sheets (EDS): write those of a robot's nodes, show one");

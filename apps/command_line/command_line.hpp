@@ -121,7 +121,8 @@ struct ControllerNewOptions {
   std::string output;                     ///< folder; empty: the name, here
 };
 
-/// tandem log info|csv|diff LOG [LOG_B], tandem log import FILE..., tandem log thresholds LOG...
+/// tandem log info|csv|export|diff LOG [LOG_B], tandem log import FILE..., tandem log thresholds
+/// LOG...
 struct LogOptions {
   enum class Action : std::uint8_t {
     kInfo,
@@ -129,7 +130,8 @@ struct LogOptions {
     kDiff,
     kImport,
     kReplay,
-    kThresholds
+    kThresholds,
+    kExport
   } action = Action::kInfo;
   double alarms_per_hour = 1.0;  ///< thresholds: false ones, of all joints together
   double from_s = 0.0;           ///< thresholds: leave out what was before, of the log's time
@@ -137,9 +139,11 @@ struct LogOptions {
   std::string other;                ///< diff: the log that `log` is compared with
   std::string topic;                ///< csv: empty is the state; info: whose fields are listed
   std::vector<std::string> fields;  ///< empty: all
+  std::vector<std::string> topics;  ///< export: empty: all
+  double rate_Hz = 0.0;             ///< export: of images
   std::size_t every = 1;            ///< n: each n-th message
-  std::string output;  ///< csv: empty is standard output; import: runs/; replay: experiment;
-                       ///< thresholds: a folder, or empty
+  std::string output;  ///< csv: empty is standard output; export: beside the log; import: runs/;
+                       ///< replay: experiment; thresholds: a folder, or empty
   std::vector<std::string> files;        ///< import: tables or bags; thresholds: runs to learn from
   std::vector<std::string> against;      ///< thresholds: other runs
   std::string robot;                     ///< import, replay: robot.toml
@@ -147,7 +151,7 @@ struct LogOptions {
   std::string source;                    ///< replay: "command", "state"; empty: what the log has
   std::string posture;                   ///< replay: to start from; empty: the recording's
   std::vector<std::string> joints;       ///< replay: that are led, as given; empty: all
-  std::optional<double> begin_s, end_s;  ///< replay: of the log's time
+  std::optional<double> begin_s, end_s;  ///< replay, export: of the log's time
   double speed = 1.0;                    ///< replay: times as fast as recorded
   bool torque = false;                   ///< replay: torques as feed-forward
   std::string json;

@@ -7,6 +7,7 @@ namespace {
 const char kLogExamples[] = R"(Examples:
   tandem log info runs/coman-squat-001.mcap          topics, messages, time, digest
   tandem log csv runs/coman-squat-001.mcap --fields position_rad > q.csv
+  tandem log export runs/coman-squat-001.mcap --rate 100  a smaller copy, for viewers
   tandem log diff runs/a.mcap runs/b.mcap            equal bit by bit, or the first difference
   tandem log thresholds a.mcap b.mcap c.mcap         [estimation.collision] from free motion
   tandem log import q.csv --robot config/ur5e/robot.toml --map ur5e_csv.toml
@@ -20,6 +21,14 @@ const char kLogInfoExamples[] = R"(Examples:
 const char kLogCsvExamples[] = R"(Examples:
   tandem log csv runs/coman-squat-001.mcap > state.csv
   tandem log csv runs/coman-squat-001.mcap --topic command --every 10 -o ref.csv)";
+
+const char kLogExportExamples[] = R"(Examples:
+  tandem log export runs/coman-squat-001.mcap --rate 100
+  tandem log export runs/coman-squat-001.mcap --rate 50 --from 2 --to 5 -o part.mcap
+  tandem log export runs/coman-squat-001.mcap --rate 100 --topics state,joint_states,tf,tf_static
+Of every 1/RATE each image, signal, joint state and transform keeps its first message: shorter peaks
+are gone. Events, words, inputs, marks and what is there once are whole. The copy says what it is:
+`tandem identify`, `log replay` and `log thresholds` refuse it.)";
 
 const char kLogDiffExamples[] = R"(Examples:
   tandem log diff runs/a.mcap runs/b.mcap            equal bit by bit, or the first difference
@@ -102,6 +111,21 @@ void add_replay_flags(CLI::App& replay, LogOptions& o) {
   replay.callback([&o] { o.action = LogOptions::Action::kReplay; });
 }
 
+void add_export_flags(CLI::App& copy, LogOptions& o) {
+  copy.add_option("log", o.log, "MCAP file")->required();
+  copy.add_option("--rate", o.rate_Hz, "Messages a second of each image [Hz]")->required();
+  copy.add_option("-o,--output", o.output,
+                  "MCAP file to write (default: NAME-100Hz.mcap beside the log)")
+      ->check(is_given(kNameAFile));
+  copy.add_option("--topics", o.topics, "Topics that are copied, by comma (default: all)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  copy.add_option("--from", o.begin_s, "Of the log's time [s] (default: its begin)");
+  copy.add_option("--to", o.end_s, "Of the log's time [s] (default: its end)");
+  copy.footer(kLogExportExamples);
+  copy.callback([&o] { o.action = LogOptions::Action::kExport; });
+}
+
 void add_thresholds_flags(CLI::App& thresholds, LogOptions& o) {
   thresholds.add_option("logs", o.files, "MCAP files of such runs, better three than one")
       ->required();
@@ -152,6 +176,7 @@ void add_flags(CLI::App& app, LogOptions& o) {
   csv->add_option("-o,--output", o.output, "File to write (default: standard output)");
   csv->footer(kLogCsvExamples);
   csv->callback([&o] { o.action = LogOptions::Action::kCsv; });
+  add_export_flags(*app.add_subcommand("export", "A copy at a lower rate, for viewers"), o);
   CLI::App* diff = app.add_subcommand("diff", "Compare two runs bit by bit");
   diff->add_option("log", o.log, "MCAP file")->required();
   diff->add_option("other", o.other, "MCAP file")->required();

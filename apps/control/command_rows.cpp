@@ -80,6 +80,10 @@ const char kLoaded[] = "of a loaded controller";
 const std::vector<CommandRow> kRows{
     {"help", kReads, "lists the commands", {}, {.on_line = false}},
     {"status", kReads, "phase and counts of the run", {}, {.on_line = false}},
+    {"loop.show", kReads, "robot, cycle times and buses of the run", {}, {.on_line = false}},
+    {"top", kReads, "shows all of it as a table that follows: loop, faults, controllers, joints",
+     {local(flag("once", "--once", "print one table and end, as without a terminal"))},
+     {.asks = "loop.show"}},
     {"fault.show", kReads, "every fault of the run, latched or cleared"},
     {"fault.reset", kChanges, "clears what is latched; resets or failed_resets counts on when done"},
     {"estop", kStops, "emergency stop, latched; waits until the loop confirms it",

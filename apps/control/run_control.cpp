@@ -49,6 +49,25 @@ Json status(const runtime::RobotCycle& cycle) {
           {"failed_resets", progress.failed_resets.load()}};
 }
 
+/// Null: nothing was measured.
+Json measured(const rt::Histogram& of) {
+  const rt::Percentiles found = of.percentiles();  // which may be read beside the loop
+  return found.max == 0 ? Json(nullptr) : percentiles_json(found);
+}
+
+Json loop(const runtime::RobotCycle& cycle, const hal::RobotConfig& robot, const RunWires& wires) {
+  const rt::CycleStatistics& times = cycle.loop();
+  return {{"robot", robot.name},
+          {"hal", wires.hal},
+          {"cycles", cycle.progress().cycles.load()},
+          {"period_ns", cycle.inbox().clock().state().period_ns},
+          {"overruns", cycle.progress().overruns.load()},
+          {"cycle_ns", measured(times.work)},
+          {"wakeup_ns", measured(times.wakeup)},
+          {"bus_ns", measured(times.bus)},
+          {"buses", wires.buses ? wires.buses() : Json::array()}};
+}
+
 Result<Json> reset(runtime::RobotCycle& cycle, std::uint64_t after_stop) {
   using runtime::RunPhase;
   const RunPhase phase = cycle.progress().phase.load();
@@ -114,9 +133,14 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
 }  // namespace
 
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
-                      const hal::RobotConfig& robot, JudgeGains judge, TryController trial) {
+                      const hal::RobotConfig& robot, JudgeGains judge, TryController trial,
+                      RunWires wires) {
   registry.stops_by([&cycle] { return cycle.progress().stopped_before.load(); });
   registry.add("status", [&cycle](const Json&) -> Result<Json> { return status(cycle); });
+  registry.add("loop.show",
+               [&cycle, &robot, wires = std::move(wires)](const Json&) -> Result<Json> {
+                 return loop(cycle, robot, wires);
+               });
   registry.add("fault.show", [&cycle](const Json&) -> Result<Json> {
     Json answer = status(cycle);
     answer["faults"] = figures_json(cycle.faults());

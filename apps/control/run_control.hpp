@@ -2,18 +2,28 @@
 // Layer: apps/control.  Thread: main; the handlers run on the serving thread.
 #pragma once
 
+#include <functional>
+#include <string>
+
 #include "apps/control/controller_control.hpp"
 #include "apps/control/joint_control.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
 
-/// Adds "status", "fault.show", "fault.reset", "estop" and "run.stop", and the commands of
-/// controllers, joints, sensors and clock. Cycle and robot outlive the registry.
+/// What "loop.show" tells of a run beside its cycle.
+struct RunWires {
+  std::string hal{};  ///< the backend: "sim", "can"
+  /// A list of `interface` and `status`; called on the serving thread. Empty: there is no bus.
+  std::function<Json()> buses{};
+};
+
+/// Adds "status", "loop.show", "fault.show", "fault.reset", "estop" and "run.stop", and the
+/// commands of controllers, joints, sensors and clock. Cycle and robot outlive the registry.
 /// @param judge  add_joint_commands()'s
 /// @param trial  add_controller_commands()'s
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                       const hal::RobotConfig& robot, JudgeGains judge = {},
-                      TryController trial = {});
+                      TryController trial = {}, RunWires wires = {});
 
 }  // namespace tandem::apps

@@ -230,7 +230,14 @@ class Session {
                 const std::vector<double>& position_rad) {
           return opinion(*judge, joint, loop, gains, position_rad);
         },
-        try_in_other_process(options_));
+        try_in_other_process(options_),
+        {.hal = hal_name(e), .buses = [this] {
+           Json all = Json::array();
+           for (const OpenBus& bus : c_.open_buses()) {
+             all.push_back({{"interface", bus.interface}, {"status", bus.end->status_text()}});
+           }
+           return all;
+         }});
     add_predict(commands_, c_.predictor.get(), e.robot);
     if (dds_ != nullptr) {
       admission_.add_to(commands_);

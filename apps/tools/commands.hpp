@@ -21,6 +21,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit log_command(const LogOptions& options);
 /// A part of log_command().
 [[nodiscard]] Exit log_import_command(const LogOptions& options);
+/// The same: a copy at a lower rate.
+[[nodiscard]] Status export_log(const LogOptions& options);
 /// The same.
 [[nodiscard]] Exit log_replay_command(const LogOptions& options);
 /// Writes a data sheet per type of board and sensor; with `show`, prints what a sheet says.

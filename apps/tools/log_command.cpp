@@ -107,7 +107,10 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
   }
   for (const std::string& one : file.damage()) facts.add("damaged", shown(one, 4'096));
   for (const std::string& remark : file.gaps()) {
-    facts.add(info.part > 0 ? "part" : "missing", shown(remark, 4'096));
+    facts.add(info.part > 0           ? "part"
+              : !info.reduced.empty() ? "reduced"
+                                      : "missing",
+              shown(remark, 4'096));
   }
   facts.add("backend", info.hal);
   facts.add("seed", std::to_string(info.seed));
@@ -266,8 +269,10 @@ Result<Exit> diff(const log::LogFile& file, const LogOptions& options) {
 Exit log_command(const LogOptions& options) {
   if (options.action == LogOptions::Action::kImport) return log_import_command(options);
   if (options.action == LogOptions::Action::kReplay) return log_replay_command(options);
-  if (options.action == LogOptions::Action::kThresholds) {
-    const Status printed = print_thresholds(options);
+  if (options.action == LogOptions::Action::kThresholds ||
+      options.action == LogOptions::Action::kExport) {
+    const bool copies = options.action == LogOptions::Action::kExport;
+    const Status printed = copies ? export_log(options) : print_thresholds(options);
     return printed ? Exit::kDone : refuse(printed.error());
   }
   const bool told = options.action == LogOptions::Action::kInfo && options.topic.empty();

@@ -69,6 +69,7 @@ std::vector<std::string> felt_channels(const log::LogFile& file) {
 }
 
 Result<ExternalTorques> read_external_torques(const log::LogFile& file, double from_s) {
+  if (const Status whole = file.require_samples(); !whole) return std::unexpected(whole.error());
   const std::vector<std::string>& joints = file.info().joints;
   const log::LoggedTopic* topic = file.find("/tandem/estimate");
   const hal::Field* field = topic == nullptr ? nullptr : topic->layout.find(kField);
