@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "apps/text/console.hpp"
-#include "hal/config/capabilities.hpp"
 
 namespace tandem::studio {
 namespace {
@@ -46,11 +45,12 @@ Json joint_json(const hal::JointConfig& joint) {
           {"passive", false}};
 }
 
-Json feet_json(const hal::Robot& robot) {
+Json feet_json(const hal::RobotConfig& robot) {
   Json feet = Json::array();
-  for (const hal::Foot& foot : robot.feet) {
-    const auto site = std::ranges::find(robot.sites, foot.site, &hal::Site::name);
-    if (site == robot.sites.end()) continue;
+  const std::vector<hal::SiteConfig>& sites = robot.model.sites;
+  for (const hal::Foot& foot : robot.contact.feet) {
+    const auto site = std::ranges::find(sites, foot.site, &hal::SiteConfig::name);
+    if (site == sites.end()) continue;
     feet.push_back(
         {{"name", foot.site}, {"link", site->link}, {"xyz", site->xyz_m}, {"rpy", site->rpy_rad}});
   }
@@ -78,24 +78,24 @@ Json field_json(const SourceField& field) {
 }  // namespace
 
 std::string hello_text(const RunDescription& run, const History& history) {
-  const hal::Robot robot = hal::robot_of(run.robot);
+  const hal::RobotConfig& robot = run.robot;
   const double period_s = 1e-9 * static_cast<double>(run.period_ns);
   Json joints = Json::array(), postures = Json::array(), reaches = Json::array();
-  for (const hal::JointConfig& joint : run.robot.joints) joints.push_back(joint_json(joint));
-  for (const hal::Posture& posture : robot.postures) postures.push_back(posture.name);
+  for (const hal::JointConfig& joint : robot.joints) joints.push_back(joint_json(joint));
+  for (const auto& posture : robot.postures) postures.push_back(posture.name);
   for (const std::uint64_t cycles : history.capacity_cycles()) {
     reaches.push_back(period_s * static_cast<double>(cycles));
   }
-  const bool ground = run.robot.contact.stiffness_N_m > 0.0;
+  const bool ground = robot.contact.stiffness_N_m > 0.0;
   return json_text({{"op", "hello"},
                     {"protocol", kProtocol},
                     {"version", run.version},
-                    {"robot", run.robot.name},
+                    {"robot", robot.name},
                     {"experiment", run.experiment},
-                    {"title", run.robot.name + ": " + run.experiment},
+                    {"title", robot.name + ": " + run.experiment},
                     {"simulated", run.simulated},
-                    {"floating", run.robot.model.floating_base},
-                    {"ground", ground ? Json{{"height_m", run.robot.contact.height_m}} : Json()},
+                    {"floating", robot.model.floating_base},
+                    {"ground", ground ? Json{{"height_m", robot.contact.height_m}} : Json()},
                     {"period_s", period_s},
                     {"run", run.run},
                     {"history_s", std::move(reaches)},

@@ -14,7 +14,7 @@ std::string status_of(const std::string& answer) {
 }
 
 std::string with_host(std::uint16_t port, const std::string& host, const std::string& more = "") {
-  return exchange(port, "GET / HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n" +
+  return raw_http(port, "GET / HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n" +
                             "Accept-Encoding: gzip\r\n" + more + "\r\n");
 }
 
@@ -35,7 +35,7 @@ TEST(StudioHttp, GivesPageAndDescriptionWithStrictHeaders) {
   EXPECT_EQ(status_of(get(rig.port, "/../../etc/passwd")), "404");
   EXPECT_EQ(status_of(get(rig.port, "/ws")), "426");
   const std::string posted =
-      exchange(rig.port, "POST / HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(rig.port) +
+      raw_http(rig.port, "POST / HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(rig.port) +
                              "\r\nConnection: close\r\nContent-Length: 0\r\n\r\n");
   EXPECT_EQ(status_of(posted), "405");
   EXPECT_EQ(rig.token.size(), 32U);
@@ -60,7 +60,7 @@ TEST(StudioHttp, AnswersUnderItsOwnNameOnly) {
   }
   const std::string twice = "Host: localhost" + port + "\r\n";
   EXPECT_EQ(status_of(with_host(rig.port, "evil.example", twice)), "421");
-  EXPECT_EQ(status_of(exchange(rig.port, "GET / HTTP/1.0\r\n\r\n")), "421");
+  EXPECT_EQ(status_of(raw_http(rig.port, "GET / HTTP/1.0\r\n\r\n")), "421");
 }
 
 TEST(StudioHttp, RefusesPagesOfOtherPlaces) {
@@ -91,19 +91,19 @@ TEST(StudioHttp, AnswersNonsenseAndGoesOn) {
   StudioRig rig;
   rig.start();
   const std::string head = "GET / HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(rig.port) + "\r\n";
-  EXPECT_EQ(status_of(exchange(rig.port, head + "X: " + std::string(9000, 'x') + "\r\n\r\n")),
+  EXPECT_EQ(status_of(raw_http(rig.port, head + "X: " + std::string(9000, 'x') + "\r\n\r\n")),
             "431");
-  EXPECT_EQ(status_of(exchange(rig.port, "\r\n\r\n\x16\x03\x01\x02\r\n\r\n")), "400");
-  EXPECT_EQ(status_of(exchange(rig.port, "GET / HTTP/9.9\r\n\r\n")), "400");
-  EXPECT_EQ(status_of(exchange(rig.port, head + "Content-Length: 5\r\n\r\nhello")), "400");
-  EXPECT_EQ(status_of(exchange(rig.port, head + "Content-Length: -1\r\n\r\n")), "400");
+  EXPECT_EQ(status_of(raw_http(rig.port, "\r\n\r\n\x16\x03\x01\x02\r\n\r\n")), "400");
+  EXPECT_EQ(status_of(raw_http(rig.port, "GET / HTTP/9.9\r\n\r\n")), "400");
+  EXPECT_EQ(status_of(raw_http(rig.port, head + "Content-Length: 5\r\n\r\nhello")), "400");
+  EXPECT_EQ(status_of(raw_http(rig.port, head + "Content-Length: -1\r\n\r\n")), "400");
   EXPECT_EQ(status_of(get(rig.port, "/robot.urdf")), "200");
 }
 
 TEST(StudioHttp, ClosesWhoNeverEndsItsRequest) {
   StudioRig rig;
   rig.start();
-  EXPECT_EQ(exchange(rig.port, "GET / HTTP/1.1\r\nHost: "), "") << "without an answer";
+  EXPECT_EQ(raw_http(rig.port, "GET / HTTP/1.1\r\nHost: "), "") << "without an answer";
   EXPECT_EQ(status_of(get(rig.port, "/robot.urdf")), "200");
 }
 
@@ -116,7 +116,7 @@ TEST(StudioHttp, HasRoomForSoManyConnectionsAndSaysSo) {
     half_open.emplace_back(io).connect(endpoint(rig.port));
   }
   // They are accepted in their order, so that the next one is too many.
-  EXPECT_EQ(status_of(exchange(rig.port, "")), "503");
+  EXPECT_EQ(status_of(raw_http(rig.port, "")), "503");
   half_open.clear();
   EXPECT_TRUE(
       tandem::test::eventually([&] { return status_of(get(rig.port, "/robot.urdf")) == "200"; }));
@@ -167,7 +167,7 @@ TEST(StudioHostile, KeepsFewQuestionsOfAFloodAndAStopFindsItsWay) {
   rig.start();
   const auto client = rig.client();
   for (int i = 0; i < 200; ++i) {
-    client->send(Json{{"op", "ask"}, {"id", i}, {"request", {{"do", "status"}}}});
+    client->say(Json{{"op", "ask"}, {"id", i}, {"request", {{"do", "status"}}}});
   }
   for (int i = 16; i < 200; ++i) {  // all but the first are refused
     const Json answer = client->next("answer");
@@ -217,14 +217,14 @@ TEST(StudioElsewhere, AnswersNobodyWhoHasNotEntered) {
   EXPECT_EQ(status_of(with_host(rig.port, "192.168.1.7" + port)), "200");
   EXPECT_EQ(status_of(with_host(rig.port, "robot.example" + port)), "421");
   const auto client = rig.client();
-  client->send(Json{{"op", "ask"}, {"id", 1}, {"request", {{"do", "status"}}}});
+  client->say(Json{{"op", "ask"}, {"id", 1}, {"request", {{"do", "status"}}}});
   const auto first = client->read();
   ASSERT_TRUE(first);
   EXPECT_EQ(Json::parse(first->bytes)["op"], "error") << "no hello came before";
-  client->send(Json{{"op", "enter"}});
+  client->say(Json{{"op", "enter"}});
   EXPECT_EQ(client->next("error")["hint"], "open the address with its token");
   EXPECT_TRUE(rig.questions().empty());
-  client->send(Json{{"op", "enter"}, {"token", rig.token}});
+  client->say(Json{{"op", "enter"}, {"token", rig.token}});
   EXPECT_EQ(client->next("entered")["may"], "all");
   EXPECT_EQ(client->next("hello")["robot"], "pair");
 }

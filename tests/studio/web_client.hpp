@@ -34,7 +34,7 @@ inline Tcp::endpoint endpoint(std::uint16_t port) {
 }
 
 /// What a server sends to `request` until it closes, or `most` bytes came.
-inline std::string exchange(std::uint16_t port, const std::string& request,
+inline std::string raw_http(std::uint16_t port, const std::string& request,
                             std::size_t most = 1'000'000) {
   net::io_context io;
   beast::tcp_stream stream(io);
@@ -62,7 +62,7 @@ inline std::string exchange(std::uint16_t port, const std::string& request,
 /// A GET whose connection ends with its answer.
 inline std::string get(std::uint16_t port, const std::string& target,
                        const std::string& headers = "") {
-  return exchange(port, "GET " + target + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
+  return raw_http(port, "GET " + target + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
                             "\r\nConnection: close\r\n" + headers + "\r\n");
 }
 
@@ -137,7 +137,7 @@ class WebClient {
                         [&](beast::error_code error, std::size_t) { failed = error; });
     run();
   }
-  void send(const Json& message) { send(message.dump()); }
+  void say(const Json& message) { send(message.dump()); }
 
   /// The next one; empty: the connection has ended, or nothing came.
   std::optional<Message> read() {
@@ -184,7 +184,7 @@ class WebClient {
   }
   /// The answer to a question.
   Json ask(const Json& request, int id = 1) {
-    send(Json{{"op", "ask"}, {"id", id}, {"request", request}});
+    say(Json{{"op", "ask"}, {"id", id}, {"request", request}});
     const Json answer = next("answer");
     EXPECT_EQ(answer.value("id", -1), id);
     return answer.value("answer", Json::object());
