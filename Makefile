@@ -5,7 +5,7 @@ TEST_JOBS ?= $(shell echo $$(($(JOBS) + 2)))
 FUZZ_SECONDS ?= 60
 FUZZ_RUNS ?=
 FUZZ_JOBS ?= 4
-FUZZ_TARGETS ?= urdf robot experiment message request input sample sheet frames ethercat line mcap import
+FUZZ_TARGETS ?= urdf robot experiment message request input sample sheet frames ethercat line mcap import studio
 
 .PHONY: demo robot test proof test-all bench unit built real anywhere hil sanitized rtsan asan tsan fuzz format lint \
   tidy hooks mutations clean help

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "base/realtime.hpp"
 #include "base/result.hpp"
@@ -10,6 +11,7 @@
 #include "hal/estimate.hpp"
 #include "hal/image.hpp"
 #include "hal/run_phase.hpp"
+#include "hal/signal_block.hpp"
 #include "hal/truth.hpp"
 
 namespace tandem::hal {
@@ -43,6 +45,34 @@ class CycleObserver {
   /// The last step of every cycle.
   /// @rt wait-free: copies what it needs into a ring, and counts what does not fit.
   virtual void take(const CycleView& view) noexcept TANDEM_RT = 0;
+  /// Before take() of the same cycle, for each controller that has written signals in it.
+  /// @param block  good during the call; its image() has the numbers
+  /// @rt the same
+  virtual void take_signals(const CycleTime& /*time*/,
+                            const SignalBlock& /*block*/) noexcept TANDEM_RT {}
+};
+
+/// Several observers of one loop, in the order in which they were added.
+class CycleFanOut final : public CycleObserver {
+ public:
+  /// Before the first cycle. @param observer  outlives the cycles; null is left out
+  void add(CycleObserver* observer) {
+    if (observer != nullptr) observers_.push_back(observer);
+  }
+  /// What a cycle gets: null where nobody watches.
+  [[nodiscard]] CycleObserver* observer() noexcept {
+    if (observers_.size() < 2) return observers_.empty() ? nullptr : observers_.front();
+    return this;
+  }
+  void take(const CycleView& view) noexcept TANDEM_RT override {
+    for (CycleObserver* one : observers_) one->take(view);
+  }
+  void take_signals(const CycleTime& time, const SignalBlock& block) noexcept TANDEM_RT override {
+    for (CycleObserver* one : observers_) one->take_signals(time, block);
+  }
+
+ private:
+  std::vector<CycleObserver*> observers_;
 };
 
 }  // namespace tandem::hal

@@ -53,6 +53,7 @@ void HandOver::show_controllers() noexcept TANDEM_RT {
       if (io.signals.numbers() > 0) {
         io.signals.publish(now_.time.cycle, now_.time.time_ns);
         now_.log.signals(now_.time, *loaded[slot]);
+        if (now_.observer != nullptr) now_.observer->take_signals(now_.time, io.signals);
       }
     }
     if (views && io.marks.show_to_viewers(now_.time.time_ns, (active & only(slot)) != 0))

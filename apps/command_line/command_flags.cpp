@@ -23,6 +23,7 @@ const char kRunExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --report        and draw the plots
   tandem run config/coman/squat.toml --rate 0.1      ten times slower than real time
   tandem run config/coman/squat.toml --start-paused  then `tandem clock step 10`, `clock resume`
+  tandem run config/coman/squat.toml --studio        look at it in a browser, while it runs
   tandem run config/coman/squat.toml --dds --realtime      publish to ROS 2 and `tandem topic`
   tandem run config/coman/squat.toml --hal dds       the robot of `tandem serve`
   tandem run config/coman/squat.toml --seed 7 --log /tmp/runs
@@ -153,6 +154,35 @@ std::optional<std::int64_t> whole_number(const std::string& text) {
   return error == std::errc() && last == end ? std::optional(number) : std::nullopt;
 }
 
+CLI::Validator is_port() {
+  const auto check = [](const std::string& text) -> std::string {
+    const std::int64_t port = whole_number(text).value_or(-1);
+    if (text == "true" || (port >= 0 && port <= 65'535)) return "";
+    return "'" + text + "' is no port from 0 to 65535: --studio=9000";
+  };
+  return {check, ""};
+}
+
+void add_studio_flags(CLI::App& app, StudioOptions& o) {
+  static const std::string kHelp =
+      "Show the run in a browser; --studio=PORT (default: the first free one from 8642). A "
+      "simulated run keeps real time then, unless a rate is said";
+  CLI::Option* studio =
+      app.add_flag("--studio", kHelp)->check(is_port())->each([&o](const std::string& text) {
+        o.wanted = true;
+        if (text != "true") o.port = static_cast<std::uint16_t>(*whole_number(text));
+      });
+  app.add_option("--studio-address", o.address,
+                 "Where the studio listens: 0.0.0.0 for other machines, too, which need its token "
+                 "(default: 127.0.0.1)")
+      ->needs(studio)
+      ->check(is_given("give an address of this machine"));
+  app.add_option("--studio-page", o.page,
+                 "Folder of the studio's page, instead of the program's own: for work on it")
+      ->needs(studio)
+      ->check(is_given("name a folder"));
+}
+
 /// What `run` and `serve` share.
 void add_loop_flags(CLI::App& app, RunOptions& o) {
   CLI::Option* rate = app.add_option("--rate", o.rate,
@@ -184,6 +214,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
   app.add_flag("--no-socket", o.no_socket, "Open no control socket")->excludes(socket);
+  add_studio_flags(app, o.studio);
   app.add_option("--domain", o.domain,
                  "DDS domain, instead of the experiment's (else: ROS_DOMAIN_ID, else 0)")
       ->check(CLI::Range(0, 232));

@@ -17,6 +17,14 @@
 namespace tandem::apps {
 
 /// tandem run EXPERIMENT
+/// --studio and its like.
+struct StudioOptions {
+  bool wanted = false;
+  std::optional<std::uint16_t> port{};  ///< empty: the first that is free from 8642 on; 0: any
+  std::string address = "127.0.0.1";    ///< where it listens
+  std::string page{};                   ///< folder of the page; empty: the program's own
+};
+
 struct RunOptions : runtime::Overrides {
   RunOptions() { trace_cycles = 10'000; }
 
@@ -32,6 +40,7 @@ struct RunOptions : runtime::Overrides {
   std::string json;           ///< file, "-" for standard output, empty for none
   std::string socket;         ///< of the run's control; empty: default_control_path("run")
   bool no_socket = false;
+  StudioOptions studio{};
 };
 
 /// tandem serve EXPERIMENT|ROBOT

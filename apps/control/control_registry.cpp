@@ -104,18 +104,16 @@ Status ControlRegistry::check_stops(const Command& command, const Asked& asked) 
               "see why: tandem fault show; then ask again");
 }
 
-Result<Json> ControlRegistry::run(std::string_view question, const Asked& asked) const {
-  const Result<Json> request = parse(question, asked.known);
-  if (!request) return request;
-  const Result<const Command*> found = find(*request, asked.known);
+Result<Json> ControlRegistry::run(const Json& request, const Asked& asked) const {
+  const Result<const Command*> found = find(request, asked.known);
   if (!found) return std::unexpected(found.error());
   const Command& command = **found;
   if (asked.gate) {
-    if (Status open = asked.gate(command.name, command.effect, *request); !open) {
+    if (Status open = asked.gate(command.name, command.effect, request); !open) {
       return std::unexpected(open.error());
     }
   }
-  if (Status keys = check_keys(*request, command.name, command.keys, asked.known); !keys) {
+  if (Status keys = check_keys(request, command.name, command.keys, asked.known); !keys) {
     return std::unexpected(keys.error());
   }
   const bool urgent =
@@ -126,7 +124,7 @@ Result<Json> ControlRegistry::run(std::string_view question, const Asked& asked)
     return std::unexpected(in_time.error());
   }
   try {
-    return command.handler(*request, asked.after_stop);
+    return command.handler(request, asked.after_stop);
   } catch (const std::exception& error) {
     return fail(fmt::format("{}: {}", command.name, error.what()));
   }
@@ -159,7 +157,8 @@ ControlTurn ControlRegistry::turn_of(std::string_view question) const {
 }
 
 Json ControlRegistry::answer(std::string_view question, const Asked& asked) const {
-  const Result<Json> result = run(question, asked);
+  const Result<Json> request = parse(question, asked.known);
+  const Result<Json> result = request ? run(*request, asked) : request;
   Json answer;
   answer["ok"] = result.has_value();
   if (result) {
@@ -168,6 +167,10 @@ Json ControlRegistry::answer(std::string_view question, const Asked& asked) cons
     const Error& error = result.error();
     answer["error"] = error.key.empty() ? error.message : error.key + ": " + error.message;
     answer["hint"] = result.error().hint;
+  }
+  if (told_ && request) {
+    const Result<const Command*> command = find(*request, false);
+    if (command && (*command)->effect != ControlEffect::kReads) told_(json_text(*request), answer);
   }
   return answer;
 }

@@ -71,6 +71,12 @@ class ControlRegistry {
   void stops_by(std::function<std::uint64_t()> last_stop) { last_stop_ = std::move(last_stop); }
   [[nodiscard]] std::uint64_t last_stop() const { return last_stop_ ? last_stop_() : 0; }
 
+  /// Who is told of each command that was asked for and does more than read, with its answer: one,
+  /// on any thread. Before anything is asked.
+  void tell(std::function<void(const std::string& question, const Json& answer)> told) {
+    told_ = std::move(told);
+  }
+
   /// What the command `name` does; empty when there is none.
   [[nodiscard]] std::optional<ControlEffect> effect(std::string_view name) const;
 
@@ -91,7 +97,7 @@ class ControlRegistry {
   struct Command : CommandRow {
     AskedHandler handler;
   };
-  [[nodiscard]] Result<Json> run(std::string_view question, const Asked& asked) const;
+  [[nodiscard]] Result<Json> run(const Json& request, const Asked& asked) const;
   [[nodiscard]] const Command* named(std::string_view question) const;
   [[nodiscard]] Result<const Command*> find(const Json& request, bool known) const;
   [[nodiscard]] Status check_stops(const Command& command, const Asked& asked) const;
@@ -99,6 +105,7 @@ class ControlRegistry {
 
   std::vector<Command> commands_;
   std::function<std::uint64_t()> last_stop_;
+  std::function<void(const std::string&, const Json&)> told_;
   mutable std::mutex working_, working_long_;
 };
 

@@ -27,6 +27,7 @@
 #include "apps/run/prediction.hpp"
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_summary.hpp"
+#include "apps/run/studio_run.hpp"
 #include "apps/run/tools_program.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
@@ -193,6 +194,11 @@ class Session {
     auto server = open_server(c_, dds_.get(), options_.once, admission_);
     if (!server) return std::unexpected(server.error());
     server_ = std::move(*server);
+    auto studio = StudioRun::open(c_, options_.studio);
+    if (!studio) return std::unexpected(studio.error());
+    studio_ = std::move(*studio);
+    if (dds_ != nullptr) observers_.add(&dds_->tap());
+    if (studio_ != nullptr) observers_.add(&studio_->tap());
     return {};
   }
 
@@ -200,7 +206,7 @@ class Session {
     c_.controllers->watch_calls(gate_);
     run_.emplace(c_, options_,
                  runtime::RunParts{.recorder = recorder_.get(),
-                                   .observer = dds_ == nullptr ? nullptr : &dds_->tap(),
+                                   .observer = observers_.observer(),
                                    .owner = server_.get()});
     cycle_ = &run_->cycle();
     if (server_ == nullptr) return;
@@ -209,6 +215,11 @@ class Session {
   }
 
   void announce() const {
+    // Whoever asks for it needs it: its token is nowhere else.
+    if (studio_ != nullptr) {
+      fmt::print(out_, "studio: {}\n", studio_->address());
+      std::fflush(out_);
+    }
     if (options_.quiet) return;
     const runtime::Experiment& e = experiment();
     fmt::print(out_, "{}: {}, {} at {:.3g} kHz, {}{}\n", e.robot.name,
@@ -250,6 +261,7 @@ class Session {
                    return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
                  });
     }
+    if (studio_ != nullptr) studio_->start(*cycle_, commands_);
     const bool on_robot = e.hal.backend == runtime::BackendKind::kWire && !e.hal.lockstep;
     auto socket = serve(commands_, {.path = options_.socket,
                                     .kind = "run",
@@ -317,6 +329,7 @@ class Session {
     }
     if (c_.frames != nullptr) (void)c_.frames->close();
     guard.log_is_closed();
+    if (studio_ != nullptr) studio_->finish(guard.fault(), log);
     socket_.reset();
     await_crash_place();
     remember_error(loop_error(guard.fault()));
@@ -350,6 +363,7 @@ class Session {
       log_ = summary.log->path;
       log_is_whole_ = summary.log->error.empty();
     }
+    if (studio_ != nullptr) studio_->finish(summary.ended(), log_);
     if (c_.frames != nullptr) summary.frames = c_.frames->close();
     summary.faults = fault_texts(*cycle_, summary.log);
     if (!options_.quiet) {
@@ -384,9 +398,11 @@ class Session {
   bool log_is_whole_ = true;
   DdsAdmission admission_;
   std::unique_ptr<remote::Server> server_;
+  hal::CycleFanOut observers_;  // of the loop
   std::optional<runtime::Run> run_;
   runtime::RobotCycle* cycle_ = nullptr;  // its
   ControlRegistry commands_;
+  std::unique_ptr<StudioRun> studio_;
   std::unique_ptr<ControlSocket> socket_;
   std::unique_ptr<DdsServices> services_;
   std::unique_ptr<InputTopics> topics_;
@@ -433,6 +449,10 @@ Exit run_command(const RunOptions& given, ReportOfRun& report) {
     return refuse(errors);
   print_warnings((*composition)->warnings);
   if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
+  // Somebody looks: unless another pace is said, it is that of a robot.
+  const bool simulated = (*composition)->backend->pace() == hal::Pace::kSimulatedClock;
+  const bool says_none = !options.rate && (*composition)->experiment.loop.rate == 0.0;
+  if (options.studio.wanted && simulated && says_none) options.rate = 1.0;
   note_overrun_policy(**composition, options);
   auto session = std::make_unique<Session>(**composition, options, gate.get());
   const Exit exit = session->run();

@@ -90,10 +90,8 @@ Result<std::unique_ptr<ControlSocket>> ControlSocket::open(const std::string& pa
   if (Status listening = socket->listen(); !listening) {
     return std::unexpected(listening.error());
   }
+  socket->turns_ = std::make_unique<ControlTurns>(registry, [done = socket->done_] { wake(done); });
   socket->thread_ = std::thread([raw = socket.get()] { raw->serve(); });
-  for (Turn& turn : socket->turns_) {
-    turn.thread = std::thread([raw = socket.get(), &turn] { raw->work(turn); });
-  }
   return socket;
 }
 
@@ -122,16 +120,11 @@ Status ControlSocket::listen() {
 }
 
 ControlSocket::~ControlSocket() {
-  {
-    const std::scoped_lock lock(mutex_);
-    ending_ = true;
-  }
-  for (Turn& turn : turns_) turn.more.notify_all();
+  ending_ = true;
+  if (turns_ != nullptr) turns_->end();
   wake(wake_);
   if (thread_.joinable()) thread_.join();
-  for (Turn& turn : turns_) {
-    if (turn.thread.joinable()) turn.thread.join();
-  }
+  turns_.reset();
   struct stat found {};
   const bool ours = inode_ != 0 && ::lstat(path_.c_str(), &found) == 0 && found.st_dev == device_ &&
                     found.st_ino == inode_;
@@ -233,48 +226,25 @@ void ControlSocket::answer_lines(Client& client) {
     if (end == std::string::npos) return;
     std::string question = client.in.substr(0, end);
     client.in.erase(0, length);
-    const ControlTurn turn = registry_->turn_of(question);
     // Whoever has hung up has given up: nothing may move when nobody expects it any more.
-    if (turn == ControlTurn::kUrgent || !client.hung_up) {
-      hand_over(client, turn, std::move(question));
+    if (!client.hung_up || registry_->turn_of(question) == ControlTurn::kUrgent) {
+      hand_over(client, std::move(question));
     }
   }
 }
 
-void ControlSocket::hand_over(Client& client, ControlTurn turn, std::string question) {
-  const std::scoped_lock lock(mutex_);
-  Turn& its = turns_[static_cast<std::size_t>(turn)];
-  its.questions.push_back({client.number, registry_->last_stop(), std::move(question)});
+void ControlSocket::hand_over(Client& client, std::string question) {
+  const ControlTurn turn = turns_->ask(client.number, 0, std::move(question));
   client.waiting = true;
   client.urgent = turn == ControlTurn::kUrgent;
-  its.more.notify_one();
-}
-
-/// One question after the other. No turn waits for another one.
-void ControlSocket::work(Turn& turn) {
-  std::unique_lock lock(mutex_);
-  for (;;) {
-    turn.more.wait(lock, [&] { return ending_ || !turn.questions.empty(); });
-    if (ending_) return;
-    Message message = std::move(turn.questions.front());
-    turn.questions.pop_front();
-    lock.unlock();
-    message.text = json_text(registry_->answer(message.text, {.after_stop = message.after_stop}));
-    lock.lock();
-    answers_.push_back(std::move(message));
-    wake(done_);
-  }
 }
 
 /// The clients that are gone, and what they asked for that has not begun, unless it is urgent.
 void ControlSocket::drop_gone() {
-  const std::scoped_lock lock(mutex_);
-  for (const ControlTurn turn : {ControlTurn::kOrdinary, ControlTurn::kLong}) {
-    std::erase_if(turns_[static_cast<std::size_t>(turn)].questions, [this](const Message& one) {
-      const auto asker = std::ranges::find(clients_, one.client, &Client::number);
-      return asker == clients_.end() || (*asker)->gone;
-    });
-  }
+  turns_->drop([this](std::uint64_t number) {
+    const auto asker = std::ranges::find(clients_, number, &Client::number);
+    return asker == clients_.end() || (*asker)->gone;
+  });
   std::erase_if(clients_, [](const auto& one) { return one->gone; });
 }
 
@@ -282,13 +252,9 @@ void ControlSocket::drop_gone() {
 void ControlSocket::deliver() {
   std::uint64_t count = 0;
   (void)!::read(done_, &count, sizeof count);
-  std::vector<Message> answers;
-  {
-    const std::scoped_lock lock(mutex_);
-    answers.swap(answers_);
-  }
-  for (Message& answer : answers) {
-    const auto found = std::ranges::find(clients_, answer.client, &Client::number);
+  std::vector<ControlTurns::Answer> answers = turns_->take();
+  for (ControlTurns::Answer& answer : answers) {
+    const auto found = std::ranges::find(clients_, answer.asker, &Client::number);
     if (found == clients_.end()) continue;
     Client& client = **found;
     client.waiting = client.urgent = false;

@@ -4,20 +4,17 @@
 
 #include <sys/types.h>
 
-#include <array>
 #include <atomic>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <thread>
 #include <vector>
 
 #include "apps/control/control_registry.hpp"
+#include "apps/control/turns.hpp"
 #include "base/result.hpp"
 
 namespace tandem::apps {
@@ -55,17 +52,6 @@ class ControlSocket {
 
  private:
   struct Client;
-  /// A question for the thread of its turn, or its answer.
-  struct Message {
-    std::uint64_t client;
-    std::uint64_t after_stop;
-    std::string text;
-  };
-  struct Turn {
-    std::condition_variable more;
-    std::deque<Message> questions;
-    std::thread thread;
-  };
   ControlSocket(std::string path, const ControlRegistry& registry);
   Status listen();
   void serve();
@@ -74,8 +60,7 @@ class ControlSocket {
   void take(Client& client);
   void answer_lines(Client& client);
   static void flush(Client& client);
-  void hand_over(Client& client, ControlTurn turn, std::string question);
-  void work(Turn& turn);
+  void hand_over(Client& client, std::string question);
   void drop_gone();
   void deliver();
 
@@ -89,10 +74,8 @@ class ControlSocket {
   std::uint64_t newest_ = 0;  // client's number
   std::vector<std::unique_ptr<Client>> clients_;
 
-  int done_ = -1;     // eventfd: to the thread that talks, "answers_ has some"
-  std::mutex mutex_;  // of what follows, but the turns' threads
-  std::array<Turn, kControlTurns> turns_;
-  std::vector<Message> answers_;
+  int done_ = -1;  // eventfd: to the thread that talks, "turns_ has answers"
+  std::unique_ptr<ControlTurns> turns_;
   std::atomic<bool> ending_{false};
 
   std::thread thread_;

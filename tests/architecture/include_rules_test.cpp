@@ -143,9 +143,9 @@ bool begins_with_a_comment(const fs::path& file) {
 TEST(Architecture, EverySourceOrItsHeaderBeginsWithItsPurpose) {
   const fs::path root = TANDEM_SOURCE_DIR;
   int checked = 0;
-  for (const char* folder :
-       {"apps", "base", "bench", "canopen", "controllers", "dds", "ethercat", "examples",
-        "firmware_emu", "hal", "log", "model", "python", "report", "rt", "runtime", "scaffold"}) {
+  for (const char* folder : {"apps", "base", "bench", "canopen", "controllers", "dds", "ethercat",
+                             "examples", "firmware_emu", "hal", "log", "model", "python", "report",
+                             "rt", "runtime", "scaffold", "studio"}) {
     for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
       const fs::path& file = entry.path();
       if (file.extension() != ".hpp" && file.extension() != ".cpp") continue;

@@ -1,0 +1,71 @@
+#include "apps/control/turns.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tandem::apps {
+
+ControlTurns::ControlTurns(const ControlRegistry& registry, std::function<void()> answered)
+    : registry_(&registry), answered_(std::move(answered)) {
+  for (Turn& turn : turns_) {
+    turn.thread = std::thread([this, &turn] { work(turn); });
+  }
+}
+
+ControlTurns::~ControlTurns() {
+  end();
+  for (Turn& turn : turns_) turn.thread.join();
+}
+
+void ControlTurns::end() {
+  {
+    const std::scoped_lock lock(mutex_);
+    ending_ = true;
+  }
+  for (Turn& turn : turns_) turn.more.notify_all();
+}
+
+ControlTurn ControlTurns::ask(std::uint64_t asker, std::uint64_t number, std::string question,
+                              ControlRegistry::Asked how) {
+  const ControlTurn turn = registry_->turn_of(question);
+  how.after_stop = registry_->last_stop();
+  const std::scoped_lock lock(mutex_);
+  Turn& its = turns_[static_cast<std::size_t>(turn)];
+  its.questions.push_back({asker, number, std::move(question), std::move(how)});
+  its.more.notify_one();
+  return turn;
+}
+
+void ControlTurns::drop(const std::function<bool(std::uint64_t asker)>& gone) {
+  const std::scoped_lock lock(mutex_);
+  for (const ControlTurn turn : {ControlTurn::kOrdinary, ControlTurn::kLong}) {
+    std::erase_if(turns_[static_cast<std::size_t>(turn)].questions,
+                  [&](const Question& one) { return gone(one.asker); });
+  }
+}
+
+std::vector<ControlTurns::Answer> ControlTurns::take() {
+  std::vector<Answer> answers;
+  const std::scoped_lock lock(mutex_);
+  answers.swap(answers_);
+  return answers;
+}
+
+/// One question after the other. No turn waits for another one.
+void ControlTurns::work(Turn& turn) {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    turn.more.wait(lock, [&] { return ending_ || !turn.questions.empty(); });
+    if (ending_) return;
+    Question question = std::move(turn.questions.front());
+    turn.questions.pop_front();
+    lock.unlock();
+    Answer answer{question.asker, question.number,
+                  json_text(registry_->answer(question.text, question.how))};
+    lock.lock();
+    answers_.push_back(std::move(answer));
+    answered_();
+  }
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,73 @@
+// What the studio answers to an HTTP request: rules alone, without a network.
+// Layer: studio.  Thread: any.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace tandem::studio {
+
+/// A request's head, as far as the rules look at it.
+struct RequestHead {
+  std::string_view method;
+  std::string_view target;
+  bool old = false;       ///< HTTP/1.0
+  bool upgrades = false;  ///< to a WebSocket
+  // Of headers that came not once the list says it.
+  std::vector<std::string_view> hosts{}, origins{}, encodings{}, authorizations{}, protocols{};
+};
+
+struct Response {
+  unsigned status = 200;
+  std::string_view reason = "OK";
+  std::string_view type = "text/plain; charset=utf-8";
+  std::string body{};
+  std::vector<std::pair<std::string_view, std::string_view>> headers{};  ///< beside kHeaders
+};
+
+/// Of every answer.
+inline constexpr std::pair<std::string_view, std::string_view> kHeaders[] = {
+    {"Content-Security-Policy",
+     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
+     "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; "
+     "frame-ancestors 'none'"},
+    {"X-Content-Type-Options", "nosniff"},
+    {"Referrer-Policy", "no-referrer"},
+    {"Cache-Control", "no-store"},
+};
+
+/// Where the studio listens.
+struct Place {
+  std::string address;  ///< "127.0.0.1", "::1", "0.0.0.0"
+  std::uint16_t port = 0;
+  bool loopback = true;  ///< nobody from elsewhere reaches it
+};
+
+class HttpRules {
+ public:
+  /// @param token  that /robot.urdf asks for where the place is no loopback
+  /// @param page   folder whose files are the page, as they are at each request; empty: assets()
+  HttpRules(Place place, std::string urdf, std::string token, std::string page = {});
+
+  /// The answer; empty: the request opens a WebSocket.
+  [[nodiscard]] std::optional<Response> answer(const RequestHead& head) const;
+
+ private:
+  [[nodiscard]] bool is_here(std::string_view host) const;
+  [[nodiscard]] Response get(std::string_view path, const RequestHead& head) const;
+
+  Place place_;
+  std::string urdf_, token_, page_;
+};
+
+/// An answer in words. @param reason  the status' own
+[[nodiscard]] Response words(unsigned status, std::string_view reason, std::string text);
+
+/// Of a text that is secret: takes as long whatever differs. False of an empty secret.
+[[nodiscard]] bool is_secret(std::string_view text, std::string_view secret);
+
+}  // namespace tandem::studio

@@ -1,0 +1,150 @@
+#include "studio/sampler.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+
+namespace tandem::studio {
+namespace {
+
+constexpr float kNoValue = std::numeric_limits<float>::quiet_NaN();
+
+SignalTable table_of(const Tap::Images& images, log::RunInfo robot) {
+  SignalTable table(std::move(robot));
+  (void)table.add("state", images.state.layout());
+  (void)table.add("command", images.command.layout());
+  if (images.truth != nullptr) (void)table.add("truth", images.truth->layout());
+  if (images.estimate != nullptr) (void)table.add("estimate", images.estimate->layout());
+  return table;
+}
+
+Event::Level level_of(hal::RunPhase phase) {
+  const bool stopped = phase == hal::RunPhase::kFaulted || phase == hal::RunPhase::kRetreating;
+  return stopped ? Event::Level::kError : Event::Level::kInfo;
+}
+
+}  // namespace
+
+Sampler::Sampler(Tap& tap, const Tap::Images& images, log::RunInfo robot, std::size_t level_bytes)
+    : tap_(&tap), table_(table_of(images, std::move(robot))), history_(level_bytes, table_.size()) {
+  command_ = 1;
+  truth_ = 2;
+  estimate_ = images.truth == nullptr ? 2 : 3;
+  widen();
+}
+
+/// Room for every id that was given.
+void Sampler::widen() {
+  const std::size_t size = table_.size();
+  history_.widen(size);
+  row_.resize(size, kNoValue);
+  span_.least.resize(size, kNoValue);
+  span_.largest.resize(size, kNoValue);
+}
+
+bool Sampler::look(const Feed& feed) {
+  bool changed = look_for_controllers(feed);
+  const std::uint64_t lost = tap_->lost();
+  span_.gap = span_.gap || lost != lost_;
+  lost_ = lost;
+  const auto signals = [this](const Tap::Signals& part) { take(part); };
+  const auto cycle = [this](const Tap::Cycle& one) { take(one); };
+  // Not more than a ring holds, so that a fast simulation does not keep clients from their turn.
+  for (std::size_t i = 0; i < Tap::kMostCycles; ++i) {
+    if (!tap_->next(signals, cycle)) break;
+    if (!std::exchange(unknown_block_, false)) continue;
+    loads_ = 0;  // one has come since
+    changed = look_for_controllers(feed) || changed;
+  }
+  return changed;
+}
+
+bool Sampler::look_for_controllers(const Feed& feed) {
+  if (!feed.loads) return false;
+  const std::uint64_t loads = feed.loads();
+  if (loads == loads_) return false;
+  loads_ = loads;
+  std::vector<Block> now;
+  bool changed = false;
+  std::vector<Feed::Signals> loaded = feed.signals();
+  for (auto& [name, block] : loaded) {
+    if (block == nullptr || block->numbers() == 0) continue;
+    const auto former = std::ranges::find(blocks_, block, &Block::block);
+    if (former == blocks_.end()) {
+      changed = true;
+      now.push_back({name, block, kMostSignals, std::vector<std::byte>(block->image().size())});
+    } else {
+      now.push_back(std::move(*former));
+      blocks_.erase(former);
+    }
+  }
+  changed = changed || !blocks_.empty();
+  for (const Block& gone : blocks_) {  // before others come, which may be the same again
+    if (gone.source != kMostSignals) table_.remove(gone.source);
+  }
+  blocks_ = std::move(now);
+  if (!changed) return false;
+  for (Block& one : blocks_) {
+    if (one.source != kMostSignals) continue;
+    const Result<std::size_t> source = table_.add("controller/" + one.name, one.block->layout());
+    if (source) {
+      one.source = *source;
+    } else {
+      events_.push_back({1e-9 * static_cast<double>(time_.time_ns), time_.cycle,
+                         Event::Level::kWarn, one.name, source.error().message});
+    }
+  }
+  widen();
+  return true;
+}
+
+void Sampler::take(const Tap::Signals& part) {
+  const auto its = std::ranges::find_if(
+      blocks_, [&](const Block& one) { return one.block.get() == part.block; });
+  if (its == blocks_.end()) {
+    unknown_block_ = true;
+    return;
+  }
+  if (its->source == kMostSignals || part.at + part.bytes.size() > its->image.size()) return;
+  begin_row();
+  std::memcpy(its->image.data() + part.at, part.bytes.data(), part.bytes.size());
+  if (part.at + part.bytes.size() < its->image.size()) return;
+  table_.convert(its->source, its->image, row_);
+}
+
+/// What does not come in this cycle has no value.
+void Sampler::begin_row() {
+  if (!std::exchange(row_is_whole_, false)) return;
+  std::ranges::fill(row_, kNoValue);
+}
+
+void Sampler::take(const Tap::Cycle& cycle) {
+  time_ = cycle.time;
+  if (!has_phase_ || phase_ != cycle.phase) {
+    has_phase_ = true;
+    phase_ = cycle.phase;
+    events_.push_back({1e-9 * static_cast<double>(time_.time_ns), time_.cycle, level_of(phase_), "",
+                       std::string("phase: ") + hal::to_string(phase_)});
+  }
+  begin_row();
+  table_.convert(state_, cycle.state, row_);
+  table_.convert(command_, cycle.command, row_);
+  if (!cycle.truth.empty()) table_.convert(truth_, cycle.truth, row_);
+  if (!cycle.estimate.empty()) table_.convert(estimate_, cycle.estimate, row_);
+  row_is_whole_ = true;
+  history_.add(time_.cycle, row_);
+  ++span_.cycles;
+  for (std::size_t i = 0; i < row_.size(); ++i) span_.least[i] = least(span_.least[i], row_[i]);
+  for (std::size_t i = 0; i < row_.size(); ++i) {
+    span_.largest[i] = largest(span_.largest[i], row_[i]);
+  }
+}
+
+void Sampler::begin_tick() {
+  span_.cycles = 0;
+  span_.gap = false;
+  std::ranges::fill(span_.least, kNoValue);
+  std::ranges::fill(span_.largest, kNoValue);
+}
+
+}  // namespace tandem::studio

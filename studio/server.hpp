@@ -1,0 +1,50 @@
+// The studio's way in: HTTP and WebSocket, on one thread, for the clients of a hub.
+// Layer: studio.  Thread: open, serve, end by main; answered() any; the rest is its own.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/result.hpp"
+#include "studio/http_rules.hpp"
+#include "studio/hub.hpp"
+
+namespace tandem::studio {
+
+/// Connections at once, of browsers and of WebSockets; a further one is told so, and closed.
+inline constexpr std::size_t kMostConnections = 64;
+/// Without a port of the caller's the first free one from here is taken.
+inline constexpr std::uint16_t kFirstPort = 8642, kLastPort = 8661;
+
+class Server {
+ public:
+  /// Listens; nobody is answered yet.
+  /// @param address  a number, or "localhost"
+  /// @param port     empty: the first that is free, from kFirstPort to kLastPort; 0: any
+  /// Errors: an address that is none, or not of this machine; a port that is taken.
+  [[nodiscard]] static Result<std::unique_ptr<Server>> open(const std::string& address,
+                                                            std::optional<std::uint16_t> port);
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  [[nodiscard]] const Place& place() const;
+  /// Starts the thread. Once. @param hub  is its from now on, and outlives this
+  void serve(Hub& hub, HttpRules rules);
+  /// Any thread: the hub's asker has answers.
+  void answered();
+  /// Tells the clients that the run is over, closes them, and ends the thread.
+  /// @param most  that is waited for them
+  void end(const std::string& how, const std::string& log, std::chrono::milliseconds most);
+
+  struct Impl;  ///< for the connections
+
+ private:
+  explicit Server(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tandem::studio

@@ -1,0 +1,71 @@
+#include "studio/studio.hpp"
+
+#include <fmt/format.h>
+#include <sys/random.h>
+
+#include <array>
+#include <cstdlib>
+#include <utility>
+
+namespace tandem::studio {
+namespace {
+
+/// A viewer has so long to hear that the run is over.
+constexpr std::chrono::milliseconds kGoodbye{120};
+constexpr std::size_t kTokenBytes = 16;
+
+log::RunInfo names_of(const hal::RobotConfig& robot) {
+  log::RunInfo info;
+  for (const hal::JointConfig& joint : robot.joints) info.joints.push_back(joint.name);
+  for (const hal::SensorConfig& sensor : robot.sensors) {
+    info.sensors.push_back({sensor.name, sensor.channels()});
+  }
+  return info;
+}
+
+}  // namespace
+
+std::string draw_hex(std::size_t bytes) {
+  std::string text;
+  while (text.size() < 2 * bytes) {
+    std::array<unsigned char, 1> one{};
+    if (::getrandom(one.data(), one.size(), 0) != 1) continue;  // a signal came
+    text += fmt::format("{:02x}", one[0]);
+  }
+  return text;
+}
+
+Result<std::unique_ptr<Studio>> Studio::open(const Options& options, RunDescription run,
+                                             const Tap::Images& images) {
+  auto server = Server::open(options.address, options.port);
+  if (!server) return std::unexpected(server.error());
+  return std::unique_ptr<Studio>(new Studio(options, std::move(run), images, std::move(*server)));
+}
+
+Studio::Studio(const Options& options, RunDescription run, const Tap::Images& images,
+               std::unique_ptr<Server> server)
+    : run_(std::move(run)),
+      token_(draw_hex(kTokenBytes)),
+      page_(options.page),
+      tap_(images, run_.period_ns),
+      sampler_(tap_, images, names_of(run_.robot), options.level_bytes),
+      hub_(run_, sampler_, {.token = token_, .open = server->place().loopback}),
+      server_(std::move(server)) {}
+
+std::string Studio::address() const {
+  const Place& place = server_->place();
+  const bool six = place.address.find(':') != std::string::npos;
+  return fmt::format("http://{}{}{}:{}/#token={}", six ? "[" : "", place.address, six ? "]" : "",
+                     place.port, token_);
+}
+
+void Studio::start(Feed feed, Asker asker) {
+  hub_.start(std::move(feed), std::move(asker));
+  server_->serve(hub_, HttpRules(server_->place(), run_.urdf, token_, page_));
+}
+
+void Studio::finish(const std::string& how, const std::string& log) {
+  server_->end(how, log, kGoodbye);
+}
+
+}  // namespace tandem::studio

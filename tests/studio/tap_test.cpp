@@ -1,0 +1,151 @@
+// What the loop hands over in each cycle, and that it costs it no heap, lock or system call.
+#include "studio/tap.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "rt/scoped_realtime.hpp"
+#include "studio/sampler.hpp"
+#include "tests/studio/shown_robot.hpp"
+#include "tests/support/rt_trap.hpp"
+
+namespace tandem::studio {
+namespace {
+
+using test::ShownRobot;
+
+TEST(StudioTap, TakesACycleWithoutHeapLockOrSystemCall) {
+  ShownRobot robot;
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  hal::CycleFanOut both;  // as DDS and the studio are there at once
+  both.add(&tap);
+  both.add(&robot.counter);
+  const auto block = test::block_of(100);
+  const rt::ScopedRealtime in_cycle;  // the trap, or the sanitizer, fails the test
+  for (std::uint64_t cycle = 0; cycle < 3000; ++cycle) robot.show(*both.observer(), cycle, {block});
+  EXPECT_GT(tap.lost(), 0U) << "a full ring is a part of it";
+}
+
+TEST(StudioTap, HandsOverEveryImageAndSignalOfACycle) {
+  ShownRobot robot;
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  const auto few = test::block_of(1), many = test::block_of(400);
+  for (std::uint64_t cycle = 0; cycle < 50; ++cycle) {
+    // One that is not active has no numbers in this cycle.
+    if (cycle % 2 == 0) {
+      robot.show(tap, cycle, {few, many});
+    } else {
+      robot.show(tap, cycle, {few});
+    }
+  }
+  std::uint64_t cycle = 0;
+  std::vector<std::byte> few_image(few->image().size()), many_image(many->image().size());
+  std::size_t parts = 0;
+  const auto signals = [&](const Tap::Signals& part) {
+    auto& image = part.block == few.get() ? few_image : many_image;
+    ASSERT_LE(part.at + part.bytes.size(), image.size());
+    std::memcpy(image.data() + part.at, part.bytes.data(), part.bytes.size());
+    ++parts;
+  };
+  const auto whole = [&](const Tap::Cycle& one) {
+    EXPECT_EQ(one.time.cycle, cycle);
+    double position = 0.0;
+    std::memcpy(&position, one.state.data() + 16, sizeof position);  // behind cycle and time
+    EXPECT_EQ(position, ShownRobot::position(cycle, 0));
+    EXPECT_EQ(one.truth.size(), robot.truth.bytes().size());
+    EXPECT_TRUE(one.estimate.empty());
+    double number = 0.0;
+    std::memcpy(&number, few_image.data() + 16, sizeof number);
+    EXPECT_EQ(number, test::number_of(cycle, 0));
+    if (cycle % 2 == 0) {
+      std::memcpy(&number, many_image.data() + 16 + 8 * 399, sizeof number);
+      EXPECT_EQ(number, test::number_of(cycle, 399));
+    }
+    EXPECT_EQ(parts, cycle % 2 == 0 ? 1U + 7U : 1U);
+    parts = 0;
+    ++cycle;
+  };
+  while (tap.next(signals, whole)) {
+  }
+  EXPECT_EQ(cycle, 50U);
+  EXPECT_EQ(tap.lost(), 0U);
+}
+
+TEST(StudioTap, CountsWhatFindsNoRoom) {
+  ShownRobot robot;
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  for (std::uint64_t cycle = 0; cycle < 5000; ++cycle) robot.show(tap, cycle, {});
+  std::uint64_t taken = 0;
+  const auto nothing = [](const Tap::Signals&) {};
+  while (tap.next(nothing, [&](const Tap::Cycle& one) { EXPECT_EQ(one.time.cycle, taken++); })) {
+  }
+  EXPECT_EQ(taken + tap.lost(), 5000U);
+  EXPECT_GE(taken, 1000U) << "a second has room";
+}
+
+TEST(StudioSampler, KeepsEachCycleAndWhatBecameOfItSinceTheTick) {
+  ShownRobot robot;
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  Sampler sampler(tap, robot.images(), robot.names(), 200'000);
+  for (std::uint64_t cycle = 0; cycle < 40; ++cycle) robot.show(tap, cycle, {});
+  EXPECT_FALSE(sampler.look({}));
+  const SignalId id = test::id_of(sampler.table(), "state.position_rad.a");
+  EXPECT_EQ(sampler.span().cycles, 40U);
+  EXPECT_EQ(sampler.span().least[id], static_cast<float>(ShownRobot::position(0, 0)));
+  EXPECT_EQ(sampler.span().largest[id], static_cast<float>(ShownRobot::position(39, 0)));
+  EXPECT_EQ(sampler.last()[id], static_cast<float>(ShownRobot::position(39, 0)));
+  EXPECT_EQ(sampler.cycle(), 39U);
+  sampler.begin_tick();
+  EXPECT_EQ(sampler.span().cycles, 0U);
+  const Window window = sampler.history().plan(10, 19, 100);
+  std::vector<float> numbers(window.numbers());
+  sampler.history().read(window, id, numbers);
+  ASSERT_EQ(numbers.size(), 10U);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    EXPECT_EQ(numbers[i], static_cast<float>(ShownRobot::position(10 + i, 0)));
+  }
+  const std::vector<Event> events = sampler.take_events();
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].text, "phase: running");
+  EXPECT_EQ(events[0].cycle, 0U);
+}
+
+TEST(StudioSampler, FollowsControllersThatComeAndGo) {
+  ShownRobot robot;
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  Sampler sampler(tap, robot.images(), robot.names(), 200'000);
+  std::vector<Feed::Signals> loaded;
+  std::uint64_t loads = 1;
+  const Feed feed{.loads = [&] { return loads; }, .signals = [&] { return loaded; }};
+  const auto block = test::block_of(3);
+  loaded = {{"wave", block}};
+  EXPECT_TRUE(sampler.look(feed));
+  const SignalId id = test::id_of(sampler.table(), "controller/wave.number.2");
+  robot.show(tap, 0, {block});
+  robot.show(tap, 1, {});  // it is not active
+  EXPECT_FALSE(sampler.look(feed));
+  EXPECT_EQ(sampler.span().largest[id], static_cast<float>(test::number_of(0, 2)));
+  EXPECT_TRUE(std::isnan(sampler.last()[id])) << "what did not come has no value";
+
+  // A new one of another shape, whose first numbers are in the ring before it is known.
+  const auto next = test::block_of(5);
+  loaded = {{"wave", next}};
+  const auto sly = [&, calls = 0]() mutable { return calls++ == 0 ? loads : loads + 1; };
+  robot.show(tap, 2, {next});
+  robot.show(tap, 3, {next});
+  EXPECT_TRUE(sampler.look({.loads = sly, .signals = [&] { return loaded; }}));
+  const SignalId other = test::id_of(sampler.table(), "controller/wave.number.4");
+  EXPECT_GT(other, id);
+  EXPECT_EQ(sampler.last()[other], static_cast<float>(test::number_of(3, 4)));
+  EXPECT_TRUE(std::isnan(sampler.last()[id]));
+  const Window window = sampler.history().plan(0, 3, 100);
+  std::vector<float> numbers(window.numbers());
+  sampler.history().read(window, id, numbers);
+  EXPECT_EQ(numbers[0], static_cast<float>(test::number_of(0, 2))) << "what was stays";
+}
+
+}  // namespace
+}  // namespace tandem::studio
