@@ -25,7 +25,6 @@ export class LiveSource implements Source {
   private nextId = 1;
   private readonly asked = new Map<number, Pending<Answer>>();
   private readonly windows = new Map<number, Pending<Window> & { signals: number }>();
-  private subscription: { revision: number; signals: number[] } | null = null;
   private watching: string[] = [];
   private ended = false;
 
@@ -63,7 +62,6 @@ export class LiveSource implements Source {
   }
 
   subscribe(revision: number, signals: number[]): void {
-    this.subscription = { revision, signals };
     this.send({ op: 'subscribe', revision, signals });
   }
 
@@ -195,7 +193,6 @@ export class LiveSource implements Source {
         return;
       case 'signals':
         this.each((l) => l.signals?.(message.revision as number, message.sources as SourceTable[]));
-        if (this.subscription) this.send({ op: 'subscribe', ...this.subscription });
         return;
       case 'events':
         this.each((l) => l.events?.(message.events as RunEvent[]));

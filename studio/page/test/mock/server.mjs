@@ -92,7 +92,12 @@ export async function startMock(options = {}) {
   let holder = null;
   const tellControl = () => {
     for (const one of clients) {
-      one.send({ op: 'control', taken: holder !== null, yours: holder === one, by: holder ? 'a page' : '' });
+      one.send({
+        op: 'control',
+        taken: holder !== null,
+        yours: holder === one,
+        by: holder ? 'a page' : '',
+      });
     }
   };
   sockets.on('connection', (socket) => {
@@ -134,7 +139,11 @@ export async function startMock(options = {}) {
         const reads = /\.(show|list)$|^status$|^estop$/.test(name);
         let answer = null;
         if (!reads && client.may !== 'all') {
-          answer = { ok: false, error: 'this page may look only', hint: 'open the address with its token' };
+          answer = {
+            ok: false,
+            error: 'this page may look only',
+            hint: 'open the address with its token',
+          };
         } else if (name.startsWith('joint.') && !reads && holder !== client) {
           answer = { ok: false, error: 'nobody has control from here', hint: 'take control first' };
         } else answer = robot.ask(message.request);
@@ -169,19 +178,27 @@ export async function startMock(options = {}) {
     robot,
     address: `http://127.0.0.1:${port}/#token=abc`,
     look: `http://127.0.0.1:${port}/`,
-    drop: () => { for (const client of clients) client.socket.terminate(); },
-    say: (message) => { for (const client of clients) client.send(message); },
-    stop: () => new Promise((resolve) => {
-      clearInterval(ticks);
-      clearInterval(watches);
+    drop: () => {
       for (const client of clients) client.socket.terminate();
-      sockets.close();
-      http.close(resolve);
-    }),
+    },
+    say: (message) => {
+      for (const client of clients) client.send(message);
+    },
+    stop: () =>
+      new Promise((resolve) => {
+        clearInterval(ticks);
+        clearInterval(watches);
+        for (const client of clients) client.socket.terminate();
+        sockets.close();
+        http.close(resolve);
+      }),
   };
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
-  const mock = await startMock({ robot: process.argv[2] ?? 'coman', port: Number(process.argv[3] ?? 8700) });
+  const mock = await startMock({
+    robot: process.argv[2] ?? 'coman',
+    port: Number(process.argv[3] ?? 8700),
+  });
   process.stdout.write(`studio: ${mock.address}\n`);
 }

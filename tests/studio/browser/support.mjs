@@ -1,0 +1,73 @@
+// A browser for the tests of the studio's page, and what every test of it looks at.
+import { existsSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+const here = dirname(fileURLToPath(import.meta.url));
+export const kPage = join(here, '../../../studio/page');
+const require = createRequire(join(kPage, 'package.json'));
+
+const kBrowsers = [
+  process.env.TANDEM_CHROMIUM,
+  '/usr/bin/chromium-headless-shell',
+  '/usr/bin/chromium',
+].filter(Boolean);
+
+/** Why the tests cannot run here; empty: they can. */
+export function lacking() {
+  if (!existsSync(join(kPage, 'node_modules/playwright-core'))) {
+    return 'npm packages of studio/page are not installed: scripts/install-node-modules';
+  }
+  if (!kBrowsers.some(existsSync)) return 'no chromium: apt install chromium-headless-shell';
+  return '';
+}
+
+export async function openBrowser() {
+  const { chromium } = require('playwright-core');
+  const args = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+  if (process.getuid?.() === 0) args.push('--no-sandbox');
+  return chromium.launch({ executablePath: kBrowsers.find(existsSync), args });
+}
+
+/** A page that keeps what the console and the network complained about. */
+export async function openPage(browser, address, options = {}) {
+  const context = await browser.newContext({
+    viewport: { width: options.width ?? 1400, height: options.height ?? 860 },
+    colorScheme: options.scheme ?? 'light',
+    acceptDownloads: true,
+    hasTouch: options.touch ?? false,
+  });
+  if (options.init) await context.addInitScript(options.init);
+  const page = await context.newPage();
+  page.complaints = [];
+  page.outside = [];
+  page.on('console', (message) => {
+    const text = message.text();
+    // Chromium's word about software rendering, not about the page.
+    if (/GPU stall due to ReadPixels|WebGL: CONTEXT_LOST/.test(text)) return;
+    if (['error', 'warning'].includes(message.type())) page.complaints.push(text);
+  });
+  page.on('pageerror', (error) => page.complaints.push(String(error)));
+  page.on('request', (request) => {
+    const { host, protocol } = new URL(request.url());
+    if (/^https?:$/.test(protocol) && host !== new URL(address).host) page.outside.push(request.url());
+  });
+  await page.goto(address);
+  return page;
+}
+
+/** What axe-core finds, in words. */
+export async function violations(page) {
+  await page.addScriptTag({ path: require.resolve('axe-core/axe.min.js') }).catch(async () => {
+    // The page's policy forbids foreign scripts: the debugger may.
+    const { readFileSync } = await import('node:fs');
+    await page.evaluate(readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8'));
+  });
+  return page.evaluate(async () => {
+    const found = await window.axe.run(document);
+    return found.violations.map(
+      (one) => `${one.id}: ${one.nodes.map((node) => `${node.target} ${node.failureSummary}`).join(' | ')}`,
+    );
+  });
+}
