@@ -99,20 +99,16 @@ export class Actions {
     button.addEventListener('focus', describe);
     describe();
     if (options.bare) return button;
-    const copier = h(
-      'button',
-      {
-        type: 'button',
-        class: 'copy',
-        title: 'copy the command',
-        'aria-label': `copy the command of ${options.name ?? label}`,
-        onclick: () => {
-          const asked = request();
-          if (asked) void this.copy(commandLine(asked));
-        },
+    const copier = h('button', {
+      type: 'button',
+      class: 'copy',
+      title: 'copy the command',
+      'aria-label': `copy the command of ${options.name ?? label}`,
+      onclick: () => {
+        const asked = request();
+        if (asked) void this.copy(commandLine(asked));
       },
-      '⧉',
-    );
+    });
     return h('span', { class: 'action' }, button, copier);
   }
 }

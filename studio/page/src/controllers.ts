@@ -3,7 +3,7 @@ import type { Actions } from './actions';
 import type { ControlLease } from './control';
 import type { Data } from './data';
 import { attribute, h, say } from './dom';
-import { micros, number } from './format';
+import { micros, plain } from './format';
 import type { Answer } from './protocol';
 
 interface Parameter {
@@ -58,7 +58,7 @@ function shown(value: unknown): string {
 }
 
 function range(parameter: Parameter): string {
-  const end = (of: number | number[] | null) => (Array.isArray(of) ? number(of[0]) : number(of));
+  const end = (of: number | number[] | null) => plain(Array.isArray(of) ? of[0] : of);
   if (parameter.min === null && parameter.max === null) return '';
   return `${end(parameter.min)} … ${end(parameter.max)}`;
 }
@@ -138,7 +138,7 @@ export class Controllers {
       h(
         'div',
         { class: 'card-head' },
-        h('h3', {}, one.name),
+        h('h2', {}, one.name),
         state,
         this.actions.button('Start', () => ({ do: 'controller.start', name: one.name }), {
           name: `start ${one.name}`,
@@ -180,7 +180,7 @@ export class Controllers {
               h(
                 'tr',
                 {},
-                ...['parameter', 'value', 'unit', 'range', ''].map((head) =>
+                ...['parameter', 'value', 'unit', 'range', 'change'].map((head) =>
                   h('th', { scope: 'col' }, head),
                 ),
               ),

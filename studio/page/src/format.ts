@@ -12,6 +12,20 @@ export function number(value: number | null | undefined): string {
   return value.toFixed(4);
 }
 
+/** Three digits: for tables, where a column must not jump. */
+export function short(value: number): string {
+  if (!Number.isFinite(value)) return '–';
+  const size = Math.abs(value);
+  if (size >= 1e5) return value.toExponential(1);
+  return value.toFixed(size >= 100 ? 0 : size >= 10 ? 1 : 2);
+}
+
+/** As a person writes it: "100", "0.1". */
+export function plain(value: number | null | undefined): string {
+  if (value === null || value === undefined || !Number.isFinite(value)) return '–';
+  return String(Number(value.toPrecision(4)));
+}
+
 export function seconds(value: number): string {
   return Number.isFinite(value) ? `${value.toFixed(3)} s` : '–';
 }

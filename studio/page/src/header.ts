@@ -18,7 +18,7 @@ export class Header {
   private readonly time = h('span', { class: 'clock' }, '–');
   private readonly rate = h('span', { class: 'rate' });
   private readonly link = h('span', { class: 'chip link' }, 'connecting');
-  private readonly lost = h('span', { class: 'lost' });
+  private readonly lost = h('span', { class: 'frames-lost' });
   private readonly reset: HTMLElement;
   private readonly start: HTMLElement;
   private readonly fault = h('p', { class: 'fault', role: 'alert', hidden: true });

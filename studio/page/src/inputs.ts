@@ -82,7 +82,7 @@ export class Inputs {
       h(
         'div',
         { class: 'card-head' },
-        h('h3', {}, name),
+        h('h2', {}, name),
         may
           ? this.actions.button('Send', () => ({ do: 'input.set', name, values: { ...values } }), {
               name: `send ${name}`,
@@ -130,7 +130,7 @@ export class Inputs {
       'button',
       {
         type: 'button',
-        'aria-label': `${component} to zero`,
+        'aria-label': `0: ${component} to zero`,
         onclick: () => {
           slider.value = '0';
           slider.dispatchEvent(new Event('input'));

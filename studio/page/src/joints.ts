@@ -4,7 +4,7 @@ import type { ControlLease } from './control';
 import type { Data } from './data';
 import { attribute, h, say } from './dom';
 import { wordOf } from './enums';
-import { number } from './format';
+import { number, plain, short } from './format';
 import { jointDrive } from './joint_drive';
 import { limbsOf, type TreeJoint } from './limbs';
 import type { Answer, JointInfo } from './protocol';
@@ -109,7 +109,7 @@ export class Joints {
       h(
         'section',
         { class: 'limb', 'aria-label': limb.name },
-        h('h3', {}, limb.name),
+        h('h2', {}, limb.name),
         h(
           'div',
           { class: 'joint-head', 'aria-hidden': 'true' },
@@ -144,19 +144,19 @@ export class Joints {
       },
       'Move',
     );
+    const who = h('p', { class: 'who muted' });
     const free = this.actions.button(
       'Stop its controller',
       () => {
-        const name = row.who.dataset.controller;
+        const name = who.dataset.controller;
         return name ? { do: 'controller.stop', name } : null;
       },
       {
-        name: `stop the controller of ${joint.name}`,
+        name: `stop its controller: ${joint.name}`,
         title: 'Its joints are held, and free to move from here.',
       },
     );
     free.hidden = true;
-    const who = h('p', { class: 'who muted' });
     const row: Row = {
       joint,
       ids,
@@ -184,9 +184,9 @@ export class Joints {
         h(
           'span',
           { class: 'bar-box' },
-          h('span', { class: 'end' }, number(joint.lower)),
+          h('span', { class: 'end' }, plain(joint.lower)),
           h('span', { class: 'bar' }, goal, place),
-          h('span', { class: 'end' }, number(joint.upper)),
+          h('span', { class: 'end' }, plain(joint.upper)),
         ),
         row.position,
         row.torque,
@@ -222,10 +222,10 @@ export class Joints {
     const goal = value('goal');
     this.mark(row.place, row.joint, position);
     this.mark(row.goal, row.joint, goal);
-    say(row.position, `${number(position)} ${unit}`);
+    say(row.position, Number.isFinite(position) ? `${position.toFixed(3)} ${unit}` : '–');
     row.position.title = `position ${number(position)}, reference ${number(goal)} ${unit}`;
-    say(row.torque, `${number(value('torque_Nm'))} ${force}`);
-    say(row.current, `${number(value('current_A'))} A`);
+    say(row.torque, `${short(value('torque_Nm'))} ${force}`);
+    say(row.current, `${short(value('current_A'))} A`);
     const warm = value('temperature_C');
     say(
       row.temperature,

@@ -42,11 +42,7 @@ export function buildModel(
   const plan = planOf(description);
   const names = prepare(doc, plan, measured);
   const robot = new URDFLoader().parse(doc);
-  const plain = new THREE.MeshStandardMaterial({
-    color: 0x9aa7b5,
-    roughness: 0.75,
-    metalness: 0.1,
-  });
+  const plain = new THREE.MeshLambertMaterial({ color: 0x9aa7b5 });
   robot.traverse((one) => {
     if (!(one instanceof THREE.Mesh)) return;
     if (material) one.material = material;

@@ -87,7 +87,7 @@ export class Scene {
 
   themeChanged(): void {
     if (this.grid) this.scene.remove(this.grid);
-    const line = new THREE.Color(theme('--grid'));
+    const line = new THREE.Color(theme('--ground'));
     this.grid = new THREE.GridHelper(10, 40, line, line);
     this.grid.rotation.x = Math.PI / 2;
     this.grid.position.z = this.data.hello?.ground?.height_m ?? 0;
@@ -302,7 +302,7 @@ export class Scene {
     if (!this.controls) return;
     const [x, y, z] = kViews[name];
     const narrow = Math.min(1, this.camera.aspect);
-    const far = (1.25 * this.radius) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
+    const far = (1.02 * this.radius) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
     const away = new THREE.Vector3(x, y, z).setLength(far);
     this.camera.position.copy(this.controls.target).add(away);
     this.controls.update();
