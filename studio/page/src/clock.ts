@@ -72,6 +72,6 @@ export class ClockPanel {
   private allow(): void {
     const may = this.lease.mayChange;
     (this.body as HTMLFieldSetElement).disabled = this.simulated !== true || !may;
-    if (this.simulated !== false) say(this.words, may ? '' : 'Looking only: no token.');
+    if (this.simulated !== false) say(this.words, this.lease.why);
   }
 }

@@ -8,6 +8,7 @@ const kAlive_ms = 200;
 export class ControlLease {
   state: Control = { taken: false, yours: false, by: '' };
   private may = 'look';
+  private linked = false;
   private last = 0;
   private readonly listeners: (() => void)[] = [];
   private readonly button = h('button', {
@@ -26,7 +27,8 @@ export class ControlLease {
         this.set(this.state);
       },
       connection: (state) => {
-        if (state !== 'live') this.may = 'look';
+        this.linked = state === 'live';
+        if (!this.linked) this.may = 'look';
         this.set(this.state);
       },
     });
@@ -38,6 +40,11 @@ export class ControlLease {
   }
   get mayChange(): boolean {
     return this.may === 'all';
+  }
+  /** Why nothing may be changed from here; empty: it may. */
+  get why(): string {
+    if (this.mayChange) return '';
+    return this.linked ? 'Looking only: open the address with its token.' : 'No connection.';
   }
   on(listener: () => void): void {
     this.listeners.push(listener);
@@ -54,7 +61,7 @@ export class ControlLease {
     let words = 'Nobody leads the joints from here.';
     if (control.yours) words = 'You lead the joints. If this page is hidden or lost, they hold.';
     else if (control.taken) words = `${control.by || 'Another page'} has control.`;
-    else if (!this.mayChange) words = 'You may look, and stop: open the address with its token.';
+    else if (!this.mayChange) words = this.why;
     say(this.words, words);
     for (const listener of this.listeners) listener();
   }

@@ -78,13 +78,12 @@ export class Data {
   /** Values at a time: from the newest rows, else from what the run kept. */
   async valuesAt(ids: number[], time: number): Promise<number[]> {
     const near = ids.map((id) => this.history.at(id, time));
-    if (near.length === 0 || near.some(Number.isFinite)) return near;
+    const lacking = ids.filter((id, i) => id >= 0 && !Number.isFinite(near[i]));
+    if (lacking.length === 0) return near;
     const period = this.hello?.period_s ?? 0.001;
-    const window = await this.source.window(ids, Math.max(0, time - 300 * period), time, 300);
-    return window.max.map((row) => {
-      for (let i = row.length - 1; i >= 0; --i) if (Number.isFinite(row[i])) return row[i];
-      return Number.NaN;
-    });
+    const window = await this.source.window(lacking, Math.max(0, time - 300 * period), time, 300);
+    const kept = new Map(lacking.map((id, i) => [id, newestOf(window.max[i])]));
+    return near.map((value, i) => kept.get(ids[i]) ?? value);
   }
 
   private begin(hello: Hello): void {
@@ -140,6 +139,12 @@ export class Data {
     if (this.events.length > kMostEvents) this.events.splice(0, this.events.length - kMostEvents);
     for (const call of this.onEvents) call();
   }
+}
+
+/** The last value of a row of them; NaN: there is none. */
+function newestOf(values: Float32Array): number {
+  for (let i = values.length - 1; i >= 0; --i) if (Number.isFinite(values[i])) return values[i];
+  return Number.NaN;
 }
 
 function same(a: number[], b: number[]): boolean {

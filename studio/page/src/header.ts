@@ -17,6 +17,7 @@ export class Header {
   private readonly phase = h('span', { class: 'chip phase' }, '–');
   private readonly time = h('span', { class: 'clock' }, '–');
   private readonly rate = h('span', { class: 'rate' });
+  private readonly measured = h('span', { class: 'rate measured' });
   private readonly link = h('span', { class: 'chip link' }, 'connecting');
   private readonly lost = h('span', { class: 'frames-lost' });
   private readonly reset: HTMLElement;
@@ -62,6 +63,7 @@ export class Header {
         this.phase,
         this.time,
         this.rate,
+        this.measured,
         this.link,
         this.lost,
         this.reset,
@@ -141,8 +143,8 @@ export class Header {
     } else if (request === 'clock.show' && answer.ok) {
       const rate = Number(answer.rate);
       const factor = answer.realtime_factor;
-      const real = typeof factor === 'number' ? `, measured ×${factor.toFixed(2)}` : '';
-      say(this.rate, `${rate === 0 ? 'free running' : `×${rate}`}${real}`);
+      say(this.rate, rate === 0 ? 'free running' : `×${rate}`);
+      say(this.measured, typeof factor === 'number' ? `measured ×${factor.toFixed(2)}` : '');
     } else if (request === 'fault.show' && answer.ok) {
       this.faults(answer);
     }

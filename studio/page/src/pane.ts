@@ -15,6 +15,8 @@ export interface PaneOwner {
   chosen(pane: Pane): void;
   remove(pane: Pane): void;
   statistics(): boolean;
+  /** Whether a pane has a second axis: all leave room for it, so that times are one below the other. */
+  secondAxis(): boolean;
 }
 
 interface Drawn {
@@ -25,6 +27,8 @@ interface Drawn {
 
 const kHeight = 170;
 const kAsk_ms = 120;
+/** Of an axis with its label. */
+const kAxis_px = 64;
 const kSync = 'tandem-time';
 
 export class Pane implements LegendOwner {
@@ -93,6 +97,12 @@ export class Pane implements LegendOwner {
   /** Ids of the signals that it draws. */
   ids(): number[] {
     return this.series.flatMap((one) => signalsOf(one, this.data.catalog).map((s) => s.id));
+  }
+
+  /** Units of its lines: each has an axis. */
+  units(): Set<string> {
+    const lines = this.series.filter((one) => !this.isLane(one));
+    return new Set(lines.map((one) => unitOf(one, this.data.catalog)));
   }
 
   /** Draws the span of the time model, from the newest rows or from what the run kept. */
@@ -245,7 +255,8 @@ export class Pane implements LegendOwner {
 
   /** A new plot when its lines are others than before. */
   private build(curves: Drawn[]): void {
-    const shape = this.series.map(labelOf).join('|');
+    const second = this.owner.secondAxis();
+    const shape = `${second} ${this.series.map(labelOf).join('|')}`;
     if (shape === this.shape && (this.plot || this.drawn.length === 0)) return;
     const width = this.plotBox.clientWidth;
     if (width === 0) return;
@@ -292,6 +303,7 @@ export class Pane implements LegendOwner {
       {
         width,
         height: this.height(),
+        padding: [8, second && units.length < 2 ? kAxis_px : 12, 0, 0],
         series: lines,
         bands,
         legend: { show: false },

@@ -99,6 +99,9 @@ export class Plots implements PaneOwner {
   statistics(): boolean {
     return this.figures;
   }
+  secondAxis(): boolean {
+    return this.panes.some((pane) => pane.units().size > 1);
+  }
   chosen(pane: Pane): void {
     this.active = pane;
     for (const one of this.panes) one.element.classList.toggle('active', one === pane);
