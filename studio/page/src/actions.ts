@@ -86,7 +86,9 @@ export class Actions {
         'aria-label': options.name,
         onclick: async () => {
           const asked = request();
-          if (asked) options.done?.(await this.run(asked));
+          if (!asked) return;
+          const answer = await this.run(asked);
+          options.done?.(answer);
         },
       },
       label,

@@ -79,7 +79,11 @@ export class Legend {
       );
     });
     this.element.replaceChildren(
-      h('thead', {}, h('tr', {}, ...heads.map((head) => h('th', { scope: 'col' }, head)))),
+      h(
+        'thead',
+        {},
+        h('tr', {}, ...heads.map((head) => (head ? h('th', { scope: 'col' }, head) : h('td')))),
+      ),
       h('tbody', {}, ...rows),
     );
     this.element.hidden = this.owner.series.length === 0;
@@ -99,7 +103,7 @@ export class Legend {
             type: 'button',
             class: 'quiet',
             title: 'add its derivative',
-            'aria-label': `derivative of ${label}`,
+            'aria-label': `d/dt of ${label}`,
             onclick: () => this.owner.add({ kind: 'derivative', name: series.name }),
           },
           'd/dt',

@@ -57,8 +57,13 @@ export class Pane implements LegendOwner {
     this.series = [...series];
     this.legend = new Legend(data, this);
     this.element = h(
-      'section',
-      { class: 'pane', 'aria-label': 'plot', onpointerdown: () => owner.chosen(this) },
+      'div',
+      {
+        class: 'pane',
+        role: 'group',
+        'aria-label': 'plot',
+        onpointerdown: () => owner.chosen(this),
+      },
       h(
         'div',
         { class: 'pane-head' },

@@ -166,7 +166,12 @@ export class Plots implements PaneOwner {
   private button(label: string, act: () => void, name = ''): HTMLElement {
     return h(
       'button',
-      { type: 'button', onclick: act, 'aria-label': name || undefined, title: name || undefined },
+      {
+        type: 'button',
+        onclick: act,
+        'aria-label': /\w/.test(label) ? undefined : name,
+        title: name || undefined,
+      },
       label,
     );
   }

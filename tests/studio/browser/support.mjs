@@ -46,6 +46,7 @@ export async function openPage(browser, address, options = {}) {
   });
   if (options.init) await context.addInitScript(options.init);
   const page = await context.newPage();
+  page.setDefaultTimeout(15000);
   page.complaints = [];
   page.outside = [];
   page.on('console', (message) => {
