@@ -13,6 +13,7 @@ interface Parameter {
   unit: string;
   min: number | number[] | null;
   max: number | number[] | null;
+  above_min: boolean;
   choices: string[];
   value: unknown;
   live: boolean;
@@ -58,9 +59,12 @@ function shown(value: unknown): string {
 }
 
 function range(parameter: Parameter): string {
-  const end = (of: number | number[] | null) => plain(Array.isArray(of) ? of[0] : of);
-  if (parameter.min === null && parameter.max === null) return '';
-  return `${end(parameter.min)} … ${end(parameter.max)}`;
+  const { min, max } = parameter;
+  const end = (of: number | number[]) => plain(Array.isArray(of) ? of[0] : of);
+  if (min === null) return max === null ? '' : `≤ ${end(max)}`;
+  const above = parameter.above_min ? '> ' : '≥ ';
+  if (max === null || end(max) === '–') return end(min) === '–' ? '' : `${above}${end(min)}`;
+  return `${parameter.above_min ? '> ' : ''}${end(min)} … ${end(max)}`;
 }
 
 export class Controllers {

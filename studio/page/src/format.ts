@@ -20,6 +20,11 @@ export function short(value: number): string {
   return value.toFixed(size >= 100 ? 0 : size >= 10 ? 1 : 2);
 }
 
+/** At an axis: short, however large. */
+export function tick(value: number): string {
+  return Math.abs(value) >= 1e5 ? value.toExponential(1) : String(Number(value.toPrecision(6)));
+}
+
 /** As a person writes it: "100", "0.1". */
 export function plain(value: number | null | undefined): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return '–';

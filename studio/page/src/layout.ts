@@ -75,7 +75,9 @@ export const kPresets: Record<string, (hello: Hello, catalog: Catalog) => Layout
     const joints = someJoints(hello, 3);
     const of = (fields: string[], names: string[]) =>
       names.flatMap((joint) => fields.map((field) => signal(`${field}.${joint}`)));
-    const controllers = catalog.signals.filter((one) => one.source.startsWith('controller/'));
+    const controllers = catalog.signals.filter(
+      (one) => one.source.startsWith('controller/') && !/^(cycle|time_ns)$/.test(one.field),
+    );
     return existing(catalog, [
       of(['state.position_rad', 'command.position_rad'], joints.slice(0, 2)),
       of(['state.torque_Nm'], joints),
@@ -98,7 +100,10 @@ export const kPresets: Record<string, (hello: Hello, catalog: Catalog) => Layout
 function existing(catalog: Catalog, panes: Series[][]): Layout {
   const kept = panes
     .map((series) => ({
-      series: series.filter((one) => catalog.named(one.name)).slice(0, kMostSeries),
+      series: series
+        .flatMap((one) => catalog.named(one.name) ?? [])
+        .map((found) => signal(found.name))
+        .slice(0, kMostSeries),
     }))
     .filter((pane) => pane.series.length > 0);
   return { version: 1, width_s: 10, panes: kept.length > 0 ? kept : [{ series: [] }] };

@@ -56,7 +56,8 @@ export class LiveSource implements Source {
   }
 
   async description(): Promise<string> {
-    const answer = await fetch('/robot.urdf');
+    const headers = this.token ? { Authorization: `Bearer ${this.token}` } : undefined;
+    const answer = await fetch('/robot.urdf', { headers });
     if (!answer.ok) throw new Error(`/robot.urdf: ${answer.status} ${await answer.text()}`);
     return answer.text();
   }

@@ -3,7 +3,7 @@ import uPlot from 'uplot';
 import type { Data } from './data';
 import { h, theme } from './dom';
 import { wordOf } from './enums';
-import { number } from './format';
+import { number, tick } from './format';
 import { Lanes } from './lanes';
 import { kPaletteSize, Legend, type LegendOwner } from './legend';
 import { eventMarks } from './marks';
@@ -274,7 +274,7 @@ export class Pane implements LegendOwner {
       scale,
       side,
       label: label || undefined,
-      labelSize: label ? 16 : 0,
+      labelSize: 16,
       labelGap: 0,
       size: 48,
       labelFont: '11px system-ui',
@@ -316,10 +316,14 @@ export class Pane implements LegendOwner {
         axes: [
           {
             ...axis('x', 2, ''),
+            labelSize: 0,
             size: 22,
             values: (_, ticks) => ticks.map((one) => `${Number(one.toFixed(6))} s`),
           },
-          ...units.slice(0, 2).map((unit, i) => axis(`y ${unit}`, i === 0 ? 3 : 1, unit)),
+          ...units.slice(0, 2).map((unit, i) => ({
+            ...axis(`y ${unit}`, i === 0 ? 3 : 1, unit),
+            values: (_: uPlot, ticks: number[]) => ticks.map(tick),
+          })),
         ],
         cursor: {
           y: false,

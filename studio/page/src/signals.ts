@@ -41,6 +41,7 @@ export class Catalog {
   readonly revision: number;
   readonly signals: Signal[] = [];
   private readonly byName = new Map<string, Signal>();
+  private readonly byLower = new Map<string, Signal>();
   private readonly byId = new Map<number, Signal>();
   private readonly entries: Entry[] = [];
 
@@ -54,16 +55,19 @@ export class Catalog {
     }
   }
 
-  /** The signal of a full name. */
+  /** The signal of a full name, in capital or small letters: a log has torque_Nm, ROS torque_nm. */
   named(name: string): Signal | undefined {
-    return this.byName.get(name);
+    return this.byName.get(name) ?? this.byLower.get(name.toLowerCase());
   }
   withId(id: number): Signal | undefined {
     return this.byId.get(id);
   }
   /** Ids of a field's numbers in their order; empty when there is no such field. */
   idsOf(source: string, field: string): number[] {
-    return this.signals.filter((s) => s.source === source && s.field === field).map((s) => s.id);
+    const wanted = field.toLowerCase();
+    return this.signals
+      .filter((one) => one.source === source && one.field.toLowerCase() === wanted)
+      .map((one) => one.id);
   }
 
   /**
@@ -108,6 +112,7 @@ export class Catalog {
     };
     this.signals.push(signal);
     this.byName.set(name, signal);
+    if (!this.byLower.has(name.toLowerCase())) this.byLower.set(name.toLowerCase(), signal);
     this.byId.set(id, signal);
     this.entries.push({
       signal,

@@ -59,6 +59,11 @@ test('words of names', () => {
   assert.deepEqual(wordsOf('l_shoulder_pitch'), ['l', 'shoulder', 'pitch']);
 });
 
+test('a name is found in capital and in small letters', () => {
+  assert.equal(catalog.named('state.torque_nm.lkneesag')?.name, 'state.torque_Nm.LKneeSag');
+  assert.deepEqual(catalog.idsOf('state', 'torque_nm'), [4, 5, 6]);
+});
+
 test('modes and states are lanes, numbers are not', () => {
   assert.equal(catalog.named('state.mode.LElbj')?.lane, true);
   assert.equal(catalog.named('state.position_rad.LElbj')?.lane, false);
