@@ -50,7 +50,8 @@ describe('the studio page', { skip: why || false }, () => {
     if (kShots) await page.screenshot({ path: join(kShots, `${name}.png`) });
   };
   const asked = (mock, name) => mock.robot.requests.filter((one) => one.do === name);
-  const until = (page, text) => page.waitForFunction((words) => document.body.innerText.includes(words), text);
+  const until = (page, text) =>
+    page.waitForFunction((words) => document.body.innerText.includes(words), text);
 
   test('shows the run, and a robot that is not blank', async () => {
     const mock = await play();
@@ -72,7 +73,8 @@ describe('the studio page', { skip: why || false }, () => {
       context.drawImage(image, 0, 0);
       const pixels = context.getImageData(0, 0, image.width, image.height).data;
       const found = new Set();
-      for (let i = 0; i < pixels.length; i += 4) found.add((pixels[i] << 16) | (pixels[i + 1] << 8) | pixels[i + 2]);
+      for (let i = 0; i < pixels.length; i += 4)
+        found.add((pixels[i] << 16) | (pixels[i + 1] << 8) | pixels[i + 2]);
       return found.size;
     }, png);
     assert.ok(colours > 12, `${colours} colours`);
@@ -87,7 +89,10 @@ describe('the studio page', { skip: why || false }, () => {
     const j = mock.robot.joints.findIndex((joint) => joint.name === 'LKneeSag');
     const expected = mock.robot.position(j, mock.robot.time);
     await page.waitForFunction(
-      (value) => Math.abs(Number(document.querySelector('.scene').getAttribute('data-joint-LKneeSag')) - value) < 1e-6,
+      (value) =>
+        Math.abs(
+          Number(document.querySelector('.scene').getAttribute('data-joint-LKneeSag')) - value,
+        ) < 1e-6,
       Math.fround(expected),
     );
     await leave(page);
@@ -110,7 +115,10 @@ describe('the studio page', { skip: why || false }, () => {
     assert.equal(mock.robot.paused, false);
     await page.waitForSelector('.pane[data-rows]');
     await page.click('.live');
-    await page.waitForFunction((from) => Number(document.querySelector('.plots').dataset.to) > Number(from), stands);
+    await page.waitForFunction(
+      (from) => Number(document.querySelector('.plots').dataset.to) > Number(from),
+      stands,
+    );
     await leave(page);
   });
 
@@ -130,11 +138,16 @@ describe('the studio page', { skip: why || false }, () => {
     await page.mouse.click(box.x + 150, box.y + 40);
     await page.waitForSelector('.scene-when:not([hidden])');
     assert.match(await page.textContent('.scene-when'), /at the selected time/);
-    const { selected } = await page.evaluate(() => ({ ...document.querySelector('.plots').dataset }));
+    const { selected } = await page.evaluate(() => ({
+      ...document.querySelector('.plots').dataset,
+    }));
     const j = mock.robot.joints.findIndex((joint) => joint.name === 'LKneeSag');
     const expected = mock.robot.position(j, Number(selected));
     await page.waitForFunction(
-      (value) => Math.abs(Number(document.querySelector('.scene').getAttribute('data-joint-LKneeSag')) - value) < 0.01,
+      (value) =>
+        Math.abs(
+          Number(document.querySelector('.scene').getAttribute('data-joint-LKneeSag')) - value,
+        ) < 0.01,
       expected,
     );
     await page.click('text=Back to now');
@@ -166,11 +179,17 @@ describe('the studio page', { skip: why || false }, () => {
     const before = mock.robot.cycle;
     await page.fill('.clock-body input', '25');
     await page.locator('.clock-body button:text-is("Step")').click();
-    await page.waitForFunction((cycle) => Number(document.body.dataset.cycle) === cycle, before + 25);
+    await page.waitForFunction(
+      (cycle) => Number(document.body.dataset.cycle) === cycle,
+      before + 25,
+    );
     await page.selectOption('.clock-body select', '0.5');
     await page.locator('.clock-body button:text-is("Set rate")').click();
     await until(page, 'tandem clock rate 0.5');
-    assert.deepEqual(asked(mock, 'clock.rate').map((one) => one.rate), [0.5]);
+    assert.deepEqual(
+      asked(mock, 'clock.rate').map((one) => one.rate),
+      [0.5],
+    );
     await leave(page);
   });
 
@@ -209,8 +228,13 @@ describe('the studio page', { skip: why || false }, () => {
     await page.click('button[aria-label="set kp of squat"]');
     await until(page, 'tandem controller set squat kp=55');
     await page.click('button[aria-label="undo kp of squat"]');
-    await page.waitForFunction(() => document.querySelector('[aria-label="kp of squat"]').value === '40');
-    assert.deepEqual(asked(mock, 'controller.set').map((one) => one.parameters.kp), [55, 40]);
+    await page.waitForFunction(
+      () => document.querySelector('[aria-label="kp of squat"]').value === '40',
+    );
+    assert.deepEqual(
+      asked(mock, 'controller.set').map((one) => one.parameters.kp),
+      [55, 40],
+    );
     await field.fill('101');
     await page.click('button[aria-label="set kp of squat"]');
     await until(page, 'it is from 0 to 100 Nm/rad');
@@ -242,7 +266,10 @@ describe('the studio page', { skip: why || false }, () => {
     await row.locator('input[aria-label^="goal of LElbj"]').first().fill('-30deg');
     await row.locator('button:text-is("Go")').click();
     await page.waitForFunction(
-      () => Math.abs(Number(document.querySelector('.scene').getAttribute('data-joint-LElbj')) + 0.523599) < 1e-5,
+      () =>
+        Math.abs(
+          Number(document.querySelector('.scene').getAttribute('data-joint-LElbj')) + 0.523599,
+        ) < 1e-5,
     );
     await until(page, 'tandem joint move LElbj --to=-0.523599');
     await row.locator('button:text-is("hold ▶")').hover();
@@ -298,7 +325,10 @@ describe('the studio page', { skip: why || false }, () => {
     await page.waitForSelector('.plots[data-panes="2"]');
     await page.reload();
     await page.waitForSelector('.plots[data-panes="2"]');
-    const [download] = await Promise.all([page.waitForEvent('download'), page.click('text=Save layout')]);
+    const [download] = await Promise.all([
+      page.waitForEvent('download'),
+      page.click('text=Save layout'),
+    ]);
     const layout = JSON.parse(readFileSync(await download.path(), 'utf8'));
     assert.equal(layout.panes.length, 2);
     layout.panes.push({ series: [{ kind: 'signal', name: 'state.nothing' }] });
@@ -316,7 +346,10 @@ describe('the studio page', { skip: why || false }, () => {
   test('a closed loop moves its joints without motors', async () => {
     const mock = await play({ robot: 'four_bar', passive: ['coupler', 'rocker'] });
     const page = await visit(mock.address);
-    await page.waitForFunction(() => Math.abs(Number(document.querySelector('.scene').getAttribute('data-joint-rocker'))) > 0.01);
+    await page.waitForFunction(
+      () =>
+        Math.abs(Number(document.querySelector('.scene').getAttribute('data-joint-rocker'))) > 0.01,
+    );
     await shot(page, 'studio-four-bar');
     await leave(page);
   });
@@ -332,7 +365,9 @@ describe('the studio page', { skip: why || false }, () => {
     const page = await visit(mock.address, { init });
     await until(page, 'This browser has no WebGL');
     await page.waitForSelector('.pane .uplot');
-    await page.waitForFunction(() => document.querySelector('.scene').hasAttribute('data-joint-LKneeSag'));
+    await page.waitForFunction(() =>
+      document.querySelector('.scene').hasAttribute('data-joint-LKneeSag'),
+    );
     page.complaints = page.complaints.filter((text) => !text.includes('WebGL'));
     await leave(page);
   });
@@ -350,7 +385,10 @@ describe('the studio page', { skip: why || false }, () => {
         if (tab === 'joints') await page.locator('.opener').first().click();
         await page.waitForTimeout(400);
         assert.deepEqual(await violations(page), [], tab);
-        const [wide, window] = await page.evaluate(() => [document.documentElement.scrollWidth, innerWidth]);
+        const [wide, window] = await page.evaluate(() => [
+          document.documentElement.scrollWidth,
+          innerWidth,
+        ]);
         assert.ok(wide <= window, `${tab}: ${wide} of ${window} pixels`);
         await shot(page, `studio-${name}-${tab}`);
       }

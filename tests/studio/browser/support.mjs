@@ -23,8 +23,7 @@ export function lacking() {
   return '';
 }
 
-export async function openBrowser() {
-  const { chromium } = require('playwright-core');
+function launchOptions() {
   // WebGL by software; lines of plots on the processor, which is faster there.
   const args = [
     '--use-angle=swiftshader',
@@ -33,7 +32,19 @@ export async function openBrowser() {
     '--disable-gpu-rasterization',
   ];
   if (process.getuid?.() === 0) args.push('--no-sandbox');
-  return chromium.launch({ executablePath: kBrowsers.find(existsSync), args });
+  return { executablePath: kBrowsers.find(existsSync), args };
+}
+
+export async function openBrowser() {
+  return require('playwright-core').chromium.launch(launchOptions());
+}
+
+/** A browser that can be killed, as by a power cut: kill(). */
+export async function openMortalBrowser() {
+  const { chromium } = require('playwright-core');
+  const server = await chromium.launchServer(launchOptions());
+  const browser = await chromium.connect(server.wsEndpoint());
+  return { browser, kill: () => server.kill() };
 }
 
 /** A page that keeps what the console and the network complained about. */
@@ -58,7 +69,8 @@ export async function openPage(browser, address, options = {}) {
   page.on('pageerror', (error) => page.complaints.push(String(error)));
   page.on('request', (request) => {
     const { host, protocol } = new URL(request.url());
-    if (/^https?:$/.test(protocol) && host !== new URL(address).host) page.outside.push(request.url());
+    if (/^https?:$/.test(protocol) && host !== new URL(address).host)
+      page.outside.push(request.url());
   });
   await page.goto(address);
   return page;
@@ -71,7 +83,8 @@ export async function violations(page) {
   return page.evaluate(async () => {
     const found = await window.axe.run(document);
     return found.violations.map(
-      (one) => `${one.id}: ${one.nodes.map((node) => `${node.target} ${node.failureSummary}`).join(' | ')}`,
+      (one) =>
+        `${one.id}: ${one.nodes.map((node) => `${node.target} ${node.failureSummary}`).join(' | ')}`,
     );
   });
 }
