@@ -1,0 +1,116 @@
+// Buttons that ask the run for something, and the line that says what became of it.
+import { commandLine } from './command';
+import { h, say } from './dom';
+import type { Answer, Request } from './protocol';
+import type { Source } from './source';
+
+export interface ButtonOptions {
+  class?: string;
+  /** What a screen reader says where the label is a sign. */
+  name?: string;
+  title?: string;
+  /** Without the button that copies the command line. */
+  bare?: boolean;
+  done?(answer: Answer): void;
+}
+
+export async function copyText(text: string): Promise<boolean> {
+  try {
+    await navigator.clipboard.writeText(text);
+    return true;
+  } catch {
+    return false;
+  }
+}
+
+export class Actions {
+  private readonly words = h('span', { class: 'said', role: 'status', 'aria-live': 'polite' });
+  private readonly line = h('code', { class: 'command', tabindex: '0' });
+  private readonly copier = h(
+    'button',
+    { type: 'button', class: 'copy', onclick: () => void this.copy(this.line.textContent ?? '') },
+    'copy',
+  );
+  readonly bar = h(
+    'footer',
+    { class: 'said-bar', 'aria-label': 'last action' },
+    this.line,
+    this.copier,
+    this.words,
+  );
+
+  constructor(readonly source: Source) {
+    this.line.hidden = true;
+    this.copier.hidden = true;
+    say(this.words, 'Every action has a command: point at a button, or copy it here.');
+  }
+
+  /** Shows a command and words about it. */
+  tell(command: string, words: string, bad = false): void {
+    this.line.hidden = command === '';
+    this.copier.hidden = command === '';
+    say(this.line, command);
+    say(this.words, words);
+    this.bar.classList.toggle('bad', bad);
+  }
+
+  async run(request: Request): Promise<Answer> {
+    const command = commandLine(request);
+    this.tell(command, '…');
+    const answer = await this.source.ask(request);
+    if (answer.ok) {
+      const note = typeof answer.note === 'string' ? `: ${answer.note}` : '';
+      this.tell(command, answer.done === false ? `not yet${note}` : `done${note}`);
+    } else {
+      const hint = answer.hint ? ` – ${answer.hint}` : '';
+      this.tell(command, `${answer.error ?? 'refused'}${hint}`, true);
+    }
+    return answer;
+  }
+
+  async copy(command: string): Promise<void> {
+    const copied = await copyText(command);
+    this.tell(
+      command,
+      copied ? 'copied' : 'the browser does not let the page copy: select the text',
+    );
+  }
+
+  /** A button with the command that does the same as its title, and a small one that copies it. */
+  button(label: string, request: () => Request | null, options: ButtonOptions = {}): HTMLElement {
+    const button = h(
+      'button',
+      {
+        type: 'button',
+        class: options.class,
+        'aria-label': options.name,
+        onclick: async () => {
+          const asked = request();
+          if (!asked) return;
+          const answer = await this.run(asked);
+          options.done?.(answer);
+        },
+      },
+      label,
+    );
+    const describe = () => {
+      const asked = request();
+      button.title = [options.title, asked && commandLine(asked)].filter(Boolean).join('\n');
+    };
+    button.addEventListener('pointerenter', describe);
+    button.addEventListener('focus', describe);
+    describe();
+    if (options.bare) return button;
+    const copier = h('button', {
+      type: 'button',
+      class: 'copy',
+      title: 'copy the command',
+      'aria-label': `copy the command of ${options.name ?? label}`,
+      onclick: () => {
+        const asked = request();
+        if (asked) void this.copy(commandLine(asked));
+      },
+    });
+    return h('span', { class: 'action' }, button, copier);
+  }
+}

@@ -1,0 +1,89 @@
+// The command line that does the same as a request.
+import type { Request } from './protocol';
+
+/** A word as a shell takes it. */
+export function shellWord(word: string): string {
+  return /^[A-Za-z0-9_@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
+}
+
+function value(of: unknown): string {
+  if (Array.isArray(of)) return `[${of.map(value).join(',')}]`;
+  return String(of);
+}
+
+function assignments(object: unknown): string[] {
+  return Object.entries((object ?? {}) as Record<string, unknown>).map(([name, of]) =>
+    shellWord(`${name}=${value(of)}`),
+  );
+}
+
+function options(request: Request, names: Record<string, string>): string[] {
+  return Object.entries(names)
+    .filter(([key]) => request[key] !== undefined)
+    .map(([key, flag]) => shellWord(`${flag}=${value(request[key])}`));
+}
+
+function list(flag: string, names: unknown): string[] {
+  return Array.isArray(names) && names.length > 0
+    ? [flag, ...names.map((name) => shellWord(String(name)))]
+    : [];
+}
+
+export function commandLine(request: Request): string {
+  const words = ['tandem', ...request.do.split('.')];
+  const joint = shellWord(String(request.joint ?? ''));
+  const name = shellWord(String(request.name ?? ''));
+  switch (request.do) {
+    case 'estop':
+      return [...words, ...options(request, { category: '--category' })].join(' ');
+    case 'clock.pause':
+    case 'clock.resume':
+    case 'fault.reset':
+    case 'joint.halt':
+      return words.join(' ');
+    case 'clock.step':
+      return [...words, value(request.cycles ?? 1)].join(' ');
+    case 'clock.rate':
+      return [...words, value(request.rate)].join(' ');
+    case 'controller.start':
+    case 'controller.stop':
+    case 'controller.unload':
+      return request.name === undefined ? words.join(' ') : [...words, name].join(' ');
+    case 'controller.switch':
+      return [...words, ...list('--stop', request.stop), ...list('--start', request.start)].join(
+        ' ',
+      );
+    case 'controller.set':
+      return [...words, name, ...assignments(request.parameters)].join(' ');
+    case 'input.set':
+      if (request.values) return ['tandem input', name, ...assignments(request.values)].join(' ');
+      break;
+    case 'joint.stop':
+    case 'joint.home':
+    case 'joint.recover':
+    case 'joint.reset':
+      return [...words, joint].join(' ');
+    case 'joint.move':
+      return [
+        ...words,
+        joint,
+        ...options(request, {
+          target_rad: '--to',
+          speed_rad_s: '--speed',
+          acceleration_rad_s2: '--acceleration',
+        }),
+      ].join(' ');
+    case 'joint.set':
+      return [
+        ...words,
+        joint,
+        ...options(request, {
+          mode: '--mode',
+          interaction: '--interaction',
+          stiffness_Nm_rad: '--stiffness',
+          damping_Nms_rad: '--damping',
+        }),
+      ].join(' ');
+  }
+  return `tandem ask ${shellWord(JSON.stringify(request))}`;
+}

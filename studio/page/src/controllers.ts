@@ -1,0 +1,286 @@
+// The list of controllers, and the parameters of each: unit, range, set and undo.
+import type { Actions } from './actions';
+import type { ControlLease } from './control';
+import type { Data } from './data';
+import { attribute, h, say } from './dom';
+import { micros, plain } from './format';
+import type { Answer } from './protocol';
+
+interface Parameter {
+  name: string;
+  type: string;
+  elements: string[];
+  unit: string;
+  min: number | number[] | null;
+  max: number | number[] | null;
+  above_min: boolean;
+  choices: string[];
+  value: unknown;
+  live: boolean;
+  doc: string;
+}
+interface Controller {
+  name: string;
+  active: boolean;
+  finished: boolean;
+  call_ns: { p50: number; p99: number; p999: number; max: number } | null;
+  overruns: number;
+  claims: { joint: string }[];
+  parameters?: Parameter[];
+}
+
+interface Row {
+  element: HTMLElement;
+  state: HTMLElement;
+  cost: HTMLElement;
+}
+
+/** A value of the parameter's type of what was typed. Undefined: it is none. */
+export function parsed(parameter: Pick<Parameter, 'type'>, text: string): unknown {
+  if (parameter.type === 'boolean') return text === 'true';
+  if (parameter.type === 'choice') return text;
+  const one = (part: string) => (part.trim() === '' ? Number.NaN : Number(part));
+  if (parameter.type === 'numbers') {
+    const list = text
+      .replace(/[[\]]/g, '')
+      .split(/[\s,]+/)
+      .filter(Boolean)
+      .map(one);
+    if (list.length === 0 || !list.every(Number.isFinite)) return undefined;
+    return list.length === 1 ? list[0] : list;
+  }
+  const value = one(text);
+  if (!Number.isFinite(value)) return undefined;
+  return parameter.type === 'integer' && !Number.isInteger(value) ? undefined : value;
+}
+
+function shown(value: unknown): string {
+  return Array.isArray(value) ? value.join(', ') : String(value ?? '');
+}
+
+function range(parameter: Parameter): string {
+  const { min, max } = parameter;
+  const end = (of: number | number[]) => plain(Array.isArray(of) ? of[0] : of);
+  if (min === null) return max === null ? '' : `≤ ${end(max)}`;
+  const above = parameter.above_min ? '> ' : '≥ ';
+  if (max === null || end(max) === '–') return end(min) === '–' ? '' : `${above}${end(min)}`;
+  return `${parameter.above_min ? '> ' : ''}${end(min)} … ${end(max)}`;
+}
+
+export class Controllers {
+  private readonly rows = new Map<string, Row>();
+  private readonly body = h('div', { class: 'cards' });
+  private readonly stop = h('select', { 'aria-label': 'controller to stop' });
+  private readonly start = h('select', { 'aria-label': 'controller to start' });
+  private names = '';
+  readonly element: HTMLElement;
+
+  constructor(
+    private readonly data: Data,
+    private readonly actions: Actions,
+    lease: ControlLease,
+  ) {
+    const both = h(
+      'fieldset',
+      { class: 'toolbar' },
+      h('legend', {}, 'Switch in one cycle'),
+      h('label', {}, 'stop ', this.stop),
+      h('label', {}, 'start ', this.start),
+      actions.button('Switch', () => {
+        const list = (choice: HTMLSelectElement) => (choice.value ? [choice.value] : []);
+        return { do: 'controller.switch', stop: list(this.stop), start: list(this.start) };
+      }),
+    );
+    this.element = h('div', { class: 'controllers' }, both, this.body);
+    data.source.on({ watched: (request, answer) => this.watched(request, answer) });
+    lease.on(() => {
+      both.disabled = !lease.mayChange;
+    });
+  }
+
+  private watched(request: string, answer: Answer): void {
+    if (request !== 'controller.list' || !answer.ok) return;
+    const list = answer.controllers as Controller[];
+    const names = list.map((one) => one.name).join('\n');
+    if (names !== this.names) {
+      this.names = names;
+      this.rows.clear();
+      this.body.replaceChildren(...list.map((one) => this.card(one)));
+      for (const choice of [this.stop, this.start]) {
+        choice.replaceChildren(
+          h('option', { value: '' }, 'none'),
+          ...list.map((one) => h('option', { value: one.name }, one.name)),
+        );
+      }
+      void this.parameters();
+    }
+    for (const one of list) {
+      const row = this.rows.get(one.name);
+      if (!row) continue;
+      const finished = one.finished ? ', its task is done' : '';
+      say(row.state, one.active ? `▶ active${finished}` : '■ inactive');
+      attribute(row.element, 'data-active', String(one.active));
+      const cost = one.call_ns;
+      const joints = one.claims.length === 1 ? '1 joint' : `${one.claims.length} joints`;
+      say(
+        row.cost,
+        cost
+          ? `${joints}; a cycle takes ${micros(cost.p50)}, p99 ${micros(cost.p99)}, most ${micros(cost.max)}; late ${one.overruns} times`
+          : joints,
+      );
+    }
+    if (list.length === 0) say(this.body, 'No controller is loaded: tandem controller load NAME.');
+  }
+
+  private card(one: Controller): HTMLElement {
+    const state = h('span', { class: 'chip' });
+    const cost = h('p', { class: 'muted' });
+    const parameters = h('div', { class: 'parameters' });
+    const element = h(
+      'section',
+      { class: 'card', 'aria-label': `controller ${one.name}` },
+      h(
+        'div',
+        { class: 'card-head' },
+        h('h2', {}, one.name),
+        state,
+        this.actions.button('Start', () => ({ do: 'controller.start', name: one.name }), {
+          name: `start ${one.name}`,
+        }),
+        this.actions.button('Stop', () => ({ do: 'controller.stop', name: one.name }), {
+          name: `stop ${one.name}`,
+          title: 'Its joints are held.',
+        }),
+      ),
+      cost,
+      parameters,
+    );
+    this.rows.set(one.name, { element, state, cost });
+    return element;
+  }
+
+  private async parameters(): Promise<void> {
+    const answer = await this.data.source.ask({ do: 'controller.show' });
+    if (!answer.ok) return;
+    for (const one of answer.controllers as Controller[]) {
+      const box = this.rows.get(one.name)?.element.querySelector('.parameters');
+      const list = one.parameters ?? [];
+      if (!box || list.length === 0) continue;
+      box.replaceChildren(
+        h(
+          'div',
+          {
+            class: 'table-box',
+            tabindex: '0',
+            role: 'region',
+            'aria-label': `parameters of ${one.name}`,
+          },
+          h(
+            'table',
+            { class: 'parameter-table' },
+            h(
+              'thead',
+              {},
+              h(
+                'tr',
+                {},
+                ...['parameter', 'value', 'unit', 'range', 'change'].map((head) =>
+                  h('th', { scope: 'col' }, head),
+                ),
+              ),
+            ),
+            h('tbody', {}, ...list.map((parameter) => this.parameter(one.name, parameter))),
+          ),
+        ),
+      );
+    }
+  }
+
+  private parameter(controller: string, parameter: Parameter): HTMLElement {
+    const first = shown(parameter.value);
+    const history: string[] = [];
+    let inForce = first;
+    const words = `${parameter.name} of ${controller}`;
+    const field = this.field(parameter, first, words);
+    const request = (text: string) => {
+      const value = parsed(parameter, text);
+      if (value === undefined) return null;
+      return { do: 'controller.set', name: controller, parameters: { [parameter.name]: value } };
+    };
+    const undo = this.actions.button('Undo', () => request(history.at(-1) ?? inForce), {
+      name: `undo ${words}`,
+      bare: true,
+      done: (answer) => {
+        if (!answer.ok) return;
+        inForce = history.pop() ?? inForce;
+        settle();
+      },
+    }) as HTMLButtonElement;
+    const settle = () => {
+      field.value = inForce;
+      undo.disabled = history.length === 0;
+      field.classList.remove('changed');
+    };
+    const set = this.actions.button(
+      'Set',
+      () => {
+        const asked = request(field.value);
+        if (!asked)
+          this.actions.tell('', `${words}: '${field.value}' is no ${parameter.type}`, true);
+        return asked;
+      },
+      {
+        name: `set ${words}`,
+        done: (answer) => {
+          if (!answer.ok) return;
+          history.push(inForce);
+          inForce = field.value;
+          settle();
+        },
+      },
+    );
+    field.addEventListener('input', () =>
+      field.classList.toggle('changed', field.value !== inForce),
+    );
+    field.addEventListener('keydown', (event) => {
+      if ((event as KeyboardEvent).key === 'Enter') set.querySelector('button')?.click();
+    });
+    settle();
+    return h(
+      'tr',
+      {},
+      h(
+        'th',
+        { scope: 'row', title: parameter.doc },
+        parameter.name,
+        h('span', { class: 'doc' }, parameter.doc),
+      ),
+      h('td', {}, parameter.live ? field : h('span', { class: 'figure' }, first)),
+      h('td', {}, parameter.unit),
+      h('td', {}, range(parameter)),
+      h(
+        'td',
+        {},
+        ...(parameter.live ? [set, undo] : [h('span', { class: 'muted' }, 'fixed while loaded')]),
+      ),
+    );
+  }
+
+  private field(
+    parameter: Parameter,
+    value: string,
+    name: string,
+  ): HTMLInputElement | HTMLSelectElement {
+    const choices = parameter.type === 'boolean' ? ['true', 'false'] : parameter.choices;
+    if (choices.length > 0) {
+      const choice = h(
+        'select',
+        { 'aria-label': name },
+        ...choices.map((one) => h('option', { value: one }, one)),
+      );
+      choice.value = value;
+      return choice;
+    }
+    return h('input', { type: 'text', inputmode: 'decimal', 'aria-label': name, value });
+  }
+}

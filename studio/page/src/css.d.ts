@@ -1,0 +1,2 @@
+// Style sheets, which the bundler gathers in studio.css.
+declare module '*.css';

@@ -1,0 +1,304 @@
+// All joints on one page, by limb: what each does, and, with control, a safe hand on it.
+import type { Actions } from './actions';
+import type { ControlLease } from './control';
+import type { Data } from './data';
+import { attribute, h, say } from './dom';
+import { wordOf } from './enums';
+import { number, plain, short } from './format';
+import { jointDrive } from './joint_drive';
+import { limbsOf, type TreeJoint } from './limbs';
+import type { Answer, JointInfo } from './protocol';
+
+const kFields = [
+  'position_rad',
+  'torque_Nm',
+  'current_A',
+  'temperature_C',
+  'mode',
+  'drive_state',
+  'age_cycles',
+  'fault',
+];
+/** A sample that is older [cycles] is lost: docs/json.md, `feedback`. */
+const kLost_cycles = 10;
+const kWarm_C = 80;
+
+interface Row {
+  joint: JointInfo;
+  element: HTMLElement;
+  ids: Record<string, number>;
+  mode: HTMLElement;
+  place: HTMLElement;
+  goal: HTMLElement;
+  position: HTMLElement;
+  torque: HTMLElement;
+  current: HTMLElement;
+  temperature: HTMLElement;
+  age: HTMLElement;
+  who: HTMLElement;
+  free: HTMLElement;
+  opener: HTMLButtonElement;
+  panel: HTMLElement;
+}
+
+export class Joints {
+  private rows: Row[] = [];
+  private tree: TreeJoint[] = [];
+  private readonly body = h('div', { class: 'limbs' });
+  private readonly filter = h('input', {
+    type: 'search',
+    class: 'search',
+    placeholder: 'Filter joints: knee',
+    'aria-label': 'filter joints',
+    oninput: () => this.applyFilter(),
+  });
+  readonly element: HTMLElement;
+
+  constructor(
+    private readonly data: Data,
+    private readonly actions: Actions,
+    private readonly lease: ControlLease,
+  ) {
+    this.element = h(
+      'div',
+      { class: 'joints' },
+      h(
+        'div',
+        { class: 'toolbar' },
+        lease.element,
+        actions.button('Halt all', () => ({ do: 'joint.halt' }), {
+          title: 'Every joint that is led from here brakes.',
+        }),
+        this.filter,
+      ),
+      h(
+        'p',
+        { class: 'key muted' },
+        h('span', { class: 'key-place' }),
+        ' position  ',
+        h('span', { class: 'key-goal' }),
+        ' reference; the bar ends at the limits.',
+      ),
+      this.body,
+    );
+    data.whenCatalog(() => this.build());
+    data.source.on({ watched: (request, answer) => this.watched(request, answer) });
+    lease.on(() => this.allow());
+  }
+
+  setTree(tree: TreeJoint[]): void {
+    this.tree = tree;
+    this.build();
+  }
+
+  /** At each frame that has new values, while the panel is seen. */
+  update(): void {
+    for (const row of this.rows) this.show(row);
+  }
+
+  /** What it needs; nothing while it is not seen. */
+  want(seen: boolean): void {
+    const ids = this.rows.flatMap((row) => Object.values(row.ids)).filter((id) => id >= 0);
+    this.data.want('joints', seen ? ids : []);
+  }
+
+  private build(): void {
+    const joints = new Map((this.data.hello?.joints ?? []).map((joint) => [joint.name, joint]));
+    this.rows = [];
+    const limbs = limbsOf([...joints.keys()], this.tree).map((limb) =>
+      h(
+        'section',
+        { class: 'limb', 'aria-label': limb.name },
+        h('h2', {}, limb.name),
+        h(
+          'div',
+          { class: 'joint-head', 'aria-hidden': 'true' },
+          ...['joint', 'mode', 'position', '', 'torque', 'current', 'winding', 'sample', ''].map(
+            (head) => h('span', {}, head),
+          ),
+        ),
+        ...limb.joints.map((name) => this.row(joints.get(name) as JointInfo)),
+      ),
+    );
+    this.body.replaceChildren(...limbs);
+    this.applyFilter();
+    this.allow();
+    if (this.element.offsetParent) this.want(true);
+  }
+
+  private row(joint: JointInfo): HTMLElement {
+    const id = (name: string) => this.data.catalog.named(name)?.id ?? -1;
+    const ids: Record<string, number> = { goal: id(`command.position_rad.${joint.name}`) };
+    for (const field of kFields) ids[field] = id(`state.${field}.${joint.name}`);
+    const cell = (kind: string) => h('span', { class: `cell ${kind}` }, '–');
+    const place = h('span', { class: 'mark place' });
+    const goal = h('span', { class: 'mark reference' });
+    const panel = h('div', { class: 'panel', hidden: true });
+    const opener = h(
+      'button',
+      {
+        type: 'button',
+        class: 'opener',
+        'aria-expanded': 'false',
+        'aria-label': `move ${joint.name}`,
+      },
+      'Move',
+    );
+    const who = h('p', { class: 'who muted' });
+    const free = this.actions.button(
+      'Stop its controller',
+      () => {
+        const name = who.dataset.controller;
+        return name ? { do: 'controller.stop', name } : null;
+      },
+      {
+        name: `stop its controller: ${joint.name}`,
+        title: 'Its joints are held, and free to move from here.',
+      },
+    );
+    free.hidden = true;
+    const row: Row = {
+      joint,
+      ids,
+      place,
+      goal,
+      panel,
+      opener,
+      who,
+      free,
+      mode: cell('mode'),
+      position: cell('position'),
+      torque: cell('torque'),
+      current: cell('current'),
+      temperature: cell('temperature'),
+      age: cell('age'),
+      element: h('div', { class: 'joint', 'data-joint': joint.name }),
+    };
+    opener.addEventListener('click', () => this.toggle(row));
+    row.element.append(
+      h(
+        'div',
+        { class: 'joint-line' },
+        h('span', { class: 'cell name', title: `${joint.name} [${joint.unit}]` }, joint.name),
+        row.mode,
+        h(
+          'span',
+          { class: 'bar-box' },
+          h('span', { class: 'end' }, plain(joint.lower)),
+          h('span', { class: 'bar' }, goal, place),
+          h('span', { class: 'end' }, plain(joint.upper)),
+        ),
+        row.position,
+        row.torque,
+        row.current,
+        row.temperature,
+        row.age,
+        opener,
+      ),
+      panel,
+    );
+    this.rows.push(row);
+    return row.element;
+  }
+
+  private toggle(row: Row): void {
+    const open = row.panel.hidden;
+    row.panel.hidden = !open;
+    attribute(row.opener, 'aria-expanded', String(open));
+    if (!open) return;
+    const drive = jointDrive(row.joint, this.actions, () => this.data.latest(row.ids.position_rad));
+    row.panel.replaceChildren(
+      row.who,
+      row.free,
+      h('fieldset', { class: 'drive-box', disabled: !this.lease.mine }, drive),
+    );
+  }
+
+  private show(row: Row): void {
+    const value = (field: string) => this.data.latest(row.ids[field]);
+    const { unit } = row.joint;
+    const force = unit === 'm' ? 'N' : 'Nm';
+    const position = value('position_rad');
+    const goal = value('goal');
+    this.mark(row.place, row.joint, position);
+    this.mark(row.goal, row.joint, goal);
+    say(row.position, Number.isFinite(position) ? `${position.toFixed(3)} ${unit}` : '–');
+    row.position.title = `position ${number(position)}, reference ${number(goal)} ${unit}`;
+    say(row.torque, `${short(value('torque_Nm'))} ${force}`);
+    say(row.current, `${short(value('current_A'))} A`);
+    const warm = value('temperature_C');
+    say(
+      row.temperature,
+      Number.isFinite(warm) ? `${warm.toFixed(0)} °C${warm > kWarm_C ? ' hot' : ''}` : '–',
+    );
+    const fault = value('fault');
+    const state = value('drive_state');
+    const mode = wordOf('mode', value('mode'));
+    const enabled = state === 5;
+    say(
+      row.mode,
+      fault > 0 ? `fault ${wordOf('fault', fault)}` : enabled ? mode : wordOf('drive_state', state),
+    );
+    const old = value('age_cycles');
+    const lost = old > kLost_cycles;
+    say(
+      row.age,
+      !Number.isFinite(old) ? '–' : lost ? `lost, ${old}` : old > 0 ? `old, ${old}` : 'fresh',
+    );
+    row.element.classList.toggle('lost', lost || !Number.isFinite(position));
+    row.element.classList.toggle('faulted', fault > 0);
+    row.element.classList.toggle('warm', warm > kWarm_C);
+  }
+
+  private mark(mark: HTMLElement, joint: JointInfo, value: number): void {
+    const low = joint.lower ?? -Math.PI;
+    const high = joint.upper ?? Math.PI;
+    const share = (value - low) / (high - low);
+    mark.hidden = !Number.isFinite(share);
+    if (!mark.hidden) mark.style.left = `${(100 * Math.min(1, Math.max(0, share))).toFixed(2)}%`;
+    mark.classList.toggle('outside', share < 0 || share > 1);
+  }
+
+  private watched(request: string, answer: Answer): void {
+    if (request !== 'joint.list' || !answer.ok) return;
+    const list = answer.joints as Record<string, unknown>[];
+    const byName = new Map(list.map((joint) => [joint.joint, joint]));
+    for (const row of this.rows) {
+      const joint = byName.get(row.joint.name);
+      if (!joint) continue;
+      const controller = String(joint.controller ?? '');
+      row.who.dataset.controller = controller;
+      row.free.hidden = controller === '';
+      const homing = joint.homing && joint.homing !== 'none' ? `; ${joint.homing}` : '';
+      const fault = joint.fault_text ? `; ${joint.fault_text}` : '';
+      const moves = joint.moving ? 'moving' : 'standing';
+      say(
+        row.who,
+        controller
+          ? `Claimed by ${controller}: it cannot be moved from here.${fault}`
+          : `Free, ${moves}${homing}${fault}`,
+      );
+      attribute(row.element, 'data-moving', String(joint.moving === true));
+      attribute(row.element, 'data-controller', controller);
+    }
+  }
+
+  private allow(): void {
+    for (const box of this.body.querySelectorAll<HTMLFieldSetElement>('.drive-box'))
+      box.disabled = !this.lease.mine;
+  }
+
+  private applyFilter(): void {
+    const words = this.filter.value.toLowerCase().split(/\s+/).filter(Boolean);
+    for (const limb of this.body.querySelectorAll<HTMLElement>('.limb')) {
+      const name = (limb.getAttribute('aria-label') ?? '').toLowerCase();
+      let any = false;
+      for (const joint of limb.querySelectorAll<HTMLElement>('.joint')) {
+        const text = `${name} ${(joint.dataset.joint ?? '').toLowerCase()}`;
+        joint.hidden = !words.every((word) => text.includes(word));
+        any ||= !joint.hidden;
+      }
+      limb.hidden = !any;
+    }
+  }
+}

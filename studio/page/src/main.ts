@@ -1,0 +1,134 @@
+// The page: joins its parts with the run that serves it.
+import 'uplot/dist/uPlot.min.css';
+import './theme.css';
+import './style.css';
+import './panels.css';
+import './joints.css';
+import './narrow.css';
+import { Actions } from './actions';
+import { ClockPanel } from './clock';
+import { ControlLease } from './control';
+import { Controllers } from './controllers';
+import { Data } from './data';
+import { h, say } from './dom';
+import { Events } from './events';
+import { Header } from './header';
+import { Inputs } from './inputs';
+import { Joints } from './joints';
+import { LiveSource } from './live';
+import { Plots } from './plots';
+import { Scene } from './scene';
+import { Tabs } from './tabs';
+
+const kAlways = ['status', 'clock.show', 'fault.show'];
+const kWatched: Record<string, string[]> = {
+  plots: [],
+  joints: ['joint.list'],
+  controllers: ['controller.list'],
+  inputs: ['input.list'],
+  events: [],
+};
+const kThemes = ['auto', 'light', 'dark'];
+const kThemeKey = 'tandem.studio.theme';
+
+function stored(key: string): string | null {
+  try {
+    return localStorage.getItem(key);
+  } catch {
+    return null;
+  }
+}
+
+function themeButton(changed: () => void): HTMLElement {
+  const button = h('button', { type: 'button', class: 'quiet theme' });
+  const set = (name: string) => {
+    document.documentElement.dataset.theme = name;
+    say(button, name === 'auto' ? '◐ auto' : name === 'light' ? '○ light' : '● dark');
+    button.title = 'light, dark, or as the system says';
+    changed();
+  };
+  button.addEventListener('click', () => {
+    const now = kThemes.indexOf(document.documentElement.dataset.theme ?? 'auto');
+    const next = kThemes[(now + 1) % kThemes.length];
+    try {
+      localStorage.setItem(kThemeKey, next);
+    } catch {
+      // Not kept: the next page follows the system.
+    }
+    set(next);
+  });
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', changed);
+  set(stored(kThemeKey) ?? 'auto');
+  return button;
+}
+
+function start(): void {
+  const token = /(?:^#|&)token=([0-9a-f]+)/.exec(location.hash)?.[1] ?? '';
+  const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
+  const source = new LiveSource(`${scheme}://${location.host}/ws`, token);
+  const data = new Data(source);
+  const actions = new Actions(source);
+  const lease = new ControlLease(source);
+  const scene = new Scene(data);
+  const plots = new Plots(data, (words, bad) => actions.tell('', words, bad));
+  const joints = new Joints(data, actions, lease);
+  const header = new Header(
+    data,
+    actions,
+    themeButton(() => {
+      scene.themeChanged();
+      plots.themeChanged();
+    }),
+  );
+  const tabs = new Tabs(
+    [
+      { name: 'plots', label: 'Plots', content: plots.element },
+      { name: 'joints', label: 'Joints', content: joints.element },
+      {
+        name: 'controllers',
+        label: 'Controllers',
+        content: new Controllers(data, actions, lease).element,
+      },
+      { name: 'inputs', label: 'Inputs', content: new Inputs(data, actions, lease).element },
+      { name: 'events', label: 'Events', content: new Events(data).element },
+    ],
+    (name) => {
+      source.watch([...kAlways, ...(kWatched[name] ?? [])]);
+      joints.want(name === 'joints');
+    },
+  );
+  scene.whenTree((tree) => joints.setTree(tree));
+  source.on({
+    trouble: (message, hint) => actions.tell('', `${message}${hint ? ` – ${hint}` : ''}`, true),
+  });
+  document.body.append(
+    header.element,
+    h(
+      'main',
+      { class: 'main' },
+      h('div', { class: 'side' }, scene.element, new ClockPanel(data, actions, lease).element),
+      tabs.element,
+    ),
+    actions.bar,
+  );
+  tabs.open('plots');
+  scene.themeChanged();
+  source.open();
+  let fresh = false;
+  data.whenTick(() => {
+    fresh = true;
+  });
+  const frame = (now: number) => {
+    if (fresh) {
+      header.update();
+      if (tabs.active === 'joints') joints.update();
+      fresh = false;
+    }
+    scene.update(now);
+    if (tabs.active === 'plots') plots.update(now);
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+}
+
+start();

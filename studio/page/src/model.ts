@@ -1,0 +1,69 @@
+// The robot as objects of three: built of its description, moved by joint positions.
+import * as THREE from 'three';
+import URDFLoader, { type URDFRobot } from 'urdf-loader';
+import type { TreeJoint } from './limbs';
+import { type Capsule, describe, planOf, prepare } from './urdf';
+
+export interface Model {
+  robot: URDFRobot;
+  tree: TreeJoint[];
+  notDrawn: string[];
+  /** @return false: the robot has no such joint. */
+  set(joint: string, position: number): boolean;
+  /** The object of a link; undefined: there is none. */
+  link(name: string): THREE.Object3D | undefined;
+  joint(name: string): THREE.Object3D | undefined;
+}
+
+function rod(capsule: Capsule, material: THREE.Material): THREE.Object3D {
+  const from = new THREE.Vector3(...capsule.from);
+  const along = new THREE.Vector3(...capsule.to).sub(from);
+  const length = along.length();
+  const radius = Math.min(0.035, Math.max(0.006, 0.08 * length));
+  const mesh = new THREE.Mesh(new THREE.CapsuleGeometry(radius, length, 4, 12), material);
+  mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.clone().normalize());
+  mesh.position.copy(from).addScaledVector(along, 0.5);
+  return mesh;
+}
+
+/**
+ * @param material null: the description's colours.
+ * @throws Error in words, when the description cannot be read.
+ */
+export function buildModel(
+  text: string,
+  measured: Set<string>,
+  material: THREE.Material | null,
+): Model {
+  const doc = new DOMParser().parseFromString(text, 'text/xml');
+  const wrong = doc.getElementsByTagName('parsererror')[0];
+  if (wrong) throw new Error('the description is no XML');
+  const description = describe(doc);
+  const plan = planOf(description);
+  const names = prepare(doc, plan, measured);
+  const robot = new URDFLoader().parse(doc);
+  const plain = new THREE.MeshLambertMaterial({ color: 0x9aa7b5 });
+  robot.traverse((one) => {
+    if (!(one instanceof THREE.Mesh)) return;
+    if (material) one.material = material;
+    else if (!(one.material as THREE.Material).name) one.material = plain;
+  });
+  for (const capsule of plan.capsules) {
+    const link = robot.links[names.links.get(capsule.link) ?? ''];
+    link?.add(rod(capsule, material ?? plain));
+  }
+  for (const joint of Object.values(robot.joints)) joint.ignoreLimits = true;
+  return {
+    robot,
+    tree: description.joints,
+    notDrawn: plan.notDrawn,
+    set(name, position) {
+      const joint = robot.joints[names.joints.get(name) ?? ''];
+      if (!joint) return false;
+      if (Number.isFinite(position)) joint.setJointValue(position);
+      return true;
+    },
+    link: (name) => robot.links[names.links.get(name) ?? ''],
+    joint: (name) => robot.joints[names.joints.get(name) ?? ''],
+  };
+}

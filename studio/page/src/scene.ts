@@ -1,0 +1,352 @@
+// The robot in 3D: posture, reference, ground and marks, at the newest or at the selected time.
+import * as THREE from 'three';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import type { Data } from './data';
+import { h, say, theme } from './dom';
+import { seconds } from './format';
+import type { TreeJoint } from './limbs';
+import { Marks } from './marks3d';
+import { buildModel, type Model } from './model';
+
+const kViews: Record<string, [number, number, number]> = {
+  free: [1.6, -1.2, 0.7],
+  front: [2.2, 0, 0.1],
+  side: [0, -2.2, 0.1],
+  top: [0.001, 0, 2.4],
+};
+/** Without a graphics processor the picture costs what the plots need: fewer, and plain. */
+const kSlowEvery_ms = 120;
+const kPlainName = /^[\w.-]+$/;
+
+/** Whether this browser draws 3D on the processor. */
+function drawsBySoftware(): boolean {
+  const context = document.createElement('canvas').getContext('webgl2');
+  const info = context?.getExtension('WEBGL_debug_renderer_info');
+  const name = info ? String(context?.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
+  context?.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
+interface Ids {
+  joints: string[];
+  position: number[];
+  reference: number[];
+  base: number[];
+  com: number[];
+  feet: number[];
+  forces: number[];
+}
+
+export class Scene {
+  readonly canvasBox = h('div', { class: 'canvas', role: 'img', 'aria-label': 'the robot in 3D' });
+  private readonly words = h('p', { class: 'scene-words', hidden: true });
+  private readonly when = h('p', { class: 'scene-when', hidden: true });
+  private readonly missing = h('details', { class: 'not-drawn', hidden: true });
+  readonly element: HTMLElement;
+  private renderer: THREE.WebGLRenderer | null = null;
+  private readonly scene = new THREE.Scene();
+  private readonly camera = new THREE.PerspectiveCamera(40, 1, 0.01, 200);
+  private controls: OrbitControls | null = null;
+  private readonly marks = new Marks();
+  private grid: THREE.GridHelper | null = null;
+  private model: Model | null = null;
+  private ghost: Model | null = null;
+  private ids: Ids | null = null;
+  private slow = false;
+  private renderedAt = 0;
+  private dirty = true;
+  private drawn = -1;
+  private busy = false;
+  /** Values at the selected time, so that the camera turns without asking again. */
+  private held: { time: number; values: number[] } | null = null;
+  private readonly center = new THREE.Vector3();
+  private radius = 0.6;
+  private fitted = false;
+  private readonly shows = { ghost: false, forces: true, com: true, frames: false, follow: true };
+  private readonly onTree: ((tree: TreeJoint[]) => void)[] = [];
+
+  constructor(private readonly data: Data) {
+    this.element = h(
+      'section',
+      { class: 'scene', 'aria-label': '3D view' },
+      this.toolbar(),
+      h('div', { class: 'canvas-frame' }, this.canvasBox, this.when, this.words),
+      this.missing,
+    );
+    this.begin();
+    data.whenHello((hello) => void this.load(hello.urdf));
+    data.whenCatalog(() => this.wire());
+    data.time.on(() => {
+      this.dirty = true;
+    });
+  }
+
+  whenTree(call: (tree: TreeJoint[]) => void): void {
+    this.onTree.push(call);
+  }
+
+  themeChanged(): void {
+    if (this.grid) this.scene.remove(this.grid);
+    const line = new THREE.Color(theme('--ground'));
+    this.grid = new THREE.GridHelper(10, 40, line, line);
+    this.grid.rotation.x = Math.PI / 2;
+    this.grid.position.z = this.data.hello?.ground?.height_m ?? 0;
+    this.scene.add(this.grid);
+    this.scene.background = new THREE.Color(theme('--scene'));
+    this.dirty = true;
+  }
+
+  /** At each animation frame. */
+  update(now: number): void {
+    const cycle = this.data.lastTick?.cycle ?? -1;
+    const selected = this.data.time.selected;
+    if (selected === null && cycle !== this.drawn) this.dirty = true;
+    if (!this.dirty || this.busy) return;
+    if (this.slow && now - this.renderedAt < kSlowEvery_ms) return;
+    this.renderedAt = now;
+    this.dirty = false;
+    this.drawn = cycle;
+    this.when.hidden = selected === null;
+    if (selected === null) {
+      this.pose(this.idsAll().map((id) => this.data.latest(id)));
+    } else {
+      say(this.when, `at the selected time, ${seconds(selected)}`);
+      if (this.held?.time === selected) {
+        this.pose(this.held.values);
+        return;
+      }
+      this.busy = true;
+      void this.data.valuesAt(this.idsAll(), selected).then((values) => {
+        this.busy = false;
+        this.held = { time: selected, values };
+        this.pose(values);
+      });
+    }
+  }
+
+  private begin(): void {
+    const sun = new THREE.DirectionalLight(0xffffff, 1.8);
+    sun.position.set(2, -3, 4);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x667788, 1.6), sun);
+    this.scene.add(this.marks.forces, this.marks.com, this.marks.frames);
+    this.camera.up.set(0, 0, 1);
+    try {
+      this.slow = drawsBySoftware();
+      this.renderer = new THREE.WebGLRenderer({ antialias: !this.slow });
+    } catch {
+      this.say('This browser has no WebGL: no 3D view. Plots, joints and lists work without it.');
+      return;
+    }
+    this.renderer.setPixelRatio(this.slow ? 1 : Math.min(window.devicePixelRatio, 2));
+    this.canvasBox.append(this.renderer.domElement);
+    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
+    this.controls.addEventListener('change', () => {
+      this.dirty = true;
+    });
+    new ResizeObserver(() => this.resize()).observe(this.canvasBox);
+    this.view('free');
+  }
+
+  private say(words: string): void {
+    this.words.hidden = words === '';
+    say(this.words, words);
+  }
+
+  private async load(urdf: string): Promise<void> {
+    for (const old of [this.model, this.ghost]) if (old) this.scene.remove(old.robot);
+    this.model = null;
+    this.ghost = null;
+    if (!urdf) return this.say('The run has no description: nothing to draw.');
+    try {
+      const text = await this.data.source.description();
+      const hello = this.data.hello;
+      const measured = new Set([
+        ...(hello?.joints.map((one) => one.name) ?? []),
+        ...(hello?.passive ?? []),
+      ]);
+      this.model = buildModel(text, measured, null);
+      const see = new THREE.MeshBasicMaterial({
+        color: 0x2f7de1,
+        transparent: true,
+        opacity: 0.28,
+        depthWrite: false,
+      });
+      this.ghost = buildModel(text, measured, see);
+      this.ghost.robot.visible = this.shows.ghost;
+      this.scene.add(this.model.robot, this.ghost.robot);
+      this.marks.setFrames(this.model, [...measured]);
+      this.listMissing(this.model.notDrawn);
+      this.fitted = false;
+      this.say(this.renderer ? '' : (this.words.textContent ?? ''));
+      for (const call of this.onTree) call(this.model.tree);
+    } catch (error) {
+      this.say(`The robot cannot be drawn: ${error instanceof Error ? error.message : error}`);
+    }
+    this.themeChanged();
+  }
+
+  private listMissing(names: string[]): void {
+    this.missing.replaceChildren(
+      h('summary', {}, `not drawn: ${names.length} shapes`),
+      h('ul', {}, ...names.map((name) => h('li', {}, name))),
+    );
+    this.missing.hidden = names.length === 0;
+  }
+
+  private wire(): void {
+    const { catalog, hello } = this.data;
+    const of = (source: string, field: string) => catalog.idsOf(source, field);
+    const first = (field: string, ...sources: string[]) =>
+      sources.map((source) => of(source, field)).find((ids) => ids.length > 0) ?? [];
+    const named = (source: string, field: string, names: string[]) =>
+      names.map((name) => catalog.named(`${source}.${field}.${name}`)?.id ?? -1);
+    const joints = hello?.joints.map((joint) => joint.name) ?? [];
+    const passive = hello?.passive ?? [];
+    const passiveIds = of('truth', 'passive_position_rad');
+    this.ids = {
+      joints: [...joints, ...passive],
+      position: [
+        ...named('state', 'position_rad', joints),
+        ...passive.map((_, i) => passiveIds[i] ?? -1),
+      ],
+      reference: named('command', 'position_rad', joints),
+      base: hello?.floating
+        ? [
+            ...first('base_position_m', 'truth', 'estimate'),
+            ...first('base_quaternion', 'truth', 'estimate'),
+          ]
+        : [],
+      com: of('truth', 'center_of_mass_m'),
+      feet: of('truth', 'foot_position_m'),
+      forces: of('truth', 'foot_force_N'),
+    };
+    this.held = null;
+    this.data.want(
+      'scene',
+      this.idsAll().filter((id) => id >= 0),
+    );
+    this.dirty = true;
+  }
+
+  private idsAll(): number[] {
+    const ids = this.ids;
+    if (!ids) return [];
+    return [...ids.position, ...ids.reference, ...ids.base, ...ids.com, ...ids.feet, ...ids.forces];
+  }
+
+  private pose(values: number[]): void {
+    const ids = this.ids;
+    if (!ids) return;
+    let at = 0;
+    const part = (count: number) => {
+      at += count;
+      return values.slice(at - count, at);
+    };
+    const position = part(ids.position.length);
+    const reference = part(ids.reference.length);
+    const base = part(ids.base.length);
+    const com = part(ids.com.length);
+    const feet = part(ids.feet.length);
+    const forces = part(ids.forces.length);
+    ids.joints.forEach((name, i) => {
+      this.model?.set(name, position[i]);
+      // A joint without a reference stands where it is.
+      const asked = i < reference.length ? reference[i] : Number.NaN;
+      this.ghost?.set(name, Number.isFinite(asked) ? asked : position[i]);
+      if (kPlainName.test(name)) {
+        this.element.setAttribute(`data-joint-${name}`, String(position[i]));
+      }
+    });
+    for (const model of [this.model, this.ghost]) {
+      if (model && base.length === 7 && base.every(Number.isFinite)) {
+        model.robot.position.set(base[0], base[1], base[2]);
+        model.robot.quaternion.set(base[3], base[4], base[5], base[6]).normalize();
+      }
+    }
+    this.marks.setFeet(feet, this.shows.forces ? forces : forces.map(() => 0));
+    this.marks.setCom(com, this.data.hello?.ground?.height_m ?? 0, this.shows.com);
+    this.marks.update();
+    this.render(position.some(Number.isFinite));
+  }
+
+  private render(posed: boolean): void {
+    if (!this.renderer || !this.controls) return;
+    if (this.model && posed && !this.fitted) this.fit();
+    if (this.shows.follow && this.model) {
+      const now = this.model.robot.position.clone();
+      const moved = now.clone().sub(this.center);
+      this.camera.position.add(moved);
+      this.controls.target.add(moved);
+      this.center.copy(now);
+    }
+    this.controls.update();
+    this.renderer.render(this.scene, this.camera);
+    this.element.dataset.drawn = String(this.drawn);
+    this.dirty = false;
+  }
+
+  private fit(): void {
+    if (!this.model || !this.controls) return;
+    this.model.robot.updateMatrixWorld(true);
+    const box = new THREE.Box3().setFromObject(this.model.robot);
+    if (box.isEmpty()) return;
+    this.fitted = true;
+    const sphere = box.getBoundingSphere(new THREE.Sphere());
+    this.radius = Math.max(0.1, sphere.radius);
+    this.center.copy(this.model.robot.position);
+    this.controls.target.copy(sphere.center);
+    this.view('free');
+  }
+
+  private view(name: string): void {
+    if (!this.controls) return;
+    const [x, y, z] = kViews[name];
+    const narrow = Math.min(1, this.camera.aspect);
+    const far = (1.02 * this.radius) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
+    const away = new THREE.Vector3(x, y, z).setLength(far);
+    this.camera.position.copy(this.controls.target).add(away);
+    this.controls.update();
+    this.dirty = true;
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvasBox;
+    if (!this.renderer || width === 0 || height === 0) return;
+    this.renderer.setSize(width, height);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.dirty = true;
+  }
+
+  private toolbar(): HTMLElement {
+    const toggle = (label: string, key: keyof Scene['shows'], title: string) => {
+      const box = h('input', {
+        type: 'checkbox',
+        checked: this.shows[key],
+        onchange: () => {
+          this.shows[key] = box.checked;
+          if (this.ghost) this.ghost.robot.visible = this.shows.ghost;
+          this.marks.frames.visible = this.shows.frames;
+          if (this.model) this.center.copy(this.model.robot.position);
+          this.dirty = true;
+        },
+      });
+      return h('label', { class: 'toggle', title }, box, label);
+    };
+    const view = (name: string) =>
+      h('button', { type: 'button', onclick: () => this.view(name) }, name);
+    return h(
+      'div',
+      { class: 'toolbar', role: 'group', 'aria-label': '3D view' },
+      view('free'),
+      view('front'),
+      view('side'),
+      view('top'),
+      toggle('follow', 'follow', 'the camera goes with the base'),
+      toggle('reference', 'ghost', 'the reference posture as a blue ghost'),
+      toggle('forces', 'forces', 'of the ground on the feet: green arrows, 1 m is 1000 N'),
+      toggle('mass', 'com', 'the centre of mass: an orange dot, and its place on the ground'),
+      toggle('frames', 'frames', 'of base and joints: red x, green y, blue z'),
+    );
+  }
+}

@@ -1,0 +1,78 @@
+// Panels of which one is seen: by pointer, or by arrow keys.
+import { attribute, h } from './dom';
+
+export interface Tab {
+  name: string;
+  label: string;
+  content: HTMLElement;
+}
+
+export class Tabs {
+  active = '';
+  private readonly buttons: HTMLButtonElement[];
+  readonly element: HTMLElement;
+
+  constructor(
+    private readonly tabs: Tab[],
+    private readonly changed: (name: string) => void,
+  ) {
+    this.buttons = tabs.map((tab) =>
+      h(
+        'button',
+        {
+          type: 'button',
+          role: 'tab',
+          id: `tab-${tab.name}`,
+          'aria-controls': `panel-${tab.name}`,
+          onclick: () => this.open(tab.name),
+        },
+        tab.label,
+      ),
+    );
+    const list = h(
+      'div',
+      {
+        role: 'tablist',
+        class: 'tabs',
+        'aria-label': 'panels',
+        onkeydown: (event: KeyboardEvent) => this.key(event),
+      },
+      ...this.buttons,
+    );
+    const panels = tabs.map((tab) =>
+      h(
+        'div',
+        {
+          role: 'tabpanel',
+          id: `panel-${tab.name}`,
+          'aria-labelledby': `tab-${tab.name}`,
+          class: 'tab-panel',
+        },
+        tab.content,
+      ),
+    );
+    this.element = h('section', { class: 'panels', 'aria-label': 'panels' }, list, ...panels);
+  }
+
+  open(name: string): void {
+    this.active = name;
+    this.tabs.forEach((tab, i) => {
+      const on = tab.name === name;
+      attribute(this.buttons[i], 'aria-selected', String(on));
+      this.buttons[i].tabIndex = on ? 0 : -1;
+      const panel = tab.content.parentElement;
+      if (panel) panel.hidden = !on;
+    });
+    this.changed(name);
+  }
+
+  private key(event: KeyboardEvent): void {
+    const by = event.key === 'ArrowRight' ? 1 : event.key === 'ArrowLeft' ? -1 : 0;
+    if (by === 0) return;
+    event.preventDefault();
+    const at = this.tabs.findIndex((tab) => tab.name === this.active);
+    const next = (at + by + this.tabs.length) % this.tabs.length;
+    this.open(this.tabs[next].name);
+    this.buttons[next].focus();
+  }
+}

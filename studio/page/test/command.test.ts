@@ -1,0 +1,37 @@
+// Command lines that do the same as a request.
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { commandLine, shellWord } from '../src/command';
+
+test('requests become command lines', () => {
+  const lines: [Parameters<typeof commandLine>[0], string][] = [
+    [{ do: 'estop' }, 'tandem estop'],
+    [{ do: 'clock.step', cycles: 10 }, 'tandem clock step 10'],
+    [{ do: 'clock.rate', rate: 0.5 }, 'tandem clock rate 0.5'],
+    [{ do: 'controller.start' }, 'tandem controller start'],
+    [
+      { do: 'controller.switch', stop: ['squat'], start: ['rest'] },
+      'tandem controller switch --stop squat --start rest',
+    ],
+    [
+      { do: 'controller.set', name: 'arm', parameters: { kp: [1, 2], on: true } },
+      "tandem controller set arm 'kp=[1,2]' on=true",
+    ],
+    [{ do: 'input.set', name: 'rate', values: { joint2: 0.3 } }, 'tandem input rate joint2=0.3'],
+    [
+      { do: 'joint.move', joint: 'LElbj', target_rad: -0.5, speed_rad_s: 0.2 },
+      'tandem joint move LElbj --to=-0.5 --speed=0.2',
+    ],
+    [{ do: 'joint.set', joint: 'LElbj', mode: 'idle' }, 'tandem joint set LElbj --mode=idle'],
+    [{ do: 'run.stop' }, `tandem ask '{"do":"run.stop"}'`],
+  ];
+  for (const [request, line] of lines) assert.equal(commandLine(request), line);
+});
+
+test('names of any kind are one word for a shell', () => {
+  assert.equal(shellWord("a'; rm -rf ~"), "'a'\\''; rm -rf ~'");
+  assert.equal(
+    commandLine({ do: 'joint.stop', joint: '$(reboot)' }),
+    "tandem joint stop '$(reboot)'",
+  );
+});

@@ -1,0 +1,278 @@
+// The played robot with a registry, which answers as a run's does.
+import { kHostile, PlayedRobot } from './played_robot.mjs';
+
+export class MockRobot extends PlayedRobot {
+  clock() {
+    return {
+      ok: true,
+      clock: this.bus ? 'bus' : 'simulated',
+      phase: this.phase,
+      time_s: this.time,
+      cycles: this.cycle,
+      paused: this.paused,
+      standing: this.paused,
+      pending_steps: 0,
+      rate: this.rate,
+      realtime_factor: this.paused ? null : this.rate * 0.98,
+    };
+  }
+  status() {
+    return {
+      ok: true,
+      phase: this.phase,
+      paused: this.paused,
+      cycles: this.cycle,
+      running_cycles: this.cycle,
+      total_cycles: 0,
+      overruns: 0,
+      dropped: 0,
+      latched: this.latched,
+      resets: 0,
+      failed_resets: 0,
+    };
+  }
+  controllers() {
+    const one = (name, active) => ({
+      name,
+      plugin: `lib/${name}.so`,
+      active,
+      finished: false,
+      of_experiment: true,
+      call_ns: active ? { p50: 4031, p99: 11007, p999: 110591, max: 202042 } : null,
+      overruns: 0,
+      claims: active
+        ? this.joints.map((j) => ({ joint: j.name, mode: 'position', interaction: 'stiff' }))
+        : [],
+    });
+    return [one(this.hostile ? kHostile : 'squat', this.active), one('rest', false)];
+  }
+  parameters() {
+    const base = {
+      elements: [],
+      choices: [],
+      required: false,
+      above_min: false,
+      min: null,
+      max: null,
+    };
+    return [
+      {
+        ...base,
+        name: 'kp',
+        type: 'number',
+        unit: 'Nm/rad',
+        min: 0,
+        max: 100,
+        default: 40,
+        value: this.gain,
+        live: true,
+        doc: 'stiffness of the base',
+      },
+      {
+        ...base,
+        name: 'smooth',
+        type: 'boolean',
+        unit: '',
+        default: true,
+        value: true,
+        live: true,
+        doc: 'without steps',
+      },
+      {
+        ...base,
+        name: 'shape',
+        type: 'choice',
+        unit: '',
+        choices: ['sine', 'step'],
+        default: 'sine',
+        value: 'sine',
+        live: true,
+        doc: 'of the motion',
+      },
+      {
+        ...base,
+        name: 'period_s',
+        type: 'number',
+        unit: 's',
+        min: 0.1,
+        max: 10,
+        default: 2,
+        value: 2,
+        live: false,
+        doc: 'of one squat',
+      },
+    ];
+  }
+  jointList() {
+    return {
+      ok: true,
+      cycle: this.cycle,
+      followers: {},
+      joints: this.joints.map((joint, j) => ({
+        joint: joint.name,
+        slides: joint.type === 'prismatic',
+        controller: this.active ? this.controllers()[0].name : '',
+        mode: 'position',
+        interaction: 'stiff',
+        mode_in_force: 'position',
+        commanded_position_rad: this.position(j, this.time),
+        moving: this.moving(joint.name),
+        position_rad: this.position(j, this.time),
+        velocity_rad_s: 0,
+        torque_Nm: 1,
+        min_position_rad: joint.lower,
+        max_position_rad: joint.upper,
+        max_velocity_rad_s: joint.velocity,
+        drive_state: 'operation enabled',
+        fault: 0,
+        fault_text: '',
+        homing: 'none',
+        homing_error: '',
+        age_cycles: 0,
+        feedback: 'fresh',
+      })),
+    };
+  }
+  moving(name) {
+    const goal = this.goal.get(name);
+    return goal !== undefined && this.time < goal.at + goal.for;
+  }
+
+  ask(request) {
+    this.requests.push(request);
+    const done = { ok: true, done: true, cycle: this.cycle };
+    const no = (error, hint) => ({ ok: false, error, hint });
+    switch (request.do) {
+      case 'status':
+        return this.status();
+      case 'fault.show':
+        return {
+          ...this.status(),
+          faults: this.latched
+            ? [
+                {
+                  time_s: this.time,
+                  joint: this.joints[1].name,
+                  cause: 'estop',
+                  text: 'emergency stop',
+                  advice: 'tandem fault reset',
+                },
+              ]
+            : [],
+          lost: 0,
+        };
+      case 'clock.show':
+        return this.clock();
+      case 'controller.list':
+        return { ok: true, controllers: this.controllers() };
+      case 'controller.show':
+        return {
+          ok: true,
+          controllers: this.controllers().map((one) => ({ ...one, parameters: this.parameters() })),
+        };
+      case 'joint.list':
+        return this.jointList();
+      case 'input.list':
+        return {
+          ok: true,
+          inputs: [
+            {
+              input: 'rate',
+              controller: 'squat',
+              kind: 'numbers',
+              doc: this.hostile ? kHostile : 'velocities',
+              source: 'command',
+              active: this.active,
+              fresh: false,
+              sequence: 1,
+              cycle: 1,
+              timeout_s: 1,
+              after: 'zero',
+              components: ['x', 'yaw'],
+              units: ['m/s', 'rad/s'],
+              arrived: 1,
+              refused: 0,
+              why: '',
+              superseded: 0,
+              timed_out: 0,
+              values: { x: this.input, yaw: 0 },
+            },
+          ],
+        };
+      case 'estop':
+        this.latched = 1;
+        this.phase = 'faulted';
+        return { ...done, category: 1, confirmed: true };
+      case 'fault.reset':
+        this.latched = 0;
+        this.phase = 'held';
+        this.active = false;
+        return this.status();
+      case 'controller.start':
+        this.active = true;
+        this.goal.clear();
+        this.phase = 'running';
+        return { ...done, active: ['squat'] };
+      case 'controller.stop':
+        this.active = false;
+        return { ...done, active: [] };
+      case 'controller.switch':
+        this.active = (request.start ?? []).length > 0;
+        return { ...done, active: request.start };
+      case 'controller.set': {
+        const { kp } = request.parameters;
+        if (kp > 100) return no('kp cannot be 101', 'it is from 0 to 100 Nm/rad');
+        if (kp !== undefined) this.gain = kp;
+        return { ...done, values: request.parameters };
+      }
+      case 'input.set':
+        this.input = request.values.x ?? 0;
+        return done;
+      case 'clock.pause':
+        this.paused = true;
+        return this.clock();
+      case 'clock.resume':
+        this.paused = false;
+        return this.clock();
+      case 'clock.step':
+        this.time += (request.cycles ?? 1) * 0.001;
+        return this.clock();
+      case 'clock.rate':
+        this.rate = request.rate;
+        return this.clock();
+      case 'joint.set':
+      case 'joint.home':
+      case 'joint.reset':
+      case 'joint.recover':
+        return done;
+      case 'joint.halt':
+        for (const [name] of this.goal) this.stop(name);
+        return { ok: true, done: true, joints: [...this.goal.keys()] };
+      case 'joint.stop':
+        this.stop(request.joint);
+        return done;
+      case 'joint.move': {
+        if (this.active)
+          return no(
+            `${request.joint} is claimed by squat`,
+            'stop it first: tandem controller stop squat',
+          );
+        const j = this.joints.findIndex((one) => one.name === request.joint);
+        const from = this.position(j, this.time);
+        this.goal.set(request.joint, {
+          from,
+          to: request.target_rad,
+          at: this.time,
+          for: Math.abs(request.target_rad - from) / (request.speed_rad_s ?? 0.5),
+        });
+        return { ...done, joint: {}, target_rad: request.target_rad };
+      }
+    }
+    return no(`unknown command "${request.do}"`, 'help lists them');
+  }
+  stop(name) {
+    const j = this.joints.findIndex((one) => one.name === name);
+    const at = this.position(j, this.time);
+    this.goal.set(name, { from: at, to: at, at: this.time, for: 0 });
+  }
+}

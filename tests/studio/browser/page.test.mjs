@@ -1,0 +1,398 @@
+// The page against a robot that is played: node --test tests/studio/browser/page.test.mjs
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, afterEach, before, describe, test } from 'node:test';
+import { kPage, lacking, openBrowser, openPage, violations } from './support.mjs';
+
+const why = lacking();
+const kScratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
+const kShots = process.env.TANDEM_SCREENSHOTS;
+
+describe('the studio page', { skip: why || false }, () => {
+  let browser;
+  let startMock;
+  const mocks = [];
+
+  before(async () => {
+    execFileSync(process.execPath, [join(kPage, 'build.mjs'), '--out', kScratch]);
+    ({ startMock } = await import(join(kPage, 'test/mock/server.mjs')));
+    browser = await openBrowser();
+  });
+  after(async () => {
+    await browser?.close();
+    rmSync(kScratch, { recursive: true, force: true });
+  });
+
+  afterEach(async () => {
+    for (const mock of mocks.splice(0)) await mock.stop();
+  });
+
+  const play = async (options = {}) => {
+    const mock = await startMock({ robot: 'coman', dist: kScratch, ...options });
+    mocks.push(mock);
+    return mock;
+  };
+  const visit = async (address, options) => {
+    const page = await openPage(browser, address, options);
+    await page.waitForSelector('body[data-cycle]');
+    return page;
+  };
+  /** Ends a visit: nothing was complained about, nothing left the machine. */
+  const leave = async (page) => {
+    assert.deepEqual(page.complaints, []);
+    assert.deepEqual(page.outside, []);
+    await page.context().close();
+  };
+  const shot = async (page, name) => {
+    if (kShots) await page.screenshot({ path: join(kShots, `${name}.png`) });
+  };
+  const asked = (mock, name) => mock.robot.requests.filter((one) => one.do === name);
+  const until = (page, text) =>
+    page.waitForFunction((words) => document.body.innerText.includes(words), text);
+
+  test('shows the run, and a robot that is not blank', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.waitForSelector('body[data-state="live"][data-phase="running"]');
+    await page.waitForSelector('.scene[data-drawn]');
+    await page.waitForFunction(() => Number(document.querySelector('.scene').dataset.drawn) > 0);
+    await page.waitForTimeout(300);
+    assert.match(await page.textContent('header'), /coman.*squat\.toml.*running.*live/s);
+    const png = (await page.locator('.canvas').screenshot()).toString('base64');
+    const colours = await page.evaluate(async (data) => {
+      const image = new Image();
+      image.src = `data:image/png;base64,${data}`;
+      await image.decode();
+      const canvas = document.createElement('canvas');
+      canvas.width = image.width;
+      canvas.height = image.height;
+      const context = canvas.getContext('2d');
+      context.drawImage(image, 0, 0);
+      const pixels = context.getImageData(0, 0, image.width, image.height).data;
+      const found = new Set();
+      for (let i = 0; i < pixels.length; i += 4)
+        found.add((pixels[i] << 16) | (pixels[i + 1] << 8) | pixels[i + 2]);
+      return found.size;
+    }, png);
+    assert.ok(colours > 12, `${colours} colours`);
+    await leave(page);
+  });
+
+  test('draws the joints where the run has them', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.locator('.clock-body button:text-is("Pause")').click();
+    await page.waitForSelector('body[data-paused="true"]');
+    const j = mock.robot.joints.findIndex((joint) => joint.name === 'LKneeSag');
+    const expected = mock.robot.position(j, mock.robot.time);
+    await page.waitForFunction(
+      (value) =>
+        Math.abs(
+          Number(document.querySelector('.scene').getAttribute('data-joint-LKneeSag')) - value,
+        ) < 1e-6,
+      Math.fround(expected),
+    );
+    await leave(page);
+  });
+
+  test('finds a signal by words, draws it, and stands while the robot goes on', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.waitForSelector('.pane .uplot');
+    await page.fill('.search', 'lknee torque');
+    await page.press('.search', 'Enter');
+    await page.press('.search', 'Escape');
+    assert.match(await page.textContent('.pane >> nth=0'), /state\.torque_Nm\.LKneeSag/);
+    await page.click('.live');
+    await page.waitForSelector('.live[aria-pressed="true"]');
+    const stands = await page.getAttribute('.plots', 'data-to');
+    const cycle = Number(await page.getAttribute('body', 'data-cycle'));
+    await page.waitForFunction((from) => Number(document.body.dataset.cycle) > from + 300, cycle);
+    assert.equal(await page.getAttribute('.plots', 'data-to'), stands);
+    assert.equal(mock.robot.paused, false);
+    await page.waitForSelector('.pane[data-rows]');
+    await page.click('.live');
+    await page.waitForFunction(
+      (from) => Number(document.querySelector('.plots').dataset.to) > Number(from),
+      stands,
+    );
+    await leave(page);
+  });
+
+  test('a dragged span shows every cycle of it; one selected time is everywhere', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.waitForSelector('.pane .u-over');
+    await page.waitForTimeout(400);
+    const box = await page.locator('.pane .u-over').first().boundingBox();
+    await page.mouse.move(box.x + 100, box.y + 40);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 220, box.y + 40, { steps: 4 });
+    await page.mouse.up();
+    await page.waitForSelector('.pane[data-cycles-per-row="1"]');
+    const plots = await page.evaluate(() => ({ ...document.querySelector('.plots').dataset }));
+    assert.ok(Number(plots.to) - Number(plots.from) < 3, JSON.stringify(plots));
+    await page.mouse.click(box.x + 150, box.y + 40);
+    await page.waitForSelector('.scene-when:not([hidden])');
+    assert.match(await page.textContent('.scene-when'), /at the selected time/);
+    const { selected } = await page.evaluate(() => ({
+      ...document.querySelector('.plots').dataset,
+    }));
+    const j = mock.robot.joints.findIndex((joint) => joint.name === 'LKneeSag');
+    const expected = mock.robot.position(j, Number(selected));
+    await page.waitForFunction(
+      (value) =>
+        Math.abs(
+          Number(document.querySelector('.scene').getAttribute('data-joint-LKneeSag')) - value,
+        ) < 0.01,
+      expected,
+    );
+    await page.click('text=Back to now');
+    await page.waitForSelector('.scene-when[hidden]', { state: 'attached' });
+    await leave(page);
+  });
+
+  test('statistics, derivative and difference are in the legend', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.waitForSelector('.pane .uplot');
+    await page.click('text=statistics');
+    await page.locator('button[aria-label^="d/dt of"]').first().click();
+    await page.locator('select[aria-label^="difference of"]').first().selectOption({ index: 1 });
+    const legend = await page.textContent('.pane >> nth=0');
+    assert.match(legend, /min.*max.*mean.*rms.*std/s);
+    assert.match(legend, /d\/dt state\.position_rad/);
+    assert.match(legend, /state\.position_rad\.\w+ − command\.position_rad/);
+    await leave(page);
+  });
+
+  test('pauses, steps and sets the rate; the commands are shown', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.waitForSelector('.clock-body:not([disabled])');
+    await page.locator('.clock-body button:text-is("Pause")').click();
+    await page.waitForSelector('body[data-paused="true"]');
+    await until(page, 'tandem clock pause');
+    const before = mock.robot.cycle;
+    await page.fill('.clock-body input', '25');
+    await page.locator('.clock-body button:text-is("Step")').click();
+    await page.waitForFunction(
+      (cycle) => Number(document.body.dataset.cycle) === cycle,
+      before + 25,
+    );
+    await page.selectOption('.clock-body select', '0.5');
+    await page.locator('.clock-body button:text-is("Set rate")').click();
+    await until(page, 'tandem clock rate 0.5');
+    assert.deepEqual(
+      asked(mock, 'clock.rate').map((one) => one.rate),
+      [0.5],
+    );
+    await leave(page);
+  });
+
+  test('time of a bus cannot be paused, and the page says so', async () => {
+    const mock = await play({ bus: true });
+    const page = await visit(mock.address);
+    await until(page, 'Time is advanced by the bus');
+    assert.equal(await page.locator('.clock-body button:text-is("Pause")').isDisabled(), true);
+    await leave(page);
+  });
+
+  test('stops without token or control; then faults can be reset', async () => {
+    const mock = await play();
+    const looking = await visit(mock.look);
+    await until(looking, 'Looking only');
+    await looking.click('.estop');
+    await looking.waitForSelector('body[data-phase="faulted"]');
+    await until(looking, 'emergency stop');
+    assert.equal(mock.robot.latched, 1);
+    await shot(looking, 'studio-fault');
+    await leave(looking);
+    const page = await visit(mock.address);
+    await page.click('button:text-is("Reset faults")');
+    await page.waitForSelector('body[data-phase="held"]');
+    await page.click('button:text-is("Start controllers")');
+    await page.waitForSelector('body[data-phase="running"]');
+    await leave(page);
+  });
+
+  test('parameters are set and taken back', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.click('#tab-controllers');
+    const field = page.locator('input[aria-label="kp of squat"]');
+    await field.fill('55');
+    await page.click('button[aria-label="set kp of squat"]');
+    await until(page, 'tandem controller set squat kp=55');
+    await page.click('button[aria-label="undo kp of squat"]');
+    await page.waitForFunction(
+      () => document.querySelector('[aria-label="kp of squat"]').value === '40',
+    );
+    assert.deepEqual(
+      asked(mock, 'controller.set').map((one) => one.parameters.kp),
+      [55, 40],
+    );
+    await field.fill('101');
+    await page.click('button[aria-label="set kp of squat"]');
+    await until(page, 'it is from 0 to 100 Nm/rad');
+    await leave(page);
+  });
+
+  test('inputs are sliders', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.click('#tab-inputs');
+    const slider = page.locator('input[aria-label="x [m/s]"]');
+    await slider.focus();
+    await page.keyboard.press('End');
+    await until(page, 'tandem input squat/rate x=1');
+    assert.equal(mock.robot.input, 1);
+    await leave(page);
+  });
+
+  test('takes control, moves a joint to its goal, and jogs only while held', async () => {
+    const mock = await play();
+    mock.robot.active = false;
+    const page = await visit(mock.address);
+    await page.click('#tab-joints');
+    const row = page.locator('[data-joint="LElbj"]');
+    await row.locator('.opener').click();
+    assert.equal(await row.locator('button:text-is("Go")').isDisabled(), true);
+    await page.click('.lease');
+    await page.waitForSelector('body[data-control="yours"]');
+    await row.locator('input[aria-label^="goal of LElbj"]').first().fill('-30deg');
+    await row.locator('button:text-is("Go")').click();
+    await page.waitForFunction(
+      () =>
+        Math.abs(
+          Number(document.querySelector('.scene').getAttribute('data-joint-LElbj')) + 0.523599,
+        ) < 1e-5,
+    );
+    await until(page, 'tandem joint move LElbj --to=-0.523599');
+    await row.locator('button:text-is("hold ▶")').hover();
+    await page.mouse.down();
+    await page.waitForTimeout(700);
+    await page.mouse.up();
+    await page.waitForTimeout(300);
+    const moves = asked(mock, 'joint.move').length;
+    assert.ok(moves >= 3, `${moves} goals`);
+    assert.ok(asked(mock, 'joint.stop').length >= 1);
+    await page.waitForTimeout(500);
+    assert.equal(asked(mock, 'joint.move').length, moves);
+    await shot(page, 'studio-joints');
+    await leave(page);
+    await new Promise((resolve) => setTimeout(resolve, 200));
+    assert.ok(asked(mock, 'joint.halt').length >= 1, 'the joints hold when the page is gone');
+  });
+
+  test('a lost connection is said, looks stale, and comes back', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    mock.drop();
+    await page.waitForSelector('body.stale[data-state="lost"]');
+    assert.match(await page.textContent('.link'), /lost \d+\.\d s ago/);
+    await page.waitForSelector('body[data-state="live"]:not(.stale)');
+    mock.say({ op: 'ended', how: 'after its duration', log: '/tmp/run.mcap' });
+    await until(page, 'ended: after its duration Its log: /tmp/run.mcap');
+    await leave(page);
+  });
+
+  test('names and texts of any kind are texts', async () => {
+    const mock = await play({ hostile: true });
+    const page = await visit(mock.address);
+    for (const tab of ['joints', 'controllers', 'inputs', 'events', 'plots']) {
+      await page.click(`#tab-${tab}`);
+      await page.waitForTimeout(350);
+    }
+    await page.fill('.search', 'img src');
+    await page.click('.estop');
+    await page.waitForTimeout(300);
+    assert.equal(await page.evaluate(() => window.hacked), undefined);
+    assert.equal(await page.locator('img').count(), 0);
+    assert.match(await page.textContent('header'), /<img src=x onerror/);
+    await page.waitForFunction(() => Number(document.querySelector('.scene').dataset.drawn) > 0);
+    await leave(page);
+  });
+
+  test('a layout is kept, saved and opened', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.waitForSelector('.pane .uplot');
+    await page.selectOption('select[aria-label="preset layout"]', 'legs torque');
+    await page.waitForSelector('.plots[data-panes="2"]');
+    await page.reload();
+    await page.waitForSelector('.plots[data-panes="2"]');
+    const [download] = await Promise.all([
+      page.waitForEvent('download'),
+      page.click('text=Save layout'),
+    ]);
+    const layout = JSON.parse(readFileSync(await download.path(), 'utf8'));
+    assert.equal(layout.panes.length, 2);
+    layout.panes.push({ series: [{ kind: 'signal', name: 'state.nothing' }] });
+    const file = join(kScratch, 'layout.json');
+    writeFileSync(file, JSON.stringify(layout));
+    await page.setInputFiles('input[type=file]', file);
+    await page.waitForSelector('.plots[data-panes="3"]');
+    await until(page, 'state.nothing (not in this run)');
+    writeFileSync(file, 'no');
+    await page.setInputFiles('input[type=file]', file);
+    await until(page, 'layout.json: the file is no JSON');
+    await leave(page);
+  });
+
+  test('a closed loop moves its joints without motors', async () => {
+    const mock = await play({ robot: 'four_bar', passive: ['coupler', 'rocker'] });
+    const page = await visit(mock.address);
+    await page.waitForFunction(
+      () =>
+        Math.abs(Number(document.querySelector('.scene').getAttribute('data-joint-rocker'))) > 0.01,
+    );
+    await shot(page, 'studio-four-bar');
+    await leave(page);
+  });
+
+  test('without WebGL there are words, and all else works', async () => {
+    const mock = await play();
+    const init = () => {
+      const get = HTMLCanvasElement.prototype.getContext;
+      HTMLCanvasElement.prototype.getContext = function context(kind, ...rest) {
+        return kind.startsWith('webgl') ? null : get.call(this, kind, ...rest);
+      };
+    };
+    const page = await visit(mock.address, { init });
+    await until(page, 'This browser has no WebGL');
+    await page.waitForSelector('.pane .uplot');
+    await page.waitForFunction(() =>
+      document.querySelector('.scene').hasAttribute('data-joint-LKneeSag'),
+    );
+    page.complaints = page.complaints.filter((text) => !text.includes('WebGL'));
+    await leave(page);
+  });
+
+  for (const [name, options] of [
+    ['light', { scheme: 'light' }],
+    ['dark', { scheme: 'dark' }],
+    ['narrow', { width: 390, height: 844, touch: true }],
+  ]) {
+    test(`${name}: nothing for axe-core to find, nothing wider than the window`, async () => {
+      const mock = await play();
+      const page = await visit(mock.address, options);
+      for (const tab of ['plots', 'joints', 'controllers', 'inputs', 'events']) {
+        await page.click(`#tab-${tab}`);
+        if (tab === 'joints') await page.locator('.opener').first().click();
+        await page.waitForTimeout(400);
+        assert.deepEqual(await violations(page), [], tab);
+        const [wide, window] = await page.evaluate(() => [
+          document.documentElement.scrollWidth,
+          innerWidth,
+        ]);
+        assert.ok(wide <= window, `${tab}: ${wide} of ${window} pixels`);
+        await shot(page, `studio-${name}-${tab}`);
+      }
+      await leave(page);
+    });
+  }
+});

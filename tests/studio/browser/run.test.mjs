@@ -1,0 +1,165 @@
+// The page against real runs: TANDEM=build/release/bin/tandem node --test tests/studio/browser/run.test.mjs
+import assert from 'node:assert/strict';
+import { execFileSync, spawn } from 'node:child_process';
+import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, afterEach, before, describe, test } from 'node:test';
+import { kPage, lacking, openBrowser, openMortalBrowser, openPage } from './support.mjs';
+
+const kTandem = process.env.TANDEM ?? join(kPage, '../../build/release/bin/tandem');
+const kConfig = join(kPage, '../../config');
+const why = lacking() || (existsSync(kTandem) ? '' : `${kTandem} is not built`);
+const kScratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
+const kShots = process.env.TANDEM_SCREENSHOTS;
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+describe('the studio of a run', { skip: why || false }, () => {
+  const runs = [];
+  let browser;
+  before(async () => {
+    browser = await openBrowser();
+  });
+  afterEach(async () => {
+    for (const run of runs.splice(0)) await run.end();
+  });
+  after(async () => {
+    await browser?.close();
+    rmSync(kScratch, { recursive: true, force: true });
+  });
+
+  /** Begins a run of a bundled experiment, with its studio at a free port. */
+  const begin = async (experiment, ...options) => {
+    const socket = join(kScratch, `run-${runs.length}-${Date.now()}.sock`);
+    const words = ['run', join(kConfig, experiment), '--rate', '1', '--no-log', '--socket', socket];
+    words.push('--duration', '300', '--on-fault', 'wait', '--studio', ...options);
+    if (process.env.TANDEM_STUDIO_PAGE) words.push('--studio-page', process.env.TANDEM_STUDIO_PAGE);
+    const child = spawn(kTandem, words, { cwd: kScratch });
+    let said = '';
+    for (const stream of [child.stdout, child.stderr]) {
+      stream.on('data', (data) => {
+        said += data;
+      });
+    }
+    const ended = new Promise((resolve) => child.on('exit', resolve));
+    const end = async () => {
+      child.kill('SIGINT');
+      await ended;
+    };
+    runs.push({ end });
+    for (let i = 0; i < 300 && !/studio: http\S+/.test(said); ++i) await sleep(100);
+    const address = /studio: (http\S+)/.exec(said)?.[1];
+    assert.ok(address, said);
+    const ask = (request) =>
+      JSON.parse(
+        execFileSync(kTandem, ['ask', JSON.stringify(request), '--socket', socket], {
+          encoding: 'utf8',
+        }),
+      );
+    return { address, ask, end, said: () => said };
+  };
+  const visit = async (address, options) => {
+    const page = await openPage(browser, address, options);
+    await page.waitForSelector('body[data-cycle]');
+    return page;
+  };
+  const leave = async (page) => {
+    assert.deepEqual(page.complaints, []);
+    assert.deepEqual(page.outside, []);
+    await page.context().close();
+  };
+  const shot = async (page, name) => {
+    if (kShots) await page.screenshot({ path: join(kShots, `${name}.png`) });
+  };
+  const joint = (run, name) =>
+    run.ask({ do: 'joint.list' }).joints.find((one) => one.joint === name);
+  /** Waits until something of the run is so. */
+  const until = async (what, is) => {
+    for (let i = 0; i < 150; ++i) {
+      if (is()) return;
+      await sleep(100);
+    }
+    assert.fail(what);
+  };
+
+  test('COMAN squats, stands still, steps; the page has the joints of the run', async () => {
+    const run = await begin('coman/squat.toml');
+    const page = await visit(run.address);
+    await page.waitForSelector('body[data-phase="running"]');
+    await page.waitForSelector('.clock-body:not([disabled])');
+    await page.locator('.clock-body button:text-is("Pause")').click();
+    await page.waitForSelector('body[data-paused="true"]');
+    const before = run.ask({ do: 'clock.show' }).cycles;
+    await page.fill('.clock-body input', '40');
+    await page.locator('.clock-body button:text-is("Step")').click();
+    await until('40 cycles later', () => run.ask({ do: 'clock.show' }).cycles === before + 40);
+    await page.waitForFunction(
+      (cycle) => Number(document.body.dataset.cycle) >= cycle,
+      before + 39,
+    );
+    for (const name of ['LKneeSag', 'RShLat', 'WaistYaw']) {
+      const expected = Math.fround(joint(run, name).position_rad);
+      await page.waitForFunction(
+        ([key, value]) =>
+          Math.abs(
+            Number(document.querySelector('.scene').getAttribute(`data-joint-${key}`)) - value,
+          ) < 1e-6,
+        [name, expected],
+      );
+    }
+    await page.locator('.clock-body button:text-is("Resume")').click();
+    await page.waitForSelector('body[data-paused="false"]');
+    await page.waitForSelector('.pane .uplot');
+    await shot(page, 'studio-squat');
+    await leave(page);
+  });
+
+  test('a joint of Panda goes where the page says; when the browser is killed it holds', async () => {
+    const run = await begin('panda/hold.toml');
+    const mortal = await openMortalBrowser();
+    const page = await openPage(mortal.browser, run.address);
+    await page.waitForSelector('body[data-phase="running"]');
+    await page.click('#tab-joints');
+    const row = page.locator('[data-joint="panda_joint4"]');
+    await row.locator('.opener').click();
+    await row.locator('button:text-is("Stop its controller")').click();
+    await page.waitForSelector('[data-joint="panda_joint4"][data-controller=""]');
+    await page.click('.lease');
+    await page.waitForSelector('body[data-control="yours"]');
+    await row.locator('input[aria-label^="speed of"]').fill('1');
+    await row.locator('input[aria-label^="goal of panda_joint4"]').first().fill('-1.5');
+    await row.locator('button:text-is("Go")').click();
+    await until(
+      'it is at its goal',
+      () => Math.abs(joint(run, 'panda_joint4').position_rad + 1.5) < 0.02,
+    );
+    await shot(page, 'studio-panda');
+    await row.locator('input[aria-label^="speed of"]').fill('0.1');
+    await row.locator('input[aria-label^="goal of panda_joint4"]').first().fill('-2.5');
+    await row.locator('button:text-is("Go")').click();
+    await until('it moves', () => joint(run, 'panda_joint4').moving);
+    assert.deepEqual(page.complaints, []);
+    await mortal.kill();
+    await until('it holds', () => !joint(run, 'panda_joint4').moving);
+    const place = joint(run, 'panda_joint4').position_rad;
+    assert.ok(place > -2.4, `at ${place} rad, far from the goal`);
+  });
+
+  test('the emergency stop needs nothing; a reset and a start go on', async () => {
+    const run = await begin('panda/hold.toml');
+    const looking = await visit(run.address.replace(/#.*/, ''));
+    await looking.waitForSelector('body[data-phase="running"]');
+    await looking.click('.estop');
+    await looking.waitForSelector('body[data-phase="faulted"]');
+    assert.equal(run.ask({ do: 'status' }).phase, 'faulted');
+    await leave(looking);
+    const page = await visit(run.address);
+    await page.locator('button:text-is("Reset faults")').click();
+    await page.waitForSelector('body[data-phase="held"]');
+    await page.locator('button:text-is("Start controllers")').click();
+    await page.waitForSelector('body[data-phase="running"]');
+    await run.end();
+    await page.waitForSelector('body[data-state="ended"]');
+    await leave(page);
+  });
+});

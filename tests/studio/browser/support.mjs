@@ -1,0 +1,90 @@
+// A browser for the tests of the studio's page, and what every test of it looks at.
+import { existsSync, readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+const here = dirname(fileURLToPath(import.meta.url));
+export const kPage = join(here, '../../../studio/page');
+const require = createRequire(join(kPage, 'package.json'));
+
+const kBrowsers = [
+  process.env.TANDEM_CHROMIUM,
+  '/usr/bin/chromium-headless-shell',
+  '/usr/bin/chromium',
+].filter(Boolean);
+
+/** Why the tests cannot run here; empty: they can. */
+export function lacking() {
+  if (!existsSync(join(kPage, 'node_modules/playwright-core'))) {
+    return 'npm packages of studio/page are not installed: scripts/install-node-modules';
+  }
+  if (!kBrowsers.some(existsSync)) return 'no chromium: apt install chromium-headless-shell';
+  return '';
+}
+
+function launchOptions() {
+  // WebGL by software; lines of plots on the processor, which is faster there.
+  const args = [
+    '--use-angle=swiftshader',
+    '--enable-unsafe-swiftshader',
+    '--disable-accelerated-2d-canvas',
+    '--disable-gpu-rasterization',
+  ];
+  if (process.getuid?.() === 0) args.push('--no-sandbox');
+  return { executablePath: kBrowsers.find(existsSync), args };
+}
+
+export async function openBrowser() {
+  return require('playwright-core').chromium.launch(launchOptions());
+}
+
+/** A browser that can be killed, as by a power cut: kill(). */
+export async function openMortalBrowser() {
+  const { chromium } = require('playwright-core');
+  const server = await chromium.launchServer(launchOptions());
+  const browser = await chromium.connect(server.wsEndpoint());
+  return { browser, kill: () => server.kill() };
+}
+
+/** A page that keeps what the console and the network complained about. */
+export async function openPage(browser, address, options = {}) {
+  const context = await browser.newContext({
+    viewport: { width: options.width ?? 1400, height: options.height ?? 860 },
+    colorScheme: options.scheme ?? 'light',
+    acceptDownloads: true,
+    hasTouch: options.touch ?? false,
+  });
+  if (options.init) await context.addInitScript(options.init);
+  const page = await context.newPage();
+  page.setDefaultTimeout(15000);
+  page.complaints = [];
+  page.outside = [];
+  page.on('console', (message) => {
+    const text = message.text();
+    // Chromium's word about software rendering, not about the page.
+    if (/GPU stall due to ReadPixels|WebGL: CONTEXT_LOST/.test(text)) return;
+    if (['error', 'warning'].includes(message.type())) page.complaints.push(text);
+  });
+  page.on('pageerror', (error) => page.complaints.push(String(error)));
+  page.on('request', (request) => {
+    const { host, protocol } = new URL(request.url());
+    if (/^https?:$/.test(protocol) && host !== new URL(address).host)
+      page.outside.push(request.url());
+  });
+  await page.goto(address);
+  return page;
+}
+
+/** What axe-core finds, in words. */
+export async function violations(page) {
+  // As text: the page's policy forbids foreign scripts.
+  await page.evaluate(readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8'));
+  return page.evaluate(async () => {
+    const found = await window.axe.run(document);
+    return found.violations.map(
+      (one) =>
+        `${one.id}: ${one.nodes.map((node) => `${node.target} ${node.failureSummary}`).join(' | ')}`,
+    );
+  });
+}
