@@ -316,4 +316,13 @@ Result<std::vector<EventText>> LogFile::events() const {
   return events;
 }
 
+Error same_data(const std::string& path, const std::string& other) {
+  return {
+      .message = "has the same data as " + other + ", bit by bit",
+      .hint =
+          "leave one of them out; a simulated robot without noise does the same with every seed",
+      .file = path,
+      .key = {}};
+}
+
 }  // namespace tandem::log
