@@ -42,7 +42,7 @@ export class Actions {
   constructor(readonly source: Source) {
     this.line.hidden = true;
     this.copier.hidden = true;
-    say(this.words, 'Every action has a command: point at a button, or copy it here.');
+    say(this.words, 'Point at a button to see its command.');
   }
 
   /** Shows a command and words about it. */

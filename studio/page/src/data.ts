@@ -106,10 +106,9 @@ export class Data {
   private subscribe(): void {
     const wanted = [...new Set([...this.needs.values()].flatMap((need) => need.ids))];
     const ids = wanted.slice(0, kMostSignals);
-    const fresh = new Set(this.history.track(ids));
-    for (const need of this.needs.values()) {
-      if (need.past) for (const id of need.ids) if (fresh.has(id)) this.lacking.add(id);
-    }
+    // Only what is plotted has a past here: of all else the newest values do.
+    const plotted = [...this.needs.values()].filter((need) => need.past);
+    for (const id of this.history.track(plotted.flatMap((need) => need.ids))) this.lacking.add(id);
     this.revisions.set(++this.revision, ids);
     this.revisions.delete(this.revision - kRevisionsKept);
     this.source.subscribe(this.revision, ids);

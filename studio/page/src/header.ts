@@ -12,6 +12,7 @@ export class Header {
   private state: Connection = 'connecting';
   private why = '';
   private brokeAt = 0;
+  private gaps = 0;
   private readonly robot = h('strong', { class: 'robot' }, '–');
   private readonly experiment = h('span', { class: 'experiment' });
   private readonly phase = h('span', { class: 'chip phase' }, '–');
@@ -89,7 +90,10 @@ export class Header {
     const tick = this.data.lastTick;
     if (!tick) return;
     say(this.time, seconds(tick.time));
-    say(this.lost, tick.lost > 0 ? `${tick.lost} frames lost` : '');
+    if (tick.gap) ++this.gaps;
+    const gaps = this.gaps > 0 ? `${this.gaps} gaps in the values` : '';
+    const lost = tick.lost > 0 ? `${tick.lost} frames lost` : '';
+    say(this.lost, [lost, gaps].filter(Boolean).join(', '));
     document.body.dataset.time = String(tick.time);
     document.body.dataset.cycle = String(tick.cycle);
     document.body.dataset.lost = String(tick.lost);

@@ -22,6 +22,7 @@ export class History {
   private readonly room: number;
   private times: Float64Array;
   private readonly columns = new Map<number, Column>();
+  private readonly newestValues = new Map<number, number>();
   private begin = 0;
   private end = 0;
   private rowStart = Number.NEGATIVE_INFINITY;
@@ -45,6 +46,7 @@ export class History {
   }
 
   clear(): void {
+    this.newestValues.clear();
     this.begin = 0;
     this.end = 0;
     this.rowStart = Number.NEGATIVE_INFINITY;
@@ -83,6 +85,7 @@ export class History {
     const row = this.end - 1;
     this.times[row] = tick.time;
     ids.forEach((id, i) => {
+      if (i < tick.count) this.newestValues.set(id, tick.values[3 * i + 2]);
       const column = this.columns.get(id);
       if (!column || i >= tick.count) return;
       widen(column, row, tick.values[3 * i], tick.values[3 * i + 1]);
@@ -126,10 +129,9 @@ export class History {
     const row = this.rowAt(time);
     return row < 0 ? Number.NaN : (this.columns.get(id)?.last[row] ?? Number.NaN);
   }
+  /** The newest value of any signal that ticks have, with or without a column. */
   latest(id: number): number {
-    return this.end === this.begin
-      ? Number.NaN
-      : (this.columns.get(id)?.last[this.end - 1] ?? Number.NaN);
+    return this.newestValues.get(id) ?? Number.NaN;
   }
 
   /** The rows of a span; views, which hold until the next push. */

@@ -1,6 +1,5 @@
 // Inputs of the controllers as sliders: a sample is sent again while it is held.
 import type { Actions } from './actions';
-import type { ControlLease } from './control';
 import type { Data } from './data';
 import { h, say } from './dom';
 import { number } from './format';
@@ -31,7 +30,6 @@ export class Inputs {
   constructor(
     data: Data,
     private readonly actions: Actions,
-    private readonly lease: ControlLease,
   ) {
     data.source.on({ watched: (request, answer) => this.watched(request, answer) });
   }
@@ -123,8 +121,7 @@ export class Inputs {
       say(shown, number(values[component]));
     });
     slider.addEventListener('change', () => {
-      if (this.lease.mayChange)
-        void this.actions.run({ do: 'input.set', name, values: { ...values } });
+      void this.actions.run({ do: 'input.set', name, values: { ...values } });
     });
     const zero = h(
       'button',

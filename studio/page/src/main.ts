@@ -17,6 +17,7 @@ import { Inputs } from './inputs';
 import { Joints } from './joints';
 import { LiveSource } from './live';
 import { Plots } from './plots';
+import { kProtocol } from './protocol';
 import { Scene } from './scene';
 import { Tabs } from './tabs';
 
@@ -89,7 +90,7 @@ function start(): void {
         label: 'Controllers',
         content: new Controllers(data, actions, lease).element,
       },
-      { name: 'inputs', label: 'Inputs', content: new Inputs(data, actions, lease).element },
+      { name: 'inputs', label: 'Inputs', content: new Inputs(data, actions).element },
       { name: 'events', label: 'Events', content: new Events(data).element },
     ],
     (name) => {
@@ -100,6 +101,11 @@ function start(): void {
   scene.whenTree((tree) => joints.setTree(tree));
   source.on({
     trouble: (message, hint) => actions.tell('', `${message}${hint ? ` – ${hint}` : ''}`, true),
+  });
+  data.whenHello((hello) => {
+    if (hello.protocol === kProtocol) return;
+    const words = `The run speaks version ${hello.protocol} of the studio, this page ${kProtocol}`;
+    actions.tell('', `${words}: what is shown may be wrong. Load the page again.`, true);
   });
   document.body.append(
     header.element,

@@ -3,6 +3,8 @@ import * as THREE from 'three';
 import type { Model } from './model';
 
 const kMetresPerNewton = 1 / 1000;
+/** Marks are drawn last, through the robot. */
+const kAbove = 2;
 
 export class Marks {
   readonly forces = new THREE.Group();
@@ -18,12 +20,13 @@ export class Marks {
       new THREE.SphereGeometry(0.018, 16, 12),
       new THREE.MeshBasicMaterial({ color: 0xe69f00, depthTest: false }),
     );
-    this.dot.renderOrder = 2;
+    this.dot.renderOrder = kAbove;
     const points = [new THREE.Vector3(), new THREE.Vector3(0, 0, -1)];
     this.drop = new THREE.Line(
       new THREE.BufferGeometry().setFromPoints(points),
       new THREE.LineBasicMaterial({ color: 0xe69f00, depthTest: false }),
     );
+    this.drop.renderOrder = kAbove;
     this.com.add(this.dot, this.drop);
     this.com.visible = false;
     this.frames.visible = false;
@@ -33,6 +36,10 @@ export class Marks {
     const feet = Math.floor(forces.length / 3);
     while (this.arrows.length < feet) {
       const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), undefined, 0.1, 0x009e73);
+      for (const part of [arrow.line, arrow.cone]) {
+        (part.material as THREE.Material).depthTest = false;
+        part.renderOrder = kAbove;
+      }
       this.arrows.push(arrow);
       this.forces.add(arrow);
     }
@@ -45,6 +52,11 @@ export class Marks {
       arrow.setDirection(force.normalize());
       arrow.setLength(length, Math.min(0.05, 0.4 * length), Math.min(0.03, 0.25 * length));
     });
+  }
+
+  /** @param radius of the robot: the dot is a small part of it. */
+  setSize(radius: number): void {
+    this.dot.scale.setScalar(Math.max(0.2, radius / 0.6));
   }
 
   /** @param ground its height; the line of the centre of mass ends there. */
@@ -64,6 +76,8 @@ export class Marks {
       if (!object) continue;
       const axes = new THREE.AxesHelper(object === model.robot ? 0.2 : 0.08);
       axes.matrixAutoUpdate = false;
+      axes.renderOrder = kAbove;
+      (axes.material as THREE.Material).depthTest = false;
       this.frames.add(axes);
       this.followed.push({ axes, object });
     }

@@ -308,7 +308,12 @@ export class Pane implements LegendOwner {
       {
         width,
         height: this.height(),
-        padding: [8, second && units.length < 2 ? kAxis_px : 12, 0, 0],
+        padding: [
+          8,
+          second && units.length < 2 ? kAxis_px : 12,
+          0,
+          units.length === 0 ? kAxis_px : 0,
+        ],
         series: lines,
         bands,
         legend: { show: false },

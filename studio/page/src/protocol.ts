@@ -1,5 +1,7 @@
 // What goes between page and studio: messages as types, binary frames as decoders.
 
+/** Version of the messages. */
+export const kProtocol = 1;
 export const kSubprotocol = 'tandem.studio.v1';
 
 export interface JointInfo {

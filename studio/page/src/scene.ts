@@ -16,6 +16,8 @@ const kViews: Record<string, [number, number, number]> = {
 };
 /** Without a graphics processor the picture costs what the plots need: fewer, and plain. */
 const kSlowEvery_ms = 120;
+/** Pictures between two looks whether the robot has left the view. */
+const kLookEvery = 10;
 const kPlainName = /^[\w.-]+$/;
 
 /** Whether this browser draws 3D on the processor. */
@@ -62,6 +64,9 @@ export class Scene {
   private readonly center = new THREE.Vector3();
   private radius = 0.6;
   private fitted = false;
+  /** Somebody has turned the view. */
+  private touched = false;
+  private looks = 0;
   private readonly shows = { ghost: false, forces: true, com: true, frames: false, follow: true };
   private readonly onTree: ((tree: TreeJoint[]) => void)[] = [];
 
@@ -142,6 +147,9 @@ export class Scene {
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.addEventListener('change', () => {
       this.dirty = true;
+    });
+    this.controls.addEventListener('start', () => {
+      this.touched = true;
     });
     new ResizeObserver(() => this.resize()).observe(this.canvasBox);
     this.view('free');
@@ -271,7 +279,7 @@ export class Scene {
 
   private render(posed: boolean): void {
     if (!this.renderer || !this.controls) return;
-    if (this.model && posed && !this.fitted) this.fit();
+    if (this.model && posed) this.keepInView();
     if (this.shows.follow && this.model) {
       const now = this.model.robot.position.clone();
       const moved = now.clone().sub(this.center);
@@ -285,21 +293,34 @@ export class Scene {
     this.dirty = false;
   }
 
-  private fit(): void {
-    if (!this.model || !this.controls) return;
+  private extent(): THREE.Sphere | null {
+    if (!this.model) return null;
     this.model.robot.updateMatrixWorld(true);
     const box = new THREE.Box3().setFromObject(this.model.robot);
-    if (box.isEmpty()) return;
+    return box.isEmpty() ? null : box.getBoundingSphere(new THREE.Sphere());
+  }
+
+  /** Fits the view at first, and, until somebody turns it, when the robot has left it. */
+  private keepInView(): void {
+    if (!this.controls || (this.fitted && (this.touched || ++this.looks % kLookEvery !== 0)))
+      return;
+    const now = this.extent();
+    if (!now) return;
+    const away = now.center.distanceTo(this.controls.target);
+    if (this.fitted && away < 0.3 * this.radius && now.radius < 1.2 * this.radius) return;
     this.fitted = true;
-    const sphere = box.getBoundingSphere(new THREE.Sphere());
-    this.radius = Math.max(0.1, sphere.radius);
-    this.center.copy(this.model.robot.position);
-    this.controls.target.copy(sphere.center);
     this.view('free');
   }
 
   private view(name: string): void {
     if (!this.controls) return;
+    const now = this.extent();
+    if (now && this.model) {
+      this.radius = Math.max(0.1, now.radius);
+      this.controls.target.copy(now.center);
+      this.center.copy(this.model.robot.position);
+      this.marks.setSize(this.radius);
+    }
     const [x, y, z] = kViews[name];
     const narrow = Math.min(1, this.camera.aspect);
     const far = (1.02 * this.radius) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
@@ -307,6 +328,11 @@ export class Scene {
     this.camera.position.copy(this.controls.target).add(away);
     this.controls.update();
     this.dirty = true;
+  }
+
+  private choose(name: string): void {
+    this.touched = name !== 'free';
+    this.view(name);
   }
 
   private resize(): void {
@@ -334,7 +360,7 @@ export class Scene {
       return h('label', { class: 'toggle', title }, box, label);
     };
     const view = (name: string) =>
-      h('button', { type: 'button', onclick: () => this.view(name) }, name);
+      h('button', { type: 'button', onclick: () => this.choose(name) }, name);
     return h(
       'div',
       { class: 'toolbar', role: 'group', 'aria-label': '3D view' },

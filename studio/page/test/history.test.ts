@@ -80,6 +80,14 @@ test('time that goes back begins anew', () => {
   assert.ok(history.view(0, 9).times.every((time) => time <= 2));
 });
 
+test('the newest value needs no column', () => {
+  const history = new History(100, 9);
+  history.push(tick(1, 1, 3, 2), [7]);
+  assert.equal(history.latest(7), 2);
+  assert.ok(Number.isNaN(history.at(7, 1)));
+  assert.ok(Number.isNaN(history.latest(8)));
+});
+
 test('a signal that is added later has no values before', () => {
   const history = new History(100, 1);
   history.track([1]);

@@ -51,7 +51,7 @@ describe('the studio page', { skip: why || false }, () => {
   };
   const asked = (mock, name) => mock.robot.requests.filter((one) => one.do === name);
   const until = (page, text) =>
-    page.waitForFunction((words) => document.body.innerText.includes(words), text);
+    page.waitForFunction((words) => document.body.textContent.includes(words), text);
 
   test('shows the run, and a robot that is not blank', async () => {
     const mock = await play();
@@ -297,6 +297,28 @@ describe('the studio page', { skip: why || false }, () => {
     await page.waitForSelector('body[data-state="live"]:not(.stale)');
     mock.say({ op: 'ended', how: 'after its duration', log: '/tmp/run.mcap' });
     await until(page, 'ended: after its duration Its log: /tmp/run.mcap');
+    await leave(page);
+  });
+
+  test('without a connection the stop says what to type', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await mock.stop();
+    mocks.splice(0);
+    await page.waitForSelector('body[data-state="lost"]');
+    await page.click('.estop');
+    await until(
+      page,
+      'The stop is not confirmed: there is no connection to the run. Type: tandem estop',
+    );
+    page.complaints = page.complaints.filter((text) => !text.includes('ERR_CONNECTION_REFUSED'));
+    await leave(page);
+  });
+
+  test('a run of another version is told from this page', async () => {
+    const mock = await play({ protocol: 2 });
+    const page = await visit(mock.address);
+    await until(page, 'The run speaks version 2 of the studio, this page 1');
     await leave(page);
   });
 

@@ -31,10 +31,11 @@ function jointsOf(urdf) {
 }
 
 export class PlayedRobot {
-  constructor({ robot, config, hostile = false, passive = [], bus = false }) {
+  constructor({ robot, config, hostile = false, passive = [], bus = false, protocol = 1 }) {
     this.urdf = readFileSync(`${config}/${robot}/${robot}.urdf`, 'utf8');
     this.hostile = hostile;
     this.bus = bus;
+    this.protocol = protocol;
     this.name = hostile ? kHostile : robot;
     const all = jointsOf(this.urdf);
     this.joints = all.filter((joint) => !passive.includes(joint.name));
@@ -224,7 +225,7 @@ export class PlayedRobot {
   hello() {
     return {
       op: 'hello',
-      protocol: 1,
+      protocol: this.protocol,
       version: 'mock',
       robot: this.name,
       experiment: this.hostile ? kHostile : 'squat.toml',
