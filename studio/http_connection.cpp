@@ -1,3 +1,5 @@
+// HTTP: one request after the other, each with an answer by HttpRules, within bounds of size and
+// time; one that opens a WebSocket hands its socket on.
 #include <algorithm>
 #include <utility>
 

@@ -17,7 +17,7 @@ struct RequestHead {
   std::string_view target;
   bool old = false;       ///< HTTP/1.0
   bool upgrades = false;  ///< to a WebSocket
-  // Of headers that came not once the list says it.
+  // Headers, as often as they came.
   std::vector<std::string_view> hosts{}, origins{}, encodings{}, authorizations{}, protocols{};
 };
 
@@ -29,7 +29,7 @@ struct Response {
   std::vector<std::pair<std::string_view, std::string_view>> headers{};  ///< beside kHeaders
 };
 
-/// Of every answer.
+/// Headers of every answer.
 inline constexpr std::pair<std::string_view, std::string_view> kHeaders[] = {
     {"Content-Security-Policy",
      "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
@@ -67,7 +67,7 @@ class HttpRules {
 /// An answer in words. @param reason  the status' own
 [[nodiscard]] Response words(unsigned status, std::string_view reason, std::string text);
 
-/// Of a text that is secret: takes as long whatever differs. False of an empty secret.
+/// Whether they are equal, found in the same time whatever differs. False for an empty secret.
 [[nodiscard]] bool is_secret(std::string_view text, std::string_view secret);
 
 }  // namespace tandem::studio

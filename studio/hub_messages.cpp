@@ -141,7 +141,7 @@ void Hub::on_window(ClientNumber, Client& client, const Json& message, Clock::ti
   }
   std::vector<SignalId> signals;
   if (!all_known(client, message.value("signals", Json()), kMostWindowSignals, signals)) return;
-  // Of many signals fewer points: an answer is kMostWindowNumbers at most.
+  // Many signals have fewer points: an answer is kMostWindowNumbers at most.
   const std::size_t most = kMostWindowNumbers / (8 * std::max<std::size_t>(1, signals.size()));
   const double period_s = 1e-9 * static_cast<double>(run_->period_ns);
   constexpr double kLastCycle = 1e18;

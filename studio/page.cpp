@@ -1,4 +1,4 @@
-// Of a build with node the three files are in the program as they are on the disk, compressed.
+// With node at build time the three files are in the program as they are on the disk, compressed.
 #include "studio/page.hpp"
 
 namespace tandem::studio {

@@ -36,7 +36,7 @@ class Sampler {
 
   [[nodiscard]] const SignalTable& table() const { return table_; }
   [[nodiscard]] const History& history() const { return history_; }
-  /// Of the newest cycle; NaN before the first.
+  /// Numbers of the newest cycle; NaN before the first.
   [[nodiscard]] const std::vector<float>& last() const { return row_; }
   [[nodiscard]] std::uint64_t cycle() const { return time_.cycle; }
   [[nodiscard]] std::int64_t time_ns() const { return time_.time_ns; }

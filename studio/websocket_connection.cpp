@@ -1,3 +1,5 @@
+// A WebSocket: moves whole messages between a client and the hub, one write at a time. It reads no
+// more while much waits to be sent.
 #include <utility>
 
 #include "studio/connections.hpp"

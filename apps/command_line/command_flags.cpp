@@ -154,35 +154,6 @@ std::optional<std::int64_t> whole_number(const std::string& text) {
   return error == std::errc() && last == end ? std::optional(number) : std::nullopt;
 }
 
-CLI::Validator is_port() {
-  const auto check = [](const std::string& text) -> std::string {
-    const std::int64_t port = whole_number(text).value_or(-1);
-    if (text == "true" || (port >= 0 && port <= 65'535)) return "";
-    return "'" + text + "' is no port from 0 to 65535: --studio=9000";
-  };
-  return {check, ""};
-}
-
-void add_studio_flags(CLI::App& app, StudioOptions& o) {
-  static const std::string kHelp =
-      "Show the run in a browser; --studio=PORT (default: the first free one from 8642). A "
-      "simulated run keeps real time then, unless a rate is said";
-  CLI::Option* studio =
-      app.add_flag("--studio", kHelp)->check(is_port())->each([&o](const std::string& text) {
-        o.wanted = true;
-        if (text != "true") o.port = static_cast<std::uint16_t>(*whole_number(text));
-      });
-  app.add_option("--studio-address", o.address,
-                 "Where the studio listens: 0.0.0.0 for other machines, too, which need its token "
-                 "(default: 127.0.0.1)")
-      ->needs(studio)
-      ->check(is_given("give an address of this machine"));
-  app.add_option("--studio-page", o.page,
-                 "Folder of the studio's page, instead of the program's own: for work on it")
-      ->needs(studio)
-      ->check(is_given("name a folder"));
-}
-
 /// What `run` and `serve` share.
 void add_loop_flags(CLI::App& app, RunOptions& o) {
   CLI::Option* rate = app.add_option("--rate", o.rate,

@@ -32,6 +32,9 @@ void add_target(CLI::App& app, ControlTarget& target);
 /// @param dds  the flag that the first two need; null: none.  @return --dds-from
 CLI::Option* add_place(CLI::App& app, DdsPlace& place, CLI::Option* dds = nullptr);
 
+/// --studio and its like, of `run` and `serve`.
+void add_studio_flags(CLI::App& app, StudioOptions& o);
+
 /// Each adds its command's flags and examples to `app`, which writes what is given to `o`: that
 /// has to outlive the parsing.
 void add_flags(CLI::App& app, RunOptions& o);

@@ -24,6 +24,7 @@
 #include "apps/run/inject.hpp"
 #include "apps/run/input_topics.hpp"
 #include "apps/run/loop_crash.hpp"
+#include "apps/run/pace.hpp"
 #include "apps/run/prediction.hpp"
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_summary.hpp"
@@ -56,60 +57,9 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
   return texts;
 }
 
-std::string pace_text(const WiredComposition& c) {
-  const runtime::HalOptions& hal = c.experiment.hal;
-  std::string where = hal.backend == runtime::BackendKind::kWire
-                          ? "over " + wire_name(c.experiment.robot) + ", "
-                          : "";
-  if (hal.backend == runtime::BackendKind::kDds) where = "over DDS, ";
-  if (c.backend->pace() == hal::Pace::kBus) return where + "at the server's pace";
-  if (c.backend->pace() == hal::Pace::kWallClock) return where + "in real time";
-  const std::string how = hal.lockstep && !where.empty() ? "in lockstep, " : "";
-  const rt::CyclicLoopConfig& loop = c.experiment.loop;
-  return where + how + (loop.rate > 0.0 ? fmt::format("rate {:g}", loop.rate) : "free running") +
-         (loop.start_paused ? ", paused: tandem clock resume" : "") +
-         (time_limits_are_waived() ? ", without limits of time" : "");
-}
-
 std::string served_text(const runtime::Experiment& e) {
   return fmt::format("served in DDS domain {}, {}", e.dds.domain,
                      e.remote.lockstep ? "in lockstep, " : "");
-}
-
-/// Boards have clocks of their own, and so has the robot of a server.
-Status check_pace(const WiredComposition& c, const RunOptions& options) {
-  const bool simulated = c.backend->pace() == hal::Pace::kSimulatedClock;
-  if (options.serves && c.experiment.teleoperation && simulated &&
-      options.rate.value_or(c.experiment.loop.rate) != 1.0) {
-    return fail("a robot behind a link keeps real time, as its operator does", "add --realtime");
-  }
-  if (simulated) return {};
-  if (c.remote != nullptr) {
-    if (!options.start_paused && options.rate.value_or(1.0) == 1.0) return {};
-    const bool own = c.backend->pace() == hal::Pace::kWallClock;
-    return fail(own ? "the operator's end of a link keeps real time, as the robot's does"
-                    : "the server gives the pace",
-                own ? "leave --rate and --start-paused out"
-                    : "give --rate and --start-paused to `tandem serve`");
-  }
-  if (options.start_paused) {
-    return fail("boards on a bus keep real time, which cannot be paused",
-                "leave --start-paused out, or add --lockstep for emulated boards");
-  }
-  if (options.rate.value_or(1.0) == 1.0) return {};
-  return fail("boards on a bus keep real time, so --rate cannot be other than 1",
-              "leave --rate out, or add --lockstep for emulated boards");
-}
-
-/// A simulated run is the same to the last bit however late its cycles are: no policy holds.
-void note_overrun_policy(const WiredComposition& c, const RunOptions& options) {
-  const rt::CyclicLoopConfig& loop = c.experiment.loop;
-  const bool paced = options.rate.value_or(loop.rate) > 0.0;
-  if (c.backend->pace() != hal::Pace::kSimulatedClock || !paced) return;
-  if (loop.on_overrun == rt::OverrunPolicy::kSkip) return;
-  fmt::print(stderr,
-             "note: [overrun] holds for the wall clock; this run's time is simulated: a late cycle "
-             "is counted, and neither skips one nor stops the run (docs/realtime.md)\n");
 }
 
 /// Writes what --trace asks for, and says how much of the run it is.
@@ -448,11 +398,8 @@ Exit run_command(const RunOptions& given, ReportOfRun& report) {
   if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty())
     return refuse(errors);
   print_warnings((*composition)->warnings);
+  set_pace(**composition, options);
   if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
-  // Somebody looks: unless another pace is said, it is that of a robot.
-  const bool simulated = (*composition)->backend->pace() == hal::Pace::kSimulatedClock;
-  const bool says_none = !options.rate && (*composition)->experiment.loop.rate == 0.0;
-  if (options.studio.wanted && simulated && says_none) options.rate = 1.0;
   note_overrun_policy(**composition, options);
   auto session = std::make_unique<Session>(**composition, options, gate.get());
   const Exit exit = session->run();
