@@ -273,7 +273,7 @@ export class Pane implements LegendOwner {
     const axis = (scale: string, side: number, label: string): uPlot.Axis => ({
       scale,
       side,
-      label: label || undefined,
+      label: label || ' ',
       labelSize: 16,
       labelGap: 0,
       size: 48,
@@ -310,7 +310,7 @@ export class Pane implements LegendOwner {
         height: this.height(),
         padding: [
           8,
-          second && units.length < 2 ? kAxis_px : 12,
+          12 + (second && units.length < 2 ? kAxis_px : 0),
           0,
           units.length === 0 ? kAxis_px : 0,
         ],

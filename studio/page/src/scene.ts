@@ -63,6 +63,7 @@ export class Scene {
   private held: { time: number; values: number[] } | null = null;
   private readonly center = new THREE.Vector3();
   private radius = 0.6;
+  private lowest = 0;
   private fitted = false;
   /** Somebody has turned the view. */
   private touched = false;
@@ -95,7 +96,7 @@ export class Scene {
     const line = new THREE.Color(theme('--ground'));
     this.grid = new THREE.GridHelper(10, 40, line, line);
     this.grid.rotation.x = Math.PI / 2;
-    this.grid.position.z = this.data.hello?.ground?.height_m ?? 0;
+    this.placeGrid();
     this.scene.add(this.grid);
     this.scene.background = new THREE.Color(theme('--scene'));
     this.dirty = true;
@@ -272,7 +273,7 @@ export class Scene {
       }
     }
     this.marks.setFeet(feet, this.shows.forces ? forces : forces.map(() => 0));
-    this.marks.setCom(com, this.data.hello?.ground?.height_m ?? 0, this.shows.com);
+    this.marks.setCom(com, this.groundHeight(), this.shows.com);
     this.marks.update();
     this.render(position.some(Number.isFinite));
   }
@@ -291,6 +292,17 @@ export class Scene {
     this.renderer.render(this.scene, this.camera);
     this.element.dataset.drawn = String(this.drawn);
     this.dirty = false;
+  }
+
+  /** Its lines are 0.25 m apart, of a small robot 0.05 m. */
+  private placeGrid(): void {
+    this.grid?.position.setZ(this.groundHeight());
+    this.grid?.scale.setScalar(this.radius < 0.3 ? 0.2 : 1);
+  }
+
+  /** Of the grid: the run's ground, else below the robot. */
+  private groundHeight(): number {
+    return this.data.hello?.ground?.height_m ?? Math.min(0, this.lowest);
   }
 
   private extent(): THREE.Sphere | null {
@@ -320,6 +332,8 @@ export class Scene {
       this.controls.target.copy(now.center);
       this.center.copy(this.model.robot.position);
       this.marks.setSize(this.radius);
+      this.lowest = now.center.z - now.radius;
+      this.placeGrid();
     }
     const [x, y, z] = kViews[name];
     const narrow = Math.min(1, this.camera.aspect);
