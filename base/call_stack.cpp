@@ -6,6 +6,7 @@
 #include <cxxabi.h>
 #include <dlfcn.h>
 #include <link.h>
+#include <sys/mman.h>
 #include <ucontext.h>
 
 #include <algorithm>
@@ -14,8 +15,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <new>
 #include <string_view>
 
+#include "base/own_child.hpp"
 #include "base/utf8.hpp"
 
 /// What libbacktrace is given for dl_iterate_phdr() (base/CMakeLists.txt).
@@ -91,23 +94,42 @@ void append(std::span<char>& room, std::string_view text) noexcept {
   room = room.subspan(fits.size());
 }
 
-struct Registers {
-  std::uintptr_t pc = 0, caller = 0;  // the caller: 0 where it is not known
-};
-
-Registers registers_of(const void* context) noexcept {
+std::uintptr_t pc_of(const void* context) noexcept {
   const mcontext_t& m = static_cast<const ucontext_t*>(context)->uc_mcontext;
 #if defined(__x86_64__)
-  Registers found{.pc = static_cast<std::uintptr_t>(m.gregs[REG_RIP])};
-  if (found.pc == 0)  // the call has just pushed where it came from
-    found.caller = *reinterpret_cast<const std::uintptr_t*>(m.gregs[REG_RSP]);
-  return found;
+  return static_cast<std::uintptr_t>(m.gregs[REG_RIP]);
 #elif defined(__aarch64__)
-  return {.pc = m.pc, .caller = m.regs[30]};
+  return m.pc;
 #else
   (void)m;
-  return {};
+  return 0;
 #endif
+}
+
+/// Who called what is no code: the call has just left where it came from.
+std::uintptr_t caller_of(const void* context) noexcept {
+  const mcontext_t& m = static_cast<const ucontext_t*>(context)->uc_mcontext;
+#if defined(__x86_64__)
+  return *reinterpret_cast<const std::uintptr_t*>(m.gregs[REG_RSP]);
+#elif defined(__aarch64__)
+  return m.regs[30];
+#else
+  (void)m;
+  return 0;
+#endif
+}
+
+/// What a child reads of the interrupted code's stack, which may lead anywhere: it may crash. In
+/// memory that the child shares.
+struct Interrupted {
+  CallStack all;  // from the handler on
+  std::uintptr_t caller = 0;
+};
+Interrupted* interrupted = nullptr;  // null: there is no memory for it
+
+void read_stack(void* context) {
+  if (library_of(pc_of(context)) == nullptr) interrupted->caller = caller_of(context);
+  ::backtrace_simple(unwinder, 0, &add, &ignore, &interrupted->all);
 }
 
 }  // namespace
@@ -135,6 +157,11 @@ namespace tandem {
 
 void prepare_call_stacks() {
   if (unwinder == nullptr) unwinder = ::backtrace_create_state(nullptr, 1, &ignore, nullptr);
+  if (interrupted == nullptr) {
+    void* const memory = ::mmap(nullptr, sizeof(Interrupted), PROT_READ | PROT_WRITE,
+                                MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (memory != MAP_FAILED) interrupted = new (memory) Interrupted;
+  }
   (void)take_call_stack();  // loads the unwinder's library
 }
 
@@ -145,15 +172,19 @@ CallStack take_call_stack(std::size_t skip) noexcept {
 }
 
 CallStack interrupted_call_stack(const void* context) noexcept {
-  const Registers at = registers_of(context);
-  CallStack all = take_call_stack();
-  const auto own = all.view();
-  const auto first = std::ranges::find_if(
-      own, [&](std::uintptr_t pc) { return at.pc != 0 && (pc == at.pc || pc + 1 == at.pc); });
-  if (first == own.end()) return {.calls = {at.pc != 0 ? at.pc : at.caller - 1}, .count = 1};
-  CallStack stack;
-  stack.count = static_cast<std::size_t>(own.end() - first);
-  std::ranges::copy(first, own.end(), stack.calls.begin());
+  const std::uintptr_t pc = pc_of(context);
+  if (interrupted == nullptr) return {.calls = {pc}, .count = 1};
+  *interrupted = {};
+  (void)run_in_child(&read_stack, const_cast<void*>(context));
+  const std::uintptr_t caller = interrupted->caller;
+  if (library_of(caller) != nullptr) return {.calls = {caller - 1}, .count = 1};
+  const auto all = interrupted->all.view();
+  const auto first =
+      std::ranges::find_if(all, [&](std::uintptr_t call) { return call == pc || call + 1 == pc; });
+  CallStack stack{.calls = {pc}, .count = 1};
+  if (first == all.end()) return stack;
+  stack.count = static_cast<std::size_t>(all.end() - first);
+  std::ranges::copy(first, all.end(), stack.calls.begin());
   return stack;
 }
 

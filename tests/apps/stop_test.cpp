@@ -153,6 +153,8 @@ TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
       {"stack", "the loop crashed, and stands still: segmentation fault (SIGSEGV) at hangs.so+0x"},
       {"abort", "fault: the loop crashed, and stands still: abort() (SIGABRT) at hangs.so+0x"},
       {"divide", "the loop crashed, and stands still: arithmetic error (SIGFPE) at hangs.so+0x"},
+      {"wild", "the loop crashed, and stands still: segmentation fault (SIGSEGV) at hangs.so+0x"},
+      {"smash", "the loop crashed, and stands still: "},
       {"exit", "fault: exit() was called in the loop, which stands still at hangs.so+0x"}};
   // A crash is no hang: nothing waits for the watchdog's time.
   hang("0.0", "crash = \"none\"\n[faults]\nwatchdog_s = 3600\n");
@@ -170,10 +172,14 @@ TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
       EXPECT_NE(run.err.find(said), std::string::npos) << run.err;
     }
     EXPECT_EQ(run.err.find("hung"), std::string::npos) << run.err;
-    const char* const place = crash == std::string("stack") ? "fill at " : "\n  update at ";
-    EXPECT_NE(run.err.find(place), std::string::npos) << crash << "\n" << run.err;
-    EXPECT_NE(run.err.find("(hangs.so+0x"), std::string::npos) << crash << "\n" << run.err;
-    expect_crash("the loop crashed in the controller 'lazy': ");
+    if (crash != std::string("smash")) {  // where the way back is overwritten, nobody can say
+      const char* const place = crash == std::string("stack")  ? "fill at "
+                                : crash == std::string("wild") ? "\n  crash at "
+                                                               : "\n  update at ";
+      EXPECT_NE(run.err.find(place), std::string::npos) << crash << "\n" << run.err;
+      EXPECT_NE(run.err.find("(hangs.so+0x"), std::string::npos) << crash << "\n" << run.err;
+      expect_crash("the loop crashed in the controller 'lazy': ");
+    }
     if (crash == std::string("null")) {
       const std::string log = tandem("log info runs/*.mcap").out;
       EXPECT_NE(log.find("hangs.cpp:"), std::string::npos) << log;

@@ -25,7 +25,8 @@ class Hangs final : public Controller {
     for_s_ = setup.parameters.number_or("for_s", 0.0, {0.0, 600.0});  // 0: for ever
     throws_ = setup.parameters.boolean_or("throws", false);
     crash_ = setup.parameters.choice_or(
-        "crash", "no", {"no", "null", "stack", "abort", "divide", "exit", "close"});
+        "crash", "no",
+        {"no", "null", "stack", "abort", "divide", "exit", "close", "wild", "smash"});
     if (setup.parameters.boolean_or("at_once", false)) crash();
     for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
       setup.claim(j, hal::ControlMode::kPosition);
@@ -55,6 +56,14 @@ class Hangs final : public Controller {
     if (crash_ == "abort") std::abort();
     if (crash_ == "divide") std::raise(SIGFPE);  // as an integer's division by zero on x86
     if (crash_ == "exit") std::exit(0);
+    if (crash_ == "wild") wild_();
+    if (crash_ == "smash") smash(40);
+  }
+  /// Its way back leads to nowhere.
+  [[gnu::noinline]] static void smash(int words) {
+    volatile std::uintptr_t room[2] = {};
+    volatile std::uintptr_t* const beyond = room;
+    for (int i = 0; i < words; ++i) beyond[i] = 0x4141'4141'4141;
   }
   static int fill(int depth) {
     volatile int here = depth;
@@ -64,6 +73,7 @@ class Hangs final : public Controller {
   }
 
   void* nowhere_ = nullptr;
+  void (*wild_)() = reinterpret_cast<void (*)()>(0x1234);
   std::int64_t after_ = 0, cycles_ = 0;
   double for_s_ = 0.0;
   bool throws_ = false;
