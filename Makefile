@@ -26,6 +26,7 @@ help:
 # Installs missing packages (root or sudo only then), builds what the demo needs, runs it.
 demo:
 	@scripts/install-dependencies demo
+	@scripts/install-node-modules studio/page
 	@cmake --preset demo --log-level=WARNING
 	@cmake --build --preset demo --parallel $(JOBS)
 	@build/release/bin/tandem run config/coman/squat.toml --report
@@ -39,6 +40,7 @@ demo:
 # No tests; optimised as a whole, and for the branches that runs take.
 robot:
 	@scripts/install-dependencies demo
+	@scripts/install-node-modules studio/page
 	@JOBS=$(JOBS) scripts/build-robot
 
 # Layout, build and unit tests. The last lines say what ran and what did not.

@@ -11,7 +11,7 @@ const why = lacking();
 const kScratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
 const kShots = process.env.TANDEM_SCREENSHOTS;
 
-describe('the studio page', { skip: why || false }, () => {
+describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
   let browser;
   let startMock;
   const mocks = [];

@@ -14,7 +14,7 @@ const kScratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
 const kShots = process.env.TANDEM_SCREENSHOTS;
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-describe('the studio of a run', { skip: why || false }, () => {
+describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
   const runs = [];
   let browser;
   before(async () => {

@@ -191,6 +191,7 @@ export async function startMock(options = {}) {
         for (const client of clients) client.socket.terminate();
         sockets.close();
         http.close(resolve);
+        http.closeAllConnections();
       }),
   };
 }
