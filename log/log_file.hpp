@@ -78,6 +78,9 @@ class LogFile {
   /// The metadata record "result"; empty when the run was killed. Of several files the last one's,
   /// with the messages of all.
   [[nodiscard]] const StringMap& result() const { return result_; }
+  /// The same for people: a row for each line of a value, "N of M" messages where some are not
+  /// here, and without `data_sha256`, which is of what was written.
+  [[nodiscard]] StringMap shown_result() const;
   [[nodiscard]] const std::vector<LoggedTopic>& topics() const { return topics_; }
   [[nodiscard]] const LoggedTopic* find(std::string_view topic) const;
   /// The same. Error: the log has no such topic, leaves it out, or is cut before its first message.

@@ -82,6 +82,24 @@ bool LogFile::damage_loses_messages() const {
   });
 }
 
+StringMap LogFile::shown_result() const {
+  StringMap all;
+  for (const auto& [key, value] : result_) {
+    if (key == "data_sha256") continue;
+    const std::string here = std::to_string(messages());
+    if (key == "messages" && value != here) {
+      all.emplace_back(key, here + " of " + value);
+      continue;
+    }
+    for (std::size_t begin = 0; begin <= value.size();) {
+      const std::size_t end = std::min(value.find('\n', begin), value.size());
+      all.emplace_back(key, value.substr(begin, end - begin));
+      begin = end + 1;
+    }
+  }
+  return all;
+}
+
 std::vector<std::string> LogFile::remarks() const {
   std::vector<std::string> all = gaps();
   for (std::string& one : damage()) all.push_back(std::move(one));

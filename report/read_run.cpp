@@ -162,6 +162,8 @@ Status read_state(const log::LogFile& file, log::RunWindow& window, RunData& run
   if (!table->time_s.empty()) {
     run.first_s = table->time_s.front();
     run.last_s = table->time_s.back();
+    for (const std::size_t begin : stretches(table->time_s))
+      if (begin > 0) run.gaps_s.emplace_back(table->time_s[begin - 1], table->time_s[begin]);
   }
   run.start_known = window.bring_up_s > -1e299;
   const double end_s = table->time_s.empty() ? 0.0 : std::min(window.end_s, run.last_s);
@@ -337,7 +339,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   RunData run;
   run.path = path;
   run.info = file->info();
-  run.result = file->result();
+  run.result = file->shown_result();
   if (file->truncated()) run.cut_reason = file->cut_reason();
   run.remarks = file->remarks();
   run.data_sha256 = file->data_sha256();
@@ -350,6 +352,9 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   run.payloads = payloads_of(*events);
   log::RunWindow window = log::run_window(*events, run.settle_s);
   if (const Status s = read_state(*file, window, run); !s) return std::unexpected(s.error());
+  // Only a crash or a hang of the loop is in the result; it had no time to be an event.
+  if (std::string how = log::value_of(run.result, "ended"); !how.empty())
+    run.faults.push_back({run.last_s, {}, std::move(how)});
   if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());
   if (const Status s = read_truth(*file, kTruth, run); !s) return std::unexpected(s.error());
   if (const Status s = read_estimate(*file, run); !s) return std::unexpected(s.error());

@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/result.hpp"
@@ -69,7 +70,7 @@ using ErrorText = std::function<std::string(std::uint32_t code)>;
 struct RunData {
   std::string path;
   log::RunInfo info;
-  log::StringMap result;             ///< empty when the run was killed
+  log::StringMap result;             ///< log::LogFile::shown_result()
   std::string cut_reason;            ///< log::LogFile::cut_reason(); empty: it is whole
   std::vector<std::string> remarks;  ///< log::LogFile::remarks()
   std::string data_sha256;
@@ -79,15 +80,16 @@ struct RunData {
   std::string position_of, torque_of, foot;  ///< the experiment's [report]; may be empty
   std::vector<std::string> wrenches;         ///< sites of its [[estimation.wrench]]
 
-  double first_s = 0.0, last_s = 0.0;  ///< which times the log has
-  bool start_known = true;             ///< false: the log begins later than the drives' bring-up
-  double settle_s = 0.0;               ///< from bring-up to the controllers' start
-  bool controllers_ran = true;         ///< false: the rows are those in which they were waited for
-  double step_s = 0.0;                 ///< between rows, where none is missing
-  std::vector<double> time_s;          ///< of each row; the first is the controllers' first cycle
-  double drawn_later_s = 0.0;          ///< added to all times of this run in the figures,
-  double drawn_slower = 1.0;           ///< after they were multiplied by this
-  bool drawn_as_replay = false;        ///< so that a replay lies over its recording
+  double first_s = 0.0, last_s = 0.0;             ///< which times the log has
+  std::vector<std::pair<double, double>> gaps_s;  ///< which times between them it lacks
+  bool start_known = true;       ///< false: the log begins later than the drives' bring-up
+  double settle_s = 0.0;         ///< from bring-up to the controllers' start
+  bool controllers_ran = true;   ///< false: the rows are those in which they were waited for
+  double step_s = 0.0;           ///< between rows, where none is missing
+  std::vector<double> time_s;    ///< of each row; the first is the controllers' first cycle
+  double drawn_later_s = 0.0;    ///< added to all times of this run in the figures,
+  double drawn_slower = 1.0;     ///< after they were multiplied by this
+  bool drawn_as_replay = false;  ///< so that a replay lies over its recording
   double drawn_from_s = -std::numeric_limits<double>::infinity();  ///< of the figures' times: only
   double drawn_to_s = std::numeric_limits<double>::infinity();     ///< rows in these are drawn
   std::vector<RunFault> faults;                                    ///< in the order of their times

@@ -3,8 +3,19 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <map>
 
 namespace tandem::report {
+namespace {
+
+bool is_number(const std::string& text, double value) {
+  char* end = nullptr;
+  const double number = std::strtod(text.c_str(), &end);
+  return !text.empty() && *end == '\0' && number == value;
+}
+
+}  // namespace
 
 std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
                                 const std::vector<std::string>& joints,
@@ -32,18 +43,25 @@ std::vector<RunParameter> parameters_of(const std::vector<log::EventText>& event
     const std::size_t equals = std::min(line.rfind(" = "), line.size());
     all.push_back({line.substr(0, equals), line.substr(std::min(equals + 3, line.size()))});
   }
+  std::map<std::string, std::string> last;  // value of each parameter
+  for (const RunParameter& one : all) last[one.name] = one.start;
   for (const auto& [event, text] : events) {
     const auto it = log::parameter_of(text);
     if (!it) continue;
     const auto known = std::ranges::find(all, it->name, &RunParameter::name);
-    RunParameter& one = known == all.end() ? all.emplace_back() : *known;
+    const bool is_new = known == all.end();
+    RunParameter& one = is_new ? all.emplace_back() : *known;
     one.name = it->name;
     const double time_s = static_cast<double>(event.time_ns) * 1e-9;
     const std::string given = it->word.empty() ? fmt::format("{:g}", it->value) : it->word;
     std::string value = fmt::format("{} at {:.3f} s", given, time_s);
-    if (event.kind == log::EventKind::kParameterLoaded) {
-      one = {one.name, std::move(value)};
-    } else {
+    std::string& before = last[one.name];
+    const bool loaded = event.kind == log::EventKind::kParameterLoaded;
+    const bool is_same = it->word.empty() ? is_number(before, it->value) : before == it->word;
+    before = it->word.empty() ? fmt::format("{}", it->value) : it->word;
+    if (loaded && is_new) {
+      one.start = std::move(value);
+    } else if (!loaded || !is_same) {  // a controller that is loaded again changes what differs
       one.then = std::move(value);
       ++one.changes;
     }

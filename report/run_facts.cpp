@@ -34,6 +34,18 @@ void add_payloads(const RunData& run, const std::string& side, Facts& facts) {
   }
 }
 
+/// Which times a log has that is not whole, and the first few that it lacks between them.
+std::string covers_text(const RunData& run) {
+  constexpr std::size_t kSaid = 3;
+  std::string text = fmt::format("{:.3f} to {:.3f} s", run.first_s, run.last_s);
+  for (std::size_t i = 0; i < std::min(kSaid, run.gaps_s.size()); ++i) {
+    text += fmt::format("{} {:.3f} to {:.3f} s", i == 0 ? ", without" : ",", run.gaps_s[i].first,
+                        run.gaps_s[i].second);
+  }
+  if (run.gaps_s.size() > kSaid) text += fmt::format(", {} more", run.gaps_s.size() - kSaid);
+  return text;
+}
+
 PageTable tracking_table(const RunData& run, const std::string& side) {
   PageTable table{"Tracking" + side,
                   "Reference minus measured link position of the joints under position control, "
@@ -92,8 +104,7 @@ PageTable loops_table(const RunData& run, const std::string& side) {
 /// Table of every parameter; without rows when the log has none.
 PageTable parameter_table(const RunData& run, const std::string& side) {
   PageTable table{"Parameters" + side,
-                  "Of the controllers, at the run's start, and what was set last. Of a word that "
-                  "was set its number among the choices is shown.",
+                  "Of the controllers, at the run's start, and what was set last.",
                   {"parameter", "at the start", "set last", "times set"},
                   {}};
   for (const RunParameter& one : run.parameters)
@@ -146,8 +157,7 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   const double ran_s = run.controllers_ran ? run.time_s[run.rows_before_stop() - 1] - start_s : 0.0;
   const bool imported = run.info.hal == "import";
   const bool whole = run.cut_reason.empty() && run.remarks.empty();
-  if (!whole)
-    facts.emplace_back("covers" + side, fmt::format("{:.3f} to {:.3f} s", run.first_s, run.last_s));
+  if (!whole) facts.emplace_back("covers" + side, covers_text(run));
   if (run.controllers_ran && !imported && run.start_known)
     facts.emplace_back("controllers started" + side, fmt::format("{:.3f} s", start_s));
   facts.emplace_back((imported ? "recorded" : "controllers ran") + side,
@@ -155,9 +165,7 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   if (!run.info.engine.empty()) facts.emplace_back("engine" + side, run.info.engine);
   facts.emplace_back("kernels" + side, run.info.kernel_variant);
   facts.emplace_back("tandem" + side, run.info.version);
-  for (const auto& [key, value] : run.result) {
-    if (key != "data_sha256") facts.emplace_back(key + side, value);
-  }
+  for (const auto& [key, value] : run.result) facts.emplace_back(key + side, value);
   facts.emplace_back("data sha256" + side, run.data_sha256);
 }
 

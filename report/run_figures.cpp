@@ -9,6 +9,7 @@
 #include <numbers>
 #include <utility>
 
+#include "log/run_window.hpp"
 #include "report/logged_torque.hpp"
 #include "report/posture.hpp"
 
@@ -58,10 +59,9 @@ void add_payloads(const RunData& run, const std::string& side, Figure& figure) {
   }
 }
 
-/// What every figure over time has: its axis, and where runs had faults. The spike of one that
-/// stopped a run may be there before the loop knows of the fault: it does not widen the plots.
+/// What every figure over time has: its axis, and where runs had faults. The plots show all that
+/// led to the one that stopped a run; what follows does not widen them.
 void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
-  constexpr double kSpike_s = 0.02;
   figure.x_label = time_label(run);
   for (std::size_t i = 0; i <= others.size(); ++i) {
     const RunData& one = i == 0 ? run : *others[i - 1];
@@ -76,7 +76,7 @@ void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
     if (stop == nullptr) continue;
     const double stop_s = one.drawn(stop->time_s);
     figure.marks.push_back({"fault" + side_of(i, others), stop_s});
-    figure.range_until_x = std::min(figure.range_until_x, stop_s - kSpike_s);
+    figure.range_until_x = std::min(figure.range_until_x, stop_s + log::kHalfNanosecond);
   }
 }
 

@@ -130,9 +130,7 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
     facts.add("started",
               info.started + (info.time_zone.empty() ? "" : " (time zone " + info.time_zone + ")"));
   }
-  for (const auto& [key, value] : file.result()) {
-    if (key != "data_sha256") facts.add(key, value);  // computed anew below
-  }
+  for (const auto& [key, value] : file.shown_result()) facts.add(key, value);
   facts.add("data sha256", file.data_sha256());
   facts.print(out);
   if (file.topics().empty()) return;

@@ -476,7 +476,7 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   }
   if (e.plant != nullptr) std::ranges::copy(e.plant->warnings, std::back_inserter(c.warnings));
   for (Error& warning : missing_retreats(c)) c.warnings.push_back(std::move(warning));
-  std::ranges::move(empty_timelines(c), std::back_inserter(c.warnings));
+  std::ranges::move(empty_plans(c), std::back_inserter(c.warnings));
   if (c.controllers != nullptr && !overrides.duration_s && !overrides.serves) {
     std::ranges::move(late_plans(c), std::back_inserter(c.warnings));
   }

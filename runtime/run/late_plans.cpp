@@ -41,17 +41,26 @@ void add_late_rows(const InputPort& port, const Experiment& e, Diagnostics& warn
 
 }  // namespace
 
-Diagnostics empty_timelines(const Composition& c) {
+Diagnostics empty_plans(const Composition& c) {
   Diagnostics warnings;
   if (c.controllers == nullptr) return warnings;
   for (const auto& one : c.controllers->owned()) {
     if (one == nullptr) continue;
     for (const auto& port : one->inputs) {
-      if (port->source().feeder != InputFeeder::kTimeline || !port->plan().at.empty()) continue;
+      const InputFeeder feeder = port->source().feeder;
+      const bool is_file = feeder == InputFeeder::kFile;
+      if ((!is_file && feeder != InputFeeder::kTimeline) || !port->plan().at.empty()) continue;
       Error& warning = warnings.emplace_back(port->source().where);
-      warning.message = fmt::format("the timeline of the input '{}' has no row: nothing arrives",
-                                    port->input().name);
+      warning.message = fmt::format("the {} of the input '{}' has no row: nothing arrives",
+                                    is_file ? "file" : "timeline", port->input().name);
       warning.hint = "write timeline = [[0.5, …], …]: seconds, then the components";
+      if (!is_file) continue;
+      warning.file = port->source().file;
+      warning.line = 0;
+      warning.key.clear();
+      warning.hint = warning.file.ends_with(".mcap")
+                         ? "name a log in which samples of this input arrived"
+                         : "write a row for each sample: seconds, then the components";
     }
   }
   return warnings;

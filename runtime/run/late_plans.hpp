@@ -12,7 +12,7 @@ namespace tandem::runtime {
 /// on after it, with the first such row.
 [[nodiscard]] Diagnostics late_plans(const Composition& composition);
 
-/// A warning of each input whose timeline has no row.
-[[nodiscard]] Diagnostics empty_timelines(const Composition& composition);
+/// A warning of each input whose timeline or file has no row.
+[[nodiscard]] Diagnostics empty_plans(const Composition& composition);
 
 }  // namespace tandem::runtime

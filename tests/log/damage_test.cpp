@@ -205,7 +205,7 @@ struct DamagedLog : testing::Test {
         const double numbers[8] = {0.1 * i, 0.2 * i};
         (*recorder)->push(state, i * 10'000'000LL, std::as_bytes(std::span(numbers)));
       }
-      EXPECT_EQ((*recorder)->close().messages, 101U);
+      EXPECT_EQ((*recorder)->close({{"loaded_controllers", "late 1\nlate 2"}}).messages, 101U);
     }
     for (const RecordPlace& place : index_of(path).places)
       if (place.opcode == Opcode::kChunk) chunks.push_back(place);
@@ -236,6 +236,14 @@ TEST_F(DamagedLog, SaysWhatOfItIsLeftOut) {
                 "chunk of " + std::to_string(chunks[2].bytes) + " bytes at byte " +
                 std::to_string(chunks[2].at) +
                 ", 0.420 to 0.620 s: its checksum is wrong; its messages are left out"}));
+  // Its run's count had stood there alone, and the two lines as one.
+  const StringMap shown = log.shown_result();
+  EXPECT_EQ(value_of(shown, "messages"), "80 of 101");
+  EXPECT_EQ(std::ranges::count(shown, std::string("loaded_controllers"),
+                               [](const auto& one) { return one.first; }),
+            2);
+  EXPECT_EQ(value_of(shown, "loaded_controllers"), "late 1");
+  EXPECT_EQ(value_of(LogFile::open(other)->shown_result(), "messages"), "101");
   const auto table = log.read("/tandem/state", {{"position_rad", 0}});
   ASSERT_TRUE(table);
   EXPECT_EQ(table->time_s.size(), 80U);

@@ -33,6 +33,20 @@ struct OddLog : testing::Test {
 
 TEST_F(OddLog, IsGoodBeforeAnythingIsChanged) { EXPECT_EQ(read(), "read"); }
 
+// A crash or a hang was among the facts alone: no line in the figures, and the last posture was
+// "end". The seed's result says `ended`, which a run's does after these alone.
+TEST_F(OddLog, OfALoopThatCrashedHasAFaultAtItsEnd) {
+  ASSERT_EQ(read(), "read");
+  const auto run = read_run(folder / "log.mcap");
+  ASSERT_TRUE(run);
+  ASSERT_FALSE(run->faults.empty());
+  const RunFault& fault = run->faults.back();
+  EXPECT_EQ(fault.text, "done");
+  EXPECT_TRUE(fault.stops);
+  EXPECT_EQ(fault.time_s, run->last_s);
+  EXPECT_NE(run->stop(), nullptr);
+}
+
 // Each read beyond the columns that were there.
 TEST_F(OddLog, LacksJointsInItsCommand) {
   EXPECT_NE(read("float64[2] position_rad\nint8[2] mode", "float64[1] position_rad\nint8[2] mode")

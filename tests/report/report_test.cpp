@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 
+#include "report/run_facts.hpp"
 #include "tests/log/scratch_folder.hpp"
 
 namespace tandem::report {
@@ -30,6 +32,25 @@ TEST(Report, SaysWhichRunItShows) {
     EXPECT_NE(page.find(fact), std::string::npos) << fact << "\n"
                                                   << page.substr(page.find("<h2>Run</h2>"));
   }
+}
+
+// It said that it covers everything from its first time to its last one.
+TEST(Report, OfADamagedLogSaysWhichTimesItLacks) {
+  RunData run;
+  run.time_s = {0.0, 10.0};
+  run.last_s = 10.0;
+  run.remarks = {"a chunk is damaged"};
+  const auto covers = [&run] {
+    Facts facts;
+    add_facts(run, "", facts);
+    const auto found = std::ranges::find(facts, "covers", &Facts::value_type::first);
+    return found == facts.end() ? "" : found->second;
+  };
+  EXPECT_EQ(covers(), "0.000 to 10.000 s");
+  run.gaps_s = {{5.0, 5.2}, {6.0, 6.2}};
+  EXPECT_EQ(covers(), "0.000 to 10.000 s, without 5.000 to 5.200 s, 6.000 to 6.200 s");
+  run.gaps_s.assign(5, {5.0, 5.2});
+  EXPECT_TRUE(covers().ends_with(", 2 more"));
 }
 
 }  // namespace

@@ -167,6 +167,21 @@ TEST_F(JogRun, ARowOfAFileAfterTheEndIsWarnedOfAtItsLine) {
       << late;
 }
 
+// Nothing was said of it.
+TEST_F(JogRun, AFileWithoutRowsIsWarnedOf) {
+  const test::ScratchFolder folder;
+  const std::string file = folder / "rates.csv";
+  std::ofstream(file) << "time_s,joint2\n";
+  const std::string empty = warned({.change = [&](Experiment& e) {
+    InputSource& source = e.controllers.front().inputs.front();
+    source.feeder = InputFeeder::kFile;
+    source.file = file;
+    source.timeline.clear();
+  }});
+  for (const char* part : {"rates.csv: ", "the file of the input 'rate' has no row"})
+    EXPECT_NE(empty.find(part), std::string::npos) << empty;
+}
+
 TEST_F(JogRun, ATimelineBeyondItsBoundsIsAnErrorWithItsPlace) {
   Composition c;
   const Diagnostics errors =
