@@ -12,7 +12,8 @@ def why_not(error: ImportError) -> str:
     if not built:
         return (
             f"tandem was not built: no _native*.so in {folder} (in Tandem's folder: "
-            "scripts/install-dependencies python, then the build of docs/python.md)"
+            "scripts/install-dependencies python; cmake --preset demo; "
+            "cmake --build --preset demo --target tandem_python: docs/python.md)"
         )
     fits = {"_native" + suffix for suffix in importlib.machinery.EXTENSION_SUFFIXES}
     if fits.isdisjoint(built):
