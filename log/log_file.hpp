@@ -95,6 +95,9 @@ class LogFile {
   [[nodiscard]] bool truncated() const;
   /// Why it is truncated: "its run is still writing it", or "its run was killed, or …".
   [[nodiscard]] std::string cut_reason() const;
+  /// The same with where what can be read ends, for whoever computes with it. Empty: its end is
+  /// there.
+  [[nodiscard]] std::string cut_remark() const;
   /// The files' size.
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] std::uint64_t messages() const;

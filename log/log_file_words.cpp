@@ -51,6 +51,13 @@ std::string suggest_topic(const std::string& name, const std::vector<LoggedTopic
   return suggest(name, names.empty() ? all : names);
 }
 
+/// "1.234"
+std::string seconds_text(std::int64_t time_ns) {
+  std::array<char, 32> number{};
+  std::snprintf(number.data(), number.size(), "%.3f", static_cast<double>(time_ns) * 1e-9);
+  return number.data();
+}
+
 std::unexpected<Error> refusal(const std::string& file, std::string message, std::string hint) {
   return std::unexpected(
       Error{.message = std::move(message), .hint = std::move(hint), .file = file, .key = {}});
@@ -60,6 +67,13 @@ std::unexpected<Error> refusal(const std::string& file, std::string message, std
 
 std::string LogFile::cut_reason() const {
   return reason_of_cut(std::ranges::any_of(parts_, &LogPart::being_written));
+}
+
+std::string LogFile::cut_remark() const {
+  if (!parts_.back().truncated) return {};  // what an earlier part lacks is one of gaps()
+  const std::string text = "the log is cut: " + cut_reason();
+  if (messages() == 0) return text + "; no message can be read";
+  return text + "; what can be read ends at " + seconds_text(parts_.back().last_ns) + " s";
 }
 
 std::vector<std::string> LogFile::damage() const {
@@ -112,11 +126,6 @@ std::vector<std::string> LogFile::gaps() const {
     return {"this is part " + std::to_string(info_.part) + " of a log in several files" +
             (name ? ": " + name->all + " opens all of them" : "")};
   }
-  const auto seconds = [](std::int64_t time_ns) {
-    std::array<char, 32> number{};
-    std::snprintf(number.data(), number.size(), "%.3f", static_cast<double>(time_ns) * 1e-9);
-    return std::string(number.data());
-  };
   std::vector<std::string> all;
   if (!info_.reduced.empty()) all.push_back("this log is reduced " + info_.reduced);
   if (!missing_.empty()) {
@@ -125,16 +134,18 @@ std::vector<std::string> LogFile::gaps() const {
     text = "the log lacks " + text + "; what is here is from ";
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       const bool follows = i > 0 && parts_[i - 1].number + 1 == parts_[i].number;
-      if (!follows) text += (i == 0 ? "" : " and from ") + seconds(parts_[i].first_ns) + " s to ";
+      if (!follows)
+        text += (i == 0 ? "" : " and from ") + seconds_text(parts_[i].first_ns) + " s to ";
       const bool ends = i + 1 == parts_.size() || parts_[i].number + 1 != parts_[i + 1].number;
-      if (ends) text += seconds(parts_[i].last_ns) + " s";
+      if (ends) text += seconds_text(parts_[i].last_ns) + " s";
     }
     all.push_back(std::move(text));
   }
   for (std::size_t i = 0; i + 1 < parts_.size(); ++i) {  // the last one's end is truncated()
     if (!parts_[i].truncated) continue;
-    all.push_back(parts_[i].path + " is cut: nothing is here from " + seconds(parts_[i].last_ns) +
-                  " s to " + seconds(parts_[i + 1].first_ns) + " s");
+    all.push_back(parts_[i].path + " is cut: nothing is here from " +
+                  seconds_text(parts_[i].last_ns) + " s to " +
+                  seconds_text(parts_[i + 1].first_ns) + " s");
   }
   return all;
 }

@@ -166,6 +166,7 @@ void add_log(py::module_& module) {
                                return paths;
                              })
       .def_property_readonly("damage", [](const Log& log) { return log.file().damage(); })
+      .def_property_readonly("cut", [](const Log& log) { return log.file().cut_remark(); })
       .def_property_readonly("remarks", [](const Log& log) { return log.file().remarks(); })
       .def_property_readonly("data_sha256", [](const Log& log) { return log.file().data_sha256(); })
       .def("channels", &Log::channels)

@@ -164,6 +164,12 @@ Status print_fields(const log::LogFile& file, const std::string& name, std::FILE
   return {};
 }
 
+/// A table of a killed run looks like one of a shorter run.
+void note_cut(const log::LogFile& file) {
+  const std::string cut = file.cut_remark();
+  if (!cut.empty()) fmt::print(stderr, "note: {}: {}\n", shown(file.path(), 4'096), cut);
+}
+
 Status write_csv(const log::LogFile& file, const LogOptions& options) {
   const std::string topic = file.full_name(options.topic.empty() ? "state" : options.topic);
   if (options.output.empty()) {
@@ -253,6 +259,7 @@ void print_robots(const log::RunInfo& a, const log::RunInfo& b, std::FILE* out) 
 Result<Exit> diff(const log::LogFile& file, const LogOptions& options) {
   const Result<log::LogFile> other = opened_log(options.other);
   if (!other) return std::unexpected(other.error());
+  for (const log::LogFile* one : {&file, &*other}) note_cut(*one);
   const Result<log::Comparison> comparison = log::compare(file, *other);
   if (!comparison) return std::unexpected(comparison.error());
   print_robots(file.info(), other->info(), human_output(options.json));
@@ -280,6 +287,7 @@ Exit log_command(const LogOptions& options) {
   if (!file) {
     done = std::unexpected(file.error());
   } else if (options.action == LogOptions::Action::kCsv) {
+    note_cut(*file);
     done = write_csv(*file, options);
   } else if (options.action == LogOptions::Action::kDiff) {
     const Result<Exit> compared = diff(*file, options);

@@ -11,9 +11,9 @@ try:
     from ._native import Error, UnknownName
     from ._native import __version__ as __version__
 except ImportError as error:
-    raise ImportError(
-        f"{error} (the module belongs to the Python that Tandem was built with: docs/python.md)"
-    ) from error
+    from ._why_not import why_not
+
+    raise ImportError(why_not(error)) from error
 from .control import Controllers, Parameters, Signals, Text
 from .fields import Fields
 from .log import Channel, Column, Event, Log

@@ -156,7 +156,7 @@ class Log(Sealed):
 
     Of a log in several files the first one's name opens all, "arm-001.3.mcap" that part alone.
     Opening counts the messages; numbers are read channel by channel when they are asked for.
-    What of a file is damaged is left out: `remarks` say so, and a UserWarning.
+    What of a file is damaged or cut is not there: `remarks` say so, and a UserWarning.
     Errors: FileNotFoundError; tandem.Error, a file that is no log; UnknownName.
     """
 
@@ -168,7 +168,7 @@ class Log(Sealed):
     result: Dict[str, str]  #: empty when the run was killed
     configuration: Dict[str, str]  #: text of every file that was read, by path
     parts: List[str]  #: its files: of a log in several, all that are there
-    remarks: List[str]  #: which parts are missing, and what is damaged; [] when neither
+    remarks: List[str]  #: which parts are missing, what is damaged, that it is cut; [] when none
     truncated: bool  #: the run was killed, or goes on: the data end where its last chunk ended
     data_sha256: str  #: over every message
 
@@ -178,10 +178,11 @@ class Log(Sealed):
         self.path, self.robot, self.joints = file.path, file.robot, file.joints
         self.info, self.result = dict(file.info), dict(file.result)
         self.configuration = dict(file.configuration)
-        self.parts, self.remarks = file.parts, file.remarks
+        cut = [file.cut] if file.cut else []
+        self.parts, self.remarks = file.parts, file.remarks + cut
         self.truncated, self.data_sha256 = file.truncated, file.data_sha256
-        for damage in file.damage:
-            warnings.warn(f"{self.path}: {damage}", stacklevel=2)
+        for lost in file.damage + cut:
+            warnings.warn(f"{self.path}: {lost}", stacklevel=2)
         self._channels = {row[0]: Channel(file, row) for row in file.channels()}
         self.channels = list(self._channels)
         self._events: Optional[List[Event]] = None

@@ -7,6 +7,7 @@ import math
 import operator
 import os
 import re
+import warnings
 import weakref
 from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
 
@@ -40,7 +41,7 @@ class Run(Sealed):
     joints: List[str]  #: in the order of the images
     seed: int
     period_s: float  #: of a cycle
-    warnings: List[str]
+    warnings: List[str]  #: what `tandem run` warns of; each is a UserWarning, too
     state: Fields  #: what was measured in this cycle, read only
     command: Fields  #: what Python commands; read only when controllers lead alone
     sent: Fields  #: what the drives were given last, behind the limits
@@ -116,6 +117,8 @@ class Run(Sealed):
         for array in self.limits.values():
             array.flags.writeable = False
         self._seal()
+        for warning in self.warnings:
+            warnings.warn(warning, stacklevel=2)
 
     def __iter__(self) -> "Run":
         return self

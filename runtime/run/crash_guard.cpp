@@ -204,16 +204,16 @@ bool CrashScene::in_cycle() const noexcept {
 
 void CrashScene::tell(const char* how, const char* why, const CallStack& stack) noexcept {
   const char* const colon = *why == '\0' ? "" : ": ";
+  const char* const where = note(stack);  // the log's, too
   if (controller_ == kNobody) {
-    std::snprintf(what_.data(), what_.size(), "the run %s in its cycle, in no controller%s%s", how,
-                  colon, why);
+    std::snprintf(what_.data(), what_.size(), "the run %s in its cycle, in no controller%s%s%s",
+                  how, colon, why, where);
   } else {
     const char* name = run_->controllers().names()->text(static_cast<std::size_t>(controller_));
-    std::snprintf(what_.data(), what_.size(), "controller %s %s in %s%s%s",
-                  name == nullptr ? "?" : name, how, to_string(function_), colon, why);
+    std::snprintf(what_.data(), what_.size(), "controller %s %s in %s%s%s%s",
+                  name == nullptr ? "?" : name, how, to_string(function_), colon, why, where);
   }
-  const char* const where = note(stack);
-  for (const char* part : {"fault: ", static_cast<const char*>(what_.data()), where, "\n"})
+  for (const char* part : {"fault: ", static_cast<const char*>(what_.data()), "\n"})
     write_text(part);
   ::sem_post(&wake_);
   write_calls();

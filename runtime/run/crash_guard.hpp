@@ -23,8 +23,8 @@ namespace tandem::runtime {
 class CrashScene final : public CallWatch {
  public:
   /// @param last  called before the process ends, with "controller lazy crashed in update():
-  ///              segmentation fault (SIGSEGV)", on a thread of its own, which waits from now on;
-  ///              empty: there is nothing to do
+  ///              segmentation fault (SIGSEGV) at lazy.so+0x12a0", on a thread of its own, which
+  ///              waits from now on; empty: there is nothing to do
   explicit CrashScene(std::function<void(const char* what)> last = {});
   ~CrashScene() override;
   CrashScene(const CrashScene&) = delete;
@@ -52,7 +52,7 @@ class CrashScene final : public CallWatch {
   Run* run_ = nullptr;
   std::int64_t controller_ = kNobody;  // that is called
   ControllerFunction function_ = ControllerFunction::kUpdate;
-  std::array<char, 256> what_{};
+  std::array<char, 512> what_{};
   std::function<void(const char*)> last_;
   sem_t wake_{};
   std::atomic<bool> ends_{false}, done_{false};

@@ -72,6 +72,24 @@ TEST_F(LogAndReport, InfoOfALogThatIsCutTellsWhatOfItCanBeRead) {
   EXPECT_TRUE(was_empty) << "its first chunk is not whole";
 }
 
+// The table of a killed run looked like one of a shorter run.
+TEST_F(LogAndReport, CsvAndDiffOfALogThatIsCutSaySo) {
+  EXPECT_EQ(tandem("log csv " + log_).err, "");
+  std::filesystem::copy_file(folder_ / log_, folder_ / "cut.mcap");
+  std::filesystem::resize_file(folder_ / "cut.mcap",
+                               std::filesystem::file_size(folder_ / log_) / 2);
+  const std::string note =
+      "note: cut.mcap: the log is cut: its run was killed, or the copy is not whole; what can be "
+      "read ends at ";
+  const Outcome csv = tandem("log csv cut.mcap");
+  EXPECT_EQ(csv.status, 0);
+  EXPECT_TRUE(csv.err.starts_with(note)) << csv.err;
+  EXPECT_GT(std::ranges::count(csv.out, '\n'), 100);
+  const Outcome diff = tandem("log diff " + log_ + " cut.mcap");
+  EXPECT_EQ(diff.status, 1);
+  EXPECT_TRUE(diff.err.starts_with(note)) << diff.err;
+}
+
 TEST_F(LogAndReport, InfoOfATopicListsItsFieldsWithUnits) {
   const Outcome outcome = tandem("log info " + log_ + " --topic truth");
   ASSERT_EQ(outcome.status, 0) << outcome.err;

@@ -218,6 +218,9 @@ TEST_F(LogFileOfThree, SaysThatItsRunIsStillWritingIt) {
   ASSERT_TRUE(log) << log.error().to_string();
   EXPECT_TRUE(log->truncated());
   EXPECT_EQ(log->cut_reason(), "its run is still writing it");
+  EXPECT_TRUE(log->cut_remark().starts_with("the log is cut: its run is still writing it; "))
+      << log->cut_remark();
+  EXPECT_EQ(LogFile::open(path_)->cut_remark(), "");
 }
 
 // "has no topic '/tandem/state'": whoever reads that looks for another topic.

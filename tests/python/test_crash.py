@@ -74,7 +74,8 @@ def test_a_crash_is_named_and_leaves_a_whole_log(crashing, tmp_path, text, param
     assert list(log["state"].cycle[:, 0]) == list(range(first + AFTER - 1))
     info = subprocess.run([BUILD / "bin/tandem", "log", "info", log.path], capture_output=True, text=True)
     assert info.returncode == 0, info.stderr
-    assert f"controller lazy crashed in update(): {why}" in info.stdout
+    assert f"controller lazy crashed in update(): {why} at hangs.so+0x" in info.stdout
+    assert f"{why} at hangs.so+0x" in log.result["ended"]
 
 
 def test_exit_in_update_is_no_silent_end(crashing, tmp_path):
@@ -153,6 +154,26 @@ def test_a_crash_of_another_thread_is_not_the_controllers(crashing, flags, enabl
     assert ended.returncode == -signal.SIGSEGV
     assert "controller" not in ended.stderr
     assert ended.stderr.count("Fatal Python error") == int(bool(flags) or enabled_meanwhile)
+
+
+def test_a_plugin_that_never_returns_is_ended_by_sigterm_alone(crashing):
+    text = """
+def end():
+    while run.cycle < first + 59:  # that it hangs in
+        time.sleep(0.001)
+    for number in (signal.SIGINT, signal.SIGINT, signal.SIGTERM):
+        print(number.name, flush=True)
+        os.kill(os.getpid(), number)
+        time.sleep(0.1)
+
+run = tandem.Run(FILE)
+first = run.cycle
+threading.Thread(target=end, daemon=True).start()
+run.step(500)
+"""
+    ended = crashing(text, "for_s = 600")
+    assert ended.returncode == -signal.SIGTERM, ended.stderr
+    assert ended.stdout == "SIGINT\nSIGINT\nSIGTERM\n" and ended.stderr == ""
 
 
 def test_a_handler_of_python_hears_what_others_send(crashing):

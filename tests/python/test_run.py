@@ -344,6 +344,22 @@ def test_one_thread_at_a_time(config, call):
     assert run.step()
 
 
+def test_what_the_program_warns_of_is_a_warning(config, recwarn):
+    tandem.Run(config / HOLD), tandem.Run(config / "panda/hold.toml", control="torque")
+    assert not recwarn.list
+    with pytest.warns(UserWarning) as told:
+        run = tandem.Run(config / "double_pendulum_interpolated/trajectory.toml")
+    assert [str(one.message) for one in told] == run.warnings and len(run.warnings) == 2
+    assert "'drive_1': what the drive does when the connection is lost" in run.warnings[0]
+    assert all(one.filename == __file__ for one in told)
+    program = subprocess.run(
+        [BUILD / "bin/tandem", "run", run.experiment, "--duration", "0.1", "--no-socket", "--no-dds",
+         "--quiet", "--no-log"], check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    for text in run.warnings:
+        assert f"warning: {text}\n" in program.stderr
+
+
 def test_ctrl_c_is_heard_and_the_run_goes_on(config):
     run = tandem.Run(config / HOLD, control="position", duration_s=1e6)
     threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
