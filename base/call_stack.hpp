@@ -30,8 +30,8 @@ void prepare_call_stacks();
 /// Safe in a signal handler, and inside malloc: no heap, no lock but the dynamic linker's.
 [[gnu::noinline]] CallStack take_call_stack(std::size_t skip = 0) noexcept;
 /// Those of the code that a signal interrupted; in its handler. After a call of what is no code the
-/// caller is all that is known. A child reads them, as a stack that was written over leads anywhere:
-/// what it had come to is there.
+/// caller is all that is known. A child reads them, as a stack that was written over leads
+/// anywhere: what it had come to is there.
 /// @param context  the handler's third argument
 CallStack interrupted_call_stack(const void* context) noexcept;
 

@@ -17,9 +17,9 @@ using MarkerMessage = visualization_msgs_msg_dds__Marker_;
 /// The topic of one controller. At its end viewers are told that nothing is left.
 class MarkTopic {
  public:
-  MarkTopic(const std::string& controller, std::shared_ptr<const hal::MarkBlock> block)
-      : controller(controller), block(std::move(block)) {
-    for (const hal::MarkInfo& mark : this->block->declared())
+  MarkTopic(const std::string& whose, std::shared_ptr<const hal::MarkBlock> marks)
+      : controller(whose), block(std::move(marks)) {
+    for (const hal::MarkInfo& mark : block->declared())
       spaces_.push_back(controller + "/" + mark.name);
   }
   ~MarkTopic() {

@@ -536,12 +536,12 @@ TEST_F(InputRun, AFileWithoutRowsAndALongWayPointAreErrors) {
         add({{"way", InputKind::kTrajectory, {.names = {"shoulder", "elbow"}}}}, {source});
     return added ? std::string() : added.error().to_string();
   };
-  const std::string file = why({.feeder = InputFeeder::kFile, .file = path});
+  const std::string file = why({.feeder = InputFeeder::kFile, .name = {}, .file = path});
   EXPECT_NE(file.find("rows.csv:1: a way-point is not"), std::string::npos) << file;
   std::vector<double> longer(100, 0.1);
   longer[0] = 0.5;
-  const std::string row =
-      why({.feeder = InputFeeder::kTimeline, .timeline = {{0.5, 1.0, 0.1, 0.2}, longer}});
+  const std::string row = why(
+      {.feeder = InputFeeder::kTimeline, .name = {}, .timeline = {{0.5, 1.0, 0.1, 0.2}, longer}});
   EXPECT_NE(row.find("row 2 of its timeline has 99 numbers"), std::string::npos) << row;
 }
 

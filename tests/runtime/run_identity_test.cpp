@@ -42,7 +42,7 @@ TEST(RunIdentity, IsReadAsItWasWrittenAndFromBytesOfAnybody) {
   back(read);
   EXPECT_TRUE(back.ok() && back.at_end());
   EXPECT_EQ(own.difference(read), "");
-  for (const std::uint8_t byte : {0x00, 0x7F, 0xFF}) {
+  for (const std::uint8_t byte : std::array<std::uint8_t, 3>{0x00, 0x7F, 0xFF}) {
     std::array<std::byte, 24> bytes{};
     bytes.fill(std::byte{byte});
     Archive bad(bytes);
