@@ -536,7 +536,7 @@ TEST_F(InputRun, AFileWithoutRowsAndALongWayPointAreErrors) {
         add({{"way", InputKind::kTrajectory, {.names = {"shoulder", "elbow"}}}}, {source});
     return added ? std::string() : added.error().to_string();
   };
-  const std::string file = why({.feeder = InputFeeder::kFile, .name = {}, .file = path});
+  const std::string file = why({.name = {}, .feeder = InputFeeder::kFile, .file = path});
   EXPECT_NE(file.find("rows.csv:1: a way-point is not"), std::string::npos) << file;
   std::vector<double> longer(100, 0.1);
   longer[0] = 0.5;
