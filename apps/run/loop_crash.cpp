@@ -100,8 +100,8 @@ void begin_to_stand_still(const char* why) noexcept {
   const bool looks = loop_search != nullptr && loop_search->note(stack, &is_controllers);
   write_line({"fault: ", what, more, looks ? loop_search->noted() : ""});
   if (looks) {
-    constexpr timespec kLook{.tv_sec = 0, .tv_nsec = 1'000'000};
-    for (int i = 0; i < 5'000 && !robot_stopped.load(); ++i) ::nanosleep(&kLook, nullptr);
+    constexpr timespec kMillisecond{.tv_sec = 0, .tv_nsec = 1'000'000};
+    for (int i = 0; i < 5'000 && !robot_stopped.load(); ++i) ::nanosleep(&kMillisecond, nullptr);
     loop_search->look({.notice = kNotice});
     loop_search->write(STDERR_FILENO, kTitle);
     loop_search->end();

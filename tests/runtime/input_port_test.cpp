@@ -541,7 +541,7 @@ TEST_F(InputRun, AFileWithoutRowsAndALongWayPointAreErrors) {
   std::vector<double> longer(100, 0.1);
   longer[0] = 0.5;
   const std::string row = why(
-      {.feeder = InputFeeder::kTimeline, .name = {}, .timeline = {{0.5, 1.0, 0.1, 0.2}, longer}});
+      {.name = {}, .feeder = InputFeeder::kTimeline, .timeline = {{0.5, 1.0, 0.1, 0.2}, longer}});
   EXPECT_NE(row.find("row 2 of its timeline has 99 numbers"), std::string::npos) << row;
 }
 
