@@ -127,6 +127,18 @@ struct Interrupted {
 };
 Interrupted* interrupted = nullptr;  // null: there is no memory for it
 
+/// The calls of the code at `pc`, without those of its handler.
+CallStack from(std::uintptr_t pc, const CallStack& all) noexcept {
+  CallStack stack{.calls = {pc}, .count = 1};
+  const auto calls = all.view();
+  const auto first = std::ranges::find_if(
+      calls, [&](std::uintptr_t call) { return call == pc || call + 1 == pc; });
+  if (first == calls.end()) return stack;
+  stack.count = static_cast<std::size_t>(calls.end() - first);
+  std::ranges::copy(first, calls.end(), stack.calls.begin());
+  return stack;
+}
+
 void read_stack(void* context) {
   if (library_of(pc_of(context)) == nullptr) interrupted->caller = caller_of(context);
   ::backtrace_simple(unwinder, 0, &add, &ignore, &interrupted->all);
@@ -172,20 +184,17 @@ CallStack take_call_stack(std::size_t skip) noexcept {
 }
 
 CallStack interrupted_call_stack(const void* context) noexcept {
+  return from(pc_of(context), take_call_stack());
+}
+
+CallStack crashed_call_stack(const void* context) noexcept {
   const std::uintptr_t pc = pc_of(context);
   if (interrupted == nullptr) return {.calls = {pc}, .count = 1};
   *interrupted = {};
   (void)run_in_child(&read_stack, const_cast<void*>(context));
   const std::uintptr_t caller = interrupted->caller;
   if (library_of(caller) != nullptr) return {.calls = {caller - 1}, .count = 1};
-  const auto all = interrupted->all.view();
-  const auto first =
-      std::ranges::find_if(all, [&](std::uintptr_t call) { return call == pc || call + 1 == pc; });
-  CallStack stack{.calls = {pc}, .count = 1};
-  if (first == all.end()) return stack;
-  stack.count = static_cast<std::size_t>(all.end() - first);
-  std::ranges::copy(first, all.end(), stack.calls.begin());
-  return stack;
+  return from(pc, interrupted->all);
 }
 
 // The linker's lock may be held for ever, where a library does not return from its initialisers.

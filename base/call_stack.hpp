@@ -29,11 +29,12 @@ void prepare_call_stacks();
 /// The calling thread's calls, without this one and the `skip` innermost others.
 /// Safe in a signal handler, and inside malloc: no heap, no lock but the dynamic linker's.
 [[gnu::noinline]] CallStack take_call_stack(std::size_t skip = 0) noexcept;
-/// Those of the code that a signal interrupted; in its handler. After a call of what is no code the
-/// caller is all that is known. A child reads them, as a stack that was written over leads
-/// anywhere: what it had come to is there.
+/// Those of the code that a signal interrupted; in its handler.
 /// @param context  the handler's third argument
 CallStack interrupted_call_stack(const void* context) noexcept;
+/// Those of code that crashed. A child reads them, as a stack that was written over leads anywhere:
+/// what it had come to is there. After a call of what is no code the caller is all that is known.
+CallStack crashed_call_stack(const void* context) noexcept;
 
 /// Where the library (or the program) begins that a call is in; null: nowhere. No lock.
 [[nodiscard]] const void* library_of(std::uintptr_t call) noexcept;

@@ -137,14 +137,14 @@ void tell_early_crash(const char* controller, const char* why, const CallStack& 
 void on_signal(int signal, siginfo_t*, void* context) {
   if (!in_cycle()) {
     if (const char* controller = hosted_controller())
-      tell_early_crash(controller, crash_text(signal), interrupted_call_stack(context));
+      tell_early_crash(controller, crash_text(signal), crashed_call_stack(context));
     std::signal(signal, SIG_DFL);
     std::raise(signal);
     return;
   }
   begin_to_stand_still(crash_text(signal));
   stand_still("the loop crashed, and stands still: ", crash_text(signal),
-              interrupted_call_stack(context));
+              crashed_call_stack(context));
 }
 
 void on_exit() {

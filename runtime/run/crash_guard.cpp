@@ -109,14 +109,14 @@ bool tell_crash(int signal, const siginfo_t& info, const void* context) {
   CrashScene* const scene = scene_here();
   if (scene != nullptr && scene->in_cycle()) {
     if (become_teller()) {
-      scene->tell("crashed", crash_text(signal), interrupted_call_stack(context));
+      scene->tell("crashed", crash_text(signal), crashed_call_stack(context));
     }
     return true;
   }
   const char* const controller = hosts.load() > 0 ? hosted_controller() : nullptr;
   if (controller == nullptr) return false;
   if (!become_teller()) return true;
-  const char* const where = note(interrupted_call_stack(context));
+  const char* const where = note(crashed_call_stack(context));
   for (const char* part : {"fault: controller ", controller,
                            " crashed before its first cycle: ", crash_text(signal), where, "\n"}) {
     write_text(part);

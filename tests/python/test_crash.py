@@ -125,7 +125,7 @@ try:
     run.step(0)
 except ValueError:
     assert handlers() == before
-print("same")
+print("same", flush=True)
 ctypes.string_at(0)
 """, "for_s = 1e-9", *flags)  # fmt: skip
     assert ended.stdout == "same\n", ended.stderr
@@ -184,6 +184,6 @@ run = tandem.Run(FILE, duration_s=1e6)
 threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGABRT)).start()
 while not heard:
     run.step(100)
-print("heard")
+print("heard", flush=True)
 """)  # fmt: skip
     assert ended.stdout == "heard\n" and ended.returncode == 0, ended.stderr

@@ -5,6 +5,7 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, afterEach, before, describe, test } from 'node:test';
+import { pathToFileURL } from 'node:url';
 import { kPage, lacking, openBrowser, openPage, violations } from './support.mjs';
 
 const why = lacking();
@@ -18,7 +19,7 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
 
   before(async () => {
     execFileSync(process.execPath, [join(kPage, 'build.mjs'), '--out', kScratch]);
-    ({ startMock } = await import(join(kPage, 'test/mock/server.mjs')));
+    ({ startMock } = await import(pathToFileURL(join(kPage, 'test/mock/server.mjs'))));
     browser = await openBrowser();
   });
   after(async () => {
