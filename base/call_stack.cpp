@@ -73,6 +73,18 @@ void shorten(char* name) {
     std::strcpy(name + whole_characters(name, kMost).size(), "...");
 }
 
+/// The function by the library's symbols; null: unknown.
+const char* symbol_of(backtrace_state* state, std::uintptr_t call) noexcept {
+  const char* found = nullptr;
+  ::backtrace_syminfo(
+      state, call,
+      [](void* to, std::uintptr_t, const char* name, std::uintptr_t, std::uintptr_t) {
+        *static_cast<const char**>(to) = name;
+      },
+      &ignore, &found);
+  return found;
+}
+
 /// What the reader of debug information is shown.
 struct Shown {
   std::uintptr_t address = 0;  // of a call in the library; 0: all libraries
@@ -223,8 +235,9 @@ void PlaceReader::read(std::uintptr_t call, Visit visit, void* to) noexcept {
     std::uintptr_t call;
     Visit visit;
     void* to;
+    backtrace_state* state;
     bool any = false;
-  } job{call, visit, to};
+  } job{call, visit, to, at->state};
   shown_library = {call, !leaves_files_open_};
   ::backtrace_pcinfo(
       at->state, call,
@@ -232,19 +245,15 @@ void PlaceReader::read(std::uintptr_t call, Visit visit, void* to) noexcept {
         auto& of = *static_cast<Job*>(self);
         if (file == nullptr && name == nullptr) return 0;
         of.any = true;
+        if (name == nullptr) name = symbol_of(of.state, of.call);  // clang's -g1 has lines alone
         of.visit(of.to, {of.call, name, file, line});
         return 0;
       },
       &ignore, &job);
   if (!job.any) {
-    ::backtrace_syminfo(
-        at->state, call,
-        [](void* self, std::uintptr_t, const char* name, std::uintptr_t, std::uintptr_t) {
-          auto& of = *static_cast<Job*>(self);
-          of.any = name != nullptr;
-          if (of.any) of.visit(of.to, {.call = of.call, .function = name});
-        },
-        &ignore, &job);
+    const char* const name = symbol_of(at->state, call);
+    job.any = name != nullptr;
+    if (job.any) visit(to, {.call = call, .function = name});
   }
   shown_library = {};
   if (!job.any) visit(to, symbol_of(call));
