@@ -21,10 +21,9 @@
 #include "apps/control/input_control.hpp"
 #include "apps/run/input_topics.hpp"
 #include "apps/transport/control_socket.hpp"
+#include "bench/blocks.hpp"
 #include "bench/rig.hpp"
 #include "dds/endpoint.hpp"
-#include "rt/histogram.hpp"
-#include "rt/thread_setup.hpp"
 
 namespace tandem::bench {
 namespace {
@@ -32,9 +31,7 @@ namespace {
 using dds::std_msgs::Float64MultiArray;
 
 struct Options {
-  int blocks = 6;  ///< of each kind
-  double seconds = 5.0;
-  int cpu = -1;
+  BlockOptions blocks{};
   int domain = 78;
   std::string flood = {};  ///< be the other process: the socket's path
 };
@@ -131,61 +128,12 @@ int be_the_flood(const Options& options) {
   return 0;
 }
 
-/// Keeps the time of each cycle's work in its block's histogram.
-class TimedTap final : public hal::CycleObserver {
- public:
-  void take(const hal::CycleView& view) noexcept TANDEM_RT override {
-    const std::size_t block = view.time.cycle / cycles_per_block;
-    const bool settled = view.time.cycle % cycles_per_block > 100;  // the other process has changed
-    if (settled && block < blocks.size()) blocks[block].record(view.times.work_ns);
-  }
-  std::uint64_t cycles_per_block = 1;
-  std::vector<rt::Histogram> blocks;
-};
-
-void print(const TimedTap& tap) {
-  fmt::print("\n{:22} {:>8} {:>8} {:>8} {:>8} {:>9}   p99 of each block\n", "work of a cycle [us]",
-             "p50", "p99", "p99.9", "max", "cycles");
-  for (std::size_t kind = 0; kind < kKinds.size(); ++kind) {
-    std::vector<double> p50, p99, p99_9;
-    rt::Histogram all;
-    std::string each;
-    for (std::size_t block = kind; block < tap.blocks.size(); block += kKinds.size()) {
-      const rt::Percentiles p = tap.blocks[block].percentiles();
-      p50.push_back(us(p.p50));
-      p99.push_back(us(p.p99));
-      p99_9.push_back(us(p.p999));
-      each += fmt::format(" {:.1f}", us(p.p99));
-      all.add(tap.blocks[block]);
-    }
-    fmt::print("{:22} {:8.1f} {:8.1f} {:8.1f} {:8.1f} {:9}  {}\n", kNames[kind], median(p50),
-               median(p99), median(p99_9), us(all.max_ns()), all.count(), each);
-  }
-}
-
-/// Steps through all blocks on a thread of its own; the process `flood` reads which is on.
-void step_through(runtime::RobotCycle& cycle, const TimedTap& tap, int cpu, std::FILE* flood) {
-  std::thread loop([&] {
-    rt::ThreadConfig thread;
-    thread.cpu = cpu;
-    const rt::ThreadReport report = rt::set_up_thread(thread);
-    if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
-    const std::uint64_t all = tap.cycles_per_block * tap.blocks.size();
-    for (std::uint64_t k = 0; k < all && cycle.step(); ++k) {
-      if (k % tap.cycles_per_block != 0) continue;
-      std::fputc(kKinds[k / tap.cycles_per_block % kKinds.size()], flood);
-      std::fflush(flood);
-    }
-  });
-  loop.join();
-}
-
 int run(const Options& options, const char* program) {
   const std::filesystem::path folder = std::filesystem::temp_directory_path();
   const std::string path = folder / fmt::format("input_flood_{}.toml", ::getpid());
   std::ofstream(path) << "robot = \"" TANDEM_CONFIG_FOLDER "/double_pendulum/robot.toml\"\n"
                       << kExperiment;
-  TimedTap tap;
+  BlockTap tap(options.blocks, kKinds, 100);
   const auto opened = open_run(path, {.duration_s = 1e6, .rate = 1.0}, {.observer = &tap});
   std::filesystem::remove(path);
   if (!opened) return fail_with(opened.error());
@@ -206,17 +154,15 @@ int run(const Options& options, const char* program) {
   const auto socket = apps::ControlSocket::open(socket_path, registry);
   if (!socket) return fail_with(socket.error());
 
-  tap.blocks.resize(kKinds.size() * static_cast<std::size_t>(options.blocks));
-  tap.cycles_per_block = static_cast<std::uint64_t>(options.seconds * 1e3);
   const std::string others =
       fmt::format("{} --flood {} --domain {}", program, socket_path, options.domain);
   std::FILE* flood = ::popen(others.c_str(), "w");
   if (flood == nullptr) return fail_with(fail("cannot start the flood").error());
   fmt::print("{}{} blocks of {:g} s of each kind, a double pendulum at 1 kHz\n", machine_text(),
-             options.blocks, options.seconds);
-  step_through(cycle, tap, options.cpu, flood);
+             options.blocks.blocks, options.blocks.seconds);
+  tap.step_through(cycle, flood);
   ::pclose(flood);
-  print(tap);
+  tap.print("work of a cycle [us]", &BlockTap::Block::work, kNames);
   for (const runtime::InputReport& input : cycle.services().inputs()) {
     const runtime::InputCounts& counts = input.look.counts;
     fmt::print("{}: {} arrived, {} superseded, {} refused {}\n", input.port->full_name(),
@@ -232,9 +178,7 @@ int main(int argc, char** argv) {
   using namespace tandem::bench;
   Options options;
   CLI::App app{"What a flood of samples for an input does to the loop"};
-  app.add_option("--blocks", options.blocks, "of each kind")->check(CLI::Range(1, 1000));
-  app.add_option("--seconds", options.seconds, "of a block")->check(CLI::Range(0.5, 600.0));
-  app.add_option("--cpu", options.cpu, "the loop's; the rest of the process may be anywhere");
+  add_options(app, options.blocks);
   app.add_option("--domain", options.domain, "DDS domain")->check(CLI::Range(0, 232));
   app.add_option("--flood", options.flood, "be the other process");
   CLI11_PARSE(app, argc, argv);

@@ -18,12 +18,10 @@
 #include <list>
 #include <optional>
 #include <string_view>
-#include <thread>
 
+#include "bench/blocks.hpp"
 #include "bench/rig.hpp"
 #include "robot/robot_files.hpp"
-#include "rt/histogram.hpp"
-#include "rt/thread_setup.hpp"
 #include "studio/studio.hpp"
 
 namespace tandem::bench {
@@ -34,15 +32,14 @@ using Tcp = boost::asio::ip::tcp;
 
 struct Options {
   std::string experiment = TANDEM_CONFIG_FOLDER "/coman/hold.toml";
-  int blocks = 6;  ///< of each kind
-  double seconds = 5.0;
-  int cpu = -1;
+  BlockOptions blocks{};
   int port = 0;  ///< not 0: be the other process
 };
 
 constexpr std::size_t kClients = 10;
-constexpr std::size_t kSignals = 800;  // of COMAN's state and command
-constexpr std::array<const char*, 2> kNames{"nobody looks", "10 clients"};
+constexpr std::size_t kSignals = 800;      // of COMAN's state and command
+constexpr std::string_view kKinds = "ab";  // 300 cycles later they have come, or gone
+constexpr std::array<const char*, kKinds.size()> kNames{"nobody looks", "10 clients"};
 
 /// A client that reads all that it gets.
 class Client {
@@ -111,53 +108,6 @@ int be_clients(int port) {
   return 0;
 }
 
-/// The studio's tap, with each cycle's times kept in its block's histograms.
-class TimedTap final : public hal::CycleObserver {
- public:
-  struct Block {
-    rt::Histogram wakeup, work;
-  };
-  void take(const hal::CycleView& view) noexcept TANDEM_RT override {
-    const std::size_t block = view.time.cycle / cycles_per_block;
-    const bool settled =
-        view.time.cycle % cycles_per_block > 300;  // the clients have come, or gone
-    if (settled && block < blocks.size()) {
-      blocks[block].work.record(view.times.work_ns);
-      if (view.times.wakeup_ns >= 0) blocks[block].wakeup.record(view.times.wakeup_ns);
-    }
-    to->take(view);
-  }
-  void take_signals(const hal::CycleTime& time,
-                    const hal::SignalBlock& signals) noexcept TANDEM_RT override {
-    to->take_signals(time, signals);
-  }
-
-  std::uint64_t cycles_per_block = 1;
-  std::vector<Block> blocks;
-  hal::CycleObserver* to = nullptr;
-};
-
-void print(const TimedTap& tap, const char* what, rt::Histogram TimedTap::Block::*which) {
-  fmt::print("\n{:24} {:>8} {:>8} {:>8} {:>8} {:>9}\n", what, "p50", "p99", "p99.9", "max",
-             "cycles");
-  std::array<double, 2> p999{};
-  for (std::size_t kind = 0; kind < 2; ++kind) {
-    std::vector<double> p50, p99, p99_9;
-    rt::Histogram all;
-    for (std::size_t block = kind; block < tap.blocks.size(); block += 2) {
-      const rt::Percentiles p = (tap.blocks[block].*which).percentiles();
-      p50.push_back(us(p.p50));
-      p99.push_back(us(p.p99));
-      p99_9.push_back(us(p.p999));
-      all.add(tap.blocks[block].*which);
-    }
-    p999[kind] = median(p99_9);
-    fmt::print("{:24} {:8.1f} {:8.1f} {:8.1f} {:8.1f} {:9}\n", kNames[kind], median(p50),
-               median(p99), p999[kind], us(all.max_ns()), all.count());
-  }
-  fmt::print("p99.9 with 10 clients over that of nobody: {:.2f}\n", p999[1] / p999[0]);
-}
-
 /// Nanoseconds of a take_signals() of so many numbers.
 double cost_ns(studio::Tap& tap, const hal::SignalBlock& block) {
   constexpr int kTimes = 1000;  // as have room
@@ -168,7 +118,7 @@ double cost_ns(studio::Tap& tap, const hal::SignalBlock& block) {
 }
 
 int run(const Options& options, const char* program) {
-  TimedTap tap;
+  BlockTap tap(options.blocks, kKinds, 300);
   const auto opened =
       open_run(options.experiment, {.duration_s = 1e6, .rate = 1.0}, {.observer = &tap});
   if (!opened) return fail_with(opened.error());
@@ -180,8 +130,8 @@ int run(const Options& options, const char* program) {
       {.robot = e.robot, .experiment = "bench", .simulated = true, .period_ns = e.loop.period_ns},
       images);
   if (!studio) return fail_with(studio.error());
-  fmt::print("{}{} blocks of {:g} s of each kind, {} at 1 kHz\n", machine_text(), options.blocks,
-             options.seconds, e.robot.name);
+  fmt::print("{}{} blocks of {:g} s of each kind, {} at 1 kHz\n", machine_text(),
+             options.blocks.blocks, options.blocks.seconds, e.robot.name);
   {
     studio::Tap alone(images, e.loop.period_ns);
     hal::SignalBlock block;
@@ -189,33 +139,18 @@ int run(const Options& options, const char* program) {
     (void)block.close();
     fmt::print("the tap takes 100 signals of a controller in {:.0f} ns\n", cost_ns(alone, block));
   }
-  tap.to = &(*studio)->tap();
-  tap.blocks.resize(2 * static_cast<std::size_t>(options.blocks));
-  tap.cycles_per_block =
-      static_cast<std::uint64_t>(options.seconds * 1e9 / static_cast<double>(e.loop.period_ns));
+  tap.hand_on_to((*studio)->tap());
   (*studio)->start({}, {});
   const std::string address = (*studio)->address();
   const std::string port = address.substr(17, address.find('/', 17) - 17);  // http://127.0.0.1:
   const std::string others = fmt::format("{} --clients {}", program, port);
   std::FILE* clients = ::popen(others.c_str(), "w");
   if (clients == nullptr) return fail_with(fail("cannot start the clients").error());
-  std::thread loop([&] {
-    rt::ThreadConfig thread;
-    thread.cpu = options.cpu;
-    const rt::ThreadReport report = rt::set_up_thread(thread);
-    if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
-    const std::uint64_t all = tap.cycles_per_block * tap.blocks.size();
-    for (std::uint64_t k = 0; k < all && cycle.step(); ++k) {
-      if (k % tap.cycles_per_block != 0) continue;
-      std::fputc(k / tap.cycles_per_block % 2 == 0 ? 'a' : 'b', clients);
-      std::fflush(clients);
-    }
-  });
-  loop.join();
+  tap.step_through(cycle, clients);
   ::pclose(clients);
   (*studio)->finish("the bench is over", "");
-  print(tap, "wake-up [us]", &TimedTap::Block::wakeup);
-  print(tap, "work of a cycle [us]", &TimedTap::Block::work);
+  tap.print("wake-up [us]", &BlockTap::Block::wakeup, kNames);
+  tap.print("work of a cycle [us]", &BlockTap::Block::work, kNames);
   return 0;
 }
 
@@ -227,9 +162,7 @@ int main(int argc, char** argv) {
   Options options;
   CLI::App app{"What clients of a studio do to the loop"};
   app.add_option("experiment", options.experiment, "default: COMAN holding");
-  app.add_option("--blocks", options.blocks, "of each kind")->check(CLI::Range(1, 1000));
-  app.add_option("--seconds", options.seconds, "of a block")->check(CLI::Range(1.0, 600.0));
-  app.add_option("--cpu", options.cpu, "the loop's; the rest of the process may be anywhere");
+  add_options(app, options.blocks);
   app.add_option("--clients", options.port, "be the other process, of that port");
   CLI11_PARSE(app, argc, argv);
   return options.port != 0 ? be_clients(options.port) : run(options, argv[0]);

@@ -14,21 +14,17 @@
 #include <array>
 #include <random>
 #include <string_view>
-#include <thread>
 
+#include "bench/blocks.hpp"
 #include "bench/rig.hpp"
 #include "dds/publisher.hpp"
-#include "rt/histogram.hpp"
-#include "rt/thread_setup.hpp"
 
 namespace tandem::bench {
 namespace {
 
 struct Options {
   std::string experiment = TANDEM_CONFIG_FOLDER "/coman/hold.toml";
-  int blocks = 6;  ///< of each kind
-  double seconds = 5.0;
-  int cpu = -1;
+  BlockOptions blocks{};
   int domain = 77;
   bool subscribers = false;  ///< be the other process
 };
@@ -130,44 +126,6 @@ int be_subscribers(int domain_number) {
   return 0;
 }
 
-/// The publisher, with the time of each cycle's work kept in the block's histogram.
-class TimedTap final : public hal::CycleObserver {
- public:
-  void take(const hal::CycleView& view) noexcept TANDEM_RT override {
-    const std::size_t block = view.time.cycle / cycles_per_block;
-    const bool settled = view.time.cycle % cycles_per_block > 100;  // the other process has changed
-    if (settled && block < blocks.size()) blocks[block].record(view.times.work_ns);
-    to->take(view);
-  }
-
-  std::uint64_t cycles_per_block = 1;
-  std::vector<rt::Histogram> blocks;
-  hal::CycleObserver* to = nullptr;
-};
-
-void print(const TimedTap& tap) {
-  fmt::print("\n{:28} {:>8} {:>8} {:>8} {:>8} {:>9}\n", "work of a cycle [us]", "p50", "p99",
-             "p99.9", "max", "cycles");
-  std::array<double, kKinds.size()> p999{};
-  for (std::size_t kind = 0; kind < kKinds.size(); ++kind) {
-    std::vector<double> p50, p99, p99_9;
-    rt::Histogram all;
-    for (std::size_t block = kind; block < tap.blocks.size(); block += kKinds.size()) {
-      const rt::Percentiles p = tap.blocks[block].percentiles();
-      p50.push_back(us(p.p50));
-      p99.push_back(us(p.p99));
-      p99_9.push_back(us(p.p999));
-      all.add(tap.blocks[block]);
-    }
-    p999[kind] = median(p99_9);
-    fmt::print("{:28} {:8.1f} {:8.1f} {:8.1f} {:8.1f} {:9}\n", kNames[kind], median(p50),
-               median(p99), p999[kind], us(all.max_ns()), all.count());
-  }
-  fmt::print(
-      "p99.9 over that of nobody: {:.2f} with 20, {:.2f} hostile; medians of {} blocks each\n",
-      p999[1] / p999[0], p999[2] / p999[0], tap.blocks.size() / kKinds.size());
-}
-
 /// Its topics are those of a run.
 Result<std::unique_ptr<dds::Publisher>> make_publisher(const runtime::Run& run,
                                                        dds::Participant& node) {
@@ -186,26 +144,8 @@ Result<std::unique_ptr<dds::Publisher>> make_publisher(const runtime::Run& run,
                                        .run = 1});
 }
 
-/// Steps through all blocks on a thread of its own; the process `subscribers` reads which is on.
-void step_through(runtime::RobotCycle& cycle, const TimedTap& tap, int cpu,
-                  std::FILE* subscribers) {
-  std::thread loop([&] {
-    rt::ThreadConfig thread;
-    thread.cpu = cpu;
-    const rt::ThreadReport report = rt::set_up_thread(thread);
-    if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
-    const std::uint64_t all = tap.cycles_per_block * tap.blocks.size();
-    for (std::uint64_t k = 0; k < all && cycle.step(); ++k) {
-      if (k % tap.cycles_per_block != 0) continue;
-      std::fputc(kKinds[k / tap.cycles_per_block % kKinds.size()], subscribers);
-      std::fflush(subscribers);
-    }
-  });
-  loop.join();
-}
-
 int run(const Options& options, const char* program) {
-  TimedTap tap;
+  BlockTap tap(options.blocks, kKinds, 100);
   const auto opened =
       open_run(options.experiment, {.duration_s = 1e6, .rate = 1.0}, {.observer = &tap});
   if (!opened) return fail_with(opened.error());
@@ -217,23 +157,20 @@ int run(const Options& options, const char* program) {
   const auto publisher = make_publisher(**opened, **node);
   if (!publisher) return fail_with(publisher.error());
 
-  tap.to = publisher->get();
-  tap.blocks.resize(kKinds.size() * static_cast<std::size_t>(options.blocks));
-  tap.cycles_per_block =
-      static_cast<std::uint64_t>(options.seconds * 1e9 / static_cast<double>(e.loop.period_ns));
+  tap.hand_on_to(**publisher);
   const std::string others = fmt::format("{} --subscribers --domain {}", program, options.domain);
   std::FILE* subscribers = ::popen(others.c_str(), "w");
   if (subscribers == nullptr) return fail_with(fail("cannot start the subscribers").error());
-  fmt::print("{}{} blocks of {:g} s of each kind, {} at 1 kHz\n", machine_text(), options.blocks,
-             options.seconds, e.robot.name);
+  fmt::print("{}{} blocks of {:g} s of each kind, {} at 1 kHz\n", machine_text(),
+             options.blocks.blocks, options.blocks.seconds, e.robot.name);
   (*publisher)
       ->start({.version = [] { return std::uint64_t{0}; },
                .faults = [] { return std::vector<dds::FaultEntry>(); },
                .lost = [] { return std::uint64_t{0}; }});
-  step_through((*opened)->cycle(), tap, options.cpu, subscribers);
+  tap.step_through((*opened)->cycle(), subscribers);
   ::pclose(subscribers);
   const dds::PublishCounts counts = (*publisher)->stop();
-  print(tap);
+  tap.print("work of a cycle [us]", &BlockTap::Block::work, kNames);
   fmt::print("published {}, refused {}, dropped cycles {}\n", counts.sent, counts.refused,
              counts.dropped);
   return 0;
@@ -247,9 +184,7 @@ int main(int argc, char** argv) {
   Options options;
   CLI::App app{"What subscribers that join and leave do to the loop"};
   app.add_option("experiment", options.experiment, "default: COMAN holding");
-  app.add_option("--blocks", options.blocks, "of each kind")->check(CLI::Range(1, 1000));
-  app.add_option("--seconds", options.seconds, "of a block")->check(CLI::Range(0.5, 600.0));
-  app.add_option("--cpu", options.cpu, "the loop's; the rest of the process may be anywhere");
+  add_options(app, options.blocks);
   app.add_option("--domain", options.domain, "DDS domain")->check(CLI::Range(0, 232));
   app.add_flag("--subscribers", options.subscribers, "be the other process");
   CLI11_PARSE(app, argc, argv);
