@@ -191,6 +191,11 @@ void Gate::leave() noexcept {
         .stack = {}});
 }
 
+void Gate::stand_aside() noexcept {
+  if (told != nullptr) told->selector_ = 0;
+  in_call = false;
+}
+
 /// On any thread, and inside malloc.
 void Gate::on_call(const char* call) {
   if (told == nullptr) return;

@@ -64,6 +64,10 @@ class Gate final : public runtime::CallWatch {
   void enter(std::uint32_t controller, runtime::ControllerFunction function) noexcept override;
   void leave() noexcept override;
 
+  /// What the calling thread does from now on is no controller's: it has crashed. Safe in a signal
+  /// handler.
+  static void stand_aside() noexcept;
+
   /// When the loop has stopped.
   [[nodiscard]] std::vector<GateResult> results(const runtime::ControllerNames& names) const;
 

@@ -16,6 +16,7 @@
 #include <string>
 #include <thread>
 
+#include "apps/run/gate.hpp"
 #include "apps/text/console.hpp"
 #include "base/call_stack.hpp"
 #include "base/crash_signals.hpp"
@@ -37,6 +38,8 @@ std::atomic<const char*> reason{nullptr};
 PlaceSearch *loop_search = nullptr, *early_search = nullptr;
 std::atomic<bool> robot_stopped{false};
 constexpr char kTitle[] = "called from (innermost first):";
+constexpr char kNowhere[] =
+    "its stack leads nowhere: build it with -fsanitize=address (docs/controllers.md)";
 constexpr char kNotice[] = "note: file and line of the crash are looked for, at most 20 s long\n";
 
 /// In one piece, as another thread writes, too. Safe in a signal handler. What is no sign of ASCII
@@ -74,12 +77,13 @@ struct EarlyCrash {
   static void write(void* self) {
     const auto& crash = *static_cast<const EarlyCrash*>(self);
     const CrashPlace place = early_search == nullptr ? CrashPlace{} : early_search->place();
-    fail_begun_json({.message = std::string("the controller crashed before its first cycle: ") +
-                                crash.why + place.in_function(),
-                     .hint = "correct it; the standard error has the calls",
-                     .file = place.file,
-                     .line = place.line,
-                     .key = crash.controller});
+    fail_begun_json(
+        {.message = std::string("the controller crashed before its first cycle: ") + crash.why +
+                    place.in_function(),
+         .hint = place.offset.empty() ? kNowhere : "correct it; the standard error has the calls",
+         .file = place.file,
+         .line = place.line,
+         .key = crash.controller});
   }
 };
 
@@ -135,6 +139,7 @@ void tell_early_crash(const char* controller, const char* why, const CallStack& 
 }
 
 void on_signal(int signal, siginfo_t*, void* context) {
+  Gate::stand_aside();  // its own look at the stack would crash
   if (!in_cycle()) {
     if (const char* controller = hosted_controller())
       tell_early_crash(controller, crash_text(signal), crashed_call_stack(context));
@@ -190,7 +195,7 @@ Error loop_error(const std::string& fault) {
   const bool noted = loop_search != nullptr && loop_search->is_noted();
   const CrashPlace place = noted ? loop_search->place() : CrashPlace{};
   return {.message = fault + place.in_function(),
-          .hint = {},
+          .hint = noted && place.offset.empty() ? kNowhere : "",
           .file = place.file,
           .line = place.line,
           .key = {}};

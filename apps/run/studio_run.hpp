@@ -34,7 +34,7 @@ class StudioRun {
   [[nodiscard]] hal::CycleObserver& tap() { return studio_->tap(); }
   [[nodiscard]] std::string address() const { return studio_->address(); }
   /// From now on clients are answered. Before the first cycle.
-  /// @param commands  complete but for what it is told itself; outlives this
+  /// @param commands  all of them are there; outlives this. Its tell() is used up
   void start(runtime::RobotCycle& cycle, ControlRegistry& commands);
   /// When there are no more cycles.
   void finish(const std::string& how, const std::string& log);

@@ -120,7 +120,9 @@ TEST_F(Stops, ByAKillLeaveNoResultOfAFormerRun) {
     }
     begin("");
     EXPECT_EQ(std::filesystem::exists(result), linked);
-    if (linked) EXPECT_EQ(read_text(result), "") << "the link is its owner's";
+    if (linked) {
+      EXPECT_EQ(read_text(result), "") << "the link is its owner's";
+    }
     signal("KILL");
     EXPECT_EQ(join(), -1);
     EXPECT_EQ(read_text(result), "");
@@ -172,7 +174,16 @@ TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
       EXPECT_NE(run.err.find(said), std::string::npos) << run.err;
     }
     EXPECT_EQ(run.err.find("hung"), std::string::npos) << run.err;
-    if (crash != std::string("smash")) {  // where the way back is overwritten, nobody can say
+    if (crash == std::string("wild")) {
+      const Outcome watched = tandem("run hold.toml --gate --no-socket -q");
+      EXPECT_EQ(watched.status, 1) << "the gate looks at the stack of each system call";
+      EXPECT_NE(watched.err.find(text), std::string::npos) << watched.err;
+    }
+    if (crash == std::string("smash")) {  // where the way back is overwritten, nobody can say
+      EXPECT_NE(json("run.json")["errors"][0]["hint"].dump().find("-fsanitize=address"),
+                std::string::npos)
+          << json("run.json");
+    } else {
       const char* const place = crash == std::string("stack")  ? "fill at "
                                 : crash == std::string("wild") ? "\n  crash at "
                                                                : "\n  update at ";

@@ -59,6 +59,7 @@ LOOP = OPEN + "for state in run:\n    pass\nprint('alive')"
         ('crash = "stack"', signal.SIGSEGV, "segmentation fault (SIGSEGV)", "fill at "),
         ('crash = "abort"', signal.SIGABRT, "abort() (SIGABRT)", "update at "),
         ('crash = "divide"', signal.SIGFPE, "arithmetic error (SIGFPE)", "update at "),
+        ('crash = "wild"', signal.SIGSEGV, "segmentation fault (SIGSEGV)", "crash at "),
         ("throws = true", signal.SIGABRT, "abort() (SIGABRT)", "complain"),
     ],
 )
