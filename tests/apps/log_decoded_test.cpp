@@ -2,15 +2,12 @@
 #include <set>
 
 #include "tests/apps/program.hpp"
+#include "tests/support/node.hpp"
 
 namespace tandem::apps {
 namespace {
 
-#ifdef TANDEM_NODE
-constexpr const char* kNode = TANDEM_NODE;
-#else
-constexpr const char* kNode = nullptr;
-#endif
+using tandem::test::kNode;
 
 const std::string kFolder = TANDEM_SOURCE_DIR "/tests/log";
 

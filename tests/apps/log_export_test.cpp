@@ -4,15 +4,12 @@
 
 #include "log/log_file.hpp"
 #include "tests/apps/program.hpp"
+#include "tests/support/node.hpp"
 
 namespace tandem::apps {
 namespace {
 
-#ifdef TANDEM_NODE
-constexpr const char* kNode = TANDEM_NODE;
-#else
-constexpr const char* kNode = nullptr;
-#endif
+using tandem::test::kNode;
 
 const std::string kReader = TANDEM_SOURCE_DIR "/tests/log";
 

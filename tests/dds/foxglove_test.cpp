@@ -12,16 +12,13 @@
 #include "base/quoting.hpp"
 #include "tests/dds/raw_topic.hpp"
 #include "tests/support/dds_domain.hpp"
+#include "tests/support/node.hpp"
 #include "tests/support/scratch_folder.hpp"
 
 namespace tandem::dds {
 namespace {
 
-#ifdef TANDEM_NODE
-constexpr const char* kNode = TANDEM_NODE;
-#else
-constexpr const char* kNode = nullptr;
-#endif
+using tandem::test::kNode;
 
 std::string hex(const test::Bytes& bytes) {
   std::string out;

@@ -4,16 +4,13 @@
 
 #include "canopen/data_sheet.hpp"
 #include "tests/ethercat_can/rig.hpp"
+#include "tests/support/node.hpp"
 #include "tests/support/script.hpp"
 
 namespace tandem::hal::can {
 namespace {
 
-#ifdef TANDEM_NODE
-constexpr const char* kNode = TANDEM_NODE;
-#else
-constexpr const char* kNode = nullptr;
-#endif
+using tandem::test::kNode;
 
 const std::string kFolder = TANDEM_SOURCE_DIR "/tests/firmware_emu";
 const std::string kSheet = TANDEM_SOURCE_DIR "/config/drives/servo.eds";

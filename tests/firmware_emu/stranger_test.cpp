@@ -8,17 +8,14 @@
 
 #include "canopen/eds.hpp"
 #include "rig.hpp"
+#include "tests/support/node.hpp"
 #include "tests/support/scratch_folder.hpp"
 #include "tests/support/script.hpp"
 
 namespace tandem::firmware::testing {
 namespace {
 
-#ifdef TANDEM_NODE
-constexpr const char* kNode = TANDEM_NODE;
-#else
-constexpr const char* kNode = nullptr;
-#endif
+using tandem::test::kNode;
 
 const std::string kFolder = TANDEM_SOURCE_DIR "/tests/firmware_emu";
 

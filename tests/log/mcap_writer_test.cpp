@@ -7,9 +7,12 @@
 #include <iterator>
 
 #include "tests/log/scratch_folder.hpp"
+#include "tests/support/node.hpp"
 
 namespace tandem::log {
 namespace {
+
+using tandem::test::kNode;
 
 std::string ascii(std::string_view text) { return std::string(text); }
 
@@ -84,12 +87,6 @@ TEST(McapWriter, RefusesAFullDiskWhenItOpens) {
   ASSERT_FALSE(opened);
   EXPECT_NE(opened.error().to_string().find("No space left on device"), std::string::npos);
 }
-
-#ifdef TANDEM_NODE
-constexpr const char* kNode = TANDEM_NODE;
-#else
-constexpr const char* kNode = nullptr;
-#endif
 
 TEST(McapWriter, SatisfiesTheReaderOfTheFormatsProject) {
   const std::string tool = std::string(TANDEM_SOURCE_DIR) + "/tests/log/validate_mcap.mjs";
