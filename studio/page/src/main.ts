@@ -42,24 +42,26 @@ function stored(key: string): string | null {
 
 function themeButton(changed: () => void): HTMLElement {
   const button = h('button', { type: 'button', class: 'quiet theme' });
-  const set = (name: string) => {
-    document.documentElement.dataset.theme = name;
-    say(button, name === 'auto' ? '◐ auto' : name === 'light' ? '○ light' : '● dark');
+  const system = matchMedia('(prefers-color-scheme: dark)');
+  let theme = stored(kThemeKey) ?? 'auto';
+  const show = () => {
+    const dark = theme === 'auto' ? system.matches : theme === 'dark';
+    document.documentElement.toggleAttribute('data-dark', dark);
+    say(button, theme === 'auto' ? '◐ auto' : theme === 'light' ? '○ light' : '● dark');
     button.title = 'light, dark, or as the system says';
     changed();
   };
   button.addEventListener('click', () => {
-    const now = kThemes.indexOf(document.documentElement.dataset.theme ?? 'auto');
-    const next = kThemes[(now + 1) % kThemes.length];
+    theme = kThemes[(kThemes.indexOf(theme) + 1) % kThemes.length];
     try {
-      localStorage.setItem(kThemeKey, next);
+      localStorage.setItem(kThemeKey, theme);
     } catch {
       // Not kept: the next page follows the system.
     }
-    set(next);
+    show();
   });
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', changed);
-  set(stored(kThemeKey) ?? 'auto');
+  system.addEventListener('change', show);
+  show();
   return button;
 }
 

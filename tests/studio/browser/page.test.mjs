@@ -6,11 +6,19 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, afterEach, before, describe, test } from 'node:test';
 import { pathToFileURL } from 'node:url';
-import { kPage, lacking, openBrowser, openPage, violations } from './support.mjs';
+import {
+  eventually,
+  kPage,
+  lacking,
+  leave,
+  openBrowser,
+  openPage,
+  shot,
+  violations,
+} from './support.mjs';
 
 const why = lacking();
 const kScratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
-const kShots = process.env.TANDEM_SCREENSHOTS;
 
 describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
   let browser;
@@ -36,29 +44,8 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     mocks.push(mock);
     return mock;
   };
-  const visit = async (address, options) => {
-    const page = await openPage(browser, address, options);
-    await page.waitForSelector('body[data-cycle]');
-    return page;
-  };
-  /** Ends a visit: nothing was complained about, nothing left the machine. */
-  const leave = async (page) => {
-    assert.deepEqual(page.complaints, []);
-    assert.deepEqual(page.outside, []);
-    await page.context().close();
-  };
-  const shot = async (page, name) => {
-    if (kShots) await page.screenshot({ path: join(kShots, `${name}.png`) });
-  };
+  const visit = (address, options) => openPage(browser, address, options);
   const asked = (mock, name) => mock.robot.requests.filter((one) => one.do === name);
-  /** Waits until something of the played run is so. */
-  const run = async (what, is) => {
-    for (let i = 0; i < 150; ++i) {
-      if (is()) return;
-      await new Promise((resolve) => setTimeout(resolve, 100));
-    }
-    assert.fail(what);
-  };
   const until = (page, text) =>
     page.waitForFunction((words) => document.body.textContent.includes(words), text);
 
@@ -284,16 +271,16 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     await row.locator('button:text-is("hold ▶")').hover();
     await page.mouse.down();
     const goals = asked(mock, 'joint.move').length;
-    await run('goals while it is held', () => asked(mock, 'joint.move').length >= goals + 2);
+    await eventually('goals while it is held', () => asked(mock, 'joint.move').length >= goals + 2);
     await page.mouse.up();
-    await run('a stop at the release', () => asked(mock, 'joint.stop').length >= 1);
+    await eventually('a stop at the release', () => asked(mock, 'joint.stop').length >= 1);
     await page.waitForTimeout(300);
     const moves = asked(mock, 'joint.move').length;
     await page.waitForTimeout(600);
     assert.equal(asked(mock, 'joint.move').length, moves, 'no goal after the release');
     await shot(page, 'studio-joints');
     await leave(page);
-    await run('a halt when the page is gone', () => asked(mock, 'joint.halt').length >= 1);
+    await eventually('a halt when the page is gone', () => asked(mock, 'joint.halt').length >= 1);
   });
 
   test('a lost connection is said, looks stale, and comes back', async () => {

@@ -5,13 +5,21 @@ import { existsSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, afterEach, before, describe, test } from 'node:test';
-import { kPage, lacking, openBrowser, openMortalBrowser, openPage } from './support.mjs';
+import {
+  eventually,
+  kPage,
+  lacking,
+  leave,
+  openBrowser,
+  openMortalBrowser,
+  openPage,
+  shot,
+} from './support.mjs';
 
 const kTandem = process.env.TANDEM ?? join(kPage, '../../build/release/bin/tandem');
 const kConfig = join(kPage, '../../config');
 const why = lacking() || (existsSync(kTandem) ? '' : `${kTandem} is not built`);
 const kScratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
-const kShots = process.env.TANDEM_SCREENSHOTS;
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
@@ -58,29 +66,9 @@ describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
       );
     return { address, ask, end, said: () => said };
   };
-  const visit = async (address, options) => {
-    const page = await openPage(browser, address, options);
-    await page.waitForSelector('body[data-cycle]');
-    return page;
-  };
-  const leave = async (page) => {
-    assert.deepEqual(page.complaints, []);
-    assert.deepEqual(page.outside, []);
-    await page.context().close();
-  };
-  const shot = async (page, name) => {
-    if (kShots) await page.screenshot({ path: join(kShots, `${name}.png`) });
-  };
+  const visit = (address, options) => openPage(browser, address, options);
   const joint = (run, name) =>
     run.ask({ do: 'joint.list' }).joints.find((one) => one.joint === name);
-  /** Waits until something of the run is so. */
-  const until = async (what, is) => {
-    for (let i = 0; i < 150; ++i) {
-      if (is()) return;
-      await sleep(100);
-    }
-    assert.fail(what);
-  };
 
   test('COMAN squats, stands still, steps; the page has the joints of the run', async () => {
     const run = await begin('coman/squat.toml');
@@ -92,7 +80,7 @@ describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
     const before = run.ask({ do: 'clock.show' }).cycles;
     await page.fill('.clock-body input', '40');
     await page.locator('.clock-body button:text-is("Step")').click();
-    await until('40 cycles later', () => run.ask({ do: 'clock.show' }).cycles === before + 40);
+    await eventually('40 cycles later', () => run.ask({ do: 'clock.show' }).cycles === before + 40);
     await page.waitForFunction(
       (cycle) => Number(document.body.dataset.cycle) >= cycle,
       before + 39,
@@ -129,7 +117,7 @@ describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
     await row.locator('input[aria-label^="speed of"]').fill('1');
     await row.locator('input[aria-label^="goal of panda_joint4"]').first().fill('-1.5');
     await row.locator('button:text-is("Go")').click();
-    await until(
+    await eventually(
       'it is at its goal',
       () => Math.abs(joint(run, 'panda_joint4').position_rad + 1.5) < 0.02,
     );
@@ -137,10 +125,10 @@ describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
     await row.locator('input[aria-label^="speed of"]').fill('0.1');
     await row.locator('input[aria-label^="goal of panda_joint4"]').first().fill('-2.5');
     await row.locator('button:text-is("Go")').click();
-    await until('it moves', () => joint(run, 'panda_joint4').moving);
+    await eventually('it moves', () => joint(run, 'panda_joint4').moving);
     assert.deepEqual(page.complaints, []);
     await mortal.kill();
-    await until('it holds', () => !joint(run, 'panda_joint4').moving);
+    await eventually('it holds', () => !joint(run, 'panda_joint4').moving);
     const place = joint(run, 'panda_joint4').position_rad;
     assert.ok(place > -2.4, `at ${place} rad, far from the goal`);
   });

@@ -1,4 +1,5 @@
 // A browser for the tests of the studio's page, and what every test of it looks at.
+import assert from 'node:assert/strict';
 import { existsSync, readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { dirname, join } from 'node:path';
@@ -73,7 +74,30 @@ export async function openPage(browser, address, options = {}) {
       page.outside.push(request.url());
   });
   await page.goto(address);
+  await page.waitForSelector('body[data-cycle]');
   return page;
+}
+
+/** Ends a visit: nothing was complained about, nothing left the machine. */
+export async function leave(page) {
+  assert.deepEqual(page.complaints, []);
+  assert.deepEqual(page.outside, []);
+  await page.context().close();
+}
+
+/** A picture into the folder that TANDEM_SCREENSHOTS names. */
+export async function shot(page, name) {
+  const folder = process.env.TANDEM_SCREENSHOTS;
+  if (folder) await page.screenshot({ path: join(folder, `${name}.png`) });
+}
+
+/** Waits until something is so. */
+export async function eventually(what, is) {
+  for (let i = 0; i < 150; ++i) {
+    if (is()) return;
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
+  assert.fail(what);
 }
 
 /** What axe-core finds, in words. */
