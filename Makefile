@@ -32,6 +32,7 @@ demo:
 	@build/release/bin/tandem run config/coman/squat.toml --report
 	@echo
 	@echo "Next, from this folder (a robot's first run builds its kernels, which takes a minute or two):"
+	@echo "  build/release/bin/tandem run config/coman/squat.toml --studio  # in a browser, while it runs"
 	@echo "  build/release/bin/tandem run config/panda/trajectory.toml  # another robot"
 	@echo "  build/release/bin/tandem run config/coman/hold.toml        # another controller"
 	@echo "  build/release/bin/tandem new config/ur5e/ur5e.urdf -o runs/my_robot  # a robot from its URDF"

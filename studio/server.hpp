@@ -14,7 +14,7 @@
 
 namespace tandem::studio {
 
-/// Connections at once, of browsers and of WebSockets; a further one is told so, and closed.
+/// Connections at once, HTTP and WebSocket together. A further one gets status 503, and is closed.
 inline constexpr std::size_t kMostConnections = 64;
 /// Without a port of the caller's the first free one from here is taken.
 inline constexpr std::uint16_t kFirstPort = 8642, kLastPort = 8661;

@@ -71,8 +71,8 @@ class ControlRegistry {
   void stops_by(std::function<std::uint64_t()> last_stop) { last_stop_ = std::move(last_stop); }
   [[nodiscard]] std::uint64_t last_stop() const { return last_stop_ ? last_stop_() : 0; }
 
-  /// Who is told of each command that was asked for and does more than read, with its answer: one,
-  /// on any thread. Before anything is asked.
+  /// `told` gets each command that does more than read, and its answer; on any thread. One
+  /// listener, which is set before anything is asked.
   void tell(std::function<void(const std::string& question, const Json& answer)> told) {
     told_ = std::move(told);
   }

@@ -102,7 +102,7 @@ bool become_teller() noexcept {
   return false;
 }
 
-/// Whether it was a crash in a cycle, or of a controller before its first one: that is told.
+/// Says what crashed: a cycle, or a controller before its first one. False: neither did.
 bool tell_crash(int signal, const siginfo_t& info, const void* context) {
   // Not what other processes sent, and not kill() of this one.
   if (info.si_code <= 0 && (info.si_code != SI_TKILL || info.si_pid != ::getpid())) return false;

@@ -39,7 +39,7 @@ class CrashScene final : public CallWatch {
 
   // For the handlers.
 
-  /// Whether a controller is called, or the cycle is at work around that.
+  /// Whether a controller is called now, or the cycle is in its own code.
   [[nodiscard]] bool in_cycle() const noexcept;
   /// Says what happened, with the calls, and lets `last` do its work.
   /// @param how  "crashed"
@@ -59,10 +59,10 @@ class CrashScene final : public CallWatch {
   std::thread thread_;  // last: it uses the others
 };
 
-/// While one lives, SIGSEGV and the like on its thread, in a cycle of the run, are told by its
-/// scene; then the handler that was there before gets the signal, and the process ends by it. So it
-/// is on the threads that open and configure controllers, which are named. All other signals go to
-/// that former handler alone. With the last guard of the process it is installed again.
+/// While one lives, its scene reports SIGSEGV and the like that come on its thread in a cycle of
+/// the run. Then the former handler gets the signal, and the process ends by it. The same holds on
+/// threads that open and configure controllers, whose names are in the report. All other signals go
+/// to the former handler alone. The last guard of the process installs that handler again.
 class CrashGuard {
  public:
   /// @param scene  outlives it
