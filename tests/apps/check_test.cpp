@@ -327,7 +327,7 @@ TEST_F(Check, HoldsOfWhatTheDemoNamesNext) {
     if (command != "run") continue;
     EXPECT_EQ(tandem("check " + shell_word(file)).status, 0) << read_text(folder_ / "err.txt");
   }
-  EXPECT_EQ(named, 3);
+  EXPECT_EQ(named, 4);
 }
 
 TEST_F(Check, RepairShowsWhatItWouldTakeForAnInertiaThatCannotBe) {
