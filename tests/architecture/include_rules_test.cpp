@@ -165,7 +165,13 @@ TEST(Architecture, FilesAreOpenedByBaseAlone) {
       // which no user names
       "apps/bench/engine_page.cpp", "apps/clients/control_search.cpp", "apps/machine/machine.cpp",
       "apps/offline/main.cpp"};
+  // A search for the plain text first: the pattern takes a hundred times as long, on every line.
+  const std::vector<std::string> texts{"fstream", "fopen(", "truncate(", "resize_file(", "dlopen("};
   const std::regex opens(R"(\bi?o?fstream\b|\bfopen\(|\btruncate\(|\bresize_file\(|\bdlopen\()");
+  const auto opens_a_file = [&](const std::string& code) {
+    return std::ranges::any_of(texts, [&](const auto& text) { return code.contains(text); }) &&
+           std::regex_search(code, opens);
+  };
   const fs::path root = TANDEM_SOURCE_DIR;
   std::set<std::string> found;
   for (const auto& [room, allowed] : rules()) {
@@ -175,7 +181,7 @@ TEST(Architecture, FilesAreOpenedByBaseAlone) {
       std::ifstream in(entry.path());
       for (std::string line; std::getline(in, line);) {
         const std::string code = line.substr(0, line.find("//"));
-        if (!code.starts_with("#include") && std::regex_search(code, opens)) found.insert(file);
+        if (!code.starts_with("#include") && opens_a_file(code)) found.insert(file);
       }
     }
   }
