@@ -1,9 +1,10 @@
 // One pane of plots: lines with their bands, lanes of words, a legend with values and figures.
 import uPlot from 'uplot';
+import { listed, timeAxis, unitAxes } from './axes';
 import type { Data } from './data';
 import { h, theme } from './dom';
 import { wordOf } from './enums';
-import { number, tick } from './format';
+import { number } from './format';
 import { Lanes } from './lanes';
 import { kPaletteSize, Legend, type LegendOwner } from './legend';
 import { eventMarks } from './marks';
@@ -270,20 +271,6 @@ export class Pane implements LegendOwner {
     if (this.drawn.length === 0) return;
     const units = [...new Set(curves.map((one) => unitOf(one.series, this.data.catalog)))];
     const time = this.data.time;
-    const axis = (scale: string, side: number, label: string): uPlot.Axis => ({
-      scale,
-      side,
-      label: label || ' ',
-      labelSize: 16,
-      labelGap: 0,
-      size: 48,
-      labelFont: '11px system-ui',
-      font: '11px system-ui',
-      gap: 3,
-      stroke: () => theme('--muted'),
-      grid: { stroke: () => theme('--grid'), width: 1, show: side !== 1 },
-      ticks: { show: false },
-    });
     const lines: uPlot.Series[] = [{}];
     const bands: uPlot.Band[] = [];
     for (const { series } of curves) {
@@ -320,15 +307,10 @@ export class Pane implements LegendOwner {
         scales: { x: { time: false } },
         axes: [
           {
-            ...axis('x', 2, ''),
-            labelSize: 0,
-            size: 22,
+            ...timeAxis(),
             values: (_, ticks) => ticks.map((one) => `${Number(one.toFixed(6))} s`),
           },
-          ...units.slice(0, 2).map((unit, i) => ({
-            ...axis(`y ${unit}`, i === 0 ? 3 : 1, unit),
-            values: (_: uPlot, ticks: number[]) => ticks.map(tick),
-          })),
+          ...unitAxes(units),
         ],
         cursor: {
           y: false,
@@ -370,10 +352,6 @@ export class Pane implements LegendOwner {
       if (this.plot && left >= 0) time.select(this.plot.posToVal(left, 'x'));
     });
   }
-}
-
-function listed(values: ArrayLike<number>): (number | null)[] {
-  return Array.from(values, (one) => (Number.isFinite(one) ? one : null));
 }
 
 /** The last row that is not after a time. */
