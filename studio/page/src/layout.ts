@@ -1,6 +1,7 @@
 // Which panes show which series: kept in the browser, saved as a file, or made of what a robot has.
 import { limbsOf } from './limbs';
 import type { Hello } from './protocol';
+import { readScope, type ScopeSettings } from './scope_settings';
 import type { Series } from './series';
 import type { Catalog } from './signals';
 
@@ -8,6 +9,8 @@ export interface Layout {
   version: 1;
   width_s: number;
   panes: { series: Series[] }[];
+  /** Absent: a preset of plots, which leaves the oscilloscope alone. */
+  scope?: ScopeSettings;
 }
 
 const kKey = 'tandem.studio.layout';
@@ -26,7 +29,7 @@ function seriesOf(value: unknown): Series | null {
 
 /** A layout of a text. @throws Error in words: what is wrong with it. */
 export function readLayout(text: string): Layout {
-  let value: { version?: unknown; width_s?: unknown; panes?: unknown };
+  let value: { version?: unknown; width_s?: unknown; panes?: unknown; scope?: unknown };
   try {
     value = JSON.parse(text);
   } catch {
@@ -40,7 +43,12 @@ export function readLayout(text: string): Layout {
     return { series: series.filter((one): one is Series => one !== null) };
   });
   const width = Number(value.width_s);
-  return { version: 1, width_s: width >= 1 && width <= 60 ? width : 10, panes };
+  return {
+    version: 1,
+    width_s: width >= 1 && width <= 60 ? width : 10,
+    panes,
+    ...(value.scope === undefined ? {} : { scope: readScope(value.scope) }),
+  };
 }
 
 /** The layout of this robot that the browser keeps; null: none, or one that cannot be read. */

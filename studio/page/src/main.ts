@@ -4,6 +4,7 @@ import './theme.css';
 import './style.css';
 import './panels.css';
 import './joints.css';
+import './scope.css';
 import './narrow.css';
 import { Actions } from './actions';
 import { ClockPanel } from './clock';
@@ -19,11 +20,13 @@ import { LiveSource } from './live';
 import { Plots } from './plots';
 import { kProtocol } from './protocol';
 import { Scene } from './scene';
+import { Scope } from './scope';
 import { Tabs } from './tabs';
 
 const kAlways = ['status', 'clock.show', 'fault.show'];
 const kWatched: Record<string, string[]> = {
   plots: [],
+  scope: [],
   joints: ['joint.list'],
   controllers: ['controller.list'],
   inputs: ['input.list'],
@@ -74,6 +77,12 @@ function start(): void {
   const lease = new ControlLease(source);
   const scene = new Scene(data);
   const plots = new Plots(data, (words, bad) => actions.tell('', words, bad));
+  const scope = new Scope(
+    data,
+    (words, bad) => actions.tell('', words, bad),
+    () => plots.keep(),
+  );
+  plots.scope = scope;
   const joints = new Joints(data, actions, lease);
   const header = new Header(
     data,
@@ -81,11 +90,13 @@ function start(): void {
     themeButton(() => {
       scene.themeChanged();
       plots.themeChanged();
+      scope.themeChanged();
     }),
   );
   const tabs = new Tabs(
     [
       { name: 'plots', label: 'Plots', content: plots.element },
+      { name: 'scope', label: 'Scope', content: scope.element },
       { name: 'joints', label: 'Joints', content: joints.element },
       {
         name: 'controllers',
@@ -134,6 +145,7 @@ function start(): void {
     }
     scene.update(now);
     if (tabs.active === 'plots') plots.update(now);
+    if (tabs.active === 'scope') scope.update(now);
     requestAnimationFrame(frame);
   };
   requestAnimationFrame(frame);

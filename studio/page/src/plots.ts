@@ -1,10 +1,12 @@
 // All panes: search, time of the picture, layouts.
+import { saveFile } from './csv';
 import type { Data } from './data';
 import { attribute, h, say } from './dom';
 import { seconds } from './format';
 import { keepLayout, keptLayout, kPresets, type Layout, readLayout } from './layout';
 import { eventNear, signOf } from './marks';
 import { Pane, type PaneOwner } from './pane';
+import type { ScopeSettings } from './scope_settings';
 import { signalSearch } from './search';
 import { kWidths } from './time';
 
@@ -13,6 +15,8 @@ const kMostPanes = 12;
 const kEvery_ms = 50;
 
 export class Plots implements PaneOwner {
+  /** Whose settings are part of the layout. */
+  scope: { settings: ScopeSettings; apply(settings: ScopeSettings): void } | null = null;
   private panes: Pane[] = [];
   private active: Pane | null = null;
   private figures = false;
@@ -272,6 +276,7 @@ export class Plots implements PaneOwner {
     this.width.value = String(width);
     this.data.time.follow(width);
     for (const pane of layout.panes) this.push(pane.series);
+    if (layout.scope) this.scope?.apply(layout.scope);
     this.want();
   }
 
@@ -280,6 +285,7 @@ export class Plots implements PaneOwner {
       version: 1,
       width_s: this.data.time.width,
       panes: this.panes.map((pane) => ({ series: pane.series })),
+      scope: this.scope?.settings,
     };
   }
 
@@ -287,16 +293,14 @@ export class Plots implements PaneOwner {
     this.element.dataset.panes = String(this.panes.length);
     this.data.want('plots', [...new Set(this.panes.flatMap((pane) => pane.ids()))], true);
   }
-  private keep(): void {
+  /** The browser remembers what is shown. */
+  keep(): void {
     if (this.data.hello) keepLayout(this.data.hello.robot, this.layout());
   }
 
   private export(): void {
     const text = JSON.stringify(this.layout(), null, 2);
-    const address = URL.createObjectURL(new Blob([text], { type: 'application/json' }));
-    const link = h('a', { href: address, download: 'tandem-layout.json' });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(address), 1000);
+    saveFile('tandem-layout.json', 'application/json', text);
   }
 
   private async import(): Promise<void> {

@@ -3,11 +3,16 @@ import type { Data } from './data';
 import { attribute, h } from './dom';
 import type { Signal } from './signals';
 
-export function signalSearch(data: Data, chosen: (signal: Signal) => void): HTMLElement {
+/** @param id of its list, another one for each search of the page */
+export function signalSearch(
+  data: Data,
+  chosen: (signal: Signal) => void,
+  id = 'found',
+): HTMLElement {
   let found: Signal[] = [];
   let active = 0;
   const list = h('ul', {
-    id: 'found',
+    id,
     role: 'listbox',
     'aria-label': 'found signals',
     class: 'found',
@@ -20,7 +25,7 @@ export function signalSearch(data: Data, chosen: (signal: Signal) => void): HTML
     placeholder: 'Search a signal: knee torque',
     'aria-label': 'search a signal; Enter adds it',
     'aria-expanded': 'false',
-    'aria-controls': 'found',
+    'aria-controls': id,
     'aria-autocomplete': 'list',
     autocomplete: 'off',
     spellcheck: 'false',
@@ -51,7 +56,7 @@ export function signalSearch(data: Data, chosen: (signal: Signal) => void): HTML
       attribute(item, 'aria-selected', String(i === active));
       if (i === active && !list.hidden) item.scrollIntoView({ block: 'nearest' });
     });
-    attribute(field, 'aria-activedescendant', found[active] ? `found-${active}` : null);
+    attribute(field, 'aria-activedescendant', found[active] ? `${id}-${active}` : null);
   }
   function show(): void {
     found = data.catalog.search(field.value);
@@ -59,7 +64,7 @@ export function signalSearch(data: Data, chosen: (signal: Signal) => void): HTML
       h(
         'li',
         {
-          id: `found-${i}`,
+          id: `${id}-${i}`,
           role: 'option',
           onpointerdown: (event: Event) => {
             event.preventDefault();

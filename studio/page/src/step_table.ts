@@ -1,0 +1,138 @@
+// The table of step responses: a row for each capture, then mean and spread.
+import { h } from './dom';
+import { number } from './format';
+import type { Capture } from './scope_engine';
+import { type StepFigures, spreadOf, stepFigures } from './step_response';
+
+interface Column {
+  head: string;
+  title: string;
+  of(figures: StepFigures): number;
+  text(value: number): string;
+  /** What stands there when there is no such figure. */
+  none: string;
+}
+
+const ms = (value: number) => `${number(1e3 * value)} ms`;
+const percent = (value: number) => `${(100 * value).toFixed(1)} %`;
+
+const kColumns: Column[] = [
+  {
+    head: 'step',
+    title: 'change of the response',
+    of: (one) => one.change,
+    text: number,
+    none: '–',
+  },
+  {
+    head: 'rise time',
+    title: 'from 10 % to 90 % of the change',
+    of: (one) => one.rise_s,
+    text: ms,
+    none: '–',
+  },
+  {
+    head: 'overshoot',
+    title: 'beyond the final value, as a share of the change',
+    of: (one) => one.overshoot,
+    text: percent,
+    none: '–',
+  },
+  {
+    head: 'peak time',
+    title: 'from the step to the largest value',
+    of: (one) => one.peak_s,
+    text: ms,
+    none: 'no peak',
+  },
+  {
+    head: 'settles to 5 %',
+    title: 'since when it stays within 5 % of the change about the final value',
+    of: (one) => one.settling5_s,
+    text: ms,
+    none: 'not settled',
+  },
+  {
+    head: 'to 2 %',
+    title: 'since when it stays within 2 % of the change about the final value',
+    of: (one) => one.settling2_s,
+    text: ms,
+    none: 'not settled',
+  },
+  {
+    head: 'error',
+    title: 'steady-state error: reference less final value',
+    of: (one) => one.error,
+    text: number,
+    none: 'no reference',
+  },
+];
+
+/** Figures of a capture's channel. @param reference empty: none */
+export function figuresOf(capture: Capture, response: string, reference: string): StepFigures {
+  return stepFigures({
+    step_s: capture.period_s,
+    trigger: capture.trigger - capture.first,
+    response: capture.channels.get(response) ?? [],
+    reference: reference ? (capture.channels.get(reference) ?? []) : null,
+  });
+}
+
+/** @param captures newest first  @param unit of the response */
+export function stepTable(
+  captures: Capture[],
+  response: string,
+  reference: string,
+  unit: string,
+): HTMLElement {
+  const known = captures.map((capture) => figuresOf(capture, response, reference));
+  const cell = (text: string, data?: number) =>
+    h('td', { class: 'figure', 'data-value': Number.isFinite(data) ? String(data) : null }, text);
+  const rows = captures.map((capture, i) =>
+    h(
+      'tr',
+      {},
+      h('th', { scope: 'row' }, `${(capture.trigger * capture.period_s).toFixed(3)} s`),
+      ...(known[i].words
+        ? [h('td', { colspan: kColumns.length, class: 'no-figures' }, known[i].words)]
+        : kColumns.map(({ of, text, none }) => {
+            const value = of(known[i]);
+            return cell(Number.isFinite(value) ? text(value) : none, value);
+          })),
+    ),
+  );
+  const spreads = kColumns.map(({ of }) => spreadOf(known.map(of)));
+  const summary = (head: string, of: (one: (typeof spreads)[number]) => number) =>
+    h(
+      'tr',
+      { class: 'summary' },
+      h('th', { scope: 'row' }, head),
+      ...kColumns.map(({ text }, i) => {
+        const value = of(spreads[i]);
+        return cell(Number.isFinite(value) ? text(value) : '–', value);
+      }),
+    );
+  return h(
+    'table',
+    { class: 'step-table' },
+    h(
+      'thead',
+      {},
+      h(
+        'tr',
+        {},
+        h('th', { scope: 'col' }, 'trigger at'),
+        ...kColumns.map(({ head, title, text }) =>
+          h('th', { scope: 'col', title }, text === number && unit ? `${head} [${unit}]` : head),
+        ),
+      ),
+    ),
+    h('tbody', {}, ...rows),
+    h(
+      'tfoot',
+      {},
+      summary('mean', (one) => one.mean),
+      summary('spread', (one) => one.spread),
+    ),
+  );
+}
