@@ -14,6 +14,8 @@ import { triggerWords } from './trigger';
 
 /** Pictures a second: many captures cost more than numbers. */
 const kEvery_ms = 80;
+/** Settings that say how captures are shown, not which are taken. */
+const kOfThePicture = ['overlay', 'response', 'reference'];
 
 export class Scope {
   settings: ScopeSettings = firstSettings();
@@ -24,7 +26,12 @@ export class Scope {
   private readonly words = h('p', { class: 'scope-state', role: 'status' });
   private readonly channels = h('tbody');
   private readonly at = h('caption', { class: 'at' });
-  private readonly steps = h('div', { class: 'table-box step-box' });
+  private readonly steps = h('div', {
+    class: 'table-box',
+    tabindex: '0',
+    role: 'region',
+    'aria-label': 'step responses',
+  });
   private values: HTMLElement[] = [];
   private dirty = true;
   private last = 0;
@@ -132,7 +139,11 @@ export class Scope {
   }
 
   private change(part: Partial<ScopeSettings>): void {
-    this.apply({ ...this.settings, ...part });
+    const settings = { ...this.settings, ...part };
+    if (Object.keys(part).every((key) => kOfThePicture.includes(key))) {
+      this.settings = settings;
+      this.list();
+    } else this.apply(settings);
     this.kept();
   }
 

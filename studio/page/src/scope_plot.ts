@@ -22,7 +22,7 @@ export class ScopePlot {
     class: 'plot-box scope-plot',
     tabindex: '0',
     role: 'group',
-    'aria-label': 'captures, aligned at the trigger; arrow keys move the cursor',
+    'aria-label': 'captures, aligned at the trigger; arrow keys move the cursor, Escape shows all',
     onkeydown: (event: KeyboardEvent) => this.key(event),
   });
   /** Row of the newest capture below the cursor; null: none. */
@@ -80,7 +80,14 @@ export class ScopePlot {
     if (this.picture) this.draw(this.picture);
   }
 
+  /** The picture has the whole records again. */
+  private all(): void {
+    this.zoom = null;
+    if (this.picture) this.draw(this.picture);
+  }
+
   private key(event: KeyboardEvent): void {
+    if (event.key === 'Escape') this.all();
     const newest = this.picture?.captures[0];
     const by = event.key === 'ArrowRight' ? 1 : event.key === 'ArrowLeft' ? -1 : 0;
     if (!newest || !this.plot || by === 0) return;
@@ -133,8 +140,7 @@ export class ScopePlot {
           drag: { x: true, y: false, setScale: false, dist: 6 },
           bind: {
             dblclick: () => () => {
-              this.zoom = null;
-              if (this.picture) this.draw(this.picture);
+              this.all();
               return null;
             },
           },

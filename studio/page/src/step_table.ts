@@ -11,6 +11,8 @@ interface Column {
   text(value: number): string;
   /** What stands there when there is no such figure. */
   none: string;
+  /** Steps up and down have no common mean. */
+  alone?: boolean;
 }
 
 const ms = (value: number) => `${number(1e3 * value)} ms`;
@@ -23,6 +25,7 @@ const kColumns: Column[] = [
     of: (one) => one.change,
     text: number,
     none: '–',
+    alone: true,
   },
   {
     head: 'rise time',
@@ -107,8 +110,8 @@ export function stepTable(
       'tr',
       { class: 'summary' },
       h('th', { scope: 'row' }, head),
-      ...kColumns.map(({ text }, i) => {
-        const value = of(spreads[i]);
+      ...kColumns.map(({ text, alone }, i) => {
+        const value = alone ? Number.NaN : of(spreads[i]);
         return cell(Number.isFinite(value) ? text(value) : '–', value);
       }),
     );

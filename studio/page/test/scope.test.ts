@@ -1,6 +1,8 @@
 // Triggers, and the engine of the oscilloscope against a run that keeps some of its cycles.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { csv, float32 } from '../src/csv';
+import { readLayout } from '../src/layout';
 import type { Window } from '../src/protocol';
 import { rowsOf } from '../src/record';
 import { ScopeEngine } from '../src/scope_engine';
@@ -263,4 +265,23 @@ test('settings of a layout; what is none there is as at first', () => {
   assert.deepEqual(readScope(undefined), firstSettings());
   const odd = { channels: [1, 'a'], trigger: { kind: 'toString', level: 'x' }, overlay: 1e9 };
   assert.deepEqual(readScope(odd), { ...firstSettings(), channels: ['a'], overlay: 20 });
+});
+
+test('a layout has the settings of the oscilloscope, or none', () => {
+  const layout = { version: 1, width_s: 10, panes: [] };
+  assert.equal(readLayout(JSON.stringify(layout)).scope, undefined);
+  const scope = { ...firstSettings(), channels: ['a'], before: 0.75 };
+  assert.deepEqual(readLayout(JSON.stringify({ ...layout, scope })).scope, scope);
+});
+
+test('numbers of 32 bits are written with the digits that they need', () => {
+  assert.equal(float32(Math.fround(0.1)), '0.1');
+  assert.equal(float32(Number.NaN), '');
+  for (const value of [1 / 3, -2e-30, 16777217, 0.49988598925, 6.02e23].map(Math.fround)) {
+    assert.equal(Math.fround(Number(float32(value))), value);
+  }
+});
+
+test('names of any kind are one cell', () => {
+  assert.equal(csv(['a [m]', 'b,"c"'], [['1', '']]), 'a [m],"b,""c"""\r\n1,\r\n');
 });

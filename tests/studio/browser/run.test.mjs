@@ -1,26 +1,14 @@
 // The page against real runs: TANDEM=build/release/bin/tandem node --test tests/studio/browser/run.test.mjs
 import assert from 'node:assert/strict';
-import { execFileSync, spawn } from 'node:child_process';
-import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, afterEach, before, describe, test } from 'node:test';
-import {
-  eventually,
-  kPage,
-  lacking,
-  leave,
-  openBrowser,
-  openMortalBrowser,
-  openPage,
-  shot,
-} from './support.mjs';
+import { beginRun, lackingRun } from './runs.mjs';
+import { eventually, leave, openBrowser, openMortalBrowser, openPage, shot } from './support.mjs';
 
-const kTandem = process.env.TANDEM ?? join(kPage, '../../build/release/bin/tandem');
-const kConfig = join(kPage, '../../config');
-const why = lacking() || (existsSync(kTandem) ? '' : `${kTandem} is not built`);
+const why = lackingRun();
 const kScratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
-const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
   const runs = [];
@@ -36,35 +24,10 @@ describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
     rmSync(kScratch, { recursive: true, force: true });
   });
 
-  /** Begins a run of a bundled experiment, with its studio at a free port. */
   const begin = async (experiment, ...options) => {
-    const socket = join(kScratch, `run-${runs.length}-${Date.now()}.sock`);
-    const words = ['run', join(kConfig, experiment), '--rate', '1', '--no-log', '--socket', socket];
-    words.push('--duration', '300', '--on-fault', 'wait', '--studio', ...options);
-    if (process.env.TANDEM_STUDIO_PAGE) words.push('--studio-page', process.env.TANDEM_STUDIO_PAGE);
-    const child = spawn(kTandem, words, { cwd: kScratch });
-    let said = '';
-    for (const stream of [child.stdout, child.stderr]) {
-      stream.on('data', (data) => {
-        said += data;
-      });
-    }
-    const ended = new Promise((resolve) => child.on('exit', resolve));
-    const end = async () => {
-      child.kill('SIGINT');
-      await ended;
-    };
-    runs.push({ end });
-    for (let i = 0; i < 300 && !/studio: http\S+/.test(said); ++i) await sleep(100);
-    const address = /studio: (http\S+)/.exec(said)?.[1];
-    assert.ok(address, said);
-    const ask = (request) =>
-      JSON.parse(
-        execFileSync(kTandem, ['ask', JSON.stringify(request), '--socket', socket], {
-          encoding: 'utf8',
-        }),
-      );
-    return { address, ask, end, said: () => said };
+    const run = await beginRun(kScratch, experiment, ['--rate', '1', '--no-log', ...options]);
+    runs.push(run);
+    return run;
   };
   const visit = (address, options) => openPage(browser, address, options);
   const joint = (run, name) =>
