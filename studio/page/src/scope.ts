@@ -34,6 +34,9 @@ export class Scope {
   });
   private values: HTMLElement[] = [];
   private dirty = true;
+  /** Whose picture is seen; `anew`: with other settings. */
+  private drawn: Capture[] = [];
+  private anew = true;
   private last = 0;
   private found = '';
 
@@ -109,6 +112,9 @@ export class Scope {
     if (!this.dirty || now - this.last < kEvery_ms) return;
     this.last = now;
     this.dirty = false;
+    if (this.engine.captures === this.drawn && !this.anew) return;
+    this.drawn = this.engine.captures;
+    this.anew = false;
     const captures = this.shown();
     this.plot.draw({
       captures,
@@ -254,6 +260,7 @@ export class Scope {
     const trigger = this.data.catalog.named(this.settings.trigger.signal);
     this.data.want('scope', trigger ? [trigger.id] : []);
     this.dirty = true;
+    this.anew = true;
   }
 
   private showValues(): void {
