@@ -49,7 +49,8 @@ export class Scope {
     const run = {
       period_s: () => data.hello?.period_s ?? 0.001,
       now_s: () => data.time.now,
-      reach_s: () => data.hello?.history_s[0] ?? 1,
+      reach_s: () =>
+        data.source.live ? (data.hello?.history_s[0] ?? 1) : Number.POSITIVE_INFINITY,
       idOf: (name: string) => data.catalog.named(name)?.id,
     };
     this.engine = new ScopeEngine(data.source, run, this.settings, () => {
@@ -300,7 +301,7 @@ export class Scope {
     else if (state === 'filled') words = `Filled: triggered at ${newest}. Arm waits for another.`;
     else words = `Stopped. Arm waits until ${waits}.`;
     if (missed_s > 0) {
-      words += ` ${number(missed_s)} s were no longer kept at full rate: triggers in them are missed.`;
+      words += ` ${number(missed_s)} s are not kept at full rate: triggers in them are not seen.`;
     }
     say(this.words, words);
     this.element.dataset.state = state;

@@ -96,7 +96,7 @@ export class ScopeControls {
   private readonly stop = this.button('Stop', 'waits no longer', () => this.actions.stop());
   private readonly seeks: HTMLButtonElement[];
 
-  /** @param live triggers are waited for; else they are looked for */
+  /** @param live triggers are waited for, too */
   constructor(
     live: boolean,
     private readonly actions: ScopeActions,
@@ -121,10 +121,12 @@ export class ScopeControls {
       kModes.map((mode) => [mode, kModeWords[mode]]),
       (mode) => actions.change({ mode }),
     );
-    const previous = this.button('◀ Previous trigger', 'before the selected time', () =>
-      actions.find(false),
+    const previous = this.button(
+      '◀ Previous',
+      'the last trigger before the selected time, as far as it is kept',
+      () => actions.find(false),
     );
-    const next = this.button('Next trigger ▶', 'behind the selected time', () =>
+    const next = this.button('Next ▶', 'the next trigger after the selected time', () =>
       actions.find(true),
     );
     const force = this.button(
@@ -132,7 +134,7 @@ export class ScopeControls {
       'takes a record without a trigger: about the selected time, else the newest',
       () => actions.force(),
     );
-    this.seeks = live ? [this.arm, force, this.stop] : [previous, next, force];
+    this.seeks = live ? [this.arm, force, this.stop, previous, next] : [previous, next, force];
     this.trigger = this.group('Trigger', [
       this.signal,
       this.kind,

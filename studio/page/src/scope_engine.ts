@@ -133,11 +133,12 @@ export class ScopeEngine {
     for (let k = 0; turn === this.turn; ++k) {
       const first = forward ? at + 1 + k * most : at - (k + 1) * most;
       const last = Math.min(end, first + most - 1);
-      if (forward ? first > end : last < 0) break;
+      if (forward ? first > end : last < this.kept()) break;
       // Rows before a piece say in which state the detector is at its begin.
       const lead = forward && k > 0 ? 0 : most;
       if (!forward) this.detector = new TriggerDetector(this.settings.trigger);
-      const rows = await rowsOf(this.source, [id], first - lead, last, period);
+      const begin = Math.max(first - lead, this.kept());
+      const rows = await rowsOf(this.source, [id], begin, last, period);
       if (!rows) this.missed_s += (last + 1 - Math.max(0, first)) * period;
       const found = rows ? this.hits(rows, first, false) : [];
       if (found.length === 0) continue;

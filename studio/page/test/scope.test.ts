@@ -28,6 +28,10 @@ test('edges are found in the cycle in which the level is reached', () => {
   assert.deepEqual(fired({ kind: 'falling', level: 0.5 }, wave), [4]);
   assert.deepEqual(fired({ kind: 'either', level: 0.5 }, wave), [2, 4, 7]);
   assert.deepEqual(fired({ kind: 'rising', level: 0.5 }, [1, 1, 1]), []);
+  assert.deepEqual(
+    fired({ kind: 'falling', level: 0.5, hysteresis: 0.25 }, [1, 0.5, 0.75, 0]),
+    [1, 3],
+  );
   assert.deepEqual(fired({ kind: 'rising', level: 0.5 }, [0, 0, 1, 0, 0]), [2]);
 });
 
@@ -47,6 +51,7 @@ test('conditions trigger where they begin, at once where they hold already', () 
 
 test('a gap hides no crossing', () => {
   assert.deepEqual(fired({ kind: 'rising', level: 0.5 }, [0, Number.NaN, Number.NaN, 1, 1]), [3]);
+  assert.deepEqual(fired({ kind: 'changes' }, [1, Number.NaN, 2, 2]), [2]);
 });
 
 /** A run that keeps `reach` cycles of its signals, a (id 0) and its number of the cycle (id 1). */
@@ -57,6 +62,7 @@ class Ring {
   constructor(
     readonly reach: number,
     readonly a: (cycle: number) => number,
+    readonly claims = reach,
   ) {}
 
   async window(signals: number[], from: number, to: number, points: number): Promise<Window> {
@@ -87,7 +93,7 @@ function scopeOn(ring: Ring, over: Partial<ScopeSettings> = {}): ScopeEngine {
   const run = {
     period_s: () => kPeriod_s,
     now_s: () => (ring.now < 0 ? Number.NaN : ring.now * kPeriod_s),
-    reach_s: () => ring.reach * kPeriod_s,
+    reach_s: () => ring.claims * kPeriod_s,
     idOf: (name: string) => ids[name],
   };
   return new ScopeEngine(ring, run, settings, () => {});
@@ -133,6 +139,21 @@ test('no trigger is missed between records, and none is in two', async () => {
     [1000, 900, 800, 700, 600, 500, 400, 300, 200, 100],
   );
   assert.equal(scope.missed_s, 0);
+});
+
+test('a trigger within a record takes none; the first cycle behind it does', async () => {
+  const ring = new Ring(1000, (cycle) => Number([100, 150, 175].includes(cycle)));
+  const scope = scopeOn(ring);
+  ring.now = 10;
+  scope.arm();
+  await play(ring, scope, 400);
+  assert.deepEqual(
+    scope.captures.map(({ trigger, first, count }) => [trigger, first, count]),
+    [
+      [175, 150, 100],
+      [100, 75, 100],
+    ],
+  );
 });
 
 test('single takes one record, and then stands', async () => {
@@ -193,6 +214,20 @@ test('what a slow link lost is counted, and the scope goes on', async () => {
   assert.equal(scope.captures[0].trigger, 900);
 });
 
+test('a run that keeps less than it said is asked less and less far back', async () => {
+  const ring = new Ring(300, (cycle) => Number(cycle === 3000), 1000);
+  const scope = scopeOn(ring);
+  ring.now = 20;
+  scope.arm();
+  await scope.settled();
+  ring.now = 2900;
+  scope.tick();
+  await scope.settled();
+  assert.ok(ring.asked.length < 30, `${ring.asked.length} questions`);
+  await play(ring, scope, 3200, 20);
+  assert.equal(scope.captures[0].trigger, 3000);
+});
+
 test('a lost connection loses nothing that is still kept', async () => {
   const ring = new Ring(1000, (cycle) => Number(cycle === 150));
   const scope = scopeOn(ring);
@@ -236,8 +271,21 @@ test('of a log the next and the last trigger are found, however far', async () =
   assert.equal(await find(450998, false), 449998);
   assert.equal(await find(449998, false), 998);
   assert.equal(await find(998, false), null);
+  // An edge in the first cycle of the piece that is looked at.
+  assert.equal(await find(998 + 200000, false), 998);
+  assert.equal(await find(997, true), 998);
   assert.equal(scope.captures.length, 3);
   assert.equal(scope.captures[0].trigger, 998);
+});
+
+test('of a live run the last trigger is found as far back as it is kept', async () => {
+  const ring = new Ring(1000, (cycle) => Number(cycle === 4000 || cycle === 4500));
+  ring.now = 5200;
+  const scope = scopeOn(ring);
+  assert.equal(await scope.find(5.2, false), 4.5);
+  assert.equal(await scope.find(4.5, false), null);
+  assert.equal(scope.captures.length, 1);
+  assert.equal(scope.missed_s, 0);
 });
 
 test('long records are asked for in pieces of full rate', async () => {

@@ -192,6 +192,18 @@ test('the next step of the reference ends the one before', () => {
   }
 });
 
+test('what was before the step begins after the step before', () => {
+  const steps = (at: number[], tau: number) => (t: number) =>
+    at.reduce(
+      (sum, one, k) => sum + (t < one ? 0 : (-1) ** k * (1 - Math.exp(-(t - one) / tau))),
+      0,
+    );
+  const response = rows(0.4, 1, steps([-0.1, 0], 0.004));
+  const reference = rows(0.4, 1, steps([-0.1, 0], 1e-9));
+  const found = stepFigures({ step_s: kStep_s, trigger: 401, response, reference });
+  near(found.change, -1, 1e-3);
+});
+
 test('a step that the response itself triggered has its rise time', () => {
   const y = secondOrder(0.4, 25);
   const response = rows(0.2, 1, y);
