@@ -9,6 +9,7 @@ import { type Capture, ScopeEngine } from './scope_engine';
 import { ScopePlot } from './scope_plot';
 import { firstSettings, kMostChannels, type ScopeSettings } from './scope_settings';
 import { signalSearch } from './search';
+import type { Connection } from './source';
 import { stepTable } from './step_table';
 import { triggerWords } from './trigger';
 
@@ -39,6 +40,7 @@ export class Scope {
   private anew = true;
   private last = 0;
   private found = '';
+  private link: Connection = 'connecting';
 
   /** @param kept the settings are others than before: they belong into the layout */
   constructor(
@@ -48,7 +50,9 @@ export class Scope {
   ) {
     const run = {
       period_s: () => data.hello?.period_s ?? 0.001,
-      now_s: () => data.time.now,
+      // A run's cycles are counted: its clock may have stood still between two of them.
+      newest: () =>
+        data.lastTick?.cycle ?? Math.round(data.time.now / (data.hello?.period_s ?? 0.001)),
       reach_s: () =>
         data.source.live ? (data.hello?.history_s[0] ?? 1) : Number.POSITIVE_INFINITY,
       idOf: (name: string) => data.catalog.named(name)?.id,
@@ -92,6 +96,12 @@ export class Scope {
       this.steps,
     );
     data.whenTick(() => this.engine.tick());
+    data.source.on({
+      connection: (state) => {
+        this.link = state;
+        if (state === 'ended') this.engine.stop();
+      },
+    });
     data.whenCatalog(() => this.list());
     this.list();
   }
@@ -299,7 +309,9 @@ export class Scope {
     else if (state === 'filling')
       words = `Triggered: ${Math.floor(100 * this.engine.filled)} % of the record are there.`;
     else if (state === 'filled') words = `Filled: triggered at ${newest}. Arm waits for another.`;
+    else if (this.link === 'ended') words = 'The run is over: nothing comes any more.';
     else words = `Stopped. Arm waits until ${waits}.`;
+    if (this.link === 'lost') words += ' There is no connection: it goes on when there is one.';
     if (missed_s > 0) {
       words += ` ${number(missed_s)} s are not kept at full rate: triggers in them are not seen.`;
     }

@@ -24,8 +24,8 @@ export interface Capture {
 /** What the engine has to know of the run. */
 export interface ScopeRun {
   period_s(): number;
-  /** Time of the newest values; NaN: there are none. */
-  now_s(): number;
+  /** Cycle of the newest values; NaN: there are none. */
+  newest(): number;
   /** How far back each cycle is kept. */
   reach_s(): number;
   /** The id of a signal; undefined: the run has none of that name. */
@@ -158,8 +158,8 @@ export class ScopeEngine {
   }
 
   private now(): number {
-    const now = this.run.now_s();
-    return Number.isFinite(now) ? Math.round(now / this.run.period_s()) : 0;
+    const newest = this.run.newest();
+    return Number.isFinite(newest) ? newest : 0;
   }
 
   private lengths(): { rows: number; before: number } {

@@ -92,7 +92,7 @@ function scopeOn(ring: Ring, over: Partial<ScopeSettings> = {}): ScopeEngine {
   };
   const run = {
     period_s: () => kPeriod_s,
-    now_s: () => (ring.now < 0 ? Number.NaN : ring.now * kPeriod_s),
+    newest: () => (ring.now < 0 ? Number.NaN : ring.now),
     reach_s: () => ring.claims * kPeriod_s,
     idOf: (name: string) => ids[name],
   };
