@@ -50,9 +50,7 @@ export class Scope {
   ) {
     const run = {
       period_s: () => data.hello?.period_s ?? 0.001,
-      // A run's cycles are counted: its clock may have stood still between two of them.
-      newest: () =>
-        data.lastTick?.cycle ?? Math.round(data.time.now / (data.hello?.period_s ?? 0.001)),
+      newest: () => Math.round(data.time.now / (data.hello?.period_s ?? 0.001)),
       reach_s: () =>
         data.source.live ? (data.hello?.history_s[0] ?? 1) : Number.POSITIVE_INFINITY,
       idOf: (name: string) => data.catalog.named(name)?.id,
