@@ -318,7 +318,7 @@ export class Scope {
     this.controls.now(
       signal ? this.data.latest(signal.id) : Number.NaN,
       state !== 'stopped' && state !== 'filled',
-      signal !== undefined,
+      signal !== undefined && !(this.data.source.live && this.link === 'ended'),
     );
   }
 }

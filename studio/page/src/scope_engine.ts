@@ -111,7 +111,8 @@ export class ScopeEngine {
   tick(): void {
     const now = this.now();
     // Time went back: the run began anew, or was led back.
-    if (now < this.newest && this.state !== 'stopped') this.begin(now, 'waiting');
+    const back = now < this.newest;
+    if (back && (this.state === 'waiting' || this.state === 'filling')) this.begin(now, 'waiting');
     this.newest = now;
     void this.look();
   }

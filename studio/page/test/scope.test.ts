@@ -252,6 +252,10 @@ test('time that goes back begins the search anew', async () => {
   scope.tick();
   await play(ring, scope, 300);
   assert.equal(scope.captures[0].trigger, 150);
+  scope.stop();
+  ring.now = 0;
+  scope.tick();
+  assert.equal(scope.state, 'stopped');
 });
 
 test('of a log the next and the last trigger are found, however far', async () => {
