@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "studio/connections.hpp"
@@ -35,6 +36,9 @@ void send_away(Tcp::socket socket) {
   }();
   beast::error_code ignored;
   socket.non_blocking(true, ignored);
+  // What has come is taken: a socket with unread bytes is reset, and some browsers lose the words.
+  std::array<char, 8192> head;
+  socket.read_some(net::buffer(head), ignored);
   socket.write_some(net::buffer(kWords), ignored);
   socket.shutdown(Tcp::socket::shutdown_send, ignored);
   socket.close(ignored);
@@ -52,7 +56,7 @@ Result<std::unique_ptr<Server>> Server::open(const std::string& address,
   beast::error_code error;
   const auto at = net::ip::make_address(address == "localhost" ? "127.0.0.1" : address, error);
   if (error) {
-    return fail("--studio-address: '" + address + "' is no address",
+    return fail("the studio cannot listen at '" + address + "': it is no address",
                 "give one of this machine as a number: 127.0.0.1, or 0.0.0.0 for all of them");
   }
   auto impl = std::make_unique<Impl>();
@@ -64,12 +68,14 @@ Result<std::unique_ptr<Server>> Server::open(const std::string& address,
   if (error == net::error::address_in_use) {
     return fail(
         fmt::format("another process listens at port {} of {}", its, address),
-        fmt::format("`ss -ltnp sport = :{}` says which; choose another port: --studio=PORT", its));
+        fmt::format("`ss -ltnp sport = :{}` says which; choose another port: --studio=PORT, or "
+                    "--port of `tandem studio`",
+                    its));
   }
   if (error) {
     return fail(fmt::format("cannot listen at port {} of {}: {}", its, address, error.message()),
                 "choose an address of this machine and a port above 1023: --studio=PORT, "
-                "--studio-address ADDRESS");
+                "--studio-address ADDRESS; of `tandem studio` --port, --address");
   }
   const Tcp::endpoint bound = impl->acceptor.local_endpoint(error);
   impl->place = {at.to_string(), bound.port(), at.is_loopback()};
