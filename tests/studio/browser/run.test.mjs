@@ -5,7 +5,7 @@ import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, afterEach, before, describe, test } from 'node:test';
-import { beginRun, lackingRun } from './runs.mjs';
+import { beginRun, kTandem, lackingRun } from './runs.mjs';
 import { eventually, leave, openBrowser, openMortalBrowser, openPage, shot } from './support.mjs';
 
 const why = lackingRun();
