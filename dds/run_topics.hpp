@@ -52,10 +52,6 @@ class RunTopics {
   /// What belongs to no cycle: faults, words, parameters; and simulated time ten times a second.
   /// @param newest_ns  time of the newest cycle, where none waits to be published
   void publish_news(std::optional<std::int64_t> newest_ns);
-  /// On the clock that the stamps have. @param time_ns  of the run
-  [[nodiscard]] std::int64_t stamp_of(std::int64_t time_ns) const {
-    return time_ns + stamp_less_time_ns_;
-  }
 
  private:
   RunTopics(Outlets& outlets, const RunDescription& run);

@@ -23,6 +23,17 @@ CLI::Validator is_port() {
   return {check, ""};
 }
 
+/// "https://app.foxglove.dev", "http://localhost:8080"
+CLI::Validator is_origin() {
+  const auto check = [](const std::string& text) -> std::string {
+    const std::size_t scheme = text.find("://");
+    const bool well = scheme != std::string::npos && scheme > 0 && scheme + 3 < text.size() &&
+                      text.find_first_of("/?#*, ", scheme + 3) == std::string::npos;
+    return well ? "" : "'" + text + "' is no origin: https://app.foxglove.dev";
+  };
+  return {check, ""};
+}
+
 }  // namespace
 
 void add_studio_flags(CLI::App& app, StudioOptions& o) {
@@ -43,6 +54,13 @@ void add_studio_flags(CLI::App& app, StudioOptions& o) {
                  "Folder of the studio's page, instead of the program's own: for work on it")
       ->needs(studio)
       ->check(is_given("name a folder"));
+  app.add_option("--studio-origin", o.origins,
+                 "Whose pages may look by Foxglove's protocol: https://app.foxglove.dev; give it "
+                 "again for others")
+      ->needs(studio)
+      ->take_all()
+      ->expected(1)
+      ->check(is_origin());
 }
 
 }  // namespace tandem::apps

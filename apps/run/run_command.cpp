@@ -131,7 +131,8 @@ class Session {
 
   /// DDS, the log, and the door for an owner over DDS.
   Status open_outputs() {
-    auto dds = DdsRun::open(c_, options_.serves ? "tandem_serve" : "tandem_run");
+    const std::string node = options_.serves ? "tandem_serve" : "tandem_run";
+    auto dds = DdsRun::open(c_, node);
     if (!dds) return std::unexpected(dds.error());
     dds_ = std::move(*dds);
     if (!options_.no_log) {
@@ -144,7 +145,7 @@ class Session {
     auto server = open_server(c_, dds_.get(), options_.once, admission_);
     if (!server) return std::unexpected(server.error());
     server_ = std::move(*server);
-    auto studio = StudioRun::open(c_, options_.studio);
+    auto studio = StudioRun::open(c_, options_.studio, node);
     if (!studio) return std::unexpected(studio.error());
     studio_ = std::move(*studio);
     if (dds_ != nullptr) observers_.add(&dds_->tap());
@@ -211,7 +212,7 @@ class Session {
                    return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
                  });
     }
-    if (studio_ != nullptr) studio_->start(*cycle_, commands_);
+    if (studio_ != nullptr) studio_->start(*cycle_, commands_, run_->parallel());
     const bool on_robot = e.hal.backend == runtime::BackendKind::kWire && !e.hal.lockstep;
     auto socket = serve(commands_, {.path = options_.socket,
                                     .kind = "run",

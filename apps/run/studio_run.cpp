@@ -116,23 +116,29 @@ class StudioRun::Happenings {
   std::vector<Event> requests_;
 };
 
-StudioRun::StudioRun(std::unique_ptr<studio::Studio> studio) : studio_(std::move(studio)) {}
+StudioRun::StudioRun(std::unique_ptr<studio::Studio> studio, std::unique_ptr<FoxgloveRun> foxglove)
+    : foxglove_(std::move(foxglove)), studio_(std::move(studio)) {}
 
 StudioRun::~StudioRun() { finish("", ""); }
 
 Result<std::unique_ptr<StudioRun>> StudioRun::open(const WiredComposition& c,
-                                                   const StudioOptions& options) {
+                                                   const StudioOptions& options,
+                                                   const std::string& node) {
   if (!options.wanted) return nullptr;
   const runtime::Experiment& e = c.experiment;
   const hal::StateImage state(e.robot.shape());
   const hal::CommandImage command(e.robot.shape());
+  const std::string session = studio::draw_hex(4);
   auto opened =
-      studio::Studio::open({.address = options.address, .port = options.port, .page = options.page},
+      studio::Studio::open({.address = options.address,
+                            .port = options.port,
+                            .page = options.page,
+                            .origins = options.origins},
                            {.robot = e.robot,
                             .urdf = robot::text_in(e.files, e.robot.model.urdf),
                             .version = TANDEM_VERSION,
                             .experiment = std::filesystem::path(e.file).filename().string(),
-                            .run = studio::draw_hex(4),
+                            .run = session,
                             .simulated = c.backend->pace() == hal::Pace::kSimulatedClock,
                             .period_ns = e.loop.period_ns},
                            {.state = state,
@@ -140,10 +146,14 @@ Result<std::unique_ptr<StudioRun>> StudioRun::open(const WiredComposition& c,
                             .truth = runtime::truth_of(c),
                             .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image()});
   if (!opened) return std::unexpected(opened.error());
-  return std::unique_ptr<StudioRun>(new StudioRun(std::move(*opened)));
+  auto foxglove = FoxgloveRun::open(c, node, session);
+  if (!foxglove) return std::unexpected(foxglove.error());
+  return std::unique_ptr<StudioRun>(new StudioRun(std::move(*opened), std::move(*foxglove)));
 }
 
-void StudioRun::start(runtime::RobotCycle& cycle, ControlRegistry& commands) {
+void StudioRun::start(runtime::RobotCycle& cycle, ControlRegistry& commands,
+                      hal::ParallelSource* parallel) {
+  foxglove_->start(cycle, parallel, [studio = studio_.get()] { return studio->lost(); });
   happenings_ = std::make_shared<Happenings>(cycle);
   commands.tell([happenings = happenings_](const std::string& request, const Json& answer) {
     happenings->requested(request, answer);
@@ -162,7 +172,8 @@ void StudioRun::start(runtime::RobotCycle& cycle, ControlRegistry& commands) {
             return all;
           },
       .events = [happenings = happenings_](std::vector<Event>& out) { happenings->take(out); },
-      .time_stands = [&cycle] { return time_stands(cycle); }};
+      .time_stands = [&cycle] { return time_stands(cycle); },
+      .cycle = [this](const studio::Tap::Cycle& one) { foxglove_->take(one); }};
   studio::Asker asker{
       .ask =
           [turns = turns_.get()](studio::Question question) {
@@ -190,7 +201,7 @@ void StudioRun::start(runtime::RobotCycle& cycle, ControlRegistry& commands) {
             return commands.turn_of(question) == ControlTurn::kUrgent;
           },
       .only_reads = [&commands](const std::string& name) { return only_reads(commands, name); }};
-  studio_->start(std::move(feed), std::move(asker));
+  studio_->start(std::move(feed), std::move(asker), &foxglove_->protocol());
 }
 
 void StudioRun::finish(const std::string& how, const std::string& log) {
