@@ -29,7 +29,7 @@ class Outlets {
   /// @param topic  Config::topic_name()
   virtual Result<std::unique_ptr<Outlet>> open(const Type& type, const std::string& topic,
                                                const Qos& qos) = 0;
-  /// Of names and rates.
+  /// Has the namespace and the rates.
   [[nodiscard]] virtual const Config& config() const = 0;
   /// "tandem_run"
   [[nodiscard]] virtual const std::string& node() const = 0;

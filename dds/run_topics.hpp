@@ -42,7 +42,7 @@ class RunTopics {
   /// Writes what does not change.
   /// @param parallel  the second robot of RunDescription::parallel; null: there is none
   void start(FaultFeed faults, hal::ParallelSource* parallel, const ControllerFeed& controllers);
-  /// Of every cycle, in their order.
+  /// Takes the times of every cycle, in their order.
   void count(const hal::CycleTimes& times);
   /// Cycles that never came here, so far.
   void set_dropped(std::uint64_t cycles) { loop_.dropped = cycles; }

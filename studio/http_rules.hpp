@@ -62,7 +62,7 @@ class HttpRules {
 
   /// The answer; empty: the request opens a WebSocket.
   [[nodiscard]] std::optional<Response> answer(const RequestHead& head) const;
-  /// Of the subprotocols that a client offers, the first that is spoken here; empty: none is.
+  /// The first subprotocol that a client offers and that is spoken here; empty: none is.
   [[nodiscard]] std::string_view subprotocol(const RequestHead& head) const;
 
  private:

@@ -37,8 +37,8 @@ void WebSocketConnection::accept() {
   // A link that is broken is noticed by a ping that nobody answers.
   stream_.set_option(
       websocket::stream_base::timeout{std::chrono::seconds(5), std::chrono::seconds(20), true});
-  stream_.set_option(websocket::stream_base::decorator([name = subprotocol_](auto& response) {
-    response.set(http::field::sec_websocket_protocol, name);
+  stream_.set_option(websocket::stream_base::decorator([chosen = subprotocol_](auto& response) {
+    response.set(http::field::sec_websocket_protocol, chosen);
     for (const auto& [name, value] : kHeaders) {
       response.set(beast::string_view(name.data(), name.size()),
                    beast::string_view(value.data(), value.size()));

@@ -8,7 +8,7 @@
 namespace tandem::apps {
 namespace {
 
-/// Of this process' run, whoever shows it.
+/// This process' run has one, whoever shows it.
 std::uint64_t run_number() {
   static const std::uint64_t number = [] {
     std::random_device device;

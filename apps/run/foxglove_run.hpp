@@ -44,7 +44,7 @@ class FoxgloveRun {
   FoxgloveRun(const WiredComposition& composition, const std::string& node,
               studio::foxglove::Description description);
   void publish(bool again);
-  /// Of messages: as their stamps, or the wall clock's.
+  /// The time of messages: as their stamps, or the wall clock's.
   [[nodiscard]] std::int64_t now_ns() const;
 
   bool simulated_time_, parallel_ = false;

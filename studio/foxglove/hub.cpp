@@ -51,7 +51,7 @@ Hub::ClientNumber Hub::connect(std::string) {
 }
 
 void Hub::tick(Clock::time_point now) {
-  if (ended_ || clients_.empty()) return;
+  if (ended_) return;
   if (run_.time && feed_.time_ns) {
     const std::int64_t time_ns = feed_.time_ns();
     for (auto& [number, client] : clients_) client.out.time(time_ns);

@@ -24,7 +24,7 @@ namespace tandem::studio::foxglove {
 
 /// Where it all comes from.
 struct Feed {
-  /// Puts what is new into the channels. Once a tick, while there is a client.
+  /// Opens and closes channels, and puts what is new into those that somebody wants. Once a tick.
   /// @param again  the newest cycle's, too: somebody has subscribed since
   std::function<void(bool again)> publish{};
   std::function<std::int64_t()> time_ns{};  ///< of the newest cycle, as the messages' stamps

@@ -162,6 +162,23 @@ describe('the studio by Foxglove’s protocol', {
     assert.deepEqual(it.statuses, []);
   });
 
+  test('the bundled layout is whole, and its topics are the run’s', async () => {
+    const it = await connect(kSubprotocols[0]);
+    const layout = JSON.parse(readFileSync(join(kConfig, '../examples/foxglove/tandem.json')));
+    const leaves = (node) =>
+      typeof node === 'string' ? [node] : [...leaves(node.first), ...leaves(node.second)];
+    const panels = Object.keys(layout.configById);
+    assert.deepEqual(leaves(layout.layout).sort(), panels.sort());
+    const text = JSON.stringify(layout);
+    const wanted = [...text.matchAll(/"(?:value|topicToRender|topicPath)":"(\/[\w/]+)/g)];
+    const topics = wanted.map(([, topic]) => topic);
+    for (const panel of Object.values(layout.configById)) {
+      topics.push(...Object.keys(panel.topics ?? {}));
+    }
+    assert.ok(topics.length > 8);
+    for (const topic of topics) assert.ok(it.channels.has(topic), topic);
+  });
+
   test('parameters are shown and not set; the rest is refused in words', async () => {
     const it = await connect(kSubprotocols[1]);
     it.client.getParameters(['squat.depth_m'], 'get');
