@@ -1,4 +1,5 @@
-// Samples as bytes: decodes CDR by a message's definition, whatever the bytes are.
+// Samples as bytes: decodes CDR by a message's definition, whatever the bytes are, and encodes
+// idlc's C structures.
 // Layer: dds.  Thread: any, non-RT.
 #pragma once
 
@@ -42,6 +43,13 @@ struct Member {
 /// header has besides. `definition` is ROS 2's of the same message.
 [[nodiscard]] Result<Value> decode_ros1(const MessageDefinition& definition,
                                         std::span<const std::byte> bytes);
+
+/// A sample of idlc's C structure as plain CDR, little endian, with the four bytes in front.
+/// @param definition  resolved; of the sample's type
+/// @param sample      its texts and sequences are there
+[[nodiscard]] std::string encode(const MessageDefinition& definition, const void* sample);
+/// Bytes of the C structure that encode() takes: idlc's own sizeof.
+[[nodiscard]] std::size_t structure_bytes(const MessageDefinition& definition);
 
 /// A member of a message by its name; null when it has none, or is no message.
 [[nodiscard]] const Value* find(const Value& value, std::string_view name);

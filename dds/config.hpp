@@ -80,6 +80,12 @@ struct Config {
   /// A sample of `topic` belongs to every cycle whose number this divides; 0: to none.
   [[nodiscard]] std::uint64_t cycles_between(Topic topic, std::int64_t period_ns) const;
 
+  /// The DDS topic of a ROS 2 topic in the namespace: "joint_states" is "rt/joint_states", or
+  /// "rt/left/joint_states".
+  [[nodiscard]] std::string topic_name(const std::string& ros_name) const {
+    return name_space.empty() ? "rt/" + ros_name : "rt/" + name_space + "/" + ros_name;
+  }
+
   /// Whether nothing leaves this machine.
   [[nodiscard]] bool loopback_only() const {
     return interfaces.size() == 1 && interfaces.front() == "lo";

@@ -32,9 +32,4 @@ Participant::Participant(std::shared_ptr<Domain> domain, std::string node, Entit
       entity_(std::move(entity)),
       graph_(std::move(graph)) {}
 
-std::string Participant::topic_name(const std::string& ros_name) const {
-  const std::string& name_space = config().name_space;
-  return name_space.empty() ? "rt/" + ros_name : "rt/" + name_space + "/" + ros_name;
-}
-
 }  // namespace tandem::dds

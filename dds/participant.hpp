@@ -26,9 +26,10 @@ class Participant {
   /// Its node's endpoints, which enter and leave by themselves.
   [[nodiscard]] RosGraph& graph() noexcept { return *graph_; }
 
-  /// The DDS topic of a ROS 2 topic in the configured namespace: "joint_states" is
-  /// "rt/joint_states", or "rt/left/joint_states".
-  [[nodiscard]] std::string topic_name(const std::string& ros_name) const;
+  /// Config::topic_name()
+  [[nodiscard]] std::string topic_name(const std::string& ros_name) const {
+    return config().topic_name(ros_name);
+  }
 
  private:
   Participant(std::shared_ptr<Domain> domain, std::string node, Entity entity,

@@ -5,31 +5,22 @@
 
 #include <array>
 #include <atomic>
-#include <chrono>
-#include <functional>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <thread>
-#include <vector>
 
 #include "base/spsc_ring.hpp"
-#include "dds/topic_group.hpp"
+#include "dds/participant.hpp"
+#include "dds/run_topics.hpp"
 #include "hal/cycle_observer.hpp"
 
 namespace tandem::dds {
 
-/// Source of the run's faults; called on the publisher's thread.
-struct FaultFeed {
-  std::function<std::uint64_t()>
-      version;  ///< 0: there are none; another one: some have come or gone
-  std::function<std::vector<FaultEntry>()> faults;
-  std::function<std::uint64_t()> lost;  ///< that the list had no room for
-};
-
 class Publisher final : public hal::CycleObserver {
  public:
   /// Makes every topic; nothing is published yet. Robot, tree and participant outlive it.
-  /// Errors: Endpoint::create()'s; two sensors whose names are the same in ROS 2.
+  /// Errors: RunTopics::create()'s.
   [[nodiscard]] static Result<std::unique_ptr<Publisher>> create(Participant& participant,
                                                                  const RunDescription& run);
   ~Publisher() override;
@@ -47,7 +38,7 @@ class Publisher final : public hal::CycleObserver {
   void take(const hal::CycleView& view) noexcept TANDEM_RT override;
 
  private:
-  static constexpr std::size_t kTopics = kTopicPeriods.size();
+  static constexpr std::size_t kTopics = RunTopics::kTopics;
   /// Record of every cycle.
   struct Times {
     std::uint64_t number;  // of take()'s calls
@@ -57,31 +48,25 @@ class Publisher final : public hal::CycleObserver {
   struct Head {
     std::uint64_t number;
     hal::CycleTime time;
-    std::int64_t nominal_ns;  // on the loop's clock
+    hal::CycleTimes times;
     std::uint32_t due;
     hal::RunPhase phase;
     Code read_code;
     bool truth, estimate;
   };
 
-  Publisher(Participant& participant, const RunDescription& run);
+  Publisher(std::unique_ptr<Outlets> outlets, std::unique_ptr<RunTopics> topics,
+            const RunDescription& run);
   [[nodiscard]] std::size_t slot_bytes() const;
   void copy_due(const hal::CycleView& view, std::uint64_t number) noexcept TANDEM_RT;
   void run();
   bool drain();
   void count_times(std::uint64_t up_to);
   void publish(std::span<const std::byte> slot);
-  void publish_clock();
-  void look_at_faults();
-  [[nodiscard]] std::int64_t stamp_ns(const Head& head);
 
-  bool simulated_time_;
-  std::array<std::uint64_t, kTopics> every_{};
-  PublishCounts counts_;
-  CycleRecord loop_;
-  std::vector<std::unique_ptr<TopicGroup>> groups_;
-  Output<rosgraph_msgs::Clock> clock_;
-  std::optional<Error> error_;
+  std::unique_ptr<Outlets> outlets_;
+  std::unique_ptr<RunTopics> topics_;
+  std::array<std::uint64_t, kTopics> every_;
 
   // Copies of what a slot holds, for the groups.
   hal::StateImage state_;
@@ -92,14 +77,7 @@ class Publisher final : public hal::CycleObserver {
   SpscRing times_ring_, image_ring_;
   std::uint64_t taken_ = 0;  // the loop's
 
-  FaultFeed fault_source_;
-  std::uint64_t fault_version_ = 0;
-  std::vector<FaultEntry> faults_;
-  std::int64_t clock_ns_ = 0;               // that `clock` publishes next
   std::atomic<std::int64_t> newest_ns_{0};  // of take()'s last cycle
-  std::chrono::steady_clock::time_point clock_due_, offset_due_;
-  std::int64_t wall_offset_ns_ = 0;      // the wall clock less the loop's
-  std::int64_t stamp_less_time_ns_ = 0;  // of the last published cycle
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

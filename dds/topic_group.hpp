@@ -11,7 +11,7 @@
 
 #include "base/result.hpp"
 #include "dds/config.hpp"
-#include "dds/endpoint.hpp"
+#include "dds/outlet.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/cycle_observer.hpp"
 #include "hal/mark_block.hpp"
@@ -125,31 +125,32 @@ template <class T>
 class Output {
  public:
   Output() = default;
-  Output(Writer<T> writer, PublishCounts& counts) : writer_(std::move(writer)), counts_(&counts) {}
+  Output(std::unique_ptr<Outlet> outlet, PublishCounts& counts)
+      : outlet_(std::move(outlet)), counts_(&counts) {}
 
   /// Whether there is a topic.
-  [[nodiscard]] bool exists() const { return writer_.has_value(); }
+  [[nodiscard]] bool exists() const { return outlet_ != nullptr; }
   /// Whether somebody would get a sample.
-  [[nodiscard]] bool wanted() const { return writer_ && writer_->endpoint().matched() > 0; }
+  [[nodiscard]] bool wanted() const { return exists() && outlet_->wanted(); }
   void write(const T& sample) {
-    if (!writer_) return;
-    ++(writer_->write(sample) ? counts_->sent : counts_->refused);
+    if (!exists()) return;
+    ++(outlet_->write(&sample) ? counts_->sent : counts_->refused);
   }
 
  private:
-  std::optional<Writer<T>> writer_;
+  std::unique_ptr<Outlet> outlet_;
   PublishCounts* counts_ = nullptr;
 };
 
-/// Makes topics in the participant's namespace, and keeps the first thing that went wrong.
+/// Makes topics in the configured namespace, and keeps the first thing that went wrong.
 class OutputMaker {
  public:
-  OutputMaker(Participant& participant, std::int64_t period_ns, PublishCounts& counts)
-      : participant_(participant), period_ns_(period_ns), counts_(counts) {}
+  OutputMaker(Outlets& outlets, std::int64_t period_ns, PublishCounts& counts)
+      : outlets_(outlets), period_ns_(period_ns), counts_(counts) {}
 
   /// Cycles between two samples; 0: the topic is off.
   [[nodiscard]] std::uint64_t every(Topic topic) const {
-    return participant_.config().cycles_between(topic, period_ns_);
+    return outlets_.config().cycles_between(topic, period_ns_);
   }
   /// One of samples that come again and again; nothing when [dds.every] has turned it off.
   template <class T>
@@ -174,24 +175,24 @@ class OutputMaker {
   }
   /// "/tandem_run", "/left/tandem_run".
   [[nodiscard]] std::string full_node_name() const {
-    return participant_.topic_name(participant_.node()).substr(2);
+    return outlets_.config().topic_name(outlets_.node()).substr(2);
   }
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
 
  private:
   template <class T>
   Output<T> make(const std::string& ros_name, const Qos& qos) {
-    return make_named<T>(participant_.topic_name(ros_name), qos);
+    return make_named<T>(outlets_.config().topic_name(ros_name), qos);
   }
   template <class T>
   Output<T> make_named(const std::string& topic, const Qos& qos) {
-    auto writer = Writer<T>::create(participant_, topic, qos);
-    if (writer) return Output<T>(std::move(*writer), counts_);
-    if (!error_) error_ = writer.error();
+    auto outlet = outlets_.open(type<T>(), topic, qos);
+    if (outlet) return Output<T>(std::move(*outlet), counts_);
+    if (!error_) error_ = outlet.error();
     return {};
   }
 
-  Participant& participant_;
+  Outlets& outlets_;
   std::int64_t period_ns_;
   PublishCounts& counts_;
   std::optional<Error> error_;

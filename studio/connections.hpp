@@ -15,7 +15,9 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <thread>
+#include <vector>
 
 #include "studio/server.hpp"
 
@@ -36,6 +38,7 @@ struct Server::Impl {
   net::steady_timer timer{io}, pause{io};
   Place place;
   Hub* hub = nullptr;
+  std::vector<Protocol*> protocols;  // the hub is the first
   std::optional<HttpRules> rules;
   std::set<std::shared_ptr<WebSocketConnection>> clients;
   bool ending = false;
@@ -47,6 +50,8 @@ struct Server::Impl {
   /// Sends what the hub has for whom.
   void pump();
   void drop(const std::shared_ptr<WebSocketConnection>& client);
+  /// The one that has this subprotocol.
+  [[nodiscard]] Protocol& protocol(std::string_view name) const;
   void run();
 };
 
@@ -82,16 +87,17 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   http::response<http::string_body> response_;
 };
 
-/// A client of the hub.
+/// A client of a protocol.
 class WebSocketConnection : public std::enable_shared_from_this<WebSocketConnection> {
  public:
   using Request = http::request<http::empty_body>;
   WebSocketConnection(Server::Impl& server, std::unique_ptr<ConnectionPlace> place,
-                      Tcp::socket socket, Request request);
+                      Tcp::socket socket, Request request, std::string subprotocol);
   void accept();
   /// Sends what waits, one frame at a time.
   void pump();
-  [[nodiscard]] Hub::ClientNumber number() const { return number_; }
+  /// It takes part no more.
+  void leave() { protocol_.disconnect(number_); }
   /// Without a word.
   void cut();
 
@@ -105,9 +111,11 @@ class WebSocketConnection : public std::enable_shared_from_this<WebSocketConnect
   std::unique_ptr<ConnectionPlace> place_;
   websocket::stream<beast::tcp_stream> stream_;
   Request request_;
+  std::string subprotocol_;
+  Protocol& protocol_;
   beast::flat_buffer buffer_;
   std::shared_ptr<const std::string> sending_;
-  Hub::ClientNumber number_ = 0;
+  Protocol::ClientNumber number_ = 0;
   bool reads_ = false, closes_ = false;
 };
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "hal/signal_block.hpp"
+#include "studio/tap.hpp"
 
 namespace tandem::studio {
 
@@ -33,6 +34,7 @@ struct Feed {
   std::function<std::vector<Signals>()> signals{};    ///< of every loaded controller, by its name
   std::function<void(std::vector<Event>&)> events{};  ///< appends what has happened since
   std::function<bool()> time_stands{};                ///< simulated time is paused
+  std::function<void(const Tap::Cycle&)> cycle{};     ///< gets every cycle of the tap
 };
 
 /// Who asks, as far as the rules go.

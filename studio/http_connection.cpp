@@ -64,17 +64,21 @@ void HttpConnection::take(beast::error_code error) {
   }
   if (error) return close();
   const http::request<http::empty_body> request = parser_->release();
-  std::optional<Response> answer = server_.rules->answer(head_of(request));
+  const RequestHead head = head_of(request);
+  std::optional<Response> answer = server_.rules->answer(head);
   if (answer) return send(*answer, request.keep_alive());
-  if (server_.hub->clients() >= kMostClients) {
-    return send(words(503, "Service Unavailable", "32 pages look at this run already."), false);
+  std::string subprotocol(server_.rules->subprotocol(head));
+  const Protocol& protocol = server_.protocol(subprotocol);
+  if (protocol.clients() >= protocol.most_clients()) {
+    return send(words(503, "Service Unavailable",
+                      std::to_string(protocol.most_clients()) + " look at this run already."),
+                false);
   }
   stream_.expires_never();
   std::make_shared<WebSocketConnection>(server_, std::move(place_), stream_.release_socket(),
-                                        request)
+                                        request, std::move(subprotocol))
       ->accept();
 }
-static_assert(kMostClients == 32);
 
 void HttpConnection::send(const Response& response, bool keep) {
   response_ = {};

@@ -91,11 +91,13 @@ Response words(unsigned status, std::string_view reason, std::string text) {
   return {.status = status, .reason = reason, .body = std::move(text) + "\n"};
 }
 
-HttpRules::HttpRules(Place place, std::string urdf, std::string token, std::string page)
+HttpRules::HttpRules(Place place, std::string urdf, std::string token, std::string page,
+                     Guests guests)
     : place_(std::move(place)),
       urdf_(std::move(urdf)),
       token_(std::move(token)),
-      page_(std::move(page)) {}
+      page_(std::move(page)),
+      guests_(std::move(guests)) {}
 
 /// Whether "localhost:8642" is us. Port 80 may be left out.
 bool HttpRules::is_here(std::string_view host) const {
@@ -120,12 +122,14 @@ std::optional<Response> HttpRules::answer(const RequestHead& head) const {
                              "printed, with port {}, and under no other name.",
                              place_.port));
   }
-  if (head.origins.size() > 1 ||
-      (head.origins.size() == 1 &&
-       !same_text(head.origins.front(), fmt::format("http://{}", head.hosts.front())))) {
-    return words(403, "Forbidden", "This is a page of somewhere else.");
+  if (!may_come(head)) {
+    return words(403, "Forbidden",
+                 is_guest(head) ? "This is a page of somewhere else: `tandem run … --studio-origin "
+                                  "ORIGIN` lets the pages of an origin look."
+                                : "This is a page of somewhere else.");
   }
   const std::string_view path = head.target.substr(0, head.target.find('?'));
+  if (is_guest(head) && path == "/" && head.method == "GET" && !head.old) return admit(head);
   const bool asset = std::ranges::find(kPage, path, &PageFile::path) != std::end(kPage);
   if (!asset && path != kWebSocket && path != kDescription) {
     return words(404, "Not Found", "There is nothing here. The page is /");
@@ -145,14 +149,53 @@ std::optional<Response> HttpRules::answer(const RequestHead& head) const {
     refused.headers.emplace_back("Upgrade", "websocket");
     return refused;
   }
-  const std::vector<std::string_view> protocols = parts_of(head.protocols);
-  if (std::ranges::find(protocols, std::string_view(kSubprotocol)) == protocols.end()) {
+  if (subprotocol(head).empty()) {
     return words(400, "Bad Request",
                  fmt::format("Ask for the subprotocol {} (is the page of another version than the "
                              "program? Then load it again.)",
                              kSubprotocol));
   }
-  return std::nullopt;
+  return admit(head);
+}
+
+std::string_view HttpRules::subprotocol(const RequestHead& head) const {
+  for (const std::string_view offered : parts_of(head.protocols)) {
+    if (offered == kSubprotocol) return kSubprotocol;
+    const auto known = std::ranges::find(guests_.names, offered);
+    if (known != guests_.names.end()) return *known;
+  }
+  return {};
+}
+
+bool HttpRules::is_guest(const RequestHead& head) const {
+  return head.upgrades &&
+         std::ranges::find(guests_.names, subprotocol(head)) != guests_.names.end();
+}
+
+/// A program has no origin; a page has the address from which it came.
+bool HttpRules::may_come(const RequestHead& head) const {
+  if (head.origins.empty()) return true;
+  if (head.origins.size() > 1) return false;
+  const std::string_view origin = head.origins.front();
+  if (same_text(origin, fmt::format("http://{}", head.hosts.front()))) return true;
+  if (!is_guest(head)) return false;
+  // A program that is made of pages has them in files.
+  return same_text(origin, "file://") ||
+         std::ranges::any_of(guests_.origins,
+                             [&](const std::string& one) { return same_text(one, origin); });
+}
+
+/// A WebSocket. A guest cannot say a word of its own: elsewhere the token is in its address.
+std::optional<Response> HttpRules::admit(const RequestHead& head) const {
+  if (place_.loopback || !is_guest(head)) return std::nullopt;
+  constexpr std::string_view kToken = "?token=";
+  const std::size_t query = std::min(head.target.find('?'), head.target.size());
+  const std::string_view given = head.target.substr(query);
+  if (given.starts_with(kToken) && is_secret(given.substr(kToken.size()), token_)) {
+    return std::nullopt;
+  }
+  return words(401, "Unauthorized",
+               "The address needs the run's token: ws://HOST:PORT/?token=TOKEN");
 }
 
 Response HttpRules::get(std::string_view path, const RequestHead& head) const {

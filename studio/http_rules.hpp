@@ -47,21 +47,34 @@ struct Place {
   bool loopback = true;  ///< nobody from elsewhere reaches it
 };
 
+/// A protocol that only shows: also to programs that are no page of the studio, at / or /ws.
+struct Guests {
+  std::vector<std::string_view> names{};  ///< subprotocols
+  std::vector<std::string> origins{};     ///< of pages elsewhere that may look
+};
+
 class HttpRules {
  public:
-  /// @param token  that /robot.urdf asks for where the place is no loopback
+  /// @param token  that /robot.urdf and guests need where the place is no loopback
   /// @param page   folder whose files are the page, as they are at each request; empty: assets()
-  HttpRules(Place place, std::string urdf, std::string token, std::string page = {});
+  HttpRules(Place place, std::string urdf, std::string token, std::string page = {},
+            Guests guests = {});
 
   /// The answer; empty: the request opens a WebSocket.
   [[nodiscard]] std::optional<Response> answer(const RequestHead& head) const;
+  /// The first subprotocol that a client offers and that is spoken here; empty: none is.
+  [[nodiscard]] std::string_view subprotocol(const RequestHead& head) const;
 
  private:
+  [[nodiscard]] bool is_guest(const RequestHead& head) const;
+  [[nodiscard]] bool may_come(const RequestHead& head) const;
+  [[nodiscard]] std::optional<Response> admit(const RequestHead& head) const;
   [[nodiscard]] bool is_here(std::string_view host) const;
   [[nodiscard]] Response get(std::string_view path, const RequestHead& head) const;
 
   Place place_;
   std::string urdf_, token_, page_;
+  Guests guests_;
 };
 
 /// An answer in words. @param reason  the status' own

@@ -37,7 +37,7 @@ void Hub::disconnect(ClientNumber number) {
   if (controls_ == number) end_control("is gone");
 }
 
-std::optional<Outbox::Frame> Hub::next(ClientNumber number) {
+std::optional<Frame> Hub::next(ClientNumber number) {
   const auto client = clients_.find(number);
   return client == clients_.end() ? std::nullopt : client->second.out.next();
 }

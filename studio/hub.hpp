@@ -17,26 +17,20 @@
 #include "studio/feed.hpp"
 #include "studio/messages.hpp"
 #include "studio/outbox.hpp"
+#include "studio/protocol.hpp"
 #include "studio/sampler.hpp"
 
 namespace tandem::studio {
 
 inline constexpr std::size_t kMostClients = 32;
-inline constexpr std::size_t kMostFromClient = 64 * 1024;  ///< bytes of one message
 inline constexpr std::size_t kMostSubscribed = 4096;
 inline constexpr std::size_t kMostWindowSignals = 256;
 inline constexpr std::size_t kMostWindowNumbers = 500'000;  ///< of one answer
 inline constexpr std::size_t kMostWaiting = 16;             ///< questions of one client
-inline constexpr int kMostBad = 20;                         ///< bad messages in a row
 inline constexpr std::size_t kMostEvents = 1000;
 
-/// Why the server closes a connection: WebSocket's numbers.
-enum class Close : std::uint16_t { kNot = 0, kGoingAway = 1001, kPolicy = 1008 };
-
-class Hub {
+class Hub final : public Protocol {
  public:
-  using Clock = std::chrono::steady_clock;
-  using ClientNumber = std::uint64_t;
   static constexpr std::chrono::milliseconds kAlive{1000}, kWatch{250}, kRepeat{500};
 
   struct Options {
@@ -50,26 +44,26 @@ class Hub {
   /// From now on questions are asked.
   void start(Feed feed, Asker asker);
 
-  /// @param name  for others to read: its address
-  [[nodiscard]] ClientNumber connect(std::string name);
-  void disconnect(ClientNumber number);
-  /// A whole message. @param binary  clients send none: it is answered as an error
-  void receive(ClientNumber number, std::string_view message, bool binary, Clock::time_point now);
+  [[nodiscard]] std::span<const std::string_view> names() const override { return kNames; }
+  [[nodiscard]] std::size_t most_clients() const override { return kMostClients; }
+  [[nodiscard]] std::size_t clients() const override { return clients_.size(); }
+  [[nodiscard]] ClientNumber connect(std::string name) override;
+  void disconnect(ClientNumber number) override;
+  /// @param binary  clients send none: it is answered as an error
+  void receive(ClientNumber number, std::string_view message, bool binary,
+               Clock::time_point now) override;
   /// Takes what the run has, and gives each client its tick.
-  void tick(Clock::time_point now);
+  void tick(Clock::time_point now) override;
   /// Hands out what has been answered.
   void take_answers();
-  /// The run is over.
-  void end(std::string_view how, std::string_view log);
+  void end(std::string_view how, std::string_view log) override;
 
-  [[nodiscard]] std::optional<Outbox::Frame> next(ClientNumber number);
-  /// Whether the connection is to be closed once next() has nothing more.
-  [[nodiscard]] Close closing(ClientNumber number) const;
-  /// Whether so much waits to be sent that nothing more is to be read.
-  [[nodiscard]] bool is_behind(ClientNumber number) const;
-  [[nodiscard]] std::size_t clients() const { return clients_.size(); }
+  [[nodiscard]] std::optional<Frame> next(ClientNumber number) override;
+  [[nodiscard]] Close closing(ClientNumber number) const override;
+  [[nodiscard]] bool is_behind(ClientNumber number) const override;
 
  private:
+  static constexpr std::string_view kNames[] = {kSubprotocol};
   struct Client {
     std::string name;
     Outbox out;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "studio/messages.hpp"
+#include "studio/protocol.hpp"
 
 namespace tandem::studio {
 
@@ -20,10 +21,7 @@ class Outbox {
  public:
   static constexpr std::size_t kMostTicks = 4, kMostMessages = 256, kMostBytes = 4'000'000;
 
-  struct Frame {
-    bool binary = false;
-    std::shared_ptr<const std::string> bytes;
-  };
+  using Frame = studio::Frame;
 
   void text(std::shared_ptr<const std::string> text) { put({false, std::move(text)}); }
   void text(std::string text) { this->text(std::make_shared<const std::string>(std::move(text))); }

@@ -48,7 +48,10 @@ bool Sampler::look(const Feed& feed) {
   span_.gap = span_.gap || lost != lost_;
   lost_ = lost;
   const auto signals = [this](const Tap::Signals& part) { take(part); };
-  const auto cycle = [this](const Tap::Cycle& one) { take(one); };
+  const auto cycle = [&](const Tap::Cycle& one) {
+    take(one);
+    if (feed.cycle) feed.cycle(one);
+  };
   // Not more than a ring holds, so that a fast simulation does not keep clients from their turn.
   for (std::size_t i = 0; i < Tap::kMostCycles; ++i) {
     if (!tap_->next(signals, cycle)) break;

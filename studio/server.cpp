@@ -84,8 +84,10 @@ Result<std::unique_ptr<Server>> Server::open(const std::string& address,
 
 const Place& Server::place() const { return impl_->place; }
 
-void Server::serve(Hub& hub, HttpRules rules) {
+void Server::serve(Hub& hub, HttpRules rules, const std::vector<Protocol*>& others) {
   impl_->hub = &hub;
+  impl_->protocols = {&hub};
+  impl_->protocols.insert(impl_->protocols.end(), others.begin(), others.end());
   impl_->rules = std::move(rules);
   impl_->accept();
   impl_->timer.expires_after(kTick);
@@ -105,8 +107,10 @@ void Server::end(const std::string& how, const std::string& log, std::chrono::mi
   std::future<void> gone = impl_->all_gone.get_future();
   net::post(impl_->io, [impl = impl_.get(), how, log] {
     impl->hub->take_answers();
-    impl->hub->tick(Hub::Clock::now());
-    impl->hub->end(how, log);
+    for (Protocol* one : impl->protocols) {
+      one->tick(Protocol::Clock::now());
+      one->end(how, log);
+    }
     impl->ending = true;
     beast::error_code ignored;
     impl->acceptor.close(ignored);
@@ -152,7 +156,7 @@ void Server::Impl::accept() {
 void Server::Impl::tick() {
   timer.async_wait([this](beast::error_code error) {
     if (error || ending) return;
-    hub->tick(Hub::Clock::now());
+    for (Protocol* one : protocols) one->tick(Protocol::Clock::now());
     pump();
     // A tick that is late moves those after it: what is missed is not made up for.
     timer.expires_at(std::max(timer.expiry() + kTick, std::chrono::steady_clock::now()));
@@ -165,9 +169,16 @@ void Server::Impl::pump() {
   for (const auto& client : all) client->pump();
 }
 
+Protocol& Server::Impl::protocol(std::string_view name) const {
+  const auto its = std::ranges::find_if(protocols, [&](const Protocol* one) {
+    return std::ranges::find(one->names(), name) != one->names().end();
+  });
+  return its == protocols.end() ? *protocols.front() : **its;
+}
+
 void Server::Impl::drop(const std::shared_ptr<WebSocketConnection>& client) {
   if (clients.erase(client) == 0) return;
-  hub->disconnect(client->number());
+  client->leave();
   if (!ending) return pump();  // others may hear of it
   if (clients.empty()) all_gone.set_value();
 }

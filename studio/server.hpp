@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/result.hpp"
 #include "studio/http_rules.hpp"
@@ -32,8 +33,9 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   [[nodiscard]] const Place& place() const;
-  /// Starts the thread. Once. @param hub  is its from now on, and outlives this
-  void serve(Hub& hub, HttpRules rules);
+  /// Starts the thread. Once. What is given is the thread's from now on, and outlives this.
+  /// @param others  protocols beside the hub's
+  void serve(Hub& hub, HttpRules rules, const std::vector<Protocol*>& others);
   /// Any thread: the hub's asker has answers.
   void answered();
   /// Tells the clients that the run is over, closes them, and ends the thread.

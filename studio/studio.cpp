@@ -47,6 +47,7 @@ Studio::Studio(const Options& options, RunDescription run, const Tap::Images& im
     : run_(std::move(run)),
       token_(draw_hex(kTokenBytes)),
       page_(options.page),
+      origins_(options.origins),
       tap_(images, run_.period_ns),
       sampler_(tap_, images, names_of(run_.robot), options.level_bytes),
       hub_(run_, sampler_, {.token = token_, .open = server->place().loopback}),
@@ -59,9 +60,15 @@ std::string Studio::address() const {
                      place.port, token_);
 }
 
-void Studio::start(Feed feed, Asker asker) {
+void Studio::start(Feed feed, Asker asker, Protocol* guests) {
   hub_.start(std::move(feed), std::move(asker));
-  server_->serve(hub_, HttpRules(server_->place(), run_.urdf, token_, page_));
+  std::vector<Protocol*> others;
+  Guests theirs{.names = {}, .origins = origins_};
+  if (guests != nullptr) {
+    others.push_back(guests);
+    theirs.names.assign(guests->names().begin(), guests->names().end());
+  }
+  server_->serve(hub_, HttpRules(server_->place(), run_.urdf, token_, page_, theirs), others);
 }
 
 void Studio::finish(const std::string& how, const std::string& log) {

@@ -26,6 +26,7 @@ struct Options {
   std::optional<std::uint16_t> port{};   ///< empty: the first that is free from kFirstPort
   std::size_t level_bytes = 48'000'000;  ///< of each of the history's levels
   std::string page{};                    ///< folder of the page; empty: what is embedded
+  std::vector<std::string> origins{};    ///< whose pages may look as guests
 };
 
 class Studio {
@@ -41,8 +42,11 @@ class Studio {
   [[nodiscard]] std::string address() const;
   /// For the run's cycle.
   [[nodiscard]] Tap& tap() { return tap_; }
+  /// Cycles that came too fast, so far.
+  [[nodiscard]] std::uint64_t lost() const { return tap_.lost(); }
   /// From now on there are answers. Once; what the functions use stays until finish().
-  void start(Feed feed, Asker asker);
+  /// @param guests  a protocol for other programs than the page, which only shows; null: none
+  void start(Feed feed, Asker asker, Protocol* guests = nullptr);
   /// Any thread: the asker has answers.
   void answered() { server_->answered(); }
   /// The run is over: tells whoever looks, and closes. No viewer holds it up.
@@ -55,6 +59,7 @@ class Studio {
 
   RunDescription run_;
   std::string token_, page_;
+  std::vector<std::string> origins_;
   Tap tap_;
   Sampler sampler_;
   Hub hub_;

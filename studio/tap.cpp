@@ -35,7 +35,7 @@ void Tap::take(const hal::CycleView& view) noexcept TANDEM_RT {
   if (slot.empty()) return;
   const bool truth = truth_bytes_ != 0 && view.truth != nullptr;
   const bool estimate = estimate_bytes_ != 0 && view.estimate != nullptr;
-  const Head head{view.time, view.phase, truth, estimate};
+  const Head head{view.time, view.times, view.phase, view.read_code, truth, estimate};
   std::memcpy(slot.data(), &head, sizeof head);
   std::memcpy(slot.data() + state_at_, view.state.bytes().data(), state_bytes_);
   std::memcpy(slot.data() + command_at_, view.command.bytes().data(), command_bytes_);
@@ -76,7 +76,7 @@ bool Tap::next(const std::function<void(const Signals&)>& signals,
     }
     signals_.pop();
   }
-  cycle({head.time, head.phase, slot.subspan(state_at_, state_bytes_),
+  cycle({head.time, head.phase, head.read_code, head.times, slot.subspan(state_at_, state_bytes_),
          slot.subspan(command_at_, command_bytes_),
          slot.subspan(truth_at_, head.truth ? truth_bytes_ : 0),
          slot.subspan(estimate_at_, head.estimate ? estimate_bytes_ : 0)});

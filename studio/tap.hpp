@@ -40,6 +40,8 @@ class Tap final : public hal::CycleObserver {
   struct Cycle {
     hal::CycleTime time;
     hal::RunPhase phase;
+    Code read_code;
+    hal::CycleTimes times;
     std::span<const std::byte> state, command;
     std::span<const std::byte> truth, estimate;  ///< empty: none
   };
@@ -63,7 +65,9 @@ class Tap final : public hal::CycleObserver {
  private:
   struct Head {
     hal::CycleTime time;
+    hal::CycleTimes times;
     hal::RunPhase phase;
+    Code read_code;
     bool truth, estimate;
   };
   /// A controller's signals cross in parts of this many bytes, so that few numbers take little.

@@ -1,5 +1,5 @@
-// A WebSocket: moves whole messages between a client and the hub, one write at a time. It reads no
-// more while much waits to be sent.
+// A WebSocket: moves whole messages between a client and its protocol, one write at a time. It
+// reads no more while much waits to be sent.
 #include <utility>
 
 #include "studio/connections.hpp"
@@ -21,11 +21,13 @@ std::string name_of(const Tcp::socket& socket) {
 
 WebSocketConnection::WebSocketConnection(Server::Impl& server,
                                          std::unique_ptr<ConnectionPlace> place, Tcp::socket socket,
-                                         Request request)
+                                         Request request, std::string subprotocol)
     : server_(server),
       place_(std::move(place)),
       stream_(std::move(socket)),
-      request_(std::move(request)) {}
+      request_(std::move(request)),
+      subprotocol_(std::move(subprotocol)),
+      protocol_(server.protocol(subprotocol_)) {}
 
 void WebSocketConnection::accept() {
   beast::error_code ignored;
@@ -35,8 +37,8 @@ void WebSocketConnection::accept() {
   // A link that is broken is noticed by a ping that nobody answers.
   stream_.set_option(
       websocket::stream_base::timeout{std::chrono::seconds(5), std::chrono::seconds(20), true});
-  stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
-    response.set(http::field::sec_websocket_protocol, kSubprotocol);
+  stream_.set_option(websocket::stream_base::decorator([chosen = subprotocol_](auto& response) {
+    response.set(http::field::sec_websocket_protocol, chosen);
     for (const auto& [name, value] : kHeaders) {
       response.set(beast::string_view(name.data(), name.size()),
                    beast::string_view(value.data(), value.size()));
@@ -50,8 +52,8 @@ void WebSocketConnection::accept() {
 }
 
 void WebSocketConnection::begin() {
-  if (server_.ending || server_.hub->clients() >= kMostClients) return cut();
-  number_ = server_.hub->connect(name_of(beast::get_lowest_layer(stream_).socket()));
+  if (server_.ending || protocol_.clients() >= protocol_.most_clients()) return cut();
+  number_ = protocol_.connect(name_of(beast::get_lowest_layer(stream_).socket()));
   server_.clients.insert(shared_from_this());
   read();
   pump();
@@ -71,24 +73,24 @@ void WebSocketConnection::take(std::size_t bytes) {
   const auto data = buffer_.data();
   const std::string_view message(static_cast<const char*>(data.data()), bytes);
   try {
-    server_.hub->receive(number_, message, stream_.got_binary(), Hub::Clock::now());
+    protocol_.receive(number_, message, stream_.got_binary(), Protocol::Clock::now());
   } catch (const std::exception&) {
     return cut();  // no memory for what it wants
   }
   buffer_.consume(bytes);
   // Who asks for more than it reads is not heard until it has read.
-  if (!server_.hub->is_behind(number_)) read();
+  if (!protocol_.is_behind(number_)) read();
   server_.pump();
 }
 
 void WebSocketConnection::pump() {
   if (closes_) return;
-  const Close why = server_.hub->closing(number_);
+  const Close why = protocol_.closing(number_);
   if (sending_ != nullptr) {
     if (why == Close::kPolicy) close(why);  // behind what is on its way
     return;
   }
-  const std::optional<Outbox::Frame> frame = server_.hub->next(number_);
+  const std::optional<Frame> frame = protocol_.next(number_);
   if (!frame) {
     if (why != Close::kNot) close(why);
     return;
@@ -100,7 +102,7 @@ void WebSocketConnection::pump() {
                         me->sending_.reset();
                         if (error) return me->server_.drop(me);
                         me->pump();
-                        if (me->reads_ || me->closes_ || me->server_.hub->is_behind(me->number_))
+                        if (me->reads_ || me->closes_ || me->protocol_.is_behind(me->number_))
                           return;
                         me->read();
                       });

@@ -23,6 +23,7 @@ struct StudioOptions {
   std::optional<std::uint16_t> port{};  ///< empty: the first that is free from 8642 on; 0: any
   std::string address = "127.0.0.1";    ///< where it listens
   std::string page{};                   ///< folder of the page; empty: the program's own
+  std::vector<std::string> origins{};   ///< of pages elsewhere that may look by Foxglove's protocol
 };
 
 struct RunOptions : runtime::Overrides {

@@ -37,6 +37,16 @@ const char kStudioExamples[] = R"(Examples:
 A run that was started without --studio opens it now, and keeps it until its end; its pace stays.
 Where it is open already the same address is printed. `tandem emulate` has no studio: look at the
 run on the other side of its wire.)";
+/// "https://app.foxglove.dev", "http://localhost:8080"
+CLI::Validator is_origin() {
+  const auto check = [](const std::string& text) -> std::string {
+    const std::size_t scheme = text.find("://");
+    const bool well = scheme != std::string::npos && scheme > 0 && scheme + 3 < text.size() &&
+                      text.find_first_of("/?#*, ", scheme + 3) == std::string::npos;
+    return well ? "" : "'" + text + "' is no origin: https://app.foxglove.dev";
+  };
+  return {check, ""};
+}
 
 }  // namespace
 
@@ -56,6 +66,13 @@ void add_studio_flags(CLI::App& app, StudioOptions& o) {
   app.add_option("--studio-page", o.page, kPageHelp)
       ->needs(studio)
       ->check(is_given("name a folder"));
+  app.add_option("--studio-origin", o.origins,
+                 "Whose pages may look by Foxglove's protocol: https://app.foxglove.dev; give it "
+                 "again for others")
+      ->needs(studio)
+      ->take_all()
+      ->expected(1)
+      ->check(is_origin());
 }
 
 void add_flags(CLI::App& app, StudioCommandOptions& o) {

@@ -8,9 +8,13 @@
 namespace tandem::apps {
 namespace {
 
-std::uint64_t draw_run() {
-  std::random_device device;
-  return (std::uint64_t{device()} << 32) | device();
+/// This process' run has one, whoever shows it.
+std::uint64_t run_number() {
+  static const std::uint64_t number = [] {
+    std::random_device device;
+    return (std::uint64_t{device()} << 32) | device();
+  }();
+  return number;
 }
 
 std::vector<std::pair<std::string, rt::Percentiles>> times_of(
@@ -65,6 +69,58 @@ std::vector<dds::FaultEntry> entries(const std::vector<runtime::FaultReport>& fa
 
 }  // namespace
 
+dds::RunDescription described(const WiredComposition& c) {
+  const runtime::Experiment& e = c.experiment;
+  return {.robot = e.robot,
+          .tree = *e.tree(),
+          .urdf = robot::text_in(e.files, e.robot.model.urdf),
+          .hal = hal_name(e),
+          .version = TANDEM_VERSION,
+          .description_hash = c.kernels->description_hash,
+          .period_ns = e.loop.period_ns,
+          .simulated_time = c.backend->pace() == hal::Pace::kSimulatedClock,
+          .truth = runtime::truth_of(c),
+          .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image(),
+          .wrenches = e.estimation.wrench_sites(),
+          .parallel = c.parallel != nullptr,
+          .run = run_number(),
+          .controllers = [names = c.controllers->names()] { return times_of(*names); }};
+}
+
+dds::FaultFeed fault_feed(runtime::RobotCycle& cycle) {
+  return {.version =
+              [&cycle] {
+                const runtime::FaultLog& log = cycle.fault_log();
+                return log.size() + log.lost() + (log.size() - log.latched());
+              },
+          .faults = [&cycle] { return entries(cycle.faults()); },
+          .lost = [&cycle] { return cycle.fault_log().lost(); }};
+}
+
+dds::ControllerFeed controller_feed(runtime::RunServices& services) {
+  return {.version = [&services] { return services.loads(); },
+          .signals =
+              [&services] {
+                std::vector<dds::ControllerFeed::Signals> all;
+                for (const runtime::ControllerSignals& one : services.signals())
+                  all.emplace_back(one.controller, one.block);
+                return all;
+              },
+          .marks =
+              [&services] {
+                std::vector<dds::ControllerFeed::Marks> all;
+                for (const runtime::ControllerMarks& one : services.marks())
+                  all.emplace_back(one.controller, one.block);
+                return all;
+              },
+          .texts =
+              [&services](std::uint64_t& seen, std::vector<hal::TextEvent>& out) {
+                (void)services.texts().read(seen, out);
+              },
+          .parameter_version = [&services] { return services.parameter_version(); },
+          .parameters = [&services] { return parameters_of(services); }};
+}
+
 Result<std::unique_ptr<DdsRun>> DdsRun::open(const WiredComposition& c, const std::string& node) {
   const runtime::Experiment& e = c.experiment;
   if (!e.dds.enabled) return nullptr;
@@ -72,57 +128,13 @@ Result<std::unique_ptr<DdsRun>> DdsRun::open(const WiredComposition& c, const st
   if (!domain) return std::unexpected(domain.error());
   auto participant = dds::Participant::open(std::move(*domain), node);
   if (!participant) return std::unexpected(participant.error());
-  auto publisher = dds::Publisher::create(
-      **participant,
-      {.robot = e.robot,
-       .tree = *c.experiment.tree(),
-       .urdf = robot::text_in(e.files, e.robot.model.urdf),
-       .hal = hal_name(e),
-       .version = TANDEM_VERSION,
-       .description_hash = c.kernels->description_hash,
-       .period_ns = e.loop.period_ns,
-       .simulated_time = c.backend->pace() == hal::Pace::kSimulatedClock,
-       .truth = runtime::truth_of(c),
-       .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image(),
-       .wrenches = e.estimation.wrench_sites(),
-       .parallel = c.parallel != nullptr,
-       .run = draw_run(),
-       .controllers = [names = c.controllers->names()] { return times_of(*names); }});
+  auto publisher = dds::Publisher::create(**participant, described(c));
   if (!publisher) return std::unexpected(publisher.error());
   return std::unique_ptr<DdsRun>(new DdsRun(std::move(*participant), std::move(*publisher)));
 }
 
 void DdsRun::start(runtime::RobotCycle& cycle, hal::ParallelSource* parallel) {
-  runtime::RunServices& services = cycle.services();
-  publisher_->start({.version =
-                         [&cycle] {
-                           const runtime::FaultLog& log = cycle.fault_log();
-                           return log.size() + log.lost() + (log.size() - log.latched());
-                         },
-                     .faults = [&cycle] { return entries(cycle.faults()); },
-                     .lost = [&cycle] { return cycle.fault_log().lost(); }},
-                    parallel,
-                    {.version = [&services] { return services.loads(); },
-                     .signals =
-                         [&services] {
-                           std::vector<dds::ControllerFeed::Signals> all;
-                           for (const runtime::ControllerSignals& one : services.signals())
-                             all.emplace_back(one.controller, one.block);
-                           return all;
-                         },
-                     .marks =
-                         [&services] {
-                           std::vector<dds::ControllerFeed::Marks> all;
-                           for (const runtime::ControllerMarks& one : services.marks())
-                             all.emplace_back(one.controller, one.block);
-                           return all;
-                         },
-                     .texts =
-                         [&services](std::uint64_t& seen, std::vector<hal::TextEvent>& out) {
-                           (void)services.texts().read(seen, out);
-                         },
-                     .parameter_version = [&services] { return services.parameter_version(); },
-                     .parameters = [&services] { return parameters_of(services); }});
+  publisher_->start(fault_feed(cycle), parallel, controller_feed(cycle.services()));
 }
 
 DdsResult DdsRun::finish() { return {participant_->config().domain, publisher_->stop()}; }

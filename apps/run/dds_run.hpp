@@ -21,6 +21,13 @@ struct DdsResult {
   dds::ServiceServer::Counts services{};
 };
 
+/// A composed run as its topics show it, whoever takes their samples.
+/// @pre the composition is connected and outlives what is made of it
+[[nodiscard]] dds::RunDescription described(const WiredComposition& composition);
+/// What a cycle tells its topics beside its images.
+[[nodiscard]] dds::FaultFeed fault_feed(runtime::RobotCycle& cycle);
+[[nodiscard]] dds::ControllerFeed controller_feed(runtime::RunServices& services);
+
 class DdsRun {
  public:
   /// Enters the domain of the experiment's [dds] and makes the topics, before anything has moved;

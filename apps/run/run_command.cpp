@@ -128,10 +128,14 @@ class Session {
 
  private:
   [[nodiscard]] const runtime::Experiment& experiment() const { return c_.experiment; }
+  /// This process in ROS 2's graph.
+  [[nodiscard]] const char* node() const {
+    return options_.serves ? "tandem_serve" : "tandem_run";
+  }
 
   /// DDS, the log, and the door for an owner over DDS.
   Status open_outputs() {
-    auto dds = DdsRun::open(c_, options_.serves ? "tandem_serve" : "tandem_run");
+    auto dds = DdsRun::open(c_, node());
     if (!dds) return std::unexpected(dds.error());
     dds_ = std::move(*dds);
     if (!options_.no_log) {
@@ -213,7 +217,7 @@ class Session {
                    return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
                  });
     }
-    studio_.start(*cycle_, commands_);
+    studio_.start(*cycle_, commands_, run_->parallel());
     const bool on_robot = e.hal.backend == runtime::BackendKind::kWire && !e.hal.lockstep;
     auto socket = serve(commands_, {.path = options_.socket,
                                     .kind = "run",
@@ -354,7 +358,7 @@ class Session {
   std::optional<runtime::Run> run_;
   runtime::RobotCycle* cycle_ = nullptr;  // its
   ControlRegistry commands_;
-  StudioRun studio_{c_};
+  StudioRun studio_{c_, node()};
   std::string studio_address_;  // empty: it was not asked for at the start
   std::unique_ptr<ControlSocket> socket_;
   std::unique_ptr<DdsServices> services_;

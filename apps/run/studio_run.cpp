@@ -121,24 +121,32 @@ class StudioRun::Happenings {
 
 StudioRun::~StudioRun() { finish("", ""); }
 
-Result<std::unique_ptr<studio::Studio>> StudioRun::make(const StudioOptions& options) const {
+Result<StudioRun::Parts> StudioRun::make(const StudioOptions& options) const {
   const WiredComposition& c = *composition_;
   const runtime::Experiment& e = c.experiment;
   const hal::StateImage state(e.robot.shape());
   const hal::CommandImage command(e.robot.shape());
-  return studio::Studio::open(
-      {.address = options.address, .port = options.port, .page = options.page},
+  const std::string session = studio::draw_hex(4);
+  auto foxglove = FoxgloveRun::open(c, node_, session);
+  if (!foxglove) return std::unexpected(foxglove.error());
+  auto studio = studio::Studio::open(
+      {.address = options.address,
+       .port = options.port,
+       .page = options.page,
+       .origins = options.origins},
       {.robot = e.robot,
        .urdf = robot::text_in(e.files, e.robot.model.urdf),
        .version = TANDEM_VERSION,
        .experiment = std::filesystem::path(e.file).filename().string(),
-       .run = studio::draw_hex(4),
+       .run = session,
        .simulated = c.backend->pace() == hal::Pace::kSimulatedClock,
        .period_ns = e.loop.period_ns},
       {.state = state,
        .command = command,
        .truth = runtime::truth_of(c),
        .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image()});
+  if (!studio) return std::unexpected(studio.error());
+  return Parts{.foxglove = std::move(*foxglove), .studio = std::move(*studio), .turns = nullptr};
 }
 
 Result<std::string> StudioRun::open(const StudioOptions& options) {
@@ -146,11 +154,10 @@ Result<std::string> StudioRun::open(const StudioOptions& options) {
   if (open_.studio != nullptr) return open_.studio->address();
   if (over_) return fail("the run is over", "its log is there: tandem report LOG");
   try {
-    auto made = make(options);
-    if (!made) return std::unexpected(made.error());
-    Parts parts{.studio = std::move(*made), .turns = nullptr};
-    if (cycle_ != nullptr) begin(parts);
-    open_ = std::move(parts);
+    auto parts = make(options);
+    if (!parts) return std::unexpected(parts.error());
+    if (cycle_ != nullptr) begin(*parts);
+    open_ = std::move(*parts);
   } catch (const std::bad_alloc&) {
     return fail("there is no memory for a studio, which takes 150 MB",
                 "raise the limit of memory (ulimit -v, -l), or end other programs");
@@ -159,9 +166,11 @@ Result<std::string> StudioRun::open(const StudioOptions& options) {
   return open_.studio->address();
 }
 
-void StudioRun::start(runtime::RobotCycle& cycle, ControlRegistry& commands) {
+void StudioRun::start(runtime::RobotCycle& cycle, ControlRegistry& commands,
+                      hal::ParallelSource* parallel) {
   cycle_ = &cycle;
   commands_ = &commands;
+  parallel_ = parallel;
   happenings_ = std::make_shared<Happenings>(cycle);
   commands.tell([happenings = happenings_](const std::string& request, const Json& answer) {
     happenings->requested(request, answer);
@@ -194,6 +203,8 @@ bool StudioRun::is_open() {
 
 void StudioRun::begin(Parts& parts) {
   studio::Studio* const studio = parts.studio.get();
+  FoxgloveRun* const foxglove = parts.foxglove.get();
+  foxglove->start(*cycle_, parallel_, [studio] { return studio->lost(); });
   parts.turns = std::make_unique<ControlTurns>(*commands_, [studio] { studio->answered(); });
   ControlTurns* const turns = parts.turns.get();
   ControlRegistry& commands = *commands_;
@@ -216,7 +227,8 @@ void StudioRun::begin(Parts& parts) {
             // It was opened meanwhile: the robot is shown as it stands.
             if (stands && tap.taken() == 0) (void)cycle.show_last_cycle(tap);
             return stands;
-          }};
+          },
+      .cycle = [foxglove](const studio::Tap::Cycle& one) { foxglove->take(one); }};
   studio::Asker asker{
       .ask =
           [turns](studio::Question question) {
@@ -244,7 +256,7 @@ void StudioRun::begin(Parts& parts) {
             return commands.turn_of(question) == ControlTurn::kUrgent;
           },
       .only_reads = [&commands](const std::string& name) { return only_reads(commands, name); }};
-  studio->start(std::move(feed), std::move(asker));
+  studio->start(std::move(feed), std::move(asker), &foxglove->protocol());
 }
 
 void StudioRun::finish(const std::string& how, const std::string& log) {

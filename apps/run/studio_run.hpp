@@ -10,6 +10,7 @@
 #include "apps/control/control_registry.hpp"
 #include "apps/control/turns.hpp"
 #include "apps/run/connection.hpp"
+#include "apps/run/foxglove_run.hpp"
 #include "base/result.hpp"
 #include "hal/cycle_observer.hpp"
 #include "runtime/robot_cycle.hpp"
@@ -25,8 +26,10 @@ namespace tandem::apps {
 /// Once open it stays until the run is over.
 class StudioRun {
  public:
+  /// @param node  this process in ROS 2's graph: "tandem_run"
   /// @pre the composition outlives this; before open() it is connected
-  explicit StudioRun(const WiredComposition& composition) : composition_(&composition) {}
+  StudioRun(const WiredComposition& composition, std::string node)
+      : composition_(&composition), node_(std::move(node)) {}
   ~StudioRun();
   StudioRun(const StudioRun&) = delete;
   StudioRun& operator=(const StudioRun&) = delete;
@@ -35,28 +38,32 @@ class StudioRun {
   [[nodiscard]] hal::CycleObserver& tap() { return tap_; }
   /// Listens; after start() clients are answered. Takes all the memory of it. Any thread but the
   /// loop's. @return the address; that of before when it is open already
-  /// Errors: studio::Studio::open()'s; no memory; the run is over.
+  /// Errors: studio::Studio::open()'s, FoxgloveRun::open()'s; no memory; the run is over.
   [[nodiscard]] Result<std::string> open(const StudioOptions& options);
   /// Adds `studio.open`; from now on clients are answered. Before the first cycle.
   /// @param commands  all others are there; outlives this. Its tell() is used up
-  void start(runtime::RobotCycle& cycle, ControlRegistry& commands);
+  /// @param parallel  the second robot; null: there is none
+  void start(runtime::RobotCycle& cycle, ControlRegistry& commands, hal::ParallelSource* parallel);
   /// When there are no more cycles.
   void finish(const std::string& how, const std::string& log);
 
  private:
   class Happenings;
   struct Parts {
+    std::unique_ptr<FoxgloveRun> foxglove;  // the studio's thread uses it
     std::unique_ptr<studio::Studio> studio;
     std::unique_ptr<ControlTurns> turns;
   };
-  [[nodiscard]] Result<std::unique_ptr<studio::Studio>> make(const StudioOptions& options) const;
+  [[nodiscard]] Result<Parts> make(const StudioOptions& options) const;
   void begin(Parts& parts);
   [[nodiscard]] Result<Json> asked_to_open(const Json& request);
   [[nodiscard]] bool is_open();
 
   const WiredComposition* composition_;
+  std::string node_;
   runtime::RobotCycle* cycle_ = nullptr;
   ControlRegistry* commands_ = nullptr;
+  hal::ParallelSource* parallel_ = nullptr;
   std::shared_ptr<Happenings> happenings_;
   hal::LateObserver tap_;
   std::mutex mutex_;  // of what follows

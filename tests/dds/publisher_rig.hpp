@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "dds/endpoint.hpp"
 #include "dds/publisher.hpp"
 #include "runtime/experiment.hpp"
 #include "tests/support/dds_domain.hpp"

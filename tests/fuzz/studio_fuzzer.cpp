@@ -1,8 +1,9 @@
 // Whatever a browser, or somebody in its place, sends to a studio: each request has an answer of a
 // known kind, each message ends in bounded output, and what is sent is JSON or a frame.
 //
-// The input: a byte that says what follows (Way): the head of an HTTP request; or messages to the
-// WebSocket, one a line, of which one that begins with a blank is binary.
+// The input: a byte that says what follows: the head of an HTTP request; or messages to the
+// WebSocket, by the page's protocol or Foxglove's, one a line. One that begins with a blank is
+// binary, without the blank in Foxglove's.
 #include <boost/beast/http.hpp>
 #include <chrono>
 #include <cstdint>
@@ -12,6 +13,8 @@
 #include <vector>
 
 #include "apps/text/json_reader.hpp"
+#include "studio/foxglove/assets.hpp"
+#include "studio/foxglove/hub.hpp"
 #include "studio/http_rules.hpp"
 #include "studio/hub.hpp"
 #include "tests/fuzz/require.hpp"
@@ -42,22 +45,28 @@ void ask_http(std::string_view head, bool loopback) {
   parser.put(boost::asio::buffer(head.data(), head.size()), error);
   if (error || !parser.is_header_done()) return;
   const auto& request = parser.get();
-  static const HttpRules kHere({"127.0.0.1", 8642, true}, "<robot/>", kToken);
-  static const HttpRules kElsewhere({"0.0.0.0", 8642, false}, "<robot/>", kToken);
+  static const Guests kGuests{
+      .names = {std::begin(foxglove::kSubprotocols), std::end(foxglove::kSubprotocols)},
+      .origins = {"https://app.foxglove.dev"}};
+  static const HttpRules kHere({"127.0.0.1", 8642, true}, "<robot/>", kToken, "", kGuests);
+  static const HttpRules kElsewhere({"0.0.0.0", 8642, false}, "<robot/>", kToken, "", kGuests);
   const std::string method(request.method_string()), target(request.target());
-  const std::optional<Response> answer =
-      (loopback ? kHere : kElsewhere)
-          .answer({.method = method,
-                   .target = target,
-                   .old = request.version() < 11,
-                   .upgrades = request.find(http::field::upgrade) != request.end(),
-                   .hosts = all_of(request, http::field::host),
-                   .origins = all_of(request, http::field::origin),
-                   .encodings = all_of(request, http::field::accept_encoding),
-                   .authorizations = all_of(request, http::field::authorization),
-                   .protocols = all_of(request, http::field::sec_websocket_protocol)});
+  const HttpRules& rules = loopback ? kHere : kElsewhere;
+  const RequestHead asked{.method = method,
+                          .target = target,
+                          .old = request.version() < 11,
+                          .upgrades = request.find(http::field::upgrade) != request.end(),
+                          .hosts = all_of(request, http::field::host),
+                          .origins = all_of(request, http::field::origin),
+                          .encodings = all_of(request, http::field::accept_encoding),
+                          .authorizations = all_of(request, http::field::authorization),
+                          .protocols = all_of(request, http::field::sec_websocket_protocol)};
+  const std::optional<Response> answer = rules.answer(asked);
   if (!answer) {
-    require(method == "GET" && target.starts_with("/ws"));
+    const bool guest = rules.subprotocol(asked).starts_with("foxglove.");
+    require(method == "GET" && !rules.subprotocol(asked).empty());
+    require(target.starts_with("/ws") || (guest && target.starts_with("/")));
+    require(loopback || !guest || target.find(kToken) != std::string::npos);
     return;
   }
   require(answer->status >= 200 && answer->status < 500);
@@ -142,6 +151,75 @@ void talk(std::string_view text, bool open, bool reads) {
   run.read(other);
 }
 
+/// A server of two topics, whose files are those of a folder that has none.
+struct Guest {
+  Guest() {
+    hub.start({.publish =
+                   [this](bool) {
+                     for (const foxglove::ChannelId channel : channels) {
+                       if (hub.wanted(channel)) hub.put(channel, 7, "payload");
+                     }
+                   },
+               .time_ns = [] { return std::int64_t{7}; },
+               .parameter_version = [this] { return ++version / 3; },
+               .parameters =
+                   [this] {
+                     return std::vector<foxglove::Parameter>{
+                         {"wave.depth_m", 0.5 * static_cast<double>(version)}, {"wave.on", true}};
+                   },
+               .asset =
+                   [](const std::string& uri) {
+                     Result<std::string> bytes = foxglove::read_asset("/proc/self/fdinfo", uri);
+                     require(!bytes.has_value());
+                     return bytes;
+                   }});
+  }
+  /// Everything that the client gets: well formed, and no more than may wait.
+  void read(foxglove::Hub::ClientNumber client) {
+    std::size_t bytes = 0;
+    while (const auto frame = hub.next(client)) {
+      bytes += frame->bytes->size();
+      if (frame->binary) {
+        const char kind = frame->bytes->at(0);
+        require(frame->bytes->size() >= 9 && (kind == 1 || kind == 2 || kind == 4));
+      } else {
+        require(apps::read_json_object(*frame->bytes).has_value());
+      }
+    }
+    require(bytes < 3 * foxglove::Queue::kMostBytes);
+  }
+
+  foxglove::Hub hub{{.name = "it", .session = "0", .time = true}};
+  std::vector<foxglove::ChannelId> channels{
+      hub.open({"/often", "std_msgs/msg/String", "string data", 0}),
+      hub.open({"/kept", "std_msgs/msg/String", "string data", 2})};
+  std::uint64_t version = 0;
+};
+
+void talk_foxglove(std::string_view text, bool reads) {
+  Guest run;
+  auto now = Protocol::Clock::time_point();
+  const auto other = run.hub.connect("other"), client = run.hub.connect("it");
+  for (std::size_t i = 0; !text.empty() && i < kMostMessages; ++i) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const bool binary = text.starts_with(' ');
+    run.hub.receive(i % 5 == 4 ? other : client, text.substr(0, end).substr(binary ? 1 : 0), binary,
+                    now);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    now += std::chrono::milliseconds(40);
+    if (i == 20) {  // a topic goes, and one of its name comes
+      run.hub.close(run.channels[0]);
+      run.channels[0] = run.hub.open({"/often", "std_msgs/msg/String", "string data", 0});
+    }
+    run.hub.tick(now);
+    if (reads) run.read(client);
+  }
+  run.read(client);
+  run.hub.disconnect(client);
+  run.hub.end("as planned", "");
+  run.read(other);
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -150,6 +228,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const unsigned way = data[0];
   if ((way & 1) == 0) {
     ask_http(text, (way & 2) == 0);
+  } else if ((way & 8) != 0) {
+    talk_foxglove(text, (way & 4) == 0);
   } else {
     talk(text, (way & 2) == 0, (way & 4) == 0);
   }
