@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
       [](const AskOptions& options) { return ask_command(options); },
       [](const AskedOptions& options) { return asked_command(options); },
       [](const TopicOptions& options) { return topic_command(options); },
+      [](const StudioCommandOptions& options) { return attach_studio(options); },
       [&](const auto&) {
         return become_tools({argv, argv + argc});
       },

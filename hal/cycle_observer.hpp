@@ -2,6 +2,7 @@
 // Layer: hal.  Thread: take() the loop's.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <vector>
 
@@ -50,6 +51,27 @@ class CycleObserver {
   /// @rt the same
   virtual void take_signals(const CycleTime& /*time*/,
                             const SignalBlock& /*block*/) noexcept TANDEM_RT {}
+};
+
+/// A place for an observer that comes while the loop runs, and stays until there are no more
+/// cycles.
+class LateObserver final : public CycleObserver {
+ public:
+  /// Any thread, once. It may see the end of a cycle whose signals it was not shown.
+  /// @param observer  outlives the cycles
+  void attach(CycleObserver& observer) noexcept { to_.store(&observer, std::memory_order_release); }
+  /// @rt one load where nobody watches
+  void take(const CycleView& view) noexcept TANDEM_RT override {
+    CycleObserver* to = to_.load(std::memory_order_acquire);
+    if (to != nullptr) to->take(view);
+  }
+  void take_signals(const CycleTime& time, const SignalBlock& block) noexcept TANDEM_RT override {
+    CycleObserver* to = to_.load(std::memory_order_acquire);
+    if (to != nullptr) to->take_signals(time, block);
+  }
+
+ private:
+  std::atomic<CycleObserver*> to_{nullptr};
 };
 
 /// Several observers of one loop, in the order in which they were added.

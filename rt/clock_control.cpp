@@ -98,6 +98,12 @@ bool ClockControl::await_standing(std::int64_t at_most_ns) const {
   return state_.standing;
 }
 
+bool ClockControl::while_standing(const std::function<void()>& look) const {
+  const std::lock_guard lock(mutex_);  // without which the loop does not go on
+  if (state_.standing) look();
+  return state_.standing;
+}
+
 ClockControl::Pace ClockControl::attend(Clock& clock, std::uint64_t cycle, bool restart) noexcept {
   std::unique_lock lock(mutex_);
   bool stood = false;

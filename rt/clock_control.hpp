@@ -4,6 +4,7 @@
 
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 
 #include "base/realtime.hpp"
@@ -61,6 +62,9 @@ class ClockControl {
   /// Blocks until the loop stands, or time is not paused any more, for at most so long.
   /// @return whether it stands.
   [[nodiscard]] bool await_standing(std::int64_t at_most_ns) const;
+  /// Calls `look` while the loop stands, and keeps it standing meanwhile: what the loop writes may
+  /// be read. `look` is short, and asks nothing of this. @return whether it stood
+  bool while_standing(const std::function<void()>& look) const;
 
   // The loop's own.
 

@@ -30,7 +30,7 @@ void HandOver::take() noexcept TANDEM_RT {
   show_progress();
   show_joints(told);
   show_sensors();
-  if (now_.observer != nullptr) show(told);
+  if (now_.observer != nullptr) show_images(*now_.observer);
 }
 
 void HandOver::show() noexcept TANDEM_RT {
@@ -81,20 +81,31 @@ void HandOver::show_progress() noexcept TANDEM_RT {
   progress.overruns.store(now_.loop.statistics().overruns, std::memory_order_relaxed);
 }
 
-void HandOver::show(const hal::CommandImage& told) noexcept TANDEM_RT {
-  now_.observer->take({.time = now_.time,
-                       .phase = now_.run.phase(),
-                       .read_code = now_.read_code,
-                       .state = now_.state,
-                       .command = told,
-                       .truth = now_.truth,
-                       .estimate = now_.estimate(),
-                       .times = {.begin_ns = now_.tick.begin_ns,
-                                 .wakeup_ns = now_.tick.wakeup_ns,
-                                 .bus_ns = now_.loop.last_bus_ns(),
-                                 .work_ns = now_.loop.last_work_ns(),
-                                 .overruns = now_.loop.statistics().overruns,
-                                 .skipped = now_.loop.statistics().skipped}});
+bool HandOver::show_to(hal::CycleObserver& observer) const {
+  if (now_.progress.cycles.load() == 0) return false;
+  for (const auto& one : now_.controllers.loaded()) {
+    const bool told = one != nullptr && one->io->signals.numbers() > 0 &&
+                      one->io->signals.look().cycle == now_.time.cycle;
+    if (told) observer.take_signals(now_.time, one->io->signals);
+  }
+  show_images(observer);
+  return true;
+}
+
+void HandOver::show_images(hal::CycleObserver& observer) const noexcept TANDEM_RT {
+  observer.take({.time = now_.time,
+                 .phase = now_.run.phase(),
+                 .read_code = now_.read_code,
+                 .state = now_.state,
+                 .command = arbiter_.told(),
+                 .truth = now_.truth,
+                 .estimate = now_.estimate(),
+                 .times = {.begin_ns = now_.tick.begin_ns,
+                           .wakeup_ns = now_.tick.wakeup_ns,
+                           .bus_ns = now_.loop.last_bus_ns(),
+                           .work_ns = now_.loop.last_work_ns(),
+                           .overruns = now_.loop.statistics().overruns,
+                           .skipped = now_.loop.statistics().skipped}});
 }
 
 /// What is asked of a joint is what its owner wants, before a delay and a transfer.

@@ -21,6 +21,9 @@ class HandOver {
   void show() noexcept TANDEM_RT;
   /// Each cycle, when its command is out.
   void take() noexcept TANDEM_RT;
+  /// The last cycle once more, to one who came later; for any thread while the loop stands.
+  /// @return false: there was none
+  bool show_to(hal::CycleObserver& observer) const;
   [[nodiscard]] const RunStatistics& statistics() const noexcept { return statistics_; }
   /// After the controllers, whose gains it shows once they are read.
   void archive(Archive& ar) {
@@ -34,7 +37,7 @@ class HandOver {
   void show_joints(const hal::CommandImage& told) noexcept TANDEM_RT;
   void show_sensors() noexcept TANDEM_RT;
   void show_gains() noexcept TANDEM_RT;
-  void show(const hal::CommandImage& told) noexcept TANDEM_RT;
+  void show_images(hal::CycleObserver& observer) const noexcept TANDEM_RT;
 
   CycleNow& now_;
   const DriveResets& resets_;

@@ -373,6 +373,12 @@ Status RobotCycle::restore(std::span<const std::byte> snapshot) {
 
 // Results.
 
+bool RobotCycle::show_last_cycle(hal::CycleObserver& observer) const {
+  bool shown = false;
+  now_.inbox.clock().while_standing([&] { shown = shown_.show_to(observer); });
+  return shown;
+}
+
 std::vector<FaultReport> RobotCycle::faults() const {
   const FaultContext about{now_.robot, now_.backend, now_.controllers, now_.config};
   const FaultLog& log = now_.faults;

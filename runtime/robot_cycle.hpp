@@ -52,6 +52,9 @@ class RobotCycle {
   [[nodiscard]] RunPhase phase() const noexcept { return now_.run.phase(); }
   [[nodiscard]] const hal::StateImage& state() const noexcept { return now_.state; }
   [[nodiscard]] const hal::CommandImage& command() const noexcept { return arbiter_.command(); }
+  /// While simulated time stands: shows the last cycle once more, to one who did not see it. Any
+  /// thread but the loop's. @return false: time goes on, or there was no cycle yet
+  bool show_last_cycle(hal::CycleObserver& observer) const;
   /// Who led `joint` in the last cycle. Between two steps.
   [[nodiscard]] JointLead lead(std::size_t joint) const noexcept { return arbiter_.lead(joint); }
 

@@ -52,7 +52,7 @@ Result<std::unique_ptr<Server>> Server::open(const std::string& address,
   beast::error_code error;
   const auto at = net::ip::make_address(address == "localhost" ? "127.0.0.1" : address, error);
   if (error) {
-    return fail("--studio-address: '" + address + "' is no address",
+    return fail("the studio cannot listen at '" + address + "': it is no address",
                 "give one of this machine as a number: 127.0.0.1, or 0.0.0.0 for all of them");
   }
   auto impl = std::make_unique<Impl>();
@@ -64,12 +64,14 @@ Result<std::unique_ptr<Server>> Server::open(const std::string& address,
   if (error == net::error::address_in_use) {
     return fail(
         fmt::format("another process listens at port {} of {}", its, address),
-        fmt::format("`ss -ltnp sport = :{}` says which; choose another port: --studio=PORT", its));
+        fmt::format("`ss -ltnp sport = :{}` says which; choose another port: --studio=PORT, or "
+                    "--port of `tandem studio`",
+                    its));
   }
   if (error) {
     return fail(fmt::format("cannot listen at port {} of {}: {}", its, address, error.message()),
                 "choose an address of this machine and a port above 1023: --studio=PORT, "
-                "--studio-address ADDRESS");
+                "--studio-address ADDRESS; of `tandem studio` --port, --address");
   }
   const Tcp::endpoint bound = impl->acceptor.local_endpoint(error);
   impl->place = {at.to_string(), bound.port(), at.is_loopback()};

@@ -40,9 +40,8 @@ class Studio {
   /// "http://127.0.0.1:8642/#token=…": who opens it may do everything.
   [[nodiscard]] std::string address() const;
   /// For the run's cycle.
-  [[nodiscard]] hal::CycleObserver& tap() { return tap_; }
-  /// From now on there are answers. Once, before the first cycle; what the functions use stays
-  /// until finish().
+  [[nodiscard]] Tap& tap() { return tap_; }
+  /// From now on there are answers. Once; what the functions use stays until finish().
   void start(Feed feed, Asker asker);
   /// Any thread: the asker has answers.
   void answered() { server_->answered(); }

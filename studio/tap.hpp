@@ -53,6 +53,8 @@ class Tap final : public hal::CycleObserver {
   /// it answers true. Signals of a cycle that found no room are dropped.
   bool next(const std::function<void(const Signals&)>& signals,
             const std::function<void(const Cycle&)>& cycle);
+  /// Cycles that were taken so far. Any thread.
+  [[nodiscard]] std::uint64_t taken() const noexcept { return cycles_.pushed(); }
   /// Cycles, and parts of controllers' signals, that found no room so far.
   [[nodiscard]] std::uint64_t lost() const noexcept {
     return cycles_.dropped() + signals_.dropped();

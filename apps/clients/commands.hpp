@@ -12,6 +12,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit asked_command(const AskedOptions& options);
 /// Asks a running process one thing and prints its answer.
 [[nodiscard]] Exit ask_command(const AskOptions& options);
+/// Lets a running process open its studio, and prints the address.
+[[nodiscard]] Exit attach_studio(const StudioCommandOptions& options);
 /// Topics of a DDS domain: a list, samples as text, rates.
 [[nodiscard]] Exit topic_command(const TopicOptions& options);
 

@@ -115,6 +115,7 @@ const char kEmulateExamples[] = R"(Examples:
   tandem emulate config/coman/squat.toml --lockstep        in one terminal, and in another
   tandem run config/coman/squat.toml --hal can --lockstep  the same bits as without --hal can
   tandem emulate config/coman/robot.toml                   in real time, for `run --hal can`
+It has no studio: `tandem run … --hal can --studio` shows the robot in a browser.
 Interfaces without hardware:
   ip link add can0 type vcan && ip link set can0 mtu 72 up)";
 

@@ -57,6 +57,14 @@ struct AskedOptions {
   std::string json{};
 };
 
+/// tandem studio: of a run that goes on
+struct StudioCommandOptions {
+  ControlTarget target{};
+  std::optional<std::uint16_t> port{};  ///< as StudioOptions'; empty: the run chooses
+  std::string address{};                ///< empty: 127.0.0.1
+  std::string page{};                   ///< empty: the run's own
+};
+
 /// tandem ask QUESTION
 struct AskOptions {
   std::string question;  ///< JSON
@@ -264,7 +272,7 @@ using Command =
     std::variant<Exit, RunOptions, ServeOptions, AskOptions, AskedOptions, CheckOptions,
                  ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, IdentifyOptions,
                  ExciteOptions, LatencyOptions, DoctorOptions, EmulateOptions, TopicOptions,
-                 BenchOptions, ControllerCheckOptions, ControllerNewOptions>;
+                 BenchOptions, ControllerCheckOptions, ControllerNewOptions, StudioCommandOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

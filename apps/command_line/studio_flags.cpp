@@ -1,4 +1,4 @@
-// The flags of a run's studio.
+// The flags of a run's studio, and of `tandem studio`.
 #include <charconv>
 #include <optional>
 
@@ -15,13 +15,28 @@ std::optional<std::uint16_t> port_of(const std::string& text) {
   return error == std::errc() && last == end ? std::optional(port) : std::nullopt;
 }
 
-CLI::Validator is_port() {
-  const auto check = [](const std::string& text) -> std::string {
+CLI::Validator is_port(const char* example) {
+  const auto check = [example](const std::string& text) -> std::string {
     if (text == "true" || port_of(text)) return "";
-    return "'" + text + "' is no port from 0 to 65535: --studio=9000";
+    return "'" + text + "' is no port from 0 to 65535: " + example;
   };
   return {check, ""};
 }
+
+constexpr char kAddressHelp[] =
+    "Where the studio listens: 0.0.0.0 for other machines, too, which need its token (default: "
+    "127.0.0.1)";
+constexpr char kPageHelp[] =
+    "Folder of the studio's page, instead of the program's own: for work on it";
+constexpr char kNameAnAddress[] = "give an address of this machine";
+
+const char kStudioExamples[] = R"(Examples:
+  tandem studio                                      of the only run of this user
+  tandem studio --socket /tmp/run.sock --port 9000
+  tandem studio --address 0.0.0.0                    for other machines, too
+A run that was started without --studio opens it now, and keeps it until its end; its pace stays.
+Where it is open already the same address is printed. `tandem emulate` has no studio: look at the
+run on the other side of its wire.)";
 
 }  // namespace
 
@@ -29,20 +44,29 @@ void add_studio_flags(CLI::App& app, StudioOptions& o) {
   static const std::string kHelp =
       "Show the run in a browser; --studio=PORT (default: the first free one from 8642). A "
       "simulated run keeps real time then, unless a rate is said";
-  CLI::Option* studio =
-      app.add_flag("--studio", kHelp)->check(is_port())->each([&o](const std::string& text) {
-        o.wanted = true;
-        if (text != "true") o.port = port_of(text);
-      });
-  app.add_option("--studio-address", o.address,
-                 "Where the studio listens: 0.0.0.0 for other machines, too, which need its token "
-                 "(default: 127.0.0.1)")
+  CLI::Option* studio = app.add_flag("--studio", kHelp)
+                            ->check(is_port("--studio=9000"))
+                            ->each([&o](const std::string& text) {
+                              o.wanted = true;
+                              if (text != "true") o.port = port_of(text);
+                            });
+  app.add_option("--studio-address", o.address, kAddressHelp)
       ->needs(studio)
-      ->check(is_given("give an address of this machine"));
-  app.add_option("--studio-page", o.page,
-                 "Folder of the studio's page, instead of the program's own: for work on it")
+      ->check(is_given(kNameAnAddress));
+  app.add_option("--studio-page", o.page, kPageHelp)
       ->needs(studio)
       ->check(is_given("name a folder"));
+}
+
+void add_flags(CLI::App& app, StudioCommandOptions& o) {
+  add_target(app, o.target);
+  app.add_option_function<std::string>(
+         "--port", [&o](const std::string& text) { o.port = port_of(text); },
+         "Where the studio listens; 0: any (default: the first free one from 8642)")
+      ->check(is_port("--port 9000"));
+  app.add_option("--address", o.address, kAddressHelp)->check(is_given(kNameAnAddress));
+  app.add_option("--page", o.page, kPageHelp)->check(is_given("name a folder"));
+  app.footer(kStudioExamples);
 }
 
 }  // namespace tandem::apps

@@ -28,6 +28,10 @@ ControlRegistry::Gate remote_gate(const runtime::RemoteOptions& remote,
   return [command, load = remote.load, owner = std::move(owner)](
              const std::string& name, ControlEffect effect, const Json& request) -> Status {
     if (!is_guarded(effect)) return {};
+    if (name == "studio.open") {
+      return fail("studio.open: the studio's token is not given away over DDS",
+                  "say `tandem studio` on the run's own machine");
+    }
     if (command == runtime::RemoteAccess::kOff) {
       return fail(name + ": this process takes no commands over DDS",
                   "[remote] command = \"local\" in its experiment allows them; its control socket "

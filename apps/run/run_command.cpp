@@ -144,11 +144,13 @@ class Session {
     auto server = open_server(c_, dds_.get(), options_.once, admission_);
     if (!server) return std::unexpected(server.error());
     server_ = std::move(*server);
-    auto studio = StudioRun::open(c_, options_.studio);
-    if (!studio) return std::unexpected(studio.error());
-    studio_ = std::move(*studio);
+    if (options_.studio.wanted) {
+      auto address = studio_.open(options_.studio);
+      if (!address) return std::unexpected(address.error());
+      studio_address_ = std::move(*address);
+    }
     if (dds_ != nullptr) observers_.add(&dds_->tap());
-    if (studio_ != nullptr) observers_.add(&studio_->tap());
+    observers_.add(&studio_.tap());
     return {};
   }
 
@@ -166,8 +168,8 @@ class Session {
 
   void announce() const {
     // Whoever asks for it needs it: its token is nowhere else.
-    if (studio_ != nullptr) {
-      fmt::print(out_, "studio: {}\n", studio_->address());
+    if (!studio_address_.empty()) {
+      fmt::print(out_, "studio: {}\n", studio_address_);
       std::fflush(out_);
     }
     if (options_.quiet) return;
@@ -211,7 +213,7 @@ class Session {
                    return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
                  });
     }
-    if (studio_ != nullptr) studio_->start(*cycle_, commands_);
+    studio_.start(*cycle_, commands_);
     const bool on_robot = e.hal.backend == runtime::BackendKind::kWire && !e.hal.lockstep;
     auto socket = serve(commands_, {.path = options_.socket,
                                     .kind = "run",
@@ -279,7 +281,7 @@ class Session {
     }
     if (c_.frames != nullptr) (void)c_.frames->close();
     guard.log_is_closed();
-    if (studio_ != nullptr) studio_->finish(guard.fault(), log);
+    studio_.finish(guard.fault(), log);
     socket_.reset();
     await_crash_place();
     remember_error(loop_error(guard.fault()));
@@ -313,7 +315,7 @@ class Session {
       log_ = summary.log->path;
       log_is_whole_ = summary.log->error.empty();
     }
-    if (studio_ != nullptr) studio_->finish(summary.ended(), log_);
+    studio_.finish(summary.ended(), log_);
     if (c_.frames != nullptr) summary.frames = c_.frames->close();
     summary.faults = fault_texts(*cycle_, summary.log);
     if (!options_.quiet) {
@@ -352,7 +354,8 @@ class Session {
   std::optional<runtime::Run> run_;
   runtime::RobotCycle* cycle_ = nullptr;  // its
   ControlRegistry commands_;
-  std::unique_ptr<StudioRun> studio_;
+  StudioRun studio_{c_};
+  std::string studio_address_;  // empty: it was not asked for at the start
   std::unique_ptr<ControlSocket> socket_;
   std::unique_ptr<DdsServices> services_;
   std::unique_ptr<InputTopics> topics_;

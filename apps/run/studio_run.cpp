@@ -1,8 +1,10 @@
 #include "apps/run/studio_run.hpp"
 
 #include <algorithm>
+#include <deque>
 #include <filesystem>
 #include <mutex>
+#include <new>
 #include <utility>
 #include <vector>
 
@@ -53,7 +55,7 @@ class StudioRun::Happenings {
  public:
   explicit Happenings(runtime::RobotCycle& cycle) : cycle_(cycle) {}
 
-  /// Any thread: a command was carried out, or refused.
+  /// Any thread: a command was carried out, or refused. The newest are kept.
   void requested(const std::string& request, const Json& answer) {
     Event event{.time_s = 1e-9 * static_cast<double>(cycle_.progress().time_ns.load()),
                 .cycle = cycle_.progress().cycles.load(),
@@ -64,7 +66,8 @@ class StudioRun::Happenings {
       event.text += ": " + answer.value("error", std::string("refused"));
     }
     const std::scoped_lock lock(mutex_);
-    if (requests_.size() < kMostRequests) requests_.push_back(std::move(event));
+    if (requests_.size() == kMostRequests) requests_.pop_front();
+    requests_.push_back(std::move(event));
   }
 
   void take(std::vector<Event>& out) {
@@ -113,43 +116,88 @@ class StudioRun::Happenings {
   std::vector<bool> latched_;  // by fault, as it was shown
   std::size_t latched_count_ = 0;
   std::mutex mutex_;
-  std::vector<Event> requests_;
+  std::deque<Event> requests_;
 };
-
-StudioRun::StudioRun(std::unique_ptr<studio::Studio> studio) : studio_(std::move(studio)) {}
 
 StudioRun::~StudioRun() { finish("", ""); }
 
-Result<std::unique_ptr<StudioRun>> StudioRun::open(const WiredComposition& c,
-                                                   const StudioOptions& options) {
-  if (!options.wanted) return nullptr;
+Result<std::unique_ptr<studio::Studio>> StudioRun::make(const StudioOptions& options) const {
+  const WiredComposition& c = *composition_;
   const runtime::Experiment& e = c.experiment;
   const hal::StateImage state(e.robot.shape());
   const hal::CommandImage command(e.robot.shape());
-  auto opened =
-      studio::Studio::open({.address = options.address, .port = options.port, .page = options.page},
-                           {.robot = e.robot,
-                            .urdf = robot::text_in(e.files, e.robot.model.urdf),
-                            .version = TANDEM_VERSION,
-                            .experiment = std::filesystem::path(e.file).filename().string(),
-                            .run = studio::draw_hex(4),
-                            .simulated = c.backend->pace() == hal::Pace::kSimulatedClock,
-                            .period_ns = e.loop.period_ns},
-                           {.state = state,
-                            .command = command,
-                            .truth = runtime::truth_of(c),
-                            .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image()});
-  if (!opened) return std::unexpected(opened.error());
-  return std::unique_ptr<StudioRun>(new StudioRun(std::move(*opened)));
+  return studio::Studio::open(
+      {.address = options.address, .port = options.port, .page = options.page},
+      {.robot = e.robot,
+       .urdf = robot::text_in(e.files, e.robot.model.urdf),
+       .version = TANDEM_VERSION,
+       .experiment = std::filesystem::path(e.file).filename().string(),
+       .run = studio::draw_hex(4),
+       .simulated = c.backend->pace() == hal::Pace::kSimulatedClock,
+       .period_ns = e.loop.period_ns},
+      {.state = state,
+       .command = command,
+       .truth = runtime::truth_of(c),
+       .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image()});
+}
+
+Result<std::string> StudioRun::open(const StudioOptions& options) {
+  const std::scoped_lock lock(mutex_);
+  if (open_.studio != nullptr) return open_.studio->address();
+  if (over_) return fail("the run is over", "its log is there: tandem report LOG");
+  try {
+    auto made = make(options);
+    if (!made) return std::unexpected(made.error());
+    Parts parts{.studio = std::move(*made), .turns = nullptr};
+    if (cycle_ != nullptr) begin(parts);
+    open_ = std::move(parts);
+  } catch (const std::bad_alloc&) {
+    return fail("there is no memory for a studio, which takes 150 MB",
+                "raise the limit of memory (ulimit -v, -l), or end other programs");
+  }
+  tap_.attach(open_.studio->tap());
+  return open_.studio->address();
 }
 
 void StudioRun::start(runtime::RobotCycle& cycle, ControlRegistry& commands) {
+  cycle_ = &cycle;
+  commands_ = &commands;
   happenings_ = std::make_shared<Happenings>(cycle);
   commands.tell([happenings = happenings_](const std::string& request, const Json& answer) {
     happenings->requested(request, answer);
   });
-  turns_ =
-      std::make_unique<ControlTurns>(commands, [studio = studio_.get()] { studio->answered(); });
+  commands.add("studio.open", [this](const Json& request) { return asked_to_open(request); });
+  if (open_.studio != nullptr) begin(open_);
+}
+
+/// Who may ask for it gets the token.
+Result<Json> StudioRun::asked_to_open(const Json& request) {
+  StudioOptions options;
+  if (request.contains("port")) options.port = request["port"].get<std::uint16_t>();
+  options.address = request.value("address", options.address);
+  options.page = request.value("page", options.page);
+  const bool was_open = is_open();
+  const Result<std::string> address = open(options);
+  if (!address) return std::unexpected(address.error());
+  Json answer{{"address", *address}, {"opened", !was_open}};
+  const rt::ClockState clock = cycle_->inbox().clock().state();
+  if (clock.pacing == rt::Pacing::kSimulated && clock.rate == 0.0) {
+    answer["note"] = "simulated time runs as fast as it can: tandem clock rate 1 for real time";
+  }
+  return answer;
+}
+
+bool StudioRun::is_open() {
+  const std::scoped_lock lock(mutex_);
+  return open_.studio != nullptr;
+}
+
+void StudioRun::begin(Parts& parts) {
+  studio::Studio* const studio = parts.studio.get();
+  parts.turns = std::make_unique<ControlTurns>(*commands_, [studio] { studio->answered(); });
+  ControlTurns* const turns = parts.turns.get();
+  ControlRegistry& commands = *commands_;
+  runtime::RobotCycle& cycle = *cycle_;
   runtime::RunServices& services = cycle.services();
   studio::Feed feed{
       .loads = [&services] { return services.loads(); },
@@ -162,21 +210,27 @@ void StudioRun::start(runtime::RobotCycle& cycle, ControlRegistry& commands) {
             return all;
           },
       .events = [happenings = happenings_](std::vector<Event>& out) { happenings->take(out); },
-      .time_stands = [&cycle] { return time_stands(cycle); }};
+      .time_stands =
+          [&cycle, &tap = studio->tap()] {
+            const bool stands = time_stands(cycle);
+            // It was opened meanwhile: the robot is shown as it stands.
+            if (stands && tap.taken() == 0) (void)cycle.show_last_cycle(tap);
+            return stands;
+          }};
   studio::Asker asker{
       .ask =
-          [turns = turns_.get()](studio::Question question) {
+          [turns](studio::Question question) {
             (void)turns->ask(
                 question.asker, static_cast<std::uint64_t>(question.number),
                 std::move(question.text),
                 {.known = question.rights.token, .gate = studio_gate(question.rights)});
           },
       .drop =
-          [turns = turns_.get()](std::uint64_t who) {
+          [turns](std::uint64_t who) {
             turns->drop([who](std::uint64_t one) { return one == who; });
           },
       .take =
-          [turns = turns_.get()] {
+          [turns] {
             std::vector<studio::Answer> answers;
             std::vector<ControlTurns::Answer> taken = turns->take();
             for (ControlTurns::Answer& one : taken) {
@@ -190,12 +244,14 @@ void StudioRun::start(runtime::RobotCycle& cycle, ControlRegistry& commands) {
             return commands.turn_of(question) == ControlTurn::kUrgent;
           },
       .only_reads = [&commands](const std::string& name) { return only_reads(commands, name); }};
-  studio_->start(std::move(feed), std::move(asker));
+  studio->start(std::move(feed), std::move(asker));
 }
 
 void StudioRun::finish(const std::string& how, const std::string& log) {
-  if (turns_ != nullptr) turns_->end();
-  studio_->finish(how, log);
+  const std::scoped_lock lock(mutex_);
+  over_ = true;
+  if (open_.turns != nullptr) open_.turns->end();
+  if (open_.studio != nullptr) open_.studio->finish(how, log);
 }
 
 }  // namespace tandem::apps

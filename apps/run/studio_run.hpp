@@ -1,8 +1,9 @@
 // The studio of a run: what it shows of it, and how it asks it.
-// Layer: apps/run.  Thread: main.
+// Layer: apps/run.  Thread: main; open() any.
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <string>
 
 #include "apps/command_line/command_line.hpp"
@@ -10,6 +11,7 @@
 #include "apps/control/turns.hpp"
 #include "apps/run/connection.hpp"
 #include "base/result.hpp"
+#include "hal/cycle_observer.hpp"
 #include "runtime/robot_cycle.hpp"
 #include "studio/studio.hpp"
 
@@ -19,33 +21,47 @@ namespace tandem::apps {
 /// run needs the run's token, and what changes a joint control of the joints as well.
 [[nodiscard]] ControlRegistry::Gate studio_gate(const studio::Rights& rights);
 
+/// Opens the studio when the run starts, or when somebody asks for it: the command `studio.open`.
+/// Once open it stays until the run is over.
 class StudioRun {
  public:
-  /// Listens; null when --studio is not given.
-  /// @pre the composition is connected and outlives this
-  /// Errors: studio::Studio::open()'s
-  [[nodiscard]] static Result<std::unique_ptr<StudioRun>> open(const WiredComposition& composition,
-                                                               const StudioOptions& options);
+  /// @pre the composition outlives this; before open() it is connected
+  explicit StudioRun(const WiredComposition& composition) : composition_(&composition) {}
   ~StudioRun();
   StudioRun(const StudioRun&) = delete;
   StudioRun& operator=(const StudioRun&) = delete;
 
-  /// CycleParts::observer
-  [[nodiscard]] hal::CycleObserver& tap() { return studio_->tap(); }
-  [[nodiscard]] std::string address() const { return studio_->address(); }
-  /// From now on clients are answered. Before the first cycle.
-  /// @param commands  all of them are there; outlives this. Its tell() is used up
+  /// CycleParts::observer, whether or not it is open
+  [[nodiscard]] hal::CycleObserver& tap() { return tap_; }
+  /// Listens; after start() clients are answered. Takes all the memory of it. Any thread but the
+  /// loop's. @return the address; that of before when it is open already
+  /// Errors: studio::Studio::open()'s; no memory; the run is over.
+  [[nodiscard]] Result<std::string> open(const StudioOptions& options);
+  /// Adds `studio.open`; from now on clients are answered. Before the first cycle.
+  /// @param commands  all others are there; outlives this. Its tell() is used up
   void start(runtime::RobotCycle& cycle, ControlRegistry& commands);
   /// When there are no more cycles.
   void finish(const std::string& how, const std::string& log);
 
  private:
   class Happenings;
-  explicit StudioRun(std::unique_ptr<studio::Studio> studio);
+  struct Parts {
+    std::unique_ptr<studio::Studio> studio;
+    std::unique_ptr<ControlTurns> turns;
+  };
+  [[nodiscard]] Result<std::unique_ptr<studio::Studio>> make(const StudioOptions& options) const;
+  void begin(Parts& parts);
+  [[nodiscard]] Result<Json> asked_to_open(const Json& request);
+  [[nodiscard]] bool is_open();
 
-  std::unique_ptr<studio::Studio> studio_;
+  const WiredComposition* composition_;
+  runtime::RobotCycle* cycle_ = nullptr;
+  ControlRegistry* commands_ = nullptr;
   std::shared_ptr<Happenings> happenings_;
-  std::unique_ptr<ControlTurns> turns_;
+  hal::LateObserver tap_;
+  std::mutex mutex_;  // of what follows
+  Parts open_;
+  bool over_ = false;
 };
 
 }  // namespace tandem::apps

@@ -19,6 +19,8 @@ TEST(RemoteGate, LetsReadingAndStopsThroughAndTheRestWhenItIsAllowed) {
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().hint.find("[remote] command"), std::string::npos);
   for (const RemoteAccess command : {RemoteAccess::kLocal, RemoteAccess::kNetwork}) {
+    EXPECT_FALSE(remote_gate({.command = command}, {})("studio.open", ControlEffect::kChanges, {}))
+        << "its answer has a token";
     EXPECT_TRUE(remote_gate({.command = command}, {})("clock.pause", ControlEffect::kChanges, {}));
   }
 }

@@ -91,6 +91,22 @@ TEST(ClockControl, StandsFromAPauseToAResume) {
   }
 }
 
+TEST(ClockControl, KeepsALoopThatStandsWhileSomebodyLooks) {
+  Threaded run(0.0, true);
+  ASSERT_TRUE(run.control.await_standing(kLong_ns));
+  std::thread other;
+  const bool stood = run.control.while_standing([&] {
+    other = std::thread([&] { EXPECT_TRUE(run.control.resume()); });
+    run.bell.ring();  // the loop wakes, and waits for this to end
+    for (int i = 0; i < 1000; ++i) std::this_thread::yield();
+    EXPECT_EQ(run.began.load(), 0U);
+  });
+  EXPECT_TRUE(stood);
+  other.join();
+  while (run.began.load() == 0) std::this_thread::yield();
+  EXPECT_FALSE(run.control.while_standing([] { ADD_FAILURE() << "time goes on"; }));
+}
+
 TEST(ClockControl, RefusesAStepWhileTimeIsRunning) {
   Simulated run;
   EXPECT_EQ(refusal(run.control.step(1)), "time is running | pause it first: tandem clock pause");

@@ -49,19 +49,6 @@ class StudioRun : public testing::Test {
   std::string token_;
 };
 
-/// The id of the first number of a field.
-std::uint32_t id_in(const Json& signals, const std::string& source, const std::string& name) {
-  for (const Json& one : signals["sources"]) {
-    std::uint32_t id = one["first"];
-    for (const Json& field : one["fields"]) {
-      if (one["name"] == source && field["name"] == name) return id;
-      id += field["count"].get<std::uint32_t>();
-    }
-  }
-  ADD_FAILURE() << source << " has no " << name;
-  return 0;
-}
-
 TEST_F(StudioRun, ShowsThePageWhatItsLogHas) {
   begin("double_pendulum/trajectory.toml", "--duration 1.5");
   WebClient client(port_);

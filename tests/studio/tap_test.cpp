@@ -5,6 +5,7 @@
 
 #include <cstring>
 #include <memory>
+#include <thread>
 #include <vector>
 
 #include "rt/scoped_realtime.hpp"
@@ -27,6 +28,31 @@ TEST(StudioTap, TakesACycleWithoutHeapLockOrSystemCall) {
   const rt::ScopedRealtime in_cycle;  // the trap, or the sanitizer, fails the test
   for (std::uint64_t cycle = 0; cycle < 3000; ++cycle) robot.show(*both.observer(), cycle, {block});
   EXPECT_GT(tap.lost(), 0U) << "a full ring is a part of it";
+}
+
+TEST(StudioTap, ComesWhileTheLoopRuns) {
+  ShownRobot robot;
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  hal::LateObserver late;
+  const auto block = test::block_of(100);
+  std::thread other([&] { late.attach(tap); });
+  {
+    const rt::ScopedRealtime in_cycle;
+    for (std::uint64_t cycle = 0; tap.taken() < 100; ++cycle) robot.show(late, cycle, {block});
+  }
+  other.join();
+  std::uint64_t parts = 0, cycles = 0, before = 0;
+  while (tap.next([&](const Tap::Signals&) { ++parts; },
+                  [&](const Tap::Cycle& one) {
+                    if (cycles > 0) {
+                      EXPECT_EQ(one.time.cycle, before + 1);
+                    }
+                    ++cycles;
+                    before = one.time.cycle;
+                  })) {
+  }
+  EXPECT_EQ(cycles, 100U);
+  EXPECT_GE(parts, 2 * (cycles - 1)) << "the first may lack its signals";
 }
 
 TEST(StudioTap, HandsOverEveryImageAndSignalOfACycle) {

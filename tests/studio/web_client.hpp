@@ -96,6 +96,20 @@ inline std::vector<float> floats_from(const std::string& bytes, std::size_t at) 
   return numbers;
 }
 
+/// The id of the first number of a field.
+inline std::uint32_t id_in(const Json& signals, const std::string& source,
+                           const std::string& name) {
+  for (const Json& one : signals["sources"]) {
+    std::uint32_t id = one["first"];
+    for (const Json& field : one["fields"]) {
+      if (one["name"] == source && field["name"] == name) return id;
+      id += field["count"].get<std::uint32_t>();
+    }
+  }
+  ADD_FAILURE() << source << " has no " << name;
+  return 0;
+}
+
 class WebClient {
  public:
   struct Message {
