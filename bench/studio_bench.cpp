@@ -1,11 +1,14 @@
 // Whether those who look change the loop: COMAN holding at 1 kHz with a studio, by turns
 //   - nobody looks,
-//   - ten clients of another process get every number 30 times a second, and ask for windows.
+//   - ten clients of another process get every number 30 times a second, and ask for windows,
+//   - a thousand that mean no good are at a server elsewhere: what they cost the machine,
+//   - the same are at the studio, beside a page that is to get its ticks.
 //   studio_bench [EXPERIMENT] [--blocks N] [--seconds S] [--cpu N]
 // Compared are, of each cycle, its wake-up (from the grid point to its begin) and its work. Before,
 // what the tap costs the cycle with 100 signals of a controller.
 #include <fmt/core.h>
 #include <poll.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -16,10 +19,12 @@
 #include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <list>
+#include <memory>
 #include <optional>
 #include <string_view>
 
 #include "bench/blocks.hpp"
+#include "bench/crowd.hpp"
 #include "bench/rig.hpp"
 #include "robot/robot_files.hpp"
 #include "studio/studio.hpp"
@@ -37,9 +42,10 @@ struct Options {
 };
 
 constexpr std::size_t kClients = 10;
-constexpr std::size_t kSignals = 800;      // of COMAN's state and command
-constexpr std::string_view kKinds = "ab";  // 300 cycles later they have come, or gone
-constexpr std::array<const char*, kKinds.size()> kNames{"nobody looks", "10 clients"};
+constexpr std::size_t kSignals = 800;        // of COMAN's state and command
+constexpr std::string_view kKinds = "abcd";  // 300 cycles later they have come, or gone
+constexpr std::array<const char*, kKinds.size()> kNames{"nobody looks", "10 clients",
+                                                        "1000 elsewhere", "1000 hostile"};
 
 /// A client that reads all that it gets.
 class Client {
@@ -82,28 +88,54 @@ class Client {
   std::size_t frames_ = 0;
 };
 
-/// The other process: 'a' on standard input sends the clients away, 'b' calls them.
+/// The other process: a letter of kKinds on standard input says which clients are there.
 int be_clients(int port) {
   std::optional<boost::asio::io_context> io;
   std::list<Client> clients;
-  std::size_t frames = 0;
+  std::unique_ptr<Crowd> crowd;
+  std::size_t frames = 0, page_frames = 0;
+  double hostile_s = 0.0;
+  Crowd::Counts sent_away, elsewhere;
+  Bin bin;
+  std::chrono::steady_clock::time_point begin;
   for (;;) {
     pollfd input{STDIN_FILENO, POLLIN, 0};
     if (::poll(&input, 1, clients.empty() ? 20 : 0) > 0) {
       char kind = 'a';
       if (::read(STDIN_FILENO, &kind, 1) != 1) break;
-      for (const Client& one : clients) frames += one.frames();
+      const bool hostile = crowd != nullptr && !clients.empty();
+      for (const Client& one : clients) (hostile ? page_frames : frames) += one.frames();
+      if (hostile) {
+        const std::chrono::duration<double> there = std::chrono::steady_clock::now() - begin;
+        hostile_s += there.count();
+      }
+      if (crowd != nullptr) (hostile ? sent_away : elsewhere).add(crowd->counts());
       clients.clear();
+      crowd.reset();
       io.emplace();
-      for (std::size_t i = 0; kind == 'b' && i < kClients; ++i) clients.emplace_back(*io, port);
+      const std::size_t pages = kind == 'b' ? kClients : kind == 'd' ? 1 : 0;
+      for (std::size_t i = 0; i < pages; ++i) clients.emplace_back(*io, port);
+      if (kind == 'c') crowd = std::make_unique<Crowd>(*io, bin.port());
+      if (kind == 'd') crowd = std::make_unique<Crowd>(*io, port);
+      begin = std::chrono::steady_clock::now();
     }
-    if (clients.empty()) continue;
-    for (Client& one : clients) one.ask_for_window();
+    if (clients.empty() && crowd == nullptr) continue;
+    if (crowd == nullptr) {
+      for (Client& one : clients) one.ask_for_window();
+    }
     io->restart();
     io->run_for(std::chrono::milliseconds(200));
   }
+  crowd.reset();
   clients.clear();
-  fmt::print("the clients received {} frames\n", frames);
+  fmt::print("the 10 clients received {} frames\n", frames);
+  fmt::print("the page beside the crowd received {:.1f} frames a second\n",
+             static_cast<double>(page_frames) / std::max(1e-3, hostile_s));
+  fmt::print(
+      "the crowd connected {} times to the studio ({} elsewhere): {} sent away in words, {} "
+      "had an answer, {} were closed without\n",
+      sent_away.connected, elsewhere.connected, sent_away.refused, sent_away.answered,
+      sent_away.closed);
   std::fflush(stdout);
   return 0;
 }
@@ -115,6 +147,13 @@ double cost_ns(studio::Tap& tap, const hal::SignalBlock& block) {
   for (int i = 0; i < kTimes; ++i) tap.take_signals({}, block);
   const std::chrono::duration<double, std::nano> spent = std::chrono::steady_clock::now() - begin;
   return spent.count() / kTimes;
+}
+
+/// Most that this process has had in memory so far.
+double memory_MB() {
+  rusage usage{};
+  (void)::getrusage(RUSAGE_SELF, &usage);
+  return 1024e-6 * static_cast<double>(usage.ru_maxrss);
 }
 
 int run(const Options& options, const char* program) {
@@ -146,9 +185,13 @@ int run(const Options& options, const char* program) {
   const std::string others = fmt::format("{} --clients {}", program, port);
   std::FILE* clients = ::popen(others.c_str(), "w");
   if (clients == nullptr) return fail_with(fail("cannot start the clients").error());
+  const double before_MB = memory_MB();
   tap.step_through(cycle, clients);
+  const double after_MB = memory_MB();
   ::pclose(clients);
   (*studio)->finish("the bench is over", "");
+  fmt::print("memory of this process: {:.1f} MB before, {:.1f} MB after; a crowd added {:.1f} MB\n",
+             before_MB, after_MB, after_MB - before_MB);
   tap.print("wake-up [us]", &BlockTap::Block::wakeup, kNames);
   tap.print("work of a cycle [us]", &BlockTap::Block::work, kNames);
   return 0;

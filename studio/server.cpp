@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "studio/connections.hpp"
@@ -35,6 +36,9 @@ void send_away(Tcp::socket socket) {
   }();
   beast::error_code ignored;
   socket.non_blocking(true, ignored);
+  // What has come is taken: a socket with unread bytes is reset, and some browsers lose the words.
+  std::array<char, 8192> head;
+  socket.read_some(net::buffer(head), ignored);
   socket.write_some(net::buffer(kWords), ignored);
   socket.shutdown(Tcp::socket::shutdown_send, ignored);
   socket.close(ignored);

@@ -143,6 +143,48 @@ TEST(StudioHostile, HasRoomForSoManyPagesWhateverAHundredDo) {
   }));
 }
 
+TEST(StudioHostile, SendsACrowdOfAThousandAwayInWordsAndThePageGoesOn) {
+  StudioRig rig;
+  rig.start();
+  const auto page = rig.client();
+  const Json signals = page->next("signals");
+  const std::uint32_t id = id_in(signals, "state", "cycle");
+  page->say(Json{{"op", "subscribe"}, {"revision", 1}, {"signals", {id}}});
+  const std::string host = "Host: 127.0.0.1:" + std::to_string(rig.port) + "\r\n";
+  const std::string says[] = {
+      "GET / HT",                                            // and no more: half-open
+      std::string(3000, '\xff'),                             // garbage
+      "GET /robot.urdf HTTP/1.1\r\n" + host + "\r\n",        // an answer that nobody reads
+      "GET /ws HTTP/1.1\r\n" + host + "Upgrade: websocket",  // a page that never gets there
+  };
+  net::io_context io;
+  std::list<Tcp::socket> crowd;
+  beast::error_code ignored;
+  for (std::size_t i = 0; i < 1000; ++i) {
+    // Those who stall come first, and take every place.
+    const bool stalls = i < kMostConnections;
+    Tcp::socket& one = crowd.emplace_back(io);
+    one.connect(endpoint(rig.port), ignored);
+    one.write_some(net::buffer(says[stalls ? 0 : i % std::size(says)]), ignored);
+    if (i % 100 == 0) rig.show(i, i + 100);
+  }
+  std::size_t sent_away = 0, nth = 0;
+  for (Tcp::socket& one : crowd) {
+    if (nth++ < kMostConnections) continue;
+    std::string words(1000, '\0');
+    words.resize(one.read_some(net::buffer(words), ignored));
+    if (words.starts_with("HTTP/1.1 503") && words.ends_with("close one, or try later\n")) {
+      ++sent_away;
+    }
+  }
+  EXPECT_EQ(sent_away, 1000 - kMostConnections);
+  while (page->tick().cycle < 999) {
+  }
+  crowd.clear();
+  EXPECT_TRUE(
+      tandem::test::eventually([&] { return status_of(get(rig.port, "/robot.urdf")) == "200"; }));
+}
+
 TEST(StudioHostile, ClosesWhoSendsTooMuchOrNoText) {
   StudioRig rig;
   rig.start();
