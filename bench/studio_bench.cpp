@@ -190,8 +190,8 @@ int run(const Options& options, const char* program) {
   const double after_MB = memory_MB();
   ::pclose(clients);
   (*studio)->finish("the bench is over", "");
-  fmt::print("memory of this process: {:.1f} MB before, {:.1f} MB after; a crowd added {:.1f} MB\n",
-             before_MB, after_MB, after_MB - before_MB);
+  fmt::print("memory of this process: {:.1f} MB before, {:.1f} MB at most with them\n", before_MB,
+             after_MB);
   tap.print("wake-up [us]", &BlockTap::Block::wakeup, kNames);
   tap.print("work of a cycle [us]", &BlockTap::Block::work, kNames);
   return 0;

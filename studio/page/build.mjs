@@ -3,6 +3,7 @@ import { copyFileSync, mkdirSync, statSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
+import { kVersion } from './version.mjs';
 
 const here = dirname(fileURLToPath(import.meta.url));
 const at = process.argv.indexOf('--out');
@@ -30,6 +31,7 @@ await build({
   target: 'es2022',
   legalComments: 'inline',
   logLevel: 'warning',
+  define: { PAGE_VERSION: JSON.stringify(kVersion) },
   plugins: [withoutMeshLoaders],
 });
 copyFileSync(join(here, 'index.html'), join(out, 'index.html'));

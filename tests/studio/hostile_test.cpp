@@ -33,7 +33,9 @@ TEST(StudioHttp, GivesPageAndDescriptionWithStrictHeaders) {
   EXPECT_TRUE(urdf.ends_with("\r\n\r\n<robot name=\"pair\"/>"));
   EXPECT_EQ(status_of(get(rig.port, "/?x=1", "Accept-Encoding: gzip\r\n")), "200");
   EXPECT_EQ(status_of(get(rig.port, "/../../etc/passwd")), "404");
-  EXPECT_EQ(status_of(get(rig.port, "/ws")), "426");
+  const std::string socket = get(rig.port, "/ws");
+  EXPECT_EQ(status_of(socket), "426");
+  EXPECT_NE(socket.find("of tandem.studio.v1."), std::string::npos) << "a page reads its version";
   const std::string posted =
       raw_http(rig.port, "POST / HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(rig.port) +
                              "\r\nConnection: close\r\nContent-Length: 0\r\n\r\n");

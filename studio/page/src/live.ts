@@ -2,6 +2,7 @@
 import type { Answer, Hello, Request, RunEvent, SourceTable, Window } from './protocol';
 import { decodeTick, decodeWindow, kSubprotocol } from './protocol';
 import type { Connection, Listener, Source } from './source';
+import { whyRefused } from './versions';
 
 const kAgain_ms = 1000;
 /** A question without an answer for so long has none; a change waits a second for the loop. */
@@ -27,6 +28,8 @@ export class LiveSource implements Source {
   private readonly windows = new Map<number, Pending<Window> & { signals: number }>();
   private watching: string[] = [];
   private ended = false;
+  private opened = false;
+  private refused = ''; // why, as it was said
 
   /** @param address of the socket: ws://HOST/ws. @param token empty: one may look, and stop. */
   constructor(
@@ -43,7 +46,9 @@ export class LiveSource implements Source {
     const socket = new WebSocket(this.address, kSubprotocol);
     socket.binaryType = 'arraybuffer';
     this.socket = socket;
+    this.opened = false;
     socket.onopen = () => {
+      this.opened = true;
       if (this.token) this.send({ op: 'enter', token: this.token });
       if (this.watching.length > 0) this.send({ op: 'watch', requests: this.watching });
     };
@@ -158,7 +163,19 @@ export class LiveSource implements Source {
     this.each((l) => l.control?.({ taken: false, yours: false, by: '' }));
     if (this.ended) return;
     this.state('lost', reason || (code === 1006 ? '' : `code ${code}`));
+    if (!this.opened) void this.sayWhyRefused();
     setTimeout(() => this.open(), kAgain_ms);
+  }
+
+  private async sayWhyRefused(): Promise<void> {
+    try {
+      const answer = await fetch(this.address.replace(/^ws/, 'http'));
+      const words = whyRefused(answer.status, await answer.text());
+      if (words && words !== this.refused) this.each((l) => l.trouble?.(words, ''));
+      this.refused = words;
+    } catch {
+      // Nobody is there.
+    }
   }
 
   private receive(data: unknown): void {

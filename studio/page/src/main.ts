@@ -18,10 +18,13 @@ import { Inputs } from './inputs';
 import { Joints } from './joints';
 import { LiveSource } from './live';
 import { Plots } from './plots';
-import { kProtocol } from './protocol';
 import { Scene } from './scene';
 import { Scope } from './scope';
 import { Tabs } from './tabs';
+import { misfit } from './versions';
+
+/** build.mjs puts it here. */
+declare const PAGE_VERSION: string;
 
 const kAlways = ['status', 'clock.show', 'fault.show'];
 const kWatched: Record<string, string[]> = {
@@ -116,9 +119,8 @@ function start(): void {
     trouble: (message, hint) => actions.tell('', `${message}${hint ? ` – ${hint}` : ''}`, true),
   });
   data.whenHello((hello) => {
-    if (hello.protocol === kProtocol) return;
-    const words = `The run speaks version ${hello.protocol} of the studio, this page ${kProtocol}`;
-    actions.tell('', `${words}: what is shown may be wrong. Load the page again.`, true);
+    const words = misfit(hello, PAGE_VERSION);
+    if (words) actions.tell('', words, true);
   });
   document.body.append(
     header.element,

@@ -1,10 +1,11 @@
 // The page against real runs: TANDEM=build/release/bin/tandem node --test tests/studio/browser/run.test.mjs
 import assert from 'node:assert/strict';
-import { mkdtempSync, rmSync } from 'node:fs';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, afterEach, before, describe, test } from 'node:test';
-import { beginRun, lackingRun } from './runs.mjs';
+import { beginRun, kTandem, lackingRun } from './runs.mjs';
 import { eventually, leave, openBrowser, openMortalBrowser, openPage, shot } from './support.mjs';
 
 const why = lackingRun();
@@ -112,5 +113,33 @@ describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
     await run.end();
     await page.waitForSelector('body[data-state="ended"]');
     await leave(page);
+  });
+
+  test('a page of another version says so', async () => {
+    const run = await begin('double_pendulum/hold.toml');
+    const files = ['index.html', 'studio.js', 'studio.css'];
+    const texts = await Promise.all(
+      ['', ...files.slice(1)].map(async (file) =>
+        (await fetch(new URL(`/${file}`, run.address))).text(),
+      ),
+    );
+    const changed = async (from, to) => {
+      const folder = mkdtempSync(join(kScratch, 'page-'));
+      const own = [...texts];
+      own[1] = texts[1].replaceAll(from, to);
+      assert.notEqual(own[1], texts[1]);
+      for (const [i, file] of files.entries()) writeFileSync(join(folder, file), own[i]);
+      const other = await begin('double_pendulum/hold.toml', '--studio-page', folder);
+      return visit(other.address, { waitFor: 'body[data-state]' });
+    };
+    const says = (page, words) =>
+      page.waitForFunction((text) => document.body.textContent.includes(text), words);
+    const version = execFileSync(kTandem, ['--version'], { encoding: 'utf8' }).trim().split(' ')[1];
+    const older = await changed(`"${version}"`, '"0.0.9"');
+    await says(older, `The run is of Tandem ${version}, this page of 0.0.9.`);
+    await leave(older);
+    const newer = await changed('tandem.studio.v1', 'tandem.studio.v2');
+    await says(newer, 'The run does not speak tandem.studio.v2');
+    await newer.context().close();
   });
 });

@@ -74,7 +74,7 @@ export async function openPage(browser, address, options = {}) {
       page.outside.push(request.url());
   });
   await page.goto(address);
-  await page.waitForSelector('body[data-cycle]');
+  await page.waitForSelector(options.waitFor ?? 'body[data-cycle]');
   return page;
 }
 

@@ -1,5 +1,6 @@
 // A robot that plays sine waves: its description, its signals, its events.
 import { readFileSync } from 'node:fs';
+import { kVersion } from '../../version.mjs';
 
 export const kHostile = '<img src=x onerror="window.hacked=1">"\'&';
 
@@ -226,7 +227,7 @@ export class PlayedRobot {
     return {
       op: 'hello',
       protocol: this.protocol,
-      version: 'mock',
+      version: kVersion,
       robot: this.name,
       experiment: this.hostile ? kHostile : 'squat.toml',
       title: 'a mock',
