@@ -140,8 +140,8 @@ std::optional<Response> HttpRules::answer(const RequestHead& head) const {
     return words(400, "Bad Request", "The WebSocket is /ws");
   }
   if (!head.upgrades || head.old) {
-    Response refused = words(426, "Upgrade Required",
-                             fmt::format("This is a WebSocket of {}.", kSubprotocol));
+    Response refused =
+        words(426, "Upgrade Required", fmt::format("This is a WebSocket of {}.", kSubprotocol));
     refused.headers.emplace_back("Upgrade", "websocket");
     return refused;
   }
