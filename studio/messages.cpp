@@ -81,8 +81,10 @@ std::string hello_text(const RunDescription& run, const History& history) {
   const hal::RobotConfig& robot = run.robot;
   const double period_s = 1e-9 * static_cast<double>(run.period_ns);
   Json joints = Json::array(), postures = Json::array(), reaches = Json::array();
+  Json sites = Json::array();
   for (const hal::JointConfig& joint : robot.joints) joints.push_back(joint_json(joint));
   for (const auto& posture : robot.postures) postures.push_back(posture.name);
+  for (const hal::SiteConfig& site : robot.model.sites) sites.push_back(site.name);
   for (const std::uint64_t cycles : history.capacity_cycles()) {
     reaches.push_back(period_s * static_cast<double>(cycles));
   }
@@ -103,6 +105,7 @@ std::string hello_text(const RunDescription& run, const History& history) {
                     {"passive", robot.passive_names()},
                     {"feet", feet_json(robot)},
                     {"postures", std::move(postures)},
+                    {"sites", std::move(sites)},
                     {"urdf", "/robot.urdf"}});
 }
 

@@ -40,7 +40,8 @@ ControlRegistry::Gate studio_gate(const studio::Rights& rights) {
       return fail(command + ": who has not the run's token may only look, and stop",
                   "open the address with its token");
     }
-    if (effect == ControlEffect::kChanges && command.starts_with("joint.") && !rights.control) {
+    const bool moves = command.starts_with("joint.") || command.starts_with("site.");
+    if (effect == ControlEffect::kChanges && moves && !rights.control) {
       return fail(command + ": it moves joints, and control of them is not taken",
                   "take control first");
     }

@@ -36,6 +36,7 @@ export interface Hello {
   passive: string[];
   feet: Foot[];
   postures: string[];
+  sites?: string[];
   urdf: string;
 }
 export interface Field {

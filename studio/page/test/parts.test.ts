@@ -6,6 +6,7 @@ import { isLane, wordOf } from '../src/enums';
 import { filterEvents } from '../src/events';
 import { Jog } from '../src/jog';
 import { parseGoal } from '../src/joint_drive';
+import { gainOf, unitOf } from '../src/joint_tuning';
 import { stretches } from '../src/lanes';
 import { kPresets, readLayout } from '../src/layout';
 import type { Answer, Hello, JointInfo, Request } from '../src/protocol';
@@ -46,7 +47,7 @@ test('a jog has goals a little ahead, within the limits', () => {
     target_rad: 1,
     speed_rad_s: 0.4,
   });
-  assert.equal(jog.goal(-1).target_rad, 0.9 - 0.2);
+  assert.equal(jog.goal(-1)?.target_rad, 0.9 - 0.2);
 });
 
 test('a goal that was under way at the release is followed by another stop', async () => {
@@ -83,6 +84,16 @@ test('values of parameters are read by their type', () => {
   assert.deepEqual(parsed({ type: 'numbers' }, '[1, 2,3]'), [1, 2, 3]);
   assert.equal(parsed({ type: 'numbers' }, '40'), 40);
   assert.equal(parsed({ type: 'numbers' }, '1, x'), undefined);
+});
+
+test('a gain is a number, its unit that of the joint', () => {
+  assert.equal(gainOf(' 4e3 '), 4000);
+  assert.equal(gainOf(''), undefined);
+  assert.equal(gainOf('4k'), undefined);
+  assert.equal(unitOf('Nm/(rad s)', false), 'Nm/(rad s)');
+  assert.equal(unitOf('Nm/(rad s)', true), 'N/(m s)');
+  assert.equal(unitOf('V/(Nm s)', true), 'V/(N s)');
+  assert.equal(unitOf('Nms²/rad', true), 'Ns²/m');
 });
 
 test('events are found by words in any order', () => {

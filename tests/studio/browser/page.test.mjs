@@ -283,6 +283,47 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     await eventually('a halt when the page is gone', () => asked(mock, 'joint.halt').length >= 1);
   });
 
+  test('several joints at once: asked before, the command shown, gains taken back', async () => {
+    const mock = await play();
+    mock.robot.active = false;
+    const page = await visit(mock.address);
+    await page.click('#tab-joints');
+    await page.click('.lease');
+    await page.waitForSelector('body[data-control="yours"]');
+    await page.selectOption('select[aria-label="group of joints"]', { label: 'left leg' });
+    await page.click('button:text-is("Idle") >> nth=0');
+    await page.waitForSelector('dialog[open]');
+    assert.deepEqual(await violations(page), []);
+    await page.keyboard.press('Escape');
+    await page.waitForSelector('dialog', { state: 'detached' });
+    assert.equal(asked(mock, 'joint.set').length, 0, 'nothing is asked for before the answer');
+    await page.click('button:text-is("Go to posture")');
+    await page.click('dialog .go');
+    await eventually('the posture', () => asked(mock, 'joint.posture').length === 1);
+    const [posture] = asked(mock, 'joint.posture');
+    assert.equal(posture.posture, 'home');
+    assert.ok(posture.joints.length > 3 && posture.joints.every((name) => name.startsWith('L')));
+    await until(page, 'tandem joint posture home --joints L');
+    await page.fill('input[aria-label="filter joints"]', 'elb');
+    await page.selectOption('select[aria-label="group of joints"]', 'shown');
+    await page.click('button:text-is("Hold") >> nth=0');
+    await until(page, '2 of 2 done');
+    const row = page.locator('[data-joint="LElbj"]');
+    await row.locator('.opener').click();
+    await row.locator('.tuning summary').click();
+    const gain = row.locator('input[aria-label^="kp of the position loop"]');
+    const undo = row.locator('button[aria-label^="undo kp of the position loop"]');
+    await gain.fill('2000');
+    await gain.press('Enter');
+    await until(page, 'kp = 2000 is beyond 1000 – give 0 to 1000');
+    await gain.fill('55');
+    await gain.press('Enter');
+    await until(page, 'tandem joint gains LElbj position --kp=55');
+    await undo.click();
+    await eventually('40 again', () => mock.robot.gainsOf('LElbj').position.kp === 40);
+    await leave(page);
+  });
+
   test('a lost connection is said, looks stale, and comes back', async () => {
     const mock = await play();
     const page = await visit(mock.address);
@@ -399,11 +440,14 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
       const page = await visit(mock.address, options);
       for (const tab of ['plots', 'scope', 'joints', 'controllers', 'inputs', 'events']) {
         await page.click(`#tab-${tab}`);
-        if (tab === 'joints') await page.locator('.opener').first().click();
         if (tab === 'scope') {
           await page.selectOption('[aria-label="joint to tune"]', 'LKneeSag');
           await page.click('button:text-is("Force")');
           await page.waitForSelector('.scope[data-captures="1"]');
+        }
+        if (tab === 'joints') {
+          await page.locator('.opener').first().click();
+          await page.locator('.tuning summary').first().click();
         }
         await page.waitForTimeout(400);
         assert.deepEqual(await violations(page), [], tab);

@@ -51,6 +51,7 @@ export class PlayedRobot {
     }
     this.floating = this.urdf.includes('base_link"') && robot === 'coman';
     this.goal = new Map();
+    this.gains = new Map();
     this.paused = false;
     this.rate = 1;
     this.time = 20;
@@ -242,6 +243,7 @@ export class PlayedRobot {
         ? [{ name: 'l_sole', link: 'l_sole', xyz: [0, 0, 0], rpy: [0, 0, 0] }]
         : [],
       postures: ['home'],
+      sites: ['l_hand'],
       urdf: '/robot.urdf',
     };
   }
