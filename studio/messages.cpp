@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "apps/text/console.hpp"
+#include "studio/mark_source.hpp"
 
 namespace tandem::studio {
 namespace {
@@ -75,6 +76,13 @@ Json field_json(const SourceField& field) {
           {"count", field.count}};
 }
 
+Json mark_json(const hal::MarkInfo& mark) {
+  return {{"name", mark.name},   {"shape", to_string(mark.shape)},
+          {"link", mark.link},   {"xyz", mark.xyz_m},
+          {"rpy", mark.rpy_rad}, {"size_m", mark.size_m},
+          {"rgba", mark.rgba}};
+}
+
 }  // namespace
 
 std::string hello_text(const RunDescription& run, const History& history) {
@@ -115,8 +123,9 @@ std::string signals_text(std::uint32_t revision, const SignalTable& table) {
     if (!source.there) continue;
     Json fields = Json::array();
     for (const SourceField& field : source.fields) fields.push_back(field_json(field));
-    sources.push_back(
-        {{"name", source.name}, {"first", source.first}, {"fields", std::move(fields)}});
+    Json one{{"name", source.name}, {"first", source.first}, {"fields", std::move(fields)}};
+    for (const hal::MarkInfo& mark : source.marks) one["marks"].push_back(mark_json(mark));
+    sources.push_back(std::move(one));
   }
   return json_text({{"op", "signals"}, {"revision", revision}, {"sources", std::move(sources)}});
 }

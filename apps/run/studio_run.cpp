@@ -162,6 +162,14 @@ void StudioRun::start(runtime::RobotCycle& cycle, ControlRegistry& commands) {
             }
             return all;
           },
+      .marks =
+          [&services] {
+            std::vector<studio::Feed::Marks> all;
+            for (const runtime::ControllerMarks& one : services.marks()) {
+              all.emplace_back(one.controller, one.block);
+            }
+            return all;
+          },
       .events = [happenings = happenings_](std::vector<Event>& out) { happenings->take(out); },
       .time_stands = [&cycle] { return time_stands(cycle); }};
   studio::Asker asker{

@@ -47,10 +47,23 @@ export interface Field {
   elements: string[] | null;
   count: number;
 }
+/** How the numbers of a source are drawn in 3D: fields NAME, NAME.shown and NAME.text. */
+export interface MarkInfo {
+  name: string;
+  /** points, arrow, line, polygon, text */
+  shape: string;
+  /** The frame of its places: a link, or odom, and where it is in that. */
+  link: string;
+  xyz: number[];
+  rpy: number[];
+  size_m: number;
+  rgba: number[];
+}
 export interface SourceTable {
   name: string;
   first: number;
   fields: Field[];
+  marks?: MarkInfo[];
 }
 export interface RunEvent {
   time_s: number;

@@ -4,9 +4,11 @@ import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Data } from './data';
 import { h, say, theme } from './dom';
 import { seconds } from './format';
+import { Layers } from './layers';
 import type { TreeJoint } from './limbs';
 import { Marks } from './marks3d';
 import { buildModel, type Model } from './model';
+import { drawsBySoftware } from './webgl';
 
 const kViews: Record<string, [number, number, number]> = {
   free: [1.6, -1.2, 0.7],
@@ -20,15 +22,6 @@ const kSlowEvery_ms = 120;
 const kLookEvery = 10;
 const kPlainName = /^[\w.-]+$/;
 
-/** Whether this browser draws 3D on the processor. */
-function drawsBySoftware(): boolean {
-  const context = document.createElement('canvas').getContext('webgl2');
-  const info = context?.getExtension('WEBGL_debug_renderer_info');
-  const name = info ? String(context?.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
-  context?.getExtension('WEBGL_lose_context')?.loseContext();
-  return /swiftshader|llvmpipe|software/i.test(name);
-}
-
 interface Ids {
   joints: string[];
   position: number[];
@@ -37,6 +30,7 @@ interface Ids {
   com: number[];
   feet: number[];
   forces: number[];
+  layers: number[];
 }
 
 export class Scene {
@@ -50,6 +44,9 @@ export class Scene {
   private readonly camera = new THREE.PerspectiveCamera(40, 1, 0.01, 200);
   private controls: OrbitControls | null = null;
   private readonly marks = new Marks();
+  private readonly layers = new Layers(() => {
+    this.dirty = true;
+  });
   private grid: THREE.GridHelper | null = null;
   private model: Model | null = null;
   private ghost: Model | null = null;
@@ -76,7 +73,14 @@ export class Scene {
       'section',
       { class: 'scene', 'aria-label': '3D view' },
       this.toolbar(),
-      h('div', { class: 'canvas-frame' }, this.canvasBox, this.when, this.words),
+      h(
+        'div',
+        { class: 'canvas-frame' },
+        this.canvasBox,
+        this.when,
+        this.words,
+        this.layers.legend,
+      ),
       this.missing,
     );
     this.begin();
@@ -134,7 +138,7 @@ export class Scene {
     const sun = new THREE.DirectionalLight(0xffffff, 1.8);
     sun.position.set(2, -3, 4);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x667788, 1.6), sun);
-    this.scene.add(this.marks.forces, this.marks.com, this.marks.frames);
+    this.scene.add(this.marks.forces, this.marks.com, this.marks.frames, ...this.layers.objects);
     this.camera.up.set(0, 0, 1);
     try {
       this.slow = drawsBySoftware();
@@ -184,6 +188,7 @@ export class Scene {
       this.ghost.robot.visible = this.shows.ghost;
       this.scene.add(this.model.robot, this.ghost.robot);
       this.marks.setFrames(this.model, [...measured]);
+      this.layers.setModel(this.model);
       this.listMissing(this.model.notDrawn);
       this.fitted = false;
       this.say(this.renderer ? '' : (this.words.textContent ?? ''));
@@ -228,6 +233,7 @@ export class Scene {
       com: of('truth', 'center_of_mass_m'),
       feet: of('truth', 'foot_position_m'),
       forces: of('truth', 'foot_force_N'),
+      layers: this.layers.wire(this.data),
     };
     this.held = null;
     this.data.want(
@@ -240,7 +246,8 @@ export class Scene {
   private idsAll(): number[] {
     const ids = this.ids;
     if (!ids) return [];
-    return [...ids.position, ...ids.reference, ...ids.base, ...ids.com, ...ids.feet, ...ids.forces];
+    const { position, reference, base, com, feet, forces, layers } = ids;
+    return [...position, ...reference, ...base, ...com, ...feet, ...forces, ...layers];
   }
 
   private pose(values: number[]): void {
@@ -257,6 +264,7 @@ export class Scene {
     const com = part(ids.com.length);
     const feet = part(ids.feet.length);
     const forces = part(ids.forces.length);
+    const layers = part(ids.layers.length);
     ids.joints.forEach((name, i) => {
       this.model?.set(name, position[i]);
       // A joint without a reference stands where it is.
@@ -275,6 +283,7 @@ export class Scene {
     this.marks.setFeet(feet, this.shows.forces ? forces : forces.map(() => 0));
     this.marks.setCom(com, this.groundHeight(), this.shows.com);
     this.marks.update();
+    this.layers.pose(layers);
     this.render(position.some(Number.isFinite));
   }
 
@@ -387,6 +396,7 @@ export class Scene {
       toggle('forces', 'forces', 'of the ground on the feet: green arrows, 1 m is 1000 N'),
       toggle('mass', 'com', 'the centre of mass: an orange dot, and its place on the ground'),
       toggle('frames', 'frames', 'of base and joints: red x, green y, blue z'),
+      ...this.layers.toggles,
     );
   }
 }

@@ -1,6 +1,7 @@
 // Parts of the panels that need no browser: goals, jogging, layouts, lanes, parameters, events.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { colourOf, placesOf, textOf } from '../src/controller_marks';
 import { parsed } from '../src/controllers';
 import { isLane, wordOf } from '../src/enums';
 import { filterEvents } from '../src/events';
@@ -94,6 +95,20 @@ test('a gain is a number, its unit that of the joint', () => {
   assert.equal(unitOf('Nm/(rad s)', true), 'N/(m s)');
   assert.equal(unitOf('V/(Nm s)', true), 'V/(N s)');
   assert.equal(unitOf('Nms²/rad', true), 'Ns²/m');
+});
+
+test('marks are places that are shown, and texts up to their end', () => {
+  const values = [1, 2, 3, 4, 5, 6];
+  assert.deepEqual(
+    placesOf(values, 1).map((one) => one.toArray()),
+    [[1, 2, 3]],
+  );
+  assert.equal(placesOf(values, 9).length, 2);
+  assert.equal(placesOf(values, Number.NaN).length, 0);
+  assert.equal(textOf([0xc3, 0xa4, 0x62, 0, 0x63]), 'äb');
+  assert.equal(textOf([]), '');
+  const look = { name: '', shape: '', link: '', xyz: [], rpy: [], size_m: 0 };
+  assert.equal(colourOf({ ...look, rgba: [1, 0.5, -1, 1] }), 'rgb(255 128 0)');
 });
 
 test('events are found by words in any order', () => {

@@ -118,6 +118,25 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     await leave(page);
   });
 
+  test('what controllers draw is in the scene, named, and can be switched off', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    // One of the five is in a frame that the robot lacks.
+    await page.waitForSelector('.scene-legend[data-shown="4"]');
+    assert.match(await page.textContent('.scene-legend'), /squat: push.*squat: goal/s);
+    await shot(page, 'studio-marks');
+    const pixels = () => page.locator('.canvas canvas').screenshot();
+    await page.locator('.clock-body button:text-is("Pause")').click();
+    await page.waitForSelector('body[data-paused="true"]');
+    await page.waitForTimeout(300);
+    const before = await pixels();
+    await page.click('label:text-is("marks")');
+    await page.waitForSelector('.scene-legend', { state: 'hidden' });
+    await page.waitForTimeout(300);
+    assert.ok(!before.equals(await pixels()), 'the picture is another one');
+    await leave(page);
+  });
+
   test('a dragged span shows every cycle of it; one selected time is everywhere', async () => {
     const mock = await play();
     const page = await visit(mock.address);
