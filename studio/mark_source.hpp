@@ -14,7 +14,8 @@
 
 namespace tandem::studio {
 
-/// Of one controller. Its image has the newest look: marks are drawn for people, not for a log.
+/// The marks of one controller. The image has the newest look: marks are drawn for people, not for
+/// a log.
 class MarkSource {
  public:
   MarkSource(std::string controller, std::shared_ptr<const hal::MarkBlock> block);

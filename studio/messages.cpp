@@ -8,6 +8,7 @@
 
 #include "apps/text/console.hpp"
 #include "studio/mark_source.hpp"
+#include "studio/mesh_files.hpp"
 
 namespace tandem::studio {
 namespace {
@@ -96,6 +97,15 @@ std::string hello_text(const RunDescription& run, const History& history) {
   for (const std::uint64_t cycles : history.capacity_cycles()) {
     reaches.push_back(period_s * static_cast<double>(cycles));
   }
+  const MeshFiles meshes(run.urdf, run.urdf_file);
+  Json files = Json::array();
+  for (std::size_t i = 0; i < meshes.names().size(); ++i) {
+    const std::string why = meshes.why_not(i);
+    files.push_back(
+        {{"file", meshes.names()[i]},
+         {"path", why.empty() ? Json(std::string(kMeshPath) + std::to_string(i)) : Json()},
+         {"why", why}});
+  }
   const bool ground = robot.contact.stiffness_N_m > 0.0;
   return json_text({{"op", "hello"},
                     {"protocol", kProtocol},
@@ -114,6 +124,7 @@ std::string hello_text(const RunDescription& run, const History& history) {
                     {"feet", feet_json(robot)},
                     {"postures", std::move(postures)},
                     {"sites", std::move(sites)},
+                    {"meshes", std::move(files)},
                     {"urdf", "/robot.urdf"}});
 }
 

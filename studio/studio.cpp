@@ -61,7 +61,8 @@ std::string Studio::address() const {
 
 void Studio::start(Feed feed, Asker asker) {
   hub_.start(std::move(feed), std::move(asker));
-  server_->serve(hub_, HttpRules(server_->place(), run_.urdf, token_, page_));
+  server_->serve(hub_, HttpRules(server_->place(), run_.urdf, token_, page_,
+                                 MeshFiles(run_.urdf, run_.urdf_file)));
 }
 
 void Studio::finish(const std::string& how, const std::string& log) {

@@ -20,6 +20,12 @@ export interface Foot {
   xyz: number[];
   rpy: number[];
 }
+/** A mesh of the description: where it can be had, or why it cannot. */
+export interface MeshFile {
+  file: string;
+  path: string | null;
+  why: string;
+}
 export interface Hello {
   protocol: number;
   version: string;
@@ -37,6 +43,7 @@ export interface Hello {
   feet: Foot[];
   postures: string[];
   sites?: string[];
+  meshes?: MeshFile[];
   urdf: string;
 }
 export interface Field {

@@ -7,7 +7,9 @@ import { seconds } from './format';
 import { Layers } from './layers';
 import type { TreeJoint } from './limbs';
 import { Marks } from './marks3d';
+import { fetchMeshes } from './meshes';
 import { buildModel, type Model } from './model';
+import { NotDrawn } from './not_drawn';
 import { drawsBySoftware } from './webgl';
 
 const kViews: Record<string, [number, number, number]> = {
@@ -37,7 +39,7 @@ export class Scene {
   readonly canvasBox = h('div', { class: 'canvas', role: 'img', 'aria-label': 'the robot in 3D' });
   private readonly words = h('p', { class: 'scene-words', hidden: true });
   private readonly when = h('p', { class: 'scene-when', hidden: true });
-  private readonly missing = h('details', { class: 'not-drawn', hidden: true });
+  private readonly missing = new NotDrawn();
   readonly element: HTMLElement;
   private renderer: THREE.WebGLRenderer | null = null;
   private readonly scene = new THREE.Scene();
@@ -65,6 +67,7 @@ export class Scene {
   /** Somebody has turned the view. */
   private touched = false;
   private looks = 0;
+  private loads = 0;
   private readonly shows = { ghost: false, forces: true, com: true, frames: false, follow: true };
   private readonly onTree: ((tree: TreeJoint[]) => void)[] = [];
 
@@ -81,7 +84,7 @@ export class Scene {
         this.words,
         this.layers.legend,
       ),
-      this.missing,
+      this.missing.element,
     );
     this.begin();
     data.whenHello((hello) => void this.load(hello.urdf));
@@ -169,27 +172,30 @@ export class Scene {
     for (const old of [this.model, this.ghost]) if (old) this.scene.remove(old.robot);
     this.model = null;
     this.ghost = null;
+    const turn = ++this.loads;
     if (!urdf) return this.say('The run has no description: nothing to draw.');
     try {
       const text = await this.data.source.description();
       const hello = this.data.hello;
+      const meshes = await fetchMeshes(hello?.meshes ?? [], this.data.source);
+      if (turn !== this.loads) return; // a newer hello has come meanwhile
       const measured = new Set([
         ...(hello?.joints.map((one) => one.name) ?? []),
         ...(hello?.passive ?? []),
       ]);
-      this.model = buildModel(text, measured, null);
+      this.model = buildModel(text, measured, null, meshes);
       const see = new THREE.MeshBasicMaterial({
         color: 0x2f7de1,
         transparent: true,
         opacity: 0.28,
         depthWrite: false,
       });
-      this.ghost = buildModel(text, measured, see);
+      this.ghost = buildModel(text, measured, see, meshes);
       this.ghost.robot.visible = this.shows.ghost;
       this.scene.add(this.model.robot, this.ghost.robot);
       this.marks.setFrames(this.model, [...measured]);
       this.layers.setModel(this.model);
-      this.listMissing(this.model.notDrawn);
+      this.missing.show(this.model.notDrawn);
       this.fitted = false;
       this.say(this.renderer ? '' : (this.words.textContent ?? ''));
       for (const call of this.onTree) call(this.model.tree);
@@ -197,14 +203,6 @@ export class Scene {
       this.say(`The robot cannot be drawn: ${error instanceof Error ? error.message : error}`);
     }
     this.themeChanged();
-  }
-
-  private listMissing(names: string[]): void {
-    this.missing.replaceChildren(
-      h('summary', {}, `not drawn: ${names.length} shapes`),
-      h('ul', {}, ...names.map((name) => h('li', {}, name))),
-    );
-    this.missing.hidden = names.length === 0;
   }
 
   private wire(): void {

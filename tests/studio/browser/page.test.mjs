@@ -118,6 +118,18 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     await leave(page);
   });
 
+  test('meshes that are there are drawn; a line says which are not', async () => {
+    const corners = ['0 0 0', '0.2 0 0', '0 0.2 0'];
+    const mesh = `solid a\nfacet normal 0 0 1\nouter loop\n${corners.map((at) => `vertex ${at}\n`).join('')}endloop\nendfacet\nendsolid a\n`;
+    const meshes = { 'a.stl': mesh, 'b.obj': 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' };
+    const mock = await play({ meshes: { ...meshes, 'c.stl': null, 'd.stl': 'solid d' } });
+    const page = await visit(mock.address);
+    await until(page, 'not drawn: 2 shapes');
+    const words = await page.textContent('.not-drawn');
+    assert.match(words, /mesh c\.stl \(it is not there\).*mesh d\.stl \(it has no surface\)/s);
+    await leave(page);
+  });
+
   test('what controllers draw is in the scene, named, and can be switched off', async () => {
     const mock = await play();
     const page = await visit(mock.address);

@@ -31,8 +31,23 @@ function jointsOf(urdf) {
 }
 
 export class PlayedRobot {
-  constructor({ robot, config, hostile = false, passive = [], bus = false, protocol = 1 }) {
+  constructor({
+    robot,
+    config,
+    hostile = false,
+    passive = [],
+    bus = false,
+    protocol = 1,
+    meshes = {},
+  }) {
     this.urdf = readFileSync(`${config}/${robot}/${robot}.urdf`, 'utf8');
+    this.meshes = Object.entries(meshes);
+    // Each stands for the box of a link, from the first on.
+    for (const [file] of this.meshes)
+      this.urdf = this.urdf.replace(
+        /<visual>(?:(?!<mesh)[\s\S])*?<\/visual>/,
+        `<visual><geometry><mesh filename="${file}"/></geometry></visual>`,
+      );
     this.hostile = hostile;
     this.bus = bus;
     this.protocol = protocol;
@@ -272,6 +287,11 @@ export class PlayedRobot {
         : [],
       postures: ['home'],
       sites: ['l_hand'],
+      meshes: this.meshes.map(([file, text], i) => ({
+        file,
+        path: text === null ? null : `/mesh/${i}`,
+        why: text === null ? 'it is not there' : '',
+      })),
       urdf: '/robot.urdf',
     };
   }
