@@ -28,7 +28,12 @@ const kParsers: Record<string, (bytes: ArrayBuffer) => THREE.Object3D> = {
 export function parseMesh(file: string, bytes: ArrayBuffer): THREE.Object3D {
   const parse = kParsers[file.slice(file.lastIndexOf('.') + 1).toLowerCase()];
   if (!parse) throw new Error('it is neither STL nor OBJ');
-  const made = parse(bytes);
+  let made: THREE.Object3D;
+  try {
+    made = parse(bytes);
+  } catch {
+    throw new Error('it cannot be read'); // the parsers' own words are about their code
+  }
   let corners = 0;
   made.traverse((one) => {
     if (one instanceof THREE.Mesh) corners += one.geometry.getAttribute('position')?.count ?? 0;

@@ -126,7 +126,7 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     const page = await visit(mock.address);
     await until(page, 'not drawn: 2 shapes');
     const words = await page.textContent('.not-drawn');
-    assert.match(words, /mesh c\.stl \(it is not there\).*mesh d\.stl \(it has no surface\)/s);
+    assert.match(words, /mesh c\.stl \(it is not there\).*mesh d\.stl \(it cannot be read\)/s);
     await leave(page);
   });
 
