@@ -1,8 +1,8 @@
 // All joints on one page, by limb: what each does, and, with control, a safe hand on it.
 import type { Actions } from './actions';
 import type { ControlLease } from './control';
-import type { Data } from './data';
 import { saveFile } from './csv';
+import type { Data } from './data';
 import { attribute, h, say } from './dom';
 import { wordOf } from './enums';
 import { number, plain, short } from './format';
