@@ -144,7 +144,7 @@ describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
     await page.locator('button:text-is("+z")').hover();
     await page.mouse.down();
     await eventually('it is led', () => joint(run, 'panda_joint4').moving);
-    await sleep(300);
+    await page.waitForTimeout(300);
     await page.mouse.up();
     await eventually('it brakes', () => !joint(run, 'panda_joint4').moving);
     assert.ok(Math.abs(joint(run, 'panda_joint4').position_rad + 2.356) < 0.2, 'a small way');
