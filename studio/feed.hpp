@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "hal/mark_block.hpp"
 #include "hal/signal_block.hpp"
 #include "studio/tap.hpp"
 
@@ -30,8 +31,11 @@ struct Event {
 struct Feed {
   using Signals = std::pair<std::string, std::shared_ptr<const hal::SignalBlock>>;
 
+  using Marks = std::pair<std::string, std::shared_ptr<const hal::MarkBlock>>;
+
   std::function<std::uint64_t()> loads{};             ///< another number: controllers came or went
   std::function<std::vector<Signals>()> signals{};    ///< of every loaded controller, by its name
+  std::function<std::vector<Marks>()> marks{};        ///< of those that have some
   std::function<void(std::vector<Event>&)> events{};  ///< appends what has happened since
   std::function<bool()> time_stands{};                ///< simulated time is paused
   std::function<void(const Tap::Cycle&)> cycle{};     ///< gets every cycle of the tap

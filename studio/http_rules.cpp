@@ -92,12 +92,13 @@ Response words(unsigned status, std::string_view reason, std::string text) {
 }
 
 HttpRules::HttpRules(Place place, std::string urdf, std::string token, std::string page,
-                     Guests guests)
+                     Guests guests, MeshFiles meshes)
     : place_(std::move(place)),
       urdf_(std::move(urdf)),
       token_(std::move(token)),
       page_(std::move(page)),
-      guests_(std::move(guests)) {}
+      guests_(std::move(guests)),
+      meshes_(std::move(meshes)) {}
 
 /// Whether "localhost:8642" is us. Port 80 may be left out.
 bool HttpRules::is_here(std::string_view host) const {
@@ -131,7 +132,7 @@ std::optional<Response> HttpRules::answer(const RequestHead& head) const {
   const std::string_view path = head.target.substr(0, head.target.find('?'));
   if (is_guest(head) && path == "/" && head.method == "GET" && !head.old) return admit(head);
   const bool asset = std::ranges::find(kPage, path, &PageFile::path) != std::end(kPage);
-  if (!asset && path != kWebSocket && path != kDescription) {
+  if (!asset && path != kWebSocket && path != kDescription && !mesh_number(path)) {
     return words(404, "Not Found", "There is nothing here. The page is /");
   }
   if (head.method != "GET") {
@@ -198,8 +199,15 @@ std::optional<Response> HttpRules::admit(const RequestHead& head) const {
                "The address needs the run's token: ws://HOST:PORT/?token=TOKEN");
 }
 
+Response HttpRules::get_mesh(std::size_t mesh) const {
+  Result<std::string> bytes = meshes_.read(mesh);
+  if (bytes) return {.type = "application/octet-stream", .body = std::move(*bytes)};
+  return words(404, "Not Found", "Mesh " + std::to_string(mesh) + ": " + bytes.error().message);
+}
+
 Response HttpRules::get(std::string_view path, const RequestHead& head) const {
-  if (path == kDescription) {
+  const auto mesh = mesh_number(path);
+  if (mesh || path == kDescription) {
     const std::string_view given =
         head.authorizations.size() == 1 ? head.authorizations.front() : std::string_view();
     constexpr std::string_view kBearer = "Bearer ";
@@ -210,6 +218,7 @@ Response HttpRules::get(std::string_view path, const RequestHead& head) const {
       refused.headers.emplace_back("WWW-Authenticate", "Bearer");
       return refused;
     }
+    if (mesh) return get_mesh(*mesh);
     return {.type = "application/xml; charset=utf-8", .body = urdf_};
   }
   if (!page_.empty()) {

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "studio/mesh_files.hpp"
+
 namespace tandem::studio {
 
 /// A request's head, as far as the rules look at it.
@@ -55,10 +57,10 @@ struct Guests {
 
 class HttpRules {
  public:
-  /// @param token  that /robot.urdf and guests need where the place is no loopback
+  /// @param token  that /robot.urdf, /mesh/N and guests need where the place is no loopback
   /// @param page   folder whose files are the page, as they are at each request; empty: assets()
   HttpRules(Place place, std::string urdf, std::string token, std::string page = {},
-            Guests guests = {});
+            Guests guests = {}, MeshFiles meshes = {});
 
   /// The answer; empty: the request opens a WebSocket.
   [[nodiscard]] std::optional<Response> answer(const RequestHead& head) const;
@@ -70,11 +72,13 @@ class HttpRules {
   [[nodiscard]] bool may_come(const RequestHead& head) const;
   [[nodiscard]] std::optional<Response> admit(const RequestHead& head) const;
   [[nodiscard]] bool is_here(std::string_view host) const;
+  [[nodiscard]] Response get_mesh(std::size_t mesh) const;
   [[nodiscard]] Response get(std::string_view path, const RequestHead& head) const;
 
   Place place_;
   std::string urdf_, token_, page_;
   Guests guests_;
+  MeshFiles meshes_;
 };
 
 /// An answer in words. @param reason  the status' own

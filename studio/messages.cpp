@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "apps/text/console.hpp"
+#include "studio/mark_source.hpp"
+#include "studio/mesh_files.hpp"
 
 namespace tandem::studio {
 namespace {
@@ -75,16 +77,34 @@ Json field_json(const SourceField& field) {
           {"count", field.count}};
 }
 
+Json mark_json(const hal::MarkInfo& mark) {
+  return {{"name", mark.name},   {"shape", to_string(mark.shape)},
+          {"link", mark.link},   {"xyz", mark.xyz_m},
+          {"rpy", mark.rpy_rad}, {"size_m", mark.size_m},
+          {"rgba", mark.rgba}};
+}
+
 }  // namespace
 
 std::string hello_text(const RunDescription& run, const History& history) {
   const hal::RobotConfig& robot = run.robot;
   const double period_s = 1e-9 * static_cast<double>(run.period_ns);
   Json joints = Json::array(), postures = Json::array(), reaches = Json::array();
+  Json sites = Json::array();
   for (const hal::JointConfig& joint : robot.joints) joints.push_back(joint_json(joint));
   for (const auto& posture : robot.postures) postures.push_back(posture.name);
+  for (const hal::SiteConfig& site : robot.model.sites) sites.push_back(site.name);
   for (const std::uint64_t cycles : history.capacity_cycles()) {
     reaches.push_back(period_s * static_cast<double>(cycles));
+  }
+  const MeshFiles meshes(run.urdf, run.urdf_file);
+  Json files = Json::array();
+  for (std::size_t i = 0; i < meshes.names().size(); ++i) {
+    const std::string why = meshes.why_not(i);
+    files.push_back(
+        {{"file", meshes.names()[i]},
+         {"path", why.empty() ? Json(std::string(kMeshPath) + std::to_string(i)) : Json()},
+         {"why", why}});
   }
   const bool ground = robot.contact.stiffness_N_m > 0.0;
   return json_text({{"op", "hello"},
@@ -103,6 +123,8 @@ std::string hello_text(const RunDescription& run, const History& history) {
                     {"passive", robot.passive_names()},
                     {"feet", feet_json(robot)},
                     {"postures", std::move(postures)},
+                    {"sites", std::move(sites)},
+                    {"meshes", std::move(files)},
                     {"urdf", "/robot.urdf"}});
 }
 
@@ -112,8 +134,9 @@ std::string signals_text(std::uint32_t revision, const SignalTable& table) {
     if (!source.there) continue;
     Json fields = Json::array();
     for (const SourceField& field : source.fields) fields.push_back(field_json(field));
-    sources.push_back(
-        {{"name", source.name}, {"first", source.first}, {"fields", std::move(fields)}});
+    Json one{{"name", source.name}, {"first", source.first}, {"fields", std::move(fields)}};
+    for (const hal::MarkInfo& mark : source.marks) one["marks"].push_back(mark_json(mark));
+    sources.push_back(std::move(one));
   }
   return json_text({{"op", "signals"}, {"revision", revision}, {"sources", std::move(sources)}});
 }

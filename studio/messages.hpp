@@ -23,6 +23,7 @@ inline constexpr char kSubprotocol[] = "tandem.studio.v1";
 struct RunDescription {
   hal::RobotConfig robot;
   std::string urdf{};        ///< the description's text
+  std::string urdf_file{};   ///< its path: meshes are beside it
   std::string version{};     ///< of Tandem
   std::string experiment{};  ///< its file's name
   std::string run{};         ///< 8 hexadecimal digits, drawn at its start

@@ -52,6 +52,7 @@ bool Sampler::look(const Feed& feed) {
     take(one);
     if (feed.cycle) feed.cycle(one);
   };
+  for (MarkSource& one : marks_) one.look();
   // Not more than a ring holds, so that a fast simulation does not keep clients from their turn.
   for (std::size_t i = 0; i < Tap::kMostCycles; ++i) {
     if (!tap_->next(signals, cycle)) break;
@@ -81,7 +82,7 @@ bool Sampler::look_for_controllers(const Feed& feed) {
       blocks_.erase(former);
     }
   }
-  changed = changed || !blocks_.empty();
+  changed = look_for_marks(feed) || changed || !blocks_.empty();
   for (const Block& gone : blocks_) {  // before others come, which may be the same again
     if (gone.source != kMostSignals) table_.remove(gone.source);
   }
@@ -89,15 +90,40 @@ bool Sampler::look_for_controllers(const Feed& feed) {
   if (!changed) return false;
   for (Block& one : blocks_) {
     if (one.source != kMostSignals) continue;
-    const Result<std::size_t> source = table_.add("controller/" + one.name, one.block->layout());
-    if (source) {
-      one.source = *source;
-    } else {
-      events_.push_back({1e-9 * static_cast<double>(time_.time_ns), time_.cycle,
-                         Event::Level::kWarn, one.name, source.error().message});
-    }
+    (void)add(one.name, "controller/" + one.name, one.block->layout(), one.source);
   }
   widen();
+  return true;
+}
+
+/// @return false: there is no room, which an event says
+bool Sampler::add(const std::string& who, const std::string& name, const hal::Layout& layout,
+                  std::size_t& source) {
+  const Result<std::size_t> added = table_.add(name, layout);
+  if (added) {
+    source = *added;
+    return true;
+  }
+  events_.push_back({1e-9 * static_cast<double>(time_.time_ns), time_.cycle, Event::Level::kWarn,
+                     who, added.error().message});
+  return false;
+}
+
+/// @return whether they are others than before
+bool Sampler::look_for_marks(const Feed& feed) {
+  const std::vector<Feed::Marks> now = feed.marks ? feed.marks() : std::vector<Feed::Marks>();
+  const bool same = std::ranges::equal(now, marks_, [](const Feed::Marks& a, const MarkSource& b) {
+    return a.first == b.controller() && a.second.get() == b.block();
+  });
+  if (same) return false;
+  for (const MarkSource& gone : marks_) table_.remove(gone.source);
+  marks_.clear();
+  for (const auto& [name, block] : now) {
+    MarkSource marks(name, block);
+    if (!add(name, "marks/" + name, marks.layout(), marks.source)) continue;
+    table_.draw(marks.source, block->declared());
+    marks_.push_back(std::move(marks));
+  }
   return true;
 }
 
@@ -134,6 +160,7 @@ void Sampler::take(const Tap::Cycle& cycle) {
   table_.convert(command_, cycle.command, row_);
   if (!cycle.truth.empty()) table_.convert(truth_, cycle.truth, row_);
   if (!cycle.estimate.empty()) table_.convert(estimate_, cycle.estimate, row_);
+  for (const MarkSource& one : marks_) table_.convert(one.source, one.image(), row_);
   row_is_whole_ = true;
   history_.add(time_.cycle, row_);
   ++span_.cycles;

@@ -10,6 +10,7 @@
 
 #include "studio/feed.hpp"
 #include "studio/history.hpp"
+#include "studio/mark_source.hpp"
 #include "studio/signal_table.hpp"
 #include "studio/tap.hpp"
 
@@ -55,6 +56,9 @@ class Sampler {
   };
 
   bool look_for_controllers(const Feed& feed);
+  bool look_for_marks(const Feed& feed);
+  bool add(const std::string& who, const std::string& name, const hal::Layout& layout,
+           std::size_t& source);
   void widen();
   void begin_row();
   void take(const Tap::Signals& part);
@@ -68,6 +72,7 @@ class Sampler {
   bool row_is_whole_ = false;
   Span span_;
   std::vector<Block> blocks_;
+  std::vector<MarkSource> marks_;
   std::uint64_t loads_ = 0, lost_ = 0;
   bool unknown_block_ = false;
   hal::CycleTime time_;

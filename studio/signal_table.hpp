@@ -13,6 +13,7 @@
 
 #include "base/result.hpp"
 #include "hal/image.hpp"
+#include "hal/mark_block.hpp"
 #include "log/info.hpp"
 
 namespace tandem::studio {
@@ -38,7 +39,8 @@ struct Source {
   std::size_t count = 0;  ///< of numbers
   std::size_t bytes = 0;  ///< of its image
   std::vector<SourceField> fields;
-  bool there = true;  ///< false: a controller that has gone
+  bool there = true;                   ///< false: a controller that has gone
+  std::vector<hal::MarkInfo> marks{};  ///< how its numbers are drawn; empty: they are not
 };
 
 /// Numbers of all sources together, at most: beyond it a source gets no ids.
@@ -53,6 +55,10 @@ class SignalTable {
   /// ids again.
   /// @return its index in sources(). Errors: more than kMostSignals numbers in all
   [[nodiscard]] Result<std::size_t> add(const std::string& name, const hal::Layout& layout);
+  /// Its numbers are drawn in 3D: MarkSource has the layout.
+  void draw(std::size_t source, std::span<const hal::MarkInfo> marks) {
+    sources_[source].marks.assign(marks.begin(), marks.end());
+  }
   /// It has gone: its ids stay its own.
   void remove(std::size_t source) { sources_[source].there = false; }
 

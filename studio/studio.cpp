@@ -68,7 +68,10 @@ void Studio::start(Feed feed, Asker asker, Protocol* guests) {
     others.push_back(guests);
     theirs.names.assign(guests->names().begin(), guests->names().end());
   }
-  server_->serve(hub_, HttpRules(server_->place(), run_.urdf, token_, page_, theirs), others);
+  server_->serve(hub_,
+                 HttpRules(server_->place(), run_.urdf, token_, page_, std::move(theirs),
+                           MeshFiles(run_.urdf, run_.urdf_file)),
+                 others);
 }
 
 void Studio::finish(const std::string& how, const std::string& log) {

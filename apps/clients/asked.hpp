@@ -52,6 +52,7 @@ void print_latched(const Json& answer);
 void print_joint_gains(const Json& joint);
 void print_joint_set(const Json& joint);
 void print_joint_stop(const Json& joint);
+void print_tuning(const Json& answer);
 void print_recovery(const Json& joint);
 
 // Each prints an answer, waits for what is to come, and puts that into the answer. Exit::kFault: it

@@ -80,6 +80,7 @@ constexpr Form kForms[]{
     {"joint.set", &print_joint_set},
     {"joint.show", nullptr, &tell_joints},
     {"joint.stop", &print_joint_stop},
+    {"joint.tuning", &print_tuning},
     {"predict", nullptr, &tell_prediction},
     {"sensor.list", nullptr, &tell_sensors},
     {"signal.list", nullptr, &tell_signals},

@@ -271,6 +271,8 @@ void print_joint_stop(const Json& joint) {
   fmt::print("{} {}\n", joint.value("joint", ""), outcome);
 }
 
+void print_tuning(const Json& answer) { fmt::print("{}", answer.value("toml", "")); }
+
 void print_recovery(const Json& joint) {
   tell_done(joint);
   fmt::print("{0} comes back from {1} {2} to its limit: tandem joint list {0}\n",

@@ -64,6 +64,8 @@ Without --socket or --dds it is the only `tandem run` of this user.)"},
   tandem joint move LElbj --to -30deg --speed 20deg/s
                                                      a free joint to a place, and `joint stop LElbj`
   tandem joint move LElbj --to 0 --wait              until it is there; Ctrl-C ends only the waiting
+  tandem joint posture ready --speed 0.2             free joints to a posture: all arrive together
+  tandem joint tuning > gains.toml                   the gains in force, for robot.toml
   tandem joint home LElbj                            let its drive find the joint's place
   tandem joint reset LElbj                           clear the fault of its drive alone
   tandem joint recover LElbj                         outside its limits: slowly back inside
@@ -81,6 +83,13 @@ Without --socket or --dds it is the only `tandem run` of this user.)"},
   tandem input way --point 1.0,0.3,0.2 --point 2,0,0 way-points: after 1 s, and after 2 s
 Without --socket or --dds it is the only `tandem run` of this user. Whose source is another in the
 experiment's [controller.inputs] is refused: docs/controllers.md)"},
+    {"site", "Leads a place on a running robot", R"(Examples:
+  tandem controller stop hold                        first: frees the joints that it claims
+  tandem site move hand z --by 0.02                  up by 20 mm, along the base's axes
+  tandem site move hand yaw --by 0.1 --axes site     turns about its own z axis
+  tandem joint halt                                  brakes what moves
+A step near a singular posture, or beyond a joint's limit, is refused.
+Without --socket or --dds it is the only `tandem run` of this user.)"},
     {"sensor", "Sensors of a running run", R"(Examples:
   tandem sensor list                                 every IMU and force/torque sensor
   tandem sensor list imu --json -                    one of them, for a program

@@ -137,6 +137,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                       RunWires wires) {
   registry.stops_by([&cycle] { return cycle.progress().stopped_before.load(); });
   registry.add("status", [&cycle](const Json&) -> Result<Json> { return status(cycle); });
+  add_group_commands(registry, cycle, robot, std::move(wires.lead));
   registry.add("loop.show",
                [&cycle, &robot, wires = std::move(wires)](const Json&) -> Result<Json> {
                  return loop(cycle, robot, wires);

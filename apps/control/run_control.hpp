@@ -7,15 +7,17 @@
 
 #include "apps/control/controller_control.hpp"
 #include "apps/control/joint_control.hpp"
+#include "apps/control/joint_group.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
 
-/// What "loop.show" tells of a run beside its cycle.
+/// What a run has beside its cycle.
 struct RunWires {
-  std::string hal{};  ///< the backend: "sim", "can"
+  std::string hal{};  ///< "loop.show" tells it: the backend: "sim", "can"
   /// A list of `interface` and `status`; called on the serving thread. Empty: there is no bus.
   std::function<Json()> buses{};
+  LeadSite lead{};  ///< add_group_commands()'s
 };
 
 /// Adds "status", "loop.show", "fault.show", "fault.reset", "estop" and "run.stop", and the

@@ -11,6 +11,7 @@
 #include "apps/run/dds_run.hpp"
 #include "base/clock_ns.hpp"
 #include "dds/cdr.hpp"
+#include "robot/complete_robot.hpp"
 #include "studio/foxglove/assets.hpp"
 
 namespace tandem::apps {
@@ -95,6 +96,8 @@ FoxgloveRun::FoxgloveRun(const WiredComposition& c, const std::string& node,
                          studio::foxglove::Description description)
     : simulated_time_(description.time),
       folder_(folder_of(c.experiment)),
+      meshes_(robot::text_in(c.experiment.files, c.experiment.robot.model.urdf),
+              c.experiment.robot.model.urdf),
       hub_(std::move(description)),
       channels_(std::make_unique<Channels>(*this, c.experiment.dds, node)),
       state_(c.experiment.robot.shape()),
@@ -142,8 +145,16 @@ void FoxgloveRun::start(runtime::RobotCycle& cycle, hal::ParallelSource* paralle
        .time_ns = [this] { return now_ns(); },
        .parameter_version = controllers.parameter_version,
        .parameters = [all = controllers.parameters] { return with_values(all()); },
-       .asset =
-           [this](const std::string& uri) { return studio::foxglove::read_asset(folder_, uri); }});
+       .asset = [this](const std::string& uri) { return asset(uri); }});
+}
+
+/// What the description names is looked for in its package, as the page's meshes are; else in its
+/// folder.
+Result<std::string> FoxgloveRun::asset(const std::string& uri) const {
+  const std::vector<std::string>& names = meshes_.names();
+  const auto mesh = static_cast<std::size_t>(std::ranges::find(names, uri) - names.begin());
+  if (mesh < names.size() && meshes_.why_not(mesh).empty()) return meshes_.read(mesh);
+  return studio::foxglove::read_asset(folder_, uri);
 }
 
 std::int64_t FoxgloveRun::now_ns() const {

@@ -13,6 +13,7 @@
 #include "dds/run_topics.hpp"
 #include "runtime/robot_cycle.hpp"
 #include "studio/foxglove/hub.hpp"
+#include "studio/mesh_files.hpp"
 #include "studio/tap.hpp"
 
 namespace tandem::apps {
@@ -46,9 +47,11 @@ class FoxgloveRun {
   void publish(bool again);
   /// The time of messages: as their stamps, or the wall clock's.
   [[nodiscard]] std::int64_t now_ns() const;
+  [[nodiscard]] Result<std::string> asset(const std::string& uri) const;
 
   bool simulated_time_, parallel_ = false;
-  std::string folder_;  // of the description
+  std::string folder_;        // of the description
+  studio::MeshFiles meshes_;  // that it names
   studio::foxglove::Hub hub_;
   std::unique_ptr<Channels> channels_;
   std::unique_ptr<dds::RunTopics> topics_;  // goes before where its samples go

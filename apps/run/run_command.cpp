@@ -23,6 +23,7 @@
 #include "apps/run/gate.hpp"
 #include "apps/run/inject.hpp"
 #include "apps/run/input_topics.hpp"
+#include "apps/run/lead_site.hpp"
 #include "apps/run/loop_crash.hpp"
 #include "apps/run/pace.hpp"
 #include "apps/run/prediction.hpp"
@@ -198,13 +199,16 @@ class Session {
           return opinion(*judge, joint, loop, gains, position_rad);
         },
         try_in_other_process(options_),
-        {.hal = hal_name(e), .buses = [this] {
-           Json all = Json::array();
-           for (const OpenBus& bus : c_.open_buses()) {
-             all.push_back({{"interface", bus.interface}, {"status", bus.end->status_text()}});
-           }
-           return all;
-         }});
+        {.hal = hal_name(e),
+         .buses =
+             [this] {
+               Json all = Json::array();
+               for (const OpenBus& bus : c_.open_buses()) {
+                 all.push_back({{"interface", bus.interface}, {"status", bus.end->status_text()}});
+               }
+               return all;
+             },
+         .lead = lead_site(e.robot, c_.kernels.get())});
     add_predict(commands_, c_.predictor.get(), e.robot);
     if (dds_ != nullptr) {
       admission_.add_to(commands_);

@@ -42,7 +42,8 @@ ControlRegistry::Gate studio_gate(const studio::Rights& rights) {
       return fail(command + ": who has not the run's token may only look, and stop",
                   "open the address with its token");
     }
-    if (effect == ControlEffect::kChanges && command.starts_with("joint.") && !rights.control) {
+    const bool moves = command.starts_with("joint.") || command.starts_with("site.");
+    if (effect == ControlEffect::kChanges && moves && !rights.control) {
       return fail(command + ": it moves joints, and control of them is not taken",
                   "take control first");
     }
@@ -136,6 +137,7 @@ Result<StudioRun::Parts> StudioRun::make(const StudioOptions& options) const {
        .origins = options.origins},
       {.robot = e.robot,
        .urdf = robot::text_in(e.files, e.robot.model.urdf),
+       .urdf_file = e.robot.model.urdf,
        .version = TANDEM_VERSION,
        .experiment = std::filesystem::path(e.file).filename().string(),
        .run = session,
@@ -216,6 +218,14 @@ void StudioRun::begin(Parts& parts) {
           [&services] {
             std::vector<studio::Feed::Signals> all;
             for (const runtime::ControllerSignals& one : services.signals()) {
+              all.emplace_back(one.controller, one.block);
+            }
+            return all;
+          },
+      .marks =
+          [&services] {
+            std::vector<studio::Feed::Marks> all;
+            for (const runtime::ControllerMarks& one : services.marks()) {
               all.emplace_back(one.controller, one.block);
             }
             return all;

@@ -9,14 +9,14 @@ const here = dirname(fileURLToPath(import.meta.url));
 const at = process.argv.indexOf('--out');
 const out = resolve(at < 0 ? join(here, 'dist') : process.argv[at + 1]);
 
-/** Meshes are not loaded, so their loaders are left out of the bundle. */
-const withoutMeshLoaders = {
-  name: 'without mesh loaders',
+/** COLLADA is not shown, so its loader is left out of the bundle. */
+const withoutCollada = {
+  name: 'without COLLADA',
   setup(setup) {
-    const name = /^three\/examples\/jsm\/loaders\/(STL|Collada)Loader\.js$/;
+    const name = /^three\/examples\/jsm\/loaders\/ColladaLoader\.js$/;
     setup.onResolve({ filter: name }, (args) => ({ path: args.path, namespace: 'none' }));
     setup.onLoad({ filter: /.*/, namespace: 'none' }, () => ({
-      contents: 'export class STLLoader {} export class ColladaLoader {}',
+      contents: 'export class ColladaLoader {}',
     }));
   },
 };
@@ -32,7 +32,7 @@ await build({
   legalComments: 'inline',
   logLevel: 'warning',
   define: { PAGE_VERSION: JSON.stringify(kVersion) },
-  plugins: [withoutMeshLoaders],
+  plugins: [withoutCollada],
 });
 copyFileSync(join(here, 'index.html'), join(out, 'index.html'));
 for (const name of ['index.html', 'studio.js', 'studio.css']) {

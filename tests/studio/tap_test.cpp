@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -137,6 +139,61 @@ TEST(StudioSampler, KeepsEachCycleAndWhatBecameOfItSinceTheTick) {
   ASSERT_EQ(events.size(), 1U);
   EXPECT_EQ(events[0].text, "phase: running");
   EXPECT_EQ(events[0].cycle, 0U);
+}
+
+TEST(StudioSampler, HasMarksAsNumbersWithTheirLook) {
+  ShownRobot robot;
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  Sampler sampler(tap, robot.images(), robot.names(), 200'000);
+  const auto block = std::make_shared<hal::MarkBlock>();
+  const std::size_t arrow = block->declare(
+      "push", {.shape = hal::MarkShape::kArrow, .frame = "odom", .points = 2, .size_m = 0.03});
+  const std::size_t words =
+      block->declare("words", {.shape = hal::MarkShape::kText, .frame = "odom"});
+  ASSERT_TRUE(block->close({}, {}));
+  std::vector<Feed::Marks> marks{{"wave", block}};
+  std::uint64_t loads = 1;
+  const Feed feed{.loads = [&] { return loads; },
+                  .signals = [] { return std::vector<Feed::Signals>(); },
+                  .marks = [&] { return marks; }};
+  EXPECT_TRUE(sampler.look(feed));
+  const auto last = [&](const std::string& name) {
+    return sampler.last()[test::id_of(sampler.table(), "marks/wave." + name)];
+  };
+  robot.show(tap, 0, {});
+  EXPECT_FALSE(sampler.look(feed));
+  EXPECT_EQ(last("push.shown"), 0.0F) << "nothing is drawn yet";
+
+  block->place(arrow, 0, {0.0, 0.0, 0.5});
+  block->place(arrow, 1, {0.25, 0.0, 0.5});
+  block->say(words, "ab");
+  block->place(words, 0, {1.0, 2.0, 3.0});
+  ASSERT_TRUE(block->show_to_viewers(1'000'000, true));
+  robot.show(tap, 1, {});
+  EXPECT_FALSE(sampler.look(feed));
+  EXPECT_EQ(last("push.3"), 0.25F);
+  EXPECT_EQ(last("push.shown"), 2.0F);
+  EXPECT_EQ(last("words.shown"), 1.0F);
+  EXPECT_EQ(last("words.text.1"), static_cast<float>('b'));
+  EXPECT_EQ(last("words.text.2"), 0.0F);
+  const Source& source = sampler.table().sources().back();
+  ASSERT_EQ(source.marks.size(), 2U);
+  EXPECT_EQ(source.marks[0].name, "push");
+  EXPECT_EQ(source.marks[0].shape, hal::MarkShape::kArrow);
+  EXPECT_EQ(source.marks[0].size_m, 0.03);
+
+  // A place that is no number: the mark is not shown.
+  block->place(arrow, 1, {std::nan(""), 0.0, 0.5});
+  ASSERT_TRUE(block->show_to_viewers(2'000'000, true));
+  robot.show(tap, 2, {});
+  EXPECT_FALSE(sampler.look(feed));
+  EXPECT_EQ(last("push.shown"), 0.0F);
+  EXPECT_EQ(last("words.shown"), 1.0F);
+
+  marks.clear();
+  ++loads;
+  EXPECT_TRUE(sampler.look(feed));
+  EXPECT_FALSE(sampler.table().sources().back().there);
 }
 
 TEST(StudioSampler, FollowsControllersThatComeAndGo) {

@@ -1,5 +1,5 @@
 // Buttons that ask the run for something, and the line that says what became of it.
-import { commandLine } from './command';
+import { commandLine, commandOfAll } from './command';
 import { h, say } from './dom';
 import type { Answer, Request } from './protocol';
 import type { Source } from './source';
@@ -12,6 +12,8 @@ export interface ButtonOptions {
   /** Without the button that copies the command line. */
   bare?: boolean;
   done?(answer: Answer): void;
+  /** It was pressed, and there is nothing to ask for. */
+  nothing?(): void;
 }
 
 export async function copyText(text: string): Promise<boolean> {
@@ -21,6 +23,11 @@ export async function copyText(text: string): Promise<boolean> {
   } catch {
     return false;
   }
+}
+
+/** Why something was refused. */
+function wordsOf(answer: Answer): string {
+  return `${answer.error ?? 'refused'}${answer.hint ? ` – ${answer.hint}` : ''}`;
 }
 
 export class Actions {
@@ -58,14 +65,35 @@ export class Actions {
     const command = commandLine(request);
     this.tell(command, '…');
     const answer = await this.source.ask(request);
+    this.show(request, answer);
+    return answer;
+  }
+
+  /** What became of a request. */
+  show(request: Request, answer: Answer): void {
+    const command = commandLine(request);
     if (answer.ok) {
       const note = typeof answer.note === 'string' ? `: ${answer.note}` : '';
       this.tell(command, answer.done === false ? `not yet${note}` : `done${note}`);
     } else {
-      const hint = answer.hint ? ` – ${answer.hint}` : '';
-      this.tell(command, `${answer.error ?? 'refused'}${hint}`, true);
+      this.tell(command, wordsOf(answer), true);
     }
-    return answer;
+  }
+
+  /** Asks one after the other, in spite of refusals; the words are about all of them. */
+  async runAll(requests: Request[]): Promise<Answer[]> {
+    if (requests.length === 1) return [await this.run(requests[0])];
+    const command = commandOfAll(requests);
+    const answers: Answer[] = [];
+    for (const request of requests) {
+      this.tell(command, `${answers.length} of ${requests.length} …`);
+      answers.push(await this.source.ask(request));
+    }
+    const refused = answers.filter((answer) => !answer.ok);
+    const done = `${answers.length - refused.length} of ${answers.length} done`;
+    const why = refused.length > 0 ? `; ${wordsOf(refused[0])}` : '';
+    this.tell(command, done + why, refused.length > 0);
+    return answers;
   }
 
   async copy(command: string): Promise<void> {
@@ -86,7 +114,7 @@ export class Actions {
         'aria-label': options.name,
         onclick: async () => {
           const asked = request();
-          if (!asked) return;
+          if (!asked) return options.nothing?.();
           const answer = await this.run(asked);
           options.done?.(answer);
         },

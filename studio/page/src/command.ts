@@ -29,6 +29,15 @@ function list(flag: string, names: unknown): string[] {
     : [];
 }
 
+/** One line for requests that differ in their joint alone. */
+export function commandOfAll(requests: Request[]): string {
+  const names = requests.map((request) => shellWord(String(request.joint)));
+  const lines = requests.map((request) => commandLine({ ...request, joint: '$j' }));
+  const line = lines[0]?.replace("'$j'", '"$j"');
+  if (lines.some((one) => one !== lines[0])) return requests.map(commandLine).join('; ');
+  return `for j in ${names.join(' ')}; do ${line}; done`;
+}
+
 export function commandLine(request: Request): string {
   const words = ['tandem', ...request.do.split('.')];
   const joint = shellWord(String(request.joint ?? ''));
@@ -40,6 +49,7 @@ export function commandLine(request: Request): string {
     case 'clock.resume':
     case 'fault.reset':
     case 'joint.halt':
+    case 'joint.tuning':
       return words.join(' ');
     case 'clock.step':
       return [...words, value(request.cycles ?? 1)].join(' ');
@@ -72,6 +82,28 @@ export function commandLine(request: Request): string {
           speed_rad_s: '--speed',
           acceleration_rad_s2: '--acceleration',
         }),
+      ].join(' ');
+    case 'joint.posture':
+      return [
+        ...words,
+        shellWord(String(request.posture)),
+        ...list('--joints', request.joints),
+        ...options(request, { speed: '--speed' }),
+      ].join(' ');
+    case 'joint.gains':
+      return [
+        ...words,
+        joint,
+        shellWord(String(request.loop)),
+        ...options(request, { kp: '--kp', ki: '--ki', kd: '--kd' }),
+        ...(request.anyway === true ? ['--anyway'] : []),
+      ].join(' ');
+    case 'site.move':
+      return [
+        ...words,
+        shellWord(String(request.site)),
+        shellWord(String(request.axis)),
+        ...options(request, { by: '--by', axes: '--axes', speed: '--speed' }),
       ].join(' ');
     case 'joint.set':
       return [

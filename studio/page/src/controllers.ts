@@ -5,6 +5,7 @@ import type { Data } from './data';
 import { attribute, h, say } from './dom';
 import { micros, plain } from './format';
 import type { Answer } from './protocol';
+import { undoable } from './undo';
 
 interface Parameter {
   name: string;
@@ -198,8 +199,6 @@ export class Controllers {
 
   private parameter(controller: string, parameter: Parameter): HTMLElement {
     const first = shown(parameter.value);
-    const history: string[] = [];
-    let inForce = first;
     const words = `${parameter.name} of ${controller}`;
     const field = this.field(parameter, first, words);
     const request = (text: string) => {
@@ -207,45 +206,11 @@ export class Controllers {
       if (value === undefined) return null;
       return { do: 'controller.set', name: controller, parameters: { [parameter.name]: value } };
     };
-    const undo = this.actions.button('Undo', () => request(history.at(-1) ?? inForce), {
-      name: `undo ${words}`,
-      bare: true,
-      done: (answer) => {
-        if (!answer.ok) return;
-        inForce = history.pop() ?? inForce;
-        settle();
-      },
-    }) as HTMLButtonElement;
-    const settle = () => {
-      field.value = inForce;
-      undo.disabled = history.length === 0;
-      field.classList.remove('changed');
-    };
-    const set = this.actions.button(
-      'Set',
-      () => {
-        const asked = request(field.value);
-        if (!asked)
-          this.actions.tell('', `${words}: '${field.value}' is no ${parameter.type}`, true);
-        return asked;
-      },
-      {
-        name: `set ${words}`,
-        done: (answer) => {
-          if (!answer.ok) return;
-          history.push(inForce);
-          inForce = field.value;
-          settle();
-        },
-      },
+    const { set, undo } = undoable(
+      this.actions,
+      { name: words, field, request, type: parameter.type },
+      first,
     );
-    field.addEventListener('input', () =>
-      field.classList.toggle('changed', field.value !== inForce),
-    );
-    field.addEventListener('keydown', (event) => {
-      if ((event as KeyboardEvent).key === 'Enter') set.querySelector('button')?.click();
-    });
-    settle();
     return h(
       'tr',
       {},

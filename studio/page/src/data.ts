@@ -20,6 +20,8 @@ interface Need {
 export class Data {
   hello: Hello | null = null;
   catalog = new Catalog();
+  /** As the run has them now. */
+  sources: SourceTable[] = [];
   readonly time = new TimeModel();
   readonly history = new History();
   readonly events: RunEvent[] = [];
@@ -99,6 +101,7 @@ export class Data {
 
   private table(revision: number, sources: SourceTable[]): void {
     this.catalog = new Catalog(revision, sources);
+    this.sources = sources;
     for (const call of this.onCatalog) call();
     this.subscribe();
   }

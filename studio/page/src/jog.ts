@@ -13,30 +13,24 @@ export interface JogJoint {
   speed(): number;
 }
 
-export class Jog {
+/** Goals as long as something is held, and a stop in any case. */
+export class Held {
   private direction = 0;
   private timer: ReturnType<typeof setTimeout> | null = null;
 
+  /**
+   * @param goal the request that comes next; null: there is none yet.
+   * @param stopper the request that stops it.
+   */
   constructor(
     private readonly ask: (request: Request) => Promise<Answer>,
-    private readonly joint: JogJoint,
+    readonly goal: (direction: number) => Request | null,
+    private readonly stopper: Request,
     private readonly said: (request: Request, answer: Answer) => void = () => {},
   ) {}
 
   get moving(): boolean {
     return this.direction !== 0;
-  }
-
-  /** The goal that the next message has. */
-  goal(direction: number): Request {
-    const { name, lower, upper } = this.joint;
-    const speed = this.joint.speed();
-    const ahead = this.joint.position() + direction * speed * kAhead_s;
-    const target = Math.min(
-      upper ?? Number.POSITIVE_INFINITY,
-      Math.max(lower ?? Number.NEGATIVE_INFINITY, ahead),
-    );
-    return { do: 'joint.move', joint: name, target_rad: target, speed_rad_s: speed };
   }
 
   start(direction: 1 | -1): void {
@@ -55,13 +49,12 @@ export class Jog {
   }
 
   private async halt(): Promise<void> {
-    const request = { do: 'joint.stop', joint: this.joint.name };
-    this.said(request, await this.ask(request));
+    this.said(this.stopper, await this.ask(this.stopper));
   }
 
   private async again(): Promise<void> {
-    if (this.direction === 0 || !Number.isFinite(this.joint.position())) return;
-    const request = this.goal(this.direction);
+    const request = this.direction === 0 ? null : this.goal(this.direction);
+    if (!request) return;
     const answer = await this.ask(request);
     this.said(request, answer);
     if (this.direction === 0) return this.halt();
@@ -73,8 +66,37 @@ export class Jog {
   }
 }
 
+/** Of one joint. */
+export class Jog extends Held {
+  constructor(
+    ask: (request: Request) => Promise<Answer>,
+    joint: JogJoint,
+    said: (request: Request, answer: Answer) => void = () => {},
+  ) {
+    super(
+      ask,
+      (direction) => goalOf(joint, direction),
+      { do: 'joint.stop', joint: joint.name },
+      said,
+    );
+  }
+}
+
+/** A goal a little ahead, inside the limits. */
+function goalOf(joint: JogJoint, direction: number): Request | null {
+  const { name, lower, upper } = joint;
+  if (!Number.isFinite(joint.position())) return null;
+  const speed = joint.speed();
+  const ahead = joint.position() + direction * speed * kAhead_s;
+  const target = Math.min(
+    upper ?? Number.POSITIVE_INFINITY,
+    Math.max(lower ?? Number.NEGATIVE_INFINITY, ahead),
+  );
+  return { do: 'joint.move', joint: name, target_rad: target, speed_rad_s: speed };
+}
+
 /** A button that moves as long as it is held: pointer, or blank and Enter. */
-export function holdToMove(button: HTMLButtonElement, jog: Jog, direction: 1 | -1): void {
+export function holdToMove(button: HTMLButtonElement, jog: Held, direction: 1 | -1): void {
   const stop = () => {
     jog.stop();
     button.classList.remove('held');

@@ -110,8 +110,7 @@ export function jointDrive(
     (request) => actions.source.ask(request),
     { name, lower: joint.lower, upper: joint.upper, position, speed: speedOf },
     (request, answer) => {
-      if (!answer.ok)
-        actions.tell(request.do, `${answer.error ?? ''} – ${answer.hint ?? ''}`, true);
+      if (!answer.ok) actions.show(request, answer);
     },
   );
   const hold = (direction: 1 | -1, label: string) => {

@@ -1,13 +1,17 @@
 // All joints on one page, by limb: what each does, and, with control, a safe hand on it.
 import type { Actions } from './actions';
 import type { ControlLease } from './control';
+import { saveFile } from './csv';
 import type { Data } from './data';
 import { attribute, h, say } from './dom';
 import { wordOf } from './enums';
 import { number, plain, short } from './format';
+import { GroupBar } from './group';
 import { jointDrive } from './joint_drive';
+import { JointTuning } from './joint_tuning';
 import { limbsOf, type TreeJoint } from './limbs';
 import type { Answer, JointInfo } from './protocol';
+import { SiteJog } from './site_jog';
 
 const kFields = [
   'position_rad',
@@ -39,10 +43,15 @@ interface Row {
   free: HTMLElement;
   opener: HTMLButtonElement;
   panel: HTMLElement;
+  tuning: JointTuning | null;
 }
 
 export class Joints {
   private rows: Row[] = [];
+  /** Of `joint.list`, by name: as the run told them last. */
+  private told = new Map<unknown, Record<string, unknown>>();
+  private readonly group: GroupBar;
+  private readonly jog: SiteJog;
   private tree: TreeJoint[] = [];
   private readonly body = h('div', { class: 'limbs' });
   private readonly filter = h('input', {
@@ -59,6 +68,10 @@ export class Joints {
     private readonly actions: Actions,
     private readonly lease: ControlLease,
   ) {
+    this.group = new GroupBar(actions, () =>
+      this.rows.filter((row) => !row.element.hidden).map((row) => row.joint.name),
+    );
+    this.jog = new SiteJog(actions);
     this.element = h(
       'div',
       { class: 'joints' },
@@ -69,8 +82,20 @@ export class Joints {
         actions.button('Halt all', () => ({ do: 'joint.halt' }), {
           title: 'Every joint that is led from here brakes.',
         }),
+        h(
+          'button',
+          {
+            type: 'button',
+            title:
+              'Gains, stiffness and damping as they are now, for robot.toml:\ntandem joint tuning',
+            onclick: () => void this.save(),
+          },
+          'Save gains as TOML',
+        ),
         this.filter,
       ),
+      this.group.element,
+      this.jog.element,
       h(
         'p',
         { class: 'key muted' },
@@ -105,7 +130,8 @@ export class Joints {
   private build(): void {
     const joints = new Map((this.data.hello?.joints ?? []).map((joint) => [joint.name, joint]));
     this.rows = [];
-    const limbs = limbsOf([...joints.keys()], this.tree).map((limb) =>
+    const groups = limbsOf([...joints.keys()], this.tree);
+    const limbs = groups.map((limb) =>
       h(
         'section',
         { class: 'limb', 'aria-label': limb.name },
@@ -121,6 +147,12 @@ export class Joints {
       ),
     );
     this.body.replaceChildren(...limbs);
+    this.group.setRobot(
+      [...joints.keys()],
+      new Map(groups.map((limb) => [limb.name, limb.joints])),
+      this.data.hello?.postures ?? [],
+    );
+    this.jog.setSites(this.data.hello?.sites ?? []);
     this.applyFilter();
     this.allow();
     if (this.element.offsetParent) this.want(true);
@@ -166,6 +198,7 @@ export class Joints {
       opener,
       who,
       free,
+      tuning: null,
       mode: cell('mode'),
       position: cell('position'),
       torque: cell('torque'),
@@ -205,12 +238,14 @@ export class Joints {
     const open = row.panel.hidden;
     row.panel.hidden = !open;
     attribute(row.opener, 'aria-expanded', String(open));
+    row.tuning = null;
     if (!open) return;
     const drive = jointDrive(row.joint, this.actions, () => this.data.latest(row.ids.position_rad));
+    row.tuning = new JointTuning(row.joint, this.actions, this.told.get(row.joint.name) ?? {});
     row.panel.replaceChildren(
       row.who,
       row.free,
-      h('fieldset', { class: 'drive-box', disabled: !this.lease.mine }, drive),
+      h('fieldset', { class: 'drive-box', disabled: !this.lease.mine }, drive, row.tuning.element),
     );
   }
 
@@ -262,10 +297,11 @@ export class Joints {
   private watched(request: string, answer: Answer): void {
     if (request !== 'joint.list' || !answer.ok) return;
     const list = answer.joints as Record<string, unknown>[];
-    const byName = new Map(list.map((joint) => [joint.joint, joint]));
+    this.told = new Map(list.map((joint) => [joint.joint, joint]));
     for (const row of this.rows) {
-      const joint = byName.get(row.joint.name);
+      const joint = this.told.get(row.joint.name);
       if (!joint) continue;
+      row.tuning?.tell(joint);
       const controller = String(joint.controller ?? '');
       row.who.dataset.controller = controller;
       row.free.hidden = controller === '';
@@ -286,6 +322,17 @@ export class Joints {
   private allow(): void {
     for (const box of this.body.querySelectorAll<HTMLFieldSetElement>('.drive-box'))
       box.disabled = !this.lease.mine;
+    this.group.element.disabled = !this.lease.mine;
+    this.jog.element.disabled = !this.lease.mine;
+  }
+
+  private async save(): Promise<void> {
+    const answer = await this.actions.run({ do: 'joint.tuning' });
+    if (!answer.ok) return;
+    const changed = (answer.changed as string[]) ?? [];
+    saveFile(`${this.data.hello?.robot ?? 'robot'}_gains.toml`, 'text/plain', String(answer.toml));
+    const words = changed.length === 0 ? 'nothing was changed' : `changed: ${changed.join(', ')}`;
+    this.actions.tell('tandem joint tuning', `saved; ${words}`);
   }
 
   private applyFilter(): void {
@@ -300,5 +347,6 @@ export class Joints {
       }
       limb.hidden = !any;
     }
+    this.group.count();
   }
 }

@@ -61,10 +61,18 @@ export class LiveSource implements Source {
   }
 
   async description(): Promise<string> {
+    return (await this.get('/robot.urdf')).text();
+  }
+
+  async mesh(path: string): Promise<ArrayBuffer> {
+    return (await this.get(path)).arrayBuffer();
+  }
+
+  private async get(path: string): Promise<Response> {
     const headers = this.token ? { Authorization: `Bearer ${this.token}` } : undefined;
-    const answer = await fetch('/robot.urdf', { headers });
-    if (!answer.ok) throw new Error(`/robot.urdf: ${answer.status} ${await answer.text()}`);
-    return answer.text();
+    const answer = await fetch(path, { headers });
+    if (!answer.ok) throw new Error(`${path}: ${answer.status} ${await answer.text()}`);
+    return answer;
   }
 
   subscribe(revision: number, signals: number[]): void {

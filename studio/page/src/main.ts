@@ -4,6 +4,7 @@ import './theme.css';
 import './style.css';
 import './panels.css';
 import './joints.css';
+import './scene.css';
 import './scope.css';
 import './narrow.css';
 import { Actions } from './actions';

@@ -2,6 +2,7 @@
 import * as THREE from 'three';
 import URDFLoader, { type URDFRobot } from 'urdf-loader';
 import type { TreeJoint } from './limbs';
+import type { Meshes } from './meshes';
 import { type Capsule, describe, planOf, prepare } from './urdf';
 
 export interface Model {
@@ -26,6 +27,24 @@ function rod(capsule: Capsule, material: THREE.Material): THREE.Object3D {
   return mesh;
 }
 
+/** Meshes are named by number, so that the loader changes no name, and never asks for a file. */
+function readMade(doc: Document, meshes: Meshes): URDFRobot {
+  const used: (THREE.Object3D | undefined)[] = [];
+  for (const mesh of Array.from(doc.getElementsByTagName('mesh'))) {
+    used.push(meshes.ready.get(mesh.getAttribute('filename') ?? ''));
+    mesh.setAttribute('filename', String(used.length - 1));
+  }
+  const loader = new URDFLoader();
+  loader.loadMeshCb = (number, _manager, look, done) => {
+    const made = used[Number(number)]?.clone();
+    made?.traverse((one) => {
+      if (one instanceof THREE.Mesh) one.material = look;
+    });
+    done(made ?? new THREE.Group());
+  };
+  return loader.parse(doc);
+}
+
 /**
  * @param material null: the description's colours.
  * @throws Error in words, when the description cannot be read.
@@ -34,14 +53,18 @@ export function buildModel(
   text: string,
   measured: Set<string>,
   material: THREE.Material | null,
+  meshes: Meshes = { ready: new Map(), why: new Map() },
 ): Model {
   const doc = new DOMParser().parseFromString(text, 'text/xml');
   const wrong = doc.getElementsByTagName('parsererror')[0];
   if (wrong) throw new Error('the description is no XML');
   const description = describe(doc);
-  const plan = planOf(description);
-  const names = prepare(doc, plan, measured);
-  const robot = new URDFLoader().parse(doc);
+  const has = (file: string) => meshes.ready.has(file);
+  const plan = planOf(description, (file) =>
+    has(file) ? '' : meshes.why.get(file) || 'it is not here',
+  );
+  const names = prepare(doc, plan, measured, has);
+  const robot = readMade(doc, meshes);
   const plain = new THREE.MeshLambertMaterial({ color: 0x9aa7b5 });
   robot.traverse((one) => {
     if (!(one instanceof THREE.Mesh)) return;

@@ -20,6 +20,12 @@ export interface Foot {
   xyz: number[];
   rpy: number[];
 }
+/** A mesh of the description: where it can be had, or why it cannot. */
+export interface MeshFile {
+  file: string;
+  path: string | null;
+  why: string;
+}
 export interface Hello {
   protocol: number;
   version: string;
@@ -36,6 +42,8 @@ export interface Hello {
   passive: string[];
   feet: Foot[];
   postures: string[];
+  sites?: string[];
+  meshes?: MeshFile[];
   urdf: string;
 }
 export interface Field {
@@ -46,10 +54,23 @@ export interface Field {
   elements: string[] | null;
   count: number;
 }
+/** How the numbers of a source are drawn in 3D: fields NAME, NAME.shown and NAME.text. */
+export interface MarkInfo {
+  name: string;
+  /** points, arrow, line, polygon, text */
+  shape: string;
+  /** The frame of its places: a link, or odom, and where it is in that. */
+  link: string;
+  xyz: number[];
+  rpy: number[];
+  size_m: number;
+  rgba: number[];
+}
 export interface SourceTable {
   name: string;
   first: number;
   fields: Field[];
+  marks?: MarkInfo[];
 }
 export interface RunEvent {
   time_s: number;

@@ -4,9 +4,13 @@ import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Data } from './data';
 import { h, say, theme } from './dom';
 import { seconds } from './format';
+import { Layers } from './layers';
 import type { TreeJoint } from './limbs';
 import { Marks } from './marks3d';
+import { fetchMeshes } from './meshes';
 import { buildModel, type Model } from './model';
+import { NotDrawn } from './not_drawn';
+import { drawsBySoftware } from './webgl';
 
 const kViews: Record<string, [number, number, number]> = {
   free: [1.6, -1.2, 0.7],
@@ -20,15 +24,6 @@ const kSlowEvery_ms = 120;
 const kLookEvery = 10;
 const kPlainName = /^[\w.-]+$/;
 
-/** Whether this browser draws 3D on the processor. */
-function drawsBySoftware(): boolean {
-  const context = document.createElement('canvas').getContext('webgl2');
-  const info = context?.getExtension('WEBGL_debug_renderer_info');
-  const name = info ? String(context?.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
-  context?.getExtension('WEBGL_lose_context')?.loseContext();
-  return /swiftshader|llvmpipe|software/i.test(name);
-}
-
 interface Ids {
   joints: string[];
   position: number[];
@@ -37,19 +32,23 @@ interface Ids {
   com: number[];
   feet: number[];
   forces: number[];
+  layers: number[];
 }
 
 export class Scene {
   readonly canvasBox = h('div', { class: 'canvas', role: 'img', 'aria-label': 'the robot in 3D' });
   private readonly words = h('p', { class: 'scene-words', hidden: true });
   private readonly when = h('p', { class: 'scene-when', hidden: true });
-  private readonly missing = h('details', { class: 'not-drawn', hidden: true });
+  private readonly missing = new NotDrawn();
   readonly element: HTMLElement;
   private renderer: THREE.WebGLRenderer | null = null;
   private readonly scene = new THREE.Scene();
   private readonly camera = new THREE.PerspectiveCamera(40, 1, 0.01, 200);
   private controls: OrbitControls | null = null;
   private readonly marks = new Marks();
+  private readonly layers = new Layers(() => {
+    this.dirty = true;
+  });
   private grid: THREE.GridHelper | null = null;
   private model: Model | null = null;
   private ghost: Model | null = null;
@@ -68,6 +67,7 @@ export class Scene {
   /** Somebody has turned the view. */
   private touched = false;
   private looks = 0;
+  private loads = 0;
   private readonly shows = { ghost: false, forces: true, com: true, frames: false, follow: true };
   private readonly onTree: ((tree: TreeJoint[]) => void)[] = [];
 
@@ -76,8 +76,15 @@ export class Scene {
       'section',
       { class: 'scene', 'aria-label': '3D view' },
       this.toolbar(),
-      h('div', { class: 'canvas-frame' }, this.canvasBox, this.when, this.words),
-      this.missing,
+      h(
+        'div',
+        { class: 'canvas-frame' },
+        this.canvasBox,
+        this.when,
+        this.words,
+        this.layers.legend,
+      ),
+      this.missing.element,
     );
     this.begin();
     data.whenHello((hello) => void this.load(hello.urdf));
@@ -134,7 +141,7 @@ export class Scene {
     const sun = new THREE.DirectionalLight(0xffffff, 1.8);
     sun.position.set(2, -3, 4);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x667788, 1.6), sun);
-    this.scene.add(this.marks.forces, this.marks.com, this.marks.frames);
+    this.scene.add(this.marks.forces, this.marks.com, this.marks.frames, ...this.layers.objects);
     this.camera.up.set(0, 0, 1);
     try {
       this.slow = drawsBySoftware();
@@ -165,26 +172,30 @@ export class Scene {
     for (const old of [this.model, this.ghost]) if (old) this.scene.remove(old.robot);
     this.model = null;
     this.ghost = null;
+    const turn = ++this.loads;
     if (!urdf) return this.say('The run has no description: nothing to draw.');
     try {
       const text = await this.data.source.description();
       const hello = this.data.hello;
+      const meshes = await fetchMeshes(hello?.meshes ?? [], this.data.source);
+      if (turn !== this.loads) return; // a newer hello has come meanwhile
       const measured = new Set([
         ...(hello?.joints.map((one) => one.name) ?? []),
         ...(hello?.passive ?? []),
       ]);
-      this.model = buildModel(text, measured, null);
+      this.model = buildModel(text, measured, null, meshes);
       const see = new THREE.MeshBasicMaterial({
         color: 0x2f7de1,
         transparent: true,
         opacity: 0.28,
         depthWrite: false,
       });
-      this.ghost = buildModel(text, measured, see);
+      this.ghost = buildModel(text, measured, see, meshes);
       this.ghost.robot.visible = this.shows.ghost;
       this.scene.add(this.model.robot, this.ghost.robot);
       this.marks.setFrames(this.model, [...measured]);
-      this.listMissing(this.model.notDrawn);
+      this.layers.setModel(this.model);
+      this.missing.show(this.model.notDrawn);
       this.fitted = false;
       this.say(this.renderer ? '' : (this.words.textContent ?? ''));
       for (const call of this.onTree) call(this.model.tree);
@@ -192,14 +203,6 @@ export class Scene {
       this.say(`The robot cannot be drawn: ${error instanceof Error ? error.message : error}`);
     }
     this.themeChanged();
-  }
-
-  private listMissing(names: string[]): void {
-    this.missing.replaceChildren(
-      h('summary', {}, `not drawn: ${names.length} shapes`),
-      h('ul', {}, ...names.map((name) => h('li', {}, name))),
-    );
-    this.missing.hidden = names.length === 0;
   }
 
   private wire(): void {
@@ -228,6 +231,7 @@ export class Scene {
       com: of('truth', 'center_of_mass_m'),
       feet: of('truth', 'foot_position_m'),
       forces: of('truth', 'foot_force_N'),
+      layers: this.layers.wire(this.data),
     };
     this.held = null;
     this.data.want(
@@ -240,7 +244,8 @@ export class Scene {
   private idsAll(): number[] {
     const ids = this.ids;
     if (!ids) return [];
-    return [...ids.position, ...ids.reference, ...ids.base, ...ids.com, ...ids.feet, ...ids.forces];
+    const { position, reference, base, com, feet, forces, layers } = ids;
+    return [...position, ...reference, ...base, ...com, ...feet, ...forces, ...layers];
   }
 
   private pose(values: number[]): void {
@@ -257,6 +262,7 @@ export class Scene {
     const com = part(ids.com.length);
     const feet = part(ids.feet.length);
     const forces = part(ids.forces.length);
+    const layers = part(ids.layers.length);
     ids.joints.forEach((name, i) => {
       this.model?.set(name, position[i]);
       // A joint without a reference stands where it is.
@@ -275,6 +281,7 @@ export class Scene {
     this.marks.setFeet(feet, this.shows.forces ? forces : forces.map(() => 0));
     this.marks.setCom(com, this.groundHeight(), this.shows.com);
     this.marks.update();
+    this.layers.pose(layers);
     this.render(position.some(Number.isFinite));
   }
 
@@ -387,6 +394,7 @@ export class Scene {
       toggle('forces', 'forces', 'of the ground on the feet: green arrows, 1 m is 1000 N'),
       toggle('mass', 'com', 'the centre of mass: an orange dot, and its place on the ground'),
       toggle('frames', 'frames', 'of base and joints: red x, green y, blue z'),
+      ...this.layers.toggles,
     );
   }
 }

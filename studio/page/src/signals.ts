@@ -114,6 +114,8 @@ export class Catalog {
     this.byName.set(name, signal);
     if (!this.byLower.has(name.toLowerCase())) this.byLower.set(name.toLowerCase(), signal);
     this.byId.set(id, signal);
+    // The bytes and counts of marks are for the 3D view alone.
+    if (source.startsWith('marks/') && field.type === 'u8') return;
     this.entries.push({
       signal,
       name: name.toLowerCase(),

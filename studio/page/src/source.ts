@@ -30,6 +30,8 @@ export interface Source {
   on(listener: Partial<Listener>): void;
   /** Text of the robot's description. */
   description(): Promise<string>;
+  /** Bytes of a mesh, by the path that the hello has. */
+  mesh(path: string): Promise<ArrayBuffer>;
   /** The signals of the next ticks, in this order; the ticks carry the revision. */
   subscribe(revision: number, signals: number[]): void;
   window(signals: number[], from: number, to: number, points: number): Promise<Window>;

@@ -105,8 +105,12 @@ function rods(link: LinkShape, joints: DescribedJoint[]): Capsule[] {
 /**
  * A robot without any visual is drawn as rods between its joints. In others a link whose visuals
  * cannot be had gets its collision shapes, or rods; links without visuals are frames.
+ * @param meshes why a mesh is not drawn; empty: it is.
  */
-export function planOf({ links, joints }: Description): Plan {
+export function planOf(
+  { links, joints }: Description,
+  meshes: (file: string) => string = () => 'it is not here',
+): Plan {
   const plan: Plan = { capsules: [], byCollision: [], notDrawn: [] };
   const bare = links.every((link) => link.visuals.length === 0);
   for (const link of links) {
@@ -115,7 +119,8 @@ export function planOf({ links, joints }: Description): Plan {
       plan.capsules.push(...rods(link, after));
       continue;
     }
-    const missing = link.visuals.filter((shape) => !kDrawn.has(shape.kind));
+    const why = (shape: Shape) => (shape.kind === 'mesh' ? meshes(shape.file) : ' ');
+    const missing = link.visuals.filter((shape) => !kDrawn.has(shape.kind) && why(shape) !== '');
     if (missing.length === 0) continue;
     const drawn = missing.length < link.visuals.length;
     const solid = link.collisions.some((shape) => kDrawn.has(shape.kind));
@@ -130,7 +135,8 @@ export function planOf({ links, joints }: Description): Plan {
       plan.capsules.push(...some);
     }
     for (const shape of missing) {
-      plan.notDrawn.push(`${link.name}: ${shape.kind} ${shape.file}: ${instead}`);
+      const words = why(shape).trim() === '' ? '' : ` (${why(shape)})`;
+      plan.notDrawn.push(`${link.name}: ${shape.kind} ${shape.file}${words}: ${instead}`);
     }
   }
   return plan;
@@ -144,9 +150,14 @@ export interface Prepared {
 
 /**
  * Makes a document that the loader reads without surprises: links and joints have plain names,
- * nothing names a file, and joints that have values of their own follow no other one.
+ * no file is named but meshes that are there, and joints that have values of their own follow no other one.
  */
-export function prepare(doc: Document, plan: Plan, measured: Set<string>): Prepared {
+export function prepare(
+  doc: Document,
+  plan: Plan,
+  measured: Set<string>,
+  hasMesh: (file: string) => boolean = () => false,
+): Prepared {
   const robot = doc.documentElement!;
   const links = new Map<string, string>();
   const joints = new Map<string, string>();
@@ -155,13 +166,13 @@ export function prepare(doc: Document, plan: Plan, measured: Set<string>): Prepa
     const name = link.getAttribute('name') ?? '';
     links.set(name, `link_${links.size}`);
     link.setAttribute('name', links.get(name)!);
-    for (const visual of childrenOf(link, 'visual')) keepPrimitive(doc, visual);
+    for (const visual of childrenOf(link, 'visual')) keepDrawn(doc, visual, hasMesh);
     for (const collision of childrenOf(link, 'collision')) {
       if (chosen.has(name)) {
         const visual = doc.createElement('visual');
         while (collision.firstChild) visual.appendChild(collision.firstChild);
         link.appendChild(visual);
-        keepPrimitive(doc, visual);
+        keepDrawn(doc, visual, () => false);
       }
       link.removeChild(collision);
     }
@@ -199,12 +210,13 @@ function withoutTexture(material: Element): void {
 }
 
 /** Leaves a visual that can be drawn; others go. A capsule becomes a cylinder. */
-function keepPrimitive(doc: Document, visual: Element): void {
+function keepDrawn(doc: Document, visual: Element, hasMesh: (file: string) => boolean): void {
   visual.removeAttribute('name');
   for (const material of childrenOf(visual, 'material')) withoutTexture(material);
   const geometry = childrenOf(visual, 'geometry')[0];
   const shape = geometry ? childrenOf(geometry)[0] : undefined;
-  if (!shape || !kDrawn.has(shape.nodeName)) {
+  const mesh = shape?.nodeName === 'mesh' && hasMesh(shape.getAttribute('filename') ?? '');
+  if (!shape || !(mesh || kDrawn.has(shape.nodeName))) {
     visual.parentNode?.removeChild(visual);
   } else if (shape.nodeName === 'capsule') {
     const cylinder = doc.createElement('cylinder');

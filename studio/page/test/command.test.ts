@@ -1,7 +1,8 @@
 // Command lines that do the same as a request.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { commandLine, shellWord } from '../src/command';
+import { commandLine, commandOfAll, shellWord } from '../src/command';
+import type { Request } from '../src/protocol';
 
 test('requests become command lines', () => {
   const lines: [Parameters<typeof commandLine>[0], string][] = [
@@ -23,6 +24,19 @@ test('requests become command lines', () => {
       'tandem joint move LElbj --to=-0.5 --speed=0.2',
     ],
     [{ do: 'joint.set', joint: 'LElbj', mode: 'idle' }, 'tandem joint set LElbj --mode=idle'],
+    [
+      { do: 'joint.posture', posture: 'ready', joints: ['a', 'b'], speed: 0.1 },
+      'tandem joint posture ready --joints a b --speed=0.1',
+    ],
+    [
+      { do: 'joint.gains', joint: 'a', loop: 'position', kp: 40, anyway: true },
+      'tandem joint gains a position --kp=40 --anyway',
+    ],
+    [
+      { do: 'site.move', site: 'hand', axis: 'z', by: -0.02, axes: 'site', speed: 0.05 },
+      'tandem site move hand z --by=-0.02 --axes=site --speed=0.05',
+    ],
+    [{ do: 'joint.tuning' }, 'tandem joint tuning'],
     [{ do: 'run.stop' }, `tandem ask '{"do":"run.stop"}'`],
   ];
   for (const [request, line] of lines) assert.equal(commandLine(request), line);
@@ -33,5 +47,17 @@ test('names of any kind are one word for a shell', () => {
   assert.equal(
     commandLine({ do: 'joint.stop', joint: '$(reboot)' }),
     "tandem joint stop '$(reboot)'",
+  );
+});
+
+test('several joints are a loop of a shell', () => {
+  const idle = (joint: string): Request => ({ do: 'joint.set', joint, mode: 'idle' });
+  assert.equal(
+    commandOfAll([idle('a'), idle("b'c")]),
+    `for j in a 'b'\\''c'; do tandem joint set "$j" --mode=idle; done`,
+  );
+  assert.equal(
+    commandOfAll([idle('a'), { do: 'joint.home', joint: 'b' }]),
+    'tandem joint set a --mode=idle; tandem joint home b',
   );
 });

@@ -1,11 +1,13 @@
 // Parts of the panels that need no browser: goals, jogging, layouts, lanes, parameters, events.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { colourOf, placesOf, textOf } from '../src/controller_marks';
 import { parsed } from '../src/controllers';
 import { isLane, wordOf } from '../src/enums';
 import { filterEvents } from '../src/events';
 import { Jog } from '../src/jog';
 import { parseGoal } from '../src/joint_drive';
+import { gainOf, unitOf } from '../src/joint_tuning';
 import { stretches } from '../src/lanes';
 import { kPresets, readLayout } from '../src/layout';
 import type { Answer, Hello, JointInfo, Request } from '../src/protocol';
@@ -46,7 +48,7 @@ test('a jog has goals a little ahead, within the limits', () => {
     target_rad: 1,
     speed_rad_s: 0.4,
   });
-  assert.equal(jog.goal(-1).target_rad, 0.9 - 0.2);
+  assert.equal(jog.goal(-1)?.target_rad, 0.9 - 0.2);
 });
 
 test('a goal that was under way at the release is followed by another stop', async () => {
@@ -83,6 +85,30 @@ test('values of parameters are read by their type', () => {
   assert.deepEqual(parsed({ type: 'numbers' }, '[1, 2,3]'), [1, 2, 3]);
   assert.equal(parsed({ type: 'numbers' }, '40'), 40);
   assert.equal(parsed({ type: 'numbers' }, '1, x'), undefined);
+});
+
+test('a gain is a number, its unit that of the joint', () => {
+  assert.equal(gainOf(' 4e3 '), 4000);
+  assert.equal(gainOf(''), undefined);
+  assert.equal(gainOf('4k'), undefined);
+  assert.equal(unitOf('Nm/(rad s)', false), 'Nm/(rad s)');
+  assert.equal(unitOf('Nm/(rad s)', true), 'N/(m s)');
+  assert.equal(unitOf('V/(Nm s)', true), 'V/(N s)');
+  assert.equal(unitOf('Nms²/rad', true), 'Ns²/m');
+});
+
+test('marks are places that are shown, and texts up to their end', () => {
+  const values = [1, 2, 3, 4, 5, 6];
+  assert.deepEqual(
+    placesOf(values, 1).map((one) => one.toArray()),
+    [[1, 2, 3]],
+  );
+  assert.equal(placesOf(values, 9).length, 2);
+  assert.equal(placesOf(values, Number.NaN).length, 0);
+  assert.equal(textOf([0xc3, 0xa4, 0x62, 0, 0x63]), 'äb');
+  assert.equal(textOf([]), '');
+  const look = { name: '', shape: '', link: '', xyz: [], rpy: [], size_m: 0 };
+  assert.equal(colourOf({ ...look, rgba: [1, 0.5, -1, 1] }), 'rgb(255 128 0)');
 });
 
 test('events are found by words in any order', () => {

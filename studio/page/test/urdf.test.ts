@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { DOMParser } from '@xmldom/xmldom';
+import { parseMesh } from '../src/meshes';
 import { describe, planOf, prepare } from '../src/urdf';
 
 const parse = (text: string) =>
@@ -54,8 +55,8 @@ test('meshes become words and other shapes', () => {
   assert.deepEqual(plan.byCollision, ['a']);
   assert.deepEqual(plan.capsules, [{ link: 'b', from: [0, 0, 0], to: [0, 0, 0.5] }]);
   assert.deepEqual(plan.notDrawn, [
-    'a: mesh package://r/a.stl: its collision shape instead',
-    'b: mesh b.dae: a rod instead',
+    'a: mesh package://r/a.stl (it is not here): its collision shape instead',
+    'b: mesh b.dae (it is not here): a rod instead',
   ]);
 });
 
@@ -93,4 +94,30 @@ test('a follower with values of its own follows nobody', () => {
 
 test('what is no robot says so', () => {
   assert.throws(() => describe(parse('<html/>')), /no URDF/);
+});
+
+test('meshes that are there are kept, with their names', () => {
+  const doc = parse(`<robot name="r"><link name="a">
+    <visual><geometry><mesh filename="a.stl" scale="1 1 1"/></geometry></visual>
+    <visual><geometry><mesh filename="b.dae"/></geometry></visual></link></robot>`);
+  const plan = planOf(describe(doc), (file) =>
+    file === 'a.stl' ? '' : 'it is neither STL nor OBJ',
+  );
+  assert.deepEqual(plan.notDrawn, [
+    'a: mesh b.dae (it is neither STL nor OBJ): its other shapes are drawn',
+  ]);
+  prepare(doc, plan, new Set(), (file) => file === 'a.stl');
+  const kept = doc.getElementsByTagName('mesh');
+  assert.equal(kept.length, 1);
+  assert.equal(kept[0].getAttribute('filename'), 'a.stl');
+});
+
+test('meshes are read by their ending, and have a surface', () => {
+  const bytes = (text: string) => new TextEncoder().encode(text).buffer as ArrayBuffer;
+  const corner = (x: number, y: number) => `vertex ${x} ${y} 0\n`;
+  const facet = `facet normal 0 0 1\nouter loop\n${corner(0, 0)}${corner(1, 0)}${corner(0, 1)}endloop\nendfacet\n`;
+  assert.ok(parseMesh('A.STL', bytes(`solid a\n${facet}endsolid a\n`)));
+  assert.ok(parseMesh('a.obj', bytes('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n')));
+  assert.throws(() => parseMesh('a.obj', bytes('# nothing')), /it has no surface/);
+  assert.throws(() => parseMesh('a.dae', bytes('<COLLADA/>')), /neither STL nor OBJ/);
 });

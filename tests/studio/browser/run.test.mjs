@@ -1,11 +1,11 @@
 // The page against real runs: TANDEM=build/release/bin/tandem node --test tests/studio/browser/run.test.mjs
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, afterEach, before, describe, test } from 'node:test';
-import { beginRun, kTandem, lackingRun } from './runs.mjs';
+import { beginRun, kConfig, kTandem, lackingRun } from './runs.mjs';
 import { eventually, leave, openBrowser, openMortalBrowser, openPage, shot } from './support.mjs';
 
 const why = lackingRun();
@@ -95,6 +95,60 @@ describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
     await eventually('it holds', () => !joint(run, 'panda_joint4').moving);
     const place = joint(run, 'panda_joint4').position_rad;
     assert.ok(place > -2.4, `at ${place} rad, far from the goal`);
+  });
+
+  test('Panda: a posture, gains that are taken back and saved, a hand that is led', async () => {
+    const run = await begin('panda/hold.toml');
+    const page = await visit(run.address);
+    await page.waitForSelector('body[data-phase="running"]');
+    run.ask({ do: 'controller.stop', name: 'hold' });
+    run.ask({ do: 'joint.move', joint: 'panda_joint4', target_rad: -2, speed_rad_s: 2 });
+    await page.click('#tab-joints');
+    await page.click('.lease');
+    await page.waitForSelector('body[data-control="yours"]');
+    const kp = () => joint(run, 'panda_joint4').gains.position.kp;
+    const row = page.locator('[data-joint="panda_joint4"]');
+    await row.locator('.opener').click();
+    await row.locator('.tuning summary').click();
+    const gain = row.locator('input[aria-label^="kp of the position loop"]');
+    for (const value of ['3500', '3000']) {
+      await gain.fill(value);
+      await gain.press('Enter');
+      await eventually(`kp is ${value}`, () => kp() === Number(value));
+    }
+    await row.locator('button[aria-label^="undo kp of the position loop"]').click();
+    await eventually('it is taken back', () => kp() === 3500);
+    const [saved] = await Promise.all([
+      page.waitForEvent('download'),
+      page.click('text=Save gains as TOML'),
+    ]);
+    await shot(page, 'studio-gains');
+
+    // The robot of the saved gains: its robot.toml with these tables in place of its own.
+    const folder = join(kScratch, 'tuned');
+    cpSync(join(kConfig, 'panda'), folder, { recursive: true });
+    const file = join(folder, 'robot.toml');
+    const rest = readFileSync(file, 'utf8')
+      .replace(/\[gains\.\w+\]\n(?:.+\n)+/g, '')
+      .replace('names = ["panda_joint4"]\n', '$&gains = "large_panda_joint4"\n');
+    writeFileSync(file, `${rest}\n${readFileSync(await saved.path(), 'utf8')}`);
+    execFileSync(kTandem, ['check', file], { stdio: 'ignore' });
+    assert.match(rest, /gains = "large_panda_joint4"/);
+
+    await page.fill('input[aria-label^="speed of the posture"]', '100');
+    await page.click('button:text-is("Go to posture")');
+    await page.click('dialog .go');
+    const ready = () => Math.abs(joint(run, 'panda_joint4').position_rad + 2.356) < 0.01;
+    await eventually('it is in its posture', ready);
+    await eventually('it stands', () => !joint(run, 'panda_joint4').moving);
+    await page.locator('button:text-is("+z")').hover();
+    await page.mouse.down();
+    await eventually('it is led', () => joint(run, 'panda_joint4').moving);
+    await page.waitForTimeout(300);
+    await page.mouse.up();
+    await eventually('it brakes', () => !joint(run, 'panda_joint4').moving);
+    assert.ok(Math.abs(joint(run, 'panda_joint4').position_rad + 2.356) < 0.2, 'a small way');
+    await leave(page);
   });
 
   test('the emergency stop needs nothing; a reset and a start go on', async () => {

@@ -6,7 +6,7 @@ import { join } from 'node:path';
 import { kPage, lacking } from './support.mjs';
 
 export const kTandem = process.env.TANDEM ?? join(kPage, '../../build/release/bin/tandem');
-const kConfig = join(kPage, '../../config');
+export const kConfig = join(kPage, '../../config');
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 let begun = 0;
 

@@ -32,8 +32,23 @@ function jointsOf(urdf) {
 }
 
 export class PlayedRobot {
-  constructor({ robot, config, hostile = false, passive = [], bus = false, protocol = 1 }) {
+  constructor({
+    robot,
+    config,
+    hostile = false,
+    passive = [],
+    bus = false,
+    protocol = 1,
+    meshes = {},
+  }) {
     this.urdf = readFileSync(`${config}/${robot}/${robot}.urdf`, 'utf8');
+    this.meshes = Object.entries(meshes);
+    // Each stands for the box of a link, from the first on.
+    for (const [file] of this.meshes)
+      this.urdf = this.urdf.replace(
+        /<visual>(?:(?!<mesh)[\s\S])*?<\/visual>/,
+        `<visual><geometry><mesh filename="${file}"/></geometry></visual>`,
+      );
     this.hostile = hostile;
     this.bus = bus;
     this.protocol = protocol;
@@ -52,6 +67,7 @@ export class PlayedRobot {
     }
     this.floating = this.urdf.includes('base_link"') && robot === 'coman';
     this.goal = new Map();
+    this.gains = new Map();
     this.paused = false;
     this.rate = 1;
     this.time = 20;
@@ -209,18 +225,46 @@ export class PlayedRobot {
           ),
         ],
       ],
+      ['marks/squat', this.markFields(f), this.marks()],
     ];
     let id = 0;
     this.values = [];
-    return sources.map(([name, fields]) => {
+    return sources.map(([name, fields, marks]) => {
       const first = id;
       for (const field of fields) {
         for (let i = 0; i < field.count; ++i, ++id) {
           this.values.push((t) => Math.fround(field.value(i, t)));
         }
       }
-      return { name, first, fields: fields.map(({ value, ...rest }) => rest) };
+      return { name, first, fields: fields.map(({ value, ...rest }) => rest), marks };
     });
+  }
+
+  marks() {
+    const look = { link: 'odom', xyz: [0, 0, 0], rpy: [0, 0, 0], size_m: 0.02 };
+    return [
+      { ...look, name: 'push', shape: 'arrow', rgba: [0.9, 0.4, 0.1, 1] },
+      { ...look, name: 'goal', shape: 'points', rgba: [0.1, 0.5, 0.9, 1], xyz: [0, 0, 0.1] },
+      { ...look, name: 'edge', shape: 'polygon', rgba: [0.2, 0.6, 0.2, 1] },
+      { ...look, name: 'words', shape: 'text', size_m: 0.06, rgba: [0.7, 0.1, 0.4, 1] },
+      { ...look, name: 'lost', shape: 'line', link: 'no_such_link', rgba: [1, 0, 0, 1] },
+    ];
+  }
+  markFields(f) {
+    const text = new TextEncoder().encode(this.hostile ? kHostile : 'left foot');
+    const square = [0.2, 0.2, 0.01, -0.2, 0.2, 0.01, -0.2, -0.2, 0.01, 0.2, -0.2, 0.01];
+    const places = (name, list, shown) => [
+      f(name, 'm', 'places in odom', list.length, (i) => list[i]),
+      f(`${name}.shown`, '', 'places that are shown', 1, () => shown, 'u8'),
+    ];
+    return [
+      ...places('push', [0.1, 0, 0.5, 0.4, 0, 0.6], 2),
+      ...places('goal', [0.3, 0.3, 0.4, 9, 9, 9], 1),
+      ...places('edge', square, 4),
+      ...places('words', [0, 0.3, 0.7], 1),
+      f('words.text', '', 'its bytes', 60, (i) => text[i] ?? 0, 'u8'),
+      ...places('lost', [0, 0, 0, 1, 1, 1], 2),
+    ];
   }
 
   hello() {
@@ -243,6 +287,12 @@ export class PlayedRobot {
         ? [{ name: 'l_sole', link: 'l_sole', xyz: [0, 0, 0], rpy: [0, 0, 0] }]
         : [],
       postures: ['home'],
+      sites: ['l_hand'],
+      meshes: this.meshes.map(([file, text], i) => ({
+        file,
+        path: text === null ? null : `/mesh/${i}`,
+        why: text === null ? 'it is not there' : '',
+      })),
       urdf: '/robot.urdf',
     };
   }

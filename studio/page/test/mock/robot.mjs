@@ -130,8 +130,23 @@ export class MockRobot extends PlayedRobot {
         homing_error: '',
         age_cycles: 0,
         feedback: 'fresh',
+        stiffness_Nm_rad: 800,
+        damping_Nms_rad: 46.7,
+        gains: this.gainsOf(joint.name),
       })),
     };
+  }
+  gainsOf(name) {
+    if (!this.gains.has(name)) {
+      const loop = () => ({ kp: 40, ki: 2, kd: 1 });
+      this.gains.set(name, {
+        position: loop(),
+        velocity: loop(),
+        torque: loop(),
+        current: loop(),
+      });
+    }
+    return this.gains.get(name);
   }
   moving(name) {
     const goal = this.goal.get(name);
@@ -245,6 +260,18 @@ export class MockRobot extends PlayedRobot {
       case 'joint.reset':
       case 'joint.recover':
         return done;
+      case 'joint.gains': {
+        if (request.kp > 1000)
+          return no(`${request.joint}: kp = ${request.kp} is beyond 1000`, 'give 0 to 1000');
+        const { kp, ki, kd } = { ...this.gainsOf(request.joint)[request.loop], ...request };
+        this.gainsOf(request.joint)[request.loop] = { kp, ki, kd };
+        return { ...done, note: 'position loop: phase margin 54 deg at 30 rad/s' };
+      }
+      case 'joint.tuning':
+        return { ok: true, toml: '[gains.soft]\n', changed: [] };
+      case 'joint.posture':
+      case 'site.move':
+        return { ...done, joints: request.joints ?? [], duration_s: 1 };
       case 'joint.halt':
         for (const [name] of this.goal) this.stop(name);
         return { ok: true, done: true, joints: [...this.goal.keys()] };

@@ -83,6 +83,7 @@ export async function startMock(options = {}) {
     response.setHeader('Content-Security-Policy', kPolicy);
     response.setHeader('Cache-Control', 'no-store');
     if (path === '/robot.urdf') return response.end(robot.urdf);
+    if (path.startsWith('/mesh/')) return response.end(robot.meshes[Number(path.slice(6))][1]);
     const file = kFiles[path] && join(dist, kFiles[path]);
     if (!file || !existsSync(file)) return response.writeHead(404).end(`${path} is not here`);
     response.setHeader('Content-Type', kTypes[file.split('.').at(-1)]);

@@ -1,0 +1,143 @@
+// What several joints do at once: those of a limb, or those that the filter shows.
+import type { Actions } from './actions';
+import { commandLine, commandOfAll } from './command';
+import { confirmed } from './confirm';
+import { h, say } from './dom';
+import type { Request } from './protocol';
+
+const kShown = 'shown';
+const kCareful_percent = 10;
+
+interface Act {
+  label: string;
+  /** What it does with each joint. */
+  each(joint: string): Request;
+  title: string;
+  /** The question before it: where joints would move, or fall. */
+  ask?: string;
+}
+
+const kActs: Act[] = [
+  {
+    label: 'Idle',
+    each: (joint) => ({ do: 'joint.set', joint, mode: 'idle' }),
+    title: 'No torque: they may fall.',
+    ask: 'lose their torque, and may fall',
+  },
+  {
+    label: 'Hold',
+    each: (joint) => ({ do: 'joint.set', joint, mode: 'position' }),
+    title: 'Position control where they are.',
+  },
+  {
+    label: 'Home',
+    each: (joint) => ({ do: 'joint.home', joint }),
+    title: 'Their drives look for their places.',
+    ask: 'move until their drives have found their places',
+  },
+];
+
+export class GroupBar {
+  private limbs = new Map<string, string[]>();
+  private all: string[] = [];
+  private readonly which = h('select', {
+    'aria-label': 'group of joints',
+    onchange: () => this.count(),
+  });
+  private readonly size = h('span', { class: 'muted', role: 'status' });
+  private readonly posture = h('select', { 'aria-label': 'posture' });
+  private readonly speed = h('input', {
+    type: 'number',
+    class: 'short',
+    min: 1,
+    max: 100,
+    value: kCareful_percent,
+    'aria-label': 'speed of the posture [% of the limits]',
+  });
+  private readonly way: HTMLElement;
+  readonly element: HTMLFieldSetElement;
+
+  /** @param shown the joints that the filter leaves. */
+  constructor(
+    private readonly actions: Actions,
+    private readonly shown: () => string[],
+  ) {
+    this.way = h(
+      'span',
+      { class: 'group-posture' },
+      h('label', {}, 'posture ', this.posture),
+      h('label', {}, 'at ', this.speed, ' %'),
+      this.button('Go to posture', 'Each by its own path; all arrive together.', () => this.go()),
+    );
+    this.element = h(
+      'fieldset',
+      { class: 'toolbar group-bar', disabled: true },
+      h('legend', {}, 'Several joints'),
+      this.which,
+      this.size,
+      ...kActs.map((act) => this.button(act.label, act.title, () => this.act(act))),
+      this.way,
+    );
+  }
+
+  /** Whose joints they are. */
+  setRobot(all: string[], limbs: Map<string, string[]>, postures: string[]): void {
+    this.all = all;
+    this.limbs = limbs;
+    const before = this.which.value;
+    this.which.replaceChildren(
+      h('option', { value: kShown }, 'all that are shown'),
+      ...[...limbs.keys()].map((name) => h('option', { value: `limb ${name}` }, name)),
+    );
+    if (before !== '') this.which.value = before;
+    if (this.which.selectedIndex < 0) this.which.value = kShown;
+    this.posture.replaceChildren(...postures.map((name) => h('option', { value: name }, name)));
+    this.way.hidden = postures.length === 0;
+    this.count();
+  }
+
+  /** The filter shows others. */
+  count(): void {
+    const count = this.names().length;
+    say(this.size, count === 1 ? '1 joint' : `${count} joints`);
+  }
+
+  private names(): string[] {
+    const { value } = this.which;
+    return value === kShown ? this.shown() : (this.limbs.get(value.slice('limb '.length)) ?? []);
+  }
+
+  private button(label: string, title: string, press: () => Promise<void>): HTMLElement {
+    return h(
+      'button',
+      {
+        type: 'button',
+        title,
+        'aria-label': `${label}: these joints`,
+        onclick: () => void press(),
+      },
+      label,
+    );
+  }
+
+  private async act(act: Act): Promise<void> {
+    const requests = this.names().map((name) => act.each(name));
+    if (requests.length === 0) return;
+    const words = `${requests.length} joints ${act.ask}: ${this.names().join(', ')}.`;
+    if (act.ask && !(await confirmed(words, commandOfAll(requests), act.label))) return;
+    await this.actions.runAll(requests);
+  }
+
+  private async go(): Promise<void> {
+    const joints = this.names();
+    if (joints.length === 0) return;
+    const percent = Math.min(100, Math.max(1, Number(this.speed.value) || kCareful_percent));
+    const request: Request = { do: 'joint.posture', posture: this.posture.value };
+    if (joints.length < this.all.length) request.joints = joints;
+    request.speed = percent / 100;
+    const words = `${joints.length} joints move to the posture ${this.posture.value}, the slowest at ${percent} % of its limit: ${joints.join(', ')}.`;
+    if (await confirmed(words, commandLine(request), 'Go to posture')) {
+      await this.actions.run(request);
+    }
+  }
+}

@@ -1,0 +1,97 @@
+// Leads a site of the robot by buttons that are held: along and about the axes of base or site.
+import type { Actions } from './actions';
+import { h } from './dom';
+import { Held, holdToMove, kAhead_s } from './jog';
+
+interface Axis {
+  name: string;
+  label: string;
+  turns: boolean;
+}
+const kAxes: Axis[] = [
+  { name: 'x', label: 'x', turns: false },
+  { name: 'y', label: 'y', turns: false },
+  { name: 'z', label: 'z', turns: false },
+  { name: 'roll', label: 'roll', turns: true },
+  { name: 'pitch', label: 'pitch', turns: true },
+  { name: 'yaw', label: 'yaw', turns: true },
+];
+const kMost_m_s = 0.2;
+/** Of a turn, for each m/s of the speed: what a hand's length makes of it. */
+const kTurn_rad_m = 4;
+
+export class SiteJog {
+  private readonly site = h('select', { 'aria-label': 'site to lead' });
+  private readonly axes = h(
+    'select',
+    { 'aria-label': 'axes' },
+    h('option', { value: 'base' }, 'base'),
+    h('option', { value: 'site' }, 'site'),
+  );
+  private readonly speed = h('input', {
+    type: 'number',
+    class: 'short',
+    min: 0.005,
+    max: kMost_m_s,
+    step: 0.005,
+    value: 0.05,
+    'aria-label': 'speed of the site [m/s]',
+  });
+  readonly element: HTMLFieldSetElement;
+
+  constructor(private readonly actions: Actions) {
+    this.element = h(
+      'fieldset',
+      { class: 'toolbar site-jog', disabled: true, hidden: true },
+      h('legend', {}, 'Lead a site'),
+      this.site,
+      h('label', {}, 'axes of the ', this.axes),
+      h('label', {}, 'at ', this.speed, ' m/s'),
+      ...kAxes.map((axis) =>
+        h(
+          'span',
+          { class: 'group', role: 'group', 'aria-label': `hold to lead: ${axis.name}` },
+          ...([-1, 1] as const).map((direction) => this.button(axis, direction)),
+        ),
+      ),
+    );
+  }
+
+  setSites(names: string[]): void {
+    this.site.replaceChildren(...names.map((name) => h('option', { value: name }, name)));
+    this.element.hidden = names.length === 0;
+  }
+
+  private button(axis: Axis, direction: 1 | -1): HTMLElement {
+    const sign = direction > 0 ? '+' : '−';
+    const button = h(
+      'button',
+      {
+        type: 'button',
+        class: 'hold short-hold',
+        'aria-label': `${sign}${axis.label}: hold to lead the site`,
+        title: `Moves while it is held, goals at most ${kAhead_s} s ahead; stops at release.`,
+      },
+      `${sign}${axis.label}`,
+    );
+    const held = new Held(
+      (request) => this.actions.source.ask(request),
+      (way) => {
+        const along = Math.min(kMost_m_s, Math.max(0.005, Number(this.speed.value) || 0.05));
+        const speed = axis.turns ? kTurn_rad_m * along : along;
+        return {
+          do: 'site.move',
+          site: this.site.value,
+          axis: axis.name,
+          by: Number((way * speed * kAhead_s).toFixed(6)),
+          axes: this.axes.value,
+          speed: Number(speed.toFixed(6)),
+        };
+      },
+      { do: 'joint.halt' },
+      (request, answer) => this.actions.show(request, answer),
+    );
+    holdToMove(button, held, direction);
+    return button;
+  }
+}

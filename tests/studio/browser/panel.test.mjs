@@ -1,0 +1,126 @@
+// Groups of joints, gains, and what the 3D view has: node --test tests/studio/browser/panel.test.mjs
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, afterEach, before, describe, test } from 'node:test';
+import { pathToFileURL } from 'node:url';
+import {
+  eventually,
+  kPage,
+  lacking,
+  leave,
+  openBrowser,
+  openPage,
+  shot,
+  violations,
+} from './support.mjs';
+
+const why = lacking();
+const kScratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
+
+describe('the joints and the 3D view of the studio', {
+  skip: why || false,
+  timeout: 240000,
+}, () => {
+  let browser;
+  let startMock;
+  const mocks = [];
+
+  before(async () => {
+    execFileSync(process.execPath, [join(kPage, 'build.mjs'), '--out', kScratch]);
+    ({ startMock } = await import(pathToFileURL(join(kPage, 'test/mock/server.mjs'))));
+    browser = await openBrowser();
+  });
+  after(async () => {
+    await browser?.close();
+    rmSync(kScratch, { recursive: true, force: true });
+  });
+
+  afterEach(async () => {
+    for (const mock of mocks.splice(0)) await mock.stop();
+  });
+
+  const play = async (options = {}) => {
+    const mock = await startMock({ robot: 'coman', dist: kScratch, ...options });
+    mocks.push(mock);
+    return mock;
+  };
+  const visit = (address, options) => openPage(browser, address, options);
+  const asked = (mock, name) => mock.robot.requests.filter((one) => one.do === name);
+  const until = (page, text) =>
+    page.waitForFunction((words) => document.body.textContent.includes(words), text);
+
+  test('several joints at once: asked before, the command shown, gains taken back', async () => {
+    const mock = await play();
+    mock.robot.active = false;
+    const page = await visit(mock.address);
+    await page.click('#tab-joints');
+    await page.click('.lease');
+    await page.waitForSelector('body[data-control="yours"]');
+    await page.selectOption('select[aria-label="group of joints"]', { label: 'left leg' });
+    await page.click('button:text-is("Idle") >> nth=0');
+    await page.waitForSelector('dialog[open]');
+    assert.deepEqual(await violations(page), []);
+    await page.keyboard.press('Escape');
+    await page.waitForSelector('dialog', { state: 'detached' });
+    assert.equal(asked(mock, 'joint.set').length, 0, 'nothing is asked for before the answer');
+    await page.click('button:text-is("Go to posture")');
+    await page.click('dialog .go');
+    await eventually('the posture', () => asked(mock, 'joint.posture').length === 1);
+    const [posture] = asked(mock, 'joint.posture');
+    assert.equal(posture.posture, 'home');
+    assert.ok(posture.joints.length > 3 && posture.joints.every((name) => name.startsWith('L')));
+    await until(page, 'tandem joint posture home --joints L');
+    await page.fill('input[aria-label="filter joints"]', 'elb');
+    await page.selectOption('select[aria-label="group of joints"]', 'shown');
+    await page.click('button:text-is("Hold") >> nth=0');
+    await until(page, '2 of 2 done');
+    const row = page.locator('[data-joint="LElbj"]');
+    await row.locator('.opener').click();
+    await row.locator('.tuning summary').click();
+    const gain = row.locator('input[aria-label^="kp of the position loop"]');
+    const undo = row.locator('button[aria-label^="undo kp of the position loop"]');
+    await gain.fill('2000');
+    await gain.press('Enter');
+    await until(page, 'kp = 2000 is beyond 1000 – give 0 to 1000');
+    await gain.fill('55');
+    await gain.press('Enter');
+    await until(page, 'tandem joint gains LElbj position --kp=55');
+    await undo.click();
+    await eventually('40 again', () => mock.robot.gainsOf('LElbj').position.kp === 40);
+    await leave(page);
+  });
+
+  test('meshes that are there are drawn; a line says which are not', async () => {
+    const corners = ['0 0 0', '0.2 0 0', '0 0.2 0'];
+    const mesh = `solid a\nfacet normal 0 0 1\nouter loop\n${corners.map((at) => `vertex ${at}\n`).join('')}endloop\nendfacet\nendsolid a\n`;
+    const meshes = { 'a.stl': mesh, 'b.obj': 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' };
+    const mock = await play({ meshes: { ...meshes, 'c.stl': null, 'd.stl': 'solid d' } });
+    const page = await visit(mock.address);
+    await until(page, 'not drawn: 2 shapes');
+    const words = await page.textContent('.not-drawn');
+    assert.match(words, /mesh c\.stl \(it is not there\).*mesh d\.stl \(it cannot be read\)/s);
+    await leave(page);
+  });
+
+  test('what controllers draw is in the scene, named, and can be switched off', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    // One of the five is in a frame that the robot lacks.
+    await page.waitForSelector('.scene-legend[data-shown="4"]');
+    assert.match(await page.textContent('.scene-legend'), /squat: push.*squat: goal/s);
+    await shot(page, 'studio-marks');
+    const pixels = () => page.locator('.canvas canvas').screenshot();
+    await page.locator('.clock-body button:text-is("Pause")').click();
+    await page.waitForSelector('body[data-paused="true"]');
+    await page.waitForTimeout(300);
+    const before = await pixels();
+    await page.click('label:text-is("marks")');
+    await page.waitForSelector('.scene-legend', { state: 'hidden' });
+    await page.waitForTimeout(300);
+    assert.ok(!before.equals(await pixels()), 'the picture is another one');
+    await leave(page);
+  });
+});
