@@ -12,6 +12,7 @@
 #include "report/close_passive.hpp"
 #include "report/gnuplot.hpp"
 #include "report/page.hpp"
+#include "report/recorded_page.hpp"
 #include "report/replay.hpp"
 #include "report/run_facts.hpp"
 #include "report/run_figures.hpp"
@@ -195,8 +196,45 @@ Result<std::vector<Figure>> draw_all(const RunData& run, const OtherRuns& others
     for (Figure& figure : figures) figure.x_label += (figure.x_label.empty() ? "" : "; ") + letters;
   }
   for (Figure& figure : figures)
-    if (!figure.equal_axes) break_at_gaps(figure);  // all but the posture are over time
+    if (is_over_time(figure)) break_at_gaps(figure);  // all but the posture are
   return figures;
+}
+
+/// What the page says of the robot before its data come.
+studio::RunDescription description_of(const RunData& run) {
+  return {.robot = run.robot,
+          .urdf = log::value_of(run.info.configuration, run.robot.model.urdf),
+          .version = run.info.version,
+          .experiment = std::filesystem::path(run.path).filename().string(),
+          .run = {},
+          .simulated = run.info.hal == "sim",
+          .period_ns = run.info.period_ns};
+}
+
+/// The page, with plots of all logs where the program has the studio's, else with pictures.
+Status write_report(const Page& page, const RunData& run, const OtherRuns& others,
+                    const std::vector<Figure>& figures, const std::string& folder) {
+  if (!has_studio_page()) return write_page(page, figures, folder);
+  std::vector<log::LogFile> files;
+  std::vector<RecordedLog> logs;
+  files.reserve(1 + others.size());
+  for (std::size_t i = 0; i <= others.size(); ++i) {
+    const RunData& one = i == 0 ? run : *others[i - 1];
+    Result<log::LogFile> file = log::LogFile::open(one.path);
+    if (!file) return std::unexpected(file.error());
+    files.push_back(std::move(*file));
+    logs.push_back({.file = &files.back(),
+                    .prefix = i == 0 ? "" : std::string(1, static_cast<char>('A' + i)) + "/",
+                    .later_s = one.drawn_later_s,
+                    .slower = one.drawn_slower});
+  }
+  const auto recording = Recording::read(description_of(run), logs, figures);
+  if (!recording) return std::unexpected(recording.error());
+  std::vector<Figure> pictures = figures;
+  std::erase_if(pictures, [](const Figure& figure) { return is_over_time(figure); });
+  const auto html = recorded_page(page, pictures, folder, *recording);
+  if (!html) return std::unexpected(html.error());
+  return write_html(*html, folder);
 }
 
 }  // namespace
@@ -234,7 +272,9 @@ Result<ReportFiles> make_report(const std::string& log, const std::vector<std::s
   const std::vector<Figure>& figures = *drawn;
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
   const Page page = *beside ? parallel_page(*run, *others.front()) : page_of(*run, others, replays);
-  if (const Status s = write_page(page, figures, folder); !s) {
+  if (const Status s = write_report(page, *run, beside->has_value() ? OtherRuns() : others, figures,
+                                    folder);
+      !s) {
     return std::unexpected(s.error());
   }
   files.page = folder + "/report.html";

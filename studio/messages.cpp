@@ -77,13 +77,13 @@ Json field_json(const SourceField& field) {
 
 }  // namespace
 
-std::string hello_text(const RunDescription& run, const History& history) {
+std::string hello_text(const RunDescription& run, std::span<const std::uint64_t> reach) {
   const hal::RobotConfig& robot = run.robot;
   const double period_s = 1e-9 * static_cast<double>(run.period_ns);
   Json joints = Json::array(), postures = Json::array(), reaches = Json::array();
   for (const hal::JointConfig& joint : robot.joints) joints.push_back(joint_json(joint));
   for (const auto& posture : robot.postures) postures.push_back(posture.name);
-  for (const std::uint64_t cycles : history.capacity_cycles()) {
+  for (const std::uint64_t cycles : reach) {
     reaches.push_back(period_s * static_cast<double>(cycles));
   }
   const bool ground = robot.contact.stiffness_N_m > 0.0;

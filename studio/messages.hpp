@@ -30,7 +30,9 @@ struct RunDescription {
   std::int64_t period_ns = 1'000'000;
 };
 
-[[nodiscard]] std::string hello_text(const RunDescription& run, const History& history);
+/// @param reach  cycles that each level of the history can hold; empty: there is none
+[[nodiscard]] std::string hello_text(const RunDescription& run,
+                                     std::span<const std::uint64_t> reach);
 [[nodiscard]] std::string signals_text(std::uint32_t revision, const SignalTable& table);
 [[nodiscard]] std::string events_text(std::span<const Event> events);
 [[nodiscard]] std::string error_text(std::string_view message, std::string_view hint);

@@ -1,10 +1,11 @@
-// The page: joins its parts with the run that serves it.
+// The page: joins its parts with the run that serves it, or with the recording that it holds.
 import 'uplot/dist/uPlot.min.css';
 import './theme.css';
 import './style.css';
 import './panels.css';
 import './joints.css';
 import './scope.css';
+import './report.css';
 import './narrow.css';
 import { Actions } from './actions';
 import { ClockPanel } from './clock';
@@ -19,6 +20,8 @@ import { Joints } from './joints';
 import { LiveSource } from './live';
 import { Plots } from './plots';
 import { kProtocol } from './protocol';
+import { recordingIn } from './recorded';
+import { startRecorded } from './recorded_page';
 import { Scene } from './scene';
 import { Scope } from './scope';
 import { Tabs } from './tabs';
@@ -151,4 +154,6 @@ function start(): void {
   requestAnimationFrame(frame);
 }
 
-start();
+const recording = recordingIn(document);
+if (recording) startRecorded(recording, themeButton);
+else start();

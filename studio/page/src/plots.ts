@@ -74,7 +74,9 @@ export class Plots implements PaneOwner {
         this.button('+', () => time.zoom(0.5), 'zoom in'),
         this.button('◀', () => time.pan(-0.4), 'earlier'),
         this.button('▶', () => time.pan(0.4), 'later'),
-        this.now,
+        this.data.source.live
+          ? this.now
+          : this.button('Whole log', () => time.follow(), 'shows all of it'),
         this.statisticsToggle(),
         this.presets(),
         this.button('Save layout', () => this.export(), 'saves the layout as a file'),

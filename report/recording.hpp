@@ -1,0 +1,57 @@
+// Logs as the studio's page shows them: every number as a signal, with the names that a live run
+// gives it, over equal spans of time; events; what the figures show. docs/studio.md says what is
+// lost.
+// Layer: report.  Thread: non-RT only.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+#include "log/log_file.hpp"
+#include "report/figure.hpp"
+#include "report/spans.hpp"
+#include "studio/messages.hpp"
+#include "studio/signal_table.hpp"
+
+namespace tandem::report {
+
+/// A log of the page.
+struct RecordedLog {
+  const log::LogFile* file = nullptr;
+  std::string prefix;    ///< before the names of its sources: "B/"; empty: the first log
+  double later_s = 0.0;  ///< added to its times, after they were
+  double slower = 1.0;   ///< multiplied by this
+};
+
+/// Events that the page has, of each log: the first ones.
+inline constexpr std::size_t kMostRecordedEvents = 2000;
+
+class Recording {
+ public:
+  /// Reads every number of `logs`; the first one is `run`'s.
+  /// @param figures  those over time become signals, too: "report/joint_position.measured"
+  /// Errors: LogFile::visit()'s; a log without a number that has a time.
+  [[nodiscard]] static Result<Recording> read(const studio::RunDescription& run,
+                                              const std::vector<RecordedLog>& logs,
+                                              const std::vector<Figure>& figures);
+
+  /// What the page unpacks: JSON that is safe within an HTML script element.
+  struct Text {
+    std::string json;
+    Grid grid;  ///< that it has
+  };
+  /// @param most  bytes: there are as many rows as fit
+  [[nodiscard]] Text text(std::size_t most) const;
+
+ private:
+  Recording(const Grid& grid, studio::SignalTable table)
+      : table_(std::move(table)), spans_(grid, table_.size()) {}
+
+  studio::SignalTable table_;
+  Spans spans_;
+  std::string head_;  // JSON of all but grid, codes and data
+};
+
+}  // namespace tandem::report
