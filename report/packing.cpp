@@ -72,7 +72,8 @@ void append_planes(const std::vector<std::uint32_t>& numbers, int bytes, std::st
   }
 }
 
-void append_codes(const std::vector<SpanRow>& rows, const Codes& codes, bool pairs, std::string& out) {
+void append_codes(const std::vector<SpanRow>& rows, const Codes& codes, bool pairs,
+                  std::string& out) {
   const int bits = 8 * codes.bytes;
   const std::uint32_t mask = (1U << bits) - 1U;
   const auto code_of = [&](float value) {
@@ -98,8 +99,8 @@ std::string deflated(std::string_view raw) {
   const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
       libdeflate_alloc_compressor(kLevel), &libdeflate_free_compressor);
   std::string out(libdeflate_zlib_compress_bound(compressor.get(), raw.size()), '\0');
-  out.resize(libdeflate_zlib_compress(compressor.get(), raw.data(), raw.size(), out.data(),
-                                      out.size()));
+  out.resize(
+      libdeflate_zlib_compress(compressor.get(), raw.data(), raw.size(), out.data(), out.size()));
   return out;
 }
 
@@ -135,7 +136,8 @@ std::string base64(std::span<const std::byte> bytes) {
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
     std::uint32_t three = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      three = three << 8U | (i + k < bytes.size() ? std::to_integer<std::uint32_t>(bytes[i + k]) : 0U);
+      three =
+          three << 8U | (i + k < bytes.size() ? std::to_integer<std::uint32_t>(bytes[i + k]) : 0U);
     }
     for (std::size_t k = 0; k < 4; ++k) {
       out.push_back(i + k > bytes.size() ? '=' : kDigits[three >> (18U - 6U * k) & 63U]);

@@ -4,8 +4,8 @@
 // own least and largest number. Of each row there is the code of the least number, less that of the
 // row before, and, where a row is more than one cycle, how much larger the code of its largest is;
 // first all low bytes, then all higher ones. Negative differences are folded between the positive
-// ones (0, -1, 1, -2, …), so that high bytes are mostly 0. All signals together are one zlib stream.
-// Layer: report.  Thread: non-RT only.
+// ones (0, -1, 1, -2, …), so that high bytes are mostly 0. All signals together are one zlib
+// stream. Layer: report.  Thread: non-RT only.
 #pragma once
 
 #include <cstddef>

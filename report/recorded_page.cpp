@@ -60,8 +60,7 @@ Result<std::string> recorded_page(Page page, std::span<const Figure> pictures,
   const Result<std::string> bare = page_content(page, pictures, folder);
   if (!bare) return bare;
   const std::size_t taken = script.size() + style.size() + bare->size() + kMostFrame;
-  const Recording::Text data =
-      recording.text(kMostReportBytes - std::min(taken, kMostReportBytes));
+  const Recording::Text data = recording.text(kMostReportBytes - std::min(taken, kMostReportBytes));
   page.facts.emplace_back("plots show", resolution_text(data.grid));
   page.facts.emplace_back("their numbers have",
                           "16 bits between a signal's own least and largest; whole numbers all");

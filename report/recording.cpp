@@ -105,9 +105,9 @@ Status add_log(const RecordedLog& log, const studio::SignalTable& table, Spans& 
     const std::string name = source_name(log.prefix, topic.name);
     const auto source = std::ranges::find(table.sources(), name, &studio::Source::name);
     if (!has_numbers(topic) || source == table.sources().end()) continue;
-    rows.emplace(topic.name,
-                 RowOfTopic(table, static_cast<std::size_t>(source - table.sources().begin()),
-                            spans));
+    rows.emplace(
+        topic.name,
+        RowOfTopic(table, static_cast<std::size_t>(source - table.sources().begin()), spans));
   }
   const Status read = log.file->visit([&](const auto& reader, const auto& view) -> Status {
     const auto found = rows.find(reader.channels().at(view.channel).topic);
@@ -259,9 +259,8 @@ std::string without_tags(std::string_view json) {
 
 }  // namespace
 
-Result<Recording> Recording::read(const studio::RunDescription& run,
-                                  const std::vector<RecordedLog>& logs,
-                                  const std::vector<Figure>& figures) {
+Result<Recording> Recording::read(const RecordingParts& parts) {
+  const std::vector<RecordedLog>& logs = parts.logs;
   studio::SignalTable table(logs.front().file->info());
   for (const RecordedLog& log : logs) {
     for (const log::LoggedTopic& topic : log.file->topics()) {
@@ -272,7 +271,7 @@ Result<Recording> Recording::read(const studio::RunDescription& run,
   }
   Json shown = Json::array();
   std::vector<std::pair<const Figure*, studio::SignalId>> curves;
-  for (const Figure& figure : figures) {
+  for (const Figure& figure : parts.figures) {
     if (!is_over_time(figure)) continue;
     std::vector<std::string> series = figure.signals;
     if (series.empty()) {
@@ -299,9 +298,10 @@ Result<Recording> Recording::read(const studio::RunDescription& run,
   std::ranges::stable_sort(events, {}, &Event::time_s);
   for (const auto& [figure, first] : curves) add_curves(*figure, first, made.spans_);
   made.head_ = without_tags(fmt::format(
-      R"("hello":{},"signals":{},"events":{},"urdf":{},"figures":{},"logs":{},)",
-      studio::hello_text(run, {}), studio::signals_text(1, made.table_),
-      studio::events_text(events), json_text(run.urdf), json_text(shown), json_text(names)));
+      R"("hello":{},"signals":{},"events":{},"urdf":{},"figures":{},"logs":{},"at_s":{},)",
+      studio::hello_text(parts.run, {}), studio::signals_text(1, made.table_),
+      studio::events_text(events), json_text(parts.run.urdf), json_text(shown), json_text(names),
+      parts.at_s));
   return made;
 }
 

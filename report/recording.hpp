@@ -25,17 +25,23 @@ struct RecordedLog {
   double slower = 1.0;   ///< multiplied by this
 };
 
+/// What is recorded.
+struct RecordingParts {
+  studio::RunDescription run;  ///< of the first log
+  std::vector<RecordedLog> logs;
+  std::vector<Figure> figures{};  ///< those over time become signals, too:
+                                  ///< "report/joint_position.measured"
+  double at_s = 0.0;              ///< the time that is shown at first
+};
+
 /// Events that the page has, of each log: the first ones.
 inline constexpr std::size_t kMostRecordedEvents = 2000;
 
 class Recording {
  public:
-  /// Reads every number of `logs`; the first one is `run`'s.
-  /// @param figures  those over time become signals, too: "report/joint_position.measured"
+  /// Reads every number of the logs. @pre there is one
   /// Errors: LogFile::visit()'s; a log without a number that has a time.
-  [[nodiscard]] static Result<Recording> read(const studio::RunDescription& run,
-                                              const std::vector<RecordedLog>& logs,
-                                              const std::vector<Figure>& figures);
+  [[nodiscard]] static Result<Recording> read(const RecordingParts& parts);
 
   /// What the page unpacks: JSON that is safe within an HTML script element.
   struct Text {

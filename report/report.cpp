@@ -228,7 +228,8 @@ Status write_report(const Page& page, const RunData& run, const OtherRuns& other
                     .later_s = one.drawn_later_s,
                     .slower = one.drawn_slower});
   }
-  const auto recording = Recording::read(description_of(run), logs, figures);
+  const auto recording = Recording::read(
+      {.run = description_of(run), .logs = logs, .figures = figures, .at_s = run.time_s.front()});
   if (!recording) return std::unexpected(recording.error());
   std::vector<Figure> pictures = figures;
   std::erase_if(pictures, [](const Figure& figure) { return is_over_time(figure); });
@@ -272,8 +273,8 @@ Result<ReportFiles> make_report(const std::string& log, const std::vector<std::s
   const std::vector<Figure>& figures = *drawn;
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
   const Page page = *beside ? parallel_page(*run, *others.front()) : page_of(*run, others, replays);
-  if (const Status s = write_report(page, *run, beside->has_value() ? OtherRuns() : others, figures,
-                                    folder);
+  if (const Status s =
+          write_report(page, *run, beside->has_value() ? OtherRuns() : others, figures, folder);
       !s) {
     return std::unexpected(s.error());
   }

@@ -61,7 +61,7 @@ export class Header {
       h(
         'div',
         { class: 'facts' },
-        this.phase,
+        data.source.live && this.phase,
         this.time,
         this.rate,
         this.measured,

@@ -16,6 +16,11 @@ export interface LegendOwner {
 
 export const kPaletteSize = 8;
 
+/** Without the name of the report's figure, whose title says it. */
+function shortLabel(series: Series): string {
+  return labelOf(series).replace(/^report\/[^.]*\./, '');
+}
+
 export class Legend {
   readonly element = h('table', { class: 'legend' });
   private cells: { value: HTMLElement; figures: HTMLElement[] }[] = [];
@@ -70,7 +75,7 @@ export class Legend {
         h(
           'th',
           { scope: 'row', title: doc },
-          known ? labelOf(series) : `${labelOf(series)} (not in this run)`,
+          known ? shortLabel(series) : `${labelOf(series)} (not in this run)`,
         ),
         value,
         h('td', {}, unitOf(series, this.data.catalog)),

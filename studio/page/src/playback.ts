@@ -51,7 +51,7 @@ export class Playback {
     data.time.whole = { from: start, to: end };
     data.time.follow();
     data.time.on(() => this.follow());
-    data.whenCatalog(() => data.time.select(start));
+    data.whenCatalog(() => data.time.select(source.first));
     this.show();
   }
 

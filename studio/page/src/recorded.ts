@@ -20,6 +20,8 @@ export interface Recording {
   urdf: string;
   figures: { title: string; series: string[] }[];
   logs: { prefix: string; path: string }[];
+  /** The time that is shown at first. */
+  at_s: number;
   grid: Grid;
   codes: Code[];
   data: string;
@@ -113,9 +115,12 @@ export class RecordedSource implements Source {
   private time: number;
 
   constructor(private readonly recording: Recording) {
-    this.time = recording.grid.start_s;
+    this.time = recording.at_s;
   }
 
+  get first(): number {
+    return this.recording.at_s;
+  }
   get start(): number {
     return this.recording.grid.start_s;
   }

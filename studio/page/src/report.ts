@@ -18,6 +18,7 @@ export class Report implements PaneOwner {
   ) {
     article.querySelector('.figures')?.before(this.box);
     this.element = article;
+    article.tabIndex = 0;
     data.whenCatalog(() => this.build());
     data.time.on(() => {
       this.dirty = true;
