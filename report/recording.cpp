@@ -12,6 +12,7 @@
 #include "apps/text/console.hpp"
 #include "log/mcap_reader.hpp"
 #include "log/schema.hpp"
+#include "log/unmeasured.hpp"
 #include "report/packing.hpp"
 
 namespace tandem::report {
@@ -51,8 +52,14 @@ std::size_t held_rows(double step_s, const Grid& grid, bool exact) {
 /// The numbers of one topic, row by row: a row is handed on when the next one begins.
 class RowOfTopic {
  public:
-  RowOfTopic(const studio::SignalTable& table, std::size_t source, Spans& spans)
-      : table_(&table), source_(source), spans_(&spans), numbers_(table.size()) {
+  /// @param unmeasured  which of its numbers are none yet
+  RowOfTopic(const studio::SignalTable& table, std::size_t source, Spans& spans,
+             log::Unmeasured unmeasured)
+      : table_(&table),
+        source_(source),
+        spans_(&spans),
+        unmeasured_(std::move(unmeasured)),
+        numbers_(table.size()) {
     clear();
   }
   void take(std::size_t row, std::span<const std::byte> image) {
@@ -61,6 +68,7 @@ class RowOfTopic {
     any_ = true;
     table_->convert(source_, image, numbers_);
     const studio::Source& its = table_->sources()[source_];
+    drop_unmeasured(its, image);
     for (std::size_t i = 0; i < its.count; ++i) {
       const float value = numbers_[its.first + i];
       if (!std::isfinite(value)) continue;
@@ -84,6 +92,17 @@ class RowOfTopic {
   }
 
  private:
+  void drop_unmeasured(const studio::Source& its, std::span<const std::byte> image) {
+    std::size_t at = its.first;
+    for (std::size_t field = 0; field < its.fields.size(); ++field) {
+      const std::size_t count = its.fields[field].count;
+      for (std::size_t i = 0; unmeasured_.tells(field) && i < count; ++i) {
+        if (unmeasured_.is(field, i, image))
+          numbers_[at + i] = std::numeric_limits<float>::quiet_NaN();
+      }
+      at += count;
+    }
+  }
   void clear() {
     const std::size_t count = table_->sources()[source_].count;
     least_.assign(count, std::numeric_limits<float>::quiet_NaN());
@@ -93,6 +112,7 @@ class RowOfTopic {
   const studio::SignalTable* table_;
   std::size_t source_;
   Spans* spans_;
+  log::Unmeasured unmeasured_;
   std::vector<float> numbers_, least_, largest_;
   std::size_t row_ = 0;
   bool any_ = false;
@@ -105,9 +125,10 @@ Status add_log(const RecordedLog& log, const studio::SignalTable& table, Spans& 
     const std::string name = source_name(log.prefix, topic.name);
     const auto source = std::ranges::find(table.sources(), name, &studio::Source::name);
     if (!has_numbers(topic) || source == table.sources().end()) continue;
-    rows.emplace(
-        topic.name,
-        RowOfTopic(table, static_cast<std::size_t>(source - table.sources().begin()), spans));
+    auto unmeasured = log::Unmeasured::of(*log.file, topic);
+    if (!unmeasured) return std::unexpected(unmeasured.error());
+    const auto index = static_cast<std::size_t>(source - table.sources().begin());
+    rows.emplace(topic.name, RowOfTopic(table, index, spans, std::move(*unmeasured)));
   }
   const Status read = log.file->visit([&](const auto& reader, const auto& view) -> Status {
     const auto found = rows.find(reader.channels().at(view.channel).topic);

@@ -155,7 +155,7 @@ export class Plots implements PaneOwner {
   private at(): void {
     const { time } = this.data;
     const event = eventNear(this.data, this.box.clientWidth);
-    let words = time.frozen ? 'The picture stands. ' : '';
+    let words = time.frozen && !time.whole ? 'The picture stands. ' : '';
     if (time.hover !== null) words += `Values at ${seconds(time.hover)}.`;
     else if (time.selected !== null)
       words += `Values at the selected time, ${seconds(time.selected)}.`;
