@@ -22,8 +22,6 @@ using apps::Json;
 using apps::json_text;
 using Event = studio::Event;
 
-/// Rows of the finest grid, and numbers of all of them together [8 bytes each].
-constexpr std::size_t kMostRows = 4000, kMostNumbers = 16'000'000;
 constexpr double kSeldom = 1.001;  // rows between two samples: more, and some rows have none
 
 /// "/tandem/controller/squat" is "controller/squat", as in a run.
@@ -226,7 +224,8 @@ Result<std::vector<Event>> events_of(const RecordedLog& log) {
 }
 
 /// The times that all logs have together, by their periods.
-Result<Grid> grid_of(const std::vector<RecordedLog>& logs, std::size_t signals) {
+Result<Grid> grid_of(const std::vector<RecordedLog>& logs, std::size_t signals,
+                     const RowLimits& limits) {
   double start_s = std::numeric_limits<double>::infinity(), end_s = -start_s;
   double period_s = 1e-9 * static_cast<double>(logs.front().file->info().period_ns);
   for (const RecordedLog& log : logs) {
@@ -247,7 +246,7 @@ Result<Grid> grid_of(const std::vector<RecordedLog>& logs, std::size_t signals) 
                                  {}});
   }
   if (!(period_s > 0.0)) period_s = 1e-3;
-  const std::size_t most = std::clamp<std::size_t>(kMostNumbers / signals, 100, kMostRows);
+  const std::size_t most = std::clamp<std::size_t>(limits.numbers / signals, 100, limits.rows);
   return Grid::over(start_s, end_s, period_s, most);
 }
 
@@ -303,7 +302,7 @@ Result<Recording> Recording::read(const RecordingParts& parts) {
     }
     shown.push_back({{"title", figure.title}, {"series", series}});
   }
-  const auto grid = grid_of(logs, std::max<std::size_t>(table.size(), 1));
+  const auto grid = grid_of(logs, std::max<std::size_t>(table.size(), 1), parts.most);
   if (!grid) return std::unexpected(grid.error());
   Recording made(*grid, std::move(table));
   std::vector<Event> events;

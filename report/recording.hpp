@@ -25,6 +25,14 @@ struct RecordedLog {
   double slower = 1.0;   ///< multiplied by this
 };
 
+/// How fine a recording may be.
+struct RowLimits {
+  std::size_t rows = 0;
+  std::size_t numbers = 0;  ///< of all signals in all rows [8 bytes each]
+};
+/// Of a report: 128 MB at most while it is written.
+inline constexpr RowLimits kReportRows{4'000, 16'000'000};
+
 /// What is recorded.
 struct RecordingParts {
   studio::RunDescription run;  ///< of the first log
@@ -32,6 +40,7 @@ struct RecordingParts {
   std::vector<Figure> figures{};  ///< those over time become signals, too:
                                   ///< "report/joint_position.measured"
   double at_s = 0.0;              ///< the time that is shown at first
+  RowLimits most = kReportRows;
 };
 
 /// Events that the page has, of each log: the first ones.

@@ -1,5 +1,5 @@
-// Reads one to three logs, aligns the start of their controllers, and writes figures, tables and
-// page.
+// Reads one to three logs, aligns the start of their controllers, and makes figures, tables and
+// facts of them.
 #include "report/report.hpp"
 
 #include <fmt/core.h>
@@ -10,26 +10,12 @@
 
 #include "base/quoting.hpp"
 #include "report/close_passive.hpp"
-#include "report/gnuplot.hpp"
-#include "report/page.hpp"
-#include "report/recorded_page.hpp"
 #include "report/replay.hpp"
 #include "report/run_facts.hpp"
 #include "report/run_figures.hpp"
 
 namespace tandem::report {
 namespace {
-
-Status create(const std::string& folder) {
-  std::error_code problem;
-  std::filesystem::create_directories(folder, problem);
-  if (!problem) return {};
-  return std::unexpected(Error{"cannot create the report's folder: " + problem.message(),
-                               "name a folder that can be written with -o",
-                               folder,
-                               0,
-                               {}});
-}
 
 constexpr const char* kSides[] = {" A", " B", " C"};
 
@@ -200,92 +186,55 @@ Result<std::vector<Figure>> draw_all(const RunData& run, const OtherRuns& others
   return figures;
 }
 
-/// What the page says of the robot before its data come.
-studio::RunDescription description_of(const RunData& run) {
-  return {.robot = run.robot,
-          .urdf = log::value_of(run.info.configuration, run.robot.model.urdf),
-          .version = run.info.version,
-          .experiment = std::filesystem::path(run.path).filename().string(),
-          .run = {},
-          .simulated = run.info.hal == "sim",
-          .period_ns = run.info.period_ns};
-}
-
-/// The page, with plots of all logs where the program has the studio's, else with pictures.
-Status write_report(const Page& page, const RunData& run, const OtherRuns& others,
-                    const std::vector<Figure>& figures, const std::string& folder) {
-  if (!has_studio_page()) return write_page(page, figures, folder);
-  std::vector<log::LogFile> files;
-  std::vector<RecordedLog> logs;
-  files.reserve(1 + others.size());
-  for (std::size_t i = 0; i <= others.size(); ++i) {
-    const RunData& one = i == 0 ? run : *others[i - 1];
-    Result<log::LogFile> file = log::LogFile::open(one.path);
-    if (!file) return std::unexpected(file.error());
-    files.push_back(std::move(*file));
-    logs.push_back({.file = &files.back(),
-                    .prefix = i == 0 ? "" : std::string(1, static_cast<char>('A' + i)) + "/",
-                    .later_s = one.drawn_later_s,
-                    .slower = one.drawn_slower});
-  }
-  const auto recording = Recording::read(
-      {.run = description_of(run), .logs = logs, .figures = figures, .at_s = run.time_s.front()});
-  if (!recording) return std::unexpected(recording.error());
-  std::vector<Figure> pictures = figures;
-  std::erase_if(pictures, [](const Figure& figure) { return is_over_time(figure); });
-  const auto html = recorded_page(page, pictures, folder, *recording);
-  if (!html) return std::unexpected(html.error());
-  return write_html(*html, folder);
-}
-
 }  // namespace
 
-Result<ReportFiles> make_report(const std::string& log, const std::vector<std::string>& other_logs,
-                                const std::string& folder, const FindKernels& find_kernels,
-                                const ErrorText& error_text) {
+Result<Report> read_report(const std::string& log, const std::vector<std::string>& other_logs,
+                           const FindKernels& find_kernels, const ErrorText& error_text) {
   Result<RunData> run = read_run(log, error_text);
   if (!run) return std::unexpected(run.error());
   std::vector<PageTable> replays;
-  Result<std::vector<RunData>> other_runs = read_others(*run, other_logs, error_text, replays);
-  if (!other_runs) return std::unexpected(other_runs.error());
+  Result<std::vector<RunData>> others = read_others(*run, other_logs, error_text, replays);
+  if (!others) return std::unexpected(others.error());
   Result<std::optional<RunData>> beside = std::nullopt;
-  if (other_runs->empty()) beside = read_parallel(*run);
+  if (others->empty()) beside = read_parallel(*run);
   if (!beside) return std::unexpected(beside.error());
-  if (*beside) {
+  const bool parallel = beside->has_value();
+  if (parallel) {
     (*beside)->drawn_later_s = run->time_s.front() - (*beside)->time_s.front();
-    other_runs->push_back(std::move(**beside));
+    others->push_back(std::move(**beside));
   }
-  if (const Status s = create(folder); !s) return std::unexpected(s.error());
 
-  ReportFiles files;
+  Report report;
   const tandem_kernels* kernels = find_kernels(*run);
   std::vector<RunData*> all{&*run};
-  for (RunData& one : *other_runs) all.push_back(&one);
-  files.remarks = close_and_remark(all, kernels);
+  for (RunData& one : *others) all.push_back(&one);
+  report.remarks = close_and_remark(all, kernels);
   for (const RunData* one : all) {
-    if (*beside && one != &*run) continue;  // it is of the same log
+    if (parallel && one != &*run) continue;  // it is of the same log
     for (const std::string& remark : one->remarks)
-      files.remarks.push_back(one->path + ": " + remark);
+      report.remarks.push_back(one->path + ": " + remark);
   }
-  const OtherRuns others(all.begin() + 1, all.end());
-  const auto drawn = draw_all(*run, others, beside->has_value(), kernels, files.remarks);
-  if (!drawn) return std::unexpected(drawn.error());
-  const std::vector<Figure>& figures = *drawn;
-  if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
-  const Page page = *beside ? parallel_page(*run, *others.front()) : page_of(*run, others, replays);
-  if (const Status s =
-          write_report(page, *run, beside->has_value() ? OtherRuns() : others, figures, folder);
-      !s) {
-    return std::unexpected(s.error());
+  const OtherRuns beside_it(all.begin() + 1, all.end());
+  auto figures = draw_all(*run, beside_it, parallel, kernels, report.remarks);
+  if (!figures) return std::unexpected(figures.error());
+  report.figures = std::move(*figures);
+  report.page =
+      parallel ? parallel_page(*run, *beside_it.front()) : page_of(*run, beside_it, replays);
+  report.at_s = run->time_s.front();
+  report.run = {.robot = run->robot,
+                .urdf = log::value_of(run->info.configuration, run->robot.model.urdf),
+                .version = run->info.version,
+                .experiment = std::filesystem::path(run->path).filename().string(),
+                .run = {},
+                .simulated = run->info.hal == "sim",
+                .period_ns = run->info.period_ns};
+  for (std::size_t i = 0; i < all.size() && (i == 0 || !parallel); ++i) {
+    report.logs.push_back({.path = all[i]->path,
+                           .prefix = i == 0 ? "" : std::string(1, static_cast<char>('A' + i)) + "/",
+                           .later_s = all[i]->drawn_later_s,
+                           .slower = all[i]->drawn_slower});
   }
-  files.page = folder + "/report.html";
-  for (const Figure& figure : figures) files.images.push_back(folder + "/" + figure.name + ".png");
-  files.images.push_back(folder + "/overview.png");
-  for (const Figure& figure : figures) {
-    std::error_code ignored;  // its drawing stands in the page
-    std::filesystem::remove(folder + "/" + figure.name + ".svg", ignored);
-  }
-  return files;
+  return report;
 }
 
 }  // namespace tandem::report
