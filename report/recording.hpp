@@ -52,6 +52,9 @@ class Recording {
   /// Errors: LogFile::visit()'s; a log without a number that has a time.
   [[nodiscard]] static Result<Recording> read(const RecordingParts& parts);
 
+  [[nodiscard]] const studio::SignalTable& table() const { return table_; }
+  [[nodiscard]] const Spans& spans() const { return spans_; }
+
   /// What the page unpacks: JSON that is safe within an HTML script element.
   struct Text {
     std::string json;

@@ -10,6 +10,7 @@
 
 #include "base/quoting.hpp"
 #include "report/close_passive.hpp"
+#include "report/differences.hpp"
 #include "report/replay.hpp"
 #include "report/run_facts.hpp"
 #include "report/run_figures.hpp"
@@ -186,6 +187,24 @@ Result<std::vector<Figure>> draw_all(const RunData& run, const OtherRuns& others
   return figures;
 }
 
+/// The robot with what its description says of its joints.
+hal::RobotConfig with_limits(const RunData& run) {
+  hal::RobotConfig robot = run.robot;
+  const auto set = [](double& limit, double described) {
+    if (std::isnan(limit)) limit = described;
+  };
+  for (hal::JointConfig& joint : robot.joints) {
+    const auto found = std::ranges::find(run.tree.joints, joint.name, &model::Joint::name);
+    if (found == run.tree.joints.end()) continue;
+    joint.slides = found->type == model::JointType::kPrismatic;
+    set(joint.min_position_rad, found->lower);
+    set(joint.max_position_rad, found->upper);
+    set(joint.max_velocity_rad_s, found->velocity);
+    set(joint.max_torque_Nm, found->effort);
+  }
+  return robot;
+}
+
 }  // namespace
 
 Result<Report> read_report(const std::string& log, const std::vector<std::string>& other_logs,
@@ -220,8 +239,15 @@ Result<Report> read_report(const std::string& log, const std::vector<std::string
   report.figures = std::move(*figures);
   report.page =
       parallel ? parallel_page(*run, *beside_it.front()) : page_of(*run, beside_it, replays);
+  for (std::size_t i = 0; i < beside_it.size() && !parallel; ++i) {
+    auto table = first_differences(run->path, beside_it[i]->path, static_cast<char>('B' + i));
+    if (table)
+      report.page.tables.push_back(std::move(*table));
+    else
+      report.remarks.push_back(table.error().to_string());
+  }
   report.at_s = run->time_s.front();
-  report.run = {.robot = run->robot,
+  report.run = {.robot = with_limits(*run),
                 .urdf = log::value_of(run->info.configuration, run->robot.model.urdf),
                 .version = run->info.version,
                 .experiment = std::filesystem::path(run->path).filename().string(),

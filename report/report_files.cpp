@@ -1,6 +1,7 @@
 // Writes a report: pictures by gnuplot, and the page with every number of its logs.
 #include <filesystem>
 
+#include "report/differences.hpp"
 #include "report/gnuplot.hpp"
 #include "report/recorded_page.hpp"
 #include "report/report.hpp"
@@ -52,9 +53,11 @@ Status write(const Report& report, const std::string& folder) {
   if (!has_studio_page()) return write_page(report.page, report.figures, folder);
   const auto recording = record(report, kReportRows);
   if (!recording) return std::unexpected(recording.error());
+  Page page = report.page;
+  for (PageTable& table : largest_differences(*recording)) page.tables.push_back(std::move(table));
   std::vector<Figure> pictures = report.figures;
   std::erase_if(pictures, [](const Figure& figure) { return is_over_time(figure); });
-  const auto html = recorded_page(report.page, pictures, folder, *recording);
+  const auto html = recorded_page(std::move(page), pictures, folder, *recording);
   if (!html) return std::unexpected(html.error());
   return write_html(*html, folder);
 }

@@ -4,6 +4,7 @@ import { h, say } from './dom';
 import { number } from './format';
 import { type Curve, labelOf, type Series, signalsOf, unitOf } from './series';
 import { statistics } from './statistics';
+import { colourOf, prefixOf } from './twins';
 
 export interface LegendOwner {
   readonly series: Series[];
@@ -54,7 +55,7 @@ export class Legend {
       '',
     ];
     this.cells = [];
-    const rows = this.owner.series.map((series, i) => {
+    const rows = this.owner.series.map((series) => {
       const value = h('td', { class: 'figure' }, '–');
       const figures = withFigures
         ? [0, 1, 2, 3, 4].map(() => h('td', { class: 'figure' }, '–'))
@@ -70,7 +71,11 @@ export class Legend {
         h(
           'td',
           {},
-          h('span', { class: 'swatch', style: `--c: var(--series-${i % kPaletteSize})` }),
+          h('span', {
+            class: 'swatch',
+            style: `--c: var(--series-${colourOf(series, this.owner.series) % kPaletteSize})`,
+            'data-log': prefixOf(series) || undefined,
+          }),
         ),
         h(
           'th',

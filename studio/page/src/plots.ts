@@ -8,7 +8,9 @@ import { eventNear, signOf } from './marks';
 import { Pane, type PaneOwner } from './pane';
 import type { ScopeSettings } from './scope_settings';
 import { signalSearch } from './search';
+import type { Series } from './series';
 import { kWidths } from './time';
+import { prefixOf, withTwins } from './twins';
 
 const kMostPanes = 12;
 /** Pictures a second: a plot costs more than a number. */
@@ -20,6 +22,7 @@ export class Plots implements PaneOwner {
   private panes: Pane[] = [];
   private active: Pane | null = null;
   private figures = false;
+  private overlay = true;
   private dirty = true;
   private pointed = false;
   private last = 0;
@@ -78,6 +81,7 @@ export class Plots implements PaneOwner {
           ? this.now
           : this.button('Whole log', () => time.follow(), 'shows all of it'),
         this.statisticsToggle(),
+        this.overlayToggle(),
         this.presets(),
         this.button('Save layout', () => this.export(), 'saves the layout as a file'),
         this.button('Open layout', () => this.file.click(), 'opens a layout file'),
@@ -104,6 +108,9 @@ export class Plots implements PaneOwner {
 
   statistics(): boolean {
     return this.figures;
+  }
+  twins(series: Series[]): Series[] {
+    return this.overlay && !this.data.source.live ? withTwins(series, this.data.catalog) : series;
   }
   secondAxis(): boolean {
     return this.panes.some((pane) => pane.units().size > 1);
@@ -204,6 +211,29 @@ export class Plots implements PaneOwner {
     );
   }
 
+  /** Of several logs: the same signals of all. */
+  private overlayToggle(): HTMLElement {
+    const box = h('input', {
+      type: 'checkbox',
+      checked: true,
+      onchange: () => {
+        this.overlay = box.checked;
+        for (const pane of this.panes) {
+          const own = pane.series.filter((one) => prefixOf(one) === '');
+          pane.series.splice(0, pane.series.length, ...this.twins(own));
+          pane.listSeries();
+        }
+        this.changed();
+      },
+    });
+    const label = h('label', { class: 'toggle', hidden: true }, box, 'all logs');
+    label.title = 'each signal of all logs: those of B and C are dashed';
+    this.data.whenCatalog(() => {
+      label.hidden = !this.data.catalog.signals.some((one) => one.source.startsWith('B/'));
+    });
+    return label;
+  }
+
   private presets(): HTMLElement {
     const choice = h(
       'select',
@@ -279,6 +309,7 @@ export class Plots implements PaneOwner {
     this.data.time.follow(width);
     for (const pane of layout.panes) this.push(pane.series);
     if (layout.scope) this.scope?.apply(layout.scope);
+    for (const pane of layout.panes) this.push(this.twins(pane.series));
     this.want();
   }
 

@@ -3,6 +3,7 @@ import type { Data } from './data';
 import { h } from './dom';
 import { Pane, type PaneOwner } from './pane';
 import type { Recording } from './recorded';
+import { withTwins } from './twins';
 
 export class Report implements PaneOwner {
   private readonly panes: Pane[] = [];
@@ -56,7 +57,8 @@ export class Report implements PaneOwner {
   private build(): void {
     this.box.replaceChildren();
     for (const figure of this.recording.figures) {
-      const series = figure.series.map((name) => ({ kind: 'signal' as const, name }));
+      const own = figure.series.map((name) => ({ kind: 'signal' as const, name }));
+      const series = withTwins(own, this.data.catalog).slice(0, 16);
       const pane = new Pane(this.data, this, series);
       this.panes.push(pane);
       this.box.append(
