@@ -48,7 +48,7 @@ export async function inflate(base64: string): Promise<Uint8Array> {
       'this browser cannot unpack the numbers (DecompressionStream): a newer one can',
     );
   }
-  const packed = Uint8Array.from(atob(base64), (one) => one.charCodeAt(0));
+  const packed = new Uint8Array(Array.from(atob(base64), (one) => one.charCodeAt(0)));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
