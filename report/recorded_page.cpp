@@ -83,4 +83,20 @@ Result<std::string> recorded_page(Page page, std::span<const Figure> pictures,
          script + "</script>\n</body>\n</html>\n";
 }
 
+Result<std::string> served_document(const Page& page, const Recording& recording) {
+  const Result<std::string> content = page_content(page, {}, {});
+  if (!content) return content;
+  return "<!doctype html>\n<article id=\"report\" class=\"report\">\n" + *content +
+         "</article>\n<script type=\"application/json\" id=\"recording\">" +
+         recording.text(kMostReportBytes).json + "</script>\n";
+}
+
+std::string served_index() {
+  std::string index = page_file("/");
+  const std::string_view body = "<body ";
+  const std::size_t at = index.find(body);
+  if (at != std::string::npos) index.insert(at + body.size(), "data-log=\"/log\" ");
+  return index;
+}
+
 }  // namespace tandem::report

@@ -28,4 +28,9 @@ inline constexpr std::size_t kMostReportBytes = 5'000'000;
                                                 const std::string& folder,
                                                 const Recording& recording);
 
+/// The same for a server that has the page's files: facts, tables and recording alone.
+[[nodiscard]] Result<std::string> served_document(const Page& page, const Recording& recording);
+/// The page's "/" that takes its data from "/log".
+[[nodiscard]] std::string served_index();
+
 }  // namespace tandem::report

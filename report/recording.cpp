@@ -327,7 +327,10 @@ Result<Recording> Recording::read(const RecordingParts& parts) {
 
 Recording::Text Recording::text(std::size_t most) const {
   Text text;
-  for (const std::size_t merge : {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128}) {
+  const std::size_t rows = spans_.grid().rows;
+  constexpr std::size_t kFewest = 16;
+  for (std::size_t merge = (rows + kReportRows.rows - 1) / kReportRows.rows;;
+       merge += (merge + 1) / 2) {
     const Packed packed = pack(spans_, merge);
     const Grid& grid = packed.grid;
     text.grid = grid;
@@ -335,9 +338,42 @@ Recording::Text Recording::text(std::size_t most) const {
         R"({{"format":1,{}"grid":{{"start_s":{},"step_s":{},"rows":{},"cycles":{}}},"codes":[{}],"data":"{}"}})",
         head_, grid.start_s, grid.step_s(), grid.rows, grid.cycles, codes_text(packed),
         packed.bytes);
-    if (text.json.size() <= most) break;
+    if (text.json.size() <= most || grid.rows <= kFewest) break;
   }
   return text;
+}
+
+std::string Recording::window(const std::vector<std::size_t>& signals, double from_s, double to_s,
+                              std::size_t points) const {
+  const Grid& grid = spans_.grid();
+  const double rows = static_cast<double>(grid.rows);
+  const auto row_at = [&](double time_s) {
+    return static_cast<std::size_t>(std::clamp((time_s - grid.start_s) / grid.step_s(), 0.0, rows));
+  };
+  const std::size_t first = row_at(from_s);
+  const std::size_t past = std::max(first, std::min(grid.rows, row_at(to_s) + 2));
+  const std::size_t count = past - first;
+  const std::size_t merge = count > 4 * points ? (count + 2 * points - 1) / (2 * points) : 1;
+  const std::size_t cycles = grid.cycles * merge;
+  const studio::FrameHead head{.signals = signals.size(),
+                               .rows = (count + merge - 1) / merge,
+                               .cycles = cycles,
+                               .start_s = grid.start_s + grid.step_s() * static_cast<double>(first),
+                               .step_s = grid.period_s * static_cast<double>(cycles)};
+  std::vector<float> numbers;
+  for (const std::size_t signal : signals) {
+    const bool known = signal < spans_.signals();
+    for (std::size_t row = first; row < first + count; row += merge) {
+      float least = std::numeric_limits<float>::quiet_NaN(), largest = least;
+      for (std::size_t i = row; known && i < std::min(row + merge, first + count); ++i) {
+        least = studio::least(least, spans_.least(signal)[i]);
+        largest = studio::largest(largest, spans_.largest(signal)[i]);
+      }
+      numbers.push_back(least);
+      if (cycles > 1) numbers.push_back(largest);
+    }
+  }
+  return studio::window_frame(head, numbers);
 }
 
 }  // namespace tandem::report

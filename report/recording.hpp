@@ -30,8 +30,11 @@ struct RowLimits {
   std::size_t rows = 0;
   std::size_t numbers = 0;  ///< of all signals in all rows [8 bytes each]
 };
-/// Of a report: 128 MB at most while it is written.
+/// Those of a report: 128 MB at most while it is written.
 inline constexpr RowLimits kReportRows{4'000, 16'000'000};
+
+/// Those of a log that is served: 512 MB at most.
+inline constexpr RowLimits kServedRows{100'000'000, 64'000'000};
 
 /// What is recorded.
 struct RecordingParts {
@@ -60,8 +63,12 @@ class Recording {
     std::string json;
     Grid grid;  ///< that it has
   };
-  /// @param most  bytes: there are as many rows as fit
+  /// @param most  bytes: there are as many rows as fit, up to 4000
   [[nodiscard]] Text text(std::size_t most) const;
+  /// A frame of studio.md: the rows of some signals in a span, merged to 2 * points where there are
+  /// more than 4 * points. Signals that it has not are gaps.
+  [[nodiscard]] std::string window(const std::vector<std::size_t>& signals, double from_s,
+                                   double to_s, std::size_t points) const;
 
  private:
   Recording(const Grid& grid, studio::SignalTable table)

@@ -58,6 +58,16 @@ struct Tick {
 /// @param lost  frames that this client was not sent so far
 [[nodiscard]] std::string tick_frame(const Tick& tick, std::uint32_t lost);
 
+/// How a window begins.
+struct FrameHead {
+  std::uint32_t id = 0;
+  std::size_t level = 0;
+  std::size_t signals = 0, rows = 0;
+  std::uint64_t cycles = 1;  ///< of a row
+  double start_s = 0.0, step_s = 0.0;
+};
+/// @param numbers  signal by signal its rows: of one cycle a number, else least and largest
+[[nodiscard]] std::string window_frame(const FrameHead& head, std::span<const float> numbers);
 /// @param id  the question's
 [[nodiscard]] std::string window_frame(std::uint32_t id, const History& history,
                                        const Window& window, std::span<const SignalId> signals,

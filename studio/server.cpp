@@ -87,6 +87,12 @@ void Server::serve(Hub& hub, HttpRules rules) {
   impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
 }
 
+void Server::serve(HttpRules rules) {
+  impl_->rules = std::move(rules);
+  impl_->accept();
+  impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
+}
+
 void Server::answered() {
   net::post(impl_->io, [impl = impl_.get()] {
     impl->hub->take_answers();
@@ -98,9 +104,11 @@ void Server::end(const std::string& how, const std::string& log, std::chrono::mi
   if (!impl_->thread.joinable()) return;
   std::future<void> gone = impl_->all_gone.get_future();
   net::post(impl_->io, [impl = impl_.get(), how, log] {
-    impl->hub->take_answers();
-    impl->hub->tick(Hub::Clock::now());
-    impl->hub->end(how, log);
+    if (impl->hub != nullptr) {
+      impl->hub->take_answers();
+      impl->hub->tick(Hub::Clock::now());
+      impl->hub->end(how, log);
+    }
     impl->ending = true;
     beast::error_code ignored;
     impl->acceptor.close(ignored);

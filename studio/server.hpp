@@ -34,6 +34,8 @@ class Server {
   [[nodiscard]] const Place& place() const;
   /// Starts the thread. Once. @param hub  is its from now on, and outlives this
   void serve(Hub& hub, HttpRules rules);
+  /// The same without a run: pages alone.
+  void serve(HttpRules rules);
   /// Any thread: the hub's asker has answers.
   void answered();
   /// Tells the clients that the run is over, closes them, and ends the thread.

@@ -55,6 +55,7 @@ void add_flags(CLI::App& app, LatencyOptions& o);
 void add_flags(CLI::App& app, BenchOptions& o);
 void add_flags(CLI::App& app, DoctorOptions& o);
 void add_flags(CLI::App& app, TopicOptions& o);
+void add_flags(CLI::App& app, StudioCommandOptions& o);
 
 /// The commands to a running process: those of command_rows(), in their groups. `o` gets the one
 /// that was named.

@@ -57,6 +57,13 @@ struct AskedOptions {
   std::string json{};
 };
 
+/// tandem studio LOG
+struct StudioCommandOptions {
+  std::vector<std::string> logs;        ///< one to three
+  std::optional<std::uint16_t> port{};  ///< as StudioOptions'
+  std::string address = "127.0.0.1";
+};
+
 /// tandem ask QUESTION
 struct AskOptions {
   std::string question;  ///< JSON
@@ -264,7 +271,7 @@ using Command =
     std::variant<Exit, RunOptions, ServeOptions, AskOptions, AskedOptions, CheckOptions,
                  ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, IdentifyOptions,
                  ExciteOptions, LatencyOptions, DoctorOptions, EmulateOptions, TopicOptions,
-                 BenchOptions, ControllerCheckOptions, ControllerNewOptions>;
+                 BenchOptions, ControllerCheckOptions, ControllerNewOptions, StudioCommandOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

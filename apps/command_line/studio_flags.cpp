@@ -45,4 +45,22 @@ void add_studio_flags(CLI::App& app, StudioOptions& o) {
       ->check(is_given("name a folder"));
 }
 
+void add_flags(CLI::App& app, StudioCommandOptions& o) {
+  app.add_option("logs", o.logs, "MCAP files of one robot, at most three")
+      ->required()
+      ->expected(1, 3);
+  app.add_option_function<std::string>(
+         "--port", [&o](const std::string& text) { o.port = port_of(text); },
+         "Where it listens; 0: any (default: the first free one from 8642)")
+      ->check(is_port());
+  app.add_option("--address", o.address,
+                 "Where it listens: 0.0.0.0 for other machines, too, which need its token "
+                 "(default: 127.0.0.1)")
+      ->check(is_given("give an address of this machine"));
+  app.footer(R"(Examples:
+  tandem studio runs/coman-squat-001.mcap
+  tandem studio runs/a.mcap runs/b.mcap      the second log over the first
+Ctrl-C ends it. `tandem report` writes the same page as a file.)");
+}
+
 }  // namespace tandem::apps

@@ -21,7 +21,7 @@ import { LiveSource } from './live';
 import { Plots } from './plots';
 import { kProtocol } from './protocol';
 import { recordingIn } from './recorded';
-import { startRecorded } from './recorded_page';
+import { startRecorded, startServed } from './recorded_page';
 import { Scene } from './scene';
 import { Scope } from './scope';
 import { Tabs } from './tabs';
@@ -71,8 +71,13 @@ function themeButton(changed: () => void): HTMLElement {
   return button;
 }
 
+/** What stands behind `#token=` in an address. */
+function tokenOf(hash: string): string {
+  return /(?:^#|&)token=([0-9a-f]+)/.exec(hash)?.[1] ?? '';
+}
+
 function start(): void {
-  const token = /(?:^#|&)token=([0-9a-f]+)/.exec(location.hash)?.[1] ?? '';
+  const token = tokenOf(location.hash);
   const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
   const source = new LiveSource(`${scheme}://${location.host}/ws`, token);
   const data = new Data(source);
@@ -155,5 +160,7 @@ function start(): void {
 }
 
 const recording = recordingIn(document);
-if (recording) startRecorded(recording, themeButton);
+const log = document.body.dataset.log;
+if (log) void startServed(log, tokenOf(location.hash), themeButton);
+else if (recording) startRecorded(recording, themeButton);
 else start();

@@ -114,7 +114,11 @@ export class RecordedSource implements Source {
   private signals: number[] = [];
   private time: number;
 
-  constructor(private readonly recording: Recording) {
+  /** @param finer windows of a server that has the log; null: there is none. */
+  constructor(
+    private readonly recording: Recording,
+    private readonly finer: Source['window'] | null = null,
+  ) {
     this.time = recording.at_s;
   }
 
@@ -175,6 +179,14 @@ export class RecordedSource implements Source {
     const first = Math.max(0, Math.floor((from - start_s) / step_s));
     const past = Math.min(rows, Math.ceil((to - start_s) / step_s) + 1);
     const count = Math.max(0, past - first);
+    if (this.finer && cycles > 1 && count < 2 * points) {
+      try {
+        return await this.finer(signals, from, to, points);
+      } catch (error) {
+        const words = error instanceof Error ? error.message : String(error);
+        this.each((l) => l.trouble?.(`Not every cycle is shown: ${words}`, ''));
+      }
+    }
     const merge = count > 4 * points ? Math.ceil(count / (2 * points)) : 1;
     const found = signals.map((id) => merged(this.rows(id), first, count, merge));
     return {

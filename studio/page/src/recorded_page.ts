@@ -8,18 +8,44 @@ import { Header } from './header';
 import { Joints } from './joints';
 import { Playback } from './playback';
 import { Plots } from './plots';
-import { RecordedSource, type Recording } from './recorded';
+import { RecordedSource, type Recording, recordingIn } from './recorded';
 import { Report } from './report';
 import { Scene } from './scene';
+import { servedDocument, servedWindow } from './served';
+import type { Source } from './source';
 import { Tabs } from './tabs';
 
-/** @param themeButton makes the button that changes the colours. */
+type ThemeButton = (changed: () => void) => HTMLElement;
+
+/** The page of `tandem studio LOG`: the recording comes from there, with its token. */
+export async function startServed(
+  path: string,
+  token: string,
+  themeButton: ThemeButton,
+): Promise<void> {
+  try {
+    const served = await servedDocument(path, token);
+    const recording = recordingIn(served);
+    const article = served.getElementById('report');
+    if (!recording || !article) throw new Error(`${path} is no recording`);
+    document.body.append(document.adoptNode(article));
+    startRecorded(recording, themeButton, (...asked) => servedWindow(token, ...asked));
+  } catch (error) {
+    const words = error instanceof Error ? error.message : String(error);
+    document.body.append(
+      h('p', { class: 'fault', role: 'alert' }, `The log is not here: ${words}`),
+    );
+  }
+}
+
+/** @param themeButton makes the button that changes the colours. @param finer as RecordedSource's */
 export function startRecorded(
   recording: Recording,
-  themeButton: (changed: () => void) => HTMLElement,
+  themeButton: ThemeButton,
+  finer: Source['window'] | null = null,
 ): void {
   document.body.classList.add('recorded');
-  const source = new RecordedSource(recording);
+  const source = new RecordedSource(recording, finer);
   const data = new Data(source);
   const actions = new Actions(source);
   actions.tell('', 'A recording: nothing here acts on a robot.');
