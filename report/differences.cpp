@@ -80,6 +80,7 @@ Result<PageTable> first_differences(const std::string& a, const std::string& b, 
                   .header = {"topic", "message", "time [s]", "signal", "A", std::string(1, letter)},
                   .rows = {}};
   for (const log::TopicComparison& one : found->topics) {
+    if (one.messages_a + one.messages_b == 0) continue;
     if (one.first) {
       table.rows.push_back({one.topic, std::to_string(one.first->message),
                             fmt::format("{:.3f}", 1e-9 * static_cast<double>(one.first->time_ns)),

@@ -348,7 +348,8 @@ std::string Recording::window(const std::vector<std::size_t>& signals, double fr
   const Grid& grid = spans_.grid();
   const double rows = static_cast<double>(grid.rows);
   const auto row_at = [&](double time_s) {
-    return static_cast<std::size_t>(std::clamp((time_s - grid.start_s) / grid.step_s(), 0.0, rows));
+    return static_cast<std::size_t>(
+        std::clamp((time_s - grid.start_s) / grid.step_s() + 1e-6, 0.0, rows));
   };
   const std::size_t first = row_at(from_s);
   const std::size_t past = std::max(first, std::min(grid.rows, row_at(to_s) + 2));

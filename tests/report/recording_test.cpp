@@ -4,12 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 
 #include "apps/text/console.hpp"
 #include "hal/signal_block.hpp"
 #include "log/recorder.hpp"
+#include "report/differences.hpp"
 #include "report/page.hpp"
 #include "report/recorded_page.hpp"
+#include "report/report.hpp"
 #include "tests/log/scratch_folder.hpp"
 #include "tests/report/unpacked.hpp"
 
@@ -163,6 +166,75 @@ TEST_F(Recorded, LetsNoNameOutOfItsPlace) {
   for (std::size_t at = 0; (at = html->find("</script", at)) != std::string::npos; ++at) ++ends;
   EXPECT_EQ(ends, 2U) << "the recording's and the page's own";
   EXPECT_EQ(html->find(" src="), html->find(" src=x")) << "nothing is loaded";
+}
+
+// It was an error that said what the log lacks, and nothing was to be seen.
+TEST_F(Recorded, OfALogWithoutItsRobotsFilesHasThePageAndSaysWhatItLacks) {
+  const auto none = [](const RunData&) { return nullptr; };
+  const auto report = read_any(make_log("a.mcap", 40), {}, none);
+  if (!has_studio_page()) {
+    EXPECT_FALSE(report);
+    return;
+  }
+  ASSERT_TRUE(report) << report.error().to_string();
+  const auto files = make_report(folder_ / "a.mcap", {}, folder_ / "out", none);
+  ASSERT_TRUE(files) << files.error().to_string();
+  EXPECT_TRUE(files->images.empty());
+  ASSERT_EQ(files->remarks.size(), 1U);
+  EXPECT_NE(files->remarks[0].find("does not carry its robot's configuration"), std::string::npos);
+  const std::string page = log::content(files->page);
+  EXPECT_NE(page.find("Its numbers and events alone"), std::string::npos);
+  EXPECT_NE(page.find("\"name\":\"controller/squat\""), std::string::npos);
+  EXPECT_FALSE(read_any(make_log("empty.mcap", 0), {}, none)) << "it has no number either";
+}
+
+TEST_F(Recorded, GivesWindowsAtTheGrainOfTheLog) {
+  const auto file = log::LogFile::open(make_log("a.mcap", 1500));
+  ASSERT_TRUE(file);
+  const auto recording =
+      Recording::read({.run = pair(), .logs = {{.file = &*file}}, .most = kServedRows});
+  ASSERT_TRUE(recording);
+  const auto of = [&](const std::string& name) {
+    std::size_t id = 0;
+    while (id < recording->table().size() &&
+           recording->table().name(static_cast<studio::SignalId>(id)) != name)
+      ++id;
+    return id;
+  };
+  const auto number = [](const std::string& frame, std::size_t i) {
+    float value = NAN;
+    std::memcpy(&value, frame.data() + 32 + 4 * i, sizeof value);
+    return value;
+  };
+  const std::size_t shoulder = of("state.position_rad.shoulder");
+  const std::string fine = recording->window({shoulder, 1U << 20U}, 0.7, 0.709, 100);
+  ASSERT_EQ(fine.size(), 32U + 2 * 4 * 11) << "two signals of one number a row";
+  EXPECT_FLOAT_EQ(number(fine, 3), static_cast<float>(std::sin(0.7 * 703)));
+  EXPECT_TRUE(std::isnan(number(fine, 11))) << "there is no such signal";
+  const std::string coarse = recording->window({shoulder}, 0.0, 2.0, 10);
+  EXPECT_EQ(coarse.size(), 32U + 2 * 4 * 20);
+  EXPECT_LT(number(coarse, 0), -0.99F);
+  EXPECT_GT(number(coarse, 1), 0.99F);
+  EXPECT_EQ(recording->window({shoulder}, 5.0, 4.0, 10).size(), 32U);
+}
+
+TEST_F(Recorded, SaysWhereTwoLogsPart) {
+  const std::string first = make_log("a.mcap", 40), second = make_log("b.mcap", 40, 5.0);
+  const auto a = log::LogFile::open(first), b = log::LogFile::open(second);
+  ASSERT_TRUE(a && b);
+  const auto recording =
+      Recording::read({.run = pair(), .logs = {{.file = &*a}, {.file = &*b, .prefix = "B/"}}});
+  ASSERT_TRUE(recording);
+  const auto tables = largest_differences(*recording);
+  ASSERT_EQ(tables.size(), 1U);
+  ASSERT_EQ(tables[0].rows.size(), 1U) << "the others are the same";
+  EXPECT_EQ(tables[0].rows[0][0], "state.position_rad.shoulder");
+  EXPECT_EQ(tables[0].rows[0][1], "5");
+  const auto table = first_differences(first, second, 'B');
+  ASSERT_TRUE(table);
+  ASSERT_EQ(table->rows.size(), 2U);
+  EXPECT_EQ(table->rows[0][3], "position_rad.shoulder");
+  EXPECT_EQ(table->rows[1][3], "the same");
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // A report as it is opened from the disk: TANDEM=… node --test tests/studio/browser/report.test.mjs
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
+import { execFileSync, spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, rmSync, statSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -141,5 +141,25 @@ describe('a report opened from the disk', { skip: why || false, timeout: 120000 
     assert.match(await page.textContent('.scene-words'), /no WebGL/);
     assert.ok(await page.locator('.report h1').isVisible());
     await page.context().close();
+  });
+
+  test('served by `tandem studio LOG`, it has every cycle; a signal ends it', async () => {
+    const served = spawn(kTandem, ['studio', log, log, '--port', '0'], { cwd: kScratch });
+    const ended = new Promise((resolve) => served.on('exit', resolve));
+    let said = '';
+    for await (const data of served.stdout) {
+      said += data;
+      if (/studio: http\S+\n/.test(said)) break;
+    }
+    const page = await openPage(browser, /http\S+/.exec(said)[0]);
+    await page.waitForSelector('.report .pane .uplot');
+    await page.click('#tab-plots');
+    await page.waitForSelector('.plots .pane[data-cycles-per-row]');
+    for (let i = 0; i < 3; ++i) await page.locator('[aria-label="zoom in"]').click();
+    await page.waitForSelector('.plots .pane[data-cycles-per-row="1"]');
+    assert.match(await page.textContent('.plots .pane'), /B\/state\.position_rad/);
+    await leave(page);
+    served.kill('SIGINT');
+    assert.equal(await ended, 0);
   });
 });
