@@ -307,9 +307,8 @@ export class Plots implements PaneOwner {
     const width = kWidths.find((one) => one >= layout.width_s) ?? 10;
     this.width.value = String(width);
     this.data.time.follow(width);
-    for (const pane of layout.panes) this.push(pane.series);
-    if (layout.scope) this.scope?.apply(layout.scope);
     for (const pane of layout.panes) this.push(this.twins(pane.series));
+    if (layout.scope) this.scope?.apply(layout.scope);
     this.want();
   }
 

@@ -11,6 +11,7 @@ import { Plots } from './plots';
 import { RecordedSource, type Recording, recordingIn } from './recorded';
 import { Report } from './report';
 import { Scene } from './scene';
+import { Scope } from './scope';
 import { servedDocument, servedWindow } from './served';
 import type { Source } from './source';
 import { Tabs } from './tabs';
@@ -51,6 +52,12 @@ export function startRecorded(
   actions.tell('', 'A recording: nothing here acts on a robot.');
   const scene = new Scene(data);
   const plots = new Plots(data, (words, bad) => actions.tell('', words, bad));
+  const scope = new Scope(
+    data,
+    (words, bad) => actions.tell('', words, bad),
+    () => plots.keep(),
+  );
+  plots.scope = scope;
   const joints = new Joints(data, actions, new ControlLease(source));
   const playback = new Playback(data, source);
   const article = document.getElementById('report') ?? h('article', { class: 'report' });
@@ -62,12 +69,17 @@ export function startRecorded(
       scene.themeChanged();
       plots.themeChanged();
       report.themeChanged();
+      scope.themeChanged();
     }),
   );
   const tabs = new Tabs(
     [
       { name: 'report', label: 'Report', content: article },
       { name: 'plots', label: 'Plots', content: plots.element },
+      // It takes every cycle.
+      ...(finer || recording.grid.cycles === 1
+        ? [{ name: 'scope', label: 'Scope', content: scope.element }]
+        : []),
       { name: 'joints', label: 'Joints', content: joints.element },
       { name: 'events', label: 'Events', content: new Events(data).element },
     ],
@@ -110,6 +122,7 @@ export function startRecorded(
     scene.update(now);
     if (tabs.active === 'plots') plots.update(now);
     if (tabs.active === 'report') report.update();
+    if (tabs.active === 'scope') scope.update(now);
     requestAnimationFrame(frame);
   };
   requestAnimationFrame(frame);
