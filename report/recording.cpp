@@ -327,10 +327,11 @@ Result<Recording> Recording::read(const RecordingParts& parts) {
 
 Recording::Text Recording::text(std::size_t most) const {
   Text text;
-  const std::size_t rows = spans_.grid().rows;
   constexpr std::size_t kFewest = 16;
-  for (std::size_t merge = (rows + kReportRows.rows - 1) / kReportRows.rows;;
-       merge += (merge + 1) / 2) {
+  const std::size_t rows = spans_.grid().rows;
+  const std::size_t allowed = std::clamp<std::size_t>(
+      kReportRows.numbers / std::max<std::size_t>(spans_.signals(), 1), 100, kReportRows.rows);
+  for (std::size_t merge = (rows + allowed - 1) / allowed;; merge += (merge + 1) / 2) {
     const Packed packed = pack(spans_, merge);
     const Grid& grid = packed.grid;
     text.grid = grid;

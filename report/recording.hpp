@@ -30,8 +30,8 @@ struct RowLimits {
   std::size_t rows = 0;
   std::size_t numbers = 0;  ///< of all signals in all rows [8 bytes each]
 };
-/// Those of a report: 128 MB at most while it is written.
-inline constexpr RowLimits kReportRows{4'000, 16'000'000};
+/// Those of a report: of COMAN some 4,200 rows.
+inline constexpr RowLimits kReportRows{40'000, 4'000'000};
 
 /// Those of a log that is served: 512 MB at most.
 inline constexpr RowLimits kServedRows{100'000'000, 64'000'000};
@@ -63,7 +63,7 @@ class Recording {
     std::string json;
     Grid grid;  ///< that it has
   };
-  /// @param most  bytes: there are as many rows as fit, up to 4000
+  /// @param most  bytes: there are as many rows as fit, up to kReportRows
   [[nodiscard]] Text text(std::size_t most) const;
   /// A frame of studio.md: the rows of some signals in a span, merged to 2 * points where there are
   /// more than 4 * points. Signals that it has not are gaps.

@@ -62,7 +62,7 @@ class HttpRules {
   /// @param page   folder whose files are the page, as they are at each request; empty: assets()
   HttpRules(Place place, std::string urdf, std::string token, std::string page = {});
 
-  /// Of a page without a run: no WebSocket, no description; each of `served` in its place.
+  /// Those of a page without a run: no WebSocket, no description; each of `served` in its place.
   HttpRules(Place place, std::string token, std::vector<Served> served);
 
   /// The answer; empty: the request opens a WebSocket.
