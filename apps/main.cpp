@@ -24,7 +24,9 @@ int main(int argc, char** argv) {
       [](const AskOptions& options) { return ask_command(options); },
       [](const AskedOptions& options) { return asked_command(options); },
       [](const TopicOptions& options) { return topic_command(options); },
-      [](const StudioCommandOptions& options) { return attach_studio(options); },
+      [&](const StudioCommandOptions& options) {
+        return options.logs.empty() ? attach_studio(options) : become_tools({argv, argv + argc});
+      },
       [&](const auto&) {
         return become_tools({argv, argv + argc});
       },

@@ -67,6 +67,8 @@ struct Figure {
   std::vector<Level> levels{};
   std::vector<Mark> marks{};
   std::vector<Note> notes{};
+  std::vector<std::string> signals{};  ///< of the studio's page that have the same curves:
+                                       ///< "controller/squat.depth"; empty: none have
   double range_until_x = std::numeric_limits<double>::infinity();  ///< what lies beyond it, as what
                                                                    ///< follows a fault, does not
                                                                    ///< widen the range of y
@@ -75,6 +77,11 @@ struct Figure {
   bool points = false;      ///< a point at each sample
   bool equal_axes = false;  ///< one metre is as long across as it is up; no numbers across
 };
+
+/// Whether x is time.
+[[nodiscard]] constexpr bool is_over_time(const Figure& figure) {
+  return !figure.equal_axes && !figure.log_axes;
+}
 
 /// Removes curves without a number: what a log lacks, as the references of a recording.
 void drop_empty_curves(Figure& figure);

@@ -74,17 +74,13 @@ std::string page_begin(const std::string& by) {
   return "<!doctype html>\n<!-- Written by `" + by + "`. -->\n";
 }
 
-Status write_page(const Page& page, std::span<const Figure> figures, const std::string& folder) {
-  std::string html = page_begin(page.by);
-  html += fmt::format(
-      "<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<main>\n<h1>{0}</h1>\n<p>{2}</p>\n",
-      page_text(page.title), kStyle, page_text(page.lead));
-  html += "<div class=\"figures\">\n";
+Result<std::string> page_content(const Page& page, std::span<const Figure> figures,
+                                 const std::string& folder) {
+  std::string html = fmt::format("<h1>{}</h1>\n<p>{}</p>\n<div class=\"figures\">\n",
+                                 page_text(page.title), page_text(page.lead));
   for (const Figure& figure : figures) {
     const Result<std::string> svg = inline_svg(folder + "/" + figure.name + ".svg", figure.name);
-    if (!svg) return std::unexpected(svg.error());
+    if (!svg) return svg;
     html += "<figure class=\"card\" style=\"margin:0\">" + *svg + "</figure>\n";
   }
   html += "</div>\n<h2>Run</h2>\n<div class=\"card\"><dl>\n";
@@ -93,8 +89,12 @@ Status write_page(const Page& page, std::span<const Figure> figures, const std::
   }
   html += "</dl></div>\n";
   for (const PageTable& table : page.tables) html += html_table(table);
-  html += "</main>\n</body>\n</html>\n";
+  return html;
+}
 
+std::string page_title(const Page& page) { return page_text(page.title); }
+
+Status write_html(const std::string& html, const std::string& folder) {
   const std::string file = folder + "/report.html";
   const Result<Descriptor> out = open_output(file);
   const std::string why = !out                         ? out.error().message
@@ -105,6 +105,19 @@ Status write_page(const Page& page, std::span<const Figure> figures, const std::
                                .hint = "check the folder's permissions and the disk's free space",
                                .file = file,
                                .key = {}});
+}
+
+Status write_page(const Page& page, std::span<const Figure> figures, const std::string& folder) {
+  const Result<std::string> content = page_content(page, figures, folder);
+  if (!content) return std::unexpected(content.error());
+  return write_html(
+      page_begin(page.by) +
+          fmt::format("<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+                      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+                      "<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<main>\n{}</main>\n"
+                      "</body>\n</html>\n",
+                      page_title(page), kStyle, *content),
+      folder);
 }
 
 }  // namespace tandem::report

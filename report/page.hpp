@@ -33,6 +33,15 @@ struct Page {
 /// How the page of a command begins: by it a page is known that may be written over.
 [[nodiscard]] std::string page_begin(const std::string& by);
 
+/// Title, figures, facts and tables as HTML: what a page has in its body. Texts are escaped.
+/// Errors: an SVG file cannot be read.
+[[nodiscard]] Result<std::string> page_content(const Page& page, std::span<const Figure> figures,
+                                               const std::string& folder);
+/// The title as HTML.
+[[nodiscard]] std::string page_title(const Page& page);
+/// Writes `folder`/report.html. Errors: it cannot be written.
+[[nodiscard]] Status write_html(const std::string& html, const std::string& folder);
+
 /// Writes `folder`/report.html with the figures' SVG files (from draw()) inlined.
 /// Errors: an SVG file or the page cannot be read or written.
 [[nodiscard]] Status write_page(const Page& page, std::span<const Figure> figures,

@@ -1,5 +1,5 @@
-// Reads one to three logs, aligns the start of their controllers, and writes figures, tables and
-// page.
+// Reads one to three logs, aligns the start of their controllers, and makes figures, tables and
+// facts of them.
 #include "report/report.hpp"
 
 #include <fmt/core.h>
@@ -10,25 +10,13 @@
 
 #include "base/quoting.hpp"
 #include "report/close_passive.hpp"
-#include "report/gnuplot.hpp"
-#include "report/page.hpp"
+#include "report/differences.hpp"
 #include "report/replay.hpp"
 #include "report/run_facts.hpp"
 #include "report/run_figures.hpp"
 
 namespace tandem::report {
 namespace {
-
-Status create(const std::string& folder) {
-  std::error_code problem;
-  std::filesystem::create_directories(folder, problem);
-  if (!problem) return {};
-  return std::unexpected(Error{"cannot create the report's folder: " + problem.message(),
-                               "name a folder that can be written with -o",
-                               folder,
-                               0,
-                               {}});
-}
 
 constexpr const char* kSides[] = {" A", " B", " C"};
 
@@ -195,56 +183,84 @@ Result<std::vector<Figure>> draw_all(const RunData& run, const OtherRuns& others
     for (Figure& figure : figures) figure.x_label += (figure.x_label.empty() ? "" : "; ") + letters;
   }
   for (Figure& figure : figures)
-    if (!figure.equal_axes) break_at_gaps(figure);  // all but the posture are over time
+    if (is_over_time(figure)) break_at_gaps(figure);  // all but the posture are
   return figures;
+}
+
+/// The robot with what its description says of its joints.
+hal::RobotConfig with_limits(const RunData& run) {
+  hal::RobotConfig robot = run.robot;
+  const auto set = [](double& limit, double described) {
+    if (std::isnan(limit)) limit = described;
+  };
+  for (hal::JointConfig& joint : robot.joints) {
+    const auto found = std::ranges::find(run.tree.joints, joint.name, &model::Joint::name);
+    if (found == run.tree.joints.end()) continue;
+    joint.slides = found->type == model::JointType::kPrismatic;
+    set(joint.min_position_rad, found->lower);
+    set(joint.max_position_rad, found->upper);
+    set(joint.max_velocity_rad_s, found->velocity);
+    set(joint.max_torque_Nm, found->effort);
+  }
+  return robot;
 }
 
 }  // namespace
 
-Result<ReportFiles> make_report(const std::string& log, const std::vector<std::string>& other_logs,
-                                const std::string& folder, const FindKernels& find_kernels,
-                                const ErrorText& error_text) {
+Result<Report> read_report(const std::string& log, const std::vector<std::string>& other_logs,
+                           const FindKernels& find_kernels, const ErrorText& error_text) {
   Result<RunData> run = read_run(log, error_text);
   if (!run) return std::unexpected(run.error());
   std::vector<PageTable> replays;
-  Result<std::vector<RunData>> other_runs = read_others(*run, other_logs, error_text, replays);
-  if (!other_runs) return std::unexpected(other_runs.error());
+  Result<std::vector<RunData>> others = read_others(*run, other_logs, error_text, replays);
+  if (!others) return std::unexpected(others.error());
   Result<std::optional<RunData>> beside = std::nullopt;
-  if (other_runs->empty()) beside = read_parallel(*run);
+  if (others->empty()) beside = read_parallel(*run);
   if (!beside) return std::unexpected(beside.error());
-  if (*beside) {
+  const bool parallel = beside->has_value();
+  if (parallel) {
     (*beside)->drawn_later_s = run->time_s.front() - (*beside)->time_s.front();
-    other_runs->push_back(std::move(**beside));
+    others->push_back(std::move(**beside));
   }
-  if (const Status s = create(folder); !s) return std::unexpected(s.error());
 
-  ReportFiles files;
+  Report report;
   const tandem_kernels* kernels = find_kernels(*run);
   std::vector<RunData*> all{&*run};
-  for (RunData& one : *other_runs) all.push_back(&one);
-  files.remarks = close_and_remark(all, kernels);
+  for (RunData& one : *others) all.push_back(&one);
+  report.remarks = close_and_remark(all, kernels);
   for (const RunData* one : all) {
-    if (*beside && one != &*run) continue;  // it is of the same log
+    if (parallel && one != &*run) continue;  // it is of the same log
     for (const std::string& remark : one->remarks)
-      files.remarks.push_back(one->path + ": " + remark);
+      report.remarks.push_back(one->path + ": " + remark);
   }
-  const OtherRuns others(all.begin() + 1, all.end());
-  const auto drawn = draw_all(*run, others, beside->has_value(), kernels, files.remarks);
-  if (!drawn) return std::unexpected(drawn.error());
-  const std::vector<Figure>& figures = *drawn;
-  if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
-  const Page page = *beside ? parallel_page(*run, *others.front()) : page_of(*run, others, replays);
-  if (const Status s = write_page(page, figures, folder); !s) {
-    return std::unexpected(s.error());
+  const OtherRuns beside_it(all.begin() + 1, all.end());
+  auto figures = draw_all(*run, beside_it, parallel, kernels, report.remarks);
+  if (!figures) return std::unexpected(figures.error());
+  report.figures = std::move(*figures);
+  report.page =
+      parallel ? parallel_page(*run, *beside_it.front()) : page_of(*run, beside_it, replays);
+  for (std::size_t i = 0; i < beside_it.size() && !parallel; ++i) {
+    auto table = first_differences(run->path, beside_it[i]->path, static_cast<char>('B' + i));
+    if (table)
+      report.page.tables.push_back(std::move(*table));
+    else
+      report.remarks.push_back(table.error().to_string());
   }
-  files.page = folder + "/report.html";
-  for (const Figure& figure : figures) files.images.push_back(folder + "/" + figure.name + ".png");
-  files.images.push_back(folder + "/overview.png");
-  for (const Figure& figure : figures) {
-    std::error_code ignored;  // its drawing stands in the page
-    std::filesystem::remove(folder + "/" + figure.name + ".svg", ignored);
+  report.at_s = run->time_s.front();
+  report.run = {.robot = with_limits(*run),
+                .urdf = log::value_of(run->info.configuration, run->robot.model.urdf),
+                .version = run->info.version,
+                .experiment = std::filesystem::path(run->path).filename().string(),
+                .run = {},
+                .simulated = run->info.hal == "sim",
+                .period_ns = run->info.period_ns};
+  for (std::size_t i = 0; i < all.size() && (i == 0 || !parallel); ++i) {
+    report.logs.push_back({.path = all[i]->path,
+                           .prefix = i == 0 ? "" : std::string(1, static_cast<char>('A' + i)) + "/",
+                           .later_s = all[i]->drawn_later_s,
+                           .slower = all[i]->drawn_slower});
   }
-  return files;
+  return report;
 }
 
 }  // namespace tandem::report

@@ -8,6 +8,8 @@
 
 #include "base/result.hpp"
 #include "model/kernels.h"
+#include "report/page.hpp"
+#include "report/recording.hpp"
 #include "report/run_data.hpp"
 
 namespace tandem::report {
@@ -15,9 +17,42 @@ namespace tandem::report {
 /// Finds the kernels of a run's robot; null when there are none that fit.
 using FindKernels = std::function<const tandem_kernels*(const RunData&)>;
 
+/// A log of a report, as RecordedLog.
+struct ReportedLog {
+  std::string path;
+  std::string prefix;
+  double later_s = 0.0, slower = 1.0;
+};
+
+/// What a report shows, before anything is written.
+struct Report {
+  studio::RunDescription run;  ///< of the first log
+  std::vector<ReportedLog> logs;
+  std::vector<Figure> figures;
+  Page page;
+  double at_s = 0.0;                 ///< where the first log's controllers start
+  std::vector<std::string> remarks;  ///< what it lacks, and why
+};
+
+/// Reads `log`, and up to two others that are laid over it.
+/// Errors: read_run()'s; logs of different robots.
+[[nodiscard]] Result<Report> read_report(const std::string& log,
+                                         const std::vector<std::string>& others,
+                                         const FindKernels& find_kernels,
+                                         const ErrorText& error_text = {});
+/// The same. A log that is no whole run's, as one without its robot's files, has its numbers and
+/// events alone.
+[[nodiscard]] Result<Report> read_any(const std::string& log,
+                                      const std::vector<std::string>& others,
+                                      const FindKernels& find_kernels,
+                                      const ErrorText& error_text = {});
+/// The numbers of its logs. Errors: Recording::read()'s.
+[[nodiscard]] Result<Recording> record(const Report& report, const RowLimits& most);
+
 struct ReportFiles {
   std::string page;                  ///< report.html
-  std::vector<std::string> images;   ///< PNG, one per figure, and the overview
+  std::vector<std::string> images;   ///< PNG, one per figure, and the overview; none of a log that
+                                     ///< has no figures
   std::vector<std::string> remarks;  ///< what the report lacks, and why
 };
 

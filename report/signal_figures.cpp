@@ -56,6 +56,7 @@ Figure figure_of(const RunData& run, const std::string& controller, const hal::F
     std::vector<double>& column = table.columns[order[k]];
     const bool still = largest > 0.0 && range_of(column) <= kStillShare * largest;
     const std::string name = log::signal_name(field, order[k], run.info);
+    figure.signals.push_back("controller/" + controller + "." + name);
     figure.curves.push_back({field.count == 1 ? std::string() : name,
                              still ? CurveStyle::kStill : kSignalStyles[k], table.time_s,
                              std::move(column)});

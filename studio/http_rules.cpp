@@ -78,6 +78,16 @@ bool is_number_address(std::string_view host) {
 
 }  // namespace
 
+namespace {
+
+Response unknown_reader() {
+  Response refused = words(401, "Unauthorized", "Open the address with its token.");
+  refused.headers.emplace_back("WWW-Authenticate", "Bearer");
+  return refused;
+}
+
+}  // namespace
+
 bool is_secret(std::string_view text, std::string_view secret) {
   unsigned differs = text.size() == secret.size() ? 0 : 1;
   for (std::size_t i = 0; i < secret.size(); ++i) {
@@ -99,6 +109,17 @@ HttpRules::HttpRules(Place place, std::string urdf, std::string token, std::stri
       page_(std::move(page)),
       guests_(std::move(guests)),
       meshes_(std::move(meshes)) {}
+
+HttpRules::HttpRules(Place place, std::string token, std::vector<Served> served)
+    : place_(std::move(place)), served_(std::move(served)), token_(std::move(token)) {}
+
+bool HttpRules::may_read(const RequestHead& head) const {
+  constexpr std::string_view kBearer = "Bearer ";
+  const std::string_view given =
+      head.authorizations.size() == 1 ? head.authorizations.front() : std::string_view();
+  return place_.loopback ||
+         (given.starts_with(kBearer) && is_secret(given.substr(kBearer.size()), token_));
+}
 
 /// Whether "localhost:8642" is us. Port 80 may be left out.
 bool HttpRules::is_here(std::string_view host) const {
@@ -132,13 +153,20 @@ std::optional<Response> HttpRules::answer(const RequestHead& head) const {
   const std::string_view path = head.target.substr(0, head.target.find('?'));
   if (is_guest(head) && path == "/" && head.method == "GET" && !head.old) return admit(head);
   const bool asset = std::ranges::find(kPage, path, &PageFile::path) != std::end(kPage);
-  if (!asset && path != kWebSocket && path != kDescription && !mesh_number(path)) {
+  const auto served = std::ranges::find(served_, path, &Served::path);
+  const bool ours = served != served_.end();
+  if (!asset && !ours && (!served_.empty() || (path != kWebSocket && path != kDescription && !mesh_number(path)))) {
     return words(404, "Not Found", "There is nothing here. The page is /");
   }
   if (head.method != "GET") {
     Response refused = words(405, "Method Not Allowed", "Only GET is answered.");
     refused.headers.emplace_back("Allow", "GET");
     return refused;
+  }
+  if (ours) {
+    if (served->guarded && !may_read(head)) return unknown_reader();
+    const std::size_t query = head.target.find('?');
+    return served->get(query == std::string_view::npos ? "" : head.target.substr(query + 1));
   }
   if (path != kWebSocket) {
     if (!head.upgrades) return get(path, head);
@@ -208,16 +236,7 @@ Response HttpRules::get_mesh(std::size_t mesh) const {
 Response HttpRules::get(std::string_view path, const RequestHead& head) const {
   const auto mesh = mesh_number(path);
   if (mesh || path == kDescription) {
-    const std::string_view given =
-        head.authorizations.size() == 1 ? head.authorizations.front() : std::string_view();
-    constexpr std::string_view kBearer = "Bearer ";
-    const bool knows =
-        given.starts_with(kBearer) && is_secret(given.substr(kBearer.size()), token_);
-    if (!place_.loopback && !knows) {
-      Response refused = words(401, "Unauthorized", "Open the address with its token.");
-      refused.headers.emplace_back("WWW-Authenticate", "Bearer");
-      return refused;
-    }
+    if (!may_read(head)) return unknown_reader();
     if (mesh) return get_mesh(*mesh);
     return {.type = "application/xml; charset=utf-8", .body = urdf_};
   }

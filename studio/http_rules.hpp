@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -55,12 +56,23 @@ struct Guests {
   std::vector<std::string> origins{};     ///< of pages elsewhere that may look
 };
 
+/// What is served beside the page where no run is behind it.
+struct Served {
+  std::string path;  ///< "/log"
+  /// The answer, without kHeaders. @param query  behind "?"; any thread of the server's
+  std::function<Response(std::string_view query)> get;
+  bool guarded = true;  ///< elsewhere than on loopback it asks for the token
+};
+
 class HttpRules {
  public:
   /// @param token  that /robot.urdf, /mesh/N and guests need where the place is no loopback
   /// @param page   folder whose files are the page, as they are at each request; empty: assets()
   HttpRules(Place place, std::string urdf, std::string token, std::string page = {},
             Guests guests = {}, MeshFiles meshes = {});
+
+  /// Those of a page without a run: no WebSocket, no description; each of `served` in its place.
+  HttpRules(Place place, std::string token, std::vector<Served> served);
 
   /// The answer; empty: the request opens a WebSocket.
   [[nodiscard]] std::optional<Response> answer(const RequestHead& head) const;
@@ -75,7 +87,11 @@ class HttpRules {
   [[nodiscard]] Response get_mesh(std::size_t mesh) const;
   [[nodiscard]] Response get(std::string_view path, const RequestHead& head) const;
 
+  /// Whether a request has the token, or needs none.
+  [[nodiscard]] bool may_read(const RequestHead& head) const;
+
   Place place_;
+  std::vector<Served> served_;
   std::string urdf_, token_, page_;
   Guests guests_;
   MeshFiles meshes_;

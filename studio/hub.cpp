@@ -22,7 +22,7 @@ Hub::ClientNumber Hub::connect(std::string name) {
 
 void Hub::greet(ClientNumber number, Client& client) {
   if (std::exchange(client.greeted, true)) return;
-  client.out.text(hello_text(*run_, sampler_->history()));
+  client.out.text(hello_text(*run_, sampler_->history().capacity_cycles()));
   client.out.text(signals_text(sources_, sampler_->table()));
   const std::vector<Event> events(events_.begin(), events_.end());
   client.out.text(events_text(events));

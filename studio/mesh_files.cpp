@@ -85,7 +85,7 @@ Result<MeshPlace> place_of(const std::string& name, const fs::path& description)
 
 MeshFiles::MeshFiles(const std::string& urdf, const std::string& file) {
   std::error_code none;
-  file_ = fs::absolute(file, none).lexically_normal().string();
+  if (!file.empty()) file_ = fs::absolute(file, none).lexically_normal().string();
   tinyxml2::XMLDocument document;
   if (document.Parse(urdf.data(), urdf.size()) != tinyxml2::XML_SUCCESS) return;
   collect(document.FirstChildElement(), names_);
@@ -93,6 +93,7 @@ MeshFiles::MeshFiles(const std::string& urdf, const std::string& file) {
 
 Result<std::string> MeshFiles::path_of(std::size_t mesh) const {
   const std::string& name = names_.at(mesh);
+  if (file_.empty()) return fail("a log has its name alone");
   if (name.size() > kLongestName) return fail("its name is too long");
   const auto place = place_of(name, file_);
   if (!place) return std::unexpected(place.error());

@@ -24,7 +24,7 @@ inline constexpr std::uintmax_t kMostMeshBytes = std::uintmax_t{32} << 20U;
 class MeshFiles {
  public:
   MeshFiles() = default;
-  /// @param urdf  the description's text; @param file  its path
+  /// @param urdf  the description's text; @param file  its path; empty: of a log, which has no mesh
   MeshFiles(const std::string& urdf, const std::string& file);
 
   /// Names as the description has them, each once.

@@ -86,7 +86,7 @@ Json mark_json(const hal::MarkInfo& mark) {
 
 }  // namespace
 
-std::string hello_text(const RunDescription& run, const History& history) {
+std::string hello_text(const RunDescription& run, std::span<const std::uint64_t> reach) {
   const hal::RobotConfig& robot = run.robot;
   const double period_s = 1e-9 * static_cast<double>(run.period_ns);
   Json joints = Json::array(), postures = Json::array(), reaches = Json::array();
@@ -94,7 +94,7 @@ std::string hello_text(const RunDescription& run, const History& history) {
   for (const hal::JointConfig& joint : robot.joints) joints.push_back(joint_json(joint));
   for (const auto& posture : robot.postures) postures.push_back(posture.name);
   for (const hal::SiteConfig& site : robot.model.sites) sites.push_back(site.name);
-  for (const std::uint64_t cycles : history.capacity_cycles()) {
+  for (const std::uint64_t cycles : reach) {
     reaches.push_back(period_s * static_cast<double>(cycles));
   }
   const MeshFiles meshes(run.urdf, run.urdf_file);
@@ -204,25 +204,38 @@ std::string tick_frame(const Tick& tick, std::uint32_t lost) {
   return frame;
 }
 
+std::string window_frame(const FrameHead& head, std::span<const float> numbers) {
+  std::string frame;
+  frame.reserve(32 + numbers.size_bytes());
+  put(frame, kWindowKind);
+  put(frame, static_cast<std::uint8_t>(head.level));
+  put(frame, static_cast<std::uint16_t>(head.signals));
+  put(frame, head.id);
+  put(frame, static_cast<std::uint32_t>(head.rows));
+  put(frame, static_cast<std::uint32_t>(head.cycles));
+  put(frame, head.start_s);
+  put(frame, head.step_s);
+  put(frame, numbers);
+  return frame;
+}
+
 std::string window_frame(std::uint32_t id, const History& history, const Window& window,
                          std::span<const SignalId> signals, std::int64_t period_ns) {
   const double period_s = 1e-9 * static_cast<double>(period_ns);
-  std::string frame;
-  frame.reserve(32 + signals.size() * window.numbers() * sizeof(float));
-  put(frame, kWindowKind);
-  put(frame, static_cast<std::uint8_t>(window.level));
-  put(frame, static_cast<std::uint16_t>(signals.size()));
-  put(frame, id);
-  put(frame, static_cast<std::uint32_t>(window.rows));
-  put(frame, static_cast<std::uint32_t>(window.cycles));
-  put(frame, period_s * static_cast<double>(window.first_cycle));
-  put(frame, period_s * static_cast<double>(window.cycles));
-  std::vector<float> numbers(window.numbers());
+  std::vector<float> numbers(signals.size() * window.numbers());
+  std::span<float> rest(numbers);
   for (const SignalId signal : signals) {
-    history.read(window, signal, numbers);
-    put(frame, std::span<const float>(numbers));
+    history.read(window, signal, rest.first(window.numbers()));
+    rest = rest.subspan(window.numbers());
   }
-  return frame;
+  return window_frame({.id = id,
+                       .level = window.level,
+                       .signals = signals.size(),
+                       .rows = window.rows,
+                       .cycles = window.cycles,
+                       .start_s = period_s * static_cast<double>(window.first_cycle),
+                       .step_s = period_s * static_cast<double>(window.cycles)},
+                      numbers);
 }
 
 }  // namespace tandem::studio

@@ -31,7 +31,9 @@ struct RunDescription {
   std::int64_t period_ns = 1'000'000;
 };
 
-[[nodiscard]] std::string hello_text(const RunDescription& run, const History& history);
+/// @param reach  cycles that each level of the history can hold; empty: there is none
+[[nodiscard]] std::string hello_text(const RunDescription& run,
+                                     std::span<const std::uint64_t> reach);
 [[nodiscard]] std::string signals_text(std::uint32_t revision, const SignalTable& table);
 [[nodiscard]] std::string events_text(std::span<const Event> events);
 [[nodiscard]] std::string error_text(std::string_view message, std::string_view hint);
@@ -57,6 +59,16 @@ struct Tick {
 /// @param lost  frames that this client was not sent so far
 [[nodiscard]] std::string tick_frame(const Tick& tick, std::uint32_t lost);
 
+/// How a window begins.
+struct FrameHead {
+  std::uint32_t id = 0;
+  std::size_t level = 0;
+  std::size_t signals = 0, rows = 0;
+  std::uint64_t cycles = 1;  ///< of a row
+  double start_s = 0.0, step_s = 0.0;
+};
+/// @param numbers  signal by signal its rows: of one cycle a number, else least and largest
+[[nodiscard]] std::string window_frame(const FrameHead& head, std::span<const float> numbers);
 /// @param id  the question's
 [[nodiscard]] std::string window_frame(std::uint32_t id, const History& history,
                                        const Window& window, std::span<const SignalId> signals,

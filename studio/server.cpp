@@ -95,6 +95,12 @@ void Server::serve(Hub& hub, HttpRules rules, const std::vector<Protocol*>& othe
   impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
 }
 
+void Server::serve(HttpRules rules) {
+  impl_->rules = std::move(rules);
+  impl_->accept();
+  impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
+}
+
 void Server::answered() {
   net::post(impl_->io, [impl = impl_.get()] {
     impl->hub->take_answers();
@@ -106,7 +112,7 @@ void Server::end(const std::string& how, const std::string& log, std::chrono::mi
   if (!impl_->thread.joinable()) return;
   std::future<void> gone = impl_->all_gone.get_future();
   net::post(impl_->io, [impl = impl_.get(), how, log] {
-    impl->hub->take_answers();
+    if (impl->hub != nullptr) impl->hub->take_answers();
     for (Protocol* one : impl->protocols) {
       one->tick(Protocol::Clock::now());
       one->end(how, log);

@@ -36,6 +36,8 @@ class Server {
   /// Starts the thread. Once. What is given is the thread's from now on, and outlives this.
   /// @param others  protocols beside the hub's
   void serve(Hub& hub, HttpRules rules, const std::vector<Protocol*>& others);
+  /// The same without a run: pages alone.
+  void serve(HttpRules rules);
   /// Any thread: the hub's asker has answers.
   void answered();
   /// Tells the clients that the run is over, closes them, and ends the thread.

@@ -53,12 +53,13 @@ Studio::Studio(const Options& options, RunDescription run, const Tap::Images& im
       hub_(run_, sampler_, {.token = token_, .open = server->place().loopback}),
       server_(std::move(server)) {}
 
-std::string Studio::address() const {
-  const Place& place = server_->place();
+std::string address_of(const Place& place, const std::string& token) {
   const bool six = place.address.find(':') != std::string::npos;
   return fmt::format("http://{}{}{}:{}/#token={}", six ? "[" : "", place.address, six ? "]" : "",
-                     place.port, token_);
+                     place.port, token);
 }
+
+std::string Studio::address() const { return address_of(server_->place(), token_); }
 
 void Studio::start(Feed feed, Asker asker, Protocol* guests) {
   hub_.start(std::move(feed), std::move(asker));

@@ -66,6 +66,9 @@ class Studio {
   std::unique_ptr<Server> server_;  // last: its thread uses the others
 };
 
+/// "http://127.0.0.1:8642/#token=…".
+[[nodiscard]] std::string address_of(const Place& place, const std::string& token);
+
 /// So many random bytes in hexadecimal digits, from the kernel.
 [[nodiscard]] std::string draw_hex(std::size_t bytes);
 

@@ -218,7 +218,7 @@ void add_all(Subcommands& commands) {
       "controller", "check", "Whether a controller keeps the rules of the cycle");
   commands.add_to_group<ControllerNewOptions>("controller", "new",
                                               "The project of a controller of your own");
-  commands.add<StudioCommandOptions>("studio", "A run that goes on, in a browser");
+  commands.add<StudioCommandOptions>("studio", "A run that goes on, or logs, in a browser");
   commands.add<TopicOptions>("topic", "Topics of ROS 2 and DDS: list, echo, hz");
   commands.add<AskOptions>("ask", "Ask a running process, in JSON");
   commands.add<DoctorOptions>("doctor", "Is this machine fit for real time?");

@@ -34,9 +34,12 @@ const char kStudioExamples[] = R"(Examples:
   tandem studio                                      of the only run of this user
   tandem studio --socket /tmp/run.sock --port 9000
   tandem studio --address 0.0.0.0                    for other machines, too
+  tandem studio runs/coman-squat-001.mcap            a log, until Ctrl-C
+  tandem studio runs/a.mcap runs/b.mcap              the second log over the first
 A run that was started without --studio opens it now, and keeps it until its end; its pace stays.
 Where it is open already the same address is printed. `tandem emulate` has no studio: look at the
-run on the other side of its wire.)";
+run on the other side of its wire. `tandem report` writes a log's page as a file.)";
+
 /// "https://app.foxglove.dev", "http://localhost:8080"
 CLI::Validator is_origin() {
   const auto check = [](const std::string& text) -> std::string {
@@ -76,13 +79,16 @@ void add_studio_flags(CLI::App& app, StudioOptions& o) {
 }
 
 void add_flags(CLI::App& app, StudioCommandOptions& o) {
+  CLI::Option* logs =
+      app.add_option("logs", o.logs, "MCAP files of one robot, at most three")->expected(1, 3);
   add_target(app, o.target);
+  for (const char* of_a_run : {"--socket", "--dds"}) app.get_option(of_a_run)->excludes(logs);
   app.add_option_function<std::string>(
          "--port", [&o](const std::string& text) { o.port = port_of(text); },
          "Where the studio listens; 0: any (default: the first free one from 8642)")
       ->check(is_port("--port 9000"));
   app.add_option("--address", o.address, kAddressHelp)->check(is_given(kNameAnAddress));
-  app.add_option("--page", o.page, kPageHelp)->check(is_given("name a folder"));
+  app.add_option("--page", o.page, kPageHelp)->check(is_given("name a folder"))->excludes(logs);
   app.footer(kStudioExamples);
 }
 

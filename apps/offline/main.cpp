@@ -47,6 +47,7 @@ Exit perform(const Command& command) {
           [](const LogOptions& options) { return log_command(options); },
           [](const EdsOptions& options) { return eds_command(options); },
           [](const ReportOptions& options) { return report_command(options); },
+          [](const StudioCommandOptions& options) { return studio_of_logs(options); },
           [](const ExciteOptions& options) { return excite_command(options, tried_in_simulation); },
           [](const IdentifyOptions& options) { return identify_command(options); },
           [](const DoctorOptions& options) { return doctor_command(options); },

@@ -27,6 +27,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit log_replay_command(const LogOptions& options);
 /// Writes a data sheet per type of board and sensor; with `show`, prints what a sheet says.
 [[nodiscard]] Exit eds_command(const EdsOptions& options);
+/// Serves logs to a browser until a signal ends it.
+[[nodiscard]] Exit studio_of_logs(const StudioCommandOptions& options);
 /// A part of it: what a drive is and can, by its data sheet.
 [[nodiscard]] Exit eds_show(const EdsOptions& options);
 [[nodiscard]] Exit report_command(const ReportOptions& options);

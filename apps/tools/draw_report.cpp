@@ -26,16 +26,19 @@ std::string default_folder(const std::string& log, const std::vector<std::string
 
 }  // namespace
 
-Result<report::ReportFiles> draw_report(const std::string& log,
-                                        const std::vector<std::string>& others,
-                                        const std::string& output, const std::string& interrupted) {
-  model::KernelLibrary kernels;  // lives as long as the drawing needs it
-  const auto find = [&kernels](const report::RunData& run) -> const tandem_kernels* {
+report::FindKernels kernels_into(model::KernelLibrary& kernels) {
+  return [&kernels](const report::RunData& run) -> const tandem_kernels* {
     auto found = robot::find_kernels(run.info.robot, run.info.description_hash, {});
     if (!found) return nullptr;
     kernels = std::move(*found);
     return kernels.get();
   };
+}
+
+Result<report::ReportFiles> draw_report(const std::string& log,
+                                        const std::vector<std::string>& others,
+                                        const std::string& output, const std::string& interrupted) {
+  model::KernelLibrary kernels;  // lives as long as the drawing needs it
   std::vector<std::string> logs{log};
   logs.insert(logs.end(), others.begin(), others.end());
   for (const std::string& one : logs) {  // before a folder is made beside it
@@ -52,8 +55,8 @@ Result<report::ReportFiles> draw_report(const std::string& log,
   Result<Draft> draft = Draft::folder(
       folder, output.empty() ? Draft::Removes::kAnyNumber : Draft::Removes::kSameName, interrupted);
   if (!draft) return std::unexpected(draft.error());
-  auto files =
-      report::make_report(log, others, draft->path(), find, hal::can::DriveMaster::error_text);
+  auto files = report::make_report(log, others, draft->path(), kernels_into(kernels),
+                                   hal::can::DriveMaster::error_text);
   if (!files) return std::unexpected(draft->placed(files.error()));
   if (const Status placed = draft->place(); !placed) return std::unexpected(placed.error());
   files->page = draft->placed(files->page);

@@ -6,9 +6,13 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "model/kernel_library.hpp"
 #include "report/report.hpp"
 
 namespace tandem::apps {
+
+/// Finds the kernels of a run's robot, which live as long as `kernels`.
+[[nodiscard]] report::FindKernels kernels_into(model::KernelLibrary& kernels);
 
 /// @param others  up to two more logs, laid over the first
 /// @param output  folder to write; empty: beside `log`, named after the logs

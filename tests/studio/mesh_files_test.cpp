@@ -82,9 +82,9 @@ TEST(StudioMeshes, ElsewhereAreRefused) {
 
 TEST(StudioMeshes, AreAskedForByNumber) {
   const MeshPackage package;
-  const HttpRules here({"127.0.0.1", 8642, true}, "<robot/>", "token", "",
+  const HttpRules here({"127.0.0.1", 8642, true}, "<robot/>", "token", "", {},
                        package.with("../meshes/a.STL"));
-  const HttpRules open({"0.0.0.0", 8642, false}, "<robot/>", "token", "",
+  const HttpRules open({"0.0.0.0", 8642, false}, "<robot/>", "token", "", {},
                        package.with("../meshes/a.STL"));
   const auto status = [](const HttpRules& rules, std::string_view target, const char* key = "") {
     RequestHead head{.method = "GET", .target = target};

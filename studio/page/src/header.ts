@@ -61,7 +61,7 @@ export class Header {
       h(
         'div',
         { class: 'facts' },
-        this.phase,
+        data.source.live && this.phase,
         this.time,
         this.rate,
         this.measured,
@@ -70,7 +70,7 @@ export class Header {
         this.reset,
         this.start,
       ),
-      h('div', { class: 'right' }, themeButton, stop),
+      h('div', { class: 'right' }, themeButton, data.source.live && stop),
       this.fault,
     );
     data.source.on({
@@ -123,7 +123,10 @@ export class Header {
     let stale = true;
     if (this.state === 'ended') words = `ended${this.why ? `: ${this.why}` : ''}`;
     else if (this.state === 'lost') words = `lost ${age(now - this.brokeAt)} ago`;
-    else if (this.state === 'live' && !this.data.lastTick) words = 'waiting for values';
+    else if (this.state === 'recorded') {
+      words = 'recorded';
+      stale = false;
+    } else if (this.state === 'live' && !this.data.lastTick) words = 'waiting for values';
     else if (this.state === 'live' && quiet > kSilent_ms) words = `silent for ${age(quiet)}`;
     else if (this.state === 'live') {
       words = this.data.lastTick?.paused ? 'paused' : 'live';

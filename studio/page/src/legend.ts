@@ -4,6 +4,7 @@ import { h, say } from './dom';
 import { number } from './format';
 import { type Curve, labelOf, type Series, signalsOf, unitOf } from './series';
 import { statistics } from './statistics';
+import { colourOf, prefixOf } from './twins';
 
 export interface LegendOwner {
   readonly series: Series[];
@@ -15,6 +16,11 @@ export interface LegendOwner {
 }
 
 export const kPaletteSize = 8;
+
+/** Without the name of the report's figure, whose title says it. */
+function shortLabel(series: Series): string {
+  return labelOf(series).replace(/^report\/[^.]*\./, '');
+}
 
 export class Legend {
   readonly element = h('table', { class: 'legend' });
@@ -49,7 +55,7 @@ export class Legend {
       '',
     ];
     this.cells = [];
-    const rows = this.owner.series.map((series, i) => {
+    const rows = this.owner.series.map((series) => {
       const value = h('td', { class: 'figure' }, '–');
       const figures = withFigures
         ? [0, 1, 2, 3, 4].map(() => h('td', { class: 'figure' }, '–'))
@@ -65,12 +71,16 @@ export class Legend {
         h(
           'td',
           {},
-          h('span', { class: 'swatch', style: `--c: var(--series-${i % kPaletteSize})` }),
+          h('span', {
+            class: 'swatch',
+            style: `--c: var(--series-${colourOf(series, this.owner.series) % kPaletteSize})`,
+            'data-log': prefixOf(series) || undefined,
+          }),
         ),
         h(
           'th',
           { scope: 'row', title: doc },
-          known ? labelOf(series) : `${labelOf(series)} (not in this run)`,
+          known ? shortLabel(series) : `${labelOf(series)} (not in this run)`,
         ),
         value,
         h('td', {}, unitOf(series, this.data.catalog)),

@@ -1,4 +1,4 @@
-// The page: joins its parts with the run that serves it.
+// The page: joins its parts with the run that serves it, or with the recording that it holds.
 import 'uplot/dist/uPlot.min.css';
 import './theme.css';
 import './style.css';
@@ -6,6 +6,7 @@ import './panels.css';
 import './joints.css';
 import './scene.css';
 import './scope.css';
+import './report.css';
 import './narrow.css';
 import { Actions } from './actions';
 import { ClockPanel } from './clock';
@@ -19,6 +20,8 @@ import { Inputs } from './inputs';
 import { Joints } from './joints';
 import { LiveSource } from './live';
 import { Plots } from './plots';
+import { recordingIn } from './recorded';
+import { startRecorded, startServed } from './recorded_page';
 import { Scene } from './scene';
 import { Scope } from './scope';
 import { Tabs } from './tabs';
@@ -72,8 +75,13 @@ function themeButton(changed: () => void): HTMLElement {
   return button;
 }
 
+/** What stands behind `#token=` in an address. */
+function tokenOf(hash: string): string {
+  return /(?:^#|&)token=([0-9a-f]+)/.exec(hash)?.[1] ?? '';
+}
+
 function start(): void {
-  const token = /(?:^#|&)token=([0-9a-f]+)/.exec(location.hash)?.[1] ?? '';
+  const token = tokenOf(location.hash);
   const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
   const source = new LiveSource(`${scheme}://${location.host}/ws`, token);
   const data = new Data(source);
@@ -154,4 +162,8 @@ function start(): void {
   requestAnimationFrame(frame);
 }
 
-start();
+const recording = recordingIn(document);
+const log = document.body.dataset.log;
+if (log) void startServed(log, tokenOf(location.hash), themeButton);
+else if (recording) startRecorded(recording, themeButton);
+else start();

@@ -10,12 +10,15 @@ import { kPaletteSize, Legend, type LegendOwner } from './legend';
 import { eventMarks } from './marks';
 import type { Window } from './protocol';
 import { type Curve, evaluate, labelOf, type Series, signalsOf, unitOf } from './series';
+import { colourOf, dashOf } from './twins';
 
 export interface PaneOwner {
   changed(pane: Pane): void;
   chosen(pane: Pane): void;
   remove(pane: Pane): void;
   statistics(): boolean;
+  /** The series with the same of the other logs, where these are laid over it. */
+  twins?(series: Series[]): Series[];
   /** Whether a pane has a second axis: all leave room for it, so that times are one below the other. */
   secondAxis(): boolean;
 }
@@ -95,7 +98,7 @@ export class Pane implements LegendOwner {
   add(series: Series): void {
     if (this.series.some((one) => labelOf(one) === labelOf(series)) || this.series.length >= 16)
       return;
-    this.series.push(series);
+    this.series.push(...(this.owner.twins?.([series]) ?? [series]));
     this.listSeries();
     this.owner.changed(this);
   }
@@ -274,7 +277,7 @@ export class Pane implements LegendOwner {
     const lines: uPlot.Series[] = [{}];
     const bands: uPlot.Band[] = [];
     for (const { series } of curves) {
-      const place = this.series.indexOf(series);
+      const place = colourOf(series, this.series);
       const colour = () => theme(`--series-${place % kPaletteSize}`);
       const scale = `y ${unitOf(series, this.data.catalog)}`;
       const first = lines.length;
@@ -284,7 +287,7 @@ export class Pane implements LegendOwner {
         stroke: colour,
         width: 1.4,
         points: { show: false },
-        dash: series.kind === 'signal' ? undefined : [5, 3],
+        dash: dashOf(series) ?? (series.kind === 'signal' ? undefined : [5, 3]),
       });
       bands.push({
         series: [first + 1, first],

@@ -8,7 +8,9 @@ import { eventNear, signOf } from './marks';
 import { Pane, type PaneOwner } from './pane';
 import type { ScopeSettings } from './scope_settings';
 import { signalSearch } from './search';
+import type { Series } from './series';
 import { kWidths } from './time';
+import { prefixOf, withTwins } from './twins';
 
 const kMostPanes = 12;
 /** Pictures a second: a plot costs more than a number. */
@@ -20,6 +22,7 @@ export class Plots implements PaneOwner {
   private panes: Pane[] = [];
   private active: Pane | null = null;
   private figures = false;
+  private overlay = true;
   private dirty = true;
   private pointed = false;
   private last = 0;
@@ -74,8 +77,11 @@ export class Plots implements PaneOwner {
         this.button('+', () => time.zoom(0.5), 'zoom in'),
         this.button('◀', () => time.pan(-0.4), 'earlier'),
         this.button('▶', () => time.pan(0.4), 'later'),
-        this.now,
+        this.data.source.live
+          ? this.now
+          : this.button('Whole log', () => time.follow(), 'shows all of it'),
         this.statisticsToggle(),
+        this.overlayToggle(),
         this.presets(),
         this.button('Save layout', () => this.export(), 'saves the layout as a file'),
         this.button('Open layout', () => this.file.click(), 'opens a layout file'),
@@ -102,6 +108,9 @@ export class Plots implements PaneOwner {
 
   statistics(): boolean {
     return this.figures;
+  }
+  twins(series: Series[]): Series[] {
+    return this.overlay && !this.data.source.live ? withTwins(series, this.data.catalog) : series;
   }
   secondAxis(): boolean {
     return this.panes.some((pane) => pane.units().size > 1);
@@ -153,7 +162,7 @@ export class Plots implements PaneOwner {
   private at(): void {
     const { time } = this.data;
     const event = eventNear(this.data, this.box.clientWidth);
-    let words = time.frozen ? 'The picture stands. ' : '';
+    let words = time.frozen && !time.whole ? 'The picture stands. ' : '';
     if (time.hover !== null) words += `Values at ${seconds(time.hover)}.`;
     else if (time.selected !== null)
       words += `Values at the selected time, ${seconds(time.selected)}.`;
@@ -200,6 +209,29 @@ export class Plots implements PaneOwner {
       box,
       'statistics',
     );
+  }
+
+  /** Of several logs: the same signals of all. */
+  private overlayToggle(): HTMLElement {
+    const box = h('input', {
+      type: 'checkbox',
+      checked: true,
+      onchange: () => {
+        this.overlay = box.checked;
+        for (const pane of this.panes) {
+          const own = pane.series.filter((one) => prefixOf(one) === '');
+          pane.series.splice(0, pane.series.length, ...this.twins(own));
+          pane.listSeries();
+        }
+        this.changed();
+      },
+    });
+    const label = h('label', { class: 'toggle', hidden: true }, box, 'all logs');
+    label.title = 'each signal of all logs: those of B and C are dashed';
+    this.data.whenCatalog(() => {
+      label.hidden = !this.data.catalog.signals.some((one) => one.source.startsWith('B/'));
+    });
+    return label;
   }
 
   private presets(): HTMLElement {
@@ -275,7 +307,7 @@ export class Plots implements PaneOwner {
     const width = kWidths.find((one) => one >= layout.width_s) ?? 10;
     this.width.value = String(width);
     this.data.time.follow(width);
-    for (const pane of layout.panes) this.push(pane.series);
+    for (const pane of layout.panes) this.push(this.twins(pane.series));
     if (layout.scope) this.scope?.apply(layout.scope);
     this.want();
   }

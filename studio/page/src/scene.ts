@@ -112,7 +112,8 @@ export class Scene {
   /** At each animation frame. */
   update(now: number): void {
     const cycle = this.data.lastTick?.cycle ?? -1;
-    const selected = this.data.time.selected;
+    // Of a recording, the newest values are those at the selected time.
+    const selected = this.data.source.live ? this.data.time.selected : null;
     if (selected === null && cycle !== this.drawn) this.dirty = true;
     if (!this.dirty || this.busy) return;
     if (this.slow && now - this.renderedAt < kSlowEvery_ms) return;

@@ -50,7 +50,8 @@ export class Scope {
   ) {
     const run = {
       period_s: () => data.hello?.period_s ?? 0.001,
-      newest: () => Math.round(data.time.now / (data.hello?.period_s ?? 0.001)),
+      newest: () =>
+        Math.round((data.time.whole?.to ?? data.time.now) / (data.hello?.period_s ?? 0.001)),
       reach_s: () =>
         data.source.live ? (data.hello?.history_s[0] ?? 1) : Number.POSITIVE_INFINITY,
       idOf: (name: string) => data.catalog.named(name)?.id,

@@ -1,4 +1,4 @@
-// Where the page's data come from: a run now, later a log. The page knows nothing but this.
+// Where the page's data come from: a run, or a log. The page knows nothing but this.
 import type {
   Answer,
   Control,
@@ -10,7 +10,7 @@ import type {
   Window,
 } from './protocol';
 
-export type Connection = 'connecting' | 'live' | 'lost' | 'ended';
+export type Connection = 'connecting' | 'live' | 'lost' | 'ended' | 'recorded';
 
 export interface Listener {
   connection(state: Connection, words: string): void;

@@ -13,6 +13,8 @@ export class TimeModel {
   selected: number | null = null;
   /** Below the pointer. */
   hover: number | null = null;
+  /** All that there is, of a recording: it is seen instead of what comes; null: a run goes on. */
+  whole: { from: number; to: number } | null = null;
   private readonly listeners: (() => void)[] = [];
 
   on(listener: () => void): void {
@@ -31,7 +33,7 @@ export class TimeModel {
 
   follow(width = this.width): void {
     this.width = width;
-    this.frozen = null;
+    this.frozen = this.whole;
     this.changed();
   }
   /** The picture stands; the robot does not notice. */
@@ -49,11 +51,14 @@ export class TimeModel {
   pan(share: number): void {
     const { from, to } = this.span();
     const by = Math.max(share * (to - from), -from);
-    if (this.frozen && Number.isFinite(this.now) && to + by >= this.now && share > 0) this.follow();
+    if (this.frozen && !this.whole && Number.isFinite(this.now) && to + by >= this.now && share > 0)
+      this.follow();
     else this.freeze(from + by, to + by);
   }
   select(time: number | null): void {
-    this.selected = time === null ? null : Math.max(0, time);
+    const { whole } = this;
+    if (!whole) this.selected = time === null ? null : Math.max(0, time);
+    else if (time !== null) this.selected = Math.min(whole.to, Math.max(whole.from, time));
     this.changed();
   }
   point(time: number | null): void {

@@ -7,6 +7,7 @@ import { join } from 'node:path';
 import { after, afterEach, before, describe, test } from 'node:test';
 import { pathToFileURL } from 'node:url';
 import {
+  colours,
   eventually,
   kPage,
   lacking,
@@ -58,22 +59,8 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     await page.waitForTimeout(300);
     assert.match(await page.textContent('header'), /coman.*squat\.toml.*running.*live/s);
     const png = (await page.locator('.canvas').screenshot()).toString('base64');
-    const colours = await page.evaluate(async (data) => {
-      const image = new Image();
-      image.src = `data:image/png;base64,${data}`;
-      await image.decode();
-      const canvas = document.createElement('canvas');
-      canvas.width = image.width;
-      canvas.height = image.height;
-      const context = canvas.getContext('2d');
-      context.drawImage(image, 0, 0);
-      const pixels = context.getImageData(0, 0, image.width, image.height).data;
-      const found = new Set();
-      for (let i = 0; i < pixels.length; i += 4)
-        found.add((pixels[i] << 16) | (pixels[i + 1] << 8) | pixels[i + 2]);
-      return found.size;
-    }, png);
-    assert.ok(colours > 12, `${colours} colours`);
+    const found = await colours(page, png);
+    assert.ok(found > 12, `${found} colours`);
     await leave(page);
   });
 

@@ -70,12 +70,31 @@ export async function openPage(browser, address, options = {}) {
   page.on('pageerror', (error) => page.complaints.push(String(error)));
   page.on('request', (request) => {
     const { host, protocol } = new URL(request.url());
-    if (/^https?:$/.test(protocol) && host !== new URL(address).host)
+    if (/^(https?|wss?):$/.test(protocol) && host !== new URL(address).host)
       page.outside.push(request.url());
   });
   await page.goto(address);
   await page.waitForSelector(options.waitFor ?? 'body[data-cycle]');
   return page;
+}
+
+/** How many colours a picture has, in base64. */
+export async function colours(page, png) {
+  return page.evaluate(async (data) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${data}`;
+    await image.decode();
+    const canvas = document.createElement('canvas');
+    canvas.width = image.width;
+    canvas.height = image.height;
+    const context = canvas.getContext('2d');
+    context.drawImage(image, 0, 0);
+    const pixels = context.getImageData(0, 0, image.width, image.height).data;
+    const found = new Set();
+    for (let i = 0; i < pixels.length; i += 4)
+      found.add((pixels[i] << 16) | (pixels[i + 1] << 8) | pixels[i + 2]);
+    return found.size;
+  }, png);
 }
 
 /** Ends a visit: nothing was complained about, nothing left the machine. */
