@@ -86,6 +86,7 @@ export class Joints {
           'button',
           {
             type: 'button',
+            class: 'live',
             title:
               'Gains, stiffness and damping as they are now, for robot.toml:\ntandem joint tuning',
             onclick: () => void this.save(),
