@@ -155,7 +155,8 @@ std::optional<Response> HttpRules::answer(const RequestHead& head) const {
   const bool asset = std::ranges::find(kPage, path, &PageFile::path) != std::end(kPage);
   const auto served = std::ranges::find(served_, path, &Served::path);
   const bool ours = served != served_.end();
-  if (!asset && !ours && (!served_.empty() || (path != kWebSocket && path != kDescription && !mesh_number(path)))) {
+  if (!asset && !ours &&
+      (!served_.empty() || (path != kWebSocket && path != kDescription && !mesh_number(path)))) {
     return words(404, "Not Found", "There is nothing here. The page is /");
   }
   if (head.method != "GET") {

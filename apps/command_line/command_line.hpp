@@ -60,7 +60,7 @@ struct AskedOptions {
 
 /// tandem studio: of a run that goes on; of logs
 struct StudioCommandOptions {
-  std::vector<std::string> logs{};      ///< one to three; empty: of a run
+  std::vector<std::string> logs{};  ///< one to three; empty: of a run
   ControlTarget target{};
   std::optional<std::uint16_t> port{};  ///< as StudioOptions'; empty: the run chooses
   std::string address{};                ///< empty: 127.0.0.1

@@ -140,12 +140,11 @@ void FoxgloveRun::start(runtime::RobotCycle& cycle, hal::ParallelSource* paralle
   lost_ = std::move(lost);
   const dds::ControllerFeed controllers = controller_feed(cycle.services());
   topics_->start(fault_feed(cycle), parallel_ ? parallel : nullptr, controllers);
-  hub_.start(
-      {.publish = [this](bool again) { publish(again); },
-       .time_ns = [this] { return now_ns(); },
-       .parameter_version = controllers.parameter_version,
-       .parameters = [all = controllers.parameters] { return with_values(all()); },
-       .asset = [this](const std::string& uri) { return asset(uri); }});
+  hub_.start({.publish = [this](bool again) { publish(again); },
+              .time_ns = [this] { return now_ns(); },
+              .parameter_version = controllers.parameter_version,
+              .parameters = [all = controllers.parameters] { return with_values(all()); },
+              .asset = [this](const std::string& uri) { return asset(uri); }});
 }
 
 /// What the description names is looked for in its package, as the page's meshes are; else in its

@@ -130,9 +130,7 @@ class Session {
  private:
   [[nodiscard]] const runtime::Experiment& experiment() const { return c_.experiment; }
   /// This process in ROS 2's graph.
-  [[nodiscard]] const char* node() const {
-    return options_.serves ? "tandem_serve" : "tandem_run";
-  }
+  [[nodiscard]] const char* node() const { return options_.serves ? "tandem_serve" : "tandem_run"; }
 
   /// DDS, the log, and the door for an owner over DDS.
   Status open_outputs() {

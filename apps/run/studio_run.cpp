@@ -130,23 +130,23 @@ Result<StudioRun::Parts> StudioRun::make(const StudioOptions& options) const {
   const std::string session = studio::draw_hex(4);
   auto foxglove = FoxgloveRun::open(c, node_, session);
   if (!foxglove) return std::unexpected(foxglove.error());
-  auto studio = studio::Studio::open(
-      {.address = options.address,
-       .port = options.port,
-       .page = options.page,
-       .origins = options.origins},
-      {.robot = e.robot,
-       .urdf = robot::text_in(e.files, e.robot.model.urdf),
-       .urdf_file = e.robot.model.urdf,
-       .version = TANDEM_VERSION,
-       .experiment = std::filesystem::path(e.file).filename().string(),
-       .run = session,
-       .simulated = c.backend->pace() == hal::Pace::kSimulatedClock,
-       .period_ns = e.loop.period_ns},
-      {.state = state,
-       .command = command,
-       .truth = runtime::truth_of(c),
-       .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image()});
+  auto studio =
+      studio::Studio::open({.address = options.address,
+                            .port = options.port,
+                            .page = options.page,
+                            .origins = options.origins},
+                           {.robot = e.robot,
+                            .urdf = robot::text_in(e.files, e.robot.model.urdf),
+                            .urdf_file = e.robot.model.urdf,
+                            .version = TANDEM_VERSION,
+                            .experiment = std::filesystem::path(e.file).filename().string(),
+                            .run = session,
+                            .simulated = c.backend->pace() == hal::Pace::kSimulatedClock,
+                            .period_ns = e.loop.period_ns},
+                           {.state = state,
+                            .command = command,
+                            .truth = runtime::truth_of(c),
+                            .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image()});
   if (!studio) return std::unexpected(studio.error());
   return Parts{.foxglove = std::move(*foxglove), .studio = std::move(*studio), .turns = nullptr};
 }

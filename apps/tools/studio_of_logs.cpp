@@ -96,8 +96,8 @@ Exit studio_of_logs(const StudioCommandOptions& options) {
   if (!document) return refuse(document.error());
 
   const sigset_t ends = block_ends();
-  auto server = studio::Server::open(
-      options.address.empty() ? "127.0.0.1" : options.address, options.port);
+  auto server =
+      studio::Server::open(options.address.empty() ? "127.0.0.1" : options.address, options.port);
   if (!server) return refuse(server.error());
   const std::string token = studio::draw_hex(kTokenBytes);
   const auto html = [](std::string body) {

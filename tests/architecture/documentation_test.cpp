@@ -60,8 +60,7 @@ std::set<std::string> keys_read() {
 TEST(Documentation, OfTheConfigurationHasEveryKey) {
   const auto words = matches(text_of(kRoot / "docs/configuration.md"), "(\\w+)");
   for (const std::string& key : keys_read()) {
-    EXPECT_TRUE(words.contains(key))
-        << "docs/configuration.md does not know the key " << key;
+    EXPECT_TRUE(words.contains(key)) << "docs/configuration.md does not know the key " << key;
   }
 }
 
@@ -72,8 +71,7 @@ TEST(Documentation, OfImportsHasEveryKeyOfAMap) {
                             "tables)(?:_or|_or_empty)?\\(\"(\\w+)\"");
   EXPECT_GT(keys.size(), 20U);
   for (const std::string& key : keys) {
-    EXPECT_TRUE(words.contains(key))
-        << "docs/import.md does not know the key " << key;
+    EXPECT_TRUE(words.contains(key)) << "docs/import.md does not know the key " << key;
   }
 }
 

@@ -113,7 +113,9 @@ TEST(Packing, GivesWholeNumbersBackAsTheyAre) {
 }
 
 TEST(Packing, HoldsWhatIsSampledMoreSeldom) {
-  const auto seldom = [](std::size_t i) { return i % 10 == 0 && i < 500 ? static_cast<float>(i) : kNothing; };
+  const auto seldom = [](std::size_t i) {
+    return i % 10 == 0 && i < 500 ? static_cast<float>(i) : kNothing;
+  };
   Spans spans = spans_of(1000, 1000, seldom);
   spans.hold(0, 20);
   EXPECT_EQ(spans.least(0)[19], 10.0F);
