@@ -24,7 +24,7 @@ export function ghostly(colour: string): THREE.Material {
   return new THREE.MeshBasicMaterial({
     color: colour,
     transparent: true,
-    opacity: 0.28,
+    opacity: 0.38,
     depthWrite: false,
   });
 }

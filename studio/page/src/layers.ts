@@ -30,7 +30,7 @@ export class Layers {
     },
     {
       // Of a run one source has all of it; of a log there are the topics.
-      layer: new RobotGhost('twin', '#b3197d', [
+      layer: new RobotGhost('twin', '#d6249f', [
         { state: 'parallel', base: ['parallel'] },
         { state: 'parallel/state', base: ['parallel/truth'] },
       ]),
@@ -38,12 +38,12 @@ export class Layers {
       title: 'the robot that runs in parallel, as a ghost',
     },
     {
-      layer: ghostOf('B', '#d55e00'),
+      layer: ghostOf('B', '#e8590c'),
       label: 'B',
       title: 'the robot of the second log, as a ghost',
     },
     {
-      layer: ghostOf('C', '#0a7d3c'),
+      layer: ghostOf('C', '#1a9e3f'),
       label: 'C',
       title: 'the robot of the third log, as a ghost',
     },

@@ -8,32 +8,38 @@ import type { Layer } from './layer';
 import type { Model } from './model';
 import type { Answer } from './protocol';
 
-const kColour = '#7a5c00';
+const kColour = '#008c96';
 /** What `predict` allows [s]. */
 const kMost_s = 10;
 
 /** The end of a prediction. */
 export interface Foreseen extends Posture {
   time_s: number;
-  /** "horizon", or why it ended before. */
-  end: string;
+  /** What is to be known of it; empty: nothing. */
+  remark: string;
 }
 
 /** The last row of an answer to `predict`. */
 export function foreseen(answer: Answer): Foreseen {
-  const { from_s, cycles, period_ns, end, joints, base } = answer as unknown as {
+  const { from_s, cycles, period_ns, end, joints, base, ...more } = answer as unknown as {
     from_s: number;
     cycles: number;
     period_ns: number;
     end: string;
     joints: Record<string, { position_rad: number[] }>;
     base: { position_m: number[][]; quaternion: number[][] } | null;
+    unarchived_controllers?: string[];
   };
+  const anew = more.unarchived_controllers ?? [];
+  const remarks = [
+    ...(end === 'horizon' ? [] : [end]),
+    ...(anew.length === 0 ? [] : [`${anew.join(', ')} began anew`]),
+  ];
   const last = <T>(rows: T[]) => rows[rows.length - 1];
   const names = Object.entries(joints);
   return {
     time_s: from_s + Math.max(0, cycles - 1) * 1e-9 * period_ns,
-    end,
+    remark: remarks.join('; '),
     joints: new Map(names.map(([name, rows]) => [name, last(rows.position_rad) ?? Number.NaN])),
     base: base ? [...(last(base.position_m) ?? []), ...(last(base.quaternion) ?? [])] : [],
   };
@@ -114,8 +120,9 @@ export class Prediction implements Layer {
     }
     say(this.words, '');
     this.end = foreseen(answer);
-    const why = this.end.end === 'horizon' ? '' : ` (${this.end.end})`;
-    this.legend = [{ name: `predicted for ${seconds(this.end.time_s)}${why}`, colour: kColour }];
+    const { time_s, remark } = this.end;
+    const words = `predicted for ${seconds(time_s)}${remark ? ` (${remark})` : ''}`;
+    this.legend = [{ name: words, colour: kColour }];
     this.show(this);
   }
 }

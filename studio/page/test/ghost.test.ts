@@ -77,8 +77,14 @@ test('a prediction ends in its last row', () => {
   };
   const end = foreseen({ ...answer, base });
   assert.equal(end.time_s, 3);
-  assert.equal(end.end, 'diverged');
+  assert.equal(end.remark, 'diverged');
   assert.deepEqual([...end.joints], [['knee', 0.4]]);
   assert.deepEqual(end.base, [0, 0, 0.9, 0, 1, 0, 0]);
-  assert.deepEqual(foreseen({ ...answer, base: null }).base, []);
+  const whole = { ...answer, end: 'horizon', base: null };
+  assert.deepEqual(foreseen(whole).base, []);
+  assert.equal(foreseen(whole).remark, '');
+  assert.equal(
+    foreseen({ ...whole, unarchived_controllers: ['a', 'b'] }).remark,
+    'a, b began anew',
+  );
 });
