@@ -19,13 +19,16 @@ export interface PostureIds {
   base: number[];
 }
 
-/** How a ghost looks. */
+/** How a ghost looks: where both stand alike, the robot is seen, and not a mixture that flickers. */
 export function ghostly(colour: string): THREE.Material {
   return new THREE.MeshBasicMaterial({
     color: colour,
     transparent: true,
     opacity: 0.38,
     depthWrite: false,
+    polygonOffset: true,
+    polygonOffsetFactor: 2,
+    polygonOffsetUnits: 4,
   });
 }
 
