@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "hal/image.hpp"
+#include "hal/truth.hpp"
 
 namespace tandem::hal {
 
@@ -17,6 +19,7 @@ struct ParallelView {
   std::vector<double> position_rad, velocity_rad_s, torque_Nm;
   std::uint64_t behind_cycles = 0;  ///< the first was so much further
   std::uint64_t missed = 0;         ///< commands that the second never got, so far
+  std::optional<TruthImage> truth{};  ///< of the second, in the same cycle; empty: it has none
 };
 
 class ParallelSource {

@@ -13,9 +13,11 @@ namespace {
 constexpr auto kPoll = std::chrono::microseconds(100);
 constexpr std::size_t kRecords = 512;  // on a clock: half a second at 1 kHz
 
-hal::ParallelView nothing(const hal::ImageShape& shape) {
+hal::ParallelView nothing(const hal::ImageShape& shape, const hal::TruthImage* truth) {
   const std::vector<double> zeros(shape.joints);
-  return {hal::StateImage(shape), zeros, zeros, zeros};
+  hal::ParallelView view{hal::StateImage(shape), zeros, zeros, zeros};
+  if (truth != nullptr) view.truth = *truth;
+  return view;
 }
 
 }  // namespace
@@ -33,7 +35,7 @@ ParallelRobot::ParallelRobot(const ParallelParts& parts, const hal::ImageShape& 
       command_(shape),
       gains_(gains),
       differences_(shape),
-      shown_(nothing(shape)) {
+      shown_(nothing(shape, parts.truth)) {
   if (recorder_ == nullptr) return;
   state_channel_ =
       recorder_->add_channel("/tandem/parallel/state", "tandem/msg/State", state_.layout());
@@ -161,6 +163,7 @@ void ParallelRobot::log(std::int64_t time_ns) {
 void ParallelRobot::show(const CommandRecord& record) {
   hal::ParallelView& view = shown_.back();
   view.state.assign(state_);
+  if (truth_ != nullptr) view.truth->assign(*truth_);
   const bool both = both_follow(record);
   for (std::size_t j = 0; j < view.position_rad.size(); ++j) {
     const hal::StateImage& one = record.state;

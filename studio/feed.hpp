@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "hal/mark_block.hpp"
+#include "hal/parallel_source.hpp"
 #include "hal/signal_block.hpp"
 #include "studio/tap.hpp"
 
@@ -39,6 +40,7 @@ struct Feed {
   std::function<void(std::vector<Event>&)> events{};  ///< appends what has happened since
   std::function<bool()> time_stands{};                ///< simulated time is paused
   std::function<void(const Tap::Cycle&)> cycle{};     ///< gets every cycle of the tap
+  hal::ParallelSource* parallel = nullptr;            ///< null: there is none, or another reads it
 };
 
 /// Who asks, as far as the rules go.

@@ -44,6 +44,7 @@ void Sampler::widen() {
 
 bool Sampler::look(const Feed& feed) {
   bool changed = look_for_controllers(feed);
+  changed = look_at_twin(feed) || changed;
   const std::uint64_t lost = tap_->lost();
   span_.gap = span_.gap || lost != lost_;
   lost_ = lost;
@@ -127,6 +128,21 @@ bool Sampler::look_for_marks(const Feed& feed) {
   return true;
 }
 
+/// @return whether it is there for the first time
+bool Sampler::look_at_twin(const Feed& feed) {
+  const hal::ParallelView* view = feed.parallel == nullptr ? nullptr : feed.parallel->newest();
+  if (view == nullptr) return false;
+  const bool first = !twin_;
+  if (first) {
+    twin_.emplace(*view);
+    twin_->source = kMostSignals;
+    (void)add("", "parallel", twin_->layout(), twin_->source);
+    widen();
+  }
+  twin_->look(*view);
+  return first;
+}
+
 void Sampler::take(const Tap::Signals& part) {
   const auto its = std::ranges::find_if(
       blocks_, [&](const Block& one) { return one.block.get() == part.block; });
@@ -161,6 +177,7 @@ void Sampler::take(const Tap::Cycle& cycle) {
   if (!cycle.truth.empty()) table_.convert(truth_, cycle.truth, row_);
   if (!cycle.estimate.empty()) table_.convert(estimate_, cycle.estimate, row_);
   for (const MarkSource& one : marks_) table_.convert(one.source, one.image(), row_);
+  if (twin_ && twin_->source != kMostSignals) table_.convert(twin_->source, twin_->image(), row_);
   row_is_whole_ = true;
   history_.add(time_.cycle, row_);
   ++span_.cycles;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "studio/mark_source.hpp"
 #include "studio/signal_table.hpp"
 #include "studio/tap.hpp"
+#include "studio/twin_source.hpp"
 
 namespace tandem::studio {
 
@@ -57,6 +59,7 @@ class Sampler {
 
   bool look_for_controllers(const Feed& feed);
   bool look_for_marks(const Feed& feed);
+  bool look_at_twin(const Feed& feed);
   bool add(const std::string& who, const std::string& name, const hal::Layout& layout,
            std::size_t& source);
   void widen();
@@ -73,6 +76,7 @@ class Sampler {
   Span span_;
   std::vector<Block> blocks_;
   std::vector<MarkSource> marks_;
+  std::optional<TwinSource> twin_;
   std::uint64_t loads_ = 0, lost_ = 0;
   bool unknown_block_ = false;
   hal::CycleTime time_;

@@ -238,7 +238,9 @@ void StudioRun::begin(Parts& parts) {
             if (stands && tap.taken() == 0) (void)cycle.show_last_cycle(tap);
             return stands;
           },
-      .cycle = [foxglove](const studio::Tap::Cycle& one) { foxglove->take(one); }};
+      .cycle = [foxglove](const studio::Tap::Cycle& one) { foxglove->take(one); },
+      // One thread may look at the second robot: with DDS that is the publisher's.
+      .parallel = composition_->experiment.dds.enabled ? nullptr : parallel_};
   studio::Asker asker{
       .ask =
           [turns](studio::Question question) {

@@ -166,6 +166,8 @@ TEST(ParallelRobot, ThatIsLateIsLateAlone) {
   }
   ASSERT_NE(view, nullptr);
   EXPECT_GT(view->behind_cycles, 10U);
+  ASSERT_TRUE(view->truth);
+  EXPECT_EQ(view->truth->time_ns()[0], view->state.time_ns()[0]) << "of one cycle";
   EXPECT_EQ(run.cycle->faults().size(), 0U);
   EXPECT_GT(cycles, 300U);
 }

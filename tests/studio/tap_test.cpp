@@ -196,6 +196,51 @@ TEST(StudioSampler, HasMarksAsNumbersWithTheirLook) {
   EXPECT_FALSE(sampler.table().sources().back().there);
 }
 
+/// A second robot that is three cycles late, and from which there is nothing at first.
+class LateTwin final : public hal::ParallelSource {
+ public:
+  LateTwin(const hal::StateImage& like, const hal::TruthImage& truth)
+      : view{.state = like,
+             .position_rad = std::vector<double>(like.joints(), 0.125),
+             .velocity_rad_s = {},
+             .torque_Nm = {},
+             .behind_cycles = 3,
+             .truth = truth} {}
+  const hal::ParallelView* newest() noexcept override { return there ? &view : nullptr; }
+  hal::ParallelView view;
+  bool there = false;
+};
+
+TEST(StudioSampler, HasTheParallelRobotOnceItIsThere) {
+  ShownRobot robot;
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  Sampler sampler(tap, robot.images(), robot.names(), 200'000);
+  LateTwin twin(robot.state, robot.truth);
+  const Feed feed{.parallel = &twin};
+  robot.show(tap, 0, {});
+  EXPECT_FALSE(sampler.look(feed)) << "there is nothing of it yet";
+
+  twin.there = true;
+  twin.view.state.position_rad()[1] = -0.5;
+  twin.view.truth->base_position_m()[2] = 0.75;
+  EXPECT_TRUE(sampler.look(feed));
+  robot.show(tap, 1, {});
+  EXPECT_FALSE(sampler.look(feed));
+  const auto last = [&](const std::string& name) {
+    return sampler.last()[test::id_of(sampler.table(), "parallel." + name)];
+  };
+  const std::string joint = robot.names().joints[1];
+  EXPECT_EQ(last("position_rad." + joint), -0.5F);
+  EXPECT_EQ(last("difference_rad." + joint), 0.125F);
+  EXPECT_EQ(last("base_position_m.2"), 0.75F);
+  EXPECT_EQ(last("behind_cycles"), 3.0F);
+
+  twin.view.state.position_rad()[1] = 0.25;
+  robot.show(tap, 2, {});
+  EXPECT_FALSE(sampler.look(feed));
+  EXPECT_EQ(last("position_rad." + joint), 0.25F);
+}
+
 TEST(StudioSampler, FollowsControllersThatComeAndGo) {
   ShownRobot robot;
   Tap tap(robot.images(), ShownRobot::kPeriod_ns);

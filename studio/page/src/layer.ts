@@ -5,6 +5,8 @@ import type { Model } from './model';
 
 export interface Layer {
   readonly object: THREE.Object3D;
+  /** Beside its switch, where there is more to choose; it is there as long as the layer is. */
+  readonly controls?: HTMLElement;
   /** How many parts of it are drawn. */
   readonly shown: number;
   /** What is in it, for the legend; empty: nothing. */

@@ -3,32 +3,72 @@ import type * as THREE from 'three';
 import { ControllerMarks } from './controller_marks';
 import type { Data } from './data';
 import { h } from './dom';
+import { RobotGhost } from './ghost';
 import type { Layer } from './layer';
 import type { Model } from './model';
+import { Prediction } from './prediction';
 
 interface Row {
   layer: Layer;
   label: string;
   title: string;
-  shown: boolean;
+}
+
+/** Of another log, by its letter: its truth has the base where the robot was simulated. */
+function ghostOf(letter: string, colour: string): Layer {
+  const [state, ...base] = ['state', 'truth', 'estimate'].map((name) => `${letter}/${name}`);
+  return new RobotGhost(letter, colour, [{ state, base }]);
 }
 
 export class Layers {
   readonly legend = h('ul', { class: 'scene-legend', hidden: true, 'aria-label': 'drawn beside' });
-  readonly toggles: HTMLElement[];
   private readonly rows: Row[] = [
     {
       layer: new ControllerMarks(),
       label: 'marks',
       title: 'what controllers draw: points, arrows, lines and words',
-      shown: true,
+    },
+    {
+      // Of a run one source has all of it; of a log there are the topics.
+      layer: new RobotGhost('twin', '#d6249f', [
+        { state: 'parallel', base: ['parallel'] },
+        { state: 'parallel/state', base: ['parallel/truth'] },
+      ]),
+      label: 'twin',
+      title: 'the robot that runs in parallel, as a ghost',
+    },
+    {
+      layer: ghostOf('B', '#e8590c'),
+      label: 'B',
+      title: 'the robot of the second log, as a ghost',
+    },
+    {
+      layer: ghostOf('C', '#1a9e3f'),
+      label: 'C',
+      title: 'the robot of the third log, as a ghost',
+    },
+    {
+      layer: new Prediction((layer) => this.show(layer)),
+      label: 'predicted',
+      title: 'where the model will be, as it was asked for',
     },
   ];
+  private readonly switches = this.rows.map(() =>
+    h('input', { type: 'checkbox', checked: true, onchange: () => this.tell() }),
+  );
+  private readonly labels = this.rows.map(({ label, title }, i) =>
+    h('label', { class: 'toggle', title, hidden: true }, this.switches[i], label),
+  );
   private counts: number[] = [];
 
   /** @param changed something is to be drawn anew. */
-  constructor(private readonly changed: () => void) {
-    this.toggles = this.rows.map((row) => this.toggle(row));
+  constructor(private readonly changed: () => void) {}
+
+  /** For the toolbar: what each has to choose, and its switch. */
+  get toggles(): HTMLElement[] {
+    return this.rows.flatMap(({ layer }, i) =>
+      layer.controls ? [layer.controls, this.labels[i]] : [this.labels[i]],
+    );
   }
 
   get objects(): THREE.Object3D[] {
@@ -37,7 +77,7 @@ export class Layers {
 
   setModel(model: Model | null): void {
     for (const row of this.rows) row.layer.setModel(model);
-    this.changed();
+    this.tell();
   }
 
   wire(data: Data): number[] {
@@ -56,12 +96,19 @@ export class Layers {
     this.legend.dataset.shown = String(this.rows.reduce((sum, row) => sum + row.layer.shown, 0));
   }
 
+  /** Something is in it that was asked for. */
+  private show(layer: Layer): void {
+    this.switches[this.rows.findIndex((row) => row.layer === layer)].checked = true;
+    this.tell();
+  }
+
   private tell(): void {
-    this.rows.forEach((row, i) => {
-      row.layer.object.visible = row.shown;
-      this.toggles[i].hidden = row.layer.legend.length === 0;
+    const shown = this.rows.filter(({ layer }, i) => {
+      this.labels[i].hidden = layer.legend.length === 0;
+      layer.object.visible = this.switches[i].checked;
+      return layer.object.visible;
     });
-    const seen = this.rows.filter((row) => row.shown).flatMap((row) => row.layer.legend);
+    const seen = shown.flatMap((row) => row.layer.legend);
     this.legend.replaceChildren(
       ...seen.map(({ name, colour }) => {
         const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });
@@ -71,17 +118,5 @@ export class Layers {
     );
     this.legend.hidden = seen.length === 0;
     this.changed();
-  }
-
-  private toggle(row: Row): HTMLElement {
-    const box = h('input', {
-      type: 'checkbox',
-      checked: row.shown,
-      onchange: () => {
-        row.shown = box.checked;
-        this.tell();
-      },
-    });
-    return h('label', { class: 'toggle', title: row.title, hidden: true }, box, row.label);
   }
 }

@@ -14,6 +14,8 @@ export interface Model {
   /** The object of a link; undefined: there is none. */
   link(name: string): THREE.Object3D | undefined;
   joint(name: string): THREE.Object3D | undefined;
+  /** Another of it, all in one look. */
+  copy(look: THREE.Material): Model;
 }
 
 function rod(capsule: Capsule, material: THREE.Material): THREE.Object3D {
@@ -88,5 +90,6 @@ export function buildModel(
     },
     link: (name) => robot.links[names.links.get(name) ?? ''],
     joint: (name) => robot.joints[names.joints.get(name) ?? ''],
+    copy: (look) => buildModel(text, measured, look, meshes),
   };
 }

@@ -4,6 +4,7 @@ import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import type { Data } from './data';
 import { h, say, theme } from './dom';
 import { seconds } from './format';
+import { ghostly } from './ghost';
 import { Layers } from './layers';
 import type { TreeJoint } from './limbs';
 import { Marks } from './marks3d';
@@ -185,13 +186,7 @@ export class Scene {
         ...(hello?.passive ?? []),
       ]);
       this.model = buildModel(text, measured, null, meshes);
-      const see = new THREE.MeshBasicMaterial({
-        color: 0x2f7de1,
-        transparent: true,
-        opacity: 0.28,
-        depthWrite: false,
-      });
-      this.ghost = buildModel(text, measured, see, meshes);
+      this.ghost = this.model.copy(ghostly('#2f7de1'));
       this.ghost.robot.visible = this.shows.ghost;
       this.scene.add(this.model.robot, this.ghost.robot);
       this.marks.setFrames(this.model, [...measured]);

@@ -143,7 +143,7 @@ describe('a report opened from the disk', { skip: why || false, timeout: 120000 
     await page.context().close();
   });
 
-  test('served by `tandem studio LOG`, it has every cycle; a signal ends it', async () => {
+  test('served by `tandem studio LOG`, it has every cycle, and a ghost; a signal ends it', async () => {
     const served = spawn(kTandem, ['studio', log, log, '--port', '0'], { cwd: kScratch });
     const ended = new Promise((resolve) => served.on('exit', resolve));
     let said = '';
@@ -153,6 +153,9 @@ describe('a report opened from the disk', { skip: why || false, timeout: 120000 
     }
     const page = await openPage(browser, /http\S+/.exec(said)[0]);
     await page.waitForSelector('.report .pane .uplot');
+    await page.waitForSelector('.scene-legend[data-shown="1"]:text-is("B")');
+    await page.locator('.scene .toggle:text-is("B") input').uncheck();
+    await page.waitForSelector('.scene-legend[data-shown="0"]', { state: 'attached' });
     await page.click('#tab-plots');
     await page.waitForSelector('.plots .pane[data-cycles-per-row]');
     for (let i = 0; i < 3; ++i) await page.locator('[aria-label="zoom in"]').click();
