@@ -17,8 +17,8 @@ struct ParallelView {
   /// First minus second, by joint; zero unless both follow their command. [rad, rad/s, Nm; m, m/s,
   /// N]
   std::vector<double> position_rad, velocity_rad_s, torque_Nm;
-  std::uint64_t behind_cycles = 0;  ///< the first was so much further
-  std::uint64_t missed = 0;         ///< commands that the second never got, so far
+  std::uint64_t behind_cycles = 0;    ///< the first was so much further
+  std::uint64_t missed = 0;           ///< commands that the second never got, so far
   std::optional<TruthImage> truth{};  ///< of the second, in the same cycle; empty: it has none
 };
 

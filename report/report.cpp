@@ -230,6 +230,8 @@ Result<Report> read_report(const std::string& log, const std::vector<std::string
   report.remarks = close_and_remark(all, kernels);
   for (const RunData* one : all) {
     if (parallel && one != &*run) continue;  // it is of the same log
+    if (!one->cut_reason.empty())
+      report.remarks.push_back(one->path + ": it is cut: " + one->cut_reason);
     for (const std::string& remark : one->remarks)
       report.remarks.push_back(one->path + ": " + remark);
   }

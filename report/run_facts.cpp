@@ -130,6 +130,9 @@ PageTable feet_table(const RunData& run, const std::string& side) {
 }  // namespace
 
 std::string start_text(const RunData& run) {
+  if (!run.cut_reason.empty()) {
+    return fmt::format("The log is cut after {:.3f} s: {}.", run.last_s, run.cut_reason);
+  }
   if (!run.controllers_ran) return "The run ended before its controllers started.";
   if (!run.start_known) {
     return fmt::format("The log begins at {:.3f} s, and does not have the controllers' start.",

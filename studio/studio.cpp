@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdlib>
+#include <filesystem>
 #include <utility>
 
 namespace tandem::studio {
@@ -37,6 +38,11 @@ std::string draw_hex(std::size_t bytes) {
 
 Result<std::unique_ptr<Studio>> Studio::open(const Options& options, RunDescription run,
                                              const Tap::Images& images) {
+  if (!options.page.empty() &&
+      !std::filesystem::is_regular_file(std::filesystem::path(options.page) / "index.html")) {
+    return fail(options.page + ": there is no page of the studio (index.html)",
+                "name the folder that `node studio/page/build.mjs --out FOLDER` wrote");
+  }
   auto server = Server::open(options.address, options.port);
   if (!server) return std::unexpected(server.error());
   return std::unique_ptr<Studio>(new Studio(options, std::move(run), images, std::move(*server)));

@@ -35,8 +35,9 @@ Exit attach_studio(const StudioCommandOptions& options) {
   const Result<Json> answer = ask(options.target, "run", question_of(options));
   if (!answer) return refuse(why_not(answer.error()));
   const std::string address = answer->value("address", "");
-  if (!answer->value("opened", true) && (options.port || !options.address.empty())) {
-    fmt::print(stderr, "note: it was open already, and stays at its address until the run ends\n");
+  const bool asked = options.port || !options.address.empty() || !options.page.empty();
+  if (!answer->value("opened", true) && asked) {
+    fmt::print(stderr, "note: it was open already, and stays as it is until the run ends\n");
   }
   if (answer->contains("note")) fmt::print(stderr, "note: {}\n", shown(answer->value("note", "")));
   fmt::print("studio: {}\n", shown(address));

@@ -1,7 +1,10 @@
 // Asks once more before a robot moves by more than one joint.
 import { h } from './dom';
 
-/** A dialog with words and the command; true: the button with `label` was pressed. */
+/**
+ * A dialog with words and the command; true: the button with `label` was pressed. The page behind
+ * it stays alive: nothing may cover the emergency stop.
+ */
 export function confirmed(words: string, command: string, label: string): Promise<boolean> {
   const dialog = h('dialog', { class: 'confirm', 'aria-label': label });
   const close = (how: string) => () => dialog.close(how);
@@ -17,7 +20,13 @@ export function confirmed(words: string, command: string, label: string): Promis
     ),
   );
   document.body.append(dialog);
-  dialog.showModal();
+  for (const other of document.querySelectorAll<HTMLDialogElement>('dialog.confirm[open]')) {
+    if (other !== dialog) other.close('no');
+  }
+  dialog.addEventListener('keydown', (event) => {
+    if (event.key === 'Escape') dialog.close('no');
+  });
+  dialog.show();
   no.focus();
   return new Promise((resolve) => {
     dialog.addEventListener('close', () => {

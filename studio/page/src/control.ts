@@ -10,11 +10,17 @@ export class ControlLease {
   private may = 'look';
   private linked = false;
   private last = 0;
+  /** Whether control was given back here, and whether it went by itself. */
+  private given = false;
+  private lost = false;
   private readonly listeners: (() => void)[] = [];
   private readonly button = h('button', {
     type: 'button',
     class: 'lease',
-    onclick: () => this.source.control(!this.state.yours),
+    onclick: () => {
+      this.given = this.state.yours;
+      this.source.control(!this.state.yours);
+    },
   });
   private readonly words = h('span', { class: 'lease-words', role: 'status' });
   readonly element = h('div', { class: 'lease-row' }, this.button, this.words);
@@ -52,13 +58,17 @@ export class ControlLease {
 
   private set(control: Control): void {
     const began = control.yours && !this.state.yours;
+    if (control.yours) this.lost = false;
+    else if (this.state.yours) this.lost = !this.given;
     this.state = control;
     if (began) requestAnimationFrame((now) => this.beat(now));
     document.body.dataset.control = control.yours ? 'yours' : control.taken ? 'taken' : 'free';
     document.body.dataset.may = this.may;
     say(this.button, control.yours ? 'Give control back' : 'Take control');
     this.button.disabled = !control.yours && (control.taken || !this.mayChange);
-    let words = 'Nobody leads the joints from here.';
+    let words = this.lost
+      ? 'Control ended by itself: this page was hidden, or silent for a second. The joints hold.'
+      : 'Nobody leads the joints from here.';
     if (control.yours) words = 'You lead the joints. If this page is hidden or lost, they hold.';
     else if (control.taken) words = `${control.by || 'Another page'} has control.`;
     else if (!this.mayChange) words = this.why;

@@ -63,22 +63,25 @@ export function jointDrive(
   const move = (target: number): Request => ({
     do: 'joint.move',
     joint: name,
-    target_rad: Number(inside(target).toFixed(6)),
+    target_rad: Number(target.toFixed(6)),
     speed_rad_s: speedOf(),
   });
   const set = (target: number) => {
-    goal.value = number(inside(target));
+    goal.value = number(target);
     slider.value = String(inside(target));
   };
-  const go = (target: number) => {
+  /** Why the joint does not go there; empty: it may. */
+  const whyNot = (target: number): string => {
     if (!Number.isFinite(target)) {
-      actions.tell(
-        '',
-        `'${goal.value}' is no place of ${name}: 0.5 or ${unit === 'm' ? '20mm' : '30deg'}`,
-        true,
-      );
-      return;
+      return `'${goal.value}' is no place of ${name}: 0.5 or ${unit === 'm' ? '20mm' : '30deg'}`;
     }
+    const { lower, upper } = joint;
+    if (target >= (lower ?? -Infinity) && target <= (upper ?? Infinity)) return '';
+    return `${number(target)} ${unit} is beyond the limits of ${name}: ${number(low)} to ${number(high)}`;
+  };
+  const go = (target: number) => {
+    const why = whyNot(target);
+    if (why) return actions.tell('', why, true);
     set(target);
     void actions.run(move(target));
   };
@@ -101,7 +104,7 @@ export function jointDrive(
       {
         type: 'button',
         'aria-label': `${name} by ${step} ${unit}`,
-        onclick: () => go(position() + step),
+        onclick: () => go(inside(position() + step)),
       },
       step > 0 ? `+${step}` : `−${-step}`,
     ),
@@ -140,9 +143,12 @@ export function jointDrive(
         'Go',
         () => {
           const target = parseGoal(goal.value, unit);
-          return Number.isFinite(target) ? move(target) : null;
+          return whyNot(target) ? null : move(target);
         },
-        { name: `go to the goal of ${name}` },
+        {
+          name: `go to the goal of ${name}`,
+          nothing: () => actions.tell('', whyNot(parseGoal(goal.value, unit)), true),
+        },
       ),
       slider,
       h('label', {}, `at [${unit}/s] `, speed),

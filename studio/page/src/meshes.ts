@@ -19,6 +19,9 @@ function stl(bytes: ArrayBuffer): THREE.Object3D {
   return new THREE.Mesh(surface);
 }
 
+/** Of a corner from the mesh's origin, in its own units: millimetres may be among them. */
+const kFarthest = 1e6;
+
 const kParsers: Record<string, (bytes: ArrayBuffer) => THREE.Object3D> = {
   stl,
   obj: (bytes) => new OBJLoader().parse(new TextDecoder().decode(bytes)),
@@ -32,11 +35,17 @@ export function parseMesh(file: string, bytes: ArrayBuffer): THREE.Object3D {
   try {
     made = parse(bytes);
   } catch {
-    throw new Error('it cannot be read'); // the parsers' own words are about their code
+    throw new Error('its content is neither STL nor OBJ'); // the parsers' own words are about their code
   }
   let corners = 0;
   made.traverse((one) => {
-    if (one instanceof THREE.Mesh) corners += one.geometry.getAttribute('position')?.count ?? 0;
+    if (!(one instanceof THREE.Mesh)) return;
+    const places = one.geometry.getAttribute('position') as THREE.BufferAttribute | undefined;
+    corners += places?.count ?? 0;
+    // One such corner, and the camera would find nothing of the robot.
+    if (places && !Array.from(places.array).every((value) => Math.abs(value) <= kFarthest)) {
+      throw new Error('a corner of it is no place near the robot');
+    }
   });
   if (corners === 0) throw new Error('it has no surface');
   return made;

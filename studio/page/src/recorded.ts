@@ -183,7 +183,9 @@ export class RecordedSource implements Source {
     const first = Math.max(0, Math.floor((from - start_s) / step_s));
     const past = Math.min(rows, Math.ceil((to - start_s) / step_s) + 1);
     const count = Math.max(0, past - first);
-    if (this.finer && cycles > 1 && count < 2 * points) {
+    // Where these rows are too coarse, or each cycle may be given.
+    const each = count * cycles <= 4 * points + 2 * cycles;
+    if (this.finer && cycles > 1 && (count < 2 * points || each)) {
       try {
         return await this.finer(signals, from, to, points);
       } catch (error) {

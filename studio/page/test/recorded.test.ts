@@ -2,9 +2,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { deflateSync } from 'node:zlib';
-import type { Hello } from '../src/protocol';
+import type { Hello, Window } from '../src/protocol';
 import { type Code, type Grid, inflate, RecordedSource, unpack } from '../src/recorded';
 import { Catalog } from '../src/signals';
+import type { Source } from '../src/source';
 import { TimeModel } from '../src/time';
 import { colourOf, withTwins } from '../src/twins';
 
@@ -35,23 +36,48 @@ test('inflates what zlib has deflated', async () => {
   assert.equal(Buffer.from(await inflate(packed)).toString(), 'some bytes');
 });
 
-const play = async (codes: Code[], bytes: number[], where: Grid) => {
-  const source = new RecordedSource({
-    format: 1,
-    hello: {} as Hello,
-    signals: { sources: [] },
-    events: { events: [] },
-    urdf: '',
-    figures: [],
-    logs: [],
-    at_s: where.start_s,
-    grid: where,
-    codes,
-    data: deflateSync(Uint8Array.from(bytes)).toString('base64'),
-  });
+const play = async (
+  codes: Code[],
+  bytes: number[],
+  where: Grid,
+  finer: Source['window'] | null = null,
+) => {
+  const source = new RecordedSource(
+    {
+      format: 1,
+      hello: {} as Hello,
+      signals: { sources: [] },
+      events: { events: [] },
+      urdf: '',
+      figures: [],
+      logs: [],
+      at_s: where.start_s,
+      grid: where,
+      codes,
+      data: deflateSync(Uint8Array.from(bytes)).toString('base64'),
+    },
+    finer,
+  );
   await source.open();
   return source;
 };
+
+test('asks who serves the log for each cycle, where so many rows may be given', async () => {
+  const asked: number[] = [];
+  const served = { rows: 7 } as Window;
+  const finer = async (_: number[], from: number) => {
+    asked.push(from);
+    return served;
+  };
+  const where = { ...grid(1000), cycles: 2 };
+  const source = await play([0], [], where, finer);
+  // As the oscilloscope asks: for every cycle of 1000 rows of two cycles.
+  const span = 1000 * where.step_s;
+  const points = Math.ceil((2000 + 2) / 4);
+  assert.equal(await source.window([0], where.start_s, where.start_s + span, points), served);
+  assert.notEqual(await source.window([0], where.start_s, where.start_s + span, 100), served);
+  assert.deepEqual(asked, [where.start_s]);
+});
 
 test('answers windows, and ticks at the time that is sought', async () => {
   const source = await play([[0, 1, 2], 4], [2, 2, 2, 2, 0, 0, 0, 0], grid(4));

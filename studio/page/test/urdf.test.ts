@@ -119,5 +119,11 @@ test('meshes are read by their ending, and have a surface', () => {
   assert.ok(parseMesh('A.STL', bytes(`solid a\n${facet}endsolid a\n`)));
   assert.ok(parseMesh('a.obj', bytes('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n')));
   assert.throws(() => parseMesh('a.obj', bytes('# nothing')), /it has no surface/);
+  for (const far of ['v nan 0 0', 'v 1e30 0 0']) {
+    const text = `v 0 0 0\nv 1 0 0\n${far}\nf 1 2 3\n`;
+    assert.throws(() => parseMesh('a.obj', bytes(text)), /no place near the robot/, far);
+  }
+  const beyond = bytes('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99\n');
+  assert.throws(() => parseMesh('a.obj', beyond), /no place near the robot/);
   assert.throws(() => parseMesh('a.dae', bytes('<COLLADA/>')), /neither STL nor OBJ/);
 });

@@ -63,6 +63,9 @@ describe('the joints and the 3D view of the studio', {
     await page.click('button:text-is("Idle") >> nth=0');
     await page.waitForSelector('dialog[open]');
     assert.deepEqual(await violations(page), []);
+    await page.click('.estop');
+    await eventually('a stop beside the question', () => asked(mock, 'estop').length === 1);
+    await page.focus('dialog button');
     await page.keyboard.press('Escape');
     await page.waitForSelector('dialog', { state: 'detached' });
     assert.equal(asked(mock, 'joint.set').length, 0, 'nothing is asked for before the answer');
@@ -80,6 +83,10 @@ describe('the joints and the 3D view of the studio', {
     const row = page.locator('[data-joint="LElbj"]');
     await row.locator('.opener').click();
     await row.locator('.tuning summary').click();
+    await row.locator('input[aria-label^="goal of LElbj"]').first().fill('99');
+    await row.locator('button[aria-label="go to the goal of LElbj"]').click();
+    await until(page, '99.000 rad is beyond the limits of LElbj');
+    assert.equal(asked(mock, 'joint.move').length, 0);
     const gain = row.locator('input[aria-label^="kp of the position loop"]');
     const undo = row.locator('button[aria-label^="undo kp of the position loop"]');
     await gain.fill('2000');
@@ -101,7 +108,10 @@ describe('the joints and the 3D view of the studio', {
     const page = await visit(mock.address);
     await until(page, 'not drawn: 2 shapes');
     const words = await page.textContent('.not-drawn');
-    assert.match(words, /mesh c\.stl \(it is not there\).*mesh d\.stl \(it cannot be read\)/s);
+    assert.match(
+      words,
+      /mesh c\.stl \(it is not there\).*mesh d\.stl \(its content is neither STL nor OBJ\)/s,
+    );
     await leave(page);
   });
 

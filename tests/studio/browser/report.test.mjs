@@ -153,7 +153,7 @@ describe('a report opened from the disk', { skip: why || false, timeout: 120000 
     }
     const page = await openPage(browser, /http\S+/.exec(said)[0]);
     await page.waitForSelector('.report .pane .uplot');
-    await page.waitForSelector('.scene-legend[data-shown="1"]:text-is("B")');
+    await page.waitForSelector('.scene-legend[data-shown="1"] li:has-text("B")');
     await page.locator('.scene .toggle:text-is("B") input').uncheck();
     await page.waitForSelector('.scene-legend[data-shown="0"]', { state: 'attached' });
     await page.click('#tab-plots');
