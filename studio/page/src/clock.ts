@@ -18,6 +18,7 @@ export class ClockPanel {
   private readonly body: HTMLElement;
   readonly element: HTMLElement;
   private simulated: boolean | null = null;
+  private told = Number.NaN;
 
   constructor(
     data: Data,
@@ -62,11 +63,23 @@ export class ClockPanel {
   private watched(request: string, answer: Answer): void {
     if (request !== 'clock.show' || !answer.ok) return;
     this.simulated = answer.clock === 'simulated';
+    this.showRate(Number(answer.rate));
     if (!this.simulated) {
       const by = answer.clock === 'bus' ? 'the bus' : 'the real clock';
       say(this.words, `Time is advanced by ${by}: only simulated time can be paused.`);
     }
     this.allow();
+  }
+
+  /** What the run has, when it changes: until then the choice is the reader's. */
+  private showRate(rate: number): void {
+    if (!Number.isFinite(rate) || rate === this.told) return;
+    this.told = rate;
+    const value = String(rate);
+    if (![...this.rate.options].some((one) => one.value === value)) {
+      this.rate.append(h('option', { value }, `×${value}`));
+    }
+    this.rate.value = value;
   }
 
   private allow(): void {

@@ -19,6 +19,7 @@ import { Header } from './header';
 import { Inputs } from './inputs';
 import { Joints } from './joints';
 import { LiveSource } from './live';
+import { LoopPanel } from './loop';
 import { Plots } from './plots';
 import { recordingIn } from './recorded';
 import { startRecorded, startServed } from './recorded_page';
@@ -37,6 +38,7 @@ const kWatched: Record<string, string[]> = {
   joints: ['joint.list'],
   controllers: ['controller.list'],
   inputs: ['input.list'],
+  loop: ['loop.show'],
   events: [],
 };
 const kThemes = ['auto', 'light', 'dark'];
@@ -116,6 +118,7 @@ function start(): void {
         content: new Controllers(data, actions, lease).element,
       },
       { name: 'inputs', label: 'Inputs', content: new Inputs(data, actions).element },
+      { name: 'loop', label: 'Loop', content: new LoopPanel(data).element },
       { name: 'events', label: 'Events', content: new Events(data).element },
     ],
     (name) => {

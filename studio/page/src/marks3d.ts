@@ -1,6 +1,7 @@
 // Arrows and marks beside the robot: forces of the ground, centre of mass, frames.
 import * as THREE from 'three';
 import type { Model } from './model';
+import { pressureCentre } from './pressure';
 
 const kMetresPerNewton = 1 / 1000;
 /** Marks are drawn last, through the robot. */
@@ -11,6 +12,7 @@ export class Marks {
   readonly com = new THREE.Group();
   readonly frames = new THREE.Group();
   private readonly arrows: THREE.ArrowHelper[] = [];
+  private readonly pressure: THREE.Mesh;
   private readonly dot: THREE.Mesh;
   private readonly drop: THREE.Line;
   private followed: { axes: THREE.AxesHelper; object: THREE.Object3D }[] = [];
@@ -28,11 +30,22 @@ export class Marks {
     );
     this.drop.renderOrder = kAbove;
     this.com.add(this.dot, this.drop);
+    this.pressure = new THREE.Mesh(
+      new THREE.RingGeometry(0.012, 0.022, 24),
+      new THREE.MeshBasicMaterial({ color: 0x009e73, depthTest: false, side: THREE.DoubleSide }),
+    );
+    this.pressure.renderOrder = kAbove;
+    this.pressure.visible = false;
+    this.forces.add(this.pressure);
     this.com.visible = false;
     this.frames.visible = false;
   }
 
-  setFeet(positions: number[], forces: number[]): void {
+  /** Arrows of the ground's forces, and a ring at the centre of pressure. */
+  setFeet(positions: number[], forces: number[], moments: number[], ground: number): void {
+    const centre = pressureCentre(positions, forces, moments, ground);
+    this.pressure.visible = centre !== null;
+    if (centre) this.pressure.position.set(...centre);
     const feet = Math.floor(forces.length / 3);
     while (this.arrows.length < feet) {
       const arrow = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), undefined, 0.1, 0x009e73);
@@ -56,7 +69,9 @@ export class Marks {
 
   /** @param radius of the robot: the dot is a small part of it. */
   setSize(radius: number): void {
-    this.dot.scale.setScalar(Math.max(0.2, radius / 0.6));
+    for (const mark of [this.dot, this.pressure]) {
+      mark.scale.setScalar(Math.max(0.2, radius / 0.6));
+    }
   }
 
   /** @param ground its height; the line of the centre of mass ends there. */

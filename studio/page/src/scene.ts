@@ -33,6 +33,7 @@ interface Ids {
   com: number[];
   feet: number[];
   forces: number[];
+  moments: number[];
   layers: number[];
 }
 
@@ -227,6 +228,7 @@ export class Scene {
       com: of('truth', 'center_of_mass_m'),
       feet: of('truth', 'foot_position_m'),
       forces: of('truth', 'foot_force_N'),
+      moments: of('truth', 'foot_moment_Nm'),
       layers: this.layers.wire(this.data),
     };
     this.held = null;
@@ -240,8 +242,8 @@ export class Scene {
   private idsAll(): number[] {
     const ids = this.ids;
     if (!ids) return [];
-    const { position, reference, base, com, feet, forces, layers } = ids;
-    return [...position, ...reference, ...base, ...com, ...feet, ...forces, ...layers];
+    const { position, reference, base, com, feet, forces, moments, layers } = ids;
+    return [position, reference, base, com, feet, forces, moments, layers].flat();
   }
 
   private pose(values: number[]): void {
@@ -258,6 +260,7 @@ export class Scene {
     const com = part(ids.com.length);
     const feet = part(ids.feet.length);
     const forces = part(ids.forces.length);
+    const moments = part(ids.moments.length);
     const layers = part(ids.layers.length);
     ids.joints.forEach((name, i) => {
       this.model?.set(name, position[i]);
@@ -274,7 +277,8 @@ export class Scene {
         model.robot.quaternion.set(base[3], base[4], base[5], base[6]).normalize();
       }
     }
-    this.marks.setFeet(feet, this.shows.forces ? forces : forces.map(() => 0));
+    const carried = this.shows.forces ? forces : forces.map(() => 0);
+    this.marks.setFeet(feet, carried, moments, this.groundHeight());
     this.marks.setCom(com, this.groundHeight(), this.shows.com);
     this.marks.update();
     this.layers.pose(layers);

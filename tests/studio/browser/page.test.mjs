@@ -307,7 +307,7 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
   test('names and texts of any kind are texts', async () => {
     const mock = await play({ hostile: true });
     const page = await visit(mock.address);
-    for (const tab of ['scope', 'joints', 'controllers', 'inputs', 'events', 'plots']) {
+    for (const tab of ['scope', 'joints', 'controllers', 'inputs', 'loop', 'events', 'plots']) {
       await page.click(`#tab-${tab}`);
       await page.waitForTimeout(350);
     }
@@ -384,7 +384,7 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     test(`${name}: nothing for axe-core to find, nothing wider than the window`, async () => {
       const mock = await play();
       const page = await visit(mock.address, options);
-      for (const tab of ['plots', 'scope', 'joints', 'controllers', 'inputs', 'events']) {
+      for (const tab of ['plots', 'scope', 'joints', 'controllers', 'inputs', 'loop', 'events']) {
         await page.click(`#tab-${tab}`);
         if (tab === 'scope') {
           await page.selectOption('[aria-label="joint to tune"]', 'LKneeSag');

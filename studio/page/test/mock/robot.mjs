@@ -176,6 +176,17 @@ export class MockRobot extends PlayedRobot {
             : [],
           lost: 0,
         };
+      case 'loop.show':
+        return {
+          ok: true,
+          cycles: this.cycle ?? 0,
+          period_ns: 1e6,
+          overruns: 2,
+          cycle_ns: { p50: 32767, p99: 75775, p999: 163839, max: 356442 },
+          wakeup_ns: { p50: 81919, p99: 278527, p999: 1997695, max: 4838981 },
+          bus_ns: null,
+          buses: [{ interface: 'can0', status: '' }],
+        };
       case 'clock.show':
         return this.clock();
       case 'controller.list':
