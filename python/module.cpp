@@ -1,6 +1,7 @@
 // The module tandem._native: what it holds, its errors, and where the parts of Tandem are.
 // Layer: python.  Thread: any that holds the interpreter's lock.
 #include <dlfcn.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
@@ -20,6 +21,14 @@ PyObject* error_type = nullptr;    // tandem.Error; the module keeps it alive
 PyObject* unknown_type = nullptr;  // tandem.UnknownName
 std::atomic<bool> recalled{false};
 std::atomic<int> threads_away{0};
+std::thread::id ending_thread;  // once it is recalled
+
+/// As Python has it for threads that want its lock when it has ended: they are seen no more. One
+/// that raised an error instead would print it while the interpreter goes, which ends the process.
+[[noreturn]] void stay_away() {
+  const py::gil_scoped_release free;
+  for (;;) ::pause();
+}
 
 [[noreturn]] void throw_as(PyObject* type, const std::string& text) {
   PyErr_SetString(type, text.c_str());
@@ -53,7 +62,10 @@ std::string program_of_this_library() {
 }  // namespace
 
 Away::Counted::Counted() {
-  if (is_recalled()) throw_as(error_type, "Python ends: nothing is begun any more");
+  if (is_recalled()) {
+    if (std::this_thread::get_id() != ending_thread) stay_away();
+    throw_as(error_type, "Python ends: nothing is begun any more");
+  }
   ++threads_away;
 }
 Away::Counted::~Counted() { --threads_away; }
@@ -61,6 +73,7 @@ Away::Counted::~Counted() { --threads_away; }
 bool Away::is_recalled() noexcept { return recalled; }
 
 void Away::recall_all() {
+  ending_thread = std::this_thread::get_id();
   recalled = true;
   while (threads_away > 0) {
     const py::gil_scoped_release back;

@@ -9,7 +9,6 @@ namespace tandem::studio {
 namespace {
 
 constexpr std::uint32_t kMostHead = 8 * 1024;
-constexpr auto kRequestTime = std::chrono::seconds(5);
 constexpr auto kAnswerTime = std::chrono::seconds(20);
 
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }

@@ -17,6 +17,8 @@ namespace tandem::studio {
 
 /// Connections at once, HTTP and WebSocket together. A further one gets status 503, and is closed.
 inline constexpr std::size_t kMostConnections = 64;
+/// For a request: who takes longer to say it is closed.
+inline constexpr std::chrono::seconds kRequestTime{5};
 /// Without a port of the caller's the first free one from here is taken.
 inline constexpr std::uint16_t kFirstPort = 8642, kLastPort = 8661;
 

@@ -1,5 +1,6 @@
 // `tandem controller new`, and what its project makes: built, tested and run as its user does it.
 #include "tests/apps/program.hpp"
+#include "tests/support/socket_path.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -21,7 +22,7 @@ class ControllerNew : public Program {
   }
   /// While the made controller runs. Its numbers were read once: `set` found no parameter.
   void set_its_gain(const std::string& tandem) const {
-    const std::string to = " --socket /tmp/tandem-test-" + std::to_string(::getpid()) + ".sock";
+    const std::string to = " --socket " + tandem::test::socket_path();
     const Outcome set =
         shell("cd nod && { " + tandem + " run nod.toml --rate 20 --duration 2000 --no-log -q" + to +
               " & } && for i in $(seq 600); do " + tandem + " controller set nod kp_1_s2=40" + to +

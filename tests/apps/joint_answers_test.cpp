@@ -12,6 +12,7 @@
 #include "apps/control/run_control.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "tests/runtime/loop_run.hpp"
+#include "tests/support/socket_path.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -58,7 +59,7 @@ struct Answered : ::testing::Test, runtime::test::LoopRun {
   }
   /// Runs a command against the run's socket; `out` and `err` are what it printed.
   Exit command(const std::vector<std::string>& words) {
-    const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-joints.sock";
+    const std::string path = tandem::test::socket_path("-joints");
     const auto socket = ControlSocket::open(path, registry);
     EXPECT_TRUE(socket) << socket.error().to_string();
     ::testing::internal::CaptureStdout();
@@ -319,7 +320,7 @@ TEST_F(JointAnswers, TellAWaiterThatTheRunHasEnded) {
   begin();
   const std::vector<std::string> move{"joint", "move",    "wrist", "--to",
                                       "-1.2",  "--speed", "0.01",  "--wait"};
-  const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-end.sock";
+  const std::string path = tandem::test::socket_path("-end");
   auto socket = ControlSocket::open(path, registry);
   ASSERT_TRUE(socket) << socket.error().to_string();
   ::testing::internal::CaptureStderr();
@@ -361,7 +362,7 @@ TEST_F(JointAnswers, EndTheWaitingWithStatus1WhenTheMotionEndsElsewhere) {
   const std::vector<std::string> move{"joint", "move",    "wrist", "--to",
                                       "-1.2",  "--speed", "0.01",  "--wait"};
   const auto wait_and = [&](const std::function<void()>& meanwhile) {
-    const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-wait.sock";
+    const std::string path = tandem::test::socket_path("-wait");
     const auto socket = ControlSocket::open(path, registry);
     ::testing::internal::CaptureStdout();
     ::testing::internal::CaptureStderr();

@@ -9,6 +9,7 @@
 #include "apps/control/run_control.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "tests/runtime/loop_run.hpp"
+#include "tests/support/socket_path.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -43,7 +44,7 @@ struct AnsweredRun : ::testing::Test, runtime::test::JointRun {
 
   /// `tandem fault reset` of what answers so.
   Exit reset_of(const ControlRegistry& served) {
-    const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-reset.sock";
+    const std::string path = tandem::test::socket_path("-reset");
     const auto socket = ControlSocket::open(path, served);
     EXPECT_TRUE(socket) << socket.error().to_string();
     ::testing::internal::CaptureStdout();

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "tests/apps/program.hpp"
+#include "tests/support/socket_path.hpp"
 
 namespace tandem::apps {
 
@@ -13,7 +14,7 @@ class Running : public Program {
  protected:
   void SetUp() override {
     Program::SetUp();
-    socket_ = "/tmp/tandem-test-" + std::to_string(::getpid()) + ".sock";
+    socket_ = tandem::test::socket_path();
   }
   /// `tandem run hold.toml MORE`, twenty times faster than a clock, until its controllers run.
   void begin(const std::string& more) {

@@ -56,7 +56,8 @@ class SeveralRuns : public Program {
   static std::string process(pid_t run) { return " (process " + std::to_string(run) + ")"; }
 
   // In /tmp: a socket's path is short.
-  const std::filesystem::path runtime_ = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-runs";
+  const std::filesystem::path runtime_ =
+      "/tmp/tandem-test-" + std::to_string(::getuid()) + "-" + std::to_string(::getpid()) + "-runs";
   std::vector<pid_t> runs_;
 };
 

@@ -717,3 +717,15 @@ time.sleep(0.2)
 """
     ended = subprocess.run([sys.executable, "-B", "-c", text], capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
+
+
+def test_python_ends_while_a_thread_steps_again_and_again():
+    """Its next step begins when the interpreter ends: an error would be printed amid that."""
+    text = f"""
+import tandem, threading, time
+run = tandem.Run({str(ROOT / "config" / HOLD)!r}, control="position", duration_s=1e6)
+threading.Thread(target=lambda: [run.step(1) for _ in iter(int, 1)], daemon=True).start()
+time.sleep(0.2)
+"""
+    ended = subprocess.run([sys.executable, "-B", "-c", text], capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")
