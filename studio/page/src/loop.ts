@@ -52,7 +52,7 @@ export class LoopPanel {
   readonly element: HTMLElement;
 
   constructor(data: Data) {
-    const heads = ['', ...kParts.map((part) => part.label), 'share of the period'];
+    const heads = ['time', ...kParts.map((part) => part.label), 'share of the period'];
     this.element = h(
       'div',
       { class: 'loop' },
@@ -72,7 +72,7 @@ export class LoopPanel {
         { class: 'muted' },
         'A bar is logarithmic, from a thousandth of the period to ten of them; the line is the period. Dark to p50, lighter to p99 and p99.9, the mark is the most.',
       ),
-      h('h3', {}, 'Buses'),
+      h('h2', {}, 'Buses'),
       this.buses,
     );
     data.source.on({ watched: (request, answer) => this.watched(request, answer) });
