@@ -1,4 +1,4 @@
-// Which topics there are, and what of a cycle each of them needs is told to whoever copies it.
+// Which topics there are. Each says what it needs of a cycle; only that is copied.
 #include "dds/run_topics.hpp"
 
 #include <algorithm>

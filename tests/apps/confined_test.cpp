@@ -276,7 +276,8 @@ class Confined : public Program {
     Program::TearDown();
   }
   /// A socket's path is short, the build folder's may be long.
-  const std::filesystem::path runtime_ = "/tmp/tandem-confined-" + std::to_string(::getpid());
+  const std::filesystem::path runtime_ =
+      "/tmp/tandem-confined-" + std::to_string(::getuid()) + "-" + std::to_string(::getpid());
   Rights rights{
       numbers("CapabilityBoundingSet", kCapabilities),
       filter(numbers("SystemCallFilter", kCalls), numbers("RestrictAddressFamilies", kFamilies))};

@@ -1,54 +1,22 @@
 // The page against a robot that is played: node --test tests/studio/browser/page.test.mjs
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { tmpdir } from 'node:os';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { after, afterEach, before, describe, test } from 'node:test';
-import { pathToFileURL } from 'node:url';
+import { describe, test } from 'node:test';
 import {
   colours,
   eventually,
-  kPage,
   lacking,
   leave,
-  openBrowser,
-  openPage,
   shot,
+  usePlayedRobots,
   violations,
 } from './support.mjs';
 
 const why = lacking();
-const kScratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
 
 describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
-  let browser;
-  let startMock;
-  const mocks = [];
-
-  before(async () => {
-    execFileSync(process.execPath, [join(kPage, 'build.mjs'), '--out', kScratch]);
-    ({ startMock } = await import(pathToFileURL(join(kPage, 'test/mock/server.mjs'))));
-    browser = await openBrowser();
-  });
-  after(async () => {
-    await browser?.close();
-    rmSync(kScratch, { recursive: true, force: true });
-  });
-
-  afterEach(async () => {
-    for (const mock of mocks.splice(0)) await mock.stop();
-  });
-
-  const play = async (options = {}) => {
-    const mock = await startMock({ robot: 'coman', dist: kScratch, ...options });
-    mocks.push(mock);
-    return mock;
-  };
-  const visit = (address, options) => openPage(browser, address, options);
-  const asked = (mock, name) => mock.robot.requests.filter((one) => one.do === name);
-  const until = (page, text) =>
-    page.waitForFunction((words) => document.body.textContent.includes(words), text);
+  const { play, visit, asked, until, scratch: kScratch } = usePlayedRobots();
 
   test('shows the run, and a robot that is not blank', async () => {
     const mock = await play();
@@ -286,7 +254,6 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     const mock = await play();
     const page = await visit(mock.address);
     await mock.stop();
-    mocks.splice(0);
     await page.waitForSelector('body[data-state="lost"]');
     await page.click('.estop');
     await until(

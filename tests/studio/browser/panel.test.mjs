@@ -1,56 +1,15 @@
 // Groups of joints, gains, and what the 3D view has: node --test tests/studio/browser/panel.test.mjs
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
-import { mkdtempSync, rmSync } from 'node:fs';
-import { tmpdir } from 'node:os';
-import { join } from 'node:path';
-import { after, afterEach, before, describe, test } from 'node:test';
-import { pathToFileURL } from 'node:url';
-import {
-  eventually,
-  kPage,
-  lacking,
-  leave,
-  openBrowser,
-  openPage,
-  shot,
-  violations,
-} from './support.mjs';
+import { describe, test } from 'node:test';
+import { eventually, lacking, leave, shot, usePlayedRobots, violations } from './support.mjs';
 
 const why = lacking();
-const kScratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
 
 describe('the joints and the 3D view of the studio', {
   skip: why || false,
   timeout: 240000,
 }, () => {
-  let browser;
-  let startMock;
-  const mocks = [];
-
-  before(async () => {
-    execFileSync(process.execPath, [join(kPage, 'build.mjs'), '--out', kScratch]);
-    ({ startMock } = await import(pathToFileURL(join(kPage, 'test/mock/server.mjs'))));
-    browser = await openBrowser();
-  });
-  after(async () => {
-    await browser?.close();
-    rmSync(kScratch, { recursive: true, force: true });
-  });
-
-  afterEach(async () => {
-    for (const mock of mocks.splice(0)) await mock.stop();
-  });
-
-  const play = async (options = {}) => {
-    const mock = await startMock({ robot: 'coman', dist: kScratch, ...options });
-    mocks.push(mock);
-    return mock;
-  };
-  const visit = (address, options) => openPage(browser, address, options);
-  const asked = (mock, name) => mock.robot.requests.filter((one) => one.do === name);
-  const until = (page, text) =>
-    page.waitForFunction((words) => document.body.textContent.includes(words), text);
+  const { play, visit, asked, until } = usePlayedRobots();
 
   test('several joints at once: asked before, the command shown, gains taken back', async () => {
     const mock = await play();

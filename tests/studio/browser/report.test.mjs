@@ -1,24 +1,15 @@
 // A report as it is opened from the disk: TANDEM=… node --test tests/studio/browser/report.test.mjs
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
-import { existsSync, mkdtempSync, rmSync, statSync } from 'node:fs';
+import { mkdtempSync, rmSync, statSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, describe, test } from 'node:test';
 import { pathToFileURL } from 'node:url';
-import {
-  colours,
-  kPage,
-  lacking,
-  leave,
-  openBrowser,
-  openPage,
-  shot,
-  violations,
-} from './support.mjs';
+import { kTandem, lackingRun } from './runs.mjs';
+import { colours, kPage, leave, openBrowser, openPage, shot, violations } from './support.mjs';
 
-const kTandem = process.env.TANDEM ?? join(kPage, '../../build/release/bin/tandem');
-const why = lacking() || (existsSync(kTandem) ? '' : `${kTandem} is not built`);
+const why = lackingRun();
 const kScratch = mkdtempSync(join(tmpdir(), 'tandem-report-'));
 const kMostBytes = 5_000_000;
 

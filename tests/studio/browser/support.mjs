@@ -1,9 +1,12 @@
 // A browser for the tests of the studio's page, and what every test of it looks at.
 import assert from 'node:assert/strict';
-import { existsSync, readFileSync } from 'node:fs';
+import { execFileSync } from 'node:child_process';
+import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
-import { fileURLToPath } from 'node:url';
+import { after, afterEach, before } from 'node:test';
+import { fileURLToPath, pathToFileURL } from 'node:url';
 
 const here = dirname(fileURLToPath(import.meta.url));
 export const kPage = join(here, '../../../studio/page');
@@ -130,4 +133,40 @@ export async function violations(page) {
         `${one.id}: ${one.nodes.map((node) => `${node.target} ${node.failureSummary}`).join(' | ')}`,
     );
   });
+}
+
+/**
+ * For the tests of a file: the page as it is built now, and robots that are played for it.
+ * @returns play: a played robot, visit: its page, asked: what it was asked for by name, until: the
+ * page shows a text, scratch: a folder that goes at the end
+ */
+export function usePlayedRobots() {
+  const scratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
+  const mocks = [];
+  let browser;
+  let startMock;
+  before(async () => {
+    execFileSync(process.execPath, [join(kPage, 'build.mjs'), '--out', scratch]);
+    ({ startMock } = await import(pathToFileURL(join(kPage, 'test/mock/server.mjs'))));
+    browser = await openBrowser();
+  });
+  after(async () => {
+    await browser?.close();
+    rmSync(scratch, { recursive: true, force: true });
+  });
+  afterEach(async () => {
+    for (const mock of mocks.splice(0)) await mock.stop();
+  });
+  return {
+    scratch,
+    play: async (options = {}) => {
+      const mock = await startMock({ robot: 'coman', dist: scratch, ...options });
+      mocks.push(mock);
+      return mock;
+    },
+    visit: (address, options) => openPage(browser, address, options),
+    asked: (mock, name) => mock.robot.requests.filter((one) => one.do === name),
+    until: (page, text) =>
+      page.waitForFunction((words) => document.body.textContent.includes(words), text),
+  };
 }
