@@ -22,6 +22,7 @@ struct ParallelView {
   std::optional<TruthImage> truth{};  ///< of the second, in the same cycle; empty: it has none
 };
 
+/// What one reader sees of it.
 class ParallelSource {
  public:
   virtual ~ParallelSource() = default;

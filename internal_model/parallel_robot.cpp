@@ -35,7 +35,7 @@ ParallelRobot::ParallelRobot(const ParallelParts& parts, const hal::ImageShape& 
       command_(shape),
       gains_(gains),
       differences_(shape),
-      shown_(nothing(shape, parts.truth)) {
+      shown_{Shown(nothing(shape, parts.truth)), Shown(nothing(shape, parts.truth))} {
   if (recorder_ == nullptr) return;
   state_channel_ =
       recorder_->add_channel("/tandem/parallel/state", "tandem/msg/State", state_.layout());
@@ -59,11 +59,9 @@ ParallelResult ParallelRobot::finish() {
   return result_;
 }
 
-const hal::ParallelView* ParallelRobot::newest() noexcept {
-  (void)shown_.refresh();
-  return shown_.front().state.joints() > 0 && done_.load(std::memory_order_acquire) > 0
-             ? &shown_.front()
-             : nullptr;
+const hal::ParallelView* ParallelRobot::Shown::newest() noexcept {
+  any_ = views_.refresh() || any_;
+  return any_ ? &views_.front() : nullptr;
 }
 
 void ParallelRobot::run() {
@@ -161,7 +159,13 @@ void ParallelRobot::log(std::int64_t time_ns) {
 }
 
 void ParallelRobot::show(const CommandRecord& record) {
-  hal::ParallelView& view = shown_.back();
+  for (Shown& one : shown_) {
+    fill(one.back(), record);
+    one.publish();
+  }
+}
+
+void ParallelRobot::fill(hal::ParallelView& view, const CommandRecord& record) const {
   view.state.assign(state_);
   if (truth_ != nullptr) view.truth->assign(*truth_);
   const bool both = both_follow(record);
@@ -173,7 +177,6 @@ void ParallelRobot::show(const CommandRecord& record) {
   }
   view.behind_cycles = tape_.size() - 1;
   view.missed = tape_.dropped();
-  shown_.publish();
 }
 
 bool ParallelRobot::snapshot_now(std::uint64_t next_cycle) noexcept TANDEM_RT {

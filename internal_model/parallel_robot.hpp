@@ -3,6 +3,7 @@
 // Layer: internal_model.  Thread: made, start(), finish() main's; the second robot its own.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <condition_variable>
 #include <cstddef>
@@ -44,16 +45,19 @@ struct ParallelResult {
   std::string fault;              ///< why the second robot stopped by itself; empty: it did not
 };
 
+/// Who looks at the second robot while it runs: each on a thread of its own.
+enum class ParallelReader : std::uint8_t { kDds, kStudio, kCount };
+
 /// Plays the first robot's tape to the second, on a thread of its own, cycle by cycle and call by
 /// call, from power-on: two equal robots stay equal to the last bit. When the second is late, it is
 /// late alone.
-class ParallelRobot final : public hal::ParallelSource {
+class ParallelRobot {
  public:
   /// Adds its channels to the recorder.
   /// @param gains  that the drives start with
   ParallelRobot(const ParallelParts& parts, const hal::ImageShape& shape,
                 const hal::ParameterImage& gains, std::int64_t period_ns);
-  ~ParallelRobot() override;
+  ~ParallelRobot();
   ParallelRobot(const ParallelRobot&) = delete;
   ParallelRobot& operator=(const ParallelRobot&) = delete;
 
@@ -66,8 +70,10 @@ class ParallelRobot final : public hal::ParallelSource {
   /// is closed. Once.
   ParallelResult finish();
 
-  /// One other thread's: what the second robot did last.
-  [[nodiscard]] const hal::ParallelView* newest() noexcept override;
+  /// What the second robot did last, for one reader. None slows another, nor the robot.
+  [[nodiscard]] hal::ParallelSource& shown_to(ParallelReader reader) noexcept {
+    return shown_[static_cast<std::size_t>(reader)];
+  }
 
   /// The loop's, before its cycle `next_cycle`: wants a snapshot of the second robot when it has
   /// made every cycle so far. Its thread takes it. False: another one is still wanted. @rt
@@ -84,6 +90,18 @@ class ParallelRobot final : public hal::ParallelSource {
   [[nodiscard]] const Differences& differences() const noexcept { return differences_; }
 
  private:
+  class Shown final : public hal::ParallelSource {
+   public:
+    explicit Shown(const hal::ParallelView& nothing) : views_(nothing) {}
+    [[nodiscard]] hal::ParallelView& back() noexcept { return views_.back(); }
+    void publish() noexcept { views_.publish(); }
+    [[nodiscard]] const hal::ParallelView* newest() noexcept override;
+
+   private:
+    TripleBuffer<hal::ParallelView> views_;
+    bool any_ = false;  // the reader's
+  };
+
   void run();
   void play(const CommandRecord& record);
   void make_up(const CommandRecord& record);
@@ -94,6 +112,7 @@ class ParallelRobot final : public hal::ParallelSource {
   void take_snapshot();
   void log(std::int64_t time_ns);
   void show(const CommandRecord& record);
+  void fill(hal::ParallelView& view, const CommandRecord& record) const;
 
   hal::Backend* second_;
   const hal::TruthImage* truth_;
@@ -115,7 +134,7 @@ class ParallelRobot final : public hal::ParallelSource {
   bool diverged_ = false;
   Differences differences_;
   ParallelResult result_;
-  TripleBuffer<hal::ParallelView> shown_;
+  std::array<Shown, static_cast<std::size_t>(ParallelReader::kCount)> shown_;
 
   static constexpr std::uint64_t kNone = ~std::uint64_t{0};
   struct Snapshot {

@@ -40,7 +40,7 @@ struct Feed {
   std::function<void(std::vector<Event>&)> events{};  ///< appends what has happened since
   std::function<bool()> time_stands{};                ///< simulated time is paused
   std::function<void(const Tap::Cycle&)> cycle{};     ///< gets every cycle of the tap
-  hal::ParallelSource* parallel = nullptr;            ///< null: there is none, or another reads it
+  hal::ParallelSource* parallel = nullptr;            ///< null: there is none
 };
 
 /// Who asks, as far as the rules go.

@@ -119,9 +119,7 @@ FoxgloveRun::~FoxgloveRun() = default;
 Result<std::unique_ptr<FoxgloveRun>> FoxgloveRun::open(const WiredComposition& c,
                                                        const std::string& node,
                                                        const std::string& session) {
-  dds::RunDescription run = described(c);
-  // Only one reader may look at the second robot: where there is DDS, its topics are there.
-  if (c.experiment.dds.enabled) run.parallel = false;
+  const dds::RunDescription run = described(c);
   const std::string experiment = std::filesystem::path(c.experiment.file).filename().string();
   std::unique_ptr<FoxgloveRun> made(new FoxgloveRun(
       c, node,
@@ -131,7 +129,6 @@ Result<std::unique_ptr<FoxgloveRun>> FoxgloveRun::open(const WiredComposition& c
   auto topics = dds::RunTopics::create(*made->channels_, run);
   if (!topics) return std::unexpected(topics.error());
   made->topics_ = std::move(*topics);
-  made->parallel_ = run.parallel;
   return made;
 }
 
@@ -139,7 +136,7 @@ void FoxgloveRun::start(runtime::RobotCycle& cycle, hal::ParallelSource* paralle
                         std::function<std::uint64_t()> lost) {
   lost_ = std::move(lost);
   const dds::ControllerFeed controllers = controller_feed(cycle.services());
-  topics_->start(fault_feed(cycle), parallel_ ? parallel : nullptr, controllers);
+  topics_->start(fault_feed(cycle), parallel, controllers);
   hub_.start({.publish = [this](bool again) { publish(again); },
               .time_ns = [this] { return now_ns(); },
               .parameter_version = controllers.parameter_version,

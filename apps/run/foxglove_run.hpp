@@ -49,7 +49,7 @@ class FoxgloveRun {
   [[nodiscard]] std::int64_t now_ns() const;
   [[nodiscard]] Result<std::string> asset(const std::string& uri) const;
 
-  bool simulated_time_, parallel_ = false;
+  bool simulated_time_;
   std::string folder_;        // of the description
   studio::MeshFiles meshes_;  // that it names
   studio::foxglove::Hub hub_;

@@ -219,7 +219,7 @@ class Session {
                    return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
                  });
     }
-    studio_.start(*cycle_, commands_, run_->parallel());
+    studio_.start(*cycle_, commands_, shown_to(internal_model::ParallelReader::kStudio));
     const bool on_robot = e.hal.backend == runtime::BackendKind::kWire && !e.hal.lockstep;
     auto socket = serve(commands_, {.path = options_.socket,
                                     .kind = "run",
@@ -254,7 +254,7 @@ class Session {
     rt::install_emergency_signal();
     std::optional<rt::NoCpuSleep> awake;
     if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
-    if (dds_ != nullptr) dds_->start(*cycle_, run_->parallel());
+    if (dds_ != nullptr) dds_->start(*cycle_, shown_to(internal_model::ParallelReader::kDds));
     auto guard = CycleGuard::open(c_, *cycle_);
     if (!guard) return std::unexpected(guard.error());
     CycleThread thread(*cycle_, e.thread);
@@ -270,6 +270,12 @@ class Session {
       fmt::print(stderr, "note: {}\n", thread.report().to_string());
     }
     return thread.times();
+  }
+
+  /// Null: there is no second robot.
+  [[nodiscard]] hal::ParallelSource* shown_to(internal_model::ParallelReader reader) {
+    auto* const parallel = run_->parallel();
+    return parallel == nullptr ? nullptr : &parallel->shown_to(reader);
   }
 
   void close_log() {

@@ -239,8 +239,7 @@ void StudioRun::begin(Parts& parts) {
             return stands;
           },
       .cycle = [foxglove](const studio::Tap::Cycle& one) { foxglove->take(one); },
-      // One thread may look at the second robot: with DDS that is the publisher's.
-      .parallel = composition_->experiment.dds.enabled ? nullptr : parallel_};
+      .parallel = parallel_};
   studio::Asker asker{
       .ask =
           [turns](studio::Question question) {

@@ -161,7 +161,8 @@ TEST(ParallelRobot, ThatIsLateIsLateAlone) {
   run.steps(300);
   const std::uint64_t cycles = run.cycle->loop().cycles;
   const hal::ParallelView* view = nullptr;
-  while ((view = run.beside->newest()) == nullptr) {
+  hal::ParallelSource& shown = run.beside->shown_to(ParallelReader::kDds);
+  while ((view = shown.newest()) == nullptr) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   ASSERT_NE(view, nullptr);
@@ -170,6 +171,44 @@ TEST(ParallelRobot, ThatIsLateIsLateAlone) {
   EXPECT_EQ(view->truth->time_ns()[0], view->state.time_ns()[0]) << "of one cycle";
   EXPECT_EQ(run.cycle->faults().size(), 0U);
   EXPECT_GT(cycles, 300U);
+}
+
+/// Two readers at once, each on a thread of its own, beside the second robot's.
+TEST(ParallelRobot, IsShownWholeToEachOfItsReaders) {
+  SwingRun run({.cycles = 3000});
+  std::atomic<bool> over{false};
+  struct Seen {
+    std::size_t views = 0, torn = 0, backwards = 0;
+    std::uint64_t last = 0;
+  };
+  const auto look = [&](ParallelReader reader, Seen& seen) {
+    hal::ParallelSource& shown = run.beside->shown_to(reader);
+    for (bool last = false; !last;) {
+      last = over.load();  // and look once more
+      const hal::ParallelView* view = shown.newest();
+      if (view == nullptr) continue;
+      const std::uint64_t cycle = view->state.cycle()[0];
+      ++seen.views;
+      if (view->truth->time_ns()[0] != view->state.time_ns()[0]) ++seen.torn;
+      if (cycle < seen.last) ++seen.backwards;
+      seen.last = cycle;
+    }
+  };
+  std::array<Seen, 2> seen;
+  std::thread dds([&] { look(ParallelReader::kDds, seen[0]); });
+  std::thread studio([&] { look(ParallelReader::kStudio, seen[1]); });
+  run.cycle->run();
+  const ParallelResult result = run.beside->finish();
+  over = true;
+  dds.join();
+  studio.join();
+  for (const Seen& one : seen) {
+    EXPECT_GT(one.views, 1U);
+    EXPECT_EQ(one.torn, 0U) << "state and truth are of one cycle";
+    EXPECT_EQ(one.backwards, 0U);
+    EXPECT_EQ(one.last, run.cycle->loop().cycles - 1) << "the last of all";
+  }
+  EXPECT_EQ(result.missed, 0U);
 }
 
 /// Cycles that found no place on the tape: the second robot makes them up with its last command,
@@ -181,7 +220,8 @@ TEST(ParallelRobot, MakesUpWhatItMissed) {
     ASSERT_TRUE(run.cycle->step());
   }
   const std::uint64_t made = run.cycle->loop().cycles;
-  while (run.beside->newest() == nullptr || run.beside->newest()->behind_cycles > 400) {
+  hal::ParallelSource& shown = run.beside->shown_to(ParallelReader::kStudio);
+  while (shown.newest() == nullptr || shown.newest()->behind_cycles > 400) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));  // there is a place again
   }
   run.steps(1);

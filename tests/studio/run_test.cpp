@@ -4,10 +4,12 @@
 
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 
 #include "base/quoting.hpp"
 #include "log/log_file.hpp"
 #include "tests/studio/web_client.hpp"
+#include "tests/support/dds_domain.hpp"
 #include "tests/support/scratch_folder.hpp"
 
 namespace tandem::studio {
@@ -19,11 +21,12 @@ using namespace test;
 class StudioRun : public testing::Test {
  protected:
   void begin(const std::string& experiment, const std::string& flags) {
-    const std::string command = "cd " + shell_word(folder_.path()) + " && exec " +
-                                shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " run " +
-                                shell_word(TANDEM_SOURCE_DIR "/config/" + experiment) +
-                                " --studio=0 -q --no-socket --no-dds --log . " + flags +
-                                " 2>run.txt";
+    const std::string command =
+        "cd " + shell_word(folder_.path()) + " && exec " +
+        shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " run " +
+        shell_word(experiment.starts_with("/") ? experiment
+                                               : TANDEM_SOURCE_DIR "/config/" + experiment) +
+        " --studio=0 -q --no-socket --log . " + flags + " 2>run.txt";
     run_ = ::popen(command.c_str(), "r");
     ASSERT_NE(run_, nullptr);
     std::array<char, 200> line{};
@@ -50,7 +53,7 @@ class StudioRun : public testing::Test {
 };
 
 TEST_F(StudioRun, ShowsThePageWhatItsLogHas) {
-  begin("double_pendulum/trajectory.toml", "--duration 1.5");
+  begin("double_pendulum/trajectory.toml", "--no-dds --duration 1.5");
   WebClient client(port_);
   ASSERT_TRUE(client.open());
   EXPECT_EQ(client.next("hello")["robot"], "double_pendulum");
@@ -122,7 +125,7 @@ TEST_F(StudioRun, ShowsThePageWhatItsLogHas) {
 }
 
 TEST_F(StudioRun, LetsAPageDoWhatItsTokenAllows) {
-  begin("double_pendulum/hold.toml", "--duration 600");
+  begin("double_pendulum/hold.toml", "--no-dds --duration 600");
   WebClient client(port_);
   ASSERT_TRUE(client.open());
   EXPECT_EQ(client.ask({{"do", "status"}})["ok"], true);
@@ -151,6 +154,38 @@ TEST_F(StudioRun, LetsAPageDoWhatItsTokenAllows) {
   EXPECT_TRUE(told);
   EXPECT_EQ(stranger.next("ended").value("how", "").empty(), false);
   EXPECT_EQ(end(), 1);
+}
+
+/// DDS and the page look at the second robot at once.
+TEST_F(StudioRun, ShowsTheTwinBesideDds) {
+  const std::string file = folder_ / "twin.toml";
+  std::ofstream(file)
+      << "robot = \"" TANDEM_SOURCE_DIR
+         "/config/double_pendulum/robot.toml\"\n"
+         "posture = \"ready\"\nduration_s = 600.0\n[[controller]]\nplugin = \"hold\"\n[parallel]\n";
+  begin(file, "--dds --domain " + std::to_string(dds::test::another_domain()) + " --duration 600");
+  WebClient client(port_);
+  ASSERT_TRUE(client.open());
+  enter(client);
+  Json signals;
+  const auto has = [&](const char* name) {
+    return std::ranges::any_of(signals["sources"],
+                               [&](const Json& source) { return source["name"] == name; });
+  };
+  do {
+    signals = client.next("signals");
+  } while (!signals.empty() && !has("parallel"));
+  ASSERT_FALSE(signals.empty()) << "no twin came";
+  client.say(Json{
+      {"op", "subscribe"},
+      {"revision", 1},
+      {"signals",
+       {id_in(signals, "parallel", "position_rad"), id_in(signals, "state", "position_rad")}}});
+  SeenTick tick = client.tick();
+  while (tick.numbers.size() < 6 || !std::isfinite(tick.numbers[2])) tick = client.tick();
+  EXPECT_NEAR(tick.numbers[2], tick.numbers[5], 1e-3) << "both hold the same posture";
+  EXPECT_EQ(client.ask({{"do", "run.stop"}})["ok"], true);
+  EXPECT_EQ(end(), 0);
 }
 
 }  // namespace
