@@ -14,6 +14,7 @@ Json question_of(const StudioCommandOptions& options) {
   Json question{{"do", "studio.open"}};
   if (options.port) question["port"] = *options.port;
   if (!options.address.empty()) question["address"] = options.address;
+  if (!options.origins.empty()) question["origins"] = options.origins;
   // The run may be in another folder.
   if (!options.page.empty()) question["page"] = std::filesystem::absolute(options.page).string();
   return question;
@@ -35,7 +36,7 @@ Exit attach_studio(const StudioCommandOptions& options) {
   const Result<Json> answer = ask(options.target, "run", question_of(options));
   if (!answer) return refuse(why_not(answer.error()));
   const std::string address = answer->value("address", "");
-  const bool asked = options.port || !options.address.empty() || !options.page.empty();
+  const bool asked = question_of(options).size() > 1;
   if (!answer->value("opened", true) && asked) {
     fmt::print(stderr, "note: it was open already, and stays as it is until the run ends\n");
   }

@@ -65,6 +65,7 @@ struct StudioCommandOptions {
   std::optional<std::uint16_t> port{};  ///< as StudioOptions'; empty: the run chooses
   std::string address{};                ///< empty: 127.0.0.1
   std::string page{};                   ///< empty: the run's own
+  std::vector<std::string> origins{};   ///< as StudioOptions'
 };
 
 /// tandem ask QUESTION

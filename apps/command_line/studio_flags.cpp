@@ -51,6 +51,16 @@ CLI::Validator is_origin() {
   return {check, ""};
 }
 
+CLI::Option* add_origins(CLI::App& app, const char* flag, std::vector<std::string>& origins) {
+  return app
+      .add_option(flag, origins,
+                  "Whose pages may look by Foxglove's protocol: https://app.foxglove.dev; give it "
+                  "again for others")
+      ->take_all()
+      ->expected(1)
+      ->check(is_origin());
+}
+
 }  // namespace
 
 void add_studio_flags(CLI::App& app, StudioOptions& o) {
@@ -69,13 +79,7 @@ void add_studio_flags(CLI::App& app, StudioOptions& o) {
   app.add_option("--studio-page", o.page, kPageHelp)
       ->needs(studio)
       ->check(is_given("name a folder"));
-  app.add_option("--studio-origin", o.origins,
-                 "Whose pages may look by Foxglove's protocol: https://app.foxglove.dev; give it "
-                 "again for others")
-      ->needs(studio)
-      ->take_all()
-      ->expected(1)
-      ->check(is_origin());
+  add_origins(app, "--studio-origin", o.origins)->needs(studio);
 }
 
 void add_flags(CLI::App& app, StudioCommandOptions& o) {
@@ -89,6 +93,7 @@ void add_flags(CLI::App& app, StudioCommandOptions& o) {
       ->check(is_port("--port 9000"));
   app.add_option("--address", o.address, kAddressHelp)->check(is_given(kNameAnAddress));
   app.add_option("--page", o.page, kPageHelp)->check(is_given("name a folder"))->excludes(logs);
+  add_origins(app, "--origin", o.origins)->excludes(logs);
   app.footer(kStudioExamples);
 }
 

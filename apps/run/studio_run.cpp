@@ -187,6 +187,7 @@ Result<Json> StudioRun::asked_to_open(const Json& request) {
   if (request.contains("port")) options.port = request["port"].get<std::uint16_t>();
   options.address = request.value("address", options.address);
   options.page = request.value("page", options.page);
+  options.origins = request.value("origins", options.origins);
   const bool was_open = is_open();
   const Result<std::string> address = open(options);
   if (!address) return std::unexpected(address.error());
