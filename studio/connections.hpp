@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <functional>
 #include <future>
+#include <list>
 #include <memory>
 #include <optional>
 #include <set>
@@ -29,10 +30,12 @@ namespace http = boost::beast::http;
 namespace websocket = boost::beast::websocket;
 using Tcp = net::ip::tcp;
 
+class HttpConnection;
 class WebSocketConnection;
 
 struct Server::Impl {
-  std::size_t connections = 0;  // first: what dies with `io` counts down
+  std::size_t connections = 0;        // these first: what dies with `io` leaves them
+  std::list<HttpConnection*> silent;  // those whose next request is waited for, the longest first
   net::io_context io{1};
   Tcp::acceptor acceptor{io};
   net::steady_timer timer{io}, pause{io};
@@ -71,10 +74,16 @@ class ConnectionPlace {
 class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
   HttpConnection(Server::Impl& server, Tcp::socket socket);
+  ~HttpConnection() { is_heard(); }
+  HttpConnection(const HttpConnection&) = delete;
+  HttpConnection& operator=(const HttpConnection&) = delete;
   /// The next request.
   void read();
+  /// Ends without a word, and leaves its place to another. @pre it is one of the silent
+  void give_way();
 
  private:
+  void is_heard();
   void take(beast::error_code error);
   void send(const Response& response, bool keep);
   void close();
@@ -84,6 +93,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
+  std::optional<std::list<HttpConnection*>::iterator> silent_;
   http::response<http::string_body> response_;
 };
 

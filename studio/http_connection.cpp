@@ -47,12 +47,26 @@ void HttpConnection::read() {
   parser_.emplace();
   parser_->header_limit(kMostHead);
   stream_.expires_after(kRequestTime);
+  silent_ = server_.silent.insert(server_.silent.end(), this);
   http::async_read(
       stream_, buffer_, *parser_,
       [me = shared_from_this()](beast::error_code error, std::size_t) { me->take(error); });
 }
 
+void HttpConnection::is_heard() {
+  if (silent_) server_.silent.erase(*silent_);
+  silent_.reset();
+}
+
+void HttpConnection::give_way() {
+  is_heard();
+  place_.reset();
+  stream_.close();  // what it waits for fails, and it is gone
+}
+
 void HttpConnection::take(beast::error_code error) {
+  if (place_ == nullptr) return;  // it has given way: what came at the same time is too late
+  is_heard();
   if (error == http::error::header_limit || error == http::error::buffer_overflow) {
     return send(words(431, "Request Header Fields Too Large", "A head has 8 kB at most."), false);
   }

@@ -146,8 +146,9 @@ std::optional<Response> HttpRules::answer(const RequestHead& head) const {
   }
   if (!may_come(head)) {
     return words(403, "Forbidden",
-                 is_guest(head) ? "This is a page of somewhere else: `tandem run … --studio-origin "
-                                  "ORIGIN` lets the pages of an origin look."
+                 is_guest(head) ? "This is a page of somewhere else: --studio-origin ORIGIN of "
+                                  "`tandem run`, or --origin of `tandem studio`, lets the pages "
+                                  "of an origin look."
                                 : "This is a page of somewhere else.");
   }
   const std::string_view path = head.target.substr(0, head.target.find('?'));

@@ -150,6 +150,8 @@ void Server::Impl::accept() {
       });
       return;
     }
+    // Who has come now may have something to say; who has been silent longest has had time.
+    if (connections >= kMostConnections && !silent.empty()) silent.front()->give_way();
     if (connections >= kMostConnections) {
       send_away(std::move(socket));
     } else {

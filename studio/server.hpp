@@ -15,7 +15,8 @@
 
 namespace tandem::studio {
 
-/// Connections at once, HTTP and WebSocket together. A further one gets status 503, and is closed.
+/// Connections at once, HTTP and WebSocket together. A further one takes the place of
+/// the one whose request is waited for longest; where there is none it gets status 503.
 inline constexpr std::size_t kMostConnections = 64;
 /// For a request: who takes longer to say it is closed.
 inline constexpr std::chrono::seconds kRequestTime{5};

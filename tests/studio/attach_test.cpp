@@ -97,6 +97,25 @@ TEST_F(Attach, ARunThatGoesOnIsShownUntilItsEnd) {
   EXPECT_EQ(client.closed(), 1001);
 }
 
+TEST_F(Attach, PagesOfTheOriginsThatWereNamedMayLook) {
+  begin("--rate 1");
+  const Printed none = print("studio --port 0 --origin lichtblick.example");
+  EXPECT_EQ(none.status, 2);
+  EXPECT_NE(none.text.find("is no origin"), std::string::npos) << none.text;
+  const Printed opened =
+      print("studio --port 0 --origin http://lichtblick.example --origin https://other.example");
+  ASSERT_EQ(opened.status, 0) << opened.text;
+  EXPECT_NE(print("studio --origin http://late.example").text.find("open already"),
+            std::string::npos);
+  const std::uint16_t port = port_of(opened.text);
+  for (const char* origin : {"http://lichtblick.example", "https://other.example"}) {
+    EXPECT_TRUE(WebClient(port).open("foxglove.sdk.v1", origin)) << origin;
+  }
+  EXPECT_FALSE(WebClient(port).open("foxglove.sdk.v1", "http://late.example"));
+  EXPECT_FALSE(WebClient(port).open("tandem.studio.v1", "http://lichtblick.example"));
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(Attach, ARobotThatStandsIsShownAsItStands) {
   begin("--start-paused");
   ASSERT_EQ(print("clock step 250").status, 0);

@@ -50,7 +50,7 @@ struct StudioRig {
   StudioRig(const StudioRig&) = delete;
   StudioRig& operator=(const StudioRig&) = delete;
 
-  void start() {
+  void start(Protocol* guests = nullptr) {
     studio->start({.loads = [this] { return loads.load(); },
                    .signals = [this] { return signals; },
                    .events =
@@ -75,7 +75,8 @@ struct StudioRig {
                        [](const std::string& question) {
                          return question.find("\"estop\"") != std::string::npos;
                        },
-                   .only_reads = [](const std::string& name) { return name == "status"; }});
+                   .only_reads = [](const std::string& name) { return name == "status"; }},
+                  guests);
   }
   void ask(Question question) {
     {
