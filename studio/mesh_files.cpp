@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr int kLevels = 5;  // above the description, where its package may be
 constexpr std::size_t kLongestName = 1000;
-constexpr std::string_view kShown[] = {".stl", ".obj"};
+constexpr std::string_view kShown[] = {".stl", ".obj", ".dae"};
 
 void collect(const tinyxml2::XMLElement* element, std::vector<std::string>& names) {
   for (; element != nullptr; element = element->NextSiblingElement()) {
@@ -100,7 +100,7 @@ Result<std::string> MeshFiles::path_of(std::size_t mesh) const {
   std::string ending = place->path.extension().string();
   std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
   if (std::ranges::find(kShown, ending) == std::end(kShown)) {
-    return fail("it is neither STL nor OBJ");
+    return fail("it is neither STL, OBJ nor COLLADA");
   }
   std::error_code error;
   const fs::path path = fs::canonical(place->path, error);

@@ -50,6 +50,7 @@ TEST(StudioMeshes, OfTheDescriptionsPackageAreShown) {
   const MeshPackage package;
   EXPECT_EQ(package.why("../meshes/a.STL"), "");
   EXPECT_EQ(package.why("package://arm/meshes/a.STL"), "");
+  EXPECT_EQ(package.why("../meshes/b.dae"), "");
   EXPECT_EQ(package.why("package://arm_2/c.obj"), "") << "a package beside it";
   EXPECT_EQ(package.why("file://" + package.at("arm/meshes/a.STL").string()), "");
   EXPECT_EQ(*package.with("../meshes/a.STL").read(0), "solid");
@@ -70,8 +71,8 @@ TEST(StudioMeshes, ElsewhereAreRefused) {
     EXPECT_EQ(package.why(name), "its package is not beside or above the description") << name;
   }
   EXPECT_EQ(package.why("http://elsewhere/a.stl"), "it is no file of this machine");
-  EXPECT_EQ(package.why("../meshes/b.dae"), "it is neither STL nor OBJ");
-  EXPECT_EQ(package.why("/etc/passwd"), "it is neither STL nor OBJ");
+  EXPECT_EQ(package.why("../meshes/b.ply"), "it is neither STL, OBJ nor COLLADA");
+  EXPECT_EQ(package.why("/etc/passwd"), "it is neither STL, OBJ nor COLLADA");
   EXPECT_EQ(package.why("../meshes/none.stl"), "it is not there");
   EXPECT_EQ(package.why("../meshes/folder.stl"), "it is not there");
   EXPECT_EQ(package.why(std::string(2000, 'a') + ".stl"), "its name is too long");

@@ -2,7 +2,9 @@
 import * as THREE from 'three';
 import { OBJLoader } from 'three/examples/jsm/loaders/OBJLoader.js';
 import { STLLoader } from 'three/examples/jsm/loaders/STLLoader.js';
-import type { MeshFile } from './protocol';
+import { parseCollada } from './collada';
+import { fairShare, kMostTriangles, makeCoarser, trianglesOf } from './fewer_triangles';
+import type { Hello } from './protocol';
 import type { Source } from './source';
 
 export interface Meshes {
@@ -10,7 +12,12 @@ export interface Meshes {
   readonly ready: Map<string, THREE.Object3D>;
   /** Why others are not there. */
   readonly why: Map<string, string>;
+  /** Those that are drawn with fewer triangles than their files have, in words. */
+  coarse: string[];
+  /** Triangles that the robot may have. */
+  most: number;
 }
+export const kNoMeshes: Meshes = { ready: new Map(), why: new Map(), coarse: [], most: 0 };
 
 /** Many files have normals of length 0: the corners say them better. */
 function stl(bytes: ArrayBuffer): THREE.Object3D {
@@ -25,17 +32,20 @@ const kFarthest = 1e6;
 const kParsers: Record<string, (bytes: ArrayBuffer) => THREE.Object3D> = {
   stl,
   obj: (bytes) => new OBJLoader().parse(new TextDecoder().decode(bytes)),
+  dae: (bytes) => parseCollada(new TextDecoder().decode(bytes)),
 };
 
 /** The geometry in a file's bytes. @throws Error in words. */
 export function parseMesh(file: string, bytes: ArrayBuffer): THREE.Object3D {
   const parse = kParsers[file.slice(file.lastIndexOf('.') + 1).toLowerCase()];
-  if (!parse) throw new Error('it is neither STL nor OBJ');
+  if (!parse) throw new Error('it is neither STL, OBJ nor COLLADA');
   let made: THREE.Object3D;
   try {
     made = parse(bytes);
-  } catch {
-    throw new Error('its content is neither STL nor OBJ'); // the parsers' own words are about their code
+  } catch (error) {
+    // The words of the other parsers are about their code.
+    const words = parse === kParsers.dae && error instanceof Error ? `: ${error.message}` : '';
+    throw new Error(`its content is neither STL, OBJ nor COLLADA${words}`);
   }
   let corners = 0;
   made.traverse((one) => {
@@ -51,10 +61,20 @@ export function parseMesh(file: string, bytes: ArrayBuffer): THREE.Object3D {
   return made;
 }
 
-/** All that can be had. */
-export async function fetchMeshes(files: MeshFile[], source: Source): Promise<Meshes> {
-  const meshes: Meshes = { ready: new Map(), why: new Map() };
-  for (const { file, path, why } of files) {
+/**
+ * All that can be had.
+ * @param uses how often each is drawn
+ * @param slow no graphics processor draws
+ */
+export async function fetchMeshes(
+  hello: Hello | null,
+  source: Source,
+  uses: Map<string, number>,
+  slow: boolean,
+): Promise<Meshes> {
+  const most = slow ? kMostTriangles.without : kMostTriangles.withGpu;
+  const meshes: Meshes = { ready: new Map(), why: new Map(), coarse: [], most };
+  for (const { file, path, why } of hello?.meshes ?? []) {
     if (!path) {
       meshes.why.set(file, why);
       continue;
@@ -65,5 +85,31 @@ export async function fetchMeshes(files: MeshFile[], source: Source): Promise<Me
       meshes.why.set(file, error instanceof Error ? error.message : String(error));
     }
   }
+  meshes.coarse = limitTriangles(meshes, uses, most);
   return meshes;
+}
+
+/**
+ * Makes the largest coarser until the robot has `most` triangles.
+ * @param uses how often each is drawn
+ * @return what is drawn with fewer, in words
+ */
+export function limitTriangles(
+  { ready }: Meshes,
+  uses: Map<string, number>,
+  most: number,
+): string[] {
+  const files = [...ready.keys()];
+  const counts = files.map((file) => trianglesOf(ready.get(file)!));
+  const share = fairShare(
+    counts,
+    files.map((file) => uses.get(file) ?? 0),
+    most,
+  );
+  return files.flatMap((file, i) => {
+    if (counts[i] <= share) return [];
+    const mesh = ready.get(file)!;
+    makeCoarser(mesh, share);
+    return [`${file}: ${trianglesOf(mesh)} of ${counts[i]} triangles`];
+  });
 }

@@ -1,8 +1,9 @@
 // The robot as objects of three: built of its description, moved by joint positions.
 import * as THREE from 'three';
 import URDFLoader, { type URDFRobot } from 'urdf-loader';
+import { kOwnColour } from './collada';
 import type { TreeJoint } from './limbs';
-import type { Meshes } from './meshes';
+import { kNoMeshes, type Meshes } from './meshes';
 import { type Capsule, describe, planOf, prepare } from './urdf';
 
 export interface Model {
@@ -40,11 +41,29 @@ function readMade(doc: Document, meshes: Meshes): URDFRobot {
   loader.loadMeshCb = (number, _manager, look, done) => {
     const made = used[Number(number)]?.clone();
     made?.traverse((one) => {
-      if (one instanceof THREE.Mesh) one.material = look;
+      // As RViz does: the description's material is of what has none.
+      if (one instanceof THREE.Mesh && one.material.name !== kOwnColour) one.material = look;
     });
     done(made ?? new THREE.Group());
   };
   return loader.parse(doc);
+}
+
+function parsed(text: string): Document {
+  const doc = new DOMParser().parseFromString(text, 'text/xml');
+  if (doc.getElementsByTagName('parsererror')[0]) throw new Error('the description is no XML');
+  return doc;
+}
+
+/** How often the description draws each mesh. @throws as buildModel() */
+export function usesOfMeshes(text: string): Map<string, number> {
+  const uses = new Map<string, number>();
+  for (const { visuals } of describe(parsed(text)).links) {
+    for (const { kind, file } of visuals) {
+      if (kind === 'mesh') uses.set(file, (uses.get(file) ?? 0) + 1);
+    }
+  }
+  return uses;
 }
 
 /**
@@ -55,11 +74,9 @@ export function buildModel(
   text: string,
   measured: Set<string>,
   material: THREE.Material | null,
-  meshes: Meshes = { ready: new Map(), why: new Map() },
+  meshes: Meshes = kNoMeshes,
 ): Model {
-  const doc = new DOMParser().parseFromString(text, 'text/xml');
-  const wrong = doc.getElementsByTagName('parsererror')[0];
-  if (wrong) throw new Error('the description is no XML');
+  const doc = parsed(text);
   const description = describe(doc);
   const has = (file: string) => meshes.ready.has(file);
   const plan = planOf(description, (file) =>

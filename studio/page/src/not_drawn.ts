@@ -1,14 +1,24 @@
-// What of a description is not drawn: a line that opens to a list.
+// What of a description is not drawn, or not as it is: lines that open to lists.
 import { h } from './dom';
+import type { Meshes } from './meshes';
+
+function line(words: string, names: string[], hint = ''): HTMLElement[] {
+  if (names.length === 0) return [];
+  const list = h('ul', {}, ...names.map((name) => h('li', {}, name)));
+  return [h('details', { class: 'not-drawn' }, h('summary', {}, words), hint, list)];
+}
 
 export class NotDrawn {
-  readonly element = h('details', { class: 'not-drawn', hidden: true });
+  readonly element = h('div', {});
 
-  show(names: string[]): void {
+  show(names: string[], { coarse, most }: Meshes): void {
     this.element.replaceChildren(
-      h('summary', {}, `not drawn: ${names.length} shapes`),
-      h('ul', {}, ...names.map((name) => h('li', {}, name))),
+      ...line(`not drawn: ${names.length} shapes`, names),
+      ...line(
+        `drawn coarser: ${coarse.length} ${coarse.length === 1 ? 'mesh' : 'meshes'}`,
+        coarse,
+        `In this browser a robot has ${most.toLocaleString('en')} triangles at most. To see a mesh as it is, simplify its file (Blender: Decimate), or use a browser with a graphics processor.`,
+      ),
     );
-    this.element.hidden = names.length === 0;
   }
 }

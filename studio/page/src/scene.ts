@@ -9,7 +9,7 @@ import { Layers } from './layers';
 import type { TreeJoint } from './limbs';
 import { Marks } from './marks3d';
 import { fetchMeshes } from './meshes';
-import { buildModel, type Model } from './model';
+import { buildModel, type Model, usesOfMeshes } from './model';
 import { NotDrawn } from './not_drawn';
 import { drawsBySoftware } from './webgl';
 
@@ -180,7 +180,7 @@ export class Scene {
     try {
       const text = await this.data.source.description();
       const hello = this.data.hello;
-      const meshes = await fetchMeshes(hello?.meshes ?? [], this.data.source);
+      const meshes = await fetchMeshes(hello, this.data.source, usesOfMeshes(text), this.slow);
       if (turn !== this.loads) return; // a newer hello has come meanwhile
       const measured = new Set([
         ...(hello?.joints.map((one) => one.name) ?? []),
@@ -192,7 +192,7 @@ export class Scene {
       this.scene.add(this.model.robot, this.ghost.robot);
       this.marks.setFrames(this.model, [...measured]);
       this.layers.setModel(this.model);
-      this.missing.show(this.model.notDrawn);
+      this.missing.show(this.model.notDrawn, meshes);
       this.fitted = false;
       this.say(this.renderer ? '' : (this.words.textContent ?? ''));
       for (const call of this.onTree) call(this.model.tree);

@@ -39,7 +39,8 @@ export interface Plan {
 const kDrawn = new Set(['box', 'cylinder', 'sphere', 'capsule']);
 const kShort_m = 0.002;
 
-function childrenOf(node: Node, name?: string): Element[] {
+/** Elements of that name, or all. */
+export function childrenOf(node: Node, name?: string): Element[] {
   const found: Element[] = [];
   for (let child = node.firstChild; child; child = child.nextSibling) {
     if (child.nodeType === 1 && (!name || child.nodeName === name)) found.push(child as Element);

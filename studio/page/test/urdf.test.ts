@@ -125,5 +125,5 @@ test('meshes are read by their ending, and have a surface', () => {
   }
   const beyond = bytes('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99\n');
   assert.throws(() => parseMesh('a.obj', beyond), /no place near the robot/);
-  assert.throws(() => parseMesh('a.dae', bytes('<COLLADA/>')), /neither STL nor OBJ/);
+  assert.throws(() => parseMesh('a.ply', bytes('ply')), /neither STL, OBJ nor COLLADA/);
 });

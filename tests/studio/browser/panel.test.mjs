@@ -5,6 +5,39 @@ import { eventually, lacking, leave, shot, usePlayedRobots, violations } from '.
 
 const why = lacking();
 
+/** A triangle whose material has a picture of elsewhere. */
+const kCollada = `<COLLADA><library_images><image id="i"><init_from>http://elsewhere.example/x.png</init_from></image></library_images>
+  <library_effects><effect id="e"><profile_COMMON><newparam sid="s"><surface type="2D"><init_from>i</init_from></surface></newparam>
+    <technique><phong><diffuse><texture texture="s" texcoord="UV"/></diffuse></phong></technique></profile_COMMON></effect></library_effects>
+  <library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
+  <library_geometries><geometry id="g"><mesh><source id="s"><float_array id="a">0 0 0 1 0 0 0 1 0</float_array>
+    <technique_common><accessor source="#a" stride="3"/></technique_common></source>
+    <vertices id="v"><input semantic="POSITION" source="#s"/></vertices>
+    <triangles material="m"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles></mesh></geometry></library_geometries>
+  <library_visual_scenes><visual_scene><node><instance_geometry url="#g"><bind_material><technique_common>
+    <instance_material symbol="m" target="#m"/></technique_common></bind_material></instance_geometry></node></visual_scene></library_visual_scenes></COLLADA>`;
+
+/** STL of a ball of 2 * n * n triangles. */
+function ball(n) {
+  const stl = Buffer.alloc(84 + 100 * n * n);
+  stl.writeUInt32LE(2 * n * n, 80);
+  let at = 84;
+  const corner = (i, j) => {
+    const [a, b] = [(Math.PI * i) / n, (2 * Math.PI * j) / n];
+    for (const x of [Math.sin(a) * Math.cos(b), Math.sin(a) * Math.sin(b), Math.cos(a)])
+      at = stl.writeFloatLE(0.2 * x, at);
+  };
+  for (let k = 0; k < 2 * n * n; ++k) {
+    const [i, j] = [(k >> 1) % n, Math.floor(k / 2 / n)];
+    at += 12;
+    corner(i, j);
+    corner(i + 1, j + (k % 2));
+    corner(i + 1 - (k % 2), j + 1);
+    at += 2;
+  }
+  return stl;
+}
+
 describe('the joints and the 3D view of the studio', {
   skip: why || false,
   timeout: 240000,
@@ -63,13 +96,23 @@ describe('the joints and the 3D view of the studio', {
     const corners = ['0 0 0', '0.2 0 0', '0 0.2 0'];
     const mesh = `solid a\nfacet normal 0 0 1\nouter loop\n${corners.map((at) => `vertex ${at}\n`).join('')}endloop\nendfacet\nendsolid a\n`;
     const meshes = { 'a.stl': mesh, 'b.obj': 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' };
-    const mock = await play({ meshes: { ...meshes, 'c.stl': null, 'd.stl': 'solid d' } });
+    const more = { 'd.stl': 'solid d', 'e.dae': kCollada, 'f.dae': `<!DOCTYPE x>${kCollada}` };
+    const mock = await play({ meshes: { ...meshes, 'c.stl': null, ...more, 'g.stl': ball(240) } });
     const page = await visit(mock.address);
-    await until(page, 'not drawn: 2 shapes');
+    await until(page, 'not drawn: 3 shapes');
     const words = await page.textContent('.not-drawn');
+    assert.doesNotMatch(words, /e\.dae/, 'it is drawn, and its picture is not asked for');
+    assert.match(words, /mesh f\.dae \(.*it defines entities\)/);
+    await page.click('summary:text-is("drawn coarser: 1 mesh")');
+    await until(page, 'In this browser a robot has 100,000 triangles at most.');
+    const coarse = await page.textContent('.not-drawn[open]');
+    const drawn = /g\.stl: (\d+) of 115200 triangles/.exec(coarse)?.[1];
+    assert.ok(drawn > 50000 && drawn < 100000, coarse);
+    assert.deepEqual(await violations(page), []);
+    await shot(page, 'studio-coarser');
     assert.match(
       words,
-      /mesh c\.stl \(it is not there\).*mesh d\.stl \(its content is neither STL nor OBJ\)/s,
+      /mesh c\.stl \(it is not there\).*mesh d\.stl \(its content is neither STL, OBJ nor COLLADA\)/s,
     );
     await leave(page);
   });
