@@ -2,7 +2,7 @@
 import * as THREE from 'three';
 
 /** Of a robot, where a graphics processor draws and where none does. */
-export const kMostTriangles = { withGpu: 2_000_000, without: 100_000 };
+export const kMostTriangles = { withGpu: 2_000_000, without: 50_000 };
 
 const kFinest = 1000; // cells along a side: their numbers are whole
 const kTries = 12;

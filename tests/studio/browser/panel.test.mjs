@@ -97,17 +97,17 @@ describe('the joints and the 3D view of the studio', {
     const mesh = `solid a\nfacet normal 0 0 1\nouter loop\n${corners.map((at) => `vertex ${at}\n`).join('')}endloop\nendfacet\nendsolid a\n`;
     const meshes = { 'a.stl': mesh, 'b.obj': 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' };
     const more = { 'd.stl': 'solid d', 'e.dae': kCollada, 'f.dae': `<!DOCTYPE x>${kCollada}` };
-    const mock = await play({ meshes: { ...meshes, 'c.stl': null, ...more, 'g.stl': ball(240) } });
+    const mock = await play({ meshes: { ...meshes, 'c.stl': null, ...more, 'g.stl': ball(180) } });
     const page = await visit(mock.address);
     await until(page, 'not drawn: 3 shapes');
     const words = await page.textContent('.not-drawn');
     assert.doesNotMatch(words, /e\.dae/, 'it is drawn, and its picture is not asked for');
     assert.match(words, /mesh f\.dae \(.*it defines entities\)/);
     await page.click('summary:text-is("drawn coarser: 1 mesh")');
-    await until(page, 'In this browser a robot has 100,000 triangles at most.');
+    await until(page, 'In this browser a robot has 50,000 triangles at most.');
     const coarse = await page.textContent('.not-drawn[open]');
-    const drawn = /g\.stl: (\d+) of 115200 triangles/.exec(coarse)?.[1];
-    assert.ok(drawn > 50000 && drawn < 100000, coarse);
+    const drawn = /g\.stl: (\d+) of 64800 triangles/.exec(coarse)?.[1];
+    assert.ok(drawn > 25000 && drawn < 50000, coarse);
     assert.deepEqual(await violations(page), []);
     await shot(page, 'studio-coarser');
     assert.match(
