@@ -28,7 +28,8 @@ void add_faults(const RunData& run, const std::string& side, Facts& facts) {
 }
 
 void add_payloads(const RunData& run, const std::string& side, Facts& facts) {
-  for (const PayloadMark& one : run.payloads) {
+  for (const RunMark& one : run.marks) {
+    if (!one.kind.starts_with("payload")) continue;
     const std::string what = one.text.substr(one.text.find(' ') + 1);  // without "payload "
     facts.emplace_back("payload" + side, fmt::format("{}, at {:.3f} s", what, one.time_s));
   }
