@@ -177,7 +177,7 @@ describe('a report opened from the disk', { skip: why || false, timeout: 120000 
     assert.match(await page.textContent('.plots .pane'), /B\/state\.position_rad/);
     // In the head both logs; in the figures the second one's line is dashed, as in the plots.
     await page.click('#tab-report');
-    assert.match(await page.locator('.report .logs').first().textContent(), /AB.*started/);
+    assert.match(await page.locator('.report .logs').first().textContent(), /A\s*B.*started/s);
     assert.equal((await page.locator('.report .legend [data-log="B/"]').count()) > 0, true);
     assert.match(await page.locator('.report .legend').first().textContent(), /measured, B/);
     await leave(page);
