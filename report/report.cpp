@@ -157,11 +157,15 @@ std::string letters_of(const RunData& run, const OtherRuns& others, bool paralle
   const auto stem = [](const RunData& one) {
     return std::filesystem::path(one.path).stem().string();
   };
+  const auto with_folder = [&stem](const RunData& one) {
+    return (std::filesystem::path(one.path).parent_path().filename() / stem(one)).string();
+  };
   bool distinct = true;
   for (const RunData* one : others) distinct = distinct && stem(*one) != stem(run);
-  std::string text = "A: " + (distinct ? stem(run) : run.path);
+  std::string text = "A: " + (distinct ? stem(run) : with_folder(run));
   for (std::size_t i = 0; i < others.size(); ++i)
-    text += fmt::format(",{}: {}", kSides[i + 1], distinct ? stem(*others[i]) : others[i]->path);
+    text += fmt::format(",{}: {}", kSides[i + 1],
+                        distinct ? stem(*others[i]) : with_folder(*others[i]));
   return text;
 }
 

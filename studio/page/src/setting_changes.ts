@@ -21,8 +21,8 @@ export interface CaptureGroup<T> {
 }
 
 /**
- * Captures by the last change before them: their order stays. One in which something was set is
- * alone, since it is of no setting: `mixed`.
+ * Captures by the last change before them: their order stays. Those in which something was set
+ * behind the trigger are of no setting: `mixed`.
  */
 export function groupsOf<
   T extends { trigger: number; first: number; count: number; period_s: number },
@@ -30,10 +30,11 @@ export function groupsOf<
   const groups: CaptureGroup<T>[] = [];
   const mixed = new Set<T>();
   for (const capture of captures) {
-    const { first, count, period_s } = capture;
-    const end_s = (first + count) * period_s;
-    const change = changes.filter((one) => one.time_s <= end_s).at(-1) ?? null;
-    if (change && change.time_s > first * period_s) mixed.add(capture);
+    const { trigger, first, count, period_s } = capture;
+    // What is set at the time of a cycle counts from the next one on.
+    const past_s = (first + count - 1.5) * period_s;
+    const change = changes.filter((one) => one.time_s <= past_s).at(-1) ?? null;
+    if (change && change.time_s > (trigger - 0.5) * period_s) mixed.add(capture);
     const known = groups.find((one) => one.change === change);
     if (known) known.captures.push(capture);
     else groups.push({ change, captures: [capture] });

@@ -82,7 +82,7 @@ export function figuresOf(capture: Capture, response: string, reference: string)
   });
 }
 
-const kMixed = 'something was set within this record: it counts for no mean';
+const kMixed = 'something was set behind its trigger: it counts for no mean';
 
 /**
  * A row for each capture; mean and spread are of those between two changes of settings.

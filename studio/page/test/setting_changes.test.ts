@@ -40,4 +40,7 @@ test('captures are apart where something was set between them; one with both set
   );
   assert.deepEqual([...mixed], [c], 'half of it is before the change');
   assert.equal(groupsOf([d, c, b, a], []).groups.length, 1);
+  const atItsEnd = groupsOf([a], [{ time_s: 0.99, text: 'kd' }]);
+  assert.equal(atItsEnd.groups[0].change, null, 'it counts from the next cycle on');
+  assert.equal(groupsOf([a], [{ time_s: 0.5, text: 'kd' }]).mixed.size, 1);
 });
