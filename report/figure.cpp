@@ -66,9 +66,14 @@ void break_at_gaps(Figure& figure) {
   }
 }
 
+std::string key_text(const Curve& curve) {
+  if (curve.log == 0 || curve.label.empty()) return curve.label;
+  return curve.label + ", " + curve.log;
+}
+
 Curve decimated(const Curve& curve, std::size_t most) {
   if (curve.x.size() <= most || most < 4) return curve;
-  Curve out{curve.label, curve.style, {}, {}};
+  Curve out{curve.label, curve.style, {}, {}, curve.log};
   const std::size_t bins = most / 2;
   for (std::size_t begin = 0; begin < curve.x.size();) {
     std::size_t end = begin;

@@ -36,7 +36,11 @@ struct Curve {
   CurveStyle style = CurveStyle::kMeasured;
   std::vector<double> x;
   std::vector<double> y;  ///< as long as x; a NaN interrupts the line
+  char log = 0;           ///< of several logs that of this letter: 'A'; 0: there is one
 };
+
+/// What a picture's key says of a curve: "measured, B".
+[[nodiscard]] std::string key_text(const Curve& curve);
 
 /// A text centred at a point.
 struct Note {

@@ -99,7 +99,7 @@ std::string plot_command(const Figure& figure, std::size_t index) {
     add(fmt::format("{} using 1:2 with {} ls {}{}", block_name(index, i),
                     points ? "linespoints" : "lines", line_style(curve.style),
                     figure.points ? " pt 7 ps 0.7" : ""),
-        curve.label);
+        key_text(curve));
   }
   for (const Level& level : figure.levels) {
     add(fmt::format("{:.9g} with lines ls 15", level.y), level.label);

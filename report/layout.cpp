@@ -81,7 +81,7 @@ void choose_numbers(Axes& axes) {
 
 std::vector<std::string> key_texts(const Figure& figure) {
   std::vector<std::string> texts;
-  for (const Curve& curve : figure.curves) texts.push_back(curve.label);
+  for (const Curve& curve : figure.curves) texts.push_back(key_text(curve));
   for (const Level& level : figure.levels) texts.push_back(level.label);
   for (const Mark& mark : figure.marks) texts.push_back(mark.label);
   std::erase(texts, "");

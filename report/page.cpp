@@ -3,8 +3,10 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <functional>
 
 #include "base/open_file.hpp"
 #include "base/quoting.hpp"
@@ -32,6 +34,8 @@ table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nu
 th, td { text-align: right; padding: 4px 10px; border-bottom: 1px solid var(--line); }
 th:first-child, td:first-child { text-align: left; }
 th { color: var(--soft); font-weight: 600; }
+.logs td { text-align: left; overflow-wrap: anywhere; }
+.logs .differs td { font-weight: 600; }
 @media (max-width: 560px) { .figures { grid-template-columns: 1fr; } }
 @media print { body { background: #fff; } .card { break-inside: avoid; } }
 )";
@@ -55,17 +59,54 @@ Result<std::string> inline_svg(const std::string& file, const std::string& name)
 /// In the page, whoever wrote it.
 std::string page_text(std::string_view text) { return xml_text(harmless(text)); }
 
+/// All values of a name, since some stand there more than once.
+std::string value_in(const Facts& facts, const std::string& name) {
+  std::string text;
+  for (const auto& [key, value] : facts)
+    if (key == name && !value.empty()) text += (text.empty() ? "" : "; ") + value;
+  return text;
+}
+
+/// Facts of several logs beside each other, a column each; what is not the same is marked.
+std::string logs_table(const std::vector<Facts>& logs) {
+  std::string out = "<div class=\"card\"><table class=\"logs\">\n<thead><tr><td></td>";
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    const char letter = static_cast<char>('A' + i);
+    out += fmt::format(
+        "<th scope=\"col\"><span class=\"log-line\" data-log=\"{0}/\"></span>{0}</th>", letter);
+  }
+  out += "</tr></thead>\n<tbody>\n";
+  std::vector<std::string> names;
+  for (const Facts& facts : logs)
+    for (const auto& [name, value] : facts)
+      if (std::ranges::find(names, name) == names.end()) names.push_back(name);
+  for (const std::string& name : names) {
+    std::vector<std::string> values;
+    for (const Facts& facts : logs) values.push_back(value_in(facts, name));
+    if (std::ranges::all_of(values, &std::string::empty)) continue;
+    const bool same = std::ranges::adjacent_find(values, std::not_equal_to<>()) == values.end();
+    out += fmt::format("<tr{}><th scope=\"row\">{}</th>", same ? "" : " class=\"differs\"",
+                       page_text(name));
+    if (same)
+      out += fmt::format("<td colspan=\"{}\">{}</td>", logs.size(), page_text(values.front()));
+    for (const std::string& value : values)
+      if (!same) out += "<td>" + page_text(value) + "</td>";
+    out += "</tr>\n";
+  }
+  return out + "</tbody></table></div>\n";
+}
+
 std::string html_table(const PageTable& table) {
-  std::string out = fmt::format("<h2>{}</h2>\n<p>{}</p>\n<div class=\"card\"><table>\n<tr>",
+  std::string out = fmt::format("<h2>{}</h2>\n<p>{}</p>\n<div class=\"card\"><table>\n<thead><tr>",
                                 page_text(table.title), page_text(table.caption));
   for (const std::string& cell : table.header) out += "<th>" + page_text(cell) + "</th>";
-  out += "</tr>\n";
+  out += "</tr></thead>\n<tbody>\n";
   for (const auto& row : table.rows) {
     out += "<tr>";
     for (const std::string& cell : row) out += "<td>" + page_text(cell) + "</td>";
     out += "</tr>\n";
   }
-  return out + "</table></div>\n";
+  return out + "</tbody></table></div>\n";
 }
 
 }  // namespace
@@ -76,14 +117,18 @@ std::string page_begin(const std::string& by) {
 
 Result<std::string> page_content(const Page& page, std::span<const Figure> figures,
                                  const std::string& folder) {
-  std::string html = fmt::format("<h1>{}</h1>\n<p>{}</p>\n<div class=\"figures\">\n",
-                                 page_text(page.title), page_text(page.lead));
+  std::string html =
+      fmt::format("<h1>{}</h1>\n<p>{}</p>\n", page_text(page.title), page_text(page.lead));
+  if (!page.heads.empty()) html += logs_table(page.heads);
+  html += "<div class=\"figures\">\n";
   for (const Figure& figure : figures) {
     const Result<std::string> svg = inline_svg(folder + "/" + figure.name + ".svg", figure.name);
     if (!svg) return svg;
     html += "<figure class=\"card\" style=\"margin:0\">" + *svg + "</figure>\n";
   }
-  html += "</div>\n<h2>Run</h2>\n<div class=\"card\"><dl>\n";
+  html += page.runs.empty() ? "</div>\n<h2>Run</h2>\n" : "</div>\n<h2>Runs</h2>\n";
+  if (!page.runs.empty()) html += logs_table(page.runs);
+  html += "<div class=\"card\"><dl>\n";
   for (const auto& [name, value] : page.facts) {
     html += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", page_text(name), page_text(value));
   }

@@ -26,7 +26,9 @@ struct Page {
   std::string title;
   std::string lead;  ///< one sentence under the title
   Facts facts;
-  std::vector<PageTable> tables;
+  std::vector<Facts> heads{};  ///< of several logs, A first: at the top of the page, side by side
+  std::vector<Facts> runs{};   ///< the same of the whole of their facts, below the figures
+  std::vector<PageTable> tables{};
   std::string by = "tandem report";  ///< the command that writes it, for page_begin()
 };
 

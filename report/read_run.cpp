@@ -308,7 +308,7 @@ Result<std::optional<RunData>> read_parallel(const RunData& run) {
   if (file->find(kParallelState) == nullptr) return std::nullopt;
   RunData second = run;
   second.faults.clear();
-  second.payloads.clear();  // they are the first one's
+  second.marks.clear();  // they are the first one's
   for (Columns* truth : {&second.base, &second.foot_position_m, &second.foot_force_N,
                          &second.foot_moment_Nm, &second.loop_error, &second.passive_rad}) {
     truth->clear();
@@ -349,7 +349,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   if (!events) return std::unexpected(events.error());
   run.faults = faults_of(*events, run.info.joints, error_text);
   run.parameters = parameters_of(*events, run.info.parameters);
-  run.payloads = payloads_of(*events);
+  run.marks = marks_of(*events);
   log::RunWindow window = log::run_window(*events, run.settle_s);
   if (const Status s = read_state(*file, window, run); !s) return std::unexpected(s.error());
   // Only a crash or a hang of the loop is in the result; it had no time to be an event.

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "apps/text/console.hpp"
 #include "log/mcap_reader.hpp"
 #include "log/schema.hpp"
 #include "log/unmeasured.hpp"
+#include "report/figure_sources.hpp"
 #include "report/packing.hpp"
 
 namespace tandem::report {
@@ -21,8 +21,6 @@ namespace {
 using apps::Json;
 using apps::json_text;
 using Event = studio::Event;
-
-constexpr double kSeldom = 1.001;  // rows between two samples: more, and some rows have none
 
 /// "/tandem/controller/squat" is "controller/squat", as in a run.
 std::string source_name(const std::string& prefix, std::string topic) {
@@ -37,14 +35,6 @@ bool has_numbers(const log::LoggedTopic& topic) {
 
 double place(const RecordedLog& log, std::int64_t time_ns) {
   return log.slower * 1e-9 * static_cast<double>(time_ns) + log.later_s;
-}
-
-/// For how many rows a number stands that is sampled every `step_s`.
-std::size_t held_rows(double step_s, const Grid& grid, bool exact) {
-  const double rows = step_s / grid.step_s();
-  if (!std::isfinite(rows) || rows <= 0.0) return 0;
-  if (rows <= kSeldom) return exact ? 0 : 1;
-  return static_cast<std::size_t>(std::ceil(2.0 * rows));
 }
 
 /// The numbers of one topic, row by row: a row is handed on when the next one begins.
@@ -145,63 +135,9 @@ Status add_log(const RecordedLog& log, const studio::SignalTable& table, Spans& 
     found->second.flush();
     const double steps = static_cast<double>(topic.messages) - 1.0;
     const double whole_s = log.slower * 1e-9 * static_cast<double>(topic.last_ns - topic.first_ns);
-    found->second.hold(held_rows(whole_s / steps, spans.grid(), exact));
+    found->second.hold(spans.grid().held_rows(whole_s / steps, exact));
   }
   return {};
-}
-
-/// "position [deg]" in two parts.
-std::pair<std::string, std::string> name_and_unit(const std::string& label) {
-  const std::size_t open = label.find(" ["), close = label.rfind(']');
-  if (open == std::string::npos || close == std::string::npos || close < open) return {label, ""};
-  return {label.substr(0, open), label.substr(open + 2, close - open - 2)};
-}
-
-/// Names of a figure's curves, then of its levels: each once.
-std::vector<std::string> names_in(const Figure& figure) {
-  std::vector<std::string> names;
-  std::set<std::string> there;
-  const auto add = [&](std::string name) {
-    if (name.empty()) name = name_and_unit(figure.y_label).first;
-    const std::string first = name;
-    for (int k = 2; !there.insert(name).second; ++k) name = fmt::format("{} {}", first, k);
-    names.push_back(name);
-  };
-  for (const Curve& curve : figure.curves) add(curve.label);
-  for (const Level& level : figure.levels) add(level.label);
-  return names;
-}
-
-/// A figure as a source: its curves and levels are signals. @return their names
-Result<std::vector<std::string>> add_source(const Figure& figure, studio::SignalTable& table) {
-  hal::Layout layout;
-  const std::string unit = name_and_unit(figure.y_label).second;
-  const std::vector<std::string> names = names_in(figure);
-  for (const std::string& name : names) {
-    layout.add(name, hal::FieldType::kF64, 1, fmt::format("[{}] {}", unit, figure.title));
-  }
-  const std::string source = "report/" + figure.name;
-  if (const auto added = table.add(source, layout); !added) return std::unexpected(added.error());
-  std::vector<std::string> full;
-  for (const std::string& name : names) full.push_back(source + "." + name);
-  return full;
-}
-
-/// The curves of a figure into the signals from `first` on.
-void add_curves(const Figure& figure, studio::SignalId first, Spans& spans) {
-  std::size_t signal = first;
-  for (const Curve& curve : figure.curves) {
-    for (std::size_t i = 0; i < curve.x.size(); ++i) {
-      const auto row = spans.grid().row_of(curve.x[i]);
-      if (row) spans.add(signal, *row, static_cast<float>(curve.y[i]));
-    }
-    spans.hold(signal++, held_rows(usual_step(curve.x), spans.grid(), true));
-  }
-  for (const Level& level : figure.levels) {
-    for (std::size_t row = 0; row < spans.grid().rows; ++row)
-      spans.add(signal, row, static_cast<float>(level.y));
-    ++signal;
-  }
 }
 
 Result<std::vector<Event>> events_of(const RecordedLog& log) {
@@ -290,15 +226,18 @@ Result<Recording> Recording::read(const RecordingParts& parts) {
     }
   }
   Json shown = Json::array();
-  std::vector<std::pair<const Figure*, studio::SignalId>> curves;
+  std::vector<FigurePart> curves;
   for (const Figure& figure : parts.figures) {
     if (!is_over_time(figure)) continue;
     std::vector<std::string> series = figure.signals;
     if (series.empty()) {
-      curves.emplace_back(&figure, static_cast<studio::SignalId>(table.size()));
-      auto names = add_source(figure, table);
-      if (!names) return std::unexpected(names.error());
-      series = std::move(*names);
+      for (FigurePart& part : parts_of(figure)) {
+        part.first = static_cast<studio::SignalId>(table.size());
+        const auto names = add_source(part, table);
+        if (!names) return std::unexpected(names.error());
+        series.insert(series.end(), names->begin(), names->end());
+        curves.push_back(std::move(part));
+      }
     }
     shown.push_back({{"title", figure.title}, {"series", series}});
   }
@@ -316,7 +255,7 @@ Result<Recording> Recording::read(const RecordingParts& parts) {
     names.push_back({{"prefix", log.prefix}, {"path", log.file->path()}});
   }
   std::ranges::stable_sort(events, {}, &Event::time_s);
-  for (const auto& [figure, first] : curves) add_curves(*figure, first, made.spans_);
+  for (const FigurePart& part : curves) add_curves(part, made.spans_);
   made.head_ = without_tags(fmt::format(
       R"("hello":{},"signals":{},"events":{},"urdf":{},"figures":{},"logs":{},"at_s":{},)",
       studio::hello_text(parts.run, {}), studio::signals_text(1, made.table_),

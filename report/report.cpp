@@ -11,6 +11,7 @@
 #include "base/quoting.hpp"
 #include "report/close_passive.hpp"
 #include "report/differences.hpp"
+#include "report/log_head.hpp"
 #include "report/replay.hpp"
 #include "report/run_facts.hpp"
 #include "report/run_figures.hpp"
@@ -46,14 +47,17 @@ Page page_of(const RunData& run, const OtherRuns& others, const std::vector<Page
   page.lead = imported ? "Times count from the recording's start, as in the log."
                        : "Times count from the run's first SYNC, as in the log.";
   if (!imported) page.lead += " " + start_text(run);
-  add_facts(run, others.empty() ? "" : " A", page.facts);
   page.tables = replays;
   add_tables(run, others.empty() ? "" : " A", page);
-  if (others.empty()) return page;
-  page.lead += " A is " + run.path;
-  for (std::size_t i = 0; i < others.size(); ++i)
-    page.lead += fmt::format(",{} is {}", kSides[i + 1], others[i]->path);
-  page.lead += ".";
+  if (others.empty()) {
+    add_facts(run, "", page.facts);
+    return page;
+  }
+  const auto add_log = [&](const RunData& one) {
+    page.heads.push_back(head_facts(one, run));
+    add_facts(one, "", page.runs.emplace_back());
+  };
+  add_log(run);
   for (std::size_t i = 0; i < others.size(); ++i) {
     const double later_s = others[i]->drawn_later_s, slower = others[i]->drawn_slower;
     if (slower != 1.0)
@@ -66,7 +70,7 @@ Page page_of(const RunData& run, const OtherRuns& others, const std::vector<Page
       if (others[i]->drawn_as_replay)
         page.lead += fmt::format(" Only what is played is drawn of{}.", kSides[i + 1]);
     }
-    add_facts(*others[i], kSides[i + 1], page.facts);
+    add_log(*others[i]);
     add_tables(*others[i], kSides[i + 1], page);
   }
   return page;
@@ -153,11 +157,15 @@ std::string letters_of(const RunData& run, const OtherRuns& others, bool paralle
   const auto stem = [](const RunData& one) {
     return std::filesystem::path(one.path).stem().string();
   };
+  const auto with_folder = [&stem](const RunData& one) {
+    return (std::filesystem::path(one.path).parent_path().filename() / stem(one)).string();
+  };
   bool distinct = true;
   for (const RunData* one : others) distinct = distinct && stem(*one) != stem(run);
-  std::string text = "A: " + (distinct ? stem(run) : run.path);
+  std::string text = "A: " + (distinct ? stem(run) : with_folder(run));
   for (std::size_t i = 0; i < others.size(); ++i)
-    text += fmt::format(",{}: {}", kSides[i + 1], distinct ? stem(*others[i]) : others[i]->path);
+    text += fmt::format(",{}: {}", kSides[i + 1],
+                        distinct ? stem(*others[i]) : with_folder(*others[i]));
   return text;
 }
 
@@ -252,7 +260,9 @@ Result<Report> read_report(const std::string& log, const std::vector<std::string
   report.run = {.robot = with_limits(*run),
                 .urdf = log::value_of(run->info.configuration, run->robot.model.urdf),
                 .version = run->info.version,
-                .experiment = std::filesystem::path(run->path).filename().string(),
+                .experiment = others->empty() || parallel
+                                  ? std::filesystem::path(run->path).filename().string()
+                                  : letters_of(*run, beside_it, false),
                 .run = {},
                 .simulated = run->info.hal == "sim",
                 .period_ns = run->info.period_ns};

@@ -53,11 +53,12 @@ struct RunParameter {
   std::size_t changes = 0;  ///< how often it was set
 };
 
-/// What the simulated robot picked up or dropped.
-struct PayloadMark {
+/// What was done to a run, or happened in it, and is no fault: a mark in its figures.
+struct RunMark {
   double time_s = 0.0;  ///< since the first SYNC
-  bool dropped = false;
-  std::string text;  ///< "payload picked up: box, 1.6 kg on panda_hand"
+  std::string kind;     ///< "payload picked up", "payload dropped", "parameter set", "gains set",
+                        ///< "limit met"
+  std::string text;     ///< of the event: "payload picked up: box, 1.6 kg on panda_hand"
 };
 
 /// Faults of a run that are shown in the page, and as lines in its figures.
@@ -94,7 +95,7 @@ struct RunData {
   double drawn_to_s = std::numeric_limits<double>::infinity();     ///< rows in these are drawn
   std::vector<RunFault> faults;                                    ///< in the order of their times
   std::vector<RunParameter> parameters;                            ///< of its controllers
-  std::vector<PayloadMark> payloads;                               ///< the same
+  std::vector<RunMark> marks;                                      ///< the same
   Columns position_rad, velocity_rad_s, torque_Nm;                 ///< [joint][row], measured
   Columns reference_rad;    ///< [joint][row]; NaN when not under position control
   Columns sensor;           ///< [channel][row], all sensors one after another

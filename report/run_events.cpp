@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <map>
+#include <utility>
 
 namespace tandem::report {
 namespace {
@@ -69,12 +70,20 @@ std::vector<RunParameter> parameters_of(const std::vector<log::EventText>& event
   return all;
 }
 
-std::vector<PayloadMark> payloads_of(const std::vector<log::EventText>& events) {
-  std::vector<PayloadMark> marks;
+std::vector<RunMark> marks_of(const std::vector<log::EventText>& events) {
+  constexpr std::pair<log::EventKind, const char*> kMarked[] = {
+      {log::EventKind::kPickedUp, "payload picked up"},
+      {log::EventKind::kDropped, "payload dropped"},
+      {log::EventKind::kParameterSet, "parameter set"},
+      {log::EventKind::kGainsSet, "gains set"},
+      {log::EventKind::kLimited, "limit met"},
+  };
+  std::vector<RunMark> marks;
   for (const auto& [event, text] : events) {
-    const bool dropped = event.kind == log::EventKind::kDropped;
-    if (!dropped && event.kind != log::EventKind::kPickedUp) continue;
-    marks.push_back({static_cast<double>(event.time_ns) * 1e-9, dropped, text});
+    const auto* const kind =
+        std::ranges::find(kMarked, event.kind, &std::pair<log::EventKind, const char*>::first);
+    if (kind == std::end(kMarked)) continue;
+    marks.push_back({static_cast<double>(event.time_ns) * 1e-9, kind->second, text});
   }
   return marks;
 }

@@ -1,4 +1,4 @@
-// What the events of a log say of its run: faults, parameters that were set, payloads.
+// What the events of a log say of its run: faults, parameters that were set, marks.
 // Layer: report.  Thread: non-RT only.
 #pragma once
 
@@ -19,6 +19,7 @@ namespace tandem::report {
 [[nodiscard]] std::vector<RunParameter> parameters_of(const std::vector<log::EventText>& events,
                                                       const std::vector<std::string>& at_start);
 
-[[nodiscard]] std::vector<PayloadMark> payloads_of(const std::vector<log::EventText>& events);
+/// Payloads, parameters and gains that were set, limits that were met.
+[[nodiscard]] std::vector<RunMark> marks_of(const std::vector<log::EventText>& events);
 
 }  // namespace tandem::report

@@ -28,7 +28,8 @@ void add_faults(const RunData& run, const std::string& side, Facts& facts) {
 }
 
 void add_payloads(const RunData& run, const std::string& side, Facts& facts) {
-  for (const PayloadMark& one : run.payloads) {
+  for (const RunMark& one : run.marks) {
+    if (!one.kind.starts_with("payload")) continue;
     const std::string what = one.text.substr(one.text.find(' ') + 1);  // without "payload "
     facts.emplace_back("payload" + side, fmt::format("{}, at {:.3f} s", what, one.time_s));
   }
@@ -112,6 +113,25 @@ PageTable parameter_table(const RunData& run, const std::string& side) {
   return table;
 }
 
+/// Table of what the marks in the figures are of; payloads are in the facts.
+PageTable marks_table(const RunData& run, const std::string& side) {
+  constexpr std::size_t kMost = 20;
+  PageTable table{"Set and limited" + side,
+                  "What was set, and where a limit first changed a command: marks in the figures.",
+                  {"what", "time [s]"},
+                  {}};
+  std::size_t more = 0;
+  for (const RunMark& one : run.marks) {
+    if (one.kind.starts_with("payload")) continue;
+    if (table.rows.size() < kMost)
+      table.rows.push_back({one.text, fmt::format("{:.3f}", one.time_s)});
+    else
+      ++more;
+  }
+  if (more > 0) table.caption += fmt::format(" {} more are not listed.", more);
+  return table;
+}
+
 /// Table of every foot, by the simulation's truth; without rows when the log has none.
 PageTable feet_table(const RunData& run, const std::string& side) {
   PageTable table{"Feet" + side,
@@ -173,7 +193,8 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
 }
 
 void add_tables(const RunData& run, const std::string& side, Page& page) {
-  for (auto* make : {plant_table, tracking_table, feet_table, loops_table, parameter_table}) {
+  for (auto* make :
+       {plant_table, tracking_table, feet_table, loops_table, parameter_table, marks_table}) {
     PageTable table = make(run, side);
     if (!table.rows.empty()) page.tables.push_back(std::move(table));
   }

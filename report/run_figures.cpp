@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <map>
 #include <numbers>
 #include <utility>
 
@@ -28,9 +29,10 @@ bool has_numbers(const std::vector<double>& values) {
 /// Whether nobody knows where the base was.
 bool unplaced(const RunData& run) { return run.robot.model.floating_base && !run.motion_known(); }
 
-Curve curve_of(const RunData& run, std::string label, CurveStyle style,
+/// @param log  its letter where there are several, else 0
+Curve curve_of(const RunData& run, std::string label, char log, CurveStyle style,
                const std::vector<double>& values, double factor) {
-  Curve curve{std::move(label), style, {}, {}};
+  Curve curve{std::move(label), style, {}, {}, log};
   for (std::size_t row = 0; row < std::min(values.size(), run.rows()); ++row) {
     if (!run.is_drawn(run.time_s[row])) continue;
     curve.x.push_back(run.drawn(run.time_s[row]));
@@ -39,23 +41,25 @@ Curve curve_of(const RunData& run, std::string label, CurveStyle style,
   return curve;
 }
 
-/// ", A" of the first of several runs; nothing when it is alone.
-std::string side_of(std::size_t index, const OtherRuns& others) {
-  return others.empty() ? "" : std::string(", ") + static_cast<char>('A' + index);
+/// 'A' of the first of several runs; 0 when it is alone.
+char letter_of(std::size_t index, const OtherRuns& others) {
+  return others.empty() ? '\0' : static_cast<char>('A' + index);
 }
 
 /// How the runs after the first look.
 constexpr CurveStyle kOthers[] = {CurveStyle::kSecond, CurveStyle::kFourth};
 static_assert(std::size(kOthers) == kMostOthers);
 
-/// What the robot picked up and dropped while it is drawn.
-void add_payloads(const RunData& run, const std::string& side, Figure& figure) {
-  std::string labels[] = {"payload picked up" + side, "payload dropped" + side};
-  for (const PayloadMark& one : run.payloads) {
+/// What was done to a run while it is drawn: each kind has one label, and the first few marks.
+void add_marks(const RunData& run, const std::string& side, Figure& figure) {
+  constexpr std::size_t kMostOfAKind = 12;
+  std::map<std::string, std::size_t> drawn;
+  for (const RunMark& one : run.marks) {
     const bool seen = one.time_s >= run.time_s.front() && one.time_s <= run.time_s.back();
     if (!seen || !run.is_drawn(one.time_s)) continue;
-    figure.marks.push_back(
-        {std::exchange(labels[one.dropped ? 1 : 0], ""), run.drawn(one.time_s), false});
+    const std::size_t before = drawn[one.kind]++;
+    if (before >= kMostOfAKind) continue;
+    figure.marks.push_back({before == 0 ? one.kind + side : "", run.drawn(one.time_s), false});
   }
 }
 
@@ -66,8 +70,9 @@ void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
   for (std::size_t i = 0; i <= others.size(); ++i) {
     const RunData& one = i == 0 ? run : *others[i - 1];
     const RunFault* const stop = one.stop();
-    add_payloads(one, side_of(i, others), figure);
-    std::string reported = "fault, reported" + side_of(i, others);
+    const std::string side = others.empty() ? "" : std::string(", ") + letter_of(i, others);
+    add_marks(one, side, figure);
+    std::string reported = "fault, reported" + side;
     for (std::size_t f = 0; f < std::min(kFaultsShown, one.faults.size()); ++f) {
       const RunFault& fault = one.faults[f];
       if (fault.stops || (stop != nullptr && fault.time_s > stop->time_s)) continue;
@@ -75,7 +80,7 @@ void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
     }
     if (stop == nullptr) continue;
     const double stop_s = one.drawn(stop->time_s);
-    figure.marks.push_back({"fault" + side_of(i, others), stop_s});
+    figure.marks.push_back({"fault" + side, stop_s});
     figure.range_until_x = std::min(figure.range_until_x, stop_s + log::kHalfNanosecond);
   }
 }
@@ -96,15 +101,15 @@ Figure position_figure(const RunData& run, const OtherRuns& others, const Subjec
   const bool slides = run.slides(joint);
   const double factor = slides ? kMillimetres : kDegrees;
   figure.y_label = slides ? "position [mm]" : "position [deg]";
-  figure.curves.push_back(curve_of(run, name_of_state(run) + side_of(0, others),
+  figure.curves.push_back(curve_of(run, name_of_state(run), letter_of(0, others),
                                    CurveStyle::kMeasured, run.measured(run.position_rad, joint),
                                    factor));
   for (std::size_t i = 0; i < others.size(); ++i) {
-    figure.curves.push_back(curve_of(*others[i], name_of_state(*others[i]) + side_of(i + 1, others),
-                                     kOthers[i],
+    figure.curves.push_back(curve_of(*others[i], name_of_state(*others[i]),
+                                     letter_of(i + 1, others), kOthers[i],
                                      others[i]->measured(others[i]->position_rad, joint), factor));
   }
-  figure.curves.push_back(curve_of(run, "reference" + side_of(0, others), CurveStyle::kReference,
+  figure.curves.push_back(curve_of(run, "reference", letter_of(0, others), CurveStyle::kReference,
                                    run.reference_rad[joint], factor));
   return figure;
 }
@@ -174,12 +179,12 @@ Figure force_figure(const RunData& run, const OtherRuns& others, const std::vect
   if (shown < forces.size()) figure.title += fmt::format(", {} of {}", shown, forces.size());
   for (std::size_t i = 0; i < shown; ++i) {
     figure.curves.push_back(
-        curve_of(run, forces[i].name + side_of(0, others), kStyles[i], forces[i].up_N, 1.0));
+        curve_of(run, forces[i].name, letter_of(0, others), kStyles[i], forces[i].up_N, 1.0));
   }
   for (std::size_t i = 0; i < others.size(); ++i) {
     const std::vector<Force> more = foot_forces(*others[i], sensors);
     if (more.empty()) continue;
-    figure.curves.push_back(curve_of(*others[i], more.front().name + side_of(i + 1, others),
+    figure.curves.push_back(curve_of(*others[i], more.front().name, letter_of(i + 1, others),
                                      kOthers[i], more.front().up_N, 1.0));
   }
   if (!run.robot.model.floating_base || feet == 0 || forces.size() != feet) return figure;
@@ -205,12 +210,12 @@ Figure torque_figure(const RunData& run, const OtherRuns& others, const Subjects
   figure.title = name + (slides ? ": force" : ": torque") + measured;
   add_time(run, others, figure);
   figure.y_label = slides ? "force [N]" : "torque [Nm]";
-  figure.curves.push_back(curve_of(run, name_of_state(run) + side_of(0, others),
+  figure.curves.push_back(curve_of(run, name_of_state(run), letter_of(0, others),
                                    CurveStyle::kMeasured, run.measured(run.torque_Nm, joint), 1.0));
   for (std::size_t i = 0; i < others.size(); ++i) {
-    figure.curves.push_back(curve_of(*others[i], name_of_state(*others[i]) + side_of(i + 1, others),
-                                     kOthers[i], others[i]->measured(others[i]->torque_Nm, joint),
-                                     1.0));
+    figure.curves.push_back(curve_of(*others[i], name_of_state(*others[i]),
+                                     letter_of(i + 1, others), kOthers[i],
+                                     others[i]->measured(others[i]->torque_Nm, joint), 1.0));
   }
   if (kernels == nullptr) return figure;
   Result<Curve> computed = inverse_dynamics_curve(run, subjects.torque_of, *kernels);
@@ -218,6 +223,7 @@ Figure torque_figure(const RunData& run, const OtherRuns& others, const Subjects
     figure.title += " (no inverse dynamics: " + computed.error().message + ")";
   } else {
     figure.title += *measured != 0 ? " and by inverse dynamics" : " by inverse dynamics";
+    computed->log = letter_of(0, others);
     figure.curves.push_back(std::move(*computed));
   }
   return figure;

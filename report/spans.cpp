@@ -12,6 +12,14 @@ std::optional<std::size_t> Grid::row_of(double time_s) const {
   return static_cast<std::size_t>(cycle) / cycles;
 }
 
+std::size_t Grid::held_rows(double step_s, bool exact) const {
+  constexpr double kSeldom = 1.001;  // rows between two samples: more, and some rows have none
+  const double rows_of_one = step_s / this->step_s();
+  if (!std::isfinite(rows_of_one) || rows_of_one <= 0.0) return 0;
+  if (rows_of_one <= kSeldom) return exact ? 0 : 1;
+  return static_cast<std::size_t>(std::ceil(2.0 * rows_of_one));
+}
+
 Grid Grid::over(double start_s, double end_s, double period_s, std::size_t most) {
   Grid grid{.start_s = start_s, .period_s = period_s};
   const double cycles = std::floor((end_s - start_s) / period_s + 0.5) + 1.0;

@@ -20,6 +20,9 @@ struct Grid {
   [[nodiscard]] double step_s() const { return period_s * static_cast<double>(cycles); }
   /// The row of a time; empty: it is outside.
   [[nodiscard]] std::optional<std::size_t> row_of(double time_s) const;
+  /// For how many rows a number stands that is sampled every `step_s`.
+  /// @param exact  where there is a sample for each row, it stands for no other
+  [[nodiscard]] std::size_t held_rows(double step_s, bool exact) const;
   /// The finest grid from `start_s` to `end_s` that has no more than `most` rows.
   [[nodiscard]] static Grid over(double start_s, double end_s, double period_s, std::size_t most);
 };

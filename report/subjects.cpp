@@ -42,18 +42,36 @@ std::vector<int> pitch_joints(const RunData& run) {
   return found;
 }
 
+/// How far a joint moved at most [rad, m].
+double moved(const RunData& run, int joint) {
+  const auto [low, high] = std::ranges::minmax_element(run.position_rad[at_index(joint)]);
+  return *high - *low;
+}
+
 /// Joints by how far they moved, the widest first.
 std::vector<int> widest_joints(const RunData& run) {
   std::vector<double> range;
-  for (const std::vector<double>& q : run.position_rad) {
-    const auto [low, high] = std::ranges::minmax_element(q);
-    range.push_back(*high - *low);
-  }
+  for (std::size_t j = 0; j < run.position_rad.size(); ++j)
+    range.push_back(moved(run, static_cast<int>(j)));
   std::vector<int> order(range.size());
   std::iota(order.begin(), order.end(), 0);
   std::ranges::stable_sort(order, std::ranges::greater{},
                            [&](int j) { return range[at_index(j)]; });
   return order;
+}
+
+/// The joints that move most instead of those that stand while these move.
+void prefer_moving(const RunData& run, Subjects& subjects) {
+  constexpr double kStands = 0.01;  // [rad, m]
+  const std::vector<int> widest = widest_joints(run);
+  const auto stands = [&](int joint) {
+    const double range = moved(run, joint);
+    return range < kStands && 10.0 * range < moved(run, widest.front());
+  };
+  if (!stands(subjects.position_of) || moved(run, widest.front()) < kStands) return;
+  subjects.position_of = widest.front();
+  if (stands(subjects.torque_of))
+    subjects.torque_of = widest[std::min<std::size_t>(1, widest.size() - 1)];
 }
 
 /// Whether a sensor measures what a foot carries; on a robot without feet, whether it is six-axis.
@@ -90,6 +108,7 @@ Subjects subjects_of(const RunData& run) {
   if (subjects.position_of < 0) subjects.position_of = joints.front();
   if (subjects.torque_of < 0)
     subjects.torque_of = joints[std::min<std::size_t>(1, joints.size() - 1)];
+  prefer_moving(run, subjects);
   for (std::size_t i = 0; i < run.robot.sensors.size(); ++i) {
     const hal::SensorConfig& sensor = run.robot.sensors[i];
     const bool first = sensor.name == run.foot;

@@ -18,7 +18,8 @@ struct Subjects {
 
 /// What the experiment's [report] says. Where it is silent: the first two pitch joints of the
 /// first foot's leg, and the force/torque sensors of the legs; on a robot without such legs the
-/// two joints that move most.
+/// two joints that move most. So it is where the joint of the first figure stands while others
+/// move.
 [[nodiscard]] Subjects subjects_of(const RunData& run);
 
 /// Whether the robot has feet.

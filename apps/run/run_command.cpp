@@ -2,11 +2,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cstdio>
 #include <optional>
 
-#include "apps/control/fault_table.hpp"
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
 #include "apps/robot/gains_opinion.hpp"
@@ -28,11 +26,11 @@
 #include "apps/run/pace.hpp"
 #include "apps/run/prediction.hpp"
 #include "apps/run/remote_link.hpp"
+#include "apps/run/run_end.hpp"
 #include "apps/run/run_summary.hpp"
 #include "apps/run/studio_run.hpp"
 #include "apps/run/tools_program.hpp"
 #include "apps/text/console.hpp"
-#include "apps/text/draft.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "apps/transport/dds_admission.hpp"
 #include "apps/transport/dds_services.hpp"
@@ -43,44 +41,13 @@
 #include "rt/cpu_latency.hpp"
 #include "rt/stop_signal.hpp"
 #include "runtime/run/run.hpp"
-#include "runtime/trace_file.hpp"
 
 namespace tandem::apps {
 namespace {
 
-std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
-                                     const std::optional<log::RecordingResult>& log) {
-  std::vector<std::string> texts = latched_texts(cycle.faults());
-  if (log && !log->error.empty()) {
-    texts.push_back(
-        fmt::format("the log lost {}: {}", counted(log->failed, "message"), log->error));
-  }
-  return texts;
-}
-
 std::string served_text(const runtime::Experiment& e) {
   return fmt::format("served in DDS domain {}, {}", e.dds.domain,
                      e.remote.lockstep ? "in lockstep, " : "");
-}
-
-/// Writes what --trace asks for, and says how much of the run it is.
-Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE* out) {
-  if (options.trace.empty()) return {};
-  const runtime::RobotCycle& cycle = summary.cycle;
-  Draft draft = Draft::file(options.trace);
-  const Status written =
-      runtime::write_trace(draft.path(), summary.composition.experiment.robot.name, cycle.trace(),
-                           cycle.faults(), *summary.composition.controllers->names());
-  if (!written) return std::unexpected(draft.placed(written.error()));
-  if (const Status placed = draft.place(); !placed || options.quiet) return placed;
-  const std::uint64_t all = cycle.trace().count();
-  Facts facts;
-  facts.add(
-      "trace",
-      fmt::format("{} (the last {} of {} cycles; open it on https://ui.perfetto.dev)",
-                  options.trace, std::min<std::uint64_t>(all, cycle.trace().capacity()), all));
-  facts.print(out);
-  return {};
 }
 
 /// The identity of this process in its DDS domain. Clients recognise its answers by it.
@@ -329,26 +296,7 @@ class Session {
     }
     studio_.finish(summary.ended(), log_);
     if (c_.frames != nullptr) summary.frames = c_.frames->close();
-    summary.faults = fault_texts(*cycle_, summary.log);
-    if (!options_.quiet) {
-      fmt::print(out_, "\n");
-      summary.print(out_);
-      if (summary.gate) {
-        fmt::print(out_, "\n");
-        print_gate(*summary.gate, out_);
-      }
-    }
-    for (const std::string& warning : summary.warnings()) {
-      fmt::print(stderr, "warning: {}\n", shown(warning, 2'000));
-    }
-    for (const std::string& fault : summary.faults)
-      fmt::print(stderr, "fault: {}\n", shown(fault, 2'000));
-    const Status traced = add_trace(options_, summary, out_);
-    const Status written = write_json(options_.json, summary.json());
-    if (!traced) return refuse(traced.error());
-    if (!written) return refuse(written.error());
-    if (!summary.faults.empty() || (summary.gate && !kept(*summary.gate))) return Exit::kFault;
-    return summary.cut_short() ? interrupted(summary.interrupted_by) : Exit::kDone;
+    return tell_end(summary, options_, out_);
   }
 
   WiredComposition& c_;

@@ -178,6 +178,25 @@ TEST(NoFeet, ArmsAreDrawnByTheJointsThatMoveMost) {
   EXPECT_EQ(figures[1].title, run.robot.joints[2].name + ": torque, measured");
 }
 
+// The joints that the experiment names stood still in every figure while the arms waved.
+TEST(NoFeet, JointsThatStandGiveWayToThoseThatMove) {
+  RunData run;
+  const test::Walker walker{"", 1, kLeg, {{0, 0, 0}}};
+  run.robot = test::walker_robot(walker);
+  run.tree = model::parse_urdf(test::walker_urdf(walker), "walker.urdf", {}).value().tree;
+  run.position_of = run.torque_of = run.robot.joints[0].name;
+  run.time_s = {0.0, 0.01};
+  run.position_rad = {{0.0, 0.009}, {0.0, 0.2}, {0.0, 0.3}};
+  Subjects subjects = subjects_of(run);
+  EXPECT_EQ(subjects.position_of, 2);
+  EXPECT_EQ(subjects.torque_of, 1);
+  run.position_rad[0][1] = 0.011;
+  subjects = subjects_of(run);
+  EXPECT_EQ(subjects.position_of, 0) << "it moves: what the experiment names is shown";
+  run.position_rad = {{0.0, 0.0}, {0.0, 0.001}, {0.0, 0.001}};
+  EXPECT_EQ(subjects_of(run).position_of, 0) << "nothing moves";
+}
+
 // foot_force.png of an arm, and "-0.00 s" below its first posture.
 TEST(NoFeet, TheSensorsOfAnArmAreNoFeetsAndItsStartIsAtZero) {
   RunData run;

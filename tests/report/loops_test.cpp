@@ -273,10 +273,10 @@ TEST_F(Gripper, OfAFaultedRunShowsTheFaultAndWhatFollowedButCountsIt) {
 // A payload that came and went left no trace in a figure.
 TEST_F(Gripper, OfARunThatPicksSomethingUpMarksWhen) {
   run.time_s = {1.0, 2.0};
-  run.payloads = {{0.0, false, "payload picked up: tool"},
-                  {1.2, false, "payload picked up: box"},
-                  {1.3, false, "payload picked up: can"},
-                  {1.7, true, "payload dropped: box"}};
+  run.marks = {{0.0, "payload picked up", "payload picked up: tool"},
+               {1.2, "payload picked up", "payload picked up: box"},
+               {1.3, "payload picked up", "payload picked up: can"},
+               {1.7, "payload dropped", "payload dropped: box"}};
   const Figure figure = figures_of(run, {}, nullptr).front();
   ASSERT_EQ(figure.marks.size(), 3U) << "what is there before the first row is no mark";
   EXPECT_EQ(figure.marks[0].label, "payload picked up");

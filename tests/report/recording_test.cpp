@@ -128,6 +128,35 @@ TEST_F(Recorded, OfSeveralLogsHasTheSecondBesideTheFirst) {
                                              "B/controller/squat"}));
 }
 
+// The second log's curve was drawn as one more signal of the first.
+TEST_F(Recorded, OfSeveralLogsAFigureIsASourceOfEach) {
+  const auto a = log::LogFile::open(make_log("a.mcap", 40));
+  const auto b = log::LogFile::open(make_log("b.mcap", 40, 5.0));
+  ASSERT_TRUE(a && b);
+  Figure figure{
+      .name = "joint_position", .title = "joint", .x_label = "t [s]", .y_label = "q [deg]"};
+  const std::vector<double> x{0.0, 0.01, 0.02};
+  figure.curves = {{"measured", CurveStyle::kMeasured, x, {1.0, 2.0, 3.0}, 'A'},
+                   {"measured", CurveStyle::kSecond, x, {4.0, 5.0, 6.0}, 'B'},
+                   {"reference", CurveStyle::kReference, x, {7.0, 8.0, 9.0}, 'A'}};
+  const auto recording = Recording::read(
+      {.run = pair(), .logs = {{.file = &*a}, {.file = &*b, .prefix = "B/"}}, .figures = {figure}});
+  ASSERT_TRUE(recording);
+  const auto json = apps::Json::parse(recording->text(kMostReportBytes).json);
+  EXPECT_EQ(json["figures"][0]["series"],
+            (apps::Json{"report/joint_position.measured", "report/joint_position.reference",
+                        "B/report/joint_position.measured"}));
+  const auto& table = recording->table();
+  for (const auto& [name, first] :
+       {std::pair{"report/joint_position", 1.0F}, std::pair{"B/report/joint_position", 4.0F}}) {
+    const auto source = std::ranges::find(table.sources(), name, &studio::Source::name);
+    ASSERT_NE(source, table.sources().end()) << name;
+    EXPECT_EQ(recording->spans().least(source->first)[0], first);
+  }
+  for (const PageTable& one : largest_differences(*recording))
+    for (const auto& row : one.rows) EXPECT_FALSE(row[0].starts_with("report/")) << row[0];
+}
+
 TEST_F(Recorded, SaysThatALogHasNoNumbers) {
   const auto file = log::LogFile::open(make_log("empty.mcap", 0));
   ASSERT_TRUE(file);

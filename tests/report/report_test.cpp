@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "report/log_head.hpp"
 #include "report/run_facts.hpp"
 #include "tests/log/scratch_folder.hpp"
 
@@ -32,6 +33,36 @@ TEST(Report, SaysWhichRunItShows) {
     EXPECT_NE(page.find(fact), std::string::npos) << fact << "\n"
                                                   << page.substr(page.find("<h2>Run</h2>"));
   }
+}
+
+// Of two logs the head named files alone: when, for how long and in what they differ was far below.
+TEST(Report, OfTwoLogsHasBothInItsHead) {
+  Page page;
+  page.title = "two runs";
+  RunData a, b;
+  a.path = "a.mcap";
+  b.path = "b.mcap";
+  a.info.seed = b.info.seed = 1;
+  a.info.started = "2026-11-28T05:03:05Z";
+  a.time_s = b.time_s = {1.0, 3.0};
+  a.info.parameters = {"squat.depth_m = 0.1", "squat.cycles = 4"};
+  b.info.parameters = {"squat.depth_m = 0.2", "squat.cycles = 4"};
+  a.info.configuration = {{"here/arm.toml", "robot = 1"}, {"here/robot.toml", "kd = 1"}};
+  b.info.configuration = {{"there/arm.toml", "robot = 1"}, {"there/robot.toml", "kd = 2"}};
+  a.info.controllers = {"squat abc /one/squat.so"};
+  b.info.controllers = {"squat abc /other/squat.so"};
+  page.heads = {head_facts(a, a), head_facts(b, a)};
+  const auto html = page_content(page, {}, {});
+  ASSERT_TRUE(html);
+  for (const std::string part :
+       {"<tr class=\"differs\"><th scope=\"row\">log</th><td>a.mcap</td><td>b.mcap</td></tr>",
+        "<th scope=\"row\">experiment</th><td colspan=\"2\">arm.toml</td>",
+        "<th scope=\"row\">seed</th><td colspan=\"2\">1</td>", "<td>2026-11-28T05:03:05Z</td>",
+        "<td colspan=\"2\">2.000 s</td>", "data-log=\"B/\"",
+        "<td>files: robot.toml; parameters: squat.depth_m = 0.2</td>"}) {
+    EXPECT_NE(html->find(part), std::string::npos) << part << "\n" << *html;
+  }
+  EXPECT_LT(html->find("b.mcap"), html->find("class=\"figures\""));
 }
 
 // It said that it covers everything from its first time to its last one.

@@ -36,5 +36,25 @@ TEST(Parameters, OfAControllerThatIsLoadedAgainKeepTheirStart) {
   EXPECT_EQ(all[4].changes, 0U);
 }
 
+log::EventText happened(double time_s, log::EventKind kind, const std::string& text) {
+  return {{.time_ns = static_cast<std::int64_t>(time_s * 1e9), .kind = kind}, text};
+}
+
+// Parameters that were set and limits that were met left no trace in a figure.
+TEST(Marks, AreOfWhatWasSetAndOfLimits) {
+  const auto marks =
+      marks_of({happened(0.0, log::EventKind::kStarted, "started"),
+                parameter(1.0, false, "squat.depth_m = 0.1"), parameter(1.5, true, "late.gain = 7"),
+                happened(2.0, log::EventKind::kLimited, "knee: command limited"),
+                happened(3.0, log::EventKind::kGainsSet, "knee: gains set"),
+                happened(4.0, log::EventKind::kDropped, "payload dropped: box")});
+  std::vector<std::string> kinds;
+  for (const RunMark& one : marks) kinds.push_back(one.kind);
+  EXPECT_EQ(kinds, (std::vector<std::string>{"parameter set", "limit met", "gains set",
+                                             "payload dropped"}));
+  EXPECT_EQ(marks[1].time_s, 2.0);
+  EXPECT_EQ(marks[1].text, "knee: command limited");
+}
+
 }  // namespace
 }  // namespace tandem::report

@@ -80,6 +80,7 @@ export class Header {
     data.whenHello((hello) => {
       say(this.robot, hello.robot);
       say(this.experiment, hello.experiment);
+      this.experiment.title = hello.experiment;
       document.title = `${hello.robot} – Tandem studio`;
     });
     setInterval(() => this.refresh(), 100);

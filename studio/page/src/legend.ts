@@ -17,9 +17,12 @@ export interface LegendOwner {
 
 export const kPaletteSize = 8;
 
-/** Without the name of the report's figure, whose title says it. */
-function shortLabel(series: Series): string {
-  return labelOf(series).replace(/^report\/[^.]*\./, '');
+/** Of a report's figure, whose title says its name: the rest, and of several logs the letter. */
+function shortLabel(series: Series, all: Series[]): string {
+  const bare = labelOf(series).replace(/^([BC]\/)?report\/[^.]*\./, '');
+  const several = all.some((one) => prefixOf(one) !== '');
+  if (bare === labelOf(series) || !several) return bare;
+  return `${bare}, ${prefixOf(series)[0] ?? 'A'}`;
 }
 
 export class Legend {
@@ -80,7 +83,7 @@ export class Legend {
         h(
           'th',
           { scope: 'row', title: doc },
-          known ? shortLabel(series) : `${labelOf(series)} (not in this run)`,
+          known ? shortLabel(series, this.owner.series) : `${labelOf(series)} (not in this run)`,
         ),
         value,
         h('td', {}, unitOf(series, this.data.catalog)),

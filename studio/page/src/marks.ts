@@ -2,6 +2,7 @@
 import type uPlot from 'uplot';
 import type { Data } from './data';
 import { theme } from './dom';
+import { onPaper } from './paper';
 import type { RunEvent } from './protocol';
 
 const kNear_px = 8;
@@ -36,7 +37,7 @@ export function eventMarks(plot: uPlot, data: Data): void {
     context.fillText(signOf(event.level), at, top + 8 * ratio);
   }
   const { selected } = data.time;
-  if (selected !== null && selected >= from && selected <= to) {
+  if (selected !== null && !onPaper() && selected >= from && selected <= to) {
     context.setLineDash([]);
     context.strokeStyle = theme('--accent');
     context.lineWidth = 1.5 * ratio;

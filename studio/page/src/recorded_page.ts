@@ -6,6 +6,7 @@ import { h } from './dom';
 import { Events } from './events';
 import { Header } from './header';
 import { Joints } from './joints';
+import { whenPrinted } from './paper';
 import { Playback } from './playback';
 import { Plots } from './plots';
 import { RecordedSource, type Recording, recordingIn } from './recorded';
@@ -101,11 +102,10 @@ export function startRecorded(
   );
   tabs.open('report');
   scene.themeChanged();
-  // On paper the report alone is seen: its plots need room to be drawn.
-  addEventListener('beforeprint', () => {
+  // On paper the report alone is seen.
+  whenPrinted(() => {
     tabs.open('report');
-    report.resize();
-    report.update();
+    report.drawAnew();
   });
   void source.open();
   let fresh = false;

@@ -9,6 +9,7 @@ import { type Capture, ScopeEngine } from './scope_engine';
 import { ScopePlot } from './scope_plot';
 import { firstSettings, kMostChannels, type ScopeSettings } from './scope_settings';
 import { signalSearch } from './search';
+import { settingChanges } from './setting_changes';
 import type { Connection } from './source';
 import { stepTable } from './step_table';
 import { triggerWords } from './trigger';
@@ -102,6 +103,11 @@ export class Scope {
       },
     });
     data.whenCatalog(() => this.list());
+    // What was set parts the captures that are there.
+    data.whenEvents(() => {
+      this.dirty = true;
+      this.anew = true;
+    });
     this.list();
   }
 
@@ -139,7 +145,10 @@ export class Scope {
     const { response, reference } = this.settings;
     this.steps.hidden = captures.length === 0 || response === '';
     if (!this.steps.hidden) {
-      this.steps.replaceChildren(stepTable(captures, response, reference, this.unitOf(response)));
+      const changes = settingChanges(this.data.events);
+      this.steps.replaceChildren(
+        stepTable(captures, response, reference, this.unitOf(response), changes),
+      );
     }
     this.element.dataset.captures = String(captures.length);
     this.element.dataset.trigger = captures[0]

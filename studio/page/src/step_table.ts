@@ -1,7 +1,8 @@
-// The table of step responses: a row for each capture, then mean and spread.
+// The table of step responses: a row for each capture, then mean and spread of each setting.
 import { h } from './dom';
 import { number } from './format';
 import type { Capture } from './scope_engine';
+import { groupsOf, type SettingChange } from './setting_changes';
 import { type StepFigures, spreadOf, stepFigures } from './step_response';
 
 interface Column {
@@ -81,40 +82,65 @@ export function figuresOf(capture: Capture, response: string, reference: string)
   });
 }
 
-/** @param captures newest first  @param unit of the response */
+const kMixed = 'something was set behind its trigger: it counts for no mean';
+
+/**
+ * A row for each capture; mean and spread are of those between two changes of settings.
+ * @param captures newest first  @param unit of the response
+ */
 export function stepTable(
   captures: Capture[],
   response: string,
   reference: string,
   unit: string,
+  changes: SettingChange[] = [],
 ): HTMLElement {
-  const known = captures.map((capture) => figuresOf(capture, response, reference));
+  const { groups, mixed } = groupsOf(captures, changes);
   const cell = (text: string, data?: number) =>
     h('td', { class: 'figure', 'data-value': Number.isFinite(data) ? String(data) : null }, text);
-  const rows = captures.map((capture, i) =>
-    h(
+  const row = (capture: Capture, figures: StepFigures) => {
+    const words = mixed.has(capture) ? kMixed : figures.words;
+    return h(
       'tr',
       {},
       h('th', { scope: 'row' }, `${(capture.trigger * capture.period_s).toFixed(3)} s`),
-      ...(known[i].words
-        ? [h('td', { colspan: kColumns.length, class: 'no-figures' }, known[i].words)]
+      ...(words
+        ? [h('td', { colspan: kColumns.length, class: 'no-figures' }, words)]
         : kColumns.map(({ of, text, none }) => {
-            const value = of(known[i]);
+            const value = of(figures);
             return cell(Number.isFinite(value) ? text(value) : none, value);
           })),
-    ),
-  );
-  const spreads = kColumns.map(({ of }) => spreadOf(known.map(of)));
-  const summary = (head: string, of: (one: (typeof spreads)[number]) => number) =>
+    );
+  };
+  const summary = (head: string, of: (column: Column) => number) =>
     h(
       'tr',
       { class: 'summary' },
       h('th', { scope: 'row' }, head),
-      ...kColumns.map(({ text, alone }, i) => {
-        const value = alone ? Number.NaN : of(spreads[i]);
-        return cell(Number.isFinite(value) ? text(value) : '–', value);
+      ...kColumns.map((column) => {
+        const value = column.alone ? Number.NaN : of(column);
+        return cell(Number.isFinite(value) ? column.text(value) : '–', value);
       }),
     );
+  const bodies = groups.map(({ change, captures: own }) => {
+    const known = own.map((capture) => figuresOf(capture, response, reference));
+    const counted = known.filter((_, i) => !mixed.has(own[i]));
+    const head = change ? `since ${change.time_s.toFixed(3)} s: ${change.text}` : 'before';
+    return h(
+      'tbody',
+      {},
+      groups.length > 1
+        ? h(
+            'tr',
+            { class: 'step-group' },
+            h('th', { scope: 'rowgroup', colspan: kColumns.length + 1 }, head),
+          )
+        : null,
+      ...own.map((capture, i) => row(capture, known[i])),
+      summary('mean', ({ of }) => spreadOf(counted.map(of)).mean),
+      summary('spread', ({ of }) => spreadOf(counted.map(of)).spread),
+    );
+  });
   return h(
     'table',
     { class: 'step-table' },
@@ -130,12 +156,6 @@ export function stepTable(
         ),
       ),
     ),
-    h('tbody', {}, ...rows),
-    h(
-      'tfoot',
-      {},
-      summary('mean', (one) => one.mean),
-      summary('spread', (one) => one.spread),
-    ),
+    ...bodies,
   );
 }

@@ -67,11 +67,17 @@ export class Tabs {
   }
 
   private key(event: KeyboardEvent): void {
-    const by = event.key === 'ArrowRight' ? 1 : event.key === 'ArrowLeft' ? -1 : 0;
-    if (by === 0) return;
-    event.preventDefault();
+    const { length } = this.tabs;
     const at = this.tabs.findIndex((tab) => tab.name === this.active);
-    const next = (at + by + this.tabs.length) % this.tabs.length;
+    const places: Record<string, number> = {
+      ArrowRight: (at + 1) % length,
+      ArrowLeft: (at + length - 1) % length,
+      Home: 0,
+      End: length - 1,
+    };
+    const next = places[event.key];
+    if (next === undefined) return;
+    event.preventDefault();
     this.open(this.tabs[next].name);
     this.buttons[next].focus();
   }

@@ -351,6 +351,14 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     test(`${name}: nothing for axe-core to find, nothing wider than the window`, async () => {
       const mock = await play();
       const page = await visit(mock.address, options);
+      const beyond = await page.$$eval('[role="tab"]', (tabs) =>
+        tabs.filter((tab) => tab.getBoundingClientRect().right > innerWidth).map((tab) => tab.id),
+      );
+      assert.deepEqual(beyond, [], 'tabs that are not seen');
+      await page.focus('[role="tab"][aria-selected="true"]');
+      await page.keyboard.press('End');
+      assert.equal(await page.getAttribute('#tab-events', 'aria-selected'), 'true');
+      await page.keyboard.press('Home');
       for (const tab of ['plots', 'scope', 'joints', 'controllers', 'inputs', 'loop', 'events']) {
         await page.click(`#tab-${tab}`);
         if (tab === 'scope') {

@@ -120,6 +120,29 @@ describe('a report opened from the disk', { skip: why || false, timeout: 120000 
     await leave(page);
   });
 
+  test('prints in light colours, its plots as wide as a sheet, with what says which line is whose', async () => {
+    const page = await openPage(browser, address, { scheme: 'dark' });
+    await page.waitForSelector('.report .pane .uplot');
+    const look = () =>
+      page.evaluate(() => ({
+        dark: document.documentElement.hasAttribute('data-dark'),
+        widths: [...document.querySelectorAll('.report canvas')].map((one) => one.clientWidth),
+        shown: [...document.querySelectorAll('.report .legend thead')].some((one) =>
+          one.checkVisibility(),
+        ),
+      }));
+    const before = await look();
+    assert.ok(before.dark && before.shown);
+    assert.ok(Math.max(...before.widths) > 690, 'wider than a sheet on the screen');
+    await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
+    const paper = await look();
+    assert.ok(!paper.dark && !paper.shown, 'values at a selected time are none of paper');
+    assert.ok(Math.max(...paper.widths) <= 690);
+    await page.evaluate(() => dispatchEvent(new Event('afterprint')));
+    assert.deepEqual(await look(), before);
+    await leave(page);
+  });
+
   test('says what a browser lacks, and shows the rest', async () => {
     const page = await openPage(browser, address, {
       init: () => {
@@ -152,6 +175,11 @@ describe('a report opened from the disk', { skip: why || false, timeout: 120000 
     for (let i = 0; i < 3; ++i) await page.locator('[aria-label="zoom in"]').click();
     await page.waitForSelector('.plots .pane[data-cycles-per-row="1"]');
     assert.match(await page.textContent('.plots .pane'), /B\/state\.position_rad/);
+    // In the head both logs; in the figures the second one's line is dashed, as in the plots.
+    await page.click('#tab-report');
+    assert.match(await page.locator('.report .logs').first().textContent(), /A\s*B.*started/s);
+    assert.equal((await page.locator('.report .legend [data-log="B/"]').count()) > 0, true);
+    assert.match(await page.locator('.report .legend').first().textContent(), /measured, B/);
     await leave(page);
     served.kill('SIGINT');
     assert.equal(await ended, 0);

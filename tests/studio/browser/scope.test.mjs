@@ -71,7 +71,7 @@ describe('the oscilloscope', { skip: why || false, timeout: 120000 }, () => {
     await page.click('.scope button:text-is("Stop")');
     await page.waitForSelector('.scope[data-state="stopped"]');
     assert.match(await page.textContent('.scope-state'), /^Stopped\. Arm waits until command/);
-    const table = await page.$$eval('.step-table tbody tr', (rows) =>
+    const table = await page.$$eval('.step-table tbody tr:not(.summary)', (rows) =>
       rows.map((row) => [...row.cells].map((cell) => Number(cell.dataset.value))),
     );
     const [download] = await Promise.all([
@@ -85,10 +85,20 @@ describe('the oscilloscope', { skip: why || false, timeout: 120000 }, () => {
     await page.click('button:text-is("Clear")');
     await page.click('button:text-is("Force")');
     await page.waitForSelector('.scope[data-captures="1"]');
+    // With another gain a mean of its own.
+    run.ask({ do: 'joint.gains', joint: 'joint1', loop: 'position', kd: 0.5 });
     await page.selectOption('[aria-label="mode"]', 'single');
     await page.click('button:text-is("Arm")');
     advance(4000);
     await page.waitForSelector('.scope[data-state="filled"][data-captures="2"]');
+    await page.waitForSelector('.step-group:has-text("joint.gains")');
+    assert.deepEqual(
+      await page.$$eval('.step-table tbody', (groups) =>
+        groups.map((one) => one.querySelectorAll('tr:not(.step-group):not(.summary)').length),
+      ),
+      [1, 1],
+    );
+    assert.doesNotMatch(await page.textContent('.step-table'), /something was set/);
     await shot(page, 'studio-scope');
     await leave(page);
     await run.end();

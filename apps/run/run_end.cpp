@@ -1,0 +1,72 @@
+#include "apps/run/run_end.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "apps/control/fault_table.hpp"
+#include "apps/run/gate.hpp"
+#include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
+#include "base/counted.hpp"
+#include "runtime/trace_file.hpp"
+
+namespace tandem::apps {
+namespace {
+
+std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
+                                     const std::optional<log::RecordingResult>& log) {
+  std::vector<std::string> texts = latched_texts(cycle.faults());
+  if (log && !log->error.empty()) {
+    texts.push_back(
+        fmt::format("the log lost {}: {}", counted(log->failed, "message"), log->error));
+  }
+  return texts;
+}
+
+/// Writes what --trace asks for, and says how much of the run it is.
+Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE* out) {
+  if (options.trace.empty()) return {};
+  const runtime::RobotCycle& cycle = summary.cycle;
+  Draft draft = Draft::file(options.trace);
+  const Status written =
+      runtime::write_trace(draft.path(), summary.composition.experiment.robot.name, cycle.trace(),
+                           cycle.faults(), *summary.composition.controllers->names());
+  if (!written) return std::unexpected(draft.placed(written.error()));
+  if (const Status placed = draft.place(); !placed || options.quiet) return placed;
+  const std::uint64_t all = cycle.trace().count();
+  Facts facts;
+  facts.add(
+      "trace",
+      fmt::format("{} (the last {} of {} cycles; open it on https://ui.perfetto.dev)",
+                  options.trace, std::min<std::uint64_t>(all, cycle.trace().capacity()), all));
+  facts.print(out);
+  return {};
+}
+
+}  // namespace
+
+Exit tell_end(RunSummary& summary, const RunOptions& options, std::FILE* out) {
+  summary.faults = fault_texts(summary.cycle, summary.log);
+  if (!options.quiet) {
+    fmt::print(out, "\n");
+    summary.print(out);
+    if (summary.gate) {
+      fmt::print(out, "\n");
+      print_gate(*summary.gate, out);
+    }
+  }
+  for (const std::string& warning : summary.warnings()) {
+    fmt::print(stderr, "warning: {}\n", shown(warning, 2'000));
+  }
+  for (const std::string& fault : summary.faults)
+    fmt::print(stderr, "fault: {}\n", shown(fault, 2'000));
+  const Status traced = add_trace(options, summary, out);
+  const Status written = write_json(options.json, summary.json());
+  if (!traced) return refuse(traced.error());
+  if (!written) return refuse(written.error());
+  if (!summary.faults.empty() || (summary.gate && !kept(*summary.gate))) return Exit::kFault;
+  return summary.cut_short() ? interrupted(summary.interrupted_by) : Exit::kDone;
+}
+
+}  // namespace tandem::apps
