@@ -66,13 +66,22 @@ export class Tabs {
     this.changed(name);
   }
 
+  /** Those that there are; the others are not shown. */
+  keep(names: string[]): void {
+    this.tabs.forEach((tab, i) => {
+      this.buttons[i].hidden = !names.includes(tab.name);
+    });
+    if (!names.includes(this.active)) this.open(names[0]);
+  }
+
   private key(event: KeyboardEvent): void {
     const by = event.key === 'ArrowRight' ? 1 : event.key === 'ArrowLeft' ? -1 : 0;
     if (by === 0) return;
     event.preventDefault();
-    const at = this.tabs.findIndex((tab) => tab.name === this.active);
-    const next = (at + by + this.tabs.length) % this.tabs.length;
-    this.open(this.tabs[next].name);
-    this.buttons[next].focus();
+    const shown = this.buttons.filter((button) => !button.hidden);
+    const at = shown.findIndex((button) => button.id === `tab-${this.active}`);
+    const next = shown[(at + by + shown.length) % shown.length];
+    next.click();
+    next.focus();
   }
 }
