@@ -163,7 +163,7 @@ int run(const Options& options, const char* program) {
   if (!opened) return fail_with(opened.error());
   runtime::RobotCycle& cycle = (*opened)->cycle();
   const runtime::Experiment& e = (*opened)->experiment();
-  const studio::Tap::Images images{cycle.state(), cycle.command(), &(*opened)->truth(), nullptr};
+  const studio::Tap::Images images{&cycle.state(), &cycle.command(), &(*opened)->truth()};
   const auto studio = studio::Studio::open(
       {.port = 0},
       {.robot = e.robot, .experiment = "bench", .simulated = true, .period_ns = e.loop.period_ns},

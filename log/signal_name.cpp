@@ -17,6 +17,7 @@ struct Row {
 
 constexpr Row kFieldRows[] = {
 #define TANDEM_FIELD(type, name, count, doc) {#name, #count},
+#include "hal/boards_fields.inc"
 #include "hal/command_fields.inc"
 #include "hal/estimate_fields.inc"
 #include "hal/state_fields.inc"

@@ -17,6 +17,8 @@ using apps::Json;
 
 constexpr char kNeedsToken[] = "open the address with its token";
 constexpr char kListing[] = "docs/studio.md lists the messages";
+constexpr char kNoRun[] = "an emulation is led and asked by the run on the other side of its wire";
+constexpr char kTheRun[] = "there: tandem run … --studio";
 constexpr double kMostPoints = 100'000.0;
 
 /// The whole number at `key`, from 0 to `most`; empty: it is none.
@@ -171,6 +173,7 @@ void Hub::on_ask(ClientNumber number, Client& client, const Json& message, Clock
     client.out.text(
         answer_text(question, apps::json_text({{"ok", false}, {"error", error}, {"hint", hint}})));
   };
+  if (!run_->emulated.empty()) return answer(kNoRun, kTheRun);
   if (!asker_.ask) return answer("the run is not ready to answer yet", "ask again");
   std::string text = apps::json_text(*request);
   // A stop finds its way past what waits.
@@ -191,6 +194,7 @@ void Hub::on_watch(ClientNumber, Client& client, const Json& message, Clock::tim
   if (!list.is_array() || list.size() > kMostWaiting) {
     return refuse(client, "\"requests\" is no list of up to 16 commands", kListing);
   }
+  if (!run_->emulated.empty() && !list.empty()) return refuse(client, kNoRun, kTheRun);
   std::set<std::string> wanted;
   for (const Json& one : list) {
     const std::string name = one.is_string() ? one.get<std::string>() : std::string();
@@ -216,6 +220,7 @@ void Hub::on_control(ClientNumber number, Client& client, const Json& message,
   if (take == message.end() || !take->is_boolean()) {
     return refuse(client, "\"take\" is neither true nor false", kListing);
   }
+  if (!run_->emulated.empty()) return refuse(client, kNoRun, kTheRun);
   if (!client.token) return refuse(client, "control needs the token of the run", kNeedsToken);
   if (!take->get<bool>()) {
     if (controls_ == number) end_control("has given control back");

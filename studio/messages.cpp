@@ -114,6 +114,7 @@ std::string hello_text(const RunDescription& run, std::span<const std::uint64_t>
                     {"experiment", run.experiment},
                     {"title", robot.name + ": " + run.experiment},
                     {"simulated", run.simulated},
+                    {"emulated", run.emulated.empty() ? Json() : Json(run.emulated)},
                     {"floating", robot.model.floating_base},
                     {"ground", ground ? Json{{"height_m", robot.contact.height_m}} : Json()},
                     {"period_s", period_s},

@@ -28,6 +28,9 @@ struct RunDescription {
   std::string experiment{};  ///< its file's name
   std::string run{};         ///< 8 hexadecimal digits, drawn at its start
   bool simulated = false;    ///< its time is
+  /// An emulation, boards and a plant without a cycle, has the --hal of the run that leads it.
+  /// Empty: it is a run.
+  std::string emulated{};
   std::int64_t period_ns = 1'000'000;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <iterator>
 #include <limits>
 
 namespace tandem::studio {
@@ -9,12 +10,16 @@ namespace {
 
 constexpr float kNoValue = std::numeric_limits<float>::quiet_NaN();
 
+/// By Tap::Part.
+constexpr const char* kNames[] = {"state", "command", "truth", "estimate", "boards"};
+static_assert(std::size(kNames) == Tap::kParts);
+
 SignalTable table_of(const Tap::Images& images, log::RunInfo robot) {
   SignalTable table(std::move(robot));
-  (void)table.add("state", images.state.layout());
-  (void)table.add("command", images.command.layout());
-  if (images.truth != nullptr) (void)table.add("truth", images.truth->layout());
-  if (images.estimate != nullptr) (void)table.add("estimate", images.estimate->layout());
+  const auto all = images.all();
+  for (std::size_t i = 0; i < Tap::kParts; ++i) {
+    if (all[i] != nullptr) (void)table.add(kNames[i], all[i]->layout());
+  }
   return table;
 }
 
@@ -27,9 +32,11 @@ Event::Level level_of(hal::RunPhase phase) {
 
 Sampler::Sampler(Tap& tap, const Tap::Images& images, log::RunInfo robot, std::size_t level_bytes)
     : tap_(&tap), table_(table_of(images, std::move(robot))), history_(level_bytes, table_.size()) {
-  command_ = 1;
-  truth_ = 2;
-  estimate_ = images.truth == nullptr ? 2 : 3;
+  const auto all = images.all();
+  std::size_t source = 0;
+  for (std::size_t i = 0; i < Tap::kParts; ++i) {
+    if (all[i] != nullptr) sources_[i] = source++;
+  }
   widen();
 }
 
@@ -165,17 +172,17 @@ void Sampler::begin_row() {
 
 void Sampler::take(const Tap::Cycle& cycle) {
   time_ = cycle.time;
-  if (!has_phase_ || phase_ != cycle.phase) {
+  const bool of_a_run = !cycle.parts[Tap::kState].empty();
+  if (of_a_run && (!has_phase_ || phase_ != cycle.phase)) {
     has_phase_ = true;
     phase_ = cycle.phase;
     events_.push_back({1e-9 * static_cast<double>(time_.time_ns), time_.cycle, level_of(phase_), "",
                        std::string("phase: ") + hal::to_string(phase_)});
   }
   begin_row();
-  table_.convert(state_, cycle.state, row_);
-  table_.convert(command_, cycle.command, row_);
-  if (!cycle.truth.empty()) table_.convert(truth_, cycle.truth, row_);
-  if (!cycle.estimate.empty()) table_.convert(estimate_, cycle.estimate, row_);
+  for (std::size_t i = 0; i < Tap::kParts; ++i) {
+    if (!cycle.parts[i].empty()) table_.convert(sources_[i], cycle.parts[i], row_);
+  }
   for (const MarkSource& one : marks_) table_.convert(one.source, one.image(), row_);
   if (twin_ && twin_->source != kMostSignals) table_.convert(twin_->source, twin_->image(), row_);
   row_is_whole_ = true;

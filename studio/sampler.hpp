@@ -2,6 +2,7 @@
 // Layer: studio.  Thread: the studio's.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -69,7 +70,7 @@ class Sampler {
 
   Tap* tap_;
   SignalTable table_;
-  std::size_t state_ = 0, command_ = 0, truth_ = 0, estimate_ = 0;  // sources
+  std::array<std::size_t, Tap::kParts> sources_{};  // of those that there are
   History history_;
   std::vector<float> row_;
   bool row_is_whole_ = false;

@@ -18,32 +18,43 @@ std::size_t cycles_of_a_second(std::int64_t period_ns) {
 
 }  // namespace
 
+Tap::Places::Places(const Images& images) : slot_bytes(whole_words(sizeof(Head))) {
+  const auto all = images.all();
+  for (std::size_t i = 0; i < kParts; ++i) {
+    bytes[i] = all[i] == nullptr ? 0 : all[i]->bytes().size();
+    at[i] = slot_bytes;
+    slot_bytes += whole_words(bytes[i]);
+  }
+}
+
 Tap::Tap(const Images& images, std::int64_t period_ns)
-    : state_bytes_(images.state.bytes().size()),
-      command_bytes_(images.command.bytes().size()),
-      truth_bytes_(images.truth == nullptr ? 0 : images.truth->bytes().size()),
-      estimate_bytes_(images.estimate == nullptr ? 0 : images.estimate->bytes().size()),
-      state_at_(whole_words(sizeof(Head))),
-      command_at_(state_at_ + whole_words(state_bytes_)),
-      truth_at_(command_at_ + whole_words(command_bytes_)),
-      estimate_at_(truth_at_ + whole_words(truth_bytes_)),
-      cycles_(slot_bytes(), cycles_of_a_second(period_ns)),
+    : places_(images),
+      cycles_(places_.slot_bytes, cycles_of_a_second(period_ns)),
       signals_(kPart, 4 * cycles_of_a_second(period_ns)) {}
 
-void Tap::take(const hal::CycleView& view) noexcept TANDEM_RT {
+void Tap::push(Head head, const Images& images) noexcept TANDEM_RT {
   const auto slot = cycles_.begin_push();
   if (slot.empty()) return;
-  const bool truth = truth_bytes_ != 0 && view.truth != nullptr;
-  const bool estimate = estimate_bytes_ != 0 && view.estimate != nullptr;
-  const Head head{view.time, view.times, view.phase, view.read_code, truth, estimate};
-  std::memcpy(slot.data(), &head, sizeof head);
-  std::memcpy(slot.data() + state_at_, view.state.bytes().data(), state_bytes_);
-  std::memcpy(slot.data() + command_at_, view.command.bytes().data(), command_bytes_);
-  if (truth) std::memcpy(slot.data() + truth_at_, view.truth->bytes().data(), truth_bytes_);
-  if (estimate) {
-    std::memcpy(slot.data() + estimate_at_, view.estimate->bytes().data(), estimate_bytes_);
+  const auto all = images.all();
+  for (std::size_t i = 0; i < kParts; ++i) {
+    head.there[i] = places_.bytes[i] != 0 && all[i] != nullptr;
+    if (!head.there[i]) continue;
+    std::memcpy(slot.data() + places_.at[i], all[i]->bytes().data(), places_.bytes[i]);
   }
+  std::memcpy(slot.data(), &head, sizeof head);
   cycles_.end_push();
+}
+
+void Tap::take(const hal::CycleView& view) noexcept TANDEM_RT {
+  push({view.time, view.times, view.phase, view.read_code, {}}, {.state = &view.state,
+                                                                 .command = &view.command,
+                                                                 .truth = view.truth,
+                                                                 .estimate = view.estimate});
+}
+
+void Tap::take_step(const hal::CycleTime& time, const hal::TruthImage& truth,
+                    const hal::BoardsImage& boards) noexcept TANDEM_RT {
+  push({time, {}, hal::RunPhase::kRunning, Code::kOk, {}}, {.truth = &truth, .boards = &boards});
 }
 
 void Tap::take_signals(const hal::CycleTime& time,
@@ -76,10 +87,11 @@ bool Tap::next(const std::function<void(const Signals&)>& signals,
     }
     signals_.pop();
   }
-  cycle({head.time, head.phase, head.read_code, head.times, slot.subspan(state_at_, state_bytes_),
-         slot.subspan(command_at_, command_bytes_),
-         slot.subspan(truth_at_, head.truth ? truth_bytes_ : 0),
-         slot.subspan(estimate_at_, head.estimate ? estimate_bytes_ : 0)});
+  Cycle one{head.time, head.phase, head.read_code, head.times, {}};
+  for (std::size_t i = 0; i < kParts; ++i) {
+    one.parts[i] = slot.subspan(places_.at[i], head.there[i] ? places_.bytes[i] : 0);
+  }
+  cycle(one);
   cycles_.pop();
   return true;
 }

@@ -1,7 +1,8 @@
 // Copies every cycle into a wait-free ring, for the studio's thread.
-// Layer: studio.  Thread: take() and take_signals() the loop's; next() and lost() the studio's.
+// Layer: studio.  Thread: take…() the loop's, or the emulation's; next() and lost() the studio's.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <span>
 
 #include "base/spsc_ring.hpp"
+#include "hal/boards.hpp"
 #include "hal/cycle_observer.hpp"
 #include "hal/estimate.hpp"
 #include "hal/image.hpp"
@@ -18,12 +20,21 @@ namespace tandem::studio {
 
 class Tap final : public hal::CycleObserver {
  public:
-  /// The images of a run, for their sizes.
+  /// What a cycle has: of a run all but the boards, of an emulation truth and boards.
+  enum Part : std::uint8_t { kState, kCommand, kTruth, kEstimate, kBoards };
+  static constexpr std::size_t kParts = 5;
+  /// The images of a run or an emulation, for their sizes. Null: the cycles bring none.
   struct Images {
-    const hal::StateImage& state;
-    const hal::CommandImage& command;
-    const hal::TruthImage* truth = nullptr;        ///< null: the cycles bring none
-    const hal::EstimateImage* estimate = nullptr;  ///< the same
+    const hal::StateImage* state = nullptr;
+    const hal::CommandImage* command = nullptr;
+    const hal::TruthImage* truth = nullptr;
+    const hal::EstimateImage* estimate = nullptr;
+    const hal::BoardsImage* boards = nullptr;
+
+    /// By Part.
+    [[nodiscard]] std::array<const hal::Image*, kParts> all() const noexcept {
+      return {state, command, truth, estimate, boards};
+    }
   };
   /// A second of cycles has room, and not less than kLeastCycles.
   static constexpr std::size_t kLeastCycles = 256, kMostCycles = 8192;
@@ -35,15 +46,18 @@ class Tap final : public hal::CycleObserver {
   /// @rt the same of its numbers
   void take_signals(const hal::CycleTime& time,
                     const hal::SignalBlock& block) noexcept TANDEM_RT override;
+  /// A step of an emulation.
+  /// @rt the same
+  void take_step(const hal::CycleTime& time, const hal::TruthImage& truth,
+                 const hal::BoardsImage& boards) noexcept TANDEM_RT;
 
   /// One cycle, as it was taken. References are good during the call.
   struct Cycle {
     hal::CycleTime time;
-    hal::RunPhase phase;
+    hal::RunPhase phase;  ///< of a run
     Code read_code;
     hal::CycleTimes times;
-    std::span<const std::byte> state, command;
-    std::span<const std::byte> truth, estimate;  ///< empty: none
+    std::array<std::span<const std::byte>, kParts> parts;  ///< by Part; empty: none
   };
   /// Numbers of a controller's block in the same cycle, or some of them.
   struct Signals {
@@ -68,7 +82,7 @@ class Tap final : public hal::CycleObserver {
     hal::CycleTimes times;
     hal::RunPhase phase;
     Code read_code;
-    bool truth, estimate;
+    std::array<bool, kParts> there;
   };
   /// A controller's signals cross in parts of this many bytes, so that few numbers take little.
   static constexpr std::size_t kPart = 512;
@@ -79,10 +93,15 @@ class Tap final : public hal::CycleObserver {
   };
   static constexpr std::size_t kPartBytes = kPart - sizeof(PartHead);
 
-  [[nodiscard]] std::size_t slot_bytes() const noexcept { return estimate_at_ + estimate_bytes_; }
+  struct Places {
+    explicit Places(const Images& images);
 
-  std::size_t state_bytes_, command_bytes_, truth_bytes_, estimate_bytes_;
-  std::size_t state_at_, command_at_, truth_at_, estimate_at_;  // in a slot
+    std::array<std::size_t, kParts> at{}, bytes{};  // in a slot
+    std::size_t slot_bytes = 0;
+  };
+  void push(Head head, const Images& images) noexcept TANDEM_RT;
+
+  Places places_;
   SpscRing cycles_, signals_;
 };
 

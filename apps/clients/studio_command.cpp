@@ -25,8 +25,8 @@ Error why_not(Error error) {
   if (!error.message.starts_with("unknown command")) return error;
   error.message = "this process has no studio: it is no run, or one of an older version of Tandem";
   error.hint =
-      "of an emulation look at the run on its other side; start an older run again: "
-      "tandem run … --studio";
+      "an emulation opens its own when it starts: tandem emulate … --studio; start an older "
+      "run again: tandem run … --studio";
   return error;
 }
 

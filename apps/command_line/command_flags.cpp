@@ -115,7 +115,9 @@ const char kEmulateExamples[] = R"(Examples:
   tandem emulate config/coman/squat.toml --lockstep        in one terminal, and in another
   tandem run config/coman/squat.toml --hal can --lockstep  the same bits as without --hal can
   tandem emulate config/coman/robot.toml                   in real time, for `run --hal can`
-It has no studio: `tandem run … --hal can --studio` shows the robot in a browser.
+  tandem emulate config/coman/robot.toml --studio          and the robot in a browser
+Its studio shows the simulated robot and its boards, and leads nothing: control is on the other side
+of the wire, `tandem run … --hal can --studio`.
 Interfaces without hardware:
   ip link add can0 type vcan && ip link set can0 mtu 72 up)";
 
@@ -186,7 +188,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
   app.add_flag("--no-socket", o.no_socket, "Open no control socket")->excludes(socket);
-  add_studio_flags(app, o.studio);
+  add_run_studio_flags(app, o.studio);
   app.add_option("--domain", o.domain,
                  "DDS domain, instead of the experiment's (else: ROS_DOMAIN_ID, else 0)")
       ->check(CLI::Range(0, 232));
@@ -326,6 +328,7 @@ void add_flags(CLI::App& app, EmulateOptions& o) {
   app.add_flag("--no-socket", o.no_socket, "Open no control socket")->excludes(socket);
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  add_emulation_studio_flags(app, o.studio);
   app.footer(kEmulateExamples);
 }
 

@@ -33,7 +33,9 @@ void add_target(CLI::App& app, ControlTarget& target);
 CLI::Option* add_place(CLI::App& app, DdsPlace& place, CLI::Option* dds = nullptr);
 
 /// --studio and its like, of `run` and `serve`.
-void add_studio_flags(CLI::App& app, StudioOptions& o);
+void add_run_studio_flags(CLI::App& app, StudioOptions& o);
+/// The same, of `emulate`.
+void add_emulation_studio_flags(CLI::App& app, StudioOptions& o);
 
 /// Each adds its command's flags and examples to `app`, which writes what is given to `o`: that
 /// has to outlive the parsing.

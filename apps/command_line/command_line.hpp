@@ -108,6 +108,7 @@ struct EmulateOptions {
   bool no_socket = false;
   bool quiet = false;  ///< neither progress nor table
   std::string json;
+  StudioOptions studio{};
 };
 
 /// tandem model build|info ROBOT

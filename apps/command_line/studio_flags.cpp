@@ -37,8 +37,8 @@ const char kStudioExamples[] = R"(Examples:
   tandem studio runs/coman-squat-001.mcap            a log, until Ctrl-C
   tandem studio runs/a.mcap runs/b.mcap              the second log over the first
 A run that was started without --studio opens it now, and keeps it until its end; its pace stays.
-Where it is open already the same address is printed. `tandem emulate` has no studio: look at the
-run on the other side of its wire. `tandem report` writes a log's page as a file.)";
+Where it is open already the same address is printed. An emulation opens its own when it starts:
+`tandem emulate … --studio`. `tandem report` writes a log's page as a file.)";
 
 /// "https://app.foxglove.dev", "http://localhost:8080"
 CLI::Validator is_origin() {
@@ -61,13 +61,9 @@ CLI::Option* add_origins(CLI::App& app, const char* flag, std::vector<std::strin
       ->check(is_origin());
 }
 
-}  // namespace
-
-void add_studio_flags(CLI::App& app, StudioOptions& o) {
-  static const std::string kHelp =
-      "Show the run in a browser; --studio=PORT (default: the first free one from 8642). A "
-      "simulated run keeps real time then, unless a rate is said";
-  CLI::Option* studio = app.add_flag("--studio", kHelp)
+/// Those that both have. @return --studio
+CLI::Option* add_studio_flags(CLI::App& app, StudioOptions& o, const std::string& help) {
+  CLI::Option* studio = app.add_flag("--studio", help)
                             ->check(is_port("--studio=9000"))
                             ->each([&o](const std::string& text) {
                               o.wanted = true;
@@ -79,7 +75,23 @@ void add_studio_flags(CLI::App& app, StudioOptions& o) {
   app.add_option("--studio-page", o.page, kPageHelp)
       ->needs(studio)
       ->check(is_given("name a folder"));
+  return studio;
+}
+
+}  // namespace
+
+void add_run_studio_flags(CLI::App& app, StudioOptions& o) {
+  CLI::Option* studio = add_studio_flags(
+      app, o,
+      "Show the run in a browser; --studio=PORT (default: the first free one from 8642). A "
+      "simulated run keeps real time then, unless a rate is said");
   add_origins(app, "--studio-origin", o.origins)->needs(studio);
+}
+
+void add_emulation_studio_flags(CLI::App& app, StudioOptions& o) {
+  (void)add_studio_flags(app, o,
+                         "Show the simulated robot and its boards in a browser; --studio=PORT "
+                         "(default: the first free one from 8642)");
 }
 
 void add_flags(CLI::App& app, StudioCommandOptions& o) {

@@ -7,6 +7,7 @@
 #include "apps/robot/kernel_build.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
+#include "apps/run/emulation_studio.hpp"
 #include "apps/run/inject.hpp"
 #include "apps/run/task_queue.hpp"
 #include "apps/text/console.hpp"
@@ -16,6 +17,7 @@
 #include "hal/sim/line_boards.hpp"
 #include "hal/sim/scenario.hpp"
 #include "robot/check.hpp"
+#include "robot/robot_files.hpp"
 #include "rt/stop_signal.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/experiment.hpp"
@@ -27,6 +29,7 @@ namespace {
 struct Subject {
   hal::RobotConfig robot;
   model::UrdfModel description;
+  robot::FileTexts files;  ///< what was read
   sim::SimRobotConfig sim;
   rt::ThreadConfig thread;
 };
@@ -42,6 +45,7 @@ std::expected<Subject, Diagnostics> read_subject(const EmulateOptions& options) 
     if (!robot) return std::unexpected(robot.error());
     subject.robot = std::move(robot->config);
     subject.description = std::move(robot->description);
+    subject.files = std::move(robot->files);
     if (!subject.robot.postures.empty()) subject.sim.posture = subject.robot.postures[0].name;
     subject.thread = {.policy = rt::SchedulingPolicy::kOther, .lock_memory = false};
   } else {
@@ -51,6 +55,7 @@ std::expected<Subject, Diagnostics> read_subject(const EmulateOptions& options) 
     subject.thread = experiment->thread;
     subject.robot = std::move(experiment->robot);
     subject.description = *experiment->description;
+    subject.files = std::move(experiment->files);
   }
   subject.sim.posture = options.posture.value_or(subject.sim.posture);
   subject.sim.seed = options.seed.value_or(subject.sim.seed);
@@ -73,14 +78,49 @@ struct Emulation {
   model::KernelLibrary kernels;
   std::unique_ptr<sim::EmulatedRobot> robot;
   std::unique_ptr<CanSockets> sockets;
+  std::vector<std::unique_ptr<hal::can::WireMeter>> meters;  ///< with a studio, those of CAN
   std::unique_ptr<sim::Emulator> emulator;
-  std::uint64_t injected = 0;  ///< faults that have begun
+  std::unique_ptr<EmulationStudio> studio;  ///< null: nobody looks
+  std::uint64_t injected = 0;               ///< faults that have begun
   bool lockstep = false;
 };
 
 Diagnostics in_file(Error error, const std::string& file) {
   if (error.file.empty()) error.file = file;
   return {std::move(error)};
+}
+
+/// With a studio each CAN bus' frames are timed.
+/// @return the boards' ends, by bus
+std::vector<hal::can::Bus*> ends_of(Emulation& e, std::vector<hal::can::WireMeter*>* wires) {
+  std::vector<hal::can::Bus*> ends(e.sockets->buses().begin(), e.sockets->buses().end());
+  if (wires == nullptr) return ends;
+  wires->resize(ends.size());
+  for (std::size_t b = 0; b < ends.size(); ++b) {
+    const hal::BusConfig& bus = e.subject.robot.buses[b];
+    if (bus.kind == hal::BusKind::kEthercat) continue;
+    const hal::can::BitRates rates{.nominal = bus.bitrate, .data = bus.data_bitrate};
+    ends[b] = (*wires)[b] =
+        e.meters.emplace_back(std::make_unique<hal::can::WireMeter>(*ends[b], rates)).get();
+  }
+  return ends;
+}
+
+Status open_studio(Emulation& e, const EmulateOptions& options,
+                   std::vector<hal::can::WireMeter*> wires) {
+  const hal::RobotConfig& robot = e.subject.robot;
+  auto studio = EmulationStudio::open(options.studio,
+                                      {.config = robot,
+                                       .urdf = robot::text_in(e.subject.files, robot.model.urdf),
+                                       .file = options.file,
+                                       .period_ns = e.subject.sim.period_ns,
+                                       .lockstep = e.lockstep,
+                                       .robot = *e.robot,
+                                       .wires = std::move(wires)});
+  if (!studio) return std::unexpected(studio.error());
+  e.studio = std::move(*studio);
+  e.emulator->watch(*e.studio);
+  return {};
 }
 
 std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
@@ -120,9 +160,16 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   auto sockets = CanSockets::open(robot, hal::can::SocketSide::kBoards, false, make_line);
   if (!sockets) return std::unexpected(sockets.error());
   e->sockets = std::move(*sockets);
+  const bool looks = options.studio.wanted;
+  std::vector<hal::can::WireMeter*> wires;
+  const std::vector<hal::can::Bus*> ends = ends_of(*e, looks ? &wires : nullptr);
   e->emulator = std::make_unique<sim::Emulator>(
-      *e->robot, e->sockets->buses(), *e->sockets,
+      *e->robot, ends, *e->sockets,
       sim::EmulatorConfig{e->subject.sim.period_ns, options.lockstep});
+  if (!looks) return e;
+  if (Status open = open_studio(*e, options, std::move(wires)); !open) {
+    return std::unexpected(Diagnostics{open.error()});
+  }
   return e;
 }
 
@@ -177,13 +224,14 @@ void tell_injected(Emulation& e, std::FILE* out, bool quiet) {
     const bool carried = fault.kind == hal::FaultKind::kPayload;
     const bool dropped = carried && fault.index < 0;
     if (!dropped) ++e.injected;
-    if (quiet) continue;
-    fmt::print(
-        out, "{:.3f} s: {}\n", static_cast<double>(e.emulator->time_ns()) * 1e-9,
+    const std::string what =
         carried
             ? fmt::format("payload {}: {}", dropped ? "dropped" : "picked up",
                           e.robot->payload_text(static_cast<std::uint32_t>(std::abs(fault.index))))
-            : fmt::format("injected {}{}", to_string(fault.kind), whose(fault, e.subject.robot)));
+            : fmt::format("injected {}{}", to_string(fault.kind), whose(fault, e.subject.robot));
+    if (e.studio != nullptr) e.studio->tell(what);
+    if (quiet) continue;
+    fmt::print(out, "{:.3f} s: {}\n", static_cast<double>(e.emulator->time_ns()) * 1e-9, what);
     std::fflush(out);
   }
 }
@@ -255,6 +303,11 @@ Exit emulate_command(const EmulateOptions& options) {
   rt::install_stop_signals();
   const rt::ThreadReport report = rt::set_up_thread(e.subject.thread);
   if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
+  // Whoever asks for it needs it: its token is nowhere else.
+  if (e.studio != nullptr) {
+    fmt::print(out, "studio: {}\n", e.studio->address());
+    std::fflush(out);
+  }
   if (!options.quiet) {
     fmt::print(out, "{}: {} and {} on {}, {}; Ctrl-C ends it\n", e.subject.robot.name,
                counted(e.subject.robot.boards.size(), "board"),
@@ -287,6 +340,9 @@ Exit emulate_command(const EmulateOptions& options) {
   const auto socket =
       serve(commands, {.path = options.socket, .kind = "emulate", .wanted = !options.no_socket});
   emulate(e, tasks, out, options.quiet);
+  if (e.studio != nullptr) {
+    e.studio->finish(e.robot->plant().diverged() ? e.robot->plant().diverged_text() : "");
+  }
   const Json summary = figures_json(&e);
   if (!options.quiet) print_summary(e, summary, out);
   return end_with_json(options.json, summary,

@@ -163,12 +163,13 @@ void FoxgloveRun::take(const studio::Tap::Cycle& cycle) {
   phase_ = cycle.phase;
   read_code_ = cycle.read_code;
   times_ = cycle.times;
-  copy(cycle.state, state_.bytes());
-  copy(cycle.command, command_.bytes());
-  has_truth_ = truth_ && !cycle.truth.empty();
-  has_estimate_ = estimate_ && !cycle.estimate.empty();
-  if (has_truth_) copy(cycle.truth, truth_->bytes());
-  if (has_estimate_) copy(cycle.estimate, estimate_->bytes());
+  using studio::Tap;
+  copy(cycle.parts[Tap::kState], state_.bytes());
+  copy(cycle.parts[Tap::kCommand], command_.bytes());
+  has_truth_ = truth_ && !cycle.parts[Tap::kTruth].empty();
+  has_estimate_ = estimate_ && !cycle.parts[Tap::kEstimate].empty();
+  if (has_truth_) copy(cycle.parts[Tap::kTruth], truth_->bytes());
+  if (has_estimate_) copy(cycle.parts[Tap::kEstimate], estimate_->bytes());
   has_cycle_ = true;
 }
 

@@ -143,8 +143,8 @@ Result<StudioRun::Parts> StudioRun::make(const StudioOptions& options) const {
                             .run = session,
                             .simulated = c.backend->pace() == hal::Pace::kSimulatedClock,
                             .period_ns = e.loop.period_ns},
-                           {.state = state,
-                            .command = command,
+                           {.state = &state,
+                            .command = &command,
                             .truth = runtime::truth_of(c),
                             .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image()});
   if (!studio) return std::unexpected(studio.error());

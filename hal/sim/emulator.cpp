@@ -97,8 +97,10 @@ Code Emulator::step(std::int64_t now_ns) noexcept {
     next_time_ns_ += config_.period_ns;
     ++statistics_.steps;
     watch_silence();
+    const bool synced = std::ranges::any_of(ports_, &Port::sync);
     for (Port& port : ports_) port.sync = false;  // it was for the first of them
     answer();
+    if (watcher_ != nullptr) watcher_->stepped(statistics_, synced);
   }
   return Code::kOk;
 }

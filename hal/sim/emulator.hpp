@@ -41,6 +41,17 @@ struct EmulatorStatistics {
   std::uint64_t frames_lost = 0;  ///< answers that a bus did not take
 };
 
+/// Looks on as the emulation steps.
+class StepWatcher {
+ public:
+  virtual ~StepWatcher() = default;
+  /// A step is over, and its answers are on the wire: none of them waits for this.
+  /// @param so_far  this step included
+  /// @param synced  SYNC came for it on a bus
+  /// @rt on the emulation's thread: no allocation, lock or system call
+  virtual void stepped(const EmulatorStatistics& so_far, bool synced) noexcept TANDEM_RT = 0;
+};
+
 /// In lockstep a step is made when SYNC has come on every bus; after its answers TIME goes out on
 /// every bus. Without a master time stands still.
 ///
@@ -58,6 +69,8 @@ class Emulator {
   /// Takes what has come, steps if it is time to, else waits, `patience_ns` at most.
   /// @return kOk: a step was made; kTimeout: none yet; kDiverged: none will be any more.
   [[nodiscard]] Code poll(std::int64_t patience_ns) noexcept;
+  /// Before the first step. @param watcher  outlives the steps
+  void watch(StepWatcher& watcher) noexcept { watcher_ = &watcher; }
 
   [[nodiscard]] const EmulatorStatistics& statistics() const noexcept { return statistics_; }
   /// Simulated time of the last step; the first step is at 0.
@@ -85,6 +98,7 @@ class Emulator {
   EmulatedRobot* robot_;
   std::vector<Port> ports_;
   hal::can::FrameWait* wait_;
+  StepWatcher* watcher_ = nullptr;
   EmulatorConfig config_;
   EmulatorStatistics statistics_;
   std::vector<canopen::Frame> batch_;

@@ -48,7 +48,7 @@ struct ShownRobot {
   static double position(std::uint64_t cycle, std::size_t joint) {
     return 0.01 * static_cast<double>(cycle) + static_cast<double>(joint);
   }
-  [[nodiscard]] Tap::Images images() const { return {state, command, &truth, nullptr}; }
+  [[nodiscard]] Tap::Images images() const { return {&state, &command, &truth}; }
   [[nodiscard]] log::RunInfo names() const {
     log::RunInfo info;
     info.joints = {"a", "b"};

@@ -81,10 +81,11 @@ TEST(StudioTap, HandsOverEveryImageAndSignalOfACycle) {
   const auto whole = [&](const Tap::Cycle& one) {
     EXPECT_EQ(one.time.cycle, cycle);
     double position = 0.0;
-    std::memcpy(&position, one.state.data() + 16, sizeof position);  // behind cycle and time
+    std::memcpy(&position, one.parts[Tap::kState].data() + 16,
+                sizeof position);  // behind cycle and time
     EXPECT_EQ(position, ShownRobot::position(cycle, 0));
-    EXPECT_EQ(one.truth.size(), robot.truth.bytes().size());
-    EXPECT_TRUE(one.estimate.empty());
+    EXPECT_EQ(one.parts[Tap::kTruth].size(), robot.truth.bytes().size());
+    EXPECT_TRUE(one.parts[Tap::kEstimate].empty());
     double number = 0.0;
     std::memcpy(&number, few_image.data() + 16, sizeof number);
     EXPECT_EQ(number, test::number_of(cycle, 0));
@@ -100,6 +101,27 @@ TEST(StudioTap, HandsOverEveryImageAndSignalOfACycle) {
   }
   EXPECT_EQ(cycle, 50U);
   EXPECT_EQ(tap.lost(), 0U);
+}
+
+TEST(StudioTap, TakesAStepOfAnEmulationWithoutHeapLockOrSystemCall) {
+  const ShownRobot robot;
+  hal::BoardsImage boards(2, 1);
+  const Tap::Images images{.truth = &robot.truth, .boards = &boards};
+  Tap tap(images, ShownRobot::kPeriod_ns);
+  {
+    const rt::ScopedRealtime in_step;
+    for (std::uint64_t step = 0; step < 3000; ++step) {
+      boards.current_A()[1] = 0.5 * static_cast<double>(step);
+      tap.take_step({step, static_cast<std::int64_t>(step), 1}, robot.truth, boards);
+    }
+  }
+  EXPECT_GT(tap.lost(), 0U) << "a full ring is a part of it";
+  Sampler sampler(tap, images, robot.names(), 200'000);
+  (void)sampler.look({});
+  ASSERT_EQ(sampler.table().sources().size(), 2U) << "neither state nor command";
+  const SignalId id = test::id_of(sampler.table(), "boards.current_a.b");
+  EXPECT_EQ(sampler.last()[id], static_cast<float>(0.5 * static_cast<double>(sampler.cycle())));
+  EXPECT_TRUE(sampler.take_events().empty()) << "it has no phases";
 }
 
 TEST(StudioTap, CountsWhatFindsNoRoom) {

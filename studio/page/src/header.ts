@@ -130,7 +130,8 @@ export class Header {
     } else if (this.state === 'live' && !this.data.lastTick) words = 'waiting for values';
     else if (this.state === 'live' && quiet > kSilent_ms) words = `silent for ${age(quiet)}`;
     else if (this.state === 'live') {
-      words = this.data.lastTick?.paused ? 'paused' : 'live';
+      const stands = this.data.hello?.emulated ? 'waits for SYNC' : 'paused';
+      words = this.data.lastTick?.paused ? stands : 'live';
       stale = false;
     }
     say(this.link, words);

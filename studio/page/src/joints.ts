@@ -102,8 +102,8 @@ export class Joints {
         { class: 'key muted' },
         h('span', { class: 'key-place' }),
         ' position  ',
-        h('span', { class: 'key-goal' }),
-        ' reference; the bar ends at the limits.',
+        h('span', { class: 'of-a-run' }, h('span', { class: 'key-goal' }), ' reference'),
+        '; the bar ends at the limits.',
       ),
       this.body,
     );
@@ -162,7 +162,9 @@ export class Joints {
   private row(joint: JointInfo): HTMLElement {
     const id = (name: string) => this.data.catalog.named(name)?.id ?? -1;
     const ids: Record<string, number> = { goal: id(`command.position_rad.${joint.name}`) };
-    for (const field of kFields) ids[field] = id(`state.${field}.${joint.name}`);
+    for (const field of kFields) {
+      ids[field] = this.data.catalog.ofJoint(field, joint.name)?.id ?? -1;
+    }
     const cell = (kind: string) => h('span', { class: `cell ${kind}` }, '–');
     const place = h('span', { class: 'mark place' });
     const goal = h('span', { class: 'mark reference' });

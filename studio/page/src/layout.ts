@@ -89,6 +89,18 @@ export const kPresets: Record<string, (hello: Hello, catalog: Catalog) => Layout
     return existing(catalog, [
       of(['state.position_rad', 'command.position_rad'], joints.slice(0, 2)),
       of(['state.torque_Nm'], joints),
+      // Of an emulation: what is so there, and what its wire carries.
+      ...(hello.emulated
+        ? [
+            of(['truth.position_rad'], joints),
+            of(['truth.torque_Nm'], joints),
+            // Of EtherCAT it is not known.
+            (hello.emulated === 'can' ? catalog.idsOf('boards', 'wire_load') : []).map((id) =>
+              signal(catalog.withId(id)?.name ?? ''),
+            ),
+            of(['boards.mode', 'boards.drive_state'], joints.slice(0, 1)),
+          ]
+        : []),
       controllers.slice(0, 3).map((one) => signal(one.name)),
       of(['state.mode', 'state.drive_state'], joints.slice(0, 1)),
     ]);
@@ -99,7 +111,9 @@ export const kPresets: Record<string, (hello: Hello, catalog: Catalog) => Layout
     const chosen = legs.length > 0 ? legs : limbs.slice(0, 2);
     return existing(
       catalog,
-      chosen.map((limb) => limb.joints.map((joint) => signal(`state.torque_Nm.${joint}`))),
+      chosen.map((limb) =>
+        limb.joints.map((joint) => signal(catalog.ofJoint('torque_Nm', joint)?.name ?? '')),
+      ),
     );
   },
 };

@@ -7,6 +7,7 @@ import './joints.css';
 import './scene.css';
 import './scope.css';
 import './report.css';
+import './emulation.css';
 import './narrow.css';
 import { Actions } from './actions';
 import { ClockPanel } from './clock';
@@ -14,6 +15,7 @@ import { ControlLease } from './control';
 import { Controllers } from './controllers';
 import { Data } from './data';
 import { h, say } from './dom';
+import { EmulationPanel, kEmulationTabs } from './emulation';
 import { Events } from './events';
 import { Header } from './header';
 import { Inputs } from './inputs';
@@ -107,6 +109,11 @@ function start(): void {
       scope.themeChanged();
     }),
   );
+  const emulation = new EmulationPanel(data);
+  // Nothing is asked before it is known whether there is somebody to ask.
+  const watch = (tab: string) => {
+    if (data.hello && !data.hello.emulated) source.watch([...kAlways, ...(kWatched[tab] ?? [])]);
+  };
   const tabs = new Tabs(
     [
       { name: 'plots', label: 'Plots', content: plots.element },
@@ -122,7 +129,7 @@ function start(): void {
       { name: 'events', label: 'Events', content: new Events(data).element },
     ],
     (name) => {
-      source.watch([...kAlways, ...(kWatched[name] ?? [])]);
+      watch(name);
       joints.want(name === 'joints');
     },
   );
@@ -131,6 +138,9 @@ function start(): void {
     trouble: (message, hint) => actions.tell('', `${message}${hint ? ` – ${hint}` : ''}`, true),
   });
   data.whenHello((hello) => {
+    if (hello.emulated) actions.tell('', 'Faults are injected by command: tandem inject');
+    tabs.keep(hello.emulated ? kEmulationTabs : Object.keys(kWatched));
+    watch(tabs.active);
     const words = misfit(hello, PAGE_VERSION);
     if (words) actions.tell('', words, true);
   });
@@ -139,7 +149,13 @@ function start(): void {
     h(
       'main',
       { class: 'main' },
-      h('div', { class: 'side' }, scene.element, new ClockPanel(data, actions, lease).element),
+      h(
+        'div',
+        { class: 'side' },
+        scene.element,
+        new ClockPanel(data, actions, lease).element,
+        emulation.element,
+      ),
       tabs.element,
     ),
     actions.bar,
@@ -154,6 +170,7 @@ function start(): void {
   const frame = (now: number) => {
     if (fresh) {
       header.update();
+      emulation.update();
       if (tabs.active === 'joints') joints.update();
       fresh = false;
     }

@@ -94,7 +94,7 @@ export class Prediction implements Layer {
 
   wire(data: Data): number[] {
     this.data = data;
-    this.controls.hidden = !data.source.live;
+    this.controls.hidden = !data.source.live || !!data.hello?.emulated;
     return [];
   }
 

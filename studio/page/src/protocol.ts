@@ -33,6 +33,8 @@ export interface Hello {
   experiment: string;
   title: string;
   simulated: boolean;
+  /** Of an emulation, boards and a plant without a cycle: the --hal of the run that leads it. */
+  emulated?: string | null;
   floating: boolean;
   ground: { height_m: number } | null;
   period_s: number;

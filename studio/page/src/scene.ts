@@ -215,7 +215,7 @@ export class Scene {
     this.ids = {
       joints: [...joints, ...passive],
       position: [
-        ...named('state', 'position_rad', joints),
+        ...joints.map((name) => catalog.ofJoint('position_rad', name)?.id ?? -1),
         ...passive.map((_, i) => passiveIds[i] ?? -1),
       ],
       reference: named('command', 'position_rad', joints),
@@ -378,7 +378,7 @@ export class Scene {
           this.dirty = true;
         },
       });
-      return h('label', { class: 'toggle', title }, box, label);
+      return h('label', { class: `toggle of-${key}`, title }, box, label);
     };
     const view = (name: string) =>
       h('button', { type: 'button', onclick: () => this.choose(name) }, name);

@@ -59,6 +59,14 @@ export class Catalog {
   named(name: string): Signal | undefined {
     return this.byName.get(name) ?? this.byLower.get(name.toLowerCase());
   }
+  /** A joint's signal: as a run has it, else as the boards and the plant of an emulation do. */
+  ofJoint(field: string, joint: string): Signal | undefined {
+    for (const source of ['state', 'boards', 'truth']) {
+      const found = this.named(`${source}.${field}.${joint}`);
+      if (found) return found;
+    }
+    return undefined;
+  }
   withId(id: number): Signal | undefined {
     return this.byId.get(id);
   }

@@ -66,9 +66,18 @@ export class Tabs {
     this.changed(name);
   }
 
+  /** Those that there are; the others are not shown. */
+  keep(names: string[]): void {
+    this.tabs.forEach((tab, i) => {
+      this.buttons[i].hidden = !names.includes(tab.name);
+    });
+    if (!names.includes(this.active)) this.open(names[0]);
+  }
+
   private key(event: KeyboardEvent): void {
-    const { length } = this.tabs;
-    const at = this.tabs.findIndex((tab) => tab.name === this.active);
+    const shown = this.buttons.filter((button) => !button.hidden);
+    const { length } = shown;
+    const at = shown.findIndex((button) => button.id === `tab-${this.active}`);
     const places: Record<string, number> = {
       ArrowRight: (at + 1) % length,
       ArrowLeft: (at + length - 1) % length,
@@ -78,7 +87,7 @@ export class Tabs {
     const next = places[event.key];
     if (next === undefined) return;
     event.preventDefault();
-    this.open(this.tabs[next].name);
-    this.buttons[next].focus();
+    shown[next].click();
+    shown[next].focus();
   }
 }
