@@ -28,6 +28,7 @@ void HandOver::take() noexcept TANDEM_RT {
   if (!ends(now_.run.phase())) statistics_.take_base(now_.truth);
   now_.log.images(now_.time, now_.state, told, now_.truth, now_.estimate());
   show_controllers();
+  if (muted_) return;
   show_progress();
   show_joints(told);
   show_sensors();
@@ -54,7 +55,7 @@ void HandOver::show_controllers() noexcept TANDEM_RT {
       if (io.signals.numbers() > 0) {
         io.signals.publish(now_.time.cycle, now_.time.time_ns);
         now_.log.signals(now_.time, *loaded[slot]);
-        if (now_.observer != nullptr) now_.observer->take_signals(now_.time, io.signals);
+        if (now_.observer != nullptr && !muted_) now_.observer->take_signals(now_.time, io.signals);
       }
     }
     if (views && io.marks.show_to_viewers(now_.time.time_ns, (active & only(slot)) != 0))
@@ -66,7 +67,7 @@ void HandOver::show_controllers() noexcept TANDEM_RT {
       event.time_ns = now_.time.time_ns;
       event.set_controller(loaded[slot]->name);
       now_.log.text(event);
-      services_.show(event);
+      if (!muted_) services_.show(event);
     }
   }
 }

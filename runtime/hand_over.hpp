@@ -20,6 +20,8 @@ class HandOver {
 
   /// To RunServices, how things are.
   void show() noexcept TANDEM_RT;
+  /// While on, cycles are for the statistics alone. Between two cycles.
+  void mute(bool on) noexcept { muted_ = on; }
   /// Each cycle, when its command is out.
   void take() noexcept TANDEM_RT;
   /// The last cycle once more, to one who came later; for any thread while the loop stands.
@@ -30,7 +32,7 @@ class HandOver {
   [[nodiscard]] const RunStatistics& statistics() const noexcept { return statistics_; }
   /// After the controllers, whose gains it shows once they are read.
   void archive(Archive& ar) {
-    ar(statistics_);
+    ar(statistics_, noted_);
     if (ar.reading()) show_gains();
   }
 
@@ -51,6 +53,7 @@ class HandOver {
   std::vector<SensorStatus> sensors_;
   std::uint64_t shown_gains_ = 0;  // their revision
   std::uint64_t noted_ = 0;        // causes of faults, a bit each, since the cycle before
+  bool muted_ = false;
 };
 
 }  // namespace tandem::runtime
