@@ -13,6 +13,7 @@
 #include "hal/fault_kind.hpp"
 #include "hal/homing.hpp"
 #include "hal/image.hpp"
+#include "hal/outside.hpp"
 #include "hal/stop_category.hpp"
 
 namespace tandem {
@@ -120,6 +121,9 @@ class Backend {
   /// The next fault that was injected and has begun since, for the log; kNone: no more. A robot
   /// that is not in this process reports nothing.
   [[nodiscard]] virtual InjectedFault next_injected() noexcept TANDEM_RT { return {}; }
+
+  /// Who takes something of other threads does so by this from now on; it outlives the cycles.
+  virtual void heed(Outside& /*outside*/) noexcept {}
 
   /// Writes or reads everything that the next read() depends on. Simulation only: a backend
   /// whose robot cannot be rewound answers false.

@@ -38,6 +38,7 @@ struct CycleView {
   const TruthImage* truth;  ///< null without a simulation
   const EstimateImage* estimate;  ///< null where nothing is estimated
   CycleTimes times;
+  std::uint64_t faults = 0;  ///< causes that were noted since the cycle before, a bit each
 };
 
 class CycleObserver {

@@ -60,6 +60,7 @@ class ForwardingBackend : public Backend {
   [[nodiscard]] InjectedFault next_injected() noexcept TANDEM_RT override {
     return to_->next_injected();
   }
+  void heed(Outside& outside) noexcept override { to_->heed(outside); }
   [[nodiscard]] bool archive(Archive& ar) override { return to_->archive(ar); }
 
  protected:

@@ -3,6 +3,7 @@
 // Layer: hal.  Thread: as the images.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -26,5 +27,15 @@ class TruthImage : public Image {
   [[nodiscard]] std::size_t passive() const noexcept { return passive_position_rad_.count; }
   [[nodiscard]] std::size_t loops() const noexcept { return loop_position_error_m_.count; }
 };
+
+/// The angle between the z axis of a frame with orientation `quaternion` (x y z w) and W's [rad].
+[[nodiscard]] inline double tilt_of(std::span<const double> quaternion) noexcept {
+  // The frame's z axis in W is the rotation matrix's last column.
+  const double x = quaternion[0], y = quaternion[1], z = quaternion[2], w = quaternion[3];
+  const double zx = 2.0 * (x * z + w * y);
+  const double zy = 2.0 * (y * z - w * x);
+  const double zz = 1.0 - 2.0 * (x * x + y * y);
+  return std::atan2(std::hypot(zx, zy), zz);
+}
 
 }  // namespace tandem::hal

@@ -62,6 +62,8 @@ class PredictionService final : public hal::Predictor, public runtime::SnapshotP
   /// @param parallel  the internal model; null: the run's own robot, which is a simulation
   /// @param fork      makes the copy when it is first needed. All outlive close().
   void attach(runtime::RobotCycle& cycle, ParallelRobot* parallel, MakeFork fork);
+  /// Whether a controller asks for predictions, which no snapshot has.
+  [[nodiscard]] bool is_prepared() const noexcept { return prepared_ns_ > 0; }
   /// The run is over: whoever waits gets an error, and the thread ends.
   void close();
 

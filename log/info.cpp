@@ -1,6 +1,8 @@
 // RunInfo to the metadata record `tandem` and back, lists as lines.
 #include "log/info.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <utility>
@@ -59,6 +61,11 @@ StringMap to_map(const RunInfo& info) {
     if (!value->empty()) map.emplace_back(key, *value);
   }
   if (info.part > 0) map.emplace_back("part", std::to_string(info.part));
+  if (!info.branch.of.empty()) {
+    map.emplace_back("branch_of", info.branch.of);
+    map.emplace_back("branch_cycle", std::to_string(info.branch.cycle));
+    map.emplace_back("branch_snapshot", fmt::format("{:016x}", info.branch.snapshot));
+  }
   if (!info.reduced.empty()) map.emplace_back("reduced", info.reduced);
   if (info.operators_view) map.emplace_back("state", kOperatorsView);
   if (!info.engine.empty()) map.emplace_back("engine", info.engine);
@@ -79,6 +86,9 @@ RunInfo info_from(const StringMap& map) {
         {line.substr(0, space), std::min<std::uint64_t>(channels, bounds::kLogNames.most)});
   }
   info.part = std::strtoull(value_of(map, "part").c_str(), nullptr, 10);
+  info.branch = {.of = value_of(map, "branch_of"),
+                 .cycle = std::strtoull(value_of(map, "branch_cycle").c_str(), nullptr, 10),
+                 .snapshot = std::strtoull(value_of(map, "branch_snapshot").c_str(), nullptr, 16)};
   info.reduced = value_of(map, "reduced");
   info.seed = std::strtoull(value_of(map, "seed").c_str(), nullptr, 10);
   info.period_ns = std::strtoll(value_of(map, "period_ns").c_str(), nullptr, 10);

@@ -16,6 +16,13 @@ struct SensorInfo {
   std::size_t channels = 0;
 };
 
+/// Where a simulated run went back in time, and on from there: the log of before stays as it is.
+struct Branch {
+  std::string of{};            ///< file of the log whose cycles it goes on from; empty: no branch
+  std::uint64_t cycle = 0;     ///< its first one; those before are in the other log
+  std::uint64_t snapshot = 0;  ///< hash of the state that this cycle followed from
+};
+
 /// The metadata record "tandem", and "configuration" with the files' texts. Outside the data
 /// hash: equal runs on different machines may differ in it.
 struct RunInfo {
@@ -31,6 +38,7 @@ struct RunInfo {
   /// "to 100 Hz, of squat-001.mcap …": a copy for viewers, which lacks most samples
   /// (log/reduced.hpp); empty: it is none.
   std::string reduced{};
+  Branch branch{};
   std::uint64_t seed = 0;
   std::int64_t period_ns = 0;
   /// The state is what a tele-operator saw, predicted or late; false: what was measured.

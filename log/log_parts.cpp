@@ -23,6 +23,22 @@ std::string part_path(const std::string& name, std::uint64_t number) {
   return stem_of(name) + "." + std::to_string(number) + std::string(kEnding);
 }
 
+std::string branch_path(const std::string& name, std::uint64_t number) {
+  return stem_of(name) + ".branch-" + std::to_string(number) + std::string(kEnding);
+}
+
+std::pair<std::string, std::uint64_t> branch_of(const std::string& file) {
+  constexpr std::string_view kBranch = ".branch-";
+  const std::string stem = stem_of(file);
+  const std::size_t at = stem.rfind(kBranch);
+  std::uint64_t number = 0;
+  if (at == std::string::npos || at == 0 || stem.size() == file.size()) return {file, 1};
+  const char* const end = stem.data() + stem.size();
+  const auto read = std::from_chars(stem.data() + at + kBranch.size(), end, number);
+  if (read.ec != std::errc() || read.ptr != end || number < 2) return {file, 1};
+  return {stem.substr(0, at) + std::string(kEnding), number};
+}
+
 std::optional<PartName> part_of(const std::string& path) {
   if (!path.ends_with(kEnding)) return std::nullopt;
   const std::string stem = stem_of(path);

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "log/damage.hpp"
@@ -16,6 +17,12 @@ namespace tandem::log {
 /// "runs/arm-001.2.mcap" is the second.
 /// @param name  of all of them
 [[nodiscard]] std::string part_path(const std::string& name, std::uint64_t number);
+
+/// Of a run that went back in time `number` - 1 times: "runs/arm-001.branch-2.mcap".
+[[nodiscard]] std::string branch_path(const std::string& name, std::uint64_t number);
+/// The name of the first one and the number, of "arm-001.branch-2.mcap"; of another file its own
+/// and 1.
+[[nodiscard]] std::pair<std::string, std::uint64_t> branch_of(const std::string& file);
 
 /// The part that a path names, and all of them: "a.2.mcap" is part 2 of "a.mcap". Part 1 alone is
 /// "a.1.mcap", a name that no file has. Empty: the path has no number.

@@ -18,7 +18,8 @@ namespace tandem::log {
 namespace {
 
 // Numbers of channels as they are pushed; what they are in a file, each file says.
-constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kTextChannel = 0xFFFF;
+constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kBranchChannel = 0xFFFE,
+                            kTextChannel = 0xFFFF;
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
 /// @param more  what was pushed behind the event
@@ -65,6 +66,7 @@ Result<std::unique_ptr<Recorder>> Recorder::open(Descriptor file, const std::str
 
 Recorder::Recorder(const std::string& path, const RunInfo& info, const RecorderOptions& options)
     : path_(path),
+      name_(path),
       info_(info),
       options_(options),
       names_{.joints = info.joints, .boards = info.boards, .buses = info.buses},
@@ -201,6 +203,13 @@ bool Recorder::push(const Event& event, const hal::LimitMet& met) noexcept TANDE
   return push(kEventChannel, event.time_ns, std::as_bytes(std::span(&both, 1)));
 }
 
+void Recorder::branch(const Branch& from) noexcept {
+  wait_for_space(1);
+  const std::uint64_t numbers[]{from.cycle, from.snapshot};
+  const auto begin_ns = static_cast<std::int64_t>(from.cycle) * info_.period_ns;
+  (void)push(kBranchChannel, begin_ns, std::as_bytes(std::span(numbers)));
+}
+
 void Recorder::wait_for_space(std::size_t messages) const noexcept { wait_for(*ring_, messages); }
 
 void Recorder::wait_for(const SpscRing& ring, std::size_t messages) noexcept {
@@ -219,8 +228,16 @@ void Recorder::run() {
       std::memcpy(&head, slot.data(), sizeof head);
       if (full_ && head.time_ns > time_ns_) next_part();  // cycles stay whole
       time_ns_ = head.time_ns;
-      write_side(head.time_ns - side_lag_ns_);
-      write(slot);
+      if (head.channel == kBranchChannel) {
+        Branch from;
+        std::memcpy(&from.cycle, slot.data() + sizeof head, sizeof from.cycle);
+        std::memcpy(&from.snapshot, slot.data() + sizeof head + sizeof from.cycle,
+                    sizeof from.snapshot);
+        next_branch(std::move(from));
+      } else {
+        write_side(head.time_ns - side_lag_ns_);
+        write(slot);
+      }
       ring_->pop();
     }
     if (last) return write_side(std::numeric_limits<std::int64_t>::max());
@@ -336,22 +353,46 @@ bool Recorder::remove_oldest() {
 }
 
 void Recorder::next_part() {
-  full_ = false;
-  const std::string path = part_path(path_, part_ + 1);
-  Status status = end_part({{"continued", std::filesystem::path(path).filename().string()}});
+  const std::string path = part_path(name_, part_ + 1);
+  const Status status = end_part({{"continued", std::filesystem::path(path).filename().string()}});
   if (!status) return give_up(writer_->error());
+  ++part_;
+  if (const Status begun = begin_file(path); !begun) give_up(begun.error().message);
+}
+
+/// What was written so far stays as it is: its "result" says where it was left.
+void Recorder::next_branch(Branch from) {
+  if (failed_.load(std::memory_order_relaxed)) return;
+  std::error_code ignored;
+  ++branch_;
+  while (std::filesystem::exists(branch_path(path_, branch_number_), ignored)) ++branch_number_;
+  const std::string path = branch_path(path_, branch_number_);
+  from.of = std::filesystem::path(name_).filename().string();
+  const Status status = end_part({{"left_at_cycle", std::to_string(from.cycle)},
+                                  {"left_for", std::filesystem::path(path).filename().string()}});
+  if (!status) return give_up(writer_->error());
+  name_ = path;
+  info_.branch = std::move(from);
+  part_ = 1;
+  whole_hash_ = {};
+  if (const Status begun = begin_file(path); !begun) give_up(begun.error().message);
+}
+
+/// A new file, with what stands before its messages.
+Status Recorder::begin_file(const std::string& path) {
+  full_ = false;
   writer_ = std::make_unique<McapWriter>();
   hash_ = {};
   Result<Descriptor> file = open_new(path, 0644);
-  if (!file) return give_up("cannot make " + path + ": " + file.error().message);
-  ++part_;
-  status = writer_->open(std::move(*file), path, options_.writer);
+  if (!file) return fail("cannot make " + path + ": " + file.error().message, file.error().hint);
+  Status status = writer_->open(std::move(*file), path, options_.writer);
   if (status) status = begin();
-  if (!status) return give_up(status.error().message);
+  if (!status) return status;
   for (Topic& topic : topics_) declare(topic);
   view_.add_channels(*writer_);
   late_ids_.clear();
   declare_late();
+  return {};
 }
 
 /// Adds the record "result" to the present part, and ends it.
@@ -367,7 +408,7 @@ Status Recorder::end_part(const StringMap& extra) {
   Status closed = writer_->close();
   ended_messages_ += writer_->messages() - writer_->lost();
   lost_ += writer_->lost();
-  ended_.push_back({part_path(path_, part_), writer_->bytes_written()});
+  ended_.push_back({part_path(name_, part_), writer_->bytes_written()});
   ended_bytes_ += ended_.back().bytes;
   return closed;
 }
@@ -386,7 +427,8 @@ RecordingResult Recorder::close(const StringMap& extra) {
     if (!closed) result.error = closed.error().message;
   }
   if (failed() && result.error.empty()) result.error = "the log is incomplete: " + trouble_;
-  result.path = path_;
+  result.path = name_;
+  result.branches = branch_;
   result.parts = part_;
   result.removed = removed_;
   result.messages = ended_messages_;

@@ -51,7 +51,8 @@ struct RecorderOptions {
 
 /// What a closed recording amounts to.
 struct RecordingResult {
-  std::string path;            ///< LogFile::open() reads all of its files by it
+  std::string path;            ///< of the last branch; LogFile::open() reads all its files by it
+  std::uint64_t branches = 1;  ///< how many there are, that of the beginning included
   std::uint64_t parts = 1;     ///< files that it wrote
   std::uint64_t removed = 0;   ///< of them, to keep to the limits
   std::uint64_t messages = 0;  ///< written, those of removed files as well
@@ -130,6 +131,10 @@ class Recorder {
   /// An event about a command: its text has field, value and limit.
   bool push(const Event& event, const hal::LimitMet& met) noexcept TANDEM_RT;
 
+  /// From now on messages go to another file, NAME.branch-2.mcap and so on, whose times begin where
+  /// `from` says; `from.of` is found here. Blocks for room, as wait_for_space(); not RT.
+  void branch(const Branch& from) noexcept;
+
   /// The same from that other thread.
   bool push_side(Channel channel, std::int64_t time_ns, std::span<const std::byte> image) noexcept;
   /// Blocks that other thread until its `messages` fit.
@@ -146,6 +151,7 @@ class Recorder {
   [[nodiscard]] bool failed() const noexcept { return failed_.load(std::memory_order_acquire); }
   /// Why. @pre failed()
   [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
+  /// Of the first branch.
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
 
   /// Writes what is in the ring, adds the metadata record "result" (with `extra` entries), ends
@@ -181,13 +187,18 @@ class Recorder {
   void write_text(const hal::TextEvent& event);
   void write(Channel id, std::int64_t time_ns, std::span<const std::byte> body);
   void next_part();
+  void next_branch(Branch from);
+  [[nodiscard]] Status begin_file(const std::string& path);
   [[nodiscard]] Status end_part(const StringMap& extra);
   void look_at_disk();
   [[nodiscard]] bool remove_oldest();
   void give_up(std::string why);
   void stop_thread();
 
-  std::string path_;
+  const std::string path_;           // of the first file
+  std::string name_;                 // of the present branch: path_ of the first; the writer's
+  std::uint64_t branch_ = 1;         // which one it is
+  std::uint64_t branch_number_ = 2;  // in the next one's name
   RunInfo info_;
   RecorderOptions options_;
   EventNames names_;

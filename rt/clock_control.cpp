@@ -86,6 +86,16 @@ Status ClockControl::set_rate(double rate) {
   return {};
 }
 
+Status ClockControl::call() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (Status possible = check(); !possible) return possible;
+    called_ = true;
+  }
+  bell_->ring();
+  return {};
+}
+
 ClockState ClockControl::state() const {
   const std::lock_guard lock(mutex_);
   return state_;
@@ -115,10 +125,11 @@ ClockControl::Pace ClockControl::attend(Clock& clock, std::uint64_t cycle, bool 
       state_.rate = 0.0;
       stands_.notify_all();
     }
-    if (!state_.paused || state_.pending_steps > 0) break;
+    if (called_ || !state_.paused || state_.pending_steps > 0) break;
     stood = true;
     stand(lock, cycle);
   }
+  const bool called = std::exchange(called_, false);
   state_.standing = false;
   state_.next_cycle = cycle;
   if (restart || stood || state_.rate != rate_) {
@@ -127,7 +138,7 @@ ClockControl::Pace ClockControl::attend(Clock& clock, std::uint64_t cycle, bool 
   }
   rate_ = state_.rate;
   gated_ = state_.paused;
-  return {.rate = rate_, .stood = stood};
+  return {.rate = rate_, .stood = stood || called, .called = called};
 }
 
 /// Lets go of the lock meanwhile.

@@ -62,6 +62,9 @@ class ClockControl {
   /// Blocks until the loop stands, or time is not paused any more, for at most so long.
   /// @return whether it stands.
   [[nodiscard]] bool await_standing(std::int64_t at_most_ns) const;
+  /// Calls the loop away: the next wait() begins no cycle, whether time stands or goes on, and
+  /// says so. Of several calls one counts. Errors: those of every command.
+  [[nodiscard]] Status call();
   /// Calls `look` while the loop stands, and keeps it standing meanwhile: what the loop writes may
   /// be read. `look` is short, and asks nothing of this. @return whether it stood
   bool while_standing(const std::function<void()>& look) const;
@@ -71,7 +74,8 @@ class ClockControl {
   /// How time goes on after attend().
   struct Pace {
     double rate;
-    bool stood;  ///< the loop has been kept
+    bool stood;   ///< the loop has been kept
+    bool called;  ///< away, before the next cycle
   };
   /// Whether attend() has anything to do. @rt one relaxed load.
   [[nodiscard]] bool changed() const noexcept TANDEM_RT { return gated_ || bell_->peek() != seen_; }
@@ -99,6 +103,7 @@ class ClockControl {
   mutable std::mutex mutex_;
   mutable std::condition_variable stands_;
   ClockState state_;
+  bool called_ = false;
 };
 
 }  // namespace tandem::rt

@@ -45,16 +45,19 @@ CyclicLoop::CyclicLoop(const CyclicLoopConfig& config, Clock& clock, ClockContro
 
 Tick CyclicLoop::wait() noexcept {
   Tick tick;
-  if (control_ == nullptr) {
+  if (replays_) {
+    begin_ns_ = clock_->now_ns();
+  } else if (control_ == nullptr) {
     pace(tick);
   } else {
     do {
-      obey();
+      if (!obey()) return {.called = true};
     } while (!pace(tick) || !control_->begin());
   }
   tick.cycle = next_cycle_++;
   tick.time_ns = static_cast<std::int64_t>(tick.cycle) * config_.period_ns;
   tick.begin_ns = begin_ns_;
+  if (replays_) return tick;
   if (paced()) {
     if (started_) {
       tick.wakeup_ns = begin_ns_ - grid_ns_;
@@ -67,13 +70,14 @@ Tick CyclicLoop::wait() noexcept {
   return tick;
 }
 
-/// What was asked of simulated time; blocks while it is paused.
-void CyclicLoop::obey() noexcept {
+/// What was asked of simulated time; blocks while it is paused. False: the loop is called away.
+bool CyclicLoop::obey() noexcept {
   const bool hurries = paced() && stop_requested();
-  if (started_ && !hurries && !control_->changed()) return;
+  if (started_ && !hurries && !control_->changed()) return true;
   const ClockControl::Pace pace = control_->attend(*clock_, next_cycle_, !started_);
   if (pace.stood) started_ = false;
   set_step(scaled(config_.period_ns, pace.rate));
+  return !pace.called;
 }
 
 /// The next grid point follows from the last. Where it has passed already, the grid restarts: lost
@@ -140,6 +144,7 @@ std::int64_t CyclicLoop::exchanged() noexcept TANDEM_RT {
 
 std::int64_t CyclicLoop::finish() noexcept TANDEM_RT {
   const std::int64_t now_ns = clock_->now_ns();
+  if (replays_) return now_ns;
   last_work_ns_ = now_ns - begin_ns_;
   statistics_.work.record(last_work_ns_);
   return now_ns;

@@ -51,6 +51,7 @@ struct Tick {
   bool late = false;            ///< the cycle before overran into this one's grid point
   bool hold = false;            ///< the policy wants the last command repeated
   bool stop = false;            ///< the policy wants the robot stopped
+  bool called = false;          ///< no cycle: somebody wants the loop between two (ClockControl)
 };
 
 /// Counts and histograms of one run.
@@ -98,6 +99,10 @@ class CyclicLoop {
   /// hundredth of the period a call; without effect where no clock paces the loop.
   void shift(std::int64_t ns) noexcept TANDEM_RT;
 
+  /// While on, what has been is played again: cycles follow each other at once, nobody is asked
+  /// whether they may, and none is counted or measured. Between two cycles.
+  void replay(bool on) noexcept { replays_ = on; }
+
   /// The overruns so far count no more towards OverrunPolicy::kStop.
   void forget_late() noexcept TANDEM_RT { late_mask_ = 0; }
   /// The cycle counter, which is all that simulated time is. The grid restarts at the next
@@ -106,7 +111,7 @@ class CyclicLoop {
 
  private:
   [[nodiscard]] bool paced() const noexcept { return step_ns_ > 0; }
-  void obey() noexcept;
+  bool obey() noexcept;
   void set_step(std::int64_t step_ns) noexcept;
   bool pace(Tick& tick) noexcept;
   void judge(Tick& tick, std::uint64_t missed) noexcept TANDEM_RT;
@@ -117,6 +122,7 @@ class CyclicLoop {
   std::int64_t step_ns_ = 0;  // between grid points on the clock; 0: not paced
   std::int64_t grid_ns_ = 0;  // clock time of the next grid point
   bool started_ = false;
+  bool replays_ = false;
   std::uint64_t next_cycle_ = 0;
   std::int64_t begin_ns_ = 0;  // clock time at which the current cycle's work began
   std::int64_t last_bus_ns_ = -1, last_work_ns_ = 0;

@@ -346,7 +346,7 @@ void ControllerHost::take_inputs(const hal::CycleTime& time, bool open,
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (!is_active(slot)) continue;
     for (const auto& port : table_[slot]->inputs) {
-      if (port->take(time, open)) log.input(time, *port);
+      if (port->take(time, open, *outside_)) log.input(time, *port);
     }
   }
 }
@@ -406,7 +406,7 @@ void ControllerHost::call_starts(ControllerSet start, const hal::CycleTime& time
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((start & only(slot)) == 0) continue;
     HostedController& one = *table_[slot];
-    for (const auto& port : one.inputs) port->begin(time, inputs_wait);
+    for (const auto& port : one.inputs) port->begin(time, inputs_wait, *outside_);
     guard_.remember(images.command, gains_);
     InCall(*this, one, ControllerFunction::kStart)->start(time, shown, images.command);
     take_back(one, images.command);

@@ -121,6 +121,8 @@ class ControllerHost {
   void predict_by(hal::Predictor* predictor) { predictor_ = predictor; }
   /// Each call of the cycle is timed by it from now on; without a clock none is.
   void time_by(rt::Clock& clock) { clock_ = &clock; }
+  /// Inputs take samples of other threads by it from now on; it outlives the cycles.
+  void heed(hal::Outside& outside) noexcept { outside_ = &outside; }
   /// Who is told of each call of the cycle; null: nobody.
   void watch_calls(CallWatch* watch) { watch_ = watch; }
   /// The document of the parameters of those who are added from now on.
@@ -332,6 +334,8 @@ class ControllerHost {
   std::atomic<std::int32_t> at_work_{-1};
   std::atomic<std::uint64_t> parameter_changes_{0};
   rt::Clock* clock_ = nullptr;
+  hal::Outside own_outside_;
+  hal::Outside* outside_ = &own_outside_;
   CallWatch* watch_ = nullptr;
   std::array<ControllerCall, kMostControllers> calls_{};  // of this cycle; more are not kept
   std::size_t called_ = 0;

@@ -118,27 +118,27 @@ void CycleLog::open(HostedController& controller) {
 
 void CycleLog::signals(const hal::CycleTime& time,
                        const HostedController& controller) noexcept TANDEM_RT {
-  if (recorder_ == nullptr || controller.signal_channel < 0) return;
+  if (silent() || controller.signal_channel < 0) return;
   recorder_->push(static_cast<log::Recorder::Channel>(controller.signal_channel), time.time_ns,
                   controller.io->signals.image());
 }
 
 void CycleLog::marks(const hal::CycleTime& time,
                      const HostedController& controller) noexcept TANDEM_RT {
-  if (recorder_ == nullptr || controller.mark_channel < 0) return;
+  if (silent() || controller.mark_channel < 0) return;
   recorder_->push(static_cast<log::Recorder::Channel>(controller.mark_channel), time.time_ns,
                   controller.io->marks.bytes());
 }
 
 void CycleLog::input(const hal::CycleTime& time, InputPort& port) noexcept TANDEM_RT {
-  if (recorder_ == nullptr || port.channel < 0) return;
+  if (silent() || port.channel < 0) return;
   recorder_->push(static_cast<log::Recorder::Channel>(port.channel), time.time_ns, port.message());
 }
 
 void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint,
                      std::uint32_t code, float value, bool reported, std::int32_t controller,
                      const hal::LimitMet& met) noexcept TANDEM_RT {
-  if (recorder_ == nullptr) return;
+  if (silent()) return;
   const log::Event event{.cycle = time.cycle,
                          .time_ns = time.time_ns,
                          .code = code,
@@ -156,7 +156,7 @@ void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::int32
 
 void CycleLog::event(const hal::CycleTime& time,
                      const hal::InjectedFault& fault) noexcept TANDEM_RT {
-  if (recorder_ == nullptr) return;
+  if (silent()) return;
   const bool of_joint = fault.target == hal::FaultTarget::kJoint;
   log::Event event{.cycle = time.cycle,
                    .time_ns = time.time_ns,
@@ -174,7 +174,7 @@ void CycleLog::event(const hal::CycleTime& time,
 
 void CycleLog::event(const hal::CycleTime& time, log::EventKind kind,
                      const ParameterChange& change) noexcept TANDEM_RT {
-  if (recorder_ == nullptr) return;
+  if (silent()) return;
   recorder_->push(log::Event{.cycle = time.cycle, .time_ns = time.time_ns, .kind = kind},
                   change.name, change.value, change.parameter->word_of(change.value));
 }
@@ -182,7 +182,7 @@ void CycleLog::event(const hal::CycleTime& time, log::EventKind kind,
 void CycleLog::images(const hal::CycleTime& time, const hal::StateImage& state,
                       const hal::CommandImage& command, const hal::TruthImage* truth,
                       const hal::EstimateImage* estimate) noexcept TANDEM_RT {
-  if (recorder_ == nullptr) return;
+  if (silent()) return;
   recorder_->push(state_, time.time_ns, state.bytes());
   recorder_->push(command_, time.time_ns, command.bytes());
   if (truth != nullptr) recorder_->push(truth_, time.time_ns, truth->bytes());

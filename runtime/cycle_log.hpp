@@ -34,7 +34,7 @@ class CycleLog {
 
   /// For simulated time, which can wait: blocks until so many messages have room.
   void wait_for_space(std::size_t messages) {
-    if (recorder_ != nullptr) recorder_->wait_for_space(messages);
+    if (!silent()) recorder_->wait_for_space(messages);
   }
   /// @param joint  -1: none
   /// @param value  of the kinds that have one
@@ -57,7 +57,13 @@ class CycleLog {
   void signals(const hal::CycleTime& time, const HostedController& controller) noexcept TANDEM_RT;
   void marks(const hal::CycleTime& time, const HostedController& controller) noexcept TANDEM_RT;
   void text(const hal::TextEvent& event) noexcept TANDEM_RT {
-    if (recorder_ != nullptr) recorder_->push(event);
+    if (!silent()) recorder_->push(event);
+  }
+  /// While on, cycles leave nothing: they are in the log already. Between two cycles.
+  void mute(bool on) noexcept { muted_ = on; }
+  /// The next cycle follows from another one than the last in the log: a file of its own begins.
+  void branch(const log::Branch& from) {
+    if (recorder_ != nullptr) recorder_->branch(from);
   }
   /// Messages that found no room.
   [[nodiscard]] std::uint64_t dropped() const noexcept TANDEM_RT {
@@ -65,7 +71,10 @@ class CycleLog {
   }
 
  private:
+  [[nodiscard]] bool silent() const noexcept TANDEM_RT { return recorder_ == nullptr || muted_; }
+
   log::Recorder* recorder_;
+  bool muted_ = false;
   int inputs_ = 0;  // that have channels
   log::Recorder::Channel state_ = 0, command_ = 0, truth_ = 0, estimate_ = 0;
 };

@@ -10,6 +10,7 @@
 #include "hal/command_limits.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/cycle_observer.hpp"
+#include "hal/outside.hpp"
 #include "hal/truth.hpp"
 #include "log/recorder.hpp"
 #include "rt/cyclic_loop.hpp"
@@ -27,6 +28,8 @@
 
 namespace tandem::runtime {
 
+class TimeMachine;
+
 /// The parts that a cycle joins. All outlive it.
 struct CycleParts {
   const hal::RobotConfig& robot;
@@ -40,6 +43,7 @@ struct CycleParts {
   estimation::Estimator* estimator = nullptr;  ///< null: nothing is estimated
   SnapshotPort* snapshots = nullptr;           ///< null: nobody wants any while it runs
   RunIdentity identity = {};                   ///< a snapshot of another one is refused
+  TimeMachine* time_machine = nullptr;         ///< null: time does not go back
 };
 
 /// What the parts of RobotCycle know of this cycle. RobotCycle fills it; they read it, note faults
@@ -58,6 +62,8 @@ struct CycleNow : CycleParts {
         log(name_controllers(parts), state, hal::CommandImage(robot.shape()), truth, estimate()) {
     progress.total_cycles = how.running_cycles;
     controllers.time_by(clock);
+    controllers.heed(outside);
+    backend.heed(outside);
   }
   /// Null where nothing is estimated.
   [[nodiscard]] const hal::EstimateImage* estimate() const noexcept TANDEM_RT {
@@ -83,6 +89,7 @@ struct CycleNow : CycleParts {
 
   const CycleConfig config;
   Inbox inbox;
+  hal::Outside outside;
   rt::CyclicLoop loop;
   rt::Tick tick;
   hal::CycleTime time;

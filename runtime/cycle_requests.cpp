@@ -116,6 +116,7 @@ void CycleRequests::carry_out() noexcept TANDEM_RT {
   for (std::size_t most = Inbox::kCapacity; most > 0; --most) {
     const std::optional<CycleRequest> request = now.inbox.take_request();
     if (!request) return;
+    now.outside.came = true;
     const bool ending = ends(now.run.phase());
     const bool at_rest =
         stops_motion(*request) && !now.controllers.references().leads(request->joint);

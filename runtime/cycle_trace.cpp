@@ -20,7 +20,7 @@ const char* to_string(CycleStage stage) noexcept {
 }
 
 void CycleTrace::begin(const rt::Tick& tick) noexcept TANDEM_RT {
-  if (!on()) return;
+  if (!on() || muted_) return;
   stamps_ = &ring_[count_++ % ring_.size()];
   stamps_->cycle = tick.cycle;
   stamps_->begin_ns = ended_ns_ != 0 ? ended_ns_ : tick.begin_ns;

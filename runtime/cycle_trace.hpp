@@ -53,6 +53,12 @@ class CycleTrace {
 
   [[nodiscard]] bool on() const noexcept TANDEM_RT { return !ring_.empty(); }
 
+  /// While on, nothing is traced. Between two cycles.
+  void mute(bool on) noexcept {
+    muted_ = on;
+    if (on) stamps_ = nullptr;
+  }
+
   // Without a capacity these do nothing.
 
   /// A cycle begins: the end of its wait. It takes the oldest one's place.
@@ -83,7 +89,8 @@ class CycleTrace {
   std::vector<CycleStamps> ring_;
   std::uint64_t count_ = 0;
   CycleStamps* stamps_ = nullptr;  // this cycle's
-  std::int64_t ended_ns_ = 0;      // when the last cycle ended; 0: there was none
+  bool muted_ = false;
+  std::int64_t ended_ns_ = 0;  // when the last cycle ended; 0: there was none
 };
 
 }  // namespace tandem::runtime

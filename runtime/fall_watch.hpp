@@ -2,9 +2,7 @@
 // Layer: runtime.  Thread: made non-RT; look() RT.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
-#include <span>
 #include <string>
 
 #include "base/archive.hpp"
@@ -35,15 +33,7 @@ struct Fall {
 /// "the robot fell: its base is tilted by 61.3 degrees"
 [[nodiscard]] std::string fall_text(const Fall& fall, const FallLimits& limits);
 
-/// The angle between the z axis of a frame with orientation `quaternion` (x y z w) and W's [rad].
-[[nodiscard]] inline double tilt_of(std::span<const double> quaternion) noexcept {
-  // The frame's z axis in W is the rotation matrix's last column.
-  const double x = quaternion[0], y = quaternion[1], z = quaternion[2], w = quaternion[3];
-  const double zx = 2.0 * (x * z + w * y);
-  const double zy = 2.0 * (y * z - w * x);
-  const double zz = 1.0 - 2.0 * (x * x + y * y);
-  return std::atan2(std::hypot(zx, zy), zz);
-}
+using hal::tilt_of;
 
 class FallWatch {
  public:

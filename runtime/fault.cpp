@@ -3,6 +3,9 @@
 namespace tandem::runtime {
 
 void FaultLog::note(const FaultRecord& record) noexcept TANDEM_RT {
+  static_assert(std::size(hal::kCauseRows) <= 64, "a bit each");
+  if (record.cause != hal::FaultCause::kNone)
+    noted_ |= std::uint64_t{1} << static_cast<unsigned>(record.cause);
   const std::size_t at = size_.load(std::memory_order_relaxed);
   if (at == kCapacity) {
     lost_.fetch_add(1, std::memory_order_relaxed);
@@ -26,7 +29,7 @@ std::size_t FaultLog::latched() const noexcept TANDEM_RT {
 void FaultLog::archive(Archive& ar) {
   std::uint64_t size = size_.load();
   std::uint64_t lost = lost_.load();
-  ar(records_, size, lost);
+  ar(records_, size, lost, noted_);
   for (auto& cleared : cleared_ns_) {
     std::int64_t time_ns = cleared.load();
     ar(time_ns);

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
@@ -51,6 +52,8 @@ class FaultLog {
       if (cleared_ns(i) == kLatched && which(records_[i])) clear(i, time_ns);
     }
   }
+  /// Causes that were noted since the last call, a bit each: also those that did not fit.
+  [[nodiscard]] std::uint64_t take_noted() noexcept TANDEM_RT { return std::exchange(noted_, 0); }
   void archive(Archive& ar);
 
   // Any thread's.
@@ -74,6 +77,7 @@ class FaultLog {
   std::array<std::atomic<std::int64_t>, kCapacity> cleared_ns_{};
   std::atomic<std::size_t> size_{0};
   std::atomic<std::uint64_t> lost_{0};
+  std::uint64_t noted_ = 0;  // the loop's
 };
 
 /// A fault in words.

@@ -20,6 +20,7 @@ HandOver::HandOver(CycleNow& now, const DriveResets& resets, const JointHoming& 
       sensors_(now.robot.sensors.size()) {}
 
 void HandOver::take() noexcept TANDEM_RT {
+  noted_ = now_.faults.take_noted();
   const hal::CommandImage& told = arbiter_.told();
   if (now_.run.in(RunPhase::kRunning)) {
     statistics_.take(now_.state, told, now_.truth, now_.limits.counters(), now_.estimate());
@@ -27,10 +28,11 @@ void HandOver::take() noexcept TANDEM_RT {
   if (!ends(now_.run.phase())) statistics_.take_base(now_.truth);
   now_.log.images(now_.time, now_.state, told, now_.truth, now_.estimate());
   show_controllers();
+  if (muted_) return;
   show_progress();
   show_joints(told);
   show_sensors();
-  if (now_.observer != nullptr) show_images(*now_.observer);
+  if (now_.observer != nullptr) now_.observer->take(view());
 }
 
 void HandOver::show() noexcept TANDEM_RT {
@@ -53,7 +55,7 @@ void HandOver::show_controllers() noexcept TANDEM_RT {
       if (io.signals.numbers() > 0) {
         io.signals.publish(now_.time.cycle, now_.time.time_ns);
         now_.log.signals(now_.time, *loaded[slot]);
-        if (now_.observer != nullptr) now_.observer->take_signals(now_.time, io.signals);
+        if (now_.observer != nullptr && !muted_) now_.observer->take_signals(now_.time, io.signals);
       }
     }
     if (views && io.marks.show_to_viewers(now_.time.time_ns, (active & only(slot)) != 0))
@@ -65,7 +67,7 @@ void HandOver::show_controllers() noexcept TANDEM_RT {
       event.time_ns = now_.time.time_ns;
       event.set_controller(loaded[slot]->name);
       now_.log.text(event);
-      services_.show(event);
+      if (!muted_) services_.show(event);
     }
   }
 }
@@ -88,24 +90,25 @@ bool HandOver::show_to(hal::CycleObserver& observer) const {
                       one->io->signals.look().cycle == now_.time.cycle;
     if (told) observer.take_signals(now_.time, one->io->signals);
   }
-  show_images(observer);
+  observer.take(view());
   return true;
 }
 
-void HandOver::show_images(hal::CycleObserver& observer) const noexcept TANDEM_RT {
-  observer.take({.time = now_.time,
-                 .phase = now_.run.phase(),
-                 .read_code = now_.read_code,
-                 .state = now_.state,
-                 .command = arbiter_.told(),
-                 .truth = now_.truth,
-                 .estimate = now_.estimate(),
-                 .times = {.begin_ns = now_.tick.begin_ns,
-                           .wakeup_ns = now_.tick.wakeup_ns,
-                           .bus_ns = now_.loop.last_bus_ns(),
-                           .work_ns = now_.loop.last_work_ns(),
-                           .overruns = now_.loop.statistics().overruns,
-                           .skipped = now_.loop.statistics().skipped}});
+hal::CycleView HandOver::view() const noexcept TANDEM_RT {
+  return {.time = now_.time,
+          .phase = now_.run.phase(),
+          .read_code = now_.read_code,
+          .state = now_.state,
+          .command = arbiter_.told(),
+          .truth = now_.truth,
+          .estimate = now_.estimate(),
+          .times = {.begin_ns = now_.tick.begin_ns,
+                    .wakeup_ns = now_.tick.wakeup_ns,
+                    .bus_ns = now_.loop.last_bus_ns(),
+                    .work_ns = now_.loop.last_work_ns(),
+                    .overruns = now_.loop.statistics().overruns,
+                    .skipped = now_.loop.statistics().skipped},
+          .faults = noted_};
 }
 
 /// What is asked of a joint is what its owner wants, before a delay and a transfer.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "hal/cycle_observer.hpp"
 #include "runtime/joint_arbiter.hpp"
 #include "runtime/run_services.hpp"
 #include "runtime/run_statistics.hpp"
@@ -19,15 +20,19 @@ class HandOver {
 
   /// To RunServices, how things are.
   void show() noexcept TANDEM_RT;
+  /// While on, cycles are for the statistics alone. Between two cycles.
+  void mute(bool on) noexcept { muted_ = on; }
   /// Each cycle, when its command is out.
   void take() noexcept TANDEM_RT;
   /// The last cycle once more, to one who came later; for any thread while the loop stands.
   /// @return false: there was none
   bool show_to(hal::CycleObserver& observer) const;
+  /// The cycle that take() was called for, as observers see it. Between two of them.
+  [[nodiscard]] hal::CycleView view() const noexcept TANDEM_RT;
   [[nodiscard]] const RunStatistics& statistics() const noexcept { return statistics_; }
   /// After the controllers, whose gains it shows once they are read.
   void archive(Archive& ar) {
-    ar(statistics_);
+    ar(statistics_, noted_);
     if (ar.reading()) show_gains();
   }
 
@@ -37,7 +42,6 @@ class HandOver {
   void show_joints(const hal::CommandImage& told) noexcept TANDEM_RT;
   void show_sensors() noexcept TANDEM_RT;
   void show_gains() noexcept TANDEM_RT;
-  void show_images(hal::CycleObserver& observer) const noexcept TANDEM_RT;
 
   CycleNow& now_;
   const DriveResets& resets_;
@@ -48,6 +52,8 @@ class HandOver {
   std::vector<JointStatus> joints_;  // as services_ shows them
   std::vector<SensorStatus> sensors_;
   std::uint64_t shown_gains_ = 0;  // their revision
+  std::uint64_t noted_ = 0;        // causes of faults, a bit each, since the cycle before
+  bool muted_ = false;
 };
 
 }  // namespace tandem::runtime

@@ -102,6 +102,9 @@ class Inbox {
     hal::StopCategory emergency_stop = hal::StopCategory::kWarn;  ///< the hardest; kWarn: none
     bool by_watchdog = false;      ///< an emergency stop, of the robot's category
     std::int32_t controller = -1;  ///< with it: the loop hung in this one; -1: in none
+    [[nodiscard]] bool any() const noexcept {
+      return end || reset || by_watchdog || emergency_stop != hal::StopCategory::kWarn;
+    }
   };
   /// Whether take_urgent() has something.
   [[nodiscard]] bool is_urgent() const noexcept {

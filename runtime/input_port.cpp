@@ -261,8 +261,9 @@ InputLook InputPort::look() const {
 
 // The loop's.
 
-void InputPort::begin(const hal::CycleTime& time, bool waits) noexcept TANDEM_RT {
-  if (waits && mail_->feed.refresh()) {
+void InputPort::begin(const hal::CycleTime& time, bool waits,
+                      const hal::Outside& outside) noexcept TANDEM_RT {
+  if (waits && !outside.closed && mail_->feed.refresh()) {
     const std::uint64_t number = mail_->feed.front().number;
     mail_->superseded.fetch_add(number - mail_->taken.load(std::memory_order_relaxed),
                                 std::memory_order_relaxed);
@@ -283,7 +284,8 @@ void InputPort::note_taken(std::uint64_t number, std::uint64_t cycle) noexcept T
 }
 
 /// The sample of this cycle; empty: there is none.
-std::span<const double> InputPort::next(std::uint64_t cycle) noexcept TANDEM_RT {
+std::span<const double> InputPort::next(std::uint64_t cycle,
+                                        hal::Outside& outside) noexcept TANDEM_RT {
   const std::size_t size = block_->value.size();
   if (!plan_.at.empty()) {
     const auto from = plan_.at.begin() + static_cast<std::ptrdiff_t>(row_);
@@ -291,14 +293,15 @@ std::span<const double> InputPort::next(std::uint64_t cycle) noexcept TANDEM_RT 
     const bool again = plan_.repeat_cycles > 0 && block_->sequence > 0 &&
                        cycle - block_->cycle >= plan_.repeat_cycles;
     if (past == from && !again) return {};
-    if (past - from > 1) {
+    if (past - from > 1 && !outside.closed) {
       mail_->superseded.fetch_add(static_cast<std::uint64_t>(past - from) - 1,
                                   std::memory_order_relaxed);
     }
     row_ = static_cast<std::uint64_t>(past - plan_.at.begin());
     return plan_.row(row_ - 1, size);
   }
-  if (!mail_->feed.refresh()) return {};
+  if (outside.closed || !mail_->feed.refresh()) return {};
+  outside.came = true;
   const Sample& sample = mail_->feed.front();
   const std::uint64_t before = mail_->taken.load(std::memory_order_relaxed);
   mail_->superseded.fetch_add(sample.number - before - 1, std::memory_order_relaxed);
@@ -308,16 +311,18 @@ std::span<const double> InputPort::next(std::uint64_t cycle) noexcept TANDEM_RT 
   return {};
 }
 
-bool InputPort::take(const hal::CycleTime& time, bool open) noexcept TANDEM_RT {
+bool InputPort::take(const hal::CycleTime& time, bool open,
+                     hal::Outside& outside) noexcept TANDEM_RT {
   InputBlock& to = *block_;
   to.arrived = false;
-  const std::span<const double> sample = open ? next(time.cycle) : std::span<const double>();
+  const std::span<const double> sample =
+      open ? next(time.cycle, outside) : std::span<const double>();
   if (!sample.empty()) {
     hold(sample);
     ++to.sequence;
     to.cycle = time.cycle;
     to.fresh = to.arrived = true;
-    mail_->arrived.fetch_add(1, std::memory_order_relaxed);
+    if (!outside.closed) mail_->arrived.fetch_add(1, std::memory_order_relaxed);
     show();
     return true;
   }
@@ -325,7 +330,7 @@ bool InputPort::take(const hal::CycleTime& time, bool open) noexcept TANDEM_RT {
   if (!to.fresh || !silent) return false;
   to.fresh = false;
   if (to.options.after != AfterTimeout::kLast) hold(without_);
-  mail_->timed_out.fetch_add(1, std::memory_order_relaxed);
+  if (!outside.closed) mail_->timed_out.fetch_add(1, std::memory_order_relaxed);
   show();
   return false;
 }

@@ -19,6 +19,7 @@
 #include "base/triple_buffer.hpp"
 #include "controllers/controller_io.hpp"
 #include "hal/cycle_time.hpp"
+#include "hal/outside.hpp"
 #include "hal/robot.hpp"
 #include "runtime/input_messages.hpp"
 #include "runtime/input_plan.hpp"
@@ -93,7 +94,8 @@ class InputPort {
 
   /// The controller starts: what came before counts no more.
   /// @param waits  false: but a sample that waits does, which arrives in this cycle
-  void begin(const hal::CycleTime& time, bool waits = true) noexcept TANDEM_RT;
+  void begin(const hal::CycleTime& time, bool waits,
+             const hal::Outside& outside) noexcept TANDEM_RT;
   /// Holds what `former`, which it follows, does, as old as it is there; its plan goes on where
   /// that one is. What is beyond the bounds here is as if it had never come. @rt a copy of a
   /// sample.
@@ -105,7 +107,7 @@ class InputPort {
   /// Each cycle in which the controller is active. @param open  false: nothing is taken
   /// @return whether a sample arrived
   /// @rt one copy of a sample at most; no search longer than a binary one.
-  bool take(const hal::CycleTime& time, bool open) noexcept TANDEM_RT;
+  bool take(const hal::CycleTime& time, bool open, hal::Outside& outside) noexcept TANDEM_RT;
   /// What its message in the log is made of: the cycle, the sequence number, the values.
   [[nodiscard]] std::span<const std::byte> message() noexcept TANDEM_RT;
   void archive(Archive& ar);
@@ -133,7 +135,8 @@ class InputPort {
   [[nodiscard]] Status check_declaration(const hal::Robot& robot);
   [[nodiscard]] Status fill_bounds(const hal::Robot& robot);
   [[nodiscard]] Status check_trajectory(std::span<const double> sample) const;
-  [[nodiscard]] std::span<const double> next(std::uint64_t cycle) noexcept TANDEM_RT;
+  [[nodiscard]] std::span<const double> next(std::uint64_t cycle,
+                                             hal::Outside& outside) noexcept TANDEM_RT;
   void note_taken(std::uint64_t number, std::uint64_t cycle) noexcept TANDEM_RT;
   void hold(std::span<const double> values) noexcept TANDEM_RT;
   void show() noexcept TANDEM_RT;

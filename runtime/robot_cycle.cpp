@@ -6,6 +6,7 @@
 #include "rt/scoped_realtime.hpp"
 #include "rt/stop_signal.hpp"
 #include "runtime/fault_text.hpp"
+#include "runtime/time_machine.hpp"
 
 namespace tandem::runtime {
 
@@ -82,10 +83,26 @@ void RobotCycle::attend() noexcept {
   if (starting) now_.progress.phase.store(before);
 }
 
+/// Where time can go back: to the cycle that somebody wants, if one does.
+void RobotCycle::travel() noexcept {
+  if (now_.time_machine != nullptr && !now_.outside.closed) now_.time_machine->attend(*this);
+}
+
 /// May block, as the backend's exchange() may and nothing else: for the cycle's time and, when time
 /// is simulated, for the log, and while it is paused.
 void RobotCycle::wait() noexcept {
-  show_snapshot();
+  do {
+    travel();
+    show_snapshot();
+    await_tick();
+  } while (now_.tick.called);
+  if (now_.time_machine != nullptr && !now_.outside.closed) {
+    if (const auto branch = now_.time_machine->begins(now_.tick.cycle)) now_.log.branch(*branch);
+  }
+  trace_.begin(now_.tick);
+}
+
+void RobotCycle::await_tick() noexcept {
   // Four images, a sample of each input, every event that one cycle can bring, and what the
   // controllers tell.
   const std::size_t most = 4 + 16 + Inbox::kCapacity * kMostParameterChanges +
@@ -94,7 +111,6 @@ void RobotCycle::wait() noexcept {
                            kMostControllers * (2 + TextEventSlots::kSlots);
   if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
   now_.tick = now_.loop.wait();
-  trace_.begin(now_.tick);
 }
 
 /// May block until the robot has answered, which does not count as the cycle's work.
@@ -205,6 +221,12 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
 /// After everything that may change the phase. Stops come first, from wherever they come: a stop
 /// wins over all that was asked before it and in its cycle.
 void RobotCycle::take_inbox() noexcept TANDEM_RT {
+  if (!now_.outside.closed) hear();
+  now_.controllers.tell_parameters(now_.time, now_.log);
+  trace_.mark(CycleStage::kCheck, now_.clock);
+}
+
+void RobotCycle::hear() noexcept TANDEM_RT {
   const hal::RemoteCommand wish = owner_.follow();
   const Inbox::Urgent asked = now_.inbox.take_urgent();
   const StopCategory declared = now_.robot.emergency_stop;
@@ -218,18 +240,18 @@ void RobotCycle::take_inbox() noexcept TANDEM_RT {
                      .category = std::min(declared, StopCategory::kCategory1)});
   }
   if (rt::take_emergency_stop()) {
+    now_.outside.came = true;
     response_.raise({.cause = FaultCause::kBySignal, .category = declared});
   }
   if (wish.reset) response_.begin_reset(wish.reset_cycle);
   if (asked.reset) response_.begin_reset(asked.known);
   const bool end = asked.end || rt::stop_requested();
+  if (asked.any()) now_.outside.came = true;
   if (end && !now_.run.in(RunPhase::kShutDown)) {
     now_.event(EventKind::kStopRequested);
     arbiter_.on(RunEvent::kEnd);
   }
   requests_.carry_out();
-  now_.controllers.tell_parameters(now_.time, now_.log);
-  trace_.mark(CycleStage::kCheck, now_.clock);
 }
 
 void RobotCycle::update() noexcept TANDEM_RT {
@@ -305,7 +327,7 @@ void RobotCycle::write() noexcept TANDEM_RT {
 /// To the log, the threads that watch the run, and those that wait for an answer.
 void RobotCycle::hand_over() noexcept TANDEM_RT {
   shown_.take();
-  now_.inbox.confirm(now_.time.cycle);
+  if (!now_.outside.closed) now_.inbox.confirm(now_.time.cycle);
   const std::int64_t now_ns = now_.loop.finish();
   took_ns_ = now_ns - now_.tick.begin_ns + std::max<std::int64_t>(now_.tick.wakeup_ns, 0);
   trace_.note(now_.controllers.calls());
@@ -338,6 +360,30 @@ void RobotCycle::show_snapshot() noexcept {
     (void)write_down(port->archive(), false);
   }
   port->taken(now_.loop.next_cycle(), now_.clock.now_ns() - begin_ns);
+}
+
+void RobotCycle::replay(bool on) noexcept {
+  now_.outside.closed = on;
+  now_.loop.replay(on);
+  now_.log.mute(on);
+  shown_.mute(on);
+  trace_.mute(on);
+}
+
+void RobotCycle::show_again() noexcept {
+  shown_.show();
+  if (now_.observer != nullptr) (void)shown_.show_to(*now_.observer);
+}
+
+bool RobotCycle::is_urgent() const noexcept {
+  return now_.inbox.is_urgent() || rt::stop_requested();
+}
+
+std::string RobotCycle::unarchived() const {
+  for (const HostedController* one : now_.controllers.loaded()) {
+    if (one != nullptr && one->lacks_archive) return one->name;
+  }
+  return {};
 }
 
 Result<std::vector<std::byte>> RobotCycle::save() {

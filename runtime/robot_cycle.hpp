@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/cycle_requests.hpp"
@@ -92,10 +93,35 @@ class RobotCycle {
   /// What save() answers, into `ar`, which may be bounded; without `backend` all but its part,
   /// which comes last. Between two steps. @return false: the backend cannot be saved
   [[nodiscard]] bool write_down(Archive& ar, bool backend);
+  /// Number of the cycle that the next step() makes. Between two steps.
+  [[nodiscard]] std::uint64_t next_cycle() const noexcept { return now_.loop.next_cycle(); }
+
+  // For a TimeMachine, in the thread of the loop, between two steps.
+
+  /// While on, step() plays a cycle that has been, with no more than the cycles before it: other
+  /// threads are neither heard nor told, and nothing is logged, counted, paced or watched.
+  void replay(bool on) noexcept;
+  /// The last cycle, as its observers saw it.
+  [[nodiscard]] hal::CycleView last_view() const noexcept { return shown_.view(); }
+  /// Shows the last cycle to all who watch, as its hand-over did.
+  void show_again() noexcept;
+  /// Whether a cycle has taken something of other threads since this was asked.
+  [[nodiscard]] bool take_heard() noexcept { return std::exchange(now_.outside.came, false); }
+  /// Which ones are loaded, as restore() compares them.
+  [[nodiscard]] std::uint64_t controllers() const noexcept {
+    return now_.controllers.fingerprint();
+  }
+  /// The first of them that restore() would begin anew; empty: none.
+  [[nodiscard]] std::string unarchived() const;
+  /// A stop or the end of the run waits to be heard.
+  [[nodiscard]] bool is_urgent() const noexcept;
 
  private:
   // The cycle, in this order.
   void show_snapshot() noexcept;
+  void travel() noexcept;
+  void await_tick() noexcept;
+  void hear() noexcept TANDEM_RT;
   void wait() noexcept;
   void exchange() noexcept;
   void read() noexcept TANDEM_RT;

@@ -58,6 +58,7 @@ void print_recovery(const Json& joint);
 // Each prints an answer, waits for what is to come, and puts that into the answer. Exit::kFault: it
 // did not come. An error: the command was refused.
 Result<Exit> tell_clock_at_rest(Asked& asked);
+Result<Exit> tell_until(Asked& asked);
 Result<Exit> tell_loaded(Asked& asked);
 Result<Exit> tell_fault_reset(Asked& asked);
 Result<Exit> tell_input(Asked& asked);

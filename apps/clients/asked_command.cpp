@@ -52,11 +52,15 @@ struct Form {
   Status (*ask)(const AskedOptions&, Json& question) = nullptr;
 };
 constexpr Form kForms[]{
+    {"clock.back-until", nullptr, &tell_clock_at_rest},
+    {"clock.goto", nullptr, &tell_clock_at_rest},
     {"clock.pause", nullptr, &tell_clock_at_rest},
     {"clock.rate", &print_clock},
     {"clock.resume", &print_clock},
+    {"clock.rewind", nullptr, &tell_clock_at_rest},
     {"clock.show", &print_clock},
     {"clock.step", nullptr, &tell_clock_at_rest},
+    {"clock.until", nullptr, &tell_until},
     {"controller.list", &print_controllers},
     {"controller.load", nullptr, &tell_loaded, &ask_for_load},
     {"controller.reload", &print_reloaded},
@@ -98,13 +102,15 @@ const Form& form_of(const CommandRow& row) {
 struct Unit {
   const char* name;
   double si;         ///< one of it, in SI units
-  const char* kind;  ///< for the run, which knows whether the joint turns or slides
+  const char* kind;  ///< for the run, which knows whether the joint turns or slides; null: a time
 };
 constexpr Unit kUnits[]{{"deg", std::numbers::pi / 180.0, "angle"},
                         {"rad", 1.0, "angle"},
                         {"mm", 1e-3, "length"},
                         {"cm", 1e-2, "length"},
                         {"m", 1.0, "length"}};
+constexpr Unit kTimes[]{
+    {"s", 1.0, nullptr}, {"ms", 1e-3, nullptr}, {"us", 1e-6, nullptr}, {"min", 60.0, nullptr}};
 
 /// What follows a unit of length or angle.
 const char* per(ControlKey::Unit unit) {
@@ -134,15 +140,21 @@ Status add_quantity(Json& question, const ControlKey& key, const std::string& te
   }
   question[key.name] = number;
   if (read && unit.empty()) return {};
-  for (const Unit& known : kUnits) {
+  const bool is_time = key.unit == ControlKey::Unit::kTime;
+  for (const Unit& known : is_time ? std::span<const Unit>(kTimes) : std::span(kUnits)) {
     if (!read || unit != std::string(known.name) + per(key.unit)) continue;
     question[key.name] = number * known.si;
+    if (known.kind == nullptr) return {};
     if (question.value("unit", known.kind) != known.kind) {
       return fail_at(key.line, fmt::format("'{}' is of another kind than the other values", text),
                      "give angles or lengths, not both");
     }
     question["unit"] = known.kind;
     return {};
+  }
+  if (is_time) {
+    return fail_at(key.line, fmt::format("'{}' is no time", text),
+                   "write 2.5s, 300ms, 1min, or a number of seconds");
   }
   return fail_at(
       key.line, fmt::format("'{}' is no number with a unit", text),

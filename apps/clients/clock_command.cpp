@@ -12,17 +12,19 @@ namespace tandem::apps {
 namespace {
 
 /// What the clock shows once it stands; before that, when somebody lets it go on or the run ends.
-Result<Json> wait_until_it_stands(ControlClient& run, std::FILE* out) {
+/// @param paused  false: it goes on until something comes
+Result<Json> wait_until_it_stands(ControlClient& run, std::FILE* out, bool paused = true) {
   StatusLine line(out);
   for (;;) {
     Result<Json> now = run.ask({{"do", "clock.show"}});
-    if (!now || now->value("standing", true) || !now->value("paused", false) ||
+    if (!now || now->value("standing", true) || (paused && !now->value("paused", false)) ||
         now->value("phase", "") == "done") {
       return now;
     }
     if (line.due()) {
-      line.show(fmt::format("{:.3f} s, {} to go", now->value("time_s", 0.0),
-                            counted(now->value("pending_steps", std::uint64_t{0}), "cycle")));
+      const std::uint64_t steps = now->value("pending_steps", std::uint64_t{0});
+      line.show(fmt::format("{:.3f} s{}", now->value("time_s", 0.0),
+                            paused ? ", " + counted(steps, "cycle") + " to go" : ""));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
@@ -41,6 +43,30 @@ std::string state_text(const Json& answer) {
   return steps > 0 ? "paused, " + counted(steps, "cycle") + " to go" : "paused after this cycle";
 }
 
+std::string past_text(const Json& past) {
+  const auto count = past.value("checkpoints", std::uint64_t{0});
+  if (count == 0) return past.value("keeps", false) ? "kept from now on" : "not kept";
+  return fmt::format("from {:.6g} s on, by {} of {:.3g} MB in all", past.value("from_s", 0.0),
+                     counted(count, "checkpoint"), 1e-6 * past.value("bytes", 0.0));
+}
+
+/// What the commands' own answers have beside the clock.
+constexpr const char* kOfTheCommand[]{"dropped_steps",   "from_s",  "asked_s",
+                                      "replayed_cycles", "took_ms", "note"};
+
+Result<Exit> tell_at_rest(Asked& asked, bool paused, const char* over) {
+  Result<Json> stands = wait_until_it_stands(asked.run, human_output(asked.options.json), paused);
+  if (!stands) return fail(over, "its own output says why");
+  if (!paused && !stands->value("standing", false))
+    return fail(over, "tandem report shows its log");
+  for (const char* key : kOfTheCommand) {
+    if (asked.answer.contains(key)) (*stands)[key] = asked.answer[key];
+  }
+  asked.answer = std::move(*stands);
+  if (asked.prints()) print_clock(asked.answer);
+  return Exit::kDone;
+}
+
 }  // namespace
 
 void print_clock(const Json& answer) {
@@ -49,19 +75,24 @@ void print_clock(const Json& answer) {
               {{"time", "{time_s:.6f s}"}, {"cycles", "{cycles}"}, {"phase", "{phase}"}});
   facts.add("clock", state_text(answer));
   facts.add("rate", rate_text(answer));
+  if (answer.contains("past")) facts.add("past", past_text(answer["past"]));
+  if (answer.contains("from_s")) {
+    facts.add("came from",
+              fmt::format("{:.6f} s, {} played again in {:.3g} ms", answer.value("from_s", 0.0),
+                          counted(answer.value("replayed_cycles", std::uint64_t{0}), "cycle"),
+                          answer.value("took_ms", 0.0)));
+  }
   facts.add("measured", figures_text("{realtime_factor:.3g} x real time", answer).value_or("-"));
   facts.print(stdout);
+  if (answer.contains("note")) fmt::print("note: {}\n", answer.value("note", ""));
 }
 
 Result<Exit> tell_clock_at_rest(Asked& asked) {
-  Result<Json> stands = wait_until_it_stands(asked.run, human_output(asked.options.json));
-  if (!stands) return fail("the run ended before its clock stood still", "its own output says why");
-  if (asked.answer.contains("dropped_steps")) {
-    (*stands)["dropped_steps"] = asked.answer["dropped_steps"];
-  }
-  asked.answer = std::move(*stands);
-  if (asked.prints()) print_clock(asked.answer);
-  return Exit::kDone;
+  return tell_at_rest(asked, true, "the run ended before its clock stood still");
+}
+
+Result<Exit> tell_until(Asked& asked) {
+  return tell_at_rest(asked, false, "the run ended before the condition became true");
 }
 
 }  // namespace tandem::apps

@@ -106,6 +106,11 @@ Without --socket or --dds it is the only `tandem run` of this user.)"},
   tandem clock rate 0.1                              ten times slower than real time
   tandem clock rate 0                                as fast as possible
   tandem clock resume
+  tandem clock rewind 2.5s                           back, by checkpoints that the run keeps
+  tandem clock goto 12.3s
+  tandem clock step --to 12.5s                       on from there, to the same bits
+  tandem clock back-until 'torque(LKneeSag) > 40Nm'  where that became true last
+  tandem clock until 'position(joint1) < 0 rad'
 The results are the same bits. Only simulated time can be paused; on a robot it is refused.
 Without --socket or --dds it is the only `tandem run` of this user.)"},
     {"predict", "What a running robot will do: runs its model ahead", R"(Examples:
@@ -135,6 +140,7 @@ const char* unit_words(ControlKey::Unit unit) {
     case ControlKey::Unit::kPlace:
       return ": 30deg, '30 deg', 0.5rad or 0.5; of a slide 20mm, 2cm, 0.02m or 0.02";
     case ControlKey::Unit::kSpeed: return ": 20deg/s, 0.3";
+    case ControlKey::Unit::kTime: return ": 2.5s, 300ms, 1min; 2.5 is seconds";
     case ControlKey::Unit::kAcceleration: return ": 40deg/s2, 0.6";
   }
   return "";

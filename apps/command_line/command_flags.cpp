@@ -166,6 +166,12 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
          "--realtime", [&o] { o.rate = 1.0; }, "The same as --rate 1")
       ->excludes(rate);
   app.add_flag("--start-paused", o.start_paused, "Pause before the first cycle: tandem clock step");
+  app.add_option(
+         "--checkpoints", o.checkpoints_bytes,
+         "Memory for going back in time (tandem clock rewind), as 512MB. Without it 64MB once "
+         "the run is paced, paused, or has a studio")
+      ->transform(CLI::AsSizeValue(true))
+      ->type_name("SIZE");
   app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's")->check(is_seed());
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--record-frames", o.record_frames,

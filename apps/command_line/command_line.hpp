@@ -41,6 +41,7 @@ struct RunOptions : runtime::Overrides {
   std::string json;           ///< file, "-" for standard output, empty for none
   std::string socket;         ///< of the run's control; empty: default_control_path("run")
   bool no_socket = false;
+  std::optional<std::size_t> checkpoints_bytes{};  ///< to go back in time by; empty: where useful
   StudioOptions studio{};
 };
 

@@ -1,5 +1,11 @@
 #include "apps/control/clock_commands.hpp"
 
+#include <fmt/core.h>
+
+#include <cmath>
+#include <memory>
+#include <utility>
+
 #include "rt/clock.hpp"
 
 namespace tandem::apps {
@@ -41,22 +47,148 @@ Json look(const runtime::RobotCycle& cycle) {
           {"realtime_factor", realtime_factor(clock, begun)}};
 }
 
-Result<Json> answer(runtime::RobotCycle& cycle, const Status& done) {
-  if (!done) return std::unexpected(done.error());
-  return look(cycle);
+double period_of(const runtime::RobotCycle& cycle) {
+  return 1e-9 * static_cast<double>(cycle.config().loop.period_ns);
 }
 
-Result<Json> pause(runtime::RobotCycle& cycle) {
-  const Result<std::uint64_t> dropped = cycle.inbox().clock().pause();
-  if (!dropped) return std::unexpected(dropped.error());
-  Json found = look(cycle);
-  found["dropped_steps"] = *dropped;
-  return found;
+/// Time of the moment before cycle `next`: that of the cycle before.
+double seconds_of(const runtime::RobotCycle& cycle, std::uint64_t next) {
+  return period_of(cycle) * static_cast<double>(next == 0 ? 0 : next - 1);
 }
 
-Result<Json> step(runtime::RobotCycle& cycle, const Json& request) {
-  return answer(cycle, cycle.inbox().clock().step(request.value("cycles", std::uint64_t{1})));
+/// The nearest moment. Errors: it is before the run's beginning, or beyond what can be counted.
+Result<std::uint64_t> moment_of(const runtime::RobotCycle& cycle, double seconds, const char* key) {
+  const double cycles = std::round(seconds / period_of(cycle));
+  if (cycles >= 0.0 && cycles < 9e15) return static_cast<std::uint64_t>(cycles) + 1;
+  return fail_at(key, fmt::format("{:g} s is no time of the run", seconds),
+                 "0 is its beginning; tandem clock show says where it is");
 }
+
+/// What the clock commands of one run share.
+struct Clock {
+  runtime::RobotCycle& cycle;
+  RunPast past;
+
+  [[nodiscard]] rt::ClockControl& control() const { return cycle.inbox().clock(); }
+  [[nodiscard]] std::uint64_t next() const { return control().state().next_cycle; }
+
+  /// Whoever is at the clock may want to go back.
+  void keep() const {
+    if (past.machine != nullptr) past.machine->keep();
+  }
+
+  [[nodiscard]] Json look() const {
+    Json found = apps::look(cycle);
+    if (past.machine == nullptr) return found;
+    const runtime::KeptPast kept = past.machine->past();
+    found["past"] = {
+        {"keeps", kept.keeps},
+        {"checkpoints", kept.count},
+        {"bytes", kept.bytes},
+        {"budget_bytes", kept.budget_bytes},
+        {"from_s", kept.count == 0 ? Json(nullptr) : Json(seconds_of(cycle, kept.oldest))}};
+    return found;
+  }
+
+  [[nodiscard]] Result<Json> answer(const Status& done) const {
+    if (!done) return std::unexpected(done.error());
+    keep();
+    return look();
+  }
+
+  [[nodiscard]] Result<Json> pause() const {
+    const Result<std::uint64_t> dropped = control().pause();
+    if (!dropped) return std::unexpected(dropped.error());
+    keep();
+    Json found = look();
+    found["dropped_steps"] = *dropped;
+    return found;
+  }
+
+  [[nodiscard]] Result<Json> step(const Json& request) const {
+    if (!request.contains("to_s")) {
+      return answer(control().step(request.value("cycles", std::uint64_t{1})));
+    }
+    if (request.contains("cycles")) {
+      return fail_at("to_s", "says where to, as 'cycles' does", "give one of them");
+    }
+    const double to_s = request["to_s"].get<double>();
+    const auto to = moment_of(cycle, to_s, "to_s");
+    if (!to) return std::unexpected(to.error());
+    if (control().state().standing && *to <= next()) {
+      return fail_at(
+          "to_s", fmt::format("{:g} s has been: it is {:g} s now", to_s, seconds_of(cycle, next())),
+          "tandem clock goto goes back");
+    }
+    return answer(control().step(*to - next()));
+  }
+
+  [[nodiscard]] Status may_go_back() const {
+    if (past.machine != nullptr) return {};
+    return fail("this run cannot go back in time: " + past.why_not,
+                "a simulation in one process can: tandem run … --hal sim");
+  }
+
+  [[nodiscard]] Result<Json> arrived(const Result<runtime::Travel>& travel) const {
+    if (!travel) return std::unexpected(travel.error());
+    Json found = look();
+    found["from_s"] = seconds_of(cycle, travel->from);
+    found["replayed_cycles"] = travel->replayed;
+    found["took_ms"] = 1e-6 * static_cast<double>(travel->took_ns);
+    if (travel->to == travel->asked) return found;
+    found["asked_s"] = seconds_of(cycle, travel->asked);
+    found["note"] = fmt::format(
+        "{:g} s follows from what came from outside just before, which cannot be played again: "
+        "time stands before that",
+        seconds_of(cycle, travel->asked));
+    return found;
+  }
+
+  [[nodiscard]] Result<Json> go(const Result<std::uint64_t>& next) const {
+    if (!next) return std::unexpected(next.error());
+    return arrived(past.machine->go_to(cycle, *next));
+  }
+
+  /// From where the run is: it is paused first, so that this is one moment.
+  [[nodiscard]] Result<Json> rewind(const Json& request) const {
+    if (const Status may = may_go_back(); !may) return std::unexpected(may.error());
+    if (const Status kept = past.machine->has_past(); !kept) return std::unexpected(kept.error());
+    const double by_s = request["by_s"].get<double>();
+    if (!(by_s > 0.0)) return fail_at("by_s", "goes back by more than 0 s", "write 2.5s");
+    if (auto paused = control().pause(); !paused) return std::unexpected(paused.error());
+    (void)control().await_standing(kStands_ns);
+    const double now_s = seconds_of(cycle, next());
+    return go(moment_of(cycle, now_s - by_s, "by_s"));
+  }
+
+  [[nodiscard]] Result<Json> go_to(const Json& request) const {
+    if (const Status may = may_go_back(); !may) return std::unexpected(may.error());
+    return go(moment_of(cycle, request["time_s"].get<double>(), "time_s"));
+  }
+
+  [[nodiscard]] Result<runtime::CycleCondition> condition(const Json& request) const {
+    if (const Status may = may_go_back(); !may) return std::unexpected(may.error());
+    if (!past.condition) return fail("no condition can be asked here", "use tandem clock goto");
+    auto read = past.condition(request["condition"].get<std::string>());
+    if (!read && read.error().key.empty()) read.error().key = "condition";
+    return read;
+  }
+
+  [[nodiscard]] Result<Json> back_until(const Json& request) const {
+    auto holds = condition(request);
+    if (!holds) return std::unexpected(holds.error());
+    return arrived(past.machine->back_until(cycle, std::move(*holds)));
+  }
+
+  [[nodiscard]] Result<Json> until(const Json& request) const {
+    auto holds = condition(request);
+    if (!holds) return std::unexpected(holds.error());
+    return answer(past.machine->until(cycle, std::move(*holds)));
+  }
+
+ private:
+  static constexpr std::int64_t kStands_ns = 1'000'000'000;  // at most
+};
 
 }  // namespace
 
@@ -64,16 +196,24 @@ bool time_stands(const runtime::RobotCycle& cycle) {
   return cycle.inbox().clock().state().standing;
 }
 
-void add_clock_commands(ControlRegistry& registry, runtime::RobotCycle& cycle) {
-  registry.add("clock.show", [&cycle](const Json&) -> Result<Json> { return look(cycle); });
-  registry.add("clock.pause", [&cycle](const Json&) { return pause(cycle); });
-  registry.add("clock.resume",
-               [&cycle](const Json&) { return answer(cycle, cycle.inbox().clock().resume()); });
-  registry.add("clock.step", [&cycle](const Json& request) { return step(cycle, request); });
-  registry.add("clock.rate", [&cycle](const Json& request) {
-    const auto rate = request["rate"].get<double>();
-    return answer(cycle, cycle.inbox().clock().set_rate(rate));
+void add_clock_commands(ControlRegistry& registry, runtime::RobotCycle& cycle, RunPast past) {
+  const auto clock = std::make_shared<const Clock>(cycle, std::move(past));
+  const auto add = [&](const char* name, auto asked) {
+    registry.add(name, [clock, asked](const Json& request) { return asked(*clock, request); });
+  };
+  add("clock.show", [](const Clock& on, const Json&) -> Result<Json> { return on.look(); });
+  add("clock.pause", [](const Clock& on, const Json&) { return on.pause(); });
+  add("clock.resume",
+      [](const Clock& on, const Json&) { return on.answer(on.control().resume()); });
+  add("clock.step", [](const Clock& on, const Json& request) { return on.step(request); });
+  add("clock.rate", [](const Clock& on, const Json& request) {
+    return on.answer(on.control().set_rate(request["rate"].get<double>()));
   });
+  add("clock.rewind", [](const Clock& on, const Json& request) { return on.rewind(request); });
+  add("clock.goto", [](const Clock& on, const Json& request) { return on.go_to(request); });
+  add("clock.back-until",
+      [](const Clock& on, const Json& request) { return on.back_until(request); });
+  add("clock.until", [](const Clock& on, const Json& request) { return on.until(request); });
 }
 
 }  // namespace tandem::apps

@@ -41,8 +41,8 @@ struct ControlKey {
     kTextOrObject,  ///< TOML, or the same as an object
   };
   /// Unit that a number may have on the command line, which gives SI units; beside it, the request
-  /// then has "unit": "angle" or "length".
-  enum class Unit : std::uint8_t { kNone, kPlace, kSpeed, kAcceleration };
+  /// then has "unit": "angle" or "length", but of a time.
+  enum class Unit : std::uint8_t { kNone, kPlace, kSpeed, kAcceleration, kTime };
 
   std::string name;
   Type type = Type::kText;

@@ -135,6 +135,7 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                       const hal::RobotConfig& robot, JudgeGains judge, TryController trial,
                       RunWires wires) {
+  RunPast past = std::move(wires.past);
   registry.stops_by([&cycle] { return cycle.progress().stopped_before.load(); });
   registry.add("status", [&cycle](const Json&) -> Result<Json> { return status(cycle); });
   add_group_commands(registry, cycle, robot, std::move(wires.lead));
@@ -163,7 +164,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
   add_input_commands(registry, cycle.services());
   add_sensor_commands(registry, cycle.services());
   add_signal_commands(registry, cycle.services(), robot);
-  add_clock_commands(registry, cycle);
+  add_clock_commands(registry, cycle, std::move(past));
 }
 
 }  // namespace tandem::apps

@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 
+#include "apps/control/clock_commands.hpp"
 #include "apps/control/controller_control.hpp"
 #include "apps/control/joint_control.hpp"
 #include "apps/control/joint_group.hpp"
@@ -18,6 +19,7 @@ struct RunWires {
   /// A list of `interface` and `status`; called on the serving thread. Empty: there is no bus.
   std::function<Json()> buses{};
   LeadSite lead{};  ///< add_group_commands()'s
+  RunPast past{};   ///< add_clock_commands()'
 };
 
 /// Adds "status", "loop.show", "fault.show", "fault.reset", "estop" and "run.stop", and the

@@ -24,6 +24,7 @@
 #include "apps/run/lead_site.hpp"
 #include "apps/run/loop_crash.hpp"
 #include "apps/run/pace.hpp"
+#include "apps/run/past.hpp"
 #include "apps/run/prediction.hpp"
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_end.hpp"
@@ -81,6 +82,8 @@ class Session {
 
   Exit run() {
     if (const Status opened = open_outputs(); !opened) return refuse(opened.error());
+    past_.emplace(c_, options_, server_ != nullptr);
+    if (const Status can = past_->check(options_); !can) return refuse(can.error());
     make_cycle();
     announce();
     if (const Status opened = open_inputs(); !opened) return refuse(opened.error());
@@ -129,7 +132,8 @@ class Session {
     run_.emplace(c_, options_,
                  runtime::RunParts{.recorder = recorder_.get(),
                                    .observer = observers_.observer(),
-                                   .owner = server_.get()});
+                                   .owner = server_.get(),
+                                   .time_machine = past_->machine()});
     cycle_ = &run_->cycle();
     if (server_ == nullptr) return;
     tell_faults(*server_, *cycle_);
@@ -173,7 +177,8 @@ class Session {
                }
                return all;
              },
-         .lead = lead_site(e.robot, c_.kernels.get())});
+         .lead = lead_site(e.robot, c_.kernels.get()),
+         .past = past_->of(*cycle_)});
     add_predict(commands_, c_.predictor.get(), e.robot);
     if (dds_ != nullptr) {
       admission_.add_to(commands_);
@@ -311,6 +316,7 @@ class Session {
   DdsAdmission admission_;
   std::unique_ptr<remote::Server> server_;
   hal::CycleFanOut observers_;  // of the loop
+  std::optional<Past> past_;
   std::optional<runtime::Run> run_;
   runtime::RobotCycle* cycle_ = nullptr;  // its
   ControlRegistry commands_;

@@ -14,6 +14,7 @@
 #include "base/counted.hpp"
 #include "base/open_file.hpp"
 #include "base/quoting.hpp"
+#include "log/branches.hpp"
 #include "log/compare.hpp"
 #include "log/csv.hpp"
 #include "log/log_file.hpp"
@@ -43,6 +44,13 @@ static void figures(apps::Figures& f, const LogPart& part) {
 static void figures(apps::Figures& f, const MissingParts& missing) {
   f("first", "its number", missing.first);
   f("last", "null: nobody knows how many follow", apps::known(missing.last > 0, missing.last));
+}
+
+static void figures(apps::Figures& f, const BranchLog& branch) {
+  f("file", branch.file);
+  f("of", "the log that it goes on from", branch.of);
+  f("cycle", "its first one", branch.cycle);
+  f("time_ns", "of that cycle", branch.time_ns);
 }
 
 }  // namespace tandem::log
@@ -80,6 +88,8 @@ static void figures(Figures& f, const log::LogFile* file) {
   f("parts", "its files, in the order of the run", [&] { return file->parts(); });
   f("missing", "parts of a [log in several files](log.md#several-files) that are not here",
     [&] { return file->missing(); });
+  f("branches", "logs beside it of the same run, which [went back in time](time.md#branches)",
+    [&] { return log::branches_beside(file->path()); });
 }
 
 std::vector<Figures::Row> log_figures() { return Figures::rows_of<const log::LogFile*>(); }
@@ -111,6 +121,16 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
               : !info.reduced.empty() ? "reduced"
                                       : "missing",
               shown(remark, 4'096));
+  }
+  if (!info.branch.of.empty()) {
+    facts.add("branch of",
+              fmt::format("{}, from cycle {} on; snapshot {:016x}", shown(info.branch.of, 4'096),
+                          info.branch.cycle, info.branch.snapshot));
+  }
+  for (const log::BranchLog& one : log::branches_beside(file.path())) {
+    facts.add("branches",
+              fmt::format("{} goes on from {} at {:.6g} s", shown(one.file, 4'096),
+                          shown(one.of, 4'096), static_cast<double>(one.time_ns) * 1e-9));
   }
   facts.add("backend", info.hal);
   facts.add("seed", std::to_string(info.seed));

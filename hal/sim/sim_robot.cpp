@@ -57,7 +57,9 @@ std::string SimRobot::status_text() const {
 }
 
 Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
-  for (auto waiting = posted_.front(); !waiting.empty(); waiting = posted_.front()) {
+  for (auto waiting = posted_.front(); !outside_->closed && !waiting.empty();
+       waiting = posted_.front()) {
+    outside_->came = true;
     ScenarioFault fault;
     std::memcpy(&fault, waiting.data(), sizeof fault);
     (void)robot_->inject(fault);  // beyond the most that there can be: left out

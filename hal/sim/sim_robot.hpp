@@ -28,6 +28,7 @@ class SimRobot final : public hal::can::DriveBackend {
   [[nodiscard]] Code read(const hal::CycleTime& time,
                           hal::StateImage& state) noexcept TANDEM_RT override;
   [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override;
+  void heed(hal::Outside& outside) noexcept override { outside_ = &outside; }
   [[nodiscard]] bool archive(Archive& ar) override;
 
   /// The true state at the last read(), when `truth` was asked for.
@@ -54,6 +55,8 @@ class SimRobot final : public hal::can::DriveBackend {
   hal::TruthImage truth_;
   bool keep_truth_;
   SpscRing posted_{sizeof(ScenarioFault), 16};
+  hal::Outside own_outside_;
+  hal::Outside* outside_ = &own_outside_;
   StageHook hook_;
 };
 

@@ -138,7 +138,8 @@ Run::Run(Composition& c, const Overrides& overrides, const RunParts& parts) : c_
                             .owner = {parts.owner, c.owner.get(), c.owner_slot},
                             .estimator = c.estimator.get(),
                             .snapshots = c.predictor.get(),
-                            .identity = identity_of(c, config)},
+                            .identity = identity_of(c, config),
+                            .time_machine = parts.time_machine},
                  config);
   if (c.predictor != nullptr) {
     c.predictor->attach(*cycle_, parallel(), [&c, config] { return make_fork(c, config); });

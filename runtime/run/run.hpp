@@ -22,6 +22,7 @@ struct RunParts {
   hal::CycleObserver* observer = nullptr;   ///< null: nobody watches
   hal::RemoteCommandPort* owner = nullptr;  ///< null: nobody owns the robot from afar
   rt::Clock* clock = nullptr;               ///< null: the computer's
+  TimeMachine* time_machine = nullptr;      ///< null: time does not go back
 };
 
 /// A robot with its controllers, from an experiment's file to the last cycle:

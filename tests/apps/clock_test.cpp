@@ -61,6 +61,55 @@ TEST_F(Clock, ChangesTheRateAndPausesWhileTheRunGoesOn) {
   EXPECT_EQ(end(), 0);
 }
 
+TEST_F(Clock, GoesBackAndOnAgain) {
+  start("--start-paused --duration 2000");
+  until(R"("paused": true)");
+  (void)clock("step 1500");
+  const auto before = to_run("joint list joint2 --json -").out;
+  auto answer = clock("rewind 0.5s");
+  EXPECT_DOUBLE_EQ(answer["time_s"].get<double>(), 0.999);
+  EXPECT_DOUBLE_EQ(answer["from_s"].get<double>(), 1.499);
+  EXPECT_EQ(answer["past"]["from_s"], 0.0);
+  EXPECT_NE(to_run("joint list joint2 --json -").out, before);
+  answer = clock("goto 250ms");
+  EXPECT_DOUBLE_EQ(answer["time_s"].get<double>(), 0.25);
+  answer = clock("step --to 1.499s");
+  EXPECT_DOUBLE_EQ(answer["time_s"].get<double>(), 1.499);
+  EXPECT_EQ(to_run("joint list joint2 --json -").out, before);
+  answer = clock("back-until 'phase() == running'");
+  const double begins_s = answer["time_s"].get<double>();
+  EXPECT_GT(begins_s, 0.01);
+  (void)clock("goto " + std::to_string(begins_s - 0.001));
+  answer = clock("until 'phase() == running'");
+  EXPECT_DOUBLE_EQ(answer["time_s"].get<double>(), begins_s);
+  struct {
+    const char* asked;
+    const char* says;
+  } const refused[]{
+      {"goto 7s", "7 s is not there yet; the run has reached"},
+      {"goto -1s", "time_s: -1 s is no time of the run"},
+      {"rewind 0", "by_s: goes back by more than 0 s"},
+      {"rewind 5min", "by_s: "},
+      {"goto soon", "time: 'soon' is no time (write 2.5s, 300ms, 1min, or a number of seconds)"},
+      {"step --to 0.001", "has been: it is"},
+      {"until 'torqu(joint2) > 1Nm'", "did you mean 'torque'"},
+      {"back-until 'torque(joint2) > 1e6 Nm'", "it has not become true since 0 s"}};
+  for (const auto& [asked, says] : refused) {
+    const Outcome outcome = to_run(std::string("clock ") + asked);
+    EXPECT_NE(outcome.err.find(says), std::string::npos) << asked << ": " << outcome.err;
+  }
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Clock, KeepsNoPastThatNobodyWants) {
+  start("--duration 1000000");  // as fast as it can
+  until(R"("phase": "running")");
+  const Outcome refused = to_run("clock rewind 1ms");
+  EXPECT_NE(refused.err.find("nothing of the past was kept"), std::string::npos) << refused.err;
+  EXPECT_EQ(clock("show")["paused"], false) << "a refusal changes nothing";
+  EXPECT_EQ(end(), 0);
+}
+
 // The pause counted as time in which the run was slow.
 TEST_F(Clock, APauseIsNoTimeOfTheRun) {
   begin("");

@@ -553,7 +553,7 @@ TEST_F(RunOverDds, PauseStepAndScaleTime) {
   EXPECT_EQ(trigger("emergency_stop").find("yes: emergency stop, category 1, in the next cycle"),
             0U);
   EXPECT_FALSE(clock("rewind", 0, 0.0));
-  EXPECT_NE(message.find("unknown command \"clock.rewind\""), std::string::npos) << message;
+  EXPECT_NE(message.find("by_s"), std::string::npos) << message;
   EXPECT_TRUE(clock("resume", 0, 0.0));
   until(R"("phase": "faulted")");
   EXPECT_EQ(end(), 1);

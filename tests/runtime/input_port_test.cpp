@@ -550,10 +550,11 @@ TEST_F(InputRun, TakesNoHeapInTheCycle) {
   run({timeline({{0.001, 0.1, 0.0}}, 0.002)});
   const auto port = services().inputs_of(InputFeeder::kTimeline).front();
   hal::CycleTime time{.cycle = 1000, .time_ns = 0, .period_ns = 1'000'000};
+  hal::Outside outside;
   const rt::ScopedRealtime now;
-  port->begin(time);
+  port->begin(time, true, outside);
   for (int i = 0; i < 20; ++i, ++time.cycle) {
-    (void)port->take(time, i < 10);
+    (void)port->take(time, i < 10, outside);
     (void)port->message();
   }
 }

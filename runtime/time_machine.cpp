@@ -1,0 +1,306 @@
+// The loop serves between two cycles; whoever asks waits for its answer.
+#include "runtime/time_machine.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <new>
+#include <utility>
+
+#include "base/clock_ns.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+constexpr auto kPatience = std::chrono::milliseconds(20);
+constexpr std::int64_t kStands_ns = 1'000'000'000;  // at most, from the answer on
+
+std::uint64_t cycles_of(std::int64_t ns, std::int64_t period_ns) {
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(1, ns / period_ns));
+}
+
+std::string moment_text(const RobotCycle& cycle, std::uint64_t next) {
+  const auto period_ns = static_cast<double>(cycle.config().loop.period_ns);
+  return fmt::format("{:.6g} s", 1e-9 * period_ns * static_cast<double>(next == 0 ? 0 : next - 1));
+}
+
+std::uint64_t hash_of(std::span<const std::byte> bytes) {
+  std::uint64_t hash = 0xCBF29CE484222325U;  // FNV-1a
+  for (const std::byte one : bytes) {
+    hash = (hash ^ static_cast<std::uint64_t>(one)) * 0x100000001B3U;
+  }
+  return hash;
+}
+
+/// While one exists the loop plays what has been.
+class Replay {
+ public:
+  explicit Replay(RobotCycle& cycle) : cycle_(&cycle) { cycle_->replay(true); }
+  ~Replay() { cycle_->replay(false); }
+  Replay(const Replay&) = delete;
+  Replay& operator=(const Replay&) = delete;
+
+ private:
+  RobotCycle* cycle_;
+};
+
+}  // namespace
+
+TimeMachine::TimeMachine(std::int64_t period_ns, std::size_t budget_bytes, bool keeps)
+    : apart_(cycles_of(kApart_ns, period_ns)),
+      soon_(cycles_of(kSoon_ns, period_ns)),
+      keeps_(keeps),
+      kept_(budget_bytes) {}
+
+KeptPast TimeMachine::past() const {
+  const std::lock_guard lock(mutex_);
+  KeptPast past{.keeps = keeps_.load(std::memory_order_relaxed),
+                .count = kept_.all().size(),
+                .bytes = kept_.bytes(),
+                .budget_bytes = kept_.budget_bytes()};
+  if (past.count == 0) return past;
+  past.oldest = kept_.all().front().cycle;
+  past.newest = kept_.all().back().cycle;
+  return past;
+}
+
+Status TimeMachine::has_past() const {
+  if (past().count > 0) return {};
+  return fail("nothing of the past was kept: the run went as fast as it can, and nobody asked",
+              "begin it with --checkpoints 64MB, or at --rate 1; from tandem clock pause on it is "
+              "kept, too");
+}
+
+Result<Travel> TimeMachine::go_to(RobotCycle& cycle, std::uint64_t next) {
+  return ask(cycle, {.kind = Request::Kind::kGo, .next = next});
+}
+
+Result<Travel> TimeMachine::back_until(RobotCycle& cycle, CycleCondition holds) {
+  return ask(cycle, {.kind = Request::Kind::kSearch, .holds = std::move(holds)});
+}
+
+Result<Travel> TimeMachine::ask(RobotCycle& cycle, Request request) {
+  const std::lock_guard one(asks_);
+  if (request.kind != Request::Kind::kWatch) {  // before time stands
+    if (const Status kept = has_past(); !kept) return std::unexpected(kept.error());
+  }
+  rt::ClockControl& clock = cycle.inbox().clock();
+  if (const auto paused = clock.pause(); !paused) return std::unexpected(paused.error());
+  std::unique_lock lock(mutex_);
+  request_ = &request;
+  wanted_.store(true, std::memory_order_release);
+  if (const Status called = clock.call(); !called) {
+    wanted_.store(false, std::memory_order_release);
+    request_ = nullptr;
+    return std::unexpected(called.error());
+  }
+  while (!answered_.wait_for(lock, kPatience, [&] { return request.answer.has_value(); })) {
+    if (cycle.progress().phase.load() != RunPhase::kDone) continue;
+    request_ = nullptr;
+    return fail("the run is over", "start another one: tandem run … --start-paused");
+  }
+  lock.unlock();
+  (void)clock.await_standing(kStands_ns);
+  return std::move(*request.answer);
+}
+
+Status TimeMachine::until(RobotCycle& cycle, CycleCondition holds) {
+  const auto watched = ask(cycle, {.kind = Request::Kind::kWatch, .holds = std::move(holds)});
+  if (!watched) return std::unexpected(watched.error());
+  return cycle.inbox().clock().resume();
+}
+
+// The loop's.
+
+void TimeMachine::attend(RobotCycle& cycle) noexcept {
+  if (until_) watch(cycle);
+  if (keeps_.load(std::memory_order_relaxed)) note(cycle);
+  if (wanted_.load(std::memory_order_acquire)) serve(cycle);
+}
+
+std::optional<log::Branch> TimeMachine::begins(std::uint64_t next) noexcept {
+  if (next >= reached_) {
+    reached_ = next + 1;
+    return std::nullopt;
+  }
+  const std::lock_guard lock(mutex_);
+  kept_.forget_after(next);
+  if (Checkpoint* const last = kept_.last(); last != nullptr && last->heard >= next) {
+    last->heard = Checkpoint::kNever;
+  }
+  reached_ = next + 1;
+  return log::Branch{.cycle = next, .snapshot = snapshot_};
+}
+
+/// What holds already has to end before it becomes true.
+void TimeMachine::watch(RobotCycle& cycle) {
+  const bool holds = until_(cycle.last_view());
+  if (std::exchange(held_, holds) || !holds) return;
+  until_ = {};
+  (void)cycle.inbox().clock().pause();
+}
+
+/// The cycle before this moment is done: what it heard, and whether its state is kept.
+void TimeMachine::note(RobotCycle& cycle) {
+  const std::uint64_t next = cycle.next_cycle();
+  const bool heard = cycle.take_heard();
+  if (std::exchange(seen_, next) == next) return;
+  Checkpoint* const last = kept_.last();
+  if (last != nullptr && heard) last->heard = std::min(last->heard, next - 1);
+  const std::uint64_t apart = last != nullptr && last->heard != Checkpoint::kNever ? soon_ : apart_;
+  if (last == nullptr || next >= last->cycle + apart) take(cycle);
+}
+
+/// Where there is no memory for it, there are no more.
+void TimeMachine::take(RobotCycle& cycle) {
+  try {
+    archive_.clear();
+    if (!cycle.write_down(archive_, true)) {
+      keeps_.store(false);
+      return;
+    }
+    const std::span<const std::byte> bytes = archive_.bytes();
+    Checkpoint one{.cycle = cycle.next_cycle(),
+                   .controllers = cycle.controllers(),
+                   .bytes = {bytes.begin(), bytes.end()}};
+    const std::lock_guard lock(mutex_);
+    kept_.add(std::move(one));
+  } catch (const std::bad_alloc&) {
+    keeps_.store(false);
+  }
+}
+
+void TimeMachine::serve(RobotCycle& cycle) {
+  Request* request = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    wanted_.store(false, std::memory_order_release);
+    request = std::exchange(request_, nullptr);
+  }
+  if (request == nullptr) return;  // nobody waits any more
+  const std::int64_t begin_ns = clock_ns(CLOCK_MONOTONIC);
+  Result<Travel> answer = serve(cycle, *request);
+  if (answer) answer->took_ns = clock_ns(CLOCK_MONOTONIC) - begin_ns;
+  if (std::exchange(seen_, cycle.next_cycle()) != cycle.next_cycle()) arrive(cycle);
+  const std::lock_guard lock(mutex_);
+  request->answer = std::move(answer);
+  answered_.notify_all();
+}
+
+Result<Travel> TimeMachine::serve(RobotCycle& cycle, Request& request) {
+  switch (request.kind) {
+    case Request::Kind::kGo: return go(cycle, request.next);
+    case Request::Kind::kSearch: return search(cycle, request.holds);
+    case Request::Kind::kWatch: break;
+  }
+  until_ = std::move(request.holds);
+  held_ = until_(cycle.last_view());
+  return Travel{.from = cycle.next_cycle(), .to = cycle.next_cycle()};
+}
+
+/// At another moment, which all who watch are shown.
+void TimeMachine::arrive(RobotCycle& cycle) {
+  archive_.clear();
+  (void)cycle.write_down(archive_, true);
+  snapshot_ = hash_of(archive_.bytes());
+  cycle.show_again();
+}
+
+Status TimeMachine::may_travel(const RobotCycle& cycle) const {
+  if (cycle.is_urgent()) return fail("a stop was asked for just now", "ask again");
+  const std::string lacking = cycle.unarchived();
+  if (lacking.empty()) return {};
+  return fail("the controller '" + lacking + "' has members, and no archive() that keeps them",
+              "give it one (docs/controllers.md), or unload it");
+}
+
+Result<Travel> TimeMachine::go(RobotCycle& cycle, std::uint64_t next) {
+  if (const Status may = may_travel(cycle); !may) return std::unexpected(may.error());
+  const std::uint64_t from = cycle.next_cycle();
+  if (next > std::max(reached_, from)) {
+    return fail(moment_text(cycle, next) + " is not there yet; the run has reached " +
+                    moment_text(cycle, std::max(reached_, from)),
+                "step to it: tandem clock step --to TIME");
+  }
+  if (next < kept_.all().front().cycle) {
+    return fail(moment_text(cycle, next) + " is before the oldest checkpoint, of " +
+                    moment_text(cycle, kept_.all().front().cycle),
+                "begin the run with --checkpoints, which keeps its first cycle");
+  }
+  if (from >= reached_) take(cycle);  // to come back to
+  const Checkpoint& start = *kept_.before(next);
+  Travel travel{.from = from, .to = std::min(next, start.heard), .asked = next};
+  const Status played = play(cycle, start, travel.to, travel);
+  if (!played) return std::unexpected(played.error());
+  return travel;
+}
+
+Result<Travel> TimeMachine::search(RobotCycle& cycle, const CycleCondition& holds) {
+  if (const Status may = may_travel(cycle); !may) return std::unexpected(may.error());
+  const std::uint64_t from = cycle.next_cycle();
+  if (from >= reached_) take(cycle);  // to come back to
+  Travel travel{.from = from, .to = from, .asked = from};
+  bool later = false;        // whether it holds at the beginning of the stretch after this one
+  std::uint64_t end = from;  // of this one
+  const auto all = kept_.all();
+  const auto first_after = std::ranges::lower_bound(all, from, {}, &Checkpoint::cycle);
+  for (auto start = first_after; start != all.begin();) {
+    --start;
+    std::optional<std::uint64_t> hit;
+    bool at_start = false, before = false;
+    const auto look = [&] {
+      const bool now = holds(cycle.last_view());
+      if (cycle.next_cycle() == start->cycle) {
+        at_start = now;
+      } else if (now && !before && cycle.next_cycle() < from) {
+        hit = cycle.next_cycle();
+      }
+      before = now;
+    };
+    const Status played = play(cycle, *start, std::min(end, start->heard), travel, look);
+    if (!played) {
+      (void)play(cycle, *kept_.before(from), from, travel);
+      return std::unexpected(played.error());
+    }
+    if (!hit && later && !before && end < from) hit = end;  // in a cycle that heard others
+    if (hit) {
+      travel.to = travel.asked = *hit;
+      const Status there = play(cycle, *kept_.before(*hit), *hit, travel);
+      if (!there) return std::unexpected(there.error());
+      return travel;
+    }
+    later = at_start;
+    end = start->cycle;
+  }
+  if (const Status back = play(cycle, *kept_.before(from), from, travel); !back) {
+    return std::unexpected(back.error());
+  }
+  return fail("it has not become true since " + moment_text(cycle, all.front().cycle) +
+                  ", the oldest moment that is kept",
+              later                   ? "it was true all that time"
+              : all.front().cycle > 0 ? "keep more of it: --checkpoints 1GB"
+                                      : "that is the beginning of the run");
+}
+
+/// Restores `from`, and plays on to the moment `to`. @param after  each moment on the way, that of
+/// `from` included
+Status TimeMachine::play(RobotCycle& cycle, const Checkpoint& from, std::uint64_t to,
+                         Travel& travel, const std::function<void()>& after) {
+  if (from.controllers != cycle.controllers()) {
+    return fail("at " + moment_text(cycle, from.cycle) + " other controllers were loaded than now",
+                "go to a later moment, or load and unload what was loaded then");
+  }
+  if (Status restored = cycle.restore(from.bytes); !restored) return restored;
+  if (after) after();
+  const Replay again(cycle);
+  while (cycle.next_cycle() < to) {
+    (void)cycle.step();
+    ++travel.replayed;
+    if (after) after();
+  }
+  return {};
+}
+
+}  // namespace tandem::runtime

@@ -1,0 +1,117 @@
+// Simulated time goes back: to a moment, or to the last cycle in which something became true.
+// Layer: runtime.  Thread: attend() and begins() the loop's; the rest any other.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+
+#include "base/archive.hpp"
+#include "base/result.hpp"
+#include "hal/cycle_observer.hpp"
+#include "log/info.hpp"
+#include "runtime/checkpoints.hpp"
+
+namespace tandem::runtime {
+
+class RobotCycle;
+
+/// Whether something holds after a cycle: asked in the thread of the loop, between two cycles.
+using CycleCondition = std::function<bool(const hal::CycleView&)>;
+
+/// Where time went. A moment is named by the cycle that comes next; its time is that of the cycle
+/// before.
+struct Travel {
+  std::uint64_t from = 0, to = 0;
+  std::uint64_t asked = 0;     ///< for; not `to` where what came from outside cannot be replayed
+  std::uint64_t replayed = 0;  ///< cycles that were played again
+  std::int64_t took_ns = 0;
+};
+
+/// What can be gone back to.
+struct KeptPast {
+  bool keeps = false;  ///< checkpoints are taken
+  std::size_t count = 0, bytes = 0, budget_bytes = 0;
+  std::uint64_t oldest = 0, newest = 0;  ///< moments, where count is not 0
+};
+
+/// Keeps checkpoints of a run in simulated time, and takes it back to any cycle since the first:
+/// restores the one before, and plays the cycles from there on again, to the same bits. What other
+/// threads gave a cycle cannot be played again: the next checkpoint comes soon after it.
+class TimeMachine {
+ public:
+  /// They are this far apart at most [ns], and come so soon after a cycle that heard something.
+  static constexpr std::int64_t kApart_ns = 1'000'000'000, kSoon_ns = 20'000'000;
+  static constexpr std::size_t kBudget_bytes = 64'000'000;
+
+  /// @param keeps  from the first cycle on; else from keep() on
+  TimeMachine(std::int64_t period_ns, std::size_t budget_bytes, bool keeps);
+
+  /// From now on there are checkpoints.
+  void keep() noexcept { keeps_.store(true, std::memory_order_relaxed); }
+  [[nodiscard]] KeptPast past() const;
+  /// Errors: nothing was kept yet.
+  [[nodiscard]] Status has_past() const;
+
+  // They pause simulated time, and block until it stands there.
+
+  /// `next` is the cycle that comes next then: at most the newest that the run has reached.
+  /// Errors: it is beyond; before the oldest checkpoint; other controllers were loaded then, or one
+  /// lacks an archive(); the run is over.
+  [[nodiscard]] Result<Travel> go_to(RobotCycle& cycle, std::uint64_t next);
+  /// To where `holds` has become true last: the cycle after the one in which it did.
+  /// Errors: go_to()'s; it has not since the oldest checkpoint, and time stands where it did.
+  [[nodiscard]] Result<Travel> back_until(RobotCycle& cycle, CycleCondition holds);
+  /// Lets time go on, and pauses it after the cycle in which `holds` becomes true. Does not wait.
+  [[nodiscard]] Status until(RobotCycle& cycle, CycleCondition holds);
+
+  // The loop's.
+
+  /// Between two cycles: keeps the state, goes where somebody wants. Blocks, and takes heap.
+  void attend(RobotCycle& cycle) noexcept;
+  /// `next` begins. @return what its log is, where the run has gone back and goes on otherwise
+  [[nodiscard]] std::optional<log::Branch> begins(std::uint64_t next) noexcept;
+
+ private:
+  struct Request {
+    enum class Kind : std::uint8_t { kGo, kSearch, kWatch } kind;
+    std::uint64_t next = 0;
+    CycleCondition holds{};  // instead of `next`
+    std::optional<Result<Travel>> answer{};
+  };
+  [[nodiscard]] Result<Travel> ask(RobotCycle& cycle, Request request);
+  void serve(RobotCycle& cycle);
+  [[nodiscard]] Result<Travel> serve(RobotCycle& cycle, Request& request);
+  void arrive(RobotCycle& cycle);
+  void watch(RobotCycle& cycle);
+  void note(RobotCycle& cycle);
+  void take(RobotCycle& cycle);
+  [[nodiscard]] Status may_travel(const RobotCycle& cycle) const;
+  [[nodiscard]] Result<Travel> go(RobotCycle& cycle, std::uint64_t next);
+  [[nodiscard]] Result<Travel> search(RobotCycle& cycle, const CycleCondition& holds);
+  [[nodiscard]] Status play(RobotCycle& cycle, const Checkpoint& from, std::uint64_t to,
+                            Travel& travel, const std::function<void()>& after = {});
+
+  const std::uint64_t apart_, soon_;  // cycles
+  std::atomic<bool> keeps_;
+
+  std::mutex asks_;  // one at a time
+  mutable std::mutex mutex_;
+  std::condition_variable answered_;
+  Request* request_ = nullptr;
+  std::atomic<bool> wanted_{false};  // request_
+  Checkpoints kept_;                 // the loop writes it, under mutex_
+
+  // The loop's.
+  Archive archive_;
+  std::uint64_t seen_ = Checkpoint::kNever;  // the moment of the last attend()
+  std::uint64_t reached_ = 0;                // the newest moment of this branch
+  std::uint64_t snapshot_ = 0;               // hash of the state that time went back to
+  CycleCondition until_;                     // empty: time goes on as it does
+  bool held_ = false;                        // until_, after the cycle before
+};
+
+}  // namespace tandem::runtime

@@ -1,0 +1,246 @@
+// Time that goes back, and on again to the same bits: bundled experiments with their whole chain,
+// as `tandem run` runs them, with a loop on a thread of its own.
+#include "runtime/time_machine.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "log/log_file.hpp"
+#include "tests/log/scratch_folder.hpp"
+#include "tests/runtime/bundled_run.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+std::uint64_t hash_of(std::span<const std::byte> bytes, std::uint64_t hash) {
+  for (const std::byte one : bytes) {
+    hash = (hash ^ static_cast<std::uint64_t>(one)) * 0x100000001B3U;
+  }
+  return hash;
+}
+
+/// Compares each cycle with what it was when it was first shown.
+class Witness final : public hal::CycleObserver {
+ public:
+  void take(const hal::CycleView& view) noexcept TANDEM_RT override {
+    std::uint64_t hash = hash_of(view.state.bytes(), 0xCBF29CE484222325U);
+    hash = hash_of(view.command.bytes(), hash);
+    if (view.truth != nullptr) hash = hash_of(view.truth->bytes(), hash);
+    if (view.time.cycle >= hashes.size()) return;
+    std::uint64_t& known = hashes[view.time.cycle];
+    ++shown;
+    if (known == 0) {
+      known = hash;
+    } else if (known == hash) {
+      ++again;
+    } else {
+      ++others;
+    }
+    last = view.time.cycle;
+  }
+  std::vector<std::uint64_t> hashes = std::vector<std::uint64_t>(100'000);
+  std::atomic<std::uint64_t> shown{0}, again{0}, others{0}, last{0};
+};
+
+/// A run that stands before its first cycle, with a loop on a thread of its own.
+struct Journey {
+  explicit Journey(const std::string& robot, const std::string& experiment,
+                   log::Recorder* recorder = nullptr, std::size_t budget_bytes = 64'000'000)
+      : machine(1'000'000, budget_bytes, true),
+        run(robot, experiment, paused(),
+            {.recorder = recorder, .observer = &witness, .time_machine = &machine}),
+        loop([this] { run.cycle->run(); }) {}
+  ~Journey() {
+    run.cycle->inbox().end_run();
+    loop.join();
+  }
+  static Overrides paused() {
+    Overrides overrides;
+    overrides.start_paused = true;
+    return overrides;
+  }
+  rt::ClockControl& clock() { return run.cycle->inbox().clock(); }
+  void step(std::uint64_t cycles) {
+    const Status stepped = clock().step(cycles);
+    ASSERT_TRUE(stepped) << stepped.error().to_string();
+    ASSERT_TRUE(clock().await_standing(60'000'000'000));
+  }
+  std::uint64_t now() { return clock().state().next_cycle; }
+  void go(std::uint64_t next) {
+    const auto travel = machine.go_to(*run.cycle, next);
+    ASSERT_TRUE(travel) << travel.error().to_string();
+    EXPECT_EQ(travel->to, next);
+    EXPECT_EQ(travel->asked, next);
+    if (next > 0) {
+      EXPECT_EQ(witness.last, next - 1);
+    }
+  }
+  std::string refusal(std::uint64_t next) {
+    const auto travel = machine.go_to(*run.cycle, next);
+    return travel ? "none" : travel.error().to_string();
+  }
+
+  Witness witness;
+  TimeMachine machine;
+  BundledRun run;
+  std::thread loop;
+};
+
+struct Experiment {
+  const char* robot;
+  const char* name;
+};
+class TimeMachineOf : public testing::TestWithParam<Experiment> {};
+INSTANTIATE_TEST_SUITE_P(
+    Experiments, TimeMachineOf,
+    testing::Values(Experiment{"coman", "squat"}, Experiment{"coman", "squat_ethercat"},
+                    Experiment{"double_pendulum", "trajectory"}, Experiment{"walkman", "squat"},
+                    Experiment{"panda", "hold"}),
+    [](const auto& one) { return std::string(one.param.robot) + "_" + one.param.name; });
+
+TEST_P(TimeMachineOf, PlaysAgainToTheSameBits) {
+  Journey trip(GetParam().robot, GetParam().name);
+  trip.step(4'000);
+  std::uint64_t reached = 4'000;
+  std::mt19937 dice(7);  // NOLINT: the same each time
+  for (int i = 0; i < TANDEM_TRAVELS; ++i) {
+    const std::uint64_t there = dice() % reached;
+    trip.go(there);
+    if (i % 3 == 0) trip.go(there);  // twice from the same checkpoint
+    if (i % 2 == 0) {  // a branch in which nothing changes, at times across checkpoints
+      trip.step(i % 4 == 0 ? 150 : 2'500);
+      reached = trip.now();
+    }
+    ASSERT_EQ(trip.witness.others, 0U) << "travel " << i << " to " << there;
+  }
+  EXPECT_GE(trip.witness.again, TANDEM_TRAVELS);
+}
+
+TEST(TimeMachine, SaysWhereItCannotGo) {
+  Journey trip("double_pendulum", "trajectory");
+  trip.step(100);
+  EXPECT_NE(trip.refusal(101).find("is not there yet; the run has reached 0.099 s"),
+            std::string::npos);
+  trip.go(50);
+  trip.go(100);  // nothing has happened since: it is still there
+  trip.go(50);
+  trip.step(1);
+  EXPECT_NE(trip.refusal(100).find("not there yet; the run has reached 0.05 s"), std::string::npos);
+}
+
+TEST(TimeMachine, KeepsWhatItHeardByACheckpointSoonAfter) {
+  Journey trip("double_pendulum", "trajectory");
+  trip.step(2'000);
+  trip.run.cycle->inbox().reset_faults();  // nothing to reset, but it was heard
+  trip.step(500);
+  const auto before = trip.machine.go_to(*trip.run.cycle, 2'010);
+  ASSERT_TRUE(before) << before.error().to_string();
+  EXPECT_EQ(before->to, 2'000U);  // the cycle that heard it cannot be played again
+  trip.go(2'200);                 // after the checkpoint that came soon
+  EXPECT_EQ(trip.witness.others, 0U);
+}
+
+TEST(TimeMachine, FindsWhereSomethingBecameTrueLast) {
+  Journey trip("double_pendulum", "trajectory");
+  trip.step(3'000);
+  const auto moves = [](const hal::CycleView& view) {
+    return view.state.velocity_rad_s()[0] > 0.1;
+  };
+  // The same by looking at each moment.
+  std::uint64_t last = 0;
+  bool before = false;
+  for (std::uint64_t moment = 1'900; moment < 3'000; ++moment) {
+    trip.go(moment);
+    const bool now = moves(trip.run.cycle->last_view());
+    if (now && !before && moment > 1'900) last = moment;
+    before = now;
+    ASSERT_EQ(trip.witness.others, 0U) << moment;
+  }
+  ASSERT_GT(last, 0U);
+  trip.go(3'000);
+  const auto found = trip.machine.back_until(*trip.run.cycle, moves);
+  ASSERT_TRUE(found) << found.error().to_string();
+  EXPECT_EQ(found->to, last);
+  EXPECT_EQ(trip.now(), last);
+  const auto never = trip.machine.back_until(
+      *trip.run.cycle, [](const hal::CycleView& view) { return view.time.cycle > 99'999; });
+  ASSERT_FALSE(never);
+  EXPECT_NE(never.error().message.find("has not become true since 0 s"), std::string::npos);
+  EXPECT_EQ(trip.now(), last);
+  // And forwards.
+  ASSERT_TRUE(trip.machine.until(
+      *trip.run.cycle, [](const hal::CycleView& view) { return view.time.cycle == 2'950; }));
+  while (!trip.clock().state().standing) std::this_thread::yield();
+  EXPECT_EQ(trip.now(), 2'951U);
+  EXPECT_EQ(trip.witness.others, 0U);
+}
+
+TEST(TimeMachine, ThinsOutToItsBudget) {
+  Checkpoints kept(1'000);
+  for (std::uint64_t second = 0; second < 1'000; ++second) {
+    kept.add({.cycle = second * 1'000, .bytes = std::vector<std::byte>(50)});
+    ASSERT_LE(kept.bytes(), 1'000U);
+  }
+  ASSERT_EQ(kept.all().size(), 20U);
+  EXPECT_EQ(kept.all().front().cycle, 0U);
+  EXPECT_EQ(kept.all().back().cycle, 999'000U);
+  // The older, the further apart: none of the gaps is much more than what lies behind it.
+  for (std::size_t i = 1; i + 1 < kept.all().size(); ++i) {
+    const double gap = static_cast<double>(kept.all()[i + 1].cycle - kept.all()[i].cycle);
+    EXPECT_LE(gap, 2'000.0 + static_cast<double>(999'000 - kept.all()[i].cycle)) << i;
+  }
+  EXPECT_LE(kept.all().back().cycle - kept.all()[18].cycle, 3'000U);
+}
+
+TEST(TimeMachine, ABranchHasALogOfItsOwn) {
+  const log::ScratchFolder folder;
+  const std::string path = (folder / "run.mcap");
+  {
+    auto recorder = log::Recorder::open(
+        path, {.robot = "double_pendulum", .joints = {"joint1", "joint2"}, .period_ns = 1'000'000},
+        {});
+    ASSERT_TRUE(recorder);
+    {
+      Journey trip("double_pendulum", "trajectory", recorder->get());
+      trip.step(1'000);
+      trip.go(600);
+      trip.go(300);
+      trip.step(400);
+      trip.go(700);  // nowhere else: no branch
+      trip.step(100);
+      trip.go(100);
+      trip.step(50);
+    }
+    const log::RecordingResult result = (*recorder)->close();
+    EXPECT_EQ(result.error, "");
+    EXPECT_EQ(result.branches, 3U);
+    EXPECT_EQ(result.path, (folder / "run.branch-3.mcap"));
+  }
+  struct Expected {
+    const char* file;
+    const char* of;
+    std::uint64_t first, last;
+  };
+  for (const Expected& expected :
+       {Expected{"run.mcap", "", 0, 999}, Expected{"run.branch-2.mcap", "run.mcap", 300, 799},
+        Expected{"run.branch-3.mcap", "run.branch-2.mcap", 100, 149}}) {
+    auto log = log::LogFile::open((folder / expected.file));
+    ASSERT_TRUE(log) << log.error().to_string();
+    EXPECT_EQ(log->info().branch.of, expected.of) << expected.file;
+    EXPECT_EQ(log->info().branch.cycle, expected.first) << expected.file;
+    const auto read = log->read("/tandem/state", {{.field = "cycle"}});
+    ASSERT_TRUE(read) << read.error().to_string();
+    const std::vector<double>& cycles = read->columns[0];
+    ASSERT_GT(cycles.size(), expected.last - expected.first) << expected.file;
+    for (std::size_t i = 0; i < cycles.size(); ++i) {
+      ASSERT_EQ(cycles[i], static_cast<double>(expected.first + i)) << expected.file;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tandem::runtime
