@@ -1,8 +1,6 @@
 // RunInfo to the metadata record `tandem` and back, lists as lines.
 #include "log/info.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cstdlib>
 #include <utility>
@@ -64,7 +62,7 @@ StringMap to_map(const RunInfo& info) {
   if (!info.branch.of.empty()) {
     map.emplace_back("branch_of", info.branch.of);
     map.emplace_back("branch_cycle", std::to_string(info.branch.cycle));
-    map.emplace_back("branch_snapshot", fmt::format("{:016x}", info.branch.snapshot));
+    map.emplace_back("branch_snapshot", std::to_string(info.branch.snapshot));
   }
   if (!info.reduced.empty()) map.emplace_back("reduced", info.reduced);
   if (info.operators_view) map.emplace_back("state", kOperatorsView);
@@ -88,7 +86,7 @@ RunInfo info_from(const StringMap& map) {
   info.part = std::strtoull(value_of(map, "part").c_str(), nullptr, 10);
   info.branch = {.of = value_of(map, "branch_of"),
                  .cycle = std::strtoull(value_of(map, "branch_cycle").c_str(), nullptr, 10),
-                 .snapshot = std::strtoull(value_of(map, "branch_snapshot").c_str(), nullptr, 16)};
+                 .snapshot = std::strtoull(value_of(map, "branch_snapshot").c_str(), nullptr, 10)};
   info.reduced = value_of(map, "reduced");
   info.seed = std::strtoull(value_of(map, "seed").c_str(), nullptr, 10);
   info.period_ns = std::strtoll(value_of(map, "period_ns").c_str(), nullptr, 10);
