@@ -58,6 +58,18 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
   return texts;
 }
 
+/// Whether a latched fault ended or disturbed the run that no expectation awaits.
+bool has_unexpected_fault(const WiredComposition& c, const runtime::RobotCycle& cycle,
+                          const std::vector<std::string>& texts) {
+  const std::uint64_t awaited = c.expectations == nullptr ? 0 : c.expectations->awaited_faults();
+  std::size_t expected = 0;
+  for (const runtime::FaultReport& one : cycle.faults()) {
+    const auto bit = static_cast<unsigned>(one.cause);
+    if (one.latched && bit < 64 && (awaited >> bit & 1U) != 0) ++expected;
+  }
+  return texts.size() > expected;  // they have the log's trouble as well
+}
+
 std::string served_text(const runtime::Experiment& e) {
   return fmt::format("served in DDS domain {}, {}", e.dds.domain,
                      e.remote.lockstep ? "in lockstep, " : "");
@@ -341,8 +353,18 @@ class Session {
     const Status written = write_json(options_.json, summary.json());
     if (!traced) return refuse(traced.error());
     if (!written) return refuse(written.error());
-    if (!summary.faults.empty() || (summary.gate && !kept(*summary.gate))) return Exit::kFault;
-    return summary.cut_short() ? interrupted(summary.interrupted_by) : Exit::kDone;
+    std::size_t failures = 0;
+    if (c_.expectations != nullptr) {
+      for (const runtime::ExpectationResult& one : c_.expectations->results()) {
+        if (one.passed) continue;
+        ++failures;
+        fmt::print(stderr, "expected: {}: {}\n", shown(one.name), runtime::in_words(one));
+      }
+    }
+    if (has_unexpected_fault(c_, *cycle_, summary.faults) || (summary.gate && !kept(*summary.gate)))
+      return Exit::kFault;
+    if (summary.cut_short()) return interrupted(summary.interrupted_by);
+    return failures > 0 ? Exit::kFault : Exit::kDone;
   }
 
   WiredComposition& c_;
