@@ -60,6 +60,8 @@ struct RunInfo {
 inline constexpr char kInfoRecord[] = "tandem";
 inline constexpr char kConfigurationRecord[] = "configuration";
 inline constexpr char kResultRecord[] = "result";
+/// Key of the result, once for each expectation: "NAME: passed, margin 3 Nm at 1.200 s".
+inline constexpr char kExpectedKey[] = "expected";
 
 [[nodiscard]] StringMap to_map(const RunInfo& info);
 /// What is missing stays empty: another program's log is no error.

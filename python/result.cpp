@@ -47,7 +47,8 @@ std::string Running::result() {
                                  .cycle = &run().cycle(),
                                  .controllers = c_->controllers.get(),
                                  .ground = runtime::ground_of(*c_, run().cycle()),
-                                 .kernel_variant = c_->kernels->variant};
+                                 .kernel_variant = c_->kernels->variant,
+                                 .expectations = run().expectations()};
   apps::Json json = apps::figures_json(&figures);
   json["ended"] = ended_of(*this);
   json["plant"] = e.plant != nullptr ? apps::Json(e.plant->differences) : apps::Json();

@@ -70,6 +70,20 @@ PageTable tracking_table(const RunData& run, const std::string& side) {
   return table;
 }
 
+/// Table of what the run expected; without rows when it expected nothing.
+PageTable expectation_table(const RunData& run, const std::string& side) {
+  PageTable table{"Expectations" + side,
+                  "What the experiment expects, and how far that was from failing.",
+                  {"expected", "result"},
+                  {}};
+  for (const auto& [key, value] : run.result) {  // "NAME: passed, margin 3 Nm at 1.200 s"
+    const std::size_t end = std::min({value.rfind(": passed"), value.rfind(": failed")});
+    if (key == log::kExpectedKey && end != std::string::npos)
+      table.rows.push_back({value.substr(0, end), value.substr(end + 2)});
+  }
+  return table;
+}
+
 /// Table of what `tandem run` says of a plant that is not the model; without rows when it was.
 PageTable plant_table(const RunData& run, const std::string& side) {
   PageTable table{
@@ -188,13 +202,16 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   if (!run.info.engine.empty()) facts.emplace_back("engine" + side, run.info.engine);
   facts.emplace_back("kernels" + side, run.info.kernel_variant);
   facts.emplace_back("tandem" + side, run.info.version);
-  for (const auto& [key, value] : run.result) facts.emplace_back(key + side, value);
+  for (const auto& [key, value] : run.result) {
+    if (key != log::kExpectedKey) facts.emplace_back(key + side, value);
+  }
   facts.emplace_back("data sha256" + side, run.data_sha256);
 }
 
 void add_tables(const RunData& run, const std::string& side, Page& page) {
   for (auto* make :
-       {plant_table, tracking_table, feet_table, loops_table, parameter_table, marks_table}) {
+       {expectation_table, plant_table, tracking_table, feet_table, loops_table, parameter_table,
+        marks_table}) {
     PageTable table = make(run, side);
     if (!table.rows.empty()) page.tables.push_back(std::move(table));
   }

@@ -23,6 +23,7 @@
 #include "rt/cyclic_loop.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/after_stop.hpp"
+#include "runtime/condition/expectation_spec.hpp"
 #include "runtime/controller_spec.hpp"
 #include "runtime/fall_watch.hpp"
 #include "runtime/teleoperation.hpp"
@@ -143,6 +144,7 @@ struct Experiment {
   std::shared_ptr<const sim::PlantChanges> plant;  ///< [sim.link] and its like; null: none
   std::optional<ParallelOptions> parallel;         ///< empty: there is no second robot
   dds::Config dds;                                 ///< off without the table
+  std::vector<ExpectationSpec> expectations;       ///< [[expect]]
   std::vector<ControllerSpec> controllers;
   TomlDocument document;  ///< its diagnostics() grow while controllers read parameters
 

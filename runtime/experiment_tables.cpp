@@ -11,6 +11,7 @@
 #include "hal/estimate.hpp"
 #include "hal/truth.hpp"
 #include "rt/clock_control.hpp"
+#include "runtime/expectation_rows.hpp"
 #include "runtime/plant_options.hpp"
 
 namespace tandem::runtime {
@@ -286,7 +287,7 @@ ParallelOptions read_parallel(TomlTable table, const std::string& file, const st
 const std::vector<std::string> kSections{
     "robot",  "duration_s", "seed",       "posture",    "kernel_variant", "period_ns", "sim",
     "hal",    "overrun",    "clock",      "realtime",   "faults",         "remote",    "log",
-    "report", "dds",        "controller", "estimation", "teleoperation",  "parallel"};
+    "report", "dds",        "controller", "estimation", "teleoperation",  "parallel",  "expect"};
 
 }  // namespace
 
@@ -316,6 +317,7 @@ Experiment read_tables(const TomlDocument& document, TomlTable& root) {
   }
   if (root.has("dds")) e.dds = dds::read_config(root.table("dds"), document.folder());
   check_remote(e, root.table_or_empty("remote"));
+  e.expectations = read_expectations(root);
   if (right) read_controllers(root, e.controllers);  // else they may be in a table of another name
   return e;
 }
@@ -338,6 +340,7 @@ void describe_experiment(KeyPage& page) {
   page.add("[log]", kLog);
   page.add("[report]", kReport);
   page.add("[parallel]", kParallel);
+  describe_expectations(page);
 }
 
 }  // namespace tandem::runtime

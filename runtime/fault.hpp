@@ -88,6 +88,7 @@ struct FaultReport {
   std::string board;       ///< the joint's; may be empty
   std::string text;        ///< one sentence, without `joint`
   std::string controller;  ///< whose doing it is; empty: nobody's
+  hal::FaultCause cause = hal::FaultCause::kNone;
   hal::StopCategory category = hal::StopCategory::kWarn;
   bool latched = true;
   double cleared_s = 0.0;  ///< when it is not latched

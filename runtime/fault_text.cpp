@@ -121,6 +121,7 @@ FaultReport in_words(const FaultRecord& record, std::int64_t cleared_ns,
   FaultReport fault;
   fault.cycle = record.cycle;
   fault.time_s = static_cast<double>(record.time_ns) * 1e-9;
+  fault.cause = record.cause;
   fault.category = record.category;
   fault.latched = cleared_ns == FaultLog::kLatched;
   fault.cleared_s = fault.latched ? 0.0 : static_cast<double>(cleared_ns) * 1e-9;

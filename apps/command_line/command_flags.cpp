@@ -37,6 +37,14 @@ const char kAskExamples[] = R"(Examples:
   tandem ask '{"do": "status"}' --dds --domain 7     of the only run in that DDS domain
 Without --socket or --dds it is the only running process of this user.)";
 
+const char kTestExamples[] = R"(Examples:
+  tandem test config/coman/stand.toml                one experiment
+  tandem test config --junit results.xml             every experiment that expects something
+  tandem test config --jobs 1 --timeout 60
+
+Each runs in simulation, without the wall clock, in a process of its own: a crash or a hang costs
+that one. The exit status is 1 when one fails. docs/expectations.md)";
+
 const char kCheckExamples[] = R"(Examples:
   tandem check config/coman/squat.toml               an experiment: robot, description, plugins
   tandem check config/coman/robot.toml               a robot by itself
@@ -344,6 +352,18 @@ void add_flags(CLI::App& app, CheckOptions& o) {
   app.add_flag("--repair", o.repair, "Read a robot as if it said inertia = \"repair\" in [model]");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kCheckExamples);
+}
+
+void add_flags(CLI::App& app, TestOptions& o) {
+  app.add_option("paths", o.paths, "Experiments with [[expect]], or folders of them")->required();
+  app.add_option("--jobs,-j", o.jobs, "Experiments at once (default: one for each core)")
+      ->check(is_count());
+  app.add_option("--timeout", o.timeout_s, "End one that takes longer [s, 300]")->check(a_duration());
+  app.add_option("--junit", o.junit, "Write JUnit's XML for a CI server")
+      ->check(is_given(kNameAFile));
+  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  app.footer(kTestExamples);
 }
 
 void add_flags(CLI::App& app, ControllerCheckOptions& o) {

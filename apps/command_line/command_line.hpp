@@ -83,6 +83,16 @@ struct CheckOptions {
   std::string json;
 };
 
+/// tandem test PATH…
+struct TestOptions {
+  std::vector<std::string> paths;  ///< experiments, or folders of them
+  std::size_t jobs = 0;            ///< at once; 0: as many as there are cores
+  double timeout_s = 300.0;        ///< of each, on the wall clock
+  std::string junit;               ///< file of JUnit's XML; empty: none
+  bool quiet = false;              ///< neither progress nor table
+  std::string json;
+};
+
 /// tandem controller check PLUGIN
 struct ControllerCheckOptions {
   std::string plugin;            ///< shared library
@@ -277,7 +287,8 @@ using Command =
     std::variant<Exit, RunOptions, ServeOptions, AskOptions, AskedOptions, CheckOptions,
                  ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, IdentifyOptions,
                  ExciteOptions, LatencyOptions, DoctorOptions, EmulateOptions, TopicOptions,
-                 BenchOptions, ControllerCheckOptions, ControllerNewOptions, StudioCommandOptions>;
+                 BenchOptions, ControllerCheckOptions, ControllerNewOptions, StudioCommandOptions,
+                 TestOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

@@ -86,6 +86,18 @@ double RunFigures::sim_s() const {
   return static_cast<double>(cycles * experiment->loop.period_ns) / 1e9;
 }
 
+void figures(Figures& f, const runtime::ExpectationResult& one) {
+  f("name", one.name);
+  f("passed", one.passed);
+  f("margin",
+    "signed distance to failing, in `unit`; null: nothing was measured, or a phase or fault "
+    "decided",
+    one.margin);
+  f("unit", "empty: a plain number", one.unit);
+  f("at_s", "when that was, as in the log: the worst cycle", one.at_s);
+  f("reason", "why it failed; empty: it passed", one.reason);
+}
+
 void figures(Figures& f, const RunFigures* s) {
   f("robot", "`name` of the robot.toml", [&] { return s->experiment->robot.name; });
   f("seed", "of every random generator", [&] { return s->experiment->seed; });
@@ -105,6 +117,12 @@ void figures(Figures& f, const RunFigures* s) {
     "known truth",
     [&] { return s->cycle->statistics().base(); });
   f("fault_log", "every fault", [&] { return s->cycle->faults(); });
+  f("expectations",
+    "of `[[expect]]`, in its order; null without: [expectations.md](expectations.md)", [&] {
+      return known(s->expectations != nullptr, s->expectations == nullptr
+                                                   ? std::vector<runtime::ExpectationResult>()
+                                                   : s->expectations->results());
+    });
   f("kernel_variant", "of the generated kernels that ran",
     [&] { return std::string(s->kernel_variant); });
 }

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "apps/text/figures.hpp"
+#include "runtime/condition/expectations.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/experiment.hpp"
 #include "runtime/robot_cycle.hpp"
@@ -18,9 +19,13 @@ struct RunFigures {
   const runtime::ControllerHost* controllers = nullptr;
   std::optional<runtime::GroundFigures> ground{};  ///< runtime::ground_of()'s
   const char* kernel_variant = "";
+  const runtime::Expectations* expectations = nullptr;  ///< null: there are none
 
   [[nodiscard]] double sim_s() const;
 };
+
+/// What became of an expectation.
+void figures(Figures& f, const runtime::ExpectationResult& one);
 
 /// docs/json.md, `tandem run`
 void figures(Figures& f, const RunFigures* s);

@@ -24,6 +24,9 @@ namespace tandem::apps {
 /// Reads every file, says what a run would do, moves nothing.
 [[nodiscard]] Exit check_command(const CheckOptions& options);
 
+/// Runs every experiment that expects something, each in a process of its own.
+[[nodiscard]] Exit test_command(const TestOptions& options);
+
 /// Runs a controller's library under the gate's traps, and rewinds the run.
 [[nodiscard]] Exit controller_check_command(const ControllerCheckOptions& options);
 struct ControllerCheckResult {

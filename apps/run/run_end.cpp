@@ -24,6 +24,30 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
   return texts;
 }
 
+/// Whether a latched fault ended or disturbed the run that no expectation awaits.
+bool has_unexpected_fault(const RunSummary& summary) {
+  const auto& expectations = summary.composition.expectations;
+  const std::uint64_t awaited = expectations == nullptr ? 0 : expectations->awaited_faults();
+  std::size_t expected = 0;
+  for (const runtime::FaultReport& one : summary.cycle.faults()) {
+    const auto bit = static_cast<unsigned>(one.cause);
+    if (one.latched && bit < 64 && (awaited >> bit & 1U) != 0) ++expected;
+  }
+  return summary.faults.size() > expected;  // they have the log's trouble as well
+}
+
+/// Says which expectations failed. @return how many
+std::size_t tell_failures(const RunSummary& summary) {
+  std::size_t failures = 0;
+  if (summary.composition.expectations == nullptr) return failures;
+  for (const runtime::ExpectationResult& one : summary.composition.expectations->results()) {
+    if (one.passed) continue;
+    ++failures;
+    fmt::print(stderr, "expected: {}: {}\n", shown(one.name), runtime::in_words(one));
+  }
+  return failures;
+}
+
 /// Writes what --trace asks for, and says how much of the run it is.
 Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE* out) {
   if (options.trace.empty()) return {};
@@ -65,8 +89,11 @@ Exit tell_end(RunSummary& summary, const RunOptions& options, std::FILE* out) {
   const Status written = write_json(options.json, summary.json());
   if (!traced) return refuse(traced.error());
   if (!written) return refuse(written.error());
-  if (!summary.faults.empty() || (summary.gate && !kept(*summary.gate))) return Exit::kFault;
-  return summary.cut_short() ? interrupted(summary.interrupted_by) : Exit::kDone;
+  const std::size_t failures = tell_failures(summary);
+  const bool broken = summary.gate && !kept(*summary.gate);
+  if (has_unexpected_fault(summary) || broken) return Exit::kFault;
+  if (summary.cut_short()) return interrupted(summary.interrupted_by);
+  return failures > 0 ? Exit::kFault : Exit::kDone;
 }
 
 }  // namespace tandem::apps

@@ -39,7 +39,8 @@ RunFigures RunSummary::run() const {
           .cycle = &cycle,
           .controllers = c.controllers.get(),
           .ground = runtime::ground_of(c, cycle),
-          .kernel_variant = c.kernels->variant};
+          .kernel_variant = c.kernels->variant,
+          .expectations = c.expectations.get()};
 }
 
 std::optional<ParallelSummary> RunSummary::parallel_summary() const {

@@ -232,6 +232,10 @@ log::StringMap result_of(const WiredComposition& c, const runtime::RobotCycle& c
     if (carries || c.experiment.plant != nullptr)
       result.emplace_back("weight_N", fmt::format("{:.6g}", ground->weight_N));
   }
+  if (c.expectations != nullptr) {
+    for (const runtime::ExpectationResult& one : c.expectations->results())
+      result.emplace_back(log::kExpectedKey, one.name + ": " + runtime::in_words(one));
+  }
   const std::string start = start_text(master);
   if (!start.empty()) result.emplace_back("start", start);
   for (const std::string& text : wire_of(master)) result.emplace_back("wire", text);

@@ -11,6 +11,7 @@
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_summary.hpp"
 #include "base/counted.hpp"
+#include "base/quoting.hpp"
 #include "hal/sim/engine_loader.hpp"
 
 namespace tandem::apps {
@@ -191,6 +192,22 @@ void add_output_facts(const RunSummary& summary, const Json& run, Facts& facts) 
     add_figures(facts, run, "requests over DDS", "{dds.requests}, {dds.requests_dropped} dropped");
 }
 
+/// What was expected, and how far it was from failing.
+void print_expectations(const Json& expectations, std::FILE* out) {
+  Table table({"expected", "", "margin", "at", "why"});
+  table.align_left();
+  for (const Json& one : expectations) {
+    const auto row = figures_text("{margin:.4g}", one);
+    const std::string unit = one.value("unit", "");
+    table.add({shown(one.value("name", ""), 60), one.value("passed", false) ? "passed" : "FAILED",
+               row ? *row + (unit.empty() ? "" : " " + unit) : "",
+               one["at_s"].is_null() ? "" : fmt::format("{:.3f} s", one["at_s"].get<double>()),
+               one.value("reason", "")});
+  }
+  fmt::print(out, "\n");
+  table.print(out);
+}
+
 }  // namespace
 
 void RunSummary::print(std::FILE* out) const {
@@ -206,6 +223,7 @@ void RunSummary::print(std::FILE* out) const {
   }
   if (!cycle.faults().empty()) fmt::print(out, "\n");
   print_faults(run["fault_log"], out);
+  if (run["expectations"].is_array()) print_expectations(run["expectations"], out);
   if (const auto second = parallel_summary()) print_parallel(*second, out);
   fmt::print(out, "\n");
   if (composition.master != nullptr && composition.backend->waits_for_bus()) {

@@ -86,6 +86,13 @@ Condition::Look Condition::look(const hal::CycleView& view) const noexcept TANDE
   return {.holds = value.holds == 1, .known = value.holds >= 0, .margin = value.number};
 }
 
+std::uint64_t Condition::faults() const noexcept {
+  std::uint64_t causes = 0;
+  for (const ConditionStep& step : program_.steps)
+    if (step.kind == Kind::kFault) causes |= step.index;
+  return causes;
+}
+
 Result<Condition> Condition::read(std::string_view text, const QuantityNames& names) {
   ConditionText reader(text, &names);
   Result<ConditionProgram> program = reader.condition();

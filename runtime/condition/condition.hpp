@@ -101,6 +101,8 @@ class Condition {
   [[nodiscard]] const std::string& unit() const noexcept { return program_.unit; }
   /// Whether its comparisons have more than one unit, so that margins are not of a kind.
   [[nodiscard]] bool mixes_units() const noexcept { return mixes_units_; }
+  /// Causes that it names, a bit each.
+  [[nodiscard]] std::uint64_t faults() const noexcept;
   /// As it was given.
   [[nodiscard]] const std::string& text() const noexcept { return text_; }
 

@@ -9,55 +9,11 @@
 
 #include "base/nearest.hpp"
 #include "base/quoting.hpp"
-#include "hal/wire_name.hpp"
-#include "log/event.hpp"
+#include "runtime/condition/fault_names.hpp"
 #include "runtime/condition/unit.hpp"
 
 namespace tandem::runtime {
 namespace {
-
-/// Causes by the names of the table: "kBoardSilent" is board_silent.
-std::string snake(std::string_view name) {
-  std::string out;
-  for (const char c : name.substr(1)) {
-    if (c >= 'A' && c <= 'Z' && !out.empty()) out += '_';
-    out += c;
-  }
-  return hal::wire_name(out);
-}
-
-struct NamedCauses {
-  std::string name;
-  std::uint64_t causes;
-};
-
-/// Every cause by its name and, where several have one, by the name of their event.
-std::vector<NamedCauses> cause_names() {
-  static constexpr std::pair<const char*, const char*> kRows[] = {
-#define TANDEM_FAULT_CAUSE(name, strikes, category, event, number, brief, words, advice) \
-  {#name, #event},
-#include "hal/fault_causes.inc"
-#undef TANDEM_FAULT_CAUSE
-  };
-  static_assert(std::size(kRows) <= 64);
-  std::vector<NamedCauses> all{{"any", 0}};
-  const auto add = [&all](const std::string& name, std::uint64_t bit) {
-    const auto at = std::ranges::find(all, name, &NamedCauses::name);
-    if (at == all.end()) {
-      all.push_back({name, bit});
-    } else {
-      at->causes |= bit;
-    }
-  };
-  for (std::size_t i = 0; i < std::size(kRows); ++i) {
-    const std::uint64_t bit = std::uint64_t{1} << i;
-    add("any", bit);
-    add(snake(kRows[i].first), bit);
-    // kFault is the event of most drives' causes: "any" of those is no name.
-    if (snake(kRows[i].second) != "fault") add(snake(kRows[i].second), bit);
-  }
-  return all;
-}
 
 constexpr hal::RunPhase kPhases[] = {
     hal::RunPhase::kBringUp, hal::RunPhase::kSettling,  hal::RunPhase::kRunning,
@@ -173,7 +129,7 @@ void ConditionText::phase(std::size_t begin) {
 
 void ConditionText::fault(std::size_t begin) {
   const auto inside = argument();
-  const std::vector<NamedCauses> known = cause_names();
+  const std::vector<NamedCauses> known = named_causes();
   if (!inside) return refuse(begin, "'fault' names none", "write fault(any) or fault(fell)");
   const auto is = std::ranges::find(known, *inside, &NamedCauses::name);
   if (is == known.end()) {

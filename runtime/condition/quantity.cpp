@@ -41,6 +41,7 @@ using Of = Quantity::Of;
 constexpr ShortName kShortNames[] = {
   {"time", Of::kState, "time_ns", Named::kNothing, 1, 0, "time()", "since the first cycle"},
   {"cycle", Of::kState, "cycle", Named::kNothing, 1, 0, "cycle()", "number of the cycle, from 0"},
+  {"overruns", Of::kLoop, "", Named::kNothing, 1, 0, "overruns()", "late cycles so far"},
   {"position", Of::kState, "position_rad", Named::kElement, 1, 0, "position(JOINT)", "measured, link side"},
   {"velocity", Of::kState, "velocity_rad_s", Named::kElement, 1, 0, "velocity(JOINT)", "measured, link side"},
   {"acceleration", Of::kState, "acceleration_rad_s2", Named::kElement, 1, 0, "acceleration(JOINT)", "the differenced velocity"},
@@ -211,13 +212,22 @@ const hal::Layout* layout_of_image(Of of, const QuantityNames& names) {
     case Of::kCommand: return &names.command;
     case Of::kTruth: return names.truth;
     case Of::kEstimate: return names.estimate;
-    case Of::kSignals: break;
+    case Of::kSignals:
+    case Of::kLoop: break;
   }
   return nullptr;
 }
 
 Result<Quantity> by_short_name(const ShortName& row, std::string_view argument,
                                const QuantityNames& names) {
+  if (row.named == Named::kNothing && !argument.empty()) {
+    return fail(std::string(row.call) + " names nothing", "leave the brackets empty");
+  }
+  if (row.of == Of::kLoop) {
+    Quantity loop;
+    loop.of = Of::kLoop;
+    return loop;
+  }
   const hal::Layout* layout = layout_of_image(row.of, names);
   if (layout == nullptr) return no_image(row.of);
   const log::RunInfo info = info_of(names.robot);
@@ -226,9 +236,6 @@ Result<Quantity> by_short_name(const ShortName& row, std::string_view argument,
     return fail("this run has no " + std::string(row.call), "name another quantity");
   }
   std::size_t index = row.at;
-  if (row.named == Named::kNothing && !argument.empty()) {
-    return fail(std::string(row.call) + " names nothing", "leave the brackets empty");
-  }
   if (row.named == Named::kElement) {
     const auto found =
         index_in(elements_of(*field, info), argument, words_of_element(*field, info));
@@ -328,6 +335,7 @@ double tilt_angle(std::span<const std::byte> bytes, std::size_t offset) noexcept
 double Quantity::read(const hal::CycleView& view) const noexcept TANDEM_RT {
   std::span<const std::byte> bytes;
   switch (of) {
+    case Of::kLoop: return static_cast<double>(view.times.overruns);
     case Of::kState: bytes = view.state.bytes(); break;
     case Of::kCommand: bytes = view.command.bytes(); break;
     case Of::kTruth:

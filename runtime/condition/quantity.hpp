@@ -18,7 +18,7 @@ namespace tandem::runtime {
 
 /// Where a number is in a cycle.
 struct Quantity {
-  enum class Of : std::uint8_t { kState, kCommand, kTruth, kEstimate, kSignals };
+  enum class Of : std::uint8_t { kState, kCommand, kTruth, kEstimate, kSignals, kLoop };
   /// Who says whether it has been measured.
   enum class Known : std::uint8_t {
     kAlways,

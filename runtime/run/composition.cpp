@@ -420,6 +420,30 @@ Diagnostics add_parallel(Composition& c, const KernelSupply& supply) {
   return {};
 }
 
+/// What [[expect]] names.
+Diagnostics look_up_expectations(Composition& c) {
+  const Experiment& e = c.experiment;
+  if (e.expectations.empty() || c.controllers == nullptr) return {};
+  const hal::Robot robot = hal::robot_of(e.robot);
+  const hal::StateImage state(robot.shape());
+  const hal::CommandImage command(robot.shape());
+  const hal::TruthImage* truth = truth_of(c);
+  QuantityNames names{
+      .robot = robot,
+      .state = state.layout(),
+      .command = command.layout(),
+      .truth = truth == nullptr ? nullptr : &truth->layout(),
+      .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image().layout()};
+  for (const auto& one : c.controllers->owned()) {
+    if (one == nullptr || one->io->signals.numbers() == 0) continue;
+    names.signals.push_back({one->name, {one->io, &one->io->signals}});
+  }
+  auto expectations = Expectations::read(e.expectations, e.file, names);
+  if (!expectations) return expectations.error();
+  c.expectations = std::move(*expectations);
+  return {};
+}
+
 /// The robot in simulation.
 Diagnostics add_simulation(Composition& c, const Overrides& overrides) {
   const std::string& scenario = overrides.scenario;
@@ -482,8 +506,10 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   }
   if (auto failed = add_parallel(c, kernels); !failed.empty()) return failed;
   const bool simulated = e.hal.backend == BackendKind::kSim;
-  if (!simulated || c.kernels.get() == nullptr) return {};
-  return add_simulation(c, overrides);
+  if (simulated && c.kernels.get() != nullptr) {
+    if (auto failed = add_simulation(c, overrides); !failed.empty()) return failed;
+  }
+  return overrides.serves ? Diagnostics() : look_up_expectations(c);
 }
 
 const hal::TruthImage* truth_of(const Composition& c) {

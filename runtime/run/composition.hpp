@@ -21,6 +21,7 @@
 #include "model/kernel_library.hpp"
 #include "robot/check.hpp"
 #include "robot/kernel_supply.hpp"
+#include "runtime/condition/expectations.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/cycle_config.hpp"
 #include "runtime/experiment.hpp"
@@ -61,8 +62,9 @@ struct Composition {
   remote::RemoteBackend* remote = nullptr;           ///< the robot, when another process has it
   std::unique_ptr<estimation::Estimator> estimator;  ///< null: nothing is estimated
   std::unique_ptr<ControllerHost> controllers;
-  std::shared_ptr<OwnerController> owner;  ///< null: nobody may own the robot from afar
-  std::size_t owner_slot = 0;              ///< its in `controllers`
+  std::shared_ptr<OwnerController> owner;      ///< null: nobody may own the robot from afar
+  std::size_t owner_slot = 0;                  ///< its in `controllers`
+  std::unique_ptr<Expectations> expectations;  ///< null: there are none
   std::vector<ControllerNote> notes;
   /// robot::check()'s, a category 2 that nobody can carry out, late_plans() unless the command line
   /// says how long

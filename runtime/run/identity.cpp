@@ -9,10 +9,10 @@ namespace {
 
 /// Keys and tables of an experiment that are no part by their text: they change no bit, or are
 /// added by what became of them.
-constexpr std::array<std::string_view, 14> kOtherwise{
-    "robot",    "duration_s",      "seed",   "kernel_variant", "period_ns",         "log",
-    "dds",      "report",          "remote", "clock",          "faults.after_stop", "hal.backend",
-    "realtime", "hal.delay_cycles"};
+constexpr std::array<std::string_view, 15> kOtherwise{
+    "robot",    "duration_s",       "seed",   "kernel_variant", "period_ns",         "log",
+    "dds",      "report",           "remote", "clock",          "faults.after_stop", "hal.backend",
+    "realtime", "hal.delay_cycles", "expect"};
 
 bool is_otherwise(std::string_view path) {
   return std::ranges::any_of(kOtherwise, [path](std::string_view one) {

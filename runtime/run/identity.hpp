@@ -8,10 +8,10 @@
 namespace tandem::runtime {
 
 /// The files of the robot by their texts, the experiment by its values, and what overrides it. Not
-/// what changes no bit: pace, thread, log, report, DDS. Not the duration, which only says when the
-/// run ends: it is that of the run that goes on. Not the controllers, whose host names them itself,
-/// nor faults that are injected, which are in the snapshot. What Overrides::change makes of the
-/// experiment is not seen.
+/// what changes no bit: pace, thread, log, report, DDS, what is expected. Not the duration, which
+/// only says when the run ends: it is that of the run that goes on. Not the controllers, whose host
+/// names them itself, nor faults that are injected, which are in the snapshot. What
+/// Overrides::change makes of the experiment is not seen.
 [[nodiscard]] RunIdentity identity_of(const Composition& c, const CycleConfig& config);
 
 }  // namespace tandem::runtime

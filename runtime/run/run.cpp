@@ -128,13 +128,15 @@ Run::Run(Composition& c, const Overrides& overrides, const RunParts& parts) : c_
         e.robot.shape(), c.controllers->gains(), e.loop.period_ns);
     backend = &parallel_->backend();  // passes every call on to the first robot, and tapes it
   }
+  observers_.add(c.expectations.get());
+  observers_.add(parts.observer);
   cycle_.emplace(CycleParts{.robot = e.robot,
                             .backend = *backend,
                             .controllers = *c.controllers,
                             .clock = parts.clock == nullptr ? clock_ : *parts.clock,
                             .recorder = parts.recorder,
                             .truth = truth_of(c),
-                            .observer = parts.observer,
+                            .observer = observers_.observer(),
                             .owner = {parts.owner, c.owner.get(), c.owner_slot},
                             .estimator = c.estimator.get(),
                             .snapshots = c.predictor.get(),

@@ -81,6 +81,8 @@ class Run {
   [[nodiscard]] internal_model::PredictionService* predictions() noexcept {
     return c_->predictor.get();
   }
+  /// What the experiment expects of it; null: nothing.
+  [[nodiscard]] const Expectations* expectations() const noexcept { return c_->expectations.get(); }
   /// Faults, statistics, requests, save() and restore().
   [[nodiscard]] RobotCycle& cycle() noexcept { return *cycle_; }
   [[nodiscard]] const RobotCycle& cycle() const noexcept { return *cycle_; }
@@ -89,6 +91,7 @@ class Run {
   std::unique_ptr<Composition> own_;  // open()'s
   Composition* c_;
   rt::WallClock clock_;
+  hal::CycleFanOut observers_;
   std::optional<internal_model::ParallelRobot> parallel_;
   std::optional<RobotCycle> cycle_;
 };

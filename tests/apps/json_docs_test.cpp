@@ -15,6 +15,7 @@
 #include "apps/robot/scale_facts.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/run_summary.hpp"
+#include "apps/run/test_suite.hpp"
 #include "apps/tools/commands.hpp"
 
 namespace tandem::apps {
@@ -31,6 +32,7 @@ std::string file_text(const std::string& file) {
 /// What docs/json.md documents by tables: the name in the comment before each, and its figures.
 const Named<std::vector<Figures::Row>> kTables{
     {"run", Figures::rows_of<const RunSummary*>()},
+    {"test", Figures::rows_of<SuiteResult>()},
     {"controller check", Figures::rows_of<ControllerCheckResult>()},
     {"bus", Figures::rows_of<hal::can::BusLoad>()},
     {"scales", scale_figures()},

@@ -308,6 +308,70 @@ TEST(Experiment, RefusesALogThatCannotBeKept) {
   EXPECT_NE(log("keep_free_MB = nan").find("arm/x.toml:5: log.keep_free_MB: "), std::string::npos);
 }
 
+TEST(Experiment, ReadsWhatItExpects) {
+  const auto e = parse_experiment(with(R"x([[expect]]
+always = "torque(elbow) < 4Nm"
+from_s = 0.5
+to_s = 2.0
+after = "phase() == running"
+[[expect]]
+name = "settles"
+settles = "position(elbow)"
+above = "1rad"
+below = "2rad"
+in_s = 0.4
+[[expect]]
+stays_up = true)x"),
+                                  "experiment.toml", robot());
+  ASSERT_TRUE(e.has_value()) << e.error().front().to_string();
+  ASSERT_EQ(e->expectations.size(), 3U);
+  const ExpectationSpec& first = e->expectations[0];
+  EXPECT_EQ(first.name, "torque(elbow) < 4Nm") << "it is called what it says";
+  EXPECT_EQ(first.kind, ExpectationKind::kAlways);
+  EXPECT_EQ(first.from_s, 0.5);
+  EXPECT_EQ(first.to_s, 2.0);
+  EXPECT_EQ(first.after, "phase() == running");
+  const ExpectationSpec& second = e->expectations[1];
+  EXPECT_EQ(second.kind, ExpectationKind::kSettles);
+  EXPECT_EQ(second.text, "position(elbow)");
+  EXPECT_EQ(second.above, "1rad");
+  EXPECT_EQ(second.below, "2rad");
+  EXPECT_EQ(second.in_s, 0.4);
+  EXPECT_TRUE(e->expectations[2].stays_up);
+  EXPECT_EQ(e->expectations[2].name, "stays up");
+}
+
+TEST(Experiment, RefusesExpectationsThatSayNothing) {
+  struct Case {
+    const char *lines, *says;
+  };
+  const Case cases[] = {
+      {"", "expects nothing"},
+      {"name = \"n\"", "give one of always, never"},
+      {"always = \"a\"\nnever = \"b\"", "the row has always already"},
+      {"always = \"a\"\nstays_up = true", "the row has always already"},
+      {"alwais = \"a\"", "did you mean 'always'"},
+      {"always = 3", "must be a text"},
+      {"always = \"\"", "is empty"},
+      {"stays_up = 1", "must be"},
+      {"bounds = \"a\"", "has no bound"},
+      {"rms = \"a\"\nbelow = 3", "must be a text"},
+      {"always = \"a\"\nbelow = \"3m\"", "is of no use beside a condition"},
+      {"always = \"a\"\nin_s = 1.0", "is of no use without `settles`"},
+      {"settles = \"a\"\nbelow = \"1m\"", "does not say how long"},
+      {"settles = \"a\"\nbelow = \"1m\"\nin_s = 3\nto_s = 2", "longer than the window"},
+      {"always = \"a\"\nfrom_s = 2\nto_s = 1", "ends before it begins"},
+      {"always = \"a\"\nfrom_s = -1", "from_s: -1 is out of range"},
+      {"always = \"a\"\nfrom_s = \"1s\"", "must be a number"},
+      {"always = \"a\"\n[[expect]]\nalways = \"a\"", "two expectations are called 'a'"},
+  };
+  for (const Case& one : cases) {
+    const std::string said = errors_of(with(std::string("[[expect]]\n") + one.lines));
+    EXPECT_NE(said.find(one.says), std::string::npos) << one.lines << "\n" << said;
+  }
+  EXPECT_NE(errors_of(with("[expect]\nalways = \"a\"")), "") << "a table is no list of rows";
+}
+
 TEST(Experiment, ReadsTheNetworkProxysKeys) {
   const auto e = parse_experiment(with("[hal]\nbackend = 'dds'\ndelay_cycles = 2\n"
                                        "[remote]\ncommand = 'local'\nlockstep = true\n"

@@ -1,0 +1,298 @@
+// `tandem test`: starts a process for each experiment, a few at once, and gathers what they say.
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <thread>
+
+#include "apps/run/commands.hpp"
+#include "apps/run/test_suite.hpp"
+#include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
+#include "apps/text/json_reader.hpp"
+#include "base/counted.hpp"
+#include "base/open_file.hpp"
+#include "base/process.hpp"
+#include "base/quoting.hpp"
+#include "rt/stop_signal.hpp"
+#include "runtime/condition/expectations.hpp"
+
+namespace tandem::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using SuiteClock = std::chrono::steady_clock;
+
+constexpr std::uint64_t kMostResult = std::uint64_t{64} << 20;
+
+/// A folder for what the processes write, gone at the end.
+class SuiteFolder {
+ public:
+  SuiteFolder() : path_((fs::temp_directory_path() / "tandem-test-XXXXXX").string()) {
+    if (::mkdtemp(path_.data()) == nullptr) path_.clear();
+  }
+  ~SuiteFolder() {
+    std::error_code ignored;
+    if (!path_.empty()) fs::remove_all(path_, ignored);
+  }
+  SuiteFolder(const SuiteFolder&) = delete;
+  SuiteFolder& operator=(const SuiteFolder&) = delete;
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// A test whose process goes on.
+struct Going {
+  std::size_t test = 0;  // its number
+  pid_t child = 0;
+  SuiteClock::time_point begin;
+  bool late = false;  // it was ended for that
+};
+
+/// In simulation, without the wall clock, and beside others: no log, no socket.
+std::vector<std::string> words_of(const std::string& file) {
+  return {"run", file, "--hal", "sim", "--rate", "0", "--no-log", "--no-socket"};
+}
+
+std::string command_of(const std::string& file) {
+  std::string command = "tandem";
+  for (const std::string& word : words_of(file)) command += " " + shell_word(word);
+  return command;
+}
+
+std::string last_lines(const std::string& text) {
+  constexpr std::size_t kMost = 4'000;
+  if (text.size() <= kMost) return text;
+  const std::size_t line = text.find('\n', text.size() - kMost);
+  return line == std::string::npos ? text.substr(text.size() - kMost) : text.substr(line + 1);
+}
+
+/// "run": {"expectations": […]} of a process' JSON.
+std::vector<runtime::ExpectationResult> expectations_of(const Json& json) {
+  std::vector<runtime::ExpectationResult> all;
+  const auto list = json.find("expectations");
+  if (list == json.end() || !list->is_array()) return all;
+  for (const Json& one : *list) {
+    runtime::ExpectationResult result;
+    result.name = one.value("name", "");
+    result.passed = one.value("passed", false);
+    result.unit = one.value("unit", "");
+    result.reason = one.value("reason", "");
+    if (one["margin"].is_number()) result.margin = one["margin"].get<double>();
+    if (one["at_s"].is_number()) result.at_s = one["at_s"].get<double>();
+    all.push_back(std::move(result));
+  }
+  return all;
+}
+
+/// The first of its errors; empty: it says none.
+std::string first_error(const Json& json) {
+  const auto list = json.find("errors");
+  if (list == json.end() || !list->is_array() || list->empty()) return {};
+  const Json& first = list->front();
+  return Error{.message = first.value("message", ""),
+               .hint = first.value("hint", ""),
+               .file = first.value("file", ""),
+               .line = first.value("line", 0),
+               .key = first.value("key", "")}
+      .to_string();
+}
+
+class Suite {
+ public:
+  Suite(std::vector<SuiteTest> tests, const TestOptions& options)
+      : tests_(std::move(tests)), options_(options), out_(human_output(options.json)) {
+    for (SuiteTest& test : tests_) test.command = command_of(test.file);
+  }
+
+  Exit run() {
+    if (folder_.path().empty())
+      return refuse(Error{
+          .message = std::string("no folder can be made for the tests: ") + std::strerror(errno),
+          .hint = "look at the free space and rights of TMPDIR",
+          .file = {},
+          .key = {}});
+    const auto begin = SuiteClock::now();
+    if (const Status written = write_junit(); !written) return refuse(written.error());
+    rt::install_stop_signals();
+    Status written;
+    while ((written = start_some()) && !going_.empty() && !rt::stop_requested()) {
+      if (const Status ended = end_some(); !ended) {
+        written = ended;
+        break;
+      }
+    }
+    for (Going& one : going_) end(one);
+    if (!written) return refuse(written.error());
+    return finish(std::chrono::duration<double>(SuiteClock::now() - begin).count());
+  }
+
+ private:
+  [[nodiscard]] std::string file_of(std::size_t test, const char* ending) const {
+    return fmt::format("{}/{}{}", folder_.path(), test, ending);
+  }
+
+  Status write_junit() const {
+    if (options_.junit.empty()) return {};
+    Draft draft = Draft::file(options_.junit);
+    if (const Status done = write_file(draft.path(), junit_text(tests_)); !done)
+      return std::unexpected(draft.placed(done.error()));
+    return draft.place();
+  }
+
+  Status start_some() {
+    while (next_ < tests_.size() && going_.size() < options_.jobs) {
+      const std::size_t test = next_++;
+      if (!tests_[test].reason.empty()) continue;
+      std::vector<std::string> words = words_of(tests_[test].file);
+      words.insert(words.begin(), program_file());
+      for (const char* word : {"--quiet", "--json"}) words.emplace_back(word);
+      words.push_back(file_of(test, ".json"));
+      const auto child =
+          spawn({.command = std::move(words), .output = file_of(test, ".txt"), .own_group = true});
+      if (!child) return std::unexpected(child.error());
+      going_.push_back({.test = test, .child = *child, .begin = SuiteClock::now()});
+    }
+    return {};
+  }
+
+  /// Waits a little; takes those that have ended, and ends those that are too slow.
+  Status end_some() {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    for (std::size_t i = 0; i < going_.size();) {
+      Going& one = going_[i];
+      int raw = 0;
+      if (::waitpid(one.child, &raw, WNOHANG) == one.child) {
+        take(one, exit_status(raw));
+        going_.erase(going_.begin() + static_cast<std::ptrdiff_t>(i));
+        if (const Status written = write_junit(); !written) return written;
+        continue;
+      }
+      const std::chrono::duration<double> took = SuiteClock::now() - one.begin;
+      if (!one.late && took.count() > options_.timeout_s) {
+        one.late = true;
+        (void)::kill(-one.child, SIGKILL);
+      }
+      ++i;
+    }
+    return {};
+  }
+
+  static void end(const Going& one) {
+    (void)::kill(-one.child, SIGKILL);
+    (void)wait_for(one.child);
+  }
+
+  void take(const Going& one, int status) {
+    SuiteTest& test = tests_[one.test];
+    test.seconds = std::chrono::duration<double>(SuiteClock::now() - one.begin).count();
+    const auto text = read_file(file_of(one.test, ".json"), "", kMostResult);
+    const auto json = text ? read_json_object(*text) : Result<Json>(Json::object());
+    const Json result = json ? *json : Json::object();
+    test.expectations = expectations_of(result);
+    const auto said = read_file(file_of(one.test, ".txt"), "", kMostResult);
+    test.passed = status == 0 && !one.late && !test.expectations.empty() &&
+                  runtime::failed(test.expectations) == 0;
+    if (*test.passed) return tell(test);
+    if (said) test.said = last_lines(*said);
+    if (one.late) {
+      test.reason = fmt::format("it was ended after {:g} s", options_.timeout_s);
+    } else if (status >= 128) {
+      const char* name = ::sigabbrev_np(status - 128);
+      test.reason =
+          fmt::format("crashed: {}", name == nullptr ? "by a signal" : std::string("SIG") + name);
+    } else if (const std::string error = first_error(result); !error.empty()) {
+      test.reason = error;
+    } else if (const auto ended = result.find("ended"); ended != result.end() &&
+                                                        *ended == "by a fault" &&
+                                                        runtime::failed(test.expectations) == 0) {
+      test.reason = "it ended by a fault that no expectation awaits";
+    } else if (runtime::failed(test.expectations) == 0) {
+      test.reason = fmt::format("its process ended with status {}", status);
+    }
+    tell(test);
+  }
+
+  void tell(const SuiteTest& test) {
+    ++ended_;
+    if (options_.quiet) return;
+    fmt::print(out_, "{} {} ({:.1f} s)\n", *test.passed ? "passed" : "FAILED",
+               shown(test.file, 4'096), test.seconds);
+    std::fflush(out_);
+  }
+
+  Exit finish(double seconds) {
+    SuiteResult result{.seconds = seconds, .tests = std::move(tests_)};
+    for (const SuiteTest& test : result.tests) {
+      std::size_t& count = !test.passed   ? result.skipped
+                           : *test.passed ? result.passed
+                                          : result.failed;
+      ++count;
+    }
+    print(result);
+    const Status written = write_json(options_.json, figures_json(result));
+    if (!written) return refuse(written.error());
+    if (rt::stop_requested() && ended_ < result.tests.size()) return interrupted(rt::stop_signal());
+    return result.failed > 0 ? Exit::kFault : Exit::kDone;
+  }
+
+  void print(const SuiteResult& result) const {
+    Table table({"experiment", "expected", "", "margin", "at", "why"});
+    table.align_left();
+    for (const SuiteTest& test : result.tests) {
+      const bool alone = test.expectations.empty() || !test.reason.empty();
+      if (alone)
+        table.add({shown(test.file, 48), "",
+                   !test.passed ? "skipped" : (*test.passed ? "passed" : "FAILED"), "", "",
+                   test.reason.empty() ? "it was not run" : shown(test.reason)});
+      for (const runtime::ExpectationResult& one : test.expectations)
+        table.add({shown(test.file, 48), shown(one.name, 48), one.passed ? "passed" : "FAILED",
+                   runtime::margin_text(one),
+                   one.at_s ? fmt::format("{:.3f} s", *one.at_s) : std::string(),
+                   shown(one.reason)});
+    }
+    if (!options_.quiet) {
+      fmt::print(out_, "\n");
+      table.print(out_);
+      fmt::print(out_, "\n{}: {} passed, {} failed, {} skipped, in {:.1f} s\n",
+                 counted(result.tests.size(), "experiment"), result.passed, result.failed,
+                 result.skipped, result.seconds);
+    }
+    for (const SuiteTest& test : result.tests) {
+      if (test.passed.value_or(true)) continue;
+      fmt::print(stderr, "failed: {}{}{}\n  repeat it: {}\n", shown(test.file, 4'096),
+                 test.reason.empty() ? "" : ": ", shown(test.reason), test.command);
+      if (!test.reason.empty() && !test.said.empty())
+        fmt::print(stderr, "{}", test.said.ends_with('\n') ? test.said : test.said + "\n");
+    }
+  }
+
+  std::vector<SuiteTest> tests_;
+  const TestOptions& options_;
+  std::FILE* out_;
+  SuiteFolder folder_;
+  std::vector<Going> going_;
+  std::size_t next_ = 0, ended_ = 0;
+};
+
+}  // namespace
+
+Exit test_command(const TestOptions& given) {
+  TestOptions options = given;
+  if (options.jobs == 0) options.jobs = std::max(1U, std::thread::hardware_concurrency());
+  for (const std::string& file : {options.json, options.junit}) {
+    if (const Status writable = check_writable(file); !writable) return refuse(writable.error());
+  }
+  auto tests = find_tests(options.paths);
+  if (!tests) return refuse(tests.error());
+  return Suite(std::move(*tests), options).run();
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,251 @@
+#include "runtime/condition/expectation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include "base/counted.hpp"
+#include "hal/truth.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using Judged = ExpectationKind;
+
+double in_seconds(std::int64_t ns) { return static_cast<double>(ns) / 1e9; }
+std::int64_t in_ns(double seconds) { return std::llround(seconds * 1e9); }
+
+const char* key_of(Judged kind) {
+  switch (kind) {
+    case Judged::kAlways: return "always";
+    case Judged::kNever: return "never";
+    case Judged::kEventually: return "eventually";
+    case Judged::kBounds: return "bounds";
+    case Judged::kRms: return "rms";
+    case Judged::kMean: return "mean";
+    case Judged::kFinal: return "final";
+    case Judged::kSettles: return "settles";
+  }
+  return "?";
+}
+
+std::unexpected<Error> at(Error error, std::string key, int line) {
+  error.key = std::move(key);
+  error.line = line;
+  return std::unexpected(std::move(error));
+}
+
+}  // namespace
+
+Result<Expectation> Expectation::read(const ExpectationSpec& spec, const QuantityNames& names) {
+  auto one = look_up(spec, names);
+  if (one || names.truth != nullptr) return one;
+  // On a robot an experiment runs as in simulation: what only that knows cannot pass there.
+  const hal::Robot& robot = names.robot;
+  const hal::TruthImage truth(robot.joints.size(), robot.feet.size(), robot.loops.size(),
+                              robot.passive.size());
+  QuantityNames with = names;
+  with.truth = &truth.layout();
+  auto simulated = look_up(spec, with);
+  if (!simulated) return one;
+  simulated->impossible_ = "it needs the truth, which a run has in simulation alone";
+  return simulated;
+}
+
+Result<Expectation> Expectation::look_up(const ExpectationSpec& spec, const QuantityNames& names) {
+  if (spec.stays_up && !names.robot.floating_base) {
+    return at(fail("the base of this robot is fixed: it cannot fall", "leave stays_up out").error(),
+              "stays_up", spec.line);
+  }
+  Expectation one;
+  one.spec_ = spec;
+  one.from_ns_ = in_ns(spec.from_s);
+  if (std::isfinite(spec.to_s)) one.to_ns_ = in_ns(spec.to_s);
+  if (one.is_condition()) {
+    auto condition = Condition::read(spec.text, names);
+    if (!condition)
+      return at(condition.error(), spec.stays_up ? "stays_up" : key_of(spec.kind), spec.line);
+    if (condition->mixes_units()) {
+      return at(fail("compares in several units: its margin would have none",
+                     "write a row [[expect]] for each unit")
+                    .error(),
+                key_of(spec.kind), spec.line);
+    }
+    one.condition_ = std::move(*condition);
+    if (spec.kind == Judged::kEventually) one.awaited_ = one.condition_.faults();
+  } else {
+    auto number = Expression::read(spec.text, names);
+    if (!number) return at(number.error(), key_of(spec.kind), spec.line);
+    one.expression_ = std::move(*number);
+    for (const auto& [text, line, bound, key] :
+         {std::tuple(&spec.above, spec.above_line, &one.above_, "above"),
+          std::tuple(&spec.below, spec.below_line, &one.below_, "below")}) {
+      if (text->empty()) continue;
+      const Result<double> value = read_amount(*text, one.expression_.unit());
+      if (!value) return at(value.error(), key, line);
+      *bound = *value;
+    }
+    if (one.above_ >= one.below_) {
+      return at(fail("nothing is above " + spec.above + " and below " + spec.below,
+                     "give a lower bound that is less than the upper one")
+                    .error(),
+                "above", spec.above_line);
+    }
+  }
+  if (!spec.after.empty()) {
+    auto after = Condition::read(spec.after, names);
+    if (!after) return at(after.error(), "after", spec.after_line);
+    one.after_ = std::move(*after);
+    if (spec.kind != Judged::kNever) one.awaited_ |= one.after_->faults();
+  }
+  return one;
+}
+
+double Expectation::margin_of(double number) const noexcept TANDEM_RT {
+  return std::min(number - above_, below_ - number);
+}
+
+void Expectation::note(double margin, bool holds, const hal::CycleView& view) noexcept TANDEM_RT {
+  const bool best = spec_.kind == Judged::kEventually;
+  const bool counts =
+      so_far_.worst_ns == kNever || (best ? margin > so_far_.worst : margin < so_far_.worst);
+  if (holds) ++so_far_.held;
+  if (!counts) return;
+  so_far_.worst = margin;
+  so_far_.worst_ns = view.time.time_ns;
+}
+
+void Expectation::take(const hal::CycleView& view) noexcept TANDEM_RT {
+  so_far_.last_ns = view.time.time_ns;
+  so_far_.period_ns = view.time.period_ns;
+  if (so_far_.zero_ns == kNever) {
+    if (after_ && !after_->holds(view)) return;
+    so_far_.zero_ns = view.time.time_ns;
+  }
+  const std::int64_t since = view.time.time_ns - so_far_.zero_ns;
+  if (since < from_ns_ || since > to_ns_) return;
+  ++so_far_.cycles;
+  if (so_far_.first_ns == kNever) so_far_.first_ns = view.time.time_ns;
+  so_far_.end_ns = view.time.time_ns;
+  const auto unknown = [this, &view] {
+    if (so_far_.unknown++ == 0) so_far_.unknown_ns = view.time.time_ns;
+  };
+  if (is_condition()) {
+    const Condition::Look look = condition_.look(view);
+    if (!look.known) return unknown();
+    const bool never = spec_.kind == Judged::kNever;
+    return note(never ? -look.margin : look.margin, look.holds != never, view);
+  }
+  const double number = expression_.value(view);
+  if (std::isnan(number)) return unknown();
+  const double margin = margin_of(number);
+  if (margin < 0.0) so_far_.outside_ns = view.time.time_ns;
+  so_far_.last = number;
+  so_far_.sum += spec_.kind == Judged::kRms ? number * number : number;
+  note(margin, margin >= 0.0, view);
+}
+
+std::string Expectation::unjudged() const {
+  if (!impossible_.empty()) return impossible_;
+  if (so_far_.last_ns == kNever) return "its controllers never started";
+  if (so_far_.zero_ns == kNever)
+    return "its window was never reached: '" + spec_.after + "' never held";
+  const double ran_s = in_seconds(so_far_.last_ns - so_far_.zero_ns);
+  if (so_far_.cycles == 0) {
+    return fmt::format(
+        "its window was never reached: it begins at {:g} s, and the run ended at {:g} s",
+        spec_.from_s, ran_s);
+  }
+  if (so_far_.unknown == so_far_.cycles) return "nobody measured it";
+  return {};
+}
+
+std::string Expectation::amount(double value) const {
+  const std::string& unit = is_condition() ? condition_.unit() : expression_.unit();
+  return fmt::format("{:.4g}{}{}", value, unit.empty() ? "" : " ", unit);
+}
+
+/// In every cycle, or in one.
+void Expectation::judge_condition(ExpectationResult& result) const {
+  const bool once = spec_.kind == Judged::kEventually;
+  const std::uint64_t known = so_far_.cycles - so_far_.unknown;
+  if (once) {
+    result.passed = so_far_.held > 0;
+    if (!result.passed) result.reason = "it never held";
+    return;
+  }
+  result.passed = so_far_.held == known && so_far_.unknown == 0;
+  if (so_far_.held != known) {
+    result.reason = fmt::format("it did not hold in {} of {}", known - so_far_.held,
+                                counted(so_far_.cycles, "cycle"));
+  }
+}
+
+void Expectation::judge_number(ExpectationResult& result) const {
+  double value = so_far_.last;
+  const auto known = static_cast<double>(so_far_.cycles - so_far_.unknown);
+  if (spec_.kind == Judged::kRms) value = std::sqrt(so_far_.sum / known);
+  if (spec_.kind == Judged::kMean) value = so_far_.sum / known;
+  if (spec_.kind == Judged::kFinal) result.at_s = in_seconds(so_far_.end_ns);
+  const double margin = margin_of(value);
+  result.margin = margin;
+  result.passed = margin >= 0.0;
+  if (!result.passed) result.reason = "it is " + amount(value);
+}
+
+void Expectation::judge_settling(ExpectationResult& result) const {
+  result.unit = "s";
+  result.at_s.reset();
+  result.margin.reset();
+  if (so_far_.outside_ns == so_far_.end_ns) {
+    result.reason = "it was outside at the end of its window";
+    const double late = spec_.in_s - in_seconds(so_far_.end_ns - so_far_.first_ns);
+    if (late < 0.0) result.margin = late;
+    return;
+  }
+  const std::int64_t settled =
+      so_far_.outside_ns == kNever ? so_far_.first_ns : so_far_.outside_ns + so_far_.period_ns;
+  const double took_s = in_seconds(settled - so_far_.first_ns);
+  result.margin = spec_.in_s - took_s;
+  result.at_s = in_seconds(settled);
+  result.passed = *result.margin >= 0.0;
+  if (!result.passed) result.reason = fmt::format("it took {:g} s", took_s);
+}
+
+ExpectationResult Expectation::result() const {
+  ExpectationResult result;
+  result.name = spec_.name;
+  result.unit = is_condition() ? condition_.unit() : expression_.unit();
+  result.reason = unjudged();
+  if (!result.reason.empty()) return result;
+  if (std::isfinite(so_far_.worst)) result.margin = so_far_.worst;
+  if (so_far_.worst_ns != kNever) result.at_s = in_seconds(so_far_.worst_ns);
+  if (is_condition() || spec_.kind == Judged::kBounds) {
+    judge_condition(result);
+  } else if (spec_.kind == Judged::kSettles) {
+    judge_settling(result);
+  } else {
+    judge_number(result);
+  }
+  const bool once = spec_.kind == Judged::kEventually;
+  // No cycle is worse than another one when a phase or a fault did not come.
+  if (result.passed && !once && !result.margin) result.at_s.reset();
+  if (so_far_.unknown > 0 && !once && result.reason.empty()) {
+    result.passed = false;
+    result.reason = fmt::format("nobody measured it in {} of {}, first at {:g} s", so_far_.unknown,
+                                counted(so_far_.cycles, "cycle"), in_seconds(so_far_.unknown_ns));
+  }
+  const std::int64_t ran = so_far_.last_ns - so_far_.zero_ns;
+  const bool whole = !std::isfinite(spec_.to_s) || ran + so_far_.period_ns >= to_ns_;
+  if (result.passed && !whole && !once) {
+    result.passed = false;
+    result.reason = fmt::format("its window ends at {:g} s, and the run ended at {:g} s",
+                                spec_.to_s, in_seconds(ran));
+  }
+  return result;
+}
+
+}  // namespace tandem::runtime

@@ -1,0 +1,91 @@
+// One expectation: judged cycle by cycle, with its distance to failing.
+// Layer: runtime/condition.  Thread: read() and result() non-RT; take() the loop's.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "base/result.hpp"
+#include "runtime/condition/condition.hpp"
+#include "runtime/condition/expectation_spec.hpp"
+
+namespace tandem::runtime {
+
+/// What became of an expectation.
+struct ExpectationResult {
+  std::string name;
+  bool passed = false;
+  /// Signed distance to failing [unit]: less than 0 when it failed. Empty: there is none, as a
+  /// phase or a fault decided, or it was never measured.
+  std::optional<double> margin{};
+  std::string unit;              ///< "Nm"; empty: a plain number
+  std::optional<double> at_s{};  ///< when that was, as in the log: the worst cycle
+  std::string reason;            ///< why it failed; empty: it passed
+
+  bool operator==(const ExpectationResult&) const = default;
+};
+
+class Expectation {
+ public:
+  /// Looks every name up. An expectation on the truth of a run that has none is read, and fails.
+  /// Errors, with the key: Condition::read()'s; bounds that leave no room.
+  [[nodiscard]] static Result<Expectation> read(const ExpectationSpec& spec,
+                                                const QuantityNames& names);
+
+  /// A cycle since the controllers start, before the run is shut down. @rt no heap, no lock
+  void take(const hal::CycleView& view) noexcept TANDEM_RT;
+  /// What became of it by now.
+  [[nodiscard]] ExpectationResult result() const;
+
+  /// Faults that have to come for it to pass: causes, a bit each.
+  [[nodiscard]] std::uint64_t awaited_faults() const { return awaited_; }
+  [[nodiscard]] const ExpectationSpec& spec() const { return spec_; }
+  void archive(Archive& ar) { ar(so_far_); }
+
+ private:
+  /// What the cycles so far amount to; plain data.
+  struct SoFar {
+    std::int64_t zero_ns = kNever;                    // of the window's times
+    std::int64_t last_ns = kNever;                    // the newest cycle
+    std::int64_t first_ns = kNever, end_ns = kNever;  // cycles in the window
+    std::uint64_t cycles = 0;                         // in it
+    std::uint64_t unknown = 0;                        // of these
+    std::int64_t unknown_ns = kNever;                 // the first of these
+    std::uint64_t held = 0;                           // known ones in which it did
+    double worst = 0.0;                               // margin; of kEventually the best
+    std::int64_t worst_ns = kNever;
+    double sum = 0.0, last = 0.0;      // of the number, or its square
+    std::int64_t outside_ns = kNever;  // the last cycle out of the bounds
+    std::int64_t period_ns = 0;
+  };
+  static constexpr std::int64_t kNever = -1;
+
+  /// read(), by these names alone.
+  [[nodiscard]] static Result<Expectation> look_up(const ExpectationSpec& spec,
+                                                   const QuantityNames& names);
+  [[nodiscard]] bool is_condition() const { return spec_.kind <= ExpectationKind::kEventually; }
+  [[nodiscard]] double margin_of(double number) const noexcept TANDEM_RT;
+  void note(double margin, bool holds, const hal::CycleView& view) noexcept TANDEM_RT;
+  /// Why nothing can be said; empty: something can.
+  [[nodiscard]] std::string unjudged() const;
+  [[nodiscard]] std::string amount(double value) const;
+  void judge_condition(ExpectationResult& result) const;
+  void judge_number(ExpectationResult& result) const;
+  void judge_settling(ExpectationResult& result) const;
+
+  ExpectationSpec spec_;
+  std::string impossible_;  // why it cannot pass in this run
+  Condition condition_;     // kAlways, kNever, kEventually
+  Expression expression_;   // the others
+  std::optional<Condition> after_;
+  double above_ = -std::numeric_limits<double>::infinity();
+  double below_ = std::numeric_limits<double>::infinity();
+  std::int64_t from_ns_ = 0, to_ns_ = std::numeric_limits<std::int64_t>::max();
+  std::uint64_t awaited_ = 0;
+  SoFar so_far_;
+};
+
+}  // namespace tandem::runtime

@@ -1,0 +1,64 @@
+#include "runtime/condition/expectations.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace tandem::runtime {
+
+std::expected<std::unique_ptr<Expectations>, Diagnostics> Expectations::read(
+    std::span<const ExpectationSpec> specs, const std::string& file, const QuantityNames& names) {
+  auto all = std::make_unique<Expectations>();
+  Diagnostics errors;
+  for (const ExpectationSpec& spec : specs) {
+    auto one = Expectation::read(spec, names);
+    if (one) {
+      all->all_.push_back(std::move(*one));
+      continue;
+    }
+    Error error = one.error();
+    error.file = file;
+    error.key = "expect." + error.key;
+    errors.push_back(std::move(error));
+  }
+  if (!errors.empty()) return std::unexpected(std::move(errors));
+  return all;
+}
+
+void Expectations::take(const hal::CycleView& view) noexcept TANDEM_RT {
+  started_ = started_ || view.phase == hal::RunPhase::kRunning;
+  if (!started_ || hal::ends(view.phase)) return;
+  for (Expectation& one : all_) one.take(view);
+}
+
+std::vector<ExpectationResult> Expectations::results() const {
+  std::vector<ExpectationResult> results;
+  for (const Expectation& one : all_) results.push_back(one.result());
+  return results;
+}
+
+std::uint64_t Expectations::awaited_faults() const {
+  std::uint64_t causes = 0;
+  for (const Expectation& one : all_) causes |= one.awaited_faults();
+  return causes;
+}
+
+std::size_t failed(std::span<const ExpectationResult> results) {
+  return static_cast<std::size_t>(std::ranges::count(results, false, &ExpectationResult::passed));
+}
+
+std::string margin_text(const ExpectationResult& result) {
+  if (!result.margin) return {};
+  return fmt::format("{:.4g}{}{}", *result.margin, result.unit.empty() ? "" : " ", result.unit);
+}
+
+std::string in_words(const ExpectationResult& result) {
+  std::string text = result.passed ? "passed" : "failed";
+  if (!result.reason.empty()) text += ", " + result.reason;
+  if (const std::string margin = margin_text(result); !margin.empty()) text += ", margin " + margin;
+  if (result.at_s) text += fmt::format(" at {:.3f} s", *result.at_s);
+  return text;
+}
+
+}  // namespace tandem::runtime

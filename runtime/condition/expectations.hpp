@@ -1,0 +1,53 @@
+// The expectations of an experiment, judged in every cycle of its run.
+// Layer: runtime/condition.  Thread: read() and results() non-RT; take() the loop's.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/archive.hpp"
+#include "base/result.hpp"
+#include "hal/cycle_observer.hpp"
+#include "runtime/condition/expectation.hpp"
+
+namespace tandem::runtime {
+
+/// Watches a loop from within: what crosses a ring may be dropped, and an expectation is on every
+/// cycle. From the controllers' start to the shut-down.
+class Expectations final : public hal::CycleObserver {
+ public:
+  /// @param file  of the specs, for errors
+  /// Errors, all at once: Expectation::read()'s.
+  [[nodiscard]] static std::expected<std::unique_ptr<Expectations>, Diagnostics> read(
+      std::span<const ExpectationSpec> specs, const std::string& file, const QuantityNames& names);
+
+  /// @rt no heap, no lock, some 50 ns an expectation
+  void take(const hal::CycleView& view) noexcept TANDEM_RT override;
+
+  /// Once the loop has ended, or stands.
+  [[nodiscard]] std::vector<ExpectationResult> results() const;
+  /// Faults that an expectation awaits, such as `eventually = "fault(board_silent)"`: causes, a bit
+  /// each. These are no failure of the run.
+  [[nodiscard]] std::uint64_t awaited_faults() const;
+  /// How far they are, for a run that is rewound.
+  void archive(Archive& ar) {
+    ar(started_);
+    for (Expectation& one : all_) one.archive(ar);
+  }
+
+ private:
+  std::vector<Expectation> all_;
+  bool started_ = false;
+};
+
+/// How many of them failed.
+[[nodiscard]] std::size_t failed(std::span<const ExpectationResult> results);
+/// "passed, margin 3.2 Nm at 1.234 s", "failed, it never held".
+[[nodiscard]] std::string in_words(const ExpectationResult& result);
+/// "3.2 Nm"; empty: there is none.
+[[nodiscard]] std::string margin_text(const ExpectationResult& result);
+
+}  // namespace tandem::runtime
