@@ -7,17 +7,17 @@ namespace tandem::runtime {
 
 void Checkpoints::add(Checkpoint one) {
   if (!all_.empty() && all_.back().cycle == one.cycle) {
-    bytes_ -= all_.back().bytes.size();
+    bytes_ -= all_.back().size();
     all_.pop_back();
   }
-  bytes_ += one.bytes.size();
+  bytes_ += one.size();
   all_.push_back(std::move(one));
   thin();
 }
 
 void Checkpoints::forget_after(std::uint64_t cycle) {
   while (!all_.empty() && all_.back().cycle > cycle) {
-    bytes_ -= all_.back().bytes.size();
+    bytes_ -= all_.back().size();
     all_.pop_back();
   }
 }
@@ -39,7 +39,7 @@ void Checkpoints::thin() {
       closest = per_age;
       worst = i;
     }
-    bytes_ -= all_[worst].bytes.size();
+    bytes_ -= all_[worst].size();
     all_.erase(all_.begin() + static_cast<std::ptrdiff_t>(worst));
   }
 }

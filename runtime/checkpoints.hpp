@@ -14,10 +14,13 @@ namespace tandem::runtime {
 struct Checkpoint {
   static constexpr std::uint64_t kNever = std::numeric_limits<std::uint64_t>::max();
 
-  std::uint64_t cycle = 0;         ///< the first that follows from it
-  std::uint64_t heard = kNever;    ///< the first cycle from there that heard other threads
-  std::uint64_t controllers = 0;   ///< ControllerHost::fingerprint()
-  std::vector<std::byte> bytes{};  ///< RobotCycle::save()
+  std::uint64_t cycle = 0;          ///< the first that follows from it
+  std::uint64_t heard = kNever;     ///< the first cycle from there that heard other threads
+  std::uint64_t controllers = 0;    ///< ControllerHost::fingerprint()
+  std::vector<std::byte> bytes{};   ///< RobotCycle::save()
+  std::vector<std::byte> judged{};  ///< how far the run's expectations are
+
+  [[nodiscard]] std::size_t size() const { return bytes.size() + judged.size(); }
 };
 
 /// Ordered by cycle.

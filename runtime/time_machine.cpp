@@ -165,6 +165,11 @@ void TimeMachine::take(RobotCycle& cycle) {
     Checkpoint one{.cycle = cycle.next_cycle(),
                    .controllers = cycle.controllers(),
                    .bytes = {bytes.begin(), bytes.end()}};
+    if (expectations_ != nullptr) {
+      Archive judged;
+      expectations_->archive(judged);
+      one.judged.assign(judged.bytes().begin(), judged.bytes().end());
+    }
     const std::lock_guard lock(mutex_);
     kept_.add(std::move(one));
   } catch (const std::bad_alloc&) {
@@ -293,11 +298,16 @@ Status TimeMachine::play(RobotCycle& cycle, const Checkpoint& from, std::uint64_
                 "go to a later moment, or load and unload what was loaded then");
   }
   if (Status restored = cycle.restore(from.bytes); !restored) return restored;
+  if (expectations_ != nullptr) {
+    Archive judged(from.judged);
+    expectations_->archive(judged);
+  }
   if (after) after();
   const Replay again(cycle);
   while (cycle.next_cycle() < to) {
     (void)cycle.step();
     ++travel.replayed;
+    if (expectations_ != nullptr) expectations_->take(cycle.last_view());
     if (after) after();
   }
   return {};

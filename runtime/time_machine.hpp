@@ -14,6 +14,7 @@
 #include "hal/cycle_observer.hpp"
 #include "log/info.hpp"
 #include "runtime/checkpoints.hpp"
+#include "runtime/condition/expectations.hpp"
 
 namespace tandem::runtime {
 
@@ -55,6 +56,9 @@ class TimeMachine {
   [[nodiscard]] KeptPast past() const;
   /// Errors: nothing was kept yet.
   [[nodiscard]] Status has_past() const;
+
+  /// Before the first cycle: expectations are judged by the branch that the run is in.
+  void judge_by(Expectations* expectations) noexcept { expectations_ = expectations; }
 
   // They pause simulated time, and block until it stands there.
 
@@ -104,6 +108,8 @@ class TimeMachine {
   Request* request_ = nullptr;
   std::atomic<bool> wanted_{false};  // request_
   Checkpoints kept_;                 // the loop writes it, under mutex_
+
+  Expectations* expectations_ = nullptr;  // watch each live cycle by themselves
 
   // The loop's.
   Archive archive_;

@@ -27,6 +27,8 @@ std::expected<std::unique_ptr<Expectations>, Diagnostics> Expectations::read(
 }
 
 void Expectations::take(const hal::CycleView& view) noexcept TANDEM_RT {
+  if (view.time.time_ns <= newest_ns_) return;
+  newest_ns_ = view.time.time_ns;
   started_ = started_ || view.phase == hal::RunPhase::kRunning;
   if (!started_ || hal::ends(view.phase)) return;
   for (Expectation& one : all_) one.take(view);

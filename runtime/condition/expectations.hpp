@@ -24,7 +24,7 @@ class Expectations final : public hal::CycleObserver {
   [[nodiscard]] static std::expected<std::unique_ptr<Expectations>, Diagnostics> read(
       std::span<const ExpectationSpec> specs, const std::string& file, const QuantityNames& names);
 
-  /// @rt no heap, no lock, some 50 ns an expectation
+  /// A cycle that it has seen already counts once. @rt no heap, no lock, some 50 ns an expectation
   void take(const hal::CycleView& view) noexcept TANDEM_RT override;
 
   /// Once the loop has ended, or stands.
@@ -34,13 +34,14 @@ class Expectations final : public hal::CycleObserver {
   [[nodiscard]] std::uint64_t awaited_faults() const;
   /// How far they are, for a run that is rewound.
   void archive(Archive& ar) {
-    ar(started_);
+    ar(started_, newest_ns_);
     for (Expectation& one : all_) one.archive(ar);
   }
 
  private:
   std::vector<Expectation> all_;
   bool started_ = false;
+  std::int64_t newest_ns_ = -1;  // of the cycles seen
 };
 
 /// How many of them failed.

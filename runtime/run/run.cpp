@@ -5,6 +5,7 @@
 #include "hal/config/capabilities.hpp"
 #include "runtime/run/identity.hpp"
 #include "runtime/run/operator_link.hpp"
+#include "runtime/time_machine.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -129,6 +130,7 @@ Run::Run(Composition& c, const Overrides& overrides, const RunParts& parts) : c_
     backend = &parallel_->backend();  // passes every call on to the first robot, and tapes it
   }
   observers_.add(c.expectations.get());
+  if (parts.time_machine != nullptr) parts.time_machine->judge_by(c.expectations.get());
   observers_.add(parts.observer);
   cycle_.emplace(CycleParts{.robot = e.robot,
                             .backend = *backend,

@@ -78,7 +78,8 @@ struct Pad : testing::Test {
   }
   /// What the next cycle holds.
   std::span<const double> take() {
-    (void)port->take({.cycle = ++cycle, .time_ns = 0, .period_ns = 1'000'000}, true);
+    hal::Outside outside;
+    (void)port->take({.cycle = ++cycle, .time_ns = 0, .period_ns = 1'000'000}, true, outside);
     return port->input().value;
   }
   [[nodiscard]] std::string why_not_open(std::map<std::string, std::string> mapping) {

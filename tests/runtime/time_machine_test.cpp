@@ -49,18 +49,20 @@ class Witness final : public hal::CycleObserver {
 /// A run that stands before its first cycle, with a loop on a thread of its own.
 struct Journey {
   explicit Journey(const std::string& robot, const std::string& experiment,
-                   log::Recorder* recorder = nullptr, std::size_t budget_bytes = 64'000'000)
-      : machine(1'000'000, budget_bytes, true),
-        run(robot, experiment, paused(),
+                   log::Recorder* recorder = nullptr,
+                   const std::vector<ExpectationSpec>& expectations = {})
+      : machine(1'000'000, TimeMachine::kBudget_bytes, true),
+        run(robot, experiment, paused(expectations),
             {.recorder = recorder, .observer = &witness, .time_machine = &machine}),
         loop([this] { run.cycle->run(); }) {}
   ~Journey() {
     run.cycle->inbox().end_run();
     loop.join();
   }
-  static Overrides paused() {
+  static Overrides paused(const std::vector<ExpectationSpec>& expectations) {
     Overrides overrides;
     overrides.start_paused = true;
+    overrides.change = [expectations](runtime::Experiment& e) { e.expectations = expectations; };
     return overrides;
   }
   rt::ClockControl& clock() { return run.cycle->inbox().clock(); }
@@ -90,17 +92,19 @@ struct Journey {
   std::thread loop;
 };
 
-struct Experiment {
+struct Journeyed {
   const char* robot;
   const char* name;
 };
-class TimeMachineOf : public testing::TestWithParam<Experiment> {};
-INSTANTIATE_TEST_SUITE_P(
-    Experiments, TimeMachineOf,
-    testing::Values(Experiment{"coman", "squat"}, Experiment{"coman", "squat_ethercat"},
-                    Experiment{"double_pendulum", "trajectory"}, Experiment{"walkman", "squat"},
-                    Experiment{"panda", "hold"}),
-    [](const auto& one) { return std::string(one.param.robot) + "_" + one.param.name; });
+class TimeMachineOf : public testing::TestWithParam<Journeyed> {};
+INSTANTIATE_TEST_SUITE_P(Experiments, TimeMachineOf,
+                         testing::Values(Journeyed{"coman", "squat"},
+                                         Journeyed{"coman", "squat_ethercat"},
+                                         Journeyed{"double_pendulum", "trajectory"},
+                                         Journeyed{"walkman", "squat"}, Journeyed{"panda", "hold"}),
+                         [](const auto& one) {
+                           return std::string(one.param.robot) + "_" + one.param.name;
+                         });
 
 TEST_P(TimeMachineOf, PlaysAgainToTheSameBits) {
   Journey trip(GetParam().robot, GetParam().name);
@@ -177,6 +181,27 @@ TEST(TimeMachine, FindsWhereSomethingBecameTrueLast) {
   while (!trip.clock().state().standing) std::this_thread::yield();
   EXPECT_EQ(trip.now(), 2'951U);
   EXPECT_EQ(trip.witness.others, 0U);
+}
+
+// What had been seen of a future that does not come counted, too.
+TEST(TimeMachine, ExpectationsAreOfTheBranch) {
+  ExpectationSpec never;
+  never.kind = ExpectationKind::kNever;
+  never.name = "late";
+  never.text = "time() > 2 s";
+  Journey trip("double_pendulum", "trajectory", nullptr, {never});
+  const auto late = [&] { return trip.run.run->expectations()->results().front(); };
+  trip.step(1'500);
+  const ExpectationResult before = late();
+  EXPECT_TRUE(before.passed) << before.reason;
+  trip.step(1'500);
+  EXPECT_FALSE(late().passed);
+  trip.go(1'500);
+  EXPECT_EQ(late(), before);
+  trip.step(100);
+  EXPECT_TRUE(late().passed);
+  trip.step(1'400);
+  EXPECT_FALSE(late().passed);
 }
 
 TEST(TimeMachine, ThinsOutToItsBudget) {

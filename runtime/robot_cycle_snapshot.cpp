@@ -1,0 +1,126 @@
+// A run's whole state as bytes, and cycles that are played once more from them.
+#include "rt/scoped_realtime.hpp"
+#include "rt/stop_signal.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::runtime {
+
+void RobotCycle::archive(Archive& ar) {
+  std::uint64_t controllers = now_.controllers.fingerprint();
+  ar(now_.identity, controllers);  // first: restore() looks at them before anything changes
+  ar(now_, resets_, homing_, arbiter_, waiting_, response_);
+  ar(now_.controllers, shown_, started_, limited_, limits_met_);
+}
+
+bool RobotCycle::write_down(Archive& ar, bool backend) {
+  archive(ar);
+  return !backend || now_.backend.archive(ar);
+}
+
+/// Where a robot's cycle is not simulated, under the traps: this takes no heap.
+void RobotCycle::show_snapshot() noexcept {
+  SnapshotPort* const port = now_.snapshots;
+  if (port == nullptr || !port->wanted()) return;
+  const std::int64_t begin_ns = now_.clock.now_ns();
+  if (port->whole()) {
+    (void)write_down(port->archive(), true);
+  } else {
+    const rt::ScopedRealtime now;
+    (void)write_down(port->archive(), false);
+  }
+  port->taken(now_.loop.next_cycle(), now_.clock.now_ns() - begin_ns);
+}
+
+void RobotCycle::replay(bool on) noexcept {
+  now_.outside.closed = on;
+  now_.loop.replay(on);
+  now_.log.mute(on);
+  shown_.mute(on);
+  trace_.mute(on);
+}
+
+void RobotCycle::show_again() noexcept {
+  shown_.show();
+  if (now_.observer != nullptr) (void)shown_.show_to(*now_.observer);
+}
+
+bool RobotCycle::is_urgent() const noexcept {
+  return now_.inbox.is_urgent() || rt::stop_requested();
+}
+
+std::string RobotCycle::unarchived() const {
+  for (const HostedController* one : now_.controllers.loaded()) {
+    if (one != nullptr && one->lacks_archive) return one->name;
+  }
+  return {};
+}
+
+Result<std::vector<std::byte>> RobotCycle::save() {
+  Archive ar;
+  if (!write_down(ar, true)) {
+    return fail("this robot cannot be saved", "snapshots need a simulated robot");
+  }
+  return std::vector<std::byte>(ar.bytes().begin(), ar.bytes().end());
+}
+
+Status RobotCycle::restore(std::span<const std::byte> snapshot) {
+  Archive ar(snapshot);
+  RunIdentity identity;
+  std::uint64_t controllers = 0;
+  Archive first(snapshot);
+  first(identity, controllers);
+  if (const std::string other = now_.identity.difference(identity); !other.empty()) {
+    return fail("the snapshot is of another run: '" + other + "' is not the same",
+                "restore it where robot, experiment, kernels, options and seed are those that it "
+                "was saved with");
+  }
+  if (controllers != now_.controllers.fingerprint()) {
+    return fail("the snapshot was taken with other controllers than are loaded now",
+                "load and unload, in the same order, what was loaded then");
+  }
+  if (!write_down(ar, true)) {
+    return fail("this robot cannot be rewound", "snapshots need a simulated robot");
+  }
+  if (ar.ok() && ar.at_end()) return {};
+  return fail("the snapshot is of another robot or experiment",
+              "restore it with the configuration that it was saved with");
+}
+
+// Results.
+
+bool RobotCycle::show_last_cycle(hal::CycleObserver& observer) const {
+  bool shown = false;
+  now_.inbox.clock().while_standing([&] { shown = shown_.show_to(observer); });
+  return shown;
+}
+
+std::vector<FaultReport> RobotCycle::faults() const {
+  const FaultContext about{now_.robot, now_.backend, now_.controllers, now_.config};
+  const FaultLog& log = now_.faults;
+  std::vector<FaultReport> out;
+  for (std::size_t i = 0; i < log.size(); ++i)
+    out.push_back(in_words(log[i], log.cleared_ns(i), about));
+  // The backend's own words are the loop's until the loop has stopped.
+  if (now_.progress.phase.load() != RunPhase::kDone) return out;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const std::string status = out[i].latched ? now_.backend.status_text() : std::string();
+    if (status.empty()) continue;
+    if (log[i].cause == FaultCause::kBackend) out[i].text = status;
+    if (log[i].cause == FaultCause::kBringUp) out[i].text += ": " + status;
+  }
+  return out;
+}
+
+std::string RobotCycle::drive_fault(std::size_t joint, std::uint32_t code) const {
+  if (code == 0) return {};
+  const FaultLog& log = now_.faults;
+  FaultCause cause = FaultCause::kDrive;
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    const bool its = hal::is_of_drive(log[i].cause) && log[i].cause != FaultCause::kJointLost &&
+                     log[i].index == static_cast<std::int32_t>(joint);
+    if (its && log.cleared_ns(i) == FaultLog::kLatched) cause = log[i].cause;
+  }
+  return now_.backend.fault_text(cause, code);
+}
+
+}  // namespace tandem::runtime
