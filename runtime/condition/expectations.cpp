@@ -28,7 +28,10 @@ std::expected<std::unique_ptr<Expectations>, Diagnostics> Expectations::read(
 
 void Expectations::take(const hal::CycleView& view) noexcept TANDEM_RT {
   started_ = started_ || view.phase == hal::RunPhase::kRunning;
-  if (!started_ || hal::ends(view.phase)) return;
+  if (!started_ || ended_) return;
+  ended_ = hal::ends(view.phase);
+  // A fault that ends the run is noted in the cycle that shuts it down.
+  if (ended_ && view.faults == 0) return;
   for (Expectation& one : all_) one.take(view);
 }
 
