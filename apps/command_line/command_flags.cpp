@@ -38,8 +38,8 @@ const char kAskExamples[] = R"(Examples:
 Without --socket or --dds it is the only running process of this user.)";
 
 const char kTestExamples[] = R"(Examples:
-  tandem test config/coman/stand.toml                one experiment
-  tandem test config --junit results.xml             every experiment that expects something
+  tandem test config/suite/coman_squat.toml          one experiment
+  tandem test config/suite --junit results.xml       every experiment of a folder that expects something
   tandem test config --jobs 1 --timeout 60
 
 Each runs in simulation, without the wall clock, in a process of its own: a crash or a hang costs

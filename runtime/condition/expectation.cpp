@@ -213,6 +213,10 @@ void Expectation::judge_settling(ExpectationResult& result) const {
   result.at_s = in_seconds(settled);
   result.passed = *result.margin >= 0.0;
   if (!result.passed) result.reason = fmt::format("it took {:g} s", took_s);
+  const std::int64_t watched = so_far_.end_ns - so_far_.first_ns + so_far_.period_ns;
+  if (!result.passed || watched >= in_ns(spec_.in_s)) return;
+  result.passed = false;
+  result.reason = fmt::format("the run ended {:g} s after its window began", in_seconds(watched));
 }
 
 ExpectationResult Expectation::result() const {

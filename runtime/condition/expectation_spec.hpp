@@ -34,7 +34,7 @@ struct ExpectationSpec {
   int line = 0, above_line = 0, below_line = 0, after_line = 0;  ///< in the file
 };
 
-/// Rows of an experiment, at most: each costs some 50 ns a cycle.
+/// Rows of an experiment, at most: each costs some 30 ns a cycle.
 inline constexpr std::size_t kMostExpectations = 200;
 
 }  // namespace tandem::runtime

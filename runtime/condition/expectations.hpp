@@ -16,7 +16,8 @@
 namespace tandem::runtime {
 
 /// Watches a loop from within: what crosses a ring may be dropped, and an expectation is on every
-/// cycle. From the controllers' start to the shut-down.
+/// cycle. From the controllers' start to the
+/// shut-down, with the fault that may be its reason.
 class Expectations final : public hal::CycleObserver {
  public:
   /// @param file  of the specs, for errors
@@ -24,7 +25,7 @@ class Expectations final : public hal::CycleObserver {
   [[nodiscard]] static std::expected<std::unique_ptr<Expectations>, Diagnostics> read(
       std::span<const ExpectationSpec> specs, const std::string& file, const QuantityNames& names);
 
-  /// A cycle that it has seen already counts once. @rt no heap, no lock, some 50 ns an expectation
+  /// A cycle that it has seen already counts once. @rt no heap, no lock, some 30 ns an expectation
   void take(const hal::CycleView& view) noexcept TANDEM_RT override;
 
   /// Once the loop has ended, or stands.
@@ -34,13 +35,13 @@ class Expectations final : public hal::CycleObserver {
   [[nodiscard]] std::uint64_t awaited_faults() const;
   /// How far they are, for a run that is rewound.
   void archive(Archive& ar) {
-    ar(started_, newest_ns_);
+    ar(started_, ended_, newest_ns_);
     for (Expectation& one : all_) one.archive(ar);
   }
 
  private:
   std::vector<Expectation> all_;
-  bool started_ = false;
+  bool started_ = false, ended_ = false;
   std::int64_t newest_ns_ = -1;  // of the cycles seen
 };
 

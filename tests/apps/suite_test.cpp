@@ -118,6 +118,13 @@ TEST_F(Suite, OneThatHangsIsEndedAndIsCrashedUntilThen) {
   EXPECT_NE(end.find("<error message=\"it was ended after 0.5 s\">"), std::string::npos) << end;
 }
 
+TEST_F(Suite, OfTheBundledRobotsPasses) {
+  const Outcome outcome =
+      tandem("test --json suite.json " + shell_word(TANDEM_SOURCE_DIR "/config/suite"));
+  EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+  EXPECT_EQ(json("suite.json")["passed"], 5);
+}
+
 TEST_F(Suite, RefusesWhatIsNoSuite) {
   for (const char* wrong : {"", "nowhere", "hold.toml", "robot.toml", "--jobs 0 .", "--timeout 0 .",
                             "--timeout no .", "--junit '' ."}) {

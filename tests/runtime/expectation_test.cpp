@@ -119,6 +119,8 @@ TEST_F(ExpectationTest, SettlingIsTheTimeAfterTheLastCycleOutside) {
   EXPECT_EQ(run(of, {5, 0.5, 2, 2, 0.5}).reason, "it took 0.004 s");
   EXPECT_NE(run(of, {5, 0.5, 2, 0.5, 2}).reason.find("outside at the end"), std::string::npos);
   EXPECT_NEAR(*run(of, {0, 0, 0}).margin, 0.003, 1e-12);
+  EXPECT_TRUE(run(of, {0, 0, 0}).passed);
+  EXPECT_EQ(run(of, {0, 0}).reason, "the run ended 0.002 s after its window began");
 }
 
 TEST_F(ExpectationTest, WindowsBeginWithTheControllersOrAnEvent) {
@@ -197,6 +199,26 @@ TEST_F(ExpectationTest, FaultsMustOrMustNotCome) {
   EXPECT_EQ(run(must_not, 3, in_cycle(1)).at_s, 0.011);
   EXPECT_EQ(Expectation::read(must, names())->awaited_faults(), bit);
   EXPECT_EQ(Expectation::read(must_not, names())->awaited_faults(), 0U);
+}
+
+TEST_F(ExpectationTest, AFaultThatEndsTheRunIsSeen) {
+  const auto bit = std::uint64_t{1} << static_cast<unsigned>(hal::FaultCause::kTilted);
+  const std::vector<ExpectationSpec> specs{
+      spec(ExpectationKind::kNever, "fault(fell)"),
+      spec(ExpectationKind::kEventually, "fault(tilted)"),
+  };
+  auto all = Expectations::read(specs, "file", names());
+  ASSERT_TRUE(all);
+  (*all)->take(view());
+  phase = hal::RunPhase::kShutDown;
+  faults = bit;
+  at(11);
+  (*all)->take(view());
+  EXPECT_FALSE((*all)->results()[0].passed);
+  EXPECT_TRUE((*all)->results()[1].passed);
+  at(12);
+  (*all)->take(view());
+  EXPECT_EQ((*all)->results()[0].reason, "it did not hold in 1 of 2 cycles") << "then it is over";
 }
 
 TEST_F(ExpectationTest, RefusesWithTheKeyOfItsRow) {
