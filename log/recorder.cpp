@@ -356,8 +356,7 @@ void Recorder::next_part() {
   const std::string path = part_path(name_, part_ + 1);
   const Status status = end_part({{"continued", std::filesystem::path(path).filename().string()}});
   if (!status) return give_up(writer_->error());
-  ++part_;
-  if (const Status begun = begin_file(path); !begun) give_up(begun.error().message);
+  if (const Status begun = begin_file(path, part_ + 1); !begun) give_up(begun.error().message);
 }
 
 /// What was written so far stays as it is: its "result" says where it was left.
@@ -373,18 +372,18 @@ void Recorder::next_branch(Branch from) {
   if (!status) return give_up(writer_->error());
   name_ = path;
   info_.branch = std::move(from);
-  part_ = 1;
   whole_hash_ = {};
-  if (const Status begun = begin_file(path); !begun) give_up(begun.error().message);
+  if (const Status begun = begin_file(path, 1); !begun) give_up(begun.error().message);
 }
 
 /// A new file, with what stands before its messages.
-Status Recorder::begin_file(const std::string& path) {
+Status Recorder::begin_file(const std::string& path, std::uint64_t part) {
   full_ = false;
   writer_ = std::make_unique<McapWriter>();
   hash_ = {};
   Result<Descriptor> file = open_new(path, 0644);
   if (!file) return fail("cannot make " + path + ": " + file.error().message, file.error().hint);
+  part_ = part;
   Status status = writer_->open(std::move(*file), path, options_.writer);
   if (status) status = begin();
   if (!status) return status;

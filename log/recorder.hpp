@@ -188,7 +188,7 @@ class Recorder {
   void write(Channel id, std::int64_t time_ns, std::span<const std::byte> body);
   void next_part();
   void next_branch(Branch from);
-  [[nodiscard]] Status begin_file(const std::string& path);
+  [[nodiscard]] Status begin_file(const std::string& path, std::uint64_t part);
   [[nodiscard]] Status end_part(const StringMap& extra);
   void look_at_disk();
   [[nodiscard]] bool remove_oldest();

@@ -27,7 +27,7 @@ std::expected<std::unique_ptr<Expectations>, Diagnostics> Expectations::read(
 }
 
 void Expectations::take(const hal::CycleView& view) noexcept TANDEM_RT {
-  if (view.time.time_ns <= newest_ns_) return;
+  if (view.time.time_ns == newest_ns_) return;
   newest_ns_ = view.time.time_ns;
   started_ = started_ || view.phase == hal::RunPhase::kRunning;
   if (!started_ || ended_) return;

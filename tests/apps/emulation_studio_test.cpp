@@ -105,7 +105,11 @@ TEST(EmulationStudio, IsNeitherAskedNorLed) {
 TEST(EmulationStudio, TakesAStepWithoutHeapLockOrSystemCall) {
   Led led(true);
   const rt::ScopedRealtime in_step;
-  for (std::uint64_t step = 1; step < 3000; ++step) led.studio->stepped({.steps = step}, true);
+  for (std::uint64_t step = 1; step < 3000; ++step) {
+    sim::EmulatorStatistics so_far;
+    so_far.steps = step;
+    led.studio->stepped(so_far, true);
+  }
 }
 
 TEST(WireMeter, AddsUpTheTimesOfFramesBothWays) {
