@@ -1,6 +1,6 @@
 // How often each of the loop's times was how long: both axes logarithmic, the period a line.
 import { h } from './dom';
-import { micros, tick } from './format';
+import { micros } from './format';
 
 /** Upper end of a bucket [ns], and how many cycles it has. */
 export type Bin = [number, number];
@@ -47,6 +47,10 @@ export function histogramWords(series: Series[], period_ns: number): string {
   return `How often each time was how long. ${parts.join('; ')}.`;
 }
 
+/** A power of ten: "0.1", "1000", "1e5". */
+const power = (decade: number) =>
+  decade > 4 || decade < -2 ? `1e${decade}` : String(Number((10 ** decade).toPrecision(1)));
+
 function s(tag: string, attributes: Record<string, string | number>, text = ''): SVGElement {
   const made = document.createElementNS('http://www.w3.org/2000/svg', tag);
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
@@ -86,8 +90,8 @@ export function drawHistogram(box: HTMLElement, all: Series[], period_ns: number
       s('line', { class: 'hist-grid', x1: x(decade), x2: x(decade), y1: kMargin.top, y2: bottom }),
       s(
         'text',
-        { x: x(decade), y: bottom + 14, 'text-anchor': 'middle' },
-        tick(10 ** (decade - 3)),
+        { x: x(decade), y: bottom + 14, 'text-anchor': decade === high ? 'end' : 'middle' },
+        power(decade - 3),
       ),
     );
   }
@@ -99,7 +103,7 @@ export function drawHistogram(box: HTMLElement, all: Series[], period_ns: number
     const at = y(10 ** decade);
     svg.append(
       s('line', { class: 'hist-grid', x1: kMargin.left, x2: right, y1: at, y2: at }),
-      s('text', { x: kMargin.left - 6, y: at + 4, 'text-anchor': 'end' }, tick(10 ** decade)),
+      s('text', { x: kMargin.left - 6, y: at + 4, 'text-anchor': 'end' }, power(decade)),
     );
   }
   series.forEach((one, i) => {
