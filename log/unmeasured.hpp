@@ -11,13 +11,14 @@
 
 namespace tandem::log {
 
-/// The ages of a field's elements: which element of which field has each. `of` is empty where nothing
-/// tells them.
+/// The ages of the elements of a field: which element of which field has each. `of` is empty where
+/// nothing tells them.
 struct Ages {
   const hal::Field* field = nullptr;
   std::vector<std::uint64_t> of{};
 };
-/// @param field  of the layout. Its element was not measured yet where its age is more than the cycle
+/// @param field  of the layout. Its element was not measured yet where its age is more than the
+/// cycle
 [[nodiscard]] Ages ages_of(const hal::Layout& layout, const hal::Field& field,
                            const RunInfo& robot);
 

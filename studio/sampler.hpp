@@ -32,8 +32,7 @@ class Sampler {
   /// @param tap     of the same images; outlives it
   /// @param robot   names the elements
   /// @param level_bytes  of each level of the history
-  Sampler(Tap& tap, const Tap::Images& images, const log::RunInfo& robot,
-          std::size_t level_bytes);
+  Sampler(Tap& tap, const Tap::Images& images, const log::RunInfo& robot, std::size_t level_bytes);
 
   /// Takes every cycle that is there. @return whether the sources are others than before
   bool look(const Feed& feed);
