@@ -11,16 +11,6 @@ namespace {
 
 constexpr std::uint64_t kNever = std::numeric_limits<std::uint64_t>::max();
 
-/// The age's element of every element of a field.
-std::vector<std::uint64_t> ages_of(const hal::Field& field, const RunInfo& info) {
-  std::vector<std::uint64_t> of;
-  const bool sensor = field.name == "sensor";
-  for (std::size_t i = 0; !sensor && i < field.count; ++i) of.push_back(i);
-  for (std::size_t s = 0; sensor && s < info.sensors.size(); ++s)
-    of.insert(of.end(), info.sensors[s].channels, s);
-  return of;
-}
-
 /// The cycle in which each joint was first measured, by the state `topic`; empty: not known.
 Result<std::vector<std::uint64_t>> first_cycles(const LogFile& log, const std::string& topic) {
   const LoggedTopic* state = log.find(topic);
@@ -41,6 +31,19 @@ Result<std::vector<std::uint64_t>> first_cycles(const LogFile& log, const std::s
 
 }  // namespace
 
+Ages ages_of(const hal::Layout& layout, const hal::Field& field, const RunInfo& robot) {
+  if (field.type != hal::FieldType::kF64) return {};
+  const bool sensor = field.name == "sensor";
+  const hal::Field* age = layout.find(sensor ? "sensor_age_cycles" : "age_cycles");
+  if (age == nullptr) return {};
+  std::vector<std::uint64_t> of;
+  for (std::size_t i = 0; !sensor && i < field.count; ++i) of.push_back(i);
+  for (std::size_t s = 0; sensor && s < robot.sensors.size(); ++s)
+    of.insert(of.end(), robot.sensors[s].channels, s);
+  const bool fits = of.size() == field.count && (of.empty() || of.back() < age->count);
+  return fits ? Ages{age, std::move(of)} : Ages{};
+}
+
 Result<Unmeasured> Unmeasured::of(const LogFile& log, const LoggedTopic& topic) {
   Unmeasured out;
   const hal::Layout& layout = topic.layout;
@@ -48,15 +51,8 @@ Result<Unmeasured> Unmeasured::of(const LogFile& log, const LoggedTopic& topic) 
   out.rows_.resize(layout.fields().size());
   if (out.cycle_ == nullptr) return out;
   for (std::size_t f = 0; f < layout.fields().size(); ++f) {
-    const hal::Field& field = layout.fields()[f];
-    if (field.type != hal::FieldType::kF64) continue;
-    const hal::Field* age =
-        layout.find(field.name == "sensor" ? "sensor_age_cycles" : "age_cycles");
-    if (age == nullptr) continue;
-    Row row{age, ages_of(field, log.info())};
-    const bool fits =
-        row.of.size() == field.count && (field.count == 0 || row.of.back() < age->count);
-    if (fits) out.rows_[f] = std::move(row);
+    Ages ages = ages_of(layout, layout.fields()[f], log.info());
+    out.rows_[f] = {ages.field, std::move(ages.of)};
   }
   constexpr std::string_view kCommand = "/command";
   if (!topic.name.ends_with(kCommand)) return out;

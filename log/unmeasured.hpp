@@ -11,6 +11,17 @@
 
 namespace tandem::log {
 
+/// The ages of the elements of a field: which element of which field has each. `of` is empty where
+/// nothing tells them.
+struct Ages {
+  const hal::Field* field = nullptr;
+  std::vector<std::uint64_t> of{};
+};
+/// @param field  of the layout. Its element was not measured yet where its age is more than the
+/// cycle
+[[nodiscard]] Ages ages_of(const hal::Layout& layout, const hal::Field& field,
+                           const RunInfo& robot);
+
 /// By what the log says of a sample's age: one that is older than the run was never measured. A
 /// command's position repeats the measured one until a controller writes it, so it is none before
 /// that either.

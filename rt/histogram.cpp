@@ -74,7 +74,8 @@ void Histogram::add(const Histogram& other) noexcept {
 std::vector<HistogramBin> Histogram::bins() const {
   std::vector<HistogramBin> out;
   for (std::size_t bucket = 0; bucket < kBuckets; ++bucket) {
-    if (counts_[bucket] > 0) out.push_back({upper_end(bucket), counts_[bucket]});
+    const std::uint64_t count = look(counts_[bucket]);
+    if (count > 0) out.push_back({upper_end(bucket), count});
   }
   return out;
 }

@@ -14,8 +14,8 @@ constexpr float kNoValue = std::numeric_limits<float>::quiet_NaN();
 constexpr const char* kNames[] = {"state", "command", "truth", "estimate", "boards"};
 static_assert(std::size(kNames) == Tap::kParts);
 
-SignalTable table_of(const Tap::Images& images, log::RunInfo robot) {
-  SignalTable table(std::move(robot));
+SignalTable table_of(const Tap::Images& images, const log::RunInfo& robot) {
+  SignalTable table(robot);
   const auto all = images.all();
   for (std::size_t i = 0; i < Tap::kParts; ++i) {
     if (all[i] != nullptr) (void)table.add(kNames[i], all[i]->layout());
@@ -30,8 +30,12 @@ Event::Level level_of(hal::RunPhase phase) {
 
 }  // namespace
 
-Sampler::Sampler(Tap& tap, const Tap::Images& images, log::RunInfo robot, std::size_t level_bytes)
-    : tap_(&tap), table_(table_of(images, std::move(robot))), history_(level_bytes, table_.size()) {
+Sampler::Sampler(Tap& tap, const Tap::Images& images, const log::RunInfo& robot,
+                 std::size_t level_bytes)
+    : tap_(&tap),
+      table_(table_of(images, robot)),
+      unmeasured_(table_, images, robot),
+      history_(level_bytes, table_.size()) {
   const auto all = images.all();
   std::size_t source = 0;
   for (std::size_t i = 0; i < Tap::kParts; ++i) {
@@ -183,6 +187,7 @@ void Sampler::take(const Tap::Cycle& cycle) {
   for (std::size_t i = 0; i < Tap::kParts; ++i) {
     if (!cycle.parts[i].empty()) table_.convert(sources_[i], cycle.parts[i], row_);
   }
+  unmeasured_.drop(cycle.parts[Tap::kState], row_);
   for (const MarkSource& one : marks_) table_.convert(one.source, one.image(), row_);
   if (twin_ && twin_->source != kMostSignals) table_.convert(twin_->source, twin_->image(), row_);
   row_is_whole_ = true;

@@ -16,6 +16,7 @@
 #include "studio/signal_table.hpp"
 #include "studio/tap.hpp"
 #include "studio/twin_source.hpp"
+#include "studio/unmeasured.hpp"
 
 namespace tandem::studio {
 
@@ -31,7 +32,7 @@ class Sampler {
   /// @param tap     of the same images; outlives it
   /// @param robot   names the elements
   /// @param level_bytes  of each level of the history
-  Sampler(Tap& tap, const Tap::Images& images, log::RunInfo robot, std::size_t level_bytes);
+  Sampler(Tap& tap, const Tap::Images& images, const log::RunInfo& robot, std::size_t level_bytes);
 
   /// Takes every cycle that is there. @return whether the sources are others than before
   bool look(const Feed& feed);
@@ -70,6 +71,7 @@ class Sampler {
 
   Tap* tap_;
   SignalTable table_;
+  Unmeasured unmeasured_;
   std::array<std::size_t, Tap::kParts> sources_{};  // of those that there are
   History history_;
   std::vector<float> row_;

@@ -55,6 +55,13 @@ Json measured(const rt::Histogram& of) {
   return found.max == 0 ? Json(nullptr) : percentiles_json(found);
 }
 
+/// Buckets as pairs, upper end [ns] and count: they may be read beside the loop, too.
+Json bins(const rt::Histogram& of) {
+  Json all = Json::array();
+  for (const rt::HistogramBin& one : of.bins()) all.push_back({one.upper_ns, one.count});
+  return all;
+}
+
 Json loop(const runtime::RobotCycle& cycle, const hal::RobotConfig& robot, const RunWires& wires) {
   const rt::CycleStatistics& times = cycle.loop();
   return {{"robot", robot.name},
@@ -65,6 +72,10 @@ Json loop(const runtime::RobotCycle& cycle, const hal::RobotConfig& robot, const
           {"cycle_ns", measured(times.work)},
           {"wakeup_ns", measured(times.wakeup)},
           {"bus_ns", measured(times.bus)},
+          {"histograms",
+           {{"cycle_ns", bins(times.work)},
+            {"wakeup_ns", bins(times.wakeup)},
+            {"bus_ns", bins(times.bus)}}},
           {"buses", wires.buses ? wires.buses() : Json::array()}};
 }
 

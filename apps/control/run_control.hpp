@@ -16,7 +16,7 @@ namespace tandem::apps {
 /// What a run has beside its cycle.
 struct RunWires {
   std::string hal{};  ///< "loop.show" tells it: the backend: "sim", "can"
-  /// A list of `interface` and `status`; called on the serving thread. Empty: there is no bus.
+  /// A list of bus_states()'; called on the serving thread. Empty: there is no bus.
   std::function<Json()> buses{};
   LeadSite lead{};  ///< add_group_commands()'s
   RunPast past{};   ///< add_clock_commands()'

@@ -113,7 +113,8 @@ Diagnostics connect(WiredComposition& c, const std::string& record_frames) {
       e.robot, buses, *c.sockets,
       {.lockstep = e.hal.lockstep, .answer_window = e.hal.answer_window});
   if (!backend) return {backend.error()};
-  c.master = &(*backend)->master();
+  c.can = backend->get();
+  c.master = &c.can->master();
   c.backend = std::move(*backend);
   return {};
 }

@@ -10,6 +10,7 @@
 #include "apps/text/figures.hpp"
 #include "dds/domain.hpp"
 #include "dds/participant.hpp"
+#include "hal/ethercat-can/can_backend.hpp"
 #include "hal/ethercat-can/frame_record.hpp"
 #include "runtime/run/composition.hpp"
 #include "runtime/run/run_log.hpp"
@@ -24,6 +25,7 @@ using runtime::wire_name;
 struct Wires {
   std::unique_ptr<CanSockets> sockets;            ///< of the CAN backend
   std::unique_ptr<hal::can::FrameRecord> frames;  ///< of the CAN backend, when it was asked for
+  const hal::can::CanBackend* can = nullptr;      ///< the composition's backend, where it is that
   std::unique_ptr<dds::Participant> participant;  ///< of the DDS backend
 
   /// Empty without a CAN backend.

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <optional>
 
+#include "apps/can/bus_states.hpp"
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
 #include "apps/robot/gains_opinion.hpp"
@@ -169,14 +170,8 @@ class Session {
         },
         try_in_other_process(options_),
         {.hal = hal_name(e),
-         .buses =
-             [this] {
-               Json all = Json::array();
-               for (const OpenBus& bus : c_.open_buses()) {
-                 all.push_back({{"interface", bus.interface}, {"status", bus.end->status_text()}});
-               }
-               return all;
-             },
+         .buses = [states = BusStates(c_.open_buses(), e.robot, e.loop.period_ns,
+                                      c_.can)] { return states.json(); },
          .lead = lead_site(e.robot, c_.kernels.get()),
          .past = past_->of(*cycle_)});
     add_predict(commands_, c_.predictor.get(), e.robot);

@@ -3,6 +3,7 @@
 #include "hal/ethercat-can/can_backend.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "canopen/objects.hpp"
 
@@ -75,20 +76,30 @@ Result<std::unique_ptr<CanBackend>> CanBackend::create(const RobotConfig& robot,
                                                        const CanBackendConfig& config) {
   std::vector<std::unique_ptr<Collected>> collected;
   std::vector<Bus*> ends;
-  for (Bus* bus : buses) {
-    collected.push_back(std::make_unique<Collected>(*bus, collected.size()));
+  Wires wires;
+  for (std::size_t b = 0; b < buses.size() && b < robot.buses.size(); ++b) {
+    const BusConfig& its = robot.buses[b];
+    auto& wire = wires.emplace_back();
+    if (its.kind == BusKind::kCan)
+      wire = std::make_unique<Wire>(*buses[b], BitRates{its.bitrate, its.data_bitrate});
+    Bus& end = wire == nullptr ? *buses[b] : wire->meter;
+    collected.push_back(std::make_unique<Collected>(end, b));
     ends.push_back(collected.back().get());
   }
   auto master = DriveMaster::create(robot, ends);
   if (!master) return std::unexpected(master.error());
   return std::unique_ptr<CanBackend>(
-      new CanBackend(std::move(collected), std::move(*master), wait, config));
+      new CanBackend(std::move(wires), std::move(collected), std::move(*master), wait, config));
 }
 
-CanBackend::CanBackend(std::vector<std::unique_ptr<Collected>> buses,
+CanBackend::CanBackend(Wires wires, std::vector<std::unique_ptr<Collected>> buses,
                        std::unique_ptr<DriveMaster> master, FrameWait& wait,
                        const CanBackendConfig& config)
-    : DriveBackend(std::move(master)), buses_(std::move(buses)), wait_(&wait), config_(config) {}
+    : DriveBackend(std::move(master)),
+      wires_(std::move(wires)),
+      buses_(std::move(buses)),
+      wait_(&wait),
+      config_(config) {}
 
 Phase CanBackend::phase() const noexcept { return silent_ ? Phase::kFault : master_->phase(); }
 
@@ -108,6 +119,23 @@ bool CanBackend::answered(std::size_t bus) const noexcept {
                           : (master_->answering(bus) & ~buses_[bus]->sampled()).none();
 }
 
+void CanBackend::Wire::end_cycle(std::int64_t period_ns) noexcept TANDEM_RT {
+  constexpr float kPerSecond = 1e-9F;
+  const auto period = static_cast<float>(period_ns);
+  const float share = static_cast<float>(meter.take_ns()) / period;
+  const float before = mean.load(std::memory_order_relaxed);
+  mean.store(before + std::min(1.0F, period * kPerSecond) * (share - before),
+             std::memory_order_relaxed);
+  if (share > most.load(std::memory_order_relaxed)) most.store(share, std::memory_order_relaxed);
+}
+
+CanBackend::WireLoad CanBackend::wire_load(std::size_t bus) const noexcept {
+  constexpr float kNotKnown = std::numeric_limits<float>::quiet_NaN();
+  if (bus >= wires_.size() || wires_[bus] == nullptr) return {kNotKnown, kNotKnown};
+  return {wires_[bus]->mean.load(std::memory_order_relaxed),
+          wires_[bus]->most.load(std::memory_order_relaxed)};
+}
+
 void CanBackend::exchange(const CycleTime& time) noexcept {
   if (silent_) return;
   for (const auto& bus : buses_) {
@@ -115,6 +143,13 @@ void CanBackend::exchange(const CycleTime& time) noexcept {
     if (!config_.lockstep)
       bus->collect(*master_);  // late answers to the last SYNC are none to this one
     bus->begin_cycle();
+  }
+  for (const auto& wire : wires_) {
+    if (wire == nullptr) continue;
+    if (begun_)
+      wire->end_cycle(time.period_ns);
+    else
+      (void)wire->meter.take_ns();
   }
   begun_ = true;
   const auto window_ns =

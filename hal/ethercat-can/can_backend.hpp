@@ -2,6 +2,7 @@
 // Layer: hal/ethercat-can.  Thread: create non-RT; the rest the loop's.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -12,6 +13,7 @@
 #include "hal/ethercat-can/bus.hpp"
 #include "hal/ethercat-can/drive_backend.hpp"
 #include "hal/ethercat-can/frame_wait.hpp"
+#include "hal/ethercat-can/wire_meter.hpp"
 
 namespace tandem::hal::can {
 
@@ -50,6 +52,13 @@ class CanBackend final : public DriveBackend {
   /// The first EtherCAT bus'.
   [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override;
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
+  /// How much of a bus' time its frames take, at their longest [share of the period]. NaN: not
+  /// measured, of EtherCAT. Any thread.
+  struct WireLoad {
+    float mean;  ///< of the last second or so
+    float most;  ///< of one cycle since the start
+  };
+  [[nodiscard]] WireLoad wire_load(std::size_t bus) const noexcept;
   /// The robot cannot be rewound: false.
   [[nodiscard]] bool archive(Archive& ar) override;
 
@@ -80,10 +89,21 @@ class CanBackend final : public DriveBackend {
     DriveMaster::NodeSet sampled_;  ///< samples since begin_cycle(); [0]: of nobody
   };
 
-  CanBackend(std::vector<std::unique_ptr<Collected>> buses, std::unique_ptr<DriveMaster> master,
-             FrameWait& wait, const CanBackendConfig& config);
+  /// A CAN bus' frames, and how much of its time they take.
+  struct Wire {
+    Wire(Bus& bus, const BitRates& rates) noexcept : meter(bus, rates) {}
+    void end_cycle(std::int64_t period_ns) noexcept TANDEM_RT;
+
+    WireMeter meter;
+    std::atomic<float> mean{0.0F}, most{0.0F};
+  };
+  using Wires = std::vector<std::unique_ptr<Wire>>;  ///< by bus; null: EtherCAT
+
+  CanBackend(Wires wires, std::vector<std::unique_ptr<Collected>> buses,
+             std::unique_ptr<DriveMaster> master, FrameWait& wait, const CanBackendConfig& config);
   [[nodiscard]] bool answered(std::size_t bus) const noexcept;
 
+  Wires wires_;
   std::vector<std::unique_ptr<Collected>> buses_;
   FrameWait* wait_;
   CanBackendConfig config_;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/archive.hpp"
+#include "base/seen_count.hpp"
 #include "canopen/messages.hpp"
 #include "hal/ethercat-can/drive_master_impl.hpp"
 
@@ -116,7 +117,7 @@ void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
     if (node.master.running() && node.exchange.doubled()) {
       node.master.fail(FaultCause::kTwoBoards, now_ns);
     }
-    if (!complete && stage == MasterStage::kRunning && !shutting_down) ++node.missed;
+    if (!complete && stage == MasterStage::kRunning && !shutting_down) count_up(node.missed);
     // A node may tell that it runs before the SYNC that its first sample answers.
     node.unanswered = complete || !node.master.running() ? 0 : node.unanswered + 1;
     if (node.timeout_cycles == 0) continue;
@@ -339,9 +340,24 @@ std::vector<RoundTrip> DriveMaster::round_trips() const {
                      .bus = impl_->robot.buses[node.plan.bus].name,
                      .id = node.plan.id,
                      .cycles = node.exchange.round_trip().cycles,
-                     .time = node.exchange.round_trip().time});
+                     .time = node.exchange.round_trip().time,
+                     .answer = node.exchange.round_trip().answer});
   }
   return trips;
+}
+
+std::vector<NodeFigures> DriveMaster::node_figures() const {
+  std::vector<NodeFigures> all;
+  for (const Impl::Node& node : impl_->nodes) {
+    const RoundTrip& trip = node.exchange.round_trip();
+    NodeFigures& one = all.emplace_back(NodeFigures{.node = node.plan.name,
+                                                    .bus = node.plan.bus,
+                                                    .id = node.plan.id,
+                                                    .missed = seen(node.missed),
+                                                    .answer = trip.answer.percentiles()});
+    for (std::size_t i = 2; i < trip.cycles.size(); ++i) one.late += seen(trip.cycles[i]);
+  }
+  return all;
 }
 
 void DriveMaster::archive(Archive& ar) {

@@ -40,6 +40,19 @@ struct RoundTrip {
   /// From handing the command over to its echo's arrival, where the bus knows its times. An echo
   /// that is older than a cycle is not in it.
   rt::Histogram time;
+  /// From handing SYNC over to the arrival of the sample that it asked for, in the same cycle,
+  /// where the bus knows its times. Sensor nodes have it, too.
+  rt::Histogram answer;
+};
+
+/// How a node has answered so far.
+struct NodeFigures {
+  std::string node;
+  std::size_t bus = 0;  ///< in RobotConfig::buses
+  int id = 0;
+  std::uint64_t missed = 0;  ///< cycles of operation without its whole sample
+  std::uint64_t late = 0;  ///< echoes of commands that came a SYNC later than they should, or more
+  rt::Percentiles answer;  ///< RoundTrip::answer's; all 0: not known
 };
 
 /// What the first start took, from the first cycle to the one in which every axis was enabled.
@@ -148,6 +161,8 @@ class DriveMaster {
   /// Round trips of every board, in the configuration's order. A measurement, no state: not in a
   /// snapshot. Not RT.
   [[nodiscard]] std::vector<RoundTrip> round_trips() const;
+  /// Every node, in the layout's order. Any thread, beside the loop. Not RT.
+  [[nodiscard]] std::vector<NodeFigures> node_figures() const;
 
   void archive(Archive& ar);
 

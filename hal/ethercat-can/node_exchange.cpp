@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/archive.hpp"
+#include "base/seen_count.hpp"
 #include "canopen/messages.hpp"
 
 namespace tandem::hal::can {
@@ -79,6 +80,7 @@ bool NodeExchange::take(int number, const canopen::Frame& frame, std::int64_t at
   const bool whole = next_part_ == plan_->parts;
   for (const PdoCopy& copy : pdo.copies) copy.from_wire(frame.data.data());
   for (const std::size_t joint : pdo.joints) fresh[joint] = whole ? 1 : 0;
+  if (pdo.part >= 0 && whole) on_sample(at_ns);
   if (pdo.echo) on_echo(at_ns);
   if (pdo.channels && whole) channels_ = sample_;
   return true;
@@ -87,9 +89,15 @@ bool NodeExchange::take(int number, const canopen::Frame& frame, std::int64_t at
 void NodeExchange::on_echo(std::int64_t at_ns) noexcept TANDEM_RT {
   const auto trip = static_cast<std::uint8_t>(*counter_ - echo_);
   if (trip == 0 || trip > counters_sent_) return;  // it has not had a command yet
-  ++trip_.cycles[std::min<std::size_t>(trip, RoundTrip::kMostCycles - 1)];
+  count_up(trip_.cycles[std::min<std::size_t>(trip, RoundTrip::kMostCycles - 1)]);
   const std::int64_t sent_ns = (*sent_ns_)[echo_];
   if (trip == 1 && sent_ns != 0 && at_ns > sent_ns) trip_.time.record(at_ns - sent_ns);
+}
+
+/// Until this cycle's commands go out, SYNC is what its counter was handed over with.
+void NodeExchange::on_sample(std::int64_t at_ns) noexcept TANDEM_RT {
+  const std::int64_t sync_ns = (*sent_ns_)[*counter_];
+  if (sync_ns != 0 && at_ns > sync_ns) trip_.answer.record(at_ns - sync_ns);
 }
 
 bool NodeExchange::end_cycle(std::span<const std::uint8_t> fresh) noexcept TANDEM_RT {

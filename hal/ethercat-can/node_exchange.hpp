@@ -82,6 +82,7 @@ class NodeExchange {
 
   [[nodiscard]] Receive compile(const PdoPlan& pdo, std::vector<canopen::PdoCopy> copies) const;
   void on_echo(std::int64_t at_ns) noexcept TANDEM_RT;
+  void on_sample(std::int64_t at_ns) noexcept TANDEM_RT;
 
   const NodePlan* plan_ = nullptr;
   const std::uint8_t* counter_ = nullptr;

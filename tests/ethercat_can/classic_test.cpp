@@ -127,6 +127,10 @@ TEST(RoundTrip, OfABoardThatHearsLessIsLonger) {
   (void)rig.read();
   const auto after = rig.master->round_trips()[0].cycles;
   EXPECT_EQ(after[3], before[3] + 1);
+  const NodeFigures figures = rig.master->node_figures()[0];
+  EXPECT_EQ(figures.id, 10);
+  EXPECT_EQ(figures.late, 1u);
+  EXPECT_EQ(figures.answer.max, 0) << "the loopback bus knows no times";
 }
 
 }  // namespace

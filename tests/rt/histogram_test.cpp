@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <thread>
 
 namespace tandem::rt {
 namespace {
@@ -73,6 +74,21 @@ TEST(Histogram, GivesItsBucketsAndAddsAnother) {
   EXPECT_EQ(a.count(), 5U);
   EXPECT_EQ(a.sum_ns(), 1'000'016);
   EXPECT_EQ(a.max_ns(), 1'000'000);
+}
+
+TEST(Histogram, GivesItsBucketsWhileItsWriterCounts) {
+  Histogram histogram;
+  std::jthread writer([&](const std::stop_token& end) {
+    while (!end.stop_requested()) histogram.record(1000);
+  });
+  std::uint64_t before = 0;
+  for (int look = 0; look < 1000; ++look) {
+    const auto bins = histogram.bins();
+    ASSERT_LE(bins.size(), 1U);
+    const std::uint64_t now = bins.empty() ? 0 : bins[0].count;
+    EXPECT_GE(now, before);
+    before = now;
+  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <memory>
@@ -161,6 +162,46 @@ TEST(StudioSampler, KeepsEachCycleAndWhatBecameOfItSinceTheTick) {
   ASSERT_EQ(events.size(), 1U);
   EXPECT_EQ(events[0].text, "phase: running");
   EXPECT_EQ(events[0].cycle, 0U);
+}
+
+TEST(StudioSampler, HasNoNumberOfWhatNobodyHasMeasured) {
+  ShownRobot robot;
+  robot.state = hal::StateImage{{.joints = 2, .sensor_channels = {1, 1}}};
+  log::RunInfo names = robot.names();
+  names.sensors = {{"foot", 1}, {"wrist", 1}};
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  Sampler sampler(tap, robot.images(), names, 200'000);
+  constexpr std::uint64_t kFirst = 20;  // b and the wrist answer from then on, then never again
+  for (std::uint64_t cycle = 0; cycle < 64; ++cycle) {
+    const std::uint64_t age = cycle < kFirst ? cycle + 1 : cycle - kFirst;
+    robot.state.age_cycles()[1] = robot.state.sensor_age_cycles()[1] =
+        static_cast<std::uint32_t>(age);
+    robot.show(tap, cycle, {});
+  }
+  (void)sampler.look({});
+  const Window each = sampler.history().plan(0, 63, 100);
+  const Window merged = sampler.history().plan(0, 63, 1);  // rows of 16
+  ASSERT_EQ(each.cycles, 1U);
+  ASSERT_EQ(merged.cycles, 16U);
+  for (const char* name : {"state.position_rad.b", "state.torque_nm.b", "state.sensor.wrist.0",
+                           "command.position_rad.b"}) {
+    const SignalId id = test::id_of(sampler.table(), name);
+    std::vector<float> numbers(each.numbers()), spans(merged.numbers());
+    sampler.history().read(each, id, numbers);
+    sampler.history().read(merged, id, spans);
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+      EXPECT_EQ(std::isnan(numbers[i]), i < kFirst) << name << " in cycle " << i;
+    EXPECT_TRUE(std::isnan(spans[0]) && std::isnan(spans[1])) << name;
+    EXPECT_EQ(spans[2], numbers[kFirst]) << name << ": what was measured alone counts";
+    EXPECT_EQ(sampler.span().least[id], numbers[kFirst]) << name;
+  }
+  for (const char* name :
+       {"state.position_rad.a", "state.sensor.foot.0", "state.mode.b", "state.age_cycles.b"}) {
+    const SignalId id = test::id_of(sampler.table(), name);
+    std::vector<float> numbers(each.numbers());
+    sampler.history().read(each, id, numbers);
+    EXPECT_EQ(std::ranges::count_if(numbers, [](float n) { return std::isnan(n); }), 0) << name;
+  }
 }
 
 TEST(StudioSampler, HasMarksAsNumbersWithTheirLook) {

@@ -100,7 +100,7 @@ export class Data {
   }
 
   private table(revision: number, sources: SourceTable[]): void {
-    this.catalog = new Catalog(revision, sources);
+    this.catalog = new Catalog(revision, sources, this.hello?.joints);
     this.sources = sources;
     for (const call of this.onCatalog) call();
     this.subscribe();

@@ -27,6 +27,19 @@ const kFields = [
 const kLost_cycles = 10;
 const kWarm_C = 80;
 
+/** With its unit; "–" where there is none. */
+export function figure(value: number, unit: string): string {
+  return Number.isFinite(value) ? `${short(value)} ${unit}` : '–';
+}
+
+/** How old a joint's sample is [cycles]. @param measured whether there was one at all */
+export function ageWords(old: number, measured: boolean): string {
+  if (!Number.isFinite(old)) return '–';
+  if (!measured) return 'never';
+  if (old > kLost_cycles) return `lost, ${old}`;
+  return old > 0 ? `old, ${old}` : 'fresh';
+}
+
 interface Row {
   joint: JointInfo;
   element: HTMLElement;
@@ -262,8 +275,8 @@ export class Joints {
     this.mark(row.goal, row.joint, goal);
     say(row.position, Number.isFinite(position) ? `${position.toFixed(3)} ${unit}` : '–');
     row.position.title = `position ${number(position)}, reference ${number(goal)} ${unit}`;
-    say(row.torque, `${short(value('torque_Nm'))} ${force}`);
-    say(row.current, `${short(value('current_A'))} A`);
+    say(row.torque, figure(value('torque_Nm'), force));
+    say(row.current, figure(value('current_A'), 'A'));
     const warm = value('temperature_C');
     say(
       row.temperature,
@@ -279,10 +292,7 @@ export class Joints {
     );
     const old = value('age_cycles');
     const lost = old > kLost_cycles;
-    say(
-      row.age,
-      !Number.isFinite(old) ? '–' : lost ? `lost, ${old}` : old > 0 ? `old, ${old}` : 'fresh',
-    );
+    say(row.age, ageWords(old, Number.isFinite(position)));
     row.element.classList.toggle('lost', lost || !Number.isFinite(position));
     row.element.classList.toggle('faulted', fault > 0);
     row.element.classList.toggle('warm', warm > kWarm_C);

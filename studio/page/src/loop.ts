@@ -2,6 +2,8 @@
 import type { Data } from './data';
 import { h, say } from './dom';
 import { micros } from './format';
+import { type BusState, BusTable } from './loop_buses';
+import { type Bin, drawHistogram } from './loop_histogram';
 import type { Answer } from './protocol';
 
 interface Spread {
@@ -9,11 +11,6 @@ interface Spread {
   p99: number;
   p999: number;
   max: number;
-}
-interface Bus {
-  interface: string;
-  /** Empty: it is well. */
-  status: string;
 }
 
 /** What is measured in each cycle: a row is a line of the table. */
@@ -48,7 +45,8 @@ export function overrunWords(overruns: number, cycles: number, period_ns: number
 export class LoopPanel {
   private readonly words = h('p', { role: 'status' });
   private readonly body = h('tbody');
-  private readonly buses = h('ul', { class: 'buses' });
+  private readonly histogram = h('div', { class: 'loop-histogram', hidden: true });
+  private readonly buses = new BusTable();
   readonly element: HTMLElement;
 
   constructor(data: Data) {
@@ -72,8 +70,9 @@ export class LoopPanel {
         { class: 'muted' },
         'A bar is logarithmic, from a thousandth of the period to ten of them; the line is the period. Dark to p50, lighter to p99 and p99.9, the mark is the most.',
       ),
+      this.histogram,
       h('h2', {}, 'Buses'),
-      this.buses,
+      this.buses.element,
     );
     data.source.on({ watched: (request, answer) => this.watched(request, answer) });
   }
@@ -87,13 +86,13 @@ export class LoopPanel {
         line(label, title, (answer[key] ?? null) as Spread | null, period_ns),
       ),
     );
-    const buses = (answer.buses ?? []) as Bus[];
-    this.buses.replaceChildren(
-      ...buses.map((bus) =>
-        h('li', { class: bus.status ? 'bad' : '' }, `${bus.interface}: ${bus.status || 'well'}`),
-      ),
+    const bins = (answer.histograms ?? {}) as Record<string, Bin[]>;
+    drawHistogram(
+      this.histogram,
+      kRows.map(({ key, label }) => ({ label, bins: bins[key] ?? [] })),
+      period_ns,
     );
-    if (buses.length === 0) this.buses.append(h('li', { class: 'muted' }, 'none'));
+    this.buses.show((answer.buses ?? []) as BusState[]);
   }
 }
 

@@ -6,6 +6,7 @@ import './panels.css';
 import './joints.css';
 import './scene.css';
 import './scope.css';
+import './loop.css';
 import './report.css';
 import './emulation.css';
 import './narrow.css';

@@ -1,6 +1,6 @@
 // The table of a run's signals, their names, and the search in it.
 import { isLane } from './enums';
-import type { Field, SourceTable } from './protocol';
+import type { Field, JointInfo, SourceTable } from './protocol';
 
 export interface Signal {
   id: number;
@@ -37,6 +37,22 @@ function elementName(field: Field, index: number): string {
   return field.count === 1 ? '' : String(index);
 }
 
+/** What of a joint says its units. */
+type Joint = Pick<JointInfo, 'name' | 'unit'>;
+
+/**
+ * "Nm or N" is the unit of what turns, then of what slides: the one of this element. Where it is no
+ * joint's, that of all joints when they are alike.
+ */
+export function unitOf(unit: string, element: string, joints: Joint[]): string {
+  const [turns, slides] = unit.split(' or ');
+  if (slides === undefined) return unit;
+  const its = joints.filter((joint) => joint.name === element);
+  const kinds = new Set((its.length > 0 ? its : joints).map((joint) => joint.unit === 'm'));
+  if (kinds.size !== 1) return unit;
+  return kinds.has(true) ? slides : turns;
+}
+
 export class Catalog {
   readonly revision: number;
   readonly signals: Signal[] = [];
@@ -45,7 +61,12 @@ export class Catalog {
   private readonly byId = new Map<number, Signal>();
   private readonly entries: Entry[] = [];
 
-  constructor(revision = 0, sources: SourceTable[] = []) {
+  /** @param joints of the robot: they say their signals' units */
+  constructor(
+    revision = 0,
+    sources: SourceTable[] = [],
+    private readonly joints: Joint[] = [],
+  ) {
     this.revision = revision;
     for (const source of sources) {
       let id = source.first;
@@ -114,7 +135,7 @@ export class Catalog {
       source,
       field: field.name,
       element,
-      unit: field.unit,
+      unit: unitOf(field.unit, element, this.joints),
       doc: field.doc,
       lane: isLane(field),
     };

@@ -1,6 +1,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { overrunWords, placeOf } from '../src/loop';
+import { loadWords } from '../src/loop_buses';
+import { type Bin, columnsOf, decadesOf, histogramWords } from '../src/loop_histogram';
 import { pressureCentre } from '../src/pressure';
 
 test('a bar of the loop is logarithmic, from a thousandth of the period to ten', () => {
@@ -15,6 +17,39 @@ test('overruns are said with the period', () => {
   assert.equal(overrunWords(0, 10, 1e6), 'None of 10 cycles overran; the period is 1000 µs.');
   assert.equal(overrunWords(3, 10, 1e6), '3 of 10 cycles overran; the period is 1000 µs.');
   assert.equal(overrunWords(0, 0, 1e6), 'no cycle yet');
+});
+
+test('buckets of the loop become columns, and words', () => {
+  const bins: Bin[] = [
+    [10000, 3],
+    [10200, 4],
+    [2000000, 1],
+  ];
+  const columns = columnsOf(bins);
+  assert.deepEqual(columns, [
+    [4, 7],
+    [100 / 16, 1],
+  ]);
+  assert.ok(10 ** columns[1][0] <= 2e6, 'a column begins at or below what it holds');
+  assert.deepEqual(decadesOf([bins], 1e6), [4, 7]);
+  assert.deepEqual(decadesOf([[[0, 1]]], 1e6), [0, 7]);
+  assert.equal(
+    histogramWords([{ label: 'work', bins }], 1e6),
+    'How often each time was how long. work: 8 cycles, half up to 10 µs, the longest up to 2000 µs, 1 beyond the period.',
+  );
+});
+
+test('the load of a bus is said as measured and as planned', () => {
+  const bus = { interface: 'can0', status: '', planned_load: 0.4, max_load: 0.8 };
+  assert.equal(
+    loadWords({ ...bus, load: 0.312, most_load: 0.55 }),
+    'load 31.2 %, most of a cycle 55.0 %; planned 40.0 % of at most 80.0 %',
+  );
+  assert.equal(
+    loadWords({ ...bus, load: null, most_load: null }),
+    'load not measured; planned 40.0 % of at most 80.0 %',
+  );
+  assert.equal(loadWords({ interface: 'can0', status: '' }), '');
 });
 
 test('the centre of pressure lies between the feet as they carry', () => {

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Field } from '../src/protocol';
-import { Catalog, wordsOf } from '../src/signals';
+import { Catalog, unitOf, wordsOf } from '../src/signals';
 
 const field = (name: string, unit: string, doc: string, elements: string[] | null, type = 'f64') =>
   ({ name, unit, doc, type, elements, count: elements?.length ?? 1 }) satisfies Field;
@@ -67,4 +67,27 @@ test('a name is found in capital and in small letters', () => {
 test('modes and states are lanes, numbers are not', () => {
   assert.equal(catalog.named('state.mode.LElbj')?.lane, true);
   assert.equal(catalog.named('state.position_rad.LElbj')?.lane, false);
+});
+
+test("a joint's numbers have the unit of its kind", () => {
+  const joints = [
+    { name: 'LKneeSag', unit: 'rad' },
+    { name: 'RKneeSag', unit: 'm' },
+  ];
+  const state = {
+    name: 'state',
+    first: 0,
+    fields: [
+      field('position_rad', 'rad or m', '', ['LKneeSag', 'RKneeSag']),
+      field('torque_Nm', 'Nm or N', '', ['LKneeSag', 'RKneeSag']),
+      field('norm', 'Nm or N', 'of them all', null),
+    ],
+  };
+  const units = (of: { name: string; unit: string }[]) =>
+    new Catalog(1, [state], of).signals.map((signal) => signal.unit);
+  assert.deepEqual(units(joints), ['rad', 'm', 'Nm', 'N', 'Nm or N']);
+  assert.deepEqual(units([joints[0]]), ['rad', 'rad', 'Nm', 'Nm', 'Nm']);
+  assert.deepEqual(units([]), ['rad or m', 'rad or m', 'Nm or N', 'Nm or N', 'Nm or N']);
+  assert.equal(unitOf('rad/s2 or m/s2', 'RKneeSag', joints), 'm/s2');
+  assert.equal(unitOf('V', 'RKneeSag', joints), 'V');
 });

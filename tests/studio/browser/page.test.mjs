@@ -370,6 +370,10 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
           await page.locator('.opener').first().click();
           await page.locator('.tuning summary').first().click();
         }
+        if (tab === 'loop') {
+          await page.waitForSelector('.loop-histogram svg[aria-label*="late: 61462 cycles"]');
+          assert.match(await page.textContent('.buses'), /load 31\.2 %.*foot \(40\)31/s);
+        }
         await page.waitForTimeout(400);
         assert.deepEqual(await violations(page), [], tab);
         const [wide, window] = await page.evaluate(() => [

@@ -185,7 +185,45 @@ export class MockRobot extends PlayedRobot {
           cycle_ns: { p50: 32767, p99: 75775, p999: 163839, max: 356442 },
           wakeup_ns: { p50: 81919, p99: 278527, p999: 1997695, max: 4838981 },
           bus_ns: null,
-          buses: [{ interface: 'can0', status: '' }],
+          histograms: {
+            cycle_ns: [
+              [24575, 900],
+              [32767, 52000],
+              [40959, 9000],
+              [75775, 700],
+              [163839, 60],
+              [356442, 1],
+            ],
+            wakeup_ns: [
+              [61439, 800],
+              [81919, 60000],
+              [278527, 600],
+              [1997695, 60],
+              [4838981, 2],
+            ],
+            bus_ns: [],
+          },
+          buses: [
+            {
+              interface: 'can0',
+              bus: 'legs',
+              status: '',
+              load: 0.312,
+              most_load: 0.55,
+              planned_load: 0.401,
+              max_load: 0.8,
+              nodes: [
+                {
+                  node: 'hip_board',
+                  id: 10,
+                  missed: 0,
+                  late: 0,
+                  answer_ns: { p50: 180000, p99: 210000, p999: 250000, max: 301000 },
+                },
+                { node: 'foot', id: 40, missed: 3, late: 1, answer_ns: null },
+              ],
+            },
+          ],
         };
       case 'clock.show':
         return this.clock();
