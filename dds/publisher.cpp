@@ -99,9 +99,11 @@ void Publisher::take(const hal::CycleView& view) noexcept TANDEM_RT {
 
 /// The images that a topic is due for in this cycle.
 void Publisher::copy_due(const hal::CycleView& view, std::uint64_t number) noexcept TANDEM_RT {
+  // Time that went back may stand there: then every topic has that moment, whatever its rate.
+  const bool back = view.time.cycle < std::exchange(cycle_, view.time.cycle);
   std::uint32_t due = 0;
   for (std::size_t t = 0; t < kTopics; ++t) {
-    if (every_[t] != 0 && view.time.cycle % every_[t] == 0) due |= 1U << t;
+    if (every_[t] != 0 && (back || view.time.cycle % every_[t] == 0)) due |= 1U << t;
   }
   if (due == 0) return;
   const auto slot = image_ring_.begin_push();

@@ -76,6 +76,7 @@ class Publisher final : public hal::CycleObserver {
   std::size_t state_at_, command_at_, truth_at_, estimate_at_;  // in a slot
   SpscRing times_ring_, image_ring_;
   std::uint64_t taken_ = 0;  // the loop's
+  std::uint64_t cycle_ = 0;  // the loop's: of its last cycle
 
   std::atomic<std::int64_t> newest_ns_{0};  // of take()'s last cycle
   std::atomic<bool> stop_{false};

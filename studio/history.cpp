@@ -25,9 +25,36 @@ void History::lay_out() {
   }
 }
 
-void History::clear() {
-  for (Level& level : levels_) std::ranges::fill(level.holds, kNone);
-  added_ = 0;
+/// Time went back: what was from there on is no past of what comes.
+void History::forget_from(std::uint64_t cycle) {
+  for (std::size_t l = 0; l < kLevels; ++l) {
+    Level& level = levels_[l];
+    level.first = std::min(oldest(l), cycle);  // what made room for newer rows is gone
+    for (std::uint64_t& number : level.holds) {
+      if (number != kNone && number >= cycle / kLevelCycles[l]) number = kNone;
+    }
+    if (l > 0 && cycle % kLevelCycles[l] != 0) gather(l, cycle / kLevelCycles[l]);
+  }
+}
+
+/// Makes a row of the rows of the level below.
+void History::gather(std::size_t l, std::uint64_t number) {
+  Level& level = levels_[l];
+  const std::uint64_t parts = kLevelCycles[l] / kLevelCycles[l - 1];
+  float* const low = &level.numbers[number % level.rows * width(l)];
+  float* const high = low + signals_;
+  bool begun = false;
+  for (std::uint64_t part = number * parts; part < (number + 1) * parts; ++part) {
+    const float* const its_low = row_of(l - 1, part);
+    if (its_low == nullptr) continue;
+    const float* const its_high = l == 1 ? its_low : its_low + signals_;
+    for (std::size_t s = 0; s < signals_; ++s) {
+      low[s] = begun ? least(low[s], its_low[s]) : its_low[s];
+      high[s] = begun ? largest(high[s], its_high[s]) : its_high[s];
+    }
+    begun = true;
+  }
+  if (begun) level.holds[number % level.rows] = number;
 }
 
 void History::widen(std::size_t signals) {
@@ -37,6 +64,7 @@ void History::widen(std::size_t signals) {
     Level& level = levels_[l];
     const std::size_t parts = l == 0 ? 1 : 2;
     Level wide;
+    wide.first = level.first;
     wide.rows = std::max<std::size_t>(2, level_floats_ / (parts * signals));
     wide.numbers.assign(wide.rows * parts * signals, kNothing);
     wide.holds.assign(wide.rows, kNone);
@@ -55,8 +83,10 @@ void History::widen(std::size_t signals) {
 }
 
 void History::add(std::uint64_t cycle, std::span<const float> row) {
-  if (added_ != 0 && cycle <= newest_) clear();
-  if (added_ == 0) first_ = cycle;
+  if (added_ != 0 && cycle <= newest_) forget_from(cycle);
+  for (Level& level : levels_) {
+    if (added_ == 0) level.first = cycle;
+  }
   ++added_;
   newest_ = cycle;
   for (std::size_t l = 0; l < kLevels; ++l) {
@@ -88,7 +118,7 @@ std::uint64_t History::oldest(std::size_t level) const {
   const std::uint64_t last = newest_ / kLevelCycles[level];
   const std::uint64_t rows = levels_[level].rows;
   const std::uint64_t number = last + 1 > rows ? last + 1 - rows : 0;
-  return std::max(first_, number * kLevelCycles[level]);
+  return std::max(levels_[level].first, number * kLevelCycles[level]);
 }
 
 const float* History::row_of(std::size_t level, std::uint64_t number) const {

@@ -39,7 +39,8 @@ class History {
   void widen(std::size_t signals);
   [[nodiscard]] std::size_t signals() const { return signals_; }
 
-  /// The numbers of one cycle. One that is not after the newest begins the history anew.
+  /// The numbers of one cycle. One that is not after the newest replaces what lies from it on: of
+  /// the coarser rows that it divides, what lay before it stays where a finer row still has it.
   /// @param row  signals() numbers
   void add(std::uint64_t cycle, std::span<const float> row);
 
@@ -61,10 +62,12 @@ class History {
     std::size_t rows = 0;
     std::vector<float> numbers;        // by row: of each signal; above level 0 least, then largest
     std::vector<std::uint64_t> holds;  // by row: which multiple of the level's cycles; kNone: none
+    std::uint64_t first = 0;           // cycle that it begins with
   };
 
   void lay_out();
-  void clear();
+  void forget_from(std::uint64_t cycle);
+  void gather(std::size_t level, std::uint64_t number);
   [[nodiscard]] std::uint64_t oldest(std::size_t level) const;
   [[nodiscard]] std::size_t width(std::size_t level) const {
     return level == 0 ? signals_ : 2 * signals_;
@@ -74,7 +77,6 @@ class History {
   std::size_t level_floats_;
   std::size_t signals_;
   std::array<Level, kLevels> levels_;
-  std::uint64_t first_ = 0;  // cycle that the history begins with
   std::uint64_t newest_ = 0;
   std::uint64_t added_ = 0;
 };

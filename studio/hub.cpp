@@ -1,11 +1,23 @@
 #include "studio/hub.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace tandem::studio {
 
 using apps::Json;
+
+namespace {
+
+/// One may have been asked for events before the jump, the next after it.
+constexpr int kLateTicks = 2;
+
+double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+
+}  // namespace
 
 void Hub::start(Feed feed, Asker asker) {
   feed_ = std::move(feed);
@@ -55,6 +67,8 @@ bool Hub::is_behind(ClientNumber number) const {
 
 void Hub::tick(Clock::time_point now) {
   if (ended_) return;
+  std::vector<Event> late;  // before the cycles: what comes with them is not later than they are
+  if (feed_.events) feed_.events(late);
   if (sampler_->look(feed_)) {
     ++sources_;
     const auto text =
@@ -63,9 +77,7 @@ void Hub::tick(Clock::time_point now) {
       if (client.greeted) client.out.text(text);
     }
   }
-  std::vector<Event> events = sampler_->take_events();
-  if (feed_.events) feed_.events(events);
-  tell(events);
+  tell(what_happened(std::move(late)));
   if (controls_ != 0 && now - alive_ > kAlive) {
     // What the page asked for, and nobody expects any more.
     if (asker_.drop) asker_.drop(controls_);
@@ -73,6 +85,40 @@ void Hub::tick(Clock::time_point now) {
   }
   give_ticks(now);
   ask_watched(now);
+}
+
+/// Ticks of what did not happen are dropped: texts go out before ticks.
+void Hub::tell_back(const TimeBack& back) {
+  const double to_s = seconds(back.to_ns);
+  std::erase_if(events_, [&](const Event& one) { return one.time_s > to_s; });
+  const auto text =
+      std::make_shared<const std::string>(back_text(to_s, back.cycle, seconds(back.from_ns)));
+  for (auto& [number, client] : clients_) {
+    if (!client.greeted) continue;
+    client.out.drop_ticks();
+    client.out.text(text);
+  }
+  late_ticks_ = kLateTicks;
+}
+
+/// @param told  by the run, before the cycles were looked at: of what comes later than they are
+/// just after a jump back, it is what did not happen
+std::vector<Event> Hub::what_happened(std::vector<Event> told) {
+  std::vector<Event> events;
+  if (const auto back = sampler_->take_back()) {
+    tell_back(*back);
+    events.push_back({seconds(back->to_ns), back->cycle, Event::Level::kInfo, "",
+                      fmt::format("time went back to {:.6g} s, from {:.6g} s",
+                                  seconds(back->to_ns), seconds(back->from_ns))});
+  }
+  std::ranges::move(sampler_->take_events(), std::back_inserter(events));
+  if (late_ticks_ > 0) {
+    --late_ticks_;
+    const double newest_s = seconds(sampler_->time_ns() + run_->period_ns);
+    std::erase_if(told, [&](const Event& one) { return one.time_s > newest_s; });
+  }
+  std::ranges::move(told, std::back_inserter(events));
+  return events;
 }
 
 void Hub::tell(const std::vector<Event>& events) {
@@ -102,7 +148,7 @@ void Hub::give_ticks(Clock::time_point now) {
               .gap = span.gap,
               .revision = client.revision,
               .cycle = sampler_->cycle(),
-              .time_s = 1e-9 * static_cast<double>(sampler_->time_ns())};
+              .time_s = seconds(sampler_->time_ns())};
     tick.numbers.reserve(3 * client.signals.size());
     for (const SignalId signal : client.signals) {
       tick.numbers.push_back(fresh ? span.least[signal] : last[signal]);
@@ -176,8 +222,7 @@ void Hub::end_control(std::string_view why) {
                 .text = R"({"do": "joint.halt"})",
                 .rights = {.token = true, .control = true}});
   }
-  tell({{1e-9 * static_cast<double>(sampler_->time_ns()), sampler_->cycle(), Event::Level::kWarn,
-         "", who + " " + std::string(why) + ": every joint that it moved is halted"}});
+  tell({{seconds(sampler_->time_ns()), sampler_->cycle(), Event::Level::kWarn, "", who + " " + std::string(why) + ": every joint that it moved is halted"}});
   tell_control();
 }
 

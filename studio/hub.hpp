@@ -100,6 +100,8 @@ class Hub final : public Protocol {
   void tell_control();
   void end_control(std::string_view why);
   void tell(const std::vector<Event>& events);
+  void tell_back(const TimeBack& back);
+  [[nodiscard]] std::vector<Event> what_happened(std::vector<Event> told);
   void give_ticks(Clock::time_point now);
   void ask_watched(Clock::time_point now);
   void give(const Answer& answer);
@@ -113,6 +115,7 @@ class Hub final : public Protocol {
   ClientNumber newest_ = 0;
   std::uint32_t sources_ = 1;  // their revision
   std::deque<Event> events_;
+  int late_ticks_ = 0;  // that may still bring events of a time that was taken back
   std::map<std::string, Watched> watched_;
   ClientNumber controls_ = 0;  // 0: nobody
   Clock::time_point alive_;

@@ -154,6 +154,10 @@ std::string events_text(std::span<const Event> events) {
   return json_text({{"op", "events"}, {"events", std::move(list)}});
 }
 
+std::string back_text(double time_s, std::uint64_t cycle, double from_s) {
+  return json_text({{"op", "back"}, {"time_s", time_s}, {"cycle", cycle}, {"from_s", from_s}});
+}
+
 std::string error_text(std::string_view message, std::string_view hint) {
   return json_text({{"op", "error"}, {"message", message}, {"hint", hint}});
 }

@@ -39,6 +39,8 @@ struct RunDescription {
                                      std::span<const std::uint64_t> reach);
 [[nodiscard]] std::string signals_text(std::uint32_t revision, const SignalTable& table);
 [[nodiscard]] std::string events_text(std::span<const Event> events);
+/// Time went back: what lies after `time_s` is forgotten.
+[[nodiscard]] std::string back_text(double time_s, std::uint64_t cycle, double from_s);
 [[nodiscard]] std::string error_text(std::string_view message, std::string_view hint);
 /// @param json  the answer's text
 [[nodiscard]] std::string answer_text(std::int64_t number, std::string_view json);

@@ -174,7 +174,19 @@ void Sampler::begin_row() {
   std::ranges::fill(row_, kNoValue);
 }
 
+/// What was after it did not happen: the history forgets it with the cycle that comes.
+void Sampler::go_back(const hal::CycleTime& to) {
+  const bool earlier = !back_ || to.cycle < back_->cycle;
+  if (earlier) {
+    const std::int64_t from_ns = back_ ? std::max(back_->from_ns, time_.time_ns) : time_.time_ns;
+    back_ = TimeBack{.from_ns = from_ns, .to_ns = to.time_ns, .cycle = to.cycle};
+  }
+  std::erase_if(events_, [&](const Event& one) { return one.cycle > to.cycle; });
+  begin_tick();
+}
+
 void Sampler::take(const Tap::Cycle& cycle) {
+  if (!history_.empty() && cycle.time.cycle < time_.cycle) go_back(cycle.time);
   time_ = cycle.time;
   const bool of_a_run = !cycle.parts[Tap::kState].empty();
   if (of_a_run && (!has_phase_ || phase_ != cycle.phase)) {

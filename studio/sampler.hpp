@@ -27,6 +27,13 @@ struct Span {
   std::vector<float> least, largest;
 };
 
+/// Simulated time went back.
+struct TimeBack {
+  std::int64_t from_ns = 0;  ///< where it had been
+  std::int64_t to_ns = 0;
+  std::uint64_t cycle = 0;  ///< the newest one now: the cycle that `to_ns` is of
+};
+
 class Sampler {
  public:
   /// @param tap     of the same images; outlives it
@@ -36,6 +43,9 @@ class Sampler {
 
   /// Takes every cycle that is there. @return whether the sources are others than before
   bool look(const Feed& feed);
+  /// Where time has gone back to in look(), once; of several times the earliest: what had been
+  /// after it is no past of the run any more.
+  [[nodiscard]] std::optional<TimeBack> take_back() { return std::exchange(back_, std::nullopt); }
   /// Events that look() found, once.
   [[nodiscard]] std::vector<Event> take_events() { return std::exchange(events_, {}); }
 
@@ -66,6 +76,7 @@ class Sampler {
            std::size_t& source);
   void widen();
   void begin_row();
+  void go_back(const hal::CycleTime& to);
   void take(const Tap::Signals& part);
   void take(const Tap::Cycle& cycle);
 
@@ -83,6 +94,7 @@ class Sampler {
   std::uint64_t loads_ = 0, lost_ = 0;
   bool unknown_block_ = false;
   hal::CycleTime time_;
+  std::optional<TimeBack> back_;
   bool has_phase_ = false;
   hal::RunPhase phase_ = hal::RunPhase::kBringUp;
   std::vector<Event> events_;

@@ -33,6 +33,7 @@ Tap::Tap(const Images& images, std::int64_t period_ns)
       signals_(kPart, 4 * cycles_of_a_second(period_ns)) {}
 
 void Tap::push(Head head, const Images& images) noexcept TANDEM_RT {
+  head.turn = turn_++;
   const auto slot = cycles_.begin_push();
   if (slot.empty()) return;
   const auto all = images.all();
@@ -46,25 +47,25 @@ void Tap::push(Head head, const Images& images) noexcept TANDEM_RT {
 }
 
 void Tap::take(const hal::CycleView& view) noexcept TANDEM_RT {
-  push({view.time, view.times, view.phase, view.read_code, {}}, {.state = &view.state,
-                                                                 .command = &view.command,
-                                                                 .truth = view.truth,
-                                                                 .estimate = view.estimate});
+  push({view.time, view.times, view.phase, view.read_code, {}, 0}, {.state = &view.state,
+                                                                    .command = &view.command,
+                                                                    .truth = view.truth,
+                                                                    .estimate = view.estimate});
 }
 
 void Tap::take_step(const hal::CycleTime& time, const hal::TruthImage& truth,
                     const hal::BoardsImage& boards) noexcept TANDEM_RT {
-  push({time, {}, hal::RunPhase::kRunning, Code::kOk, {}}, {.truth = &truth, .boards = &boards});
+  push({time, {}, hal::RunPhase::kRunning, Code::kOk, {}, 0}, {.truth = &truth, .boards = &boards});
 }
 
-void Tap::take_signals(const hal::CycleTime& time,
+void Tap::take_signals(const hal::CycleTime& /*time*/,
                        const hal::SignalBlock& block) noexcept TANDEM_RT {
   const std::span<const std::byte> image = block.image();
   for (std::size_t at = 0; at < image.size(); at += kPartBytes) {
     const auto slot = signals_.begin_push();
     if (slot.empty()) return;
     const auto bytes = image.subspan(at, std::min(kPartBytes, image.size() - at));
-    const PartHead head{time.cycle, &block, static_cast<std::uint32_t>(at),
+    const PartHead head{turn_, &block, static_cast<std::uint32_t>(at),
                         static_cast<std::uint32_t>(bytes.size())};
     std::memcpy(slot.data(), &head, sizeof head);
     std::memcpy(slot.data() + sizeof head, bytes.data(), bytes.size());
@@ -81,8 +82,8 @@ bool Tap::next(const std::function<void(const Signals&)>& signals,
   for (auto part = signals_.front(); !part.empty(); part = signals_.front()) {
     PartHead its{};
     std::memcpy(&its, part.data(), sizeof its);
-    if (its.cycle > head.time.cycle) break;
-    if (its.cycle == head.time.cycle) {
+    if (its.turn > head.turn) break;
+    if (its.turn == head.turn) {
       signals({its.block, its.at, part.subspan(sizeof its, its.bytes)});
     }
     signals_.pop();

@@ -83,11 +83,12 @@ class Tap final : public hal::CycleObserver {
     hal::RunPhase phase;
     Code read_code;
     std::array<bool, kParts> there;
+    std::uint64_t turn;
   };
   /// A controller's signals cross in parts of this many bytes, so that few numbers take little.
   static constexpr std::size_t kPart = 512;
   struct PartHead {
-    std::uint64_t cycle;
+    std::uint64_t turn;
     const hal::SignalBlock* block;
     std::uint32_t at, bytes;
   };
@@ -103,6 +104,7 @@ class Tap final : public hal::CycleObserver {
 
   Places places_;
   SpscRing cycles_, signals_;
+  std::uint64_t turn_ = 0;  // calls of take(): cycles' numbers come again where time goes back
 };
 
 }  // namespace tandem::studio

@@ -91,7 +91,8 @@ dds::FaultFeed fault_feed(runtime::RobotCycle& cycle) {
   return {.version =
               [&cycle] {
                 const runtime::FaultLog& log = cycle.fault_log();
-                return log.size() + log.lost() + (log.size() - log.latched());
+                // Each has its own bits: all three are less again where time goes back.
+                return log.lost() << 32U | log.size() << 16U | (log.size() - log.latched());
               },
           .faults = [&cycle] { return entries(cycle.faults()); },
           .lost = [&cycle] { return cycle.fault_log().lost(); }};

@@ -173,10 +173,11 @@ void FoxgloveRun::take(const studio::Tap::Cycle& cycle) {
   has_cycle_ = true;
 }
 
-/// Topics are due when a cycle of theirs has passed since the last tick.
+/// Topics are due when a cycle of theirs has passed since the last tick, and when time went back.
 void FoxgloveRun::publish(bool again) {
   std::uint32_t due = 0;
   if (has_cycle_) {
+    again = again || (shown_ && time_.cycle < *shown_);
     for (std::size_t t = 0; t < dds::RunTopics::kTopics; ++t) {
       const std::uint64_t every = topics_->every()[t];
       if (every == 0) continue;

@@ -95,15 +95,20 @@ class StudioRun::Happenings {
     const std::size_t size = log.size(), latched = log.latched();
     if (size == latched_.size() && latched == latched_count_) return;
     const std::vector<runtime::FaultReport> faults = cycle_.faults();
+    // Where time went back, those that came after it are not there, and others may come.
+    latched_.resize(std::min(latched_.size(), faults.size()));
+    for (std::size_t i = 0; i < latched_.size(); ++i) {
+      if (latched_[i].cycle != faults[i].cycle) latched_.resize(i);
+    }
     for (std::size_t i = 0; i < faults.size(); ++i) {
       const runtime::FaultReport& fault = faults[i];
       const std::string& who = fault.joint;
       if (i >= latched_.size()) {
-        latched_.push_back(true);
+        latched_.push_back({fault.cycle, true});
         out.push_back({fault.time_s, fault.cycle, level_of(fault), who, "fault: " + fault.text});
       }
-      if (!fault.latched && latched_[i]) {
-        latched_[i] = false;
+      const bool was = std::exchange(latched_[i].latched, fault.latched);
+      if (was && !fault.latched) {
         out.push_back({fault.cleared_s, cycle_.progress().cycles.load(), Event::Level::kInfo, who,
                        "cleared: " + fault.text});
       }
@@ -114,7 +119,12 @@ class StudioRun::Happenings {
   runtime::RobotCycle& cycle_;
   std::uint64_t seen_ = 0;
   std::vector<hal::TextEvent> texts_;
-  std::vector<bool> latched_;  // by fault, as it was shown
+  /// A fault as it was shown.
+  struct Shown {
+    std::uint64_t cycle;
+    bool latched;
+  };
+  std::vector<Shown> latched_;
   std::size_t latched_count_ = 0;
   std::mutex mutex_;
   std::deque<Event> requests_;

@@ -35,7 +35,8 @@ void Hub::put(ChannelId channel, std::int64_t time_ns, std::string payload) {
   for (auto& [number, client] : clients_) {
     const auto its = client.subscriptions.find(channel);
     if (its == client.subscriptions.end()) continue;
-    client.out.message({its->second, time_ns, shared}, std::max(keeps, Queue::kMostMessages));
+    client.out.message({its->second, time_ns, shared, keeps > 0},
+                       std::max(keeps, Queue::kMostMessages));
   }
   std::deque<Stamped>& kept = topic->second.kept;
   if (keeps > 0) kept.emplace_back(time_ns, shared);

@@ -130,7 +130,7 @@ void Hub::subscribe(Client& client, SubscriptionId subscription, ChannelId chann
   subscribed_ = true;
   const std::size_t most = std::max(topic->second.channel.keeps, Queue::kMostMessages);
   for (const auto& [time_ns, payload] : topic->second.kept) {
-    client.out.message({subscription, time_ns, payload}, most);
+    client.out.message({subscription, time_ns, payload, true}, most);
   }
 }
 

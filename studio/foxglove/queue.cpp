@@ -54,8 +54,20 @@ void Queue::message(Message message, std::size_t most) {
 }
 
 void Queue::drop(SubscriptionId subscription) {
+  drop_all([=](const Message& message) { return message.subscription == subscription; });
+}
+
+void Queue::time(std::int64_t time_ns) {
+  time_ns_ = time_ns;
+  if (time_ns >= std::exchange(newest_ns_, time_ns)) return;
+  drop_all([](const Message& message) { return !message.stays; });
+}
+
+template <class Is>
+void Queue::drop_all(Is is) {
   std::erase_if(entries_, [&](const Entry& entry) {
-    if (!is_of(entry, subscription)) return false;
+    const auto* message = std::get_if<Message>(&entry);
+    if (message == nullptr || !is(*message)) return false;
     message_bytes_ -= bytes_of(entry);
     return true;
   });

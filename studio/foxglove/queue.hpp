@@ -25,6 +25,7 @@ class Queue {
     SubscriptionId subscription;
     std::int64_t time_ns;
     std::shared_ptr<const std::string> payload;
+    bool stays = false;  ///< true whenever it was: of a topic that keeps some
   };
   /// A file that is read when its turn comes.
   struct Asset {
@@ -37,8 +38,9 @@ class Queue {
   void asset(Asset asset) { put(std::move(asset)); }
   /// @param most  of its subscription that wait
   void message(Message message, std::size_t most = kMostMessages);
-  /// The run's time; of several that wait the newest counts.
-  void time(std::int64_t time_ns) { time_ns_ = time_ns; }
+  /// The run's time; of several that wait the newest counts. Where it went back, messages that
+  /// wait are of what did not happen: viewers would take them for newer than all that comes.
+  void time(std::int64_t time_ns);
   /// Nobody waits for its messages any more.
   void drop(SubscriptionId subscription);
 
@@ -57,10 +59,13 @@ class Queue {
   void put(Entry entry);
   template <class Is>
   bool lose_first(Is is);
+  template <class Is>
+  void drop_all(Is is);
 
   std::deque<Entry> entries_;
   std::size_t texts_ = 0, text_bytes_ = 0, message_bytes_ = 0;
   std::optional<std::int64_t> time_ns_;
+  std::int64_t newest_ns_ = 0;  // of time()
   std::uint64_t lost_ = 0;
   bool over_ = false;
 };

@@ -1,8 +1,9 @@
-// Time of the run: pause, resume, step, rate.
+// Time of the run: pause, resume, step, rate, and back.
 import type { Actions } from './actions';
 import type { ControlLease } from './control';
 import type { Data } from './data';
 import { h, say } from './dom';
+import { PastPanel } from './past';
 import type { Answer } from './protocol';
 
 export class ClockPanel {
@@ -16,6 +17,7 @@ export class ClockPanel {
   private readonly rate = h('select', { 'aria-label': 'simulated seconds per second' });
   private readonly words = h('span', { class: 'why' });
   private readonly body: HTMLElement;
+  private readonly past: PastPanel;
   readonly element: HTMLElement;
   private simulated: boolean | null = null;
   private told = Number.NaN;
@@ -31,6 +33,7 @@ export class ClockPanel {
       );
     }
     this.rate.value = '1';
+    this.past = new PastPanel(data, actions);
     this.body = h(
       'fieldset',
       { class: 'clock-body' },
@@ -49,6 +52,7 @@ export class ClockPanel {
       this.rate,
       actions.button('Set rate', () => ({ do: 'clock.rate', rate: Number(this.rate.value) })),
       this.words,
+      this.past.element,
     );
     this.element = h(
       'section',
@@ -64,6 +68,8 @@ export class ClockPanel {
     if (request !== 'clock.show' || !answer.ok) return;
     this.simulated = answer.clock === 'simulated';
     this.showRate(Number(answer.rate));
+    this.past.watched(answer);
+    this.past.element.hidden = !this.simulated;
     if (!this.simulated) {
       const by = answer.clock === 'bus' ? 'the bus' : 'the real clock';
       say(this.words, `Time is advanced by ${by}: only simulated time can be paused.`);

@@ -53,6 +53,13 @@ export function commandLine(request: Request): string {
       return words.join(' ');
     case 'clock.step':
       return [...words, value(request.cycles ?? 1)].join(' ');
+    case 'clock.rewind':
+      return [...words, `${value(request.by_s)}s`].join(' ');
+    case 'clock.goto':
+      return [...words, `${value(request.time_s)}s`].join(' ');
+    case 'clock.back-until':
+    case 'clock.until':
+      return [...words, shellWord(String(request.condition))].join(' ');
     case 'clock.rate':
       return [...words, value(request.rate)].join(' ');
     case 'controller.start':

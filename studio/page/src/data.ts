@@ -1,6 +1,6 @@
 // Joins the source with the page: who needs which signals, their newest rows, and the time.
 import { History } from './history';
-import type { Hello, RunEvent, SourceTable, Tick, Window } from './protocol';
+import type { Hello, RunEvent, SourceTable, Tick, TimeBack, Window } from './protocol';
 import { Catalog } from './signals';
 import type { Source } from './source';
 import { TimeModel } from './time';
@@ -37,6 +37,7 @@ export class Data {
   private readonly onCatalog: (() => void)[] = [];
   private readonly onTick: (() => void)[] = [];
   private readonly onEvents: (() => void)[] = [];
+  private readonly onBack: (() => void)[] = [];
 
   constructor(readonly source: Source) {
     source.on({
@@ -44,6 +45,7 @@ export class Data {
       signals: (revision, sources) => this.table(revision, sources),
       tick: (tick) => this.take(tick),
       events: (events) => this.say(events),
+      back: (back) => this.goBack(back),
     });
   }
 
@@ -58,6 +60,10 @@ export class Data {
   }
   whenEvents(call: () => void): void {
     this.onEvents.push(call);
+  }
+
+  whenBack(call: () => void): void {
+    this.onBack.push(call);
   }
 
   /** What `owner` looks at from now on. @param past what came before is wanted, too. */
@@ -125,6 +131,16 @@ export class Data {
     this.time.now = tick.time;
     if (this.lacking.size > 0 && tick.revision === this.revision) void this.backfill(tick.time);
     for (const call of this.onTick) call();
+  }
+
+  /** What lay after it did not happen; the run's events say that it went back. */
+  private goBack({ time_s }: TimeBack): void {
+    this.history.forgetAfter(time_s);
+    // Older than the rows are: those before the next tick come from what the run kept.
+    if (this.history.rows === 0) for (const id of this.history.ids()) this.lacking.add(id);
+    this.events.splice(0, this.events.length, ...this.events.filter((e) => e.time_s <= time_s));
+    this.time.goBack(time_s);
+    for (const call of [...this.onBack, ...this.onEvents]) call();
   }
 
   private async backfill(now: number): Promise<void> {

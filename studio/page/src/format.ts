@@ -35,6 +35,10 @@ export function seconds(value: number): string {
   return Number.isFinite(value) ? `${value.toFixed(3)} s` : '–';
 }
 
+export function megabytes(bytes: number): string {
+  return `${(bytes / 1e6).toPrecision(2)} MB`;
+}
+
 /** Nanoseconds as microseconds. */
 export function micros(ns: number | null | undefined): string {
   return ns === null || ns === undefined ? '–' : `${(ns / 1000).toFixed(ns < 10000 ? 1 : 0)} µs`;

@@ -41,6 +41,10 @@ export class History {
   get newest(): number {
     return this.rows > 0 ? this.times[this.end - 1] : Number.NaN;
   }
+  /** The signals that have columns. */
+  ids(): number[] {
+    return [...this.columns.keys()];
+  }
   has(id: number): boolean {
     return this.columns.has(id);
   }
@@ -49,6 +53,12 @@ export class History {
     this.newestValues.clear();
     this.begin = 0;
     this.end = 0;
+    this.rowStart = Number.NEGATIVE_INFINITY;
+  }
+
+  /** Time went back: rows that reach beyond `time` did not happen. */
+  forgetAfter(time: number): void {
+    while (this.end > this.begin && this.times[this.end - 1] > time) --this.end;
     this.rowStart = Number.NEGATIVE_INFINITY;
   }
 
@@ -67,7 +77,7 @@ export class History {
   }
 
   push(tick: Tick, ids: number[]): void {
-    if (tick.time < this.newest) this.clear();
+    if (tick.time < this.newest) this.forgetAfter(tick.time);
     if (this.rows === 0) this.before(tick.time);
     const gap = this.kept_s / (0.9 * this.capacity);
     const merge = this.rows > 0 && tick.time - this.rowStart < gap;

@@ -1,5 +1,5 @@
 // The source of a run that goes on: a WebSocket, which is opened again each second when it breaks.
-import type { Answer, Hello, Request, RunEvent, SourceTable, Window } from './protocol';
+import type { Answer, Hello, Request, RunEvent, SourceTable, TimeBack, Window } from './protocol';
 import { decodeTick, decodeWindow, kSubprotocol } from './protocol';
 import type { Connection, Listener, Source } from './source';
 import { whyRefused } from './versions';
@@ -222,6 +222,9 @@ export class LiveSource implements Source {
         return;
       case 'events':
         this.each((l) => l.events?.(message.events as RunEvent[]));
+        return;
+      case 'back':
+        this.each((l) => l.back?.(message as unknown as TimeBack));
         return;
       case 'watched':
         this.each((l) => l.watched?.(message.request as string, message.answer as Answer));

@@ -229,6 +229,11 @@ export class Pane implements LegendOwner {
     }));
   }
 
+  /** What was asked for may not have happened. */
+  forget(): void {
+    this.window = null;
+  }
+
   /** Asks for a span once it stands still. */
   private ask(from: number, to: number): void {
     const ids = [...new Set(this.ids())];

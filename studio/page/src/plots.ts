@@ -97,6 +97,9 @@ export class Plots implements PaneOwner {
     data.whenEvents(() => {
       this.dirty = true;
     });
+    data.whenBack(() => {
+      for (const pane of this.panes) pane.forget();
+    });
     data.whenCatalog(() => this.load());
     new ResizeObserver(() => {
       for (const pane of this.panes) pane.resize();

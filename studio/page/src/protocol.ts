@@ -81,6 +81,12 @@ export interface RunEvent {
   who: string;
   text: string;
 }
+/** Simulated time went back to `time_s`: what lay after it is forgotten. */
+export interface TimeBack {
+  time_s: number;
+  cycle: number;
+  from_s: number;
+}
 export interface Control {
   taken: boolean;
   yours: boolean;

@@ -7,6 +7,7 @@ import type {
   RunEvent,
   SourceTable,
   Tick,
+  TimeBack,
   Window,
 } from './protocol';
 
@@ -18,6 +19,7 @@ export interface Listener {
   signals(revision: number, sources: SourceTable[]): void;
   tick(tick: Tick): void;
   events(events: RunEvent[]): void;
+  back(back: TimeBack): void;
   watched(request: string, answer: Answer): void;
   control(control: Control): void;
   entered(may: string): void;

@@ -61,6 +61,14 @@ export class TimeModel {
     else if (time !== null) this.selected = Math.min(whole.to, Math.max(whole.from, time));
     this.changed();
   }
+  /** The run went back to `time`: what is selected or seen after it is not there any more. */
+  goBack(time: number): void {
+    this.now = time;
+    this.hover = null;
+    if (this.selected !== null && this.selected > time) this.selected = null;
+    if (this.frozen && this.frozen.from >= time) this.frozen = null;
+    this.changed();
+  }
   point(time: number | null): void {
     if (this.hover === time) return;
     this.hover = time;

@@ -9,6 +9,12 @@ test('requests become command lines', () => {
     [{ do: 'estop' }, 'tandem estop'],
     [{ do: 'clock.step', cycles: 10 }, 'tandem clock step 10'],
     [{ do: 'clock.rate', rate: 0.5 }, 'tandem clock rate 0.5'],
+    [{ do: 'clock.rewind', by_s: 1 }, 'tandem clock rewind 1s'],
+    [{ do: 'clock.goto', time_s: 3.125 }, 'tandem clock goto 3.125s'],
+    [
+      { do: 'clock.back-until', condition: 'torque(LKneeSag) > 40Nm' },
+      "tandem clock back-until 'torque(LKneeSag) > 40Nm'",
+    ],
     [{ do: 'controller.start' }, 'tandem controller start'],
     [
       { do: 'controller.switch', stop: ['squat'], start: ['rest'] },

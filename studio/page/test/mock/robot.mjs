@@ -14,6 +14,7 @@ export class MockRobot extends PlayedRobot {
       pending_steps: 0,
       rate: this.rate,
       realtime_factor: this.paused ? null : this.rate * 0.98,
+      past: { keeps: true, checkpoints: 20, bytes: 1.2e6, budget_bytes: 64e6, from_s: 0 },
     };
   }
   status() {
