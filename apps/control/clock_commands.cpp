@@ -79,7 +79,10 @@ struct Clock {
 
   [[nodiscard]] Json look() const {
     Json found = apps::look(cycle);
-    if (past.machine == nullptr) return found;
+    if (past.machine == nullptr) {
+      if (!past.why_not.empty()) found["no_past"] = past.why_not;
+      return found;
+    }
     const runtime::KeptPast kept = past.machine->past();
     found["past"] = {
         {"keeps", kept.keeps},

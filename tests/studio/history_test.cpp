@@ -132,17 +132,42 @@ TEST(StudioHistory, HasNothingOfTimesThatWereNot) {
   EXPECT_EQ(history.plan(0, 60'000, 100).rows, 10U);
 }
 
-TEST(StudioHistory, BeginsAnewWhenTimeGoesBack) {
-  History history(4 * 100, 1);
+TEST(StudioHistory, ForgetsWhatLayAfterWhereTimeGoesBackTo) {
+  History history(4 * 4'000, 1);
+  Rows rows;
+  const auto add = [&](std::uint64_t cycle, float value) {
+    history.add(cycle, std::span(&value, 1));
+    rows.erase(rows.lower_bound(cycle), rows.end());
+    rows[cycle] = {value};
+  };
+  for (std::uint64_t cycle = 0; cycle < 3'000; ++cycle) add(cycle, cycle < 2'500 ? 1.0F : 9.0F);
+  for (const std::uint64_t to : {2'490U, 1'111U, 512U, 3U}) {
+    for (std::uint64_t cycle = to; cycle < to + 300; ++cycle) add(cycle, -1.0F * float(to));
+    for (const std::size_t points : {10'000U, 40U, 3U}) {
+      const Window window = history.plan(0, 10'000, points);
+      EXPECT_EQ((window.first_cycle + (window.rows - 1) * window.cycles) / window.cycles,
+                (to + 299) / window.cycles);
+      expect_right(history, rows, window);
+    }
+  }
+}
+
+TEST(StudioHistory, HasOfTheTimeBeforeItsFinestRowsWhatTheCoarserOnesHave) {
+  History history(4 * 100, 1);  // 100 rows of a cycle, 50 of 16, 50 of 256
   float value = 1.0F;
-  for (std::uint64_t cycle = 0; cycle < 40; ++cycle) history.add(cycle, std::span(&value, 1));
+  for (std::uint64_t cycle = 0; cycle < 700; ++cycle) history.add(cycle, std::span(&value, 1));
   value = 2.0F;
-  history.add(20, std::span(&value, 1));
-  const Window window = history.plan(0, 100, 100);
-  ASSERT_EQ(window.rows, 1U);
-  EXPECT_EQ(window.first_cycle, 20U);
-  history.read(window, 0, std::span(&value, 1));
-  EXPECT_EQ(value, 2.0F);
+  for (std::uint64_t cycle = 325; cycle < 330; ++cycle) history.add(cycle, std::span(&value, 1));
+  const Window fine = history.plan(326, 329, 100);
+  EXPECT_EQ(fine.level, 0U);
+  EXPECT_EQ(fine.rows, 4U);
+  const Window all = history.plan(160, 329, 100);
+  ASSERT_EQ(all.level, 1U) << "the single cycles before the jump have made room long ago";
+  std::vector<float> numbers(all.numbers());
+  history.read(all, 0, numbers);
+  EXPECT_EQ(numbers[0], 1.0F);
+  EXPECT_EQ(numbers[numbers.size() - 4], 1.0F) << "the row before the moment";
+  EXPECT_EQ(numbers.back(), 2.0F) << "that of the moment begins anew";
 }
 
 TEST(StudioHistory, KeepsItsNewestRowsAndItsMemoryWhenSignalsCome) {

@@ -307,6 +307,36 @@ TEST(Studio, TellsWhatHappenedAlsoToThoseWhoComeLater) {
   EXPECT_EQ(rig.client()->next("events")["events"].size(), 1U);
 }
 
+TEST(Studio, TellsThatTimeWentBackAndForgetsWhatLayAfter) {
+  StudioRig rig;
+  rig.start();
+  const auto one = rig.client();
+  (void)one->next("events");
+  rig.show(0, 200);
+  const auto event = [](double time_s, const char* text) {
+    return Event{time_s, static_cast<std::uint64_t>(1000.0 * time_s), Event::Level::kInfo, "", text};
+  };
+  {
+    const std::lock_guard lock(rig.mutex);
+    rig.events = {event(0.05, "early"), event(0.15, "late")};
+  }
+  while (one->next("events")["events"].back()["text"] != "late") {
+  }
+  rig.show(100, 101);
+  {
+    const std::lock_guard lock(rig.mutex);
+    rig.events = {event(0.19, "later still")};
+  }
+  const Json back = one->next("back");
+  EXPECT_DOUBLE_EQ(back["time_s"].get<double>(), 0.1);
+  EXPECT_EQ(back["cycle"], 100);
+  EXPECT_DOUBLE_EQ(back["from_s"].get<double>(), 0.199);
+  std::vector<std::string> texts;
+  for (const Json& told : rig.client()->next("events")["events"]) texts.push_back(told["text"]);
+  EXPECT_EQ(texts, (std::vector<std::string>{"phase: running", "early",
+                                             "time went back to 0.1 s, from 0.199 s"}));
+}
+
 TEST(Studio, TellsItsClientsThatTheRunIsOverAndClosesThem) {
   StudioRig rig;
   rig.start();

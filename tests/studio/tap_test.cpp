@@ -338,5 +338,51 @@ TEST(StudioSampler, FollowsControllersThatComeAndGo) {
   EXPECT_EQ(numbers[0], static_cast<float>(test::number_of(0, 2))) << "what was stays";
 }
 
+TEST(StudioTap, KeepsTheSignalsOfCyclesThatComeAgain) {
+  ShownRobot robot;
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  const auto block = test::block_of(3);
+  for (std::uint64_t cycle = 90; cycle < 100; ++cycle) robot.show(tap, cycle, {block});
+  for (std::uint64_t cycle = 50; cycle < 60; ++cycle) robot.show(tap, cycle, {block});
+  std::size_t parts = 0, cycles = 0;
+  double number = 0.0;
+  while (tap.next(
+      [&](const Tap::Signals& part) {
+        ++parts;
+        std::memcpy(&number, part.bytes.data() + 16, sizeof number);
+      },
+      [&](const Tap::Cycle& one) {
+        ++cycles;
+        EXPECT_EQ(number, test::number_of(one.time.cycle, 0));
+      })) {
+  }
+  EXPECT_EQ(cycles, 20U);
+  EXPECT_EQ(parts, 20U);
+}
+
+TEST(Sampler, GoesBackWithTheRun) {
+  ShownRobot robot;
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  Sampler sampler(tap, robot.images(), robot.names(), 100'000);
+  for (std::uint64_t cycle = 0; cycle < 100; ++cycle) robot.show(tap, cycle, {});
+  (void)sampler.look({});
+  EXPECT_FALSE(sampler.take_back());
+  sampler.begin_tick();
+  for (std::uint64_t cycle = 100; cycle < 110; ++cycle) robot.show(tap, cycle, {});
+  for (std::uint64_t cycle = 40; cycle < 60; ++cycle) robot.show(tap, cycle, {});
+  for (std::uint64_t cycle = 50; cycle < 53; ++cycle) robot.show(tap, cycle, {});
+  (void)sampler.look({});
+  const auto back = sampler.take_back();
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->cycle, 40U) << "the earliest of two jumps";
+  EXPECT_EQ(back->to_ns, 40'000'000);
+  EXPECT_EQ(back->from_ns, 109'000'000);
+  EXPECT_FALSE(sampler.take_back()) << "once";
+  EXPECT_EQ(sampler.cycle(), 52U);
+  EXPECT_EQ(sampler.history().newest(), 52U);
+  const SignalId position = test::id_of(sampler.table(), "state.position_rad.a");
+  EXPECT_FLOAT_EQ(sampler.span().largest[position], 0.52F) << "nothing of what was taken back";
+}
+
 }  // namespace
 }  // namespace tandem::studio

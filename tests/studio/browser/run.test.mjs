@@ -169,6 +169,52 @@ describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
     await leave(page);
   });
 
+  test('a simulated run goes back, and on; the page has the past, then the new branch', async () => {
+    const run = await begin('double_pendulum/hold.toml');
+    const page = await visit(run.address);
+    await page.waitForSelector('body[data-phase="running"]');
+    await page.waitForSelector('.clock-body:not([disabled])');
+    const seen = (name) => page.evaluate((key) => Number(document.body.dataset[key]), name);
+    const press = (label) => page.locator(`.clock-body button:text-is("${label}")`).click();
+    await page.waitForFunction(() => Number(document.body.dataset.time) > 1.4);
+    await press('Pause');
+    await page.waitForSelector('body[data-paused="true"]');
+    await press('Step');
+    await page.waitForTimeout(100);
+    const before = run.ask({ do: 'clock.show' }).time_s;
+    await press('Back 1 s');
+    await page.waitForFunction(
+      (time) => Math.abs(Number(document.body.dataset.time) - time) < 1e-6,
+      before - 1,
+    );
+    assert.ok(Math.abs(run.ask({ do: 'clock.show' }).time_s - (before - 1)) < 1e-6);
+    for (const name of ['joint1', 'joint2']) {
+      const place = Math.fround(joint(run, name).position_rad);
+      await page.waitForFunction(
+        ([key, value]) =>
+          Math.abs(
+            Number(document.querySelector('.scene').getAttribute(`data-joint-${key}`)) - value,
+          ) < 1e-6,
+        [name, place],
+      );
+    }
+    await page.waitForFunction(
+      (time) => Number(document.querySelector('.plots').dataset.to) <= Math.max(10, time),
+      before - 0.9,
+    );
+    await page.fill('.condition', 'torqe(joint1) > 1Nm');
+    await press('Back until');
+    await page.waitForSelector('.past .field-error:not([hidden])');
+    await shot(page, 'studio-back');
+    await page.click('#tab-events');
+    await page.waitForFunction(() => document.body.textContent.includes('time went back to'));
+    await press('Resume');
+    const there = await seen('time');
+    await page.waitForFunction((time) => Number(document.body.dataset.time) > time + 0.1, there);
+    assert.ok((await seen('time')) < before, 'it goes on from there, not from where it was');
+    await leave(page);
+  });
+
   test('a page of another version says so', async () => {
     const run = await begin('double_pendulum/hold.toml');
     const files = ['index.html', 'studio.js', 'studio.css'];
