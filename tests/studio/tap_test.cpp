@@ -360,7 +360,7 @@ TEST(StudioTap, KeepsTheSignalsOfCyclesThatComeAgain) {
   EXPECT_EQ(parts, 20U);
 }
 
-TEST(Sampler, GoesBackWithTheRun) {
+TEST(StudioSampler, GoesBackWithTheRun) {
   ShownRobot robot;
   Tap tap(robot.images(), ShownRobot::kPeriod_ns);
   Sampler sampler(tap, robot.images(), robot.names(), 100'000);

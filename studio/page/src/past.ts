@@ -55,6 +55,7 @@ export class PastPanel {
   private readonly wrong = h('p', { class: 'field-error', role: 'alert', hidden: true });
   private readonly list = h('datalist', { id: 'past-conditions' });
   private readonly condition = h('input', {
+    type: 'text',
     class: 'condition',
     list: 'past-conditions',
     placeholder: 'torque(LKneeSag) > 40Nm',
