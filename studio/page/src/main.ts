@@ -3,6 +3,7 @@ import 'uplot/dist/uPlot.min.css';
 import './theme.css';
 import './style.css';
 import './panels.css';
+import './past.css';
 import './joints.css';
 import './scene.css';
 import './scope.css';

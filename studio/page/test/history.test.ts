@@ -70,7 +70,7 @@ test('rows before the first tick are filled with what the run kept', () => {
   assert.equal(history.latest(1), 7);
 });
 
-test('time that goes back begins anew', () => {
+test('nothing is later than where time went back to', () => {
   const history = new History(100, 9);
   history.track([1]);
   history.push(tick(8, 1, 1, 1), [1]);
