@@ -1,5 +1,5 @@
 // A log-linear histogram of durations: fixed buckets, no heap, 3 % resolution.
-// Layer: rt.  Thread: one writer; read by others only when it has stopped.
+// Layer: rt.  Thread: one writer; beside it others may ask for percentiles() and bins() alone.
 #pragma once
 
 #include <array>

@@ -1,5 +1,6 @@
 // Classic CAN: a command and a sample of one axis take two frames each. And the round trips.
 #include <algorithm>
+#include <array>
 
 #include "tests/ethercat_can/rig.hpp"
 
@@ -131,6 +132,48 @@ TEST(RoundTrip, OfABoardThatHearsLessIsLonger) {
   EXPECT_EQ(figures.id, 10);
   EXPECT_EQ(figures.late, 1u);
   EXPECT_EQ(figures.answer.max, 0) << "the loopback bus knows no times";
+}
+
+/// A bus on which every answer comes 300 us after SYNC.
+struct TimedBus final : ForwardingBus {
+  static constexpr std::int64_t kAnswer_ns = 300'000;
+  explicit TimedBus(Bus& to) : ForwardingBus(to) {}
+
+  std::size_t send(std::span<const Frame> frames) noexcept TANDEM_RT override {
+    now_ns += 400'000;
+    return ForwardingBus::send(frames);
+  }
+  std::size_t receive(std::span<Frame> frames) noexcept TANDEM_RT override {
+    const std::size_t count = ForwardingBus::receive(frames);
+    stamps.fill(now_ns + kAnswer_ns);
+    return count;
+  }
+  [[nodiscard]] std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT override {
+    return stamps;
+  }
+  [[nodiscard]] std::int64_t sent_ns() const noexcept TANDEM_RT override { return now_ns; }
+
+  std::int64_t now_ns = 0;
+  std::array<std::int64_t, 64> stamps{};
+};
+
+TEST(RoundTrip, TellsTheTimeFromSyncToTheWholeSampleOfEveryNode) {
+  for (const RobotConfig& robot : {test::robot_config(), classic_config()}) {
+    Rig rig(robot);
+    TimedBus legs(rig.legs.master()), arms(rig.arms.master());
+    const std::array<Bus*, 2> ends{&legs, &arms};
+    rig.master = std::move(*DriveMaster::create(rig.robot, ends));
+    rig.bring_up();
+    rig.steps(50);
+    const std::vector<NodeFigures> all = rig.master->node_figures();
+    ASSERT_EQ(all.size(), 4u) << "the sensor, too";
+    for (const NodeFigures& node : all) {
+      EXPECT_EQ(node.answer.p50, TimedBus::kAnswer_ns) << node.node;
+      EXPECT_EQ(node.answer.max, TimedBus::kAnswer_ns) << node.node;
+      EXPECT_EQ(node.missed, 0u) << node.node;
+      EXPECT_EQ(node.bus, node.node == "foot" ? 1u : 0u);
+    }
+  }
 }
 
 }  // namespace
