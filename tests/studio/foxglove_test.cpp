@@ -317,5 +317,24 @@ TEST(FoxgloveRules, SayWhoMayLook) {
   }
 }
 
+TEST(FoxgloveQueue, DropsMessagesOfATimeThatWasTakenBack) {
+  const auto payload = std::make_shared<const std::string>("x");
+  Queue queue;
+  queue.time(500);
+  queue.message({1, 500, payload});
+  queue.message({2, 10, payload, true});  // a description
+  queue.text("words");
+  queue.time(200);
+  queue.message({1, 200, payload});
+  EXPECT_EQ(queue.next_time(), 200);
+  std::vector<std::int64_t> stamps;
+  while (const auto entry = queue.next()) {
+    if (const auto* message = std::get_if<Queue::Message>(&*entry)) {
+      stamps.push_back(message->time_ns);
+    }
+  }
+  EXPECT_EQ(stamps, (std::vector<std::int64_t>{10, 200}));
+}
+
 }  // namespace
 }  // namespace tandem::studio::foxglove
