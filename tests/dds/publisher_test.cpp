@@ -102,6 +102,22 @@ TEST(Publisher, TellsTheSimulationsTimeAlsoWhileItStandsStill) {
                                               100'000'000}));
 }
 
+TEST(Publisher, HasTheMomentThatTimeGoesBackToOnEveryTopic) {
+  PublisherRig rig;
+  auto clock = rig.reader<rosgraph_msgs::Clock>("clock");
+  auto joints = rig.reader<sensor_msgs::JointState>("joint_states");
+  rig.start();
+  rig.show_all(0, 101);
+  rig.show_all(43, 44);  // no cycle in which a topic is due; time stands there
+  rig.publisher->stop();
+  std::vector<std::int64_t> times, stamps;
+  clock.take([&](const rosgraph_msgs::Clock& c, const auto&) { times.push_back(ns(c.clock)); });
+  joints.take([&](const auto& j, const auto&) { stamps.push_back(ns(j.header.stamp)); });
+  ASSERT_FALSE(times.empty() || stamps.empty());
+  EXPECT_EQ(times.back(), 43'000'000);
+  EXPECT_EQ(stamps.back(), 43'000'000);
+}
+
 TEST(Publisher, StampsTheWallClocksTimeWhereTimeIsNotSimulated) {
   PublisherRig rig({.simulated_time = false});
   auto joints = rig.reader<sensor_msgs::JointState>("joint_states");
