@@ -108,8 +108,8 @@ std::vector<Event> Hub::what_happened(std::vector<Event> told) {
   if (const auto back = sampler_->take_back()) {
     tell_back(*back);
     events.push_back({seconds(back->to_ns), back->cycle, Event::Level::kInfo, "",
-                      fmt::format("time went back to {:.6g} s, from {:.6g} s",
-                                  seconds(back->to_ns), seconds(back->from_ns))});
+                      fmt::format("time went back to {:.6g} s, from {:.6g} s", seconds(back->to_ns),
+                                  seconds(back->from_ns))});
   }
   std::ranges::move(sampler_->take_events(), std::back_inserter(events));
   if (late_ticks_ > 0) {
@@ -222,7 +222,8 @@ void Hub::end_control(std::string_view why) {
                 .text = R"({"do": "joint.halt"})",
                 .rights = {.token = true, .control = true}});
   }
-  tell({{seconds(sampler_->time_ns()), sampler_->cycle(), Event::Level::kWarn, "", who + " " + std::string(why) + ": every joint that it moved is halted"}});
+  tell({{seconds(sampler_->time_ns()), sampler_->cycle(), Event::Level::kWarn, "",
+         who + " " + std::string(why) + ": every joint that it moved is halted"}});
   tell_control();
 }
 

@@ -314,7 +314,8 @@ TEST(Studio, TellsThatTimeWentBackAndForgetsWhatLayAfter) {
   (void)one->next("events");
   rig.show(0, 200);
   const auto event = [](double time_s, const char* text) {
-    return Event{time_s, static_cast<std::uint64_t>(1000.0 * time_s), Event::Level::kInfo, "", text};
+    return Event{time_s, static_cast<std::uint64_t>(1000.0 * time_s), Event::Level::kInfo, "",
+                 text};
   };
   {
     const std::lock_guard lock(rig.mutex);
