@@ -176,10 +176,10 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
   app.add_flag("--start-paused", o.start_paused, "Pause before the first cycle: tandem clock step");
   app.add_option(
          "--checkpoints", o.checkpoints_bytes,
-         "Memory for going back in time (tandem clock rewind), as 512MB. Without it 64MB once "
-         "the run is paced, paused, or has a studio")
+         "Memory for going back in time (tandem clock rewind), as 512MB. Without it 64MB, once "
+         "the run is paced or paused, has a studio, or its clock is told something")
       ->transform(CLI::AsSizeValue(true))
-      ->type_name("SIZE");
+      ->option_text("SIZE");
   app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's")->check(is_seed());
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--record-frames", o.record_frames,
@@ -358,7 +358,8 @@ void add_flags(CLI::App& app, TestOptions& o) {
   app.add_option("paths", o.paths, "Experiments with [[expect]], or folders of them")->required();
   app.add_option("--jobs,-j", o.jobs, "Experiments at once (default: one for each core)")
       ->check(is_count());
-  app.add_option("--timeout", o.timeout_s, "End one that takes longer [s, 300]")->check(a_duration());
+  app.add_option("--timeout", o.timeout_s, "End one that takes longer [s, 300]")
+      ->check(a_duration());
   app.add_option("--junit", o.junit, "Write JUnit's XML for a CI server")
       ->check(is_given(kNameAFile));
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");

@@ -32,7 +32,7 @@ const char kExamples[] = R"(Examples:
   tandem latency --load idle --duration 10           wake-up latency of this machine
 `tandem COMMAND --help` shows more, with examples.
 
-Exit status: 0 done; 1 the run ended in a fault; 2 wrong input or usage, or no run to ask;
+Exit status: 0 done; 1 the run ended in a fault, or not as expected; 2 wrong input or usage, or no run to ask;
 130 (129, 143) a signal ended it before its planned end.)";
 
 /// The innermost subcommand that was named.
