@@ -27,10 +27,9 @@ std::expected<std::unique_ptr<Expectations>, Diagnostics> Expectations::read(
 }
 
 void Expectations::take(const hal::CycleView& view) noexcept TANDEM_RT {
-  if (view.time.time_ns == newest_ns_) return;
-  newest_ns_ = view.time.time_ns;
   started_ = started_ || view.phase == hal::RunPhase::kRunning;
-  if (!started_ || ended_) return;
+  if (!started_ || ended_ || view.time.time_ns == newest_ns_) return;
+  newest_ns_ = view.time.time_ns;
   ended_ = hal::ends(view.phase);
   // A fault that ends the run is noted in the cycle that shuts it down.
   if (ended_ && view.faults == 0) return;
