@@ -209,9 +209,8 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
 }
 
 void add_tables(const RunData& run, const std::string& side, Page& page) {
-  for (auto* make :
-       {expectation_table, plant_table, tracking_table, feet_table, loops_table, parameter_table,
-        marks_table}) {
+  for (auto* make : {expectation_table, plant_table, tracking_table, feet_table, loops_table,
+                     parameter_table, marks_table}) {
     PageTable table = make(run, side);
     if (!table.rows.empty()) page.tables.push_back(std::move(table));
   }

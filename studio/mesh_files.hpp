@@ -17,10 +17,10 @@ inline constexpr std::size_t kMostMeshes = 500;
 inline constexpr std::uintmax_t kMostMeshBytes = std::uintmax_t{32} << 20U;
 
 /// Files are asked for by their number in the description, so that no request names a path. Shown
-/// is a regular file (STL, OBJ, COLLADA) of 32 MB at most that lies in the description's package: the folder
-/// above it with a package.xml, else the folder above one that is called "urdf", else its own; of
-/// package://NAME/… the folder NAME beside or above it. Links are followed before that is looked
-/// at.
+/// is a regular file (STL, OBJ, COLLADA) of 32 MB at most that lies in the description's package:
+/// the folder above it with a package.xml, else the folder above one that is called "urdf", else
+/// its own; of package://NAME/… the folder NAME beside or above it. Links are followed before that
+/// is looked at.
 class MeshFiles {
  public:
   MeshFiles() = default;

@@ -252,7 +252,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     if (error.get_exit_code() != 0) return report_usage_error(app, error);
     if (const auto unknown = check_commands(app, words)) return *unknown;
     errno = 0;
-    app.exit(error);  // prints help or version
+    app.exit(error);                                          // prints help or version
     if (std::ferror(stdout) != 0) (void)flush_output(errno);  // why is known here alone
     return Exit::kDone;
   }

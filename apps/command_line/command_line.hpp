@@ -283,12 +283,11 @@ struct TopicOptions {
 
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
 // clang-format off: one a line, so that additions meet without conflict
-using Command =
-    std::variant<Exit, RunOptions, ServeOptions, AskOptions, AskedOptions, CheckOptions,
-                 ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, IdentifyOptions,
-                 ExciteOptions, LatencyOptions, DoctorOptions, EmulateOptions, TopicOptions,
-                 BenchOptions, ControllerCheckOptions, ControllerNewOptions, StudioCommandOptions,
-                 TestOptions>;
+using Command = std::variant<Exit, RunOptions, ServeOptions, AskOptions, AskedOptions, CheckOptions,
+                             ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions,
+                             IdentifyOptions, ExciteOptions, LatencyOptions, DoctorOptions,
+                             EmulateOptions, TopicOptions, BenchOptions, ControllerCheckOptions,
+                             ControllerNewOptions, StudioCommandOptions, TestOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

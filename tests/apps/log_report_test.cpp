@@ -257,8 +257,8 @@ TEST_F(LogAndReport, ReportLaysTwoLogsOverEachOther) {
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const std::string page = read_text(folder_ / "both/report.html");
   for (const char* const one :
-       {"report/joint_position.measured", "B/report/joint_position.measured",
-        "data-log=\"A/\"", "data-log=\"B/\"", "double_pendulum-hold-001.mcap"})
+       {"report/joint_position.measured", "B/report/joint_position.measured", "data-log=\"A/\"",
+        "data-log=\"B/\"", "double_pendulum-hold-001.mcap"})
     EXPECT_NE(page.find(one), std::string::npos) << one;
 }
 
