@@ -18,7 +18,7 @@ namespace tandem::log {
 /// @param name  of all of them
 [[nodiscard]] std::string part_path(const std::string& name, std::uint64_t number);
 
-/// Of a run that went back in time `number` - 1 times: "runs/arm-001.branch-2.mcap".
+/// "runs/arm-001.branch-2.mcap", of a run that went back in time `number` - 1 times.
 [[nodiscard]] std::string branch_path(const std::string& name, std::uint64_t number);
 /// The name of the first one and the number, of "arm-001.branch-2.mcap"; of another file its own
 /// and 1.

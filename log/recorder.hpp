@@ -151,7 +151,7 @@ class Recorder {
   [[nodiscard]] bool failed() const noexcept { return failed_.load(std::memory_order_acquire); }
   /// Why. @pre failed()
   [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
-  /// Of the first branch.
+  /// The first branch's.
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
 
   /// Writes what is in the ring, adds the metadata record "result" (with `extra` entries), ends

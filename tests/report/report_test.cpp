@@ -35,7 +35,7 @@ TEST(Report, SaysWhichRunItShows) {
   }
 }
 
-// Of two logs the head named files alone: when, for how long and in what they differ was far below.
+// The head of two logs named files alone: when, how long and in what they differ was far below.
 TEST(Report, OfTwoLogsHasBothInItsHead) {
   Page page;
   page.title = "two runs";
