@@ -39,7 +39,7 @@ TEST(CommandRows, SpeakOfCommandsAsTheyAreTyped) {
 /// Words in backticks of the cells that show requests, in the section of what a process is asked.
 std::set<std::string> documented() {
   std::ifstream file(TANDEM_SOURCE_DIR "/docs/json.md");
-  const std::regex word("`([a-z][A-Za-z0-9_.]*)`");
+  const std::regex word("`([a-z][A-Za-z0-9_.-]*)`");
   std::set<std::string> words;
   bool inside = false;
   for (std::string line; std::getline(file, line);) {

@@ -19,7 +19,10 @@ function readColumns(text) {
   const [head, ...lines] = text.trim().split(/\r?\n/);
   const rows = lines.map((line) => line.split(',').map(Number));
   const names = head.split(',');
-  return (name) => rows.map((row) => row[names.indexOf(name)]);
+  return (name) => {
+    assert.ok(names.includes(name), `no column '${name}' in '${head}'`);
+    return rows.map((row) => row[names.indexOf(name)]);
+  };
 }
 
 /** Figures of a step by the plainest means: the first and the last rows that are somewhere. */
@@ -122,8 +125,8 @@ describe('the oscilloscope', { skip: why || false, timeout: 120000 }, () => {
     assert.equal(time.length, 2000);
     const begin = at(time[0]);
     for (const [name, values] of [
-      ['state.position_rad.joint1 [rad or m]', position],
-      ['command.position_rad.joint1 [rad or m]', reference],
+      ['state.position_rad.joint1 [rad]', position],
+      ['command.position_rad.joint1 [rad]', reference],
     ]) {
       const expected = values.slice(begin, begin + 2000).map(Math.fround);
       assert.deepEqual(saved(name).map(Math.fround), expected, name);
