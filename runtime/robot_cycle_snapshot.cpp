@@ -40,7 +40,12 @@ void RobotCycle::replay(bool on) noexcept {
 }
 
 void RobotCycle::show_again() noexcept {
+  Progress& progress = now_.progress;
+  // A stop of a future that does not come is none that anybody knows.
+  const std::uint64_t next = now_.loop.next_cycle();
+  if (progress.stopped_before.load() > next) progress.stopped_before.store(next);
   shown_.show();
+  progress.travels.fetch_add(1, std::memory_order_release);
   if (now_.observer != nullptr) (void)shown_.show_to(*now_.observer);
 }
 

@@ -12,6 +12,7 @@
 #include "apps/control/clock_commands.hpp"
 #include "apps/run/loop_crash.hpp"
 #include "apps/text/console.hpp"
+#include "base/counted.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -71,6 +72,7 @@ class FaultNotes {
  public:
   explicit FaultNotes(bool waits) : waits_(waits) {}
   void look(const runtime::RobotCycle& cycle) {
+    look_back(cycle);
     if (cycle.fault_log().size() <= told_) return;
     const std::vector<runtime::FaultReport> faults = cycle.faults();
     restart_line(stderr);
@@ -89,8 +91,25 @@ class FaultNotes {
   }
 
  private:
+  /// Where time went to another moment, faults are those of that moment.
+  void look_back(const runtime::RobotCycle& cycle) {
+    const runtime::Progress& progress = cycle.progress();
+    const std::uint64_t travels = progress.travels.load(std::memory_order_acquire);
+    if (std::exchange(travels_, travels) == travels) return;
+    const double now_s = 1e-9 * static_cast<double>(progress.time_ns.load());
+    const std::vector<runtime::FaultReport> faults = cycle.faults();
+    const auto before = static_cast<std::size_t>(
+        std::ranges::count_if(faults, [&](const auto& one) { return one.time_s <= now_s; }));
+    restart_line(stderr);
+    fmt::print(
+        stderr, "time went to {:.6g} s{}\n", now_s,
+        before < told_ ? ": " + counted(told_ - before, "fault") + " since then did not come" : "");
+    told_ = std::min(told_, before);
+  }
+
   bool waits_;
   std::size_t told_ = 0;
+  std::uint64_t travels_ = 0;
 };
 
 /// Prints what controllers say, up to some lines: the log has them all.

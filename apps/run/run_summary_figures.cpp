@@ -83,6 +83,10 @@ std::vector<std::string> wire_of(const hal::can::DriveMaster* master) {
 static void figures(Figures& f, const log::RecordingResult& log) {
   f("path", "of several files that of the first: it opens all of them, also when that one is gone",
     log.path);
+  f("branches",
+    "logs of the run, which [went back in time](time.md#branches) where it is not 1; "
+    "`path` and `data_sha256` are the last one's",
+    log.branches);
   f("files", "that were written", log.parts);
   f("files_removed", "of them, to keep to `[log] total_MB` or `keep_free_MB`", log.removed);
   f("messages", "written", log.messages);

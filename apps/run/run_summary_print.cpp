@@ -183,7 +183,9 @@ void add_output_facts(const RunSummary& summary, const Json& run, Facts& facts) 
         facts, run, "log",
         "{log.path} ({log.messages} messages, {log.dropped} dropped, " +
             fmt::format("{:.1f} MB", static_cast<double>(summary.log->bytes) * 1e-6) +
-            (summary.log->parts == 1 ? ")" : ", {log.files} files, {log.files_removed} removed)"));
+            (summary.log->branches > 1 ? ", in {log.branches} logs of one run that went back)"
+             : summary.log->parts == 1 ? ")"
+                                       : ", {log.files} files, {log.files_removed} removed)"));
   }
   add_figures(facts, run, "DDS",
               "domain {dds.domain}: {dds.samples} samples, {dds.refused} refused; {dds.dropped} "
