@@ -77,9 +77,10 @@ void run(InputPort& port) {
                           .time_ns = static_cast<std::int64_t>(cycle) * kPeriod_ns,
                           .period_ns = kPeriod_ns};
   };
-  port.begin(time(begun));
+  hal::Outside outside;
+  port.begin(time(begun), true, outside);
   for (std::uint64_t cycle = begun; cycle < begun + kCycles; ++cycle) {
-    (void)port.take(time(cycle), true);
+    (void)port.take(time(cycle), true, outside);
     may_hold();
   }
 }

@@ -123,8 +123,8 @@ struct Run {
 
   hal::StateImage state{{.joints = 2, .sensor_channels = {}}};
   hal::CommandImage command{{.joints = 2, .sensor_channels = {}}};
-  Tap tap{{state, command, nullptr, nullptr}, 1'000'000};
-  Sampler sampler{tap, {state, command, nullptr, nullptr}, {}, 100'000};
+  Tap tap{{.state = &state, .command = &command}, 1'000'000};
+  Sampler sampler{tap, {.state = &state, .command = &command}, {}, 100'000};
   RunDescription description{.robot = {}};
   std::vector<Answer> asked;
   std::size_t waiting = 0;
