@@ -74,7 +74,11 @@ Status TimeMachine::has_past() const {
 }
 
 Result<Travel> TimeMachine::go_to(RobotCycle& cycle, std::uint64_t next) {
-  return ask(cycle, {.kind = Request::Kind::kGo, .next = next});
+  return ask(cycle, {.kind = Request::Kind::kGo, .cycles = next});
+}
+
+Result<Travel> TimeMachine::go_back(RobotCycle& cycle, std::uint64_t cycles) {
+  return ask(cycle, {.kind = Request::Kind::kGoBack, .cycles = cycles});
 }
 
 Result<Travel> TimeMachine::back_until(RobotCycle& cycle, CycleCondition holds) {
@@ -83,11 +87,19 @@ Result<Travel> TimeMachine::back_until(RobotCycle& cycle, CycleCondition holds) 
 
 Result<Travel> TimeMachine::ask(RobotCycle& cycle, Request request) {
   const std::lock_guard one(asks_);
-  if (request.kind != Request::Kind::kWatch) {  // before time stands
+  if (request.kind != Request::Kind::kWatch) {
     if (const Status kept = has_past(); !kept) return std::unexpected(kept.error());
   }
   rt::ClockControl& clock = cycle.inbox().clock();
+  const bool stood = clock.state().paused;
   if (const auto paused = clock.pause(); !paused) return std::unexpected(paused.error());
+  Result<Travel> answer = wait_for(cycle, request);
+  if (!answer && !stood) (void)clock.resume();
+  return answer;
+}
+
+Result<Travel> TimeMachine::wait_for(RobotCycle& cycle, Request& request) {
+  rt::ClockControl& clock = cycle.inbox().clock();
   std::unique_lock lock(mutex_);
   request_ = &request;
   wanted_.store(true, std::memory_order_release);
@@ -195,14 +207,17 @@ void TimeMachine::serve(RobotCycle& cycle) {
 }
 
 Result<Travel> TimeMachine::serve(RobotCycle& cycle, Request& request) {
-  switch (request.kind) {
-    case Request::Kind::kGo: return go(cycle, request.next);
-    case Request::Kind::kSearch: return search(cycle, request.holds);
-    case Request::Kind::kWatch: break;
+  const std::uint64_t here = cycle.next_cycle();
+  if (request.kind == Request::Kind::kWatch) {
+    until_ = std::move(request.holds);
+    held_ = until_(cycle.last_view());
+    return Travel{.from = here, .to = here};
   }
-  until_ = std::move(request.holds);
-  held_ = until_(cycle.last_view());
-  return Travel{.from = cycle.next_cycle(), .to = cycle.next_cycle()};
+  until_ = {};  // it was about the time that would have come
+  if (request.kind == Request::Kind::kGo) return go(cycle, request.cycles);
+  if (request.kind == Request::Kind::kSearch) return search(cycle, request.holds);
+  if (request.cycles < here) return go(cycle, here - request.cycles);
+  return fail("the run has begun only " + moment_text(cycle, here) + " ago", "go back less far");
 }
 
 /// At another moment, which all who watch are shown.
@@ -284,13 +299,13 @@ Result<Travel> TimeMachine::search(RobotCycle& cycle, const CycleCondition& hold
   }
   return fail("it has not become true since " + moment_text(cycle, all.front().cycle) +
                   ", the oldest moment that is kept",
-              later                   ? "it was true all that time"
+              later                   ? "it was true there already"
               : all.front().cycle > 0 ? "keep more of it: --checkpoints 1GB"
                                       : "that is the beginning of the run");
 }
 
 /// Restores `from`, and plays on to the moment `to`. @param after  each moment on the way, that of
-/// `from` included
+/// `from` included. A search may be long: a stop ends it
 Status TimeMachine::play(RobotCycle& cycle, const Checkpoint& from, std::uint64_t to,
                          Travel& travel, const std::function<void()>& after) {
   if (from.controllers != cycle.controllers()) {
@@ -305,6 +320,7 @@ Status TimeMachine::play(RobotCycle& cycle, const Checkpoint& from, std::uint64_
   if (after) after();
   const Replay again(cycle);
   while (cycle.next_cycle() < to) {
+    if (after && cycle.is_urgent()) return fail("a stop was asked for meanwhile", "ask again");
     (void)cycle.step();
     ++travel.replayed;
     if (expectations_ != nullptr) expectations_->take(cycle.last_view());

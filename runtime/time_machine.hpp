@@ -60,14 +60,17 @@ class TimeMachine {
   /// Before the first cycle: expectations are judged by the branch that the run is in.
   void judge_by(Expectations* expectations) noexcept { expectations_ = expectations; }
 
-  // They pause simulated time, and block until it stands there.
+  // They pause simulated time, and block until it stands there. After an error it is where it was,
+  // and goes on if it did before.
 
   /// `next` is the cycle that comes next then: at most the newest that the run has reached.
   /// Errors: it is beyond; before the oldest checkpoint; other controllers were loaded then, or one
   /// lacks an archive(); the run is over.
   [[nodiscard]] Result<Travel> go_to(RobotCycle& cycle, std::uint64_t next);
+  /// So many cycles back from where the run is when it stands. Errors: go_to()'s.
+  [[nodiscard]] Result<Travel> go_back(RobotCycle& cycle, std::uint64_t cycles);
   /// To where `holds` has become true last: the cycle after the one in which it did.
-  /// Errors: go_to()'s; it has not since the oldest checkpoint, and time stands where it did.
+  /// Errors: go_to()'s; it has not since the oldest checkpoint; a stop was asked for meanwhile.
   [[nodiscard]] Result<Travel> back_until(RobotCycle& cycle, CycleCondition holds);
   /// Lets time go on, and pauses it after the cycle in which `holds` becomes true. Does not wait.
   [[nodiscard]] Status until(RobotCycle& cycle, CycleCondition holds);
@@ -81,12 +84,13 @@ class TimeMachine {
 
  private:
   struct Request {
-    enum class Kind : std::uint8_t { kGo, kSearch, kWatch } kind;
-    std::uint64_t next = 0;
-    CycleCondition holds{};  // instead of `next`
+    enum class Kind : std::uint8_t { kGo, kGoBack, kSearch, kWatch } kind;
+    std::uint64_t cycles = 0;  // to the moment, or back
+    CycleCondition holds{};    // instead
     std::optional<Result<Travel>> answer{};
   };
   [[nodiscard]] Result<Travel> ask(RobotCycle& cycle, Request request);
+  [[nodiscard]] Result<Travel> wait_for(RobotCycle& cycle, Request& request);
   void serve(RobotCycle& cycle);
   [[nodiscard]] Result<Travel> serve(RobotCycle& cycle, Request& request);
   void arrive(RobotCycle& cycle);

@@ -177,7 +177,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
   app.add_option(
          "--checkpoints", o.checkpoints_bytes,
          "Memory for going back in time (tandem clock rewind), as 512MB. Without it 64MB, once "
-         "the run is paced or paused, has a studio, or its clock is told something")
+         "the run is paced or paused, has a studio, or gets a clock command")
       ->transform(CLI::AsSizeValue(true))
       ->option_text("SIZE");
   app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's")->check(is_seed());

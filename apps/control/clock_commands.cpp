@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -147,26 +148,23 @@ struct Clock {
     return found;
   }
 
-  [[nodiscard]] Result<Json> go(const Result<std::uint64_t>& next) const {
-    if (!next) return std::unexpected(next.error());
-    return arrived(past.machine->go_to(cycle, *next));
-  }
-
-  /// From where the run is: it is paused first, so that this is one moment.
   [[nodiscard]] Result<Json> rewind(const Json& request) const {
     if (const Status may = may_go_back(); !may) return std::unexpected(may.error());
-    if (const Status kept = past.machine->has_past(); !kept) return std::unexpected(kept.error());
     const double by_s = request["by_s"].get<double>();
     if (!(by_s > 0.0)) return fail_at("by_s", "goes back by more than 0 s", "write 2.5s");
-    if (auto paused = control().pause(); !paused) return std::unexpected(paused.error());
-    (void)control().await_standing(kStands_ns);
-    const double now_s = seconds_of(cycle, next());
-    return go(moment_of(cycle, now_s - by_s, "by_s"));
+    const double now_s = 1e-9 * static_cast<double>(cycle.progress().time_ns.load());
+    if (const auto there = moment_of(cycle, now_s - by_s, "by_s"); !there) {
+      return std::unexpected(there.error());
+    }
+    const double cycles = std::max(1.0, std::round(by_s / period_of(cycle)));
+    return arrived(past.machine->go_back(cycle, static_cast<std::uint64_t>(cycles)));
   }
 
   [[nodiscard]] Result<Json> go_to(const Json& request) const {
     if (const Status may = may_go_back(); !may) return std::unexpected(may.error());
-    return go(moment_of(cycle, request["time_s"].get<double>(), "time_s"));
+    const auto next = moment_of(cycle, request["time_s"].get<double>(), "time_s");
+    if (!next) return std::unexpected(next.error());
+    return arrived(past.machine->go_to(cycle, *next));
   }
 
   [[nodiscard]] Result<runtime::CycleCondition> condition(const Json& request) const {
@@ -188,9 +186,6 @@ struct Clock {
     if (!holds) return std::unexpected(holds.error());
     return answer(past.machine->until(cycle, std::move(*holds)));
   }
-
- private:
-  static constexpr std::int64_t kStands_ns = 1'000'000'000;  // at most
 };
 
 }  // namespace

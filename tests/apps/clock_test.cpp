@@ -89,6 +89,7 @@ TEST_F(Clock, GoesBackAndOnAgain) {
       {"goto 7s", "7 s is not there yet; the run has reached"},
       {"goto -1s", "time_s: -1 s is no time of the run"},
       {"rewind 0", "by_s: goes back by more than 0 s"},
+      {"rewind -1s", "by_s: goes back by more than 0 s"},
       {"rewind 5min", "by_s: "},
       {"goto soon", "time: 'soon' is no time (write 2.5s, 300ms, 1min, or a number of seconds)"},
       {"step --to 0.001", "has been: it is"},
@@ -98,6 +99,18 @@ TEST_F(Clock, GoesBackAndOnAgain) {
     const Outcome outcome = to_run(std::string("clock ") + asked);
     EXPECT_NE(outcome.err.find(says), std::string::npos) << asked << ": " << outcome.err;
   }
+  EXPECT_EQ(end(), 0);
+}
+
+// The run stood after a refusal.
+TEST_F(Clock, ARefusedJourneyStopsNothing) {
+  begin("");
+  const auto before = clock("show")["cycles"].get<std::uint64_t>();
+  for (const char* asked : {"goto 5000s", "rewind 5000s", "back-until 'time() < 0 s'"}) {
+    EXPECT_NE(to_run(std::string("clock ") + asked).status, 0) << asked;
+    EXPECT_EQ(clock("show")["paused"], false) << asked;
+  }
+  EXPECT_GT(clock("show")["cycles"].get<std::uint64_t>(), before);
   EXPECT_EQ(end(), 0);
 }
 

@@ -136,6 +136,23 @@ TEST(TimeMachine, SaysWhereItCannotGo) {
   EXPECT_NE(trip.refusal(100).find("not there yet; the run has reached 0.05 s"), std::string::npos);
 }
 
+// A search went on to its end, whoever asked for a stop.
+TEST(TimeMachine, AStopEndsASearch) {
+  Journey trip("double_pendulum", "trajectory");
+  trip.step(3'000);
+  std::uint64_t looks = 0;
+  const auto found = trip.machine.back_until(*trip.run.cycle, [&](const hal::CycleView&) {
+    if (++looks == 10) (void)trip.run.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
+    return false;
+  });
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().message, "a stop was asked for meanwhile");
+  EXPECT_EQ(looks, 10U);
+  EXPECT_EQ(trip.now(), 3'000U) << "time is where it was";
+  trip.step(1);
+  EXPECT_EQ(trip.run.cycle->phase(), RunPhase::kFaulted);
+}
+
 TEST(TimeMachine, KeepsWhatItHeardByACheckpointSoonAfter) {
   Journey trip("double_pendulum", "trajectory");
   trip.step(2'000);
