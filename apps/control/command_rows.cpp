@@ -84,6 +84,7 @@ const std::vector<CommandRow> kRows{
     {"top", kReads, "shows all of it as a table that follows: loop, faults, controllers, joints",
      {local(flag("once", "--once", "print one table and end, as without a terminal"))},
      {.asks = "loop.show"}},
+    {"expect.show", kReads, "how far the run's expectations are", {}, {.on_line = false}},
     {"fault.show", kReads, "every fault of the run, latched or cleared"},
     {"fault.reset", kChanges, "clears what is latched; resets or failed_resets counts on when done"},
     {"estop", kStops, "emergency stop, latched; waits until the loop confirms it",

@@ -18,6 +18,7 @@
 #include "apps/run/cycle_thread.hpp"
 #include "apps/run/dds_run.hpp"
 #include "apps/run/end_guard.hpp"
+#include "apps/run/expect_run.hpp"
 #include "apps/run/game_pad.hpp"
 #include "apps/run/gate.hpp"
 #include "apps/run/inject.hpp"
@@ -174,6 +175,7 @@ class Session {
                                       c_.can)] { return states.json(); },
          .lead = lead_site(e.robot, c_.kernels.get()),
          .past = past_->of(*cycle_)});
+    add_expectations(commands_, *cycle_, c_.expectations.get());
     add_predict(commands_, c_.predictor.get(), e.robot);
     if (dds_ != nullptr) {
       admission_.add_to(commands_);

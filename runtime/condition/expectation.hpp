@@ -44,6 +44,8 @@ class Expectation {
   [[nodiscard]] std::uint64_t awaited_faults() const { return awaited_; }
   [[nodiscard]] const ExpectationSpec& spec() const { return spec_; }
   void archive(Archive& ar) { ar(so_far_); }
+  /// Is as far as `other`, of the same spec. @rt a copy of plain data
+  void follow(const Expectation& other) noexcept TANDEM_RT { so_far_ = other.so_far_; }
 
  private:
   /// What the cycles so far amount to; plain data.

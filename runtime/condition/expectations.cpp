@@ -3,9 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 namespace tandem::runtime {
+namespace {
+
+constexpr auto kLook = std::chrono::microseconds(200);
+
+std::vector<ExpectationResult> results_of(const std::vector<Expectation>& all) {
+  std::vector<ExpectationResult> results;
+  for (const Expectation& one : all) results.push_back(one.result());
+  return results;
+}
+
+}  // namespace
 
 std::expected<std::unique_ptr<Expectations>, Diagnostics> Expectations::read(
     std::span<const ExpectationSpec> specs, const std::string& file, const QuantityNames& names) {
@@ -23,10 +35,12 @@ std::expected<std::unique_ptr<Expectations>, Diagnostics> Expectations::read(
     errors.push_back(std::move(error));
   }
   if (!errors.empty()) return std::unexpected(std::move(errors));
+  all->shown_ = all->all_;
   return all;
 }
 
 void Expectations::take(const hal::CycleView& view) noexcept TANDEM_RT {
+  if (looked_at_.load(std::memory_order_acquire)) show();
   started_ = started_ || view.phase == hal::RunPhase::kRunning;
   if (!started_ || ended_ || view.time.time_ns == newest_ns_) return;
   newest_ns_ = view.time.time_ns;
@@ -36,11 +50,22 @@ void Expectations::take(const hal::CycleView& view) noexcept TANDEM_RT {
   for (Expectation& one : all_) one.take(view);
 }
 
-std::vector<ExpectationResult> Expectations::results() const {
-  std::vector<ExpectationResult> results;
-  for (const Expectation& one : all_) results.push_back(one.result());
-  return results;
+void Expectations::show() noexcept TANDEM_RT {
+  for (std::size_t i = 0; i < all_.size(); ++i) shown_[i].follow(all_[i]);
+  looked_at_.store(false, std::memory_order_release);
 }
+
+std::optional<std::vector<ExpectationResult>> Expectations::look(std::chrono::nanoseconds at_most) {
+  const auto until = std::chrono::steady_clock::now() + at_most;
+  looked_at_.store(true, std::memory_order_release);
+  while (looked_at_.load(std::memory_order_acquire)) {
+    if (std::chrono::steady_clock::now() > until) return std::nullopt;
+    std::this_thread::sleep_for(kLook);
+  }
+  return results_of(shown_);
+}
+
+std::vector<ExpectationResult> Expectations::results() const { return results_of(all_); }
 
 std::uint64_t Expectations::awaited_faults() const {
   std::uint64_t causes = 0;

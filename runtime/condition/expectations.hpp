@@ -2,8 +2,11 @@
 // Layer: runtime/condition.  Thread: read() and results() non-RT; take() the loop's.
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,6 +33,10 @@ class Expectations final : public hal::CycleObserver {
 
   /// Once the loop has ended, or stands.
   [[nodiscard]] std::vector<ExpectationResult> results() const;
+  /// While the loop cycles, for another thread, one at a time: as of its next cycle. Empty: none
+  /// came in that time.
+  [[nodiscard]] std::optional<std::vector<ExpectationResult>> look(
+      std::chrono::nanoseconds at_most);
   /// Faults that an expectation awaits, such as `eventually = "fault(board_silent)"`: causes, a bit
   /// each. These are no failure of the run.
   [[nodiscard]] std::uint64_t awaited_faults() const;
@@ -40,7 +47,11 @@ class Expectations final : public hal::CycleObserver {
   }
 
  private:
+  void show() noexcept TANDEM_RT;
+
   std::vector<Expectation> all_;
+  std::vector<Expectation> shown_;  // the loop's while looked_at_, else look()'s
+  std::atomic<bool> looked_at_{false};
   bool started_ = false, ended_ = false;
   std::int64_t newest_ns_ = -1;  // of the cycles seen
 };

@@ -1,10 +1,13 @@
 // Expectations: what passes, by how much, and that nothing passes which nobody measured.
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "rt/scoped_realtime.hpp"
@@ -258,6 +261,27 @@ TEST_F(ExpectationTest, WithoutATruthItFailsAndTheRunGoesOn) {
   EXPECT_FALSE(one->result().passed);
   EXPECT_NE(one->result().reason.find("in simulation alone"), std::string::npos);
   EXPECT_FALSE(Expectation::read(spec(ExpectationKind::kAlways, "heigt() > 0.4m"), real));
+}
+
+TEST_F(ExpectationTest, IsSeenByAnotherThreadWhileCyclesGoOn) {
+  const auto of = spec(ExpectationKind::kAlways, "torque(knee) < 40Nm");
+  auto all = Expectations::read({&of, 1}, "file", names());
+  ASSERT_TRUE(all);
+  EXPECT_FALSE((*all)->look(std::chrono::milliseconds(1))) << "no cycle came";
+  std::atomic<bool> seen{false};
+  std::thread other([&] {
+    const auto looked = (*all)->look(std::chrono::seconds(10));
+    EXPECT_TRUE(looked && looked->front().passed);
+    seen = true;
+  });
+  state.torque_Nm()[0] = 10.0;
+  for (std::uint64_t cycle = 10; !seen; ++cycle) {
+    at(cycle);
+    (*all)->take(view());
+    std::this_thread::yield();
+  }
+  other.join();
+  EXPECT_EQ((*all)->results().front().margin, 30.0);
 }
 
 TEST_F(ExpectationTest, IsRewoundWithItsRun) {

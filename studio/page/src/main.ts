@@ -19,6 +19,7 @@ import { Data } from './data';
 import { h, say } from './dom';
 import { EmulationPanel, kEmulationTabs } from './emulation';
 import { Events } from './events';
+import { Expectations } from './expectations';
 import { Header } from './header';
 import { Inputs } from './inputs';
 import { Joints } from './joints';
@@ -43,6 +44,7 @@ const kWatched: Record<string, string[]> = {
   controllers: ['controller.list'],
   inputs: ['input.list'],
   loop: ['loop.show'],
+  expected: ['expect.show'],
   events: [],
 };
 const kThemes = ['auto', 'light', 'dark'];
@@ -128,6 +130,7 @@ function start(): void {
       },
       { name: 'inputs', label: 'Inputs', content: new Inputs(data, actions).element },
       { name: 'loop', label: 'Loop', content: new LoopPanel(data).element },
+      { name: 'expected', label: 'Expected', content: new Expectations(data).element },
       { name: 'events', label: 'Events', content: new Events(data).element },
     ],
     (name) => {

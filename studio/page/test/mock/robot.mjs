@@ -177,6 +177,28 @@ export class MockRobot extends PlayedRobot {
             : [],
           lost: 0,
         };
+      case 'expect.show':
+        return {
+          ok: true,
+          expectations: [
+            {
+              name: 'knee stays cool',
+              passed: true,
+              margin: 24.51,
+              unit: 'Nm',
+              at_s: 4.352,
+              reason: '',
+            },
+            {
+              name: 'settles',
+              passed: false,
+              margin: -0.2,
+              unit: 's',
+              at_s: 2.2,
+              reason: 'it settled after 2.2 s',
+            },
+          ],
+        };
       case 'loop.show':
         return {
           ok: true,
