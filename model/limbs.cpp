@@ -13,7 +13,7 @@ constexpr double kAlike = 0.1;      // relative difference of two masses
 constexpr double kShort_m = 1e-3;   // a length that makes no difference
 constexpr double kLight_kg = 1e-3;  // nor does such a mass
 constexpr double kPattern = 0.01;   // of a constant that is zero in one of two joints
-constexpr double kZero = 1e-13;
+constexpr double kVanishes = 1e-13;
 constexpr double kTie = 1e-6;  // the first one then
 constexpr double kUnlike = std::numeric_limits<double>::infinity();
 
@@ -59,7 +59,7 @@ class Comparison {
   static int zeros_in_one(const Placement& a, const Placement& b) {
     int count = 0;
     const auto look = [&](double x, double y) {
-      count += (std::abs(x) > kZero) != (std::abs(y) > kZero) ? 1 : 0;
+      count += (std::abs(x) > kVanishes) != (std::abs(y) > kVanishes) ? 1 : 0;
     };
     for (int k = 0; k < 9; ++k) look(a.R(k / 3, k % 3), b.R(k / 3, k % 3));
     for (int k = 0; k < 3; ++k) look(a.p[k], b.p[k]);

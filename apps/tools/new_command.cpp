@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t kPeriod_ns = 1'000'000;
 
-Diagnostics one(std::string message, std::string hint, std::string file) {
+Diagnostics wrong_file(std::string message, std::string hint, std::string file) {
   return {Error{std::move(message), std::move(hint), std::move(file), 0, {}}};
 }
 
@@ -249,7 +249,7 @@ std::string command_again(const NewOptions& options) {
 /// What can be said of the input before it is read as XML.
 Diagnostics check_input(const std::string& file) {
   if (!is_utf8(fs::path(file).filename().string())) {
-    return one("the file's name is not UTF-8, which robot.toml must be", "rename it", file);
+    return wrong_file("the file's name is not UTF-8, which robot.toml must be", "rename it", file);
   }
   if (fs::path(file).extension() != ".toml") {
     std::error_code ignored;
@@ -258,14 +258,14 @@ Diagnostics check_input(const std::string& file) {
     return opened ? Diagnostics() : Diagnostics{opened.error()};
   }
   if (robot::is_robot(file)) {
-    return one("this is a robot.toml already: `tandem new` makes one, from a URDF",
-               "`tandem check " + shell_word(file) +
-                   "` reads it, `tandem run` takes the experiments beside "
-                   "it; or name the URDF that a new folder is to be made from",
-               file);
+    return wrong_file("this is a robot.toml already: `tandem new` makes one, from a URDF",
+                      "`tandem check " + shell_word(file) +
+                          "` reads it, `tandem run` takes the experiments beside "
+                          "it; or name the URDF that a new folder is to be made from",
+                      file);
   }
-  return one("this is a TOML file: `tandem new` starts from a URDF",
-             "`tandem run " + shell_word(file) + "` runs an experiment", file);
+  return wrong_file("this is a TOML file: `tandem new` starts from a URDF",
+                    "`tandem run " + shell_word(file) + "` runs an experiment", file);
 }
 
 /// Errors of a text that the options have changed, and that is nowhere to be read: their lines
@@ -280,12 +280,13 @@ Diagnostics check_folder(const std::string& folder, bool force) {
   std::error_code ignored;
   const bool exists = fs::exists(folder, ignored);
   if (exists && !fs::is_directory(folder, ignored)) {
-    return one("this is a file, and the robot needs a folder", "give another one with -o", folder);
+    return wrong_file("this is a file, and the robot needs a folder", "give another one with -o",
+                      folder);
   }
   if (exists && !force) {
-    return one("this exists already",
-               "give another folder with -o; or --force, which keeps files that differ as FILE~",
-               folder);
+    return wrong_file(
+        "this exists already",
+        "give another folder with -o; or --force, which keeps files that differ as FILE~", folder);
   }
   return {};
 }

@@ -4,7 +4,7 @@
 namespace tandem::apps {
 namespace {
 
-constexpr char kLost[] = "method = 23, home_switch_rad = [50.0, 51.0]";
+constexpr char kHomingLost[] = "method = 23, home_switch_rad = [50.0, 51.0]";
 
 class HomedJoints : public Running {
  protected:
@@ -21,7 +21,7 @@ class HomedJoints : public Running {
     joint.replace(joint.find(both), both.size(), "name = \"joint1\"\n" + homing);
     std::string other = joint;
     other.replace(other.find("joint1"), 6, "joint2");
-    other.replace(other.find("method = 35"), 11, kLost);
+    other.replace(other.find("method = 35"), 11, kHomingLost);
     other.replace(other.find("speed_rad_s = 0.5"), 17, "speed_rad_s = 5.0");
     other.replace(other.find("acceleration_rad_s2 = 1.0"), 25, "acceleration_rad_s2 = 50.0");
     other.replace(other.find("position_rad = 0.5"), 18, "required = false");
@@ -85,7 +85,7 @@ TEST_F(HomedJoints, ARunHomesThoseThatAreDeclaredSo) {
 
 TEST_F(HomedJoints, ARunThatCannotHomeOneEndsAtOnceAndSaysWhy) {
   edit("robot.toml", "method = 35, speed_rad_s = 0.5, acceleration_rad_s2 = 1.0",
-       kLost + std::string(", speed_rad_s = 5.0, acceleration_rad_s2 = 50.0"));
+       kHomingLost + std::string(", speed_rad_s = 5.0, acceleration_rad_s2 = 50.0"));
   edit("robot.toml", "position_rad = 0.5 }", "position_rad = 0.5, at_start = true }");
   const Outcome ran = tandem("run hold.toml --duration 50 --no-log --json run.json");
   expect(ran, 1, "its homing (method 23) failed: the drive reports a homing error");

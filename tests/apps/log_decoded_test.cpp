@@ -7,14 +7,12 @@
 namespace tandem::apps {
 namespace {
 
-using tandem::test::kNode;
-
 const std::string kFolder = TANDEM_SOURCE_DIR "/tests/log";
 
 class DecodedLog : public Program {
  protected:
   void SetUp() override {
-    if (kNode == nullptr) GTEST_SKIP() << "node is not installed";
+    if (tandem::test::kNode == nullptr) GTEST_SKIP() << "node is not installed";
     if (!std::filesystem::exists(kFolder + "/node_modules/@foxglove/rosmsg2-serialization")) {
       GTEST_SKIP()
           << "@foxglove/rosmsg2-serialization is not installed (run `npm ci` in tests/log)";
@@ -30,8 +28,8 @@ class DecodedLog : public Program {
     ASSERT_EQ(run.status, 0) << run.err;
     const std::string log = nlohmann::json::parse(run.out)["log"]["path"];
     const auto info = nlohmann::json::parse(tandem("log info " + log + " --json -").out);
-    std::string command =
-        shell_word(kNode) + " " + shell_word(kFolder + "/decode_log.mjs") + " " + log + " 10";
+    std::string command = shell_word(tandem::test::kNode) + " " +
+                          shell_word(kFolder + "/decode_log.mjs") + " " + log + " 10";
     for (const auto& [topic, about] : info["topics"].items()) {
       if (!topic.starts_with("/tandem/")) {
         EXPECT_EQ(viewed.erase(topic), 1u) << topic;
