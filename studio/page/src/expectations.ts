@@ -18,7 +18,8 @@ export interface Expected {
 
 /** "3 of 4 hold so far." */
 export function expectedWords(all: Expected[]): string {
-  if (all.length === 0) return 'The experiment expects nothing: rows [[expect]] say what it must do.';
+  if (all.length === 0)
+    return 'The experiment expects nothing: rows [[expect]] say what it must do.';
   const held = all.filter((one) => one.passed).length;
   return held === all.length ? `All ${held} hold so far.` : `${held} of ${all.length} hold so far.`;
 }
