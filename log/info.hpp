@@ -18,9 +18,10 @@ struct SensorInfo {
 
 /// Where a simulated run went back in time, and on from there: the log of before stays as it is.
 struct Branch {
-  std::string of{};            ///< file of the log whose cycles it goes on from; empty: no branch
-  std::uint64_t cycle = 0;     ///< its first one; those before are in the other log
-  std::uint64_t snapshot = 0;  ///< hash of the state that this cycle followed from
+  std::string of{};         ///< file of the log whose cycles it goes on from; empty: no branch
+  std::uint64_t cycle = 0;  ///< its first one; those before are in the other log
+  std::uint64_t snapshot =
+      0;  ///< hash of the state that this cycle followed from; 0: another run's
 };
 
 /// The metadata record "tandem", and "configuration" with the files' texts. Outside the data

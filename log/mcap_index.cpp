@@ -54,10 +54,12 @@ bool read_records(std::span<const std::byte> summary, McapIndex& index) {
     ByteReader in(content);
     if (opcode == Opcode::kChunkIndex) {
       index.places.push_back(chunk_place(in));
-    } else if (opcode == Opcode::kMetadataIndex) {
+    } else if (opcode == Opcode::kMetadataIndex || opcode == Opcode::kAttachmentIndex) {
       const auto at = in.number<std::uint64_t>();
       index.places.push_back(
-          {.opcode = Opcode::kMetadata, .at = at, .bytes = in.number<std::uint64_t>()});
+          {.opcode = opcode == Opcode::kMetadataIndex ? Opcode::kMetadata : Opcode::kAttachment,
+           .at = at,
+           .bytes = in.number<std::uint64_t>()});
     } else if (opcode == Opcode::kSchema || opcode == Opcode::kChannel) {
       index.texts.emplace_back(opcode, Bytes(content.begin(), content.end()));
     }

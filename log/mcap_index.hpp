@@ -13,7 +13,7 @@
 
 namespace tandem::log {
 
-/// A record of the data: a chunk or metadata.
+/// A record of the data: a chunk, metadata, an attachment.
 struct RecordPlace {
   Opcode opcode{};
   std::uint64_t at = 0;

@@ -45,6 +45,7 @@ Error file_error(const std::string& path, std::string message, std::string hint)
 bool is_of_tandem(Opcode opcode, std::span<const std::byte> content) {
   switch (opcode) {
     case Opcode::kChunk:
+    case Opcode::kAttachment:
     case Opcode::kMetadata: return true;
     case Opcode::kDataEnd: return content.size() == sizeof(std::uint32_t);
     case Opcode::kMessageIndex: {

@@ -176,6 +176,23 @@ void McapWriter::add_metadata(std::string_view name, const StringMap& map) {
   emit_record(Opcode::kMetadata, content);
 }
 
+void McapWriter::add_attachment(std::string_view name, std::int64_t time_ns,
+                                std::span<const std::byte> data) {
+  finish_chunk();
+  const auto time = static_cast<std::uint64_t>(time_ns);
+  Bytes content;
+  append(content, time);
+  append(content, time);  // when it was made
+  append(content, name);
+  append(content, kAttachedType);
+  append(content, static_cast<std::uint64_t>(data.size()));
+  append(content, data);
+  append(content, crc(0, content));
+  attachments_.push_back(
+      {offset_, kRecordHeaderBytes + content.size(), time, data.size(), std::string(name)});
+  emit_record(Opcode::kAttachment, content);
+}
+
 bool McapWriter::write(std::uint16_t channel, std::int64_t time_ns, std::span<const std::byte> head,
                        std::span<const std::byte> body) {
   if (failed()) return false;
@@ -270,7 +287,7 @@ Bytes McapWriter::statistics_content() const {
   append(content, statistics_.messages);
   append(content, static_cast<std::uint16_t>(schemas_.size()));
   append(content, static_cast<std::uint32_t>(channels_.size()));
-  append(content, std::uint32_t{0});  // attachments
+  append(content, static_cast<std::uint32_t>(attachments_.size()));
   append(content, static_cast<std::uint32_t>(metadata_.size()));
   append(content, static_cast<std::uint32_t>(chunks_.size()));
   append(content, statistics_.start_time);
@@ -318,6 +335,19 @@ void McapWriter::write_summary() {
   start = offset_;
   for (const Chunk& chunk : chunks_) emit_record(Opcode::kChunkIndex, chunk_index_content(chunk));
   summary_group(Opcode::kChunkIndex, start, offsets);
+  start = offset_;
+  for (const AttachmentPlace& place : attachments_) {
+    Bytes content;
+    append(content, place.offset);
+    append(content, place.length);
+    append(content, place.time);
+    append(content, place.time);
+    append(content, place.size);
+    append(content, place.name);
+    append(content, kAttachedType);
+    emit_record(Opcode::kAttachmentIndex, content);
+  }
+  summary_group(Opcode::kAttachmentIndex, start, offsets);
   start = offset_;
   for (const MetadataPlace& place : metadata_) {
     Bytes content;

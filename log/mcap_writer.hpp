@@ -47,6 +47,8 @@ class McapWriter {
   }
   /// Outside of every chunk, at the present end of the file.
   void add_metadata(std::string_view name, const StringMap& map);
+  /// The same: a file within the file, which other programs pass over. @param time_ns  log time
+  void add_attachment(std::string_view name, std::int64_t time_ns, std::span<const std::byte> data);
 
   /// Appends a message of `head` then `body`. False once writing has failed.
   bool write(std::uint16_t channel, std::int64_t time_ns, std::span<const std::byte> head,
@@ -78,6 +80,10 @@ class McapWriter {
   };
   struct MetadataPlace {
     std::uint64_t offset, length;
+    std::string name;
+  };
+  struct AttachmentPlace {
+    std::uint64_t offset, length, time, size;
     std::string name;
   };
   struct Statistics {
@@ -114,6 +120,7 @@ class McapWriter {
   std::vector<Bytes> schemas_, channels_;  // contents, for the summary
   std::vector<Chunk> chunks_;
   std::vector<MetadataPlace> metadata_;
+  std::vector<AttachmentPlace> attachments_;
   Statistics statistics_;
 };
 

@@ -18,8 +18,8 @@ namespace tandem::log {
 namespace {
 
 // Numbers of channels as they are pushed; what they are in a file, each file says.
-constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kBranchChannel = 0xFFFE,
-                            kTextChannel = 0xFFFF;
+constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kAttachedChannel = 0xFFFD,
+                            kBranchChannel = 0xFFFE, kTextChannel = 0xFFFF;
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
 /// @param more  what was pushed behind the event
@@ -210,6 +210,15 @@ void Recorder::branch(const Branch& from) noexcept {
   (void)push(kBranchChannel, begin_ns, std::as_bytes(std::span(numbers)));
 }
 
+void Recorder::attach(std::string name, std::int64_t time_ns, Bytes data) {
+  {
+    const std::lock_guard lock(attached_mutex_);
+    attached_.push_back({std::move(name), std::move(data)});
+  }
+  wait_for_space(1);
+  (void)push(kAttachedChannel, time_ns, {});
+}
+
 void Recorder::wait_for_space(std::size_t messages) const noexcept { wait_for(*ring_, messages); }
 
 void Recorder::wait_for(const SpscRing& ring, std::size_t messages) noexcept {
@@ -234,6 +243,8 @@ void Recorder::run() {
         std::memcpy(&from.snapshot, slot.data() + sizeof head + sizeof from.cycle,
                     sizeof from.snapshot);
         next_branch(std::move(from));
+      } else if (head.channel == kAttachedChannel) {
+        write_attached(head.time_ns);
       } else {
         write_side(head.time_ns - side_lag_ns_);
         write(slot);
@@ -298,6 +309,18 @@ void Recorder::write_text(const hal::TextEvent& event) {
   write(kEventChannel, event.time_ns, event_);
   encode_rosout(event, event.time_ns, event_);
   write_late(*rosout_, event.time_ns, event_);
+}
+
+void Recorder::write_attached(std::int64_t time_ns) {
+  Attached one;
+  {
+    const std::lock_guard lock(attached_mutex_);
+    one = std::move(attached_.front());
+    attached_.pop_front();
+  }
+  if (!failed_.load(std::memory_order_relaxed)) {
+    writer_->add_attachment(one.name, time_ns, one.data);
+  }
 }
 
 void Recorder::write(Channel id, std::int64_t time_ns, std::span<const std::byte> body) {

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -135,7 +136,11 @@ class Recorder {
   /// `from` says; `from.of` is found here. Blocks for room, as wait_for_space(); not RT.
   void branch(const Branch& from) noexcept;
 
-  /// The same from that other thread.
+  /// A file within the log, behind the messages so far: McapWriter::add_attachment(). Blocks for
+  /// room, as wait_for_space(); not RT.
+  void attach(std::string name, std::int64_t time_ns, Bytes data);
+
+  /// push() from that other thread.
   bool push_side(Channel channel, std::int64_t time_ns, std::span<const std::byte> image) noexcept;
   /// Blocks that other thread until its `messages` fit.
   void wait_for_side_space(std::size_t messages) const noexcept { wait_for(*side_, messages); }
@@ -185,6 +190,7 @@ class Recorder {
   void write(std::span<const std::byte> slot);
   void write_late(Channel channel, std::int64_t time_ns, std::span<const std::byte> body);
   void write_text(const hal::TextEvent& event);
+  void write_attached(std::int64_t time_ns);
   void write(Channel id, std::int64_t time_ns, std::span<const std::byte> body);
   void next_part();
   void next_branch(Branch from);
@@ -212,6 +218,12 @@ class Recorder {
   std::int64_t side_lag_ns_ = -1;   // -1: the same
   std::thread thread_;
   std::atomic<bool> closing_{false};
+  struct Attached {
+    std::string name;
+    Bytes data;
+  };
+  std::mutex attached_mutex_;
+  std::deque<Attached> attached_;  // of which the ring says when
   std::mutex late_mutex_;
   std::vector<LateChannel> late_;  // the asking threads'; in the order of their numbers
   std::atomic<bool> failed_{false};

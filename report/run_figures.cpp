@@ -162,8 +162,9 @@ std::vector<Force> foot_forces(const RunData& run, const std::vector<int>& senso
 }
 
 Figure force_figure(const RunData& run, const OtherRuns& others, const std::vector<int>& sensors) {
-  constexpr CurveStyle kStyles[] = {CurveStyle::kMeasured, CurveStyle::kSecond, CurveStyle::kThird,
-                                    CurveStyle::kFourth,   CurveStyle::kFifth,  CurveStyle::kSixth};
+  constexpr CurveStyle kForceStyles[] = {CurveStyle::kMeasured, CurveStyle::kSecond,
+                                         CurveStyle::kThird,    CurveStyle::kFourth,
+                                         CurveStyle::kFifth,    CurveStyle::kSixth};
   const std::vector<Force> forces = foot_forces(run, sensors);
   const std::size_t feet = run.robot.contact.feet.size();
   Figure figure;
@@ -175,11 +176,11 @@ Figure force_figure(const RunData& run, const OtherRuns& others, const std::vect
   add_time(run, others, figure);
   figure.y_label = "force [N]";
   const std::size_t shown =
-      others.empty() ? std::min(std::size(kStyles), forces.size()) : std::size_t{1};
+      others.empty() ? std::min(std::size(kForceStyles), forces.size()) : std::size_t{1};
   if (shown < forces.size()) figure.title += fmt::format(", {} of {}", shown, forces.size());
   for (std::size_t i = 0; i < shown; ++i) {
     figure.curves.push_back(
-        curve_of(run, forces[i].name, letter_of(0, others), kStyles[i], forces[i].up_N, 1.0));
+        curve_of(run, forces[i].name, letter_of(0, others), kForceStyles[i], forces[i].up_N, 1.0));
   }
   for (std::size_t i = 0; i < others.size(); ++i) {
     const std::vector<Force> more = foot_forces(*others[i], sensors);

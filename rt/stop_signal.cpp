@@ -120,9 +120,12 @@ void install_emergency_signal() {
   ::sigaction(SIGUSR1, &action, nullptr);
 }
 
+bool emergency_stop_waits() noexcept TANDEM_RT {
+  return emergency_flag.load(std::memory_order_relaxed);
+}
+
 bool take_emergency_stop() noexcept TANDEM_RT {
-  return emergency_flag.load(std::memory_order_relaxed) &&
-         emergency_flag.exchange(false, std::memory_order_relaxed);
+  return emergency_stop_waits() && emergency_flag.exchange(false, std::memory_order_relaxed);
 }
 
 bool stop_requested() noexcept TANDEM_RT { return stop_flag.load(std::memory_order_relaxed); }

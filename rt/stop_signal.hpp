@@ -37,6 +37,9 @@ void clear_stop() noexcept;
 /// From now on each SIGUSR1 is an emergency stop.
 void install_emergency_signal();
 
+/// Whether an emergency stop was signalled that nobody has taken yet.
+[[nodiscard]] bool emergency_stop_waits() noexcept TANDEM_RT;
+
 /// True once for the emergency stops that were signalled since the last call.
 [[nodiscard]] bool take_emergency_stop() noexcept TANDEM_RT;
 

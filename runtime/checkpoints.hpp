@@ -18,6 +18,7 @@ struct Checkpoint {
   std::uint64_t heard = kNever;     ///< the first cycle from there that heard other threads
   std::uint64_t controllers = 0;    ///< ControllerHost::fingerprint()
   std::vector<std::byte> bytes{};   ///< RobotCycle::save()
+  std::uint64_t expects = 0;        ///< Expectations::fingerprint(); 0: there are none
   std::vector<std::byte> judged{};  ///< how far the run's expectations are
 
   [[nodiscard]] std::size_t size() const { return bytes.size() + judged.size(); }

@@ -50,7 +50,7 @@ void RobotCycle::show_again() noexcept {
 }
 
 bool RobotCycle::is_urgent() const noexcept {
-  return now_.inbox.is_urgent() || rt::stop_requested();
+  return now_.inbox.is_urgent() || rt::stop_requested() || rt::emergency_stop_waits();
 }
 
 std::string RobotCycle::unarchived() const {

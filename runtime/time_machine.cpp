@@ -34,6 +34,11 @@ std::uint64_t hash_of(std::span<const std::byte> bytes) {
   return hash;
 }
 
+Status lacks_archive(const std::string& controller) {
+  return fail("the controller '" + controller + "' has members, and no archive() that keeps them",
+              "give it one (docs/controllers.md), or unload it");
+}
+
 /// While one exists the loop plays what has been.
 class Replay {
  public:
@@ -51,6 +56,8 @@ class Replay {
 TimeMachine::TimeMachine(std::int64_t period_ns, std::size_t budget_bytes, bool keeps)
     : apart_(cycles_of(kApart_ns, period_ns)),
       soon_(cycles_of(kSoon_ns, period_ns)),
+      logged_apart_(cycles_of(kLogged_ns, period_ns)),
+      logged_soon_(cycles_of(kLoggedSoon_ns, period_ns)),
       keeps_(keeps),
       kept_(budget_bytes) {}
 
@@ -87,6 +94,7 @@ Result<Travel> TimeMachine::back_until(RobotCycle& cycle, CycleCondition holds) 
 
 Result<Travel> TimeMachine::ask(RobotCycle& cycle, Request request) {
   const std::lock_guard one(asks_);
+  abandoned_.store(false, std::memory_order_relaxed);
   if (request.kind != Request::Kind::kWatch) {
     if (const Status kept = has_past(); !kept) return std::unexpected(kept.error());
   }
@@ -124,11 +132,32 @@ Status TimeMachine::until(RobotCycle& cycle, CycleCondition holds) {
   return cycle.inbox().clock().resume();
 }
 
+Status TimeMachine::begin(RobotCycle& cycle, Checkpoint from, std::uint64_t next) {
+  const std::string lacking = cycle.unarchived();
+  if (!lacking.empty()) return lacks_archive(lacking);
+  if (from.expects != (expectations_ == nullptr ? 0 : expectations_->fingerprint())) {
+    return fail("[[expect]] has other rows than that run had",
+                "they are judged from its beginning: give the experiment the same");
+  }
+  // It names what differs; where nothing does, the cycles are played from there.
+  if (Status restored = cycle.restore(from.bytes); !restored) return restored;
+  Travel travel;
+  if (const Status played = play(cycle, from, next, travel); !played) return played;
+  reached_ = next;
+  if (keeps_.load(std::memory_order_relaxed)) kept_.add(std::move(from));
+  return {};
+}
+
+std::optional<std::uint64_t> TimeMachine::met() const noexcept {
+  const std::uint64_t met = met_.load(std::memory_order_acquire);
+  return met == Checkpoint::kNever ? std::nullopt : std::optional(met);
+}
+
 // The loop's.
 
 void TimeMachine::attend(RobotCycle& cycle) noexcept {
   if (until_) watch(cycle);
-  if (keeps_.load(std::memory_order_relaxed)) note(cycle);
+  if (keeps_.load(std::memory_order_relaxed) || log_) note(cycle);
   if (wanted_.load(std::memory_order_acquire)) serve(cycle);
 }
 
@@ -137,6 +166,9 @@ std::optional<log::Branch> TimeMachine::begins(std::uint64_t next) noexcept {
     reached_ = next + 1;
     return std::nullopt;
   }
+  flush();  // to the log that is left
+  unlogged_ = std::exchange(arrived_, std::nullopt);
+  due_ = next + logged_apart_;
   const std::lock_guard lock(mutex_);
   kept_.forget_after(next);
   if (Checkpoint* const last = kept_.last(); last != nullptr && last->heard >= next) {
@@ -151,42 +183,75 @@ void TimeMachine::watch(RobotCycle& cycle) {
   const bool holds = until_(cycle.last_view());
   if (std::exchange(held_, holds) || !holds) return;
   until_ = {};
+  met_.store(cycle.next_cycle(), std::memory_order_release);
   (void)cycle.inbox().clock().pause();
 }
 
 /// The cycle before this moment is done: what it heard, and whether its state is kept.
 void TimeMachine::note(RobotCycle& cycle) {
-  const std::uint64_t next = cycle.next_cycle();
   const bool heard = cycle.take_heard();
-  if (std::exchange(seen_, next) == next) return;
+  if (std::exchange(seen_, cycle.next_cycle()) == cycle.next_cycle()) return;
+  if (keeps_.load(std::memory_order_relaxed)) note_kept(cycle, heard);
+  try {
+    if (log_) note_logged(cycle, heard);
+  } catch (const std::bad_alloc&) {
+    log_ = {};
+  }
+}
+
+void TimeMachine::note_kept(RobotCycle& cycle, bool heard) {
+  const std::uint64_t next = cycle.next_cycle();
   Checkpoint* const last = kept_.last();
   if (last != nullptr && heard) last->heard = std::min(last->heard, next - 1);
   const std::uint64_t apart = last != nullptr && last->heard != Checkpoint::kNever ? soon_ : apart_;
   if (last == nullptr || next >= last->cycle + apart) take(cycle);
 }
 
+void TimeMachine::note_logged(RobotCycle& cycle, bool heard) {
+  const std::uint64_t next = cycle.next_cycle();
+  if (heard && unlogged_) {
+    unlogged_->heard = next - 1;
+    flush();
+    due_ = std::min(due_, next + logged_soon_);
+  }
+  if (next < due_) return;
+  flush();
+  unlogged_ = capture(cycle);
+  due_ = next + logged_apart_;
+}
+
+void TimeMachine::flush() {
+  if (unlogged_ && log_) log_(*unlogged_);
+  unlogged_.reset();
+}
+
 /// Where there is no memory for it, there are no more.
 void TimeMachine::take(RobotCycle& cycle) {
   try {
-    archive_.clear();
-    if (!cycle.write_down(archive_, true)) {
-      keeps_.store(false);
-      return;
-    }
-    const std::span<const std::byte> bytes = archive_.bytes();
-    Checkpoint one{.cycle = cycle.next_cycle(),
-                   .controllers = cycle.controllers(),
-                   .bytes = {bytes.begin(), bytes.end()}};
-    if (expectations_ != nullptr) {
-      Archive judged;
-      expectations_->archive(judged);
-      one.judged.assign(judged.bytes().begin(), judged.bytes().end());
-    }
+    auto one = capture(cycle);
+    if (!one) return keeps_.store(false);
     const std::lock_guard lock(mutex_);
-    kept_.add(std::move(one));
+    kept_.add(std::move(*one));
   } catch (const std::bad_alloc&) {
     keeps_.store(false);
   }
+}
+
+/// The state at this moment; nothing where the robot cannot be saved.
+std::optional<Checkpoint> TimeMachine::capture(RobotCycle& cycle) {
+  archive_.clear();
+  if (!cycle.write_down(archive_, true)) return std::nullopt;
+  const std::span<const std::byte> bytes = archive_.bytes();
+  Checkpoint one{.cycle = cycle.next_cycle(),
+                 .controllers = cycle.controllers(),
+                 .bytes = {bytes.begin(), bytes.end()}};
+  if (expectations_ != nullptr) {
+    Archive judged;
+    expectations_->archive(judged);
+    one.expects = expectations_->fingerprint();
+    one.judged.assign(judged.bytes().begin(), judged.bytes().end());
+  }
+  return one;
 }
 
 void TimeMachine::serve(RobotCycle& cycle) {
@@ -208,6 +273,7 @@ void TimeMachine::serve(RobotCycle& cycle) {
 
 Result<Travel> TimeMachine::serve(RobotCycle& cycle, Request& request) {
   const std::uint64_t here = cycle.next_cycle();
+  met_.store(Checkpoint::kNever, std::memory_order_release);
   if (request.kind == Request::Kind::kWatch) {
     until_ = std::move(request.holds);
     held_ = until_(cycle.last_view());
@@ -222,18 +288,15 @@ Result<Travel> TimeMachine::serve(RobotCycle& cycle, Request& request) {
 
 /// At another moment, which all who watch are shown.
 void TimeMachine::arrive(RobotCycle& cycle) {
-  archive_.clear();
-  (void)cycle.write_down(archive_, true);
-  snapshot_ = hash_of(archive_.bytes());
+  arrived_ = capture(cycle);
+  if (arrived_) snapshot_ = hash_of(arrived_->bytes);
   cycle.show_again();
 }
 
 Status TimeMachine::may_travel(const RobotCycle& cycle) const {
   if (cycle.is_urgent()) return fail("a stop was asked for just now", "ask again");
   const std::string lacking = cycle.unarchived();
-  if (lacking.empty()) return {};
-  return fail("the controller '" + lacking + "' has members, and no archive() that keeps them",
-              "give it one (docs/controllers.md), or unload it");
+  return lacking.empty() ? Status() : lacks_archive(lacking);
 }
 
 Result<Travel> TimeMachine::go(RobotCycle& cycle, std::uint64_t next) {
@@ -321,6 +384,9 @@ Status TimeMachine::play(RobotCycle& cycle, const Checkpoint& from, std::uint64_
   const Replay again(cycle);
   while (cycle.next_cycle() < to) {
     if (after && cycle.is_urgent()) return fail("a stop was asked for meanwhile", "ask again");
+    if (after && abandoned_.load(std::memory_order_relaxed)) {
+      return fail("the search was ended: somebody paused", "ask again");
+    }
     (void)cycle.step();
     ++travel.replayed;
     if (expectations_ != nullptr) expectations_->take(cycle.last_view());

@@ -47,6 +47,8 @@ class TimeMachine {
   /// They are this far apart at most [ns], and come so soon after a cycle that heard something.
   static constexpr std::int64_t kApart_ns = 1'000'000'000, kSoon_ns = 20'000'000;
   static constexpr std::size_t kBudget_bytes = 64'000'000;
+  /// The same of those that go to the log.
+  static constexpr std::int64_t kLogged_ns = 5'000'000'000, kLoggedSoon_ns = 1'000'000'000;
 
   /// @param keeps  from the first cycle on; else from keep() on
   TimeMachine(std::int64_t period_ns, std::size_t budget_bytes, bool keeps);
@@ -59,6 +61,16 @@ class TimeMachine {
 
   /// Before the first cycle: expectations are judged by the branch that the run is in.
   void judge_by(Expectations* expectations) noexcept { expectations_ = expectations; }
+
+  /// Keeps a state in the run's log; in the thread of the loop, between two cycles.
+  using LogState = std::function<void(const Checkpoint&)>;
+  /// Before the first cycle: states go to the log, too, whether they are kept here or not.
+  void log_to(LogState log) { log_ = std::move(log); }
+  /// Before the first cycle: the run goes on from a state of another one, from its cycle `next` on.
+  /// Errors: RobotCycle::restore()'s; other [[expect]]; a controller lacks an archive().
+  [[nodiscard]] Status begin(RobotCycle& cycle, Checkpoint from, std::uint64_t next);
+  /// After the last cycle, before the log is closed: logs what is left.
+  void finish() { flush(); }
 
   // They pause simulated time, and block until it stands there. After an error it is where it was,
   // and goes on if it did before.
@@ -74,6 +86,11 @@ class TimeMachine {
   [[nodiscard]] Result<Travel> back_until(RobotCycle& cycle, CycleCondition holds);
   /// Lets time go on, and pauses it after the cycle in which `holds` becomes true. Does not wait.
   [[nodiscard]] Status until(RobotCycle& cycle, CycleCondition holds);
+  /// The moment after the cycle in which the condition of the last until() became true; none: it
+  /// has not, or time went elsewhere since. Any thread, at once, as the next.
+  [[nodiscard]] std::optional<std::uint64_t> met() const noexcept;
+  /// Ends a search that goes on: time stays where it is.
+  void abandon() noexcept { abandoned_.store(true, std::memory_order_relaxed); }
 
   // The loop's.
 
@@ -96,14 +113,18 @@ class TimeMachine {
   void arrive(RobotCycle& cycle);
   void watch(RobotCycle& cycle);
   void note(RobotCycle& cycle);
+  void note_kept(RobotCycle& cycle, bool heard);
+  void note_logged(RobotCycle& cycle, bool heard);
   void take(RobotCycle& cycle);
+  [[nodiscard]] std::optional<Checkpoint> capture(RobotCycle& cycle);
+  void flush();
   [[nodiscard]] Status may_travel(const RobotCycle& cycle) const;
   [[nodiscard]] Result<Travel> go(RobotCycle& cycle, std::uint64_t next);
   [[nodiscard]] Result<Travel> search(RobotCycle& cycle, const CycleCondition& holds);
   [[nodiscard]] Status play(RobotCycle& cycle, const Checkpoint& from, std::uint64_t to,
                             Travel& travel, const std::function<void()>& after = {});
 
-  const std::uint64_t apart_, soon_;  // cycles
+  const std::uint64_t apart_, soon_, logged_apart_, logged_soon_;  // cycles
   std::atomic<bool> keeps_;
 
   std::mutex asks_;  // one at a time
@@ -111,7 +132,9 @@ class TimeMachine {
   std::condition_variable answered_;
   Request* request_ = nullptr;
   std::atomic<bool> wanted_{false};  // request_
-  Checkpoints kept_;                 // the loop writes it, under mutex_
+  std::atomic<bool> abandoned_{false};
+  std::atomic<std::uint64_t> met_{Checkpoint::kNever};
+  Checkpoints kept_;  // the loop writes it, under mutex_
 
   Expectations* expectations_ = nullptr;  // watch each live cycle by themselves
 
@@ -120,6 +143,10 @@ class TimeMachine {
   std::uint64_t seen_ = Checkpoint::kNever;  // the moment of the last attend()
   std::uint64_t reached_ = 0;                // the newest moment of this branch
   std::uint64_t snapshot_ = 0;               // hash of the state that time went back to
+  LogState log_;                             // empty: there is no log
+  std::optional<Checkpoint> unlogged_;       // until it is known what the cycles after it heard
+  std::optional<Checkpoint> arrived_;        // the state that time went back to, for the log
+  std::uint64_t due_ = 0;                    // the moment whose state is logged next
   CycleCondition until_;                     // empty: time goes on as it does
   bool held_ = false;                        // until_, after the cycle before
 };

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <numbers>
 #include <string_view>
@@ -12,6 +14,7 @@
 #include "apps/clients/asked.hpp"
 #include "apps/clients/commands.hpp"
 #include "hal/sim/scenario.hpp"
+#include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -195,7 +198,15 @@ Exit asked_command(const AskedOptions& options) {
   if (!question) return refuse(question.error());
   const auto run = ControlClient::open(options.target, options.row->more.any_process ? "" : "run");
   if (!run) return refuse(run.error());
+  const bool may_last = answer_time(*question) > std::chrono::minutes(1);
+  if (may_last) rt::install_stop_signals();
   Result<Json> answer = (*run)->ask(*question);
+  if (!answer && may_last && rt::stop_requested()) {  // nobody waits for it any more
+    rt::clear_stop();
+    (void)(*run)->ask({{"do", "clock.pause"}});
+    return interrupted(SIGINT);
+  }
+  if (may_last) rt::remove_stop_signals();
   if (!answer) return refuse(answer.error());
   Asked asked{options, **run, std::move(*question), std::move(*answer)};
   Exit exit = Exit::kDone;

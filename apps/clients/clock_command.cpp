@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "apps/clients/asked.hpp"
@@ -54,11 +55,28 @@ std::string past_text(const Json& past) {
 constexpr const char* kOfTheCommand[]{"dropped_steps",   "from_s",  "asked_s",
                                       "replayed_cycles", "took_ms", "note"};
 
+/// Another client may have paused it before, or taken it elsewhere.
+Status is_where_asked(const Asked& asked, const Json& stands, bool paused) {
+  const double now_s = stands.value("time_s", 0.0);
+  const char* const others = "another client paused it, or took it elsewhere: ask again";
+  if (!paused && !stands.contains("until_met_s")) {
+    return fail(
+        fmt::format("time stands at {:.6g} s, and the condition has not become true", now_s),
+        others);
+  }
+  const double to_s = asked.question.value("to_s", now_s);
+  if (std::abs(to_s - now_s) < 0.5 * stands.value("period_s", 0.0)) return {};
+  if (!asked.question.contains("to_s")) return {};
+  return fail(fmt::format("time stands at {:.6g} s, not at {:.6g} s", now_s, to_s), others);
+}
+
 Result<Exit> tell_at_rest(Asked& asked, bool paused, const char* over) {
   Result<Json> stands = wait_until_it_stands(asked.run, human_output(asked.options.json), paused);
   if (!stands) return fail(over, "its own output says why");
   if (!paused && !stands->value("standing", false))
     return fail(over, "tandem report shows its log");
+  if (const Status there = is_where_asked(asked, *stands, paused); !there)
+    return std::unexpected(there.error());
   for (const char* key : kOfTheCommand) {
     if (asked.answer.contains(key)) (*stands)[key] = asked.answer[key];
   }
@@ -78,7 +96,7 @@ void print_clock(const Json& answer) {
   if (answer.contains("past")) facts.add("past", past_text(answer["past"]));
   if (answer.contains("from_s")) {
     facts.add("came from",
-              fmt::format("{:.6f} s, {} played again in {:.3g} ms", answer.value("from_s", 0.0),
+              fmt::format("{:.6f} s, {} played again in {:.0f} ms", answer.value("from_s", 0.0),
                           counted(answer.value("replayed_cycles", std::uint64_t{0}), "cycle"),
                           answer.value("took_ms", 0.0)));
   }

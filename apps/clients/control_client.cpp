@@ -18,6 +18,7 @@
 #include "apps/transport/control_path.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "base/open_file.hpp"
+#include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -75,6 +76,9 @@ Result<std::string> exchange(int fd, std::string out, std::chrono::milliseconds 
     pollfd watched{fd, static_cast<short>(out.empty() ? POLLIN : POLLOUT), 0};
     const int ready =
         ::poll(&watched, 1, static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
+    if (ready < 0 && errno == EINTR && rt::stop_requested()) {
+      return fail("interrupted before the answer came", "ask again");
+    }
     if (ready < 0 && errno == EINTR) continue;
     if (ready <= 0) return std::unexpected(no_answer(patience));
     char bytes[4096];
@@ -152,6 +156,8 @@ class SocketClient : public ControlClient {
 std::chrono::milliseconds answer_time(const Json& question) {
   const std::string name = question.value("do", "");  // dds.show: an emergency stop waits for it
   if (name == "estop" || name == "dds.show") return kStopAnswer;
+  // A run of an hour may take minutes to be searched.
+  if (name == "clock.rewind" || name == "clock.goto" || name == "clock.back-until") return 600s;
   // A library is tried, opened, and configured: each may take 4 s. Where one crashes, which is
   // tried, is looked for 25 s long.
   return name == "controller.load" || name == "controller.reload" ? 40000ms : 5000ms;

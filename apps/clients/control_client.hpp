@@ -19,7 +19,7 @@ namespace tandem::apps {
 inline constexpr char kNoAnswer[] = "no answer within";
 
 /// How long ask() waits for the answer to `question`: kStopAnswer, 40 s of a controller
-/// that is loaded, or 5 s.
+/// that is loaded, 10 min of time that goes back, or 5 s.
 [[nodiscard]] std::chrono::milliseconds answer_time(const Json& question);
 
 /// Sends `question` and waits for its answer.

@@ -180,6 +180,9 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
          "the run is paced or paused, has a studio, or gets a clock command")
       ->transform(CLI::AsSizeValue(true))
       ->option_text("SIZE");
+  app.add_option("--from", o.from,
+                 "Go on from a moment of a simulated run's log, which keeps its state every 5 s")
+      ->option_text("LOG@TIME");
   app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's")->check(is_seed());
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--record-frames", o.record_frames,

@@ -43,6 +43,7 @@ Json look(const runtime::RobotCycle& cycle) {
           {"cycles", done},
           {"paused", clock.paused},
           {"standing", clock.standing},
+          {"period_s", 1e-9 * static_cast<double>(clock.period_ns)},
           {"pending_steps", clock.pending_steps},
           {"rate", clock.pacing == rt::Pacing::kSimulated ? clock.rate : 1.0},
           {"realtime_factor", realtime_factor(clock, begun)}};
@@ -84,6 +85,7 @@ struct Clock {
       if (!past.why_not.empty()) found["no_past"] = past.why_not;
       return found;
     }
+    if (const auto met = past.machine->met()) found["until_met_s"] = seconds_of(cycle, *met);
     const runtime::KeptPast kept = past.machine->past();
     found["past"] = {
         {"keeps", kept.keeps},
@@ -101,6 +103,7 @@ struct Clock {
   }
 
   [[nodiscard]] Result<Json> pause() const {
+    if (past.machine != nullptr) past.machine->abandon();
     const Result<std::uint64_t> dropped = control().pause();
     if (!dropped) return std::unexpected(dropped.error());
     keep();
@@ -151,10 +154,8 @@ struct Clock {
   [[nodiscard]] Result<Json> rewind(const Json& request) const {
     if (const Status may = may_go_back(); !may) return std::unexpected(may.error());
     const double by_s = request["by_s"].get<double>();
-    if (!(by_s > 0.0)) return fail_at("by_s", "goes back by more than 0 s", "write 2.5s");
-    const double now_s = 1e-9 * static_cast<double>(cycle.progress().time_ns.load());
-    if (const auto there = moment_of(cycle, now_s - by_s, "by_s"); !there) {
-      return std::unexpected(there.error());
+    if (!(by_s > 0.0 && by_s < 1e9)) {
+      return fail_at("by_s", "goes back by more than 0 s, and less than 1e9 s", "write 2.5s");
     }
     const double cycles = std::max(1.0, std::round(by_s / period_of(cycle)));
     return arrived(past.machine->go_back(cycle, static_cast<std::uint64_t>(cycles)));

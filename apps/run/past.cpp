@@ -1,5 +1,7 @@
 #include "apps/run/past.hpp"
 
+#include <fmt/core.h>
+
 #include <utility>
 
 #include "runtime/condition/condition.hpp"
@@ -8,10 +10,10 @@ namespace tandem::apps {
 namespace {
 
 /// Why the run cannot go back; empty: it can.
-std::string obstacle(const runtime::Composition& c, bool served) {
+std::string obstacle(const runtime::Composition& c) {
   if (c.backend->pace() != hal::Pace::kSimulatedClock) return "its time is real";
   if (c.sim == nullptr) return "its boards are in another process";
-  if (served) return "another process may own its robot";
+  if (c.owner != nullptr) return "another process may own its robot";
   if (c.parallel != nullptr) return "the second robot of [parallel] would not go with it";
   if (c.predictor != nullptr && c.predictor->is_prepared()) {
     return "a controller acts on predictions, which are not kept";
@@ -38,8 +40,8 @@ Result<runtime::Condition> read_condition(const runtime::Composition& c,
 
 }  // namespace
 
-Past::Past(const runtime::Composition& composition, const RunOptions& options, bool served)
-    : c_(composition), why_not_(obstacle(composition, served)) {
+Past::Past(const runtime::Composition& composition, const RunOptions& options)
+    : c_(composition), why_not_(obstacle(composition)) {
   if (!why_not_.empty()) return;
   const rt::CyclicLoopConfig& loop = composition.experiment.loop;
   const bool useful = options.rate.value_or(loop.rate) > 0.0 || options.start_paused ||
@@ -50,8 +52,47 @@ Past::Past(const runtime::Composition& composition, const RunOptions& options, b
 }
 
 Status Past::check(const RunOptions& options) const {
-  if (machine_ != nullptr || options.checkpoints_bytes.value_or(0) == 0) return {};
-  return fail_at("--checkpoints", "this run cannot go back in time: " + why_not_, "leave it out");
+  if (machine_ != nullptr) return {};
+  const std::string why = "this run cannot go back in time: " + why_not_;
+  if (options.checkpoints_bytes.value_or(0) > 0) {
+    return fail_at("--checkpoints", why, "leave it out");
+  }
+  return options.from.empty() ? Status() : fail_at("--from", why, "leave it out");
+}
+
+Status Past::read_beginning(const RunOptions& options) {
+  if (options.from.empty()) return {};
+  const auto moment = runtime::LogMoment::read(options.from);
+  if (!moment) return std::unexpected(moment.error());
+  auto begins = runtime::beginning_at(*moment);
+  if (!begins) return std::unexpected(begins.error());
+  begins_ = std::move(*begins);
+  return {};
+}
+
+Result<std::string> Past::begin(runtime::RobotCycle& cycle, log::Recorder* recorder) {
+  if (machine_ == nullptr) return std::string();
+  const std::int64_t period_ns = c_.experiment.loop.period_ns;
+  if (recorder != nullptr) {
+    machine_->log_to([recorder, period_ns](const runtime::Checkpoint& one) {
+      runtime::log_state(*recorder, one, period_ns);
+    });
+  }
+  if (!begins_) return std::string();
+  const Status there = machine_->begin(cycle, std::move(begins_->from), begins_->next);
+  if (!there) return std::unexpected(there.error());
+  const auto time_s = [period_ns](std::uint64_t next) {
+    return 1e-9 * static_cast<double>(period_ns) * static_cast<double>(next == 0 ? 0 : next - 1);
+  };
+  std::string line =
+      fmt::format("goes on from {} at {:.6g} s", begins_->branch.of, time_s(begins_->next));
+  if (begins_->next == begins_->asked) return line;
+  return line + fmt::format(", not {:.6g} s: it heard something then, which cannot be played again",
+                            time_s(begins_->asked));
+}
+
+void Past::finish() {
+  if (machine_ != nullptr) machine_->finish();
 }
 
 RunPast Past::of(runtime::RobotCycle& cycle) {

@@ -83,10 +83,17 @@ class Session {
         admission_(composition.experiment.remote.trust == runtime::RemoteTrust::kDomain) {}
 
   Exit run() {
-    if (const Status opened = open_outputs(); !opened) return refuse(opened.error());
-    past_.emplace(c_, options_, server_ != nullptr);
+    past_.emplace(c_, options_);
     if (const Status can = past_->check(options_); !can) return refuse(can.error());
+    if (const Status read = past_->read_beginning(options_); !read) return refuse(read.error());
+    if (const Status opened = open_outputs(); !opened) return refuse(opened.error());
     make_cycle();
+    auto begun = past_->begin(*cycle_, recorder_.get());
+    if (!begun) {
+      forget_log();
+      return refuse(begun.error());
+    }
+    begins_ = std::move(*begun);
     announce();
     if (const Status opened = open_inputs(); !opened) return refuse(opened.error());
     const auto times = loop();
@@ -104,6 +111,15 @@ class Session {
   /// This process in ROS 2's graph.
   [[nodiscard]] const char* node() const { return options_.serves ? "tandem_serve" : "tandem_run"; }
 
+  /// Of a run that was none.
+  void forget_log() {
+    if (recorder_ == nullptr) return;
+    const std::string path = recorder_->path();
+    run_.reset();
+    recorder_.reset();
+    (void)::unlink(path.c_str());
+  }
+
   /// DDS, the log, and the door for an owner over DDS.
   Status open_outputs() {
     auto dds = DdsRun::open(c_, node());
@@ -111,7 +127,8 @@ class Session {
     dds_ = std::move(*dds);
     if (!options_.no_log) {
       const std::string& asked = options_.log_folder;
-      auto recorder = runtime::open_log(c_, asked.empty() ? experiment().log.folder : asked);
+      auto recorder = runtime::open_log(c_, asked.empty() ? experiment().log.folder : asked, {},
+                                        past_->branch());
       if (!recorder) return std::unexpected(recorder.error());
       recorder_ = std::move(*recorder);
       plugins_at_start_ = c_.controllers->code().size();
@@ -154,6 +171,7 @@ class Session {
                counted(e.robot.joints.size(), "joint"), length_text(e),
                1e6 / static_cast<double>(e.loop.period_ns), options_.serves ? served_text(e) : "",
                pace_text(c_));
+    if (!begins_.empty()) fmt::print(out_, "{}\n", begins_);
     if (recorder_ == nullptr) return;
     fmt::print(out_, "log: {}\n", recorder_->path());
     if (e.endless()) fmt::print(out_, "     {}\n", runtime::log_growth(c_, recorder_->path()));
@@ -231,6 +249,7 @@ class Session {
           cycle_->config().after_stop == runtime::AfterStop::kWait, options_.quiet);
     if ((*guard)->gave_up()) end_without_loop(**guard);
     thread.join();
+    past_->finish();
     const EndGuard in_time([this] { close_log(); });
     if (c_.predictor != nullptr) c_.predictor->close();
     guard->reset();
@@ -314,6 +333,7 @@ class Session {
   std::unique_ptr<remote::Server> server_;
   hal::CycleFanOut observers_;  // of the loop
   std::optional<Past> past_;
+  std::string begins_;  // where it goes on from, for people
   std::optional<runtime::Run> run_;
   runtime::RobotCycle* cycle_ = nullptr;  // its
   ControlRegistry commands_;

@@ -131,6 +131,12 @@ class Suite {
     }
     for (Going& one : going_) end(one);
     if (!written) return refuse(written.error());
+    if (rt::stop_requested()) {
+      for (SuiteTest& test : tests_) {
+        if (!test.passed && test.reason.empty()) test.reason = "it was not run";
+      }
+      if (written = write_junit(); !written) return refuse(written.error());
+    }
     return finish(std::chrono::duration<double>(SuiteClock::now() - begin).count());
   }
 
@@ -251,7 +257,7 @@ class Suite {
       if (alone)
         table.add({shown(test.file, 48), "",
                    !test.passed ? "skipped" : (*test.passed ? "passed" : "FAILED"), "", "",
-                   test.reason.empty() ? "it was not run" : shown(test.reason)});
+                   shown(test.reason)});
       for (const runtime::ExpectationResult& one : test.expectations)
         table.add({shown(test.file, 48), shown(one.name, 48), one.passed ? "passed" : "FAILED",
                    runtime::margin_text(one),
@@ -287,8 +293,9 @@ class Suite {
 Exit test_command(const TestOptions& given) {
   TestOptions options = given;
   if (options.jobs == 0) options.jobs = std::max(1U, std::thread::hardware_concurrency());
-  for (const std::string& file : {options.json, options.junit}) {
-    if (const Status writable = check_writable(file); !writable) return refuse(writable.error());
+  for (const Status& writable :
+       {check_writable(options.json), check_writable(options.junit, "<?xml", "XML")}) {
+    if (!writable) return refuse(writable.error());
   }
   auto tests = find_tests(options.paths);
   if (!tests) return refuse(tests.error());

@@ -48,8 +48,8 @@ std::string right(const std::string& text, std::size_t columns) {
   return std::string(columns - std::min(columns, width(text)), ' ') + text;
 }
 
-Error json_error(const std::string& file, const std::string& reason) {
-  return {.message = "cannot write the JSON: " + reason,
+Error unwritable(const std::string& file, const std::string& what, const std::string& reason) {
+  return {.message = "cannot write the " + what + ": " + reason,
           .hint = "name a file in a folder that can be written",
           .file = file,
           .key = {}};
@@ -236,9 +236,11 @@ Status check_overwrites(const std::string& file, std::string_view begins, const 
                                {}});
 }
 
-Status check_writable(const std::string& file) {
+Status check_writable(const std::string& file, std::string_view begins, const std::string& what) {
   if (file.empty() || file == "-") return {};
-  if (holds_something_else(file)) {
+  if (!begins.empty()) {
+    if (Status kept = check_overwrites(file, begins, what); !kept) return kept;
+  } else if (holds_something_else(file)) {
     return std::unexpected(Error{"this file is there, and it is no JSON: it would be lost",
                                  "name another file, or remove it first",
                                  file,
@@ -250,15 +252,16 @@ Status check_writable(const std::string& file) {
   const std::filesystem::path folder = std::filesystem::path(file).parent_path();
   if (!folder.empty() && !std::filesystem::exists(folder, ignored)) {
     const std::error_code problem = try_folders(file);
-    return problem ? std::unexpected(json_error(file, std::strerror(problem.value()))) : Status{};
+    return problem ? std::unexpected(unwritable(file, what, std::strerror(problem.value())))
+                   : Status{};
   }
   if (there) {
     const bool is_folder = std::filesystem::is_directory(file, ignored);
     if (!is_folder && ::faccessat(AT_FDCWD, file.c_str(), W_OK, AT_EACCESS) == 0) return {};
-    return std::unexpected(json_error(file, std::strerror(is_folder ? EISDIR : errno)));
+    return std::unexpected(unwritable(file, what, std::strerror(is_folder ? EISDIR : errno)));
   }
   const Result<Descriptor> out = open_new(file);
-  if (!out) return std::unexpected(json_error(file, out.error().message));
+  if (!out) return std::unexpected(unwritable(file, what, out.error().message));
   std::filesystem::remove(file, ignored);
   return {};
 }

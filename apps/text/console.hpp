@@ -57,7 +57,9 @@ void outlive_files();
 
 /// Whether `file` and the folders that it lacks can be written, found out before a run: an error
 /// that names it when not. Nothing is made.
-[[nodiscard]] Status check_writable(const std::string& file);
+/// @param begins  of a file that is there and may be lost; empty: JSON. @param what  that is
+[[nodiscard]] Status check_writable(const std::string& file, std::string_view begins = {},
+                                    const std::string& what = "JSON");
 
 /// `value` as JSON, whatever bytes its texts hold: what is no UTF-8 becomes U+FFFD.
 /// @param indent  blanks a level; -1: all in one line

@@ -14,6 +14,7 @@
 #include "base/counted.hpp"
 #include "base/open_file.hpp"
 #include "base/quoting.hpp"
+#include "log/attachments.hpp"
 #include "log/branches.hpp"
 #include "log/compare.hpp"
 #include "log/csv.hpp"
@@ -53,6 +54,12 @@ static void figures(apps::Figures& f, const BranchLog& branch) {
   f("time_ns", "of that cycle", branch.time_ns);
 }
 
+static void figures(apps::Figures& f, const Attachment& one) {
+  f("name", "of a state: its next cycle", one.name);
+  f("time_ns", "of the cycle before", one.time_ns);
+  f("bytes", one.bytes);
+}
+
 }  // namespace tandem::log
 
 namespace tandem::apps {
@@ -62,6 +69,16 @@ static void figures(Figures& f, const log::LoggedTopic& topic) {
   f("messages", topic.messages);
   f("schema", topic.type);
   f("fields", fields);
+}
+
+/// Of all its files; what cannot be read has none.
+static std::vector<log::Attachment> attachments_in(const log::LogFile& file) {
+  std::vector<log::Attachment> all;
+  for (const log::LogPart& part : file.parts()) {
+    const auto its = log::attachments_of(part.path);
+    if (its) all.insert(all.end(), its->begin(), its->end());
+  }
+  return all;
 }
 
 static void figures(Figures& f, const log::LogFile* file) {
@@ -90,6 +107,8 @@ static void figures(Figures& f, const log::LogFile* file) {
     [&] { return file->missing(); });
   f("branches", "logs beside it of the same run, which [went back in time](time.md#branches)",
     [&] { return log::branches_beside(file->path()); });
+  f("attachments", "states that another run [goes on from](time.md#from-a-log)",
+    [&] { return attachments_in(*file); });
 }
 
 std::vector<Figures::Row> log_figures() { return Figures::rows_of<const log::LogFile*>(); }
@@ -124,13 +143,21 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
   }
   if (!info.branch.of.empty()) {
     facts.add("branch of",
-              fmt::format("{}, from cycle {} on; snapshot {:016x}", shown(info.branch.of, 4'096),
-                          info.branch.cycle, info.branch.snapshot));
+              fmt::format("{}, from cycle {} on{}", shown(info.branch.of, 4'096), info.branch.cycle,
+                          info.branch.snapshot == 0
+                              ? ""
+                              : fmt::format("; snapshot {:016x}", info.branch.snapshot)));
   }
   for (const log::BranchLog& one : log::branches_beside(file.path())) {
     facts.add("branches",
               fmt::format("{} goes on from {} at {:.6g} s", shown(one.file, 4'096),
                           shown(one.of, 4'096), static_cast<double>(one.time_ns) * 1e-9));
+  }
+  if (const auto states = attachments_in(file); !states.empty()) {
+    facts.add("states", fmt::format("{}, {:.6g} to {:.6g} s: tandem run … --from {}@TIME",
+                                    states.size(), 1e-9 * static_cast<double>(states[0].time_ns),
+                                    1e-9 * static_cast<double>(states.back().time_ns),
+                                    shown(file.path(), 4'096)));
   }
   facts.add("backend", info.hal);
   facts.add("seed", std::to_string(info.seed));

@@ -174,13 +174,17 @@ void Expectation::judge_condition(ExpectationResult& result) const {
   const std::uint64_t known = so_far_.cycles - so_far_.unknown;
   if (once) {
     result.passed = so_far_.held > 0;
-    if (!result.passed) result.reason = "it never held";
+    if (!result.passed) {
+      result.reason = "it never held";
+      if (!result.margin) result.at_s.reset();  // no cycle was nearer than another
+    }
     return;
   }
   result.passed = so_far_.held == known && so_far_.unknown == 0;
   if (so_far_.held != known) {
-    result.reason = fmt::format("it did not hold in {} of {}", known - so_far_.held,
-                                counted(so_far_.cycles, "cycle"));
+    result.reason =
+        fmt::format("it {} in {} of {}", spec_.kind == Judged::kNever ? "held" : "did not hold",
+                    known - so_far_.held, counted(so_far_.cycles, "cycle"));
   }
 }
 

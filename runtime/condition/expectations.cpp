@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <thread>
 #include <utility>
 
@@ -48,6 +49,22 @@ void Expectations::take(const hal::CycleView& view) noexcept TANDEM_RT {
   // A fault that ends the run is noted in the cycle that shuts it down.
   if (ended_ && view.faults == 0) return;
   for (Expectation& one : all_) one.take(view);
+}
+
+std::uint64_t Expectations::fingerprint() const noexcept {
+  std::uint64_t hash = 0xCBF29CE484222325U;  // FNV-1a
+  const auto add = [&hash](std::uint64_t value) { hash = (hash ^ value) * 0x100000001B3U; };
+  for (const Expectation& one : all_) {
+    const ExpectationSpec& spec = one.spec();
+    add(static_cast<std::uint64_t>(spec.kind));
+    for (const std::string* text : {&spec.text, &spec.above, &spec.below, &spec.after}) {
+      for (const char letter : *text) add(static_cast<unsigned char>(letter));
+      add(text->size());
+    }
+    for (const double number : {spec.in_s, spec.from_s, spec.to_s})
+      add(std::bit_cast<std::uint64_t>(number));
+  }
+  return hash;
 }
 
 void Expectations::show() noexcept TANDEM_RT {

@@ -315,7 +315,8 @@ log::StringMap loaded_later(const ControllerHost& host, std::size_t known) {
 }
 
 Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& folder,
-                                                const std::string& file_name) {
+                                                const std::string& file_name,
+                                                const log::Branch& branch) {
   const auto cycles = static_cast<double>(c.experiment.cycles());
   const log::RecorderOptions options = recorder_options(c);
   const log::DiskLimits& limits = options.limits;
@@ -332,7 +333,9 @@ Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std:
       file_name.empty() ? claim_file(folder, name) : claim_named(fs::path(folder) / file_name);
   if (!claimed) return std::unexpected(claimed.error());
   auto& [path, file] = *claimed;
-  auto recorder = log::Recorder::open(std::move(file), path, info_of(c), options);
+  log::RunInfo info = info_of(c);
+  info.branch = branch;
+  auto recorder = log::Recorder::open(std::move(file), path, info, options);
   if (recorder && c.sim != nullptr) {
     (*recorder)->name_payloads(
         [sim = c.sim](std::uint32_t number) { return sim->robot().payload_text(number); });

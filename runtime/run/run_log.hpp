@@ -22,11 +22,13 @@ namespace tandem::runtime {
 ///
 /// @param folder  created when it is missing.
 /// @param file    empty: as above
+/// @param branch  where the run goes on from a log; of none: it does not
 /// Errors, before anything has moved: the folder cannot be made or written; the disk has less
 /// room than the run will write; the file is there already.
 [[nodiscard]] Result<std::unique_ptr<log::Recorder>> open_log(const Composition& composition,
                                                               const std::string& folder,
-                                                              const std::string& file = {});
+                                                              const std::string& file = {},
+                                                              const log::Branch& branch = {});
 
 /// How fast the log at `path` grows, and for how long there is room: "at most 0.84 MB for each
 /// second; the disk has room for 6.1 h of it".

@@ -77,6 +77,7 @@ TEST_F(ExpectationTest, NeverIsItsOpposite) {
   EXPECT_TRUE(run(of, {1, 38}).passed);
   EXPECT_FALSE(run(of, {1, 41}).passed);
   EXPECT_EQ(run(of, {1, 41}).margin, -1.0);
+  EXPECT_EQ(run(of, {1, 41, 42}).reason, "it held in 2 of 3 cycles");
 }
 
 TEST_F(ExpectationTest, EventuallyHasTheBestCycle) {
@@ -221,7 +222,7 @@ TEST_F(ExpectationTest, AFaultThatEndsTheRunIsSeen) {
   EXPECT_TRUE((*all)->results()[1].passed);
   at(12);
   (*all)->take(view());
-  EXPECT_EQ((*all)->results()[0].reason, "it did not hold in 1 of 2 cycles") << "then it is over";
+  EXPECT_EQ((*all)->results()[0].reason, "it held in 1 of 2 cycles") << "then it is over";
 }
 
 TEST_F(ExpectationTest, RefusesWithTheKeyOfItsRow) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "log/log_file.hpp"
+#include "runtime/logged_state.hpp"
 #include "tests/log/scratch_folder.hpp"
 #include "tests/runtime/bundled_run.hpp"
 
@@ -236,6 +237,62 @@ TEST(TimeMachine, ThinsOutToItsBudget) {
     EXPECT_LE(gap, 2'000.0 + static_cast<double>(999'000 - kept.all()[i].cycle)) << i;
   }
   EXPECT_LE(kept.all().back().cycle - kept.all()[18].cycle, 3'000U);
+}
+
+// In another process as here: nothing of the first run is left.
+TEST(TimeMachine, GoesOnFromALog) {
+  const log::ScratchFolder folder;
+  const std::string path = (folder / "run.mcap");
+  Witness witness;
+  {
+    auto recorder = log::Recorder::open(path, {.robot = "coman", .period_ns = 1'000'000}, {});
+    ASSERT_TRUE(recorder);
+    TimeMachine machine(1'000'000, TimeMachine::kBudget_bytes, false);
+    BundledRun run("coman", "squat", {},
+                   {.recorder = recorder->get(), .observer = &witness, .time_machine = &machine});
+    machine.log_to([&](const Checkpoint& one) { log_state(**recorder, one, 1'000'000); });
+    run.steps(5'100);
+    run.cycle->inbox().reset_faults();  // nothing to reset, but it was heard
+    run.steps(1'400);
+    machine.finish();
+    EXPECT_EQ((*recorder)->close().error, "");
+  }
+  const auto begin = [&](double time_s, const char* experiment, std::uint64_t next) {
+    const auto found = beginning_at({path, time_s});
+    if (!found) return found.error().to_string();
+    EXPECT_EQ(found->next, next);
+    EXPECT_EQ(found->branch.of, "run.mcap");
+    EXPECT_EQ(found->branch.cycle, next);
+    TimeMachine machine(1'000'000, TimeMachine::kBudget_bytes, true);
+    BundledRun run("coman", experiment, {}, {.observer = &witness, .time_machine = &machine});
+    const Status begun = machine.begin(*run.cycle, found->from, found->next);
+    if (!begun) return begun.error().to_string();
+    const std::uint64_t again = witness.again;
+    run.steps(300);
+    EXPECT_EQ(run.cycle->next_cycle(), next + 300);
+    EXPECT_EQ(witness.again - again, 300U);
+    EXPECT_EQ(witness.others, 0U);
+    return std::string();
+  };
+  EXPECT_EQ(begin(1.2, "squat", 1'201), "");
+  EXPECT_EQ(begin(5.05, "squat", 5'051), "");
+  EXPECT_EQ(begin(5.15, "squat", 5'100), "");  // what was heard then cannot be played again
+  EXPECT_EQ(begin(6.15, "squat", 6'151), "");  // a state was logged soon after
+  EXPECT_NE(begin(1.2, "hold", 1'201).find("the snapshot is of another run"), std::string::npos);
+  EXPECT_NE(begin(9.0, "squat", 0).find("9 s is after its end, of 6.499 s"), std::string::npos);
+}
+
+TEST(TimeMachine, SaysWhatIsNoMomentOfALog) {
+  for (const char* text : {"", "run.mcap", "@1s", "run.mcap@", "run.mcap@soon", "run.mcap@-1s",
+                           "run.mcap@1h", "run.mcap@nan", "run.mcap@1e400"}) {
+    const auto read = LogMoment::read(text);
+    ASSERT_FALSE(read) << text;
+    EXPECT_EQ(read.error().message, "is no moment of a log") << text;
+  }
+  const auto read = LogMoment::read("a@b/run.mcap@1500ms");
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->log, "a@b/run.mcap");
+  EXPECT_EQ(read->time_s, 1.5);
 }
 
 TEST(TimeMachine, ABranchHasALogOfItsOwn) {
