@@ -111,7 +111,7 @@ class Session {
   /// This process in ROS 2's graph.
   [[nodiscard]] const char* node() const { return options_.serves ? "tandem_serve" : "tandem_run"; }
 
-  /// Of a run that was none.
+  /// The log of a run that was none.
   void forget_log() {
     if (recorder_ == nullptr) return;
     const std::string path = recorder_->path();

@@ -71,7 +71,7 @@ static void figures(Figures& f, const log::LoggedTopic& topic) {
   f("fields", fields);
 }
 
-/// Of all its files; what cannot be read has none.
+/// What all its files have; one that cannot be read has nothing.
 static std::vector<log::Attachment> attachments_in(const log::LogFile& file) {
   std::vector<log::Attachment> all;
   for (const log::LogPart& part : file.parts()) {

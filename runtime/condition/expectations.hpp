@@ -40,7 +40,7 @@ class Expectations final : public hal::CycleObserver {
   /// Faults that an expectation awaits, such as `eventually = "fault(board_silent)"`: causes, a bit
   /// each. These are no failure of the run.
   [[nodiscard]] std::uint64_t awaited_faults() const;
-  /// Of their rows: archive() fits those that have the same.
+  /// A hash of their rows: archive() fits those that have the same.
   [[nodiscard]] std::uint64_t fingerprint() const noexcept;
   /// How far they are, for a run that is rewound.
   void archive(Archive& ar) {
