@@ -204,6 +204,11 @@ bool Recorder::push(const Event& event, const hal::LimitMet& met) noexcept TANDE
 }
 
 void Recorder::branch(const Branch& from) noexcept {
+  if (parameters_) {
+    std::vector<std::string> now = parameters_();
+    const std::lock_guard lock(attached_mutex_);
+    branch_parameters_.push_back(std::move(now));
+  }
   wait_for_space(1);
   const std::uint64_t numbers[]{from.cycle, from.snapshot};
   const auto begin_ns = static_cast<std::int64_t>(from.cycle) * info_.period_ns;
@@ -384,6 +389,11 @@ void Recorder::next_part() {
 
 /// What was written so far stays as it is: its "result" says where it was left.
 void Recorder::next_branch(Branch from) {
+  if (parameters_) {
+    const std::lock_guard lock(attached_mutex_);
+    info_.parameters = std::move(branch_parameters_.front());
+    branch_parameters_.pop_front();
+  }
   if (failed_.load(std::memory_order_relaxed)) return;
   std::error_code ignored;
   ++branch_;

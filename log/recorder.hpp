@@ -116,6 +116,11 @@ class Recorder {
   void name_payloads(std::function<std::string(std::uint32_t)> name) {
     names_.payload = std::move(name);
   }
+  /// Who knows the controllers' parameters, as RunInfo has them: asked where a branch begins, in
+  /// the thread that calls branch(). Before start().
+  void name_parameters(std::function<std::vector<std::string>()> parameters) {
+    parameters_ = std::move(parameters);
+  }
   /// No more channels but late ones: allocates the ring and starts the writer's thread.
   void start();
 
@@ -223,7 +228,9 @@ class Recorder {
     Bytes data;
   };
   std::mutex attached_mutex_;
-  std::deque<Attached> attached_;  // of which the ring says when
+  std::deque<Attached> attached_;                           // of which the ring says when
+  std::deque<std::vector<std::string>> branch_parameters_;  // the same of each branch
+  std::function<std::vector<std::string>()> parameters_;    // empty: they stay as they were
   std::mutex late_mutex_;
   std::vector<LateChannel> late_;  // the asking threads'; in the order of their numbers
   std::atomic<bool> failed_{false};

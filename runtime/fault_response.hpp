@@ -35,8 +35,12 @@ class FaultResponse {
   [[nodiscard]] bool watch_reset() noexcept TANDEM_RT;
 
   void archive(Archive& ar) {
-    ar(stopped_before_);
+    std::uint64_t resets = now_.progress.resets.load(std::memory_order_relaxed);
+    std::uint64_t failed = now_.progress.failed_resets.load(std::memory_order_relaxed);
+    ar(stopped_before_, resets, failed);
     now_.progress.stopped_before.store(stopped_before_, std::memory_order_relaxed);
+    now_.progress.resets.store(resets, std::memory_order_relaxed);
+    now_.progress.failed_resets.store(failed, std::memory_order_relaxed);
   }
 
  private:

@@ -499,7 +499,7 @@ void AxisMaster::archive(Archive& ar) {
   ar(feedback_, raw_, target_, error_, heard_, was_enabled_, fault_code_, emergency_code_,
      age_cycles_, reset_cycles_, previous_velocity_, sample_ns_, trouble_ns_, since_ns_,
      acceleration_rad_s2_, scale_.zero_counts);
-  ar(aim_, set_point_, last_set_point_, offers_);
+  ar(aim_, set_point_, last_set_point_, offers_, last_emergency_);
 }
 
 }  // namespace tandem::hal::can

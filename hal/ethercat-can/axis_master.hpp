@@ -214,7 +214,7 @@ class AxisMaster {
   bool was_enabled_ = false;  ///< reached Operation Enabled under the present wish to be
   std::uint16_t fault_code_ = 0;
   std::uint16_t emergency_code_ = 0;
-  std::uint16_t last_emergency_ = 0;  ///< for a warning; no state
+  std::uint16_t last_emergency_ = 0;  ///< for a warning
   std::uint32_t age_cycles_ = 0;
   std::uint32_t reset_cycles_ = 0;
   std::uint32_t disobedient_cycles_ = 0;  ///< since the stop: samples of an enabled drive

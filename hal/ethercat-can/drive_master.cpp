@@ -367,7 +367,9 @@ void DriveMaster::archive(Archive& ar) {
   for (Impl::Port& port : m.ports) ar(port.next_heartbeat_ns);
   for (Impl::Node& node : m.nodes) {
     ar(node.master, node.exchange, node.gains, node.unanswered, node.recovering, node.asking);
+    ar(node.missed, node.emergencies, node.emergency);
   }
+  ar(m.unsent);
 }
 
 }  // namespace tandem::hal::can

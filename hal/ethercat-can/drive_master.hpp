@@ -151,7 +151,7 @@ class DriveMaster {
 
   /// What went wrong and was tolerated, a sentence each: feedback that did not come, counted by
   /// node; commands that a bus did not take; the last gain that a board refused, with the object
-  /// and why. Empty when nothing did. A measurement, no state: not in a snapshot. Not RT.
+  /// and why. Empty when nothing did. Not RT.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
   /// "bus line: …" of every bus that has something to tell of its wire. Not RT.

@@ -56,7 +56,7 @@ struct DriveMaster::Impl {
     std::uint32_t unanswered = 0;   ///< cycles of operation without a whole sample
     bool recovering = false;        ///< a lost node that is configured anew
     std::int16_t asking = -1;       ///< axis whose error code is being read
-    // Measurements, no state
+    // For warnings
     std::uint64_t missed = 0;             ///< cycles of operation without its whole feedback
     std::uint64_t emergencies = 0;        ///< that name none of its axes
     canopen::EmergencyMessage emergency;  ///< the last of them
@@ -136,7 +136,7 @@ struct DriveMaster::Impl {
   std::int64_t shut_down_since_ns = 0;
   StartUp start_up;             ///< no state
   std::int64_t started_ns = 0;  ///< time of the first cycle; no state
-  std::uint64_t unsent = 0;     ///< cycles whose commands a bus did not take whole; no state
+  std::uint64_t unsent = 0;     ///< cycles whose commands a bus did not take whole
 };
 
 }  // namespace tandem::hal::can

@@ -50,6 +50,22 @@ std::vector<std::string> controller_lines(const ControllerHost& host) {
   return lines;
 }
 
+void add_parameters(const HostedController& one, std::vector<std::string>& lines) {
+  for (const ParameterRow& row : one.io->parameters.rows()) {
+    const std::string value = row.text();
+    if (!value.empty()) lines.push_back(one.name + "." + row.name + " = " + value);
+  }
+}
+
+/// As they are in force; in the loop's thread.
+std::vector<std::string> parameters_now(const ControllerHost& host) {
+  std::vector<std::string> lines;
+  for (const HostedController* one : host.loaded()) {
+    if (one != nullptr) add_parameters(*one, lines);
+  }
+  return lines;
+}
+
 log::RunInfo info_of(const Composition& c) {
   const Experiment& e = c.experiment;
   log::RunInfo info;
@@ -76,10 +92,7 @@ log::RunInfo info_of(const Composition& c) {
     if (one == nullptr) continue;
     // Part of the program: Python, a robot's owner.
     if (one->plugin.empty()) info.controllers.push_back(one->name + " - -");
-    for (const ParameterRow& row : one->io->parameters.rows()) {
-      const std::string value = row.text();
-      if (!value.empty()) info.parameters.push_back(one->name + "." + row.name + " = " + value);
-    }
+    add_parameters(*one, info.parameters);
   }
   add_place_and_time(info);
   for (const auto& file : e.files) {  // each once
@@ -336,6 +349,9 @@ Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std:
   log::RunInfo info = info_of(c);
   info.branch = branch;
   auto recorder = log::Recorder::open(std::move(file), path, info, options);
+  if (recorder) {
+    (*recorder)->name_parameters([host = c.controllers.get()] { return parameters_now(*host); });
+  }
   if (recorder && c.sim != nullptr) {
     (*recorder)->name_payloads(
         [sim = c.sim](std::uint32_t number) { return sim->robot().payload_text(number); });

@@ -190,6 +190,30 @@ TEST(Recorder, CountsWhatIsLostWhenItsFileIsCut) {
   }
 }
 
+// It said what the run had begun with.
+TEST(Recorder, ABranchHasTheParametersOfItsBegin) {
+  const ScratchFolder folder;
+  const std::string path = folder / "run.mcap";
+  RunInfo info = run_info();
+  info.parameters = {"squat.depth = 1"};
+  auto recorder = Recorder::open(path, info, {});
+  ASSERT_TRUE(recorder);
+  std::string depth = "2";
+  (*recorder)->name_parameters([&] { return std::vector{"squat.depth = " + depth}; });
+  (*recorder)->start();
+  (*recorder)->branch({.cycle = 3});
+  depth = "5";
+  (*recorder)->branch({.cycle = 1});
+  EXPECT_EQ((*recorder)->close().branches, 3U);
+  const auto parameters = [&](const char* file) {
+    const auto log = LogFile::open(folder / file);
+    return log ? log->info().parameters : std::vector{log.error().to_string()};
+  };
+  EXPECT_EQ(parameters("run.mcap"), std::vector<std::string>{"squat.depth = 1"});
+  EXPECT_EQ(parameters("run.branch-2.mcap"), std::vector<std::string>{"squat.depth = 2"});
+  EXPECT_EQ(parameters("run.branch-3.mcap"), std::vector<std::string>{"squat.depth = 5"});
+}
+
 TEST(Recorder, LeavesAReadableFileWhenItIsKilled) {
   const ScratchFolder folder;
   int pipes[2];

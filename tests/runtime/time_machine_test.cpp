@@ -239,6 +239,25 @@ TEST(TimeMachine, ThinsOutToItsBudget) {
   EXPECT_LE(kept.all().back().cycle - kept.all()[18].cycle, 3'000U);
 }
 
+// Boards told of a fault, and frames were lost, in a future that does not come.
+TEST(TimeMachine, WarnsOfNothingThatWasForgotten) {
+  Journey trip("coman", "squat");
+  trip.step(3'000);
+  ASSERT_EQ(trip.run.backend->master().warnings(), std::vector<std::string>{});
+  sim::ScenarioFault freeze;
+  freeze.kind = hal::FaultKind::kEncoderFreeze;
+  freeze.joint = 3;
+  freeze.start_ns = 3'050'000'000;
+  freeze.duration_ns = 400'000'000;
+  ASSERT_TRUE(trip.run.backend->post(freeze));
+  trip.step(600);
+  ASSERT_EQ(trip.run.cycle->faults().size(), 1U);
+  trip.go(2'900);
+  trip.step(300);
+  EXPECT_EQ(trip.run.cycle->faults().size(), 0U);
+  EXPECT_EQ(trip.run.backend->master().warnings(), std::vector<std::string>{});
+}
+
 // In another process as here: nothing of the first run is left.
 TEST(TimeMachine, GoesOnFromALog) {
   const log::ScratchFolder folder;
