@@ -29,19 +29,25 @@ CycleAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
 
 }  // namespace
 
-std::int32_t ControllerHost::begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT {
-  std::int64_t all_ns = 0;
-  for (const ControllerCall& call : calls()) all_ns += call.took_ns;
-  const auto longest = std::ranges::max_element(calls(), {}, &ControllerCall::took_ns);
-  std::int32_t reason = -1;
-  if (late_ns > 0 && called_ > 0 && 2 * all_ns >= late_ns) {
-    reason = static_cast<std::int32_t>(longest->controller);
-    for (const HostedController* one : table_) {
-      if (one != nullptr && one->id == longest->controller)
-        one->times->overruns.fetch_add(1, std::memory_order_relaxed);
+ControllerHost::Slow ControllerHost::begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT {
+  std::int64_t active_ns = 0, shadows_ns = 0;
+  for (const ControllerCall& call : calls()) (call.shadow ? shadows_ns : active_ns) += call.took_ns;
+  Slow reason{.shadow = shadows_ns > 0 && late_ns > 0 && late_ns - shadows_ns < period_ns_};
+  std::int64_t longest_ns = -1;
+  if (reason.shadow || (late_ns > 0 && called_ > 0 && 2 * active_ns >= late_ns)) {
+    for (const ControllerCall& call : calls()) {
+      if (call.shadow != reason.shadow || call.took_ns <= longest_ns) continue;
+      longest_ns = call.took_ns;
+      reason.controller = static_cast<std::int32_t>(call.controller);
     }
   }
   called_ = 0;
+  for (std::size_t slot = 0; reason.controller >= 0 && slot < table_.size(); ++slot) {
+    const HostedController* const one = table_[slot];
+    if (one == nullptr || static_cast<std::int32_t>(one->id) != reason.controller) continue;
+    one->times->overruns.fetch_add(1, std::memory_order_relaxed);
+    if (reason.shadow) shadows_.end_late(slot);
+  }
   return reason;
 }
 
@@ -57,7 +63,8 @@ ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kern
       references_(robot_, capabilities_, gains_, period_ns),
       at_rest_(robot_.shape()),
       discarded_(robot_.shape()),
-      guard_(robot_.shape(), capabilities_, gains_) {}
+      guard_(robot_.shape(), capabilities_, gains_),
+      shadows_(*this) {}
 
 ControllerSource::ControllerSource(LoadedController plugin)
     : code{.name = {}, .sha256 = plugin.sha256(), .path = plugin.path()},
@@ -109,7 +116,7 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
   const std::string path = parameters.path();
   const auto shared =
       std::make_shared<ControllerSetup>(robot_, gains_, kernels_, period_ns_, std::move(parameters),
-                                        start_rad, estimate_, predictor_);
+                                        start_rad, estimate_, predictor_.get());
   const auto call = [controller = source.controller, shared] {
     return controller->configure(*shared);
   };
@@ -143,6 +150,7 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
   made->plans.assign(setup.plans().begin(), setup.plans().end());
   made->claimed.assign(robot_.joints.size(), 0);
   made->strayed.assign(robot_.joints.size(), 0);
+  made->shadow = std::make_unique<Shadow>(robot_.shape(), made->claims.size());
   for (const auto& claim : made->claims) made->claimed[claim.joint] = 1;
   return made;
 }
@@ -246,6 +254,7 @@ CycleAnswer ControllerHost::insert(std::size_t slot,
 CycleAnswer ControllerHost::remove(std::size_t slot) noexcept TANDEM_RT {
   if (table_[slot] == nullptr) return refuse(RejectReason::kGone, slot);
   if (is_active(slot)) return refuse(RejectReason::kActive, slot);
+  if (shadows_.is_one(slot)) (void)shadows_.end(slot);
   table_[slot] = nullptr;
   return {};
 }
@@ -303,6 +312,15 @@ CycleAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start,
     InCall(*this, *table_[slot], ControllerFunction::kStop)->stop();
     for (const auto& claim : table_[slot]->claims) references_.release(claim.joint, images);
   }
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((start & only(slot)) == 0 || !shadows_.is_one(slot)) continue;
+    if (!shadows_.has_started(slot)) {
+      shadows_.finish(slot, ShadowEnd::kLeads);
+      continue;
+    }
+    shadows_.lead(slot, images.command);
+    start &= ~only(slot);  // it goes on
+  }
   call_starts(start, time, images);
   return {};
 }
@@ -325,6 +343,7 @@ bool ControllerHost::retreat(const hal::CycleTime& time, JointImages images) noe
       retreating |= only(slot);
   }
   if (retreating == 0) return false;
+  shadows_.end_all(ShadowEnd::kStopped);
   (void)switch_over(active_ & ~retreating, 0, true, time, images);
   return true;
 }
@@ -344,7 +363,7 @@ std::size_t ControllerHost::inputs() const noexcept TANDEM_RT {
 void ControllerHost::take_inputs(const hal::CycleTime& time, bool open,
                                  CycleLog& log) noexcept TANDEM_RT {
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if (!is_active(slot)) continue;
+    if (!is_active(slot) && !shadows_.is_one(slot)) continue;
     for (const auto& port : table_[slot]->inputs) {
       if (port->take(time, open, *outside_)) log.input(time, *port);
     }
@@ -371,6 +390,7 @@ Code ControllerHost::update(const hal::CycleTime& time, JointImages images) noex
     }
     ends = ends && (done_ & only(slot)) != 0 && one.of_experiment;
   }
+  shadows_.offer(images.command);
   references_.after_update(images);
   show();
   return ends ? Code::kStopped : Code::kOk;
@@ -437,6 +457,7 @@ void ControllerHost::stop() noexcept TANDEM_RT {
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (is_active(slot)) InCall(*this, *table_[slot], ControllerFunction::kStop)->stop();
   }
+  shadows_.end_all(ShadowEnd::kStopped);
 }
 
 std::uint64_t ControllerHost::fingerprint() const noexcept {
@@ -473,6 +494,7 @@ void ControllerHost::archive(Archive& ar) {
     if (table_[slot] == nullptr) active_ &= ~only(slot);  // bytes of something else
   }
   set_active(active_);
+  ar(shadows_);
 }
 
 }  // namespace tandem::runtime

@@ -149,6 +149,7 @@ std::vector<ControllerStatus> RunServices::controllers() {
     all.push_back({.name = one->name,
                    .plugin = one->plugin,
                    .active = active,
+                   .shadow = (host_->shadows().shown() & only(slot)) != 0,
                    .done = active && (shown.done & only(slot)) != 0,
                    .of_experiment = one->of_experiment,
                    .call_ns = one->times->calls.percentiles(),
