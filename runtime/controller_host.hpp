@@ -118,6 +118,7 @@ class ControllerHost {
   [[nodiscard]] std::string name(std::size_t id) const { return names_->name(id); }
   /// Names and times of all that are or were loaded.
   [[nodiscard]] const std::shared_ptr<ControllerNames>& names() const noexcept { return names_; }
+  [[nodiscard]] std::int64_t period_ns() const noexcept { return period_ns_; }
   /// Who is active, and done, after the last cycle.
   struct Shown {
     ControllerSet active = 0, done = 0;

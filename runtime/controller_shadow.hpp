@@ -27,11 +27,12 @@ struct ReferenceRow {
   const char* unit;        ///< of a joint that turns
   const char* slide_unit;  ///< of one that slides
 };
-inline constexpr ReferenceRow kCommandReferenceRows[kCommandReferences] = {{"position_rad", "rad", "m"},
-                                                             {"velocity_rad_s", "rad/s", "m/s"},
-                                                             {"torque_Nm", "Nm", "N"},
-                                                             {"voltage_V", "V", "V"},
-                                                             {"current_A", "A", "A"}};
+inline constexpr ReferenceRow kCommandReferenceRows[kCommandReferences] = {
+    {"position_rad", "rad", "m"},
+    {"velocity_rad_s", "rad/s", "m/s"},
+    {"torque_Nm", "Nm", "N"},
+    {"voltage_V", "V", "V"},
+    {"current_A", "A", "A"}};
 
 [[nodiscard]] double value_of(CommandReference reference, const hal::CommandImage& command,
                               std::size_t joint) noexcept TANDEM_RT;
@@ -39,14 +40,14 @@ inline constexpr ReferenceRow kCommandReferenceRows[kCommandReferences] = {{"pos
 /// Which of its references a mode uses; the first is the one that leads. Idle: none.
 [[nodiscard]] std::span<const CommandReference> references_of(std::int8_t mode) noexcept TANDEM_RT;
 
-/// A claimed joint of a shadow: its references less those of the command, in the units of the joint.
-/// What its mode does not use, and what nobody commands, is NaN.
+/// A claimed joint of a shadow: its references less those of the command, in the units of the
+/// joint. What its mode does not use, and what nobody commands, is NaN.
 struct JointDifference {
   std::array<double, kCommandReferences> now{};   ///< after the last cycle, by CommandReference
   std::array<double, kCommandReferences> most{};  ///< the largest since its start, without a sign
   std::array<double, kCommandReferences> step{};  ///< its largest change from one cycle to the next
-  std::int32_t owner = -1;                 ///< slot of whose command that is; -1: nobody's
-  std::int8_t mode = 0, commanded_mode = 0;               ///< hal::ControlMode
+  std::int32_t owner = -1;                        ///< slot of whose command that is; -1: nobody's
+  std::int8_t mode = 0, commanded_mode = 0;       ///< hal::ControlMode
   std::uint8_t interaction = 0, commanded_interaction = 0;  ///< hal::InteractionMode
 };
 
@@ -77,7 +78,8 @@ struct ShadowLook {
 /// Whether somebody should look at why it ended.
 [[nodiscard]] bool is_trouble(ShadowEnd end) noexcept TANDEM_RT;
 /// "shadow ended: a reference is not finite: elbow". @param joint  of look.joint
-void append_end(hal::TextEvent& to, const ShadowLook& look, std::string_view joint) noexcept TANDEM_RT;
+void append_end(hal::TextEvent& to, const ShadowLook& look,
+                std::string_view joint) noexcept TANDEM_RT;
 
 /// Fields of one joint.
 void copy_joint(hal::CommandImage& to, const hal::CommandImage& from,

@@ -41,9 +41,7 @@ Shadow& ControllerShadows::at(std::size_t slot) const noexcept TANDEM_RT {
   return *host_.table_[slot]->shadow;
 }
 
-void ControllerShadows::show() noexcept TANDEM_RT {
-  shown_.store(set_, std::memory_order_release);
-}
+void ControllerShadows::show() noexcept TANDEM_RT { shown_.store(set_, std::memory_order_release); }
 
 // At a cycle's boundary.
 
@@ -236,8 +234,7 @@ void ControllerShadows::call(std::size_t slot, const hal::CycleTime& time,
 
 /// As ControllerHost calls an active one, but with a command of its own.
 Code ControllerShadows::call(HostedController& one, bool starts, const hal::CycleTime& time,
-                             const hal::StateImage& state,
-                             std::int32_t& stray) noexcept TANDEM_RT {
+                             const hal::StateImage& state, std::int32_t& stray) noexcept TANDEM_RT {
   hal::CommandImage& wants = one.shadow->wants;
   for (std::size_t j = 0; j < one.claimed.size(); ++j) {
     if (starts || one.claimed[j] == 0) copy_joint(wants, led_, j);
@@ -256,8 +253,8 @@ Code ControllerShadows::call(HostedController& one, bool starts, const hal::Cycl
     take_back();
   }
   guard_.remember(wants, host_.gains_);
-  const Code code = ControllerHost::InCall(host_, one, ControllerFunction::kUpdate)
-                        ->update(time, state, wants);
+  const Code code =
+      ControllerHost::InCall(host_, one, ControllerFunction::kUpdate)->update(time, state, wants);
   one.io->parameters.seen();
   take_back();
   return code;

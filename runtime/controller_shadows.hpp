@@ -43,10 +43,10 @@ enum class SwitchState : std::uint8_t {
 [[nodiscard]] const char* to_string(SwitchState state) noexcept;
 
 struct SwitchLook {
-  std::uint64_t asked = 0;   ///< cycle
-  std::uint64_t cycle = 0;   ///< of `state`
-  double difference = 0.0;   ///< the largest, of the reference that leads; NaN: of other modes
-  std::int32_t joint = -1;   ///< whose that is; -1: nobody's, or not known
+  std::uint64_t asked = 0;  ///< cycle
+  std::uint64_t cycle = 0;  ///< of `state`
+  double difference = 0.0;  ///< the largest, of the reference that leads; NaN: of other modes
+  std::int32_t joint = -1;  ///< whose that is; -1: nobody's, or not known
   SwitchState state = SwitchState::kNone;
   std::array<std::uint8_t, 3> padding{};
 };

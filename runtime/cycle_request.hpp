@@ -56,21 +56,21 @@ inline constexpr std::size_t kMostParameterChanges = 64;
 
 struct CycleRequest {
   enum class Kind : std::uint32_t {
-    kInsert,   ///< `controller` into `slot`
-    kRemove,   ///< what is in `slot`
-    kReplace,  ///< what is in `slot`, by `controller`
-    kSwitch,   ///< the controllers of `stop` and `start`
-    kShadow,   ///< what is in `slot` runs as a shadow
+    kInsert,      ///< `controller` into `slot`
+    kRemove,      ///< what is in `slot`
+    kReplace,     ///< what is in `slot`, by `controller`
+    kSwitch,      ///< the controllers of `stop` and `start`
+    kShadow,      ///< what is in `slot` runs as a shadow
     kEndShadow,   ///< it does no longer
     kSwitchWhen,  ///< as kSwitch, once they agree `within`, up to `cycles` later
-    kGoOn,     ///< the controllers that a reset holds back
-    kJoint,    ///< `wish` of `joint`
-    kGains,    ///< `gains` of `joint` and `loop`
-    kRecover,  ///< `joint`, back to its limits
-    kMove,     ///< `joint`, as `move` says
-    kReset,    ///< the drive of `joint`
-    kHome,     ///< `joint`, as its configuration says
-    kSet,      ///< `changes`
+    kGoOn,        ///< the controllers that a reset holds back
+    kJoint,       ///< `wish` of `joint`
+    kGains,       ///< `gains` of `joint` and `loop`
+    kRecover,     ///< `joint`, back to its limits
+    kMove,        ///< `joint`, as `move` says
+    kReset,       ///< the drive of `joint`
+    kHome,        ///< `joint`, as its configuration says
+    kSet,         ///< `changes`
   };
   std::uint64_t number = 0;  ///< its answer's
   Kind kind = Kind::kSwitch;

@@ -79,6 +79,7 @@ struct ShadowStatus {
   ShadowLook look;
   std::vector<ControllerSetup::Claim> claims;
   std::vector<JointDifference> joints;  ///< by claim
+  std::vector<std::string> owners;      ///< by claim: whose command that is; empty: nobody's
 };
 
 /// The signals of a loaded controller, which stay for as long as this is kept.
@@ -208,10 +209,10 @@ class RunServices {
   /// the command: in each joint that they claim in mode, interaction and, within `within` of its
   /// unit, in the reference that leads in that mode. Done means that it waits; what becomes of it,
   /// last_switch() tells. Errors: switch_controllers()'s; one to start is no shadow; another waits.
-  /// @param cycles  so long it waits at most
+  /// @param wait_ns  of the run's time: so long it waits at most
   [[nodiscard]] Result<RequestResult> switch_when(const std::vector<std::string>& stop,
                                                   const std::vector<std::string>& start,
-                                                  double within, std::uint64_t cycles,
+                                                  double within, std::int64_t wait_ns,
                                                   Patience patience = kPatience);
   [[nodiscard]] SwitchLook last_switch() const { return host_->shadows().last_switch(); }
   /// Shadows, and those that have ended as one, in the order in which they run.

@@ -38,9 +38,8 @@ Result<RequestResult> RunServices::ask_of_shadow(const std::string& name, bool b
 }
 
 Result<RequestResult> RunServices::switch_when(const std::vector<std::string>& stop,
-                                               const std::vector<std::string>& start,
-                                               double within, std::uint64_t cycles,
-                                               Patience patience) {
+                                               const std::vector<std::string>& start, double within,
+                                               std::int64_t wait_ns, Patience patience) {
   Lock lock(mutex_);
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
@@ -58,7 +57,7 @@ Result<RequestResult> RunServices::switch_when(const std::vector<std::string>& s
               .start = *coming,
               .stop = *leaving,
               .within = within,
-              .cycles = cycles},
+              .cycles = static_cast<std::uint64_t>(wait_ns / host_->period_ns())},
              patience);
 }
 
@@ -74,9 +73,12 @@ std::vector<ShadowStatus> RunServices::shadows() {
                         .runs = (shown & only(slot)) != 0,
                         .look = {},
                         .claims = one->claims,
-                        .joints = std::vector<JointDifference>(one->claims.size())};
+                        .joints = std::vector<JointDifference>(one->claims.size()),
+                        .owners = {}};
     while (!one->shadow->shown.read({&status.look, 1})) std::this_thread::yield();
     while (!one->shadow->shown_joints.read(status.joints)) std::this_thread::yield();
+    for (const JointDifference& joint : status.joints)
+      status.owners.push_back(controller_name(joint.owner));
     if (status.runs || status.look.end != ShadowEnd::kNone) all.push_back(std::move(status));
   }
   return all;

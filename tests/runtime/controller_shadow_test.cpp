@@ -16,6 +16,7 @@ using test::kNow;
 using test::Names;
 using test::Sine;
 
+constexpr std::int64_t kCycle_ns = 1'000'000;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// Writes places that the test says, and misbehaves on demand.
@@ -28,8 +29,8 @@ class Candidate : public Controller {
     depth_ = setup.signal("depth", "m", "a number");
     return {};
   }
-  void start(const hal::CycleTime&, const hal::StateImage&, hal::CommandImage& command) noexcept
-      override {
+  void start(const hal::CycleTime&, const hal::StateImage&,
+             hal::CommandImage& command) noexcept override {
     ++starts;
     seen_rad = command.position_rad()[0];
   }
@@ -161,15 +162,14 @@ struct Trouble {
 class ShadowTrouble : public testing::TestWithParam<Trouble> {};
 INSTANTIATE_TEST_SUITE_P(
     Kinds, ShadowTrouble,
-    testing::Values(
-        Trouble{"Nan", [](Candidate& c) { c.torque_Nm = kUnknown; },
-                "shadow ended: a reference is not finite: shoulder"},
-        Trouble{"Code", [](Candidate& c) { c.answer = Code::kDiverged; },
-                "shadow ended: its update() answered an error: Diverged"},
-        Trouble{"Stray", [](Candidate& c) { c.strays = true; },
-                "shadow ended: it wrote what it has not claimed: wrist"},
-        Trouble{"Done", [](Candidate& c) { c.answer = Code::kStopped; },
-                "shadow ended: its task is done"}),
+    testing::Values(Trouble{"Nan", [](Candidate& c) { c.torque_Nm = kUnknown; },
+                            "shadow ended: a reference is not finite: shoulder"},
+                    Trouble{"Code", [](Candidate& c) { c.answer = Code::kDiverged; },
+                            "shadow ended: its update() answered an error: Diverged"},
+                    Trouble{"Stray", [](Candidate& c) { c.strays = true; },
+                            "shadow ended: it wrote what it has not claimed: wrist"},
+                    Trouble{"Done", [](Candidate& c) { c.answer = Code::kStopped; },
+                            "shadow ended: its task is done"}),
     [](const auto& one) { return std::string(one.param.name); });
 
 TEST_P(ShadowTrouble, ConcernsTheShadowAlone) {
@@ -202,7 +202,7 @@ TEST(ControllerShadow, RefusesWhatIsActiveAShadowAlreadyOrNone) {
   const auto again = run.while_cycling([&] { return run.services().end_shadow("other"); });
   EXPECT_NE(text(again).find("the controller 'other' is no shadow"), std::string::npos);
   const auto waits = run.while_cycling(
-      [&] { return run.services().switch_when({"led"}, {"other"}, 0.01, 100); });
+      [&] { return run.services().switch_when({"led"}, {"other"}, 0.01, 100 * kCycle_ns); });
   EXPECT_NE(text(waits).find("the controller 'other' is no shadow"), std::string::npos);
 }
 
@@ -232,7 +232,7 @@ TEST(ShadowSwitch, OfEqualOnesHappensAtOnceAndTheShadowGoesOn) {
   ShadowRun run;
   run.other->from_rad = 0.1;
   run.begin_shadow();
-  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 1e-9, 100, kNow));
+  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 1e-9, 100 * kCycle_ns, kNow));
   run.steps(1);
   const SwitchLook look = run.services().last_switch();
   EXPECT_EQ(look.state, SwitchState::kDone);
@@ -255,7 +255,7 @@ TEST(ShadowSwitch, WaitsForTheFirstCycleInWhichTheyAgree) {
   const std::uint64_t now = run.cycle->next_cycle();
   run.other->rate_rad = 0.001;
   run.other->from_rad = 0.05 - 0.001 * static_cast<double>(now);
-  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 0.0105, 1000, kNow));
+  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 0.0105, 1000 * kCycle_ns, kNow));
   run.steps(40);  // the last of them is apart by 0.011
   EXPECT_EQ(run.services().last_switch().state, SwitchState::kWaits);
   EXPECT_NEAR(run.apart(CommandReference::kPosition), -0.011, 1e-12);
@@ -271,7 +271,7 @@ TEST(ShadowSwitch, WaitsForTheFirstCycleInWhichTheyAgree) {
 TEST(ShadowSwitch, TellsThatTheyDidNotAgreeInTime) {
   ShadowRun run;
   run.begin_shadow();
-  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 0.19, 50, kNow));
+  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 0.19, 50 * kCycle_ns, kNow));
   run.steps(50);
   EXPECT_EQ(run.services().last_switch().state, SwitchState::kWaits);
   run.steps(1);
@@ -287,7 +287,7 @@ TEST(ShadowSwitch, TellsThatTheyDidNotAgreeInTime) {
 TEST(ShadowSwitch, NeedsTheSameMode) {
   ShadowRun run({}, hal::ControlMode::kTorque);
   run.begin_shadow();
-  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 1e6, 10, kNow));
+  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 1e6, 10 * kCycle_ns, kNow));
   run.steps(12);
   EXPECT_EQ(run.services().last_switch().state, SwitchState::kTimeOut);
   EXPECT_TRUE(std::isnan(run.services().last_switch().difference));
@@ -296,10 +296,10 @@ TEST(ShadowSwitch, NeedsTheSameMode) {
 TEST(ShadowSwitch, IsGivenUpWithItsShadow) {
   ShadowRun run;
   run.begin_shadow();
-  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 0.01, 1000, kNow));
+  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 0.01, 1000 * kCycle_ns, kNow));
   run.steps(1);
   const auto second = run.while_cycling(
-      [&] { return run.services().switch_when({"led"}, {"other"}, 1.0, 1000); });
+      [&] { return run.services().switch_when({"led"}, {"other"}, 1.0, 1000 * kCycle_ns); });
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().message.find("another switch waits"), std::string::npos);
   run.other->answer = Code::kFault;
@@ -313,7 +313,7 @@ TEST(ShadowSwitch, PlaysAgainToTheSameBits) {
   const std::uint64_t now = run.cycle->next_cycle();
   run.other->rate_rad = 0.001;
   run.other->from_rad = 0.05 - 0.001 * static_cast<double>(now);
-  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 0.01, 1000, kNow));
+  ASSERT_TRUE(run.services().switch_when({"led"}, {"other"}, 0.01, 1000 * kCycle_ns, kNow));
   run.steps(10);
   const auto snapshot = run.cycle->save();
   ASSERT_TRUE(snapshot);
