@@ -97,6 +97,7 @@ Result<Exit> tell_switch(Asked& asked) {
     if (asked.prints()) print_switched(asked.answer);
     return Exit::kDone;
   }
+  rt::install_stop_signals();  // Ctrl-C ends the waiting, not the switch
   if (asked.prints()) {
     fmt::print("waits since cycle {} until they agree\n", asked.answer.value("cycle", 0));
     std::fflush(stdout);  // before the waiting
