@@ -162,7 +162,7 @@ std::vector<ControllerStatus> RunServices::controllers() {
 std::vector<ControllerSignals> RunServices::signals() {
   const Lock lock(mutex_);
   collect();
-  const ControllerSet active = host_->shown().active;
+  const ControllerSet active = host_->shown().active | host_->shadows().shown();
   std::vector<ControllerSignals> all;
   for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
     const auto& one = host_->owned()[slot];
