@@ -53,6 +53,10 @@ std::string target(const Event& event, const EventNames&) {
 
 std::string nothing(const Event&, const EventNames&) { return ""; }
 
+std::string given_up(const Event& event, const EventNames&) {
+  return event.code == 1 ? ": the shadow did not agree in time" : ": a joint is another's by now";
+}
+
 std::string afresh(const Event&, const EventNames&) { return ": it starts afresh"; }
 
 std::string hex_code(const Event& event, const EventNames&) {

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 #include "base/archive.hpp"
 #include "rt/clock_control.hpp"
@@ -154,6 +155,15 @@ void CyclicLoop::shift(std::int64_t ns) noexcept TANDEM_RT {
   if (config_.pacing != Pacing::kWallClock || !started_) return;
   const std::int64_t most_ns = config_.period_ns / 100;
   grid_ns_ += std::clamp(ns, -most_ns, most_ns);
+}
+
+std::int64_t CyclicLoop::due_ns() const noexcept TANDEM_RT {
+  switch (config_.pacing) {
+    case Pacing::kWallClock: return grid_ns_;
+    case Pacing::kExternal: return begin_ns_ + config_.period_ns;
+    case Pacing::kSimulated: break;
+  }
+  return std::numeric_limits<std::int64_t>::max();
 }
 
 void CyclicLoop::skip(Tick& tick, std::uint64_t cycles) noexcept TANDEM_RT {

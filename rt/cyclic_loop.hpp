@@ -103,6 +103,11 @@ class CyclicLoop {
   /// whether they may, and none is counted or measured. Between two cycles.
   void replay(bool on) noexcept { replays_ = on; }
 
+  /// Clock time at which the next cycle has to begin, in real time; of simulated time, which is
+  /// never missed, the end of time. @rt
+  [[nodiscard]] std::int64_t due_ns() const noexcept TANDEM_RT;
+  /// A late cycle before this one counts no more towards OverrunPolicy::kStop.
+  void forgive_late() noexcept TANDEM_RT { late_mask_ &= ~std::uint64_t{1}; }
   /// The overruns so far count no more towards OverrunPolicy::kStop.
   void forget_late() noexcept TANDEM_RT { late_mask_ = 0; }
   /// The cycle counter, which is all that simulated time is. The grid restarts at the next

@@ -1,27 +1,13 @@
-// What is loaded, who is active, and their calls in the cycle.
+// Who is active, and the calls of the cycle.
 #include "runtime/controller_host.hpp"
 
 #include <algorithm>
 #include <utility>
 
-#include "controllers/hosted_call.hpp"
 #include "runtime/cycle_log.hpp"
 
 namespace tandem::runtime {
 namespace {
-
-/// Nothing more is declared. Errors name the controller, and what of it is wrong.
-Status close_io(const std::string& controller, ControllerIo& io, std::span<const std::string> links,
-                std::span<const hal::Site> sites) {
-  const auto of = [&](const char* what, const Error& error) {
-    return fail_at(controller,
-                   "its " + (what + (" '" + error.key.substr(0, 64) + "' ")) + error.message,
-                   error.hint);
-  };
-  if (const Status signals = io.signals.close(); !signals) return of("signal", signals.error());
-  if (const Status marks = io.marks.close(links, sites); !marks) return of("mark", marks.error());
-  return {};
-}
 
 CycleAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
   return {.reason = why, .one = static_cast<std::int32_t>(one)};
@@ -29,19 +15,25 @@ CycleAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
 
 }  // namespace
 
-std::int32_t ControllerHost::begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT {
-  std::int64_t all_ns = 0;
-  for (const ControllerCall& call : calls()) all_ns += call.took_ns;
-  const auto longest = std::ranges::max_element(calls(), {}, &ControllerCall::took_ns);
-  std::int32_t reason = -1;
-  if (late_ns > 0 && called_ > 0 && 2 * all_ns >= late_ns) {
-    reason = static_cast<std::int32_t>(longest->controller);
-    for (const HostedController* one : table_) {
-      if (one != nullptr && one->id == longest->controller)
-        one->times->overruns.fetch_add(1, std::memory_order_relaxed);
+ControllerHost::Slow ControllerHost::begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT {
+  std::int64_t active_ns = 0, shadows_ns = 0;
+  for (const ControllerCall& call : calls()) (call.shadow ? shadows_ns : active_ns) += call.took_ns;
+  Slow reason{.shadow = shadows_ns > 0 && late_ns > 0 && late_ns - shadows_ns < period_ns_};
+  std::int64_t longest_ns = -1;
+  if (reason.shadow || (late_ns > 0 && called_ > 0 && 2 * active_ns >= late_ns)) {
+    for (const ControllerCall& call : calls()) {
+      if (call.shadow != reason.shadow || call.took_ns <= longest_ns) continue;
+      longest_ns = call.took_ns;
+      reason.controller = static_cast<std::int32_t>(call.controller);
     }
   }
   called_ = 0;
+  for (std::size_t slot = 0; reason.controller >= 0 && slot < table_.size(); ++slot) {
+    const HostedController* const one = table_[slot];
+    if (one == nullptr || static_cast<std::int32_t>(one->id) != reason.controller) continue;
+    one->times->overruns.fetch_add(1, std::memory_order_relaxed);
+    if (reason.shadow) shadows_.end_late(slot);
+  }
   return reason;
 }
 
@@ -57,135 +49,8 @@ ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kern
       references_(robot_, capabilities_, gains_, period_ns),
       at_rest_(robot_.shape()),
       discarded_(robot_.shape()),
-      guard_(robot_.shape(), capabilities_, gains_) {}
-
-ControllerSource::ControllerSource(LoadedController plugin)
-    : code{.name = {}, .sha256 = plugin.sha256(), .path = plugin.path()},
-      lacks_archive(plugin.plugin().lacks_archive) {
-  auto owner = std::make_shared<LoadedController>(std::move(plugin));
-  controller = std::shared_ptr<Controller>(owner, &**owner);
-}
-
-Status ControllerHost::add(const std::string& name, ControllerSource source, TomlTable parameters,
-                           bool active, std::span<const InputSource> inputs) {
-  const std::size_t slot = size();
-  if (slot == kMostControllers) {
-    return fail_at(name, "is one controller more than there can be",
-                   "at most " + std::to_string(kMostControllers));
-  }
-  std::optional<std::chrono::milliseconds> limit;
-  if (!source.code.path.empty()) limit = kStartTime;
-  auto made =
-      configure(name, std::move(source), std::move(parameters), limit,
-                active ? std::span<const double>(start_rad_) : std::span<const double>(), inputs);
-  if (!made) return std::unexpected(made.error());
-  (*made)->document = document_;
-  enter(**made);
-  note_code(**made);
-  table_[slot] = made->get();
-  const ControllerSet after = active_ | only(slot);
-  if (const auto conflict = active ? find_conflict(table_, after) : std::nullopt) {
-    table_[slot] = nullptr;
-    return fail_at(
-        robot_.joints[conflict->joint].name,
-        "is claimed by the controllers '" + owned_[conflict->one]->name + "' and '" + name + "'",
-        "let one controller have the joint, or give one of them "
-        "active = false");
-  }
-  owned_[slot] = std::move(*made);
-  if (active) set_active(after);
-  return {};
-}
-
-std::vector<ControllerCode> ControllerHost::code() const {
-  const std::lock_guard lock(code_mutex_);
-  return code_;
-}
-
-Result<std::unique_ptr<HostedController>> ControllerHost::configure(
-    const std::string& name, ControllerSource source, TomlTable parameters,
-    std::optional<std::chrono::milliseconds> limit, std::span<const double> start_rad,
-    std::span<const InputSource> inputs) {
-  const std::string path = parameters.path();
-  const auto shared =
-      std::make_shared<ControllerSetup>(robot_, gains_, kernels_, period_ns_, std::move(parameters),
-                                        start_rad, estimate_, predictor_);
-  const auto call = [controller = source.controller, shared] {
-    return controller->configure(*shared);
-  };
-  const Status configured = limit ? bounded_call(name, *limit, call) : hosted_call(name, call);
-  // Keys that it did not get to before it failed are not wrong.
-  if (!configured) {
-    Error error = configured.error();
-    if (error.message.empty()) error.message = "the controller refused, and did not say why";
-    return std::unexpected(std::move(error));
-  }
-  ControllerSetup& setup = *shared;
-  setup.parameters.finish();
-  if (Status claims = check_claims(name, setup.claims()); !claims) {
-    return std::unexpected(claims.error());
-  }
-  if (const Status closed = close_io(name, *setup.io, links_, robot_.sites); !closed) {
-    return std::unexpected(closed.error());
-  }
-  auto made = std::make_unique<HostedController>();
-  made->plugin = source.code.path;
-  made->sha256 = source.code.sha256;
-  made->lacks_archive = source.lacks_archive;
-  made->parameters = path;
-  made->controller = std::move(source.controller);
-  made->io = setup.io;
-  made->name = name;
-  auto ports = make_input_ports(made->io, name, robot_, period_ns_, inputs);
-  if (!ports) return std::unexpected(ports.error());
-  made->inputs = std::move(*ports);
-  made->claims.assign(setup.claims().begin(), setup.claims().end());
-  made->plans.assign(setup.plans().begin(), setup.plans().end());
-  made->claimed.assign(robot_.joints.size(), 0);
-  made->strayed.assign(robot_.joints.size(), 0);
-  for (const auto& claim : made->claims) made->claimed[claim.joint] = 1;
-  return made;
-}
-
-void ControllerHost::enter(HostedController& one) {
-  one.id = names_->add(one.name);
-  one.times = names_->all()[one.id];
-}
-
-void ControllerHost::note_code(const HostedController& one) {
-  if (one.plugin.empty()) return;
-  const std::lock_guard lock(code_mutex_);
-  code_.push_back({one.name, one.sha256, one.plugin});
-}
-
-Status ControllerHost::check_claims(const std::string& name,
-                                    std::span<const ControllerSetup::Claim> claims) const {
-  std::vector<std::uint8_t> claimed(robot_.joints.size());
-  for (const auto& claim : claims) {
-    if (claim.joint >= claimed.size()) {
-      return fail_at(name,
-                     "claims joint number " + std::to_string(claim.joint) + " of " +
-                         std::to_string(claimed.size()),
-                     "joints are numbered from 0 in the robot.toml's order");
-    }
-    if (claimed[claim.joint] != 0) {
-      return fail_at(robot_.joints[claim.joint].name,
-                     "is claimed twice by the controller '" + name + "'", "claim each joint once");
-    }
-    claimed[claim.joint] = 1;
-    if (claim.mode < hal::ControlMode::kIdle || claim.mode > hal::ControlMode::kCurrent) {
-      return fail_at(robot_.joints[claim.joint].name,
-                     "is claimed by the controller '" + name + "' in mode " +
-                         std::to_string(static_cast<int>(claim.mode)) + ", which does not exist",
-                     "name one of hal::ControlMode");
-    }
-    if (Status able = hal::check_capability(*config_, claim.joint, claim.mode, claim.interaction);
-        !able) {
-      return able;
-    }
-  }
-  return {};
-}
+      guard_(robot_.shape(), capabilities_, gains_),
+      shadows_(*this) {}
 
 std::optional<ClaimConflict> ControllerHost::find_conflict(
     const Table& table, ControllerSet active) noexcept TANDEM_RT {
@@ -246,6 +111,7 @@ CycleAnswer ControllerHost::insert(std::size_t slot,
 CycleAnswer ControllerHost::remove(std::size_t slot) noexcept TANDEM_RT {
   if (table_[slot] == nullptr) return refuse(RejectReason::kGone, slot);
   if (is_active(slot)) return refuse(RejectReason::kActive, slot);
+  if (shadows_.is_one(slot)) (void)shadows_.end(slot);
   table_[slot] = nullptr;
   return {};
 }
@@ -303,6 +169,15 @@ CycleAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start,
     InCall(*this, *table_[slot], ControllerFunction::kStop)->stop();
     for (const auto& claim : table_[slot]->claims) references_.release(claim.joint, images);
   }
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((start & only(slot)) == 0 || !shadows_.is_one(slot)) continue;
+    if (!shadows_.has_started(slot)) {
+      shadows_.finish(slot, ShadowEnd::kLeads);
+      continue;
+    }
+    shadows_.lead(slot, images.command);
+    start &= ~only(slot);  // it goes on
+  }
   call_starts(start, time, images);
   return {};
 }
@@ -325,6 +200,7 @@ bool ControllerHost::retreat(const hal::CycleTime& time, JointImages images) noe
       retreating |= only(slot);
   }
   if (retreating == 0) return false;
+  shadows_.end_all(ShadowEnd::kStopped);
   (void)switch_over(active_ & ~retreating, 0, true, time, images);
   return true;
 }
@@ -344,7 +220,7 @@ std::size_t ControllerHost::inputs() const noexcept TANDEM_RT {
 void ControllerHost::take_inputs(const hal::CycleTime& time, bool open,
                                  CycleLog& log) noexcept TANDEM_RT {
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if (!is_active(slot)) continue;
+    if (!is_active(slot) && !shadows_.is_one(slot)) continue;
     for (const auto& port : table_[slot]->inputs) {
       if (port->take(time, open, *outside_)) log.input(time, *port);
     }
@@ -371,6 +247,7 @@ Code ControllerHost::update(const hal::CycleTime& time, JointImages images) noex
     }
     ends = ends && (done_ & only(slot)) != 0 && one.of_experiment;
   }
+  shadows_.offer(images.command);
   references_.after_update(images);
   show();
   return ends ? Code::kStopped : Code::kOk;
@@ -437,6 +314,7 @@ void ControllerHost::stop() noexcept TANDEM_RT {
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (is_active(slot)) InCall(*this, *table_[slot], ControllerFunction::kStop)->stop();
   }
+  shadows_.end_all(ShadowEnd::kStopped);
 }
 
 std::uint64_t ControllerHost::fingerprint() const noexcept {
@@ -473,6 +351,7 @@ void ControllerHost::archive(Archive& ar) {
     if (table_[slot] == nullptr) active_ &= ~only(slot);  // bytes of something else
   }
   set_active(active_);
+  ar(shadows_);
 }
 
 }  // namespace tandem::runtime

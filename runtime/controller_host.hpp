@@ -18,7 +18,6 @@
 #include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "controllers/controller.hpp"
-#include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/image.hpp"
@@ -26,63 +25,14 @@
 #include "rt/clock.hpp"
 #include "runtime/call_watch.hpp"
 #include "runtime/claim_guard.hpp"
-#include "runtime/controller_succession.hpp"
-#include "runtime/controller_times.hpp"
+#include "runtime/controller_shadows.hpp"
 #include "runtime/cycle_request.hpp"
-#include "runtime/input_port.hpp"
+#include "runtime/hosted_controller.hpp"
 #include "runtime/joint_references.hpp"
 
 namespace tandem::runtime {
 
 class CycleLog;
-
-/// Controllers that may be loaded at a time; the bits of a set of them.
-inline constexpr std::size_t kMostControllers = 32;
-using ControllerSet = std::uint32_t;
-[[nodiscard]] constexpr ControllerSet only(std::size_t slot) { return ControllerSet{1} << slot; }
-
-/// The code of a controller: which file it came from.
-struct ControllerCode {
-  std::string name, sha256, path;
-};
-
-/// A controller, and where it is from.
-struct ControllerSource {
-  template <class Pointer>  // to one of this program
-  ControllerSource(Pointer made) : controller(std::move(made)) {}
-  ControllerSource(LoadedController plugin);  ///< keeps its library open
-
-  std::shared_ptr<Controller> controller;
-  ControllerCode code = {};    ///< of a plugin; else empty
-  bool lacks_archive = false;  ///< a plugin has members, and no archive()
-};
-
-/// A configured controller.
-struct HostedController {
-  std::string name;
-  std::string plugin;                              ///< its library's path; empty: it has none
-  std::string sha256;                              ///< of its library; empty: it has none
-  std::shared_ptr<ControllerIo> io;                ///< what it declared
-  std::shared_ptr<Controller> controller;          ///< a plugin's shares its library's life
-  std::int32_t signal_channel = -1;                ///< of the log; -1: none
-  std::int32_t mark_channel = -1;                  ///< the same
-  std::vector<std::shared_ptr<InputPort>> inputs;  ///< the ways to its inputs
-  std::vector<ControllerSetup::Claim> claims;
-  std::vector<ControllerSetup::Plan> plans;
-  std::vector<std::uint8_t> claimed;       ///< by joint
-  std::vector<std::uint8_t> strayed;       ///< by joint: something was taken back, and reported
-  std::uint32_t id = 0;                    ///< of its name, for the fault log: enter()
-  std::shared_ptr<ControllerTimes> times;  ///< of its calls in the cycle
-  bool lacks_archive = false;              ///< it has members, and no archive()
-  bool of_experiment = true;               ///< not loaded while the run went on
-  bool leaves = false;                     ///< the asking side's: the loop was asked to let it go
-  std::optional<TomlDocument> document;    ///< where its parameters are; none: it has no document
-  std::string parameters;                  ///< the path of their table there
-  std::unique_ptr<HostedController> next;  ///< the asking side's: the loop was asked to replace it
-  std::vector<ParameterChange> loaded;     ///< for the log: what it came with during a run
-  std::size_t told = 0;                    ///< the loop's: of these
-  std::unique_ptr<Succession> succession;  ///< of one that replaces another, until that is done
-};
 
 /// A controller wrote what it had not claimed, and that was taken back.
 struct Stray {
@@ -118,7 +68,7 @@ class ControllerHost {
   /// The robot's links, for the frames of marks; none: any name is a link.
   void draw_in(std::vector<std::string> links) { links_ = std::move(links); }
   /// What those who are added from now on may ask for what will happen; null: nobody.
-  void predict_by(hal::Predictor* predictor) { predictor_ = predictor; }
+  void predict_by(hal::Predictor* predictor) { predictor_.of(predictor); }
   /// Each call of the cycle is timed by it from now on; without a clock none is.
   void time_by(rt::Clock& clock) { clock_ = &clock; }
   /// Inputs take samples of other threads by it from now on; it outlives the cycles.
@@ -168,6 +118,7 @@ class ControllerHost {
   [[nodiscard]] std::string name(std::size_t id) const { return names_->name(id); }
   /// Names and times of all that are or were loaded.
   [[nodiscard]] const std::shared_ptr<ControllerNames>& names() const noexcept { return names_; }
+  [[nodiscard]] std::int64_t period_ns() const noexcept { return period_ns_; }
   /// Who is active, and done, after the last cycle.
   struct Shown {
     ControllerSet active = 0, done = 0;
@@ -225,11 +176,16 @@ class ControllerHost {
   [[nodiscard]] std::span<const ControllerCall> calls() const noexcept TANDEM_RT {
     return {calls_.data(), called_};
   }
+  /// The reason for a late cycle.
+  struct Slow {
+    std::int32_t controller = -1;  ///< for name(); -1: none of them
+    bool shadow = false;           ///< it is one: without it the cycle would have been in time
+  };
   /// A cycle begins: the calls of the one before are forgotten. That one was late, and took
-  /// `late_ns`; 0: it was not.
-  /// @return for name(): who is the reason, as the controllers took at least half of it: the one
-  ///         with the longest call; -1: nobody is
-  std::int32_t begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT;
+  /// `late_ns`; 0: it was not. A shadow that is the reason is ended.
+  /// @return whose call was the longest: of the shadows where the cycle would have been in time
+  ///         without them, else of the active ones where they took at least half of it
+  Slow begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT;
   /// Inputs of everything that is loaded.
   [[nodiscard]] std::size_t inputs() const noexcept TANDEM_RT;
   /// Before the controllers' calls: the active ones get their newest samples, which go to the log.
@@ -280,11 +236,16 @@ class ControllerHost {
   /// The slot of one of `by` that claims `joint`, or -1.
   [[nodiscard]] std::int32_t claimant(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
   [[nodiscard]] JointReferences& references() noexcept { return references_; }
+  /// Those that run beside the active ones without commanding.
+  [[nodiscard]] ControllerShadows& shadows() noexcept { return shadows_; }
+  [[nodiscard]] const ControllerShadows& shadows() const noexcept { return shadows_; }
   /// A number of what is loaded: slots, names, claims and how many parameters each has.
   [[nodiscard]] std::uint64_t fingerprint() const noexcept;
   void archive(Archive& ar);
 
  private:
+  friend class ControllerShadows;
+
   [[nodiscard]] Status check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const;
   void settle_ended(JointImages images) noexcept TANDEM_RT;
@@ -309,7 +270,6 @@ class ControllerHost {
   hal::ParameterImage gains_;
   const tandem_kernels* kernels_;
   std::int64_t period_ns_;
-  hal::Predictor* predictor_ = nullptr;
   std::vector<double> start_rad_;         // of start_from()
   std::vector<std::string> links_;        // of draw_in()
   std::optional<TomlDocument> document_;  // of read_from()
@@ -328,6 +288,8 @@ class ControllerHost {
   hal::StateImage at_rest_;      // what a start sees of joints that brake
   hal::CommandImage discarded_;  // of a start whose references nobody wants
   ClaimGuard guard_;
+  ControllerShadows shadows_;
+  SharedPredictor predictor_{shadows_};
   std::optional<Stray> stray_;
   std::size_t failed_controller_ = 0;
   std::atomic<std::uint64_t> shown_{0};  // active, and done in the upper half
@@ -369,7 +331,7 @@ class ControllerHost::InCall {
   void note(std::int64_t took_ns) noexcept TANDEM_RT {
     one_.times->calls.record(took_ns);
     if (host_.called_ == host_.calls_.size()) return;
-    host_.calls_[host_.called_++] = {one_.id, begin_ns_, took_ns};
+    host_.calls_[host_.called_++] = {one_.id, begin_ns_, took_ns, host_.shadows_.at_work()};
   }
 
   ControllerHost& host_;

@@ -24,6 +24,7 @@ struct ControllerTimes {
 struct ControllerCall {
   std::uint32_t controller = 0;  ///< for ControllerNames::name()
   std::int64_t begin_ns = 0, took_ns = 0;
+  bool shadow = false;  ///< of one that commands nothing
 };
 
 /// Every name that a controller ever was loaded by, by number, also when it is gone. Later ones of

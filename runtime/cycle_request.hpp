@@ -15,6 +15,11 @@ namespace tandem::runtime {
 
 struct HostedController;
 
+/// Controllers that may be loaded at a time; the bits of a set of them.
+inline constexpr std::size_t kMostControllers = 32;
+using ControllerSet = std::uint32_t;
+[[nodiscard]] constexpr ControllerSet only(std::size_t slot) { return ControllerSet{1} << slot; }
+
 /// A parameter of a controller to be set.
 struct ParameterChange {
   std::size_t slot = 0;
@@ -51,23 +56,28 @@ inline constexpr std::size_t kMostParameterChanges = 64;
 
 struct CycleRequest {
   enum class Kind : std::uint32_t {
-    kInsert,   ///< `controller` into `slot`
-    kRemove,   ///< what is in `slot`
-    kReplace,  ///< what is in `slot`, by `controller`
-    kSwitch,   ///< the controllers of `stop` and `start`
-    kGoOn,     ///< the controllers that a reset holds back
-    kJoint,    ///< `wish` of `joint`
-    kGains,    ///< `gains` of `joint` and `loop`
-    kRecover,  ///< `joint`, back to its limits
-    kMove,     ///< `joint`, as `move` says
-    kReset,    ///< the drive of `joint`
-    kHome,     ///< `joint`, as its configuration says
-    kSet,      ///< `changes`
+    kInsert,      ///< `controller` into `slot`
+    kRemove,      ///< what is in `slot`
+    kReplace,     ///< what is in `slot`, by `controller`
+    kSwitch,      ///< the controllers of `stop` and `start`
+    kShadow,      ///< what is in `slot` runs as a shadow
+    kEndShadow,   ///< it does no longer
+    kSwitchWhen,  ///< as kSwitch, once they agree `within`, up to `cycles` later
+    kGoOn,        ///< the controllers that a reset holds back
+    kJoint,       ///< `wish` of `joint`
+    kGains,       ///< `gains` of `joint` and `loop`
+    kRecover,     ///< `joint`, back to its limits
+    kMove,        ///< `joint`, as `move` says
+    kReset,       ///< the drive of `joint`
+    kHome,        ///< `joint`, as its configuration says
+    kSet,         ///< `changes`
   };
   std::uint64_t number = 0;  ///< its answer's
   Kind kind = Kind::kSwitch;
   std::uint32_t slot = 0;
   std::uint32_t start = 0, stop = 0;  ///< a bit per slot
+  double within = 0.0;
+  std::uint64_t cycles = 0;
   std::uint32_t joint = 0;
   hal::PidLoop loop = hal::PidLoop::kPosition;
   HostedController* controller = nullptr;

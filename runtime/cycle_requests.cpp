@@ -32,6 +32,20 @@ CycleAnswer switch_over(CycleRequests& to, const CycleRequest& request) noexcept
   return to.arbiter.switch_over(request.stop, request.start);
 }
 
+CycleAnswer begin_shadow(CycleRequests& to, std::size_t slot) noexcept TANDEM_RT {
+  if (!to.arbiter.controls()) return {.reason = RejectReason::kNotRunning};
+  return to.now.controllers.shadows().begin(slot, to.now.time);
+}
+
+CycleAnswer wait_to_switch(CycleRequests& to, const CycleRequest& request) noexcept TANDEM_RT {
+  const std::uint64_t now = to.now.time.cycle;
+  return to.now.controllers.shadows().wait_for({.stop = request.stop,
+                                                .start = request.start,
+                                                .within = request.within,
+                                                .until = now + request.cycles},
+                                               now);
+}
+
 /// A motion, its stop, and the way back to the limits.
 CycleAnswer move(CycleRequests& to, const CycleRequest& request) noexcept TANDEM_RT {
   const bool stops = stops_motion(request);
@@ -60,12 +74,23 @@ void set_gains(CycleRequests& to, const CycleRequest& request) noexcept TANDEM_R
                    or_now(request.gains.kd, now.kd)});
 }
 
+/// For the name of what is in `slot`.
+std::int32_t id_in(CycleNow& now, std::size_t slot) noexcept TANDEM_RT {
+  const HostedController* const one = now.controllers.at(slot);
+  return one == nullptr ? -1 : static_cast<std::int32_t>(one->id);
+}
+
 /// What comes and goes without moving anything is not logged.
 void log(CycleNow& now, const CycleRequest& request) noexcept TANDEM_RT {
   const auto joint = static_cast<std::int32_t>(request.joint);
   switch (request.kind) {
     case RequestKind::kSwitch:
     case RequestKind::kGoOn: return now.event(EventKind::kControllersSwitched);
+    case RequestKind::kShadow:
+      return now.event(EventKind::kShadowStarted, -1, 0, id_in(now, request.slot));
+    case RequestKind::kEndShadow:
+      return now.event(EventKind::kShadowEnded, -1, 0, id_in(now, request.slot));
+    case RequestKind::kSwitchWhen: return now.event(EventKind::kSwitchWaits);
     case RequestKind::kReplace: {
       const auto kept = static_cast<std::uint32_t>(request.controller->succession->kept);
       return now.event(EventKind::kControllerReloaded, -1, kept);
@@ -95,6 +120,9 @@ CycleAnswer carry_out(CycleRequests& to, const CycleRequest& request) noexcept T
     case RequestKind::kReplace: return to.arbiter.replace(request.slot, *request.controller);
     case RequestKind::kGoOn: return to.waiting.go_on();
     case RequestKind::kSwitch: return switch_over(to, request);
+    case RequestKind::kShadow: return begin_shadow(to, request.slot);
+    case RequestKind::kEndShadow: return to.now.controllers.shadows().end(request.slot);
+    case RequestKind::kSwitchWhen: return wait_to_switch(to, request);
     case RequestKind::kJoint: {
       const CycleAnswer no = to.arbiter.may_lead(request.joint, request.wish.drives());
       if (no.reason != RejectReason::kNone) return no;
@@ -128,6 +156,23 @@ void CycleRequests::carry_out() noexcept TANDEM_RT {
     answer.number = request->number;
     answer.cycle = now.time.cycle;
     now.inbox.answer(answer);
+  }
+}
+
+void CycleRequests::carry_out_waiting() noexcept TANDEM_RT {
+  ControllerShadows& shadows = now.controllers.shadows();
+  if (!shadows.waiting() || response.stops_now()) return;
+  const std::uint64_t cycle = now.time.cycle;
+  const WaitingSwitch wanted = *shadows.waiting();
+  if (shadows.agree(cycle) && arbiter.may_start(wanted.start).reason == RejectReason::kNone) {
+    shadows.settle(SwitchState::kDone, cycle);
+    const CycleAnswer done = arbiter.switch_over(wanted.stop, wanted.start);
+    if (done.reason == RejectReason::kNone) return now.event(EventKind::kControllersSwitched);
+    shadows.settle(SwitchState::kRefused, cycle);
+    now.event(EventKind::kSwitchGivenUp, -1, 2);
+  } else if (cycle >= wanted.until) {
+    shadows.settle(SwitchState::kTimeOut, cycle);
+    now.event(EventKind::kSwitchGivenUp, -1, 1);
   }
 }
 

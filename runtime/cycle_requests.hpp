@@ -17,6 +17,8 @@ struct CycleRequests {
 
   /// Those that wait, in their order, after every stop of the cycle.
   void carry_out() noexcept TANDEM_RT;
+  /// After them, also where nobody is heard: the switch that waits for its shadows.
+  void carry_out_waiting() noexcept TANDEM_RT;
 };
 
 }  // namespace tandem::runtime

@@ -28,6 +28,7 @@ void HandOver::take() noexcept TANDEM_RT {
   if (!ends(now_.run.phase())) statistics_.take_base(now_.truth);
   now_.log.images(now_.time, now_.state, told, now_.truth, now_.estimate());
   show_controllers();
+  tell_ended_shadows();
   if (muted_) return;
   show_progress();
   show_joints(told);
@@ -45,7 +46,8 @@ void HandOver::show() noexcept TANDEM_RT {
 void HandOver::show_controllers() noexcept TANDEM_RT {
   const double period_s = 1e-9 * static_cast<double>(now_.time.period_ns);
   const ControllerSet updated = now_.controllers.take_updated();
-  const ControllerSet active = now_.controllers.shown().active;
+  const ControllerSet shadows = now_.controllers.shadows().set();
+  const ControllerSet calls = now_.controllers.shown().active | shadows;
   const bool views = log::RobotView::begins_period(now_.time);
   const ControllerHost::Table& loaded = now_.controllers.loaded();
   for (std::size_t slot = 0; slot < loaded.size(); ++slot) {
@@ -58,7 +60,7 @@ void HandOver::show_controllers() noexcept TANDEM_RT {
         if (now_.observer != nullptr && !muted_) now_.observer->take_signals(now_.time, io.signals);
       }
     }
-    if (views && io.marks.show_to_viewers(now_.time.time_ns, (active & only(slot)) != 0))
+    if (views && io.marks.show_to_viewers(now_.time.time_ns, (calls & only(slot)) != 0))
       now_.log.marks(now_.time, *loaded[slot]);
     const auto said = io.texts.take(period_s);
     statistics_.take_texts({.said = said.size(), .left_out = io.texts.take_left_out()});
@@ -69,6 +71,24 @@ void HandOver::show_controllers() noexcept TANDEM_RT {
       now_.log.text(event);
       if (!muted_) services_.show(event);
     }
+  }
+}
+
+/// Shadows that ended by themselves say why.
+void HandOver::tell_ended_shadows() noexcept TANDEM_RT {
+  const ControllerSet ended = now_.controllers.shadows().take_ended();
+  for (std::size_t slot = 0; ended != 0 && slot < kMostControllers; ++slot) {
+    const HostedController* const one = now_.controllers.at(slot);
+    if ((ended & only(slot)) == 0 || one == nullptr) continue;
+    const ShadowLook& look = one->shadow->look;
+    hal::TextEvent event{.cycle = now_.time.cycle, .time_ns = now_.time.time_ns};
+    if (is_trouble(look.end)) event.level = hal::TextLevel::kWarn;
+    event.set_controller(one->name);
+    append_end(event, look,
+               look.joint < 0 ? std::string_view()
+                              : now_.robot.joints[static_cast<std::size_t>(look.joint)].name);
+    now_.log.text(event);
+    if (!muted_) services_.show(event);
   }
 }
 

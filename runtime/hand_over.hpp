@@ -38,6 +38,7 @@ class HandOver {
 
  private:
   void show_controllers() noexcept TANDEM_RT;
+  void tell_ended_shadows() noexcept TANDEM_RT;
   void show_progress() noexcept TANDEM_RT;
   void show_joints(const hal::CommandImage& told) noexcept TANDEM_RT;
   void show_sensors() noexcept TANDEM_RT;

@@ -68,6 +68,7 @@ bool RobotCycle::finish() noexcept {
     update();
     limit();
     write();
+    now_.controllers.shadows().run(now_.time, now_.state, now_.loop.due_ns());
     hand_over();
   }
   return !now_.run.in(RunPhase::kDone);
@@ -108,7 +109,7 @@ void RobotCycle::await_tick() noexcept {
   const std::size_t most = 4 + 16 + Inbox::kCapacity * kMostParameterChanges +
                            ControllerHost::kToldParameters + 3 * now_.watch.joints() +
                            now_.watch.sensors() + now_.controllers.inputs() +
-                           kMostControllers * (2 + TextEventSlots::kSlots);
+                           kMostControllers * (3 + TextEventSlots::kSlots);
   if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
   now_.tick = now_.loop.wait();
 }
@@ -148,12 +149,15 @@ void RobotCycle::check() noexcept TANDEM_RT {
   const rt::Tick& tick = now_.tick;
   // What came between two cycles, such as another program, is no controller's doing.
   const bool took_too_long = tick.late && took_ns_ >= now_.time.period_ns;
-  const std::int32_t slow = now_.controllers.begin_cycle(took_too_long ? took_ns_ : 0);
+  const auto slow = now_.controllers.begin_cycle(took_too_long ? took_ns_ : 0);
+  if (slow.shadow) now_.loop.forgive_late();  // it has ended: it is no fault of the run
   if (tick.skipped > 0) {
-    now_.event(EventKind::kOverrun, -1, static_cast<std::uint32_t>(tick.skipped), slow);
+    const auto skipped = static_cast<std::uint32_t>(tick.skipped);
+    now_.event(EventKind::kOverrun, -1, skipped, slow.controller);
   }
-  if (tick.stop && !run.in(RunPhase::kFaulted) && !run.in(RunPhase::kShutDown)) {
-    response_.raise({.cause = FaultCause::kOverrun, .controller = slow});
+  const bool stops = tick.stop && !slow.shadow;
+  if (stops && !run.in(RunPhase::kFaulted) && !run.in(RunPhase::kShutDown)) {
+    response_.raise({.cause = FaultCause::kOverrun, .controller = slow.controller});
   }
   if (now_.estimator != nullptr) now_.estimator->update(now_.state);
   if (!run.in(RunPhase::kBringUp) && !run.in(RunPhase::kShutDown)) {
@@ -222,6 +226,7 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
 /// wins over all that was asked before it and in its cycle.
 void RobotCycle::take_inbox() noexcept TANDEM_RT {
   if (!now_.outside.closed) hear();
+  requests_.carry_out_waiting();
   now_.controllers.tell_parameters(now_.time, now_.log);
   trace_.mark(CycleStage::kCheck, now_.clock);
 }
@@ -329,6 +334,7 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
   shown_.take();
   if (!now_.outside.closed) now_.inbox.confirm(now_.time.cycle);
   const std::int64_t now_ns = now_.loop.finish();
+  now_.controllers.shadows().note_end_of_cycle(now_ns);
   took_ns_ = now_ns - now_.tick.begin_ns + std::max<std::int64_t>(now_.tick.wakeup_ns, 0);
   trace_.note(now_.controllers.calls());
   trace_.end(now_ns);

@@ -149,6 +149,7 @@ std::vector<ControllerStatus> RunServices::controllers() {
     all.push_back({.name = one->name,
                    .plugin = one->plugin,
                    .active = active,
+                   .shadow = (host_->shadows().shown() & only(slot)) != 0,
                    .done = active && (shown.done & only(slot)) != 0,
                    .of_experiment = one->of_experiment,
                    .call_ns = one->times->calls.percentiles(),
@@ -161,7 +162,7 @@ std::vector<ControllerStatus> RunServices::controllers() {
 std::vector<ControllerSignals> RunServices::signals() {
   const Lock lock(mutex_);
   collect();
-  const ControllerSet active = host_->shown().active;
+  const ControllerSet active = host_->shown().active | host_->shadows().shown();
   std::vector<ControllerSignals> all;
   for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
     const auto& one = host_->owned()[slot];

@@ -25,6 +25,7 @@
 #include "runtime/controller_host.hpp"
 #include "runtime/cycle_log.hpp"
 #include "runtime/inbox.hpp"
+#include "runtime/joint_looks.hpp"
 #include "runtime/progress.hpp"
 #include "runtime/text_history.hpp"
 
@@ -63,6 +64,7 @@ struct ControllerStatus {
   std::string name;
   std::string plugin;  ///< its library's path; may be empty
   bool active = false;
+  bool shadow = false;         ///< it runs beside the active ones, and commands nothing
   bool done = false;           ///< it is active, and says that its task is done
   bool of_experiment = false;  ///< it came with it
   rt::Percentiles call_ns;     ///< of its calls in the cycle so far; 0: there was none
@@ -70,54 +72,14 @@ struct ControllerStatus {
   std::vector<ControllerSetup::Claim> claims;
 };
 
-/// A joint after the last cycle: plain words, as the loop shows them.
-struct JointStatus {
-  std::uint64_t cycle = 0;
-  double position_rad = 0.0, velocity_rad_s = 0.0, torque_Nm = 0.0;  ///< measured
-  double acceleration_rad_s2 = 0.0;
-  double motor_position_rad = 0.0, motor_velocity_rad_s = 0.0;   ///< on the link side
-  double current_A = 0.0, voltage_V = 0.0, temperature_C = 0.0;  ///< of the motor
-  double commanded_rad = 0.0;  ///< NaN: outside position control nobody wrote a reference
-  double stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;  ///< asked for: the command goes over to it
-  std::uint32_t fault = 0;                               ///< 0, or the drive's CiA 402 error code
-  std::uint32_t age_cycles = 0;                          ///< of the sample
-  std::int32_t owner = -1;       ///< slot of the active controller that claims it
-  std::int8_t mode = 0;          ///< hal::ControlMode asked for
-  std::uint8_t interaction = 0;  ///< hal::InteractionMode asked for
-  std::int8_t drive_mode = 0;    ///< hal::ControlMode in force
-  std::uint8_t drive_state = 0;  ///< hal::DriveState
-  std::uint8_t moving = 0;       ///< by move_joint() or recover()
-  std::uint8_t resetting = 0;    ///< by reset_joint()
-  hal::Homing homing;            ///< what is known of its place
-  std::uint8_t padding[4] = {};
-};
-
-/// The same with what is known of it besides.
-struct JointInfo {
+/// A controller that runs as a shadow, or did.
+struct ShadowStatus {
   std::string name;
-  std::string owner;    ///< controller; empty: nobody
-  bool slides = false;  ///< prismatic: m and N
-  JointStatus look;
-  std::array<hal::PidGains, hal::kPidLoops> gains{};  ///< by hal::PidLoop, as asked for last
-};
-
-/// A sensor after the last cycle.
-struct SensorStatus {
-  static constexpr std::size_t kMostChannels = 10;
-
-  std::uint64_t cycle = 0;
-  std::uint64_t age_cycles = 0;                ///< of the sample
-  std::uint64_t valid = 0;                     ///< 1: there is a sample, and it is not too old
-  std::array<double, kMostChannels> values{};  ///< of its channels, hal::channels_of() first ones
-};
-
-/// The same with what is known of it besides.
-struct SensorReport {
-  std::string name;
-  hal::SensorType type = hal::SensorType::kForceTorque;
-  std::string joint;  ///< force_torque: measures the wrench through this joint
-  std::string link;   ///< the frame of its values
-  SensorStatus look;
+  bool runs = false;
+  ShadowLook look;
+  std::vector<ControllerSetup::Claim> claims;
+  std::vector<JointDifference> joints;  ///< by claim
+  std::vector<std::string> owners;      ///< by claim: whose command that is; empty: nobody's
 };
 
 /// The signals of a loaded controller, which stay for as long as this is kept.
@@ -235,6 +197,26 @@ class RunServices {
   /// Starts, in one cycle and without a bump, the controllers that were active before a reset.
   /// Errors: nothing is held back; all of them were unloaded; a joint that two would claim.
   [[nodiscard]] Result<RequestResult> go_on(Patience patience = kPatience);
+
+  /// Lets a loaded, inactive controller run beside the active ones without commanding anything.
+  /// Errors: unknown; active; a shadow already; no controllers run.
+  [[nodiscard]] Result<RequestResult> begin_shadow(const std::string& name,
+                                                   Patience patience = kPatience);
+  /// Errors: unknown; no shadow.
+  [[nodiscard]] Result<RequestResult> end_shadow(const std::string& name,
+                                                 Patience patience = kPatience);
+  /// switch_controllers(), in the first cycle after one in which the shadows of `start` agreed with
+  /// the command: in each joint that they claim in mode, interaction and, within `within` of its
+  /// unit, in the reference that leads in that mode. Done means that it waits; what becomes of it,
+  /// last_switch() tells. Errors: switch_controllers()'s; one to start is no shadow; another waits.
+  /// @param wait_ns  of the run's time: so long it waits at most
+  [[nodiscard]] Result<RequestResult> switch_when(const std::vector<std::string>& stop,
+                                                  const std::vector<std::string>& start,
+                                                  double within, std::int64_t wait_ns,
+                                                  Patience patience = kPatience);
+  [[nodiscard]] SwitchLook last_switch() const { return host_->shadows().last_switch(); }
+  /// Shadows, and those that have ended as one, in the order in which they run.
+  [[nodiscard]] std::vector<ShadowStatus> shadows();
 
   /// Parameters of a loaded controller, in the order in which it declares them.
   /// Errors: unknown (with the nearest name).
@@ -364,6 +346,8 @@ class RunServices {
   [[nodiscard]] std::string names_of(ControllerSet set) const;
   [[nodiscard]] Status check_switch(ControllerSet stop, ControllerSet start) const;
   [[nodiscard]] ControllerSet planned() const;
+  [[nodiscard]] Result<RequestResult> ask_of_shadow(const std::string& name, bool begins,
+                                                    Patience patience);
   [[nodiscard]] Result<std::size_t> joint_of(const std::string& name) const;
   [[nodiscard]] Result<std::size_t> gains_fit(const std::string& joint, hal::PidLoop loop,
                                               const GainsRequest& wish);

@@ -57,7 +57,7 @@ Result<std::vector<double>> sample_of_wish(const InputPort& port, const InputReq
 std::vector<InputReport> RunServices::inputs() {
   const Lock lock(mutex_);
   collect();
-  const ControllerSet active = host_->shown().active;
+  const ControllerSet active = host_->shown().active | host_->shadows().shown();
   std::vector<InputReport> all;
   for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
     const auto& one = host_->owned()[slot];
@@ -123,7 +123,7 @@ Status RunServices::check_runs_locked(const InputPort& port) const {
                    std::string("no sample is taken in the phase ") + to_string(phase),
                    "ask again in the phase running");
   }
-  const ControllerSet active = host_->shown().active;
+  const ControllerSet active = host_->shown().active | host_->shadows().shown();
   for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
     const auto& one = host_->owned()[slot];
     if (one == nullptr || (active & only(slot)) == 0) continue;

@@ -44,6 +44,8 @@ Status ask_for_motion(const AskedOptions& options, Json& question);
 // Each prints an answer.
 void print_clock(const Json& answer);
 void print_controllers(const Json& answer);
+void print_differences(const Json& answer);
+void print_shadow(const Json& answer);
 void print_reloaded(const Json& answer);
 void print_controller(const Json& answer);
 void print_set(const Json& answer);
@@ -60,6 +62,7 @@ void print_recovery(const Json& joint);
 Result<Exit> tell_clock_at_rest(Asked& asked);
 Result<Exit> tell_until(Asked& asked);
 Result<Exit> tell_loaded(Asked& asked);
+Result<Exit> tell_switch(Asked& asked);
 Result<Exit> tell_fault_reset(Asked& asked);
 Result<Exit> tell_input(Asked& asked);
 Result<Exit> tell_inputs(Asked& asked);

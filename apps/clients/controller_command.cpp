@@ -165,7 +165,10 @@ void print_controllers(const Json& answer) {
   table.align_left();
   for (const Json& one : answer["controllers"]) {
     const bool active = one.value("active", false);
-    const char* state = !active ? "inactive" : one.value("finished", false) ? "done" : "active";
+    const char* state = one.value("shadow", false)     ? "shadow"
+                        : !active                      ? "inactive"
+                        : one.value("finished", false) ? "done"
+                                                       : "active";
     std::vector<std::string> joints;
     for (const Json& claim : one["claims"]) joints.push_back(claim.value("joint", ""));
     const std::size_t count = joints.size();

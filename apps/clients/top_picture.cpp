@@ -133,6 +133,7 @@ void add_controllers(std::vector<TopLine>& lines, const TopLook& look) {
     lines.push_back({fmt::format("controller {}: {}, {}, {}{}", shown(one.value("name", "?")),
                                  one.value("finished", false) ? "done"
                                  : active                     ? "active"
+                                 : one.value("shadow", false) ? "shadow"
                                                               : "STOPPED",
                                  counted(one.value("claims", Json::array()).size(), "joint"),
                                  times.is_object() ? "a call " + times_text(times) : "never called",

@@ -46,6 +46,10 @@ same without a socket, and gets no answer.)"},
   tandem controller list                             loaded controllers, active or not, their joints
   tandem controller load hold --name rest --set 'duration_s = 2.0'
   tandem controller switch --stop squat --start rest in one cycle, or not at all
+  tandem controller shadow squat2                    beside the active ones, without commanding
+  tandem controller difference squat2                how far it is from what is commanded
+  tandem controller switch --stop squat --start squat2 --when-within 0.01
+                                                     once they agree; Ctrl-C ends only the waiting
   tandem controller show squat                       its parameters: unit, range, value, live or not
   tandem controller set squat link_damping_Nms_rad=2 between two cycles; several: all or none
   tandem controller set arm kp_Nm_rad.elbow=20       of a parameter by joint one; kp_Nm_rad=20: all

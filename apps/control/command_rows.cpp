@@ -132,7 +132,19 @@ const std::vector<CommandRow> kRows{
     {"controller.stop", kChanges, "stops a controller; its joints are held",
      {need(text("name", "", kLoaded)), need(local(texts("names", "names", "of controllers")))}},
     {"controller.switch", kChanges, "stops some and starts others in one cycle, all or none",
-     {texts("stop", "--stop", "controllers to stop"), texts("start", "--start", "and to start")}},
+     {texts("stop", "--stop", "controllers to stop"), texts("start", "--start", "and to start"),
+      {.name = "when_within", .type = Type::kNumber, .doc = "waits until the shadows to start are "
+       "so near to what is commanded [unit of the reference: rad or m in position control], in the "
+       "same modes", .line = "--when-within", .min = 0.0, .max = 1e6},
+      {.name = "timeout_s", .type = Type::kNumber, .doc = "with it: how long at most [s], of the "
+       "run's time, 0 to 3600; default 10. Then nothing has changed", .line = "--timeout",
+       .unit = Unit::kTime, .min = 0.0, .max = 3600.0}}},
+    {"controller.shadow", kChanges,
+     "runs an inactive controller beside the active ones on live data, without commanding",
+     {need(text("name", "name", kLoaded)), flag("end", "--end", "it is no shadow any more")}},
+    {"controller.difference", kReads,
+     "of each shadow: its references less those that are commanded, joint by joint",
+     {text("name", "name", "of a shadow; else of every one")}},
 
     {"joint.list", kReads, "every joint: who has it, what it does, what is measured",
      {local(texts("joints", "joints", "only these")),

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "apps/control/shadow_control.hpp"
 #include "apps/text/toml_text.hpp"
 #include "base/nearest.hpp"
 #include "base/utf8.hpp"
@@ -85,6 +86,7 @@ Json list(RunServices& services, const hal::RobotConfig& robot, const std::strin
     all.push_back({{"name", one.name},
                    {"plugin", one.plugin},
                    {"active", one.active},
+                   {"shadow", one.shadow},
                    {"finished", one.done},
                    {"of_experiment", one.of_experiment},
                    {"call_ns", one.call_ns.max == 0 ? Json() : percentiles_json(one.call_ns)},
@@ -125,14 +127,20 @@ Result<Json> tell(RunServices& services, const Result<runtime::RequestResult>& a
   return answer;
 }
 
-/// A switch that an operator asks for. The owner in another process comes and goes with its lease.
-Result<Json> switch_by_hand(RunServices& services, const Names& stop, const Names& start) {
-  for (const runtime::ControllerStatus& one : services.controllers()) {
-    if (one.name != runtime::kOwnerController || !one.plugin.empty()) continue;
-    const auto named = std::ranges::count(stop, one.name) + std::ranges::count(start, one.name);
-    if (named == 0) continue;
-    return fail("'" + one.name + "' is the owner in another process: it comes and goes by itself",
-                "end the owner's run; `tandem estop` stops the robot in any case");
+/// A switch that an operator asks for.
+Result<Json> switch_by_hand(RunServices& services, const Names& stop, const Names& start,
+                            const Json& request) {
+  for (const Names& names : {stop, start}) {
+    if (const Status own = check_no_owner(services, names); !own)
+      return std::unexpected(own.error());
+  }
+  if (request.contains("when_within")) {
+    auto answer = tell(services, switch_when(services, stop, start, request));
+    if (answer) (*answer)["waits"] = true;
+    return answer;
+  }
+  if (request.contains("timeout_s")) {
+    return fail_at("timeout_s", "is for a switch that waits", "give when_within, too");
   }
   const auto asked = services.switch_controllers(stop, start);
   auto answer = tell(services, asked);
@@ -318,6 +326,16 @@ Names names_of(const Json& request, const char* key) {
 
 }  // namespace
 
+Status check_no_owner(RunServices& services, const std::vector<std::string>& names) {
+  for (const runtime::ControllerStatus& one : services.controllers()) {
+    if (one.name != runtime::kOwnerController || !one.plugin.empty()) continue;
+    if (std::ranges::find(names, one.name) == names.end()) continue;
+    return fail("'" + one.name + "' is the owner in another process: it comes and goes by itself",
+                "end the owner's run; `tandem estop` stops the robot in any case");
+  }
+  return {};
+}
+
 Json asked_json(const runtime::RequestResult& asked) {
   if (asked.done) return {{"done", true}, {"cycle", asked.cycle}};
   return {{"done", false}, {"note", "asked for; it will happen in the loop's next cycle"}};
@@ -343,15 +361,16 @@ void add_controller_commands(ControlRegistry& registry, RunServices& services,
   registry.add("controller.start", [&services](const Json& request) {
     if (!request.contains("name")) return tell(services, services.go_on());
     const Names names{request["name"].get<std::string>()};
-    return switch_by_hand(services, {}, names);
+    return switch_by_hand(services, {}, names, request);
   });
   registry.add("controller.stop", [&services](const Json& request) {
     const Names names{request["name"].get<std::string>()};
-    return switch_by_hand(services, names, {});
+    return switch_by_hand(services, names, {}, request);
   });
   registry.add("controller.switch", [&services](const Json& request) {
-    return switch_by_hand(services, names_of(request, "stop"), names_of(request, "start"));
+    return switch_by_hand(services, names_of(request, "stop"), names_of(request, "start"), request);
   });
+  add_shadow_commands(registry, services, robot);
 }
 
 }  // namespace tandem::apps

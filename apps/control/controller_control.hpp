@@ -22,11 +22,15 @@ struct ControllerTrial {
 using TryController = std::function<Status(const ControllerTrial&)>;
 
 /// Adds "controller.list", "controller.load", "controller.reload", "controller.unload",
-/// "controller.start", "controller.stop" and "controller.switch". Services and robot outlive the
-/// registry.
+/// "controller.start", "controller.stop", "controller.switch" and those of shadows. Services and
+/// robot outlive the registry.
 /// @param trial  before a library is opened, unless the question says "untried"; empty: none is
 void add_controller_commands(ControlRegistry& registry, runtime::RunServices& services,
                              const hal::RobotConfig& robot, TryController trial = {});
+
+/// Error: one of these is the owner in another process, which nobody switches by hand.
+[[nodiscard]] Status check_no_owner(runtime::RunServices& services,
+                                    const std::vector<std::string>& names);
 
 /// {"done": …, "cycle": …}: what became of a request.
 [[nodiscard]] Json asked_json(const runtime::RequestResult& asked);

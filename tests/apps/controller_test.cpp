@@ -49,6 +49,39 @@ TEST_F(Controllers, AreLoadedSwitchedStoppedAndUnloaded) {
   EXPECT_EQ(end(), 0);
 }
 
+TEST_F(Controllers, AShadowShowsHowFarItIsAndIsSwitchedToOnceItAgrees) {
+  begin("");
+  expect(refused("controller difference hold"), "hold: is no shadow");
+  expect(refused("controller shadow hold"),
+         "hold: is active: a shadow runs beside the active ones");
+  EXPECT_EQ(to_run("controller load hold --name rest").status, 0);
+  EXPECT_EQ(asked("controller shadow rest")["done"], true);
+  expect(to_run("controller list").out, "rest        shadow  joint1, joint2");
+  const auto apart = asked("controller difference rest");
+  ASSERT_EQ(apart["shadows"].size(), 1U);
+  EXPECT_EQ(apart["shadows"][0]["runs"], true);
+  EXPECT_EQ(apart["switch"], nlohmann::json());
+  const auto joint = apart["shadows"][0]["joints"][1];
+  EXPECT_EQ(joint["joint"], "joint2");
+  EXPECT_EQ(joint["owner"], "hold");
+  EXPECT_EQ(joint["references"][0]["name"], "position_rad");
+  EXPECT_EQ(joint["references"][0]["unit"], "rad");
+  EXPECT_LT(std::abs(joint["references"][0]["difference"].get<double>()), 0.1);
+  const Outcome late =
+      to_run("controller switch --stop hold --start rest --when-within 0 --timeout 20ms");
+  EXPECT_EQ(late.status, 1);
+  expect(late.out, "nothing has changed: they did not agree in time, at last by ");
+  const auto change = asked("controller switch --stop hold --start rest --when-within 0.2");
+  EXPECT_EQ(change["switch"]["state"], "done");
+  const auto list = asked("controller list")["controllers"];
+  EXPECT_EQ(list[0]["active"], false);
+  EXPECT_EQ(list[1]["active"], true);
+  EXPECT_EQ(list[1]["shadow"], false);
+  expect(refused("controller switch --stop rest --start hold --timeout 1s"),
+         "is for a switch that waits");
+  EXPECT_EQ(end(), 0);
+}
+
 class Builds : public Controllers {
  protected:
   /// nodder.so is that build now, as a linker leaves it.

@@ -51,19 +51,24 @@ class Witness final : public hal::CycleObserver {
 struct Journey {
   explicit Journey(const std::string& robot, const std::string& experiment,
                    log::Recorder* recorder = nullptr,
-                   const std::vector<ExpectationSpec>& expectations = {})
+                   const std::vector<ExpectationSpec>& expectations = {},
+                   const std::vector<ControllerSpec>& more = {})
       : machine(1'000'000, TimeMachine::kBudget_bytes, true),
-        run(robot, experiment, paused(expectations),
+        run(robot, experiment, paused(expectations, more),
             {.recorder = recorder, .observer = &witness, .time_machine = &machine}),
         loop([this] { run.cycle->run(); }) {}
   ~Journey() {
     run.cycle->inbox().end_run();
     loop.join();
   }
-  static Overrides paused(const std::vector<ExpectationSpec>& expectations) {
+  static Overrides paused(const std::vector<ExpectationSpec>& expectations,
+                          const std::vector<ControllerSpec>& more) {
     Overrides overrides;
     overrides.start_paused = true;
-    overrides.change = [expectations](runtime::Experiment& e) { e.expectations = expectations; };
+    overrides.change = [expectations, more](runtime::Experiment& e) {
+      e.expectations = expectations;
+      e.controllers.insert(e.controllers.end(), more.begin(), more.end());
+    };
     return overrides;
   }
   rt::ClockControl& clock() { return run.cycle->inbox().clock(); }
@@ -123,6 +128,37 @@ TEST_P(TimeMachineOf, PlaysAgainToTheSameBits) {
     ASSERT_EQ(trip.witness.others, 0U) << "travel " << i << " to " << there;
   }
   EXPECT_GE(trip.witness.again, TANDEM_TRAVELS);
+}
+
+// A shadow goes along, and so does a switch that waits for it: it happens again in the same cycle.
+TEST(TimeMachine, GoesBackWithAShadow) {
+  constexpr RunServices::Patience kNow{0};
+  Journey trip("coman", "squat", nullptr, {},
+               {{"hold", "rest", false, TomlDocument::parse("", "rest")->root()}});
+  trip.step(1'500);  // it stands
+  RunServices& services = trip.run.cycle->services();
+  ASSERT_TRUE(services.begin_shadow("rest", kNow));
+  trip.step(3'000);  // it is down
+  EXPECT_GT(std::abs(services.shadows().at(0).joints.at(0).most[0]), 0.1);
+  ASSERT_TRUE(services.switch_when({"squat"}, {"rest"}, 0.05, 10'000'000'000, kNow));
+  trip.step(500);
+  EXPECT_EQ(services.last_switch().state, SwitchState::kWaits);
+  trip.step(4'500);
+  const SwitchLook done = services.last_switch();
+  ASSERT_EQ(done.state, SwitchState::kDone);
+  EXPECT_GT(done.cycle, 5'000U);
+  for (const std::uint64_t back : {done.cycle - 100, std::uint64_t{4'900}}) {
+    trip.go(back);
+    EXPECT_EQ(services.last_switch().state, SwitchState::kWaits);
+    EXPECT_TRUE(services.controllers()[1].shadow);
+    trip.go(9'000);
+    EXPECT_EQ(services.last_switch().cycle, done.cycle);
+    EXPECT_TRUE(services.controllers()[1].active);
+  }
+  trip.go(done.cycle - 10);
+  trip.step(1'000);  // a branch in which nothing changes
+  EXPECT_EQ(services.last_switch().cycle, done.cycle);
+  EXPECT_EQ(trip.witness.others, 0U);
 }
 
 TEST(TimeMachine, SaysWhereItCannotGo) {

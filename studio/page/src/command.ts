@@ -66,10 +66,15 @@ export function commandLine(request: Request): string {
     case 'controller.stop':
     case 'controller.unload':
       return request.name === undefined ? words.join(' ') : [...words, name].join(' ');
+    case 'controller.shadow':
+      return [...words, name, ...(request.end === true ? ['--end'] : [])].join(' ');
     case 'controller.switch':
-      return [...words, ...list('--stop', request.stop), ...list('--start', request.start)].join(
-        ' ',
-      );
+      return [
+        ...words,
+        ...list('--stop', request.stop),
+        ...list('--start', request.start),
+        ...options(request, { when_within: '--when-within', timeout_s: '--timeout' }),
+      ].join(' ');
     case 'controller.set':
       return [...words, name, ...assignments(request.parameters)].join(' ');
     case 'input.set':

@@ -5,6 +5,7 @@ import type { Data } from './data';
 import { attribute, h, say } from './dom';
 import { micros, plain } from './format';
 import type { Answer } from './protocol';
+import { Shadows } from './shadows';
 import { undoable } from './undo';
 
 interface Parameter {
@@ -23,6 +24,7 @@ interface Parameter {
 interface Controller {
   name: string;
   active: boolean;
+  shadow?: boolean;
   finished: boolean;
   call_ns: { p50: number; p99: number; p999: number; max: number } | null;
   overruns: number;
@@ -73,6 +75,7 @@ export class Controllers {
   private readonly body = h('div', { class: 'cards' });
   private readonly stop = h('select', { 'aria-label': 'controller to stop' });
   private readonly start = h('select', { 'aria-label': 'controller to start' });
+  private readonly shadows: Shadows;
   private names = '';
   readonly element: HTMLElement;
 
@@ -81,6 +84,7 @@ export class Controllers {
     private readonly actions: Actions,
     lease: ControlLease,
   ) {
+    this.shadows = new Shadows(data, actions);
     const both = h(
       'fieldset',
       { class: 'toolbar' },
@@ -106,6 +110,7 @@ export class Controllers {
     if (names !== this.names) {
       this.names = names;
       this.rows.clear();
+      this.shadows.clear();
       this.body.replaceChildren(...list.map((one) => this.card(one)));
       for (const choice of [this.stop, this.start]) {
         choice.replaceChildren(
@@ -119,8 +124,10 @@ export class Controllers {
       const row = this.rows.get(one.name);
       if (!row) continue;
       const finished = one.finished ? ', its task is done' : '';
-      say(row.state, one.active ? `▶ active${finished}` : '■ inactive');
+      const idle = one.shadow ? '◌ shadow' : '■ inactive';
+      say(row.state, one.active ? `▶ active${finished}` : idle);
       attribute(row.element, 'data-active', String(one.active));
+      attribute(row.element, 'data-shadow', String(one.shadow === true));
       const cost = one.call_ns;
       const joints = one.claims.length === 1 ? '1 joint' : `${one.claims.length} joints`;
       say(
@@ -152,8 +159,11 @@ export class Controllers {
           name: `stop ${one.name}`,
           title: 'Its joints are held.',
         }),
+        h('span', { class: 'begins-shadow' }, this.shadows.button(one.name, false)),
+        h('span', { class: 'ends-shadow' }, this.shadows.button(one.name, true)),
       ),
       cost,
+      this.shadows.part(one.name),
       parameters,
     );
     this.rows.set(one.name, { element, state, cost });

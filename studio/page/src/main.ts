@@ -41,7 +41,7 @@ const kWatched: Record<string, string[]> = {
   plots: [],
   scope: [],
   joints: ['joint.list'],
-  controllers: ['controller.list'],
+  controllers: ['controller.list', 'controller.difference'],
   inputs: ['input.list'],
   loop: ['loop.show'],
   expected: ['expect.show'],

@@ -17,6 +17,20 @@ test('requests become command lines', () => {
     ],
     [{ do: 'controller.start' }, 'tandem controller start'],
     [
+      { do: 'controller.shadow', name: 'squat2', end: true },
+      'tandem controller shadow squat2 --end',
+    ],
+    [
+      {
+        do: 'controller.switch',
+        stop: ['squat'],
+        start: ['squat2'],
+        when_within: 0.01,
+        timeout_s: 10,
+      },
+      'tandem controller switch --stop squat --start squat2 --when-within=0.01 --timeout=10',
+    ],
+    [
       { do: 'controller.switch', stop: ['squat'], start: ['rest'] },
       'tandem controller switch --stop squat --start rest',
     ],

@@ -192,6 +192,34 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     await leave(page);
   });
 
+  test('a shadow shows how far it is, and is switched to when within', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.click('#tab-controllers');
+    await page.click('button[aria-label="shadow rest"]');
+    const table = page.locator('[aria-label="difference of rest from what is commanded"]');
+    await page.waitForSelector('.shadow:visible tbody tr');
+    const knee = mock.robot.joints[1].name;
+    assert.equal(await table.locator('tbody tr').count(), 5, 'what never differed is left out');
+    const row = table.locator(`tr:has-text("${knee}")`).first();
+    assert.deepEqual(await row.locator('th, td').allTextContents(), [
+      knee,
+      'squat',
+      'position',
+      '0.0200',
+      '0.3500',
+      '0.0035',
+      'rad',
+    ]);
+    await page.fill('[aria-label="bound of rest\'s difference"]', '0.005');
+    await page.click('button[aria-label="switch when within, to rest"]');
+    await until(page, 'switch --stop squat --start rest --when-within=0.005 --timeout=10');
+    await until(page, `The switch waits: 0.0200 rad at ${knee}`);
+    await page.click('button[aria-label="end shadow rest"]');
+    await page.waitForSelector('.shadow', { state: 'hidden' });
+    await leave(page);
+  });
+
   test('inputs are sliders', async () => {
     const mock = await play();
     const page = await visit(mock.address);
@@ -369,6 +397,10 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
         if (tab === 'joints') {
           await page.locator('.opener').first().click();
           await page.locator('.tuning summary').first().click();
+        }
+        if (tab === 'controllers') {
+          await page.click('button[aria-label="shadow rest"]');
+          await page.waitForSelector('.shadow:visible tbody tr');
         }
         if (tab === 'loop') {
           await page.waitForSelector('.loop-histogram svg[aria-label*="late: 61462 cycles"]');

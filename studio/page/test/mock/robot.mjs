@@ -37,6 +37,7 @@ export class MockRobot extends PlayedRobot {
       name,
       plugin: `lib/${name}.so`,
       active,
+      shadow: !active && this.shadow === name,
       finished: false,
       of_experiment: true,
       call_ns: active ? { p50: 4031, p99: 11007, p999: 110591, max: 202042 } : null,
@@ -46,6 +47,36 @@ export class MockRobot extends PlayedRobot {
         : [],
     });
     return [one(this.hostile ? kHostile : 'squat', this.active), one('rest', false)];
+  }
+  /** What "rest" wants as a shadow: the knee 0.02 rad away. */
+  difference() {
+    const reference = (name, unit, difference, largest) => ({
+      name,
+      unit,
+      difference,
+      largest,
+      largest_step: largest / 100,
+    });
+    const joints = this.joints.slice(0, 4).map((joint, j) => ({
+      joint: joint.name,
+      owner: this.active ? 'squat' : '',
+      mode: 'position',
+      interaction: j === 3 ? 'compliant' : 'stiff',
+      commanded_mode: 'position',
+      commanded_interaction: 'stiff',
+      references: [
+        reference('position_rad', 'rad', j === 1 ? 0.02 : 0, j === 1 ? 0.35 : 0),
+        reference('velocity_rad_s', 'rad/s', 0, 0),
+        reference('torque_Nm', 'Nm', j === 1 ? -1.5 : 0, j === 1 ? 9 : 0),
+      ],
+    }));
+    const shadows = this.shadow
+      ? [{ name: this.shadow, runs: true, since: 1, calls: 5, missed: 0, ended: null, joints }]
+      : [];
+    const last = this.waits
+      ? { state: 'waits', joint: this.joints[1].name, difference: 0.02, unit: 'rad' }
+      : null;
+    return { ok: true, shadows, switch: last };
   }
   parameters() {
     const base = {
@@ -303,7 +334,16 @@ export class MockRobot extends PlayedRobot {
       case 'controller.stop':
         this.active = false;
         return { ...done, active: [] };
+      case 'controller.shadow':
+        this.shadow = request.end ? '' : request.name;
+        return { ...done, name: request.name };
+      case 'controller.difference':
+        return this.difference();
       case 'controller.switch':
+        if (request.when_within !== undefined) {
+          this.waits = true;
+          return { ...done, waits: true, active: ['squat'] };
+        }
         this.active = (request.start ?? []).length > 0;
         return { ...done, active: request.start };
       case 'controller.set': {
