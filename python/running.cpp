@@ -115,6 +115,7 @@ Running::Running(const std::string& file, runtime::Overrides overrides, const st
   run().cycle().services().attended_by([this] {
     if (begun_) run().cycle().attend();
   });
+  carry_out_events();
   begin();
   while (begun_ && (run().cycle().phase() == RunPhase::kBringUp ||
                     run().cycle().phase() == RunPhase::kSettling)) {

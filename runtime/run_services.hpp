@@ -14,6 +14,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include "base/result.hpp"
@@ -190,7 +191,16 @@ class RunServices {
 
   /// The thread of the loop asks by itself, between the halves of a cycle: where another thread
   /// would wait for the loop's answer, `attend` is called instead.
-  void attended_by(std::function<void()> attend) { attend_ = std::move(attend); }
+  /// @param alone  nobody else asks; else other threads do, which wait, and the loop's is the one
+  ///               that asks_here() says. Before the first cycle
+  void attended_by(std::function<void()> attend, bool alone = true) {
+    attend_ = std::move(attend);
+    alone_ = alone;
+  }
+  /// Until the next call the thread of the loop asks: `yes` on that thread.
+  void asks_here(bool yes) noexcept {
+    asking_.store(yes ? std::this_thread::get_id() : std::thread::id(), std::memory_order_relaxed);
+  }
 
   /// Loaded controllers, in the order in which they run.
   [[nodiscard]] std::vector<ControllerStatus> controllers();
@@ -387,7 +397,15 @@ class RunServices {
   Seqlock<hal::PidGains> gain_looks_;
   TextHistory texts_;
   std::atomic<std::uint64_t> loads_{1};
-  std::function<void()> attend_;  // empty: the loop has a thread of its own
+  /// Whether this thread is the loop's.
+  [[nodiscard]] bool attends() const noexcept {
+    return attend_ != nullptr && (alone_ || asking_.load(std::memory_order_relaxed) ==
+                                                std::this_thread::get_id());
+  }
+
+  std::function<void()> attend_;  // empty: the loop never asks
+  bool alone_ = true;
+  std::atomic<std::thread::id> asking_{};
 
   std::mutex mutex_;  // of all below, and of the asking side of inbox and host
   std::function<std::string()> owner_;
