@@ -115,15 +115,18 @@ void Events::add_results(bool followed, std::vector<ExpectationResult>& results)
                              .passed = state.outcome == Outcome::kDone,
                              .unit = {},
                              .reason = {}};
-    if (state.came_ns >= 0) result.at_s = 1e-9 * static_cast<double>(state.came_ns);
+    if (state.came_ns >= 0) result.at_s = static_cast<double>(state.came_ns) / 1e9;
     if (state.outcome == Outcome::kRefused) {
       result.reason = fmt::format("it was refused: {}", state.why.data());
     } else if (state.outcome == Outcome::kNone) {
       result.passed = one.spec.optional;
+      const std::int64_t due_ns =
+          one.spec.at_ns >= 0 ? one.spec.at_ns : state.held_ns + one.spec.after_ns;
       if (!result.passed) {
         result.reason = state.held_ns >= 0 || one.spec.at_ns >= 0
-                            ? "the run ended before its time"
-                            : "its condition never held: " + one.spec.when;
+                            ? fmt::format("it has not come, it is due at {:.6g} s",
+                                          static_cast<double>(due_ns) / 1e9)
+                            : "its condition has not held: " + one.spec.when;
       }
     }
     results.push_back(std::move(result));

@@ -135,9 +135,9 @@ TEST(Events, WhatNeverComesFailsUnlessItIsOptional) {
   run.steps(1'000);
   const auto results = run.run->expectations()->results();
   ASSERT_EQ(results.size(), 4U);
-  EXPECT_EQ(results[0].reason, "its condition never held: position(joint1) > 100rad");
+  EXPECT_EQ(results[0].reason, "its condition has not held: position(joint1) > 100rad");
   EXPECT_TRUE(results[1].passed);
-  EXPECT_EQ(results[2].reason, "the run ended before its time");
+  EXPECT_EQ(results[2].reason, "it has not come, it is due at 90 s");
   EXPECT_NE(results[3].reason.find("nobody carries out requests"), std::string::npos);
 }
 

@@ -32,7 +32,7 @@ export class Layers {
     {
       layer: new Pushes((layer) => this.show(layer)),
       label: 'pushes',
-      title: 'the sum of all pushes on the simulated robot: 1 m is 200 N',
+      title: 'the sum of all pushes on the simulated robot: 1 m is 100 N',
     },
     {
       // Of a run one source has all of it; of a log there are the topics.

@@ -4,7 +4,7 @@ import type { Data } from './data';
 import type { Layer } from './layer';
 import type { Model } from './model';
 
-const kMetresPerNewton = 1 / 200;
+const kMetresPerNewton = 1 / 100;
 const kColour = '#d55e00';
 /** Drawn last, through the robot. */
 const kAbove = 2;
