@@ -76,10 +76,10 @@ void read_asked(TomlTable& table, Experiment& e) {
   read_keys(table, kAt, keys);
   if (table.has("at_s")) spec.at_ns = event_ns(keys.at_s);
   if (table.has("at_s") == table.has("when")) {
-    table.error(table.has("when") ? "at_s" : "",
-                table.has("when") ? "it comes once, and `when` says when"
-                                  : "nothing says when it comes",
-                table.has("when") ? "keep one of both" : "add at_s, or when = \"…\"");
+    table.error(
+        table.has("when") ? "at_s" : "",
+        table.has("when") ? "it comes once, and `when` says when" : "nothing says when it comes",
+        table.has("when") ? "keep one of both" : "add at_s, or when = \"…\"");
   }
   spec.ask = table.json("ask");
   spec.ask_line = table.line("ask");

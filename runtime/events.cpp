@@ -90,9 +90,9 @@ std::string Events::ask(std::size_t event, std::int64_t time_ns) noexcept {
   Event& one = all_[event];
   std::string why;
   try {
-    const Status done = ask_ ? ask_(one.spec.ask)
-                             : fail("nobody carries out requests in this program",
-                                    "run it by `tandem run`");
+    const Status done =
+        ask_ ? ask_(one.spec.ask)
+             : fail("nobody carries out requests in this program", "run it by `tandem run`");
     if (!done) {
       why = done.error().message;
       if (!done.error().hint.empty()) why += " (" + done.error().hint + ")";

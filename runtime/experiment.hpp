@@ -24,8 +24,8 @@
 #include "rt/thread_setup.hpp"
 #include "runtime/after_stop.hpp"
 #include "runtime/condition/expectation_spec.hpp"
-#include "runtime/event_spec.hpp"
 #include "runtime/controller_spec.hpp"
+#include "runtime/event_spec.hpp"
 #include "runtime/fall_watch.hpp"
 #include "runtime/teleoperation.hpp"
 

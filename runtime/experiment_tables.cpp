@@ -286,10 +286,10 @@ ParallelOptions read_parallel(TomlTable table, const std::string& file, const st
 }
 
 const std::vector<std::string> kSections{
-    "robot",  "duration_s", "seed",       "posture",    "kernel_variant", "period_ns", "sim",
-    "hal",    "overrun",    "clock",      "realtime",   "faults",         "remote",    "log",
-    "report", "dds",        "controller", "estimation", "teleoperation",  "parallel",  "expect",
-    "fault",  "push",       "event"};
+    "robot",         "duration_s", "seed",    "posture", "kernel_variant", "period_ns",
+    "sim",           "hal",        "overrun", "clock",   "realtime",       "faults",
+    "remote",        "log",        "report",  "dds",     "controller",     "estimation",
+    "teleoperation", "parallel",   "expect",  "fault",   "push",           "event"};
 
 }  // namespace
 

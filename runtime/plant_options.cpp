@@ -220,7 +220,7 @@ void add_payload(TomlTable& table, const model::Tree& described, std::vector<std
   body.inertia = body.inertia + link.in_body * more;
 }
 
-/// Of overlapping ones the first counts.
+/// The first of those that overlap counts.
 void add_patch(TomlTable& table, sim::PlantChanges& plant) {
   hal::ContactConfig& ground = plant.robot.contact;
   PatchKeys keys;

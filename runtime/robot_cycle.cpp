@@ -49,7 +49,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       limited_(parts.robot.joints.size()),
       limits_met_(parts.robot.joints.size()) {
   if (now_.events != nullptr && now_.events->asks())
-    services_.attended_by([this] { attend(); }, false);
+    services_.asker().attend_by([this] { attend(); }, false);
 }
 
 bool RobotCycle::begin() noexcept {
@@ -93,9 +93,9 @@ void RobotCycle::ask_events() noexcept {
   Events& events = *now_.events;
   while (const auto event = events.next_ask(now_.time.time_ns)) {
     now_.outside.came = true;
-    services_.asks_here(true);
+    services_.asker().here(true);
     const std::string why = events.ask(*event, now_.time.time_ns);
-    services_.asks_here(false);
+    services_.asker().here(false);
     hal::TextEvent text;
     text.cycle = now_.time.cycle;
     text.time_ns = now_.time.time_ns;
@@ -129,7 +129,8 @@ void RobotCycle::wait() noexcept {
 void RobotCycle::await_tick() noexcept {
   // Four images, a sample of each input, every event that one cycle can bring, and what the
   // controllers tell.
-  const std::size_t most = (now_.events != nullptr ? now_.events->size() : 0) + 4 + 16 + Inbox::kCapacity * kMostParameterChanges +
+  const std::size_t most = (now_.events != nullptr ? now_.events->size() : 0) + 4 + 16 +
+                           Inbox::kCapacity * kMostParameterChanges +
                            ControllerHost::kToldParameters + 3 * now_.watch.joints() +
                            now_.watch.sensors() + now_.controllers.inputs() +
                            kMostControllers * (2 + TextEventSlots::kSlots);

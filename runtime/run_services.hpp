@@ -14,7 +14,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <vector>
 
 #include "base/result.hpp"
@@ -26,6 +25,7 @@
 #include "runtime/controller_host.hpp"
 #include "runtime/cycle_log.hpp"
 #include "runtime/inbox.hpp"
+#include "runtime/loop_asker.hpp"
 #include "runtime/progress.hpp"
 #include "runtime/text_history.hpp"
 
@@ -189,18 +189,8 @@ class RunServices {
   RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
               const Progress& progress, const hal::ParameterImage& gains, CycleLog& log);
 
-  /// The thread of the loop asks by itself, between the halves of a cycle: where another thread
-  /// would wait for the loop's answer, `attend` is called instead.
-  /// @param alone  nobody else asks; else other threads do, which wait, and the loop's is the one
-  ///               that asks_here() says. Before the first cycle
-  void attended_by(std::function<void()> attend, bool alone = true) {
-    attend_ = std::move(attend);
-    alone_ = alone;
-  }
-  /// Until the next call the thread of the loop asks: `yes` on that thread.
-  void asks_here(bool yes) noexcept {
-    asking_.store(yes ? std::this_thread::get_id() : std::thread::id(), std::memory_order_relaxed);
-  }
+  /// For who asks in the thread of the loop.
+  [[nodiscard]] LoopAsker& asker() noexcept { return asker_; }
 
   /// Loaded controllers, in the order in which they run.
   [[nodiscard]] std::vector<ControllerStatus> controllers();
@@ -397,15 +387,7 @@ class RunServices {
   Seqlock<hal::PidGains> gain_looks_;
   TextHistory texts_;
   std::atomic<std::uint64_t> loads_{1};
-  /// Whether this thread is the loop's.
-  [[nodiscard]] bool attends() const noexcept {
-    return attend_ != nullptr && (alone_ || asking_.load(std::memory_order_relaxed) ==
-                                                std::this_thread::get_id());
-  }
-
-  std::function<void()> attend_;  // empty: the loop never asks
-  bool alone_ = true;
-  std::atomic<std::thread::id> asking_{};
+  LoopAsker asker_;
 
   std::mutex mutex_;  // of all below, and of the asking side of inbox and host
   std::function<std::string()> owner_;

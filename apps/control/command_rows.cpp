@@ -307,11 +307,6 @@ const std::vector<CommandRow> kRows{
 };
 // clang-format on
 
-/// What somebody wrote, as far as it can be a word.
-std::string shown_name(const std::string& word) {
-  return word.size() <= kMostNamed ? word : std::string(whole_characters(word, kMostNamed)) + "…";
-}
-
 }  // namespace
 
 const char* to_string(ControlEffect effect) {
@@ -351,52 +346,6 @@ Status check_value(const ControlKey& key, const Json& value) {
   return fail(
       fmt::format("is {}from {} to {}", key.or_zero ? "neither 0 nor " : "not ", key.min, key.max),
       key.doc);
-}
-
-Status check_keys(const CommandRow& row, const Json& request, bool suggests) {
-  std::vector<std::string> names;
-  for (const ControlKey& key : row.keys) {
-    if (key.sent) names.push_back(key.name);
-  }
-  for (const auto& [name, value] : request.items()) {
-    if (name == "do") continue;
-    const auto known = std::ranges::find(row.keys, name, &ControlKey::name);
-    if (known == row.keys.end() || !known->sent) {
-      return fail(fmt::format("{}: unknown key \"{}\"", row.name, shown_name(name)),
-                  names.empty() ? "it takes none"
-                  : suggests    ? suggest(name, names)
-                                : R"({"do": "help"} lists them)");
-    }
-    if (Status fits = check_value(*known, value); !fits) {
-      return fail(fmt::format("{}: \"{}\" {}", row.name, name, fits.error().message),
-                  fits.error().hint);
-    }
-  }
-  for (const ControlKey& key : row.keys) {
-    if (key.required && key.sent && !request.contains(key.name)) {
-      return fail(fmt::format("{}: \"{}\" is missing", row.name, key.name), key.doc);
-    }
-  }
-  return {};
-}
-
-Status check_event(const Json& request) {
-  const auto name = request.find("do");
-  if (name == request.end() || !name->is_string()) {
-    return fail("`do` does not name a command", "write { do = \"controller.set\", … }");
-  }
-  const auto wanted = name->get<std::string>();
-  const CommandRow* row = command_row(wanted);
-  if (row == nullptr || !row->more.by_event) {
-    std::vector<std::string> names;
-    for (const CommandRow& one : kRows)
-      if (one.more.by_event) names.push_back(one.name);
-    if (row == nullptr)
-      return fail(fmt::format("unknown command \"{}\"", shown_name(wanted)),
-                  suggest(wanted, names));
-    return fail(wanted + " is not for events", fmt::format("these are: {}", fmt::join(names, ", ")));
-  }
-  return check_keys(*row, request);
 }
 
 std::string words_of(const ControlKey& key) {

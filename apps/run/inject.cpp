@@ -49,8 +49,7 @@ void add_inject(ControlRegistry& registry, const hal::RobotConfig& robot, const 
   registry.add(
       "inject",
       [&robot, tree, period_ns, add = std::move(add)](const Json& request) -> Result<Json> {
-        return add_all(scenario_of(request), "inject", robot, tree, period_ns,
-                       add);
+        return add_all(scenario_of(request), "inject", robot, tree, period_ns, add);
       });
 }
 

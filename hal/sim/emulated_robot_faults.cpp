@@ -33,6 +33,8 @@ Status EmulatedRobot::add_faults(const hal::RobotConfig& robot, const SimRobotCo
       return fail("there are at most " + std::to_string(FaultInjection::kMostFaults) +
                   " faults, and payloads that come and go, together");
     }
+    if (fault.kind == FaultKind::kPush && config.tree == nullptr)
+      return fail("a push needs the robot's description", "give SimRobotConfig its tree");
     if (fault.kind == FaultKind::kPayload && config.engine != kOwnEngine) {
       return fail("the engine '" + config.engine + "' cannot carry a payload that comes or goes",
                   "set engine = \"tandem\" in [sim]");
@@ -111,8 +113,7 @@ hal::InjectedFault EmulatedRobot::next_injected() noexcept TANDEM_RT {
   }
   const FaultSlot* over = faults_.next_over();
   if (over == nullptr) return {};
-  if (over->fault.kind == FaultKind::kPayload)
-    return payload(-std::int64_t{payload_number(*over)});
+  if (over->fault.kind == FaultKind::kPayload) return payload(-std::int64_t{payload_number(*over)});
   hal::InjectedFault push = injected(over->fault);
   push.over = true;
   return push;

@@ -42,8 +42,8 @@ struct ScenarioFault {
   std::int64_t duration_ns = -1;  ///< -1: for good
   std::int64_t ramp_ns = 0;       ///< in which a sag or a temperature is reached
   double value = 0.0;  ///< jump [rad, or m of a slide], supply [V], winding [degC], payload [kg]
-  double probability = 1.0;         ///< that a selected frame is struck
-  std::uint64_t seed = 0;           ///< of what is random in it
+  double probability = 1.0;           ///< that a selected frame is struck
+  std::uint64_t seed = 0;             ///< of what is random in it
   std::array<double, 3> force_N{};    ///< in W, or in the body with `turns`
   std::array<double, 3> torque_Nm{};  ///< beside it, in the same frame
   std::array<double, 3> point_m{};    ///< where it acts, in the body's frame (its joint's);

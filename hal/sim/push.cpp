@@ -37,9 +37,9 @@ void Pushes::act_on(std::int64_t time_ns, std::int64_t step_ns) noexcept TANDEM_
     } else {
       const auto lasts = static_cast<double>(lasts_ns), since = static_cast<double>(since_ns);
       const auto step = static_cast<double>(step_ns);
-      push.share = (area(push.given.shape, (since + step) / lasts) -
-                    area(push.given.shape, since / lasts)) *
-                   lasts / step;
+      push.share =
+          (area(push.given.shape, (since + step) / lasts) - area(push.given.shape, since / lasts)) *
+          lasts / step;
     }
     pushes_[kept++] = push;
   }

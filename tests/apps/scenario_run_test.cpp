@@ -61,8 +61,8 @@ eventually = "abs(truth.push_force_N.0) > 0.5N"
 TEST_F(ScenarioRun, ComesInTheSameCyclesEachTime) {
   scenario("events", kEvents);
   for (const char* log : {"one", "two"}) {
-    const Outcome outcome = tandem("run events.toml --duration 1.2 -q --json run.json --log " +
-                                   std::string(log));
+    const Outcome outcome =
+        tandem("run events.toml --duration 1.2 -q --json run.json --log " + std::string(log));
     ASSERT_EQ(outcome.status, 0) << outcome.err;
   }
   const auto rows = json("run.json")["expectations"];

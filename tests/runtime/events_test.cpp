@@ -51,9 +51,8 @@ std::uint64_t state_hash(const BundledRun& run) {
 
 // It acts from the end of the cycle in which the condition held, and ends after its time.
 TEST(Events, AConditionPushesFromTheNextCycleOn) {
-  BundledRun run("double_pendulum", "trajectory", with([](Experiment& e) {
-                   e.events = {pushed(e, "position(joint1) > 0.1rad")};
-                 }));
+  BundledRun run("double_pendulum", "trajectory",
+                 with([](Experiment& e) { e.events = {pushed(e, "position(joint1) > 0.1rad")}; }));
   std::uint64_t met = 0, first = 0, last = 0;
   while (run.cycle->step() && run.run->state().cycle()[0] < 3'000) {
     const std::uint64_t cycle = run.run->state().cycle()[0];
@@ -128,8 +127,8 @@ TEST(Events, ARequestIsCarriedOutInItsCycle) {
 TEST(Events, WhatNeverComesFailsUnlessItIsOptional) {
   BundledRun run("double_pendulum", "trajectory", with([](Experiment& e) {
                    e.events = {pushed(e, "position(joint1) > 100rad"),
-                               pushed(e, "position(joint1) > 100rad"), asked("late", 90'000'000'000),
-                               asked("nobody", 500'000'000)};
+                               pushed(e, "position(joint1) > 100rad"),
+                               asked("late", 90'000'000'000), asked("nobody", 500'000'000)};
                    e.events[1].optional = true;
                  }));
   run.steps(1'000);

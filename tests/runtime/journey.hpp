@@ -50,8 +50,9 @@ struct Journey {
   explicit Journey(const std::string& robot, const std::string& experiment,
                    log::Recorder* recorder = nullptr,
                    const std::vector<ExpectationSpec>& expectations = {})
-      : Journey(robot, experiment,
-                [expectations](Experiment& e) { e.expectations = expectations; }, recorder) {}
+      : Journey(
+            robot, experiment, [expectations](Experiment& e) { e.expectations = expectations; },
+            recorder) {}
   Journey(const std::string& robot, const std::string& experiment,
           std::function<void(Experiment&)> change, log::Recorder* recorder = nullptr)
       : machine(1'000'000, TimeMachine::kBudget_bytes, true),

@@ -80,7 +80,8 @@ ScenarioFault push_of(const std::string& row, const model::Tree& tree, std::int6
   read_push(table, {}, &tree, push);
   table.finish();
   EXPECT_TRUE(document->diagnostics().empty())
-      << document->diagnostics().front().to_string() << "\n" << row;
+      << document->diagnostics().front().to_string() << "\n"
+      << row;
   return push;
 }
 
