@@ -462,6 +462,22 @@ TomlTable TomlTable::table_or_empty(std::string_view key) {
   return {shared_, &kBroken, dotted(key), line(key)};
 }
 
+std::string TomlTable::json(std::string_view key) {
+  const toml::node* node = require(key);
+  if (node == nullptr) return {};
+  const toml::table* found = node->as_table();
+  if (found == nullptr) {
+    error(key, "must be a table, not " + kind(*node), "write { key = value }");
+    return {};
+  }
+  std::ostringstream text;
+  text << toml::json_formatter(*found, toml::format_flags::quote_dates_and_times |
+                                           toml::format_flags::quote_infinities_and_nans);
+  std::string line = text.str();
+  std::ranges::replace(line, '\n', ' ');  // of the layout: in texts they are escaped
+  return line;
+}
+
 /// Errors call an entry by a name that no other of the list has, and else by its number.
 std::vector<TomlTable> TomlTable::tables(std::string_view key, std::string_view named_by) {
   const toml::node* node = find(key);

@@ -85,6 +85,9 @@ class TomlTable {
   /// The sub-table `key`; an empty one without error when it is missing. A key that is then
   /// required of it is still an error, at this table's line.
   [[nodiscard]] TomlTable table_or_empty(std::string_view key);
+  /// The sub-table `key` as JSON in a line, for who checks its keys by himself; numbers that are
+  /// not finite become texts. Empty, after an error, when it is missing or no table.
+  [[nodiscard]] std::string json(std::string_view key);
   /// The array of tables [[key]] in the order of the file; empty when it is missing.
   /// @param named_by  the key whose value names one in errors that has no `name`, unless it is a
   ///                  path

@@ -48,11 +48,12 @@ inline constexpr std::array<std::string_view, 21> kFaultNames = {
 /// What a fault strikes.
 enum class FaultTarget : std::uint8_t { kNone = 0, kJoint, kBoard, kSensor, kBus };
 
-/// An injected fault that has begun.
+/// An injected fault that has begun; a push also, `over`, once it has ended.
 struct InjectedFault {
   FaultKind kind = FaultKind::kNone;
   FaultTarget target = FaultTarget::kNone;  ///< kNone: frames of every bus
   std::int32_t index = -1;                  ///< in the configuration; a payload's number, < 0: gone
+  bool over = false;
 };
 
 /// As a scenario's `kind` says it.

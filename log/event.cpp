@@ -136,7 +136,7 @@ const EventRow* row_of(EventKind kind) {
 
 std::string what_happened(const Event& event, const EventNames& names, const hal::LimitMet& met) {
   std::string text = to_string(event.kind);
-  if (event.kind == EventKind::kInjected) {
+  if (event.kind == EventKind::kInjected || event.kind == EventKind::kEnded) {
     text += " " + std::string(hal::to_string(static_cast<hal::FaultKind>(event.code)));
   }
   text += whose(event, names);

@@ -33,11 +33,9 @@ std::size_t Running::inject(const std::string& scenario) {
   return faults->size();
 }
 
-std::string Running::ask(const std::string& question) {
-  const Turn turn(*this, true);
-  check_open();
-  runtime::RobotCycle& cycle = run().cycle();
+apps::ControlRegistry& Running::commands() {
   if (commands_ == nullptr) {  // not those of stops and time, which are the run's own
+    runtime::RobotCycle& cycle = run().cycle();
     commands_ = std::make_unique<apps::ControlRegistry>();
     apps::add_controller_commands(*commands_, cycle.services(), c_->experiment.robot);
     apps::add_joint_commands(*commands_, cycle, c_->experiment.robot);
@@ -45,8 +43,24 @@ std::string Running::ask(const std::string& question) {
     apps::add_sensor_commands(*commands_, cycle.services());
     apps::add_signal_commands(*commands_, cycle.services(), c_->experiment.robot);
   }
-  if (begun_) cycle.attend();  // what is asked for is judged by the state that was read
-  const apps::Json answer = commands_->answer(question);
+  return *commands_;
+}
+
+void Running::carry_out_events() {
+  runtime::Events* const events = run().events();
+  if (events == nullptr) return;
+  events->ask_by([this](const std::string& request) -> Status {
+    const apps::Json answer = commands().answer(request);
+    if (answer.value("ok", false)) return {};
+    return fail(answer.value("error", "no answer"), answer.value("hint", ""));
+  });
+}
+
+std::string Running::ask(const std::string& question) {
+  const Turn turn(*this, true);
+  check_open();
+  if (begun_) run().cycle().attend();  // what is asked for is judged by the state that was read
+  const apps::Json answer = commands().answer(question);
   look_for_plugins();
   take_lead();
   if (!answer.value("ok", false)) {

@@ -112,9 +112,10 @@ Running::Running(const std::string& file, runtime::Overrides overrides, const st
                                         runtime::RunParts{.recorder = recorder_.get()});
   scene_->look_at(run());
   look_for_plugins();
-  run().cycle().services().attended_by([this] {
+  run().cycle().services().asker().attend_by([this] {
     if (begun_) run().cycle().attend();
   });
+  carry_out_events();
   begin();
   while (begun_ && (run().cycle().phase() == RunPhase::kBringUp ||
                     run().cycle().phase() == RunPhase::kSettling)) {

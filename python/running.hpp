@@ -97,6 +97,9 @@ class Running {
     std::optional<runtime::CrashGuard> guard_;  // where there is a plugin that may crash
   };
 
+  /// Whom ask() and events ask.
+  [[nodiscard]] apps::ControlRegistry& commands();
+  void carry_out_events();
   void add_lead(const std::string& all, const Control& some);
   void end_log();
   void end_log_by(const char* crash);

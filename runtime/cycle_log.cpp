@@ -162,7 +162,7 @@ void CycleLog::event(const hal::CycleTime& time,
                    .time_ns = time.time_ns,
                    .code = static_cast<std::uint32_t>(fault.kind),
                    .joint = of_joint ? fault.index : -1,
-                   .kind = log::EventKind::kInjected,
+                   .kind = fault.over ? log::EventKind::kEnded : log::EventKind::kInjected,
                    .target = fault.target,
                    .value = static_cast<float>(fault.index)};
   if (fault.kind == hal::FaultKind::kPayload) {

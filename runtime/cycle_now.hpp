@@ -28,6 +28,7 @@
 
 namespace tandem::runtime {
 
+class Events;
 class TimeMachine;
 
 /// The parts that a cycle joins. All outlive it.
@@ -44,6 +45,7 @@ struct CycleParts {
   SnapshotPort* snapshots = nullptr;           ///< null: nobody wants any while it runs
   RunIdentity identity = {};                   ///< a snapshot of another one is refused
   TimeMachine* time_machine = nullptr;         ///< null: time does not go back
+  Events* events = nullptr;                    ///< null: there are none
 };
 
 /// What the parts of RobotCycle know of this cycle. RobotCycle fills it; they read it, note faults

@@ -8,6 +8,7 @@
 #include "base/nearest.hpp"
 #include "robot/posture.hpp"
 #include "runtime/estimation_options.hpp"
+#include "runtime/event_rows.hpp"
 #include "runtime/experiment_tables.hpp"
 #include "runtime/plant_options.hpp"
 #include "runtime/robot_layout.hpp"
@@ -133,6 +134,7 @@ void combine(Experiment& e, TomlTable& root) {
   apply_order(e, e.robot, root.table_or_empty("sim"));
   if (!e.sim.noise) remove_noise(e.robot);
   e.plant = read_plant_changes(root.table_or_empty("sim"), e.robot, e.description.get(), e.files);
+  read_events(root, e);
 }
 
 /// The second robot: its files, against the first.

@@ -25,6 +25,7 @@
 #include "runtime/after_stop.hpp"
 #include "runtime/condition/expectation_spec.hpp"
 #include "runtime/controller_spec.hpp"
+#include "runtime/event_spec.hpp"
 #include "runtime/fall_watch.hpp"
 #include "runtime/teleoperation.hpp"
 
@@ -145,6 +146,8 @@ struct Experiment {
   std::optional<ParallelOptions> parallel;         ///< empty: there is no second robot
   dds::Config dds;                                 ///< off without the table
   std::vector<ExpectationSpec> expectations;       ///< [[expect]]
+  std::vector<sim::ScenarioFault> faults;          ///< [[push]] and [[fault]] at a time
+  std::vector<EventSpec> events;                   ///< [[event]], and those at a condition
   std::vector<ControllerSpec> controllers;
   TomlDocument document;  ///< its diagnostics() grow while controllers read parameters
 

@@ -11,6 +11,7 @@
 #include "hal/estimate.hpp"
 #include "hal/truth.hpp"
 #include "rt/clock_control.hpp"
+#include "runtime/event_rows.hpp"
 #include "runtime/expectation_rows.hpp"
 #include "runtime/plant_options.hpp"
 
@@ -285,9 +286,10 @@ ParallelOptions read_parallel(TomlTable table, const std::string& file, const st
 }
 
 const std::vector<std::string> kSections{
-    "robot",  "duration_s", "seed",       "posture",    "kernel_variant", "period_ns", "sim",
-    "hal",    "overrun",    "clock",      "realtime",   "faults",         "remote",    "log",
-    "report", "dds",        "controller", "estimation", "teleoperation",  "parallel",  "expect"};
+    "robot",         "duration_s", "seed",    "posture", "kernel_variant", "period_ns",
+    "sim",           "hal",        "overrun", "clock",   "realtime",       "faults",
+    "remote",        "log",        "report",  "dds",     "controller",     "estimation",
+    "teleoperation", "parallel",   "expect",  "fault",   "push",           "event"};
 
 }  // namespace
 
@@ -341,6 +343,7 @@ void describe_experiment(KeyPage& page) {
   page.add("[report]", kReport);
   page.add("[parallel]", kParallel);
   describe_expectations(page);
+  describe_events(page);
 }
 
 }  // namespace tandem::runtime

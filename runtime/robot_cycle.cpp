@@ -5,6 +5,7 @@
 
 #include "rt/scoped_realtime.hpp"
 #include "rt/stop_signal.hpp"
+#include "runtime/events.hpp"
 #include "runtime/fault_text.hpp"
 #include "runtime/time_machine.hpp"
 
@@ -46,7 +47,10 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       shown_(now_, resets_, homing_, arbiter_, services_),
       trace_(config.trace_cycles),
       limited_(parts.robot.joints.size()),
-      limits_met_(parts.robot.joints.size()) {}
+      limits_met_(parts.robot.joints.size()) {
+  if (now_.events != nullptr && now_.events->asks())
+    services_.asker().attend_by([this] { attend(); }, false);
+}
 
 bool RobotCycle::begin() noexcept {
   if (now_.run.in(RunPhase::kDone)) return false;
@@ -62,6 +66,7 @@ bool RobotCycle::begin() noexcept {
 
 bool RobotCycle::finish() noexcept {
   owner_.await();
+  if (now_.events != nullptr && !now_.outside.closed) ask_events();
   {
     const AtWork now(heartbeat_);
     take_inbox();
@@ -82,6 +87,25 @@ void RobotCycle::attend() noexcept {
   // The controllers start in this cycle, and forget what came before.
   const bool starting = now_.run.in(RunPhase::kRunning) && !arbiter_.controls();
   if (starting) now_.progress.phase.store(before);
+}
+
+/// In simulated time, which waits for it. A cycle that asked is played again by nobody.
+void RobotCycle::ask_events() noexcept {
+  Events& events = *now_.events;
+  while (const auto event = events.next_ask(now_.time.time_ns)) {
+    now_.outside.came = true;
+    services_.asker().here(true);
+    const std::string why = events.ask(*event, now_.time.time_ns);
+    services_.asker().here(false);
+    hal::TextEvent text;
+    text.cycle = now_.time.cycle;
+    text.time_ns = now_.time.time_ns;
+    text.level = why.empty() ? hal::TextLevel::kInfo : hal::TextLevel::kWarn;
+    text.set_controller(events.spec(*event).name);
+    text.append(why.empty() ? "done: " + events.spec(*event).ask : "refused: " + why);
+    now_.log.text(text);
+    services_.show(text);
+  }
 }
 
 /// Where time can go back: to the cycle that somebody wants, if one does.
@@ -106,7 +130,8 @@ void RobotCycle::wait() noexcept {
 void RobotCycle::await_tick() noexcept {
   // Four images, a sample of each input, every event that one cycle can bring, and what the
   // controllers tell.
-  const std::size_t most = 4 + 16 + Inbox::kCapacity * kMostParameterChanges +
+  const std::size_t most = (now_.events != nullptr ? now_.events->size() : 0) + 4 + 16 +
+                           Inbox::kCapacity * kMostParameterChanges +
                            ControllerHost::kToldParameters + 3 * now_.watch.joints() +
                            now_.watch.sensors() + now_.controllers.inputs() +
                            kMostControllers * (3 + TextEventSlots::kSlots);
@@ -332,6 +357,7 @@ void RobotCycle::write() noexcept TANDEM_RT {
 /// To the log, the threads that watch the run, and those that wait for an answer.
 void RobotCycle::hand_over() noexcept TANDEM_RT {
   shown_.take();
+  if (now_.events != nullptr) now_.events->take(shown_.view());
   if (!now_.outside.closed) now_.inbox.confirm(now_.time.cycle);
   const std::int64_t now_ns = now_.loop.finish();
   now_.controllers.shadows().note_end_of_cycle(now_ns);

@@ -127,6 +127,7 @@ class RobotCycle {
   void read() noexcept TANDEM_RT;
   void check() noexcept TANDEM_RT;
   void advance_phase() noexcept TANDEM_RT;
+  void ask_events() noexcept;
   void take_inbox() noexcept TANDEM_RT;
   void update() noexcept TANDEM_RT;
   void limit() noexcept TANDEM_RT;

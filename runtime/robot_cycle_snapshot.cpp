@@ -1,6 +1,7 @@
 // A run's whole state as bytes, and cycles that are played once more from them.
 #include "rt/scoped_realtime.hpp"
 #include "rt/stop_signal.hpp"
+#include "runtime/events.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::runtime {
@@ -10,6 +11,7 @@ void RobotCycle::archive(Archive& ar) {
   ar(now_.identity, controllers);  // first: restore() looks at them before anything changes
   ar(now_, resets_, homing_, arbiter_, waiting_, response_);
   ar(now_.controllers, shown_, started_, limited_, limits_met_);
+  if (now_.events != nullptr) ar(*now_.events);
 }
 
 bool RobotCycle::write_down(Archive& ar, bool backend) {

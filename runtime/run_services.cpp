@@ -96,12 +96,12 @@ Result<RequestResult> RunServices::ask(Lock& lock, CycleRequest request, Patienc
   bool stands = false;  // nothing comes any more, until somebody lets time go on
   while (!answer && !stands && SteadyClock::now() < deadline) {
     lock.unlock();
-    if (attend_) {
-      attend_();
+    if (asker_.attends()) {
+      asker_.attend();
     } else {
       std::this_thread::sleep_for(kLook);
     }
-    stands = attend_ != nullptr || inbox_->clock().state().standing ||
+    stands = asker_.attends() || inbox_->clock().state().standing ||
              progress_->phase.load() == RunPhase::kDone;
     lock.lock();
     collect();

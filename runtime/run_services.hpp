@@ -26,6 +26,7 @@
 #include "runtime/cycle_log.hpp"
 #include "runtime/inbox.hpp"
 #include "runtime/joint_looks.hpp"
+#include "runtime/loop_asker.hpp"
 #include "runtime/progress.hpp"
 #include "runtime/text_history.hpp"
 
@@ -150,9 +151,8 @@ class RunServices {
   RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
               const Progress& progress, const hal::ParameterImage& gains, CycleLog& log);
 
-  /// The thread of the loop asks by itself, between the halves of a cycle: where another thread
-  /// would wait for the loop's answer, `attend` is called instead.
-  void attended_by(std::function<void()> attend) { attend_ = std::move(attend); }
+  /// For who asks in the thread of the loop.
+  [[nodiscard]] LoopAsker& asker() noexcept { return asker_; }
 
   /// Loaded controllers, in the order in which they run.
   [[nodiscard]] std::vector<ControllerStatus> controllers();
@@ -371,7 +371,7 @@ class RunServices {
   Seqlock<hal::PidGains> gain_looks_;
   TextHistory texts_;
   std::atomic<std::uint64_t> loads_{1};
-  std::function<void()> attend_;  // empty: the loop has a thread of its own
+  LoopAsker asker_;
 
   std::mutex mutex_;  // of all below, and of the asking side of inbox and host
   std::function<std::string()> owner_;

@@ -159,7 +159,7 @@ Result<RequestResult> RunServices::set_input(const std::string& name, const Inpu
     if (const auto cycle = (*port)->taken(*number)) {
       return RequestResult{.done = true, .cycle = *cycle, .phase = progress_->phase.load()};
     }
-    const bool stands = attend_ != nullptr || inbox_->clock().state().standing ||
+    const bool stands = asker_.attends() || inbox_->clock().state().standing ||
                         progress_->phase.load() != RunPhase::kRunning;
     if (stands || std::chrono::steady_clock::now() >= deadline) return RequestResult{};
     std::this_thread::sleep_for(kSampleLook);

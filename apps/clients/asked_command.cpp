@@ -29,6 +29,8 @@ void print_injected(const Json& answer) {
   fmt::print("{} injected\n", answer.value("injected", 0) == 1 ? "the fault is" : "the faults are");
 }
 
+void print_pushed(const Json& /*answer*/) { fmt::print("it is pushed from the next cycle on\n"); }
+
 /// Every single value and list of an answer: of a command that has no words of its own.
 void print_values(const Json& answer) {
   tell_done(answer);
@@ -91,6 +93,7 @@ constexpr Form kForms[]{
     {"joint.stop", &print_joint_stop},
     {"joint.tuning", &print_tuning},
     {"predict", nullptr, &tell_prediction},
+    {"push", &print_pushed},
     {"sensor.list", nullptr, &tell_sensors},
     {"signal.list", nullptr, &tell_signals},
     {"signal.watch", nullptr, &tell_signal_watch},

@@ -123,6 +123,16 @@ Without --socket or --dds it is the only `tandem run` of this user.)"},
   tandem predict --horizon 5 --every 50              a row every 50 cycles
 A simulated robot is predicted by a copy of it, a real one by the robot of [parallel]:
 docs/internal-model.md)"},
+    {"push", "Push a simulated robot", R"(Examples:
+  tandem push torso --force 40,0,0 --for 0.2s        at a site, along the world's x axis
+  tandem push hand --impulse 0,2,0 --for 50ms --shape half_sine
+                                                     2 Ns, whatever the shape
+  tandem push --link LForearm --point 0,0,-0.1 --force 0,0,-20
+                                                     on a link, until the run ends
+  tandem push hand --torque 0,0,1 --frame local --for 1s
+                                                     about the site's own z axis
+The robot of another process is pushed by `tandem inject kind=push …` there: docs/scenarios.md.
+Without --socket or --dds it is the only `tandem run` of this user.)"},
     {"inject", "Inject a fault into a running emulated or simulated robot", R"(Examples:
   tandem inject kind=board_kill board=left_leg_1 for_s=0.5
   tandem inject kind=encoder_jump joint=LKneeSag rad=0.05
@@ -183,6 +193,9 @@ CLI::Option* add_key(CLI::App& app, const ControlKey& key, Json& given) {
     CLI::Option* list = app.add_option_function<std::vector<std::string>>(key.line, put, doc);
     if (flag) key.sent ? list->delimiter(',') : list->allow_extra_args(false);
     return list;
+  }
+  if (key.type == Type::kNumbers) {
+    return app.add_option_function<std::vector<double>>(key.line, put, doc)->delimiter(',');
   }
   if (key.unit != ControlKey::Unit::kNone || key.type == Type::kText) {
     CLI::Option* text = app.add_option_function<std::string>(key.line, put, doc)

@@ -24,6 +24,7 @@ const char* to_string(Type type) {
     case Type::kBoolean: return "true or false";
     case Type::kObject: return "object";
     case Type::kTexts: return "list of texts";
+    case Type::kNumbers: return "list of numbers";
     case Type::kTextOrObject: return "text or object";
   }
   return "?";
@@ -39,6 +40,9 @@ bool is_of(const Json& value, Type type) {
     case Type::kTexts:
       return value.is_array() &&
              std::ranges::all_of(value, [](const Json& one) { return one.is_string(); });
+    case Type::kNumbers:
+      return value.is_array() &&
+             std::ranges::all_of(value, [](const Json& one) { return one.is_number(); });
     case Type::kTextOrObject: return value.is_string() || value.is_object();
   }
   return false;
@@ -58,6 +62,9 @@ ControlKey integer(const char* name, const char* line, double min, double max, c
 }
 ControlKey texts(const char* name, const char* line, const char* doc) {
   return {.name = name, .type = Type::kTexts, .doc = doc, .line = line};
+}
+ControlKey numbers(const char* name, const char* line, const char* doc) {
+  return {.name = name, .type = Type::kNumbers, .doc = doc, .line = line};
 }
 ControlKey flag(const char* name, const char* line, const char* doc) {
   return {.name = name, .type = Type::kBoolean, .doc = doc, .line = line};
@@ -86,12 +93,13 @@ const std::vector<CommandRow> kRows{
      {.asks = "loop.show"}},
     {"expect.show", kReads, "how far the run's expectations are", {}, {.on_line = false}},
     {"fault.show", kReads, "every fault of the run, latched or cleared"},
-    {"fault.reset", kChanges, "clears what is latched; resets or failed_resets counts on when done"},
+    {"fault.reset", kChanges, "clears what is latched; resets or failed_resets counts on when done",
+     {}, {.by_event = true}},
     {"estop", kStops, "emergency stop, latched; waits until the loop confirms it",
      {integer("category", "--category", 0, 2, "0, 1 or 2; else what robot.toml's [safety] says"),
       local(flag("trust-domain", "--trust-domain",
                  "believe whoever answers in the DDS domain, where nobody but robots is"))}},
-    {"run.stop", kEnds, "ends the run in order", {}, {.on_line = false}},
+    {"run.stop", kEnds, "ends the run in order", {}, {.on_line = false, .by_event = true}},
 
     {"controller.list", kReads, "every loaded controller and its claims"},
     {"controller.show", kReads, "claims and parameters of a controller",
@@ -106,7 +114,8 @@ const std::vector<CommandRow> kRows{
       flag("each", "", "true: each by itself; `results` has what became of it"),
       need(local(text("controller", "name", kLoaded))),
       need(local(texts("values", "values",
-                       "one or more of NAME=VALUE: kp=40; of a list kp=[40,40,20], kp.joint2=30")))}},
+                       "one or more of NAME=VALUE: kp=40; of a list kp=[40,40,20], kp.joint2=30")))},
+     {.by_event = true}},
     {"controller.load", kChanges, "loads a controller, inactive",
      {need(text("plugin", "plugin", "its name, or the path of its library")),
       text("name", "--name", "default: the plugin's"),
@@ -116,21 +125,26 @@ const std::vector<CommandRow> kRows{
            "the file of them, in errors: parameters; the command line reads it: TOML"),
       local(texts("set", "--set", "one parameter, 'key = value', beside the file's; repeatable")),
       flag("untried", "--untried", "open it without the trial in a process of its own: a crash ends the run"),
-      local(flag("start", "--start", "start it as well"))}},
+      local(flag("start", "--start", "start it as well"))},
+     {.by_event = true}},
     {"controller.reload", kChanges,
      "loads a controller's library as it is now, with the same parameters, and puts it in the "
      "place of the former build in one cycle; it goes on with the former one's state where that "
      "has the same shape",
      {need(text("name", "name", kLoaded)),
       flag("fresh", "--fresh", "start from the measured state in any case"),
-      flag("untried", "--untried", "open it without the trial in a process of its own: a crash ends the run")}},
+      flag("untried", "--untried", "open it without the trial in a process of its own: a crash ends the run")},
+     {.by_event = true}},
     {"controller.unload", kChanges, "frees an inactive controller",
-     {need(text("name", "name", kLoaded))}},
+     {need(text("name", "name", kLoaded))},
+     {.by_event = true}},
     {"controller.start", kChanges, "starts a controller, or all that a reset holds back",
      {text("name", "", "of a loaded controller; else those that were active before the reset"),
-      local(texts("names", "names", "none: those that were active before the reset"))}},
+      local(texts("names", "names", "none: those that were active before the reset"))},
+     {.by_event = true}},
     {"controller.stop", kChanges, "stops a controller; its joints are held",
-     {need(text("name", "", kLoaded)), need(local(texts("names", "names", "of controllers")))}},
+     {need(text("name", "", kLoaded)), need(local(texts("names", "names", "of controllers")))},
+     {.by_event = true}},
     {"controller.switch", kChanges, "stops some and starts others in one cycle, all or none",
      {texts("stop", "--stop", "controllers to stop"), texts("start", "--start", "and to start"),
       {.name = "when_within", .type = Type::kNumber, .doc = "waits until the shadows to start are "
@@ -138,7 +152,8 @@ const std::vector<CommandRow> kRows{
        "same modes", .line = "--when-within", .min = 0.0, .max = 1e6},
       {.name = "timeout_s", .type = Type::kNumber, .doc = "with it: how long at most [s], of the "
        "run's time, 0 to 3600; default 10. Then nothing has changed", .line = "--timeout",
-       .unit = Unit::kTime, .min = 0.0, .max = 3600.0}}},
+       .unit = Unit::kTime, .min = 0.0, .max = 3600.0}},
+     {.by_event = true}},
     {"controller.shadow", kChanges,
      "runs an inactive controller beside the active ones on live data, without commanding",
      {need(text("name", "name", kLoaded)), flag("end", "--end", "it is no shadow any more")}},
@@ -159,7 +174,8 @@ const std::vector<CommandRow> kRows{
              {"idle", "position", "velocity", "torque", "open_loop", "current"}),
       choice("interaction", "--interaction", {"stiff", "compliant"}),
       number("stiffness_Nm_rad", "--stiffness", "of the virtual spring [Nm/rad, of a slide N/m]"),
-      number("damping_Nms_rad", "--damping", "of the virtual damper [Nms/rad, of a slide Ns/m]")}},
+      number("damping_Nms_rad", "--damping", "of the virtual damper [Nms/rad, of a slide Ns/m]")},
+     {.by_event = true}},
     {"joint.move", kChanges,
      "moves a joint that no active controller claims, with a trapezoidal velocity profile",
      {kJoint,
@@ -172,7 +188,8 @@ const std::vector<CommandRow> kRows{
            "the target by whole turns nearest to the joint, within its limits"),
       local(flag("wait", "--wait",
                  "until it has arrived: status 0; 1 when the motion ended elsewhere. Ctrl-C ends "
-                 "the waiting, not the motion: tandem joint stop"))}},
+                 "the waiting, not the motion: tandem joint stop"))},
+     {.by_event = true}},
     {"joint.posture", kChanges,
      "leads joints that no active controller claims to a posture of the robot, so that all arrive "
      "together",
@@ -180,24 +197,31 @@ const std::vector<CommandRow> kRows{
       texts("joints", "--joints", "only these; else every joint"),
       {.name = "speed", .type = Type::kNumber,
        .doc = "share of its greatest velocity for the joint that takes longest; default 0.1",
-       .line = "--speed", .min = 0.001, .max = 1.0}}},
+       .line = "--speed", .min = 0.001, .max = 1.0}},
+     {.by_event = true}},
     {"joint.tuning", kReads,
      "the gains and impedances in force as [gains.NAME] tables for robot.toml"},
-    {"joint.stop", kChanges, "brakes a joint that `joint move`, `home` or `recover` leads", {kJoint}},
-    {"joint.halt", kChanges, "brakes every joint that `joint move`, `home` or `recover` leads"},
+    {"joint.stop", kChanges, "brakes a joint that `joint move`, `home` or `recover` leads", {kJoint},
+     {.by_event = true}},
+    {"joint.halt", kChanges, "brakes every joint that `joint move`, `home` or `recover` leads",
+     {}, {.by_event = true}},
     {"joint.home", kChanges,
      "lets the drive of a joint find the joint's place, as its `homing` in robot.toml says; the "
-     "command line waits for that: status 1 when it failed", {kJoint}},
+     "command line waits for that: status 1 when it failed", {kJoint},
+     {.by_event = true}},
     {"joint.recover", kChanges,
-     "leads a joint that stands outside its limits back, at a twentieth of its velocity", {kJoint}},
+     "leads a joint that stands outside its limits back, at a twentieth of its velocity", {kJoint},
+     {.by_event = true}},
     {"joint.reset", kChanges,
-     "clears the fault of one drive; while the run is faulted nothing is enabled", {kJoint}},
+     "clears the fault of one drive; while the run is faulted nothing is enabled", {kJoint},
+     {.by_event = true}},
     {"joint.gains", kChanges, "gains of a loop in a joint's drive, by SDO",
      {kJoint, need(choice("loop", "loop", {"position", "velocity", "torque", "current"})),
       number("kp", "--kp", "as in [gains]; it stays if left out"),
       number("ki", "--ki", "of the integral: kp's units per second"),
       number("kd", "--kd", "of the derivative: kp's units times seconds"),
-      flag("anyway", "--anyway", "true: also when the model finds the loop unstable")}},
+      flag("anyway", "--anyway", "true: also when the model finds the loop unstable")},
+     {.by_event = true}},
 
     {"site.move", kChanges,
      "leads a site of the robot a small step, by joints that no active controller claims",
@@ -208,7 +232,8 @@ const std::vector<CommandRow> kRows{
       choice("axes", "--axes", {"base", "site"}),
       {.name = "speed", .type = Type::kNumber,
        .doc = "[m/s, rad/s]; default 0.05, of an angle 0.2; slower where a joint's limit says so",
-       .line = "--speed", .min = 0.001, .max = 2.0}}},
+       .line = "--speed", .min = 0.001, .max = 2.0}},
+     {.by_event = true}},
 
     {"input.list", kReads, "every input of the loaded controllers: who feeds it, what holds",
      {local(texts("inputs", "inputs", "only these"))}},
@@ -224,7 +249,7 @@ const std::vector<CommandRow> kRows{
                   "commas; repeatable")),
       local({.name = "for_s", .type = Type::kNumber, .doc = "sends it again, ten times a second, "
              "for so long [s]", .line = "--for", .min = 0.0, .max = 3600.0})},
-     {.of_group = true}},
+     {.of_group = true, .by_event = true}},
 
     {"sensor.list", kReads, "every sensor: where it is, what it measures, how old that is",
      {local(texts("sensors", "sensors", "only these"))}},
@@ -263,10 +288,22 @@ const std::vector<CommandRow> kRows{
       integer("every_cycles", "--every", 1, 1e9,
               "cycles between two rows of the answer; default: about 100 rows")},
      {.takes_long = true}},
+    {"push", kChanges, "pushes a simulated robot, from the next cycle on",
+     {text("site", "site", "of robot.toml's [[site]]; or a link, or a joint"),
+      text("link", "--link", "of the description"), text("joint", "--joint", "whose body"),
+      numbers("force_N", "--force", "x,y,z [N]; the greatest of its shape"),
+      numbers("torque_Nm", "--torque", "x,y,z [Nm]"),
+      numbers("impulse_Ns", "--impulse", "instead of a force: what its duration divides [Ns]"),
+      numbers("impulse_Nms", "--angular-impulse", "instead of a torque [Nms]"),
+      numbers("point_m", "--point", "where, in the frame of the place [m]"),
+      choice("frame", "--frame", {"world", "local"}),
+      choice("shape", "--shape", {"step", "half_sine", "triangle"}),
+      with_unit(Unit::kTime, "for_s", "--for", "how long it lasts [s]")},
+     {.by_event = true}},
     {"inject", kChanges, "inject faults, from the next cycle on",
      {need(text("scenario", "", "[[fault]] tables, TOML")),
       need(local(texts("fault", "fault", "key=value words, or TOML")))},
-     {.any_process = true}},
+     {.any_process = true, .by_event = true}},
     {"studio.open", kChanges, "shows the run in a browser; the answer has the address with its token",
      {integer("port", "", 0, 65535, "else the first that is free from 8642 on; 0: any"),
       text("address", "", "where it listens; else 127.0.0.1"),

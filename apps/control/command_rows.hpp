@@ -38,6 +38,7 @@ struct ControlKey {
     kBoolean,
     kObject,
     kTexts,         ///< a list of texts
+    kNumbers,       ///< a list of numbers
     kTextOrObject,  ///< TOML, or the same as an object
   };
   /// Unit that a number may have on the command line, which gives SI units; beside it, the request
@@ -70,6 +71,8 @@ struct CommandRow {
     bool of_group = false;     ///< `tandem input NAME`: its line is the group's, without a verb
     /// What is asked instead: the command line has two forms of one question. Empty: its name.
     std::string asks{};
+    /// An [[event]] may ask for it: it ends within the cycle in which it is asked.
+    bool by_event = false;
   } more{};
 };
 
@@ -80,6 +83,13 @@ struct CommandRow {
 /// Whether a value of a key is of its type, one of its choices, and in its range. The error lacks a
 /// subject: `is not of type text`.
 [[nodiscard]] Status check_value(const ControlKey& key, const Json& value);
+
+/// Whether `request` is one of a command's: its keys are known, there when required, and of the
+/// right type. @param suggests  for nobody else it is looked what may be meant
+[[nodiscard]] Status check_keys(const CommandRow& row, const Json& request, bool suggests = true);
+
+/// Whether an [[event]] may ask for it: the command is there, may be asked so, and check_keys().
+[[nodiscard]] Status check_event(const Json& request);
 
 /// "integer, optional: 1 to 3".
 [[nodiscard]] std::string words_of(const ControlKey& key);

@@ -30,35 +30,6 @@ std::string shown(const std::string& word) {
   return word.size() <= kMostNamed ? word : std::string(whole_characters(word, kMostNamed)) + "…";
 }
 
-/// @param known_asker  for nobody else it is looked what may be meant
-Status check_keys(const Json& request, const std::string& command,
-                  const std::vector<ControlKey>& keys, bool known_asker) {
-  std::vector<std::string> names;
-  for (const ControlKey& key : keys) {
-    if (key.sent) names.push_back(key.name);
-  }
-  for (const auto& [name, value] : request.items()) {
-    if (name == "do") continue;
-    const auto known = std::ranges::find(keys, name, &ControlKey::name);
-    if (known == keys.end() || !known->sent) {
-      return fail(fmt::format("{}: unknown key \"{}\"", command, shown(name)),
-                  names.empty() ? "it takes none"
-                  : known_asker ? suggest(name, names)
-                                : R"({"do": "help"} lists them)");
-    }
-    if (Status fits = check_value(*known, value); !fits) {
-      return fail(fmt::format("{}: \"{}\" {}", command, name, fits.error().message),
-                  fits.error().hint);
-    }
-  }
-  for (const ControlKey& key : keys) {
-    if (key.required && key.sent && !request.contains(key.name)) {
-      return fail(fmt::format("{}: \"{}\" is missing", command, key.name), key.doc);
-    }
-  }
-  return {};
-}
-
 }  // namespace
 
 ControlRegistry::ControlRegistry() {
@@ -113,13 +84,14 @@ Result<Json> ControlRegistry::run(const Json& request, const Asked& asked) const
       return std::unexpected(open.error());
     }
   }
-  if (Status keys = check_keys(request, command.name, command.keys, asked.known); !keys) {
+  if (Status keys = check_keys(command, request, asked.known); !keys) {
     return std::unexpected(keys.error());
   }
   const bool urgent =
       command.effect == ControlEffect::kStops || command.effect == ControlEffect::kEnds;
   std::unique_lock lock(command.more.takes_long ? working_long_ : working_, std::defer_lock);
-  if (!urgent) lock.lock();
+  if (!urgent && !asked.meanwhile) lock.lock();
+  while (!urgent && !lock.owns_lock() && !lock.try_lock()) asked.meanwhile();
   if (Status in_time = check_stops(command, asked); !in_time) {
     return std::unexpected(in_time.error());
   }

@@ -53,6 +53,8 @@ class ControlRegistry {
     std::uint64_t after_stop = 0;  ///< last_stop() when the question came
     bool known = true;  ///< else kMaxStrangersQuestion, and nobody looks for what was meant
     Gate gate = {};     ///< empty: everything may be asked for
+    /// Called while another handler works, by the thread that one may wait for; empty: it blocks.
+    std::function<void()> meanwhile = {};
   };
 
   /// The command "help" is there from the start: it lists the others.

@@ -118,7 +118,9 @@ void figures(Figures& f, const RunFigures* s) {
     [&] { return s->cycle->statistics().base(); });
   f("fault_log", "every fault", [&] { return s->cycle->faults(); });
   f("expectations",
-    "of `[[expect]]`, in its order; null without: [expectations.md](expectations.md)", [&] {
+    "of `[[expect]]`, in its order, then of events; null without: "
+    "[expectations.md](expectations.md)",
+    [&] {
       return known(s->expectations != nullptr, s->expectations == nullptr
                                                    ? std::vector<runtime::ExpectationResult>()
                                                    : s->expectations->results());

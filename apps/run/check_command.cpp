@@ -12,6 +12,7 @@
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/connection.hpp"
+#include "apps/run/event_run.hpp"
 #include "apps/run/input_topics.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
@@ -272,6 +273,7 @@ Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagno
   warn_of_payloads((*composition)->experiment, warnings);
   print_warnings(warnings);
   if (const Status fed = check_topics(**composition); !fed) return {fed.error()};
+  if (Diagnostics events = check_events((*composition)->experiment); !events.empty()) return events;
   const runtime::Experiment& e = (*composition)->experiment;
   add_loop_json(e.robot, (*composition)->loops, json);
   add_scale_json(e.robot, json);

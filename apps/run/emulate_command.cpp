@@ -223,12 +223,13 @@ void tell_injected(Emulation& e, std::FILE* out, bool quiet) {
     if (fault.kind == hal::FaultKind::kNone) return;
     const bool carried = fault.kind == hal::FaultKind::kPayload;
     const bool dropped = carried && fault.index < 0;
-    if (!dropped) ++e.injected;
+    if (!dropped && !fault.over) ++e.injected;
     const std::string what =
         carried
             ? fmt::format("payload {}: {}", dropped ? "dropped" : "picked up",
                           e.robot->payload_text(static_cast<std::uint32_t>(std::abs(fault.index))))
-            : fmt::format("injected {}{}", to_string(fault.kind), whose(fault, e.subject.robot));
+            : fmt::format("{} {}{}", fault.over ? "ended" : "injected", to_string(fault.kind),
+                          whose(fault, e.subject.robot));
     if (e.studio != nullptr) e.studio->tell(what);
     if (quiet) continue;
     fmt::print(out, "{:.3f} s: {}\n", static_cast<double>(e.emulator->time_ns()) * 1e-9, what);

@@ -18,6 +18,7 @@
 #include "apps/run/cycle_thread.hpp"
 #include "apps/run/dds_run.hpp"
 #include "apps/run/end_guard.hpp"
+#include "apps/run/event_run.hpp"
 #include "apps/run/expect_run.hpp"
 #include "apps/run/game_pad.hpp"
 #include "apps/run/gate.hpp"
@@ -195,17 +196,20 @@ class Session {
          .past = past_->of(*cycle_)});
     add_expectations(commands_, *cycle_, c_.expectations.get());
     add_predict(commands_, c_.predictor.get(), e.robot);
+    if (c_.events != nullptr) carry_out(*c_.events, commands_, *cycle_);
     if (dds_ != nullptr) {
       admission_.add_to(commands_);
       add_identity(commands_, dds_->participant());
     }
+    AddFault add;
     if (c_.sim != nullptr) {
-      add_inject(commands_, e.robot, e.tree().get(), e.loop.period_ns,
-                 [this](const sim::ScenarioFault& fault) -> Status {
-                   if (!c_.sim->robot().can_begin(fault)) return injected(Code::kOutOfRange);
-                   return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
-                 });
+      add = [this](const sim::ScenarioFault& fault) -> Status {
+        if (!c_.sim->robot().can_begin(fault)) return injected(Code::kOutOfRange);
+        return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
+      };
+      add_inject(commands_, e.robot, e.tree().get(), e.loop.period_ns, add);
     }
+    add_push(commands_, e.robot, e.tree().get(), e.loop.period_ns, std::move(add));
     studio_.start(*cycle_, commands_, shown_to(internal_model::ParallelReader::kStudio));
     const bool on_robot = e.hal.backend == runtime::BackendKind::kWire && !e.hal.lockstep;
     auto socket = serve(commands_, {.path = options_.socket,
@@ -381,6 +385,8 @@ Exit run_command(const RunOptions& given, ReportOfRun& report) {
   print_warnings(std::exchange((*composition)->warnings, {}));
   rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
   outlive_files();
+  if (const Diagnostics errors = check_events((*composition)->experiment); !errors.empty())
+    return refuse(errors);
   if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty())
     return refuse(errors);
   print_warnings((*composition)->warnings);

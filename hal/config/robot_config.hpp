@@ -291,6 +291,18 @@ struct SensorConfig {
   [[nodiscard]] std::size_t channels() const { return channels_of(type); }
 };
 
+/// [[sim.patch]]: a rectangle of the simulated ground that is other than the rest.
+struct GroundPatch {
+  std::string name;
+  std::array<double, 2> x_m{}, y_m{};  ///< from and to, in W
+  double static_friction = 0.0, sliding_friction = 0.0;
+  double stiffness_share = 1.0;  ///< of the ground's stiffnesses
+
+  [[nodiscard]] bool holds(double x, double y) const noexcept {
+    return x >= x_m[0] && x <= x_m[1] && y >= y_m[0] && y <= y_m[1];
+  }
+};
+
 /// [contact]: compliant ground at z = height. Per point.
 struct ContactConfig {
   double height_m = 0.0;
@@ -302,6 +314,7 @@ struct ContactConfig {
   double sliding_friction = 0.0;
   double stick_velocity_m_s = 0.01;  ///< regularisation between static and sliding
   std::vector<Foot> feet;            ///< [[contact.foot]]
+  std::vector<GroundPatch> patches;  ///< the first that holds a point counts
   std::map<std::string, int> lines;  ///< key -> line in the TOML, for messages
 };
 

@@ -33,6 +33,8 @@ Status EmulatedRobot::add_faults(const hal::RobotConfig& robot, const SimRobotCo
       return fail("there are at most " + std::to_string(FaultInjection::kMostFaults) +
                   " faults, and payloads that come and go, together");
     }
+    if (fault.kind == FaultKind::kPush && config.tree == nullptr)
+      return fail("a push needs the robot's description", "give SimRobotConfig its tree");
     if (fault.kind == FaultKind::kPayload && config.engine != kOwnEngine) {
       return fail("the engine '" + config.engine + "' cannot carry a payload that comes or goes",
                   "set engine = \"tandem\" in [sim]");
@@ -75,9 +77,12 @@ void EmulatedRobot::begin_faults(std::int64_t time_ns) noexcept {
       one.frozen[side] = one.unplugged[side] = 0;
     }
   }
-  plant_.pushes().clear();
   bool loads = false;
   for (const FaultSlot& slot : faults_.slots()) {
+    if (slot.fault.kind == FaultKind::kPush) {  // it ends by itself, between two steps
+      if (slot.began != 0) plant_.pushes().begin(slot.fault, plant_.time_ns());
+      continue;
+    }
     if (slot.active != 0 || slot.ended != 0) apply(slot, time_ns - first_ns_);
     loads |= slot.fault.kind == FaultKind::kPayload && (slot.began != 0 || slot.ended != 0);
   }
@@ -106,9 +111,12 @@ hal::InjectedFault EmulatedRobot::next_injected() noexcept TANDEM_RT {
     if (slot->fault.kind != FaultKind::kPayload) return injected(slot->fault);
     return payload(payload_number(*slot));
   }
-  const FaultSlot* dropped = faults_.next_dropped();
-  return dropped == nullptr ? hal::InjectedFault{}
-                            : payload(-std::int64_t{payload_number(*dropped)});
+  const FaultSlot* over = faults_.next_over();
+  if (over == nullptr) return {};
+  if (over->fault.kind == FaultKind::kPayload) return payload(-std::int64_t{payload_number(*over)});
+  hal::InjectedFault push = injected(over->fault);
+  push.over = true;
+  return push;
 }
 
 std::uint32_t EmulatedRobot::payload_number(const FaultSlot& slot) const noexcept TANDEM_RT {
@@ -207,7 +215,6 @@ void EmulatedRobot::apply_to_joint(const FaultSlot& slot, std::int64_t since_ns)
     case FaultKind::kSpringBreak:
       if (slot.began != 0) plant_.break_spring(j);
       break;
-    case FaultKind::kPush: plant_.pushes().add(j, fault.force_N, fault.point_m); break;
     default: break;
   }
 }

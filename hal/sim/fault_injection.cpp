@@ -184,9 +184,10 @@ const FaultSlot* FaultInjection::next_begun() noexcept TANDEM_RT {
   return nullptr;
 }
 
-const FaultSlot* FaultInjection::next_dropped() noexcept TANDEM_RT {
+const FaultSlot* FaultInjection::next_over() noexcept TANDEM_RT {
   for (FaultSlot& slot : std::span(slots_).first(count_)) {
-    if (slot.fault.kind != FaultKind::kPayload || slot.told != 1 || slot.active != 0) continue;
+    const bool body = slot.fault.kind == FaultKind::kPayload || slot.fault.kind == FaultKind::kPush;
+    if (!body || slot.told != 1 || slot.active != 0) continue;
     slot.told = 2;
     return &slot;
   }

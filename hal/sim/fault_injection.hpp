@@ -29,16 +29,25 @@ enum class FaultFrom : std::uint8_t {
 
 enum class EncoderSide : std::uint8_t { kLink, kMotor };
 
+/// A push's course from its begin to its end; the force that is given is its greatest.
+enum class PushShape : std::uint8_t {
+  kStep,      ///< all of it at once
+  kHalfSine,  ///< sin(pi s), s from 0 to 1
+  kTriangle,  ///< up to the middle and down again
+};
+
 /// One fault, its target by index in the robot's configuration. Plain data without padding.
 struct ScenarioFault {
   std::int64_t start_ns = 0;      ///< after `from`
   std::int64_t duration_ns = -1;  ///< -1: for good
   std::int64_t ramp_ns = 0;       ///< in which a sag or a temperature is reached
   double value = 0.0;  ///< jump [rad, or m of a slide], supply [V], winding [degC], payload [kg]
-  double probability = 1.0;         ///< that a selected frame is struck
-  std::uint64_t seed = 0;           ///< of what is random in it
-  std::array<double, 3> force_N{};  ///< in W
-  std::array<double, 3> point_m{};  ///< where it acts, in the joint's frame; a payload: the link's
+  double probability = 1.0;           ///< that a selected frame is struck
+  std::uint64_t seed = 0;             ///< of what is random in it
+  std::array<double, 3> force_N{};    ///< in W, or in the body with `turns`
+  std::array<double, 3> torque_Nm{};  ///< beside it, in the same frame
+  std::array<double, 3> point_m{};    ///< where it acts, in the body's frame (its joint's);
+                                      ///< a payload: in the link's
   /// A payload's: xx xy xz yy yz zz about its center of mass, along the link's axes.
   std::array<double, 6> inertia_kg_m2{};
   std::int32_t bus = -1;  ///< -1: any
@@ -58,9 +67,12 @@ struct ScenarioFault {
   FaultFrom from = FaultFrom::kPowerOn;
   FrameDirection direction = FrameDirection::kBoth;
   EncoderSide encoder = EncoderSide::kLink;
-  std::int32_t link = -1;  ///< of the description's tree
+  std::int32_t link = -1;  ///< of the description's tree; a push: -1: the joint's
+  PushShape shape = PushShape::kStep;
+  std::uint8_t turns = 0;  ///< 1: a push turns with the body
+  std::array<std::uint8_t, 6> reserved{};
 };
-static_assert(sizeof(ScenarioFault) == 200);
+static_assert(sizeof(ScenarioFault) == 232);
 
 /// As the loop sees it: what it strikes, the narrowest that it names.
 [[nodiscard]] constexpr hal::InjectedFault injected(const ScenarioFault& fault) noexcept {
@@ -85,10 +97,10 @@ struct FaultSlot {
   std::uint8_t began = 0;  ///< in this step
   std::uint8_t ended = 0;  ///< in this step
   std::uint8_t acted = 0;  ///< ever
-  std::uint8_t told = 0;   ///< 1: next_begun() gave it; 2: next_dropped(), too
+  std::uint8_t told = 0;   ///< 1: next_begun() gave it; 2: next_over(), too
   std::array<std::uint8_t, 7> reserved{};
 };
-static_assert(sizeof(FaultSlot) == 224);
+static_assert(sizeof(FaultSlot) == 256);
 
 /// ```
 /// faults.begin_step(time_ns, enabled_ns);
@@ -132,8 +144,8 @@ class FaultInjection {
 
   /// The next fault that has begun and was not given yet; null: none.
   [[nodiscard]] const FaultSlot* next_begun() noexcept TANDEM_RT;
-  /// The next payload that is gone after next_begun() gave it; null: none.
-  [[nodiscard]] const FaultSlot* next_dropped() noexcept TANDEM_RT;
+  /// The next payload or push that is over after next_begun() gave it; null: none.
+  [[nodiscard]] const FaultSlot* next_over() noexcept TANDEM_RT;
   /// The fault of a slot that one of these gave: on any thread that knows of it.
   [[nodiscard]] const ScenarioFault& fault(std::size_t slot) const noexcept {
     return slots_[std::min(slot, kMostFaults - 1)].fault;

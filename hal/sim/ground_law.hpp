@@ -55,17 +55,24 @@ inline std::array<double, 3> ground_force(const hal::ContactConfig& config,
     if (move_anchor) *anchor.touching = 0;
     return {};
   }
-  const double elastic = ground.stiffness_N_m * depth;
+  double share = 1.0, most = config.static_friction, least = config.sliding_friction;
+  for (const hal::GroundPatch& patch : config.patches) {
+    if (!patch.holds(point.px, point.py)) continue;
+    share = patch.stiffness_share;
+    most = patch.static_friction;
+    least = patch.sliding_friction;
+    break;
+  }
+  const double elastic = share * ground.stiffness_N_m * depth;
   const double damping = std::min(ground.damping_s_m, ground.most_damping_Ns_m / elastic);
   const double normal = std::max(0.0, elastic * (1.0 - damping * point.vz));
   const double speed2 = point.vx * point.vx + point.vy * point.vy;
   const double stick2 = config.stick_velocity_m_s * config.stick_velocity_m_s;
-  const double mu = config.sliding_friction +
-                    (config.static_friction - config.sliding_friction) * stick2 / (stick2 + speed2);
+  const double mu = least + (most - least) * stick2 / (stick2 + speed2);
   const double cone = mu * normal;
   // A point that came down since the last sub-step is anchored where it is now.
   const bool anchored = *anchor.touching != 0;
-  const double kt = ground.tangential_stiffness_N_m;
+  const double kt = share * ground.tangential_stiffness_N_m;
   double fx = anchored ? -kt * (point.px - *anchor.x) : 0.0;
   double fy = anchored ? -kt * (point.py - *anchor.y) : 0.0;
   cut_to(cone, fx, fy);

@@ -50,6 +50,10 @@ Result<PlantConfig> plant_config(const hal::RobotConfig& described, const tandem
     plant.robot = &robot;
     plant.tree = config.tree.get();
   }
+  if (config.engine != kOwnEngine && !robot.contact.patches.empty()) {
+    return fail_at("sim.patch", "the ground of the engine '" + config.engine + "' is one plane",
+                   "leave it out, or set engine = \"tandem\"");
+  }
   if (changes == nullptr) return plant;
   plant.actual = &changes->tree;
   for (const ScenarioFault& payload : changes->carried) {

@@ -19,35 +19,6 @@ std::vector<std::string> names_of(const Items& items) {
   return names;
 }
 
-/// Reads `link` or `site`, and gives the frame of the payload's numbers in its link.
-std::optional<model::Placement> read_carrier(TomlTable& table, const hal::RobotConfig& robot,
-                                             const model::Tree* tree, ScenarioFault& payload) {
-  if (tree == nullptr) {
-    table.error("", "nothing says what links the robot has", "run it with its description");
-    return {};
-  }
-  model::Placement frame;
-  if (table.has("site")) {
-    const std::int32_t at = index_in(table, "site", names_of(robot.model.sites));
-    if (at < 0) return {};
-    const hal::SiteConfig& site = robot.model.sites[static_cast<std::size_t>(at)];
-    frame = model::placement_of(site.xyz_m, site.rpy_rad);
-    payload.link = tree->link_index(site.link);
-  } else {
-    payload.link = index_in(table, "link", names_of(tree->links));
-  }
-  if (payload.link < 0) return {};
-  const int body = tree->links[static_cast<std::size_t>(payload.link)].body;
-  if (body == 0 && !tree->floating_base) {
-    table.error(table.has("site") ? "site" : "link", "it is fixed to the world: it carries nothing",
-                "name what moves");
-    return {};
-  }
-  if (body > 0)
-    payload.joint = robot.joint_index(tree->joints[static_cast<std::size_t>(body - 1)].name);
-  return frame;
-}
-
 }  // namespace
 
 std::string words_of(const ScenarioFault& payload, const model::Tree& tree) {
@@ -75,6 +46,40 @@ Load load_of(const ScenarioFault& payload) noexcept TANDEM_RT {
   return load;
 }
 
+std::optional<model::Placement> read_place(TomlTable& table, const hal::RobotConfig& robot,
+                                           const model::Tree* tree, const std::string& not_there,
+                                           ScenarioFault& fault) {
+  if (tree == nullptr) {
+    table.error("", "nothing says what links the robot has", "run it with its description");
+    return {};
+  }
+  const bool by_site = table.has("site");
+  model::Placement frame;
+  if (by_site) {
+    const std::int32_t at = index_in(table, "site", names_of(robot.model.sites));
+    if (table.has("link")) {
+      (void)table.text("link");
+      table.error("site", "this is at one place, and `link` names another", "keep one of both");
+    }
+    if (at < 0) return {};
+    const hal::SiteConfig& site = robot.model.sites[static_cast<std::size_t>(at)];
+    frame = model::placement_of(site.xyz_m, site.rpy_rad);
+    fault.link = tree->link_index(site.link);
+  } else {
+    fault.link = index_in(table, "link", names_of(tree->links));
+  }
+  if (fault.link < 0) return {};
+  const int body = tree->links[static_cast<std::size_t>(fault.link)].body;
+  if (body == 0 && !tree->floating_base) {
+    table.error(by_site ? "site" : "link", "it is fixed to the world: " + not_there,
+                "name what moves");
+    return {};
+  }
+  if (body > 0)
+    fault.joint = robot.joint_index(tree->joints[static_cast<std::size_t>(body - 1)].name);
+  return frame;
+}
+
 std::int32_t index_in(TomlTable& table, const char* key, const std::vector<std::string>& known) {
   const std::string name = table.text(key);
   const auto found = std::ranges::find(known, name);
@@ -89,12 +94,8 @@ std::int32_t index_in(TomlTable& table, const char* key, const std::vector<std::
 void read_payload(TomlTable& table, const hal::RobotConfig& robot, const model::Tree* tree,
                   ScenarioFault& payload) {
   payload.kind = hal::FaultKind::kPayload;
-  const bool by_site = table.has("site");
-  const std::optional<model::Placement> frame = read_carrier(table, robot, tree, payload);
-  if (by_site && table.has("link")) {
-    (void)table.text("link");
-    table.error("site", "a payload is at one place, and `link` names another", "keep one of both");
-  }
+  const std::optional<model::Placement> frame =
+      read_place(table, robot, tree, "it carries nothing", payload);
   payload.value = table.number("mass_kg", {0.0, 1e5, true});
   const auto com_m = table.numbers_or("com_m", {0.0, 0.0, 0.0}, {-100.0, 100.0}, 3);
   const auto moments = table.numbers_or("inertia_kg_m2", std::vector<double>(6), {-1e6, 1e6}, 6);

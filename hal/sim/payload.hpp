@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,16 @@ struct Load {
 
 /// What a fault of kind kPayload attaches.
 [[nodiscard]] Load load_of(const ScenarioFault& payload) noexcept TANDEM_RT;
+
+/// Reads `link` or `site`: which link of the tree, in `fault`, with the joint of the image that
+/// moves it. @return the frame in which numbers are given there; empty, after an error: neither of
+/// them, both, one that is not there or does not move
+/// @param not_there  "it carries nothing": of what is fixed to the world
+[[nodiscard]] std::optional<model::Placement> read_place(TomlTable& table,
+                                                         const hal::RobotConfig& robot,
+                                                         const model::Tree* tree,
+                                                         const std::string& not_there,
+                                                         ScenarioFault& fault);
 
 /// Reads what a payload is, of a [[fault]] or of [[sim.payload]]: `link` or `site`, mass_kg, com_m
 /// and inertia_kg_m2. Errors, in the table: none or both of the first two, one that is not there,

@@ -145,7 +145,7 @@ class Plant {
   [[nodiscard]] Code advance(std::int64_t duration_ns) noexcept TANDEM_RT;
 
   /// Evaluates forces and accelerations at the present state, for sensors. Cheap when nothing
-  /// changed since; the next sub-step reuses it.
+  /// changed since; the next sub-step reuses it. Pushes are those of the last sub-step.
   void evaluate() noexcept TANDEM_RT;
 
   /// @pre evaluate() since the last advance(), for torque_Nm.
@@ -200,6 +200,7 @@ class Plant {
   Status close_loops(double* q);
   void hold(const double* q, std::span<const double> load);
 
+  void evaluate(std::int64_t step_ns) noexcept;
   void touch_ground(const PlantState& x, bool move_anchors) noexcept;
   void rates(const PlantState& x) noexcept;
   [[nodiscard]] const std::vector<double>& with_ends_and_ground(const PlantState& x) noexcept;

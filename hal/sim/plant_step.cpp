@@ -67,14 +67,22 @@ void Plant::evaluate() noexcept TANDEM_RT {
   vdot_fresh_ = 1;
 }
 
+/// For the sub-step of `step_ns` from now on.
+void Plant::evaluate(std::int64_t step_ns) noexcept {
+  if (pushes_.any()) pushes_.act_on(time_ns_, step_ns);
+  evaluate();
+}
+
 Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
   while (duration_ns > 0) {
     if (diverged_ >= 0) return Code::kDiverged;
-    evaluate();
+    std::int64_t step_ns = std::min(duration_ns, light_.step_ns(substep_ns_));
+    evaluate(step_ns);
     if (light_.due(time_ns_)) {
       light_.look(added_, sines(), q(), v(), applied_tau_.data(), wrench_.data(), time_ns_);
+      step_ns = std::min(duration_ns, light_.step_ns(substep_ns_));
+      evaluate(step_ns);
     }
-    const std::int64_t step_ns = std::min(duration_ns, light_.step_ns(substep_ns_));
     const double h_s = static_cast<double>(step_ns) * 1e-9;
     if (engine_) {
       step_engine(h_s);

@@ -9,6 +9,7 @@
 
 #include "base/toml_reader.hpp"
 #include "hal/sim/payload.hpp"
+#include "hal/sim/push_row.hpp"
 
 namespace tandem::sim {
 
@@ -166,16 +167,6 @@ void read_joint(TomlTable& table, const hal::RobotConfig& robot, ScenarioFault& 
   }
 }
 
-/// On the joint's link, at its origin or another point of it.
-void read_push(TomlTable& table, const hal::RobotConfig& robot, ScenarioFault& fault) {
-  fault.joint = index_of(table, "joint", robot.joints);
-  const std::vector<double> force_N = table.numbers("force_N", 3, {-1e5, 1e5});
-  const std::vector<double> point_m =
-      table.numbers_or("point_m", {0.0, 0.0, 0.0}, {-10.0, 10.0}, 3);
-  if (force_N.size() == 3) std::ranges::copy(force_N, fault.force_N.begin());
-  if (point_m.size() == 3) std::ranges::copy(point_m, fault.point_m.begin());
-}
-
 void read_target(TomlTable& table, const Context& context, ScenarioFault& fault) {
   const hal::RobotConfig& robot = context.robot;
   switch (fault.kind) {
@@ -205,7 +196,7 @@ void read_target(TomlTable& table, const Context& context, ScenarioFault& fault)
     case FaultKind::kMotorOverheat:
     case FaultKind::kSpringBreak: return read_joint(table, robot, fault);
     case FaultKind::kBusDown: return read_cable(table, robot, fault);
-    case FaultKind::kPush: return read_push(table, robot, fault);
+    case FaultKind::kPush: return read_push(table, robot, context.tree, fault);
     case FaultKind::kPayload: return read_payload(table, robot, context.tree, fault);
   }
 }
@@ -220,9 +211,9 @@ FaultKind read_kind(TomlTable& table) {
                               : static_cast<FaultKind>(found - known.begin() + 1);
 }
 
-ScenarioFault read_fault(TomlTable& table, const Context& context) {
+ScenarioFault read_row(TomlTable& table, const Context& context, FaultKind kind) {
   ScenarioFault fault;
-  fault.kind = read_kind(table);
+  fault.kind = kind;
   read_times(table, context, fault);
   read_target(table, context, fault);
   const bool ramps = fault.kind == FaultKind::kSupplySag || fault.kind == FaultKind::kMotorOverheat;
@@ -259,7 +250,10 @@ std::expected<std::vector<ScenarioFault>, Diagnostics> read(Result<TomlDocument>
   TomlTable root = document->root();
   const Context context{robot, period_ns, tree};
   std::vector<ScenarioFault> faults;
-  for (TomlTable& table : root.tables("fault")) faults.push_back(read_fault(table, context));
+  for (TomlTable& table : root.tables("fault"))
+    faults.push_back(read_row(table, context, read_kind(table)));
+  for (TomlTable& table : root.tables("push"))
+    faults.push_back(read_row(table, context, FaultKind::kPush));
   if (faults.empty()) {
     root.error("fault", "there is no fault", "add [[fault]] with kind = \"board_kill\", for one");
     return std::unexpected(document->diagnostics());  // what else is there is of another kind
@@ -276,6 +270,12 @@ std::expected<std::vector<ScenarioFault>, Diagnostics> read(Result<TomlDocument>
 }
 
 }  // namespace
+
+ScenarioFault read_fault(TomlTable& table, const hal::RobotConfig& robot, std::int64_t period_ns,
+                         const model::Tree* tree, hal::FaultKind kind) {
+  return read_row(table, {robot, period_ns, tree},
+                  kind == FaultKind::kNone ? read_kind(table) : kind);
+}
 
 std::expected<std::vector<ScenarioFault>, Diagnostics> read_scenario(const std::string& file,
                                                                      const hal::RobotConfig& robot,

@@ -37,6 +37,8 @@ void TruthFiller::fill(Plant& plant, const hal::CycleTime& time,
     const tandem_kernels& k = plant.kernels();
     truth.passive_position_rad()[j] = plant.q()[k.nq - k.joints + plant.passive()[j]];
   }
+  plant.pushes().sum_up(plant.q(), plant.v(), truth.center_of_mass_m().data(),
+                        truth.push_force_N().data(), truth.push_moment_Nm().data());
   truth.hoist_share()[0] = plant.hoist_share();
 }
 

@@ -12,12 +12,6 @@ namespace {
 
 constexpr auto kLook = std::chrono::microseconds(200);
 
-std::vector<ExpectationResult> results_of(const std::vector<Expectation>& all) {
-  std::vector<ExpectationResult> results;
-  for (const Expectation& one : all) results.push_back(one.result());
-  return results;
-}
-
 }  // namespace
 
 std::expected<std::unique_ptr<Expectations>, Diagnostics> Expectations::read(
@@ -69,6 +63,7 @@ std::uint64_t Expectations::fingerprint() const noexcept {
 
 void Expectations::show() noexcept TANDEM_RT {
   for (std::size_t i = 0; i < all_.size(); ++i) shown_[i].follow(all_[i]);
+  if (others_ != nullptr) others_->follow();
   looked_at_.store(false, std::memory_order_release);
 }
 
@@ -79,10 +74,18 @@ std::optional<std::vector<ExpectationResult>> Expectations::look(std::chrono::na
     if (std::chrono::steady_clock::now() > until) return std::nullopt;
     std::this_thread::sleep_for(kLook);
   }
-  return results_of(shown_);
+  return results_of(shown_, true);
 }
 
-std::vector<ExpectationResult> Expectations::results() const { return results_of(all_); }
+std::vector<ExpectationResult> Expectations::results() const { return results_of(all_, false); }
+
+std::vector<ExpectationResult> Expectations::results_of(const std::vector<Expectation>& all,
+                                                        bool followed) const {
+  std::vector<ExpectationResult> results;
+  for (const Expectation& one : all) results.push_back(one.result());
+  if (others_ != nullptr) others_->add_results(followed, results);
+  return results;
+}
 
 std::uint64_t Expectations::awaited_faults() const {
   std::uint64_t causes = 0;

@@ -18,6 +18,16 @@
 
 namespace tandem::runtime {
 
+/// What else of a run is judged as an expectation is.
+class AlsoJudged {
+ public:
+  virtual ~AlsoJudged() = default;
+  /// The loop's: add_results() gives what is known now, from another thread, too.
+  virtual void follow() noexcept TANDEM_RT = 0;
+  /// @param followed  as of the last follow(); else as it is now
+  virtual void add_results(bool followed, std::vector<ExpectationResult>& results) const = 0;
+};
+
 /// Watches a loop from within: what crosses a ring may be dropped, and an expectation is on every
 /// cycle. From the controllers' start to the
 /// shut-down, with the fault that may be its reason.
@@ -27,6 +37,9 @@ class Expectations final : public hal::CycleObserver {
   /// Errors, all at once: Expectation::read()'s.
   [[nodiscard]] static std::expected<std::unique_ptr<Expectations>, Diagnostics> read(
       std::span<const ExpectationSpec> specs, const std::string& file, const QuantityNames& names);
+
+  /// These come after its own. Before the first cycle.
+  void judge(AlsoJudged* others) noexcept { others_ = others; }
 
   /// A cycle that it has seen already counts once. @rt no heap, no lock, some 30 ns an expectation
   void take(const hal::CycleView& view) noexcept TANDEM_RT override;
@@ -51,9 +64,13 @@ class Expectations final : public hal::CycleObserver {
  private:
   void show() noexcept TANDEM_RT;
 
+  [[nodiscard]] std::vector<ExpectationResult> results_of(const std::vector<Expectation>& all,
+                                                          bool followed) const;
+
   std::vector<Expectation> all_;
   std::vector<Expectation> shown_;  // the loop's while looked_at_, else look()'s
   std::atomic<bool> looked_at_{false};
+  AlsoJudged* others_ = nullptr;
   bool started_ = false, ended_ = false;
   std::int64_t newest_ns_ = -1;  // of the cycles seen
 };

@@ -13,6 +13,7 @@
 #include "hal/sim/engine_loader.hpp"
 #include "hal/sim/payload.hpp"
 #include "hal/sim/scenario.hpp"
+#include "runtime/run/conditions.hpp"
 #include "runtime/run/late_plans.hpp"
 #include "runtime/run/operator_link.hpp"
 #include "runtime/run/retreats.hpp"
@@ -345,6 +346,7 @@ Diagnostics unfit(const Experiment& e, const Overrides& overrides) {
              .key = {}}};
   }
   if (Diagnostics link = unfit_for_link(e, overrides); !link.empty()) return link;
+  if (Diagnostics events = unfit_for_events(e, overrides.serves); !events.empty()) return events;
   if (!overrides.scenario.empty() && e.hal.backend != BackendKind::kSim) {
     return {{.message = "faults are injected on the other end of the wire",
              .hint = is_remote ? "give --scenario to `tandem serve`"
@@ -420,40 +422,17 @@ Diagnostics add_parallel(Composition& c, const KernelSupply& supply) {
   return {};
 }
 
-/// What [[expect]] names.
-Diagnostics look_up_expectations(Composition& c) {
-  const Experiment& e = c.experiment;
-  if (e.expectations.empty() || c.controllers == nullptr) return {};
-  const hal::Robot robot = hal::robot_of(e.robot);
-  const hal::StateImage state(robot.shape());
-  const hal::CommandImage command(robot.shape());
-  const hal::TruthImage* truth = truth_of(c);
-  QuantityNames names{
-      .robot = robot,
-      .state = state.layout(),
-      .command = command.layout(),
-      .truth = truth == nullptr ? nullptr : &truth->layout(),
-      .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image().layout()};
-  for (const auto& one : c.controllers->owned()) {
-    if (one == nullptr || one->io->signals.numbers() == 0) continue;
-    names.signals.push_back({one->name, {one->io, &one->io->signals}});
-  }
-  auto expectations = Expectations::read(e.expectations, e.file, names);
-  if (!expectations) return expectations.error();
-  c.expectations = std::move(*expectations);
-  return {};
-}
-
 /// The robot in simulation.
 Diagnostics add_simulation(Composition& c, const Overrides& overrides) {
   const std::string& scenario = overrides.scenario;
   const Experiment& e = c.experiment;
   sim::SimRobotConfig sim = e.sim_robot_config();
+  sim.faults = e.faults;
   if (!scenario.empty()) {
     auto faults = sim::read_scenario(scenario, e.robot, e.loop.period_ns, e.tree().get());
     if (!faults) return faults.error();
-    sim.faults = std::move(*faults);
-    for (const sim::ScenarioFault& fault : sim.faults) {
+    sim.faults.insert(sim.faults.end(), faults->begin(), faults->end());
+    for (const sim::ScenarioFault& fault : *faults) {
       if (fault.kind != hal::FaultKind::kPayload || e.tree() == nullptr) continue;
       if (std::string heavy = sim::too_heavy(fault, *e.tree()); !heavy.empty())
         c.warnings.push_back({heavy, "give its mass in kg", scenario, 0, "fault"});
@@ -509,7 +488,7 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   if (simulated && c.kernels.get() != nullptr) {
     if (auto failed = add_simulation(c, overrides); !failed.empty()) return failed;
   }
-  return overrides.serves ? Diagnostics() : look_up_expectations(c);
+  return overrides.serves ? Diagnostics() : look_up_conditions(c);
 }
 
 const hal::TruthImage* truth_of(const Composition& c) {

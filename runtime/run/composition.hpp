@@ -24,6 +24,7 @@
 #include "runtime/condition/expectations.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/cycle_config.hpp"
+#include "runtime/events.hpp"
 #include "runtime/experiment.hpp"
 #include "runtime/local_controllers.hpp"
 #include "runtime/owner_controller.hpp"
@@ -65,6 +66,7 @@ struct Composition {
   std::shared_ptr<OwnerController> owner;      ///< null: nobody may own the robot from afar
   std::size_t owner_slot = 0;                  ///< its in `controllers`
   std::unique_ptr<Expectations> expectations;  ///< null: there are none
+  std::unique_ptr<Events> events;              ///< null: there are none
   std::vector<ControllerNote> notes;
   /// robot::check()'s, a category 2 that nobody can carry out, late_plans() unless the command line
   /// says how long

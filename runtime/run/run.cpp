@@ -28,6 +28,7 @@ struct RunFork final : internal_model::Fork {
   std::unique_ptr<estimation::Estimator> estimator;  // as the run's, or null
   std::unique_ptr<hal::Backend> backend;
   sim::SimRobot* robot = nullptr;  // the backend, or behind its link
+  std::unique_ptr<Events> events;
   std::unique_ptr<RobotCycle> own;
 };
 
@@ -82,6 +83,7 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
     if (!link) return std::unexpected(link.error().front());
     fork->backend = std::move(*link);
   }
+  if (c.events != nullptr) fork->events = c.events->idle_copy();
   CycleConfig ahead = config;
   ahead.loop.pacing = rt::Pacing::kSimulated;
   ahead.loop.rate = 0.0;
@@ -94,7 +96,8 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
                  .clock = fork->clock,
                  .truth = truth_of(c) != nullptr ? fork->truth : nullptr,
                  .estimator = fork->estimator.get(),
-                 .identity = identity_of(c, config)},
+                 .identity = identity_of(c, config),
+                 .events = fork->events.get()},
       ahead);
   fork->cycle = fork->own.get();
   return fork;
@@ -143,7 +146,8 @@ Run::Run(Composition& c, const Overrides& overrides, const RunParts& parts) : c_
                             .estimator = c.estimator.get(),
                             .snapshots = c.predictor.get(),
                             .identity = identity_of(c, config),
-                            .time_machine = parts.time_machine},
+                            .time_machine = parts.time_machine,
+                            .events = c.events.get()},
                  config);
   if (c.predictor != nullptr) {
     c.predictor->attach(*cycle_, parallel(), [&c, config] { return make_fork(c, config); });

@@ -83,6 +83,9 @@ class Run {
   }
   /// What the experiment expects of it; null: nothing.
   [[nodiscard]] const Expectations* expectations() const noexcept { return c_->expectations.get(); }
+  /// What the experiment lets happen; null: nothing, or at known times alone. Requests among it are
+  /// refused unless the caller says who carries them out, before the first cycle.
+  [[nodiscard]] Events* events() noexcept { return c_->events.get(); }
   /// Faults, statistics, requests, save() and restore().
   [[nodiscard]] RobotCycle& cycle() noexcept { return *cycle_; }
   [[nodiscard]] const RobotCycle& cycle() const noexcept { return *cycle_; }

@@ -66,6 +66,9 @@ TEST(Event, SaysWhatHappenedInOneLine) {
            .joint = 1,
            .kind = EventKind::kInjected};
   EXPECT_EQ(describe(event, kNames), "injected encoder_freeze of knee");
+  event.code = static_cast<std::uint32_t>(hal::FaultKind::kPush);
+  event.kind = EventKind::kEnded;
+  EXPECT_EQ(describe(event, kNames), "ended push of knee");
   // It had named the first joint of the board.
   event = {.code = static_cast<std::uint32_t>(hal::FaultKind::kBoardKill),
            .kind = EventKind::kInjected,

@@ -307,3 +307,28 @@ def nodding(config, monkeypatch):
     """Example 08, by whose folder it is found."""
     monkeypatch.setenv("TANDEM_CONTROLLERS", str(BUILD / "lib/examples"))
     return config.parent / "examples/08_declarations/nod.toml"
+
+
+def test_events_come_in_their_cycles(config, tmp_path):
+    run = tandem.Run(experiment(tmp_path, config, """
+[[controller]]
+plugin = "hold"
+[[push]]
+link = "link2"
+when = "phase() == running"
+impulse_Ns = [0.1, 0, 0]
+for_s = 0.02
+[[event]]
+name = "softer"
+at_s = 0.6
+ask = { do = "joint.gains", joint = "joint1", loop = "position", kp = 30.0 }
+[[event]]
+at_s = 0.7
+ask = { do = "joint.gains", joint = "jiont1", loop = "position", kp = 30.0 }
+"""))  # fmt: skip
+    while run.time_s < 0.8:
+        run.step()
+    rows = {row["name"]: row for row in run.result["expectations"]}
+    assert rows["push[0] comes"]["passed"] and rows["softer comes"]["passed"]
+    assert rows["softer comes"]["at_s"] == 0.6
+    assert "did you mean 'joint1'" in rows["event[1] comes"]["reason"]

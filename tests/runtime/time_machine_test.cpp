@@ -12,91 +12,10 @@
 #include "log/log_file.hpp"
 #include "runtime/logged_state.hpp"
 #include "tests/log/scratch_folder.hpp"
-#include "tests/runtime/bundled_run.hpp"
+#include "tests/runtime/journey.hpp"
 
 namespace tandem::runtime {
 namespace {
-
-std::uint64_t hash_of(std::span<const std::byte> bytes, std::uint64_t hash) {
-  for (const std::byte one : bytes) {
-    hash = (hash ^ static_cast<std::uint64_t>(one)) * 0x100000001B3U;
-  }
-  return hash;
-}
-
-/// Compares each cycle with what it was when it was first shown.
-class Witness final : public hal::CycleObserver {
- public:
-  void take(const hal::CycleView& view) noexcept TANDEM_RT override {
-    std::uint64_t hash = hash_of(view.state.bytes(), 0xCBF29CE484222325U);
-    hash = hash_of(view.command.bytes(), hash);
-    if (view.truth != nullptr) hash = hash_of(view.truth->bytes(), hash);
-    if (view.time.cycle >= hashes.size()) return;
-    std::uint64_t& known = hashes[view.time.cycle];
-    ++shown;
-    if (known == 0) {
-      known = hash;
-    } else if (known == hash) {
-      ++again;
-    } else {
-      ++others;
-    }
-    last = view.time.cycle;
-  }
-  std::vector<std::uint64_t> hashes = std::vector<std::uint64_t>(100'000);
-  std::atomic<std::uint64_t> shown{0}, again{0}, others{0}, last{0};
-};
-
-/// A run that stands before its first cycle, with a loop on a thread of its own.
-struct Journey {
-  explicit Journey(const std::string& robot, const std::string& experiment,
-                   log::Recorder* recorder = nullptr,
-                   const std::vector<ExpectationSpec>& expectations = {},
-                   const std::vector<ControllerSpec>& more = {})
-      : machine(1'000'000, TimeMachine::kBudget_bytes, true),
-        run(robot, experiment, paused(expectations, more),
-            {.recorder = recorder, .observer = &witness, .time_machine = &machine}),
-        loop([this] { run.cycle->run(); }) {}
-  ~Journey() {
-    run.cycle->inbox().end_run();
-    loop.join();
-  }
-  static Overrides paused(const std::vector<ExpectationSpec>& expectations,
-                          const std::vector<ControllerSpec>& more) {
-    Overrides overrides;
-    overrides.start_paused = true;
-    overrides.change = [expectations, more](runtime::Experiment& e) {
-      e.expectations = expectations;
-      e.controllers.insert(e.controllers.end(), more.begin(), more.end());
-    };
-    return overrides;
-  }
-  rt::ClockControl& clock() { return run.cycle->inbox().clock(); }
-  void step(std::uint64_t cycles) {
-    const Status stepped = clock().step(cycles);
-    ASSERT_TRUE(stepped) << stepped.error().to_string();
-    ASSERT_TRUE(clock().await_standing(60'000'000'000));
-  }
-  std::uint64_t now() { return clock().state().next_cycle; }
-  void go(std::uint64_t next) {
-    const auto travel = machine.go_to(*run.cycle, next);
-    ASSERT_TRUE(travel) << travel.error().to_string();
-    EXPECT_EQ(travel->to, next);
-    EXPECT_EQ(travel->asked, next);
-    if (next > 0) {
-      EXPECT_EQ(witness.last, next - 1);
-    }
-  }
-  std::string refusal(std::uint64_t next) {
-    const auto travel = machine.go_to(*run.cycle, next);
-    return travel ? "none" : travel.error().to_string();
-  }
-
-  Witness witness;
-  TimeMachine machine;
-  BundledRun run;
-  std::thread loop;
-};
 
 struct Journeyed {
   const char* robot;
@@ -133,8 +52,9 @@ TEST_P(TimeMachineOf, PlaysAgainToTheSameBits) {
 // A shadow goes along, and so does a switch that waits for it: it happens again in the same cycle.
 TEST(TimeMachine, GoesBackWithAShadow) {
   constexpr RunServices::Patience kNow{0};
-  Journey trip("coman", "squat", nullptr, {},
-               {{"hold", "rest", false, TomlDocument::parse("", "rest")->root()}});
+  Journey trip("coman", "squat", [](Experiment& e) {
+    e.controllers.push_back({"hold", "rest", false, TomlDocument::parse("", "rest")->root()});
+  });
   trip.step(1'500);  // it stands
   RunServices& services = trip.run.cycle->services();
   ASSERT_TRUE(services.begin_shadow("rest", kNow));

@@ -52,6 +52,39 @@ double contact_force_z(Plant& plant) {
 
 class BothIntegrators : public testing::TestWithParam<Integrator> {};
 
+hal::GroundPatch patch(double from_m, double to_m, double friction, double share = 1.0) {
+  return {.name = "patch",
+          .x_m = {from_m, to_m},
+          .y_m = {-1.0, 1.0},
+          .static_friction = friction,
+          .sliding_friction = friction,
+          .stiffness_share = share};
+}
+
+// Ice under the block is as a whole ground of ice, to the bit; ice elsewhere is none.
+TEST(GroundPatch, CountsWhereItIsAlone) {
+  const auto slid = [](const hal::ContactConfig& contact) {
+    Plant plant = block_on(block_kernels<10>(), contact, 0.05);
+    EXPECT_EQ(plant.advance(500'000'000), Code::kOk);
+    return plant.q()[0];
+  };
+  hal::ContactConfig icy = ground(0.9, 0.8);
+  icy.patches = {patch(5.0, 9.0, 0.5), patch(-2.0, 4.0, 0.05), patch(-2.0, 4.0, 0.7)};
+  EXPECT_EQ(slid(icy), slid(ground(0.05, 0.05)));
+  EXPECT_GT(slid(icy), 0.1);
+  icy.patches = {patch(5.0, 9.0, 0.05)};
+  EXPECT_EQ(slid(icy), slid(ground(0.9, 0.8)));
+  EXPECT_LT(slid(icy), 0.01);
+}
+
+TEST(GroundPatch, IsSofterByItsShare) {
+  hal::ContactConfig soft = ground(0.9, 0.8);
+  soft.patches = {patch(-1.0, 1.0, 0.9, 0.25)};
+  Plant plant = block_on(block_kernels<0>(), soft, 0.05);
+  ASSERT_EQ(plant.advance(6'000'000'000), Code::kOk);
+  EXPECT_NEAR(plant.q()[2], 0.05 - 4.0 * kSag, 1e-9);
+}
+
 TEST_P(BothIntegrators, RestingBlockCarriesItsWeightAndStandsStill) {
   Plant plant = block_on(block_kernels<0>(), ground(0.9, 0.8), 0.05, GetParam());
   ASSERT_EQ(plant.advance(3'000'000'000), Code::kOk);

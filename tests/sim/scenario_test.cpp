@@ -1,5 +1,6 @@
 #include "hal/sim/scenario.hpp"
 
+#include "model/urdf.hpp"
 #include "tests/sim/swing_robot.hpp"
 
 namespace tandem::sim {
@@ -89,6 +90,79 @@ TEST(Scenario, ReadsAPush) {
   EXPECT_NE(errors_of("[[fault]]\nkind = 'push'\njoint = 'swing'\nforce_N = [1.0, 2.0]\n")
                 .find("force_N"),
             std::string::npos);
+}
+
+constexpr char kTwoLinks[] = R"(<robot name="swing"><link name="world"/><link name="bracket"/>
+<joint name="mount" type="fixed"><parent link="world"/><child link="bracket"/></joint>
+<link name="pole"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0"
+ iyz="0"/></inertial></link>
+<joint name="swing" type="continuous"><parent link="bracket"/><child link="pole"/><axis xyz="0 1 0"/>
+</joint>
+<link name="hand"/><joint name="tip" type="fixed"><parent link="pole"/><child link="hand"/>
+ <origin xyz="0 0 1" rpy="0 0 1.5707963267948966"/></joint></robot>)";
+
+/// With a description, and a site above the hand.
+auto parse_push(const std::string& row) {
+  hal::RobotConfig robot = test::swing_robot(2);
+  hal::SiteConfig grip, bolt;
+  grip.name = "grip";
+  grip.link = "hand";
+  grip.xyz_m = {0.0, 0.0, 0.25};
+  bolt.name = "bolt";
+  bolt.link = "bracket";
+  robot.model.sites = {grip, bolt};
+  const auto read = model::parse_urdf(kTwoLinks, "swing.urdf", {});
+  return parse_scenario("[[push]]\n" + row, "faults.toml", robot, 1'000'000, &read->tree);
+}
+std::string push_errors(const std::string& row) {
+  const auto faults = parse_push(row);
+  std::string all;
+  if (faults) return "none";
+  for (const Error& error : faults.error()) all += error.to_string() + "\n";
+  return all;
+}
+
+TEST(Scenario, ReadsAPushAtASiteInItsOwnFrame) {
+  const auto faults = parse_push(
+      "site = 'grip'\nimpulse_Ns = [3, 0, 0]\npoint_m = [0.5, 0, 0]\nframe = 'local'\n"
+      "shape = 'triangle'\nat_s = 1.5\nfor_s = 0.1\n");
+  ASSERT_TRUE(faults) << faults.error().front().to_string();
+  const ScenarioFault& push = faults->front();
+  EXPECT_EQ(push.kind, FaultKind::kPush);
+  EXPECT_EQ(push.joint, 0);
+  EXPECT_EQ(push.shape, PushShape::kTriangle);
+  EXPECT_EQ(push.start_ns, 1'500'000'000);
+  EXPECT_EQ(push.duration_ns, 100'000'000);
+  // Turned by 90 degrees about z: its x is the body's y. Twice 3 Ns / 0.1 s at the tip.
+  EXPECT_NEAR(push.point_m[0], 0.0, 1e-15);
+  EXPECT_NEAR(push.point_m[1], 0.5, 1e-15);
+  EXPECT_NEAR(push.point_m[2], 1.25, 1e-15);
+  EXPECT_NEAR(push.force_N[0], 0.0, 1e-13);
+  EXPECT_NEAR(push.force_N[1], 60.0, 1e-12);
+  EXPECT_EQ(push.turns, 1);
+}
+
+TEST(Scenario, SaysWhatIsWrongWithAPush) {
+  const auto has = [](const std::string& row, const std::string& words) {
+    EXPECT_NE(push_errors(row).find(words), std::string::npos) << row << push_errors(row);
+  };
+  has("force_N = [1, 0, 0]\n", "nothing says where it acts");
+  has("site = 'gripp'\nforce_N = [1, 0, 0]\n", "did you mean 'grip'?");
+  has("link = 'hnd'\nforce_N = [1, 0, 0]\n", "faults.toml:2: push[0].link");
+  has("site = 'bolt'\nforce_N = [1, 0, 0]\n", "it is fixed to the world: it cannot be pushed");
+  has("link = 'world'\nforce_N = [1, 0, 0]\n", "it cannot be pushed");
+  has("site = 'grip'\nlink = 'hand'\nforce_N = [1, 0, 0]\n", "keep one of both");
+  has("site = 'grip'\njoint = 'swing'\nforce_N = [1, 0, 0]\n", "acts at one place");
+  has("site = 'grip'\n", "nothing says how hard it pushes");
+  has("site = 'grip'\nforce_N = [1, 0, 0]\nimpulse_Ns = [1, 0, 0]\nfor_s = 1\n", "not both");
+  has("site = 'grip'\nimpulse_Ns = [1, 0, 0]\n", "an impulse takes a time");
+  has("site = 'grip'\nforce_N = [1, 0, 0]\nshape = 'half_sine'\n", "with a shape takes a time");
+  has("site = 'grip'\nforce_N = [1, 0, 0]\nfor_s = 0\n", "takes a time");
+  has("site = 'grip'\nforce_N = [1, 0, 0]\nfor_s = -1\n", "for_s");
+  has("site = 'grip'\nforce_N = [nan, 0, 0]\n", "must be finite");
+  has("site = 'grip'\nforce_N = [1, 0]\n", "force_N");
+  has("site = 'grip'\nforce_N = [1, 0, 0]\nshape = 'square'\n", "shape");
+  has("site = 'grip'\nforce_N = [1, 0, 0]\nkind = 'push'\n", "kind");
 }
 
 TEST(Scenario, SaysWhatIsWrongAndWhere) {

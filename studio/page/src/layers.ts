@@ -7,6 +7,7 @@ import { RobotGhost } from './ghost';
 import type { Layer } from './layer';
 import type { Model } from './model';
 import { Prediction } from './prediction';
+import { Pushes } from './pushes';
 
 interface Row {
   layer: Layer;
@@ -27,6 +28,11 @@ export class Layers {
       layer: new ControllerMarks(),
       label: 'marks',
       title: 'what controllers draw: points, arrows, lines and words',
+    },
+    {
+      layer: new Pushes((layer) => this.show(layer)),
+      label: 'pushes',
+      title: 'the sum of all pushes on the simulated robot: 1 m is 100 N',
     },
     {
       // Of a run one source has all of it; of a log there are the topics.

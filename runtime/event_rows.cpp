@@ -1,0 +1,112 @@
+#include "runtime/event_rows.hpp"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "hal/sim/scenario.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+/// When a row comes, and what it is called.
+struct EventKeys {
+  std::string name, when;
+  double at_s = 0.0, after_s = 0.0;
+  bool optional = false;
+};
+
+using Event = EventKeys;
+// A key a line.
+// clang-format off
+constexpr Key<Event> kWhen[] = {
+  key<&Event::name>("name", "for results").by_default("its row: `event[0]`"),
+  key<&Event::when>("when", "a [condition](expectations.md#conditions): the event comes after the first cycle in which it holds, once, and not before the controllers start").by_default("–"),
+  key<&Event::after_s>("after_s", {0.0, 1e6}, "with `when`: so much later"),
+  key<&Event::optional>("optional", "`false`: the run has failed if its condition never held, as if the row were an expectation"),
+};
+constexpr Key<Event> kAt[] = {
+  key<&Event::at_s>("at_s", {0.0, 1e6}, "instead of `when`: the time of the run").by_default("–"),
+  by_hand<Event>("ask", "required", "a table", "a request, `{ do = \"controller.set\", … }` ([scenarios.md](scenarios.md#requests))"),
+};
+// clang-format on
+
+std::int64_t event_ns(double seconds) { return std::llround(seconds * 1e9); }
+
+/// What a condition decides; the rest of the row is still to be read.
+EventSpec read_when(TomlTable& table) {
+  EventKeys keys;
+  read_keys(table, kWhen, keys);
+  EventSpec spec;
+  spec.name = keys.name.empty() ? table.path() : keys.name;
+  spec.when = keys.when;
+  spec.after_ns = event_ns(keys.after_s);
+  spec.optional = keys.optional;
+  spec.line = table.line();
+  spec.when_line = table.line("when");
+  if (table.has("when") && keys.when.empty() && table.is_text("when"))
+    table.error("when", "is empty", "write a condition, such as \"tilt() > 5deg\"");
+  for (const char* const key : {"after_s", "optional"}) {
+    if (table.has(key) && !table.has("when"))
+      table.error(key, "is of no use without `when`", "leave it out");
+  }
+  return spec;
+}
+
+/// A row of [[push]] or [[fault]].
+void read_struck(TomlTable& table, hal::FaultKind kind, Experiment& e) {
+  EventSpec spec = read_when(table);
+  const bool waits = table.has("when");
+  for (const char* const key : {"at_s", "at_cycle", "after_enabled_s"}) {
+    if (waits && table.has(key))
+      table.error(key, "it comes once, and `when` says when", "keep one of both");
+  }
+  spec.fault = sim::read_fault(table, e.robot, e.loop.period_ns, e.tree().get(), kind);
+  if (!waits) return e.faults.push_back(*spec.fault);
+  if (spec.fault->kind == hal::FaultKind::kBoardDuplicate) {
+    table.error("when", "a board_duplicate has to be there when the robot is made",
+                "give it a time, at_s");
+  }
+  e.events.push_back(std::move(spec));
+}
+
+void read_asked(TomlTable& table, Experiment& e) {
+  EventSpec spec = read_when(table);
+  EventKeys keys;
+  read_keys(table, kAt, keys);
+  if (table.has("at_s")) spec.at_ns = event_ns(keys.at_s);
+  if (table.has("at_s") == table.has("when")) {
+    table.error(
+        table.has("when") ? "at_s" : "",
+        table.has("when") ? "it comes once, and `when` says when" : "nothing says when it comes",
+        table.has("when") ? "keep one of both" : "add at_s, or when = \"…\"");
+  }
+  spec.ask = table.json("ask");
+  spec.ask_line = table.line("ask");
+  table.finish();
+  e.events.push_back(std::move(spec));
+}
+
+}  // namespace
+
+void read_events(TomlTable& root, Experiment& e) {
+  for (TomlTable& table : root.tables("fault")) read_struck(table, hal::FaultKind::kNone, e);
+  for (TomlTable& table : root.tables("push")) read_struck(table, hal::FaultKind::kPush, e);
+  for (TomlTable& table : root.tables("event")) read_asked(table, e);
+  const std::size_t most = sim::FaultInjection::kMostFaults;
+  const std::size_t count = e.faults.size() + e.events.size();
+  if (count > most) {
+    root.error(root.has("event")  ? "event"
+               : root.has("push") ? "push"
+                                  : "fault",
+               std::to_string(count) + " events, pushes and faults are too many",
+               "at most " + std::to_string(most) + " together");
+  }
+}
+
+void describe_events(KeyPage& page) {
+  page.add("[[event]]", kWhen);
+  page.add("[[event]]", kAt);
+}
+
+}  // namespace tandem::runtime

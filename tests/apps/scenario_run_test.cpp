@@ -1,0 +1,162 @@
+// `tandem run`, `check` and `test` with scenarios; `tandem push` against a run.
+#include <algorithm>
+
+#include "apps/run/inject.hpp"
+#include "tests/apps/running.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class ScenarioRun : public Running {
+ protected:
+  /// hold.toml with these rows, for one second.
+  void scenario(const std::string& name, const std::string& rows) const {
+    write_text(folder_ / (name + ".toml"), read_text(folder_ / "hold.toml") + "\n" + rows);
+  }
+  /// What `check` and `run` say of wrong rows, before anything moves.
+  void refused(const std::string& rows, const std::string& words) const {
+    scenario("wrong", rows);
+    for (const char* command : {"check wrong.toml", "run wrong.toml --no-log"}) {
+      const Outcome outcome = tandem(command);
+      EXPECT_EQ(outcome.status, 2) << command << "\n" << rows;
+      EXPECT_NE((outcome.out + outcome.err).find(words), std::string::npos)
+          << command << "\n"
+          << rows << outcome.out << outcome.err;
+    }
+  }
+  [[nodiscard]] int line_of(const std::string& text) const {
+    const std::string all = read_text(folder_ / "wrong.toml");
+    return 1 + static_cast<int>(std::count(
+                   all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.find(text)), '\n'));
+  }
+};
+
+constexpr char kEvents[] = R"(
+[[push]]
+name = "nudge"
+link = "link2"
+when = "phase() == running"
+after_s = 0.1
+impulse_Ns = [0.05, 0, 0]
+shape = "half_sine"
+for_s = 0.05
+
+[[event]]
+name = "softer"
+at_s = 0.8
+ask = { do = "joint.gains", joint = "joint1", loop = "position", kp = 30.0 }
+
+[[event]]
+when = "time() > 0.9s"
+ask = { do = "inject", scenario = "[[fault]]\nkind = 'push'\njoint = 'joint1'\nforce_N = [1,0,0]\nfor_s = 0.01" }
+
+[[event]]
+at_s = 1.0
+ask = { do = "controller.stop", name = "hold" }
+
+[[expect]]
+eventually = "abs(truth.push_force_N.0) > 0.5N"
+)";
+
+TEST_F(ScenarioRun, ComesInTheSameCyclesEachTime) {
+  scenario("events", kEvents);
+  for (const char* log : {"one", "two"}) {
+    const Outcome outcome =
+        tandem("run events.toml --duration 1.2 -q --json run.json --log " + std::string(log));
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+  }
+  const auto rows = json("run.json")["expectations"];
+  ASSERT_EQ(rows.size(), 5U);
+  EXPECT_EQ(rows[1]["name"], "nudge comes");
+  EXPECT_EQ(rows[2]["name"], "softer comes");
+  EXPECT_EQ(rows[2]["at_s"], 0.8);
+  EXPECT_EQ(rows[3]["name"], "event[1] comes");
+  for (const auto& row : rows) EXPECT_EQ(row["passed"], true) << row;
+  std::vector<std::string> logs;
+  for (const char* log : {"one", "two"})
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / log))
+      if (entry.path().extension() == ".mcap") logs.push_back(entry.path().string());
+  ASSERT_EQ(logs.size(), 2U);
+  const Outcome same = tandem("log diff " + shell_word(logs[0]) + " " + shell_word(logs[1]));
+  EXPECT_EQ(same.status, 0) << same.out << same.err;
+  const Outcome csv = tandem("log csv " + shell_word(logs[0]) + " --topic /tandem/event -o e.csv");
+  const std::string events = read_text(folder_ / "e.csv") + csv.err;
+  for (const char* text : {"injected push", "ended push", "softer: done", "gains set"})
+    EXPECT_NE(events.find(text), std::string::npos) << text << " in\n" << events;
+}
+
+TEST_F(ScenarioRun, FailsWithWhatWasRefused) {
+  scenario("bad", R"(
+[[event]]
+name = "no such controller"
+at_s = 0.5
+ask = { do = "controller.stop", name = "hodl" }
+[[expect]]
+always = "time() >= 0s"
+)");
+  const Outcome run = tandem("run bad.toml --duration 0.3 --no-log --json bad.json");
+  EXPECT_EQ(run.status, 1) << run.err;
+  const auto row = json("bad.json")["expectations"][1];
+  EXPECT_EQ(row["passed"], false);
+  EXPECT_NE(row["reason"].get<std::string>().find("it was refused"), std::string::npos) << row;
+  EXPECT_NE(row["reason"].get<std::string>().find("hold"), std::string::npos) << row;
+  EXPECT_NE(run.err.find("no such controller"), std::string::npos) << run.err;
+  EXPECT_EQ(tandem("test bad.toml").status, 1);
+}
+
+TEST_F(ScenarioRun, FindsWhatIsWrongBeforeAnythingMoves) {
+  const std::string row = "[[event]]\nat_s = 1.0\n";
+  refused(row + "ask = { do = \"controler.set\" }\n", "did you mean 'controller.set'?");
+  refused(row + "ask = { do = \"joint.gains\", joint = \"joint1\", loop = \"positon\" }\n",
+          "did you mean 'position'?");
+  refused(row + "ask = { do = \"joint.gains\", joint = \"jiont1\", loop = \"position\" }\n",
+          "did you mean 'joint1'?");
+  refused(row + "ask = { do = \"joint.set\", joint = \"joint1\", stiffness_Nm_rad = nan }\n",
+          "event[0].ask: joint.set: \"stiffness_Nm_rad\" is not of type number");
+  EXPECT_NE(tandem("check wrong.toml").err.find("wrong.toml:" + std::to_string(line_of("ask ="))),
+            std::string::npos);
+  refused(row + "ask = { do = \"clock.pause\" }\n", "clock.pause is not for events");
+  refused(row + "ask = { do = \"push\", site = \"hnd\", force_N = [1, 0, 0] }\n", "did you mean");
+  refused(row, "event[0].ask");
+  refused("[[event]]\nask = { do = \"run.stop\" }\n", "nothing says when it comes");
+  refused(row + "when = \"time() > 1s\"\nask = { do = \"run.stop\" }\n", "keep one of both");
+  refused("[[event]]\nwhen = \"tme() > 1s\"\nask = { do = \"run.stop\" }\n", "did you mean 'time");
+  refused("[[push]]\nlink = \"link2\"\nforce_N = [1, 0, 0]\nwhen = \"time() > 1s\"\nat_s = 1.0\n",
+          "it comes once");
+  refused("[[push]]\nlink = \"link2\"\nforce_N = [1, 0, 0]\noptional = true\n", "without `when`");
+  refused("[[fault]]\nkind = \"board_duplicate\"\nboard = \"board_1\"\nwhen = \"time() > 1s\"\n",
+          "has to be there when the robot is made");
+  refused("[[push]]\nlink = \"link9\"\nforce_N = [1, 0, 0]\n", "did you mean");
+}
+
+TEST_F(ScenarioRun, OfARobotThatIsNotSimulatedHereIsRefused) {
+  scenario("events", kEvents);
+  const Outcome outcome = tandem("run events.toml --hal can --no-log");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("come in a simulation in this process"), std::string::npos)
+      << outcome.err;
+  const hal::RobotConfig robot;
+  ControlRegistry registry;
+  add_push(registry, robot, nullptr, 1'000'000, {});
+  const Json no = registry.answer(R"({"do": "push", "joint": "a", "force_N": [1, 0, 0]})");
+  EXPECT_EQ(no["ok"], false);
+  EXPECT_NE(no["error"].get<std::string>().find("nobody can push it"), std::string::npos) << no;
+}
+
+TEST_F(ScenarioRun, IsPushedFromTheCommandLine) {
+  start("--start-paused --duration 2000");
+  until(R"("paused": true)");
+  (void)to_run("clock step 500");
+  const Outcome pushed = to_run("push --link link2 --force=-3,0,0 --for 20ms --shape triangle");
+  EXPECT_EQ(pushed.status, 0) << pushed.err;
+  EXPECT_EQ(pushed.out, "it is pushed from the next cycle on\n");
+  const Outcome back = to_run("clock until 'truth.push_force_N.0 < -1N'");
+  EXPECT_EQ(back.status, 0) << back.err;
+  EXPECT_NE(to_run("push --link link2").err.find("nothing says how hard"), std::string::npos);
+  EXPECT_NE(to_run("push lnk2 --force 1,0,0").err.find("no site 'lnk2'"), std::string::npos);
+  EXPECT_NE(to_run("push --link link2 --force 1,0").err.find("force_N"), std::string::npos);
+  EXPECT_EQ(end(), 0);
+}
+
+}  // namespace
+}  // namespace tandem::apps
