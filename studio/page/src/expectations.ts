@@ -2,7 +2,6 @@
 import type { Data } from './data';
 import { h, say } from './dom';
 import { plain, seconds } from './format';
-import type { Answer } from './protocol';
 
 /** One of `expectations` of expect.show: docs/json.md. */
 export interface Expected {
@@ -16,12 +15,36 @@ export interface Expected {
   reason: string;
 }
 
-/** "3 of 4 hold so far." */
-export function expectedWords(all: Expected[]): string {
+/** Reasons of a window that has not begun, and what they are while the run goes on. */
+const kNotBegun: [RegExp, string][] = [
+  [/^its controllers never started$/, 'its controllers have not started'],
+  [/^its window was never reached: it begins at (.+?), and the run ended.*$/s, 'it begins at $1'],
+  [/^its window was never reached: (.*) never held$/s, 'it begins once $1 holds'],
+];
+
+/** How an expectation stands: `sort` is its colour, `why` the reason, empty where it holds. */
+export interface Standing {
+  sort: 'good' | 'bad' | 'muted';
+  word: string;
+  why: string;
+}
+
+/** @param over nothing comes any more: what has not begun by then has failed */
+export function standingOf({ passed, reason }: Expected, over: boolean): Standing {
+  if (passed) return { sort: 'good', word: '✓ holds', why: '' };
+  const waits = over ? undefined : kNotBegun.find(([words]) => words.test(reason));
+  if (waits) return { sort: 'muted', word: '… not yet', why: reason.replace(...waits) };
+  return { sort: 'bad', word: '✗ does not', why: reason };
+}
+
+/** "3 of 4 hold so far, 1 not begun." */
+export function expectedWords(all: Expected[], over = false): string {
   if (all.length === 0)
     return 'The experiment expects nothing: rows [[expect]] say what it must do.';
-  const held = all.filter((one) => one.passed).length;
-  return held === all.length ? `All ${held} hold so far.` : `${held} of ${all.length} hold so far.`;
+  const count = (sort: string) => all.filter((one) => standingOf(one, over).sort === sort).length;
+  const [held, waiting] = [count('good'), count('muted')];
+  if (held === all.length) return `All ${held} hold so far.`;
+  return `${held} of ${all.length} hold so far${waiting > 0 ? `, ${waiting} not begun` : ''}.`;
 }
 
 /** "24.5 Nm", "–" */
@@ -30,16 +53,24 @@ export function marginWords(one: Expected): string {
   return one.unit ? `${plain(one.margin)} ${one.unit}` : plain(one.margin);
 }
 
-const kHeads = ['expectation', 'so far', 'margin', 'at', 'why'];
+const kHeads: [string, string][] = [
+  ['expectation', ''],
+  ['so far', ''],
+  ['margin', 'figure'],
+  ['at', 'figure'],
+];
 
 export class Expectations {
   private readonly words = h('p', { role: 'status' });
   private readonly body = h('tbody');
   private readonly table: HTMLElement;
   readonly element: HTMLElement;
+  private all: Expected[] | null = null;
+  private over = false;
   private shown = '';
 
   constructor(data: Data) {
+    const heads = kHeads.map(([head, name]) => h('th', { scope: 'col', class: name }, head));
     this.table = h(
       'div',
       {
@@ -49,38 +80,41 @@ export class Expectations {
         'aria-label': 'expectations of the run',
         hidden: true,
       },
-      h(
-        'table',
-        { class: 'loop-table' },
-        h('thead', {}, h('tr', {}, ...kHeads.map((head) => h('th', { scope: 'col' }, head)))),
-        this.body,
-      ),
+      h('table', { class: 'expect-table' }, h('thead', {}, h('tr', {}, ...heads)), this.body),
     );
-    this.element = h('div', { class: 'loop' }, this.words, this.table);
-    data.source.on({ watched: (request, answer) => this.watched(request, answer) });
+    this.element = h('div', { class: 'expected' }, this.words, this.table);
+    data.source.on({
+      watched: (request, answer) => {
+        if (request !== 'expect.show' || !answer.ok) return;
+        this.all = (answer.expectations ?? []) as Expected[];
+        this.show();
+      },
+      connection: (state) => {
+        this.over = state === 'ended';
+        this.show();
+      },
+    });
   }
 
-  private watched(request: string, answer: Answer): void {
-    if (request !== 'expect.show' || !answer.ok) return;
-    const all = (answer.expectations ?? []) as Expected[];
-    const text = JSON.stringify(all);
-    if (text === this.shown) return;
+  private show(): void {
+    const { all, over } = this;
+    const text = JSON.stringify([all, over]);
+    if (!all || text === this.shown) return;
     this.shown = text;
-    say(this.words, expectedWords(all));
+    say(this.words, expectedWords(all, over));
     this.table.hidden = all.length === 0;
-    this.body.replaceChildren(...all.map(row));
+    this.body.replaceChildren(...all.map((one) => row(one, standingOf(one, over))));
   }
 }
 
 /** Its word says what its colour does. */
-function row(one: Expected): HTMLElement {
+function row(one: Expected, { sort, word, why }: Standing): HTMLElement {
   return h(
     'tr',
     {},
-    h('th', { scope: 'row' }, one.name),
-    h('td', { class: one.passed ? '' : 'bad' }, one.passed ? '✓ holds' : '✗ does not'),
+    h('th', { scope: 'row' }, one.name, why !== '' && h('span', { class: 'doc' }, why)),
+    h('td', { class: sort }, word),
     h('td', { class: 'figure' }, marginWords(one)),
     h('td', { class: 'figure' }, one.at_s === null ? '–' : seconds(one.at_s)),
-    h('td', {}, one.reason),
   );
 }
