@@ -27,7 +27,7 @@ export async function copyText(text: string): Promise<boolean> {
 
 /** What may take long, in words. */
 const kUnderWay: Record<string, string> = {
-  'clock.back-until': 'searching backwards… The emergency stop ends it.',
+  'clock.back-until': 'searching backwards… The emergency stop ends it. ',
 };
 
 /** Why something was refused. */
@@ -44,7 +44,7 @@ export class Actions {
     'copy',
   );
   /** Beside the words, which a screen reader would say again at each second. */
-  private readonly elapsed = h('span', { class: 'figure' });
+  private readonly elapsed = h('span');
   private readonly underWay = new Map<Request, number>();
   readonly bar = h(
     'footer',

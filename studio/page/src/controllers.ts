@@ -79,6 +79,8 @@ function range(parameter: Parameter): string {
   return `${parameter.above_min ? '> ' : ''}${end(min)} … ${end(max)}`;
 }
 
+const kShow = 'controller.show';
+
 export class Controllers {
   private readonly rows = new Map<string, Row>();
   private readonly body = h('div', { class: 'cards' });
@@ -104,14 +106,22 @@ export class Controllers {
       }),
     );
     this.element = h('div', { class: 'controllers' }, both, this.body);
-    data.source.on({ watched: (request, answer) => this.watched(request, answer) });
+    data.source.on({
+      watched: (request, answer) => {
+        if (request === kShow) this.show(answer);
+      },
+    });
+    // What is watched is told when it changes: not where time went back to what was told before.
+    data.whenBack(async () => {
+      if (this.rows.size > 0) this.show(await data.source.ask({ do: kShow }));
+    });
     lease.on(() => {
       both.disabled = !lease.mayChange;
     });
   }
 
-  private watched(request: string, answer: Answer): void {
-    if (request !== 'controller.show' || !answer.ok) return;
+  private show(answer: Answer): void {
+    if (!answer.ok) return;
     const list = answer.controllers as Controller[];
     const names = list.map((one) => one.name).join('\n');
     if (names !== this.names) {
