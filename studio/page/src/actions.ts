@@ -51,8 +51,7 @@ export class Actions {
     { class: 'said-bar', 'aria-label': 'last action' },
     this.line,
     this.copier,
-    this.words,
-    this.elapsed,
+    h('span', {}, this.words, this.elapsed),
   );
 
   constructor(readonly source: Source) {

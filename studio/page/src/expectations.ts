@@ -15,26 +15,29 @@ export interface Expected {
   reason: string;
 }
 
-/** Reasons of a window that has not begun, and what they are while the run goes on. */
-const kNotBegun: [RegExp, string][] = [
-  [/^its controllers never started$/, 'its controllers have not started'],
-  [/^its window was never reached: it begins at (.+?), and the run ended.*$/s, 'it begins at $1'],
-  [/^its window was never reached: (.*) never held$/s, 'it begins once $1 holds'],
-];
-
-/** How an expectation stands: `sort` is its colour, `why` the reason, empty where it holds. */
+/** How an expectation stands: `sort` is its colour, `why` the reason, if there is one. */
 export interface Standing {
   sort: 'good' | 'bad' | 'muted';
   word: string;
   why: string;
 }
 
-/** @param over nothing comes any more: what has not begun by then has failed */
+const kWords = { good: '✓ holds', bad: '✗ does not', muted: '… not yet' };
+/** Reasons of runtime/condition that are none while the run goes on: how it stands then, and why. */
+const kUnderWay: [RegExp, 'good' | 'muted', string][] = [
+  [/^its controllers never started$/, 'muted', 'its controllers have not started'],
+  [/^its window was never reached: it begins at (.+?), and.*/s, 'muted', 'it begins at $1'],
+  [/^its window was never reached: (.*) never held$/s, 'muted', 'it begins once $1 holds'],
+  [/^its window ends at (.+?), and.*/s, 'good', 'its window ends at $1'],
+  [/^the run ended .* after its window began$/, 'good', 'its window goes on'],
+];
+
+/** @param over nothing comes any more: what is not known by then has failed */
 export function standingOf({ passed, reason }: Expected, over: boolean): Standing {
-  if (passed) return { sort: 'good', word: '✓ holds', why: '' };
-  const waits = over ? undefined : kNotBegun.find(([words]) => words.test(reason));
-  if (waits) return { sort: 'muted', word: '… not yet', why: reason.replace(...waits) };
-  return { sort: 'bad', word: '✗ does not', why: reason };
+  const standing = (sort: Standing['sort'], why: string) => ({ sort, word: kWords[sort], why });
+  if (passed) return standing('good', '');
+  const row = over ? undefined : kUnderWay.find(([words]) => words.test(reason));
+  return row ? standing(row[1], reason.replace(row[0], row[2])) : standing('bad', reason);
 }
 
 /** "3 of 4 hold so far, 1 not begun." */
