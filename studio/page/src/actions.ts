@@ -11,7 +11,7 @@ export interface ButtonOptions {
   title?: string;
   /** Without the button that copies the command line. */
   bare?: boolean;
-  done?(answer: Answer): void;
+  done?(answer: Answer, asked: Request): void;
   /** It was pressed, and there is nothing to ask for. */
   nothing?(): void;
 }
@@ -24,6 +24,11 @@ export async function copyText(text: string): Promise<boolean> {
     return false;
   }
 }
+
+/** What may take long, in words. */
+const kUnderWay: Record<string, string> = {
+  'clock.back-until': 'searching backwards… The emergency stop ends it. ',
+};
 
 /** Why something was refused. */
 function wordsOf(answer: Answer): string {
@@ -38,12 +43,15 @@ export class Actions {
     { type: 'button', class: 'copy', onclick: () => void this.copy(this.line.textContent ?? '') },
     'copy',
   );
+  /** Beside the words, which a screen reader would say again at each second. */
+  private readonly elapsed = h('span');
+  private readonly underWay = new Map<Request, number>();
   readonly bar = h(
     'footer',
     { class: 'said-bar', 'aria-label': 'last action' },
     this.line,
     this.copier,
-    this.words,
+    h('span', {}, this.words, this.elapsed),
   );
 
   constructor(readonly source: Source) {
@@ -58,15 +66,35 @@ export class Actions {
     this.copier.hidden = command === '';
     say(this.line, command);
     say(this.words, words);
+    this.elapsed.hidden = !Object.values(kUnderWay).includes(words);
     this.bar.classList.toggle('bad', bad);
   }
 
   async run(request: Request): Promise<Answer> {
-    const command = commandLine(request);
-    this.tell(command, '…');
+    const words = kUnderWay[request.do];
+    this.tell(commandLine(request), words ?? '…');
+    if (words) this.underWay.set(request, performance.now());
+    const ticking = words ? setInterval(() => this.count(), 200) : undefined;
+    this.count();
     const answer = await this.source.ask(request);
+    clearInterval(ticking);
+    this.underWay.delete(request);
+    this.count();
     this.show(request, answer);
     return answer;
+  }
+
+  /** Whether a search of this page is under way: the run stands meanwhile. */
+  get searching(): boolean {
+    return this.underWay.size > 0;
+  }
+
+  private count(): void {
+    const [since] = this.underWay.values();
+    say(
+      this.elapsed,
+      since === undefined ? '' : `${Math.floor((performance.now() - since) / 1000)} s`,
+    );
   }
 
   /** What became of a request. */
@@ -116,7 +144,7 @@ export class Actions {
           const asked = request();
           if (!asked) return options.nothing?.();
           const answer = await this.run(asked);
-          options.done?.(answer);
+          options.done?.(answer, asked);
         },
       },
       label,

@@ -20,9 +20,32 @@ function axis(scale: string, side: number, label: string): uPlot.Axis {
   };
 }
 
-/** The axis below a plot; its values are the owner's. */
-export function timeAxis(): uPlot.Axis {
-  return { ...axis('x', 2, ''), labelSize: 0, size: 22 };
+/** Of `labels` those that a picture `width` wide has place for, their middles at `places`. */
+export function uncut(
+  labels: string[],
+  places: number[],
+  widths: number[],
+  width: number,
+): string[] {
+  return labels.map((label, i) => (places[i] + widths[i] / 2 > width ? '' : label));
+}
+
+/** The axis below a plot. A label that would be cut off at the right is left out. */
+export function timeAxis(words: (value: number) => string): uPlot.Axis {
+  return {
+    ...axis('x', 2, ''),
+    labelSize: 0,
+    size: 22,
+    values: (u, ticks) => {
+      const labels = ticks.map(words);
+      const { canvas, font } = u.ctx;
+      u.ctx.font = `${11 * devicePixelRatio}px system-ui`;
+      const widths = labels.map((label) => u.ctx.measureText(label).width);
+      u.ctx.font = font;
+      const places = ticks.map((one) => u.valToPos(one, 'x', true));
+      return uncut(labels, places, widths, canvas.width);
+    },
+  };
 }
 
 /** An axis on the left for the first unit, on the right for the second; scales are `y UNIT`. */

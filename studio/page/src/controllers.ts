@@ -6,7 +6,7 @@ import { attribute, h, say } from './dom';
 import { micros, plain } from './format';
 import type { Answer } from './protocol';
 import { Shadows } from './shadows';
-import { undoable } from './undo';
+import { type Undoable, undoable } from './undo';
 
 interface Parameter {
   name: string;
@@ -36,6 +36,10 @@ interface Row {
   element: HTMLElement;
   state: HTMLElement;
   cost: HTMLElement;
+  parameters: HTMLElement;
+  /** What the parameters are, without what changes. */
+  shape: string;
+  values: Map<string, Undoable>;
 }
 
 /** A value of the parameter's type of what was typed. Undefined: it is none. */
@@ -61,6 +65,13 @@ function shown(value: unknown): string {
   return Array.isArray(value) ? value.join(', ') : String(value ?? '');
 }
 
+/** What was typed, as the run will tell it: one number for a list is that of every element. */
+export function toldAs(parameter: Pick<Parameter, 'type' | 'elements'>, text: string): string {
+  const value = parsed(parameter, text);
+  const one = parameter.type === 'numbers' && typeof value === 'number';
+  return shown(one ? parameter.elements.map(() => value) : value);
+}
+
 function range(parameter: Parameter): string {
   const { min, max } = parameter;
   const end = (of: number | number[]) => plain(Array.isArray(of) ? of[0] : of);
@@ -69,6 +80,8 @@ function range(parameter: Parameter): string {
   if (max === null || end(max) === '–') return end(min) === '–' ? '' : `${above}${end(min)}`;
   return `${parameter.above_min ? '> ' : ''}${end(min)} … ${end(max)}`;
 }
+
+const kShow = 'controller.show';
 
 export class Controllers {
   private readonly rows = new Map<string, Row>();
@@ -80,7 +93,7 @@ export class Controllers {
   readonly element: HTMLElement;
 
   constructor(
-    private readonly data: Data,
+    data: Data,
     private readonly actions: Actions,
     lease: ControlLease,
   ) {
@@ -97,14 +110,22 @@ export class Controllers {
       }),
     );
     this.element = h('div', { class: 'controllers' }, both, this.body);
-    data.source.on({ watched: (request, answer) => this.watched(request, answer) });
+    data.source.on({
+      watched: (request, answer) => {
+        if (request === kShow) this.show(answer);
+      },
+    });
+    // What is watched is told when it changes: not where time went back to what was told before.
+    data.whenBack(async () => {
+      if (this.rows.size > 0) this.show(await data.source.ask({ do: kShow }));
+    });
     lease.on(() => {
       both.disabled = !lease.mayChange;
     });
   }
 
-  private watched(request: string, answer: Answer): void {
-    if (request !== 'controller.list' || !answer.ok) return;
+  private show(answer: Answer): void {
+    if (!answer.ok) return;
     const list = answer.controllers as Controller[];
     const names = list.map((one) => one.name).join('\n');
     if (names !== this.names) {
@@ -118,7 +139,6 @@ export class Controllers {
           ...list.map((one) => h('option', { value: one.name }, one.name)),
         );
       }
-      void this.parameters();
     }
     for (const one of list) {
       const row = this.rows.get(one.name);
@@ -136,6 +156,7 @@ export class Controllers {
           ? `${joints}; a cycle takes ${micros(cost.p50)}, p99 ${micros(cost.p99)}, most ${micros(cost.max)}; late ${one.overruns} times`
           : joints,
       );
+      this.parameters(row, one);
     }
     if (list.length === 0) say(this.body, 'No controller is loaded: tandem controller load NAME.');
   }
@@ -166,48 +187,43 @@ export class Controllers {
       this.shadows.part(one.name),
       parameters,
     );
-    this.rows.set(one.name, { element, state, cost });
+    this.rows.set(one.name, { element, state, cost, parameters, shape: '', values: new Map() });
     return element;
   }
 
-  private async parameters(): Promise<void> {
-    const answer = await this.data.source.ask({ do: 'controller.show' });
-    if (!answer.ok) return;
-    for (const one of answer.controllers as Controller[]) {
-      const box = this.rows.get(one.name)?.element.querySelector('.parameters');
-      const list = one.parameters ?? [];
-      if (!box || list.length === 0) continue;
-      box.replaceChildren(
-        h(
-          'div',
-          {
-            class: 'table-box',
-            tabindex: '0',
-            role: 'region',
-            'aria-label': `parameters of ${one.name}`,
-          },
-          h(
-            'table',
-            { class: 'parameter-table' },
-            h(
-              'thead',
-              {},
-              h(
-                'tr',
-                {},
-                ...['parameter', 'value', 'unit', 'range', 'change'].map((head) =>
-                  h('th', { scope: 'col' }, head),
-                ),
-              ),
-            ),
-            h('tbody', {}, ...list.map((parameter) => this.parameter(one.name, parameter))),
-          ),
-        ),
-      );
+  /** Their values; the table is made again where it has other rows, as after a reload. */
+  private parameters(row: Row, one: Controller): void {
+    const list = one.parameters ?? [];
+    const shape = JSON.stringify(list.map((each) => (each.live ? { ...each, value: null } : each)));
+    if (shape !== row.shape) {
+      row.shape = shape;
+      row.values.clear();
+      row.parameters.replaceChildren();
+      if (list.length > 0) row.parameters.append(this.table(row, one.name, list));
     }
+    for (const each of list) row.values.get(each.name)?.tell(shown(each.value));
   }
 
-  private parameter(controller: string, parameter: Parameter): HTMLElement {
+  private table(row: Row, controller: string, list: Parameter[]): HTMLElement {
+    const heads = ['parameter', 'value', 'unit', 'range', 'change'];
+    return h(
+      'div',
+      {
+        class: 'table-box',
+        tabindex: '0',
+        role: 'region',
+        'aria-label': `parameters of ${controller}`,
+      },
+      h(
+        'table',
+        { class: 'parameter-table' },
+        h('thead', {}, h('tr', {}, ...heads.map((head) => h('th', { scope: 'col' }, head)))),
+        h('tbody', {}, ...list.map((parameter) => this.parameter(row, controller, parameter))),
+      ),
+    );
+  }
+
+  private parameter(row: Row, controller: string, parameter: Parameter): HTMLElement {
     const first = shown(parameter.value);
     const words = `${parameter.name} of ${controller}`;
     const field = this.field(parameter, first, words);
@@ -216,11 +232,14 @@ export class Controllers {
       if (value === undefined) return null;
       return { do: 'controller.set', name: controller, parameters: { [parameter.name]: value } };
     };
-    const { set, undo } = undoable(
+    const told = (text: string) => toldAs(parameter, text);
+    const value = undoable(
       this.actions,
-      { name: words, field, request, type: parameter.type },
+      { name: words, field, request, told, type: parameter.type },
       first,
     );
+    const { set, undo, note } = value;
+    if (parameter.live) row.values.set(parameter.name, value);
     return h(
       'tr',
       {},
@@ -230,7 +249,7 @@ export class Controllers {
         parameter.name,
         h('span', { class: 'doc' }, parameter.doc),
       ),
-      h('td', {}, parameter.live ? field : h('span', { class: 'figure' }, first)),
+      h('td', {}, ...(parameter.live ? [field, note] : [h('span', { class: 'figure' }, first)])),
       h('td', {}, parameter.unit),
       h('td', {}, range(parameter)),
       h(

@@ -1,6 +1,14 @@
 // Joins the source with the page: who needs which signals, their newest rows, and the time.
 import { History } from './history';
-import type { Hello, RunEvent, SourceTable, Tick, TimeBack, Window } from './protocol';
+import {
+  type Hello,
+  isRequest,
+  type RunEvent,
+  type SourceTable,
+  type Tick,
+  type TimeBack,
+  type Window,
+} from './protocol';
 import { Catalog } from './signals';
 import type { Source } from './source';
 import { TimeModel } from './time';
@@ -138,7 +146,9 @@ export class Data {
     this.history.forgetAfter(time_s);
     // Older than the rows are: those before the next tick come from what the run kept.
     if (this.history.rows === 0) for (const id of this.history.ids()) this.lacking.add(id);
-    this.events.splice(0, this.events.length, ...this.events.filter((e) => e.time_s <= time_s));
+    // A request acts in the cycle after its time.
+    const stays = (e: RunEvent) => e.time_s < time_s || (e.time_s === time_s && !isRequest(e));
+    this.events.splice(0, this.events.length, ...this.events.filter(stays));
     this.time.goBack(time_s);
     for (const call of [...this.onBack, ...this.onEvents]) call();
   }

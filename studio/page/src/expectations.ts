@@ -2,7 +2,6 @@
 import type { Data } from './data';
 import { h, say } from './dom';
 import { plain, seconds } from './format';
-import type { Answer } from './protocol';
 
 /** One of `expectations` of expect.show: docs/json.md. */
 export interface Expected {
@@ -16,12 +15,39 @@ export interface Expected {
   reason: string;
 }
 
-/** "3 of 4 hold so far." */
-export function expectedWords(all: Expected[]): string {
+/** How an expectation stands: `sort` is its colour, `why` the reason, if there is one. */
+export interface Standing {
+  sort: 'good' | 'bad' | 'muted';
+  word: string;
+  why: string;
+}
+
+const kWords = { good: '✓ holds', bad: '✗ does not', muted: '… not yet' };
+/** Reasons of runtime/condition that are none while the run goes on: how it stands then, and why. */
+const kUnderWay: [RegExp, 'good' | 'muted', string][] = [
+  [/^its controllers never started$/, 'muted', 'its controllers have not started'],
+  [/^its window was never reached: it begins at (.+?), and.*/s, 'muted', 'it begins at $1'],
+  [/^its window was never reached: (.*) never held$/s, 'muted', 'it begins once $1 holds'],
+  [/^its window ends at (.+?), and.*/s, 'good', 'its window ends at $1'],
+  [/^the run ended .* after its window began$/, 'good', 'its window goes on'],
+];
+
+/** @param over nothing comes any more: what is not known by then has failed */
+export function standingOf({ passed, reason }: Expected, over: boolean): Standing {
+  const standing = (sort: Standing['sort'], why: string) => ({ sort, word: kWords[sort], why });
+  if (passed) return standing('good', '');
+  const row = over ? undefined : kUnderWay.find(([words]) => words.test(reason));
+  return row ? standing(row[1], reason.replace(row[0], row[2])) : standing('bad', reason);
+}
+
+/** "3 of 4 hold so far, 1 not begun." */
+export function expectedWords(all: Expected[], over = false): string {
   if (all.length === 0)
     return 'The experiment expects nothing: rows [[expect]] say what it must do.';
-  const held = all.filter((one) => one.passed).length;
-  return held === all.length ? `All ${held} hold so far.` : `${held} of ${all.length} hold so far.`;
+  const count = (sort: string) => all.filter((one) => standingOf(one, over).sort === sort).length;
+  const [held, waiting] = [count('good'), count('muted')];
+  if (held === all.length) return `All ${held} hold so far.`;
+  return `${held} of ${all.length} hold so far${waiting > 0 ? `, ${waiting} not begun` : ''}.`;
 }
 
 /** "24.5 Nm", "–" */
@@ -30,16 +56,24 @@ export function marginWords(one: Expected): string {
   return one.unit ? `${plain(one.margin)} ${one.unit}` : plain(one.margin);
 }
 
-const kHeads = ['expectation', 'so far', 'margin', 'at', 'why'];
+const kHeads: [string, string][] = [
+  ['expectation', ''],
+  ['so far', ''],
+  ['margin', 'figure'],
+  ['at', 'figure'],
+];
 
 export class Expectations {
   private readonly words = h('p', { role: 'status' });
   private readonly body = h('tbody');
   private readonly table: HTMLElement;
   readonly element: HTMLElement;
+  private all: Expected[] | null = null;
+  private over = false;
   private shown = '';
 
   constructor(data: Data) {
+    const heads = kHeads.map(([head, name]) => h('th', { scope: 'col', class: name }, head));
     this.table = h(
       'div',
       {
@@ -49,38 +83,41 @@ export class Expectations {
         'aria-label': 'expectations of the run',
         hidden: true,
       },
-      h(
-        'table',
-        { class: 'loop-table' },
-        h('thead', {}, h('tr', {}, ...kHeads.map((head) => h('th', { scope: 'col' }, head)))),
-        this.body,
-      ),
+      h('table', { class: 'expect-table' }, h('thead', {}, h('tr', {}, ...heads)), this.body),
     );
-    this.element = h('div', { class: 'loop' }, this.words, this.table);
-    data.source.on({ watched: (request, answer) => this.watched(request, answer) });
+    this.element = h('div', { class: 'expected' }, this.words, this.table);
+    data.source.on({
+      watched: (request, answer) => {
+        if (request !== 'expect.show' || !answer.ok) return;
+        this.all = (answer.expectations ?? []) as Expected[];
+        this.show();
+      },
+      connection: (state) => {
+        this.over = state === 'ended';
+        this.show();
+      },
+    });
   }
 
-  private watched(request: string, answer: Answer): void {
-    if (request !== 'expect.show' || !answer.ok) return;
-    const all = (answer.expectations ?? []) as Expected[];
-    const text = JSON.stringify(all);
-    if (text === this.shown) return;
+  private show(): void {
+    const { all, over } = this;
+    const text = JSON.stringify([all, over]);
+    if (!all || text === this.shown) return;
     this.shown = text;
-    say(this.words, expectedWords(all));
+    say(this.words, expectedWords(all, over));
     this.table.hidden = all.length === 0;
-    this.body.replaceChildren(...all.map(row));
+    this.body.replaceChildren(...all.map((one) => row(one, standingOf(one, over))));
   }
 }
 
 /** Its word says what its colour does. */
-function row(one: Expected): HTMLElement {
+function row(one: Expected, { sort, word, why }: Standing): HTMLElement {
   return h(
     'tr',
     {},
-    h('th', { scope: 'row' }, one.name),
-    h('td', { class: one.passed ? '' : 'bad' }, one.passed ? '✓ holds' : '✗ does not'),
+    h('th', { scope: 'row' }, one.name, why !== '' && h('span', { class: 'doc' }, why)),
+    h('td', { class: sort }, word),
     h('td', { class: 'figure' }, marginWords(one)),
     h('td', { class: 'figure' }, one.at_s === null ? '–' : seconds(one.at_s)),
-    h('td', {}, one.reason),
   );
 }

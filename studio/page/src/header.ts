@@ -28,7 +28,7 @@ export class Header {
 
   constructor(
     private readonly data: Data,
-    actions: Actions,
+    private readonly actions: Actions,
     themeButton: HTMLElement,
   ) {
     const stop = h(
@@ -134,6 +134,9 @@ export class Header {
       words = this.data.lastTick?.paused ? stands : 'live';
       stale = false;
     }
+    const searching = this.state === 'live' && this.actions.searching;
+    if (searching) words = 'searching backwards';
+    this.measured.hidden = searching; // no cycle is made
     say(this.link, words);
     attribute(this.link, 'title', this.state === 'lost' ? `${this.why} It is tried again.` : null);
     document.body.dataset.state = this.state;

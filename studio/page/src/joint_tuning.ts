@@ -116,6 +116,7 @@ export class JointTuning {
           const number = gainOf(text);
           return number === undefined ? null : request(number);
         },
+        told: (text) => shown(gainOf(text)),
       },
       shown(of(told)),
     );

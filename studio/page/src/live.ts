@@ -7,10 +7,12 @@ import { whyRefused } from './versions';
 const kAgain_ms = 1000;
 /** A question without an answer for so long has none; a change waits a second for the loop. */
 const kPatience_ms = 10000;
+/** These take as long as the cycles that are played again. */
+const kTravels = ['clock.back-until', 'clock.goto', 'clock.rewind'];
 
 interface Pending<T> {
   resolve(value: T): void;
-  timer: ReturnType<typeof setTimeout>;
+  timer?: ReturnType<typeof setTimeout>;
 }
 
 const kNoLink: Answer = {
@@ -107,14 +109,16 @@ export class LiveSource implements Source {
     const id = this.nextId++;
     if (!this.send({ op: 'ask', id, request })) return Promise.resolve(kNoLink);
     return new Promise((resolve) => {
-      const timer = setTimeout(() => {
+      const giveUp = () => {
         this.asked.delete(id);
         resolve({
           ok: false,
           error: `no answer within ${kPatience_ms / 1000} s`,
           hint: 'the run may be busy: look at its state before you ask again',
         });
-      }, kPatience_ms);
+      };
+      const patient = kTravels.includes(request.do);
+      const timer = patient ? undefined : setTimeout(giveUp, kPatience_ms);
       this.asked.set(id, { resolve, timer });
     });
   }

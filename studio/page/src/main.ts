@@ -8,6 +8,7 @@ import './joints.css';
 import './scene.css';
 import './scope.css';
 import './loop.css';
+import './expected.css';
 import './report.css';
 import './emulation.css';
 import './narrow.css';
@@ -41,7 +42,7 @@ const kWatched: Record<string, string[]> = {
   plots: [],
   scope: [],
   joints: ['joint.list'],
-  controllers: ['controller.list', 'controller.difference'],
+  controllers: ['controller.show', 'controller.difference'],
   inputs: ['input.list'],
   loop: ['loop.show'],
   expected: ['expect.show'],

@@ -161,7 +161,7 @@ export class Pane implements LegendOwner {
     const left = this.plot ? this.plot.bbox.left / uPlot.pxRatio : 64;
     const width = this.plot
       ? this.plot.bbox.width / uPlot.pxRatio
-      : this.element.clientWidth - left - 24;
+      : this.element.clientWidth - left - 32;
     const lanes = this.drawn.flatMap(({ series, curve, lane }) =>
       lane && curve
         ? [
@@ -305,7 +305,7 @@ export class Pane implements LegendOwner {
         height: this.height(),
         padding: [
           8,
-          12 + (second && units.length < 2 ? kAxis_px : 0),
+          20 + (second && units.length < 2 ? kAxis_px : 0),
           0,
           units.length === 0 ? kAxis_px : 0,
         ],
@@ -313,13 +313,7 @@ export class Pane implements LegendOwner {
         bands,
         legend: { show: false },
         scales: { x: { time: false } },
-        axes: [
-          {
-            ...timeAxis(),
-            values: (_, ticks) => ticks.map((one) => `${Number(one.toFixed(6))} s`),
-          },
-          ...unitAxes(units),
-        ],
+        axes: [timeAxis((one) => `${Number(one.toFixed(6))} s`), ...unitAxes(units)],
         cursor: {
           y: false,
           points: { show: false },

@@ -81,6 +81,10 @@ export interface RunEvent {
   who: string;
   text: string;
 }
+/** Whether an event is a command that somebody asked for. */
+export function isRequest(event: RunEvent): boolean {
+  return event.who === '' && event.text.startsWith('request ');
+}
 /** Simulated time went back to `time_s`: what lay after it is forgotten. */
 export interface TimeBack {
   time_s: number;

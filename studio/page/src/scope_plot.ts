@@ -123,17 +123,11 @@ export class ScopePlot {
       {
         width,
         height: kHeight,
-        padding: [8, units.length < 2 ? 16 : 0, 0, 0],
+        padding: [8, units.length < 2 ? 22 : 0, 0, 0],
         series: [{}, ...lines],
         legend: { show: false },
         scales: { x: { time: false } },
-        axes: [
-          {
-            ...timeAxis(),
-            values: (_, ticks) => ticks.map((one) => `${Number((1e3 * one).toFixed(3))} ms`),
-          },
-          ...unitAxes(units),
-        ],
+        axes: [timeAxis((one) => `${Number((1e3 * one).toFixed(3))} ms`), ...unitAxes(units)],
         cursor: {
           y: false,
           points: { show: false },

@@ -51,7 +51,11 @@ test('events, the selected time and a picture that stands go back with the run',
     who: '',
     text,
   });
-  each((one) => one.events?.([event(1, 'early'), event(3, 'at'), event(4, 'late')]));
+  const asked = 'request {"do": "controller.set"}';
+  each((one) =>
+    one.events?.([event(1, 'early'), event(2, asked), event(3, 'at'), event(3, asked)]),
+  );
+  each((one) => one.events?.([event(4, 'late')]));
   each((one) => one.tick?.(tick(5, 0)));
   data.time.select(4.5);
   data.time.freeze(4, 5);
@@ -60,7 +64,8 @@ test('events, the selected time and a picture that stands go back with the run',
   each((one) => one.back?.({ time_s: 3, cycle: 3000, from_s: 5 }));
   assert.deepEqual(
     data.events.map((one) => one.text),
-    ['early', 'at'],
+    ['early', asked, 'at'],
+    'what was asked for at that moment had not been done',
   );
   assert.equal(data.time.selected, null);
   assert.equal(data.time.frozen, null);

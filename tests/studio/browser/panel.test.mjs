@@ -140,4 +140,98 @@ describe('the joints and the 3D view of the studio', {
     assert.ok(!before.equals(await pixels()), 'the picture is another one');
     await leave(page);
   });
+
+  test('parameters follow the run: back in time, from elsewhere, not over what is typed', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.click('#tab-controllers');
+    const kp = page.locator('input[aria-label="kp of squat"]');
+    const undo = page.locator('button[aria-label="undo kp of squat"]');
+    const shows = (value) =>
+      page.waitForFunction(
+        (text) => document.querySelector('[aria-label="kp of squat"]').value === text,
+        value,
+      );
+    await kp.fill('55');
+    await kp.press('Enter');
+    await eventually('it is set', () => mock.robot.gain === 55);
+    assert.equal(await undo.isDisabled(), false);
+    const to = mock.robot.time - 1;
+    mock.robot.gain = 40; // as it was then
+    mock.say({ op: 'back', time_s: to, cycle: Math.round(1000 * to), from_s: to + 1 });
+    await shows('40');
+    assert.equal(await undo.isDisabled(), true, 'nothing is left to take back');
+    await kp.fill('66');
+    mock.robot.gain = 20;
+    await until(page, 'in force: 20');
+    assert.equal(await kp.inputValue(), '66', 'what is being typed stays');
+    mock.robot.paused = true;
+    await kp.press('Enter');
+    await until(page, 'asked for; in force: 20');
+    await shot(page, 'studio-asked-for');
+    assert.deepEqual(await violations(page), []);
+    mock.robot.ask({ do: 'clock.resume' });
+    await page.waitForSelector('.in-force', { state: 'hidden' });
+    await undo.click();
+    await eventually('the former value', () => mock.robot.gain === 20);
+    await shows('20');
+    await leave(page);
+  });
+
+  test('what is expected: names with their reasons, on a phone as well', async () => {
+    const mock = await play();
+    const row = (name, reason) => ({
+      ...{ name, passed: reason === '', margin: null, unit: 'Nm', at_s: null, reason },
+    });
+    const begins = 'its window was never reached: it begins at 30 s, and the run ended at 20 s';
+    mock.robot.expected = [
+      { ...row('the knee keeps within its torque', ''), margin: 24.5, at_s: 4.352 },
+      { ...row('the base stays level', 'it did not hold in 3 of 900 cycles'), margin: -0.2 },
+      row('it settles after the push', begins),
+    ];
+    const page = await visit(mock.address, { scheme: 'dark' });
+    await page.click('#tab-expected');
+    await until(page, '1 of 3 hold so far, 1 not begun.');
+    const texts = (selector) => page.locator(`.expect-table ${selector}`).allTextContents();
+    assert.deepEqual(await texts('thead th'), ['expectation', 'so far', 'margin', 'at']);
+    assert.deepEqual(await texts('.doc'), [
+      'it did not hold in 3 of 900 cycles',
+      'it begins at 30 s',
+    ]);
+    assert.deepEqual(await texts('td:nth-child(2)'), ['✓ holds', '✗ does not', '… not yet']);
+    const colours = await page.$$eval('.expect-table td:nth-child(2)', (cells) =>
+      cells.map((cell) => getComputedStyle(cell).color),
+    );
+    assert.equal(new Set(colours).size, 3, 'each has its colour');
+    const edges = await page.$eval('.expect-table', (table) =>
+      ['thead th', 'tbody th'].map((one) => table.querySelector(one).getBoundingClientRect().x),
+    );
+    assert.equal(edges[0], edges[1], 'a head above its column');
+    await shot(page, 'studio-dark-expected');
+    await page.setViewportSize({ width: 390, height: 844 });
+    const cut = await page.$eval(
+      '.expected .table-box',
+      (box) => box.scrollWidth - box.clientWidth,
+    );
+    assert.equal(cut, 0, 'pixels that are not seen');
+    await page.locator('.expect-table').scrollIntoViewIfNeeded();
+    assert.deepEqual(await violations(page), []);
+    await shot(page, 'studio-narrow-expected');
+    await leave(page);
+  });
+
+  test('a search says that it goes on, for how long, and how it ends', async () => {
+    const mock = await play();
+    const page = await visit(mock.address);
+    await page.fill('.condition', 'torque(LKneeSag) > 40Nm');
+    await page.click('button:text-is("Back until")');
+    await until(page, 'searching backwards… The emergency stop ends it. 1 s');
+    assert.equal(await page.textContent('.link'), 'searching backwards');
+    assert.equal(await page.isVisible('.measured'), false);
+    await shot(page, 'studio-searching');
+    await page.click('.estop');
+    await until(page, 'a stop was asked for meanwhile');
+    await page.waitForFunction(() => document.querySelector('.link').textContent === 'live');
+    await leave(page);
+  });
 });

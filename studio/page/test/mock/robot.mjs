@@ -2,6 +2,28 @@
 import { kHostile, PlayedRobot } from './played_robot.mjs';
 
 export class MockRobot extends PlayedRobot {
+  /** What expect.show tells. */
+  expected = [
+    {
+      name: 'knee stays cool',
+      passed: true,
+      margin: 24.51,
+      unit: 'Nm',
+      at_s: 4.352,
+      reason: '',
+    },
+    {
+      name: 'settles',
+      passed: false,
+      margin: -0.2,
+      unit: 's',
+      at_s: 2.2,
+      reason: 'it settled after 2.2 s',
+    },
+  ];
+  /** Ends a search: with its answer. Null: there is none. */
+  found = null;
+
   clock() {
     return {
       ok: true,
@@ -211,24 +233,7 @@ export class MockRobot extends PlayedRobot {
       case 'expect.show':
         return {
           ok: true,
-          expectations: [
-            {
-              name: 'knee stays cool',
-              passed: true,
-              margin: 24.51,
-              unit: 'Nm',
-              at_s: 4.352,
-              reason: '',
-            },
-            {
-              name: 'settles',
-              passed: false,
-              margin: -0.2,
-              unit: 's',
-              at_s: 2.2,
-              reason: 'it settled after 2.2 s',
-            },
-          ],
+          expectations: this.expected,
         };
       case 'loop.show':
         return {
@@ -320,6 +325,7 @@ export class MockRobot extends PlayedRobot {
       case 'estop':
         this.latched = 1;
         this.phase = 'faulted';
+        this.found?.(no('a stop was asked for meanwhile', 'ask again'));
         return { ...done, category: 1, confirmed: true };
       case 'fault.reset':
         this.latched = 0;
@@ -349,6 +355,10 @@ export class MockRobot extends PlayedRobot {
       case 'controller.set': {
         const { kp } = request.parameters;
         if (kp > 100) return no('kp cannot be 101', 'it is from 0 to 100 Nm/rad');
+        if (this.paused) {
+          this.waiting = kp;
+          return { ...done, done: false, note: "it will happen in the loop's next cycle" };
+        }
         if (kp !== undefined) this.gain = kp;
         return { ...done, values: request.parameters };
       }
@@ -360,7 +370,13 @@ export class MockRobot extends PlayedRobot {
         return this.clock();
       case 'clock.resume':
         this.paused = false;
+        this.gain = this.waiting ?? this.gain;
+        this.waiting = undefined;
         return this.clock();
+      case 'clock.back-until':
+        return new Promise((resolve) => {
+          this.found = resolve;
+        });
       case 'clock.step':
         this.time += (request.cycles ?? 1) * 0.001;
         return this.clock();

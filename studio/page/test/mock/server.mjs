@@ -117,7 +117,7 @@ export async function startMock(options = {}) {
         tellControl();
       }
     });
-    socket.on('message', (data) => {
+    socket.on('message', async (data) => {
       const message = JSON.parse(data);
       client.heard = Date.now();
       if (message.op === 'enter') {
@@ -148,7 +148,7 @@ export async function startMock(options = {}) {
         } else if (name.startsWith('joint.') && !reads && holder !== client) {
           answer = { ok: false, error: 'nobody has control from here', hint: 'take control first' };
         } else answer = robot.ask(message.request);
-        client.send({ op: 'answer', id: message.id, answer });
+        client.send({ op: 'answer', id: message.id, answer: await answer });
       }
     });
   });
