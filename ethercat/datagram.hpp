@@ -2,6 +2,7 @@
 // Layer: ethercat.  Thread: any.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -29,6 +30,14 @@ inline constexpr std::size_t kEthernetHeaderBytes = 14;
 inline constexpr std::size_t kFrameHeaderBytes = kEthernetHeaderBytes + 2;
 inline constexpr std::size_t kMinFrameBytes = 60;    ///< without Ethernet's check sum
 inline constexpr std::size_t kMaxFrameBytes = 1514;  ///< without Ethernet's check sum
+/// What a frame costs on the wire besides its bytes: preamble and start (8), check sum (4), and the
+/// gap before the next one (12). IEEE 802.3-2018, 3.1.1 and 4.4.2.
+inline constexpr std::size_t kWireOverhead = 8 + 4 + 12;
+inline constexpr std::int64_t kByteNs = 80;  ///< at 100 Mbit/s
+/// The bytes of wire that a frame of `bytes` takes: a short one is filled up.
+[[nodiscard]] constexpr std::size_t wire_bytes(std::size_t bytes) noexcept {
+  return std::max(bytes, kMinFrameBytes) + kWireOverhead;
+}
 inline constexpr std::size_t kDatagramHeaderBytes = 10;
 inline constexpr std::size_t kWorkingCounterBytes = 2;
 /// What a datagram costs besides its data.

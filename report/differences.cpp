@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <string_view>
 
 #include "log/compare.hpp"
 
@@ -41,6 +43,20 @@ TwinGap twin_gap(const Spans& spans, std::size_t first, std::size_t second) {
   return found;
 }
 
+/// "rad or m" is the unit of what turns, then of what slides: that of `joint`. Where it is no
+/// joint's, that of all when they are alike.
+std::string unit_of(const std::string& unit, const std::string& joint,
+                    std::span<const hal::JointConfig> joints) {
+  constexpr std::string_view kOr = " or ";
+  const std::size_t end = unit.find(kOr);
+  if (end == std::string::npos || joints.empty()) return unit;
+  const auto its = std::ranges::find(joints, joint, &hal::JointConfig::name);
+  const bool slides = (its == joints.end() ? joints.front() : *its).slides;
+  const auto is_other = [&](const hal::JointConfig& one) { return one.slides != slides; };
+  if (its == joints.end() && std::ranges::any_of(joints, is_other)) return unit;
+  return slides ? unit.substr(end + kOr.size()) : unit.substr(0, end);
+}
+
 bool is_clock(const std::string& field) { return field == "cycle" || field == "time_ns"; }
 
 /// Every signal of two sources with the same fields, as far as they differ.
@@ -53,7 +69,8 @@ void add_gaps(const Recording& recording, const studio::Source& first, const stu
       TwinGap one = twin_gap(recording.spans(), first.first + at, second.first + at);
       if (!(one.largest > 0.0)) continue;
       one.name = recording.table().name(static_cast<studio::SignalId>(first.first + at));
-      one.unit = field.unit;
+      const std::string element = i < field.elements.size() ? field.elements[i] : "";
+      one.unit = unit_of(field.unit, element, recording.joints());
       all.push_back(std::move(one));
     }
   }

@@ -243,7 +243,7 @@ Result<Recording> Recording::read(const RecordingParts& parts) {
   }
   const auto grid = grid_of(logs, std::max<std::size_t>(table.size(), 1), parts.most);
   if (!grid) return std::unexpected(grid.error());
-  Recording made(*grid, std::move(table));
+  Recording made(*grid, std::move(table), parts.run.robot.joints);
   std::vector<Event> events;
   Json names = Json::array();
   for (const RecordedLog& log : logs) {

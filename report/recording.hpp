@@ -57,6 +57,8 @@ class Recording {
 
   [[nodiscard]] const studio::SignalTable& table() const { return table_; }
   [[nodiscard]] const Spans& spans() const { return spans_; }
+  /// Those of the first log's robot; empty: not known.
+  [[nodiscard]] const std::vector<hal::JointConfig>& joints() const { return joints_; }
 
   /// What the page unpacks: JSON that is safe within an HTML script element.
   struct Text {
@@ -71,11 +73,12 @@ class Recording {
                                    double to_s, std::size_t points) const;
 
  private:
-  Recording(const Grid& grid, studio::SignalTable table)
-      : table_(std::move(table)), spans_(grid, table_.size()) {}
+  Recording(const Grid& grid, studio::SignalTable table, std::vector<hal::JointConfig> joints)
+      : table_(std::move(table)), spans_(grid, table_.size()), joints_(std::move(joints)) {}
 
   studio::SignalTable table_;
   Spans spans_;
+  std::vector<hal::JointConfig> joints_;
   std::string head_;  // JSON of all but grid, codes and data
 };
 

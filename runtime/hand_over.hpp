@@ -9,6 +9,7 @@
 #include "runtime/joint_arbiter.hpp"
 #include "runtime/run_services.hpp"
 #include "runtime/run_statistics.hpp"
+#include "runtime/text_history.hpp"
 
 namespace tandem::runtime {
 
@@ -20,6 +21,12 @@ class HandOver {
 
   /// To RunServices, how things are.
   void show() noexcept TANDEM_RT;
+  /// A limit that was met, for people. @rt wait-free
+  void tell(const LimitNote& limit) noexcept TANDEM_RT {
+    if (!muted_) limits_.write(limit);
+  }
+  /// What tell() was told. Any thread.
+  [[nodiscard]] const LimitHistory& limits() const noexcept { return limits_; }
   /// While on, cycles are for the statistics alone. Between two cycles.
   void mute(bool on) noexcept { muted_ = on; }
   /// Each cycle, when its command is out.
@@ -50,6 +57,7 @@ class HandOver {
   JointArbiter& arbiter_;
   RunServices& services_;
   RunStatistics statistics_;
+  LimitHistory limits_;
   std::vector<JointStatus> joints_;  // as services_ shows them
   std::vector<SensorStatus> sensors_;
   std::uint64_t shown_gains_ = 0;  // their revision

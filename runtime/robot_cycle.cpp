@@ -334,6 +334,11 @@ void RobotCycle::note_limits() noexcept TANDEM_RT {
     limited_[j] = {.met = now_.limits.met()[j], .controller = owner};
     now_.event(EventKind::kLimited, static_cast<std::int32_t>(j),
                static_cast<std::uint32_t>(now_.limits.codes()[j]), owner, limited_[j].met);
+    shown_.tell({.cycle = now_.time.cycle,
+                 .time_ns = now_.time.time_ns,
+                 .met = limited_[j].met,
+                 .joint = static_cast<std::int32_t>(j),
+                 .controller = owner});
   }
 }
 

@@ -71,6 +71,16 @@ class RobotCycle {
 
   /// Every fault so far, in the order of their times. Any thread.
   [[nodiscard]] std::vector<FaultReport> faults() const;
+  /// A joint's first command that a limit changed; once more when it is the first one of a
+  /// controller, as in the log.
+  struct LimitReport {
+    double time_s = 0.0;
+    std::uint64_t cycle = 0;
+    std::string joint;
+    std::string text;  ///< "the position reference 4 rad is beyond 3.14 rad, by 'squat'"
+  };
+  /// Those after the first `seen`, which counts on. Any thread.
+  [[nodiscard]] std::vector<LimitReport> limits_met(std::uint64_t& seen) const;
   [[nodiscard]] const FaultLog& fault_log() const noexcept { return now_.faults; }
   /// A drive's error code in words, with the cause that the run has latched of its joint; empty for
   /// 0. Any thread.

@@ -118,6 +118,25 @@ std::vector<FaultReport> RobotCycle::faults() const {
   return out;
 }
 
+std::vector<RobotCycle::LimitReport> RobotCycle::limits_met(std::uint64_t& seen) const {
+  std::vector<LimitReport> reports;
+  if (shown_.limits().count() == seen) return reports;
+  std::vector<LimitNote> notes;
+  (void)shown_.limits().read(seen, notes);
+  for (const LimitNote& one : notes) {
+    std::string text = hal::in_words(one.met);
+    if (one.controller >= 0) {
+      const auto controller = static_cast<std::size_t>(one.controller);
+      text += ", by '" + now_.controllers.name(controller) + "'";
+    }
+    reports.push_back({.time_s = 1e-9 * static_cast<double>(one.time_ns),
+                       .cycle = one.cycle,
+                       .joint = now_.robot.joints[static_cast<std::size_t>(one.joint)].name,
+                       .text = std::move(text)});
+  }
+  return reports;
+}
+
 std::string RobotCycle::drive_fault(std::size_t joint, std::uint32_t code) const {
   if (code == 0) return {};
   const FaultLog& log = now_.faults;

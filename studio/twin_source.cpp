@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <string>
 
 namespace tandem::studio {
@@ -33,6 +34,15 @@ void TwinSource::look(const hal::ParallelView& view) {
   };
   put("position_rad", view.state.position_rad());
   put("difference_rad", view.position_rad);
+  // By the rule of log/unmeasured.hpp: a sample that is older than the run is none.
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  for (std::size_t joint = 0; joint < view.state.joints(); ++joint) {
+    if (view.state.age_cycles()[joint] <= view.state.cycle()[0]) continue;
+    for (const char* name : {"position_rad", "difference_rad"}) {
+      std::memcpy(image_.data() + layout_.find(name)->offset + joint * sizeof kNone, &kNone,
+                  sizeof kNone);
+    }
+  }
   if (view.truth) {
     put("passive_position_rad", view.truth->passive_position_rad());
     put("base_position_m", view.truth->base_position_m());

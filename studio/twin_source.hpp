@@ -21,6 +21,7 @@ class TwinSource {
   /// position_rad, difference_rad, passive_position_rad, base_position_m, base_quaternion,
   /// behind_cycles.
   [[nodiscard]] const hal::Layout& layout() const { return layout_; }
+  /// What of a joint the parallel robot has not measured yet is NaN, and so is the difference.
   void look(const hal::ParallelView& view);
   /// What look() took, by layout().
   [[nodiscard]] std::span<const std::byte> image() const { return image_; }

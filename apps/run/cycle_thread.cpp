@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <limits>
+#include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -112,6 +114,22 @@ class FaultNotes {
   std::uint64_t travels_ = 0;
 };
 
+/// Prints of each joint the first of its commands that a limit changed: the table counts them.
+class LimitNotes {
+ public:
+  void look(const runtime::RobotCycle& cycle) {
+    for (const auto& one : cycle.limits_met(seen_)) {
+      if (!told_.insert(one.joint).second) continue;
+      restart_line(stderr);
+      fmt::print(stderr, "{:.3f} s: {}: limited: {}\n", one.time_s, one.joint, one.text);
+    }
+  }
+
+ private:
+  std::uint64_t seen_ = 0;
+  std::set<std::string> told_;
+};
+
 /// Prints what controllers say, up to some lines: the log has them all.
 class TextNotes {
  public:
@@ -193,6 +211,7 @@ void watch(runtime::RobotCycle& cycle, const CycleThread& loop, const WiredCompo
   FaultNotes faults(waits);
   HomingNote homing;
   TextNotes texts;
+  LimitNotes limits;
   bool logged = recorder != nullptr;
   while (!loop.done() && !guard.gave_up()) {
     if (logged && recorder->failed()) {
@@ -203,6 +222,7 @@ void watch(runtime::RobotCycle& cycle, const CycleThread& loop, const WiredCompo
     if (!quiet) homing.look(cycle, e.robot);
     if (!quiet) faults.look(cycle);
     if (!quiet) texts.look(cycle.services().texts());
+    if (!quiet) limits.look(cycle);
     if (!quiet) {
       bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
                  progress_note(cycle));
@@ -211,6 +231,7 @@ void watch(runtime::RobotCycle& cycle, const CycleThread& loop, const WiredCompo
   }
   if (!quiet) {
     texts.look(cycle.services().texts());
+    limits.look(cycle);
     bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
                progress_note(cycle));
     bar.finish();

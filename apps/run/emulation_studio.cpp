@@ -168,7 +168,7 @@ void EmulationStudio::stepped(const sim::EmulatorStatistics& so_far,
   boards_.frames_lost()[0] = since(frames_lost_, so_far.frames_lost);
   for (std::size_t b = 0; b < wires_.size(); ++b) {
     boards_.wire_load()[b] = wires_[b] == nullptr ? std::numeric_limits<double>::quiet_NaN()
-                                                  : static_cast<double>(wires_[b]->take_ns()) /
+                                                  : static_cast<double>(wires_[b]->take_wire_ns()) /
                                                         static_cast<double>(period_ns_);
   }
   show({so_far.steps - 1, robot_->now_ns(), period_ns_});

@@ -73,6 +73,7 @@ class StudioRun::Happenings {
 
   void take(std::vector<Event>& out) {
     look_at_texts(out);
+    look_at_limits(out);
     look_at_faults(out);
     const std::scoped_lock lock(mutex_);
     for (Event& one : requests_) out.push_back(std::move(one));
@@ -88,6 +89,12 @@ class StudioRun::Happenings {
                      one.level == hal::TextLevel::kWarn ? Event::Level::kWarn : Event::Level::kInfo,
                      std::string(one.controller()), one.words()});
     }
+  }
+
+  void look_at_limits(std::vector<Event>& out) {
+    for (const auto& one : cycle_.limits_met(seen_limits_))
+      out.push_back(
+          {one.time_s, one.cycle, Event::Level::kInfo, one.joint, "limited: " + one.text});
   }
 
   void look_at_faults(std::vector<Event>& out) {
@@ -117,7 +124,7 @@ class StudioRun::Happenings {
   }
 
   runtime::RobotCycle& cycle_;
-  std::uint64_t seen_ = 0;
+  std::uint64_t seen_ = 0, seen_limits_ = 0;
   std::vector<hal::TextEvent> texts_;
   /// A fault as it was shown.
   struct Shown {

@@ -67,6 +67,8 @@ class Bus {
   /// When the last send() handed its frames over; 0 when the bus does not know.
   [[nodiscard]] virtual std::int64_t sent_ns() const noexcept TANDEM_RT { return 0; }
 
+  /// How long its wire was busy with frames since it was asked last [ns]; 0: the bus does not know.
+  [[nodiscard]] virtual std::int64_t take_wire_ns() noexcept TANDEM_RT { return 0; }
   [[nodiscard]] virtual BusStatistics statistics() const noexcept TANDEM_RT { return {}; }
   /// What this kind of wire alone can tell of the run so far, in a sentence; empty: nothing. Not
   /// RT.
@@ -100,6 +102,9 @@ class ForwardingBus : public Bus {
     return to_->received_ns();
   }
   [[nodiscard]] std::int64_t sent_ns() const noexcept TANDEM_RT override { return to_->sent_ns(); }
+  [[nodiscard]] std::int64_t take_wire_ns() noexcept TANDEM_RT override {
+    return to_->take_wire_ns();
+  }
   [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override {
     return to_->statistics();
   }

@@ -80,9 +80,9 @@ Result<std::unique_ptr<CanBackend>> CanBackend::create(const RobotConfig& robot,
   for (std::size_t b = 0; b < buses.size() && b < robot.buses.size(); ++b) {
     const BusConfig& its = robot.buses[b];
     auto& wire = wires.emplace_back();
-    if (its.kind == BusKind::kCan)
-      wire = std::make_unique<Wire>(*buses[b], BitRates{its.bitrate, its.data_bitrate});
-    Bus& end = wire == nullptr ? *buses[b] : wire->meter;
+    if (its.kind == BusKind::kCan || !config.lockstep)
+      wire = std::make_unique<Wire>(*buses[b], its);
+    Bus& end = wire == nullptr ? *buses[b] : wire->end();
     collected.push_back(std::make_unique<Collected>(end, b));
     ends.push_back(collected.back().get());
   }
@@ -119,10 +119,14 @@ bool CanBackend::answered(std::size_t bus) const noexcept {
                           : (master_->answering(bus) & ~buses_[bus]->sampled()).none();
 }
 
+CanBackend::Wire::Wire(Bus& its_bus, const BusConfig& its) noexcept : bus(&its_bus) {
+  if (its.kind == BusKind::kCan) meter.emplace(its_bus, BitRates{its.bitrate, its.data_bitrate});
+}
+
 void CanBackend::Wire::end_cycle(std::int64_t period_ns) noexcept TANDEM_RT {
   constexpr float kPerSecond = 1e-9F;
   const auto period = static_cast<float>(period_ns);
-  const float share = static_cast<float>(meter.take_ns()) / period;
+  const float share = static_cast<float>(end().take_wire_ns()) / period;
   const float before = mean.load(std::memory_order_relaxed);
   mean.store(before + std::min(1.0F, period * kPerSecond) * (share - before),
              std::memory_order_relaxed);
@@ -149,7 +153,7 @@ void CanBackend::exchange(const CycleTime& time) noexcept {
     if (begun_)
       wire->end_cycle(time.period_ns);
     else
-      (void)wire->meter.take_ns();
+      (void)wire->end().take_wire_ns();
   }
   begun_ = true;
   const auto window_ns =

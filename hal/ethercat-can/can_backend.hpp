@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -52,8 +53,9 @@ class CanBackend final : public DriveBackend {
   /// The first EtherCAT bus'.
   [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override;
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
-  /// How much of a bus' time its frames take, at their longest [share of the period]. NaN: not
-  /// measured, of EtherCAT. Any thread.
+  /// How much of a bus' time its frames take [share of the period]: of CAN with the most stuff bits
+  /// that they can have, of EtherCAT as LineBus::take_wire_ns(). NaN: not measured, of EtherCAT in
+  /// lockstep, where no time passes. Any thread.
   struct WireLoad {
     float mean;  ///< of the last second or so
     float most;  ///< of one cycle since the start
@@ -89,15 +91,17 @@ class CanBackend final : public DriveBackend {
     DriveMaster::NodeSet sampled_;  ///< samples since begin_cycle(); [0]: of nobody
   };
 
-  /// A CAN bus' frames, and how much of its time they take.
+  /// A bus' frames, and how much of its time they take.
   struct Wire {
-    Wire(Bus& bus, const BitRates& rates) noexcept : meter(bus, rates) {}
+    Wire(Bus& bus, const BusConfig& its) noexcept;
+    [[nodiscard]] Bus& end() noexcept TANDEM_RT { return meter ? *meter : *bus; }
     void end_cycle(std::int64_t period_ns) noexcept TANDEM_RT;
 
-    WireMeter meter;
+    Bus* bus;
+    std::optional<WireMeter> meter;  ///< of CAN
     std::atomic<float> mean{0.0F}, most{0.0F};
   };
-  using Wires = std::vector<std::unique_ptr<Wire>>;  ///< by bus; null: EtherCAT
+  using Wires = std::vector<std::unique_ptr<Wire>>;  ///< by bus; null: not measured
 
   CanBackend(Wires wires, std::vector<std::unique_ptr<Collected>> buses,
              std::unique_ptr<DriveMaster> master, FrameWait& wait, const CanBackendConfig& config);

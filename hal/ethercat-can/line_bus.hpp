@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/result.hpp"
@@ -61,6 +62,12 @@ class LineBus final : public Bus {
   [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override;
   void ask_again() noexcept TANDEM_RT override { (void)line_->resend(); }
   [[nodiscard]] bool gives_up(int node) const noexcept TANDEM_RT override;
+  /// The time of all frames that went out or came back, mailboxes, the start and what was sent
+  /// again included: LinkStatistics::wire_ns_since().
+  [[nodiscard]] std::int64_t take_wire_ns() noexcept TANDEM_RT override {
+    const ecat::LinkStatistics now = link_->statistics();
+    return now.wire_ns_since(std::exchange(told_, now));
+  }
   [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override;
   [[nodiscard]] std::string status_text() const override;
   /// Lost cycles, frames sent again, and how closely the clocks follow.
@@ -131,6 +138,7 @@ class LineBus final : public Bus {
   std::int64_t now_ns_ = 0;    ///< cycles so far
   std::int64_t shift_ns_ = 0;  ///< of the last cycle; no state
   bool taken_ = true;          ///< what the last cycle brought
+  ecat::LinkStatistics told_;  ///< by take_wire_ns(); no state
   std::vector<canopen::Frame> storage_;
   canopen::FrameSink inbox_;  ///< for the drive master
   std::size_t given_ = 0;     ///< of it

@@ -27,8 +27,7 @@ class WireMeter final : public ForwardingBus {
     count(frames.first(count_of));
     return count_of;
   }
-  /// [ns] of all frames since it was asked last.
-  [[nodiscard]] std::int64_t take_ns() noexcept TANDEM_RT {
+  [[nodiscard]] std::int64_t take_wire_ns() noexcept TANDEM_RT override {
     return duration_ns(std::exchange(bits_, {}), rates_);
   }
 

@@ -202,6 +202,10 @@ TEST_F(ControllerCheck, IsNotNeededToNameWhoMetALimit) {
   const std::string met = "command limited of joint2: " + what + ", controller 'hold'";
   EXPECT_NE(events.find(met), std::string::npos) << events;
   EXPECT_EQ(events.find(met), events.rfind(met)) << "once";
+  const std::string told = " s: joint2: limited: " + what + ", by 'hold'\n";
+  EXPECT_NE(outcome.err.find(told), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find(": limited: "), outcome.err.rfind(": limited: "))
+      << "of a joint, once";
 }
 
 TEST_F(ControllerCheck, IsNotNeededToNameWhoWroteWithoutAClaim) {

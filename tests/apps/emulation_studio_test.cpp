@@ -121,8 +121,8 @@ TEST(WireMeter, AddsUpTheTimesOfFramesBothWays) {
   ASSERT_EQ(meter.receive(frames), 1U);
   ASSERT_EQ(meter.send({frames.data(), 1}), 1U);
   // A frame without data: 34 stuffable bits, 8 stuff bits at most, 13 more: 55 us at 1 Mbit/s.
-  EXPECT_EQ(meter.take_ns(), 2 * 55'000);
-  EXPECT_EQ(meter.take_ns(), 0);
+  EXPECT_EQ(meter.take_wire_ns(), 2 * 55'000);
+  EXPECT_EQ(meter.take_wire_ns(), 0);
 }
 
 }  // namespace

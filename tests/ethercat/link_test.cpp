@@ -45,6 +45,21 @@ std::vector<std::pair<int, int>> come(hal::ecat::DataLink& link) {
   return all;
 }
 
+TEST(LinkStatistics, CountBytesOfWire) {
+  EXPECT_EQ(ethercat::wire_bytes(1514), 1538U);
+  EXPECT_EQ(ethercat::wire_bytes(61), 85U);
+  EXPECT_EQ(ethercat::wire_bytes(28), 84U) << "the shortest frame";
+  LineRig rig(1);
+  InProcessLink link(*rig.line);
+  const std::array<FrameBuffer, 2> frames{count_slaves(0), count_slaves(1)};
+  (void)link.send(frames);
+  EXPECT_EQ(link.statistics().sent_bytes, 168U);
+  EXPECT_EQ(link.statistics().received_bytes, 0U);
+  std::array<FrameBuffer, 4> came;
+  EXPECT_EQ(link.receive(came), 2U);
+  EXPECT_EQ(link.statistics().received_bytes, 168U);
+}
+
 /// Takes away every right of root from this process.
 void drop_rights() {
   __user_cap_header_struct header{.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};

@@ -1,8 +1,10 @@
 #include "hal/ethercat-can/loopback.hpp"
 
 #include <array>
+#include <cmath>
 
 #include "base/archive.hpp"
+#include "canopen/messages.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
 #include "tests/ethercat_can/rig.hpp"
 
@@ -79,6 +81,45 @@ struct NoAnswer final : FrameWait {
   std::int64_t now_ns() noexcept override { return 0; }
   void wait(std::int64_t, int) noexcept override {}
 };
+
+/// A line that is busy for 0.25 ms of each cycle.
+struct BusyLine final : ForwardingBus {
+  using ForwardingBus::ForwardingBus;
+  std::int64_t take_wire_ns() noexcept override { return 250'000; }
+};
+
+TEST(CanBackend, MeasuresTheLoadOfALineButInLockstep) {
+  LoopbackBus legs, arms;
+  BusyLine line(arms.master());
+  const std::array<Bus*, 2> buses{&legs.master(), &line};
+  /// In lockstep the boards of both have answered.
+  struct Answers final : FrameWait {
+    explicit Answers(std::array<Bus*, 2> its) : boards(its) {}
+    std::int64_t now_ns() noexcept override { return 0; }
+    void wait(std::int64_t, int) noexcept override {
+      const Frame time = canopen::make_time(0);
+      for (Bus* one : boards) (void)one->send({&time, 1});
+    }
+    std::array<Bus*, 2> boards;
+  } wait({&legs.boards(), &arms.boards()});
+  RobotConfig robot = test::robot_config();
+  robot.buses[1].kind = BusKind::kEthercat;
+  robot.sensors[0].node_id = 1;
+  const auto loads = [&](bool lockstep) {
+    const auto backend = CanBackend::create(robot, buses, wait, {.lockstep = lockstep});
+    EXPECT_TRUE(backend) << backend.error().to_string();
+    for (std::uint64_t cycle = 0; cycle < 2; ++cycle) {
+      (*backend)->exchange({.cycle = cycle, .time_ns = 0, .period_ns = 1'000'000});
+    }
+    return std::array{(*backend)->wire_load(0), (*backend)->wire_load(1)};
+  };
+  const auto real = loads(false);
+  EXPECT_EQ(real[1].most, 0.25F);
+  EXPECT_FLOAT_EQ(real[1].mean, 0.00025F) << "a thousandth of a second has passed";
+  EXPECT_GT(real[0].most, 0.0F) << "SYNC, at least";
+  const auto lockstep = loads(true);
+  EXPECT_TRUE(std::isnan(lockstep[1].most) && std::isnan(lockstep[1].mean));
+}
 
 TEST(CanBackend, SaysThatRealBoardsCannotBeRewound) {
   LoopbackBus legs, arms;

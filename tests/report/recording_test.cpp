@@ -252,6 +252,25 @@ TEST_F(Recorded, GivesWindowsAtTheGrainOfTheLog) {
   EXPECT_EQ(recording->window({shoulder}, 5.0, 4.0, 10).size(), 32U);
 }
 
+TEST_F(Recorded, HasDifferencesInTheUnitOfTheJointsKind) {
+  const auto a = log::LogFile::open(make_log("a.mcap", 40));
+  const auto b = log::LogFile::open(make_log("b.mcap", 40, 5.0));
+  ASSERT_TRUE(a && b);
+  for (const auto& [slides, unit] : {std::pair{false, "rad"}, std::pair{true, "m"}}) {
+    studio::RunDescription run = pair();
+    run.robot.joints.resize(2);
+    run.robot.joints[0].name = "shoulder";
+    run.robot.joints[0].slides = slides;
+    run.robot.joints[1].slides = !slides;
+    const auto recording =
+        Recording::read({.run = run, .logs = {{.file = &*a}, {.file = &*b, .prefix = "B/"}}});
+    ASSERT_TRUE(recording);
+    const auto tables = largest_differences(*recording);
+    ASSERT_EQ(tables.size(), 1U);
+    EXPECT_EQ(tables[0].rows[0][2], unit);
+  }
+}
+
 TEST_F(Recorded, SaysWhereTwoLogsPart) {
   const std::string first = make_log("a.mcap", 40), second = make_log("b.mcap", 40, 5.0);
   const auto a = log::LogFile::open(first), b = log::LogFile::open(second);
@@ -264,6 +283,7 @@ TEST_F(Recorded, SaysWhereTwoLogsPart) {
   ASSERT_EQ(tables[0].rows.size(), 1U) << "the others are the same";
   EXPECT_EQ(tables[0].rows[0][0], "state.position_rad.shoulder");
   EXPECT_EQ(tables[0].rows[0][1], "5");
+  EXPECT_EQ(tables[0].rows[0][2], "rad or m") << "nobody has said what kind its joints are of";
   const auto table = first_differences(first, second, 'B');
   ASSERT_TRUE(table);
   ASSERT_EQ(table->rows.size(), 2U);

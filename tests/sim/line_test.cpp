@@ -1,5 +1,6 @@
 // The swing with its board and sensors on an EtherCAT line, in process.
 #include "base/archive.hpp"
+#include "canopen/messages.hpp"
 #include "hal/ethercat-can/line/in_process_link.hpp"
 #include "hal/ethercat-can/line/loopback_link.hpp"
 #include "tests/ethercat/line_rig.hpp"
@@ -154,6 +155,26 @@ TEST(Line, ASlaveWhoseMemoryIsSpoiltIsNamedAtOnce) {
   EXPECT_NE((*line)->status_text().find("slave 0 (board): the SII's check sum is wrong"),
             std::string::npos)
       << (*line)->status_text();
+}
+
+TEST(Line, KnowsHowLongItsWireWasBusy) {
+  tandem::test::LineRig slaves(3);
+  hal::ecat::InProcessLink link(*slaves.line);
+  auto made = hal::can::LineBus::create(line_swing_robot(), 0, link, {.period_ns = 1'000'000});
+  ASSERT_TRUE(made.has_value());
+  hal::can::LineBus& line = **made;
+  EXPECT_EQ(line.take_wire_ns(), 0);
+  const canopen::Frame sync = canopen::make_sync();
+  (void)line.send({&sync, 1});
+  // The scan's first frame is a short one: 60 bytes, preamble 8, check sum 4, gap 12; 80 ns each.
+  const auto frames = static_cast<std::int64_t>(link.statistics().sent);
+  ASSERT_GT(frames, 0);
+  EXPECT_EQ(link.statistics().received, 0U) << "it waits at the master's end";
+  EXPECT_EQ(line.take_wire_ns(), frames * 84 * 80);
+  EXPECT_EQ(line.take_wire_ns(), 0);
+  std::array<canopen::Frame, 8> none;
+  (void)line.receive(none);
+  EXPECT_EQ(line.take_wire_ns(), frames * 84 * 80) << "the other pair, in the time after";
 }
 
 TEST(Line, HasNoBusTiming) {

@@ -285,6 +285,7 @@ TEST(StudioSampler, HasTheParallelRobotOnceItIsThere) {
 
   twin.there = true;
   twin.view.state.position_rad()[1] = -0.5;
+  twin.view.state.age_cycles()[0] = 1;  // in cycle 0: joint 0 has not answered yet
   twin.view.truth->base_position_m()[2] = 0.75;
   EXPECT_TRUE(sampler.look(feed));
   robot.show(tap, 1, {});
@@ -295,13 +296,19 @@ TEST(StudioSampler, HasTheParallelRobotOnceItIsThere) {
   const std::string joint = robot.names().joints[1];
   EXPECT_EQ(last("position_rad." + joint), -0.5F);
   EXPECT_EQ(last("difference_rad." + joint), 0.125F);
+  const std::string silent = robot.names().joints[0];
+  EXPECT_TRUE(std::isnan(last("position_rad." + silent))) << "its 0 is no measurement";
+  EXPECT_TRUE(std::isnan(last("difference_rad." + silent)));
   EXPECT_EQ(last("base_position_m.2"), 0.75F);
   EXPECT_EQ(last("behind_cycles"), 3.0F);
 
   twin.view.state.position_rad()[1] = 0.25;
+  twin.view.state.cycle()[0] = 1;
+  twin.view.state.position_rad()[0] = 0.75;
   robot.show(tap, 2, {});
   EXPECT_FALSE(sampler.look(feed));
   EXPECT_EQ(last("position_rad." + joint), 0.25F);
+  EXPECT_EQ(last("position_rad." + silent), 0.75F);
 }
 
 TEST(StudioSampler, FollowsControllersThatComeAndGo) {

@@ -14,8 +14,8 @@ void InProcessLink::set_fate(FrameFate fate, std::uint32_t frames) noexcept {
 }
 
 std::size_t InProcessLink::send(std::span<const FrameBuffer> frames) noexcept TANDEM_RT {
+  statistics_.count_sent(frames);
   for (const FrameBuffer& frame : frames) {
-    ++statistics_.sent;
     FrameFate fate = FrameFate::kPass;
     if (fated_ > 0) {
       --fated_;
@@ -50,8 +50,8 @@ std::size_t InProcessLink::receive(std::span<FrameBuffer> frames) noexcept TANDE
     frames[taken++] = waiting_[first_];
     first_ = (first_ + 1) % waiting_.size();
     --count_;
-    ++statistics_.received;
   }
+  statistics_.count_received(frames.first(taken));
   return taken;
 }
 

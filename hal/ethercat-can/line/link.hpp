@@ -2,6 +2,7 @@
 // Layer: hal/ethercat-can/line.  Thread: RT.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -28,7 +29,24 @@ struct FrameBuffer {
 struct LinkStatistics {
   std::uint64_t sent = 0;
   std::uint64_t received = 0;
-  std::uint64_t refused = 0;  ///< frames that could not be sent
+  std::uint64_t refused = 0;                         ///< frames that could not be sent
+  std::uint64_t sent_bytes = 0, received_bytes = 0;  ///< of wire: ethercat::wire_bytes() of each
+
+  /// How long the wire was busy since `before` [ns], at 100 Mbit/s. A line has a pair of wires each
+  /// way, and what goes out on one comes back on the other: the time of the fuller pair.
+  [[nodiscard]] std::int64_t wire_ns_since(const LinkStatistics& before) const noexcept {
+    return ethercat::kByteNs *
+           static_cast<std::int64_t>(
+               std::max(sent_bytes - before.sent_bytes, received_bytes - before.received_bytes));
+  }
+  void count_sent(std::span<const FrameBuffer> frames) noexcept {
+    sent += frames.size();
+    for (const FrameBuffer& one : frames) sent_bytes += ethercat::wire_bytes(one.size);
+  }
+  void count_received(std::span<const FrameBuffer> frames) noexcept {
+    received += frames.size();
+    for (const FrameBuffer& one : frames) received_bytes += ethercat::wire_bytes(one.size);
+  }
 };
 
 /// One end of a line of slaves. Never blocks.

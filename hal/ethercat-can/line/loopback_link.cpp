@@ -19,7 +19,7 @@ std::size_t LoopbackLink::End::send(std::span<const FrameBuffer> frames) noexcep
   for (const FrameBuffer& frame : frames.first(taken)) {
     copy(frame, out_->frames[(out_->first + out_->count++) % kWaiting]);
   }
-  statistics_.sent += taken;
+  statistics_.count_sent(frames.first(taken));
   statistics_.refused += frames.size() - taken;
   return taken;
 }
@@ -31,7 +31,7 @@ std::size_t LoopbackLink::End::receive(std::span<FrameBuffer> frames) noexcept T
     in_->first = (in_->first + 1) % kWaiting;
   }
   in_->count -= given;
-  statistics_.received += given;
+  statistics_.count_received(frames.first(given));
   return given;
 }
 

@@ -156,7 +156,7 @@ std::size_t PacketLink::send(std::span<const FrameBuffer> frames) noexcept TANDE
     if (sent <= 0) break;
     done += static_cast<std::size_t>(sent);
   }
-  statistics_.sent += done;
+  statistics_.count_sent(frames.first(done));
   statistics_.refused += frames.size() - done;
   return done;
 }
@@ -179,7 +179,7 @@ std::size_t PacketLink::receive(std::span<FrameBuffer> frames) noexcept TANDEM_R
     taken += static_cast<std::size_t>(got);
     if (static_cast<std::size_t>(got) < count) break;
   }
-  statistics_.received += taken;
+  statistics_.count_received(frames.first(taken));
   return taken;
 }
 

@@ -51,6 +51,12 @@ export async function openMortalBrowser() {
   return { browser, kill: () => server.kill() };
 }
 
+/** Twenty frames a second: drawing sixty takes most of a core without a GPU, and no test counts them. */
+function fewerFrames() {
+  window.requestAnimationFrame = (call) => setTimeout(() => call(performance.now()), 50);
+  window.cancelAnimationFrame = clearTimeout;
+}
+
 /** A page that keeps what the console and the network complained about. */
 export async function openPage(browser, address, options = {}) {
   const context = await browser.newContext({
@@ -59,6 +65,7 @@ export async function openPage(browser, address, options = {}) {
     acceptDownloads: true,
     hasTouch: options.touch ?? false,
   });
+  await context.addInitScript(fewerFrames);
   if (options.init) await context.addInitScript(options.init);
   const page = await context.newPage();
   page.setDefaultTimeout(15000);
@@ -116,23 +123,33 @@ export async function shot(page, name) {
 /** Waits until something is so. */
 export async function eventually(what, is) {
   for (let i = 0; i < 150; ++i) {
-    if (is()) return;
+    if (await is()) return;
     await new Promise((resolve) => setTimeout(resolve, 100));
   }
   assert.fail(what);
 }
 
-/** What axe-core finds, in words. */
-export async function violations(page) {
+/**
+ * What axe-core finds, in words.
+ * @param rules which of its rules; by default all that it has on
+ * @param part of the page, a selector
+ */
+export async function violations(page, rules, part) {
   // As text: the page's policy forbids foreign scripts.
-  await page.evaluate(readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8'));
-  return page.evaluate(async () => {
-    const found = await window.axe.run(document);
-    return found.violations.map(
-      (one) =>
-        `${one.id}: ${one.nodes.map((node) => `${node.target} ${node.failureSummary}`).join(' | ')}`,
-    );
-  });
+  if (await page.evaluate(() => !window.axe))
+    await page.evaluate(readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8'));
+  const options = { resultTypes: ['violations'] };
+  if (rules) options.runOnly = { type: 'rule', values: rules };
+  return page.evaluate(
+    async ([where, how]) => {
+      const found = await window.axe.run(where ?? document, how);
+      return found.violations.map(
+        (one) =>
+          `${one.id}: ${one.nodes.map((node) => `${node.target} ${node.failureSummary}`).join(' | ')}`,
+      );
+    },
+    [part, options],
+  );
 }
 
 /**

@@ -99,7 +99,8 @@ export class PlayedRobot {
     return middle + (this.active ? swing * Math.sin(1.5 * t + 0.3 * j) : 0);
   }
 
-  makeTable() {
+  /** [name, fields, marks] of each source. */
+  sources() {
     const names = this.joints.map((joint) => joint.name);
     const n = names.length;
     const f = (name, unit, doc, count, value, type = 'f64', elements = null) => ({
@@ -113,7 +114,7 @@ export class PlayedRobot {
     });
     const joint = (name, unit, doc, value, type) => f(name, unit, doc, n, value, type, names);
     const sole = (i) => [0, i < 3 ? 0.1 : -0.1, 0][i % 3];
-    const sources = [
+    return [
       [
         'state',
         [
@@ -227,9 +228,12 @@ export class PlayedRobot {
       ],
       ['marks/squat', this.markFields(f), this.marks()],
     ];
+  }
+
+  makeTable() {
     let id = 0;
     this.values = [];
-    return sources.map(([name, fields, marks]) => {
+    return this.sources().map(([name, fields, marks]) => {
       const first = id;
       for (const field of fields) {
         for (let i = 0; i < field.count; ++i, ++id) {

@@ -4,6 +4,7 @@ import { createServer } from 'node:http';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { WebSocketServer } from 'ws';
+import { EmulatedRobot } from './emulated_robot.mjs';
 import { MockRobot } from './robot.mjs';
 
 const here = dirname(fileURLToPath(import.meta.url));
@@ -72,11 +73,12 @@ function windowFrame(robot, { id, signals, from_s, to_s, points }) {
   return frame;
 }
 
-/** @param options robot, port, config, dist, hostile, passive, bus. */
+/** @param options robot, port, config, dist, hostile, passive, bus; emulated: its wires, no run. */
 export async function startMock(options = {}) {
   const config = options.config ?? join(here, '../../../../config');
   const dist = options.dist ?? join(here, '../../dist');
-  const robot = new MockRobot({ robot: 'coman', ...options, config });
+  const Played = options.emulated ? EmulatedRobot : MockRobot;
+  const robot = new Played({ robot: 'coman', ...options, config });
   const clients = new Set();
   const http = createServer((request, response) => {
     const path = request.url.split('?')[0];
