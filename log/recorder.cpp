@@ -18,8 +18,8 @@ namespace tandem::log {
 namespace {
 
 // Numbers of channels as they are pushed; what they are in a file, each file says.
-constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kBranchChannel = 0xFFFE,
-                            kTextChannel = 0xFFFF;
+constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kGivenChannel = 0xFFFD,
+                            kBranchChannel = 0xFFFE, kTextChannel = 0xFFFF;
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
 /// @param more  what was pushed behind the event
@@ -182,6 +182,10 @@ bool Recorder::push(const hal::TextEvent& event) noexcept TANDEM_RT {
   return push(kTextChannel, event.time_ns, std::as_bytes(std::span(&event, 1)));
 }
 
+bool Recorder::push(const Given& given) noexcept TANDEM_RT {
+  return push(kGivenChannel, given.time_ns, std::as_bytes(std::span(&given, 1)));
+}
+
 bool Recorder::push(const Event& event, std::string_view parameter, double value,
                     std::string_view word) noexcept TANDEM_RT {
   struct {
@@ -273,6 +277,7 @@ void Recorder::write(std::span<const std::byte> slot) {
     std::memcpy(&event, body.data(), sizeof event);
     return write_text(event);
   }
+  if (head.channel == kGivenChannel) return write_given(head.time_ns, body.first(kGivenBytes));
   if (head.channel >= kFirstLate) return write_late(head.channel, head.time_ns, body);
   Topic& topic = topics_[head.channel - 1U];
   if (topic.id && topic.kept.takes(body)) write(*topic.id, head.time_ns, topic.kept.cut(body));
@@ -298,6 +303,12 @@ void Recorder::write_text(const hal::TextEvent& event) {
   write(kEventChannel, event.time_ns, event_);
   encode_rosout(event, event.time_ns, event_);
   write_late(*rosout_, event.time_ns, event_);
+}
+
+void Recorder::write_given(std::int64_t time_ns, std::span<const std::byte> given) {
+  if (!given_)
+    given_ = add_late_channel(kGivenTopic, "tandem/msg/Given", ros2msg_of(given_layout()));
+  write_late(*given_, time_ns, given);
 }
 
 void Recorder::write(Channel id, std::int64_t time_ns, std::span<const std::byte> body) {
