@@ -163,8 +163,20 @@ Result<std::string> read_all(const Descriptor& file, const std::string& path,
   }
 }
 
+namespace {
+thread_local const TextsInstead::Texts* texts_instead = nullptr;
+}  // namespace
+
+TextsInstead::TextsInstead(const Texts& texts) noexcept { texts_instead = &texts; }
+TextsInstead::~TextsInstead() { texts_instead = nullptr; }
+
 Result<std::string> read_file(const std::string& path, const std::string& hint,
                               std::uint64_t most_bytes) {
+  if (texts_instead != nullptr) {
+    const auto found =
+        std::ranges::find(*texts_instead, path, &std::pair<std::string, std::string>::first);
+    if (found != texts_instead->end()) return found->second;
+  }
   const Result<Descriptor> file = open_to_read(path, hint, most_bytes);
   if (!file) return std::unexpected(file.error());
   return read_all(*file, path, most_bytes);

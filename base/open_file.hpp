@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "base/result.hpp"
 
@@ -57,6 +58,17 @@ inline constexpr std::uint64_t kAnySize = UINT64_MAX;  ///< of logs, which are r
 /// Both. Errors: theirs.
 [[nodiscard]] Result<std::string> read_file(const std::string& path, const std::string& hint,
                                             std::uint64_t most_bytes);
+
+/// While one lives, read_file() of its thread answers these texts instead of what is in the files
+/// of those paths, whether they are there or not. One at a time a thread; outlived by the texts.
+class TextsInstead {
+ public:
+  using Texts = std::vector<std::pair<std::string, std::string>>;  ///< path, text
+  explicit TextsInstead(const Texts& texts) noexcept;
+  ~TextsInstead();
+  TextsInstead(const TextsInstead&) = delete;
+  TextsInstead& operator=(const TextsInstead&) = delete;
+};
 
 // --- to write ---
 

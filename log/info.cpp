@@ -47,6 +47,8 @@ StringMap to_map(const RunInfo& info) {
   for (const std::string& one : info.controllers) controllers += one + "\n";
   std::string parameters;
   for (const std::string& one : info.parameters) parameters += one + "\n";
+  std::string options;
+  for (const std::string& one : info.options) options += one + "\n";
   std::string plant;
   for (const std::string& one : info.plant) plant += one + "\n";
   for (const auto& [key, value] : {std::pair{"host", &info.host},
@@ -55,6 +57,7 @@ StringMap to_map(const RunInfo& info) {
                                    {"kernel_sha256", &info.kernel_sha256},
                                    {"controllers", &std::as_const(controllers)},
                                    {"parameters", &std::as_const(parameters)},
+                                   {"options", &std::as_const(options)},
                                    {"plant", &std::as_const(plant)}}) {
     if (!value->empty()) map.emplace_back(key, *value);
   }
@@ -101,6 +104,7 @@ RunInfo info_from(const StringMap& map) {
   info.kernel_sha256 = value_of(map, "kernel_sha256");
   info.controllers = lines_of(value_of(map, "controllers"));
   info.parameters = lines_of(value_of(map, "parameters"));
+  info.options = lines_of(value_of(map, "options"));
   info.plant = lines_of(value_of(map, "plant"));
   return info;
 }

@@ -51,6 +51,9 @@ struct RunInfo {
   std::vector<std::string>
       controllers{};  ///< "NAME SHA256 PATH" at the start; without a library "NAME - -"
   std::vector<std::string> parameters{};  ///< "NAME.PARAMETER = VALUE" at the start
+  /// "KEY = VALUE" of the experiment as the run went by them, whoever said them; empty: a log of an
+  /// earlier version, which has no /tandem/given either.
+  std::vector<std::string> options{};
   std::vector<std::string> plant{};       ///< what of the simulated robot is not as its files say
   StringMap configuration{};              ///< path -> text of every file that was read
   std::vector<std::string> boards{};      ///< for events' texts: in no record

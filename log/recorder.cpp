@@ -18,7 +18,8 @@ namespace tandem::log {
 namespace {
 
 // Numbers of channels as they are pushed; what they are in a file, each file says.
-constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kAttachedChannel = 0xFFFD,
+constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kGivenChannel = 0xFFFC,
+                            kAttachedChannel = 0xFFFD,
                             kBranchChannel = 0xFFFE, kTextChannel = 0xFFFF;
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
@@ -182,6 +183,10 @@ bool Recorder::push(const hal::TextEvent& event) noexcept TANDEM_RT {
   return push(kTextChannel, event.time_ns, std::as_bytes(std::span(&event, 1)));
 }
 
+bool Recorder::push(const Given& given) noexcept TANDEM_RT {
+  return push(kGivenChannel, given.time_ns, std::as_bytes(std::span(&given, 1)));
+}
+
 bool Recorder::push(const Event& event, std::string_view parameter, double value,
                     std::string_view word) noexcept TANDEM_RT {
   struct {
@@ -289,6 +294,7 @@ void Recorder::write(std::span<const std::byte> slot) {
     std::memcpy(&event, body.data(), sizeof event);
     return write_text(event);
   }
+  if (head.channel == kGivenChannel) return write_given(head.time_ns, body.first(kGivenBytes));
   if (head.channel >= kFirstLate) return write_late(head.channel, head.time_ns, body);
   Topic& topic = topics_[head.channel - 1U];
   if (topic.id && topic.kept.takes(body)) write(*topic.id, head.time_ns, topic.kept.cut(body));
@@ -326,6 +332,12 @@ void Recorder::write_attached(std::int64_t time_ns) {
   if (!failed_.load(std::memory_order_relaxed)) {
     writer_->add_attachment(one.name, time_ns, one.data);
   }
+}
+
+void Recorder::write_given(std::int64_t time_ns, std::span<const std::byte> given) {
+  if (!given_)
+    given_ = add_late_channel(kGivenTopic, "tandem/msg/Given", ros2msg_of(given_layout()));
+  write_late(*given_, time_ns, given);
 }
 
 void Recorder::write(Channel id, std::int64_t time_ns, std::span<const std::byte> body) {

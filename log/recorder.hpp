@@ -24,6 +24,7 @@
 #include "hal/text_event.hpp"
 #include "log/data_hash.hpp"
 #include "log/event.hpp"
+#include "log/given.hpp"
 #include "log/info.hpp"
 #include "log/kept_image.hpp"
 #include "log/mcap_writer.hpp"
@@ -131,6 +132,8 @@ class Recorder {
   bool push(const Event& event) noexcept TANDEM_RT;
   /// A controller's words: an event, and a line of /rosout.
   bool push(const hal::TextEvent& event) noexcept TANDEM_RT;
+  /// A message of /tandem/given, a channel that is there once something was.
+  bool push(const Given& given) noexcept TANDEM_RT;
   /// An event about a parameter: its text has both. @param word  for the value; empty: none
   bool push(const Event& event, std::string_view parameter, double value,
             std::string_view word) noexcept TANDEM_RT;
@@ -196,6 +199,7 @@ class Recorder {
   void write_late(Channel channel, std::int64_t time_ns, std::span<const std::byte> body);
   void write_text(const hal::TextEvent& event);
   void write_attached(std::int64_t time_ns);
+  void write_given(std::int64_t time_ns, std::span<const std::byte> given);
   void write(Channel id, std::int64_t time_ns, std::span<const std::byte> body);
   void next_part();
   void next_branch(Branch from);
@@ -239,6 +243,7 @@ class Recorder {
   std::vector<Channel> late_ids_;  // in the present part, of those that it has
   std::vector<Encode> encoders_;   // of those that a part has had
   std::optional<Channel> rosout_;  // once there are words
+  std::optional<Channel> given_;   // once something was given
   std::uint64_t part_ = 1;         // the present one
   std::uint64_t head_bytes_ = 0;   // of it, before its messages
   std::uint64_t looked_at_ = 0;    // bytes of it when the disk was looked at

@@ -93,7 +93,10 @@ void CyclicLoop::set_step(std::int64_t step_ns) noexcept {
 /// Sleeps until the cycle's grid point. False: it was woken before.
 bool CyclicLoop::pace(Tick& tick) noexcept {
   begin_ns_ = clock_->now_ns();
-  if (!paced()) return true;
+  if (!paced()) {
+    late_mask_ <<= 1;
+    return true;
+  }
   if (!started_) {
     grid_ns_ = begin_ns_;
     return true;
@@ -130,9 +133,13 @@ void CyclicLoop::judge(Tick& tick, std::uint64_t missed) noexcept TANDEM_RT {
   }
   late_mask_ = (late_mask_ << 1) | 1U;
   if (config_.on_overrun != OverrunPolicy::kStop || config_.pacing != Pacing::kWallClock) return;
+  tick.stop = is_late_often();
+}
+
+bool CyclicLoop::is_late_often() const noexcept TANDEM_RT {
   const std::uint64_t window =
       config_.stop_window == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << config_.stop_window) - 1;
-  tick.stop = std::popcount(late_mask_ & window) >= config_.stop_late;
+  return std::popcount(late_mask_ & window) >= config_.stop_late;
 }
 
 std::int64_t CyclicLoop::exchanged() noexcept TANDEM_RT {
@@ -173,6 +180,10 @@ void CyclicLoop::skip(Tick& tick, std::uint64_t cycles) noexcept TANDEM_RT {
   tick.skipped += cycles;
   tick.cycle += cycles;
   tick.time_ns = static_cast<std::int64_t>(tick.cycle) * config_.period_ns;
+  if (config_.pacing != Pacing::kSimulated) return;
+  tick.hold = config_.on_overrun == OverrunPolicy::kHold;
+  late_mask_ |= 1U;
+  tick.stop = config_.on_overrun == OverrunPolicy::kStop && is_late_often();
 }
 
 void CyclicLoop::archive(Archive& ar) {

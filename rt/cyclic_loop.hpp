@@ -92,7 +92,8 @@ class CyclicLoop {
   [[nodiscard]] std::int64_t last_work_ns() const noexcept { return last_work_ns_; }
 
   /// External pacing: so many cycles went by unseen before the one that wait() has announced, which
-  /// gets its number and time by that. Counted as an overrun's are.
+  /// gets its number and time by that. Counted as an overrun's are. In simulated time it is an
+  /// overrun that was: what the policy made of it on the wall clock follows again.
   void skip(Tick& tick, std::uint64_t cycles) noexcept TANDEM_RT;
 
   /// Moves the grid, and all that comes after, by `ns`: the wire has a clock of its own. At most a
@@ -120,6 +121,7 @@ class CyclicLoop {
   void set_step(std::int64_t step_ns) noexcept;
   bool pace(Tick& tick) noexcept;
   void judge(Tick& tick, std::uint64_t missed) noexcept TANDEM_RT;
+  [[nodiscard]] bool is_late_often() const noexcept TANDEM_RT;
 
   CyclicLoopConfig config_;
   Clock* clock_;

@@ -48,6 +48,13 @@ class CycleLog {
   /// A controller's parameter was set, or came with it.
   void event(const hal::CycleTime& time, log::EventKind kind,
              const ParameterChange& change) noexcept TANDEM_RT;
+  /// What the cycle took of somebody, or of the backend, beside its images.
+  void given(const hal::CycleTime& time, log::Given given) noexcept TANDEM_RT {
+    if (silent()) return;
+    given.cycle = time.cycle;
+    given.time_ns = time.time_ns;
+    recorder_->push(given);
+  }
   /// A sample that has arrived.
   void input(const hal::CycleTime& time, InputPort& port) noexcept TANDEM_RT;
   void images(const hal::CycleTime& time, const hal::StateImage& state,

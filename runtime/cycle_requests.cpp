@@ -80,9 +80,51 @@ std::int32_t id_in(CycleNow& now, std::size_t slot) noexcept TANDEM_RT {
   return one == nullptr ? -1 : static_cast<std::int32_t>(one->id);
 }
 
-/// What comes and goes without moving anything is not logged.
+/// For the log: all that is needed to ask for the same again. Parameters are in events.
+log::Given given_of(const CycleRequest& request) noexcept TANDEM_RT {
+  using Kind = log::GivenKind;
+  const auto of = [&](Kind kind, double a = 0.0, double b = 0.0, double c = 0.0, double d = 0.0) {
+    const bool of_slot = kind == Kind::kInsert || kind == Kind::kRemove ||
+                         kind == Kind::kReplace || kind == Kind::kShadow ||
+                         kind == Kind::kEndShadow;
+    return log::Given{.values = {a, b, c, d},
+                      .start = request.start,
+                      .stop = request.stop,
+                      .index = static_cast<std::int32_t>(of_slot ? request.slot : request.joint),
+                      .kind = kind};
+  };
+  const JointRequest& wish = request.wish;
+  const MoveRequest& move = request.move;
+  switch (request.kind) {
+    case RequestKind::kInsert: return of(Kind::kInsert);
+    case RequestKind::kRemove: return of(Kind::kRemove);
+    case RequestKind::kReplace: return of(Kind::kReplace);
+    case RequestKind::kSwitch: return of(Kind::kSwitch);
+    case RequestKind::kShadow: return of(Kind::kShadow);
+    case RequestKind::kEndShadow: return of(Kind::kEndShadow);
+    case RequestKind::kSwitchWhen:
+      return of(Kind::kSwitchWhen, request.within, static_cast<double>(request.cycles));
+    case RequestKind::kGoOn: return of(Kind::kGoOn);
+    case RequestKind::kJoint:
+      return of(Kind::kJoint, wish.stiffness_Nm_rad, wish.damping_Nms_rad, wish.mode,
+                wish.interaction);
+    case RequestKind::kGains:
+      return of(Kind::kGains, request.gains.kp, request.gains.ki, request.gains.kd,
+                static_cast<double>(request.loop));
+    case RequestKind::kRecover: return of(Kind::kRecover);
+    case RequestKind::kMove:
+      return of(Kind::kMove, move.target_rad, move.speed_rad_s, move.acceleration_rad_s2);
+    case RequestKind::kReset: return of(Kind::kResetDrive);
+    case RequestKind::kHome: return of(Kind::kHome);
+    case RequestKind::kSet: break;
+  }
+  return of(Kind::kGoOn);
+}
+
+/// What comes and goes without moving anything is no event.
 void log(CycleNow& now, const CycleRequest& request) noexcept TANDEM_RT {
   const auto joint = static_cast<std::int32_t>(request.joint);
+  if (request.kind != RequestKind::kSet) now.log.given(now.time, given_of(request));
   switch (request.kind) {
     case RequestKind::kSwitch:
     case RequestKind::kGoOn: return now.event(EventKind::kControllersSwitched);

@@ -14,6 +14,13 @@ void FaultResponse::raise(FaultRecord record) noexcept TANDEM_RT {
   const bool of_joint = hal::strikes_joint(row.strikes);
   const bool of_base = of_joint && record.index < 0;
   if (row.strikes == hal::FaultStrikes::kController) record.controller = record.index;
+  const bool by_drive = hal::is_of_drive(record.cause) && record.cause != hal::FaultCause::kDrive &&
+                        record.cause != hal::FaultCause::kJointLost;
+  if (by_drive) {  // its event does not tell these apart
+    now_.log.given(now_.time, {.values = {static_cast<double>(record.cause)},
+                               .index = record.index,
+                               .kind = log::GivenKind::kCause});
+  }
   const bool by_value = row.strikes == hal::FaultStrikes::kSensor || of_base;
   now_.log.event(now_.time, log::event_of(record.cause), of_joint && !of_base ? record.index : -1,
                  row.number != 0 ? row.number : record.code,

@@ -132,7 +132,7 @@ void RobotCycle::await_tick() noexcept {
   // controllers tell.
   const std::size_t most = (now_.events != nullptr ? now_.events->size() : 0) + 4 + 16 +
                            Inbox::kCapacity * kMostParameterChanges +
-                           ControllerHost::kToldParameters + 3 * now_.watch.joints() +
+                           ControllerHost::kToldParameters + 4 * now_.watch.joints() +
                            now_.watch.sensors() + now_.controllers.inputs() +
                            kMostControllers * (3 + TextEventSlots::kSlots);
   if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
@@ -261,6 +261,8 @@ void RobotCycle::hear() noexcept TANDEM_RT {
   const Inbox::Urgent asked = now_.inbox.take_urgent();
   const StopCategory declared = now_.robot.emergency_stop;
   if (asked.emergency_stop != StopCategory::kWarn) {
+    now_.log.given(now_.time, {.values = {static_cast<double>(asked.emergency_stop)},
+                               .kind = log::GivenKind::kStop});
     response_.raise({.cause = FaultCause::kByRequest, .category = asked.emergency_stop});
   }
   if (asked.by_watchdog) {
@@ -274,7 +276,11 @@ void RobotCycle::hear() noexcept TANDEM_RT {
     response_.raise({.cause = FaultCause::kBySignal, .category = declared});
   }
   if (wish.reset) response_.begin_reset(wish.reset_cycle);
-  if (asked.reset) response_.begin_reset(asked.known);
+  if (asked.reset) {
+    const double known = asked.known == Inbox::kNow ? -1.0 : static_cast<double>(asked.known);
+    now_.log.given(now_.time, {.values = {known}, .kind = log::GivenKind::kReset});
+    response_.begin_reset(asked.known);
+  }
   const bool end = asked.end || rt::stop_requested();
   if (asked.any()) now_.outside.came = true;
   if (end && !now_.run.in(RunPhase::kShutDown)) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -91,6 +92,18 @@ struct TestOptions {
   double timeout_s = 300.0;        ///< of each, on the wall clock
   std::string junit;               ///< file of JUnit's XML; empty: none
   bool quiet = false;              ///< neither progress nor table
+  std::string json;
+};
+
+/// tandem replay LOG
+struct ReplayCommandOptions {
+  std::string log;
+  std::vector<std::pair<std::string, std::string>> plugins;  ///< --plugin NAME=FILE
+  std::string output;          ///< log of what is commanded; empty: with plugins beside `log`
+  bool watch = false;          ///< once more whenever a plugin's file changes
+  std::optional<double> to_s;  ///< the last cycle is not later
+  bool no_build = false;       ///< missing kernels are an error
+  bool quiet = false;          ///< no table
   std::string json;
 };
 
@@ -284,11 +297,12 @@ struct TopicOptions {
 
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
 // clang-format off: one a line, so that additions meet without conflict
-using Command = std::variant<Exit, RunOptions, ServeOptions, AskOptions, AskedOptions, CheckOptions,
-                             ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions,
-                             IdentifyOptions, ExciteOptions, LatencyOptions, DoctorOptions,
-                             EmulateOptions, TopicOptions, BenchOptions, ControllerCheckOptions,
-                             ControllerNewOptions, StudioCommandOptions, TestOptions>;
+using Command =
+    std::variant<Exit, RunOptions, ServeOptions, AskOptions, AskedOptions, CheckOptions,
+                 ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, IdentifyOptions,
+                 ExciteOptions, LatencyOptions, DoctorOptions, EmulateOptions, TopicOptions,
+                 BenchOptions, ControllerCheckOptions, ControllerNewOptions, StudioCommandOptions,
+                 TestOptions, ReplayCommandOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

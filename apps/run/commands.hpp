@@ -27,6 +27,9 @@ namespace tandem::apps {
 /// Runs every experiment that expects something, each in a process of its own.
 [[nodiscard]] Exit test_command(const TestOptions& options);
 
+/// Plays a run again from its log. @return kFault where something differs
+[[nodiscard]] Exit replay_command(const ReplayCommandOptions& options);
+
 /// Runs a controller's library under the gate's traps, and rewinds the run.
 [[nodiscard]] Exit controller_check_command(const ControllerCheckOptions& options);
 struct ControllerCheckResult {

@@ -378,9 +378,9 @@ Error in_its_file(Error error, const Experiment& e) {
 }
 
 /// What is wrong, or odd, with the robot where it starts.
-void check_robot(Composition& c, const robot::RobotFiles& robot, Collector& errors) {
+void check_robot(Composition& c, const robot::RobotFiles& robot, bool from_log, Collector& errors) {
   const Experiment& e = c.experiment;
-  const bool simulated = e.hal.backend == BackendKind::kSim;
+  const bool simulated = e.hal.backend == BackendKind::kSim && !from_log;
   robot::Findings found = robot::check(robot, {.plant = simulated,
                                                .drives = e.hal.backend != BackendKind::kDds,
                                                .postures = {e.posture},
@@ -470,7 +470,7 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   const auto robot = robot::join(e.robot, *e.description, e.files);
   if (!robot) return robot.error();
   Collector errors;
-  check_robot(c, *robot, errors);
+  check_robot(c, *robot, overrides.from_log, errors);
   if (!add_kernels(c, *robot, overrides.serves, kernels, errors)) return errors.give().error();
   if (!overrides.serves) add_controllers(c, errors);
   add_owner(c, errors);
@@ -483,6 +483,7 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   if (c.controllers != nullptr && !overrides.duration_s && !overrides.serves) {
     std::ranges::move(late_plans(c), std::back_inserter(c.warnings));
   }
+  if (overrides.from_log) return {};
   if (auto failed = add_parallel(c, kernels); !failed.empty()) return failed;
   const bool simulated = e.hal.backend == BackendKind::kSim;
   if (simulated && c.kernels.get() != nullptr) {
@@ -496,8 +497,11 @@ const hal::TruthImage* truth_of(const Composition& c) {
 }
 
 CycleConfig cycle_config(Composition& c, const Overrides& overrides) {
+  return cycle_config(c, overrides, c.backend->pace());
+}
+
+CycleConfig cycle_config(Composition& c, const Overrides& overrides, hal::Pace pace) {
   Experiment& e = c.experiment;
-  const hal::Pace pace = c.backend->pace();
   const bool simulated = pace == hal::Pace::kSimulatedClock;
   e.loop.rate = overrides.rate.value_or(simulated ? e.loop.rate : 0.0);
   e.loop.start_paused = simulated && (overrides.start_paused || e.loop.start_paused);

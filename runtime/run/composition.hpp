@@ -103,5 +103,7 @@ template <class C = Composition>
 
 /// How the cycle of what is connected goes; the experiment's loop becomes it.
 [[nodiscard]] CycleConfig cycle_config(Composition& c, const Overrides& overrides);
+/// The same of a robot that is not connected, of that pace.
+[[nodiscard]] CycleConfig cycle_config(Composition& c, const Overrides& overrides, hal::Pace pace);
 
 }  // namespace tandem::runtime

@@ -25,6 +25,8 @@ struct Overrides {
   std::vector<std::string> interfaces = {};   ///< "can0=vcan0"
   std::string scenario = {};                  ///< faults to inject into the simulation
   std::optional<std::uint32_t> delay_cycles = std::nullopt;
+  /// The robot is a log: nothing is simulated, connected or expected, only controllers are made.
+  bool from_log = false;
   bool serves = false;  ///< no controllers of its own, and no end
   std::optional<bool> dds = std::nullopt;
   std::optional<int> domain = std::nullopt;  ///< of DDS

@@ -80,6 +80,12 @@ log::RunInfo info_of(const Composition& c) {
     info.sensors.push_back({sensor.name, sensor.channels()});
   }
   info.seed = e.seed;
+  info.options = {fmt::format("duration_s = {}", e.duration_s),
+                  fmt::format("delay_cycles = {}", e.hal.delay_cycles)};
+  if (e.after_stop) {
+    info.options.push_back(*e.after_stop == AfterStop::kWait ? "on_fault = wait"
+                                                             : "on_fault = end");
+  }
   info.period_ns = e.loop.period_ns;
   info.operators_view = c.tele != nullptr;
   if (c.sim != nullptr) info.engine = sim::engine_text(e.sim.engine);

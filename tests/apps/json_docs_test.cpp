@@ -14,6 +14,7 @@
 #include "apps/machine/latency_report.hpp"
 #include "apps/robot/scale_facts.hpp"
 #include "apps/run/commands.hpp"
+#include "apps/run/replay_figures.hpp"
 #include "apps/run/run_summary.hpp"
 #include "apps/run/test_suite.hpp"
 #include "apps/tools/commands.hpp"
@@ -32,6 +33,7 @@ std::string file_text(const std::string& file) {
 /// What docs/json.md documents by tables: the name in the comment before each, and its figures.
 const Named<std::vector<Figures::Row>> kTables{
     {"run", Figures::rows_of<const RunSummary*>()},
+    {"replay", Figures::rows_of<runtime::ReplayResult>()},
     {"test", Figures::rows_of<SuiteResult>()},
     {"controller check", Figures::rows_of<ControllerCheckResult>()},
     {"bus", Figures::rows_of<hal::can::BusLoad>()},
