@@ -57,8 +57,8 @@ struct PatchKeys {
 };
 constexpr Key<PatchKeys> kPatch[] = {
   required(key<&PatchKeys::name>("name", "for messages").within("unique")),
-  required(key<&PatchKeys::x_m>("x_m", {-1e4, 1e4}, "from and to, in the world")),
-  required(key<&PatchKeys::y_m>("y_m", {-1e4, 1e4}, "from and to, in the world")),
+  required(key<&PatchKeys::x_m>("x_m", {-1e4, 1e4}, "from and to, in the world").within("2 numbers of ±10000")),
+  required(key<&PatchKeys::y_m>("y_m", {-1e4, 1e4}, "the same").within("2 numbers of ±10000")),
   key<&PatchKeys::sliding>("sliding_friction", kNotNegative, "Coulomb coefficient").by_default("the ground's"),
   key<&PatchKeys::still>("static_friction", kNotNegative, "the same of a point that is stuck").by_default("`sliding_friction`, or the ground's"),
   key<&PatchKeys::stiffness_share>("stiffness_share", {1e-3, 1.0}, "of the ground's stiffnesses: below 1 it is softer"),
