@@ -35,8 +35,9 @@ const kLooks = {
  * Nothing for axe-core to find, and nothing wider than the window, whatever tab is open.
  * @param names of looks
  * @param open opens each of the tabs
+ * @param of whom, for the names of pictures
  */
-export async function looks(page, names, tabs, open) {
+export async function looks(page, names, tabs, open, of = 'studio') {
   for (const tab of tabs) {
     await open(tab);
     for (const name of names) {
@@ -53,7 +54,7 @@ export async function looks(page, names, tabs, open) {
       assert.deepEqual(await violations(page, rules, part), [], `${name}: ${tab}`);
       const wide = await page.evaluate(() => document.documentElement.scrollWidth);
       assert.ok(wide <= width, `${name}: ${tab}: ${wide} of ${width} pixels`);
-      await shot(page, `studio-${name}-${tab}`);
+      await shot(page, `${of}-${name}-${tab}`);
     }
   }
 }

@@ -397,17 +397,18 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     assert.ok(Number.isFinite(Number(before)), before);
     await eventually('the robot moves', async () => (await knee()) !== before);
     assert.deepEqual(await tabsOf(page), ['plots', 'scope', 'joints', 'events']);
+    const open = (tab) => page.click(`#tab-${tab}`);
     for (const tab of ['plots', 'scope', 'joints', 'events']) {
-      await page.click(`#tab-${tab}`);
+      await open(tab);
       for (const name of ['.estop', '.lease', '.opener', '.clock-body', '.group-bar', '.site-jog'])
         assert.equal(await page.locator(name).filter({ visible: true }).count(), 0, name);
     }
     await until(page, 'injected link_down');
     const row = page.locator('[data-joint="LKneeSag"]');
-    await page.click('#tab-joints');
+    await open('joints');
     await row.locator('.mode:text-is("position")').waitFor();
     assert.match(await row.textContent(), /-?\d\.\d{3} rad.* A.* °C/s);
-    await looks(page, ['phone', 'light', 'dark'], ['joints'], (tab) => page.click(`#tab-${tab}`));
+    await looks(page, ['phone', 'light', 'dark'], ['joints'], open, 'emulation');
     assert.deepEqual(mock.robot.requests, [], 'there is nobody to ask');
     await leave(page);
   });
