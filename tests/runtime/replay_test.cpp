@@ -157,6 +157,20 @@ TEST_F(Replay, TakesWhatWasAskedInItsCycles) {
   expect_equal(replayed(log), run.cycles);
 }
 
+TEST_F(Replay, RunsAShadowAlongAndSwitchesWhereItAgreed) {
+  Recording run = record();
+  RunServices& services = run.cycle().services();
+  run.until(RunPhase::kRunning);
+  run.steps(50);
+  ASSERT_TRUE(services.begin_shadow("other", kNow));
+  run.steps(50);
+  ASSERT_TRUE(services.switch_when({"one"}, {"other"}, 0.02, 400'000'000, kNow));
+  run.steps(5);
+  const std::string& log = run.finish();
+  EXPECT_EQ(services.last_switch().state, SwitchState::kDone);
+  expect_equal(replayed(log), run.cycles);
+}
+
 TEST_F(Replay, GoesThroughAFaultItsResetAndAnEmergencyStop) {
   Recording run = record();
   run.until(RunPhase::kRunning);
