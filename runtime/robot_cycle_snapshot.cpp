@@ -2,9 +2,12 @@
 #include "rt/scoped_realtime.hpp"
 #include "rt/stop_signal.hpp"
 #include "runtime/events.hpp"
+#include "runtime/fault_text.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::runtime {
+
+using hal::FaultCause;
 
 void RobotCycle::archive(Archive& ar) {
   std::uint64_t controllers = now_.controllers.fingerprint();
