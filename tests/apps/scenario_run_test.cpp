@@ -116,7 +116,7 @@ TEST_F(ScenarioRun, FindsWhatIsWrongBeforeAnythingMoves) {
   EXPECT_NE(tandem("check wrong.toml").err.find("wrong.toml:" + std::to_string(line_of("ask ="))),
             std::string::npos);
   refused(row + "ask = { do = \"clock.pause\" }\n", "clock.pause is not for events");
-  refused(row + "ask = { do = \"push\", site = \"hnd\", force_N = [1, 0, 0] }\n", "did you mean");
+  refused(row + "ask = { do = \"push\", site = \"hnd\", force_N = [1, 0, 0] }\n", "no site 'hnd'");
   refused(row, "event[0].ask");
   refused("[[event]]\nask = { do = \"run.stop\" }\n", "nothing says when it comes");
   refused(row + "when = \"time() > 1s\"\nask = { do = \"run.stop\" }\n", "keep one of both");
@@ -126,7 +126,7 @@ TEST_F(ScenarioRun, FindsWhatIsWrongBeforeAnythingMoves) {
   refused("[[push]]\nlink = \"link2\"\nforce_N = [1, 0, 0]\noptional = true\n", "without `when`");
   refused("[[fault]]\nkind = \"board_duplicate\"\nboard = \"board_1\"\nwhen = \"time() > 1s\"\n",
           "has to be there when the robot is made");
-  refused("[[push]]\nlink = \"link9\"\nforce_N = [1, 0, 0]\n", "did you mean");
+  refused("[[push]]\nlink = \"link9\"\nforce_N = [1, 0, 0]\n", "no link 'link9'");
 }
 
 TEST_F(ScenarioRun, OfARobotThatIsNotSimulatedHereIsRefused) {

@@ -122,7 +122,7 @@ TEST_F(Suite, OfTheBundledRobotsPasses) {
   const Outcome outcome =
       tandem("test --json suite.json " + shell_word(TANDEM_SOURCE_DIR "/config/suite"));
   EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
-  EXPECT_EQ(json("suite.json")["passed"], 5);
+  EXPECT_EQ(json("suite.json")["passed"], 6);
 }
 
 TEST_F(Suite, RefusesWhatIsNoSuite) {
