@@ -65,7 +65,7 @@ export async function openPage(browser, address, options = {}) {
     acceptDownloads: true,
     hasTouch: options.touch ?? false,
   });
-  await context.addInitScript(fewerFrames);
+  if (options.fewerFrames) await context.addInitScript(fewerFrames);
   if (options.init) await context.addInitScript(options.init);
   const page = await context.newPage();
   page.setDefaultTimeout(15000);
@@ -181,7 +181,7 @@ export function usePlayedRobots() {
       mocks.push(mock);
       return mock;
     },
-    visit: (address, options) => openPage(browser, address, options),
+    visit: (address, options) => openPage(browser, address, { fewerFrames: true, ...options }),
     asked: (mock, name) => mock.robot.requests.filter((one) => one.do === name),
     until: (page, text) =>
       page.waitForFunction((words) => document.body.textContent.includes(words), text),
