@@ -23,7 +23,7 @@ const hal::Layout& given_layout() {
 std::optional<Given> decode_given(std::span<const std::byte> body) {
   if (body.size() < kGivenBytes) return std::nullopt;
   Given given;
-  std::memcpy(&given, body.data(), kGivenBytes);
+  std::memcpy(static_cast<void*>(&given), body.data(), kGivenBytes);
   return given;
 }
 

@@ -18,8 +18,8 @@
 namespace tandem::apps {
 namespace {
 
-constexpr std::chrono::milliseconds kAgain{100};  // between two samples of a pad at rest
-constexpr std::chrono::milliseconds kLook{500};   // between two looks for one that is gone
+constexpr std::chrono::milliseconds kAgain{100};    // between two samples of a pad at rest
+constexpr std::chrono::milliseconds kPadLook{500};  // between two looks for one that is gone
 
 struct PadCode {
   const char* name;
@@ -220,7 +220,7 @@ bool GamePad::look() {
 
 void GamePad::look_for() {
   const auto now = std::chrono::steady_clock::now();
-  if (now - looked_for_ < kLook) return;
+  if (now - looked_for_ < kPadLook) return;
   looked_for_ = now;
   auto again = open(port_);
   if (again) {

@@ -132,9 +132,9 @@ TEST_F(InputRun, AfterTheTimeOutItHoldsWhatTheControllerDeclared) {
 
 TEST_F(InputRun, WhatIsOutOfBoundsIsRefusedByNameAndCounted) {
   run();
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  for (const double wrong : {1.001, -1.001, kNaN, kInfinity, -kInfinity}) {
+  for (const double wrong : {1.001, -1.001, kNotANumber, kInfinity, -kInfinity}) {
     EXPECT_NE(set({.components = {"a"}, .numbers = {wrong}}).find("a:"), std::string::npos)
         << wrong;
   }
