@@ -19,8 +19,8 @@ namespace {
 
 // Numbers of channels as they are pushed; what they are in a file, each file says.
 constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kGivenChannel = 0xFFFC,
-                            kAttachedChannel = 0xFFFD,
-                            kBranchChannel = 0xFFFE, kTextChannel = 0xFFFF;
+                            kAttachedChannel = 0xFFFD, kBranchChannel = 0xFFFE,
+                            kTextChannel = 0xFFFF;
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
 /// @param more  what was pushed behind the event

@@ -84,9 +84,8 @@ std::int32_t id_in(CycleNow& now, std::size_t slot) noexcept TANDEM_RT {
 log::Given given_of(const CycleRequest& request) noexcept TANDEM_RT {
   using Kind = log::GivenKind;
   const auto of = [&](Kind kind, double a = 0.0, double b = 0.0, double c = 0.0, double d = 0.0) {
-    const bool of_slot = kind == Kind::kInsert || kind == Kind::kRemove ||
-                         kind == Kind::kReplace || kind == Kind::kShadow ||
-                         kind == Kind::kEndShadow;
+    const bool of_slot = kind == Kind::kInsert || kind == Kind::kRemove || kind == Kind::kReplace ||
+                         kind == Kind::kShadow || kind == Kind::kEndShadow;
     return log::Given{.values = {a, b, c, d},
                       .start = request.start,
                       .stop = request.stop,

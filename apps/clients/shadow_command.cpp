@@ -25,6 +25,7 @@ std::string figure(const Json& value) {
 std::string apart(const Json& waits) {
   const std::string joint =
       shown(waits["joint"].is_string() ? waits["joint"].get<std::string>() : "", 200);
+  if (joint.empty() && waits["difference"] == 0.0) return "nothing";
   if (joint.empty()) return "they have not been compared";
   if (!waits["difference"].is_number()) return "another mode at " + joint;
   const std::string unit = waits["unit"].is_string() ? " " + waits["unit"].get<std::string>() : "";
@@ -38,7 +39,7 @@ Result<Json> wait_for_switch(ControlClient& run, const Json& cycle) {
     if (!answer) return answer;
     const Json& last = (*answer)["switch"];
     if (!last.is_object() || last["asked"] != cycle) {
-      return fail("another switch was asked for meanwhile",
+      return fail("another switch was asked for meanwhile, or time went back to before this one",
                   "tandem controller list shows who leads");
     }
     if (last["state"] != "waits") return last;
@@ -59,6 +60,8 @@ void print_differences(const Json& answer) {
   if (answer["shadows"].empty()) {
     fmt::print("no controller is a shadow: tandem controller shadow NAME\n");
   }
+  if (const Json& last = answer["switch"]; last.is_object() && last["state"] == "waits")
+    fmt::print("a switch waits since cycle {}: {}\n", last.value("asked", 0), apart(last));
   for (const Json& shadow : answer["shadows"]) {
     fmt::print("{}: {} calls{}{}\n", shown(shadow.value("name", ""), 200), shadow.value("calls", 0),
                shadow.value("missed", 0) > 0

@@ -124,7 +124,7 @@ Without --socket or --dds it is the only `tandem run` of this user.)"},
 A simulated robot is predicted by a copy of it, a real one by the robot of [parallel]:
 docs/internal-model.md)"},
     {"push", "Push a simulated robot", R"(Examples:
-  tandem push torso --force 40,0,0 --for 0.2s        at a site, along the world's x axis
+  tandem push imu --force 40,0,0 --for 0.2s          at a site, along the world's x axis
   tandem push hand --impulse 0,2,0 --for 50ms --shape half_sine
                                                      2 Ns, whatever the shape
   tandem push --link LForearm --point 0,0,-0.1 --force 0,0,-20

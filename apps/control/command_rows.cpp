@@ -289,7 +289,7 @@ const std::vector<CommandRow> kRows{
               "cycles between two rows of the answer; default: about 100 rows")},
      {.takes_long = true}},
     {"push", kChanges, "pushes a simulated robot, from the next cycle on",
-     {text("site", "site", "of robot.toml's [[site]]; or a link, or a joint"),
+     {text("site", "site", "of robot.toml's [[site]]; else --link or --joint"),
       text("link", "--link", "of the description"), text("joint", "--joint", "whose body"),
       numbers("force_N", "--force", "x,y,z [N]; the greatest of its shape"),
       numbers("torque_Nm", "--torque", "x,y,z [Nm]"),

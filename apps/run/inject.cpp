@@ -61,9 +61,10 @@ Status injected(Code code) {
         "robot is made",
         "put it into a scenario file: --scenario; a payload into [[sim.payload]]");
   }
-  return fail(fmt::format("{} faults were injected already, the most that there can be",
+  return fail(fmt::format("there is no room for another one: at most 16 a cycle, and {} in all; "
+                          "pushes that are over do not count",
                           sim::FaultInjection::kMostFaults),
-              "start the robot again");
+              "let time go on for a cycle; where all are taken, start the robot again");
 }
 
 }  // namespace tandem::apps

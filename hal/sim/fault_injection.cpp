@@ -47,14 +47,32 @@ void corrupt(FaultSlot& slot, Frame& frame) noexcept {
 
 }  // namespace
 
+/// A push that is over leaves nothing behind.
+std::size_t FaultInjection::free_slot() const noexcept TANDEM_RT {
+  for (std::size_t i = 0; i < count_; ++i) {
+    const FaultSlot& slot = slots_[i];
+    if (slot.fault.kind == FaultKind::kPush && slot.told == 2 && slot.ended == 0) return i;
+  }
+  return count_;
+}
+
+std::size_t FaultInjection::room() const noexcept TANDEM_RT {
+  std::size_t over = 0;
+  for (const FaultSlot& slot : slots())
+    over += slot.fault.kind == FaultKind::kPush && slot.told == 2 && slot.ended == 0 ? 1 : 0;
+  return slots_.size() - count_ + over;
+}
+
 bool FaultInjection::add(const ScenarioFault& fault) noexcept TANDEM_RT {
-  if (count_ == slots_.size()) return false;
-  FaultSlot& slot = slots_[count_];
+  const std::size_t place = free_slot();
+  if (place == slots_.size()) return false;
+  count_ = std::max(count_, place + 1);
+  FaultSlot& slot = slots_[place];
   slot = {};
   slot.fault = fault;
   slot.random = seed_;
   slot.random = split_mix(slot.random) ^ fault.seed;
-  slot.random = split_mix(slot.random) ^ ++count_;
+  slot.random = split_mix(slot.random) ^ (place + 1);
   return true;
 }
 

@@ -118,7 +118,9 @@ class FaultInjection {
 
   explicit FaultInjection(std::uint64_t seed) noexcept : seed_(seed) {}
 
-  /// @return false: there are kMostFaults already.
+  /// How many may still be added: a push that is over makes room.
+  [[nodiscard]] std::size_t room() const noexcept TANDEM_RT;
+  /// @return false: there is no room
   [[nodiscard]] bool add(const ScenarioFault& fault) noexcept TANDEM_RT;
 
   /// Begins and ends faults: those whose time has come act on the whole step to `time_ns`.
@@ -164,6 +166,7 @@ class FaultInjection {
   };
   static_assert(sizeof(Held) == 96);
 
+  [[nodiscard]] std::size_t free_slot() const noexcept TANDEM_RT;
   [[nodiscard]] bool strikes(FaultSlot& slot) noexcept;
   [[nodiscard]] bool hold(std::size_t slot, std::uint64_t due, FrameDirection direction,
                           std::size_t bus, const canopen::Frame& frame) noexcept;

@@ -62,9 +62,10 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
     outside_->came = true;
     ScenarioFault fault;
     std::memcpy(&fault, waiting.data(), sizeof fault);
-    (void)robot_->inject(fault);  // beyond the most that there can be: left out
+    (void)robot_->inject(fault);  // post() knows of the room
     posted_.pop();
   }
+  room_.store(robot_->injection().room(), std::memory_order_relaxed);
   master_->cycle_begin(time);
   hook_(SimStage::kMasterSync);
   for (const auto& line : lines_) line->to_boards();
@@ -82,6 +83,7 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
 }
 
 bool SimRobot::post(const ScenarioFault& fault) {
+  if (posted_.size() >= room_.load(std::memory_order_relaxed)) return false;
   const std::span<std::byte> slot = posted_.begin_push();
   if (slot.empty()) return false;
   std::memcpy(slot.data(), &fault, sizeof fault);

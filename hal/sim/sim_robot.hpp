@@ -3,6 +3,7 @@
 // Layer: hal/sim.  Thread: create non-RT; the rest the loop's thread.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 
@@ -55,6 +56,7 @@ class SimRobot final : public hal::can::DriveBackend {
   hal::TruthImage truth_;
   bool keep_truth_;
   SpscRing posted_{sizeof(ScenarioFault), 16};
+  std::atomic<std::size_t> room_{FaultInjection::kMostFaults};  // after the last cycle
   hal::Outside own_outside_;
   hal::Outside* outside_ = &own_outside_;
   StageHook hook_;

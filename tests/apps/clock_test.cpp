@@ -90,7 +90,7 @@ TEST_F(Clock, GoesBackAndOnAgain) {
       {"goto -1s", "time_s: -1 s is no time of the run"},
       {"rewind 0", "by_s: goes back by more than 0 s"},
       {"rewind -1s", "by_s: goes back by more than 0 s"},
-      {"rewind 5min", "by_s: "},
+      {"rewind 5min", "the run has begun only "},
       {"goto soon", "time: 'soon' is no time (write 2.5s, 300ms, 1min, or a number of seconds)"},
       {"step --to 0.001", "has been: it is"},
       {"until 'torqu(joint2) > 1Nm'", "did you mean 'torque'"},

@@ -67,10 +67,12 @@ TEST_F(Controllers, AShadowShowsHowFarItIsAndIsSwitchedToOnceItAgrees) {
   EXPECT_EQ(joint["references"][0]["name"], "position_rad");
   EXPECT_EQ(joint["references"][0]["unit"], "rad");
   EXPECT_LT(std::abs(joint["references"][0]["difference"].get<double>()), 0.1);
+  EXPECT_EQ(to_run("controller load gravity_compensation --name soft").status, 0);
+  EXPECT_EQ(to_run("controller shadow soft").status, 0);
   const Outcome late =
-      to_run("controller switch --stop hold --start rest --when-within 0 --timeout 20ms");
+      to_run("controller switch --stop hold --start soft --when-within 1 --timeout 20ms");
   EXPECT_EQ(late.status, 1);
-  expect(late.out, "nothing has changed: they did not agree in time, at last by ");
+  expect(late.out, "nothing has changed: they did not agree in time, at last by another mode at");
   const auto change = asked("controller switch --stop hold --start rest --when-within 0.2");
   EXPECT_EQ(change["switch"]["state"], "done");
   const auto list = asked("controller list")["controllers"];

@@ -326,7 +326,7 @@ ask = { do = "joint.gains", joint = "joint1", loop = "position", kp = 30.0 }
 at_s = 0.7
 ask = { do = "joint.gains", joint = "jiont1", loop = "position", kp = 30.0 }
 """))  # fmt: skip
-    while run.time_s < 0.8:
+    while run.time_s < 1.5:
         run.step()
     rows = {row["name"]: row for row in run.result["expectations"]}
     assert rows["push[0] comes"]["passed"] and rows["softer comes"]["passed"]

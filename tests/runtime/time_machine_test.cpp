@@ -60,7 +60,7 @@ TEST(TimeMachine, GoesBackWithAShadow) {
   ASSERT_TRUE(services.begin_shadow("rest", kNow));
   trip.step(3'000);  // it is down
   EXPECT_GT(std::abs(services.shadows().at(0).joints.at(0).most[0]), 0.1);
-  ASSERT_TRUE(services.switch_when({"squat"}, {"rest"}, 0.05, 10'000'000'000, kNow));
+  ASSERT_TRUE(services.switch_when({"squat"}, {"rest"}, 0.1, 10'000'000'000, kNow));
   trip.step(500);
   EXPECT_EQ(services.last_switch().state, SwitchState::kWaits);
   trip.step(4'500);

@@ -147,6 +147,33 @@ TEST(FaultInjection, ABusThatIsDownPassesNothing) {
   EXPECT_EQ(line.step({frame(0x181, 1)}).size(), 1U);
 }
 
+// The 65th one of a run was confirmed and left out.
+TEST(FaultInjection, APushThatIsOverMakesRoom) {
+  FaultInjection faults(1);
+  ScenarioFault push;
+  push.kind = FaultKind::kPush;
+  push.duration_ns = 1'000'000;
+  for (std::int64_t i = 0; i < 200; ++i) {
+    push.start_ns = i * 3'000'000;
+    ASSERT_TRUE(faults.add(push)) << i;
+    int begun = 0, over = 0;
+    for (std::int64_t step = 0; step < 3; ++step) {
+      faults.begin_step(push.start_ns + step * 1'000'000, 0);
+      for (; faults.next_begun() != nullptr; ++begun) {
+      }
+      for (; faults.next_over() != nullptr; ++over) {
+      }
+    }
+    ASSERT_EQ(begun, 1) << i;
+    ASSERT_EQ(over, 1) << i;
+  }
+  EXPECT_EQ(faults.room(), FaultInjection::kMostFaults);
+  push.duration_ns = -1;
+  for (std::size_t i = 0; i < FaultInjection::kMostFaults; ++i) ASSERT_TRUE(faults.add(push));
+  EXPECT_EQ(faults.room(), 0U);
+  EXPECT_FALSE(faults.add(push));
+}
+
 TEST(FaultInjection, TellsOfEachFaultOnceEvenOfTheShortest) {
   Line line(of(FaultKind::kBoardReset));
   EXPECT_EQ(line.faults.next_begun(), nullptr);

@@ -155,7 +155,7 @@ class Part {
     const within = Number(this.within.value);
     const timeout = Number(this.timeout.value);
     const valid = this.within.value.trim() !== '' && within >= 0 && timeout >= 0;
-    this.within.toggleAttribute('aria-invalid', !valid);
+    this.within.setAttribute('aria-invalid', String(!valid));
     if (!valid) return null;
     const owners = new Set(this.joints.map((one) => one.owner).filter(Boolean));
     return {

@@ -13,7 +13,7 @@ const kFilled = {
   plots: '.pane .uplot',
   scope: '.scope[data-state]',
   joints: '[data-joint][data-controller]',
-  controllers: '.parameter-table',
+  controllers: '.parameter-table:not(.shadow-table)',
   inputs: '.slider-row',
   loop: '.loop-histogram svg',
   expected: '#panel-expected td',
