@@ -114,6 +114,7 @@ Result<Exit> tell_switch(Asked& asked) {
   }
   asked.answer["switch"] = *end;
   const bool done = (*end)["state"] == "done";
+  asked.answer["done"] = done;  // it was asked for, at first
   if (!asked.prints()) return done ? Exit::kDone : Exit::kFault;
   if (done) {
     fmt::print("done in cycle {}; the largest difference was {}\n", end->value("cycle", 0),

@@ -55,8 +55,8 @@ double RunSummary::realtime_factor() const {
 namespace {
 
 /// The faults of the scenario that were due after the run's end.
-std::vector<std::string> never_injected(const WiredComposition& c,
-                                        const runtime::RobotCycle& cycle) {
+std::vector<std::string> due_after_end(const WiredComposition& c,
+                                       const runtime::RobotCycle& cycle) {
   std::vector<std::string> all;
   if (c.sim == nullptr) return all;
   const double ended_s = static_cast<double>(cycle.state().time_ns()[0]) * 1e-9;
@@ -103,7 +103,7 @@ std::vector<std::string> RunSummary::warnings() const {
         "the robot has to stand still on its feet for {} s ([estimation.base] rest_s)",
         composition.experiment.estimation.base->rest_s));
   }
-  for (std::string& one : never_injected(composition, cycle)) all.push_back(std::move(one));
+  for (std::string& one : due_after_end(composition, cycle)) all.push_back(std::move(one));
   for (std::string& one : refused_samples(composition)) all.push_back(std::move(one));
   if (composition.tele == nullptr) return all;
   const remote::TeleConfig& link = composition.experiment.teleoperation->link;
@@ -116,5 +116,7 @@ std::vector<std::string> RunSummary::warnings() const {
   }
   return all;
 }
+
+std::size_t RunSummary::never_injected() const { return due_after_end(composition, cycle).size(); }
 
 }  // namespace tandem::apps

@@ -59,6 +59,8 @@ struct RunSummary {
   void print(std::FILE* out) const;
   /// What was tolerated: missing feedback, refused values; a link that was silent at the end.
   [[nodiscard]] std::vector<std::string> warnings() const;
+  /// How many faults, pushes and payloads were due after its end.
+  [[nodiscard]] std::size_t never_injected() const;
 };
 
 /// docs/json.md, `tandem run`

@@ -220,6 +220,8 @@ void figures(Figures& f, const RunSummary* s) {
     "tolerated anomalies: missing feedback, counted by node; commands that a bus did not accept; a "
     "refused value",
     [&] { return s->warnings(); });
+  f("never_injected", "faults, pushes and payloads of its scenario that were due after its end",
+    [&] { return s->never_injected(); });
   f("gate", "with `--gate`: as `rules` of `tandem controller check`", [&] { return s->gate; });
   figures(f, s == nullptr ? nullptr : &e());
 }

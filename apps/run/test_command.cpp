@@ -206,6 +206,8 @@ class Suite {
     const auto said = read_file(file_of(one.test, ".txt"), "", kMostResult);
     test.passed = status == 0 && !one.late && !test.expectations.empty() &&
                   runtime::failed(test.expectations) == 0;
+    const auto lost = result.value("never_injected", std::size_t{0});
+    test.passed = *test.passed && lost == 0;
     if (*test.passed) return tell(test);
     if (said) test.said = last_lines(*said);
     if (one.late) {
@@ -220,6 +222,9 @@ class Suite {
                                                         *ended == "by a fault" &&
                                                         runtime::failed(test.expectations) == 0) {
       test.reason = "it ended by a fault that no expectation awaits";
+    } else if (runtime::failed(test.expectations) == 0 && lost > 0) {
+      test.reason = fmt::format("{} of its scenario never came: due after its end",
+                                counted(lost, "fault or push", "faults or pushes"));
     } else if (runtime::failed(test.expectations) == 0) {
       test.reason = fmt::format("its process ended with status {}", status);
     }

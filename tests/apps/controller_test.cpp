@@ -73,6 +73,10 @@ TEST_F(Controllers, AShadowShowsHowFarItIsAndIsSwitchedToOnceItAgrees) {
       to_run("controller switch --stop hold --start soft --when-within 1 --timeout 20ms");
   EXPECT_EQ(late.status, 1);
   expect(late.out, "nothing has changed: they did not agree in time, at last by another mode at");
+  const Outcome never =
+      to_run("controller switch --stop hold --start soft --when-within 1 --timeout 20ms --json -");
+  EXPECT_EQ(never.status, 1);
+  EXPECT_EQ(nlohmann::json::parse(never.out, nullptr, false)["done"], false);
   const auto change = asked("controller switch --stop hold --start rest --when-within 0.2");
   EXPECT_EQ(change["switch"]["state"], "done");
   const auto list = asked("controller list")["controllers"];

@@ -104,6 +104,26 @@ always = "time() >= 0s"
   EXPECT_EQ(tandem("test bad.toml").status, 1);
 }
 
+// Its test passed, whatever the push would have done.
+TEST_F(ScenarioRun, APushThatNeverCameIsNoPass) {
+  scenario("late", R"(
+[[push]]
+link = "link2"
+at_s = 50
+force_N = [1, 0, 0]
+for_s = 0.1
+[[expect]]
+always = "time() >= 0s"
+)");
+  const Outcome run = tandem("run late.toml --duration 0.3 --no-log --json late.json");
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(json("late.json")["never_injected"], 1);
+  const Outcome suite = tandem("test late.toml");
+  EXPECT_EQ(suite.status, 1);
+  EXPECT_NE(suite.err.find("1 fault or push of its scenario never came"), std::string::npos)
+      << suite.err;
+}
+
 TEST_F(ScenarioRun, FindsWhatIsWrongBeforeAnythingMoves) {
   const std::string row = "[[event]]\nat_s = 1.0\n";
   refused(row + "ask = { do = \"controler.set\" }\n", "did you mean 'controller.set'?");

@@ -102,7 +102,10 @@ export class Actions {
     const command = commandLine(request);
     if (answer.ok) {
       const note = typeof answer.note === 'string' ? `: ${answer.note}` : '';
-      this.tell(command, answer.done === false ? `not yet${note}` : `done${note}`);
+      this.tell(
+        command,
+        `${answer.done === false ? 'not yet' : answer.waits ? 'it waits' : 'done'}${note}`,
+      );
     } else {
       this.tell(command, wordsOf(answer), true);
     }

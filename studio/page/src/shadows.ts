@@ -156,7 +156,10 @@ class Part {
     const timeout = Number(this.timeout.value);
     const valid = this.within.value.trim() !== '' && within >= 0 && timeout >= 0;
     this.within.setAttribute('aria-invalid', String(!valid));
-    if (!valid) return null;
+    if (!valid) {
+      say(this.waiting, 'The bound and the time are numbers, 0 or more.');
+      return null;
+    }
     const owners = new Set(this.joints.map((one) => one.owner).filter(Boolean));
     return {
       do: 'controller.switch',
