@@ -3,36 +3,24 @@
 
 #include <libdeflate.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
+#include <algorithm>
 #include <array>
-#include <cerrno>
 
 #include "base/bounds.hpp"
 #include "base/open_file.hpp"
 #include "log/mcap_format.hpp"
+#include "log/mcap_index.hpp"
 
 namespace tandem::log {
 namespace {
 
 constexpr const char* kNameOne = "name a log of `tandem run`";
 
-/// False: the file is shorter, or its disk does not answer.
-bool read_whole(const Descriptor& file, std::uint64_t at, std::span<std::byte> into) {
-  while (!into.empty()) {
-    const ssize_t size = ::pread(file.get(), into.data(), into.size(), static_cast<off_t>(at));
-    if (size < 0 && errno == EINTR) continue;
-    if (size <= 0) return false;
-    at += static_cast<std::uint64_t>(size);
-    into = into.subspan(static_cast<std::size_t>(size));
-  }
-  return true;
-}
-
 /// What stands before the data. False: it is none.
 bool read_title(const Descriptor& file, Attachment& one) {
   Bytes head(std::min<std::uint64_t>(one.bytes, 256));
-  if (!read_whole(file, one.at, head)) return false;
+  if (!read_at(file, one.at, head)) return false;
   ByteReader in(head);
   one.time_ns = static_cast<std::int64_t>(in.number<std::uint64_t>());
   (void)in.number<std::uint64_t>();
@@ -49,13 +37,13 @@ Result<std::vector<Attachment>> attachments_of(const std::string& path) {
   if (::fstat(file->get(), &found) != 0) found.st_size = 0;
   const auto size = static_cast<std::uint64_t>(found.st_size);
   std::array<std::byte, kMagic.size()> magic{};
-  if (!read_whole(*file, 0, magic) || magic != kMagic) {
+  if (!read_at(*file, 0, magic) || magic != kMagic) {
     return std::unexpected(
         Error{.message = "this is no MCAP file", .hint = kNameOne, .file = path, .key = {}});
   }
   std::vector<Attachment> all;
   std::uint64_t at = kMagic.size();
-  for (std::array<std::byte, kRecordHeaderBytes> head{}; read_whole(*file, at, head);) {
+  for (std::array<std::byte, kRecordHeaderBytes> head{}; read_at(*file, at, head);) {
     ByteReader in(head);
     const auto opcode = static_cast<Opcode>(in.number<std::uint8_t>());
     const auto length = in.number<std::uint64_t>();
@@ -79,7 +67,7 @@ Result<Bytes> read_attachment(const Attachment& one) {
   if (!file) return std::unexpected(file.error());
   if (one.bytes > bounds::kLogRecord.most || one.bytes < sizeof(std::uint32_t)) return damaged();
   Bytes content(one.bytes);
-  if (!read_whole(*file, one.at, content)) return damaged();
+  if (!read_at(*file, one.at, content)) return damaged();
   const std::size_t signed_bytes = content.size() - sizeof(std::uint32_t);
   ByteReader in(content);
   (void)in.take(16);

@@ -13,17 +13,6 @@ constexpr std::uint64_t kFooterBytes = kRecordHeaderBytes + 20;
 /// The largest summary that is read: that of a day in chunks of 200 ms.
 constexpr std::uint64_t kMostSummary = std::uint64_t{128} << 20;
 
-bool read_at(const Descriptor& file, std::uint64_t at, std::span<std::byte> into) {
-  while (!into.empty()) {
-    const ssize_t size = ::pread(file.get(), into.data(), into.size(), static_cast<off_t>(at));
-    if (size < 0 && errno == EINTR) continue;
-    if (size <= 0) return false;
-    at += static_cast<std::uint64_t>(size);
-    into = into.subspan(static_cast<std::size_t>(size));
-  }
-  return true;
-}
-
 RecordPlace chunk_place(ByteReader& in) {
   RecordPlace place{.opcode = Opcode::kChunk};
   place.first_ns = static_cast<std::int64_t>(in.number<std::uint64_t>());
@@ -75,6 +64,17 @@ bool read_records(std::span<const std::byte> summary, McapIndex& index) {
 }
 
 }  // namespace
+
+bool read_at(const Descriptor& file, std::uint64_t at, std::span<std::byte> into) {
+  while (!into.empty()) {
+    const ssize_t size = ::pread(file.get(), into.data(), into.size(), static_cast<off_t>(at));
+    if (size < 0 && errno == EINTR) continue;
+    if (size <= 0) return false;
+    at += static_cast<std::uint64_t>(size);
+    into = into.subspan(static_cast<std::size_t>(size));
+  }
+  return true;
+}
 
 McapIndex read_index(const Descriptor& file, std::uint64_t file_bytes) {
   std::array<std::byte, kFooterBytes + kMagic.size()> end{};

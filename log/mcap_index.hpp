@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -12,6 +13,9 @@
 #include "log/mcap_format.hpp"
 
 namespace tandem::log {
+
+/// Fills `into` with what stands at `at`. False: the file is shorter, or its disk does not answer.
+[[nodiscard]] bool read_at(const Descriptor& file, std::uint64_t at, std::span<std::byte> into);
 
 /// A record of the data: a chunk, metadata, an attachment.
 struct RecordPlace {

@@ -40,7 +40,8 @@ SimRobot::SimRobot(std::unique_ptr<EmulatedRobot> robot,
       truth_filler_(robot_->plant()),
       truth_(robot_->plant().joints(), robot_->plant().contact().feet(),
              robot_->plant().loops().equations().loops(), robot_->plant().passive().size()),
-      keep_truth_(keep_truth) {}
+      keep_truth_(keep_truth),
+      room_(robot_->injection().room()) {}
 
 hal::Phase SimRobot::phase() const noexcept {
   return plant().diverged() ? hal::Phase::kFault : master_->phase();

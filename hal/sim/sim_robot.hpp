@@ -56,7 +56,7 @@ class SimRobot final : public hal::can::DriveBackend {
   hal::TruthImage truth_;
   bool keep_truth_;
   SpscRing posted_{sizeof(ScenarioFault), 16};
-  std::atomic<std::size_t> room_{FaultInjection::kMostFaults};  // after the last cycle
+  std::atomic<std::size_t> room_;  // for faults, after the last cycle
   hal::Outside own_outside_;
   hal::Outside* outside_ = &own_outside_;
   StageHook hook_;

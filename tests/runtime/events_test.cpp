@@ -154,7 +154,7 @@ TEST(Events, AWrongConditionIsFoundBeforeAnythingMoves) {
   EXPECT_NE(run.error().front().to_string().find("did you mean 'position'"), std::string::npos);
 }
 
-// Restored amid a push, the same bits follow; what has come does not come again.
+// Restored in the middle of a push, the same bits follow; what has come does not come again.
 TEST(Events, ASnapshotHasThem) {
   BundledRun run("coman", "squat", with([](Experiment& e) {
                    sim::ScenarioFault push;
@@ -173,12 +173,12 @@ TEST(Events, ASnapshotHasThem) {
   run.run_to(RunPhase::kRunning);
   run.steps(250);
   ASSERT_NE(run.run->truth().push_force_N()[0], 0.0);
-  const auto amid = run.cycle->save();
-  ASSERT_TRUE(amid);
+  const auto within = run.cycle->save();
+  ASSERT_TRUE(within);
   const std::vector<std::byte> first = run.bytes(150);
   EXPECT_EQ(run.run->truth().push_force_N()[0], 0.0);
-  ASSERT_TRUE(run.cycle->restore(*amid));
-  EXPECT_EQ(*run.cycle->save(), *amid);
+  ASSERT_TRUE(run.cycle->restore(*within));
+  EXPECT_EQ(*run.cycle->save(), *within);
   EXPECT_EQ(run.bytes(150), first);
 }
 

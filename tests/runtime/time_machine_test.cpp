@@ -214,6 +214,20 @@ TEST(TimeMachine, WarnsOfNothingThatWasForgotten) {
   EXPECT_EQ(trip.run.backend->master().warnings(), std::vector<std::string>{});
 }
 
+// The 65th was confirmed, and left out.
+TEST(TimeMachine, AFaultWithoutRoomIsRefusedAndNotLost) {
+  BundledRun run("double_pendulum", "trajectory");
+  sim::ScenarioFault lasting;
+  lasting.kind = hal::FaultKind::kFrameDelay;
+  lasting.start_ns = 1'000'000'000'000;
+  for (int cycle = 0; cycle < 4; ++cycle) {
+    for (int i = 0; i < 16; ++i) ASSERT_TRUE(run.backend->post(lasting)) << cycle << " " << i;
+    EXPECT_FALSE(run.backend->post(lasting)) << "at most 16 a cycle";
+    run.steps(1);
+  }
+  EXPECT_FALSE(run.backend->post(lasting));
+}
+
 // In another process as here: nothing of the first run is left.
 TEST(TimeMachine, GoesOnFromALog) {
   const log::ScratchFolder folder;
