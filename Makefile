@@ -76,8 +76,9 @@ test-all:
 	@TANDEM_IDENTIFY_ALL=1 build/release/bin/identify_test --gtest_brief=1
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
 	@TANDEM_MOTION_COMMANDS=20000 build/release/bin/motion_bounds_test
+	@TANDEM_CLOCK_SEQUENCES=20000 build/release/bin/runtime_test --gtest_filter='ClockSequences.*'
 	@TANDEM_TELEOPERATION=build/teleoperation.txt build/release/bin/teleoperation_test --gtest_filter='*Table*' --gtest_brief=1
-	@TANDEM_HIL_SECONDS=30 tests/hil/run build/release/bin/hil_test --gtest_filter='*HilLockstep*'
+	@TANDEM_HIL_SECONDS=30 tests/hil/run build/release/bin/hil_test --gtest_filter='*HilLockstep*:HilTwin*'
 	@scripts/test-anywhere --paths
 	@scripts/test-build-types
 	@cmake --preset dev --log-level=WARNING && cmake --build --preset dev --parallel $(JOBS)
@@ -131,7 +132,7 @@ rtsan:
 	@scripts/install-dependencies test
 	@cmake --preset rtsan --log-level=WARNING
 	@cmake --build --preset rtsan --parallel $(JOBS)
-	@TANDEM_MOTION_COMMANDS=200 scripts/run-tests build/rtsan $(TEST_JOBS) \
+	@TANDEM_MOTION_COMMANDS=200 TANDEM_CLOCK_SEQUENCES=1000 scripts/run-tests build/rtsan $(TEST_JOBS) \
 	  -E 'walkman|DoesNotDriftInAMinute|^Collapse\.|^Standing\.|Teleoperation\.Prediction'
 
 # Every room; the kernels are those of `unit`. Of the generator's random robots fewer: they are slow
