@@ -57,9 +57,12 @@ target_precompile_headers(tandem_pch PRIVATE ${TANDEM_COSTLY_HEADERS})
 # RealtimeSanitizer says is in the names of functions; lines would cost a sixth of its build.
 set(TANDEM_SANITIZE "" CACHE STRING "Value of -fsanitize=, such as address,undefined")
 if(TANDEM_SANITIZE)
+  set(lines -g1)
+  if(TANDEM_SANITIZE STREQUAL "realtime")
+    set(lines)
+  endif()
   target_compile_options(tandem_options INTERFACE
-    -fsanitize=${TANDEM_SANITIZE} -fno-omit-frame-pointer
-    $<$<NOT:$<STREQUAL:${TANDEM_SANITIZE},realtime>>:-g1>)
+    -fsanitize=${TANDEM_SANITIZE} -fno-omit-frame-pointer ${lines})
   target_link_options(tandem_options INTERFACE -fsanitize=${TANDEM_SANITIZE})
 endif()
 
