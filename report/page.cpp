@@ -15,15 +15,21 @@ namespace tandem::report {
 namespace {
 
 const char kStyle[] = R"(
-:root { --ink: #1d242c; --soft: #5b6470; --line: #e3e7ec; --blue: #1f5fa8; }
+:root { color-scheme: light dark; --ink: #1d242c; --soft: #5b6470; --line: #e3e7ec;
+        --desk: #f5f7f9; --card: #fff; }
+@media screen and (prefers-color-scheme: dark) {
+  :root { --ink: #e3e7ec; --soft: #a7b0bb; --line: #343c46; --desk: #14181d; --card: #1d232a; }
+}
 * { box-sizing: border-box; }
-body { margin: 0; background: #f5f7f9; color: var(--ink);
+body { margin: 0; background: var(--desk); color: var(--ink);
        font: 15px/1.5 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }
 main { max-width: 1180px; margin: 0 auto; padding: 32px 20px 64px; }
 h1 { font-size: 26px; margin: 0 0 4px; }
 h2 { font-size: 18px; margin: 36px 0 8px; }
 p { margin: 0 0 16px; color: var(--soft); }
-.card { background: #fff; border: 1px solid var(--line); border-radius: 8px; padding: 14px; }
+.card { background: var(--card); border: 1px solid var(--line); border-radius: 8px; padding: 14px;
+        overflow-x: auto; }
+.figures .card { background: #fff; }  /* they are drawn in dark ink */
 .figures { display: grid; gap: 16px; grid-template-columns: repeat(auto-fit, minmax(480px, 1fr)); }
 .figures svg { width: 100%; height: auto; display: block; }
 dl { display: grid; grid-template-columns: repeat(auto-fill, minmax(250px, 1fr)); gap: 10px 24px;
