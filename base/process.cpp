@@ -3,11 +3,13 @@
 
 #include <fcntl.h>
 #include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -71,12 +73,33 @@ Error become(const std::string& program, const std::vector<std::string>& words) 
           .key = {}};
 }
 
+/// posix_spawn() has no way to say so; all that the child does here is a system call.
+static pid_t fork_with_us(const Spawn& what, int output, const char* const* arguments) noexcept {
+  const pid_t parent = getpid();
+  const pid_t child = fork();
+  if (child != 0) return child;
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) _exit(127);  // it has ended meanwhile
+  if (what.own_group) setpgid(0, 0);
+  const int input = what.input < 0 ? open("/dev/null", O_RDONLY | O_CLOEXEC) : what.input;
+  if (dup2(input, 0) < 0 || dup2(output, 1) < 0 || dup2(1, 2) < 0) _exit(127);
+  if (what.directory != "." && chdir(what.directory.c_str()) != 0) _exit(127);
+  execvp(arguments[0], const_cast<char* const*>(arguments));
+  _exit(127);
+}
+
 Result<pid_t> spawn(const Spawn& what) {
   const std::vector<char*> arguments = arguments_of(what.command);
   const Result<Descriptor> output = open_output(what.output, 0644);
   if (!output) {
     return fail(what.command.front() + " could not be started: " + what.output + ": " +
                 output.error().message);
+  }
+  if (what.ends_with_us) {
+    const pid_t child = fork_with_us(what, output->get(), arguments.data());
+    if (child > 0 && what.own_group) (void)setpgid(child, child);  // before anybody signals it
+    if (child > 0) return child;
+    return fail(what.command.front() + " could not be started: " + std::strerror(errno));
   }
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);

@@ -21,6 +21,7 @@ struct Spawn {
   std::string directory = ".";       ///< that it works in
   int input = -1;                    ///< descriptor of its standard input; -1: it is empty
   bool own_group = false;            ///< a process group of its own, whose number is the child's
+  bool ends_with_us = false;         ///< it is killed when the thread that starts it ends, however
 };
 
 /// Starts it. No shell is between: a word of `command` is a word of the program's.

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,15 @@ enum class Phase : std::uint8_t {
   kBringUp,      ///< nodes are being configured and drives enabled, at first or by reset()
   kOperational,  ///< every axis follows the command
   kFault,        ///< latched; `status_text()` says the cause
+};
+
+/// What becomes other of the declared link to a robot far away. NaN: it stays.
+struct LinkChange {
+  static constexpr double kStays = std::numeric_limits<double>::quiet_NaN();
+
+  double delay_s = kStays, jitter_s = kStays;
+  double loss = kStays;         ///< a share of 1, at random
+  bool up = true, down = true;  ///< of commands, of states
 };
 
 /// A robot: simulated, emulated behind a bus, or real.
@@ -118,6 +128,8 @@ class Backend {
   [[nodiscard]] virtual FaultCause link_loss() const noexcept TANDEM_RT {
     return FaultCause::kNone;
   }
+  /// Another declared link from now on, in simulated time. @return false: there is none
+  virtual bool set_link(const LinkChange& /*change*/) noexcept TANDEM_RT { return false; }
   /// The next fault that was injected and has begun since, for the log; kNone: no more. A robot
   /// that is not in this process reports nothing.
   [[nodiscard]] virtual InjectedFault next_injected() noexcept TANDEM_RT { return {}; }

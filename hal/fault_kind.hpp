@@ -52,7 +52,7 @@ enum class FaultTarget : std::uint8_t { kNone = 0, kJoint, kBoard, kSensor, kBus
 struct InjectedFault {
   FaultKind kind = FaultKind::kNone;
   FaultTarget target = FaultTarget::kNone;  ///< kNone: frames of every bus
-  std::int32_t index = -1;                  ///< in the configuration; a payload's number, < 0: gone
+  std::int32_t index = -1;  ///< in the configuration; a push's row; a payload's number, < 0: gone
   bool over = false;
 };
 

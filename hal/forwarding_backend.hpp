@@ -57,6 +57,9 @@ class ForwardingBackend : public Backend {
   [[nodiscard]] FaultCause link_loss() const noexcept TANDEM_RT override {
     return to_->link_loss();
   }
+  bool set_link(const LinkChange& change) noexcept TANDEM_RT override {
+    return to_->set_link(change);
+  }
   [[nodiscard]] InjectedFault next_injected() noexcept TANDEM_RT override {
     return to_->next_injected();
   }

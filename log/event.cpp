@@ -54,7 +54,15 @@ std::string target(const Event& event, const EventNames&) {
 std::string nothing(const Event&, const EventNames&) { return ""; }
 
 std::string given_up(const Event& event, const EventNames&) {
-  return event.code == 1 ? ": the shadow did not agree in time" : ": a joint is another's by now";
+  static constexpr const char* kWhy[] = {
+      "",
+      ": the shadow did not agree in time",
+      ": a joint is another's by now",
+      ": that was asked for",
+      ": one to start is no shadow any more",
+      ": one to stop is not active any more",
+  };
+  return kWhy[event.code < std::size(kWhy) ? event.code : 0];
 }
 
 std::string afresh(const Event&, const EventNames&) { return ": it starts afresh"; }
@@ -137,7 +145,12 @@ const EventRow* row_of(EventKind kind) {
 std::string what_happened(const Event& event, const EventNames& names, const hal::LimitMet& met) {
   std::string text = to_string(event.kind);
   if (event.kind == EventKind::kInjected || event.kind == EventKind::kEnded) {
-    text += " " + std::string(hal::to_string(static_cast<hal::FaultKind>(event.code)));
+    const auto kind = static_cast<hal::FaultKind>(event.code);
+    text += " " + std::string(hal::to_string(kind));
+    if (kind == hal::FaultKind::kPush && event.value >= 1.0F) {
+      const auto number = static_cast<std::uint32_t>(event.value);
+      text += " '" + (names.push ? names.push(number) : std::to_string(number)) + "'";
+    }
   }
   text += whose(event, names);
   if (met.kind != hal::LimitKind::kNone) return text + ": " + hal::in_words(met);

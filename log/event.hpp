@@ -62,6 +62,7 @@ struct EventNames {
   std::function<std::string(std::size_t)> controller{};  ///< by number; any thread's
   /// "box, 1.6 kg on panda_hand" by the event's code; any thread's.
   std::function<std::string(std::uint32_t)> payload{};
+  std::function<std::string(std::uint32_t)> push{};  ///< by its row in the experiment, from 1
 };
 
 /// A controller's parameter that was set, or came with it.

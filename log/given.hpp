@@ -32,7 +32,8 @@ enum class GivenKind : std::uint8_t {
   kCause,       ///< why joint `index` is in fault; values: hal::FaultCause
   kShadow,      ///< what is in slot `index` runs as a shadow
   kEndShadow,   ///< it does no longer
-  kSwitchWhen,  ///< as kSwitch, once they agree; values: within, cycles
+  kSwitchWhen,  ///< as kSwitch, once they agree; values: within, cycles. Of none: it waits no more
+  kLink,        ///< the declared link; values: delay, jitter, loss, 1 up + 2 down
 };
 
 /// Plain data: it crosses the ring as bytes, and the first kGivenBytes of them are the message.

@@ -114,6 +114,9 @@ class Recorder {
     names_.controller = std::move(name);
   }
   /// Who knows what the robot carries, the same way.
+  void name_pushes(std::function<std::string(std::uint32_t)> name) {
+    names_.push = std::move(name);
+  }
   void name_payloads(std::function<std::string(std::uint32_t)> name) {
     names_.payload = std::move(name);
   }

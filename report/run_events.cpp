@@ -76,6 +76,10 @@ std::vector<RunMark> marks_of(const std::vector<log::EventText>& events) {
       {log::EventKind::kDropped, "payload dropped"},
       {log::EventKind::kParameterSet, "parameter set"},
       {log::EventKind::kGainsSet, "gains set"},
+      {log::EventKind::kInjected, "injected"},
+      {log::EventKind::kEnded, "push ended"},
+      {log::EventKind::kLinkSet, "link set"},
+      {log::EventKind::kControllersSwitched, "controllers switched"},
       {log::EventKind::kLimited, "limit met"},
   };
   std::vector<RunMark> marks;

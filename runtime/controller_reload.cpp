@@ -45,7 +45,11 @@ CycleAnswer ControllerHost::replace(std::size_t slot, HostedController& next, bo
   if (former == nullptr) {
     return {.reason = RejectReason::kGone, .one = static_cast<std::int32_t>(slot)};
   }
-  if (shadows_.is_one(slot)) shadows_.finish(slot, ShadowEnd::kReplaced);
+  if (shadows_.is_one(slot)) {
+    shadows_.finish(slot, ShadowEnd::kReplaced);
+    next.shadow->look = former->shadow->look;  // why it ended is asked of the new one
+    next.shadow->show();
+  }
   table_[slot] = &next;
   if (const auto conflict = find_conflict(table_, active_)) {
     table_[slot] = former;

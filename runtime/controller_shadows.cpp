@@ -93,7 +93,8 @@ void ControllerShadows::finish(std::size_t slot, ShadowEnd why, std::int32_t joi
   one.shadow->look.joint = joint;
   one.shadow->look.code = code;
   one.shadow->show();
-  if (waiting_ && (waiting_->start & only(slot)) != 0) settle(SwitchState::kGivenUp, look_.cycle);
+  if (waiting_ && (waiting_->start & only(slot)) != 0)
+    (void)give_up(SwitchEnd::kNoShadow, look_.cycle);
   show();
 }
 
@@ -150,6 +151,19 @@ bool ControllerShadows::agree(std::uint64_t cycle) noexcept TANDEM_RT {
   }
   shown_switch_.write({&look_, 1});
   return agrees;
+}
+
+bool ControllerShadows::lost_its_premise() const noexcept TANDEM_RT {
+  for (std::size_t slot = 0; waiting_ && slot < kMostControllers; ++slot)
+    if ((waiting_->stop & only(slot)) != 0 && !host_.is_active(slot)) return true;
+  return false;
+}
+
+CycleAnswer ControllerShadows::give_up(SwitchEnd why, std::uint64_t cycle) noexcept TANDEM_RT {
+  if (!waiting_) return {.reason = RejectReason::kNoneWaits};
+  settle(SwitchState::kGivenUp, cycle);
+  switch_end_ = why;
+  return {};
 }
 
 void ControllerShadows::settle(SwitchState state, std::uint64_t cycle) noexcept TANDEM_RT {
@@ -276,7 +290,7 @@ void ControllerShadows::put_gains_back() noexcept TANDEM_RT {
 void ControllerShadows::archive(Archive& ar) {
   bool waits = waiting_.has_value();
   WaitingSwitch waiting = waiting_.value_or(WaitingSwitch{});
-  ar(set_, starting_, compared_, waits, waiting, look_);
+  ar(set_, starting_, compared_, waits, waiting, look_, switch_end_);
   if (set_ != 0) ar(led_);
   for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
     if (host_.table_[slot] == nullptr) set_ &= ~only(slot);  // bytes of something else

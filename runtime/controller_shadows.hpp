@@ -37,10 +37,20 @@ enum class SwitchState : std::uint8_t {
   kWaits,    ///< they do not agree yet
   kDone,     ///< it has happened
   kTimeOut,  ///< they did not agree in time, and nothing has changed
-  kGivenUp,  ///< one of them is no shadow any more, and nothing has changed
+  kGivenUp,  ///< on request, or what it was asked for is gone, and nothing has changed
   kRefused,  ///< as others claim a joint by now, and nothing has changed
 };
 [[nodiscard]] const char* to_string(SwitchState state) noexcept;
+
+/// Why one that waited is given up: `code` of log::EventKind::kSwitchGivenUp.
+enum class SwitchEnd : std::uint8_t {
+  kNone,
+  kTimeOut,    ///< they did not agree in time
+  kTaken,      ///< a joint is another controller's by now
+  kRequested,  ///< on request
+  kNoShadow,   ///< one to start is no shadow any more
+  kStopped,    ///< one to stop is not active any more
+};
 
 struct SwitchLook {
   std::uint64_t asked = 0;  ///< cycle
@@ -92,6 +102,13 @@ class ControllerShadows {
   [[nodiscard]] bool agree(std::uint64_t cycle) noexcept TANDEM_RT;
   /// It waits no more.
   void settle(SwitchState state, std::uint64_t cycle) noexcept TANDEM_RT;
+  /// The same, with a reason for the log: take_switch_end(). Refused: none waits.
+  CycleAnswer give_up(SwitchEnd why, std::uint64_t cycle) noexcept TANDEM_RT;
+  /// Whether one that the waiting switch is to stop is not active any more.
+  [[nodiscard]] bool lost_its_premise() const noexcept TANDEM_RT;
+  [[nodiscard]] SwitchEnd take_switch_end() noexcept TANDEM_RT {
+    return std::exchange(switch_end_, SwitchEnd::kNone);
+  }
 
   // The cycle.
 
@@ -137,7 +154,8 @@ class ControllerShadows {
   ControllerSet starting_ = 0;  // of these: not called yet
   ControllerSet compared_ = 0;  // of these: in the last cycle
   ControllerSet ended_ = 0;     // of take_ended()
-  hal::CommandImage led_;       // of offer()
+  SwitchEnd switch_end_ = SwitchEnd::kNone;
+  hal::CommandImage led_;  // of offer()
   bool offered_ = false;
   bool real_time_ = false;
   bool at_work_ = false;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "controllers/live_parameter.hpp"
+#include "hal/backend.hpp"
 #include "hal/image.hpp"
 
 namespace tandem::runtime {
@@ -62,7 +63,8 @@ struct CycleRequest {
     kSwitch,      ///< the controllers of `stop` and `start`
     kShadow,      ///< what is in `slot` runs as a shadow
     kEndShadow,   ///< it does no longer
-    kSwitchWhen,  ///< as kSwitch, once they agree `within`, up to `cycles` later
+    kSwitchWhen,  ///< as kSwitch, once they agree `within`, up to `cycles` later; of none: the one
+                  ///< that waits does no longer
     kGoOn,        ///< the controllers that a reset holds back
     kJoint,       ///< `wish` of `joint`
     kGains,       ///< `gains` of `joint` and `loop`
@@ -71,6 +73,7 @@ struct CycleRequest {
     kReset,       ///< the drive of `joint`
     kHome,        ///< `joint`, as its configuration says
     kSet,         ///< `changes`
+    kLink,        ///< `link`
   };
   std::uint64_t number = 0;  ///< its answer's
   Kind kind = Kind::kSwitch;
@@ -84,6 +87,7 @@ struct CycleRequest {
   JointRequest wish{};
   hal::PidGains gains{};  ///< NaN: stays
   MoveRequest move{};
+  hal::LinkChange link{};
   const std::vector<ParameterChange>* changes = nullptr;  ///< the asking side's, until the answer
 };
 

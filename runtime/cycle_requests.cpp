@@ -1,6 +1,11 @@
 #include "runtime/cycle_requests.hpp"
 
 #include <cmath>
+#include <iterator>
+#include <string_view>
+
+#include "runtime/refusal_text.hpp"
+#include "runtime/run_services.hpp"
 
 namespace tandem::runtime {
 
@@ -39,6 +44,7 @@ CycleAnswer begin_shadow(CycleRequests& to, std::size_t slot) noexcept TANDEM_RT
 
 CycleAnswer wait_to_switch(CycleRequests& to, const CycleRequest& request) noexcept TANDEM_RT {
   const std::uint64_t now = to.now.time.cycle;
+  if (request.start == 0) return to.now.controllers.shadows().give_up(SwitchEnd::kRequested, now);
   return to.now.controllers.shadows().wait_for({.stop = request.stop,
                                                 .start = request.start,
                                                 .within = request.within,
@@ -115,9 +121,45 @@ log::Given given_of(const CycleRequest& request) noexcept TANDEM_RT {
       return of(Kind::kMove, move.target_rad, move.speed_rad_s, move.acceleration_rad_s2);
     case RequestKind::kReset: return of(Kind::kResetDrive);
     case RequestKind::kHome: return of(Kind::kHome);
+    case RequestKind::kLink:
+      return of(Kind::kLink, request.link.delay_s, request.link.jitter_s, request.link.loss,
+                (request.link.up ? 1.0 : 0.0) + (request.link.down ? 2.0 : 0.0));
     case RequestKind::kSet: break;
   }
   return of(Kind::kGoOn);
+}
+
+/// As `tandem ask` calls them, in the order of RequestKind.
+constexpr std::string_view kAsked[] = {
+    "controller.load",   "controller.unload", "controller.reload",
+    "controller.switch", "controller.shadow", "controller.shadow --end",
+    "controller.switch", "controller.start",  "joint.set",
+    "joint.gains",       "joint.recover",     "joint.move",
+    "joint.reset",       "joint.home",        "controller.set",
+    "link.set",
+};
+static_assert(std::size(kAsked) == static_cast<std::size_t>(RequestKind::kLink) + 1);
+
+/// Whoever asked has been told that it will happen.
+void tell_refused(CycleRequests& to, const CycleRequest& request,
+                  const CycleAnswer& answer) noexcept TANDEM_RT {
+  const auto name_in = [&](std::int32_t slot) -> std::string_view {
+    const HostedController* const one =
+        slot < 0 ? nullptr : to.now.controllers.at(static_cast<std::size_t>(slot));
+    return one == nullptr ? std::string_view() : std::string_view(one->name);
+  };
+  hal::TextEvent text{.cycle = to.now.time.cycle, .time_ns = to.now.time.time_ns};
+  text.level = hal::TextLevel::kWarn;
+  text.set_controller(kAsked[static_cast<std::size_t>(request.kind)]);
+  text.append("refused: ");
+  const std::string_view joint =
+      answer.joint < 0
+          ? std::string_view()
+          : std::string_view(to.now.robot.joints[static_cast<std::size_t>(answer.joint)].name);
+  append_refusal(text, answer.reason,
+                 {.joint = joint, .one = name_in(answer.one), .other = name_in(answer.other)});
+  to.now.log.text(text);
+  to.services.show(text);
 }
 
 /// What comes and goes without moving anything is no event.
@@ -131,7 +173,10 @@ void log(CycleNow& now, const CycleRequest& request) noexcept TANDEM_RT {
       return now.event(EventKind::kShadowStarted, -1, 0, id_in(now, request.slot));
     case RequestKind::kEndShadow:
       return now.event(EventKind::kShadowEnded, -1, 0, id_in(now, request.slot));
-    case RequestKind::kSwitchWhen: return now.event(EventKind::kSwitchWaits);
+    case RequestKind::kSwitchWhen:
+      if (request.start != 0) now.event(EventKind::kSwitchWaits);
+      return;
+    case RequestKind::kLink: return now.event(EventKind::kLinkSet);
     case RequestKind::kReplace: {
       const auto kept = static_cast<std::uint32_t>(request.controller->succession->kept);
       return now.event(EventKind::kControllerReloaded, -1, kept);
@@ -175,6 +220,9 @@ CycleAnswer carry_out(CycleRequests& to, const CycleRequest& request) noexcept T
     case RequestKind::kHome: return to.homing.begin(request.joint);
     case RequestKind::kGains: set_gains(to, request); break;
     case RequestKind::kSet: return to.now.controllers.set_parameters(*request.changes);
+    case RequestKind::kLink:
+      if (!to.now.backend.set_link(request.link)) return {.reason = RejectReason::kNoLink};
+      break;
   }
   return {};
 }
@@ -194,6 +242,8 @@ void CycleRequests::carry_out() noexcept TANDEM_RT {
                          : too_late ? CycleAnswer{.reason = RejectReason::kStopped}
                                     : runtime::carry_out(*this, *request);
     if (answer.reason == RejectReason::kNone && !at_rest) log(now, *request);
+    const bool left = now.inbox.take_left(request->number);
+    if (answer.reason != RejectReason::kNone && left) tell_refused(*this, *request, answer);
     answer.number = request->number;
     answer.cycle = now.time.cycle;
     now.inbox.answer(answer);
@@ -202,18 +252,21 @@ void CycleRequests::carry_out() noexcept TANDEM_RT {
 
 void CycleRequests::carry_out_waiting() noexcept TANDEM_RT {
   ControllerShadows& shadows = now.controllers.shadows();
-  if (!shadows.waiting() || response.stops_now()) return;
   const std::uint64_t cycle = now.time.cycle;
+  if (shadows.lost_its_premise()) (void)shadows.give_up(SwitchEnd::kStopped, cycle);
+  if (const SwitchEnd end = shadows.take_switch_end(); end != SwitchEnd::kNone)
+    now.event(EventKind::kSwitchGivenUp, -1, static_cast<std::uint32_t>(end));
+  if (!shadows.waiting() || response.stops_now()) return;
   const WaitingSwitch wanted = *shadows.waiting();
   if (shadows.agree(cycle) && arbiter.may_start(wanted.start).reason == RejectReason::kNone) {
     shadows.settle(SwitchState::kDone, cycle);
     const CycleAnswer done = arbiter.switch_over(wanted.stop, wanted.start);
     if (done.reason == RejectReason::kNone) return now.event(EventKind::kControllersSwitched);
     shadows.settle(SwitchState::kRefused, cycle);
-    now.event(EventKind::kSwitchGivenUp, -1, 2);
+    now.event(EventKind::kSwitchGivenUp, -1, static_cast<std::uint32_t>(SwitchEnd::kTaken));
   } else if (cycle >= wanted.until) {
     shadows.settle(SwitchState::kTimeOut, cycle);
-    now.event(EventKind::kSwitchGivenUp, -1, 1);
+    now.event(EventKind::kSwitchGivenUp, -1, static_cast<std::uint32_t>(SwitchEnd::kTimeOut));
   }
 }
 

@@ -6,6 +6,8 @@
 
 namespace tandem::runtime {
 
+class RunServices;
+
 /// The requests of a run: joins what carries them out. All outlive it.
 struct CycleRequests {
   CycleNow& now;
@@ -14,6 +16,7 @@ struct CycleRequests {
   JointArbiter& arbiter;
   WaitingControllers& waiting;
   const FaultResponse& response;
+  RunServices& services;
 
   /// Those that wait, in their order, after every stop of the cycle.
   void carry_out() noexcept TANDEM_RT;

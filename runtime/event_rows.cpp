@@ -1,8 +1,12 @@
 #include "runtime/event_rows.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "hal/sim/scenario.hpp"
 
@@ -33,12 +37,20 @@ constexpr Key<Event> kAt[] = {
 
 std::int64_t event_ns(double seconds) { return std::llround(seconds * 1e9); }
 
+/// Every row of a name: results and the log tell them apart by it.
+void check_event_name(TomlTable& table, const std::string& name, std::vector<std::string>& names) {
+  if (std::ranges::find(names, name) != names.end())
+    table.error("name", "two events are called '" + name + "'", "rename one of them");
+  names.push_back(name);
+}
+
 /// What a condition decides; the rest of the row is still to be read.
-EventSpec read_when(TomlTable& table) {
+EventSpec read_when(TomlTable& table, std::vector<std::string>& names) {
   EventKeys keys;
   read_keys(table, kWhen, keys);
   EventSpec spec;
   spec.name = keys.name.empty() ? table.path() : keys.name;
+  check_event_name(table, spec.name, names);
   spec.when = keys.when;
   spec.after_ns = event_ns(keys.after_s);
   spec.optional = keys.optional;
@@ -53,15 +65,38 @@ EventSpec read_when(TomlTable& table) {
   return spec;
 }
 
+/// "a bump: push when phase() == running, 2 s later", "softer knee: {"do":…} at 4 s", for people.
+std::string happens_text(const EventSpec& spec) {
+  const auto seconds = [](std::int64_t ns) {
+    return fmt::format("{:g} s", 1e-9 * static_cast<double>(ns));
+  };
+  const std::string what =
+      spec.fault ? std::string(hal::to_string(spec.fault->kind)) : "asks for " + spec.ask;
+  std::string when = spec.when.empty() ? "" : " when " + spec.when;
+  if (spec.after_ns > 0) when += ", " + seconds(spec.after_ns) + " later";
+  if (spec.at_ns >= 0) when = " at " + seconds(spec.at_ns);
+  if (spec.when.empty() && spec.fault) {
+    when = " at " + seconds(spec.fault->start_ns);
+    if (spec.fault->from == sim::FaultFrom::kEnabled) when += " after the drives are enabled";
+  }
+  return spec.name + ": " + what + when + (spec.optional ? " (optional)" : "");
+}
+
 /// A row of [[push]] or [[fault]].
-void read_struck(TomlTable& table, hal::FaultKind kind, Experiment& e) {
-  EventSpec spec = read_when(table);
+void read_struck(TomlTable& table, hal::FaultKind kind, std::vector<std::string>& names,
+                 Experiment& e) {
+  EventSpec spec = read_when(table, names);
   const bool waits = table.has("when");
   for (const char* const key : {"at_s", "at_cycle", "after_enabled_s"}) {
     if (waits && table.has(key))
       table.error(key, "it comes once, and `when` says when", "keep one of both");
   }
   spec.fault = sim::read_fault(table, e.robot, e.loop.period_ns, e.tree().get(), kind);
+  if (spec.fault->kind == hal::FaultKind::kPush) {
+    e.pushes.push_back(spec.name);
+    spec.fault->number = static_cast<std::uint32_t>(e.pushes.size());
+  }
+  e.happens.push_back(happens_text(spec));
   if (!waits) return e.faults.push_back(*spec.fault);
   if (spec.fault->kind == hal::FaultKind::kBoardDuplicate) {
     table.error("when", "a board_duplicate has to be there when the robot is made",
@@ -70,8 +105,8 @@ void read_struck(TomlTable& table, hal::FaultKind kind, Experiment& e) {
   e.events.push_back(std::move(spec));
 }
 
-void read_asked(TomlTable& table, Experiment& e) {
-  EventSpec spec = read_when(table);
+void read_asked(TomlTable& table, std::vector<std::string>& names, Experiment& e) {
+  EventSpec spec = read_when(table, names);
   EventKeys keys;
   read_keys(table, kAt, keys);
   if (table.has("at_s")) spec.at_ns = event_ns(keys.at_s);
@@ -84,15 +119,17 @@ void read_asked(TomlTable& table, Experiment& e) {
   spec.ask = table.json("ask");
   spec.ask_line = table.line("ask");
   table.finish();
+  e.happens.push_back(happens_text(spec));
   e.events.push_back(std::move(spec));
 }
 
 }  // namespace
 
 void read_events(TomlTable& root, Experiment& e) {
-  for (TomlTable& table : root.tables("fault")) read_struck(table, hal::FaultKind::kNone, e);
-  for (TomlTable& table : root.tables("push")) read_struck(table, hal::FaultKind::kPush, e);
-  for (TomlTable& table : root.tables("event")) read_asked(table, e);
+  std::vector<std::string> names;
+  for (TomlTable& table : root.tables("fault")) read_struck(table, hal::FaultKind::kNone, names, e);
+  for (TomlTable& table : root.tables("push")) read_struck(table, hal::FaultKind::kPush, names, e);
+  for (TomlTable& table : root.tables("event")) read_asked(table, names, e);
   const std::size_t most = sim::FaultInjection::kMostFaults;
   const std::size_t count = e.faults.size() + e.events.size();
   if (count > most) {

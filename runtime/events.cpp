@@ -122,7 +122,9 @@ void Events::add_results(bool followed, std::vector<ExpectationResult>& results)
       result.passed = one.spec.optional;
       const std::int64_t due_ns =
           one.spec.at_ns >= 0 ? one.spec.at_ns : state.held_ns + one.spec.after_ns;
-      if (!result.passed) {
+      if (result.passed) {
+        result.reason = "did not come (optional)";
+      } else {
         result.reason = state.held_ns >= 0 || one.spec.at_ns >= 0
                             ? fmt::format("it has not come, it is due at {:.6g} s",
                                           static_cast<double>(due_ns) / 1e9)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <iterator>
 #include <limits>
 #include <string>
@@ -13,9 +14,9 @@ namespace {
 
 /// A row as its keys are; one of the first says what is expected.
 struct ExpectationKeys {
-  std::string always, never, eventually, bounds, rms, mean, final_value, settles;
+  std::string always, never, eventually, bounds, rms, mean, final_value, settles, as_in;
   bool stays_up = false;
-  std::string name, above, below, after;
+  std::string name, above, below, after, signal, within;
   double in_s = 0.0, from_s = 0.0, to_s = std::numeric_limits<double>::infinity();
 };
 
@@ -33,6 +34,9 @@ constexpr Key<Keys> kExpect[] = {
   key<&Keys::mean>("mean", "a number whose mean is").by_default("–"),
   key<&Keys::final_value>("final", "a number that is, in the last cycle of the window").by_default("–"),
   key<&Keys::settles>("settles", "a number that is, from `in_s` on to the end of the window").by_default("–"),
+  key<&Keys::as_in>("as_in", "a log whose run has the same `signal`, `within` a difference, at each time").within("path, from this file's folder").by_default("–"),
+  key<&Keys::signal>("signal", "with `as_in`: a number; `*` in it stands for each joint in turn, as in `\"position(*)\"`").by_default("–"),
+  key<&Keys::within>("within", "with `as_in`: the largest difference, with its unit: `\"1mrad\"`").by_default("–"),
   key<&Keys::above>("above", "with a number: its lower bound, with its unit: `\"0.4m\"`").by_default("none"),
   key<&Keys::below>("below", "its upper bound").by_default("none"),
   key<&Keys::in_s>("in_s", {0.0, 1e6}, "with `settles`: how long it may take"),
@@ -55,10 +59,11 @@ constexpr KindRow kKinds[] = {{"always", ExpectationKind::kAlways, &Keys::always
                               {"rms", ExpectationKind::kRms, &Keys::rms},
                               {"mean", ExpectationKind::kMean, &Keys::mean},
                               {"final", ExpectationKind::kFinal, &Keys::final_value},
-                              {"settles", ExpectationKind::kSettles, &Keys::settles}};
+                              {"settles", ExpectationKind::kSettles, &Keys::settles},
+                              {"as_in", ExpectationKind::kAsIn, &Keys::as_in}};
 
 constexpr char kOneOf[] =
-    "give one of always, never, eventually, stays_up, bounds, rms, mean, final, settles";
+    "give one of always, never, eventually, stays_up, bounds, rms, mean, final, settles, as_in";
 
 /// Which of them the row has. None, or several, are errors.
 void read_kind(TomlTable& table, const Keys& row, ExpectationSpec& spec) {
@@ -84,12 +89,37 @@ void read_kind(TomlTable& table, const Keys& row, ExpectationSpec& spec) {
   if (first.empty() && !table.has_errors()) table.error("", "expects nothing", kOneOf);
 }
 
+/// What compares with a log: the row's text is the signal.
+void check_recorded(TomlTable& table, const Keys& row, ExpectationSpec& spec) {
+  const bool recorded = spec.kind == ExpectationKind::kAsIn;
+  for (const auto& [key, value] : {std::pair{"signal", &row.signal}, {"within", &row.within}}) {
+    if (recorded && value->empty() && !table.has_errors())
+      table.error(table.has(key) ? key : "as_in",
+                  std::string("does not say ") +
+                      (value == &row.signal ? "what is compared" : "how far it may differ"),
+                  value == &row.signal ? "add signal = \"position(JOINT)\", for one"
+                                       : "add within = \"1mrad\", for one");
+    if (!recorded && table.has(key))
+      table.error(key, "is of no use without `as_in`", "leave it out, or name a log");
+  }
+  if (!recorded) return;
+  spec.log = (std::filesystem::path(table.folder()) / row.as_in).lexically_normal().string();
+  spec.text = row.signal;
+  spec.line = table.line("signal");
+  spec.within = row.within;
+  spec.within_line = table.line("within");
+}
+
 void check_bounds(TomlTable& table, const ExpectationSpec& row) {
-  const bool number = row.kind >= ExpectationKind::kBounds;
+  const bool number = row.kind >= ExpectationKind::kBounds && row.kind != ExpectationKind::kAsIn;
   for (const char* bound : {"above", "below"}) {
     if (!number && table.has(bound))
-      table.error(bound, "is of no use beside a condition",
-                  "write the bound into the condition, or use `bounds`");
+      table.error(bound,
+                  row.kind == ExpectationKind::kAsIn ? "is of no use beside `as_in`"
+                                                     : "is of no use beside a condition",
+                  row.kind == ExpectationKind::kAsIn
+                      ? "give `within`"
+                      : "write the bound into the condition, or use `bounds`");
   }
   if (number && row.above.empty() && row.below.empty() && !table.has_errors())
     table.error("", "has no bound", "give `above`, `below` or both, such as below = \"0.01rad\"");
@@ -109,6 +139,8 @@ std::string name_of(const ExpectationSpec& spec) {
   if (spec.stays_up) return "stays up";
   if (spec.kind == ExpectationKind::kAlways || spec.kind == ExpectationKind::kBounds)
     return spec.text;
+  if (spec.kind == ExpectationKind::kAsIn)
+    return spec.text + " as in " + std::filesystem::path(spec.log).filename().string();
   const auto* row = std::ranges::find(kKinds, spec.kind, &KindRow::kind);
   const bool number = spec.kind > ExpectationKind::kBounds;
   return std::string(row->key) + (number ? " of " : " ") + spec.text;
@@ -126,6 +158,8 @@ std::vector<ExpectationSpec> read_expectations(TomlTable& root) {
                          .above = row.above,
                          .below = row.below,
                          .in_s = row.in_s,
+                         .log = {},
+                         .within = row.within,
                          .from_s = row.from_s,
                          .to_s = row.to_s,
                          .after = row.after,
@@ -133,6 +167,7 @@ std::vector<ExpectationSpec> read_expectations(TomlTable& root) {
                          .below_line = table.line("below"),
                          .after_line = table.line("after")};
     read_kind(table, row, spec);
+    check_recorded(table, row, spec);
     check_bounds(table, spec);
     if (spec.name.empty()) spec.name = name_of(spec);
     if (std::ranges::find(all, spec.name, &ExpectationSpec::name) != all.end() &&

@@ -148,6 +148,8 @@ struct Experiment {
   std::vector<ExpectationSpec> expectations;       ///< [[expect]]
   std::vector<sim::ScenarioFault> faults;          ///< [[push]] and [[fault]] at a time
   std::vector<EventSpec> events;                   ///< [[event]], and those at a condition
+  std::vector<std::string> pushes;                 ///< names of [[push]] and kind = "push"
+  std::vector<std::string> happens;                ///< every one of these rows, for people
   std::vector<ControllerSpec> controllers;
   TomlDocument document;  ///< its diagnostics() grow while controllers read parameters
 

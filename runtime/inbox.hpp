@@ -92,6 +92,11 @@ class Inbox {
   [[nodiscard]] rt::ClockControl& clock() noexcept { return clock_; }
   [[nodiscard]] const rt::ClockControl& clock() const noexcept { return clock_; }
 
+  /// Nobody waits for the answer to request `number` any more.
+  void leave(std::uint64_t number) noexcept {
+    left_.fetch_or(std::uint64_t{1} << (number % 64), std::memory_order_acq_rel);
+  }
+
   // The loop's.
 
   /// What was asked for since the last take_urgent().
@@ -135,6 +140,11 @@ class Inbox {
   [[nodiscard]] std::optional<CycleRequest> take_request() noexcept TANDEM_RT {
     return get<CycleRequest>(requests_);
   }
+  /// Whether nobody waits for this answer any more: leave(). Once.
+  [[nodiscard]] bool take_left(std::uint64_t number) noexcept TANDEM_RT {
+    const std::uint64_t bit = std::uint64_t{1} << (number % 64);
+    return (left_.fetch_and(~bit, std::memory_order_acq_rel) & bit) != 0;
+  }
   void answer(const CycleAnswer& answer) noexcept TANDEM_RT { (void)put(answers_, answer); }
   [[nodiscard]] rt::Doorbell& bell() noexcept { return bell_; }
   [[nodiscard]] const rt::Doorbell& bell() const noexcept { return bell_; }
@@ -169,7 +179,8 @@ class Inbox {
   rt::ClockControl clock_;
 
   std::atomic<std::uint32_t> urgent_{0};
-  std::uint32_t taken_ = 0;  // the loop's
+  std::atomic<std::uint64_t> left_{0};  // bits of leave()
+  std::uint32_t taken_ = 0;             // the loop's
   std::atomic<std::int32_t> hung_in_{-1};
   std::atomic<std::uint64_t> reset_known_{kNow};
   std::atomic<std::uint32_t> confirmed_{0};

@@ -11,6 +11,7 @@
 
 #include "base/nearest.hpp"
 #include "hal/sim/payload.hpp"
+#include "runtime/ground_options.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -47,21 +48,6 @@ constexpr Key<EncoderChange> kEncoder[] = {
 constexpr Key<PassiveConfig> kPassive[] = {
   key<&PassiveConfig::friction_Nm>("friction_Nm", {0.0, 1e6}, {}),
   key<&PassiveConfig::damping_Nms_rad>("damping_Nms_rad", {0.0, 1e6}, {}),
-};
-/// A patch whose frictions may be the ground's.
-struct PatchKeys {
-  std::string name;
-  std::array<double, 2> x_m{}, y_m{};
-  std::optional<double> sliding, still;
-  double stiffness_share = 1.0;
-};
-constexpr Key<PatchKeys> kPatch[] = {
-  required(key<&PatchKeys::name>("name", "for messages").within("unique")),
-  required(key<&PatchKeys::x_m>("x_m", {-1e4, 1e4}, "from and to, in the world").within("2 numbers of ±10000")),
-  required(key<&PatchKeys::y_m>("y_m", {-1e4, 1e4}, "the same").within("2 numbers of ±10000")),
-  key<&PatchKeys::sliding>("sliding_friction", kNotNegative, "Coulomb coefficient").by_default("the ground's"),
-  key<&PatchKeys::still>("static_friction", kNotNegative, "the same of a point that is stuck").by_default("`sliding_friction`, or the ground's"),
-  key<&PatchKeys::stiffness_share>("stiffness_share", {1e-3, 1.0}, "of the ground's stiffnesses: below 1 it is softer"),
 };
 constexpr Key<PayloadTimes> kPayload[] = {
   required(key<&PayloadTimes::name>("name", "for messages").within("unique")),
@@ -176,14 +162,6 @@ std::string times_text(const PayloadTimes& times) {
          (times.until_s ? seconds(" to ", *times.until_s) : "");
 }
 
-/// "link panda_link4: mass_kg = 3", as the table says it.
-void note(const std::string& what, const TomlTable& table, sim::PlantChanges& plant) {
-  std::string keys;
-  for (const auto& [key, value] : table.values())
-    keys += (keys.empty() ? "" : ", ") + key + " = " + value;
-  plant.differences.push_back(what + ": " + keys);
-}
-
 /// What is there for good is a part of the tree.
 void add_payload(TomlTable& table, const model::Tree& described, std::vector<std::string>& names,
                  sim::PlantChanges& plant) {
@@ -220,39 +198,13 @@ void add_payload(TomlTable& table, const model::Tree& described, std::vector<std
   body.inertia = body.inertia + link.in_body * more;
 }
 
-/// The first of those that overlap counts.
-void add_patch(TomlTable& table, sim::PlantChanges& plant) {
-  hal::ContactConfig& ground = plant.robot.contact;
-  PatchKeys keys;
-  read_keys(table, kPatch, keys);
-  table.finish();
-  const double sliding = keys.sliding.value_or(ground.sliding_friction);
-  const double still = keys.still.value_or(keys.sliding ? sliding : ground.static_friction);
-  if (!(still >= sliding))
-    table.error(keys.still ? "static_friction" : "sliding_friction",
-                "static friction is below sliding friction", "give both, static the larger");
-  for (const auto& [key, range] : {std::pair{"x_m", keys.x_m}, std::pair{"y_m", keys.y_m}}) {
-    if (!(range[1] > range[0]) && !table.has_errors())
-      table.error(key, "it ends where it begins, or before", "write [from, to]");
-  }
-  if (std::ranges::count(ground.patches, keys.name, &hal::GroundPatch::name) != 0)
-    table.error("name", "two patches are called '" + keys.name + "'", "rename one of them");
-  ground.patches.push_back({.name = keys.name,
-                            .x_m = keys.x_m,
-                            .y_m = keys.y_m,
-                            .static_friction = still,
-                            .sliding_friction = sliding,
-                            .stiffness_share = keys.stiffness_share});
-  note("patch " + keys.name, table, plant);
-}
-
 }  // namespace
 
 void leave_plant_changes(TomlTable& sim) {
   (void)sim.table_or_empty("link");
   (void)sim.table_or_empty("joint");
   (void)sim.tables("payload");
-  (void)sim.tables("patch");
+  for (const char* const what : kGroundTables) (void)sim.tables(what);
 }
 
 std::shared_ptr<const sim::PlantChanges> read_plant_changes(TomlTable sim,
@@ -260,7 +212,9 @@ std::shared_ptr<const sim::PlantChanges> read_plant_changes(TomlTable sim,
                                                             const model::UrdfModel* description,
                                                             const robot::FileTexts& files) {
   const auto given = [&](const char* what) { return sim.has(what); };
-  if (std::ranges::none_of(std::array{"link", "joint", "payload", "patch"}, given)) return nullptr;
+  if (std::ranges::none_of(std::array{"link", "joint", "payload"}, given) &&
+      std::ranges::none_of(kGroundTables, given))
+    return nullptr;
   if (description == nullptr) {
     sim.error("", "the plant cannot be changed without the robot's description");
     return nullptr;
@@ -272,12 +226,13 @@ std::shared_ptr<const sim::PlantChanges> read_plant_changes(TomlTable sim,
   if (sim.has("joint")) change_joints(sim.table("joint"), *plant);
   for (const char* const what : {"link", "joint"}) {
     TomlTable all = sim.table_or_empty(what);
-    for (const std::string& name : all.keys()) note(what + (" " + name), all.table(name), *plant);
+    for (const std::string& name : all.keys())
+      note_difference(what + (" " + name), all.table(name), *plant);
   }
   std::vector<std::string> names;
   for (TomlTable& table : sim.tables("payload"))
     add_payload(table, description->tree, names, *plant);
-  for (TomlTable& table : sim.tables("patch")) add_patch(table, *plant);
+  read_ground(sim, *plant);
   return plant;
 }
 
@@ -285,7 +240,7 @@ void describe_plant_changes(KeyPage& page) {
   page.add("[sim.joint.NAME]", kActuator);
   page.add("[sim.joint.NAME]", kEncoder);
   page.add("[[sim.payload]]", kPayload);
-  page.add("[[sim.patch]]", kPatch);
+  describe_ground(page);
 }
 
 }  // namespace tandem::runtime

@@ -67,4 +67,25 @@ RefusalText refusal_text(RejectReason reason, RunPhase phase, const std::string&
   return {filled(row.message), filled(row.hint)};
 }
 
+void append_refusal(hal::TextEvent& to, RejectReason reason,
+                    const RefusalNames& names) noexcept TANDEM_RT {
+  if (!names.joint.empty()) {
+    to.append(names.joint);
+    to.append(": ");
+  }
+  std::string_view words = kWords[static_cast<std::size_t>(reason)].message;
+  for (std::size_t open; (open = words.find('{')) != std::string_view::npos;) {
+    to.append(words.substr(0, open));
+    switch (words[open + 1]) {
+      case '0': to.append(names.joint); break;
+      case '1': to.append(names.one); break;
+      case '2': to.append(names.other); break;
+      case '4': to.append(names.one.empty() ? std::string_view("this") : names.one); break;
+      default: to.append("now"); break;  // {3}: the phase
+    }
+    words.remove_prefix(open + 3);
+  }
+  to.append(words);
+}
+
 }  // namespace tandem::runtime

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "hal/sim/fault_injection.hpp"
 #include "rt/scoped_realtime.hpp"
 #include "rt/stop_signal.hpp"
 #include "runtime/events.hpp"
@@ -16,6 +17,9 @@ using hal::StopCategory;
 using log::EventKind;
 
 namespace {
+
+/// That begin or end in a cycle: every one may do both.
+constexpr std::size_t kMostInjected = 2 * sim::FaultInjection::kMostFaults;
 
 /// While one exists the cycle may not block: the real-time traps are armed, and the watchdog counts
 /// the loop as working.
@@ -41,7 +45,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       waiting_(now_, arbiter_, homing_),
       response_(now_, resets_, arbiter_, waiting_),
       owner_(now_, arbiter_, response_),
-      requests_{now_, resets_, homing_, arbiter_, waiting_, response_},
+      requests_{now_, resets_, homing_, arbiter_, waiting_, response_, services_},
       services_(parts.robot, parts.controllers, now_.inbox, now_.progress,
                 parts.controllers.gains(), now_.log),
       shown_(now_, resets_, homing_, arbiter_, services_),
@@ -130,11 +134,11 @@ void RobotCycle::wait() noexcept {
 void RobotCycle::await_tick() noexcept {
   // Four images, a sample of each input, every event that one cycle can bring, and what the
   // controllers tell.
-  const std::size_t most = (now_.events != nullptr ? now_.events->size() : 0) + 4 + 16 +
-                           Inbox::kCapacity * kMostParameterChanges +
-                           ControllerHost::kToldParameters + 4 * now_.watch.joints() +
-                           now_.watch.sensors() + now_.controllers.inputs() +
-                           kMostControllers * (3 + TextEventSlots::kSlots);
+  const std::size_t most =
+      (now_.events != nullptr ? now_.events->size() : 0) + 4 + 12 +
+      (now_.truth != nullptr ? kMostInjected : 4) + Inbox::kCapacity * kMostParameterChanges +
+      ControllerHost::kToldParameters + 4 * now_.watch.joints() + now_.watch.sensors() +
+      now_.controllers.inputs() + kMostControllers * (3 + TextEventSlots::kSlots);
   if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
   now_.tick = now_.loop.wait();
 }
@@ -160,7 +164,7 @@ void RobotCycle::read() noexcept TANDEM_RT {
   now_.state.time_ns()[0] = now_.time.time_ns;
   if (!started_) now_.event(EventKind::kStarted);
   started_ = true;
-  for (int most = 4; most > 0; --most) {  // of a cycle, for there is only so much room in the log
+  for (std::size_t most = kMostInjected; most > 0; --most) {
     const hal::InjectedFault injected = now_.backend.next_injected();
     if (injected.kind == hal::FaultKind::kNone) break;
     now_.log.event(now_.time, injected);

@@ -113,6 +113,7 @@ Result<RequestResult> RunServices::ask(Lock& lock, CycleRequest request, Patienc
   const std::optional<CycleAnswer> found = answer;
   awaited_.erase(request.number);
   if (!found) {
+    inbox_->leave(request.number);
     if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
     return RequestResult{};
   }
@@ -371,19 +372,7 @@ Status RunServices::check_switch(ControllerSet stop, ControllerSet start) const 
 Result<RequestResult> RunServices::switch_controllers(const std::vector<std::string>& stop,
                                                       const std::vector<std::string>& start,
                                                       Patience patience) {
-  Lock lock(mutex_);
-  collect();
-  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
-  const Result<ControllerSet> leaving = set_of(stop);
-  if (!leaving) return std::unexpected(leaving.error());
-  const Result<ControllerSet> coming = set_of(start);
-  if (!coming) return std::unexpected(coming.error());
-  if ((*leaving | *coming) == 0) {
-    return fail("no controller is named", "name those to stop, to start, or both");
-  }
-  if (Status able = check_switch(*leaving, *coming); !able) return std::unexpected(able.error());
-  return ask(lock, {.kind = CycleRequest::Kind::kSwitch, .start = *coming, .stop = *leaving},
-             patience);
+  return ask_to_switch(stop, start, {.kind = CycleRequest::Kind::kSwitch}, patience);
 }
 
 Result<RequestResult> RunServices::go_on(Patience patience) {

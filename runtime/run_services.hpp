@@ -214,6 +214,12 @@ class RunServices {
                                                   const std::vector<std::string>& start,
                                                   double within, std::int64_t wait_ns,
                                                   Patience patience = kPatience);
+  /// The switch that waits does no longer. Errors: none waits.
+  [[nodiscard]] Result<RequestResult> cancel_switch(Patience patience = kPatience);
+  /// Another delay, jitter or loss of the declared link, in simulated time.
+  /// Errors: there is no such link.
+  [[nodiscard]] Result<RequestResult> set_link(const hal::LinkChange& change,
+                                               Patience patience = kPatience);
   [[nodiscard]] SwitchLook last_switch() const { return host_->shadows().last_switch(); }
   /// Shadows, and those that have ended as one, in the order in which they run.
   [[nodiscard]] std::vector<ShadowStatus> shadows();
@@ -346,6 +352,9 @@ class RunServices {
   [[nodiscard]] std::string names_of(ControllerSet set) const;
   [[nodiscard]] Status check_switch(ControllerSet stop, ControllerSet start) const;
   [[nodiscard]] ControllerSet planned() const;
+  [[nodiscard]] Result<RequestResult> ask_to_switch(const std::vector<std::string>& stop,
+                                                    const std::vector<std::string>& start,
+                                                    CycleRequest request, Patience patience);
   [[nodiscard]] Result<RequestResult> ask_of_shadow(const std::string& name, bool begins,
                                                     Patience patience);
   [[nodiscard]] Result<std::size_t> joint_of(const std::string& name) const;

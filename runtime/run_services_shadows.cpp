@@ -1,4 +1,4 @@
-// Asking the loop for shadows, and for a switch that waits until they agree.
+// Asking the loop for switches, at once or once shadows agree, for shadows and for another link.
 #include <cmath>
 #include <thread>
 #include <utility>
@@ -40,6 +40,23 @@ Result<RequestResult> RunServices::ask_of_shadow(const std::string& name, bool b
 Result<RequestResult> RunServices::switch_when(const std::vector<std::string>& stop,
                                                const std::vector<std::string>& start, double within,
                                                std::int64_t wait_ns, Patience patience) {
+  return ask_to_switch(stop, start,
+                       {.kind = CycleRequest::Kind::kSwitchWhen,
+                        .within = within,
+                        .cycles = static_cast<std::uint64_t>(wait_ns / host_->period_ns())},
+                       patience);
+}
+
+Result<RequestResult> RunServices::cancel_switch(Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  return ask(lock, {.kind = CycleRequest::Kind::kSwitchWhen}, patience);
+}
+
+Result<RequestResult> RunServices::ask_to_switch(const std::vector<std::string>& stop,
+                                                 const std::vector<std::string>& start,
+                                                 CycleRequest request, Patience patience) {
   Lock lock(mutex_);
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
@@ -47,18 +64,24 @@ Result<RequestResult> RunServices::switch_when(const std::vector<std::string>& s
   if (!leaving) return std::unexpected(leaving.error());
   const Result<ControllerSet> coming = set_of(start);
   if (!coming) return std::unexpected(coming.error());
-  if (*coming == 0) {
+  if ((*leaving | *coming) == 0) {
+    return fail("no controller is named", "name those to stop, to start, or both");
+  }
+  if (request.kind == CycleRequest::Kind::kSwitchWhen && *coming == 0) {
     return fail("no controller is to start, so nothing can agree",
                 "name the shadow with --start, or switch without --when-within");
   }
   if (Status able = check_switch(*leaving, *coming); !able) return std::unexpected(able.error());
-  return ask(lock,
-             {.kind = CycleRequest::Kind::kSwitchWhen,
-              .start = *coming,
-              .stop = *leaving,
-              .within = within,
-              .cycles = static_cast<std::uint64_t>(wait_ns / host_->period_ns())},
-             patience);
+  request.start = *coming;
+  request.stop = *leaving;
+  return ask(lock, request, patience);
+}
+
+Result<RequestResult> RunServices::set_link(const hal::LinkChange& change, Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  return ask(lock, {.kind = CycleRequest::Kind::kLink, .link = change}, patience);
 }
 
 std::vector<ShadowStatus> RunServices::shadows() {

@@ -113,6 +113,7 @@ struct Unit {
   const char* kind;  ///< for the run, which knows whether the joint turns or slides; null: a time
 };
 constexpr Unit kUnits[]{{"deg", std::numbers::pi / 180.0, "angle"},
+                        {"mrad", 1e-3, "angle"},
                         {"rad", 1.0, "angle"},
                         {"mm", 1e-3, "length"},
                         {"cm", 1e-2, "length"},

@@ -108,8 +108,7 @@ Result<Exit> tell_switch(Asked& asked) {
   const Result<Json> end = wait_for_switch(asked.run, asked.answer["cycle"]);
   if (!end) return std::unexpected(end.error());
   if (end->is_null()) {
-    if (asked.prints())
-      fmt::print("it waits on; tandem controller shadow NAME --end gives it up\n");
+    if (asked.prints()) fmt::print("it waits on; tandem controller switch --cancel gives it up\n");
     return Exit::kFault;
   }
   asked.answer["switch"] = *end;
@@ -125,8 +124,9 @@ Result<Exit> tell_switch(Asked& asked) {
     fmt::print("nothing has changed: another controller has a joint by now\n");
   } else {
     fmt::print(
-        "nothing has changed: one of them is no shadow any more; tandem controller "
-        "difference says why\n");
+        "nothing has changed: it was given up, for one of them is no shadow or not active any "
+        "more, "
+        "or on request; the log says why\n");
   }
   return done ? Exit::kDone : Exit::kFault;
 }

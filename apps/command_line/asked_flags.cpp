@@ -48,8 +48,9 @@ same without a socket, and gets no answer.)"},
   tandem controller switch --stop squat --start rest in one cycle, or not at all
   tandem controller shadow squat2                    beside the active ones, without commanding
   tandem controller difference squat2                how far it is from what is commanded
-  tandem controller switch --stop squat --start squat2 --when-within 0.01
+  tandem controller switch --stop squat --start squat2 --when-within 10mrad
                                                      once they agree; Ctrl-C ends only the waiting
+  tandem controller switch --cancel                  gives up the one that waits
   tandem controller show squat                       its parameters: unit, range, value, live or not
   tandem controller set squat link_damping_Nms_rad=2 between two cycles; several: all or none
   tandem controller set arm kp_Nm_rad.elbow=20       of a parameter by joint one; kp_Nm_rad=20: all
@@ -116,6 +117,11 @@ Without --socket or --dds it is the only `tandem run` of this user.)"},
   tandem clock back-until 'torque(LKneeSag) > 40Nm'  where that became true last
   tandem clock until 'position(joint1) < 0 rad'
 The results are the same bits. Only simulated time can be paused; on a robot it is refused.
+Without --socket or --dds it is the only `tandem run` of this user.)"},
+    {"link", "The declared link of a simulated tele-operation", R"(Examples:
+  tandem link set --delay 400ms --loss 0.3           both ways, from now on
+  tandem link set --way up --jitter 20ms             commands alone
+What is left out stays: docs/teleoperation.md.
 Without --socket or --dds it is the only `tandem run` of this user.)"},
     {"predict", "What a running robot will do: runs its model ahead", R"(Examples:
   tandem predict                                     one second ahead, of the run that goes on

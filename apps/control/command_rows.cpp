@@ -149,7 +149,9 @@ const std::vector<CommandRow> kRows{
      {texts("stop", "--stop", "controllers to stop"), texts("start", "--start", "and to start"),
       {.name = "when_within", .type = Type::kNumber, .doc = "waits until the shadows to start are "
        "so near to what is commanded [unit of the reference: rad or m in position control], in the "
-       "same modes", .line = "--when-within", .min = 0.0, .max = 1e6},
+       "same modes", .line = "--when-within", .unit = Unit::kPlace, .min = 0.0, .max = 1e6},
+      choice("unit", "", {"angle", "length"}),
+      flag("cancel", "--cancel", "instead: the switch that waits is given up"),
       {.name = "timeout_s", .type = Type::kNumber, .doc = "with it: how long at most [s], of the "
        "run's time, 0 to 3600; default 10. Then nothing has changed", .line = "--timeout",
        .unit = Unit::kTime, .min = 0.0, .max = 3600.0}},
@@ -288,6 +290,14 @@ const std::vector<CommandRow> kRows{
       integer("every_cycles", "--every", 1, 1e9,
               "cycles between two rows of the answer; default: about 100 rows")},
      {.takes_long = true}},
+    {"link.set", kChanges,
+     "changes the declared link of [teleoperation], in simulated time; what is left out stays",
+     {choice("way", "--way", {"up", "down", "both"}),
+      with_unit(Unit::kTime, "delay_s", "--delay", "of what is sent from now on [s], 0 to 60"),
+      with_unit(Unit::kTime, "jitter_s", "--jitter", "[s], 0 to 60"),
+      {.name = "loss", .type = Type::kNumber, .doc = "share of messages that is lost, at random",
+       .line = "--loss", .min = 0.0, .max = 1.0}},
+     {.by_event = true}},
     {"push", kChanges, "pushes a simulated robot, from the next cycle on",
      {text("site", "site", "of robot.toml's [[site]]; else --link or --joint"),
       text("link", "--link", "of the description"), text("joint", "--joint", "whose body"),

@@ -134,6 +134,11 @@ Result<Json> switch_by_hand(RunServices& services, const Names& stop, const Name
     if (const Status own = check_no_owner(services, names); !own)
       return std::unexpected(own.error());
   }
+  if (request.value("cancel", false)) {
+    if (!stop.empty() || !start.empty() || request.contains("when_within"))
+      return fail_at("cancel", "is for the switch that waits, whatever that is", "give it alone");
+    return tell(services, services.cancel_switch());
+  }
   if (request.contains("when_within")) {
     auto answer = tell(services, switch_when(services, stop, start, request));
     if (answer) (*answer)["waits"] = true;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "apps/control/clock_commands.hpp"
@@ -141,6 +142,27 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
               "stop the robot by its own stop circuit");
 }
 
+Result<Json> set_link(runtime::RobotCycle& cycle, const Json& request) {
+  constexpr double kLongest_s = 60.0;
+  hal::LinkChange change;
+  for (const auto& [key, value] :
+       {std::pair{"delay_s", &change.delay_s}, {"jitter_s", &change.jitter_s}}) {
+    if (!request.contains(key)) continue;
+    *value = request[key].get<double>();
+    if (!(*value >= 0.0 && *value <= kLongest_s))
+      return fail_at(key, "is no time of a link", "give 0 to 60 s");
+  }
+  if (request.contains("loss")) change.loss = request["loss"].get<double>();
+  if (std::isnan(change.delay_s) && std::isnan(change.jitter_s) && std::isnan(change.loss))
+    return fail("link.set: nothing is to be set", "give delay_s, jitter_s or loss");
+  const std::string way = request.value("way", std::string("both"));
+  change.up = way != "down";
+  change.down = way != "up";
+  const auto asked = cycle.services().set_link(change);
+  if (!asked) return std::unexpected(asked.error());
+  return asked_json(*asked);
+}
+
 }  // namespace
 
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
@@ -170,6 +192,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
     cycle.inbox().end_run();
     return Json::object();
   });
+  registry.add("link.set", [&cycle](const Json& request) { return set_link(cycle, request); });
   add_controller_commands(registry, cycle.services(), robot, std::move(trial));
   add_joint_commands(registry, cycle, robot, std::move(judge));
   add_input_commands(registry, cycle.services());

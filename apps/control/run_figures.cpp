@@ -95,7 +95,10 @@ void figures(Figures& f, const runtime::ExpectationResult& one) {
     one.margin);
   f("unit", "empty: a plain number", one.unit);
   f("at_s", "when that was, as in the log: the worst cycle", one.at_s);
-  f("reason", "why it failed; empty: it passed", one.reason);
+  f("reason",
+    "why it failed; of an event that passed: that it did not come, and is optional; else empty",
+    one.reason);
+  f("joint", "of a signal with a `*`: the worst; empty: it has none", one.joint);
 }
 
 void figures(Figures& f, const RunFigures* s) {

@@ -153,6 +153,7 @@ void print_plan(const WiredComposition& c, std::FILE* out) {
   add_simulation_facts(e, facts);
   if (e.hal.backend == runtime::BackendKind::kSim && e.plant != nullptr)
     for (const std::string& one : e.plant->differences) facts.add("plant is other in", one);
+  for (const std::string& one : e.happens) facts.add("what happens", one);
   facts.add("seed", std::to_string(e.seed));
   add_estimation_facts(e, facts);
   if (e.teleoperation) {

@@ -23,8 +23,9 @@ TomlKind kind_of(const std::string& file) {
   if (!document) return TomlKind::kTest;
   const TomlTable root = document->root();
   if (root.has("expect")) return TomlKind::kTest;
-  const bool experiment = root.has("duration_s") || root.has("controller");
-  return experiment ? TomlKind::kWithout : TomlKind::kOther;
+  if (!root.has("duration_s") && !root.has("controller")) return TomlKind::kOther;
+  const bool happens = root.has("event") || root.has("push") || root.has("fault");
+  return happens ? TomlKind::kTest : TomlKind::kWithout;
 }
 
 std::vector<std::string> files_in(const std::string& folder) {
@@ -108,13 +109,14 @@ Result<std::vector<SuiteTest>> find_tests(const std::vector<std::string>& paths)
       if (std::ranges::find(tests, file, &SuiteTest::file) != tests.end()) continue;
       SuiteTest test;
       test.file = file;
-      if (kind == TomlKind::kWithout) test.reason = "it has no [[expect]]";
+      if (kind == TomlKind::kWithout)
+        test.reason = "it has no [[expect]], and nothing happens in it";
       tests.push_back(std::move(test));
     }
   }
   if (std::ranges::all_of(tests, [](const SuiteTest& one) { return !one.reason.empty(); })) {
-    return fail("no experiment there expects anything",
-                "add [[expect]] to one: docs/expectations.md");
+    return fail("no experiment there expects anything, and nothing happens in one",
+                "add [[expect]] or [[event]] to one: docs/expectations.md");
   }
   return tests;
 }

@@ -20,6 +20,7 @@
 #include "base/toml_reader.hpp"
 #include "canopen/data_sheet.hpp"
 #include "canopen/drive_parameters.hpp"
+#include "hal/config/terrain.hpp"
 #include "hal/image.hpp"
 #include "hal/robot.hpp"
 #include "hal/stop_category.hpp"
@@ -315,6 +316,7 @@ struct ContactConfig {
   double stick_velocity_m_s = 0.01;  ///< regularisation between static and sliding
   std::vector<Foot> feet;            ///< [[contact.foot]]
   std::vector<GroundPatch> patches;  ///< the first that holds a point counts
+  Terrain terrain;                   ///< added to the plane
   std::map<std::string, int> lines;  ///< key -> line in the TOML, for messages
 };
 

@@ -39,6 +39,9 @@ class ImageNetwork {
     message.image = bytes.subspan(sizeof message.head);
     return message;
   }
+  void change(double delay_s, double jitter_s, double loss) noexcept TANDEM_RT {
+    network_.change(delay_s, jitter_s, loss);
+  }
   void cut(bool is_cut) noexcept TANDEM_RT { network_.cut(is_cut); }
   [[nodiscard]] const Network::Counts& counts() const noexcept { return network_.counts(); }
   void archive(Archive& ar) { ar(network_); }

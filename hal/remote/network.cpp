@@ -304,9 +304,18 @@ std::span<const std::byte> Network::receive(std::int64_t now_ns) noexcept TANDEM
   return {bytes_.data() + slot.place * most_bytes_, slot.bytes};
 }
 
+void Network::change(double delay_s, double jitter_s, double loss) noexcept TANDEM_RT {
+  if (!std::isnan(delay_s)) config_.delay_s = delay_s;
+  if (!std::isnan(jitter_s)) config_.jitter_s = jitter_s;
+  if (std::isnan(loss)) return;
+  config_.loss_model = LossModel::kRandom;
+  config_.loss = loss;
+}
+
 void Network::archive(Archive& ar) {
-  ar(delay_, loss_, duplicate_, reorder_, random_, state_, counter_, cut_, counts_, number_,
-     last_arrival_ns_, queue_, free_, bytes_);
+  ar(config_.delay_s, config_.jitter_s, config_.loss, config_.loss_model, delay_, loss_, duplicate_,
+     reorder_, random_, state_, counter_, cut_, counts_, number_, last_arrival_ns_, queue_, free_,
+     bytes_);
 }
 
 }  // namespace tandem::remote

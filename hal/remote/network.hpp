@@ -103,6 +103,9 @@ class Network {
   [[nodiscard]] std::span<const std::byte> receive(std::int64_t now_ns) noexcept TANDEM_RT;
   /// Nothing that is sent arrives from now on, or again; what is under way does.
   void cut(bool is_cut) noexcept TANDEM_RT { cut_ = is_cut; }
+  /// What is sent from now on has another delay, jitter and share of loss, at random. NaN: as it
+  /// is. @pre they are what check() allows
+  void change(double delay_s, double jitter_s, double loss) noexcept TANDEM_RT;
 
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
   [[nodiscard]] std::size_t under_way() const noexcept { return queue_.size() - free_; }

@@ -139,6 +139,12 @@ Code TeleBackend::write(const hal::CommandImage& command,
   return robot_->write(robot_command_, parameters);
 }
 
+bool TeleBackend::set_link(const hal::LinkChange& change) noexcept TANDEM_RT {
+  if (change.up) up_.change(change.delay_s, change.jitter_s, change.loss);
+  if (change.down) down_.change(change.delay_s, change.jitter_s, change.loss);
+  return true;
+}
+
 bool TeleBackend::archive(Archive& ar) {
   if (!robot_->archive(ar) || (twin_ && !twin_->archive(ar))) return false;
   if (robot_side_) robot_side_->archive(ar);

@@ -37,6 +37,7 @@ class TeleBackend final : public OperatorEnd {
                           hal::StateImage& state) noexcept TANDEM_RT override;
   [[nodiscard]] Code write(const hal::CommandImage& command,
                            const hal::ParameterImage& parameters) noexcept TANDEM_RT override;
+  bool set_link(const hal::LinkChange& change) noexcept TANDEM_RT override;
   [[nodiscard]] bool archive(Archive& ar) override;
 
   [[nodiscard]] TeleFigures figures() const noexcept override;

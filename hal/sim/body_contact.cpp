@@ -14,6 +14,12 @@ constexpr double kTogether = 4.0;                        // points on the ground
 // What the bound on the way leaves out: projections onto closed loops, stages of Runge-Kutta.
 constexpr double kMargin_m = 0.001;
 
+/// Below the ground that stands where it starts, vertically.
+double depth_m(const hal::ContactConfig& config, const Vec3& at) noexcept {
+  const double level_m = config.height_m - at[2];
+  return config.terrain.level() ? level_m : level_m + config.terrain.at(at[0], at[1]).height_m;
+}
+
 double length_1(const double* v) noexcept {
   return std::abs(v[0]) + std::abs(v[1]) + std::abs(v[2]);
 }
@@ -49,8 +55,7 @@ void BodyContact::add_groups(const model::Tree& tree, const std::vector<LinkPoin
     Eigen::Vector3d center = Eigen::Vector3d::Zero();
     for (const Eigen::Vector3d& point : one.in_body_m) {
       const Vec3 at = rotate(motion_.bodies()[body].R.data(), vec3(point).data());
-      const double depth = config_.height_m - motion_.bodies()[body].p[2] - at[2];
-      if (depth > 0.0) continue;
+      if (depth_m(config_, sum(motion_.bodies()[body].p, at)) > 0.0) continue;
       points_.push_back(vec3(point));
       center += point;
     }
@@ -158,7 +163,7 @@ void BodyContact::moved(const double* v, double h_s) noexcept TANDEM_RT {
     v += 6;
   }
   for (std::size_t i = 0; i < reach_m_.size(); ++i) speed += reach_m_[i] * std::abs(v[i]);
-  step_m_ = h_s * speed;
+  step_m_ = h_s * (speed + config_.terrain.fastest_m_s());
   clearance_m_ -= step_m_;
 }
 
@@ -171,9 +176,11 @@ void BodyContact::evaluate(const double* q, const double* v, bool move_anchors) 
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
     const TreeMotion::BodyMotion& body = motion_.bodies()[group.body];
-    const double clearance = body.p[2] +
-                             dot({body.R[6], body.R[7], body.R[8]}, group.center.data()) -
-                             group.radius - config_.height_m;
+    const double clearance =
+        config_.terrain.level()
+            ? body.p[2] + dot({body.R[6], body.R[7], body.R[8]}, group.center.data()) -
+                  group.radius - config_.height_m
+            : clearance_m(sum(body.p, rotate(body.R.data(), group.center.data())), group.radius);
     nearest_m = std::min(nearest_m, clearance);
     double* force = groups_force_.data() + 6 * g;
     std::fill_n(force, 6, 0.0);
@@ -188,15 +195,26 @@ void BodyContact::evaluate(const double* q, const double* v, bool move_anchors) 
   if (touching_ != 0) generalize();
 }
 
+Vec3 BodyContact::on_ground(const Vec3& at) const noexcept {
+  return {at[0] - moved_.position_m[0], at[1] - moved_.position_m[1], at[2] - moved_.position_m[2]};
+}
+
+/// At least so far a ball has to move before it touches terrain: no place is steeper than the
+/// steepest.
+double BodyContact::clearance_m(const Vec3& center, double radius) const noexcept {
+  const double steepest = config_.terrain.steepest();
+  return -depth_m(config_, on_ground(center)) / std::sqrt(1.0 + steepest * steepest) - radius;
+}
+
 void BodyContact::touch(const Group& group, double* force, bool move_anchors) noexcept {
   const TreeMotion::BodyMotion& body = motion_.bodies()[group.body];
   for (std::size_t i = group.begin; i < group.end; ++i) {
     const Vec3 lever = rotate(body.R.data(), points_[i].data());
     const Vec3 at = sum(body.p, lever);
     const Vec3 rate = sum(body.v, cross(body.w, lever));
-    if (at[2] < config_.height_m) ++touching_;
+    if (depth_m(config_, on_ground(at)) > 0.0) ++touching_;
     const std::array<double, 3> f =
-        ground_force(config_, ground_[i], {at[0], at[1], at[2], rate[0], rate[1], rate[2]},
+        ground_force(config_, moved_, ground_[i], {at[0], at[1], at[2], rate[0], rate[1], rate[2]},
                      move_anchors, {&anchor_x_[i], &anchor_y_[i], &anchored_[i]}, energy_J_);
     const Vec3 moment = cross(at, f);
     for (std::size_t axis = 0; axis < 3; ++axis) {

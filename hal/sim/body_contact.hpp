@@ -37,6 +37,8 @@ class BodyContact {
   BodyContact(const hal::RobotConfig& robot, const model::Tree& tree, const tandem_kernels& kernels,
               const double* q, std::span<const PostureInertia> postures, std::int64_t substep_ns);
 
+  /// As Contact's.
+  void move_ground(const hal::GroundMotion& moved) noexcept { moved_ = moved; }
   /// Computes the ground's forces at this state. Cheap while nothing is near.
   /// @param move_anchors  true exactly once per sub-step, at its first evaluation
   void evaluate(const double* q, const double* v, bool move_anchors) noexcept TANDEM_RT;
@@ -80,10 +82,13 @@ class BodyContact {
   void add_sensors(const hal::RobotConfig& robot, const model::Tree& tree);
   void fit(const tandem_kernels& kernels, std::span<const PostureInertia> postures,
            std::int64_t substep_ns);
+  [[nodiscard]] Vec3 on_ground(const Vec3& at) const noexcept;
+  [[nodiscard]] double clearance_m(const Vec3& center, double radius) const noexcept;
   void touch(const Group& group, double* force, bool move_anchors) noexcept;
   void generalize() noexcept;
 
   hal::ContactConfig config_;
+  hal::GroundMotion moved_;  // at the last evaluation
   TreeMotion motion_;
   std::vector<std::string> names_;  // of links
   std::vector<Group> groups_;

@@ -1,6 +1,10 @@
 // Sums the law of ground_law.hpp over every sole's points into one wrench in the site's axes.
 #include "hal/sim/contact.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include "hal/sim/ground_law.hpp"
 #include "hal/sim/rotation.hpp"
 
@@ -77,7 +81,7 @@ void Contact::evaluate(const double* pose, const double* twist, bool move_anchor
                               v[1] + w[2] * x - w[0] * z,
                               v[2] + w[0] * y - w[1] * x};
       const std::array<double, 3> force_W =
-          ground_force(config_, ground, point, move_anchors,
+          ground_force(config_, moved_, ground, point, move_anchors,
                        {&anchor_x_[i], &anchor_y_[i], &touching_[i]}, energy_J_);
       F[0] += force_W[0];
       F[1] += force_W[1];
@@ -88,6 +92,19 @@ void Contact::evaluate(const double* pose, const double* twist, bool move_anchor
     }
     write(f, R, F, M, wrench);
   }
+}
+
+double Contact::rise_m(const double* pose) const noexcept {
+  double rise = -std::numeric_limits<double>::infinity();
+  for (const SolePoints& foot : feet_) {
+    const double* R = pose + 12 * foot.site;
+    for (std::size_t i = foot.begin; i < foot.end; ++i) {
+      const double in_site[3] = {x_[i], y_[i], z_[i]};
+      const Vec3 way = rotate(R, in_site);
+      rise = std::max(rise, config_.terrain.at(R[9] + way[0], R[10] + way[1]).height_m);
+    }
+  }
+  return std::isfinite(rise) ? rise : config_.terrain.at(0.0, 0.0).height_m;
 }
 
 void Contact::take(const double* pose, const double* forces_W, double* wrench) noexcept {

@@ -15,7 +15,7 @@
 
 namespace tandem::sim {
 
-/// The ground plane z = height under the points of the soles.
+/// The ground under the points of the soles: the plane z = height, and its terrain.
 ///
 /// Normal, per point at depth d > 0: Fz = k d (1 + c d'), never below zero (Hunt and Crossley
 /// 1975, exponent 1). It is continuous in d and takes out energy whenever d' is not zero.
@@ -27,6 +27,9 @@ namespace tandem::sim {
 /// Strack 1979). Both cuts are projections onto a convex set, so no motion gains energy. mu goes
 /// from static to sliding friction with the point's speed s,
 /// mu = sliding + (static - sliding) / (1 + (s / stick_velocity)^2).
+///
+/// On terrain d, p and a are along the normal and the tangents of the place, relative to the
+/// ground, which may move.
 class Contact {
  public:
   struct Sole {
@@ -44,6 +47,13 @@ class Contact {
   /// Index of foot `foot`'s sole among the kernels' sites.
   [[nodiscard]] std::size_t site(std::size_t foot) const noexcept { return feet_[foot].site; }
   [[nodiscard]] std::size_t points() const noexcept { return x_.size(); }
+
+  [[nodiscard]] const hal::Terrain& terrain() const noexcept { return config_.terrain; }
+  /// Where the ground is from now on; for terrain that moves.
+  void move_ground(const hal::GroundMotion& moved) noexcept { moved_ = moved; }
+  /// The highest terrain under a point of a sole, over the level ground.
+  /// @param pose  as evaluate()'s
+  [[nodiscard]] double rise_m(const double* pose) const noexcept;
 
   /// Fills the feet's entries of `wrench`: force then moment about the site's origin, in the
   /// site's frame, acting on the robot (the kernels' input).
@@ -77,6 +87,7 @@ class Contact {
              double* wrench) noexcept;
 
   hal::ContactConfig config_;
+  hal::GroundMotion moved_;  // at the last evaluation
   std::vector<SolePoints> feet_;
   std::vector<double> x_, y_, z_;            // points, site's frame
   std::vector<double> anchor_x_, anchor_y_;  // W

@@ -61,8 +61,8 @@ struct ScenarioFault {
   std::uint32_t steps = 1;     ///< that a frame is delayed
   std::uint32_t bits = 1;      ///< that are flipped in a frame
   std::int32_t length = -1;    ///< that a frame gets; -1: its own
-  std::uint32_t number = 0;    ///< product code, revision; a payload's: which [[sim.payload]],
-                               ///< from 1, 0: none of them
+  std::uint32_t number = 0;    ///< product code, revision; of a payload and a push: which row of
+                               ///< the experiment, from 1, 0: none of them
   hal::FaultKind kind = hal::FaultKind::kNone;
   FaultFrom from = FaultFrom::kPowerOn;
   FrameDirection direction = FrameDirection::kBoth;
@@ -77,6 +77,8 @@ static_assert(sizeof(ScenarioFault) == 232);
 /// As the loop sees it: what it strikes, the narrowest that it names.
 [[nodiscard]] constexpr hal::InjectedFault injected(const ScenarioFault& fault) noexcept {
   using hal::FaultTarget;
+  if (fault.kind == hal::FaultKind::kPush && fault.number != 0)
+    return {.kind = fault.kind, .index = static_cast<std::int32_t>(fault.number)};
   if (fault.joint >= 0) return {fault.kind, FaultTarget::kJoint, fault.joint};
   if (fault.board >= 0) return {fault.kind, FaultTarget::kBoard, fault.board};
   if (fault.sensor >= 0) return {fault.kind, FaultTarget::kSensor, fault.sensor};

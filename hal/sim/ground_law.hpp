@@ -42,51 +42,86 @@ inline void cut_to(double length, double& x, double& y) noexcept {
   y *= scale;
 }
 
-/// The ground's force on a point, in W; class Contact has the law.
-///
-/// @param move_anchor  true exactly once per sub-step, at its first evaluation
-/// @param energy_J     what the point's springs hold is added
-inline std::array<double, 3> ground_force(const hal::ContactConfig& config,
-                                          const PointGround& ground, const PointMotion& point,
-                                          bool move_anchor, const Anchor& anchor,
-                                          double& energy_J) noexcept {
-  const double depth = config.height_m - point.pz;
-  if (!(depth > 0.0)) {
-    if (move_anchor) *anchor.touching = 0;
-    return {};
-  }
+/// How a point presses on the ground, in axes of the ground's own: two along it, one away from it.
+struct Press {
+  double depth, rate;       ///< rate: out of the ground
+  double way_x, way_y;      ///< from the anchor
+  double speed_x, speed_y;  ///< over the ground
+};
+/// The force in those axes, and how far the spring to the anchor is stretched.
+struct PressForce {
+  double x, y, normal;
+  double stretch_x, stretch_y;
+};
+
+/// The law of class Contact.
+/// @param x, y  the place, for patches
+/// @pre press.depth > 0
+inline PressForce press_force(const hal::ContactConfig& config, const PointGround& ground,
+                              const Press& press, bool anchored, double x, double y,
+                              double& energy_J) noexcept {
   double share = 1.0, most = config.static_friction, least = config.sliding_friction;
   for (const hal::GroundPatch& patch : config.patches) {
-    if (!patch.holds(point.px, point.py)) continue;
+    if (!patch.holds(x, y)) continue;
     share = patch.stiffness_share;
     most = patch.static_friction;
     least = patch.sliding_friction;
     break;
   }
-  const double elastic = share * ground.stiffness_N_m * depth;
+  const double elastic = share * ground.stiffness_N_m * press.depth;
   const double damping = std::min(ground.damping_s_m, ground.most_damping_Ns_m / elastic);
-  const double normal = std::max(0.0, elastic * (1.0 - damping * point.vz));
-  const double speed2 = point.vx * point.vx + point.vy * point.vy;
+  const double normal = std::max(0.0, elastic * (1.0 - damping * press.rate));
+  const double speed2 = press.speed_x * press.speed_x + press.speed_y * press.speed_y;
   const double stick2 = config.stick_velocity_m_s * config.stick_velocity_m_s;
   const double mu = least + (most - least) * stick2 / (stick2 + speed2);
   const double cone = mu * normal;
   // A point that came down since the last sub-step is anchored where it is now.
-  const bool anchored = *anchor.touching != 0;
   const double kt = share * ground.tangential_stiffness_N_m;
-  double fx = anchored ? -kt * (point.px - *anchor.x) : 0.0;
-  double fy = anchored ? -kt * (point.py - *anchor.y) : 0.0;
+  double fx = anchored ? -kt * press.way_x : 0.0;
+  double fy = anchored ? -kt * press.way_y : 0.0;
   cut_to(cone, fx, fy);
   const double stretch_x = -fx / kt, stretch_y = -fy / kt;
-  fx -= ground.tangential_damping_Ns_m * point.vx;
-  fy -= ground.tangential_damping_Ns_m * point.vy;
+  fx -= ground.tangential_damping_Ns_m * press.speed_x;
+  fy -= ground.tangential_damping_Ns_m * press.speed_y;
   cut_to(cone, fx, fy);
+  energy_J += 0.5 * (elastic * press.depth + kt * (stretch_x * stretch_x + stretch_y * stretch_y));
+  return {fx, fy, normal, stretch_x, stretch_y};
+}
+
+/// Ground that is not level, or moves: force on a point, in W. Depth is measured along the normal
+/// of the place, and the anchor moves along with the ground.
+[[nodiscard]] std::array<double, 3> terrain_force(const hal::ContactConfig& config,
+                                                  const hal::GroundMotion& moved,
+                                                  const PointGround& ground,
+                                                  const PointMotion& point, bool move_anchor,
+                                                  const Anchor& anchor, double& energy_J) noexcept;
+
+/// The ground's force on a point, in W; class Contact has the law.
+///
+/// @param moved        where the ground is; not read where it stands still
+/// @param move_anchor  true exactly once per sub-step, at its first evaluation
+/// @param energy_J     what the point's springs hold is added
+inline std::array<double, 3> ground_force(const hal::ContactConfig& config,
+                                          const hal::GroundMotion& moved, const PointGround& ground,
+                                          const PointMotion& point, bool move_anchor,
+                                          const Anchor& anchor, double& energy_J) noexcept {
+  if (!config.terrain.level())
+    return terrain_force(config, moved, ground, point, move_anchor, anchor, energy_J);
+  const double depth = config.height_m - point.pz;
+  if (!(depth > 0.0)) {
+    if (move_anchor) *anchor.touching = 0;
+    return {};
+  }
+  const Press press{depth,    point.vz, point.px - *anchor.x, point.py - *anchor.y,
+                    point.vx, point.vy};
+  const PressForce force =
+      press_force(config, ground, press, *anchor.touching != 0, point.px, point.py, energy_J);
   if (move_anchor) {
     *anchor.touching = 1;
-    *anchor.x = point.px - stretch_x;
-    *anchor.y = point.py - stretch_y;
+    *anchor.x = point.px - force.stretch_x;
+    *anchor.y = point.py - force.stretch_y;
   }
-  energy_J += 0.5 * (elastic * depth + kt * (stretch_x * stretch_x + stretch_y * stretch_y));
-  return {fx, fy, normal};
+  return {force.x, force.y, force.normal};
 }
 
 }  // namespace tandem::sim

@@ -50,9 +50,12 @@ Result<PlantConfig> plant_config(const hal::RobotConfig& described, const tandem
     plant.robot = &robot;
     plant.tree = config.tree.get();
   }
-  if (config.engine != kOwnEngine && !robot.contact.patches.empty()) {
-    return fail_at("sim.patch", "the ground of the engine '" + config.engine + "' is one plane",
-                   "leave it out, or set engine = \"tandem\"");
+  const bool patches = !robot.contact.patches.empty();
+  if (config.engine != kOwnEngine && (patches || !robot.contact.terrain.level())) {
+    return fail_at(
+        patches ? "sim.patch" : "sim.ground",
+        "the ground of the engine '" + config.engine + "' is one plane that stands still",
+        "leave it out, or set engine = \"tandem\"");
   }
   if (changes == nullptr) return plant;
   plant.actual = &changes->tree;

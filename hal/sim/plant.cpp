@@ -217,6 +217,7 @@ Status Plant::start(const PlantConfig& config) {
   for (std::size_t j = 0; j < passive_.size(); ++j)
     at.joint_q()[passive_[j]] = config.passive[j].position_rad;
   if (Status status = close_loops(at.q()); !status) return status;
+  if (base_v_ != 0 && !contact_.terrain().level()) at.q()[2] += rise_m(at);
   const std::span<const double> q(at.q(), kernels_->nq), v(at.v(), kernels_->nv);
   fit_passive_friction(config, q);
   set_state(q, v);
@@ -240,6 +241,13 @@ Status Plant::start(const PlantConfig& config) {
   released_ = config.held ? 0 : 1;
   if (config.held && base_v_ != 0) hold(q.data(), load);
   return {};
+}
+
+/// So much higher no sole is inside the terrain.
+double Plant::rise_m(PlantState& at) noexcept {
+  sines_.take(at.q());
+  kernels_->site_twists_at(sines(), at.q(), at.v(), pose_.data(), twist_.data());
+  return contact_.rise_m(pose_.data());
 }
 
 /// A joint without a rotor has a share of the least inertia that it shows: together they are never

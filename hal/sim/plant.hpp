@@ -201,7 +201,8 @@ class Plant {
   void hold(const double* q, std::span<const double> load);
 
   void evaluate(std::int64_t step_ns) noexcept;
-  void touch_ground(const PlantState& x, bool move_anchors) noexcept;
+  void touch_ground(const PlantState& x, bool move_anchors, double ahead_s = 0.0) noexcept;
+  [[nodiscard]] double rise_m(PlantState& at) noexcept;
   void rates(const PlantState& x) noexcept;
   [[nodiscard]] const std::vector<double>& with_ends_and_ground(const PlantState& x) noexcept;
   void accelerate(const double* q, const double* v, const double* forces) noexcept;

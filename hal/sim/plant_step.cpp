@@ -9,9 +9,15 @@
 
 namespace tandem::sim {
 
-/// Everything at x that does not need the forces.
-void Plant::touch_ground(const PlantState& x, bool move_anchors) noexcept {
+/// Everything at x, which is `ahead_s` from now, that does not need the forces.
+void Plant::touch_ground(const PlantState& x, bool move_anchors, double ahead_s) noexcept {
   sines_.take(x.q());
+  if (contact_.terrain().moves()) {
+    const double time_s = static_cast<double>(time_ns_) * 1e-9 + ahead_s;
+    const hal::GroundMotion moved = contact_.terrain().motion_at(time_s);
+    contact_.move_ground(moved);
+    bodies_.move_ground(moved);
+  }
   bodies_.evaluate(x.q(), x.v(), move_anchors);
   if (contact_.feet() == 0) return;
   kernels_->site_twists_at(sines(), x.q(), x.v(), pose_.data(), twist_.data());
@@ -126,7 +132,7 @@ void Plant::step_runge_kutta(double h_s) noexcept {
   for (const auto& [ahead, weight] : kStages) {
     stage_.move(x_, ahead * h_s, rate_);
     loops_.changed();
-    touch_ground(stage_, false);
+    touch_ground(stage_, false, ahead * h_s);
     rates(stage_);
     rate_.follow(stage_, vdot_.data());
     sum_.add(weight, rate_);

@@ -48,17 +48,17 @@ Value flag(bool is) noexcept TANDEM_RT {
 
 }  // namespace
 
-Value ConditionProgram::run(const hal::CycleView& view) const noexcept TANDEM_RT {
+/// @param push  the value of a step that reads the run
+template <class Push>
+Value ConditionProgram::run_with(const Push& push) const noexcept TANDEM_RT {
   std::array<Value, kStack> stack;
   std::size_t top = 0;  // ConditionText has counted that it fits
   for (const ConditionStep& step : steps) {
     switch (step.kind) {
       case Kind::kNumber: stack[top++] = {step.number, -1}; continue;
-      case Kind::kQuantity: stack[top++] = {quantities[step.index].read(view), -1}; continue;
+      case Kind::kQuantity:
       case Kind::kPhase:
-        stack[top++] = flag(static_cast<std::uint64_t>(view.phase) == step.index);
-        continue;
-      case Kind::kFault: stack[top++] = flag((view.faults & step.index) != 0); continue;
+      case Kind::kFault: stack[top++] = push(step); continue;
       case Kind::kNegate: stack[top - 1].number = -stack[top - 1].number; continue;
       case Kind::kAbs: stack[top - 1].number = std::abs(stack[top - 1].number); continue;
       case Kind::kNot: {
@@ -79,6 +79,22 @@ Value ConditionProgram::run(const hal::CycleView& view) const noexcept TANDEM_RT
     }
   }
   return stack[0];
+}
+
+Value ConditionProgram::run(const hal::CycleView& view) const noexcept TANDEM_RT {
+  return run_with([this, &view](const ConditionStep& step) noexcept {
+    switch (step.kind) {
+      case Kind::kPhase: return flag(static_cast<std::uint64_t>(view.phase) == step.index);
+      case Kind::kFault: return flag((view.faults & step.index) != 0);
+      default: return Value{quantities[step.index].read(view), -1};
+    }
+  });
+}
+
+Value ConditionProgram::run(std::span<const double> known) const noexcept TANDEM_RT {
+  return run_with([known](const ConditionStep& step) noexcept {
+    return Value{known[step.index], -1};
+  });
 }
 
 Condition::Look Condition::look(const hal::CycleView& view) const noexcept TANDEM_RT {

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -56,6 +57,12 @@ struct ConditionProgram {
   std::string unit;  ///< of what is compared: "Nm"; empty: plain numbers, or several units
 
   [[nodiscard]] Value run(const hal::CycleView& view) const noexcept TANDEM_RT;
+  /// The same of numbers alone, without phases and faults: `known` has the quantities.
+  [[nodiscard]] Value run(std::span<const double> known) const noexcept TANDEM_RT;
+
+ private:
+  template <class Push>
+  [[nodiscard]] Value run_with(const Push& push) const noexcept TANDEM_RT;
 };
 
 /// Words and numbers of one:
@@ -121,6 +128,13 @@ class Expression {
   /// In this cycle [unit()]; NaN: nobody has measured it yet. @rt as Condition::holds()
   [[nodiscard]] double value(const hal::CycleView& view) const noexcept TANDEM_RT {
     return program_.run(view).number;
+  }
+  /// The same where its quantities() have these numbers.
+  [[nodiscard]] double value(std::span<const double> known) const noexcept TANDEM_RT {
+    return program_.run(known).number;
+  }
+  [[nodiscard]] std::span<const Quantity> quantities() const noexcept {
+    return program_.quantities;
   }
   [[nodiscard]] const std::string& unit() const noexcept { return program_.unit; }
   [[nodiscard]] const std::string& text() const noexcept { return text_; }

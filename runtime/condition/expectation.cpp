@@ -28,6 +28,7 @@ const char* key_of(Judged kind) {
     case Judged::kMean: return "mean";
     case Judged::kFinal: return "final";
     case Judged::kSettles: return "settles";
+    case Judged::kAsIn: return "signal";
   }
   return "?";
 }
@@ -76,6 +77,12 @@ Result<Expectation> Expectation::look_up(const ExpectationSpec& spec, const Quan
     }
     one.condition_ = std::move(*condition);
     if (spec.kind == Judged::kEventually) one.awaited_ = one.condition_.faults();
+  } else if (spec.kind == Judged::kAsIn) {
+    if (Status read = one.read_recorded(names); !read) {
+      Error error = std::move(read.error());
+      return at(error, error.key.empty() ? "signal" : error.key,
+                error.key == "within" ? spec.within_line : spec.line);
+    }
   } else {
     auto number = Expression::read(spec.text, names);
     if (!number) return at(number.error(), key_of(spec.kind), spec.line);
@@ -102,6 +109,54 @@ Result<Expectation> Expectation::look_up(const ExpectationSpec& spec, const Quan
     if (spec.kind != Judged::kNever) one.awaited_ |= one.after_->faults();
   }
   return one;
+}
+
+Status Expectation::read_recorded(const QuantityNames& names) {
+  const std::size_t star = spec_.text.find('*');
+  std::vector<std::string> joints;
+  if (star == std::string::npos) joints.emplace_back();
+  for (const hal::DrivenJoint& joint : names.robot.joints)
+    if (star != std::string::npos) joints.push_back(joint.name);
+  for (const std::string& joint : joints) {
+    std::string text = spec_.text;
+    for (std::size_t i = star; i < text.size(); i = text.find('*', i + joint.size()))
+      text.replace(i, 1, joint);
+    auto now = Expression::read(text, names);
+    if (!now) return std::unexpected(now.error());
+    auto then = Recorded::read(*now, names, spec_.log);
+    if (!then) return std::unexpected(then.error());
+    compared_.push_back({joint, std::move(*now), std::move(*then)});
+  }
+  const Result<double> within = read_amount(spec_.within, unit());
+  if (within && *within > 0.0) {
+    within_ = *within;
+    return {};
+  }
+  Error error = within ? fail("nothing is within " + spec_.within, "give more than 0").error()
+                       : within.error();
+  error.key = "within";
+  return std::unexpected(std::move(error));
+}
+
+const std::string& Expectation::unit() const {
+  return is_condition()                ? condition_.unit()
+         : spec_.kind == Judged::kAsIn ? compared_.front().now.unit()
+                                       : expression_.unit();
+}
+
+double Expectation::margin_to_recorded(const hal::CycleView& view) noexcept TANDEM_RT {
+  double margin = std::numeric_limits<double>::infinity();
+  std::uint64_t worst_of = 0;
+  for (std::size_t i = 0; i < compared_.size(); ++i) {
+    const double apart =
+        std::abs(compared_[i].now.value(view) - compared_[i].then.at(view.time.time_ns));
+    if (std::isnan(apart)) return apart;
+    if (within_ - apart >= margin) continue;
+    margin = within_ - apart;
+    worst_of = i;
+  }
+  if (so_far_.worst_ns == kNever || margin < so_far_.worst) so_far_.worst_of = worst_of;
+  return margin;
 }
 
 double Expectation::margin_of(double number) const noexcept TANDEM_RT {
@@ -139,6 +194,10 @@ void Expectation::take(const hal::CycleView& view) noexcept TANDEM_RT {
     const bool never = spec_.kind == Judged::kNever;
     return note(never ? -look.margin : look.margin, look.holds != never, view);
   }
+  if (spec_.kind == Judged::kAsIn) {
+    const double margin = margin_to_recorded(view);
+    return std::isnan(margin) ? unknown() : note(margin, margin >= 0.0, view);
+  }
   const double number = expression_.value(view);
   if (std::isnan(number)) return unknown();
   const double margin = margin_of(number);
@@ -164,8 +223,7 @@ std::string Expectation::unjudged() const {
 }
 
 std::string Expectation::amount(double value) const {
-  const std::string& unit = is_condition() ? condition_.unit() : expression_.unit();
-  return fmt::format("{:.4g}{}{}", value, unit.empty() ? "" : " ", unit);
+  return fmt::format("{:.4g}{}{}", value, unit().empty() ? "" : " ", unit());
 }
 
 /// In every cycle, or in one.
@@ -182,9 +240,11 @@ void Expectation::judge_condition(ExpectationResult& result) const {
   }
   result.passed = so_far_.held == known && so_far_.unknown == 0;
   if (so_far_.held != known) {
-    result.reason =
-        fmt::format("it {} in {} of {}", spec_.kind == Judged::kNever ? "held" : "did not hold",
-                    known - so_far_.held, counted(so_far_.cycles, "cycle"));
+    result.reason = fmt::format("it {} in {} of {}",
+                                spec_.kind == Judged::kNever  ? "held"
+                                : spec_.kind == Judged::kAsIn ? "differed"
+                                                              : "did not hold",
+                                known - so_far_.held, counted(so_far_.cycles, "cycle"));
   }
 }
 
@@ -226,12 +286,14 @@ void Expectation::judge_settling(ExpectationResult& result) const {
 ExpectationResult Expectation::result() const {
   ExpectationResult result;
   result.name = spec_.name;
-  result.unit = is_condition() ? condition_.unit() : expression_.unit();
+  result.unit = unit();
   result.reason = unjudged();
   if (!result.reason.empty()) return result;
   if (std::isfinite(so_far_.worst)) result.margin = so_far_.worst;
   if (so_far_.worst_ns != kNever) result.at_s = in_seconds(so_far_.worst_ns);
-  if (is_condition() || spec_.kind == Judged::kBounds) {
+  const bool recorded = spec_.kind == Judged::kAsIn;
+  if (recorded && so_far_.worst_ns != kNever) result.joint = compared_[so_far_.worst_of].joint;
+  if (is_condition() || recorded || spec_.kind == Judged::kBounds) {
     judge_condition(result);
   } else if (spec_.kind == Judged::kSettles) {
     judge_settling(result);
@@ -245,6 +307,10 @@ ExpectationResult Expectation::result() const {
     result.passed = false;
     result.reason = fmt::format("nobody measured it in {} of {}, first at {:g} s", so_far_.unknown,
                                 counted(so_far_.cycles, "cycle"), in_seconds(so_far_.unknown_ns));
+    if (recorded)
+      result.reason += fmt::format("; the log has it from {:g} s to {:g} s",
+                                   in_seconds(compared_.front().then.first_ns()),
+                                   in_seconds(compared_.front().then.last_ns()));
   }
   const std::int64_t ran = so_far_.last_ns - so_far_.zero_ns;
   const bool whole = !std::isfinite(spec_.to_s) || ran + so_far_.period_ns >= to_ns_;

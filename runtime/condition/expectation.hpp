@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "runtime/condition/condition.hpp"
 #include "runtime/condition/expectation_spec.hpp"
+#include "runtime/condition/recorded.hpp"
 
 namespace tandem::runtime {
 
@@ -23,7 +25,8 @@ struct ExpectationResult {
   std::optional<double> margin{};
   std::string unit;              ///< "Nm"; empty: a plain number
   std::optional<double> at_s{};  ///< when that was, as in the log: the worst cycle
-  std::string reason;            ///< why it failed; empty: it passed
+  std::string reason;            ///< why it failed; empty: it passed, or did not come and may
+  std::string joint{};           ///< with a `*`: which one that was
 
   bool operator==(const ExpectationResult&) const = default;
 };
@@ -60,8 +63,15 @@ class Expectation {
     double worst = 0.0;                               // margin; of kEventually the best
     std::int64_t worst_ns = kNever;
     double sum = 0.0, last = 0.0;      // of the number, or its square
+    std::uint64_t worst_of = 0;        // kAsIn: of compared_
     std::int64_t outside_ns = kNever;  // the last cycle out of the bounds
     std::int64_t period_ns = 0;
+  };
+  /// A number of this run, and what it was in a recorded one.
+  struct Compared {
+    std::string joint;
+    Expression now;
+    Recorded then;
   };
   static constexpr std::int64_t kNever = -1;
 
@@ -74,14 +84,21 @@ class Expectation {
   /// Why nothing can be said; empty: something can.
   [[nodiscard]] std::string unjudged() const;
   [[nodiscard]] std::string amount(double value) const;
+  /// Reads what a kAsIn compares with: of a signal with a `*`, of each joint.
+  Status read_recorded(const QuantityNames& names);
+  /// The worst of these; NaN where one is not known.
+  [[nodiscard]] double margin_to_recorded(const hal::CycleView& view) noexcept TANDEM_RT;
+  [[nodiscard]] const std::string& unit() const;
   void judge_condition(ExpectationResult& result) const;
   void judge_number(ExpectationResult& result) const;
   void judge_settling(ExpectationResult& result) const;
 
   ExpectationSpec spec_;
-  std::string impossible_;  // why it cannot pass in this run
-  Condition condition_;     // kAlways, kNever, kEventually
-  Expression expression_;   // the others
+  std::string impossible_;          // why it cannot pass in this run
+  Condition condition_;             // kAlways, kNever, kEventually
+  Expression expression_;           // the others
+  std::vector<Compared> compared_;  // kAsIn
+  double within_ = 0.0;
   std::optional<Condition> after_;
   double above_ = -std::numeric_limits<double>::infinity();
   double below_ = std::numeric_limits<double>::infinity();

@@ -18,6 +18,7 @@ enum class ExpectationKind : std::uint8_t {
   kMean,        ///< its mean is
   kFinal,       ///< it is, in the last cycle
   kSettles,     ///< it is, from some cycle to the last, and that comes within `in_s`
+  kAsIn,        ///< it differs from that of a recorded run by less than `within` in every cycle
 };
 
 /// A row of [[expect]], as the file has it.
@@ -27,11 +28,12 @@ struct ExpectationSpec {
   std::string text;          ///< the condition, or the number
   std::string above, below;  ///< "0.4m"; empty: no such bound
   double in_s = 0.0;         ///< kSettles
+  std::string log, within;   ///< kAsIn: the recorded run; "1mrad"
   double from_s = 0.0;       ///< the window's begin, since the controllers start, or since `after`
   double to_s = std::numeric_limits<double>::infinity();
   std::string after;      ///< a condition; empty: none
   bool stays_up = false;  ///< the condition is about a floating base
-  int line = 0, above_line = 0, below_line = 0, after_line = 0;  ///< in the file
+  int line = 0, above_line = 0, below_line = 0, after_line = 0, within_line = 0;  ///< in the file
 };
 
 /// Rows of an experiment, at most: each costs some 30 ns a cycle.

@@ -51,7 +51,8 @@ std::uint64_t Expectations::fingerprint() const noexcept {
   for (const Expectation& one : all_) {
     const ExpectationSpec& spec = one.spec();
     add(static_cast<std::uint64_t>(spec.kind));
-    for (const std::string* text : {&spec.text, &spec.above, &spec.below, &spec.after}) {
+    for (const std::string* text :
+         {&spec.text, &spec.above, &spec.below, &spec.after, &spec.log, &spec.within}) {
       for (const char letter : *text) add(static_cast<unsigned char>(letter));
       add(text->size());
     }
@@ -103,9 +104,11 @@ std::string margin_text(const ExpectationResult& result) {
 }
 
 std::string in_words(const ExpectationResult& result) {
+  if (result.passed && !result.reason.empty()) return result.reason;  // it did not come, and may
   std::string text = result.passed ? "passed" : "failed";
   if (!result.reason.empty()) text += ", " + result.reason;
   if (const std::string margin = margin_text(result); !margin.empty()) text += ", margin " + margin;
+  if (!result.joint.empty()) text += " of " + result.joint;
   if (result.at_s) text += fmt::format(" at {:.3f} s", *result.at_s);
   return text;
 }

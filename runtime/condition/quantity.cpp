@@ -66,14 +66,6 @@ constexpr ShortName kShortNames[] = {
 };
 // clang-format on
 
-log::RunInfo info_of(const hal::Robot& robot) {
-  log::RunInfo info;
-  for (const hal::DrivenJoint& joint : robot.joints) info.joints.push_back(joint.name);
-  for (const hal::Sensor& sensor : robot.sensors)
-    info.sensors.push_back({sensor.name, sensor.channels()});
-  return info;
-}
-
 /// The units of a field's text: those of a leading "[N, Nm]", or of every bracket.
 std::vector<std::string> bracketed(const std::string& doc) {
   std::vector<std::string> units;
@@ -230,7 +222,7 @@ Result<Quantity> by_short_name(const ShortName& row, std::string_view argument,
   }
   const hal::Layout* layout = layout_of_image(row.of, names);
   if (layout == nullptr) return no_image(row.of);
-  const log::RunInfo info = info_of(names.robot);
+  const log::RunInfo info = names_in_log(names.robot);
   const hal::Field* field = layout->find(hal::wire_name(row.field));
   if (field == nullptr || field->count < row.each) {
     return fail("this run has no " + std::string(row.call), "name another quantity");
@@ -293,7 +285,7 @@ Result<Quantity> by_path(std::string_view path, const QuantityNames& names) {
       if (one.count != 0) known.push_back(one.name);
     return fail(image->name + " has no field '" + name + "'", suggest(name, known));
   }
-  const log::RunInfo info = info_of(names.robot);
+  const log::RunInfo info = names_in_log(names.robot);
   const std::vector<std::string> elements = elements_of(*field, info);
   if (end == std::string_view::npos && field->count == 1 && log::named_by(*field, info).empty())
     return place(*image, *field, 0, names, info);
@@ -372,6 +364,14 @@ Result<Quantity> find_quantity(std::string_view function, std::string_view argum
   std::vector<std::string> known{"signal", "phase", "fault", "abs"};
   for (const ShortName& one : kShortNames) known.emplace_back(one.name);
   return fail("there is no quantity '" + std::string(function) + "'", suggest(function, known, 40));
+}
+
+log::RunInfo names_in_log(const hal::Robot& robot) {
+  log::RunInfo info;
+  for (const hal::DrivenJoint& joint : robot.joints) info.joints.push_back(joint.name);
+  for (const hal::Sensor& sensor : robot.sensors)
+    info.sensors.push_back({sensor.name, sensor.channels()});
+  return info;
 }
 
 std::vector<QuantityWords> quantity_words() {

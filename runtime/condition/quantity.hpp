@@ -13,6 +13,7 @@
 #include "base/result.hpp"
 #include "hal/cycle_observer.hpp"
 #include "hal/robot.hpp"
+#include "log/info.hpp"
 
 namespace tandem::runtime {
 
@@ -67,6 +68,9 @@ struct QuantityNames {
 /// Errors: an unknown name, with the nearest; an image that the run lacks.
 [[nodiscard]] Result<Quantity> find_quantity(std::string_view function, std::string_view argument,
                                              const QuantityNames& names);
+
+/// Names of the robot's parts, as log::signal_name() takes them.
+[[nodiscard]] log::RunInfo names_in_log(const hal::Robot& robot);
 
 /// A short name, for help and docs.
 struct QuantityWords {

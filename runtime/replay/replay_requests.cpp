@@ -119,6 +119,7 @@ std::string ReplayRequests::ask(const log::Given& given) {
       switch_waits_ = true;  // the cycle in which it happens follows
       break;
     case GivenKind::kGoOn: what.kind = Kind::kGoOn; break;
+    case GivenKind::kLink: return {};  // the recorded robot answers as it did
     case GivenKind::kJoint:
       what.kind = Kind::kJoint;
       what.wish = {value[0], value[1], static_cast<std::int32_t>(value[2]),

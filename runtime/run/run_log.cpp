@@ -359,6 +359,9 @@ Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std:
     (*recorder)->name_parameters([host = c.controllers.get()] { return parameters_now(*host); });
   }
   if (recorder && c.sim != nullptr) {
+    (*recorder)->name_pushes([names = c.experiment.pushes](std::uint32_t number) {
+      return number <= names.size() ? names[number - 1] : std::to_string(number);
+    });
     (*recorder)->name_payloads(
         [sim = c.sim](std::uint32_t number) { return sim->robot().payload_text(number); });
   }

@@ -81,7 +81,8 @@ TEST_F(ScenarioRun, ComesInTheSameCyclesEachTime) {
   EXPECT_EQ(same.status, 0) << same.out << same.err;
   const Outcome csv = tandem("log csv " + shell_word(logs[0]) + " --topic /tandem/event -o e.csv");
   const std::string events = read_text(folder_ / "e.csv") + csv.err;
-  for (const char* text : {"injected push", "ended push", "softer: done", "gains set"})
+  for (const char* text :
+       {"injected push 'nudge'", "ended push 'nudge'", "softer: done", "gains set"})
     EXPECT_NE(events.find(text), std::string::npos) << text << " in\n" << events;
 }
 
@@ -124,6 +125,55 @@ always = "time() >= 0s"
       << suite.err;
 }
 
+TEST_F(ScenarioRun, IsAsInALog) {
+  const std::string all =
+      "[[expect]]\nsignal = \"position(*)\"\nas_in = \"good.mcap\"\nwithin = \"1mrad\"\n";
+  scenario("plain", "[[expect]]\nalways = \"time() >= 0s\"\n");
+  ASSERT_EQ(tandem("run plain.toml --duration 0.3 -q --log log").status, 0);
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "log"))
+    if (entry.path().extension() == ".mcap")
+      std::filesystem::copy_file(entry.path(), folder_ / "good.mcap");
+  scenario("same", all);
+  const Outcome same = tandem("run same.toml --duration 0.3 -q --no-log --json same.json");
+  EXPECT_EQ(same.status, 0) << same.err;
+  const auto row = json("same.json")["expectations"][0];
+  EXPECT_EQ(row["margin"], 0.001) << row;
+  EXPECT_EQ(row["unit"], "rad");
+  EXPECT_EQ(row["joint"], "joint1");
+  scenario("other",
+           all + "[[push]]\njoint = \"joint2\"\nforce_N = [20, 0, 0]\nat_s = 0.7\nfor_s = 0.1\n");
+  const Outcome other = tandem("run other.toml --duration 0.3 -q --no-log --json other.json");
+  EXPECT_EQ(other.status, 1) << other.err;
+  const auto failed = json("other.json")["expectations"][0];
+  EXPECT_LT(failed["margin"], 0.0) << failed;
+  EXPECT_NE(failed["reason"].get<std::string>().find("it differed in"), std::string::npos);
+  EXPECT_NE(failed["joint"], "") << failed;
+  const Outcome longer = tandem("run same.toml --duration 0.5 -q --no-log --json long.json");
+  EXPECT_EQ(longer.status, 1) << longer.err;
+  EXPECT_NE(json("long.json")["expectations"][0].dump().find("; the log has it from 0 s to"),
+            std::string::npos);
+  refused("[[expect]]\nsignal = \"position(joint1)\"\nas_in = \"bad.mcap\"\nwithin = \"1mrad\"\n",
+          "bad.mcap");
+  refused("[[expect]]\nsignal = \"position(joint9)\"\nas_in = \"good.mcap\"\nwithin = \"1mrad\"\n",
+          "joint1");
+  refused("[[expect]]\nsignal = \"position(joint1)\"\nas_in = \"good.mcap\"\nwithin = \"1mm\"\n",
+          "within");
+  refused("[[expect]]\nsignal = \"position(joint1)\"\nas_in = \"good.mcap\"\n", "within");
+}
+
+TEST_F(ScenarioRun, AnOptionalEventThatDidNotComeSaysSo) {
+  scenario("maybe",
+           "[[event]]\nname = \"maybe\"\nwhen = \"time() > 100s\"\noptional = true\n"
+           "ask = { do = \"run.stop\" }\n");
+  const Outcome run = tandem("run maybe.toml --duration 0.1 --no-log --json maybe.json");
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(json("maybe.json")["expectations"][0]["reason"], "did not come (optional)");
+  const Outcome suite = tandem("test maybe.toml");  // without [[expect]]
+  EXPECT_EQ(suite.status, 0) << suite.err;
+  const Outcome check = tandem("check maybe.toml");
+  EXPECT_NE(check.out.find("maybe: asks for"), std::string::npos) << check.out;
+}
+
 TEST_F(ScenarioRun, FindsWhatIsWrongBeforeAnythingMoves) {
   const std::string row = "[[event]]\nat_s = 1.0\n";
   refused(row + "ask = { do = \"controler.set\" }\n", "did you mean 'controller.set'?");
@@ -146,6 +196,10 @@ TEST_F(ScenarioRun, FindsWhatIsWrongBeforeAnythingMoves) {
   refused("[[push]]\nlink = \"link2\"\nforce_N = [1, 0, 0]\noptional = true\n", "without `when`");
   refused("[[fault]]\nkind = \"board_duplicate\"\nboard = \"board_1\"\nwhen = \"time() > 1s\"\n",
           "has to be there when the robot is made");
+  refused(
+      "[[event]]\nname = \"a\"\nat_s = 1.0\nask = { do = \"run.stop\" }\n"
+      "[[push]]\nname = \"a\"\nlink = \"link2\"\nforce_N = [1, 0, 0]\n",
+      "two events are called 'a'");
   refused("[[push]]\nlink = \"link9\"\nforce_N = [1, 0, 0]\n", "no link 'link9'");
 }
 

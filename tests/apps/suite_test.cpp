@@ -86,12 +86,12 @@ TEST_F(Suite, OneThatCrashesCostsThatOne) {
   EXPECT_NE(tests["suite/crashes.toml"]["reason"].dump().find("rash"), std::string::npos)
       << tests["suite/crashes.toml"]["reason"];
   EXPECT_NE(tests["suite/broken.toml"]["reason"].dump().find("not valid TOML"), std::string::npos);
-  EXPECT_EQ(tests["suite/hold.toml"]["reason"], "it has no [[expect]]");
+  EXPECT_EQ(tests["suite/hold.toml"]["reason"], "it has no [[expect]], and nothing happens in it");
   EXPECT_TRUE(tests["suite/hold.toml"]["passed"].is_null());
   EXPECT_FALSE(tests.contains("suite/robot.toml")) << "it is no experiment";
   const std::string xml = read_text(folder_ / "out/suite.xml");
   EXPECT_NE(xml.find("<failure message=\"failed, it never held"), std::string::npos) << xml;
-  EXPECT_NE(xml.find("<skipped message=\"it has no [[expect]]\"/>"), std::string::npos);
+  EXPECT_NE(xml.find("<skipped message=\"it has no [[expect]], and nothing happens in it\"/>"), std::string::npos);
   EXPECT_EQ(xml.find("message=\"crashed\""), std::string::npos) << "each has ended";
   // The command that repeats it does so.
   const std::string again = tests["suite/bad.toml"]["command"];
@@ -122,7 +122,7 @@ TEST_F(Suite, OfTheBundledRobotsPasses) {
   const Outcome outcome =
       tandem("test --json suite.json " + shell_word(TANDEM_SOURCE_DIR "/config/suite"));
   EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
-  EXPECT_EQ(json("suite.json")["passed"], 6);
+  EXPECT_EQ(json("suite.json")["passed"], 7);
 }
 
 TEST_F(Suite, RefusesWhatIsNoSuite) {

@@ -302,5 +302,25 @@ TEST(Network, RefusesWhatIsNoNetwork) {
   EXPECT_EQ(check({.limit = 0}).error().key, "limit");
 }
 
+TEST(Network, HasAnotherDelayAndLossFromNowOn) {
+  constexpr double kStays = std::numeric_limits<double>::quiet_NaN();
+  constexpr std::int64_t kMs = 1'000'000;
+  Network network({.delay_s = 0.1}, 1, 8);
+  const std::uint64_t one = 1, two = 2, three = 3;
+  EXPECT_TRUE(network.send(0, bytes_of(one)));
+  network.change(0.3, kStays, kStays);
+  EXPECT_TRUE(network.send(kMs, bytes_of(two)));
+  EXPECT_EQ(number_of(network.receive(100 * kMs)), 1U);
+  Archive kept;
+  network.archive(kept);
+  network.change(kStays, kStays, 1.0);
+  EXPECT_FALSE(network.send(101 * kMs, bytes_of(three)));
+  EXPECT_TRUE(network.receive(300 * kMs).empty());
+  EXPECT_EQ(number_of(network.receive(301 * kMs)), 2U);
+  Archive load(kept.bytes());  // time goes back
+  network.archive(load);
+  EXPECT_TRUE(network.send(101 * kMs, bytes_of(three)));
+}
+
 }  // namespace
 }  // namespace tandem::remote
