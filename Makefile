@@ -77,6 +77,7 @@ test-all:
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
 	@TANDEM_MOTION_COMMANDS=20000 build/release/bin/motion_bounds_test
 	@TANDEM_CLOCK_SEQUENCES=20000 build/release/bin/runtime_test --gtest_filter='ClockSequences.*'
+	@TANDEM_TRAVELS=100 TANDEM_SNAPSHOT_CYCLES=3000 build/release/bin/time_machine_test --gtest_brief=1
 	@TANDEM_TELEOPERATION=build/teleoperation.txt build/release/bin/teleoperation_test --gtest_filter='*Table*' --gtest_brief=1
 	@TANDEM_HIL_SECONDS=30 tests/hil/run build/release/bin/hil_test --gtest_filter='*HilLockstep*:HilTwin*'
 	@scripts/test-anywhere --paths

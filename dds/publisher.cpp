@@ -101,6 +101,10 @@ void Publisher::take(const hal::CycleView& view) noexcept TANDEM_RT {
 void Publisher::copy_due(const hal::CycleView& view, std::uint64_t number) noexcept TANDEM_RT {
   // Time that went back may stand there: then every topic has that moment, whatever its rate.
   const bool back = view.time.cycle < std::exchange(cycle_, view.time.cycle);
+  if (back) {
+    back_ns_.store(view.time.time_ns, std::memory_order_relaxed);
+    back_.store(number, std::memory_order_release);
+  }
   std::uint32_t due = 0;
   for (std::size_t t = 0; t < kTopics; ++t) {
     if (every_[t] != 0 && (back || view.time.cycle % every_[t] == 0)) due |= 1U << t;
@@ -176,6 +180,11 @@ void Publisher::count_times(std::uint64_t up_to) {
 void Publisher::publish(std::span<const std::byte> slot) {
   Head head{};
   std::memcpy(&head, slot.data(), sizeof(head));
+  count_times(head.number);
+  topics_->set_dropped(image_ring_.dropped());
+  // It waited, and its future does not come: its stamps would be ahead of the clock.
+  const bool before = head.number < back_.load(std::memory_order_acquire);
+  if (before && head.time.time_ns > back_ns_.load(std::memory_order_relaxed)) return;
   const auto copy = [&](std::span<std::byte> bytes, std::size_t at) {
     std::memcpy(bytes.data(), slot.data() + at, bytes.size());
   };
@@ -183,8 +192,6 @@ void Publisher::publish(std::span<const std::byte> slot) {
   if ((head.due & kNeedsCommand) != 0) copy(command_.bytes(), command_at_);
   if (head.truth) copy(truth_->bytes(), truth_at_);
   if (head.estimate) copy(estimate_->bytes(), estimate_at_);
-  count_times(head.number);
-  topics_->set_dropped(image_ring_.dropped());
   topics_->publish({.time = head.time,
                     .phase = head.phase,
                     .read_code = head.read_code,

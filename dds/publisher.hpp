@@ -79,6 +79,9 @@ class Publisher final : public hal::CycleObserver {
   std::uint64_t cycle_ = 0;  // the loop's: of its last cycle
 
   std::atomic<std::int64_t> newest_ns_{0};  // of take()'s last cycle
+  // Where time went back last, and by which of take()'s calls: what waited is not published.
+  std::atomic<std::int64_t> back_ns_{0};
+  std::atomic<std::uint64_t> back_{0};
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

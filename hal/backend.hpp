@@ -137,6 +137,10 @@ class Backend {
   /// Who takes something of other threads does so by this from now on; it outlives the cycles.
   virtual void heed(Outside& /*outside*/) noexcept {}
 
+  /// Between two cycles: what other threads have given for the next one is dropped.
+  /// @return how much
+  virtual std::size_t forget_waiting() noexcept { return 0; }
+
   /// Writes or reads everything that the next read() depends on. Simulation only: a backend
   /// whose robot cannot be rewound answers false.
   [[nodiscard]] virtual bool archive(Archive& ar) = 0;

@@ -64,6 +64,7 @@ class ForwardingBackend : public Backend {
     return to_->next_injected();
   }
   void heed(Outside& outside) noexcept override { to_->heed(outside); }
+  std::size_t forget_waiting() noexcept override { return to_->forget_waiting(); }
   [[nodiscard]] bool archive(Archive& ar) override { return to_->archive(ar); }
 
  protected:

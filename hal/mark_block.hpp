@@ -116,8 +116,11 @@ class MarkBlock {
     to.fill('\0');
     std::copy_n(text.begin(), std::min(text.size(), to.size()), to.begin());
   }
+  /// What is read is shown, too.
   void archive(Archive& ar) {
-    if (!declared_.empty()) ar.raw(&state_, sizeof state_);
+    if (declared_.empty()) return;
+    ar.raw(&state_, sizeof state_);
+    if (ar.reading() && shown_ != nullptr) shown_->write(std::span(&state_, 1));
   }
 
  private:

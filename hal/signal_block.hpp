@@ -90,8 +90,12 @@ class SignalBlock {
   [[nodiscard]] std::span<const std::byte> image() const noexcept TANDEM_RT {
     return std::as_bytes(words());
   }
-  /// A signal keeps its number until another is written.
-  void archive(Archive& ar) { ar.raw(words_.data(), words().size_bytes()); }
+  /// A signal keeps its number until another is written. What is read is shown, too: nobody sees
+  /// the numbers of another future.
+  void archive(Archive& ar) {
+    ar.raw(words_.data(), words().size_bytes());
+    if (ar.reading() && shown_ != nullptr) shown_->write(words());
+  }
 
  private:
   static constexpr std::size_t kHead = 2;

@@ -43,6 +43,7 @@ struct CommandRecord {
   hal::Phase phase = hal::Phase::kBringUp;  ///< of the first robot after read()
   bool written = false;                     ///< write(command, gains) was called
   bool shut_down = false;                   ///< shut_down() was called instead
+  bool again = false;                       ///< it has been, and is played again: nothing is logged
   bool new_gains = true;                    ///< `gains` are not those of the record before
   std::size_t calls_made = 0;
   std::size_t calls_before = 0;  ///< of them: made before read(), after the last cycle's write()

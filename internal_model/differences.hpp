@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "base/archive.hpp"
 #include "hal/image.hpp"
 
 namespace tandem::internal_model {
@@ -54,6 +55,10 @@ class Differences {
   }
   [[nodiscard]] const SignalDifference* base_angle_rad() const noexcept {
     return bases_ ? &base_angle_rad_ : nullptr;
+  }
+  void archive(Archive& ar) {
+    ar(joints_, channels_, base_position_m_, base_angle_rad_, bases_);
+    ar(compared_, cycles_, unequal_, first_unequal_);
   }
   /// The root of the mean square of one of them.
   [[nodiscard]] double rms(const SignalDifference& one) const noexcept;

@@ -4,6 +4,8 @@
 #include <chrono>
 #include <thread>
 
+#include "base/archive.hpp"
+
 namespace tandem::internal_model {
 
 DuplicatingBackend::DuplicatingBackend(hal::Backend& first, CommandTape& tape, std::size_t joints,
@@ -12,12 +14,24 @@ DuplicatingBackend::DuplicatingBackend(hal::Backend& first, CommandTape& tape, s
     : ForwardingBackend(first), tape_(&tape), done_(&done), truth_(truth), revisions_(joints) {}
 
 void DuplicatingBackend::exchange(const hal::CycleTime& time) noexcept {
-  if (to().pace() == hal::Pace::kSimulatedClock) {
-    while (cycles_ - done_->load(std::memory_order_acquire) >= kMostBehind) {
-      std::this_thread::sleep_for(std::chrono::microseconds(50));
-    }
-  }
+  if (to().pace() == hal::Pace::kSimulatedClock) wait_for_second(kMostBehind - 1);
   to().exchange(time);
+}
+
+void DuplicatingBackend::wait_for_second(std::uint64_t most_behind) const noexcept {
+  while (cycles_ - done_->load(std::memory_order_acquire) > most_behind) {
+    std::this_thread::sleep_for(std::chrono::microseconds(50));
+  }
+}
+
+/// Records count on, whatever the time: they are the tape's.
+bool DuplicatingBackend::archive(Archive& ar) {
+  if (!second_ || !to().archive(ar)) return false;
+  wait_for_second(0);
+  ar(late_calls_, late_);
+  late_calls_ = std::min(late_calls_, late_.size());  // bytes of something else
+  if (ar.reading()) gains_known_ = false;
+  return second_(ar);
 }
 
 Code DuplicatingBackend::read(const hal::CycleTime& time,
@@ -30,6 +44,7 @@ Code DuplicatingBackend::read(const hal::CycleTime& time,
   record.number = cycles_;
   record.time = time;
   record.phase = to().phase();
+  record.again = outside_ != nullptr && outside_->closed;
   record.written = record.shut_down = record.new_gains = false;
   record.calls_made = record.calls_before = late_calls_;
   std::copy_n(late_.begin(), late_calls_, record.calls.begin());

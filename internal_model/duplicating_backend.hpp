@@ -6,7 +6,9 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hal/forwarding_backend.hpp"
@@ -45,13 +47,22 @@ class DuplicatingBackend final : public hal::ForwardingBackend {
   bool home(std::size_t joint) noexcept TANDEM_RT override;
   void stop_homing(std::size_t joint) noexcept TANDEM_RT override;
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
-  /// Returns false: of the two robots one is on another thread.
-  [[nodiscard]] bool archive(Archive&) override { return false; }
+  void heed(hal::Outside& outside) noexcept override {
+    outside_ = &outside;
+    to().heed(outside);
+  }
+  /// Both robots, where the first can be rewound: waits for the second, whose thread stands then.
+  [[nodiscard]] bool archive(Archive& ar) override;
+  /// How the second writes itself down, or reads itself; false: it cannot. Before the first cycle.
+  void archive_second_by(std::function<bool(Archive&)> archive) { second_ = std::move(archive); }
 
  private:
   void note(const BackendCall& call) noexcept TANDEM_RT;
   void end_record() noexcept TANDEM_RT;
+  void wait_for_second(std::uint64_t most_behind) const noexcept;
 
+  std::function<bool(Archive&)> second_;
+  const hal::Outside* outside_ = nullptr;
   CommandTape* tape_;
   const std::atomic<std::uint64_t>* done_;
   const hal::TruthImage* truth_;

@@ -36,6 +36,7 @@ ParallelRobot::ParallelRobot(const ParallelParts& parts, const hal::ImageShape& 
       gains_(gains),
       differences_(shape),
       shown_{Shown(nothing(shape, parts.truth)), Shown(nothing(shape, parts.truth))} {
+  if (all_counts_) backend_.archive_second_by([this](Archive& ar) { return archive(ar); });
   if (recorder_ == nullptr) return;
   state_channel_ =
       recorder_->add_channel("/tandem/parallel/state", "tandem/msg/State", state_.layout());
@@ -57,6 +58,33 @@ ParallelResult ParallelRobot::finish() {
   if (thread_.joinable()) thread_.join();
   result_.missed = tape_.dropped();
   return result_;
+}
+
+/// The loop's, which waits for it: the thread has emptied the tape.
+bool ParallelRobot::archive(Archive& ar) {
+  while (snapshot_pending()) std::this_thread::sleep_for(kPoll);  // the thread reads the robot
+  if (!second_->archive(ar)) return false;
+  ar(state_, last_time_, diverged_, differences_, result_.cycles);
+  bool stopped = !result_.fault.empty();
+  ar(stopped);
+  if (!stopped) result_.fault.clear();
+  if (stopped && result_.fault.empty()) result_.fault = second_->status_text();
+  if (ar.reading()) show_again();
+  return true;
+}
+
+/// As it is at a moment to which time went back; how far the two are apart, the next cycle says.
+void ParallelRobot::show_again() {
+  for (Shown& one : shown_) {
+    hal::ParallelView& view = one.back();
+    view.state.assign(state_);
+    if (truth_ != nullptr) view.truth->assign(*truth_);
+    for (auto* apart : {&view.position_rad, &view.velocity_rad_s, &view.torque_Nm}) {
+      std::ranges::fill(*apart, 0.0);
+    }
+    view.behind_cycles = 0;
+    one.publish();
+  }
 }
 
 const hal::ParallelView* ParallelRobot::Shown::newest() noexcept {
@@ -109,7 +137,7 @@ void ParallelRobot::play(const CommandRecord& record) {
     differences_.take(record.state, state_);
     compare_bases(record);
   }
-  log(record.time.time_ns);
+  if (!record.again) log(record.time.time_ns);
   show(record);
 }
 

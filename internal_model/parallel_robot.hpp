@@ -50,7 +50,7 @@ enum class ParallelReader : std::uint8_t { kDds, kStudio, kCount };
 
 /// Plays the first robot's tape to the second, on a thread of its own, cycle by cycle and call by
 /// call, from power-on: two equal robots stay equal to the last bit. When the second is late, it is
-/// late alone.
+/// late alone. Where the run goes back in time, it does, and what it is compared by.
 class ParallelRobot {
  public:
   /// Adds its channels to the recorder.
@@ -102,6 +102,7 @@ class ParallelRobot {
     bool any_ = false;  // the reader's
   };
 
+  [[nodiscard]] bool archive(Archive& ar);
   void run();
   void play(const CommandRecord& record);
   void make_up(const CommandRecord& record);
@@ -112,6 +113,7 @@ class ParallelRobot {
   void take_snapshot();
   void log(std::int64_t time_ns);
   void show(const CommandRecord& record);
+  void show_again();
   void fill(hal::ParallelView& view, const CommandRecord& record) const;
 
   hal::Backend* second_;

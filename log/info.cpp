@@ -47,6 +47,8 @@ StringMap to_map(const RunInfo& info) {
   for (const std::string& one : info.controllers) controllers += one + "\n";
   std::string parameters;
   for (const std::string& one : info.parameters) parameters += one + "\n";
+  std::string active;
+  for (const std::string& one : info.active) active += one + "\n";
   std::string options;
   for (const std::string& one : info.options) options += one + "\n";
   std::string plant;
@@ -57,6 +59,7 @@ StringMap to_map(const RunInfo& info) {
                                    {"kernel_sha256", &info.kernel_sha256},
                                    {"controllers", &std::as_const(controllers)},
                                    {"parameters", &std::as_const(parameters)},
+                                   {"active_controllers", &std::as_const(active)},
                                    {"options", &std::as_const(options)},
                                    {"plant", &std::as_const(plant)}}) {
     if (!value->empty()) map.emplace_back(key, *value);
@@ -104,6 +107,7 @@ RunInfo info_from(const StringMap& map) {
   info.kernel_sha256 = value_of(map, "kernel_sha256");
   info.controllers = lines_of(value_of(map, "controllers"));
   info.parameters = lines_of(value_of(map, "parameters"));
+  info.active = lines_of(value_of(map, "active_controllers"));
   info.options = lines_of(value_of(map, "options"));
   info.plant = lines_of(value_of(map, "plant"));
   return info;

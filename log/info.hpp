@@ -51,6 +51,7 @@ struct RunInfo {
   std::vector<std::string>
       controllers{};  ///< "NAME SHA256 PATH" at the start; without a library "NAME - -"
   std::vector<std::string> parameters{};  ///< "NAME.PARAMETER = VALUE" at the start
+  std::vector<std::string> active{};      ///< of a branch: controllers that lead as it begins
   /// "KEY = VALUE" of the experiment as the run went by them, whoever said them; empty: a log of an
   /// earlier version, which has no /tandem/given either.
   std::vector<std::string> options{};

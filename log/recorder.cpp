@@ -209,15 +209,16 @@ bool Recorder::push(const Event& event, const hal::LimitMet& met) noexcept TANDE
 }
 
 void Recorder::branch(const Branch& from) noexcept {
-  if (parameters_) {
-    std::vector<std::string> now = parameters_();
+  if (beginning_) {
+    Beginning now = beginning_();
     const std::lock_guard lock(attached_mutex_);
-    branch_parameters_.push_back(std::move(now));
+    beginnings_.push_back(std::move(now));
   }
   wait_for_space(1);
   const std::uint64_t numbers[]{from.cycle, from.snapshot};
   const auto begin_ns = static_cast<std::int64_t>(from.cycle) * info_.period_ns;
   (void)push(kBranchChannel, begin_ns, std::as_bytes(std::span(numbers)));
+  if (side_ != nullptr) wait_for_space(ring_->capacity());  // what the side pushes now is the new's
 }
 
 void Recorder::attach(std::string name, std::int64_t time_ns, Bytes data) {
@@ -252,6 +253,7 @@ void Recorder::run() {
         std::memcpy(&from.cycle, slot.data() + sizeof head, sizeof from.cycle);
         std::memcpy(&from.snapshot, slot.data() + sizeof head + sizeof from.cycle,
                     sizeof from.snapshot);
+        write_side(std::numeric_limits<std::int64_t>::max());  // of the branch that is left
         next_branch(std::move(from));
       } else if (head.channel == kAttachedChannel) {
         write_attached(head.time_ns);
@@ -401,10 +403,11 @@ void Recorder::next_part() {
 
 /// What was written so far stays as it is: its "result" says where it was left.
 void Recorder::next_branch(Branch from) {
-  if (parameters_) {
+  if (beginning_) {
     const std::lock_guard lock(attached_mutex_);
-    info_.parameters = std::move(branch_parameters_.front());
-    branch_parameters_.pop_front();
+    info_.parameters = std::move(beginnings_.front().parameters);
+    info_.active = std::move(beginnings_.front().active);
+    beginnings_.pop_front();
   }
   if (failed_.load(std::memory_order_relaxed)) return;
   std::error_code ignored;

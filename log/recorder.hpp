@@ -120,11 +120,12 @@ class Recorder {
   void name_payloads(std::function<std::string(std::uint32_t)> name) {
     names_.payload = std::move(name);
   }
-  /// Who knows the controllers' parameters, as RunInfo has them: asked where a branch begins, in
-  /// the thread that calls branch(). Before start().
-  void name_parameters(std::function<std::vector<std::string>()> parameters) {
-    parameters_ = std::move(parameters);
-  }
+  /// What RunInfo says of the moment at which a branch begins.
+  struct Beginning {
+    std::vector<std::string> parameters{}, active{};
+  };
+  /// Who knows it: asked in the thread that calls branch(). Before start().
+  void name_beginnings(std::function<Beginning()> beginning) { beginning_ = std::move(beginning); }
   /// No more channels but late ones: allocates the ring and starts the writer's thread.
   void start();
 
@@ -235,9 +236,9 @@ class Recorder {
     Bytes data;
   };
   std::mutex attached_mutex_;
-  std::deque<Attached> attached_;                           // of which the ring says when
-  std::deque<std::vector<std::string>> branch_parameters_;  // the same of each branch
-  std::function<std::vector<std::string>()> parameters_;    // empty: they stay as they were
+  std::deque<Attached> attached_;         // of which the ring says when
+  std::deque<Beginning> beginnings_;      // the same of each branch
+  std::function<Beginning()> beginning_;  // empty: all stays as it was
   std::mutex late_mutex_;
   std::vector<LateChannel> late_;  // the asking threads'; in the order of their numbers
   std::atomic<bool> failed_{false};

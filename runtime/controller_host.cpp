@@ -335,6 +335,15 @@ std::uint64_t ControllerHost::fingerprint() const noexcept {
   return hash;
 }
 
+std::size_t ControllerHost::forget_waiting() {
+  std::size_t samples = 0;
+  for (const HostedController* one : table_) {
+    if (one == nullptr) continue;
+    for (const auto& port : one->inputs) samples += port->forget_waiting() ? 1 : 0;
+  }
+  return samples;
+}
+
 void ControllerHost::archive(Archive& ar) {
   for (HostedController* one : table_) {
     if (one == nullptr) continue;

@@ -188,6 +188,8 @@ class ControllerHost {
   Slow begin_cycle(std::int64_t late_ns) noexcept TANDEM_RT;
   /// Inputs of everything that is loaded.
   [[nodiscard]] std::size_t inputs() const noexcept TANDEM_RT;
+  /// Between two cycles: samples that wait are refused. @return how many. May block
+  std::size_t forget_waiting();
   /// Before the controllers' calls: the active ones get their newest samples, which go to the log.
   /// @param open  false: they get none
   void take_inputs(const hal::CycleTime& time, bool open, CycleLog& log) noexcept TANDEM_RT;

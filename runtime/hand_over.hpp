@@ -25,6 +25,8 @@ class HandOver {
   void tell(const LimitNote& limit) noexcept TANDEM_RT {
     if (!muted_) limits_.write(limit);
   }
+  /// Time went back to here: nobody reads limits any more that were met after it.
+  void forget_after(std::int64_t time_ns) noexcept { limits_.forget_after(time_ns); }
   /// What tell() was told. Any thread.
   [[nodiscard]] const LimitHistory& limits() const noexcept { return limits_; }
   /// While on, cycles are for the statistics alone. Between two cycles.

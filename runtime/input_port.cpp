@@ -335,6 +335,17 @@ bool InputPort::take(const hal::CycleTime& time, bool open,
   return false;
 }
 
+bool InputPort::forget_waiting() {
+  if (!mail_->feed.refresh()) return false;
+  const std::uint64_t number = mail_->feed.front().number;
+  const std::uint64_t before = mail_->taken.load(std::memory_order_relaxed);
+  mail_->superseded.fetch_add(number - before - 1, std::memory_order_relaxed);
+  note_taken(number, mail_->taken_cycle.load(std::memory_order_relaxed));
+  refuse(fail("time went elsewhere before the cycle that would have taken it", "give it again")
+             .error());
+  return true;
+}
+
 void InputPort::hold(std::span<const double> values) noexcept TANDEM_RT {
   std::ranges::copy(values, block_->value.begin());
 }

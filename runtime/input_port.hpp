@@ -108,6 +108,9 @@ class InputPort {
   /// @return whether a sample arrived
   /// @rt one copy of a sample at most; no search longer than a binary one.
   bool take(const hal::CycleTime& time, bool open, hal::Outside& outside) noexcept TANDEM_RT;
+  /// Between two cycles: a sample that waits is refused, for time went elsewhere.
+  /// @return whether one did. May block
+  bool forget_waiting();
   /// What its message in the log is made of: the cycle, the sequence number, the values.
   [[nodiscard]] std::span<const std::byte> message() noexcept TANDEM_RT;
   void archive(Archive& ar);

@@ -24,7 +24,8 @@ struct Progress {
   std::atomic<std::uint64_t> latched{0};  ///< faults
   std::atomic<std::uint64_t> resets{0};   ///< that were carried out
   std::atomic<std::uint64_t> failed_resets{0};
-  std::atomic<std::uint64_t> travels{0};  ///< how often time went to another moment
+  std::atomic<std::uint64_t> travels{0};    ///< how often time went to another moment
+  std::atomic<std::int64_t> went_to_ns{0};  ///< the time there; stored before `travels`
   /// The cycle after the last one that stopped the robot; 0: none did. Who asks for a reset says by
   /// it which stops they know.
   std::atomic<std::uint64_t> stopped_before{0};

@@ -128,14 +128,20 @@ void RobotCycle::wait() noexcept {
   if (now_.time_machine != nullptr && !now_.outside.closed) {
     if (const auto branch = now_.time_machine->begins(now_.tick.cycle)) now_.log.branch(*branch);
   }
+  if (forgotten_) {
+    forgotten_->cycle = now_.tick.cycle;
+    forgotten_->time_ns = now_.tick.time_ns;
+    now_.log.text(*forgotten_);
+    forgotten_.reset();
+  }
   trace_.begin(now_.tick);
 }
 
 void RobotCycle::await_tick() noexcept {
-  // Four images, a sample of each input, every event that one cycle can bring, and what the
-  // controllers tell.
+  // Four images, a line about time, a sample of each input, every event that one cycle can bring,
+  // and what the controllers tell.
   const std::size_t most =
-      (now_.events != nullptr ? now_.events->size() : 0) + 4 + 12 +
+      (now_.events != nullptr ? now_.events->size() : 0) + 5 + 12 +
       (now_.truth != nullptr ? kMostInjected : 4) + Inbox::kCapacity * kMostParameterChanges +
       ControllerHost::kToldParameters + 4 * now_.watch.joints() + now_.watch.sensors() +
       now_.controllers.inputs() + kMostControllers * (3 + TextEventSlots::kSlots);

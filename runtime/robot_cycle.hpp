@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "hal/text_event.hpp"
 #include "runtime/cycle_requests.hpp"
 #include "runtime/cycle_trace.hpp"
 #include "runtime/hand_over.hpp"
@@ -113,6 +115,10 @@ class RobotCycle {
   void replay(bool on) noexcept;
   /// The last cycle, as its observers saw it.
   [[nodiscard]] hal::CycleView last_view() const noexcept { return shown_.view(); }
+  /// Time went to another moment. What waits for the next cycle was meant for one of another
+  /// future: it is dropped, and whoever waits is told; so are people and the log. What was said
+  /// after this moment is shown no more. May block.
+  void forget_waiting();
   /// Shows the last cycle to all who watch, as its hand-over did.
   void show_again() noexcept;
   /// Whether a cycle has taken something of other threads since this was asked.
@@ -160,8 +166,9 @@ class RobotCycle {
   CycleTrace trace_;
   Heartbeat heartbeat_;
 
-  bool started_ = false;            // the first cycle was
-  bool ends_with_command_ = false;  // controllers wrote in this cycle
+  std::optional<hal::TextEvent> forgotten_;  // for the log, with the next cycle
+  bool started_ = false;                     // the first cycle was
+  bool ends_with_command_ = false;           // controllers wrote in this cycle
   static constexpr std::int32_t kNever = -2;
   struct Limited {
     hal::LimitMet met{};

@@ -1,4 +1,5 @@
 // A run's whole state as bytes, and cycles that are played once more from them.
+#include "base/counted.hpp"
 #include "rt/scoped_realtime.hpp"
 #include "rt/stop_signal.hpp"
 #include "runtime/events.hpp"
@@ -50,8 +51,33 @@ void RobotCycle::show_again() noexcept {
   const std::uint64_t next = now_.loop.next_cycle();
   if (progress.stopped_before.load() > next) progress.stopped_before.store(next);
   shown_.show();
+  progress.went_to_ns.store(now_.time.time_ns, std::memory_order_relaxed);
   progress.travels.fetch_add(1, std::memory_order_release);
   if (now_.observer != nullptr) (void)shown_.show_to(*now_.observer);
+}
+
+void RobotCycle::forget_waiting() {
+  services_.forget_after(now_.time.time_ns);
+  shown_.forget_after(now_.time.time_ns);
+  std::size_t requests = 0;
+  for (; const auto request = now_.inbox.take_request(); ++requests) {
+    now_.inbox.answer(
+        {.number = request->number, .cycle = now_.time.cycle, .reason = RejectReason::kTimeWent});
+  }
+  const std::size_t samples = now_.controllers.forget_waiting();
+  const std::size_t faults = now_.backend.forget_waiting();
+  std::string what;
+  for (const auto& [count, one] :
+       {std::pair{requests, "request"}, {samples, "sample of an input"}, {faults, "fault"}}) {
+    if (count > 0) what += (what.empty() ? "" : ", ") + counted(count, one);
+  }
+  if (what.empty()) return;
+  hal::TextEvent text{.cycle = now_.time.cycle, .time_ns = now_.time.time_ns};
+  text.level = hal::TextLevel::kWarn;
+  text.set_controller("time");
+  text.append("went elsewhere: dropped what waited for the next cycle: " + what);
+  services_.show(text);
+  forgotten_ = text;
 }
 
 bool RobotCycle::is_urgent() const noexcept {

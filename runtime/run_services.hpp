@@ -323,6 +323,8 @@ class RunServices {
   }
   void show(const hal::ParameterImage& gains) noexcept TANDEM_RT { gain_looks_.write(gains.all()); }
   void show(const hal::TextEvent& words) noexcept TANDEM_RT { texts_.write(words); }
+  /// The loop's: time went back to here, and what was said after it is of another future.
+  void forget_after(std::int64_t time_ns) noexcept { texts_.forget_after(time_ns); }
 
  private:
   using Lock = std::unique_lock<std::mutex>;

@@ -40,6 +40,11 @@ class NewestHistory {
     slots_[number % kSlots].write(std::span(&event, 1));
     count_.store(number + 1, std::memory_order_release);
   }
+  /// The writer's: nobody reads any more what was written so far of times after `time_ns`.
+  void forget_after(std::int64_t time_ns) noexcept {
+    forgotten_ns_.store(time_ns, std::memory_order_relaxed);
+    forgotten_.store(count_.load(std::memory_order_relaxed), std::memory_order_release);
+  }
   /// So far.
   [[nodiscard]] std::uint64_t count() const noexcept {
     return count_.load(std::memory_order_acquire);
@@ -48,12 +53,14 @@ class NewestHistory {
   /// @return how many of them are gone
   std::uint64_t read(std::uint64_t& seen, std::vector<T>& out) const {
     const std::uint64_t all = count();
+    const std::uint64_t forgotten = forgotten_.load(std::memory_order_acquire);
+    const std::int64_t forgotten_ns = forgotten_ns_.load(std::memory_order_relaxed);
     std::uint64_t gone = 0;
     for (; seen < all; ++seen) {
       T event;
       const bool read = slots_[seen % kSlots].read(std::span(&event, 1));
       if (read && count() - seen < kSlots) {
-        out.push_back(event);
+        if (seen >= forgotten || event.time_ns <= forgotten_ns) out.push_back(event);
       } else {
         ++gone;
       }
@@ -64,6 +71,8 @@ class NewestHistory {
  private:
   std::deque<Seqlock<T>> slots_;
   std::atomic<std::uint64_t> count_{0};
+  std::atomic<std::uint64_t> forgotten_{0};  // so many of the first, where they are later than
+  std::atomic<std::int64_t> forgotten_ns_{0};
 };
 using TextHistory = NewestHistory<hal::TextEvent>;
 using LimitHistory = NewestHistory<LimitNote>;

@@ -288,6 +288,7 @@ Result<Travel> TimeMachine::serve(RobotCycle& cycle, Request& request) {
 
 /// At another moment, which all who watch are shown.
 void TimeMachine::arrive(RobotCycle& cycle) {
+  cycle.forget_waiting();
   try {
     arrived_ = capture(cycle);
   } catch (const std::bad_alloc&) {

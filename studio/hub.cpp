@@ -78,6 +78,12 @@ void Hub::tick(Clock::time_point now) {
     }
   }
   tell(what_happened(std::move(late)));
+  if (std::exchange(went_back_, false) && controls_ != 0) {
+    // What was asked for was meant for another future. Nothing is halted: what goes on unchanged
+    // has the same bits.
+    if (asker_.drop) asker_.drop(controls_);
+    end_control("has no control any more, for time went back: take it again", false);
+  }
   if (controls_ != 0 && now - alive_ > kAlive) {
     // What the page asked for, and nobody expects any more.
     if (asker_.drop) asker_.drop(controls_);
@@ -107,6 +113,7 @@ std::vector<Event> Hub::what_happened(std::vector<Event> told) {
   std::vector<Event> events;
   if (const auto back = sampler_->take_back()) {
     tell_back(*back);
+    went_back_ = true;
     events.push_back({seconds(back->to_ns), back->cycle, Event::Level::kInfo, "",
                       fmt::format("time went back to {:.6g} s, from {:.6g} s", seconds(back->to_ns),
                                   seconds(back->from_ns))});
@@ -211,19 +218,19 @@ void Hub::tell_control() {
   }
 }
 
-/// Nobody expects a motion any more: what the holder has set going brakes.
-void Hub::end_control(std::string_view why) {
+/// Nobody expects a motion any more: what the holder has set going brakes, if it `halts`.
+void Hub::end_control(std::string_view why, bool halts) {
   const auto holder = clients_.find(controls_);
   const std::string who = holder == clients_.end() ? "who had control" : holder->second.name;
   controls_ = 0;
-  if (asker_.ask) {
+  if (asker_.ask && halts) {
     asker_.ask({.asker = 0,
                 .number = -1,
                 .text = R"({"do": "joint.halt"})",
                 .rights = {.token = true, .control = true}});
   }
   tell({{seconds(sampler_->time_ns()), sampler_->cycle(), Event::Level::kWarn, "",
-         who + " " + std::string(why) + ": every joint that it moved is halted"}});
+         who + " " + std::string(why) + (halts ? ": every joint that it moved is halted" : "")}});
   tell_control();
 }
 

@@ -98,7 +98,7 @@ class Hub final : public Protocol {
   [[nodiscard]] bool all_known(Client& client, const apps::Json& list, std::size_t most,
                                std::vector<SignalId>& signals);
   void tell_control();
-  void end_control(std::string_view why);
+  void end_control(std::string_view why, bool halts = true);
   void tell(const std::vector<Event>& events);
   void tell_back(const TimeBack& back);
   [[nodiscard]] std::vector<Event> what_happened(std::vector<Event> told);
@@ -118,6 +118,7 @@ class Hub final : public Protocol {
   int late_ticks_ = 0;  // that may still bring events of a time that was taken back
   std::map<std::string, Watched> watched_;
   ClientNumber controls_ = 0;  // 0: nobody
+  bool went_back_ = false;     // time did, in this tick
   Clock::time_point alive_;
   bool stands_ = false;
   bool ended_ = false;

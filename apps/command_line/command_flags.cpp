@@ -165,6 +165,36 @@ std::optional<std::int64_t> whole_number(const std::string& text) {
   return error == std::errc() && last == end ? std::optional(number) : std::nullopt;
 }
 
+/// Memory, as "512MB" or "0.5GB"; the text becomes its number of bytes.
+CLI::Validator a_memory_size() {
+  const auto read = [](std::string& text) -> std::string {
+    constexpr double kMost = 1e12;
+    double number = -1.0;
+    const char* end = text.data() + text.size();
+    const auto [last, error] = std::from_chars(text.data(), end, number);
+    const std::string unit = CLI::detail::to_lower(CLI::detail::trim_copy({last, end}));
+    double bytes = std::numeric_limits<double>::quiet_NaN();
+    for (const auto& [name, size] : {std::pair{"", 1.0},
+                                     {"b", 1.0},
+                                     {"kb", 1e3},
+                                     {"mb", 1e6},
+                                     {"gb", 1e9},
+                                     {"kib", 1024.0},
+                                     {"mib", 1048576.0},
+                                     {"gib", 1073741824.0}}) {
+      if (unit == name) bytes = number * size;
+    }
+    if (error != std::errc() || !(bytes >= 0.0 && bytes <= kMost)) {
+      return "'" + text +
+             "' is no memory: give 0, or a number with kB, MB or GB, as 512MB or "
+             "0.5GB, up to 1000GB";
+    }
+    text = std::to_string(std::llround(bytes));
+    return "";
+  };
+  return {read, "0, 512MB, 0.5GB"};
+}
+
 /// What `run` and `serve` share.
 void add_loop_flags(CLI::App& app, RunOptions& o) {
   CLI::Option* rate = app.add_option("--rate", o.rate,
@@ -178,7 +208,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
          "--checkpoints", o.checkpoints_bytes,
          "Memory for going back in time (tandem clock rewind), as 512MB. Without it 64MB, once "
          "the run is paced or paused, has a studio, or gets a clock command")
-      ->transform(CLI::AsSizeValue(true))
+      ->transform(a_memory_size())
       ->option_text("SIZE");
   app.add_option("--from", o.from,
                  "Go on from a moment of a simulated run's log, which keeps its state every 5 s")

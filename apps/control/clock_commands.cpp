@@ -169,7 +169,6 @@ struct Clock {
   }
 
   [[nodiscard]] Result<runtime::CycleCondition> condition(const Json& request) const {
-    if (const Status may = may_go_back(); !may) return std::unexpected(may.error());
     if (!past.condition) return fail("no condition can be asked here", "use tandem clock goto");
     auto read = past.condition(request["condition"].get<std::string>());
     if (!read && read.error().key.empty()) read.error().key = "condition";
@@ -177,12 +176,18 @@ struct Clock {
   }
 
   [[nodiscard]] Result<Json> back_until(const Json& request) const {
+    if (const Status may = may_go_back(); !may) return std::unexpected(may.error());
     auto holds = condition(request);
     if (!holds) return std::unexpected(holds.error());
     return arrived(past.machine->back_until(cycle, std::move(*holds)));
   }
 
   [[nodiscard]] Result<Json> until(const Json& request) const {
+    if (past.machine == nullptr) {
+      return fail(
+          "conditions are looked at where time can go back, and here it cannot: " + past.why_not,
+          "go on to a time: tandem clock step --to TIME; or ask a simulation in one process");
+    }
     auto holds = condition(request);
     if (!holds) return std::unexpected(holds.error());
     return answer(past.machine->until(cycle, std::move(*holds)));

@@ -98,7 +98,7 @@ class FaultNotes {
     const runtime::Progress& progress = cycle.progress();
     const std::uint64_t travels = progress.travels.load(std::memory_order_acquire);
     if (std::exchange(travels_, travels) == travels) return;
-    const double now_s = 1e-9 * static_cast<double>(progress.time_ns.load());
+    const double now_s = 1e-9 * static_cast<double>(progress.went_to_ns.load());
     const std::vector<runtime::FaultReport> faults = cycle.faults();
     const auto before = static_cast<std::size_t>(
         std::ranges::count_if(faults, [&](const auto& one) { return one.time_s <= now_s; }));

@@ -9,18 +9,6 @@
 namespace tandem::apps {
 namespace {
 
-/// Why the run cannot go back; empty: it can.
-std::string obstacle(const runtime::Composition& c) {
-  if (c.backend->pace() != hal::Pace::kSimulatedClock) return "its time is real";
-  if (c.sim == nullptr) return "its boards are in another process";
-  if (c.owner != nullptr) return "another process may own its robot";
-  if (c.parallel != nullptr) return "the second robot of [parallel] would not go with it";
-  if (c.predictor != nullptr && c.predictor->is_prepared()) {
-    return "a controller acts on predictions, which are not kept";
-  }
-  return {};
-}
-
 Result<runtime::Condition> read_condition(const runtime::Composition& c,
                                           const runtime::RobotCycle& cycle,
                                           runtime::RunServices& services, const std::string& text) {
@@ -41,7 +29,7 @@ Result<runtime::Condition> read_condition(const runtime::Composition& c,
 }  // namespace
 
 Past::Past(const runtime::Composition& composition, const RunOptions& options)
-    : c_(composition), why_not_(obstacle(composition)) {
+    : c_(composition), why_not_(runtime::why_no_past(composition)) {
   if (!why_not_.empty()) return;
   const rt::CyclicLoopConfig& loop = composition.experiment.loop;
   const bool useful = options.rate.value_or(loop.rate) > 0.0 || options.start_paused ||

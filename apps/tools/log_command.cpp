@@ -170,6 +170,7 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
   facts.add("kernels", info.kernel_variant);
   if (!info.kernel_sha256.empty()) facts.add("kernels sha256", info.kernel_sha256);
   for (const std::string& controller : info.controllers) facts.add("controller", controller);
+  for (const std::string& name : info.active) facts.add("active as it begins", name);
   for (const std::string& parameter : info.parameters) facts.add("parameter", parameter);
   facts.add("written by", "tandem " + info.version);
   if (!info.host.empty()) facts.add("on", info.host);

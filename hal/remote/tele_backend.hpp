@@ -38,6 +38,8 @@ class TeleBackend final : public OperatorEnd {
   [[nodiscard]] Code write(const hal::CommandImage& command,
                            const hal::ParameterImage& parameters) noexcept TANDEM_RT override;
   bool set_link(const hal::LinkChange& change) noexcept TANDEM_RT override;
+  void heed(hal::Outside& outside) noexcept override { robot_->heed(outside); }
+  std::size_t forget_waiting() noexcept override { return robot_->forget_waiting(); }
   [[nodiscard]] bool archive(Archive& ar) override;
 
   [[nodiscard]] TeleFigures figures() const noexcept override;

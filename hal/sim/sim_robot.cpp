@@ -92,6 +92,12 @@ bool SimRobot::post(const ScenarioFault& fault) {
   return true;
 }
 
+std::size_t SimRobot::forget_waiting() noexcept {
+  std::size_t faults = 0;
+  for (; !posted_.front().empty(); ++faults) posted_.pop();
+  return faults;
+}
+
 hal::InjectedFault SimRobot::next_injected() noexcept TANDEM_RT { return robot_->next_injected(); }
 
 bool SimRobot::archive(Archive& ar) {

@@ -30,6 +30,7 @@ class SimRobot final : public hal::can::DriveBackend {
                           hal::StateImage& state) noexcept TANDEM_RT override;
   [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override;
   void heed(hal::Outside& outside) noexcept override { outside_ = &outside; }
+  std::size_t forget_waiting() noexcept override;
   [[nodiscard]] bool archive(Archive& ar) override;
 
   /// The true state at the last read(), when `truth` was asked for.

@@ -77,6 +77,9 @@ struct Composition {
 /// What the cycle may show of the plant: null where nothing is simulated here, or it is not wanted.
 [[nodiscard]] const hal::TruthImage* truth_of(const Composition& c);
 
+/// Why the run of what is composed and connected cannot go back in time; empty: it can.
+[[nodiscard]] std::string why_no_past(const Composition& c);
+
 /// Where the joints stand when the run starts, as far as the experiment says.
 [[nodiscard]] std::vector<double> start_of(const Experiment& e);
 

@@ -105,6 +105,16 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
 
 }  // namespace
 
+std::string why_no_past(const Composition& c) {
+  if (c.backend->pace() != hal::Pace::kSimulatedClock) return "its time is real";
+  if (c.sim == nullptr) return "its boards are in another process";
+  if (c.owner != nullptr) return "another process may own its robot";
+  if (c.predictor != nullptr && c.predictor->is_prepared()) {
+    return "a controller acts on predictions, which are not kept";
+  }
+  return {};
+}
+
 std::expected<std::unique_ptr<Run>, Diagnostics> Run::open(const std::string& experiment,
                                                            const Overrides& overrides,
                                                            const RunParts& parts,

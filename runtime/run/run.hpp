@@ -86,6 +86,8 @@ class Run {
   /// What the experiment lets happen; null: nothing, or at known times alone. Requests among it are
   /// refused unless the caller says who carries them out, before the first cycle.
   [[nodiscard]] Events* events() noexcept { return c_->events.get(); }
+  /// Why save() and restore() of the cycle are not the whole of it; empty: they are.
+  [[nodiscard]] std::string why_no_past() const { return runtime::why_no_past(*c_); }
   /// Faults, statistics, requests, save() and restore().
   [[nodiscard]] RobotCycle& cycle() noexcept { return *cycle_; }
   [[nodiscard]] const RobotCycle& cycle() const noexcept { return *cycle_; }

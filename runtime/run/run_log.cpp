@@ -57,13 +57,17 @@ void add_parameters(const HostedController& one, std::vector<std::string>& lines
   }
 }
 
-/// As they are in force; in the loop's thread.
-std::vector<std::string> parameters_now(const ControllerHost& host) {
-  std::vector<std::string> lines;
-  for (const HostedController* one : host.loaded()) {
-    if (one != nullptr) add_parameters(*one, lines);
+/// Parameters as they are in force, and who leads; in the loop's thread.
+log::Recorder::Beginning as_now(const ControllerHost& host) {
+  log::Recorder::Beginning now;
+  const ControllerSet active = host.shown().active;
+  const ControllerHost::Table& loaded = host.loaded();
+  for (std::size_t slot = 0; slot < loaded.size(); ++slot) {
+    if (loaded[slot] == nullptr) continue;
+    add_parameters(*loaded[slot], now.parameters);
+    if ((active & only(slot)) != 0) now.active.push_back(loaded[slot]->name);
   }
-  return lines;
+  return now;
 }
 
 log::RunInfo info_of(const Composition& c) {
@@ -356,7 +360,7 @@ Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std:
   info.branch = branch;
   auto recorder = log::Recorder::open(std::move(file), path, info, options);
   if (recorder) {
-    (*recorder)->name_parameters([host = c.controllers.get()] { return parameters_now(*host); });
+    (*recorder)->name_beginnings([host = c.controllers.get()] { return as_now(*host); });
   }
   if (recorder && c.sim != nullptr) {
     (*recorder)->name_pushes([names = c.experiment.pushes](std::uint32_t number) {

@@ -27,6 +27,15 @@ TEST_F(RefusedFlags, SeedsBeyondThoseOfAnExperiment) {
             0);
 }
 
+TEST_F(RefusedFlags, MemoryThatIsNone) {
+  for (const char* size : {"-1MB", "much", "5 parrots", "nan", "2000GB"}) {
+    refused("run hold.toml --no-log --checkpoints='" + std::string(size) + "'",
+            "'" + std::string(size) + "' is no memory: give 0, or a number with kB, MB or GB");
+  }
+  const std::string run = "run hold.toml --no-log --no-socket -q --duration 0.01 --checkpoints ";
+  EXPECT_EQ(tandem(run + "0.5GB").status, 0);  // it was refused
+}
+
 TEST_F(RefusedFlags, AReportWithoutALog) {
   refused("run hold.toml --no-log --report", "--no-log excludes --report");
 }

@@ -70,6 +70,27 @@ TEST(Publisher, DropsAndCountsWhatItsThreadIsTooSlowFor) {
   EXPECT_EQ(told, counts.dropped);
 }
 
+// Samples that waited were published behind the jump, with stamps that did not come yet.
+TEST(Publisher, PublishesNothingOfAFutureThatWasForgotten) {
+  PublisherRig rig;
+  auto states = rig.reader<tandem_msgs::State>("tandem/state");
+  auto clock = rig.reader<rosgraph_msgs::Clock>("clock");
+  rig.show_all(0, 301);
+  rig.show(105);
+  rig.show_all(106, 121);
+  rig.start();
+  std::vector<std::uint64_t> cycles;
+  const auto take = [&] {
+    states.take([&](const tandem_msgs::State& s, const auto&) { cycles.push_back(s.cycle); });
+  };
+  EXPECT_TRUE(eventually([&] { return take(), !cycles.empty() && cycles.back() == 120; }));
+  (void)rig.publisher->stop();
+  EXPECT_EQ(cycles, (std::vector<std::uint64_t>{0, 10, 20, 30, 40, 50, 60, 70, 80, 90, 100, 105,
+                                                110, 120}));
+  clock.take(
+      [&](const rosgraph_msgs::Clock& c, const auto&) { EXPECT_LE(ns(c.clock), 120'000'000); });
+}
+
 TEST(Publisher, TakesACycleWithoutHeapLockOrSystemCall) {
   PublisherRig rig;
   rig.start();

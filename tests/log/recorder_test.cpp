@@ -191,7 +191,7 @@ TEST(Recorder, CountsWhatIsLostWhenItsFileIsCut) {
 }
 
 // It said what the run had begun with.
-TEST(Recorder, ABranchHasTheParametersOfItsBegin) {
+TEST(Recorder, ABranchHasTheParametersAndControllersOfItsBegin) {
   const ScratchFolder folder;
   const std::string path = folder / "run.mcap";
   RunInfo info = run_info();
@@ -199,7 +199,9 @@ TEST(Recorder, ABranchHasTheParametersOfItsBegin) {
   auto recorder = Recorder::open(path, info, {});
   ASSERT_TRUE(recorder);
   std::string depth = "2";
-  (*recorder)->name_parameters([&] { return std::vector{"squat.depth = " + depth}; });
+  (*recorder)->name_beginnings([&] {
+    return Recorder::Beginning{.parameters = {"squat.depth = " + depth}, .active = {"rest"}};
+  });
   (*recorder)->start();
   (*recorder)->branch({.cycle = 3});
   depth = "5";
@@ -212,6 +214,9 @@ TEST(Recorder, ABranchHasTheParametersOfItsBegin) {
   EXPECT_EQ(parameters("run.mcap"), std::vector<std::string>{"squat.depth = 1"});
   EXPECT_EQ(parameters("run.branch-2.mcap"), std::vector<std::string>{"squat.depth = 2"});
   EXPECT_EQ(parameters("run.branch-3.mcap"), std::vector<std::string>{"squat.depth = 5"});
+  const auto branch = LogFile::open(folder / "run.branch-2.mcap");
+  ASSERT_TRUE(branch);
+  EXPECT_EQ(branch->info().active, std::vector<std::string>{"rest"});
 }
 
 TEST(Recorder, LeavesAReadableFileWhenItIsKilled) {

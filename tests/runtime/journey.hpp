@@ -59,9 +59,11 @@ struct Journey {
         run(robot, experiment, paused(std::move(change)),
             {.recorder = recorder, .observer = &witness, .time_machine = &machine}),
         loop([this] { run.cycle->run(); }) {}
-  ~Journey() {
+  ~Journey() { end(); }
+  /// No cycle comes any more.
+  void end() {
     run.cycle->inbox().end_run();
-    loop.join();
+    if (loop.joinable()) loop.join();
   }
   static Overrides paused(std::function<void(Experiment&)> change) {
     Overrides overrides;

@@ -266,9 +266,69 @@ TEST_F(Replay, OfALogThatIsCutComparesWhatIsThere) {
   ASSERT_FALSE(result.notes.empty());
 }
 
+TEST_F(Replay, OfALogWithAGapEndsBeforeIt) {
+  Recording run = record();
+  run.until(RunPhase::kRunning);
+  run.steps(100);
+  const std::uint64_t before = run.cycle().next_cycle();
+  run.cycle().replay(true);  // as it does not log then
+  run.steps(3);
+  run.cycle().replay(false);
+  const ReplayResult result = replayed(run.finish());
+  EXPECT_FALSE(result.equal());
+  EXPECT_FALSE(result.first);
+  EXPECT_EQ(result.compared, before);
+  EXPECT_NE(result.why_short.find("3 cycles before it are not in the log"), std::string::npos)
+      << result.why_short;
+}
+
+TEST_F(Replay, EndsWhereAControllerStartsThatCameDuringTheRun) {
+  Recording run = record();
+  run.until(RunPhase::kRunning);
+  run.steps(50);
+  RunServices& services = run.cycle().services();
+  auto late = load_controller(kSways, {});
+  ASSERT_TRUE(late) << late.error().to_string();
+  const auto nothing = TomlDocument::parse("", "late.toml");
+  ASSERT_TRUE(services.load("late", std::move(*late), *nothing, kNow));
+  run.steps(50);
+  const std::uint64_t before = run.cycle().next_cycle();
+  ASSERT_TRUE(services.switch_controllers({"one"}, {"late"}, kNow));
+  const ReplayResult result = replayed(run.finish());
+  EXPECT_FALSE(result.equal());
+  EXPECT_FALSE(result.first);
+  EXPECT_EQ(result.compared, before);
+  EXPECT_NE(result.why_short.find("was loaded while the run went on"), std::string::npos)
+      << result.why_short;
+}
+
 TEST_F(Replay, EndsAtTheTimeThatIsAsked) {
   const ReplayResult result = replayed(recorded(), {.to_ns = 299'000'000});
   expect_equal(result, 300);
+}
+
+TEST(ReplayedOverrun, IsWhatThePolicyMadeOfIt) {
+  rt::WallClock clock;
+  rt::CyclicLoop holds({.on_overrun = rt::OverrunPolicy::kHold}, clock);
+  rt::Tick tick = holds.wait();
+  holds.skip(tick, 3);
+  EXPECT_EQ(tick.cycle, 3U);
+  EXPECT_EQ(tick.time_ns, 3'000'000);
+  EXPECT_TRUE(tick.hold);
+  EXPECT_FALSE(holds.wait().hold);
+  rt::CyclicLoop stops({.on_overrun = rt::OverrunPolicy::kStop, .stop_late = 2, .stop_window = 3},
+                       clock);
+  const auto late = [&] {
+    rt::Tick one = stops.wait();
+    stops.skip(one, 1);
+    return one.stop;
+  };
+  EXPECT_FALSE(late());
+  (void)stops.wait();
+  EXPECT_TRUE(late());  // two of the last three
+  (void)stops.wait();
+  (void)stops.wait();
+  EXPECT_FALSE(late());
 }
 
 TEST_F(Replay, RefusesWhatItCannotPlay) {

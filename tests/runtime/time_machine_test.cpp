@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <random>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -31,12 +33,18 @@ INSTANTIATE_TEST_SUITE_P(Experiments, TimeMachineOf,
                            return std::string(one.param.robot) + "_" + one.param.name;
                          });
 
+/// How many journeys of an experiment; `make test-all` wants more.
+int travels() {
+  const char* text = std::getenv("TANDEM_TRAVELS");
+  return text == nullptr ? TANDEM_TRAVELS : std::stoi(text);
+}
+
 TEST_P(TimeMachineOf, PlaysAgainToTheSameBits) {
   Journey trip(GetParam().robot, GetParam().name);
   trip.step(4'000);
   std::uint64_t reached = 4'000;
   std::mt19937 dice(7);  // NOLINT: the same each time
-  for (int i = 0; i < TANDEM_TRAVELS; ++i) {
+  for (int i = 0; i < travels(); ++i) {
     const std::uint64_t there = dice() % reached;
     trip.go(there);
     if (i % 3 == 0) trip.go(there);  // twice from the same checkpoint
@@ -46,7 +54,7 @@ TEST_P(TimeMachineOf, PlaysAgainToTheSameBits) {
     }
     ASSERT_EQ(trip.witness.others, 0U) << "travel " << i << " to " << there;
   }
-  EXPECT_GE(trip.witness.again, TANDEM_TRAVELS);
+  EXPECT_GE(trip.witness.again, static_cast<std::uint64_t>(travels()));
 }
 
 // A shadow goes along, and so does a switch that waits for it: it happens again in the same cycle.
@@ -226,6 +234,121 @@ TEST(TimeMachine, AFaultWithoutRoomIsRefusedAndNotLost) {
     run.steps(1);
   }
   EXPECT_FALSE(run.backend->post(lasting));
+}
+
+constexpr RunServices::Patience kAtOnce{0};
+
+// A request, a sample and a fault were carried out in the next cycle, wherever that was.
+TEST(TimeMachine, WhatWaitsIsDroppedWhenTimeGoesElsewhere) {
+  Journey trip("double_pendulum", "jog", [](Experiment& e) {
+    e.controllers[0].inputs = {{.name = "rate", .feeder = InputFeeder::kCommand}};
+  });
+  trip.step(2'000);
+  RunServices& services = trip.run.cycle->services();
+  const auto asked = services.switch_controllers({"jog"}, {}, kAtOnce);
+  ASSERT_TRUE(asked) << asked.error().to_string();
+  EXPECT_FALSE(asked->done);
+  const std::shared_ptr<InputPort> rate = trip.run.run->controllers().loaded()[0]->inputs[0];
+  const double sample[]{0.4};
+  ASSERT_TRUE(rate->offer(InputFeeder::kCommand, sample));
+  sim::ScenarioFault freeze;
+  freeze.kind = hal::FaultKind::kEncoderFreeze;
+  ASSERT_TRUE(trip.run.backend->post(freeze));
+  trip.go(1'500);
+  EXPECT_EQ(trip.run.cycle->progress().went_to_ns, 1'499'000'000);
+  std::vector<hal::TextEvent> said;
+  std::uint64_t seen = 0;
+  (void)services.texts().read(seen, said);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_EQ(said[0].words(),
+            "went elsewhere: dropped what waited for the next cycle: 1 request, 1 sample of an "
+            "input, 1 fault");
+  trip.step(1'500);  // as if nobody had asked
+  EXPECT_EQ(trip.witness.others, 0U);
+  EXPECT_EQ(rate->look().counts.arrived, 0U);
+  EXPECT_EQ(rate->look().counts.refused, 1U);
+  EXPECT_TRUE(trip.run.backend->robot().faults().empty());
+  EXPECT_TRUE(services.controllers()[0].active);
+  // What is asked for there counts there.
+  ASSERT_TRUE(services.switch_controllers({"jog"}, {}, kAtOnce));
+  trip.step(1);
+  EXPECT_FALSE(services.controllers()[0].active);
+}
+
+// It kept the numbers of a future that does not come.
+TEST(TimeMachine, AnInactiveControllersSignalsAreThoseOfTheMoment) {
+  Journey trip("double_pendulum", "trajectory", [](Experiment& e) {
+    e.controllers[0].active = false;
+    e.controllers.push_back({"hold", "rest", true, TomlDocument::parse("", "rest")->root()});
+  });
+  trip.step(2'000);
+  RunServices& services = trip.run.cycle->services();
+  const auto newest_ns = [&] { return services.signals().at(0).block->look().time_ns; };
+  EXPECT_EQ(newest_ns(), -1) << "it has not told anything yet";
+  ASSERT_TRUE(services.switch_controllers({"rest"}, {"joint_trajectory"}, kAtOnce));
+  trip.step(500);
+  EXPECT_EQ(newest_ns(), 2'499'000'000);
+  trip.go(1'500);
+  EXPECT_EQ(newest_ns(), -1);
+}
+
+TEST(TimeMachine, WhatWasSaidInAForgottenFutureIsReadByNobody) {
+  TextHistory history;
+  const auto say = [&](std::int64_t time_ns) {
+    history.write(hal::TextEvent{.cycle = 0, .time_ns = time_ns});
+  };
+  for (const std::int64_t time_ns : {1, 2, 3}) say(time_ns);
+  history.forget_after(2);
+  say(4);
+  std::vector<hal::TextEvent> read;
+  std::uint64_t seen = 0;
+  EXPECT_EQ(history.read(seen, read), 0U);
+  EXPECT_EQ(seen, 4U);
+  ASSERT_EQ(read.size(), 3U);
+  EXPECT_EQ(read[1].time_ns, 2);
+  EXPECT_EQ(read[2].time_ns, 4);
+}
+
+// Its exact twin has the same bits in each branch, and no cycle more or less.
+TEST(TimeMachine, TheSecondRobotGoesAlong) {
+  const log::ScratchFolder folder;
+  const std::string path = folder / "run.mcap";
+  auto recorder = log::Recorder::open(path, {.robot = "coman", .period_ns = 1'000'000}, {});
+  ASSERT_TRUE(recorder);
+  std::uint64_t played = 0;
+  {
+    Journey trip("coman", "squat_twin", recorder->get());
+    trip.step(1'300);
+    trip.go(1'250);
+    trip.go(900);
+    trip.step(450);
+    trip.go(1'000);  // a checkpoint: nothing is played again
+    trip.step(50);
+    EXPECT_EQ(trip.witness.others, 0U);
+    trip.end();
+    played = trip.run.run->parallel()->finish().cycles;
+    EXPECT_EQ(trip.run.run->parallel()->differences().compared(), played);
+    EXPECT_EQ(trip.run.run->parallel()->differences().unequal(), 0U);
+  }
+  EXPECT_EQ((*recorder)->close().branches, 3U);
+  struct Expected {
+    const char* file;
+    std::uint64_t first, end;
+  };
+  for (const Expected& expected :
+       {Expected{"run.mcap", 0, 1'300}, Expected{"run.branch-2.mcap", 900, 1'350},
+        Expected{"run.branch-3.mcap", 1'000, played}}) {
+    auto log = log::LogFile::open(folder / expected.file);
+    ASSERT_TRUE(log) << log.error().to_string();
+    const std::vector<log::Column> columns{{"cycle"}, {"position_rad", 3}, {"torque_nm", 5}};
+    const auto first = log->read("/tandem/state", columns);
+    const auto second = log->read("/tandem/parallel/state", columns);
+    ASSERT_TRUE(first) << first.error().to_string();
+    ASSERT_TRUE(second) << second.error().to_string();
+    ASSERT_EQ(first->columns[0].size(), expected.end - expected.first) << expected.file;
+    EXPECT_EQ(first->columns[0].front(), static_cast<double>(expected.first)) << expected.file;
+    EXPECT_TRUE(first->columns == second->columns) << expected.file;
+  }
 }
 
 // In another process as here: nothing of the first run is left.

@@ -275,6 +275,28 @@ TEST(Studio, HaltsTheJointsWhenWhoHasControlIsGone) {
   EXPECT_FALSE(rig.dropped.empty()) << "what it asked for and has not begun";
 }
 
+// Who had control went on to lead joints in a time that it did not see.
+TEST(Studio, EndsControlWhenTimeGoesBackAndHaltsNothing) {
+  StudioRig rig;
+  rig.start();
+  const auto client = rig.client(), other = rig.client();
+  (void)other->next("control");
+  rig.show(0, 200);
+  client->say(Json{{"op", "enter"}, {"token", rig.token}});
+  client->say(Json{{"op", "control"}, {"take", true}});
+  EXPECT_EQ(other->next("control")["taken"], true);
+  rig.show(100, 101);
+  std::string told;
+  while (told.find("no control any more, for time went back") == std::string::npos) {
+    const Json events = other->next("events");
+    told = events["events"].back()["text"];
+  }
+  EXPECT_EQ(other->next("control")["taken"], false);
+  EXPECT_FALSE(rig.asked_itself("joint.halt")) << "what goes on unchanged has the same bits";
+  const std::lock_guard lock(rig.mutex);
+  EXPECT_FALSE(rig.dropped.empty()) << "what it asked for and has not begun";
+}
+
 TEST(Studio, AsksWhatIsWatchedForAllAndTellsWhatIsNew) {
   StudioRig rig;
   rig.counts = true;
