@@ -138,16 +138,6 @@ CLI::Validator is_rate() {
   return {check, "0, 0.01 to 1000"};
 }
 
-CLI::Validator a_duration() {
-  const auto check = [](const std::string& text) -> std::string {
-    double duration_s = 0.0;
-    const bool number = CLI::detail::lexical_cast(text, duration_s);
-    if (number && duration_s > 0.0 && duration_s <= 1e6) return "";
-    return "'" + text + "' is no number of seconds above 0, and up to 1000000";
-  };
-  return {check, "above 0, to 1e6"};
-}
-
 /// The length of a run: a duration, or "endless".
 CLI::Validator a_run_length() {
   const auto check = [](std::string& text) -> std::string {
@@ -238,6 +228,16 @@ CLI::Validator is_seed() {
     return "'" + text + "' is no whole number from 0 to 9223372036854775807";
   };
   return {check, "0 to 9223372036854775807"};
+}
+
+CLI::Validator a_duration() {
+  const auto check = [](const std::string& text) -> std::string {
+    double duration_s = 0.0;
+    const bool number = CLI::detail::lexical_cast(text, duration_s);
+    if (number && duration_s > 0.0 && duration_s <= 1e6) return "";
+    return "'" + text + "' is no number of seconds above 0, and up to 1000000";
+  };
+  return {check, "above 0, to 1e6"};
 }
 
 CLI::Validator is_count() {

@@ -95,6 +95,31 @@ struct TestOptions {
   std::string json;
 };
 
+/// tandem shrink SCENARIO
+struct ShrinkOptions {
+  std::string scenario;      ///< an experiment that fails
+  std::string output;        ///< the smaller one; empty: NAME.small.toml, here
+  std::string expect;        ///< which expectation has to fail; empty: the first that does
+  std::size_t jobs = 0;      ///< as TestOptions'
+  double timeout_s = 300.0;  ///< as TestOptions'
+  bool quiet = false;        ///< neither progress nor result
+  std::string json;
+};
+
+/// tandem search STUDY
+struct SearchOptions {
+  std::string study;       ///< as of `tandem sweep`
+  std::string output;      ///< the worst point as a scenario; empty: none
+  std::string expect;      ///< whose margin; empty: the least of all
+  std::string method;      ///< empty: the first of search_methods()
+  std::string along;       ///< key of a phase sweep; empty: the only one
+  std::size_t runs = 200;  ///< at most
+  std::uint64_t seed = 1;  ///< of the method
+  std::size_t jobs = 0;    ///< as TestOptions'
+  bool quiet = false;      ///< neither progress nor result
+  std::string json;
+};
+
 /// tandem replay LOG
 struct ReplayCommandOptions {
   std::string log;
@@ -302,7 +327,7 @@ using Command =
                  ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, IdentifyOptions,
                  ExciteOptions, LatencyOptions, DoctorOptions, EmulateOptions, TopicOptions,
                  BenchOptions, ControllerCheckOptions, ControllerNewOptions, StudioCommandOptions,
-                 TestOptions, ReplayCommandOptions>;
+                 TestOptions, ReplayCommandOptions, ShrinkOptions, SearchOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest
