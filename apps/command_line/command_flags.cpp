@@ -27,6 +27,7 @@ const char kRunExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --dds --realtime      publish to ROS 2 and `tandem topic`
   tandem run config/coman/squat.toml --hal dds       the robot of `tandem serve`
   tandem run config/coman/squat.toml --seed 7 --log /tmp/runs
+  tandem run config/suite/coman_push.toml --set 'push[0].impulse_Ns[0]=-4'  another value
   tandem run config/coman/squat.toml --json - --quiet | jq .realtime_factor
   tandem run config/coman/squat.toml --trace squat.json    open it on https://ui.perfetto.dev
 The same experiment and seed give the same bytes at every rate.)";
@@ -155,6 +156,23 @@ std::optional<std::int64_t> whole_number(const std::string& text) {
   return error == std::errc() && last == end ? std::optional(number) : std::nullopt;
 }
 
+/// --set, as often as one likes.
+void add_settings(CLI::App& app, std::vector<TomlSetting>& settings) {
+  const auto check = [](const std::string& text) -> std::string {
+    const auto setting = read_setting(text);
+    return setting ? "" : setting.error().to_string();
+  };
+  app.add_option_function<std::vector<std::string>>(
+         "--set",
+         [&settings](const std::vector<std::string>& texts) {
+           for (const std::string& text : texts) settings.push_back(read_setting(text).value());
+         },
+         "Another value than the file's, or below \"robot\" than its robot's; may be repeated")
+      ->allow_extra_args(false)
+      ->check(CLI::Validator(check, ""))
+      ->option_text("KEY=VALUE");
+}
+
 /// What `run` and `serve` share.
 void add_loop_flags(CLI::App& app, RunOptions& o) {
   CLI::Option* rate = app.add_option("--rate", o.rate,
@@ -174,6 +192,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
                  "Go on from a moment of a simulated run's log, which keeps its state every 5 s")
       ->option_text("LOG@TIME");
   app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's")->check(is_seed());
+  add_settings(app, o.settings);
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--record-frames", o.record_frames,
                  "CAN: write every frame to this file, as candump -L does");
@@ -353,6 +372,7 @@ void add_flags(CLI::App& app, CheckOptions& o) {
   app.add_option("file", o.file, "Experiment or robot TOML")->required();
   app.add_flag("--bus", o.bus, "Show the load of every bus (a robot's: at 1 kHz)");
   app.add_flag("--repair", o.repair, "Read a robot as if it said inertia = \"repair\" in [model]");
+  add_settings(app, o.settings);
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kCheckExamples);
 }

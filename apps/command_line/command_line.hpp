@@ -79,9 +79,10 @@ struct AskOptions {
 
 /// tandem check FILE
 struct CheckOptions {
-  std::string file;     ///< an experiment or a robot
-  bool bus = false;     ///< show the load of every bus
-  bool repair = false;  ///< of a robot: as if it said inertia = "repair"
+  std::string file;                     ///< an experiment or a robot
+  bool bus = false;                     ///< show the load of every bus
+  bool repair = false;                  ///< of a robot: as if it said inertia = "repair"
+  std::vector<TomlSetting> settings{};  ///< what is otherwise than in the files
   std::string json;
 };
 
