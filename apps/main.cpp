@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
       [](const CheckOptions& options) { return check_command(options); },
       [](const TestOptions& options) { return test_command(options); },
       [](const ShrinkOptions& options) { return shrink_command(options); },
+      [](const SearchOptions& options) { return search_command(options); },
       [](const ReplayCommandOptions& options) { return replay_command(options); },
       [](const ControllerCheckOptions& options) { return controller_check_command(options); },
       [](const AskOptions& options) { return ask_command(options); },

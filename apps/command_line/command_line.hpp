@@ -109,15 +109,18 @@ struct ShrinkOptions {
 
 /// tandem search STUDY
 struct SearchOptions {
-  std::string study;       ///< as of `tandem sweep`
-  std::string output;      ///< the worst point as a scenario; empty: none
-  std::string expect;      ///< whose margin; empty: the least of all
-  std::string method;      ///< empty: the first of search_methods()
-  std::string along;       ///< key of a phase sweep; empty: the only one
-  std::size_t runs = 200;  ///< at most
-  std::uint64_t seed = 1;  ///< of the method
-  std::size_t jobs = 0;    ///< as TestOptions'
-  bool quiet = false;      ///< neither progress nor result
+  std::string study;         ///< as of `tandem sweep`
+  std::string output;        ///< the worst point as a scenario; empty: none
+  std::string expect;        ///< whose margin; empty: the least of all
+  std::string method;        ///< empty: the first of search_methods()
+  std::string along;         ///< key of a phase sweep; empty: the only one
+  std::string limit;         ///< instead: key whose values are scaled until it fails
+  double up_to = 0.0;        ///< greatest factor of `limit`
+  std::size_t halvings = 5;  ///< of the interval in which its limit lies
+  std::size_t runs = 200;    ///< at most
+  std::uint64_t seed = 1;    ///< of the method
+  std::size_t jobs = 0;      ///< as TestOptions'
+  bool quiet = false;        ///< neither progress nor result
   std::string json;
 };
 

@@ -16,6 +16,7 @@ constexpr char kSearchExamples[] = R"(Examples:
   tandem search push.toml -o worst.toml              the least margin of any expectation
   tandem search push.toml --expect "stays up" --runs 500
   tandem search push.toml --method phase --along 'push[0].after_s'   evenly along one key
+  tandem search map.toml --limit 'push[0].impulse_Ns' --up-to 12 -o map.csv   how hard a push, where
 
 A study is the file of `tandem sweep`: an experiment, and a [[vary]] for each value that changes.
 The same study and seed give the same result, however many run at once. The exit status is 0 when
@@ -52,6 +53,18 @@ void add_flags(CLI::App& app, SearchOptions& o) {
       ->check(CLI::IsMember({"cma_es", "phase", "random"}));
   app.add_option("--along", o.along, "Key of a phase sweep (default: the only one)")
       ->check(is_given("name the key of a [[vary]], or leave it out"));
+  CLI::Option* up_to = app.add_option("--up-to", o.up_to, "Greatest factor of --limit")
+                           ->check(CLI::Range(1e-9, 1e9));
+  CLI::Option* limit =
+      app.add_option("--limit", o.limit,
+                     "Instead: at each point of a grid, by how much this key's numbers can be "
+                     "multiplied until it fails; -o is CSV")
+          ->check(is_given("name the key of a [[vary]], or leave it out"))
+          ->needs(up_to);
+  up_to->needs(limit);
+  app.add_option("--halvings", o.halvings, "Of the interval from 0 to --up-to (default: 5)")
+      ->check(CLI::Range(0, 30))
+      ->needs(limit);
   app.add_option("--runs", o.runs, "Runs at most (default: 200)")->check(is_count());
   app.add_option("--seed", o.seed, "Seed of the method (default: 1)")->check(is_seed());
   add_runs(app, o, "the least margin of all");

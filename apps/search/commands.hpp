@@ -10,6 +10,7 @@
 #include "apps/control/run_figures.hpp"
 #include "apps/text/figures.hpp"
 #include "runtime/condition/expectation.hpp"
+#include "sweep/study.hpp"
 
 namespace tandem::apps {
 
@@ -45,6 +46,22 @@ struct SearchResult {
   std::string command{};  ///< that repeats it
   std::vector<Progress> progress{};
 };
+/// How far the list of numbers at a key can be scaled until it fails, at each point of a grid.
+[[nodiscard]] Exit find_limits(const SearchOptions& options, const sweep::Study& study);
+/// What its JSON has.
+struct LimitResult {
+  struct Row {
+    std::vector<std::string> values{};
+    double passed = 0.0;
+    std::optional<double> failed{};
+  };
+  std::string key;
+  std::size_t runs = 0;
+  double seconds = 0.0;  ///< on the wall clock
+  std::vector<Row> points{};
+};
+void figures(Figures& f, const LimitResult::Row& row);
+void figures(Figures& f, const LimitResult& result);
 void figures(Figures& f, const SearchResult::Progress& progress);
 void figures(Figures& f, const SearchResult& result);
 

@@ -294,9 +294,8 @@ std::vector<std::string> keys_of_row(const std::string& row) {
     if (rule.left_out || (rule.how != Simpler::kWords && !numbers_of(value).empty()))
       keys.push_back(key);
   }
-  std::ranges::stable_partition(keys, [](const std::string& key) {
-    return simpler_key(key).how != Simpler::kSmaller;
-  });
+  std::ranges::stable_partition(
+      keys, [](const std::string& key) { return simpler_key(key).how != Simpler::kSmaller; });
   return keys;
 }
 
@@ -323,6 +322,16 @@ std::vector<std::string> simpler_rows(const std::string& row, const std::string&
     if (auto text = with_settings(row, {setting})) simpler.push_back(std::move(text->text));
   }
   return simpler;
+}
+
+std::optional<std::string> scaled_value(const std::string& value, double factor) {
+  const auto document = TomlDocument::parse("x = " + value, "value");
+  if (!document) return std::nullopt;
+  const std::string text = document->root().values()["x"];
+  std::vector<double> numbers = numbers_of(text);
+  if (numbers.empty()) return std::nullopt;
+  for (double& one : numbers) one = std::stod(fmt::format("{:.9g}", one * factor));
+  return value_of(numbers, text.starts_with('['));
 }
 
 Result<std::string> relocated(const std::string& text, const std::string& file,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,6 +44,9 @@ class ScenarioText {
 /// The keys of a row that may become simpler, those that make it weaker last: a row at its weakest
 /// would not fail without them any more.
 [[nodiscard]] std::vector<std::string> keys_of_row(const std::string& row);
+
+/// A number, or a list of them, of TOML, times a factor, with nine digits; empty: it is none.
+[[nodiscard]] std::optional<std::string> scaled_value(const std::string& value, double factor);
 
 /// An experiment's text as it has to be in another folder: what names a file relative to its own
 /// does so from there. A value counts as such a name when the file is there.

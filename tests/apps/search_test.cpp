@@ -295,5 +295,73 @@ TEST_F(Shrink, RefusesWhatDoesNotFailOrHasNothingToLeaveOut) {
   EXPECT_EQ(read_text(folder_ / "mine.toml"), "# Written by hand.\n");
 }
 
+constexpr char kStudy[] = R"(experiment = "five.toml"
+[sample]
+method = "random"
+points = 4
+[[vary]]
+key = "push[2].impulse_Ns[1]"
+uniform = [0.1, 0.8]
+[[vary]]
+key = "push[2].at_s"
+uniform = [0.95, 1.1]
+)";
+
+TEST_F(Shrink, ASearchFindsTheHardestPushWhateverRunsAtOnce) {
+  write_text(folder_ / "study.toml", kStudy);
+  const Outcome outcome = tandem(
+      "search study.toml --expect 'in place' --runs 18 -o found/worst.toml --json w.json -j 2");
+  EXPECT_EQ(outcome.status, 1) << outcome.out << outcome.err;
+  const auto worst = json("w.json");
+  EXPECT_EQ(worst["runs"], 18);
+  EXPECT_EQ(worst["expectation"]["name"], "in place");
+  EXPECT_LT(worst["expectation"]["margin"], -0.015);
+  const std::string command = worst["command"];
+  EXPECT_EQ(tandem(command.substr(7) + " --json once.json").status, 1);
+  EXPECT_EQ(json("once.json")["expectations"][0]["margin"], worst["expectation"]["margin"]);
+  EXPECT_TRUE(
+      read_text(folder_ / "found/worst.toml")
+          .starts_with("# Found by `tandem search` with ../study.toml: the worst of 18 runs."));
+
+  EXPECT_EQ(tandem("search study.toml --expect 'in place' --runs 18 --json alone.json -j 1").status,
+            1);
+  auto alone = json("alone.json");
+  for (const char* same : {"expectation", "settings", "progress", "failed"})
+    EXPECT_EQ(alone[same], worst[same]) << same;
+}
+
+TEST_F(Shrink, ALimitLiesBetweenWhatPassedAndWhatFailed) {
+  write_text(folder_ / "map.toml", R"(experiment = "five.toml"
+[[vary]]
+key = "push[2].impulse_Ns"
+values = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
+)");
+  const Outcome outcome = tandem(
+      "search map.toml --limit 'push[2].impulse_Ns' --up-to 1 --halvings 3 -o map.csv --json "
+      "m.json");
+  EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+  // 0.6 Ns pass and 0.65 fail across the axis; along it nothing moves.
+  EXPECT_EQ(read_text(folder_ / "map.csv"),
+            "push[2].impulse_Ns,passes_at,fails_at\n"
+            "\"[0.0, 1.0, 0.0]\",0.5,0.625\n"
+            "\"[1.0, 0.0, 0.0]\",1,\n");
+  EXPECT_EQ(json("m.json")["runs"], 5);
+}
+
+TEST_F(Shrink, ASearchRefusesWhatHasNoWorst) {
+  write_text(folder_ / "study.toml", kStudy);
+  const auto refused = [this](const std::string& arguments, const std::string& why) {
+    const Outcome outcome = tandem("search " + arguments);
+    EXPECT_EQ(outcome.status, 2) << arguments;
+    EXPECT_NE(outcome.err.find(why), std::string::npos) << arguments << ": " << outcome.err;
+  };
+  refused("study.toml --runs 2 --expect 'in plac'", "did you mean 'in place'");
+  refused("study.toml --method phase", "say --along KEY");
+  refused("study.toml --method phase --along at_s", "no [[vary]] has the key 'at_s'");
+  refused("study.toml --limit at_s --up-to 2", "limits are of a grid's points");
+  write_text(folder_ / "study.toml", "experiment = \"five.toml\"\n");
+  refused("study.toml", "add a [[vary]]");
+}
+
 }  // namespace
 }  // namespace tandem::apps
