@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
       [](const EmulateOptions& options) { return emulate_command(options); },
       [](const CheckOptions& options) { return check_command(options); },
       [](const TestOptions& options) { return test_command(options); },
+      [](const SweepOptions& options) { return sweep_command(options); },
       [](const ReplayCommandOptions& options) { return replay_command(options); },
       [](const ControllerCheckOptions& options) { return controller_check_command(options); },
       [](const AskOptions& options) { return ask_command(options); },
