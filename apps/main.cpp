@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
       [](const EmulateOptions& options) { return emulate_command(options); },
       [](const CheckOptions& options) { return check_command(options); },
       [](const TestOptions& options) { return test_command(options); },
+      [](const SweepOptions& options) { return sweep_command(options); },
       [](const ShrinkOptions& options) { return shrink_command(options); },
       [](const SearchOptions& options) { return search_command(options); },
       [](const ReplayCommandOptions& options) { return replay_command(options); },

@@ -47,6 +47,7 @@ void add_flags(CLI::App& app, AskOptions& o);
 void add_flags(CLI::App& app, EmulateOptions& o);
 void add_flags(CLI::App& app, CheckOptions& o);
 void add_flags(CLI::App& app, TestOptions& o);
+void add_flags(CLI::App& app, SweepOptions& o);
 void add_flags(CLI::App& app, ReplayCommandOptions& o);
 void add_flags(CLI::App& app, ShrinkOptions& o);
 void add_flags(CLI::App& app, SearchOptions& o);

@@ -96,6 +96,16 @@ struct TestOptions {
   std::string json;
 };
 
+/// tandem sweep STUDY
+struct SweepOptions {
+  std::string study;      ///< study.toml
+  std::string folder;     ///< of what it comes to; empty: sweeps/STUDY
+  std::size_t jobs = 0;   ///< points at once; 0: as many as there are cores
+  double at_least = 0.0;  ///< share of points that have to pass, or the status is 1
+  bool quiet = false;     ///< neither progress nor table
+  std::string json;
+};
+
 /// tandem shrink SCENARIO
 struct ShrinkOptions {
   std::string scenario;      ///< an experiment that fails
@@ -331,7 +341,7 @@ using Command =
                  ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, IdentifyOptions,
                  ExciteOptions, LatencyOptions, DoctorOptions, EmulateOptions, TopicOptions,
                  BenchOptions, ControllerCheckOptions, ControllerNewOptions, StudioCommandOptions,
-                 TestOptions, ReplayCommandOptions, ShrinkOptions, SearchOptions>;
+                 TestOptions, SweepOptions, ReplayCommandOptions, ShrinkOptions, SearchOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

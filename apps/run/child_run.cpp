@@ -64,8 +64,8 @@ ChildRun child_run(const std::string& json_file, const std::string& output_file,
   const auto lost = result.value("never_injected", std::size_t{0});
   if (const auto ended = result.find("ended"); ended != result.end() && ended->is_string())
     run.ended = ended->get<std::string>();
-  run.passed = status == 0 && limit_s == 0.0 && !run.expectations.empty() && failures == 0 &&
-               lost == 0;
+  run.passed =
+      status == 0 && limit_s == 0.0 && !run.expectations.empty() && failures == 0 && lost == 0;
   if (run.passed) return run;
   if (const auto said = read_file(output_file, "", kMostResult)) run.said = last_lines(*said);
   const std::string error = first_error(result);
