@@ -145,7 +145,7 @@ std::vector<double> numbers_of(std::string_view value) {
   return numbers;
 }
 
-/// Of so many significant digits. @param down  towards 0
+/// A number with so many significant digits. @param down  towards 0
 double with_digits(double number, int digits, bool down) {
   if (number == 0.0) return 0.0;
   const double place = std::floor(std::log10(std::abs(number))) - (digits - 1);

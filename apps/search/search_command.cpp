@@ -100,6 +100,7 @@ class Search {
     looked.resize(std::min(looked.size(), runs_left()));
     ran_ = runs_.run(looked);
     if (!ran_ || rt::stop_requested()) return {};
+    if (looked.empty()) return {};
     note(looked);
     std::vector<double> values;
     for (std::size_t i = 0; i + study_.seeds.size() <= looked.size(); i += study_.seeds.size()) {

@@ -315,7 +315,7 @@ TEST_F(Shrink, ASearchFindsTheHardestPushWhateverRunsAtOnce) {
   const auto worst = json("w.json");
   EXPECT_EQ(worst["runs"], 18);
   EXPECT_EQ(worst["expectation"]["name"], "in place");
-  EXPECT_LT(worst["expectation"]["margin"], -0.015);
+  EXPECT_LT(worst["expectation"]["margin"], -0.07);
   const std::string command = worst["command"];
   EXPECT_EQ(tandem(command.substr(7) + " --json once.json").status, 1);
   EXPECT_EQ(json("once.json")["expectations"][0]["margin"], worst["expectation"]["margin"]);
@@ -340,11 +340,11 @@ values = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
       "search map.toml --limit 'push[2].impulse_Ns' --up-to 1 --halvings 3 -o map.csv --json "
       "m.json");
   EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
-  // 0.6 Ns pass and 0.65 fail across the axis; along it nothing moves.
+  // Across the axis of the joint 0.6 Ns pass and 0.65 fail; along it nothing moves.
   EXPECT_EQ(read_text(folder_ / "map.csv"),
             "push[2].impulse_Ns,passes_at,fails_at\n"
-            "\"[0.0, 1.0, 0.0]\",0.5,0.625\n"
-            "\"[1.0, 0.0, 0.0]\",1,\n");
+            "\"[0, 1, 0]\",0.5,0.625\n"
+            "\"[1, 0, 0]\",1,\n");
   EXPECT_EQ(json("m.json")["runs"], 5);
 }
 
