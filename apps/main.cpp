@@ -8,6 +8,7 @@
 #include "apps/run/controller_trial.hpp"
 #include "apps/run/loop_crash.hpp"
 #include "apps/run/tools_program.hpp"
+#include "apps/search/commands.hpp"
 
 int main(int argc, char** argv) {
   using namespace tandem::apps;
@@ -21,6 +22,9 @@ int main(int argc, char** argv) {
       [](const EmulateOptions& options) { return emulate_command(options); },
       [](const CheckOptions& options) { return check_command(options); },
       [](const TestOptions& options) { return test_command(options); },
+      [](const SweepOptions& options) { return sweep_command(options); },
+      [](const ShrinkOptions& options) { return shrink_command(options); },
+      [](const SearchOptions& options) { return search_command(options); },
       [](const ReplayCommandOptions& options) { return replay_command(options); },
       [](const ControllerCheckOptions& options) { return controller_check_command(options); },
       [](const AskOptions& options) { return ask_command(options); },

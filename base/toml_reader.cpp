@@ -24,6 +24,7 @@ namespace tandem {
 struct TomlTable::Shared {
   toml::table root;
   std::string file, text;
+  SetText set;  // whose text is `text`
   Diagnostics diagnostics;
   std::set<std::string> meant;  // keys that a misspelt one stands for: not missing besides
   std::map<std::string, std::string> names;  // of entries of arrays: "joint[0]" is "hip"
@@ -175,14 +176,16 @@ int TomlTable::line() const { return line_; }
 
 int TomlTable::line(std::string_view key) const {
   const toml::node* node = key.empty() ? nullptr : get(key);
-  return node == nullptr ? line() : static_cast<int>(node->source().begin.line);
+  return node == nullptr ? line()
+                         : shared_->set.line_of_file(static_cast<int>(node->source().begin.line));
 }
 
 Error TomlTable::error_at(std::string_view key, std::string message, std::string hint) const {
+  const std::string said = shared_->set.said_of(dotted(key));
   return {.message = std::move(message),
           .hint = std::move(hint),
-          .file = shared_->file,
-          .line = line(key),
+          .file = said.empty() ? shared_->file : said,
+          .line = said.empty() ? line(key) : 0,
           .key = shared_->shown(dotted(key))};
 }
 
@@ -203,10 +206,11 @@ bool TomlTable::has_errors() const {
 }
 
 bool TomlTable::has_errors(std::string_view key) const {
-  return std::ranges::any_of(shared_->diagnostics, [path = shared_->shown(dotted(key)),
-                                                    line = line(key)](const Error& error) {
-    return error.key == path && error.line == line;
-  });
+  return std::ranges::any_of(
+      shared_->diagnostics,
+      [path = shared_->shown(dotted(key)), line = error_at(key, {}).line](const Error& error) {
+        return error.key == path && error.line == line;
+      });
 }
 
 void TomlTable::report_unknown(std::string_view key, const std::vector<std::string>& known) {
@@ -419,6 +423,24 @@ std::vector<std::string> TomlTable::texts_or(std::string_view key, std::vector<s
   return found;
 }
 
+std::vector<std::string> TomlTable::value_texts(std::string_view key) {
+  const toml::node* node = require(key);
+  if (node == nullptr) return {};
+  const toml::array* array = node->as_array();
+  const bool values =
+      array != nullptr && !array->empty() && std::ranges::none_of(*array, [](const auto& one) {
+        return one.is_table() ||
+               (one.is_floating_point() && !std::isfinite(**one.as_floating_point()));
+      });
+  if (!values) {
+    error(key, "must be a list of values in brackets", "such as [1, 2.5], or [\"a\", \"b\"]");
+    return {};
+  }
+  std::vector<std::string> found;
+  for (const toml::node& element : *array) found.push_back(value_text(element));
+  return found;
+}
+
 std::vector<std::vector<double>> TomlTable::rows(std::string_view key, std::size_t columns) {
   const toml::node* node = require(key);
   if (node == nullptr) return {};
@@ -501,7 +523,8 @@ std::vector<TomlTable> TomlTable::tables(std::string_view key, std::string_view 
     if (!names[i].empty() && std::ranges::count(names, names[i]) == 1) {
       shared_->names[path] = names[i];
     }
-    found.push_back(TomlTable(shared_, table, path, static_cast<int>(table->source().begin.line)));
+    const auto line = static_cast<int>(table->source().begin.line);
+    found.push_back(TomlTable(shared_, table, path, shared_->set.line_of_file(line)));
   }
   return found;
 }
@@ -539,7 +562,8 @@ std::string quoted_line(std::string_view text, std::size_t number) {
 
 }  // namespace
 
-Result<TomlDocument> TomlDocument::load(const std::string& file, const char* of_xml) {
+Result<TomlDocument> TomlDocument::load(const std::string& file, const char* of_xml,
+                                        const std::vector<TomlSetting>& settings) {
   if (file.empty()) {
     return std::unexpected(Error{"the file's name is empty", "name a .toml file", {}, 0, {}});
   }
@@ -548,17 +572,25 @@ Result<TomlDocument> TomlDocument::load(const std::string& file, const char* of_
   if (text->find_first_not_of(" \t\r\n") == std::string::npos) {
     return std::unexpected(Error{"the file is empty", "name another, or write it", file, 0, {}});
   }
-  return parse(*text, file, of_xml);
+  return parse(*text, file, of_xml, settings);
 }
 
 Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::string& file,
-                                         const char* of_xml) {
+                                         const char* of_xml,
+                                         const std::vector<TomlSetting>& settings) {
   if (const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
       first != std::string_view::npos && text[first] == '<') {
     return std::unexpected(Error{"this is XML, not TOML", of_xml, file, 1, {}});
   }
   if (Status within = check_toml_bounds(text, file); !within)
     return std::unexpected(within.error());
+  if (!settings.empty()) {
+    auto set = with_settings(text, settings);
+    if (!set) return std::unexpected(set.error());
+    auto document = parse(set->text, file, of_xml);
+    if (document) document->shared_->set = std::move(*set);
+    return document;
+  }
   TomlDocument document;
   document.shared_ = std::make_shared<TomlTable::Shared>();
   document.shared_->file = file;

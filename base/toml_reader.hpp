@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "base/toml_setting.hpp"
 
 namespace toml {
 inline namespace v3 {
@@ -74,6 +75,8 @@ class TomlTable {
                                                Range range = kAnyNumber, std::size_t size = 0);
   [[nodiscard]] std::vector<std::string> texts_or(std::string_view key,
                                                   std::vector<std::string> value);
+  /// The elements of a list of numbers, texts or booleans, each in TOML: for a --set.
+  [[nodiscard]] std::vector<std::string> value_texts(std::string_view key);
   /// A list of equal-length rows: [[x, y, z], …]. No columns: as many as the first one has.
   [[nodiscard]] std::vector<std::vector<double>> rows(std::string_view key, std::size_t columns);
 
@@ -159,16 +162,20 @@ class TomlTable {
 class TomlDocument {
  public:
   /// Errors: the file cannot be read; the text is no TOML (with line).
-  /// @param of_xml  the hint for a file that is XML
-  [[nodiscard]] static Result<TomlDocument> load(const std::string& file, const char* of_xml = "");
+  /// @param of_xml    the hint for a file that is XML
+  /// @param settings  what is otherwise than in the file. Their errors, and the reader's of what
+  ///                  they set, have the setting in place of file and line
+  [[nodiscard]] static Result<TomlDocument> load(const std::string& file, const char* of_xml = "",
+                                                 const std::vector<TomlSetting>& settings = {});
   /// The same from memory; `file` only names it in errors. Errors: beyond a bound of bounds.hpp.
   [[nodiscard]] static Result<TomlDocument> parse(std::string_view text, const std::string& file,
-                                                  const char* of_xml = "");
+                                                  const char* of_xml = "",
+                                                  const std::vector<TomlSetting>& settings = {});
 
   [[nodiscard]] TomlTable root() const;
   [[nodiscard]] const Diagnostics& diagnostics() const;
   [[nodiscard]] const std::string& file() const;
-  /// What was read: the file may be another by now.
+  /// What was read, with its settings: the file may be another by now.
   [[nodiscard]] const std::string& text() const;
   /// The file's folder, for paths given relative to the file; "." when it has none.
   [[nodiscard]] std::string folder() const;

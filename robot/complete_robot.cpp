@@ -90,11 +90,11 @@ std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& ro
   return found;
 }
 
-std::expected<CompleteRobot, Diagnostics> read_complete_robot(const std::string& file,
-                                                              bool repair) {
+std::expected<CompleteRobot, Diagnostics> read_complete_robot(
+    const std::string& file, bool repair, const std::vector<TomlSetting>& settings) {
   Diagnostics errors;
   std::vector<hal::JointReference> loose;
-  const Result<TomlDocument> document = TomlDocument::load(file, hal::kRobotOfXml);
+  const Result<TomlDocument> document = TomlDocument::load(file, hal::kRobotOfXml, settings);
   hal::RobotConfig config = hal::read_robot_config(document, errors, loose);
   config.model.repair_inertia = config.model.repair_inertia || repair;
   if (errors.empty() && loose.empty()) {

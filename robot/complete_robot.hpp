@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "base/toml_setting.hpp"
 #include "hal/config/robot_config.hpp"
 #include "model/urdf.hpp"
 
@@ -32,9 +33,10 @@ struct CompleteRobot {
 
 /// Reads a robot.toml and its URDF. Errors: those of both at once, read_robot_config()'s and
 /// complete_robot()'s.
-/// @param repair  as if it said inertia = "repair"
-[[nodiscard]] std::expected<CompleteRobot, Diagnostics> read_complete_robot(const std::string& file,
-                                                                            bool repair = false);
+/// @param repair    as if it said inertia = "repair"
+/// @param settings  what is otherwise than in the file
+[[nodiscard]] std::expected<CompleteRobot, Diagnostics> read_complete_robot(
+    const std::string& file, bool repair = false, const std::vector<TomlSetting>& settings = {});
 
 /// Reads the robot's URDF and fills from it what robot.toml left out: limits, the heights of
 /// postures that are "auto", and its followers. Errors: read_urdf()'s and

@@ -55,8 +55,9 @@ std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config,
   return join(std::move(config), *description, std::move(read));
 }
 
-std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file, bool repair) {
-  auto robot = read_complete_robot(file, repair);
+std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file, bool repair,
+                                                  const std::vector<TomlSetting>& settings) {
+  auto robot = read_complete_robot(file, repair, settings);
   if (!robot) return std::unexpected(robot.error());
   return join(std::move(robot->config), robot->description, std::move(robot->files));
 }

@@ -42,8 +42,9 @@ struct RobotFiles {
 [[nodiscard]] std::string text_of(const std::string& file);
 
 /// Reads a robot.toml and its description, and joins them.
-/// @param repair  as if it said inertia = "repair"
-[[nodiscard]] std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file,
-                                                                bool repair = false);
+/// @param repair    as if it said inertia = "repair"
+/// @param settings  what is otherwise than in the file
+[[nodiscard]] std::expected<RobotFiles, Diagnostics> read_robot(
+    const std::string& file, bool repair = false, const std::vector<TomlSetting>& settings = {});
 
 }  // namespace tandem::robot

@@ -138,7 +138,8 @@ void combine(Experiment& e, TomlTable& root) {
 }
 
 /// The second robot: its files, against the first.
-void add_parallel(Experiment& e, TomlTable& root, Diagnostics& errors) {
+void add_parallel(Experiment& e, TomlTable& root, const std::vector<TomlSetting>& settings,
+                  Diagnostics& errors) {
   if (!e.parallel) return;
   ParallelOptions& parallel = *e.parallel;
   TomlTable table = root.table("parallel");
@@ -148,7 +149,9 @@ void add_parallel(Experiment& e, TomlTable& root, Diagnostics& errors) {
                 "give the path of a robot's TOML, from the experiment's folder");
     return;
   }
-  auto read = robot::read_complete_robot(parallel.robot_file);
+  const bool same = parallel.robot_file == e.robot_file;
+  auto read = robot::read_complete_robot(parallel.robot_file, false,
+                                         same ? settings : std::vector<TomlSetting>());
   if (!read) {
     errors.insert(errors.end(), read.error().begin(), read.error().end());
     return;
@@ -225,20 +228,22 @@ sim::SimRobotConfig Experiment::sim_robot_config() const {
           .changes = plant};
 }
 
-std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) {
-  const auto document = TomlDocument::load(file, hal::kRobotOfXml);
+std::expected<Experiment, Diagnostics> read_experiment(const std::string& file,
+                                                       std::vector<TomlSetting> settings) {
+  const std::vector<TomlSetting> of_robot = take_below("robot", settings);
+  const auto document = TomlDocument::load(file, hal::kRobotOfXml, settings);
   if (!document) return std::unexpected(Diagnostics{document.error()});
   TomlTable root = document->root();
   Experiment e = read_tables(*document, root);
   e.files = {{file, document->text()}};
   Diagnostics robot_errors;
   if (!e.robot_file.empty()) {
-    if (auto robot = robot::read_complete_robot(e.robot_file)) {
+    if (auto robot = robot::read_complete_robot(e.robot_file, false, of_robot)) {
       e.robot = std::move(robot->config);
       for (auto& one : robot->files) e.files.push_back(std::move(one));
       e.description = std::make_shared<const model::UrdfModel>(std::move(robot->description));
       combine(e, root);
-      add_parallel(e, root, robot_errors);
+      add_parallel(e, root, of_robot, robot_errors);
     } else {
       robot_errors = robot.error();
       Error& first = robot_errors.front();

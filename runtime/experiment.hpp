@@ -121,7 +121,8 @@ struct Experiment {
   std::string file;        ///< the TOML's path
   std::string robot_file;  ///< resolved against the TOML's folder
   hal::RobotConfig robot;  ///< completed from its description
-  robot::FileTexts files;  ///< all that was read, the TOML itself first
+  robot::FileTexts files;  ///< all that was read, the TOML itself first; with what was set
+  std::vector<std::string> settings;  ///< what of it is otherwise than in the files: "--set …"
   std::shared_ptr<const model::UrdfModel> description;  ///< null when none was read
   double duration_s = 0.0;  ///< that controllers run, after the bring-up; or kEndless_s
   std::uint64_t seed = 1;
@@ -170,7 +171,9 @@ struct Experiment {
 /// as TOML's, read_robot_config()'s and complete_robot()'s; a period of 0; periods and sub-step
 /// that do not divide; an unknown posture, joint or sensor; a backend that this version lacks; no
 /// controller, or two of a name.
-[[nodiscard]] std::expected<Experiment, Diagnostics> read_experiment(const std::string& file);
+/// @param settings  what is otherwise than in the file; those of "robot.…" in its robot.toml
+[[nodiscard]] std::expected<Experiment, Diagnostics> read_experiment(
+    const std::string& file, std::vector<TomlSetting> settings = {});
 
 /// The same from memory, for a robot at hand: `robot = …` of the text is not followed, and the
 /// robot stays as it is.

@@ -27,6 +27,7 @@ const char kRunExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --dds --realtime      publish to ROS 2 and `tandem topic`
   tandem run config/coman/squat.toml --hal dds       the robot of `tandem serve`
   tandem run config/coman/squat.toml --seed 7 --log /tmp/runs
+  tandem run config/suite/coman_push.toml --set 'push[0].impulse_Ns[0]=-4'  another value
   tandem run config/coman/squat.toml --json - --quiet | jq .realtime_factor
   tandem run config/coman/squat.toml --trace squat.json    open it on https://ui.perfetto.dev
 The same experiment and seed give the same bytes at every rate.)";
@@ -44,6 +45,14 @@ const char kTestExamples[] = R"(Examples:
 
 Each runs in simulation, without the wall clock, in a process of its own: a crash or a hang costs
 that one. The exit status is 1 when one fails. docs/expectations.md)";
+
+const char kSweepExamples[] = R"(Examples:
+  tandem sweep config/studies/coman_push.toml        into sweeps/coman_push, on all cores
+  tandem sweep study.toml -j 2 -o /tmp/study         two points at once
+  tandem sweep study.toml --at-least 0.99            in CI: status 1 when fewer pass
+
+Stopped or killed, the same command goes on where it was. The exit status is 0 when every point has a
+result, whatever that is: points that fail are what a sweep looks for. docs/sweep.md)";
 
 const char kCheckExamples[] = R"(Examples:
   tandem check config/coman/squat.toml               an experiment: robot, description, plugins
@@ -138,16 +147,6 @@ CLI::Validator is_rate() {
   return {check, "0, 0.01 to 1000"};
 }
 
-CLI::Validator a_duration() {
-  const auto check = [](const std::string& text) -> std::string {
-    double duration_s = 0.0;
-    const bool number = CLI::detail::lexical_cast(text, duration_s);
-    if (number && duration_s > 0.0 && duration_s <= 1e6) return "";
-    return "'" + text + "' is no number of seconds above 0, and up to 1000000";
-  };
-  return {check, "above 0, to 1e6"};
-}
-
 /// The length of a run: a duration, or "endless".
 CLI::Validator a_run_length() {
   const auto check = [](std::string& text) -> std::string {
@@ -195,6 +194,23 @@ CLI::Validator a_memory_size() {
   return {read, "0, 512MB, 0.5GB"};
 }
 
+/// --set, as often as one likes.
+void add_settings(CLI::App& app, std::vector<TomlSetting>& settings) {
+  const auto check = [](const std::string& text) -> std::string {
+    const auto setting = read_setting(text);
+    return setting ? "" : setting.error().to_string();
+  };
+  app.add_option_function<std::vector<std::string>>(
+         "--set",
+         [&settings](const std::vector<std::string>& texts) {
+           for (const std::string& text : texts) settings.push_back(read_setting(text).value());
+         },
+         "Another value than the file's, or below \"robot\" than its robot's; may be repeated")
+      ->allow_extra_args(false)
+      ->check(CLI::Validator(check, ""))
+      ->option_text("KEY=VALUE");
+}
+
 /// What `run` and `serve` share.
 void add_loop_flags(CLI::App& app, RunOptions& o) {
   CLI::Option* rate = app.add_option("--rate", o.rate,
@@ -214,6 +230,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
                  "Go on from a moment of a simulated run's log, which keeps its state every 5 s")
       ->option_text("LOG@TIME");
   app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's")->check(is_seed());
+  add_settings(app, o.settings);
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--record-frames", o.record_frames,
                  "CAN: write every frame to this file, as candump -L does");
@@ -268,6 +285,16 @@ CLI::Validator is_seed() {
     return "'" + text + "' is no whole number from 0 to 9223372036854775807";
   };
   return {check, "0 to 9223372036854775807"};
+}
+
+CLI::Validator a_duration() {
+  const auto check = [](const std::string& text) -> std::string {
+    double duration_s = 0.0;
+    const bool number = CLI::detail::lexical_cast(text, duration_s);
+    if (number && duration_s > 0.0 && duration_s <= 1e6) return "";
+    return "'" + text + "' is no number of seconds above 0, and up to 1000000";
+  };
+  return {check, "above 0, to 1e6"};
 }
 
 CLI::Validator is_count() {
@@ -383,6 +410,7 @@ void add_flags(CLI::App& app, CheckOptions& o) {
   app.add_option("file", o.file, "Experiment or robot TOML")->required();
   app.add_flag("--bus", o.bus, "Show the load of every bus (a robot's: at 1 kHz)");
   app.add_flag("--repair", o.repair, "Read a robot as if it said inertia = \"repair\" in [model]");
+  add_settings(app, o.settings);
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kCheckExamples);
 }
@@ -398,6 +426,20 @@ void add_flags(CLI::App& app, TestOptions& o) {
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kTestExamples);
+}
+
+void add_flags(CLI::App& app, SweepOptions& o) {
+  app.add_option("study", o.study, "TOML that says what varies (docs/sweep.md)")->required();
+  app.add_option("--jobs,-j", o.jobs, "Points at once (default: one for each core)")
+      ->check(is_count());
+  app.add_option("-o,--output", o.folder, "Folder of the results (default: sweeps/STUDY)")
+      ->check(is_given("name a folder, or leave it out"));
+  app.add_option("--at-least", o.at_least,
+                 "Exit status 1 when a smaller share of points passes [0 to 1, 0]")
+      ->check(CLI::Range(0.0, 1.0));
+  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  app.footer(kSweepExamples);
 }
 
 void add_flags(CLI::App& app, ControllerCheckOptions& o) {

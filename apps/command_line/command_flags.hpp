@@ -23,6 +23,8 @@ inline constexpr char kNameAFile[] = "name a file, or leave it out";
 [[nodiscard]] CLI::Validator is_given(const std::string& hint);
 /// Check that an option can be an experiment's `seed`.
 [[nodiscard]] CLI::Validator is_seed();
+/// Check that an option is a duration in seconds, above 0.
+[[nodiscard]] CLI::Validator a_duration();
 /// Check that an option is a whole number above 0.
 [[nodiscard]] CLI::Validator is_count();
 
@@ -45,7 +47,10 @@ void add_flags(CLI::App& app, AskOptions& o);
 void add_flags(CLI::App& app, EmulateOptions& o);
 void add_flags(CLI::App& app, CheckOptions& o);
 void add_flags(CLI::App& app, TestOptions& o);
+void add_flags(CLI::App& app, SweepOptions& o);
 void add_flags(CLI::App& app, ReplayCommandOptions& o);
+void add_flags(CLI::App& app, ShrinkOptions& o);
+void add_flags(CLI::App& app, SearchOptions& o);
 void add_flags(CLI::App& app, ControllerCheckOptions& o);
 void add_flags(CLI::App& app, ModelOptions& o);
 void add_flags(CLI::App& app, NewOptions& o);

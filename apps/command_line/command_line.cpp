@@ -209,6 +209,9 @@ void add_all(Subcommands& commands) {
                                "The robot on the other end of CAN: boards' firmware and plant");
   commands.add<CheckOptions>("check", "Validate an experiment's or robot's files");
   commands.add<TestOptions>("test", "Run experiments that say what they expect, as a suite");
+  commands.add<SweepOptions>("sweep", "Run an experiment at many values, on all cores");
+  commands.add<ShrinkOptions>("shrink", "The fewest, smallest events with which a scenario fails");
+  commands.add<SearchOptions>("search", "Where the margin of an experiment is least");
   commands.add<ReplayCommandOptions>("replay", "Play a run again from its log, and compare");
   commands.add<ReportOptions>("report", "Draw the plots of a log, or of up to three");
   commands.add<ExciteOptions>("excite", "An experiment that excites a robot's dynamics");

@@ -79,9 +79,10 @@ struct AskOptions {
 
 /// tandem check FILE
 struct CheckOptions {
-  std::string file;     ///< an experiment or a robot
-  bool bus = false;     ///< show the load of every bus
-  bool repair = false;  ///< of a robot: as if it said inertia = "repair"
+  std::string file;                     ///< an experiment or a robot
+  bool bus = false;                     ///< show the load of every bus
+  bool repair = false;                  ///< of a robot: as if it said inertia = "repair"
+  std::vector<TomlSetting> settings{};  ///< what is otherwise than in the files
   std::string json;
 };
 
@@ -92,6 +93,44 @@ struct TestOptions {
   double timeout_s = 300.0;        ///< of each, on the wall clock
   std::string junit;               ///< file of JUnit's XML; empty: none
   bool quiet = false;              ///< neither progress nor table
+  std::string json;
+};
+
+/// tandem sweep STUDY
+struct SweepOptions {
+  std::string study;      ///< study.toml
+  std::string folder;     ///< of what it comes to; empty: sweeps/STUDY
+  std::size_t jobs = 0;   ///< points at once; 0: as many as there are cores
+  double at_least = 0.0;  ///< share of points that have to pass, or the status is 1
+  bool quiet = false;     ///< neither progress nor table
+  std::string json;
+};
+
+/// tandem shrink SCENARIO
+struct ShrinkOptions {
+  std::string scenario;      ///< an experiment that fails
+  std::string output;        ///< the smaller one; empty: NAME.small.toml, here
+  std::string expect;        ///< which expectation has to fail; empty: the first that does
+  std::size_t jobs = 0;      ///< as TestOptions'
+  double timeout_s = 300.0;  ///< as TestOptions'
+  bool quiet = false;        ///< neither progress nor result
+  std::string json;
+};
+
+/// tandem search STUDY
+struct SearchOptions {
+  std::string study;         ///< as of `tandem sweep`
+  std::string output;        ///< the worst point as a scenario; empty: none
+  std::string expect;        ///< whose margin; empty: the least of all
+  std::string method;        ///< empty: the first of search_methods()
+  std::string along;         ///< key of a phase sweep; empty: the only one
+  std::string limit;         ///< instead: key whose values are scaled until it fails
+  double up_to = 0.0;        ///< greatest factor of `limit`
+  std::size_t halvings = 5;  ///< of the interval in which its limit lies
+  std::size_t runs = 200;    ///< at most
+  std::uint64_t seed = 1;    ///< of the method
+  std::size_t jobs = 0;      ///< as TestOptions'
+  bool quiet = false;        ///< neither progress nor result
   std::string json;
 };
 
@@ -302,7 +341,7 @@ using Command =
                  ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, IdentifyOptions,
                  ExciteOptions, LatencyOptions, DoctorOptions, EmulateOptions, TopicOptions,
                  BenchOptions, ControllerCheckOptions, ControllerNewOptions, StudioCommandOptions,
-                 TestOptions, ReplayCommandOptions>;
+                 TestOptions, SweepOptions, ReplayCommandOptions, ShrinkOptions, SearchOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

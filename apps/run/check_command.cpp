@@ -183,21 +183,29 @@ void print_robot(const robot::RobotFiles& robot, const model::KernelLibrary& ker
 /// The loop's period that `--bus` counts with for a robot's own file, which has none.
 constexpr std::int64_t kBusPeriod_ns = 1'000'000;
 
+/// What is set of a robot's own file: "robot.gains…" as of an experiment, or "gains…".
+std::vector<TomlSetting> of_robot(const CheckOptions& options) {
+  std::vector<TomlSetting> others = options.settings;
+  std::vector<TomlSetting> settings = take_below("robot", others);
+  settings.insert(settings.end(), others.begin(), others.end());
+  return settings;
+}
+
 /// What `--bus` shows, before anything is refused.
-Diagnostics check_buses(const std::string& file, bool robot_only, std::FILE* out, Json& json) {
+Diagnostics check_buses(const CheckOptions& options, bool robot_only, std::FILE* out, Json& json) {
   if (!robot_only) {
-    const auto experiment = runtime::read_experiment(file);
+    const auto experiment = runtime::read_experiment(options.file, options.settings);
     if (!experiment) return {};  // composing reports it
     return show_buses(experiment->robot, experiment->loop.period_ns, out, json);
   }
-  const auto robot = robot::read_robot(file);
+  const auto robot = robot::read_robot(options.file, false, of_robot(options));
   if (!robot) return {};
   return show_buses(robot->config, kBusPeriod_ns, out, json);
 }
 
 Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                         Json& json) {
-  const auto robot = robot::read_robot(options.file, options.repair);
+  const auto robot = robot::read_robot(options.file, options.repair, of_robot(options));
   if (!robot) return robot.error();
   const robot::Findings found =
       robot::check(*robot, robot::use_alone(robot->config, options.bus ? kBusPeriod_ns : 0));
@@ -266,7 +274,7 @@ Status check_topics(const WiredComposition& c) {
 Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                              Json& json) {
   const auto composition = runtime::composed<WiredComposition>(
-      options.file, {}, {.missing = robot::MissingKernels::kTolerate});
+      options.file, {.settings = options.settings}, {.missing = robot::MissingKernels::kTolerate});
   if (!composition) return composition.error();
   warnings = (*composition)->experiment.description->warnings;
   warnings.insert(warnings.end(), (*composition)->warnings.begin(), (*composition)->warnings.end());
@@ -295,8 +303,7 @@ Exit check_command(const CheckOptions& options) {
                          ? wrong_kind(options.file, Takes::kRobot, "tandem check --repair")
                          : wrong_kind(options.file, Takes::kEither, "tandem check");
   if (wrong) errors.push_back(*wrong);
-  if (errors.empty() && options.bus)
-    errors = check_buses(options.file, robot_only, out, json["buses"]);
+  if (errors.empty() && options.bus) errors = check_buses(options, robot_only, out, json["buses"]);
   if (errors.empty()) {
     errors = robot_only ? check_robot(options, out, warnings, json)
                         : check_experiment(options, out, warnings, json);

@@ -27,6 +27,9 @@ namespace tandem::apps {
 /// Runs every experiment that expects something, each in a process of its own.
 [[nodiscard]] Exit test_command(const TestOptions& options);
 
+/// Runs every point of a study, each in a process of its own.
+[[nodiscard]] Exit sweep_command(const SweepOptions& options);
+
 /// Plays a run again from its log. @return kFault where something differs
 [[nodiscard]] Exit replay_command(const ReplayCommandOptions& options);
 

@@ -59,7 +59,10 @@ class TrialFolder {
 
 /// What the other process needs of the run to compose the same robot.
 Json request_of(const RunOptions& options, const ControllerTrial& trial) {
+  Json settings = Json::array();
+  for (const TomlSetting& one : options.settings) settings.push_back(one.key + "=" + one.value);
   return {{"experiment", options.experiment},
+          {"settings", settings},
           {"hal", options.hal},
           {"serves", options.serves},
           {"lockstep", options.lockstep},
@@ -177,6 +180,10 @@ Status tried(const RunOptions& options, const ControllerTrial& trial) {
 int tried_here(const Json& request) {
   runtime::Overrides overrides;
   const auto text = [&](const char* key) { return request[key].get<std::string>(); };
+  for (const Json& one : request["settings"]) {
+    if (auto setting = read_setting(one.get<std::string>()))
+      overrides.settings.push_back(std::move(*setting));
+  }
   overrides.hal = text("hal");
   overrides.serves = request["serves"].get<bool>();
   overrides.lockstep = request["lockstep"].get<bool>();

@@ -198,9 +198,10 @@ void CycleThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config
     began = now;
   }
   done_.store(true, std::memory_order_release);
+  ended_.release();
 }
 
-void watch(runtime::RobotCycle& cycle, const CycleThread& loop, const WiredComposition& c,
+void watch(runtime::RobotCycle& cycle, CycleThread& loop, const WiredComposition& c,
            const CycleGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
            bool quiet) {
   const runtime::Experiment& e = c.experiment;
@@ -227,7 +228,7 @@ void watch(runtime::RobotCycle& cycle, const CycleThread& loop, const WiredCompo
       bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
                  progress_note(cycle));
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    loop.await(std::chrono::milliseconds(20));
   }
   if (!quiet) {
     texts.look(cycle.services().texts());

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdio>
+#include <semaphore>
 #include <thread>
 
 #include "apps/run/connection.hpp"
@@ -25,6 +27,8 @@ class CycleThread {
   CycleThread(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
       : thread_([this, &cycle, config] { run(cycle, config); }) {}
   [[nodiscard]] bool done() const { return done_.load(std::memory_order_acquire); }
+  /// Waits until it is done, or for so long.
+  void await(std::chrono::milliseconds longest) { (void)ended_.try_acquire_for(longest); }
   void join() { thread_.join(); }
   // For when it has joined.
   [[nodiscard]] const RunTimes& times() const { return times_; }
@@ -36,6 +40,7 @@ class CycleThread {
   RunTimes times_;
   rt::ThreadReport report_;
   std::atomic<bool> done_{false};
+  std::binary_semaphore ended_{0};
   std::thread thread_;  // last: it uses the others
 };
 
@@ -43,7 +48,7 @@ class CycleThread {
 /// waits. Either way it warns when the log is lost.
 /// @param recorder  null: nothing is logged
 /// @param waits  the run waits after a fault: each is printed when it happens, not at the end alone
-void watch(runtime::RobotCycle& cycle, const CycleThread& loop, const WiredComposition& c,
+void watch(runtime::RobotCycle& cycle, CycleThread& loop, const WiredComposition& c,
            const CycleGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
            bool quiet);
 

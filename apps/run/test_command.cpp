@@ -10,13 +10,12 @@
 #include <filesystem>
 #include <thread>
 
+#include "apps/run/child_run.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/test_suite.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
-#include "apps/text/json_reader.hpp"
 #include "base/counted.hpp"
-#include "base/open_file.hpp"
 #include "base/process.hpp"
 #include "base/quoting.hpp"
 #include "rt/stop_signal.hpp"
@@ -27,8 +26,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using SuiteClock = std::chrono::steady_clock;
-
-constexpr std::uint64_t kMostResult = std::uint64_t{64} << 20;
 
 /// A folder for what the processes write, gone at the end.
 class SuiteFolder {
@@ -56,54 +53,10 @@ struct Going {
   bool late = false;  // it was ended for that
 };
 
-/// In simulation, without the wall clock, and beside others: no log, no socket.
-std::vector<std::string> words_of(const std::string& file) {
-  return {"run", file, "--hal", "sim", "--rate", "0", "--no-log", "--no-socket"};
-}
-
 std::string command_of(const std::string& file) {
   std::string command = "tandem";
-  for (const std::string& word : words_of(file)) command += " " + shell_word(word);
+  for (const std::string& word : child_words(file)) command += " " + shell_word(word);
   return command;
-}
-
-std::string last_lines(const std::string& text) {
-  constexpr std::size_t kMost = 4'000;
-  if (text.size() <= kMost) return text;
-  const std::size_t line = text.find('\n', text.size() - kMost);
-  return line == std::string::npos ? text.substr(text.size() - kMost) : text.substr(line + 1);
-}
-
-/// "run": {"expectations": […]} of a process' JSON.
-std::vector<runtime::ExpectationResult> expectations_of(const Json& json) {
-  std::vector<runtime::ExpectationResult> all;
-  const auto list = json.find("expectations");
-  if (list == json.end() || !list->is_array()) return all;
-  for (const Json& one : *list) {
-    runtime::ExpectationResult result;
-    result.name = one.value("name", "");
-    result.passed = one.value("passed", false);
-    result.unit = one.value("unit", "");
-    result.reason = one.value("reason", "");
-    result.joint = one.value("joint", "");
-    if (one["margin"].is_number()) result.margin = one["margin"].get<double>();
-    if (one["at_s"].is_number()) result.at_s = one["at_s"].get<double>();
-    all.push_back(std::move(result));
-  }
-  return all;
-}
-
-/// The first of its errors; empty: it says none.
-std::string first_error(const Json& json) {
-  const auto list = json.find("errors");
-  if (list == json.end() || !list->is_array() || list->empty()) return {};
-  const Json& first = list->front();
-  return Error{.message = first.value("message", ""),
-               .hint = first.value("hint", ""),
-               .file = first.value("file", ""),
-               .line = first.value("line", 0),
-               .key = first.value("key", "")}
-      .to_string();
 }
 
 class Suite {
@@ -158,7 +111,7 @@ class Suite {
     while (next_ < tests_.size() && going_.size() < options_.jobs) {
       const std::size_t test = next_++;
       if (!tests_[test].reason.empty()) continue;
-      std::vector<std::string> words = words_of(tests_[test].file);
+      std::vector<std::string> words = child_words(tests_[test].file);
       words.insert(words.begin(), program_file());
       for (const char* word : {"--quiet", "--json"}) words.emplace_back(word);
       words.push_back(file_of(test, ".json"));
@@ -202,36 +155,12 @@ class Suite {
   void take(const Going& one, int status) {
     SuiteTest& test = tests_[one.test];
     test.seconds = std::chrono::duration<double>(SuiteClock::now() - one.begin).count();
-    const auto text = read_file(file_of(one.test, ".json"), "", kMostResult);
-    const auto json = text ? read_json_object(*text) : Result<Json>(Json::object());
-    const Json result = json ? *json : Json::object();
-    test.expectations = expectations_of(result);
-    const auto said = read_file(file_of(one.test, ".txt"), "", kMostResult);
-    // Faults at times are no rows of it: that they came is the count below.
-    const bool judged = !test.expectations.empty() || result.contains("never_injected");
-    test.passed = status == 0 && !one.late && judged && runtime::failed(test.expectations) == 0;
-    const auto lost = result.value("never_injected", std::size_t{0});
-    test.passed = *test.passed && lost == 0;
-    if (*test.passed) return tell(test);
-    if (said) test.said = last_lines(*said);
-    if (one.late) {
-      test.reason = fmt::format("it was ended after {:g} s", options_.timeout_s);
-    } else if (status >= 128) {
-      const char* name = ::sigabbrev_np(status - 128);
-      test.reason =
-          fmt::format("crashed: {}", name == nullptr ? "by a signal" : std::string("SIG") + name);
-    } else if (const std::string error = first_error(result); !error.empty()) {
-      test.reason = error;
-    } else if (const auto ended = result.find("ended"); ended != result.end() &&
-                                                        *ended == "by a fault" &&
-                                                        runtime::failed(test.expectations) == 0) {
-      test.reason = "it ended by a fault that no expectation awaits";
-    } else if (runtime::failed(test.expectations) == 0 && lost > 0) {
-      test.reason = fmt::format("{} of its scenario never came: due after its end",
-                                counted(lost, "fault or push", "faults or pushes"));
-    } else if (runtime::failed(test.expectations) == 0) {
-      test.reason = fmt::format("its process ended with status {}", status);
-    }
+    ChildRun run = child_run(file_of(one.test, ".json"), file_of(one.test, ".txt"), status,
+                             one.late ? options_.timeout_s : 0.0);
+    test.passed = run.passed;
+    test.expectations = std::move(run.expectations);
+    test.reason = std::move(run.reason);
+    test.said = std::move(run.said);
     tell(test);
   }
 

@@ -7,9 +7,9 @@
 
 #include "apps/text/draft.hpp"
 #include "apps/text/figures.hpp"
+#include "apps/text/relative_path.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/listed_names.hpp"
-#include "apps/tools/relative_path.hpp"
 #include "base/counted.hpp"
 #include "base/quoting.hpp"
 #include "identification/excite.hpp"

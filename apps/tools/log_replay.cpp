@@ -7,11 +7,11 @@
 
 #include "apps/text/draft.hpp"
 #include "apps/text/figures.hpp"
+#include "apps/text/relative_path.hpp"
 #include "apps/tools/carried_settings.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/listed_names.hpp"
 #include "apps/tools/opened_log.hpp"
-#include "apps/tools/relative_path.hpp"
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
 #include "base/quoting.hpp"

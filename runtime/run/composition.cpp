@@ -145,9 +145,10 @@ bool add_kernels(Composition& c, const robot::RobotFiles& robot, bool serves,
 }
 
 /// What to serve: an experiment, or a robot in the first of its postures.
-std::expected<Experiment, Diagnostics> read_served(const std::string& file) {
-  if (!robot::is_robot(file)) return read_experiment(file);
-  auto robot = robot::read_complete_robot(file);
+std::expected<Experiment, Diagnostics> read_served(const std::string& file,
+                                                   std::vector<TomlSetting> settings) {
+  if (!robot::is_robot(file)) return read_experiment(file, std::move(settings));
+  auto robot = robot::read_complete_robot(file, false, take_below("robot", settings));
   if (!robot) return std::unexpected(robot.error());
   std::string text = "robot = \"robot.toml\"\nduration_s = 1.0\n";  // is not followed
   if (!robot->config.postures.empty()) {
@@ -455,10 +456,12 @@ Diagnostics compose(Composition& c, const std::string& file, const Overrides& ov
   if (overrides.no_build && kernels.missing == robot::MissingKernels::kBuild) {
     kernels.missing = robot::MissingKernels::kRefuse;
   }
-  auto experiment = overrides.serves ? read_served(file) : read_experiment(file);
+  auto experiment = overrides.serves ? read_served(file, overrides.settings)
+                                     : read_experiment(file, overrides.settings);
   if (!experiment) return experiment.error();
   Experiment& e = c.experiment;
   e = std::move(*experiment);
+  for (const TomlSetting& one : overrides.settings) e.settings.push_back(one.said);
   if (auto unknown = override_experiment(e, overrides); !unknown.empty()) return unknown;
   if (auto reasons = unfit(e, overrides); !reasons.empty()) return reasons;
   if (overrides.debug) waive_time_limits();

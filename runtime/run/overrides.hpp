@@ -9,11 +9,15 @@
 #include <string>
 #include <vector>
 
+#include "base/toml_setting.hpp"
+
 namespace tandem::runtime {
 
 struct Experiment;
 
 struct Overrides {
+  /// Values of the experiment's file, and of its robot's below "robot", that are others.
+  std::vector<TomlSetting> settings = {};
   std::optional<std::uint64_t> seed = std::nullopt;
   std::optional<double> duration_s = std::nullopt;
   std::optional<double> rate = std::nullopt;  ///< 1: real time, 0: as fast as it goes

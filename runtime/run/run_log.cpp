@@ -90,6 +90,7 @@ log::RunInfo info_of(const Composition& c) {
     info.options.push_back(*e.after_stop == AfterStop::kWait ? "on_fault = wait"
                                                              : "on_fault = end");
   }
+  for (const std::string& one : e.settings) info.options.push_back(one);
   info.period_ns = e.loop.period_ns;
   info.operators_view = c.tele != nullptr;
   if (c.sim != nullptr) info.engine = sim::engine_text(e.sim.engine);

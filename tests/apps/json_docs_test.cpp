@@ -17,6 +17,7 @@
 #include "apps/run/replay_figures.hpp"
 #include "apps/run/run_summary.hpp"
 #include "apps/run/test_suite.hpp"
+#include "apps/search/commands.hpp"
 #include "apps/tools/commands.hpp"
 
 namespace tandem::apps {
@@ -35,6 +36,9 @@ const Named<std::vector<Figures::Row>> kTables{
     {"run", Figures::rows_of<const RunSummary*>()},
     {"replay", Figures::rows_of<runtime::ReplayResult>()},
     {"test", Figures::rows_of<SuiteResult>()},
+    {"shrink", Figures::rows_of<ShrinkResult>()},
+    {"search", Figures::rows_of<SearchResult>()},
+    {"search limit", Figures::rows_of<LimitResult>()},
     {"controller check", Figures::rows_of<ControllerCheckResult>()},
     {"bus", Figures::rows_of<hal::can::BusLoad>()},
     {"scales", scale_figures()},

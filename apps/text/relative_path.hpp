@@ -1,5 +1,5 @@
 // How an experiment that is written names another file.
-// Layer: apps/tools.  Thread: main.
+// Layer: apps/text.  Thread: main.
 #pragma once
 
 #include <filesystem>

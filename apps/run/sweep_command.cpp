@@ -1,0 +1,290 @@
+// `tandem sweep`: prepares a study, has its points run, keeps what they come to, and sums it up.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include "apps/robot/kernel_build.hpp"
+#include "apps/run/commands.hpp"
+#include "apps/run/connection.hpp"
+#include "apps/run/point_workers.hpp"
+#include "apps/text/console.hpp"
+#include "base/counted.hpp"
+#include "base/sha256.hpp"
+#include "rt/stop_signal.hpp"
+#include "sweep/page.hpp"
+#include "sweep/results.hpp"
+#include "sweep/summary.hpp"
+#include "sweep/table.hpp"
+
+namespace tandem::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using SweepClock = std::chrono::steady_clock;
+using SweepWorlds = std::vector<std::unique_ptr<WiredComposition>>;
+
+std::string duration_text(double seconds) {
+  if (seconds < 90.0) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 5400.0) return fmt::format("{:.0f} min", seconds / 60.0);
+  return seconds < 129'600.0 ? fmt::format("{:.1f} h", seconds / 3600.0)
+                             : fmt::format("{:.0f} days", seconds / 86'400.0);
+}
+
+std::string share_text(const sweep::PassRate& rate) {
+  const sweep::Interval interval = rate.interval();
+  return fmt::format("{} of {} passed: {:.1f} %, {:.1f} to {:.1f} % (Wilson, 95 %)", rate.passed,
+                     rate.all,
+                     100.0 * static_cast<double>(rate.passed) /
+                         static_cast<double>(std::max<std::uint64_t>(1, rate.all)),
+                     100.0 * interval.low, 100.0 * interval.high);
+}
+
+/// Everything that the points are made of, read once: kernels and plugins stay loaded, so a process
+/// that is forked from this one has them.
+struct Prepared {
+  TextsInstead::Texts texts;  ///< of the files, as they stand there
+  SweepWorlds worlds;         ///< the first point of each variant
+  sweep::SweepHead head;
+};
+
+std::expected<std::unique_ptr<WiredComposition>, Diagnostics> first_of(const sweep::Study& study,
+                                                                       const sweep::Point& point,
+                                                                       bool quiet) {
+  RunOptions options = child_options(study.experiment);
+  options.settings = point.settings;
+  return runtime::composed<WiredComposition>(study.experiment, options, {.build = builder(quiet)});
+}
+
+std::expected<Prepared, Diagnostics> prepare(const sweep::Study& study, const sweep::Points& points,
+                                             bool quiet) {
+  Prepared prepared;
+  const std::size_t variants = std::max<std::size_t>(1, study.variants.size());
+  for (std::size_t v = 0; v < variants; ++v) {  // which files there are
+    auto world = first_of(study, points.at(v), quiet);
+    if (!world) return std::unexpected(world.error());
+    for (const auto& [path, text] : (*world)->experiment.files) {
+      if (std::ranges::find(prepared.texts, path, &std::pair<std::string, std::string>::first) !=
+          prepared.texts.end())
+        continue;
+      auto original = read_file(path, "", kMostUrdfBytes);
+      if (!original) return std::unexpected(Diagnostics{original.error()});
+      prepared.texts.emplace_back(path, std::move(*original));
+    }
+  }
+  const TextsInstead instead(prepared.texts);
+  for (std::size_t v = 0; v < variants; ++v) {
+    auto world = first_of(study, points.at(v), quiet);
+    if (!world) return std::unexpected(world.error());
+    prepared.worlds.push_back(std::move(*world));
+  }
+  sweep::SweepHead& head = prepared.head;
+  head.points = points.size();
+  head.parts.emplace_back(fs::path(study.file).filename().string(), sha256(study.text));
+  head.parts.emplace_back("version of tandem", TANDEM_VERSION);
+  for (const auto& [path, text] : prepared.texts)
+    head.parts.emplace_back(fs::path(path).filename().string(), sha256(text));
+  for (const auto& world : prepared.worlds) {
+    head.parts.emplace_back("kernel", world->kernels.sha256());
+    for (const runtime::ControllerCode& code : world->controllers->code())
+      head.parts.emplace_back("plugin " + code.name, code.sha256);
+  }
+  return prepared;
+}
+
+class Sweep {
+ public:
+  Sweep(const SweepOptions& options, const sweep::Study& study, const sweep::Points& points,
+        const Prepared& prepared, sweep::SweepFolder& folder)
+      : options_(options),
+        study_(study),
+        points_(points),
+        folder_(folder),
+        workers_(study, folder.path() + "/work", prepared.texts),
+        out_(human_output(options.json)),
+        line_(out_) {}
+
+  Exit run() {
+    announce();
+    rt::install_stop_signals();
+    begin_ = SweepClock::now();
+    done_before_ = folder_.done();
+    if (const Status ran = run_points(); !ran) return refuse(ran.error());
+    if (rt::stop_requested()) {
+      fmt::print(stderr, "stopped after {} of {}; the same command goes on from there\n",
+                 folder_.done(), counted(points_.size(), "point"));
+      return interrupted(rt::stop_signal());
+    }
+    if (const Status kept = keep_logs(); !kept) return refuse(kept.error());
+    return finish();
+  }
+
+ private:
+  void announce() const {
+    if (options_.quiet) return;
+    std::string of = counted(study_.points, "sample");
+    if (study_.seeds.size() > 1) of += fmt::format(" x {}", counted(study_.seeds.size(), "seed"));
+    if (!study_.variants.empty())
+      of += fmt::format(" x {}", counted(study_.variants.size(), "variant"));
+    fmt::print(out_, "{}: {} ({}), {} at once, in {}\n", study_.file,
+               counted(points_.size(), "point"), of, options_.jobs, folder_.path());
+    if (folder_.done() > 0)
+      fmt::print(out_, "goes on: {} are there already\n", counted(folder_.done(), "point"));
+    std::fflush(out_);
+  }
+
+  Status run_points() {
+    std::uint64_t next = 0;
+    const auto more = [&] {
+      while (next < points_.size() && folder_.results()[static_cast<std::size_t>(next)]) ++next;
+      return next < points_.size() && !rt::stop_requested();
+    };
+    while (more() || workers_.going() > 0) {
+      if (rt::stop_requested()) return {};
+      while (workers_.going() < options_.jobs && more()) {
+        if (const Status started = workers_.start(points_.at(next++)); !started) return started;
+      }
+      const Status waited =
+          workers_.wait([this](const sweep::Point& point, const ChildRun& run, double seconds) {
+            failed_ += run.passed ? 0 : 1;
+            return folder_.add(point, {.passed = run.passed,
+                                       .ended = run.ended,
+                                       .reason = run.reason,
+                                       .expectations = run.expectations,
+                                       .seconds = seconds});
+          });
+      if (!waited) return waited;
+      show_progress();
+    }
+    return {};
+  }
+
+  void show_progress() {
+    if (options_.quiet || !line_.due()) return;
+    const double s = std::chrono::duration<double>(SweepClock::now() - begin_).count();
+    const double rate = static_cast<double>(folder_.done() - done_before_) / s;
+    const auto left = static_cast<double>(points_.size() - folder_.done());
+    line_.show(fmt::format("{} of {} points, {:.1f} a second{}, {} failed", folder_.done(),
+                           points_.size(), rate,
+                           rate > 0.0 ? ", " + duration_text(left / rate) + " left" : "", failed_));
+  }
+
+  /// The points that [keep] wants logs of, once more with a log each, in their order: a run is a
+  /// function of its files, so it is the same run.
+  Status keep_logs() {
+    double left_MB = study_.keep.logs_MB;
+    std::uint64_t passed = 0;
+    const std::string all = folder_.path() + "/logs";
+    for (std::uint64_t i = 0; i < points_.size() && left_MB > 0.0; ++i) {
+      const auto& result = folder_.results()[static_cast<std::size_t>(i)];
+      if (result->passed && passed >= study_.keep.sample) continue;
+      passed += result->passed ? 1 : 0;
+      const sweep::Point point = points_.at(i);
+      const std::string folder = all + "/" + point.name;
+      std::error_code ignored;
+      if (!fs::exists(folder, ignored)) {
+        if (const Status started = workers_.start(point, folder + ".part"); !started)
+          return started;
+        while (workers_.going() > 0 && !rt::stop_requested()) {
+          const auto nothing = [](const auto&, const auto&, double) { return Status(); };
+          if (const Status waited = workers_.wait(nothing); !waited) return waited;
+        }
+        if (rt::stop_requested()) return {};
+        fs::rename(folder + ".part", folder, ignored);
+      }
+      for (const fs::directory_entry& file : fs::recursive_directory_iterator(folder, ignored))
+        left_MB -= static_cast<double>(file.file_size(ignored)) * 1e-6;
+    }
+    return {};
+  }
+
+  Exit finish() {
+    const auto& results = folder_.results();
+    if (const Status s = sweep::write_tables(folder_.path(), study_, points_, results); !s)
+      return refuse(s.error());
+    sweep::SweepSummary summary = sweep::summary_of(study_, points_, results);
+    summary.folder = folder_.path();
+    const std::string page = folder_.path() + "/index.html";
+    if (const Status s = sweep::write_page(page, study_, points_, results, summary); !s)
+      return refuse(s.error());
+    print(summary);
+    if (const Status s = write_json(options_.json, figures_json(summary)); !s)
+      return refuse(s.error());
+    const double share = static_cast<double>(summary.rate.passed) /
+                         static_cast<double>(std::max<std::uint64_t>(1, summary.rate.all));
+    return share < options_.at_least ? Exit::kFault : Exit::kDone;
+  }
+
+  void print(const sweep::SweepSummary& summary) const {
+    if (options_.quiet) return;
+    const double s = std::chrono::duration<double>(SweepClock::now() - begin_).count();
+    const std::uint64_t now = folder_.done() - done_before_;
+    fmt::print(out_, "\n{}\n", share_text(summary.rate));
+    for (const sweep::PassRate& one : summary.variants)
+      fmt::print(out_, "  {}: {}\n", shown(one.variant), share_text(one));
+    for (const sweep::Comparison& one : summary.comparisons) {
+      fmt::print(out_,
+                 "  {} against {}: {} passed with {} alone, {} with {} alone; McNemar p = {:.3g}\n",
+                 shown(one.other), shown(one.first), one.only_other, shown(one.other),
+                 one.only_first, shown(one.first), one.p());
+    }
+    for (const auto& [ended, count] : summary.ends)
+      fmt::print(out_, "  {} ended: {}\n", count, shown(ended));
+    if (!summary.ranking.empty()) {
+      Table table({"margin of", "with", "rank correlation"});
+      for (std::size_t i = 0; i < std::min<std::size_t>(10, summary.ranking.size()); ++i) {
+        const sweep::Sensitivity& one = summary.ranking[i];
+        table.add({shown(one.expectation, 48), shown(one.key, 48),
+                   fmt::format("{:+.2f}", one.rank_correlation)});
+      }
+      fmt::print(out_, "\n");
+      table.print(out_);
+    }
+    fmt::print(out_, "\nworst:\n");
+    for (const sweep::WorstPoint& one : summary.worst) {
+      fmt::print(out_, "{} {}{}\n  {}\n", one.passed ? "passed" : "FAILED", one.point,
+                 one.why.empty() ? "" : ": " + shown(one.why), one.command);
+    }
+    fmt::print(out_, "\n{}/results.csv, results.sqlite, index.html", folder_.path());
+    if (now > 0)
+      fmt::print(out_, "; {} in {:.1f} s, {:.2f} a second", counted(now, "point"), s,
+                 static_cast<double>(now) / s);
+    fmt::print(out_, "\n");
+  }
+
+  const SweepOptions& options_;
+  const sweep::Study& study_;
+  const sweep::Points& points_;
+  sweep::SweepFolder& folder_;
+  PointWorkers workers_;
+  std::FILE* out_;
+  StatusLine line_;
+  SweepClock::time_point begin_;
+  std::uint64_t done_before_ = 0, failed_ = 0;
+};
+
+}  // namespace
+
+Exit sweep_command(const SweepOptions& given) {
+  SweepOptions options = given;
+  if (options.jobs == 0) options.jobs = std::max(1U, std::thread::hardware_concurrency());
+  if (options.folder.empty()) options.folder = "sweeps/" + fs::path(options.study).stem().string();
+  const auto study = sweep::read_study(options.study);
+  if (!study) return refuse(study.error());
+  const sweep::Points points(*study);
+  auto prepared = prepare(*study, points, options.quiet);
+  if (!prepared) return refuse(prepared.error());
+  if (prepared->worlds.front()->experiment.expectations.empty()) {
+    return refuse(Error{.message = "has no [[expect]]: every point would come to nothing",
+                        .hint = "say what is expected: docs/expectations.md",
+                        .file = study->experiment,
+                        .key = {}});
+  }
+  auto folder = sweep::SweepFolder::open(options.folder, prepared->head, points);
+  if (!folder) return refuse(folder.error());
+  return Sweep(options, *study, points, *prepared, *folder).run();
+}
+
+}  // namespace tandem::apps
