@@ -18,6 +18,7 @@
 #include "apps/run/run_summary.hpp"
 #include "apps/run/test_suite.hpp"
 #include "apps/tools/commands.hpp"
+#include "sweep/summary.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -35,6 +36,7 @@ const Named<std::vector<Figures::Row>> kTables{
     {"run", Figures::rows_of<const RunSummary*>()},
     {"replay", Figures::rows_of<runtime::ReplayResult>()},
     {"test", Figures::rows_of<SuiteResult>()},
+    {"sweep", Figures::rows_of<sweep::SweepSummary>()},
     {"controller check", Figures::rows_of<ControllerCheckResult>()},
     {"bus", Figures::rows_of<hal::can::BusLoad>()},
     {"scales", scale_figures()},
