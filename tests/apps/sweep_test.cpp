@@ -31,7 +31,7 @@ TEST_F(SweepProgram, ASetValueIsRunLoggedAndToldOf) {
   const Outcome run = tandem(
       "run hold.toml --log . --json run.json --set duration_s=0.2 --set push.bump.torque_Nm[0]=40");
   EXPECT_EQ(run.status, 1) << run.err;
-  EXPECT_EQ(json("run.json")["cycles"], 200);
+  EXPECT_EQ(json("run.json")["planned_cycles"], 200);
   std::string log;
   for (const auto& entry : std::filesystem::directory_iterator(folder_))
     if (entry.path().extension() == ".mcap") log = entry.path().filename().string();
