@@ -49,7 +49,8 @@ b.no { color: var(--bad); }
 @media print { .card { break-inside: avoid; } }
 )";
 
-constexpr double kWide = 340.0, kHigh = 180.0, kLeft = 8.0, kRight = 8.0, kTop = 10.0, kFoot = 22.0;
+constexpr double kWide = 340.0, kHigh = 180.0, kLeft = 48.0, kRight = 8.0, kTop = 10.0,
+                 kFoot = 22.0;
 constexpr std::size_t kMostDots = 1'500;
 
 std::string text_in_page(const std::string& text) { return xml_text(harmless(text)); }
@@ -97,6 +98,11 @@ std::string ends_of_axis(const Span& span, const std::string& unit) {
          label(kWide - kRight, kHigh - 6.0, "end", fmt::format("{:.3g} {}", span.high, unit));
 }
 
+/// A number at a height, left of the figure.
+std::string beside_axis(double value, double share) {
+  return label(kLeft - 5.0, y_at(share) + 4.0, "end", fmt::format("{:.3g}", value));
+}
+
 /// How many points have which margin; those that failed in the other color.
 std::string histogram(const std::vector<Dot>& dots, const NamedMargin& margin) {
   constexpr std::size_t kBars = 24;
@@ -132,6 +138,7 @@ std::string histogram(const std::vector<Dot>& dots, const NamedMargin& margin) {
         "<line class=\"zero\" x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{0:.1f}\" y2=\"{2:.1f}\"/>", x,
         kTop, kHigh - kFoot);
   }
+  out += beside_axis(static_cast<double>(most), 1.0) + beside_axis(0.0, 0.0);
   return out + ends_of_axis(span, margin.unit) + "</svg>";
 }
 
@@ -154,8 +161,7 @@ std::string scatter(const std::vector<Dot>& dots, const NamedMargin& margin,
                        y_at(y.share(dots[i].margin)));
   }
   out += "</g>";
-  out += label(kLeft + 2.0, kTop + 4.0, "start", fmt::format("{:.3g} {}", y.high, margin.unit));
-  out += label(kLeft + 2.0, kHigh - kFoot - 4.0, "start", fmt::format("{:.3g}", y.low));
+  out += beside_axis(y.high, 1.0) + beside_axis(y.low, 0.0);
   return out + ends_of_axis(x, "") + "</svg>";
 }
 
@@ -225,11 +231,15 @@ std::string margins(const Study& study, const Points& points,
         "<h2>{}</h2>\n<div class=\"figures\"><div class=\"card\"><h3>margin{}: {}</h3>{}</div>\n",
         text_in_page(margin.name),
         margin.unit.empty() ? "" : " [" + text_in_page(margin.unit) + "]",
-        counted(dots.size(), "point"), histogram(dots, margin));
+        dots.size() == results.size()
+            ? counted(dots.size(), "point")
+            : fmt::format("{} of {} points have one", dots.size(), results.size()),
+        histogram(dots, margin));
     for (std::size_t k = 0; k < study.vary.size(); ++k) {
       for (std::size_t i = 0; i < dots.size(); ++i)
         dots[i].x = number_of(study.vary[k], points.at(indices[i]).values[k]);
-      out += fmt::format("<div class=\"card\"><h3>over {}</h3>{}</div>\n",
+      out += fmt::format("<div class=\"card\"><h3>margin{} over {}</h3>{}</div>\n",
+                         margin.unit.empty() ? "" : " [" + text_in_page(margin.unit) + "]",
                          text_in_page(study.vary[k].key), scatter(dots, margin, study.vary[k].key));
     }
     out += "</div>\n";

@@ -35,13 +35,14 @@ std::map<std::string, double> scales_of(const Results& results) {
 
 double badness(const PointResult& result, const std::map<std::string, double>& scales) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
+  if (!result.passed && result.expectations.empty()) return -kNone;
   double least = kNone;
   for (const auto& one : result.expectations) {
+    if (!one.passed && !one.margin) return -kNone;
     const auto scale = scales.find(one.name);
     if (one.margin && scale != scales.end()) least = std::min(least, *one.margin / scale->second);
   }
-  if (result.passed) return least;
-  return least == kNone ? -kNone : least;
+  return least;
 }
 
 std::string variant_name(const Study& study, const Point& point) {

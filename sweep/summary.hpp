@@ -58,8 +58,9 @@ struct SweepSummary {
 };
 void figures(apps::Figures& f, const SweepSummary& summary);
 
-/// Worst are points without margins (crashed, refused) first, then by the least margin, each
-/// expectation's as a multiple of the median of its absolute values: so units do not matter.
+/// Worst are points that failed without a margin (crashed, refused, fell) first, then by the least
+/// margin, each expectation's as a multiple of the median of its absolute values: so units do not
+/// matter.
 [[nodiscard]] SweepSummary summary_of(const Study& study, const Points& points,
                                       const std::vector<std::optional<PointResult>>& results);
 

@@ -197,12 +197,8 @@ std::vector<NamedMargin> margins_of(const std::vector<std::optional<PointResult>
   for (const auto& result : results) {
     if (!result) continue;
     for (const runtime::ExpectationResult& one : result->expectations) {
-      const auto it = std::ranges::find(all, one.name, &NamedMargin::name);
-      if (it == all.end()) {
+      if (one.margin && std::ranges::find(all, one.name, &NamedMargin::name) == all.end())
         all.push_back({one.name, one.unit});
-      } else if (it->unit.empty()) {
-        it->unit = one.unit;
-      }
     }
   }
   return all;

@@ -27,7 +27,8 @@ struct Column {
 [[nodiscard]] std::vector<Column> columns_of(
     const Study& study, const std::vector<std::optional<PointResult>>& results);
 
-/// Names and units of the expectations that any point has, in the order of their first.
+/// Names and units of the expectations that have a margin in any point, in the order of their
+/// first.
 struct NamedMargin {
   std::string name, unit;
 };

@@ -104,11 +104,15 @@ Diagnostics notes_of(const RecordedRun& run, const Composition& c, const ReplayO
   Diagnostics notes;
   const log::RunInfo& info = run.info();
   std::string gone;
+  const bool was_set = std::ranges::any_of(
+      info.options, [](const std::string& one) { return one.starts_with("--set "); });
   for (const auto& [path, text] : info.configuration) {
     const auto now = read_file(path, {}, kMostUrdfBytes);
     if (!now) gone += (gone.empty() ? "" : ", ") + path;
     if (!now || *now == text) continue;
-    notes.push_back({.message = "has changed since: the log's text of it is replayed",
+    notes.push_back({.message = (was_set ? "is otherwise here, by --set or a change since"
+                                         : "has changed since") +
+                                std::string(": the log's text of it is replayed"),
                      .hint = "record the run once more to have the file as it is now",
                      .file = path,
                      .key = {}});

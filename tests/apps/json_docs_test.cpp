@@ -19,6 +19,7 @@
 #include "apps/run/test_suite.hpp"
 #include "apps/search/commands.hpp"
 #include "apps/tools/commands.hpp"
+#include "sweep/summary.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -36,6 +37,7 @@ const Named<std::vector<Figures::Row>> kTables{
     {"run", Figures::rows_of<const RunSummary*>()},
     {"replay", Figures::rows_of<runtime::ReplayResult>()},
     {"test", Figures::rows_of<SuiteResult>()},
+    {"sweep", Figures::rows_of<sweep::SweepSummary>()},
     {"shrink", Figures::rows_of<ShrinkResult>()},
     {"search", Figures::rows_of<SearchResult>()},
     {"search limit", Figures::rows_of<LimitResult>()},
