@@ -201,6 +201,7 @@ FallLimits Experiment::fall_limits() const {
   if (start == nullptr || !robot.model.floating_base || robot.contact.feet.empty()) return limits;
   limits.watched = falls_are_faults;
   limits.ground_m = robot.contact.height_m;
+  if (plant != nullptr) limits.terrain = plant->robot.contact.terrain;
   limits.standing_m = limits.highest_m = start->base_height_m - limits.ground_m;
   if (description == nullptr) return limits;
   if (const auto touching = robot::standing(robot, *start, description->tree)) {

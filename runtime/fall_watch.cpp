@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numbers>
+#include <span>
 
 namespace tandem::runtime {
 
@@ -15,6 +16,14 @@ Fall found(FaultCause cause, double value) noexcept {
   return {cause, static_cast<std::int32_t>(std::clamp(1e3 * value, -2e9, 2e9))};
 }
 
+/// The ground's height in W under a place, where it is by now.
+double ground_under(const FallLimits& limits, const hal::GroundMotion& moved,
+                    std::span<const double> place) noexcept TANDEM_RT {
+  if (limits.terrain.level()) return limits.ground_m;
+  const double x = place[0] - moved.position_m[0], y = place[1] - moved.position_m[1];
+  return limits.ground_m + moved.position_m[2] + limits.terrain.at(x, y).height_m;
+}
+
 }  // namespace
 
 Fall FallWatch::look(const hal::TruthImage& truth) noexcept TANDEM_RT {
@@ -23,7 +32,10 @@ Fall FallWatch::look(const hal::TruthImage& truth) noexcept TANDEM_RT {
   if (!(tilt_rad <= limits_.tilt_rad)) {
     return found(FaultCause::kTilted, tilt_rad * 180.0 / std::numbers::pi);
   }
-  const double height_m = truth.base_position_m()[2] - limits_.ground_m;
+  const hal::GroundMotion moved =
+      limits_.terrain.motion_at(1e-9 * static_cast<double>(truth.time_ns()[0]));
+  const auto base = truth.base_position_m();
+  const double height_m = base[2] - ground_under(limits_, moved, base);
   if (!(height_m >= limits_.lowest_share * limits_.standing_m)) {
     return found(FaultCause::kLow, height_m);
   }
@@ -31,7 +43,8 @@ Fall FallWatch::look(const hal::TruthImage& truth) noexcept TANDEM_RT {
     return found(FaultCause::kHigh, height_m);
   bool touching = false;
   for (std::size_t f = 0; f < truth.feet(); ++f) {
-    const double depth_m = limits_.ground_m - truth.foot_position_m()[3 * f + 2];
+    const auto foot = truth.foot_position_m().subspan(3 * f, 3);
+    const double depth_m = ground_under(limits_, moved, foot) - foot[2];
     if (depth_m > limits_.sunk_share * limits_.standing_m) return found(FaultCause::kSunk, depth_m);
     touching = touching || truth.foot_force_N()[3 * f + 2] > 0.0;
   }

@@ -7,6 +7,7 @@
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
+#include "hal/config/terrain.hpp"
 #include "hal/stop_category.hpp"
 #include "hal/truth.hpp"
 
@@ -15,7 +16,8 @@ namespace tandem::runtime {
 /// When a robot with a floating base has fallen. Heights are of the base's origin above the ground.
 struct FallLimits {
   bool watched = false;
-  double ground_m = 0.0;                           ///< the ground's height in W
+  double ground_m = 0.0;                           ///< the level ground's height in W
+  hal::Terrain terrain{};                          ///< over it
   double standing_m = 0.0;                         ///< where it stands in its first posture
   double highest_m = 0.0;                          ///< it starts there, or lower
   double tilt_rad = 1.0472;                        ///< of the base: 60 degrees

@@ -91,7 +91,8 @@ TEST_F(Suite, OneThatCrashesCostsThatOne) {
   EXPECT_FALSE(tests.contains("suite/robot.toml")) << "it is no experiment";
   const std::string xml = read_text(folder_ / "out/suite.xml");
   EXPECT_NE(xml.find("<failure message=\"failed, it never held"), std::string::npos) << xml;
-  EXPECT_NE(xml.find("<skipped message=\"it has no [[expect]], and nothing happens in it\"/>"), std::string::npos);
+  EXPECT_NE(xml.find("<skipped message=\"it has no [[expect]], and nothing happens in it\"/>"),
+            std::string::npos);
   EXPECT_EQ(xml.find("message=\"crashed\""), std::string::npos) << "each has ended";
   // The command that repeats it does so.
   const std::string again = tests["suite/bad.toml"]["command"];
