@@ -125,6 +125,11 @@ Status PointWorkers::wait(const Take& take) {
 Status PointWorkers::take_one(Going& one, int status, const Take& take) {
   const std::chrono::duration<double> took = WorkerClock::now() - one.begin;
   const std::string json = file_of(one.point, ".json"), output = file_of(one.point, ".txt");
+  std::error_code ignored;
+  if (status == static_cast<int>(Exit::kUsage) && !one.late && !fs::exists(json, ignored)) {
+    return fail(folder_ + ": a point's result cannot be written there",
+                "make room; then the same command goes on from here");
+  }
   const ChildRun run = child_run(json, output, status, one.late ? study_.time_limit_s : 0.0);
   for (const std::string& file : {json, output}) (void)::unlink(file.c_str());
   return take(one.point, run, took.count());
