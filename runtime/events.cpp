@@ -129,6 +129,7 @@ void Events::add_results(bool followed, std::vector<ExpectationResult>& results)
                             ? fmt::format("it has not come, it is due at {:.6g} s",
                                           static_cast<double>(due_ns) / 1e9)
                             : "its condition has not held: " + one.spec.when;
+        result.awaits = result.reason;
       }
     }
     results.push_back(std::move(result));

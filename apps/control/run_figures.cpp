@@ -99,6 +99,11 @@ void figures(Figures& f, const runtime::ExpectationResult& one) {
     "why it failed; of an event that passed: that it did not come, and is optional; else empty",
     one.reason);
   f("joint", "of a signal with a `*`: the worst; empty: it has none", one.joint);
+  f("awaits",
+    "what may still come to one that has not passed, while the run goes on; empty: nothing",
+    one.awaits);
+  f("holds_so_far", "of one that awaits something: nothing speaks against it yet",
+    one.holds_so_far);
 }
 
 void figures(Figures& f, const RunFigures* s) {

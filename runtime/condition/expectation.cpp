@@ -207,19 +207,24 @@ void Expectation::take(const hal::CycleView& view) noexcept TANDEM_RT {
   note(margin, margin >= 0.0, view);
 }
 
-std::string Expectation::unjudged() const {
-  if (!impossible_.empty()) return impossible_;
-  if (so_far_.last_ns == kNever) return "its controllers never started";
-  if (so_far_.zero_ns == kNever)
-    return "its window was never reached: '" + spec_.after + "' never held";
-  const double ran_s = in_seconds(so_far_.last_ns - so_far_.zero_ns);
-  if (so_far_.cycles == 0) {
-    return fmt::format(
+bool Expectation::unjudged(ExpectationResult& result) const {
+  if (!impossible_.empty()) {
+    result.reason = impossible_;
+  } else if (so_far_.last_ns == kNever) {
+    result.reason = "its controllers never started";
+    result.awaits = "its controllers have not started";
+  } else if (so_far_.zero_ns == kNever) {
+    result.reason = "its window was never reached: '" + spec_.after + "' never held";
+    result.awaits = "it begins once '" + spec_.after + "' holds";
+  } else if (so_far_.cycles == 0) {
+    result.reason = fmt::format(
         "its window was never reached: it begins at {:g} s, and the run ended at {:g} s",
-        spec_.from_s, ran_s);
+        spec_.from_s, in_seconds(so_far_.last_ns - so_far_.zero_ns));
+    result.awaits = fmt::format("it begins at {:g} s", spec_.from_s);
+  } else if (so_far_.unknown == so_far_.cycles) {
+    result.reason = "nobody measured it";
   }
-  if (so_far_.unknown == so_far_.cycles) return "nobody measured it";
-  return {};
+  return !result.reason.empty();
 }
 
 std::string Expectation::amount(double value) const {
@@ -267,7 +272,11 @@ void Expectation::judge_settling(ExpectationResult& result) const {
   if (so_far_.outside_ns == so_far_.end_ns) {
     result.reason = "it was outside at the end of its window";
     const double late = spec_.in_s - in_seconds(so_far_.end_ns - so_far_.first_ns);
-    if (late < 0.0) result.margin = late;
+    if (late < 0.0) {
+      result.margin = late;
+    } else {
+      result.awaits = fmt::format("it has {:g} s left to settle", late);
+    }
     return;
   }
   const std::int64_t settled =
@@ -281,14 +290,15 @@ void Expectation::judge_settling(ExpectationResult& result) const {
   if (!result.passed || watched >= in_ns(spec_.in_s)) return;
   result.passed = false;
   result.reason = fmt::format("the run ended {:g} s after its window began", in_seconds(watched));
+  result.awaits = "its window goes on";
+  result.holds_so_far = true;
 }
 
 ExpectationResult Expectation::result() const {
   ExpectationResult result;
   result.name = spec_.name;
   result.unit = unit();
-  result.reason = unjudged();
-  if (!result.reason.empty()) return result;
+  if (unjudged(result)) return result;
   if (std::isfinite(so_far_.worst)) result.margin = so_far_.worst;
   if (so_far_.worst_ns != kNever) result.at_s = in_seconds(so_far_.worst_ns);
   const bool recorded = spec_.kind == Judged::kAsIn;
@@ -313,12 +323,16 @@ ExpectationResult Expectation::result() const {
                                    in_seconds(compared_.front().then.last_ns()));
   }
   const std::int64_t ran = so_far_.last_ns - so_far_.zero_ns;
-  const bool whole = !std::isfinite(spec_.to_s) || ran + so_far_.period_ns >= to_ns_;
+  const bool endless = !std::isfinite(spec_.to_s);
+  const bool whole = endless || ran + so_far_.period_ns >= to_ns_;
   if (result.passed && !whole && !once) {
     result.passed = false;
     result.reason = fmt::format("its window ends at {:g} s, and the run ended at {:g} s",
                                 spec_.to_s, in_seconds(ran));
+    result.awaits = fmt::format("its window ends at {:g} s", spec_.to_s);
+    result.holds_so_far = true;
   }
+  if (!result.passed && once && (endless || !whole)) result.awaits = "it has not held yet";
   return result;
 }
 

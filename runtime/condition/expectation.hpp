@@ -27,6 +27,10 @@ struct ExpectationResult {
   std::optional<double> at_s{};  ///< when that was, as in the log: the worst cycle
   std::string reason;            ///< why it failed; empty: it passed, or did not come and may
   std::string joint{};           ///< with a `*`: which one that was
+  /// What may still come to one that has not passed, while the run goes on: "its window ends at
+  /// 5 s". Empty: it passed, or nothing can make it pass any more.
+  std::string awaits{};
+  bool holds_so_far = false;  ///< of one that awaits something: nothing speaks against it yet
 
   bool operator==(const ExpectationResult&) const = default;
 };
@@ -81,8 +85,8 @@ class Expectation {
   [[nodiscard]] bool is_condition() const { return spec_.kind <= ExpectationKind::kEventually; }
   [[nodiscard]] double margin_of(double number) const noexcept TANDEM_RT;
   void note(double margin, bool holds, const hal::CycleView& view) noexcept TANDEM_RT;
-  /// Why nothing can be said; empty: something can.
-  [[nodiscard]] std::string unjudged() const;
+  /// Whether nothing can be said yet, or at all; the reason is in `result` then.
+  [[nodiscard]] bool unjudged(ExpectationResult& result) const;
   [[nodiscard]] std::string amount(double value) const;
   /// Reads what a kAsIn compares with: of a signal with a `*`, of each joint.
   Status read_recorded(const QuantityNames& names);

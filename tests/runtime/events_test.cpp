@@ -137,6 +137,7 @@ TEST(Events, WhatNeverComesFailsUnlessItIsOptional) {
   EXPECT_EQ(results[0].reason, "its condition has not held: position(joint1) > 100rad");
   EXPECT_TRUE(results[1].passed);
   EXPECT_EQ(results[2].reason, "it has not come, it is due at 90 s");
+  EXPECT_EQ(results[2].awaits, "it has not come, it is due at 90 s");
   EXPECT_NE(results[3].reason.find("nobody carries out requests"), std::string::npos);
 }
 

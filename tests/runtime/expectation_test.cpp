@@ -148,6 +148,8 @@ TEST_F(ExpectationTest, AWindowThatIsNotReachedFails) {
   EXPECT_FALSE(before.margin);
   EXPECT_EQ(before.reason,
             "its window was never reached: it begins at 0.01 s, and the run ended at 0.002 s");
+  EXPECT_EQ(before.awaits, "it begins at 0.01 s");
+  EXPECT_FALSE(before.holds_so_far);
   of.from_s = 0.0;
   of.to_s = 0.01;
   EXPECT_EQ(run(of, {1, 2, 3}).reason, "its window ends at 0.01 s, and the run ended at 0.002 s");
@@ -157,6 +159,28 @@ TEST_F(ExpectationTest, AWindowThatIsNotReachedFails) {
   of.kind = ExpectationKind::kEventually;
   EXPECT_TRUE(run(of, {1, 2, 3}).passed) << "it has held";
   EXPECT_EQ(run(of, std::vector<double>{}).reason, "its controllers never started");
+}
+
+TEST_F(ExpectationTest, OneUnderWaySaysWhatMayStillCome) {
+  auto of = spec(ExpectationKind::kAlways, "torque(knee) < 40Nm");
+  of.to_s = 0.01;
+  EXPECT_EQ(run(of, {1, 2, 3}).awaits, "its window ends at 0.01 s");
+  EXPECT_TRUE(run(of, {1, 2, 3}).holds_so_far);
+  EXPECT_EQ(run(of, {1, 99, 3}).awaits, "") << "it has failed";
+  EXPECT_EQ(run(of, std::vector<double>{}).awaits, "its controllers have not started");
+  of.after = "torque(knee) > 90Nm";
+  EXPECT_EQ(run(of, {1, 2, 3}).awaits, "it begins once 'torque(knee) > 90Nm' holds");
+  auto once = spec(ExpectationKind::kEventually, "torque(knee) > 40Nm");
+  EXPECT_EQ(run(once, {1, 2}).awaits, "it has not held yet");
+  once.to_s = 0.002;
+  EXPECT_EQ(run(once, {1, 2, 3}).awaits, "") << "its window is over";
+  auto settles = spec(ExpectationKind::kSettles, "torque(knee)");
+  settles.below = "40Nm";
+  settles.in_s = 0.003;
+  EXPECT_EQ(run(settles, {99, 98}).awaits, "it has 0.002 s left to settle");
+  EXPECT_EQ(run(settles, {99, 1}).awaits, "its window goes on");
+  EXPECT_TRUE(run(settles, {99, 1}).holds_so_far);
+  EXPECT_EQ(run(settles, {99, 98, 97, 96, 95}).awaits, "");
 }
 
 TEST_F(ExpectationTest, WhatNobodyMeasuredFails) {

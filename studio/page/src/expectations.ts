@@ -13,6 +13,9 @@ export interface Expected {
   at_s: number | null;
   /** Why it has not passed. */
   reason: string;
+  /** What may still come to one that has not passed while the run goes on; empty: nothing. */
+  awaits: string;
+  holds_so_far: boolean;
 }
 
 /** How an expectation stands: `sort` is its colour, `why` the reason, if there is one. */
@@ -23,31 +26,22 @@ export interface Standing {
 }
 
 const kWords = { good: '✓ holds', bad: '✗ does not', muted: '… not yet' };
-/** Reasons of runtime/condition that are none while the run goes on: how it stands then, and why. */
-const kUnderWay: [RegExp, 'good' | 'muted', string][] = [
-  [/^its controllers never started$/, 'muted', 'its controllers have not started'],
-  [/^its window was never reached: it begins at (.+?), and.*/s, 'muted', 'it begins at $1'],
-  [/^its window was never reached: (.*) never held$/s, 'muted', 'it begins once $1 holds'],
-  [/^its window ends at (.+?), and.*/s, 'good', 'its window ends at $1'],
-  [/^the run ended .* after its window began$/, 'good', 'its window goes on'],
-];
-
 /** @param over nothing comes any more: what is not known by then has failed */
-export function standingOf({ passed, reason }: Expected, over: boolean): Standing {
+export function standingOf(one: Expected, over: boolean): Standing {
   const standing = (sort: Standing['sort'], why: string) => ({ sort, word: kWords[sort], why });
-  if (passed) return standing('good', '');
-  const row = over ? undefined : kUnderWay.find(([words]) => words.test(reason));
-  return row ? standing(row[1], reason.replace(row[0], row[2])) : standing('bad', reason);
+  if (one.passed) return standing('good', one.reason);
+  if (over || one.awaits === '') return standing('bad', one.reason);
+  return standing(one.holds_so_far ? 'good' : 'muted', one.awaits);
 }
 
-/** "3 of 4 hold so far, 1 not begun." */
+/** "3 of 4 hold so far, 1 not yet." */
 export function expectedWords(all: Expected[], over = false): string {
   if (all.length === 0)
     return 'The experiment expects nothing: rows [[expect]] say what it must do.';
   const count = (sort: string) => all.filter((one) => standingOf(one, over).sort === sort).length;
   const [held, waiting] = [count('good'), count('muted')];
   if (held === all.length) return `All ${held} hold so far.`;
-  return `${held} of ${all.length} hold so far${waiting > 0 ? `, ${waiting} not begun` : ''}.`;
+  return `${held} of ${all.length} hold so far${waiting > 0 ? `, ${waiting} not yet` : ''}.`;
 }
 
 /** "24.5 Nm", "–" */

@@ -182,16 +182,17 @@ describe('the joints and the 3D view of the studio', {
     const mock = await play();
     const row = (name, reason) => ({
       ...{ name, passed: reason === '', margin: null, unit: 'Nm', at_s: null, reason },
+      ...{ joint: '', awaits: '', holds_so_far: false },
     });
     const begins = 'its window was never reached: it begins at 30 s, and the run ended at 20 s';
     mock.robot.expected = [
       { ...row('the knee keeps within its torque', ''), margin: 24.5, at_s: 4.352 },
       { ...row('the base stays level', 'it did not hold in 3 of 900 cycles'), margin: -0.2 },
-      row('it settles after the push', begins),
+      { ...row('it settles after the push', begins), awaits: 'it begins at 30 s' },
     ];
     const page = await visit(mock.address, { scheme: 'dark' });
     await page.click('#tab-expected');
-    await until(page, '1 of 3 hold so far, 1 not begun.');
+    await until(page, '1 of 3 hold so far, 1 not yet.');
     const texts = (selector) => page.locator(`.expect-table ${selector}`).allTextContents();
     assert.deepEqual(await texts('thead th'), ['expectation', 'so far', 'margin', 'at']);
     assert.deepEqual(await texts('.doc'), [
