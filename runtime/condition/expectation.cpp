@@ -317,11 +317,11 @@ ExpectationResult Expectation::result() const {
     result.passed = false;
     result.reason = fmt::format("nobody measured it in {} of {}, first at {:g} s", so_far_.unknown,
                                 counted(so_far_.cycles, "cycle"), in_seconds(so_far_.unknown_ns));
-    if (recorded)
-      result.reason += fmt::format("; the log has it from {:g} s to {:g} s",
-                                   in_seconds(compared_.front().then.first_ns()),
-                                   in_seconds(compared_.front().then.last_ns()));
   }
+  if (so_far_.unknown > 0 && recorded)
+    result.reason += fmt::format("; the log has it from {:g} s to {:g} s",
+                                 in_seconds(compared_.front().then.first_ns()),
+                                 in_seconds(compared_.front().then.last_ns()));
   const std::int64_t ran = so_far_.last_ns - so_far_.zero_ns;
   const bool endless = !std::isfinite(spec_.to_s);
   const bool whole = endless || ran + so_far_.period_ns >= to_ns_;

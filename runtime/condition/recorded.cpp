@@ -126,7 +126,7 @@ Result<Recorded> Recorded::read(const Expression& expression, const QuantityName
                 "write one, such as position(JOINT)");
   }
   const auto log = log::LogFile::open(file);
-  if (!log) return std::unexpected(log.error());
+  if (!log) return fail("the log " + file + ": " + log.error().message, log.error().hint);
   if (const Status whole = log->require_samples(); !whole) return std::unexpected(whole.error());
   std::vector<Series> all;
   for (const Quantity& quantity : quantities) {

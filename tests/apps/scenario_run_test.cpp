@@ -141,14 +141,14 @@ TEST_F(ScenarioRun, IsAsInALog) {
   EXPECT_EQ(row["unit"], "rad");
   EXPECT_EQ(row["joint"], "joint1");
   scenario("other",
-           all + "[[push]]\njoint = \"joint2\"\nforce_N = [20, 0, 0]\nat_s = 0.7\nfor_s = 0.1\n");
+           all + "[[push]]\njoint = \"joint2\"\nforce_N = [0, 20, 0]\nat_s = 0.3\nfor_s = 0.1\n");
   const Outcome other = tandem("run other.toml --duration 0.3 -q --no-log --json other.json");
   EXPECT_EQ(other.status, 1) << other.err;
   const auto failed = json("other.json")["expectations"][0];
   EXPECT_LT(failed["margin"], 0.0) << failed;
   EXPECT_NE(failed["reason"].get<std::string>().find("it differed in"), std::string::npos);
   EXPECT_NE(failed["joint"], "") << failed;
-  const Outcome longer = tandem("run same.toml --duration 0.5 -q --no-log --json long.json");
+  const Outcome longer = tandem("run same.toml --duration 5 -q --no-log --json long.json");
   EXPECT_EQ(longer.status, 1) << longer.err;
   EXPECT_NE(json("long.json")["expectations"][0].dump().find("; the log has it from 0 s to"),
             std::string::npos);

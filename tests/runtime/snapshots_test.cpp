@@ -12,13 +12,13 @@
 namespace tandem::runtime {
 namespace {
 
-/// "coman/squat", and so on: all but robots and drives' data sheets.
+/// "coman/squat", and so on: all but robots, drives' data sheets, and studies of experiments.
 std::vector<std::string> bundled_experiments() {
   std::vector<std::string> found;
   const std::filesystem::path root = TANDEM_SOURCE_DIR "/config";
   for (const auto& folder : std::filesystem::directory_iterator(root)) {
     const std::string robot = folder.path().filename().string();
-    if (!folder.is_directory() || robot == "drives") continue;
+    if (!folder.is_directory() || robot == "drives" || robot == "studies") continue;
     for (const auto& file : std::filesystem::directory_iterator(folder.path())) {
       const std::string name = file.path().stem().string();
       if (file.path().extension() == ".toml" && !name.starts_with("robot")) {
