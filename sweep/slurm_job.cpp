@@ -133,7 +133,7 @@ std::string SlurmScript::text() const {
 #SBATCH --cpus-per-task={}
 {}
 chunk=$(($1 + SLURM_ARRAY_TASK_ID))
-exec < /dev/null >> {}"$chunk.txt" 2>&1 || exit
+exec < /dev/null > {}"$chunk.txt" 2>&1 || exit
 cd {} || exit
 exec {} sweep {} --quiet --jobs {} --output {} \
   --chunk "$chunk" --chunk-points {}
