@@ -47,7 +47,7 @@ struct SweepHead {
   std::uint64_t points = 0;
 };
 
-/// Of the sweep that is in a folder; none: no sweep is there.
+/// The head of the sweep in a folder; none: no sweep is there.
 /// Errors: it cannot be read.
 [[nodiscard]] Result<std::optional<SweepHead>> head_in(const std::string& folder);
 

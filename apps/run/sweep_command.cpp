@@ -65,8 +65,8 @@ class Sweep {
     return finish();
   }
 
-  /// Of some points the results alone. What killed one of their processes may be what ends this
-  /// job: that is no result.
+  /// The results of a chunk, without tables. What killed one of their processes may be what ends
+  /// this job: that is no result.
   Exit run_chunk(const sweep::Chunk& chunk) {
     rt::install_stop_signals();
     begin_ = SweepClock::now();
