@@ -1,7 +1,8 @@
-// What points came to: a line of JSON each, in a file that a killed sweep goes on with.
+// What points came to: a line of JSON each, in files that a killed sweep goes on with.
 // Layer: sweep.  Thread: one at a time.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -41,34 +42,76 @@ struct ReadLine {
 
 /// What a sweep is made of: all of it is the same when it goes on.
 struct SweepHead {
-  /// What it is, and its SHA-256: "study", "coman_push.toml", "robot.toml", "plugin hold".
+  /// What it is, and its SHA-256 or name: "kernel variant", "coman_push.toml", "plugin hold".
   std::vector<std::pair<std::string, std::string>> parts;
   std::uint64_t points = 0;
 };
 
+/// The head of the sweep in a folder; none: no sweep is there.
+/// Errors: it cannot be read.
+[[nodiscard]] Result<std::optional<SweepHead>> head_in(const std::string& folder);
+
+/// A row of points that a process of its own computes, on whatever machine.
+struct Chunk {
+  std::uint64_t number = 0, first = 0, end = 0;  ///< its points: first <= index < end
+};
+
 /// The folder of a sweep: `sweep.json` is its head, `points.jsonl` has a line a point, in the order
-/// in which they ended. One process has it at a time.
+/// in which they ended. One process has it at a time. Beside it those of chunks, each with a file
+/// of its own that nobody else writes, `chunks/NUMBER.*.jsonl`: so nothing hangs on locks of a
+/// shared file system, and a chunk that is started twice mixes nothing.
 class SweepFolder {
  public:
-  /// Makes it, or goes on with it: the last line, when it is not whole, is taken away.
+  /// Makes it, or goes on with it: the last line, when it is not whole, is taken away. Results of
+  /// chunks are read, too.
   /// Errors: the folder cannot be made; another process has it; its head is another, with the first
   /// part that differs; it is something else's.
   [[nodiscard]] static Result<SweepFolder> open(const std::string& path, const SweepHead& head,
                                                 const Points& points);
+  /// For one chunk, whose results alone are here. Errors: the same; there is no sweep.
+  [[nodiscard]] static Result<SweepFolder> open_chunk(const std::string& path,
+                                                      const SweepHead& head, const Points& points,
+                                                      const Chunk& chunk);
 
   [[nodiscard]] const std::string& path() const { return path_; }
-  /// By the points' numbers; empty: not yet.
+  /// By the points' numbers, of a chunk from its first on; empty: not yet.
   [[nodiscard]] const std::vector<std::optional<PointResult>>& results() const { return results_; }
+  [[nodiscard]] bool has(std::uint64_t index) const {
+    return results_[static_cast<std::size_t>(index - first_)].has_value();
+  }
   [[nodiscard]] std::uint64_t done() const { return done_; }
-  /// Keeps a result. Errors: the disk is full or gone; then the file ends with the line before.
+  /// Keeps a result; a chunk's is on the disk at the next one that comes a second later.
+  /// Errors: the disk is full or gone; then the file ends with the line before.
   [[nodiscard]] Status add(const Point& point, PointResult result);
+  /// What was kept is on the disk. Errors: as add()'s.
+  [[nodiscard]] Status sync();
 
  private:
-  std::string path_;
+  struct Lines {
+    const Points& points;
+    std::string file, text;
+    bool of_chunk = false;
+  };
+  [[nodiscard]] Result<std::uint64_t> take(const Lines& lines);
+  [[nodiscard]] Status take_chunks(const Points& points, const std::string& begin);
+  [[nodiscard]] std::unexpected<Error> write_fails(int error);
+  void keep(std::uint64_t index, PointResult result);
+
+  std::string path_, name_;  // of the folder, of the file that is written
   Descriptor file_;
-  std::uint64_t bytes_ = 0;
+  bool shared_ = false;  // what is written is a chunk's
+  std::chrono::steady_clock::time_point synced_;
+  std::uint64_t bytes_ = 0, first_ = 0, done_ = 0;
   std::vector<std::optional<PointResult>> results_;
-  std::uint64_t done_ = 0;
 };
+
+/// How far a sweep is, without its study: any machine may look, at any time.
+struct Progress {
+  std::uint64_t points = 0, done = 0, failed = 0;
+  double seconds = 0.0;     ///< of those that are done, on the wall clock
+  std::vector<bool> there;  ///< by the points' numbers
+};
+/// Errors: there is no sweep; a file that cannot be read.
+[[nodiscard]] Result<Progress> progress_in(const std::string& folder);
 
 }  // namespace tandem::sweep

@@ -46,14 +46,6 @@ const char kTestExamples[] = R"(Examples:
 Each runs in simulation, without the wall clock, in a process of its own: a crash or a hang costs
 that one. The exit status is 1 when one fails. docs/expectations.md)";
 
-const char kSweepExamples[] = R"(Examples:
-  tandem sweep config/studies/coman_push.toml        into sweeps/coman_push, on all cores
-  tandem sweep study.toml -j 2 -o /tmp/study         two points at once
-  tandem sweep study.toml --at-least 0.99            in CI: status 1 when fewer pass
-
-Stopped or killed, the same command goes on where it was. The exit status is 0 when every point has a
-result, whatever that is: points that fail are what a sweep looks for. docs/sweep.md)";
-
 const char kCheckExamples[] = R"(Examples:
   tandem check config/coman/squat.toml               an experiment: robot, description, plugins
   tandem check config/coman/robot.toml               a robot by itself
@@ -426,20 +418,6 @@ void add_flags(CLI::App& app, TestOptions& o) {
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kTestExamples);
-}
-
-void add_flags(CLI::App& app, SweepOptions& o) {
-  app.add_option("study", o.study, "TOML that says what varies (docs/sweep.md)")->required();
-  app.add_option("--jobs,-j", o.jobs, "Points at once (default: one for each core)")
-      ->check(is_count());
-  app.add_option("-o,--output", o.folder, "Folder of the results (default: sweeps/STUDY)")
-      ->check(is_given("name a folder, or leave it out"));
-  app.add_option("--at-least", o.at_least,
-                 "Exit status 1 when a smaller share of points passes [0 to 1, 0]")
-      ->check(CLI::Range(0.0, 1.0));
-  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
-  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
-  app.footer(kSweepExamples);
 }
 
 void add_flags(CLI::App& app, ControllerCheckOptions& o) {

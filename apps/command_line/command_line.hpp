@@ -96,13 +96,21 @@ struct TestOptions {
   std::string json;
 };
 
-/// tandem sweep STUDY
+/// tandem sweep STUDY; tandem sweep status|collect|cancel FOLDER
 struct SweepOptions {
-  std::string study;      ///< study.toml
-  std::string folder;     ///< of what it comes to; empty: sweeps/STUDY
-  std::size_t jobs = 0;   ///< points at once; 0: as many as there are cores
-  double at_least = 0.0;  ///< share of points that have to pass, or the status is 1
-  bool quiet = false;     ///< neither progress nor table
+  enum class Action : std::uint8_t { kRun, kStatus, kCollect, kCancel };
+  Action action = Action::kRun;
+  std::string study;                ///< study.toml
+  std::string folder;               ///< of what it comes to; empty: sweeps/STUDY
+  std::size_t jobs = 0;             ///< points at once; 0: as many as there are cores
+  double at_least = 0.0;            ///< share of points that have to pass, or the status is 1
+  std::string kernel_variant;       ///< of every point; empty: as the folder, else this CPU's best
+  bool slurm = false;               ///< submit it instead
+  bool dry_run = false;             ///< of `slurm`: print what would be submitted
+  std::uint64_t chunk_points = 0;   ///< of each element of an array; 0: as usual
+  std::vector<std::string> sbatch;  ///< its options, without dashes
+  std::optional<std::uint64_t> chunk;  ///< run this one alone: what an element does
+  bool quiet = false;                  ///< neither progress nor table
   std::string json;
 };
 

@@ -77,6 +77,7 @@ ChildRun child_run(const std::string& json_file, const std::string& output_file,
   } else if (status >= 128) {
     const char* name = ::sigabbrev_np(status - 128);
     run.ended = "crashed";
+    run.killed = status == 128 + SIGKILL || status == 128 + SIGTERM || status == 128 + SIGINT;
     run.reason =
         fmt::format("crashed: {}", name == nullptr ? "by a signal" : std::string("SIG") + name);
   } else if (!error.empty()) {

@@ -18,7 +18,8 @@ struct ChildRun {
   std::string ended;
   /// Why it failed beside its expectations: "crashed: SIGSEGV"; empty: it did not.
   std::string reason{};
-  std::string said{};  ///< the end of what it printed; empty: it passed
+  std::string said{};   ///< the end of what it printed; empty: it passed
+  bool killed = false;  ///< by somebody else, or for want of memory: that need not be its fault
 };
 
 /// Reads what it has left: its JSON, and what it printed.

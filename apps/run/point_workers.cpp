@@ -25,18 +25,19 @@ using WorkerClock = std::chrono::steady_clock;
 
 /// What a point's process does: the same as `tandem run` with its settings.
 [[noreturn]] void run_point(const sweep::Study& study, const sweep::Point& point,
-                            const TextsInstead::Texts& texts, const std::string& json,
+                            const PreparedStudy& prepared, const std::string& json,
                             const std::string& log_folder) {
   RunOptions options = child_options(study.experiment);
   options.settings = point.settings;
   options.seed = point.seed;
+  options.kernel_variant = prepared.kernel_variant;
   options.json = json;
   options.no_log = log_folder.empty();
   options.log_folder = log_folder;
   begin_json(json);
   Exit exit = Exit::kUsage;
   {
-    const TextsInstead instead(texts);
+    const TextsInstead instead(prepared.texts);
     ReportOfRun none;
     exit = run_command(options, none);
   }
@@ -56,8 +57,8 @@ bool redirect(const std::string& output) {
 }  // namespace
 
 PointWorkers::PointWorkers(const sweep::Study& study, std::string folder,
-                           const TextsInstead::Texts& texts)
-    : study_(study), folder_(std::move(folder)), texts_(texts) {
+                           const PreparedStudy& prepared)
+    : study_(study), folder_(std::move(folder)), prepared_(prepared) {
   std::error_code ignored;
   fs::remove_all(folder_, ignored);
   fs::create_directories(folder_, ignored);
@@ -84,7 +85,7 @@ Status PointWorkers::start(const sweep::Point& point, const std::string& log_fol
     (void)::setpgid(0, 0);
     (void)::prctl(PR_SET_PDEATHSIG, SIGKILL);  // a sweep that is killed leaves nobody
     if (::getppid() != parent || !redirect(file_of(point, ".txt"))) ::_exit(127);
-    run_point(study_, point, texts_, file_of(point, ".json"), log_folder);
+    run_point(study_, point, prepared_, file_of(point, ".json"), log_folder);
   }
   if (child < 0) {
     return fail(std::string("no process can be made for a point: ") + std::strerror(errno),

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "apps/run/child_run.hpp"
+#include "apps/run/prepared_study.hpp"
 #include "base/open_file.hpp"
 #include "sweep/study.hpp"
 
@@ -23,8 +24,8 @@ class PointWorkers {
   using Take = std::function<Status(const sweep::Point&, const ChildRun&, double seconds)>;
 
   /// @param folder  for what the processes write; it is emptied.
-  /// @param texts   read instead of the files of these paths; outlive this
-  PointWorkers(const sweep::Study& study, std::string folder, const TextsInstead::Texts& texts);
+  /// @param prepared  outlives this
+  PointWorkers(const sweep::Study& study, std::string folder, const PreparedStudy& prepared);
   ~PointWorkers();  ///< ends those that go on
   PointWorkers(const PointWorkers&) = delete;
   PointWorkers& operator=(const PointWorkers&) = delete;
@@ -49,7 +50,7 @@ class PointWorkers {
 
   const sweep::Study& study_;
   std::string folder_;
-  const TextsInstead::Texts& texts_;
+  const PreparedStudy& prepared_;
   std::vector<Going> going_;
 };
 

@@ -3,16 +3,16 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <thread>
 
-#include "apps/robot/kernel_build.hpp"
 #include "apps/run/commands.hpp"
-#include "apps/run/connection.hpp"
 #include "apps/run/point_workers.hpp"
+#include "apps/run/prepared_study.hpp"
+#include "apps/run/slurm_sweep.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
-#include "base/sha256.hpp"
 #include "rt/stop_signal.hpp"
 #include "sweep/page.hpp"
 #include "sweep/results.hpp"
@@ -24,7 +24,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using SweepClock = std::chrono::steady_clock;
-using SweepWorlds = std::vector<std::unique_ptr<WiredComposition>>;
 
 std::string duration_text(double seconds) {
   if (seconds < 90.0) return fmt::format("{:.0f} s", seconds);
@@ -42,67 +41,16 @@ std::string share_text(const sweep::PassRate& rate) {
                      100.0 * interval.low, 100.0 * interval.high);
 }
 
-/// Everything that the points are made of, read once: kernels and plugins stay loaded, so a process
-/// that is forked from this one has them.
-struct Prepared {
-  TextsInstead::Texts texts;  ///< of the files, as they stand there
-  SweepWorlds worlds;         ///< the first point of each variant
-  sweep::SweepHead head;
-};
-
-std::expected<std::unique_ptr<WiredComposition>, Diagnostics> first_of(const sweep::Study& study,
-                                                                       const sweep::Point& point,
-                                                                       bool quiet) {
-  RunOptions options = child_options(study.experiment);
-  options.settings = point.settings;
-  return runtime::composed<WiredComposition>(study.experiment, options, {.build = builder(quiet)});
-}
-
-std::expected<Prepared, Diagnostics> prepare(const sweep::Study& study, const sweep::Points& points,
-                                             bool quiet) {
-  Prepared prepared;
-  const std::size_t variants = std::max<std::size_t>(1, study.variants.size());
-  for (std::size_t v = 0; v < variants; ++v) {  // which files there are
-    auto world = first_of(study, points.at(v), quiet);
-    if (!world) return std::unexpected(world.error());
-    for (const auto& [path, text] : (*world)->experiment.files) {
-      if (std::ranges::find(prepared.texts, path, &std::pair<std::string, std::string>::first) !=
-          prepared.texts.end())
-        continue;
-      auto original = read_file(path, "", kMostUrdfBytes);
-      if (!original) return std::unexpected(Diagnostics{original.error()});
-      prepared.texts.emplace_back(path, std::move(*original));
-    }
-  }
-  const TextsInstead instead(prepared.texts);
-  for (std::size_t v = 0; v < variants; ++v) {
-    auto world = first_of(study, points.at(v), quiet);
-    if (!world) return std::unexpected(world.error());
-    prepared.worlds.push_back(std::move(*world));
-  }
-  sweep::SweepHead& head = prepared.head;
-  head.points = points.size();
-  head.parts.emplace_back(fs::path(study.file).filename().string(), sha256(study.text));
-  head.parts.emplace_back("version of tandem", TANDEM_VERSION);
-  for (const auto& [path, text] : prepared.texts)
-    head.parts.emplace_back(fs::path(path).filename().string(), sha256(text));
-  for (const auto& world : prepared.worlds) {
-    head.parts.emplace_back("kernel", world->kernels.sha256());
-    for (const runtime::ControllerCode& code : world->controllers->code())
-      head.parts.emplace_back("plugin " + code.name, code.sha256);
-  }
-  return prepared;
-}
-
 class Sweep {
  public:
+  /// @param work  a folder for what its processes write
   Sweep(const SweepOptions& options, const sweep::Study& study, const sweep::Points& points,
-        const Prepared& prepared, sweep::SweepFolder& folder)
+        const PreparedStudy& prepared, sweep::SweepFolder& folder, const std::string& work)
       : options_(options),
         study_(study),
         points_(points),
         folder_(folder),
-        workers_(study, folder.path() + "/work", prepared.texts),
+        workers_(study, work, prepared),
         out_(human_output(options.json)),
         line_(out_) {}
 
@@ -111,17 +59,35 @@ class Sweep {
     rt::install_stop_signals();
     begin_ = SweepClock::now();
     done_before_ = folder_.done();
-    if (const Status ran = run_points(); !ran) return refuse(ran.error());
-    if (rt::stop_requested()) {
-      fmt::print(stderr, "stopped after {} of {}; the same command goes on from there\n",
-                 folder_.done(), counted(points_.size(), "point"));
-      return interrupted(rt::stop_signal());
-    }
+    if (const Status ran = run_points({.end = points_.size()}); !ran) return refuse(ran.error());
+    if (rt::stop_requested()) return stopped(points_.size());
     if (const Status kept = keep_logs(); !kept) return refuse(kept.error());
     return finish();
   }
 
+  /// The results of a chunk, without tables. What killed one of their processes may be what ends
+  /// this job: that is no result.
+  Exit run_chunk(const sweep::Chunk& chunk) {
+    rt::install_stop_signals();
+    begin_ = SweepClock::now();
+    done_before_ = folder_.done();
+    if (const Status ran = run_points(chunk); !ran) return refuse(ran.error());
+    if (const Status kept = folder_.sync(); !kept) return refuse(kept.error());
+    if (rt::stop_requested()) return stopped(chunk.end - chunk.first);
+    if (killed_ == 0) return Exit::kDone;
+    return refuse(Error{.message = counted(killed_, "point") + " were killed by somebody else",
+                        .hint = "more memory? --sbatch mem=4G",
+                        .file = {},
+                        .key = {}});
+  }
+
  private:
+  Exit stopped(std::uint64_t of) const {
+    fmt::print(stderr, "stopped after {} of {}; the same command goes on from there\n",
+               folder_.done(), counted(of, "point"));
+    return interrupted(rt::stop_signal());
+  }
+
   void announce() const {
     if (options_.quiet) return;
     std::string of = counted(study_.points, "sample");
@@ -135,11 +101,11 @@ class Sweep {
     std::fflush(out_);
   }
 
-  Status run_points() {
-    std::uint64_t next = 0;
+  Status run_points(const sweep::Chunk& chunk) {
+    std::uint64_t next = chunk.first;
     const auto more = [&] {
-      while (next < points_.size() && folder_.results()[static_cast<std::size_t>(next)]) ++next;
-      return next < points_.size() && !rt::stop_requested();
+      while (next < chunk.end && folder_.has(next)) ++next;
+      return next < chunk.end && !rt::stop_requested();
     };
     while (more() || workers_.going() > 0) {
       if (rt::stop_requested()) return {};
@@ -148,6 +114,10 @@ class Sweep {
       }
       const Status waited =
           workers_.wait([this](const sweep::Point& point, const ChildRun& run, double seconds) {
+            if (run.killed && options_.chunk) {
+              ++killed_;
+              return Status();
+            }
             failed_ += run.passed ? 0 : 1;
             return folder_.add(point, {.passed = run.passed,
                                        .ended = run.ended,
@@ -262,19 +232,118 @@ class Sweep {
   std::FILE* out_;
   StatusLine line_;
   SweepClock::time_point begin_;
-  std::uint64_t done_before_ = 0, failed_ = 0;
+  std::uint64_t done_before_ = 0, failed_ = 0, killed_ = 0;
 };
+
+/// A folder of this machine alone, gone at the end.
+class ScratchOfChunk {
+ public:
+  ScratchOfChunk() : path_((fs::temp_directory_path() / "tandem-chunk-XXXXXX").string()) {
+    if (::mkdtemp(path_.data()) == nullptr) path_.clear();
+  }
+  ~ScratchOfChunk() {
+    std::error_code ignored;
+    if (!path_.empty()) fs::remove_all(path_, ignored);
+  }
+  ScratchOfChunk(const ScratchOfChunk&) = delete;
+  ScratchOfChunk& operator=(const ScratchOfChunk&) = delete;
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+Exit run_chunk(const SweepOptions& options, const sweep::Study& study, const sweep::Points& points,
+               const PreparedStudy& prepared) {
+  const std::uint64_t size =
+      options.chunk_points > 0 ? options.chunk_points : sweep::usual_chunk_points(points.size());
+  const std::uint64_t count = sweep::chunks_of(points.size(), size);
+  if (*options.chunk >= count) {
+    return refuse(Error{.message = fmt::format("--chunk {}: there are {}, from 0", *options.chunk,
+                                               counted(count, "chunk")),
+                        .hint = "was the study another when it was submitted?",
+                        .file = {},
+                        .key = {}});
+  }
+  const sweep::Chunk chunk = sweep::chunk_of(*options.chunk, size, points.size());
+  auto folder = sweep::SweepFolder::open_chunk(options.folder, prepared.head, points, chunk);
+  if (!folder) return refuse(folder.error());
+  const ScratchOfChunk scratch;
+  if (scratch.path().empty())
+    return refuse(Error{.message = "no folder can be made in the machine's temporary one",
+                        .hint = "set TMPDIR to one that can be written",
+                        .file = {},
+                        .key = {}});
+  return Sweep(options, study, points, prepared, *folder, scratch.path()).run_chunk(chunk);
+}
+
+/// Where the study was named: names of files are relative to it.
+class InDirectory {
+ public:
+  explicit InDirectory(const std::string& path) : before_(fs::current_path(ignored_)) {
+    fs::current_path(path, ignored_);
+    there_ = !ignored_;
+  }
+  ~InDirectory() { fs::current_path(before_, ignored_); }
+  InDirectory(const InDirectory&) = delete;
+  InDirectory& operator=(const InDirectory&) = delete;
+  [[nodiscard]] bool there() const { return there_; }
+
+ private:
+  std::error_code ignored_;
+  fs::path before_;
+  bool there_ = false;
+};
+
+Exit collect_sweep(SweepOptions options) {
+  std::error_code ignored;
+  options.folder = fs::absolute(options.folder, ignored).lexically_normal().string();
+  if (!options.json.empty() && options.json != "-")
+    options.json = fs::absolute(options.json, ignored).string();
+  const auto job = submitted_in(options.folder);
+  if (!job) return refuse(job.error());
+  const InDirectory there(job->directory);
+  if (!there.there()) {
+    return refuse(Error{.message = "is gone: the study was named from there",
+                        .hint = "collect on a machine that has it",
+                        .file = job->directory,
+                        .key = {}});
+  }
+  const auto progress = sweep::progress_in(options.folder);
+  if (!progress) return refuse(progress.error());
+  if (progress->done < progress->points) {
+    return refuse(
+        Error{.message = counted(progress->points - progress->done, "point") + " have no result",
+              .hint = "tandem sweep status FOLDER says whether they are in the queue; tandem sweep "
+                      "STUDY -o FOLDER computes them here",
+              .file = options.folder,
+              .key = {}});
+  }
+  options.action = SweepOptions::Action::kRun;
+  options.study = job->study;
+  return sweep_command(options);
+}
 
 }  // namespace
 
 Exit sweep_command(const SweepOptions& given) {
+  using Action = SweepOptions::Action;
+  if (given.action == Action::kStatus) return sweep_status(given);
+  if (given.action == Action::kCollect) return collect_sweep(given);
+  if (given.action == Action::kCancel) return cancel_sweep(given);
   SweepOptions options = given;
-  if (options.jobs == 0) options.jobs = std::max(1U, std::thread::hardware_concurrency());
+  if (options.jobs == 0)
+    options.jobs = options.slurm ? 1 : std::max(1U, std::thread::hardware_concurrency());
   if (options.folder.empty()) options.folder = "sweeps/" + fs::path(options.study).stem().string();
   const auto study = sweep::read_study(options.study);
   if (!study) return refuse(study.error());
   const sweep::Points points(*study);
-  auto prepared = prepare(*study, points, options.quiet);
+  if (options.kernel_variant.empty()) {
+    const auto before = kernel_variant_in(options.folder);
+    if (!before) return refuse(before.error());
+    options.kernel_variant = *before;
+  }
+  auto prepared = prepare_study(*study, points, options.kernel_variant, options.quiet);
   if (!prepared) return refuse(prepared.error());
   if (prepared->worlds.front()->experiment.expectations.empty()) {
     return refuse(Error{.message = "has no [[expect]]: every point would come to nothing",
@@ -282,9 +351,11 @@ Exit sweep_command(const SweepOptions& given) {
                         .file = study->experiment,
                         .key = {}});
   }
+  if (options.slurm) return submit_sweep(options, *study, points, *prepared);
+  if (options.chunk) return run_chunk(options, *study, points, *prepared);
   auto folder = sweep::SweepFolder::open(options.folder, prepared->head, points);
   if (!folder) return refuse(folder.error());
-  return Sweep(options, *study, points, *prepared, *folder).run();
+  return Sweep(options, *study, points, *prepared, *folder, folder->path() + "/work").run();
 }
 
 }  // namespace tandem::apps
