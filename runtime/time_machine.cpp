@@ -26,6 +26,12 @@ std::string moment_text(const RobotCycle& cycle, std::uint64_t next) {
   return fmt::format("{:.6g} s", 1e-9 * period_ns * static_cast<double>(next == 0 ? 0 : next - 1));
 }
 
+/// @param next  the cycle that it does not come to
+std::unexpected<Error> is_over(const RobotCycle& cycle, std::uint64_t next) {
+  return fail("the run is over before " + moment_text(cycle, next),
+              "give an earlier moment, or a longer --duration");
+}
+
 std::uint64_t hash_of(std::span<const std::byte> bytes) {
   std::uint64_t hash = 0xCBF29CE484222325U;  // FNV-1a
   for (const std::byte one : bytes) {
@@ -142,7 +148,10 @@ Status TimeMachine::begin(RobotCycle& cycle, Checkpoint from, std::uint64_t next
   // It names what differs; where nothing does, the cycles are played from there.
   if (Status restored = cycle.restore(from.bytes); !restored) return restored;
   Travel travel;
+  const RunPhase phase = cycle.phase();
   if (const Status played = play(cycle, from, next, travel); !played) return played;
+  // Its duration may be shorter than it was.
+  if (hal::ends(cycle.phase()) && !hal::ends(phase)) return is_over(cycle, next);
   reached_ = next;
   if (keeps_.load(std::memory_order_relaxed)) kept_.add(std::move(from));
   return {};
@@ -392,6 +401,7 @@ Status TimeMachine::play(RobotCycle& cycle, const Checkpoint& from, std::uint64_
     if (after && abandoned_.load(std::memory_order_relaxed)) {
       return fail("the search was ended: somebody paused", "ask again");
     }
+    if (cycle.phase() == RunPhase::kDone) return is_over(cycle, to);
     (void)cycle.step();
     ++travel.replayed;
     if (expectations_ != nullptr) expectations_->take(cycle.last_view());

@@ -319,6 +319,7 @@ class Session {
       log_ = summary.log->path;
       log_is_whole_ = summary.log->error.empty();
     }
+    summary.faults = fault_texts(*cycle_, summary.log);
     studio_.finish(summary.ended(), log_);
     if (c_.frames != nullptr) summary.frames = c_.frames->close();
     return tell_end(summary, options_, out_);

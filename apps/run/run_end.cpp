@@ -14,16 +14,6 @@
 namespace tandem::apps {
 namespace {
 
-std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
-                                     const std::optional<log::RecordingResult>& log) {
-  std::vector<std::string> texts = latched_texts(cycle.faults());
-  if (log && !log->error.empty()) {
-    texts.push_back(
-        fmt::format("the log lost {}: {}", counted(log->failed, "message"), log->error));
-  }
-  return texts;
-}
-
 /// Whether a latched fault ended or disturbed the run that no expectation awaits.
 bool has_unexpected_fault(const RunSummary& summary) {
   const auto& expectations = summary.composition.expectations;
@@ -70,8 +60,17 @@ Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE
 
 }  // namespace
 
-Exit tell_end(RunSummary& summary, const RunOptions& options, std::FILE* out) {
-  summary.faults = fault_texts(summary.cycle, summary.log);
+std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
+                                     const std::optional<log::RecordingResult>& log) {
+  std::vector<std::string> texts = latched_texts(cycle.faults());
+  if (log && !log->error.empty()) {
+    texts.push_back(
+        fmt::format("the log lost {}: {}", counted(log->failed, "message"), log->error));
+  }
+  return texts;
+}
+
+Exit tell_end(const RunSummary& summary, const RunOptions& options, std::FILE* out) {
   if (!options.quiet) {
     fmt::print(out, "\n");
     summary.print(out);

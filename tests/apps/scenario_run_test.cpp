@@ -125,6 +125,19 @@ always = "time() >= 0s"
       << suite.err;
 }
 
+TEST_F(ScenarioRun, TheDocumentationsExamplePasses) {
+  const std::string page = read_text(TANDEM_SOURCE_DIR "/docs/scenarios.md");
+  const std::size_t from = page.find("```toml\n") + 8;
+  std::string example = page.substr(from, page.find("```", from) - from);
+  const std::string robot = "../coman/robot.toml";
+  ASSERT_NE(example.find(robot), std::string::npos);
+  example.replace(example.find(robot), robot.size(), TANDEM_SOURCE_DIR "/config/coman/robot.toml");
+  write_text(folder_ / "example.toml", example);
+  const Outcome run = tandem("run example.toml --no-log -q --json example.json");
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(json("example.json")["expectations"].size(), 4U);
+}
+
 TEST_F(ScenarioRun, IsAsInALog) {
   const std::string all =
       "[[expect]]\nsignal = \"position(*)\"\nas_in = \"good.mcap\"\nwithin = \"1mrad\"\n";

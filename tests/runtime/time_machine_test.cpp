@@ -369,14 +369,16 @@ TEST(TimeMachine, GoesOnFromALog) {
     machine.finish();
     EXPECT_EQ((*recorder)->close().error, "");
   }
-  const auto begin = [&](double time_s, const char* experiment, std::uint64_t next) {
+  const auto begin = [&](double time_s, const char* experiment, std::uint64_t next,
+                         const Overrides& overrides = {}) {
     const auto found = beginning_at({path, time_s});
     if (!found) return found.error().to_string();
     EXPECT_EQ(found->next, next);
     EXPECT_EQ(found->branch.of, "run.mcap");
     EXPECT_EQ(found->branch.cycle, next);
     TimeMachine machine(1'000'000, TimeMachine::kBudget_bytes, true);
-    BundledRun run("coman", experiment, {}, {.observer = &witness, .time_machine = &machine});
+    BundledRun run("coman", experiment, overrides,
+                   {.observer = &witness, .time_machine = &machine});
     const Status begun = machine.begin(*run.cycle, found->from, found->next);
     if (!begun) return begun.error().to_string();
     const std::uint64_t again = witness.again;
@@ -391,6 +393,13 @@ TEST(TimeMachine, GoesOnFromALog) {
   EXPECT_EQ(begin(5.15, "squat", 5'100), "");  // what was heard then cannot be played again
   EXPECT_EQ(begin(6.15, "squat", 6'151), "");  // a state was logged soon after
   EXPECT_NE(begin(1.2, "hold", 1'201).find("the snapshot is of another run"), std::string::npos);
+  Overrides shorter;
+  shorter.duration_s = 2.0;
+  for (const double time_s : {3.5, 6.15}) {
+    const auto next = static_cast<std::uint64_t>(std::llround(time_s * 1e3)) + 1;
+    const std::string said = begin(time_s, "squat", next, shorter);
+    EXPECT_NE(said.find("the run is over before "), std::string::npos) << time_s << " s: " << said;
+  }
   EXPECT_NE(begin(9.0, "squat", 0).find("9 s is after its end, of 6.499 s"), std::string::npos);
 }
 

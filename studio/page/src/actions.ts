@@ -1,5 +1,6 @@
 // Buttons that ask the run for something, and the line that says what became of it.
 import { commandLine, commandOfAll } from './command';
+import { confirmed } from './confirm';
 import { h, say } from './dom';
 import type { Answer, Request } from './protocol';
 import type { Source } from './source';
@@ -11,6 +12,8 @@ export interface ButtonOptions {
   title?: string;
   /** Without the button that copies the command line. */
   bare?: boolean;
+  /** What is asked once more before, in a dialog with the command. */
+  ask?: string;
   done?(answer: Answer, asked: Request): void;
   /** It was pressed, and there is nothing to ask for. */
   nothing?(): void;
@@ -146,6 +149,7 @@ export class Actions {
         onclick: async () => {
           const asked = request();
           if (!asked) return options.nothing?.();
+          if (options.ask && !(await confirmed(options.ask, commandLine(asked), label))) return;
           const answer = await this.run(asked);
           options.done?.(answer, asked);
         },

@@ -8,6 +8,11 @@ import type { Connection } from './source';
 
 const kSilent_ms = 1000;
 
+/** Ends that nothing went wrong in: what `ended` of `tandem run --json` says. */
+const kWell = /^(as planned|on request|its controllers were done|(stopped|interrupted) by SIG)/;
+const kNothingToStop =
+  'The run has ended: there is nothing to stop from here. If the robot moves, use its own emergency stop.';
+
 export class Header {
   private state: Connection = 'connecting';
   private why = '';
@@ -38,6 +43,7 @@ export class Header {
         class: 'estop',
         title: 'Stops the robot; needs no control.\ntandem estop',
         onclick: async () => {
+          if (this.state === 'ended') return this.alarm(kNothingToStop);
           const answer = await actions.run({ do: 'estop' });
           if (!answer.ok)
             this.alarm(`The stop is not confirmed: ${answer.error}. Type: tandem estop`);
@@ -140,6 +146,7 @@ export class Header {
     say(this.link, words);
     attribute(this.link, 'title', this.state === 'lost' ? `${this.why} It is tried again.` : null);
     document.body.dataset.state = this.state;
+    document.body.classList.toggle('ended-well', this.state === 'ended' && kWell.test(this.why));
     document.body.classList.toggle('stale', stale);
   }
 

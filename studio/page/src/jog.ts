@@ -10,6 +10,7 @@ export interface JogJoint {
   lower: number | null;
   upper: number | null;
   position(): number;
+  /** NaN: nobody has said one, and it does not move. */
   speed(): number;
 }
 
@@ -85,8 +86,8 @@ export class Jog extends Held {
 /** A goal a little ahead, inside the limits. */
 function goalOf(joint: JogJoint, direction: number): Request | null {
   const { name, lower, upper } = joint;
-  if (!Number.isFinite(joint.position())) return null;
   const speed = joint.speed();
+  if (!Number.isFinite(joint.position()) || !(speed > 0)) return null;
   const ahead = joint.position() + direction * speed * kAhead_s;
   const target = Math.min(
     upper ?? Number.POSITIVE_INFINITY,
@@ -95,14 +96,22 @@ function goalOf(joint: JogJoint, direction: number): Request | null {
   return { do: 'joint.move', joint: name, target_rad: target, speed_rad_s: speed };
 }
 
-/** A button that moves as long as it is held: pointer, or blank and Enter. */
-export function holdToMove(button: HTMLButtonElement, jog: Held, direction: 1 | -1): void {
+/**
+ * A button that moves as long as it is held: pointer, or blank and Enter.
+ * @param may whether it moves now; says why not
+ */
+export function holdToMove(
+  button: HTMLButtonElement,
+  jog: Held,
+  direction: 1 | -1,
+  may: () => boolean = () => true,
+): void {
   const stop = () => {
     jog.stop();
     button.classList.remove('held');
   };
   const start = () => {
-    if (button.disabled) return;
+    if (button.disabled || !may()) return;
     button.classList.add('held');
     jog.start(direction);
   };

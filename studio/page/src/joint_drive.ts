@@ -16,6 +16,12 @@ export function parseGoal(text: string, unit: string): number {
   return Number(match[1]) * (scales[match[2].toLowerCase()] ?? Number.NaN);
 }
 
+/** A speed as typed: "0.1", "15deg", "20 mm/s". NaN: none. In rad/s or m/s, above 0. */
+export function parseSpeed(text: string, unit: string): number {
+  const speed = parseGoal(text.replace(/\/\s*s\s*$/, ''), unit);
+  return speed > 0 ? speed : Number.NaN;
+}
+
 /** A careful speed when nobody says one: a tenth of the limit. */
 function carefulSpeed(joint: JointInfo): number {
   const limit = joint.velocity ?? 1;
@@ -40,10 +46,11 @@ export function jointDrive(
     value: carefulSpeed(joint),
     'aria-label': `speed of ${name} [${unit}/s]`,
   });
-  const speedOf = () => {
-    const value = Number(speed.value);
-    return value > 0 ? value : carefulSpeed(joint);
-  };
+  const speedOf = () => parseSpeed(speed.value, unit);
+  const whyNoSpeed = () =>
+    Number.isFinite(speedOf())
+      ? ''
+      : `'${speed.value}' is no speed of ${name}: 0.1 or ${unit === 'm' ? '20mm' : '15deg'}, per second`;
   const goal = h('input', {
     type: 'text',
     inputmode: 'decimal',
@@ -76,7 +83,7 @@ export function jointDrive(
       return `'${goal.value}' is no place of ${name}: 0.5 or ${unit === 'm' ? '20mm' : '30deg'}`;
     }
     const { lower, upper } = joint;
-    if (target >= (lower ?? -Infinity) && target <= (upper ?? Infinity)) return '';
+    if (target >= (lower ?? -Infinity) && target <= (upper ?? Infinity)) return whyNoSpeed();
     return `${number(target)} ${unit} is beyond the limits of ${name}: ${number(low)} to ${number(high)}`;
   };
   const go = (target: number) => {
@@ -127,11 +134,15 @@ export function jointDrive(
       },
       label,
     );
-    holdToMove(button, jog, direction);
+    holdToMove(button, jog, direction, () => {
+      const why = whyNoSpeed();
+      if (why) actions.tell('', why, true);
+      return why === '';
+    });
     return button;
   };
-  const simple = (label: string, request: Request, title: string) =>
-    actions.button(label, () => request, { name: `${label} ${name}`, title });
+  const simple = (label: string, request: Request, title: string, ask?: string) =>
+    actions.button(label, () => request, { name: `${label} ${name}`, title, ask });
   return h(
     'div',
     { class: 'drive' },
@@ -164,7 +175,12 @@ export function jointDrive(
         hold(1, 'hold ▶'),
       ),
       simple('Stop', { do: 'joint.stop', joint: name }, 'Its motion brakes.'),
-      simple('Idle', { do: 'joint.set', joint: name, mode: 'idle' }, 'No torque: it may fall.'),
+      simple(
+        'Idle',
+        { do: 'joint.set', joint: name, mode: 'idle' },
+        'No torque: it may fall.',
+        `${name} gets no torque: it falls where its load takes it.`,
+      ),
       simple(
         'Hold',
         { do: 'joint.set', joint: name, mode: 'position' },

@@ -257,7 +257,7 @@ export class LiveSource implements Source {
         return;
       case 'ended': {
         this.ended = true;
-        const log = message.log ? ` Its log: ${message.log}` : '';
+        const log = message.log ? `; its log: ${message.log}` : '';
         this.state('ended', `${message.how ?? ''}${log}`);
         return;
       }

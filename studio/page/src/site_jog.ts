@@ -16,6 +16,7 @@ const kAxes: Axis[] = [
   { name: 'pitch', label: 'pitch', turns: true },
   { name: 'yaw', label: 'yaw', turns: true },
 ];
+const kLeast_m_s = 0.005;
 const kMost_m_s = 0.2;
 /** Of a turn, for each m/s of the speed: what a hand's length makes of it. */
 const kTurn_rad_m = 4;
@@ -31,7 +32,7 @@ export class SiteJog {
   private readonly speed = h('input', {
     type: 'number',
     class: 'short',
-    min: 0.005,
+    min: kLeast_m_s,
     max: kMost_m_s,
     step: 0.005,
     value: 0.05,
@@ -77,7 +78,8 @@ export class SiteJog {
     const held = new Held(
       (request) => this.actions.source.ask(request),
       (way) => {
-        const along = Math.min(kMost_m_s, Math.max(0.005, Number(this.speed.value) || 0.05));
+        const along = this.speedOf();
+        if (Number.isNaN(along)) return null;
         const speed = axis.turns ? kTurn_rad_m * along : along;
         return {
           do: 'site.move',
@@ -91,7 +93,20 @@ export class SiteJog {
       { do: 'joint.halt' },
       (request, answer) => this.actions.show(request, answer),
     );
-    holdToMove(button, held, direction);
+    holdToMove(button, held, direction, () => {
+      const known = !Number.isNaN(this.speedOf());
+      if (!known) {
+        const words = `'${this.speed.value}' is no speed of a site: ${kLeast_m_s} to ${kMost_m_s} m/s`;
+        this.actions.tell('', words, true);
+      }
+      return known;
+    });
     return button;
+  }
+
+  /** As typed [m/s]; NaN: it is none that a site may have. */
+  private speedOf(): number {
+    const speed = Number(this.speed.value);
+    return speed >= kLeast_m_s && speed <= kMost_m_s ? speed : Number.NaN;
   }
 }

@@ -6,13 +6,22 @@ import { parsed } from '../src/controllers';
 import { isLane, wordOf } from '../src/enums';
 import { filterEvents } from '../src/events';
 import { Jog } from '../src/jog';
-import { parseGoal } from '../src/joint_drive';
+import { parseGoal, parseSpeed } from '../src/joint_drive';
 import { gainOf, unitOf } from '../src/joint_tuning';
 import { stretches } from '../src/lanes';
 import { kPresets, readLayout } from '../src/layout';
 import type { Answer, Hello, JointInfo, Request } from '../src/protocol';
 import { Catalog } from '../src/signals';
 import { TimeModel } from '../src/time';
+
+test('a speed that is not understood is none, and no other one', () => {
+  assert.equal(parseSpeed('0.05', 'rad'), 0.05);
+  assert.ok(Math.abs(parseSpeed('2deg', 'rad') - Math.PI / 90) < 1e-12);
+  assert.ok(Math.abs(parseSpeed('20 mm/s', 'm') - 0.02) < 1e-12);
+  for (const text of ['0,05', '-1', '0', '', 'fast', '2rad/min', 'NaN', 'Infinity']) {
+    assert.ok(Number.isNaN(parseSpeed(text, 'rad')), text);
+  }
+});
 
 test('goals are numbers with or without a unit', () => {
   assert.equal(parseGoal('0.5', 'rad'), 0.5);
@@ -49,6 +58,8 @@ test('a jog has goals a little ahead, within the limits', () => {
     speed_rad_s: 0.4,
   });
   assert.equal(jog.goal(-1)?.target_rad, 0.9 - 0.2);
+  const unsaid = new Jog(slowRun().ask, { ...kJoint, speed: () => Number.NaN });
+  assert.equal(unsaid.goal(1), null, 'nobody has said how fast');
 });
 
 test('a goal that was under way at the release is followed by another stop', async () => {

@@ -261,8 +261,8 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     await page.waitForSelector('body.stale[data-state="lost"]');
     assert.match(await page.textContent('.link'), /lost \d+\.\d s ago/);
     await page.waitForSelector('body[data-state="live"]:not(.stale)');
-    mock.say({ op: 'ended', how: 'after its duration', log: '/tmp/run.mcap' });
-    await until(page, 'ended: after its duration Its log: /tmp/run.mcap');
+    mock.say({ op: 'ended', how: 'as planned', log: '/tmp/run.mcap' });
+    await until(page, 'ended: as planned; its log: /tmp/run.mcap');
     await leave(page);
   });
 

@@ -165,8 +165,15 @@ describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
     await page.locator('button:text-is("Start controllers")').click();
     await page.waitForSelector('body[data-phase="running"]');
     await run.end();
-    await page.waitForSelector('body[data-state="ended"]');
+    await page.waitForSelector('body[data-state="ended"].ended-well');
     await leave(page);
+    const other = await begin('double_pendulum/hold.toml', '--on-fault', 'end');
+    const last = await visit(other.address);
+    await last.waitForSelector('body[data-phase="running"]');
+    await last.click('.estop');
+    await last.waitForSelector('body[data-state="ended"]:not(.ended-well)');
+    assert.match(await last.textContent('.link'), /^ended: by a fault/);
+    await leave(last);
   });
 
   test('a simulated run goes back, and on; the page has the past, then the new branch', async () => {

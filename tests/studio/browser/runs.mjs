@@ -19,7 +19,8 @@ export function lackingRun() {
 export async function beginRun(folder, experiment, options) {
   const socket = join(folder, `run-${++begun}.sock`);
   const words = ['run', join(kConfig, experiment), '--socket', socket, '--duration', '300'];
-  words.push('--on-fault', 'wait', '--studio', ...options);
+  if (!options.includes('--on-fault')) words.push('--on-fault', 'wait');
+  words.push('--studio', ...options);
   if (process.env.TANDEM_STUDIO_PAGE) words.push('--studio-page', process.env.TANDEM_STUDIO_PAGE);
   const child = spawn(kTandem, words, { cwd: folder });
   let said = '';
