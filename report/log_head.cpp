@@ -91,11 +91,10 @@ std::string differences(const RunData& run, const RunData& first) {
 }  // namespace
 
 Facts head_facts(const RunData& run, const RunData& first) {
-  const double ran_s = run.time_s.empty() ? 0.0 : run.time_s.back() - run.time_s.front();
   return {{"log", run.path},
           {"experiment", experiment_of(run)},
           {"started", run.info.started},
-          {"controllers ran", fmt::format("{:.3f} s", ran_s)},
+          {"controllers ran", fmt::format("{:.3f} s", run.ran_s())},
           {"backend", run.info.hal},
           {"seed", std::to_string(run.info.seed)},
           {"tandem", run.info.version},

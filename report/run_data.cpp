@@ -15,6 +15,10 @@ const RunFault* RunData::stop() const {
   return first == faults.end() ? nullptr : &*first;
 }
 
+double RunData::ran_s() const {
+  return controllers_ran && !time_s.empty() ? time_s[rows_before_stop() - 1] - time_s.front() : 0.0;
+}
+
 std::size_t RunData::rows_before_stop() const {
   if (stop() == nullptr) return rows();
   const auto after = std::ranges::upper_bound(time_s, stop()->time_s + log::kHalfNanosecond);

@@ -121,6 +121,8 @@ struct RunData {
   [[nodiscard]] const RunFault* stop() const;
   /// Rows until stop(), its cycle included; the others show what followed. At least 1.
   [[nodiscard]] std::size_t rows_before_stop() const;
+  /// From the controllers' start to their stop, or to the end of what is here [s]; 0: none ran.
+  [[nodiscard]] double ran_s() const;
   /// First channel of sensor `index` in `sensor`.
   [[nodiscard]] std::size_t first_channel(std::size_t index) const;
   /// The root link in W; upright at the origin when nobody knows.

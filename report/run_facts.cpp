@@ -191,14 +191,13 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   facts.emplace_back("period" + side,
                      fmt::format("{} us", static_cast<double>(run.info.period_ns) * 1e-3));
   const double start_s = run.time_s.front();
-  const double ran_s = run.controllers_ran ? run.time_s[run.rows_before_stop() - 1] - start_s : 0.0;
   const bool imported = run.info.hal == "import";
   const bool whole = run.cut_reason.empty() && run.remarks.empty();
   if (!whole) facts.emplace_back("covers" + side, covers_text(run));
   if (run.controllers_ran && !imported && run.start_known)
     facts.emplace_back("controllers started" + side, fmt::format("{:.3f} s", start_s));
   facts.emplace_back((imported ? "recorded" : "controllers ran") + side,
-                     fmt::format("{:.3f} s{}", ran_s, whole ? "" : " of what is here"));
+                     fmt::format("{:.3f} s{}", run.ran_s(), whole ? "" : " of what is here"));
   if (!run.info.engine.empty()) facts.emplace_back("engine" + side, run.info.engine);
   facts.emplace_back("kernels" + side, run.info.kernel_variant);
   facts.emplace_back("tandem" + side, run.info.version);

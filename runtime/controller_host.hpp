@@ -331,7 +331,7 @@ class ControllerHost::InCall {
 
  private:
   void note(std::int64_t took_ns) noexcept TANDEM_RT {
-    one_.times->calls.record(took_ns);
+    if (!host_.outside_->closed) one_.times->calls.record(took_ns);  // not of what has been
     if (host_.called_ == host_.calls_.size()) return;
     host_.calls_[host_.called_++] = {one_.id, begin_ns_, took_ns, host_.shadows_.at_work()};
   }

@@ -238,6 +238,17 @@ TEST(TimeMachine, AFaultWithoutRoomIsRefusedAndNotLost) {
 
 constexpr RunServices::Patience kAtOnce{0};
 
+TEST(TimeMachine, CallsOfCyclesThatHaveBeenAreNotCounted) {
+  Journey trip("double_pendulum", "jog");
+  trip.step(2'000);
+  const auto& calls = trip.run.run->controllers().loaded()[0]->times->calls;
+  const std::uint64_t before = calls.count();
+  trip.go(1'500);
+  EXPECT_EQ(calls.count(), before);
+  trip.step(10);
+  EXPECT_EQ(calls.count(), before + 10);
+}
+
 // A request, a sample and a fault were carried out in the next cycle, wherever that was.
 TEST(TimeMachine, WhatWaitsIsDroppedWhenTimeGoesElsewhere) {
   Journey trip("double_pendulum", "jog", [](Experiment& e) {
