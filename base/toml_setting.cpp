@@ -117,7 +117,9 @@ class SettingEditor {
   Status edit() {
     if (steps_.empty()) {
       return wrong(setting_, "'" + setting_.key + "' is no path of a key",
-                   "write it as push[0].impulse_Ns[0], or sim.link.torso.mass_kg");
+                   setting_.key.find(' ') == std::string::npos
+                       ? "write it as push[0].impulse_Ns[0], or sim.link.torso.mass_kg"
+                       : "put a name with blanks into quotes: push.\"a bump\".at_s");
     }
     const toml::node* node = &root_;
     for (std::size_t i = 0; i < steps_.size(); ++i) {

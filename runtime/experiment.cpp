@@ -235,6 +235,12 @@ std::expected<Experiment, Diagnostics> read_experiment(const std::string& file,
   const auto document = TomlDocument::load(file, hal::kRobotOfXml, settings);
   if (!document) return std::unexpected(Diagnostics{document.error()});
   TomlTable root = document->root();
+  if (root.has("experiment") && !root.has("robot")) {
+    return std::unexpected(Diagnostics{{.message = "is a study, and no experiment",
+                                        .hint = "`tandem sweep` it, or `tandem search` in it",
+                                        .file = file,
+                                        .key = {}}});
+  }
   Experiment e = read_tables(*document, root);
   e.files = {{file, document->text()}};
   Diagnostics robot_errors;

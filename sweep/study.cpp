@@ -172,6 +172,13 @@ std::expected<Study, Diagnostics> read_study(const std::string& file) {
   const auto document = TomlDocument::load(file);
   if (!document) return std::unexpected(Diagnostics{document.error()});
   TomlTable root = document->root();
+  if (!root.has("experiment") && root.has("robot")) {
+    return std::unexpected(Diagnostics{
+        {.message = "is an experiment, and no study",
+         .hint = "write a study: experiment = \"FILE\", and a [[vary]] for each value that changes",
+         .file = file,
+         .key = {}}});
+  }
   Study study;
   study.file = file;
   study.text = document->text();

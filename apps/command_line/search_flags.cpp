@@ -1,4 +1,6 @@
 // The flags of `tandem shrink` and `tandem search`.
+#include <charconv>
+
 #include "apps/command_line/command_flags.hpp"
 
 namespace tandem::apps {
@@ -21,6 +23,17 @@ constexpr char kSearchExamples[] = R"(Examples:
 A study is the file of `tandem sweep`: an experiment, and a [[vary]] for each value that changes.
 The same study and seed give the same result, however many run at once. The exit status is 0 when
 the worst point passes, 1 when it fails, 2 when nothing could be run. docs/search.md)";
+
+CLI::Validator is_a_factor() {
+  const auto check = [](const std::string& text) -> std::string {
+    double factor = 0.0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), factor);
+    const bool whole = error == std::errc() && end == text.data() + text.size();
+    if (whole && factor >= 1e-9 && factor <= 1e9) return "";
+    return "'" + text + "' is no factor from 1e-9 to 1e9 (to push the other way, turn the values)";
+  };
+  return {check, "above 0"};
+}
 
 /// What both have.
 template <class Options>
@@ -49,18 +62,20 @@ void add_flags(CLI::App& app, SearchOptions& o) {
   app.add_option("study", o.study, "Study: what varies, and of which experiment")->required();
   app.add_option("-o,--output", o.output, "Write the worst point as a scenario")
       ->check(is_given(kNameAFile));
-  app.add_option("--method", o.method, "cma_es (default), phase, random")
-      ->check(CLI::IsMember({"cma_es", "phase", "random"}));
-  app.add_option("--along", o.along, "Key of a phase sweep (default: the only one)")
-      ->check(is_given("name the key of a [[vary]], or leave it out"));
-  CLI::Option* up_to = app.add_option("--up-to", o.up_to, "Greatest factor of --limit")
-                           ->check(CLI::Range(1e-9, 1e9));
+  CLI::Option* method = app.add_option("--method", o.method, "cma_es (default), phase, random")
+                            ->check(CLI::IsMember({"cma_es", "phase", "random"}));
+  CLI::Option* along =
+      app.add_option("--along", o.along, "Key of a phase sweep (default: the only one)")
+          ->check(is_given("name the key of a [[vary]], or leave it out"));
+  CLI::Option* up_to = app.add_option("--up-to", o.up_to, "Greatest factor of --limit");
+  up_to->check(is_a_factor());
   CLI::Option* limit =
       app.add_option("--limit", o.limit,
                      "Instead: at each point of a grid, by how much this key's numbers can be "
                      "multiplied until it fails; -o is CSV")
           ->check(is_given("name the key of a [[vary]], or leave it out"))
-          ->needs(up_to);
+          ->needs(up_to)
+          ->excludes(method, along);
   up_to->needs(limit);
   app.add_option("--halvings", o.halvings, "Of the interval from 0 to --up-to (default: 5)")
       ->check(CLI::Range(0, 30))

@@ -90,8 +90,8 @@ void figures(Figures& f, const runtime::ExpectationResult& one) {
   f("name", one.name);
   f("passed", one.passed);
   f("margin",
-    "signed distance to failing, in `unit`; null: nothing was measured, or a phase or fault "
-    "decided",
+    "signed distance to failing, in `unit`; null: nothing was measured, or a phase, a fault or the "
+    "run's end decided",
     one.margin);
   f("unit", "empty: a plain number", one.unit);
   f("at_s", "when that was, as in the log: the worst cycle", one.at_s);

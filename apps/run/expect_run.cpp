@@ -15,7 +15,7 @@ Result<Json> show(runtime::RobotCycle& cycle, runtime::Expectations* expectation
   if (expectations == nullptr) return answer;
   std::vector<runtime::ExpectationResult> results;
   const bool stood =
-      cycle.inbox().clock().while_standing([&] { results = expectations->results(); });
+      cycle.inbox().clock().while_standing([&] { results = expectations->so_far(); });
   if (!stood) {
     auto looked = expectations->look(kPatience);
     if (!looked) return fail("no cycle came within 0.2 s", "ask again");

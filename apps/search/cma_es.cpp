@@ -3,7 +3,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <numeric>
 #include <utility>
@@ -87,17 +86,21 @@ std::vector<Eigen::VectorXd> CmaEs::ask() {
 }
 
 void CmaEs::tell(std::span<const double> values) {
-  std::vector<double> ranked(values.begin(), values.end());
-  for (double& one : ranked)
-    if (std::isnan(one)) one = std::numeric_limits<double>::infinity();
   std::vector<std::size_t> order(population_);
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return ranked[i]; });
-  flat_ = ranked[order.front()] == ranked[order.back()] ? flat_ + 1 : 0;
+  const auto rank = [&values](std::size_t i) {
+    const bool none = std::isnan(values[i]);
+    return std::pair(none, none ? 0.0 : values[i]);
+  };
+  std::ranges::stable_sort(order, {}, rank);
+  flat_ = rank(order.front()) == rank(order.back()) ? flat_ + 1 : 0;
+  // Nothing draws towards a point without a value, even where there are few others.
+  const auto drawn = static_cast<Eigen::Index>(
+      std::ranges::count_if(values, [](double one) { return !std::isnan(one); }));
 
   const auto lambda = static_cast<Eigen::Index>(population_);
   Eigen::VectorXd step = Eigen::VectorXd::Zero(n_);
-  for (Eigen::Index i = 0; i < lambda / 2; ++i)
+  for (Eigen::Index i = 0; i < std::min(lambda / 2, drawn); ++i)
     step += weights_[i] * steps_[order[static_cast<std::size_t>(i)]];
   mean_ += sigma_ * step;
 
@@ -119,7 +122,7 @@ void CmaEs::tell(std::span<const double> values) {
   covariance_ += c_1_ * p_c_ * p_c_.transpose();
   for (Eigen::Index i = 0; i < lambda; ++i) {
     const Eigen::VectorXd& y = steps_[order[static_cast<std::size_t>(i)]];
-    double weight = weights_[i];
+    double weight = i >= drawn ? std::min(weights_[i], 0.0) : weights_[i];
     if (weight < 0.0)
       weight *= static_cast<double>(n_) / std::max(whitened(y).squaredNorm(), 1e-20);
     covariance_ += c_mu_ * weight * y * y.transpose();

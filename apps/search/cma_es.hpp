@@ -23,8 +23,8 @@ class CmaEs {
 
   /// The next generation.
   [[nodiscard]] std::vector<Eigen::VectorXd> ask();
-  /// What the function is there, in the same order; NaN: it has no value, and counts as the
-  /// largest.
+  /// What the function is there, in the same order; NaN: it has no value, and counts as larger than
+  /// any. The search does not move towards it.
   void tell(std::span<const double> values);
 
   /// Whether further generations are of no use: all points lie within `resolution`, or the last

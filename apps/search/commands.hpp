@@ -40,7 +40,7 @@ struct SearchResult {
   std::string method;
   runtime::ExpectationResult expectation{};  ///< at the worst point
   std::vector<std::string> settings{};       ///< of it: KEY=VALUE
-  std::size_t runs = 0, failed = 0, unknown = 0;
+  std::size_t runs = 0, failed = 0, refused = 0;
   double seconds = 0.0;   ///< on the wall clock
   std::string file{};     ///< the worst point as a scenario; empty: none was asked for
   std::string command{};  ///< that repeats it
@@ -52,8 +52,8 @@ struct SearchResult {
 struct LimitResult {
   struct Row {
     std::vector<std::string> values{};
-    double passed = 0.0;
-    std::optional<double> failed{};
+    std::optional<double> passed{}, failed{};
+    std::string reason{};  ///< why none passed; empty: one did
   };
   std::string key;
   std::size_t runs = 0;

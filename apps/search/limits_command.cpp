@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <utility>
 
 #include "apps/search/commands.hpp"
@@ -11,7 +12,9 @@
 #include "apps/search/scenario_rows.hpp"
 #include "apps/text/draft.hpp"
 #include "base/counted.hpp"
+#include "base/nearest.hpp"
 #include "rt/stop_signal.hpp"
+#include "runtime/condition/expectations.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -19,9 +22,8 @@ namespace {
 /// A point of the study: between the largest factor that passed and the least that failed.
 struct Bracket {
   sweep::Point point;
-  double passed = 0.0;
-  double failed = 0.0;  // 0: none did
-  bool measured = true;
+  std::optional<double> passed{}, failed{};
+  std::string reason{};  // why none passed
 };
 
 /// A field of CSV.
@@ -40,13 +42,22 @@ class Limits {
         out_(human_output(options.json)),
         runs_(study.experiment, options.jobs, study.time_limit_s) {}
 
-  /// The greatest factor first, then halves: all points a round.
+  /// The greatest factor first, then halves, then 0 where none passed: all points a round.
   Exit find() {
     const auto begin = std::chrono::steady_clock::now();
     const sweep::Points points(study_);
     for (std::uint64_t i = 0; i < points.size(); ++i) brackets_.push_back({.point = points.at(i)});
-    for (std::size_t round = 0; round <= options_.halvings && !rt::stop_requested(); ++round) {
-      if (const Status ran = look(round == 0); !ran) return refuse(ran.error());
+    const auto greatest = [this](const Bracket&) { return std::optional(options_.up_to); };
+    const auto middle = [](const Bracket& one) {
+      return known(one.failed.has_value(),
+                   (one.passed.value_or(0.0) + one.failed.value_or(0.0)) / 2.0);
+    };
+    const auto nothing = [](const Bracket& one) { return known(!one.passed, 0.0); };
+    for (std::size_t round = 0; round <= options_.halvings + 1 && !rt::stop_requested(); ++round) {
+      const Status ran = round == 0                   ? look(greatest)
+                         : round <= options_.halvings ? look(middle)
+                                                      : look(nothing);
+      if (!ran) return refuse(ran.error());
     }
     if (rt::stop_requested()) return interrupted(rt::stop_signal());
     gather(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
@@ -56,43 +67,63 @@ class Limits {
   }
 
  private:
-  [[nodiscard]] bool passes(const ChildRun& run) const {
-    if (options_.expect.empty()) return run.passed;
-    const auto it =
-        std::ranges::find(run.expectations, options_.expect, &runtime::ExpectationResult::name);
-    return it != run.expectations.end() && it->passed;
-  }
-
-  Status look(bool first) {
+  /// @param factor  to run of a point; empty: it is not run
+  Status look(const std::function<std::optional<double>(const Bracket&)>& factor) {
     std::vector<PointRun> looked;
     std::vector<std::size_t> of;
     std::vector<double> factors;
     for (std::size_t i = 0; i < brackets_.size(); ++i) {
-      const Bracket& one = brackets_[i];
-      if (!first && one.failed == 0.0) continue;
-      factors.push_back(first ? options_.up_to : (one.passed + one.failed) / 2.0);
+      const std::optional<double> next = factor(brackets_[i]);
+      if (!next) continue;
+      factors.push_back(*next);
       of.push_back(i);
-      auto settings = scaled(one.point.settings, factors.back());
+      auto settings = scaled(brackets_[i].point.settings, *next);
       if (!settings) return std::unexpected(settings.error());
       looked.push_back({.settings = std::move(*settings)});
     }
     if (const Status ran = runs_.run(looked); !ran || rt::stop_requested()) return ran;
     for (std::size_t k = 0; k < looked.size(); ++k) {
-      Bracket& one = brackets_[of[k]];
-      if (looked[k].run.ended == "refused") {
-        return std::unexpected(Error{.message = looked[k].run.reason,
-                                     .hint = "a point of the study cannot be run",
-                                     .file = study_.file,
-                                     .key = {}});
-      }
-      (passes(looked[k].run) ? one.passed : one.failed) = factors[k];
+      if (const Status noted = note(brackets_[of[k]], looked[k].run, factors[k]); !noted)
+        return noted;
     }
     result_.runs += looked.size();
-    if (!options_.quiet) {
-      fmt::print(out_, "{:>5} runs: {} of {} points fail somewhere\n", result_.runs,
-                 std::ranges::count_if(brackets_, [](const Bracket& b) { return b.failed > 0.0; }),
-                 brackets_.size());
+    if (!options_.quiet && !looked.empty()) {
+      fmt::print(
+          out_, "{:>5} runs: {} of {} points fail somewhere\n", result_.runs,
+          std::ranges::count_if(brackets_, [](const Bracket& b) { return b.failed.has_value(); }),
+          brackets_.size());
       std::fflush(out_);
+    }
+    return {};
+  }
+
+  Status note(Bracket& one, const ChildRun& run, double factor) const {
+    const auto wrong = [this](std::string message, std::string hint) {
+      return std::unexpected(Error{
+          .message = std::move(message), .hint = std::move(hint), .file = study_.file, .key = {}});
+    };
+    const bool refused = run.ended == "refused" || run.killed;
+    if (refused && factor > 0.0)
+      return wrong(run.reason, fmt::format("a point of the study cannot be run at {:g}", factor));
+    const auto least = least_margin(run, options_.expect);
+    if (!refused && !least) {
+      std::vector<std::string> names;
+      for (const runtime::ExpectationResult& result : run.expectations)
+        names.push_back(result.name);
+      return names.empty() ? wrong("its experiment expects nothing",
+                                   "add an [[expect]]: docs/expectations.md")
+                           : wrong("its experiment expects no '" + options_.expect + "'",
+                                   suggest(options_.expect, names));
+    }
+    if (least && (options_.expect.empty() ? run.passed : least->passed)) {
+      one.passed = factor;
+    } else if (!refused) {
+      one.failed = factor;
+    }
+    if (factor == 0.0 && !one.passed) {
+      const std::string why =
+          refused || least->passed ? run.reason : least->name + " " + runtime::in_words(*least);
+      one.reason = (refused ? "0 cannot be run: " : "fails already at 0: ") + why;
     }
     return {};
   }
@@ -100,14 +131,12 @@ class Limits {
   [[nodiscard]] Result<std::vector<TomlSetting>> scaled(std::vector<TomlSetting> settings,
                                                         double factor) const {
     const auto it = std::ranges::find(settings, options_.limit, &TomlSetting::key);
-    const auto value =
-        it == settings.end() ? std::optional<std::string>() : scaled_value(it->value, factor);
+    const auto value = scaled_value(it->value, factor);
     if (!value) {
-      return std::unexpected(
-          Error{.message = "'" + options_.limit + "' has no numbers in it to scale",
-                .hint = "give it a [[vary]] whose values are directions: [[1, 0, 0], [0, 1, 0]]",
-                .file = study_.file,
-                .key = "vary"});
+      return std::unexpected(Error{.message = "'" + it->value + "' is not made of numbers",
+                                   .hint = "give values such as directions: [[1, 0, 0], [0, 1, 0]]",
+                                   .file = study_.file,
+                                   .key = "vary " + options_.limit});
     }
     it->value = *value;
     return settings;
@@ -117,7 +146,7 @@ class Limits {
     result_.key = options_.limit;
     result_.seconds = seconds;
     for (const Bracket& one : brackets_) {
-      LimitResult::Row row{.passed = one.passed, .failed = known(one.failed > 0.0, one.failed)};
+      LimitResult::Row row{.passed = one.passed, .failed = one.failed, .reason = one.reason};
       for (std::size_t k = 0; k < study_.vary.size(); ++k)
         row.values.push_back(one.point.values[k]);
       result_.points.push_back(std::move(row));
@@ -131,7 +160,8 @@ class Limits {
     text += "passes_at,fails_at\n";
     for (const LimitResult::Row& row : result_.points) {
       for (const std::string& value : row.values) text += csv_field(value) + ",";
-      text += fmt::format("{},{}\n", row.passed, row.failed ? fmt::format("{}", *row.failed) : "");
+      text += fmt::format("{},{}\n", row.passed ? fmt::format("{}", *row.passed) : "",
+                          row.failed ? fmt::format("{}", *row.failed) : "");
     }
     Draft draft = Draft::file(options_.output);
     if (const Status done = write_file(draft.path(), text); !done)
@@ -143,12 +173,13 @@ class Limits {
     if (options_.quiet) return;
     std::vector<std::string> header;
     for (const sweep::Vary& one : study_.vary) header.push_back(one.key);
-    header.insert(header.end(), {"passes at", "fails at"});
+    header.insert(header.end(), {"passes at", "fails at", ""});
     Table table(header);
     for (const LimitResult::Row& row : result_.points) {
       std::vector<std::string> cells = row.values;
-      cells.push_back(fmt::format("{:.4g}", row.passed));
-      cells.push_back(row.failed ? fmt::format("{:.4g}", *row.failed) : "-");
+      for (const auto& factor : {row.passed, row.failed})
+        cells.push_back(factor ? fmt::format("{:.4g}", *factor) : "-");
+      cells.push_back(row.reason);
       table.add(std::move(cells));
     }
     fmt::print(out_, "\n");
@@ -169,8 +200,10 @@ class Limits {
 
 void figures(Figures& f, const LimitResult::Row& row) {
   f("values", "of the study's [[vary]], in their order, in TOML", row.values);
-  f("passed", "the greatest factor that was run and passed; 0: none", row.passed);
+  f("passed", "the greatest factor that was run and passed; null: none did, not even 0",
+    row.passed);
   f("failed", "the least that failed; null: none did", row.failed);
+  f("reason", "why none passed; empty: one did", row.reason);
 }
 
 void figures(Figures& f, const LimitResult& result) {
@@ -187,8 +220,18 @@ Exit find_limits(const SearchOptions& options, const sweep::Study& study) {
                         .file = study.file,
                         .key = "sample"});
   }
+  std::vector<std::string> keys;
+  for (const sweep::Vary& one : study.vary) keys.push_back(one.key);
+  if (std::ranges::find(keys, options.limit) == keys.end()) {
+    return refuse(
+        Error{.message = "no [[vary]] of it has the key '" + options.limit + "'",
+              .hint = "--limit scales the values of a [[vary]], of which one is enough; " +
+                      suggest(options.limit, keys),
+              .file = study.file,
+              .key = "vary"});
+  }
   const Status writable =
-      check_writable(options.output, csv_field(study.vary.front().key) + ",", "a table of limits");
+      check_writable(options.output, csv_field(study.vary.front().key) + ",", "table of limits");
   if (!writable) return refuse(writable.error());
   rt::install_stop_signals();
   return Limits(options, study).find();

@@ -1,6 +1,5 @@
 #include "apps/search/point_runs.hpp"
 
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -32,17 +31,23 @@ std::vector<std::string> flags_of(const std::vector<TomlSetting>& settings) {
 }
 
 double margin_value(const runtime::ExpectationResult& result) {
-  if (result.margin) return *result.margin;
-  const bool measured = !result.passed && result.at_s;
-  return measured ? -std::numeric_limits<double>::infinity()
-                  : std::numeric_limits<double>::quiet_NaN();
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  return result.margin.value_or(result.passed ? kNone : -kNone);
 }
 
-const runtime::ExpectationResult* least_margin(const ChildRun& run, const std::string& name) {
-  const runtime::ExpectationResult* least = nullptr;
+std::optional<runtime::ExpectationResult> least_margin(const ChildRun& run,
+                                                       const std::string& name) {
+  if (run.ended == "refused" || run.killed) return std::nullopt;
+  std::optional<runtime::ExpectationResult> least;
   for (const runtime::ExpectationResult& one : run.expectations) {
-    if (std::isnan(margin_value(one)) || (!name.empty() && one.name != name)) continue;
-    if (least == nullptr || margin_value(one) < margin_value(*least)) least = &one;
+    if (!name.empty() && one.name != name) continue;
+    if (!least || margin_value(one) < margin_value(*least)) least = one;
+  }
+  const bool ended_badly = run.ended == "crashed" || run.ended == "too slow";
+  const bool by_a_fault = run.ended == "by a fault" && !run.reason.empty();  // none awaits it
+  if (ended_badly || (least && by_a_fault)) {
+    least = runtime::ExpectationResult{
+        .name = name.empty() ? "the run" : name, .unit = {}, .reason = run.reason};
   }
   return least;
 }

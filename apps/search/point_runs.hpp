@@ -2,6 +2,7 @@
 // Layer: apps/search.  Thread: main.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,12 +35,14 @@ class PointRuns {
 /// As words of a command line: --set KEY=VALUE.
 [[nodiscard]] std::vector<std::string> flags_of(const std::vector<TomlSetting>& settings);
 
-/// What a search minimises: the margin; minus infinity where it failed without one, as by a fall;
-/// NaN where nobody measured it.
+/// What a search minimises: the margin. Without one minus infinity where it failed, as by a fall,
+/// and infinity where it passed.
 [[nodiscard]] double margin_value(const runtime::ExpectationResult& result);
-/// The result of an expectation, or of that with the least margin_value(); null: all are NaN.
+/// The result of an expectation, or of that with the least margin_value(). A run that crashed, took
+/// too long, or ended by a fault that none awaits failed without a margin. Empty: it could not be
+/// run, or has no such expectation.
 /// @param name  empty: any
-[[nodiscard]] const runtime::ExpectationResult* least_margin(const ChildRun& run,
-                                                             const std::string& name);
+[[nodiscard]] std::optional<runtime::ExpectationResult> least_margin(const ChildRun& run,
+                                                                     const std::string& name);
 
 }  // namespace tandem::apps

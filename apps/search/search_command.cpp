@@ -45,8 +45,8 @@ class Search {
                     .seed = options_.seed},
                    [this](const std::vector<Eigen::VectorXd>& points) { return values(points); });
     if (!ran_) return refuse(ran_.error());
-    const runtime::ExpectationResult* worst = least_of(worst_);
-    if (worst == nullptr) return refuse(nothing_found());
+    const auto worst = least_of(worst_);
+    if (!worst) return refuse(nothing_found());
     result_.seconds = Seconds(std::chrono::steady_clock::now() - begin).count();
     result_.expectation = *worst;
     for (const TomlSetting& one : worst_.settings)
@@ -60,7 +60,7 @@ class Search {
   }
 
  private:
-  [[nodiscard]] const runtime::ExpectationResult* least_of(const PointRun& point) const {
+  [[nodiscard]] std::optional<runtime::ExpectationResult> least_of(const PointRun& point) const {
     return least_margin(point.run, options_.expect);
   }
   [[nodiscard]] std::size_t runs_left() const { return options_.runs - result_.runs; }
@@ -68,12 +68,17 @@ class Search {
   [[nodiscard]] Error nothing_found() const {
     if (rt::stop_requested())
       return {.message = "interrupted before a run had ended", .hint = "", .file = {}, .key = {}};
-    const bool named = !options_.expect.empty();
-    return {.message = last_reason_.empty() ? "no expectation has a margin" : last_reason_,
-            .hint = named ? suggest(options_.expect, names_)
-                          : "add an [[expect]] of a number: docs/expectations.md",
-            .file = study_.experiment,
-            .key = {}};
+    Error error{.message = "no point of the study can be run: " + refusal_,
+                .hint = "",
+                .file = study_.file,
+                .key = {}};
+    const bool named = !names_.empty();
+    if (!named && !refusal_.empty()) return error;
+    error.message = named ? "it expects no '" + options_.expect + "'" : "it expects nothing";
+    error.hint = named ? suggest(options_.expect, names_)
+                       : "add an [[expect]] of a number: docs/expectations.md";
+    error.file = study_.experiment;
+    return error;
   }
 
   [[nodiscard]] std::vector<TomlSetting> settings_of(const Eigen::VectorXd& point,
@@ -106,7 +111,7 @@ class Search {
     for (std::size_t i = 0; i + study_.seeds.size() <= looked.size(); i += study_.seeds.size()) {
       double least = std::numeric_limits<double>::quiet_NaN();
       for (std::size_t k = i; k < i + study_.seeds.size(); ++k)
-        if (const auto* one = least_of(looked[k])) least = std::fmin(least, margin_value(*one));
+        if (const auto one = least_of(looked[k])) least = std::fmin(least, margin_value(*one));
       values.push_back(least);
     }
     return values;
@@ -117,42 +122,41 @@ class Search {
     SearchResult::Progress progress;
     for (const PointRun& one : looked) {
       ++result_.runs;
-      if (!one.run.passed) ++result_.failed;
-      for (const runtime::ExpectationResult& result : one.run.expectations)
-        if (result_.runs == 1) names_.push_back(result.name);
-      const runtime::ExpectationResult* least = least_of(one);
-      if (least == nullptr) {
-        ++result_.unknown;
-        last_reason_ = one.run.reason;
+      if (one.run.ended == "refused" || one.run.killed) {
+        ++result_.refused;
+        if (refusal_.empty()) refusal_ = one.run.reason;
         continue;
       }
-      const runtime::ExpectationResult* worst = least_of(worst_);
+      if (!one.run.passed) ++result_.failed;
+      if (names_.empty()) {
+        for (const runtime::ExpectationResult& result : one.run.expectations)
+          names_.push_back(result.name);
+      }
+      const auto least = least_of(one);
+      if (!least) continue;
+      const auto worst = least_of(worst_);
       progress.least =
           std::min(progress.least.value_or(margin_value(*least)), margin_value(*least));
-      if (worst == nullptr || margin_value(*least) < margin_value(*worst)) worst_ = one;
+      if (!worst || margin_value(*least) < margin_value(*worst)) worst_ = one;
     }
-    const runtime::ExpectationResult* worst = least_of(worst_);
+    const auto worst = least_of(worst_);
     progress.runs = result_.runs;
-    if (worst != nullptr) progress.least_so_far = margin_value(*worst);
+    if (worst) progress.least_so_far = margin_value(*worst);
     result_.progress.push_back(progress);
-    if (options_.quiet || worst == nullptr) return;
+    if (options_.quiet || !worst) return;
     fmt::print(out_, "{:>5} {}: {} {}\n", result_.runs, result_.runs == 1 ? "run" : "runs",
                shown(worst->name), shown(runtime::in_words(*worst)));
     std::fflush(out_);
   }
 
-  /// Robot's keys are in another file: they stay flags.
   Status write() {
-    std::vector<TomlSetting> own = worst_.settings;
-    std::vector<TomlSetting> of_robot = take_below("robot", own);
-    for (TomlSetting& one : of_robot) one.key = "robot." + one.key;
     result_.command = command_of_run(study_.experiment, flags_of(worst_.settings));
     if (options_.output.empty()) return {};
     result_.file = options_.output;
-    result_.command = command_of_run(options_.output, flags_of(of_robot));
+    result_.command = command_of_run(options_.output);
     const auto document = TomlDocument::load(study_.experiment);
     if (!document) return std::unexpected(document.error());
-    auto text = with_settings(document->text(), own);
+    auto text = with_settings(document->text(), worst_.settings);
     if (!text) return std::unexpected(text.error());
     auto moved = relocated(text->text, study_.experiment, options_.output);
     if (!moved) return std::unexpected(moved.error());
@@ -171,12 +175,14 @@ class Search {
     if (options_.quiet) return;
     Facts facts;
     facts.add("worst", result_.expectation.name + " " + runtime::in_words(result_.expectation));
+    if (std::isinf(margin_value(result_.expectation)))
+      facts.add("", result_.expectation.passed ? "without a margin"
+                                               : "without a margin: nothing counts as worse");
     for (const std::string& one : result_.settings) facts.add("", one);
-    facts.add(
-        "runs",
-        fmt::format(
-            "{} in {:.1f} s, {} failed{}", result_.runs, result_.seconds, result_.failed,
-            result_.unknown == 0 ? "" : fmt::format(", {} without a margin", result_.unknown)));
+    facts.add("runs", fmt::format("{} in {:.1f} s, {} failed", result_.runs, result_.seconds,
+                                  result_.failed));
+    if (result_.refused > 0)
+      facts.add("refused", fmt::format("{} of them; the first: {}", result_.refused, refusal_));
     if (!result_.file.empty()) facts.add("written", result_.file);
     facts.add("repeat it", result_.command);
     fmt::print(out_, "\n");
@@ -191,7 +197,7 @@ class Search {
   Status ran_;
   PointRun worst_;
   std::vector<std::string> names_;  // of expectations
-  std::string last_reason_;
+  std::string refusal_;             // of the first run that could not be
   SearchResult result_;
 };
 
@@ -204,19 +210,21 @@ Error wrong_study(const sweep::Study& study, std::string message, std::string hi
 
 void figures(Figures& f, const SearchResult::Progress& progress) {
   f("runs", "so far", progress.runs);
-  f("least", "margin of this generation; null: one failed without a margin", progress.least);
+  f("least", "margin of this generation; null: one failed without a margin, or none has one",
+    progress.least);
   f("least_so_far", progress.least_so_far);
 }
 
 void figures(Figures& f, const SearchResult& result) {
   f("method", "", result.method);
-  f("expectation", "the one of least margin, at the worst point, as of `tandem run`",
+  f("expectation",
+    "the one of least margin, at the worst point, as of `tandem run`; `margin` is null where it "
+    "failed without one, which nothing is worse than, or where none has one",
     result.expectation);
   f("settings", "of the worst point, as of `--set`", result.settings);
   f("runs", "", result.runs);
   f("failed", "of them", result.failed);
-  f("unknown", "of them, without a margin: they could not be run, or measured nothing",
-    result.unknown);
+  f("refused", "of them: they could not be run, and count for nothing", result.refused);
   f("wall_seconds", "of all of them", result.seconds);
   f("file", "the worst point as a scenario; empty: none was asked for", result.file);
   f("command", "that repeats it", result.command);
@@ -228,7 +236,7 @@ Exit search_command(const SearchOptions& options) {
   for (const Status& writable :
        {check_writable(options.json),
         limits ? Status()
-               : check_writable(options.output, kFoundBy, "a scenario that was found before")}) {
+               : check_writable(options.output, kFoundBy, "scenario that was found before")}) {
     if (!writable) return refuse(writable.error());
   }
   const auto study = sweep::read_study(options.study);
@@ -239,7 +247,16 @@ Exit search_command(const SearchOptions& options) {
     return refuse(wrong_study(*study, "a comparison has no worst point",
                               "take [[variant]] out, or `tandem sweep` it"));
   }
-  if (!options.limit.empty()) return find_limits(options, *study);
+  if (limits) return find_limits(options, *study);
+  std::vector<TomlSetting> settings = study->settings;
+  for (const sweep::Vary& one : study->vary)
+    settings.push_back({.key = one.key, .value = {}, .said = {}});
+  if (const auto of_robot = take_below("robot", settings);
+      !options.output.empty() && !of_robot.empty()) {
+    return refuse(wrong_study(
+        *study, "'robot." + of_robot.front().key + "' is of the robot's file: no scenario has it",
+        "leave -o out: the command that it prints has the value"));
+  }
   if (options.runs < study->seeds.size()) {
     return refuse(wrong_study(*study, "one point needs a run for each of its seeds",
                               fmt::format("give --runs {} at least", study->seeds.size())));
@@ -250,6 +267,13 @@ Exit search_command(const SearchOptions& options) {
       &SearchMethod::name);
   std::vector<std::string> keys;
   for (const sweep::Vary& one : study->vary) keys.push_back(one.key);
+  if (!options.along.empty() && method->name != "phase") {
+    return refuse(
+        Error{.message = "--along is of --method phase, and this is " + std::string(method->name),
+              .hint = "add --method phase, or leave --along out",
+              .file = study->file,
+              .key = {}});
+  }
   const auto along = options.along.empty() ? keys.begin() : std::ranges::find(keys, options.along);
   if (along == keys.end()) {
     return refuse(wrong_study(*study, "no [[vary]] has the key '" + options.along + "'",

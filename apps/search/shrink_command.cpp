@@ -210,11 +210,17 @@ Exit shrink_command(const ShrinkOptions& options) {
   }
   for (const Status& writable :
        {check_writable(options.json),
-        check_writable(output, kShrunkBy, "a scenario that was shrunk before")}) {
+        check_writable(output, kShrunkBy, "scenario that was shrunk before")}) {
     if (!writable) return refuse(writable.error());
   }
   const auto document = TomlDocument::load(options.scenario);
   if (!document) return refuse(document.error());
+  if (document->root().has("experiment")) {
+    return refuse(Error{.message = "is a study, and what is shrunk is a scenario",
+                        .hint = "`tandem search` it: -o writes its worst point as a scenario",
+                        .file = options.scenario,
+                        .key = {}});
+  }
   auto scenario = ScenarioText::read(without_its_words(document->text()), options.scenario);
   if (!scenario) return refuse(scenario.error());
   if (scenario->rows().empty()) {

@@ -294,7 +294,7 @@ void Expectation::judge_settling(ExpectationResult& result) const {
   result.holds_so_far = true;
 }
 
-ExpectationResult Expectation::result() const {
+ExpectationResult Expectation::so_far() const {
   ExpectationResult result;
   result.name = spec_.name;
   result.unit = unit();
@@ -317,6 +317,8 @@ ExpectationResult Expectation::result() const {
     result.passed = false;
     result.reason = fmt::format("nobody measured it in {} of {}, first at {:g} s", so_far_.unknown,
                                 counted(so_far_.cycles, "cycle"), in_seconds(so_far_.unknown_ns));
+    result.margin.reset();  // of the others
+    result.at_s.reset();
   }
   if (so_far_.unknown > 0 && recorded)
     result.reason += fmt::format("; the log has it from {:g} s to {:g} s",
@@ -333,6 +335,16 @@ ExpectationResult Expectation::result() const {
     result.holds_so_far = true;
   }
   if (!result.passed && once && (endless || !whole)) result.awaits = "it has not held yet";
+  return result;
+}
+
+ExpectationResult Expectation::verdict() const {
+  ExpectationResult result = so_far();
+  if (result.holds_so_far) {  // what failed it is the run's end, not the number
+    result.margin.reset();
+    result.at_s.reset();
+    result.joint.clear();
+  }
   return result;
 }
 

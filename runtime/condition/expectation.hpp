@@ -1,5 +1,5 @@
 // One expectation: judged cycle by cycle, with its distance to failing.
-// Layer: runtime/condition.  Thread: read() and result() non-RT; take() the loop's.
+// Layer: runtime/condition.  Thread: read(), so_far() and verdict() non-RT; take() the loop's.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,8 @@ namespace tandem::runtime {
 struct ExpectationResult {
   std::string name;
   bool passed = false;
-  /// Signed distance to failing [unit]: less than 0 when it failed. Empty: there is none, as a
-  /// phase or a fault decided, or it was never measured.
+  /// Signed distance to failing [unit]: not above 0 when it failed. Empty: there is none, as a
+  /// phase, a fault or the run's end decided, or it was not measured.
   std::optional<double> margin{};
   std::string unit;              ///< "Nm"; empty: a plain number
   std::optional<double> at_s{};  ///< when that was, as in the log: the worst cycle
@@ -44,8 +44,10 @@ class Expectation {
 
   /// A cycle since the controllers start, before the run is shut down. @rt no heap, no lock
   void take(const hal::CycleView& view) noexcept TANDEM_RT;
-  /// What became of it by now.
-  [[nodiscard]] ExpectationResult result() const;
+  /// What became of it by now. Of one that holds so far the margin is that so far.
+  [[nodiscard]] ExpectationResult so_far() const;
+  /// What became of it if no further cycle comes.
+  [[nodiscard]] ExpectationResult verdict() const;
 
   /// Faults that have to come for it to pass: causes, a bit each.
   [[nodiscard]] std::uint64_t awaited_faults() const { return awaited_; }

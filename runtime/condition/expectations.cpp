@@ -75,15 +75,22 @@ std::optional<std::vector<ExpectationResult>> Expectations::look(std::chrono::na
     if (std::chrono::steady_clock::now() > until) return std::nullopt;
     std::this_thread::sleep_for(kLook);
   }
-  return results_of(shown_, true);
+  return each(shown_, &Expectation::so_far, true);
 }
 
-std::vector<ExpectationResult> Expectations::results() const { return results_of(all_, false); }
+std::vector<ExpectationResult> Expectations::results() const {
+  return each(all_, &Expectation::verdict, false);
+}
 
-std::vector<ExpectationResult> Expectations::results_of(const std::vector<Expectation>& all,
-                                                        bool followed) const {
+std::vector<ExpectationResult> Expectations::so_far() const {
+  return each(all_, &Expectation::so_far, false);
+}
+
+std::vector<ExpectationResult> Expectations::each(const std::vector<Expectation>& all,
+                                                  ExpectationResult (Expectation::*result)() const,
+                                                  bool followed) const {
   std::vector<ExpectationResult> results;
-  for (const Expectation& one : all) results.push_back(one.result());
+  for (const Expectation& one : all) results.push_back((one.*result)());
   if (others_ != nullptr) others_->add_results(followed, results);
   return results;
 }

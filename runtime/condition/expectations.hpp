@@ -44,10 +44,12 @@ class Expectations final : public hal::CycleObserver {
   /// A cycle that it has seen already counts once. @rt no heap, no lock, some 30 ns an expectation
   void take(const hal::CycleView& view) noexcept TANDEM_RT override;
 
-  /// Once the loop has ended, or stands.
+  /// Once the loop has ended: the verdicts.
   [[nodiscard]] std::vector<ExpectationResult> results() const;
-  /// While the loop cycles, for another thread, one at a time: as of its next cycle. Empty: none
-  /// came in that time.
+  /// While the loop stands.
+  [[nodiscard]] std::vector<ExpectationResult> so_far() const;
+  /// so_far() while the loop cycles, for another thread, one at a time: as of its next cycle.
+  /// Empty: none came in that time.
   [[nodiscard]] std::optional<std::vector<ExpectationResult>> look(
       std::chrono::nanoseconds at_most);
   /// Faults that an expectation awaits, such as `eventually = "fault(board_silent)"`: causes, a bit
@@ -63,9 +65,10 @@ class Expectations final : public hal::CycleObserver {
 
  private:
   void show() noexcept TANDEM_RT;
-
-  [[nodiscard]] std::vector<ExpectationResult> results_of(const std::vector<Expectation>& all,
-                                                          bool followed) const;
+  [[nodiscard]] std::vector<ExpectationResult> each(const std::vector<Expectation>& all,
+                                                    ExpectationResult (Expectation::*result)()
+                                                        const,
+                                                    bool followed) const;
 
   std::vector<Expectation> all_;
   std::vector<Expectation> shown_;  // the loop's while looked_at_, else look()'s

@@ -1,9 +1,15 @@
-// `tandem shrink` and `tandem search`: what they do, on functions and on the pendulum.
+// What `tandem shrink` and `tandem search` are made of, on functions.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include "apps/search/cma_es.hpp"
+#include "apps/search/point_runs.hpp"
 #include "apps/search/scenario_rows.hpp"
 #include "apps/search/shrink.hpp"
 #include "base/toml_reader.hpp"
-#include "tests/apps/program.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -186,181 +192,57 @@ TEST(CmaEs, HasTheSamePointsForTheSameSeedAndAllWithinTheCube) {
   }
 }
 
-constexpr char kFive[] = R"(# Five bumps; one is too hard.
-robot = "robot.toml"
-posture = "ready"
-duration_s = 0.6
-
-[[controller]]
-plugin = "hold"
-
-[[push]]
-name = "first"
-link = "link2"
-at_s = 0.9
-force_N = [1.0, 0.0, 0.0]
-for_s = 0.05
-
-[[push]]
-name = "second"
-link = "link1"
-at_s = 0.95
-force_N = [0.0, 0.0, 2.0]
-for_s = 0.05
-
-# The hard one.
-[[push]]
-name = "third"
-link = "link2"
-at_s = 1.013
-impulse_Ns = [0.1, 1.0, 0.3]
-shape = "half_sine"
-for_s = 0.1
-
-[[push]]
-name = "fourth"
-link = "link2"
-at_s = 1.2
-force_N = [-1.0, 0.0, 0.0]
-for_s = 0.05
-
-[[push]]
-name = "fifth"
-link = "link1"
-at_s = 1.25
-force_N = [0.0, 0.0, -1.0]
-for_s = 0.05
-
-[[expect]]
-name = "in place"
-always = "abs(position(joint1) - reference(joint1)) < 0.05rad"
-)";
-
-class Shrink : public Program {
- protected:
-  void SetUp() override {
-    Program::SetUp();
-    std::filesystem::create_directories(folder_ / "found");
-    write_text(folder_ / "five.toml", kFive);
+TEST(CmaEs, DoesNotMoveTowardsPointsWithoutAValue) {
+  CmaEs blind(Eigen::VectorXd::Constant(2, 0.5), 0.3, 1);
+  std::vector<Eigen::VectorXd> points;
+  for (int generation = 0; generation < 30; ++generation) {
+    points = blind.ask();
+    blind.tell(std::vector<double>(points.size(), std::nan("")));
   }
-};
-
-TEST_F(Shrink, OneOfFivePushesIsLeftAndItsCommandRepeatsIt) {
-  const Outcome outcome = tandem("shrink five.toml -o found/small.toml --json small.json -j 2");
-  EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
-  const auto result = json("small.json");
-  EXPECT_EQ(result["events_before"], 5);
-  EXPECT_EQ(result["events"], 1);
-  EXPECT_EQ(result["expectation"]["name"], "in place");
-  EXPECT_LT(result["expectation"]["margin"], 0.0);
-  const std::string small = read_text(folder_ / "found/small.toml");
-  EXPECT_TRUE(
-      small.starts_with("# Shrunk by `tandem shrink` from ../five.toml: 1 of 5 events is left."))
-      << small;
-  EXPECT_NE(small.find("robot = \"../robot.toml\""), std::string::npos) << small;
-  EXPECT_NE(small.find(R"(# The hard one.
-[[push]]
-name = "third"
-link = "link2"
-at_s = 1
-impulse_Ns = [0, 0.)"),
-            std::string::npos)
-      << small;
-  EXPECT_EQ(small.find("first"), std::string::npos) << small;
-  // What it prints fails, by the same margin to the last bit.
-  const std::string command = result["command"];
-  EXPECT_NE(outcome.out.find("repeat it: " + command), std::string::npos) << outcome.out;
-  EXPECT_EQ(tandem(command.substr(7) + " --json once.json").status, 1);
-  EXPECT_EQ(json("once.json")["expectations"][0]["margin"], result["expectation"]["margin"]);
-  // However many run at once.
-  EXPECT_EQ(tandem("shrink five.toml -o found/alone.toml -j 1 -q").status, 0);
-  EXPECT_EQ(read_text(folder_ / "found/alone.toml").substr(300), small.substr(300));
+  for (const Eigen::VectorXd& x : points) EXPECT_LT((x.array() - 0.5).abs().maxCoeff(), 0.1);
+  // The middle, where it begins, has none; minus infinity is less than any.
+  CmaEs search(Eigen::VectorXd::Constant(2, 0.5), 0.3, 1);
+  double nearest = 1.0;
+  for (int generation = 0; generation < 60; ++generation) {
+    points = search.ask();
+    std::vector<double> values;
+    for (const Eigen::VectorXd& x : points) {
+      const double far = (x.array() - 0.2).matrix().norm();
+      nearest = std::min(nearest, far);
+      values.push_back(x[0] > 0.4   ? std::nan("")
+                       : far < 0.01 ? -std::numeric_limits<double>::infinity()
+                                    : far);
+    }
+    search.tell(values);
+  }
+  EXPECT_LT(nearest, 0.01);
 }
 
-TEST_F(Shrink, RefusesWhatDoesNotFailOrHasNothingToLeaveOut) {
-  const auto refused = [this](const std::string& arguments, const std::string& why) {
-    const Outcome outcome = tandem("shrink " + arguments);
-    EXPECT_EQ(outcome.status, 2) << arguments;
-    EXPECT_NE(outcome.err.find(why), std::string::npos) << arguments << ": " << outcome.err;
-    EXPECT_FALSE(std::filesystem::exists(folder_ / "small.toml")) << arguments;
-  };
-  write_text(folder_ / "soft.toml", kFive);
-  edit("soft.toml", "[0.1, 1.0, 0.3]", "[0.1, 0.2, 0.3]");
-  refused("soft.toml -o small.toml", "it passes all of its 1 expectation");
-  refused("hold.toml -o small.toml", "nothing happens in it");
-  refused("five.toml -o ./five.toml", "would be overwritten");
-  refused("five.toml -o small.toml --expect 'in plac'", "did you mean 'in place'");
-  write_text(folder_ / "mine.toml", "# Written by hand.\n");
-  refused("five.toml -o mine.toml", "mine.toml");
-  EXPECT_EQ(read_text(folder_ / "mine.toml"), "# Written by hand.\n");
-}
-
-constexpr char kStudy[] = R"(experiment = "five.toml"
-[sample]
-method = "random"
-points = 4
-[[vary]]
-key = "push[2].impulse_Ns[1]"
-uniform = [0.1, 0.8]
-[[vary]]
-key = "push[2].at_s"
-uniform = [0.95, 1.1]
-)";
-
-TEST_F(Shrink, ASearchFindsTheHardestPushWhateverRunsAtOnce) {
-  write_text(folder_ / "study.toml", kStudy);
-  const Outcome outcome = tandem(
-      "search study.toml --expect 'in place' --runs 18 -o found/worst.toml --json w.json -j 2");
-  EXPECT_EQ(outcome.status, 1) << outcome.out << outcome.err;
-  const auto worst = json("w.json");
-  EXPECT_EQ(worst["runs"], 18);
-  EXPECT_EQ(worst["expectation"]["name"], "in place");
-  EXPECT_LT(worst["expectation"]["margin"], -0.07);
-  const std::string command = worst["command"];
-  EXPECT_EQ(tandem(command.substr(7) + " --json once.json").status, 1);
-  EXPECT_EQ(json("once.json")["expectations"][0]["margin"], worst["expectation"]["margin"]);
-  EXPECT_TRUE(
-      read_text(folder_ / "found/worst.toml")
-          .starts_with("# Found by `tandem search` with ../study.toml: the worst of 18 runs."));
-
-  EXPECT_EQ(tandem("search study.toml --expect 'in place' --runs 18 --json alone.json -j 1").status,
-            1);
-  auto alone = json("alone.json");
-  for (const char* same : {"expectation", "settings", "progress", "failed"})
-    EXPECT_EQ(alone[same], worst[same]) << same;
-}
-
-TEST_F(Shrink, ALimitLiesBetweenWhatPassedAndWhatFailed) {
-  write_text(folder_ / "map.toml", R"(experiment = "five.toml"
-[[vary]]
-key = "push[2].impulse_Ns"
-values = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
-)");
-  const Outcome outcome = tandem(
-      "search map.toml --limit 'push[2].impulse_Ns' --up-to 1 --halvings 3 -o map.csv --json "
-      "m.json");
-  EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
-  // Across the axis of the joint 0.6 Ns pass and 0.65 fail; along it nothing moves.
-  EXPECT_EQ(read_text(folder_ / "map.csv"),
-            "push[2].impulse_Ns,passes_at,fails_at\n"
-            "\"[0, 1, 0]\",0.5,0.625\n"
-            "\"[1, 0, 0]\",1,\n");
-  EXPECT_EQ(json("m.json")["runs"], 5);
-}
-
-TEST_F(Shrink, ASearchRefusesWhatHasNoWorst) {
-  write_text(folder_ / "study.toml", kStudy);
-  const auto refused = [this](const std::string& arguments, const std::string& why) {
-    const Outcome outcome = tandem("search " + arguments);
-    EXPECT_EQ(outcome.status, 2) << arguments;
-    EXPECT_NE(outcome.err.find(why), std::string::npos) << arguments << ": " << outcome.err;
-  };
-  refused("study.toml --runs 2 --expect 'in plac'", "did you mean 'in place'");
-  refused("study.toml --method phase", "say --along KEY");
-  refused("study.toml --method phase --along at_s", "no [[vary]] has the key 'at_s'");
-  refused("study.toml --limit at_s --up-to 2", "limits are of a grid's points");
-  write_text(folder_ / "study.toml", "experiment = \"five.toml\"\n");
-  refused("study.toml", "add a [[vary]]");
+TEST(LeastMargin, WhatFailsWithoutOneIsTheWorstAndWhatIsRefusedIsNone) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  ChildRun run{
+      .expectations = {{.name = "a", .passed = true, .margin = 2.0, .unit = "m", .reason = {}},
+                       {.name = "b", .passed = true, .unit = {}, .reason = {}},
+                       {.name = "c", .unit = "s", .reason = "it was outside"}},
+      .ended = "completed"};
+  EXPECT_EQ(margin_value(*least_margin(run, "a")), 2.0);
+  EXPECT_EQ(margin_value(*least_margin(run, "b")), kNone);
+  EXPECT_EQ(margin_value(*least_margin(run, "c")), -kNone);
+  EXPECT_EQ(least_margin(run, "")->name, "c");
+  EXPECT_FALSE(least_margin(run, "d"));
+  run.ended = "by a fault";
+  EXPECT_EQ(margin_value(*least_margin(run, "a")), 2.0) << "another one failed";
+  run.expectations.pop_back();
+  run.reason = "it ended by a fault that no expectation awaits";
+  EXPECT_EQ(margin_value(*least_margin(run, "a")), -kNone);
+  EXPECT_FALSE(least_margin(run, "d"));
+  for (const char* ended : {"crashed", "too slow"}) {
+    const ChildRun bad{.ended = ended, .reason = "why"};
+    EXPECT_EQ(margin_value(*least_margin(bad, "a")), -kNone) << ended;
+    EXPECT_EQ(least_margin(bad, "")->reason, "why") << ended;
+  }
+  EXPECT_FALSE(least_margin({.ended = "refused", .reason = "why"}, "a"));
+  EXPECT_FALSE(least_margin({.ended = "crashed", .killed = true}, "a")) << "not by itself";
 }
 
 }  // namespace

@@ -90,6 +90,9 @@ TEST(TomlSetting, SaysWhatAPathShouldHaveBeen) {
   EXPECT_EQ(set({"a..b=1"}),
             "--set a..b=1: 'a..b' is no path of a key (write it as "
             "push[0].impulse_Ns[0], or sim.link.torso.mass_kg)");
+  EXPECT_EQ(set({"push.a bump.at_s=1"}),
+            "--set push.a bump.at_s=1: 'push.a bump.at_s' is no path of a key (put a name with "
+            "blanks into quotes: push.\"a bump\".at_s)");
   EXPECT_EQ(set({"hal.delay=[1"}),
             "--set hal.delay=[1: is no value of TOML in one line (a number, "
             "true, false, \"text\" in quotes or a list in brackets)");

@@ -48,8 +48,10 @@ struct ExpectationTest : test::ConditionRobot, testing::Test {
     at(10 + count);
     (*all)->take(view());
     phase = hal::RunPhase::kRunning;
+    so_far = (*all)->so_far().front();
     return (*all)->results().front();
   }
+  ExpectationResult so_far;  // of the last run(), had it gone on
   /// Torques of the knee, a cycle each.
   ExpectationResult run(const ExpectationSpec& of, const std::vector<double>& torques) {
     return run(of, torques.size(), [&](std::uint64_t i) { state.torque_Nm()[0] = torques[i]; });
@@ -124,7 +126,10 @@ TEST_F(ExpectationTest, SettlingIsTheTimeAfterTheLastCycleOutside) {
   EXPECT_NE(run(of, {5, 0.5, 2, 0.5, 2}).reason.find("outside at the end"), std::string::npos);
   EXPECT_NEAR(*run(of, {0, 0, 0}).margin, 0.003, 1e-12);
   EXPECT_TRUE(run(of, {0, 0, 0}).passed);
-  EXPECT_EQ(run(of, {0, 0}).reason, "the run ended 0.002 s after its window began");
+  const ExpectationResult cut = run(of, {0, 0});
+  EXPECT_EQ(cut.reason, "the run ended 0.002 s after its window began");
+  EXPECT_FALSE(cut.margin) << "it failed";
+  EXPECT_NEAR(*so_far.margin, 0.003, 1e-12);
 }
 
 TEST_F(ExpectationTest, WindowsBeginWithTheControllersOrAnEvent) {
@@ -152,7 +157,12 @@ TEST_F(ExpectationTest, AWindowThatIsNotReachedFails) {
   EXPECT_FALSE(before.holds_so_far);
   of.from_s = 0.0;
   of.to_s = 0.01;
-  EXPECT_EQ(run(of, {1, 2, 3}).reason, "its window ends at 0.01 s, and the run ended at 0.002 s");
+  const ExpectationResult cut = run(of, {1, 2, 3});
+  EXPECT_EQ(cut.reason, "its window ends at 0.01 s, and the run ended at 0.002 s");
+  EXPECT_FALSE(cut.margin) << "it failed";
+  EXPECT_FALSE(cut.at_s);
+  EXPECT_EQ(so_far.margin, 37.0);
+  EXPECT_EQ(so_far.at_s, 0.012);
   of.to_s = 0.003;
   EXPECT_TRUE(run(of, {1, 2, 3}).passed) << "the third cycle lasts until then";
   of.to_s = 0.01;
@@ -202,6 +212,7 @@ TEST_F(ExpectationTest, WhatNobodyMeasuredFails) {
     const ExpectationResult partly = run(of, {1, kUnmeasured, 1});
     EXPECT_FALSE(partly.passed);
     EXPECT_EQ(partly.reason, "nobody measured it in 1 of 3 cycles, first at 0.011 s");
+    EXPECT_FALSE(partly.margin);
   }
   auto signal = spec(ExpectationKind::kAlways, "squat.depth < 1m");
   block->depth[0] = 0.1;
@@ -283,8 +294,8 @@ TEST_F(ExpectationTest, WithoutATruthItFailsAndTheRunGoesOn) {
   auto one = Expectation::read(of, real);
   ASSERT_TRUE(one) << one.error().to_string();
   one->take(view());
-  EXPECT_FALSE(one->result().passed);
-  EXPECT_NE(one->result().reason.find("in simulation alone"), std::string::npos);
+  EXPECT_FALSE(one->verdict().passed);
+  EXPECT_NE(one->verdict().reason.find("in simulation alone"), std::string::npos);
   EXPECT_FALSE(Expectation::read(spec(ExpectationKind::kAlways, "heigt() > 0.4m"), real));
 }
 
