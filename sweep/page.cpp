@@ -3,12 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
+#include <filesystem>
 
 #include "apps/text/draft.hpp"
 #include "base/counted.hpp"
-#include "base/quoting.hpp"
+#include "sweep/pictures.hpp"
 #include "sweep/table.hpp"
 
 namespace tandem::sweep {
@@ -45,132 +44,24 @@ th:first-child, td:first-child, .text { text-align: left; }
 th { color: var(--soft); font-weight: 600; }
 ol { margin: 0; padding-left: 26px; } li { margin-bottom: 10px; }
 code { display: block; white-space: pre-wrap; overflow-wrap: anywhere; font-size: 13px; }
+code.in { display: inline; } a { color: var(--good); }
+.ranks td:first-child, .ranks td.text { overflow-wrap: anywhere; }
+@media (max-width: 600px) { main { padding: 20px 12px 40px; } .card { padding: 10px; }
+  th, td { padding: 4px; font-size: 13px; } }
 b.no { color: var(--bad); }
 @media print { .card { break-inside: avoid; } }
 )";
 
-constexpr double kWide = 340.0, kHigh = 180.0, kLeft = 48.0, kRight = 8.0, kTop = 10.0,
-                 kFoot = 22.0;
-constexpr std::size_t kMostDots = 1'500;
-
-std::string text_in_page(const std::string& text) { return xml_text(harmless(text)); }
-
-/// What a figure shows of one point.
-struct Dot {
-  double x = 0.0, margin = 0.0;
-  bool passed = false;  // the expectation
-};
-
-struct Span {
-  double low = 0.0, high = 0.0;
-  [[nodiscard]] double share(double value) const {
-    return high > low ? (value - low) / (high - low) : 0.5;
-  }
-};
-
-template <class Of>
-Span span_of(const std::vector<Dot>& dots, Of of) {
-  Span span{of(dots.front()), of(dots.front())};
-  for (const Dot& dot : dots) {
-    span.low = std::min(span.low, of(dot));
-    span.high = std::max(span.high, of(dot));
-  }
-  return span;
-}
-
-double x_at(double share) { return kLeft + share * (kWide - kLeft - kRight); }
-double y_at(double share) { return kHigh - kFoot - share * (kHigh - kTop - kFoot); }
-
-std::string label(double x, double y, const char* anchor, const std::string& text) {
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>", x, y, anchor,
-                     text_in_page(text));
-}
-
-std::string figure_begin(const std::string& what) {
-  return fmt::format(
-      "<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\"><line class=\"axis\" "
-      "x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"/>",
-      kWide, kHigh, text_in_page(what), kLeft, kHigh - kFoot, kWide - kRight, kHigh - kFoot);
-}
-
-std::string ends_of_axis(const Span& span, const std::string& unit) {
-  return label(kLeft, kHigh - 6.0, "start", fmt::format("{:.3g}", span.low)) +
-         label(kWide - kRight, kHigh - 6.0, "end", fmt::format("{:.3g} {}", span.high, unit));
-}
-
-/// A number at a height, left of the figure.
-std::string beside_axis(double value, double share) {
-  return label(kLeft - 5.0, y_at(share) + 4.0, "end", fmt::format("{:.3g}", value));
-}
-
-/// How many points have which margin; those that failed in the other color.
-std::string histogram(const std::vector<Dot>& dots, const NamedMargin& margin) {
-  constexpr std::size_t kBars = 24;
-  const Span span = span_of(dots, [](const Dot& dot) { return dot.margin; });
-  std::array<std::array<std::size_t, 2>, kBars> counts{};
-  std::size_t most = 1;
-  for (const Dot& dot : dots) {
-    const auto bar = std::min<std::size_t>(
-        kBars - 1, static_cast<std::size_t>(span.share(dot.margin) * static_cast<double>(kBars)));
-    ++counts[bar][dot.passed ? 1 : 0];
-    most = std::max(most, counts[bar][0] + counts[bar][1]);
-  }
-  std::string out = figure_begin("how many points have which margin of " + margin.name);
-  const auto height = [&](std::size_t count) {
-    return static_cast<double>(count) / static_cast<double>(most);
-  };
-  for (std::size_t bar = 0; bar < kBars; ++bar) {
-    double base = 0.0;
-    for (const std::size_t passed : {std::size_t{0}, std::size_t{1}}) {
-      const double high = height(counts[bar][passed]);
-      if (high == 0.0) continue;
-      const double x = x_at(static_cast<double>(bar) / kBars);
-      out += fmt::format(
-          "<rect class=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/>",
-          passed == 1 ? "good" : "bad", x, y_at(base + high), x_at(1.0 / kBars) - kLeft - 1.0,
-          y_at(base) - y_at(base + high));
-      base += high;
-    }
-  }
-  if (span.low < 0.0 && span.high > 0.0) {
-    const double x = x_at(span.share(0.0));
-    out += fmt::format(
-        "<line class=\"zero\" x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{0:.1f}\" y2=\"{2:.1f}\"/>", x,
-        kTop, kHigh - kFoot);
-  }
-  out += beside_axis(static_cast<double>(most), 1.0) + beside_axis(0.0, 0.0);
-  return out + ends_of_axis(span, margin.unit) + "</svg>";
-}
-
-/// The margin over what varies: full dots failed.
-std::string scatter(const std::vector<Dot>& dots, const NamedMargin& margin,
-                    const std::string& key) {
-  const Span x = span_of(dots, [](const Dot& dot) { return dot.x; });
-  const Span y = span_of(dots, [](const Dot& dot) { return dot.margin; });
-  std::string out = figure_begin("the margin of " + margin.name + " over " + key);
-  if (y.low < 0.0 && y.high > 0.0) {
-    out += fmt::format(
-        "<line class=\"zero\" x1=\"{1:.1f}\" y1=\"{0:.1f}\" x2=\"{2:.1f}\" y2=\"{0:.1f}\"/>",
-        y_at(y.share(0.0)), kLeft, kWide - kRight);
-  }
-  out += "<g class=\"dots\">";
-  const std::size_t every = 1 + (dots.size() - 1) / kMostDots;
-  for (std::size_t i = 0; i < dots.size(); i += every) {
-    out += fmt::format("<circle class=\"{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.5\"/>",
-                       dots[i].passed ? "good" : "bad", x_at(x.share(dots[i].x)),
-                       y_at(y.share(dots[i].margin)));
-  }
-  out += "</g>";
-  out += beside_axis(y.high, 1.0) + beside_axis(y.low, 0.0);
-  return out + ends_of_axis(x, "") + "</svg>";
-}
-
 std::string rate_words(const PassRate& rate) {
   const Interval interval = rate.interval();
-  return fmt::format("{:.1f} % of {} passed, {:.1f} to {:.1f} %",
-                     100.0 * static_cast<double>(rate.passed) /
-                         static_cast<double>(std::max<std::uint64_t>(1, rate.all)),
-                     rate.all, 100.0 * interval.low, 100.0 * interval.high);
+  const std::string refused = rate.refused == 0
+                                  ? ""
+                                  : fmt::format("{} of {} were refused; of those that ran ",
+                                                rate.refused, rate.all + rate.refused);
+  return refused + fmt::format("{:.1f} % of {} passed, {:.1f} to {:.1f} %",
+                               100.0 * static_cast<double>(rate.passed) /
+                                   static_cast<double>(std::max<std::uint64_t>(1, rate.all)),
+                               rate.all, 100.0 * interval.low, 100.0 * interval.high);
 }
 
 std::string rates(const Study& study, const SweepSummary& summary) {
@@ -178,7 +69,15 @@ std::string rates(const Study& study, const SweepSummary& summary) {
                                 rate_words(summary.rate));
   for (const auto& [ended, count] : summary.ends)
     out += fmt::format("{} ended {}. ", count, text_in_page(ended));
+  if (!summary.refused_why.empty()) out += "Refused, such as: " + text_in_page(summary.refused_why);
   out += "</p>\n";
+  if (summary.seeds_alike) {
+    out += fmt::format(
+        "<p><b class=\"no\">The {} change nothing</b>: results are the same to the last bit, so "
+        "each value counts once. Set <code class=\"in\">sim.noise=true</code>, or leave "
+        "<code class=\"in\">seeds</code> out.</p>\n",
+        counted(study.seeds.size(), "seed"));
+  }
   if (study.variants.empty()) return out;
   out +=
       "<h2>Variants</h2><div class=\"card\"><table><thead><tr><th>variant</th><th>passed</th>"
@@ -204,12 +103,15 @@ std::string ranking(const SweepSummary& summary) {
   std::string out =
       "<h2>What margins hang on</h2><p>Spearman's rank correlation of a margin with what varies: 1 "
       "when it always rises with it, -1 when it always falls; near 0 it may still have a "
-      "maximum in between.</p><div class=\"card\"><table><thead><tr><th>key</th><th class=\"text\">"
-      "margin of</th><th>rank correlation</th><th>points</th></tr></thead><tbody>\n";
+      "maximum in between. A failure without a margin counts as the least.</p><div "
+      "class=\"card\"><table class=\"ranks\"><thead><tr><th>key</th>"
+      "<th class=\"text\">margin of</th><th>rank "
+      "correlation</th><th>points</th></tr></thead><tbody>\n";
   for (const Sensitivity& one : summary.ranking) {
     out += fmt::format(
-        "<tr><td>{}</td><td class=\"text\">{}</td><td>{:+.2f}</td><td>{}</td></tr>\n",
-        text_in_page(one.key), text_in_page(one.expectation), one.rank_correlation, one.points);
+        "<tr><td>{}</td><td class=\"text\">{}</td><td>{:+.2f}</td><td>{}{}</td></tr>\n",
+        text_in_page(one.key), text_in_page(one.expectation), one.rank_correlation, one.points,
+        one.without_margin == 0 ? "" : fmt::format(", {} without", one.without_margin));
   }
   return out + "</tbody></table></div>\n";
 }
@@ -218,45 +120,64 @@ std::string margins(const Study& study, const Points& points,
                     const std::vector<std::optional<PointResult>>& results) {
   std::string out;
   for (const NamedMargin& margin : margins_of(results)) {
-    std::vector<Dot> dots;
-    std::vector<std::uint64_t> indices;
-    for (std::size_t i = 0; i < results.size(); ++i) {
-      const auto* one = results[i] ? expectation_in(*results[i], margin.name) : nullptr;
-      if (one == nullptr || !one->margin) continue;
-      dots.push_back({.x = 0.0, .margin = *one->margin, .passed = one->passed});
-      indices.push_back(i);
-    }
-    if (dots.empty()) continue;
+    const std::vector<MarginOfPoint> of_points = margins_in(results, margin.name);
+    if (of_points.empty()) continue;
+    const auto count = [&](const auto& is) {
+      return static_cast<std::uint64_t>(std::ranges::count_if(of_points, is));
+    };
+    const std::uint64_t with = count([](const auto& one) { return one.has_margin(); });
     out += fmt::format(
-        "<h2>{}</h2>\n<div class=\"figures\"><div class=\"card\"><h3>margin{}: {}</h3>{}</div>\n",
-        text_in_page(margin.name),
+        "<h2>{}</h2>\n<p>{} of {} have a margin. It failed in {}, {} of them without a "
+        "margin.</p>\n<div class=\"figures\"><div class=\"card\"><h3>margin{}"
+        "</h3>{}</div>\n",
+        text_in_page(margin.name), with, counted(results.size(), "point"),
+        count([](const auto& one) { return one.failed; }), of_points.size() - with,
         margin.unit.empty() ? "" : " [" + text_in_page(margin.unit) + "]",
-        dots.size() == results.size()
-            ? counted(dots.size(), "point")
-            : fmt::format("{} of {} points have one", dots.size(), results.size()),
-        histogram(dots, margin));
+        histogram(of_points, margin));
     for (std::size_t k = 0; k < study.vary.size(); ++k) {
-      for (std::size_t i = 0; i < dots.size(); ++i)
-        dots[i].x = number_of(study.vary[k], points.at(indices[i]).values[k]);
+      std::vector<double> x;
+      for (const MarginOfPoint& one : of_points)
+        x.push_back(number_of(study.vary[k], points.at(one.index).values[k]));
       out += fmt::format("<div class=\"card\"><h3>margin{} over {}</h3>{}</div>\n",
                          margin.unit.empty() ? "" : " [" + text_in_page(margin.unit) + "]",
-                         text_in_page(study.vary[k].key), scatter(dots, margin, study.vary[k].key));
+                         text_in_page(study.vary[k].key),
+                         scatter(of_points, std::move(x), margin, study.vary[k]));
     }
     out += "</div>\n";
   }
   return out;
 }
 
-std::string worst(const SweepSummary& summary) {
-  std::string out =
-      "<h2>Worst points</h2><p>Each expectation's margin is taken as a multiple of its usual size. "
-      "The command repeats the point, with a log.</p><div class=\"card\"><ol>\n";
+std::string worst(const Study& study, const SweepSummary& summary) {
+  std::string out = fmt::format(
+      "<h2>Worst points</h2><p>Failures without a margin come first, then the least margins, each "
+      "as a multiple of its expectation's usual size; a row for each set of values. The command "
+      "repeats the point, with a log, in the folder <code class=\"in\">{}</code>.</p>"
+      "<div class=\"card\"><ol>\n",
+      text_in_page(summary.directory));
   for (const WorstPoint& one : summary.worst) {
-    out += fmt::format(
-        "<li>{} {}{}<code>{}</code></li>\n", one.passed ? "passed" : "<b class=\"no\">failed</b>",
-        one.point, one.why.empty() ? "" : ": " + text_in_page(one.why), text_in_page(one.command));
+    std::error_code ignored;
+    const std::string log = "logs/" + one.point;
+    out += fmt::format("<li>{} {}{}{}{}<code>{}</code></li>\n",
+                       one.passed ? "passed" : "<b class=\"no\">failed</b>", one.point,
+                       one.more_text(study), one.why.empty() ? "" : ": " + text_in_page(one.why),
+                       std::filesystem::exists(summary.folder + "/" + log, ignored)
+                           ? fmt::format(" (<a href=\"{}/\">log</a>)", log)
+                           : "",
+                       text_in_page(one.command));
   }
   return out + "</ol></div>\n";
+}
+
+/// The files beside the page.
+std::string links(const SweepSummary& summary) {
+  std::string out = "<p>";
+  for (const char* file : {"results.csv", "results.sqlite", "times.csv", "logs"}) {
+    std::error_code ignored;
+    if (std::filesystem::exists(summary.folder + "/" + file, ignored))
+      out += fmt::format("<a href=\"{0}\">{0}</a> ", file);
+  }
+  return out + "</p>\n";
 }
 
 }  // namespace
@@ -270,11 +191,12 @@ Status write_page(const std::string& path, const Study& study, const Points& poi
           "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
           "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">"
           "<title>{0}</title><style>{1}</style></head><body><main>\n<h1>{0}</h1>\n"
-          "<p>{2} of {3}, {4}. Blue: passed; red: failed.</p>\n",
+          "<p>{2} of {3}, {4}. In pictures blue is where the expectation passed, "
+          "red where it failed.</p>\n",
           title, kSweepStyle, counted(points.size(), "point"), text_in_page(study.experiment),
           study.method->words) +
-      rates(study, summary) + worst(summary) + ranking(summary) + margins(study, points, results) +
-      "</main></body></html>\n";
+      links(summary) + rates(study, summary) + worst(study, summary) + ranking(summary) +
+      margins(study, points, results) + "</main></body></html>\n";
   apps::Draft draft = apps::Draft::file(path);
   if (const Status written = apps::write_file(draft.path(), html); !written)
     return std::unexpected(draft.placed(written.error()));

@@ -60,7 +60,7 @@ double normal(double u, double mean, double deviation) {
 constexpr std::array kDistributions{
     Distribution{"uniform", "[least, greatest]", ordered, uniform},
     Distribution{"log_uniform", "[least, greatest], each factor as likely", positive_ordered,
-                 log_uniform},
+                 log_uniform, true},
     Distribution{"normal", "[mean, standard deviation]", deviation, normal},
 };
 

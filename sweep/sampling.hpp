@@ -17,6 +17,7 @@ struct Distribution {
   std::string_view (*problem)(double a, double b);
   /// The value below which a share `u` of all is, 0 < u < 1.
   double (*at)(double u, double a, double b);
+  bool logarithmic = false;  ///< its axis
 };
 [[nodiscard]] std::span<const Distribution> distributions();
 

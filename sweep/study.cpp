@@ -139,6 +139,70 @@ void read_variants(TomlTable& root, Study& study) {
   }
 }
 
+/// Where settings lead: the same place may be called by several keys.
+class Places {
+ public:
+  explicit Places(const std::string& experiment) {
+    auto document = TomlDocument::load(experiment);
+    if (!document) return;
+    experiment_ = document->text();
+    TomlTable root = document->root();
+    const auto robot = TomlDocument::load(
+        (std::filesystem::path(root.folder()) / root.text_or("robot", "")).string());
+    if (robot) robot_ = robot->text();
+  }
+  /// As the reader calls it: "push.knock.at_s" is "push[0].at_s". A key that leads nowhere stays.
+  [[nodiscard]] std::string of(const std::string& key) const {
+    constexpr std::string_view kRobot = "robot.";
+    if (key.starts_with(kRobot)) return "robot." + in(robot_, key.substr(kRobot.size()));
+    return in(experiment_, key);
+  }
+
+ private:
+  static std::string in(const std::string& text, const std::string& key) {
+    const auto set = with_settings(text, {{.key = key, .value = "0", .said = key}});
+    return set && !set->who.empty() ? set->who.front().first : key;
+  }
+  std::string experiment_, robot_;
+};
+
+bool is_part_of(const std::string& place, const std::string& whole) {
+  return place.starts_with(whole) &&
+         (place.size() == whole.size() || place[whole.size()] == '.' || place[whole.size()] == '[');
+}
+
+/// What varies is set last: nobody else may set it, or the points would differ by less than they
+/// say. A list that `set` gives may have an entry that varies.
+void check_places(TomlTable& root, std::vector<TomlTable>& rows, const Study& study) {
+  const Places places(study.experiment);
+  std::vector<std::pair<std::string, std::string>> set;  // place, who sets it
+  const auto add = [&](const std::vector<TomlSetting>& settings, const std::string& whose) {
+    for (const TomlSetting& one : settings)
+      set.emplace_back(places.of(one.key), "'" + one.key + "' in `set` of " + whose);
+  };
+  add(study.settings, "the study");
+  for (const Variant& one : study.variants) add(one.settings, "[[variant]] '" + one.name + "'");
+  for (const auto& [place, who] : set) {
+    if (place == "seed" && study.seeds.front())
+      root.error("seeds", "give the seed, which " + who + " sets too", "leave one of the two out");
+  }
+  std::vector<std::string> varied;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const std::string place = varied.emplace_back(places.of(study.vary[k].key));
+    const auto twice = [&](const std::string& who) {
+      rows[k].error("key", "varies " + place + ", which " + who + " sets too",
+                    "leave one of the two out");
+    };
+    if (place == "seed") rows[k].error("key", "seeds are no [[vary]]", "give `seeds = [1, 2]`");
+    for (std::size_t j = 0; j < k; ++j) {
+      if (is_part_of(place, varied[j]) || is_part_of(varied[j], place))
+        twice(fmt::format("[[vary]] '{}' of line {}", study.vary[j].key, rows[j].line("key")));
+    }
+    for (const auto& [other, who] : set)
+      if (is_part_of(other, place)) twice(who);
+  }
+}
+
 /// How many points; more than there can be: saturated.
 std::uint64_t times(std::uint64_t a, std::uint64_t b) {
   constexpr std::uint64_t kMany = std::uint64_t{1} << 62;
@@ -193,13 +257,10 @@ std::expected<Study, Diagnostics> read_study(const std::string& file) {
   study.settings = read_settings(root);
   study.time_limit_s = root.number_or("time_limit_s", study.time_limit_s, {0.0, 1e6, true});
   study.method = &read_method(root.table_or_empty("sample"), study);
-  std::set<std::string> keys;
-  for (TomlTable& row : root.tables("vary", "key")) {
-    study.vary.push_back(read_vary(row, *study.method));
-    if (!keys.insert(study.vary.back().key).second)
-      row.error("key", "varies twice", "give one [[vary]] all its values");
-  }
+  std::vector<TomlTable> rows = root.tables("vary", "key");
+  for (TomlTable& row : rows) study.vary.push_back(read_vary(row, *study.method));
   read_variants(root, study);
+  if (document->diagnostics().empty()) check_places(root, rows, study);
   TomlTable keep = root.table_or_empty("keep");
   study.keep.logs_MB = keep.number_or("logs_MB", 0.0, kNotNegative);
   study.keep.sample = static_cast<std::uint64_t>(keep.integer_or("sample", 0, 0, 1'000'000));

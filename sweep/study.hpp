@@ -55,7 +55,7 @@ struct Study {
 inline constexpr std::uint64_t kMostPoints = 10'000'000;
 
 /// Reads a study.toml. Errors, all at once, with line and key: those of its keys; a distribution in
-/// a grid; a key that varies twice; more than kMostPoints.
+/// a grid; a place that varies and is set twice, by whatever keys; more than kMostPoints.
 [[nodiscard]] std::expected<Study, Diagnostics> read_study(const std::string& file);
 
 /// One run.

@@ -34,8 +34,12 @@ std::string duration_text(double seconds) {
 
 std::string share_text(const sweep::PassRate& rate) {
   const sweep::Interval interval = rate.interval();
-  return fmt::format("{} of {} passed: {:.1f} %, {:.1f} to {:.1f} % (Wilson, 95 %)", rate.passed,
-                     rate.all,
+  const std::string refused = rate.refused == 0
+                                  ? ""
+                                  : fmt::format("{} of {} were refused; of those that ran ",
+                                                rate.refused, rate.all + rate.refused);
+  return fmt::format("{}{} of {} passed: {:.1f} %, {:.1f} to {:.1f} % (Wilson, 95 %)", refused,
+                     rate.passed, rate.all,
                      100.0 * static_cast<double>(rate.passed) /
                          static_cast<double>(std::max<std::uint64_t>(1, rate.all)),
                      100.0 * interval.low, 100.0 * interval.high);
@@ -59,6 +63,8 @@ class Sweep {
     rt::install_stop_signals();
     begin_ = SweepClock::now();
     done_before_ = folder_.done();
+    failed_ = static_cast<std::uint64_t>(std::ranges::count_if(
+        folder_.results(), [](const auto& one) { return one && !one->passed; }));
     if (const Status ran = run_points({.end = points_.size()}); !ran) return refuse(ran.error());
     if (rt::stop_requested()) return stopped(points_.size());
     if (const Status kept = keep_logs(); !kept) return refuse(kept.error());
@@ -136,21 +142,20 @@ class Sweep {
     const double s = std::chrono::duration<double>(SweepClock::now() - begin_).count();
     const double rate = static_cast<double>(folder_.done() - done_before_) / s;
     const auto left = static_cast<double>(points_.size() - folder_.done());
-    line_.show(fmt::format("{} of {} points, {:.1f} a second{}, {} failed", folder_.done(),
-                           points_.size(), rate,
-                           rate > 0.0 ? ", " + duration_text(left / rate) + " left" : "", failed_));
+    line_.show(fmt::format(
+        "{} of {} points{}, {} failed", folder_.done(), points_.size(),
+        rate > 0.0 ? fmt::format(", {:.2g} a second, {} left", rate, duration_text(left / rate))
+                   : "",
+        failed_));
   }
 
-  /// The points that [keep] wants logs of, once more with a log each, in their order: a run is a
-  /// function of its files, so it is the same run.
+  /// The points that [keep] wants logs of, once more with a log each: a run is a function of its
+  /// files, so it is the same run. The budget is for the sample first, then for the worst.
   Status keep_logs() {
     double left_MB = study_.keep.logs_MB;
-    std::uint64_t passed = 0;
     const std::string all = folder_.path() + "/logs";
-    for (std::uint64_t i = 0; i < points_.size() && left_MB > 0.0; ++i) {
-      const auto& result = folder_.results()[static_cast<std::size_t>(i)];
-      if (result->passed && passed >= study_.keep.sample) continue;
-      passed += result->passed ? 1 : 0;
+    for (const std::uint64_t i : sweep::kept_points(study_.keep, folder_.results())) {
+      if (left_MB <= 0.0) break;
       const sweep::Point point = points_.at(i);
       const std::string folder = all + "/" + point.name;
       std::error_code ignored;
@@ -176,14 +181,17 @@ class Sweep {
       return refuse(s.error());
     sweep::SweepSummary summary = sweep::summary_of(study_, points_, results);
     summary.folder = folder_.path();
+    std::error_code ignored;
+    summary.directory = fs::current_path(ignored).string();
     const std::string page = folder_.path() + "/index.html";
     if (const Status s = sweep::write_page(page, study_, points_, results, summary); !s)
       return refuse(s.error());
     print(summary);
     if (const Status s = write_json(options_.json, figures_json(summary)); !s)
       return refuse(s.error());
-    const double share = static_cast<double>(summary.rate.passed) /
-                         static_cast<double>(std::max<std::uint64_t>(1, summary.rate.all));
+    const double share =
+        static_cast<double>(summary.rate.passed) /
+        static_cast<double>(std::max<std::uint64_t>(1, summary.rate.all + summary.rate.refused));
     return share < options_.at_least ? Exit::kFault : Exit::kDone;
   }
 
@@ -202,6 +210,8 @@ class Sweep {
     }
     for (const auto& [ended, count] : summary.ends)
       fmt::print(out_, "  {} ended: {}\n", count, shown(ended));
+    if (!summary.refused_why.empty())
+      fmt::print(out_, "  refused, such as: {}\n", shown(summary.refused_why));
     if (!summary.ranking.empty()) {
       Table table({"margin of", "with", "rank correlation"});
       for (std::size_t i = 0; i < std::min<std::size_t>(10, summary.ranking.size()); ++i) {
@@ -214,8 +224,14 @@ class Sweep {
     }
     fmt::print(out_, "\nworst:\n");
     for (const sweep::WorstPoint& one : summary.worst) {
-      fmt::print(out_, "{} {}{}\n  {}\n", one.passed ? "passed" : "FAILED", one.point,
-                 one.why.empty() ? "" : ": " + shown(one.why), one.command);
+      fmt::print(out_, "{} {}{}{}\n  {}\n", one.passed ? "passed" : "FAILED", one.point,
+                 one.more_text(study_), one.why.empty() ? "" : ": " + shown(one.why), one.command);
+    }
+    if (summary.seeds_alike) {
+      fmt::print(out_,
+                 "\nwarning: the {} change nothing: results are the same to the last bit, so each "
+                 "value counts once above. Set sim.noise=true, or leave `seeds` out\n",
+                 counted(study_.seeds.size(), "seed"));
     }
     fmt::print(out_, "\n{}/results.csv, results.sqlite, index.html", folder_.path());
     if (now > 0)

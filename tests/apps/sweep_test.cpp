@@ -90,6 +90,8 @@ TEST_F(SweepProgram, ACrashARefusalAndAHangCostOnePointEach) {
   const std::string csv = read_text(folder_ / "out/results.csv");
   EXPECT_NE(csv.find(",1,as planned,,"), std::string::npos) << csv;
   EXPECT_NE(csv.find(",0,refused,"), std::string::npos) << csv;
+  EXPECT_EQ(json("out.json")["rate"]["of"], 1);
+  EXPECT_EQ(json("out.json")["rate"]["refused"], 1);
   EXPECT_FALSE(has_log());
 
   study("values = [40.0]\n", "[keep]\nlogs_MB = 50\n");

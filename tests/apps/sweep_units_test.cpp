@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
+#include "sweep/pictures.hpp"
 #include "sweep/statistics.hpp"
 #include "sweep/study.hpp"
 #include "sweep/summary.hpp"
@@ -97,6 +99,120 @@ TEST_F(StudyFile, MakesPointsInOrderThatAreNamedByWhatTheySet) {
   for (std::uint64_t i = 0; i < points.size(); ++i) names.insert(points.at(i).name);
   EXPECT_EQ(names.size(), 24U);
   EXPECT_EQ(points.at(0).name, "9654e740745968e0");
+}
+
+TEST_F(StudyFile, RefusesTwoRowsThatSetTheSamePlace) {
+  const auto text = apps::read_text(folder_ / "hold.toml");
+  apps::write_text(folder_ / "hold.toml",
+                   text + "\n[[push]]\nname = \"knock\"\nimpulse_Ns = [0.0, 1.0, 0.0]\n");
+  const auto vary = [](const std::string& key) {
+    return "[[vary]]\nkey = \"" + key + "\"\nvalues = [1, 2]\n";
+  };
+  EXPECT_EQ(first_error(vary("push.knock.impulse_Ns[1]") +
+                        "[[variant]]\nname = \"b\"\nset = [\"push[0].impulse_Ns[1]=3\"]\n"),
+            "study.toml:3: vary.push.knock.impulse_Ns[1].key: varies push[0].impulse_Ns[1], which "
+            "'push[0].impulse_Ns[1]' in `set` of [[variant]] 'b' sets too (leave one of the two "
+            "out)");
+  EXPECT_EQ(first_error("set = [\"duration_s=2\"]\n" + vary("duration_s")),
+            "study.toml:4: vary.duration_s.key: varies duration_s, which 'duration_s' in `set` of "
+            "the study sets too (leave one of the two out)");
+  EXPECT_EQ(first_error(vary("push[0].impulse_Ns[1]") + vary("push.knock.impulse_Ns")),
+            "study.toml:6: vary.push.knock.impulse_Ns.key: varies push[0].impulse_Ns, which "
+            "[[vary]] 'push[0].impulse_Ns[1]' of line 3 sets too (leave one of the two out)");
+  EXPECT_EQ(first_error("set = [\"push[0].impulse_Ns=[1.0,2.0,3.0]\"]\n" +
+                        vary("push.knock.impulse_Ns[1]")),
+            "none");
+  EXPECT_EQ(first_error(vary("seed")),
+            "study.toml:3: vary.seed.key: seeds are no [[vary]] (give `seeds = [1, 2]`)");
+}
+
+PointResult point_of(std::optional<double> margin, bool passed, const std::string& reason = {}) {
+  return {.passed = passed,
+          .ended = "as planned",
+          .reason = {},
+          .expectations = {
+              {.name = "slips", .passed = passed, .margin = margin, .unit = {}, .reason = reason}}};
+}
+
+PointResult refused_point() {
+  PointResult result;
+  result.ended = "refused";
+  result.reason = "too long";
+  return result;
+}
+
+TEST_F(StudyFile, FailuresWithoutAMarginCountAsTheLeastAndAreOneRowOfTheirValues) {
+  const auto study = read("seeds = 2\n[[vary]]\nkey = \"duration_s\"\nvalues = [1, 2, 3, 4]\n");
+  ASSERT_TRUE(study);
+  const Points points(*study);
+  const std::vector<std::optional<PointResult>> results{point_of(0.5, true),
+                                                        point_of(0.6, true),
+                                                        point_of(-0.1, false, "far"),
+                                                        point_of(0.1, true),
+                                                        point_of({}, false, "fell"),
+                                                        point_of({}, false, "fell"),
+                                                        refused_point(),
+                                                        refused_point()};
+  const SweepSummary summary = summary_of(*study, points, results);
+  EXPECT_EQ(summary.rate.passed, 3U);
+  EXPECT_EQ(summary.rate.all, 6U);
+  EXPECT_EQ(summary.rate.refused, 2U);
+  EXPECT_EQ(summary.refused_why, "too long");
+  EXPECT_FALSE(summary.seeds_alike);
+  ASSERT_EQ(summary.worst.size(), 3U);
+  EXPECT_EQ(summary.worst[0].why, "slips: fell");
+  EXPECT_EQ(summary.worst[0].more_text(*study), " and 1 more seed");
+  EXPECT_EQ(summary.worst[1].why, "slips: far");
+  EXPECT_EQ(summary.worst[1].more, 0U);
+  EXPECT_EQ(summary.worst[2].why, "slips: margin 0.5");
+  ASSERT_EQ(summary.ranking.size(), 1U);
+  EXPECT_EQ(summary.ranking[0].points, 6U);
+  EXPECT_EQ(summary.ranking[0].without_margin, 2U);
+  EXPECT_NEAR(summary.ranking[0].rank_correlation, -0.9701425, 1e-6);
+  EXPECT_EQ(kept_points({.logs_MB = 1.0, .sample = 1}, results),
+            (std::vector<std::uint64_t>{0, 4, 5, 2}));
+}
+
+TEST_F(StudyFile, SeedsThatChangeNothingCountOnce) {
+  const auto study = read("seeds = 3\n[[vary]]\nkey = \"duration_s\"\nvalues = [1, 2]\n");
+  ASSERT_TRUE(study);
+  const Points points(*study);
+  std::vector<std::optional<PointResult>> results(3, point_of(0.5, true));
+  results.resize(6, point_of(-0.5, false));
+  SweepSummary summary = summary_of(*study, points, results);
+  EXPECT_TRUE(summary.seeds_alike);
+  EXPECT_EQ(summary.rate.all, 2U);
+  EXPECT_EQ(summary.rate.passed, 1U);
+  EXPECT_EQ(summary.done, 6U);
+  results[5]->expectations[0].margin = std::nextafter(-0.5, 0.0);
+  summary = summary_of(*study, points, results);
+  EXPECT_FALSE(summary.seeds_alike);
+  EXPECT_EQ(summary.rate.all, 6U);
+}
+
+TEST(Pictures, EndsOfAnAxisHaveTheDigitsThatTellThemApart) {
+  EXPECT_EQ(ends_in_words(0.2995, 0.3001),
+            (std::pair<std::string, std::string>("0.2995", "0.3001")));
+  EXPECT_EQ(ends_in_words(-2.0, 10.25), (std::pair<std::string, std::string>("-2", "10.2")));
+}
+
+TEST(Pictures, FailuresWithoutAMarginHaveALaneAndLabelsHaveRoom) {
+  const std::vector<MarginOfPoint> points{
+      {.index = 0, .margin = -0.00012345, .failed = true},
+      {.index = 1, .margin = -0.00012301, .failed = true},
+      {.index = 2, .margin = -std::numeric_limits<double>::infinity(), .failed = true}};
+  const NamedMargin margin{.name = "slips", .unit = "m"};
+  EXPECT_NE(histogram(points, margin).find(">no margin</text>"), std::string::npos);
+  Vary vary;
+  vary.key = "posture";
+  vary.values = {"\"stand\"", "\"squat\"", "\"bow\""};
+  const std::string svg = scatter(points, {0.0, 1.0, 2.0}, margin, vary);
+  EXPECT_NE(svg.find(">no margin</text>"), std::string::npos);
+  EXPECT_NE(svg.find(">squat</text>"), std::string::npos);
+  // 11 letters of 6.3 before 72.3: all of them are right of 0.
+  EXPECT_NE(svg.find("<text x=\"72.3\" y=\"14.0\" text-anchor=\"end\">-0.00012301</text>"),
+            std::string::npos)
+      << svg;
 }
 
 TEST_F(StudyFile, SaysWhatIsWrong) {
