@@ -18,7 +18,8 @@
 namespace tandem::apps {
 namespace {
 
-constexpr std::array kRowKinds{"push", "fault", "event", "sim.payload", "sim.patch"};
+constexpr std::array kRowKinds{"push",      "fault",      "event",    "sim.payload",
+                               "sim.patch", "sim.ground", "sim.shake"};
 
 /// How a value becomes simpler.
 enum class Simpler : std::uint8_t {
@@ -227,6 +228,13 @@ std::string without_key(const std::string& row, const std::string& key) {
 }
 
 }  // namespace
+
+std::string row_kinds_text() {
+  std::string text;
+  for (const char* const kind : kRowKinds)
+    text += fmt::format("{}[[{}]]", text.empty() ? "" : ", ", kind);
+  return text;
+}
 
 Result<ScenarioText> ScenarioText::read(const std::string& text, const std::string& file) {
   const auto document = TomlDocument::parse(text, file);

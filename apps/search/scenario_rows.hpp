@@ -12,7 +12,10 @@
 
 namespace tandem::apps {
 
-/// Something that happens: a row [[push]], [[fault]], [[event]], [[sim.payload]] or [[sim.patch]].
+/// The kinds of rows that can be left out: "[[push]], [[fault]], …".
+[[nodiscard]] std::string row_kinds_text();
+
+/// Something that happens: a row of one of these kinds.
 struct ScenarioRow {
   std::size_t place = 0;  ///< among the rows of the file
   std::string text;       ///< header, keys, and the comment above them

@@ -225,8 +225,7 @@ Exit shrink_command(const ShrinkOptions& options) {
   if (!scenario) return refuse(scenario.error());
   if (scenario->rows().empty()) {
     return refuse(Error{.message = "nothing happens in it: there is nothing to leave out",
-                        .hint = "give a scenario with [[push]], [[fault]], [[event]], "
-                                "[[sim.payload]] or [[sim.patch]]",
+                        .hint = "give a scenario that has one of " + row_kinds_text(),
                         .file = options.scenario,
                         .key = {}});
   }

@@ -126,6 +126,9 @@ text = """
 """
 
 )");
+  const auto ground = ScenarioText::read("[[sim.ground]]\nslope_deg = 3.0\n", "ground.toml");
+  ASSERT_TRUE(ground) << ground.error().to_string();
+  EXPECT_EQ(ground->rows().size(), 1U);
   const auto inline_rows = ScenarioText::read("push = [{ at_s = 1.0 }]\n", "inline.toml");
   ASSERT_FALSE(inline_rows);
   EXPECT_EQ(inline_rows.error().hint, "write each as [[push]] with its keys below");
