@@ -2,13 +2,7 @@
 // known name. All tables of a document collect their errors in one list.
 #include "base/toml_reader.hpp"
 
-// The library asserts what some texts that are no TOML make false, and then reports them: a build
-// with assertions must not end by them.
-#define TOML_ASSERT(expr) static_assert(true)
-#include <toml++/toml.h>
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <sstream>
@@ -18,30 +12,9 @@
 #include "base/nearest.hpp"
 #include "base/open_file.hpp"
 #include "base/quoting.hpp"
+#include "base/toml_shared.hpp"
 
 namespace tandem {
-
-struct TomlTable::Shared {
-  toml::table root;
-  std::string file, text;
-  SetText set;  // whose text is `text`
-  Diagnostics diagnostics;
-  std::set<std::string> meant;  // keys that a misspelt one stands for: not missing besides
-  std::map<std::string, std::string> names;  // of entries of arrays: "joint[0]" is "hip"
-
-  /// A dotted path as errors have it: entries by their names, where they have one.
-  [[nodiscard]] std::string shown(const std::string& path) const {
-    std::string out;
-    std::size_t from = 0;
-    for (std::size_t at = path.find(']'); at != std::string::npos; at = path.find(']', at + 1)) {
-      const auto name = names.find(path.substr(0, at + 1));
-      if (name == names.end()) continue;
-      out.append(path, from, path.rfind('[', at) - from).append("." + name->second);
-      from = at + 1;
-    }
-    return out.append(path, from);
-  }
-};
 
 namespace {
 
@@ -80,42 +53,6 @@ std::string number_text(double value) {
   std::ostringstream out;
   out << value;
   return out.str();
-}
-
-/// What two values that mean the same have in common.
-std::string value_text(const toml::node& node) {
-  if (const auto* text = node.as_string()) return quoted_text(text->get());
-  if (const auto* number = node.as_floating_point()) {
-    std::array<char, 32> out{};
-    const auto end = std::to_chars(out.data(), out.data() + out.size(), number->get());
-    return {out.data(), end.ptr};
-  }
-  std::ostringstream out;
-  if (const auto* list = node.as_array()) {
-    out << '[';
-    for (const toml::node& one : *list)
-      out << (&one == &list->front() ? "" : ", ") << value_text(one);
-    out << ']';
-  } else {
-    node.visit([&out](const auto& value) {
-      if constexpr (!toml::is_container<decltype(value)>) out << std::boolalpha << value.get();
-    });
-  }
-  return out.str();
-}
-
-void add_values(const toml::node& node, const std::string& key,
-                std::map<std::string, std::string>& values) {
-  if (const toml::table* table = node.as_table()) {
-    for (const auto& [name, value] : *table)
-      add_values(value, (key.empty() ? "" : key + ".") + std::string(name.str()), values);
-    return;
-  }
-  const toml::array* list = node.as_array();
-  const bool of_tables = list != nullptr && list->is_array_of_tables();
-  if (!of_tables) values[key] = value_text(node);
-  for (std::size_t i = 0; of_tables && i < list->size(); ++i)
-    add_values((*list)[i], key + "[" + std::to_string(i) + "]", values);
 }
 
 }  // namespace
@@ -492,12 +429,7 @@ std::string TomlTable::json(std::string_view key) {
     error(key, "must be a table, not " + kind(*node), "write { key = value }");
     return {};
   }
-  std::ostringstream text;
-  text << toml::json_formatter(*found, toml::format_flags::quote_dates_and_times |
-                                           toml::format_flags::quote_infinities_and_nans);
-  std::string line = text.str();
-  std::ranges::replace(line, '\n', ' ');  // of the layout: in texts they are escaped
-  return line;
+  return json_text(*found);
 }
 
 /// Errors call an entry by a name that no other of the list has, and else by its number.
@@ -541,89 +473,9 @@ std::map<std::string, std::string> TomlTable::values() const {
   return all;
 }
 
-namespace {
-
-/// `KEY = "WORD"` for a line that reads `KEY = WORD`, else empty.
-std::string quoted_line(std::string_view text, std::size_t number) {
-  for (; number > 1 && text.contains('\n'); --number) text.remove_prefix(text.find('\n') + 1);
-  text = text.substr(0, text.find_first_of("\r\n#"));
-  const std::size_t equals = text.find('=');
-  if (equals == std::string_view::npos) return {};
-  const auto trimmed = [](std::string_view part) {
-    const std::size_t from = part.find_first_not_of(" \t");
-    return from == std::string_view::npos
-               ? std::string()
-               : std::string(part.substr(from, part.find_last_not_of(" \t") + 1 - from));
-  };
-  const std::string word = trimmed(text.substr(equals + 1));
-  if (word.empty() || word.find_first_of("\"'[]{},") != std::string::npos) return {};
-  return trimmed(text.substr(0, equals)) + " = \"" + word + "\"";
-}
-
-}  // namespace
-
-Result<TomlDocument> TomlDocument::load(const std::string& file, const char* of_xml,
-                                        const std::vector<TomlSetting>& settings) {
-  if (file.empty()) {
-    return std::unexpected(Error{"the file's name is empty", "name a .toml file", {}, 0, {}});
-  }
-  const Result<std::string> text = read_file(file, "name a .toml file", kMostTomlBytes);
-  if (!text) return std::unexpected(text.error());
-  if (text->find_first_not_of(" \t\r\n") == std::string::npos) {
-    return std::unexpected(Error{"the file is empty", "name another, or write it", file, 0, {}});
-  }
-  return parse(*text, file, of_xml, settings);
-}
-
-Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::string& file,
-                                         const char* of_xml,
-                                         const std::vector<TomlSetting>& settings) {
-  if (const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
-      first != std::string_view::npos && text[first] == '<') {
-    return std::unexpected(Error{"this is XML, not TOML", of_xml, file, 1, {}});
-  }
-  if (Status within = check_toml_bounds(text, file); !within)
-    return std::unexpected(within.error());
-  if (!settings.empty()) {
-    auto set = with_settings(text, settings);
-    if (!set) return std::unexpected(set.error());
-    auto document = parse(set->text, file, of_xml);
-    if (document) document->shared_->set = std::move(*set);
-    return document;
-  }
-  TomlDocument document;
-  document.shared_ = std::make_shared<TomlTable::Shared>();
-  document.shared_->file = file;
-  document.shared_->text = text;
-  try {
-    document.shared_->root = toml::parse(text, file);
-  } catch (const toml::parse_error& e) {
-    const bool encoding = e.description().find("utf-8") != std::string_view::npos;
-    const bool twice = e.description().find("redefine existing table") != std::string_view::npos;
-    const std::string quoted = quoted_line(text, e.source().begin.line);
-    const bool value = e.description().find("parsing value") != std::string_view::npos;
-    return std::unexpected(Error{"not valid TOML: " + std::string(e.description()),
-                                 encoding ? "save the file as UTF-8"
-                                 : twice  ? "of several write each as [[NAME]], or remove one"
-                                 : value && !quoted.empty() ? "a text stands in quotes: " + quoted
-                                                            : "correct the syntax at this line",
-                                 file,
-                                 static_cast<int>(e.source().begin.line),
-                                 {}});
-  }
-  return document;
-}
-
-TomlTable TomlDocument::root() const { return {shared_, &shared_->root, {}, 1}; }
-const Diagnostics& TomlDocument::diagnostics() const { return shared_->diagnostics; }
-const std::string& TomlDocument::file() const { return shared_->file; }
-const std::string& TomlDocument::text() const { return shared_->text; }
-
 std::string TomlTable::folder() const {
   const std::string folder = std::filesystem::path(shared_->file).parent_path().string();
   return folder.empty() ? "." : folder;
 }
-
-std::string TomlDocument::folder() const { return root().folder(); }
 
 }  // namespace tandem

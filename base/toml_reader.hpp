@@ -100,7 +100,7 @@ class TomlTable {
   [[nodiscard]] std::vector<std::string> keys() const;
   /// Every value of this table itself and of the tables in it, by its key from here on, "a.b[0].c":
   /// for comparing two tables. Numbers are the shortest that reads the same, whether written as 12
-  /// or 12.0. Marks none as read.
+  /// or 12.0; a table without any is `{}`. Marks none as read.
   [[nodiscard]] std::map<std::string, std::string> values() const;
 
   /// From now on the keys that this table lacks are those of `defaults`: a sub-table or list as a

@@ -23,6 +23,17 @@ Frame short_frame(std::uint32_t id, std::uint8_t length) noexcept {
   return frame;
 }
 
+constexpr std::uint8_t kPastOrderBytes = 5, kPastAnswerBytes = 8;
+
+void put_order(Frame& frame, const PastOrderMessage& message) noexcept {
+  frame.data[0] = static_cast<std::uint8_t>(message.order);
+  put(&frame.data[1], message.number);
+}
+
+PastOrderMessage order_in(const Frame& frame) noexcept {
+  return {static_cast<PastOrder>(frame.data[0]), get<std::uint32_t>(&frame.data[1])};
+}
+
 }  // namespace
 
 const char* to_string(NmtState state) noexcept {
@@ -49,6 +60,31 @@ Frame make_time(std::int64_t time_ns) noexcept TANDEM_RT {
   put(frame.data.data(), static_cast<std::uint32_t>(time_ms % kMsPerDay));
   put(frame.data.data() + 4, static_cast<std::uint16_t>(time_ms / kMsPerDay));
   return frame;
+}
+
+Frame make_past_order(const PastOrderMessage& message) noexcept TANDEM_RT {
+  Frame frame = short_frame(cob::kPastOrder, kPastOrderBytes);
+  put_order(frame, message);
+  return frame;
+}
+
+std::optional<PastOrderMessage> parse_past_order(const Frame& frame) noexcept TANDEM_RT {
+  if (frame.id != cob::kPastOrder || frame.length != kPastOrderBytes) return std::nullopt;
+  return order_in(frame);
+}
+
+Frame make_past_answer(const PastAnswerMessage& message) noexcept TANDEM_RT {
+  Frame frame = short_frame(cob::kPastAnswer, kPastAnswerBytes);
+  put_order(frame, message.to);
+  frame.data[5] = static_cast<std::uint8_t>(message.refusal);
+  put(&frame.data[6], message.size);
+  return frame;
+}
+
+std::optional<PastAnswerMessage> parse_past_answer(const Frame& frame) noexcept TANDEM_RT {
+  if (frame.id != cob::kPastAnswer || frame.length != kPastAnswerBytes) return std::nullopt;
+  return PastAnswerMessage{order_in(frame), static_cast<PastRefusal>(frame.data[5]),
+                           get<std::uint16_t>(&frame.data[6])};
 }
 
 std::optional<NmtMessage> parse_nmt(const Frame& frame) noexcept TANDEM_RT {

@@ -45,6 +45,43 @@ struct NmtMessage {
 /// @param time_ns  since midnight of day 0, not negative
 [[nodiscard]] Frame make_time(std::int64_t time_ns) noexcept TANDEM_RT;
 
+/// What a master in lockstep asks of an emulated robot's state, and what that has to say of it.
+enum class PastOrder : std::uint8_t {
+  kKeep = 1,    ///< keep it, by this number
+  kGoBack = 2,  ///< be as it was when that number was kept
+  kDrop = 3,    ///< forget that number; 0: all of them
+  kHeard = 4,   ///< from the robot alone: this step has taken something from outside
+};
+/// Why an order was not carried out.
+enum class PastRefusal : std::uint8_t {
+  kNone = 0,      ///< it was
+  kNoMemory = 1,  ///< for another state
+  kUnknown = 2,   ///< nothing is kept by that number
+  kNoOrder = 3,   ///< that one this robot does not know
+};
+/// Frame 101, in lockstep alone: byte 0 order, bytes 1-4 number.
+struct PastOrderMessage {
+  PastOrder order = PastOrder::kKeep;
+  std::uint32_t number = 0;
+  bool operator==(const PastOrderMessage&) const = default;
+};
+[[nodiscard]] Frame make_past_order(const PastOrderMessage& message) noexcept TANDEM_RT;
+/// Empty when the frame is none. Its order may be one that nobody knows.
+[[nodiscard]] std::optional<PastOrderMessage> parse_past_order(
+    const Frame& frame) noexcept TANDEM_RT;
+
+/// Frame 102: the order with its number, byte 5 refusal, bytes 6-7 size of what is kept by it.
+struct PastAnswerMessage {
+  static constexpr std::size_t kSizeUnit = 16'384;  ///< bytes
+
+  PastOrderMessage to;
+  PastRefusal refusal = PastRefusal::kNone;
+  std::uint16_t size = 0;  ///< in kSizeUnit, rounded up
+};
+[[nodiscard]] Frame make_past_answer(const PastAnswerMessage& message) noexcept TANDEM_RT;
+[[nodiscard]] std::optional<PastAnswerMessage> parse_past_answer(
+    const Frame& frame) noexcept TANDEM_RT;
+
 /// Frame 700 + node: byte 0 state. Boot-up is the state 0, sent once.
 struct HeartbeatMessage {
   std::uint8_t node = 0;

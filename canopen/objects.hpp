@@ -12,6 +12,8 @@ namespace cob {
 inline constexpr std::uint32_t kNmt = 0x000;
 inline constexpr std::uint32_t kSync = 0x080;
 inline constexpr std::uint32_t kTime = 0x100;
+inline constexpr std::uint32_t kPastOrder = 0x101;   ///< ours, in lockstep: PastOrderMessage
+inline constexpr std::uint32_t kPastAnswer = 0x102;  ///< ours: PastAnswerMessage
 inline constexpr std::uint32_t kEmergency = 0x080;
 inline constexpr std::uint32_t kSdoResponse = 0x580;  ///< server to client
 inline constexpr std::uint32_t kSdoRequest = 0x600;   ///< client to server

@@ -46,6 +46,13 @@ struct LinkChange {
   bool up = true, down = true;  ///< of commands, of states
 };
 
+/// What of a state another process keeps.
+struct KeptElsewhere {
+  std::uint32_t number = 0;  ///< by which it is gone back to; 0: nothing is elsewhere
+  std::uint32_t padding = 0;
+  std::uint64_t bytes = 0;  ///< that it takes there
+};
+
 /// A robot: simulated, emulated behind a bus, or real.
 class Backend {
  public:
@@ -144,6 +151,17 @@ class Backend {
   /// Writes or reads everything that the next read() depends on. Simulation only: a backend
   /// whose robot cannot be rewound answers false.
   [[nodiscard]] virtual bool archive(Archive& ar) = 0;
+
+  // What of that state is in another process. Between two cycles; each may block, and takes heap.
+
+  /// Has it kept, before archive() writes the rest.
+  /// Errors: the other process does not answer, or cannot.
+  [[nodiscard]] virtual Result<KeptElsewhere> keep() { return KeptElsewhere{}; }
+  /// Before archive() reads the rest. Errors: keep()'s, and then nothing has changed; it is not
+  /// kept.
+  [[nodiscard]] virtual Status go_back(const KeptElsewhere& /*kept*/) { return {}; }
+  /// It is gone back to no more.
+  virtual void forget(const KeptElsewhere& /*kept*/) noexcept {}
 };
 
 }  // namespace tandem::hal

@@ -66,6 +66,9 @@ class ForwardingBackend : public Backend {
   void heed(Outside& outside) noexcept override { to_->heed(outside); }
   std::size_t forget_waiting() noexcept override { return to_->forget_waiting(); }
   [[nodiscard]] bool archive(Archive& ar) override { return to_->archive(ar); }
+  [[nodiscard]] Result<KeptElsewhere> keep() override { return to_->keep(); }
+  [[nodiscard]] Status go_back(const KeptElsewhere& kept) override { return to_->go_back(kept); }
+  void forget(const KeptElsewhere& kept) noexcept override { to_->forget(kept); }
 
  protected:
   [[nodiscard]] Backend& to() const noexcept { return *to_; }

@@ -20,11 +20,14 @@ class TruthImage : public Image {
 #undef TANDEM_FIELD
 
  public:
-  TruthImage(std::size_t joints, std::size_t feet, std::size_t loops = 0, std::size_t passive = 0);
+  /// @param ground  3: it moves, 0: it does not
+  TruthImage(std::size_t joints, std::size_t feet, std::size_t loops = 0, std::size_t passive = 0,
+             std::size_t ground = 0);
 
   [[nodiscard]] std::size_t joints() const noexcept { return position_rad_.count; }
   [[nodiscard]] std::size_t feet() const noexcept { return foot_position_m_.count / 3; }
   [[nodiscard]] std::size_t passive() const noexcept { return passive_position_rad_.count; }
+  [[nodiscard]] bool ground_moves() const noexcept { return ground_position_m_.count > 0; }
   [[nodiscard]] std::size_t loops() const noexcept { return loop_position_error_m_.count; }
 };
 

@@ -4,12 +4,17 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/result.hpp"
 #include "log/bytes.hpp"
 
 namespace tandem::log {
+
+/// What a run attaches: its state before cycle N; and, without bytes, that cycle N was given
+/// something from outside and cannot be played again. N follows the name.
+inline constexpr std::string_view kStateName = "state-", kHeardName = "heard-";
 
 /// Where one stands.
 struct Attachment {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 
 #include "log/info.hpp"
 #include "log/log_parts.hpp"
@@ -18,6 +19,21 @@ RunInfo info_of(const std::string& path) {
   if (!reader || !reader->next()) return {};
   const auto info = reader->metadata().find(kInfoRecord);
   return info == reader->metadata().end() ? RunInfo{} : info_from(info->second);
+}
+
+/// The nearest of the logs that the one at `path` goes on from, which begins at `cycle` or before;
+/// without a cycle, or where there is none, the first.
+std::string ancestor(const std::string& path, const RunInfo& info,
+                     std::optional<std::uint64_t> cycle) {
+  constexpr int kMost = 1000;  // logs that name each other have no first
+  const fs::path folder = fs::path(path).parent_path();
+  std::string file = info.branch.of;
+  for (int i = 0; i < kMost; ++i) {
+    const Branch its = info_of((folder / file).string()).branch;
+    if (its.of.empty() || (cycle && its.cycle <= *cycle)) break;
+    file = its.of;
+  }
+  return file;
 }
 
 }  // namespace
@@ -41,6 +57,14 @@ std::vector<BranchLog> branches_beside(const std::string& path) {
   std::vector<BranchLog> all;
   for (auto& [number, one] : found) all.push_back(std::move(one));
   return all;
+}
+
+std::string log_with(const std::string& path, const RunInfo& info, std::uint64_t cycle) {
+  return ancestor(path, info, cycle);
+}
+
+std::string first_log(const std::string& path, const RunInfo& info) {
+  return branch_of(ancestor(path, info, std::nullopt)).first;
 }
 
 }  // namespace tandem::log

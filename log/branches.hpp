@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "log/info.hpp"
+
 namespace tandem::log {
 
 /// One that goes on from another.
@@ -19,5 +21,13 @@ struct BranchLog {
 /// Those that are beside the log at `path`, a branch or the first, in the order in which they were
 /// made. Files that cannot be read are left out.
 [[nodiscard]] std::vector<BranchLog> branches_beside(const std::string& path);
+
+/// A log at `path` goes on from another: the one that has its run's beginning, as far as
+/// those in between are beside it.
+[[nodiscard]] std::string first_log(const std::string& path, const RunInfo& info);
+/// The one of them that has `cycle`, which was before the log at `path` began. A run may have left
+/// a branch for a cycle that is not in it.
+[[nodiscard]] std::string log_with(const std::string& path, const RunInfo& info,
+                                   std::uint64_t cycle);
 
 }  // namespace tandem::log

@@ -61,7 +61,8 @@ StringMap to_map(const RunInfo& info) {
                                    {"parameters", &std::as_const(parameters)},
                                    {"active_controllers", &std::as_const(active)},
                                    {"options", &std::as_const(options)},
-                                   {"plant", &std::as_const(plant)}}) {
+                                   {"plant", &std::as_const(plant)},
+                                   {"ground", &info.ground}}) {
     if (!value->empty()) map.emplace_back(key, *value);
   }
   if (info.part > 0) map.emplace_back("part", std::to_string(info.part));
@@ -110,6 +111,7 @@ RunInfo info_from(const StringMap& map) {
   info.active = lines_of(value_of(map, "active_controllers"));
   info.options = lines_of(value_of(map, "options"));
   info.plant = lines_of(value_of(map, "plant"));
+  info.ground = value_of(map, "ground");
   return info;
 }
 

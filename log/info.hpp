@@ -55,8 +55,9 @@ struct RunInfo {
   /// "KEY = VALUE" of the experiment as the run went by them, whoever said them; empty: a log of an
   /// earlier version, which has no /tandem/given either.
   std::vector<std::string> options{};
-  std::vector<std::string> plant{};   ///< what of the simulated robot is not as its files say
-  StringMap configuration{};          ///< path -> text of every file that was read
+  std::vector<std::string> plant{};  ///< what of the simulated robot is not as its files say
+  std::string ground{};       ///< its patches and terrain, tables of TOML; empty: it is level
+  StringMap configuration{};  ///< path -> text of every file that was read
   std::vector<std::string> boards{};  ///< for events' texts: in no record
   std::vector<std::string> buses{};   ///< the same
 };

@@ -6,18 +6,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/text/columns.hpp"
+
 namespace tandem::report {
 namespace {
+
+using apps::columns_of;
 
 constexpr double kLetter = 0.6;      // width of a letter, over the font's size
 constexpr double kTitleFont = 15.0;  // points, when others have 13
 constexpr double kOtherFont = 13.0;
-
-/// Characters of a UTF-8 text.
-std::size_t length(const std::string& text) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
-}
 
 /// Numbers along a logarithmic axis: powers of ten; more of each decade where these are few.
 std::vector<double> log_ticks(double low, double high) {
@@ -135,13 +133,13 @@ FigureLayout layout_of(const Figure& figure, const Axes& axes, const Cell& cell)
   at.right = cell.left + cell.width - 1.6 * font;
   at.bottom = cell.bottom + (figure.x_label.empty() ? 0.6 : 3.0) * line;
   const double letters = (at.right - at.left) / (kLetter * font);
-  const auto title = static_cast<double>(length(figure.title));
+  const auto title = static_cast<double>(columns_of(figure.title));
   at.title_font = std::clamp(kOtherFont * letters / std::max(title, 1.0), 9.0, kTitleFont);
   at.title_y = cell.bottom + cell.height - line;
   at.key_y = at.title_y - 0.8 * line;
   std::size_t longest = 0;
   const std::vector<std::string> texts = key_texts(figure);
-  for (const std::string& text : texts) longest = std::max(longest, length(text));
+  for (const std::string& text : texts) longest = std::max(longest, columns_of(text));
   const double fit = letters * kOtherFont / kKeyFont / (static_cast<double>(longest) + 7.0);
   at.key_columns = std::clamp<std::size_t>(static_cast<std::size_t>(fit), 1,
                                            std::max<std::size_t>(texts.size(), 1));

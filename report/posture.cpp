@@ -337,12 +337,18 @@ std::vector<Limb> known_limbs(const model::Tree& tree, const hal::RobotConfig& r
   return limbs;
 }
 
-/// The moments, turned so that W's x goes to the drawing's right: ahead or, from the front, W's y.
-std::vector<PostureSample> turned(const model::Tree& tree, const hal::RobotConfig& robot,
-                                  std::span<const PostureSample> moments, bool from_front) {
+/// What goes to the drawing's right, as the angle of W's x to it: ahead or, from the front, W's y.
+double view_of(const model::Tree& tree, const hal::RobotConfig& robot,
+               std::span<const PostureSample> moments, bool from_front) {
   const Eigen::Vector3d right = from_front ? Eigen::Vector3d(Eigen::Vector3d::UnitY())
                                            : ahead_of(tree, robot, moments.front());
-  const Eigen::AngleAxisd view(-std::atan2(right.y(), right.x()), Eigen::Vector3d::UnitZ());
+  return std::atan2(right.y(), right.x());
+}
+
+/// The moments, turned so that W's x is what goes to the drawing's right.
+std::vector<PostureSample> turned(const model::Tree& tree, const hal::RobotConfig& robot,
+                                  std::span<const PostureSample> moments, double view_rad) {
+  const Eigen::AngleAxisd view(-view_rad, Eigen::Vector3d::UnitZ());
   const model::Placement turn{view.toRotationMatrix(), Eigen::Vector3d::Zero()};
   std::vector<PostureSample> samples(moments.begin(), moments.end());
   for (PostureSample& sample : samples) {
@@ -352,6 +358,25 @@ std::vector<PostureSample> turned(const model::Tree& tree, const hal::RobotConfi
     if (lowest_m) sample.base.p.z() += robot.contact.height_m - *lowest_m;
   }
   return samples;
+}
+
+/// The ground that is not level, along the line to the drawing's right through a moment's base;
+/// empty: it is level, or nobody knows where the base is.
+/// @param along_m  from the base
+Curve ground_under(const PostureSample& moment, double view_rad, const Extent& along_m) {
+  constexpr int kPieces = 200;
+  Curve curve{"ground", CurveStyle::kThird, {}, {}};
+  if (moment.ground == nullptr || moment.ground->terrain.level() || !moment.placed) return curve;
+  for (int i = 0; i <= kPieces; ++i) {
+    const double d_m = along_m.low + (along_m.high - along_m.low) * i / kPieces;
+    const double x_m = moment.base.p.x() + d_m * std::cos(view_rad) - moment.ground_m[0];
+    const double y_m = moment.base.p.y() + d_m * std::sin(view_rad) - moment.ground_m[1];
+    curve.x.push_back(d_m);
+    curve.y.push_back(moment.ground->height_m + moment.ground_m[2] +
+                      moment.ground->terrain.at(x_m, y_m).height_m);
+  }
+  end_line(curve);
+  return curve;
 }
 
 Figure empty_figure(bool from_front, bool leaves_out, bool unplaced, bool legged) {
@@ -395,13 +420,15 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configure
   if (leaves_out) robot.loops.clear();
   const bool legged = !robot.contact.feet.empty();
   const bool from_front = !legged && shows_more_from_front(tree, robot, moments);
-  const std::vector<PostureSample> samples = turned(tree, robot, moments, from_front);
+  const double view_rad = view_of(tree, robot, moments, from_front);
+  const std::vector<PostureSample> samples = turned(tree, robot, moments, view_rad);
   const bool unplaced = !std::ranges::all_of(samples, &PostureSample::placed);
   Figure figure = empty_figure(from_front, leaves_out, unplaced, legged);
   Sticks sticks(legged ? "trunk" : robot.name);
   const std::vector<Limb> limbs = known_limbs(tree, robot, unknown);
   std::vector<Sticks> drawn;
   std::vector<Extents> extents;
+  std::vector<Curve> grounds;
   Extent up_m;
   if (legged) up_m.include(robot.contact.height_m);
   for (const PostureSample& sample : samples) {
@@ -409,6 +436,14 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configure
     extents.push_back(extents_of(drawn.back()));
     up_m.include(extents.back().up_m.low);
     up_m.include(extents.back().up_m.high);
+    const Extent& across_m = extents.back().across_m;
+    const double beside_m = 0.1 * (across_m.high - across_m.low);
+    const double base_m = sample.base.p.x();
+    grounds.push_back(
+        ground_under(moments[grounds.size()], view_rad,
+                     {across_m.low - beside_m - base_m, across_m.high + beside_m - base_m}));
+    for (double& x : grounds.back().x) x += base_m;
+    for (const double z : grounds.back().y) up_m.include(z);
   }
   const Row row = row_of(extents, up_m.high - up_m.low);
   const auto moved = [&](std::size_t s) {
@@ -419,8 +454,10 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configure
     sticks.trunk.x.push_back(edge_m);
     sticks.trunk.y.push_back(kGap);
   }
+  Curve ground{"ground", CurveStyle::kThird, {}, {}};
   for (std::size_t s = 0; s < samples.size(); ++s) {
     const double shift_m = moved(s) + begin_m;
+    append(grounds[s], shift_m, ground);
     append(drawn[s].others, shift_m, sticks.others);
     append(drawn[s].trunk, shift_m, sticks.trunk);
     append(drawn[s].legs, shift_m, sticks.legs);
@@ -429,8 +466,9 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configure
     figure.notes.push_back(
         {fmt::format("{:.2f} s", hundredths(samples[s].time_s)), x, up_m.low - 2.0 * row.line_m});
   }
-  if (legged) figure.levels.push_back({"ground", robot.contact.height_m});
-  for (Curve* curve : {&sticks.others, &sticks.trunk, &sticks.legs}) {
+  if (legged && robot.contact.terrain.level())
+    figure.levels.push_back({"ground", robot.contact.height_m});
+  for (Curve* curve : {&ground, &sticks.others, &sticks.trunk, &sticks.legs}) {
     if (!curve->x.empty()) figure.curves.push_back(std::move(*curve));
   }
   return figure;

@@ -2,6 +2,7 @@
 // Layer: report.  Thread: non-RT only.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,6 +22,9 @@ struct PostureSample {
   model::Placement base;  ///< of the root link in W
   std::vector<double> position_rad;
   bool placed = true;  ///< false: nobody knows where the base is
+  /// Under it, and how far that is moved then; null: only what the robot's file says is drawn.
+  const hal::ContactConfig* ground = nullptr;
+  std::array<double, 3> ground_m{};
 };
 
 /// The side view from the robot's right, ahead to the right (model::direction_ahead() of its feet)
@@ -31,6 +35,7 @@ struct PostureSample {
 /// motion. Closed loops are drawn over their sites, with a rod between them if there is one;
 /// where the passive joints are unknown, what they move is left out, and the title says so. Where
 /// nobody knows the base it stands upright with its lowest foot on the ground, as the title says.
+/// Ground that is not level is drawn below each, along the line through its base.
 /// @pre every joint of the tree is one of the robot's, or passive.
 [[nodiscard]] Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
                                     std::span<const PostureSample> moments);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/toml_reader.hpp"
+#include "hal/config/ground_keys.hpp"
 #include "log/run_window.hpp"
 #include "model/urdf.hpp"
 #include "report/figure.hpp"
@@ -50,7 +51,11 @@ Status read_configuration(RunData& run) {
       run.settle_s = log::settle_time_s(root);
     }
   }
-  if (found) return {};
+  if (found) {
+    if (Status s = hal::read_ground(run.info.ground, run.path, run.robot.contact); !s)
+      run.remarks.push_back("the ground is drawn level: " + s.error().to_string());
+    return {};
+  }
   return log_error(run, "this log does not carry its robot's configuration",
                    run.remarks.empty() ? "report needs a log that `tandem run` has written"
                                        : run.remarks.back());

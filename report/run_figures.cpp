@@ -281,7 +281,8 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   const auto add = [&](const char* what, std::size_t shown) {
     const std::size_t row = rows[shown];
     samples.push_back({what + suffix, run.drawn(run.time_s[row]), run.base_placement(row),
-                       run.positions(row), !unplaced(run)});
+                       run.positions(row), !unplaced(run), &run.robot.contact,
+                       run.robot.contact.terrain.motion_at(run.time_s[row]).position_m});
   };
   const std::size_t last = depth.size() - 1;
   const double start = depth.front();

@@ -6,20 +6,21 @@
 namespace tandem::runtime {
 
 void Checkpoints::add(Checkpoint one) {
-  if (!all_.empty() && all_.back().cycle == one.cycle) {
-    bytes_ -= all_.back().size();
-    all_.pop_back();
-  }
+  if (!all_.empty() && all_.back().cycle == one.cycle) erase(all_.size() - 1);
   bytes_ += one.size();
   all_.push_back(std::move(one));
   thin();
 }
 
 void Checkpoints::forget_after(std::uint64_t cycle) {
-  while (!all_.empty() && all_.back().cycle > cycle) {
-    bytes_ -= all_.back().size();
-    all_.pop_back();
-  }
+  while (!all_.empty() && all_.back().cycle > cycle) erase(all_.size() - 1);
+}
+
+void Checkpoints::erase(std::size_t index) {
+  const Checkpoint& one = all_[index];
+  bytes_ -= one.size();
+  if (one.elsewhere.number != 0) gone_.push_back(one.elsewhere);
+  all_.erase(all_.begin() + static_cast<std::ptrdiff_t>(index));
 }
 
 const Checkpoint* Checkpoints::before(std::uint64_t cycle) const noexcept {
@@ -39,8 +40,7 @@ void Checkpoints::thin() {
       closest = per_age;
       worst = i;
     }
-    bytes_ -= all_[worst].size();
-    all_.erase(all_.begin() + static_cast<std::ptrdiff_t>(worst));
+    erase(worst);
   }
 }
 

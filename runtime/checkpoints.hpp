@@ -6,7 +6,10 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
+
+#include "hal/backend.hpp"
 
 namespace tandem::runtime {
 
@@ -20,8 +23,14 @@ struct Checkpoint {
   std::vector<std::byte> bytes{};   ///< RobotCycle::save()
   std::uint64_t expects = 0;        ///< Expectations::fingerprint(); 0: there are none
   std::vector<std::byte> judged{};  ///< how far the run's expectations are
+  /// What has come of its events, where they are kept apart: Events::apart().
+  std::vector<std::byte> happened{};
+  hal::KeptElsewhere elsewhere{};  ///< what of it another process keeps
 
-  [[nodiscard]] std::size_t size() const { return bytes.size() + judged.size(); }
+  [[nodiscard]] std::size_t size() const {
+    return bytes.size() + judged.size() + happened.size() +
+           static_cast<std::size_t>(elsewhere.bytes);
+  }
 };
 
 /// Ordered by cycle.
@@ -39,15 +48,19 @@ class Checkpoints {
   [[nodiscard]] const Checkpoint* before(std::uint64_t cycle) const noexcept;
   [[nodiscard]] Checkpoint* last() noexcept { return all_.empty() ? nullptr : &all_.back(); }
   [[nodiscard]] std::span<const Checkpoint> all() const noexcept { return all_; }
+  /// What went since this was asked, of what other processes keep.
+  [[nodiscard]] std::vector<hal::KeptElsewhere> take_gone() { return std::exchange(gone_, {}); }
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
   [[nodiscard]] std::size_t budget_bytes() const noexcept { return budget_bytes_; }
 
  private:
   void thin();
+  void erase(std::size_t index);
 
   std::size_t budget_bytes_;
   std::size_t bytes_ = 0;
   std::vector<Checkpoint> all_;
+  std::vector<hal::KeptElsewhere> gone_;
 };
 
 }  // namespace tandem::runtime

@@ -150,7 +150,7 @@ void tell_refused(CycleRequests& to, const CycleRequest& request,
   };
   hal::TextEvent text{.cycle = to.now.time.cycle, .time_ns = to.now.time.time_ns};
   text.level = hal::TextLevel::kWarn;
-  text.set_controller(kAsked[static_cast<std::size_t>(request.kind)]);
+  text.set_controller(asked_as(request.kind));
   text.append("refused: ");
   const std::string_view joint =
       answer.joint < 0
@@ -228,6 +228,10 @@ CycleAnswer carry_out(CycleRequests& to, const CycleRequest& request) noexcept T
 }
 
 }  // namespace
+
+std::string_view asked_as(CycleRequest::Kind kind) noexcept TANDEM_RT {
+  return kAsked[static_cast<std::size_t>(kind)];
+}
 
 void CycleRequests::carry_out() noexcept TANDEM_RT {
   for (std::size_t most = Inbox::kCapacity; most > 0; --most) {

@@ -2,6 +2,9 @@
 // Layer: runtime.  Thread: the loop's.
 #pragma once
 
+#include <string_view>
+
+#include "runtime/cycle_request.hpp"
 #include "runtime/fault_response.hpp"
 
 namespace tandem::runtime {
@@ -23,5 +26,8 @@ struct CycleRequests {
   /// After them, also where nobody is heard: the switch that waits for its shadows.
   void carry_out_waiting() noexcept TANDEM_RT;
 };
+
+/// "joint.move": as `tandem ask` calls it.
+[[nodiscard]] std::string_view asked_as(CycleRequest::Kind kind) noexcept TANDEM_RT;
 
 }  // namespace tandem::runtime

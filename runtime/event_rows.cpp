@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -35,6 +36,9 @@ constexpr Key<Event> kAt[] = {
 };
 // clang-format on
 
+/// Times of a push or a fault, instead of `when`.
+constexpr std::array kTimes{"at_s", "at_cycle", "after_enabled_s"};
+
 std::int64_t event_ns(double seconds) { return std::llround(seconds * 1e9); }
 
 /// Every row of a name: results and the log tell them apart by it.
@@ -50,6 +54,7 @@ EventSpec read_when(TomlTable& table, std::vector<std::string>& names) {
   read_keys(table, kWhen, keys);
   EventSpec spec;
   spec.name = keys.name.empty() ? table.path() : keys.name;
+  spec.row = table.path();
   check_event_name(table, spec.name, names);
   spec.when = keys.when;
   spec.after_ns = event_ns(keys.after_s);
@@ -87,7 +92,7 @@ void read_struck(TomlTable& table, hal::FaultKind kind, std::vector<std::string>
                  Experiment& e) {
   EventSpec spec = read_when(table, names);
   const bool waits = table.has("when");
-  for (const char* const key : {"at_s", "at_cycle", "after_enabled_s"}) {
+  for (const char* const key : kTimes) {
     if (waits && table.has(key))
       table.error(key, "it comes once, and `when` says when", "keep one of both");
   }
@@ -96,8 +101,19 @@ void read_struck(TomlTable& table, hal::FaultKind kind, std::vector<std::string>
     e.pushes.push_back(spec.name);
     spec.fault->number = static_cast<std::uint32_t>(e.pushes.size());
   }
+  const auto has = [&table](const char* key) { return table.has(key); };
+  if (kind == hal::FaultKind::kPush && !waits && std::ranges::none_of(kTimes, has))
+    table.error("", "nothing says when it comes", "add at_s, or when = \"…\"");
   e.happens.push_back(happens_text(spec));
-  if (!waits) return e.faults.push_back(*spec.fault);
+  if (!waits) {
+    e.due.push_back({.name = spec.name,
+                     .key = table.path(),
+                     .at_s = 1e-9 * static_cast<double>(spec.fault->start_ns),
+                     .after_enabled = spec.fault->from == sim::FaultFrom::kEnabled,
+                     .line = table.line()});
+    e.faults.push_back(*spec.fault);
+    return e.fault_rows.push_back(spec.row);
+  }
   if (spec.fault->kind == hal::FaultKind::kBoardDuplicate) {
     table.error("when", "a board_duplicate has to be there when the robot is made",
                 "give it a time, at_s");
@@ -120,6 +136,9 @@ void read_asked(TomlTable& table, std::vector<std::string>& names, Experiment& e
   spec.ask_line = table.line("ask");
   table.finish();
   e.happens.push_back(happens_text(spec));
+  if (spec.at_ns >= 0)
+    e.due.push_back(
+        {spec.name, table.path(), 1e-9 * static_cast<double>(spec.at_ns), false, spec.line});
   e.events.push_back(std::move(spec));
 }
 

@@ -43,6 +43,44 @@ std::unique_ptr<Events> Events::idle_copy() const {
   return copy;
 }
 
+std::vector<Events::Row> Events::rows() const {
+  std::vector<Row> rows;
+  for (const Event& one : all_) rows.push_back({.name = one.spec.name, .when = one.spec.when});
+  return rows;
+}
+
+bool Events::begin_as(std::span<const std::byte> happened, std::span<const Row> theirs,
+                      std::span<const std::string> later, std::int64_t moment_ns) {
+  Archive ar(happened);
+  bool started = false, ended = false;
+  std::vector<State> was(theirs.size());
+  ar(started, ended);
+  for (State& one : was) ar(one);
+  if (!ar.ok() || !ar.at_end()) return false;
+  std::vector<Event> begun = all_;
+  for (Event& one : begun)
+    if (!begins_as(one, was, theirs, is_among(one.spec.row, later), moment_ns)) return false;
+  all_ = std::move(begun);
+  started_ = started;
+  ended_ = ended;
+  return true;
+}
+
+/// One that comes later has the time at which its condition held, of any row that awaits the same.
+bool Events::begins_as(Event& one, const std::vector<State>& was, std::span<const Row> theirs,
+                       bool later, std::int64_t moment_ns) {
+  const bool at_time = one.spec.at_ns >= 0;
+  for (std::size_t i = 0; i < theirs.size() && !(later && at_time); ++i) {
+    const bool is_it = later ? theirs[i].when == one.spec.when : theirs[i].name == one.spec.name;
+    if (!is_it) continue;
+    if (!later) one.now = was[i];
+    one.now.held_ns = was[i].held_ns;
+    const std::int64_t due_ns = one.now.held_ns + one.spec.after_ns;
+    return !later || one.now.held_ns < 0 || due_ns > moment_ns;
+  }
+  return later && at_time && one.spec.at_ns > moment_ns;
+}
+
 bool Events::asks() const noexcept {
   return std::ranges::any_of(all_, [](const Event& one) { return !one.spec.fault; });
 }

@@ -40,6 +40,21 @@ class Events final : public AlsoJudged {
   /// Has their state and does nothing: for a copy of the run.
   [[nodiscard]] std::unique_ptr<Events> idle_copy() const;
 
+  /// What became of an event of another run, by what it is called and awaits.
+  struct Row {
+    std::string name, when;
+  };
+  [[nodiscard]] std::vector<Row> rows() const;
+  /// From now on they are no part of a run's state, but kept beside it: their rows may be others
+  /// where it goes on.
+  void keep_apart() noexcept { apart_ = true; }
+  [[nodiscard]] bool apart() const noexcept { return apart_; }
+  /// Those in `later` have not come, and are due later than the moment; the others are as `theirs`
+  /// of the same name. @param happened  their archive(). Before the first cycle
+  /// @return false: it says nothing of one; nothing has changed
+  [[nodiscard]] bool begin_as(std::span<const std::byte> happened, std::span<const Row> theirs,
+                              std::span<const std::string> later, std::int64_t moment_ns);
+
   /// Whom faults strike, before the first cycle.
   void strike(sim::EmulatedRobot& robot) noexcept { robot_ = &robot; }
   /// Who carries out requests, before the first cycle; else they are refused.
@@ -73,12 +88,15 @@ class Events final : public AlsoJudged {
     State now, followed;
   };
   [[nodiscard]] static bool due(const Event& one, std::int64_t time_ns) noexcept TANDEM_RT;
+  [[nodiscard]] static bool begins_as(Event& one, const std::vector<State>& was,
+                                      std::span<const Row> theirs, bool later,
+                                      std::int64_t moment_ns);
   static void note(Event& one, std::int64_t time_ns, std::string_view why) noexcept TANDEM_RT;
 
   std::vector<Event> all_;
   sim::EmulatedRobot* robot_ = nullptr;
   Ask ask_;
-  bool idle_ = false;
+  bool idle_ = false, apart_ = false;
   bool started_ = false, ended_ = false;
 };
 

@@ -14,7 +14,7 @@ namespace {
 
 /// A row as its keys are; one of the first says what is expected.
 struct ExpectationKeys {
-  std::string always, never, eventually, bounds, rms, mean, final_value, settles, as_in;
+  std::string always, never, eventually, bounds, rms, mean, final_value, work, settles, as_in;
   bool stays_up = false;
   std::string name, above, below, after, signal, within;
   double in_s = 0.0, from_s = 0.0, to_s = std::numeric_limits<double>::infinity();
@@ -33,6 +33,7 @@ constexpr Key<Keys> kExpect[] = {
   key<&Keys::rms>("rms", "a number whose root mean square is").by_default("–"),
   key<&Keys::mean>("mean", "a number whose mean is").by_default("–"),
   key<&Keys::final_value>("final", "a number that is, in the last cycle of the window").by_default("–"),
+  key<&Keys::work>("work", "a joint, or `\"*\"` for all of them: the work that drives did, in J, is; what they took back while they braked does not count").by_default("–"),
   key<&Keys::settles>("settles", "a number that is, from `in_s` on to the end of the window").by_default("–"),
   key<&Keys::as_in>("as_in", "a log whose run has the same `signal`, `within` a difference, at each time").within("path, from this file's folder").by_default("–"),
   key<&Keys::signal>("signal", "with `as_in`: a number; `*` in it stands for each joint in turn, as in `\"position(*)\"`").by_default("–"),
@@ -59,11 +60,13 @@ constexpr KindRow kKinds[] = {{"always", ExpectationKind::kAlways, &Keys::always
                               {"rms", ExpectationKind::kRms, &Keys::rms},
                               {"mean", ExpectationKind::kMean, &Keys::mean},
                               {"final", ExpectationKind::kFinal, &Keys::final_value},
+                              {"work", ExpectationKind::kWork, &Keys::work},
                               {"settles", ExpectationKind::kSettles, &Keys::settles},
                               {"as_in", ExpectationKind::kAsIn, &Keys::as_in}};
 
 constexpr char kOneOf[] =
-    "give one of always, never, eventually, stays_up, bounds, rms, mean, final, settles, as_in";
+    "give one of always, never, eventually, stays_up, bounds, rms, mean, final, work, "
+    "settles, as_in";
 
 /// Which of them the row has. None, or several, are errors.
 void read_kind(TomlTable& table, const Keys& row, ExpectationSpec& spec) {

@@ -148,8 +148,10 @@ struct Experiment {
   dds::Config dds;                                 ///< off without the table
   std::vector<ExpectationSpec> expectations;       ///< [[expect]]
   std::vector<sim::ScenarioFault> faults;          ///< [[push]] and [[fault]] at a time
+  std::vector<std::string> fault_rows;             ///< of each of those: "push[0]"
   std::vector<EventSpec> events;                   ///< [[event]], and those at a condition
   std::vector<std::string> pushes;                 ///< names of [[push]] and kind = "push"
+  std::vector<DueRow> due;                         ///< those of all these rows that have a time
   std::vector<std::string> happens;                ///< every one of these rows, for people
   std::vector<ControllerSpec> controllers;
   TomlDocument document;  ///< its diagnostics() grow while controllers read parameters

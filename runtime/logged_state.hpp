@@ -2,21 +2,21 @@
 // Layer: runtime.  Thread: any, non-RT.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "base/result.hpp"
+#include "log/attachments.hpp"
 #include "log/info.hpp"
 #include "log/recorder.hpp"
 #include "runtime/checkpoints.hpp"
+#include "runtime/time_machine.hpp"
 
 namespace tandem::runtime {
 
-/// Attaches a state to a run's log, for beginning_at(). Not RT.
-void log_state(log::Recorder& recorder, const Checkpoint& one, std::int64_t period_ns);
+/// Attaches states, and the cycles that cannot be played again, to a run's log, which outlives what
+/// is returned; for beginning_at(). Not RT.
+[[nodiscard]] TimeMachine::StateLog states_to(log::Recorder& recorder, std::int64_t period_ns);
 
 /// "runs/coman-squat-001.mcap@12.3s": a moment of a log, on its own time.
 struct LogMoment {
@@ -33,6 +33,7 @@ struct Beginning {
   std::uint64_t next = 0;   ///< the cycle that comes first
   std::uint64_t asked = 0;  ///< for; not `next` where what came from outside cannot be played again
   log::Branch branch{};     ///< for the new log
+  log::RunInfo info{};      ///< of the other one
 };
 
 /// Errors: LogFile::open()'s; the moment is before or after what the log has; it holds no state;

@@ -4,14 +4,15 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "base/nearest.hpp"
+#include "hal/config/ground_keys.hpp"
 #include "hal/sim/payload.hpp"
-#include "runtime/ground_options.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -204,7 +205,7 @@ void leave_plant_changes(TomlTable& sim) {
   (void)sim.table_or_empty("link");
   (void)sim.table_or_empty("joint");
   (void)sim.tables("payload");
-  for (const char* const what : kGroundTables) (void)sim.tables(what);
+  for (const char* const what : hal::kGroundTables) (void)sim.tables(what);
 }
 
 std::shared_ptr<const sim::PlantChanges> read_plant_changes(TomlTable sim,
@@ -213,7 +214,7 @@ std::shared_ptr<const sim::PlantChanges> read_plant_changes(TomlTable sim,
                                                             const robot::FileTexts& files) {
   const auto given = [&](const char* what) { return sim.has(what); };
   if (std::ranges::none_of(std::array{"link", "joint", "payload"}, given) &&
-      std::ranges::none_of(kGroundTables, given))
+      std::ranges::none_of(hal::kGroundTables, given))
     return nullptr;
   if (description == nullptr) {
     sim.error("", "the plant cannot be changed without the robot's description");
@@ -227,12 +228,16 @@ std::shared_ptr<const sim::PlantChanges> read_plant_changes(TomlTable sim,
   for (const char* const what : {"link", "joint"}) {
     TomlTable all = sim.table_or_empty(what);
     for (const std::string& name : all.keys())
-      note_difference(what + (" " + name), all.table(name), *plant);
+      plant->differences.push_back(what + (" " + name + ": ") +
+                                   hal::values_text(all.table(name), ", "));
   }
   std::vector<std::string> names;
   for (TomlTable& table : sim.tables("payload"))
     add_payload(table, description->tree, names, *plant);
-  read_ground(sim, *plant);
+  hal::GroundWords words;
+  hal::read_ground(sim, plant->robot.contact, words);
+  std::ranges::move(words.differences, std::back_inserter(plant->differences));
+  plant->ground = std::move(words.toml);
   return plant;
 }
 
@@ -240,7 +245,7 @@ void describe_plant_changes(KeyPage& page) {
   page.add("[sim.joint.NAME]", kActuator);
   page.add("[sim.joint.NAME]", kEncoder);
   page.add("[[sim.payload]]", kPayload);
-  describe_ground(page);
+  hal::describe_ground(page);
 }
 
 }  // namespace tandem::runtime

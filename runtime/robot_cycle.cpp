@@ -47,7 +47,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       owner_(now_, arbiter_, response_),
       requests_{now_, resets_, homing_, arbiter_, waiting_, response_, services_},
       services_(parts.robot, parts.controllers, now_.inbox, now_.progress,
-                parts.controllers.gains(), now_.log),
+                parts.controllers.gains(), now_.log, parts.backend.set_link({})),
       shown_(now_, resets_, homing_, arbiter_, services_),
       trace_(config.trace_cycles),
       limited_(parts.robot.joints.size()),

@@ -103,8 +103,14 @@ class RobotCycle {
   [[nodiscard]] Result<std::vector<std::byte>> save();
   [[nodiscard]] Status restore(std::span<const std::byte> snapshot);
   /// What save() answers, into `ar`, which may be bounded; without `backend` all but its part,
-  /// which comes last. Between two steps. @return false: the backend cannot be saved
-  [[nodiscard]] bool write_down(Archive& ar, bool backend);
+  /// which comes last. Between two steps. Errors: save()'s
+  [[nodiscard]] Status write_down(Archive& ar, bool backend);
+  /// What of the state that was written down or restored last another process keeps.
+  [[nodiscard]] const hal::KeptElsewhere& kept_elsewhere() const noexcept {
+    return kept_elsewhere_;
+  }
+  /// That is gone back to no more. Between two steps; may block.
+  void forget(const hal::KeptElsewhere& kept) noexcept { now_.backend.forget(kept); }
   /// Number of the cycle that the next step() makes. Between two steps.
   [[nodiscard]] std::uint64_t next_cycle() const noexcept { return now_.loop.next_cycle(); }
 
@@ -127,6 +133,8 @@ class RobotCycle {
   [[nodiscard]] std::uint64_t controllers() const noexcept {
     return now_.controllers.fingerprint();
   }
+  /// The events, where they are no part of save(); null: they are, or there are none.
+  [[nodiscard]] Events* events_apart() noexcept;
   /// The first of them that restore() would begin anew; empty: none.
   [[nodiscard]] std::string unarchived() const;
   /// A stop or the end of the run waits to be heard.
@@ -153,6 +161,7 @@ class RobotCycle {
 
   void archive(Archive& ar);
 
+  hal::KeptElsewhere kept_elsewhere_;
   CycleNow now_;
   DriveResets resets_;
   JointHoming homing_;

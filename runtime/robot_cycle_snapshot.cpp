@@ -10,17 +10,40 @@ namespace tandem::runtime {
 
 using hal::FaultCause;
 
-void RobotCycle::archive(Archive& ar) {
-  std::uint64_t controllers = now_.controllers.fingerprint();
-  ar(now_.identity, controllers);  // first: restore() looks at them before anything changes
-  ar(now_, resets_, homing_, arbiter_, waiting_, response_);
-  ar(now_.controllers, shown_, started_, limited_, limits_met_);
-  if (now_.events != nullptr) ar(*now_.events);
+namespace {
+
+/// "joint.move of joint1", "controller.set squat.kp": what was asked for.
+std::string words_of(const CycleRequest& request, const hal::RobotConfig& robot) {
+  using enum CycleRequest::Kind;
+  std::string words(asked_as(request.kind));
+  if (request.kind >= kJoint && request.kind <= kHome)
+    words += " of " + robot.joints[request.joint].name;
+  if (request.kind == kSet && !request.changes->empty())
+    words += " " + request.changes->front().name;
+  return words;
 }
 
-bool RobotCycle::write_down(Archive& ar, bool backend) {
+}  // namespace
+
+void RobotCycle::archive(Archive& ar) {
+  std::uint64_t controllers = now_.controllers.fingerprint();
+  // First: restore() looks at them before anything changes.
+  ar(now_.identity, controllers, kept_elsewhere_);
+  ar(now_, resets_, homing_, arbiter_, waiting_, response_);
+  ar(now_.controllers, shown_, started_, limited_, limits_met_);
+  if (now_.events != nullptr && !now_.events->apart()) ar(*now_.events);
+}
+
+Status RobotCycle::write_down(Archive& ar, bool backend) {
+  kept_elsewhere_ = {};
+  if (backend) {
+    auto kept = now_.backend.keep();
+    if (!kept) return std::unexpected(std::move(kept.error()));
+    kept_elsewhere_ = *kept;
+  }
   archive(ar);
-  return !backend || now_.backend.archive(ar);
+  if (!backend || now_.backend.archive(ar)) return {};
+  return fail("this robot cannot be saved", "snapshots need a simulated robot");
 }
 
 /// Where a robot's cycle is not simulated, under the traps: this takes no heap.
@@ -60,7 +83,9 @@ void RobotCycle::forget_waiting() {
   services_.forget_after(now_.time.time_ns);
   shown_.forget_after(now_.time.time_ns);
   std::size_t requests = 0;
+  std::string asked;
   for (; const auto request = now_.inbox.take_request(); ++requests) {
+    asked += (asked.empty() ? "" : ", ") + words_of(*request, now_.robot);
     now_.inbox.answer(
         {.number = request->number, .cycle = now_.time.cycle, .reason = RejectReason::kTimeWent});
   }
@@ -70,6 +95,7 @@ void RobotCycle::forget_waiting() {
   for (const auto& [count, one] :
        {std::pair{requests, "request"}, {samples, "sample of an input"}, {faults, "fault"}}) {
     if (count > 0) what += (what.empty() ? "" : ", ") + counted(count, one);
+    if (!asked.empty()) what += " (" + std::exchange(asked, {}) + ")";
   }
   if (what.empty()) return;
   hal::TextEvent text{.cycle = now_.time.cycle, .time_ns = now_.time.time_ns};
@@ -84,6 +110,10 @@ bool RobotCycle::is_urgent() const noexcept {
   return now_.inbox.is_urgent() || rt::stop_requested() || rt::emergency_stop_waits();
 }
 
+Events* RobotCycle::events_apart() noexcept {
+  return now_.events != nullptr && now_.events->apart() ? now_.events : nullptr;
+}
+
 std::string RobotCycle::unarchived() const {
   for (const HostedController* one : now_.controllers.loaded()) {
     if (one != nullptr && one->lacks_archive) return one->name;
@@ -93,9 +123,7 @@ std::string RobotCycle::unarchived() const {
 
 Result<std::vector<std::byte>> RobotCycle::save() {
   Archive ar;
-  if (!write_down(ar, true)) {
-    return fail("this robot cannot be saved", "snapshots need a simulated robot");
-  }
+  if (Status written = write_down(ar, true); !written) return std::unexpected(written.error());
   return std::vector<std::byte>(ar.bytes().begin(), ar.bytes().end());
 }
 
@@ -103,8 +131,9 @@ Status RobotCycle::restore(std::span<const std::byte> snapshot) {
   Archive ar(snapshot);
   RunIdentity identity;
   std::uint64_t controllers = 0;
+  hal::KeptElsewhere elsewhere;
   Archive first(snapshot);
-  first(identity, controllers);
+  first(identity, controllers, elsewhere);
   if (const std::string other = now_.identity.difference(identity); !other.empty()) {
     return fail("the snapshot is of another run: '" + other + "' is not the same",
                 "restore it where robot, experiment, kernels, options and seed are those that it "
@@ -114,7 +143,11 @@ Status RobotCycle::restore(std::span<const std::byte> snapshot) {
     return fail("the snapshot was taken with other controllers than are loaded now",
                 "load and unload, in the same order, what was loaded then");
   }
-  if (!write_down(ar, true)) {
+  if (elsewhere.number != 0) {
+    if (Status there = now_.backend.go_back(elsewhere); !there) return there;
+  }
+  archive(ar);
+  if (!now_.backend.archive(ar)) {
     return fail("this robot cannot be rewound", "snapshots need a simulated robot");
   }
   if (ar.ok() && ar.at_end()) return {};

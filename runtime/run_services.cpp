@@ -21,7 +21,8 @@ constexpr std::chrono::microseconds kLook{200};  // between two looks for an ans
 }  // namespace
 
 RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
-                         const Progress& progress, const hal::ParameterImage& gains, CycleLog& log)
+                         const Progress& progress, const hal::ParameterImage& gains, CycleLog& log,
+                         bool linked)
     : robot_(&robot),
       host_(&host),
       inbox_(&inbox),
@@ -29,7 +30,8 @@ RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, In
       log_(&log),
       looks_(robot.joints.size()),
       sensor_looks_(robot.sensors.size()),
-      gain_looks_(gains.all().size()) {
+      gain_looks_(gains.all().size()),
+      linked_(linked) {
   show(gains);
   for (const auto& one : host.owned()) {
     if (one != nullptr) log.open(*one);
@@ -79,13 +81,23 @@ void RunServices::free_what_left(const CycleRequest& request, const CycleAnswer&
   }
 }
 
+/// Undoes what was noted of a request that the loop will not see.
+void RunServices::take_back(const CycleRequest& request) {
+  using Kind = CycleRequest::Kind;
+  forget_changes(request);
+  if (request.kind == Kind::kRemove) host_->owned()[request.slot]->leaves = false;
+  if (request.kind == Kind::kReplace) host_->owned()[request.slot]->next.reset();
+}
+
 Result<RequestResult> RunServices::ask(Lock& lock, CycleRequest request, Patience patience) {
+  if (asks_ahead_) {  // what was loaded stays: others may name it
+    take_back(request);
+    return RequestResult{.done = true};
+  }
   request.number = ++number_;
   if (!inbox_->ask(request)) {
-    forget_changes(request);
+    take_back(request);
     if (request.kind == CycleRequest::Kind::kInsert) host_->owned()[request.slot].reset();
-    if (request.kind == CycleRequest::Kind::kRemove) host_->owned()[request.slot]->leaves = false;
-    if (request.kind == CycleRequest::Kind::kReplace) host_->owned()[request.slot]->next.reset();
     return fail(
         "the loop has not come to the last " + std::to_string(Inbox::kCapacity) + " requests",
         "is it paused? Let it go on");
@@ -115,7 +127,7 @@ Result<RequestResult> RunServices::ask(Lock& lock, CycleRequest request, Patienc
   if (!found) {
     inbox_->leave(request.number);
     if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
-    return RequestResult{};
+    return RequestResult{.stands = inbox_->clock().state().standing};
   }
   if (found->reason != RejectReason::kNone) return std::unexpected(refusal(*found));
   return RequestResult{.done = true, .cycle = found->cycle, .phase = progress_->phase.load()};
@@ -195,8 +207,9 @@ Result<std::size_t> RunServices::slot_of(const std::string& name) const {
   return fail_at(name, "no controller '" + name + "' is loaded", suggest(name, names));
 }
 
-/// Who is active once the loop has done all that it was asked for.
+/// Who is active once the loop has done all that it was asked for; asked ahead, nobody knows.
 ControllerSet RunServices::planned() const {
+  if (asks_ahead_) return 0;
   ControllerSet active = host_->shown().active;
   for (const auto& [number, request] : asked_) {
     if (request.kind != CycleRequest::Kind::kSwitch) continue;
@@ -340,7 +353,7 @@ Status RunServices::check_switch(ControllerSet stop, ControllerSet start) const 
     if ((stop & start & bit) != 0) {
       return fail_at(name, "is to be stopped and started", "name it once");
     }
-    if ((stop & ~active & bit) != 0) {
+    if (!asks_ahead_ && (stop & ~active & bit) != 0) {
       return fail_at(name, "is not active", "tandem controller list shows which are");
     }
     if ((start & active & bit) != 0) {

@@ -38,6 +38,8 @@ struct RequestResult {
   std::uint64_t cycle = 0;  ///< in which it was done
   /// Phase of the run at the answer: in some phases a switch only selects who will start.
   hal::RunPhase phase = hal::RunPhase::kRunning;
+  /// Not done, as time stands: the next cycle decides, whenever that is, and tells what it refuses.
+  bool stands = false;
 };
 
 /// What became of a controller that was to be loaded anew.
@@ -149,7 +151,8 @@ class RunServices {
 
   /// All outlive it. The loaded controllers get their channels of the log.
   RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
-              const Progress& progress, const hal::ParameterImage& gains, CycleLog& log);
+              const Progress& progress, const hal::ParameterImage& gains, CycleLog& log,
+              bool linked);
 
   /// For who asks in the thread of the loop.
   [[nodiscard]] LoopAsker& asker() noexcept { return asker_; }
@@ -312,6 +315,12 @@ class RunServices {
   /// Who commands the robot from afar; empty text: nobody. Called on any thread.
   void name_owner(std::function<std::string()> owner);
 
+  /// From now on nothing is asked for, but for what the loop would say: each question is checked as
+  /// one at any time of a run, whoever is active then. Before the first cycle of a run that nobody
+  /// steps. What is loaded stays loaded.
+  void ask_ahead() noexcept { asks_ahead_ = true; }
+  [[nodiscard]] bool asks_ahead() const noexcept { return asks_ahead_; }
+
   /// Whether set_gains() would take them now; the same errors.
   [[nodiscard]] Status check_gains(const std::string& joint, hal::PidLoop loop,
                                    const GainsRequest& wish);
@@ -342,6 +351,7 @@ class RunServices {
   [[nodiscard]] Result<RequestResult> ask_of_joint(CycleRequest::Kind kind,
                                                    const std::string& joint, Patience patience);
   [[nodiscard]] Result<RequestResult> ask(Lock& lock, CycleRequest request, Patience patience);
+  void take_back(const CycleRequest& request);
   void collect();
   void free_what_left(const CycleRequest& request, const CycleAnswer& answer);
   void forget_changes(const CycleRequest& request);
@@ -383,6 +393,8 @@ class RunServices {
   TextHistory texts_;
   std::atomic<std::uint64_t> loads_{1};
   LoopAsker asker_;
+  bool asks_ahead_ = false;
+  bool linked_;
 
   std::mutex mutex_;  // of all below, and of the asking side of inbox and host
   std::function<std::string()> owner_;

@@ -113,6 +113,7 @@ void RunServices::name_owner(std::function<std::string()> owner) {
 }
 
 Status RunServices::check_runs_locked(const InputPort& port) const {
+  if (asks_ahead_) return {};
   if (const std::string who = owner_ ? owner_() : std::string(); !who.empty()) {
     return fail_at(port.full_name(), "'" + who + "' commands the robot",
                    "wait until it releases the robot");
@@ -153,6 +154,7 @@ Result<RequestResult> RunServices::set_input(const std::string& name, const Inpu
   }
   const auto number = (*port)->offer(InputFeeder::kCommand, *sample);
   if (!number) return std::unexpected(number.error());
+  if (asks_ahead_) return RequestResult{.done = true};
   lock.unlock();  // the port stays, and a flood of samples holds up nobody else
   const auto deadline = std::chrono::steady_clock::now() + patience;
   for (;;) {
@@ -161,7 +163,8 @@ Result<RequestResult> RunServices::set_input(const std::string& name, const Inpu
     }
     const bool stands = asker_.attends() || inbox_->clock().state().standing ||
                         progress_->phase.load() != RunPhase::kRunning;
-    if (stands || std::chrono::steady_clock::now() >= deadline) return RequestResult{};
+    if (stands || std::chrono::steady_clock::now() >= deadline)
+      return RequestResult{.stands = inbox_->clock().state().standing};
     std::this_thread::sleep_for(kSampleLook);
   }
 }

@@ -144,12 +144,13 @@ std::vector<SensorReport> RunServices::sensors() const {
 /// Whether the loop would put the joint into the mode. The loop looks again.
 Status RunServices::check_mode(std::size_t joint, const JointRequest& wish,
                                const JointStatus& now) const {
+  if (asks_ahead_ && wish.mode < 0) return {};  // nobody knows which it will have
   const auto mode = static_cast<hal::ControlMode>(wish.mode >= 0 ? wish.mode : now.mode);
   const auto interaction =
       static_cast<hal::InteractionMode>(wish.interaction >= 0 ? wish.interaction : now.interaction);
   if (Status able = hal::check_capability(*robot_, joint, mode, interaction); !able) return able;
   if (Status free = check_unclaimed(joint); !free) return free;
-  if (progress_->phase.load() == RunPhase::kRunning) return {};
+  if (asks_ahead_ || progress_->phase.load() == RunPhase::kRunning) return {};
   return std::unexpected(
       refusal({.reason = RejectReason::kNotRunning, .joint = static_cast<std::int32_t>(joint)}));
 }

@@ -138,8 +138,10 @@ Status RunServices::add_changes(const ParameterWish& wish,
     const Result<double> value = fit(*named[i], given, full);
     if (!value) return std::unexpected(value.error());
     if (!named[i]->facts.live) {
-      return fail_at(key, "is not live: it is read when the controller is loaded",
-                     "unload the controller, then load it with --set '" + wish.parameter + " = …'");
+      return fail_at(
+          key, "is not live: it is read when the controller is loaded",
+          "give it in the experiment's file, or unload the controller and load it with another "
+          "value");
     }
     if (std::ranges::find(changes, named[i], &ParameterChange::parameter) != changes.end())
       return fail_at(full, "is named twice", "name it once");

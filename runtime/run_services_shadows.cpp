@@ -81,6 +81,7 @@ Result<RequestResult> RunServices::set_link(const hal::LinkChange& change, Patie
   Lock lock(mutex_);
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  if (!linked_) return std::unexpected(refusal({.reason = RejectReason::kNoLink}));
   return ask(lock, {.kind = CycleRequest::Kind::kLink, .link = change}, patience);
 }
 

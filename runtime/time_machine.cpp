@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/clock_ns.hpp"
+#include "runtime/events.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::runtime {
@@ -72,7 +73,8 @@ KeptPast TimeMachine::past() const {
   KeptPast past{.keeps = keeps_.load(std::memory_order_relaxed),
                 .count = kept_.all().size(),
                 .bytes = kept_.bytes(),
-                .budget_bytes = kept_.budget_bytes()};
+                .budget_bytes = kept_.budget_bytes(),
+                .no_more = why_no_more_.message.empty() ? "" : why_no_more_.to_string()};
   if (past.count == 0) return past;
   past.oldest = kept_.all().front().cycle;
   past.newest = kept_.all().back().cycle;
@@ -81,6 +83,10 @@ KeptPast TimeMachine::past() const {
 
 Status TimeMachine::has_past() const {
   if (past().count > 0) return {};
+  const std::lock_guard lock(mutex_);
+  if (!why_no_more_.message.empty()) {
+    return fail("nothing of the past is kept: " + why_no_more_.message, why_no_more_.hint);
+  }
   return fail("nothing of the past was kept: the run went as fast as it can, and nobody asked",
               "begin it with --checkpoints 64MB, or at --rate 1; from tandem clock pause on it is "
               "kept, too");
@@ -132,10 +138,37 @@ Result<Travel> TimeMachine::wait_for(RobotCycle& cycle, Request& request) {
   return std::move(*request.answer);
 }
 
-Status TimeMachine::until(RobotCycle& cycle, CycleCondition holds) {
-  const auto watched = ask(cycle, {.kind = Request::Kind::kWatch, .holds = std::move(holds)});
+Result<Awaited> TimeMachine::until(RobotCycle& cycle, CycleCondition holds, std::string words) {
+  Awaited begun{.replaced = awaited()};
+  const auto watched = ask(
+      cycle, {.kind = Request::Kind::kWatch, .holds = std::move(holds), .words = std::move(words)});
   if (!watched) return std::unexpected(watched.error());
-  return cycle.inbox().clock().resume();
+  begun.holds_now = watched->holds;
+  if (Status resumed = cycle.inbox().clock().resume(); !resumed)
+    return std::unexpected(resumed.error());
+  return begun;
+}
+
+Result<std::string> TimeMachine::give_up(RobotCycle& cycle) {
+  std::string before = awaited();
+  if (before.empty()) return fail("no condition is waited for", "tandem clock until CONDITION");
+  const bool stood = cycle.inbox().clock().state().paused;
+  const auto none = ask(cycle, {.kind = Request::Kind::kWatch});
+  if (!none) return std::unexpected(none.error());
+  if (stood) return before;
+  if (Status resumed = cycle.inbox().clock().resume(); !resumed)
+    return std::unexpected(resumed.error());
+  return before;
+}
+
+std::string TimeMachine::met_words() const {
+  const std::lock_guard lock(mutex_);
+  return met_words_;
+}
+
+std::string TimeMachine::awaited() const {
+  const std::lock_guard lock(mutex_);
+  return awaited_;
 }
 
 Status TimeMachine::begin(RobotCycle& cycle, Checkpoint from, std::uint64_t next) {
@@ -166,8 +199,9 @@ std::optional<std::uint64_t> TimeMachine::met() const noexcept {
 
 void TimeMachine::attend(RobotCycle& cycle) noexcept {
   if (until_) watch(cycle);
-  if (keeps_.load(std::memory_order_relaxed) || log_) note(cycle);
+  if (keeps_.load(std::memory_order_relaxed) || log_.state) note(cycle);
   if (wanted_.load(std::memory_order_acquire)) serve(cycle);
+  forget_gone(cycle);
 }
 
 std::optional<log::Branch> TimeMachine::begins(std::uint64_t next) noexcept {
@@ -175,9 +209,9 @@ std::optional<log::Branch> TimeMachine::begins(std::uint64_t next) noexcept {
     reached_ = next + 1;
     return std::nullopt;
   }
-  flush();  // to the log that is left
   unlogged_ = std::exchange(arrived_, std::nullopt);
-  due_ = next + logged_apart_;
+  logged_ = false;
+  due_ = unlogged_ ? next + logged_apart_ : next;
   const std::lock_guard lock(mutex_);
   kept_.forget_after(next);
   if (Checkpoint* const last = kept_.last(); last != nullptr && last->heard >= next) {
@@ -187,11 +221,21 @@ std::optional<log::Branch> TimeMachine::begins(std::uint64_t next) noexcept {
   return log::Branch{.cycle = next, .snapshot = snapshot_};
 }
 
+void TimeMachine::await(CycleCondition holds, std::string words) {
+  until_ = std::move(holds);
+  const std::lock_guard lock(mutex_);
+  awaited_ = std::move(words);
+}
+
 /// What holds already has to end before it becomes true.
 void TimeMachine::watch(RobotCycle& cycle) {
   const bool holds = until_(cycle.last_view());
   if (std::exchange(held_, holds) || !holds) return;
-  until_ = {};
+  {
+    const std::lock_guard lock(mutex_);
+    met_words_ = awaited_;
+  }
+  await({}, {});
   met_.store(cycle.next_cycle(), std::memory_order_release);
   (void)cycle.inbox().clock().pause();
 }
@@ -202,7 +246,7 @@ void TimeMachine::note(RobotCycle& cycle) {
   if (std::exchange(seen_, cycle.next_cycle()) == cycle.next_cycle()) return;
   if (keeps_.load(std::memory_order_relaxed)) note_kept(cycle, heard);
   try {
-    if (log_) note_logged(cycle, heard);
+    if (log_.state) note_logged(cycle, heard);
   } catch (const std::bad_alloc&) {
     log_ = {};
   }
@@ -218,38 +262,57 @@ void TimeMachine::note_kept(RobotCycle& cycle, bool heard) {
 
 void TimeMachine::note_logged(RobotCycle& cycle, bool heard) {
   const std::uint64_t next = cycle.next_cycle();
-  if (heard && unlogged_) {
-    unlogged_->heard = next - 1;
-    flush();
+  if (unlogged_) {
+    log_.state(*std::exchange(unlogged_, std::nullopt));
+    logged_ = true;
+  }
+  if (heard && std::exchange(logged_, false)) {
+    if (log_.heard) log_.heard(next - 1);
     due_ = std::min(due_, next + logged_soon_);
   }
   if (next < due_) return;
-  flush();
-  unlogged_ = capture(cycle);
+  if (const auto one = capture(cycle)) {
+    log_.state(*one);
+    logged_ = true;
+  }
   due_ = next + logged_apart_;
-}
-
-void TimeMachine::flush() {
-  if (unlogged_ && log_) log_(*unlogged_);
-  unlogged_.reset();
 }
 
 /// Where there is no memory for it, there are no more.
 void TimeMachine::take(RobotCycle& cycle) {
   try {
     auto one = capture(cycle);
-    if (!one) return keeps_.store(false);
+    if (!one) return keep_no_more(one.error());
+    // What waits for the next cycle may be in this state already; in those before it is not.
+    Checkpoint* const last = kept_.last();
+    if (cycle.take_heard() && last != nullptr) last->heard = std::min(last->heard, one->cycle);
     const std::lock_guard lock(mutex_);
     kept_.add(std::move(*one));
+    why_no_more_ = {};
   } catch (const std::bad_alloc&) {
-    keeps_.store(false);
+    keep_no_more({.message = "there is no memory for another state",
+                  .hint = "give this process more, or --checkpoints less",
+                  .file = {},
+                  .key = {}});
   }
 }
 
-/// The state at this moment; nothing where the robot cannot be saved.
-std::optional<Checkpoint> TimeMachine::capture(RobotCycle& cycle) {
+void TimeMachine::keep_no_more(const Error& why) {
+  keeps_.store(false);
+  const std::lock_guard lock(mutex_);
+  why_no_more_ = why;
+}
+
+/// States that other processes keep for checkpoints that are no more.
+void TimeMachine::forget_gone(RobotCycle& cycle) {
+  for (const hal::KeptElsewhere& one : kept_.take_gone()) cycle.forget(one);
+}
+
+/// The state at this moment. Errors: RobotCycle::save()'s
+Result<Checkpoint> TimeMachine::capture(RobotCycle& cycle) {
   archive_.clear();
-  if (!cycle.write_down(archive_, true)) return std::nullopt;
+  if (Status written = cycle.write_down(archive_, true); !written)
+    return std::unexpected(std::move(written.error()));
   const std::span<const std::byte> bytes = archive_.bytes();
   Checkpoint one{.cycle = cycle.next_cycle(),
                  .controllers = cycle.controllers(),
@@ -260,6 +323,12 @@ std::optional<Checkpoint> TimeMachine::capture(RobotCycle& cycle) {
     one.expects = expectations_->fingerprint();
     one.judged.assign(judged.bytes().begin(), judged.bytes().end());
   }
+  if (Events* const apart = cycle.events_apart(); apart != nullptr) {
+    Archive happened;
+    apart->archive(happened);
+    one.happened.assign(happened.bytes().begin(), happened.bytes().end());
+  }
+  one.elsewhere = cycle.kept_elsewhere();
   return one;
 }
 
@@ -284,11 +353,11 @@ Result<Travel> TimeMachine::serve(RobotCycle& cycle, Request& request) {
   const std::uint64_t here = cycle.next_cycle();
   met_.store(Checkpoint::kNever, std::memory_order_release);
   if (request.kind == Request::Kind::kWatch) {
-    until_ = std::move(request.holds);
-    held_ = until_(cycle.last_view());
-    return Travel{.from = here, .to = here};
+    await(std::move(request.holds), std::move(request.words));
+    held_ = until_ && until_(cycle.last_view());
+    return Travel{.from = here, .to = here, .holds = held_};
   }
-  until_ = {};  // it was about the time that would have come
+  await({}, {});  // it was about the time that would have come
   if (request.kind == Request::Kind::kGo) return go(cycle, request.cycles);
   if (request.kind == Request::Kind::kSearch) return search(cycle, request.holds);
   if (request.cycles < here) return go(cycle, here - request.cycles);
@@ -298,12 +367,19 @@ Result<Travel> TimeMachine::serve(RobotCycle& cycle, Request& request) {
 /// At another moment, which all who watch are shown.
 void TimeMachine::arrive(RobotCycle& cycle) {
   cycle.forget_waiting();
+  arrived_.reset();
   try {
-    arrived_ = capture(cycle);
+    if (cycle.kept_elsewhere().number != 0) {
+      // That part goes to no log, and the number by which it is kept is no state.
+      archive_.clear();
+      if (cycle.write_down(archive_, false)) snapshot_ = hash_of(archive_.bytes());
+    } else if (auto one = capture(cycle)) {
+      arrived_ = std::move(*one);
+      snapshot_ = hash_of(arrived_->bytes);
+    }
   } catch (const std::bad_alloc&) {
     arrived_.reset();  // the branch's log then begins without a state
   }
-  if (arrived_) snapshot_ = hash_of(arrived_->bytes);
   cycle.show_again();
 }
 
@@ -404,6 +480,13 @@ Status TimeMachine::play(RobotCycle& cycle, const Checkpoint& from, std::uint64_
     if (cycle.phase() == RunPhase::kDone) return is_over(cycle, to);
     (void)cycle.step();
     ++travel.replayed;
+    if (cycle.take_heard()) {
+      return fail(
+          "the emulated robot was given something meanwhile, which was not there before: "
+          "time stands at " +
+              moment_text(cycle, cycle.next_cycle()),
+          "ask again, and inject nothing until the answer comes");
+    }
     if (expectations_ != nullptr) expectations_->take(cycle.last_view());
     if (after) after();
   }

@@ -8,6 +8,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <string>
 
 #include "base/archive.hpp"
 #include "base/result.hpp"
@@ -30,6 +31,13 @@ struct Travel {
   std::uint64_t asked = 0;     ///< for; not `to` where what came from outside cannot be replayed
   std::uint64_t replayed = 0;  ///< cycles that were played again
   std::int64_t took_ns = 0;
+  bool holds = false;  ///< of until(): its condition does already
+};
+
+/// What until() has begun.
+struct Awaited {
+  std::string replaced;    ///< words of the one that waited until now, which is given up; or empty
+  bool holds_now = false;  ///< it has to end before it can become true
 };
 
 /// What can be gone back to.
@@ -37,6 +45,7 @@ struct KeptPast {
   bool keeps = false;  ///< checkpoints are taken
   std::size_t count = 0, bytes = 0, budget_bytes = 0;
   std::uint64_t oldest = 0, newest = 0;  ///< moments, where count is not 0
+  std::string no_more;  ///< why no more are taken; empty: nothing stands in the way
 };
 
 /// Keeps checkpoints of a run in simulated time, and takes it back to any cycle since the first:
@@ -62,15 +71,22 @@ class TimeMachine {
   /// Before the first cycle: expectations are judged by the branch that the run is in.
   void judge_by(Expectations* expectations) noexcept { expectations_ = expectations; }
 
-  /// Keeps a state in the run's log; in the thread of the loop, between two cycles.
-  using LogState = std::function<void(const Checkpoint&)>;
+  /// Keeps states in the run's log; in the thread of the loop, between two cycles.
+  struct StateLog {
+    std::function<void(const Checkpoint&)> state{};
+    /// This cycle was given something from outside and cannot be played again. Told once for each
+    /// state, of the first such cycle after it.
+    std::function<void(std::uint64_t cycle)> heard{};
+  };
   /// Before the first cycle: states go to the log, too, whether they are kept here or not.
-  void log_to(LogState log) { log_ = std::move(log); }
+  /// @param apart  cycles from one to the next; 0: kLogged_ns
+  void log_to(StateLog log, std::uint64_t apart = 0) {
+    log_ = std::move(log);
+    if (apart > 0) logged_apart_ = apart;
+  }
   /// Before the first cycle: the run goes on from a state of another one, from its cycle `next` on.
   /// Errors: RobotCycle::restore()'s; other [[expect]]; a controller lacks an archive().
   [[nodiscard]] Status begin(RobotCycle& cycle, Checkpoint from, std::uint64_t next);
-  /// After the last cycle, before the log is closed: logs what is left.
-  void finish() { flush(); }
 
   // They pause simulated time, and block until it stands there. After an error it is where it was,
   // and goes on if it did before.
@@ -85,10 +101,17 @@ class TimeMachine {
   /// Errors: go_to()'s; it has not since the oldest checkpoint; a stop was asked for meanwhile.
   [[nodiscard]] Result<Travel> back_until(RobotCycle& cycle, CycleCondition holds);
   /// Lets time go on, and pauses it after the cycle in which `holds` becomes true. Does not wait.
-  [[nodiscard]] Status until(RobotCycle& cycle, CycleCondition holds);
+  /// @param words  what it is, for awaited()
+  [[nodiscard]] Result<Awaited> until(RobotCycle& cycle, CycleCondition holds, std::string words);
+  /// Gives up the condition of until(); time stands or goes on as it did. @return its words
+  [[nodiscard]] Result<std::string> give_up(RobotCycle& cycle);
+  /// The condition that time goes on until, in words; empty: there is none. Any thread, at once.
+  [[nodiscard]] std::string awaited() const;
   /// The moment after the cycle in which the condition of the last until() became true; none: it
   /// has not, or time went elsewhere since. Any thread, at once, as the next.
   [[nodiscard]] std::optional<std::uint64_t> met() const noexcept;
+  /// That condition, in words.
+  [[nodiscard]] std::string met_words() const;
   /// Ends a search that goes on: time stays where it is.
   void abandon() noexcept { abandoned_.store(true, std::memory_order_relaxed); }
 
@@ -103,7 +126,8 @@ class TimeMachine {
   struct Request {
     enum class Kind : std::uint8_t { kGo, kGoBack, kSearch, kWatch } kind;
     std::uint64_t cycles = 0;  // to the moment, or back
-    CycleCondition holds{};    // instead
+    CycleCondition holds{};    // instead; of kWatch empty: none any more
+    std::string words{};       // of it
     std::optional<Result<Travel>> answer{};
   };
   [[nodiscard]] Result<Travel> ask(RobotCycle& cycle, Request request);
@@ -112,19 +136,23 @@ class TimeMachine {
   [[nodiscard]] Result<Travel> serve(RobotCycle& cycle, Request& request);
   void arrive(RobotCycle& cycle);
   void watch(RobotCycle& cycle);
+  void await(CycleCondition holds, std::string words);
   void note(RobotCycle& cycle);
   void note_kept(RobotCycle& cycle, bool heard);
   void note_logged(RobotCycle& cycle, bool heard);
   void take(RobotCycle& cycle);
-  [[nodiscard]] std::optional<Checkpoint> capture(RobotCycle& cycle);
-  void flush();
+  void keep_no_more(const Error& why);
+  void forget_gone(RobotCycle& cycle);
+  [[nodiscard]] Result<Checkpoint> capture(RobotCycle& cycle);
   [[nodiscard]] Status may_travel(const RobotCycle& cycle) const;
   [[nodiscard]] Result<Travel> go(RobotCycle& cycle, std::uint64_t next);
   [[nodiscard]] Result<Travel> search(RobotCycle& cycle, const CycleCondition& holds);
   [[nodiscard]] Status play(RobotCycle& cycle, const Checkpoint& from, std::uint64_t to,
                             Travel& travel, const std::function<void()>& after = {});
 
-  const std::uint64_t apart_, soon_, logged_apart_, logged_soon_;  // cycles
+  const std::uint64_t apart_, soon_;  // cycles
+  std::uint64_t logged_apart_;
+  const std::uint64_t logged_soon_;
   std::atomic<bool> keeps_;
 
   std::mutex asks_;  // one at a time
@@ -134,7 +162,9 @@ class TimeMachine {
   std::atomic<bool> wanted_{false};  // request_
   std::atomic<bool> abandoned_{false};
   std::atomic<std::uint64_t> met_{Checkpoint::kNever};
-  Checkpoints kept_;  // the loop writes it, under mutex_
+  std::string awaited_, met_words_;  // under mutex_: until_, and the last one that came true
+  Checkpoints kept_;                 // the loop writes it, under mutex_
+  Error why_no_more_;                // of kept_; without a message: there are more
 
   Expectations* expectations_ = nullptr;  // watch each live cycle by themselves
 
@@ -143,9 +173,10 @@ class TimeMachine {
   std::uint64_t seen_ = Checkpoint::kNever;  // the moment of the last attend()
   std::uint64_t reached_ = 0;                // the newest moment of this branch
   std::uint64_t snapshot_ = 0;               // hash of the state that time went back to
-  LogState log_;                             // empty: there is no log
-  std::optional<Checkpoint> unlogged_;       // until it is known what the cycles after it heard
-  std::optional<Checkpoint> arrived_;        // the state that time went back to, for the log
+  StateLog log_;                             // empty: there is no log
+  bool logged_ = false;                      // a state, and no cycle since has heard anything
+  std::optional<Checkpoint> arrived_;        // the state that time went back to, for a branch
+  std::optional<Checkpoint> unlogged_;       // it, until that branch's log has begun
   std::uint64_t due_ = 0;                    // the moment whose state is logged next
   CycleCondition until_;                     // empty: time goes on as it does
   bool held_ = false;                        // until_, after the cycle before

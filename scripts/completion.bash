@@ -8,7 +8,7 @@ _tandem() {
   done
   local known
   known=$("${COMP_WORDS[0]}" "${words[@]}" --help 2>/dev/null | awk '
-    /^[A-Z].*:$/ { part = $1 }
+    /^[A-Z].*:$/ { part = /^Subcommands|`tandem help/ ? "Subcommands:" : $1 }
     part == "Subcommands:" && /^  [a-z]/ { print $1 }
     part == "Options:" && /^  -/ { sub(/^.*--/, "--", $1); print $1 }')
   mapfile -t COMPREPLY < <(compgen -W "$known" -- "${COMP_WORDS[COMP_CWORD]}")

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -26,6 +27,10 @@ struct Event {
   Level level = Level::kInfo;
   std::string who;  ///< controller or joint; empty: the run
   std::string text;
+
+  /// Whether it is a command that somebody asked for.
+  [[nodiscard]] bool is_request() const { return who.empty() && text.starts_with(kRequest); }
+  static constexpr std::string_view kRequest = "request ";
 };
 
 /// What happens in a run.

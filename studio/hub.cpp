@@ -96,7 +96,11 @@ void Hub::tick(Clock::time_point now) {
 /// Ticks of what did not happen are dropped: texts go out before ticks.
 void Hub::tell_back(const TimeBack& back) {
   const double to_s = seconds(back.to_ns);
-  std::erase_if(events_, [&](const Event& one) { return one.time_s > to_s; });
+  // The cycle of that time is done and is not made again: what happened in it is not told twice. A
+  // request acts in the cycle after its time.
+  std::erase_if(events_, [&](const Event& one) {
+    return one.time_s > to_s || (one.time_s == to_s && one.is_request());
+  });
   const auto text =
       std::make_shared<const std::string>(back_text(to_s, back.cycle, seconds(back.from_ns)));
   for (auto& [number, client] : clients_) {
@@ -209,12 +213,14 @@ void Hub::give(const Answer& answer) {
   asker->second.out.text(answer_text(answer.number, answer.text));
 }
 
-void Hub::tell_control() {
+/// @param went_back  why it has ended: time did
+void Hub::tell_control(bool went_back) {
   const auto holder = clients_.find(controls_);
   const bool taken = holder != clients_.end();
   for (auto& [number, client] : clients_) {
     if (!client.greeted) continue;
-    client.out.text(control_text(taken, number == controls_, taken ? holder->second.name : ""));
+    client.out.text(
+        control_text(taken, number == controls_, taken ? holder->second.name : "", went_back));
   }
 }
 
@@ -231,7 +237,7 @@ void Hub::end_control(std::string_view why, bool halts) {
   }
   tell({{seconds(sampler_->time_ns()), sampler_->cycle(), Event::Level::kWarn, "",
          who + " " + std::string(why) + (halts ? ": every joint that it moved is halted" : "")}});
-  tell_control();
+  tell_control(!halts);
 }
 
 void Hub::end(std::string_view how, std::string_view log) {

@@ -97,7 +97,7 @@ class Hub final : public Protocol {
   void on_alive(ClientNumber, Client&, const apps::Json&, Clock::time_point);
   [[nodiscard]] bool all_known(Client& client, const apps::Json& list, std::size_t most,
                                std::vector<SignalId>& signals);
-  void tell_control();
+  void tell_control(bool went_back = false);
   void end_control(std::string_view why, bool halts = true);
   void tell(const std::vector<Event>& events);
   void tell_back(const TimeBack& back);

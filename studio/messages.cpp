@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "apps/text/console.hpp"
+#include "hal/config/terrain_grid.hpp"
 #include "studio/mark_source.hpp"
 #include "studio/mesh_files.hpp"
 
@@ -59,6 +60,33 @@ Json feet_json(const hal::RobotConfig& robot) {
   return feet;
 }
 
+Json patch_json(const hal::GroundPatch& patch) {
+  return {{"name", patch.name},
+          {"x_m", patch.x_m},
+          {"y_m", patch.y_m},
+          {"static_friction", patch.static_friction},
+          {"sliding_friction", patch.sliding_friction},
+          {"stiffness_share", patch.stiffness_share}};
+}
+
+/// The level plane, and what is added to it: as a grid of heights, so that only hal::Terrain
+/// computes them.
+Json ground_json(const hal::ContactConfig& ground) {
+  if (!(ground.stiffness_N_m > 0.0)) return nullptr;
+  Json json{{"height_m", ground.height_m}};
+  if (!ground.terrain.level()) {
+    constexpr double kPerMetre = 1e5;
+    hal::TerrainGrid grid = hal::grid_of(ground.terrain);
+    for (double& height : grid.height_m) height = std::round(kPerMetre * height) / kPerMetre;
+    json["terrain"] = {{"x_m", std::move(grid.x_m)},
+                       {"y_m", std::move(grid.y_m)},
+                       {"height_m", std::move(grid.height_m)},
+                       {"coarser", grid.coarser}};
+  }
+  for (const hal::GroundPatch& patch : ground.patches) json["patches"].push_back(patch_json(patch));
+  return json;
+}
+
 const char* level_name(Event::Level level) {
   switch (level) {
     case Event::Level::kInfo: return "info";
@@ -93,7 +121,8 @@ std::string hello_text(const RunDescription& run, std::span<const std::uint64_t>
   Json sites = Json::array();
   for (const hal::JointConfig& joint : robot.joints) joints.push_back(joint_json(joint));
   for (const auto& posture : robot.postures) postures.push_back(posture.name);
-  for (const hal::SiteConfig& site : robot.model.sites) sites.push_back(site.name);
+  for (const hal::SiteConfig& site : robot.model.sites)
+    sites.push_back({{"name", site.name}, {"link", site.link}});
   for (const std::uint64_t cycles : reach) {
     reaches.push_back(period_s * static_cast<double>(cycles));
   }
@@ -106,7 +135,6 @@ std::string hello_text(const RunDescription& run, std::span<const std::uint64_t>
          {"path", why.empty() ? Json(std::string(kMeshPath) + std::to_string(i)) : Json()},
          {"why", why}});
   }
-  const bool ground = robot.contact.stiffness_N_m > 0.0;
   return json_text({{"op", "hello"},
                     {"protocol", kProtocol},
                     {"version", run.version},
@@ -116,7 +144,7 @@ std::string hello_text(const RunDescription& run, std::span<const std::uint64_t>
                     {"simulated", run.simulated},
                     {"emulated", run.emulated.empty() ? Json() : Json(run.emulated)},
                     {"floating", robot.model.floating_base},
-                    {"ground", ground ? Json{{"height_m", robot.contact.height_m}} : Json()},
+                    {"ground", ground_json(robot.contact)},
                     {"period_s", period_s},
                     {"run", run.run},
                     {"history_s", std::move(reaches)},
@@ -173,8 +201,12 @@ std::string watched_text(std::string_view request, std::string_view json) {
   return text.append(json) + "}";
 }
 
-std::string control_text(bool taken, bool yours, std::string_view by) {
-  return json_text({{"op", "control"}, {"taken", taken}, {"yours", yours}, {"by", by}});
+std::string control_text(bool taken, bool yours, std::string_view by, bool went_back) {
+  return json_text({{"op", "control"},
+                    {"taken", taken},
+                    {"yours", yours},
+                    {"by", by},
+                    {"went_back", went_back}});
 }
 
 std::string entered_text(bool all) {

@@ -21,7 +21,7 @@ inline constexpr char kSubprotocol[] = "tandem.studio.v1";
 
 /// What does not change in a run.
 struct RunDescription {
-  hal::RobotConfig robot;
+  hal::RobotConfig robot;    ///< `contact` is the ground that it stands on
   std::string urdf{};        ///< the description's text
   std::string urdf_file{};   ///< its path: meshes are beside it
   std::string version{};     ///< of Tandem
@@ -45,7 +45,8 @@ struct RunDescription {
 /// @param json  the answer's text
 [[nodiscard]] std::string answer_text(std::int64_t number, std::string_view json);
 [[nodiscard]] std::string watched_text(std::string_view request, std::string_view json);
-[[nodiscard]] std::string control_text(bool taken, bool yours, std::string_view by);
+[[nodiscard]] std::string control_text(bool taken, bool yours, std::string_view by,
+                                       bool went_back = false);
 [[nodiscard]] std::string entered_text(bool all);
 [[nodiscard]] std::string ended_text(std::string_view how, std::string_view log);
 

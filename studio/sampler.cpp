@@ -186,14 +186,20 @@ void Sampler::go_back(const hal::CycleTime& to) {
 }
 
 void Sampler::take(const Tap::Cycle& cycle) {
-  if (!history_.empty() && cycle.time.cycle < time_.cycle) go_back(cycle.time);
+  const bool back = !history_.empty() && cycle.time.cycle < time_.cycle;
+  if (back) go_back(cycle.time);
+  // The loss was counted with a cycle of before it, maybe in the tick before.
+  if (!history_.empty() && cycle.time.cycle > time_.cycle + 1) span_.gap = true;
   time_ = cycle.time;
+  if (!has_phase_) first_ = time_.cycle;
   const bool of_a_run = !cycle.parts[Tap::kState].empty();
   if (of_a_run && (!has_phase_ || phase_ != cycle.phase)) {
     has_phase_ = true;
     phase_ = cycle.phase;
-    events_.push_back({1e-9 * static_cast<double>(time_.time_ns), time_.cycle, level_of(phase_), "",
-                       std::string("phase: ") + hal::to_string(phase_)});
+    // The phase that it went back to was told when it began.
+    if (!back || time_.cycle < first_)
+      events_.push_back({1e-9 * static_cast<double>(time_.time_ns), time_.cycle, level_of(phase_),
+                         "", std::string("phase: ") + hal::to_string(phase_)});
   }
   begin_row();
   for (std::size_t i = 0; i < Tap::kParts; ++i) {

@@ -95,6 +95,7 @@ class Sampler {
   bool unknown_block_ = false;
   hal::CycleTime time_;
   std::optional<TimeBack> back_;
+  std::uint64_t first_ = 0;  // cycle that was seen
   bool has_phase_ = false;
   hal::RunPhase phase_ = hal::RunPhase::kBringUp;
   std::vector<Event> events_;

@@ -10,6 +10,7 @@
 #include "apps/text/draft.hpp"
 #include "apps/text/json_reader.hpp"
 #include "base/quoting.hpp"
+#include "sweep/slurm_options.hpp"
 
 namespace tandem::sweep {
 namespace {
@@ -112,14 +113,17 @@ std::vector<ArrayOfChunks> arrays_of(const std::vector<std::uint64_t>& chunks,
   return arrays;
 }
 
+double SlurmScript::needed_minutes() const {
+  const double rounds = std::ceil(static_cast<double>(job.chunk_points) /
+                                  static_cast<double>(std::max<std::size_t>(1, cpus)));
+  return std::ceil(rounds * time_limit_s / 60.0) + 1.0;
+}
+
 std::string SlurmScript::text() const {
-  const auto is_time = [](const std::string& option) { return option.starts_with("time="); };
   std::string directives;
-  if (std::ranges::none_of(options, is_time)) {
-    const double rounds = std::ceil(static_cast<double>(job.chunk_points) /
-                                    static_cast<double>(std::max<std::size_t>(1, cpus)));
-    directives +=
-        fmt::format("#SBATCH --time={:.0f}\n", std::ceil(rounds * time_limit_s / 60.0) + 1.0);
+  if (!sbatch_value(options, "time")) {
+    directives += fmt::format("#SBATCH --time={:.0f}\n",
+                              std::max(1.0, std::floor(std::min(needed_minutes(), most_minutes))));
   }
   for (const std::string& option : options) directives += "#SBATCH --" + option + "\n";
   const std::string chunks = shell_word(folder + "/chunks/");

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -62,6 +63,11 @@ struct SlurmScript {
   std::size_t cpus = 1;
   double time_limit_s = 60.0;        ///< of a point
   std::vector<std::string> options;  ///< of sbatch, without dashes: "partition=long"
+  double most_minutes =
+      std::numeric_limits<double>::infinity();  ///< that the partition gives a job
+
+  /// What a chunk takes at most, if each of its points takes as long as it may.
+  [[nodiscard]] double needed_minutes() const;
 
   /// For bash, to be submitted with an array's offset as its argument.
   [[nodiscard]] std::string text() const;

@@ -285,6 +285,26 @@ std::expected<Study, Diagnostics> read_study(const std::string& file) {
   return study;
 }
 
+std::string Study::meaning() const {
+  std::string all = fmt::format("{} {} {}\n", method->name, points, seed);
+  const auto add = [&all](const std::vector<TomlSetting>& settings_of) {
+    for (const TomlSetting& one : settings_of) all += "set " + one.key + "=" + one.value + "\n";
+  };
+  add(settings);
+  for (const auto& one : seeds) all += one ? fmt::format("seed {}\n", *one) : "no seed\n";
+  for (const Vary& one : vary) {
+    all += "vary " + one.key + "\n";
+    for (const std::string& value : one.values) all += value + "\n";
+    if (one.distribution != nullptr)
+      all += fmt::format("{} {} {}\n", one.distribution->name, one.a, one.b);
+  }
+  for (const Variant& one : variants) {
+    all += "variant " + one.name + "\n";
+    add(one.settings);
+  }
+  return all;
+}
+
 std::string Point::command(const std::string& experiment) const {
   std::string words = "tandem run " + shell_word(experiment) + " --hal sim";
   for (const TomlSetting& one : settings)

@@ -49,6 +49,9 @@ struct Study {
   std::uint64_t seed = 1;      ///< of the method
   double time_limit_s = 60.0;  ///< of a point, on the wall clock
   Keep keep;
+
+  /// All that its points are made of, but for the experiment: neither comments nor what is kept.
+  [[nodiscard]] std::string meaning() const;
 };
 
 /// Points that a study has at most.
@@ -79,6 +82,7 @@ class Points {
   /// @param study  outlives it
   explicit Points(const Study& study);
   [[nodiscard]] std::uint64_t size() const { return size_; }
+  [[nodiscard]] const Study& study() const { return study_; }
   /// @pre index < size()
   [[nodiscard]] Point at(std::uint64_t index) const;
 

@@ -9,6 +9,7 @@
 #include <set>
 #include <thread>
 
+#include "apps/text/console.hpp"
 #include "base/file_name.hpp"
 #include "base/nearest.hpp"
 #include "hal/ethercat-can/foreign_master.hpp"
@@ -42,7 +43,7 @@ std::expected<std::unique_ptr<CanSockets>, Diagnostics> CanSockets::open(
         errors.push_back(of_bus(bus, lock.error()));
         continue;
       }
-      if (!lock->remark().empty()) fmt::print(stderr, "warning: {}\n", lock->remark());
+      if (!lock->remark().empty()) say(Said::kWarning, lock->remark());
       all->locks_.push_back(std::move(*lock));
     }
     const Status opened = bus.kind == hal::BusKind::kEthercat ? all->open_line(bus, b, make_line)

@@ -167,7 +167,8 @@ Status add_quantity(Json& question, const ControlKey& key, const std::string& te
   }
   return fail_at(
       key.line, fmt::format("'{}' is no number with a unit", text),
-      fmt::format("write 30deg{0}, 0.5rad{0}, 20mm{0}, 2cm{0}, 0.02m{0}, or a number in SI units",
+      fmt::format("write 30deg{0}, 0.5rad{0}, 20mm{0}, 2cm{0}, 0.02m{0}, or a bare number in SI "
+                  "units",
                   per(key.unit)));
 }
 

@@ -14,12 +14,14 @@ namespace {
 
 /// What the clock shows once it stands; before that, when somebody lets it go on or the run ends.
 /// @param paused  false: it goes on until something comes
-Result<Json> wait_until_it_stands(ControlClient& run, std::FILE* out, bool paused = true) {
+/// @param until   what that is; it is over when another condition is waited for instead, or none
+Result<Json> wait_until_it_stands(ControlClient& run, std::FILE* out, bool paused = true,
+                                  const std::string& until = {}) {
   StatusLine line(out);
   for (;;) {
     Result<Json> now = run.ask({{"do", "clock.show"}});
     if (!now || now->value("standing", true) || (paused && !now->value("paused", false)) ||
-        now->value("phase", "") == "done") {
+        now->value("phase", "") == "done" || now->value("until", "") != until) {
       return now;
     }
     if (line.due()) {
@@ -51,6 +53,30 @@ std::string past_text(const Json& past) {
                      counted(count, "checkpoint"), 1e-6 * past.value("bytes", 0.0));
 }
 
+void print_figures(const Json& answer) {
+  Facts facts;
+  add_figures(facts, answer,
+              {{"time", "{time_s:.6f s}"}, {"cycles", "{cycles}"}, {"phase", "{phase}"}});
+  facts.add("clock", state_text(answer));
+  facts.add("rate", rate_text(answer));
+  if (answer.contains("until")) facts.add("goes on until", shown(answer.value("until", "")));
+  if (answer.contains("past")) facts.add("past", past_text(answer["past"]));
+  if (answer.contains("from_s")) {
+    facts.add("came from",
+              fmt::format("{:.6f} s, {} played again in {:.0f} ms", answer.value("from_s", 0.0),
+                          counted(answer.value("replayed_cycles", std::uint64_t{0}), "cycle"),
+                          answer.value("took_ms", 0.0)));
+  }
+  facts.add("measured", figures_text("{realtime_factor:.3g} x real time", answer).value_or("-"));
+  facts.print(stdout);
+}
+
+void print_note(const Json& answer, std::FILE* out) {
+  if (!answer.contains("note")) return;
+  fmt::print(out, "note: {}\n", answer.value("note", ""));
+  std::fflush(out);
+}
+
 /// What the commands' own answers have beside the clock.
 constexpr const char* kOfTheCommand[]{"dropped_steps",   "from_s",  "asked_s",
                                       "replayed_cycles", "took_ms", "note"};
@@ -59,7 +85,10 @@ constexpr const char* kOfTheCommand[]{"dropped_steps",   "from_s",  "asked_s",
 Status is_where_asked(const Asked& asked, const Json& stands, bool paused) {
   const double now_s = stands.value("time_s", 0.0);
   const char* const others = "another client paused it, or took it elsewhere: ask again";
-  if (!paused && !stands.contains("until_met_s")) {
+  const std::string condition = asked.question.value("condition", "");
+  if (!paused && stands.value("until_met", "") != condition) {
+    if (!stands.value("standing", false))
+      return fail("another client gave this condition up, or waits for another one by now", others);
     return fail(
         fmt::format("time stands at {:.6g} s, and the condition has not become true", now_s),
         others);
@@ -71,9 +100,11 @@ Status is_where_asked(const Asked& asked, const Json& stands, bool paused) {
 }
 
 Result<Exit> tell_at_rest(Asked& asked, bool paused, const char* over) {
-  Result<Json> stands = wait_until_it_stands(asked.run, human_output(asked.options.json), paused);
+  Result<Json> stands =
+      wait_until_it_stands(asked.run, human_output(asked.options.json), paused,
+                           paused ? std::string() : asked.question.value("condition", ""));
   if (!stands) return fail(over, "its own output says why");
-  if (!paused && !stands->value("standing", false))
+  if (!paused && stands->value("phase", "") == "done" && !stands->value("standing", false))
     return fail(over, "tandem report shows its log");
   if (const Status there = is_where_asked(asked, *stands, paused); !there)
     return std::unexpected(there.error());
@@ -81,28 +112,17 @@ Result<Exit> tell_at_rest(Asked& asked, bool paused, const char* over) {
     if (asked.answer.contains(key)) (*stands)[key] = asked.answer[key];
   }
   asked.answer = std::move(*stands);
-  if (asked.prints()) print_clock(asked.answer);
+  if (!asked.prints()) return Exit::kDone;
+  print_figures(asked.answer);
+  if (paused) print_note(asked.answer, stdout);
   return Exit::kDone;
 }
 
 }  // namespace
 
 void print_clock(const Json& answer) {
-  Facts facts;
-  add_figures(facts, answer,
-              {{"time", "{time_s:.6f s}"}, {"cycles", "{cycles}"}, {"phase", "{phase}"}});
-  facts.add("clock", state_text(answer));
-  facts.add("rate", rate_text(answer));
-  if (answer.contains("past")) facts.add("past", past_text(answer["past"]));
-  if (answer.contains("from_s")) {
-    facts.add("came from",
-              fmt::format("{:.6f} s, {} played again in {:.0f} ms", answer.value("from_s", 0.0),
-                          counted(answer.value("replayed_cycles", std::uint64_t{0}), "cycle"),
-                          answer.value("took_ms", 0.0)));
-  }
-  facts.add("measured", figures_text("{realtime_factor:.3g} x real time", answer).value_or("-"));
-  facts.print(stdout);
-  if (answer.contains("note")) fmt::print("note: {}\n", answer.value("note", ""));
+  print_figures(answer);
+  print_note(answer, stdout);
 }
 
 Result<Exit> tell_clock_at_rest(Asked& asked) {
@@ -110,6 +130,11 @@ Result<Exit> tell_clock_at_rest(Asked& asked) {
 }
 
 Result<Exit> tell_until(Asked& asked) {
+  if (asked.question.value("cancel", false)) {
+    if (asked.prints()) print_clock(asked.answer);
+    return Exit::kDone;
+  }
+  print_note(asked.answer, human_output(asked.options.json));  // now: it may wait for long
   return tell_at_rest(asked, false, "the run ended before the condition became true");
 }
 

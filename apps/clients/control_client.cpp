@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "apps/clients/dds_client.hpp"
+#include "apps/control/command_rows.hpp"
 #include "apps/control/control_registry.hpp"
 #include "apps/text/json_reader.hpp"
 #include "apps/transport/control_path.hpp"
@@ -154,13 +155,8 @@ class SocketClient : public ControlClient {
 }  // namespace
 
 std::chrono::milliseconds answer_time(const Json& question) {
-  const std::string name = question.value("do", "");  // dds.show: an emergency stop waits for it
-  if (name == "estop" || name == "dds.show") return kStopAnswer;
-  // A run of an hour may take minutes to be searched.
-  if (name == "clock.rewind" || name == "clock.goto" || name == "clock.back-until") return 600s;
-  // A library is tried, opened, and configured: each may take 4 s. Where one crashes, which is
-  // tried, is looked for 25 s long.
-  return name == "controller.load" || name == "controller.reload" ? 40000ms : 5000ms;
+  const CommandRow* row = command_row(question.value("do", ""));
+  return std::chrono::seconds(row == nullptr ? CommandRow::More().answer_s : row->more.answer_s);
 }
 
 Result<Json> ask(const std::string& path, const Json& question) {

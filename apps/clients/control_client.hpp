@@ -18,8 +18,7 @@ namespace tandem::apps {
 /// How the error begins of who does not answer in time.
 inline constexpr char kNoAnswer[] = "no answer within";
 
-/// How long ask() waits for the answer to `question`: kStopAnswer, 40 s of a controller
-/// that is loaded, 10 min of time that goes back, or 5 s.
+/// How long ask() waits for the answer to `question`: as its row says.
 [[nodiscard]] std::chrono::milliseconds answer_time(const Json& question);
 
 /// Sends `question` and waits for its answer.

@@ -162,8 +162,7 @@ Exit tell_unvouched(const DdsAnswer& one) {
 /// Runs of this user in the same place that nobody has heard.
 Exit tell_missing(const OwnRuns& own, const DdsAnswers& answers, const ControlTarget& target) {
   for (const std::string& who : own.silent) {
-    fmt::print(stderr, "warning: {} does not answer: if it is in this domain, it is not stopped\n",
-               who);
+    say(Said::kWarning, who + " does not answer: if it is in this domain, it is not stopped");
   }
   if (!target.place.from.empty()) return Exit::kDone;  // which domain and namespace, it says
   const auto place = dds_config(target.place);         // it has been asked there: this is right
@@ -192,8 +191,8 @@ Exit stop_all_over_dds(const ControlTarget& target, const Json& question, bool t
   const auto answers = stop_all_by_dds(target, question);
   if (!answers) {
     for (const std::string& socket : running_control_sockets("run")) {
-      fmt::print(stderr, "warning: {} is not stopped: tandem estop, without --dds\n",
-                 process_of(socket));
+      say(Said::kWarning,
+          fmt::format("{} is not stopped: tandem estop, without --dds", process_of(socket)));
     }
     return tell_stop(std::unexpected(answers.error()), question, {});
   }
@@ -216,7 +215,7 @@ Exit stop_all_over_dds(const ControlTarget& target, const Json& question, bool t
 Exit stop_all(const Json& question) {
   const ControlSearch search = search_control_sockets("run");
   for (const Error& refused : search.refused) {
-    fmt::print(stderr, "warning: not looked for runs there: {}\n", refused.message);
+    say(Said::kWarning, "not looked for runs there: " + refused.message);
   }
   if (search.sockets.empty()) {
     print_errors({nobody_to_stop(search)});

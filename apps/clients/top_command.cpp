@@ -183,8 +183,7 @@ std::optional<TopLook> follow(Looker& looker, Screen& screen, TopView& view) {
 Exit watch(ControlClient& run, TopLook& last) {
   rt::install_stop_signals();
   Looker looker(run, last);
-  const char* no_color = std::getenv("NO_COLOR");
-  TopView view{.dims = true, .colours = no_color == nullptr || *no_color == '\0'};
+  TopView view{.dims = true, .colours = has_colours(stdout)};
   std::optional<TopLook> ended;
   {
     Screen screen;

@@ -9,6 +9,7 @@
 
 #include "apps/clients/joint_print.hpp"
 #include "apps/clients/top_picture.hpp"
+#include "apps/text/columns.hpp"
 #include "base/counted.hpp"
 
 namespace tandem::apps {
@@ -31,7 +32,9 @@ std::string fitting(double value, int decimals, std::size_t most, const char* su
   if (!std::isfinite(value)) return "-";
   std::string text;
   for (int d = decimals; d >= 0; --d) {
-    text = fmt::format("{:.{}f}{}", value, d, suffix);
+    // No "-0.00": what rounds to zero has no sign.
+    const bool zero = std::abs(value) < 0.5 * std::pow(10.0, -d);
+    text = fmt::format("{:.{}f}{}", zero ? 0.0 : value, d, suffix);
     if (text.size() <= most) return text;
   }
   return cut_to(fmt::format("{:.0e}{}", value, suffix), most);

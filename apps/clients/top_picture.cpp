@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "apps/control/fault_table.hpp"
+#include "apps/text/columns.hpp"
 #include "apps/text/figures.hpp"
 #include "base/counted.hpp"
 
@@ -271,28 +272,6 @@ std::string painted(const TopLine& line, const TopView& view) {
                      : dim ? "2"
                            : "",
                      red ? ";31" : "", line.text);
-}
-
-std::size_t columns_of(std::string_view text) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
-}
-
-std::string cut_to(std::string text, std::size_t most, bool middle) {
-  const std::size_t all = columns_of(text);
-  if (all <= most) return text;
-  if (most == 0) return {};
-  /// Where the character with this number begins.
-  const auto byte_of = [&](std::size_t character) {
-    std::size_t at = 0;
-    for (std::size_t seen = 0; at < text.size(); ++at) {
-      if ((static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U) continue;
-      if (seen++ == character) break;
-    }
-    return at;
-  };
-  const std::size_t behind = middle ? (most - 1) / 2 : 0;
-  return text.substr(0, byte_of(most - 1 - behind)) + "…" + text.substr(byte_of(all - behind));
 }
 
 }  // namespace tandem::apps

@@ -75,10 +75,5 @@ struct TopLine {
 /// A heading, and a line for each joint.
 [[nodiscard]] std::vector<TopLine> joint_table(const std::vector<Json>& joints,
                                                const TopView& view);
-/// Columns that a text takes.
-[[nodiscard]] std::size_t columns_of(std::string_view text);
-/// The text in `most` columns at most: with an ellipsis where it is cut, at its end or in its
-/// middle.
-[[nodiscard]] std::string cut_to(std::string text, std::size_t most, bool middle = false);
 
 }  // namespace tandem::apps

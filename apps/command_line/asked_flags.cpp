@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "apps/command_line/command_flags.hpp"
+#include "apps/command_line/help_text.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -13,24 +14,26 @@ namespace {
 /// First words of the commands, with their help.
 struct Group {
   const char* name;
+  Task task;
   const char* doc;
   const char* examples;
 };
 constexpr Group kGroups[]{
-    {"top", "A live table of a running run: loop, faults, controllers, every joint", R"(Examples:
+    {"top", Task::kSee, "A live table of a running run: loop, faults, controllers, every joint",
+     R"(Examples:
   tandem top                                         in the terminal, until `q`; `?` lists the keys
   tandem top --once > picture.txt                    one table, as without a terminal
   tandem top --json -                                what the table is made of
   tandem top --dds --namespace left                  of the run with this [dds] namespace
 It asks five times a second, and only what reads. Without --socket or --dds it is the only
 `tandem run` of this user.)"},
-    {"fault", "Faults of a running run", R"(Examples:
+    {"fault", Task::kStop, "Faults of a running run", R"(Examples:
   tandem fault show                                  what has been latched, and what was cleared
   tandem fault reset                                 clears and holds; exit status 1: it failed
   tandem controller start                            then starts the controllers again
   tandem fault show --dds --namespace left           of the run with this [dds] namespace
 Without --socket or --dds it is the only `tandem run` of this user.)"},
-    {"estop", "Emergency stop of every run of this user", R"(Examples:
+    {"estop", Task::kStop, "Emergency stop of every run of this user", R"(Examples:
   tandem estop                                       every run of this user on this machine, with
                                                      the category of robot.toml's [safety]
   tandem estop --socket /tmp/run.sock                this one alone
@@ -41,25 +44,27 @@ Exit status: 0 each loop has carried it out, or does so first when its paused ti
 1 a stop is not confirmed, or there is no run. Over DDS, a confirmation counts from a run of this
 user on this machine, or from one that DDS Security has authenticated. `kill -USR1 PID` asks for the
 same without a socket, and gets no answer.)"},
-    {"controller", "Controllers of a running run", R"(Examples:
+    {"controller", Task::kMove, "Controllers of a running run", R"(Examples:
   tandem controller new mine                         a project of your own; needs no run
   tandem controller list                             loaded controllers, active or not, their joints
   tandem controller load hold --name rest --set 'duration_s = 2.0'
-  tandem controller switch --stop squat --start rest in one cycle, or not at all
+  tandem controller switch --stop squat --start rest
+                                                     in one cycle, or not at all
   tandem controller shadow squat2                    beside the active ones, without commanding
   tandem controller difference squat2                how far it is from what is commanded
   tandem controller switch --stop squat --start squat2 --when-within 10mrad
                                                      once they agree; Ctrl-C ends only the waiting
   tandem controller switch --cancel                  gives up the one that waits
   tandem controller show squat                       its parameters: unit, range, value, live or not
-  tandem controller set squat link_damping_Nms_rad=2 between two cycles; several: all or none
+  tandem controller set squat link_damping_Nms_rad=2
+                                                     between two cycles; several: all or none
   tandem controller set arm kp_Nm_rad.elbow=20       of a parameter by joint one; kp_Nm_rad=20: all
   tandem controller start                            after `fault reset`: those active before
   tandem controller stop rest                        its joints are held where they are
   tandem controller reload mine                      goes on with its new build, in its state
   tandem controller unload rest                      then it can be loaded once more
 Without --socket or --dds it is the only `tandem run` of this user.)"},
-    {"joint", "Joints of a running run", R"(Examples:
+    {"joint", Task::kMove, "Joints of a running run", R"(Examples:
   tandem joint list                                  every joint: its controller, mode, measurements
   tandem joint list LKneeSag RKneeSag --gains        and the gains of their loops
   tandem joint show LElbj                            its encoders, its drive, its fault
@@ -78,33 +83,34 @@ Without --socket or --dds it is the only `tandem run` of this user.)"},
   tandem joint gains LElbj position --kp 9e4 --anyway
                                                      also when the model finds that it is not
 Without --socket or --dds it is the only `tandem run` of this user.)"},
-    {"input",
+    {"input", Task::kMove,
      "Inputs of a running run's controllers: `tandem input NAME x=0.2`, `tandem input list`",
      R"(Examples:
   tandem input list                                  every input: who feeds it, what it holds
   tandem input rate joint2=0.3                       one sample, which counts until its time-out
   tandem input rate joint2=0.3 --for 2               again and again, for two seconds
   tandem input jog/rate joint2=0.3                   of the controller `jog`, where several have it
-  tandem input way --point 1.0,0.3,0.2 --point 2,0,0 way-points: after 1 s, and after 2 s
+  tandem input way --point 1.0,0.3,0.2 --point 2,0,0
+                                                     way-points: after 1 s, and after 2 s
 Without --socket or --dds it is the only `tandem run` of this user. Whose source is another in the
 experiment's [controller.inputs] is refused: docs/controllers.md)"},
-    {"site", "Leads a place on a running robot", R"(Examples:
+    {"site", Task::kMove, "Leads a place on a running robot", R"(Examples:
   tandem controller stop hold                        first: frees the joints that it claims
   tandem site move hand z --by 0.02                  up by 20 mm, along the base's axes
   tandem site move hand yaw --by 0.1 --axes site     turns about its own z axis
   tandem joint halt                                  brakes what moves
 A step near a singular posture, or beyond a joint's limit, is refused.
 Without --socket or --dds it is the only `tandem run` of this user.)"},
-    {"sensor", "Sensors of a running run", R"(Examples:
+    {"sensor", Task::kSee, "Sensors of a running run", R"(Examples:
   tandem sensor list                                 every IMU and force/torque sensor
   tandem sensor list imu --json -                    one of them, for a program
 Without --socket or --dds it is the only `tandem run` of this user.)"},
-    {"signal", "Signals of a running run's controllers", R"(Examples:
+    {"signal", Task::kSee, "Signals of a running run's controllers", R"(Examples:
   tandem signal list                                 what the loaded controllers tell of themselves
   tandem signal watch squat                          all of one, a line every 0.1 s
   tandem signal watch squat.depth --every 1 --count 10
 Without --socket or --dds it is the only `tandem run` of this user.)"},
-    {"clock", "Simulated time of a run", R"(Examples:
+    {"clock", Task::kDebug, "Simulated time of a run", R"(Examples:
   tandem clock show                                  time, paused or not, rate, measured speed
   tandem clock pause
   tandem clock step 10                               ten cycles, then paused again
@@ -118,18 +124,18 @@ Without --socket or --dds it is the only `tandem run` of this user.)"},
   tandem clock until 'position(joint1) < 0 rad'
 The results are the same bits. Only simulated time can be paused; on a robot it is refused.
 Without --socket or --dds it is the only `tandem run` of this user.)"},
-    {"link", "The declared link of a simulated tele-operation", R"(Examples:
+    {"link", Task::kTest, "The declared link of a simulated tele-operation", R"(Examples:
   tandem link set --delay 400ms --loss 0.3           both ways, from now on
   tandem link set --way up --jitter 20ms             commands alone
 What is left out stays: docs/teleoperation.md.
 Without --socket or --dds it is the only `tandem run` of this user.)"},
-    {"predict", "What a running robot will do: runs its model ahead", R"(Examples:
+    {"predict", Task::kDebug, "What a running robot will do: runs its model ahead", R"(Examples:
   tandem predict                                     one second ahead, of the run that goes on
   tandem predict --horizon 0.2 --json -              every row, for programs
   tandem predict --horizon 5 --every 50              a row every 50 cycles
 A simulated robot is predicted by a copy of it, a real one by the robot of [parallel]:
 docs/internal-model.md)"},
-    {"push", "Push a simulated robot", R"(Examples:
+    {"push", Task::kMove, "Push a simulated robot", R"(Examples:
   tandem push imu --force 40,0,0 --for 0.2s          at a site, along the world's x axis
   tandem push hand --impulse 0,2,0 --for 50ms --shape half_sine
                                                      2 Ns, whatever the shape
@@ -139,7 +145,8 @@ docs/internal-model.md)"},
                                                      about the site's own z axis
 The robot of another process is pushed by `tandem inject kind=push …` there: docs/scenarios.md.
 Without --socket or --dds it is the only `tandem run` of this user.)"},
-    {"inject", "Inject a fault into a running emulated or simulated robot", R"(Examples:
+    {"inject", Task::kTest, "Inject a fault into a running emulated or simulated robot",
+     R"(Examples:
   tandem inject kind=board_kill board=left_leg_1 for_s=0.5
   tandem inject kind=encoder_jump joint=LKneeSag rad=0.05
   tandem inject kind=frame_drop board=left_arm_1 direction=to_master probability=0.01
@@ -234,7 +241,7 @@ void add_row(CLI::App& app, const CommandRow& row, const char* examples, AskedOp
 
 void add_asked(CLI::App& app, AskedOptions& o) {
   for (const Group& group : kGroups) {
-    CLI::App* first = app.add_subcommand(group.name, group.doc);
+    CLI::App* first = app.add_subcommand(group.name, group.doc)->group(to_string(group.task));
     first->footer(group.examples);
     std::vector<std::string> verbs;
     bool own_line = false;

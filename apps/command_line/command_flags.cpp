@@ -326,7 +326,8 @@ void add_flags(CLI::App& app, RunOptions& o) {
     o.duration_s = seconds;
   };
   app.add_option_function<std::string>("--duration", run_for,
-                                       "Seconds to run, or endless, instead of the experiment's")
+                                       "Seconds to run instead of the experiment's, or endless: "
+                                       "until it is stopped, or its controllers are done")
       ->type_name("SECONDS")
       ->check(a_run_length());
   app.add_option("--hal", o.hal, "Backend: where the robot is (default: the experiment's, or sim)")

@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "apps/command_line/command_flags.hpp"
+#include "apps/command_line/help_text.hpp"
 #include "apps/text/console.hpp"
 #include "base/nearest.hpp"
 
@@ -30,7 +31,8 @@ const char kExamples[] = R"(Examples:
   tandem model info config/coman/robot.toml          joints, mass, operation counts
   tandem doctor                                      is this machine fit for real time?
   tandem latency --load idle --duration 10           wake-up latency of this machine
-`tandem COMMAND --help` shows more, with examples.
+`tandem COMMAND --help` shows more, with examples. `tandem help see` lists the commands of a task.
+Lines fit the terminal, or $COLUMNS; with $NO_COLOR there are no colours.
 
 Exit status: 0 done; 1 the run ended in a fault, or not as expected; 2 wrong input or usage, or no run to ask;
 130 (129, 143) a signal ended it before its planned end.)";
@@ -161,8 +163,8 @@ class Subcommands {
   explicit Subcommands(CLI::App& app) : app_(app) {}
 
   template <class Options>
-  void add(const char* name, const char* doc) {
-    add_to<Options>(app_, name, doc);
+  void add(const char* name, Task task, const char* doc) {
+    add_to<Options>(app_, name, doc)->group(to_string(task));
   }
   /// One more command of the group `group`, which is there.
   template <class Options>
@@ -172,7 +174,7 @@ class Subcommands {
     add_to<Options>(*first, name, doc);
   }
   template <class Options>
-  void add_to(CLI::App& app, const char* name, const char* doc) {
+  CLI::App* add_to(CLI::App& app, const char* name, const char* doc) {
     const auto options = std::make_shared<Options>();
     CLI::App* command = app.add_subcommand(name, doc);
     add_flags(*command, *options);
@@ -180,6 +182,7 @@ class Subcommands {
       if (!command->parsed()) return std::nullopt;
       return *options;
     });
+    return command;
   }
   /// Every command to a running process.
   void add_asked() {
@@ -203,34 +206,43 @@ class Subcommands {
 };
 
 void add_all(Subcommands& commands) {
-  commands.add<RunOptions>("run", "Run an experiment");
-  commands.add<ServeOptions>("serve", "Run a robot for controllers in other processes");
-  commands.add<EmulateOptions>("emulate",
+  commands.add<RunOptions>("run", Task::kRun, "Run an experiment");
+  commands.add<ServeOptions>("serve", Task::kRun, "Run a robot for controllers in other processes");
+  commands.add<EmulateOptions>("emulate", Task::kRun,
                                "The robot on the other end of CAN: boards' firmware and plant");
-  commands.add<CheckOptions>("check", "Validate an experiment's or robot's files");
-  commands.add<TestOptions>("test", "Run experiments that say what they expect, as a suite");
-  commands.add<SweepOptions>("sweep", "Run an experiment at many values, on all cores");
-  commands.add<ShrinkOptions>("shrink", "The fewest, smallest events with which a scenario fails");
-  commands.add<SearchOptions>("search", "Where the margin of an experiment is least");
-  commands.add<ReplayCommandOptions>("replay", "Play a run again from its log, and compare");
-  commands.add<ReportOptions>("report", "Draw the plots of a log, or of up to three");
-  commands.add<ExciteOptions>("excite", "An experiment that excites a robot's dynamics");
-  commands.add<IdentifyOptions>("identify", "Masses, inertias and friction from logs");
-  commands.add<LogOptions>("log", "Logs: info, csv, export, diff, import, replay, thresholds");
-  commands.add<ModelOptions>("model", "A robot's generated kernels: build, info");
-  commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
-  commands.add<EdsOptions>("eds", "Data sheets (EDS): write those of a robot's nodes, show one");
+  commands.add<CheckOptions>("check", Task::kTest, "Validate an experiment's or robot's files");
+  commands.add<TestOptions>("test", Task::kTest,
+                            "Run experiments that say what they expect, as a suite");
+  commands.add<SweepOptions>("sweep", Task::kTest,
+                             "Run an experiment at many values, on all cores");
+  commands.add<ShrinkOptions>("shrink", Task::kTest,
+                              "The fewest, smallest events with which a scenario fails");
+  commands.add<SearchOptions>("search", Task::kTest, "Where the margin of an experiment is least");
+  commands.add<ReplayCommandOptions>("replay", Task::kDebug,
+                                     "Play a run again from its log, and compare");
+  commands.add<ReportOptions>("report", Task::kSee, "Draw the plots of a log, or of up to three");
+  commands.add<ExciteOptions>("excite", Task::kMake,
+                              "An experiment that excites a robot's dynamics");
+  commands.add<IdentifyOptions>("identify", Task::kMake, "Masses, inertias and friction from logs");
+  commands.add<LogOptions>("log", Task::kSee,
+                           "Logs: info, csv, export, diff, import, replay, thresholds");
+  commands.add<ModelOptions>("model", Task::kMake, "A robot's generated kernels: build, info");
+  commands.add<NewOptions>("new", Task::kMake, "A robot's folder from its URDF alone");
+  commands.add<EdsOptions>("eds", Task::kMake,
+                           "Data sheets (EDS): write those of a robot's nodes, show one");
   commands.add_asked();
   commands.add_to_group<ControllerCheckOptions>(
       "controller", "check", "Whether a controller keeps the rules of the cycle");
   commands.add_to_group<ControllerNewOptions>("controller", "new",
                                               "The project of a controller of your own");
-  commands.add<StudioCommandOptions>("studio", "A run that goes on, or logs, in a browser");
-  commands.add<TopicOptions>("topic", "Topics of ROS 2 and DDS: list, echo, hz");
-  commands.add<AskOptions>("ask", "Ask a running process, in JSON");
-  commands.add<DoctorOptions>("doctor", "Is this machine fit for real time?");
-  commands.add<BenchOptions>("bench", "Measure this build: engines");
-  commands.add<LatencyOptions>("latency", "Wake-up latency of the loop, beside cyclictest");
+  commands.add<StudioCommandOptions>("studio", Task::kSee,
+                                     "A run that goes on, or logs, in a browser");
+  commands.add<TopicOptions>("topic", Task::kSee, "Topics of ROS 2 and DDS: list, echo, hz");
+  commands.add<AskOptions>("ask", Task::kDebug, "Ask a running process, in JSON");
+  commands.add<DoctorOptions>("doctor", Task::kMachine, "Is this machine fit for real time?");
+  commands.add<BenchOptions>("bench", Task::kMachine, "Measure this build: engines");
+  commands.add<LatencyOptions>("latency", Task::kMachine,
+                               "Wake-up latency of the loop, beside cyclictest");
 }
 
 }  // namespace
@@ -240,13 +252,18 @@ Command parse_command_line(int argc, const char* const* argv) {
   app.footer(kExamples);
   app.require_subcommand(1);
   app.set_version_flag("--version", "tandem " TANDEM_VERSION);
-  app.get_formatter()->column_width(34);
+  app.formatter(std::make_shared<HelpText>());
 
   Subcommands commands(app);
   add_all(commands);
   std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
   if (!words.empty() && words.front() == "help") {
     words.erase(words.begin());
+    const auto task = words.size() == 1 ? task_named(words.front()) : std::nullopt;
+    if (task && std::ranges::count(subcommands_of(app), to_string(*task)) == 0) {
+      fmt::print("{}", help_of_task(app, *task));
+      return Exit::kDone;
+    }
     words.emplace_back("--help");
   }
   try {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,6 +15,10 @@
 #include "apps/control/command_rows.hpp"
 #include "apps/text/console.hpp"
 #include "runtime/run/overrides.hpp"
+
+namespace tandem::runtime {
+struct Trunk;
+}
 
 namespace tandem::apps {
 
@@ -45,6 +50,11 @@ struct RunOptions : runtime::Overrides {
   std::optional<std::size_t> checkpoints_bytes{};  ///< to go back in time by; empty: where useful
   std::string from{};  ///< "LOG@12.3s": goes on from there; empty: from the beginning
   StudioOptions studio{};
+  // For one of many runs that differ in `later` rows alone; no flags of the command line.
+  std::shared_ptr<const runtime::Trunk> trunk{};  ///< goes on from a state of it, where one fits
+  std::string
+      lacks_kernels{};       ///< is made where no kernels fit, and none are built; empty: they are
+  std::string trunk_file{};  ///< gets the states of this one, in which those rows never come
 };
 
 /// tandem serve EXPERIMENT|ROBOT
@@ -110,6 +120,7 @@ struct SweepOptions {
   std::uint64_t chunk_points = 0;   ///< of each element of an array; 0: as usual
   std::vector<std::string> sbatch;  ///< its options, without dashes
   std::optional<std::uint64_t> chunk;  ///< run this one alone: what an element does
+  bool branches = true;                ///< common beginnings are simulated once
   bool quiet = false;                  ///< neither progress nor table
   std::string json;
 };
@@ -121,6 +132,7 @@ struct ShrinkOptions {
   std::string expect;        ///< which expectation has to fail; empty: the first that does
   std::size_t jobs = 0;      ///< as TestOptions'
   double timeout_s = 300.0;  ///< as TestOptions'
+  bool branches = true;      ///< common beginnings are simulated once
   bool quiet = false;        ///< neither progress nor result
   std::string json;
 };
@@ -134,10 +146,12 @@ struct SearchOptions {
   std::string along;         ///< key of a phase sweep; empty: the only one
   std::string limit;         ///< instead: key whose values are scaled until it fails
   double up_to = 0.0;        ///< greatest factor of `limit`
+  std::string svg;           ///< file of its picture; empty: none
   std::size_t halvings = 5;  ///< of the interval in which its limit lies
   std::size_t runs = 200;    ///< at most
   std::uint64_t seed = 1;    ///< of the method
   std::size_t jobs = 0;      ///< as TestOptions'
+  bool branches = true;      ///< common beginnings are simulated once
   bool quiet = false;        ///< neither progress nor result
   std::string json;
 };

@@ -10,8 +10,8 @@ constexpr char kShrinkExamples[] = R"(Examples:
   tandem shrink fall.toml -o small.toml              which of its pushes, and how hard at least?
   tandem shrink fall.toml --expect "stays_up" -j 4   the same expectation has to fail, four at once
 
-Every candidate is run. What happens are its rows [[push]], [[fault]], [[event]], [[sim.payload]]
-and [[sim.patch]]. Ctrl-C keeps the smallest so far. The exit status is 0 when small.toml is
+Every candidate is run. What happens are its rows [[push]], [[fault]], [[event]], [[sim.payload]],
+[[sim.patch]], [[sim.ground]] and [[sim.shake]]. Ctrl-C keeps the smallest so far. The exit status is 0 when small.toml is
 written, 2 when the scenario does not fail. docs/search.md)";
 
 constexpr char kSearchExamples[] = R"(Examples:
@@ -42,6 +42,8 @@ void add_runs(CLI::App& app, Options& o, const std::string& which) {
       ->check(is_given("name an expectation, or leave it out"));
   app.add_option("--jobs,-j", o.jobs, "Runs at once (default: one for each core)")
       ->check(is_count());
+  app.add_flag("!--no-branches", o.branches,
+               "Run every candidate from its beginning, for the same result");
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor result");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
 }
@@ -77,6 +79,9 @@ void add_flags(CLI::App& app, SearchOptions& o) {
           ->needs(up_to)
           ->excludes(method, along);
   up_to->needs(limit);
+  app.add_option("--svg", o.svg, "Draw the limits by direction, a panel for each other value")
+      ->check(is_given(kNameAFile))
+      ->needs(limit);
   app.add_option("--halvings", o.halvings, "Of the interval from 0 to --up-to (default: 5)")
       ->check(CLI::Range(0, 30))
       ->needs(limit);

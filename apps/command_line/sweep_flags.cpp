@@ -49,6 +49,8 @@ void add_flags(CLI::App& app, SweepOptions& o) {
       ->check(is_given("name a folder, or leave it out"));
   app.add_option("--kernel-variant", o.kernel_variant,
                  "Of every point, on any CPU (default: as the folder's, else this CPU's best)");
+  app.add_flag("!--no-branches", o.branches,
+               "Run every point from its beginning, for the same result");
   add_summary(app, o);
   CLI::Option* slurm = app.add_flag(
       "--slurm", o.slurm, "Submit the points that have no result, as arrays of jobs of Slurm");
@@ -64,7 +66,9 @@ void add_flags(CLI::App& app, SweepOptions& o) {
   app.add_option("--chunk", o.chunk, "Run this chunk alone: what an element of an array does")
       ->excludes(slurm);
   app.footer(kSweepExamples);
-  add_of_folder(app, o, "status", "How far a sweep is", Action::kStatus)->excludes(study);
+  CLI::App* status =
+      add_of_folder(app, o, "status", "How far a sweep is", Action::kStatus)->excludes(study);
+  status->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   CLI::App* collect =
       add_of_folder(app, o, "collect", "Tables and page of a sweep on a cluster", Action::kCollect);
   add_summary(*collect, o);

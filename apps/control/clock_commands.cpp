@@ -85,10 +85,16 @@ struct Clock {
       if (!past.why_not.empty()) found["no_past"] = past.why_not;
       return found;
     }
-    if (const auto met = past.machine->met()) found["until_met_s"] = seconds_of(cycle, *met);
+    if (std::string awaited = past.machine->awaited(); !awaited.empty())
+      found["until"] = std::move(awaited);
+    if (const auto met = past.machine->met()) {
+      found["until_met_s"] = seconds_of(cycle, *met);
+      found["until_met"] = past.machine->met_words();
+    }
     const runtime::KeptPast kept = past.machine->past();
     found["past"] = {
         {"keeps", kept.keeps},
+        {"no_more", kept.no_more.empty() ? Json(nullptr) : Json(kept.no_more)},
         {"checkpoints", kept.count},
         {"bytes", kept.bytes},
         {"budget_bytes", kept.budget_bytes},
@@ -133,7 +139,7 @@ struct Clock {
   [[nodiscard]] Status may_go_back() const {
     if (past.machine != nullptr) return {};
     return fail("this run cannot go back in time: " + past.why_not,
-                "a simulation in one process can: tandem run … --hal sim");
+                "a simulation can: tandem run … --hal sim, or in lockstep with tandem emulate");
   }
 
   [[nodiscard]] Result<Json> arrived(const Result<runtime::Travel>& travel) const {
@@ -182,15 +188,40 @@ struct Clock {
     return arrived(past.machine->back_until(cycle, std::move(*holds)));
   }
 
+  [[nodiscard]] Result<Json> give_up() const {
+    const Result<std::string> before = past.machine->give_up(cycle);
+    if (!before) return std::unexpected(before.error());
+    keep();
+    Json found = look();
+    found["note"] = "it is given up: " + *before;
+    return found;
+  }
+
   [[nodiscard]] Result<Json> until(const Json& request) const {
     if (past.machine == nullptr) {
       return fail(
           "conditions are looked at where time can go back, and here it cannot: " + past.why_not,
           "go on to a time: tandem clock step --to TIME; or ask a simulation in one process");
     }
+    const bool cancel = request.value("cancel", false);
+    if (cancel == request.contains("condition")) {
+      return fail_at("condition", cancel ? "none is given up and waited for at once" : "is missing",
+                     "give a condition, or cancel the one that waits");
+    }
+    if (cancel) return give_up();
     auto holds = condition(request);
     if (!holds) return std::unexpected(holds.error());
-    return answer(past.machine->until(cycle, std::move(*holds)));
+    const auto begun = past.machine->until(cycle, std::move(*holds), request["condition"]);
+    if (!begun) return std::unexpected(begun.error());
+    keep();
+    Json found = look();
+    found["waits"] = found.contains("until");  // else it has become true meanwhile
+    std::string note = begun->holds_now ? "it holds now, so it has to end first" : "";
+    if (!begun->replaced.empty()) {
+      note += (note.empty() ? "" : "; ") + ("it replaces one that waited: " + begun->replaced);
+    }
+    if (!note.empty()) found["note"] = std::move(note);
+    return found;
   }
 };
 

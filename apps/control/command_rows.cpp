@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/control/control_registry.hpp"
 #include "base/nearest.hpp"
 #include "base/utf8.hpp"
 
@@ -15,6 +16,14 @@ namespace {
 using Type = ControlKey::Type;
 using Unit = ControlKey::Unit;
 using enum ControlEffect;
+
+/// For CommandRow::More::answer_s. An emergency stop over DDS waits for dds.show.
+constexpr int kStop_s = kStopAnswer / std::chrono::seconds(1);
+/// A run of an hour may take minutes to be searched.
+constexpr int kSearch_s = 600;
+/// A library is tried, opened, and configured: each may take 4 s. Where one crashes, which is
+/// tried, is looked for 25 s long.
+constexpr int kLibrary_s = 40;
 
 const char* to_string(Type type) {
   switch (type) {
@@ -98,7 +107,8 @@ const std::vector<CommandRow> kRows{
     {"estop", kStops, "emergency stop, latched; waits until the loop confirms it",
      {integer("category", "--category", 0, 2, "0, 1 or 2; else what robot.toml's [safety] says"),
       local(flag("trust-domain", "--trust-domain",
-                 "believe whoever answers in the DDS domain, where nobody but robots is"))}},
+                 "believe whoever answers in the DDS domain, where nobody but robots is"))},
+     {.answer_s = kStop_s}},
     {"run.stop", kEnds, "ends the run in order", {}, {.on_line = false, .by_event = true}},
 
     {"controller.list", kReads, "every loaded controller and its claims"},
@@ -126,7 +136,7 @@ const std::vector<CommandRow> kRows{
       local(texts("set", "--set", "one parameter, 'key = value', beside the file's; repeatable")),
       flag("untried", "--untried", "open it without the trial in a process of its own: a crash ends the run"),
       local(flag("start", "--start", "start it as well"))},
-     {.by_event = true}},
+     {.by_event = true, .answer_s = kLibrary_s}},
     {"controller.reload", kChanges,
      "loads a controller's library as it is now, with the same parameters, and puts it in the "
      "place of the former build in one cycle; it goes on with the former one's state where that "
@@ -134,7 +144,7 @@ const std::vector<CommandRow> kRows{
      {need(text("name", "name", kLoaded)),
       flag("fresh", "--fresh", "start from the measured state in any case"),
       flag("untried", "--untried", "open it without the trial in a process of its own: a crash ends the run")},
-     {.by_event = true}},
+     {.by_event = true, .answer_s = kLibrary_s}},
     {"controller.unload", kChanges, "frees an inactive controller",
      {need(text("name", "name", kLoaded))},
      {.by_event = true}},
@@ -272,15 +282,16 @@ const std::vector<CommandRow> kRows{
       with_unit(Unit::kTime, "to_s", "--to", "instead: until this time is there [s]")}},
     {"clock.rewind", kChanges, "goes back in simulated time, and stands there",
      {need(with_unit(Unit::kTime, "by_s", "by", "how far [s]"))},
-     {.takes_long = true}},
+     {.takes_long = true, .answer_s = kSearch_s}},
     {"clock.goto", kChanges, "goes to a time that has been, and stands there",
      {need(with_unit(Unit::kTime, "time_s", "time", "of the run [s]"))},
-     {.takes_long = true}},
+     {.takes_long = true, .answer_s = kSearch_s}},
     {"clock.back-until", kChanges, "goes back to where a condition became true last",
      {need(text("condition", "condition", "as 'torque(LKneeSag) > 40Nm'"))},
-     {.takes_long = true}},
+     {.takes_long = true, .answer_s = kSearch_s}},
     {"clock.until", kChanges, "goes on until a condition becomes true, and stands there",
-     {need(text("condition", "condition", "as 'torque(LKneeSag) > 40Nm'"))}},
+     {text("condition", "condition", "as 'torque(LKneeSag) > 40Nm'; a second one replaces the first"),
+      flag("cancel", "--cancel", "instead: the one that waits is given up; time goes on as it does")}},
     {"clock.rate", kChanges, "simulated seconds per wall second, from the next cycle on",
      {{.name = "rate", .type = Type::kNumber, .required = true,
        .doc = "0.01 to 1000; 0: as fast as possible", .line = "rate",
@@ -319,9 +330,9 @@ const std::vector<CommandRow> kRows{
       text("address", "", "where it listens; else 127.0.0.1"),
       text("page", "", "folder of the page, instead of the program's own: for work on it"),
       texts("origins", "", "whose pages may look by Foxglove's protocol: https://app.foxglove.dev")},
-     {.on_line = false}},
+     {.on_line = false, .answer_s = 30}},
     {"dds.show", kReads, "the participant by which this process is on DDS", {},
-     {.on_line = false}},
+     {.on_line = false, .answer_s = kStop_s}},
     {"dds.admit", kChanges, "lets a participant of the DDS domain change what [remote] allows",
      {need(text("participant", "", "its GUID's first 12 bytes in hexadecimal digits: those of "
                 "`ros2 topic info -v`, dots and what follows are left out"))},

@@ -73,6 +73,7 @@ struct CommandRow {
     std::string asks{};
     /// An [[event]] may ask for it: it ends within the cycle in which it is asked.
     bool by_event = false;
+    int answer_s = 5;  ///< how long a client waits for the answer
   } more{};
 };
 

@@ -128,8 +128,8 @@ Result<Json> tell(RunServices& services, const Result<runtime::RequestResult>& a
 }
 
 /// A switch that an operator asks for.
-Result<Json> switch_by_hand(RunServices& services, const Names& stop, const Names& start,
-                            const Json& request) {
+Result<Json> switch_by_hand(RunServices& services, const hal::RobotConfig& robot, const Names& stop,
+                            const Names& start, const Json& request) {
   for (const Names& names : {stop, start}) {
     if (const Status own = check_no_owner(services, names); !own)
       return std::unexpected(own.error());
@@ -140,12 +140,13 @@ Result<Json> switch_by_hand(RunServices& services, const Names& stop, const Name
     return tell(services, services.cancel_switch());
   }
   if (request.contains("when_within")) {
-    auto answer = tell(services, switch_when(services, stop, start, request));
+    auto answer = tell(services, switch_when(services, robot, stop, start, request));
     if (answer) (*answer)["waits"] = true;
     return answer;
   }
-  if (request.contains("timeout_s")) {
-    return fail_at("timeout_s", "is for a switch that waits", "give when_within, too");
+  for (const char* const key : {"timeout_s", "unit"}) {
+    if (request.contains(key))
+      return fail_at(key, "is for a switch that waits", "give when_within, too");
   }
   const auto asked = services.switch_controllers(stop, start);
   auto answer = tell(services, asked);
@@ -343,6 +344,12 @@ Status check_no_owner(RunServices& services, const std::vector<std::string>& nam
 
 Json asked_json(const runtime::RequestResult& asked) {
   if (asked.done) return {{"done", true}, {"cycle", asked.cycle}};
+  if (asked.stands) {
+    return {{"done", false},
+            {"note",
+             "asked for; it will happen in the loop's next cycle, or be refused by it, as "
+             "time stands: then the run's output and its log tell (tandem clock step)"}};
+  }
   return {{"done", false}, {"note", "asked for; it will happen in the loop's next cycle"}};
 }
 
@@ -363,17 +370,18 @@ void add_controller_commands(ControlRegistry& registry, RunServices& services,
   registry.add("controller.unload", [&services](const Json& request) {
     return tell(services, services.unload(request["name"].get<std::string>()));
   });
-  registry.add("controller.start", [&services](const Json& request) {
+  registry.add("controller.start", [&services, &robot](const Json& request) {
     if (!request.contains("name")) return tell(services, services.go_on());
     const Names names{request["name"].get<std::string>()};
-    return switch_by_hand(services, {}, names, request);
+    return switch_by_hand(services, robot, {}, names, request);
   });
-  registry.add("controller.stop", [&services](const Json& request) {
+  registry.add("controller.stop", [&services, &robot](const Json& request) {
     const Names names{request["name"].get<std::string>()};
-    return switch_by_hand(services, names, {}, request);
+    return switch_by_hand(services, robot, names, {}, request);
   });
-  registry.add("controller.switch", [&services](const Json& request) {
-    return switch_by_hand(services, names_of(request, "stop"), names_of(request, "start"), request);
+  registry.add("controller.switch", [&services, &robot](const Json& request) {
+    return switch_by_hand(services, robot, names_of(request, "stop"), names_of(request, "start"),
+                          request);
   });
   add_shadow_commands(registry, services, robot);
 }

@@ -346,7 +346,9 @@ Result<Json> set_gains(Run& run, const Json& request) {
     run.waiting[key] = wanted;
   }
   (*answer)["stability"] = *stability;
-  (*answer)["note"] = told(*stability);  // gains are nobody's: not the one of the joint's owner
+  // Gains are nobody's: not the note of the joint's owner.
+  const std::string waits = answer->value("done", false) ? "" : answer->value("note", "") + "; ";
+  (*answer)["note"] = waits + told(*stability);
   return answer;
 }
 

@@ -74,6 +74,7 @@ runtime::MoveRequest path_of(const JointInfo& joint, const hal::JointCapabilitie
 /// @param travel_s  of the whole way at full speed, without the ramps
 Result<Json> begin(const Groups& run, const std::vector<JointInfo>& all, const LedJoints& group,
                    double travel_s) {
+  if (run.cycle.services().asks_ahead()) return Json::object();
   if (time_stands(run.cycle)) {
     return fail("simulated time stands: a group would not begin together",
                 "let it go on first: tandem clock resume");
@@ -155,6 +156,14 @@ constexpr std::array kCarefulSpeed{0.05, 0.2};  // of a site [m/s], [rad/s]
 
 /// A step of a site, by a straight line of its joints, none of which is faster than it may be.
 Result<Json> move_site(const Groups& run, const Json& request) {
+  const auto site = request["site"].get<std::string>();
+  if (run.cycle.services().asks_ahead()) {  // where it is then, nobody knows
+    std::vector<std::string> known;
+    for (const hal::SiteConfig& one : run.robot.model.sites) known.push_back(one.name);
+    if (std::ranges::find(known, site) == known.end())
+      return fail_at(site, "the robot has no site of that name", suggest(site, known));
+    return Json::object();
+  }
   const auto name = request["axis"].get<std::string>();
   const auto axis = static_cast<std::size_t>(std::ranges::find(kAxes, name) - kAxes.begin());
   const double by = request["by"];
@@ -163,7 +172,7 @@ Result<Json> move_site(const Groups& run, const Json& request) {
   std::vector<double> from;
   for (const JointInfo& joint : all) from.push_back(reference_of(joint));
   const bool own = request.value("axes", std::string("base")) == "site";
-  const auto led = run.lead(request["site"].get<std::string>(), axis, own, by, from);
+  const auto led = run.lead(site, axis, own, by, from);
   if (!led) return std::unexpected(led.error());
   double travel_s = std::abs(by) / speed;
   for (std::size_t i = 0; i < led->joints.size(); ++i) {

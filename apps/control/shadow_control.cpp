@@ -1,5 +1,7 @@
 #include "apps/control/shadow_control.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -21,6 +23,28 @@ const char* unit_of(const hal::RobotConfig& robot, std::size_t joint,
                     runtime::CommandReference reference) {
   const auto& row = runtime::kCommandReferenceRows[static_cast<std::size_t>(reference)];
   return robot.joints[joint].slides ? row.slide_unit : row.unit;
+}
+
+/// Whether what has to agree is an angle, or a length, in each joint that one to start claims.
+Status check_within_unit(RunServices& services, const hal::RobotConfig& robot,
+                         const std::vector<std::string>& start, const std::string& unit) {
+  const std::string_view given = unit == "length" ? "m" : "rad";
+  for (const runtime::ControllerStatus& one : services.controllers()) {
+    if (std::ranges::find(start, one.name) == start.end()) continue;
+    for (const auto& claim : one.claims) {
+      const auto used = runtime::references_of(static_cast<std::int8_t>(claim.mode));
+      if (used.empty() || unit_of(robot, claim.joint, used.front()) == given) continue;
+      const std::string is = unit_of(robot, claim.joint, used.front());
+      return fail_at(robot.joints[claim.joint].name,
+                     fmt::format("when_within is {}, and the reference of this joint, which '{}' "
+                                 "claims, is in {}",
+                                 unit == "length" ? "a length" : "an angle", one.name, is),
+                     is == "rad" ? "give an angle: 0.5deg, 0.01rad; or a bare number [rad]"
+                     : is == "m" ? "give a length: 1mm, 0.001m; or a bare number [m]"
+                                 : "give a bare number [" + is + "]");
+    }
+  }
+  return {};
 }
 
 Json joint_json(const hal::RobotConfig& robot, std::size_t joint, const std::string& owner,
@@ -132,10 +156,15 @@ void add_shadow_commands(ControlRegistry& registry, RunServices& services,
   });
 }
 
-Result<runtime::RequestResult> switch_when(RunServices& services,
+Result<runtime::RequestResult> switch_when(RunServices& services, const hal::RobotConfig& robot,
                                            const std::vector<std::string>& stop,
                                            const std::vector<std::string>& start,
                                            const Json& request) {
+  if (request.contains("unit")) {
+    const Status fits =
+        check_within_unit(services, robot, start, request["unit"].get<std::string>());
+    if (!fits) return std::unexpected(fits.error());
+  }
   return services.switch_when(
       stop, start, request["when_within"].get<double>(),
       static_cast<std::int64_t>(1e9 * request.value("timeout_s", kTimeout_s)));

@@ -12,8 +12,10 @@ namespace tandem::apps {
 void add_shadow_commands(ControlRegistry& registry, runtime::RunServices& services,
                          const hal::RobotConfig& robot);
 
-/// controller.switch with "when_within": what was asked for, and that it waits.
+/// controller.switch with "when_within": what was asked for, and that it waits. Errors: a value in
+/// a unit that is not the one of a joint's reference; RunServices::switch_when()'s.
 [[nodiscard]] Result<runtime::RequestResult> switch_when(runtime::RunServices& services,
+                                                         const hal::RobotConfig& robot,
                                                          const std::vector<std::string>& stop,
                                                          const std::vector<std::string>& start,
                                                          const Json& request);

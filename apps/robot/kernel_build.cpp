@@ -5,6 +5,7 @@
 
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
+#include "base/open_file.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -52,6 +53,14 @@ Result<model::BuildReport> build_once(const robot::RobotFiles& robot, model::Bui
                report->seconds, report->library);
   }
   return report;
+}
+
+robot::BuildKernels not_built(const std::string& file) {
+  return [file](const robot::RobotFiles& robot,
+                const model::BuildOptions&) -> Result<model::BuildReport> {
+    (void)open_new(file);
+    return fail(robot.config.name + ": no kernels fit", "they are built first");
+  };
 }
 
 }  // namespace tandem::apps

@@ -19,6 +19,8 @@ namespace tandem::apps {
 [[nodiscard]] constexpr robot::MissingKernels missing_kernels(bool no_build) {
   return no_build ? robot::MissingKernels::kRefuse : robot::MissingKernels::kBuild;
 }
+/// Builds nothing: makes this empty file, by which others know that it is to be done.
+[[nodiscard]] robot::BuildKernels not_built(const std::string& file);
 [[nodiscard]] inline robot::BuildKernels builder(bool quiet) {
   return quiet ? robot::BuildKernels() : build_once;
 }

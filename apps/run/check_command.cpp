@@ -12,8 +12,10 @@
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/connection.hpp"
+#include "apps/run/controller_trial.hpp"
 #include "apps/run/event_run.hpp"
 #include "apps/run/input_topics.hpp"
+#include "apps/run/scenario_warnings.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
 #include "base/quoting.hpp"
@@ -235,28 +237,6 @@ void warn_of_archives(const WiredComposition& c, Diagnostics& warnings) {
   }
 }
 
-/// Payloads that nobody will see, or see dropped. A run ends its length after the drives' bring-up,
-/// which takes a part of a second.
-void warn_of_payloads(const runtime::Experiment& e, Diagnostics& warnings) {
-  constexpr double kBringUp_s = 0.5;
-  if (e.hal.backend != runtime::BackendKind::kSim || e.plant == nullptr || e.endless()) return;
-  const double end_s = kBringUp_s + e.hal.settle_s + e.duration_s;
-  for (const sim::ScenarioFault& one : e.plant->carried) {
-    const double from_s = static_cast<double>(one.start_ns) * 1e-9;
-    const double until_s = from_s + static_cast<double>(one.duration_ns) * 1e-9;
-    const bool never = from_s >= end_s;
-    if (!never && (one.duration_ns < 0 || until_s < end_s)) continue;
-    warnings.push_back(
-        {.message = fmt::format("{} is never {}: that is due {:.6g} s after the first SYNC, and "
-                                "the run ends about {:.1f} s after it",
-                                e.plant->payloads[one.number - 1], never ? "picked up" : "dropped",
-                                never ? from_s : until_s, end_s),
-         .hint = never ? "give an earlier from_s, or a longer duration_s" : "",
-         .file = e.file,
-         .key = "sim.payload"});
-  }
-}
-
 /// Inputs whose topics a run would refuse to read.
 Status check_topics(const WiredComposition& c) {
   if (c.controllers == nullptr) return {};
@@ -279,10 +259,15 @@ Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagno
   warnings = (*composition)->experiment.description->warnings;
   warnings.insert(warnings.end(), (*composition)->warnings.begin(), (*composition)->warnings.end());
   warn_of_archives(**composition, warnings);
-  warn_of_payloads((*composition)->experiment, warnings);
+  add_scenario_warnings((*composition)->experiment, warnings);
   print_warnings(warnings);
   if (const Status fed = check_topics(**composition); !fed) return {fed.error()};
   if (Diagnostics events = check_events((*composition)->experiment); !events.empty()) return events;
+  RunOptions as_run;
+  as_run.experiment = options.file;
+  as_run.settings = options.settings;
+  const TryController trial = try_in_other_process(as_run);
+  if (Diagnostics events = ask_ahead(**composition, trial); !events.empty()) return events;
   const runtime::Experiment& e = (*composition)->experiment;
   add_loop_json(e.robot, (*composition)->loops, json);
   add_scale_json(e.robot, json);

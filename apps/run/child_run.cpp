@@ -65,6 +65,8 @@ ChildRun child_run(const std::string& json_file, const std::string& output_file,
   const auto lost = result.value("never_injected", std::size_t{0});
   if (const auto ended = result.find("ended"); ended != result.end() && ended->is_string())
     run.ended = ended->get<std::string>();
+  if (const auto begins = result.find("begins_s"); begins != result.end() && begins->is_number())
+    run.begins_s = begins->get<double>();
   // Faults at times are no rows of it: that they came is `lost`.
   const bool judged = !run.expectations.empty() || result.contains("never_injected");
   run.passed = status == 0 && limit_s == 0.0 && judged && failures == 0 && lost == 0;
@@ -73,6 +75,7 @@ ChildRun child_run(const std::string& json_file, const std::string& output_file,
   const std::string error = first_error(result);
   if (limit_s > 0.0) {
     run.ended = "too slow";
+    run.limit_s = limit_s;
     run.reason = fmt::format("it was ended after {:g} s", limit_s);
   } else if (status >= 128) {
     const char* name = ::sigabbrev_np(status - 128);

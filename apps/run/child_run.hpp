@@ -18,7 +18,9 @@ struct ChildRun {
   std::string ended;
   /// Why it failed beside its expectations: "crashed: SIGSEGV"; empty: it did not.
   std::string reason{};
-  std::string said{};   ///< the end of what it printed; empty: it passed
+  double begins_s = 0.0;            ///< not 0: it went on from a state of another run
+  std::string said{};               ///< the end of what it printed; empty: it passed
+  std::optional<double> limit_s{};  ///< it was too slow for this one
   bool killed = false;  ///< by somebody else, or for want of memory: that need not be its fault
 };
 

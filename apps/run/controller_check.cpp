@@ -21,6 +21,7 @@
 #include "apps/text/figures.hpp"
 #include "base/open_file.hpp"
 #include "base/quoting.hpp"
+#include "base/temporary_folder.hpp"
 #include "rt/stop_signal.hpp"
 #include "runtime/run/run.hpp"
 
@@ -42,25 +43,15 @@ class MadeExperiment {
         "robot = {}\nduration_s = 1.0\n[[controller]]\nplugin = {}\n[controller.parameters]\n",
         quoted_text(fs::absolute(*robot).string()), quoted_text(o.plugin));
     for (const std::string& line : o.set) text += line + "\n";
-    std::string folder = (fs::temp_directory_path() / "tandem-check-XXXXXX").string();
-    if (::mkdtemp(folder.data()) == nullptr) {
-      return fail("cannot make a folder in " + fs::temp_directory_path().string(),
-                  "let TMPDIR name one that can be written");
-    }
-    MadeExperiment made(folder, o.set);
+    MadeExperiment made(o.set);
+    if (const Status there = made.folder_.made(); !there) return std::unexpected(there.error());
     auto file = open_output(made.path(), 0600);
     if (!file) return std::unexpected(file.error());
     if (::write(file->get(), text.data(), text.size()) != static_cast<ssize_t>(text.size()))
       return fail("cannot write " + made.path(), "is the disk full?");
     return made;
   }
-  MadeExperiment(MadeExperiment&& other) noexcept
-      : folder_(std::exchange(other.folder_, {})), set_(std::move(other.set_)) {}
-  ~MadeExperiment() {
-    std::error_code ignored;
-    if (!folder_.empty()) fs::remove_all(folder_, ignored);
-  }
-  [[nodiscard]] std::string path() const { return folder_ + "/check.toml"; }
+  [[nodiscard]] std::string path() const { return folder_.below("check.toml"); }
 
   /// Errors of this file, which nobody has seen, as those of the command line that it was made of.
   [[nodiscard]] Diagnostics as_given(Diagnostics errors) const {
@@ -80,9 +71,8 @@ class MadeExperiment {
 
  private:
   static constexpr std::size_t kFirstSet = 6;  // line
-  MadeExperiment(std::string folder, std::vector<std::string> set)
-      : folder_(std::move(folder)), set_(std::move(set)) {}
-  std::string folder_;
+  explicit MadeExperiment(std::vector<std::string> set) : set_(std::move(set)) {}
+  TemporaryFolder folder_{"check"};
   std::vector<std::string> set_;
 };
 
@@ -317,7 +307,7 @@ Exit controller_check_command(const ControllerCheckOptions& given) {
     await_crash_place();
     remember_error(loop_error(proof->crashed));
     write_failure(options.json);
-    fmt::print(stderr, "fault: {}\n", proof->crashed);
+    say(Said::kFault, proof->crashed);
     std::fflush(nullptr);
     ::_exit(static_cast<int>(Exit::kFault));  // the loop's thread is still there
   }
@@ -331,8 +321,7 @@ Exit controller_check_command(const ControllerCheckOptions& given) {
   }
   result.kept = kept(result.rules) && result.faults.empty();
   if (!options.quiet) print_gate(result.rules, human_output(options.json));
-  for (const std::string& fault : result.faults)
-    fmt::print(stderr, "fault: {}\n", shown(fault, 2'000));
+  for (const std::string& fault : result.faults) say(Said::kFault, shown(fault, 2'000));
   if (const Status written = write_json(options.json, figures_json(result)); !written)
     return refuse(written.error());
   return result.kept ? Exit::kDone : Exit::kFault;

@@ -21,6 +21,7 @@
 #include "base/open_file.hpp"
 #include "base/process.hpp"
 #include "base/quoting.hpp"
+#include "base/temporary_folder.hpp"
 #include "controllers/hosted_call.hpp"
 #include "runtime/run/composition.hpp"
 #include "runtime/run_services.hpp"
@@ -36,26 +37,6 @@ constexpr int kUntried = 3;
 constexpr std::uint64_t kMostTrialBytes = std::uint64_t{32} << 20;
 constexpr char kUntriedHint[] =
     "put that right; or load it with --untried: then its crash ends the run";
-
-/// A folder for the request and for what is said of it, gone at the end.
-class TrialFolder {
- public:
-  TrialFolder() : path_((fs::temp_directory_path() / "tandem-trial-XXXXXX").string()) {
-    if (::mkdtemp(path_.data()) == nullptr) path_.clear();
-  }
-  ~TrialFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  TrialFolder(const TrialFolder&) = delete;
-  TrialFolder& operator=(const TrialFolder&) = delete;
-  [[nodiscard]] bool there() const { return !path_.empty(); }
-  [[nodiscard]] std::string request() const { return path_ + "/request.json"; }
-  [[nodiscard]] std::string output() const { return path_ + "/output"; }
-
- private:
-  std::string path_;
-};
 
 /// What the other process needs of the run to compose the same robot.
 Json request_of(const RunOptions& options, const ControllerTrial& trial) {
@@ -155,24 +136,23 @@ Status judged(const ControllerTrial& trial, const std::optional<int>& status, mi
 }
 
 Status tried(const RunOptions& options, const ControllerTrial& trial) {
-  const TrialFolder folder;
+  const TemporaryFolder folder("trial");
   const auto untried = [&](const std::string& why) {
     return std::unexpected(trial_error(trial, "it could not be tried: " + why, kUntriedHint));
   };
-  if (!folder.there())
-    return untried("no folder can be made in " + fs::temp_directory_path().string());
+  if (const Status made = folder.made(); !made) return untried(made.error().message);
+  const std::string asked = folder.below("request.json"), said = folder.below("output");
   {
-    auto request = open_output(folder.request(), 0600);
+    auto request = open_output(asked, 0600);
     if (!request) return untried(request.error().message);
     if (write_all(*request, json_text(request_of(options, trial))) != 0)
       return untried("the disk is full");
   }
-  const auto child = spawn(
-      {.command = {program_file(), kTryController, folder.request()}, .output = folder.output()});
+  const auto child = spawn({.command = {program_file(), kTryController, asked}, .output = said});
   if (!child) return untried(child.error().message);
   const milliseconds limit = runtime::ControllerHost::kConfigureTime;
-  const std::optional<int> status = wait_for_trial(*child, limit, folder.output());
-  const auto output = read_file(folder.output(), "", kMostTrialBytes);
+  const std::optional<int> status = wait_for_trial(*child, limit, said);
+  const auto output = read_file(said, "", kMostTrialBytes);
   return judged(trial, status, limit, output ? *output : "");
 }
 

@@ -176,10 +176,10 @@ void count_time(RunTimes& times, runtime::RunPhase phase, double seconds, double
 }
 
 void warn_of_log(const log::Recorder& recorder) {
-  fmt::print(stderr,
-             "warning: {}: nothing is logged any more: {}; the run continues without a log (end it "
-             "with Ctrl-C or tandem ask '{{\"do\": \"run.stop\"}}', and start it again)\n",
-             recorder.path(), recorder.trouble());
+  say(Said::kWarning,
+      fmt::format("{}: nothing is logged any more: {}; the run continues without a log (end it "
+                  "with Ctrl-C or tandem ask '{{\"do\": \"run.stop\"}}', and start it again)",
+                  recorder.path(), recorder.trouble()));
 }
 
 }  // namespace
@@ -213,6 +213,11 @@ void watch(runtime::RobotCycle& cycle, CycleThread& loop, const WiredComposition
   HomingNote homing;
   TextNotes texts;
   LimitNotes limits;
+  // What has no end has no share that is done: then the run's time, as all other lines have it.
+  const auto done_s = [&] {
+    return e.endless() ? static_cast<double>(progress.time_ns.load()) * 1e-9
+                       : static_cast<double>(progress.running_cycles.load()) * period_s;
+  };
   bool logged = recorder != nullptr;
   while (!loop.done() && !guard.gave_up()) {
     if (logged && recorder->failed()) {
@@ -224,17 +229,13 @@ void watch(runtime::RobotCycle& cycle, CycleThread& loop, const WiredComposition
     if (!quiet) faults.look(cycle);
     if (!quiet) texts.look(cycle.services().texts());
     if (!quiet) limits.look(cycle);
-    if (!quiet) {
-      bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
-                 progress_note(cycle));
-    }
+    if (!quiet) bar.update(done_s(), progress_note(cycle));
     loop.await(std::chrono::milliseconds(20));
   }
   if (!quiet) {
     texts.look(cycle.services().texts());
     limits.look(cycle);
-    bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
-               progress_note(cycle));
+    bar.update(done_s(), progress_note(cycle));
     bar.finish();
   }
 }

@@ -13,6 +13,7 @@
 #include "apps/text/console.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "base/counted.hpp"
+#include "hal/ethercat-can/wire_meter.hpp"
 #include "hal/sim/emulator.hpp"
 #include "hal/sim/line_boards.hpp"
 #include "hal/sim/scenario.hpp"
@@ -90,15 +91,19 @@ Diagnostics in_file(Error error, const std::string& file) {
   return {std::move(error)};
 }
 
-/// With a studio each CAN bus' frames are timed.
+/// With a studio the frames of each bus are timed; but those of EtherCAT in lockstep, where a
+/// master sends them again for as long as a step takes.
 /// @return the boards' ends, by bus
-std::vector<hal::can::Bus*> ends_of(Emulation& e, std::vector<hal::can::WireMeter*>* wires) {
+std::vector<hal::can::Bus*> ends_of(Emulation& e, std::vector<hal::can::Bus*>* wires) {
   std::vector<hal::can::Bus*> ends(e.sockets->buses().begin(), e.sockets->buses().end());
   if (wires == nullptr) return ends;
   wires->resize(ends.size());
   for (std::size_t b = 0; b < ends.size(); ++b) {
     const hal::BusConfig& bus = e.subject.robot.buses[b];
-    if (bus.kind == hal::BusKind::kEthercat) continue;
+    if (bus.kind == hal::BusKind::kEthercat) {
+      if (!e.lockstep) (*wires)[b] = ends[b];
+      continue;
+    }
     const hal::can::BitRates rates{.nominal = bus.bitrate, .data = bus.data_bitrate};
     ends[b] = (*wires)[b] =
         e.meters.emplace_back(std::make_unique<hal::can::WireMeter>(*ends[b], rates)).get();
@@ -106,8 +111,7 @@ std::vector<hal::can::Bus*> ends_of(Emulation& e, std::vector<hal::can::WireMete
   return ends;
 }
 
-Status open_studio(Emulation& e, const EmulateOptions& options,
-                   std::vector<hal::can::WireMeter*> wires) {
+Status open_studio(Emulation& e, const EmulateOptions& options, std::vector<hal::can::Bus*> wires) {
   const hal::RobotConfig& robot = e.subject.robot;
   auto studio = EmulationStudio::open(options.studio,
                                       {.config = robot,
@@ -116,6 +120,7 @@ Status open_studio(Emulation& e, const EmulateOptions& options,
                                        .period_ns = e.subject.sim.period_ns,
                                        .lockstep = e.lockstep,
                                        .robot = *e.robot,
+                                       .changes = e.subject.sim.changes.get(),
                                        .wires = std::move(wires)});
   if (!studio) return std::unexpected(studio.error());
   e.studio = std::move(*studio);
@@ -161,7 +166,7 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   if (!sockets) return std::unexpected(sockets.error());
   e->sockets = std::move(*sockets);
   const bool looks = options.studio.wanted;
-  std::vector<hal::can::WireMeter*> wires;
+  std::vector<hal::can::Bus*> wires;
   const std::vector<hal::can::Bus*> ends = ends_of(*e, looks ? &wires : nullptr);
   e->emulator = std::make_unique<sim::Emulator>(
       *e->robot, ends, *e->sockets,
@@ -331,7 +336,7 @@ Exit emulate_command(const EmulateOptions& options) {
   add_inject(commands, e.subject.robot, &e.subject.description.tree, e.subject.sim.period_ns,
              [&](const sim::ScenarioFault& fault) {
                const auto done = tasks.run([&]() -> Result<Json> {
-                 if (Status added = injected(e.robot->inject(fault)); !added) {
+                 if (Status added = injected(e.emulator->inject(fault)); !added) {
                    return std::unexpected(added.error());
                  }
                  return Json::object();

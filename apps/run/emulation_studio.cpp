@@ -11,6 +11,8 @@
 #include <new>
 #include <utility>
 
+#include "apps/run/studio_run.hpp"
+
 namespace tandem::apps {
 
 using studio::Event;
@@ -107,7 +109,8 @@ EmulationStudio::EmulationStudio(const Subject& subject, std::size_t feet, std::
       wires_(subject.wires),
       truth_filler_(subject.robot.plant()),
       boards_filler_(subject.robot, subject.config),
-      truth_(subject.config.joints.size(), feet, loops, passive),
+      truth_(subject.config.joints.size(), feet, loops, passive,
+             sim::ground_numbers(subject.robot.plant())),
       boards_(subject.config.joints.size(), subject.wires.size()),
       happenings_(std::make_shared<Happenings>(subject.config, subject.lockstep)) {}
 
@@ -122,7 +125,7 @@ Result<std::unique_ptr<EmulationStudio>> EmulationStudio::open(const StudioOptio
                                                               plant.passive().size()));
     auto opened = studio::Studio::open(
         {.address = options.address, .port = options.port, .page = options.page},
-        {.robot = subject.config,
+        {.robot = on_its_ground(subject.config, subject.changes),
          .urdf = std::move(subject.urdf),
          .urdf_file = subject.config.model.urdf,
          .version = TANDEM_VERSION,

@@ -9,9 +9,10 @@
 
 #include "apps/command_line/command_line.hpp"
 #include "base/result.hpp"
-#include "hal/ethercat-can/wire_meter.hpp"
+#include "hal/ethercat-can/bus.hpp"
 #include "hal/sim/boards.hpp"
 #include "hal/sim/emulator.hpp"
+#include "hal/sim/plant_changes.hpp"
 #include "hal/sim/truth.hpp"
 #include "studio/studio.hpp"
 
@@ -26,9 +27,10 @@ class EmulationStudio final : public sim::StepWatcher {
     std::string file;  ///< that the user named
     std::int64_t period_ns;
     bool lockstep;
-    sim::EmulatedRobot& robot;  ///< outlives the studio
-    /// By bus; null: nothing is known of its wire. Outlive the studio.
-    std::vector<hal::can::WireMeter*> wires;
+    sim::EmulatedRobot& robot;         ///< outlives the studio
+    const sim::PlantChanges* changes;  ///< of the plant; null: there are none
+    /// By bus; null: its load is not measured. Outlive the studio.
+    std::vector<hal::can::Bus*> wires;
   };
   /// Listens, and answers. Takes all the memory of it. Before the first step, and before this
   /// thread gets the emulation's priority, which the studio's thread would inherit.
@@ -53,7 +55,7 @@ class EmulationStudio final : public sim::StepWatcher {
 
   sim::EmulatedRobot* robot_;
   std::int64_t period_ns_;
-  std::vector<hal::can::WireMeter*> wires_;
+  std::vector<hal::can::Bus*> wires_;
   sim::TruthFiller truth_filler_;
   sim::BoardsFiller boards_filler_;
   hal::TruthImage truth_;

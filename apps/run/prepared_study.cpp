@@ -36,6 +36,15 @@ bool says_kernel_variant(const sweep::Study& study) {
          });
 }
 
+/// The values of an experiment's text: its comments and its layout are left out.
+std::string meaning_of(const std::string& text, const std::string& file) {
+  const auto document = TomlDocument::parse(text, file);
+  if (!document) return text;
+  std::string meaning;
+  for (const auto& [key, value] : document->root().values()) meaning += key + "=" + value + "\n";
+  return meaning;
+}
+
 /// The C library that a controller's sines come from: it has other last bits with fused
 /// multiply-add than without.
 std::string c_library() {
@@ -44,6 +53,19 @@ std::string c_library() {
 }
 
 }  // namespace
+
+LoadedRun load_run(const RunOptions& options) {
+  LoadedRun loaded;
+  auto world = runtime::composed<WiredComposition>(options.experiment, options,
+                                                   {.build = builder(options.quiet)});
+  if (!world) return loaded;
+  loaded.world = std::move(*world);
+  for (const auto& [path, text] : loaded.world->experiment.files) {
+    if (auto original = read_file(path, "", kMostUrdfBytes); original)
+      loaded.texts.emplace_back(path, std::move(*original));
+  }
+  return loaded;
+}
 
 Result<std::string> kernel_variant_in(const std::string& folder) {
   const auto head = sweep::head_in(folder);
@@ -90,9 +112,12 @@ std::expected<PreparedStudy, Diagnostics> prepare_study(const sweep::Study& stud
   head.parts.emplace_back("program tandem", sha256(*program));
   if (chosen) head.parts.emplace_back(kKernelVariant, prepared.kernel_variant);
   head.parts.emplace_back("C library", c_library());
-  head.parts.emplace_back(fs::path(study.file).filename().string(), sha256(study.text));
-  for (const auto& [path, text] : prepared.texts)
-    head.parts.emplace_back(fs::path(path).filename().string(), sha256(text));
+  head.study = sha256(study.meaning());
+  const std::string& experiment = prepared.worlds.front()->experiment.file;
+  for (const auto& [path, text] : prepared.texts) {
+    head.parts.emplace_back(fs::path(path).filename().string(),
+                            sha256(path == experiment ? meaning_of(text, path) : text));
+  }
   for (const auto& world : prepared.worlds) {
     head.parts.emplace_back("kernel", world->kernels.sha256());
     for (const runtime::ControllerCode& code : world->controllers->code())

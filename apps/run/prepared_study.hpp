@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/command_line/command_line.hpp"
 #include "apps/run/connection.hpp"
 #include "base/open_file.hpp"
 #include "sweep/results.hpp"
@@ -22,6 +23,13 @@ struct PreparedStudy {
   std::string kernel_variant;  ///< of every point, on any CPU; empty: the study's settings say it
   sweep::SweepHead head;
 };
+
+/// One run whose files, kernels and controllers are loaded, for others that are forked from here.
+struct LoadedRun {
+  TextsInstead::Texts texts{};
+  std::unique_ptr<WiredComposition> world{};  ///< null: it cannot be run with these values
+};
+[[nodiscard]] LoadedRun load_run(const RunOptions& options);
 
 /// @param kernel_variant  empty: the best that this CPU runs
 /// Errors: those of the experiment with the first values of each variant.

@@ -154,7 +154,7 @@ Exit watch(const ReplayCommandOptions& options) {
     }
     const int status = wait_for(child);
     if (status >= 128 && !rt::stop_requested())
-      fmt::print(stderr, "error: the replay ended by signal {}\n", status - 128);
+      say(Said::kError, fmt::format("the replay ended by signal {}", status - 128));
     fmt::print(out, "watching {}; Ctrl-C ends it\n\n", shown(options.plugins.front().second));
     std::fflush(out);
     auto changed = await_change(options.plugins, seen);

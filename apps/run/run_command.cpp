@@ -89,12 +89,16 @@ class Session {
     if (const Status read = past_->read_beginning(options_); !read) return refuse(read.error());
     if (const Status opened = open_outputs(); !opened) return refuse(opened.error());
     make_cycle();
-    auto begun = past_->begin(*cycle_, recorder_.get());
+    auto begun = past_->begin(*cycle_, recorder_.get(), options_);
     if (!begun) {
       forget_log();
       return refuse(begun.error());
     }
     begins_ = std::move(*begun);
+    cycles_before_ = cycle_->running_cycles();
+    for (const runtime::ControllerStatus& one : cycle_->services().controllers())
+      if (!begins_.empty() && one.active)
+        active_at_first_ += (active_at_first_.empty() ? "" : ", ") + one.name;
     announce();
     if (const Status opened = open_inputs(); !opened) return refuse(opened.error());
     const auto times = loop();
@@ -290,8 +294,7 @@ class Session {
     await_crash_place();
     remember_error(loop_error(guard.fault()));
     write_failure(options_.json);
-    fmt::print(stderr, "fault: {}{}\n", guard.fault(),
-               log.empty() ? "" : "; the log up to then is " + log);
+    say(Said::kFault, guard.fault() + (log.empty() ? "" : "; the log up to then is " + log));
     std::fflush(nullptr);
     ::_exit(static_cast<int>(Exit::kFault));
   }
@@ -300,6 +303,8 @@ class Session {
   Exit finish(const RunTimes& times) {
     RunSummary summary{c_, *cycle_, times, std::nullopt, std::nullopt, {}, {}, {}};
     summary.server = server_.get();
+    summary.begins_s = past_->begins_s();
+    summary.cycles_before = cycles_before_;
     if (gate_ != nullptr) summary.gate = gate_->results(*c_.controllers->names());
     summary.interrupted_by = rt::stop_signal();
     if (auto* parallel = run_->parallel(); parallel != nullptr) {
@@ -313,6 +318,7 @@ class Session {
     if (services_ != nullptr) summary.dds->services = services_->counts();
     if (recorder_ != nullptr) {
       log::StringMap result = result_of(c_, *cycle_);
+      if (!active_at_first_.empty()) result.emplace_back("active as it begins", active_at_first_);
       for (auto& later : runtime::loaded_later(*c_.controllers, plugins_at_start_))
         result.push_back(std::move(later));
       summary.log = recorder_->close(result);
@@ -338,7 +344,9 @@ class Session {
   std::unique_ptr<remote::Server> server_;
   hal::CycleFanOut observers_;  // of the loop
   std::optional<Past> past_;
-  std::string begins_;  // where it goes on from, for people
+  std::string begins_;               // where it goes on from, for people
+  std::string active_at_first_;      // then: who leads
+  std::uint64_t cycles_before_ = 0;  // of the run that it goes on from
   std::optional<runtime::Run> run_;
   runtime::RobotCycle* cycle_ = nullptr;  // its
   ControlRegistry commands_;
@@ -357,8 +365,9 @@ void warn_of_inertias(const runtime::Experiment& e) {
     if (warning.key.starts_with("link ")) links.push_back(warning.key.substr(5));
   }
   if (links.empty()) return;
-  fmt::print(stderr, "warning: {}: no body can have the inertia of {} (`tandem check {}`)\n",
-             e.robot.model.urdf, fmt::join(links, ", "), shell_word(e.robot.file));
+  say(Said::kWarning,
+      fmt::format("{}: no body can have the inertia of {} (`tandem check {}`)", e.robot.model.urdf,
+                  fmt::join(links, ", "), shell_word(e.robot.file)));
 }
 
 }  // namespace
@@ -379,8 +388,10 @@ Exit run_command(const RunOptions& given, ReportOfRun& report) {
                          ? wrong_kind(options.experiment, Takes::kEither, "tandem serve")
                          : wrong_kind(options.experiment, Takes::kExperiment, "tandem run");
   if (wrong) return refuse(*wrong);
-  auto composition = runtime::composed<WiredComposition>(options.experiment, options,
-                                                         {.build = builder(options.quiet)});
+  auto composition = runtime::composed<WiredComposition>(
+      options.experiment, options,
+      {.build = options.lacks_kernels.empty() ? builder(options.quiet)
+                                              : not_built(options.lacks_kernels)});
   if (!composition) return refuse(composition.error());
   warn_of_inertias((*composition)->experiment);
   print_warnings(std::exchange((*composition)->warnings, {}));

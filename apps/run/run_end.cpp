@@ -26,6 +26,15 @@ bool has_unexpected_fault(const RunSummary& summary) {
   return summary.faults.size() > expected;  // they have the log's trouble as well
 }
 
+/// Whether it ended with a stop after which another run would wait for a reset.
+bool ended_by_its_stop(const runtime::RobotCycle& cycle) {
+  return cycle.config().after_stop == runtime::AfterStop::kEnd &&
+         std::ranges::any_of(cycle.faults(), [](const runtime::FaultReport& one) {
+           return one.latched && one.category != hal::StopCategory::kHold &&
+                  one.category != hal::StopCategory::kWarn;
+         });
+}
+
 /// Says which expectations failed. @return how many
 std::size_t tell_failures(const RunSummary& summary) {
   std::size_t failures = 0;
@@ -80,10 +89,14 @@ Exit tell_end(const RunSummary& summary, const RunOptions& options, std::FILE* o
     }
   }
   for (const std::string& warning : summary.warnings()) {
-    fmt::print(stderr, "warning: {}\n", shown(warning, 2'000));
+    say(Said::kWarning, shown(warning, 2'000));
   }
-  for (const std::string& fault : summary.faults)
-    fmt::print(stderr, "fault: {}\n", shown(fault, 2'000));
+  for (const std::string& fault : summary.faults) say(Said::kFault, shown(fault, 2'000));
+  if (!options.quiet && !summary.faults.empty() && ended_by_its_stop(summary.cycle)) {
+    say(Said::kHint,
+        "with `--on-fault wait` a run stays after a stop, for `tandem fault reset` and "
+        "`tandem controller start` (docs/safety.md)");
+  }
   const Status traced = add_trace(options, summary, out);
   const Status written = write_json(options.json, summary.json());
   if (!traced) return refuse(traced.error());

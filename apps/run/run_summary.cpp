@@ -49,7 +49,12 @@ std::optional<ParallelSummary> RunSummary::parallel_summary() const {
 }
 
 double RunSummary::realtime_factor() const {
-  return times.running_s > 0.0 ? run().sim_s() / times.running_s : 0.0;
+  return times.running_s > 0.0 ? simulated_s() / times.running_s : 0.0;
+}
+
+double RunSummary::simulated_s() const {
+  const auto cycles = static_cast<std::int64_t>(cycle.running_cycles() - cycles_before);
+  return static_cast<double>(cycles * composition.experiment.loop.period_ns) / 1e9;
 }
 
 namespace {
@@ -94,7 +99,11 @@ std::vector<std::string> refused_samples(const WiredComposition& c) {
 
 std::vector<std::string> RunSummary::warnings() const {
   std::vector<std::string> all;
-  if (composition.master != nullptr) all = composition.master->warnings();
+  if (composition.can != nullptr) {
+    all = composition.can->warnings();
+  } else if (composition.master != nullptr) {
+    all = composition.master->warnings();
+  }
   const bool estimates =
       composition.estimator != nullptr && composition.estimator->image().estimates_base();
   if (estimates && cycle.running_cycles() > 0 && cycle.statistics().estimate().base_cycles == 0) {

@@ -40,6 +40,10 @@ struct RunSummary {
   const remote::Server* server = nullptr;         ///< null: nobody could own the robot from afar
   std::optional<std::vector<GateResult>> gate{};  ///< empty: without --gate
 
+  /// Under the controllers, of the run that it goes on from (`--from`): this one did not make them.
+  std::uint64_t cycles_before = 0;
+  double begins_s = 0.0;  ///< of its own time: not 0 where it goes on from another run
+
   int interrupted_by = 0;  ///< the signal that asked the run to end; 0: none did
 
   /// Cycles under the controllers that the run was to have; 0: it has no planned end.
@@ -51,7 +55,9 @@ struct RunSummary {
   [[nodiscard]] std::string ended() const;
   /// Those of its figures that are no program's.
   [[nodiscard]] RunFigures run() const;
-  /// Simulated by wall clock, while controllers ran; 0: they did not.
+  /// Simulated here, while controllers ran.
+  [[nodiscard]] double simulated_s() const;
+  /// That by wall clock, while controllers ran; 0: they did not.
   [[nodiscard]] double realtime_factor() const;
   [[nodiscard]] std::optional<ParallelSummary> parallel_summary() const;
   /// Its figures.

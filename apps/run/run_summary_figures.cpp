@@ -171,6 +171,8 @@ void figures(Figures& f, const RunSummary* s) {
     "by SIGINT`; `on request` (`run.stop`); `its controllers were done` before the planned end; "
     "`by a fault`; `nobody reads its output any more`",
     [&] { return s->ended(); });
+  f("begins_s", "the run's time from which it went on, as with `--from`; 0: from its beginning",
+    [&] { return s->begins_s; });
   f("wall_seconds", "of those cycles on the wall clock", [&] { return s->times.running_s; });
   f("stopped_seconds", "on the wall clock: in fault, in a reset, or held after it",
     [&] { return s->times.stopped_s; });
@@ -178,7 +180,10 @@ void figures(Figures& f, const RunSummary* s) {
     "on the wall clock, of simulated time: paused, or the process suspended, for half a second or "
     "more",
     [&] { return s->times.stood_s; });
-  f("realtime_factor", "`sim_seconds / wall_seconds`",
+  f("simulated_seconds",
+    "of `sim_seconds`, by this run: with `--from` the others are of the run that it goes on from",
+    [&] { return s->simulated_s(); });
+  f("realtime_factor", "`simulated_seconds / wall_seconds`",
     [&] { return known(s->times.running_s > 0.0, s->realtime_factor()); });
   f("overruns", "cycles that ended after the next one's start (paced runs)",
     [&] { return loop().overruns; });

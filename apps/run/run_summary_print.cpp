@@ -136,7 +136,11 @@ void add_timing_facts(const RunSummary& summary, const Json& run, Facts& facts) 
     row("ran", "{wall_seconds:.3f s}, {cycles|cycle}, {skipped} skipped");
   } else {
     row("simulated",
-        "{sim_seconds:.3f s} in {wall_seconds:.2f s}: {realtime_factor:.1f} x real time");
+        "{simulated_seconds:.3f s} in {wall_seconds:.2f s}: {realtime_factor:.1f} x real time");
+    if (summary.cycles_before > 0)
+      facts.add("taken over", fmt::format("{} of the run that it goes on from; the figures but for "
+                                          "times count them, too",
+                                          counted(summary.cycles_before, "cycle")));
   }
   // The time that is not in the line above: nothing has run then.
   if (summary.times.stopped_s > 0.0)

@@ -5,13 +5,16 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <charconv>
+#include <limits>
 #include <optional>
 #include <sstream>
 
 #include "base/open_file.hpp"
 #include "base/process.hpp"
 #include "base/quoting.hpp"
+#include "sweep/slurm_options.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -63,6 +66,28 @@ Result<std::uint64_t> max_array_size() {
     return fail("this site has no job arrays (MaxArraySize is 0)", "ask who runs it");
   }
   return fail("scontrol names no MaxArraySize", "is this Slurm?");
+}
+
+Result<double> partition_minutes(const std::string& partitions) {
+  if (!program_exists("sinfo")) return std::numeric_limits<double>::infinity();
+  const auto said = answer_of({"sinfo", "--noheader", "--format", "%P %l"}, "does slurmctld run?");
+  if (!said) return std::unexpected(said.error());
+  std::istringstream lines(*said);
+  std::string known;
+  double most = 0.0;
+  for (std::string name, time; lines >> name >> time;) {
+    const bool is_default = name.ends_with('*');
+    if (is_default) name.pop_back();
+    known += (known.empty() ? "" : ", ") + name;
+    const bool wanted =
+        partitions.empty() ? is_default : ("," + partitions + ",").contains("," + name + ",");
+    if (!wanted) continue;
+    most = std::max(most,
+                    sweep::slurm_minutes(time).value_or(std::numeric_limits<double>::infinity()));
+  }
+  if (most > 0.0) return most;
+  if (partitions.empty()) return std::numeric_limits<double>::infinity();
+  return fail("this site has no partition '" + shown(partitions) + "'", "it has " + known);
 }
 
 Result<std::uint64_t> submit_array(const std::string& script, const std::string& list,

@@ -17,6 +17,11 @@ namespace tandem::apps {
 /// Errors: scontrol fails; the site has no job arrays.
 [[nodiscard]] Result<std::uint64_t> max_array_size();
 
+/// How long a job of a partition may take, of several the longest [minutes]; infinite: nobody says
+/// so. @param partitions  "long,short"; empty: the site's default
+/// Errors: sinfo fails; the site has no such partition.
+[[nodiscard]] Result<double> partition_minutes(const std::string& partitions);
+
 /// Submits a script as an array. @param list  of its indices  @param argument  of the script
 /// @return the job's number. Errors: sbatch fails, with what it says; it names no job.
 [[nodiscard]] Result<std::uint64_t> submit_array(const std::string& script, const std::string& list,

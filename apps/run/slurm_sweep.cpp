@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -12,6 +13,7 @@
 #include "base/counted.hpp"
 #include "base/process.hpp"
 #include "base/quoting.hpp"
+#include "sweep/slurm_options.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -49,13 +51,6 @@ std::vector<std::uint64_t> open_chunks(const std::vector<bool>& there, std::uint
   return chunks;
 }
 
-Error no_single_line(const std::string& option) {
-  return {.message = "--sbatch " + shown(option) + ": no option of sbatch",
-          .hint = "give its long name and value: --sbatch partition=long",
-          .file = {},
-          .key = {}};
-}
-
 /// Where chunks of another size are there, this one's would overlap them.
 Result<sweep::SlurmJob> job_for(const SweepOptions& options, const sweep::Points& points) {
   const auto before = sweep::slurm_job_in(options.folder);
@@ -91,15 +86,41 @@ struct SlurmPlan {
   std::vector<sweep::ArrayOfChunks> arrays;
   std::uint64_t queued = 0;  ///< chunks that wait or run already
   std::uint64_t max_array_size = 1001;
-  bool installed = true;
+  double most_minutes = std::numeric_limits<double>::infinity();  ///< of the partition
+  std::string unknown;  ///< why the cluster says nothing; empty: it does
 };
+
+/// What the cluster alone knows. Errors: it does not answer; --sbatch asks for what it has not.
+Status ask_cluster(const SweepOptions& options, std::vector<std::uint64_t>& chunks,
+                   SlurmPlan& plan) {
+  const auto queue = queue_of(plan.job);
+  if (!queue) return std::unexpected(queue.error());
+  const auto most = max_array_size();
+  if (!most) return std::unexpected(most.error());
+  const auto minutes =
+      partition_minutes(sweep::sbatch_value(options.sbatch, "partition").value_or(""));
+  if (!minutes) return std::unexpected(minutes.error());
+  plan.queued = queue->chunks.size();
+  std::erase_if(chunks, [&](std::uint64_t chunk) { return queue->chunks.contains(chunk); });
+  plan.max_array_size = *most;
+  plan.most_minutes = *minutes;
+  return {};
+}
+
+/// Whether the time that somebody wants is one that the partition gives.
+Status check_time(const SweepOptions& options, double most_minutes) {
+  const auto time = sweep::sbatch_value(options.sbatch, "time");
+  if (!time || sweep::slurm_minutes(*time).value_or(0.0) <= most_minutes) return {};
+  return fail(fmt::format("--sbatch time={}: a job of this partition has {:g} minutes at most",
+                          shown(*time), most_minutes),
+              "leave it out, or name another: --sbatch partition=NAME");
+}
 
 Result<SlurmPlan> plan_of(const SweepOptions& options, const sweep::Points& points,
                           const PreparedStudy& prepared) {
   SlurmPlan plan;
   const Status installed = find_slurm();
   if (!installed && !options.dry_run) return std::unexpected(installed.error());
-  plan.installed = installed.has_value();
   auto job = job_for(options, points);
   if (!job) return std::unexpected(job.error());
   plan.job = std::move(*job);
@@ -108,19 +129,17 @@ Result<SlurmPlan> plan_of(const SweepOptions& options, const sweep::Points& poin
   if (!options.dry_run || fs::exists(options.folder, ignored)) {
     auto folder = sweep::SweepFolder::open(options.folder, prepared.head, points);
     if (!folder) return std::unexpected(folder.error());
+    print_warnings(folder->damaged());
     plan.folder = std::move(*folder);
     for (std::uint64_t i = 0; i < points.size(); ++i) there[i] = plan.folder->has(i);
   }
   std::vector<std::uint64_t> chunks = open_chunks(there, plan.job.chunk_points);
-  if (plan.installed) {
-    const auto queue = queue_of(plan.job);
-    if (!queue) return std::unexpected(queue.error());
-    plan.queued = queue->chunks.size();
-    std::erase_if(chunks, [&](std::uint64_t chunk) { return queue->chunks.contains(chunk); });
-    const auto most = max_array_size();
-    if (!most) return std::unexpected(most.error());
-    plan.max_array_size = *most;
+  if (const Status asked = installed ? ask_cluster(options, chunks, plan) : installed; !asked) {
+    if (!options.dry_run) return std::unexpected(asked.error());
+    plan.unknown = asked.error().message;
   }
+  if (const Status fits = check_time(options, plan.most_minutes); !fits)
+    return std::unexpected(fits.error());
   plan.arrays = sweep::arrays_of(chunks, plan.max_array_size);
   return plan;
 }
@@ -132,8 +151,9 @@ void print_slurm_plan(const SlurmPlan& plan, const sweep::SlurmScript& script) {
   for (const sweep::ArrayOfChunks& one : plan.arrays)
     fmt::print("# sbatch --array={} {} {}\n", one.list(), shell_word(script_file(script)),
                one.offset);
-  if (!plan.installed)
-    fmt::print("# Slurm is not here: MaxArraySize is taken for {}\n", plan.max_array_size);
+  if (!plan.unknown.empty())
+    fmt::print("# {}\n# MaxArraySize is taken for {}; neither queue nor partition is known\n",
+               plan.unknown, plan.max_array_size);
 }
 
 /// Submits it; each array is noted at once.
@@ -190,8 +210,8 @@ Exit submit_sweep(const SweepOptions& given, const sweep::Study& study, const sw
   SweepOptions options = given;
   std::error_code ignored;
   options.folder = fs::absolute(options.folder, ignored).lexically_normal().string();
-  for (const std::string& option : options.sbatch)
-    if (option.starts_with('-') || option.contains('\n')) return refuse(no_single_line(option));
+  if (const Status right = sweep::check_sbatch(options.sbatch); !right)
+    return refuse(right.error());
   const auto plan = plan_of(options, points, prepared);
   if (!plan) return refuse(plan.error());
   const sweep::SlurmScript script{.job = plan->job,
@@ -199,7 +219,16 @@ Exit submit_sweep(const SweepOptions& given, const sweep::Study& study, const sw
                                   .folder = options.folder,
                                   .cpus = std::max<std::size_t>(1, options.jobs),
                                   .time_limit_s = study.time_limit_s,
-                                  .options = options.sbatch};
+                                  .options = options.sbatch,
+                                  .most_minutes = plan->most_minutes};
+  if (!sweep::sbatch_value(options.sbatch, "time") &&
+      script.needed_minutes() > plan->most_minutes) {
+    fmt::print(stderr,
+               "note: a chunk takes up to {:.0f} minutes by time_limit_s, and a job of this "
+               "partition has {:g}: what is not done then, the same command submits again. Fewer "
+               "points a chunk take less: --chunk-points\n",
+               script.needed_minutes(), plan->most_minutes);
+  }
   if (options.dry_run) {
     print_slurm_plan(*plan, script);
     return Exit::kDone;
@@ -222,45 +251,81 @@ Exit submit_sweep(const SweepOptions& given, const sweep::Study& study, const sw
   return Exit::kDone;
 }
 
-Exit sweep_status(const SweepOptions& options) {
-  const auto progress = sweep::progress_in(options.folder);
-  if (!progress) return refuse(progress.error());
-  fmt::print("{}: {} of {}, {} failed\n", options.folder, progress->done,
-             counted(progress->points, "point"), progress->failed);
-  const auto job = sweep::slurm_job_in(options.folder);
-  if (!job) return refuse(job.error());
-  if (!*job) return Exit::kDone;
-  const bool complete = progress->done == progress->points;
-  if (const Status installed = find_slurm(); !installed) {
-    fmt::print("Slurm is not here: whether it runs is not known\n");
-    return Exit::kDone;
-  }
+void figures(Figures& f, const EndedEarly& one) {
+  f("words", "that they left last", one.words);
+  f("chunks", "how many left them", one.chunks);
+  f("first", "one of them", one.first);
+}
+
+void figures(Figures& f, const SweepStatus& s) {
+  f("folder", "of the sweep", s.folder);
+  f("points", "of the study", s.points);
+  f("done", "points that have a result", s.done);
+  f("failed", "of them", s.failed);
+  f("submitted", "to a cluster, from here", s.submitted);
+  f("queue_known", "this machine can ask Slurm: else the figures below are null", s.queue_known);
+  f("running_chunks", "", s.running);
+  f("waiting_chunks", "", s.waiting);
+  f("points_a_second", "with one core for each chunk that runs", s.points_a_second);
+  f("left_s", "until the last point, by that", s.left_s);
+  f("ended_early", "chunks that miss points and are not in the queue", s.ended_early);
+  f("again", "the command that submits them; empty: nothing is missing", s.again);
+}
+
+Result<SweepStatus> status_of_sweep(const std::string& folder) {
+  const auto progress = sweep::progress_in(folder);
+  if (!progress) return std::unexpected(progress.error());
+  SweepStatus status{.folder = folder,
+                     .points = progress->points,
+                     .done = progress->done,
+                     .failed = progress->failed};
+  const auto job = sweep::slurm_job_in(folder);
+  if (!job) return std::unexpected(job.error());
+  status.submitted = job->has_value() && !(*job)->arrays.empty();
+  if (!*job || !find_slurm()) return status;
   const auto queue = queue_of(**job);
-  if (!queue) return refuse(queue.error());
-  fmt::print("{} run, {} wait\n", counted(queue->running, "chunk"),
-             queue->chunks.size() - queue->running);
+  if (!queue) return std::unexpected(queue.error());
+  status.queue_known = true;
+  status.running = queue->running;
+  status.waiting = queue->chunks.size() - queue->running;
   if (queue->running > 0 && progress->seconds > 0.0) {
-    const double rate = static_cast<double>(queue->running) * static_cast<double>(progress->done) /
-                        progress->seconds;
-    fmt::print("about {:.2g} points a second, {:.0f} s left, with one core each\n", rate,
-               static_cast<double>(progress->points - progress->done) / rate);
-  }
-  if (complete) {
-    fmt::print("done: tandem sweep collect {}\n", shell_word(options.folder));
-    return Exit::kDone;
+    status.points_a_second = static_cast<double>(queue->running) *
+                             static_cast<double>(progress->done) / progress->seconds;
+    status.left_s =
+        static_cast<double>(progress->points - progress->done) / *status.points_a_second;
   }
   std::vector<std::uint64_t> ended = open_chunks(progress->there, (*job)->chunk_points);
   std::erase_if(ended, [&](std::uint64_t chunk) { return queue->chunks.contains(chunk); });
-  constexpr std::size_t kMostWords = 5;
-  std::size_t count = 0;
-  for (const auto& [words, chunks] : last_words(options.folder, ended)) {
-    if (++count > kMostWords) break;
-    fmt::print("{} ended early, such as {}: {}\n", counted(chunks.size(), "chunk"), chunks.front(),
-               shown(words, 400));
+  for (const auto& [words, chunks] : last_words(folder, ended))
+    status.ended_early.push_back({words, chunks.size(), chunks.front()});
+  if (!ended.empty()) status.again = again_command(**job, folder);
+  return status;
+}
+
+Exit sweep_status(const SweepOptions& options) {
+  const auto status = status_of_sweep(options.folder);
+  if (!status) return refuse(status.error());
+  std::FILE* out = human_output(options.json);
+  fmt::print(out, "{}: {} of {}, {} failed\n", status->folder, status->done,
+             counted(status->points, "point"), status->failed);
+  if (status->submitted && !status->queue_known)
+    fmt::print(out, "Slurm is not here: whether it runs is not known\n");
+  if (status->queue_known) {
+    fmt::print(out, "{} run, {} wait\n", counted(*status->running, "chunk"), *status->waiting);
+    if (status->left_s)
+      fmt::print(out, "about {:.2g} points a second, {:.0f} s left, with one core each\n",
+                 *status->points_a_second, *status->left_s);
+    if (status->done == status->points)
+      fmt::print(out, "done: tandem sweep collect {}\n", shell_word(options.folder));
   }
-  if (!ended.empty())
-    fmt::print("submit again what is missing: {}\n", again_command(**job, options.folder));
-  return Exit::kDone;
+  constexpr std::size_t kMostWords = 5;
+  for (std::size_t i = 0; i < std::min(kMostWords, status->ended_early.size()); ++i) {
+    const EndedEarly& one = status->ended_early[i];
+    fmt::print(out, "{} ended early, such as {}: {}\n", counted(one.chunks, "chunk"), one.first,
+               shown(one.words, 400));
+  }
+  if (!status->again.empty()) fmt::print(out, "submit again what is missing: {}\n", status->again);
+  return end_with_json(options.json, figures_json(*status), Exit::kDone);
 }
 
 Exit cancel_sweep(const SweepOptions& options) {

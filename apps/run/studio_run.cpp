@@ -42,7 +42,8 @@ ControlRegistry::Gate studio_gate(const studio::Rights& rights) {
       return fail(command + ": who has not the run's token may only look, and stop",
                   "open the address with its token");
     }
-    const bool moves = command.starts_with("joint.") || command.starts_with("site.");
+    const bool moves = (command.starts_with("joint.") || command.starts_with("site.")) &&
+                       command != "joint.halt";  // what brakes is everybody's, as a stop is
     if (effect == ControlEffect::kChanges && moves && !rights.control) {
       return fail(command + ": it moves joints, and control of them is not taken",
                   "take control first");
@@ -61,7 +62,7 @@ class StudioRun::Happenings {
     Event event{.time_s = 1e-9 * static_cast<double>(cycle_.progress().time_ns.load()),
                 .cycle = cycle_.progress().cycles.load(),
                 .who = {},
-                .text = "request " + request.substr(0, kLongestRequest)};
+                .text = std::string(Event::kRequest) + request.substr(0, kLongestRequest)};
     if (!answer.value("ok", false)) {
       event.level = Event::Level::kWarn;
       event.text += ": " + answer.value("error", std::string("refused"));
@@ -137,6 +138,11 @@ class StudioRun::Happenings {
   std::deque<Event> requests_;
 };
 
+hal::RobotConfig on_its_ground(hal::RobotConfig robot, const sim::PlantChanges* plant) {
+  if (plant != nullptr) robot.contact = plant->robot.contact;
+  return robot;
+}
+
 StudioRun::~StudioRun() { finish("", ""); }
 
 Result<StudioRun::Parts> StudioRun::make(const StudioOptions& options) const {
@@ -147,23 +153,23 @@ Result<StudioRun::Parts> StudioRun::make(const StudioOptions& options) const {
   const std::string session = studio::draw_hex(4);
   auto foxglove = FoxgloveRun::open(c, node_, session);
   if (!foxglove) return std::unexpected(foxglove.error());
-  auto studio =
-      studio::Studio::open({.address = options.address,
-                            .port = options.port,
-                            .page = options.page,
-                            .origins = options.origins},
-                           {.robot = e.robot,
-                            .urdf = robot::text_in(e.files, e.robot.model.urdf),
-                            .urdf_file = e.robot.model.urdf,
-                            .version = TANDEM_VERSION,
-                            .experiment = std::filesystem::path(e.file).filename().string(),
-                            .run = session,
-                            .simulated = c.backend->pace() == hal::Pace::kSimulatedClock,
-                            .period_ns = e.loop.period_ns},
-                           {.state = &state,
-                            .command = &command,
-                            .truth = runtime::truth_of(c),
-                            .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image()});
+  auto studio = studio::Studio::open(
+      {.address = options.address,
+       .port = options.port,
+       .page = options.page,
+       .origins = options.origins},
+      {.robot = c.sim == nullptr ? e.robot : on_its_ground(e.robot, e.plant.get()),
+       .urdf = robot::text_in(e.files, e.robot.model.urdf),
+       .urdf_file = e.robot.model.urdf,
+       .version = TANDEM_VERSION,
+       .experiment = std::filesystem::path(e.file).filename().string(),
+       .run = session,
+       .simulated = c.backend->pace() == hal::Pace::kSimulatedClock,
+       .period_ns = e.loop.period_ns},
+      {.state = &state,
+       .command = &command,
+       .truth = runtime::truth_of(c),
+       .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image()});
   if (!studio) return std::unexpected(studio.error());
   return Parts{.foxglove = std::move(*foxglove), .studio = std::move(*studio), .turns = nullptr};
 }

@@ -13,6 +13,7 @@
 #include "apps/run/foxglove_run.hpp"
 #include "base/result.hpp"
 #include "hal/cycle_observer.hpp"
+#include "hal/sim/plant_changes.hpp"
 #include "runtime/robot_cycle.hpp"
 #include "studio/studio.hpp"
 
@@ -21,6 +22,10 @@ namespace tandem::apps {
 /// What a client of the studio may ask for: reading and stopping everybody may; what changes the
 /// run needs the run's token, and what changes a joint control of the joints as well.
 [[nodiscard]] ControlRegistry::Gate studio_gate(const studio::Rights& rights);
+
+/// The robot on the ground that is simulated. @param plant  null: the ground is its files'
+[[nodiscard]] hal::RobotConfig on_its_ground(hal::RobotConfig robot,
+                                             const sim::PlantChanges* plant);
 
 /// Opens the studio when the run starts, or when somebody asks for it: the command `studio.open`.
 /// Once open it stays until the run is over.

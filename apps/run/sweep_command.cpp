@@ -8,11 +8,13 @@
 #include <thread>
 
 #include "apps/run/commands.hpp"
-#include "apps/run/point_workers.hpp"
 #include "apps/run/prepared_study.hpp"
+#include "apps/run/run_workers.hpp"
 #include "apps/run/slurm_sweep.hpp"
+#include "apps/run/trunks.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
+#include "base/temporary_folder.hpp"
 #include "rt/stop_signal.hpp"
 #include "sweep/page.hpp"
 #include "sweep/results.hpp"
@@ -54,9 +56,14 @@ class Sweep {
         study_(study),
         points_(points),
         folder_(folder),
-        workers_(study, work, prepared),
+        prepared_(prepared),
+        later_(options.branches ? later_keys(study) : LaterKeys()),
+        trunks_(later_.rows),
+        workers_(work, options.jobs, study.time_limit_s),
         out_(human_output(options.json)),
-        line_(out_) {}
+        line_(out_) {
+    workers_.read_instead(prepared.texts);
+  }
 
   Exit run() {
     announce();
@@ -66,7 +73,7 @@ class Sweep {
     failed_ = static_cast<std::uint64_t>(std::ranges::count_if(
         folder_.results(), [](const auto& one) { return one && !one->passed; }));
     if (const Status ran = run_points({.end = points_.size()}); !ran) return refuse(ran.error());
-    if (rt::stop_requested()) return stopped(points_.size());
+    if (rt::stop_requested()) return stopped_with_tables();
     if (const Status kept = keep_logs(); !kept) return refuse(kept.error());
     return finish();
   }
@@ -94,6 +101,12 @@ class Sweep {
     return interrupted(rt::stop_signal());
   }
 
+  /// Tables and page of the points that are there.
+  Exit stopped_with_tables() {
+    if (folder_.done() > 0) (void)finish();
+    return stopped(points_.size());
+  }
+
   void announce() const {
     if (options_.quiet) return;
     std::string of = counted(study_.points, "sample");
@@ -113,28 +126,62 @@ class Sweep {
       while (next < chunk.end && folder_.has(next)) ++next;
       return next < chunk.end && !rt::stop_requested();
     };
-    while (more() || workers_.going() > 0) {
+    if (const Status grown = grow_trunks(chunk); !grown) return grown;
+    while (more() || !workers_.is_empty()) {
       if (rt::stop_requested()) return {};
-      while (workers_.going() < options_.jobs && more()) {
-        if (const Status started = workers_.start(points_.at(next++)); !started) return started;
+      while (!workers_.is_full() && more()) {
+        RunOptions run = options_of(points_.at(next));
+        trunks_.begin_in(common_of(run), run);
+        if (const Status started = workers_.start(next++, std::move(run)); !started) return started;
       }
-      const Status waited =
-          workers_.wait([this](const sweep::Point& point, const ChildRun& run, double seconds) {
-            if (run.killed && options_.chunk) {
-              ++killed_;
-              return Status();
-            }
-            failed_ += run.passed ? 0 : 1;
-            return folder_.add(point, {.passed = run.passed,
-                                       .ended = run.ended,
-                                       .reason = run.reason,
-                                       .expectations = run.expectations,
-                                       .seconds = seconds});
-          });
-      if (!waited) return waited;
+      auto ended = workers_.take_ended();
+      if (!ended) return std::unexpected(ended.error());
+      for (const EndedRun& one : *ended)
+        if (const Status taken = take(one); !taken) return taken;
       show_progress();
     }
     return {};
+  }
+
+  [[nodiscard]] RunOptions options_of(const sweep::Point& point) const {
+    RunOptions run = child_options(study_.experiment);
+    run.settings = point.settings;
+    run.seed = point.seed;
+    run.kernel_variant = prepared_.kernel_variant;
+    return run;
+  }
+
+  [[nodiscard]] std::string common_of(const RunOptions& run) const {
+    return later_.common(run.settings) + (run.seed ? fmt::format("{}", *run.seed) : "");
+  }
+
+  /// Simulates the beginnings that points have in common, of those that have no result yet.
+  Status grow_trunks(const sweep::Chunk& chunk) {
+    if (later_.rows.empty()) return {};
+    constexpr std::uint64_t kMostLookedAt = 1'000;
+    std::uint64_t looked = 0;
+    for (std::uint64_t i = chunk.first; i < chunk.end && looked < kMostLookedAt; ++i) {
+      if (folder_.has(i)) continue;
+      ++looked;
+      const RunOptions run = options_of(points_.at(i));
+      trunks_.want(common_of(run), run);
+    }
+    return trunks_.grow(workers_);
+  }
+
+  Status take(const EndedRun& one) {
+    const ChildRun& run = one.run;
+    if (run.killed && options_.chunk) {
+      ++killed_;
+      return {};
+    }
+    failed_ += run.passed ? 0 : 1;
+    return folder_.add(points_.at(one.number), {.passed = run.passed,
+                                                .ended = run.ended,
+                                                .reason = run.reason,
+                                                .expectations = run.expectations,
+                                                .seconds = one.seconds,
+                                                .limit_s = run.limit_s});
   }
 
   void show_progress() {
@@ -160,11 +207,13 @@ class Sweep {
       const std::string folder = all + "/" + point.name;
       std::error_code ignored;
       if (!fs::exists(folder, ignored)) {
-        if (const Status started = workers_.start(point, folder + ".part"); !started)
-          return started;
-        while (workers_.going() > 0 && !rt::stop_requested()) {
-          const auto nothing = [](const auto&, const auto&, double) { return Status(); };
-          if (const Status waited = workers_.wait(nothing); !waited) return waited;
+        RunOptions run = options_of(point);
+        run.no_log = false;
+        run.log_folder = folder + ".part";
+        if (const Status started = workers_.start(i, std::move(run)); !started) return started;
+        while (!workers_.is_empty() && !rt::stop_requested()) {
+          if (const auto ended = workers_.take_ended(); !ended)
+            return std::unexpected(ended.error());
         }
         if (rt::stop_requested()) return {};
         fs::rename(folder + ".part", folder, ignored);
@@ -244,29 +293,14 @@ class Sweep {
   const sweep::Study& study_;
   const sweep::Points& points_;
   sweep::SweepFolder& folder_;
-  PointWorkers workers_;
+  const PreparedStudy& prepared_;
+  LaterKeys later_;
+  Trunks trunks_;
+  RunWorkers workers_;
   std::FILE* out_;
   StatusLine line_;
   SweepClock::time_point begin_;
   std::uint64_t done_before_ = 0, failed_ = 0, killed_ = 0;
-};
-
-/// A folder of this machine alone, gone at the end.
-class ScratchOfChunk {
- public:
-  ScratchOfChunk() : path_((fs::temp_directory_path() / "tandem-chunk-XXXXXX").string()) {
-    if (::mkdtemp(path_.data()) == nullptr) path_.clear();
-  }
-  ~ScratchOfChunk() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  ScratchOfChunk(const ScratchOfChunk&) = delete;
-  ScratchOfChunk& operator=(const ScratchOfChunk&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
 };
 
 Exit run_chunk(const SweepOptions& options, const sweep::Study& study, const sweep::Points& points,
@@ -284,12 +318,9 @@ Exit run_chunk(const SweepOptions& options, const sweep::Study& study, const swe
   const sweep::Chunk chunk = sweep::chunk_of(*options.chunk, size, points.size());
   auto folder = sweep::SweepFolder::open_chunk(options.folder, prepared.head, points, chunk);
   if (!folder) return refuse(folder.error());
-  const ScratchOfChunk scratch;
-  if (scratch.path().empty())
-    return refuse(Error{.message = "no folder can be made in the machine's temporary one",
-                        .hint = "set TMPDIR to one that can be written",
-                        .file = {},
-                        .key = {}});
+  print_warnings(folder->damaged());
+  const TemporaryFolder scratch("runs");
+  if (const Status made = scratch.made(); !made) return refuse(made.error());
   return Sweep(options, study, points, prepared, *folder, scratch.path()).run_chunk(chunk);
 }
 
@@ -371,6 +402,7 @@ Exit sweep_command(const SweepOptions& given) {
   if (options.chunk) return run_chunk(options, *study, points, *prepared);
   auto folder = sweep::SweepFolder::open(options.folder, prepared->head, points);
   if (!folder) return refuse(folder.error());
+  print_warnings(folder->damaged());
   return Sweep(options, *study, points, *prepared, *folder, folder->path() + "/work").run();
 }
 

@@ -2,12 +2,10 @@
 #include <fmt/format.h>
 #include <signal.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstring>
-#include <filesystem>
 #include <thread>
 
 #include "apps/run/child_run.hpp"
@@ -18,32 +16,14 @@
 #include "base/counted.hpp"
 #include "base/process.hpp"
 #include "base/quoting.hpp"
+#include "base/temporary_folder.hpp"
 #include "rt/stop_signal.hpp"
 #include "runtime/condition/expectations.hpp"
 
 namespace tandem::apps {
 namespace {
 
-namespace fs = std::filesystem;
 using SuiteClock = std::chrono::steady_clock;
-
-/// A folder for what the processes write, gone at the end.
-class SuiteFolder {
- public:
-  SuiteFolder() : path_((fs::temp_directory_path() / "tandem-test-XXXXXX").string()) {
-    if (::mkdtemp(path_.data()) == nullptr) path_.clear();
-  }
-  ~SuiteFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  SuiteFolder(const SuiteFolder&) = delete;
-  SuiteFolder& operator=(const SuiteFolder&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 /// A test whose process goes on.
 struct Going {
@@ -67,12 +47,7 @@ class Suite {
   }
 
   Exit run() {
-    if (folder_.path().empty())
-      return refuse(Error{
-          .message = std::string("no folder can be made for the tests: ") + std::strerror(errno),
-          .hint = "look at the free space and rights of TMPDIR",
-          .file = {},
-          .key = {}});
+    if (const Status made = folder_.made(); !made) return refuse(made.error());
     const auto begin = SuiteClock::now();
     if (const Status written = write_junit(); !written) return refuse(written.error());
     rt::install_stop_signals();
@@ -221,7 +196,7 @@ class Suite {
   std::vector<SuiteTest> tests_;
   const TestOptions& options_;
   std::FILE* out_;
-  SuiteFolder folder_;
+  TemporaryFolder folder_{"test"};  // for what the processes write
   std::vector<Going> going_;
   std::size_t next_ = 0, ended_ = 0;
 };

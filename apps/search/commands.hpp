@@ -14,6 +14,9 @@
 
 namespace tandem::apps {
 
+/// "12 of them went on from 1 common beginning, simulated once"
+[[nodiscard]] std::string branches_text(std::size_t branched, std::size_t trunks);
+
 /// The fewest and smallest events with which a scenario fails. @return kUsage: it does not fail
 [[nodiscard]] Exit shrink_command(const ShrinkOptions& options);
 /// What its JSON has.
@@ -21,7 +24,7 @@ struct ShrinkResult {
   std::string file;                          ///< the smaller scenario
   runtime::ExpectationResult expectation{};  ///< that fails
   std::size_t events_before = 0, events = 0;
-  std::size_t runs = 0;
+  std::size_t runs = 0, branched = 0, trunks = 0;
   double seconds = 0.0;  ///< on the wall clock
   std::string command;   ///< that repeats it
 };
@@ -40,7 +43,7 @@ struct SearchResult {
   std::string method;
   runtime::ExpectationResult expectation{};  ///< at the worst point
   std::vector<std::string> settings{};       ///< of it: KEY=VALUE
-  std::size_t runs = 0, failed = 0, refused = 0;
+  std::size_t runs = 0, failed = 0, refused = 0, branched = 0, trunks = 0;
   double seconds = 0.0;   ///< on the wall clock
   std::string file{};     ///< the worst point as a scenario; empty: none was asked for
   std::string command{};  ///< that repeats it
@@ -56,7 +59,7 @@ struct LimitResult {
     std::string reason{};  ///< why none passed; empty: one did
   };
   std::string key;
-  std::size_t runs = 0;
+  std::size_t runs = 0, branched = 0, trunks = 0;
   double seconds = 0.0;  ///< on the wall clock
   std::vector<Row> points{};
 };

@@ -1,5 +1,7 @@
 #include "apps/search/judged_scenarios.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <utility>
@@ -32,11 +34,39 @@ bool Failure::is_of(const ChildRun& run) const {
          without_figures(one->reason) == without_figures(expectation.reason);
 }
 
-JudgedScenarios::JudgedScenarios(std::string file, std::size_t jobs, double timeout_s)
-    : file_(std::move(file)), runs_(jobs, timeout_s) {}
+JudgedScenarios::JudgedScenarios(std::string file, std::size_t jobs, double timeout_s,
+                                 bool branches)
+    : file_(std::move(file)),
+      trunks_(branches ? ScenarioText::later_kinds() : std::vector<std::string>()),
+      workers_(scratch_.below("work"), jobs, timeout_s) {}
+
+Status JudgedScenarios::write_down(const std::vector<std::string>& texts,
+                                   std::vector<RunOptions>& options,
+                                   std::vector<std::string>& common) {
+  for (const std::string& text : texts) {
+    const std::string file = fmt::format("{}/{}.toml", scratch_.path(), written_++);
+    const auto moved = relocated(text, file_, file);
+    if (!moved) return std::unexpected(moved.error());
+    if (Status written = write_file(file, *moved); !written) return written;
+    const auto rows = ScenarioText::read(*moved, file);
+    if (!rows) return std::unexpected(rows.error());
+    options.push_back(child_options(file));
+    common.push_back(rows->without_later());
+    trunks_.want(common.back(), options.back());
+  }
+  if (std::exchange(is_loaded_, true)) return trunks_.grow(workers_);
+  loaded_ = load_run(child_options(file_));
+  if (loaded_.world != nullptr) workers_.read_instead(loaded_.texts);
+  return {};  // it is run as it is, first
+}
 
 Result<std::vector<std::optional<ChildRun>>> JudgedScenarios::run_until(
     const std::vector<std::string>& texts, const Wanted& wanted) {
+  if (Status made = scratch_.made(); !made) return std::unexpected(made.error());
+  std::vector<RunOptions> options;
+  std::vector<std::string> common;
+  if (Status written = write_down(texts, options, common); !written)
+    return std::unexpected(written.error());
   std::vector<std::optional<ChildRun>> done(texts.size());
   std::size_t next = 0, end = texts.size();  // none from there on counts
   const auto all_known = [&] {
@@ -44,23 +74,22 @@ Result<std::vector<std::optional<ChildRun>>> JudgedScenarios::run_until(
                        [](const auto& one) { return one.has_value(); });
   };
   while (!all_known() && !rt::stop_requested()) {
-    while (next < end && !runs_.is_full()) {
-      const std::string candidate = runs_.folder() + "/" + std::to_string(started_) + ".toml";
-      auto text = relocated(texts[next], file_, candidate);
-      if (!text) return std::unexpected(text.error());
-      if (Status written = write_file(candidate, *text); !written)
-        return std::unexpected(written.error());
-      if (Status started = runs_.start(next, child_words(candidate)); !started)
+    while (next < end && !workers_.is_full()) {
+      trunks_.begin_in(common[next], options[next]);
+      if (Status started = workers_.start(next, options[next]); !started)
         return std::unexpected(started.error());
       ++started_;
       ++next;
     }
-    for (EndedRun& one : runs_.take_ended()) {
+    auto ended = workers_.take_ended();
+    if (!ended) return std::unexpected(ended.error());
+    for (EndedRun& one : *ended) {
       if (one.number < end && wanted(one.run)) end = one.number + 1;
+      if (one.run.begins_s > 0.0) ++branched_;
       done[one.number] = std::move(one.run);
     }
   }
-  runs_.end_all();
+  workers_.end_all();
   done.resize(rt::stop_requested() && !all_known() ? 0 : end);
   return done;
 }

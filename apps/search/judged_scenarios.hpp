@@ -7,8 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "apps/search/child_runs.hpp"
+#include "apps/run/prepared_study.hpp"
+#include "apps/run/run_workers.hpp"
+#include "apps/run/trunks.hpp"
 #include "base/result.hpp"
+#include "base/temporary_folder.hpp"
 #include "runtime/condition/expectation.hpp"
 
 namespace tandem::apps {
@@ -30,7 +33,8 @@ struct Failure {
 class JudgedScenarios {
  public:
   /// @param file  of the scenario: names in the texts are relative to it
-  JudgedScenarios(std::string file, std::size_t jobs, double timeout_s);
+  /// @param branches  beginnings that they have in common are simulated once
+  JudgedScenarios(std::string file, std::size_t jobs, double timeout_s, bool branches);
 
   /// Runs all of them; in their order. A stop that was asked for ends it: fewer.
   [[nodiscard]] Result<std::vector<ChildRun>> run(const std::vector<std::string>& texts);
@@ -40,7 +44,9 @@ class JudgedScenarios {
   [[nodiscard]] Result<std::optional<EndedRun>> first_failing(const std::vector<std::string>& texts,
                                                               const Failure& failure);
 
-  [[nodiscard]] std::size_t runs() const { return started_; }  ///< that were started
+  [[nodiscard]] std::size_t runs() const { return started_; }       ///< that were started
+  [[nodiscard]] std::size_t branched() const { return branched_; }  ///< of those that have ended
+  [[nodiscard]] std::size_t trunks() const { return trunks_.count(); }
 
  private:
   using Wanted = std::function<bool(const ChildRun&)>;
@@ -48,9 +54,18 @@ class JudgedScenarios {
   [[nodiscard]] Result<std::vector<std::optional<ChildRun>>> run_until(
       const std::vector<std::string>& texts, const Wanted& wanted);
 
+  /// Each in a file of its own, and what it has in common with others.
+  [[nodiscard]] Status write_down(const std::vector<std::string>& texts,
+                                  std::vector<RunOptions>& options,
+                                  std::vector<std::string>& common);
+
   std::string file_;
-  ChildRuns runs_;
-  std::size_t started_ = 0;
+  TemporaryFolder scratch_{"runs"};
+  LoadedRun loaded_;  // as it is
+  Trunks trunks_;
+  RunWorkers workers_;
+  bool is_loaded_ = false;
+  std::size_t written_ = 0, started_ = 0, branched_ = 0;
 };
 
 }  // namespace tandem::apps

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "apps/search/commands.hpp"
+#include "apps/search/limit_picture.hpp"
 #include "apps/search/point_runs.hpp"
 #include "apps/search/scenario_rows.hpp"
 #include "apps/text/draft.hpp"
@@ -40,7 +41,7 @@ class Limits {
       : options_(options),
         study_(study),
         out_(human_output(options.json)),
-        runs_(study.experiment, options.jobs, study.time_limit_s) {}
+        runs_(study, options.jobs, options.branches) {}
 
   /// The greatest factor first, then halves, then 0 where none passed: all points a round.
   Exit find() {
@@ -62,6 +63,7 @@ class Limits {
     if (rt::stop_requested()) return interrupted(rt::stop_signal());
     gather(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     if (const Status written = write(); !written) return refuse(written.error());
+    if (const Status written = draw(); !written) return refuse(written.error());
     print();
     return end_with_json(options_.json, figures_json(result_));
   }
@@ -87,6 +89,8 @@ class Limits {
         return noted;
     }
     result_.runs += looked.size();
+    result_.branched += static_cast<std::size_t>(
+        std::ranges::count_if(looked, [](const PointRun& one) { return one.run.begins_s > 0.0; }));
     if (!options_.quiet && !looked.empty()) {
       fmt::print(
           out_, "{:>5} runs: {} of {} points fail somewhere\n", result_.runs,
@@ -145,6 +149,7 @@ class Limits {
   void gather(double seconds) {
     result_.key = options_.limit;
     result_.seconds = seconds;
+    result_.trunks = runs_.trunks();
     for (const Bracket& one : brackets_) {
       LimitResult::Row row{.passed = one.passed, .failed = one.failed, .reason = one.reason};
       for (std::size_t k = 0; k < study_.vary.size(); ++k)
@@ -163,10 +168,39 @@ class Limits {
       text += fmt::format("{},{}\n", row.passed ? fmt::format("{}", *row.passed) : "",
                           row.failed ? fmt::format("{}", *row.failed) : "");
     }
-    Draft draft = Draft::file(options_.output);
+    return put(options_.output, text);
+  }
+
+  static Status put(const std::string& file, const std::string& text) {
+    Draft draft = Draft::file(file);
     if (const Status done = write_file(draft.path(), text); !done)
       return std::unexpected(draft.placed(done.error()));
     return draft.place();
+  }
+
+  Status draw() {
+    if (options_.svg.empty()) return {};
+    std::vector<std::pair<std::optional<double>, std::optional<double>>> limits;
+    for (const Bracket& one : brackets_) limits.emplace_back(one.passed, one.failed);
+    LimitPicture picture{
+        .title = {}, .below = {}, .unit = unit_of_key(options_.limit), .panels = {}};
+    picture.panels = panels_of(study_, options_.limit, limits);
+    const runtime::Composition* first = runs_.first();
+    const double mass_kg =
+        first == nullptr || first->kernels.get() == nullptr ? 0.0 : first->kernels.get()->mass_kg;
+    const std::string robot = first == nullptr ? "" : first->experiment.robot.name + ": ";
+    if (mass_kg > 0.0) {
+      picture.scale = 1.0 / mass_kg;
+      picture.unit += "/kg";
+    }
+    picture.title = fmt::format("{}{} by direction{}", robot, options_.limit,
+                                mass_kg > 0.0 ? ", over the robot's mass" : "");
+    picture.below = fmt::format(
+        "Passes: {}.{} {} in simulation, up to a factor of {:g}.",
+        options_.expect.empty() ? "all of its expectations" : "'" + options_.expect + "'",
+        mass_kg > 0.0 ? fmt::format(" Mass {:.4g} kg.", mass_kg) : "", counted(result_.runs, "run"),
+        options_.up_to);
+    return put(options_.svg, drawn(picture));
   }
 
   void print() const {
@@ -186,6 +220,8 @@ class Limits {
     table.print(out_);
     fmt::print(out_, "\n{} of '{}': {} in {:.1f} s\n", counted(result_.points.size(), "point"),
                result_.key, counted(result_.runs, "run"), result_.seconds);
+    if (result_.branched > 0)
+      fmt::print(out_, "{}\n", branches_text(result_.branched, result_.trunks));
   }
 
   const SearchOptions& options_;
@@ -209,6 +245,8 @@ void figures(Figures& f, const LimitResult::Row& row) {
 void figures(Figures& f, const LimitResult& result) {
   f("key", "whose values are scaled", result.key);
   f("runs", "", result.runs);
+  f("branched", "of them, as of a search", result.branched);
+  f("trunks", "as of a search", result.trunks);
   f("wall_seconds", "of all of them", result.seconds);
   f("points", "of the study", result.points);
 }
@@ -233,6 +271,12 @@ Exit find_limits(const SearchOptions& options, const sweep::Study& study) {
   const Status writable =
       check_writable(options.output, csv_field(study.vary.front().key) + ",", "table of limits");
   if (!writable) return refuse(writable.error());
+  if (!options.svg.empty()) {
+    if (const Status drawn = can_be_drawn(study, options.limit); !drawn)
+      return refuse(drawn.error());
+    const Status picture = check_writable(options.svg, "<svg ", "picture of limits");
+    if (!picture) return refuse(picture.error());
+  }
   rt::install_stop_signals();
   return Limits(options, study).find();
 }

@@ -6,9 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "apps/search/child_runs.hpp"
+#include "apps/run/prepared_study.hpp"
+#include "apps/run/run_workers.hpp"
+#include "apps/run/trunks.hpp"
 #include "base/result.hpp"
+#include "base/temporary_folder.hpp"
 #include "base/toml_setting.hpp"
+#include "sweep/study.hpp"
 
 namespace tandem::apps {
 
@@ -20,18 +24,29 @@ struct PointRun {
 
 class PointRuns {
  public:
-  /// As ChildRuns.
-  PointRuns(std::string experiment, std::size_t jobs, double timeout_s)
-      : experiment_(std::move(experiment)), runs_(jobs, timeout_s) {}
+  /// @param jobs  as RunWorkers'. @param branches  beginnings that points have in common are
+  /// simulated once
+  PointRuns(const sweep::Study& study, std::size_t jobs, bool branches);
 
   /// Runs all of them. A stop that was asked for ends it; who called asks for that, too.
   [[nodiscard]] Status run(std::vector<PointRun>& points);
+  /// The run of the first point, as it is composed; null: it cannot be run, or there was none yet.
+  [[nodiscard]] const runtime::Composition* first() const { return loaded_.world.get(); }
+  [[nodiscard]] std::size_t trunks() const { return trunks_.count(); }  ///< that were simulated
 
  private:
   std::string experiment_;
-  ChildRuns runs_;
+  TemporaryFolder scratch_{"runs"};
+  LoadedRun loaded_;  // by the first point
+  LaterKeys later_;
+  Trunks trunks_;
+  RunWorkers workers_;
+  bool is_loaded_ = false;
 };
 
+/// The command of such a run, for a shell. @param more  of its flags
+[[nodiscard]] std::string command_of_run(const std::string& file,
+                                         const std::vector<std::string>& more = {});
 /// As words of a command line: --set KEY=VALUE.
 [[nodiscard]] std::vector<std::string> flags_of(const std::vector<TomlSetting>& settings);
 

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <optional>
 
@@ -263,7 +264,7 @@ Result<ScenarioText> ScenarioText::read(const std::string& text, const std::stri
     } else if (twice && is_row_kind(header)) {
       kind = header;
       ++found[kind];
-      out.rows_.push_back({.place = out.rows_.size(), .text = comment + raw});
+      out.rows_.push_back({.place = out.rows_.size(), .text = comment + raw, .kind = kind});
       out.between_.emplace_back();
     } else {
       if (!is_of_row(header, kind)) kind.clear();
@@ -281,6 +282,17 @@ Result<ScenarioText> ScenarioText::read(const std::string& text, const std::stri
               .key = one});
   }
   return out;
+}
+
+std::vector<std::string> ScenarioText::later_kinds() { return {"push", "fault", "event"}; }
+
+std::string ScenarioText::without_later() const {
+  const std::vector<std::string> later = later_kinds();
+  ScenarioRows rows;
+  std::ranges::copy_if(rows_, std::back_inserter(rows), [&](const ScenarioRow& row) {
+    return std::ranges::find(later, row.kind) == later.end();
+  });
+  return with(rows);
 }
 
 std::string ScenarioText::with(const ScenarioRows& rows) const {

@@ -19,6 +19,7 @@ namespace tandem::apps {
 struct ScenarioRow {
   std::size_t place = 0;  ///< among the rows of the file
   std::string text;       ///< header, keys, and the comment above them
+  std::string kind{};     ///< "push"
 
   bool operator==(const ScenarioRow&) const = default;
 };
@@ -32,6 +33,10 @@ class ScenarioText {
   [[nodiscard]] static Result<ScenarioText> read(const std::string& text, const std::string& file);
 
   [[nodiscard]] const ScenarioRows& rows() const { return rows_; }
+  /// The rows that may come at any time of a run: all but what is there when it begins.
+  [[nodiscard]] static std::vector<std::string> later_kinds();
+  /// The experiment without those.
+  [[nodiscard]] std::string without_later() const;
   /// The experiment with these of its rows, which may have other texts.
   [[nodiscard]] std::string with(const ScenarioRows& rows) const;
 

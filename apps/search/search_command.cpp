@@ -33,7 +33,7 @@ class Search {
         study_(study),
         method_(method),
         out_(human_output(options.json)),
-        runs_(study.experiment, options.jobs, study.time_limit_s) {
+        runs_(study, options.jobs, options.branches) {
     result_.method = method.name;
   }
 
@@ -48,6 +48,7 @@ class Search {
     const auto worst = least_of(worst_);
     if (!worst) return refuse(nothing_found());
     result_.seconds = Seconds(std::chrono::steady_clock::now() - begin).count();
+    result_.trunks = runs_.trunks();
     result_.expectation = *worst;
     for (const TomlSetting& one : worst_.settings)
       result_.settings.push_back(one.key + "=" + one.value);
@@ -128,6 +129,7 @@ class Search {
         continue;
       }
       if (!one.run.passed) ++result_.failed;
+      if (one.run.begins_s > 0.0) ++result_.branched;
       if (names_.empty()) {
         for (const runtime::ExpectationResult& result : one.run.expectations)
           names_.push_back(result.name);
@@ -181,6 +183,7 @@ class Search {
     for (const std::string& one : result_.settings) facts.add("", one);
     facts.add("runs", fmt::format("{} in {:.1f} s, {} failed", result_.runs, result_.seconds,
                                   result_.failed));
+    if (result_.branched > 0) facts.add("", branches_text(result_.branched, result_.trunks));
     if (result_.refused > 0)
       facts.add("refused", fmt::format("{} of them; the first: {}", result_.refused, refusal_));
     if (!result_.file.empty()) facts.add("written", result_.file);
@@ -225,6 +228,9 @@ void figures(Figures& f, const SearchResult& result) {
   f("runs", "", result.runs);
   f("failed", "of them", result.failed);
   f("refused", "of them: they could not be run, and count for nothing", result.refused);
+  f("branched", "of them: they went on from a state of a beginning that they have in common",
+    result.branched);
+  f("trunks", "such beginnings, which were simulated beside the runs", result.trunks);
   f("wall_seconds", "of all of them", result.seconds);
   f("file", "the worst point as a scenario; empty: none was asked for", result.file);
   f("command", "that repeats it", result.command);

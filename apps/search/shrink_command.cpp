@@ -7,6 +7,7 @@
 
 #include "apps/search/commands.hpp"
 #include "apps/search/judged_scenarios.hpp"
+#include "apps/search/point_runs.hpp"
 #include "apps/search/shrink.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/text/relative_path.hpp"
@@ -35,7 +36,7 @@ class Shrinking {
         output_(std::move(output)),
         out_(human_output(options.json)),
         scenario_(std::move(scenario)),
-        runs_(options.scenario, options.jobs, options.timeout_s) {}
+        runs_(options.scenario, options.jobs, options.timeout_s, options.branches) {}
 
   Exit shrink() {
     const auto begin = std::chrono::steady_clock::now();
@@ -49,6 +50,8 @@ class Shrinking {
     result_.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     result_.runs = runs_.runs();
+    result_.branched = runs_.branched();
+    result_.trunks = runs_.trunks();
     if (const Status written = write(rows); !written) return refuse(written.error());
     print(rows);
     const Status written = write_json(options_.json, figures_json(result_));
@@ -192,6 +195,8 @@ void figures(Figures& f, const ShrinkResult& result) {
   f("events_before", "of the scenario that was given", result.events_before);
   f("events", "that are left", result.events);
   f("runs", "that were begun; with more at once there may be more", result.runs);
+  f("branched", "of them, as of `tandem search`", result.branched);
+  f("trunks", "as of `tandem search`", result.trunks);
   f("wall_seconds", "of all of them", result.seconds);
   f("command", "that repeats it", result.command);
 }

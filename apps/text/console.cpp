@@ -18,6 +18,7 @@
 #include <sstream>
 #include <vector>
 
+#include "apps/text/columns.hpp"
 #include "apps/text/draft.hpp"
 #include "base/open_file.hpp"
 #include "base/quoting.hpp"
@@ -28,25 +29,12 @@ namespace tandem::apps {
 namespace {
 
 constexpr std::size_t kLongestCell = 2'000;  // characters
+constexpr std::size_t kWidest = 100;         // columns of a line of texts
 
 Diagnostics reported;      // by print_errors(), for write_failure()
 bool has_written = false;  // by write_json()
 std::string begun_json;    // by begin_json()
 std::atomic<int> lost{0};  // errno with which the standard output was last thrown away
-
-/// Columns that a UTF-8 text takes: bytes that do not continue a character.
-std::size_t width(const std::string& text) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
-}
-
-std::string left(const std::string& text, std::size_t columns) {
-  return text + std::string(columns - std::min(columns, width(text)), ' ');
-}
-
-std::string right(const std::string& text, std::size_t columns) {
-  return std::string(columns - std::min(columns, width(text)), ' ') + text;
-}
 
 Error unwritable(const std::string& file, const std::string& what, const std::string& reason) {
   return {.message = "cannot write the " + what + ": " + reason,
@@ -162,11 +150,43 @@ void show_harmless() {
   std::cerr.rdbuf(&error);
 }
 
-void restart_line(std::FILE* out) {
-  if (!is_terminal(out)) return;
+namespace {
+
+/// Past show_harmless(), which lets no sequence through.
+void write_sequence(std::FILE* out, std::string_view sequence) {
   std::fflush(out);
   const int fd = out == stdout ? STDOUT_FILENO : out == stderr ? STDERR_FILENO : ::fileno(out);
-  (void)!::write(fd, "\r\x1b[K", 4);
+  (void)!::write(fd, sequence.data(), sequence.size());
+}
+
+}  // namespace
+
+bool has_colours(std::FILE* out) {
+  const char* refused = std::getenv("NO_COLOR");
+  const char* kind = std::getenv("TERM");
+  return is_terminal(out) && (refused == nullptr || *refused == '\0') && kind != nullptr &&
+         std::string_view(kind) != "dumb";
+}
+
+void say(Said what, const std::string& text) {
+  struct Label {
+    const char* word;
+    const char* colour;  ///< sequence of ECMA-48; empty: as the text
+  };
+  static constexpr Label kLabels[]{{"error: ", "\x1b[1;31m"},
+                                   {"warning: ", "\x1b[1;33m"},
+                                   {"fault: ", "\x1b[1;31m"},
+                                   {"hint: ", ""}};
+  const Label& label = kLabels[static_cast<std::size_t>(what)];
+  const bool coloured = *label.colour != '\0' && has_colours(stderr);
+  if (coloured) write_sequence(stderr, label.colour);
+  std::fputs(label.word, stderr);
+  if (coloured) write_sequence(stderr, "\x1b[0m");
+  std::fputs((text + "\n").c_str(), stderr);
+}
+
+void restart_line(std::FILE* out) {
+  if (is_terminal(out)) write_sequence(out, "\r\x1b[K");
 }
 
 void outlive_files() {
@@ -342,15 +362,14 @@ std::string indented(const std::string& text) {
   std::string out;
   for (const char c : whole_characters(text, kMost))
     out += c == '\n' ? std::string("\n    ") : std::string(1, c);
-  return harmless(out + (text.size() > kMost ? "…" : "")) + "\n";
+  return harmless(out + (text.size() > kMost ? "…" : ""));
 }
 
 }  // namespace
 
 void print_errors(const Diagnostics& errors) {
   reported.insert(reported.end(), errors.begin(), errors.end());
-  for (const Error& error : errors)  // not fmt::print(), which throws when it cannot write
-    std::fputs(("error: " + indented(error.to_string())).c_str(), stderr);
+  for (const Error& error : errors) say(Said::kError, indented(error.to_string()));
 }
 
 Exit refuse(const Diagnostics& errors) {
@@ -361,27 +380,10 @@ Exit refuse(const Diagnostics& errors) {
 Exit refuse(const Error& error) { return refuse(Diagnostics{error}); }
 
 void print_warnings(const Diagnostics& warnings) {
-  for (const Error& warning : warnings)  // as above
-    std::fputs(("warning: " + indented(warning.to_string())).c_str(), stderr);
+  for (const Error& warning : warnings) say(Said::kWarning, indented(warning.to_string()));
 }
 
 namespace {
-
-/// `text` in lines of at most `most` characters, broken at blanks; a longer word is a line.
-std::vector<std::string> broken(const std::string& text, std::size_t most) {
-  std::vector<std::string> lines(1);
-  std::istringstream words(text);
-  if (width(text) <= most) return {text};
-  for (std::string word; words >> word;) {
-    std::string& line = lines.back();
-    if (!line.empty() && width(line) + 1 + width(word) > most) {
-      lines.push_back(std::move(word));
-    } else {
-      line += (line.empty() ? "" : " ") + word;
-    }
-  }
-  return lines;
-}
 
 /// The longest word of a column, where no line can be broken.
 std::size_t longest_word(const std::vector<std::vector<std::string>>& rows, std::size_t column) {
@@ -389,26 +391,26 @@ std::size_t longest_word(const std::vector<std::vector<std::string>>& rows, std:
   for (const auto& row : rows) {
     if (column >= row.size()) continue;
     std::istringstream words(row[column]);
-    for (std::string word; words >> word;) longest = std::max(longest, width(word));
+    for (std::string word; words >> word;) longest = std::max(longest, columns_of(word));
   }
   return longest;
 }
 
-/// Makes the widest column that has blanks so narrow that a line has at most 100 characters, or it
-/// has 24, or its longest word.
-void narrow(std::vector<std::size_t>& columns, const std::vector<std::vector<std::string>>& rows) {
-  constexpr std::size_t kLine = 100;
+/// Makes the widest column that has blanks so narrow that a line has at most `most` characters, or
+/// the column has 24, or its longest word.
+void narrow(std::vector<std::size_t>& columns, const std::vector<std::vector<std::string>>& rows,
+            std::size_t most) {
   constexpr std::size_t kLeast = 24;
   std::size_t line = 0;
   for (const std::size_t column : columns) line += column + 2;
   std::size_t widest = 0, gain = 0;
-  for (std::size_t i = 0; line > kLine && i < columns.size(); ++i) {
+  for (std::size_t i = 0; line > most && i < columns.size(); ++i) {
     const std::size_t least = std::max(kLeast, longest_word(rows, i));
     if (columns[i] <= least || (gain > 0 && columns[i] <= columns[widest])) continue;
     widest = i;
     gain = columns[i] - least;
   }
-  if (gain > 0) columns[widest] -= std::min(gain, line - kLine);
+  if (gain > 0) columns[widest] -= std::min(gain, line - most);
 }
 
 }  // namespace
@@ -422,15 +424,16 @@ void Table::print(std::FILE* out) const {
   std::vector<std::size_t> columns;
   for (const auto& row : rows_) {
     columns.resize(std::max(columns.size(), row.size()), 0);
-    for (std::size_t i = 0; i < row.size(); ++i) columns[i] = std::max(columns[i], width(row[i]));
+    for (std::size_t i = 0; i < row.size(); ++i)
+      columns[i] = std::max(columns[i], columns_of(row[i]));
   }
-  if (left_) narrow(columns, rows_);
+  if (left_) narrow(columns, rows_, line_columns(out, kWidest, kWidest));
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     if (rows_[r].empty()) continue;
     std::vector<std::vector<std::string>> cells;
     std::size_t lines = 1;
     for (std::size_t i = 0; i < rows_[r].size(); ++i) {
-      cells.push_back(broken(rows_[r][i], columns[i]));
+      cells.push_back(wrapped(rows_[r][i], columns[i]));
       lines = std::max(lines, cells.back().size());
     }
     for (std::size_t l = 0; l < lines; ++l) {
@@ -457,11 +460,27 @@ void Facts::add(const std::string& name, const std::string& value) {
 
 void Facts::print(std::FILE* out) const {
   std::size_t column = 0;
-  for (const auto& [name, value] : facts_) column = std::max(column, width(name));
+  for (const auto& [name, value] : facts_) column = std::max(column, columns_of(name));
   for (const auto& [name, value] : facts_) {
-    fmt::print(out, "  {}  {}\n", left(name, column), value);
+    // Elsewhere than on a terminal each stays in its line, for grep.
+    const std::size_t line = line_columns(out, kWidest, kWidest);
+    const std::size_t room = line - std::min(line - 20, column + 4);
+    std::string begin = left(name, column);
+    for (const std::string& part : wrapped(value, is_terminal(out) ? room : columns_of(value))) {
+      fmt::print(out, "  {}  {}\n", begin, part);
+      begin = std::string(column, ' ');
+    }
   }
 }
+
+namespace {
+
+/// As much of a line that is drawn again and again as one of the terminal's holds.
+std::string in_a_line(const std::string& text, std::FILE* out) {
+  return cut_to(text, line_columns(out, kLongestCell, kLongestCell) - 1);
+}
+
+}  // namespace
 
 StatusLine::StatusLine(std::FILE* out)
     : out_(out), terminal_(is_terminal(out)), next_(std::chrono::steady_clock::now()) {}
@@ -479,7 +498,8 @@ bool StatusLine::due() {
 
 void StatusLine::show(const std::string& text) {
   restart_line(out_);
-  fmt::print(out_, "  {}{}", shown(text, kLongestCell), terminal_ ? "" : "\n");
+  const std::string line = "  " + shown(text, kLongestCell);
+  fmt::print(out_, "{}{}", terminal_ ? in_a_line(line, out_) : line, terminal_ ? "" : "\n");
   std::fflush(out_);
   drawn_ = terminal_;
 }
@@ -512,8 +532,10 @@ void ProgressBar::update(double done_s, const std::string& note) {
   for (int i = 0; i < kCells; ++i) bar += i < full ? "█" : "░";
   const double wall_s = std::chrono::duration<double>(now - started_).count();
   restart_line(out_);
-  fmt::print(out_, "  {} {:6.2f} / {:.2f} s  {:5.1f} s elapsed  {}", bar, done_s, total_s_, wall_s,
-             shown(note));
+  fmt::print(out_, "{}",
+             in_a_line(fmt::format("  {} {:6.2f} / {:.2f} s  {:5.1f} s elapsed  {}", bar, done_s,
+                                   total_s_, wall_s, shown(note)),
+                       out_));
   std::fflush(out_);
   drawn_ = true;
 }
@@ -531,7 +553,10 @@ void ProgressBar::update_endless(double done_s, const std::string& note) {
   next_ = now + std::chrono::milliseconds(50);
   const double wall_s = std::chrono::duration<double>(now - started_).count();
   restart_line(out_);
-  fmt::print(out_, "  {:8.2f} s  {:5.1f} s elapsed  {}", done_s, wall_s, shown(note));
+  fmt::print(
+      out_, "{}",
+      in_a_line(fmt::format("  {:8.2f} s  {:5.1f} s elapsed  {}", done_s, wall_s, shown(note)),
+                out_));
   std::fflush(out_);
   drawn_ = true;
 }

@@ -41,6 +41,15 @@ using Json = nlohmann::ordered_json;
 /// wrote it. Call it first.
 void show_harmless();
 
+/// Whether `out` may have colours: a terminal that knows them, without $NO_COLOR (no-color.org).
+[[nodiscard]] bool has_colours(std::FILE* out);
+
+/// What a line on the standard error is.
+enum class Said : std::uint8_t { kError, kWarning, kFault, kHint };
+/// A line on the standard error that begins with what it is, in its colour where there are colours.
+/// Throws nothing where it cannot be written.
+void say(Said what, const std::string& text);
+
 /// Begins the line anew on a terminal, over a bar that is there; nothing elsewhere.
 void restart_line(std::FILE* out);
 
@@ -117,7 +126,7 @@ void write_failure(const std::string& file);
 
 /// A table of two or more columns, the first left-aligned and the others to the right, unless all
 /// are texts. Cells are shown(), each in one line. A table of texts that is wider than 100
-/// characters breaks the widest column's lines at blanks.
+/// characters, or than the terminal, breaks the widest column's lines at blanks.
 class Table {
  public:
   explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}

@@ -133,8 +133,7 @@ Exit identify_command(const IdentifyOptions& options) {
   print_result(out, *result, figures_json(*result));
   for (const std::string& remark : result->remarks)
     fmt::print(stderr, "note: {}\n", shown(remark, 2'000));
-  for (const std::string& warning : result->warnings)
-    fmt::print(stderr, "warning: {}\n", shown(warning, 2'000));
+  for (const std::string& warning : result->warnings) say(Said::kWarning, shown(warning, 2'000));
   const auto written = write_identified(*robot, *result, options.logs, draft->path());
   if (!written) return refuse(draft->placed(written.error()));
   Facts files;

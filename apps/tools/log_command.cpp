@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 #include <ext/stdio_filebuf.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <filesystem>
 #include <iostream>
@@ -71,12 +72,15 @@ static void figures(Figures& f, const log::LoggedTopic& topic) {
   f("fields", fields);
 }
 
-/// What all its files have; one that cannot be read has nothing.
-static std::vector<log::Attachment> attachments_in(const log::LogFile& file) {
+/// What all its files have; one that cannot be read has none.
+static std::vector<log::Attachment> states_in(const log::LogFile& file) {
   std::vector<log::Attachment> all;
   for (const log::LogPart& part : file.parts()) {
-    const auto its = log::attachments_of(part.path);
-    if (its) all.insert(all.end(), its->begin(), its->end());
+    auto its = log::attachments_of(part.path);
+    if (!its) continue;
+    for (log::Attachment& one : *its) {
+      if (one.name.starts_with(log::kStateName)) all.push_back(std::move(one));
+    }
   }
   return all;
 }
@@ -108,7 +112,7 @@ static void figures(Figures& f, const log::LogFile* file) {
   f("branches", "logs beside it of the same run, which [went back in time](time.md#branches)",
     [&] { return log::branches_beside(file->path()); });
   f("attachments", "states that another run [goes on from](time.md#from-a-log)",
-    [&] { return attachments_in(*file); });
+    [&] { return states_in(*file); });
 }
 
 std::vector<Figures::Row> log_figures() { return Figures::rows_of<const log::LogFile*>(); }
@@ -142,23 +146,24 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
               shown(remark, 4'096));
   }
   if (!info.branch.of.empty()) {
-    facts.add("branch of",
-              fmt::format("{}, from cycle {} on{}", shown(info.branch.of, 4'096), info.branch.cycle,
-                          info.branch.snapshot == 0
-                              ? ""
-                              : fmt::format("; snapshot {:016x}", info.branch.snapshot)));
+    facts.add(
+        "branch of",
+        fmt::format(
+            "{}, from cycle {} on{}", shown(info.branch.of, 4'096), info.branch.cycle,
+            info.branch.snapshot == 0 ? "" : fmt::format("; state {:016x}", info.branch.snapshot)));
   }
   for (const log::BranchLog& one : log::branches_beside(file.path())) {
     facts.add("branches",
               fmt::format("{} goes on from {} at {:.6g} s", shown(one.file, 4'096),
                           shown(one.of, 4'096), static_cast<double>(one.time_ns) * 1e-9));
   }
-  if (const auto states = attachments_in(file); !states.empty()) {
+  if (const auto states = states_in(file); !states.empty()) {
     facts.add("states", fmt::format("{}, {:.6g} to {:.6g} s: tandem run … --from {}@TIME",
                                     states.size(), 1e-9 * static_cast<double>(states[0].time_ns),
                                     1e-9 * static_cast<double>(states.back().time_ns),
                                     shown(file.path(), 4'096)));
   }
+  for (const std::string& one : info.options) facts.add("option", one);
   facts.add("backend", info.hal);
   facts.add("seed", std::to_string(info.seed));
   facts.add("period", info.period_ns == 0
@@ -181,7 +186,7 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
   for (const auto& [key, value] : file.shown_result()) facts.add(key, value);
   facts.add("data sha256", file.data_sha256());
   facts.print(out);
-  if (file.topics().empty()) return;
+  if (std::ranges::all_of(file.topics(), [](const auto& one) { return one.messages == 0; })) return;
   Table table({"topic", "messages", "from [s]", "to [s]", "fields"});
   for (const log::LoggedTopic& topic : file.topics()) {
     table.add({topic.name, std::to_string(topic.messages),

@@ -1,7 +1,6 @@
 #include "apps/tools/new_source.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
@@ -13,6 +12,7 @@
 #include "base/open_file.hpp"
 #include "base/process.hpp"
 #include "base/quoting.hpp"
+#include "base/temporary_folder.hpp"
 #include "model/shape_mass.hpp"
 #include "model/urdf_write.hpp"
 
@@ -22,26 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 
 bool is_xacro(const std::string& file) { return fs::path(file).extension() == ".xacro"; }
-
-/// A folder of our own, gone at the end.
-class Scratch {
- public:
-  Scratch() {
-    std::error_code ignored;
-    std::string name = (fs::temp_directory_path(ignored) / "tandem-new-XXXXXX").string();
-    if (::mkdtemp(name.data()) != nullptr) path_ = name;
-  }
-  ~Scratch() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 std::unexpected<Error> failed(const std::string& file, std::string message, std::string hint) {
   return std::unexpected(Error{std::move(message), std::move(hint), file, 0, {}});
@@ -65,10 +45,10 @@ Result<std::string> expanded(const std::string& file) {
     return failed(file, "this is xacro, and no program xacro is installed to expand it",
                   "where ROS is: " + command + "; or pip install xacro");
   }
-  const Scratch scratch;
-  if (scratch.path().empty())
-    return failed(file, "there is no folder for temporary files", "set TMPDIR to one");
-  const std::string output = scratch.path() + "/robot.urdf", said = scratch.path() + "/said";
+  const TemporaryFolder scratch("new");
+  if (const Status made = scratch.made(); !made)
+    return failed(file, made.error().message, made.error().hint);
+  const std::string output = scratch.below("robot.urdf"), said = scratch.below("said");
   const auto child =
       spawn({.command = {"xacro", fs::absolute(file).string(), "-o", output}, .output = said});
   if (!child) return failed(file, "xacro cannot be started: " + child.error().message, command);

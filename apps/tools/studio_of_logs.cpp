@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
+#include <filesystem>
 #include <string_view>
 
 #include "apps/text/console.hpp"
@@ -83,11 +85,25 @@ Exit studio_of_logs(const StudioCommandOptions& options) {
                    .file = {},
                    .key = {}});
   }
+  // A long log takes seconds. On stderr: whoever reads the address has no other line before it.
+  const auto say = [](const std::string& words) {
+    fmt::print(stderr, "{} …\n", words);
+    std::fflush(stderr);
+  };
+  for (const std::string& log : options.logs) {
+    const std::filesystem::path path(log);
+    std::error_code none;
+    const std::uintmax_t bytes = std::filesystem::file_size(path, none);
+    if (!none)
+      say(fmt::format("reading {} ({:.1f} MB)", shown(path.filename().string()),
+                      1e-6 * static_cast<double>(bytes)));
+  }
   const std::vector<std::string> others(options.logs.begin() + 1, options.logs.end());
   model::KernelLibrary kernels;
   auto report = report::read_any(options.logs.front(), others, kernels_into(kernels),
                                  hal::can::DriveMaster::error_text);
   if (!report) return refuse(report.error());
+  say("laying out every cycle of it");
   const auto recording = report::record(*report, report::kServedRows);
   if (!recording) return refuse(recording.error());
   for (report::PageTable& table : report::largest_differences(*recording))

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <numbers>
 
+#include "hal/config/terrain_grid.hpp"
+
 namespace tandem::hal {
 namespace {
 
@@ -94,15 +96,34 @@ double steepest_slope(const GroundShape& shape) {
   return rise + std::numbers::sqrt2 * kSteepestFade * high / shape.edge_m;
 }
 
+/// `parts` + 1 places from `from` to `to`.
+void add_parts(double from, double to, int parts, std::vector<double>& places) {
+  for (int i = 0; i <= parts && std::isfinite(from) && std::isfinite(to); ++i)
+    places.push_back(std::lerp(from, to, static_cast<double>(i) / parts));
+}
+
+/// Both edges of a step or slope, on which its height fades.
+void edge_lines(const std::array<double, 2>& range, double edge_m, std::vector<double>& places) {
+  constexpr int kParts = 6;
+  add_parts(range[0] - edge_m, range[0], kParts, places);
+  add_parts(range[1], range[1] + edge_m, kParts, places);
+}
+
+void hill_lines(const std::array<double, 2>& range, double, std::vector<double>& places) {
+  constexpr int kParts = 24;
+  add_parts(range[0], range[1], kParts, places);
+}
+
 struct Kind {
   Surface (*at)(const GroundShape&, double x, double y) noexcept;
   double (*steepest)(const GroundShape&);
+  void (*lines)(const std::array<double, 2>& range, double edge_m, std::vector<double>& places);
 };
 
 constexpr Kind kKinds[] = {
-    {&slope, &steepest_slope},
-    {&step, &steepest_step},
-    {&bump, &steepest_bump},
+    {&slope, &steepest_slope, &edge_lines},
+    {&step, &steepest_step, &edge_lines},
+    {&bump, &steepest_bump, &hill_lines},
 };
 
 const Kind& kind_of(const GroundShape& shape) noexcept {
@@ -127,6 +148,11 @@ Surface Terrain::at(double x_m, double y_m) const noexcept TANDEM_RT {
   Surface all;
   for (const GroundShape& shape : shapes_) all += kind_of(shape).at(shape, x_m, y_m);
   return all;
+}
+
+void add_lines(const Terrain& terrain, std::size_t axis, std::vector<double>& places_m) {
+  for (const GroundShape& shape : terrain.shapes())
+    kind_of(shape).lines(axis == 0 ? shape.x_m : shape.y_m, shape.edge_m, places_m);
 }
 
 GroundMotion Terrain::motion_at(double time_s) const noexcept TANDEM_RT {

@@ -10,6 +10,10 @@
 #include "base/realtime.hpp"
 #include "canopen/frame.hpp"
 
+namespace tandem {
+class Archive;
+}
+
 namespace tandem::hal::can {
 
 enum class BusState : std::uint8_t {
@@ -58,6 +62,8 @@ class Bus {
   [[nodiscard]] virtual bool gives_up(int /*node*/) const noexcept TANDEM_RT { return false; }
   /// All that the nodes of this end say in a step has been sent.
   virtual void end_step() noexcept TANDEM_RT {}
+  /// What this end remembers between two cycles of lockstep, when every frame was taken. Not RT.
+  virtual void archive(Archive& /*ar*/) {}
 
   /// When the frames of the last receive() reached this machine [ns, the clock of sent_ns()], in
   /// their order; empty when the bus does not know.
@@ -98,6 +104,7 @@ class ForwardingBus : public Bus {
     return to_->gives_up(node);
   }
   void end_step() noexcept TANDEM_RT override { to_->end_step(); }
+  void archive(Archive& ar) override { to_->archive(ar); }
   [[nodiscard]] std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT override {
     return to_->received_ns();
   }

@@ -5,11 +5,17 @@
 #include <algorithm>
 #include <limits>
 
+#include "base/archive.hpp"
+#include "base/counted.hpp"
 #include "canopen/objects.hpp"
 
 namespace tandem::hal::can {
 
 using canopen::Frame;
+using canopen::PastAnswerMessage;
+using canopen::PastOrder;
+using canopen::PastOrderMessage;
+using canopen::PastRefusal;
 
 namespace {
 
@@ -47,6 +53,10 @@ void CanBackend::Collected::collect(const DriveMaster& master) noexcept {
         ++times_;
         continue;
       }
+      if (batch[i].id == canopen::cob::kPastAnswer) {
+        take_past(batch[i]);
+        continue;
+      }
       sampled_.set(master.completes(index_, batch[i]));
       frames_ns_[kept] = i < stamps.size() ? stamps[i] : 0;
       frames_[kept++] = batch[i];
@@ -54,6 +64,28 @@ void CanBackend::Collected::collect(const DriveMaster& master) noexcept {
     count_ = kept;
     if (got < room) return;
   }
+}
+
+void CanBackend::Collected::expect(const PastOrderMessage& order) noexcept {
+  expected_ = order;
+  past_.reset();
+}
+
+/// Frames of that identifier are an emulated robot's alone; a real one is never asked.
+void CanBackend::Collected::take_past(const Frame& frame) noexcept {
+  const auto answer = canopen::parse_past_answer(frame);
+  if (answer && answer->to.order == PastOrder::kHeard) {
+    heard_ = true;
+  } else if (answer && answer->to == expected_ && !past_) {
+    past_ = answer;
+  } else {
+    ++stray_answers_;
+  }
+}
+
+void CanBackend::Collected::archive(Archive& ar) {
+  ForwardingBus::archive(ar);
+  if (ar.reading()) first_ = count_ = 0;
 }
 
 void CanBackend::Collected::forget(const DriveMaster& master) noexcept {
@@ -187,6 +219,11 @@ void CanBackend::exchange(const CycleTime& time) noexcept {
     const bool half = !config_.lockstep && !asked_again;
     wait_->wait(deadline_ns - now_ns - (half ? window_ns / 2 : 0), static_cast<int>(waiting - 1));
   }
+  hear();
+}
+
+void CanBackend::hear() noexcept {
+  for (const auto& bus : buses_) outside_->came = bus->take_heard() || outside_->came;
 }
 
 Code CanBackend::read(const CycleTime& time, StateImage& state) noexcept TANDEM_RT {
@@ -212,6 +249,131 @@ std::int64_t CanBackend::clock_shift_ns() const noexcept TANDEM_RT {
 /// Nobody is there to be shut down when the emulated robot is gone.
 bool CanBackend::shut_down() noexcept TANDEM_RT { return silent_ || master_->shut_down(); }
 
-bool CanBackend::archive(Archive& /*ar*/) { return false; }
+// The past of an emulated robot: between TIME of a cycle and SYNC of the next the robot stands, and
+// a bus keeps its order. So whatever was sent before an order is there, both ways, once every bus
+// has brought the answer.
+
+bool CanBackend::archive(Archive& ar) {
+  if (!config_.lockstep || silent_) return false;
+  ar(*master_, begun_);
+  for (const auto& bus : buses_) bus->archive(ar);
+  return true;
+}
+
+namespace {
+
+constexpr const char* kOfThisVersion =
+    "begin again with a `tandem emulate … --lockstep` of this version";
+
+Error refused(PastRefusal why) {
+  switch (why) {
+    case PastRefusal::kNoMemory:
+      return {.message = "the emulated robot has no memory for another state",
+              .hint = "give its process more, or this run less of the past: --checkpoints 16MB",
+              .file = {},
+              .key = {}};
+    case PastRefusal::kUnknown:
+      return {.message =
+                  "the emulated robot has no such state: it was started anew, or has "
+                  "another master",
+              .hint = "go to a later moment, or begin both again",
+              .file = {},
+              .key = {}};
+    case PastRefusal::kNone:
+    case PastRefusal::kNoOrder: break;
+  }
+  return {.message = "the emulated robot does not know this order about its past",
+          .hint = kOfThisVersion,
+          .file = {},
+          .key = {}};
+}
+
+}  // namespace
+
+/// The first order asks whether the robot knows any. One that has known them is waited for as long
+/// as in a cycle; then it is gone, for it may carry the order out later, and is another one then.
+/// @return what the robot has answered on every bus
+Result<PastAnswerMessage> CanBackend::order(const PastOrderMessage& order) {
+  if (!config_.lockstep) return fail("a robot in real time cannot be rewound");
+  if (!no_past_.empty()) return fail(no_past_, kOfThisVersion);
+  if (silent_) return fail("no emulated robot answers in lockstep any more", kOfThisVersion);
+  const Frame frame = canopen::make_past_order(order);
+  const std::uint64_t strays = stray_answers();
+  for (const auto& bus : buses_) bus->expect(order);
+  for (const auto& bus : buses_) (void)bus->send({&frame, 1});
+  std::int64_t deadline_ns =
+      wait_->now_ns() + (has_past_ ? config_.lockstep_timeout_ns : config_.past_timeout_ns);
+  PastAnswerMessage answer;
+  for (std::size_t waiting = buses_.size(); waiting > 0;) {
+    Collected& bus = *buses_[waiting - 1];
+    bus.collect(*master_);
+    if (bus.past()) {
+      if (answer.refusal == PastRefusal::kNone) answer = *bus.past();
+      --waiting;
+      continue;
+    }
+    const std::int64_t now_ns = wait_->now_ns();
+    if (now_ns >= deadline_ns) return no_answer(stray_answers() > strays);
+    if (wait_->stopping()) deadline_ns = std::min(deadline_ns, now_ns + kPatienceNs);
+    wait_->wait(deadline_ns - now_ns, static_cast<int>(waiting - 1));
+  }
+  has_past_ = true;
+  hear();
+  for (const auto& bus : buses_) bus->expect({.order = PastOrder::kHeard});
+  if (answer.refusal != PastRefusal::kNone) return std::unexpected(refused(answer.refusal));
+  return answer;
+}
+
+std::unexpected<Error> CanBackend::no_answer(bool strange) {
+  if (strange) {
+    no_past_ =
+        "the emulated robot answers (102) for another state than it was asked for: two of them "
+        "are on one bus";
+  } else {
+    no_past_ = has_past_
+                   ? "the emulated robot does not answer orders about its past (101) any more"
+                   : "the emulated robot does not answer orders about its past (101): it is of a "
+                     "version that cannot go back, or gone";
+  }
+  silent_ = has_past_;
+  return fail(no_past_, kOfThisVersion);
+}
+
+Result<KeptElsewhere> CanBackend::keep() {
+  if (kept_ == 0) {  // what an earlier master left there
+    if (const auto dropped = order({PastOrder::kDrop, 0}); !dropped)
+      return std::unexpected(dropped.error());
+  }
+  const auto kept = order({PastOrder::kKeep, ++kept_});
+  if (!kept) return std::unexpected(kept.error());
+  return KeptElsewhere{.number = kept_, .bytes = kept->size * PastAnswerMessage::kSizeUnit};
+}
+
+Status CanBackend::go_back(const KeptElsewhere& kept) {
+  const auto there = order({PastOrder::kGoBack, kept.number});
+  if (!there) return std::unexpected(there.error());
+  return {};
+}
+
+void CanBackend::forget(const KeptElsewhere& kept) noexcept {
+  if (no_past_.empty()) (void)order({PastOrder::kDrop, kept.number});
+}
+
+std::uint64_t CanBackend::stray_answers() const noexcept {
+  std::uint64_t strays = 0;
+  for (const auto& bus : buses_) strays += bus->stray_answers();
+  return strays;
+}
+
+std::vector<std::string> CanBackend::warnings() const {
+  std::vector<std::string> all = master_->warnings();
+  const std::uint64_t strays = stray_answers();
+  if (strays > 0) {
+    all.push_back(counted(strays, "answer") +
+                  " about the robot's past (102) came that nobody had asked for: another emulated "
+                  "robot, or a stranger, is on the bus");
+  }
+  return all;
+}
 
 }  // namespace tandem::hal::can

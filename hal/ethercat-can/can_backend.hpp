@@ -8,8 +8,10 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "canopen/messages.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/bus.hpp"
 #include "hal/ethercat-can/drive_backend.hpp"
@@ -22,6 +24,7 @@ struct CanBackendConfig {
   bool lockstep = false;       ///< wait for an emulated robot's TIME, at any speed
   double answer_window = 0.5;  ///< in real time: share of the period to wait for answers
   std::int64_t lockstep_timeout_ns = 10'000'000'000;  ///< then the emulated robot is gone
+  std::int64_t past_timeout_ns = 2'000'000'000;  ///< then it does not know keep() and go_back()
 };
 
 /// exchange() sends SYNC and collects the answers; read() decodes them, write() sends commands.
@@ -61,8 +64,15 @@ class CanBackend final : public DriveBackend {
     float most;  ///< of one cycle since the start
   };
   [[nodiscard]] WireLoad wire_load(std::size_t bus) const noexcept;
-  /// The robot cannot be rewound: false.
+  /// A robot outside of lockstep cannot be rewound: false. In lockstep the rest of the state is the
+  /// emulated robot's to keep.
   [[nodiscard]] bool archive(Archive& ar) override;
+  void heed(Outside& outside) noexcept override { outside_ = &outside; }
+  [[nodiscard]] Result<KeptElsewhere> keep() override;
+  [[nodiscard]] Status go_back(const KeptElsewhere& kept) override;
+  void forget(const KeptElsewhere& kept) noexcept override;
+  /// The master's; and what was heard of the past that nobody had asked for. Not RT.
+  [[nodiscard]] std::vector<std::string> warnings() const;
 
  private:
   /// A bus whose frames exchange() has taken already. Sending goes straight on.
@@ -73,6 +83,15 @@ class CanBackend final : public DriveBackend {
     void collect(const DriveMaster& master) noexcept;
     void forget(const DriveMaster& master) noexcept;  ///< everything that has come so far
     [[nodiscard]] bool answered() const noexcept { return times_ > 0; }
+    /// In lockstep: this is asked of the robot's past from now on; kHeard: nothing.
+    void expect(const canopen::PastOrderMessage& order) noexcept;
+    /// What it has answered; none: nothing yet.
+    [[nodiscard]] const std::optional<canopen::PastAnswerMessage>& past() const noexcept {
+      return past_;
+    }
+    [[nodiscard]] std::uint64_t stray_answers() const noexcept { return stray_answers_; }
+    /// The robot has taken something from outside since this was asked.
+    [[nodiscard]] bool take_heard() noexcept { return std::exchange(heard_, false); }
     [[nodiscard]] const DriveMaster::NodeSet& sampled() const noexcept { return sampled_; }
     void begin_cycle() noexcept;
 
@@ -80,8 +99,11 @@ class CanBackend final : public DriveBackend {
     [[nodiscard]] std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT override {
       return given_ns_;
     }
+    void archive(Archive& ar) override;
 
    private:
+    void take_past(const canopen::Frame& frame) noexcept;
+
     std::size_t index_;  ///< of the bus
     std::vector<canopen::Frame> frames_;
     std::vector<std::int64_t> frames_ns_;
@@ -89,6 +111,10 @@ class CanBackend final : public DriveBackend {
     std::size_t first_ = 0, count_ = 0;
     std::size_t times_ = 0;         ///< TIMEs since begin_cycle()
     DriveMaster::NodeSet sampled_;  ///< samples since begin_cycle(); [0]: of nobody
+    canopen::PastOrderMessage expected_{.order = canopen::PastOrder::kHeard};
+    std::optional<canopen::PastAnswerMessage> past_;
+    std::uint64_t stray_answers_ = 0;
+    bool heard_ = false;
   };
 
   /// A bus' frames, and how much of its time they take.
@@ -106,6 +132,10 @@ class CanBackend final : public DriveBackend {
   CanBackend(Wires wires, std::vector<std::unique_ptr<Collected>> buses,
              std::unique_ptr<DriveMaster> master, FrameWait& wait, const CanBackendConfig& config);
   [[nodiscard]] bool answered(std::size_t bus) const noexcept;
+  void hear() noexcept;
+  [[nodiscard]] std::uint64_t stray_answers() const noexcept;
+  [[nodiscard]] std::unexpected<Error> no_answer(bool strange);
+  [[nodiscard]] Result<canopen::PastAnswerMessage> order(const canopen::PastOrderMessage& order);
 
   Wires wires_;
   std::vector<std::unique_ptr<Collected>> buses_;
@@ -113,6 +143,11 @@ class CanBackend final : public DriveBackend {
   CanBackendConfig config_;
   bool begun_ = false;
   bool silent_ = false;  ///< lockstep: the emulated robot did not answer in time
+  hal::Outside own_outside_;
+  hal::Outside* outside_ = &own_outside_;
+  bool has_past_ = false;   ///< it has answered an order
+  std::uint32_t kept_ = 0;  ///< the last number; 0: nothing was kept yet
+  std::string no_past_;     ///< why the robot has no past any more; empty: it may have
 };
 
 }  // namespace tandem::hal::can

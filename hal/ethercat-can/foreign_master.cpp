@@ -17,6 +17,7 @@ const char* sent_by_master(const canopen::Frame& frame) noexcept {
   if (frame.id == cob::kNmt) return "NMT commands (000)";
   if (frame.id == cob::kSync) return "SYNC (080)";
   if (frame.id == cob::kHeartbeat + kMasterNodeId) return "a master's heartbeat (77F)";
+  if (frame.id == cob::kPastOrder) return "orders to an emulated robot (101)";
   return nullptr;
 }
 

@@ -154,6 +154,9 @@ std::size_t LineBus::send(std::span<const Frame> frames) noexcept TANDEM_RT {
       command(frame);
     } else if (frame.id == cob::kSync) {
       begin_cycle();
+    } else if (frame.id == cob::kPastOrder) {
+      line_->post(frame);
+      asked_ = true;
     } else if (slave < slaves_.size() && (frame.id & 0x780) == cob::kSdoRequest) {
       request(slave, frame);
     } else if (slave < slaves_.size()) {
@@ -237,7 +240,7 @@ void LineBus::begin_cycle() noexcept {
     if (slaves_[i].op_wanted && slave.stage() == SlaveStage::kReady) slave.start(now_ns_);
   }
   line_->send(now_ns_);
-  taken_ = false;
+  taken_ = asked_ = false;
 }
 
 /// All at once when nobody was started yet; else each by itself, while the others run.
@@ -257,10 +260,11 @@ void LineBus::restart() noexcept {
 }
 
 std::size_t LineBus::receive(std::span<Frame> frames) noexcept TANDEM_RT {
-  if (!taken_) {
-    const bool complete = line_->collect();
-    if (config_.lockstep ? line_->settled() : complete) take_cycle();
+  const bool complete = (!taken_ || asked_) && line_->collect();
+  if (config_.lockstep) {
+    while (const auto past = line_->take_posted(canopen::cob::kPastAnswer)) inbox_.push(*past);
   }
+  if (!taken_ && (config_.lockstep ? line_->settled() : complete)) take_cycle();
   const std::span<const Frame> waiting = inbox_.frames().subspan(given_);
   const std::size_t count = std::min(waiting.size(), frames.size());
   std::copy_n(waiting.begin(), count, frames.begin());
@@ -394,6 +398,7 @@ void LineBus::archive(Archive& ar) {
   if (!ar.reading()) return;
   inbox_.clear();
   given_ = 0;
+  asked_ = false;
 }
 
 std::string LineBus::status_text() const {

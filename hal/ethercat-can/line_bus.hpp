@@ -34,6 +34,7 @@ namespace tandem::hal::can {
 /// | NMT start                      | SAFEOP, clocks, OP                                 |
 /// | NMT stop                       | outputs 0                                          |
 /// | NMT pre-operational, every node | INIT                                              |
+/// | 101, in lockstep               | a datagram NOP, which none of them looks at        |
 ///
 /// Back come inputs as TPDOs, answers and emergencies of the mailbox, a boot-up when the slave is
 /// in PREOP, and as its heartbeat the state that it is in, as long as frames reach it. In lockstep
@@ -73,8 +74,7 @@ class LineBus final : public Bus {
   /// Lost cycles, frames sent again, and how closely the clocks follow.
   [[nodiscard]] std::string measured_text() const override;
 
-  /// Between two cycles, when every frame was taken.
-  void archive(Archive& ar);
+  void archive(Archive& ar) override;
 
   [[nodiscard]] const ecat::LineMaster& line() const noexcept { return *line_; }
 
@@ -138,6 +138,7 @@ class LineBus final : public Bus {
   std::int64_t now_ns_ = 0;    ///< cycles so far
   std::int64_t shift_ns_ = 0;  ///< of the last cycle; no state
   bool taken_ = true;          ///< what the last cycle brought
+  bool asked_ = false;         ///< an order about the past went out after it; no state
   ecat::LinkStatistics told_;  ///< by take_wire_ns(); no state
   std::vector<canopen::Frame> storage_;
   canopen::FrameSink inbox_;  ///< for the drive master

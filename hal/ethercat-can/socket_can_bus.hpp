@@ -21,8 +21,8 @@ namespace tandem::hal::can {
 
 /// Who is at this end: decides which frames the kernel lets through.
 enum class SocketSide : std::uint8_t {
-  kMaster,   ///< what nodes send: emergencies, TPDOs, SDO answers, heartbeats, TIME
-  kBoards,   ///< NMT, SYNC, RPDOs, SDO requests, every heartbeat, remote requests for TPDOs
+  kMaster,   ///< what nodes send: emergencies, TPDOs, SDO answers, heartbeats, TIME, 102
+  kBoards,   ///< NMT, SYNC, 101, RPDOs, SDO requests, every heartbeat, remote requests for TPDOs
   kWitness,  ///< every frame
   kSender,   ///< nothing: for who only sends
 };

@@ -142,9 +142,11 @@ std::vector<can_filter> filters(SocketSide side) {
     let(cob::kSdoResponse, kFunctionMask);
     let(cob::kHeartbeat, kFunctionMask);
     let(cob::kTime, cob::kIdMask);
+    let(cob::kPastAnswer, cob::kIdMask);
   } else if (side == SocketSide::kBoards) {
     let(cob::kNmt, cob::kIdMask);
     let(cob::kSync, cob::kIdMask);
+    let(cob::kPastOrder, cob::kIdMask);
     for (int number = 1; number <= canopen::kPdosPerNode; ++number) {
       let(cob::rpdo(number, 0), kFunctionMask);
       let(cob::tpdo(number, 0), kFunctionMask, CAN_RTR_FLAG);

@@ -4,15 +4,20 @@
 #include "hal/sim/emulator.hpp"
 
 #include <algorithm>
+#include <exception>
 #include <limits>
 #include <utility>
 
-#include "canopen/messages.hpp"
+#include "base/archive.hpp"
 #include "canopen/objects.hpp"
 
 namespace tandem::sim {
 
 using canopen::Frame;
+using canopen::PastAnswerMessage;
+using canopen::PastOrder;
+using canopen::PastOrderMessage;
+using canopen::PastRefusal;
 
 namespace {
 
@@ -31,6 +36,7 @@ Emulator::Emulator(EmulatedRobot& robot, std::span<hal::can::Bus* const> buses,
 
 Code Emulator::poll(std::int64_t patience_ns) noexcept {
   collect();
+  obey();
   const std::int64_t now_ns = config_.lockstep ? 0 : wait_->now_ns();  // nothing depends on it
   const Due next = due(now_ns);
   if (next.now) return step(now_ns);
@@ -46,7 +52,7 @@ void Emulator::collect() noexcept {
       count = port.bus->receive(batch_);
       const std::span<const Frame> frames = std::span(batch_).first(count);
       statistics_.frames_in += count;
-      (void)robot_->bus(b).master().send(frames);
+      take(port, b, frames);
       const auto syncs = std::ranges::count(frames, canopen::cob::kSync, &Frame::id);
       if (syncs > 0 && first_sync_ns_ == 0 && !config_.lockstep) {
         first_sync_ns_ = wait_->now_ns();
@@ -54,6 +60,119 @@ void Emulator::collect() noexcept {
       port.sync = port.sync || syncs > 0;
     } while (count == batch_.size());
   }
+}
+
+/// To the robot, but for orders about its past, which are the emulator's.
+void Emulator::take(Port& port, std::size_t bus, std::span<const Frame> frames) noexcept {
+  hal::can::Bus& boards = robot_->bus(bus).master();
+  const auto is_order = [](const Frame& frame) { return frame.id == canopen::cob::kPastOrder; };
+  for (auto rest = frames; !rest.empty();) {
+    const auto order = std::ranges::find_if(rest, is_order);
+    const auto before = static_cast<std::size_t>(order - rest.begin());
+    (void)boards.send(rest.first(before));
+    if (before == rest.size()) return;
+    if (config_.lockstep) port.order = canopen::parse_past_order(*order);
+    rest = rest.subspan(before + 1);
+  }
+}
+
+/// An order is one when every bus has brought it: then all that was sent before is here.
+void Emulator::obey() noexcept {
+  const std::optional<PastOrderMessage> order = ports_.empty() ? std::nullopt : ports_[0].order;
+  const bool everywhere =
+      order && std::ranges::all_of(ports_, [&](const Port& port) { return port.order == order; });
+  if (!everywhere) return;
+  for (Port& port : ports_) port.order.reset();
+  // What came is in that state, and in none before it.
+  if (order->order == PastOrder::kKeep) tell_heard();
+  tell(carry_out(*order));
+}
+
+void Emulator::tell(const PastAnswerMessage& answer) noexcept {
+  const Frame frame = canopen::make_past_answer(answer);
+  for (const Port& port : ports_) {
+    const std::size_t sent = port.bus->send({&frame, 1});
+    statistics_.frames_out += sent;
+    statistics_.frames_lost += 1 - sent;
+  }
+}
+
+void Emulator::tell_heard() noexcept {
+  if (!std::exchange(heard_, false) || kept_.empty()) return;
+  tell({.to = {.order = PastOrder::kHeard}});
+}
+
+PastAnswerMessage Emulator::carry_out(const PastOrderMessage& order) noexcept {
+  PastAnswerMessage answer{.to = order};
+  const auto kept = kept_.find(order.number);
+  switch (order.order) {
+    case PastOrder::kKeep: answer.refusal = keep(order.number); break;
+    case PastOrder::kGoBack:
+      if (kept == kept_.end()) {
+        answer.refusal = PastRefusal::kUnknown;
+      } else {
+        answer.refusal = go_back(kept->second);
+      }
+      break;
+    case PastOrder::kDrop:
+      if (order.number == 0) {
+        kept_.clear();
+      } else if (kept_.erase(order.number) == 0) {
+        answer.refusal = PastRefusal::kUnknown;
+      }
+      break;
+    case PastOrder::kHeard:
+    default: answer.refusal = PastRefusal::kNoOrder;
+  }
+  const auto state = kept_.find(order.number);
+  if (state == kept_.end()) return answer;
+  const std::size_t units =
+      (state->second.size() + PastAnswerMessage::kSizeUnit - 1) / PastAnswerMessage::kSizeUnit;
+  answer.size = static_cast<std::uint16_t>(std::min<std::size_t>(units, 0xFFFF));
+  return answer;
+}
+
+PastRefusal Emulator::keep(std::uint32_t number) noexcept {
+  try {
+    Archive ar;
+    archive(ar);
+    if (!ar.ok() || kept_bytes() + ar.bytes().size() > config_.kept_bytes)
+      return PastRefusal::kNoMemory;
+    kept_[number].assign(ar.bytes().begin(), ar.bytes().end());
+    return PastRefusal::kNone;
+  } catch (const std::exception&) {
+    kept_.erase(number);
+    return PastRefusal::kNoMemory;
+  }
+}
+
+/// Reading takes a copy, and nothing has changed before it is there.
+PastRefusal Emulator::go_back(std::span<const std::byte> state) noexcept {
+  try {
+    Archive ar(state);
+    archive(ar);
+    heard_ = false;
+    return ar.ok() && ar.at_end() ? PastRefusal::kNone : PastRefusal::kUnknown;
+  } catch (const std::exception&) {
+    return PastRefusal::kNoMemory;
+  }
+}
+
+void Emulator::archive(Archive& ar) {
+  ar(*robot_, next_time_ns_, running_);
+  for (Port& port : ports_) port.bus->archive(ar);
+}
+
+std::size_t Emulator::kept_bytes() const noexcept {
+  std::size_t bytes = 0;
+  for (const auto& [number, state] : kept_) bytes += state.size();
+  return bytes;
+}
+
+Code Emulator::inject(const ScenarioFault& fault) noexcept {
+  const Code code = robot_->inject(fault);
+  heard_ = heard_ || code == Code::kOk;
+  return code;
 }
 
 Emulator::Due Emulator::due(std::int64_t now_ns) const noexcept {
@@ -130,6 +249,7 @@ void Emulator::watch_silence() noexcept {
 }
 
 void Emulator::answer() noexcept {
+  tell_heard();
   for (std::size_t b = 0; b < ports_.size(); ++b) {
     hal::can::Bus& out = *ports_[b].bus;
     std::size_t count = 0;

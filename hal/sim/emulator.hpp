@@ -2,10 +2,14 @@
 // Layer: hal/sim.  Thread: one.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "canopen/messages.hpp"
 #include "hal/ethercat-can/bus.hpp"
 #include "hal/ethercat-can/frame_wait.hpp"
 #include "hal/sim/emulated_robot.hpp"
@@ -15,6 +19,7 @@ namespace tandem::sim {
 struct EmulatorConfig {
   std::int64_t period_ns = 1'000'000;  ///< of a step; the master's SYNC period
   bool lockstep = false;
+  std::size_t kept_bytes = 4'000'000'000;  ///< that states for the master may take
 };
 
 /// How a board stops without SYNC, in steps since SYNC came last on its bus. 0: not (yet). A master
@@ -53,7 +58,9 @@ class StepWatcher {
 };
 
 /// In lockstep a step is made when SYNC has come on every bus; after its answers TIME goes out on
-/// every bus. Without a master time stands still.
+/// every bus. Without a master time stands still. Between two steps the master may order, on every
+/// bus and as the last frame there, that the state be kept, gone back to or forgotten; the answer
+/// goes out on every bus. In real time there is no such order.
 ///
 /// In real time a step is made when SYNC has come on every bus, or half a period after the first of
 /// them; and when none came for a period and a half, because the boards have clocks of their own:
@@ -72,6 +79,13 @@ class Emulator {
   /// Before the first step. @param watcher  outlives the steps
   void watch(StepWatcher& watcher) noexcept { watcher_ = &watcher; }
 
+  /// Adds a fault between two steps: EmulatedRobot::inject(). In lockstep the master hears that
+  /// something came, for it cannot be played again.
+  [[nodiscard]] Code inject(const ScenarioFault& fault) noexcept;
+  /// States that are kept for the master, and the memory that they take.
+  [[nodiscard]] std::size_t kept() const noexcept { return kept_.size(); }
+  [[nodiscard]] std::size_t kept_bytes() const noexcept;
+
   [[nodiscard]] const EmulatorStatistics& statistics() const noexcept { return statistics_; }
   /// Simulated time of the last step; the first step is at 0.
   [[nodiscard]] std::int64_t time_ns() const noexcept { return robot_->now_ns(); }
@@ -80,6 +94,8 @@ class Emulator {
   struct Port {
     hal::can::Bus* bus;
     bool sync = false;  ///< one has come since the last step, or is that of the step
+    /// That came last, and was not carried out yet.
+    std::optional<canopen::PastOrderMessage> order{};
   };
   /// When a step is due without any further frame.
   struct Due {
@@ -89,6 +105,15 @@ class Emulator {
   };
 
   void collect() noexcept;
+  void take(Port& port, std::size_t bus, std::span<const canopen::Frame> frames) noexcept;
+  void obey() noexcept;
+  void tell(const canopen::PastAnswerMessage& answer) noexcept;
+  void tell_heard() noexcept;
+  [[nodiscard]] canopen::PastAnswerMessage carry_out(
+      const canopen::PastOrderMessage& order) noexcept;
+  [[nodiscard]] canopen::PastRefusal keep(std::uint32_t number) noexcept;
+  [[nodiscard]] canopen::PastRefusal go_back(std::span<const std::byte> state) noexcept;
+  void archive(Archive& ar);
   [[nodiscard]] Due due(std::int64_t now_ns) const noexcept;
   [[nodiscard]] Code step(std::int64_t now_ns) noexcept;
   [[nodiscard]] std::int64_t periods_to(std::int64_t now_ns) noexcept;
@@ -106,6 +131,8 @@ class Emulator {
   std::int64_t stepped_ns_ = 0;     ///< wall clock: of the last step
   std::int64_t first_sync_ns_ = 0;  ///< wall clock: of those that wait; 0: none waits
   bool running_ = false;            ///< the first step was made
+  bool heard_ = false;              ///< something from outside, since the last step
+  std::map<std::uint32_t, std::vector<std::byte>> kept_;
 };
 
 }  // namespace tandem::sim

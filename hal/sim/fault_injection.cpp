@@ -212,6 +212,12 @@ const FaultSlot* FaultInjection::next_over() noexcept TANDEM_RT {
   return nullptr;
 }
 
+void FaultInjection::come_later(const FaultInjection& own, std::span<const std::size_t> slots,
+                                bool alone) {
+  for (const std::size_t i : slots) slots_[i] = own.slots_[i];
+  if (alone) count_ = own.count_;
+}
+
 /// Only what is in use: what the arrays held before is no state.
 void FaultInjection::archive(Archive& ar) {
   ar(count_, held_count_, step_, seed_);

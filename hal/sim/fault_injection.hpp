@@ -156,6 +156,9 @@ class FaultInjection {
   }
 
   void archive(Archive& ar);
+  /// After archive() has read another one's: these slots are as in `own`, and none has acted in
+  /// either. @param alone  there are no others
+  void come_later(const FaultInjection& own, std::span<const std::size_t> slots, bool alone);
 
  private:
   struct Held {

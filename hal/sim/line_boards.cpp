@@ -47,7 +47,7 @@ LineBoards::LineBoards(EmulatedRobot& robot, std::size_t bus, hal::ecat::DataLin
   std::vector<firmware::esc::Slave*> slaves;
   for (const Seat& seat : seats_) slaves.push_back(seat.slave.get());
   line_ = std::make_unique<firmware::esc::SlaveLine>(std::move(slaves));
-  storage_.resize(seats_.size() * (2 + canopen::kPdosPerNode) + 1);
+  storage_.resize(seats_.size() * (2 + canopen::kPdosPerNode) + 2);
   inbox_ = canopen::FrameSink(storage_);
 }
 
@@ -139,11 +139,23 @@ void LineBoards::pass() noexcept {
     late_.size = 0;
   }
   for (; first_ < count_; ++first_) {
+    if (takes_order(came_[first_])) continue;
     if (!in_cycle_ && begins_cycle(came_[first_])) break;
     in_cycle_ = false;
     pass(came_[first_]);
   }
   if (back_count_ > 0) (void)link_->send(std::span(back_).first(back_count_));
+}
+
+/// In lockstep an order about the past is the emulator's: what came before it has passed.
+bool LineBoards::takes_order(hal::ecat::FrameBuffer& frame) noexcept {
+  if (config_.clock != nullptr) return false;
+  const auto order = hal::ecat::parse_nop_frame(frame);
+  if (!order || order->id != canopen::cob::kPastOrder) return false;
+  std::copy_n(frame.bytes.begin() + 6, master_.size(), master_.begin());
+  master_[0] |= ethercat::kProcessedMark;
+  inbox_.push(*order);
+  return true;
 }
 
 void LineBoards::pass(hal::ecat::FrameBuffer& frame) noexcept {
@@ -221,6 +233,11 @@ void LineBoards::tell_state(Seat& seat) noexcept {
 
 std::size_t LineBoards::send(std::span<const Frame> frames) noexcept TANDEM_RT {
   for (const Frame& frame : frames) {
+    if (frame.id == canopen::cob::kPastAnswer) {
+      hal::ecat::make_nop_frame(frame, master_, answer_);
+      (void)link_->send({&answer_, 1});
+      continue;
+    }
     const std::size_t place = (frame.id & 0x7F) - 1;
     if (place >= seats_.size()) continue;
     if ((frame.id & 0x780) == canopen::cob::kHeartbeat) watch_boot_up(seats_[place], frame);

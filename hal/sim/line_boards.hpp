@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "canopen/frame.hpp"
@@ -13,7 +14,7 @@
 #include "firmware_emu/slaves/slave_line.hpp"
 #include "hal/ethercat-can/bus.hpp"
 #include "hal/ethercat-can/frame_wait.hpp"
-#include "hal/ethercat-can/line/link.hpp"
+#include "hal/ethercat-can/line/nop_frame.hpp"
 #include "hal/sim/emulated_robot.hpp"
 
 namespace tandem::sim {
@@ -49,9 +50,13 @@ class LineBoards final : public hal::can::Bus {
     return hal::can::BusState::kActive;
   }
   [[nodiscard]] hal::can::BusStatistics statistics() const noexcept TANDEM_RT override;
+  /// Time of all frames of the line, those of a master that sends them again included.
+  [[nodiscard]] std::int64_t take_wire_ns() noexcept TANDEM_RT override {
+    const hal::ecat::LinkStatistics now = link_->statistics();
+    return now.wire_ns_since(std::exchange(told_, now));
+  }
 
-  /// Between two steps.
-  void archive(Archive& ar);
+  void archive(Archive& ar) override;
 
   [[nodiscard]] firmware::esc::SlaveLine& line() noexcept { return *line_; }
 
@@ -68,6 +73,7 @@ class LineBoards final : public hal::can::Bus {
   void add_seat(const EmulatedRobot::Node& node, const Config& config);
   void fetch() noexcept;
   [[nodiscard]] bool begins_cycle(hal::ecat::FrameBuffer& frame) noexcept;
+  [[nodiscard]] bool takes_order(hal::ecat::FrameBuffer& frame) noexcept;
   void pass() noexcept;
   void begin_cycle() noexcept;
   void idle() noexcept;
@@ -81,13 +87,16 @@ class LineBoards final : public hal::can::Bus {
   EmulatedRobot* robot_;
   std::size_t bus_;
   hal::ecat::DataLink* link_;
+  hal::ecat::LinkStatistics told_;  ///< by take_wire_ns(); no state
   Config config_;
   std::vector<Seat> seats_;  ///< by place
   std::unique_ptr<firmware::esc::SlaveLine> line_;
   std::vector<hal::ecat::FrameBuffer> came_;  ///< what waits to pass is [first_, count_)
   std::vector<hal::ecat::FrameBuffer> back_;
   std::size_t back_count_ = 0;
-  hal::ecat::FrameBuffer late_;  ///< a fault's: it comes back with the next cycle; size 0: none
+  hal::ecat::FrameBuffer late_;    ///< a fault's: it comes back with the next cycle; size 0: none
+  hal::ecat::FrameBuffer answer_;  ///< about the past; no state, as the next
+  ethercat::MacAddress master_{};  ///< that has asked
   std::size_t first_ = 0;
   std::size_t count_ = 0;
   bool in_cycle_ = false;  ///< a cycle's frame waits for the step

@@ -25,6 +25,7 @@ struct PlantChanges {
   /// Everything, for people: "link panda_link4: mass_kg = 3", "payload box, 1.6 kg on panda_hand,
   /// from 5 s to 9 s".
   std::vector<std::string> differences;
+  std::string ground;    ///< patches and terrain as tables of TOML: for the log
   Diagnostics warnings;  ///< of what is allowed, and hardly meant
 };
 

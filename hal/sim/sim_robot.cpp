@@ -39,7 +39,8 @@ SimRobot::SimRobot(std::unique_ptr<EmulatedRobot> robot,
       lines_(std::move(lines)),
       truth_filler_(robot_->plant()),
       truth_(robot_->plant().joints(), robot_->plant().contact().feet(),
-             robot_->plant().loops().equations().loops(), robot_->plant().passive().size()),
+             robot_->plant().loops().equations().loops(), robot_->plant().passive().size(),
+             ground_numbers(robot_->plant())),
       keep_truth_(keep_truth),
       room_(robot_->injection().room()) {}
 

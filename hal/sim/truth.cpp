@@ -37,6 +37,11 @@ void TruthFiller::fill(Plant& plant, const hal::CycleTime& time,
     const tandem_kernels& k = plant.kernels();
     truth.passive_position_rad()[j] = plant.q()[k.nq - k.joints + plant.passive()[j]];
   }
+  if (truth.ground_moves()) {
+    const double time_s = 1e-9 * static_cast<double>(plant.time_ns());
+    std::ranges::copy(contact.terrain().motion_at(time_s).position_m,
+                      truth.ground_position_m().begin());
+  }
   plant.pushes().sum_up(plant.q(), plant.v(), truth.center_of_mass_m().data(),
                         truth.push_force_N().data(), truth.push_moment_Nm().data());
   truth.hoist_share()[0] = plant.hoist_share();

@@ -2,6 +2,7 @@
 // Layer: hal/sim.  Thread: create non-RT; fill RT.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "base/realtime.hpp"
@@ -10,6 +11,11 @@
 #include "hal/truth.hpp"
 
 namespace tandem::sim {
+
+/// Numbers of the ground's place in a truth image: 0 where it never moves.
+[[nodiscard]] inline std::size_t ground_numbers(const Plant& plant) {
+  return plant.contact().terrain().moves() ? 3 : 0;
+}
 
 /// Copies the plant's present state into a truth image, joints in the process image's order.
 class TruthFiller {

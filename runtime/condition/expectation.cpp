@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "base/counted.hpp"
+#include "base/nearest.hpp"
 #include "hal/truth.hpp"
+#include "log/log_file.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -27,6 +29,7 @@ const char* key_of(Judged kind) {
     case Judged::kRms: return "rms";
     case Judged::kMean: return "mean";
     case Judged::kFinal: return "final";
+    case Judged::kWork: return "work";
     case Judged::kSettles: return "settles";
     case Judged::kAsIn: return "signal";
   }
@@ -47,7 +50,7 @@ Result<Expectation> Expectation::read(const ExpectationSpec& spec, const Quantit
   // On a robot an experiment runs as in simulation: what only that knows cannot pass there.
   const hal::Robot& robot = names.robot;
   const hal::TruthImage truth(robot.joints.size(), robot.feet.size(), robot.loops.size(),
-                              robot.passive.size());
+                              robot.passive.size(), 3);
   QuantityNames with = names;
   with.truth = &truth.layout();
   auto simulated = look_up(spec, with);
@@ -84,23 +87,15 @@ Result<Expectation> Expectation::look_up(const ExpectationSpec& spec, const Quan
                 error.key == "within" ? spec.within_line : spec.line);
     }
   } else {
-    auto number = Expression::read(spec.text, names);
-    if (!number) return at(number.error(), key_of(spec.kind), spec.line);
-    one.expression_ = std::move(*number);
-    for (const auto& [text, line, bound, key] :
-         {std::tuple(&spec.above, spec.above_line, &one.above_, "above"),
-          std::tuple(&spec.below, spec.below_line, &one.below_, "below")}) {
-      if (text->empty()) continue;
-      const Result<double> value = read_amount(*text, one.expression_.unit());
-      if (!value) return at(value.error(), key, line);
-      *bound = *value;
+    if (spec.kind == Judged::kWork) {
+      if (Status found = one.look_up_joints(names); !found)
+        return at(found.error(), "work", spec.line);
+    } else {
+      auto number = Expression::read(spec.text, names);
+      if (!number) return at(number.error(), key_of(spec.kind), spec.line);
+      one.expression_ = std::move(*number);
     }
-    if (one.above_ >= one.below_) {
-      return at(fail("nothing is above " + spec.above + " and below " + spec.below,
-                     "give a lower bound that is less than the upper one")
-                    .error(),
-                "above", spec.above_line);
-    }
+    if (Status bounds = one.read_bounds(); !bounds) return std::unexpected(bounds.error());
   }
   if (!spec.after.empty()) {
     auto after = Condition::read(spec.after, names);
@@ -111,7 +106,52 @@ Result<Expectation> Expectation::look_up(const ExpectationSpec& spec, const Quan
   return one;
 }
 
+Status Expectation::read_bounds() {
+  for (const auto& [text, line, bound, key] :
+       {std::tuple(&spec_.above, spec_.above_line, &above_, "above"),
+        std::tuple(&spec_.below, spec_.below_line, &below_, "below")}) {
+    if (text->empty()) continue;
+    const Result<double> value = read_amount(*text, unit());
+    if (!value) return at(value.error(), key, line);
+    *bound = *value;
+  }
+  if (above_ < below_) return {};
+  return at(fail("nothing is above " + spec_.above + " and below " + spec_.below,
+                 "give a lower bound that is less than the upper one")
+                .error(),
+            "above", spec_.above_line);
+}
+
+Status Expectation::look_up_joints(const QuantityNames& names) {
+  for (const hal::DrivenJoint& joint : names.robot.joints) {
+    if (spec_.text != "*" && spec_.text != joint.name) continue;
+    auto torque = Expression::read("torque(" + joint.name + ")", names);
+    auto velocity = Expression::read("velocity(" + joint.name + ")", names);
+    if (!torque) return std::unexpected(torque.error());
+    if (!velocity) return std::unexpected(velocity.error());
+    driven_.push_back({std::move(*torque), std::move(*velocity)});
+  }
+  if (!driven_.empty()) return {};
+  std::vector<std::string> known;
+  for (const hal::DrivenJoint& joint : names.robot.joints) known.push_back(joint.name);
+  return fail("there is no joint '" + spec_.text + "'", suggest(spec_.text, known));
+}
+
+double Expectation::number_in(const hal::CycleView& view) const noexcept TANDEM_RT {
+  if (spec_.kind != Judged::kWork) return expression_.value(view);
+  double work_J = 0.0;
+  for (const Driven& one : driven_) {
+    const double power_W = one.torque.value(view) * one.velocity.value(view);
+    if (std::isnan(power_W)) return power_W;
+    work_J += std::max(power_W, 0.0) * 1e-9 * static_cast<double>(view.time.period_ns);
+  }
+  return work_J;
+}
+
 Status Expectation::read_recorded(const QuantityNames& names) {
+  const auto log = log::LogFile::open(spec_.log);
+  if (!log) return fail("the log " + spec_.log + ": " + log.error().message, log.error().hint);
+  if (const Status whole = log->require_samples(); !whole) return std::unexpected(whole.error());
   const std::size_t star = spec_.text.find('*');
   std::vector<std::string> joints;
   if (star == std::string::npos) joints.emplace_back();
@@ -123,7 +163,7 @@ Status Expectation::read_recorded(const QuantityNames& names) {
       text.replace(i, 1, joint);
     auto now = Expression::read(text, names);
     if (!now) return std::unexpected(now.error());
-    auto then = Recorded::read(*now, names, spec_.log);
+    auto then = Recorded::read(*now, names, *log);
     if (!then) return std::unexpected(then.error());
     compared_.push_back({joint, std::move(*now), std::move(*then)});
   }
@@ -139,7 +179,9 @@ Status Expectation::read_recorded(const QuantityNames& names) {
 }
 
 const std::string& Expectation::unit() const {
-  return is_condition()                ? condition_.unit()
+  static const std::string kJoule = "J";
+  return spec_.kind == Judged::kWork   ? kJoule
+         : is_condition()              ? condition_.unit()
          : spec_.kind == Judged::kAsIn ? compared_.front().now.unit()
                                        : expression_.unit();
 }
@@ -198,7 +240,7 @@ void Expectation::take(const hal::CycleView& view) noexcept TANDEM_RT {
     const double margin = margin_to_recorded(view);
     return std::isnan(margin) ? unknown() : note(margin, margin >= 0.0, view);
   }
-  const double number = expression_.value(view);
+  const double number = number_in(view);
   if (std::isnan(number)) return unknown();
   const double margin = margin_of(number);
   if (margin < 0.0) so_far_.outside_ns = view.time.time_ns;
@@ -258,7 +300,9 @@ void Expectation::judge_number(ExpectationResult& result) const {
   const auto known = static_cast<double>(so_far_.cycles - so_far_.unknown);
   if (spec_.kind == Judged::kRms) value = std::sqrt(so_far_.sum / known);
   if (spec_.kind == Judged::kMean) value = so_far_.sum / known;
-  if (spec_.kind == Judged::kFinal) result.at_s = in_seconds(so_far_.end_ns);
+  if (spec_.kind == Judged::kWork) value = so_far_.sum;
+  if (spec_.kind == Judged::kFinal || spec_.kind == Judged::kWork)
+    result.at_s = in_seconds(so_far_.end_ns);
   const double margin = margin_of(value);
   result.margin = margin;
   result.passed = margin >= 0.0;

@@ -79,6 +79,10 @@ class Expectation {
     Expression now;
     Recorded then;
   };
+  /// Its product is the power that a joint's drive has.
+  struct Driven {
+    Expression torque, velocity;
+  };
   static constexpr std::int64_t kNever = -1;
 
   /// read(), by these names alone.
@@ -94,6 +98,11 @@ class Expectation {
   Status read_recorded(const QuantityNames& names);
   /// The worst of these; NaN where one is not known.
   [[nodiscard]] double margin_to_recorded(const hal::CycleView& view) noexcept TANDEM_RT;
+  /// Finds the joint of a kWork, or all of them.
+  Status look_up_joints(const QuantityNames& names);
+  Status read_bounds();
+  /// What the cycle adds to the sum; NaN where it is not known.
+  [[nodiscard]] double number_in(const hal::CycleView& view) const noexcept TANDEM_RT;
   [[nodiscard]] const std::string& unit() const;
   void judge_condition(ExpectationResult& result) const;
   void judge_number(ExpectationResult& result) const;
@@ -104,6 +113,7 @@ class Expectation {
   Condition condition_;             // kAlways, kNever, kEventually
   Expression expression_;           // the others
   std::vector<Compared> compared_;  // kAsIn
+  std::vector<Driven> driven_;      // kWork
   double within_ = 0.0;
   std::optional<Condition> after_;
   double above_ = -std::numeric_limits<double>::infinity();

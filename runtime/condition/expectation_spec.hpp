@@ -17,6 +17,7 @@ enum class ExpectationKind : std::uint8_t {
   kRms,         ///< its root mean square is
   kMean,        ///< its mean is
   kFinal,       ///< it is, in the last cycle
+  kWork,        ///< what a joint, or all, have done while they drove is, at the end of the window
   kSettles,     ///< it is, from some cycle to the last, and that comes within `in_s`
   kAsIn,        ///< it differs from that of a recorded run by less than `within` in every cycle
 };
@@ -25,7 +26,7 @@ enum class ExpectationKind : std::uint8_t {
 struct ExpectationSpec {
   ExpectationKind kind = ExpectationKind::kAlways;
   std::string name;
-  std::string text;          ///< the condition, or the number
+  std::string text;          ///< the condition, the number, or the joint; "*" of kWork: all
   std::string above, below;  ///< "0.4m"; empty: no such bound
   double in_s = 0.0;         ///< kSettles
   std::string log, within;   ///< kAsIn: the recorded run; "1mrad"

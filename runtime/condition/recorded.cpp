@@ -119,22 +119,20 @@ Result<Series> series_of(const Quantity& quantity, const log::LogFile& log,
 }  // namespace
 
 Result<Recorded> Recorded::read(const Expression& expression, const QuantityNames& names,
-                                const std::string& file) {
+                                const log::LogFile& log) {
   const std::span<const Quantity> quantities = expression.quantities();
   if (quantities.empty()) {
     return fail("'" + expression.text() + "' names no number of the run",
                 "write one, such as position(JOINT)");
   }
-  const auto log = log::LogFile::open(file);
-  if (!log) return fail("the log " + file + ": " + log.error().message, log.error().hint);
-  if (const Status whole = log->require_samples(); !whole) return std::unexpected(whole.error());
   std::vector<Series> all;
   for (const Quantity& quantity : quantities) {
-    auto series = series_of(quantity, *log, names);
+    auto series = series_of(quantity, log, names);
     if (!series) return std::unexpected(series.error());
     if (series->time_ns.empty())
-      return fail("the log " + file + " has no sample of '" + expression.text() + "'",
-                  "record it again");
+      return fail(
+          "the log " + std::string(log.path()) + " has no sample of '" + expression.text() + "'",
+          "record it again");
     all.push_back(std::move(*series));
   }
   Recorded recorded;

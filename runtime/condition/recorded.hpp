@@ -3,23 +3,26 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "runtime/condition/condition.hpp"
 
+namespace tandem::log {
+class LogFile;
+}
+
 namespace tandem::runtime {
 
 /// Samples over time, read before the run.
 class Recorded {
  public:
-  /// @param file  a log
-  /// Errors: the file's; its log lacks a field or an element, with the nearest; numbers of the loop
+  /// @param log  with every sample: require_samples()
+  /// Errors: the log lacks a field or an element, with the nearest; numbers of the loop
   /// itself, which are of the computer.
   [[nodiscard]] static Result<Recorded> read(const Expression& expression,
-                                             const QuantityNames& names, const std::string& file);
+                                             const QuantityNames& names, const log::LogFile& log);
 
   /// At a time of the run, on a line between two samples; NaN before the first, after the last, and
   /// where it was not measured. @rt no heap, no lock

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "log/branches.hpp"
 #include "log/mcap_reader.hpp"
 
 namespace tandem::runtime {
@@ -118,9 +119,10 @@ Status check_beginning(const log::LogFile& file) {
     return std::unexpected(
         of_log(path,
                "begins at cycle " + std::to_string(info.branch.cycle) +
-                   ", where the run went back in time: the controllers' state at it is in no "
-                   "log",
-               "replay the log that it branched from: " + info.branch.of));
+                   (info.branch.snapshot == 0 ? ", as it goes on from another run"
+                                              : ", where the run went back in time") +
+                   ": a replay begins with the controllers' start",
+               "replay the log that has it: " + log::first_log(path, info)));
   }
   for (const char* topic : {"/tandem/state", "/tandem/command"}) {
     if (const auto there = file.require(topic); !there) return std::unexpected(there.error());

@@ -2,6 +2,9 @@
 // Layer: runtime/run.  Thread: main.
 #pragma once
 
+#include <optional>
+
+#include "log/info.hpp"
 #include "runtime/run/composition.hpp"
 #include "runtime/run_identity.hpp"
 
@@ -12,6 +15,14 @@ namespace tandem::runtime {
 /// only says when the run ends: it is that of the run that goes on. Not the controllers, whose host
 /// names them itself, nor faults that are injected, which are in the snapshot. What
 /// Overrides::change makes of the experiment is not seen.
-[[nodiscard]] RunIdentity identity_of(const Composition& c, const CycleConfig& config);
+/// @param later  Overrides' rows, which are no part of it
+[[nodiscard]] RunIdentity identity_of(const Composition& c, const CycleConfig& config,
+                                      std::span<const std::string> later = {});
+
+/// What of a run is another in `c` than its log says: "robot.toml: joint[0].gains is \"stiff\"
+/// there, and \"soft\" here", with a setting that makes it the same, where one does. Nothing: all
+/// that the log names is the same.
+[[nodiscard]] std::optional<Error> difference_from(const log::RunInfo& log, const Composition& c,
+                                                   const CycleConfig& config);
 
 }  // namespace tandem::runtime

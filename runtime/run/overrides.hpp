@@ -38,6 +38,9 @@ struct Overrides {
   /// No limit of the wall clock ends anything: for work in a debugger. Simulation only.
   bool debug = false;
   std::size_t trace_cycles = 0;  ///< the last whose stages' times are kept
+  /// Rows of what happens, such as "push[0]", or "push" of all of a kind, that may have other
+  /// values in a run that goes on from a state of this one: they are no part of what it is.
+  std::vector<std::string> later = {};
   /// Any other change of what was read, before it is checked. Robot and period stay valid.
   std::function<void(Experiment&)> change = {};
 };

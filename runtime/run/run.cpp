@@ -107,7 +107,9 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
 
 std::string why_no_past(const Composition& c) {
   if (c.backend->pace() != hal::Pace::kSimulatedClock) return "its time is real";
-  if (c.sim == nullptr) return "its boards are in another process";
+  const bool boards_along =
+      c.experiment.hal.backend == BackendKind::kWire;  // they stand in lockstep
+  if (c.sim == nullptr && !boards_along) return "its boards are in another process";
   if (c.owner != nullptr) return "another process may own its robot";
   if (c.predictor != nullptr && c.predictor->is_prepared()) {
     return "a controller acts on predictions, which are not kept";
@@ -142,6 +144,7 @@ Run::Run(Composition& c, const Overrides& overrides, const RunParts& parts) : c_
         e.robot.shape(), c.controllers->gains(), e.loop.period_ns);
     backend = &parallel_->backend();  // passes every call on to the first robot, and tapes it
   }
+  if (!overrides.later.empty() && c.events != nullptr) c.events->keep_apart();
   observers_.add(c.expectations.get());
   if (parts.time_machine != nullptr) parts.time_machine->judge_by(c.expectations.get());
   observers_.add(parts.observer);
@@ -155,7 +158,7 @@ Run::Run(Composition& c, const Overrides& overrides, const RunParts& parts) : c_
                             .owner = {parts.owner, c.owner.get(), c.owner_slot},
                             .estimator = c.estimator.get(),
                             .snapshots = c.predictor.get(),
-                            .identity = identity_of(c, config),
+                            .identity = identity_of(c, config, overrides.later),
                             .time_machine = parts.time_machine,
                             .events = c.events.get()},
                  config);

@@ -94,7 +94,10 @@ log::RunInfo info_of(const Composition& c) {
   info.period_ns = e.loop.period_ns;
   info.operators_view = c.tele != nullptr;
   if (c.sim != nullptr) info.engine = sim::engine_text(e.sim.engine);
-  if (c.sim != nullptr && e.plant != nullptr) info.plant = e.plant->differences;
+  if (c.sim != nullptr && e.plant != nullptr) {
+    info.plant = e.plant->differences;
+    info.ground = e.plant->ground;
+  }
   info.kernel_variant = c.kernels->variant;
   info.description_hash = c.kernels->description_hash;
   info.kernel_sha256 = c.kernels.sha256();

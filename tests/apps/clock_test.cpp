@@ -102,6 +102,24 @@ TEST_F(Clock, GoesBackAndOnAgain) {
   EXPECT_EQ(end(), 0);
 }
 
+// What holds already was waited for in silence.
+TEST_F(Clock, SaysThatAConditionWaitsAndThatItHoldsNow) {
+  start("--rate 20 --start-paused --duration 2000");
+  until(R"("paused": true)");
+  (void)clock("step 100");
+  const Outcome asked = to_run(R"(ask '{"do": "clock.until", "condition": "time() < 1000 s"}')");
+  const auto answer = nlohmann::json::parse(asked.out, nullptr, false);
+  EXPECT_EQ(answer["waits"], true) << asked.out;
+  EXPECT_EQ(answer["note"], "it holds now, so it has to end first");
+  EXPECT_EQ(clock("rewind 1ms")["standing"], true) << "which gives it up";
+  (void)clock("goto 0.05s");
+  const Outcome stands = to_run("clock until 'time() < 0.2 s or time() > 0.3005 s'");
+  EXPECT_EQ(stands.out.find("note: it holds now, so it has to end first\n"), 0U) << stands.out;
+  EXPECT_EQ(stands.out.find("note: ", 1), std::string::npos) << "once: " << stands.out;
+  EXPECT_NE(stands.out.find("0.301000 s"), std::string::npos) << stands.out;
+  EXPECT_EQ(end(), 0);
+}
+
 // The run stood after a refusal.
 TEST_F(Clock, ARefusedJourneyStopsNothing) {
   begin("");

@@ -1,6 +1,8 @@
 // Help that teaches, and messages for what was mistyped.
+#include <algorithm>
 #include <cstdlib>
 #include <map>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -42,6 +44,65 @@ TEST_F(CommandLine, HelpOfACommandWithSubcommandsHasAnExampleOfEach) {
     }
     EXPECT_EQ(outcome.out.find("\n  tandem run config/coman/squat.toml"), std::string::npos);
   }
+}
+
+/// The widest line of a text, in columns.
+std::size_t widest_line(const std::string& text) {
+  std::istringstream lines(text);
+  std::size_t widest = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const auto columns = std::ranges::count_if(line, [](char c) { return (c & '\xC0') != '\x80'; });
+    widest = std::max(widest, static_cast<std::size_t>(columns));
+  }
+  return widest;
+}
+
+/// The commands that a help lists: "joint" of tandem's, "move" of that.
+std::vector<std::string> listed(const std::string& help) {
+  std::vector<std::string> names;
+  std::istringstream lines(help);
+  bool lists = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line[0] != ' ')
+      lists = line.starts_with("Subcommands") || line.find("(`tandem help") != std::string::npos;
+    else if (lists && line[2] != ' ')
+      names.push_back(line.substr(2, line.find(' ', 2) - 2));
+  }
+  return names;
+}
+
+// Its lines had up to 222 columns.
+TEST_F(CommandLine, HelpOfEveryCommandFitsTheTerminal) {
+  for (const std::string columns : {"", "COLUMNS=60", "COLUMNS=200"}) {
+    const std::size_t most = columns == "COLUMNS=60" ? 60 : columns.empty() ? 80 : 120;
+    const std::string all = tandem("--help", columns).out;
+    EXPECT_LE(widest_line(all), most);
+    EXPECT_GT(listed(all).size(), 30U);
+    for (const std::string& command : listed(all)) {
+      const std::string help = tandem(command + " --help", columns).out;
+      EXPECT_LE(widest_line(help), most) << help;
+      if (!columns.empty()) continue;
+      for (const std::string& verb : listed(help))
+        EXPECT_LE(widest_line(tandem(command + " " + verb + " --help").out), most) << verb;
+    }
+  }
+}
+
+TEST_F(CommandLine, HelpHasEveryCommandUnderATask) {
+  const std::string see = tandem("help see").out;
+  EXPECT_TRUE(see.starts_with("See what it does (`tandem help see`):\n")) << see;
+  for (const char* name : {"top", "studio", "report", "topic"})
+    EXPECT_EQ(std::ranges::count(listed(see), name), 1) << name;
+  EXPECT_EQ(std::ranges::count(listed(tandem("help debug").out), "clock"), 1);
+  EXPECT_NE(tandem("help test").out.find("Test it: also check, sweep"), std::string::npos);
+}
+
+TEST_F(CommandLine, AnExampleIsOneCommandHoweverNarrowTheTerminalIs) {
+  const std::string help = tandem("controller load --help", "COLUMNS=40").out;
+  EXPECT_NE(help.find("  tandem controller load hold \\\n      --name rest \\\n"
+                      "      --set 'duration_s = 2.0'\n"),
+            std::string::npos)
+      << help;
 }
 
 TEST_F(CommandLine, HelpMayComeFirst) {

@@ -1,29 +1,11 @@
-// `tandem controller` and `tandem joint` against a running `tandem run`.
+// `tandem controller` against a running `tandem run`.
 #include <cmath>
 
-#include "tests/apps/running.hpp"
+#include "tests/apps/controllers_run.hpp"
 #include "tests/support/eventually.hpp"
 
 namespace tandem::apps {
 namespace {
-
-class Controllers : public Running {
- protected:
-  [[nodiscard]] nlohmann::json asked(const std::string& command) const {
-    const Outcome outcome = to_run(command + " --json -");
-    EXPECT_EQ(outcome.status, 0) << outcome.err;
-    return nlohmann::json::parse(outcome.out, nullptr, false);
-  }
-  /// The exit status is 2; what standard error says.
-  [[nodiscard]] std::string refused(const std::string& command) const {
-    const Outcome outcome = to_run(command);
-    EXPECT_EQ(outcome.status, 2) << outcome.out;
-    return outcome.err;
-  }
-  void expect(const std::string& text, const std::string& part) const {
-    EXPECT_NE(text.find(part), std::string::npos) << text;
-  }
-};
 
 TEST_F(Controllers, AreLoadedSwitchedStoppedAndUnloaded) {
   begin("");
@@ -77,6 +59,17 @@ TEST_F(Controllers, AShadowShowsHowFarItIsAndIsSwitchedToOnceItAgrees) {
       to_run("controller switch --stop hold --start soft --when-within 1 --timeout 20ms --json -");
   EXPECT_EQ(never.status, 1);
   EXPECT_EQ(nlohmann::json::parse(never.out, nullptr, false)["done"], false);
+  // It was taken for 1 mrad.
+  expect(
+      refused("controller switch --stop hold --start rest --when-within 1mm"),
+      "joint1: when_within is a length, and the reference of this joint, which 'rest' claims, is "
+      "in rad (give an angle: 0.5deg, 0.01rad; or a bare number [rad])");
+  EXPECT_EQ(
+      to_run("controller load gravity_compensation --name limp --set 'mode = \"torque\"'").status,
+      0);
+  EXPECT_EQ(to_run("controller shadow limp").status, 0);
+  expect(refused("controller switch --stop hold --start limp --when-within 1deg"),
+         "is in Nm (give a bare number [Nm])");
   const auto change = asked("controller switch --stop hold --start rest --when-within 0.2");
   EXPECT_EQ(change["switch"]["state"], "done");
   const auto list = asked("controller list")["controllers"];
@@ -369,282 +362,6 @@ TEST_F(Controllers, ThatAreActiveMayNotShareAJoint) {
   const Outcome outcome = tandem("check hold.toml");
   EXPECT_EQ(outcome.status, 2);
   expect(outcome.err, "is claimed by the controllers 'hold' and 'rest'");
-}
-
-TEST_F(Controllers, JointsAreSetWhenNobodyHasThem) {
-  begin("");
-  expect(refused("joint set joint1 --mode velocity"),
-         "joint1: is claimed by the controller 'hold', which sets its mode");
-  EXPECT_EQ(to_run("controller stop hold").status, 0);
-  const auto still = asked("joint set joint1 --mode velocity");
-  EXPECT_EQ(still["mode"], "velocity");
-  EXPECT_EQ(still["controller"], "");
-  const auto soft =
-      asked("joint set joint2 --mode position --interaction compliant --stiffness 2.5");
-  EXPECT_EQ(soft["interaction"], "compliant");
-  EXPECT_EQ(soft["stiffness_Nm_rad"], 2.5);
-  expect(refused("joint set joint2 --stiffness 1e6"),
-         "joint2: the stiffness 1e+06 Nm/rad is beyond");
-  expect(refused("joint set joint2 --damping -1"), "joint2: the damping -1 Nms/rad is beyond");
-  expect(refused("joint set jiont2 --mode idle"), "did you mean 'joint2'?");
-  expect(refused("joint set joint2 --mode fast"), "cannot be 'fast'");
-  expect(refused("joint set joint2"),
-         "nothing is to be set (give mode, interaction, stiffness or damping)");
-  expect(to_run("joint list joint1").out, "joint1           -  velocity");
-  EXPECT_EQ(end(), 0);
-}
-
-TEST_F(Controllers, JointsAreMovedWhenNobodyHasThem) {
-  begin("");
-  expect(refused("joint move joint1 --to 30deg"), "joint1: is claimed by the controller 'hold'");
-  EXPECT_EQ(to_run("controller stop hold").status, 0);
-  expect(to_run("joint move joint1 --to 30deg --speed 200deg/s --acceleration 1000deg/s2").out,
-         "joint1 moves from ");
-  double position_rad = 0.0;
-  EXPECT_TRUE(test::eventually([&] {
-    position_rad = asked("joint list joint1")["joints"][0]["position_rad"];
-    return std::abs(position_rad - 0.5236) < 0.02;
-  })) << position_rad;
-  EXPECT_EQ(to_run("joint move joint1 --to -1 --speed 0.01").status, 0) << "radians";
-  EXPECT_EQ(to_run("joint stop joint1").status, 0);
-  position_rad = asked("joint list joint1")["joints"][0]["position_rad"];
-  EXPECT_NEAR(position_rad, 0.5236, 0.1) << "it had only just begun";
-  expect(to_run("joint list joint1 --drives").out, "winding [degC]");
-  expect(refused("joint move joint1 --to 400deg"),
-         "joint1: the target 6.98132 rad (400 deg) is beyond");
-  expect(refused("joint move joint1 --to 20mm"), "joint1: this joint turns");
-  expect(refused("joint move joint1 --to 30deg --speed 1m/s"),
-         "--speed: '1m/s' is of another kind");
-  for (const char* words : {"--to 30°", "--to deg", "--to +", "--to +-1", "--to ++1",
-                            "--to 30deg --speed 20deg", "--to 30deg/s"}) {
-    expect(refused(std::string("joint move joint1 ") + words), "is no number with a unit");
-  }
-  for (const char* number : {"nan", "inf", "-inf", "1e999", "1e999deg"}) {
-    expect(refused(std::string("joint move joint1 --to ") + number),
-           "--to: '" + std::string(number) + "' is not finite");
-  }
-  for (const char* flag : {"--to", "--to 1 --speed", "--to 1 --acceleration"}) {
-    const std::string name = std::string(flag).substr(std::string(flag).rfind('-') - 1);
-    expect(refused(std::string("joint move joint1 ") + flag + " ''"), name + ": is empty");
-  }
-  EXPECT_EQ(to_run("joint move joint1 --to +0.5").status, 0);
-  EXPECT_EQ(end(), 0);
-}
-
-/// What interrupts the waiting does not end the motion.
-TEST_F(Controllers, JointsThatMoveAreWaitedFor) {
-  begin("");
-  EXPECT_EQ(to_run("controller stop hold").status, 0);
-  const Outcome there = to_run("joint move joint1 --to 20deg --speed 100deg/s --wait");
-  EXPECT_EQ(there.status, 0) << there.err;
-  expect(there.out, "joint1 has arrived: 0.3");
-  const auto slow = asked("joint move joint1 --to 30deg --speed 200deg/s --wait");
-  EXPECT_EQ(slow["arrived"], true);
-  EXPECT_EQ(slow["moving"], false);
-  const std::string away = "joint move joint1 --to -300deg --speed 1deg/s --wait --socket ";
-  const Outcome interrupted = tandem(away + socket_, "timeout --foreground -s INT 0.5");
-  EXPECT_EQ(interrupted.status, 124);
-  expect(interrupted.err,
-         "joint1 still moves to -5.236 rad (-300 deg): `tandem joint stop joint1`");
-  const auto goes_on = asked("joint list joint1")["joints"][0];
-  EXPECT_EQ(goes_on["moving"], true);
-  EXPECT_LT(goes_on["position_rad"].get<double>(), 0.52);
-  EXPECT_EQ(to_run("joint stop joint1").status, 0);
-  EXPECT_TRUE(
-      test::eventually([&] { return asked("joint list joint1")["joints"][0]["moving"] == false; }));
-  EXPECT_EQ(end(), 0);
-}
-
-TEST_F(Controllers, SensorsAndDrivesAreShown) {
-  write_text(folder_ / "hold.toml",
-             "robot = \"" TANDEM_SOURCE_DIR
-             "/config/ur5e/robot.toml\"\nposture = \"ready\"\nduration_s = 5.0\nseed = 1\n"
-             "[[controller]]\nplugin = \"hold\"\n");
-  begin("--on-fault wait");
-  const auto sensors = asked("sensor list")["sensors"];
-  ASSERT_EQ(sensors.size(), 1U);
-  EXPECT_EQ(sensors[0]["type"], "force_torque");
-  EXPECT_EQ(sensors[0]["valid"], true);
-  EXPECT_FALSE(sensors[0]["link"].get<std::string>().empty());
-  EXPECT_EQ(sensors[0]["force_N"].size(), 3U);
-  const std::string name = sensors[0]["sensor"];
-  expect(to_run("sensor list").out, name);
-  expect(refused("sensor list " + name + "x"), "did you mean '" + name + "'?");
-  expect(to_run("joint show elbow_joint").out, "operation enabled");
-  expect(to_run("joint reset elbow_joint").out, "elbow_joint: its drive has no fault");
-  EXPECT_EQ(to_run("inject kind=encoder_unplug joint=elbow_joint for_s=2").status, 0);
-  until(R"("phase": "faulted")");
-  const auto drive = asked("joint show elbow_joint");
-  EXPECT_EQ(drive["fault"], 0x7300);
-  expect(drive["fault_text"], "position sensor (error code 0x7300)");
-  Outcome reset;
-  EXPECT_TRUE(test::eventually([&] {  // until the cause is gone
-    reset = to_run("joint reset elbow_joint");
-    return reset.status == 0;
-  })) << reset.err;
-  expect(reset.out, "elbow_joint: its fault is cleared, its drive stays disabled");
-  EXPECT_EQ(asked("joint show elbow_joint")["fault"], 0);
-  until(R"("phase": "faulted")");
-  expect(refused("joint move elbow_joint --to 10deg"),
-         "elbow_joint: nothing is moved while a fault is latched");
-  EXPECT_EQ(to_run("fault reset").status, 0);
-  EXPECT_EQ(end(), 0);
-}
-
-TEST_F(Controllers, GainsAreKeptAndShown) {
-  begin("");
-  const auto gains = asked("joint gains joint1 position --kp 7.5");
-  EXPECT_EQ(gains["gains"]["position"]["kp"], 7.5);
-  EXPECT_EQ(gains["gains"]["position"]["ki"], 12.0) << "what is not named stays";
-  expect(to_run("joint list joint1 --gains").out, "joint1  position   7.5    12  0.25");
-  expect(refused("joint gains joint1 position --kp -1"), "joint1: kp -1 is beyond");
-  expect(refused("joint gains joint1 speed --kp 1"), "cannot be 'speed'");
-  expect(refused("joint gains joint1 position"), "nothing is to be set (give kp, ki or kd)");
-  EXPECT_EQ(end(), 0);
-}
-
-TEST_F(Controllers, ParametersAreShownAndSetByAnotherProcess) {
-  begin("");
-  EXPECT_EQ(asked("controller load hold --name rest --set 'link_damping_Nms_rad = 0.5' --set "
-                  "'joints = [\"joint2\"]'")["done"],
-            true);
-  const auto shown = asked("controller show rest")["controllers"];
-  ASSERT_EQ(shown.size(), 1U);
-  EXPECT_EQ(shown[0]["claims"][0]["joint"], "joint2");
-  nlohmann::json damping;
-  for (const auto& one : shown[0]["parameters"])
-    if (one["name"] == "link_damping_Nms_rad") damping = one;
-  EXPECT_EQ(damping["value"], 0.5);
-  EXPECT_EQ(damping["default"], 0.0);
-  EXPECT_EQ(damping["min"], 0.0);
-  EXPECT_EQ(damping["max"], nullptr);
-  EXPECT_EQ(damping["unit"], "Nms/rad");
-  EXPECT_EQ(damping["live"], true);
-  expect(to_run("controller show rest").out, "duration_s");
-
-  const auto set = asked("controller set rest link_damping_Nms_rad=1.25");
-  EXPECT_EQ(set["done"], true);
-  EXPECT_GT(set["cycle"].get<int>(), 0);
-  EXPECT_EQ(set["values"]["rest.link_damping_Nms_rad"], 1.25);
-  expect(to_run("controller set rest 'link_damping_Nms_rad = 1.5'").out,
-         "rest.link_damping_Nms_rad  1.5");
-  expect(refused("controller set rest link_damping_Nms_rad=-1"),
-         "rest.link_damping_Nms_rad: -1 is out of range (give 0 Nms/rad or more)");
-  expect(refused("controller set rest link_damping_Nms_rad=inf"), "is a number, not 'inf'");
-  expect(refused("controller set rest link_damping=2"), "did you mean 'link_damping_Nms_rad'?");
-  expect(refused("controller set rest duration_s=2"), "rest.duration_s: is not live");
-  expect(refused("controller set rset duration_s=2"), "did you mean 'rest'?");
-  expect(refused("controller show rset"), "did you mean 'rest'?");
-  expect(refused("controller set rest link_damping_Nms_rad=2 duration_s=2"), "is not live");
-  expect(refused("controller set rest link_damping_Nms_rad"), "is not NAME=VALUE");
-  expect(refused("controller set rest link_damping_Nms_rad=1 link_damping_Nms_rad=2"),
-         "is named twice");
-  const auto each = nlohmann::json::parse(
-      to_run("ask '{\"do\": \"controller.set\", \"each\": true, \"parameters\": "
-             "{\"rest.link_damping_Nms_rad\": 3, \"hold.nothing\": 1, \"nobody\": 1}}'")
-          .out,
-      nullptr, false)["results"];
-  EXPECT_EQ(each["rest.link_damping_Nms_rad"], "");
-  EXPECT_NE(each["hold.nothing"].dump().find("has no such parameter"), std::string::npos);
-  EXPECT_NE(each["nobody"].dump().find("names no controller"), std::string::npos);
-  const auto after = asked("controller show rest");
-  for (const auto& one : after["controllers"][0]["parameters"]) {
-    if (one["name"] == "link_damping_Nms_rad") damping = one;
-  }
-  EXPECT_EQ(damping["value"], 3.0);
-  EXPECT_EQ(end(), 0);
-}
-
-TEST_F(Controllers, HaveListsOfParametersByJoint) {
-  begin("");
-  EXPECT_EQ(asked("controller load gravity_compensation --name weigh --set "
-                  "'damping_Nms_rad = [0.2, 0.15]'")["done"],
-            true);
-  nlohmann::json damping;
-  const auto answer = asked("controller show weigh");
-  for (const auto& one : answer["controllers"][0]["parameters"])
-    if (one["name"] == "damping_Nms_rad") damping = one;
-  EXPECT_EQ(damping["type"], "numbers");
-  EXPECT_EQ(damping["elements"], nlohmann::json({"joint1", "joint2"}));
-  EXPECT_EQ(damping["value"], nlohmann::json({0.2, 0.15}));
-  EXPECT_EQ(damping["default"], nlohmann::json({0.1, 0.1}));
-  EXPECT_EQ(damping["min"], nlohmann::json({0.0, 0.0}));
-  const std::string shown = to_run("controller show weigh").out;
-  expect(shown, "damping_Nms_rad.joint2  0.15");
-  expect(shown, "stiffness_Nm_rad        1.2");
-  expect(shown, "elements)");
-
-  EXPECT_EQ(asked("controller set weigh damping_Nms_rad=0.05")["values"]["weigh.damping_Nms_rad"],
-            nlohmann::json({0.05, 0.05}));
-  EXPECT_EQ(asked("controller set weigh damping_Nms_rad.joint2=0.125")["values"],
-            nlohmann::json({{"weigh.damping_Nms_rad.joint2", 0.125}}));
-  expect(to_run("controller set weigh 'damping_Nms_rad=[0.125, 0]'").out,
-         "weigh.damping_Nms_rad  0.125, 0");
-  expect(
-      refused("controller set weigh 'damping_Nms_rad=[0.1, 0, 0]'"),
-      "weigh.damping_Nms_rad: has 2 elements, not 3 (give one number for all, or one for each of "
-      "joint1, joint2)");
-  expect(refused("controller set weigh 'damping_Nms_rad=[0.1, -1]'"),
-         "weigh.damping_Nms_rad.joint2: -1 is out of range");
-  expect(refused("controller set weigh 'damping_Nms_rad=[0.1, true]'"),
-         "other things than numbers");
-  expect(refused("controller set weigh 'damping_Nms_rad=[0.1, 0'"), "is a number, not '[0.1, 0'");
-  expect(refused("controller set weigh damping_Nms_rad.joint3=0"), "has no such parameter");
-  expect(refused("controller set weigh damping_Nms_rad=0 damping_Nms_rad.joint1=0.1"),
-         "weigh.damping_Nms_rad.joint1: is named twice");
-  expect(refused("controller load gravity_compensation --name x --set 'damping_Nms_rad = [1]'"),
-         "damping_Nms_rad: has 1 numbers");
-  expect(to_run("ask '{\"do\": \"controller.set\", \"parameters\": "
-                "{\"weigh.damping_Nms_rad.joint1\": 0.0625}}'")
-             .out,
-         "0.0625");
-  EXPECT_EQ(end(), 0);
-}
-
-TEST_F(Controllers, HaveTheirParametersInTheLogAndInItsReport) {
-  log_flags_ = "--log runs";
-  begin("");
-  ASSERT_EQ(to_run("controller load gravity_compensation --name weigh --set ramp_s=2").status, 0);
-  ASSERT_EQ(to_run("controller load hold --name soft --set 'interaction = \"compliant\"'").status,
-            0);
-  ASSERT_EQ(asked("controller set hold link_damping_Nms_rad=0.5")["done"], true);
-  ASSERT_EQ(asked("controller set hold link_damping_Nms_rad=0.25")["done"], true);
-  EXPECT_EQ(end(), 0);
-  const std::string log = "runs/double_pendulum-hold-001.mcap";
-  const std::string info = tandem("log info " + log).out;
-  expect(info, "hold.link_damping_Nms_rad = 0\n");
-  expect(info, "hold.interaction = stiff\n");
-  const std::string events = tandem("log csv " + log + " --topic event").out;
-  expect(events, "parameter loaded: weigh.ramp_s = 2\"");
-  expect(events, "parameter loaded: weigh.damping_Nms_rad.joint2 = 0.1\"");
-  expect(events, "parameter loaded: soft.interaction = compliant\"");
-  expect(events, "parameter set: hold.link_damping_Nms_rad = 0.25\"");
-  ASSERT_EQ(tandem("report " + log + " -o page").status, 0);
-  const std::string page = read_text(folder_ / "page/report.html");
-  expect(page, "Parameters");
-  const std::size_t row = page.find("hold.link_damping_Nms_rad");
-  ASSERT_NE(row, std::string::npos);
-  expect(page.substr(row, 200), "0.25 at ");
-  expect(page.substr(row, 200), ">2<");
-  expect(page, "weigh.ramp_s");
-}
-
-TEST_F(Controllers, ManyParametersInOneRequestAreRefusedAndTheRunGoesOn) {
-  begin("");
-  for (const auto& [count, why] : {std::pair{10'000, "an object of more than 1000 keys"},
-                                   {1'000, "sets 1000 parameters at once (set at most 64)"}}) {
-    nlohmann::json question{{"do", "controller.set"}, {"name", "hold"}};
-    for (int i = 0; i < count; ++i) question["parameters"][std::to_string(i)] = 1;
-    for (const bool each : {false, true}) {
-      question["each"] = each;
-      write_text(folder_ / "many.json", question.dump());
-      const Outcome said = to_run("ask \"$(cat many.json)\"");  // not more than 128 kB
-      EXPECT_NE(said.status, 0);
-      expect(said.out + said.err, why);
-    }
-  }
-  EXPECT_EQ(asked("controller set hold link_damping_Nms_rad=1")["done"], true);
-  EXPECT_EQ(end(), 0);
 }
 
 TEST_F(Controllers, OfARunWhoseTimeStandsChangeWithItsNextCycle) {

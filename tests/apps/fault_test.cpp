@@ -1,5 +1,6 @@
 // `tandem fault` and `tandem estop` against a running `tandem run`.
 #include <cmath>
+#include <regex>
 
 #include "tests/apps/running.hpp"
 
@@ -239,6 +240,11 @@ TEST_F(Faults, AnEndlessRunThatASignalStopsIsDone) {
       EXPECT_NE(out.find(text), std::string::npos) << text << "\nin: " << out;
     }
     EXPECT_EQ(out.find(" % "), std::string::npos) << "a share of what has no end: " << out;
+    // Its lines have the run's time, as faults and words of controllers: bring-up counts.
+    std::smatch done, ran;
+    ASSERT_TRUE(std::regex_search(out, done, std::regex("([0-9.]+) s  done"))) << out;
+    ASSERT_TRUE(std::regex_search(out, ran, std::regex("stopped by SIG\\w+ after ([0-9.]+) s")));
+    EXPECT_GT(std::stod(done[1]), std::stod(ran[1]) + 0.1) << out;
   }
 }
 

@@ -74,6 +74,7 @@ TEST_F(HomedJoints, ARunThatDoesNotWaitSaysWhichWasNotHomed) {
   expect(ran, 1, "held until these are homed: joint1 (tandem joint home NAME");
   expect(ran, 1, "fault: 1.");
   expect(ran, 1, "joint1: it was not homed, for which the controllers waited");
+  expect(ran, 1, "hint: with `--on-fault wait` a run stays after a stop");
 }
 
 TEST_F(HomedJoints, ARunHomesThoseThatAreDeclaredSo) {

@@ -35,7 +35,9 @@ TEST_F(JointAtRest, WhileTimeIsPausedHasNotBegunItsMotion) {
   begin_paused();
   const Outcome move = interrupted_move();
   EXPECT_EQ(move.status, 1);
-  expect(move.out, "asked for; it will happen in the loop's next cycle");
+  expect(move.out,
+         "asked for; it will happen in the loop's next cycle, or be refused by it, as time "
+         "stands: then the run's output and its log tell");
   expect(move.out, "joint1 will move from ");
   expect(move.err,
          "joint1 has not begun to move to 0.3 rad: it begins when the run goes on (tandem clock "

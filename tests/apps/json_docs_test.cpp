@@ -16,6 +16,7 @@
 #include "apps/run/commands.hpp"
 #include "apps/run/replay_figures.hpp"
 #include "apps/run/run_summary.hpp"
+#include "apps/run/slurm_sweep.hpp"
 #include "apps/run/test_suite.hpp"
 #include "apps/search/commands.hpp"
 #include "apps/tools/commands.hpp"
@@ -38,6 +39,7 @@ const Named<std::vector<Figures::Row>> kTables{
     {"replay", Figures::rows_of<runtime::ReplayResult>()},
     {"test", Figures::rows_of<SuiteResult>()},
     {"sweep", Figures::rows_of<sweep::SweepSummary>()},
+    {"sweep status", Figures::rows_of<SweepStatus>()},
     {"shrink", Figures::rows_of<ShrinkResult>()},
     {"search", Figures::rows_of<SearchResult>()},
     {"search limit", Figures::rows_of<LimitResult>()},

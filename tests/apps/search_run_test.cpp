@@ -155,6 +155,76 @@ TEST_F(Shrink, ASearchFindsTheHardestPushWhateverRunsAtOnce) {
     EXPECT_EQ(alone[same], worst[same]) << same;
 }
 
+// The runs have a beginning in common, which is simulated once; or each begins at its beginning.
+TEST_F(Shrink, ASearchComesToTheSameBytesByBranches) {
+  write_text(folder_ / "study.toml", kStudy);
+  write_text(folder_ / "map.toml", R"(experiment = "five.toml"
+[[vary]]
+key = "push.third.impulse_Ns"
+values = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+)");
+  const std::string limit =
+      "search map.toml --limit push.third.impulse_Ns --up-to 1 --halvings 3 -q ";
+  EXPECT_EQ(tandem("search study.toml --runs 12 -q -j 1 --no-branches --json whole.json").status,
+            1);
+  EXPECT_EQ(tandem(limit + "-j 2 --no-branches -o whole.csv --json wholes.json").status, 0);
+  const auto whole = json("whole.json");
+  EXPECT_EQ(whole["branched"], 0);
+  EXPECT_EQ(whole["trunks"], 0);
+  for (const char* const jobs : {"1", "2"}) {
+    const std::string j = std::string("-j ") + jobs;
+    EXPECT_EQ(tandem("search study.toml --runs 12 -q --json branched.json " + j).status, 1);
+    const auto branched = json("branched.json");
+    EXPECT_EQ(branched["branched"], 12);
+    EXPECT_EQ(branched["trunks"], 1);
+    for (const char* same : {"expectation", "settings", "progress", "failed", "runs"})
+      EXPECT_EQ(branched[same], whole[same]) << same << " " << j;
+    EXPECT_EQ(tandem(limit + "-o branched.csv --json branches.json " + j).status, 0);
+    EXPECT_EQ(read_text(folder_ / "branched.csv"), read_text(folder_ / "whole.csv")) << j;
+    EXPECT_EQ(json("branches.json")["branched"], json("wholes.json")["runs"]);
+  }
+}
+
+TEST_F(Shrink, ShrinksToTheSameByBranches) {
+  const std::string shrink = "shrink five.toml -q -j 1 ";
+  EXPECT_EQ(tandem(shrink + "-o whole.toml --json whole.json --no-branches").status, 0);
+  EXPECT_EQ(tandem(shrink + "-o branched.toml --json branched.json").status, 0);
+  const auto after_words = [&](const char* file) {
+    const std::string text = read_text(folder_ / file);
+    return text.substr(text.find("\n\n"));
+  };
+  EXPECT_EQ(after_words("branched.toml"), after_words("whole.toml"));
+  EXPECT_EQ(json("branched.json")["expectation"], json("whole.json")["expectation"]);
+  EXPECT_EQ(json("branched.json")["runs"], json("whole.json")["runs"]);
+  EXPECT_EQ(json("whole.json")["branched"], 0);
+  EXPECT_GT(json("branched.json")["branched"], 10);
+}
+
+TEST_F(Shrink, DrawsLimitsByDirection) {
+  write_text(folder_ / "map.toml", R"(experiment = "five.toml"
+[[vary]]
+key = "push[2].impulse_Ns"
+values = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+[[vary]]
+key = "push[2].at_s"
+values = [1.0, 1.1]
+)");
+  const std::string limit = "search map.toml --limit 'push[2].impulse_Ns' --up-to 1 --halvings 1 ";
+  const Outcome drawn = tandem(limit + "--svg map.svg");
+  EXPECT_EQ(drawn.status, 0) << drawn.err;
+  const std::string svg = read_text(folder_ / "map.svg");
+  EXPECT_TRUE(svg.starts_with("<svg ")) << svg;
+  for (const char* text :
+       {"push[2].at_s = 1<", "push[2].at_s = 1.1", "push[2].impulse_Ns by direction", "Ns/kg",
+        "none failed", "double_pendulum"})
+    EXPECT_NE(svg.find(text), std::string::npos) << text << "\n" << svg;
+  edit("map.toml", "[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]", "[1.0]");
+  edit("map.toml", "push[2].impulse_Ns", "push[2].for_s");
+  const Outcome none = tandem("search map.toml --limit 'push[2].for_s' --up-to 1 --svg map.svg");
+  EXPECT_EQ(none.status, 2);
+  EXPECT_NE(none.err.find("is no direction"), std::string::npos) << none.err;
+}
+
 TEST_F(Shrink, ASearchCountsFailuresWithoutAMarginAsTheWorstAndRefusedPointsApart) {
   write_settle();
   write_text(folder_ / "study.toml", R"(experiment = "settle.toml"

@@ -3,6 +3,7 @@
 #include <csignal>
 
 #include "sweep/slurm_job.hpp"
+#include "sweep/slurm_options.hpp"
 #include "tests/apps/cluster.hpp"
 
 namespace tandem::apps {
@@ -69,6 +70,72 @@ TEST(SlurmJob, DividesPointsAndKeepsIndicesBelowTheLimit) {
   EXPECT_EQ(arrays[2].list(), "0,3");
 }
 
+TEST(SlurmOptions, RefuseWhatTheSweepSetsItself) {
+  const auto said = [](const std::string& option) {
+    const Status right = sweep::check_sbatch({option});
+    return right ? std::string() : right.error().to_string();
+  };
+  EXPECT_EQ(said("array=0-7"),
+            "--sbatch array=0-7: the sweep sets it: an element for each chunk of points "
+            "(--chunk-points N makes larger ones)");
+  EXPECT_EQ(said("cpus-per-task=8"),
+            "--sbatch cpus-per-task=8: the sweep sets it (the points at once are the cores: -j N)");
+  for (const char* option : {"wrap=ls", "output=x", "error=x", "ntasks=2", "chdir=/", "test-only",
+                             "wait", "--mem=4G", "-p long", "P=3", "time=soon", "time", "nodes=2"})
+    EXPECT_NE(said(option), "") << option;
+  for (const char* option : {"partition=long", "mem=4G", "time=2:00:00", "begin=now+1hour",
+                             "account=me", "exclusive", "constraint=avx2&ssd"})
+    EXPECT_EQ(said(option), "");
+  EXPECT_FALSE(sweep::check_sbatch({"mem=4G", "mem=8G"}));
+  EXPECT_EQ(sweep::slurm_minutes("90"), 90.0);
+  EXPECT_EQ(sweep::slurm_minutes("1:30"), 1.5);
+  EXPECT_EQ(sweep::slurm_minutes("1:30:00"), 90.0);
+  EXPECT_EQ(sweep::slurm_minutes("2-12"), 3600.0);
+  EXPECT_EQ(sweep::slurm_minutes("1-00:00:30"), 1440.5);
+  EXPECT_EQ(sweep::slurm_minutes("infinite"), std::numeric_limits<double>::infinity());
+  for (const char* text : {"", "soon", "1:", "-3", "1:2:3:4"})
+    EXPECT_EQ(sweep::slurm_minutes(text), std::nullopt) << text;
+}
+
+// It needed a controller that answers, for a script that it only prints.
+TEST_F(SlurmProgram, ADryRunNeedsNoController) {
+  std::filesystem::create_directories(folder_ / "bin");
+  for (const char* name : {"sbatch", "squeue", "scancel", "scontrol", "sinfo"}) {
+    write_text(folder_ / "bin" / name,
+               "#!/bin/sh\necho 'Unable to contact slurm controller' >&2\n"
+               "exit 1\n");
+    std::filesystem::permissions(folder_ / "bin" / name, std::filesystem::perms::owner_all);
+  }
+  const std::string path = "PATH=\"$PWD/bin:$PATH\"";
+  const Outcome script = tandem("sweep study.toml --slurm --dry-run -o far", path);
+  EXPECT_EQ(script.status, 0) << script.err;
+  EXPECT_NE(script.out.find("#SBATCH --requeue"), std::string::npos) << script.out;
+  EXPECT_NE(script.out.find("Unable to contact slurm controller"), std::string::npos) << script.out;
+  EXPECT_EQ(tandem("sweep study.toml --slurm -o far", path).status, 2);
+  EXPECT_EQ(tandem("sweep study.toml --slurm --dry-run --sbatch array=1 -o far", path).status, 2);
+
+  // A partition of half an hour, though four points of a minute would need five.
+  write_text(folder_ / "bin/scontrol", "#!/bin/sh\necho 'MaxArraySize = 1001'\n");
+  write_text(folder_ / "bin/sinfo", "#!/bin/sh\necho 'short* 2:00'\necho 'long 1-00:00:00'\n");
+  write_text(folder_ / "bin/squeue", "#!/bin/sh\n");
+  const std::string dry = "sweep study.toml --slurm --dry-run -o far --chunk-points 4";
+  const Outcome clamped = tandem(dry, path);
+  EXPECT_NE(clamped.out.find("#SBATCH --time=2\n"), std::string::npos) << clamped.out;
+  EXPECT_NE(clamped.err.find("a chunk takes up to 5 minutes by time_limit_s, and a job of this "
+                             "partition has 2"),
+            std::string::npos)
+      << clamped.err;
+  EXPECT_NE(tandem(dry + " --sbatch partition=long", path).out.find("#SBATCH --time=5\n"),
+            std::string::npos);
+  const Outcome long_time = tandem(dry + " --sbatch time=1:00:00", path);
+  EXPECT_EQ(long_time.status, 2);
+  EXPECT_NE(long_time.err.find("a job of this partition has 2 minutes at most"), std::string::npos)
+      << long_time.err;
+  const Outcome typo = tandem("sweep study.toml --slurm --sbatch partition=lnog -o far", path);
+  EXPECT_EQ(typo.status, 2);
+  EXPECT_NE(typo.err.find("it has short, long"), std::string::npos) << typo.err;
+}
+
 TEST_F(SlurmProgram, WithoutSlurmItSaysSoAndShowsTheScript) {
   const Outcome none = tandem("sweep study.toml --slurm -o far", "PATH=/nowhere");
   EXPECT_EQ(none.status, 2);
@@ -92,6 +159,10 @@ TEST_F(SlurmProgram, PointsKeepTheKernelsThatTheFirstHad) {
              "experiment = \"hold.toml\"\n[[vary]]\nkey = \"duration_s\"\nvalues = [0.1]\n");
   ASSERT_EQ(tandem("sweep short.toml -o base -q --kernel-variant baseline").status, 0);
   EXPECT_EQ(tandem("sweep short.toml -o base -q").status, 0);  // whatever this CPU would take
+  ASSERT_EQ(tandem("sweep status base --json status.json").status, 0);
+  EXPECT_EQ(json("status.json")["done"], 1);
+  EXPECT_EQ(json("status.json")["submitted"], false);
+  EXPECT_EQ(json("status.json")["running_chunks"], nlohmann::json());
   const Outcome other = tandem("sweep short.toml -o base -q --kernel-variant x87");
   EXPECT_EQ(other.status, 2);
   EXPECT_NE(other.err.find("no variant 'x87'"), std::string::npos) << other.err;

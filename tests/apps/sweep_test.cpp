@@ -84,6 +84,93 @@ TEST_F(SweepProgram, HasTheSameBytesOnAnyNumberOfWorkersAndGoesOn) {
       << mixed.err;
 }
 
+// What comes at a time, at a condition, is asked for, or is random; with an event that does not
+// vary among those that do.
+constexpr char kMixed[] = R"toml(robot = "robot.toml"
+posture = "ready"
+duration_s = 0.8
+[sim]
+noise = true
+[[controller]]
+plugin = "hold"
+[[push]]
+name = "same"
+link = "link1"
+when = "phase() == running"
+after_s = 0.1
+torque_Nm = [1.0, 0.0, 0.0]
+for_s = 0.05
+[[push]]
+name = "later"
+link = "link2"
+when = "abs(velocity(joint1)) > 0.05rad/s"
+after_s = 0.2
+impulse_Ns = [0.1, 0.2, 0.3]
+for_s = 0.05
+[[fault]]
+kind = "frame_drop"
+probability = 0.3
+at_s = 0.9
+for_s = 0.05
+[[fault]]
+kind = "frame_drop"
+probability = 0.2
+at_s = 1.0
+for_s = 0.1
+[[event]]
+name = "softer"
+at_s = 0.9
+ask = { do = "joint.gains", joint = "joint1", loop = "position", kp = 20.0 }
+[[expect]]
+name = "slow"
+rms = "velocity(joint1)"
+below = "0.001rad/s"
+[[expect]]
+name = "in place"
+bounds = "position(joint2)"
+below = "9rad"
+)toml";
+
+TEST_F(SweepProgram, HasTheSameBytesByBranchesOfWhateverHappens) {
+  write_text(folder_ / "mixed.toml", kMixed);
+  const auto rows_of = [this](const std::string& key, const std::string& values, bool branch) {
+    write_text(folder_ / "study.toml",
+               "experiment = \"mixed.toml\"\nseeds = 2\n[[vary]]\nkey = \"" + key +
+                   "\"\nvalues = " + values + "\n");
+    std::filesystem::remove_all(folder_ / "one");
+    const Outcome outcome =
+        tandem(std::string("sweep study.toml -q -j 2 -o one") + (branch ? "" : " --no-branches"));
+    EXPECT_EQ(outcome.status, 0) << key << ": " << outcome.err;
+    return read_text(folder_ / "one/results.csv");
+  };
+  for (const auto& [key, values] : {
+           std::pair{"push.later.impulse_Ns[0]", "[0.1, 0.2, 0.3, 0.4]"},
+           std::pair{"push.later.after_s", "[0.0, 0.1, 0.3, 9.0]"},
+           std::pair{"push.later.when",
+                     "[\"position(joint2) > 9rad\", \"phase() == running\", \"time() > "
+                     "1s\"]"},
+           std::pair{"fault[1].at_s", "[0.5, 0.85, 1.0, 1.2]"},
+           std::pair{"fault[0].probability", "[0.1, 0.3, 0.5]"},
+           std::pair{"event.softer.at_s", "[0.7, 0.9, 1.1]"},
+           std::pair{"event.softer.ask.kp", "[10.0, 50.0, 90.0]"},
+       }) {
+    EXPECT_EQ(rows_of(key, values, true), rows_of(key, values, false)) << key;
+  }
+}
+
+TEST_F(SweepProgram, BuildsTheKernelsOfEachRobotOnce) {
+  study("values = [0.0, 0.5]\n",
+        "[[vary]]\nkey = \"robot.model.link.link2.mass_kg\"\nvalues = [1.25, 1.5]\n");
+  const Outcome outcome =
+      tandem("sweep study.toml -q -j 2 -o one --json one.json", "XDG_CACHE_HOME=$PWD/cache");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(json("one.json")["rate"]["passed"], 4) << read_text(folder_ / "one/results.csv");
+  std::size_t libraries = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "cache/tandem/models"))
+    libraries += entry.path().extension() == ".so" ? 1 : 0;
+  EXPECT_EQ(libraries, 2U);
+}
+
 TEST_F(SweepProgram, ACrashARefusalAndAHangCostOnePointEach) {
   study("values = [0.0, \"text\"]\n", "time_limit_s = 2\n");
   EXPECT_EQ(tandem("sweep study.toml -o out --json out.json -q").status, 0);

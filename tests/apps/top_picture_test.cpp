@@ -3,6 +3,7 @@
 
 #include "apps/clients/top_picture.hpp"
 #include "apps/clients/top_screen.hpp"
+#include "apps/text/columns.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -159,6 +160,20 @@ TEST(TopPicture, DrawsPositionAndReferenceBetweenTheLimits) {
   EXPECT_EQ(bar(3, 1.2, -7.0), "[|-------------------->]");
   joint_at(look, 4)["min_position_rad"] = joint_at(look, 4)["max_position_rad"] = nullptr;
   EXPECT_NE(line_with(look, {.width = 300}, "er_4 ").text.find("no limits"), std::string::npos);
+}
+
+TEST(TopPicture, HasNoSignBeforeWhatRoundsToZero) {
+  TopLook look = a_look();
+  for (Json& joint : look.joints["joints"]) {
+    for (const char* key : {"position_rad", "commanded_position_rad"}) joint[key] = -0.0004;
+    for (const char* key : {"velocity_rad_s", "torque_Nm", "current_A"}) joint[key] = -0.004;
+    joint["temperature_C"] = -0.4;
+  }
+  const std::string text = text_of(look, {});
+  EXPECT_NE(text.find(" 0.000"), std::string::npos) << text;
+  EXPECT_EQ(text.find("-0"), std::string::npos) << text;
+  joint_at(look, 0)["position_rad"] = -0.0006;
+  EXPECT_NE(text_of(look, {}).find("-0.001"), std::string::npos);
 }
 
 TEST(TopPicture, ShowsUnitsOfSlidesAmongJointsThatTurn) {

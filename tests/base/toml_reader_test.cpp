@@ -215,5 +215,17 @@ TEST(TomlReader, AKeyRequiredOfAnOptionalTableIsAnErrorAtTheTableAbove) {
   EXPECT_EQ(document.diagnostics()[0].key, "controller.parameters.depth_m");
 }
 
+// 0.4 was shown as 0.40000000000000002.
+TEST(TomlReader, GivesATableAsJsonWithTheShortestNumbers) {
+  const TomlDocument document = parse(
+      "ask = { loss = 0.4, most = 1e300, whole = 200.0, count = 3, text = \"a \\\"b\\\"\\n\", "
+      "  list = [0.1, -2.5], not = nan, far = -inf, deep = { yes = true, \"k\\\"ey\" = [] } }\n");
+  TomlTable root = document.root();
+  EXPECT_EQ(root.json("ask"),
+            R"({"count": 3, "deep": {"k\"ey": [], "yes": true}, "far": "-Infinity", )"
+            R"("list": [0.1, -2.5], "loss": 0.4, "most": 1e+300, "not": "NaN", )"
+            R"("text": "a \"b\"\n", "whole": 200.0})");
+}
+
 }  // namespace
 }  // namespace tandem

@@ -122,7 +122,9 @@ class HilRealTimeFault : public HilFault {
                    file("robot.txt"));
     ASSERT_TRUE(robot_->says("Ctrl-C")) << robot_->output();
     master_.emplace(tandem({"run", file("experiment.toml"), "--hal", "can", "--on-fault", "end",
-                            "--no-log", "--no-socket", "--json", file("run.json")}),
+                            "--no-log", "--no-socket", "--json", file("run.json"),
+                            // On a slow machine 10 s pass until a fault has been asked for.
+                            "--duration", "20"}),
                     file("run.txt"));
     ASSERT_TRUE(master_->says(" 10 %")) << master_->output() << robot_->output();
   }

@@ -8,6 +8,7 @@
 #include <set>
 #include <thread>
 
+#include "canopen/objects.hpp"
 #include "tests/hil/socket_can_rig.hpp"
 
 namespace tandem::hal::can {
@@ -118,8 +119,8 @@ TEST(SocketCan, KernelLetsThroughWhatTheOtherSideSends) {
   const auto function_is = [](std::uint32_t id, std::initializer_list<std::uint32_t> functions) {
     return std::ranges::find(functions, id & 0x780) != functions.end();
   };
-  std::set<std::uint32_t> of_nodes{0x100};
-  std::set<std::uint32_t> of_masters{0x000, 0x080};
+  std::set<std::uint32_t> of_nodes{0x100, canopen::cob::kPastAnswer};
+  std::set<std::uint32_t> of_masters{0x000, 0x080, canopen::cob::kPastOrder};
   std::set<std::uint32_t> all;
   for (std::uint32_t id = 0; id <= 0x7FF; ++id) {
     all.insert(id);

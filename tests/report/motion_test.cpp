@@ -126,6 +126,46 @@ TEST(Posture, OfABaseThatNobodyKnowsStandsOnItsFeetAndSaysSo) {
   EXPECT_EQ(known.title, "Posture, seen from the robot's right");
 }
 
+/// On a slope and steps the robot hung in the air: the ground is below it, where it stands in W.
+TEST(Posture, HasTheGroundBelowEachMomentWhereItIsNotLevel) {
+  const std::string folder = TANDEM_SOURCE_DIR "/config/icub/";  // whose x points backwards
+  auto robot = hal::read_robot_config(folder + "robot.toml");
+  ASSERT_TRUE(robot.has_value());
+  const auto description = model::read_urdf(robot->model.urdf, {.floating_base = true});
+  ASSERT_TRUE(description.has_value());
+  hal::ContactConfig ground = robot->contact;
+  hal::GroundShape slope;
+  slope.slope_rad = 0.1;
+  ground.terrain.add(slope);
+  std::vector<PostureSample> samples;
+  for (const double x_m : {0.0, 2.0}) {
+    PostureSample sample{"", 0.0, {}, std::vector<double>(robot->joints.size(), 0.0)};
+    sample.base.p = {x_m, 0.3, 0.6};
+    sample.ground = &ground;
+    sample.ground_m = {0.0, 0.0, 0.05};
+    samples.push_back(sample);
+  }
+  const Figure figure = posture_figure(description->tree, *robot, samples);
+  const auto found = std::ranges::find(figure.curves, "ground", &Curve::label);
+  ASSERT_NE(found, figure.curves.end());
+  ASSERT_EQ(found->x.size() % 2, 0U);
+  const std::size_t each = found->x.size() / 2;
+  const auto middle = [&](std::size_t s) {  // of the line below one figure
+    const auto first = found->y.begin() + static_cast<std::ptrdiff_t>(s * each);
+    const auto [low, high] = std::minmax_element(first, first + std::ptrdiff_t(each) - 1);
+    return 0.5 * (*low + *high);
+  };
+  EXPECT_NEAR(middle(1) - middle(0), 2.0 * std::tan(0.1), 1e-9);
+  EXPECT_NEAR(middle(0), ground.height_m + 0.05, 0.05) << "the base is about over its feet";
+  // Ahead is to the right, and against W's x: there the slope falls.
+  EXPECT_NEAR((found->y[10] - found->y[0]) / (found->x[10] - found->x[0]), -std::tan(0.1), 1e-9);
+  EXPECT_TRUE(std::isnan(found->y[each - 1])) << "a line for each moment";
+  // On level ground it is one level, as before; of a base that nobody knows there is none.
+  samples[0].placed = samples[1].placed = false;
+  const Figure unknown = posture_figure(description->tree, *robot, samples);
+  EXPECT_EQ(std::ranges::find(unknown.curves, "ground", &Curve::label), unknown.curves.end());
+}
+
 /// An arm that reaches ahead and turns a little was a line, seen from the front.
 TEST(Posture, OfAnArmIsSeenFromWhereItShowsMost) {
   const std::string folder = TANDEM_SOURCE_DIR "/config/panda/";

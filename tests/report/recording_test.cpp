@@ -252,6 +252,29 @@ TEST_F(Recorded, GivesWindowsAtTheGrainOfTheLog) {
   EXPECT_EQ(recording->window({shoulder}, 5.0, 4.0, 10).size(), 32U);
 }
 
+TEST_F(Recorded, HasTheGroundAsAGridOfHeights) {
+  const auto file = log::LogFile::open(make_log("a.mcap", 40));
+  ASSERT_TRUE(file);
+  studio::RunDescription run = pair();
+  hal::ContactConfig& contact = run.robot.contact;
+  contact.stiffness_N_m = 1e4;
+  contact.height_m = 0.5;
+  const auto ground = [&] {
+    const auto recording = Recording::read({.run = run, .logs = {{.file = &*file}}});
+    EXPECT_TRUE(recording);
+    return apps::Json::parse(recording->text(kMostReportBytes).json)["hello"]["ground"];
+  };
+  EXPECT_EQ(ground(), apps::Json({{"height_m", 0.5}})) << "it is level";
+  contact.terrain.add(hal::GroundShape{.name = "slope", .slope_rad = 0.1});
+  contact.patches.push_back({.name = "ice", .x_m = {0, 1}, .y_m = {0, 1}});
+  const apps::Json sloped = ground();
+  EXPECT_EQ(sloped["terrain"]["x_m"], apps::Json({-10.0, 10.0})) << "a plane needs no more";
+  const double end = std::round(1e5 * 10.0 * std::tan(0.1)) / 1e5;
+  EXPECT_EQ(sloped["terrain"]["height_m"], apps::Json({-end, end, -end, end}));
+  EXPECT_EQ(sloped["terrain"]["coarser"], false);
+  EXPECT_EQ(sloped["patches"][0]["name"], "ice");
+}
+
 TEST_F(Recorded, HasDifferencesInTheUnitOfTheJointsKind) {
   const auto a = log::LogFile::open(make_log("a.mcap", 40));
   const auto b = log::LogFile::open(make_log("b.mcap", 40, 5.0));

@@ -113,6 +113,40 @@ TEST_F(ExpectationTest, NumbersHaveBounds) {
   EXPECT_FALSE(run(of, {14.0, -14.0}).passed);
 }
 
+TEST_F(ExpectationTest, WorkIsWhatDrivesDidWhileTheyDrove) {
+  auto of = spec(ExpectationKind::kWork, "knee");
+  of.above = "1mJ";
+  of.below = "50mJ";
+  const auto cycle = [this](std::uint64_t i) {
+    state.torque_Nm()[0] = 2.0;
+    state.velocity_rad_s()[0] = i == 1 ? -4.0 : 4.0;  // in one cycle it brakes
+    state.torque_Nm()[1] = -5.0;
+    state.velocity_rad_s()[1] = -2.0;
+  };
+  const ExpectationResult good = run(of, 3, cycle);
+  EXPECT_TRUE(good.passed) << good.reason;
+  EXPECT_NEAR(*good.margin, 0.016 - 0.001, 1e-15) << "2 Nm at 4 rad/s for 2 ms";
+  EXPECT_EQ(good.unit, "J");
+  EXPECT_EQ(good.at_s, 0.012) << "the end of its window";
+  of.text = "*";
+  EXPECT_NEAR(*run(of, 3, cycle).margin, 0.05 - (0.016 + 0.030), 1e-15) << "and 5 N at 2 m/s";
+  of.below = "40mJ";
+  EXPECT_EQ(run(of, 3, cycle).reason, "it is 0.046 J");
+  const ExpectationResult unknown_once = run(of, 3, [&](std::uint64_t i) {
+    cycle(i);
+    if (i == 1) state.torque_Nm()[0] = kUnmeasured;
+  });
+  EXPECT_EQ(unknown_once.reason, "nobody measured it in 1 of 3 cycles, first at 0.011 s");
+  of.text = "knie";
+  const auto unknown = Expectation::read(of, names());
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().key, "work");
+  EXPECT_NE(unknown.error().hint.find("knee"), std::string::npos) << unknown.error().hint;
+  of.text = "*";
+  of.below = "3Nm";
+  EXPECT_FALSE(Expectation::read(of, names())) << "that is no energy";
+}
+
 TEST_F(ExpectationTest, SettlingIsTheTimeAfterTheLastCycleOutside) {
   auto of = spec(ExpectationKind::kSettles, "torque(knee)");
   of.below = "1Nm";
@@ -343,10 +377,13 @@ TEST_F(ExpectationTest, IsRewoundWithItsRun) {
 
 TEST_F(ExpectationTest, IsJudgedWithoutHeapAndLocks) {
   std::vector<ExpectationSpec> specs{spec(ExpectationKind::kAlways, "torque(knee) < 40Nm"),
-                                     spec(ExpectationKind::kSettles, "height()")};
+                                     spec(ExpectationKind::kSettles, "height()"),
+                                     spec(ExpectationKind::kWork, "*")};
   specs[0].after = "phase() == running";
   specs[1].name = "other";
   specs[1].above = "0m";
+  specs[2].name = "work";
+  specs[2].below = "1J";
   auto all = Expectations::read(specs, "file", names());
   ASSERT_TRUE(all);
   const rt::ScopedRealtime realtime;

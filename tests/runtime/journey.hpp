@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/logged_state.hpp"
 #include "runtime/time_machine.hpp"
 #include "tests/runtime/bundled_run.hpp"
 
@@ -55,10 +56,18 @@ struct Journey {
             recorder) {}
   Journey(const std::string& robot, const std::string& experiment,
           std::function<void(Experiment&)> change, log::Recorder* recorder = nullptr)
-      : machine(1'000'000, TimeMachine::kBudget_bytes, true),
-        run(robot, experiment, paused(std::move(change)),
-            {.recorder = recorder, .observer = &witness, .time_machine = &machine}),
-        loop([this] { run.cycle->run(); }) {}
+      : Journey(robot, experiment, paused(std::move(change)), {}, recorder) {}
+  /// @param overrides  begin paused: paused()
+  Journey(const std::string& robot, const std::string& experiment, Overrides overrides,
+          const Run::Connect& connect, log::Recorder* recorder = nullptr,
+          std::size_t budget_bytes = TimeMachine::kBudget_bytes)
+      : machine(1'000'000, budget_bytes, true),
+        run(robot, experiment, std::move(overrides),
+            {.recorder = recorder, .observer = &witness, .time_machine = &machine}, connect),
+        loop([this, recorder] {
+          if (recorder != nullptr) machine.log_to(states_to(*recorder, 1'000'000));
+          run.cycle->run();
+        }) {}
   ~Journey() { end(); }
   /// No cycle comes any more.
   void end() {

@@ -14,15 +14,7 @@ namespace tandem::runtime {
 namespace {
 
 using test::LockstepRobot;
-
-/// Puts the wire and its emulated robot, made in `place`, before a run.
-Run::Connect over(std::optional<LockstepRobot>& place, bool lockstep = true) {
-  return [&place, lockstep](Composition& c) -> Diagnostics {
-    place.emplace(c.experiment.robot, c.kernels.get(), c.experiment.sim_robot_config(), lockstep);
-    c.backend = std::move(place->backend);
-    return {};
-  };
-}
+using test::over;
 
 /// A squat with its log, in process or over `wire`; `cycles` 0: all of it.
 struct LoggedSquat {

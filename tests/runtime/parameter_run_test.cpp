@@ -255,8 +255,8 @@ TEST_F(ParameterRun, SaysWhyAValueDoesNotFitAndWhatWould) {
   EXPECT_EQ(refusal("word", "thre"),
             "tuned.word: 'thre' is none of its words (did you mean 'there'?)");
   EXPECT_EQ(refusal("length_m", 0.4),
-            "tuned.length_m: is not live: it is read when the controller is loaded (unload the "
-            "controller, then load it with --set 'length_m = …')");
+            "tuned.length_m: is not live: it is read when the controller is loaded (give it in the "
+            "experiment's file, or unload the controller and load it with another value)");
   EXPECT_EQ(set({{"tnued", "share", 0.5}}).error().to_string(),
             "tnued: no controller 'tnued' is loaded (did you mean 'tuned'?)");
   steps(3);

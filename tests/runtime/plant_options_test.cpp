@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <fstream>
 
+#include "hal/config/ground_keys.hpp"
 #include "hal/sim/payload.hpp"
 #include "runtime/experiment.hpp"
 #include "tests/support/scratch_folder.hpp"
@@ -40,6 +41,37 @@ TEST_F(PlantOptions, AreNothingWithoutTheirKeys) {
   ASSERT_TRUE(e) << to_string(e.error());
   EXPECT_EQ(e->plant, nullptr);
   EXPECT_EQ(e->sim_robot_config().changes, nullptr);
+}
+
+// A log has the ground's tables: who reads them gets the same ground, to the bit.
+TEST_F(PlantOptions, SayTheGroundSoThatALogHasIt) {
+  const auto e = read(
+      "[[sim.patch]]\nname = 'ice \"1\"'\nx_m = [0.1, 2]\ny_m = [-1, 1]\nsliding_friction = 0.05\n"
+      "[[sim.ground]]\nname = 'ramp'\nshape = 'slope'\nslope_deg = 7.3\ntowards_deg = 30\n"
+      "x_m = [0.5, 3]\ny_m = [-1, 1.5]\nedge_m = 0.3\n"
+      "[[sim.ground]]\nname = 'hill'\nshape = 'bump'\nheight_m = 0.1\nx_m = [0, 1]\ny_m = [0, 1]\n"
+      "[[sim.shake]]\nname = 'quake'\nalong = 'y'\namplitude_m = 0.02\nfrequency_Hz = 1.7\n"
+      "from_s = 0.3\n",
+      "coman");
+  ASSERT_TRUE(e) << to_string(e.error());
+  ASSERT_NE(e->plant, nullptr);
+  hal::ContactConfig logged = e->robot.contact;
+  const Status read_again = hal::read_ground(e->plant->ground, "run.mcap", logged);
+  ASSERT_TRUE(read_again) << read_again.error().to_string();
+  const hal::ContactConfig& ground = e->plant->robot.contact;
+  for (double x = -1.0; x < 4.0; x += 0.173) {
+    for (double y = -2.0; y < 2.0; y += 0.191)
+      ASSERT_EQ(logged.terrain.at(x, y).height_m, ground.terrain.at(x, y).height_m);
+  }
+  for (double t = 0.0; t < 3.0; t += 0.07)
+    ASSERT_EQ(logged.terrain.motion_at(t).position_m, ground.terrain.motion_at(t).position_m);
+  ASSERT_EQ(logged.patches.size(), 1U);
+  EXPECT_EQ(logged.patches[0].name, "ice \"1\"");
+  EXPECT_EQ(logged.patches[0].sliding_friction, 0.05);
+  const Status wrong =
+      hal::read_ground("[[ground]]\nname = 'x'\nshape = 'cave'\n", "run.mcap", logged);
+  ASSERT_FALSE(wrong);
+  EXPECT_EQ(logged.patches.size(), 1U) << "as it was";
 }
 
 TEST_F(PlantOptions, ChangeThePlantAndLeaveTheRobot) {

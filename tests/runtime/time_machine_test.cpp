@@ -159,10 +159,42 @@ TEST(TimeMachine, FindsWhereSomethingBecameTrueLast) {
   EXPECT_EQ(trip.now(), last);
   // And forwards.
   ASSERT_TRUE(trip.machine.until(
-      *trip.run.cycle, [](const hal::CycleView& view) { return view.time.cycle == 2'950; }));
+      *trip.run.cycle, [](const hal::CycleView& view) { return view.time.cycle == 2'950; },
+      "2950"));
   while (!trip.clock().state().standing) std::this_thread::yield();
   EXPECT_EQ(trip.now(), 2'951U);
   EXPECT_EQ(trip.witness.others, 0U);
+}
+
+// The second one replaced the first and nobody was told.
+TEST(TimeMachine, SaysWhichConditionIsWaitedForAndWhichItGivesUp) {
+  Journey trip("double_pendulum", "trajectory");
+  trip.step(100);
+  RobotCycle& cycle = *trip.run.cycle;
+  ASSERT_TRUE(cycle.inbox().clock().set_rate(0.01)) << "so that it does not end meanwhile";
+  const auto never = [](const hal::CycleView&) { return false; };
+  EXPECT_EQ(trip.machine.awaited(), "");
+  const auto begin = [&](const CycleCondition& holds, const char* words) {
+    return trip.machine.until(cycle, holds, words).value_or(Awaited{.replaced = "?"});
+  };
+  EXPECT_EQ(begin(never, "first").replaced, "");
+  EXPECT_EQ(trip.machine.awaited(), "first");
+  const Awaited second = begin(never, "second");
+  EXPECT_EQ(second.replaced, "first");
+  EXPECT_FALSE(second.holds_now);
+  EXPECT_EQ(trip.machine.awaited(), "second");
+  EXPECT_EQ(trip.machine.give_up(cycle).value_or("?"), "second");
+  EXPECT_EQ(trip.machine.awaited(), "");
+  EXPECT_FALSE(trip.clock().state().paused) << "it went on before";
+  const auto none = trip.machine.give_up(cycle);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().message, "no condition is waited for");
+  EXPECT_FALSE(trip.machine.met());
+  EXPECT_TRUE(begin([](const hal::CycleView&) { return true; }, "always").holds_now)
+      << "it has to end first, which nobody was told";
+  ASSERT_TRUE(trip.machine.until(cycle, never, "third"));
+  trip.go(100);
+  EXPECT_EQ(trip.machine.awaited(), "") << "it was about the time that would have come";
 }
 
 // What had been seen of a future that does not come counted, too.
@@ -271,9 +303,10 @@ TEST(TimeMachine, WhatWaitsIsDroppedWhenTimeGoesElsewhere) {
   std::uint64_t seen = 0;
   (void)services.texts().read(seen, said);
   ASSERT_EQ(said.size(), 1U);
-  EXPECT_EQ(said[0].words(),
-            "went elsewhere: dropped what waited for the next cycle: 1 request, 1 sample of an "
-            "input, 1 fault");
+  EXPECT_EQ(
+      said[0].words(),
+      "went elsewhere: dropped what waited for the next cycle: 1 request (controller.switch), 1 "
+      "sample of an input, 1 fault");
   trip.step(1'500);  // as if nobody had asked
   EXPECT_EQ(trip.witness.others, 0U);
   EXPECT_EQ(rate->look().counts.arrived, 0U);
@@ -373,11 +406,10 @@ TEST(TimeMachine, GoesOnFromALog) {
     TimeMachine machine(1'000'000, TimeMachine::kBudget_bytes, false);
     BundledRun run("coman", "squat", {},
                    {.recorder = recorder->get(), .observer = &witness, .time_machine = &machine});
-    machine.log_to([&](const Checkpoint& one) { log_state(**recorder, one, 1'000'000); });
+    machine.log_to(states_to(**recorder, 1'000'000));
     run.steps(5'100);
     run.cycle->inbox().reset_faults();  // nothing to reset, but it was heard
     run.steps(1'400);
-    machine.finish();
     EXPECT_EQ((*recorder)->close().error, "");
   }
   const auto begin = [&](double time_s, const char* experiment, std::uint64_t next,
@@ -412,6 +444,47 @@ TEST(TimeMachine, GoesOnFromALog) {
     EXPECT_NE(said.find("the run is over before "), std::string::npos) << time_s << " s: " << said;
   }
   EXPECT_NE(begin(9.0, "squat", 0).find("9 s is after its end, of 6.499 s"), std::string::npos);
+}
+
+// It waited for what the cycles after it would hear, so a run that was killed had lost it.
+TEST(TimeMachine, TellsOfAStateAtOnce) {
+  std::vector<std::uint64_t> states, heard;
+  TimeMachine machine(1'000'000, TimeMachine::kBudget_bytes, false);
+  BundledRun run("double_pendulum", "trajectory", {}, {.time_machine = &machine});
+  machine.log_to({.state = [&](const Checkpoint& one) { states.push_back(one.cycle); },
+                  .heard = [&](std::uint64_t cycle) { heard.push_back(cycle); }});
+  run.steps(1);
+  EXPECT_EQ(states, (std::vector<std::uint64_t>{0}));
+  run.steps(4);
+  for (int i = 0; i < 2; ++i) {
+    run.cycle->inbox().reset_faults();  // nothing to reset, but it was heard
+    run.steps(2);
+  }
+  EXPECT_EQ(states.size(), 1U);
+  EXPECT_EQ(heard, (std::vector<std::uint64_t>{5}));  // the first of that state is enough
+}
+
+// One of a run that was killed, and one whose boards keep its states in a process of their own.
+TEST(TimeMachine, NamesTheLogThatABranchWithoutAStateGoesOnFrom) {
+  const log::ScratchFolder folder;
+  const auto refused = [&](const std::string& hal) {
+    const std::string path = (folder / (hal + ".mcap"));
+    auto recorder = log::Recorder::open(path,
+                                        {.robot = "coman",
+                                         .hal = hal,
+                                         .branch = {.of = "run.mcap", .cycle = 301},
+                                         .period_ns = 1'000'000},
+                                        {});
+    EXPECT_TRUE(recorder);
+    (*recorder)->start();
+    EXPECT_EQ((*recorder)->close().error, "");
+    const auto begins = beginning_at({path, 0.4});
+    return begins ? "none" : begins.error().hint;
+  };
+  EXPECT_EQ(refused("sim"), "go on from run.mcap, at a moment up to 0.3 s");
+  EXPECT_EQ(refused("can"),
+            "only runs that could go back in time, with their boards in this process, log some "
+            "(docs/time.md)");
 }
 
 TEST(TimeMachine, SaysWhatIsNoMomentOfALog) {
@@ -467,10 +540,17 @@ TEST(TimeMachine, ABranchHasALogOfItsOwn) {
     ASSERT_TRUE(read) << read.error().to_string();
     const std::vector<double>& cycles = read->columns[0];
     ASSERT_GT(cycles.size(), expected.last - expected.first) << expected.file;
+    const auto begins = beginning_at({log->path(), 1e-3 * static_cast<double>(expected.first + 9)});
+    ASSERT_TRUE(begins) << begins.error().to_string();
+    EXPECT_EQ(begins->from.cycle, expected.first) << expected.file;
     for (std::size_t i = 0; i < cycles.size(); ++i) {
       ASSERT_EQ(cycles[i], static_cast<double>(expected.first + i)) << expected.file;
     }
   }
+  // The second one, which it went on from, began after that.
+  const auto before = beginning_at({folder / "run.branch-3.mcap", 0.05});
+  ASSERT_FALSE(before);
+  EXPECT_EQ(before.error().hint, "that moment is in run.mcap");
 }
 
 }  // namespace

@@ -117,6 +117,11 @@ std::int64_t phase_ns(bool follows, int cycles) {
     clock.now += kPeriod + (follows ? (*line)->clock_shift_ns() : 0);
   }
   EXPECT_EQ((*master)->phase(), hal::Phase::kOperational) << (*master)->status_text();
+  // Both ends of the wire see the same frames.
+  const std::int64_t boards_ns = boards.take_wire_ns();
+  EXPECT_GT(boards_ns, cycles * 5'000);
+  EXPECT_NEAR(static_cast<double>(boards_ns), static_cast<double>((*line)->take_wire_ns()), 2e5);
+  EXPECT_EQ(boards.take_wire_ns(), 0) << "since it was asked last";
   return static_cast<std::int64_t>((*line)->line().cycle().reference_ns %
                                    static_cast<std::uint64_t>(kPeriod));
 }

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include "hal/config/terrain_grid.hpp"
 #include "hal/sim/plant.hpp"
 #include "tests/sim/hand_kernels.hpp"
 
@@ -207,6 +208,70 @@ TEST(Terrain, ADropOnSlopesStepsAndBumpsNeverGainsEnergy) {
     }
     EXPECT_LT(last, 0.6 * start);
   }
+}
+
+/// Between the lines as a picture draws them.
+double drawn(const hal::TerrainGrid& grid, double x, double y) {
+  const auto place = [](const std::vector<double>& lines, double at) {
+    const auto above = std::ranges::upper_bound(lines, at);
+    const std::size_t i = std::clamp<std::ptrdiff_t>(above - lines.begin() - 1, 0,
+                                                     static_cast<std::ptrdiff_t>(lines.size()) - 2);
+    return std::pair(i, (at - lines[i]) / (lines[i + 1] - lines[i]));
+  };
+  const auto [i, u] = place(grid.x_m, x);
+  const auto [j, v] = place(grid.y_m, y);
+  const auto at = [&](std::size_t a, std::size_t b) {
+    return grid.height_m[b * grid.x_m.size() + a];
+  };
+  return std::lerp(std::lerp(at(i, j), at(i + 1, j), u),
+                   std::lerp(at(i, j + 1), at(i + 1, j + 1), u), v);
+}
+
+TEST(Terrain, IsDrawnAsItIsFeltWithFewLines) {
+  hal::Terrain terrain;
+  terrain.add(incline(5.0, 30.0));
+  hal::GroundShape step{.name = "step", .kind = GroundShapeKind::kStep};
+  step.x_m = {0.5, 1.5};
+  step.y_m = {-1.0, 1.0};
+  step.height_m = 0.1;
+  terrain.add(step);
+  hal::GroundShape bump{.name = "bump", .kind = GroundShapeKind::kBump};
+  bump.x_m = {2.0, 14.0};
+  bump.y_m = {-2.0, 2.0};
+  bump.height_m = -0.2;
+  terrain.add(bump);
+  const hal::TerrainGrid grid = hal::grid_of(terrain);
+  EXPECT_FALSE(grid.coarser);
+  EXPECT_LT(grid.x_m.size(), 60U);
+  EXPECT_EQ(grid.height_m.size(), grid.x_m.size() * grid.y_m.size());
+  EXPECT_DOUBLE_EQ(grid.x_m.front(), -10.0);
+  EXPECT_DOUBLE_EQ(grid.x_m.back(), 15.0) << "a metre beyond what is not everywhere";
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> x(-10.0, 15.0), y(-10.0, 10.0);
+  for (int i = 0; i < 20'000; ++i) {
+    const double at_x = x(random), at_y = y(random);
+    ASSERT_NEAR(drawn(grid, at_x, at_y), terrain.at(at_x, at_y).height_m, 3e-3)
+        << at_x << " " << at_y;
+  }
+}
+
+TEST(Terrain, OfAThousandStepsIsDrawnCoarserAndBounded) {
+  hal::Terrain terrain;
+  for (int i = 0; i < 1000; ++i) {
+    hal::GroundShape step{.name = "step", .kind = GroundShapeKind::kStep};
+    step.x_m = {0.3 * i, 0.3 * i + 0.25};
+    step.y_m = {-1e4, 1e4};
+    step.height_m = 0.01;
+    terrain.add(step);
+  }
+  const hal::TerrainGrid grid = hal::grid_of(terrain);
+  EXPECT_TRUE(grid.coarser);
+  EXPECT_LE(grid.x_m.size(), hal::TerrainGrid::kMostLines);
+  EXPECT_GT(grid.x_m.size(), hal::TerrainGrid::kMostLines / 2);
+  EXPECT_TRUE(std::ranges::is_sorted(grid.x_m));
+  EXPECT_DOUBLE_EQ(grid.x_m.back(), hal::TerrainGrid::kMost_m);
+  EXPECT_DOUBLE_EQ(grid.y_m.front(), -hal::TerrainGrid::kMost_m);
+  EXPECT_DOUBLE_EQ(hal::grid_of({}).x_m.back(), hal::TerrainGrid::kLeast_m);
 }
 
 hal::GroundShake shake(std::size_t axis, double amplitude_m, double frequency_Hz) {

@@ -158,7 +158,8 @@ TEST_F(Attach, WhatIsRefusedSaysWhatToDo) {
   const Printed no_page = print("studio --page /nowhere");
   EXPECT_EQ(no_page.status, 2);
   EXPECT_NE(no_page.text.find("there is no page of the studio"), std::string::npos) << no_page.text;
-  EXPECT_EQ(print("studio --port 0").status, 0) << "what was refused leaves nothing behind";
+  const Printed after = print("studio --port 0");  // what was refused leaves nothing behind
+  EXPECT_EQ(after.status, 0) << after.text;
   EXPECT_NE(print("studio --page /nowhere").text.find("stays as it is"), std::string::npos);
   EXPECT_EQ(end(), 0);
 }

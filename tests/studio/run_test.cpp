@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <set>
 
 #include "base/quoting.hpp"
 #include "log/log_file.hpp"
@@ -111,13 +112,18 @@ TEST_F(StudioRun, ShowsThePageWhatItsLogHas) {
       if (joint[2 + j][cycle] > static_cast<double>(cycle)) joint[j][cycle] = std::nan("");
     }
   }
+  // A studio that had no processor for a second lost cycles, and said so.
+  constexpr unsigned kGap = 2;
+  std::set<std::uint64_t> lost;
   std::uint64_t before = 0;
   for (const SeenTick& tick : ticks) {
     ASSERT_LT(tick.cycle, joint[0].size());
     for (std::size_t j = 0; j < 2 && tick.cycle > 0; ++j) {
       EXPECT_TRUE(same(tick.numbers[3 * j + 2], joint[j][tick.cycle])) << tick.cycle;
     }
-    if (before > 0 && tick.cycle > before && tick.lost == 0) {
+    const bool gap = (tick.flags & kGap) != 0;
+    for (std::uint64_t cycle = before; gap && cycle <= tick.cycle; ++cycle) lost.insert(cycle);
+    if (before > 0 && tick.cycle > before && tick.lost == 0 && !gap) {
       float low = std::nanf(""), high = low;
       for (std::uint64_t cycle = before + 1; cycle <= tick.cycle; ++cycle) {
         low = std::fmin(low, static_cast<float>(joint[0][cycle]));
@@ -131,9 +137,13 @@ TEST_F(StudioRun, ShowsThePageWhatItsLogHas) {
   ASSERT_EQ(window.cycles, 1U);
   ASSERT_GT(window.rows, 100U);
   const auto first = static_cast<std::size_t>(std::lround(window.first_s / window.row_s));
+  std::size_t compared = 0;
   for (std::size_t row = 0; row < window.rows; ++row) {
+    if (std::isnan(window.numbers[row]) && lost.contains(first + row)) continue;
     EXPECT_TRUE(same(window.numbers[row], joint[0][first + row])) << first + row;
+    ++compared;
   }
+  EXPECT_GT(compared, 100U) << lost.size();
 }
 
 TEST_F(StudioRun, LetsAPageDoWhatItsTokenAllows) {
@@ -147,10 +157,11 @@ TEST_F(StudioRun, LetsAPageDoWhatItsTokenAllows) {
   enter(client);
   EXPECT_EQ(client.ask({{"do", "clock.pause"}})["ok"], true);
   EXPECT_EQ(client.ask({{"do", "clock.resume"}})["ok"], true);
-  const Json move{{"do", "joint.halt"}};
-  EXPECT_EQ(client.ask(move)["hint"], "take control first");
+  const Json stop{{"do", "joint.stop"}, {"joint", "joint1"}}, halt{{"do", "joint.halt"}};
+  EXPECT_EQ(client.ask(stop)["hint"], "take control first");
+  EXPECT_EQ(client.ask(halt)["ok"], true) << "what brakes is everybody's who may change";
   client.say(Json{{"op", "control"}, {"take", true}});
-  EXPECT_EQ(client.ask(move).value("hint", ""), "");
+  EXPECT_NE(client.ask(stop).value("hint", ""), "take control first");
   WebClient stranger(port_);
   ASSERT_TRUE(stranger.open());
   EXPECT_EQ(stranger.ask({{"do", "run.stop"}})["ok"], false);

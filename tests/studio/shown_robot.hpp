@@ -66,7 +66,7 @@ struct ShownRobot {
       observer.take_signals(time, *block);
     }
     observer.take({.time = time,
-                   .phase = hal::RunPhase::kRunning,
+                   .phase = phase,
                    .read_code = Code::kOk,
                    .state = state,
                    .command = command,
@@ -79,6 +79,7 @@ struct ShownRobot {
     void take(const hal::CycleView&) noexcept TANDEM_RT override { ++cycles; }
     std::uint64_t cycles = 0;
   } counter;
+  hal::RunPhase phase = hal::RunPhase::kRunning;
   hal::StateImage state{{.joints = 2, .sensor_channels = {}}};
   hal::CommandImage command{{.joints = 2, .sensor_channels = {}}};
   hal::TruthImage truth{2, 0};

@@ -291,7 +291,9 @@ TEST(Studio, EndsControlWhenTimeGoesBackAndHaltsNothing) {
     const Json events = other->next("events");
     told = events["events"].back()["text"];
   }
-  EXPECT_EQ(other->next("control")["taken"], false);
+  const Json control = other->next("control");
+  EXPECT_EQ(control["taken"], false);
+  EXPECT_EQ(control["went_back"], true);
   EXPECT_FALSE(rig.asked_itself("joint.halt")) << "what goes on unchanged has the same bits";
   const std::lock_guard lock(rig.mutex);
   EXPECT_FALSE(rig.dropped.empty()) << "what it asked for and has not begun";
@@ -359,6 +361,42 @@ TEST(Studio, TellsThatTimeWentBackAndForgetsWhatLayAfter) {
   for (const Json& told : kept["events"]) texts.push_back(told["text"]);
   EXPECT_EQ(texts, (std::vector<std::string>{"phase: running", "early",
                                              "time went back to 0.1 s, from 0.199 s"}));
+}
+
+// The cycle of that time is done and is not made again: what happened in it stays, once. What was
+// asked for while time stood there acts in the next cycle, so it is forgotten.
+TEST(Studio, KeepsWhatHappenedInTheCycleThatItGoesBackToOnce) {
+  StudioRig rig;
+  rig.start();
+  const auto one = rig.client();
+  (void)one->next("events");
+  rig.show(0, 100);
+  rig.robot.phase = hal::RunPhase::kHeld;
+  rig.show(100, 150);
+  rig.robot.phase = hal::RunPhase::kFaulted;
+  rig.show(150, 200);
+  const auto event = [](std::int64_t ms, const char* text) {
+    return Event{1e-9 * static_cast<double>(1'000'000 * ms), static_cast<std::uint64_t>(ms),
+                 Event::Level::kInfo, "", text};
+  };
+  {
+    const std::lock_guard lock(rig.mutex);
+    rig.events = {event(100, "fault: of that cycle"), event(100, "request joint.gains a"),
+                  event(101, "request joint.stop a"), event(199, "late")};
+  }
+  while (one->next("events")["events"].back()["text"] != "late") {
+  }
+  rig.robot.phase = hal::RunPhase::kHeld;
+  rig.show(100, 101);
+  (void)one->next("back");
+  while (one->next("events")["events"].back()["text"] != "time went back to 0.1 s, from 0.199 s") {
+  }
+  std::vector<std::string> texts;
+  const Json kept = rig.client()->next("events");
+  for (const Json& told : kept["events"]) texts.push_back(told["text"]);
+  EXPECT_EQ(texts,
+            (std::vector<std::string>{"phase: running", "phase: held", "fault: of that cycle",
+                                      "time went back to 0.1 s, from 0.199 s"}));
 }
 
 TEST(Studio, TellsItsClientsThatTheRunIsOverAndClosesThem) {

@@ -137,6 +137,24 @@ TEST(StudioTap, CountsWhatFindsNoRoom) {
   EXPECT_GE(taken, 1000U) << "a second has room";
 }
 
+// It was told in the tick before it, whose cycles were whole.
+TEST(StudioSampler, TellsOfAGapInTheTickThatHasIt) {
+  ShownRobot robot;
+  Tap tap(robot.images(), ShownRobot::kPeriod_ns);
+  Sampler sampler(tap, robot.images(), robot.names(), 200'000);
+  for (std::uint64_t cycle = 0; cycle < 5000; ++cycle) robot.show(tap, cycle, {});
+  (void)sampler.look({});
+  ASSERT_LT(sampler.cycle(), 4999U);
+  sampler.begin_tick();
+  robot.show(tap, 5000, {});
+  (void)sampler.look({});
+  EXPECT_TRUE(sampler.span().gap);
+  sampler.begin_tick();
+  robot.show(tap, 5001, {});
+  (void)sampler.look({});
+  EXPECT_FALSE(sampler.span().gap);
+}
+
 TEST(StudioSampler, KeepsEachCycleAndWhatBecameOfItSinceTheTick) {
   ShownRobot robot;
   Tap tap(robot.images(), ShownRobot::kPeriod_ns);

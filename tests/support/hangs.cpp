@@ -26,7 +26,7 @@ class Hangs final : public Controller {
     throws_ = setup.parameters.boolean_or("throws", false);
     crash_ = setup.parameters.choice_or(
         "crash", "no",
-        {"no", "null", "stack", "abort", "divide", "exit", "close", "wild", "smash"});
+        {"no", "null", "stack", "abort", "divide", "exit", "close", "wild", "smash", "kill"});
     if (setup.parameters.boolean_or("at_once", false)) crash();
     for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
       setup.claim(j, hal::ControlMode::kPosition);
@@ -55,6 +55,7 @@ class Hangs final : public Controller {
     if (crash_ == "stack") (void)fill(1);
     if (crash_ == "abort") std::abort();
     if (crash_ == "divide") std::raise(SIGFPE);  // as an integer's division by zero on x86
+    if (crash_ == "kill") ::kill(::getpid(), SIGKILL);
     if (crash_ == "exit") std::exit(0);
     if (crash_ == "wild") wild_();
     if (crash_ == "smash") smash(40);

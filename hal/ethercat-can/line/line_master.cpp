@@ -114,6 +114,10 @@ void LineMaster::take_frame(FrameBuffer& frame) noexcept {
     }
     return;
   }
+  if (const auto posted = parse_nop_frame(frame)) {
+    if (posted_count_ < posted_.size()) posted_[posted_count_++] = *posted;
+    return;
+  }
   ethercat::FrameReader reader(frame.frame());
   ethercat::Datagram datagram;
   while (reader.next(datagram)) {
@@ -204,6 +208,21 @@ void LineMaster::write() noexcept TANDEM_RT {
   batch_.begin(link_->address());
   writes_ = image_.write(batch_);
   (void)link_->send(batch_.finish());
+}
+
+void LineMaster::post(const canopen::Frame& frame) noexcept TANDEM_RT {
+  make_nop_frame(frame, link_->address(), post_);
+  (void)link_->send({&post_, 1});
+}
+
+std::optional<canopen::Frame> LineMaster::take_posted(std::uint32_t id) noexcept TANDEM_RT {
+  while (posted_count_ > 0) {
+    const canopen::Frame first = posted_[0];
+    std::copy(posted_.begin() + 1, posted_.end(), posted_.begin());
+    --posted_count_;
+    if (first.id == id) return first;
+  }
+  return std::nullopt;
 }
 
 void LineMaster::stop() noexcept TANDEM_RT {

@@ -2,14 +2,16 @@
 // Layer: hal/ethercat-can/line.  Thread: construction and texts non-RT; the rest the loop's.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "base/result.hpp"
-#include "hal/ethercat-can/line/link.hpp"
+#include "hal/ethercat-can/line/nop_frame.hpp"
 #include "hal/ethercat-can/line/process_image.hpp"
 
 namespace tandem {
@@ -78,6 +80,10 @@ class LineMaster {
   void write() noexcept TANDEM_RT;
   /// Asks every slave to go to INIT, with its outputs off. Once, at the end.
   void stop() noexcept TANDEM_RT;
+  /// Sends a frame of CANopen that no slave looks at, by itself: parse_nop_frame().
+  void post(const canopen::Frame& frame) noexcept TANDEM_RT;
+  /// The next one that has come so with this COB-ID, a few at most; none: no more.
+  [[nodiscard]] std::optional<canopen::Frame> take_posted(std::uint32_t id) noexcept TANDEM_RT;
   /// Whether nothing that was sent is under way any more.
   [[nodiscard]] bool settled() const noexcept;
 
@@ -121,6 +127,9 @@ class LineMaster {
   void add_watch() noexcept;
 
   DataLink* link_;
+  FrameBuffer post_;
+  std::array<canopen::Frame, 8> posted_{};  // no state, as what follows
+  std::size_t posted_count_ = 0;
   ProcessImage image_;
   std::vector<SlaveMaster> slaves_;
   Exchange exchange_;

@@ -1,7 +1,8 @@
 // Buttons that ask the run for something, and the line that says what became of it.
 import { commandLine, commandOfAll } from './command';
-import { confirmed } from './confirm';
+import { confirmed, giveUpQuestions } from './confirm';
 import { h, say } from './dom';
+import { seconds } from './format';
 import type { Answer, Request } from './protocol';
 import type { Source } from './source';
 
@@ -13,7 +14,7 @@ export interface ButtonOptions {
   /** Without the button that copies the command line. */
   bare?: boolean;
   /** What is asked once more before, in a dialog with the command. */
-  ask?: string;
+  ask?: string | (() => string);
   done?(answer: Answer, asked: Request): void;
   /** It was pressed, and there is nothing to ask for. */
   nothing?(): void;
@@ -33,12 +34,33 @@ const kUnderWay: Record<string, string> = {
   'clock.back-until': 'searching backwards… The emergency stop ends it. ',
 };
 
+/** Controls that ask the run: those of the class, and all within an element of it. */
+const kAsking = ':is(button, input, select, fieldset):is(.asks-run, .asks-run *)';
+/** What is bad is red for so long, or until the next action. */
+const kRed_ms = 10_000;
+
 /** Why something was refused. */
 function wordsOf(answer: Answer): string {
   return `${answer.error ?? 'refused'}${answer.hint ? ` – ${answer.hint}` : ''}`;
 }
 
+const kEnded = 'The run has ended: nothing can be asked of it any more.';
+
+/** Of a run that is over: why it cannot be pressed stands where its command was. */
+function closeAll(): void {
+  for (const control of document.querySelectorAll<HTMLButtonElement>(kAsking)) {
+    control.title = kEnded;
+    if (!control.disabled) control.disabled = true;
+  }
+}
+
 export class Actions {
+  private ended = false;
+  /** Of the run; NaN: nobody has told it. */
+  private now = Number.NaN;
+  private cooling: ReturnType<typeof setTimeout> | undefined;
+  /** When what the words are about was. */
+  private readonly when = h('span', { class: 'muted' });
   private readonly words = h('span', { class: 'said', role: 'status', 'aria-live': 'polite' });
   private readonly line = h('code', { class: 'command', tabindex: '0' });
   private readonly copier = h(
@@ -54,23 +76,47 @@ export class Actions {
     { class: 'said-bar', 'aria-label': 'last action' },
     this.line,
     this.copier,
-    h('span', {}, this.words, this.elapsed),
+    h('span', {}, this.when, this.words, this.elapsed),
   );
 
   constructor(readonly source: Source) {
     this.line.hidden = true;
     this.copier.hidden = true;
-    say(this.words, 'Point at a button to see its command.');
+    const hovers = matchMedia('(hover: hover)').matches;
+    say(
+      this.words,
+      hovers
+        ? 'Point at a button to see its command.'
+        : 'What you press is shown here as a command.',
+    );
+    source.on({
+      connection: (state, words) => {
+        if (state !== 'ended') return;
+        this.ended = true;
+        closeAll();
+        giveUpQuestions();
+        // What is made, or would be enabled, from now on.
+        const changes = { subtree: true, childList: true, attributeFilter: ['disabled'] };
+        new MutationObserver(closeAll).observe(document.body, changes);
+        this.tell('', words ? `${kEnded} It ended: ${words}` : kEnded);
+      },
+      tick: ({ time }) => {
+        if (source.live) this.now = time;
+      },
+    });
   }
 
-  /** Shows a command and words about it. */
+  /** Shows a command and words about it, with the time of the run. */
   tell(command: string, words: string, bad = false): void {
     this.line.hidden = command === '';
     this.copier.hidden = command === '';
     say(this.line, command);
+    say(this.when, Number.isFinite(this.now) ? `at ${seconds(this.now)}: ` : '');
     say(this.words, words);
     this.elapsed.hidden = !Object.values(kUnderWay).includes(words);
     this.bar.classList.toggle('bad', bad);
+    clearTimeout(this.cooling);
+    if (bad) this.cooling = setTimeout(() => this.bar.classList.remove('bad'), kRed_ms);
   }
 
   async run(request: Request): Promise<Answer> {
@@ -144,12 +190,13 @@ export class Actions {
       'button',
       {
         type: 'button',
-        class: options.class,
+        class: ['asks-run', options.class].filter(Boolean).join(' '),
         'aria-label': options.name,
         onclick: async () => {
           const asked = request();
           if (!asked) return options.nothing?.();
-          if (options.ask && !(await confirmed(options.ask, commandLine(asked), label))) return;
+          const ask = typeof options.ask === 'function' ? options.ask() : options.ask;
+          if (ask && !(await confirmed(ask, commandLine(asked), label))) return;
           const answer = await this.run(asked);
           options.done?.(answer, asked);
         },
@@ -157,6 +204,7 @@ export class Actions {
       label,
     );
     const describe = () => {
+      if (this.ended) return;
       const asked = request();
       button.title = [options.title, asked && commandLine(asked)].filter(Boolean).join('\n');
     };
@@ -166,7 +214,7 @@ export class Actions {
     if (options.bare) return button;
     const copier = h('button', {
       type: 'button',
-      class: 'copy',
+      class: 'copy asks-run',
       title: 'copy the command',
       'aria-label': `copy the command of ${options.name ?? label}`,
       onclick: () => {

@@ -36,7 +36,7 @@ export class ClockPanel {
     this.past = new PastPanel(data, actions);
     this.body = h(
       'fieldset',
-      { class: 'clock-body' },
+      { class: 'clock-body asks-run' },
       h('legend', {}, 'Robot time'),
       actions.button('Pause', () => ({ do: 'clock.pause' }), { title: 'Simulated time stands.' }),
       actions.button('Resume', () => ({ do: 'clock.resume' })),

@@ -1,5 +1,5 @@
 // The command line that does the same as a request.
-import type { Request } from './protocol';
+import { isRequest, type Request, type RunEvent } from './protocol';
 
 /** A word as a shell takes it. */
 export function shellWord(word: string): string {
@@ -57,8 +57,10 @@ export function commandLine(request: Request): string {
       return [...words, `${value(request.by_s)}s`].join(' ');
     case 'clock.goto':
       return [...words, `${value(request.time_s)}s`].join(' ');
-    case 'clock.back-until':
     case 'clock.until':
+      if (request.cancel === true) return `${words.join(' ')} --cancel`;
+      return [...words, shellWord(String(request.condition))].join(' ');
+    case 'clock.back-until':
       return [...words, shellWord(String(request.condition))].join(' ');
     case 'clock.rate':
       return [...words, value(request.rate)].join(' ');
@@ -130,4 +132,73 @@ export function commandLine(request: Request): string {
       ].join(' ');
   }
   return `tandem ask ${shellWord(JSON.stringify(request))}`;
+}
+
+const kDone: Record<string, string> = {
+  'controller.load': 'loaded',
+  'controller.reload': 'loaded anew',
+  'controller.start': 'started',
+  'controller.stop': 'stopped',
+};
+
+/** What a request does, in words: "joint1: gains of its position loop: kd 0.5". */
+export function requestInWords(request: Request): string {
+  const joint = String(request.joint ?? '');
+  const name = String(request.name ?? '');
+  const values = (names: string[]) =>
+    names.filter((key) => request[key] !== undefined).map((key) => `${key} ${value(request[key])}`);
+  switch (request.do) {
+    case 'joint.gains':
+      return `${joint}: gains of its ${request.loop} loop: ${values(['kp', 'ki', 'kd']).join(', ')}`;
+    case 'joint.set': {
+      const stiff = { stiffness_Nm_rad: 'stiffness', damping_Nms_rad: 'damping' };
+      const impedance = Object.entries(stiff)
+        .filter(([key]) => request[key] !== undefined)
+        .map(([key, word]) => `${word} ${value(request[key])}`);
+      const modes = [request.mode, request.interaction].filter(Boolean).map(String);
+      return `${joint}: ${[...modes, ...impedance].join(', ')}`;
+    }
+    case 'controller.set': {
+      const set = Object.entries((request.parameters ?? {}) as Record<string, unknown>);
+      return `${name}: ${set.map(([key, of]) => `${key} ${value(of)}`).join(', ')}`;
+    }
+    case 'controller.switch': {
+      const list = (of: unknown) => (Array.isArray(of) ? of.map(String).join(', ') : '');
+      const parts = [
+        [list(request.stop), 'stopped'],
+        [list(request.start), 'started'],
+      ];
+      return parts
+        .filter(([who]) => who !== '')
+        .map(([who, what]) => `${who} ${what}`)
+        .join('; ');
+    }
+  }
+  const done = kDone[request.do];
+  if (done) return `${name || 'controllers'} ${done}`;
+  return commandLine(request);
+}
+
+function parsedRequest(text: string): Request | null {
+  try {
+    const request = JSON.parse(text) as Request;
+    return typeof request?.do === 'string' ? request : null;
+  } catch {
+    return null;
+  }
+}
+
+/** The words of an event "request {…}", and of its refusal behind it; what is none stays as it is. */
+export function requestWords(text: string): string {
+  const rest = text.replace(/^request /, '');
+  for (let end = rest.length; end > 1; end = rest.lastIndexOf('}', end - 2) + 1) {
+    const request = parsedRequest(rest.slice(0, end));
+    if (request) return requestInWords(request) + rest.slice(end);
+  }
+  return rest;
+}
+
+/** The text of an event: of a request what it does. */
+export function eventWords(event: RunEvent): string {
+  return isRequest(event) ? `asked: ${requestWords(event.text)}` : event.text;
 }

@@ -85,7 +85,7 @@ const kShow = 'controller.show';
 
 export class Controllers {
   private readonly rows = new Map<string, Row>();
-  private readonly body = h('div', { class: 'cards' });
+  private readonly body = h('fieldset', { class: 'cards' });
   private readonly stop = h('select', { 'aria-label': 'controller to stop' });
   private readonly start = h('select', { 'aria-label': 'controller to start' });
   private readonly shadows: Shadows;
@@ -109,7 +109,7 @@ export class Controllers {
         return { do: 'controller.switch', stop: list(this.stop), start: list(this.start) };
       }),
     );
-    this.element = h('div', { class: 'controllers' }, both, this.body);
+    this.element = h('div', { class: 'controllers asks-run' }, both, this.body);
     data.source.on({
       watched: (request, answer) => {
         if (request === kShow) this.show(answer);
@@ -121,6 +121,9 @@ export class Controllers {
     });
     lease.on(() => {
       both.disabled = !lease.mayChange;
+      this.body.disabled = !lease.mayChange;
+      attribute(this.body, 'aria-description', lease.why || null);
+      this.body.title = lease.why;
     });
   }
 

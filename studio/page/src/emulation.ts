@@ -7,6 +7,8 @@ import type { Hello } from './protocol';
 export const kEmulationTabs = ['plots', 'scope', 'joints', 'events'];
 
 const kFields = ['synced', 'all_enabled', 'slipped'] as const;
+const kNoLoad =
+  'wire_load is not measured of EtherCAT in lockstep: a master sends its frames again for as long as a step takes.';
 type Field = (typeof kFields)[number];
 
 /** How it is, in words. @param stands time does: nothing is stepped. */
@@ -26,6 +28,8 @@ export class EmulationPanel {
   private ids: Partial<Record<Field, number>> = {};
   private readonly run = h('code', {});
   private readonly words = h('p', { class: 'emulation-words', role: 'status' });
+  private loads: number[] = [];
+  private readonly load = h('p', { class: 'muted', hidden: true }, kNoLoad);
   readonly element = h(
     'section',
     { class: 'emulation-panel', 'aria-label': 'emulation', hidden: true },
@@ -37,6 +41,7 @@ export class EmulationPanel {
       this.run,
     ),
     this.words,
+    this.load,
   );
 
   constructor(private readonly data: Data) {
@@ -51,10 +56,8 @@ export class EmulationPanel {
         data.catalog.named(`boards.${field}`)?.id ?? -1,
       ]);
       this.ids = Object.fromEntries(found);
-      data.want(
-        'emulation',
-        Object.values(this.ids).filter((id) => id >= 0),
-      );
+      this.loads = data.catalog.idsOf('boards', 'wire_load');
+      data.want('emulation', [...Object.values(this.ids).filter((id) => id >= 0), ...this.loads]);
     });
   }
 
@@ -62,6 +65,9 @@ export class EmulationPanel {
   update(): void {
     const stands = this.data.lastTick?.paused === true;
     const words = emulationWords((field) => this.data.latest(this.ids[field] ?? -1), stands);
-    if (!this.element.hidden) say(this.words, words);
+    if (this.element.hidden) return;
+    say(this.words, words);
+    const known = this.loads.every((id) => Number.isFinite(this.data.latest(id)));
+    this.load.hidden = known || this.data.hello?.emulated !== 'ethercat';
   }
 }

@@ -1,9 +1,11 @@
 // The list of events, newest first, with a search.
+
+import { eventWords } from './command';
 import type { Data } from './data';
 import { h, say } from './dom';
 import { seconds } from './format';
 import { signOf } from './marks';
-import type { RunEvent } from './protocol';
+import { isRequest, type RunEvent } from './protocol';
 
 const kMostShown = 400;
 const kLevels: Record<string, string> = { error: 'error', warn: 'warning', info: 'note' };
@@ -13,7 +15,7 @@ export function filterEvents(events: RunEvent[], query: string): RunEvent[] {
   const words = query.toLowerCase().split(/\s+/).filter(Boolean);
   return events.filter((event) => {
     const text =
-      `${event.level} ${kLevels[event.level] ?? ''} ${event.who} ${event.text}`.toLowerCase();
+      `${event.level} ${kLevels[event.level] ?? ''} ${event.who} ${event.text} ${eventWords(event)}`.toLowerCase();
     return words.every((word) => text.includes(word));
   });
 }
@@ -95,7 +97,7 @@ export class Events {
       ),
       h('td', {}, `${signOf(event.level)} ${level}`),
       h('td', {}, event.who),
-      h('td', {}, event.text),
+      h('td', { title: isRequest(event) ? event.text : null }, eventWords(event)),
     );
   }
 }

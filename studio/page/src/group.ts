@@ -1,5 +1,6 @@
 // What several joints do at once: those of a limb, or those that the filter shows.
 import type { Actions } from './actions';
+import { claimsOf } from './claims';
 import { commandLine, commandOfAll } from './command';
 import { confirmed } from './confirm';
 import { h, say } from './dom';
@@ -13,7 +14,7 @@ interface Act {
   /** What it does with each joint. */
   each(joint: string): Request;
   title: string;
-  /** The question before it: where joints would move, or fall. */
+  /** The question before it, of what they do: where joints would move, or fall. */
   ask?: string;
 }
 
@@ -55,12 +56,17 @@ export class GroupBar {
     'aria-label': 'speed of the posture [% of the limits]',
   });
   private readonly way: HTMLElement;
+  private readonly acts = h('fieldset');
   readonly element: HTMLFieldSetElement;
 
-  /** @param shown the joints that the filter leaves. */
+  /**
+   * @param shown the joints that the filter leaves.
+   * @param controllerOf who has a joint; empty: nobody.
+   */
   constructor(
     private readonly actions: Actions,
     private readonly shown: () => string[],
+    private readonly controllerOf: (joint: string) => string,
   ) {
     this.way = h(
       'span',
@@ -71,10 +77,13 @@ export class GroupBar {
     );
     this.element = h(
       'fieldset',
-      { class: 'toolbar group-bar', disabled: true },
+      { class: 'toolbar group-bar asks-run', disabled: true },
       h('legend', {}, 'Several joints'),
       this.which,
       this.size,
+      this.acts,
+    );
+    this.acts.append(
       ...kActs.map((act) => this.button(act.label, act.title, () => this.act(act))),
       this.way,
     );
@@ -96,15 +105,24 @@ export class GroupBar {
     this.count();
   }
 
-  /** The filter shows others. */
+  /** The filter shows others, or a controller came or went. What all are claimed of does nothing. */
   count(): void {
-    const count = this.names().length;
-    say(this.size, count === 1 ? '1 joint' : `${count} joints`);
+    const names = this.names();
+    const claimed = names.length - claimsOf(names, this.controllerOf).free.length;
+    const count = names.length === 1 ? '1 joint' : `${names.length} joints`;
+    say(this.size, claimed === 0 ? count : `${count}, ${claimed} claimed by a controller`);
+    this.acts.disabled = names.length > 0 && claimed === names.length;
   }
 
   private names(): string[] {
     const { value } = this.which;
     return value === kShown ? this.shown() : (this.limbs.get(value.slice('limb '.length)) ?? []);
+  }
+
+  /** Those that nobody has claimed, and words for the question about the others. */
+  private askable(): { free: string[]; others: string } {
+    const { free, words } = claimsOf(this.names(), this.controllerOf);
+    return { free, others: words && ` ${words} These are not asked.` };
   }
 
   private button(label: string, title: string, press: () => Promise<void>): HTMLElement {
@@ -121,21 +139,22 @@ export class GroupBar {
   }
 
   private async act(act: Act): Promise<void> {
-    const requests = this.names().map((name) => act.each(name));
+    const { free, others } = this.askable();
+    const requests = free.map((name) => act.each(name));
     if (requests.length === 0) return;
-    const words = `${requests.length} joints ${act.ask}: ${this.names().join(', ')}.`;
+    const words = `These joints ${act.ask}: ${free.join(', ')}.${others}`;
     if (act.ask && !(await confirmed(words, commandOfAll(requests), act.label))) return;
     await this.actions.runAll(requests);
   }
 
   private async go(): Promise<void> {
-    const joints = this.names();
+    const { free: joints, others } = this.askable();
     if (joints.length === 0) return;
     const percent = Math.min(100, Math.max(1, Number(this.speed.value) || kCareful_percent));
     const request: Request = { do: 'joint.posture', posture: this.posture.value };
     if (joints.length < this.all.length) request.joints = joints;
     request.speed = percent / 100;
-    const words = `${joints.length} joints move to the posture ${this.posture.value}, the slowest at ${percent} % of its limit: ${joints.join(', ')}.`;
+    const words = `These joints move to the posture ${this.posture.value}, the slowest at ${percent} % of its limit: ${joints.join(', ')}.${others}`;
     if (await confirmed(words, commandLine(request), 'Go to posture')) {
       await this.actions.run(request);
     }

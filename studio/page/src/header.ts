@@ -26,6 +26,7 @@ export class Header {
   private readonly measured = h('span', { class: 'rate measured' });
   private readonly link = h('span', { class: 'chip link' }, 'connecting');
   private readonly lost = h('span', { class: 'frames-lost' });
+  private readonly stop: HTMLElement;
   private readonly reset: HTMLElement;
   private readonly start: HTMLElement;
   private readonly fault = h('p', { class: 'fault', role: 'alert', hidden: true });
@@ -36,7 +37,7 @@ export class Header {
     private readonly actions: Actions,
     themeButton: HTMLElement,
   ) {
-    const stop = h(
+    this.stop = h(
       'button',
       {
         type: 'button',
@@ -76,7 +77,7 @@ export class Header {
         this.reset,
         this.start,
       ),
-      h('div', { class: 'right' }, themeButton, data.source.live && stop),
+      h('div', { class: 'right' }, themeButton, data.source.live && this.stop),
       this.fault,
     );
     data.source.on({
@@ -120,6 +121,13 @@ export class Header {
     }
     this.state = state;
     this.why = words;
+    if (state === 'ended') {
+      // It can still be pressed: then it says what is left to do.
+      attribute(this.stop, 'aria-disabled', 'true');
+      this.stop.title = kNothingToStop;
+      this.reset.hidden = true;
+      this.start.hidden = true;
+    }
     this.refresh();
   }
 
@@ -151,6 +159,7 @@ export class Header {
   }
 
   private watched(request: string, answer: Answer): void {
+    if (this.state === 'ended') return;
     if (request === 'status' && answer.ok) {
       const phase = String(answer.phase);
       say(this.phase, phase);

@@ -25,7 +25,7 @@ export class Inputs {
   private readonly body = h('div', { class: 'cards' });
   private readonly holds = new Map<string, HTMLElement>();
   private shape = '?';
-  readonly element = h('div', { class: 'inputs' }, this.body);
+  readonly element = h('div', { class: 'inputs asks-run' }, this.body);
 
   constructor(
     data: Data,

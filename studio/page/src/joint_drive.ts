@@ -30,12 +30,12 @@ function carefulSpeed(joint: JointInfo): number {
 
 const kSteps = [-0.1, -0.01, 0.01, 0.1];
 
-/** @param position of the joint now. @param homed it has a place that its drive can look for. */
+/** @param position of the joint now. @returns what moves it, and what a claimed joint has as well. */
 export function jointDrive(
   joint: JointInfo,
   actions: Actions,
   position: () => number,
-): HTMLElement {
+): { moves: HTMLFieldSetElement; resets: HTMLElement } {
   const low = joint.lower ?? -Math.PI;
   const high = joint.upper ?? Math.PI;
   const { name, unit } = joint;
@@ -64,6 +64,7 @@ export function jointDrive(
     min: low,
     max: high,
     step: (high - low) / 400,
+    title: 'The joint goes there when it is let go.',
     'aria-label': `goal of ${name} [${unit}]`,
   });
   const inside = (value: number) => Math.min(high, Math.max(low, value));
@@ -143,8 +144,13 @@ export function jointDrive(
   };
   const simple = (label: string, request: Request, title: string, ask?: string) =>
     actions.button(label, () => request, { name: `${label} ${name}`, title, ask });
-  return h(
+  const resets = h(
     'div',
+    { class: 'drive-row' },
+    simple('Reset drive', { do: 'joint.reset', joint: name }, 'Clears the fault of its drive.'),
+  );
+  const moves = h(
+    'fieldset',
     { class: 'drive' },
     h(
       'div',
@@ -188,7 +194,7 @@ export function jointDrive(
       ),
       simple('Home', { do: 'joint.home', joint: name }, 'Its drive looks for its place.'),
       simple('Recover', { do: 'joint.recover', joint: name }, 'Leads it back inside its limits.'),
-      simple('Reset drive', { do: 'joint.reset', joint: name }, 'Clears the fault of its drive.'),
     ),
   );
+  return { moves, resets };
 }

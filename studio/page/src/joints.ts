@@ -5,11 +5,11 @@ import { saveFile } from './csv';
 import type { Data } from './data';
 import { attribute, h, say } from './dom';
 import { wordOf } from './enums';
-import { number, plain, short } from './format';
+import { fixed, number, plain, short } from './format';
 import { GroupBar } from './group';
 import { jointDrive } from './joint_drive';
 import { JointTuning } from './joint_tuning';
-import { limbsOf, type TreeJoint } from './limbs';
+import { jointsBefore, limbsOf, type TreeJoint } from './limbs';
 import type { Answer, JointInfo } from './protocol';
 import { SiteJog } from './site_jog';
 
@@ -54,6 +54,8 @@ interface Row {
   age: HTMLElement;
   who: HTMLElement;
   free: HTMLElement;
+  /** What moves it, while it is open. */
+  moves: HTMLFieldSetElement | null;
   opener: HTMLButtonElement;
   panel: HTMLElement;
   tuning: JointTuning | null;
@@ -65,6 +67,7 @@ export class Joints {
   private told = new Map<unknown, Record<string, unknown>>();
   private readonly group: GroupBar;
   private readonly jog: SiteJog;
+  private readonly halt: HTMLFieldSetElement;
   private tree: TreeJoint[] = [];
   private readonly body = h('div', { class: 'limbs' });
   private readonly filter = h('input', {
@@ -81,10 +84,20 @@ export class Joints {
     private readonly actions: Actions,
     private readonly lease: ControlLease,
   ) {
-    this.group = new GroupBar(actions, () =>
-      this.rows.filter((row) => !row.element.hidden).map((row) => row.joint.name),
+    const controllerOf = (name: string) => String(this.told.get(name)?.controller ?? '');
+    this.group = new GroupBar(
+      actions,
+      () => this.rows.filter((row) => !row.element.hidden).map((row) => row.joint.name),
+      controllerOf,
     );
-    this.jog = new SiteJog(actions);
+    this.jog = new SiteJog(actions, controllerOf);
+    this.halt = h(
+      'fieldset',
+      {},
+      actions.button('Halt all', () => ({ do: 'joint.halt' }), {
+        title: 'Every joint that an operator moves brakes. It needs no control.',
+      }),
+    );
     this.element = h(
       'div',
       { class: 'joints' },
@@ -92,14 +105,13 @@ export class Joints {
         'div',
         { class: 'toolbar' },
         lease.element,
-        actions.button('Halt all', () => ({ do: 'joint.halt' }), {
-          title: 'Every joint that is led from here brakes.',
-        }),
+        this.halt,
         h(
           'button',
           {
             type: 'button',
-            class: 'live',
+            class: 'asks-run',
+            hidden: !actions.source.live,
             title:
               'Gains, stiffness and damping as they are now, for robot.toml:\ntandem joint tuning',
             onclick: () => void this.save(),
@@ -166,7 +178,13 @@ export class Joints {
       new Map(groups.map((limb) => [limb.name, limb.joints])),
       this.data.hello?.postures ?? [],
     );
-    this.jog.setSites(this.data.hello?.sites ?? []);
+    const moved = new Set((this.data.hello?.joints ?? []).map((joint) => joint.name));
+    const led = (link: string) => jointsBefore(link, this.tree).some((name) => moved.has(name));
+    const sites = this.data.hello?.sites ?? [];
+    this.jog.setSites(
+      this.tree.length === 0 ? sites : sites.filter(({ link }) => led(link)),
+      this.tree,
+    );
     this.applyFilter();
     this.allow();
     if (this.element.offsetParent) this.want(true);
@@ -186,7 +204,7 @@ export class Joints {
       'button',
       {
         type: 'button',
-        class: 'opener',
+        class: 'opener asks-run',
         'aria-expanded': 'false',
         'aria-label': `move ${joint.name}`,
       },
@@ -202,6 +220,12 @@ export class Joints {
       {
         name: `stop its controller: ${joint.name}`,
         title: 'Its joints are held, and free to move from here.',
+        ask: () => {
+          const name = who.dataset.controller ?? '';
+          const its = this.rows.filter((row) => row.who.dataset.controller === name);
+          const count = its.length === 1 ? '1 joint' : `${its.length} joints`;
+          return `${name} stops: what it does with ${count} ends, and they are held where they are.`;
+        },
       },
     );
     free.hidden = true;
@@ -215,6 +239,7 @@ export class Joints {
       who,
       free,
       tuning: null,
+      moves: null,
       mode: cell('mode'),
       position: cell('position'),
       torque: cell('torque'),
@@ -255,14 +280,19 @@ export class Joints {
     row.panel.hidden = !open;
     attribute(row.opener, 'aria-expanded', String(open));
     row.tuning = null;
+    row.moves = null;
     if (!open) return;
-    const drive = jointDrive(row.joint, this.actions, () => this.data.latest(row.ids.position_rad));
+    const { moves, resets } = jointDrive(row.joint, this.actions, () =>
+      this.data.latest(row.ids.position_rad),
+    );
+    row.moves = moves;
     row.tuning = new JointTuning(row.joint, this.actions, this.told.get(row.joint.name) ?? {});
     row.panel.replaceChildren(
       row.who,
       row.free,
-      h('fieldset', { class: 'drive-box', disabled: !this.lease.mine }, drive, row.tuning.element),
+      h('fieldset', { class: 'drive-box asks-run' }, moves, resets, row.tuning.element),
     );
+    this.allow();
   }
 
   private show(row: Row): void {
@@ -273,14 +303,14 @@ export class Joints {
     const goal = value('goal');
     this.mark(row.place, row.joint, position);
     this.mark(row.goal, row.joint, goal);
-    say(row.position, Number.isFinite(position) ? `${position.toFixed(3)} ${unit}` : '–');
+    say(row.position, Number.isFinite(position) ? `${fixed(position, 3)} ${unit}` : '–');
     row.position.title = `position ${number(position)}, reference ${number(goal)} ${unit}`;
     say(row.torque, figure(value('torque_Nm'), force));
     say(row.current, figure(value('current_A'), 'A'));
     const warm = value('temperature_C');
     say(
       row.temperature,
-      Number.isFinite(warm) ? `${warm.toFixed(0)} °C${warm > kWarm_C ? ' hot' : ''}` : '–',
+      Number.isFinite(warm) ? `${fixed(warm, 0)} °C${warm > kWarm_C ? ' hot' : ''}` : '–',
     );
     const fault = value('fault');
     const state = value('drive_state');
@@ -318,25 +348,50 @@ export class Joints {
       const controller = String(joint.controller ?? '');
       row.who.dataset.controller = controller;
       row.free.hidden = controller === '';
-      const homing = joint.homing && joint.homing !== 'none' ? `; ${joint.homing}` : '';
-      const fault = joint.fault_text ? `; ${joint.fault_text}` : '';
-      const moves = joint.moving ? 'moving' : 'standing';
-      say(
-        row.who,
-        controller
-          ? `Claimed by ${controller}: it cannot be moved from here.${fault}`
-          : `Free, ${moves}${homing}${fault}`,
-      );
       attribute(row.element, 'data-moving', String(joint.moving === true));
       attribute(row.element, 'data-controller', controller);
     }
+    this.allow();
+  }
+
+  /** Who leads it, and why it cannot be moved from here. */
+  private leadOf(row: Row): string {
+    const joint = this.told.get(row.joint.name) ?? {};
+    const controller = String(joint.controller ?? '');
+    const homing = joint.homing && joint.homing !== 'none' ? `; ${joint.homing}` : '';
+    const fault = joint.fault_text ? `; ${joint.fault_text}` : '';
+    const moves = joint.moving ? 'moving' : 'standing';
+    const lead = controller
+      ? `Claimed by ${controller}: it cannot be moved from here.${fault}`
+      : `Free, ${moves}${homing}${fault}`;
+    return this.lease.mine ? lead : `${lead.replace(/\.?$/, '.')} ${this.lease.whyNotMine}`;
   }
 
   private allow(): void {
     for (const box of this.body.querySelectorAll<HTMLFieldSetElement>('.drive-box'))
       box.disabled = !this.lease.mine;
+    for (const row of this.rows) {
+      if (!row.moves) continue;
+      const claimed = row.who.dataset.controller ?? '';
+      row.moves.disabled = claimed !== '';
+      say(row.who, this.leadOf(row));
+      // Of a screen reader: why what is disabled is.
+      attribute(
+        row.moves,
+        'aria-description',
+        claimed || !this.lease.mine ? this.leadOf(row) : null,
+      );
+    }
+    const may = this.lease.mayChange;
+    this.halt.disabled = !may;
+    for (const row of this.rows) {
+      const free = row.free.querySelector('button');
+      if (free) free.disabled = !may;
+    }
     this.group.element.disabled = !this.lease.mine;
+    this.group.count();
     this.jog.element.disabled = !this.lease.mine;
+    this.jog.allow();
   }
 
   private async save(): Promise<void> {

@@ -4,9 +4,11 @@ import { ControllerMarks } from './controller_marks';
 import type { Data } from './data';
 import { h } from './dom';
 import { RobotGhost } from './ghost';
+import { patchColour, patchWords } from './ground';
 import type { Layer } from './layer';
 import type { Model } from './model';
 import { Prediction } from './prediction';
+import type { Ground } from './protocol';
 import { Pushes } from './pushes';
 
 interface Row {
@@ -66,6 +68,7 @@ export class Layers {
     h('label', { class: 'toggle', title, hidden: true }, this.switches[i], label),
   );
   private counts: number[] = [];
+  private patches: { name: string; colour: string }[] = [];
 
   /** @param changed something is to be drawn anew. */
   constructor(private readonly changed: () => void) {}
@@ -83,6 +86,15 @@ export class Layers {
 
   setModel(model: Model | null): void {
     for (const row of this.rows) row.layer.setModel(model);
+    this.tell();
+  }
+
+  /** Patches of the ground, which are always shown. */
+  setGround(ground: Ground | null): void {
+    this.patches = (ground?.patches ?? []).map((patch, i) => ({
+      name: patchWords(patch),
+      colour: patchColour(i),
+    }));
     this.tell();
   }
 
@@ -114,7 +126,7 @@ export class Layers {
       layer.object.visible = this.switches[i].checked;
       return layer.object.visible;
     });
-    const seen = shown.flatMap((row) => row.layer.legend);
+    const seen = [...shown.flatMap((row) => row.layer.legend), ...this.patches];
     this.legend.replaceChildren(
       ...seen.map(({ name, colour }) => {
         const swatch = h('span', { class: 'swatch', 'aria-hidden': 'true' });

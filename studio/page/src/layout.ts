@@ -94,10 +94,9 @@ export const kPresets: Record<string, (hello: Hello, catalog: Catalog) => Layout
         ? [
             of(['truth.position_rad'], joints),
             of(['truth.torque_Nm'], joints),
-            // Of EtherCAT it is not known.
-            (hello.emulated === 'can' ? catalog.idsOf('boards', 'wire_load') : []).map((id) =>
-              signal(catalog.withId(id)?.name ?? ''),
-            ),
+            catalog
+              .idsOf('boards', 'wire_load')
+              .map((id) => signal(catalog.withId(id)?.name ?? '')),
             of(['boards.mode', 'boards.drive_state'], joints.slice(0, 1)),
           ]
         : []),

@@ -69,6 +69,15 @@ function towardsRoot(joint: string, parents: Map<string, string>): string[] {
   return [...seen].slice(1);
 }
 
+/** The joints that lead a link: from it to the root. */
+export function jointsBefore(link: string, tree: TreeJoint[]): string[] {
+  const byChild = new Map(tree.map((joint) => [joint.child, joint]));
+  const before = new Set<string>(); // of a ring, which is no tree, each once
+  let up = byChild.get(link);
+  for (; up && !before.has(up.name); up = byChild.get(up.parent)) before.add(up.name);
+  return [...before];
+}
+
 /** For each joint the nearest one of the list towards the root. */
 function parentsAmong(names: string[], tree: TreeJoint[]): Map<string, string> {
   const listed = new Set(names);

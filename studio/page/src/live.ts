@@ -239,6 +239,7 @@ export class LiveSource implements Source {
             taken: message.taken === true,
             yours: message.yours === true,
             by: String(message.by ?? ''),
+            wentBack: message.went_back === true,
           }),
         );
         return;

@@ -1,7 +1,7 @@
 // Arrows and marks beside the robot: forces of the ground, centre of mass, frames.
 import * as THREE from 'three';
 import type { Model } from './model';
-import { pressureCentre } from './pressure';
+import { centreOn, type GroundHeight } from './pressure';
 
 const kMetresPerNewton = 1 / 1000;
 /** Marks are drawn last, through the robot. */
@@ -42,8 +42,8 @@ export class Marks {
   }
 
   /** Arrows of the ground's forces, and a ring at the centre of pressure. */
-  setFeet(positions: number[], forces: number[], moments: number[], ground: number): void {
-    const centre = pressureCentre(positions, forces, moments, ground);
+  setFeet(positions: number[], forces: number[], moments: number[], ground: GroundHeight): void {
+    const centre = centreOn(ground, positions, forces, moments);
     this.pressure.visible = centre !== null;
     if (centre) this.pressure.position.set(...centre);
     const feet = Math.floor(forces.length / 3);
@@ -74,12 +74,12 @@ export class Marks {
     }
   }
 
-  /** @param ground its height; the line of the centre of mass ends there. */
-  setCom(at: number[], ground: number, shown: boolean): void {
+  /** The line of the centre of mass ends on the ground. */
+  setCom(at: number[], ground: GroundHeight, shown: boolean): void {
     this.com.visible = shown && at.length === 3 && at.every(Number.isFinite);
     if (!this.com.visible) return;
     this.com.position.set(at[0], at[1], at[2]);
-    this.drop.scale.z = Math.max(1e-3, at[2] - ground);
+    this.drop.scale.z = Math.max(1e-3, at[2] - ground(at[0], at[1]));
   }
 
   /** Axes at the base and at each joint that moves. */

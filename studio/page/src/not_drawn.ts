@@ -9,10 +9,20 @@ function line(words: string, names: string[], hint = ''): HTMLElement[] {
 }
 
 export class NotDrawn {
-  readonly element = h('div', {});
+  private readonly shapes = h('div', {});
+  private readonly coarser = h(
+    'p',
+    { class: 'not-drawn', hidden: true },
+    'ground drawn coarser: it has too many edges',
+  );
+  readonly element = h('div', {}, this.shapes, this.coarser);
+
+  ground(coarser: boolean): void {
+    this.coarser.hidden = !coarser;
+  }
 
   show(names: string[], { coarse, most }: Meshes): void {
-    this.element.replaceChildren(
+    this.shapes.replaceChildren(
       ...line(`not drawn: ${names.length} shapes`, names),
       ...line(
         `drawn coarser: ${coarse.length} ${coarse.length === 1 ? 'mesh' : 'meshes'}`,

@@ -65,6 +65,8 @@ export class PastPanel {
     oninput: () => this.complain(null),
   });
   private readonly here: HTMLElement;
+  private readonly awaited = h('span', {});
+  private readonly waits: HTMLElement;
   readonly element: HTMLElement;
 
   constructor(
@@ -92,6 +94,15 @@ export class PastPanel {
           nothing: () => this.say(`Write a condition, such as ${this.condition.placeholder}.`),
         },
       );
+    this.waits = h(
+      'p',
+      { class: 'past-waits', hidden: true },
+      this.awaited,
+      actions.button('Cancel', () => ({ do: 'clock.until', cancel: true }), {
+        name: 'cancel: go on until',
+        title: 'The condition is given up; time goes on as it does.',
+      }),
+    );
     this.element = h(
       'div',
       { class: 'past', role: 'group', 'aria-label': 'back in time' },
@@ -102,7 +113,12 @@ export class PastPanel {
       this.condition,
       this.list,
       search('Back until', 'clock.back-until', 'Back to where that became true last.'),
-      search('Go on until', 'clock.until', 'On until that becomes true.'),
+      search(
+        'Go on until',
+        'clock.until',
+        'On until that becomes true; what holds already has to end first. One that waits is replaced.',
+      ),
+      this.waits,
       this.wrong,
       this.words,
     );
@@ -119,6 +135,9 @@ export class PastPanel {
     for (const one of this.element.querySelectorAll<HTMLInputElement>('button, input')) {
       one.disabled = this.past === null;
     }
+    const until = typeof answer.until === 'string' ? answer.until : '';
+    this.waits.hidden = until === '';
+    say(this.awaited, `◷ Goes on until ${until}`);
     this.show();
   }
 

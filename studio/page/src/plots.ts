@@ -1,4 +1,5 @@
 // All panes: search, time of the picture, layouts.
+import { eventWords } from './command';
 import { saveFile } from './csv';
 import type { Data } from './data';
 import { attribute, h, say } from './dom';
@@ -154,7 +155,9 @@ export class Plots implements PaneOwner {
       ? 'The picture follows the run again.'
       : 'The picture stands; the robot goes on.';
     attribute(this.live, 'aria-pressed', String(time.frozen !== null));
-    this.now.hidden = time.selected === null;
+    // It keeps its place: the buttons beside it do not jump.
+    this.now.disabled = time.selected === null;
+    this.now.title = time.selected === null ? 'No time is selected: values are those of now.' : '';
     const span = time.span();
     this.element.dataset.from = String(span.from);
     this.element.dataset.to = String(span.to);
@@ -170,7 +173,8 @@ export class Plots implements PaneOwner {
     else if (time.selected !== null)
       words += `Values at the selected time, ${seconds(time.selected)}.`;
     else words += 'Values of now. Click selects a time, dragging a span; arrow keys move.';
-    if (event) words += ` ${signOf(event.level)} ${event.who ? `${event.who}: ` : ''}${event.text}`;
+    if (event)
+      words += ` ${signOf(event.level)} ${event.who ? `${event.who}: ` : ''}${eventWords(event)}`;
     say(this.words, words);
     if (time.hover !== null) this.pointed = true;
     else if (this.pointed) {

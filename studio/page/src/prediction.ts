@@ -70,7 +70,7 @@ export class Prediction implements Layer {
   private readonly words = h('span', { role: 'status' });
   readonly controls = h(
     'span',
-    { class: 'toggle predict', hidden: true },
+    { class: 'toggle predict asks-run', hidden: true },
     this.button,
     this.ahead,
     's',

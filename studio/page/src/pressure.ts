@@ -30,5 +30,24 @@ export function pressureCentre(
   return at.every(Number.isFinite) ? at : null;
 }
 
+/** Height of the ground under a place of the world [m]. */
+export type GroundHeight = (x: number, y: number) => number;
+
+/** The same on ground that is not level: where the line of the centre meets it, nearly. */
+export function centreOn(
+  ground: GroundHeight,
+  feet: number[],
+  forces: number[],
+  moments: number[],
+): [number, number, number] | null {
+  let at: [number, number, number] | null = [feet[0] ?? 0, feet[1] ?? 0, 0];
+  for (let i = 0; i < kTurns && at; ++i) {
+    at = pressureCentre(feet, forces, moments, ground(at[0], at[1]));
+  }
+  return at;
+}
+
+/** On a plane of 10 degrees each comes ten times nearer or more. */
+const kTurns = 4;
 /** Less than that is noise, and its centre anywhere. */
 const kLeast_N = 1;

@@ -14,6 +14,11 @@ export interface JointInfo {
   torque: number | null;
   passive: boolean;
 }
+/** A place on a link that can be led. */
+export interface SiteInfo {
+  name: string;
+  link: string;
+}
 export interface Foot {
   name: string;
   link: string;
@@ -26,6 +31,27 @@ export interface MeshFile {
   path: string | null;
   why: string;
 }
+/** Lines along x and y, and the heights where they cross: of each y a row. */
+export interface Terrain {
+  x_m: number[];
+  y_m: number[];
+  height_m: number[];
+  /** Lines that are close to each other are left out. */
+  coarser: boolean;
+}
+export interface Patch {
+  name: string;
+  x_m: number[];
+  y_m: number[];
+  static_friction: number;
+  sliding_friction: number;
+  stiffness_share: number;
+}
+export interface Ground {
+  height_m: number;
+  terrain?: Terrain;
+  patches?: Patch[];
+}
 export interface Hello {
   protocol: number;
   version: string;
@@ -36,7 +62,7 @@ export interface Hello {
   /** Of an emulation, boards and a plant without a cycle: the --hal of the run that leads it. */
   emulated?: string | null;
   floating: boolean;
-  ground: { height_m: number } | null;
+  ground: Ground | null;
   period_s: number;
   run: string;
   history_s: number[];
@@ -44,7 +70,7 @@ export interface Hello {
   passive: string[];
   feet: Foot[];
   postures: string[];
-  sites?: string[];
+  sites?: SiteInfo[];
   meshes?: MeshFile[];
   urdf: string;
 }
@@ -95,6 +121,8 @@ export interface Control {
   taken: boolean;
   yours: boolean;
   by: string;
+  /** It ended as time went back: nothing was halted. */
+  wentBack?: boolean;
 }
 /** A request to the registry: its name and its keys. */
 export interface Request {

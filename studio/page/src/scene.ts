@@ -5,13 +5,14 @@ import type { Data } from './data';
 import { h, say, theme } from './dom';
 import { seconds } from './format';
 import { ghostly } from './ghost';
+import { GroundView } from './ground';
 import { Layers } from './layers';
 import type { TreeJoint } from './limbs';
 import { Marks } from './marks3d';
 import { fetchMeshes } from './meshes';
 import { buildModel, type Model, usesOfMeshes } from './model';
 import { NotDrawn } from './not_drawn';
-import { drawsBySoftware } from './webgl';
+import { drawsBy } from './webgl';
 
 const kViews: Record<string, [number, number, number]> = {
   free: [1.6, -1.2, 0.7],
@@ -35,6 +36,7 @@ interface Ids {
   forces: number[];
   moments: number[];
   layers: number[];
+  moved: number[];
 }
 
 export class Scene {
@@ -51,7 +53,7 @@ export class Scene {
   private readonly layers = new Layers(() => {
     this.dirty = true;
   });
-  private grid: THREE.GridHelper | null = null;
+  private readonly ground = new GroundView();
   private model: Model | null = null;
   private ghost: Model | null = null;
   private ids: Ids | null = null;
@@ -89,7 +91,12 @@ export class Scene {
       this.missing.element,
     );
     this.begin();
-    data.whenHello((hello) => void this.load(hello.urdf));
+    data.whenHello((hello) => {
+      this.ground.set(hello.ground);
+      this.layers.setGround(hello.ground);
+      this.missing.ground(hello.ground?.terrain?.coarser === true);
+      void this.load(hello.urdf);
+    });
     data.whenCatalog(() => this.wire());
     data.time.on(() => {
       this.dirty = true;
@@ -101,12 +108,7 @@ export class Scene {
   }
 
   themeChanged(): void {
-    if (this.grid) this.scene.remove(this.grid);
-    const line = new THREE.Color(theme('--ground'));
-    this.grid = new THREE.GridHelper(10, 40, line, line);
-    this.grid.rotation.x = Math.PI / 2;
-    this.placeGrid();
-    this.scene.add(this.grid);
+    this.ground.draw(this.radius, this.lowest);
     this.scene.background = new THREE.Color(theme('--scene'));
     this.dirty = true;
   }
@@ -144,12 +146,24 @@ export class Scene {
     const sun = new THREE.DirectionalLight(0xffffff, 1.8);
     sun.position.set(2, -3, 4);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x667788, 1.6), sun);
-    this.scene.add(this.marks.forces, this.marks.com, this.marks.frames, ...this.layers.objects);
+    this.scene.add(
+      this.ground.object,
+      this.marks.forces,
+      this.marks.com,
+      this.marks.frames,
+      ...this.layers.objects,
+    );
     this.camera.up.set(0, 0, 1);
+    const by = drawsBy();
+    this.slow = by === 'software';
+    this.ground.slow = this.slow;
     try {
-      this.slow = drawsBySoftware();
-      this.renderer = new THREE.WebGLRenderer({ antialias: !this.slow });
+      // Where nobody draws it is not tried: three would complain in the console as well.
+      this.renderer = by && new THREE.WebGLRenderer({ antialias: !this.slow });
     } catch {
+      // As where nobody draws.
+    }
+    if (!this.renderer) {
       this.say('This browser has no WebGL: no 3D view. Plots, joints and lists work without it.');
       return;
     }
@@ -230,6 +244,7 @@ export class Scene {
       forces: of('truth', 'foot_force_N'),
       moments: of('truth', 'foot_moment_Nm'),
       layers: this.layers.wire(this.data),
+      moved: of('truth', 'ground_position_m'),
     };
     this.held = null;
     this.data.want(
@@ -242,8 +257,8 @@ export class Scene {
   private idsAll(): number[] {
     const ids = this.ids;
     if (!ids) return [];
-    const { position, reference, base, com, feet, forces, moments, layers } = ids;
-    return [position, reference, base, com, feet, forces, moments, layers].flat();
+    const { position, reference, base, com, feet, forces, moments, layers, moved } = ids;
+    return [position, reference, base, com, feet, forces, moments, layers, moved].flat();
   }
 
   private pose(values: number[]): void {
@@ -277,9 +292,13 @@ export class Scene {
         model.robot.quaternion.set(base[3], base[4], base[5], base[6]).normalize();
       }
     }
+    this.ground.move(part(ids.moved.length));
     const carried = this.shows.forces ? forces : forces.map(() => 0);
-    this.marks.setFeet(feet, carried, moments, this.groundHeight());
-    this.marks.setCom(com, this.groundHeight(), this.shows.com);
+    const { x, y } = this.model?.robot.position ?? { x: 0, y: 0 };
+    this.element.dataset.under = `${x} ${y} ${this.ground.height(x, y, this.lowest)}`;
+    const ground = (x: number, y: number) => this.ground.height(x, y, this.lowest);
+    this.marks.setFeet(feet, carried, moments, ground);
+    this.marks.setCom(com, ground, this.shows.com);
     this.marks.update();
     this.layers.pose(layers);
     this.render(position.some(Number.isFinite));
@@ -299,17 +318,6 @@ export class Scene {
     this.renderer.render(this.scene, this.camera);
     this.element.dataset.drawn = String(this.drawn);
     this.dirty = false;
-  }
-
-  /** Its lines are 0.25 m apart, of a small robot 0.05 m. */
-  private placeGrid(): void {
-    this.grid?.position.setZ(this.groundHeight());
-    this.grid?.scale.setScalar(this.radius < 0.3 ? 0.2 : 1);
-  }
-
-  /** Of the grid: the run's ground, else below the robot. */
-  private groundHeight(): number {
-    return this.data.hello?.ground?.height_m ?? Math.min(0, this.lowest);
   }
 
   private extent(): THREE.Sphere | null {
@@ -340,7 +348,7 @@ export class Scene {
       this.center.copy(this.model.robot.position);
       this.marks.setSize(this.radius);
       this.lowest = now.center.z - now.radius;
-      this.placeGrid();
+      this.ground.draw(this.radius, this.lowest);
     }
     const [x, y, z] = kViews[name];
     const narrow = Math.min(1, this.camera.aspect);

@@ -3,7 +3,7 @@ import { csv, float32, saveFile } from './csv';
 import type { Data } from './data';
 import { h, say } from './dom';
 import { wordOf } from './enums';
-import { number, seconds } from './format';
+import { digits, duration, seconds } from './format';
 import { ScopeControls } from './scope_controls';
 import { type Capture, ScopeEngine } from './scope_engine';
 import { ScopePlot } from './scope_plot';
@@ -293,12 +293,12 @@ export class Scope {
         ? 'Search a signal above, and press Enter: it becomes a channel. Or choose a joint to tune.'
         : at === null
           ? 'Point at the picture for values; a drag zooms, a click selects the time everywhere.'
-          : `Newest capture, ${number(1e3 * since * capture.period_s)} ms from the trigger:`,
+          : `Newest capture, ${duration(since * capture.period_s)} from the trigger:`,
     );
     this.settings.channels.forEach((name, i) => {
       const value = at === null ? Number.NaN : (capture.channels.get(name)?.[at] ?? Number.NaN);
       const signal = this.data.catalog.named(name);
-      say(this.values[i], signal?.lane ? wordOf(signal.field, value) : number(value));
+      say(this.values[i], signal?.lane ? wordOf(signal.field, value) : digits(value, 5));
     });
   }
 
@@ -321,7 +321,7 @@ export class Scope {
     else words = `Stopped. Arm waits until ${waits}.`;
     if (this.link === 'lost') words += ' There is no connection: it goes on when there is one.';
     if (missed_s > 0) {
-      words += ` ${number(missed_s)} s are not kept at full rate: triggers in them are not seen.`;
+      words += ` ${duration(missed_s)} are not kept at full rate: triggers in them are not seen.`;
     }
     say(this.words, words);
     this.element.dataset.state = state;

@@ -1,5 +1,6 @@
 // What was set during a run, by its events: captures before and after it are not of one kind.
-import type { RunEvent } from './protocol';
+import { requestWords } from './command';
+import { isRequest, type RunEvent } from './protocol';
 
 /** Texts of a log's events, and of a run's: commands that change how its joints are led. */
 const kOfALog =
@@ -46,6 +47,9 @@ export function groupsOf<
 export function settingChanges(events: RunEvent[]): SettingChange[] {
   return events
     .filter(({ level, text }) => kOfALog.test(text) || (level === 'info' && kRequests.test(text)))
-    .map(({ time_s, text }) => ({ time_s, text: text.replace(/^request /, '') }))
+    .map((event) => ({
+      time_s: event.time_s,
+      text: isRequest(event) ? requestWords(event.text) : event.text,
+    }))
     .sort((a, b) => a.time_s - b.time_s);
 }

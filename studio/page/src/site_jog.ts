@@ -1,7 +1,10 @@
 // Leads a site of the robot by buttons that are held: along and about the axes of base or site.
 import type { Actions } from './actions';
-import { h } from './dom';
+import { claimsOf } from './claims';
+import { attribute, h, say } from './dom';
 import { Held, holdToMove, kAhead_s } from './jog';
+import { jointsBefore, type TreeJoint } from './limbs';
+import type { SiteInfo } from './protocol';
 
 interface Axis {
   name: string;
@@ -22,7 +25,12 @@ const kMost_m_s = 0.2;
 const kTurn_rad_m = 4;
 
 export class SiteJog {
-  private readonly site = h('select', { 'aria-label': 'site to lead' });
+  private sites: SiteInfo[] = [];
+  private tree: TreeJoint[] = [];
+  private readonly site = h('select', {
+    'aria-label': 'site to lead',
+    onchange: () => this.allow(),
+  });
   private readonly axes = h(
     'select',
     { 'aria-label': 'axes' },
@@ -38,16 +46,18 @@ export class SiteJog {
     value: 0.05,
     'aria-label': 'speed of the site [m/s]',
   });
+  private readonly why = h('span', { class: 'muted', role: 'status' });
+  private readonly moves: HTMLFieldSetElement;
   readonly element: HTMLFieldSetElement;
 
-  constructor(private readonly actions: Actions) {
-    this.element = h(
+  /** @param controllerOf who has a joint; empty: nobody. */
+  constructor(
+    private readonly actions: Actions,
+    private readonly controllerOf: (joint: string) => string,
+  ) {
+    this.moves = h(
       'fieldset',
-      { class: 'toolbar site-jog', disabled: true, hidden: true },
-      h('legend', {}, 'Lead a site'),
-      this.site,
-      h('label', {}, 'axes of the ', this.axes),
-      h('label', {}, 'at ', this.speed, ' m/s'),
+      {},
       ...kAxes.map((axis) =>
         h(
           'span',
@@ -56,11 +66,38 @@ export class SiteJog {
         ),
       ),
     );
+    this.element = h(
+      'fieldset',
+      { class: 'toolbar site-jog asks-run', disabled: true, hidden: true },
+      h('legend', {}, 'Lead a site'),
+      this.site,
+      h('label', {}, 'axes of the ', this.axes),
+      h('label', {}, 'at ', this.speed, ' m/s'),
+      this.moves,
+      this.why,
+    );
   }
 
-  setSites(names: string[]): void {
-    this.site.replaceChildren(...names.map((name) => h('option', { value: name }, name)));
-    this.element.hidden = names.length === 0;
+  /** @param tree of the description; empty: nobody knows which joints lead a site */
+  setSites(sites: SiteInfo[], tree: TreeJoint[]): void {
+    this.sites = sites;
+    this.tree = tree;
+    const before = this.site.value;
+    this.site.replaceChildren(...sites.map(({ name }) => h('option', { value: name }, name)));
+    if (sites.some(({ name }) => name === before)) this.site.value = before;
+    this.element.hidden = sites.length === 0;
+    this.allow();
+  }
+
+  /** A controller came or went, or another site is to be led. */
+  allow(): void {
+    const site = this.sites.find(({ name }) => name === this.site.value);
+    const joints = site ? jointsBefore(site.link, this.tree) : [];
+    const { words } = claimsOf(joints, this.controllerOf);
+    const why = words && `${words} ${this.site.value} cannot be led from here.`;
+    this.moves.disabled = why !== '';
+    attribute(this.moves, 'aria-description', why || null);
+    say(this.why, why);
   }
 
   private button(axis: Axis, direction: 1 | -1): HTMLElement {

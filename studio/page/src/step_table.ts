@@ -1,6 +1,6 @@
 // The table of step responses: a row for each capture, then mean and spread of each setting.
 import { h } from './dom';
-import { number } from './format';
+import { digits, duration, fixed, seconds } from './format';
 import type { Capture } from './scope_engine';
 import { groupsOf, type SettingChange } from './setting_changes';
 import { type StepFigures, spreadOf, stepFigures } from './step_response';
@@ -16,8 +16,8 @@ interface Column {
   alone?: boolean;
 }
 
-const ms = (value: number) => `${number(1e3 * value)} ms`;
-const percent = (value: number) => `${(100 * value).toFixed(1)} %`;
+const number = (value: number) => digits(value, 4);
+const percent = (value: number) => `${fixed(100 * value, 1)} %`;
 
 const kColumns: Column[] = [
   {
@@ -32,7 +32,7 @@ const kColumns: Column[] = [
     head: 'rise time',
     title: 'from 10 % to 90 % of the change',
     of: (one) => one.rise_s,
-    text: ms,
+    text: duration,
     none: '–',
   },
   {
@@ -46,21 +46,21 @@ const kColumns: Column[] = [
     head: 'peak time',
     title: 'from the step to the largest value',
     of: (one) => one.peak_s,
-    text: ms,
+    text: duration,
     none: 'no peak',
   },
   {
     head: 'settles to 5 %',
     title: 'since when it stays within 5 % of the change about the final value',
     of: (one) => one.settling5_s,
-    text: ms,
+    text: duration,
     none: 'not settled',
   },
   {
     head: 'to 2 %',
     title: 'since when it stays within 2 % of the change about the final value',
     of: (one) => one.settling2_s,
-    text: ms,
+    text: duration,
     none: 'not settled',
   },
   {
@@ -103,7 +103,7 @@ export function stepTable(
     return h(
       'tr',
       {},
-      h('th', { scope: 'row' }, `${(capture.trigger * capture.period_s).toFixed(3)} s`),
+      h('th', { scope: 'row' }, seconds(capture.trigger * capture.period_s)),
       ...(words
         ? [h('td', { colspan: kColumns.length, class: 'no-figures' }, words)]
         : kColumns.map(({ of, text, none }) => {
@@ -125,7 +125,7 @@ export function stepTable(
   const bodies = groups.map(({ change, captures: own }) => {
     const known = own.map((capture) => figuresOf(capture, response, reference));
     const counted = known.filter((_, i) => !mixed.has(own[i]));
-    const head = change ? `since ${change.time_s.toFixed(3)} s: ${change.text}` : 'before';
+    const head = change ? `since ${seconds(change.time_s)}: ${change.text}` : 'before';
     return h(
       'tbody',
       {},

@@ -1,7 +1,7 @@
 // Command lines that do the same as a request.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { commandLine, commandOfAll, shellWord } from '../src/command';
+import { commandLine, commandOfAll, requestWords, shellWord } from '../src/command';
 import type { Request } from '../src/protocol';
 
 test('requests become command lines', () => {
@@ -80,4 +80,25 @@ test('several joints are a loop of a shell', () => {
     commandOfAll([idle('a'), { do: 'joint.home', joint: 'b' }]),
     'tandem joint set a --mode=idle; tandem joint home b',
   );
+});
+
+test('an event of a request is told in words', () => {
+  const words: [string, string][] = [
+    [
+      '{"do":"joint.set","joint":"a","mode":"position","stiffness_Nm_rad":80}',
+      'a: position, stiffness 80',
+    ],
+    ['{"do":"controller.set","name":"squat","parameters":{"depth_m":0.1}}', 'squat: depth_m 0.1'],
+    ['{"do":"controller.switch","stop":["a"],"start":["b","c"]}', 'a stopped; b, c started'],
+    ['{"do":"controller.start"}', 'controllers started'],
+    ['{"do":"clock.pause"}', 'tandem clock pause'],
+    ['{"do":"clock.until","cancel":true}', 'tandem clock until --cancel'],
+    [
+      '{"do":"joint.gains","joint":"a","loop":"position","kp":-1}: kp {is} negative',
+      'a: gains of its position loop: kp -1: kp {is} negative',
+    ],
+    ['{"do":"joint.gains","joint":"cut off at its', '{"do":"joint.gains","joint":"cut off at its'],
+    ['}}}', '}}}'],
+  ];
+  for (const [request, told] of words) assert.equal(requestWords(`request ${request}`), told);
 });

@@ -23,7 +23,7 @@ try {
   const files = names.map((name) => join(out, name.replace(/\.ts$/, '.mjs')));
   const env = { ...process.env, TANDEM_CONFIG: join(here, '../../../config') };
   process.exitCode =
-    spawnSync(process.execPath, ['--test', ...files], { timeout: 60000, stdio: 'inherit', env })
+    spawnSync(process.execPath, ['--test', ...files], { timeout: 240_000, stdio: 'inherit', env })
       .status ?? 1;
 } finally {
   rmSync(out, { recursive: true, force: true });

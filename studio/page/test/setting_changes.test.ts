@@ -12,7 +12,7 @@ const event = (time_s: number, text: string, level = 'info') => ({
 
 test('what changes settings is known from a run and from a log; what was refused is not', () => {
   const found = settingChanges([
-    event(4, 'request {"do":"joint.gains","joint":"j1","kd":0.5}'),
+    event(4, 'request {"do":"joint.gains","joint":"j1","loop":"position","kd":0.5}'),
     event(1, 'parameter set: squat.depth_m = 0.1'),
     event(2, 'request {"do":"joint.gains","joint":"j1","kd":-1}: kd is negative', 'warn'),
     event(3, 'request {"do":"clock.pause"}'),
@@ -23,7 +23,7 @@ test('what changes settings is known from a run and from a log; what was refused
     found.map(({ time_s }) => time_s),
     [1, 4, 6],
   );
-  assert.equal(found[1].text, '{"do":"joint.gains","joint":"j1","kd":0.5}');
+  assert.equal(found[1].text, 'j1: gains of its position loop: kd 0.5');
 });
 
 test('captures are apart where something was set between them; one with both settings is mixed', () => {

@@ -21,7 +21,7 @@ const lacks = [
 
 describe('the studio by Foxglove’s protocol', {
   skip: lacks ? `${lacks[1]} is not there` : false,
-  timeout: 120000,
+  timeout: 480000,
 }, () => {
   let child;
   let address;

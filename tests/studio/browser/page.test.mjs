@@ -26,7 +26,7 @@ const openTab = async (page, tab) => {
   await page.waitForSelector(kFilled[tab]);
 };
 
-describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
+describe('the studio page', { skip: why || false, timeout: 480000 }, () => {
   const { play, visit, asked, until, scratch: kScratch } = usePlayedRobots();
 
   test('shows the run, and a robot that is not blank', async () => {
@@ -345,8 +345,7 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
     await page.waitForFunction(() =>
       document.querySelector('.scene').hasAttribute('data-joint-LKneeSag'),
     );
-    page.complaints = page.complaints.filter((text) => !text.includes('WebGL'));
-    await leave(page);
+    await leave(page); // without a word in the console
   });
 
   test('on a phone, in the light and in the dark: nothing for axe-core to find, nothing too wide', async () => {
@@ -356,6 +355,8 @@ describe('the studio page', { skip: why || false, timeout: 240000 }, () => {
       tabs.filter((tab) => tab.getBoundingClientRect().right > innerWidth).map((tab) => tab.id),
     );
     assert.deepEqual(beyond, [], 'tabs that are not seen');
+    const begins = await page.$eval('#panel-plots', (panel) => panel.getBoundingClientRect().top);
+    assert.ok(begins < 600, `what a tab has begins at ${begins} of 844 pixels`);
     await page.focus('[role="tab"][aria-selected="true"]');
     await page.keyboard.press('End');
     assert.equal(await page.getAttribute('#tab-events', 'aria-selected'), 'true');

@@ -13,7 +13,7 @@ const why = lackingRun();
 const kScratch = mkdtempSync(join(tmpdir(), 'tandem-report-'));
 const kMostBytes = 5_000_000;
 
-describe('a report opened from the disk', { skip: why || false, timeout: 120000 }, () => {
+describe('a report opened from the disk', { skip: why || false, timeout: 480000 }, () => {
   let browser;
   let address;
   const log = join(kScratch, 'a/coman-squat-001.mcap');

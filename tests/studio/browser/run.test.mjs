@@ -11,7 +11,7 @@ import { eventually, leave, openBrowser, openMortalBrowser, openPage, shot } fro
 const why = lackingRun();
 const kScratch = mkdtempSync(join(tmpdir(), 'tandem-studio-'));
 
-describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
+describe('the studio of a run', { skip: why || false, timeout: 480000 }, () => {
   const runs = [];
   let browser;
   before(async () => {
@@ -75,6 +75,7 @@ describe('the studio of a run', { skip: why || false, timeout: 240000 }, () => {
     const row = page.locator('[data-joint="panda_joint4"]');
     await row.locator('.opener').click();
     await row.locator('button:text-is("Stop its controller")').click();
+    await page.click('dialog .go');
     await page.waitForSelector('[data-joint="panda_joint4"][data-controller=""]');
     await page.click('.lease');
     await page.waitForSelector('body[data-control="yours"]');

@@ -44,7 +44,7 @@ function plainFigures(times, values) {
   };
 }
 
-describe('the oscilloscope', { skip: why || false, timeout: 120000 }, () => {
+describe('the oscilloscope', { skip: why || false, timeout: 480000 }, () => {
   let browser;
   let run;
   before(async () => {
@@ -94,7 +94,7 @@ describe('the oscilloscope', { skip: why || false, timeout: 120000 }, () => {
     await page.click('button:text-is("Arm")');
     advance(4000);
     await page.waitForSelector('.scope[data-state="filled"][data-captures="2"]');
-    await page.waitForSelector('.step-group:has-text("joint.gains")');
+    await page.waitForSelector('.step-group:has-text("joint1: gains of its position loop")');
     assert.deepEqual(
       await page.$$eval('.step-table tbody', (groups) =>
         groups.map((one) => one.querySelectorAll('tr:not(.step-group):not(.summary)').length),

@@ -74,6 +74,7 @@ export class PlayedRobot {
     this.latched = 0;
     this.active = true;
     this.gain = 40;
+    this.winding = 25;
     this.phase = 'running';
     this.input = 0;
     this.requests = [];
@@ -140,7 +141,7 @@ export class PlayedRobot {
             'temperature_C',
             'degC',
             'of the winding',
-            (j, t) => 25 + j * 0.5 + Math.sin(t / 9),
+            (j, t) => this.winding + j * 0.5 + Math.sin(t / 9),
           ),
           joint(
             'fault',
@@ -281,7 +282,7 @@ export class PlayedRobot {
       title: 'a mock',
       simulated: !this.bus,
       floating: this.floating,
-      ground: { height_m: 0 },
+      ground: this.ground ?? { height_m: 0 },
       period_s: 0.001,
       run: '12345678',
       history_s: [15, 120, 1900],
@@ -291,7 +292,7 @@ export class PlayedRobot {
         ? [{ name: 'l_sole', link: 'l_sole', xyz: [0, 0, 0], rpy: [0, 0, 0] }]
         : [],
       postures: ['home'],
-      sites: ['l_hand'],
+      sites: [{ name: 'l_hand', link: 'LElb' }],
       meshes: this.meshes.map(([file, text], i) => ({
         file,
         path: text === null ? null : `/mesh/${i}`,

@@ -21,6 +21,8 @@ export class MockRobot extends PlayedRobot {
       reason: 'it settled after 2.2 s',
     },
   ];
+  /** Joints that a controller has besides, by name. */
+  claimed = new Map();
   /** Ends a search: with its answer. Null: there is none. */
   found = null;
 
@@ -36,6 +38,7 @@ export class MockRobot extends PlayedRobot {
       pending_steps: 0,
       rate: this.rate,
       realtime_factor: this.paused ? null : this.rate * 0.98,
+      ...(this.until ? { until: this.until } : {}),
       past: { keeps: true, checkpoints: 20, bytes: 1.2e6, budget_bytes: 64e6, from_s: 0 },
     };
   }
@@ -165,7 +168,7 @@ export class MockRobot extends PlayedRobot {
       joints: this.joints.map((joint, j) => ({
         joint: joint.name,
         slides: joint.type === 'prismatic',
-        controller: this.active ? this.controllers()[0].name : '',
+        controller: this.active ? this.controllers()[0].name : (this.claimed.get(joint.name) ?? ''),
         mode: 'position',
         interaction: 'stiff',
         mode_in_force: 'position',
@@ -377,6 +380,21 @@ export class MockRobot extends PlayedRobot {
         return new Promise((resolve) => {
           this.found = resolve;
         });
+      case 'clock.until': {
+        const before = this.until;
+        this.until = request.cancel ? undefined : request.condition;
+        const notes = [
+          ...(request.condition?.startsWith('true')
+            ? ['it holds now, so it has to end first']
+            : []),
+          ...(before ? [`it replaces one that waited: ${before}`] : []),
+        ];
+        return {
+          ...this.clock(),
+          ...(request.cancel ? {} : { waits: true }),
+          ...(notes.length > 0 ? { note: notes.join('; ') } : {}),
+        };
+      }
       case 'clock.step':
         this.time += (request.cycles ?? 1) * 0.001;
         return this.clock();

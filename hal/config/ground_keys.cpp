@@ -1,4 +1,4 @@
-#include "runtime/ground_options.hpp"
+#include "hal/config/ground_keys.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-namespace tandem::runtime {
+namespace tandem::hal {
 namespace {
 
 constexpr double kLongestShake_s = 1e6;
@@ -34,15 +34,15 @@ constexpr Key<PatchKeys> kPatch[] = {
 /// A shape whose rectangle may be everywhere.
 struct GroundKeys {
   std::string name;
-  hal::GroundShapeKind shape = hal::GroundShapeKind::kSlope;
+  GroundShapeKind shape = GroundShapeKind::kSlope;
   std::optional<std::array<double, 2>> x_m, y_m;
   std::optional<double> height_m, slope_deg;
   double towards_deg = 0.0;
-  double edge_m = hal::GroundShape{}.edge_m;
+  double edge_m = GroundShape{}.edge_m;
 };
 constexpr Key<GroundKeys> kGround[] = {
   required(key<&GroundKeys::name>("name", "for messages").within("unique")),
-  required(choice<&GroundKeys::shape>("shape", hal::kGroundShapes, "an inclined plane; a plateau; a hill, highest in its middle")),
+  required(choice<&GroundKeys::shape>("shape", kGroundShapes, "an inclined plane; a plateau; a hill, highest in its middle")),
   key<&GroundKeys::x_m>("x_m", {-1e4, 1e4}, "from and to, in the world; required of a step or bump").within("2 numbers of ±10000").by_default("everywhere"),
   key<&GroundKeys::y_m>("y_m", {-1e4, 1e4}, "the same; both or none").within("2 numbers of ±10000").by_default("everywhere"),
   key<&GroundKeys::height_m>("height_m", {-100.0, 100.0}, "of a step or bump, over what is there without it; negative: a hole").by_default("required of those"),
@@ -67,6 +67,12 @@ constexpr Key<ShakeKeys> kShake[] = {
 };
 // clang-format on
 
+/// What is added to, and what is said of it.
+struct Ground {
+  ContactConfig& contact;
+  GroundWords& words;
+};
+
 /// From where to where, where it says so.
 template <class Keys>
 void check_range(TomlTable& table, const Keys& keys) {
@@ -87,14 +93,21 @@ void check_name(TomlTable& table, const std::string& name, const Rows& rows, con
   }
 }
 
-void add_ground(TomlTable& table, sim::PlantChanges& plant) {
+/// For people, and for the log.
+void note(const std::string& list, const std::string& name, const TomlTable& table,
+          GroundWords& words) {
+  words.differences.push_back(list + " " + name + ": " + values_text(table, ", "));
+  words.toml += "[[" + list + "]]\n" + values_text(table, "\n") + "\n";
+}
+
+void add_ground(TomlTable& table, Ground& ground) {
   GroundKeys keys;
   read_keys(table, kGround, keys);
   table.finish();
-  const bool slope = keys.shape == hal::GroundShapeKind::kSlope;
+  const bool slope = keys.shape == GroundShapeKind::kSlope;
   const char* const size = slope ? "slope_deg" : "height_m";
   for (const char* const other : {slope ? "height_m" : "slope_deg", slope ? "" : "towards_deg",
-                                  keys.shape == hal::GroundShapeKind::kBump ? "edge_m" : ""}) {
+                                  keys.shape == GroundShapeKind::kBump ? "edge_m" : ""}) {
     if (*other != 0 && table.has(other))
       table.error(other, "is of another shape", std::string("give ") + size + ", or change shape");
   }
@@ -104,26 +117,26 @@ void add_ground(TomlTable& table, sim::PlantChanges& plant) {
   if (keys.x_m.has_value() != keys.y_m.has_value() || (!slope && !keys.x_m))
     table.error("", "it has no rectangle", "give x_m and y_m, both");
   check_range(table, keys);
-  hal::Terrain& terrain = plant.robot.contact.terrain;
+  Terrain& terrain = ground.contact.terrain;
   check_name(table, keys.name, terrain.shapes(), "parts of the ground");
   if (table.has_errors()) return;
-  hal::GroundShape shape{.name = keys.name,
-                         .kind = keys.shape,
-                         .height_m = keys.height_m.value_or(0.0),
-                         .slope_rad = keys.slope_deg.value_or(0.0) * kRadPerDegree,
-                         .towards_rad = keys.towards_deg * kRadPerDegree,
-                         .edge_m = keys.edge_m};
+  GroundShape shape{.name = keys.name,
+                    .kind = keys.shape,
+                    .height_m = keys.height_m.value_or(0.0),
+                    .slope_rad = keys.slope_deg.value_or(0.0) * kRadPerDegree,
+                    .towards_rad = keys.towards_deg * kRadPerDegree,
+                    .edge_m = keys.edge_m};
   if (keys.x_m) shape.x_m = *keys.x_m;
   if (keys.y_m) shape.y_m = *keys.y_m;
   terrain.add(shape);
-  note_difference("ground " + keys.name, table, plant);
+  note("ground", keys.name, table, ground.words);
 }
 
-void add_shake(TomlTable& table, sim::PlantChanges& plant) {
+void add_shake(TomlTable& table, Ground& ground) {
   ShakeKeys keys;
   read_keys(table, kShake, keys);
   table.finish();
-  hal::Terrain& terrain = plant.robot.contact.terrain;
+  Terrain& terrain = ground.contact.terrain;
   check_name(table, keys.name, terrain.shakes(), "motions of the ground");
   if (keys.for_s && *keys.for_s * keys.frequency_Hz < 2.0 && !table.has_errors())
     table.error("for_s",
@@ -131,19 +144,19 @@ void add_shake(TomlTable& table, sim::PlantChanges& plant) {
                     " Hz: it would end while it begins",
                 "give 2 / frequency_Hz or more");
   if (table.has_errors()) return;
-  hal::GroundShake shake{.name = keys.name,
-                         .amplitude_m = keys.amplitude_m,
-                         .frequency_Hz = keys.frequency_Hz,
-                         .from_s = keys.from_s};
+  GroundShake shake{.name = keys.name,
+                    .amplitude_m = keys.amplitude_m,
+                    .frequency_Hz = keys.frequency_Hz,
+                    .from_s = keys.from_s};
   shake.along[static_cast<std::size_t>(keys.along)] = 1.0;
   if (keys.for_s) shake.for_s = *keys.for_s;
   terrain.add(shake);
-  note_difference("shake " + keys.name, table, plant);
+  note("shake", keys.name, table, ground.words);
 }
 
 /// The first of those that overlap counts.
-void add_patch(TomlTable& table, sim::PlantChanges& plant) {
-  hal::ContactConfig& ground = plant.robot.contact;
+void add_patch(TomlTable& table, Ground& to) {
+  ContactConfig& ground = to.contact;
   PatchKeys keys;
   read_keys(table, kPatch, keys);
   table.finish();
@@ -162,15 +175,39 @@ void add_patch(TomlTable& table, sim::PlantChanges& plant) {
                             .static_friction = still,
                             .sliding_friction = sliding,
                             .stiffness_share = keys.stiffness_share});
-  note_difference("patch " + keys.name, table, plant);
+  note("patch", keys.name, table, to.words);
 }
 
 }  // namespace
 
-void read_ground(TomlTable& sim, sim::PlantChanges& plant) {
-  for (TomlTable& table : sim.tables("patch")) add_patch(table, plant);
-  for (TomlTable& table : sim.tables("ground")) add_ground(table, plant);
-  for (TomlTable& table : sim.tables("shake")) add_shake(table, plant);
+void read_ground(TomlTable& sim, ContactConfig& ground, GroundWords& words) {
+  Ground to{ground, words};
+  for (TomlTable& table : sim.tables("patch")) add_patch(table, to);
+  for (TomlTable& table : sim.tables("ground")) add_ground(table, to);
+  for (TomlTable& table : sim.tables("shake")) add_shake(table, to);
+}
+
+Status read_ground(const std::string& toml, const std::string& file, ContactConfig& ground) {
+  const Result<TomlDocument> document = TomlDocument::parse(toml, file);
+  if (!document) return std::unexpected(document.error());
+  ContactConfig read = ground;
+  GroundWords words;
+  TomlTable root = document->root();
+  read_ground(root, read, words);
+  root.finish();
+  if (const Diagnostics& errors = document->diagnostics(); !errors.empty())
+    return std::unexpected(errors.front());
+  ground = std::move(read);
+  return {};
+}
+
+std::string values_text(const TomlTable& table, std::string_view between) {
+  std::string text;
+  for (const auto& [key, value] : table.values()) {
+    if (!text.empty()) text += between;
+    text += key + " = " + value;
+  }
+  return text;
 }
 
 void describe_ground(KeyPage& page) {
@@ -179,11 +216,4 @@ void describe_ground(KeyPage& page) {
   page.add("[[sim.shake]]", kShake);
 }
 
-void note_difference(const std::string& what, const TomlTable& table, sim::PlantChanges& plant) {
-  std::string keys;
-  for (const auto& [key, value] : table.values())
-    keys += (keys.empty() ? "" : ", ") + key + " = " + value;
-  plant.differences.push_back(what + ": " + keys);
-}
-
-}  // namespace tandem::runtime
+}  // namespace tandem::hal

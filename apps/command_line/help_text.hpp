@@ -1,0 +1,36 @@
+// How `--help` is laid out: the commands by task, every line within the terminal's width.
+// Layer: apps/command_line.  Thread: main.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace tandem::apps {
+
+/// What somebody wants to do with `tandem`: each of its commands is for one.
+enum class Task : std::uint8_t { kRun, kSee, kMove, kStop, kTest, kDebug, kMake, kMachine };
+
+/// The word of a task in `tandem help WORD`; also the group of its commands.
+[[nodiscard]] const char* to_string(Task task);
+/// @return empty: no task has this word
+[[nodiscard]] std::optional<Task> task_named(const std::string& word);
+
+/// The commands of a task, with a line each.
+[[nodiscard]] std::string help_of_task(const CLI::App& app, Task task);
+
+/// Lays out help as wide as the standard output's terminal, else in 80 columns. Examples of a
+/// command have two blanks before them; what follows after two more, or far to the right on a line
+/// of its own, says what it does.
+class HelpText : public CLI::Formatter {
+ public:
+  std::string make_description(const CLI::App* app) const override;
+  std::string make_usage(const CLI::App* app, std::string name) const override;
+  std::string make_subcommands(const CLI::App* app, CLI::AppFormatMode mode) const override;
+  std::string make_subcommand(const CLI::App* sub) const override;
+  std::string make_option(const CLI::Option* option, bool is_positional) const override;
+  std::string make_footer(const CLI::App* app) const override;
+};
+
+}  // namespace tandem::apps
