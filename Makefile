@@ -7,7 +7,7 @@ FUZZ_RUNS ?=
 FUZZ_JOBS ?= 4
 FUZZ_TARGETS ?= urdf robot experiment message request input sample sheet frames ethercat line mcap import studio
 
-.PHONY: demo robot test proof test-all bench unit built real anywhere hil sanitized rtsan asan tsan fuzz format lint \
+.PHONY: demo robot test proof test-all bench unit built real anywhere hil firmware sanitized rtsan asan tsan fuzz format lint \
   tidy hooks mutations clean help
 
 help:
@@ -16,6 +16,7 @@ help:
 	@echo "make test   install what is missing, build everything, run the unit tests (about 12 minutes the first time)"
 	@echo "make proof  that build in strange surroundings and on a CAN stack, fuzzers, real-time sanitizer (about 15 minutes)"
 	@echo "make test-all  both, and the proofs that take long (hours)"
+	@echo "make firmware  the boards' firmware on an emulated microcontroller, beside this machine's"
 	@echo "make bench  times this build; AGAINST=../old/build/release: beside another one"
 	@echo "make fuzz   the fuzzers, a minute each, four at a time; FUZZ_RUNS=1000000: so many inputs each"
 	@echo "make mutations  whether the tests notice 200 broken lines (hours)"
@@ -65,6 +66,7 @@ proof:
 test-all:
 	@$(MAKE) --no-print-directory test
 	@$(MAKE) --no-print-directory proof
+	@$(MAKE) --no-print-directory firmware
 	@scripts/install-dependencies engines
 	@cmake --preset release --log-level=WARNING && cmake --build --preset release --parallel $(JOBS)
 	@build/release/bin/engines_test --gtest_brief=1
@@ -122,6 +124,11 @@ anywhere:
 # On this machine's kernel if it has CAN, else in a User-Mode-Linux one: tests/hil/README.md.
 hil: built
 	@$(MAKE) --no-print-directory real ANYWHERE=
+
+# Not in CI: compiler and emulator are 950 MB of packages.
+firmware: built
+	@scripts/install-dependencies firmware
+	@scripts/test-firmware build/release
 
 # One after the other: each takes two cores, as far as `real` leaves them, which runs robots in real
 # time. The fuzzers take forty seconds.

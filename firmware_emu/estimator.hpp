@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <numbers>
 
+#include "base/decay.hpp"
 #include "base/realtime.hpp"
 #include "base/split_mix.hpp"
 
@@ -85,7 +86,7 @@ class FilteredDifference {
  public:
   /// @param cutoff_Hz  f; 0: the plain difference. @param period_s  T > 0.
   void configure(double cutoff_Hz, double period_s) noexcept TANDEM_RT {
-    decay_ = cutoff_Hz > 0.0 ? std::exp(-2.0 * std::numbers::pi * cutoff_Hz * period_s) : 0.0;
+    decay_ = cutoff_Hz > 0.0 ? decay(2.0 * std::numbers::pi * cutoff_Hz * period_s) : 0.0;
     gain_ = (1.0 - decay_) / period_s;
   }
   /// One sample, T after the one before; the first one only starts the estimate at 0.

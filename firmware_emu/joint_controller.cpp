@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "base/decay.hpp"
+
 namespace tandem::firmware {
 
 using canopen::Mode;
@@ -30,8 +32,7 @@ void JointController::configure(const canopen::DriveParameters& config,
                                 double period_s) noexcept TANDEM_RT {
   config_ = config;
   period_s_ = period_s;
-  transfer_decay_ =
-      config.transfer_time_s > 0.0 ? std::exp(-period_s / config.transfer_time_s) : 0.0;
+  transfer_decay_ = config.transfer_time_s > 0.0 ? decay(period_s / config.transfer_time_s) : 0.0;
   retuned_ = true;
 }
 

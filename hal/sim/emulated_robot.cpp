@@ -268,7 +268,9 @@ void EmulatedRobot::pass_to_boards(std::size_t bus, const canopen::Frame& frame)
 /// Everybody on the bus who has power hears it.
 void EmulatedRobot::receive(std::size_t bus, const canopen::Frame& frame) noexcept {
   for (const std::size_t b : attached_[bus].boards) {
-    if (boards_[b].powered != 0) boards_[b].board->receive(frame);
+    if (boards_[b].powered == 0) continue;
+    boards_[b].board->receive(frame);
+    if (listener_ != nullptr) listener_->received(b, frame);
   }
   for (const std::size_t s : attached_[bus].sensors) {
     if (sensor_nodes_[s].powered != 0) sensor_nodes_[s].board->receive(frame);
@@ -286,7 +288,12 @@ void EmulatedRobot::run_boards() noexcept {
     const std::size_t axes = node.joints.size();
     const std::span<firmware::AxisDrive> drives(drive_.data() + node.first, axes);
     if (node.powered != 0) {
-      node.board->step(tick_ns_, {sense_.data() + node.first, axes}, drives);
+      const std::span<const firmware::AxisSense> sense(sense_.data() + node.first, axes);
+      node.board->step(tick_ns_, sense, drives);
+      if (listener_ != nullptr) {
+        const auto board = static_cast<std::size_t>(&node - boards_.data());
+        listener_->stepped(board, tick_ns_, sense, node.board->outgoing(), drives);
+      }
       answer(node.bus, sender, node.board->outgoing());
       node.board->clear_outgoing();
     } else {

@@ -73,6 +73,20 @@ struct StageHook {
   }
 };
 
+/// Hears all that boards get and answer, in order: enough to play it to the same firmware
+/// elsewhere. Called in the cycle, by the robot's thread.
+class BoardListener {
+ public:
+  virtual ~BoardListener() = default;
+  virtual void received(std::size_t board, const canopen::Frame& frame) noexcept TANDEM_RT = 0;
+  /// @param answers  the frames that the board put out since the step before
+  /// @param drives   what its bridges do from now on
+  virtual void stepped(std::size_t board, std::int64_t dt_ns,
+                       std::span<const firmware::AxisSense> sense,
+                       std::span<const canopen::Frame> answers,
+                       std::span<const firmware::AxisDrive> drives) noexcept TANDEM_RT = 0;
+};
+
 /// ```
 /// robot->bus(b).master().send(frames);        // what the master sends, SYNC k its last
 /// code = robot->step(time_ns of cycle k);
@@ -169,6 +183,8 @@ class EmulatedRobot {
   }
 
   void set_stage_hook(StageHook hook) noexcept { hook_ = hook; }
+  /// @param listener  outlives the robot; null: nobody
+  void set_board_listener(BoardListener* listener) noexcept { listener_ = listener; }
   void archive(Archive& ar);
 
  private:
@@ -283,6 +299,7 @@ class EmulatedRobot {
   std::uint8_t started_ = 0, let_down_ = 0;
   std::uint64_t told_kept_ = 0;  // of what is carried for good: next_injected() gave it
   StageHook hook_;
+  BoardListener* listener_ = nullptr;
 };
 
 }  // namespace tandem::sim
