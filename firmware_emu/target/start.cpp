@@ -6,7 +6,7 @@
 #include "firmware_emu/target/memory.hpp"
 #include "firmware_emu/target/semihosting.hpp"
 
-// Of the linker script.
+// These are the linker script's.
 extern "C" {
 extern std::uint32_t data_from, data_begin, data_end, bss_begin, bss_end, stack_begin, stack_top;
 extern void (*init_begin[])();
