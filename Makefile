@@ -7,7 +7,7 @@ FUZZ_RUNS ?=
 FUZZ_JOBS ?= 4
 FUZZ_TARGETS ?= urdf robot experiment message request input sample sheet frames ethercat line mcap import studio
 
-.PHONY: demo robot test proof test-all bench unit built real anywhere hil firmware sanitized rtsan asan tsan fuzz format lint \
+.PHONY: demo robot test proof test-all bench unit built real anywhere hil firmware arm64 sanitized rtsan asan tsan fuzz format lint \
   tidy hooks mutations clean help
 
 help:
@@ -17,6 +17,7 @@ help:
 	@echo "make proof  that build in strange surroundings and on a CAN stack, fuzzers, real-time sanitizer (about 15 minutes)"
 	@echo "make test-all  both, and the proofs that take long (hours)"
 	@echo "make firmware  the boards' firmware on an emulated microcontroller, beside this machine's"
+	@echo "make arm64  cross-builds the rooms below the runtime for 64-bit Arm, and runs their tests in qemu"
 	@echo "make bench  times this build; AGAINST=../old/build/release: beside another one"
 	@echo "make fuzz   the fuzzers, a minute each, four at a time; FUZZ_RUNS=1000000: so many inputs each"
 	@echo "make mutations  whether the tests notice 200 broken lines (hours)"
@@ -67,6 +68,7 @@ test-all:
 	@$(MAKE) --no-print-directory test
 	@$(MAKE) --no-print-directory proof
 	@$(MAKE) --no-print-directory firmware
+	@$(MAKE) --no-print-directory arm64
 	@scripts/install-dependencies engines
 	@cmake --preset release --log-level=WARNING && cmake --build --preset release --parallel $(JOBS)
 	@build/release/bin/engines_test --gtest_brief=1
@@ -129,6 +131,13 @@ hil: built
 firmware: built
 	@scripts/install-dependencies firmware
 	@scripts/test-firmware build/release
+
+# Its plugins, too: they are what a robot's computer loads.
+arm64:
+	@scripts/install-dependencies arm64
+	@scripts/arm64-sysroot
+	@cmake --preset arm64 --log-level=WARNING
+	@JOBS=$(JOBS) scripts/test-arm64
 
 # One after the other: each takes two cores, as far as `real` leaves them, which runs robots in real
 # time. The fuzzers take forty seconds.

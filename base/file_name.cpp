@@ -58,7 +58,7 @@ std::string interface_name_problem(std::string_view name) {
     return "is longer than " + std::to_string(kLongest) + " characters, the limit of Linux";
   }
   const auto forbidden = [](char c) {
-    return c == '/' || c == ':' || c == 0x7F || (c >= 0 && c <= ' ');
+    return c == '/' || c == ':' || c == 0x7F || static_cast<unsigned char>(c) <= ' ';
   };
   if (std::ranges::any_of(name, forbidden)) return "has a blank, '/' or ':'";
   return name == "." || name == ".." ? "is a folder's name" : "";

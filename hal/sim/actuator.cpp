@@ -8,6 +8,7 @@
 #include <limits>
 #include <string>
 
+#include "base/decay.hpp"
 #include "base/wide.hpp"
 
 namespace tandem::sim {
@@ -313,7 +314,7 @@ void Actuators::cool(double h_s) noexcept {
   if (h_s == cooling_h_s_) return;
   cooling_h_s_ = h_s;
   for (std::size_t j = 0; j < models_.size(); ++j) {
-    cooling_[j] = std::exp(-h_s / models_[j].thermal_time_constant_s);
+    cooling_[j] = decay(h_s / models_[j].thermal_time_constant_s);
   }
 }
 
