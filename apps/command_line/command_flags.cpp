@@ -350,6 +350,11 @@ void add_flags(CLI::App& app, RunOptions& o) {
                  "After a stop: end the run, or wait for `tandem fault reset` (default: wait with "
                  "boards on a bus in real time; end in simulation, with --realtime, too)")
       ->check(CLI::IsMember({"end", "wait"}));
+  app.add_flag("--wait-for-start", o.waits_for_start,
+               "Open no bus and enable no drive before `tandem controller start`; wait again where "
+               "the drives could not be enabled")
+      ->excludes("--no-socket")
+      ->excludes("--from");
   CLI::Option* dds = app.add_flag_callback(
       "--dds", [&o] { o.dds = true; }, "Publish the robot to ROS 2 and `tandem topic`");
   app.add_flag_callback(

@@ -47,6 +47,7 @@ struct RunOptions : runtime::Overrides {
   std::string json;           ///< file, "-" for standard output, empty for none
   std::string socket;         ///< of the run's control; empty: default_control_path("run")
   bool no_socket = false;
+  bool waits_for_start = false;                    ///< touches no robot before somebody asks for it
   std::optional<std::size_t> checkpoints_bytes{};  ///< to go back in time by; empty: where useful
   std::string from{};  ///< "LOG@12.3s": goes on from there; empty: from the beginning
   StudioOptions studio{};

@@ -1,4 +1,4 @@
-// A run with the rights of scripts/tandem-run.service and no others: another user than root, two
+// A run with the rights of scripts/tandem@.service and no others: another user than root, two
 // capabilities, the listed system calls and address families.
 #include <fcntl.h>
 #include <grp.h>
@@ -33,7 +33,7 @@ constexpr uid_t kNobody = 65534;
 /// Every value that the unit gives a key, in the order of its lines.
 std::vector<std::string> of_unit(const std::string& key) {
   std::vector<std::string> all;
-  std::ifstream unit(TANDEM_SOURCE_DIR "/scripts/tandem-run.service");
+  std::ifstream unit(TANDEM_SOURCE_DIR "/scripts/tandem@.service");
   for (std::string line; std::getline(unit, line);) {
     if (!line.starts_with(key + "=")) continue;
     std::istringstream values(line.substr(key.size() + 1));
@@ -190,7 +190,7 @@ std::vector<int> numbers(const std::string& key, const std::map<std::string, int
   for (const std::string& name : of_unit(key)) {
     const auto found = known.find(name);
     if (found == known.end()) {
-      ADD_FAILURE() << "scripts/tandem-run.service: " << key << " has " << name
+      ADD_FAILURE() << "scripts/tandem@.service: " << key << " has " << name
                     << ", which this test does not know";
     } else {
       all.push_back(found->second);
