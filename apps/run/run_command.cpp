@@ -230,7 +230,8 @@ class Session {
       add_inject(commands_, e.robot, e.tree().get(), e.loop.period_ns, add);
     }
     add_push(commands_, e.robot, e.tree().get(), e.loop.period_ns, std::move(add));
-    studio_.start(*cycle_, commands_, shown_to(internal_model::ParallelReader::kStudio));
+    studio_.start(*cycle_, commands_, shown_to(internal_model::ParallelReader::kStudio),
+                  recorder_.get());
     const bool on_robot = e.hal.backend == runtime::BackendKind::kWire && !e.hal.lockstep;
     auto socket = serve(commands_, {.path = options_.socket,
                                     .kind = "run",
