@@ -155,6 +155,8 @@ const std::map<std::string, int> kCalls{
     CALL(epoll_create1),
     CALL(epoll_ctl),
     CALL(epoll_pwait),
+    CALL(timerfd_create),
+    CALL(timerfd_settime),
 #ifdef __x86_64__
     CALL(arch_prctl),
     CALL(open),
@@ -383,7 +385,8 @@ TEST_F(Confined, ARunEndsInOrderWithRealTimePriorityAndLockedMemory) {
 TEST_F(Confined, ARunIsAskedAndStopsBySignal) {
   if (const std::string reason = not_permitted(); !reason.empty()) GTEST_SKIP() << reason;
   give_folder();
-  const pid_t run = begin({"--realtime", "--duration", "60", "--no-log", "--json", "run.json"});
+  const pid_t run =
+      begin({"--realtime", "--duration", "60", "--no-log", "--json", "run.json", "--studio=0"});
   const std::string socket =
       (runtime_ / "tandem" / ("run-" + std::to_string(run) + ".sock")).string();
   EXPECT_TRUE(tandem::test::eventually([&] {
