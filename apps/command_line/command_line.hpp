@@ -341,6 +341,7 @@ struct DoctorOptions {
   std::string robot;                    ///< robot.toml, whose buses are looked at; may be empty
   std::vector<std::string> interfaces;  ///< "can0=vcan0"
   std::string root = "/";               ///< of the files that are read
+  std::string fix;                      ///< folder for files that do what is advised; empty: none
   std::string json;
 };
 
