@@ -102,4 +102,16 @@ McapIndex read_index(const Descriptor& file, std::uint64_t file_bytes) {
   return index;
 }
 
+std::optional<StringMap> read_map(ByteReader& in) {
+  StringMap map;
+  ByteReader pairs(in.take(in.number<std::uint32_t>()));
+  while (pairs.left() > 0) {
+    std::string key = pairs.text();
+    std::string value = pairs.text();
+    map.emplace_back(std::move(key), std::move(value));
+  }
+  if (!in.ok() || !pairs.ok()) return std::nullopt;
+  return map;
+}
+
 }  // namespace tandem::log

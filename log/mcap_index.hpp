@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -35,5 +36,8 @@ struct McapIndex {
 
 /// Only a summary whose checksum is right is taken: a file without loses nothing but the help.
 [[nodiscard]] McapIndex read_index(const Descriptor& file, std::uint64_t file_bytes);
+
+/// The map of a metadata record. None: it is shorter than its content.
+[[nodiscard]] std::optional<StringMap> read_map(ByteReader& in);
 
 }  // namespace tandem::log

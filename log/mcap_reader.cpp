@@ -58,19 +58,6 @@ bool is_of_tandem(Opcode opcode, std::span<const std::byte> content) {
   }
 }
 
-/// None: it is shorter than its content.
-std::optional<StringMap> read_map(ByteReader& in) {
-  StringMap map;
-  ByteReader pairs(in.take(in.number<std::uint32_t>()));
-  while (pairs.left() > 0) {
-    std::string key = pairs.text();
-    std::string value = pairs.text();
-    map.emplace_back(std::move(key), std::move(value));
-  }
-  if (!in.ok() || !pairs.ok()) return std::nullopt;
-  return map;
-}
-
 SchemaRecord read_schema(ByteReader& in) {
   SchemaRecord schema;
   schema.id = in.number<std::uint16_t>();

@@ -5,7 +5,6 @@
 #include <libdeflate.h>
 #include <sys/file.h>
 #include <sys/stat.h>
-#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -74,7 +73,7 @@ Status McapWriter::open(Descriptor file, const std::string& path, const WriterOp
   options_ = options;
   file_ = std::move(file);
   (void)::flock(file_.get(), LOCK_EX | LOCK_NB);  // readers see by it that it is being written
-  if (free_bytes().value_or(kSpaceNeeded) < kSpaceNeeded) {
+  if (const auto disk = room(); disk && disk->free_bytes < kSpaceNeeded) {
     return std::unexpected(open_error(path, ENOSPC, std::strerror(ENOSPC)));
   }
   chunk_.reserve(options.chunk_bytes + options.chunk_bytes / 4);
@@ -88,11 +87,7 @@ Status McapWriter::open(Descriptor file, const std::string& path, const WriterOp
   return {};
 }
 
-std::optional<std::uint64_t> McapWriter::free_bytes() const {
-  struct statvfs disk {};
-  if (::fstatvfs(file_.get(), &disk) != 0 || disk.f_blocks == 0) return std::nullopt;
-  return static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize;
-}
+std::optional<DiskRoom> McapWriter::room() const { return disk_room(file_); }
 
 void McapWriter::look_at_file() {
   struct stat found {};

@@ -14,6 +14,7 @@
 #include "base/result.hpp"
 #include "log/bytes.hpp"
 #include "log/compression.hpp"
+#include "log/disk_limits.hpp"
 #include "log/mcap_format.hpp"
 
 namespace tandem::log {
@@ -58,8 +59,8 @@ class McapWriter {
   [[nodiscard]] Status close();
 
   [[nodiscard]] bool is_open() const noexcept { return file_.get() >= 0; }
-  /// Free space for this user on the disk that the file is on. Nothing: it does not say.
-  [[nodiscard]] std::optional<std::uint64_t> free_bytes() const;
+  /// The disk that the file is on. Nothing: it does not say.
+  [[nodiscard]] std::optional<DiskRoom> room() const;
   [[nodiscard]] bool failed() const noexcept { return !error_.empty(); }
   /// "No space left on device", or empty.
   [[nodiscard]] const std::string& error() const noexcept { return error_; }

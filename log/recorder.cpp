@@ -2,8 +2,6 @@
 // recorder's thread.
 #include "log/recorder.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstring>
@@ -72,13 +70,14 @@ Recorder::Recorder(const std::string& path, const RunInfo& info, const RecorderO
       options_(options),
       names_{.joints = info.joints, .boards = info.boards, .buses = info.buses},
       writer_(std::make_unique<McapWriter>()),
-      view_(options.viewed, info.joints) {
+      view_(options.viewed, info.joints),
+      files_(options.earlier.value_or(KeptFiles(options.limits))) {
   for (const SensorInfo& sensor : info.sensors) names_.sensors.push_back(sensor.name);
 }
 
 /// What stands before the messages of every part.
 Status Recorder::begin() {
-  if (options_.limits.file_bytes > 0) info_.part = part_;
+  if (options_.limits.in_several_files()) info_.part = part_;
   writer_->add_metadata(kInfoRecord, to_map(info_));
   writer_->add_metadata(kConfigurationRecord, info_.configuration);
   if (writer_->failed()) {
@@ -287,6 +286,7 @@ void Recorder::write(std::span<const std::byte> slot) {
   if (head.channel == kEventChannel) {
     Event event;
     std::memcpy(&event, body.data(), sizeof event);
+    if (is_stop(event)) files_.note_stop(event.time_ns);
     encode_event(event, whole_text(event, body.subspan(sizeof event), names_), event_);
     write(kEventChannel, head.time_ns, event_);
     return;
@@ -347,6 +347,7 @@ void Recorder::write(Channel id, std::int64_t time_ns, std::span<const std::byte
     ++lost_;
     return;
   }
+  files_.note(time_ns);
   hash_.add(id, time_ns, kCdrHeader, body);
   if (info_.part > 0 && (part_ == 1 || !view_.repeats(id))) {
     whole_hash_.add(id, time_ns, kCdrHeader, body);
@@ -368,30 +369,17 @@ void Recorder::give_up(std::string why) {
 /// After each chunk.
 void Recorder::look_at_disk() {
   const DiskLimits& limits = options_.limits;
+  const WriterOptions& chunk = options_.writer;
   looked_at_ = writer_->bytes_written();
   // The file is known to be full before it is: one more chunk is written.
-  full_ = limits.file_bytes > 0 &&
-          looked_at_ - head_bytes_ + options_.writer.chunk_bytes >= limits.file_bytes;
-  const std::uint64_t next = head_bytes_ + 2 * options_.writer.chunk_bytes;
-  while (limits.total_bytes > 0 && ended_bytes_ + looked_at_ + next > limits.total_bytes) {
-    if (!remove_oldest()) break;
+  full_ = (limits.file_bytes > 0 &&
+           looked_at_ - head_bytes_ + chunk.chunk_bytes >= limits.file_bytes) ||
+          (limits.file_ns > 0 && files_.length_ns() + chunk.chunk_span_ns >= limits.file_ns);
+  files_.keep_totals(looked_at_ + head_bytes_ + 2 * chunk.chunk_bytes);
+  if (limits.keep_free_bytes == 0 && limits.keep_free_share == 0.0) return;
+  if (!files_.keep_free([this] { return writer_->room(); })) {
+    give_up("the disk has less than [log] " + free_text(limits) + " free");
   }
-  while (limits.keep_free_bytes > 0 &&
-         writer_->free_bytes().value_or(limits.keep_free_bytes) < limits.keep_free_bytes) {
-    if (limits.total_bytes > 0 && remove_oldest()) continue;
-    return give_up("the disk has less than [log] keep_free_MB = " +
-                   std::to_string(limits.keep_free_bytes / 1'000'000) + " free");
-  }
-}
-
-/// False: there is none beside the present part.
-bool Recorder::remove_oldest() {
-  if (ended_.empty()) return false;
-  (void)::unlink(ended_.front().path.c_str());  // one that somebody took away is gone, too
-  ended_bytes_ -= ended_.front().bytes;
-  ended_.erase(ended_.begin());
-  ++removed_;
-  return true;
 }
 
 void Recorder::next_part() {
@@ -449,14 +437,18 @@ Status Recorder::end_part(const StringMap& extra) {
                 {"messages", std::to_string(writer_->messages())},
                 {"dropped", std::to_string(dropped())},
                 {"failed", std::to_string(lost_)}};
-  if (removed_ > 0) map.emplace_back("removed_parts", std::to_string(removed_));
+  if (files_.removed() > 0) map.emplace_back("removed_parts", std::to_string(files_.removed()));
+  if (options_.limits.in_several_files()) {
+    if (!value_of(extra, "ended").empty()) files_.note_stop(time_ns_);  // no event could say so
+    const StringMap stops = files_.stops();
+    map.insert(map.end(), stops.begin(), stops.end());
+  }
   map.insert(map.end(), extra.begin(), extra.end());
   writer_->add_metadata(kResultRecord, map);
   Status closed = writer_->close();
   ended_messages_ += writer_->messages() - writer_->lost();
   lost_ += writer_->lost();
-  ended_.push_back({part_path(name_, part_), writer_->bytes_written()});
-  ended_bytes_ += ended_.back().bytes;
+  files_.end(part_path(name_, part_), writer_->bytes_written());
   return closed;
 }
 
@@ -477,11 +469,12 @@ RecordingResult Recorder::close(const StringMap& extra) {
   result.path = name_;
   result.branches = branch_;
   result.parts = part_;
-  result.removed = removed_;
+  result.removed = files_.removed();
+  result.earlier_removed = files_.earlier_removed();
   result.messages = ended_messages_;
   result.dropped = dropped();
   result.failed = lost_;
-  result.bytes = ended_bytes_;
+  result.bytes = files_.ended_bytes();
   result.data_sha256 = part_ == 1 ? last_hash_ : whole_hash_.finish();
   return result;
 }

@@ -26,21 +26,12 @@
 #include "log/event.hpp"
 #include "log/given.hpp"
 #include "log/info.hpp"
+#include "log/kept_files.hpp"
 #include "log/kept_image.hpp"
 #include "log/mcap_writer.hpp"
 #include "log/robot_view.hpp"
 
 namespace tandem::log {
-
-/// What a recording may take of the disk. 0: no limit.
-struct DiskLimits {
-  /// Messages of one file, about; the next ones go to another. NAME.mcap is followed by
-  /// NAME.2.mcap, NAME.3.mcap: each a whole log.
-  std::uint64_t file_bytes = 0;
-  std::uint64_t total_bytes = 0;      ///< of all its files: the oldest are removed
-  std::uint64_t keep_free_bytes = 0;  ///< on the disk: the oldest are removed if total_bytes says
-                                      ///< so, else nothing more is logged
-};
 
 struct RecorderOptions {
   WriterOptions writer{};
@@ -49,6 +40,8 @@ struct RecorderOptions {
   /// Messages between the threads. 2048 are half a second of three channels at 1 kHz.
   std::size_t ring_slots = 2048;
   ViewedRobot viewed{};  ///< with a description: what a ROS viewer needs is logged, too
+  /// Files of runs before count for the limits: those that KeptFiles::take_over() found.
+  std::optional<KeptFiles> earlier{};
 };
 
 /// What a closed recording amounts to.
@@ -57,10 +50,11 @@ struct RecordingResult {
   std::uint64_t branches = 1;  ///< how many there are, that of the beginning included
   std::uint64_t parts = 1;     ///< files that it wrote
   std::uint64_t removed = 0;   ///< of them, to keep to the limits
-  std::uint64_t messages = 0;  ///< written, those of removed files as well
-  std::uint64_t dropped = 0;   ///< refused because the ring was full
-  std::uint64_t failed = 0;    ///< lost because writing failed (disk full, file deleted or cut)
-  std::uint64_t bytes = 0;     ///< of the files that are there
+  std::uint64_t earlier_removed = 0;  ///< of runs before, to keep to the limits
+  std::uint64_t messages = 0;         ///< written, those of removed files as well
+  std::uint64_t dropped = 0;          ///< refused because the ring was full
+  std::uint64_t failed = 0;  ///< lost because writing failed (disk full, file deleted or cut)
+  std::uint64_t bytes = 0;   ///< of the files that are there
   /// DataHash of every message, in order. Several files have that of the same messages in one:
   /// what is in each file once for viewers counts once.
   std::string data_sha256;
@@ -186,10 +180,6 @@ class Recorder {
     std::string topic, type, ros2msg, meaning;
     Encode encode;
   };
-  struct Part {
-    std::string path;
-    std::uint64_t bytes;
-  };
   Recorder(const std::string& path, const RunInfo& info, const RecorderOptions& options);
   [[nodiscard]] Status begin();
   void declare(Topic& topic);
@@ -210,7 +200,6 @@ class Recorder {
   [[nodiscard]] Status begin_file(const std::string& path, std::uint64_t part);
   [[nodiscard]] Status end_part(const StringMap& extra);
   void look_at_disk();
-  [[nodiscard]] bool remove_oldest();
   void give_up(std::string why);
   void stop_thread();
 
@@ -252,9 +241,8 @@ class Recorder {
   std::uint64_t head_bytes_ = 0;   // of it, before its messages
   std::uint64_t looked_at_ = 0;    // bytes of it when the disk was looked at
   bool full_ = false;              // the next cycle begins another
-  std::vector<Part> ended_;        // that are there
-  std::uint64_t ended_bytes_ = 0;  // theirs
-  std::uint64_t removed_ = 0, ended_messages_ = 0, lost_ = 0;
+  KeptFiles files_;
+  std::uint64_t ended_messages_ = 0, lost_ = 0;
   DataHash whole_hash_;    // of a log in several files, as if it were in one
   std::string last_hash_;  // of the part that ended last
   std::int64_t time_ns_ = std::numeric_limits<std::int64_t>::min();  // of the loop's last message

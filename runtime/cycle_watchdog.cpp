@@ -56,12 +56,17 @@ void CycleWatchdog::run() {
       hung = false;
       silent = {};
       seen = beats;
+      if (hooks_.on_cycles) hooks_.on_cycles();
       continue;
     }
     const bool at_work = Heartbeat::at_work(beats);
     const bool crashed = heartbeat_->stands_still();
     nanoseconds limit = at_work ? config_.limit : config_.wait_limit;
-    if (beats == 0 || (limit == nanoseconds{} && !crashed)) continue;
+    if (beats == 0) continue;
+    if (limit == nanoseconds{} && !crashed) {
+      if (hooks_.on_wait) hooks_.on_wait();
+      continue;
+    }
     if (crashed) limit = {};  // there is nothing to wait for
     silent += awake;
     if (silent > limit && !crashed && config_.waits_for_debugger && time_limits_are_waived()) {

@@ -31,6 +31,8 @@ class CycleWatchdog {
     std::function<void(bool at_work)> on_hang;
     std::function<void()> on_return;    ///< it cycles again
     std::function<void()> on_given_up;  ///< it did not come back; the watchdog has ended
+    std::function<void()> on_cycles{};  ///< at each look: it has cycled since the last one
+    std::function<void()> on_wait{};    ///< the same: it waits, as long as it likes (wait_limit)
   };
 
   /// The heartbeat outlives it. Nothing happens before the first beat.

@@ -88,6 +88,8 @@ struct RemoteOptions {
 
 /// [log]
 enum class LogCompression : std::uint8_t { kNone, kLz4, kZstd };
+/// Whose files the limits of [log] are for.
+enum class LogBudget : std::uint8_t { kRun, kExperiment };
 struct LogConfig {
   std::string folder = "runs";  ///< relative to the working directory
   LogCompression compression = LogCompression::kNone;
@@ -98,6 +100,11 @@ struct LogConfig {
   double file_MB = 0.0;                ///< messages of one file; 0: no limit
   double total_MB = 0.0;               ///< of all files of the run; 0: no limit
   double keep_free_MB = 0.0;           ///< that the disk keeps
+  double keep_free_share = 0.0;        ///< the same of its size
+  double file_s = 0.0;                 ///< log time of one file; 0: no limit
+  double total_s = 0.0;                ///< log time after which a file is removed; 0: no limit
+  double keep_before_fault_s = 120.0;  ///< of log time, whose files are never removed
+  LogBudget budget = LogBudget::kRun;
 };
 
 /// [report]: what the four plots show. Empty: the report chooses.

@@ -116,8 +116,13 @@ constexpr Key<LogConfig> kLog[] = {
   key<&LogConfig::without>("without", "fields that are left out, as topic and field: `[\"state.acceleration_rad_s2\"]`. `tandem log info FILE --topic state` lists them").by_default("none").within("list of texts"),
   key<&LogConfig::viewers>("viewers", "`false`: nothing for ROS viewers: no `/joint_states`, `/tf`, `/tf_static`, `/robot_description`"),
   key<&LogConfig::file_MB>("file_MB", {4, 1e6}, "when the messages of a file need about so much, the next file begins ([log.md](log.md#several-files))").by_default("one file"),
-  key<&LogConfig::total_MB>("total_MB", {8, 1e7}, "of all files of the run: the oldest are removed. At least twice `file_MB`").by_default("no limit"),
-  key<&LogConfig::keep_free_MB>("keep_free_MB", {1, 1e9}, "before the disk has less: with `total_MB` the oldest files of the run are removed, else logging ends with a warning").by_default("no limit"),
+  key<&LogConfig::file_s>("file_s", {1, 1e7}, "when a file has about so much log time, the next file begins").by_default("one file"),
+  key<&LogConfig::total_MB>("total_MB", {8, 1e7}, "of all files: the oldest are removed, but for those of a fault. At least twice `file_MB`").by_default("no limit"),
+  key<&LogConfig::total_s>("total_s", {2, 1e9}, "a file whose end is so much log time ago is removed, but for those of a fault. At least twice `file_s`, and `keep_before_fault_s`").by_default("no limit"),
+  key<&LogConfig::keep_before_fault_s>("keep_before_fault_s", {0, 86400}, "log time before a fault that stops the robot, whose files `total_MB`, `total_s` and `keep_free_MB` never remove; 0: they do"),
+  key<&LogConfig::keep_free_MB>("keep_free_MB", {1, 1e9}, "before the disk has less: with `total_MB` or `total_s` the oldest files are removed, else logging ends with a warning").by_default("no limit"),
+  key<&LogConfig::keep_free_share>("keep_free_share", {0.001, 0.95}, "the same as a share of the disk: 0.05 is a twentieth. The larger of both counts").by_default("no limit"),
+  choice<&LogConfig::budget>("budget", "run|experiment", "whose files count and go: this run's, or also those of all runs before of this robot and experiment in the folder, so that a service that was started again keeps to the same limits"),
 };
 constexpr Key<ReportConfig> kReport[] = {
   key<&ReportConfig::position_of>("position_of", "joint: position with reference").by_default("[chosen by the report](log.md#the-report)"),
@@ -230,12 +235,27 @@ LogConfig read_log(TomlTable table) {
     if (const auto wrong = unknown_field(entry))
       table.error("without", wrong->first, wrong->second);
   }
+  const bool several = table.has("file_MB") || table.has("file_s");
   if (table.has("total_MB") && log.total_MB < 2.0 * log.file_MB) {
     table.error("total_MB", "is less than two files of file_MB",
                 "the file that is being written and one before it stay");
   } else if (table.has("total_MB") && !table.has("file_MB")) {
     table.error("total_MB", "without file_MB there is one file, which cannot be shortened",
                 "set file_MB, at most half of it");
+  }
+  if (table.has("total_s") && log.total_s < 2.0 * log.file_s) {
+    table.error("total_s", "is less than two files of file_s",
+                "the file that is being written and one before it stay");
+  } else if (table.has("total_s") && !several) {
+    table.error("total_s", "without file_s or file_MB there is one file, which cannot be shortened",
+                "set file_s, at most half of it");
+  } else if (table.has("total_s") && log.total_s < log.keep_before_fault_s) {
+    table.error("total_s", "is less than keep_before_fault_s",
+                "when a fault comes, what was before it has to be there still");
+  }
+  if (log.budget == LogBudget::kExperiment && !table.has("total_MB") && !table.has("total_s")) {
+    table.error("budget", "without total_MB and total_s nothing is removed",
+                "set one of them, or leave budget out");
   }
   table.finish();
   return log;

@@ -14,6 +14,7 @@
 #include "hal/mark_block.hpp"
 #include "hal/parallel_source.hpp"
 #include "hal/signal_block.hpp"
+#include "studio/http_rules.hpp"
 #include "studio/tap.hpp"
 
 namespace tandem::studio {
@@ -46,6 +47,7 @@ struct Feed {
   std::function<bool()> time_stands{};                ///< simulated time is paused
   std::function<void(const Tap::Cycle&)> cycle{};     ///< gets every cycle of the tap
   hal::ParallelSource* parallel = nullptr;            ///< null: there is none
+  std::vector<Served> served{};                       ///< beside the page
 };
 
 /// Who asks, as far as the rules go.

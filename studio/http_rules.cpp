@@ -102,8 +102,9 @@ Response words(unsigned status, std::string_view reason, std::string text) {
 }
 
 HttpRules::HttpRules(Place place, std::string urdf, std::string token, std::string page,
-                     Guests guests, MeshFiles meshes)
+                     Guests guests, MeshFiles meshes, std::vector<Served> served)
     : place_(std::move(place)),
+      served_(std::move(served)),
       urdf_(std::move(urdf)),
       token_(std::move(token)),
       page_(std::move(page)),
@@ -111,7 +112,10 @@ HttpRules::HttpRules(Place place, std::string urdf, std::string token, std::stri
       meshes_(std::move(meshes)) {}
 
 HttpRules::HttpRules(Place place, std::string token, std::vector<Served> served)
-    : place_(std::move(place)), served_(std::move(served)), token_(std::move(token)) {}
+    : place_(std::move(place)),
+      has_run_(false),
+      served_(std::move(served)),
+      token_(std::move(token)) {}
 
 bool HttpRules::may_read(const RequestHead& head) const {
   constexpr std::string_view kBearer = "Bearer ";
@@ -157,7 +161,7 @@ std::optional<Response> HttpRules::answer(const RequestHead& head) const {
   const auto served = std::ranges::find(served_, path, &Served::path);
   const bool ours = served != served_.end();
   if (!asset && !ours &&
-      (!served_.empty() || (path != kWebSocket && path != kDescription && !mesh_number(path)))) {
+      (!has_run_ || (path != kWebSocket && path != kDescription && !mesh_number(path)))) {
     return words(404, "Not Found", "There is nothing here. The page is /");
   }
   if (head.method != "GET") {

@@ -56,7 +56,7 @@ struct Guests {
   std::vector<std::string> origins{};     ///< of pages elsewhere that may look
 };
 
-/// What is served beside the page where no run is behind it.
+/// What is served beside the page.
 struct Served {
   std::string path;  ///< "/log"
   /// The answer, without kHeaders. @param query  behind "?"; any thread of the server's
@@ -69,7 +69,7 @@ class HttpRules {
   /// @param token  that /robot.urdf, /mesh/N and guests need where the place is no loopback
   /// @param page   folder whose files are the page, as they are at each request; empty: assets()
   HttpRules(Place place, std::string urdf, std::string token, std::string page = {},
-            Guests guests = {}, MeshFiles meshes = {});
+            Guests guests = {}, MeshFiles meshes = {}, std::vector<Served> served = {});
 
   /// Those of a page without a run: no WebSocket, no description; each of `served` in its place.
   HttpRules(Place place, std::string token, std::vector<Served> served);
@@ -91,6 +91,7 @@ class HttpRules {
   [[nodiscard]] bool may_read(const RequestHead& head) const;
 
   Place place_;
+  bool has_run_ = true;
   std::vector<Served> served_;
   std::string urdf_, token_, page_;
   Guests guests_;

@@ -68,6 +68,7 @@ std::string address_of(const Place& place, const std::string& token) {
 std::string Studio::address() const { return address_of(server_->place(), token_); }
 
 void Studio::start(Feed feed, Asker asker, Protocol* guests) {
+  std::vector<Served> served = std::move(feed.served);
   hub_.start(std::move(feed), std::move(asker));
   std::vector<Protocol*> others;
   Guests theirs{.names = {}, .origins = origins_};
@@ -77,7 +78,7 @@ void Studio::start(Feed feed, Asker asker, Protocol* guests) {
   }
   server_->serve(hub_,
                  HttpRules(server_->place(), run_.urdf, token_, page_, std::move(theirs),
-                           MeshFiles(run_.urdf, run_.urdf_file)),
+                           MeshFiles(run_.urdf, run_.urdf_file), std::move(served)),
                  others);
 }
 

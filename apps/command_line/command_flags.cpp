@@ -112,6 +112,7 @@ const char kDoctorExamples[] = R"(Examples:
   tandem doctor                                      kernel, CPUs, interrupts, limits, memory
   tandem doctor config/coman/robot.toml              and the interfaces of its buses
   tandem doctor config/coman/robot_ethercat.toml     and the slaves behind an EtherCAT interface
+  tandem doctor --fix fixes                          what it advises, as files to look at
   tandem doctor --json - | jq '.findings[] | select(.health != "ok")'
 Each finding comes with the command that fixes it. The exit status does not depend on them.)";
 
@@ -350,6 +351,11 @@ void add_flags(CLI::App& app, RunOptions& o) {
                  "After a stop: end the run, or wait for `tandem fault reset` (default: wait with "
                  "boards on a bus in real time; end in simulation, with --realtime, too)")
       ->check(CLI::IsMember({"end", "wait"}));
+  app.add_flag("--wait-for-start", o.waits_for_start,
+               "Open no bus and enable no drive before `tandem controller start`; wait again where "
+               "the drives could not be enabled")
+      ->excludes("--no-socket")
+      ->excludes("--from");
   CLI::Option* dds = app.add_flag_callback(
       "--dds", [&o] { o.dds = true; }, "Publish the robot to ROS 2 and `tandem topic`");
   app.add_flag_callback(
@@ -545,6 +551,11 @@ void add_flags(CLI::App& app, DoctorOptions& o) {
   app.add_option("robot", o.robot,
                  "Robot TOML, to look at the interfaces of its buses and its EtherCAT slaves");
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
+  app.add_option("--fix", o.fix,
+                 "New folder for what is advised as files, with how to install and to undo each; "
+                 "nothing of the system is changed")
+      ->type_name("FOLDER")
+      ->check(is_given("name a new folder"));
   app.add_option("--root", o.root, "Folder with copies of /proc and /sys")->group("");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kDoctorExamples);

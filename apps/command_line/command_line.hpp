@@ -47,6 +47,7 @@ struct RunOptions : runtime::Overrides {
   std::string json;           ///< file, "-" for standard output, empty for none
   std::string socket;         ///< of the run's control; empty: default_control_path("run")
   bool no_socket = false;
+  bool waits_for_start = false;                    ///< touches no robot before somebody asks for it
   std::optional<std::size_t> checkpoints_bytes{};  ///< to go back in time by; empty: where useful
   std::string from{};  ///< "LOG@12.3s": goes on from there; empty: from the beginning
   StudioOptions studio{};
@@ -340,6 +341,7 @@ struct DoctorOptions {
   std::string robot;                    ///< robot.toml, whose buses are looked at; may be empty
   std::vector<std::string> interfaces;  ///< "can0=vcan0"
   std::string root = "/";               ///< of the files that are read
+  std::string fix;                      ///< folder for files that do what is advised; empty: none
   std::string json;
 };
 

@@ -2,10 +2,13 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 #include "apps/can/can_sockets.hpp"
 #include "apps/machine/commands.hpp"
 #include "apps/machine/doctor.hpp"
+#include "apps/machine/doctor_fix.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
 #include "robot/robot_files.hpp"
@@ -87,6 +90,7 @@ Exit doctor_command(const DoctorOptions& options) {
                        "tandem doctor ROBOT.toml --interface " + options.interfaces.front())
                       .error());
   }
+  std::optional<hal::RobotConfig> known;
   if (!options.robot.empty()) {
     auto robot = robot::read_robot(options.robot);
     if (!robot) return refuse(robot.error());
@@ -100,10 +104,18 @@ Exit doctor_command(const DoctorOptions& options) {
     const std::vector<Finding> more = examine_interfaces(machine, robot->config);
     findings.insert(findings.end(), more.begin(), more.end());
     if (options.root == "/") look_at_lines(robot->config, result);
+    known = std::move(robot->config);
   }
   std::FILE* out = human_output(options.json);
   print_findings(findings, out);
   print_verdict(findings, out);
+  if (!options.fix.empty()) {
+    const Fixes fixes = fixes_of(machine, findings, known ? &*known : nullptr);
+    if (const Status written = write_fixes(options.fix, fixes); !written)
+      return refuse(written.error());
+    fmt::print(out, "\n  {} in {}, nothing was changed: see {}/README.md\n",
+               counted(fixes.files.size(), "file"), options.fix, options.fix);
+  }
   return end_with_json(options.json, figures_json(result));
 }
 

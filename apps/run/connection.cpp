@@ -119,4 +119,15 @@ Diagnostics connect(WiredComposition& c, const std::string& record_frames) {
   return {};
 }
 
+void disconnect(WiredComposition& c) {
+  if (c.experiment.hal.backend == runtime::BackendKind::kSim) return;
+  c.backend.reset();  // before what it uses
+  c.can = nullptr;
+  c.master = nullptr;
+  c.remote = nullptr;
+  c.frames.reset();
+  c.sockets.reset();
+  c.participant.reset();
+}
+
 }  // namespace tandem::apps

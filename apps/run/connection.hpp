@@ -50,5 +50,7 @@ void figures(Figures& f, const runtime::Experiment* e);
 /// Errors: CanSockets::open()'s; a record that cannot be made, or without a bus; Domain::open()'s,
 /// RemoteBackend::connect()'s.
 [[nodiscard]] Diagnostics connect(WiredComposition& composition, const std::string& record_frames);
+/// Gives up what connect() has opened, also where it failed half way: it can be called again.
+void disconnect(WiredComposition& composition);
 
 }  // namespace tandem::apps

@@ -201,7 +201,8 @@ class RewoundRun {
 /// place.
 Result<Proof> prove_on_thread(const WiredComposition& c, runtime::Run& run, Gate& gate,
                               double seconds) {
-  auto guard = CycleGuard::open(c, run.cycle());
+  ServiceNotice nobody({}, {});
+  auto guard = CycleGuard::open(c, run.cycle(), nobody);
   if (!guard) return std::unexpected(guard.error());
   Proof proof;
   std::atomic<bool> done{false};

@@ -36,8 +36,9 @@ void say(const std::string& line) {
 }  // namespace
 
 Result<std::unique_ptr<CycleGuard>> CycleGuard::open(const WiredComposition& composition,
-                                                     runtime::RobotCycle& cycle) {
-  std::unique_ptr<CycleGuard> guard(new CycleGuard(composition, cycle));
+                                                     runtime::RobotCycle& cycle,
+                                                     ServiceNotice& notice) {
+  std::unique_ptr<CycleGuard> guard(new CycleGuard(composition, cycle, notice));
   for (const OpenBus& bus : composition.open_buses()) {
     if (bus.can == nullptr) continue;  // without frames a slave's watchdog stops it
     auto sender = SocketCanBus::open({.interface = bus.interface,
@@ -68,7 +69,9 @@ void CycleGuard::start() {
       runtime::CycleWatchdog::Hooks{
           .on_hang = [this](bool at_work) { on_hang(at_work); },
           .on_return = [] { say("note: the loop cycles again; the run ends in order"); },
-          .on_given_up = [this] { on_given_up(); }});
+          .on_given_up = [this] { on_given_up(); },
+          .on_cycles = [this] { notice_->cycles(); },
+          .on_wait = [this] { notice_->suspend(); }});
 }
 
 /// First what stops the robot, then what may wait.
@@ -85,6 +88,7 @@ void CycleGuard::on_hang(bool at_work) {
   const bool crashed = cycle_->heartbeat().stands_still();
   fault_ = crashed ? fmt::format("the loop crashed {}: {}", where, crash_reason())
                    : "the loop hung " + where + " and did not come back";
+  notice_->fails(crashed ? fault_ : "the loop hangs " + where);
   say(
       fmt::format("fault: the loop {}, it is {}. The emergency stop is latched{}; the process ends "
                   "in {} s{}",

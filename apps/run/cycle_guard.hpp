@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/run/connection.hpp"
+#include "apps/run/service_notice.hpp"
 #include "base/result.hpp"
 #include "runtime/cycle_watchdog.hpp"
 #include "runtime/robot_cycle.hpp"
@@ -28,9 +29,11 @@ class CycleGuard {
   static constexpr std::chrono::seconds kGrace{2};
   static constexpr std::chrono::seconds kLastWords{3};
 
-  /// Both outlive it. Errors: SocketCanBus::open()'s.
+  /// All outlive it. Errors: SocketCanBus::open()'s.
+  /// @param notice  told whether the loop cycles, by the watchdog's thread
   [[nodiscard]] static Result<std::unique_ptr<CycleGuard>> open(const WiredComposition& composition,
-                                                                runtime::RobotCycle& cycle);
+                                                                runtime::RobotCycle& cycle,
+                                                                ServiceNotice& notice);
 
   [[nodiscard]] bool gave_up() const noexcept { return gave_up_.load(std::memory_order_acquire); }
   /// The log is closed: nothing is lost any more by a process that ends. When it gave up.
@@ -39,8 +42,8 @@ class CycleGuard {
   [[nodiscard]] const std::string& fault() const noexcept { return fault_; }
 
  private:
-  CycleGuard(const WiredComposition& composition, runtime::RobotCycle& cycle)
-      : composition_(&composition), cycle_(&cycle) {}
+  CycleGuard(const WiredComposition& composition, runtime::RobotCycle& cycle, ServiceNotice& notice)
+      : composition_(&composition), cycle_(&cycle), notice_(&notice) {}
   void start();
   void on_hang(bool at_work);
   void on_given_up();
@@ -48,6 +51,7 @@ class CycleGuard {
 
   const WiredComposition* composition_;
   runtime::RobotCycle* cycle_;
+  ServiceNotice* notice_;
   std::vector<std::unique_ptr<hal::can::SocketCanBus>> buses_;
   double limit_s_ = 0.0;
   std::string fault_;

@@ -27,6 +27,16 @@ std::string progress_note(const runtime::RobotCycle& cycle) {
   return phase == runtime::RunPhase::kRunning ? "" : runtime::to_string(phase);
 }
 
+/// For who looks at the service: the phase, and what a person may do about it.
+std::string service_status(const runtime::RobotCycle& cycle) {
+  if (time_stands(cycle)) return "simulated time is paused: tandem clock resume";
+  const runtime::RunPhase phase = cycle.progress().phase.load();
+  const std::string name = runtime::to_string(phase);
+  if (phase == runtime::RunPhase::kHeld) return name + ": tandem controller start";
+  if (phase == runtime::RunPhase::kFaulted) return name + ": tandem fault show, tandem fault reset";
+  return name;
+}
+
 /// Says once why a run that was just enabled does not start, and at once which homing failed.
 class HomingNote {
  public:
@@ -202,8 +212,8 @@ void CycleThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config
 }
 
 void watch(runtime::RobotCycle& cycle, CycleThread& loop, const WiredComposition& c,
-           const CycleGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
-           bool quiet) {
+           const CycleGuard& guard, const log::Recorder* recorder, ServiceNotice& notice,
+           std::FILE* out, bool waits, bool quiet) {
   const runtime::Experiment& e = c.experiment;
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
   const runtime::Progress& progress = cycle.progress();
@@ -230,6 +240,7 @@ void watch(runtime::RobotCycle& cycle, CycleThread& loop, const WiredComposition
     if (!quiet) texts.look(cycle.services().texts());
     if (!quiet) limits.look(cycle);
     if (!quiet) bar.update(done_s(), progress_note(cycle));
+    notice.status(service_status(cycle));
     loop.await(std::chrono::milliseconds(20));
   }
   if (!quiet) {

@@ -45,11 +45,11 @@ class CycleThread {
 };
 
 /// Shows progress and the buses' states until the loop is done, or given up; with `quiet` it only
-/// waits. Either way it warns when the log is lost.
+/// waits. Either way it warns when the log is lost, and `notice` has the run's phase.
 /// @param recorder  null: nothing is logged
 /// @param waits  the run waits after a fault: each is printed when it happens, not at the end alone
 void watch(runtime::RobotCycle& cycle, CycleThread& loop, const WiredComposition& c,
-           const CycleGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
-           bool quiet);
+           const CycleGuard& guard, const log::Recorder* recorder, ServiceNotice& notice,
+           std::FILE* out, bool waits, bool quiet);
 
 }  // namespace tandem::apps

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "apps/can/bus_states.hpp"
+#include "apps/control/fault_table.hpp"
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
 #include "apps/robot/gains_opinion.hpp"
@@ -32,6 +33,8 @@
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_end.hpp"
 #include "apps/run/run_summary.hpp"
+#include "apps/run/service_notice.hpp"
+#include "apps/run/start_room.hpp"
 #include "apps/run/studio_run.hpp"
 #include "apps/run/tools_program.hpp"
 #include "apps/text/console.hpp"
@@ -76,10 +79,12 @@ ControlRegistry::Gate gate_of(const runtime::RemoteOptions& remote, const remote
 /// A run, or a server: the loop and all that talks to it. Taken apart in reverse order.
 class Session {
  public:
-  Session(WiredComposition& composition, const RunOptions& options, Gate* gate)
+  Session(WiredComposition& composition, const RunOptions& options, Gate* gate,
+          ServiceNotice& notice)
       : c_(composition),
         options_(options),
         gate_(gate),
+        notice_(notice),
         out_(human_output(options.json)),
         admission_(composition.experiment.remote.trust == runtime::RemoteTrust::kDomain) {}
 
@@ -110,6 +115,17 @@ class Session {
   [[nodiscard]] const std::string& log() const { return log_; }
   /// Whether it has every message.
   [[nodiscard]] bool log_is_whole() const { return log_is_whole_; }
+  /// It was to wait for its start, and no drive could be enabled: it is to wait once more.
+  [[nodiscard]] bool waits_again() const {
+    return options_.waits_for_start && !rt::stop_requested() && !not_enabled().empty();
+  }
+  /// Why the drives could not be enabled: nothing has moved. Empty: they were, or nobody tried.
+  [[nodiscard]] std::string not_enabled() const {
+    if (cycle_ == nullptr || c_.master == nullptr || c_.master->start_up().duration_ns > 0)
+      return {};
+    const std::vector<std::string> faults = latched_texts(cycle_->faults());
+    return faults.empty() ? std::string() : faults.front();
+  }
 
  private:
   [[nodiscard]] const runtime::Experiment& experiment() const { return c_.experiment; }
@@ -214,7 +230,8 @@ class Session {
       add_inject(commands_, e.robot, e.tree().get(), e.loop.period_ns, add);
     }
     add_push(commands_, e.robot, e.tree().get(), e.loop.period_ns, std::move(add));
-    studio_.start(*cycle_, commands_, shown_to(internal_model::ParallelReader::kStudio));
+    studio_.start(*cycle_, commands_, shown_to(internal_model::ParallelReader::kStudio),
+                  recorder_.get());
     const bool on_robot = e.hal.backend == runtime::BackendKind::kWire && !e.hal.lockstep;
     auto socket = serve(commands_, {.path = options_.socket,
                                     .kind = "run",
@@ -250,11 +267,16 @@ class Session {
     std::optional<rt::NoCpuSleep> awake;
     if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
     if (dds_ != nullptr) dds_->start(*cycle_, shown_to(internal_model::ParallelReader::kDds));
-    auto guard = CycleGuard::open(c_, *cycle_);
+    auto guard = CycleGuard::open(c_, *cycle_, notice_);
     if (!guard) return std::unexpected(guard.error());
     CycleThread thread(*cycle_, e.thread);
-    watch(*cycle_, thread, c_, **guard, recorder_.get(), out_,
+    watch(*cycle_, thread, c_, **guard, recorder_.get(), notice_, out_,
           cycle_->config().after_stop == runtime::AfterStop::kWait, options_.quiet);
+    if (waits_again()) {
+      notice_.suspend();
+    } else {
+      notice_.stops();
+    }
     if ((*guard)->gave_up()) end_without_loop(**guard);
     thread.join();
     past_->finish();
@@ -334,6 +356,7 @@ class Session {
   WiredComposition& c_;
   const RunOptions& options_;
   Gate* const gate_;  // null: without --gate
+  ServiceNotice& notice_;
   std::FILE* out_;
   std::size_t plugins_at_start_ = 0;  // in the log's first record
   std::unique_ptr<DdsRun> dds_;
@@ -370,6 +393,63 @@ void warn_of_inertias(const runtime::Experiment& e) {
                   fmt::join(links, ", "), shell_word(e.robot.file)));
 }
 
+/// Connects to the robot; before, with --wait-for-start, waits until somebody asks for it.
+/// @param why  it waits again
+/// @return nothing: it is connected. Else with what the process ends
+std::optional<Exit> reach(WiredComposition& c, const RunOptions& options, ServiceNotice& notice,
+                          const std::string& why) {
+  if (!options.waits_for_start) {
+    const Diagnostics errors = connect(c, options.record_frames);
+    return errors.empty() ? std::nullopt : std::optional(refuse(errors));
+  }
+  auto room = StartRoom::open(options.socket, notice, why);
+  if (!room) return refuse(room.error());
+  for (;;) {
+    if (!(*room)->await()) {
+      notice.stops();
+      return rt::stop_requested() ? interrupted(rt::stop_signal()) : Exit::kDone;
+    }
+    const Diagnostics errors = connect(c, options.record_frames);
+    if ((*room)->answer(errors.empty() ? std::nullopt : std::optional(errors.front()))) return {};
+    disconnect(c);
+  }
+}
+
+/// From the files to the end of the run.
+/// @param why  it waits for its start again; set where it is to do so once more
+Exit run_once(RunOptions options, Gate* gate, ServiceNotice& notice, ReportOfRun& report,
+              std::string& why) {
+  auto composition = runtime::composed<WiredComposition>(
+      options.experiment, options,
+      {.build = options.lacks_kernels.empty() ? builder(options.quiet)
+                                              : not_built(options.lacks_kernels)});
+  if (!composition) return refuse(composition.error());
+  warn_of_inertias((*composition)->experiment);
+  print_warnings(std::exchange((*composition)->warnings, {}));
+  rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
+  outlive_files();
+  if (const Diagnostics errors = check_events((*composition)->experiment); !errors.empty())
+    return refuse(errors);
+  if (const auto ended = reach(**composition, options, notice, std::exchange(why, {})))
+    return *ended;
+  print_warnings((*composition)->warnings);
+  set_pace(**composition, options);
+  if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
+  note_overrun_policy(**composition, options);
+  auto session = std::make_unique<Session>(**composition, options, gate, notice);
+  const Exit exit = session->run();
+  if (session->waits_again()) why = session->not_enabled();
+  if (options.report) {
+    report = {session->log(), session->log_is_whole(),
+              options.quiet ? nullptr : human_output(options.json)};
+  }
+  const EndGuard in_time;
+  session.reset();
+  // A library that hangs where it is loaded or freed keeps all others from being freed.
+  if (a_hosted_call_goes_on()) (void)composition->release();
+  return exit;
+}
+
 }  // namespace
 
 Exit run_command(const RunOptions& given, ReportOfRun& report) {
@@ -388,34 +468,12 @@ Exit run_command(const RunOptions& given, ReportOfRun& report) {
                          ? wrong_kind(options.experiment, Takes::kEither, "tandem serve")
                          : wrong_kind(options.experiment, Takes::kExperiment, "tandem run");
   if (wrong) return refuse(*wrong);
-  auto composition = runtime::composed<WiredComposition>(
-      options.experiment, options,
-      {.build = options.lacks_kernels.empty() ? builder(options.quiet)
-                                              : not_built(options.lacks_kernels)});
-  if (!composition) return refuse(composition.error());
-  warn_of_inertias((*composition)->experiment);
-  print_warnings(std::exchange((*composition)->warnings, {}));
-  rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
-  outlive_files();
-  if (const Diagnostics errors = check_events((*composition)->experiment); !errors.empty())
-    return refuse(errors);
-  if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty())
-    return refuse(errors);
-  print_warnings((*composition)->warnings);
-  set_pace(**composition, options);
-  if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
-  note_overrun_policy(**composition, options);
-  auto session = std::make_unique<Session>(**composition, options, gate.get());
-  const Exit exit = session->run();
-  if (options.report) {
-    report = {session->log(), session->log_is_whole(),
-              options.quiet ? nullptr : human_output(options.json)};
+  ServiceNotice notice;
+  std::string why;
+  for (;;) {
+    const Exit exit = run_once(options, gate.get(), notice, report, why);
+    if (why.empty()) return exit;
   }
-  const EndGuard in_time;
-  session.reset();
-  // A library that hangs where it is loaded or freed keeps all others from being freed.
-  if (a_hosted_call_goes_on()) (void)composition->release();
-  return exit;
 }
 
 Exit serve_command(const ServeOptions& options, ReportOfRun& report) {

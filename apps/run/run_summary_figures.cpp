@@ -88,7 +88,8 @@ static void figures(Figures& f, const log::RecordingResult& log) {
     "`path` and `data_sha256` are the last one's",
     log.branches);
   f("files", "that were written", log.parts);
-  f("files_removed", "of them, to keep to `[log] total_MB` or `keep_free_MB`", log.removed);
+  f("files_removed", "of them, to keep to the limits of `[log]`", log.removed);
+  f("earlier_files_removed", "the same of runs before (`[log] budget`)", log.earlier_removed);
   f("messages", "written", log.messages);
   f("dropped", "the ring was full", log.dropped);
   f("data_sha256", "of the messages' data, in order, in however many files", log.data_sha256);

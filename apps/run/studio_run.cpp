@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/control/clock_commands.hpp"
+#include "apps/run/metrics.hpp"
 #include "robot/robot_files.hpp"
 #include "runtime/run/run_log.hpp"
 
@@ -192,8 +193,9 @@ Result<std::string> StudioRun::open(const StudioOptions& options) {
 }
 
 void StudioRun::start(runtime::RobotCycle& cycle, ControlRegistry& commands,
-                      hal::ParallelSource* parallel) {
+                      hal::ParallelSource* parallel, const log::Recorder* recorder) {
   cycle_ = &cycle;
+  recorder_ = recorder;
   commands_ = &commands;
   parallel_ = parallel;
   happenings_ = std::make_shared<Happenings>(cycle);
@@ -263,7 +265,12 @@ void StudioRun::begin(Parts& parts) {
             return stands;
           },
       .cycle = [foxglove](const studio::Tap::Cycle& one) { foxglove->take(one); },
-      .parallel = parallel_};
+      .parallel = parallel_,
+      .served = {{.path = "/metrics", .get = [this, &cycle](std::string_view) {
+                    return studio::Response{
+                        .type = kMetricsType,
+                        .body = metrics_text({*composition_, cycle, recorder_})};
+                  }}}};
   studio::Asker asker{
       .ask =
           [turns](studio::Question question) {

@@ -48,7 +48,9 @@ class StudioRun {
   /// Adds `studio.open`; from now on clients are answered. Before the first cycle.
   /// @param commands  all others are there; outlives this. Its tell() is used up
   /// @param parallel  the second robot; null: there is none
-  void start(runtime::RobotCycle& cycle, ControlRegistry& commands, hal::ParallelSource* parallel);
+  /// @param recorder  for /metrics; null: nothing is logged. Outlives finish()
+  void start(runtime::RobotCycle& cycle, ControlRegistry& commands, hal::ParallelSource* parallel,
+             const log::Recorder* recorder);
   /// When there are no more cycles.
   void finish(const std::string& how, const std::string& log);
 
@@ -69,6 +71,7 @@ class StudioRun {
   runtime::RobotCycle* cycle_ = nullptr;
   ControlRegistry* commands_ = nullptr;
   hal::ParallelSource* parallel_ = nullptr;
+  const log::Recorder* recorder_ = nullptr;
   std::shared_ptr<Happenings> happenings_;
   hal::LateObserver tap_;
   std::mutex mutex_;  // of what follows

@@ -19,7 +19,7 @@ namespace tandem::apps {
 [[nodiscard]] std::string control_folder();
 /// Where another process of this user can have its socket, whose environment may be another one:
 /// control_folder() first, then /run/user/<uid>/tandem, /tmp/tandem-<uid> and that of
-/// scripts/tandem-run.service. Each once, as far as the names tell. With $TANDEM_SOCKETS there is
+/// scripts/tandem@.service. Each once, as far as the names tell. With $TANDEM_SOCKETS there is
 /// no other than that.
 [[nodiscard]] std::vector<std::string> control_folders();
 /// Whether $TANDEM_SOCKETS keeps the search to one folder.

@@ -1,7 +1,6 @@
 #include "runtime/run/run_log.hpp"
 
 #include <fmt/core.h>
-#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <Eigen/Geometry>
@@ -180,31 +179,36 @@ Error folder_error(const std::string& folder, std::string message) {
           .key = {}};
 }
 
-/// @param needed  bytes of the log
-/// @param keep_free  bytes that it has to leave
-Status check_folder(const std::string& folder, std::uint64_t needed, std::uint64_t keep_free) {
+/// Makes the folder.
+Status make_folder(const std::string& folder) {
   std::error_code problem;
   fs::create_directories(folder, problem);
   if (problem) {
     return std::unexpected(
         folder_error(folder, "cannot make the log's folder: " + problem.message()));
   }
-  if (access(folder.c_str(), W_OK | X_OK) != 0) {
-    return std::unexpected(folder_error(
-        folder, std::string("cannot write into the log's folder: ") + std::strerror(errno)));
-  }
-  struct statvfs disk {};
-  if (statvfs(folder.c_str(), &disk) != 0) return {};
-  const std::uint64_t room = static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize;
-  if (room >= needed + keep_free) return {};
+  if (access(folder.c_str(), W_OK | X_OK) == 0) return {};
+  return std::unexpected(folder_error(
+      folder, std::string("cannot write into the log's folder: ") + std::strerror(errno)));
+}
+
+/// @param needed  bytes of the log
+/// @param files   of runs before: the oldest are removed where there is no room, and they may go
+Status make_room(const std::string& folder, std::uint64_t needed, const LogConfig& config,
+                 log::KeptFiles& files) {
+  const auto room = [&folder] { return log::disk_room(folder); };
+  if (files.keep_free(room, needed)) return {};
+  std::string free;
+  if (config.keep_free_MB > 0.0)
+    free += fmt::format(", and keep_free_MB = {:g}", config.keep_free_MB);
+  if (config.keep_free_share > 0.0)
+    free += fmt::format(", and keep_free_share = {:g}", config.keep_free_share);
   return std::unexpected(folder_error(
       folder,
       fmt::format(
           "the disk is too full for the log: it has {:.1f} MB, the run may need {:.1f} MB{}",
-          static_cast<double>(room) * 1e-6, static_cast<double>(needed) * 1e-6,
-          keep_free == 0 ? ""
-                         : fmt::format(", and keep_free_MB = {:g} stay free",
-                                       static_cast<double>(keep_free) * 1e-6))));
+          static_cast<double>(room().value_or(log::DiskRoom{}).free_bytes) * 1e-6,
+          static_cast<double>(needed) * 1e-6, free.empty() ? "" : free + " stay free")));
 }
 
 /// Numbers of logs whose first part has been removed, or is there.
@@ -223,10 +227,11 @@ std::set<int> taken_numbers(const std::string& folder, const std::string& name) 
 
 /// The first free name, taken by an empty file: of two runs that begin at once each has its own.
 /// That file stays open, and is the log.
+/// @param last  behind all others: their numbers then say which is older
 Result<std::pair<std::string, Descriptor>> claim_file(const std::string& folder,
-                                                      const std::string& name) {
+                                                      const std::string& name, bool last) {
   const std::set<int> taken = taken_numbers(folder, name);
-  for (int number = 1;; ++number) {
+  for (int number = last && !taken.empty() ? *taken.rbegin() + 1 : 1;; ++number) {
     if (taken.contains(number)) continue;
     std::string path = fmt::format("{}/{}-{:03d}.mcap", folder, name, number);
     Result<Descriptor> file = open_new(path, 0644);
@@ -278,16 +283,40 @@ log::ViewedRobot viewed(const Experiment& e) {
 log::RecorderOptions recorder_options(const Composition& c) {
   const Experiment& e = c.experiment;
   const auto bytes = [](double megabytes) { return static_cast<std::uint64_t>(megabytes * 1e6); };
-  log::RecorderOptions options{
-      .limits = {bytes(e.log.file_MB), bytes(e.log.total_MB), bytes(e.log.keep_free_MB)},
-      .shares = shares(e.log),
-      .viewed = viewed(e)};
+  const auto ns = [](double seconds) { return static_cast<std::int64_t>(seconds * 1e9); };
+  log::RecorderOptions options{.limits = {.file_bytes = bytes(e.log.file_MB),
+                                          .total_bytes = bytes(e.log.total_MB),
+                                          .keep_free_bytes = bytes(e.log.keep_free_MB),
+                                          .keep_free_share = e.log.keep_free_share,
+                                          .file_ns = ns(e.log.file_s),
+                                          .total_ns = ns(e.log.total_s),
+                                          .keep_before_fault_ns = ns(e.log.keep_before_fault_s)},
+                               .shares = shares(e.log),
+                               .viewed = viewed(e)};
   switch (e.log.compression) {
     case LogCompression::kNone: options.writer.compression = log::Compression::kNone; break;
     case LogCompression::kLz4: options.writer.compression = log::Compression::kLz4; break;
     case LogCompression::kZstd: options.writer.compression = log::Compression::kZstd; break;
   }
   return options;
+}
+
+/// Bytes of the log for which there must be room as it begins.
+std::uint64_t needed_bytes(const Composition& c, const log::DiskLimits& limits) {
+  const double per_ns = bytes_per_cycle(c) / static_cast<double>(c.experiment.loop.period_ns);
+  const auto least = [per_ns](std::uint64_t bytes, std::int64_t ns) {
+    const auto time_bytes = static_cast<std::uint64_t>(per_ns * static_cast<double>(ns));
+    return bytes == 0 || (ns > 0 && time_bytes < bytes) ? time_bytes : bytes;
+  };
+  const std::uint64_t whole =
+      kFixed_bytes +
+      static_cast<std::uint64_t>(static_cast<double>(c.experiment.cycles()) * bytes_per_cycle(c));
+  if (!limits.remove_oldest()) return whole;
+  // Its oldest files go, before the disk has less, too.
+  const bool file_by_file = limits.keep_free_bytes > 0 || limits.keep_free_share > 0.0 ||
+                            c.experiment.log.budget == LogBudget::kExperiment;
+  return std::min(whole, file_by_file ? least(limits.file_bytes, limits.file_ns)
+                                      : least(limits.total_bytes, limits.total_ns));
 }
 
 /// "2.5 h", "12 min", "40 s": as long as that is.
@@ -303,17 +332,18 @@ std::string time_text(double seconds) {
 std::string log_growth(const Composition& c, const std::string& path) {
   const double rate = bytes_per_cycle(c) * 1e9 / static_cast<double>(c.experiment.loop.period_ns);
   const LogConfig& config = c.experiment.log;
-  struct statvfs disk {};
   std::string room;
-  if (statvfs(path.c_str(), &disk) == 0) {
-    const double free = static_cast<double>(disk.f_bavail) * static_cast<double>(disk.f_frsize);
+  if (const auto disk = log::disk_room(path)) {
+    const std::uint64_t kept = log::wanted_free(recorder_options(c).limits, disk->all_bytes);
+    const std::uint64_t free = disk->free_bytes > kept ? disk->free_bytes - kept : 0;
     room = fmt::format("; the disk has room for {} of it",
-                       time_text(std::max(0.0, free - 1e6 * config.keep_free_MB) / rate));
+                       time_text(static_cast<double>(free) / rate));
   }
-  if (config.total_MB > 0.0) {
-    room = fmt::format("; the last {:g} MB, {}, are kept", config.total_MB,
-                       time_text(1e6 * config.total_MB / rate));
-  }
+  const double total_s = config.total_MB > 0.0 ? 1e6 * config.total_MB / rate : config.total_s;
+  const bool by_time = config.total_s > 0.0 && config.total_s <= total_s;
+  if (by_time) room = fmt::format("; the last {} are kept", time_text(config.total_s));
+  if (config.total_MB > 0.0 && !by_time)
+    room = fmt::format("; the last {:g} MB, {}, are kept", config.total_MB, time_text(total_s));
   return fmt::format("at most {:.2f} MB for each second{}", rate * 1e-6, room);
 }
 
@@ -344,20 +374,18 @@ log::StringMap loaded_later(const ControllerHost& host, std::size_t known) {
 Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& folder,
                                                 const std::string& file_name,
                                                 const log::Branch& branch) {
-  const auto cycles = static_cast<double>(c.experiment.cycles());
-  const log::RecorderOptions options = recorder_options(c);
-  const log::DiskLimits& limits = options.limits;
-  std::uint64_t needed = static_cast<std::uint64_t>(cycles * bytes_per_cycle(c)) + kFixed_bytes;
-  if (limits.total_bytes > 0) {  // its oldest files go, before the disk has less, too
-    needed = std::min(needed, limits.keep_free_bytes > 0 ? limits.file_bytes : limits.total_bytes);
-  }
-  if (const Status s = check_folder(folder, needed, limits.keep_free_bytes); !s) {
-    return std::unexpected(s.error());
-  }
+  log::RecorderOptions options = recorder_options(c);
+  const bool all_runs = c.experiment.log.budget == LogBudget::kExperiment;
   const std::string name =
       c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
-  auto claimed =
-      file_name.empty() ? claim_file(folder, name) : claim_named(fs::path(folder) / file_name);
+  if (const Status s = make_folder(folder); !s) return std::unexpected(s.error());
+  options.earlier.emplace(options.limits);
+  if (all_runs) options.earlier->take_over(folder, name);
+  const std::uint64_t needed = needed_bytes(c, options.limits);
+  if (const Status s = make_room(folder, needed, c.experiment.log, *options.earlier); !s)
+    return std::unexpected(s.error());
+  auto claimed = file_name.empty() ? claim_file(folder, name, all_runs)
+                                   : claim_named(fs::path(folder) / file_name);
   if (!claimed) return std::unexpected(claimed.error());
   auto& [path, file] = *claimed;
   log::RunInfo info = info_of(c);

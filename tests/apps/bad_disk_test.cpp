@@ -74,5 +74,27 @@ TEST_F(BadDisk, ARunWhoseOldFilesGoBeginsOnADiskThatCannotHaveThemAll) {
   EXPECT_GT(json("j.json")["log"]["files_removed"].get<int>(), 0);
 }
 
+// A robot whose own logs have filled its disk starts in the morning; one whose disk others have
+// filled says so.
+TEST_F(BadDisk, ARunBeginsOnADiskThatLogsOfRunsBeforeHaveFilled) {
+  const Mount disk(folder_ / "disk", "size=12m");
+  if (!disk.mounted()) GTEST_SKIP() << test::needs_root("to mount a small disk");
+  write_text(folder_ / "hold.toml",
+             read_text(folder_ / "hold.toml") +
+                 "\n[log]\nfile_MB = 4\ntotal_MB = 100\nkeep_free_share = 0.05\nbudget = "
+                 "'experiment'\ncompression = 'none'\n");
+  for (const int number : {1, 2}) {
+    const Outcome run = tandem("run hold.toml --duration 40 -q --log disk --json j.json");
+    EXPECT_EQ(run.status, 0) << number << run.err;
+  }
+  EXPECT_GT(json("j.json")["log"]["earlier_files_removed"].get<int>(), 0);
+  write_text(folder_ / "disk/others", std::string(20'000'000, 'x'));  // as much as there is room
+  for (const auto& file : std::filesystem::directory_iterator(folder_ / "disk"))
+    if (file.path().extension() == ".mcap") std::filesystem::remove(file.path());
+  write_text(folder_ / "disk/more", std::string(20'000'000, 'x'));
+  expect_refused({"disk", "too full", "keep_free_share = 0.05"},
+                 "run hold.toml --duration 40 --log disk");
+}
+
 }  // namespace
 }  // namespace tandem::apps

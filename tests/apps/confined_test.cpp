@@ -1,4 +1,4 @@
-// A run with the rights of scripts/tandem-run.service and no others: another user than root, two
+// A run with the rights of scripts/tandem@.service and no others: another user than root, two
 // capabilities, the listed system calls and address families.
 #include <fcntl.h>
 #include <grp.h>
@@ -33,7 +33,7 @@ constexpr uid_t kNobody = 65534;
 /// Every value that the unit gives a key, in the order of its lines.
 std::vector<std::string> of_unit(const std::string& key) {
   std::vector<std::string> all;
-  std::ifstream unit(TANDEM_SOURCE_DIR "/scripts/tandem-run.service");
+  std::ifstream unit(TANDEM_SOURCE_DIR "/scripts/tandem@.service");
   for (std::string line; std::getline(unit, line);) {
     if (!line.starts_with(key + "=")) continue;
     std::istringstream values(line.substr(key.size() + 1));
@@ -155,6 +155,8 @@ const std::map<std::string, int> kCalls{
     CALL(epoll_create1),
     CALL(epoll_ctl),
     CALL(epoll_pwait),
+    CALL(timerfd_create),
+    CALL(timerfd_settime),
 #ifdef __x86_64__
     CALL(arch_prctl),
     CALL(open),
@@ -190,7 +192,7 @@ std::vector<int> numbers(const std::string& key, const std::map<std::string, int
   for (const std::string& name : of_unit(key)) {
     const auto found = known.find(name);
     if (found == known.end()) {
-      ADD_FAILURE() << "scripts/tandem-run.service: " << key << " has " << name
+      ADD_FAILURE() << "scripts/tandem@.service: " << key << " has " << name
                     << ", which this test does not know";
     } else {
       all.push_back(found->second);
@@ -383,7 +385,8 @@ TEST_F(Confined, ARunEndsInOrderWithRealTimePriorityAndLockedMemory) {
 TEST_F(Confined, ARunIsAskedAndStopsBySignal) {
   if (const std::string reason = not_permitted(); !reason.empty()) GTEST_SKIP() << reason;
   give_folder();
-  const pid_t run = begin({"--realtime", "--duration", "60", "--no-log", "--json", "run.json"});
+  const pid_t run =
+      begin({"--realtime", "--duration", "60", "--no-log", "--json", "run.json", "--studio=0"});
   const std::string socket =
       (runtime_ / "tandem" / ("run-" + std::to_string(run) + ".sock")).string();
   EXPECT_TRUE(tandem::test::eventually([&] {

@@ -14,6 +14,7 @@
 #include "apps/machine/latency_report.hpp"
 #include "apps/robot/scale_facts.hpp"
 #include "apps/run/commands.hpp"
+#include "apps/run/metrics.hpp"
 #include "apps/run/replay_figures.hpp"
 #include "apps/run/run_summary.hpp"
 #include "apps/run/slurm_sweep.hpp"
@@ -89,6 +90,39 @@ TEST(Documentation, OfTheJsonIsWhatTheFiguresDeclare) {
   }
   EXPECT_TRUE(page == declared)
       << "docs/json.md is not what the figures declare: scripts/json-docs writes it";
+}
+
+TEST(Documentation, OfTheMetricsIsWhatTheRowsDeclare) {
+  const std::string file = std::string(TANDEM_SOURCE_DIR) + "/docs/service.md";
+  const std::string page = file_text(file);
+  std::string table = "| metric | type | unit | meaning |\n|---|---|---|---|\n";
+  for (const MetricRow& row : metric_rows())
+    table += fmt::format("| `{}` | {} | {} | {} |\n", row.name, row.type, row.unit, row.help);
+  const std::string begin = "<!-- metrics -->\n";
+  const std::size_t at = page.find(begin), end = page.find("<!-- end -->", at);
+  ASSERT_NE(end, std::string::npos);
+  std::string declared = page;
+  declared.replace(at + begin.size(), end - at - begin.size(), table);
+  if (std::getenv("TANDEM_WRITE_DOCS") != nullptr) {
+    std::ofstream(file) << declared;
+    GTEST_SKIP() << "docs/service.md is written";
+  }
+  EXPECT_TRUE(page == declared)
+      << "docs/service.md is not what the rows declare: scripts/json-docs writes it";
+}
+
+/// As Prometheus wants names: of ours, in base units, a counter by its ending.
+TEST(Documentation, OfTheMetricsHasRowsAsPrometheusWantsThem) {
+  std::set<std::string> names;
+  for (const MetricRow& row : metric_rows()) {
+    const std::string name = row.name, type = row.type;
+    EXPECT_TRUE(names.insert(name).second) << name;
+    EXPECT_TRUE(std::regex_match(name, std::regex("tandem(_[a-z]+)+"))) << name;
+    EXPECT_TRUE(type == "counter" || type == "gauge" || type == "histogram") << name;
+    EXPECT_EQ(name.ends_with("_total"), type == "counter") << name;
+    EXPECT_FALSE(std::string(row.help).ends_with('.') || *row.help == 0) << name;
+  }
+  EXPECT_GT(names.size(), 20U);
 }
 
 TEST(Documentation, OfTheJsonHasNoKeyTwice) {

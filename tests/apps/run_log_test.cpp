@@ -85,6 +85,24 @@ TEST_F(RunLog, GoesOnInSeveralFilesOfWhichTheOldestGo) {
   EXPECT_EQ(json("b.json")["log"]["data_sha256"], log["data_sha256"]);
 }
 
+// What a service needs: started again and again, it keeps to the limits that one run had.
+TEST_F(RunLog, GoesOnWithTheBudgetOfTheRunsBefore) {
+  write_text(folder_ / "hold.toml",
+             read_text(folder_ / "hold.toml") +
+                 "\n[log]\nfile_s = 2\ntotal_s = 6\nkeep_before_fault_s = 0\n"
+                 "keep_free_share = 0.001\nbudget = \"experiment\"\n");
+  for (int number = 1; number <= 4; ++number) {
+    ASSERT_EQ(tandem("run hold.toml --duration 5 -q --json run.json").status, 0);
+    const std::string path = json("run.json")["log"]["path"];
+    EXPECT_EQ(path, "runs/double_pendulum-hold-00" + std::to_string(number) + ".mcap");
+  }
+  EXPECT_GT(json("run.json")["log"]["earlier_files_removed"].get<int>(), 0);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "runs/double_pendulum-hold-001.mcap"));
+  const auto files = std::distance(std::filesystem::directory_iterator(folder_ / "runs"), {});
+  EXPECT_LE(files, 6) << "the last 6 s, in files of up to 2 s";
+  EXPECT_GE(files, 3);
+}
+
 TEST_F(RunLog, IsTheFileThatIsNamedUnlessThatIsThere) {
   auto composition = runtime::composed((folder_ / "hold.toml").string(), {});
   ASSERT_TRUE(composition);

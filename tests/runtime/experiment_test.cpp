@@ -305,6 +305,23 @@ TEST(Experiment, RefusesALogThatCannotBeKept) {
             "arm/x.toml:5: log.total_MB: is less than two files of file_MB (the file that is being "
             "written and one before it stay)\n");
   EXPECT_EQ(log("total_MB = 120\nfile_MB = 60\nkeep_free_MB = 1e4"), "");
+  EXPECT_EQ(log("total_s = 600"),
+            "arm/x.toml:5: log.total_s: without file_s or file_MB there is one file, which cannot "
+            "be shortened (set file_s, at most half of it)\n");
+  EXPECT_EQ(log("total_s = 600\nfile_s = 301"),
+            "arm/x.toml:5: log.total_s: is less than two files of file_s (the file that is being "
+            "written and one before it stay)\n");
+  EXPECT_EQ(log("total_s = 60\nfile_s = 10"),
+            "arm/x.toml:5: log.total_s: is less than keep_before_fault_s (when a fault comes, what "
+            "was before it has to be there still)\n");
+  EXPECT_EQ(log("budget = 'experiment'\nfile_s = 10"),
+            "arm/x.toml:5: log.budget: without total_MB and total_s nothing is removed (set one of "
+            "them, or leave budget out)\n");
+  EXPECT_EQ(log("total_s = 60\nfile_MB = 10\nkeep_before_fault_s = 0\nbudget = 'experiment'\n"
+                "keep_free_share = 0.1"),
+            "");
+  EXPECT_NE(log("keep_free_share = 1").find("arm/x.toml:5: log.keep_free_share: "),
+            std::string::npos);
   EXPECT_NE(log("keep_free_MB = nan").find("arm/x.toml:5: log.keep_free_MB: "), std::string::npos);
 }
 

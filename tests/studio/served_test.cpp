@@ -47,6 +47,25 @@ TEST(Served, ElsewhereIsForWhoKnowsTheToken) {
   EXPECT_EQ(get(rules, "/log", "10.0.0.1:8642", std::string("Bearer ") + kToken).body, "log ");
 }
 
+/// Beside a run's own paths, which stay.
+TEST(Served, StandsBesideARun) {
+  for (const bool loopback : {true, false}) {
+    const std::string address = loopback ? "127.0.0.1" : "10.0.0.1";
+    const HttpRules rules({.address = address, .port = 8642, .loopback = loopback}, "<robot/>",
+                          kToken, {}, {}, {},
+                          {{.path = "/metrics", .get = [](std::string_view) {
+                              return Response{.type = "text/x", .body = "tandem_up 1"};
+                            }}});
+    const std::string host = address + ":8642", bearer = std::string("Bearer ") + kToken;
+    EXPECT_EQ(get(rules, "/metrics", host, bearer).body, "tandem_up 1");
+    EXPECT_EQ(get(rules, "/metrics", host).status, loopback ? 200U : 401U);
+    EXPECT_EQ(get(rules, "/robot.urdf", host, bearer).body, "<robot/>");
+    EXPECT_EQ(get(rules, "/metric", host, bearer).status, 404U);
+    EXPECT_EQ(get(rules, "/ws", host).status, 426U);
+    EXPECT_EQ(get(rules, "/metrics", host, bearer, "POST").status, 405U);
+  }
+}
+
 TEST(Served, HasNoRun) {
   const HttpRules rules = rules_at("127.0.0.1", true);
   for (const char* path : {"/ws", "/robot.urdf"})

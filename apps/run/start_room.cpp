@@ -1,0 +1,151 @@
+#include "apps/run/start_room.hpp"
+
+#include <fmt/core.h>
+
+#include <chrono>
+#include <thread>
+#include <utility>
+
+#include "apps/text/console.hpp"
+#include "hal/stop_category.hpp"
+#include "rt/stop_signal.hpp"
+
+namespace tandem::apps {
+namespace {
+
+constexpr std::chrono::milliseconds kLook{50};  // between two looks for a signal
+constexpr std::chrono::milliseconds kOut{100};  // for an answer to leave before the socket closes
+constexpr char kWaits[] = "waits for its start: tandem controller start";
+constexpr char kWaiting[] = "waiting";
+
+std::unexpected<Error> not_started() {
+  return fail("the run waits for its start, and has touched no drive yet",
+              "tandem controller start");
+}
+
+}  // namespace
+
+Result<std::unique_ptr<StartRoom>> StartRoom::open(const std::string& socket, ServiceNotice& notice,
+                                                   const std::string& why) {
+  std::unique_ptr<StartRoom> room(new StartRoom(notice));
+  room->add_commands();
+  auto opened =
+      serve(room->commands_, {.path = socket, .kind = "run", .wanted = true, .needed = true});
+  if (!opened) return std::unexpected(opened.error());
+  room->socket_ = std::move(*opened);
+  rt::install_emergency_signal();
+  room->tell(why);
+  return room;
+}
+
+/// To journal and service manager.
+void StartRoom::tell(const std::string& why) {
+  const std::string line = std::string(kWaits) + (why.empty() ? "" : "; before: " + why);
+  fmt::print(stderr, "{}\n", shown(line, 2'000));
+  notice_.waits(line);
+}
+
+Json StartRoom::status() {
+  const std::scoped_lock lock(mutex_);
+  return {{"phase", kWaiting}, {"paused", false},   {"cycles", 0},  {"running_cycles", 0},
+          {"total_cycles", 0}, {"overruns", 0},     {"dropped", 0}, {"latched", stopped_ ? 1 : 0},
+          {"resets", 0},       {"failed_resets", 0}};
+}
+
+void StartRoom::add_commands() {
+  commands_.add("status", [this](const Json&) -> Result<Json> { return status(); });
+  commands_.add("fault.show", [this](const Json&) -> Result<Json> {
+    Json answer = status();
+    answer["faults"] = Json::array();
+    answer["lost"] = 0;
+    return answer;
+  });
+  commands_.add("fault.reset", [this](const Json&) -> Result<Json> {
+    {
+      const std::scoped_lock lock(mutex_);
+      stopped_ = false;
+    }
+    return status();
+  });
+  // Confirmed at once: no drive is enabled, and from here on none will be.
+  commands_.add("estop", [this](const Json& request) -> Result<Json> {
+    const std::scoped_lock lock(mutex_);
+    if (left_) return fail("the run goes on to its robot: ask again");
+    stopped_ = true;
+    const auto category = static_cast<hal::StopCategory>(request.value("category", 0));
+    return Json{{"category", hal::to_string(category)}, {"paused", false}, {"confirmed", true}};
+  });
+  commands_.add("run.stop", [this](const Json&) -> Result<Json> {
+    const std::scoped_lock lock(mutex_);
+    ends_ = true;
+    news_.notify_all();
+    return Json::object();
+  });
+  commands_.add("controller.start", [this](const Json& request) { return start(request); });
+  for (const CommandRow& row : command_rows()) {
+    if (commands_.effect(row.name) || !row.more.asks.empty()) continue;
+    commands_.add(row, [](const Json&) -> Result<Json> { return not_started(); });
+  }
+}
+
+/// On a thread of the socket, which waits for main.
+Result<Json> StartRoom::start(const Json& request) {
+  if (request.contains("name")) {
+    return fail("the run waits for its start: no controller is there by itself yet",
+                "tandem controller start, without a name");
+  }
+  std::unique_lock lock(mutex_);
+  if (stopped_)
+    return fail("an emergency stop is latched: nothing starts", "tandem fault reset, then start");
+  if (ends_) return fail("the run ends");
+  wanted_ = true;
+  const std::uint64_t before = answers_;
+  news_.notify_all();
+  news_.wait(lock, [&] { return answers_ != before || ends_; });
+  if (answers_ == before) return fail("the run ends");
+  if (refused_) return std::unexpected(*refused_);
+  return Json{{"done", false},
+              {"active", Json::array()},
+              {"note", "the drives are enabled, then the controllers start"}};
+}
+
+bool StartRoom::await() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    if (rt::take_emergency_stop()) stopped_ = true;
+    if (rt::stop_requested()) ends_ = true;
+    if (ends_) {
+      news_.notify_all();
+      lock.unlock();
+      std::this_thread::sleep_for(kOut);
+      return false;
+    }
+    if (wanted_) return true;
+    news_.wait_for(lock, kLook);
+  }
+}
+
+bool StartRoom::answer(std::optional<Error> refused) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (rt::take_emergency_stop()) stopped_ = true;
+    if (stopped_ && !refused) {  // it came after the question, and wins
+      refused = fail("an emergency stop is latched: nothing starts",
+                     "tandem fault reset, then tandem controller start")
+                    .error();
+    }
+    refused_ = refused;
+    wanted_ = false;
+    left_ = !refused;
+    ++answers_;
+  }
+  news_.notify_all();
+  if (refused) {
+    tell(refused->to_string());
+    return false;
+  }
+  std::this_thread::sleep_for(kOut);
+  return true;
+}
+
+}  // namespace tandem::apps
