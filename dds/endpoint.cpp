@@ -10,8 +10,8 @@ Endpoint::Endpoint(Kind kind, std::string topic, RawEndpoint raw, RosGraph& grap
       entry_(graph, kind, raw_.entity.get()) {}
 
 Result<Endpoint> Endpoint::create(Kind kind, Participant& participant, const Type& type,
-                                  const std::string& topic, const Qos& qos) {
-  auto raw = RawEndpoint::create(kind, participant.get(), type, topic, qos);
+                                  const std::string& topic, const Qos& qos, const MakeTopic& make) {
+  auto raw = RawEndpoint::create(kind, participant.get(), type, topic, qos, make);
   if (!raw) return std::unexpected(raw.error());
   return Endpoint(kind, topic, std::move(*raw), participant.graph());
 }

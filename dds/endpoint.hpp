@@ -22,7 +22,7 @@ class Endpoint {
   /// Errors: RawEndpoint::create()'s.
   [[nodiscard]] static Result<Endpoint> create(Kind kind, Participant& participant,
                                                const Type& type, const std::string& topic,
-                                               const Qos& qos);
+                                               const Qos& qos, const MakeTopic& make = &make_topic);
 
   [[nodiscard]] dds_entity_t get() const noexcept { return raw_.entity.get(); }
   [[nodiscard]] const std::string& topic() const noexcept { return topic_; }

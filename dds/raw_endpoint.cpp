@@ -28,12 +28,16 @@ QosPointer to_dds(const Qos& qos, const Type& type) {
 
 }  // namespace
 
-Result<RawEndpoint> RawEndpoint::create(EndpointKind kind, dds_entity_t participant,
-                                        const Type& type, const std::string& topic,
-                                        const Qos& qos) {
-  const QosPointer settings = to_dds(qos, type);
+dds_entity_t make_topic(dds_entity_t participant, const Type& type, const char* name) {
   // Without settings: they are the endpoint's, and may be others for the next one of this topic.
-  Entity made(dds_create_topic(participant, type.descriptor, topic.c_str(), nullptr, nullptr));
+  return dds_create_topic(participant, type.descriptor, name, nullptr, nullptr);
+}
+
+Result<RawEndpoint> RawEndpoint::create(EndpointKind kind, dds_entity_t participant,
+                                        const Type& type, const std::string& topic, const Qos& qos,
+                                        const MakeTopic& make) {
+  const QosPointer settings = to_dds(qos, type);
+  Entity made(make(participant, type, topic.c_str()));
   if (!made.ok()) {
     return std::unexpected(
         dds_error("make the topic " + topic + " of type " + type.ros_name, made.get()));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "base/result.hpp"
@@ -22,6 +23,12 @@ struct Qos {
   std::string user_data{};       ///< "key=value;…": what it says of itself before its type's hash
 };
 
+/// Makes the DDS topic of an endpoint. Below 1: the error's code.
+using MakeTopic =
+    std::function<dds_entity_t(dds_entity_t participant, const Type& type, const char* name)>;
+/// One whose samples are encoded as idlc's types are.
+[[nodiscard]] dds_entity_t make_topic(dds_entity_t participant, const Type& type, const char* name);
+
 struct RawEndpoint {
   Entity topic;
   Entity entity;  ///< after the topic, so that it goes first
@@ -30,7 +37,8 @@ struct RawEndpoint {
   /// Errors: what Cyclone DDS refuses, such as a topic that has another type in this process.
   [[nodiscard]] static Result<RawEndpoint> create(EndpointKind kind, dds_entity_t participant,
                                                   const Type& type, const std::string& topic,
-                                                  const Qos& qos);
+                                                  const Qos& qos,
+                                                  const MakeTopic& make = &make_topic);
 };
 
 }  // namespace tandem::dds

@@ -18,7 +18,7 @@ std::optional<Peer> to_peer(dds_builtintopic_endpoint_t* endpoint) {
   if (endpoint == nullptr) return std::nullopt;
   const std::unique_ptr<dds_builtintopic_endpoint_t, decltype(&dds_builtintopic_free_endpoint)>
       owned(endpoint, &dds_builtintopic_free_endpoint);
-  Peer peer{.participant = endpoint->participant_key, .user_data = {}};
+  Peer peer{.participant = endpoint->participant_key, .endpoint = endpoint->key, .user_data = {}};
   void* bytes = nullptr;
   std::size_t size = 0;
   if (endpoint->qos != nullptr && dds_qget_userdata(endpoint->qos, &bytes, &size)) {

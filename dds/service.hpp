@@ -1,5 +1,5 @@
-// What both ends of a service share: a topic for requests and one for replies, as ROS 2's Cyclone
-// DDS middleware maps services. Start at service_server.hpp or service_client.hpp.
+// What both ends of a service share: a topic for requests and one for replies, as ROS 2 maps
+// services. Start at service_server.hpp or service_client.hpp.
 // Layer: dds.  Thread: any, non-RT.
 #pragma once
 
@@ -63,7 +63,7 @@ using ParticipantId = std::array<std::uint8_t, 12>;
 
 /// An endpoint of somebody else, or of this process.
 struct Peer {
-  dds_guid_t participant{};
+  dds_guid_t participant{}, endpoint{};
   std::string user_data;  ///< "clientid=…;typehash=…;"
 };
 /// What the reader that `writer` is connected to by this handle says of itself; empty when it is

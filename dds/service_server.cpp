@@ -2,6 +2,7 @@
 // the queues off in order; replies wait for their reader to be discovered.
 #include "dds/service_server.hpp"
 
+#include <dds/ddsi/ddsi_serdata.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -46,22 +47,27 @@ Result<std::unique_ptr<ServiceServer>> ServiceServer::open(Participant& particip
 }
 
 Status ServiceServer::add(const std::string& name, const Type& request, const Type& response,
-                          std::size_t response_size, Read read) {
+                          Read read) {
   const std::string id = new_service_id(*participant_);
   const Qos qos = service_qos(
       kDepth, fmt::format("serviceid={};node={};pid={};", id, participant_->node(), ::getpid()));
+  const ddsi_sertype* layout = nullptr;
+  const MakeTopic make = [&layout](dds_entity_t participant, const Type& type, const char* topic) {
+    return create_service_topic(participant, type, topic, &layout);
+  };
   // Replies first: who finds the service by its requests may ask at once.
   auto replies = Endpoint::create(Endpoint::Kind::kWriter, *participant_, response,
-                                  reply_topic(*participant_, name), qos);
+                                  reply_topic(*participant_, name), qos, make);
   if (!replies) return std::unexpected(replies.error());
+  const ddsi_sertype* reply_layout = layout;
   auto requests = Endpoint::create(Endpoint::Kind::kReader, *participant_, request,
-                                   request_topic(*participant_, name), qos);
+                                   request_topic(*participant_, name), qos, make);
   if (!requests) return std::unexpected(requests.error());
   Entity waiting(dds_create_readcondition(requests->get(), DDS_ANY_STATE));
   if (!waiting.ok()) return std::unexpected(dds_error("wait for requests", waiting.get()));
-  services_.push_back(
-      std::make_unique<Service>(Service{id, std::move(*requests), std::move(*replies),
-                                        std::move(waiting), response_size, std::move(read)}));
+  services_.push_back(std::make_unique<Service>(
+      Service{id, std::move(*requests), std::move(*replies), std::move(waiting), &request,
+              &response, reply_layout, std::move(read)}));
   dds_waitset_attach(waitset_.get(), services_.back()->waiting.get(), 0);
   return {};
 }
@@ -106,22 +112,40 @@ void ServiceServer::receive() {
 
 /// Some of a service's requests, so that the others get their turn.
 void ServiceServer::take(Service& service) {
-  constexpr std::size_t kBatch = 8;
-  std::array<void*, kBatch> samples{};
+  constexpr std::uint32_t kBatch = 8;
+  std::array<ddsi_serdata*, kBatch> requests{};
   std::array<dds_sample_info_t, kBatch> infos{};
   const dds_return_t taken =
-      dds_take(service.requests.get(), samples.data(), infos.data(), kBatch, kBatch);
-  if (taken <= 0) return;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(taken); ++i) {
-    if (!infos[i].valid_data) continue;
-    Job job{.service = &service, .header = {}, .asker = infos[i].publication_handle, .answer = {}};
-    std::memcpy(&job.header, samples[i], sizeof job.header);
-    const Asker asker = participant_of(service.requests.get(), infos[i].publication_handle);
-    Work work = service.read(samples[i], asker);
-    job.answer = std::move(work.answer);
-    accept(std::move(job), work.at_once, work.takes_long);
+      dds_takecdr(service.requests.get(), requests.data(), kBatch, infos.data(), DDS_ANY_STATE);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(taken, 0)); ++i) {
+    if (infos[i].valid_data) take(service, requests[i], infos[i].publication_handle);
+    ddsi_serdata_unref(requests[i]);
   }
-  dds_return_loan(service.requests.get(), samples.data(), taken);
+}
+
+void ServiceServer::take(Service& service, const ddsi_serdata* request,
+                         dds_instance_handle_t asker) {
+  const auto free = [&service](void* sample) {
+    dds_sample_free(sample, service.request->descriptor, DDS_FREE_ALL);
+  };
+  const std::unique_ptr<void, decltype(free)> sample(
+      std::memset(dds_alloc(service.request->descriptor->m_size), 0,
+                  service.request->descriptor->m_size),
+      free);
+  if (!ddsi_serdata_to_sample(request, sample.get(), nullptr, nullptr)) {
+    const std::scoped_lock lock(mutex_);
+    ++counts_.malformed;
+    return;
+  }
+  Job job{.service = &service,
+          .header = {},
+          .call = fast_call_of(request),
+          .asker = asker,
+          .answer = {}};
+  std::memcpy(&job.header, sample.get(), sizeof job.header);
+  Work work = service.read(sample.get(), participant_of(service.requests.get(), asker));
+  job.answer = std::move(work.answer);
+  accept(std::move(job), work.at_once, work.takes_long);
 }
 
 void ServiceServer::accept(Job job, bool at_once, bool takes_long) {
@@ -159,11 +183,12 @@ void ServiceServer::work(Turn& turn) {
 
 void ServiceServer::answer(const Job& job) {
   Reply reply{.service = job.service,
+              .call = job.call,
               .asker = job.asker,
               .memory = {},
               .sample = nullptr,
               .until = SteadyClock::now() + kReplyPatience};
-  reply.sample = reply.memory.zeroed(job.service->reply_size);
+  reply.sample = reply.memory.zeroed(job.service->reply->descriptor->m_size);
   std::memcpy(reply.sample, &job.header, sizeof job.header);
   job.answer(reply.sample, reply.memory);
   if (send(reply)) return;
@@ -181,7 +206,10 @@ ServiceServer::Reach ServiceServer::reach(const Reply& reply) {
   const auto asker = matched_writer(reply.service->requests.get(), reply.asker);
   if (!asker) return Reach::kGone;
   for (const Peer& reader : matched_readers(reply.service->replies.get())) {
-    if (belong_together(*asker, reader, "clientid")) return Reach::kConnected;
+    if (reply.call ? std::ranges::equal(reader.endpoint.v, reply.call->client)
+                   : belong_together(*asker, reader, "clientid")) {
+      return Reach::kConnected;
+    }
   }
   return Reach::kNotYet;
 }
@@ -190,8 +218,9 @@ ServiceServer::Reach ServiceServer::reach(const Reply& reply) {
 bool ServiceServer::send(const Reply& reply) {
   const Reach found = reach(reply);
   if (found == Reach::kNotYet && SteadyClock::now() < reply.until) return false;
-  const bool sent = found != Reach::kGone &&
-                    dds_write(reply.service->replies.get(), reply.sample) == DDS_RETCODE_OK;
+  const bool sent =
+      found != Reach::kGone && write_reply(reply.service->replies.get(),
+                                           reply.service->reply_layout, reply.sample, reply.call);
   const std::scoped_lock lock(mutex_);
   ++(sent ? counts_.replies : counts_.unclaimed);
   return true;

@@ -19,6 +19,7 @@
 
 #include "base/result.hpp"
 #include "dds/service.hpp"
+#include "dds/service_layout.hpp"
 
 namespace tandem::dds {
 
@@ -69,6 +70,7 @@ class ServiceServer {
     std::uint64_t replies = 0;
     std::uint64_t dropped = 0;    ///< requests: too many waited
     std::uint64_t unclaimed = 0;  ///< replies: who asked is gone
+    std::uint64_t malformed = 0;  ///< requests that are none of their type; not among `requests`
   };
 
   /// The participant outlives it.
@@ -85,7 +87,7 @@ class ServiceServer {
   [[nodiscard]] Status add(
       const std::string& name,
       std::function<ServiceWork<Response>(const Request&, const Asker&)> read) {
-    return add(name, type<Request>(), type<Response>(), sizeof(Response),
+    return add(name, type<Request>(), type<Response>(),
                [read = std::move(read)](const void* request, const Asker& asker) -> Work {
                  ServiceWork<Response> work = read(*static_cast<const Request*>(request), asker);
                  return {work.at_once, work.takes_long,
@@ -109,17 +111,21 @@ class ServiceServer {
     std::string id;
     Endpoint requests, replies;
     Entity waiting;  // the condition of `requests`
-    std::size_t reply_size;
+    const Type* request;
+    const Type* reply;
+    const ddsi_sertype* reply_layout;
     Read read;
   };
   struct Job {
     Service* service;
     ServiceHeader header;
+    std::optional<FastCall> call;
     dds_instance_handle_t asker;  // the writer of the request
     std::function<void(void*, ReplyMemory&)> answer;
   };
   struct Reply {
     Service* service;
+    std::optional<FastCall> call;
     dds_instance_handle_t asker;
     ReplyMemory memory;
     void* sample;
@@ -134,9 +140,10 @@ class ServiceServer {
 
   explicit ServiceServer(Participant& participant) : participant_(&participant) {}
   [[nodiscard]] Status add(const std::string& name, const Type& request, const Type& response,
-                           std::size_t response_size, Read read);
+                           Read read);
   void receive();
   void take(Service& service);
+  void take(Service& service, const ddsi_serdata* request, dds_instance_handle_t asker);
   void accept(Job job, bool at_once, bool takes_long);
   void work(Turn& turn);
   void answer(const Job& job);

@@ -108,6 +108,7 @@ static void figures(Figures& f, const DdsResult& dds) {
   f("dropped", "cycles that were due but found no room in the ring", dds.counts.dropped);
   f("requests", "to its services", dds.services.requests);
   f("requests_dropped", "the queue was full", dds.services.dropped);
+  f("requests_malformed", "none of their type: not read, not answered", dds.services.malformed);
   f("replies", dds.services.replies);
   f("replies_unclaimed", "the client was gone", dds.services.unclaimed);
 }

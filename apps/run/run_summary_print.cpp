@@ -194,8 +194,10 @@ void add_output_facts(const RunSummary& summary, const Json& run, Facts& facts) 
   add_figures(facts, run, "DDS",
               "domain {dds.domain}: {dds.samples} samples, {dds.refused} refused; {dds.dropped} "
               "cycles dropped");
-  if (summary.dds && summary.dds->services.requests > 0)
-    add_figures(facts, run, "requests over DDS", "{dds.requests}, {dds.requests_dropped} dropped");
+  if (summary.dds && summary.dds->services.requests + summary.dds->services.malformed > 0)
+    add_figures(
+        facts, run, "requests over DDS",
+        "{dds.requests}, {dds.requests_dropped} dropped, {dds.requests_malformed} malformed");
 }
 
 /// What was expected, and how far it was from failing.

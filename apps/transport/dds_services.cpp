@@ -45,6 +45,7 @@ dds::ServiceServer::Counts DdsServices::counts() const {
   all.replies += stops.replies;
   all.dropped += stops.dropped;
   all.unclaimed += stops.unclaimed;
+  all.malformed += stops.malformed;
   return all;
 }
 

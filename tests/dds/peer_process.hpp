@@ -44,6 +44,16 @@ class PeerProcess {
 
   [[nodiscard]] pid_t pid() const { return pid_; }
 
+  /// Its next line of input.
+  void say(const std::string& line) const {
+    const std::string text = line + "\n";
+    for (std::size_t done = 0; done < text.size();) {
+      const ssize_t some = ::write(stdin_, text.data() + done, text.size() - done);
+      if (some <= 0) return;
+      done += static_cast<std::size_t>(some);
+    }
+  }
+
   /// The lines that it has printed since the last call.
   std::vector<std::string> lines() {
     std::array<char, 4096> some;

@@ -8,8 +8,10 @@
 #include <filesystem>
 
 #include "base/quoting.hpp"
+#include "dds/cdr.hpp"
 #include "dds/domain.hpp"
 #include "dds/raw_endpoint.hpp"
+#include "dds/service_layout.hpp"
 #include "tests/dds/raw_topic.hpp"
 #include "tests/support/dds_domain.hpp"
 #include "tests/support/eventually.hpp"
@@ -112,6 +114,40 @@ TEST_F(Security, LetsTwoWithCertificatesTalkAndNobodyElseHear) {
   EXPECT_FALSE(stranger.hears(2));
   EXPECT_FALSE(one.hears(3));
   EXPECT_FALSE(two.hears(3));
+}
+
+/// The replies to Fast DDS come from the same writer, and are the others' to ignore here as well.
+TEST_F(Security, CarriesRepliesOfServices) {
+  Member one(1, secured());
+  Member two(2, secured());
+  ASSERT_TRUE(one.participant.ok() && two.participant.ok());
+  const Type& replies = type<std_srvs::Trigger_Response>();
+  const ddsi_sertype* layout = nullptr;
+  const auto writer = RawEndpoint::create(
+      EndpointKind::kWriter, one.participant.get(), replies, "rr/resetReply", {},
+      [&layout](dds_entity_t participant, const Type& type, const char* name) {
+        return create_service_topic(participant, type, name, &layout);
+      });
+  const auto reader = RawEndpoint::create(EndpointKind::kReader, two.participant.get(), replies,
+                                          "rr/resetReply", {});
+  ASSERT_TRUE(writer && reader);
+  std::string text = "done";
+  const std_srvs::Trigger_Response reply{7, 8, true, text.data()};
+  std::vector<test::Bytes> heard;
+  EXPECT_TRUE(eventually([&] {
+    EXPECT_TRUE(write_reply(writer->entity.get(), layout, &reply,
+                            FastCall{.client = {1}, .sequence = 1, .parameter = 0x800f}));
+    EXPECT_TRUE(write_reply(writer->entity.get(), layout, &reply, std::nullopt));
+    for (test::Bytes& one_more : test::take_bytes(reader->entity.get())) {
+      heard.push_back(std::move(one_more));
+    }
+    return heard.size() >= 3;
+  }));
+  for (const test::Bytes& one_of_them : heard) {
+    const auto read = decode(*replies.tree, one_of_them);
+    ASSERT_TRUE(read) << "of the other layout";
+    EXPECT_EQ(std::get<std::string>(find(*read, "message")->of), text);
+  }
 }
 
 TEST_F(Security, WithACertificateOfAnotherAuthorityIsAStranger) {
