@@ -31,6 +31,7 @@ const char kExamples[] = R"(Examples:
   tandem model info config/coman/robot.toml          joints, mass, operation counts
   tandem doctor                                      is this machine fit for real time?
   tandem latency --load idle --duration 10           wake-up latency of this machine
+Robots and experiments that come with Tandem go by their names, too: `tandem run coman/squat`.
 `tandem COMMAND --help` shows more, with examples. `tandem help see` lists the commands of a task.
 Lines fit the terminal, or $COLUMNS; with $NO_COLOR there are no colours.
 
@@ -50,10 +51,6 @@ std::vector<std::string> flags_of(const CLI::App& app) {
     for (const std::string& name : option->get_lnames()) flags.push_back("--" + name);
   }
   return flags;
-}
-
-std::vector<const CLI::App*> all_subcommands(const CLI::App& app) {
-  return app.get_subcommands([](const CLI::App*) { return true; });
 }
 
 std::vector<std::string> subcommands_of(const CLI::App& app) {
@@ -79,12 +76,6 @@ bool has_its_argument(const CLI::App& app) {
   const auto options = app.get_options(
       [](const CLI::Option* option) { return option->get_positional() && !option->empty(); });
   return !options.empty();
-}
-
-/// "tandem model build": as typed, for the pointer to its help.
-std::string path_of(const CLI::App& app) {
-  const CLI::App* parent = app.get_parent();
-  return parent == nullptr ? app.get_name() : path_of(*parent) + " " + app.get_name();
 }
 
 /// "LOG, OTHER": the arguments that are no flags, as the help names them.
@@ -155,6 +146,19 @@ void refuse_not_finite(const CLI::App& app) {
     }
   }
   for (const CLI::App* command : app.get_subcommands()) refuse_not_finite(*command);
+}
+
+/// @throw CLI::ValidationError  of the first option that should be a file or a bundled name
+void refuse_unknown_names(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    const std::optional<Bundled> kind = bundled_kind(*option);
+    if (!kind) continue;
+    for (const std::string& text : option->results()) {
+      const Result<std::string> file = named_file(text, *kind);
+      if (!file) throw CLI::ValidationError(option->get_name(), file.error().to_string());
+    }
+  }
+  for (const CLI::App* command : app.get_subcommands()) refuse_unknown_names(*command);
 }
 
 /// The subcommands with their options; the one that was named, once the line is parsed.
@@ -269,6 +273,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   try {
     app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // as CLI11 wants them
     refuse_not_finite(app);
+    refuse_unknown_names(app);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) return report_usage_error(app, error);
     if (const auto unknown = check_commands(app, words)) return *unknown;
