@@ -10,7 +10,9 @@
 #include <memory>
 
 #include "apps/command_line/command_flags.hpp"
+#include "apps/command_line/completion.hpp"
 #include "apps/command_line/help_text.hpp"
+#include "apps/command_line/man_page.hpp"
 #include "apps/text/console.hpp"
 #include "base/nearest.hpp"
 
@@ -261,8 +263,18 @@ Command parse_command_line(int argc, const char* const* argv) {
   Subcommands commands(app);
   add_all(commands);
   std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  if (!words.empty() && words.front() == kComplete) {
+    words.erase(words.begin());
+    fmt::print("{}", to_lines(completions(app, words)));
+    return Exit::kDone;
+  }
   if (!words.empty() && words.front() == "help") {
     words.erase(words.begin());
+    if (words.size() == 2 && words.front() == "--man") {
+      const Status written = write_man_pages(app, words.back());
+      if (!written) print_errors({written.error()});
+      return written ? Exit::kDone : Exit::kUsage;
+    }
     const auto task = words.size() == 1 ? task_named(words.front()) : std::nullopt;
     if (task && std::ranges::count(subcommands_of(app), to_string(*task)) == 0) {
       fmt::print("{}", help_of_task(app, *task));
