@@ -4,6 +4,7 @@
 #include <cmath>
 #include <initializer_list>
 
+#include "base/bundled_files.hpp"
 #include "python/arrays.hpp"
 #include "robot/kernel_supply.hpp"
 
@@ -248,7 +249,9 @@ class Kernels {
                                                                   bool derivatives, bool build,
                                                                   const std::string& variant) {
     const std::scoped_lock alone(reading());
-    auto robot = robot::read_robot(file);
+    const Result<std::string> named = named_file(file, Bundled::kRobot);
+    if (!named) return std::unexpected(Diagnostics{named.error()});
+    auto robot = robot::read_robot(*named);
     if (!robot) return std::unexpected(robot.error());
     const bool declared =
         std::exchange(robot->spec.derivatives, robot->spec.derivatives || derivatives);
@@ -260,7 +263,7 @@ class Kernels {
           {.message = "there are no kernels of '" + robot->config.name + "' with derivatives",
            .hint = "let Model build them once (build=True), or write `derivatives = true` into "
                    "[model] of robot.toml, then: tandem model build",
-           .file = file,
+           .file = *named,
            .key = {}}});
     }
     if (!library) return std::unexpected(Diagnostics{library.error()});

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "base/bundled_files.hpp"
 #include "base/counted.hpp"
 #include "base/crash_signals.hpp"
 #include "hal/config/capabilities.hpp"
@@ -82,9 +83,10 @@ void Running::check_going(const char* what) const {
             .error());
 }
 
-Running::Running(const std::string& file, runtime::Overrides overrides, const std::string& all,
+Running::Running(const std::string& given, runtime::Overrides overrides, const std::string& all,
                  const Control& some, const std::string& log) {
   if (is_backend(overrides.hal)) refuse_place({});
+  const std::string file = take(named_file(given, Bundled::kExperiment));
   using Last = std::function<void(const char*)>;
   scene_ = std::make_unique<runtime::CrashScene>(
       log.empty() ? Last() : [this](const char* what) { end_log_by(what); });

@@ -32,7 +32,7 @@ class Running {
   /// @param log   its folder, or a new NAME.mcap; empty: nothing is logged
   /// Errors: compose()'s; a robot that is not simulated in this process; an unknown joint or mode;
   /// open_log()'s.
-  Running(const std::string& file, runtime::Overrides overrides, const std::string& all,
+  Running(const std::string& given, runtime::Overrides overrides, const std::string& all,
           const Control& some, const std::string& log);
   ~Running();
   Running(const Running&) = delete;

@@ -1,16 +1,18 @@
-# Completion of `tandem` in bash: `source scripts/completion.bash`. Commands and flags are what
-# `tandem … --help` lists.
+# Completion of `tandem` in bash: `source scripts/completion.bash`. The program itself answers what
+# may stand there: `tandem __complete WORD…`.
 _tandem() {
-  local word words=()
-  for word in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do
-    [[ $word == -* ]] && break
-    words+=("$word")
+  local word words=() line found=() files=no
+  for word in "${COMP_WORDS[@]:1:COMP_CWORD}"; do
+    [ "$word" = = ] || words+=("$word")  # bash takes --hal=sim for three words
   done
-  local known
-  known=$("${COMP_WORDS[0]}" "${words[@]}" --help 2>/dev/null | awk '
-    /^[A-Z].*:$/ { part = /^Subcommands|`tandem help/ ? "Subcommands:" : $1 }
-    part == "Subcommands:" && /^  [a-z]/ { print $1 }
-    part == "Options:" && /^  -/ { sub(/^.*--/, "--", $1); print $1 }')
-  mapfile -t COMPREPLY < <(compgen -W "$known" -- "${COMP_WORDS[COMP_CWORD]}")
+  [ "${COMP_WORDS[COMP_CWORD]}" != = ] || words+=('')
+  while IFS= read -r line; do
+    if [ "$line" = :files ]; then files=yes; else found+=("${line%%$'\t'*}"); fi
+  done < <("${COMP_WORDS[0]/#\~/$HOME}" __complete "${words[@]}" 2> /dev/null)
+  if [ $files = yes ]; then
+    compopt -o filenames 2> /dev/null  # outside of a completion there is none to tell
+    while IFS= read -r line; do found+=("$line"); done < <(compgen -f -- "${words[-1]}")
+  fi
+  COMPREPLY=(${found[@]+"${found[@]}"})
 }
-complete -o default -F _tandem tandem
+complete -F _tandem tandem

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "apps/robot/bundled.hpp"
 #include "apps/robot/kernel_build.hpp"
+#include "base/bundled_files.hpp"
 #include "hal/sim/setup.hpp"
 #include "model/urdf.hpp"
 
@@ -139,8 +139,8 @@ Result<BenchRobot> make_flyer(double gravity_m_s2) {
 }
 
 Result<std::string> bundled_folder(const std::string& robot) {
-  const auto file = bundled_robot(robot);
-  if (!file.empty()) return file.parent_path().string();
+  const auto file = named_file(robot, Bundled::kRobot);
+  if (file) return std::filesystem::path(*file).parent_path().string();
   return fail("the bundled robot '" + robot + "' is not found",
               "run it in the project's folder, or install Tandem whole");
 }

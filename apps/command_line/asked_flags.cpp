@@ -213,7 +213,8 @@ CLI::Option* add_key(CLI::App& app, const ControlKey& key, Json& given) {
   if (key.unit != ControlKey::Unit::kNone || key.type == Type::kText) {
     CLI::Option* text = app.add_option_function<std::string>(key.line, put, doc)
                             ->check(is_given("give a value, or leave it out"));
-    return key.unit == ControlKey::Unit::kNone ? text->check(fits(key)) : text;
+    return key.unit == ControlKey::Unit::kNone ? text->check(is_one_of(key.choices, fits(key)))
+                                               : text;
   }
   if (key.type == Type::kInteger) {
     return app.add_option_function<std::int64_t>(key.line, put, doc)->check(fits(key));

@@ -1,7 +1,5 @@
 #include "apps/command_line/command_flags.hpp"
 
-#include <charconv>
-#include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
@@ -149,44 +147,6 @@ CLI::Validator a_run_length() {
   return {check, "above 0, to 1e6, or endless"};
 }
 
-/// Number that the whole of `text` is; CLI11's own cast lets a number overflow.
-std::optional<std::int64_t> whole_number(const std::string& text) {
-  std::int64_t number = 0;
-  const char* end = text.data() + text.size();
-  const auto [last, error] = std::from_chars(text.data(), end, number);
-  return error == std::errc() && last == end ? std::optional(number) : std::nullopt;
-}
-
-/// Memory, as "512MB" or "0.5GB"; the text becomes its number of bytes.
-CLI::Validator a_memory_size() {
-  const auto read = [](std::string& text) -> std::string {
-    constexpr double kMost = 1e12;
-    double number = -1.0;
-    const char* end = text.data() + text.size();
-    const auto [last, error] = std::from_chars(text.data(), end, number);
-    const std::string unit = CLI::detail::to_lower(CLI::detail::trim_copy({last, end}));
-    double bytes = std::numeric_limits<double>::quiet_NaN();
-    for (const auto& [name, size] : {std::pair{"", 1.0},
-                                     {"b", 1.0},
-                                     {"kb", 1e3},
-                                     {"mb", 1e6},
-                                     {"gb", 1e9},
-                                     {"kib", 1024.0},
-                                     {"mib", 1048576.0},
-                                     {"gib", 1073741824.0}}) {
-      if (unit == name) bytes = number * size;
-    }
-    if (error != std::errc() || !(bytes >= 0.0 && bytes <= kMost)) {
-      return "'" + text +
-             "' is no memory: give 0, or a number with kB, MB or GB, as 512MB or "
-             "0.5GB, up to 1000GB";
-    }
-    text = std::to_string(std::llround(bytes));
-    return "";
-  };
-  return {read, "0, 512MB, 0.5GB"};
-}
-
 /// --set, as often as one likes.
 void add_settings(CLI::App& app, std::vector<TomlSetting>& settings) {
   const auto check = [](const std::string& text) -> std::string {
@@ -227,7 +187,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--record-frames", o.record_frames,
                  "CAN: write every frame to this file, as candump -L does");
-  app.add_option("--scenario", o.scenario, kScenarioHelp);
+  app.add_option("--scenario", o.scenario, kScenarioHelp)->transform(a_bundled(Bundled::kScenario));
   CLI::Option* log = app.add_option(
       "--log", o.log_folder,
       "Folder of the log, instead of the experiment's (else runs, below the current folder)");
@@ -272,39 +232,6 @@ CLI::Option* add_place(CLI::App& app, DdsPlace& place, CLI::Option* dds) {
   return from;
 }
 
-CLI::Validator is_seed() {
-  const auto check = [](const std::string& text) -> std::string {
-    if (whole_number(text).value_or(-1) >= 0) return "";
-    return "'" + text + "' is no whole number from 0 to 9223372036854775807";
-  };
-  return {check, "0 to 9223372036854775807"};
-}
-
-CLI::Validator a_duration() {
-  const auto check = [](const std::string& text) -> std::string {
-    double duration_s = 0.0;
-    const bool number = CLI::detail::lexical_cast(text, duration_s);
-    if (number && duration_s > 0.0 && duration_s <= 1e6) return "";
-    return "'" + text + "' is no number of seconds above 0, and up to 1000000";
-  };
-  return {check, "above 0, to 1e6"};
-}
-
-CLI::Validator is_count() {
-  const auto check = [](const std::string& text) -> std::string {
-    if (whole_number(text).value_or(0) > 0) return "";
-    return "'" + text + "' is no whole number above 0";
-  };
-  return {check, "1 or more"};
-}
-
-CLI::Validator is_given(const std::string& hint) {
-  const auto check = [hint](const std::string& text) -> std::string {
-    return text.empty() ? "is empty (" + hint + ")" : "";
-  };
-  return {check, ""};
-}
-
 void add_target(CLI::App& app, ControlTarget& target) {
   CLI::Option* socket = app.add_option("--socket", target.socket, kAskedSocketHelp);
   CLI::Option* dds =
@@ -319,7 +246,9 @@ void add_target(CLI::App& app, ControlTarget& target) {
 }
 
 void add_flags(CLI::App& app, RunOptions& o) {
-  app.add_option("experiment", o.experiment, "Experiment TOML")->required();
+  app.add_option("experiment", o.experiment, "Experiment: its TOML, or the name of a bundled one")
+      ->required()
+      ->transform(a_bundled(Bundled::kExperiment));
   add_loop_flags(app, o);
   const auto run_for = [&o](const std::string& text) {
     double seconds = std::numeric_limits<double>::infinity();  // which no number may be
@@ -366,7 +295,9 @@ void add_flags(CLI::App& app, RunOptions& o) {
 }
 
 void add_flags(CLI::App& app, ServeOptions& o) {
-  app.add_option("file", o.run.experiment, "Experiment or robot TOML")->required();
+  app.add_option("file", o.run.experiment, "Experiment or robot: its TOML, or a bundled name")
+      ->required()
+      ->transform(a_bundled(Bundled::kRobotOrExperiment));
   add_loop_flags(app, o.run);
   app.add_option("--hal", o.run.hal,
                  "Backend: where the robot is (default: the experiment's, or sim)")
@@ -383,9 +314,11 @@ void add_flags(CLI::App& app, AskOptions& o) {
 }
 
 void add_flags(CLI::App& app, EmulateOptions& o) {
-  app.add_option("file", o.file, "Robot or experiment TOML")->required();
+  app.add_option("file", o.file, "Robot or experiment: its TOML, or a bundled name")
+      ->required()
+      ->transform(a_bundled(Bundled::kRobotOrExperiment));
   app.add_flag("--lockstep", o.lockstep, "One step per SYNC, independent of the wall clock");
-  app.add_option("--scenario", o.scenario, kScenarioHelp);
+  app.add_option("--scenario", o.scenario, kScenarioHelp)->transform(a_bundled(Bundled::kScenario));
   app.add_option("--posture", o.posture,
                  "Start posture (default: the experiment's, or the robot's first)");
   app.add_option("--seed", o.seed, "Seed of noise (default: the experiment's, or 1)")
@@ -406,7 +339,9 @@ void add_flags(CLI::App& app, EmulateOptions& o) {
 }
 
 void add_flags(CLI::App& app, CheckOptions& o) {
-  app.add_option("file", o.file, "Experiment or robot TOML")->required();
+  app.add_option("file", o.file, "Experiment or robot: its TOML, or a bundled name")
+      ->required()
+      ->transform(a_bundled(Bundled::kRobotOrExperiment));
   app.add_flag("--bus", o.bus, "Show the load of every bus (a robot's: at 1 kHz)");
   app.add_flag("--repair", o.repair, "Read a robot as if it said inertia = \"repair\" in [model]");
   add_settings(app, o.settings);
@@ -415,7 +350,10 @@ void add_flags(CLI::App& app, CheckOptions& o) {
 }
 
 void add_flags(CLI::App& app, TestOptions& o) {
-  app.add_option("paths", o.paths, "Experiments with [[expect]], or folders of them")->required();
+  app.add_option("paths", o.paths,
+                 "Experiments with [[expect]], or folders of them; or bundled names")
+      ->required()
+      ->transform(a_bundled(Bundled::kTests));
   app.add_option("--jobs,-j", o.jobs, "Experiments at once (default: one for each core)")
       ->check(is_count());
   app.add_option("--timeout", o.timeout_s, "End one that takes longer [s, 300]")
@@ -431,8 +369,10 @@ void add_flags(CLI::App& app, ControllerCheckOptions& o) {
   app.add_option("plugin", o.plugin, "Shared library of the controller")->required();
   CLI::Option* experiment =
       app.add_option("--experiment", o.experiment, "Experiment that has it among its controllers")
+          ->transform(a_bundled(Bundled::kExperiment))
           ->check(is_given("name an experiment, or leave it out"));
   app.add_option("--robot", o.robot, "A bundled robot, or a robot.toml (default: double_pendulum)")
+      ->transform(a_bundled(Bundled::kRobot))
       ->check(is_given("name a robot, or leave it out"))
       ->excludes(experiment);
   app.add_option("--set", o.set, "One of its parameters, KEY = VALUE as in TOML")
@@ -449,13 +389,15 @@ void add_flags(CLI::App& app, ModelOptions& o) {
   app.require_subcommand(1);
   app.footer(kModelExamples);
   CLI::App* build = app.add_subcommand("build", "Generate and compile a robot's kernels");
-  build->add_option("robot", o.robot, "Robot TOML")->required();
+  build->add_option("robot", o.robot, kRobotHelp)
+      ->required()
+      ->transform(a_bundled(Bundled::kRobot));
   build->add_option("-o,--output", o.output, "Shared library to write");
   build->add_flag("--force", o.force, "Build even when the library is up to date");
   build->footer(kModelBuildExamples);
   build->callback([&o] { o.action = ModelOptions::Action::kBuild; });
   CLI::App* info = app.add_subcommand("info", "Joints, mass, operation counts and sizes");
-  info->add_option("robot", o.robot, "Robot TOML")->required();
+  info->add_option("robot", o.robot, kRobotHelp)->required()->transform(a_bundled(Bundled::kRobot));
   info->add_option("--kernel-variant", o.kernel_variant, "baseline, x86-64-v3, …");
   info->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   info->footer(kModelInfoExamples);
@@ -477,7 +419,8 @@ void add_flags(CLI::App& app, NewOptions& o) {
       ->check(CLI::Range(1.0, 3e4));
   CLI::Option* like =
       app.add_option("--like", o.like,
-                     "Series elastic drives in proportion to this robot's: its name or robot.toml");
+                     "Series elastic drives in proportion to this robot's: its name or robot.toml")
+          ->check(a_bundled(Bundled::kRobot));
   app.add_flag("--dynamics", o.dynamics,
                "Put damping and friction of the URDF's <dynamics> into the drives")
       ->excludes(like);
@@ -493,6 +436,7 @@ void add_flags(CLI::App& app, ControllerNewOptions& o) {
   app.add_option("name", o.name, "Of the controller: a class and files are called so")->required();
   app.add_option("--robot", o.robot, "Robot that it moves: a bundled one, or a robot.toml")
       ->capture_default_str()
+      ->transform(a_bundled(Bundled::kRobot))
       ->check(is_given("name a robot"));
   app.add_option("-o,--output", o.output, "Folder to write (default: the name)")
       ->check(is_given("name a folder"));
@@ -500,7 +444,9 @@ void add_flags(CLI::App& app, ControllerNewOptions& o) {
 }
 
 void add_flags(CLI::App& app, EdsOptions& o) {
-  CLI::Option* robot = app.add_option("robot", o.robot, "Robot TOML, needed without `show`");
+  CLI::Option* robot =
+      app.add_option("robot", o.robot, "Robot: its TOML, or a bundled name; needed without `show`")
+          ->transform(a_bundled(Bundled::kRobot));
   CLI::Option* output = app.add_option("-o,--output", o.output, "Folder to write (default: eds)");
   CLI::Option* json = app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kEdsExamples);
@@ -549,7 +495,9 @@ void add_flags(CLI::App& app, LatencyOptions& o) {
 
 void add_flags(CLI::App& app, DoctorOptions& o) {
   app.add_option("robot", o.robot,
-                 "Robot TOML, to look at the interfaces of its buses and its EtherCAT slaves");
+                 "Robot, to look at the interfaces of its buses and its EtherCAT slaves: its TOML, "
+                 "or a bundled name")
+      ->transform(a_bundled(Bundled::kRobot));
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--fix", o.fix,
                  "New folder for what is advised as files, with how to install and to undo each; "

@@ -3,8 +3,12 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "apps/command_line/command_line.hpp"
+#include "base/bundled_files.hpp"
 
 namespace tandem::apps {
 
@@ -16,8 +20,20 @@ inline constexpr char kSocketHelp[] =
 inline constexpr char kAskedSocketHelp[] =
     "Control socket of the run to ask (default: the only one of this user, wherever it is)";
 
+inline constexpr char kRobotHelp[] = "Robot: its TOML, or the name of a bundled one";
+
 inline constexpr char kNameAFile[] = "name a file, or leave it out";
 
+/// An option that is a file, or the name of a bundled one (base/bundled_files.hpp): it becomes the
+/// file's path. What is neither is refused after all other checks, by parse_command_line().
+[[nodiscard]] CLI::Validator a_bundled(Bundled kind);
+/// `check`, of an option that takes these alone: completion offers them. None: any.
+[[nodiscard]] CLI::Validator is_one_of(const std::vector<std::string>& choices,
+                                       CLI::Validator check);
+/// The choices of an option, by is_one_of() or CLI::IsMember; empty: any value.
+[[nodiscard]] std::vector<std::string> choices_of(const CLI::Option& option);
+/// What the names of this option are for; empty: it has no a_bundled().
+[[nodiscard]] std::optional<Bundled> bundled_kind(const CLI::Option& option);
 /// Check that an option's text is not empty.
 /// @param hint  what to give, or to leave out
 [[nodiscard]] CLI::Validator is_given(const std::string& hint);
@@ -25,6 +41,8 @@ inline constexpr char kNameAFile[] = "name a file, or leave it out";
 [[nodiscard]] CLI::Validator is_seed();
 /// Check that an option is a duration in seconds, above 0.
 [[nodiscard]] CLI::Validator a_duration();
+/// Memory, as "512MB" or "0.5GB"; the text becomes its number of bytes.
+[[nodiscard]] CLI::Validator a_memory_size();
 /// Check that an option is a whole number above 0.
 [[nodiscard]] CLI::Validator is_count();
 

@@ -10,7 +10,9 @@
 #include <memory>
 
 #include "apps/command_line/command_flags.hpp"
+#include "apps/command_line/completion.hpp"
 #include "apps/command_line/help_text.hpp"
+#include "apps/command_line/man_page.hpp"
 #include "apps/text/console.hpp"
 #include "base/nearest.hpp"
 
@@ -31,6 +33,7 @@ const char kExamples[] = R"(Examples:
   tandem model info config/coman/robot.toml          joints, mass, operation counts
   tandem doctor                                      is this machine fit for real time?
   tandem latency --load idle --duration 10           wake-up latency of this machine
+Robots and experiments that come with Tandem go by their names, too: `tandem run coman/squat`.
 `tandem COMMAND --help` shows more, with examples. `tandem help see` lists the commands of a task.
 Lines fit the terminal, or $COLUMNS; with $NO_COLOR there are no colours.
 
@@ -50,10 +53,6 @@ std::vector<std::string> flags_of(const CLI::App& app) {
     for (const std::string& name : option->get_lnames()) flags.push_back("--" + name);
   }
   return flags;
-}
-
-std::vector<const CLI::App*> all_subcommands(const CLI::App& app) {
-  return app.get_subcommands([](const CLI::App*) { return true; });
 }
 
 std::vector<std::string> subcommands_of(const CLI::App& app) {
@@ -79,12 +78,6 @@ bool has_its_argument(const CLI::App& app) {
   const auto options = app.get_options(
       [](const CLI::Option* option) { return option->get_positional() && !option->empty(); });
   return !options.empty();
-}
-
-/// "tandem model build": as typed, for the pointer to its help.
-std::string path_of(const CLI::App& app) {
-  const CLI::App* parent = app.get_parent();
-  return parent == nullptr ? app.get_name() : path_of(*parent) + " " + app.get_name();
 }
 
 /// "LOG, OTHER": the arguments that are no flags, as the help names them.
@@ -155,6 +148,19 @@ void refuse_not_finite(const CLI::App& app) {
     }
   }
   for (const CLI::App* command : app.get_subcommands()) refuse_not_finite(*command);
+}
+
+/// @throw CLI::ValidationError  of the first option that should be a file or a bundled name
+void refuse_unknown_names(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    const std::optional<Bundled> kind = bundled_kind(*option);
+    if (!kind) continue;
+    for (const std::string& text : option->results()) {
+      const Result<std::string> file = named_file(text, *kind);
+      if (!file) throw CLI::ValidationError(option->get_name(), file.error().to_string());
+    }
+  }
+  for (const CLI::App* command : app.get_subcommands()) refuse_unknown_names(*command);
 }
 
 /// The subcommands with their options; the one that was named, once the line is parsed.
@@ -257,8 +263,18 @@ Command parse_command_line(int argc, const char* const* argv) {
   Subcommands commands(app);
   add_all(commands);
   std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  if (!words.empty() && words.front() == kComplete) {
+    words.erase(words.begin());
+    fmt::print("{}", to_lines(completions(app, words)));
+    return Exit::kDone;
+  }
   if (!words.empty() && words.front() == "help") {
     words.erase(words.begin());
+    if (words.size() == 2 && words.front() == "--man") {
+      const Status written = write_man_pages(app, words.back());
+      if (!written) print_errors({written.error()});
+      return written ? Exit::kDone : Exit::kUsage;
+    }
     const auto task = words.size() == 1 ? task_named(words.front()) : std::nullopt;
     if (task && std::ranges::count(subcommands_of(app), to_string(*task)) == 0) {
       fmt::print("{}", help_of_task(app, *task));
@@ -269,6 +285,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   try {
     app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // as CLI11 wants them
     refuse_not_finite(app);
+    refuse_unknown_names(app);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) return report_usage_error(app, error);
     if (const auto unknown = check_commands(app, words)) return *unknown;

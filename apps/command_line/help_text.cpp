@@ -72,36 +72,6 @@ std::string entry(const std::string& name, const std::string& doc) {
   return "  " + left(name, column - 2) + text.substr(column);
 }
 
-/// An example and what it does; or prose.
-struct Part {
-  std::string text;
-  std::string comment;
-  bool example = false;
-};
-
-/// The parts of a footer.
-std::vector<Part> parts_of(const std::string& footer) {
-  std::vector<Part> parts;
-  std::istringstream lines(footer);
-  for (std::string one; std::getline(lines, one);) {
-    const std::size_t indent = std::min(one.find_first_not_of(' '), one.size());
-    const std::string text = one.substr(indent);
-    if (indent >= kComment && !parts.empty() && parts.back().example) {
-      parts.back().comment += (parts.back().comment.empty() ? "" : " ") + text;
-    } else if (indent > 0) {
-      const std::size_t gap = std::min(text.find("  "), text.size());
-      const std::size_t comment = std::min(text.find_first_not_of(' ', gap), text.size());
-      parts.push_back({text.substr(0, gap), text.substr(comment), true});
-    } else if (!text.empty() && !parts.empty() && !parts.back().example &&
-               !parts.back().text.empty() && !parts.back().text.ends_with(':')) {
-      parts.back().text += " " + text;
-    } else {
-      parts.push_back({text, {}, false});
-    }
-  }
-  return parts;
-}
-
 /// A command in lines that a shell takes together: none ends within quotes, or behind a flag.
 std::string command_lines(std::string command) {
   constexpr char kKept = '\1';
@@ -126,7 +96,39 @@ std::string command_lines(std::string command) {
   return lines + "\n";
 }
 
-/// The other commands of the task that has this command's name.
+}  // namespace
+
+std::vector<FooterPart> parts_of(const std::string& footer) {
+  std::vector<FooterPart> parts;
+  std::istringstream lines(footer);
+  for (std::string one; std::getline(lines, one);) {
+    const std::size_t indent = std::min(one.find_first_not_of(' '), one.size());
+    const std::string text = one.substr(indent);
+    if (indent >= kComment && !parts.empty() && parts.back().example) {
+      parts.back().comment += (parts.back().comment.empty() ? "" : " ") + text;
+    } else if (indent > 0) {
+      const std::size_t gap = std::min(text.find("  "), text.size());
+      const std::size_t comment = std::min(text.find_first_not_of(' ', gap), text.size());
+      parts.push_back({text.substr(0, gap), text.substr(comment), true});
+    } else if (!text.empty() && !parts.empty() && !parts.back().example &&
+               !parts.back().text.empty() && !parts.back().text.ends_with(':')) {
+      parts.back().text += " " + text;
+    } else {
+      parts.push_back({text, {}, false});
+    }
+  }
+  return parts;
+}
+
+std::vector<const CLI::App*> all_subcommands(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App*) { return true; });
+}
+
+std::string path_of(const CLI::App& app) {
+  const CLI::App* parent = app.get_parent();
+  return parent == nullptr ? app.get_name() : path_of(*parent) + " " + app.get_name();
+}
+
 std::string see_also(const CLI::App& app) {
   const CLI::App* parent = app.get_parent();
   const std::optional<Task> task = parent == nullptr ? std::nullopt : task_named(app.get_name());
@@ -139,9 +141,9 @@ std::string see_also(const CLI::App& app) {
   return fmt::format("{}: also {}.", kTasks[static_cast<std::size_t>(*task)].doc, others);
 }
 
-}  // namespace
-
 const char* to_string(Task task) { return kTasks[static_cast<std::size_t>(task)].word; }
+
+const char* title_of(Task task) { return kTasks[static_cast<std::size_t>(task)].doc; }
 
 std::optional<Task> task_named(const std::string& word) {
   const auto* const found =
@@ -183,26 +185,31 @@ std::string HelpText::make_subcommand(const CLI::App* sub) const {
   return entry(sub->get_display_name(true), sub->get_description());
 }
 
-std::string HelpText::make_option(const CLI::Option* option, bool is_positional) const {
-  std::string name = make_option_name(option, is_positional);
-  if (!option->get_option_text().empty()) {
-    name += " " + option->get_option_text();
-  } else if (option->get_type_size() != 0) {
-    if (!option->get_type_name().empty()) name += " " + option->get_type_name();
-    if (!option->get_default_str().empty()) name += "=" + option->get_default_str();
-    if (option->get_expected_max() == CLI::detail::expected_max_vector_size) name += " ...";
-    if (option->get_required()) name += " REQUIRED";
+OptionText HelpText::text_of(const CLI::Option& option, bool is_positional) const {
+  std::string name = make_option_name(&option, is_positional);
+  if (!option.get_option_text().empty()) {
+    name += " " + option.get_option_text();
+  } else if (option.get_type_size() != 0) {
+    if (!option.get_type_name().empty()) name += " " + option.get_type_name();
+    if (!option.get_default_str().empty()) name += "=" + option.get_default_str();
+    if (option.get_expected_max() == CLI::detail::expected_max_vector_size) name += " ...";
+    if (option.get_required()) name += " REQUIRED";
   }
-  std::string doc = make_option_desc(option);
+  std::string doc = make_option_desc(&option);
   const auto add = [&doc](const char* words, const std::set<CLI::Option*>& others) {
     std::string names;
     for (const CLI::Option* other : others)
       names += (names.empty() ? "" : ", ") + other->get_name();
     if (!names.empty()) doc += fmt::format(" ({} {})", words, names);
   };
-  add("with", option->get_needs());
-  add("not with", option->get_excludes());
-  return entry(name, doc);
+  add("with", option.get_needs());
+  add("not with", option.get_excludes());
+  return {std::move(name), std::move(doc)};
+}
+
+std::string HelpText::make_option(const CLI::Option* option, bool is_positional) const {
+  const OptionText text = text_of(*option, is_positional);
+  return entry(text.name, text.doc);
 }
 
 std::string HelpText::make_footer(const CLI::App* app) const {
@@ -215,7 +222,7 @@ std::string HelpText::make_footer(const CLI::App* app) const {
   for (std::string one; std::getline(lines, one);) fits = fits && columns_of(one) <= line();
   if (fits) return footer + "\n";
   std::string text;
-  for (const Part& part : parts_of(footer)) {
+  for (const FooterPart& part : parts_of(footer)) {
     if (!part.example) {
       text += part.text.empty() ? "\n" : block(part.text, 0);
       continue;

@@ -86,7 +86,9 @@ The experiment is an ordinary one: `tandem check excite.toml`, `tandem run excit
 
 void add_replay_flags(CLI::App& replay, LogOptions& o) {
   replay.add_option("log", o.log, "MCAP file, of a run or of `tandem log import`")->required();
-  replay.add_option("--robot", o.robot, "The robot that plays it: its TOML")->required();
+  replay.add_option("--robot", o.robot, "The robot that plays it: its TOML, or a bundled name")
+      ->required()
+      ->transform(a_bundled(Bundled::kRobot));
   replay.add_option("--out", o.output, "Experiment to write")
       ->required()
       ->check(is_given(kNameAFile));
@@ -148,7 +150,9 @@ void add_thresholds_flags(CLI::App& thresholds, LogOptions& o) {
 void add_import_flags(CLI::App& taken, LogOptions& o) {
   taken.add_option("files", o.files, "CSV tables side by side, or MCAP bags one after another")
       ->required();
-  taken.add_option("--robot", o.robot, "The robot that was recorded: its TOML")->required();
+  taken.add_option("--robot", o.robot, "The robot that was recorded: its TOML, or a bundled name")
+      ->required()
+      ->transform(a_bundled(Bundled::kRobot));
   taken.add_option("--map", o.map, "TOML that says what columns or topics mean")->required();
   taken.add_option("-o,--output", o.output, "Log to write (default: runs/ROBOT-FILE.mcap)")
       ->check(is_given(kNameAFile));
@@ -205,8 +209,10 @@ void add_flags(CLI::App& app, ReportOptions& o) {
 
 void add_flags(CLI::App& app, IdentifyOptions& o) {
   app.add_option("logs", o.logs, "MCAP files of the same robot")->required();
-  app.add_option("--robot", o.robot, "Robot TOML to start from; its joints are the logs'")
-      ->required();
+  app.add_option("--robot", o.robot,
+                 "Robot to start from, whose joints are the logs': its TOML, or a bundled name")
+      ->required()
+      ->transform(a_bundled(Bundled::kRobot));
   app.add_option("--out", o.output, "Folder to write")
       ->required()
       ->check(is_given("name a folder"));
@@ -217,7 +223,7 @@ void add_flags(CLI::App& app, IdentifyOptions& o) {
 }
 
 void add_flags(CLI::App& app, ExciteOptions& o) {
-  app.add_option("robot", o.robot, "Robot TOML")->required();
+  app.add_option("robot", o.robot, kRobotHelp)->required()->transform(a_bundled(Bundled::kRobot));
   app.add_option("--out", o.output, "Experiment to write")->required()->check(is_given(kNameAFile));
   app.add_option("--posture", o.posture, "Start posture (default: the robot's first, or all at 0)");
   app.add_option("--joints", o.joints,

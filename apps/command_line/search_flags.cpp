@@ -51,7 +51,9 @@ void add_runs(CLI::App& app, Options& o, const std::string& which) {
 }  // namespace
 
 void add_flags(CLI::App& app, ShrinkOptions& o) {
-  app.add_option("scenario", o.scenario, "Experiment that fails an expectation")->required();
+  app.add_option("scenario", o.scenario, "Experiment that fails an expectation")
+      ->required()
+      ->transform(a_bundled(Bundled::kExperiment));
   app.add_option("-o,--output", o.output, "The smaller one (default: NAME.small.toml, here)")
       ->check(is_given(kNameAFile));
   app.add_option("--timeout", o.timeout_s, "End a run that takes longer [s, 300]")
@@ -61,7 +63,9 @@ void add_flags(CLI::App& app, ShrinkOptions& o) {
 }
 
 void add_flags(CLI::App& app, SearchOptions& o) {
-  app.add_option("study", o.study, "Study: what varies, and of which experiment")->required();
+  app.add_option("study", o.study, "Study: what varies, and of which experiment")
+      ->required()
+      ->transform(a_bundled(Bundled::kStudy));
   app.add_option("-o,--output", o.output, "Write the worst point as a scenario")
       ->check(is_given(kNameAFile));
   CLI::Option* method = app.add_option("--method", o.method, "cma_es (default), phase, random")

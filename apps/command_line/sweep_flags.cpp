@@ -41,7 +41,9 @@ void add_summary(CLI::App& app, SweepOptions& o) {
 void add_flags(CLI::App& app, SweepOptions& o) {
   using Action = SweepOptions::Action;
   CLI::Option* study =
-      app.add_option("study", o.study, "TOML that says what varies (docs/sweep.md)");
+      app.add_option("study", o.study,
+                     "TOML that says what varies (docs/sweep.md), or a bundled name")
+          ->transform(a_bundled(Bundled::kStudy));
   app.add_option("--jobs,-j", o.jobs,
                  "Points at once (default: one for each core; with --slurm 1, its cores)")
       ->check(is_count());

@@ -10,7 +10,6 @@
 #include <filesystem>
 #include <thread>
 
-#include "apps/robot/bundled.hpp"
 #include "apps/robot/kernel_build.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/connection.hpp"
@@ -19,6 +18,7 @@
 #include "apps/run/loop_crash.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/figures.hpp"
+#include "base/bundled_files.hpp"
 #include "base/open_file.hpp"
 #include "base/quoting.hpp"
 #include "base/temporary_folder.hpp"
@@ -37,7 +37,7 @@ constexpr double kBeforeSave_s = 0.2;  // under the controllers
 class MadeExperiment {
  public:
   static Result<MadeExperiment> make(const ControllerCheckOptions& o) {
-    const auto robot = named_robot(o.robot.empty() ? kDefaultRobot : o.robot);
+    const auto robot = named_file(o.robot.empty() ? kDefaultRobot : o.robot, Bundled::kRobot);
     if (!robot) return std::unexpected(robot.error());
     std::string text = fmt::format(
         "robot = {}\nduration_s = 1.0\n[[controller]]\nplugin = {}\n[controller.parameters]\n",

@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <string_view>
 
-#include "apps/robot/bundled.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/controller_files.hpp"
+#include "base/bundled_files.hpp"
 #include "base/file_name.hpp"
 #include "base/open_file.hpp"
 #include "base/process.hpp"
@@ -99,9 +99,10 @@ Diagnostics run(const ControllerNewOptions& options) {
     return {Error{
         "this exists already", "give another name, or another folder with -o", folder, 0, {}}};
   }
-  const Result<fs::path> file = named_robot(options.robot);
+  const Result<std::string> file =
+      named_file(options.robot, Bundled::kRobot);  // the default's, too
   if (!file) return {file.error()};
-  const auto robot = robot::read_robot(file->string());
+  const auto robot = robot::read_robot(*file);
   if (!robot) return robot.error();
   const Result<std::string> package = package_folder();
   if (!package) return {package.error()};

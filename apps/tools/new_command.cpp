@@ -7,12 +7,12 @@
 #include <filesystem>
 #include <map>
 
-#include "apps/robot/bundled.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/new_source.hpp"
 #include "apps/tools/right_angles.hpp"
+#include "base/bundled_files.hpp"
 #include "base/counted.hpp"
 #include "base/file_name.hpp"
 #include "base/nearest.hpp"
@@ -47,11 +47,11 @@ std::string plain_name(std::string name) {
   return name;
 }
 
-/// The robot that --like names: a file, or the folder of a bundled one.
+/// The robot that --like names.
 std::expected<scaffold::Like, Diagnostics> read_like(const std::string& name) {
-  const auto file = named_robot(name);
+  const auto file = named_file(name, Bundled::kRobot);
   if (!file) return std::unexpected(Diagnostics{file.error()});
-  auto robot = robot::read_robot(file->string());
+  auto robot = robot::read_robot(*file);
   if (!robot) return std::unexpected(robot.error());
   return scaffold::Like{std::move(robot->config), std::move(robot->tree)};
 }

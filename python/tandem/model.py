@@ -47,8 +47,9 @@ class Model(Sealed):
         build: bool = True,
         variant: str = "",
     ) -> None:
-        """Reads the robot and finds its kernels; `build`: makes those that are missing, once.
+        """Reads the robot (robot.toml, or a bundled one's name as "panda") and finds its kernels.
 
+        build: makes those that are missing, once.
         derivatives: as if robot.toml had `derivatives = true` in [model].
         """
         kernels = _native.Kernels(os.fspath(robot), derivatives, build, variant)

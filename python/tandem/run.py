@@ -72,6 +72,7 @@ class Run(Sealed):
     ) -> None:
         """Reads and checks everything, enables the drives, and stands at the first cycle of control.
 
+        experiment: its file, or a bundled one's name as "panda/hold".
         control: None, the experiment's controllers lead. A mode ("position", "velocity", "torque",
         "current", "open_loop", "compliant"): Python leads every joint in it, and the experiment's
         controllers are left out. {joint: mode}: Python leads these, the controllers the others.

@@ -128,10 +128,13 @@ std::set<std::string> anchors_of(const fs::path& page) {
   return anchors;
 }
 
-/// Links in the sources' pages, or in an installation's ($TANDEM_PAGES).
-TEST(Documentation, LinksLeadSomewhere) {
+/// The folder of the sources' pages, or of an installation's ($TANDEM_PAGES).
+fs::path pages_folder() {
   const char* installed = std::getenv("TANDEM_PAGES");
-  const fs::path root = installed == nullptr ? kRoot : fs::path(installed);
+  return installed == nullptr ? kRoot : fs::path(installed);
+}
+
+std::vector<fs::path> all_pages(const fs::path& root) {
   std::vector<fs::path> pages;
   for (fs::recursive_directory_iterator entry(root), end; entry != end; ++entry) {
     const std::string name = entry->path().filename().string();
@@ -141,8 +144,12 @@ TEST(Documentation, LinksLeadSomewhere) {
       pages.push_back(entry->path());
     }
   }
+  return pages;
+}
+
+TEST(Documentation, LinksLeadSomewhere) {
   int links = 0;
-  for (const fs::path& page : pages) {
+  for (const fs::path& page : all_pages(pages_folder())) {
     for (const std::string& link : matches(prose_of(page), "\\]\\(([^):\\s]+)\\)")) {
       ++links;
       const std::size_t mark = link.find('#');
@@ -155,6 +162,18 @@ TEST(Documentation, LinksLeadSomewhere) {
     }
   }
   EXPECT_GT(links, 200);
+}
+
+// What a reader is told to look at, to copy or to start, without a link.
+TEST(Documentation, LinksToExamplesAndMessagesAreOfFilesThatAreThere) {
+  const fs::path root = pages_folder();
+  std::set<std::string> named;
+  for (const fs::path& page : all_pages(root)) {
+    named.merge(matches(text_of(page),
+                        "(?:\\$TANDEM/|`)((?:examples|dds/(?:ros2|idl|tandem_msgs))[\\w./-]*)"));
+  }
+  EXPECT_GT(named.size(), 10U);
+  for (const std::string& file : named) EXPECT_TRUE(fs::exists(root / file)) << file;
 }
 
 }  // namespace

@@ -230,6 +230,16 @@ def test_files_that_do_not_fit(tmp_path):
     assert len(str(error.value).splitlines()) > 1  # every error, a line each
 
 
+def test_bundled_names(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert tandem.Run("double_pendulum/hold", duration_s=0.1).joints == ["joint1", "joint2"]
+    assert tandem.Model("double_pendulum").nq == 2
+    with pytest.raises(tandem.Error, match="did you mean 'double_pendulum/hold'"):
+        tandem.Run("double_pendulum/hlod")
+    with pytest.raises(tandem.Error, match="did you mean 'panda'"):
+        tandem.Model("padna")
+
+
 def test_pushes_and_faults(config):
     run = tandem.Run(config / HOLD, control="position", on_fault="wait")
     run.step(50)
