@@ -44,7 +44,7 @@ endfunction()
 
 # What the terminal's own programs find: the manual, and completion.
 foreach(file man/man1/tandem.1 man/man1/tandem-run.1 bash-completion/completions/tandem
-    zsh/site-functions/_tandem fish/vendor_completions.d/tandem.fish doc/tandem/scripts/tandem-run.service)
+    zsh/site-functions/_tandem fish/vendor_completions.d/tandem.fish doc/tandem/scripts/tandem@.service)
   if(NOT EXISTS ${prefix}/share/${file})
     message(FATAL_ERROR "not installed: share/${file}")
   endif()
