@@ -7,12 +7,13 @@ FUZZ_RUNS ?=
 FUZZ_JOBS ?= 4
 FUZZ_TARGETS ?= urdf robot experiment message request input sample sheet frames ethercat line mcap import studio
 
-.PHONY: demo robot test proof test-all bench unit built real anywhere hil firmware arm64 sanitized rtsan asan tsan fuzz format lint \
+.PHONY: demo robot deb test proof test-all bench unit built real anywhere hil firmware arm64 sanitized rtsan asan tsan fuzz format lint \
   tidy hooks mutations clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
 	@echo "make robot  the program for a robot PC: the fastest, in build/robot (12 minutes)"
+	@echo "make deb    Debian packages in build/packages (10 minutes the first time; docs/install.md)"
 	@echo "make test   install what is missing, build everything, run the unit tests (about 12 minutes the first time)"
 	@echo "make proof  that build in strange surroundings and on a CAN stack, fuzzers, real-time sanitizer (about 15 minutes)"
 	@echo "make test-all  both, and the proofs that take long (hours)"
@@ -45,6 +46,12 @@ robot:
 	@scripts/install-dependencies demo
 	@scripts/install-node-modules studio/page
 	@JOBS=$(JOBS) scripts/build-robot
+
+# Debian's packages, in build/packages, and what lintian says of them.
+deb:
+	@scripts/install-dependencies package
+	@scripts/install-node-modules studio/page
+	@JOBS=$(JOBS) scripts/build-packages
 
 # Layout, build and unit tests. The last lines say what ran and what did not.
 test:
@@ -87,6 +94,10 @@ test-all:
 	@TANDEM_TRAVELS=100 tests/hil/run build/release/bin/hil_test --gtest_filter='HilTravel*'
 	@scripts/test-anywhere --paths
 	@scripts/test-build-types
+	@$(MAKE) --no-print-directory deb
+	@scripts/install-dependencies package-test
+	@scripts/test-packages
+	@scripts/test-packages --twice
 	@cmake --preset dev --log-level=WARNING && cmake --build --preset dev --parallel $(JOBS)
 	@$(MAKE) --no-print-directory fuzz FUZZ_SECONDS=600
 	@$(MAKE) --no-print-directory asan

@@ -27,6 +27,9 @@ function(tandem_headers out)
   set(${out} ${all} PARENT_SCOPE)
 endfunction()
 
+# package_files: all that is installed, and no more (the preset `package`).
+add_custom_target(package_files)
+
 # tandem_man(): the manual's pages, as the program writes them.
 function(tandem_man)
   set(folder ${PROJECT_BINARY_DIR}/man)
@@ -36,6 +39,7 @@ function(tandem_man)
   add_custom_command(OUTPUT ${folder}/tandem.1 COMMAND ${CMAKE_COMMAND} -E rm -rf ${folder}
     COMMAND tandem help --man ${folder} DEPENDS tandem VERBATIM COMMENT "The manual's pages")
   add_custom_target(man ALL DEPENDS ${folder}/tandem.1)
+  add_dependencies(package_files man)
   install(DIRECTORY ${folder}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program)
 endfunction()
 
@@ -121,6 +125,10 @@ function(tandem_install)
     ${PROJECT_BINARY_DIR}/installed/tandemConfig.cmake INSTALL_DESTINATION ${package})
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/installed/tandemConfigVersion.cmake
     COMPATIBILITY SameMinorVersion)
+  add_dependencies(package_files tandem kernels engines tandem_log)
+  if(TARGET tandem_python)
+    add_dependencies(package_files tandem_python)
+  endif()
   install(FILES ${PROJECT_BINARY_DIR}/installed/tandemConfig.cmake
     ${PROJECT_BINARY_DIR}/installed/tandemConfigVersion.cmake cmake/TandemController.cmake cmake/plugin.map
     DESTINATION ${package} COMPONENT dev)

@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
 
 #include "base/file_name.hpp"
 #include "base/process.hpp"
@@ -53,17 +54,27 @@ Result<std::string> user_model_folder() {
               "set one of them to an absolute path");
 }
 
-Result<std::string> user_library(const std::string& robot, const std::string& hash) {
+Result<std::string> library_in(const std::string& folder, const std::string& robot,
+                               const std::string& hash) {
   if (const std::string problem = file_name_problem(robot); !problem.empty()) {
     return fail("the robot's name '" + robot + "' " + problem, "give it another name");
   }
+  return candidates(folder, robot, hash).front();
+}
+
+Result<std::string> user_library(const std::string& robot, const std::string& hash) {
   const Result<std::string> folder = user_model_folder();
   if (!folder) return std::unexpected(folder.error());
-  return candidates(*folder, robot, hash).front();
+  return library_in(*folder, robot, hash);
 }
 
 std::vector<std::string> model_folders() {
   std::vector<std::string> folders;
+  if (const char* set = std::getenv("TANDEM_MODELS")) {
+    std::istringstream list(set);
+    for (std::string folder; std::getline(list, folder, ':');)
+      if (!folder.empty()) folders.push_back(folder);
+  }
   const fs::path program = program_file();
   if (!program.empty()) {
     const fs::path root = program.parent_path().parent_path();

@@ -14,14 +14,21 @@ namespace tandem::robot {
 /// Digits of the description's hash in the name of a library in the user's folder.
 inline constexpr std::size_t kHashDigits = 16;
 
-/// Folders in which `tandem` looks for libraries, in this order: lib/models and
-/// lib/tandem/models beside the program's folder, then the user's folder, if there is one.
+/// Folders in which `tandem` looks for libraries, in this order: those of TANDEM_MODELS (separated
+/// by
+/// ':'), lib/models and lib/tandem/models beside the program's folder, then the user's folder, if
+/// there is one.
 [[nodiscard]] std::vector<std::string> model_folders();
 
 /// The user's folder: $XDG_CACHE_HOME/tandem/models, or ~/.cache/tandem/models.
 ///
 /// Error: neither XDG_CACHE_HOME nor HOME holds an absolute path.
 [[nodiscard]] Result<std::string> user_model_folder();
+
+/// The library of a robot in a folder: ROBOT-HASH_kernels.so.
+/// Errors: a robot's name that is no file name.
+[[nodiscard]] Result<std::string> library_in(const std::string& folder, const std::string& robot,
+                                             const std::string& hash);
 
 /// Where `tandem model build` writes when nothing else is said: ROBOT-HASH_kernels.so in the
 /// user's folder. So two robots of one name, and two versions of a robot, stand side by side.

@@ -79,7 +79,7 @@ const char kModelExamples[] = R"(Examples:
 
 const char kModelBuildExamples[] = R"(Examples:
   tandem model build config/coman/robot.toml
-  tandem model build my_robot/robot.toml -o /tmp/my_robot.so
+  tandem model build my_robot/robot.toml -o kernels/    for a computer without a compiler
 Without -o the library goes to the cache folder ($XDG_CACHE_HOME/tandem/models, or
 ~/.cache/tandem/models), where `tandem run` finds it by the robot's name and the hash of its
 files. A library that is up to date is not built again.)";
@@ -392,7 +392,8 @@ void add_flags(CLI::App& app, ModelOptions& o) {
   build->add_option("robot", o.robot, kRobotHelp)
       ->required()
       ->transform(a_bundled(Bundled::kRobot));
-  build->add_option("-o,--output", o.output, "Shared library to write");
+  build->add_option("-o,--output", o.output,
+                    "Shared library to write, or a folder for ROBOT-HASH_kernels.so");
   build->add_flag("--force", o.force, "Build even when the library is up to date");
   build->footer(kModelBuildExamples);
   build->callback([&o] { o.action = ModelOptions::Action::kBuild; });
@@ -495,8 +496,7 @@ void add_flags(CLI::App& app, LatencyOptions& o) {
 
 void add_flags(CLI::App& app, DoctorOptions& o) {
   app.add_option("robot", o.robot,
-                 "Robot, to look at the interfaces of its buses and its EtherCAT slaves: its TOML, "
-                 "or a bundled name")
+                 "Robot whose buses and EtherCAT slaves are looked at: its TOML, or its name")
       ->transform(a_bundled(Bundled::kRobot));
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--fix", o.fix,

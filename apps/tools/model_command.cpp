@@ -1,6 +1,8 @@
 // `tandem model`: builds a robot's kernels, and shows what its description amounts to.
 #include <fmt/core.h>
 
+#include <filesystem>
+
 #include "apps/robot/kernel_build.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/text/console.hpp"
@@ -17,12 +19,16 @@ namespace {
 Status build(const robot::RobotFiles& robot, const ModelOptions& options) {
   model::BuildOptions build;
   build.library = options.output;
-  if (options.output.empty()) {
-    auto path =
-        robot::user_library(robot.config.name, model::description_hash(robot.tree, robot.spec));
+  std::error_code ignored;
+  const bool folder =
+      options.output.ends_with('/') || std::filesystem::is_directory(options.output, ignored);
+  if (options.output.empty() || folder) {
+    const std::string hash = model::description_hash(robot.tree, robot.spec);
+    auto path = folder ? robot::library_in(options.output, robot.config.name, hash)
+                       : robot::user_library(robot.config.name, hash);
     if (!path) {
       Error error = path.error();
-      error.hint += ", or name the library with -o";
+      if (!folder) error.hint += ", or name the library with -o";
       return std::unexpected(std::move(error));
     }
     build.library = std::move(*path);

@@ -34,6 +34,34 @@ TEST_F(Model, AUsersOwnRobotRunsFromTheCacheFolder) {
   }
 }
 
+// What a computer without a compiler has: the library of another one, and PATH with no programs.
+TEST_F(Model, ALibraryThatIsBroughtAlongNeedsNoCompiler) {
+  edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\nderivatives = true");
+  for (const char* folder : {"brought", "made/"}) {
+    std::filesystem::create_directory(folder_ / "brought");
+    ASSERT_EQ(tandem(std::string("model build robot.toml -o ") + folder).status, 0) << folder;
+    std::filesystem::permissions(folder_ / folder, std::filesystem::perms(0755));
+  }
+  std::string name;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "brought"))
+    if (entry.path().extension() == ".so") name = entry.path().filename();
+  EXPECT_TRUE(name.starts_with("double_pendulum-") && name.ends_with("_kernels.so")) << name;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "made" / name));
+  const std::string bare =
+      "env PATH=/nonexistent XDG_CACHE_HOME=" + shell_word(folder_.string() + "/cache");
+  const std::string run = "run hold.toml --duration 0.05 --no-log --no-socket -q --no-build";
+  const Outcome lacks = tandem(run, bare);
+  EXPECT_EQ(lacks.status, 2);
+  EXPECT_NE(lacks.err.find("model build"), std::string::npos) << lacks.err;
+  const Outcome has = tandem(run, bare + " TANDEM_MODELS=nowhere:brought");
+  EXPECT_EQ(has.status, 0) << has.err;
+  edit("double_pendulum.urdf", "<mass value=\"", "<mass value=\"1");
+  const Outcome other = tandem(run, bare + " TANDEM_MODELS=brought");
+  EXPECT_EQ(other.status, 2);
+  EXPECT_NE(other.err.find("kernel"), std::string::npos) << other.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "cache"));
+}
+
 // A run has no -o.
 TEST_F(Model, WithoutACacheFolderEachCommandSaysWhatItTakes) {
   edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\nderivatives = true");
