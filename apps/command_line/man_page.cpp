@@ -4,6 +4,7 @@
 
 #include <cctype>
 #include <filesystem>
+#include <string_view>
 
 #include "apps/command_line/help_text.hpp"
 #include "apps/text/console.hpp"
@@ -23,8 +24,11 @@ std::string page_name(const CLI::App& app) {
   return name;
 }
 
-/// Text in which roff takes nothing for a request or an escape.
-std::string roff(const std::string& text) {
+/// Text in which roff takes nothing for a request or an escape, and that it can print everywhere.
+std::string roff(std::string text) {
+  constexpr std::string_view kEllipsis = "…";
+  for (std::size_t at = 0; (at = text.find(kEllipsis)) != std::string::npos;)
+    text.replace(at, kEllipsis.size(), "...");
   std::string out;
   bool begins = true;
   for (const char c : text) {

@@ -49,7 +49,7 @@ TEST_F(ManPages, SayWhatHelpSays) {
 TEST_F(ManPages, ArePrintedWithoutWarnings) {
   if (!program_exists("man")) GTEST_SKIP() << "there is no man";
   for (const auto& entry : fs::directory_iterator(folder_ / "pages")) {
-    const std::string command = "MANWIDTH=80 MANPAGER=cat LC_ALL=C.UTF-8 man --warnings -l " +
+    const std::string command = "MANWIDTH=80 MANPAGER=cat LC_ALL=C man --warnings -l " +
                                 shell_word(entry.path().string()) + " >" +
                                 shell_word((folder_ / "out.txt").string()) + " 2>" +
                                 shell_word((folder_ / "err.txt").string()) + " </dev/null";
