@@ -27,8 +27,8 @@ std::string imu_site(const hal::Robot& robot, const hal::Sensor& sensor) {
 }
 
 /// Parameters: mode ("compliant": a virtual spring and damper about the start posture, "torque":
-/// none), joints (all), stiffness_Nm_rad and damping_Nms_rad (by joint, the robot's), ramp_s (1),
-/// feet (all; floating base only).
+/// none), joints (all), effort (false), effort_timeout_s (0.5), stiffness_Nm_rad and
+/// damping_Nms_rad (by joint, the robot's), ramp_s (1), feet (all; floating base only).
 ///
 /// tau = h(q, 0) for a fixed base. A floating base is taken to stand on its feet, turned as its
 /// IMU says, or upright when it has none.
@@ -52,6 +52,7 @@ class GravityCompensation : public Controller {
                      .is("compliant");
     if (const Status standing = stand(setup); !standing) return standing;
     claim_joints(setup);
+    take_effort(setup);
     sines_ = model::Sines(*kernels_);
     q_.assign(kernels_->nq, 0.0);
     map_.passive_to_q(q_);
@@ -86,7 +87,8 @@ class GravityCompensation : public Controller {
       command.velocity_rad_s()[j] = 0.0;
       command.stiffness_Nm_rad()[j] = stiffness_Nm_rad_[i];
       command.damping_Nms_rad()[j] = damping_Nms_rad_[i];
-      command.torque_Nm()[j] = joint.torque_Nm + (weight - joint.torque_Nm) * share;
+      command.torque_Nm()[j] =
+          joint.torque_Nm + (weight - joint.torque_Nm) * share + (effort_ ? (*effort_)[i] : 0.0);
     }
     return Code::kOk;
   }
@@ -115,6 +117,30 @@ class GravityCompensation : public Controller {
       }
     }
     return {};
+  }
+
+  /// An input is there only where it is asked for: the robot's end of a link can have none.
+  void take_effort(ControllerSetup& setup) {
+    const double timeout_s =
+        setup.parameter("effort_timeout_s", {.unit = "s",
+                                             .min = 0.01,
+                                             .max = 60,
+                                             .otherwise = 0.5,
+                                             .doc = "that a sample of the input `effort` counts"});
+    const bool takes =
+        setup.parameter("effort", {.otherwise = false, .doc = "an input `effort` adds torques"})
+            .on();
+    if (!takes) return;
+    InputOptions options{.doc = "torques of the joints, beside those of the weight",
+                         .unit = "Nm",
+                         .timeout_s = timeout_s,
+                         .after = AfterTimeout::kZero};
+    for (const ClaimedJoint& joint : joints_) {
+      const hal::DrivenJoint& limit = setup.robot.joints[joint.index];
+      options.names.push_back(limit.name);
+      options.max.push_back(limit.max_torque_Nm);
+    }
+    effort_ = setup.input("effort", InputKind::kNumbers, std::move(options));
   }
 
   void claim_joints(ControllerSetup& setup) {
@@ -202,6 +228,7 @@ class GravityCompensation : public Controller {
   std::optional<Support> support_;  // of a floating base
   std::optional<Imu> imu_;
   Signal weight_;
+  std::optional<Input> effort_;
   bool compliant_ = true;
   double ramp_s_ = 1.0;
   std::int64_t start_ns_ = 0;

@@ -53,6 +53,25 @@ TEST(GravityCompensation, GivesTheWeightsTorqueOfAFixedBase) {
   EXPECT_NEAR(run.command.torque_Nm()[1], 3.0 * 9.81 * 0.5 * std::sin(0.7) + outer, 1e-12);
 }
 
+TEST(GravityCompensation, AddsTheTorquesThatItIsToldWhereAskedFor) {
+  test::Harness run(pendulum_robot(), "gravity_compensation", "mode = 'torque'\neffort = true\n",
+                    pendulum());
+  ASSERT_EQ(run.problem(), "");
+  ASSERT_EQ(run.setup.io->inputs.all.size(), 1U);
+  InputBlock& input = run.setup.io->inputs.all.front();
+  EXPECT_EQ(input.components, (std::vector<std::string>{"lower", "upper"}));
+  EXPECT_EQ(input.options.max, (std::vector<double>{200.0, 200.0}));
+  run.state.position_rad()[0] = 0.3;
+  run.start();
+  ASSERT_EQ(run.run(1.5), Code::kOk);
+  const double weight = run.command.torque_Nm()[0];
+  input.value = {7.0, 0.0};
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_NEAR(run.command.torque_Nm()[0], weight + 7.0, 1e-12);
+  test::Harness without(pendulum_robot(), "gravity_compensation", "mode = 'torque'\n", pendulum());
+  EXPECT_TRUE(without.setup.io->inputs.all.empty());
+}
+
 TEST(GravityCompensation, YieldsAboutTheStartPostureWhenCompliant) {
   test::Harness run(pendulum_robot(), "gravity_compensation", "stiffness_Nm_rad = 12.5\n",
                     pendulum());

@@ -1,18 +1,17 @@
-// Clients of services as rmw_fastrtps_cpp makes them. It shares nothing with Tandem.
-//   fastdds_caller DOMAIN [SERVICE TYPE]…        SERVICE: "/tandem/ask", TYPE:
-//   "tandem_msgs/srv/Ask" fastdds_caller DOMAIN … [hear|latched TOPIC TYPE]…   and readers of
-//   topics
-// Each service has one client, in the order of the arguments. A service may be named more than
-// once. Input, a line each:
+// Clients of services as rmw_fastrtps_cpp makes them, and topics. It shares nothing with Tandem.
+//   fastdds_caller DOMAIN [SERVICE TYPE]… [hear|latched|tell TOPIC TYPE]…
+// SERVICE: "/tandem/ask", TYPE: "tandem_msgs/srv/Ask". Each has one client, in the arguments'
+// order. A service may be named more than once. Input, a line each:
 //   I HEX    client I sends this payload, the encoding's four bytes in front
 //   drop I   client I goes away
+//   T HEX    says this on the topic T, which begins with a slash
 // Output, a line each:
-//   participant HEX           GUID prefix
-//   I ready                   both ends are connected, as rmw_service_server_is_available() wants
-//   I sent N                  the request's sequence number
-//   I reply N HEX             that is client I's own
-//   I other                   a reply to somebody else, which rmw_fastrtps_cpp ignores
-//   T heard HEX               T: the topic
+//   participant HEX   GUID prefix
+//   I ready           both ends are connected, as rmw_service_server_is_available() wants
+//   I sent N          the request's sequence number
+//   I reply N HEX     that is client I's own
+//   I other           a reply to somebody else, which rmw_fastrtps_cpp ignores
+//   T heard HEX       T: the topic
 // It ends when its input does.
 #include <poll.h>
 #include <unistd.h>
@@ -31,6 +30,8 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
+#include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -189,6 +190,17 @@ struct Client : fdds::DataReaderListener {
   bool ready_ = false;
 };
 
+struct Teller {
+  Teller(fdds::DomainParticipant& participant, const std::string& topic, const std::string& type)
+      : writer_(participant.create_publisher(fdds::PUBLISHER_QOS_DEFAULT)
+                    ->create_datawriter(topic_of(participant, "rt" + topic, dds_name(type, "")),
+                                        of_services(fdds::DATAWRITER_QOS_DEFAULT))) {}
+  void send(Bytes payload) { writer_->write(&payload); }
+
+ private:
+  fdds::DataWriter* writer_;
+};
+
 struct Hearer : fdds::DataReaderListener {
   Hearer(fdds::DomainParticipant& participant, std::string topic, const std::string& type,
          bool latched)
@@ -224,9 +236,13 @@ int main(int argc, char** argv) {
   print("participant %s", hex(participant->guid().guidPrefix.value, 12).c_str());
   std::vector<std::unique_ptr<Client>> clients;
   std::vector<std::unique_ptr<Hearer>> hearers;
+  std::map<std::string, Teller> tellers;
   for (int i = 2; i + 1 < argc; i += 2) {
     const std::string word = argv[i];
-    if (word == "hear" || word == "latched") {
+    if (word == "tell") {
+      if (++i + 1 >= argc) return 2;
+      tellers.emplace(argv[i], Teller(*participant, argv[i], argv[i + 1]));
+    } else if (word == "hear" || word == "latched") {
       if (++i + 1 >= argc) return 2;
       hearers.push_back(
           std::make_unique<Hearer>(*participant, argv[i], argv[i + 1], word == "latched"));
@@ -251,6 +267,8 @@ int main(int argc, char** argv) {
       const std::string first = line.substr(0, blank), rest = line.substr(blank + 1);
       if (first == "drop") {
         clients.at(std::stoul(rest))->drop();
+      } else if (first.front() == '/') {
+        tellers.at(first).send(from_hex(rest));
       } else {
         clients.at(std::stoul(first))->send(from_hex(rest));
       }
