@@ -79,7 +79,7 @@ execute_process(COMMAND ${prefix}/bin/tandem run --no-log --duration 2 --quiet $
 file(WRITE ${WORK}/reader/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)
 project(reader LANGUAGES CXX)
 find_package(tandem REQUIRED COMPONENTS log)
-add_executable(read_log ${prefix}/share/doc/tandem/examples/02_read_log.cpp)
+add_executable(read_log \"${prefix}/share/doc/tandem/examples/02_read_log.cpp\")
 target_link_libraries(read_log tandem::log)
 ")
 build(${WORK}/reader ${WORK}/reader/build)

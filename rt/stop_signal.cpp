@@ -120,6 +120,8 @@ void install_emergency_signal() {
   ::sigaction(SIGUSR1, &action, nullptr);
 }
 
+void request_emergency_stop() noexcept { emergency_flag.store(true, std::memory_order_relaxed); }
+
 bool emergency_stop_waits() noexcept TANDEM_RT {
   return emergency_flag.load(std::memory_order_relaxed);
 }

@@ -37,6 +37,9 @@ void clear_stop() noexcept;
 /// From now on each SIGUSR1 is an emergency stop.
 void install_emergency_signal();
 
+/// The same without a signal, from any thread.
+void request_emergency_stop() noexcept;
+
 /// Whether an emergency stop was signalled that nobody has taken yet.
 [[nodiscard]] bool emergency_stop_waits() noexcept TANDEM_RT;
 

@@ -210,10 +210,22 @@ Exit stop_all_over_dds(const ControlTarget& target, const Json& question, bool t
   return tell_missing(own, *answers, target) == Exit::kDone ? exit : Exit::kFault;
 }
 
+/// The runs of this user on this machine. A run that has just been started has no socket for some
+/// 0.1 s: where there is none, it is looked for until then.
+ControlSearch search_runs() {
+  constexpr std::chrono::milliseconds kStart{500}, kAgain{10};
+  const auto deadline = SteadyClock::now() + kStart;
+  for (;;) {
+    ControlSearch search = search_control_sockets("run");
+    if (!search.sockets.empty() || SteadyClock::now() > deadline) return search;
+    std::this_thread::sleep_for(kAgain);
+  }
+}
+
 /// Stops every run of this user on this machine. All are asked at once: one that hangs must not
 /// delay the others.
 Exit stop_all(const Json& question) {
-  const ControlSearch search = search_control_sockets("run");
+  const ControlSearch search = search_runs();
   for (const Error& refused : search.refused) {
     say(Said::kWarning, "not looked for runs there: " + refused.message);
   }

@@ -126,6 +126,13 @@ class Session {
     const std::vector<std::string> faults = latched_texts(cycle_->faults());
     return faults.empty() ? std::string() : faults.front();
   }
+  /// An emergency stop is latched: a person's.
+  [[nodiscard]] bool stopped() const {
+    return std::ranges::any_of(cycle_->faults(), [](const runtime::FaultReport& fault) {
+      return fault.latched && (fault.cause == hal::FaultCause::kByRequest ||
+                               fault.cause == hal::FaultCause::kBySignal);
+    });
+  }
 
  private:
   [[nodiscard]] const runtime::Experiment& experiment() const { return c_.experiment; }
@@ -394,15 +401,20 @@ void warn_of_inertias(const runtime::Experiment& e) {
 }
 
 /// Connects to the robot; before, with --wait-for-start, waits until somebody asks for it.
-/// @param why  it waits again
 /// @return nothing: it is connected. Else with what the process ends
 std::optional<Exit> reach(WiredComposition& c, const RunOptions& options, ServiceNotice& notice,
-                          const std::string& why) {
+                          const StartRoom::Before& before) {
   if (!options.waits_for_start) {
     const Diagnostics errors = connect(c, options.record_frames);
     return errors.empty() ? std::nullopt : std::optional(refuse(errors));
   }
-  auto room = StartRoom::open(options.socket, notice, why);
+  if (c.experiment.hal.backend == runtime::BackendKind::kDds) {
+    return refuse(fail("a robot of another process is not waited for: its server gives it to a run "
+                       "whose loop is there",
+                       "leave --wait-for-start out, and give it to `tandem serve`")
+                      .error());
+  }
+  auto room = StartRoom::open(options.socket, notice, before);
   if (!room) return refuse(room.error());
   for (;;) {
     if (!(*room)->await()) {
@@ -416,9 +428,9 @@ std::optional<Exit> reach(WiredComposition& c, const RunOptions& options, Servic
 }
 
 /// From the files to the end of the run.
-/// @param why  it waits for its start again; set where it is to do so once more
+/// @param again  why it waits for its start again; set where it is to do so once more
 Exit run_once(RunOptions options, Gate* gate, ServiceNotice& notice, ReportOfRun& report,
-              std::string& why) {
+              StartRoom::Before& again) {
   auto composition = runtime::composed<WiredComposition>(
       options.experiment, options,
       {.build = options.lacks_kernels.empty() ? builder(options.quiet)
@@ -430,7 +442,7 @@ Exit run_once(RunOptions options, Gate* gate, ServiceNotice& notice, ReportOfRun
   outlive_files();
   if (const Diagnostics errors = check_events((*composition)->experiment); !errors.empty())
     return refuse(errors);
-  if (const auto ended = reach(**composition, options, notice, std::exchange(why, {})))
+  if (const auto ended = reach(**composition, options, notice, std::exchange(again, {})))
     return *ended;
   print_warnings((*composition)->warnings);
   set_pace(**composition, options);
@@ -438,7 +450,7 @@ Exit run_once(RunOptions options, Gate* gate, ServiceNotice& notice, ReportOfRun
   note_overrun_policy(**composition, options);
   auto session = std::make_unique<Session>(**composition, options, gate, notice);
   const Exit exit = session->run();
-  if (session->waits_again()) why = session->not_enabled();
+  if (session->waits_again()) again = {session->not_enabled(), session->stopped()};
   if (options.report) {
     report = {session->log(), session->log_is_whole(),
               options.quiet ? nullptr : human_output(options.json)};
@@ -469,10 +481,10 @@ Exit run_command(const RunOptions& given, ReportOfRun& report) {
                          : wrong_kind(options.experiment, Takes::kExperiment, "tandem run");
   if (wrong) return refuse(*wrong);
   ServiceNotice notice;
-  std::string why;
+  StartRoom::Before again;
   for (;;) {
-    const Exit exit = run_once(options, gate.get(), notice, report, why);
-    if (why.empty()) return exit;
+    const Exit exit = run_once(options, gate.get(), notice, report, again);
+    if (again.why.empty()) return exit;
   }
 }
 

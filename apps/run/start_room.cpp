@@ -16,7 +16,9 @@ namespace {
 constexpr std::chrono::milliseconds kLook{50};  // between two looks for a signal
 constexpr std::chrono::milliseconds kOut{100};  // for an answer to leave before the socket closes
 constexpr char kWaits[] = "waits for its start: tandem controller start";
-constexpr char kWaiting[] = "waiting";
+constexpr char kStopped[] =
+    "waits, and an emergency stop is latched: tandem fault reset, then tandem controller start";
+constexpr char kWaiting[] = "waiting", kLeft[] = "bring-up";
 
 std::unexpected<Error> not_started() {
   return fail("the run waits for its start, and has touched no drive yet",
@@ -26,30 +28,44 @@ std::unexpected<Error> not_started() {
 }  // namespace
 
 Result<std::unique_ptr<StartRoom>> StartRoom::open(const std::string& socket, ServiceNotice& notice,
-                                                   const std::string& why) {
+                                                   const Before& before) {
   std::unique_ptr<StartRoom> room(new StartRoom(notice));
+  room->stopped_ = before.stopped;
   room->add_commands();
   auto opened =
       serve(room->commands_, {.path = socket, .kind = "run", .wanted = true, .needed = true});
   if (!opened) return std::unexpected(opened.error());
   room->socket_ = std::move(*opened);
   rt::install_emergency_signal();
-  room->tell(why);
+  room->tell(before.why);
   return room;
 }
 
 /// To journal and service manager.
 void StartRoom::tell(const std::string& why) {
-  const std::string line = std::string(kWaits) + (why.empty() ? "" : "; before: " + why);
+  const std::string line =
+      std::string(stopped_ ? kStopped : kWaits) + (why.empty() ? "" : "; before: " + why);
   fmt::print(stderr, "{}\n", shown(line, 2'000));
   notice_.waits(line);
 }
 
+void StartRoom::latch() {
+  if (std::exchange(stopped_, true)) return;
+  tell("");
+}
+
 Json StartRoom::status() {
   const std::scoped_lock lock(mutex_);
-  return {{"phase", kWaiting}, {"paused", false},   {"cycles", 0},  {"running_cycles", 0},
-          {"total_cycles", 0}, {"overruns", 0},     {"dropped", 0}, {"latched", stopped_ ? 1 : 0},
-          {"resets", 0},       {"failed_resets", 0}};
+  return {{"phase", left_ ? kLeft : kWaiting},
+          {"paused", false},
+          {"cycles", 0},
+          {"running_cycles", 0},
+          {"total_cycles", 0},
+          {"overruns", 0},
+          {"dropped", 0},
+          {"latched", stopped_ ? 1 : 0},
+          {"resets", 0},
+          {"failed_resets", 0}};
 }
 
 void StartRoom::add_commands() {
@@ -63,15 +79,19 @@ void StartRoom::add_commands() {
   commands_.add("fault.reset", [this](const Json&) -> Result<Json> {
     {
       const std::scoped_lock lock(mutex_);
-      stopped_ = false;
+      if (std::exchange(stopped_, false)) tell("");
     }
     return status();
   });
-  // Confirmed at once: no drive is enabled, and from here on none will be.
+  // Confirmed at once: no drive is enabled, and from here on none will be. A run that goes on looks
+  // for it before it enables one.
   commands_.add("estop", [this](const Json& request) -> Result<Json> {
     const std::scoped_lock lock(mutex_);
-    if (left_) return fail("the run goes on to its robot: ask again");
-    stopped_ = true;
+    if (left_) {
+      rt::request_emergency_stop();
+    } else {
+      latch();
+    }
     const auto category = static_cast<hal::StopCategory>(request.value("category", 0));
     return Json{{"category", hal::to_string(category)}, {"paused", false}, {"confirmed", true}};
   });
@@ -98,21 +118,23 @@ Result<Json> StartRoom::start(const Json& request) {
   if (stopped_)
     return fail("an emergency stop is latched: nothing starts", "tandem fault reset, then start");
   if (ends_) return fail("the run ends");
+  if (left_) return fail("the run has been started, and goes on to its robot");
   wanted_ = true;
   const std::uint64_t before = answers_;
   news_.notify_all();
   news_.wait(lock, [&] { return answers_ != before || ends_; });
   if (answers_ == before) return fail("the run ends");
   if (refused_) return std::unexpected(*refused_);
-  return Json{{"done", false},
-              {"active", Json::array()},
-              {"note", "the drives are enabled, then the controllers start"}};
+  return Json{
+      {"done", false},
+      {"active", Json::array()},
+      {"note", "the run goes on to its robot: drives are enabled, then the controllers start"}};
 }
 
 bool StartRoom::await() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    if (rt::take_emergency_stop()) stopped_ = true;
+    if (rt::take_emergency_stop()) latch();
     if (rt::stop_requested()) ends_ = true;
     if (ends_) {
       news_.notify_all();
@@ -128,7 +150,7 @@ bool StartRoom::await() {
 bool StartRoom::answer(std::optional<Error> refused) {
   {
     const std::scoped_lock lock(mutex_);
-    if (rt::take_emergency_stop()) stopped_ = true;
+    if (rt::take_emergency_stop()) latch();
     if (stopped_ && !refused) {  // it came after the question, and wins
       refused = fail("an emergency stop is latched: nothing starts",
                      "tandem fault reset, then tandem controller start")

@@ -21,18 +21,22 @@ namespace tandem::apps {
 /// emergency stop is confirmed, and latched until `tandem fault reset`: nothing starts before.
 class StartRoom {
  public:
-  /// @param why  it waits again; empty: at first
+  /// Why it waits again.
+  struct Before {
+    std::string why{};     ///< empty: it waits for the first time
+    bool stopped = false;  ///< by an emergency stop, which stays latched
+  };
   /// Errors: apps::serve()'s of a socket that is needed.
   [[nodiscard]] static Result<std::unique_ptr<StartRoom>> open(const std::string& socket,
                                                                ServiceNotice& notice,
-                                                               const std::string& why);
+                                                               const Before& before);
 
   /// Blocks until somebody asks for the start. @return false: for the run's end instead, by a
   /// signal or over the socket
   [[nodiscard]] bool await();
   /// The answer to who asked. @param refused  why the robot cannot be started
   /// @return whether the run goes on to its robot. Else it waits on: it was refused, or an
-  /// emergency stop came meanwhile. From a run that goes on no stop is confirmed here any more
+  /// emergency stop came meanwhile. A stop that comes later is the first thing that the run sees
   [[nodiscard]] bool answer(std::optional<Error> refused);
 
  private:
@@ -41,6 +45,8 @@ class StartRoom {
   [[nodiscard]] Json status();
   [[nodiscard]] Result<Json> start(const Json& request);
   void tell(const std::string& why);
+  /// @pre the mutex is locked
+  void latch();
 
   ServiceNotice& notice_;
   ControlRegistry commands_;

@@ -133,6 +133,55 @@ TEST_F(Service, AnEmergencyStopWhileItWaitsIsLatched) {
   EXPECT_EQ(end(), 0) << said();
 }
 
+// Where it said "ask again" the robot was enabled; and where it was confirmed in time for no drive
+// to be enabled, the next start needed no reset.
+TEST_F(Service, AnEmergencyStopAtAnyMomentOfItsStartIsLatched) {
+  for (const int after_ms : {0, 60, 130, 200}) {
+    SCOPED_TRACE(after_ms);
+    begin("--rate 1 --duration endless --on-fault wait --wait-for-start");
+    ASSERT_TRUE(comes_to("waiting"));
+    ASSERT_EQ(to_run("controller start").status, 0);
+    std::this_thread::sleep_for(std::chrono::milliseconds(after_ms));
+    // Between two sockets there is none, which is said.
+    Outcome stop;
+    ASSERT_TRUE(test::eventually([&] {
+      stop = to_run("estop");
+      return stop.status == 0 || stop.err.find("no running tandem") == std::string::npos;
+    }));
+    EXPECT_EQ(stop.status, 0) << stop.err;
+    ASSERT_TRUE(test::eventually([&] {
+      const std::string now = phase();
+      return now == "waiting" || now == "faulted";
+    })) << phase();
+    const Outcome refused = to_run("controller start");
+    EXPECT_NE(refused.status, 0) << refused.out;
+    EXPECT_NE(refused.err.find("latched"), std::string::npos) << refused.err;
+    ::kill(run_->id(), SIGTERM);
+    (void)end();
+    run_.reset();
+  }
+}
+
+// The second waited for an answer for ever, and with it the process, which no signal ended.
+TEST_F(Service, IsStartedOnce) {
+  begin("--rate 1 --duration endless --wait-for-start");
+  ASSERT_TRUE(manager_.hears("READY=1"));
+  ASSERT_EQ(to_run("controller start").status, 0);
+  const Outcome again = to_run("controller start");
+  EXPECT_NE(again.status, 0) << again.out;
+  EXPECT_EQ(again.err.find("no answer"), std::string::npos) << again.err;
+  EXPECT_TRUE(comes_to("running")) << said();
+  ::kill(run_->id(), SIGTERM);
+  (void)end();
+}
+
+TEST_F(Service, TakesNoRobotOfAnotherProcess) {
+  const Outcome refused =
+      tandem("run hold.toml --hal dds --no-log -q --wait-for-start --socket " + socket_);
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("--wait-for-start"), std::string::npos) << refused.err;
+}
+
 TEST_F(Service, EndsWhileItWaits) {
   begin("--wait-for-start");
   ASSERT_TRUE(manager_.hears("READY=1"));
