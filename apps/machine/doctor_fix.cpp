@@ -25,10 +25,13 @@ constexpr Place kGrub{"etc/default/grub.d/tandem.cfg", "sudo update-grub; sudo r
 constexpr Place kTmpfiles{"etc/tmpfiles.d/tandem.conf",
                           "sudo systemd-tmpfiles --create /etc/tmpfiles.d/tandem.conf",
                           "sudo reboot"};
-constexpr Place kSysctl{"etc/sysctl.d/60-tandem.conf", "sudo sysctl --system", "sudo reboot"};
-constexpr Place kLimits{"etc/security/limits.d/tandem.conf",
-                        "sudo adduser \"$USER\" tandem   # then log in again",
-                        "sudo deluser \"$USER\" tandem   # then log in again"};
+constexpr Place kSysctl{"etc/sysctl.d/60-tandem.conf", "sudo sysctl --system",
+                        "sudo sysctl kernel.sched_rt_runtime_us=950000"};
+// Another file than that of the advice for one user, who keeps it.
+constexpr Place kLimits{
+    "etc/security/limits.d/tandem-group.conf",
+    "sudo addgroup --system tandem; sudo adduser \"$USER\" tandem   # then log in again",
+    "sudo deluser \"$USER\" tandem   # where you were not in it before; then log in again"};
 constexpr Place kUdev{"etc/udev/rules.d/60-tandem.rules",
                       "sudo udevadm control --reload; sudo udevadm trigger", "sudo reboot"};
 constexpr Place kModules{"etc/modules-load.d/tandem.conf",
@@ -129,7 +132,9 @@ constexpr char kAwake[] = "KERNEL==\"cpu_dma_latency\", GROUP=\"tandem\", MODE=\
 constexpr char kThreads[] = "w /sys/devices/system/cpu/smt/control - - - - off";
 constexpr char kPriority98[] = "@tandem - rtprio 98";
 constexpr char kAllMemory[] = "@tandem - memlock unlimited";
-constexpr char kNoThrottling[] = "kernel.sched_rt_runtime_us = -1";
+constexpr char kNoThrottling[] =
+    "# Not on a computer with one CPU: a loop that hangs would leave its watchdog no time.\n"
+    "kernel.sched_rt_runtime_us = -1";
 constexpr char kPages[] = "w /sys/kernel/mm/transparent_hugepage/enabled - - - - madvise";
 constexpr char kCanRaw[] = "can_raw";
 
@@ -162,7 +167,8 @@ void fix_can(const hal::BusConfig& bus, FixWriter& to) {
   const std::string path = "etc/systemd/network/60-tandem-" + bus.interface + ".network";
   const Place place{path.c_str(),
                     "sudo systemctl enable --now systemd-networkd; sudo networkctl reload",
-                    "sudo networkctl reload"};
+                    "sudo networkctl reload   # it was off before? sudo systemctl disable --now "
+                    "systemd-networkd systemd-networkd-wait-online"};
   std::string text = fmt::format("[Match]\nName={}\n\n[CAN]\nBitRate={}\nRestartSec=100ms",
                                  bus.interface, bus.bitrate);
   if (bus.fd) text += fmt::format("\nFDMode=yes\nDataBitRate={}", bus.data_bitrate);

@@ -98,7 +98,7 @@ TEST_F(DoctorFix, WritesFilesThatParse) {
   const Fixes all = fixes();
   expect_lines(text_of(all, "etc/tmpfiles.d/tandem.conf"), "w /[a-z0-9_*/]+ - - - - [a-z]+");
   expect_lines(text_of(all, "etc/sysctl.d/60-tandem.conf"), "[a-z_.]+ = -?[0-9]+");
-  expect_lines(text_of(all, "etc/security/limits.d/tandem.conf"),
+  expect_lines(text_of(all, "etc/security/limits.d/tandem-group.conf"),
                "@tandem - (rtprio 98|memlock unlimited)");
   expect_lines(text_of(all, "etc/udev/rules.d/60-tandem.rules"),
                "([A-Z]+(==|=)\"[a-z0-9_]+\"(, )?)+");
