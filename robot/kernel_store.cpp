@@ -29,12 +29,16 @@ Result<model::KernelLibrary> find(const std::string& robot, const std::string& h
   }
   Result<model::KernelLibrary> last =
       fail("there is no kernel library of '" + robot + "' as its files describe it", mend);
+  bool meant = false;  // the last was made from these files: why it is refused says most
   for (const std::string& folder : model_folders()) {
-    for (const std::string& path : candidates(folder, robot, hash)) {
+    const std::vector<std::string> paths = candidates(folder, robot, hash);
+    for (const std::string& path : paths) {
       std::error_code ignored;
       if (!fs::exists(path, ignored)) continue;
       Result<model::KernelLibrary> library = model::load_kernels(path, hash, variant);
       if (library) return library;
+      if (meant) continue;
+      meant = path == paths.front();
       last = std::move(library);
       if (last.error().hint.starts_with("run: tandem model build")) last.error().hint = mend;
     }

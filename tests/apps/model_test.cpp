@@ -55,6 +55,13 @@ TEST_F(Model, ALibraryThatIsBroughtAlongNeedsNoCompiler) {
   EXPECT_NE(lacks.err.find("model build"), std::string::npos) << lacks.err;
   const Outcome has = tandem(run, bare + " TANDEM_MODELS=nowhere:brought");
   EXPECT_EQ(has.status, 0) << has.err;
+  // It was passed over in silence: the error was that another robot's library is another one's.
+  std::filesystem::permissions(folder_ / "brought" / name, std::filesystem::perms(0777));
+  const Outcome open = tandem(run, bare + " TANDEM_MODELS=brought");
+  EXPECT_EQ(open.status, 2);
+  EXPECT_NE(open.err.find(name), std::string::npos) << open.err;
+  EXPECT_NE(open.err.find("may be changed by everybody"), std::string::npos) << open.err;
+  std::filesystem::permissions(folder_ / "brought" / name, std::filesystem::perms(0755));
   edit("double_pendulum.urdf", "<mass value=\"", "<mass value=\"1");
   const Outcome other = tandem(run, bare + " TANDEM_MODELS=brought");
   EXPECT_EQ(other.status, 2);
