@@ -16,6 +16,15 @@ class Running : public Program {
     Program::SetUp();
     socket_ = tandem::test::socket_path();
   }
+  /// A test that ends early leaves no run behind: it would stay in a domain that others have next.
+  void TearDown() override {
+    if (run_.joinable()) {
+      (void)std::system(
+          ("kill -KILL $(cat " + shell_word((folder_ / "pid").string()) + ") 2>/dev/null").c_str());
+      run_.join();
+    }
+    Program::TearDown();
+  }
   /// `tandem run hold.toml MORE`, twenty times faster than a clock, until its controllers run.
   void begin(const std::string& more) {
     start("--rate 20 --duration 2000 " + more);
