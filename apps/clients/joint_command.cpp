@@ -34,7 +34,9 @@ bool in_degrees(const Asked& asked) {
 
 /// The joint, and the cycle of what is said of it.
 Result<Json> look(ControlClient& run, const std::string& name) {
-  const Result<Json> answer = run.ask({{"do", "joint.list"}});
+  Result<Json> answer = run.ask({{"do", "joint.list"}});
+  // Ctrl-C ends the waiting, which still says where the joint is.
+  if (!answer && rt::stop_requested()) answer = run.ask({{"do", "joint.list"}});
   if (!answer) return answer;
   const Result<Json> joint = named((*answer)["joints"], "joint", {name});
   if (!joint) return joint;
