@@ -9,7 +9,7 @@
 
 namespace tandem::apps {
 
-/// A datagram each to $NOTIFY_SOCKET; without that variable nothing is told, and nothing here
+/// A datagram each to $NOTIFY_SOCKET; without that variable none is sent, and nothing here
 /// fails. No call blocks but the last: what the manager has no room for is said at the next call.
 class ServiceNotice {
  public:

@@ -164,7 +164,7 @@ TEST(Documentation, LinksLeadSomewhere) {
   EXPECT_GT(links, 200);
 }
 
-// What a reader is told to look at, to copy or to start, without a link.
+// What pages ask a reader to look at, to copy or to start, without a link.
 TEST(Documentation, LinksToExamplesAndMessagesAreOfFilesThatAreThere) {
   const fs::path root = pages_folder();
   std::set<std::string> named;

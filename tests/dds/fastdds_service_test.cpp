@@ -32,7 +32,7 @@ Octets text_payload(const std::string& text) {
   return out;
 }
 
-/// Without padding, which is told in its fourth byte.
+/// Without padding: its fourth byte says how much there is.
 Octets unpadded(Octets payload) {
   if (payload.size() < 4) return payload;
   payload.resize(payload.size() - payload[3]);

@@ -105,7 +105,8 @@ int travels() {
   return wanted == nullptr ? 0 : std::stoi(wanted);
 }
 
-/// COMAN amid its squat goes to random cycles, then back to where it was, or on from there.
+/// COMAN in the middle of its squat goes to random cycles, then back to where it was, or on from
+/// there.
 TEST_F(HilTravel, ToAnyCycleAndOnIsTheRunThatWasNeverInterrupted) {
   if (travels() == 0) GTEST_SKIP() << "in make test-all: TANDEM_TRAVELS=100, takes minutes";
   const std::filesystem::path memory = std::filesystem::temp_directory_path() / "travel";
