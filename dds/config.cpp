@@ -203,11 +203,14 @@ std::string to_xml(const Config& config, bool any_ports) {
   <MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>
   <Peers>{}</Peers>
 </Discovery>
-<Internal><MaxSampleSize>{}</MaxSampleSize></Internal>
+<Internal><MaxSampleSize>{}</MaxSampleSize>{}</Internal>
 {}</Domain></CycloneDDS>
 )",
       interfaces, config.loopback_only() ? "false" : "spdp", any_ports ? "none" : "auto",
       kMostParticipants - 1, peers, kMostSampleBytes,
+      config.lost_per_mille == 0
+          ? ""
+          : fmt::format("<Test><XmitLossiness>{}</XmitLossiness></Test>", config.lost_per_mille),
       config.security.on() ? security_xml(config.security) : "");
 }
 

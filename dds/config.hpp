@@ -74,6 +74,7 @@ struct Config {
   std::vector<std::string> interfaces{"lo"};  ///< names or addresses of network interfaces
   std::vector<std::string> peers;             ///< addresses to look for others at, beside multicast
   SecurityConfig security;
+  int lost_per_mille = 0;  ///< of the packets that it sends, on purpose: for tests, no key
   /// [dds.every]: cycles of the loop between two samples, 0: none; empty: kTopicPeriods' default.
   std::array<std::optional<std::uint64_t>, kTopicPeriods.size()> every;
 

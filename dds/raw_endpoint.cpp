@@ -3,6 +3,8 @@
 
 #include <memory>
 
+#include "dds/cyclone_inside.hpp"
+
 namespace tandem::dds {
 namespace {
 
@@ -49,6 +51,7 @@ Result<RawEndpoint> RawEndpoint::create(EndpointKind kind, dds_entity_t particip
     return std::unexpected(dds_error(
         std::string("make a ") + (writes ? "writer" : "reader") + " of " + topic, end.get()));
   }
+  if (!writes && qos.reliable) tandem_dds_hear_from_first(end.get());
   return RawEndpoint{.topic = std::move(made), .entity = std::move(end)};
 }
 

@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-extern "C" void tandem_dds_send_hashes(dds_entity_t writer, const ddsi_sertype* type);
+#include "dds/cyclone_inside.hpp"
 
 namespace tandem::dds {
 namespace {
@@ -336,7 +336,7 @@ std::optional<FastCall> fast_call_of(const ddsi_serdata* request) { return packe
 bool write_reply(dds_entity_t writer, const ddsi_sertype* layout, const void* sample,
                  const std::optional<FastCall>& call) {
   if (!call) return dds_write(writer, sample) == DDS_RETCODE_OK;
-  tandem_dds_send_hashes(writer, layout);
+  tandem_dds_send_hashes(writer);
   Packed* reply = pack(layout, SDK_DATA, sample, call);
   if (reply == nullptr) return false;
   reply->timestamp.v = dds_time();
