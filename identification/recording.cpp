@@ -184,8 +184,8 @@ SimFacts sim_facts(const log::StringMap& configuration) {
     TomlTable root = document->root();
     TomlTable sim = root.table_or_empty("sim");
     facts.substep_ns = sim.integer_or("substep_ns", facts.substep_ns, 1, 1'000'000'000);
-    facts.semi_implicit =
-        sim.choice_or("integrator", "semi_implicit", {"semi_implicit", "rk4"}) == "semi_implicit";
+    facts.semi_implicit = sim.choice_or("integrator", "semi_implicit",
+                                        {"semi_implicit", "rk4", "leapfrog"}) == "semi_implicit";
     facts.hangs = sim.table_or_empty("hoist").number_or("lift_m", 0.0) > 0.0;
     break;
   }

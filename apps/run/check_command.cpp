@@ -73,6 +73,7 @@ void add_simulation_facts(const runtime::Experiment& e, Facts& facts) {
     integrator = sim::load_engine(e.sim.engine).value()->integrator;
   }
   if (e.sim.integrator == sim::Integrator::kRungeKutta4) integrator = "Runge-Kutta 4";
+  if (e.sim.integrator == sim::Integrator::kLeapfrog) integrator = "leapfrog";
   facts.add("integrator", fmt::format("{}, {} us steps", integrator,
                                       static_cast<double>(e.sim.substep_ns) * 1e-3));
 }

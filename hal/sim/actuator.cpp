@@ -102,6 +102,9 @@ Actuators::Actuators(std::vector<ActuatorModel> models, double ambient_C)
   free_.assign(n, 1.0);
   whole_.assign(n, 1.0);
   cooling_.assign(n, 1.0);
+  kick_s_.assign(n, 0.0);
+  limited_kick_s_.assign(n, 0.0);
+  limit_V_.assign(n, 0.0);
   brakes_.resize(n);
   brake_states_.resize(n);
   for (const ActuatorModel& model : models_) all_elastic_ &= model.order == 2;
@@ -238,9 +241,10 @@ double Actuators::rigid_brake(std::size_t joint, double q, double qd) const noex
          J * kBrakeFrequency_rad_s * (kBrakeFrequency_rad_s * (q - brake_rad_[joint]) + 2.0 * qd);
 }
 
-void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor, double* torque_Nm,
+void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor,
+                         const double* spring_rad_s, double* torque_Nm,
                          MotorState rate) const noexcept TANDEM_RT {
-  if (all_elastic()) return evaluate_elastic(q, qd, motor, torque_Nm, rate);
+  if (all_elastic()) return evaluate_elastic(q, qd, motor, spring_rad_s, torque_Nm, rate);
   for (std::size_t j = 0; j < models_.size(); ++j) {
     const ActuatorModel& m = models_[j];
     const double velocity = m.elastic() ? motor.velocity_rad_s[j] : qd[j];
@@ -264,7 +268,7 @@ void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor
       continue;
     }
     const double spring = whole_[j] * (m.spring_Nm_rad * (motor.position_rad[j] - q[j]) +
-                                       m.spring_damping_Nms_rad * (velocity - qd[j]));
+                                       m.spring_damping_Nms_rad * (spring_rad_s[j] - qd[j]));
     torque_Nm[j] = spring;
     rate.position_rad[j] = free_[j] * velocity;
     rate.velocity_rad_s[j] = free_[j] * ((drive - spring) / m.inertia_kg_m2);
@@ -284,6 +288,50 @@ void Actuators::step_semi_implicit(double h_s, MotorStateView rate,
       motor.velocity_rad_s[j] += h_s * rate.velocity_rad_s[j];
       motor.position_rad[j] += h_s * motor.velocity_rad_s[j];
     }
+  }
+}
+
+void Actuators::fit_kick(double h_s) noexcept {
+  kick_h_s_ = h_s;
+  for (std::size_t j = 0; j < models_.size(); ++j) {
+    const ActuatorModel& m = models_[j];
+    const auto fit = [&](double damping_Nms_rad) {
+      const double rate = damping_Nms_rad / m.inertia_kg_m2;
+      return h_s * rate > 1e-12 ? (1.0 - decay(h_s * rate)) / rate : h_s;
+    };
+    const double back_emf =
+        m.current_is_state() ? 0.0 : m.torque_per_A * m.back_emf_Vs_rad / m.resistance_ohm;
+    kick_s_[j] = fit(m.friction_Nms_rad + back_emf);
+    limited_kick_s_[j] = fit(m.friction_Nms_rad);
+    limit_V_[j] = elastic_.current_limit[j] * m.resistance_ohm;
+  }
+}
+
+void Actuators::kick(double h_s, MotorStateView rate, MotorState motor) noexcept TANDEM_RT {
+  if (h_s != kick_h_s_) fit_kick(h_s);
+  if (all_elastic()) return kick_elastic(rate, motor);
+  for (std::size_t j = 0; j < models_.size(); ++j) {
+    const ActuatorModel& m = models_[j];
+    if (!m.elastic() || braked(j)) continue;
+    const double driven_V = voltage_[j] - m.back_emf_Vs_rad * motor.velocity_rad_s[j];
+    const bool limited = !m.current_is_state() && std::abs(driven_V) > limit_V_[j];
+    motor.velocity_rad_s[j] += (limited ? limited_kick_s_[j] : kick_s_[j]) * rate.velocity_rad_s[j];
+  }
+}
+
+void Actuators::drift(double h_s, const double* q, MotorState motor) const noexcept TANDEM_RT {
+  const double* free = free_.data();
+  for (std::size_t j = 0; j < size(); ++j)
+    motor.position_rad[j] += h_s * free[j] * motor.velocity_rad_s[j];
+  if (all_elastic()) return;
+  for (std::size_t j = 0; j < models_.size(); ++j) {
+    const ActuatorModel& m = models_[j];
+    if (!m.elastic()) motor.position_rad[j] = q[j];
+    if (!m.current_is_state() || bridge_[j] == 0.0) continue;
+    const double settled =
+        (voltage_[j] - m.back_emf_Vs_rad * motor.velocity_rad_s[j]) / m.resistance_ohm;
+    motor.current_A[j] =
+        settled + (motor.current_A[j] - settled) * decay(h_s * m.resistance_ohm / m.inductance_H);
   }
 }
 
@@ -326,8 +374,8 @@ Actuators::Elastic<const double*> Actuators::pointers(const Elastic<std::vector<
 }
 
 TANDEM_WIDE void Actuators::evaluate_elastic(const double* q, const double* qd,
-                                             MotorStateView motor, double* torque_Nm,
-                                             MotorState rate) const noexcept {
+                                             MotorStateView motor, const double* spring_rad_s,
+                                             double* torque_Nm, MotorState rate) const noexcept {
   const Elastic<const double*> m = pointers(elastic_);
   const double *bridge = bridge_.data(), *free = free_.data(), *whole = whole_.data();
   const double* voltage = voltage_.data();
@@ -337,7 +385,7 @@ TANDEM_WIDE void Actuators::evaluate_elastic(const double* q, const double* qd,
     const double velocity = motor.velocity_rad_s[j];
     const double current = bridge[j] * order_2_current(m, j, voltage[j], velocity);
     const double spring = whole[j] * (m.spring[j] * (motor.position_rad[j] - q[j]) +
-                                      m.spring_damping[j] * (velocity - qd[j]));
+                                      m.spring_damping[j] * (spring_rad_s[j] - qd[j]));
     const double drive = m.torque_per_A[j] * current - m.friction[j] * velocity;
     torque_Nm[j] = spring;
     rate.position_rad[j] = free[j] * velocity;
@@ -354,6 +402,19 @@ TANDEM_WIDE void Actuators::step_elastic(double h_s, MotorStateView rate,
   for (std::size_t j = 0; j < n; ++j) {
     motor.velocity_rad_s[j] += h_s * rate.velocity_rad_s[j];
     motor.position_rad[j] += h_s * free[j] * motor.velocity_rad_s[j];
+  }
+}
+
+TANDEM_WIDE void Actuators::kick_elastic(MotorStateView rate, MotorState motor) const noexcept {
+  const double *kick = kick_s_.data(), *limited_kick = limited_kick_s_.data();
+  const double *limit_V = limit_V_.data(), *voltage = voltage_.data();
+  const double* back_emf = elastic_.back_emf.data();
+  const std::size_t n = size();
+  TANDEM_EACH_ALONE
+  for (std::size_t j = 0; j < n; ++j) {
+    const double driven_V = voltage[j] - back_emf[j] * motor.velocity_rad_s[j];
+    const double of_it = std::abs(driven_V) > limit_V[j] ? limited_kick[j] : kick[j];
+    motor.velocity_rad_s[j] += of_it * rate.velocity_rad_s[j];
   }
 }
 

@@ -122,13 +122,19 @@ class Actuators {
   }
 
   /// Torque on the links `torque_Nm` (n) and the motor state's rate of change.
-  void evaluate(const double* q, const double* qd, MotorStateView motor, double* torque_Nm,
-                MotorState rate) const noexcept TANDEM_RT;
+  /// @param spring_rad_s  (n) motor velocities that the springs' damping goes by
+  void evaluate(const double* q, const double* qd, MotorStateView motor, const double* spring_rad_s,
+                double* torque_Nm, MotorState rate) const noexcept TANDEM_RT;
 
   /// One semi-implicit step of length `h_s`: the current implicitly, the velocity, then the
   /// position with the new velocity.
   void step_semi_implicit(double h_s, MotorStateView rate,
                           MotorState motor) const noexcept TANDEM_RT;
+
+  /// Motor velocities `h_s` after they had `rate`: exactly, where only they themselves change it.
+  void kick(double h_s, MotorStateView rate, MotorState motor) noexcept TANDEM_RT;
+  /// Motor positions after `h_s` of their velocities, and currents that are states.
+  void drift(double h_s, const double* q, MotorState motor) const noexcept TANDEM_RT;
 
   /// After a step to link state q, qd: clamps currents, copies rigid links to their motors,
   /// computes algebraic currents, and warms the windings for `h_s`.
@@ -181,9 +187,12 @@ class Actuators {
   [[nodiscard]] bool all_elastic() const noexcept {
     return all_elastic_ && !any_brake_ && frictions_.empty();
   }
-  void evaluate_elastic(const double* q, const double* qd, MotorStateView motor, double* torque_Nm,
+  void evaluate_elastic(const double* q, const double* qd, MotorStateView motor,
+                        const double* spring_rad_s, double* torque_Nm,
                         MotorState rate) const noexcept;
   void step_elastic(double h_s, MotorStateView rate, MotorState motor) const noexcept;
+  void kick_elastic(MotorStateView rate, MotorState motor) const noexcept;
+  void fit_kick(double h_s) noexcept;
   void finish_elastic(MotorState motor) noexcept;
   void cool(double h_s) noexcept;
 
@@ -200,6 +209,10 @@ class Actuators {
   std::vector<double> friction_anchors_rad_;  // alike
   std::vector<double> cooling_;               // exp(-h / time constant) of the last step length
   double cooling_h_s_ = 0.0;
+  std::vector<double> kick_s_,
+      limited_kick_s_;           // the velocity's change over its rate, in kick_h_s_
+  std::vector<double> limit_V_;  // at which the current is limited, at rest
+  double kick_h_s_ = 0.0;
   double ambient_C_;
 };
 

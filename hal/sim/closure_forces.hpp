@@ -26,6 +26,9 @@ class ClosureForces {
   /// The positions have changed: what depends on them is computed when it is needed next.
   void changed() noexcept { fresh_ = false; }
 
+  /// Computes it now, as a restored snapshot needs.
+  void prepare(AddedInertia& added, const double* q, const double* v) noexcept;
+
   /// Zeroes the wrenches at the loops' sites.
   void let_go(double* wrench) const noexcept TANDEM_RT { loops_.clear_wrenches(wrench); }
 
@@ -56,7 +59,6 @@ class ClosureForces {
   }
 
  private:
-  void prepare(AddedInertia& added, const double* q, const double* v) noexcept;
   void impulse(const std::vector<double>& change) noexcept;
   void step_positions(double* q) const noexcept;
 

@@ -7,22 +7,18 @@
 #include <limits>
 
 namespace tandem::sim {
-namespace {
-
-constexpr double kTaken = 0.5;  // of the link's inertia
-
-double need_kg_m2(const ActuatorModel& m, double link_damping_Nms_rad, double u_s) {
+double LightJoints::need_kg_m2(const ActuatorModel& motor, double link_damping_Nms_rad, double u_s,
+                               double dampers) noexcept {
+  const ActuatorModel& m = motor;
   const double back_emf =
       m.resistance_ohm > 0.0 ? m.torque_per_A * m.back_emf_Vs_rad / m.resistance_ohm : 0.0;
   const double motor_damping = m.friction_Nms_rad + back_emf;
-  if (!m.elastic()) return u_s * (motor_damping + link_damping_Nms_rad);
-  const double spring = u_s * u_s * m.spring_Nm_rad + u_s * m.spring_damping_Nms_rad;
+  if (!m.elastic()) return dampers * u_s * (motor_damping + link_damping_Nms_rad);
+  const double spring = u_s * u_s * m.spring_Nm_rad + dampers * u_s * m.spring_damping_Nms_rad;
   const double left_of_motor = m.inertia_kg_m2 - spring - u_s * motor_damping;
   if (!(left_of_motor > 0.0)) return std::numeric_limits<double>::infinity();
-  return spring + spring * spring / left_of_motor + u_s * link_damping_Nms_rad;
+  return spring + spring * spring / left_of_motor + dampers * u_s * link_damping_Nms_rad;
 }
-
-}  // namespace
 
 LightJoints::LightJoints(const tandem_kernels& kernels, const Actuators& actuators,
                          std::span<const double> damping_Nms_rad,

@@ -27,6 +27,11 @@ namespace tandem::sim {
 class LightJoints {
  public:
   static constexpr std::int64_t kLook_ns = 10'000'000;  ///< between two looks; time 0 is one
+  static constexpr double kTaken = 0.5;                 ///< of a link's inertia, at most
+
+  /// need(h), with Ds, d and a rigid drive's b as many times as `dampers`.
+  [[nodiscard]] static double need_kg_m2(const ActuatorModel& motor, double link_damping_Nms_rad,
+                                         double u_s, double dampers = 1.0) noexcept;
 
   LightJoints() = default;
   /// Watches the joints that need more than half of the least inertia of `inertias`.

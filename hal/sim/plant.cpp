@@ -77,6 +77,7 @@ Plant::Plant(const PlantConfig& config)
       added_(*config.kernels),
       sines_(*config.kernels),
       integrator_(config.integrator),
+      leaps_(config.integrator == Integrator::kLeapfrog && config.engine == kOwnEngine),
       substep_ns_(config.substep_ns),
       release_ns_(config.release_ns),
       lifted_(config.lift_m != 0.0),
@@ -84,6 +85,10 @@ Plant::Plant(const PlantConfig& config)
       base_v_(config.kernels->floating_base != 0 ? 6 : 0),
       actuators_({}),
       x_(*config.kernels),
+      ahead_v_(kernels_->nv),
+      midway_v_(kernels_->nv),
+      damper_v_(2 * kernels_->joints),
+      predicted_(kernels_->joints, 1.0),
       rate_(x_),
       stage_(x_),
       sum_(x_) {
@@ -225,7 +230,7 @@ Status Plant::start(const PlantConfig& config) {
   for (const Load& load : config.carried) added_.carry(load);
 
   // Springs and hoist start with the load that keeps everything at rest.
-  touch_ground(x_, true);
+  touch_ground(x_, x_.v(), true);
   std::vector<double> load(kernels_->nv, 0.0);
   added_.inverse_dynamics(sines(), q.data(), v.data(), v.data(), wrench_.data(), load.data());
   loops_.equations().carry_passive(load.data());
@@ -278,8 +283,15 @@ void Plant::place_surroundings(const PlantConfig& config) {
   const auto postures = postures_within(added_, {q(), kernels_->nq}, ranges);
   stops_ = EndStops(*kernels_, ranges, joint_inertias(*kernels_, postures), substep_ns_);
   const auto many = postures_within(added_, {q(), kernels_->nq}, ranges, 128);
-  light_ = LightJoints(*kernels_, actuators_, damping_, joint_inertias(*kernels_, many),
-                       step_stretch(integrator_), substep_ns_);
+  const std::vector<JointInertia> inertias = joint_inertias(*kernels_, many);
+  light_ = LightJoints(*kernels_, actuators_, damping_, inertias, step_stretch(integrator_),
+                       substep_ns_);
+  const double u_s = static_cast<double>(substep_ns_) * 1e-9 / step_stretch(integrator_);
+  for (std::size_t j = 0; j < inertias.size(); ++j) {
+    const double need_kg_m2 =
+        LightJoints::need_kg_m2(actuators_.model(j), damping_[j], u_s, kPredictedDamper);
+    predicted_[j] = need_kg_m2 <= LightJoints::kTaken * inertias[j].least ? 1.0 : 0.0;
+  }
   if (!described) return;
   bodies_ = BodyContact(*config.robot, *config.tree, *kernels_, q(), postures, substep_ns_);
   std::vector<std::string> joints;
@@ -311,6 +323,7 @@ void Plant::set_state(std::span<const double> q, std::span<const double> v) noex
   if (engine_) engine_->set_state(q.data(), v.data());
   std::fill(point_forces_W_.begin(), point_forces_W_.end(), 0.0);
   contact_fresh_ = vdot_fresh_ = 0;
+  begin_leaps();
 }
 
 void Plant::set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexcept TANDEM_RT {
@@ -352,7 +365,7 @@ JointReading Plant::joint(std::size_t joint) const noexcept TANDEM_RT {
           x_.joint_v()[i],
           motors.position_rad[i],
           motors.velocity_rad_s[i],
-          tau_[base_v_ + i] + damping_[i] * x_.joint_v()[i],
+          tau_[base_v_ + i] + damping_[i] * (leaps_ ? damper_v_.data() : x_.joint_v())[i],
           motors.current_A[i],
           actuators_.voltage_V()[i],
           actuators_.temperature_C()[i]};
@@ -371,10 +384,11 @@ std::string Plant::diverged_text() const {
 }
 
 void Plant::archive(Archive& ar) {
-  ar(actuators_, added_, contact_, bodies_, hoist_, loops_, light_, x_, tau_, applied_tau_, vdot_,
-     wrench_, pose_, twist_, time_ns_, released_, contact_fresh_, vdot_fresh_, diverged_,
-     diverged_rate_, point_forces_W_, pushes_);
+  ar(actuators_, added_, contact_, bodies_, hoist_, loops_, light_, x_, ahead_v_, midway_v_,
+     damper_v_, tau_, applied_tau_, vdot_, wrench_, pose_, twist_, time_ns_, released_,
+     contact_fresh_, vdot_fresh_, diverged_, diverged_rate_, point_forces_W_, pushes_);
   if (ar.reading()) sines_.take(q());
+  if (ar.reading() && leaps_ && !loops_.none()) loops_.prepare(added_, q(), v());
   if (engine_) engine_->archive(ar);
 }
 

@@ -33,12 +33,16 @@ namespace tandem::sim {
 enum class Integrator : std::uint8_t {
   kSemiImplicitEuler,  ///< order 1, one evaluation a sub-step; positions move with new velocities
   kRungeKutta4,        ///< order 4, four evaluations a sub-step
+  kLeapfrog,           ///< order 2, one evaluation a sub-step: see docs/simulation.md
 };
 
 /// The sub-step in units of u, which hal/sim/stability.hpp limits.
 [[nodiscard]] constexpr double step_stretch(Integrator integrator) noexcept {
   return integrator == Integrator::kRungeKutta4 ? 2.6 : 2.0;
 }
+/// So many times as much a damper counts there whose velocity the leapfrog predicts: it is stable
+/// in half the sub-step.
+inline constexpr double kPredictedDamper = 2.0;
 
 /// One joint of the plant, in the process image's order.
 struct PlantJoint {
@@ -172,6 +176,10 @@ class Plant {
   [[nodiscard]] const BodyContact& bodies() const noexcept { return bodies_; }
   [[nodiscard]] const EndStops& end_stops() const noexcept { return stops_; }
   [[nodiscard]] const Actuators& actuators() const noexcept { return actuators_; }
+  /// Whether the dampers of the kernels' joint `joint` go by a velocity that is predicted.
+  [[nodiscard]] bool predicts(std::size_t joint) const noexcept {
+    return leaps_ && predicted_[joint] != 0.0;
+  }
   /// Index of joint `joint` among the kernels' joints.
   [[nodiscard]] std::size_t model_index(std::size_t joint) const noexcept { return map_[joint]; }
   /// The same of the passive joints, in PlantConfig's order.
@@ -201,12 +209,24 @@ class Plant {
   void hold(const double* q, std::span<const double> load);
 
   void evaluate(std::int64_t step_ns) noexcept;
-  void touch_ground(const PlantState& x, bool move_anchors, double ahead_s = 0.0) noexcept;
+  void touch_ground(const PlantState& x, const double* v, bool move_anchors,
+                    double ahead_s = 0.0) noexcept;
   [[nodiscard]] double rise_m(PlantState& at) noexcept;
-  void rates(const PlantState& x) noexcept;
-  [[nodiscard]] const std::vector<double>& with_ends_and_ground(const PlantState& x) noexcept;
+  /// At a state: by which velocity what goes.
+  struct Velocities {
+    const double *dynamics, *forces;              ///< (nv)
+    const double *joint_dampers, *motor_dampers;  ///< (n)
+  };
+  [[nodiscard]] static Velocities velocities_of(const PlantState& x) noexcept;
+  [[nodiscard]] Velocities leap_velocities() const noexcept;
+  void begin_leaps() noexcept;
+  void rates(const PlantState& x, const Velocities& v) noexcept;
+  [[nodiscard]] const std::vector<double>& with_ends_and_ground(const PlantState& x,
+                                                                const double* v) noexcept;
   void accelerate(const double* q, const double* v, const double* forces) noexcept;
   void step_runge_kutta(double h_s) noexcept;
+  void leap(double h_s) noexcept;
+  void land(double h_s) noexcept;
   void step_engine(double h_s) noexcept;
   [[nodiscard]] bool plausible() noexcept;
 
@@ -214,6 +234,7 @@ class Plant {
   AddedInertia added_;
   model::Sines sines_;  // of the last touch_ground()'s posture
   Integrator integrator_;
+  bool leaps_;  // our own bodies, by the leapfrog
   std::int64_t substep_ns_, release_ns_;
   bool lifted_;  // the hoist holds the base to the end
   double rate_limit_;
@@ -232,6 +253,9 @@ class Plant {
   std::unique_ptr<Engine> engine_;  // null: our own
 
   PlantState x_;
+  // By which velocities leap() evaluates: predicted (nv), half a step behind (nv), and of joints
+  // and motors (2n) the one or the other, as `predicted_` (n) is 1 or 0.
+  std::vector<double> ahead_v_, midway_v_, damper_v_, predicted_;
   PlantState rate_, stage_, sum_;  // scratch: of the last rates(); of Runge-Kutta
   std::vector<double> tau_;        // of actuators, joint friction and hoist
   std::vector<double> forces_;     // with what else acts, where anything does

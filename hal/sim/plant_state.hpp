@@ -46,6 +46,12 @@ class PlantState {
   void place(std::span<const double> q, std::span<const double> v) noexcept TANDEM_RT;
   /// One semi-implicit step of q and v.
   void step_bodies(double h_s, const double* vdot) noexcept TANDEM_RT;
+  /// v after `h_s` of an acceleration, at the same q.
+  /// @param vdot, at_v  (nv) v's rate of change as forward dynamics has it at the velocity `at_v`
+  void kick(double h_s, const double* vdot, const double* at_v) noexcept TANDEM_RT;
+  /// q after `h_s` of the velocity v.
+  /// @param ahead  (nv) a velocity at the old q; like v it comes out in the base's new axes
+  void drift(double h_s, double* ahead) noexcept TANDEM_RT;
   /// Becomes `from` after `h_s` of `rate`, with a quaternion of unit length.
   void move(const PlantState& from, double h_s, const PlantState& rate) noexcept TANDEM_RT;
 

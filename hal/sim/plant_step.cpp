@@ -10,7 +10,8 @@
 namespace tandem::sim {
 
 /// Everything at x, which is `ahead_s` from now, that does not need the forces.
-void Plant::touch_ground(const PlantState& x, bool move_anchors, double ahead_s) noexcept {
+void Plant::touch_ground(const PlantState& x, const double* v, bool move_anchors,
+                         double ahead_s) noexcept {
   sines_.take(x.q());
   if (contact_.terrain().moves()) {
     const double time_s = static_cast<double>(time_ns_) * 1e-9 + ahead_s;
@@ -18,40 +19,42 @@ void Plant::touch_ground(const PlantState& x, bool move_anchors, double ahead_s)
     contact_.move_ground(moved);
     bodies_.move_ground(moved);
   }
-  bodies_.evaluate(x.q(), x.v(), move_anchors);
+  bodies_.evaluate(x.q(), v, move_anchors);
   if (contact_.feet() == 0) return;
-  kernels_->site_twists_at(sines(), x.q(), x.v(), pose_.data(), twist_.data());
+  kernels_->site_twists_at(sines(), x.q(), v, pose_.data(), twist_.data());
   if (engine_) return contact_.take(pose_.data(), point_forces_W_.data(), wrench_.data());
   contact_.evaluate(pose_.data(), twist_.data(), move_anchors, wrench_.data());
 }
 
 /// Forces at x, vdot_ and the motors' part of rate_.
-void Plant::rates(const PlantState& x) noexcept {
-  const double* joint_v = x.joint_v();
+void Plant::rates(const PlantState& x, const Velocities& v) noexcept {
   double* joint_tau = tau_.data() + base_v_;
-  actuators_.evaluate(x.joint_q(), joint_v, x.motor(), joint_tau, rate_.motor());
-  for (std::size_t i = 0; i < kernels_->joints; ++i) joint_tau[i] -= damping_[i] * joint_v[i];
+  actuators_.evaluate(x.joint_q(), v.joint_dampers, x.motor(), v.motor_dampers, joint_tau,
+                      rate_.motor());
+  for (std::size_t i = 0; i < kernels_->joints; ++i)
+    joint_tau[i] -= damping_[i] * v.joint_dampers[i];
   if (base_v_ != 0) {
     std::fill_n(tau_.begin(), 6, 0.0);
-    hoist_.add_wrench(x.q(), x.v(), tau_.data());
+    hoist_.add_wrench(x.q(), v.forces, tau_.data());
   }
   // The same state with the same torques (elastic joints between two cycles): nothing to do.
-  const std::vector<double>& forces = with_ends_and_ground(x);
+  const std::vector<double>& forces = with_ends_and_ground(x, v.forces);
   const std::size_t bytes = forces.size() * sizeof(double);
   if (vdot_fresh_ != 0 && std::memcmp(forces.data(), applied_tau_.data(), bytes) == 0) return;
-  accelerate(x.q(), x.v(), forces.data());
+  accelerate(x.q(), v.dynamics, forces.data());
   applied_tau_ = forces;
 }
 
 /// tau_ itself, to the bit, while no joint is at an end, only soles touch the ground and nobody
 /// pushes.
-const std::vector<double>& Plant::with_ends_and_ground(const PlantState& x) noexcept {
+const std::vector<double>& Plant::with_ends_and_ground(const PlantState& x,
+                                                       const double* v) noexcept {
   const bool ends = stops_.touched(x.joint_q());
   if (!ends && !bodies_.touching() && !pushes_.any()) return tau_;
   forces_ = tau_;
-  if (ends) stops_.add_torques(x.joint_q(), x.joint_v(), forces_.data() + base_v_);
+  if (ends) stops_.add_torques(x.joint_q(), v + base_v_, forces_.data() + base_v_);
   if (bodies_.touching()) bodies_.add_forces(forces_.data());
-  if (pushes_.any()) pushes_.add_forces(x.q(), x.v(), forces_.data());
+  if (pushes_.any()) pushes_.add_forces(x.q(), v, forces_.data());
   return forces_;
 }
 
@@ -67,9 +70,10 @@ void Plant::accelerate(const double* q, const double* v, const double* forces) n
 }
 
 void Plant::evaluate() noexcept TANDEM_RT {
-  if (contact_fresh_ == 0) touch_ground(x_, true);
+  const Velocities v = leaps_ ? leap_velocities() : velocities_of(x_);
+  if (contact_fresh_ == 0) touch_ground(x_, v.forces, true);
   contact_fresh_ = 1;
-  rates(x_);
+  rates(x_, v);
   vdot_fresh_ = 1;
 }
 
@@ -94,6 +98,8 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
       step_engine(h_s);
     } else if (integrator_ == Integrator::kRungeKutta4) {
       step_runge_kutta(h_s);
+    } else if (leaps_) {
+      leap(h_s);
     } else {
       x_.step_bodies(h_s, vdot_.data());
       actuators_.step_semi_implicit(h_s, rate_.motor(), x_.motor());
@@ -101,11 +107,14 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
     if (!loops_.none()) loops_.project(added_, x_.q(), x_.v());
     bodies_.moved(v(), h_s);
     contact_fresh_ = vdot_fresh_ = 0;
-    actuators_.finish_step(h_s, x_.joint_q(), x_.joint_v(), x_.motor());
+    if (!leaps_) {
+      actuators_.finish_step(h_s, x_.joint_q(), x_.joint_v(), x_.motor());
+    }
     actuators_.advance_brakes(step_ns, x_.motor().position_rad);
     hoist_.advance(step_ns);
     time_ns_ += step_ns;
     duration_ns -= step_ns;
+    if (leaps_) land(h_s);
     if (!plausible()) return Code::kDiverged;
   }
   return Code::kOk;
@@ -123,6 +132,58 @@ void Plant::step_engine(double h_s) noexcept {
   actuators_.step_semi_implicit(h_s, rate_.motor(), x_.motor());
 }
 
+Plant::Velocities Plant::velocities_of(const PlantState& x) noexcept {
+  return {.dynamics = x.v(),
+          .forces = x.v(),
+          .joint_dampers = x.joint_v(),
+          .motor_dampers = x.motor().velocity_rad_s};
+}
+
+Plant::Velocities Plant::leap_velocities() const noexcept {
+  return {.dynamics = ahead_v_.data(),
+          .forces = midway_v_.data(),
+          .joint_dampers = damper_v_.data(),
+          .motor_dampers = damper_v_.data() + kernels_->joints};
+}
+
+/// The state is one of choice: no velocity is predicted, none is behind.
+void Plant::begin_leaps() noexcept {
+  std::copy_n(x_.v(), ahead_v_.size(), ahead_v_.begin());
+  std::copy_n(x_.v(), midway_v_.size(), midway_v_.begin());
+  std::copy_n(x_.joint_v(), kernels_->joints, damper_v_.begin());
+  std::copy_n(x_.motor().velocity_rad_s, kernels_->joints,
+              damper_v_.begin() + static_cast<std::ptrdiff_t>(kernels_->joints));
+}
+
+/// Half the kick, and the drift with the velocity that it gives.
+/// @pre rate_ and vdot_ are those of evaluate()
+void Plant::leap(double h_s) noexcept {
+  x_.kick(0.5 * h_s, vdot_.data(), ahead_v_.data());
+  actuators_.kick(0.5 * h_s, rate_.motor(), x_.motor());
+  std::copy_n(x_.v(), kernels_->nv + 2 * kernels_->joints, stage_.v());
+  stage_.kick(0.5 * h_s, vdot_.data(), ahead_v_.data());
+  actuators_.kick(0.5 * h_s, rate_.motor(), stage_.motor());
+  const std::size_t n = kernels_->joints;
+  const double *joint = x_.joint_v(), *motor = x_.motor().velocity_rad_s;
+  const double *joint_ahead = stage_.joint_v(), *motor_ahead = stage_.motor().velocity_rad_s;
+  for (std::size_t j = 0; j < n; ++j) {
+    damper_v_[j] = predicted_[j] != 0.0 ? joint_ahead[j] : joint[j];
+    damper_v_[n + j] = predicted_[j] != 0.0 ? motor_ahead[j] : motor[j];
+  }
+  std::copy_n(stage_.v(), ahead_v_.size(), ahead_v_.begin());
+  x_.drift(h_s, ahead_v_.data());
+  actuators_.drift(h_s, x_.joint_q(), x_.motor());
+}
+
+/// The other half of the kick, by the forces where the drift has led.
+void Plant::land(double h_s) noexcept {
+  std::copy_n(x_.v(), midway_v_.size(), midway_v_.begin());
+  evaluate();
+  x_.kick(0.5 * h_s, vdot_.data(), ahead_v_.data());
+  actuators_.kick(0.5 * h_s, rate_.motor(), x_.motor());
+  actuators_.finish_step(h_s, x_.joint_q(), x_.joint_v(), x_.motor());
+}
+
 /// @pre rate_ and vdot_ are those of evaluate()
 void Plant::step_runge_kutta(double h_s) noexcept {
   vdot_fresh_ = 0;
@@ -132,8 +193,8 @@ void Plant::step_runge_kutta(double h_s) noexcept {
   for (const auto& [ahead, weight] : kStages) {
     stage_.move(x_, ahead * h_s, rate_);
     loops_.changed();
-    touch_ground(stage_, false, ahead * h_s);
-    rates(stage_);
+    touch_ground(stage_, stage_.v(), false, ahead * h_s);
+    rates(stage_, velocities_of(stage_));
     rate_.follow(stage_, vdot_.data());
     sum_.add(weight, rate_);
   }

@@ -29,15 +29,16 @@ void add_joints(const PlantConfig& config, const Plant& plant, Linear& to) {
     const double motor_damping =
         m.friction_Nms_rad + m.torque_per_A * m.back_emf_Vs_rad / m.resistance_ohm;
     const Eigen::Index link = base + i, rotor = nv + i;
-    to.D(link, link) += config.joints[j].damping_Nms_rad;
+    const double dampers = plant.predicts(plant.model_index(j)) ? kPredictedDamper : 1.0;
+    to.D(link, link) += dampers * config.joints[j].damping_Nms_rad;
     if (!m.elastic()) {
-      to.D(link, link) += motor_damping;
+      to.D(link, link) += dampers * motor_damping;
       continue;
     }
     to.M(rotor, rotor) = m.inertia_kg_m2;
     to.D(rotor, rotor) += motor_damping;
-    for (const auto& [matrix, value] :
-         {std::pair{&to.K, m.spring_Nm_rad}, std::pair{&to.D, m.spring_damping_Nms_rad}}) {
+    for (const auto& [matrix, value] : {std::pair{&to.K, m.spring_Nm_rad},
+                                        std::pair{&to.D, dampers * m.spring_damping_Nms_rad}}) {
       (*matrix)(link, link) += value;
       (*matrix)(rotor, rotor) += value;
       (*matrix)(link, rotor) -= value;
@@ -50,7 +51,8 @@ void add_passive(const PlantConfig& config, const Plant& plant, Linear& to) {
   const Eigen::Index base = plant.kernels().nv - plant.kernels().joints;
   for (std::size_t j = 0; j < config.passive.size(); ++j) {
     const Eigen::Index link = base + static_cast<Eigen::Index>(plant.passive()[j]);
-    to.D(link, link) += config.passive[j].damping_Nms_rad;
+    const double dampers = plant.predicts(plant.passive()[j]) ? kPredictedDamper : 1.0;
+    to.D(link, link) += dampers * config.passive[j].damping_Nms_rad;
   }
 }
 

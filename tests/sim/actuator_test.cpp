@@ -82,7 +82,7 @@ class Rig {
   Eigen::VectorXd rate(const Eigen::VectorXd& at, double volt) {
     actuators_.set_drive(0, volt, bridge_on);
     Eigen::VectorXd dx(5);
-    actuators_.evaluate(&at[0], &at[1], {&at[2], &at[3], &at[4]}, &torque_Nm,
+    actuators_.evaluate(&at[0], &at[1], {&at[2], &at[3], &at[4]}, &at[3], &torque_Nm,
                         {&dx[2], &dx[3], &dx[4]});
     dx[0] = at[1];
     dx[1] = torque_Nm / inertia_;
@@ -225,7 +225,7 @@ TEST(Actuators, SemiImplicitStepsConvergeWithOrderOne) {
       double q = 0.0, qd = 0.0, th = 0.0, thd = 0.0, i = 0.0, tau = 0.0, r[3];
       const auto steps = static_cast<int>(std::lround(0.02 / h));
       for (int k = 0; k < steps; ++k) {
-        actuators.evaluate(&q, &qd, {&th, &thd, &i}, &tau, {r, r + 1, r + 2});
+        actuators.evaluate(&q, &qd, {&th, &thd, &i}, &thd, &tau, {r, r + 1, r + 2});
         actuators.step_semi_implicit(h, {r, r + 1, r + 2}, {&th, &thd, &i});
         actuators.finish_step(h, &q, &qd, {&th, &thd, &i});
       }
@@ -234,6 +234,31 @@ TEST(Actuators, SemiImplicitStepsConvergeWithOrderOne) {
     const double fine = end(1e-7);
     const double error = std::abs(end(2e-4) - fine), half = std::abs(end(1e-4) - fine);
     EXPECT_NEAR(std::log2(error / half), 1.0, 0.1) << "order " << order;
+  }
+}
+
+TEST(Actuators, LeapfrogConvergesWithOrderTwo) {
+  for (const int order : {2, 3}) {
+    const hal::ActuatorConfig config = motor("coman", order);
+    const auto end = [&](double h) {  // of the motor, its link held
+      Actuators actuators({*make_actuator(config)});
+      actuators.set_drive(0, 10.0, true);
+      double q = 0.0, qd = 0.0, th = 0.0, thd = 0.0, i = 0.0, tau = 0.0, r[3];
+      const auto steps = static_cast<int>(std::lround(0.02 / h));
+      for (int k = 0; k < steps; ++k) {
+        actuators.evaluate(&q, &qd, {&th, &thd, &i}, &thd, &tau, {r, r + 1, r + 2});
+        actuators.kick(0.5 * h, {r, r + 1, r + 2}, {&th, &thd, &i});
+        const double ahead = thd + 0.5 * h * r[1];
+        actuators.drift(h, &q, {&th, &thd, &i});
+        actuators.evaluate(&q, &qd, {&th, &thd, &i}, &ahead, &tau, {r, r + 1, r + 2});
+        actuators.kick(0.5 * h, {r, r + 1, r + 2}, {&th, &thd, &i});
+        actuators.finish_step(h, &q, &qd, {&th, &thd, &i});
+      }
+      return th;
+    };
+    const double fine = end(1e-7);
+    const double error = std::abs(end(2e-4) - fine), half = std::abs(end(1e-4) - fine);
+    EXPECT_NEAR(std::log2(error / half), 2.0, 0.1) << "order " << order;
   }
 }
 

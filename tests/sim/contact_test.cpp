@@ -121,7 +121,8 @@ TEST_P(BothIntegrators, SlidingBlockDeceleratesAtMuG) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Contact, BothIntegrators,
-                         testing::Values(Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4));
+                         testing::Values(Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4,
+                                         Integrator::kLeapfrog));
 
 TEST(Contact, SteepInclineIsSlidDownAtTheRateOfTheCone) {
   Plant plant = block_on(block_kernels<40>(), ground(0.5, 0.4), 0.05);
@@ -159,7 +160,8 @@ TEST(Contact, DropNeverGainsEnergy) {
 }
 
 TEST(Contact, ReboundsOfAFlatDropGetLower) {
-  for (const Integrator integrator : {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+  for (const Integrator integrator :
+       {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4, Integrator::kLeapfrog}) {
     Plant plant = block_on(block_kernels<0>(), ground(0.9, 0.8), 0.15, integrator);
     double apex = 0.15;
     for (int bounce = 0; bounce < 3; ++bounce) {

@@ -142,8 +142,8 @@ TEST_P(DryFriction, OfAPassiveJointIsAsExact) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Both, DryFriction,
-                         ::testing::Values(Integrator::kSemiImplicitEuler,
-                                           Integrator::kRungeKutta4));
+                         ::testing::Values(Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4,
+                                           Integrator::kLeapfrog));
 
 /// Anchors are state: a run goes on from a snapshot to the same bits.
 TEST(DryFrictionState, IsInSnapshots) {

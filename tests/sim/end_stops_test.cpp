@@ -33,7 +33,8 @@ double energy_J(const Plant& plant) {
 }
 
 TEST(EndStops, OfAJointThatDoesNotReachThemChangeNoBit) {
-  for (const Integrator integrator : {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+  for (const Integrator integrator :
+       {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4, Integrator::kLeapfrog}) {
     Plant with = swing(0.79, true, integrator), without = swing(0.79, false, integrator);
     for (int i = 0; i < 3000; ++i) {
       ASSERT_EQ(with.advance(1'000'000), Code::kOk);

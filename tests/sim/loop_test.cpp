@@ -257,7 +257,8 @@ TEST_F(FourBar, AdvancesClosesAndCarriesWithinTheCycle) {
 }
 
 TEST_F(FourBar, GoesOnFromASnapshotBitByBit) {
-  for (const Integrator integrator : {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+  for (const Integrator integrator :
+       {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4, Integrator::kLeapfrog}) {
     Plant plant = make(config({1.0}, integrator));
     ASSERT_EQ(plant.advance(100'000'000), Code::kOk);
     Archive saved;

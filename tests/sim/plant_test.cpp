@@ -82,6 +82,7 @@ TEST(Plant, IntegratorsConvergeWithTheirOrderOnAnElasticPendulum) {
         pendulum(order == 0 ? pendulum_kernels<139>() : pendulum_kernels<0>(), order, 0.0);
     EXPECT_NEAR(order_of(config, Integrator::kRungeKutta4, 1'600'000, prepare), 4.0, 0.25);
     EXPECT_NEAR(order_of(config, Integrator::kSemiImplicitEuler, 200'000, prepare), 1.0, 0.1);
+    EXPECT_NEAR(order_of(config, Integrator::kLeapfrog, 200'000, prepare), 2.0, 0.01);
   }
 }
 
@@ -94,6 +95,7 @@ TEST(Plant, IntegratorsConvergeWithTheirOrderOnATumblingBlock) {
   };
   EXPECT_NEAR(order_of(config, Integrator::kRungeKutta4, 8'000'000, prepare), 4.0, 0.25);
   EXPECT_NEAR(order_of(config, Integrator::kSemiImplicitEuler, 500'000, prepare), 1.0, 0.1);
+  EXPECT_NEAR(order_of(config, Integrator::kLeapfrog, 500'000, prepare), 2.0, 0.01);
 }
 
 TEST(Plant, FreeFlightKeepsMomentumAndFallsOnAParabola) {
@@ -121,7 +123,8 @@ TEST(Plant, FreeFlightKeepsMomentumAndFallsOnAParabola) {
 
 // A body that nothing acts on, spinning fast: both integrators keep its velocity in W.
 TEST(Plant, AFreeSpinningBodyFliesStraight) {
-  for (const Integrator integrator : {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+  for (const Integrator integrator :
+       {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4, Integrator::kLeapfrog}) {
     PlantConfig config;
     config.kernels = block_kernels<0>();
     config.integrator = integrator;
@@ -144,8 +147,9 @@ TEST(Plant, AFreeSpinningBodyFliesStraight) {
 TEST(Plant, PassivePendulumKeepsItsEnergy) {
   PlantConfig config = pendulum(pendulum_kernels<0>(), 0, 1.2);
   config.joints[0].actuator.damping_Nms_rad = 0.0;  // bridge off and no friction: a free joint
-  for (const auto& [integrator, bound] : {std::pair{Integrator::kRungeKutta4, 1e-9},
-                                          std::pair{Integrator::kSemiImplicitEuler, 2e-2}}) {
+  for (const auto& [integrator, bound] :
+       {std::pair{Integrator::kRungeKutta4, 1e-9}, std::pair{Integrator::kLeapfrog, 2e-6},
+        std::pair{Integrator::kSemiImplicitEuler, 2e-2}}) {
     config.integrator = integrator;
     Plant plant = make(config);
     const auto energy = [&] {
@@ -182,7 +186,8 @@ TEST(Plant, JointDampingSlowsTheLinkAndIsNoSpringTorque) {
 }
 
 TEST(Plant, StepsAreTheSameHoweverTheTimeIsCut) {
-  for (const Integrator integrator : {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+  for (const Integrator integrator :
+       {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4, Integrator::kLeapfrog}) {
     for (const int order : {0, 3}) {
       PlantConfig config = pendulum(pendulum_kernels<0>(), order, 0.7);
       config.integrator = integrator;
@@ -334,7 +339,8 @@ double gravity_Nm(double q) {
 
 TEST(PlantBrake, HoldsWithoutCreeping) {
   for (const int order : {0, 2}) {
-    for (const Integrator integrator : {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+    for (const Integrator integrator :
+         {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4, Integrator::kLeapfrog}) {
       PlantConfig config = braked(order, 20.0);  // the spring swings to twice the load at first
       config.integrator = integrator;
       config.joints[0].actuator.spring_damping_Nms_rad = 5.0;
@@ -350,7 +356,8 @@ TEST(PlantBrake, HoldsWithoutCreeping) {
 
 // Dry friction takes torque_Nm for every rad: nothing else does here.
 TEST(PlantBrake, SlipsAboveItsTorqueAndTakesJustThatMuchEnergy) {
-  for (const Integrator integrator : {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+  for (const Integrator integrator :
+       {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4, Integrator::kLeapfrog}) {
     PlantConfig config = braked(0, 5.0);
     config.integrator = integrator;
     config.substep_ns = 50'000;

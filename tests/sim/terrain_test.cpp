@@ -112,7 +112,8 @@ TEST_P(Slopes, AboveItABlockSlidesAtTheRateOfTheCone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Terrain, Slopes,
-                         testing::Values(Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4));
+                         testing::Values(Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4,
+                                         Integrator::kLeapfrog));
 
 // Acceleration from force, and force from acceleration.
 TEST(Terrain, ForwardDynamicsAndInverseAgreeWithItsForce) {
