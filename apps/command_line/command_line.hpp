@@ -204,7 +204,7 @@ struct ModelOptions {
   std::string robot;   ///< robot.toml
   std::string output;  ///< library; empty: beside `tandem` or in the cache. kRos2: folder; empty:
                        ///< the package's name
-  std::string controller = "joint_trajectory_controller";  ///< kRos2: whose action moves the robot
+  std::string controller = "trajectory";  ///< kRos2: whose action moves the robot
   std::string kernel_variant;
   bool force = false;
   std::string json;

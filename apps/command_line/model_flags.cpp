@@ -55,7 +55,7 @@ void add_flags(CLI::App& app, ModelOptions& o) {
   ros2->add_option("-o,--output", o.output, "Folder to write (default: the package's name)")
       ->check(is_given("name a folder"));
   ros2->add_option("--controller", o.controller,
-                   "NAME of the run's action NAME/follow_joint_trajectory")
+                   "Controller of the run that serves NAME/follow_joint_trajectory")
       ->capture_default_str()
       ->check(is_given("name a controller"));
   ros2->footer(kModelRos2Examples);

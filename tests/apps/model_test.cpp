@@ -231,7 +231,7 @@ TEST_F(Model, WritesAPackageForRos2Once) {
   const Outcome made = tandem("model ros2 robot.toml");
   ASSERT_EQ(made.status, 0) << made.err;
   for (const char* part : {"double_pendulum_moveit_config: 12 files in double_pendulum_moveit",
-                           "moved by joint_trajectory_controller/follow_joint_trajectory",
+                           "moved by trajectory/follow_joint_trajectory",
                            "ros2 launch double_pendulum_moveit_config moveit.launch.py"})
     EXPECT_NE(made.out.find(part), std::string::npos) << made.out;
   const std::filesystem::path folder = folder_ / "double_pendulum_moveit_config";
