@@ -46,6 +46,8 @@ std::vector<char*> arguments_of(const std::vector<std::string>& words) {
 
 namespace {
 
+constexpr const char* kSelf = "/proc/self/exe";
+
 std::string& stands_for() {
   static std::string path;
   return path;
@@ -56,8 +58,15 @@ std::string& stands_for() {
 std::string program_file() {
   if (!stands_for().empty()) return stands_for();
   std::error_code ignored;
-  return std::filesystem::read_symlink("/proc/self/exe", ignored).string();
+  std::string file = std::filesystem::read_symlink(kSelf, ignored).string();
+  // The kernel's word for a file whose name another one has taken.
+  constexpr std::string_view kReplaced = " (deleted)";
+  if (file.ends_with(kReplaced) && !std::filesystem::exists(file, ignored))
+    file.resize(file.size() - kReplaced.size());
+  return file;
 }
+
+std::string same_program() { return stands_for().empty() ? kSelf : stands_for(); }
 
 void stand_for_program(std::string path) { stands_for() = std::move(path); }
 

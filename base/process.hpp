@@ -29,8 +29,10 @@ struct Spawn {
 [[nodiscard]] Result<pid_t> spawn(const Spawn& what);
 
 /// The file of this program: its parts (controllers, kernels, engines) are found from there, and
-/// its owner is trusted.
+/// its owner is trusted. After an upgrade it is the new program's.
 [[nodiscard]] std::string program_file();
+/// For spawn(): this program once more, also after an upgrade.
+[[nodiscard]] std::string same_program();
 /// For a library in another program, such as Python's module: it is `path` whose parts are used. To
 /// be called before anything else is.
 void stand_for_program(std::string path);

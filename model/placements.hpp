@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -20,6 +21,15 @@ namespace tandem::model {
            AngleAxisd(rpy_rad[0], Vector3d::UnitX()))
               .toRotationMatrix(),
           Vector3d(xyz_m.data())};
+}
+
+/// Roll, pitch, yaw about fixed axes of such a frame [rad]; where the pitch is a right angle, the
+/// yaw is 0.
+[[nodiscard]] inline std::array<double, 3> rpy_of(const Eigen::Matrix3d& R) {
+  const double across = std::hypot(R(0, 0), R(1, 0));
+  const double pitch = std::atan2(-R(2, 0), across);
+  if (across < 1e-9) return {std::atan2(-R(1, 2), R(1, 1)), pitch, 0.0};
+  return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
 }
 
 /// Where every body stands in the world, the base first.

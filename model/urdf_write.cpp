@@ -5,11 +5,14 @@
 #include <tinyxml2.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <set>
 
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 #include "base/xml_scan.hpp"
+#include "model/placements.hpp"
 
 namespace tandem::model {
 namespace {
@@ -17,8 +20,12 @@ namespace {
 /// The shortest decimal number that is read back as the same double.
 std::string shortest_text(double value) {
   char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
+  const auto end = std::to_chars(text, text + sizeof text, value + 0.0).ptr;  // no -0
   return {text, end};
+}
+
+std::string shortest_texts(const Eigen::Vector3d& v) {
+  return shortest_text(v.x()) + " " + shortest_text(v.y()) + " " + shortest_text(v.z());
 }
 
 /// An element's bytes: [begin, end) with its tags, [inside, inside_end) between them. One that
@@ -99,8 +106,7 @@ std::vector<Part> parts_of(const Inertia& inertia) {
                                                     {"iyz", I(1, 2)}, {"izz", I(2, 2)}};
   for (const auto& [name, value] : entries)
     moments += std::string(" ") + name + "=\"" + shortest_text(value) + "\"";
-  return {{"origin", "<origin xyz=\"" + shortest_text(c.x()) + " " + shortest_text(c.y()) + " " +
-                         shortest_text(c.z()) + "\" rpy=\"0 0 0\"/>"},
+  return {{"origin", "<origin xyz=\"" + shortest_texts(c) + "\" rpy=\"0 0 0\"/>"},
           {"mass", "<mass value=\"" + shortest_text(inertia.mass_kg) + "\"/>"},
           {"inertia", moments + "/>"}};
 }
@@ -278,6 +284,38 @@ Result<std::string> with_inertias(std::string_view text,
     } else {
       edit_inertial(text, all, inertials[0], inertia, edits);
     }
+  }
+  return edited(text, std::move(edits));
+}
+
+Result<std::string> with_fixed(std::string_view text,
+                               const std::vector<std::pair<std::string, Placement>>& placements) {
+  tinyxml2::XMLDocument document;
+  const std::string plain = without_instructions(text);
+  if (document.Parse(plain.data(), plain.size()) != tinyxml2::XML_SUCCESS ||
+      document.RootElement() == nullptr) {
+    return fail("the description is no XML", "name a URDF");
+  }
+  const std::vector<Element> all = elements_of(text);
+  const std::vector<Element> joints = children(all, all.front(), "joint");
+  std::vector<Edit> edits;
+  for (const auto& [name, placement] : placements) {
+    const auto joint = std::ranges::find_if(
+        joints, [&](const Element& e) { return name_attribute(text, e) == name; });
+    if (joint == joints.end()) return fail("the description has no joint '" + name + "'");
+    const std::string outer = indentation(text, joint->begin);
+    const std::array<double, 3> rpy = rpy_of(placement.R);
+    std::string fixed = "<joint name=\"" + xml_text(name) + "\" type=\"fixed\">\n" + outer +
+                        "  <origin xyz=\"" + shortest_texts(placement.p) + "\" rpy=\"" +
+                        shortest_texts(Eigen::Vector3d(rpy.data())) + "\"/>\n";
+    for (const char* end : {"parent", "child"}) {
+      const std::vector<Element> found = children(all, *joint, end);
+      if (found.empty()) return fail("joint '" + name + "' has no <" + std::string(end) + ">");
+      fixed += outer + "  ";
+      fixed += text.substr(found[0].begin, found[0].end - found[0].begin);
+      fixed += '\n';
+    }
+    edits.push_back({joint->begin, joint->end, fixed + outer + "</joint>"});
   }
   return edited(text, std::move(edits));
 }

@@ -1,4 +1,4 @@
-// A URDF's text with other inertias, or without some limbs.
+// A URDF's text with other inertias, without some limbs, or with joints that stand still.
 // Layer: model.  Thread: non-RT only.
 #pragma once
 
@@ -28,5 +28,12 @@ namespace tandem::model {
 [[nodiscard]] Result<std::string> without_limbs(std::string_view text,
                                                 const std::vector<std::string>& names,
                                                 const std::vector<std::string>& still = {});
+
+/// `text` with these joints fixed, whatever they were; all else stays, to the byte.
+///
+/// @param placements  joint and where its child's frame stands in its parent link's
+/// Errors: no XML; a joint that is not there, or lacks a parent or a child.
+[[nodiscard]] Result<std::string> with_fixed(
+    std::string_view text, const std::vector<std::pair<std::string, Placement>>& placements);
 
 }  // namespace tandem::model

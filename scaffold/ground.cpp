@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "model/placements.hpp"
 #include "scaffold/posed.hpp"
 
 namespace tandem::scaffold {
@@ -23,13 +24,8 @@ hal::SiteConfig site_of(const model::Tree& tree, const FoundFoot& foot) {
   site.name = foot.name;
   site.link = tree.links[foot.link].name;
   site.wrench = true;
-  const Eigen::Matrix3d& R = foot.sole_in_link.R;
-  // Roll, pitch, yaw about fixed axes.
-  const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
-  const bool upright = std::hypot(R(0, 0), R(1, 0)) < 1e-9;
-  const double roll = upright ? std::atan2(-R(1, 2), R(1, 1)) : std::atan2(R(2, 1), R(2, 2));
-  const double yaw = upright ? 0.0 : std::atan2(R(1, 0), R(0, 0));
-  site.rpy_rad = {clean(roll, 1e-8), clean(pitch, 1e-8), clean(yaw, 1e-8)};
+  const std::array<double, 3> rpy = model::rpy_of(foot.sole_in_link.R);
+  for (int i = 0; i < 3; ++i) site.rpy_rad[i] = clean(rpy[i], 1e-8);
   for (int i = 0; i < 3; ++i) site.xyz_m[i] = clean(foot.sole_in_link.p[i], 1e-6);
   return site;
 }

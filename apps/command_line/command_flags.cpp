@@ -73,21 +73,6 @@ const char kControllerNewExamples[] = R"(Examples:
   tandem controller new reach --robot panda          on another robot
   tandem controller new reach --robot my/robot.toml -o controllers/reach)";
 
-const char kModelExamples[] = R"(Examples:
-  tandem model build config/coman/robot.toml         generates and compiles the robot's kernels
-  tandem model info config/coman/robot.toml          joints, mass, operation counts and sizes)";
-
-const char kModelBuildExamples[] = R"(Examples:
-  tandem model build config/coman/robot.toml
-  tandem model build my_robot/robot.toml -o kernels/    for a computer without a compiler
-Without -o the library goes to the cache folder ($XDG_CACHE_HOME/tandem/models, or
-~/.cache/tandem/models), where `tandem run` finds it by the robot's name and the hash of its
-files. A library that is up to date is not built again.)";
-
-const char kModelInfoExamples[] = R"(Examples:
-  tandem model info config/walkman/robot.toml
-  tandem model info config/walkman/robot.toml --kernel-variant baseline --json -)";
-
 const char kEdsExamples[] = R"(Examples:
   tandem eds config/coman/robot.toml                 data sheets of its boards and sensors into eds/
   tandem eds my_robot.toml -o sheets --json -        the files and the nodes that each is for
@@ -383,26 +368,6 @@ void add_flags(CLI::App& app, ControllerCheckOptions& o) {
   app.add_flag("--quiet,-q", o.quiet, "No table");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kControllerCheckExamples);
-}
-
-void add_flags(CLI::App& app, ModelOptions& o) {
-  app.require_subcommand(1);
-  app.footer(kModelExamples);
-  CLI::App* build = app.add_subcommand("build", "Generate and compile a robot's kernels");
-  build->add_option("robot", o.robot, kRobotHelp)
-      ->required()
-      ->transform(a_bundled(Bundled::kRobot));
-  build->add_option("-o,--output", o.output,
-                    "Shared library to write, or a folder for ROBOT-HASH_kernels.so");
-  build->add_flag("--force", o.force, "Build even when the library is up to date");
-  build->footer(kModelBuildExamples);
-  build->callback([&o] { o.action = ModelOptions::Action::kBuild; });
-  CLI::App* info = app.add_subcommand("info", "Joints, mass, operation counts and sizes");
-  info->add_option("robot", o.robot, kRobotHelp)->required()->transform(a_bundled(Bundled::kRobot));
-  info->add_option("--kernel-variant", o.kernel_variant, "baseline, x86-64-v3, …");
-  info->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
-  info->footer(kModelInfoExamples);
-  info->callback([&o] { o.action = ModelOptions::Action::kInfo; });
 }
 
 void add_flags(CLI::App& app, NewOptions& o) {

@@ -232,7 +232,8 @@ void add_all(Subcommands& commands) {
   commands.add<IdentifyOptions>("identify", Task::kMake, "Masses, inertias and friction from logs");
   commands.add<LogOptions>("log", Task::kSee,
                            "Logs: info, csv, export, diff, import, replay, thresholds");
-  commands.add<ModelOptions>("model", Task::kMake, "A robot's generated kernels: build, info");
+  commands.add<ModelOptions>("model", Task::kMake,
+                             "A robot's kernels, and its package for ROS 2: build, info, ros2");
   commands.add<NewOptions>("new", Task::kMake, "A robot's folder from its URDF alone");
   commands.add<EdsOptions>("eds", Task::kMake,
                            "Data sheets (EDS): write those of a robot's nodes, show one");

@@ -198,11 +198,13 @@ struct EmulateOptions {
   StudioOptions studio{};
 };
 
-/// tandem model build|info ROBOT
+/// tandem model build|info|ros2 ROBOT
 struct ModelOptions {
-  enum class Action : std::uint8_t { kBuild, kInfo } action = Action::kBuild;
+  enum class Action : std::uint8_t { kBuild, kInfo, kRos2 } action = Action::kBuild;
   std::string robot;   ///< robot.toml
-  std::string output;  ///< library; empty: beside `tandem` or in the cache
+  std::string output;  ///< library; empty: beside `tandem` or in the cache. kRos2: folder; empty:
+                       ///< the package's name
+  std::string controller = "trajectory";  ///< kRos2: whose action moves the robot
   std::string kernel_variant;
   bool force = false;
   std::string json;

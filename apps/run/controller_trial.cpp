@@ -148,7 +148,7 @@ Status tried(const RunOptions& options, const ControllerTrial& trial) {
     if (write_all(*request, json_text(request_of(options, trial))) != 0)
       return untried("the disk is full");
   }
-  const auto child = spawn({.command = {program_file(), kTryController, asked}, .output = said});
+  const auto child = spawn({.command = {same_program(), kTryController, asked}, .output = said});
   if (!child) return untried(child.error().message);
   const milliseconds limit = runtime::ControllerHost::kConfigureTime;
   const std::optional<int> status = wait_for_trial(*child, limit, said);

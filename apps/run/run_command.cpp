@@ -154,9 +154,7 @@ class Session {
     if (!dds) return std::unexpected(dds.error());
     dds_ = std::move(*dds);
     if (!options_.no_log) {
-      const std::string& asked = options_.log_folder;
-      auto recorder = runtime::open_log(c_, asked.empty() ? experiment().log.folder : asked, {},
-                                        past_->branch());
+      auto recorder = runtime::open_log(c_, options_.log_folder, {}, past_->branch());
       if (!recorder) return std::unexpected(recorder.error());
       recorder_ = std::move(*recorder);
       plugins_at_start_ = c_.controllers->code().size();
@@ -421,7 +419,10 @@ std::optional<Exit> reach(WiredComposition& c, const RunOptions& options, Servic
       notice.stops();
       return rt::stop_requested() ? interrupted(rt::stop_signal()) : Exit::kDone;
     }
-    const Diagnostics errors = connect(c, options.record_frames);
+    Diagnostics errors = connect(c, options.record_frames);
+    if (errors.empty() && !options.no_log) {
+      if (Status log = runtime::make_log_room(c, options.log_folder); !log) errors = {log.error()};
+    }
     if ((*room)->answer(errors.empty() ? std::nullopt : std::optional(errors.front()))) return {};
     disconnect(c);
   }
@@ -436,6 +437,7 @@ Exit run_once(RunOptions options, Gate* gate, ServiceNotice& notice, ReportOfRun
       {.build = options.lacks_kernels.empty() ? builder(options.quiet)
                                               : not_built(options.lacks_kernels)});
   if (!composition) return refuse(composition.error());
+  if (options.log_folder.empty()) options.log_folder = (*composition)->experiment.log.folder;
   warn_of_inertias((*composition)->experiment);
   print_warnings(std::exchange((*composition)->warnings, {}));
   rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels

@@ -11,9 +11,16 @@
 #include "apps/text/figures.hpp"
 #include "base/result.hpp"
 
+namespace tandem::robot {
+struct RobotFiles;
+}  // namespace tandem::robot
+
 namespace tandem::apps {
 
 [[nodiscard]] Exit model_command(const ModelOptions& options);
+/// A part of it: writes a robot's package for ROS 2 and MoveIt.
+[[nodiscard]] Status write_ros2_package(const robot::RobotFiles& robot,
+                                        const ModelOptions& options);
 /// Writes a robot's folder from its description: robot.toml, hold.toml, move.toml.
 [[nodiscard]] Exit new_command(const NewOptions& options);
 /// Writes the project of a new controller: source, tests, experiment, build.

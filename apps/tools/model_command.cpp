@@ -1,6 +1,8 @@
-// `tandem model`: builds a robot's kernels, and shows what its description amounts to.
+// `tandem model`: builds a robot's kernels, shows what its description amounts to, and writes its
+// package for ROS 2.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "apps/robot/kernel_build.hpp"
@@ -113,12 +115,22 @@ Status info(const robot::RobotFiles& robot, const ModelOptions& options) {
 }  // namespace
 
 Exit model_command(const ModelOptions& options) {
-  const bool builds = options.action == ModelOptions::Action::kBuild;
-  const char* command = builds ? "tandem model build" : "tandem model info";
-  if (const auto wrong = wrong_kind(options.robot, Takes::kRobot, command)) return refuse(*wrong);
+  struct Row {
+    ModelOptions::Action action;
+    const char* command;
+    Status (*perform)(const robot::RobotFiles& robot, const ModelOptions& options);
+  };
+  static constexpr Row kRows[] = {
+      {ModelOptions::Action::kBuild, "tandem model build", build},
+      {ModelOptions::Action::kInfo, "tandem model info", info},
+      {ModelOptions::Action::kRos2, "tandem model ros2", write_ros2_package},
+  };
+  const Row& row = *std::ranges::find(kRows, options.action, &Row::action);
+  if (const auto wrong = wrong_kind(options.robot, Takes::kRobot, row.command))
+    return refuse(*wrong);
   const auto robot = robot::read_robot(options.robot);
   if (!robot) return refuse(robot.error());
-  const Status done = builds ? build(*robot, options) : info(*robot, options);
+  const Status done = row.perform(*robot, options);
   if (done) return Exit::kDone;
   return refuse(done.error());
 }

@@ -319,6 +319,20 @@ std::uint64_t needed_bytes(const Composition& c, const log::DiskLimits& limits) 
                                       : least(limits.total_bytes, limits.total_ns));
 }
 
+/// What the names of its logs begin with.
+std::string log_name(const Composition& c) {
+  return c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
+}
+
+/// Makes the folder, and room for the log in it. `options` gets the files of runs before.
+Status find_room(const Composition& c, const std::string& folder, log::RecorderOptions& options) {
+  if (Status made = make_folder(folder); !made) return made;
+  options.earlier.emplace(options.limits);
+  if (c.experiment.log.budget == LogBudget::kExperiment)
+    options.earlier->take_over(folder, log_name(c));
+  return make_room(folder, needed_bytes(c, options.limits), c.experiment.log, *options.earlier);
+}
+
 /// "2.5 h", "12 min", "40 s": as long as that is.
 std::string time_text(double seconds) {
   constexpr double kMinute_s = 60.0, kHour_s = 3600.0;
@@ -371,19 +385,18 @@ log::StringMap loaded_later(const ControllerHost& host, std::size_t known) {
   return {{"loaded_controllers", later}};
 }
 
+Status make_log_room(const Composition& c, const std::string& folder) {
+  log::RecorderOptions options = recorder_options(c);
+  return find_room(c, folder, options);
+}
+
 Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& folder,
                                                 const std::string& file_name,
                                                 const log::Branch& branch) {
   log::RecorderOptions options = recorder_options(c);
   const bool all_runs = c.experiment.log.budget == LogBudget::kExperiment;
-  const std::string name =
-      c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
-  if (const Status s = make_folder(folder); !s) return std::unexpected(s.error());
-  options.earlier.emplace(options.limits);
-  if (all_runs) options.earlier->take_over(folder, name);
-  const std::uint64_t needed = needed_bytes(c, options.limits);
-  if (const Status s = make_room(folder, needed, c.experiment.log, *options.earlier); !s)
-    return std::unexpected(s.error());
+  const std::string name = log_name(c);
+  if (const Status s = find_room(c, folder, options); !s) return std::unexpected(s.error());
   auto claimed = file_name.empty() ? claim_file(folder, name, all_runs)
                                    : claim_named(fs::path(folder) / file_name);
   if (!claimed) return std::unexpected(claimed.error());

@@ -18,6 +18,10 @@ namespace tandem::runtime {
 /// "sim", "can", "can lockstep", "ethercat", "dds", "dds lockstep", for logs and summaries.
 [[nodiscard]] std::string hal_name(const Experiment& e);
 
+/// Makes `folder`, and room for the run's log in it: the oldest logs of runs before go, where they
+/// may. Errors: open_log()'s of folder and room.
+[[nodiscard]] Status make_log_room(const Composition& composition, const std::string& folder);
+
 /// Opens FOLDER/ROBOT-EXPERIMENT-NNN.mcap, the next free number, or FOLDER/FILE.
 ///
 /// @param folder  created when it is missing.

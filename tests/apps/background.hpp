@@ -19,11 +19,13 @@ namespace tandem::apps {
 class Background {
  public:
   /// Starts `tandem ARGUMENTS` in `folder`, as a shell reads them. It writes NAME.txt and NAME.err.
+  /// @param program  another one than that of the build
   Background(const std::filesystem::path& folder, const std::string& arguments,
-             const std::string& name) {
+             const std::string& name,
+             const std::string& program = TANDEM_BINARY_DIR "/bin/tandem") {
     const std::string command = "cd " + shell_word(folder.string()) + " && exec " +
-                                shell_word(TANDEM_BINARY_DIR "/bin/tandem") + " " + arguments +
-                                " >" + name + ".txt 2>" + name + ".err </dev/null";
+                                shell_word(program) + " " + arguments + " >" + name + ".txt 2>" +
+                                name + ".err </dev/null";
     const pid_t test = ::getpid();
     process_ = ::fork();
     if (process_ != 0) return;

@@ -125,7 +125,8 @@ TEST_F(BadInput, AFolderIsRefusedWithTheCommandsForWhatIsInIt) {
 }
 
 TEST_F(BadInput, AnExperimentInPlaceOfARobotIsRefusedWithTheRobotsCommand) {
-  for (const std::string command : {"model info", "model build", "eds", "check --repair"}) {
+  for (const std::string command :
+       {"model info", "model build", "model ros2", "eds", "check --repair"}) {
     expect_refused({"hold.toml: this is an experiment, and a robot is needed",
                     "(type: tandem " + command + " robot.toml)"},
                    command + " hold.toml");

@@ -1,4 +1,8 @@
 // `tandem model`: libraries that are built once, and their figures.
+#include <unistd.h>
+
+#include <map>
+
 #include "tests/apps/program.hpp"
 
 namespace tandem::apps {
@@ -210,6 +214,74 @@ TEST_F(Model, InfoTellsOfAVariantByName) {
   const Outcome outcome = tandem("model info robot.toml --kernel-variant baseline --json -");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(nlohmann::json::parse(outcome.out)["kernel_variant"], "baseline");
+}
+
+/// What is in a folder, by its path there.
+std::map<std::string, std::string> files_in(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file())
+      files[entry.path().lexically_relative(folder).string()] = read_text(entry.path());
+  }
+  return files;
+}
+
+// What is in the files: tests/scaffold/moveit_test.cpp.
+TEST_F(Model, WritesAPackageForRos2Once) {
+  const Outcome made = tandem("model ros2 robot.toml");
+  ASSERT_EQ(made.status, 0) << made.err;
+  for (const char* part : {"double_pendulum_moveit_config: 12 files in double_pendulum_moveit",
+                           "moved by trajectory/follow_joint_trajectory",
+                           "ros2 launch double_pendulum_moveit_config moveit.launch.py"})
+    EXPECT_NE(made.out.find(part), std::string::npos) << made.out;
+  const std::filesystem::path folder = folder_ / "double_pendulum_moveit_config";
+  const auto files = files_in(folder);
+  for (const char* name :
+       {"package.xml", "CMakeLists.txt", ".setup_assistant", "launch/moveit.launch.py",
+        "config/double_pendulum.urdf", "config/double_pendulum.srdf", "config/kinematics.yaml",
+        "config/joint_limits.yaml", "config/moveit_controllers.yaml"})
+    EXPECT_TRUE(files.contains(name)) << name;
+  EXPECT_EQ(files.at("config/double_pendulum.urdf"), read_text(folder_ / "double_pendulum.urdf"));
+
+  // What is there stays, whoever wrote it.
+  write_text(folder / "config/joint_limits.yaml", "mine");
+  const Outcome again = tandem("model ros2 robot.toml");
+  EXPECT_EQ(again.status, 2);
+  EXPECT_NE(again.err.find("double_pendulum_moveit_config: this exists already"), std::string::npos)
+      << again.err;
+  EXPECT_EQ(read_text(folder / "config/joint_limits.yaml"), "mine");
+  write_text(folder_ / "a file", "mine");
+  EXPECT_EQ(tandem("model ros2 robot.toml -o 'a file'").status, 2);
+  EXPECT_EQ(read_text(folder_ / "a file"), "mine");
+
+  const Outcome named = tandem("model ros2 robot.toml -o 'ws/möve it' --controller swing");
+  ASSERT_EQ(named.status, 0) << named.err;
+  EXPECT_NE(read_text(folder_ / "ws/möve it/config/moveit_controllers.yaml").find("\"swing\""),
+            std::string::npos);
+}
+
+TEST_F(Model, RefusesRos2WhatItCannotWrite) {
+  for (const auto& [arguments, said] :
+       {std::pair<std::string, std::string>{"robot.toml --controller a/b",
+                                            "--controller: the controller's name 'a/b'"},
+        {"robot.toml --controller ''", "name a controller"},
+        {"robot.toml -o ''", "name a folder"},
+        {"hold.toml", "hold.toml: this is an experiment, and a robot is needed"},
+        {"four_bar", "the robot closes kinematic loops"},
+        {"ur5", "ur5e"}}) {
+    const Outcome refused = tandem("model ros2 " + arguments);
+    EXPECT_EQ(refused.status, 2) << arguments;
+    EXPECT_NE(refused.err.find(said), std::string::npos) << arguments << ": " << refused.err;
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(folder_))
+    EXPECT_FALSE(entry.is_directory()) << entry.path();
+  std::filesystem::create_directory(folder_ / "locked");
+  if (::geteuid() != 0) {
+    std::filesystem::permissions(folder_ / "locked", std::filesystem::perms::owner_read |
+                                                         std::filesystem::perms::owner_exec);
+    EXPECT_EQ(tandem("model ros2 robot.toml -o locked/p").status, 2);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "locked/p"));
 }
 
 }  // namespace

@@ -21,8 +21,8 @@ class Service : public Program {
     ASSERT_TRUE(manager_.listens());
     ::setenv("NOTIFY_SOCKET", manager_.name().c_str(), 1);
     ::setenv("WATCHDOG_USEC", limit_us.c_str(), 1);
-    run_.emplace(folder_, "run " + experiment + " --no-log -q --socket " + socket_ + " " + flags,
-                 "run");
+    run_.emplace(folder_,
+                 "run " + experiment + " " + log_ + " -q --socket " + socket_ + " " + flags, "run");
     ::unsetenv("NOTIFY_SOCKET");
     ::unsetenv("WATCHDOG_USEC");
   }
@@ -51,6 +51,7 @@ class Service : public Program {
   [[nodiscard]] std::string said() const { return read_text(folder_ / "run.err"); }
 
   ServiceManager manager_;
+  std::string log_ = "--no-log";
   const std::string socket_ = test::socket_path("-service");
   std::optional<Background> run_;
 };
@@ -222,6 +223,43 @@ TEST_F(Service, WaitsAgainWhereNoDriveCouldBeEnabled) {
   EXPECT_EQ(manager_.place("STOPPING=1"), manager_.heard().size());
   EXPECT_EQ(to_run("ask '{\"do\": \"run.stop\"}'").status, 0);
   EXPECT_EQ(end(), 0) << said();
+}
+
+// The service of a robot that had booted ended with its start, and nobody could start it again but
+// root.
+TEST_F(Service, WaitsOnWhereTheDiskHasNoRoomForItsLog) {
+  edit("hold.toml", "seed = 1", "seed = 1\n[log]\nkeep_free_MB = 1e9");
+  log_ = "--log logs";
+  begin("--rate 1 --duration endless --wait-for-start");
+  ASSERT_TRUE(manager_.hears("READY=1")) << said();
+  for (int i = 0; i < 2; ++i) {
+    const Outcome refused = to_run("controller start");
+    EXPECT_NE(refused.status, 0);
+    EXPECT_NE(refused.err.find("the disk is too full for the log"), std::string::npos)
+        << refused.err;
+    EXPECT_EQ(phase(), "waiting");
+  }
+  EXPECT_TRUE(
+      manager_.hears("READY=1\nSTATUS=waits for its start: tandem controller start; before:"));
+  EXPECT_FALSE(has_log());
+  ::kill(run_->id(), SIGTERM);
+  EXPECT_EQ(end(), 128 + SIGTERM);
+}
+
+TEST_F(Service, StartsOnceItsLogHasAPlace) {
+  write_text(folder_ / "logs", "no folder");
+  log_ = "--log logs";
+  begin("--rate 1 --duration endless --wait-for-start");
+  ASSERT_TRUE(manager_.hears("READY=1"));
+  const Outcome refused = to_run("controller start");
+  EXPECT_NE(refused.status, 0);
+  EXPECT_NE(refused.err.find("log's folder"), std::string::npos) << refused.err;
+  std::filesystem::remove(folder_ / "logs");
+  EXPECT_EQ(to_run("controller start").status, 0);
+  EXPECT_TRUE(comes_to("running")) << said();
+  EXPECT_EQ(to_run("ask '{\"do\": \"run.stop\"}'").status, 0);
+  EXPECT_EQ(end(), 0) << said();
+  EXPECT_TRUE(has_log());
 }
 
 TEST_F(Service, NeedsASocketToBeStartedBy) {

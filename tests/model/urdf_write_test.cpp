@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "model/placements.hpp"
+
 namespace tandem::model {
 namespace {
 
@@ -106,6 +108,40 @@ TEST(UrdfWrite, LeavesNoFollowerWithoutItsLeader) {
             "type='revolute'><parent link='b'/><child link='rf'/></joint></robot>");
   EXPECT_TRUE(without_limbs(robot, {"rf"})) << "a leader needs no follower";
   EXPECT_TRUE(without_limbs(robot, {"l", "r"}));
+}
+
+TEST(UrdfWrite, FixesAJointWhereItStands) {
+  const std::string head = "<robot name='r'>\n  <link name='a'/>\n  <link name='b'/>\n  ",
+                    tail = "\n  <link name='c'/>\n</robot>\n";
+  const std::string joint =
+      "<joint type='revolute' name='a&lt;b'><child link='b'/><origin xyz='9 9 9'/>\n"
+      "    <parent link='a' ></parent><mimic joint='x'/><limit lower='0'/></joint>";
+  Placement at;
+  at.p = {0.1, -0.0, -0.25};
+  at.R = Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const auto fixed = with_fixed(head + joint + tail, {{"a<b", at}});
+  ASSERT_TRUE(fixed) << fixed.error().to_string();
+  EXPECT_EQ(*fixed, head +
+                        "<joint name=\"a&lt;b\" type=\"fixed\">\n"
+                        "    <origin xyz=\"0.1 0 -0.25\" rpy=\"0 0 0.5\"/>\n"
+                        "    <parent link='a' ></parent>\n    <child link='b'/>\n  </joint>" +
+                        tail);
+  EXPECT_EQ(with_fixed(head + joint + tail, {}).value_or(""), head + joint + tail);
+  EXPECT_EQ(with_fixed(head + joint + tail, {{"d", at}}).error().message,
+            "the description has no joint 'd'");
+  EXPECT_FALSE(with_fixed(head + "<joint name='j'><parent link='a'/></joint>" + tail, {{"j", at}}));
+  EXPECT_FALSE(with_fixed("<robot><joint></robot>", {}));
+}
+
+// Also where the pitch is a right angle, and yaw and roll are one.
+TEST(UrdfWrite, WritesEveryDirectionAsItIsRead) {
+  for (const double pitch : {-1.2, 0.0, 0.7, M_PI / 2, -M_PI / 2}) {
+    for (const double roll : {-2.0, 0.0, 0.3}) {
+      const Placement whole = placement_of({}, {roll, pitch, 2.5});
+      const Placement again = placement_of({}, rpy_of(whole.R));
+      EXPECT_TRUE(again.R.isApprox(whole.R, 1e-12)) << roll << ' ' << pitch;
+    }
+  }
 }
 
 }  // namespace
