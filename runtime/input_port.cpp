@@ -80,6 +80,12 @@ Result<std::shared_ptr<InputPort>> InputPort::make(std::shared_ptr<ControllerIo>
     if (!message) return std::unexpected(message.error());
     port->message_ = *message;
   }
+  if (!port->source_.action.empty() && !block.options.terms) {
+    Error error = port->source_.where;
+    error.message = "the input '" + block.name + "' of '" + controller + "' takes no goals";
+    error.hint = "leave `action` out, or use trajectory_follower";
+    return std::unexpected(std::move(error));
+  }
   const PlannedInput planned{
       .block = block,
       .controller = controller,
