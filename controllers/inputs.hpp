@@ -58,12 +58,27 @@ struct InputOptions {
   AfterTimeout after = AfterTimeout::kDefault;
   std::vector<double> otherwise = {};  ///< a number per component; empty: as kZero
   std::size_t most_points = 16;        ///< of a trajectory
+  bool terms = false;                  ///< of a trajectory: its samples have TrajectoryTerms
+};
+
+/// What a trajectory asks of a joint, in the order of the sample's numbers. A tolerance is what
+/// the measured value may differ by from the reference; 0: the controller's own, below 0: anything.
+struct JointTerms {
+  double stays = 0.0;                       ///< 1: its positions are none, and it stays where it is
+  double path_rad = 0.0, path_rad_s = 0.0;  ///< tolerances on the way
+  double goal_rad = 0.0, goal_rad_s = 0.0;  ///< tolerances at the end
+};
+
+/// And of all of them.
+struct TrajectoryTerms {
+  double start_s = 0.0;      ///< its beginning after the sample's arrival; below 0: it is past
+  double goal_time_s = 0.0;  ///< that joints have after its end; 0, below 0: as a tolerance
 };
 
 /// An input: what was declared, and what the loop puts into it between two cycles.
 struct InputBlock {
   static constexpr std::size_t kMost = 16;          ///< of one controller
-  static constexpr std::size_t kMostValues = 1024;  ///< of one input
+  static constexpr std::size_t kMostValues = 2048;  ///< of one input
 
   InputBlock(std::string its_name, InputKind its_kind, InputOptions its)
       : name(std::move(its_name)), kind(its_kind), options(std::move(its)) {
@@ -74,11 +89,18 @@ struct InputBlock {
     value.assign(values(), 0.0);
   }
   /// Numbers of a sample: of a trajectory its points, whether they have velocities, then of each
-  /// point its time, the joints' positions and the joints' velocities.
+  /// point its time, the joints' positions and the joints' velocities; with terms, those of all
+  /// joints and then of each.
   [[nodiscard]] std::size_t values() const noexcept {
     if (kind != InputKind::kTrajectory) return components.size();
+    return terms_at() + (options.terms ? kTerms + kTermsOfJoint * components.size() : 0);
+  }
+  /// Where the terms of a trajectory stand in its sample.
+  [[nodiscard]] std::size_t terms_at() const noexcept TANDEM_RT {
     return 2 + options.most_points * (1 + 2 * components.size());
   }
+  static constexpr std::size_t kTerms = sizeof(TrajectoryTerms) / sizeof(double);
+  static constexpr std::size_t kTermsOfJoint = sizeof(JointTerms) / sizeof(double);
   void archive(Archive& ar) { ar(value, sequence, cycle, fresh, arrived); }
 
   const std::string name;
@@ -145,6 +167,17 @@ class Input {
   /// The same, 0 without velocities.
   [[nodiscard]] std::span<const double> velocity_rad_s(std::size_t point) const noexcept TANDEM_RT {
     return values().subspan(at(point) + 1 + block_->components.size(), block_->components.size());
+  }
+  /// @pre InputOptions::terms
+  [[nodiscard]] TrajectoryTerms terms() const noexcept TANDEM_RT {
+    const double* const its = block_->value.data() + block_->terms_at();
+    return {its[0], its[1]};
+  }
+  /// @pre InputOptions::terms
+  [[nodiscard]] JointTerms terms(std::size_t joint) const noexcept TANDEM_RT {
+    const double* const its = block_->value.data() + block_->terms_at() + InputBlock::kTerms +
+                              joint * InputBlock::kTermsOfJoint;
+    return {its[0], its[1], its[2], its[3], its[4]};
   }
 
  private:

@@ -1,4 +1,4 @@
-// Parses .msg and .srv text; the hash is SHA-256 of the REP-2016 description as JSON.
+// Parses .msg, .srv and .action text; the hash is SHA-256 of the REP-2016 description as JSON.
 #include "dds/message_definition.hpp"
 
 #include <fmt/core.h>
@@ -106,11 +106,13 @@ Result<bool> read_line(std::string_view line, std::string_view package, MessageF
   return !trimmed(rest.substr(name.size())).starts_with('=');  // after it may stand a default
 }
 
+MessageField field(std::string name, MessageFieldType type) {
+  return {.name = std::move(name), .type = type, .message_name = {}};
+}
+
 /// ROS 2 gives a message without fields one, since IDL has no empty structure.
 MessageField placeholder() {
-  return {.name = "structure_needs_at_least_one_member",
-          .type = MessageFieldType::kUint8,
-          .message_name = {}};
+  return field("structure_needs_at_least_one_member", MessageFieldType::kUint8);
 }
 
 Result<MessageDefinition> read_message(std::string name, std::string_view text, int& line_number) {
@@ -158,6 +160,51 @@ void add_service(std::vector<MessageDefinition>& out, const std::string& name) {
                             message_field("event_message", name + "_Event")}});
 }
 
+/// And of an action: services that send a goal and get its result, a message of its feedback.
+void add_action(std::vector<MessageDefinition>& out, const std::string& name) {
+  const MessageField goal_id = message_field("goal_id", "unique_identifier_msgs/msg/UUID");
+  const auto add = [&](const char* part, std::vector<MessageField> fields) {
+    out.push_back({.name = name + part, .text = {}, .fields = std::move(fields)});
+  };
+  add("_SendGoal_Request", {goal_id, message_field("goal", name + "_Goal")});
+  add("_SendGoal_Response", {field("accepted", MessageFieldType::kBool),
+                             message_field("stamp", "builtin_interfaces/msg/Time")});
+  add_service(out, name + "_SendGoal");
+  add("_GetResult_Request", {goal_id});
+  add("_GetResult_Response",
+      {field("status", MessageFieldType::kInt8), message_field("result", name + "_Result")});
+  add_service(out, name + "_GetResult");
+  add("_FeedbackMessage", {goal_id, message_field("feedback", name + "_Feedback")});
+  add("", {message_field("goal", name + "_Goal"), message_field("result", name + "_Result"),
+           message_field("feedback", name + "_Feedback"),
+           message_field("send_goal_service", name + "_SendGoal"),
+           message_field("get_result_service", name + "_GetResult"),
+           message_field("feedback_message", name + "_FeedbackMessage")});
+}
+
+/// The messages of a file, between which stand lines of three dashes.
+Result<std::vector<MessageDefinition>> read_parts(const std::string& name, std::string_view text,
+                                                  std::initializer_list<const char*> parts) {
+  constexpr std::string_view kBetween = "---\n";
+  std::vector<MessageDefinition> out;
+  int line = 0;
+  for (const char* part : parts) {
+    const bool last = out.size() + 1 == parts.size();
+    const auto between = text.starts_with(kBetween) ? 0 : text.find("\n---\n") + 1;
+    if (text.substr(between).starts_with(kBetween) == last) {
+      return fail(fmt::format("{} has {} lines --- than {}", name, last ? "more" : "fewer",
+                              parts.size() - 1));
+    }
+    auto message = read_message(name + part, last ? text : text.substr(0, between), line);
+    if (!message) return std::unexpected(message.error());
+    out.push_back(std::move(*message));
+    if (last) break;
+    text.remove_prefix(between + kBetween.size());
+    ++line;
+  }
+  return out;
+}
+
 /// Every message in it, at any depth, once, in the order of their names.
 using References = std::map<std::string, const MessageDefinition*>;
 void collect(const MessageDefinition& definition, References& out) {
@@ -188,26 +235,25 @@ Result<std::vector<MessageDefinition>> parse_definition(std::string_view name,
   std::vector<MessageDefinition> out;
   int line = 0;
   const std::string own(name);
-  if (name.find("/srv/") == std::string_view::npos) {
+  if (name.find("/msg/") != std::string_view::npos) {
     auto message = read_message(own, text, line);
     if (!message) return std::unexpected(message.error());
     out.push_back(std::move(*message));
     return out;
   }
-  constexpr std::string_view kBetween = "---\n";
-  const auto between = text.starts_with(kBetween) ? 0 : text.find("\n---\n") + 1;
-  if (!text.substr(between).starts_with(kBetween)) {
-    return fail(own + " has no line --- between request and response");
+  const bool is_action = name.find("/action/") != std::string_view::npos;
+  auto parts = is_action ? read_parts(own, text, {"_Goal", "_Result", "_Feedback"})
+                         : read_parts(own, text, {"_Request", "_Response"});
+  if (!parts) return std::unexpected(parts.error());
+  out = std::move(*parts);
+  if (is_action) {
+    add_action(out, own);
+  } else {
+    add_service(out, own);
   }
-  auto request = read_message(own + "_Request", text.substr(0, between), line);
-  if (!request) return std::unexpected(request.error());
-  ++line;
-  auto response = read_message(own + "_Response", text.substr(between + kBetween.size()), line);
-  if (!response) return std::unexpected(response.error());
-  request->request_or_response = response->request_or_response = true;
-  out.push_back(std::move(*request));
-  out.push_back(std::move(*response));
-  add_service(out, own);
+  for (MessageDefinition& one : out) {
+    one.request_or_response = one.name.ends_with("_Request") || one.name.ends_with("_Response");
+  }
   return out;
 }
 

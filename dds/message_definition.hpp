@@ -1,6 +1,6 @@
-// ROS 2's message definitions (.msg, .srv) as trees of fields, with what follows from them: the
-// type's hash and the definition's text with all that it needs.
-// Layer: dds.  Thread: any, non-RT.
+// ROS 2's message definitions (.msg, .srv, .action) as trees of fields, with what follows from
+// them: the type's hash and the definition's text with all that it needs. Layer: dds.  Thread: any,
+// non-RT.
 #pragma once
 
 #include <cstddef>
@@ -53,7 +53,8 @@ struct MessageField {
   const MessageDefinition* message = nullptr;  ///< that message, once it has been looked up
 };
 
-/// One message, or a service's request, response or event, or (of its three) a service.
+/// One message, or a service's request, response or event, or (of its three) a service, or (of its
+/// goal, result, feedback, two services and a message) an action.
 struct MessageDefinition {
   std::string name;                  ///< "sensor_msgs/msg/JointState"
   std::string text;                  ///< of the definition, without those that it needs
@@ -62,8 +63,11 @@ struct MessageDefinition {
   bool request_or_response = false;
 };
 
-/// The trees of one file. A service gives five: request, response, event, itself.
-/// @param name  of the type: "sensor_msgs/msg/JointState", "std_srvs/srv/Trigger"
+/// The trees of one file. A service gives four: request, response, event, itself. An action gives
+/// goal, result and feedback, the services "…_SendGoal" and "…_GetResult", "…_FeedbackMessage",
+/// itself.
+/// @param name  of the type: "sensor_msgs/msg/JointState", "std_srvs/srv/Trigger",
+///              "control_msgs/action/FollowJointTrajectory"
 /// Errors: what is no definition, with the line; messages of others are not looked up yet.
 [[nodiscard]] Result<std::vector<MessageDefinition>> parse_definition(std::string_view name,
                                                                       std::string_view text);

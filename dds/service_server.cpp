@@ -104,6 +104,7 @@ void ServiceServer::receive() {
     bool woken = false;
     dds_take_guardcondition(wake_.get(), &woken);
     for (const auto& service : services_) take(*service);
+    do_ready();
     holding = send_held();
     const std::scoped_lock lock(mutex_);
     if (ending_) return;
@@ -141,10 +142,12 @@ void ServiceServer::take(Service& service, const ddsi_serdata* request,
           .header = {},
           .call = fast_call_of(request),
           .asker = asker,
-          .answer = {}};
+          .answer = {},
+          .ready = {}};
   std::memcpy(&job.header, sample.get(), sizeof job.header);
   Work work = service.read(sample.get(), participant_of(service.requests.get(), asker));
   job.answer = std::move(work.answer);
+  job.ready = std::move(work.ready);
   accept(std::move(job), work.at_once, work.takes_long);
 }
 
@@ -152,19 +155,34 @@ void ServiceServer::accept(Job job, bool at_once, bool takes_long) {
   {
     const std::scoped_lock lock(mutex_);
     ++counts_.requests;
-    if (!at_once) {
-      Turn& turn = turns_[takes_long ? 1 : 0];
-      const auto of_this = std::ranges::count(turn.jobs, job.asker, &Job::asker);
-      if (turn.jobs.size() == kMostWaiting || of_this == static_cast<std::ptrdiff_t>(kMostOfOne)) {
+    Turn* const turn = at_once ? nullptr : &turns_[takes_long ? 1 : 0];
+    if (turn != nullptr || job.ready) {
+      std::deque<Job>& jobs = turn != nullptr ? turn->jobs : unready_;
+      const auto of_this = std::ranges::count(jobs, job.asker, &Job::asker);
+      if (jobs.size() == kMostWaiting || of_this == static_cast<std::ptrdiff_t>(kMostOfOne)) {
         ++counts_.dropped;
         return;
       }
-      turn.jobs.push_back(std::move(job));
-      turn.more.notify_one();
+      jobs.push_back(std::move(job));
+      if (turn != nullptr) turn->more.notify_one();
       return;
     }
   }
   answer(job);
+}
+
+/// What has waited long enough, and what nobody waits for any more.
+void ServiceServer::do_ready() {
+  std::erase_if(unready_, [this](const Job& job) {
+    if (!matched_writer(job.service->requests.get(), job.asker)) {
+      const std::scoped_lock lock(mutex_);
+      ++counts_.unclaimed;
+      return true;
+    }
+    if (!job.ready()) return false;
+    answer(job);
+    return true;
+  });
 }
 
 void ServiceServer::work(Turn& turn) {

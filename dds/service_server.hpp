@@ -52,6 +52,9 @@ struct ServiceWork {
   bool takes_long = false;
   /// Fills in the reply, which is zeroed but for its header: every text has to be set.
   std::function<void(Response& reply, ReplyMemory& memory)> answer;
+  /// Work that is done at once waits until this says yes, which is asked after each wake(). Empty:
+  /// it does not wait.
+  std::function<bool()> ready = {};
 };
 
 /// Requests are done one after another, whoever asks. Nothing that a client does or leaves undone
@@ -93,11 +96,15 @@ class ServiceServer {
                  return {work.at_once, work.takes_long,
                          [answer = std::move(work.answer)](void* reply, ReplyMemory& memory) {
                            answer(*static_cast<Response*>(reply), memory);
-                         }};
+                         },
+                         std::move(work.ready)};
                });
   }
   /// @param only_at_once  no request is done in its turn: there are no threads for that
   [[nodiscard]] Status start(bool only_at_once = false);
+
+  /// Work that waits may be ready. Any thread.
+  void wake() { dds_set_guardcondition(wake_.get(), true); }
 
   [[nodiscard]] Counts counts() const;
 
@@ -105,6 +112,7 @@ class ServiceServer {
   struct Work {
     bool at_once = false, takes_long = false;
     std::function<void(void* reply, ReplyMemory& memory)> answer;
+    std::function<bool()> ready;
   };
   using Read = std::function<Work(const void* request, const Asker& asker)>;
   struct Service {
@@ -122,6 +130,7 @@ class ServiceServer {
     std::optional<FastCall> call;
     dds_instance_handle_t asker;  // the writer of the request
     std::function<void(void*, ReplyMemory&)> answer;
+    std::function<bool()> ready;
   };
   struct Reply {
     Service* service;
@@ -145,6 +154,7 @@ class ServiceServer {
   void take(Service& service);
   void take(Service& service, const ddsi_serdata* request, dds_instance_handle_t asker);
   void accept(Job job, bool at_once, bool takes_long);
+  void do_ready();
   void work(Turn& turn);
   void answer(const Job& job);
   [[nodiscard]] static Reach reach(const Reply& reply);
@@ -161,6 +171,7 @@ class ServiceServer {
   Counts counts_;
   std::array<Turn, 2> turns_;  // the usual one, and the long one
   std::deque<Reply> held_;     // until their readers are found
+  std::deque<Job> unready_;    // the receiver's
 
   std::thread receiver_;
 };

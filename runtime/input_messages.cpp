@@ -3,6 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <optional>
 #include <string_view>
 
 #include "base/nearest.hpp"
@@ -13,6 +17,11 @@ namespace {
 using Numbers = std::vector<double>;
 
 constexpr double kPerNs = 1e-9;
+constexpr double kMostAhead_s = 3600.0;  // of a goal's beginning: beyond, it has another clock
+
+double seconds(const builtin_interfaces_msg_dds__Duration_& time) {
+  return static_cast<double>(time.sec) + kPerNs * static_cast<double>(time.nanosec);
+}
 
 /// Tells the numbers of a list. Errors: another count than the input has, or with `more` fewer.
 template <class List>
@@ -60,60 +69,138 @@ Result<Numbers> numbers_of(const dds::sensor_msgs::Joy& joy, const InputBlock& i
   return numbers_of("axes", joy.axes, input, true);
 }
 
-/// Where the joints of the input stand in the message. Error: it has others, or lacks one.
-Result<std::vector<std::size_t>> order_of(const dds::trajectory_msgs::JointTrajectory& message,
-                                          const InputBlock& input) {
+/// What a joint is called in an error, however long it is.
+std::string shown(const char* name) { return std::string(name, ::strnlen(name, 64)); }
+
+/// Where each joint of the input stands in the message; of a part of them the others nowhere.
+using Order = std::vector<std::optional<std::size_t>>;
+
+/// Error: it has others, one twice, or, unless a part will do, not each.
+Result<Order> order_of(const dds::trajectory_msgs::JointTrajectory& message,
+                       const InputBlock& input, bool part) {
   const std::size_t joints = input.components.size();
-  if (message.joint_names._length != joints) {
-    return fail_at(
-        "joint_names",
-        fmt::format("{} joints are not the {} of the input", message.joint_names._length, joints),
-        "name each of them, in any order");
+  const std::size_t named = message.joint_names._length;
+  if (part ? named == 0 || named > joints : named != joints) {
+    return fail_at("joint_names",
+                   fmt::format("{} joints are not {}the {} of the input", named,
+                               part ? "some of " : "", joints),
+                   part ? "name those that move" : "name each of them, in any order");
   }
-  std::vector<std::size_t> order(joints, joints);
-  for (std::size_t i = 0; i < joints; ++i) {
-    const auto found = std::ranges::find(input.components, message.joint_names._buffer[i]);
+  Order order(joints);
+  for (std::size_t i = 0; i < named; ++i) {
+    const char* const name = message.joint_names._buffer[i];
+    const auto found = std::ranges::find(input.components, name);
     const auto joint = static_cast<std::size_t>(found - input.components.begin());
-    if (joint == joints || order[joint] != joints) {
-      return fail_at("joint_names", "has a joint twice, or one that the input has not",
-                     "name each of the input's, in any order");
+    if (joint == joints || order[joint]) {
+      return fail_at(
+          "joint_names",
+          part ? "'" + shown(name) + "' is there twice, or is none of the input's"
+               : "has a joint twice, or one that the input has not",
+          part ? suggest(shown(name), input.components) : "name each of the input's, in any order");
     }
     order[joint] = i;
   }
   return order;
 }
 
-/// It begins when it arrives, whatever its stamp says. No points: the joints stay.
-Result<Numbers> numbers_of(const dds::trajectory_msgs::JointTrajectory& message,
-                           const InputBlock& input) {
-  const std::size_t joints = input.components.size();
-  Numbers sample(input.values(), 0.0);
+/// The way-points, of which there are some.
+Result<Numbers> way_points(const dds::trajectory_msgs::JointTrajectory& message,
+                           const InputBlock& input, const Order& order) {
+  const std::size_t joints = input.components.size(), named = message.joint_names._length;
   const std::size_t points = message.points._length;
-  if (points == 0) return sample;
   if (points > input.options.most_points) {
     return fail_at("points", fmt::format("{} way-points are too many", points),
-                   fmt::format("at most {}", input.options.most_points));
+                   fmt::format("at most {}: `most_points`", input.options.most_points));
   }
-  const auto order = order_of(message, input);
-  if (!order) return std::unexpected(order.error());
+  Numbers sample(input.values(), 0.0);
   const bool moves = message.points._buffer[0].velocities._length > 0;
   sample[0] = static_cast<double>(points);
   sample[1] = moves ? 1.0 : 0.0;
   for (std::size_t p = 0; p < points; ++p) {
     const auto& point = message.points._buffer[p];
-    if (point.positions._length != joints || point.velocities._length != (moves ? joints : 0)) {
+    if (point.positions._length != named || point.velocities._length != (moves ? named : 0)) {
       return fail_at("points", fmt::format("way-point {} has not a number of each joint", p + 1),
                      "positions of each joint; velocities of each in all points, or in none");
     }
     const std::size_t at = 2 + p * (1 + 2 * joints);
-    const auto& after = point.time_from_start;
-    sample[at] = static_cast<double>(after.sec) + kPerNs * static_cast<double>(after.nanosec);
+    sample[at] = seconds(point.time_from_start);
     for (std::size_t j = 0; j < joints; ++j) {
-      sample[at + 1 + j] = point.positions._buffer[(*order)[j]];
-      if (moves) sample[at + 1 + joints + j] = point.velocities._buffer[(*order)[j]];
+      if (!order[j]) continue;
+      sample[at + 1 + j] = point.positions._buffer[*order[j]];
+      if (moves) sample[at + 1 + joints + j] = point.velocities._buffer[*order[j]];
     }
   }
   return sample;
+}
+
+/// It begins when it arrives, whatever its stamp says. No points: the joints stay.
+Result<Numbers> numbers_of(const dds::trajectory_msgs::JointTrajectory& message,
+                           const InputBlock& input) {
+  if (message.points._length == 0) return Numbers(input.values(), 0.0);
+  if (message.points._length > input.options.most_points) return way_points(message, input, {});
+  const auto order = order_of(message, input, false);
+  if (!order) return std::unexpected(order.error());
+  return way_points(message, input, *order);
+}
+
+/// A tolerance of a goal: above 0 itself, 0 the default, -1 none.
+Result<double> tolerance_of(const char* what, const std::string& name, double value) {
+  if (value >= 0.0 || std::abs(value + 1.0) < std::numeric_limits<float>::epsilon()) {
+    return value < 0.0 ? -1.0 : value;
+  }
+  return fail_at(what, fmt::format("{:g} is no tolerance{}", value, name),
+                 "above 0; 0: the controller's; -1: none");
+}
+
+/// @param first  among a joint's terms
+Status add_tolerances(Numbers& sample, const char* what, const InputBlock& input,
+                      std::span<const control_msgs_msg_dds__JointTolerance_> given,
+                      std::size_t first) {
+  for (const auto& one : given) {
+    const auto found = std::ranges::find(input.components, one.name);
+    if (found == input.components.end()) {
+      return fail_at(what, "'" + shown(one.name) + "' is none of the input's joints",
+                     suggest(shown(one.name), input.components));
+    }
+    const auto joint = static_cast<std::size_t>(found - input.components.begin());
+    const std::size_t at =
+        input.terms_at() + InputBlock::kTerms + joint * InputBlock::kTermsOfJoint + first;
+    const auto position = tolerance_of(what, " of " + *found, one.position);
+    const auto velocity = tolerance_of(what, " of " + *found, one.velocity);
+    const auto acceleration = tolerance_of(what, " of " + *found, one.acceleration);
+    for (const auto* each : {&position, &velocity, &acceleration}) {
+      if (!*each) return std::unexpected(each->error());
+    }
+    sample[at] = *position;
+    sample[at + 1] = *velocity;  // accelerations are not measured
+  }
+  return {};
+}
+
+/// What a trajectory must not have, and joint_trajectory_controller refuses.
+Status check_goal(const control_msgs_action_dds__FollowJointTrajectory_Goal_& goal) {
+  const auto& way = goal.trajectory;
+  const auto& several = goal.multi_dof_trajectory;
+  if (several.joint_names._length + several.points._length + goal.component_path_tolerance._length +
+          goal.component_goal_tolerance._length >
+      0) {
+    return fail_at("multi_dof_trajectory", "joints of several axes are not led",
+                   "leave it and the component tolerances empty");
+  }
+  if (way.points._length == 0) {
+    return fail_at("points", "has no way-point", "to stop the joints, cancel the goal");
+  }
+  const auto& last = way.points._buffer[way.points._length - 1];
+  for (const double speed : std::span(last.velocities._buffer, last.velocities._length)) {
+    if (std::abs(speed) <= std::numeric_limits<float>::epsilon()) continue;
+    return fail_at("points", fmt::format("the last way-point has a velocity of {:g}", speed),
+                   "end at rest");
+  }
+  for (const auto& point : std::span(way.points._buffer, way.points._length)) {
+    if (point.effort._length == 0) continue;
+    return fail_at("points", "has efforts, which are not followed", "leave them out");
+  }
+  return {};
 }
 
 Status check_frame(const char* frame_id, const InputSource& source) {
@@ -152,6 +239,42 @@ constexpr InputMessage kMessages[] = {
 }  // namespace
 
 std::span<const InputMessage> input_messages() { return kMessages; }
+
+Result<Numbers> goal_sample(const control_msgs_action_dds__FollowJointTrajectory_Goal_& goal,
+                            const InputBlock& input, std::int64_t now_ns) {
+  if (const Status right = check_goal(goal); !right) return std::unexpected(right.error());
+  const auto order = order_of(goal.trajectory, input, true);
+  if (!order) return std::unexpected(order.error());
+  auto sample = way_points(goal.trajectory, input, *order);
+  if (!sample) return sample;
+  double* const terms = sample->data() + input.terms_at();
+  const auto& stamp = goal.trajectory.header.stamp;
+  if (stamp.sec != 0 || stamp.nanosec != 0) {
+    terms[0] = kPerNs * static_cast<double>(std::int64_t{stamp.sec} * 1'000'000'000 +
+                                            stamp.nanosec - now_ns);
+    const auto& last = goal.trajectory.points._buffer[goal.trajectory.points._length - 1];
+    const double end_s = terms[0] + seconds(last.time_from_start);
+    const bool ended = end_s < 0.0;
+    if (ended || terms[0] > kMostAhead_s) {
+      return fail_at("header.stamp",
+                     ended ? fmt::format("it ended {:.3f} s ago", -end_s)
+                           : fmt::format("it begins in {:.0f} s", terms[0]),
+                     "stamp it on the clock of this run (use_sim_time), or with 0: at once");
+    }
+  }
+  const auto time = tolerance_of("goal_time_tolerance", {}, seconds(goal.goal_time_tolerance));
+  if (!time) return std::unexpected(time.error());
+  terms[1] = *time;
+  for (std::size_t j = 0; j < order->size(); ++j) {
+    if (!(*order)[j]) terms[InputBlock::kTerms + j * InputBlock::kTermsOfJoint] = 1.0;
+  }
+  const auto all = [](const auto& list) { return std::span(list._buffer, list._length); };
+  const Status path = add_tolerances(*sample, "path_tolerance", input, all(goal.path_tolerance), 1);
+  if (!path) return std::unexpected(path.error());
+  const Status end = add_tolerances(*sample, "goal_tolerance", input, all(goal.goal_tolerance), 3);
+  if (!end) return std::unexpected(end.error());
+  return sample;
+}
 
 Result<const InputMessage*> message_of(InputKind kind, const InputSource& source) {
   std::vector<std::string> types;

@@ -2,6 +2,7 @@
 // Layer: runtime.  Thread: any, non-RT.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,6 +28,15 @@ struct InputMessage {
 
 /// Every type; of a kind the usual one first. A new one is a row.
 [[nodiscard]] std::span<const InputMessage> input_messages();
+
+/// A goal of the action control_msgs/action/FollowJointTrajectory as a sample of an input that has
+/// terms. A stamp that is not 0 is the trajectory's beginning, on the clock of `now_ns`.
+/// Errors: what joint_trajectory_controller refuses as well (no joint, no way-point, a joint that
+/// the input lacks, an end in the past, a speed at the end, efforts), and what it overlooks: a
+/// tolerance of another joint or below 0 that is not -1, joints of several axes, a joint twice.
+[[nodiscard]] Result<std::vector<double>> goal_sample(
+    const control_msgs_action_dds__FollowJointTrajectory_Goal_& goal, const InputBlock& input,
+    std::int64_t now_ns);
 
 /// That of the type which the source names, else the first of the kind.
 /// Errors, at the source's place: no such type of this kind (the nearest is suggested); a frame of

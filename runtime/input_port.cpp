@@ -16,11 +16,18 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kUnitNorm = 1e-3;  // that a quaternion's may differ from 1
+constexpr double kMostTime_s = 1e6;
+constexpr double kMostTolerance = 1e6;
 
 bool is_name(const std::string& name) {
   const auto fits = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; };
   return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, fits) &&
          std::isdigit(static_cast<unsigned char>(name.front())) == 0;
+}
+
+/// Where those of a joint begin among a trajectory's terms.
+constexpr std::size_t terms_of_joint(std::size_t joint) {
+  return InputBlock::kTerms + joint * InputBlock::kTermsOfJoint;
 }
 
 /// A bound of each component, from none, one, or each.
@@ -72,6 +79,12 @@ Result<std::shared_ptr<InputPort>> InputPort::make(std::shared_ptr<ControllerIo>
     const auto message = message_of(block.kind, port->source_);
     if (!message) return std::unexpected(message.error());
     port->message_ = *message;
+  }
+  if (!port->source_.action.empty() && !block.options.terms) {
+    Error error = port->source_.where;
+    error.message = "the input '" + block.name + "' of '" + controller + "' takes no goals";
+    error.hint = "leave `action` out, or use trajectory_follower";
+    return std::unexpected(std::move(error));
   }
   const PlannedInput planned{
       .block = block,
@@ -157,24 +170,43 @@ Status InputPort::check_trajectory(std::span<const double> sample) const {
                    fmt::format("at most {}", block_->options.most_points));
   }
   const bool moves = sample[1] != 0.0;
+  const auto terms = sample.subspan(block_->terms_at());
   double before_s = 0.0;
   for (std::size_t p = 0; p < static_cast<std::size_t>(points); ++p) {
     const auto point = sample.subspan(2 + p * (1 + 2 * joints), 1 + 2 * joints);
     const bool later = p == 0 ? point[0] >= 0.0 : point[0] > before_s;
-    if (!later || !(point[0] <= 1e6)) {
+    if (!later || !(point[0] <= kMostTime_s)) {
       return fail_at("after_s", fmt::format("the time of way-point {} does not grow", p + 1),
                      "seconds after the sample, each later than the one before");
     }
     before_s = point[0];
     for (std::size_t j = 0; j < joints; ++j) {
       const std::string& name = block_->components[j];
-      const Status fits = check_value(name, point[1 + j], min_[j], max_[j], "rad (of a slide m)");
+      const double stays = terms.empty() ? 0.0 : terms[terms_of_joint(j)];
+      const Status fits = check_value(name, point[1 + j], stays != 0.0 ? 0.0 : min_[j],
+                                      stays != 0.0 ? 0.0 : max_[j], "rad (of a slide m)");
       if (!fits) return fits;
       const double speed = point[1 + joints + j];
       const Status slow = check_value(name + "'s velocity", speed, moves ? -max_speed_[j] : 0.0,
                                       moves ? max_speed_[j] : 0.0, "rad/s (of a slide m/s)");
       if (!slow) return slow;
     }
+  }
+  return check_terms(terms);
+}
+
+Status InputPort::check_terms(std::span<const double> terms) const {
+  if (terms.empty()) return {};
+  const Status starts = check_value("start", terms[0], -kMostTime_s, kMostTime_s, "s");
+  const Status ends = check_value("goal_time_tolerance", terms[1], -1.0, kMostTime_s, "s");
+  if (!starts || !ends) return starts ? ends : starts;
+  for (std::size_t i = InputBlock::kTerms; i < terms.size(); ++i) {
+    const std::size_t of = i - InputBlock::kTerms;
+    const std::string& name = block_->components[of / InputBlock::kTermsOfJoint];
+    const bool stays = of % InputBlock::kTermsOfJoint == 0;
+    const Status fits = check_value(name + (stays ? " stays" : "'s tolerance"), terms[i],
+                                    stays ? 0.0 : -1.0, stays ? 1.0 : kMostTolerance, {});
+    if (!fits) return fits;
   }
   return {};
 }

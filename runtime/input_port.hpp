@@ -138,6 +138,7 @@ class InputPort {
   [[nodiscard]] Status check_declaration(const hal::Robot& robot);
   [[nodiscard]] Status fill_bounds(const hal::Robot& robot);
   [[nodiscard]] Status check_trajectory(std::span<const double> sample) const;
+  [[nodiscard]] Status check_terms(std::span<const double> terms) const;
   [[nodiscard]] std::span<const double> next(std::uint64_t cycle,
                                              hal::Outside& outside) noexcept TANDEM_RT;
   void note_taken(std::uint64_t number, std::uint64_t cycle) noexcept TANDEM_RT;

@@ -16,6 +16,7 @@ constexpr Key<InputSource> kInput[] = {
   key<&InputSource::repeat_s>("repeat_s", {0.0, 3600.0}, "`timeline` and `file`: a row is a sample again and again, this time apart, until the next row; 0: once"),
   key<&InputSource::topic>("topic", "`topic`: its ROS 2 name, in the namespace of `[dds]`: `\"cmd_vel\"`; `\"/cmd_vel\"` is without it").by_default("–"),
   key<&InputSource::type>("type", "`topic`: of its messages").by_default("the first of the input's kind: [ros2.md](ros2.md#inputs)"),
+  key<&InputSource::action>("action", "`topic`: of a trajectory, a ROS 2 action `control_msgs/action/FollowJointTrajectory` beside it: `\"follow_joint_trajectory\"` is `CONTROLLER/follow_joint_trajectory`, in the namespace of `[dds]` ([ros2.md](ros2.md#follow-a-joint-trajectory))").by_default("`\"\"`: none"),
   key<&InputSource::frame>("frame", "`topic`: the `header.frame_id` that a stamped twist, wrench or pose has to name. Others are refused: nothing is transformed").by_default("`\"\"`: none"),
   key<&InputSource::device>("device", "`gamepad`: its event device: `\"/dev/input/by-id/…-event-joystick\"`").by_default("–"),
   by_hand<InputSource>("mapping", "–", "table", "`gamepad`: `{ x = \"-ABS_Y 0.5\", yaw = \"ABS_RX\", stop = \"BTN_SOUTH\" }`: each component's axis or button, with a minus sign for the other direction and what it is at the end; else 1"),
@@ -32,8 +33,9 @@ void refuse_others(TomlTable& table, InputFeeder feeder) {
   } kOf[]{{"timeline", kTimeline, kTimeline}, {"components", kTimeline, kTimeline},
           {"repeat_s", kTimeline, kFile},     {"file", kFile, kFile},
           {"topic", kTopic, kTopic},          {"type", kTopic, kTopic},
-          {"frame", kTopic, kTopic},          {"device", kGamepad, kGamepad},
-          {"mapping", kGamepad, kGamepad},    {"deadband", kGamepad, kGamepad}};
+          {"action", kTopic, kTopic},         {"frame", kTopic, kTopic},
+          {"device", kGamepad, kGamepad},     {"mapping", kGamepad, kGamepad},
+          {"deadband", kGamepad, kGamepad}};
   for (const auto& row : kOf) {
     if (!table.has(row.key) || feeder == row.of || feeder == row.or_of) continue;
     table.error(row.key, "its source is \"" + std::string(to_string(feeder)) + "\"",

@@ -36,6 +36,7 @@ struct InputSource {
   double repeat_s = 0.0;                            ///< 0: each row is one sample
   std::string topic = {};                           ///< kTopic: ROS 2's name
   std::string type = {};                            ///< kTopic; empty: the kind's
+  std::string action = {};                          ///< kTopic: of ROS 2, beside the topic
   std::string frame = {};                           ///< kTopic: what a stamped message names
   std::string device = {};                          ///< kGamepad: /dev/input/…
   std::map<std::string, std::string> mapping = {};  ///< kGamepad: a component's axis or button

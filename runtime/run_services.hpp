@@ -312,6 +312,9 @@ class RunServices {
   /// nobody commands the robot from afar.
   [[nodiscard]] Status check_runs(const InputPort& port);
 
+  /// The run's time in the newest cycle.
+  [[nodiscard]] std::int64_t time_ns() const noexcept { return progress_->time_ns.load(); }
+
   /// Who commands the robot from afar; empty text: nobody. Called on any thread.
   void name_owner(std::function<std::string()> owner);
 

@@ -2,19 +2,16 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <string>
 #include <utility>
 
+#include "apps/run/trajectory_action.hpp"
 #include "dds/endpoint.hpp"
 
 namespace tandem::apps {
 namespace {
 
-using SteadyClock = std::chrono::steady_clock;
-
-constexpr std::chrono::milliseconds kLeastSilence{500};  // before another writer may feed
-constexpr std::size_t kKept = 16;                        // samples that wait to be looked at
+constexpr std::size_t kKept = 16;  // samples that wait to be looked at
 
 /// The DDS topic of a ROS 2 name: "/cmd_vel" has its namespace already.
 std::string dds_topic(const dds::Participant& participant, const std::string& name) {
@@ -27,14 +24,17 @@ class InputTopics::Feed {
  public:
   /// Rings `rung` for each sample that comes.
   static Result<std::unique_ptr<Feed>> open(std::shared_ptr<runtime::InputPort> port,
-                                            const Parts& parts, std::atomic<std::uint64_t>& rung) {
+                                            const FeedParts& parts,
+                                            std::shared_ptr<InputLease> lease,
+                                            std::atomic<std::uint64_t>& rung) {
     const dds::Type& type = port->messages().type();
     // Best effort: the newest counts, and every writer matches.
     auto reader = dds::Endpoint::create(dds::EndpointKind::kReader, parts.participant, type,
                                         dds_topic(parts.participant, port->source().topic),
                                         {.reliable = false, .depth = kKept});
     if (!reader) return std::unexpected(reader.error());
-    std::unique_ptr<Feed> feed(new Feed(std::move(port), std::move(*reader), parts, rung));
+    std::unique_ptr<Feed> feed(
+        new Feed(std::move(port), std::move(*reader), std::move(lease), rung));
     dds_listener_t* listener = dds_create_listener(feed.get());
     dds_lset_data_available(listener,
                             [](dds_entity_t, void* its) { static_cast<Feed*>(its)->hear(); });
@@ -60,7 +60,9 @@ class InputTopics::Feed {
     for (std::size_t i = 0; taken > 0 && i < static_cast<std::size_t>(taken); ++i) {
       if (!infos[i].valid_data) continue;
       const dds_instance_handle_t writer = infos[i].publication_handle;
-      if (writer != std::exchange(asked, writer)) may = check_writer(writer);
+      if (writer != std::exchange(asked, writer)) {
+        may = lease_->take(*port_, dds::participant_of(reader_.get(), writer), writer);
+      }
       if (!may) {
         port_->refuse(may.error());
       } else {
@@ -78,9 +80,12 @@ class InputTopics::Feed {
   }
 
  private:
-  Feed(std::shared_ptr<runtime::InputPort> port, dds::Endpoint reader, const Parts& parts,
-       std::atomic<std::uint64_t>& rung)
-      : port_(std::move(port)), parts_(parts), rung_(&rung), reader_(std::move(reader)) {}
+  Feed(std::shared_ptr<runtime::InputPort> port, dds::Endpoint reader,
+       std::shared_ptr<InputLease> lease, std::atomic<std::uint64_t>& rung)
+      : port_(std::move(port)),
+        lease_(std::move(lease)),
+        rung_(&rung),
+        reader_(std::move(reader)) {}
 
   void hear() {
     heard_.fetch_add(1);
@@ -94,32 +99,8 @@ class InputTopics::Feed {
     (void)port_->offer(runtime::InputFeeder::kTopic, *sample);
   }
 
-  /// Who was admitted stays so, as far as the gate lets anybody through.
-  Status check_writer(dds_instance_handle_t writer) {
-    if (const Status runs = parts_.services.check_runs(*port_); !runs) return runs;
-    if (parts_.gate) {
-      const Status open = parts_.gate("input.set", ControlEffect::kChanges, Json::object());
-      if (!open) return open;
-    }
-    if (!parts_.admission.admits(dds::participant_of(reader_.get(), writer))) {
-      return fail("its writer is a stranger",
-                  "[remote] trust = \"domain\", or `tandem ask` with dds.admit: docs/security.md");
-    }
-    const auto now = SteadyClock::now();
-    const std::chrono::duration<double> timeout(port_->input().options.timeout_s);
-    const auto silence = std::max<std::chrono::duration<double>>(timeout, kLeastSilence);
-    if (writer_ != 0 && writer != writer_ && now - heard_at_ < silence) {
-      return fail("another node feeds it", "one at a time; stop the other one first");
-    }
-    writer_ = writer;
-    heard_at_ = now;
-    return {};
-  }
-
   std::shared_ptr<runtime::InputPort> port_;
-  Parts parts_;
-  dds_instance_handle_t writer_ = 0;  // who feeds; 0: nobody yet
-  SteadyClock::time_point heard_at_;
+  std::shared_ptr<InputLease> lease_;
   std::atomic<std::uint64_t> heard_{0};  // by the listener
   std::uint64_t looked_at_ = 0;          // or passed over
   std::atomic<std::uint64_t>* rung_;
@@ -145,17 +126,23 @@ Status topics_may_feed(std::span<const std::shared_ptr<runtime::InputPort>> inpu
 Result<std::unique_ptr<InputTopics>> InputTopics::open(dds::Participant* participant,
                                                        runtime::RunServices& services,
                                                        ControlRegistry::Gate gate,
-                                                       const DdsAdmission& admission) {
+                                                       const DdsAdmission& admission,
+                                                       bool simulated_time) {
   const auto ports = services.inputs_of(runtime::InputFeeder::kTopic);
   if (ports.empty()) return nullptr;
   if (const Status may = topics_may_feed(ports, participant != nullptr, gate); !may)
     return std::unexpected(may.error());
   std::unique_ptr<InputTopics> topics(new InputTopics);
-  const Parts parts{*participant, services, std::move(gate), admission};
+  const FeedParts parts{*participant, services, std::move(gate), admission, simulated_time};
   for (const auto& port : ports) {
-    auto feed = Feed::open(port, parts, topics->rung_);
+    const auto lease = std::make_shared<InputLease>(parts);
+    auto feed = Feed::open(port, parts, lease, topics->rung_);
     if (!feed) return std::unexpected(feed.error());
     topics->feeds_.push_back(std::move(*feed));
+    if (port->source().action.empty()) continue;
+    auto action = TrajectoryAction::open(port, parts, lease);
+    if (!action) return std::unexpected(action.error());
+    topics->actions_.push_back(std::move(*action));
   }
   topics->thread_ = std::thread([&one = *topics] { one.take(); });
   return topics;

@@ -250,8 +250,9 @@ class Session {
                   "leave out --no-socket; or [remote] trust = \"domain\" admits everybody");
     }
     const ControlRegistry::Gate gate = gate_of(e.remote, server_.get());
-    auto topics = InputTopics::open(dds_ == nullptr ? nullptr : &dds_->participant(),
-                                    cycle_->services(), gate, admission_);
+    auto topics =
+        InputTopics::open(dds_ == nullptr ? nullptr : &dds_->participant(), cycle_->services(),
+                          gate, admission_, c_.backend->pace() == hal::Pace::kSimulatedClock);
     if (!topics) return std::unexpected(topics.error());
     topics_ = std::move(*topics);
     auto pads = GamePads::open(cycle_->services());

@@ -361,6 +361,49 @@ TEST(InputMessages, BringEveryKind) {
             "");
 }
 
+/// The same of goals, which name joints that there are, and numbers that may be right.
+TEST_F(InputTopic, AnyGoalIsTakenWholeOrRefused) {
+  using Request = dds::control_msgs::FollowJointTrajectory_SendGoal_Request;
+  std::mt19937_64 random(12);
+  const InputOptions options{.names = {"shoulder", "elbow"}, .most_points = 2, .terms = true};
+  const InputBlock block("wish", InputKind::kTrajectory, options);
+  auto io = std::make_shared<ControllerIo>();
+  io->inputs.declare("wish", InputKind::kTrajectory, options);
+  const auto port = runtime::InputPort::make(io, io->inputs.all.front(), "one",
+                                             hal::robot_of(robot), 1'000'000, nullptr);
+  ASSERT_TRUE(port) << port.error().to_string();
+  const dds::Type& type = dds::type<Request>();
+  const dds::test::Codec codec(*own, type);
+  const dds::test::Filling any{
+      .next = [&] { return random() % 8 == 0 ? random() : 0; },
+      .elements = [&] { return static_cast<std::uint32_t>(random() % 8 == 0 ? 1 : 0); }};
+  std::size_t taken = 0, refused = 0;
+  std::array<std::string, 2> names{"elbow", "shoulder"};
+  for (int i = 0; i < 5000; ++i) {
+    const auto message = codec.sample(dds::test::CdrWriter(any).sample(*type.tree));
+    ASSERT_TRUE(message);
+    auto& goal = static_cast<Request*>(message->get())->goal;
+    const auto restored = goal.trajectory;
+    std::array<char*, 2> texts{names[0].data(), names[random() % 2].data()};
+    std::array<double, 2> place{0.1, static_cast<double>(random() % 5) - 1.0};
+    std::array<trajectory_msgs_msg_dds__JointTrajectoryPoint_, 2> points{};
+    const auto joints = static_cast<std::uint32_t>(random() % 3);
+    for (auto& point : points) {
+      point.positions = {joints, joints, place.data(), false};
+      point.time_from_start.sec = static_cast<std::int32_t>(random() % 4);
+    }
+    goal.trajectory.joint_names = {joints, joints, texts.data(), false};
+    const auto count = static_cast<std::uint32_t>(random() % 3);
+    goal.trajectory.points = {count, count, points.data(), false};
+    const auto sample = runtime::goal_sample(goal, block, 1'000'000'000);
+    ASSERT_TRUE(!sample || sample->size() == block.values());
+    ++(sample && (*port)->check(*sample) ? taken : refused);
+    goal.trajectory = restored;  // whose memory it is
+  }
+  EXPECT_GT(taken, 50U);
+  EXPECT_GT(refused, 50U);
+}
+
 /// Lengths, texts and numbers at random, decoded by Cyclone DDS: taken whole and within the bounds,
 /// or refused.
 TEST_F(InputTopic, AnyMessageOfEveryTypeIsTakenWholeOrRefused) {

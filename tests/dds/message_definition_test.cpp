@@ -150,6 +150,56 @@ constexpr Published kDefinitions[] = {
      "5e773a60a4c7fc8a54985f307c7837aa2994252a126c301957a24e31282c9cbe"},
     {"std_msgs/msg/MultiArrayLayout",
      "4c66e6f78e740ac103a94cf63259f968e48c617e7699e829b63c21a5cb50dac6"},
+    // saahu27/aprs: build/control_msgs/…/follow_joint_trajectory__description.c
+    {"control_msgs/action/FollowJointTrajectory",
+     "738ebcb7a2d7cfa42f9f1001cc99ce3a4383d1cfe508015d9be8485e4b1c66f6"},
+    {"control_msgs/action/FollowJointTrajectory_Goal",
+     "8a9060704b269608f5a340934cc26e66869dd14bdac29e2e7fd9ec8b9882d205"},
+    {"control_msgs/action/FollowJointTrajectory_Result",
+     "8002e99ed2c14c6faa522f2a93c26d744c5982f254f9e98ff9c6f19789bdb220"},
+    {"control_msgs/action/FollowJointTrajectory_Feedback",
+     "3fd0aaecf71725121ae1ff7f01098a5e0da581e672be18a6b2c286cb43d96b49"},
+    {"control_msgs/action/FollowJointTrajectory_SendGoal",
+     "b13789dddc325a7a962825c45e28c77d37237ec129dd0c34dc5994562938c57f"},
+    {"control_msgs/action/FollowJointTrajectory_SendGoal_Request",
+     "179c93691f1f6d1d115881ff88c3917b7cc6eac2ba4bf56766cc7c4389e19ef1"},
+    {"control_msgs/action/FollowJointTrajectory_SendGoal_Response",
+     "e6a48ba740ae254500129a877f0b071be8663a115da1a539b74599cc97921fbf"},
+    {"control_msgs/action/FollowJointTrajectory_SendGoal_Event",
+     "906dd566308db02673c73c654f69bdd84738589629c1bc2841ddb49059ed1c6f"},
+    {"control_msgs/action/FollowJointTrajectory_GetResult",
+     "e3ceb38e3e1867c8dc0f46014df26e90eb93422f27e9e97f936e07f94be4bc8b"},
+    {"control_msgs/action/FollowJointTrajectory_GetResult_Request",
+     "ecf7ea8463d3beec7084bca75216d0b01b87b6e1e4e09679bb26093041efcbe9"},
+    {"control_msgs/action/FollowJointTrajectory_GetResult_Response",
+     "08eefbaa146ce02ba45898d5e99160afd6c4c54a30d159aee0f2ca6035b1580f"},
+    {"control_msgs/action/FollowJointTrajectory_GetResult_Event",
+     "43161a489e52daaa5bbc2fa74f73f1804d099574fcf8f819170807d75472662a"},
+    {"control_msgs/action/FollowJointTrajectory_FeedbackMessage",
+     "80398fcb9674a79081a9906e2ccf0c804dd7cb15e22e362e606ee87186beab71"},
+    {"control_msgs/msg/JointTolerance",
+     "c254f9cece0f3b733017b6990fd46d1326e25242d6b8844398c97d9a88e7d648"},
+    {"control_msgs/msg/JointComponentTolerance",
+     "739ea7566931944d33830fa10f1bf5e7a7fbdc3172bce7a7eaac642bd6e3ffa4"},
+    {"trajectory_msgs/msg/MultiDOFJointTrajectory",
+     "3a18fd095292a65cfde8833c72985a30af981f3ec44494655c6267262b443a4a"},
+    {"trajectory_msgs/msg/MultiDOFJointTrajectoryPoint",
+     "6ada1085b5ee64eaa069b074968e69f0e27c8c5e6f5bb0586dd1c834ef0e32b8"},
+    {"unique_identifier_msgs/msg/UUID",
+     "1b8e8aca958cbea28fe6ef60bf6c19b683c97a9ef60bb34752067d0f2f7ab437"},
+    // hpmicro/hpm_sdk: middleware/microros/kilted/include/action_msgs/…__description.c
+    {"action_msgs/msg/GoalInfo",
+     "6398fe763154554353930716b225947f93b672f0fb2e49fdd01bb7a7e37933e9"},
+    {"action_msgs/msg/GoalStatus",
+     "32f4cfd717735d17657e1178f24431c1ce996c878c515230f6c5b3476819dbb9"},
+    {"action_msgs/msg/GoalStatusArray",
+     "6c1684b00f177d37438febe6e709fc4e2b0d4248dca4854946f9ed8b30cda83e"},
+    {"action_msgs/srv/CancelGoal",
+     "573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a"},
+    {"action_msgs/srv/CancelGoal_Request",
+     "3d3c84653c1f96918086887e1dcb236faec88b81a5b14fd4cf4840065bcdf8af"},
+    {"action_msgs/srv/CancelGoal_Response",
+     "35e682cf3f510e83c70a82a4aac888496dedee56773bf9d8e5e0aa81f9e1c960"},
     // rmw_dds_common's participant_entities_info__description.c
     {"rmw_dds_common/msg/ParticipantEntitiesInfo",
      "91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"},
@@ -294,7 +344,8 @@ std::map<std::string, std::string> structures() {
     in << std::ifstream(file).rdbuf();
     std::string text = std::regex_replace(in.str(), std::regex("//[^\n]*"), "");
     text = std::regex_replace(text, std::regex("\\s+"), " ");
-    text = std::regex_replace(text, std::regex(R"(\w+::msg::dds_::)"), "");
+    text = std::regex_replace(text, std::regex(R"(\w+::\w+::dds_::)"), "");
+    text = std::regex_replace(text, std::regex(" _"), " ");  // escaped: a keyword of IDL
     std::string place;
     for (std::sregex_iterator one(text.begin(), text.end(), kToken), end; one != end; ++one) {
       const std::smatch& match = *one;

@@ -56,7 +56,14 @@ struct Services : ::testing::Test {
                     reply.message = memory.text("stopped");
                   }};
     });
-    ASSERT_TRUE(echo && stop);
+    const auto later =
+        server->add<Request, Response>("later", [this](const Request&, const Asker&) {
+          return Work{.at_once = true,
+                      .answer = [](Response& reply,
+                                   ReplyMemory& memory) { reply.message = memory.text("at last"); },
+                      .ready = [this] { return ready.load(); }};
+        });
+    ASSERT_TRUE(echo && stop && later);
     ASSERT_TRUE(server->start());
   }
   [[nodiscard]] static Client client_of(Participant& participant, const std::string& name) {
@@ -73,11 +80,23 @@ struct Services : ::testing::Test {
   }
 
   Result<std::shared_ptr<Domain>> domain;
-  std::atomic<bool> hold{false};
+  std::atomic<bool> hold{false}, ready{false};
   std::atomic<int> echoed{0}, stopped{0};
   std::unique_ptr<Participant> server_side, client_side;
   std::unique_ptr<ServiceServer> server;  // goes before what its work uses
 };
+
+/// A request that waits holds up no other.
+TEST_F(Services, MayAnswerLater) {
+  Client later = client_of(*client_side, "later"), stop = client_of(*client_side, "stop");
+  std::future<std::string> answered = std::async(std::launch::async, [&] { return call(later); });
+  ASSERT_TRUE(eventually([&] { return server->counts().requests == 1; }));
+  EXPECT_EQ(call(stop), "stopped");
+  EXPECT_EQ(server->counts().replies, 1U);
+  ready = true;
+  server->wake();
+  EXPECT_EQ(answered.get(), "at last");
+}
 
 TEST_F(Services, AnswerEveryRequestOnce) {
   Client client = client_of(*client_side, "echo");

@@ -168,6 +168,8 @@ const std::map<std::string, Make>& types() {
       TYPE(nav_msgs, Odometry),
       TYPE(diagnostic_msgs, DiagnosticArray),
       TYPE(control_msgs, DynamicJointState),
+      TYPE(action_msgs, GoalStatusArray),
+      KIND(control_msgs, action, FollowJointTrajectory_FeedbackMessage),
       TYPE(rmw_dds_common, ParticipantEntitiesInfo),
       KIND(std_srvs, srv, Trigger_Request),
       KIND(std_srvs, srv, Trigger_Response),

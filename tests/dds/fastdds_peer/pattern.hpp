@@ -75,6 +75,17 @@ MEMBERS(diagnostic_msgs::msg::dds_::DiagnosticArray_, m.header(), m.status())
 MEMBERS(control_msgs::msg::dds_::InterfaceValue_, m.interface_names(), m.values())
 MEMBERS(control_msgs::msg::dds_::DynamicJointState_, m.header(), m.joint_names(),
         m.interface_values())
+MEMBERS(unique_identifier_msgs::msg::dds_::UUID_, m.uuid())
+MEMBERS(action_msgs::msg::dds_::GoalInfo_, m.goal_id(), m.stamp())
+MEMBERS(action_msgs::msg::dds_::GoalStatus_, m.goal_info(), m.status())
+MEMBERS(action_msgs::msg::dds_::GoalStatusArray_, m.status_list())
+MEMBERS(trajectory_msgs::msg::dds_::MultiDOFJointTrajectoryPoint_, m.transforms(), m.velocities(),
+        m.accelerations(), m.time_from_start())
+MEMBERS(control_msgs::action::dds_::FollowJointTrajectory_Feedback_, m.header(), m.joint_names(),
+        m.desired(), m.actual(), m.error(), m.multi_dof_joint_names(), m.multi_dof_desired(),
+        m.multi_dof_actual(), m.multi_dof_error())
+MEMBERS(control_msgs::action::dds_::FollowJointTrajectory_FeedbackMessage_, m.goal_id(),
+        m.feedback())
 MEMBERS(rmw_dds_common::msg::dds_::Gid_, m.data())
 MEMBERS(rmw_dds_common::msg::dds_::NodeEntitiesInfo_, m.node_namespace(), m.node_name(),
         m.reader_gid_seq(), m.writer_gid_seq())
