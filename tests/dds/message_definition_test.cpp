@@ -235,7 +235,7 @@ TEST(MessageDefinition, RefusesWhatIsNoneWithItsLine) {
   EXPECT_FALSE(resolve(circle));
 }
 
-// ---- the IDL of idlc and the definitions are two texts of one thing ----
+// ---- the IDL that the build makes of the definitions, read as message_definition.cpp does ----
 
 std::string idl_element(const MessageField& field) {
   switch (field.type) {
@@ -283,18 +283,18 @@ std::string idl_members(const MessageDefinition& definition) {
   return out;
 }
 
-/// Every structure of dds/idl and of the images' IDL: "std_msgs/msg/String" -> "string data;"
+/// Every structure of the IDL that the build makes: "std_msgs/msg/String" -> "string data;"
 std::map<std::string, std::string> structures() {
   static const std::regex kToken(R"(module (\w+) \{ module (\w+) \{|struct (\w+)_ \{ ([^}]*?) \})");
   std::map<std::string, std::string> out;
   for (const char* file :
-       {TANDEM_SOURCE_DIR "/dds/idl/ros2.idl", TANDEM_SOURCE_DIR "/dds/idl/tandem_msgs.idl",
-        TANDEM_BINARY_DIR "/dds/tandem_images.idl"}) {
+       {TANDEM_BINARY_DIR "/dds/ros2.idl", TANDEM_BINARY_DIR "/dds/tandem_msgs.idl"}) {
     std::stringstream in;
     in << std::ifstream(file).rdbuf();
     std::string text = std::regex_replace(in.str(), std::regex("//[^\n]*"), "");
     text = std::regex_replace(text, std::regex("\\s+"), " ");
     text = std::regex_replace(text, std::regex(R"(\w+::msg::dds_::)"), "");
+    text = std::regex_replace(text, std::regex(" _(\\w)"), " $1");  // a word of IDL's own
     std::string place;
     for (std::sregex_iterator one(text.begin(), text.end(), kToken), end; one != end; ++one) {
       const std::smatch& match = *one;
