@@ -18,9 +18,9 @@
 
 #include "apps/control/control_registry.hpp"
 #include "apps/control/dds_parameter_types.hpp"
-#include "apps/control/dds_service_types.hpp"
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
+#include "apps/control/typed_service.hpp"
 #include "apps/text/json_reader.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "tests/fuzz/require.hpp"
@@ -106,6 +106,16 @@ Json ask(Run& run, const std::string& question, const ControlRegistry::Gate& gat
   return answer;
 }
 
+/// The question that the service `name` makes of `request`.
+template <class Request>
+std::string question_for(std::string_view name, const Request& request) {
+  static const std::vector<TypedService> kRows = tandem_services();
+  const auto row = std::ranges::find(kRows, name, &TypedService::name);
+  if (row != kRows.end()) return json_text(row->question(&request));
+  require(false);
+  return {};
+}
+
 /// The question that a typed service makes of a request with these fields.
 std::string typed_question(unsigned service, std::vector<std::string>& fields) {
   using namespace dds::tandem_msgs;
@@ -127,7 +137,7 @@ std::string typed_question(unsigned service, std::vector<std::string>& fields) {
       request.interaction = texts[2];
       request.stiffness_nm_rad = optional(3);
       request.damping_nms_rad = optional(4);
-      return json_text(set_joint_question(request));
+      return question_for("tandem/set_joint", request);
     }
     case 1: {
       SetGains_Request request{};
@@ -136,21 +146,21 @@ std::string typed_question(unsigned service, std::vector<std::string>& fields) {
       request.kp = optional(2);
       request.ki = optional(3);
       request.kd = optional(4);
-      return json_text(set_gains_question(request));
+      return question_for("tandem/set_gains", request);
     }
     case 2: {
       LoadController_Request request{};
       request.plugin = texts[0];
       request.name = texts[1];
       request.parameters = texts[2];
-      return json_text(load_controller_question(request));
+      return question_for("tandem/load_controller", request);
     }
     default: {
       SwitchControllers_Request request{};
       const auto stop = static_cast<std::uint32_t>(fields[0].size() % 4);
       request.stop = {stop, stop, texts.data() + 1, false};
       request.start = {3, 3, texts.data() + 1 + stop, false};
-      return json_text(switch_controllers_question(request));
+      return question_for("tandem/switch_controllers", request);
     }
   }
 }
