@@ -53,5 +53,7 @@ template <class Request, class Response>
 
 /// "tandem/list_controllers" and so on.
 [[nodiscard]] std::vector<TypedService> tandem_services();
+/// "controller_manager/list_controllers" and so on, by which `ros2 control` asks.
+[[nodiscard]] std::vector<TypedService> controller_manager_services();
 
 }  // namespace tandem::apps

@@ -52,8 +52,10 @@ Status DdsServices::add_all() {
     if (Status added = add_ask(*stops_, "tandem/stop", true); !added) return added;
   }
   if (Status added = add_ask(*server_, "tandem/ask", false); !added) return added;
-  for (const TypedService& row : tandem_services()) {
-    if (Status added = add(row); !added) return added;
+  for (const auto& rows : {tandem_services(), controller_manager_services()}) {
+    for (const TypedService& row : rows) {
+      if (Status added = add(row); !added) return added;
+    }
   }
   return add_parameters();
 }

@@ -109,9 +109,12 @@ Json ask(Run& run, const std::string& question, const ControlRegistry::Gate& gat
 /// The question that the service `name` makes of `request`.
 template <class Request>
 std::string question_for(std::string_view name, const Request& request) {
-  static const std::vector<TypedService> kRows = tandem_services();
-  const auto row = std::ranges::find(kRows, name, &TypedService::name);
-  if (row != kRows.end()) return json_text(row->question(&request));
+  static const std::vector<TypedService> kTandem = tandem_services(),
+                                         kRos = controller_manager_services();
+  for (const auto* rows : {&kTandem, &kRos}) {
+    const auto row = std::ranges::find(*rows, name, &TypedService::name);
+    if (row != rows->end()) return json_text(row->question(&request));
+  }
   require(false);
   return {};
 }
@@ -155,12 +158,20 @@ std::string typed_question(unsigned service, std::vector<std::string>& fields) {
       request.parameters = texts[2];
       return question_for("tandem/load_controller", request);
     }
-    default: {
+    case 3: {
       SwitchControllers_Request request{};
       const auto stop = static_cast<std::uint32_t>(fields[0].size() % 4);
       request.stop = {stop, stop, texts.data() + 1, false};
       request.start = {3, 3, texts.data() + 1 + stop, false};
       return question_for("tandem/switch_controllers", request);
+    }
+    default: {
+      dds::controller_manager_msgs::SwitchController_Request request{};
+      const auto stop = static_cast<std::uint32_t>(fields[0].size() % 4);
+      request.strictness = static_cast<std::int32_t>(std::strtol(fields[7].c_str(), nullptr, 10));
+      request.deactivate_controllers = {stop, stop, texts.data() + 1, false};
+      request.activate_controllers = {3, 3, texts.data() + 1 + stop, false};
+      return question_for("controller_manager/switch_controller", request);
     }
   }
 }
@@ -277,7 +288,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if ((way & 4) == 0) {
     for (const std::string& line : lines) ask(run, line, gate(way & 3));
   } else if ((way & 32) == 0) {
-    ask(run, typed_question((way >> 3) & 3, lines), gate(way & 3));
+    ask(run, typed_question((way & 64) != 0 ? 4 : (way >> 3) & 3, lines), gate(way & 3));
   } else {
     ask(run, R"({"do": "controller.load", "plugin": "hold"})", {});
     ask_parameters(run, (way & 8) != 0, lines, gate(way & 3));
