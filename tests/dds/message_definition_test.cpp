@@ -219,6 +219,9 @@ constexpr const char* kNotCompared[] = {
     "controller_manager_msgs/srv/CleanupController_Response",
     "controller_manager_msgs/srv/ListHardwareInterfaces_Response",
     "controller_manager_msgs/srv/SwitchController_Response",  // older ones lack its `message`
+    "pal_statistics_msgs/msg/Statistics",
+    "pal_statistics_msgs/msg/StatisticsNames",
+    "pal_statistics_msgs/msg/StatisticsValues",
 };
 
 TEST(MessageDefinition, HasThePublishedHash) {
