@@ -43,12 +43,13 @@ enum class Topic : std::uint8_t {
   kParallel,  ///< of the robot beside this one, when there is one
   kSignals,   ///< of every controller that declares some
   kMarks,     ///< the same
+  kIntrospection,
 };
 struct TopicPeriod {
   std::string_view key;     ///< of [dds.every]
   std::int64_t default_ns;  ///< between two samples, unless the key says otherwise; 0: none
 };
-inline constexpr std::array<TopicPeriod, 14> kTopicPeriods{{
+inline constexpr std::array<TopicPeriod, 15> kTopicPeriods{{
     {"joint_states", 10'000'000},
     {"dynamic_joint_states", 0},
     {"imu", 10'000'000},
@@ -63,6 +64,7 @@ inline constexpr std::array<TopicPeriod, 14> kTopicPeriods{{
     {"parallel", 10'000'000},
     {"signals", 10'000'000},
     {"marks", 20'000'000},
+    {"introspection", 10'000'000},
 }};
 
 /// [dds]

@@ -1,17 +1,8 @@
 # The messages that carry process images: their fields are the rows of the images' tables.
 
-set(idl_of_float64 "double")
-set(idl_of_uint64 "unsigned long long")
-set(idl_of_int64 "long long")
-set(idl_of_uint32 "unsigned long")
-set(idl_of_uint16 "unsigned short")
-set(idl_of_uint8 "octet")
-set(idl_of_int8 "int8")
-
 # tandem_image_message(State TABLE): gives dds/tandem_msgs/msg/State.msg the rows of TABLE as its
-# last fields, and appends to the caller's variables
-#   image_idl      the message as IDL
-#   image_members  TANDEM_STATE(the message's member, the image's), a line per row
+# last fields, and appends TANDEM_STATE(the message's member, the image's), a line per row, to the
+# caller's variable image_members.
 function(tandem_image_message name table)
   set(message ${CMAKE_CURRENT_SOURCE_DIR}/tandem_msgs/msg/${name}.msg)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${table} ${message})
@@ -51,17 +42,5 @@ function(tandem_image_message name table)
     file(WRITE ${message} "${text}")
   endif()
 
-  string(APPEND image_idl "  @final struct ${name}_ {\n")
-  string(REGEX MATCHALL "\n[a-z0-9]+(\\[\\])? [a-z0-9_]+" members "\n${text}")
-  foreach(one IN LISTS members)
-    string(REGEX MATCH "([a-z0-9]+)(\\[\\])? ([a-z0-9_]+)" one "${one}")
-    set(type "${idl_of_${CMAKE_MATCH_1}}")
-    if(CMAKE_MATCH_2)
-      set(type "sequence<${type}>")
-    endif()
-    string(APPEND image_idl "    ${type} ${CMAKE_MATCH_3};\n")
-  endforeach()
-  string(APPEND image_idl "  };\n")
-  set(image_idl "${image_idl}" PARENT_SCOPE)
   set(image_members "${image_members}" PARENT_SCOPE)
 endfunction()

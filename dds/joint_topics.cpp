@@ -1,35 +1,16 @@
 // joint_states and dynamic_joint_states.
 // Names and interfaces are set once; each sample lends DDS values in robot.toml's order.
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <memory>
 #include <vector>
 
+#include "dds/hardware_interfaces.hpp"
 #include "dds/message_parts.hpp"
 #include "dds/topic_group.hpp"
-#include "hal/config/capabilities.hpp"
 
 namespace tandem::dds {
 namespace {
-
-/// An interface of dynamic_joint_states, named as ros2_control names it where it does.
-struct Interface {
-  const char* name;
-  std::span<const double> (hal::StateImage::*values)() const noexcept;
-  bool hal::MotorFeedback::*told = nullptr;  ///< null: of every joint
-};
-constexpr std::array<Interface, 9> kInterfaces{{
-    {"position", &hal::StateImage::position_rad},
-    {"velocity", &hal::StateImage::velocity_rad_s},
-    {"acceleration", &hal::StateImage::acceleration_rad_s2},
-    {"effort", &hal::StateImage::torque_Nm, &hal::MotorFeedback::torque},
-    {"motor_position", &hal::StateImage::motor_position_rad},
-    {"motor_velocity", &hal::StateImage::motor_velocity_rad_s},
-    {"current", &hal::StateImage::current_A, &hal::MotorFeedback::current},
-    {"voltage", &hal::StateImage::voltage_V, &hal::MotorFeedback::voltage},
-    {"temperature", &hal::StateImage::temperature_C, &hal::MotorFeedback::temperature},
-}};
 
 /// Every joint has been measured once: its sample is no older than the run.
 bool measured(const hal::StateImage& state) {
@@ -51,7 +32,7 @@ std::vector<std::string> names_with_followers(const RunDescription& run) {
 
 std::vector<std::string> interface_names() {
   std::vector<std::string> names;
-  for (const Interface& one : kInterfaces) names.emplace_back(one.name);
+  for (const StateInterface& one : kStateInterfaces) names.emplace_back(one.name);
   return names;
 }
 
@@ -86,15 +67,15 @@ JointTopics::JointTopics(OutputMaker& maker, const RunDescription& run)
       joints_(joint_names(run.robot)),
       joints_and_followers_(names_with_followers(run)),
       interfaces_(interface_names()),
-      values_(run.robot.joints.size() * kInterfaces.size()),
+      values_(run.robot.joints.size() * kStateInterfaces.size()),
       joint_values_(run.robot.joints.size()),
       joint_states_(maker.periodic<sensor_msgs::JointState>(Topic::kJointStates, "joint_states")),
       dynamic_joint_states_(maker.periodic<control_msgs::DynamicJointState>(
           Topic::kDynamicJointStates, "dynamic_joint_states")) {
   for (std::size_t j = 0; j < joint_values_.size(); ++j) {
     refer(joint_values_[j].interface_names, interfaces_.get());
-    refer(joint_values_[j].values,
-          std::span<const double>(values_).subspan(j * kInterfaces.size(), kInterfaces.size()));
+    refer(joint_values_[j].values, std::span<const double>(values_).subspan(
+                                       j * kStateInterfaces.size(), kStateInterfaces.size()));
   }
   dynamic_.header.frame_id = refer(no_frame_);
   refer(dynamic_.joint_names, joints_.get());
@@ -139,12 +120,12 @@ void JointTopics::fill_states(const hal::StateImage& state) {
 
 const control_msgs::DynamicJointState& JointTopics::dynamic(const CycleSample& sample) {
   dynamic_.header.stamp = ros_time(sample.stamp_ns);
-  for (std::size_t i = 0; i < kInterfaces.size(); ++i) {
-    const auto values = (sample.state.*kInterfaces[i].values)();
-    const auto told = kInterfaces[i].told;
+  for (std::size_t i = 0; i < kStateInterfaces.size(); ++i) {
+    const auto values = (sample.state.*kStateInterfaces[i].values)();
+    const auto told = kStateInterfaces[i].told;
     for (std::size_t j = 0; j < values.size(); ++j) {
       const bool known = told == nullptr || tells_[j].*told;
-      values_[j * kInterfaces.size() + i] =
+      values_[j * kStateInterfaces.size() + i] =
           known ? values[j] : std::numeric_limits<double>::quiet_NaN();
     }
   }

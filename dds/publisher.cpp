@@ -18,8 +18,9 @@ constexpr auto kPoll = std::chrono::milliseconds(1);
 constexpr std::uint32_t bit(Topic topic) { return 1U << static_cast<unsigned>(topic); }
 constexpr std::uint32_t kNeedsState = bit(Topic::kJointStates) | bit(Topic::kDynamicJointStates) |
                                       bit(Topic::kImu) | bit(Topic::kWrench) | bit(Topic::kTf) |
-                                      bit(Topic::kDiagnostics) | bit(Topic::kState);
-constexpr std::uint32_t kNeedsCommand = bit(Topic::kCommand);
+                                      bit(Topic::kDiagnostics) | bit(Topic::kState) |
+                                      bit(Topic::kIntrospection);
+constexpr std::uint32_t kNeedsCommand = bit(Topic::kCommand) | bit(Topic::kIntrospection);
 constexpr std::uint32_t kNeedsTruth = bit(Topic::kTf) | bit(Topic::kOdom);
 constexpr std::uint32_t kNeedsEstimate = kNeedsTruth | bit(Topic::kWrench);
 

@@ -67,8 +67,9 @@ RunTopics::RunTopics(Outlets& outlets, const RunDescription& run)
   if (run.truth == nullptr && !bases) every_[static_cast<std::size_t>(Topic::kOdom)] = 0;
   if (!run.parallel) every_[static_cast<std::size_t>(Topic::kParallel)] = 0;
   if (run.simulated_time) clock_ = maker.periodic<rosgraph_msgs::Clock>(Topic::kClock, "clock");
-  for (MakeTopics* topics : {joint_topics, sensor_topics, wrench_topics, frame_topics, image_topics,
-                             diagnostic_topics, controller_topics, parameter_topics, mark_topics}) {
+  for (MakeTopics* topics :
+       {joint_topics, sensor_topics, wrench_topics, frame_topics, image_topics, diagnostic_topics,
+        controller_topics, parameter_topics, mark_topics, introspection_topics}) {
     groups_.push_back(topics(maker, run));
   }
   if (run.parallel) groups_.push_back(parallel_topics(maker, run));

@@ -83,6 +83,14 @@ class ServiceServer {
   ServiceServer(const ServiceServer&) = delete;
   ServiceServer& operator=(const ServiceServer&) = delete;
 
+  /// What a request asks for, as ServiceWork has it: `reply` is of the service's own type.
+  struct Work {
+    bool at_once = false, takes_long = false;
+    std::function<void(void* reply, ReplyMemory& memory)> answer;
+    std::function<bool()> ready = {};  ///< as ServiceWork's
+};
+  using Read = std::function<Work(const void* request, const Asker& asker)>;
+
   /// Adds a service before start().
   /// @param name  ROS 2's, without the namespace: "tandem/ask"
   /// @param read  called on the taking thread; the request is gone when it returns
@@ -100,6 +108,9 @@ class ServiceServer {
                          std::move(work.ready)};
                });
   }
+  /// The same, of types that are not known before the program runs.
+  [[nodiscard]] Status add(const std::string& name, const Type& request, const Type& response,
+                           Read read);
   /// @param only_at_once  no request is done in its turn: there are no threads for that
   [[nodiscard]] Status start(bool only_at_once = false);
 
@@ -109,12 +120,6 @@ class ServiceServer {
   [[nodiscard]] Counts counts() const;
 
  private:
-  struct Work {
-    bool at_once = false, takes_long = false;
-    std::function<void(void* reply, ReplyMemory& memory)> answer;
-    std::function<bool()> ready;
-  };
-  using Read = std::function<Work(const void* request, const Asker& asker)>;
   struct Service {
     std::string id;
     Endpoint requests, replies;
@@ -148,8 +153,6 @@ class ServiceServer {
   enum class Reach : std::uint8_t { kConnected, kNotYet, kGone };
 
   explicit ServiceServer(Participant& participant) : participant_(&participant) {}
-  [[nodiscard]] Status add(const std::string& name, const Type& request, const Type& response,
-                           Read read);
   void receive();
   void take(Service& service);
   void take(Service& service, const ddsi_serdata* request, dds_instance_handle_t asker);

@@ -225,7 +225,7 @@ class TopicGroup {
 /// Makes the topics of one file, NAME_topics.cpp.
 using MakeTopics = std::unique_ptr<TopicGroup>(OutputMaker& maker, const RunDescription& run);
 MakeTopics joint_topics, sensor_topics, frame_topics, image_topics, diagnostic_topics,
-    parallel_topics, controller_topics, parameter_topics, mark_topics;
+    parallel_topics, controller_topics, parameter_topics, mark_topics, introspection_topics;
 MakeTopics wrench_topics;  ///< @pre run.wrenches are sites of run.robot
 
 }  // namespace tandem::dds

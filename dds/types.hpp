@@ -5,7 +5,6 @@
 
 #include <dds/dds.h>
 #include <ros2.h>
-#include <tandem_images.h>
 #include <tandem_link.h>
 #include <tandem_msgs.h>
 

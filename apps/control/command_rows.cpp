@@ -112,6 +112,7 @@ const std::vector<CommandRow> kRows{
     {"run.stop", kEnds, "ends the run in order", {}, {.on_line = false, .by_event = true}},
 
     {"controller.list", kReads, "every loaded controller and its claims"},
+    {"controller.available", kReads, "the names by which controllers can be loaded"},
     {"controller.show", kReads, "claims and parameters of a controller",
      {text("name", "", "of a loaded controller; else of every one"),
       need(local(text("controller", "name", kLoaded)))}},
@@ -161,6 +162,7 @@ const std::vector<CommandRow> kRows{
        "so near to what is commanded [unit of the reference: rad or m in position control], in the "
        "same modes", .line = "--when-within", .unit = Unit::kPlace, .min = 0.0, .max = 1e6},
       choice("unit", "", {"angle", "length"}),
+      choice("strictness", "--strictness", {"strict", "best_effort", "force"}),
       flag("cancel", "--cancel", "instead: the switch that waits is given up"),
       {.name = "timeout_s", .type = Type::kNumber, .doc = "with it: how long at most [s], of the "
        "run's time, 0 to 3600; default 10. Then nothing has changed", .line = "--timeout",

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "apps/control/lenient_switch.hpp"
 #include "apps/control/shadow_control.hpp"
 #include "apps/text/toml_text.hpp"
 #include "base/nearest.hpp"
@@ -127,6 +128,16 @@ Result<Json> tell(RunServices& services, const Result<runtime::RequestResult>& a
   return answer;
 }
 
+/// A switch at once, all or none.
+Result<Json> switch_now(RunServices& services, const Names& stop, const Names& start) {
+  const auto asked = services.switch_controllers(stop, start);
+  auto answer = tell(services, asked);
+  if (!answer || !asked->done || start.empty()) return answer;
+  const std::string later = starts_later(asked->phase);
+  if (!later.empty()) (*answer)["note"] = later;
+  return answer;
+}
+
 /// A switch that an operator asks for.
 Result<Json> switch_by_hand(RunServices& services, const hal::RobotConfig& robot, const Names& stop,
                             const Names& start, const Json& request) {
@@ -140,6 +151,8 @@ Result<Json> switch_by_hand(RunServices& services, const hal::RobotConfig& robot
     return tell(services, services.cancel_switch());
   }
   if (request.contains("when_within")) {
+    if (request.contains("strictness"))
+      return fail_at("strictness", "is for a switch at once", "leave it or when_within out");
     auto answer = tell(services, switch_when(services, robot, stop, start, request));
     if (answer) (*answer)["waits"] = true;
     return answer;
@@ -148,11 +161,23 @@ Result<Json> switch_by_hand(RunServices& services, const hal::RobotConfig& robot
     if (request.contains(key))
       return fail_at(key, "is for a switch that waits", "give when_within, too");
   }
-  const auto asked = services.switch_controllers(stop, start);
-  auto answer = tell(services, asked);
-  if (!answer || !asked->done || start.empty()) return answer;
-  const std::string later = starts_later(asked->phase);
-  if (!later.empty()) (*answer)["note"] = later;
+  const std::string strictness = request.value("strictness", "strict");
+  if (strictness == "strict") return switch_now(services, stop, start);
+  const std::vector<runtime::ControllerStatus> all = services.controllers();
+  if (strictness == "force") {
+    const Names more = with_who_is_in_the_way(all, stop, start);
+    if (const Status own = check_no_owner(services, more); !own)
+      return std::unexpected(own.error());
+    return switch_now(services, more, start);
+  }
+  const LenientSwitch is = best_effort(all, stop, start);
+  if (!is.some) return switch_now(services, stop, start);  // which says why not
+  auto answer = is.stop.empty() && is.start.empty()
+                    ? tell(services, runtime::RequestResult{.done = true})
+                    : switch_now(services, is.stop, is.start);
+  if (!answer || is.left_out.empty()) return answer;
+  const std::string note = answer->value("note", std::string());
+  (*answer)["note"] = (note.empty() ? "" : note + "; ") + left_out_text(is);
   return answer;
 }
 
@@ -357,6 +382,9 @@ void add_controller_commands(ControlRegistry& registry, RunServices& services,
                              const hal::RobotConfig& robot, TryController trial) {
   registry.add("controller.list", [&services, &robot](const Json&) -> Result<Json> {
     return Json{{"controllers", list(services, robot)}};
+  });
+  registry.add("controller.available", [](const Json&) -> Result<Json> {
+    return Json{{"plugins", available_controllers(controller_folders())}};
   });
   registry.add("controller.show",
                [&services, &robot](const Json& request) { return show(services, robot, request); });

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/control/dds_service_types.hpp"
+#include "apps/control/dds_reply.hpp"
 #include "runtime/cycle_request.hpp"
 
 namespace tandem::apps {
@@ -44,7 +44,7 @@ ParameterQuestion about(const dds_sequence_string& names) {
 }
 
 template <class Sequence>
-Json list_of(const Sequence& sequence) {
+Json elements_of(const Sequence& sequence) {
   Json list = Json::array();
   const std::size_t count = std::min<std::size_t>(sequence._length, kMostElements);
   for (const auto& one : std::span(sequence._buffer, count)) list.push_back(one);
@@ -58,8 +58,8 @@ Json json_of(const Value& value) {
     case kInteger: return value.integer_value;
     case kDouble: return value.double_value;
     case kString: return name_of(value.string_value);
-    case kIntegerArray: return list_of(value.integer_array_value);
-    case kDoubleArray: return list_of(value.double_array_value);
+    case kIntegerArray: return elements_of(value.integer_array_value);
+    case kDoubleArray: return elements_of(value.double_array_value);
     default: return nullptr;
   }
 }
@@ -117,21 +117,6 @@ RosType type_of(const Json& parameter) {
                              : kDouble;
 }
 
-/// Room for `count` elements in `sequence`, of the sequence's own type.
-template <class Sequence>
-auto places_in(Sequence& sequence, std::size_t count, ReplyMemory& memory) {
-  using Element = std::remove_pointer_t<decltype(sequence._buffer)>;
-  sequence._buffer = memory.array<Element>(count);
-  sequence._length = sequence._maximum = static_cast<std::uint32_t>(count);
-  return std::span(sequence._buffer, count);
-}
-
-void fill_texts(const std::vector<std::string>& texts, dds_sequence_string& to,
-                ReplyMemory& memory) {
-  const auto places = places_in(to, texts.size(), memory);
-  for (std::size_t i = 0; i < texts.size(); ++i) places[i] = memory.text(texts[i]);
-}
-
 /// One that is not given is no number.
 double number_of(const Json& value) {
   return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
@@ -148,7 +133,7 @@ void fill_value(const Json* parameter, Value& to, ReplyMemory& memory) {
   if (to.type == kDouble) to.double_value = value.get<double>();
   if (to.type == kString) to.string_value = memory.text(value.get<std::string>());
   if (to.type != kDoubleArray) return;
-  const auto places = places_in(to.double_array_value, value.size(), memory);
+  const auto places = room(to.double_array_value, value.size(), memory);
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = number_of(value[i]);
 }
 
@@ -187,10 +172,10 @@ void fill_descriptor(const Json& name, const Json* parameter,
   const double least = min.is_null() ? Limits::lowest() : min.get<double>();
   const double most = max.is_null() ? Limits::max() : max.get<double>();
   if (to.type != kInteger) {
-    places_in(to.floating_point_range, 1, memory)[0] = {least, most, 0.0};
+    room(to.floating_point_range, 1, memory)[0] = {least, most, 0.0};
   } else {  // an integer's limits are within 2^53
-    places_in(to.integer_range, 1, memory)[0] = {static_cast<std::int64_t>(least),
-                                                 static_cast<std::int64_t>(most), 0};
+    room(to.integer_range, 1, memory)[0] = {static_cast<std::int64_t>(least),
+                                            static_cast<std::int64_t>(most), 0};
   }
 }
 
@@ -252,7 +237,7 @@ void fill(const Json& answer, const ParameterQuestion& asked, ros::ListParameter
 void fill(const Json& answer, const ParameterQuestion& asked,
           ros::DescribeParameters_Response& reply, ReplyMemory& memory) {
   const auto all = named_parameters(answer);
-  const auto places = places_in(reply.descriptors, asked.names.size(), memory);
+  const auto places = room(reply.descriptors, asked.names.size(), memory);
   for (std::size_t i = 0; i < places.size(); ++i)
     fill_descriptor(asked.names[i], find(all, asked.names[i]), places[i], memory);
 }
@@ -260,7 +245,7 @@ void fill(const Json& answer, const ParameterQuestion& asked,
 void fill(const Json& answer, const ParameterQuestion& asked, ros::GetParameters_Response& reply,
           ReplyMemory& memory) {
   const auto all = named_parameters(answer);
-  const auto places = places_in(reply.values, asked.names.size(), memory);
+  const auto places = room(reply.values, asked.names.size(), memory);
   for (std::size_t i = 0; i < places.size(); ++i)
     fill_value(find(all, asked.names[i]), places[i], memory);
 }
@@ -268,7 +253,7 @@ void fill(const Json& answer, const ParameterQuestion& asked, ros::GetParameters
 void fill(const Json& answer, const ParameterQuestion& asked,
           ros::GetParameterTypes_Response& reply, ReplyMemory& memory) {
   const auto all = named_parameters(answer);
-  const auto places = places_in(reply.types, asked.names.size(), memory);
+  const auto places = room(reply.types, asked.names.size(), memory);
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Json* parameter = find(all, asked.names[i]);
     places[i] = parameter == nullptr ? kNotSet : type_of(*parameter);
@@ -280,10 +265,10 @@ void fill(const Json& answer, const ParameterQuestion& asked, ros::SetParameters
   if (!answer.value("ok", false)) {  // the same of all, of however many
     ::rcl_interfaces_msg_dds__SetParametersResult_ refused{};
     fill_result(message_of(answer), refused, memory);
-    std::ranges::fill(places_in(reply.results, asked.count, memory), refused);
+    std::ranges::fill(room(reply.results, asked.count, memory), refused);
     return;
   }
-  const auto places = places_in(reply.results, asked.names.size(), memory);
+  const auto places = room(reply.results, asked.names.size(), memory);
   for (std::size_t i = 0; i < places.size(); ++i) {
     const auto& name = asked.names[i].get_ref<const std::string&>();
     fill_result(answer["results"].value(name, ""), places[i], memory);

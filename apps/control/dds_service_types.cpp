@@ -1,10 +1,12 @@
-#include "apps/control/dds_service_types.hpp"
+// The services "tandem/…".
+#include "apps/control/typed_service.hpp"
 
 #include <fmt/core.h>
 
 #include <cstring>
 #include <span>
 
+#include "apps/control/dds_reply.hpp"
 #include "apps/control/fault_table.hpp"
 
 namespace tandem::apps {
@@ -23,31 +25,6 @@ void add_number(Json& question, const char* key, const dds_sequence_double& valu
   if (value._length > 0) question[key] = value._buffer[0];
 }
 
-Json texts(const dds_sequence_string& sequence) {
-  Json list = Json::array();
-  for (const char* text : std::span(sequence._buffer, sequence._length)) list.push_back(text);
-  return list;
-}
-
-char* text_of(const Json& object, const char* key, ReplyMemory& memory) {
-  return memory.text(object.value(key, std::string()));
-}
-
-const Json& list_of(const Json& answer, const char* key) {
-  static const Json kEmpty = Json::array();
-  const auto found = answer.find(key);
-  return found != answer.end() && found->is_array() ? *found : kEmpty;
-}
-
-/// Room for a list's elements in `sequence`, of the sequence's own type.
-template <class Sequence>
-auto room(Sequence& sequence, const Json& list, ReplyMemory& memory) {
-  using Element = std::remove_pointer_t<decltype(sequence._buffer)>;
-  sequence._buffer = memory.array<Element>(list.size());
-  sequence._length = sequence._maximum = static_cast<std::uint32_t>(list.size());
-  return std::span(sequence._buffer, list.size());
-}
-
 /// What is asked of a loop whose time stands waits.
 const char* when(const Json& answer) {
   return answer.value("paused", false) ? ", in the next cycle: simulated time stands" : "";
@@ -60,15 +37,13 @@ void fill_controller(const Json& from, tandem_msgs_msg_dds__Controller_& to, Rep
   to.finished = from.value("finished", false);
   to.of_experiment = from.value("of_experiment", false);
   const Json& claims = list_of(from, "claims");
-  const auto room_for = room(to.claims, claims, memory);
+  const auto room_for = room(to.claims, claims.size(), memory);
   for (std::size_t i = 0; i < claims.size(); ++i) {
     room_for[i].joint = text_of(claims[i], "joint", memory);
     room_for[i].mode = text_of(claims[i], "mode", memory);
     room_for[i].interaction = text_of(claims[i], "interaction", memory);
   }
 }
-
-}  // namespace
 
 Json load_controller_question(const LoadController_Request& request) {
   Json question{{"do", "controller.load"}, {"plugin", request.plugin}};
@@ -82,8 +57,9 @@ Json unload_controller_question(const UnloadController_Request& request) {
 }
 
 Json switch_controllers_question(const SwitchControllers_Request& request) {
-  return {
-      {"do", "controller.switch"}, {"stop", texts(request.stop)}, {"start", texts(request.start)}};
+  return {{"do", "controller.switch"},
+          {"stop", texts_of(request.stop)},
+          {"start", texts_of(request.start)}};
 }
 
 Json set_joint_question(const SetJoint_Request& request) {
@@ -110,12 +86,6 @@ Json clock_question(const Clock_Request& request) {
   if (action == "step") question["cycles"] = request.cycles;
   if (action == "rate") question["rate"] = request.rate;
   return question;
-}
-
-std::string message_of(const Json& answer) {
-  if (answer.value("ok", false)) return answer.value("note", std::string());
-  const std::string hint = answer.value("hint", std::string());
-  return answer.value("error", std::string()) + (hint.empty() ? "" : " (" + hint + ")");
 }
 
 void fill_emergency_stop(const Json& answer, dds::std_srvs::Trigger_Response& reply,
@@ -155,18 +125,26 @@ void fill_controllers(const Json& answer, ListControllers_Response& reply, Reply
   reply.success = answer.value("ok", false);
   reply.message = memory.text(message_of(answer));
   const Json& controllers = list_of(answer, "controllers");
-  const auto room_for = room(reply.controllers, controllers, memory);
+  const auto room_for = room(reply.controllers, controllers.size(), memory);
   for (std::size_t i = 0; i < controllers.size(); ++i) {
     fill_controller(controllers[i], room_for[i], memory);
   }
 }
 
-void fill_active(const Json& answer, dds_sequence_string& sequence, ReplyMemory& memory) {
-  const Json& active = list_of(answer, "active");
-  const auto room_for = room(sequence, active, memory);
-  for (std::size_t i = 0; i < active.size(); ++i) {
-    room_for[i] = memory.text(active[i].get<std::string>());
-  }
+/// Common to all replies that say whether something was done.
+template <class Response>
+void fill_done(const Json& answer, Response& reply, ReplyMemory& memory) {
+  reply.success = answer.value("ok", false);
+  reply.message = memory.text(message_of(answer));
+  reply.done = answer.value("done", false);
+  reply.cycle = answer.value("cycle", std::uint64_t{0});
+}
+
+/// And to those that say who is active then.
+template <class Response>
+void fill_switched(const Json& answer, Response& reply, ReplyMemory& memory) {
+  fill_done(answer, reply, memory);
+  fill_texts(list_of(answer, "active"), reply.active, memory);
 }
 
 void fill_clock(const Json& answer, Clock_Response& reply, ReplyMemory& memory) {
@@ -178,6 +156,54 @@ void fill_clock(const Json& answer, Clock_Response& reply, ReplyMemory& memory) 
   reply.standing = answer.value("standing", false);
   reply.pending_steps = answer.value("pending_steps", std::uint64_t{0});
   reply.rate = answer.value("rate", 0.0);
+}
+
+}  // namespace
+
+std::string message_of(const Json& answer) {
+  if (answer.value("ok", false)) return answer.value("note", std::string());
+  const std::string hint = answer.value("hint", std::string());
+  return answer.value("error", std::string()) + (hint.empty() ? "" : " (" + hint + ")");
+}
+
+char* text_of(const Json& object, const char* key, ReplyMemory& memory) {
+  return memory.text(object.value(key, std::string()));
+}
+
+const Json& list_of(const Json& answer, const char* key) {
+  static const Json kEmpty = Json::array();
+  const auto found = answer.find(key);
+  return found != answer.end() && found->is_array() ? *found : kEmpty;
+}
+
+Json texts_of(const dds_sequence_string& sequence) {
+  Json list = Json::array();
+  for (const char* text : std::span(sequence._buffer, sequence._length)) list.push_back(text);
+  return list;
+}
+
+std::vector<TypedService> tandem_services() {
+  constexpr Json (*kNoKeys)(const dds::std_srvs::Trigger_Request&) = nullptr;
+  constexpr Json (*kNothing)(const ListControllers_Request&) = nullptr;
+  return {
+      typed_service("tandem/emergency_stop", "estop", kNoKeys, &fill_emergency_stop),
+      typed_service("tandem/clear_faults", "fault.reset", kNoKeys, &fill_clear_faults),
+      // Those that a reset holds back.
+      typed_service("tandem/start_controllers", "controller.start", kNoKeys,
+                    &fill_start_controllers),
+      typed_service("tandem/list_controllers", "controller.list", kNothing, &fill_controllers),
+      typed_service("tandem/load_controller", "controller.load", &load_controller_question,
+                    &fill_switched<LoadController_Response>),
+      typed_service("tandem/unload_controller", "controller.unload", &unload_controller_question,
+                    &fill_switched<UnloadController_Response>),
+      typed_service("tandem/switch_controllers", "controller.switch", &switch_controllers_question,
+                    &fill_switched<SwitchControllers_Response>),
+      typed_service("tandem/set_joint", "joint.set", &set_joint_question,
+                    &fill_done<SetJoint_Response>),
+      typed_service("tandem/set_gains", "joint.gains", &set_gains_question,
+                    &fill_done<SetGains_Response>),
+      typed_service("tandem/clock", "clock.show", &clock_question, &fill_clock),
+  };
 }
 
 }  // namespace tandem::apps

@@ -34,6 +34,7 @@ struct Run {
   const hal::RobotConfig& robot;
   std::vector<hal::JointCapabilities> limits;
   std::vector<hal::MotorFeedback> motors;
+  std::vector<Json> modes;  ///< that each can be put into, by joint
   JudgeGains judge = {};
   /// What joint.gains asked for and the loop has not taken yet, by joint and loop: while a run is
   /// paused. What comes next is judged with it.
@@ -61,6 +62,17 @@ const char* feedback_of(const runtime::JointStatus& look) {
   return look.age_cycles > 0 ? "old" : "fresh";
 }
 
+/// The modes that each joint can be put into.
+std::vector<Json> modes_of(const hal::RobotConfig& robot) {
+  std::vector<Json> all;
+  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+    Json& modes = all.emplace_back(Json::array());
+    for (const ControlMode mode : kModes)
+      if (hal::check_capability(robot, j, mode)) modes.push_back(hal::to_string(mode));
+  }
+  return all;
+}
+
 /// @param index  of the joint in the image
 Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t index) {
   const runtime::JointStatus& look = joint.look;
@@ -81,6 +93,7 @@ Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t ind
           {"controller", joint.owner},
           {"mode", hal::to_string(static_cast<ControlMode>(look.mode))},
           {"interaction", hal::to_string(static_cast<InteractionMode>(look.interaction))},
+          {"modes", run.modes[index]},
           {"mode_in_force", hal::to_string(static_cast<ControlMode>(look.drive_mode))},
           {"commanded_position_rad",
            std::isfinite(look.commanded_rad) ? Json(look.commanded_rad) : Json(nullptr)},
@@ -356,8 +369,9 @@ Result<Json> set_gains(Run& run, const Json& request) {
 
 void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle, const hal::RobotConfig& robot,
                         JudgeGains judge) {
-  const auto run = std::make_shared<Run>(Run{cycle, robot, hal::joint_capabilities(robot),
-                                             hal::motor_feedback(robot), std::move(judge)});
+  const auto run =
+      std::make_shared<Run>(Run{cycle, robot, hal::joint_capabilities(robot),
+                                hal::motor_feedback(robot), modes_of(robot), std::move(judge)});
   registry.add("joint.list", [run](const Json&) -> Result<Json> { return list(*run); });
   registry.add("joint.set", [run](const Json& request) { return set(*run, request); });
   registry.add("joint.move", [run](const Json& request) { return move(*run, request); });

@@ -3,7 +3,6 @@
 #include <cstring>
 
 #include "apps/control/dds_parameter_types.hpp"
-#include "apps/control/dds_service_types.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -27,7 +26,6 @@ Result<std::unique_ptr<DdsServices>> DdsServices::open(dds::Participant& partici
     *one = std::move(*server);
   }
   services->node_ = participant.node();
-  if (Status added = services->add_stops(); !added) return std::unexpected(added.error());
   if (Status added = services->add_all(); !added) return std::unexpected(added.error());
   if (Status started = services->stops_->start(true); !started) {
     return std::unexpected(started.error());
@@ -49,38 +47,15 @@ dds::ServiceServer::Counts DdsServices::counts() const {
   return all;
 }
 
-Status DdsServices::add_stops() {
-  if (!registry_->effect("estop")) return {};
-  if (Status added = add_ask(*stops_, "tandem/stop", true); !added) return added;
-  using Trigger = dds::std_srvs::Trigger_Request;
-  return add<Trigger>(*stops_, "tandem/emergency_stop", "estop", nullptr, &fill_emergency_stop);
-}
-
 Status DdsServices::add_all() {
-  using namespace dds::tandem_msgs;
-  using Trigger = dds::std_srvs::Trigger_Request;
-  const Status added[]{
-      add_ask(*server_, "tandem/ask", false),
-      add<Trigger>(*server_, "tandem/clear_faults", "fault.reset", nullptr, &fill_clear_faults),
-      // Those that a reset holds back.
-      add<Trigger>(*server_, "tandem/start_controllers", "controller.start", nullptr,
-                   &fill_start_controllers),
-      add<ListControllers_Request>(*server_, "tandem/list_controllers", "controller.list", nullptr,
-                                   &fill_controllers),
-      add(*server_, "tandem/load_controller", "controller.load", &load_controller_question,
-          &fill_switched<LoadController_Response>),
-      add(*server_, "tandem/unload_controller", "controller.unload", &unload_controller_question,
-          &fill_switched<UnloadController_Response>),
-      add(*server_, "tandem/switch_controllers", "controller.switch", &switch_controllers_question,
-          &fill_switched<SwitchControllers_Response>),
-      add(*server_, "tandem/set_joint", "joint.set", &set_joint_question,
-          &fill_done<SetJoint_Response>),
-      add(*server_, "tandem/set_gains", "joint.gains", &set_gains_question,
-          &fill_done<SetGains_Response>),
-      add(*server_, "tandem/clock", "clock.show", &clock_question, &fill_clock),
-  };
-  for (const Status& one : added) {
-    if (!one) return one;
+  if (registry_->effect("estop")) {
+    if (Status added = add_ask(*stops_, "tandem/stop", true); !added) return added;
+  }
+  if (Status added = add_ask(*server_, "tandem/ask", false); !added) return added;
+  for (const auto& rows : {tandem_services(), controller_manager_services()}) {
+    for (const TypedService& row : rows) {
+      if (Status added = add(row); !added) return added;
+    }
   }
   return add_parameters();
 }
@@ -164,24 +139,28 @@ Status DdsServices::add_ask(dds::ServiceServer& server, const char* name, bool o
 }
 
 /// The questions of whoever may not ask are not read.
-template <class Request, class Response>
-Status DdsServices::add(dds::ServiceServer& server, const char* name, const char* needs,
-                        Json (*question)(const Request&),
-                        void (*fill)(const Json&, Response&, dds::ReplyMemory&)) {
-  const auto effect = registry_->effect(needs);
+Status DdsServices::add(const TypedService& row) {
+  const auto effect = registry_->effect(row.needs);
   if (!effect) return {};
-  return server.add<Request, Response>(name, [=, this, guarded = is_guarded(*effect)](
-                                                 const Request& request, const dds::Asker& asker) {
-    const bool read = !guarded || admission_->admits(asker);
-    const std::string text =
-        json_text(read && question != nullptr ? question(request) : Json{{"do", needs}});
-    return dds::ServiceWork<Response>{
-        .at_once = registry_->turn_of(text) == ControlTurn::kUrgent,
-        .answer = [this, text, fill, asker, after_stop = registry_->last_stop()](
-                      Response& reply, dds::ReplyMemory& memory) {
-          fill(ask(text, asker, after_stop), reply, memory);
-        }};
-  });
+  dds::ServiceServer& server = *effect == ControlEffect::kStops ? *stops_ : *server_;
+  return server.add(
+      row.name, *row.request, *row.response,
+      [this, row, guarded = is_guarded(*effect)](
+          const void* request, const dds::Asker& asker) -> dds::ServiceServer::Work {
+        const bool read = !guarded || admission_->admits(asker);
+        const std::string text =
+            json_text(read && row.question ? row.question(request) : Json{{"do", row.needs}});
+        return {
+            .at_once = registry_->turn_of(text) == ControlTurn::kUrgent,
+            .answer = [this, row, text, asker, kept = row.kept ? row.kept(request) : Json(),
+                       after_stop = registry_->last_stop()](void* reply, dds::ReplyMemory& memory) {
+              Json answer = ask(text, asker, after_stop);
+              for (const char* also : row.also)
+                answer[also] = ask(json_text({{"do", also}}), asker, after_stop);
+              answer["kept"] = kept;
+              row.fill(answer, reply, memory);
+            }};
+      });
 }
 
 }  // namespace tandem::apps

@@ -5,15 +5,16 @@
 #include <memory>
 
 #include "apps/control/control_registry.hpp"
+#include "apps/control/typed_service.hpp"
 #include "apps/transport/dds_admission.hpp"
 #include "base/result.hpp"
 #include "dds/service_server.hpp"
 
 namespace tandem::apps {
 
-/// Serves a registry as "tandem/ask", and those of its commands that have a type of their own:
-/// "tandem/list_controllers" and so on; and "tandem_run/set_parameters" and the other five by which
-/// ROS 2 reads and sets a node's parameters. Every typed request becomes a question to the
+/// Serves a registry as "tandem/ask"; by the rows of typed_service.hpp, "tandem/list_controllers"
+/// and so on; and as "tandem_run/set_parameters" and the other five by which ROS 2 reads and sets a
+/// node's parameters. Every typed request becomes a question to the
 /// registry. Stops have services, readers and a thread of their own, "tandem/stop" and
 /// "tandem/emergency_stop": what others ask for, and how much of it, does not delay them. Of who is
 /// not admitted kMaxStrangersQuestion bytes are read.
@@ -32,15 +33,9 @@ class DdsServices {
   DdsServices(const ControlRegistry& registry, ControlRegistry::Gate gate,
               const DdsAdmission& admission)
       : registry_(&registry), gate_(std::move(gate)), admission_(&admission) {}
-  Status add_stops();
   Status add_all();
   Status add_ask(dds::ServiceServer& server, const char* name, bool only_stops);
-  /// Adds a service that asks for a command, when the registry has `needs`.
-  /// @param question  null: `needs` without keys
-  template <class Request, class Response>
-  Status add(dds::ServiceServer& server, const char* name, const char* needs,
-             Json (*question)(const Request&),
-             void (*fill)(const Json& answer, Response& reply, dds::ReplyMemory& memory));
+  Status add(const TypedService& row);
   Status add_parameters();
   template <class Request, class Response>
   Status add_parameters(const char* name);

@@ -90,6 +90,20 @@ class Reply {
   /// "controllers.0.name"
   template <class T>
   [[nodiscard]] T at(std::string_view path) const {
+    const Value* here = find_at(path);
+    const T* found = here == nullptr ? nullptr : std::get_if<T>(&here->of);
+    EXPECT_NE(found, nullptr);
+    return found == nullptr ? T{} : *found;
+  }
+  [[nodiscard]] std::string text(std::string_view path) const { return at<std::string>(path); }
+  [[nodiscard]] bool yes(std::string_view path) const { return at<bool>(path); }
+  /// How many elements a list has.
+  [[nodiscard]] std::size_t size(std::string_view path) const {
+    return at<Value::List>(path).size();
+  }
+
+ private:
+  [[nodiscard]] const Value* find_at(std::string_view path) const {
     const Value* here = &value_;
     while (!path.empty() && here != nullptr) {
       const std::string_view name = path.substr(0, path.find('.'));
@@ -99,14 +113,9 @@ class Reply {
       if (list != nullptr) std::from_chars(name.data(), name.data() + name.size(), index);
       here = list == nullptr ? find(*here, name) : index < list->size() ? &(*list)[index] : nullptr;
     }
-    const T* found = here == nullptr ? nullptr : std::get_if<T>(&here->of);
-    EXPECT_NE(found, nullptr);
-    return found == nullptr ? T{} : *found;
+    return here;
   }
-  [[nodiscard]] std::string text(std::string_view path) const { return at<std::string>(path); }
-  [[nodiscard]] bool yes(std::string_view path) const { return at<bool>(path); }
 
- private:
   Value value_;
 };
 

@@ -34,6 +34,7 @@ std::string content(const std::string& path) {
 
 /// What @foxglove/rosmsg-msgs-common has of ours.
 const std::set<std::string> kPublished{
+    "action_msgs/msg/GoalStatusArray",
     "diagnostic_msgs/msg/DiagnosticArray",
     "geometry_msgs/msg/PoseStamped",
     "geometry_msgs/msg/Twist",

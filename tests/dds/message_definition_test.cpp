@@ -204,6 +204,74 @@ constexpr Published kDefinitions[] = {
     {"rmw_dds_common/msg/ParticipantEntitiesInfo",
      "91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"},
     {"rmw_dds_common/msg/Gid", "ab6f21cfbb0a6dbb837161e1110c2051a2850ed9f9c53944d7115d9bcebedf71"},
+    // dhruvigoradia/ros2-warehouse-robot:
+    // build/controller_manager_msgs/…/list_controllers__description.c
+    {"controller_manager_msgs/msg/ChainConnection",
+     "2daecd1da4b171f48b291c79747657a651eb1ab8821b68e38b1c88c736bba91c"},
+    {"controller_manager_msgs/msg/ControllerState",
+     "9a8780ab9814b6032978a07c6c7033cf1a7894ac8d948a6fb72afea07b04cc83"},
+    {"controller_manager_msgs/srv/ListControllers",
+     "4f8e36bb1fa5afdeba45c2d56ae6a2097b1493a253f961dd6290c085033bd189"},
+    {"controller_manager_msgs/srv/ListControllers_Request",
+     "fb985bc3dcc9b07c7d3af4b46787afa5a09ac79da6465ea42b5696f9355c1f70"},
+    {"controller_manager_msgs/srv/ListControllers_Response",
+     "445459f6b387bda67942d8bea4dfee82dedf12388317e68d5bc4513993799b86"},
+    {"controller_manager_msgs/srv/ListControllers_Event",
+     "33f64fb8f4d3a7415113d5b6a9fa74f91c732c5f4d491b0077cfe8f7ca15cb2b"},
+    // Brainiac11/ros2-coding:
+    // build/controller_manager_msgs/…/list_hardware_components__description.c
+    {"controller_manager_msgs/msg/HardwareComponentState",
+     "8723f76b60e3ea54920065e3e777d93c68b76fc12839ad6a6ca4e0a6439b384c"},
+    {"controller_manager_msgs/msg/HardwareInterface",
+     "b4c556991db81ca56a49338b5e8f0675a6707faee54fba161d2bbd4d963d418a"},
+    {"lifecycle_msgs/msg/State",
+     "dd2d02b82f3ebc858e53c431b1e6e91f3ffc71436fc81d0715214ac6ee2107a0"},
+    {"controller_manager_msgs/srv/ListHardwareComponents_Request",
+     "4d528f3bba24425b73c788ebcb6462bf77d40eb194b77682138f079f821faeab"},
+    {"controller_manager_msgs/srv/ListHardwareComponents_Response",
+     "9607f3bd43ebcfaa25ca4f506701fb2697186a986364f58649b43182d9dd1556"},
+    // several: …_controller__, list_controller_types__, list_hardware_interfaces__,
+    // reload_controller_libraries__ and set_hardware_component_state__description.c
+    {"controller_manager_msgs/srv/ConfigureController_Request",
+     "027c272c6b945317d5e057515c83c747725ccaf9d345be6f6941383f6472d3a9"},
+    {"controller_manager_msgs/srv/ConfigureController_Response",
+     "f22a10e36403ebf6e9a54f5fa76dddb7c0af2e5417f4ff098bb0525bf89a726d"},
+    {"controller_manager_msgs/srv/ListControllerTypes_Request",
+     "b6cda89b7e31f5525f7a328119f64f6bf5710db263cecb00f91e59aa9b5d41de"},
+    {"controller_manager_msgs/srv/ListControllerTypes_Response",
+     "4e924ba35dac47257de06fabd757aaf7bd05f47da99dc878864c9c3f9a3f721e"},
+    {"controller_manager_msgs/srv/LoadController_Request",
+     "7a6624df1a6c972c13c9c5b71f13eda236226b7c08f118feccbbc60ad1829216"},
+    {"controller_manager_msgs/srv/LoadController_Response",
+     "8ce86b422a67d8150b4a2885fcce601670c39a7fddb8601df8609ed0b931ad76"},
+    {"controller_manager_msgs/srv/ReloadControllerLibraries_Request",
+     "c5ae8813adda2aed0e5e5558031e6f4c7834b941aa871746e86adc1cb745cda8"},
+    {"controller_manager_msgs/srv/ReloadControllerLibraries_Response",
+     "bea69bb80ebbb4a00023758c51fd0e3eaf308c1ae6640fdf4bbad6793bb967d4"},
+    {"controller_manager_msgs/srv/SetHardwareComponentState_Request",
+     "22c9b3e32a02221d411a47dab1fda921003a96ac41e8de7d4d805e2cfd0de21d"},
+    {"controller_manager_msgs/srv/SetHardwareComponentState_Response",
+     "c230aa244dd97d761e27ccde7b5056ec4e28e0bb804da283e42cd37944c46592"},
+    {"controller_manager_msgs/srv/UnloadController_Request",
+     "90f14a0b402791210988f4931be46a62edc7f6c90d0551c54c9a7cbce1b56ea1"},
+    {"controller_manager_msgs/srv/UnloadController_Response",
+     "4636099a7eaa6a9f3b299504878d58d580123f738e235c9df7bc46ef7b8f3461"},
+    {"controller_manager_msgs/srv/ListHardwareInterfaces_Request",
+     "419a204c74b85adb602848d0f288fc756d0216f70bd30ab889c1d9b154ed8098"},
+    {"controller_manager_msgs/srv/SwitchController_Request",
+     "d258d35c1ce6d7469e0155900202519be21f82c2641393540babd728a09cfa50"},
+};
+
+/// What nobody has published by its hash, as far as was found: newer than the builds that are kept
+/// in public. Of what is in them, the messages are above.
+constexpr const char* kNotCompared[] = {
+    "controller_manager_msgs/srv/CleanupController_Request",
+    "controller_manager_msgs/srv/CleanupController_Response",
+    "controller_manager_msgs/srv/ListHardwareInterfaces_Response",
+    "controller_manager_msgs/srv/SwitchController_Response",  // older ones lack its `message`
+    "pal_statistics_msgs/msg/Statistics",
+    "pal_statistics_msgs/msg/StatisticsNames",
+    "pal_statistics_msgs/msg/StatisticsValues",
 };
 
 TEST(MessageDefinition, HasThePublishedHash) {
@@ -217,9 +285,11 @@ TEST(MessageDefinition, HasThePublishedHash) {
 TEST(MessageDefinition, OfEveryStandardTypeIsAmongThePublished) {
   for (const Type& type : types()) {
     if (type.ros_name.starts_with("tandem_msgs/")) continue;
-    EXPECT_TRUE(std::ranges::any_of(kDefinitions, [&](const Published& one) {
-      return type.ros_name == one.type;
-    })) << type.ros_name;
+    const bool compared = std::ranges::any_of(
+        kDefinitions, [&](const auto& one) { return type.ros_name == one.type; });
+    const bool known =
+        std::ranges::any_of(kNotCompared, [&](const char* one) { return type.ros_name == one; });
+    EXPECT_NE(compared, known) << type.ros_name;
   }
 }
 
@@ -285,7 +355,7 @@ TEST(MessageDefinition, RefusesWhatIsNoneWithItsLine) {
   EXPECT_FALSE(resolve(circle));
 }
 
-// ---- the IDL of idlc and the definitions are two texts of one thing ----
+// ---- the IDL that the build makes of the definitions, read as message_definition.cpp does ----
 
 std::string idl_element(const MessageField& field) {
   switch (field.type) {
@@ -333,19 +403,18 @@ std::string idl_members(const MessageDefinition& definition) {
   return out;
 }
 
-/// Every structure of dds/idl and of the images' IDL: "std_msgs/msg/String" -> "string data;"
+/// Every structure of the IDL that the build makes: "std_msgs/msg/String" -> "string data;"
 std::map<std::string, std::string> structures() {
   static const std::regex kToken(R"(module (\w+) \{ module (\w+) \{|struct (\w+)_ \{ ([^}]*?) \})");
   std::map<std::string, std::string> out;
   for (const char* file :
-       {TANDEM_SOURCE_DIR "/dds/idl/ros2.idl", TANDEM_SOURCE_DIR "/dds/idl/tandem_msgs.idl",
-        TANDEM_BINARY_DIR "/dds/tandem_images.idl"}) {
+       {TANDEM_BINARY_DIR "/dds/ros2.idl", TANDEM_BINARY_DIR "/dds/tandem_msgs.idl"}) {
     std::stringstream in;
     in << std::ifstream(file).rdbuf();
     std::string text = std::regex_replace(in.str(), std::regex("//[^\n]*"), "");
     text = std::regex_replace(text, std::regex("\\s+"), " ");
     text = std::regex_replace(text, std::regex(R"(\w+::\w+::dds_::)"), "");
-    text = std::regex_replace(text, std::regex(" _"), " ");  // escaped: a keyword of IDL
+    text = std::regex_replace(text, std::regex(" _(\\w)"), " $1");  // a word of IDL's own
     std::string place;
     for (std::sregex_iterator one(text.begin(), text.end(), kToken), end; one != end; ++one) {
       const std::smatch& match = *one;

@@ -45,6 +45,8 @@ struct RigOptions {
   bool follows = false;                    ///< the last joint goes by the first
   std::vector<std::string> wrenches = {};  ///< sites of the estimate's; of a fixed base with it
   Config config = own_config();
+  /// RunDescription::controllers
+  std::function<std::vector<std::pair<std::string, rt::Percentiles>>()> controllers = {};
 };
 
 struct PublisherRig {
@@ -89,7 +91,8 @@ struct PublisherRig {
                                                  .estimate = shown_estimate(),
                                                  .wrenches = options.wrenches,
                                                  .parallel = options.parallel,
-                                                 .run = 77});
+                                                 .run = 77,
+                                                 .controllers = options.controllers});
     EXPECT_TRUE(made) << made.error().to_string();
     publisher = std::move(*made);
   }

@@ -18,9 +18,9 @@
 
 #include "apps/control/control_registry.hpp"
 #include "apps/control/dds_parameter_types.hpp"
-#include "apps/control/dds_service_types.hpp"
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
+#include "apps/control/typed_service.hpp"
 #include "apps/text/json_reader.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "tests/fuzz/require.hpp"
@@ -106,6 +106,19 @@ Json ask(Run& run, const std::string& question, const ControlRegistry::Gate& gat
   return answer;
 }
 
+/// The question that the service `name` makes of `request`.
+template <class Request>
+std::string question_for(std::string_view name, const Request& request) {
+  static const std::vector<TypedService> kTandem = tandem_services(),
+                                         kRos = controller_manager_services();
+  for (const auto* rows : {&kTandem, &kRos}) {
+    const auto row = std::ranges::find(*rows, name, &TypedService::name);
+    if (row != rows->end()) return json_text(row->question(&request));
+  }
+  require(false);
+  return {};
+}
+
 /// The question that a typed service makes of a request with these fields.
 std::string typed_question(unsigned service, std::vector<std::string>& fields) {
   using namespace dds::tandem_msgs;
@@ -127,7 +140,7 @@ std::string typed_question(unsigned service, std::vector<std::string>& fields) {
       request.interaction = texts[2];
       request.stiffness_nm_rad = optional(3);
       request.damping_nms_rad = optional(4);
-      return json_text(set_joint_question(request));
+      return question_for("tandem/set_joint", request);
     }
     case 1: {
       SetGains_Request request{};
@@ -136,21 +149,29 @@ std::string typed_question(unsigned service, std::vector<std::string>& fields) {
       request.kp = optional(2);
       request.ki = optional(3);
       request.kd = optional(4);
-      return json_text(set_gains_question(request));
+      return question_for("tandem/set_gains", request);
     }
     case 2: {
       LoadController_Request request{};
       request.plugin = texts[0];
       request.name = texts[1];
       request.parameters = texts[2];
-      return json_text(load_controller_question(request));
+      return question_for("tandem/load_controller", request);
     }
-    default: {
+    case 3: {
       SwitchControllers_Request request{};
       const auto stop = static_cast<std::uint32_t>(fields[0].size() % 4);
       request.stop = {stop, stop, texts.data() + 1, false};
       request.start = {3, 3, texts.data() + 1 + stop, false};
-      return json_text(switch_controllers_question(request));
+      return question_for("tandem/switch_controllers", request);
+    }
+    default: {
+      dds::controller_manager_msgs::SwitchController_Request request{};
+      const auto stop = static_cast<std::uint32_t>(fields[0].size() % 4);
+      request.strictness = static_cast<std::int32_t>(std::strtol(fields[7].c_str(), nullptr, 10));
+      request.deactivate_controllers = {stop, stop, texts.data() + 1, false};
+      request.activate_controllers = {3, 3, texts.data() + 1 + stop, false};
+      return question_for("controller_manager/switch_controller", request);
     }
   }
 }
@@ -267,7 +288,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if ((way & 4) == 0) {
     for (const std::string& line : lines) ask(run, line, gate(way & 3));
   } else if ((way & 32) == 0) {
-    ask(run, typed_question((way >> 3) & 3, lines), gate(way & 3));
+    ask(run, typed_question((way & 64) != 0 ? 4 : (way >> 3) & 3, lines), gate(way & 3));
   } else {
     ask(run, R"({"do": "controller.load", "plugin": "hold"})", {});
     ask_parameters(run, (way & 8) != 0, lines, gate(way & 3));

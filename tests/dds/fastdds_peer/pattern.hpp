@@ -57,6 +57,11 @@ MEMBERS(sensor_msgs::msg::dds_::Joy_, m.header(), m.axes(), m.buttons())
 MEMBERS(trajectory_msgs::msg::dds_::JointTrajectoryPoint_, m.positions(), m.velocities(),
         m.accelerations(), m.effort(), m.time_from_start())
 MEMBERS(trajectory_msgs::msg::dds_::JointTrajectory_, m.header(), m.joint_names(), m.points())
+MEMBERS(pal_statistics_msgs::msg::dds_::Statistic_, m.name(), m.value())
+MEMBERS(pal_statistics_msgs::msg::dds_::Statistics_, m.header(), m.statistics())
+MEMBERS(pal_statistics_msgs::msg::dds_::StatisticsNames_, m.header(), m.names(), m.names_version())
+MEMBERS(pal_statistics_msgs::msg::dds_::StatisticsValues_, m.header(), m.values(),
+        m.names_version())
 MEMBERS(std_msgs::msg::dds_::ColorRGBA_, m.r(), m.g(), m.b(), m.a())
 MEMBERS(sensor_msgs::msg::dds_::CompressedImage_, m.header(), m.format(), m.data())
 MEMBERS(visualization_msgs::msg::dds_::UVCoordinate_, m.u(), m.v())
