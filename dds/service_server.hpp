@@ -88,7 +88,7 @@ class ServiceServer {
     bool at_once = false, takes_long = false;
     std::function<void(void* reply, ReplyMemory& memory)> answer;
     std::function<bool()> ready = {};  ///< as ServiceWork's
-};
+  };
   using Read = std::function<Work(const void* request, const Asker& asker)>;
 
   /// Adds a service before start().
