@@ -282,6 +282,10 @@ TEST_F(InputOfARun, ATopicThatNobodyMayUseIsAnErrorAtTheStart) {
   EXPECT_NE(why("").find("bring no twist"), std::string::npos) << why("");
   with_jog("[controller.inputs.rate]\nsource = \"topic\"\ntopic = \"rates\"\nframe = \"hand\"\n");
   EXPECT_NE(why("").find("'std_msgs/msg/Float64MultiArray' name no frame"), std::string::npos);
+  with_jog("[controller.inputs.rate]\nsource = \"topic\"\ntopic = \"rates\"\naction = \"go\"\n");
+  EXPECT_NE(why("").find("'rate' of 'jog' takes no goals"), std::string::npos) << why("");
+  with_jog("[controller.inputs.rate]\nsource = \"command\"\naction = \"go\"\n");
+  EXPECT_NE(why("").find("its source is \"command\""), std::string::npos) << why("");
   with_jog("[controller.inputs.rate]\nsource = \"command\"\nframe = \"hand\"\n");
   EXPECT_NE(why("").find("its source is \"command\""), std::string::npos) << why("");
   with_jog(
