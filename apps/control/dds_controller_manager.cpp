@@ -327,7 +327,7 @@ void fill_set_state(const Json& answer, cm::SetHardwareComponentState_Response& 
   const Json& wish = answer["kept"];
   Lifecycle state = kUnknown;
   for (const Component& one : components_of(answer)) {
-    if (one.name == wish["name"]) state = one.state;
+    if (wish["name"] == one.name) state = one.state;
   }
   fill_state(state, reply.state, memory);
   const std::uint8_t id = wish["id"].get<std::uint8_t>();
