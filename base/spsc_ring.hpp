@@ -49,6 +49,12 @@ class SpscRing {
     }
     return {bytes_.data() + (head & mask_) * slot_bytes_, slot_bytes_};
   }
+  /// Producer: whether begin_push() gives so many slots; if not, one refused push is counted.
+  [[nodiscard]] bool has_room(std::size_t slots) noexcept TANDEM_RT {
+    if (size() + slots <= capacity()) return true;
+    dropped_.fetch_add(1, std::memory_order_relaxed);
+    return false;
+  }
   /// Producer: publishes the slot that begin_push() gave.
   void end_push() noexcept TANDEM_RT {
     head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release);

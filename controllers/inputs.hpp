@@ -78,7 +78,7 @@ struct TrajectoryTerms {
 /// An input: what was declared, and what the loop puts into it between two cycles.
 struct InputBlock {
   static constexpr std::size_t kMost = 16;          ///< of one controller
-  static constexpr std::size_t kMostValues = 2048;  ///< of one input
+  static constexpr std::size_t kMostValues = 4096;  ///< of one input
 
   InputBlock(std::string its_name, InputKind its_kind, InputOptions its)
       : name(std::move(its_name)), kind(its_kind), options(std::move(its)) {

@@ -16,9 +16,9 @@ namespace tandem::log {
 namespace {
 
 // Numbers of channels as they are pushed; what they are in a file, each file says.
-constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kGivenChannel = 0xFFFC,
-                            kAttachedChannel = 0xFFFD, kBranchChannel = 0xFFFE,
-                            kTextChannel = 0xFFFF;
+constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kPartChannel = 0xFFFB,
+                            kGivenChannel = 0xFFFC, kAttachedChannel = 0xFFFD,
+                            kBranchChannel = 0xFFFE, kTextChannel = 0xFFFF;
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
 /// @param more  what was pushed behind the event
@@ -146,7 +146,7 @@ void Recorder::open_side(std::int64_t lag_ns) { side_lag_ns_ = lag_ns; }
 
 void Recorder::start() {
   view_.add_channels(*writer_);
-  largest_ = std::max(largest_, kMostLateBytes);
+  largest_ = std::max(largest_, kLateSlotBytes);
   const std::size_t slot_bytes = (sizeof(Slot) + largest_ + 7) / 8 * 8;
   ring_ = std::make_unique<SpscRing>(slot_bytes, options_.ring_slots);
   if (side_lag_ns_ >= 0) side_ = std::make_unique<SpscRing>(slot_bytes, options_.ring_slots);
@@ -163,8 +163,20 @@ bool Recorder::push_side(Channel channel, std::int64_t time_ns,
   return push(*side_, channel, time_ns, image);
 }
 
+/// What is longer than a slot takes several: parts, and the last by its own channel.
 bool Recorder::push(SpscRing& ring, Channel channel, std::int64_t time_ns,
                     std::span<const std::byte> image) noexcept TANDEM_RT {
+  const std::size_t room = ring.slot_bytes() - sizeof(Slot);
+  if (image.size() > room) {
+    if (!ring.has_room((image.size() + room - 1) / room)) return false;
+    for (; image.size() > room; image = image.subspan(room))
+      push_slot(ring, kPartChannel, time_ns, image.first(room));
+  }
+  return push_slot(ring, channel, time_ns, image);
+}
+
+bool Recorder::push_slot(SpscRing& ring, Channel channel, std::int64_t time_ns,
+                         std::span<const std::byte> image) noexcept TANDEM_RT {
   const std::span<std::byte> slot = ring.begin_push();
   if (slot.empty()) return false;
   const Slot head{time_ns, static_cast<std::uint32_t>(image.size()), channel};
@@ -245,6 +257,13 @@ void Recorder::run() {
     for (auto slot = ring_->front(); !slot.empty(); slot = ring_->front()) {
       Slot head{};
       std::memcpy(&head, slot.data(), sizeof head);
+      if (head.channel == kPartChannel) {
+        const auto part = slot.subspan(sizeof head, head.bytes);
+        parts_.insert(parts_.end(), part.begin(), part.end());
+        ring_->pop();
+        continue;
+      }
+      if (!parts_.empty()) slot = put_together(slot);
       if (full_ && head.time_ns > time_ns_) next_part();  // cycles stay whole
       time_ns_ = head.time_ns;
       if (head.channel == kBranchChannel) {
@@ -265,6 +284,20 @@ void Recorder::run() {
     if (last) return write_side(std::numeric_limits<std::int64_t>::max());
     std::this_thread::sleep_for(kPoll);
   }
+}
+
+/// The parts before the slot and the slot itself, as one.
+std::span<const std::byte> Recorder::put_together(std::span<const std::byte> last) {
+  Slot head{};
+  std::memcpy(&head, last.data(), sizeof head);
+  const auto end = last.subspan(sizeof head, head.bytes);
+  head.bytes += static_cast<std::uint32_t>(parts_.size());
+  const auto begin = std::as_bytes(std::span(&head, 1));
+  whole_.assign(begin.begin(), begin.end());
+  whole_.insert(whole_.end(), parts_.begin(), parts_.end());
+  whole_.insert(whole_.end(), end.begin(), end.end());
+  parts_.clear();
+  return whole_;
 }
 
 /// The other thread's messages of up to that time.

@@ -89,13 +89,12 @@ class Recorder {
   /// where it has one of another, "_2" is added to the topic and "2" to the type, or the next
   /// number.
   /// @param ros2msg  definition of its messages
-  /// @param encode   empty: what is pushed is the body, at most kMostLateBytes. Else the type keeps
-  ///                 its name
+  /// @param encode   empty: what is pushed is the body. Else the type keeps its name
   /// @param meaning  of the bytes that `encode` gets: another one is another channel
   [[nodiscard]] Channel add_late_channel(const std::string& topic, const std::string& type,
                                          const std::string& ros2msg, Encode encode = {},
                                          const std::string& meaning = {});
-  static constexpr std::size_t kMostLateBytes = 8 * 1024 + 16;
+  static constexpr std::size_t kLateSlotBytes = 8 * 1024 + 16;  ///< longer ones take several slots
   /// log::ros2msg_of(), with the names of this recording's joints and sensors.
   [[nodiscard]] std::string ros2msg_of(const hal::Layout& layout) const;
   /// One other thread will push, too. Its messages follow in the file when the loop's are `lag_ns`
@@ -186,6 +185,9 @@ class Recorder {
   void declare_late();
   static bool push(SpscRing& ring, Channel channel, std::int64_t time_ns,
                    std::span<const std::byte> image) noexcept TANDEM_RT;
+  static bool push_slot(SpscRing& ring, Channel channel, std::int64_t time_ns,
+                        std::span<const std::byte> image) noexcept TANDEM_RT;
+  [[nodiscard]] std::span<const std::byte> put_together(std::span<const std::byte> last);
   static void wait_for(const SpscRing& ring, std::size_t messages) noexcept;
   void run();
   void write_side(std::int64_t up_to_ns);
@@ -247,6 +249,7 @@ class Recorder {
   std::string last_hash_;  // of the part that ended last
   std::int64_t time_ns_ = std::numeric_limits<std::int64_t>::min();  // of the loop's last message
   Bytes event_;                                                      // reused
+  Bytes parts_, whole_;                                              // of one that took more slots
 };
 
 }  // namespace tandem::log

@@ -138,13 +138,15 @@ void RobotCycle::wait() noexcept {
 }
 
 void RobotCycle::await_tick() noexcept {
-  // Four images, a line about time, a sample of each input, every event that one cycle can bring,
-  // and what the controllers tell.
+  // Four images, a line about time, a sample of each input, which may be long, every event that one
+  // cycle can bring, and what the controllers tell.
+  constexpr std::size_t kSlotsOfInput =
+      8 * (InputBlock::kMostValues + 2) / log::Recorder::kLateSlotBytes + 1;
   const std::size_t most =
       (now_.events != nullptr ? now_.events->size() : 0) + 5 + 12 +
       (now_.truth != nullptr ? kMostInjected : 4) + Inbox::kCapacity * kMostParameterChanges +
       ControllerHost::kToldParameters + 4 * now_.watch.joints() + now_.watch.sensors() +
-      now_.controllers.inputs() + kMostControllers * (3 + TextEventSlots::kSlots);
+      kSlotsOfInput * now_.controllers.inputs() + kMostControllers * (3 + TextEventSlots::kSlots);
   if (now_.config.loop.pacing == rt::Pacing::kSimulated) now_.log.wait_for_space(most);
   now_.tick = now_.loop.wait();
 }

@@ -146,6 +146,42 @@ TEST(Recorder, DropsAndCountsWhenTheRingIsFull) {
   EXPECT_EQ(result.messages, pushed);
 }
 
+/// Longer than a slot: an input's sample wrote beyond its slot, and over what is not the ring's.
+TEST(Recorder, WritesMessagesOfEveryLength) {
+  const ScratchFolder folder;
+  auto recorder = Recorder::open(folder / "run.mcap", run_info(), {.ring_slots = 8});
+  ASSERT_TRUE(recorder);
+  std::vector<std::size_t> lengths;
+  std::size_t wrong = 0;
+  const auto channel = (*recorder)->add_late_channel(
+      "/long", "tandem/msg/Long", "uint8[] bytes",
+      [&](std::int64_t time_ns, std::span<const std::byte> body, Bytes& out) {
+        lengths.push_back(body.size());
+        for (std::size_t i = 0; i < body.size(); ++i)
+          wrong +=
+              body[i] == static_cast<std::byte>(i * 7 + static_cast<std::size_t>(time_ns)) ? 0 : 1;
+        out.assign(8, std::byte{});
+      });
+  (*recorder)->start();
+  constexpr std::size_t kSlot = Recorder::kLateSlotBytes;
+  const std::vector<std::size_t> all{0,         1, kSlot, kSlot + 1, 2 * kSlot, 2 * kSlot + 1,
+                                     5 * kSlot, 3};
+  for (std::size_t round = 0; round < 50; ++round) {
+    for (const std::size_t length : all) {
+      (*recorder)->wait_for_space(8);
+      std::vector<std::byte> body(length);
+      for (std::size_t i = 0; i < length; ++i) body[i] = static_cast<std::byte>(i * 7 + round);
+      ASSERT_TRUE((*recorder)->push(channel, static_cast<std::int64_t>(round), body));
+    }
+  }
+  EXPECT_FALSE((*recorder)->push(channel, 50, std::vector<std::byte>(100 * kSlot)));
+  const RecordingResult result = (*recorder)->close();
+  EXPECT_EQ(result.dropped, 1U);
+  ASSERT_EQ(lengths.size(), 50 * all.size());
+  for (std::size_t i = 0; i < lengths.size(); ++i) ASSERT_EQ(lengths[i], all[i % all.size()]) << i;
+  EXPECT_EQ(wrong, 0U);
+}
+
 TEST(Recorder, CountsWhatADiskThatFillsUpLoses) {
   const ScratchFolder folder;
   const pid_t child = fork();

@@ -261,7 +261,7 @@ TEST_F(InputRun, DeclarationsThatMakeNoSenseAreErrorsByName) {
   has(why({{"a", Kind::kTwist, {.timeout_s = std::nan("")}}}), "no time-out");
   has(why({{"a", Kind::kTwist, {.max = {1.0}, .otherwise = {9, 0, 0, 0, 0, 0}}}}), "beyond");
   has(why({{"a", Kind::kTrajectory, {.names = {"nobody"}}}}), "nobody");
-  has(why({{"a", Kind::kTrajectory, {.names = {"shoulder"}, .most_points = 1000}}}), "too large");
+  has(why({{"a", Kind::kTrajectory, {.names = {"shoulder"}, .most_points = 2000}}}), "too large");
   has(why(std::vector<Follower::Declared>(17, {"a", Kind::kTwist, {}})), "17 inputs");
   has(why({{"rate", Kind::kNumbers, kRate}}, {timeline({{0.0, 3.0, 0.0}})}), "a 3 is beyond");
   has(why({{"rate", Kind::kNumbers, kRate}}, {timeline({{0.0, 1.0}})}), "1 numbers");
