@@ -161,7 +161,7 @@ TEST(TrajectoryFollower, EndsWhereAJointLeavesItsPathTolerance) {
     EXPECT_NEAR(run.told(TrajectorySignals::kTime), 0.301, 1e-6);
     run.smoothly(1000, 4.0);
     EXPECT_EQ(run.command.velocity_rad_s()[0], 0.0);
-    EXPECT_EQ(run.outcome(), Outcome::kOffPath) << "it is told until the next";
+    EXPECT_EQ(run.outcome(), Outcome::kOffPath) << "the outcome stays until the next trajectory";
     const auto said = run.setup.io->texts.take(1.0);
     ASSERT_EQ(said.size(), 1U);
     EXPECT_NE(said.front().words().find("elbow left the path by 0.12 rad"), std::string::npos)
