@@ -160,6 +160,8 @@ bool Recorder::push(Channel channel, std::int64_t time_ns,
 
 bool Recorder::push_side(Channel channel, std::int64_t time_ns,
                          std::span<const std::byte> image) noexcept {
+  // Nobody puts parts together there: start() made its slots as long as the images of all channels.
+  if (image.size() > side_->slot_bytes() - sizeof(Slot)) return false;
   return push(*side_, channel, time_ns, image);
 }
 
