@@ -8,10 +8,12 @@
 #include <charconv>
 #include <functional>
 #include <limits>
+#include <map>
 #include <queue>
 #include <set>
 
 #include "model/lanes.hpp"
+#include "model/stores.hpp"
 #include "model/sums.hpp"
 
 namespace tandem::model {
@@ -20,6 +22,8 @@ namespace {
 constexpr std::size_t kLongestInline = 96;  // characters of an expression written into another
 constexpr int kEarlyDepth = 3;    // of an angle: (multiplier * q + offset) + the frames' own offset
 constexpr int kMostZeros = 1000;  // of one output that are written one by one
+constexpr std::size_t kLongestWait = 60;  // units between two outputs that are stored at once
+constexpr double kManyOutputs = 0.25;     // per unit: stores count then
 constexpr std::string_view kPosture = "q";
 constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
 
@@ -56,6 +60,7 @@ class Emitter {
         last_part_(nodes_.size(), 0),
         slot_(nodes_.size(), kNowhere),
         angle_(nodes_.size(), kNowhere),
+        negated_(nodes_.size(), false),
         text_(nodes_.size()),
         outputs_of_(nodes_.size()) {
     result_.name = name_;
@@ -68,6 +73,7 @@ class Emitter {
     find_angles();
     find_uses();
     schedule();
+    find_zeros();
     for (std::uint32_t part = 0; part < parts_.size(); ++part) write_part(part);
     write_entry();
     return std::move(result_);
@@ -95,6 +101,7 @@ class Emitter {
       for (int i = 0; i < out.size; ++i) zeros += is_zero(first + static_cast<std::uint32_t>(i));
       if (zeros > kMostZeros) cleared_.insert(out.name);
       for (int i = 0; i < out.size; ++i, ++first) {
+        array_of_.push_back(a);
         cleared_outputs_.push_back(zeros > kMostZeros && is_zero(first));
         output_names_.push_back(out.name + "[" + std::to_string(i) + "]");
         const Expr& output = kernel_.outputs[first];
@@ -165,6 +172,25 @@ class Emitter {
     }
     for (std::uint32_t i = 0; i < nodes_.size(); ++i)
       uses_[i] += static_cast<std::uint32_t>(outputs_of_[i].size());
+    for (std::uint32_t i = 0; i < nodes_.size(); ++i)
+      if (is_written(i) && !is_second(i)) negated_[i] = is_better_negated(i);
+  }
+
+  // What outputs want with a minus, where that costs nothing.
+  bool is_better_negated(std::uint32_t i) const {
+    const GraphNode& node = nodes_[i];
+    const bool scales = node.op == Op::kMul && nodes_[node.b].op == Op::kConstant;
+    if (!scales && node.op != Op::kAdd && node.op != Op::kSub) return false;
+    bool any = false, all = true;
+    const auto look = [&](std::uint32_t of, bool minus) {
+      for (const std::uint32_t output : outputs_of_[of]) {
+        any = true;
+        all = all && kernel_.outputs[output].negative() != minus;
+      }
+    };
+    look(i, false);
+    if (is_pair(i)) look(lanes_.second(i), lanes_.minus[i]);
+    return any && all;
   }
 
   bool is_written(std::uint32_t i) const {
@@ -242,21 +268,33 @@ class Emitter {
       const std::string value = part_of_[unit] == part_
                                     ? "p" + std::to_string(unit) + "[" + std::to_string(lane) + "]"
                                     : "w[" + std::to_string(slot_[unit] + lane) + "]";
-      return lane == 1 && lanes_.minus[unit] ? "(-" + value + ")" : value;
+      const bool minus = negated_[unit] != (lane == 1 && lanes_.minus[unit]);
+      return minus ? "(-" + value + ")" : value;
     }
     if (!text_[i].empty()) return "(" + text_[i] + ")";
-    if (part_of_[i] != part_) return "w[" + std::to_string(slot_[i]) + "]";
-    return "t" + std::to_string(i);
+    const std::string value =
+        part_of_[i] != part_ ? "w[" + std::to_string(slot_[i]) + "]" : "t" + std::to_string(i);
+    return negated_[i] ? "(-" + value + ")" : value;
+  }
+
+  // The operation of node i, or the negative of its result where that is what is held.
+  std::string joined(std::uint32_t i, const std::string& a, const std::string& b) const {
+    switch (nodes_[i].op) {
+      case Op::kAdd: return negated_[i] ? "-" + a + " - " + b : a + " + " + b;
+      case Op::kSub: return negated_[i] ? b + " - " + a : a + " - " + b;
+      case Op::kMul: return (negated_[i] ? "-" : "") + a + " * " + b;
+      default: return a + " / " + b;
+    }
   }
 
   std::string expression(std::uint32_t i) {
     const GraphNode& node = nodes_[i];
     std::string a = operand(node.a);
     switch (node.op) {
-      case Op::kAdd: return a + " + " + operand(node.b);
-      case Op::kSub: return a + " - " + operand(node.b);
-      case Op::kMul: return a + " * " + operand(node.b);
-      case Op::kDiv: return a + " / " + operand(node.b);
+      case Op::kAdd:
+      case Op::kSub:
+      case Op::kMul:
+      case Op::kDiv: return joined(i, a, operand(node.b));
       case Op::kSqrt: return "root(" + a + ")";
       case Op::kSin: return "sine(" + a + ")";
       case Op::kCos: return "cosine(" + a + ")";
@@ -281,7 +319,8 @@ class Emitter {
       const std::string pair = part_of_[first] == part_
                                    ? "p" + std::to_string(first)
                                    : "pair(w + " + std::to_string(slot_[first]) + ")";
-      return lanes_.minus[first] == minus ? pair : "flip(" + pair + ")";
+      const std::string value = negated_[first] ? "(-" + pair + ")" : pair;
+      return lanes_.minus[first] == minus ? value : "flip(" + value + ")";
     }
     return "two{" + operand(first) + ", " + (minus ? "-" : "") + operand(second) + "}";
   }
@@ -299,15 +338,15 @@ class Emitter {
       const bool minus_b = x.op == Op::kSub;
       const bool second_minus_a = swapped && y.op == Op::kSub;
       const bool second_minus_b = !swapped && y.op == Op::kSub;
-      return vector(x.a, a, minus != second_minus_a) + (minus_b ? " - " : " + ") +
-             vector(x.b, b, (minus != second_minus_b) != minus_b);
+      return joined(i, vector(x.a, a, minus != second_minus_a),
+                    vector(x.b, b, (minus != second_minus_b) != minus_b));
     }
     // The product's sign is on the operand whose sign is free, if any is.
     const bool held_a = held_minus(x.a, a);
     const bool a_is_free = is_free(x.a, a) && !is_free(x.b, b);
     const bool minus_b = a_is_free ? held_minus(x.b, b) : minus != held_a;
     const bool minus_a = minus != minus_b;
-    return vector(x.a, a, minus_a) + (x.op == Op::kDiv ? " / " : " * ") + vector(x.b, b, minus_b);
+    return joined(i, vector(x.a, a, minus_a), vector(x.b, b, minus_b));
   }
   // With either sign: a sine, or what no vector holds and is made where it is used.
   bool is_free(std::uint32_t first, std::uint32_t second) const {
@@ -321,11 +360,12 @@ class Emitter {
   void write_part(std::uint32_t part) {
     part_ = part;
     release_slots(part);
+    plan_stores(part);
     std::string body;
     for (const std::uint32_t i : parts_[part]) {
       if (is_pair(i)) {
-        body += "  const two p" + std::to_string(i) + " = " + pair_expression(i) + ";\n";
-        body += assignments(i) + assignments(lanes_.second(i));
+        body += fmt::format("  const two p{} = {};\n", i, pair_expression(i));
+        body += stores_after(i);
         if (last_part_[i] > part)
           body +=
               "  pair(w + " + std::to_string(take_slots(i)) + ") = p" + std::to_string(i) + ";\n";
@@ -335,10 +375,11 @@ class Emitter {
       const bool crosses = last_part_[i] > part;
       if (uses_[i] == 1 && outputs_of_[i].empty() && !crosses && value.size() < kLongestInline) {
         text_[i] = value;
+        body += stores_after(i);
         continue;
       }
       const std::string name = "t" + std::to_string(i);
-      body += "  const " + number_ + " " + name + " = " + value + ";\n" + assignments(i);
+      body += "  const " + number_ + " " + name + " = " + value + ";\n" + stores_after(i);
       if (crosses) body += "  w[" + std::to_string(take_slot(i)) + "] = " + name + ";\n";
     }
     if (part + 1 == parts_.size()) body += plain_outputs();
@@ -347,13 +388,59 @@ class Emitter {
     result_.parts.push_back("void " + name + "(" + parameters_ + ") {\n" + body + "}\n");
   }
 
-  // The outputs that are this node.
-  std::string assignments(std::uint32_t i) {
+  // When the outputs of a part are stored.
+  void plan_stores(std::uint32_t part) {
+    const std::vector<std::uint32_t>& units = parts_[part];
+    std::map<std::uint32_t, std::size_t> known;
+    const auto add = [&](std::uint32_t node, std::size_t time) {
+      for (const std::uint32_t output : outputs_of_[node]) known[output] = time;
+    };
+    for (std::size_t time = 0; time < units.size(); ++time) {
+      add(units[time], time);
+      if (is_pair(units[time])) add(lanes_.second(units[time]), time);
+    }
+    const bool many = states_ == 1 && kernel_.outputs.size() > kManyOutputs * units_;
+    for (const OutputStore& store : stores_of(known, array_of_, many ? kLongestWait : 0))
+      stores_[units[store.time]].push_back(store);
+  }
+
+  // The outputs that wait for this unit, and some of the zeros, which wait for nothing: they are
+  // spread over the whole kernel.
+  std::string stores_after(std::uint32_t unit) {
     std::string body;
-    for (const std::uint32_t output : outputs_of_[i])
-      body += "  " + output_names_[output] + " = " +
-              (kernel_.outputs[output].negative() ? "-" : "") + operand(i) + ";\n";
+    for (const OutputStore& store : stores_[unit]) {
+      if (store.count == 1) {
+        body += "  " + output_names_[store.first] + " = " + output_value(store.first) + ";\n";
+        continue;
+      }
+      std::string values = output_value(store.first);
+      for (std::uint32_t k = 1; k < store.count; ++k)
+        values += ", " + output_value(store.first + k);
+      body += vector_store(store, values);
+    }
+    ++written_units_;
+    for (; written_zeros_ * units_ < zeros_.size() * written_units_; ++written_zeros_)
+      body += vector_store(zeros_[written_zeros_], {});
     return body;
+  }
+  std::string vector_store(const OutputStore& store, const std::string& values) const {
+    const char* type = store.count == 1 ? "double" : store.count == 2 ? "two" : "four";
+    return fmt::format("  put(&{}, {}{{{}}});\n", output_names_[store.first], type, values);
+  }
+  std::string output_value(std::uint32_t output) {
+    const Expr& value = kernel_.outputs[output];
+    return (value.negative() ? "-" : "") + operand(value.node());
+  }
+
+  void find_zeros() {
+    for (const std::vector<std::uint32_t>& part : parts_) units_ += part.size();
+    if (states_ > 1) return;
+    std::vector<bool> wanted(kernel_.outputs.size());
+    for (std::uint32_t k = 0; k < wanted.size(); ++k)
+      wanted[k] = is_zero(k) && !cleared_outputs_[k];
+    if (units_ > 0) zeros_ = stores_of_runs(wanted, array_of_);
+    for (const OutputStore& store : zeros_)
+      for (std::uint32_t k = 0; k < store.count; ++k) cleared_outputs_[store.first + k] = true;
   }
 
   // Outputs that are constants, inputs or tabulated.
@@ -365,8 +452,8 @@ class Emitter {
       if (output.is_constant()) {
         body += "  " + output_names_[k] + " = " + constant(output.value()) + ";\n";
       } else if (!is_written(output.node())) {
-        body += "  " + output_names_[k] + " = " + (output.negative() ? "-" : "") +
-                operand(output.node()) + ";\n";
+        body +=
+            "  " + output_names_[k] + " = " + output_value(static_cast<std::uint32_t>(k)) + ";\n";
       }
     }
     return body;
@@ -466,9 +553,14 @@ class Emitter {
   std::string number_, array_, name_;  // types of a number and of what arguments point at
   std::vector<bool> live_;
   std::vector<std::uint32_t> uses_, part_of_, last_part_, slot_, angle_;
+  std::vector<bool> negated_;                           // held as its negative
   std::vector<std::string> text_;                       // written where it is used
   std::vector<std::vector<std::uint32_t>> outputs_of_;  // per node
   std::vector<std::string> output_names_;
+  std::vector<std::uint32_t> array_of_;                       // per output
+  std::map<std::uint32_t, std::vector<OutputStore>> stores_;  // after a unit
+  std::vector<OutputStore> zeros_;
+  std::size_t units_ = 0, written_units_ = 0, written_zeros_ = 0;
   std::set<std::string> cleared_;      // outputs, mostly zeros, that a loop clears first
   std::vector<bool> cleared_outputs_;  // per output: nothing is left to write
   bool at_sines_ = false;              // takes the table of the robot's sines

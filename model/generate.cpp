@@ -81,7 +81,7 @@ static inline T get(const double* from) {
   return value;
 }
 template <class T>
-static inline void put(double* to, T value) {
+static inline void put(double* to, const T& value) {
   __builtin_memcpy(to, &value, sizeof value);
 }
 )";

@@ -380,21 +380,40 @@ class Pairing {
   }
 
   void choose_signs() {
-    std::vector<Parities::Row> wishes;
+    std::vector<Parities::Row> wishes, sines;
     for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
       if (lanes_.second_of[i] == kNone) continue;
       const Op op = nodes_[i].op;
       if (op == Op::kCos) {
         sign_[i] = {};
-      } else if (op == Op::kInput || op == Op::kSin) {
+      } else if (op == Op::kInput) {
         wishes.push_back(sign_of(i));
+      } else if (op == Op::kSin) {
+        sines.push_back(sign_of(i));  // the table has both
       } else if (is_operation(op)) {
         sign_operation(i);
       }
     }
+    wish_for_outputs(wishes);
+    wishes.insert(wishes.end(), sines.begin(), sines.end());
     for (const Parities::Row& wish : wishes) (void)parities_.require_zero(wish);
     parities_.solve();
     for (const auto& [first, row] : sign_) lanes_.minus[first] = parities_.sum(row);
+  }
+
+  // Both lanes are written with one sign: as they stand.
+  void wish_for_outputs(std::vector<Parities::Row>& wishes) {
+    std::map<std::uint32_t, bool> negative;
+    for (const Expr& output : kernel_.outputs)
+      if (!output.is_constant()) negative.emplace(output.node(), output.negative());
+    for (const auto& [node, first_negative] : negative) {
+      if (lanes_.second_of[node] == kNone) continue;
+      const auto second = negative.find(lanes_.second_of[node]);
+      if (second == negative.end()) continue;
+      Parities::Row wish = sign_of(node);
+      if (first_negative != second->second) Parities::add(wish, Parities::one());
+      wishes.push_back(std::move(wish));
+    }
   }
 
   void sign_operation(std::uint32_t i) {
