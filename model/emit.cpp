@@ -52,7 +52,7 @@ class Emitter {
         number_(states == 1   ? "double"
                 : states == 4 ? "four"
                               : "eight"),
-        array_(states == 1 ? number_ : number_ + "_at"),
+        array_(states == 8 ? "eight_at" : "double"),
         name_(kernel.shape.name + (states == 1 ? "" : "_" + number_)),
         live_(live_nodes(graph, kernel.outputs)),
         uses_(nodes_.size(), 0),
@@ -86,6 +86,11 @@ class Emitter {
       parameters_ = "const double* __restrict s, ";
       arguments_ = "s, ";
     }
+    if (states_ == 4) {
+      parameters_ = "long states, ";
+      arguments_ = "states, ";
+      result_.parameters = "long states";
+    }
     for (const KernelArray& in : kernel_.shape.inputs) {
       parameters_ += "const " + array_ + "* __restrict " + in.name + ", ";
       arguments_ += in.name + ", ";
@@ -103,13 +108,19 @@ class Emitter {
       for (int i = 0; i < out.size; ++i, ++first) {
         array_of_.push_back(a);
         cleared_outputs_.push_back(zeros > kMostZeros && is_zero(first));
-        output_names_.push_back(out.name + "[" + std::to_string(i) + "]");
+        output_names_.push_back(element(out, std::to_string(i)));
         const Expr& output = kernel_.outputs[first];
         if (!output.is_constant()) outputs_of_[output.node()].push_back(first);
       }
     }
     parameters_ += number_ + "* __restrict w";
     arguments_ += "w";
+  }
+
+  // Four states may be some of many, whose numbers stand side by side.
+  std::string element(const KernelArray& array, const std::string& i) const {
+    return states_ == 4 ? fmt::format("four_of({} + {} * states)", array.name, i)
+                        : array.name + "[" + i + "]";
   }
 
   bool is_zero(std::uint32_t output) const {
@@ -259,8 +270,7 @@ class Emitter {
   std::string operand(std::uint32_t i) {
     const GraphNode& node = nodes_[i];
     if (node.op == Op::kConstant) return literal(node.value);
-    if (node.op == Op::kInput)
-      return kernel_.shape.inputs[node.a].name + "[" + std::to_string(node.b) + "]";
+    if (node.op == Op::kInput) return element(kernel_.shape.inputs[node.a], std::to_string(node.b));
     if (is_tabulated(i)) return tabulated(i);
     const std::uint32_t unit = unit_of(i);
     if (is_pair(unit)) {
@@ -503,8 +513,8 @@ class Emitter {
       body += "  " + number_ + "* w = nullptr;\n";
     for (const KernelArray& out : kernel_.shape.outputs)
       if (cleared_.contains(out.name))
-        body += "  for (int i = 0; i < " + std::to_string(out.size) + "; ++i) " + out.name +
-                "[i] = " + constant(0.0) + ";\n";
+        body += "  for (int i = 0; i < " + std::to_string(out.size) + "; ++i) " +
+                element(out, "i") + " = " + constant(0.0) + ";\n";
     if (states_ > 1) body += sines_of_states();
     for (std::size_t part = 0; part < parts_.size(); ++part)
       body += "  " + name_ + "_" + std::to_string(part) + "(" + arguments_ + ");\n";

@@ -49,8 +49,9 @@ struct EmittedKernel {
                                         const Mechanism& m, SineTable& sines,
                                         std::uint32_t part_operations);
 
-/// The same kernel for four or eight states at once, as "NAME_four" or "NAME_eight": each number is
-/// a vector of as many.
+/// The same kernel for four states of many, as "NAME_four" (states, …), where element i of an array
+/// is at [i * states], or for eight that stand alone, as "NAME_eight": each number is a vector of
+/// as many.
 [[nodiscard]] EmittedKernel emit_batch(const Graph& graph, const TracedKernel& kernel,
                                        std::uint32_t states, std::uint32_t part_operations);
 

@@ -44,6 +44,10 @@ static inline two flip(two x) {  // minus lane 1
 }
 typedef double four __attribute__((vector_size(32), may_alias));
 typedef double four_at __attribute__((vector_size(32), may_alias, aligned(8)));
+static inline four_at& four_of(double* at) { return *reinterpret_cast<four_at*>(at); }
+static inline const four_at& four_of(const double* at) {
+  return *reinterpret_cast<const four_at*>(at);
+}
 static inline double root(double x) { return __builtin_sqrt(x); }
 static inline double sine(double x) { return __builtin_sin(x); }
 static inline double cosine(double x) { return __builtin_cos(x); }
@@ -122,10 +126,18 @@ std::string count_table(const std::vector<KernelCount>& counts) {
 
 constexpr Kernel kBatches[] = {Kernel::kForwardDynamics, Kernel::kInverseDynamics};
 
-// The loop of a batch over its states, `step` (1, 4, 8) at a time, in arrays of its own but for
-// exactly as many, which stand as they are wanted.
+// The loop of a batch over its states, four at a time, where they stand.
+std::string fours_source(const KernelShape& shape) {
+  std::string given = "states";
+  for (const auto* arrays : {&shape.inputs, &shape.outputs})
+    for (const KernelArray& array : *arrays) given += ", " + array.name + " + s";
+  return fmt::format("  for (; s + 4 <= states; s += 4) {}_four({});\n", shape.name, given);
+}
+
+// The same for one (`step` 1) or eight at a time, in arrays of its own but for exactly eight, which
+// stand as they are wanted: with steps in between, that kernel takes an eighth longer.
 std::string states_source(const KernelShape& shape, int step) {
-  const std::string number = step == 1 ? "double" : step == 4 ? "four" : "eight";
+  const std::string number = step == 1 ? "double" : "eight";
   const std::string call = shape.name + (step == 1 ? "" : "_" + number);
   std::string arrays, in, out, own, given;
   const auto add = [&](const KernelArray& array, bool output) {
@@ -159,7 +171,7 @@ std::string batch_source(const KernelShape& shape, bool vectors) {
   text += ") {\n  uint32_t s = 0;\n";
   if (vectors)
     text += fmt::format("{}{}#endif\n{}{}#else\n", kIfEightLanes, states_source(shape, 8),
-                        kIfFourLanes, states_source(shape, 4));
+                        kIfFourLanes, fours_source(shape));
   text += states_source(shape, 1);
   return text + (vectors ? "#endif\n}\n\n" : "}\n\n");
 }

@@ -86,7 +86,7 @@ typedef struct tandem_kernels {
 
   /* Several states in a call, for sweeps, predictions and differences: element i of state s stands
    * at [i * states + s] of every array. `states` is a multiple of four, and what exceeds one is
-   * left out. Fastest is exactly four, or eight with AVX-512. Never null in a library. */
+   * left out. Fastest is exactly eight with AVX-512. Never null in a library. */
   void (*forward_dynamics_batch)(uint32_t states, const double* q, const double* v,
                                  const double* tau, const double* wrench, double* vdot);
   void (*inverse_dynamics_batch)(uint32_t states, const double* q, const double* v,
