@@ -14,7 +14,8 @@
 namespace tandem {
 
 /// Ring of equal slots of `slot_bytes` raw bytes each. When it is full a push is refused and
-/// counted, never waited for.
+/// counted, never waited for. When it is empty it begins at its first slot again: a consumer that
+/// keeps up lets both threads use the same few slots, which stay in the caches.
 class SpscRing {
  public:
   /// @param slots  rounded up to a power of two, at least 2. All memory is allocated and touched.
@@ -43,11 +44,13 @@ class SpscRing {
   /// Producer: the next free slot to fill in place, or empty (and counted) when full.
   [[nodiscard]] std::span<std::byte> begin_push() noexcept TANDEM_RT {
     const std::size_t head = head_.load(std::memory_order_relaxed);
-    if (head - tail_.load(std::memory_order_acquire) > mask_) {
+    const std::size_t used = head - tail_.load(std::memory_order_acquire);
+    if (used > mask_) {
       dropped_.fetch_add(1, std::memory_order_relaxed);
       return {};
     }
-    return {bytes_.data() + (head & mask_) * slot_bytes_, slot_bytes_};
+    if (used == 0) first_ = head;  // the consumer reads it when there is a slot
+    return {bytes_.data() + place(head), slot_bytes_};
   }
   /// Producer: whether begin_push() gives so many slots; if not, one refused push is counted.
   [[nodiscard]] bool has_room(std::size_t slots) noexcept TANDEM_RT {
@@ -64,7 +67,7 @@ class SpscRing {
   [[nodiscard]] std::span<const std::byte> front() const noexcept {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
     if (tail == head_.load(std::memory_order_acquire)) return {};
-    return {bytes_.data() + (tail & mask_) * slot_bytes_, slot_bytes_};
+    return {bytes_.data() + place(tail), slot_bytes_};
   }
   /// Consumer: gives the oldest slot back.
   void pop() noexcept {
@@ -72,9 +75,14 @@ class SpscRing {
   }
 
  private:
+  [[nodiscard]] std::size_t place(std::size_t count) const noexcept {
+    return ((count - first_) & mask_) * slot_bytes_;
+  }
+
   std::size_t slot_bytes_;
   std::size_t mask_ = 0;
   std::vector<std::byte> bytes_;
+  std::size_t first_ = 0;  // the count whose slot is at the beginning; the producer's while empty
   alignas(64) std::atomic<std::size_t> head_{0};
   alignas(64) std::atomic<std::size_t> tail_{0};
   alignas(64) std::atomic<std::uint64_t> dropped_{0};

@@ -19,7 +19,9 @@ namespace {
 constexpr Recorder::Channel kEventChannel = 0, kFirstLate = 0x4000, kPartChannel = 0xFFFB,
                             kGivenChannel = 0xFFFC, kAttachedChannel = 0xFFFD,
                             kBranchChannel = 0xFFFE, kTextChannel = 0xFFFF;
-constexpr auto kPoll = std::chrono::milliseconds(2);
+constexpr std::chrono::microseconds kPoll = std::chrono::milliseconds(2);
+/// Messages that are worth waking the writer for: so few that they are still in the caches.
+constexpr std::size_t kBatch = 256;
 
 /// @param more  what was pushed behind the event
 std::string whole_text(const Event& event, std::span<const std::byte> more,
@@ -243,7 +245,27 @@ void Recorder::attach(std::string name, std::int64_t time_ns, Bytes data) {
   (void)push(kAttachedChannel, time_ns, {});
 }
 
-void Recorder::wait_for_space(std::size_t messages) const noexcept { wait_for(*ring_, messages); }
+void Recorder::wait_for_space(std::size_t messages) const noexcept {
+  const std::size_t capacity = ring_->capacity();
+  const std::size_t wanted = std::min(messages, capacity);
+  if (ring_->size() + wanted > capacity) {
+    // Not for every message that is written.
+    const std::size_t room = std::max(wanted, capacity / 2);
+    std::unique_lock lock(pace_mutex_);
+    wanted_room_.store(room, std::memory_order_relaxed);
+    work_.notify_one();
+    while (!room_.wait_for(lock, kPoll, [&] { return ring_->size() + room <= capacity; })) continue;
+    wanted_room_.store(0, std::memory_order_relaxed);
+  } else if (ring_->size() >= std::min(kBatch, capacity / 2)) {
+    work_.notify_one();
+  }
+}
+
+/// A message was written.
+void Recorder::give_room() const noexcept {
+  const std::size_t wanted = wanted_room_.load(std::memory_order_relaxed);
+  if (wanted != 0 && ring_->size() + wanted <= ring_->capacity()) room_.notify_one();
+}
 
 void Recorder::wait_for(const SpscRing& ring, std::size_t messages) noexcept {
   const std::size_t wanted = std::min(messages, ring.capacity());
@@ -282,9 +304,11 @@ void Recorder::run() {
         write(slot);
       }
       ring_->pop();
+      give_room();
     }
     if (last) return write_side(std::numeric_limits<std::int64_t>::max());
-    std::this_thread::sleep_for(kPoll);
+    std::unique_lock lock(pace_mutex_);
+    work_.wait_for(lock, kPoll);  // a call that comes too early is late by no more
   }
 }
 
@@ -489,6 +513,7 @@ Status Recorder::end_part(const StringMap& extra) {
 
 void Recorder::stop_thread() {
   closing_.store(true, std::memory_order_release);
+  work_.notify_one();
   if (thread_.joinable()) thread_.join();
 }
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -150,8 +151,9 @@ class Recorder {
   /// Blocks that other thread until its `messages` fit.
   void wait_for_side_space(std::size_t messages) const noexcept { wait_for(*side_, messages); }
 
-  /// Blocks until `messages` fit into the ring, or until it is empty. For simulated time only,
-  /// where the loop may wait for the disk; never on a robot.
+  /// Blocks until `messages` fit into the ring, or until it is empty; wakes the writer's thread
+  /// when there is enough for it to do. For simulated time only, where the loop may wait for the
+  /// disk; never on a robot. One thread at a time.
   void wait_for_space(std::size_t messages) const noexcept;
 
   [[nodiscard]] std::uint64_t dropped() const noexcept {
@@ -189,6 +191,7 @@ class Recorder {
                         std::span<const std::byte> image) noexcept TANDEM_RT;
   [[nodiscard]] std::span<const std::byte> put_together(std::span<const std::byte> last);
   static void wait_for(const SpscRing& ring, std::size_t messages) noexcept;
+  void give_room() const noexcept;
   void run();
   void write_side(std::int64_t up_to_ns);
   void write(std::span<const std::byte> slot);
@@ -222,6 +225,10 @@ class Recorder {
   std::int64_t side_lag_ns_ = -1;   // -1: the same
   std::thread thread_;
   std::atomic<bool> closing_{false};
+  // Where the loop may wait, the two threads wake each other; elsewhere the writer looks by itself.
+  mutable std::mutex pace_mutex_;
+  mutable std::condition_variable work_, room_;
+  mutable std::atomic<std::size_t> wanted_room_{0};  // 0: nobody waits for it
   struct Attached {
     std::string name;
     Bytes data;

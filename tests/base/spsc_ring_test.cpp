@@ -14,6 +14,28 @@ TEST(SpscRing, CountsWhatItRefusesWhenFull) {
   EXPECT_EQ(ring.dropped(), 2U);
 }
 
+TEST(SpscRing, UsesItsFirstSlotsAgainOnceItIsEmpty) {
+  SpscRing ring(8, 4);
+  const auto push = [&] {
+    const std::byte* slot = ring.begin_push().data();
+    ring.end_push();
+    return slot;
+  };
+  const std::byte* const first = push();
+  EXPECT_EQ(push(), first + 8);
+  ring.pop();
+  EXPECT_EQ(push(), first + 16);  // one is in use: they follow each other
+  ring.pop();
+  ring.pop();
+  for (int round = 0; round < 3; ++round) {
+    EXPECT_EQ(push(), first);
+    EXPECT_EQ(ring.front().data(), first);
+    ring.pop();
+  }
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(push(), first + 8 * i);
+  EXPECT_TRUE(ring.begin_push().empty());
+}
+
 TEST(SpscRing, HandsEverySlotOverInOrderBetweenThreads) {
   SpscRing ring(sizeof(std::uint64_t), 64);
   constexpr std::uint64_t kCount = 200'000;
