@@ -2,6 +2,7 @@
 // Layer: log.  Thread: one at a time.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -22,10 +23,15 @@ class DataHash {
   void add(std::uint16_t channel, std::int64_t time_ns, std::span<const std::byte> cdr_header,
            std::span<const std::byte> body) noexcept;
   /// 64 hexadecimal digits, lower case. Ends the stream: call it once.
-  [[nodiscard]] std::string finish() { return hash_.finish(); }
+  [[nodiscard]] std::string finish();
 
  private:
+  static constexpr std::size_t kMostOfMessage = 30;
+  void take_waiting() noexcept;
+
   Sha256 hash_;
+  std::array<std::byte, 64 * kMostOfMessage> waiting_;  // for it: a call for each would cost more
+  std::size_t waits_ = 0;
 };
 
 }  // namespace tandem::log

@@ -23,6 +23,27 @@ std::uint32_t crc(std::uint32_t before, std::span<const std::byte> bytes) {
   return libdeflate_crc32(before, bytes.data(), bytes.size());
 }
 
+/// Product of two polynomials modulo the CRC's: bit 31 is the coefficient of x^0.
+std::uint32_t product(std::uint32_t a, std::uint32_t b) noexcept {
+  constexpr std::uint32_t kModulus = 0xEDB88320;
+  std::uint32_t sum = 0;
+  for (std::uint32_t bit = 1U << 31; bit != 0; bit >>= 1) {
+    if ((a & bit) != 0) sum ^= b;
+    b = (b >> 1) ^ ((b & 1) != 0 ? kModulus : 0);
+  }
+  return sum;
+}
+
+/// The CRC of two pieces of which those are the CRCs: the first times x^(bits of the second).
+std::uint32_t joined(std::uint32_t first, std::uint32_t second, std::size_t second_bytes) noexcept {
+  std::uint32_t power = 1U << 23;  // x^8
+  for (std::size_t left = second_bytes; left != 0; left >>= 1) {
+    if ((left & 1) != 0) first = product(first, power);
+    power = product(power, power);
+  }
+  return first ^ second;
+}
+
 void append_record(Bytes& out, Opcode opcode, std::span<const std::byte> content) {
   append(out, static_cast<std::uint8_t>(opcode));
   append(out, static_cast<std::uint64_t>(content.size()));
@@ -116,6 +137,10 @@ std::uint64_t McapWriter::lost() const noexcept {
 
 void McapWriter::emit(std::span<const std::byte> bytes) {
   crc_ = crc(crc_, bytes);
+  put(bytes);
+}
+
+void McapWriter::put(std::span<const std::byte> bytes) {
   look_at_file();
   while (!bytes.empty() && !failed()) {
     const ssize_t written = ::write(file_.get(), bytes.data(), bytes.size());
@@ -235,11 +260,12 @@ void McapWriter::finish_chunk() {
   chunk.messages = statistics_.messages - chunked_messages_;
   chunked_messages_ = statistics_.messages;
 
+  const std::uint32_t chunk_crc = crc(0, chunk_);
   Bytes head;
   append(head, chunk.start_time);
   append(head, chunk.end_time);
   append(head, chunk.uncompressed);
-  append(head, crc(0, chunk_));
+  append(head, chunk_crc);
   append(head, mcap_name(options_.compression));
   append(head, chunk.compressed);
   Bytes record;
@@ -247,7 +273,12 @@ void McapWriter::finish_chunk() {
   append(record, static_cast<std::uint64_t>(head.size() + records.size()));
   append(record, head);
   emit(record);
-  emit(records);
+  if (options_.compression == Compression::kNone) {
+    crc_ = joined(crc_, chunk_crc, records.size());
+    put(records);
+  } else {
+    emit(records);
+  }
   chunk.length = record.size() + records.size();
   write_indices(chunk);
   chunks_.push_back(std::move(chunk));
@@ -266,9 +297,13 @@ void McapWriter::write_indices(Chunk& chunk) {
     Bytes content;
     append(content, channel);
     append(content, static_cast<std::uint32_t>(entries.size() * 16));
+    const std::size_t at = content.size();
+    content.resize(at + entries.size() * 16);
+    std::byte* out = content.data() + at;
     for (const IndexEntry& entry : entries) {
-      append(content, entry.time);
-      append(content, entry.offset);
+      store(out, entry.time);
+      store(out + 8, entry.offset);
+      out += 16;
     }
     append_record(records, Opcode::kMessageIndex, content);
     entries.clear();

@@ -95,6 +95,7 @@ class McapWriter {
   void look_at_file();  // fails when it was deleted or cut meanwhile
   void fail(std::string error, std::uint64_t kept_bytes);
   void emit(std::span<const std::byte> bytes);  // to the file, into the CRC
+  void put(std::span<const std::byte> bytes);   // to the file, whose CRC has them already
   void emit_record(Opcode opcode, const Bytes& content);
   void finish_chunk();
   void write_indices(Chunk& chunk);
