@@ -52,7 +52,10 @@ class SwingWatch {
     const std::array<double, 3> x{1.0, e_, w_};
     for (std::size_t i = 0; i < 3; ++i) {
       now_.by_torque[i] += x[i] * torque_Nm_;
-      for (std::size_t k = 0; k < 3; ++k) now_.among[i][k] += x[i] * x[k];
+      for (std::size_t k = i; k < 3; ++k) {
+        now_.among[i][k] += x[i] * x[k];
+        now_.among[k][i] = now_.among[i][k];
+      }
     }
     if (now_.time_s > kLongest_s) rest();
     const std::int64_t side = w_ >= threshold_rad_s ? 1 : w_ <= -threshold_rad_s ? -1 : 0;

@@ -41,22 +41,6 @@ const char* to_string(DriveMachineState state) noexcept {
   return "unknown";
 }
 
-DriveMachineState drive_state(std::uint16_t word) noexcept TANDEM_RT {
-  switch (word & 0x4F) {
-    case 0x40: return DriveMachineState::kSwitchOnDisabled;
-    case 0x0F: return DriveMachineState::kFaultReactionActive;
-    case 0x08: return DriveMachineState::kFault;
-    default: break;
-  }
-  switch (word & 0x6F) {
-    case 0x21: return DriveMachineState::kReadyToSwitchOn;
-    case 0x23: return DriveMachineState::kSwitchedOn;
-    case 0x27: return DriveMachineState::kOperationEnabled;
-    case 0x07: return DriveMachineState::kQuickStopActive;
-    default: return DriveMachineState::kNotReadyToSwitchOn;
-  }
-}
-
 std::uint16_t controlword_towards_enabled(DriveMachineState state) noexcept TANDEM_RT {
   switch (state) {
     case DriveMachineState::kSwitchOnDisabled: return kCommandShutdown;  // 2

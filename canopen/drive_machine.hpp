@@ -2,6 +2,8 @@
 // Layer: canopen.  Thread: any; an object belongs to one thread.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "base/realtime.hpp"
@@ -26,9 +28,29 @@ enum class DriveMachineState : std::uint8_t {
 };
 [[nodiscard]] const char* to_string(DriveMachineState state) noexcept;
 
+namespace detail {
+/// By a statusword's bits 0 to 3, 5 and 6.
+inline constexpr std::array kDriveStates = [] {
+  std::array<DriveMachineState, 0x70> states{};
+  states.fill(DriveMachineState::kNotReadyToSwitchOn);
+  for (const std::size_t bit_5 : {0x00U, 0x20U}) {
+    states[0x40 | bit_5] = DriveMachineState::kSwitchOnDisabled;
+    states[0x0F | bit_5] = DriveMachineState::kFaultReactionActive;
+    states[0x08 | bit_5] = DriveMachineState::kFault;
+  }
+  states[0x21] = DriveMachineState::kReadyToSwitchOn;
+  states[0x23] = DriveMachineState::kSwitchedOn;
+  states[0x27] = DriveMachineState::kOperationEnabled;
+  states[0x07] = DriveMachineState::kQuickStopActive;
+  return states;
+}();
+}  // namespace detail
+
 /// The state in a statusword; bits 4, 7 to 15 play no part. A pattern of no state (none
 /// is sent by a conforming drive) counts as kNotReadyToSwitchOn.
-[[nodiscard]] DriveMachineState drive_state(std::uint16_t statusword) noexcept TANDEM_RT;
+[[nodiscard]] constexpr DriveMachineState drive_state(std::uint16_t statusword) noexcept TANDEM_RT {
+  return detail::kDriveStates[statusword & 0x6F];
+}
 
 /// The controlword that brings a drive one transition nearer to Operation Enabled, from any state
 /// but a fault; in Fault 0x0000, so that fault reset gets its rising edge.

@@ -115,11 +115,12 @@ void Pdo::resolve() noexcept TANDEM_RT {
   for (std::size_t i = 0; i < count_; ++i) {
     const ObjectEntry* object = od_->find(static_cast<std::uint16_t>(mapping_[i] >> 16),
                                           static_cast<std::uint8_t>(mapping_[i] >> 8));
-    copies_[i] = {.data = object->data,
-                  .offset = static_cast<std::uint8_t>(mapped_bytes_),
-                  .size = static_cast<std::uint8_t>(object->size)};
+    copy_storage_[i] = {.data = object->data,
+                        .offset = static_cast<std::uint8_t>(mapped_bytes_),
+                        .size = static_cast<std::uint8_t>(object->size)};
     mapped_bytes_ += object->size;
   }
+  copies_ = PdoCopies(std::span(copy_storage_).first(count_));
 }
 
 void Pdo::archive(Archive& ar) {
@@ -146,9 +147,7 @@ bool RxPdo::sync() noexcept TANDEM_RT {
   return true;
 }
 
-void RxPdo::apply(const std::uint8_t* bytes) noexcept {
-  for (std::size_t i = 0; i < count_; ++i) copies_[i].from_wire(bytes);
-}
+void RxPdo::apply(const std::uint8_t* bytes) noexcept { copies_.from_wire(bytes); }
 
 void RxPdo::archive(Archive& ar) {
   Pdo::archive(ar);
@@ -183,21 +182,15 @@ void TxPdo::write(FrameSink& out) const noexcept {
   frame->id = cob_id();
   frame->length = frame_length(mapped_bytes());
   if (frame->length > kClassicFrameBytes) frame->flags = kFlagFd | kFlagBrs;
-  for (std::size_t i = 0; i < count_; ++i) copies_[i].to_wire(frame->data.data());
+  copies_.to_wire(frame->data.data());
 }
 
-bool TxPdo::changed() const noexcept {
-  if (!sent_) return true;
-  for (std::size_t i = 0; i < count_; ++i) {
-    if (copies_[i].differs(last_.data())) return true;
-  }
-  return false;
-}
+bool TxPdo::changed() const noexcept { return !sent_ || copies_.differ(last_.data()); }
 
 void TxPdo::send(FrameSink& out) noexcept {
   write(out);
   if (!synchronous() || type_ == kSynchronousAcyclic) {
-    for (std::size_t i = 0; i < count_; ++i) copies_[i].to_wire(last_.data());
+    copies_.to_wire(last_.data());
   }
   sent_ = true;
   syncs_ = 0;

@@ -66,8 +66,8 @@ class Pdo : public ObjectOwner {
   std::uint32_t cob_id_ = cob::kInvalid;
   std::size_t mapped_bytes_ = 0;
 
- protected:                                          // what every frame needs stands side by side
-  std::array<PdoCopy, kMaxMappedObjects> copies_{};  ///< the mapping, compiled
+ protected:             // what every frame needs stands side by side
+  PdoCopies copies_{};  ///< the mapping, compiled
 
  private:
   AbortCode check_parameter(std::uint8_t sub, const std::uint8_t* bytes) const noexcept TANDEM_RT;
@@ -81,6 +81,7 @@ class Pdo : public ObjectOwner {
   std::uint32_t default_cob_id_ = cob::kInvalid;
   std::size_t max_bytes_ = kMaxFrameBytes;
   std::array<std::uint32_t, kMaxMappedObjects> mapping_{};
+  std::array<PdoCopy, kMaxMappedObjects> copy_storage_{};
 };
 
 /// Master to node. A synchronous one takes effect at the next SYNC, the others at once.

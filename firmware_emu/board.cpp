@@ -139,7 +139,7 @@ Board::Board(const BoardSetup& setup)
   node_.objects_changed();
 }
 
-void Board::receive(const Frame& frame) noexcept TANDEM_RT {
+void Board::hear(const Frame& frame) noexcept TANDEM_RT {
   NodeEvents events = 0;
   if (is_data_frame(frame)) {
     events = node_.receive(frame, outbox_);

@@ -16,6 +16,7 @@
 #include "firmware_emu/axis.hpp"
 #include "firmware_emu/setup.hpp"
 #include "firmware_emu/sheet_dictionary.hpp"
+#include "firmware_emu/wire.hpp"
 
 namespace tandem::firmware {
 
@@ -45,7 +46,10 @@ class Board {
 
   /// Takes a frame of the bus, whoever it is for. What is no data frame of CAN or CAN FD is
   /// ignored and counted (2050).
-  void receive(const canopen::Frame& frame) noexcept TANDEM_RT;
+  void receive(const canopen::Frame& frame) noexcept TANDEM_RT {
+    // Frames of others, most of a bus, change nothing.
+    if (heartbeat_lost_ || !is_data_frame(frame) || node_.hears(frame.id)) hear(frame);
+  }
 
   /// Advances time by `dt_ns`. The controllers run in the first call and then whenever the
   /// control period is over; in between `drive` repeats what they last said.
@@ -97,6 +101,7 @@ class Board {
     std::uint32_t rpdos = 0;  ///< bit n-1: RPDO n carries the axis's controlword
   };
 
+  void hear(const canopen::Frame& frame) noexcept TANDEM_RT;
   void take(canopen::NodeEvents events) noexcept;
   void find_command_rpdos() noexcept;
   void clear_when_well() noexcept;

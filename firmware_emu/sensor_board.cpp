@@ -102,7 +102,7 @@ SensorBoard::SensorBoard(const SensorSetup& setup)
       outbox_storage_(kSensorOutboxFrames),
       outbox_(outbox_storage_) {}
 
-void SensorBoard::receive(const Frame& frame) noexcept TANDEM_RT {
+void SensorBoard::hear(const Frame& frame) noexcept TANDEM_RT {
   if (is_remote_request(frame)) (void)node_.answer_remote(frame.id, outbox_);
   if (!is_data_frame(frame)) return;
   if ((node_.receive(frame, outbox_) & kEventSync) != 0) sync_pending_ = true;

@@ -14,6 +14,7 @@
 #include "canopen/object_dictionary.hpp"
 #include "firmware_emu/estimator.hpp"
 #include "firmware_emu/setup.hpp"
+#include "firmware_emu/wire.hpp"
 
 namespace tandem::firmware {
 
@@ -31,7 +32,9 @@ class SensorBoard {
   SensorBoard(const SensorBoard&) = delete;
   SensorBoard& operator=(const SensorBoard&) = delete;
 
-  void receive(const canopen::Frame& frame) noexcept TANDEM_RT;
+  void receive(const canopen::Frame& frame) noexcept TANDEM_RT {
+    if (!is_data_frame(frame) || node_.hears(frame.id)) hear(frame);
+  }
   /// Advances time by `dt_ns`, after a SYNC with a fresh sample of every channel. A channel whose
   /// truth is no number keeps its last value.
   /// @param truth  (channels) SI
@@ -55,6 +58,8 @@ class SensorBoard {
   void archive(Archive& ar);
 
  private:
+  void hear(const canopen::Frame& frame) noexcept TANDEM_RT;
+
   SensorSetup setup_;
   canopen::ObjectDictionary od_;
   std::vector<float> values_;

@@ -16,9 +16,9 @@ namespace tandem::firmware {
 [[nodiscard]] inline bool is_data_frame(const canopen::Frame& frame) noexcept TANDEM_RT {
   if (frame.id > canopen::cob::kIdMask) return false;
   if ((frame.flags & (canopen::kFlagRtr | canopen::kFlagError)) != 0) return false;
-  if (frame.length > canopen::kMaxFrameBytes) return false;
-  if (canopen::frame_length(frame.length) != frame.length) return false;
-  return frame.fd() || frame.length <= canopen::kClassicFrameBytes;
+  if (frame.length <= canopen::kClassicFrameBytes) return true;
+  return frame.fd() && frame.length <= canopen::kMaxFrameBytes &&
+         canopen::frame_length(frame.length) == frame.length;
 }
 
 /// Whether `frame` is a classic remote request, which asks for the PDO of its identifier.

@@ -8,6 +8,7 @@
 
 namespace tandem::hal::can {
 
+using canopen::PdoCopies;
 using canopen::PdoCopy;
 using canopen::PdoDirection;
 
@@ -41,7 +42,8 @@ void NodeExchange::connect(const NodePlan& plan, std::span<AxisMaster> axes, std
       continue;
     }
     Send& send = sends_.emplace_back();
-    send.copies = std::move(copies);
+    send.storage = std::move(copies);
+    send.copies = PdoCopies(send.storage);
     send.in_every_cycle = pdo.group == PdoGroup::kCommand;
     send.frame.id = pdo.cob_id;
     send.frame.length = canopen::frame_length(pdo.bytes);
@@ -51,11 +53,12 @@ void NodeExchange::connect(const NodePlan& plan, std::span<AxisMaster> axes, std
 }
 
 NodeExchange::Receive NodeExchange::compile(const PdoPlan& pdo, std::vector<PdoCopy> copies) const {
-  Receive receive = {.copies = std::move(copies),
+  Receive receive = {.storage = std::move(copies),
                      .in_use = true,
                      .channels = pdo.group == PdoGroup::kSensor,
                      .bytes = pdo.bytes,
                      .part = pdo.group == PdoGroup::kSlowFeedback ? -1 : pdo.part};
+  receive.copies = PdoCopies(receive.storage);  // a vector's elements stay when it is moved
   for (const MappedField& field : pdo.fields) {
     receive.echo |= field.field == WireField::kCycleEcho;
     if (pdo.group != PdoGroup::kFeedback || field.field == WireField::kCycleEcho) continue;
@@ -78,7 +81,7 @@ bool NodeExchange::take(int number, const canopen::Frame& frame, std::int64_t at
     next_part_ = pdo.part + 1;
   }
   const bool whole = next_part_ == plan_->parts;
-  for (const PdoCopy& copy : pdo.copies) copy.from_wire(frame.data.data());
+  pdo.copies.from_wire(frame.data.data());
   for (const std::size_t joint : pdo.joints) fresh[joint] = whole ? 1 : 0;
   if (pdo.part >= 0 && whole) on_sample(at_ns);
   if (pdo.echo) on_echo(at_ns);
@@ -114,14 +117,13 @@ bool NodeExchange::end_cycle(std::span<const std::uint8_t> fresh) noexcept TANDE
 void NodeExchange::write(canopen::FrameSink& out) noexcept TANDEM_RT {
   if (counters_sent_ < 0xFF) ++counters_sent_;
   for (Send& pdo : sends_) {
-    const auto changed = [&](const PdoCopy& copy) { return copy.differs(pdo.frame.data.data()); };
-    if (!pdo.in_every_cycle && pdo.sent != 0 && std::ranges::none_of(pdo.copies, changed)) continue;
+    if (!pdo.in_every_cycle && pdo.sent != 0 && !pdo.copies.differ(pdo.frame.data.data())) continue;
     canopen::Frame* frame = out.next();
     if (frame == nullptr) continue;
     *frame = pdo.frame;
-    for (const PdoCopy& copy : pdo.copies) copy.to_wire(frame->data.data());
+    pdo.copies.to_wire(frame->data.data());
     if (pdo.in_every_cycle) continue;
-    for (const PdoCopy& copy : pdo.copies) copy.to_wire(pdo.frame.data.data());
+    pdo.copies.to_wire(pdo.frame.data.data());
     pdo.sent = 1;
   }
 }

@@ -65,13 +65,15 @@ class NodeExchange {
   /// An RPDO's plan, compiled.
   struct Send {
     canopen::Frame frame;  ///< identifier and length; of what is sent when it changes, the last one
-    std::vector<canopen::PdoCopy> copies{};
+    std::vector<canopen::PdoCopy> storage{};
+    canopen::PdoCopies copies{};
     bool in_every_cycle = true;
     std::uint8_t sent = 0;  ///< since the node's start; of what is sent when it changes
   };
   /// A TPDO's.
   struct Receive {
-    std::vector<canopen::PdoCopy> copies{};
+    std::vector<canopen::PdoCopy> storage{};
+    canopen::PdoCopies copies{};
     std::vector<std::size_t> joints{};  ///< of a sample: whose
     bool in_use = false;
     bool echo = false;       ///< one of the copies is echo_

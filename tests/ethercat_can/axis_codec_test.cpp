@@ -130,8 +130,8 @@ TEST_F(Codec, IdleKeepsTheModeOfTheDrive) {
 TEST_F(Codec, FeedbackFromLiteralBytes) {
   RawFeedback feedback;
   const auto from_wire = [](void* variable, const auto& bytes) {
-    canopen::PdoCopy{.data = variable, .size = static_cast<std::uint8_t>(bytes.size())}.from_wire(
-        bytes.data());
+    canopen::PdoCopy copy{.data = variable, .size = static_cast<std::uint8_t>(bytes.size())};
+    canopen::PdoCopies({&copy, 1}).from_wire(bytes.data());
   };
   const std::array<std::uint8_t, 2> status{0x37, 0x12};
   const std::array<std::uint8_t, 4> position{0xD8, 0xDC, 0xFF, 0xFF};  // -9000
@@ -173,14 +173,19 @@ TEST_F(Codec, CommandToLiteralBytes) {
   out.torque_offset = -250;
   out.stiffness = 1.0F;
   std::array<std::uint8_t, 16> bytes{};
-  for (const canopen::PdoCopy& copy : {
-           canopen::PdoCopy{out.variable(WireField::kControlword), 0, 2},
-           canopen::PdoCopy{out.variable(WireField::kMode), 2, 1},
-           canopen::PdoCopy{out.variable(WireField::kTargetPosition), 3, 4},
-           canopen::PdoCopy{out.variable(WireField::kTorqueOffset), 7, 2},
-           canopen::PdoCopy{out.variable(WireField::kStiffness), 9, 4},
-       })
-    copy.to_wire(bytes.data());
+  std::array copies{
+      canopen::PdoCopy{out.variable(WireField::kControlword), 0, 2},
+      canopen::PdoCopy{out.variable(WireField::kMode), 2, 1},
+      canopen::PdoCopy{out.variable(WireField::kTargetPosition), 3, 4},
+      canopen::PdoCopy{out.variable(WireField::kTorqueOffset), 7, 2},
+      canopen::PdoCopy{out.variable(WireField::kStiffness), 9, 4},
+  };
+  const canopen::PdoCopies all(copies);
+  EXPECT_TRUE(all.differ(bytes.data()));
+  all.to_wire(bytes.data());
+  EXPECT_FALSE(all.differ(bytes.data()));
+  out.mode = 8;
+  EXPECT_TRUE(all.differ(bytes.data()));
   EXPECT_EQ(bytes, (std::array<std::uint8_t, 16>{0x0F, 0x00, 0xFF, 0xD8, 0xDC, 0xFF, 0xFF, 0x06,
                                                  0xFF, 0x00, 0x00, 0x80, 0x3F}));
 }
