@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "model/mechanism.hpp"
+#include "model/right_angles.hpp"
 
 namespace tandem::model {
 namespace {
@@ -11,7 +12,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kExact = 1e-14;  // below this an entry is rounding noise
+constexpr double kExact = kExactRightAngle;  // below this an entry is rounding noise
 
 AxisRotation<double> make_turn(int axis, double c, double s) {
   const double norm = std::hypot(c, s);

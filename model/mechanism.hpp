@@ -100,7 +100,7 @@ enum class Frames : std::uint8_t {
 [[nodiscard]] Result<Mechanism> make_mechanism(const Tree& tree, const ModelSpec& spec,
                                                Frames frames = Frames::kFewestOperations);
 
-/// R as turns and a permutation; entries within 1e-14 of a multiple of 90 degrees are exact.
+/// R as turns and a permutation; entries within kExactRightAngle of 0 or +-1 are exact.
 [[nodiscard]] FixedRotation factor_rotation(const Eigen::Matrix3d& R);
 
 /// The joint between a parent's and a body's chosen frames (`parent`, `own`: in the frames of

@@ -18,8 +18,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kExact_rad = 1e-15;  // rounding of a right angle with all its digits
-
 std::optional<Vector3d> three_numbers(const tinyxml2::XMLElement* e, const char* name) {
   const char* text = e == nullptr ? nullptr : e->Attribute(name);
   if (text == nullptr) return {};
@@ -46,7 +44,7 @@ void write(tinyxml2::XMLElement* e, const char* name, const Vector3d& numbers) {
 
 // Counts what is so far off; false when it is exact, or no right angle at all.
 bool near(double off, RightAngles& found) {
-  if (off <= kExact_rad || off > kNearRightAngle_rad) return false;
+  if (off <= kExactRightAngle || off > kNearRightAngle_rad) return false;
   ++found.count;
   found.worst_rad = std::max(found.worst_rad, off);
   return true;

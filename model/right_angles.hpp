@@ -13,6 +13,9 @@ class XMLElement;
 
 namespace tandem::model {
 
+/// Entries of rotations and axes within so much of 0 or +-1 are set to it: rounding of a right
+/// angle with 14 digits or more, and of products of such rotations.
+inline constexpr double kExactRightAngle = 1e-14;
 /// An angle is taken for a right one, written with few digits, within so much.
 inline constexpr double kNearRightAngle_rad = 1e-5;
 /// Within so much it may have been meant as one (1.57 is 8e-4 off), or measured: never changed.

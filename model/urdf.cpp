@@ -14,6 +14,7 @@
 #include "base/bounds.hpp"
 #include "base/nearest.hpp"
 #include "base/open_file.hpp"
+#include "model/right_angles.hpp"
 #include "model/urdf_inertia.hpp"
 #include "model/urdf_mimic.hpp"
 #include "model/urdf_outline.hpp"
@@ -61,9 +62,8 @@ Result<urdf::ModelInterfaceSharedPtr> parse_with_urdfdom(const std::string& text
 
 /// Sets what is within rounding of 0 or +-1 to it, so that right angles stay exact.
 double exact(double x) {
-  constexpr double kRounding = 1e-15;
-  if (std::abs(x) < kRounding) return 0.0;
-  return std::abs(std::abs(x) - 1.0) < kRounding ? std::copysign(1.0, x) : x;
+  if (std::abs(x) < kExactRightAngle) return 0.0;
+  return std::abs(std::abs(x) - 1.0) < kExactRightAngle ? std::copysign(1.0, x) : x;
 }
 
 Eigen::Matrix3d rotation(const urdf::Rotation& r) {

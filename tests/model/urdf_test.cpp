@@ -67,6 +67,16 @@ TEST(Urdf, LocksAJointAtItsPosition) {
   EXPECT_EQ(turned->tree.links[1].in_body.R, about_y);
 }
 
+// 3.4e-15 off, which the kernels took as exact and other readers of the tree did not.
+TEST(Urdf, TakesARightAngleOf14DigitsAsExact) {
+  const auto full = parse_urdf(kRobot, "arm.urdf", {});
+  const auto rounded =
+      parse_urdf(with("rpy=\"1.5707963267948966 0 0", "rpy=\"1.5707963267949 0 0"), "arm.urdf", {});
+  ASSERT_TRUE(full && rounded);
+  EXPECT_EQ(rounded->tree.joints[1].in_parent.R, full->tree.joints[1].in_parent.R);
+  EXPECT_EQ(rounded->right_angles.count, 0);
+}
+
 TEST(Urdf, TakesRightAnglesAsTheyAreWrittenAndExactlyOnRequest) {
   std::string few = with("rpy=\"1.5707963267948966 0 0", "rpy=\"1.5708 0 0");
   few = replaced(few, "<axis xyz=\"0 2 0\"/>", "<axis xyz=\"0 2 1e-5\"/>");
