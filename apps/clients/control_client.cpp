@@ -11,6 +11,7 @@
 #include <cstring>
 #include <filesystem>
 #include <string_view>
+#include <thread>
 
 #include "apps/clients/dds_client.hpp"
 #include "apps/control/command_rows.hpp"
@@ -28,6 +29,7 @@ using SteadyClock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
 constexpr char kClosed[] = "the process closed the connection";
+constexpr char kEnded[] = "the run has ended";
 /// Whose place others took before it was read stops the robot the next time.
 constexpr int kStopTries = 20;
 
@@ -108,10 +110,17 @@ bool has_ended(const std::string& path) {
 }
 
 Error ended() {
-  return {.message = "the run has ended",
-          .hint = "its own output and its log say how",
-          .file = {},
-          .key = {}};
+  return {.message = kEnded, .hint = "its own output and its log say how", .file = {}, .key = {}};
+}
+
+/// Whether a socket is there again within a second: a process that waited for its start has one for
+/// the wait and then one for the run.
+bool comes_back(const std::string& path) {
+  for (int tries = 0; has_ended(path); ++tries) {
+    if (tries == 20) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return true;
 }
 
 Result<Json> ask_once(const std::string& path, const Json& question) {
@@ -165,7 +174,7 @@ Result<Json> ask(const std::string& path, const Json& question) {
     Result<Json> answer = ask_once(path, question);
     if (answer || left == 1) return answer;
     const std::string& why = answer.error().message;
-    if (why != kClosed && why != kTooManyClients) return answer;
+    if (why == kEnded ? !comes_back(path) : why != kClosed && why != kTooManyClients) return answer;
   }
 }
 
