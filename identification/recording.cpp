@@ -24,7 +24,6 @@ constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kState = "/tandem/state";
 constexpr const char* kCommand = "/tandem/command";
 constexpr double kLongestGap_s = 600.0;
-constexpr int kContinuous = 64;  // steps of a hold that stand for an integrator of higher order
 
 std::unexpected<Error> bad_log(const std::string& path, std::string message, std::string hint) {
   return std::unexpected(Error{std::move(message), std::move(hint), path, 0, {}});
@@ -169,10 +168,12 @@ Signal on_grid(const Grid& grid, const std::vector<double>& time_s, Value value)
   return out;
 }
 
+constexpr int kContinuous = 64;  // steps of a hold that stand for an integrator of higher order
+
 /// What [sim] says in the experiment that a log carries.
 struct SimFacts {
   std::int64_t substep_ns = 250'000;
-  bool semi_implicit = true;
+  bool leapfrog = true;
   bool hangs = false;
 };
 SimFacts sim_facts(const log::StringMap& configuration) {
@@ -184,8 +185,7 @@ SimFacts sim_facts(const log::StringMap& configuration) {
     TomlTable root = document->root();
     TomlTable sim = root.table_or_empty("sim");
     facts.substep_ns = sim.integer_or("substep_ns", facts.substep_ns, 1, 1'000'000'000);
-    facts.semi_implicit = sim.choice_or("integrator", "semi_implicit",
-                                        {"semi_implicit", "rk4", "leapfrog"}) == "semi_implicit";
+    facts.leapfrog = sim.choice_or("integrator", "leapfrog", {"leapfrog", "rk4"}) == "leapfrog";
     facts.hangs = sim.table_or_empty("hoist").number_or("lift_m", 0.0) > 0.0;
     break;
   }
@@ -297,18 +297,15 @@ void note_simulation(const log::RunInfo& info, const hal::RobotConfig& robot,
     return;
   }
   const double period_s = 1e-9 * static_cast<double>(info.period_ns);
-  const double substep_s = 1e-9 * static_cast<double>(sim.substep_ns);
-  if (sim.semi_implicit) recording.velocity_lag_s = 0.5 * substep_s;
   if (shortest_ns != info.period_ns || longest_ns != info.period_ns) {
     recording.unknown_hold_s = std::max(period_s, 1e-9 * static_cast<double>(longest_ns));
     recording.out_of_step = true;
     return;
   }
   recording.voltage_hold_s = period_s;
-  recording.hold_steps = sim.semi_implicit
-                             ? static_cast<int>(std::clamp<double>(
-                                   std::ceil(period_s / substep_s - 1e-9), 1.0, kContinuous))
-                             : kContinuous;
+  const double steps = std::ceil(period_s / (1e-9 * static_cast<double>(sim.substep_ns)) - 1e-9);
+  recording.hold_steps =
+      sim.leapfrog ? static_cast<int>(std::clamp<double>(steps, 1.0, kContinuous)) : kContinuous;
 }
 
 void take_signals(const Columns& state, const Grid& grid, const Order& order,

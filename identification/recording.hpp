@@ -30,7 +30,6 @@ struct Recording {
   double period_s = 0.0;
   double voltage_hold_s = 0.0;             ///< see read_recording(); 0: nothing is held
   int hold_steps = 1;                      ///< of the simulation in it
-  double velocity_lag_s = 0.0;             ///< see read_recording()
   double unknown_hold_s = 0.0;             ///< how long another one may be; 0: none
   bool out_of_step = false;                ///< see read_recording()
   bool hangs = false;                      ///< the whole log, from a hoist
@@ -50,11 +49,10 @@ struct Recording {
 /// In a simulated log the voltage of a motor is held for voltage_hold_s, in hold_steps steps of the
 /// simulation, and everything is sampled at the end: by then a joint without a spring has given way
 /// to the back-EMF, and its torque and its acceleration are smaller than on the hold's mean
-/// (voltage_hold.hpp). velocity_lag_s: the forces at a sample are those of the velocity so long
-/// before; half a step of the semi-implicit integrator, whose positions move with new velocities.
-/// All are 0 in other logs. Those have an unknown hold of up to a control period. A simulated one
-/// is out of step where the boards' control has another period than the log: torques between two
-/// samples are not known then, and differ from those at the samples by more than the back-EMF.
+/// (voltage_hold.hpp). Other logs have none. Those have an unknown hold of up to a control period.
+/// A simulated one is out of step where the boards' control has another period than the log:
+/// torques between two samples are not known then, and differ from those at the samples by more
+/// than the back-EMF.
 ///
 /// Reads the part of a log in which controllers ran, puts it on a grid and takes out what lies:
 /// gaps, NaN, samples that are old, signals that stand still while the robot moves, torques that

@@ -307,7 +307,7 @@ class Writer {
       const Signal& position = r_.position_rad[joint(static_cast<int>(c))];
       now.q[c] = filter_.value(position, at);
       now.vdot[c] = filter_.second_rate(position, at);
-      now.v[c] = filter_.rate(position, at) - r_.velocity_lag_s * now.vdot[c];
+      now.v[c] = filter_.rate(position, at);
     }
     for (const std::size_t channel : facts.wrench_channel) {
       Eigen::Matrix<double, 6, 1> wrench;

@@ -8,15 +8,20 @@ namespace tandem::identification {
 
 /// Rigid drives between two samples. The voltages are constant, so the back-EMF brakes:
 ///
-///   M a = u - D v    and step by step    a_k+1 = (I - h A) a_k,    A = M^-1 D
+///   M a = u - D v
 ///
-/// Positions show the mean of these accelerations, torques and sensors the last of them, a_n.
+/// By the plant's leapfrog (docs/simulation.md), whose dampers go by predicted velocities, and with
+/// A = M^-1 D,
+///
+///   a_1 = (I - h A) a_0        a_k+2 = (I - 3/2 h A) a_k+1 + 1/2 h A a_k
+///
+/// Positions show the mean (a_0 / 2 + a_1 + ... + a_n / 2) / n, torques and sensors the last, a_n.
 struct VoltageHold {
   double seconds = 0.0;  ///< n h
   int steps = 1;         ///< n
 
   /// From the middle of the accelerations to the sample [s].
-  [[nodiscard]] double lag_s() const { return 0.5 * (seconds + seconds / steps); }
+  [[nodiscard]] double lag_s() const { return 0.5 * seconds; }
 
   /// The accelerations at the samples.
   /// @param M        (n x n) inertia about the joints, rotors included

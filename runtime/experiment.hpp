@@ -51,7 +51,7 @@ struct HalOptions {
 /// [sim]. Its `order` and `noise` are already applied to Experiment::robot.
 struct SimOptions {
   std::string engine = sim::kOwnEngine;  ///< who moves the bodies
-  sim::Integrator integrator = sim::Integrator::kSemiImplicitEuler;
+  sim::Integrator integrator = sim::Integrator::kLeapfrog;
   std::int64_t substep_ns = 250'000;  ///< divides the period and every board's control period
   int order = -1;                     ///< 0 to 3 for every actuator; -1: as robot.toml says
   bool noise = true;                  ///< false: sensors and torque measurement without noise

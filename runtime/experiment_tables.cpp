@@ -59,7 +59,7 @@ constexpr Key<HalOptions> kHal[] = {
 };
 constexpr Key<SimOptions> kSim[] = {
   choice<&SimOptions::engine>("engine", sim::kEngineChoices, "who moves the bodies and carries the soles: [simulation.md](simulation.md#engines-of-others). Others have to be installed, and may refuse the robot by name"),
-  choice<&SimOptions::integrator>("integrator", "semi_implicit|rk4|leapfrog", "of the plant; of another engine its usual one, or its own `rk4` if it has one"),
+  choice<&SimOptions::integrator>("integrator", "leapfrog|rk4", "of the plant; of another engine its usual one, or its own `rk4` if it has one"),
   key<&SimOptions::substep_ns>("substep_ns", {1e3, 1e8}, "step of the integrator; divides the period and every control period"),
   key<&SimOptions::order>("order", {0, 3}, "of every actuator; a change between {0, 1} and {2, 3} needs kernels made for it: a rigid joint carries its rotor").by_default("as robot.toml says"),
   key<&SimOptions::noise>("noise", "`false`: no sensor has noise"),

@@ -23,7 +23,7 @@ std::vector<EngineEntry> own() {
   EngineEntry first{.label = "tandem",
                     .engine = sim::kOwnEngine,
                     .version = "this build",
-                    .method = "semi-implicit Euler, order 1",
+                    .method = "leapfrog, order 2",
                     .settings = "none",
                     .style = CurveStyle::kMeasured};
   return {first, by_runge_kutta(first, CurveStyle::kReference)};

@@ -15,7 +15,7 @@ namespace tandem::apps {
 struct EngineEntry {
   std::string label;   ///< "tandem rk4"
   std::string engine;  ///< as `[sim] engine`
-  sim::Integrator integrator = sim::Integrator::kSemiImplicitEuler;
+  sim::Integrator integrator = sim::Integrator::kLeapfrog;
   std::string version, method, settings;                     ///< in words
   report::CurveStyle style = report::CurveStyle::kMeasured;  ///< of its curves
 

@@ -67,13 +67,12 @@ void add_kernel_facts(const model::KernelLibrary& kernels, const std::string& ro
 
 /// Who moves the bodies, how, and in which steps.
 void add_simulation_facts(const runtime::Experiment& e, Facts& facts) {
-  std::string integrator = "semi-implicit Euler";
+  std::string integrator = "leapfrog";
   if (e.hal.backend == runtime::BackendKind::kSim && e.sim.engine != sim::kOwnEngine) {
     facts.add("engine", sim::engine_text(e.sim.engine));
     integrator = sim::load_engine(e.sim.engine).value()->integrator;
   }
   if (e.sim.integrator == sim::Integrator::kRungeKutta4) integrator = "Runge-Kutta 4";
-  if (e.sim.integrator == sim::Integrator::kLeapfrog) integrator = "leapfrog";
   facts.add("integrator", fmt::format("{}, {} us steps", integrator,
                                       static_cast<double>(e.sim.substep_ns) * 1e-3));
 }

@@ -275,22 +275,6 @@ void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor
   }
 }
 
-void Actuators::step_semi_implicit(double h_s, MotorStateView rate,
-                                   MotorState motor) const noexcept TANDEM_RT {
-  if (all_elastic()) return step_elastic(h_s, rate, motor);
-  for (std::size_t j = 0; j < models_.size(); ++j) {
-    const ActuatorModel& m = models_[j];
-    if (m.current_is_state()) {
-      motor.current_A[j] +=
-          h_s * rate.current_A[j] / (1.0 + h_s * m.resistance_ohm / m.inductance_H);
-    }
-    if (m.elastic() && !braked(j)) {
-      motor.velocity_rad_s[j] += h_s * rate.velocity_rad_s[j];
-      motor.position_rad[j] += h_s * motor.velocity_rad_s[j];
-    }
-  }
-}
-
 void Actuators::fit_kick(double h_s) noexcept {
   kick_h_s_ = h_s;
   for (std::size_t j = 0; j < models_.size(); ++j) {
@@ -330,8 +314,15 @@ void Actuators::drift(double h_s, const double* q, MotorState motor) const noexc
     if (!m.current_is_state() || bridge_[j] == 0.0) continue;
     const double settled =
         (voltage_[j] - m.back_emf_Vs_rad * motor.velocity_rad_s[j]) / m.resistance_ohm;
-    motor.current_A[j] =
-        settled + (motor.current_A[j] - settled) * decay(h_s * m.resistance_ohm / m.inductance_H);
+    const double time_constants = h_s * m.resistance_ohm / m.inductance_H;
+    const double before = motor.current_A[j], left = decay(time_constants);
+    motor.current_A[j] = settled + (before - settled) * left;
+    if (!m.elastic() || braked(j)) continue;
+    // Kicks go by the currents at the step's ends; the rotor has felt their mean.
+    const double mean = settled + (before - settled) * (1.0 - left) / time_constants;
+    const double ends = 0.5 * (before + motor.current_A[j]);
+    if (clamp_to(motor.current_A[j], m.current_limit_A) == motor.current_A[j])
+      motor.velocity_rad_s[j] += h_s * m.torque_per_A * (mean - ends) / m.inertia_kg_m2;
   }
 }
 
@@ -391,17 +382,6 @@ TANDEM_WIDE void Actuators::evaluate_elastic(const double* q, const double* qd,
     rate.position_rad[j] = free[j] * velocity;
     rate.velocity_rad_s[j] = free[j] * ((drive - spring) / m.inertia[j]);
     rate.current_A[j] = 0.0;  // it is no state: nothing of it changes by itself
-  }
-}
-
-TANDEM_WIDE void Actuators::step_elastic(double h_s, MotorStateView rate,
-                                         MotorState motor) const noexcept {
-  const double* free = free_.data();
-  const std::size_t n = size();
-  TANDEM_EACH_ALONE
-  for (std::size_t j = 0; j < n; ++j) {
-    motor.velocity_rad_s[j] += h_s * rate.velocity_rad_s[j];
-    motor.position_rad[j] += h_s * free[j] * motor.velocity_rad_s[j];
   }
 }
 

@@ -126,11 +126,6 @@ class Actuators {
   void evaluate(const double* q, const double* qd, MotorStateView motor, const double* spring_rad_s,
                 double* torque_Nm, MotorState rate) const noexcept TANDEM_RT;
 
-  /// One semi-implicit step of length `h_s`: the current implicitly, the velocity, then the
-  /// position with the new velocity.
-  void step_semi_implicit(double h_s, MotorStateView rate,
-                          MotorState motor) const noexcept TANDEM_RT;
-
   /// Motor velocities `h_s` after they had `rate`: exactly, where only they themselves change it.
   void kick(double h_s, MotorStateView rate, MotorState motor) noexcept TANDEM_RT;
   /// Motor positions after `h_s` of their velocities, and currents that are states.
@@ -190,7 +185,6 @@ class Actuators {
   void evaluate_elastic(const double* q, const double* qd, MotorStateView motor,
                         const double* spring_rad_s, double* torque_Nm,
                         MotorState rate) const noexcept;
-  void step_elastic(double h_s, MotorStateView rate, MotorState motor) const noexcept;
   void kick_elastic(MotorStateView rate, MotorState motor) const noexcept;
   void fit_kick(double h_s) noexcept;
   void finish_elastic(MotorState motor) noexcept;

@@ -95,7 +95,7 @@ void ClosureForces::step_positions(double* q) const noexcept {
     q[kernels_->nq - kernels_->joints + i] += step_[base + i];
 }
 
-void ClosureForces::project(AddedInertia& added, double* q, double* v) noexcept TANDEM_RT {
+void ClosureForces::close_positions(double* q, const double* v) noexcept TANDEM_RT {
   for (int step = 0;; ++step) {
     loops_.move(q, v);
     double open = 0.0;
@@ -112,6 +112,10 @@ void ClosureForces::project(AddedInertia& added, double* q, double* v) noexcept 
     worst_position_m_[l] = std::max(worst_position_m_[l], position_error_m_[l]);
   }
   fresh_ = false;
+}
+
+void ClosureForces::close_velocities(AddedInertia& added, const double* q,
+                                     double* v) noexcept TANDEM_RT {
   prepare(added, q, v);
   const std::size_t n = kernels_->nv;
   for (std::size_t r = 0; r < change_.size(); ++r) {

@@ -37,11 +37,13 @@ class ClosureForces {
   void constrain(AddedInertia& added, const double* q, const double* v, double* vdot,
                  double* wrench) noexcept TANDEM_RT;
 
-  /// Moves q and v onto the closed loops along the least kinetic energy. The directions are those
-  /// of the last constrain(), which a sub-step changes little.
-  void project(AddedInertia& added, double* q, double* v) noexcept TANDEM_RT;
+  /// Moves q onto the closed loops along the least kinetic energy. The directions are those of the
+  /// last constrain(), which a sub-step changes little.
+  void close_positions(double* q, const double* v) noexcept TANDEM_RT;
+  /// Moves v onto them in the same way, at q.
+  void close_velocities(AddedInertia& added, const double* q, double* v) noexcept TANDEM_RT;
 
-  /// Errors of the last project().
+  /// Errors that the last of these two left.
   [[nodiscard]] double position_error_m(std::size_t loop) const noexcept {
     return position_error_m_[loop];
   }

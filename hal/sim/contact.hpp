@@ -2,6 +2,7 @@
 // Layer: hal/sim.  Thread: create non-RT; evaluate RT.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -74,6 +75,11 @@ class Contact {
   [[nodiscard]] double elastic_energy_J() const noexcept { return energy_J_; }
   /// Whether point `index` touches the ground.
   [[nodiscard]] bool touching(std::size_t index) const noexcept { return touching_[index] != 0; }
+
+  /// Whether any point does.
+  [[nodiscard]] bool touching() const noexcept {
+    return std::ranges::find(touching_, 1) != touching_.end();
+  }
 
   void archive(Archive& ar) { ar(anchor_x_, anchor_y_, touching_, wrench_W_, energy_J_); }
 

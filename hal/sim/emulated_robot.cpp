@@ -39,10 +39,6 @@ Status named(Status status, const std::string& key) {
 
 Status check_engine(const hal::RobotConfig& robot, const SimRobotConfig& config) {
   if (config.engine == kOwnEngine) return {};
-  if (config.integrator == Integrator::kLeapfrog) {
-    return fail_at("sim.integrator", "the engine '" + config.engine + "' has no leapfrog",
-                   "leave it out: an engine has an integrator of its own");
-  }
   const PlantChanges* changes = config.changes.get();
   const auto engine = make_engine(config.engine, changes != nullptr ? changes->robot : robot,
                                   changes != nullptr ? changes->tree : *config.tree,

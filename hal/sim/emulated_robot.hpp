@@ -27,7 +27,7 @@ namespace tandem::sim {
 struct SimRobotConfig {
   std::int64_t period_ns = 1'000'000;  ///< of the loop
   std::string engine = kOwnEngine;     ///< another one needs `tree`
-  Integrator integrator = Integrator::kSemiImplicitEuler;
+  Integrator integrator = Integrator::kLeapfrog;
   std::int64_t substep_ns = 250'000;
   std::string posture;                      ///< where the robot starts; empty: every joint at 0
   bool hold = true;                         ///< hoist and brakes until every drive is enabled

@@ -84,6 +84,7 @@ Plant::Plant(const PlantConfig& config)
       rate_limit_(config.rate_limit),
       base_v_(config.kernels->floating_base != 0 ? 6 : 0),
       actuators_({}),
+      flight_(*config.kernels),
       x_(*config.kernels),
       ahead_v_(kernels_->nv),
       midway_v_(kernels_->nv),
@@ -271,8 +272,6 @@ void Plant::fit_passive_friction(const PlantConfig& config, std::span<const doub
 }
 
 void Plant::place_surroundings(const PlantConfig& config) {
-  const bool described = config.tree != nullptr && config.robot != nullptr;
-  if (config.ranges.empty() && !described) return;
   std::vector<JointRange> ranges = config.ranges;
   for (JointRange& range : ranges) {
     const std::size_t joint = joint_of(*kernels_, range.joint);
@@ -280,23 +279,30 @@ void Plant::place_surroundings(const PlantConfig& config) {
     range.lower_rad = std::min(range.lower_rad, x_.joint_q()[joint]);
     range.upper_rad = std::max(range.upper_rad, x_.joint_q()[joint]);
   }
-  const auto postures = postures_within(added_, {q(), kernels_->nq}, ranges);
-  stops_ = EndStops(*kernels_, ranges, joint_inertias(*kernels_, postures), substep_ns_);
   const auto many = postures_within(added_, {q(), kernels_->nq}, ranges, 128);
   const std::vector<JointInertia> inertias = joint_inertias(*kernels_, many);
+  predict_dampers(inertias);
+  const bool described = config.tree != nullptr && config.robot != nullptr;
+  if (config.ranges.empty() && !described) return;
+  const auto postures = postures_within(added_, {q(), kernels_->nq}, ranges);
+  stops_ = EndStops(*kernels_, ranges, joint_inertias(*kernels_, postures), substep_ns_);
   light_ = LightJoints(*kernels_, actuators_, damping_, inertias, step_stretch(integrator_),
                        substep_ns_);
+  if (!described) return;
+  bodies_ = BodyContact(*config.robot, *config.tree, *kernels_, q(), postures, substep_ns_);
+  std::vector<std::string> joints;
+  for (const PlantJoint& joint : config.joints) joints.push_back(joint.name);
+  pushes_ = Pushes(*config.tree, *kernels_, joints);
+}
+
+/// Which dampers may go by a predicted velocity: those of joints whose links are heavy enough.
+void Plant::predict_dampers(std::span<const JointInertia> inertias) {
   const double u_s = static_cast<double>(substep_ns_) * 1e-9 / step_stretch(integrator_);
   for (std::size_t j = 0; j < inertias.size(); ++j) {
     const double need_kg_m2 =
         LightJoints::need_kg_m2(actuators_.model(j), damping_[j], u_s, kPredictedDamper);
     predicted_[j] = need_kg_m2 <= LightJoints::kTaken * inertias[j].least ? 1.0 : 0.0;
   }
-  if (!described) return;
-  bodies_ = BodyContact(*config.robot, *config.tree, *kernels_, q(), postures, substep_ns_);
-  std::vector<std::string> joints;
-  for (const PlantJoint& joint : config.joints) joints.push_back(joint.name);
-  pushes_ = Pushes(*config.tree, *kernels_, joints);
 }
 
 void Plant::hold(const double* q, std::span<const double> load) {
@@ -318,6 +324,7 @@ void Plant::set_state(std::span<const double> q, std::span<const double> v) noex
   x_.place(q, v);
   actuators_.seat_brakes(x_.motor().position_rad);
   loops_.changed();
+  flight_.end();
   bodies_.lost();
   light_.lost();
   if (engine_) engine_->set_state(q.data(), v.data());
@@ -345,6 +352,7 @@ void Plant::carry(std::span<const Load> loads) noexcept TANDEM_RT {
   added_.let_go();
   for (const Load& load : loads) added_.carry(load);
   loops_.changed();
+  flight_.end();
   vdot_fresh_ = 0;
 }
 
@@ -384,8 +392,8 @@ std::string Plant::diverged_text() const {
 }
 
 void Plant::archive(Archive& ar) {
-  ar(actuators_, added_, contact_, bodies_, hoist_, loops_, light_, x_, ahead_v_, midway_v_,
-     damper_v_, tau_, applied_tau_, vdot_, wrench_, pose_, twist_, time_ns_, released_,
+  ar(actuators_, added_, contact_, bodies_, hoist_, loops_, flight_, light_, x_, ahead_v_,
+     midway_v_, damper_v_, tau_, applied_tau_, vdot_, wrench_, pose_, twist_, time_ns_, released_,
      contact_fresh_, vdot_fresh_, diverged_, diverged_rate_, point_forces_W_, pushes_);
   if (ar.reading()) sines_.take(q());
   if (ar.reading() && leaps_ && !loops_.none()) loops_.prepare(added_, q(), v());

@@ -21,6 +21,7 @@
 #include "hal/sim/contact.hpp"
 #include "hal/sim/end_stops.hpp"
 #include "hal/sim/engine_loader.hpp"
+#include "hal/sim/flight_momentum.hpp"
 #include "hal/sim/hoist.hpp"
 #include "hal/sim/light_joints.hpp"
 #include "hal/sim/plant_state.hpp"
@@ -31,9 +32,8 @@
 namespace tandem::sim {
 
 enum class Integrator : std::uint8_t {
-  kSemiImplicitEuler,  ///< order 1, one evaluation a sub-step; positions move with new velocities
-  kRungeKutta4,        ///< order 4, four evaluations a sub-step
-  kLeapfrog,           ///< order 2, one evaluation a sub-step: see docs/simulation.md
+  kLeapfrog,     ///< order 2, one evaluation a sub-step: see docs/simulation.md
+  kRungeKutta4,  ///< order 4, four evaluations a sub-step
 };
 
 /// The sub-step in units of u, which hal/sim/stability.hpp limits.
@@ -61,7 +61,7 @@ struct PlantConfig {
   std::vector<PlantJoint> joints;
   hal::ContactConfig contact;
   double base_height_m = 0.0;  ///< of the floating base at the start, upright at x = y = 0
-  Integrator integrator = Integrator::kSemiImplicitEuler;
+  Integrator integrator = Integrator::kLeapfrog;
   std::int64_t substep_ns = 250'000;
   /// Start held: the base by a hoist, every joint whose bridge is off by a brake, until release().
   bool held = false;
@@ -205,6 +205,7 @@ class Plant {
   Status start(const PlantConfig& config);
   void fit_passive_friction(const PlantConfig& config, std::span<const double> q);
   void place_surroundings(const PlantConfig& config);
+  void predict_dampers(std::span<const JointInertia> inertias);
   Status close_loops(double* q);
   void hold(const double* q, std::span<const double> load);
 
@@ -227,6 +228,8 @@ class Plant {
   void step_runge_kutta(double h_s) noexcept;
   void leap(double h_s) noexcept;
   void land(double h_s) noexcept;
+  [[nodiscard]] bool flies() const noexcept;
+  void settle(double h_s) noexcept;
   void step_engine(double h_s) noexcept;
   [[nodiscard]] bool plausible() noexcept;
 
@@ -250,6 +253,7 @@ class Plant {
   LightJoints light_;
   Hoist hoist_;
   ClosureForces loops_;
+  FlightMomentum flight_;
   std::unique_ptr<Engine> engine_;  // null: our own
 
   PlantState x_;

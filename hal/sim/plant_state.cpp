@@ -15,34 +15,6 @@ void PlantState::place(std::span<const double> q, std::span<const double> v) noe
   std::fill_n(motor().current_A, joints_, 0.0);
 }
 
-void PlantState::step_bodies(double h_s, const double* vdot) noexcept TANDEM_RT {
-  if (floating()) step_base(h_s, vdot);
-  double* q = joint_q();
-  double* v = this->v() + (nv_ - joints_);
-  vdot += nv_ - joints_;
-  for (std::size_t i = 0; i < joints_; ++i) {
-    v[i] += h_s * vdot[i];
-    q[i] += h_s * v[i];
-  }
-}
-
-/// Velocities along B's axes change by B's turning too. A step of these would lengthen them by
-/// (w h)^2 / 2, so the base's velocity is stepped along W's, where that of a free body stays.
-void PlantState::step_base(double h_s, const double* vdot) noexcept {
-  double* q = this->q();
-  double* v = this->v();
-  const Vec3 turning = cross({v[3], v[4], v[5]}, {v[0], v[1], v[2]});
-  for (std::size_t i = 0; i < 3; ++i) v[i] += h_s * (vdot[i] + turning[i]);
-  const Vec3 velocity_W = rotate(rotation_of(q + 3).data(), v);
-  for (std::size_t i = 0; i < 3; ++i) {
-    q[i] += h_s * velocity_W[i];
-    v[3 + i] += h_s * vdot[3 + i];
-  }
-  turn_quaternion(q + 3, v + 3, h_s);
-  const Vec3 velocity_B = rotate_back(rotation_of(q + 3).data(), velocity_W.data());
-  std::ranges::copy(velocity_B, v);
-}
-
 /// A base's velocity changes along B's axes by B's turning, too. That part is left out, as a step
 /// of it would lengthen the velocity: drift() turns the axes.
 void PlantState::kick(double h_s, const double* vdot, const double* at_v) noexcept TANDEM_RT {

@@ -44,8 +44,6 @@ class PlantState {
 
   /// Motors move with their joints, without currents.
   void place(std::span<const double> q, std::span<const double> v) noexcept TANDEM_RT;
-  /// One semi-implicit step of q and v.
-  void step_bodies(double h_s, const double* vdot) noexcept TANDEM_RT;
   /// v after `h_s` of an acceleration, at the same q.
   /// @param vdot, at_v  (nv) v's rate of change as forward dynamics has it at the velocity `at_v`
   void kick(double h_s, const double* vdot, const double* at_v) noexcept TANDEM_RT;
@@ -64,7 +62,6 @@ class PlantState {
   void archive(Archive& ar) { ar(x_); }
 
  private:
-  void step_base(double h_s, const double* vdot) noexcept;
   [[nodiscard]] bool floating() const noexcept { return nv_ != joints_; }
 
   std::size_t nq_, nv_, joints_;

@@ -98,18 +98,13 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
       step_engine(h_s);
     } else if (integrator_ == Integrator::kRungeKutta4) {
       step_runge_kutta(h_s);
-    } else if (leaps_) {
-      leap(h_s);
     } else {
-      x_.step_bodies(h_s, vdot_.data());
-      actuators_.step_semi_implicit(h_s, rate_.motor(), x_.motor());
+      leap(h_s);
     }
-    if (!loops_.none()) loops_.project(added_, x_.q(), x_.v());
+    if (!loops_.none()) loops_.close_positions(x_.q(), x_.v());
     bodies_.moved(v(), h_s);
     contact_fresh_ = vdot_fresh_ = 0;
-    if (!leaps_) {
-      actuators_.finish_step(h_s, x_.joint_q(), x_.joint_v(), x_.motor());
-    }
+    if (!leaps_) settle(h_s);
     actuators_.advance_brakes(step_ns, x_.motor().position_rad);
     hoist_.advance(step_ns);
     time_ns_ += step_ns;
@@ -129,7 +124,8 @@ void Plant::step_engine(double h_s) noexcept {
     std::fill_n(v, kernels_->nv, std::numeric_limits<double>::quiet_NaN());
   }
   for (std::size_t i = 0; i < kernels_->nv; ++i) vdot_[i] = (v[i] - vdot_[i]) / h_s;
-  actuators_.step_semi_implicit(h_s, rate_.motor(), x_.motor());
+  actuators_.kick(h_s, rate_.motor(), x_.motor());
+  actuators_.drift(h_s, x_.joint_q(), x_.motor());
 }
 
 Plant::Velocities Plant::velocities_of(const PlantState& x) noexcept {
@@ -181,6 +177,22 @@ void Plant::land(double h_s) noexcept {
   evaluate();
   x_.kick(0.5 * h_s, vdot_.data(), ahead_v_.data());
   actuators_.kick(0.5 * h_s, rate_.motor(), x_.motor());
+  if (flies()) {
+    flight_.keep(h_s, added_, sines(), x_.q(), x_.v());
+  } else {
+    flight_.end();
+  }
+  settle(h_s);
+}
+
+/// Whether nothing but weight acts from outside.
+bool Plant::flies() const noexcept {
+  return !hoist_.holding() && !pushes_.any() && !bodies_.touching() && !contact_.touching();
+}
+
+/// What of a step is no motion: rates are those of closed loops, currents and windings follow.
+void Plant::settle(double h_s) noexcept {
+  if (!loops_.none()) loops_.close_velocities(added_, x_.q(), x_.v());
   actuators_.finish_step(h_s, x_.joint_q(), x_.joint_v(), x_.motor());
 }
 

@@ -94,8 +94,8 @@ std::string place_of(const tandem_kernels& k, Eigen::Index index) {
   return (rotor ? "the motor of joint " : "joint ") + std::string(joint);
 }
 
-/// A current's own time, L / R. Semi-implicit Euler takes it implicitly; in longer steps of
-/// Runge-Kutta's it grew to its limit and stayed there, at any voltage.
+/// A current's own time, L / R. The leapfrog takes it exactly; in longer steps of Runge-Kutta's
+/// it grew to its limit and stayed there, at any voltage.
 StepLimit shortest_current(const PlantConfig& config, const Plant& plant) {
   StepLimit limit{std::numeric_limits<double>::infinity(), {}};
   if (config.integrator != Integrator::kRungeKutta4) return limit;

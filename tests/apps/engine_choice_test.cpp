@@ -112,12 +112,6 @@ TEST_F(EngineRefusal, OfAnEngineThatIsNotInstalledComesBeforeKernelsAreBuilt) {
   if (missing == 0) GTEST_SKIP() << "every engine is installed";
 }
 
-TEST_F(EngineRefusal, OfTheLeapfrogWhichIsTandemsOwn) {
-  edit("double_pendulum.urdf", "mass value=\"", "mass value=\"1");
-  choose("mujoco", "integrator = \"leapfrog\"\n");
-  expect_refused("sim.integrator: the engine 'mujoco' has no leapfrog");
-}
-
 TEST_F(EngineRefusal, OfAnIntegratorComesBeforeKernelsAreBuilt) {
   edit("double_pendulum.urdf", "mass value=\"", "mass value=\"1");
   if (!installed("ode"))

@@ -108,7 +108,7 @@ TEST(Experiment, IsReadWithItsDefaults) {
   EXPECT_EQ(e->loop.on_overrun, rt::OverrunPolicy::kSkip);
   EXPECT_EQ(e->thread.policy, rt::SchedulingPolicy::kOther);
   EXPECT_FALSE(e->thread.lock_memory);
-  EXPECT_EQ(e->sim.integrator, sim::Integrator::kSemiImplicitEuler);
+  EXPECT_EQ(e->sim.integrator, sim::Integrator::kLeapfrog);
   EXPECT_TRUE(e->sim.hoist);
   EXPECT_FALSE(e->remote.command.has_value());
   EXPECT_EQ(e->remote.lease_timeout_s, 1.0);

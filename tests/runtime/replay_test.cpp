@@ -205,7 +205,7 @@ TEST_F(Replay, OfAChangedControllerSaysWhereItPartsAndWritesItsLog) {
   EXPECT_EQ(result.first->joint, "joint1");
   EXPECT_EQ(result.first->field, "position_rad");
   EXPECT_EQ(result.first->controller, "one");
-  EXPECT_NEAR(result.first->replayed - result.first->recorded, 1.0943270831e-4, 1e-12);
+  EXPECT_NEAR(result.first->replayed - result.first->recorded, 2.0923733332e-4, 1e-12);
   for (const CommandSpread& one : result.spreads) EXPECT_NE(one.joint, "joint2") << one.field;
   const auto file = log::LogFile::open(output);
   ASSERT_TRUE(file) << file.error().to_string();

@@ -216,27 +216,6 @@ INSTANTIATE_TEST_SUITE_P(Published, EveryOrder,
                                   std::to_string(std::get<1>(test.param));
                          });
 
-TEST(Actuators, SemiImplicitStepsConvergeWithOrderOne) {
-  for (const int order : {2, 3}) {
-    const hal::ActuatorConfig config = motor("coman", order);
-    const auto end = [&](double h) {  // of the motor, its link held
-      Actuators actuators({*make_actuator(config)});
-      actuators.set_drive(0, 10.0, true);
-      double q = 0.0, qd = 0.0, th = 0.0, thd = 0.0, i = 0.0, tau = 0.0, r[3];
-      const auto steps = static_cast<int>(std::lround(0.02 / h));
-      for (int k = 0; k < steps; ++k) {
-        actuators.evaluate(&q, &qd, {&th, &thd, &i}, &thd, &tau, {r, r + 1, r + 2});
-        actuators.step_semi_implicit(h, {r, r + 1, r + 2}, {&th, &thd, &i});
-        actuators.finish_step(h, &q, &qd, {&th, &thd, &i});
-      }
-      return th;
-    };
-    const double fine = end(1e-7);
-    const double error = std::abs(end(2e-4) - fine), half = std::abs(end(1e-4) - fine);
-    EXPECT_NEAR(std::log2(error / half), 1.0, 0.1) << "order " << order;
-  }
-}
-
 TEST(Actuators, LeapfrogConvergesWithOrderTwo) {
   for (const int order : {2, 3}) {
     const hal::ActuatorConfig config = motor("coman", order);

@@ -13,7 +13,7 @@ namespace {
 constexpr double kEnd_rad = 0.8;
 
 /// The pendulum without a motor, let go at `start_rad`, between its ends or without any.
-Plant swing(double start_rad, bool ends, Integrator integrator = Integrator::kSemiImplicitEuler) {
+Plant swing(double start_rad, bool ends, Integrator integrator = Integrator::kLeapfrog) {
   PlantConfig config;
   config.kernels = test::pendulum_kernels();
   config.passive = {{.name = "swing", .position_rad = 0.0}};
@@ -33,8 +33,7 @@ double energy_J(const Plant& plant) {
 }
 
 TEST(EndStops, OfAJointThatDoesNotReachThemChangeNoBit) {
-  for (const Integrator integrator :
-       {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4, Integrator::kLeapfrog}) {
+  for (const Integrator integrator : {Integrator::kLeapfrog, Integrator::kRungeKutta4}) {
     Plant with = swing(0.79, true, integrator), without = swing(0.79, false, integrator);
     for (int i = 0; i < 3000; ++i) {
       ASSERT_EQ(with.advance(1'000'000), Code::kOk);

@@ -140,8 +140,8 @@ TEST_F(FourBar, SwingsOnTheClosedFormAndKeepsItsEnergy) {
 }
 
 TEST_F(FourBar, KeepsItsEnergyWithinItsStepWithTheSimpleIntegratorToo) {
-  Plant plant = make(config({1.0}, Integrator::kSemiImplicitEuler));
-  EXPECT_LT(swing(plant, 10.0), 0.02);
+  Plant plant = make(config({1.0}, Integrator::kLeapfrog));
+  EXPECT_LT(swing(plant, 10.0), 1e-5);
   EXPECT_LT(worst_m, 1e-11);
   EXPECT_LT(worst_m_s, 1e-11);
 }
@@ -257,8 +257,7 @@ TEST_F(FourBar, AdvancesClosesAndCarriesWithinTheCycle) {
 }
 
 TEST_F(FourBar, GoesOnFromASnapshotBitByBit) {
-  for (const Integrator integrator :
-       {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4, Integrator::kLeapfrog}) {
+  for (const Integrator integrator : {Integrator::kLeapfrog, Integrator::kRungeKutta4}) {
     Plant plant = make(config({1.0}, integrator));
     ASSERT_EQ(plant.advance(100'000'000), Code::kOk);
     Archive saved;

@@ -102,8 +102,7 @@ constexpr double kInertia = 0.02 + 2.0 * 0.25;  // about the joint
 TEST(Push, GivesAPendulumItsImpulseWhateverTheSteps) {
   const model::Tree tree = parsed(kPendulum, false);
   for (const std::string shape : {"step", "half_sine", "triangle"}) {
-    for (const Integrator integrator :
-         {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4, Integrator::kLeapfrog}) {
+    for (const Integrator integrator : {Integrator::kLeapfrog, Integrator::kRungeKutta4}) {
       Free one(tree, {0.0, 0.0, 0.0}, 100'000, integrator);
       one.push(push_of("link = 'arm'\nimpulse_Nms = [0, 0.26, 0]\nshape = '" + shape + "'\n", tree,
                        83'333'333));

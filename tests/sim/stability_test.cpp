@@ -35,8 +35,9 @@ bool stays(PlantConfig config, double step_s) {
   return plant.advance(2000 * config.substep_ns) == Code::kOk && std::abs(plant.v()[0]) < 1e-2;
 }
 
-TEST(Stability, SemiImplicitLimitIsExactOnOneElasticJoint) {
-  const PlantConfig config = elastic_pendulum(Integrator::kSemiImplicitEuler);
+TEST(Stability, LeapfrogLimitIsExactOnOneElasticJoint) {
+  PlantConfig config = elastic_pendulum(Integrator::kLeapfrog);
+  config.substep_ns = 9'800'000;  // the dampers go by no predicted velocity in steps so long
   const StepLimit limit = longest_step(config, *Plant::create(config));
   // Link and rotor against each other: 0.25 kg m2 on spring and damper, h^2 k + 2 h d = 4 m.
   const double m = 0.25, k = 1e4, d = 2.0;
@@ -71,7 +72,7 @@ TEST(Stability, ACurrentIsNoFasterThanRungeKutta) {
   };
   EXPECT_LT(current_A(0.98 * limit.seconds), 3.0);
   EXPECT_GT(current_A(1.15 * limit.seconds), 100.0);
-  config.integrator = Integrator::kSemiImplicitEuler;
+  config.integrator = Integrator::kLeapfrog;
   EXPECT_GT(longest_step(config, *Plant::create(config)).seconds, limit.seconds);
 }
 

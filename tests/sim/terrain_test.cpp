@@ -112,8 +112,7 @@ TEST_P(Slopes, AboveItABlockSlidesAtTheRateOfTheCone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Terrain, Slopes,
-                         testing::Values(Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4,
-                                         Integrator::kLeapfrog));
+                         testing::Values(Integrator::kLeapfrog, Integrator::kRungeKutta4));
 
 // Acceleration from force, and force from acceleration.
 TEST(Terrain, ForwardDynamicsAndInverseAgreeWithItsForce) {
@@ -328,7 +327,7 @@ TEST(MovingGround, DragsWhatSlidesAtMuG) {
 TEST(MovingGround, LiftsWithoutLosingTheBlock) {
   hal::ContactConfig contact = gripping(0.6);
   contact.terrain.add(shake(2, 0.05, 1.0));
-  Plant plant = block(contact, Integrator::kSemiImplicitEuler);
+  Plant plant = block(contact, Integrator::kLeapfrog);
   ASSERT_EQ(plant.advance(2'250'000'000), Code::kOk);
   // At the top it weighs less by 0.05 (2 pi)^2 = 1.974 m/s2.
   plant.evaluate();
