@@ -1,5 +1,5 @@
 // The equations of the four actuator orders (docs/simulation.md), brake and winding temperature.
-// The semi-implicit step is implicit in the current; the temperature's step is exact.
+// The steps of a current that is a state and of the temperature are exact.
 #include "hal/sim/actuator.hpp"
 
 #include <algorithm>

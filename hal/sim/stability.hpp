@@ -16,10 +16,10 @@ struct StepLimit {
 
 /// Linearises M x'' + D x' + K x = 0 around the plant's present posture, with the springs and
 /// dampers of joints, motors and, every point touching, ground. With u = h / s the sub-step h is
-/// stable while every eigenvalue of M^-1 (u^2 K + u D) is below 1. s = 2 for semi-implicit Euler
-/// (exact for a single mode) and for the leapfrog, for which the dampers that it predicts count
-/// kPredictedDamper times; s = 2.6 for Runge-Kutta 4 (on the safe side). `place` is where the
-/// critical mode moves most. Another posture has another limit: keep a margin.
+/// stable while every eigenvalue of M^-1 (u^2 K + u D) is below 1. s = 2 for the leapfrog (exact
+/// for a single mode); dampers that go by predicted velocities count kPredictedDamper times. s
+/// = 2.6 for Runge-Kutta 4 (on the safe side). `place` is where the critical mode moves most.
+/// Another posture has another limit: keep a margin.
 [[nodiscard]] StepLimit longest_step(const PlantConfig& config, const Plant& plant);
 
 }  // namespace tandem::sim

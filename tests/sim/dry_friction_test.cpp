@@ -96,7 +96,7 @@ TEST_P(DryFriction, HoldsALoadBelowItWithoutCreepAndNoneAboveIt) {
 }
 
 TEST_P(DryFriction, OnlyTakesEnergy) {
-  // h w E, of semi-implicit steps: it comes and goes with the swing.
+  // The integrator's own change of energy comes and goes with the swing.
   const double integrator_J = GetParam() == Integrator::kRungeKutta4 ? 1e-4 : 2e-2;
   for (const int order : {0, 2}) {
     SCOPED_TRACE(order);
