@@ -11,8 +11,9 @@
 namespace tandem::studio {
 namespace {
 
-/// A viewer has so long to hear that the run is over.
-constexpr std::chrono::milliseconds kGoodbye{120};
+/// A viewer has so long to hear that the run is over; on a busy machine its browser takes a while.
+/// Only one that does not read makes a run wait for all of it.
+constexpr std::chrono::milliseconds kGoodbye{1000};
 constexpr std::size_t kTokenBytes = 16;
 
 log::RunInfo names_of(const hal::RobotConfig& robot) {

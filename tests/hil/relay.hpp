@@ -47,7 +47,7 @@ class Relay {
     for (ssize_t size = 0; (size = ends_[from_master ? 0 : 1].receive(in)) > 0;) {
       const auto bytes = static_cast<std::size_t>(size);
       if (hal::can::from_kernel(in, bytes, frame) != hal::can::KernelFrame::kData) continue;
-      wire_.offer({&frame, 1}, from_master);
+      wire_.offer({&frame, 1}, from_master, clock_ns(CLOCK_MONOTONIC));
     }
   }
   void give(const SerialWire::Passage& passage) {

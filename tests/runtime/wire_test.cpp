@@ -98,7 +98,7 @@ class WiredRobot final : private hal::can::FrameWait {
   void offer(std::size_t b, hal::can::Bus& from, bool from_master) {
     std::array<canopen::Frame, 64> frames;
     while (const std::size_t count = from.receive(frames)) {
-      wires_[b].offer(std::span(frames).first(count), from_master);
+      wires_[b].offer(std::span(frames).first(count), from_master, now_ns_);
     }
   }
   void deliver(std::size_t b) {
