@@ -91,7 +91,7 @@ Result<DropRow> drop(const BenchRobot& block, const EngineEntry& entry, std::int
   for (std::int64_t now = 0; now < static_cast<std::int64_t>(kTime_s * 1e9); now += step_ns) {
     const double before = thread_time_s();
     const bool fine = plant->advance(step_ns) == Code::kOk;
-    row.cost_us_per_ms += 1e3 * (thread_time_s() - before) / kTime_s;
+    row.cost_us_per_ms += 1e3 * thread_time_since_s(before) / kTime_s;
     const double height = plant->q()[2] - kHalf_m;
     const double* v = plant->v();
     const double speed2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];

@@ -47,7 +47,7 @@ std::string experiment_text(const std::string& folder, const std::string& name,
                             const EngineEntry& entry) {
   std::string text = robot::text_of(folder + "/" + name);
   const std::string robot = "robot = \"";
-  text.insert(text.find(robot) + robot.size(), folder + "/");
+  text.insert(text.find(robot) + robot.size(), fs::absolute(folder).string() + "/");
   text += fmt::format("\n[sim]\nengine = \"{}\"\n", entry.engine);
   if (entry.integrator == sim::Integrator::kRungeKutta4) text += "integrator = \"rk4\"\n";
   return text;

@@ -37,6 +37,16 @@ TEST_F(Bench, EnginesConvergeWithTheOrderOfTheirIntegrator) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/engines/box.png"));
 }
 
+// Where the folder of the bundled experiments is a relative one, every engine's squat was refused.
+TEST_F(Bench, SquatsFromWithinTheFolderOfTheExperiments) {
+  std::filesystem::create_directory_symlink(TANDEM_SOURCE_DIR "/config", folder_ / "config");
+  const Outcome outcome = tandem("bench engines --engines tandem --scenes squat -q -o out", cache());
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const std::string page = read_text(folder_ / "out/engines.md");
+  EXPECT_NE(page.find("| tandem | 0.0"), std::string::npos) << page;
+  EXPECT_NE(page.find("| tandem rk4 | 0.0"), std::string::npos) << page;
+}
+
 TEST_F(Bench, RefusesAnEngineThatIsNotThereBeforeItMeasures) {
   const Outcome outcome = tandem("bench engines --engines havok -o out", cache());
   EXPECT_EQ(outcome.status, 2);
