@@ -62,8 +62,8 @@ struct AccelerationRow {
 
 /// Processor time of the calling thread [s].
 [[nodiscard]] double thread_time_s();
-/// What has passed of it since `before_s`, less what reading the clock takes, which is a system call
-/// and may be more than a short step.
+/// What has passed of it since `before_s`, less what reading the clock takes, which is a system
+/// call and may be more than a short step.
 [[nodiscard]] double thread_time_since_s(double before_s);
 
 }  // namespace tandem::apps

@@ -40,7 +40,8 @@ TEST_F(Bench, EnginesConvergeWithTheOrderOfTheirIntegrator) {
 // Where the folder of the bundled experiments is a relative one, every engine's squat was refused.
 TEST_F(Bench, SquatsFromWithinTheFolderOfTheExperiments) {
   std::filesystem::create_directory_symlink(TANDEM_SOURCE_DIR "/config", folder_ / "config");
-  const Outcome outcome = tandem("bench engines --engines tandem --scenes squat -q -o out", cache());
+  const Outcome outcome =
+      tandem("bench engines --engines tandem --scenes squat -q -o out", cache());
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   const std::string page = read_text(folder_ / "out/engines.md");
   EXPECT_NE(page.find("| tandem | 0.0"), std::string::npos) << page;
