@@ -95,7 +95,9 @@ class Recorder {
   [[nodiscard]] Channel add_late_channel(const std::string& topic, const std::string& type,
                                          const std::string& ros2msg, Encode encode = {},
                                          const std::string& meaning = {});
-  static constexpr std::size_t kLateSlotBytes = 8 * 1024 + 16;  ///< longer ones take several slots
+  /// A slot has room for the images and for so much; what is longer takes several. All slots are
+  /// touched at the start, so that few large messages must not make all of them large.
+  static constexpr std::size_t kLateSlotBytes = 1024;
   /// log::ros2msg_of(), with the names of this recording's joints and sensors.
   [[nodiscard]] std::string ros2msg_of(const hal::Layout& layout) const;
   /// One other thread will push, too. Its messages follow in the file when the loop's are `lag_ns`

@@ -190,7 +190,7 @@ TEST(Plant, RigidActuatorsFeelTheirRotorAsArmature) {
   plant.evaluate();
   const double J = 0.639, kt_R = 4.1 / 0.664, D = 25.5;
   const double exact = kt_R * 10.0 / D * (1.0 - std::exp(-D / J * 0.04));
-  EXPECT_NEAR(plant.joint(0).velocity_rad_s, exact, 0.02 * exact);  // Euler at 0.5 ms
+  EXPECT_NEAR(plant.joint(0).velocity_rad_s, exact, 1e-4 * exact);
   EXPECT_EQ(plant.joint(0).motor_position_rad, plant.joint(0).position_rad);
   EXPECT_EQ(plant.joint(0).motor_velocity_rad_s, plant.joint(0).velocity_rad_s);
 }

@@ -59,7 +59,7 @@ class StudioRun : public testing::Test {
 };
 
 TEST_F(StudioRun, ShowsThePageWhatItsLogHas) {
-  begin("double_pendulum/trajectory.toml", "--no-dds --duration 1.5");
+  begin("double_pendulum/trajectory.toml", "--no-dds --duration 3");
   WebClient client(port_);
   ASSERT_TRUE(client.open());
   EXPECT_EQ(client.next("hello")["robot"], "double_pendulum");
