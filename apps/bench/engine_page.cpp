@@ -243,8 +243,8 @@ void EnginePage::add(const std::vector<DropRow>& rows) {
       "\n## A block is dropped\nThe cube falls 50 mm onto its four points; nothing bounces by "
       "intent. It is settled when it stays slower than 1 mm/s. 1 ms is longer than this ground's "
       "stiffness and damping allow Tandem's leapfrog: from some heights it settles, from others "
-      "the "
-      "block is thrown.\n";
+      "the block is thrown. (The bench sets sub-steps itself; a run refuses those that are too "
+      "long.)\n";
   sections_ += header({"engine", "step [ms]", "rebound [mm]", "settled after [s]",
                        "in the ground at the end [mm]", "energy gained [mJ]", "cost [us per ms]"});
   for (const DropRow& row : rows) {

@@ -21,6 +21,9 @@ using SteadyClock = std::chrono::steady_clock;
 /// A board that is configured anew takes some seconds.
 constexpr std::chrono::seconds kResetTime{30};
 
+const char kNotStarted[] =
+    "the run waits for its start: no drive was enabled, and none will be before `tandem fault "
+    "reset` and `tandem controller start`";
 const char kKept[] = "simulated time stands: it is done in the next cycle (tandem clock resume)";
 const char kAsked[] =
     "simulated time stands: it is asked for in the next cycle (tandem clock resume, then tandem "
@@ -129,6 +132,7 @@ Exit tell_stop(const Result<Json>& answer, const Json& question, const std::stri
              category_words(category),
              no_retreat ? ": no active controller can bring the robot to a safe posture" : "");
   if (answer->value("paused", false)) fmt::print("{}\n", kKept);
+  if (answer->value("waiting", false)) fmt::print("{}\n", kNotStarted);
   std::fflush(stdout);  // before an error of the next run
   return Exit::kDone;
 }

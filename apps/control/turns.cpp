@@ -12,9 +12,13 @@ ControlTurns::ControlTurns(const ControlRegistry& registry, std::function<void()
   }
 }
 
-ControlTurns::~ControlTurns() {
+ControlTurns::~ControlTurns() { finish(); }
+
+void ControlTurns::finish() {
   end();
-  for (Turn& turn : turns_) turn.thread.join();
+  for (Turn& turn : turns_) {
+    if (turn.thread.joinable()) turn.thread.join();
+  }
 }
 
 void ControlTurns::end() {
@@ -56,7 +60,9 @@ void ControlTurns::work(Turn& turn) {
   std::unique_lock lock(mutex_);
   for (;;) {
     turn.more.wait(lock, [&] { return ending_ || !turn.questions.empty(); });
-    if (ending_) return;
+    // A stop that came in time is answered: who asked for it must not have to guess.
+    const bool urgent = &turn == &turns_[static_cast<std::size_t>(ControlTurn::kUrgent)];
+    if (ending_ && (!urgent || turn.questions.empty())) return;
     Question question = std::move(turn.questions.front());
     turn.questions.pop_front();
     lock.unlock();

@@ -42,8 +42,11 @@ class ControlTurns {
   /// Drops what waits, but stops and ends, of every asker that `gone` picks.
   void drop(const std::function<bool(std::uint64_t asker)>& gone);
   [[nodiscard]] std::vector<Answer> take();
-  /// What has not begun is dropped from now on. The threads end, and are joined by the destructor.
+  /// What has not begun is dropped from now on, unless it is urgent. The threads end, and are
+  /// joined by the destructor.
   void end();
+  /// end(), and blocks until the threads have: take() has all answers then.
+  void finish();
 
  private:
   struct Question {

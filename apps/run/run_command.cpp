@@ -413,7 +413,7 @@ std::optional<Exit> reach(WiredComposition& c, const RunOptions& options, Servic
                        "leave --wait-for-start out, and give it to `tandem serve`")
                       .error());
   }
-  auto room = StartRoom::open(options.socket, notice, before);
+  auto room = StartRoom::open(options.socket, notice, before, c.experiment.robot.emergency_stop);
   if (!room) return refuse(room.error());
   for (;;) {
     if (!(*room)->await()) {

@@ -2,12 +2,12 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 #include <utility>
 
 #include "apps/text/console.hpp"
-#include "hal/stop_category.hpp"
 #include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
@@ -28,8 +28,9 @@ std::unexpected<Error> not_started() {
 }  // namespace
 
 Result<std::unique_ptr<StartRoom>> StartRoom::open(const std::string& socket, ServiceNotice& notice,
-                                                   const Before& before) {
-  std::unique_ptr<StartRoom> room(new StartRoom(notice));
+                                                   const Before& before,
+                                                   hal::StopCategory declared) {
+  std::unique_ptr<StartRoom> room(new StartRoom(notice, declared));
   room->stopped_ = before.stopped;
   room->add_commands();
   auto opened =
@@ -87,13 +88,19 @@ void StartRoom::add_commands() {
   // for it before it enables one.
   commands_.add("estop", [this](const Json& request) -> Result<Json> {
     const std::scoped_lock lock(mutex_);
+    hal::StopCategory category = declared_;  // what the run carries out, however it is asked
     if (left_) {
       rt::request_emergency_stop();
     } else {
       latch();
+      if (request.contains("category"))
+        category = static_cast<hal::StopCategory>(request["category"].get<std::int64_t>());
     }
-    const auto category = static_cast<hal::StopCategory>(request.value("category", 0));
-    return Json{{"category", hal::to_string(category)}, {"paused", false}, {"confirmed", true}};
+    category = std::min(category, hal::StopCategory::kCategory1);  // no controller can retreat yet
+    return Json{{"category", hal::to_string(category)},
+                {"paused", false},
+                {"confirmed", true},
+                {"waiting", !left_}};
   });
   commands_.add("run.stop", [this](const Json&) -> Result<Json> {
     const std::scoped_lock lock(mutex_);

@@ -13,6 +13,7 @@
 #include "apps/run/service_notice.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "base/result.hpp"
+#include "hal/stop_category.hpp"
 
 namespace tandem::apps {
 
@@ -26,10 +27,12 @@ class StartRoom {
     std::string why{};     ///< empty: it waits for the first time
     bool stopped = false;  ///< by an emergency stop, which stays latched
   };
+  /// @param declared  the robot's emergency stop
   /// Errors: apps::serve()'s of a socket that is needed.
   [[nodiscard]] static Result<std::unique_ptr<StartRoom>> open(const std::string& socket,
                                                                ServiceNotice& notice,
-                                                               const Before& before);
+                                                               const Before& before,
+                                                               hal::StopCategory declared);
 
   /// Blocks until somebody asks for the start. @return false: for the run's end instead, by a
   /// signal or over the socket
@@ -40,7 +43,8 @@ class StartRoom {
   [[nodiscard]] bool answer(std::optional<Error> refused);
 
  private:
-  explicit StartRoom(ServiceNotice& notice) : notice_(notice) {}
+  StartRoom(ServiceNotice& notice, hal::StopCategory declared)
+      : notice_(notice), declared_(declared) {}
   void add_commands();
   [[nodiscard]] Json status();
   [[nodiscard]] Result<Json> start(const Json& request);
@@ -49,6 +53,7 @@ class StartRoom {
   void latch();
 
   ServiceNotice& notice_;
+  hal::StopCategory declared_;
   ControlRegistry commands_;
   std::mutex mutex_;
   std::condition_variable news_;

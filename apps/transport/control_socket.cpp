@@ -124,6 +124,14 @@ ControlSocket::~ControlSocket() {
   if (turns_ != nullptr) turns_->end();
   wake(wake_);
   if (thread_.joinable()) thread_.join();
+  if (turns_ != nullptr) {  // the run that a stop ends ends before the answer is out
+    while (accept()) continue;
+    for (const auto& client : clients_) {
+      if (!client->waiting && client->out.empty()) take(*client);
+    }
+    turns_->finish();
+    deliver();
+  }
   turns_.reset();
   struct stat found {};
   const bool ours = inode_ != 0 && ::lstat(path_.c_str(), &found) == 0 && found.st_dev == device_ &&
@@ -166,7 +174,7 @@ void ControlSocket::serve() {
     }
     drop_gone();
     if (watched[1].revents != 0) deliver();
-    if (watched[2].revents != 0) accept();
+    if (watched[2].revents != 0) (void)accept();
   }
 }
 
@@ -177,13 +185,14 @@ void ControlSocket::send_away(Client& client) {
   (void)!::send(client.fd, words.data(), words.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
-void ControlSocket::accept() {
+/// @return whether somebody waited
+bool ControlSocket::accept() {
   const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-  if (fd < 0) return;
+  if (fd < 0) return false;
   // The socket's mode keeps others out already: this holds where a folder's or a copy's does not.
   if (const std::int64_t user = peer_user(fd); user != ::geteuid() && user != 0) {
     ::close(fd);
-    return;
+    return true;
   }
   if (clients_.size() == kMaxControlClients) {
     const auto quietest = std::ranges::min_element(clients_, {}, [](const auto& client) {
@@ -195,6 +204,7 @@ void ControlSocket::accept() {
   clients_.push_back(std::make_unique<Client>(fd, ++newest_));
   clients_.back()->last_turn = ++turn_;
   take(*clients_.back());  // before anybody else can take its place
+  return true;
 }
 
 void ControlSocket::take(Client& client) {

@@ -55,7 +55,7 @@ class ControlSocket {
   ControlSocket(std::string path, const ControlRegistry& registry);
   Status listen();
   void serve();
-  void accept();
+  bool accept();
   static void send_away(Client& client);
   void take(Client& client);
   void answer_lines(Client& client);

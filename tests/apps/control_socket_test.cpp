@@ -243,6 +243,31 @@ TEST_F(Socket, LeavesAClientThatStopsItsPlace) {
   ::close(stops);
 }
 
+// `tandem estop` said that the run had ended, and not that the stop had ended it.
+TEST_F(Socket, AnswersAStopThatItsEndMeets) {
+  std::atomic<bool> at_work{false}, released{false};
+  registry.add({"stop", ControlEffect::kStops, "stops", {}}, [&](const Json&) -> Result<Json> {
+    at_work = true;
+    while (!released) std::this_thread::yield();
+    return Json{{"text", "stop"}};
+  });
+  auto socket = open(path);
+  const int first = connect(), second = connect();
+  send(first, "{\"do\": \"stop\"}\n");
+  while (!at_work) std::this_thread::yield();
+  send(second, "{\"do\": \"stop\"}\n");
+  std::thread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    released = true;
+  });
+  socket.reset();
+  later.join();
+  for (const int fd : {first, second}) {
+    EXPECT_EQ(line(fd), "{\"ok\":true,\"text\":\"stop\"}\n");
+    ::close(fd);
+  }
+}
+
 // It had waited behind a slow one, and undone the stop that came meanwhile.
 TEST_F(Socket, RefusesWhatWasAskedBeforeAStopAndComesToItsTurnAfterIt) {
   std::atomic<bool> at_work{false}, released{false};

@@ -123,6 +123,13 @@ TEST_F(Service, AnEmergencyStopWhileItWaitsIsLatched) {
   ASSERT_TRUE(manager_.hears("READY=1"));
   const Outcome stop = to_run("estop --category 0");
   EXPECT_EQ(stop.status, 0) << stop.err;
+  EXPECT_NE(stop.out.find("no drive was enabled"), std::string::npos) << stop.out;
+  // Asked for nothing it is the robot's own, and before controllers run no retreat. It was 0,
+  // and 2.
+  for (const char* words : {"estop", "estop --category 2"}) {
+    const Outcome again = to_run(words);
+    EXPECT_NE(again.out.find("category 1"), std::string::npos) << again.out;
+  }
   const Outcome refused = to_run("controller start");
   EXPECT_NE(refused.status, 0);
   EXPECT_NE(refused.err.find("an emergency stop is latched"), std::string::npos) << refused.err;
