@@ -125,7 +125,7 @@ ControlSocket::~ControlSocket() {
   wake(wake_);
   if (thread_.joinable()) thread_.join();
   if (turns_ != nullptr) {  // the run that a stop ends ends before the answer is out
-    while (accept()) continue;
+    for (std::size_t i = 0; i < kMaxControlClients && accept(); ++i) continue;
     for (const auto& client : clients_) {
       if (!client->waiting && client->out.empty()) take(*client);
     }
