@@ -103,12 +103,17 @@ void ServiceServer::receive() {
     dds_waitset_wait(waitset_.get(), nullptr, 0, holding ? kTryAgain : DDS_INFINITY);
     bool woken = false;
     dds_take_guardcondition(wake_.get(), &woken);
+    const bool ending = ends();  // what has come by then is taken
     for (const auto& service : services_) take(*service);
     do_ready();
     holding = send_held();
-    const std::scoped_lock lock(mutex_);
-    if (ending_) return;
+    if (ending && !holding) return;
   }
+}
+
+bool ServiceServer::ends() const {
+  const std::scoped_lock lock(mutex_);
+  return ending_;
 }
 
 /// Some of a service's requests, so that the others get their turn.

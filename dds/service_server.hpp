@@ -78,7 +78,8 @@ class ServiceServer {
 
   /// The participant outlives it.
   [[nodiscard]] static Result<std::unique_ptr<ServiceServer>> open(Participant& participant);
-  /// Ends the threads, after the request that is at work.
+  /// Ends the threads, after the request that is at work, what is done at once and has come, and
+  /// the replies that wait for their reader.
   ~ServiceServer();
   ServiceServer(const ServiceServer&) = delete;
   ServiceServer& operator=(const ServiceServer&) = delete;
@@ -154,6 +155,7 @@ class ServiceServer {
 
   explicit ServiceServer(Participant& participant) : participant_(&participant) {}
   void receive();
+  [[nodiscard]] bool ends() const;
   void take(Service& service);
   void take(Service& service, const ddsi_serdata* request, dds_instance_handle_t asker);
   void accept(Job job, bool at_once, bool takes_long);

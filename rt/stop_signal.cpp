@@ -22,9 +22,12 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 std::atomic<int> stop_cause{0};  // the signal
 static_assert(std::atomic<int>::is_always_lock_free);
 
-std::atomic<bool> emergency_flag{false};
+std::atomic<EmergencyStop> emergency{EmergencyStop::kNone};
+static_assert(std::atomic<EmergencyStop>::is_always_lock_free);
 
-extern "C" void on_emergency_signal(int) { emergency_flag.store(true, std::memory_order_relaxed); }
+extern "C" void on_emergency_signal(int) {
+  emergency.store(EmergencyStop::kBySignal, std::memory_order_relaxed);
+}
 
 /// A signal whose default action ends the process, and that somebody sends to end it.
 struct Taken {
@@ -120,14 +123,17 @@ void install_emergency_signal() {
   ::sigaction(SIGUSR1, &action, nullptr);
 }
 
-void request_emergency_stop() noexcept { emergency_flag.store(true, std::memory_order_relaxed); }
-
-bool emergency_stop_waits() noexcept TANDEM_RT {
-  return emergency_flag.load(std::memory_order_relaxed);
+void request_emergency_stop() noexcept {
+  emergency.store(EmergencyStop::kOnRequest, std::memory_order_relaxed);
 }
 
-bool take_emergency_stop() noexcept TANDEM_RT {
-  return emergency_stop_waits() && emergency_flag.exchange(false, std::memory_order_relaxed);
+bool emergency_stop_waits() noexcept TANDEM_RT {
+  return emergency.load(std::memory_order_relaxed) != EmergencyStop::kNone;
+}
+
+EmergencyStop take_emergency_stop() noexcept TANDEM_RT {
+  if (!emergency_stop_waits()) return EmergencyStop::kNone;
+  return emergency.exchange(EmergencyStop::kNone, std::memory_order_relaxed);
 }
 
 bool stop_requested() noexcept TANDEM_RT { return stop_flag.load(std::memory_order_relaxed); }

@@ -37,13 +37,17 @@ void clear_stop() noexcept;
 /// From now on each SIGUSR1 is an emergency stop.
 void install_emergency_signal();
 
-/// The same without a signal, from any thread.
+/// Who asked for an emergency stop.
+enum class EmergencyStop : std::uint8_t { kNone, kBySignal, kOnRequest };
+
+/// The same without a signal, from any thread: for who is asked while there is no loop to pass it
+/// on to.
 void request_emergency_stop() noexcept;
 
-/// Whether an emergency stop was signalled that nobody has taken yet.
+/// Whether an emergency stop was asked for that nobody has taken yet.
 [[nodiscard]] bool emergency_stop_waits() noexcept TANDEM_RT;
 
-/// True once for the emergency stops that were signalled since the last call.
-[[nodiscard]] bool take_emergency_stop() noexcept TANDEM_RT;
+/// The newest emergency stop since the last call; kNone: there was none.
+[[nodiscard]] EmergencyStop take_emergency_stop() noexcept TANDEM_RT;
 
 }  // namespace tandem::rt

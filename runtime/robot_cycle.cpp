@@ -283,9 +283,11 @@ void RobotCycle::hear() noexcept TANDEM_RT {
                      .cause = FaultCause::kByWatchdog,
                      .category = std::min(declared, StopCategory::kCategory1)});
   }
-  if (rt::take_emergency_stop()) {
+  if (const auto stop = rt::take_emergency_stop(); stop != rt::EmergencyStop::kNone) {
     now_.outside.came = true;
-    response_.raise({.cause = FaultCause::kBySignal, .category = declared});
+    response_.raise({.cause = stop == rt::EmergencyStop::kOnRequest ? FaultCause::kByRequest
+                                                                    : FaultCause::kBySignal,
+                     .category = declared});
   }
   if (wish.reset) response_.begin_reset(wish.reset_cycle);
   if (asked.reset) {

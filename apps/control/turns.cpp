@@ -27,16 +27,24 @@ void ControlTurns::end() {
     ending_ = true;
   }
   for (Turn& turn : turns_) turn.more.notify_all();
+  if (urgent().thread.joinable()) urgent().thread.join();
 }
 
 ControlTurn ControlTurns::ask(std::uint64_t asker, std::uint64_t number, std::string question,
                               ControlRegistry::Asked how) {
   const ControlTurn turn = registry_->turn_of(question);
   how.after_stop = registry_->last_stop();
-  const std::scoped_lock lock(mutex_);
-  Turn& its = turns_[static_cast<std::size_t>(turn)];
-  its.questions.push_back({asker, number, std::move(question), std::move(how)});
-  its.more.notify_one();
+  Question asked{asker, number, std::move(question), std::move(how)};
+  {
+    const std::scoped_lock lock(mutex_);
+    Turn& its = turns_[static_cast<std::size_t>(turn)];
+    if (&its != &urgent() || !stops_are_over_) {
+      its.questions.push_back(std::move(asked));
+      its.more.notify_one();
+      return turn;
+    }
+  }
+  answer(asked);
   return turn;
 }
 
@@ -57,21 +65,27 @@ std::vector<ControlTurns::Answer> ControlTurns::take() {
 
 /// One question after the other. No turn waits for another one.
 void ControlTurns::work(Turn& turn) {
-  std::unique_lock lock(mutex_);
   for (;;) {
+    std::unique_lock lock(mutex_);
     turn.more.wait(lock, [&] { return ending_ || !turn.questions.empty(); });
     // A stop that came in time is answered: who asked for it must not have to guess.
-    const bool urgent = &turn == &turns_[static_cast<std::size_t>(ControlTurn::kUrgent)];
-    if (ending_ && (!urgent || turn.questions.empty())) return;
-    Question question = std::move(turn.questions.front());
+    if (ending_ && (&turn != &urgent() || turn.questions.empty())) {
+      stops_are_over_ |= &turn == &urgent();
+      return;
+    }
+    const Question question = std::move(turn.questions.front());
     turn.questions.pop_front();
     lock.unlock();
-    Answer answer{question.asker, question.number,
-                  json_text(registry_->answer(question.text, question.how))};
-    lock.lock();
-    answers_.push_back(std::move(answer));
-    answered_();
+    answer(question);
   }
+}
+
+void ControlTurns::answer(const Question& question) {
+  Answer answer{question.asker, question.number,
+                json_text(registry_->answer(question.text, question.how))};
+  const std::scoped_lock lock(mutex_);
+  answers_.push_back(std::move(answer));
+  answered_();
 }
 
 }  // namespace tandem::apps

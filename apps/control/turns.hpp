@@ -42,10 +42,11 @@ class ControlTurns {
   /// Drops what waits, but stops and ends, of every asker that `gone` picks.
   void drop(const std::function<bool(std::uint64_t asker)>& gone);
   [[nodiscard]] std::vector<Answer> take();
-  /// What has not begun is dropped from now on, unless it is urgent. The threads end, and are
-  /// joined by the destructor.
+  /// What has not begun is dropped from now on, unless it is urgent: blocks until that is answered,
+  /// and take() has it then. What is urgent and asked later, ask() answers before it returns. The
+  /// other threads end, and are joined by the destructor.
   void end();
-  /// end(), and blocks until the threads have: take() has all answers then.
+  /// end(), and blocks until all threads have ended: take() has all answers then.
   void finish();
 
  private:
@@ -60,6 +61,8 @@ class ControlTurns {
     std::thread thread;
   };
   void work(Turn& turn);
+  void answer(const Question& question);
+  [[nodiscard]] Turn& urgent() { return turns_[static_cast<std::size_t>(ControlTurn::kUrgent)]; }
 
   const ControlRegistry* registry_;
   std::function<void()> answered_;
@@ -67,6 +70,7 @@ class ControlTurns {
   std::array<Turn, kControlTurns> turns_;
   std::vector<Answer> answers_;
   bool ending_ = false;
+  bool stops_are_over_ = false;  // the urgent turn's thread takes no more
 };
 
 }  // namespace tandem::apps

@@ -141,7 +141,7 @@ Result<Json> StartRoom::start(const Json& request) {
 bool StartRoom::await() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    if (rt::take_emergency_stop()) latch();
+    if (rt::take_emergency_stop() != rt::EmergencyStop::kNone) latch();
     if (rt::stop_requested()) ends_ = true;
     if (ends_) {
       news_.notify_all();
@@ -157,7 +157,7 @@ bool StartRoom::await() {
 bool StartRoom::answer(std::optional<Error> refused) {
   {
     const std::scoped_lock lock(mutex_);
-    if (rt::take_emergency_stop()) latch();
+    if (rt::take_emergency_stop() != rt::EmergencyStop::kNone) latch();
     if (stopped_ && !refused) {  // it came after the question, and wins
       refused = fail("an emergency stop is latched: nothing starts",
                      "tandem fault reset, then tandem controller start")

@@ -268,6 +268,37 @@ TEST_F(Socket, AnswersAStopThatItsEndMeets) {
   }
 }
 
+// The studio of a run closed while the thread of stops was still at work.
+TEST_F(Socket, TurnsHaveAnsweredEveryStopWhenTheyEnd) {
+  std::atomic<bool> at_work{false}, released{false};
+  registry.add({"stop", ControlEffect::kStops, "stops", {}}, [&](const Json&) -> Result<Json> {
+    at_work = true;
+    while (!released) std::this_thread::yield();
+    return Json{{"text", "stop"}};
+  });
+  std::atomic<int> told{0};
+  ControlTurns turns(registry, [&] { ++told; });
+  EXPECT_EQ(turns.ask(1, 10, R"({"do": "stop"})"), ControlTurn::kUrgent);
+  while (!at_work) std::this_thread::yield();
+  (void)turns.ask(2, 20, R"({"do": "stop"})");
+  std::thread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    released = true;
+  });
+  turns.end();
+  later.join();
+  (void)turns.ask(3, 30, R"({"do": "stop"})");
+  (void)turns.ask(4, 40, R"({"do": "echo", "text": "a"})");
+  const std::vector<ControlTurns::Answer> answers = turns.take();
+  ASSERT_EQ(answers.size(), 3U);
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    EXPECT_EQ(answers[i].asker, i + 1);
+    EXPECT_EQ(answers[i].number, 10 * (i + 1));
+    EXPECT_EQ(answers[i].text, R"({"ok":true,"text":"stop"})");
+  }
+  EXPECT_EQ(told, 3);
+}
+
 // It had waited behind a slow one, and undone the stop that came meanwhile.
 TEST_F(Socket, RefusesWhatWasAskedBeforeAStopAndComesToItsTurnAfterIt) {
   std::atomic<bool> at_work{false}, released{false};

@@ -178,6 +178,38 @@ TEST_F(RawService, IsNotHeldUpByAClientThatFloods) {
   EXPECT_GT(counts.dropped, counts.replies) << "the flood is not done";
 }
 
+// A stop that a run's end met had no answer where its reader was not found yet.
+TEST_F(RawService, AtItsEndSendsTheReplyThatWaitsForItsReader) {
+  server = std::move(*ServiceServer::open(*participant));
+  ASSERT_TRUE((server->add<std_srvs::Trigger_Request, std_srvs::Trigger_Response>(
+      "stop", [](const std_srvs::Trigger_Request&, const Asker&) {
+        return ServiceWork<std_srvs::Trigger_Response>{
+            .at_once = true, .answer = [](std_srvs::Trigger_Response& reply, ReplyMemory& memory) {
+              reply.message = memory.text("stopped");
+            }};
+      })));
+  ASSERT_TRUE(server->start(true));
+  RawEnd asks(config.domain, std_srvs_srv_dds__Trigger_Request__desc, "rq/left/stopRequest",
+              std_srvs_srv_dds__Trigger_Response__desc, "rr/left/elsewhere");
+  ASSERT_TRUE(
+      eventually([&] { return dds_get_matched_subscriptions(asks.writer, nullptr, 0) > 0; }));
+  const RawRequest request{1, 7, 0};
+  dds_write(asks.writer, &request);
+  ASSERT_TRUE(eventually([&] { return server->counts().requests == 1; }));
+  std::thread end([this] { server.reset(); });
+  std::this_thread::sleep_for(milliseconds(100));
+  dds_qos_t* qos = dds_create_qos();
+  dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
+  asks.reader = dds_create_reader(
+      asks.participant,
+      dds_create_topic(asks.participant, &std_srvs_srv_dds__Trigger_Response__desc,
+                       "rr/left/stopReply", nullptr, nullptr),
+      qos, nullptr);
+  dds_delete_qos(qos);
+  end.join();
+  EXPECT_TRUE(eventually([&] { return !asks.take_bytes().empty(); }));
+}
+
 TEST_F(RawService, RepliesThatAreNotForItAreIgnoredByAClient) {
   RawEnd raw(config.domain, std_srvs_srv_dds__Trigger_Response__desc, "rr/left/resetReply",
              std_srvs_srv_dds__Trigger_Request__desc, "rq/left/resetRequest");

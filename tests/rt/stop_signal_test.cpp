@@ -48,7 +48,7 @@ TEST(StopSignal, StopsInOrderOrIgnoresEverySignalThatWouldEndTheProcess) {
           install_stop_signals();
           install_emergency_signal();
           std::raise(signal);
-          if (take_emergency_stop()) std::_Exit(7);
+          if (take_emergency_stop() == EmergencyStop::kBySignal) std::_Exit(7);
           std::_Exit(stop_requested() && stop_signal() == signal ? 5 : 6);
         },
         testing::ExitedWithCode(signal == SIGUSR1 ? 7

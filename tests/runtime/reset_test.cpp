@@ -361,6 +361,18 @@ TEST_F(Waiting, AnEmergencyStopBySignalFollowsTheRobotsCategory) {
   EXPECT_EQ(cycle->faults().size(), 2U);
 }
 
+// `tandem estop` that met a start was said to be a signal.
+TEST_F(Waiting, AnEmergencyStopBeforeThereWasALoopIsOnRequest) {
+  robot.emergency_stop = StopCategory::kCategory0;
+  rt::request_emergency_stop();
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(backend->latched, StopCategory::kCategory0);
+  EXPECT_EQ(cycle->faults().at(0).text, "emergency stop on request");
+  steps(20);
+  EXPECT_EQ(cycle->faults().size(), 1U) << "once";
+}
+
 TEST_F(Waiting, AnEmergencyStopEndsARunThatDoesNotWait) {
   start({});
   cycle->inbox().emergency_stop(StopCategory::kCategory0);
