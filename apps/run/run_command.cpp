@@ -126,12 +126,14 @@ class Session {
     const std::vector<std::string> faults = latched_texts(cycle_->faults());
     return faults.empty() ? std::string() : faults.front();
   }
-  /// An emergency stop is latched: a person's.
-  [[nodiscard]] bool stopped() const {
-    return std::ranges::any_of(cycle_->faults(), [](const runtime::FaultReport& fault) {
-      return fault.latched && (fault.cause == hal::FaultCause::kByRequest ||
-                               fault.cause == hal::FaultCause::kBySignal);
-    });
+  /// A person's emergency stop that is latched.
+  [[nodiscard]] std::optional<runtime::FaultReport> stopped() const {
+    for (runtime::FaultReport& fault : cycle_->faults()) {
+      const bool by_person =
+          fault.cause == hal::FaultCause::kByRequest || fault.cause == hal::FaultCause::kBySignal;
+      if (fault.latched && by_person) return std::move(fault);
+    }
+    return std::nullopt;
   }
 
  private:

@@ -7,6 +7,7 @@
 #include <thread>
 #include <utility>
 
+#include "apps/control/fault_table.hpp"
 #include "apps/text/console.hpp"
 #include "rt/stop_signal.hpp"
 
@@ -19,10 +20,11 @@ constexpr char kWaits[] = "waits for its start: tandem controller start";
 constexpr char kStopped[] =
     "waits, and an emergency stop is latched: tandem fault reset, then tandem controller start";
 constexpr char kWaiting[] = "waiting", kLeft[] = "bring-up";
+constexpr char kResetFirst[] = "tandem fault reset, then tandem controller start";
 
-std::unexpected<Error> not_started() {
-  return fail("the run waits for its start, and has touched no drive yet",
-              "tandem controller start");
+/// No controller can retreat yet.
+hal::StopCategory retreatless(hal::StopCategory category) {
+  return std::min(category, hal::StopCategory::kCategory1);
 }
 
 }  // namespace
@@ -31,7 +33,7 @@ Result<std::unique_ptr<StartRoom>> StartRoom::open(const std::string& socket, Se
                                                    const Before& before,
                                                    hal::StopCategory declared) {
   std::unique_ptr<StartRoom> room(new StartRoom(notice, declared));
-  room->stopped_ = before.stopped;
+  room->stop_ = before.stop;
   room->add_commands();
   auto opened =
       serve(room->commands_, {.path = socket, .kind = "run", .wanted = true, .needed = true});
@@ -45,14 +47,32 @@ Result<std::unique_ptr<StartRoom>> StartRoom::open(const std::string& socket, Se
 /// To journal and service manager.
 void StartRoom::tell(const std::string& why) {
   const std::string line =
-      std::string(stopped_ ? kStopped : kWaits) + (why.empty() ? "" : "; before: " + why);
+      std::string(stop_ ? kStopped : kWaits) + (why.empty() ? "" : "; before: " + why);
   fmt::print(stderr, "{}\n", shown(line, 2'000));
   notice_.waits(line);
 }
 
-void StartRoom::latch() {
-  if (std::exchange(stopped_, true)) return;
+void StartRoom::latch(hal::FaultCause cause, hal::StopCategory category) {
+  if (stop_) return;
+  stop_ = runtime::FaultReport{
+      .text = hal::row_of(cause).words, .cause = cause, .category = retreatless(category)};
   tell("");
+}
+
+void StartRoom::look_for_stop() {
+  const rt::EmergencyStop stop = rt::take_emergency_stop();
+  if (stop == rt::EmergencyStop::kNone) return;
+  latch(stop == rt::EmergencyStop::kOnRequest ? hal::FaultCause::kByRequest
+                                              : hal::FaultCause::kBySignal,
+        declared_);
+}
+
+std::unexpected<Error> StartRoom::not_started() {
+  const std::scoped_lock lock(mutex_);
+  return stop_ ? fail("the run waits, and an emergency stop is latched: no drive was touched yet",
+                      kResetFirst)
+               : fail("the run waits for its start, and has touched no drive yet",
+                      "tandem controller start");
 }
 
 Json StartRoom::status() {
@@ -64,7 +84,7 @@ Json StartRoom::status() {
           {"total_cycles", 0},
           {"overruns", 0},
           {"dropped", 0},
-          {"latched", stopped_ ? 1 : 0},
+          {"latched", stop_ ? 1 : 0},
           {"resets", 0},
           {"failed_resets", 0}};
 }
@@ -73,14 +93,16 @@ void StartRoom::add_commands() {
   commands_.add("status", [this](const Json&) -> Result<Json> { return status(); });
   commands_.add("fault.show", [this](const Json&) -> Result<Json> {
     Json answer = status();
-    answer["faults"] = Json::array();
+    const std::scoped_lock lock(mutex_);
+    answer["faults"] =
+        figures_json(stop_ ? std::vector{*stop_} : std::vector<runtime::FaultReport>{});
     answer["lost"] = 0;
     return answer;
   });
   commands_.add("fault.reset", [this](const Json&) -> Result<Json> {
     {
       const std::scoped_lock lock(mutex_);
-      if (std::exchange(stopped_, false)) tell("");
+      if (std::exchange(stop_, std::nullopt)) tell("");
     }
     return status();
   });
@@ -92,12 +114,11 @@ void StartRoom::add_commands() {
     if (left_) {
       rt::request_emergency_stop();
     } else {
-      latch();
       if (request.contains("category"))
         category = static_cast<hal::StopCategory>(request["category"].get<std::int64_t>());
+      latch(hal::FaultCause::kByRequest, category);
     }
-    category = std::min(category, hal::StopCategory::kCategory1);  // no controller can retreat yet
-    return Json{{"category", hal::to_string(category)},
+    return Json{{"category", hal::to_string(retreatless(category))},
                 {"paused", false},
                 {"confirmed", true},
                 {"waiting", !left_}};
@@ -111,7 +132,7 @@ void StartRoom::add_commands() {
   commands_.add("controller.start", [this](const Json& request) { return start(request); });
   for (const CommandRow& row : command_rows()) {
     if (commands_.effect(row.name) || !row.more.asks.empty()) continue;
-    commands_.add(row, [](const Json&) -> Result<Json> { return not_started(); });
+    commands_.add(row, [this](const Json&) -> Result<Json> { return not_started(); });
   }
 }
 
@@ -122,8 +143,7 @@ Result<Json> StartRoom::start(const Json& request) {
                 "tandem controller start, without a name");
   }
   std::unique_lock lock(mutex_);
-  if (stopped_)
-    return fail("an emergency stop is latched: nothing starts", "tandem fault reset, then start");
+  if (stop_) return fail("an emergency stop is latched: nothing starts", kResetFirst);
   if (ends_) return fail("the run ends");
   if (left_) return fail("the run has been started, and goes on to its robot");
   wanted_ = true;
@@ -141,7 +161,7 @@ Result<Json> StartRoom::start(const Json& request) {
 bool StartRoom::await() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    if (rt::take_emergency_stop() != rt::EmergencyStop::kNone) latch();
+    look_for_stop();
     if (rt::stop_requested()) ends_ = true;
     if (ends_) {
       news_.notify_all();
@@ -157,11 +177,9 @@ bool StartRoom::await() {
 bool StartRoom::answer(std::optional<Error> refused) {
   {
     const std::scoped_lock lock(mutex_);
-    if (rt::take_emergency_stop() != rt::EmergencyStop::kNone) latch();
-    if (stopped_ && !refused) {  // it came after the question, and wins
-      refused = fail("an emergency stop is latched: nothing starts",
-                     "tandem fault reset, then tandem controller start")
-                    .error();
+    look_for_stop();
+    if (stop_ && !refused) {  // it came after the question, and wins
+      refused = fail("an emergency stop is latched: nothing starts", kResetFirst).error();
     }
     refused_ = refused;
     wanted_ = false;

@@ -14,6 +14,7 @@
 #include "apps/transport/control_socket.hpp"
 #include "base/result.hpp"
 #include "hal/stop_category.hpp"
+#include "runtime/fault.hpp"
 
 namespace tandem::apps {
 
@@ -24,8 +25,8 @@ class StartRoom {
  public:
   /// Why it waits again.
   struct Before {
-    std::string why{};     ///< empty: it waits for the first time
-    bool stopped = false;  ///< by an emergency stop, which stays latched
+    std::string why{};                           ///< empty: it waits for the first time
+    std::optional<runtime::FaultReport> stop{};  ///< an emergency stop, which stays latched
   };
   /// @param declared  the robot's emergency stop
   /// Errors: apps::serve()'s of a socket that is needed.
@@ -49,15 +50,18 @@ class StartRoom {
   [[nodiscard]] Json status();
   [[nodiscard]] Result<Json> start(const Json& request);
   void tell(const std::string& why);
-  /// @pre the mutex is locked
-  void latch();
+  [[nodiscard]] std::unexpected<Error> not_started();
+  // With the mutex locked:
+  void latch(hal::FaultCause cause, hal::StopCategory category);
+  void look_for_stop();
 
   ServiceNotice& notice_;
   hal::StopCategory declared_;
   ControlRegistry commands_;
   std::mutex mutex_;
   std::condition_variable news_;
-  bool wanted_ = false, ends_ = false, stopped_ = false, left_ = false;
+  bool wanted_ = false, ends_ = false, left_ = false;
+  std::optional<runtime::FaultReport> stop_;  // that is latched
   std::uint64_t answers_ = 0;
   std::optional<Error> refused_;           // of the last answer
   std::unique_ptr<ControlSocket> socket_;  // last: its threads use the others

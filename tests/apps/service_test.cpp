@@ -130,6 +130,16 @@ TEST_F(Service, AnEmergencyStopWhileItWaitsIsLatched) {
     const Outcome again = to_run(words);
     EXPECT_NE(again.out.find("category 1"), std::string::npos) << again.out;
   }
+  // It had counted one, without a row.
+  const Outcome shown = to_run("fault show");
+  EXPECT_NE(shown.out.find("1 latched"), std::string::npos) << shown.out;
+  EXPECT_NE(shown.out.find("emergency stop on request  torque off"), std::string::npos)
+      << shown.out;
+  // It had advised the start alone, which is refused.
+  const Outcome list = to_run("controller list");
+  EXPECT_NE(list.err.find("an emergency stop is latched"), std::string::npos) << list.err;
+  EXPECT_NE(list.err.find("tandem fault reset, then tandem controller start"), std::string::npos)
+      << list.err;
   const Outcome refused = to_run("controller start");
   EXPECT_NE(refused.status, 0);
   EXPECT_NE(refused.err.find("an emergency stop is latched"), std::string::npos) << refused.err;
