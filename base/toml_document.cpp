@@ -65,11 +65,13 @@ Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::strin
   } catch (const toml::parse_error& e) {
     const bool encoding = e.description().find("utf-8") != std::string_view::npos;
     const bool twice = e.description().find("redefine existing table") != std::string_view::npos;
+    const bool wide = e.description().find("representable in 64 bits") != std::string_view::npos;
     const std::string quoted = quoted_line(text, e.source().begin.line);
     const bool value = e.description().find("parsing value") != std::string_view::npos;
     return std::unexpected(Error{"not valid TOML: " + std::string(e.description()),
                                  encoding ? "save the file as UTF-8"
                                  : twice  ? "of several write each as [[NAME]], or remove one"
+                                 : wide   ? "an integer is at most 9223372036854775807"
                                  : value && !quoted.empty() ? "a text stands in quotes: " + quoted
                                                             : "correct the syntax at this line",
                                  file,

@@ -306,6 +306,12 @@ std::string TomlTable::choice_or(std::string_view key, std::string value,
                                  const std::vector<std::string>& allowed) {
   std::string found = text_or(key, value);
   if (found == value) return value;
+  if (found.empty()) {  // which text_or() has said
+    Diagnostics& said = shared_->diagnostics;
+    if (!said.empty() && said.back().key == shared_->shown(dotted(key)))
+      said.back().hint = suggest(found, allowed);
+    return value;
+  }
   for (const std::string& one : allowed) {
     if (found == one) return found;
   }

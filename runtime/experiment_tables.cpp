@@ -150,6 +150,11 @@ HalOptions read_hal(TomlTable table, const SimOptions& sim) {
 
 SimOptions read_sim(TomlTable table) {
   SimOptions sim;
+  constexpr char kFormer[] = "semi_implicit";
+  if (table.is_text("integrator") && table.text_or("integrator", {}) == kFormer) {
+    table.error("integrator", "'" + std::string(kFormer) + "' is not one of the choices",
+                "leave it out: the leapfrog has replaced it, in the same sub-steps");
+  }
   read_keys(table, kSim, sim);
   TomlTable hoist = table.table_or_empty("hoist");
   read_keys(hoist, kHoist, sim);

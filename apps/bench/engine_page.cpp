@@ -94,6 +94,12 @@ report::Figure curves(const std::string& name, const std::string& title,
   return figure;
 }
 
+/// What rounds to zero has no sign.
+std::string percent(double share) {
+  constexpr double kHalf = 0.5e-3;  // of the last decimal
+  return std::abs(100.0 * share) < kHalf ? "0.000 %" : fmt::format("{:+.3f} %", 100.0 * share);
+}
+
 std::string file_name(std::string title) {
   std::ranges::replace_if(
       title, [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
@@ -274,9 +280,9 @@ void EnginePage::add(const std::vector<StandRow>& rows) {
       sections_ += refused(*row.entry, 6, row.refusal);
       continue;
     }
-    sections_ += fmt::format("| {} | {} | {} | {} | {:+.3f} % | {:.3g} | {} |\n", row.entry->label,
+    sections_ += fmt::format("| {} | {} | {} | {} | {} | {:.3g} | {} |\n", row.entry->label,
                              number(row.foot_mm), number(row.base_mm), number(row.turn_deg),
-                             100.0 * row.force_error, row.cost_us_per_ms, row.refusal);
+                             percent(row.force_error), row.cost_us_per_ms, row.refusal);
     if (row.refusal.empty())
       prices.push_back(
           {row.entry, row.cost_us_per_ms * row.foot_mm, row.foot_mm, number(row.foot_mm)});
@@ -297,9 +303,9 @@ void EnginePage::add(const std::string& title, const std::vector<HumanoidRow>& r
       continue;
     }
     sections_ +=
-        fmt::format("| {} | {:.3f} | {:.2f} | {:.3f} | {:+.3f} % | {:.2f} | {:.3g} | {} |\n",
+        fmt::format("| {} | {:.3f} | {:.2f} | {:.3f} | {} | {:.2f} | {:.3g} | {} |\n",
                     row.entry->label, row.slip_mm, row.height_mm, row.tilt_deg,
-                    100.0 * row.force_error, row.tracking_deg, row.cost_us_per_ms, row.refusal);
+                    percent(row.force_error), row.tracking_deg, row.cost_us_per_ms, row.refusal);
     if (row.refusal.empty())
       prices.push_back({row.entry, row.cost_us_per_ms * row.slip_mm, row.slip_mm,
                         fmt::format("{:.3f}", row.slip_mm)});

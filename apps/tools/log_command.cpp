@@ -217,12 +217,6 @@ Status print_fields(const log::LogFile& file, const std::string& name, std::FILE
   return {};
 }
 
-/// A table of a killed run looks like one of a shorter run.
-void note_cut(const log::LogFile& file) {
-  const std::string cut = file.cut_remark();
-  if (!cut.empty()) fmt::print(stderr, "note: {}: {}\n", shown(file.path(), 4'096), cut);
-}
-
 Status write_csv(const log::LogFile& file, const LogOptions& options) {
   const std::string topic = file.full_name(options.topic.empty() ? "state" : options.topic);
   if (options.output.empty()) {

@@ -49,6 +49,7 @@ Status check_place(const log::LogFile& file, const std::string& output) {
 Status export_log(const LogOptions& options) {
   const Result<log::LogFile> file = opened_log(options.log);
   if (!file) return std::unexpected(file.error());
+  note_cut(*file);
   log::Reduction how{.rate_Hz = options.rate_Hz, .from_s = options.begin_s, .to_s = options.end_s};
   for (const std::string& topic : options.topics) how.topics.push_back(file->full_name(topic));
   const std::string output =

@@ -2,6 +2,8 @@
 // Layer: apps/tools.  Thread: main.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <string>
 #include <utility>
 
@@ -18,6 +20,12 @@ namespace tandem::apps {
     print_warnings({{.message = std::move(remark), .hint = {}, .file = path, .key = {}}});
   }
   return file;
+}
+
+/// What is made of a killed run's log looks like that of a shorter run: says so.
+inline void note_cut(const log::LogFile& file) {
+  const std::string cut = file.cut_remark();
+  if (!cut.empty()) fmt::print(stderr, "note: {}: {}\n", shown(file.path(), 4'096), cut);
 }
 
 }  // namespace tandem::apps

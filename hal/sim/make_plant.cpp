@@ -1,6 +1,7 @@
 #include "hal/sim/make_plant.hpp"
 
 #include <memory>
+#include <numeric>
 #include <utility>
 
 #include "base/nearest.hpp"
@@ -87,28 +88,43 @@ std::string stiffest_of_ground(const PlantConfig& config, const Plant& plant, do
 
 constexpr std::int64_t kShortestStep_ns = 1'000;
 
+/// "at most 450927 ns in this posture: 250000 ns divides the period and every control period".
+std::string shorter(const hal::RobotConfig& robot, std::int64_t period_ns, std::int64_t most_ns) {
+  const std::string most = "at most " + std::to_string(most_ns) + " ns in this posture";
+  std::int64_t common_ns = period_ns;
+  for (const hal::BoardConfig& board : robot.boards)
+    common_ns = std::gcd(common_ns, board.control_period_ns);
+  if (most_ns < kShortestStep_ns || common_ns < kShortestStep_ns) return most;
+  std::int64_t parts = (common_ns + most_ns - 1) / most_ns;
+  while (common_ns % parts != 0) ++parts;
+  if (common_ns / parts < kShortestStep_ns) return most;
+  return most + ": " + std::to_string(common_ns / parts) +
+         " ns divides the period and every control period";
+}
+
 // A step that cannot be stable would show as a drive's fault, far from its cause.
-Status check_step(const hal::RobotConfig& robot, const PlantConfig& config, const Plant& plant) {
+Status check_step(const hal::RobotConfig& robot, const PlantConfig& config, const Plant& plant,
+                  std::int64_t period_ns) {
   PlantConfig tested = config;
   if (config.engine != kOwnEngine) tested.contact = {};  // its ground is the engine's own
   const StepLimit limit = longest_step(tested, plant);
   const double step_s = static_cast<double>(config.substep_ns) * 1e-9;
   if (step_s <= limit.seconds) return {};
-  const auto at_most = static_cast<std::int64_t>(limit.seconds * 1e9);
+  const auto most_ns = static_cast<std::int64_t>(limit.seconds * 1e9);
+  const std::string at_most = shorter(robot, period_ns, most_ns);
   if (const std::string key = stiffest_of_ground(config, plant, step_s); !key.empty()) {
     return std::unexpected(
         Error{.message = "makes a sub-step of " + std::to_string(config.substep_ns) +
                          " ns unstable at " + limit.place,
-              .hint = "lower it, or sim.substep_ns to at most " + std::to_string(at_most) +
-                      " ns in this posture",
+              .hint = "lower it, or sim.substep_ns to " + at_most,
               .file = robot.file,
               .line = robot.contact.lines.contains(key) ? robot.contact.lines.at(key) : 0,
               .key = "contact." + key});
   }
   return std::unexpected(
       Error{.message = std::to_string(config.substep_ns) + " ns is unstable at " + limit.place,
-            .hint = at_most >= kShortestStep_ns
-                        ? "at most " + std::to_string(at_most) + " ns in this posture"
+            .hint = most_ns >= kShortestStep_ns
+                        ? at_most
                         : "no sub-step is short enough: are its inertia, stiffness, damping and "
                           "inductance right?",
             .file = {},
@@ -133,7 +149,8 @@ Error blamed(Error error, const hal::RobotConfig& robot, const tandem_kernels* k
   const Result<PlantConfig> described = plant_config(robot, kernels, config);
   const Result<Plant> as_described =
       described ? Plant::create(*described) : std::unexpected(described.error());
-  if (!as_described || !check_step(robot, *described, *as_described)) return error;
+  if (!as_described || !check_step(robot, *described, *as_described, config.period_ns))
+    return error;
   const std::string step = std::to_string(config.substep_ns) + " ns";
   const std::string& first = changes->differences.front();
   return {.message = "makes a sub-step of " + step + " unstable at " +
@@ -151,7 +168,7 @@ Result<Plant> make_plant(const hal::RobotConfig& robot, const tandem_kernels* ke
   if (!plant) return std::unexpected(plant.error());
   Result<Plant> body = Plant::create(*plant);
   if (!body) return std::unexpected(placed(body.error(), robot));
-  if (const Status status = check_step(robot, *plant, *body); !status) {
+  if (const Status status = check_step(robot, *plant, *body, config.period_ns); !status) {
     return std::unexpected(blamed(status.error(), robot, kernels, *plant, *body, config));
   }
   return body;

@@ -371,9 +371,12 @@ Error in_its_file(Error error, const Experiment& e) {
   if (!error.file.empty()) return error;
   constexpr std::string_view kOurs = "sim.";  // keys of the experiment
   const bool of_experiment = error.key.starts_with(kOurs);
-  error.file = of_experiment ? e.file : e.robot.file;
+  error.file = e.robot.file;
   if (of_experiment) {
-    error.line = e.document.root().table_or_empty("sim").line(error.key.substr(kOurs.size()));
+    const Error there =
+        e.document.root().table_or_empty("sim").error_at(error.key.substr(kOurs.size()), {}, {});
+    error.file = there.file;
+    error.line = there.line;
   }
   return error;
 }

@@ -377,6 +377,27 @@ TEST_F(BadInput, AGroundTooStiffForTheSubStepIsNamedAtItsStiffness) {
   }
 }
 
+// The line was that of the file's beginning, and what is short enough did not divide the period.
+TEST_F(BadInput, ASubStepThatIsTooLongIsNamedWhereItIsSet) {
+  std::filesystem::remove_all(folder_);
+  std::filesystem::copy(TANDEM_SOURCE_DIR "/config/coman", folder_,
+                        std::filesystem::copy_options::recursive);
+  const std::string setting = "--set sim.substep_ns=1000000";
+  const Outcome check = tandem("check squat.toml " + setting);
+  EXPECT_EQ(check.status, 2);
+  EXPECT_EQ(check.err.find("error: " + setting + ": sim.substep_ns: 1000000 ns is unstable at "),
+            0U)
+      << check.err;
+  const std::size_t most = check.err.find("(at most "), fits = check.err.find("posture: ");
+  ASSERT_NE(most, std::string::npos) << check.err;
+  ASSERT_NE(fits, std::string::npos) << check.err;
+  const int most_ns = std::stoi(check.err.substr(most + 9)),
+            fits_ns = std::stoi(check.err.substr(fits + 9));
+  EXPECT_LE(fits_ns, most_ns);
+  EXPECT_EQ(1'000'000 % fits_ns, 0);
+  EXPECT_EQ(tandem("check squat.toml --set sim.substep_ns=" + std::to_string(fits_ns)).status, 0);
+}
+
 TEST_F(BadInput, GravityThatPointsUpIsWarnedOf) {
   edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\ngravity_m_s2 = [0, 0, 9.81]");
   for (const std::string command : {"check robot.toml", "check hold.toml"}) {

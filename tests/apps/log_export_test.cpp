@@ -152,6 +152,17 @@ TEST_F(LogExport, IsRefusedByWhoNeedsEverySample) {
       << csv.err;
 }
 
+// A copy of a killed run's log looks like that of a shorter run.
+TEST_F(LogExport, SaysThatTheLogIsCut) {
+  const std::string path = logged("run", 1.0);
+  const std::string export_it = "log export " + path + " --rate 100 -o copy.mcap";
+  EXPECT_EQ(tandem(export_it).err, "");
+  std::filesystem::resize_file(folder_ / path, std::filesystem::file_size(folder_ / path) / 2);
+  const Outcome cut = tandem(export_it);
+  EXPECT_EQ(cut.status, 0);
+  EXPECT_NE(cut.err.find("note: " + path + ": the log is cut: "), std::string::npos) << cut.err;
+}
+
 TEST_F(LogExport, RefusesWhatCannotBe) {
   const std::string path = logged("run", 1.0), other = logged("other", 0.2);
   const std::string export_it = "log export " + path;

@@ -145,6 +145,22 @@ TEST(TomlReader, QuotesAWordThatStandsWithoutQuotes) {
   EXPECT_EQ(list.error().hint, "correct the syntax at this line");
 }
 
+// A seed of twenty digits was to have its syntax corrected.
+TEST(TomlReader, SaysHowLargeAnIntegerMayBe) {
+  const auto document = TomlDocument::parse("a = 1\nseed = 99999999999999999999\n", "x.toml");
+  ASSERT_FALSE(document.has_value());
+  EXPECT_EQ(document.error().line, 2);
+  EXPECT_EQ(document.error().hint, "an integer is at most 9223372036854775807");
+}
+
+TEST(TomlReader, TakesAnEmptyTextForNoChoiceOnce) {
+  const TomlDocument document = parse("a = ''\n");
+  EXPECT_EQ(document.root().choice_or("a", "one", {"one", "two"}), "one");
+  ASSERT_EQ(document.diagnostics().size(), 1U);
+  EXPECT_EQ(document.diagnostics()[0].to_string(),
+            "robot.toml:1: a: must not be empty (known: one, two)");
+}
+
 TEST(TomlReader, NamesAFileThatIsNotThere) {
   const auto document = TomlDocument::load("no/such/file.toml");
   ASSERT_FALSE(document.has_value());

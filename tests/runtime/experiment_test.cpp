@@ -276,6 +276,18 @@ TEST(Experiment, RefusesASubstepThatDoesNotDivide) {
             "(choose a divisor of period_ns)\n");
 }
 
+TEST(Experiment, SaysWhatToDoAboutAnIntegratorThatIsNone) {
+  EXPECT_EQ(
+      errors_of(with("[sim]\nintegrator = 'semi_implicit'")),
+      "arm/x.toml:5: sim.integrator: 'semi_implicit' is not one of the choices (leave it out: "
+      "the leapfrog has replaced it, in the same sub-steps)\n");
+  EXPECT_EQ(errors_of(with("[sim]\nintegrator = ''")),
+            "arm/x.toml:5: sim.integrator: must not be empty (known: leapfrog, rk4)\n");
+  EXPECT_EQ(errors_of(with("[sim]\nintegrator = 'euler'")),
+            "arm/x.toml:5: sim.integrator: 'euler' is not one of the choices (known: leapfrog, "
+            "rk4)\n");
+}
+
 TEST(Experiment, RefusesALogThatCannotBeKept) {
   const auto log = [](const std::string& lines) { return errors_of(with("[log]\n" + lines)); };
   EXPECT_EQ(log("truth_every = -1"),
