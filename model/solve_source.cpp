@@ -166,9 +166,10 @@ class Sweep {
 constexpr std::string_view kEntry = R"(
 static inline void copy(const double* from, double* to, int count) {{
   int i = 0;
-  for (; i + 4 <= count; i += 4) put(to + i, get<four>(from + i));
-  if (count & 2) put(to + i, get<two>(from + i));
-  if (count & 1) to[count - 1] = from[count - 1];
+  for (; i + lanes <= count; i += lanes) put(to + i, get<wide>(from + i));
+  if (count >= lanes) i = count - lanes;  // some of them once more
+  for (; i + lanes <= count; i += lanes) put(to + i, get<wide>(from + i));
+  for (; i < count; ++i) to[i] = from[i];
 }}
 void {name}({parameters}) {{
   constexpr int n = {size}, base_q = {base_q}, base_v = {base_v}, width = {width};
@@ -179,8 +180,9 @@ void {name}({parameters}) {{
   forward_dynamics_at(s, q, v, tau, wrench, vdot);
   inverse_dynamics_derivatives_at(s, q, v, vdot, wrench, dvdot_dq, dvdot_dv, dvdot_dtau);
   mass_factor(dvdot_dtau, L, minus_reciprocal);
-  alignas(64) double x[n * width] = {{}};
+  alignas(64) double x[n * width];
   for (int i = 0; i < n; ++i) {{
+    for (int j = at_tau / lanes * lanes; j < width; j += lanes) put(x + i * width + j, wide{{}});
     copy(dvdot_dq + i * n + base_q, x + i * width, n - base_q);
     copy(dvdot_dv + i * n + base_v, x + i * width + at_v, n - base_v);
     x[i * width + at_tau + i] = -1.0;
