@@ -74,6 +74,7 @@ StringMap to_map(const RunInfo& info) {
   if (!info.reduced.empty()) map.emplace_back("reduced", info.reduced);
   if (info.operators_view) map.emplace_back("state", kOperatorsView);
   if (!info.engine.empty()) map.emplace_back("engine", info.engine);
+  if (!info.integrator.empty()) map.emplace_back("integrator", info.integrator);
   return map;
 }
 
@@ -100,6 +101,7 @@ RunInfo info_from(const StringMap& map) {
   if (info.period_ns < kShortest_ns || info.period_ns > kLongest_ns) info.period_ns = 0;
   info.operators_view = value_of(map, "state") == kOperatorsView;
   info.engine = value_of(map, "engine");
+  info.integrator = value_of(map, "integrator");
   info.kernel_variant = value_of(map, "kernel_variant");
   info.description_hash = value_of(map, "description_hash");
   info.host = value_of(map, "host");

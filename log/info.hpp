@@ -45,6 +45,7 @@ struct RunInfo {
   /// The state is what a tele-operator saw, predicted or late; false: what was measured.
   bool operators_view = false;
   std::string engine{};            ///< "mujoco 2.2.2", which moved the bodies; empty: Tandem's own
+  std::string integrator{};        ///< "leapfrog, 250 us steps"; empty: nothing was simulated here
   std::string kernel_variant{};    ///< "x86-64-v3"; may change a result's last bits
   std::string description_hash{};  ///< of what the kernels were made from
   std::string kernel_sha256{};     ///< of the kernels' library

@@ -199,6 +199,7 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   facts.emplace_back((imported ? "recorded" : "controllers ran") + side,
                      fmt::format("{:.3f} s{}", run.ran_s(), whole ? "" : " of what is here"));
   if (!run.info.engine.empty()) facts.emplace_back("engine" + side, run.info.engine);
+  if (!run.info.integrator.empty()) facts.emplace_back("integrator" + side, run.info.integrator);
   facts.emplace_back("kernels" + side, run.info.kernel_variant);
   facts.emplace_back("tandem" + side, run.info.version);
   for (const auto& [key, value] : run.result) {

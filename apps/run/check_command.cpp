@@ -22,6 +22,7 @@
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/drive_use.hpp"
 #include "hal/sim/engine_loader.hpp"
+#include "runtime/run/run_log.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -67,14 +68,10 @@ void add_kernel_facts(const model::KernelLibrary& kernels, const std::string& ro
 
 /// Who moves the bodies, how, and in which steps.
 void add_simulation_facts(const runtime::Experiment& e, Facts& facts) {
-  std::string integrator = "leapfrog";
   if (e.hal.backend == runtime::BackendKind::kSim && e.sim.engine != sim::kOwnEngine) {
     facts.add("engine", sim::engine_text(e.sim.engine));
-    integrator = sim::load_engine(e.sim.engine).value()->integrator;
   }
-  if (e.sim.integrator == sim::Integrator::kRungeKutta4) integrator = "Runge-Kutta 4";
-  facts.add("integrator", fmt::format("{}, {} us steps", integrator,
-                                      static_cast<double>(e.sim.substep_ns) * 1e-3));
+  facts.add("integrator", runtime::integrator_text(e));
 }
 
 /// How many joints move the link: they alone feel a wrench at it.

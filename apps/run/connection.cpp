@@ -12,6 +12,7 @@
 #include "hal/sim/engine_loader.hpp"
 #include "rt/stop_signal.hpp"
 #include "runtime/run/operator_link.hpp"
+#include "runtime/run/run_log.hpp"
 
 namespace tandem::apps {
 
@@ -28,6 +29,10 @@ void figures(Figures& f, const runtime::Experiment* e) {
     const std::string version = here() ? sim::engine_version(e->sim.engine) : "";
     return known(!version.empty(), version);
   });
+  f("integrator",
+    "[of the plant](simulation.md#integrators), in words; null where no plant is in this process",
+    [&] { return known(here(), runtime::integrator_name(*e)); });
+  f("substep_ns", "its step; null the same", [&] { return known(here(), e->sim.substep_ns); });
   f("plant",
     "[what of the simulated robot](simulation.md#the-plant-is-not-the-model) is other than its "
     "files say, a text each; null: nothing",

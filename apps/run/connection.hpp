@@ -41,7 +41,7 @@ struct WiredComposition : Wires, runtime::Composition {};
 /// How long it runs: "5.000 s", "until it is stopped".
 [[nodiscard]] std::string length_text(const runtime::Experiment& e);
 
-/// Who moves the bodies: `engine` and `engine_version`.
+/// Who moves the bodies, and how: `engine` and so on.
 void figures(Figures& f, const runtime::Experiment* e);
 
 /// Opens the CAN interfaces and makes the CAN backend, or finds the server of the DDS backend and

@@ -13,6 +13,7 @@
 #include "base/counted.hpp"
 #include "base/quoting.hpp"
 #include "hal/sim/engine_loader.hpp"
+#include "runtime/run/run_log.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -256,6 +257,8 @@ void RunSummary::print(std::FILE* out) const {
   add_figures(facts, run, "kernels", "{kernel_variant}");
   const std::string engine = sim::engine_text(composition.experiment.sim.engine);
   if (composition.sim != nullptr && !engine.empty()) facts.add("engine", engine);
+  if (composition.sim != nullptr)
+    facts.add("integrator", runtime::integrator_text(composition.experiment));
   if (run["plant"].is_array()) {
     std::string all;
     for (const Json& one : run["plant"]) all += (all.empty() ? "" : "; ") + one.get<std::string>();

@@ -171,6 +171,7 @@ void print_info(const log::LogFile& file, const Json& json, std::FILE* out) {
                           : fmt::format("{} us", static_cast<double>(info.period_ns) / 1e3));
   if (info.operators_view) facts.add("state", "what the tele-operator saw: predicted, or late");
   if (!info.engine.empty()) facts.add("engine", info.engine);
+  if (!info.integrator.empty()) facts.add("integrator", info.integrator);
   for (const std::string& one : info.plant) facts.add("plant is other in", one);
   facts.add("kernels", info.kernel_variant);
   if (!info.kernel_sha256.empty()) facts.add("kernels sha256", info.kernel_sha256);

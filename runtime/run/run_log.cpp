@@ -92,7 +92,10 @@ log::RunInfo info_of(const Composition& c) {
   for (const std::string& one : e.settings) info.options.push_back(one);
   info.period_ns = e.loop.period_ns;
   info.operators_view = c.tele != nullptr;
-  if (c.sim != nullptr) info.engine = sim::engine_text(e.sim.engine);
+  if (c.sim != nullptr) {
+    info.engine = sim::engine_text(e.sim.engine);
+    info.integrator = integrator_text(e);
+  }
   if (c.sim != nullptr && e.plant != nullptr) {
     info.plant = e.plant->differences;
     info.ground = e.plant->ground;
@@ -367,6 +370,18 @@ std::string wire_name(const hal::RobotConfig& robot) {
         return bus.kind == hal::BusKind::kEthercat;
       });
   return line ? "EtherCAT" : "CAN";
+}
+
+std::string integrator_name(const Experiment& e) {
+  if (e.sim.integrator == sim::Integrator::kRungeKutta4) return "Runge-Kutta 4";
+  if (e.hal.backend != BackendKind::kSim || e.sim.engine == sim::kOwnEngine) return "leapfrog";
+  const Result<const sim::EnginePlugin*> engine = sim::load_engine(e.sim.engine);
+  return engine ? (*engine)->integrator : "";
+}
+
+std::string integrator_text(const Experiment& e) {
+  return fmt::format("{}, {} us steps", integrator_name(e),
+                     static_cast<double>(e.sim.substep_ns) * 1e-3);
 }
 
 std::string hal_name(const Experiment& e) {

@@ -18,6 +18,11 @@ namespace tandem::runtime {
 /// "sim", "can", "can lockstep", "ethercat", "dds", "dds lockstep", for logs and summaries.
 [[nodiscard]] std::string hal_name(const Experiment& e);
 
+/// What integrates the bodies' motion: "leapfrog", "Runge-Kutta 4"; of another engine, as it says.
+[[nodiscard]] std::string integrator_name(const Experiment& e);
+/// "leapfrog, 250 us steps", for logs and summaries.
+[[nodiscard]] std::string integrator_text(const Experiment& e);
+
 /// Makes `folder`, and room for the run's log in it: the oldest logs of runs before go, where they
 /// may. Errors: open_log()'s of folder and room.
 [[nodiscard]] Status make_log_room(const Composition& composition, const std::string& folder);

@@ -53,6 +53,32 @@ TEST_F(EngineChoice, OfOursHasNoVersionOfItsOwn) {
   EXPECT_FALSE(json("info.json")["metadata"].contains("engine"));
 }
 
+// `tandem check` alone said them.
+TEST_F(EngineChoice, IntegratorAndStepAreToldByRunLogAndReport) {
+  const std::string integrators[][3] = {
+      {"", "leapfrog", "250"},
+      {"[sim]\nintegrator = \"rk4\"\nsubstep_ns = 125000\n", "Runge-Kutta 4", "125"}};
+  const std::string plain = read_text(folder_ / "hold.toml");
+  for (const auto& [more, name, step_us] : integrators) {
+    write_text(folder_ / "hold.toml", plain + more);
+    const std::string text = name + ", " + step_us + " us steps";
+    EXPECT_NE(tandem("check hold.toml --json check.json").out.find(text + "\n"), std::string::npos);
+    EXPECT_EQ(json("check.json")["integrator"], name);
+    const Outcome run = tandem("run hold.toml --duration 0.05 --report --json run.json");
+    ASSERT_EQ(run.status, 0) << run.err;
+    EXPECT_NE(run.out.find(text + "\n"), std::string::npos) << run.out;
+    EXPECT_EQ(json("run.json")["integrator"], name);
+    EXPECT_EQ(json("run.json")["substep_ns"], 1000 * std::stoi(step_us));
+    const std::string log = json("run.json")["log"]["path"];
+    const Outcome info = tandem("log info " + log + " --json info.json");
+    EXPECT_NE(info.out.find(text + "\n"), std::string::npos) << info.out;
+    EXPECT_EQ(json("info.json")["metadata"]["integrator"], text);
+    const std::filesystem::path page =
+        std::filesystem::path(log).replace_extension("") / "report.html";
+    EXPECT_NE(read_text(folder_ / page).find(text), std::string::npos) << page;
+  }
+}
+
 TEST_F(EngineChoice, WithOneCoefficientOfFrictionIsWarnedOf) {
   if (!installed("mujoco")) GTEST_SKIP() << "MuJoCo is not installed";
   const std::string coman = TANDEM_SOURCE_DIR "/config/coman/";

@@ -25,6 +25,7 @@ RunInfo run_info() {
           .seed = 42,
           .period_ns = 1'000'000,
           .engine = "mujoco 2.2.2",
+          .integrator = "leapfrog, 250 us steps",
           .kernel_variant = "baseline",
           .description_hash = "00",
           .configuration = {{"robot.toml", "name = \"three\"\n"}}};
@@ -104,6 +105,7 @@ TEST(Recorder, ReadsBackTheSameNumbersNamesAndHash) {
   EXPECT_EQ(log->info().sensors.at(0).channels, 6U);
   EXPECT_EQ(log->info().seed, 42U);
   EXPECT_EQ(log->info().engine, "mujoco 2.2.2");
+  EXPECT_EQ(log->info().integrator, "leapfrog, 250 us steps");
   EXPECT_EQ(log->info().configuration, run_info().configuration);
   const auto table = log->read("/tandem/state", {{"position_rad", 2}, {"cycle", 0}});
   ASSERT_TRUE(table) << table.error().to_string();
