@@ -44,6 +44,9 @@ std::optional<Error> ringing_loops(const hal::RobotConfig& config, const tandem_
     count += rings ? 1 : 0;
   }
   if (worst_joint == nullptr) return {};
+  const bool springy =
+      config.actuator_of(*worst_joint).spring_Nm_rad > 0.0 &&
+      config.gains_of(*worst_joint).position_feedback == hal::PositionFeedback::kLink;
   return Error{
       .message = fmt::format(
           "with these gains and a control period of {:g} ms the {} loop will probably oscillate: "
@@ -52,7 +55,11 @@ std::optional<Error> ringing_loops(const hal::RobotConfig& config, const tandem_
           worst_joint->slides ? "kg" : "kg m2",
           std::numbers::ln2 * worst.period_s / std::log(worst.growth),
           count == 1 ? "" : fmt::format("; so will {} more", counted(count - 1, "joint"))),
-      .hint = "lower the gains, or shorten its board's control_period_ns (docs/firmware.md)",
+      .hint =
+          std::string("lower the gains, or shorten its board's control_period_ns ") +
+          (springy ? "(docs/firmware.md); on a soft spring set position_feedback = \"motor\" in "
+                     "its [gains.…] (docs/robots.md)"
+                   : "(docs/firmware.md)"),
       .file = config.file,
       .line = worst_joint->line,
       .key = "joint." + worst_joint->name + ".gains"};

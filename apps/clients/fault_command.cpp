@@ -276,7 +276,12 @@ Result<Exit> tell_fault_reset(Asked& asked) {
   const bool again = done && answer.value("latched", 0) > 0;
   const bool stays = again && stayed(before, answer);
   if (asked.prints()) {
-    if (nothing) fmt::print("nothing is latched\n");
+    if (nothing) {
+      fmt::print("{}\n",
+                 before.value("cleared", false)
+                     ? "the emergency stop is cleared; `tandem controller start` starts the run"
+                     : "nothing is latched");
+    }
     if (kept) fmt::print("{}\n", kAsked);
     if (done && !stays) fmt::print("reset: every joint is enabled where it is\n");
     if (!nothing) print_latched(answer);

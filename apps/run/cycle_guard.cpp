@@ -35,6 +35,15 @@ void say(const std::string& line) {
 
 }  // namespace
 
+std::string where_the_loop_is(const runtime::ControllerHost& controllers, bool at_work) {
+  const std::int32_t controller = controllers.at_work();
+  if (controller >= 0) {
+    return fmt::format("in the controller '{}'",
+                       controllers.name(static_cast<std::size_t>(controller)));
+  }
+  return at_work ? "in its cycle, in no controller" : "between two cycles, in no controller";
+}
+
 Result<std::unique_ptr<CycleGuard>> CycleGuard::open(const WiredComposition& composition,
                                                      runtime::RobotCycle& cycle,
                                                      ServiceNotice& notice) {
@@ -79,12 +88,7 @@ void CycleGuard::on_hang(bool at_work) {
   const std::int32_t controller = composition_->controllers->at_work();
   cycle_->inbox().watchdog_stop(controller);
   const std::string nodes = stop_nodes();
-  const std::string where =
-      controller >= 0
-          ? fmt::format("in the controller '{}'",
-                        composition_->controllers->name(static_cast<std::size_t>(controller)))
-      : at_work ? "in its cycle, in no controller"
-                : "between two cycles, in no controller";
+  const std::string where = where_the_loop_is(*composition_->controllers, at_work);
   const bool crashed = cycle_->heartbeat().stands_still();
   fault_ = crashed ? fmt::format("the loop crashed {}: {}", where, crash_reason())
                    : "the loop hung " + where + " and did not come back";

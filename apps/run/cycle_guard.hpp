@@ -15,6 +15,11 @@
 
 namespace tandem::apps {
 
+/// "in the controller 'nod'". For a loop that hangs or stands still.
+/// @param at_work  as CycleWatchdog says
+[[nodiscard]] std::string where_the_loop_is(const runtime::ControllerHost& controllers,
+                                            bool at_work);
+
 /// Watches the loop from its first cycle on. When that does not come back from a cycle within
 /// [faults] watchdog_s, and in real time when it does not begin one either, then
 /// 1. the emergency stop and the end of the run are latched: a loop that comes back carries them

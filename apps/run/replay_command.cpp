@@ -14,6 +14,7 @@
 #include "apps/robot/kernel_build.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/replay_figures.hpp"
+#include "apps/run/replay_guard.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "base/counted.hpp"
@@ -181,9 +182,16 @@ Exit replay_command(const ReplayCommandOptions& options) {
   runtime::ReplayOptions how{.plugins = {options.plugins.begin(), options.plugins.end()},
                              .output = draft ? draft->path() : "",
                              .kernels = {missing_kernels(options.no_build), builder(options.quiet)},
-                             .goes_on = [] { return !rt::stop_requested(); }};
+                             .goes_on = [] { return !rt::stop_requested(); },
+                             .guard =
+                                 [&](runtime::RobotCycle& cycle, const auto& composition) {
+                                   return std::make_shared<ReplayGuard>(cycle, composition,
+                                                                        draft ? draft->path() : "",
+                                                                        options.json);
+                                 }};
   if (options.to_s) how.to_ns = static_cast<std::int64_t>(*options.to_s * 1e9);
-  auto result = runtime::replay(options.log, how);
+  std::expected<runtime::ReplayResult, Diagnostics> result;
+  std::thread([&] { result = runtime::replay(options.log, how); }).join();  // a crash ends it alone
   if (!result) {
     print_errors(result.error());
     write_failure(options.json);

@@ -100,11 +100,15 @@ void StartRoom::add_commands() {
     return answer;
   });
   commands_.add("fault.reset", [this](const Json&) -> Result<Json> {
+    bool cleared = false;
     {
       const std::scoped_lock lock(mutex_);
-      if (std::exchange(stop_, std::nullopt)) tell("");
+      cleared = std::exchange(stop_, std::nullopt).has_value();
+      if (cleared) tell("");
     }
-    return status();
+    Json answer = status();
+    answer["cleared"] = cleared;
+    return answer;
   });
   // Confirmed at once: no drive is enabled, and from here on none will be. A run that goes on looks
   // for it before it enables one.

@@ -94,10 +94,11 @@ std::string shorter(const hal::RobotConfig& robot, std::int64_t period_ns, std::
   std::int64_t common_ns = period_ns;
   for (const hal::BoardConfig& board : robot.boards)
     common_ns = std::gcd(common_ns, board.control_period_ns);
-  if (most_ns < kShortestStep_ns || common_ns < kShortestStep_ns) return most;
+  if (most_ns < kShortestStep_ns) return most;
+  const std::int64_t most_parts = common_ns / kShortestStep_ns;
   std::int64_t parts = (common_ns + most_ns - 1) / most_ns;
-  while (common_ns % parts != 0) ++parts;
-  if (common_ns / parts < kShortestStep_ns) return most;
+  while (parts < most_parts && common_ns % parts != 0) ++parts;
+  if (parts > most_parts || common_ns % parts != 0) return most;
   return most + ": " + std::to_string(common_ns / parts) +
          " ns divides the period and every control period";
 }

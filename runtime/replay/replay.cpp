@@ -185,7 +185,8 @@ class Player {
     note_missing(comparison_.missing(), "command", "it is not compared", result);
   }
 
-  Status play(const RecordedRun& run) {
+  Status play(const RecordedRun& run, const Composition& c) {
+    const auto guard = options_.guard ? options_.guard(cycle_, c) : nullptr;
     const std::int64_t begin_ns = clock_ns(CLOCK_MONOTONIC);
     const Status read = run.visit([this](const RecordedCycle& cycle) { return take(cycle); });
     result_.seconds = 1e-9 * static_cast<double>(clock_ns(CLOCK_MONOTONIC) - begin_ns);
@@ -301,7 +302,7 @@ std::expected<ReplayResult, Diagnostics> replay(const std::string& log,
   }
   {
     Player player(*run, c, overrides, options, recorder.get(), result);
-    const Status read = player.play(*run);
+    const Status read = player.play(*run, c);
     if (recorder != nullptr) {
       const log::RecordingResult closed = recorder->close({{"replay_of", log}});
       result.log = closed.path;

@@ -7,6 +7,7 @@
 #include <expected>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "base/result.hpp"
 #include "runtime/replay/command_comparison.hpp"
 #include "runtime/replay/recorded_run.hpp"
+#include "runtime/robot_cycle.hpp"
 #include "runtime/run/composition.hpp"
 
 namespace tandem::runtime {
@@ -25,6 +27,9 @@ struct ReplayOptions {
   std::optional<std::int64_t> to_ns{};  ///< the last cycle is not later
   KernelSupply kernels{};
   std::function<bool()> goes_on{};  ///< asked before each cycle; empty: it does
+  /// Called before the first cycle, on the thread of replay(). What it returns lives as long as
+  /// there are cycles.
+  std::function<std::shared_ptr<void>(RobotCycle&, const Composition&)> guard{};
 };
 
 struct ReplayResult {

@@ -453,6 +453,19 @@ TEST_F(Check, RefusesAStartInsideTheGroundAndSaysWhichHeightTouches) {
   EXPECT_EQ(tandem("check hold.toml").status, 0);
 }
 
+// The cure was on another page alone.
+TEST_F(Check, NamesTheMotorsEncoderForALoopThatRingsOnASpring) {
+  write_text(folder_ / "robot.toml",
+             read_text(TANDEM_SOURCE_DIR "/config/double_pendulum/robot.toml"));
+  edit("robot.toml", "kp = 6.0", "kp = 600.0");
+  const std::string says = "position_feedback = \"motor\"";
+  EXPECT_EQ(tandem("check robot.toml").err.find(says), std::string::npos) << "a rigid drive";
+  edit("robot.toml", "order = 0", "order = 2\nspring_Nm_rad = 200.0\nspring_damping_Nms_rad = 0.2");
+  const Outcome soft = tandem("check robot.toml");
+  EXPECT_NE(soft.err.find("will probably oscillate"), std::string::npos) << soft.err;
+  EXPECT_NE(soft.err.find(says), std::string::npos) << soft.err;
+}
+
 /// Each command had a list of its own: a robot by itself was not told of its back-EMF, and
 /// `emulate` was silent.
 TEST_F(Check, SaysTheSameOfARobotWhoeverAsks) {

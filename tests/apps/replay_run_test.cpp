@@ -73,5 +73,40 @@ TEST_F(ReplayProgram, RepeatsItAtEachBuildAndGoesOnAfterAnError) {
   EXPECT_EQ(std::system(end.c_str()), 0);
 }
 
+// It died by the signal, without a word, and left its draft behind; one that hangs had to be
+// killed.
+TEST_F(ReplayProgram, NamesAControllerThatCrashesOrHangsAndLeavesNothing) {
+  const auto run = [this](const std::string& how) {
+    write_text(
+        folder_ / "hangs.toml",
+        "robot = \"robot.toml\"\nposture = \"ready\"\nduration_s = 0.3\n"
+        "[faults]\nwatchdog_s = 1.0\n[[controller]]\nplugin = \"" TANDEM_BINARY_DIR
+        "/tests/test_plugins/hangs.so\"\n[controller.parameters]\nafter_cycles = 1_000_000\n" +
+            how);
+    fs::remove_all(folder_ / "crashed");
+    EXPECT_EQ(tandem("run hangs.toml --no-socket -q --log crashed").status, 0);
+  };
+  for (const auto& [how, what] :
+       {std::pair("crash = \"null\"",
+                  "the replay crashed in the controller 'hangs': "
+                  "segmentation fault (SIGSEGV) in "),
+        {"throws = true", "the replay crashed in the controller 'hangs': an exception"},
+        {"crash = \"exit\"", "the replay crashed in the controller 'hangs': exit()"},
+        {"", "the replay hangs: no cycle for 1 s, it is in the controller 'hangs'"}}) {
+    run(how);
+    const Outcome outcome = tandem(
+        "replay crashed/double_pendulum-hangs-001.mcap -o crashed/again.mcap --json replay.json",
+        "HANGS_AFTER_CYCLES=100");
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << outcome.err;
+    EXPECT_NE(json("replay.json")["errors"].dump().find(what), std::string::npos)
+        << json("replay.json").dump();
+    int files = 0;
+    for (const auto& entry : fs::directory_iterator(folder_ / "crashed"))
+      files += entry.path().extension() == ".mcap" ? 1 : 0;
+    EXPECT_EQ(files, 1) << "the run's log";
+  }
+}
+
 }  // namespace
 }  // namespace tandem::apps

@@ -22,6 +22,8 @@ class Hangs final : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     after_ = setup.parameters.integer_or("after_cycles", 100, 0, 1'000'000'000);
+    // A replay has the run's parameters.
+    if (const char* sooner = std::getenv("HANGS_AFTER_CYCLES")) after_ = std::atoll(sooner);
     for_s_ = setup.parameters.number_or("for_s", 0.0, {0.0, 600.0});  // 0: for ever
     throws_ = setup.parameters.boolean_or("throws", false);
     crash_ = setup.parameters.choice_or(
