@@ -78,8 +78,8 @@ class ServiceServer {
 
   /// The participant outlives it.
   [[nodiscard]] static Result<std::unique_ptr<ServiceServer>> open(Participant& participant);
-  /// Ends the threads, after the request that is at work, what is done at once and has come, and
-  /// the replies that wait for their reader.
+  /// Ends the threads. First they finish the request that they have begun, answer the requests
+  /// that are carried out at once, and send the replies that wait for their reader.
   ~ServiceServer();
   ServiceServer(const ServiceServer&) = delete;
   ServiceServer& operator=(const ServiceServer&) = delete;

@@ -18,7 +18,7 @@ namespace {
 using hal::can::SocketCanBus;
 using std::chrono::nanoseconds;
 
-constexpr double kOnRobot_s = 0.5, kSimulated_s = 5.0;
+constexpr double kOnRobot_s = 0.5;
 constexpr int kSendTries = 5;
 constexpr std::chrono::milliseconds kSendPause{10};
 

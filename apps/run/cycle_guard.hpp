@@ -31,6 +31,8 @@ namespace tandem::apps {
 /// the log is closed there is kPlaceTime more for what is still to be said.
 class CycleGuard {
  public:
+  /// How long a cycle of simulated time may take where [faults] watchdog_s does not say it.
+  static constexpr double kSimulated_s = 5.0;
   static constexpr std::chrono::seconds kGrace{2};
   static constexpr std::chrono::seconds kLastWords{3};
 

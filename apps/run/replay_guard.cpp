@@ -13,11 +13,6 @@
 #include "apps/text/console.hpp"
 
 namespace tandem::apps {
-namespace {
-
-constexpr double kLongestCycle_s = 5.0;
-
-}  // namespace
 
 ReplayGuard::ReplayGuard(runtime::RobotCycle& cycle, const runtime::Composition& composition,
                          std::string draft, std::string json)
@@ -25,7 +20,7 @@ ReplayGuard::ReplayGuard(runtime::RobotCycle& cycle, const runtime::Composition&
       controllers_(composition.controllers.get()),
       draft_(std::move(draft)),
       json_(std::move(json)),
-      limit_s_(composition.experiment.watchdog_s.value_or(kLongestCycle_s)),
+      limit_s_(composition.experiment.watchdog_s.value_or(CycleGuard::kSimulated_s)),
       watchdog_(cycle.heartbeat(),
                 {.limit = std::chrono::nanoseconds(static_cast<std::int64_t>(limit_s_ * 1e9)),
                  .waits_for_debugger = true},

@@ -268,7 +268,7 @@ TEST_F(Socket, AnswersAStopThatItsEndMeets) {
   }
 }
 
-// The studio of a run closed while the thread of stops was still at work.
+// A run's studio closed before the thread of stops had answered.
 TEST_F(Socket, TurnsHaveAnsweredEveryStopWhenTheyEnd) {
   std::atomic<bool> at_work{false}, released{false};
   registry.add({"stop", ControlEffect::kStops, "stops", {}}, [&](const Json&) -> Result<Json> {
